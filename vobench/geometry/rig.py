@@ -1,0 +1,90 @@
+"""A stereo pair on a robot: lens presets, mounts, and what the wheels measure with."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vobench.geometry import se3
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.se3 import Array
+
+# Focal length, sensor and resolution as the paper gives them (section II-B).
+PAPER_FOCAL_MM, PAPER_SENSOR_MM, PAPER_SIZE_PX = 32.0, (35.0, 28.18), (720, 480)
+
+
+@dataclass(frozen=True, slots=True)
+class WheelGeometry:
+    """Nominal geometry of the two driven wheels, as an odometer believes it."""
+
+    radius_m: float
+    track_m: float
+    ticks_per_revolution: int
+
+
+# Radius and track: CoppeliaSim's Pioneer 3-DX; 500 lines x 4 edges x gear 38.3, from the data sheet.
+PIONEER_WHEELS = WheelGeometry(radius_m=0.0975, track_m=0.331, ticks_per_revolution=76_600)
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """A stereo pair, where it sits on the body, and the wheels: all the calibration there is.
+
+    The left camera is the reference; both look along their own z axis.
+    """
+
+    left: Pinhole
+    right: Pinhole
+    T_body_left: Array
+    T_body_right: Array
+    wheels: WheelGeometry
+
+    @property
+    def T_left_right(self) -> Array:
+        """Pose of the right camera seen from the left one."""
+        return se3.inverse(self.T_body_left) @ self.T_body_right
+
+    @property
+    def baseline_m(self) -> float:
+        """Distance between the two optical centres."""
+        return float(np.linalg.norm(self.T_left_right[:3, 3]))
+
+
+def paper_lens(*, square_pixels: bool) -> Pinhole:
+    """The paper's 32 mm lens on 35 x 28.18 mm and 720 x 480 pixels, in either reading.
+
+    Taken literally both sensor sides count and pixels are not square (fx 658.3, fy 545.1);
+    Blender fits the width alone, which gives fx = fy = 658.3.
+    """
+    width, height = PAPER_SIZE_PX
+    fx = PAPER_FOCAL_MM / PAPER_SENSOR_MM[0] * width
+    fy = fx if square_pixels else PAPER_FOCAL_MM / PAPER_SENSOR_MM[1] * height
+    return Pinhole(width, height, fx, fy, (width - 1) / 2, (height - 1) / 2)
+
+
+LENSES = {
+    "paper_literal": paper_lens(square_pixels=False),
+    "paper_blender": paper_lens(square_pixels=True),
+}
+
+
+def looking(*, pitch_deg: float, position_m: tuple[float, float, float]) -> Array:
+    """T_body_camera of a camera that looks ahead and `pitch_deg` below the horizon (90: at the floor)."""
+    pitch = np.deg2rad(pitch_deg)
+    forward = np.array([np.cos(pitch), 0.0, -np.sin(pitch)])
+    right = np.array([0.0, -1.0, 0.0])
+    return se3.transform(np.stack([right, np.cross(forward, right), forward], -1), position_m)
+
+
+def stereo_rig(
+    lens: Pinhole,
+    *,
+    pitch_deg: float,
+    baseline_m: float = 0.12,
+    forward_m: float = 0.25,
+    height_m: float = 0.4,
+    wheels: WheelGeometry = PIONEER_WHEELS,
+) -> Rig:
+    """Two equal cameras side by side across the robot, `forward_m` ahead of its axle."""
+    T_body_left = looking(pitch_deg=pitch_deg, position_m=(forward_m, baseline_m / 2, height_m))
+    T_body_right = looking(pitch_deg=pitch_deg, position_m=(forward_m, -baseline_m / 2, height_m))
+    return Rig(lens, lens, T_body_left, T_body_right, wheels)

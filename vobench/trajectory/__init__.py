@@ -1,0 +1,1 @@
+"""Stamped poses: the arrays, their text form, association and alignment. Pure."""
