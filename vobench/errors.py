@@ -4,8 +4,8 @@ VobenchError               the user's mistake or machine: one line, exit code 1
 ├── InputError             a file does not say what it should
 │   ├── SuiteError         a suite, scene or manifest: names file, line, key and value
 │   └── TrajectoryError    a trajectory file or array
-├── UnknownName            no scene, suite or estimator of that name
-├── MissingDependency      this machine lacks something; the message says how to get it
+├── UnknownNameError       no scene, suite or estimator of that name
+├── MissingDependencyError this machine lacks something; the message says how to get it
 ├── AlignmentError         two trajectories cannot be compared as asked
 ├── MotionError            the robot cannot drive as asked
 ├── RenderError            the renderer cannot make this picture
@@ -29,11 +29,11 @@ class TrajectoryError(InputError):
     """A trajectory file or array is wrong."""
 
 
-class UnknownName(VobenchError):
+class UnknownNameError(VobenchError):
     """No scene, suite or estimator of that name."""
 
 
-class MissingDependency(VobenchError):
+class MissingDependencyError(VobenchError):
     """This machine lacks something; the message says how to get it."""
 
 
