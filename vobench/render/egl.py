@@ -1,0 +1,38 @@
+"""The way to a picture without a display: OpenGL through EGL, or one sentence that says what is missing."""
+
+import ctypes.util
+import os
+from typing import Any
+
+from vobench.errors import MissingDependencyError
+
+EGL_PACKAGES = ("libegl1", "libgl1", "libopengl0", "libgl1-mesa-dri")
+EGL_REMEDY = f"apt-get install -y {' '.join(EGL_PACKAGES)}"
+
+
+def missing_libraries() -> list[str]:
+    """Names of the system libraries that drawing needs and this machine lacks."""
+    return [name for name in ("EGL", "GL", "OpenGL") if ctypes.util.find_library(name) is None]
+
+
+def context() -> Any:
+    """A current OpenGL context of pyrender's EGL platform.
+
+    Raises MissingDependencyError where the machine has no EGL or no driver for it.
+    """
+    os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
+    try:
+        from pyrender.platforms.egl import EGLPlatform
+
+        # The size matters to windows only; we draw into framebuffers of our own.
+        platform = EGLPlatform(1, 1)
+        platform.init_context()
+        platform.make_current()
+    except Exception as error:  # PyOpenGL fails with whatever it trips over first
+        raise MissingDependencyError(f"cannot draw without a display ({_cause(error)}); run: {EGL_REMEDY}") from error
+    return platform
+
+
+def _cause(error: Exception) -> str:
+    missing = missing_libraries()
+    return f"missing lib{', lib'.join(missing)}" if missing else f"EGL says {type(error).__name__}: {error}"
