@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import RAY_OFFSET_M, RayCaster, all_surfaces
+from vobench.render.geometry import RAY_OFFSET_M, Hits, RayCaster, all_surfaces
 from vobench.render.lightmap import Layout, layout
 from vobench.scene.scene import AreaLight, Scene, Surface
 from vobench.scene.texture import Map, reflectance
@@ -44,6 +44,21 @@ class BakedScene:
     albedo: dict[str, Map]
 
 
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Where light is computed: points and normals (P, 3), and their flat indices (P,) in the map."""
+
+    points_m: Array
+    normals: Array
+    indices: NDArray[np.int64]
+
+    def on_map(self, values: Array, where: Layout) -> Array:
+        """Values (P,) laid out as the map (H, W); 0 where no surface is."""
+        flat = np.zeros(where.height * where.width)
+        flat[self.indices] = values
+        return flat.reshape(where.height, where.width)
+
+
 def bake(scene: Scene, settings: BakeSettings) -> BakedScene:
     """Make the textures and compute the light of a scene; the same bytes for the same arguments."""
     albedo = {name: reflectance(texture) for name, texture in sorted(scene.textures.items())}
@@ -51,109 +66,91 @@ def bake(scene: Scene, settings: BakeSettings) -> BakedScene:
     fine = layout(surfaces, spacing_m=settings.spacing_m)
     coarse = layout(surfaces, spacing_m=settings.indirect_spacing_m)
     light = _direct(scene, caster, fine, settings)
-    first = _direct(scene, caster, coarse, settings)
-    bounced = _indirect(scene, caster, coarse, first, {k: float(a.mean()) for k, a in albedo.items()}, settings)
+    # Lamps' panels come last in the list of surfaces, and reflect nothing.
+    reflect = np.array([albedo[s.material].mean() for s in scene.surfaces] + [0.0] * len(scene.lights))
+    bounced = _indirect(scene, caster, coarse, reflect, settings)
     for index in range(len(surfaces)):
         light[fine.patches[index].window] += _resampled(bounced, coarse, fine, index)
     for lamp, patch in zip(scene.lights, fine.patches[len(scene.surfaces) :], strict=True):
-        # A lamp's panel has albedo 1, so that this illuminance shows as its luminance.
+        # A lamp's panel is drawn with albedo 1, so that this illuminance shows as its luminance.
         light[patch.window] = np.pi * lamp.luminance_cd_m2
     return BakedScene(scene, fine, light.astype(np.float32), albedo)
 
 
-def _points(surfaces: list[Surface], where: Layout) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Sample points (P, 3), normals (P, 3) and their flat index (P,) in the map, surface by surface."""
+def _samples(surfaces: list[Surface], where: Layout) -> Samples:
     points, normals, indices = [], [], []
     for surface, patch in zip(surfaces, where.patches, strict=True):
-        u, v = patch.fractions()
         # Samples on an edge touch the neighbour; a hair inwards they see past it.
-        hair = 1e-3
-        points.append(surface.at(*(np.clip(f, hair, 1 - hair) for f in (u, v))).reshape(-1, 3))
+        u, v = (np.clip(fraction, 1e-3, 1 - 1e-3) for fraction in patch.fractions())
+        points.append((surface.at(u, v) + RAY_OFFSET_M * surface.normal).reshape(-1, 3))
         normals.append(np.broadcast_to(surface.normal, points[-1].shape))
         indices.append(np.arange(where.height * where.width).reshape(where.height, -1)[patch.window].ravel())
-    return np.concatenate(points), np.concatenate(normals), np.concatenate(indices)
+    return Samples(np.concatenate(points), np.concatenate(normals), np.concatenate(indices))
 
 
 def _direct(scene: Scene, caster: RayCaster, where: Layout, settings: BakeSettings) -> Array:
     """Illuminance (H, W) in lux straight from the lamps."""
-    points, normals, indices = _points(all_surfaces(scene), where)
+    samples = _samples(all_surfaces(scene), where)
     rng = np.random.default_rng([settings.seed, 1])
-    total = np.zeros(len(points))
-    for lamp in scene.lights:
-        total += _from_lamp(lamp, caster, points + RAY_OFFSET_M * normals, normals, settings.light_rays, rng)
-    light = np.zeros(where.height * where.width)
-    light[indices] = total
-    return light.reshape(where.height, where.width)
+    lamps = (_from_lamp(lamp, caster, samples, settings.light_rays, rng) for lamp in scene.lights)
+    return samples.on_map(sum(lamps, start=np.zeros(len(samples.points_m))), where)
 
 
-def _from_lamp(
-    lamp: AreaLight, caster: RayCaster, points: Array, normals: Array, rays: int, rng: np.random.Generator
-) -> Array:
+def _from_lamp(lamp: AreaLight, caster: RayCaster, samples: Samples, rays: int, rng: np.random.Generator) -> Array:
     """Illuminance (P,) by stratified samples of the lamp's area, jittered for every point."""
-    side = round(np.sqrt(rays))
-    area = float(np.prod(lamp.surface.size_m))
-    total = np.zeros(len(points))
+    side, panel = round(np.sqrt(rays)), lamp.surface
+    total = np.zeros(len(samples.points_m))
     for cell in range(side * side):
-        jitter = rng.random((2, len(points)))
-        target = lamp.surface.at((cell % side + jitter[0]) / side, (cell // side + jitter[1]) / side)
-        way = target - points
+        jitter = rng.random((2, len(total)))
+        target = panel.at((cell % side + jitter[0]) / side, (cell // side + jitter[1]) / side)
+        way = target - samples.points_m
         squared = np.einsum("ij,ij->i", way, way)
-        cosines = np.einsum("ij,ij->i", way, normals) * -(way @ lamp.surface.normal) / squared
-        seen = np.flatnonzero((cosines > 0) & (way @ lamp.surface.normal < 0))
-        lit = seen[~caster.occluded(points[seen], target[seen] + RAY_OFFSET_M * lamp.surface.normal)]
-        total[lit] += cosines[lit] / squared[lit]
-    illuminance: Array = total * lamp.luminance_cd_m2 * area / (side * side)
+        arriving, leaving = np.einsum("ij,ij->i", way, samples.normals), -(way @ panel.normal)
+        faced = np.flatnonzero((arriving > 0) & (leaving > 0))
+        blocked = caster.occluded(samples.points_m[faced], target[faced] + RAY_OFFSET_M * panel.normal)
+        lit = faced[~blocked]
+        total[lit] += arriving[lit] * leaving[lit] / squared[lit] ** 2
+    illuminance: Array = total * lamp.luminance_cd_m2 * np.prod(panel.size_m) / (side * side)
     return illuminance
 
 
-def _indirect(
-    scene: Scene, caster: RayCaster, where: Layout, direct: Array, albedo: dict[str, float], settings: BakeSettings
-) -> Array:
+def _indirect(scene: Scene, caster: RayCaster, where: Layout, reflect: Array, settings: BakeSettings) -> Array:
     """Illuminance (H, W) in lux that arrives after one bounce or more."""
-    points, normals, indices = _points(all_surfaces(scene), where)
-    points = points + RAY_OFFSET_M * normals
-    # Lamps' panels reflect nothing: they are last in the list and have no albedo.
-    reflect = np.array([albedo[s.material] for s in scene.surfaces] + [0.0] * len(scene.lights) + [0.0])
-    rng = np.random.default_rng([settings.seed, 2])
-    seen, factor = _gather_table(caster, where, points, normals, reflect, settings.indirect_rays, rng)
-    gathered = np.zeros(direct.size)
+    samples = _samples(all_surfaces(scene), where)
+    direct = _direct(scene, caster, where, settings)
+    seen, factor = _gather_table(caster, samples, where, reflect, settings)
+    gathered = np.zeros(direct.shape)
     for _ in range(settings.bounces):
         # Cosine-weighted rays: illuminance is the mean of albedo × illuminance where they end.
-        gathered[indices] = ((direct.ravel() + gathered)[seen] * factor).mean(0)
-    return gathered.reshape(direct.shape)
+        gathered = samples.on_map(((direct + gathered).ravel()[seen] * factor).mean(0), where)
+    return gathered
 
 
 def _gather_table(
-    caster: RayCaster,
-    where: Layout,
-    points: Array,
-    normals: Array,
-    reflect: Array,
-    rays: int,
-    rng: np.random.Generator,
+    caster: RayCaster, samples: Samples, where: Layout, reflect: Array, settings: BakeSettings
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """For every ray and point (rays, P): the map sample it ends on, and that surface's albedo."""
-    side = round(np.sqrt(rays))
-    rotation = rng.random((2, len(points)))
-    u_axis, v_axis = _tangents(normals)
-    seen = np.zeros((side * side, len(points)), np.int32)
-    factor = np.zeros((side * side, len(points)), np.float32)
+    side = round(np.sqrt(settings.indirect_rays))
+    rotation = np.random.default_rng([settings.seed, 2]).random((2, len(samples.points_m)))
+    u_axis, v_axis = _tangents(samples.normals)
+    seen = np.zeros((side * side, len(samples.points_m)), np.int32)
+    factor = np.zeros(seen.shape, np.float32)
     for cell in range(side * side):
         a, b = (cell % side + rotation[0]) / side, (cell // side + rotation[1]) / side
         radius, angle = np.sqrt(a), 2 * np.pi * b
         disc = (radius * np.cos(angle))[:, None] * u_axis + (radius * np.sin(angle))[:, None] * v_axis
-        hits = caster.hits(points, disc + np.sqrt(1 - a)[:, None] * normals)
-        seen[cell] = _sample_at(where, hits.surface, hits.u, hits.v)
-        factor[cell] = reflect[hits.surface]
+        hits = caster.hits(samples.points_m, disc + np.sqrt(1 - a)[:, None] * samples.normals)
+        seen[cell] = _sample_at(where, hits)
+        factor[cell] = np.where(hits.surface < 0, 0, reflect[hits.surface])
     return seen, factor
 
 
-def _sample_at(where: Layout, surface: NDArray[np.int32], u: Array, v: Array) -> NDArray[np.int32]:
-    """Flat index in the map of the sample nearest to (u, v) on a surface; surface -1 gives 0."""
+def _sample_at(where: Layout, hits: Hits) -> NDArray[np.int32]:
+    """Flat index (R,) in the map of the sample nearest to where each ray ended; 0 where it did not."""
     row, column, rows, columns = np.array([(p.row, p.column, p.rows, p.columns) for p in where.patches]).T
-    r = row[surface] + np.rint(v * (rows[surface] - 1)).astype(np.int32)
-    c = column[surface] + np.rint(u * (columns[surface] - 1)).astype(np.int32)
-    return np.where(surface < 0, 0, r * where.width + c).astype(np.int32)
+    r = row[hits.surface] + np.rint(hits.v * (rows[hits.surface] - 1)).astype(np.int32)
+    c = column[hits.surface] + np.rint(hits.u * (columns[hits.surface] - 1)).astype(np.int32)
+    return np.where(hits.surface < 0, 0, r * where.width + c).astype(np.int32)
 
 
 def _tangents(normals: Array) -> tuple[Array, Array]:

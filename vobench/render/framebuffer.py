@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 if not hasattr(np, "infty"):
-    np.infty = np.inf  # type: ignore[attr-defined]  # pyrender 0.1.45 still says infty, numpy 2 does not
+    setattr(np, "infty", np.inf)  # noqa: B010 - pyrender 0.1.45 still says infty, numpy 2 has none
 
 from OpenGL import GL
 from pyrender import RenderFlags
@@ -75,6 +75,7 @@ class LinearRenderer(Renderer):  # type: ignore[misc]
         super().__init__(1, 1)
         self._program_cache = ShaderProgramCache(shader_dir=shader_dir)
         self._supersampling = supersampling
+        self._main_fb_dims: tuple[int | None, int | None] = (None, None)
 
     def picture(self, scene: Any, *, width: int, height: int) -> Radiance:
         """Draw the scene; (height, width) float32, top row first."""
@@ -94,7 +95,7 @@ class LinearRenderer(Renderer):  # type: ignore[misc]
 
     def _read_main_framebuffer(self, scene: Any, flags: int) -> Radiance:
         del scene, flags
-        width, height = self._main_fb_dims
+        width, height = self.viewport_width, self.viewport_height
         small = (width // self._supersampling, height // self._supersampling)
         GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._main_fb_ms)
         GL.glBindFramebuffer(GL.GL_DRAW_FRAMEBUFFER, self._main_fb)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from embreex import mesh_construction, rtcore_scene
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
@@ -46,13 +46,13 @@ class RayCaster:
         self._scene = rtcore_scene.EmbreeScene()
         self._mesh = mesh_construction.TriangleMesh(self._scene, np.ascontiguousarray(triangles))
 
-    def occluded(self, origins_m: Floats, targets_m: Floats) -> NDArray[np.bool_]:
+    def occluded(self, origins_m: ArrayLike, targets_m: ArrayLike) -> NDArray[np.bool_]:
         """Whether anything stands between each of (R, 3) origins and its target (R, 3)."""
-        way = targets_m - origins_m
+        way = np.asarray(targets_m) - np.asarray(origins_m)
         blocked: NDArray[np.int32] = self._scene.run(*_rays(origins_m, way, reach=1 - 1e-3), query="OCCLUDED")
         return blocked >= 0
 
-    def hits(self, origins_m: Floats, directions: Floats) -> Hits:
+    def hits(self, origins_m: ArrayLike, directions: ArrayLike) -> Hits:
         """The nearest surface along each ray (R, 3)."""
         hit = self._nearest(origins_m, directions)
         second = hit["primID"] % 2 == 1
@@ -62,7 +62,7 @@ class RayCaster:
         surface = np.where(hit["primID"] < 0, -1, hit["primID"] // 2).astype(np.int32)
         return Hits(surface, u.astype(np.float32), v.astype(np.float32))
 
-    def distance(self, origins_m: Floats, directions: Floats) -> Floats:
+    def distance(self, origins_m: ArrayLike, directions: ArrayLike) -> Floats:
         """How many lengths of its direction each ray (R, 3) travels; NaN where it meets nothing."""
         hit = self._nearest(origins_m, directions)
         return np.where(hit["primID"] < 0, np.nan, hit["tfar"]).astype(np.float32)
@@ -73,13 +73,13 @@ class RayCaster:
         origins = np.broadcast_to(T_world_camera[:3, 3], rays.shape)
         return self.distance(origins, rays).reshape(camera.height_px, camera.width_px)
 
-    def _nearest(self, origins_m: Floats, directions: Floats) -> dict[str, NDArray[np.float32]]:
+    def _nearest(self, origins_m: ArrayLike, directions: ArrayLike) -> dict[str, NDArray[np.float32]]:
         rays = _rays(origins_m, directions, reach=1e8)
         hit: dict[str, NDArray[np.float32]] = self._scene.run(*rays, query="INTERSECT", output=1)
         return hit
 
 
-def _rays(origins_m: Floats, directions: Floats, *, reach: float) -> tuple[Floats, Floats, Floats]:
+def _rays(origins_m: ArrayLike, directions: ArrayLike, *, reach: float) -> tuple[Floats, Floats, Floats]:
     """Contiguous float32 arrays, as Embree wants them; `reach` in lengths of the direction."""
     origins = np.ascontiguousarray(origins_m, np.float32)
     return origins, np.ascontiguousarray(directions, np.float32), np.full(len(origins), reach, np.float32)

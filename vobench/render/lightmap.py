@@ -28,7 +28,7 @@ class Patch:
         return slice(self.row, self.row + self.rows), slice(self.column, self.column + self.columns)
 
     def fractions(self) -> tuple[Array, Array]:
-        """u and v (rows, columns) of the samples, as fractions of the surface's edges."""
+        """Fractions u and v (rows, columns) of the surface's edges at the samples."""
         u, v = np.meshgrid(np.linspace(0, 1, self.columns), np.linspace(0, 1, self.rows))
         return u, v
 

@@ -1,1 +1,1 @@
-"""."""
+"""How the robot moves: the identified model, its controller, wheel slip, and a drive through waypoints. Pure."""

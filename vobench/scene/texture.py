@@ -47,7 +47,8 @@ def _noise(texture: Texture, rng: np.random.Generator, *, coarse_m: float, fine_
     band = (f > 0.5 / coarse_m) & (f < 0.5 / fine_m)
     spectrum *= np.where(band, np.maximum(f, 1e-6) ** -slope, 0).astype(np.float32)
     noise = fft.irfft2(spectrum, s=(n, n), workers=-1)
-    return (noise / noise.std()).astype(np.float32)
+    unit: Map = noise / noise.std()
+    return unit
 
 
 def plain(texture: Texture, rng: np.random.Generator) -> Map:
@@ -62,14 +63,16 @@ def terrazzo(texture: Texture, rng: np.random.Generator) -> Map:
     small = _noise(texture, rng, coarse_m=0.015, fine_m=0.004, slope=0.5)
     grain = _noise(texture, rng, coarse_m=0.5, fine_m=0.002, slope=1.2)
     step = 0.08
-    return 0.9 * np.tanh((chips - 0.6) / step) - 0.6 * np.tanh((small - 0.8) / step) + 0.5 * grain
+    pattern: Map = 0.9 * np.tanh((chips - 0.6) / step) - 0.6 * np.tanh((small - 0.8) / step) + 0.5 * grain
+    return pattern
 
 
 def plaster(texture: Texture, rng: np.random.Generator) -> Map:
     """A trowelled wall: soft patches with pits."""
     patches = _noise(texture, rng, coarse_m=0.8, fine_m=0.006, slope=1.1)
     pits = _noise(texture, rng, coarse_m=0.04, fine_m=0.008, slope=0.3)
-    return patches - 0.8 * np.tanh((pits - 1.4) / 0.1)
+    pattern: Map = patches - 0.8 * np.tanh((pits - 1.4) / 0.1)
+    return pattern
 
 
 def wood(texture: Texture, rng: np.random.Generator) -> Map:
@@ -78,7 +81,8 @@ def wood(texture: Texture, rng: np.random.Generator) -> Map:
     fibre = _noise(texture, rng, coarse_m=0.05, fine_m=0.004, slope=0.6)
     n = texture.resolution_px
     rings = np.arange(n, dtype=np.float32)[:, None] / n * 2 * np.pi * round(texture.tile_m / 0.05)
-    return np.sin(rings + 2.5 * bend) + 0.7 * fibre
+    pattern: Map = np.sin(rings + 2.5 * bend) + 0.7 * fibre
+    return pattern
 
 
 def poster(texture: Texture, rng: np.random.Generator) -> Map:

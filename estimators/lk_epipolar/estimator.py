@@ -1,0 +1,175 @@
+"""Stereo visual odometry with Lucas-Kanade tracks and epipolar geometry."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import cv2
+import numpy as np
+
+from vobench.errors import VobenchError
+from vobench.estimator import Frame, Result, Status, Tracks
+from vobench.estimator.protocol import Image
+from vobench.geometry import se3
+from vobench.geometry.rig import Rig
+from vobench.geometry.se3 import Array
+
+from .motion import Mask, Matches, Motion, TwoViews, best_motion, scaled, two_views
+from .refinement import refined
+from .tracking import Points, comparable, detect, disparity, follow, inside
+
+PARALLEL = 1e-6  # rad and share of the baseline
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The parameters of the manifest."""
+
+    corners_per_cell: int
+    corner_distance_px: float
+    margin_px: int
+    min_tracks: int
+    min_flow_px: float
+    keep_below_px: float
+    ransac_px: float
+    refine_below_h_ratio: float
+    degraded_above_px: float
+    lost_above_px: float
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A stereo pair and the corners (N, 2) of its left picture."""
+
+    left: Image
+    right: Image
+    corners: Points
+
+
+class LkEpipolar:
+    """Direction of motion from the tracks of the left camera, its length from stereo."""
+
+    def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
+        """Take the calibration. Raises VobenchError for a rig that is not rectified."""
+        cv2.setRNGSeed(seed)
+        self._settings = settings_from(params)
+        self._rig = rectified(rig)
+        self._last: View | None = None  # the view that corners are followed from, ...
+        self._rho_last: Array = np.zeros(0)  # ... their inverse depths (N,) in 1/m, NaN for unknown, ...
+        self._T_odom_last: Array = np.eye(4)  # ... and its pose
+        self._T_odom_left: Array = np.eye(4)
+
+    def process(self, frame: Frame) -> Result:
+        """Look, follow the corners of the last view, find the motion between the two, step on."""
+        view = self._look(frame)
+        if view is None:
+            return Result(None, Status.LOST, "few_corners")  # a black picture is not worth remembering
+        if self._last is None:
+            self._remember(view)
+            return Result(self._T_odom_left, Status.INIT)
+
+        # Lucas-Kanade from the last picture to this one.
+        matches = self._follow(self._last, view)
+        if len(matches.x0) < self._settings.min_tracks:
+            return self._lost(view, "few_tracks", matches)
+
+        # No flow, no motion; since the last view is kept, creeping adds up until it shows.
+        if matches.flow_px < self._settings.min_flow_px:
+            self._T_odom_left = self._T_odom_last
+            return Result(self._T_odom_left, Status.STATIONARY, "no_flow", *told(matches))
+
+        return self._move(view, matches)
+
+    def _move(self, view: View, matches: Matches) -> Result:
+        """Take the two views apart; let stereo choose and measure; refine; step on."""
+        # Every motion that the essential matrix or the homography allows; the one stereo agrees with.
+        views = two_views(matches, self._settings.ransac_px)
+        motion = best_motion(views.shapes, matches)
+        if motion is None:
+            return self._lost(view, "no_scale" if views.shapes else "no_model", matches)
+
+        # Off a plane the tracks alone know the direction better than either matrix does.
+        if views.h_ratio < self._settings.refine_below_h_ratio:
+            motion = scaled(refined(motion.shape, matches, views.inlier), matches) or motion
+        if motion.transfer_px > self._settings.lost_above_px:
+            return self._lost(view, "transfer_error", matches)
+        return self._step(view, matches, views, motion)
+
+    def _look(self, frame: Frame) -> View | None:
+        """The corners of the left picture; None where there is too little to see."""
+        if frame.left is None or frame.right is None:
+            return None
+        s = self._settings
+        corners = detect(frame.left, s.corners_per_cell, distance_px=s.corner_distance_px, margin_px=s.margin_px)
+        return View(frame.left, frame.right, corners) if len(corners) >= s.min_tracks else None
+
+    def _follow(self, last: View, view: View) -> Matches:
+        """Tracks from the last view's corners to this picture."""
+        there, found = follow(*comparable(last.left, view.left), last.corners)
+        good = found & inside(there, view.left, self._settings.margin_px)
+        uv0, uv1 = last.corners[good].astype(float), there[good].astype(float)
+        lens = self._rig.left
+        return Matches(lens.rays(uv0), lens.rays(uv1), uv0, uv1, self._rho_last[good], lens.K)
+
+    def _step(self, view: View, matches: Matches, views: TwoViews, motion: Motion) -> Result:
+        """Chain the motion on the pose of the last view."""
+        T_odom_left = self._T_odom_last @ se3.inverse(motion.T_now_last)
+        # Thousands of products drift off SO(3) by rounding.
+        self._T_odom_left = se3.transform(se3.nearest_rotation(T_odom_left[:3, :3]), T_odom_left[:3, 3])
+        if matches.flow_px >= self._settings.keep_below_px:
+            self._remember(view)
+        tracks, stats = told(matches, views.inlier)
+        stats |= {"h_ratio": views.h_ratio, "transfer_px": motion.transfer_px}
+        if motion.transfer_px > self._settings.degraded_above_px:
+            return Result(self._T_odom_left, Status.DEGRADED, "transfer_error", tracks, stats)
+        return Result(self._T_odom_left, Status.OK, "", tracks, stats)
+
+    def _remember(self, view: View) -> None:
+        """Follow the next frame from this view, at the pose of now, with depths from stereo."""
+        self._last, self._T_odom_last = view, self._T_odom_left
+        disparity_px = disparity(view.left, view.right, view.corners, self._settings.margin_px)
+        self._rho_last = disparity_px / (self._rig.left.fx_px * self._rig.baseline_m)
+
+    def _lost(self, view: View, reason: str, matches: Matches) -> Result:
+        """No pose for this frame; the next one carries on from here with the last pose there was."""
+        self._remember(view)
+        return Result(None, Status.LOST, reason, stats={"tracks": len(matches.x0)})
+
+
+def told(matches: Matches, inlier: Mask | None = None) -> tuple[Tracks, dict[str, float]]:
+    """What a person sees of one frame: the tracks, and how many and how long they are."""
+    inlier = np.ones(len(matches.x0), bool) if inlier is None else inlier
+    numbers = {
+        "tracks": len(inlier),
+        "stereo": int(np.isfinite(matches.rho).sum()),
+        "inliers": int(inlier.sum()),
+        "parallax_px": matches.flow_px,
+    }
+    return Tracks(matches.uv0_px, matches.uv1_px, inlier), numbers
+
+
+def settings_from(params: Mapping[str, Any]) -> Settings:
+    """Raises VobenchError for a name that is no parameter, or a value that is no number."""
+    known = [field.name for field in fields(Settings)]
+    if set(params) != set(known):
+        raise VobenchError(f"lk_epipolar takes the parameters {', '.join(known)}, got {', '.join(params)}")
+    for name, value in params.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
+            raise VobenchError(f"lk_epipolar: {name} is {value!r}, expected a number that is not negative")
+    return Settings(**params)
+
+
+def rectified(rig: Rig) -> Rig:
+    """The same rig, if its cameras are equal, parallel and side by side; otherwise VobenchError."""
+    T_left_right = rig.T_left_right
+    turned_rad = float(se3.rotation_angle(T_left_right[:3, :3]))
+    right, *aside = T_left_right[:3, 3]
+    if turned_rad > PARALLEL or right <= 0 or np.abs(aside).max() > PARALLEL * right:
+        position = ", ".join(f"{x:.4g}" for x in T_left_right[:3, 3])
+        raise VobenchError(
+            f"lk_epipolar needs a rectified pair, the right camera at (b, 0, 0) m of the left and parallel to it; "
+            f"it is at ({position}) m and turned by {np.rad2deg(turned_rad):.3g} deg"
+        )
+    if rig.left != rig.right:
+        raise VobenchError(f"lk_epipolar needs two equal lenses, got {rig.left} and {rig.right}")
+    return rig

@@ -1,0 +1,20 @@
+"""The null hypothesis: the camera never moved."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from vobench.estimator import Frame, Result
+from vobench.geometry.rig import Rig
+
+
+class StandStill:
+    """Answers every frame with the pose of the first."""
+
+    def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
+        """Take nothing: there is nothing to prepare."""
+
+    def process(self, frame: Frame) -> Result:  # noqa: ARG002
+        """Still here."""
+        return Result(np.eye(4))

@@ -1,0 +1,72 @@
+"""Segments: the devkit's rule, and what becomes of it where frames are missing."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vobench.geometry import se3
+from vobench.metric.segment import segment_errors, segment_pairs
+
+STEP_M = 0.25  # a power of two, so that path lengths are exact and "strictly beyond" shows
+
+
+def straight(n, step_m=STEP_M):
+    return se3.transform(np.eye(3), np.arange(n)[:, None] * [step_m, 0.0, 0.0])
+
+
+def path(n):
+    return np.arange(n) * STEP_M
+
+
+def test_a_segment_ends_at_the_first_frame_strictly_beyond_its_length():
+    first, last, over_m = segment_pairs(np.arange(10), path(10), 0.5)
+    assert first.tolist() == list(range(7))
+    assert last.tolist() == list(range(3, 10))
+    assert over_m.tolist() == [0.5] * 7
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.1, 5.0), st.integers(1, 4))
+def test_pairs_are_those_of_the_rule_word_for_word(seed, length_m, step):
+    rng = np.random.default_rng(seed)
+    distances_m = np.cumsum(rng.uniform(0, 0.5, 40) * rng.integers(0, 2, 40))
+    frames = np.flatnonzero(rng.random(40) < 0.7)
+    expected = []
+    for i, frame in enumerate(frames):
+        beyond = [f for f in range(40) if distances_m[f] > distances_m[frame] + length_m]
+        later = [j for j, f in enumerate(frames) if beyond and f >= beyond[0]]
+        if frame % step == 0 and later:
+            travelled_m = distances_m[frames[later[0]]] - distances_m[frame]
+            expected.append((i, later[0], length_m if frames[later[0]] == beyond[0] else travelled_m))
+    assert list(zip(*segment_pairs(frames, distances_m, length_m, step_frames=step), strict=True)) == expected
+
+
+def test_across_a_gap_the_path_really_travelled_divides():
+    frames = np.array([0, 1, 9])
+    first, last, over_m = segment_pairs(frames, path(10), 0.5)
+    assert (first.tolist(), last.tolist(), over_m.tolist()) == ([0, 1], [2, 2], [2.25, 2.0])
+
+
+def test_lengths_longer_than_the_path_give_no_segment():
+    T = straight(9)
+    s = segment_errors(T, T, np.arange(9), path(9), lengths_m=(1.0, 2.0, 3.0))
+    assert set(s.length_m) == {1.0}
+    assert len(segment_errors(T, T, np.arange(9), path(9), lengths_m=(2.0,))) == 0
+
+
+def test_two_percent_of_drift_is_two_percent_at_every_length():
+    n = 400
+    T_gt, T_est = straight(n, 1 / 1024), straight(n, 1.02 / 1024)
+    s = segment_errors(T_gt, T_est, np.arange(n), np.arange(n) / 1024, lengths_m=(0.1, 0.3))
+    # A segment is up to one frame longer than its length.
+    assert s.trans_ratio == pytest.approx(0.02, rel=0.01)
+    assert (s.rot_radpm < 1e-12).all()
+
+
+def test_a_turn_of_a_tenth_of_a_radian_a_metre_is_found():
+    n = 400
+    T_gt = straight(n, 1 / 1024)
+    T_est = T_gt.copy()
+    T_est[:, :3, :3] = se3.rotation_z(0.1 * np.arange(n) / 1024)
+    s = segment_errors(T_gt, T_est, np.arange(n), np.arange(n) / 1024, lengths_m=(0.1, 0.3))
+    assert s.rot_radpm == pytest.approx(0.1, rel=0.01)

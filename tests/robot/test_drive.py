@@ -1,0 +1,174 @@
+"""A drive enters every target, keeps the physics, and gives the same truth however it is sampled."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from vobench.errors import MotionError
+from vobench.geometry import se3
+from vobench.robot.controller import CONTROLLERS
+from vobench.robot.drive import Drive, drive
+from vobench.robot.pioneer import THETAS, Theta
+from vobench.robot.slip import SLIPS, STREAMS, SlipSettings
+
+PATHS = {"figure_10": ((1, 1), (0, 1), (1, 0), (2, 2)), "figure_12": ((0, 1), (1, 1), (2, 2))}
+SHORT = ((0.5, 0.3),)
+
+
+@cache
+def driven(path: str, controller: str, slip: str = "none", seed: int = 0) -> Drive:
+    rngs = dict(zip(STREAMS, np.random.default_rng(seed).spawn(3), strict=True))
+    return drive(PATHS[path], controller=CONTROLLERS[controller], slip=SLIPS[slip], rngs=rngs)
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_every_target_is_entered_within_a_centimetre_on_both_axes_in_order(path: str, controller: str) -> None:
+    run = driven(path, controller)
+    assert list(run.reached) == sorted(set(run.reached))
+    for frame, target in zip(run.reached, PATHS[path], strict=True):
+        assert np.abs(run.state[frame, :2] - target).max() < 0.01
+    assert run.reached[-1] == len(run.t_ns) - 1
+
+
+def test_a_target_counts_from_the_first_frame_inside_and_not_before() -> None:
+    run, start = driven("figure_10", "smooth"), 0
+    for frame, target in zip(run.reached, PATHS["figure_10"], strict=True):
+        assert (np.abs(run.state[start:frame, :2] - target).max(1) >= 0.01).all()
+        start = frame
+
+
+def test_a_later_target_that_is_met_on_the_way_does_not_count() -> None:
+    first, second = drive([(0.5, 0.3), (0, 0)]).reached
+    assert 0 < first < second
+
+
+def test_nothing_jumps_at_a_target() -> None:
+    run = driven("figure_10", "smooth")
+    largest = np.abs(np.diff(run.state, axis=0)).max(0)
+    assert (largest < [0.03, 0.03, 0.06, 0.06, 0.3]).all()
+
+
+def test_stamps_are_index_over_rate_and_every_fourth_encoder_instant_is_a_frame() -> None:
+    run = driven("figure_12", "smooth")
+    assert run.t_ns.tolist() == [round(i * 1e9 / 30) for i in range(len(run.t_ns))]
+    np.testing.assert_array_equal(run.encoder_t_ns[::4], run.t_ns)
+    assert len(run.rim_rad) == len(run.encoder_t_ns) == 4 * (len(run.t_ns) - 1) + 1
+
+
+@pytest.mark.parametrize(
+    "slip",
+    [replace(SLIPS["none"], skid_s=0.05), replace(SLIPS["none"], angle_std_rad=0.1, correlation_s=1e9)],
+    ids=["skid", "side slip"],
+)
+def test_the_body_moves_as_its_twist_says(slip: SlipSettings) -> None:
+    fine = drive(SHORT, rate_hz=500.0, slip=slip, rngs={"side": np.random.default_rng(1)})
+    T = fine.T_world_body
+    step = (se3.inverse(T[:-2]) @ T[2:])[:, :2, 3] * 250
+    R_first_middle = se3.rotation_z(np.diff(fine.state[:, 2])[:-1])[:, :2, :2]
+    middle = np.einsum("nij,nj->ni", R_first_middle, fine.twist[1:-1, :2])
+    np.testing.assert_allclose(step, middle, atol=2e-4)
+    np.testing.assert_array_equal(fine.twist[:, 5], fine.state[:, 4])
+    assert np.abs(fine.twist[:, 1]).max() > 1e-3
+
+
+def test_without_slip_the_axle_never_moves_sideways_and_rims_roll_what_it_travels() -> None:
+    run = driven("figure_10", "smooth")
+    assert not run.twist[:, 1].any()
+    np.testing.assert_allclose(np.diff(run.rim_rad, axis=1)[::4, 0] * 0.0975 / 0.331, run.state[:, 2], atol=1e-12)
+
+
+def test_a_mirrored_course_is_driven_in_mirror_image_to_the_last_bit() -> None:
+    ahead = drive([(0.5, 0.3), (0.2, -0.4)], start=(0.1, 0.2, 0.3))
+    mirrored = drive([(0.5, -0.3), (0.2, 0.4)], start=(0.1, -0.2, -0.3))
+    np.testing.assert_array_equal(mirrored.state, ahead.state * [1, -1, -1, 1, -1])
+    np.testing.assert_array_equal(mirrored.rim_rad, ahead.rim_rad[:, ::-1])
+
+
+def test_the_course_may_lie_anywhere_if_the_controller_treats_all_directions_alike() -> None:
+    # tanh acts on each world axis; without its bend (a high axis speed) the law is a rotation-free gain.
+    linear = replace(CONTROLLERS["smooth"], axis_speed_mps=1e9)
+    angle, shift = 0.7, np.array([3.0, -1.0])
+    R = se3.rotation_z(angle)[:2, :2]
+    here = drive(np.array([[0.5, 0.3], [0.2, -0.4]]), controller=linear)
+    there = drive(np.array([[0.5, 0.3], [0.2, -0.4]]) @ R.T + shift, controller=linear, start=(*shift, angle))
+    first = min(here.reached[0], there.reached[0])  # the square of tolerance does not turn with the course
+    np.testing.assert_allclose(there.state[:first, :2], here.state[:first, :2] @ R.T + shift, atol=1e-9)
+    np.testing.assert_allclose(there.state[:first, 3:], here.state[:first, 3:], atol=1e-9)
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_the_number_of_substeps_changes_no_step_count(controller: str) -> None:
+    coarse = drive(PATHS["figure_12"], controller=CONTROLLERS[controller], substeps=1)
+    assert coarse.steps_per_leg == driven("figure_12", controller).steps_per_leg
+
+
+@pytest.mark.parametrize("name", [n for n in THETAS if n != "robulab_10"])
+def test_every_robot_of_the_table_drives_the_short_course(name: str) -> None:
+    assert drive(SHORT, theta=THETAS[name]).reached
+
+
+def test_slip_moves_the_truth_and_the_same_seed_moves_it_the_same() -> None:
+    first, clean = driven("figure_12", "smooth", "slippery", seed=1), driven("figure_12", "smooth")
+    again = driven.__wrapped__("figure_12", "smooth", "slippery", seed=1)
+    np.testing.assert_array_equal(first.state, again.state)
+    np.testing.assert_array_equal(first.rim_rad, again.rim_rad)
+    assert np.abs(first.rim_rad[:1000] - clean.rim_rad[:1000]).max() > 0.01
+
+
+def test_longitudinal_slip_alone_shows_in_the_rims_and_not_in_the_path() -> None:
+    rngs = dict(zip(STREAMS, np.random.default_rng(2).spawn(3), strict=True))
+    slipping = drive(SHORT, slip=replace(SLIPS["slippery"], angle_std_rad=0.0, skid_s=0.0), rngs=rngs)
+    clean = drive(SHORT)
+    np.testing.assert_array_equal(slipping.state, clean.state)
+    assert np.abs(slipping.rim_rad - clean.rim_rad).max() > 0.01
+
+
+def test_a_start_on_the_target_is_reached_at_once_and_settling_adds_its_frames() -> None:
+    assert len(drive([(0, 0)]).t_ns) == 1
+    assert len(drive([(0, 0)], settle_s=0.5).t_ns) == 16
+
+
+def test_a_target_out_of_time_says_which_and_how_far() -> None:
+    with pytest.raises(MotionError, match=r"target 2 at \(9, 0\) m was not entered.*away"):
+        drive([(0.1, 0), (9, 0)], max_time_s=3.0)
+
+
+def test_an_unstable_gain_is_refused_with_the_gain_that_would_do() -> None:
+    with pytest.raises(MotionError, match=r"gain_per_s 10 at 10 Hz with euler.*below 9\.56"):
+        drive(
+            SHORT,
+            theta=THETAS["pioneer_3dx_paper"],
+            controller=CONTROLLERS["paper"],
+            rate_hz=10.0,
+            substeps=1,
+            integrator="euler",
+        )
+
+
+def test_a_motion_that_runs_away_is_stopped() -> None:
+    wild = Theta(0.5, 0.2, 0.0, 1.0, -50.0, 1.0)
+    with pytest.raises(MotionError, match="ran away"):
+        drive([(5, 5)], theta=wild, integrator="euler", substeps=1)
+
+
+@pytest.mark.parametrize(
+    ("targets", "options", "sentence"),
+    [
+        ([(0, float("nan"))], {}, "target 1 is"),
+        ([], {}, "one or more targets"),
+        ([(1, 2, 3)], {}, "two coordinates"),
+        (SHORT, {"start": (0.0, 0.0, float("inf"))}, "start"),
+        (SHORT, {"rate_hz": 0.0}, "rate_hz"),
+        (SHORT, {"substeps": 0}, "substeps"),
+        (SHORT, {"tolerance_m": 0.0}, "tolerance_m"),
+        (SHORT, {"max_time_s": float("nan")}, "max_time_s"),
+        (SHORT, {"settle_s": -1.0}, "settle_s"),
+        (SHORT, {"integrator": "ode3"}, "no integrator named 'ode3'"),
+    ],
+)
+def test_what_cannot_be_driven_is_refused(targets: object, options: dict[str, object], sentence: str) -> None:
+    with pytest.raises(MotionError, match=sentence):
+        drive(targets, **options)

@@ -1,0 +1,73 @@
+"""Laws of the identified model, equations (18)-(19)."""
+
+import numpy as np
+import pytest
+
+from vobench.geometry import se3
+from vobench.robot.pioneer import THETAS, Theta, accelerations, axle_poses, velocities, wheel_speeds
+
+ALL = pytest.mark.parametrize("theta", THETAS.values(), ids=THETAS.keys())
+PIONEER = THETAS["pioneer_3dx"]
+
+
+def random_inputs(seed: int, count: int = 50) -> list[list[float]]:
+    """u, omega, u_ref, omega_ref."""
+    return np.random.default_rng(seed).uniform(-1.5, 1.5, (count, 4)).tolist()
+
+
+@ALL
+def test_mirroring_turn_and_turn_reference_mirrors_the_motion_exactly(theta: Theta) -> None:
+    for u, omega, u_ref, omega_ref in random_inputs(0):
+        u_rate, omega_rate = accelerations(u, omega, u_ref, omega_ref, theta=theta)
+        assert accelerations(u, -omega, u_ref, -omega_ref, theta=theta) == (u_rate, -omega_rate)
+
+
+@ALL
+def test_the_model_is_linear_in_theta_so_least_squares_finds_theta_again(theta: Theta) -> None:
+    rows, right = [], []
+    for u, omega, u_ref, omega_ref in random_inputs(1):
+        du, dw = accelerations(u, omega, u_ref, omega_ref, theta=theta)
+        rows += [[du, 0, -(omega**2), u, 0, 0], [0, dw, 0, 0, u * omega, omega]]
+        right += [u_ref, omega_ref]
+    found = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
+    expected = [theta.t1, theta.t2, theta.t3, theta.t4, theta.t5, theta.t6]
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
+
+
+def test_coupling_moves_energy_between_speed_and_turn_but_makes_none() -> None:
+    c = PIONEER.t3 / PIONEER.t5
+    for u, omega, u_ref, omega_ref in random_inputs(2):
+        du, dw = accelerations(u, omega, u_ref, omega_ref, theta=PIONEER)
+        power = PIONEER.t1 * u * du + c * PIONEER.t2 * omega * dw
+        supplied = u * u_ref + c * omega * omega_ref - PIONEER.t4 * u**2 - c * PIONEER.t6 * omega**2
+        assert power == pytest.approx(supplied, abs=1e-13)
+
+
+def test_a_disturbance_adds_to_the_accelerations() -> None:
+    free = np.array(accelerations(0.4, 0.7, 0.5, 1.0, theta=PIONEER))
+    pushed = np.array(accelerations(0.4, 0.7, 0.5, 1.0, theta=PIONEER, delta=(0.3, -0.2)))
+    np.testing.assert_allclose(pushed - free, [0.3, -0.2], atol=1e-15)
+
+
+@pytest.mark.parametrize("psi", [-2.0, 0.0, 0.3, 3.0])
+def test_in_the_robots_own_axes_the_point_h_moves_at_u_and_a_omega(psi: float) -> None:
+    x_rate, y_rate, psi_rate = velocities(psi, 0.6, -0.9, a_m=0.2)
+    body = se3.rotation_z(psi)[:2, :2].T @ [x_rate, y_rate]
+    np.testing.assert_allclose([*body, psi_rate], [0.6, 0.2 * -0.9, -0.9], atol=1e-15)
+
+
+def test_sliding_moves_h_to_the_robots_left_and_turns_nothing() -> None:
+    psi = 0.7
+    difference = np.subtract(velocities(psi, 0.6, 0.9, a_m=0.2, side_mps=0.1), velocities(psi, 0.6, 0.9, a_m=0.2))
+    np.testing.assert_allclose(difference, [-0.1 * np.sin(psi), 0.1 * np.cos(psi), 0.0], atol=1e-15)
+
+
+def test_the_axle_midpoint_is_a_behind_h_on_the_floor() -> None:
+    x, y, psi = np.random.default_rng(3).uniform(-2, 2, (3, 20))
+    T_world_body = axle_poses(x, y, psi, a_m=0.2)
+    h = se3.apply(T_world_body, [[0.2, 0.0, 0.0]])[:, 0]
+    np.testing.assert_allclose(h, np.stack([x, y, 0 * x], -1), atol=1e-15)
+
+
+def test_both_wheels_of_a_robot_that_turns_on_the_spot_run_oppositely() -> None:
+    assert wheel_speeds(0.0, 2.0, track_m=0.331) == (-0.331, 0.331)

@@ -1,0 +1,128 @@
+"""A recording reads back as it was written, and says so when it cannot."""
+
+import shutil
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from vobench.errors import SequenceError
+from vobench.geometry.rig import WheelGeometry
+from vobench.sequence import Sequence, payload_hash, read_case, read_truth
+
+
+def test_pixels_and_stamps_come_back_exactly(recording, folder):
+    frames = list(Sequence.open(folder).frames())
+    assert [f.index for f in frames] == list(range(len(recording.t_ns)))
+    np.testing.assert_array_equal([f.t_ns for f in frames], recording.t_ns)
+    np.testing.assert_array_equal([f.left for f in frames], recording.left)
+    np.testing.assert_array_equal([f.right for f in frames], recording.right)
+    assert frames[0].left.dtype == np.uint8
+
+
+def test_encoder_readings_come_back_exactly(recording, folder):
+    t_ns, ticks = Sequence.open(folder).encoders()
+    assert t_ns.dtype == ticks.dtype == np.int64
+    np.testing.assert_array_equal(t_ns, recording.encoder_t_ns)
+    np.testing.assert_array_equal(ticks, recording.ticks)
+
+
+def test_truth_comes_back_to_the_last_bits(recording, folder):
+    truth = read_truth(folder)
+    np.testing.assert_array_equal(truth.t_ns, recording.t_ns)
+    np.testing.assert_allclose(truth.T_world_frame, recording.T_map_body, rtol=0, atol=1e-12)
+
+
+def test_rig_comes_back(recording, folder):
+    rig = Sequence.open(folder).rig
+    assert (rig.left, rig.right, rig.wheels) == (recording.rig.left, recording.rig.right, recording.rig.wheels)
+    np.testing.assert_allclose(rig.T_body_left, recording.rig.T_body_left, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(rig.T_body_right, recording.rig.T_body_right, rtol=0, atol=1e-15)
+
+
+def test_png_frames_are_the_frames_undecoded(recording, folder):
+    sequence = Sequence.open(folder)
+    assert len(sequence) == len(recording.t_ns)
+    frame = next(islice(sequence.png_frames(), 4, None))
+    assert (frame.index, frame.t_ns) == (4, recording.t_ns[4])
+    picture = cv2.imdecode(np.frombuffer(frame.right, np.uint8), cv2.IMREAD_UNCHANGED)
+    np.testing.assert_array_equal(picture, recording.right[4])
+
+
+def test_case_comes_back_from_the_truth_and_is_not_among_the_sensors(folder):
+    assert read_case(folder) == b'{"seed": 7}'
+    assert b"seed" not in (folder / "sensors.mcap").read_bytes()
+
+
+def test_sensors_are_read_without_the_truth_and_the_truth_without_sensors(folder, tmp_path):
+    for name in ("sensors", "truth"):
+        (tmp_path / name).mkdir()
+        shutil.copy(folder / f"{name}.mcap", tmp_path / name)
+    assert len(list(Sequence.open(tmp_path / "sensors").frames())) == len(read_truth(tmp_path / "truth"))
+
+
+def test_payload_hash_follows_pixels_but_not_their_compression(recording, folder, tmp_path, monkeypatch):
+    encode = cv2.imencode
+    monkeypatch.setattr(cv2, "imencode", lambda ext, image: encode(ext, image, [cv2.IMWRITE_PNG_COMPRESSION, 0]))
+    same = recording.write(tmp_path / "same")
+    assert (same / "sensors.mcap").read_bytes() != (folder / "sensors.mcap").read_bytes()
+    assert payload_hash(same) == payload_hash(folder)
+    right = recording.right.copy()
+    right[5, 0, 0] ^= 1
+    assert payload_hash(replace(recording, right=right).write(tmp_path / "other")) != payload_hash(folder)
+
+
+def test_payload_hash_follows_stamps_encoders_and_wheels(recording, folder, tmp_path):
+    others = {
+        "stamps": replace(recording, t_ns=recording.t_ns + 1),
+        "encoders": replace(recording, ticks=recording.ticks + 1),
+        "truth": replace(recording, T_map_body=recording.T_map_body[::-1]),
+        "wheels": replace(recording, rig=replace(recording.rig, wheels=WheelGeometry(0.2, 0.3, 4096))),
+    }
+    hashes = {payload_hash(other.write(tmp_path / name)) for name, other in others.items()}
+    assert len(hashes | {payload_hash(folder)}) == 5
+
+
+def read_all(folder: Path) -> None:
+    sequence = Sequence.open(folder)
+    list(sequence.frames())
+    sequence.encoders()
+    read_truth(folder)
+    read_case(folder)
+
+
+@pytest.mark.parametrize("name", ["sensors.mcap", "truth.mcap"])
+@pytest.mark.parametrize("kept", [0, 5, 8, 60, 0.5, 0.97, 0.999])
+def test_torn_file_is_refused_in_one_line(folder, tmp_path, name, kept):
+    torn = Path(shutil.copytree(folder, tmp_path / "torn"))
+    whole = (torn / name).read_bytes()
+    (torn / name).write_bytes(whole[: kept if isinstance(kept, int) else int(kept * len(whole))])
+    with pytest.raises(SequenceError, match=name) as caught:
+        read_all(torn)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("at", [0.1, 0.3, 0.6, 0.8])
+def test_flipped_bit_in_the_pictures_is_refused(folder, tmp_path, at):
+    bad = Path(shutil.copytree(folder, tmp_path / "bad"))
+    data = bytearray((bad / "sensors.mcap").read_bytes())
+    data[int(at * len(data))] ^= 0x10
+    (bad / "sensors.mcap").write_bytes(data)
+    with pytest.raises(SequenceError, match=r"sensors\.mcap"):
+        read_all(bad)
+
+
+def test_missing_recording_is_named(tmp_path):
+    with pytest.raises(SequenceError, match=r"^no recording at .*nowhere/sensors\.mcap$"):
+        Sequence.open(tmp_path / "nowhere")
+
+
+def test_foreign_recording_says_which_topic_it_lacks(folder, tmp_path):
+    shutil.copy(folder / "truth.mcap", tmp_path / "sensors.mcap")
+    with pytest.raises(
+        SequenceError, match=r"^/cam_left/camera_info should be sensor_msgs/msg/CameraInfo but is missing"
+    ):
+        Sequence.open(tmp_path)

@@ -1,0 +1,97 @@
+"""One search order for scenes, suites and estimators; the first of a name wins.
+
+./<kind>/, then <folder>/<kind>/ for each folder of $VOBENCH_PATH, then installed entry points
+(groups vobench.scenes, vobench.suites, vobench.estimators), then what vobench brings along.
+A scene or suite is <name>.yaml, an estimator a folder <name>/ with an estimator.yaml.
+"""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Literal
+
+from vobench.errors import UnknownNameError
+
+Kind = Literal["scene", "suite", "estimator"]
+KINDS: tuple[Kind, ...] = ("suite", "scene", "estimator")
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """Something with a name, where it lies, and which stop of the search order it came from.
+
+    `path` is the YAML file of a scene or suite, the folder of an estimator.
+    """
+
+    kind: Kind
+    name: str
+    path: Path
+    origin: str
+
+
+def builtin_root() -> Path:
+    """The folder that holds the scenes, suites and estimators that vobench brings along."""
+    package = Path(__file__).resolve().parents[1]
+    wheel = package / "builtin"
+    return wheel if wheel.is_dir() else package.parent
+
+
+def entries(kind: Kind) -> list[Entry]:
+    """Everything of a kind, by name; where a name is there twice, the one that wins comes first."""
+    return sorted(_all(kind), key=lambda entry: entry.name)
+
+
+def find(kind: Kind, name: str) -> Entry:
+    """The entry of that name that wins; a path to a file or folder is taken as it is.
+
+    Raises UnknownNameError with the nearest name and all known ones.
+    """
+    path = Path(name)
+    if path.suffix in {".yaml", ".yml"} or len(path.parts) > 1:
+        return _at(kind, path)
+    known: dict[str, Entry] = {}
+    for entry in _all(kind):
+        known.setdefault(entry.name, entry)
+    if name not in known:
+        raise UnknownNameError(unknown(kind, name, list(known)))
+    return known[name]
+
+
+def unknown(kind: str, name: str, known: list[str]) -> str:
+    """One line for a name that nothing has, with the nearest one and all there are."""
+    near = get_close_matches(name, known, n=1)
+    guess = f" Did you mean '{near[0]}'?" if near else ""
+    return f"no {kind} named '{name}'.{guess} Known: {', '.join(sorted(known)) or 'none'}"
+
+
+def _at(kind: Kind, path: Path) -> Entry:
+    wanted = path / "estimator.yaml" if kind == "estimator" else path
+    if not wanted.is_file():
+        known = sorted({entry.name for entry in _all(kind)})
+        raise UnknownNameError(f"no {kind} file at {wanted}. Known by name: {', '.join(known)}")
+    return Entry(kind, path.name if kind == "estimator" else path.stem, path.resolve(), "path")
+
+
+def _all(kind: Kind) -> Iterator[Entry]:
+    yield from _in_folder(kind, Path(f"{kind}s"), f"./{kind}s")
+    for folder in filter(None, os.environ.get("VOBENCH_PATH", "").split(os.pathsep)):
+        yield from _in_folder(kind, Path(folder) / f"{kind}s", "$VOBENCH_PATH")
+    for point in entry_points(group=f"vobench.{kind}s"):
+        spec = find_spec(point.value)
+        for folder in spec.submodule_search_locations or [] if spec else []:
+            path = Path(folder) if kind == "estimator" else Path(folder) / f"{point.name}.yaml"
+            yield Entry(kind, point.name, path, f"installed: {point.dist.name if point.dist else point.value}")
+    yield from _in_folder(kind, builtin_root() / f"{kind}s", "built in")
+
+
+def _in_folder(kind: Kind, folder: Path, origin: str) -> Iterator[Entry]:
+    if kind == "estimator":
+        paths = (manifest.parent for manifest in folder.glob("*/estimator.yaml"))
+    else:
+        paths = iter(folder.glob("*.yaml"))
+    for path in sorted(paths):
+        yield Entry(kind, path.name if kind == "estimator" else path.stem, path.resolve(), origin)

@@ -1,0 +1,30 @@
+"""What an estimator's `estimator.yaml` may say: read without importing its code."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from vobench.catalog import yaml_file
+
+MANIFEST_FILE = "estimator.yaml"
+
+
+class Manifest(BaseModel):
+    """One estimator: its name, where its class is, which sensors it needs and whose pose it gives."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+    version: Annotated[str, Field(min_length=1)]
+    class_path: Annotated[str, Field(alias="class", pattern=r"^[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*$")]
+    needs: tuple[Literal["stereo", "encoders"], ...] = ()
+    pose_of: Literal["left_camera", "body"]
+    summary: Annotated[str, Field(min_length=1)]
+    paper: str = ""
+    params: dict[str, Any] = {}
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """The manifest in an estimator's folder. Raises SuiteError, one line, where it is wrong."""
+    return yaml_file.read(folder / MANIFEST_FILE, Manifest)

@@ -1,0 +1,156 @@
+"""All of vobench's commands; what they need is imported when they run, so that --help is instant."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vobench.errors import VobenchError
+
+app = typer.Typer(
+    name="vobench",
+    help="Simulate, run and score visual odometry, and see where it breaks.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+SuiteName = Annotated[str, typer.Argument(metavar="SUITE", help="A suite's name, or a path to its YAML.")]
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or runs/<suite> for its latest.")]
+
+
+def run() -> None:
+    """Run a command; a user's mistake is one line and exit code 1, a stop by Ctrl-C is 130."""
+    try:
+        app()
+    except VobenchError as error:
+        _fail(str(error), error, code=1)
+    except KeyboardInterrupt as error:
+        _fail("stopped; finished stages are kept, the same command goes on from there", error, code=130)
+
+
+def _fail(sentence: str, error: BaseException, *, code: int) -> None:
+    if "--debug" in sys.argv:
+        raise error
+    print(f"vobench: {sentence}", file=sys.stderr)
+    raise SystemExit(code) from None
+
+
+@app.callback()
+def common(
+    *,
+    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback where there would be one line.")] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    """Simulate, run and score visual odometry, and see where it breaks."""
+    del debug  # read by _fail, which also hears of mistakes made before options are parsed
+    if version:
+        from vobench import __version__
+
+        print(__version__)
+        raise typer.Exit
+
+
+@app.command("run")
+def run_command(
+    suite: SuiteName,
+    *,
+    estimator: Annotated[
+        list[str] | None, typer.Option("--estimator", "-e", help="Run only this one; may be given several times.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Where the folders of runs go.")] = Path("runs"),
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
+    json: Json = False,
+) -> None:
+    """Run a suite: simulate, estimate, score, and print the leaderboard."""
+    from vobench.cli import run
+
+    names = tuple(estimator or ())
+    if dry_run:
+        run.check(suite, names, as_json=json)
+    else:
+        run.run(suite, names, out=out, as_json=json)
+
+
+@app.command()
+def check(suite: SuiteName, *, json: Json = False) -> None:
+    """Validate a suite and print its plan; nothing is rendered."""
+    from vobench.cli import run
+
+    run.check(suite, (), as_json=json)
+
+
+@app.command("list")
+def list_command(
+    kind: Annotated[
+        str | None, typer.Argument(metavar="[suites|scenes|estimators]", help="All where left out.")
+    ] = None,
+    *,
+    json: Json = False,
+) -> None:
+    """List the suites, scenes and estimators that can be found, and where."""
+    from vobench.cli import listing
+
+    listing.show(kind, as_json=json)
+
+
+@app.command()
+def score(
+    gt: Annotated[Path, typer.Argument(metavar="GT", help="Ground truth: a TUM file, or a sequence's folder.")],
+    est: Annotated[Path, typer.Argument(metavar="EST", help="Estimate: a TUM file.")],
+    *,
+    align: Annotated[str, typer.Option("--align", "-a", help="none, origin, se3 or sim3.")] = "se3",
+    delta: Annotated[int, typer.Option("--delta", "-d", help="RPE over so many frames.")] = 1,
+    t_max_diff: Annotated[float, typer.Option(help="Poses further apart than this are no pair, in seconds.")] = 0.01,
+    json: Json = False,
+) -> None:
+    """Score an estimate against ground truth: ATE, RPE, segments, coverage."""
+    from vobench.cli import scoring
+
+    scoring.show(gt, est, align=align, delta=delta, t_max_diff_s=t_max_diff, as_json=json)
+
+
+@app.command()
+def report(
+    run: RunPath,
+    *,
+    form: Annotated[str, typer.Option("--format", help="terminal, md, csv, json, latex or html.")] = "terminal",
+    out: Annotated[Path | None, typer.Option(help="Write to this file instead of the terminal.")] = None,
+    json: Json = False,
+) -> None:
+    """Print a run's leaderboard, in any form."""
+    from vobench.cli import reporting
+
+    reporting.show(run, form="json" if json else form, out=out)
+
+
+@app.command()
+def view(
+    run: RunPath,
+    *,
+    case: Annotated[str | None, typer.Option(help="The case to look into; the worst where left out.")] = None,
+    estimator: Annotated[
+        str | None, typer.Option(help="The estimator; the worst run of lk_epipolar, or of all.")
+    ] = None,
+    save: Annotated[Path | None, typer.Option(help="Write this .rrd instead of opening the viewer.")] = None,
+    json: Json = False,
+) -> None:
+    """Open one run in Rerun, failures first."""
+    from vobench.cli import viewing
+
+    viewing.show(run, case=case, estimator=estimator, save=save, as_json=json)
+
+
+@app.command()
+def doctor(
+    *,
+    fix: Annotated[bool, typer.Option("--fix", help="Install what is missing, where we may.")] = False,
+    json: Json = False,
+) -> None:
+    """Say what this machine lacks, and the command that mends it."""
+    from vobench.cli import doctor
+
+    doctor.show(fix=fix, as_json=json)

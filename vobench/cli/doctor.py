@@ -1,0 +1,100 @@
+"""vobench doctor: what this machine lacks, and the command that mends it."""
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, requires, version
+
+from vobench.cli import terminal
+from vobench.errors import MissingDependencyError
+from vobench.render.egl import EGL_PACKAGES, EGL_REMEDY
+from vobench.results.store import default_store
+
+PROBE = "from vobench.render import egl; egl.context()"
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing looked at: what was found, and the command that mends it where it is not well."""
+
+    check: str
+    well: bool
+    result: str
+    remedy: str = ""
+
+
+def show(*, fix: bool, as_json: bool) -> None:
+    """Print every check; raise MissingDependencyError, with the commands that mend it, where one is not well."""
+    checks = [_python(), _libraries(), _drawing(), _cache()]
+    if fix and not checks[2].well:
+        checks[2] = _installed_drawing()
+    if as_json:
+        terminal.print_json({"well": all(c.well for c in checks), "checks": [asdict(c) for c in checks]})
+    else:
+        rows = [["ok" if c.well else "MISSING", c.check, c.result] for c in checks]
+        terminal.console().print(terminal.table("", ["", "check", "result"], rows))
+    ill = [c for c in checks if not c.well]
+    if ill:
+        raise MissingDependencyError("; ".join(f"{c.check}: {c.remedy}" for c in ill))
+
+
+def _python() -> Check:
+    return Check("Python", True, sys.version.split()[0])
+
+
+def _libraries() -> Check:
+    """All that our distribution requires, extras aside, is installed."""
+    missing = []
+    for line in requires("vobench") or []:
+        name = line.split(";")[0].split("[")[0].split(">")[0].split("<")[0].split("=")[0].strip()
+        if "extra ==" in line:
+            continue
+        try:
+            version(name)
+        except PackageNotFoundError:
+            missing.append(name)
+    remedy = f"run: {sys.executable} -m pip install {' '.join(missing)}"
+    return Check("Python libraries", not missing, f"missing: {', '.join(missing)}" if missing else "all there", remedy)
+
+
+def _drawing() -> Check:
+    """Whether a picture can be drawn, tried in a process of its own: a broken driver may kill it."""
+    tried = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, check=False)
+    if tried.returncode == 0:
+        return Check("drawing without a display (EGL)", True, "works")
+    last = tried.stderr.strip().splitlines()[-1:] or [f"the probe died with {tried.returncode}"]
+    return Check("drawing without a display (EGL)", False, last[0].split("Error: ")[-1].split("; run")[0], _remedy())
+
+
+def _remedy() -> str:
+    return f"run: {'' if os.geteuid() == 0 else 'sudo '}{EGL_REMEDY}"
+
+
+def _installed_drawing() -> Check:
+    """Install Mesa's EGL with apt where we are root, and look again."""
+    if os.geteuid() != 0 or shutil.which("apt-get") is None:
+        return _drawing()
+    with terminal.Bars().step(f"apt-get install {' '.join(EGL_PACKAGES)}"):
+        _apt_get("update")
+        _apt_get("install", "-y", "--no-install-recommends", *EGL_PACKAGES)
+    return _drawing()
+
+
+def _apt_get(*words: str) -> None:
+    """Run apt-get without a word or a question; whether it helped, the next check tells."""
+    environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+    command = ["apt-get", "-qq", *words]
+    subprocess.run(command, env=environment, check=False, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+
+
+def _cache() -> Check:
+    root = default_store().root
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        writable = os.access(root, os.W_OK)
+    except OSError:
+        writable = False
+    remedy = "set VOBENCH_CACHE to a folder that can be written"
+    return Check("cache", writable, str(root) if writable else f"cannot write {root}", remedy)

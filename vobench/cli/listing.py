@@ -1,0 +1,50 @@
+"""vobench list."""
+
+from typing import Any
+
+from vobench.catalog import catalog, yaml_file
+from vobench.catalog.catalog import KINDS, Entry, Kind
+from vobench.catalog.manifest import read_manifest
+from vobench.cli import terminal
+from vobench.errors import UnknownNameError, VobenchError
+from vobench.suite.model import Suite
+from vobench.suite.scene_file import SceneFile
+
+
+def show(kind: str | None, *, as_json: bool) -> None:
+    """Print all entries of one kind or of all; where a name is there twice, the second is hidden by the first."""
+    facts = [_facts(entry) for wanted in _kinds(kind) for entry in catalog.entries(wanted)]
+    seen: set[tuple[str, str]] = set()
+    for fact in facts:
+        fact["hidden"] = (fact["kind"], fact["name"]) in seen
+        seen.add((fact["kind"], fact["name"]))
+    if as_json:
+        terminal.print_json({"entries": facts})
+        return
+    rows = [[f["kind"], f["name"] + (" (hidden)" if f["hidden"] else ""), f["summary"], f["path"]] for f in facts]
+    terminal.console().print(terminal.table("", ["kind", "name", "summary", "path"], rows))
+
+
+def _kinds(kind: str | None) -> tuple[Kind, ...]:
+    if kind is None:
+        return KINDS
+    for known in KINDS:
+        if kind in (known, f"{known}s"):
+            return (known,)
+    raise UnknownNameError(catalog.unknown("kind", kind, [f"{known}s" for known in KINDS]))
+
+
+def _facts(entry: Entry) -> dict[str, Any]:
+    return {"kind": entry.kind, "name": entry.name, "summary": _summary(entry), "path": str(entry.path)}
+
+
+def _summary(entry: Entry) -> str:
+    """What the file says of itself; one that cannot be read says why."""
+    try:
+        if entry.kind == "estimator":
+            return read_manifest(entry.path).summary
+        if entry.kind == "scene":
+            return yaml_file.read(entry.path, SceneFile).summary
+        return yaml_file.read(entry.path, Suite).summary
+    except VobenchError as error:
+        return f"unreadable: {error}"

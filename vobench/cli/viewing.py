@@ -1,0 +1,36 @@
+"""vobench view."""
+
+from pathlib import Path
+
+from vobench.cli import terminal
+from vobench.errors import MissingDependencyError
+from vobench.results.run_folder import open_run
+from vobench.viewer import save_run
+from vobench.viewer.run_view import pick, run_view
+
+
+def show(run: Path, *, case: str | None, estimator: str | None, save: Path | None, as_json: bool) -> None:
+    """Save a run as .rrd, or open it in Rerun's viewer."""
+    folder = open_run(run)
+    chosen = pick(folder.scores(), case=case, estimator=estimator)
+    path = save or folder.estimate(chosen.case, chosen.estimator, chosen.repeat) / "run.rrd"
+    save_run(path, run_view(folder, chosen))
+    if as_json:
+        terminal.print_json(
+            {"case": chosen.case, "estimator": chosen.estimator, "repeat": chosen.repeat, "path": str(path)}
+        )
+    else:
+        print(f"{chosen.estimator} on {chosen.case} ({chosen.status}): {path}")
+    if save is None and not as_json:
+        _open(path)
+
+
+def _open(path: Path) -> None:
+    """Hand the file to Rerun's viewer, which needs a display."""
+    import os
+    import subprocess
+    import sys
+
+    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise MissingDependencyError(f"no display to open the viewer on; on a machine that has one, run: rerun {path}")
+    subprocess.Popen([sys.executable, "-m", "rerun", str(path)], start_new_session=True)

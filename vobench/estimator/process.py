@@ -1,0 +1,134 @@
+"""An estimator at arm's length: in a process of its own, under limits, its failures as data."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing import Pipe
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from vobench.estimator.protocol import Frame, Result
+from vobench.geometry import se3
+from vobench.geometry.rig import Rig
+
+# One thread each: runs compare, and do not fight for cores.
+ONE_THREAD = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "OPENCV_FOR_THREADS_NUM": "1",
+    "PYTHONHASHSEED": "0",
+}
+KEPT_ENVIRONMENT = ("PATH", "HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV")
+
+
+class EstimatorFailure(Exception):  # noqa: N818 - a result, not a mistake of ours
+    """The estimator gave up: `kind` is a run's status, `reason` one line."""
+
+    def __init__(self, kind: str, reason: str) -> None:
+        super().__init__(f"{kind}: {reason}")
+        self.kind = kind
+        self.reason = reason
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What an estimator may take: seconds to start and for each frame, bytes of its own data."""
+
+    start_s: float = 60.0
+    frame_s: float = 20.0
+    memory_bytes: int = 4 << 30
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A checked result and what it cost."""
+
+    result: Result
+    wall_ms: float
+    cpu_ms: float
+
+
+class EstimatorProcess:
+    """A running estimator; what it prints goes to `log`. Its verbs raise EstimatorFailure."""
+
+    def __init__(self, folder: Path, class_path: str, *, name: str, log: Path, limits: Limits) -> None:
+        self._limits = limits
+        self._connection, child = Pipe()
+        self._home = tempfile.TemporaryDirectory(prefix="vobench-estimator-")
+        fd, memory = str(child.fileno()), str(limits.memory_bytes)
+        self._log = log.open("wb")
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "vobench.estimator.worker", fd, str(folder), class_path, name, memory],
+            pass_fds=[child.fileno()],
+            cwd=self._home.name,
+            env={k: v for k, v in os.environ.items() if k in KEPT_ENVIRONMENT} | ONE_THREAD,
+            stdin=subprocess.DEVNULL,
+            stdout=self._log,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        child.close()
+
+    def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
+        """Hand over the calibration and the parameters."""
+        self._ask(("start", rig, dict(params), seed), self._limits.start_s)
+
+    def process(self, frame: Frame) -> Answer:
+        """Hand over the next frame; its pose, checked to be a rigid transform."""
+        _, result, wall_ms, cpu_ms = self._ask(frame, self._limits.frame_s)
+        if result.T_odom_frame is not None:
+            _check_pose(result.T_odom_frame, frame.index)
+        return Answer(result, wall_ms, cpu_ms)
+
+    def _ask(self, message: Any, timeout_s: float) -> tuple[Any, ...]:
+        try:
+            self._connection.send(message)
+            answered = self._connection.poll(timeout_s)
+            reply: tuple[Any, ...] = self._connection.recv() if answered else ()
+        except (EOFError, ConnectionError):
+            raise EstimatorFailure(*self._death()) from None
+        if not answered:
+            raise EstimatorFailure("timeout", f"no answer within {timeout_s:g} s")
+        if reply[0] == "failed":
+            raise EstimatorFailure(reply[1], reply[2])
+        return reply
+
+    def _death(self) -> tuple[str, str]:
+        code = self._process.wait(timeout=5)
+        if code == -signal.SIGKILL:
+            return "out_of_memory", "killed by the system, most likely for memory"
+        by = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+        return "crashed", f"the process ended with {by}"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._connection.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout=0.5 if kind is None else 0)
+        # The whole session goes: an estimator may have started processes of its own.
+        with suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        self._log.close()
+        self._home.cleanup()
+
+
+def _check_pose(T_odom_frame: Any, index: int) -> None:
+    T = np.asarray(T_odom_frame)
+    if T.shape != (4, 4) or not np.isfinite(T).all():
+        raise EstimatorFailure("invalid_output", f"frame {index}: the pose is no finite (4, 4) array")
+    if not se3.is_rotation(T[:3, :3]) or not np.array_equal(T[3], [0, 0, 0, 1]):
+        raise EstimatorFailure("invalid_output", f"frame {index}: the pose is no rigid transform (R'R differs from I)")

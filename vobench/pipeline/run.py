@@ -1,0 +1,86 @@
+"""A suite, run: simulate, estimate, score, and put it all in one folder."""
+
+import platform
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from shutil import copyfile
+
+from vobench import __version__
+from vobench.pipeline.estimate import estimate
+from vobench.pipeline.score import score_run
+from vobench.pipeline.simulate import LIBRARIES, simulate
+from vobench.pipeline.workshop import Workshop
+from vobench.results import estimate_file
+from vobench.results.run_folder import (
+    CASE,
+    ENVIRONMENT,
+    GROUND_TRUTH,
+    SCORE,
+    SEQUENCE,
+    SUITE,
+    RunFolder,
+    RunScore,
+    new_run,
+    write_json,
+)
+from vobench.results.store import digest, library_versions
+from vobench.sequence import Sequence, read_truth
+from vobench.suite.expand import Case, Plan
+from vobench.trajectory.text import format_tum
+from vobench.trajectory.trajectory import Trajectory
+
+Finish = Callable[[RunFolder, list[RunScore]], None]
+ESTIMATE_FILES = (estimate_file.ESTIMATE, estimate_file.FRAMES, estimate_file.TRACKS, estimate_file.LOG)
+
+
+def run_suite(plan: Plan, *, root: Path, shop: Workshop, finish: Finish) -> RunFolder:
+    """Run every case, estimator and repeat; what the store holds already is not made again.
+
+    `finish` adds reports to the folder before it gets its final name under `root`.
+    """
+    suite = plan.suite.model_dump(mode="json")
+    with new_run(root, plan.suite.name, digest(suite)) as folder:
+        write_json(folder.path / SUITE, suite)
+        write_json(folder.path / ENVIRONMENT, _environment())
+        scores = [score for case in plan.cases for score in _run_case(plan, case, folder, shop)]
+        finish(folder, scores)
+    return RunFolder((root / plan.suite.name / "latest").resolve())
+
+
+def left_truth(sequence: Path) -> Trajectory:
+    """The left camera's true path: what every estimate is compared with."""
+    return read_truth(sequence).of_mounted(Sequence.open(sequence).rig.T_body_left)
+
+
+def _run_case(plan: Plan, case: Case, folder: RunFolder, shop: Workshop) -> list[RunScore]:
+    sequence = simulate(case, shop)
+    gt = left_truth(sequence)
+    target = folder.case(case.name)
+    target.mkdir(parents=True)
+    write_json(target / CASE, case.model_dump(mode="json"))
+    (target / GROUND_TRUTH).write_text(format_tum(gt))
+    (target / SEQUENCE).symlink_to(sequence.resolve())
+    scores = []
+    for run in plan.runs(case):
+        estimated = estimate(run, sequence, shop)
+        scores.append(score_run(run, estimated, gt))
+        _keep(estimated, scores[-1], folder.estimate(case.name, run.entrant.label, run.repeat))
+    return scores
+
+
+def _keep(estimated: Path, score: RunScore, target: Path) -> None:
+    """Copy an estimate out of the store, and put its score beside it."""
+    target.mkdir(parents=True)
+    for name in ESTIMATE_FILES:
+        copyfile(estimated / name, target / name)
+    write_json(target / SCORE, score.model_dump(mode="json"))
+
+
+def _environment() -> dict[str, object]:
+    return {
+        "vobench": __version__,
+        "python": sys.version.split()[0],
+        "platform": platform.platform(),
+        "libraries": library_versions(*LIBRARIES, "pandas", "rerun-sdk"),
+    }

@@ -1,0 +1,54 @@
+"""Estimate to score: one run's numbers and its status."""
+
+from pathlib import Path
+
+from vobench.metric.score import Score, score
+from vobench.results import estimate_file
+from vobench.results.run_folder import RunScore, RunStatus
+from vobench.suite.expand import Run
+from vobench.trajectory.text import parse_tum
+from vobench.trajectory.trajectory import Trajectory
+
+# Below this share of frames with a pose an estimate counts as lost.
+LOST_COVERAGE = 0.5
+
+
+def score_run(run: Run, estimate: Path, gt: Trajectory) -> RunScore:
+    """Score a run's estimate against the left camera's true path."""
+    outcome, scored = estimate_file.read_outcome(estimate), score_estimate(estimate, gt)
+    status, reason = _status(outcome, scored, gt)
+    return RunScore(
+        case=run.case.name,
+        variant=run.case.variant,
+        estimator=run.entrant.label,
+        repeat=run.repeat,
+        status=status,
+        reason=reason,
+        coverage=scored.coverage.ratio if scored else 0.0,
+        frames=len(gt),
+        path_m=float(gt.distances_m()[-1]),
+        score=scored.as_dict() if scored else None,
+    )
+
+
+def score_estimate(estimate: Path, gt: Trajectory) -> Score | None:
+    """The score of an estimate's folder, None where it holds no pose at all."""
+    file = estimate / estimate_file.ESTIMATE
+    text = file.read_text()
+    return score(gt, parse_tum(text, name=str(file))) if text else None
+
+
+def _status(outcome: estimate_file.Outcome, scored: Score | None, gt: Trajectory) -> tuple[RunStatus, str]:
+    """How the run ended, the gravest first; a run that died is not saved by what it had answered before."""
+    if outcome.kind != "finished":
+        return outcome.kind, outcome.reason  # type: ignore[return-value]  # EstimatorFailure's kinds are statuses
+    if scored is None or scored.coverage.ratio < LOST_COVERAGE:
+        covered = scored.coverage.ratio if scored else 0.0
+        return "lost", f"a pose for {covered:.0%} of the frames"
+    ate, path_m = scored.metric("ate_trans"), float(gt.distances_m()[-1])
+    if ate is not None and ate.statistics.rmse > max(path_m, 1e-3):
+        return "diverged", f"ATE {ate.statistics.rmse:.3g} m on a path of {path_m:.3g} m"
+    if scored.coverage.ratio < 1:
+        first = scored.coverage.first_lost_frame
+        return "partial", f"no pose for {scored.coverage.longest_gap_frames} frames in a row; first at frame {first}"
+    return "ok", ""

@@ -1,0 +1,83 @@
+"""The leaderboard as one page that needs no network: tables, and each case's paths from above."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vobench.geometry.se3 import Array
+from vobench.report import table
+from vobench.report.leaderboard import Board
+from vobench.results import estimate_file
+from vobench.results.run_folder import GROUND_TRUTH, RunFolder, RunScore
+from vobench.trajectory.text import parse_tum
+
+TEMPLATES = Path(__file__).parent / "templates"
+PLOT_PX = 420
+MARGIN_PX = 24
+# Okabe and Ito (2008): eight colours that colour-blind readers tell apart; black is the truth's.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#7f7f7f")
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One path in a plot: its points as SVG wants them."""
+
+    name: str
+    colour: str
+    points: str
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """The paths of one case from above; `bar_m` metres are `bar_px` long."""
+
+    case: str
+    lines: tuple[Line, ...]
+    bar_m: float
+    bar_px: float
+
+
+def html(folder: RunFolder, scores: list[RunScore], boards: list[Board]) -> str:
+    """The page."""
+    from jinja2 import Environment, FileSystemLoader
+
+    environment = Environment(loader=FileSystemLoader(TEMPLATES), autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    names = sorted({score.estimator for score in scores})
+    colours = {name: COLOURS[i % len(COLOURS)] for i, name in enumerate(names)}
+    cases = sorted({score.case for score in scores})
+    return environment.get_template("leaderboard.html").render(
+        title=scores[0].variant.get("suite", folder.path.parent.name),
+        boards=boards,
+        headings=table.HEADINGS,
+        cells=table.cells,
+        legend=table.LEGEND,
+        plots=[_plot(folder, case, [s for s in scores if s.case == case and s.repeat == 0], colours) for case in cases],
+        size=PLOT_PX,
+    )
+
+
+def _plot(folder: RunFolder, case: str, scores: list[RunScore], colours: dict[str, str]) -> Plot:
+    truth_file = folder.case(case) / GROUND_TRUTH
+    truth = parse_tum(truth_file.read_text(), name=str(truth_file)).positions_m[:, :2]
+    low, span = truth.min(0), max(float(np.ptp(truth, axis=0).max()), 1e-3)
+    px_per_m = (PLOT_PX - 2 * MARGIN_PX) / span
+    middle = low + np.ptp(truth, axis=0) / 2
+
+    def line(name: str, colour: str, path: Array) -> Line:
+        # North up: y grows upwards on the floor and downwards on the page.
+        points = PLOT_PX / 2 + (path - middle) * (px_per_m, -px_per_m)
+        return Line(name, colour, " ".join(f"{x:.1f},{y:.1f}" for x, y in points))
+
+    estimates = [line(s.estimator, colours[s.estimator], _aligned(folder, s)) for s in scores if s.score]
+    bar_m = 10.0 ** np.floor(np.log10(span))
+    return Plot(case, (line("ground truth", "#000000", truth), *estimates), bar_m, bar_m * px_per_m)
+
+
+def _aligned(folder: RunFolder, score: RunScore) -> Array:
+    """An estimate's positions (N, 2) from above, after the alignment that its score states."""
+    file = folder.estimate(score.case, score.estimator, score.repeat) / estimate_file.ESTIMATE
+    positions = parse_tum(file.read_text(), name=str(file)).positions_m
+    a = score.score["alignment"] if score.score else {}
+    aligned: Array = a["scale"] * positions @ np.array(a["rotation"]).T + a["translation"]
+    return aligned[:, :2]

@@ -1,0 +1,128 @@
+"""The folder of a run of a suite, as a person reads it.
+
+runs/<suite>/<UTC stamp>_<short hash>/
+    suite.yaml        the suite as resolved
+    environment.json  versions and machine
+    leaderboard.*     md, html, csv, json
+    cases/<case>/     case.json, ground_truth.tum, sequence -> cache
+    cases/<case>/<estimator>/<repeat>/   estimate.tum, frames.csv, tracks.zip, score.json, log.txt
+"""
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from vobench.errors import InputError
+
+GROUND_TRUTH, CASE, SCORE, SEQUENCE = "ground_truth.tum", "case.json", "score.json", "sequence"
+ENVIRONMENT, SUITE, SUITE_SOURCE = "environment.json", "suite.json", "suite.yaml"
+
+RunStatus = Literal[
+    "ok", "partial", "lost", "diverged", "invalid_output", "timeout", "out_of_memory", "crashed", "refused"
+]
+# Best first; the last seven are failures, and no failure ranks before a survivor.
+STATUSES: tuple[RunStatus, ...] = (
+    "ok",
+    "partial",
+    "lost",
+    "diverged",
+    "invalid_output",
+    "timeout",
+    "out_of_memory",
+    "crashed",
+    "refused",
+)
+SURVIVED = ("ok", "partial")
+
+
+class RunScore(BaseModel):
+    """One estimator on one case: its status and, where there is any estimate, its score."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    schema_version: int = 1
+    case: str
+    variant: dict[str, str]
+    estimator: str
+    repeat: int
+    status: RunStatus
+    reason: str
+    coverage: float
+    frames: int
+    path_m: float
+    score: dict[str, Any] | None
+
+    def value(self, metric: str, statistic: str) -> float | None:
+        """One statistic of one metric, None where the run has no such score."""
+        for entry in (self.score or {"metrics": []})["metrics"]:
+            if entry["name"] == metric:
+                return float(entry[statistic])
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class RunFolder:
+    """A finished run of a suite."""
+
+    path: Path
+
+    def case(self, case: str) -> Path:
+        """The folder of a case."""
+        return self.path / "cases" / case
+
+    def estimate(self, case: str, estimator: str, repeat: int) -> Path:
+        """The folder of an estimator's run on a case."""
+        return self.case(case) / estimator / str(repeat)
+
+    def scores(self) -> list[RunScore]:
+        """Every run's score, in order of folders. Raises InputError where the folder is none of ours."""
+        files = sorted((self.path / "cases").glob(f"*/*/*/{SCORE}"))
+        if not files:
+            raise InputError(f"not the folder of a run (no cases/*/*/*/{SCORE} in it): {self.path}")
+        return [RunScore.model_validate_json(file.read_text()) for file in files]
+
+
+def open_run(path: Path) -> RunFolder:
+    """The run at a path; a suite's folder stands for its latest run."""
+    return RunFolder((path / "latest") if (path / "latest").exists() else path)
+
+
+@contextmanager
+def new_run(root: Path, suite: str, key: str) -> Iterator[RunFolder]:
+    """A folder for a run, which gets its name when the block ends without an error."""
+    parent = root / suite
+    name = f"{datetime.now(UTC):%Y%m%dT%H%M%S}_{key[:8]}"
+    unfinished = parent / f".unfinished-{name}-{os.getpid()}"
+    unfinished.mkdir(parents=True)
+    try:
+        yield RunFolder(unfinished)
+        final = _free(parent / name)
+        unfinished.rename(final)
+        _point(parent / "latest", final.name)
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def _free(path: Path) -> Path:
+    """The path itself, or with a number behind it where two runs ended in one second."""
+    return next(p for n in range(1, 1000) if not (p := path if n == 1 else Path(f"{path}.{n}")).exists())
+
+
+def _point(link: Path, target: str) -> None:
+    """Make a link point elsewhere in one step."""
+    fresh = link.with_name(f".{link.name}-{os.getpid()}")
+    fresh.symlink_to(target)
+    fresh.replace(link)
+
+
+def write_json(path: Path, content: Any) -> None:
+    """JSON that people can read."""
+    path.write_text(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,0 +1,88 @@
+"""The cache of what is costly: folders addressed by a hash of all that they depend on."""
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+PACKAGE = Path(__file__).resolve().parents[1]
+
+
+class Store:
+    """Finished folders under a root; what is not finished is never seen under its final name."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    def path(self, kind: str, inputs: Mapping[str, Any]) -> Path:
+        """Where the result of these inputs lies, or will lie."""
+        return self.root / kind / digest(inputs)
+
+    def get(self, kind: str, inputs: Mapping[str, Any], build: Callable[[Path], None]) -> Path:
+        """The folder made from these inputs; `build` fills an empty one where there is none yet."""
+        final = self.path(kind, inputs)
+        if final.is_dir():
+            return final
+        final.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=final.parent))
+        try:
+            build(unfinished)
+            (unfinished / "inputs.json").write_text(canonical(inputs))
+            _publish(unfinished, final)
+        finally:
+            shutil.rmtree(unfinished, ignore_errors=True)
+        return final
+
+
+def _publish(unfinished: Path, final: Path) -> None:
+    """Give a folder its final name; where another process was faster, both hold the same."""
+    unfinished.chmod(0o755)
+    try:
+        unfinished.rename(final)
+    except OSError:
+        if not final.is_dir():
+            raise
+
+
+def default_store() -> Store:
+    """$VOBENCH_CACHE, or vobench/ in the user's cache folder."""
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return Store(Path(os.environ.get("VOBENCH_CACHE") or home / "vobench"))
+
+
+def canonical(inputs: Mapping[str, Any]) -> str:
+    """JSON with sorted keys: the same text for the same content."""
+    return json.dumps(inputs, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False)
+
+
+def digest(inputs: Mapping[str, Any]) -> str:
+    """128 bits of SHA-256 over the canonical text, in hex."""
+    return hashlib.sha256(canonical(inputs).encode()).hexdigest()[:32]
+
+
+@cache
+def code_digest(*rooms: str) -> str:
+    """A hash of the source of these rooms of vobench: results of older code are not taken for new ones."""
+    return folder_digest(*(PACKAGE / room for room in rooms))
+
+
+def folder_digest(*folders: Path) -> str:
+    """A hash over names and contents of all files below these folders, compiled Python left out."""
+    state = hashlib.sha256()
+    for folder in folders:
+        for path in sorted(p for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts):
+            state.update(f"{path.relative_to(folder)}\0".encode())
+            state.update(hashlib.sha256(path.read_bytes()).digest())
+    return state.hexdigest()[:32]
+
+
+@cache
+def library_versions(*names: str) -> dict[str, str]:
+    """Installed versions of the distributions whose release can change a result's bytes."""
+    return {name: version(name) for name in names}

@@ -1,0 +1,102 @@
+"""Wheel slip: what makes the robot move other than its wheels say.
+
+sigma    longitudinal slip ratio of one wheel: rim speed = ground speed / (1 - sigma)
+beta     side-slip angle (rad): the robot slides left at u tan(beta)
+c        skid (s): in a turn it slides outwards at c u omega
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import exp, radians, sqrt, tan
+
+import numpy as np
+from scipy.signal import lfilter
+
+from vobench.errors import MotionError
+from vobench.geometry.se3 import Array
+
+# The random streams, one for each process: switching one off leaves the others as they were.
+STREAMS = ("left", "right", "side")
+
+
+@dataclass(frozen=True, slots=True)
+class SlipSettings:
+    """Three independent, stationary, zero-mean Ornstein-Uhlenbeck processes, and one deterministic skid term.
+
+    `ratio_std` is the standard deviation of both wheels' sigma, `angle_std_rad` that of beta,
+    `correlation_s` the time over which they forget. Engineering choices: no published values exist.
+    """
+
+    ratio_std: float = 0.0
+    angle_std_rad: float = 0.0
+    skid_s: float = 0.0
+    correlation_s: float = 0.3
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.ratio_std <= 0.1 and 0 <= self.angle_std_rad <= 0.15 and self.correlation_s > 0):
+            raise MotionError(
+                f"slip needs ratio_std in 0..0.1, angle_std_rad in 0..0.15 and correlation_s > 0, "
+                f"got {self.ratio_std}, {self.angle_std_rad} and {self.correlation_s}"
+            )
+
+
+SLIPS = {
+    "none": SlipSettings(),
+    "nominal": SlipSettings(ratio_std=0.01, angle_std_rad=radians(0.5), skid_s=0.005),
+    "slippery": SlipSettings(ratio_std=0.05, angle_std_rad=radians(2.0), skid_s=0.02),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class SlipNow:
+    """Slip during one frame: the two wheels' sigma, beta (rad) and c (s)."""
+
+    left: float = 0.0
+    right: float = 0.0
+    beta: float = 0.0
+    skid_s: float = 0.0
+
+    def side_speed(self, u: float, omega: float) -> float:
+        """Speed of sliding to the left in m/s."""
+        return u * tan(self.beta) - self.skid_s * u * omega
+
+    def rim_rates(self, left_mps: float, right_mps: float, *, radius_m: float) -> tuple[float, float]:
+        """Angular rates of the left and right rim in rad/s that carry the wheels at these ground speeds."""
+        return left_mps / (radius_m * (1 - self.left)), right_mps / (radius_m * (1 - self.right))
+
+
+def ornstein_uhlenbeck(
+    count: int, *, std: float, step_s: float, correlation_s: float, rng: np.random.Generator
+) -> Array:
+    """A stationary first-order Gauss-Markov path (count,), exact for any step: the variance does not depend on it.
+
+    A longer path of the same generator begins with the same values. Source: Gillespie (1996).
+    """
+    keep = exp(-step_s / correlation_s)
+    shocks = std * rng.standard_normal(count)
+    shocks[1:] *= sqrt(1 - keep**2)
+    path: Array = lfilter([1.0], [1.0, -keep], shocks)
+    return path
+
+
+def slip_path(
+    count: int, settings: SlipSettings, *, step_s: float, rngs: Mapping[str, np.random.Generator] | None
+) -> Array:
+    """Slip ratios of the left and right wheel and beta in rad, (count, 3), each from its own generator in `rngs`.
+
+    Raises MotionError where the settings ask for chance and a generator is missing.
+    """
+    stds = (settings.ratio_std, settings.ratio_std, settings.angle_std_rad)
+    path = np.zeros((count, 3))
+    for column, (stream, std) in enumerate(zip(STREAMS, stds, strict=True)):
+        if std > 0:
+            path[:, column] = ornstein_uhlenbeck(
+                count, std=std, step_s=step_s, correlation_s=settings.correlation_s, rng=_generator(rngs, stream)
+            )
+    return path
+
+
+def _generator(rngs: Mapping[str, np.random.Generator] | None, stream: str) -> np.random.Generator:
+    if rngs is None or stream not in rngs:
+        raise MotionError(f"slip needs one random generator for each of {', '.join(STREAMS)}; {stream!r} is missing")
+    return rngs[stream]

@@ -1,0 +1,56 @@
+"""Wheel encoders: rim angles to counts, with the calibration errors a real odometer does not know of."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench.errors import InputError
+from vobench.geometry.rig import WheelGeometry
+from vobench.geometry.se3 import Array
+
+
+@dataclass(frozen=True, slots=True)
+class EncoderErrors:
+    """How the true wheels differ from the nominal ones, relative: true = nominal (1 + error).
+
+    They are truth about the robot; the odometer goes on with the nominal geometry. So a larger left
+    wheel turns less and the estimate bends left, and a larger track overstates every turn.
+    Source: Borenstein and Feng (1996), who name these as the two dominant systematic errors.
+    """
+
+    radius_left: float = 0.0
+    radius_right: float = 0.0
+    track: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (
+            ("radius_left", self.radius_left),
+            ("radius_right", self.radius_right),
+            ("track", self.track),
+        ):
+            if not abs(value) <= 0.2:
+                raise InputError(f"encoder error {name} is a fraction of the nominal value within 0.2, got {value}")
+
+
+ENCODERS = {
+    "exact": EncoderErrors(),
+    "nominal": EncoderErrors(radius_left=0.0015, radius_right=-0.0015, track=0.005),
+}
+
+
+def true_rims(rim_rad: Array, errors: EncoderErrors) -> Array:
+    """Angles (M, 2) of the true wheels on a motion that turns nominal wheels by rim_rad (M, 2), left and right.
+
+    The track changes what each wheel must travel in a turn: half the difference of the two. The
+    radius changes how far a wheel turns for its travel. Exact without slip; with slip, short by
+    the product of slip ratio and track error, some 1e-5.
+    """
+    mean, half_turn = rim_rad.mean(1), (rim_rad[:, 1] - rim_rad[:, 0]) / 2 * (1 + errors.track)
+    left, right = (mean - half_turn) / (1 + errors.radius_left), (mean + half_turn) / (1 + errors.radius_right)
+    return np.stack([left, right], -1)
+
+
+def ticks(rim_rad: Array, wheels: WheelGeometry, errors: EncoderErrors = ENCODERS["exact"]) -> NDArray[np.int64]:
+    """Counts (M, 2) since angle zero, left and right: whole ticks passed, rounded down also when rolling back."""
+    return np.floor(true_rims(rim_rad, errors) * wheels.ticks_per_revolution / (2 * np.pi)).astype(np.int64)

@@ -1,0 +1,227 @@
+"""A run as one .rrd file, for finding out where and why an estimator failed."""
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import Rig
+from vobench.geometry.se3 import Array
+from vobench.sequence import PngFrame
+from vobench.trajectory.trajectory import Stamps, Trajectory
+from vobench.viewer import blueprint as bp
+
+Color = tuple[int, int, int]
+Tracks = tuple[Array, NDArray[np.bool_]]
+
+GREEN, ORANGE, RED = (60, 200, 90), (255, 150, 40), (235, 60, 60)
+STATUS_COLORS = {
+    "init": (90, 140, 220),
+    "ok": GREEN,
+    "stationary": (70, 180, 190),
+    "degraded": (235, 205, 70),
+    "lost": RED,
+    "no output": (150, 40, 110),
+}
+NO_OUTPUT = "no output"
+NS_PER_S = 1_000_000_000
+FAILED = ("lost", NO_OUTPUT)
+PIXEL_CENTRE = 0.5  # Rerun puts the corner of the top-left pixel at (0, 0), we its centre
+FRUSTUM_LINE = -1.5  # negative: in screen points, whatever the zoom
+TRACK_RADIUS = rr.Radius.ui_points(3.5)
+
+
+@dataclass(frozen=True, slots=True)
+class RunView:
+    """All that is shown of a run; both trajectories are of the left camera, in the same world.
+
+    `frames` starts a fresh pass over the pictures. `error_m` belongs to the instants `error_t_ns`.
+    `tracks` maps a frame's index to points (N, 2) in the left picture and which are inliers (N,).
+    There may be fewer `statuses` than frames, where an estimator stopped early.
+    """
+
+    title: str
+    rig: Rig
+    frames: Callable[[], Iterable[PngFrame]]
+    ground_truth: Trajectory
+    estimate: Trajectory
+    error_t_ns: Stamps
+    error_m: Array
+    statuses: Sequence[str]
+    tracks: Mapping[int, Tracks]
+    summary_md: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Log:
+    """A Rerun stream, and the frames' stamps (N,) that place anything stamped on the `frame` time line."""
+
+    stream: rr.RecordingStream
+    t_ns: Stamps
+
+    def static(self, entity: str, *what: Any) -> None:
+        self.stream.log(entity, *what, static=True)
+
+    def columns(self, entity: str, frames: NDArray[np.int64], columns: Any) -> None:
+        """Send rows for some frames, on the time lines `frame` and `t`."""
+        if len(frames):
+            self.stream.send_columns(entity, time_columns(frames, self.t_ns[frames]), columns)
+
+    def frames_of(self, t_ns: Stamps) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """The frames that have a sample closer than half the time between frames, and which sample it is."""
+        if not len(t_ns):
+            return np.zeros(0, np.int64), np.zeros(0, np.int64)
+        after = np.searchsorted(t_ns, self.t_ns).clip(max=len(t_ns) - 1)
+        before = (after - 1).clip(min=0)
+        nearest = np.where(self.t_ns - t_ns[before] < t_ns[after] - self.t_ns, before, after)
+        step_ns = np.diff(self.t_ns).min(initial=NS_PER_S)
+        frames = np.flatnonzero(2 * np.abs(t_ns[nearest] - self.t_ns) < step_ns)
+        return frames, nearest[frames]
+
+
+def save_run(path: Path, run: RunView) -> None:
+    """Write a run to an .rrd file that opens in Rerun with its own layout."""
+    with rr.RecordingStream(application_id(run.title), recording_id=run.title, send_properties=False) as stream:
+        part = path.with_name(path.name + ".part")
+        stream.save(part)
+        stream.send_recording_name(run.title)
+        log = _Log(stream, _log_pictures(stream, run.frames()))
+        statuses = [*run.statuses, *[NO_OUTPUT] * (len(log.t_ns) - len(run.statuses))]
+        _log_paths(log, run)
+        _log_cameras(log, run)
+        _log_error(log, run)
+        _log_tracks(log, run.tracks)
+        _log_statuses(log, statuses)
+        log.static(bp.SUMMARY, rr.TextDocument(run.summary_md, media_type=rr.MediaType.MARKDOWN))
+        focus = first_failure(statuses)
+        stream.send_blueprint(bp.layout(run.ground_truth.positions_m, run.estimate.positions_m, focus=focus))
+        stream.disconnect()
+    part.replace(path)
+
+
+def application_id(title: str) -> str:
+    """One for each run, since Rerun keeps one layout per application; it takes few characters in them."""
+    return "vobench-" + re.sub(r"[^A-Za-z0-9_]+", "-", title).strip("-")
+
+
+def time_columns(frames: NDArray[np.int64], t_ns: Stamps) -> list[rr.TimeColumn]:
+    """The two time lines of a recording: the frame's number, and seconds since the start."""
+    seconds = rr.TimeColumn("t", duration=t_ns.astype("timedelta64[ns]"))
+    return [rr.TimeColumn(bp.FRAME_TIMELINE, sequence=frames), seconds]
+
+
+def first_failure(statuses: Sequence[str]) -> tuple[int, int] | None:
+    """The frames around the first failed one, or None where all went well."""
+    failed = [i for i, status in enumerate(statuses) if status in FAILED]
+    if not failed:
+        return None
+    around = bp.FRAMES_AROUND_FOCUS
+    return max(0, failed[0] - around), min(len(statuses) - 1, failed[0] + around)
+
+
+def _log_pictures(stream: rr.RecordingStream, frames: Iterable[PngFrame]) -> Stamps:
+    """Log both pictures as the PNG they are, one frame in memory at a time; return the stamps."""
+    stamps = []
+    for frame in frames:
+        times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
+        for entity, png in ((bp.TRUTH_LEFT, frame.left), (bp.TRUTH_RIGHT, frame.right)):
+            columns = rr.EncodedImage.columns(blob=[png], media_type=[rr.MediaType.PNG])
+            stream.send_columns(f"{entity}/image", times, columns)
+        stamps.append(frame.t_ns)
+    return np.array(stamps, np.int64)
+
+
+def _log_paths(log: _Log, run: RunView) -> None:
+    """Both whole paths; the estimate is broken where frames have no pose."""
+    log.static(bp.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    width = rr.Radius.ui_points(1.8)
+    truth_m, estimate_m = run.ground_truth.positions_m, run.estimate.positions_m
+    log.static(bp.TRUTH_PATH, rr.LineStrips3D([truth_m], colors=GREEN, radii=width))
+    frames, samples = log.frames_of(run.estimate.t_ns)
+    strips = np.split(estimate_m[samples], np.flatnonzero(np.diff(frames) > 1) + 1)
+    log.static(bp.ESTIMATE_PATH, rr.LineStrips3D(strips, colors=ORANGE, radii=width))
+
+
+def _log_cameras(log: _Log, run: RunView) -> None:
+    """True left and right camera, and the estimated left one, which vanishes while there is no pose."""
+    right = run.ground_truth.of_mounted(run.rig.T_left_right)
+    length_m = bp.frustum_m(run.ground_truth.positions_m)
+    _log_camera(log, bp.TRUTH_LEFT, run.rig.left, run.ground_truth, length_m=length_m, color=GREEN)
+    _log_camera(log, bp.TRUTH_RIGHT, run.rig.right, right, length_m=length_m, color=GREEN)
+    _log_camera(log, bp.ESTIMATE_LEFT, run.rig.left, run.estimate, length_m=length_m, color=ORANGE)
+    frames, _ = log.frames_of(run.estimate.t_ns)
+    absent = np.setdiff1d(np.arange(len(log.t_ns)), frames)
+    log.columns(bp.ESTIMATE_LEFT, absent, rr.Clear.columns(is_recursive=[False] * len(absent)))
+
+
+def _log_camera(log: _Log, entity: str, camera: Pinhole, path: Trajectory, *, length_m: float, color: Color) -> None:
+    frames, samples = log.frames_of(path.t_ns)
+    poses, count = path.T_world_frame[samples], len(frames)
+    log.columns(entity, frames, rr.Transform3D.columns(translation=poses[:, :3, 3], mat3x3=poses[:, :3, :3]))
+    pinhole = rr.Pinhole.columns(
+        image_from_camera=[rerun_matrix(camera)] * count,
+        resolution=[[camera.width_px, camera.height_px]] * count,
+        camera_xyz=[rr.components.ViewCoordinates.RDF] * count,
+        image_plane_distance=[length_m] * count,
+        color=[color] * count,
+        line_width=[FRUSTUM_LINE] * count,
+    )
+    log.columns(entity, frames, pinhole)
+
+
+def rerun_matrix(camera: Pinhole) -> Array:
+    """The camera matrix (3, 3) for Rerun's pixels, whose centres lie at halves."""
+    K = camera.K
+    K[:2, 2] += PIXEL_CENTRE
+    return K
+
+
+def _log_error(log: _Log, run: RunView) -> None:
+    """The error of each frame as a plot with gaps, and in 3-D as a line from truth to estimate."""
+    frames, samples = log.frames_of(run.error_t_ns)
+    error_m = np.full(len(log.t_ns), np.nan)
+    error_m[frames] = run.error_m[samples]
+    log.static(bp.ERROR_PLOT, rr.SeriesLines(colors=RED, widths=1.5, names="position error (m)"))
+    log.columns(bp.ERROR_PLOT, np.arange(len(error_m)), rr.Scalars.columns(scalars=error_m))
+    _log_error_lines(log, run)
+
+
+def _log_error_lines(log: _Log, run: RunView) -> None:
+    truth, estimate = (dict(zip(*log.frames_of(path.t_ns), strict=True)) for path in (run.ground_truth, run.estimate))
+    both = sorted(truth.keys() & estimate.keys())
+    truth_m = run.ground_truth.positions_m[[truth[i] for i in both]]
+    estimate_m = run.estimate.positions_m[[estimate[i] for i in both]]
+    lengths = np.isin(np.arange(len(log.t_ns)), both).astype(int)  # no line, where there is no pose
+    lines = rr.LineStrips3D.columns(strips=np.stack([truth_m, estimate_m], 1)).partition(lengths)
+    log.static(bp.ERROR_LINE, rr.LineStrips3D.from_fields(colors=RED, radii=rr.Radius.ui_points(1.5)))
+    log.columns(bp.ERROR_LINE, np.arange(len(lengths)), lines)
+
+
+def _log_tracks(log: _Log, tracks: Mapping[int, Tracks]) -> None:
+    """Points in the left picture; a frame without any clears those of the frame before."""
+    count = len(log.t_ns)
+    nothing = (np.zeros((0, 2)), np.zeros(0, bool))
+    rows = [tracks.get(index, nothing) for index in range(count)]
+    uv_px = np.concatenate([uv.reshape(-1, 2) for uv, _ in rows])
+    inlier = np.concatenate([inlier for _, inlier in rows])
+    lengths = [len(uv) for uv, _ in rows]
+    colors = np.where(inlier[:, None], np.array(GREEN, np.uint8), np.array(RED, np.uint8))
+    columns = rr.Points2D.columns(positions=uv_px + PIXEL_CENTRE, colors=colors).partition(lengths)
+    log.static(bp.LEFT_TRACKS, rr.Points2D.from_fields(radii=TRACK_RADIUS))
+    log.columns(bp.LEFT_TRACKS, np.arange(count), columns)
+
+
+def _log_statuses(log: _Log, statuses: Sequence[str]) -> None:
+    """A row where the status changes: Rerun draws it until the next one."""
+    known = dict.fromkeys([*STATUS_COLORS, *statuses])
+    colors = [STATUS_COLORS.get(status, (128, 128, 128)) for status in known]
+    log.static(bp.STATUS, rr.StateConfiguration(values=list(known), colors=colors))
+    changes = [i for i, status in enumerate(statuses) if i == 0 or status != statuses[i - 1]]
+    states = rr.StateChange.columns(state=[statuses[i] for i in changes])
+    log.columns(bp.STATUS, np.array(changes, np.int64), states)
