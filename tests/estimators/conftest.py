@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
+from vobench.catalog.manifest import read_manifest
 from vobench.estimator import Estimator, Frame, Result
 from vobench.estimator.load import load
-from vobench.estimator.manifest import read_manifest
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import Rig
@@ -118,7 +118,7 @@ def accuracy(results: Sequence[Result], T_world_frame: Array) -> Accuracy:
 def started(name: str, rig: Rig, **params: object) -> Estimator:
     """The estimator of this name from the folder, started with its manifest's parameters."""
     manifest = read_manifest(ESTIMATORS / name)
-    estimator = load(ESTIMATORS / name, manifest)
+    estimator = load(ESTIMATORS / name, manifest.class_path, name=name)
     estimator.start(rig, {**manifest.params, **params}, seed=0)
     return estimator
 

@@ -10,44 +10,43 @@ from types import ModuleType
 from typing import cast
 
 from vobench.errors import VobenchError
-from vobench.estimator.manifest import Manifest
 from vobench.estimator.protocol import Estimator
 
 NAMESPACE = "vobench_estimators"
 
 
-def load(folder: Path, manifest: Manifest) -> Estimator:
-    """A new estimator from the class that the manifest names; relative imports in its folder work.
+def load(folder: Path, class_path: str, *, name: str) -> Estimator:
+    """A new estimator from `file:Class` in a folder, imported as the package `vobench_estimators.<name>`.
 
     Raises VobenchError, one line, where the plugin cannot be imported, found or constructed.
     """
-    folder = folder.resolve()
-    file = folder / f"{manifest.module_name.replace('.', '/')}.py"
+    folder, (module_name, _, class_name) = folder.resolve(), class_path.partition(":")
+    file = folder / f"{module_name.replace('.', '/')}.py"
     if not file.is_file():
-        raise VobenchError(f"estimator {manifest.name!r} says class: {manifest.class_path}, but there is no {file}")
-    made = getattr(_module(folder, manifest, file), manifest.class_name, None)
+        raise VobenchError(f"estimator {name!r} says class: {class_path}, but there is no {file}")
+    made = getattr(_module(folder, f"{NAMESPACE}.{name}", module_name), class_name, None)
     if not isinstance(made, type):
-        raise VobenchError(f"estimator {manifest.name!r} has no class {manifest.class_name!r}: {file}")
+        raise VobenchError(f"estimator {name!r} has no class {class_name!r}: {file}")
     missing = [verb for verb in ("start", "process") if not callable(getattr(made, verb, None))]
     if missing:
-        raise VobenchError(f"{manifest.class_name} lacks the method {' and '.join(missing)}: {file}")
+        raise VobenchError(f"{class_name} lacks the method {' and '.join(missing)}: {file}")
     try:
         return cast("Estimator", made())
     except Exception as error:  # the user's code may raise anything
-        raise VobenchError(f"{manifest.class_name}() {_cause(error, file)}") from error
+        raise VobenchError(f"{class_name}() {_cause(error, folder)}") from error
 
 
-def _module(folder: Path, manifest: Manifest, file: Path) -> ModuleType:
+def _module(folder: Path, package: str, module_name: str) -> ModuleType:
     """The module with the class, freshly imported from this folder and no other of the same name."""
-    package = f"{NAMESPACE}.{manifest.name}"
     for name in [name for name in sys.modules if name == package or name.startswith(f"{package}.")]:
         del sys.modules[name]
     importlib.invalidate_caches()
     try:
         _open_package(package, folder)
-        return importlib.import_module(f"{package}.{manifest.module_name}")
+        return importlib.import_module(f"{package}.{module_name}")
     except Exception as error:
-        raise VobenchError(f"estimator {manifest.name!r} cannot be imported: {_cause(error, file)}") from error
+        name = package.removeprefix(f"{NAMESPACE}.")
+        raise VobenchError(f"estimator {name!r} cannot be imported: {_cause(error, folder)}") from error
 
 
 def _open_package(package: str, folder: Path) -> None:
@@ -64,10 +63,10 @@ def _open_package(package: str, folder: Path) -> None:
         loader.exec_module(module)
 
 
-def _cause(error: Exception, file: Path) -> str:
+def _cause(error: Exception, folder: Path) -> str:
     """What was raised, and the innermost line of the plugin that raised it."""
     if isinstance(error, SyntaxError):
         return f"SyntaxError: {error.msg}: {error.filename}:{error.lineno}"
-    inside = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).is_relative_to(file.parent)]
-    place = f"{inside[-1].filename}:{inside[-1].lineno}" if inside else str(file)
+    inside = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).is_relative_to(folder)]
+    place = f"{inside[-1].filename}:{inside[-1].lineno}" if inside else str(folder)
     return f"{type(error).__name__}: {' '.join(str(error).split())}: {place}"
