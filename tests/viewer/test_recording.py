@@ -31,7 +31,7 @@ def test_every_entity_has_its_rows(rrd):
         found[chunk.entity_path, chunk.is_static] += chunk.num_rows
     for entity in ("left/image", "left/tracks", "right/image"):
         assert found[f"/world/ground_truth/{entity}", False] == 12
-    assert found["/error_m", False] == found["/world/error", False] == 12
+    assert found["/error_mm", False] == found["/world/error", False] == 12
     assert found["/status", False] == 3
     for entity in ("/world/ground_truth/path", "/world/estimate/path", "/summary", "/status"):
         assert found[entity, True] == 1
@@ -77,7 +77,7 @@ def test_estimated_camera_vanishes_while_lost(rrd):
 def test_estimated_path_and_error_have_a_gap_where_lost(rrd):
     (path,) = rows(rrd, "/world/estimate/path", static=True)
     assert [len(strip) for strip in path["LineStrips3D:strips"]] == [5, 5]
-    error = values(rrd, "/error_m", "Scalars:scalars")
+    error = values(rrd, "/error_mm", "Scalars:scalars")
     assert [frame for frame, (value,) in error.items() if np.isnan(value)] == [5, 6]
     lines = values(rrd, "/world/error", "LineStrips3D:strips")
     assert [frame for frame, strips in lines.items() if not strips] == [5, 6]
@@ -109,7 +109,7 @@ def test_run_that_failed_at_once_can_still_be_looked_at(run, tmp_path, kept):
 
 def test_saving_twice_holds_the_same(run, rrd, tmp_path):
     save_run(tmp_path / "again.rrd", run)
-    for entity in (f"{LEFT}/tracks", LEFT, "/error_m"):
+    for entity in (f"{LEFT}/tracks", LEFT, "/error_mm"):
         again, before = rows(tmp_path / "again.rrd", entity), rows(rrd, entity)
         for row in (*again, *before):
             row.pop("rerun.controls.RowId")

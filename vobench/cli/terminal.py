@@ -7,7 +7,15 @@ from typing import Any, TypeVar
 
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 
 from vobench.report.leaderboard import Board
@@ -58,12 +66,15 @@ class Bars:
     def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
         """The same items, counted on a bar that goes when they are through."""
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=self._console, transient=True) as progress:
+        with self._progress(*columns) as progress:
             yield from progress.track(items, total=total, description=what)
 
     @contextmanager
     def step(self, what: str) -> Iterator[None]:
         """A spinner around work of unknown length."""
-        with Progress(SpinnerColumn(), TextColumn(what), console=self._console, transient=True) as progress:
+        with self._progress(SpinnerColumn(), TextColumn(what)) as progress:
             progress.add_task(what)
             yield
+
+    def _progress(self, *columns: ProgressColumn) -> Progress:
+        return Progress(*columns, console=self._console, transient=True, disable=not self._console.is_terminal)

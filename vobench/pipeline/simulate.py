@@ -38,7 +38,7 @@ def is_simulated(case: Case, store: Store) -> bool:
 def sequence_inputs(case: Case) -> dict[str, Any]:
     """All that a sequence's bytes depend on; the names of the variants are not among it."""
     return {
-        "case": case.model_dump(mode="json", exclude={"variant": True, "scene": {"summary"}}),
+        "case": case.model_dump(mode="json", exclude={"name": True, "variant": True, "scene": {"summary"}}),
         "code": code_digest("geometry", "robot", "scene", "sensor", "render", "sequence"),
         "libraries": library_versions(*LIBRARIES),
     }

@@ -47,7 +47,7 @@ def html(folder: RunFolder, scores: list[RunScore], boards: list[Board]) -> str:
     colours = {name: COLOURS[i % len(COLOURS)] for i, name in enumerate(names)}
     cases = sorted({score.case for score in scores})
     return environment.get_template("leaderboard.html").render(
-        title=scores[0].variant.get("suite", folder.path.parent.name),
+        title=folder.path.parent.name,
         boards=boards,
         headings=table.HEADINGS,
         cells=table.cells,

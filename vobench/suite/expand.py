@@ -21,9 +21,11 @@ AXES = ("scene", "lighting", "rig", "trajectory", "camera")
 class Case(Strict):
     """One sequence to be made: everything it depends on, resolved.
 
-    `variant` names the case's place on each of AXES; `seed` is the suite's.
+    `variant` names the case's place on each of AXES; `name` keeps those that differ within the suite,
+    and so is unique there and fit for a folder. `seed` is the suite's.
     """
 
+    name: str
     variant: dict[str, str]
     scene: SceneFile
     lighting: dict[str, LampOverride]
@@ -31,11 +33,6 @@ class Case(Strict):
     trajectory: TrajectorySpec
     camera: CameraSpec
     seed: int
-
-    @property
-    def name(self) -> str:
-        """The variants joined: unique in the suite, and fit for a folder's name."""
-        return "-".join(self.variant.values())
 
     def build_scene(self) -> Scene:
         """The scene under this case's lighting."""
@@ -124,12 +121,15 @@ def _entrant(spec: EstimatorSpec) -> Entrant:
 
 
 def _cases(suite: Suite) -> Iterator[Case]:
-    scenes = {name: yaml_file.read(catalog.find("scene", name).path, SceneFile) for name in suite.scenes}
-    axes = (scenes, suite.lightings, suite.rigs, suite.trajectories, suite.cameras)
+    entries = [catalog.find("scene", name) for name in suite.scenes]
+    scenes = {entry.name: yaml_file.read(entry.path, SceneFile) for entry in entries}
+    axes = tuple(map(tuple, (scenes, suite.lightings, suite.rigs, suite.trajectories, suite.cameras)))
     for names in product(*axes):
         scene, lighting, rig, trajectory, camera = names
+        differing = [name for name, axis in zip(names, axes, strict=True) if len(axis) > 1]
         case = Case(
-            variant=dict(zip(AXES, (scenes[scene].name, *names[1:]), strict=True)),
+            name="-".join(differing) or trajectory,
+            variant=dict(zip(AXES, names, strict=True)),
             scene=scenes[scene],
             lighting=suite.lightings[lighting],
             rig=suite.rigs[rig],

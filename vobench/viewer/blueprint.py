@@ -15,7 +15,7 @@ TRUTH_LEFT, TRUTH_RIGHT = f"{WORLD}/ground_truth/left", f"{WORLD}/ground_truth/r
 ESTIMATE_LEFT = f"{WORLD}/estimate/left"
 ERROR_LINE = f"{WORLD}/error"
 LEFT_TRACKS = f"{TRUTH_LEFT}/tracks"
-ERROR_PLOT, STATUS, SUMMARY = "error_m", "status", "summary"
+ERROR_PLOT, STATUS, SUMMARY = "error_mm", "status", "summary"
 
 EYE_PITCH_DEG = 38.0
 EYE_DISTANCE_PER_RADIUS = 1.6  # fills the view with Rerun's default field of view, with a margin for frusta
@@ -30,7 +30,7 @@ def layout(truth_m: Array, estimate_m: Array, *, focus: tuple[int, int] | None) 
         _space(truth_m, seen_m),
         rrb.TimeSeriesView(
             origin=ERROR_PLOT,
-            name="Position error (m)",
+            name="Position error (mm)",
             axis_y=rrb.ScalarAxis(zoom_lock=True),
             plot_legend=rrb.PlotLegend(visible=False),
         ),

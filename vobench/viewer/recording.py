@@ -185,10 +185,10 @@ def rerun_matrix(camera: Pinhole) -> Array:
 def _log_error(log: _Log, run: RunView) -> None:
     """The error of each frame as a plot with gaps, and in 3-D as a line from truth to estimate."""
     frames, samples = log.frames_of(run.error_t_ns)
-    error_m = np.full(len(log.t_ns), np.nan)
-    error_m[frames] = run.error_m[samples]
-    log.static(bp.ERROR_PLOT, rr.SeriesLines(colors=RED, widths=1.5, names="position error (m)"))
-    log.columns(bp.ERROR_PLOT, np.arange(len(error_m)), rr.Scalars.columns(scalars=error_m))
+    error_mm = np.full(len(log.t_ns), np.nan)
+    error_mm[frames] = 1e3 * run.error_m[samples]
+    log.static(bp.ERROR_PLOT, rr.SeriesLines(colors=RED, widths=1.5, names="position error (mm)"))
+    log.columns(bp.ERROR_PLOT, np.arange(len(error_mm)), rr.Scalars.columns(scalars=error_mm))
     _log_error_lines(log, run)
 
 
