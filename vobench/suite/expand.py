@@ -123,7 +123,7 @@ def _entrant(spec: EstimatorSpec) -> Entrant:
 def _cases(suite: Suite) -> Iterator[Case]:
     entries = [catalog.find("scene", name) for name in suite.scenes]
     scenes = {entry.name: yaml_file.read(entry.path, SceneFile) for entry in entries}
-    axes = tuple(map(tuple, (scenes, suite.lightings, suite.rigs, suite.trajectories, suite.cameras)))
+    axes: list[dict[str, Any]] = [scenes, suite.lightings, suite.rigs, suite.trajectories, suite.cameras]
     for names in product(*axes):
         scene, lighting, rig, trajectory, camera = names
         differing = [name for name, axis in zip(names, axes, strict=True) if len(axis) > 1]
