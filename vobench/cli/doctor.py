@@ -65,7 +65,7 @@ def _drawing() -> Check:
     if tried.returncode == 0:
         return Check("drawing without a display (EGL)", True, "works")
     last = tried.stderr.strip().splitlines()[-1:] or [f"the probe died with {tried.returncode}"]
-    return Check("drawing without a display (EGL)", False, last[0].split("Error: ")[-1].split("; run")[0], _remedy())
+    return Check("drawing without a display (EGL)", False, last[0].split("Error: ", 1)[-1].split("; run")[0], _remedy())
 
 
 def _remedy() -> str:

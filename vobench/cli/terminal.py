@@ -32,8 +32,8 @@ def print_json(content: Any) -> None:
 
 def console() -> Console:
     """Standard output; lines are as long as they are where nobody watches."""
-    plain = Console(highlight=False)
-    return plain if plain.is_terminal else Console(highlight=False, width=200)
+    plain = Console(markup=False, highlight=False)
+    return plain if plain.is_terminal else Console(markup=False, highlight=False, width=200)
 
 
 def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
@@ -61,7 +61,7 @@ class Bars:
     """Progress as bars on standard error; nothing where that is no terminal."""
 
     def __init__(self) -> None:
-        self._console = Console(stderr=True)
+        self._console = Console(stderr=True, markup=False)
 
     def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
         """The same items, counted on a bar that goes when they are through."""

@@ -19,7 +19,7 @@ from vobench.pipeline.workshop import Workshop
 from vobench.results import estimate_file
 from vobench.results.estimate_file import FrameRow, Outcome
 from vobench.results.store import code_digest, folder_digest, library_versions
-from vobench.sequence import Sequence
+from vobench.sequence import Sequence, StereoFrame
 from vobench.suite.expand import Run
 from vobench.trajectory.text import format_tum
 from vobench.trajectory.trajectory import Trajectory
@@ -69,10 +69,11 @@ def _frames(sequence: Sequence, needs: tuple[str, ...]) -> Iterator[Frame]:
     """What the estimator asked for, one instant at a time."""
     t_ns, ticks = sequence.encoders()
     seen = 0
-    for f in sequence.frames():
+    # Pictures that nobody asked for are not decoded.
+    for f in sequence.frames() if "stereo" in needs else sequence.png_frames():
         now = int(np.searchsorted(t_ns, f.t_ns, side="right"))
         encoders = EncoderReadings(t_ns[seen:now], ticks[seen:now]) if "encoders" in needs else None
-        left, right = (f.left, f.right) if "stereo" in needs else (None, None)
+        left, right = (f.left, f.right) if isinstance(f, StereoFrame) else (None, None)
         yield Frame(f.index, f.t_ns, left, right, encoders)
         seen = now
 

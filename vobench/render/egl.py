@@ -21,6 +21,8 @@ def context() -> Any:
     Raises MissingDependencyError where the machine has no EGL or no driver for it.
     """
     os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
+    # pyrender imports its viewer, whose pyglet would load X11's libraries, which a bare machine lacks.
+    os.environ.setdefault("PYGLET_HEADLESS", "1")
     try:
         from pyrender.platforms.egl import EGLPlatform
 
@@ -35,4 +37,6 @@ def context() -> Any:
 
 def _cause(error: Exception) -> str:
     missing = missing_libraries()
-    return f"missing lib{', lib'.join(missing)}" if missing else f"EGL says {type(error).__name__}: {error}"
+    if missing:
+        return f"missing lib{', lib'.join(missing)}"
+    return f"EGL says {type(error).__name__}: {' '.join(str(error).split())}"

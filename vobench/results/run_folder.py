@@ -1,7 +1,7 @@
 """The folder of a run of a suite, as a person reads it.
 
 runs/<suite>/<UTC stamp>_<short hash>/
-    suite.yaml        the suite as resolved
+    suite.json        the suite as resolved
     environment.json  versions and machine
     leaderboard.*     md, html, csv, json
     cases/<case>/     case.json, ground_truth.tum, sequence -> cache
@@ -23,7 +23,7 @@ from pydantic import BaseModel, ConfigDict
 from vobench.errors import InputError
 
 GROUND_TRUTH, CASE, SCORE, SEQUENCE = "ground_truth.tum", "case.json", "score.json", "sequence"
-ENVIRONMENT, SUITE, SUITE_SOURCE = "environment.json", "suite.json", "suite.yaml"
+ENVIRONMENT, SUITE = "environment.json", "suite.json"
 
 RunStatus = Literal[
     "ok", "partial", "lost", "diverged", "invalid_output", "timeout", "out_of_memory", "crashed", "refused"
