@@ -46,12 +46,12 @@ def entries(kind: Kind) -> list[Entry]:
 
 
 def find(kind: Kind, name: str) -> Entry:
-    """The entry of that name that wins; a path to a file or folder is taken as it is.
+    """The entry of that name that wins; a path, which has a / or ends in .yaml, is taken as it is.
 
     Raises UnknownNameError with the nearest name and all known ones.
     """
     path = Path(name)
-    if path.suffix in {".yaml", ".yml"} or len(path.parts) > 1:
+    if path.suffix in {".yaml", ".yml"} or "/" in name or os.sep in name:
         return _at(kind, path)
     known: dict[str, Entry] = {}
     for entry in _all(kind):
@@ -69,11 +69,13 @@ def unknown(kind: str, name: str, known: list[str]) -> str:
 
 
 def _at(kind: Kind, path: Path) -> Entry:
+    if kind == "estimator" and path.name == "estimator.yaml":
+        path = path.parent
     wanted = path / "estimator.yaml" if kind == "estimator" else path
     if not wanted.is_file():
         known = sorted({entry.name for entry in _all(kind)})
-        raise UnknownNameError(f"no {kind} file at {wanted}. Known by name: {', '.join(known)}")
-    return Entry(kind, path.name if kind == "estimator" else path.stem, path.resolve(), "path")
+        raise UnknownNameError(f"no {kind} file at {wanted}. Known by name: {', '.join(known) or 'none'}")
+    return Entry(kind, path.resolve().name if kind == "estimator" else path.stem, path.resolve(), "path")
 
 
 def _all(kind: Kind) -> Iterator[Entry]:

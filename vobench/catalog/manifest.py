@@ -6,18 +6,20 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from vobench.catalog import yaml_file
+from vobench.catalog.yaml_file import matching
 
 MANIFEST_FILE = "estimator.yaml"
+CLASS_PATH = r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*"
 
 
 class Manifest(BaseModel):
     """One estimator: its name, where its class is, which sensors it needs and whose pose it gives."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, populate_by_name=True)
 
-    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+    name: Annotated[str, matching(r"[a-z][a-z0-9_]*", "lower-case letters, digits and _, a letter first")]
     version: Annotated[str, Field(min_length=1)]
-    class_path: Annotated[str, Field(alias="class", pattern=r"^[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*$")]
+    class_path: Annotated[str, Field(alias="class"), matching(CLASS_PATH, "file:Class, as in 'estimator:Mine'")]
     needs: tuple[Literal["stereo", "encoders"], ...] = ()
     pose_of: Literal["left_camera", "body"]
     summary: Annotated[str, Field(min_length=1)]

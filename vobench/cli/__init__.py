@@ -3,6 +3,9 @@
 
 def main() -> None:
     """The entry point of the `vobench` command."""
-    from vobench.cli.app import run
+    try:
+        from vobench.cli.app import run
 
-    run()
+        run()
+    except KeyboardInterrupt:  # before `run` listens to it
+        raise SystemExit(130) from None

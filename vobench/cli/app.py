@@ -1,5 +1,7 @@
 """All of vobench's commands; what they need is imported when they run, so that --help is instant."""
 
+import json as json_module
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -17,41 +19,70 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+DEBUG = "--debug"
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 SuiteName = Annotated[str, typer.Argument(metavar="SUITE", help="A suite's name, or a path to its YAML.")]
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or runs/<suite> for its latest.")]
 
 
+class Stopped(BaseException):
+    """Ctrl-C; not a KeyboardInterrupt, which some libraries take for a failed import of theirs."""
+
+
 def run() -> None:
-    """Run a command; a user's mistake is one line and exit code 1, a stop by Ctrl-C is 130."""
+    """Run a command; a user's mistake or machine is one line and exit code 1, a stop by Ctrl-C is 130."""
+    stops: list[int] = []
+
+    def stop(number: int, _: object) -> None:
+        stops.append(number)
+        raise Stopped
+
+    signal.signal(signal.SIGINT, stop)
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a terminal without ° gets a ? for it
     try:
-        app()
-    except VobenchError as error:
-        _fail(str(error), error, code=1)
-    except KeyboardInterrupt as error:
-        _fail("stopped; finished stages are kept, the same command goes on from there", error, code=130)
+        # Nobody remembers whether --debug goes before the command or after it.
+        app([word for word in sys.argv[1:] if word != DEBUG])
+    except (VobenchError, OSError, Stopped) as error:
+        if stops:
+            _fail("stopped; finished stages are kept, the same command goes on from there", error, code=130)
+        _fail(_sentence(error), error, code=1)
+
+
+def _sentence(error: BaseException) -> str:
+    """One line; the system's errors with what it is about in front."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.strerror}: {error.filename}"
+    return " ".join(str(error).split())
 
 
 def _fail(sentence: str, error: BaseException, *, code: int) -> None:
-    if "--debug" in sys.argv:
+    if DEBUG in sys.argv:
         raise error
+    if "--json" in sys.argv:
+        print(json_module.dumps({"error": sentence}, ensure_ascii=False))
     print(f"vobench: {sentence}", file=sys.stderr)
     raise SystemExit(code) from None
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from vobench import __version__
+
+        print(__version__)
+        raise typer.Exit
 
 
 @app.callback()
 def common(
     *,
-    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback where there would be one line.")] = False,
-    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    debug: Annotated[bool, typer.Option(DEBUG, help="Show a traceback where there would be one line.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
 ) -> None:
     """Simulate, run and score visual odometry, and see where it breaks."""
-    del debug  # read by _fail, which also hears of mistakes made before options are parsed
-    if version:
-        from vobench import __version__
-
-        print(__version__)
-        raise typer.Exit
+    del debug, version  # the one is read by _fail, the other done by its callback
 
 
 @app.command("run")
@@ -103,7 +134,7 @@ def score(
     est: Annotated[Path, typer.Argument(metavar="EST", help="Estimate: a TUM file.")],
     *,
     align: Annotated[str, typer.Option("--align", "-a", help="none, origin, se3 or sim3.")] = "se3",
-    delta: Annotated[int, typer.Option("--delta", "-d", help="RPE over so many frames.")] = 1,
+    delta: Annotated[int, typer.Option("--delta", "-d", min=1, help="RPE over so many frames.")] = 1,
     t_max_diff: Annotated[float, typer.Option(help="Poses further apart than this are no pair, in seconds.")] = 0.01,
     json: Json = False,
 ) -> None:
@@ -117,14 +148,16 @@ def score(
 def report(
     run: RunPath,
     *,
-    form: Annotated[str, typer.Option("--format", help="terminal, md, csv, json, latex or html.")] = "terminal",
+    form: Annotated[
+        str | None, typer.Option("--format", help="terminal, md, csv, json, latex or html; --out's ending says it too.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Write to this file instead of the terminal.")] = None,
     json: Json = False,
 ) -> None:
     """Print a run's leaderboard, in any form."""
     from vobench.cli import reporting
 
-    reporting.show(run, form="json" if json else form, out=out)
+    reporting.show(run, form=form, out=out, as_json=json)
 
 
 @app.command()

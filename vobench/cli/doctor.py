@@ -36,6 +36,8 @@ def show(*, fix: bool, as_json: bool) -> None:
         rows = [["ok" if c.well else "MISSING", c.check, c.result] for c in checks]
         terminal.console().print(terminal.table("", ["", "check", "result"], rows))
     ill = [c for c in checks if not c.well]
+    if ill and as_json:
+        raise SystemExit(1)  # the one object has said it all
     if ill:
         raise MissingDependencyError("; ".join(f"{c.check}: {c.remedy}" for c in ill))
 
@@ -65,11 +67,12 @@ def _drawing() -> Check:
     if tried.returncode == 0:
         return Check("drawing without a display (EGL)", True, "works")
     last = tried.stderr.strip().splitlines()[-1:] or [f"the probe died with {tried.returncode}"]
-    return Check("drawing without a display (EGL)", False, last[0].split("Error: ", 1)[-1].split("; run")[0], _remedy())
+    result, _, remedy = last[0].split("Error: ", 1)[-1].partition("; run: ")
+    return Check("drawing without a display (EGL)", False, result, f"run: {_as_we_are(remedy or EGL_REMEDY)}")
 
 
-def _remedy() -> str:
-    return f"run: {'' if os.geteuid() == 0 else 'sudo '}{EGL_REMEDY}"
+def _as_we_are(command: str) -> str:
+    return command if os.geteuid() == 0 else command.replace("apt-get", "sudo apt-get")
 
 
 def _installed_drawing() -> Check:

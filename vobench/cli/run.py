@@ -5,19 +5,19 @@ from typing import Any
 
 from vobench.cli import terminal
 from vobench.pipeline.run import run_suite
-from vobench.pipeline.simulate import drive_case, is_simulated
+from vobench.pipeline.simulate import drive_all, is_simulated
 from vobench.pipeline.workshop import Workshop
 from vobench.report import files
 from vobench.report.table import as_json as boards_as_json
 from vobench.results.store import default_store
-from vobench.suite.expand import Case, plan, read_suite
+from vobench.robot.drive import Drive
+from vobench.suite.expand import Case, read_plan
 
 
 def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) -> None:
     """Run a suite and print its leaderboard and where everything lies."""
-    planned = plan(read_suite(suite), only_estimators=estimators)
-    for case in planned.cases:
-        drive_case(case)  # a target that cannot be reached is said before hours of rendering
+    planned = read_plan(suite, only_estimators=estimators)
+    drive_all(planned)
     shop = Workshop(default_store(), terminal.Bars())
     folder = run_suite(planned, root=out, shop=shop, finish=files.write_reports)
     boards = files.boards_of(folder, folder.scores())
@@ -30,8 +30,9 @@ def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) ->
 
 def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     """Validate a suite and print what it comes to."""
-    planned = plan(read_suite(suite), only_estimators=estimators)
-    cases = [_case_facts(case) for case in planned.cases]
+    planned = read_plan(suite, only_estimators=estimators)
+    drives = drive_all(planned)
+    cases = [_case_facts(case, drives[case.variant["trajectory"]]) for case in planned.cases]
     entrants = [
         {"estimator": e.label, "version": e.manifest.version, "needs": list(e.manifest.needs), "path": str(e.folder)}
         for e in planned.entrants
@@ -50,8 +51,7 @@ def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     out.print(f"{len(cases)} cases, {len(entrants)} estimators, {runs} runs: the suite is valid")
 
 
-def _case_facts(case: Case) -> dict[str, Any]:
-    motion = drive_case(case)
+def _case_facts(case: Case, motion: Drive) -> dict[str, Any]:
     return {
         "case": case.name,
         "frames": len(motion.t_ns),

@@ -12,12 +12,15 @@ from vobench.trajectory.text import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
 MCAP_MAGIC = b"\x89MCAP"
+MAX_DIFF_S = 1e6
 
 
 def show(gt: Path, est: Path, *, align: str, delta: int, t_max_diff_s: float, as_json: bool) -> None:
     """Score two trajectories and print every metric with its identity."""
     if align not in get_args(Kind):
         raise UnknownNameError(unknown("alignment", align, list(get_args(Kind))))
+    if not 0 <= t_max_diff_s <= MAX_DIFF_S:
+        raise InputError(f"--t-max-diff should be 0 to {MAX_DIFF_S:g} seconds, got {t_max_diff_s:g}")
     kind = cast("Kind", align)
     settings = ScoreSettings(alignment=kind, max_diff_ns=round(t_max_diff_s * 1e9), rpe_delta_frames=delta)
     scored = score(read_trajectory(gt), read_trajectory(est), settings=settings)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from vobench.cli import terminal
-from vobench.errors import MissingDependencyError
+from vobench.errors import InputError, MissingDependencyError
 from vobench.results.run_folder import open_run
 from vobench.viewer import save_run
 from vobench.viewer.run_view import pick, run_view
@@ -14,6 +14,9 @@ def show(run: Path, *, case: str | None, estimator: str | None, save: Path | Non
     folder = open_run(run)
     chosen = pick(folder.scores(), case=case, estimator=estimator)
     path = save or folder.estimate(chosen.case, chosen.estimator, chosen.repeat) / "run.rrd"
+    if path.is_dir() or not path.parent.is_dir():
+        wrong = "a folder" if path.is_dir() else "in a folder that is not there"
+        raise InputError(f"--save should be a file to write, but this is {wrong}: {path}")
     save_run(path, run_view(folder, chosen))
     if as_json:
         terminal.print_json(

@@ -17,7 +17,8 @@ from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.pipeline.workshop import Workshop
 from vobench.results import estimate_file
-from vobench.results.estimate_file import FrameRow, Outcome
+from vobench.results.estimate_file import FINISHED, FrameRow, Outcome
+from vobench.results.run_folder import write_json
 from vobench.results.store import code_digest, folder_digest, library_versions
 from vobench.sequence import Sequence, StereoFrame
 from vobench.suite.expand import Run
@@ -28,8 +29,15 @@ LIMITS = Limits()
 
 
 def estimate(run: Run, sequence: Path, shop: Workshop) -> Path:
-    """The folder of a run's estimate on its case's sequence; made where the store has none of these inputs."""
-    return shop.store.get("estimates", _inputs(run, sequence), lambda folder: _run(run, sequence, folder, shop))
+    """The folder of a run's estimate on its case's sequence; made where the store has none of these inputs.
+
+    A failure is tried again: it may have been the machine's, or a library's that is there by now.
+    """
+    inputs = _inputs(run, sequence)
+    held = shop.store.path("estimates", inputs)
+    if held.is_dir() and estimate_file.read_outcome(held).kind != FINISHED:
+        shop.store.forget("estimates", inputs)
+    return shop.store.get("estimates", inputs, lambda folder: _run(run, sequence, folder, shop))
 
 
 def _inputs(run: Run, sequence: Path) -> dict[str, Any]:
@@ -49,7 +57,7 @@ def _inputs(run: Run, sequence: Path) -> dict[str, Any]:
 def _run(run: Run, recording: Path, folder: Path, shop: Workshop) -> None:
     """Feed the sequence to the estimator; whatever happens, the folder is complete afterwards."""
     sequence, manifest, log = Sequence.open(recording), run.entrant.manifest, folder / estimate_file.LOG
-    outcome = Outcome(kind="finished", reason="")
+    outcome = Outcome(kind=FINISHED, reason="")
     with (
         _Keeper(folder, sequence.rig, manifest.pose_of) as keeper,
         EstimatorProcess(
@@ -62,7 +70,7 @@ def _run(run: Run, recording: Path, folder: Path, shop: Workshop) -> None:
                 keeper.keep(frame, process.process(frame))
         except EstimatorFailure as failure:
             outcome = Outcome(kind=failure.kind, reason=failure.reason)
-    (folder / estimate_file.OUTCOME).write_text(json.dumps(outcome.model_dump(), indent=1) + "\n")
+    write_json(folder / estimate_file.OUTCOME, outcome.model_dump())
 
 
 def _frames(sequence: Sequence, needs: tuple[str, ...]) -> Iterator[Frame]:
@@ -91,7 +99,7 @@ class _Keeper:
         """Add one frame."""
         r = answer.result
         if r.T_odom_frame is not None and r.status is not Status.LOST:
-            T = se3.inverse(self._T_frame_left) @ np.asarray(r.T_odom_frame, float) @ self._T_frame_left
+            T = se3.inverse(self._T_frame_left) @ r.T_odom_frame @ self._T_frame_left
             self._poses.append((frame.t_ns, T))
         stats = json.dumps({key: float(f"{value:.6g}") for key, value in sorted(r.stats.items())})
         row = FrameRow(frame.index, frame.t_ns, str(r.status), r.reason, stats, answer.wall_ms, answer.cpu_ms)
@@ -100,7 +108,7 @@ class _Keeper:
             self._tracks.writestr(_member(frame.index), _table(r.tracks))
 
     def __enter__(self) -> "_Keeper":
-        self._file = (self._folder / estimate_file.FRAMES).open("w", newline="")
+        self._file = (self._folder / estimate_file.FRAMES).open("w", newline="", encoding="utf-8")
         self._rows = csv.writer(self._file)
         self._rows.writerow(FrameRow.columns())
         self._tracks = zipfile.ZipFile(self._folder / estimate_file.TRACKS, "w", zipfile.ZIP_DEFLATED)
@@ -113,7 +121,7 @@ class _Keeper:
         if self._poses:
             stamps = np.array([t for t, _ in self._poses], np.int64)
             text = format_tum(Trajectory(stamps, np.stack([T for _, T in self._poses])))
-        (self._folder / estimate_file.ESTIMATE).write_text(text)
+        (self._folder / estimate_file.ESTIMATE).write_text(text, encoding="utf-8")
 
 
 def _member(index: int) -> zipfile.ZipInfo:

@@ -21,7 +21,7 @@ from vobench.results.run_folder import (
     SUITE,
     RunFolder,
     RunScore,
-    new_run,
+    make_run,
     write_json,
 )
 from vobench.results.store import digest, library_versions
@@ -40,12 +40,13 @@ def run_suite(plan: Plan, *, root: Path, shop: Workshop, finish: Finish) -> RunF
     `finish` adds reports to the folder before it gets its final name under `root`.
     """
     suite = plan.suite.model_dump(mode="json")
-    with new_run(root, plan.suite.name, digest(suite)) as folder:
+
+    def fill(folder: RunFolder) -> None:
         write_json(folder.path / SUITE, suite)
         write_json(folder.path / ENVIRONMENT, _environment())
-        scores = [score for case in plan.cases for score in _run_case(plan, case, folder, shop)]
-        finish(folder, scores)
-    return RunFolder((root / plan.suite.name / "latest").resolve())
+        finish(folder, [score for case in plan.cases for score in _run_case(plan, case, folder, shop)])
+
+    return make_run(root, plan.suite.name, digest(suite), fill)
 
 
 def left_truth(sequence: Path) -> Trajectory:
@@ -59,7 +60,7 @@ def _run_case(plan: Plan, case: Case, folder: RunFolder, shop: Workshop) -> list
     target = folder.case(case.name)
     target.mkdir(parents=True)
     write_json(target / CASE, case.model_dump(mode="json"))
-    (target / GROUND_TRUTH).write_text(format_tum(gt))
+    (target / GROUND_TRUTH).write_text(format_tum(gt), encoding="utf-8")
     (target / SEQUENCE).symlink_to(sequence.resolve())
     scores = []
     for run in plan.runs(case):

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from vobench.errors import AlignmentError
 from vobench.metric.score import Score, score
 from vobench.results import estimate_file
 from vobench.results.run_folder import RunScore, RunStatus
@@ -15,8 +16,12 @@ LOST_COVERAGE = 0.5
 
 def score_run(run: Run, estimate: Path, gt: Trajectory) -> RunScore:
     """Score a run's estimate against the left camera's true path."""
-    outcome, scored = estimate_file.read_outcome(estimate), score_estimate(estimate, gt)
-    status, reason = _status(outcome, scored, gt)
+    outcome = estimate_file.read_outcome(estimate)
+    try:
+        scored = score_estimate(estimate, gt)
+        status, reason = _status(outcome, scored, gt)
+    except AlignmentError as error:
+        scored, status, reason = None, "diverged", str(error)
     return RunScore(
         case=run.case.name,
         variant=run.case.variant,
@@ -34,13 +39,13 @@ def score_run(run: Run, estimate: Path, gt: Trajectory) -> RunScore:
 def score_estimate(estimate: Path, gt: Trajectory) -> Score | None:
     """The score of an estimate's folder, None where it holds no pose at all."""
     file = estimate / estimate_file.ESTIMATE
-    text = file.read_text()
+    text = file.read_text(encoding="utf-8")
     return score(gt, parse_tum(text, name=str(file))) if text else None
 
 
 def _status(outcome: estimate_file.Outcome, scored: Score | None, gt: Trajectory) -> tuple[RunStatus, str]:
     """How the run ended, the gravest first; a run that died is not saved by what it had answered before."""
-    if outcome.kind != "finished":
+    if outcome.kind != estimate_file.FINISHED:
         return outcome.kind, outcome.reason  # type: ignore[return-value]  # EstimatorFailure's kinds are statuses
     if scored is None or scored.coverage.ratio < LOST_COVERAGE:
         covered = scored.coverage.ratio if scored else 0.0

@@ -2,11 +2,13 @@
 
 import hashlib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from vobench.errors import MotionError
 from vobench.pipeline.workshop import Workshop
 from vobench.render.bake import BakedScene, BakeSettings, bake
 from vobench.render.baked_file import load_baked, save_baked
@@ -19,7 +21,7 @@ from vobench.robot.slip import SLIPS, STREAMS
 from vobench.sensor.camera import CAMERAS, CameraSensor, FixedPattern, Grey, Radiance, expose, fixed_pattern
 from vobench.sensor.encoder import ENCODERS, ticks
 from vobench.sequence import SequenceWriter
-from vobench.suite.expand import Case
+from vobench.suite.expand import Case, Plan
 
 BAKE = BakeSettings()
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "pyrender", "embreex", "mcap", "rosbags")
@@ -58,6 +60,35 @@ def drive_case(case: Case) -> Drive:
         max_time_s=t.max_time_s,
         rngs={stream: generator(case.seed, f"slip.{stream}") for stream in STREAMS},
     )
+
+
+def drive_all(plan: Plan) -> dict[str, Drive]:
+    """The drive of each trajectory of a plan, by its name: said before hours of rendering.
+
+    Raises SuiteError or MotionError where a target cannot be reached, or a camera leaves the room.
+    """
+    drives: dict[str, Drive] = {}
+    for case in plan.cases:
+        name = case.variant["trajectory"]
+        with plan.at("trajectories", name):
+            if name not in drives:
+                drives[name] = drive_case(case)
+            _check_in_room(case, drives[name])
+    return drives
+
+
+def _check_in_room(case: Case, motion: Drive) -> None:
+    rig, size_m = case.build_rig(), np.array(case.scene.room.size_m)
+    for T_body_camera in (rig.T_body_left, rig.T_body_right):
+        at_m = (motion.T_world_body @ T_body_camera)[:, :3, 3]
+        outside = (np.abs(at_m[:, :2]) >= size_m[:2] / 2).any(1) | (at_m[:, 2] >= size_m[2])
+        if outside.any():
+            first, size = int(np.flatnonzero(outside)[0]), " × ".join(f"{side:g}" for side in size_m)
+            where = ", ".join(f"{x:.2f}" for x in at_m[first])
+            raise MotionError(
+                f"a camera of rig '{case.variant['rig']}' leaves the room of scene '{case.variant['scene']}' "
+                f"({size} m around the origin) after {motion.t_ns[first] / 1e9:.1f} s, at ({where}) m"
+            )
 
 
 def generator(seed: int, stream: str) -> np.random.Generator:
@@ -117,8 +148,6 @@ class _Chip:
 
 
 def _sensor(case: Case) -> CameraSensor:
-    from dataclasses import replace
-
     return replace(CAMERAS[case.camera.sensor], exposure_gain=case.camera.exposure_gain)
 
 

@@ -22,7 +22,7 @@ from vobench.scene.texture import Map, reflectance
 class BakeSettings:
     """How finely light is sampled; rays per sample are squares so that they can be stratified."""
 
-    spacing_m: float = 0.025
+    spacing_m: float = 0.03
     light_rays: int = 16
     indirect_spacing_m: float = 0.1
     indirect_rays: int = 256

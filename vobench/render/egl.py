@@ -2,12 +2,15 @@
 
 import ctypes.util
 import os
+import re
+import sys
+from importlib.metadata import version
 from typing import Any
 
 from vobench.errors import MissingDependencyError
 
 EGL_PACKAGES = ("libegl1", "libgl1", "libopengl0", "libgl1-mesa-dri")
-EGL_REMEDY = f"apt-get install -y {' '.join(EGL_PACKAGES)}"
+EGL_REMEDY = f"apt-get update && apt-get install -y {' '.join(EGL_PACKAGES)}"
 
 
 def missing_libraries() -> list[str]:
@@ -18,8 +21,9 @@ def missing_libraries() -> list[str]:
 def context() -> Any:
     """A current OpenGL context of pyrender's EGL platform.
 
-    Raises MissingDependencyError where the machine has no EGL or no driver for it.
+    Raises MissingDependencyError where the machine has no EGL or no driver for it, or PyOpenGL is too old.
     """
+    _check_opengl()
     os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
     # pyrender imports its viewer, whose pyglet would load X11's libraries, which a bare machine lacks.
     os.environ.setdefault("PYGLET_HEADLESS", "1")
@@ -33,6 +37,26 @@ def context() -> Any:
     except Exception as error:  # PyOpenGL fails with whatever it trips over first
         raise MissingDependencyError(f"cannot draw without a display ({_cause(error)}); run: {EGL_REMEDY}") from error
     return platform
+
+
+def release(platform: Any) -> None:
+    """Free the context that `context` made.
+
+    pyrender's own `delete_context` ends the display too, which all contexts of a process share.
+    """
+    from OpenGL import EGL
+
+    display, context = platform._egl_display, platform._egl_context
+    EGL.eglMakeCurrent(display, EGL.EGL_NO_SURFACE, EGL.EGL_NO_SURFACE, EGL.EGL_NO_CONTEXT)
+    EGL.eglDestroyContext(display, context)
+
+
+def _check_opengl() -> None:
+    """Pip, unlike uv in this repository, obeys pyrender's pin of PyOpenGL 3.1.0, which Python 3.12 breaks."""
+    found = version("PyOpenGL")
+    if sys.version_info >= (3, 12) and [int(n) for n in re.findall(r"\d+", found)[:3]] < [3, 1, 10]:
+        remedy = f"{sys.executable} -m pip install 'PyOpenGL>=3.1.10'"
+        raise MissingDependencyError(f"cannot draw with PyOpenGL {found} on Python 3.12 or later; run: {remedy}")
 
 
 def _cause(error: Exception) -> str:

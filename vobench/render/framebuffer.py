@@ -104,7 +104,8 @@ class LinearRenderer(Renderer):  # type: ignore[misc]
         GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._main_fb)
         GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 1)
         buffer = GL.glReadPixels(0, 0, *small, GL.GL_RED, GL.GL_FLOAT)
-        return np.frombuffer(buffer, np.float32).reshape(small[1], small[0])[::-1]
+        # OpenGL's first row is the lowest; a copy, as OpenCV takes no array that runs backwards.
+        return np.ascontiguousarray(np.frombuffer(buffer, np.float32).reshape(small[1], small[0])[::-1])
 
 
 def _framebuffer(width: int, height: int) -> tuple[Any, Any, Any]:

@@ -58,7 +58,7 @@ class RasterRenderer:
         """Free the OpenGL context and all in it."""
         self._platform.make_current()
         self._renderer.delete()
-        self._platform.delete_context()
+        egl.release(self._platform)
 
 
 def _mesh(baked: BakedScene) -> object:

@@ -5,7 +5,7 @@ crash, loss or divergence can rank before an estimator that survived every case.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from statistics import fmean
 
@@ -93,6 +93,4 @@ def _mean(runs: list[RunScore], metric: str, statistic: str, scale: float) -> fl
 
 
 def _with_rank(row: Row, rank: int) -> Row:
-    from dataclasses import replace
-
     return replace(row, rank=rank)

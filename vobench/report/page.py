@@ -47,7 +47,7 @@ def html(folder: RunFolder, scores: list[RunScore], boards: list[Board]) -> str:
     colours = {name: COLOURS[i % len(COLOURS)] for i, name in enumerate(names)}
     cases = sorted({score.case for score in scores})
     return environment.get_template("leaderboard.html").render(
-        title=folder.path.parent.name,
+        title=folder.path.resolve().parent.name,
         boards=boards,
         headings=table.HEADINGS,
         cells=table.cells,
@@ -59,7 +59,7 @@ def html(folder: RunFolder, scores: list[RunScore], boards: list[Board]) -> str:
 
 def _plot(folder: RunFolder, case: str, scores: list[RunScore], colours: dict[str, str]) -> Plot:
     truth_file = folder.case(case) / GROUND_TRUTH
-    truth = parse_tum(truth_file.read_text(), name=str(truth_file)).positions_m[:, :2]
+    truth = parse_tum(truth_file.read_text(encoding="utf-8"), name=str(truth_file)).positions_m[:, :2]
     low, span = truth.min(0), max(float(np.ptp(truth, axis=0).max()), 1e-3)
     px_per_m = (PLOT_PX - 2 * MARGIN_PX) / span
     middle = low + np.ptp(truth, axis=0) / 2
@@ -77,7 +77,7 @@ def _plot(folder: RunFolder, case: str, scores: list[RunScore], colours: dict[st
 def _aligned(folder: RunFolder, score: RunScore) -> Array:
     """An estimate's positions (N, 2) from above, after the alignment that its score states."""
     file = folder.estimate(score.case, score.estimator, score.repeat) / estimate_file.ESTIMATE
-    positions = parse_tum(file.read_text(), name=str(file)).positions_m
+    positions = parse_tum(file.read_text(encoding="utf-8"), name=str(file)).positions_m
     a = score.score["alignment"] if score.score else {}
     aligned: Array = a["scale"] * positions @ np.array(a["rotation"]).T + a["translation"]
     return aligned[:, :2]

@@ -17,10 +17,11 @@ FRAMES = "frames.csv"
 TRACKS = "tracks.zip"
 OUTCOME = "outcome.json"
 LOG = "log.txt"
+FINISHED = "finished"
 
 
 class Outcome(BaseModel):
-    """How an estimator's process ended: finished, or the kind of its failure and why."""
+    """How an estimator's process ended: FINISHED, or the kind of its failure and why."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -53,12 +54,12 @@ class FrameRow:
 
 def read_outcome(folder: Path) -> Outcome:
     """How the estimate ended."""
-    return Outcome(**json.loads((folder / OUTCOME).read_text()))
+    return Outcome(**json.loads((folder / OUTCOME).read_text(encoding="utf-8")))
 
 
 def read_frames(folder: Path) -> list[FrameRow]:
     """One row per frame that the estimator answered."""
-    with (folder / FRAMES).open(newline="") as file:
+    with (folder / FRAMES).open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     return [
         FrameRow(

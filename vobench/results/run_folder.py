@@ -10,9 +10,7 @@ runs/<suite>/<UTC stamp>_<short hash>/
 
 import json
 import os
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -21,6 +19,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict
 
 from vobench.errors import InputError
+from vobench.results.unfinished import unfinished
 
 GROUND_TRUTH, CASE, SCORE, SEQUENCE = "ground_truth.tum", "case.json", "score.json", "sequence"
 ENVIRONMENT, SUITE = "environment.json", "suite.json"
@@ -87,7 +86,7 @@ class RunFolder:
         files = sorted((self.path / "cases").glob(f"*/*/*/{SCORE}"))
         if not files:
             raise InputError(f"not the folder of a run (no cases/*/*/*/{SCORE} in it): {self.path}")
-        return [RunScore.model_validate_json(file.read_text()) for file in files]
+        return [RunScore.model_validate_json(file.read_text(encoding="utf-8")) for file in files]
 
 
 def open_run(path: Path) -> RunFolder:
@@ -95,20 +94,15 @@ def open_run(path: Path) -> RunFolder:
     return RunFolder((path / "latest") if (path / "latest").exists() else path)
 
 
-@contextmanager
-def new_run(root: Path, suite: str, key: str) -> Iterator[RunFolder]:
-    """A folder for a run, which gets its name when the block ends without an error."""
+def make_run(root: Path, suite: str, key: str, fill: Callable[[RunFolder], None]) -> RunFolder:
+    """A new run's folder, which gets its name when `fill` is through with it without an error."""
     parent = root / suite
-    name = f"{datetime.now(UTC):%Y%m%dT%H%M%S}_{key[:8]}"
-    unfinished = parent / f".unfinished-{name}-{os.getpid()}"
-    unfinished.mkdir(parents=True)
-    try:
-        yield RunFolder(unfinished)
-        final = _free(parent / name)
-        unfinished.rename(final)
+    with unfinished(parent) as folder:
+        fill(RunFolder(folder))
+        final = _free(parent / f"{datetime.now(UTC):%Y%m%dT%H%M%S}_{key[:8]}")
+        folder.rename(final)
         _point(parent / "latest", final.name)
-    finally:
-        shutil.rmtree(unfinished, ignore_errors=True)
+    return RunFolder(final)
 
 
 def _free(path: Path) -> Path:

@@ -3,13 +3,14 @@
 import hashlib
 import json
 import os
-import shutil
-import tempfile
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+from vobench.results.unfinished import unfinished
 
 PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -29,22 +30,24 @@ class Store:
         final = self.path(kind, inputs)
         if final.is_dir():
             return final
-        final.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=final.parent))
-        try:
-            build(unfinished)
-            (unfinished / "inputs.json").write_text(canonical(inputs))
-            _publish(unfinished, final)
-        finally:
-            shutil.rmtree(unfinished, ignore_errors=True)
+        with unfinished(final.parent) as folder:
+            build(folder)
+            (folder / "inputs.json").write_text(canonical(inputs), encoding="utf-8")
+            _publish(folder, final)
         return final
 
+    def forget(self, kind: str, inputs: Mapping[str, Any]) -> None:
+        """Take the result of these inputs out of the store, in one step."""
+        final = self.path(kind, inputs)
+        if final.is_dir():
+            with unfinished(final.parent) as folder, suppress(FileNotFoundError):
+                final.rename(folder / "forgotten")
 
-def _publish(unfinished: Path, final: Path) -> None:
+
+def _publish(folder: Path, final: Path) -> None:
     """Give a folder its final name; where another process was faster, both hold the same."""
-    unfinished.chmod(0o755)
     try:
-        unfinished.rename(final)
+        folder.rename(final)
     except OSError:
         if not final.is_dir():
             raise

@@ -14,8 +14,8 @@ Map = NDArray[np.float32]
 class Texture:
     """A square tile of reflectance that repeats every `tile_m`.
 
-    `albedo` is its mean and `contrast` the spread: the darkest 1 % and the brightest 1 %
-    lie about albedo·(1 ∓ contrast).
+    `albedo` is its mean, and `contrast` its spread over its mean: half the step from the darkest 1 %
+    to the brightest 1 %.
     """
 
     kind: str
@@ -31,8 +31,9 @@ def reflectance(texture: Texture) -> Map:
     rng = np.random.default_rng([texture.seed, texture.resolution_px])
     pattern = PATTERNS[texture.kind](texture, rng)
     low, high = np.percentile(pattern[::4, ::4], [1, 99]) if pattern.std() > 0 else (-1.0, 1.0)
-    unit = (pattern - (low + high) / 2) / ((high - low) / 2)
-    return np.clip(texture.albedo * (1 + texture.contrast * unit), 0.02, 0.98).astype(np.float32)
+    unit = (pattern - pattern.mean()) / ((high - low) / 2)
+    tile: Map = np.clip(texture.albedo * (1 + texture.contrast * unit), 0.02, 0.98).astype(np.float32)
+    return tile
 
 
 def _noise(texture: Texture, rng: np.random.Generator, *, coarse_m: float, fine_m: float, slope: float) -> Map:
@@ -41,11 +42,14 @@ def _noise(texture: Texture, rng: np.random.Generator, *, coarse_m: float, fine_
     White noise shaped in the frequency domain by f^-slope: isotropic, and a tile without seams.
     """
     n = texture.resolution_px
-    spectrum = fft.rfft2(rng.standard_normal((n, n), dtype=np.float32), workers=-1)
     per_m = n / texture.tile_m
-    f = np.hypot(fft.fftfreq(n)[:, None], fft.rfftfreq(n)[None, :]).astype(np.float32) * per_m
+    f_u = fft.rfftfreq(n) * per_m
+    # Columns above the band are zero, and the inverse transform adds them back as such.
+    f_u = f_u[f_u < 0.5 / fine_m]
+    spectrum = fft.rfft2(rng.standard_normal((n, n), dtype=np.float32), workers=-1)[:, : len(f_u)]
+    f = np.hypot(fft.fftfreq(n)[:, None] * per_m, f_u).astype(np.float32)
     band = (f > 0.5 / coarse_m) & (f < 0.5 / fine_m)
-    spectrum *= np.where(band, np.maximum(f, 1e-6) ** -slope, 0).astype(np.float32)
+    spectrum = spectrum * np.where(band, np.maximum(f, 1e-6) ** -slope, 0).astype(np.float32)
     noise = fft.irfft2(spectrum, s=(n, n), workers=-1)
     unit: Map = noise / noise.std()
     return unit
@@ -92,7 +96,8 @@ def poster(texture: Texture, rng: np.random.Generator) -> Map:
     for _ in range(160):
         row, column = rng.integers(0, n, 2)
         height, width = (rng.uniform(0.02, 0.22, 2) * n).astype(int)
-        pattern[row : row + height, column : column + width] = rng.uniform(-1, 1)
+        rows, columns = np.arange(row, row + height) % n, np.arange(column, column + width) % n
+        pattern[np.ix_(rows, columns)] = rng.uniform(-1, 1)
     return pattern + 0.15 * _noise(texture, rng, coarse_m=0.1, fine_m=0.004, slope=0.5)
 
 

@@ -1,6 +1,7 @@
 """From a suite to its plan: every case, and every run of an estimator on it."""
 
 from collections.abc import Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any
 
 from vobench.catalog import catalog, yaml_file
 from vobench.catalog.manifest import Manifest, read_manifest
+from vobench.catalog.yaml_file import Source
 from vobench.errors import SuiteError
 from vobench.geometry.rig import LENSES, Rig, stereo_rig
 from vobench.scene.scene import Scene
@@ -76,53 +78,74 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What a suite comes to: cases × entrants × repeats."""
+    """What a suite comes to: cases × entrants × repeats; `source` is the suite's file."""
 
     suite: Suite
     cases: tuple[Case, ...]
     entrants: tuple[Entrant, ...]
+    source: Source | None = None
 
     def runs(self, case: Case) -> list[Run]:
         """Every run on one case."""
         return [Run(case, entrant, n) for entrant in self.entrants for n in range(self.suite.repeats)]
 
+    def at(self, *keys: int | str) -> AbstractContextManager[None]:
+        """Errors of the block name this place in the suite's file."""
+        return _at(self.source, *keys)
 
-def read_suite(name: str) -> Suite:
-    """The suite of that name, or in that file. Raises SuiteError or UnknownNameError."""
-    return yaml_file.read(catalog.find("suite", name).path, Suite)
+
+def read_plan(name: str, *, only_estimators: tuple[str, ...] = ()) -> Plan:
+    """The plan of the suite of that name, or in that file. Raises SuiteError or UnknownNameError."""
+    suite, source = yaml_file.read_marked(catalog.find("suite", name).path, Suite)
+    return plan(suite, source=source, only_estimators=only_estimators)
 
 
-def plan(suite: Suite, *, only_estimators: tuple[str, ...] = ()) -> Plan:
+def plan(suite: Suite, *, source: Source | None = None, only_estimators: tuple[str, ...] = ()) -> Plan:
     """Resolve all names in a suite; nothing is simulated and no estimator's code is imported."""
-    specs = [EstimatorSpec(name=e) if isinstance(e, str) else e for e in suite.estimators]
     if only_estimators:
-        specs = [_asked_for(name, specs) for name in only_estimators]
-    entrants = tuple(_entrant(spec) for spec in specs)
-    labels = [entrant.label for entrant in entrants]
-    for label in labels:
-        if labels.count(label) > 1:
-            raise SuiteError(f"suite '{suite.name}' has two estimators called '{label}'; give one a label of its own")
-    return Plan(suite, tuple(_cases(suite)), entrants)
+        entrants = [_entrant(_asked_for(name, suite.estimators)) for name in only_estimators]
+    else:
+        entrants = [_listed(spec, index, source) for index, spec in enumerate(suite.estimators)]
+    for index, entrant in enumerate(entrants):
+        if entrant.label in [earlier.label for earlier in entrants[:index]]:
+            with nullcontext() if only_estimators else _at(source, "estimators", index):
+                raise SuiteError(f"two estimators are called '{entrant.label}'; give one a label of its own")
+    return Plan(suite, tuple(_cases(suite, source)), tuple(entrants), source)
 
 
-def _asked_for(name: str, specs: list[EstimatorSpec]) -> EstimatorSpec:
+def _at(source: Source | None, *keys: int | str) -> AbstractContextManager[None]:
+    return source.at(*keys) if source else nullcontext()
+
+
+def _asked_for(name: str, specs: tuple[EstimatorSpec, ...]) -> EstimatorSpec:
     """The suite's own entry of that label, else the estimator of that name with its defaults."""
     return next((spec for spec in specs if name == (spec.label or spec.name)), EstimatorSpec(name=name))
+
+
+def _listed(spec: EstimatorSpec, index: int, source: Source | None) -> Entrant:
+    with _at(source, "estimators", index):
+        return _entrant(spec)
 
 
 def _entrant(spec: EstimatorSpec) -> Entrant:
     folder = catalog.find("estimator", spec.name).path
     manifest = read_manifest(folder)
-    for key in spec.params:
-        if key not in manifest.params:
-            known = list(manifest.params)
-            raise SuiteError(f"estimator '{spec.name}': {catalog.unknown('parameter', key, known)}")
+    for key, value in spec.params.items():
+        _check_param(key, value, manifest.params)
     return Entrant(spec.label or manifest.name, folder, manifest, {**manifest.params, **spec.params})
 
 
-def _cases(suite: Suite) -> Iterator[Case]:
-    entries = [catalog.find("scene", name) for name in suite.scenes]
-    scenes = {entry.name: yaml_file.read(entry.path, SceneFile) for entry in entries}
+def _check_param(key: str, value: Any, defaults: dict[str, Any]) -> None:
+    """A parameter of the manifest's, and of the kind of its value there; whole numbers may become fractions."""
+    if key not in defaults:
+        raise SuiteError(catalog.unknown("parameter", key, list(defaults)))
+    kinds = [int if isinstance(v, float) else type(v) for v in (defaults[key], value)]
+    if defaults[key] is not None and kinds[0] is not kinds[1]:
+        raise SuiteError(f"parameter '{key}' should be of the kind of its default {defaults[key]!r}, got {value!r}")
+
+
+def _cases(suite: Suite, source: Source | None) -> Iterator[Case]:
+    scenes = _scenes(suite, source)
     axes: list[dict[str, Any]] = [scenes, suite.lightings, suite.rigs, suite.trajectories, suite.cameras]
     for names in product(*axes):
         scene, lighting, rig, trajectory, camera = names
@@ -137,5 +160,18 @@ def _cases(suite: Suite) -> Iterator[Case]:
             camera=suite.cameras[camera],
             seed=suite.seed,
         )
-        case.build_scene()  # a lighting that names no lamp is an error now, not after an hour
+        with _at(source, "lightings", lighting):
+            case.build_scene()  # a lighting that names no lamp is an error now, not after an hour
         yield case
+
+
+def _scenes(suite: Suite, source: Source | None) -> dict[str, SceneFile]:
+    """The scenes by their files' names, which name a case's place on this axis."""
+    scenes: dict[str, SceneFile] = {}
+    for index, name in enumerate(suite.scenes):
+        with _at(source, "scenes", index):
+            entry = catalog.find("scene", name)
+            if entry.name in scenes:
+                raise SuiteError(f"two scenes are called '{entry.name}'; give each once, from files of different names")
+            scenes[entry.name] = yaml_file.read(entry.path, SceneFile)
+    return scenes

@@ -2,9 +2,10 @@
 
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from vobench.catalog.catalog import unknown
+from vobench.catalog.yaml_file import matching
 from vobench.geometry.rig import LENSES
 from vobench.robot.controller import CONTROLLERS
 from vobench.robot.pioneer import THETAS
@@ -14,9 +15,9 @@ from vobench.sensor.encoder import ENCODERS
 
 
 class Strict(BaseModel):
-    """A frozen model in which an unknown key is an error, as are NaN and infinity."""
+    """A frozen model in which an unknown key is an error, as are NaN, infinity and a number in quotes."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
 def _one_of(kind: str, known: dict[str, Any]) -> AfterValidator:
@@ -28,7 +29,14 @@ def _one_of(kind: str, known: dict[str, Any]) -> AfterValidator:
     return AfterValidator(check)
 
 
-Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_.]*$")]
+def _named(value: Any) -> Any:
+    """A bare name stands for an estimator with its manifest's parameters."""
+    return {"name": value} if isinstance(value, str) else value
+
+
+# Names become folders, and a case's name joins several with a hyphen.
+NAME = matching(r"[a-z0-9][a-z0-9_.]*", "lower-case letters, digits, _ and ., a letter or digit first")
+Name = Annotated[str, NAME]
 Point = tuple[float, float]
 Positive = Annotated[float, Field(gt=0)]
 
@@ -94,4 +102,4 @@ class Suite(Strict):
     rigs: Annotated[dict[Name, RigSpec], Field(min_length=1)]
     trajectories: Annotated[dict[Name, TrajectorySpec], Field(min_length=1)]
     cameras: Annotated[dict[Name, CameraSpec], Field(min_length=1)] = {"clean": CameraSpec()}
-    estimators: Annotated[tuple[str | EstimatorSpec, ...], Field(min_length=1)]
+    estimators: Annotated[tuple[Annotated[EstimatorSpec, BeforeValidator(_named)], ...], Field(min_length=1)]

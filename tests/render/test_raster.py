@@ -1,0 +1,135 @@
+"""Pictures are reflectance times light over pi, linear without end, and the same bytes every time."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import LENSES, looking
+from vobench.render.bake import BakedScene, BakeSettings, bake
+from vobench.render.raster import RasterRenderer
+from vobench.scene.scene import Scene, box, ceiling_light, rectangle, room
+from vobench.scene.texture import Texture
+
+CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
+DOWN, AHEAD = looking(pitch_deg=90, position_m=(0.2, 0.1, 0.4)), looking(pitch_deg=20, position_m=(0.2, 0.1, 0.4))
+LAMP = ceiling_light("lamp", np.array([0.5, 0.2, 2.4]), (0.5, 0.3), power_lm=2000)
+TEXTURES = {
+    "plain": Texture("plain", 0.5, 0.0, 1.0, 8, 0),
+    "busy": Texture("terrazzo", 0.5, 0.6, 1.0, 512, 1),
+}
+
+
+@pytest.fixture(scope="module")
+def furnished() -> BakedScene:
+    """A small room with a crate, a lamp and bounces, baked coarsely."""
+    surfaces = (
+        *room((4, 3, 2.5), floor="busy", wall="plain", ceiling="plain"),
+        *box(np.array([1.2, -0.3, 0.3]), (0.5, 0.4, 0.6), yaw_deg=20, material="busy"),
+    )
+    settings = BakeSettings(spacing_m=0.1, light_rays=4, indirect_spacing_m=0.3, indirect_rays=16)
+    return bake(Scene("furnished", surfaces, TEXTURES, (LAMP,)), settings)
+
+
+@pytest.fixture(scope="module")
+def renderer(furnished: BakedScene, draw: Any) -> RasterRenderer:
+    renderer: RasterRenderer = draw(furnished)
+    return renderer
+
+
+def test_the_same_picture_twice_is_the_same_bytes(renderer: RasterRenderer) -> None:
+    assert renderer.radiance(CAMERA, AHEAD).tobytes() == renderer.radiance(CAMERA, AHEAD).tobytes()
+
+
+def test_a_picture_does_not_depend_on_what_was_drawn_before(renderer: RasterRenderer) -> None:
+    first, second = renderer.radiance(CAMERA, DOWN), renderer.radiance(CAMERA, AHEAD)
+    large = renderer.radiance(LENSES["paper_literal"], DOWN)
+    assert renderer.radiance(CAMERA, AHEAD).tobytes() == second.tobytes()
+    assert renderer.radiance(LENSES["paper_literal"], DOWN).tobytes() == large.tobytes()
+    assert renderer.radiance(CAMERA, DOWN).tobytes() == first.tobytes()
+
+
+def test_a_picture_is_its_own_array_that_others_can_work_on(renderer: RasterRenderer) -> None:
+    picture = renderer.radiance(CAMERA, DOWN)
+    assert (picture.shape, picture.dtype) == ((120, 180), np.float32)
+    assert picture.flags.c_contiguous
+    before = picture.copy()
+    renderer.radiance(CAMERA, AHEAD)
+    np.testing.assert_array_equal(picture, before)
+
+
+def test_renderers_live_side_by_side_and_one_outlives_the_others(furnished: BakedScene) -> None:
+    first, second = RasterRenderer(furnished), RasterRenderer(furnished)
+    expected = first.radiance(CAMERA, AHEAD).tobytes()
+    assert second.radiance(CAMERA, AHEAD).tobytes() == expected
+    first.close()
+    assert second.radiance(CAMERA, AHEAD).tobytes() == expected
+    second.close()
+    third = RasterRenderer(furnished)
+    assert third.radiance(CAMERA, AHEAD).tobytes() == expected
+    third.close()
+
+
+def test_luminance_of_a_plain_floor_is_reflectance_times_illuminance_over_pi(draw: Any) -> None:
+    floor = rectangle(np.zeros(3), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]), "plain")
+    lamp = ceiling_light("lamp", np.array([0.3, -0.2, 2.0]), (0.04, 0.04), power_lm=1000)
+    settings = BakeSettings(spacing_m=0.02, light_rays=16, indirect_spacing_m=1.0, indirect_rays=1, bounces=0)
+    picture = draw(bake(Scene("floor", (floor,), TEXTURES, (lamp,)), settings)).radiance(CAMERA, DOWN)
+    x, y, _ = np.moveaxis(DOWN[:3, 3] + 0.4 * CAMERA.rays(CAMERA.pixel_grid()) @ DOWN[:3, :3].T, -1, 0)
+    squared = (x - 0.3) ** 2 + (y + 0.2) ** 2 + 4.0
+    np.testing.assert_allclose(picture, 0.5 / np.pi * 1000 / np.pi * 4.0 / squared**2, rtol=0.01)
+
+
+@pytest.mark.parametrize("illuminance_lx", [1e-3, 1.0, 1e6])
+def test_luminance_is_linear_from_moonlight_to_beyond_the_sun(
+    draw: Any, even_light: Any, illuminance_lx: float
+) -> None:
+    scene = Scene("room", tuple(room((4, 4, 2), floor="plain", wall="plain", ceiling="plain")), TEXTURES, ())
+    picture = draw(even_light(scene, illuminance_lx=illuminance_lx)).radiance(CAMERA, AHEAD)
+    np.testing.assert_allclose(picture, 0.5 * illuminance_lx / np.pi, rtol=2e-5)
+
+
+def test_twice_the_light_is_exactly_twice_the_picture(draw: Any, even_light: Any) -> None:
+    surfaces = tuple(room((4, 4, 2), floor="busy", wall="busy", ceiling="plain"))
+    scene = Scene("room", surfaces, TEXTURES, ())
+    once, twice = (draw(even_light(scene, illuminance_lx=lx)).radiance(CAMERA, AHEAD) for lx in (70.0, 140.0))
+    np.testing.assert_array_equal(twice, 2 * once)
+
+
+def test_a_far_texture_fades_to_its_mean_and_keeps_its_brightness(draw: Any, even_light: Any) -> None:
+    board = rectangle(np.array([40.0, 0, 0]), np.array([0, -60.0, 0]), np.array([0, 0, 40.0]), "busy")
+    picture = draw(even_light(Scene("board", (board,), TEXTURES, ()), illuminance_lx=np.pi)).radiance(
+        CAMERA, looking(pitch_deg=0, position_m=(0, 0, 0))
+    )
+    assert picture.mean() == pytest.approx(0.5, rel=0.003)
+    assert picture.std() < 0.03
+
+
+def test_a_lamp_in_view_shows_its_luminance_and_its_back_is_not_there(renderer: RasterRenderer) -> None:
+    lamp = LAMP.luminance_cd_m2
+    up = looking(pitch_deg=-90, position_m=(0.5, 0.2, 1.5))
+    assert renderer.radiance(CAMERA, up)[60, 90] == pytest.approx(lamp, rel=1e-5)
+    from_above = looking(pitch_deg=90, position_m=(0.5, 0.2, 2.49))
+    assert renderer.radiance(CAMERA, from_above)[60, 90] < lamp / 10
+
+
+def test_where_nothing_is_the_picture_is_black_and_depth_is_not_a_number(draw: Any, even_light: Any) -> None:
+    floor = rectangle(np.zeros(3), np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), "plain")
+    renderer = draw(even_light(Scene("floor", (floor,), TEXTURES, ()), illuminance_lx=np.pi))
+    picture, depth = (method(CAMERA, AHEAD) for method in (renderer.radiance, renderer.depth))
+    assert picture[0, 90] == 0
+    assert np.isnan(depth[0, 90])
+    assert ((picture > 0) == np.isfinite(depth)).mean() > 0.99
+
+
+def test_depth_and_picture_agree_on_where_the_crate_is(draw: Any, even_light: Any) -> None:
+    textures = {"dark": Texture("plain", 0.1, 0, 1, 8, 0), "bright": Texture("plain", 0.9, 0, 1, 8, 0)}
+    crate = box(np.array([1.5, 0.1, 0.4]), (0.5, 0.5, 0.5), yaw_deg=30, material="bright")
+    surfaces = (*room((20, 20, 20), floor="dark", wall="dark", ceiling="dark"), *crate)
+    renderer = draw(even_light(Scene("crate", surfaces, textures, ()), illuminance_lx=np.pi))
+    view = looking(pitch_deg=0, position_m=(0, 0, 0.4))
+    picture, depth = renderer.radiance(CAMERA, view)[:75], renderer.depth(CAMERA, view)[:75]  # above the near floor
+    whole = (picture < 0.11) | (picture > 0.89)  # pixels without an edge in them
+    np.testing.assert_array_equal(picture[whole] > 0.5, depth[whole] < 2.5)
+    assert (picture[whole] > 0.5).sum() > 1000

@@ -1,0 +1,83 @@
+"""Rooms face inwards, boxes outwards, and a lamp gives off the power it is sold with."""
+
+import numpy as np
+import pytest
+
+from vobench.geometry import se3
+from vobench.scene.scene import AreaLight, Surface, box, ceiling_light, rectangle, room
+
+ROOM = room((4, 6, 3), floor="floor", wall="wall", ceiling="ceiling")
+CENTER_M, YAW_DEG = np.array([1.0, -2.0, 0.5]), 25.0
+BOX = box(CENTER_M, (0.8, 0.4, 1.0), yaw_deg=YAW_DEG, material="wood")
+
+
+def center(surface: Surface) -> np.ndarray:
+    return surface.at(np.array(0.5), np.array(0.5))
+
+
+def signed_volume(surfaces: list[Surface]) -> float:
+    """Volume that the surfaces enclose, positive where all face outwards (Gauss's theorem)."""
+    return sum(float(np.dot(center(s), np.cross(s.edge_u_m, s.edge_v_m))) / 3 for s in surfaces)
+
+
+def test_every_side_of_a_room_faces_its_middle() -> None:
+    for side in ROOM:
+        assert np.dot(np.array([0, 0, 1.5]) - center(side), side.normal) > 1
+
+
+def test_every_side_of_a_box_faces_away_from_its_middle() -> None:
+    for side in BOX:
+        assert np.dot(center(side) - CENTER_M, side.normal) > 0.1
+
+
+def test_rooms_and_boxes_are_closed() -> None:
+    assert signed_volume(ROOM) == pytest.approx(-4 * 6 * 3)
+    assert signed_volume(BOX) == pytest.approx(0.8 * 0.4 * 1.0)
+    for surfaces in (ROOM, BOX):
+        areas = [np.cross(s.edge_u_m, s.edge_v_m) for s in surfaces]
+        np.testing.assert_allclose(np.sum(areas, 0), 0, atol=1e-12)
+
+
+def test_a_rooms_floor_is_at_zero_and_its_materials_are_where_they_belong() -> None:
+    by_height = sorted(ROOM, key=lambda s: center(s)[2])
+    assert [s.material for s in by_height] == ["floor", *["wall"] * 4, "ceiling"]
+    np.testing.assert_allclose(center(by_height[0]), [0, 0, 0])
+    np.testing.assert_allclose(center(by_height[-1]), [0, 0, 3])
+
+
+def test_a_turned_box_is_the_straight_box_turned() -> None:
+    straight = box(np.zeros(3), (0.8, 0.4, 1.0), yaw_deg=0, material="wood")
+    R = se3.rotation_z(np.deg2rad(YAW_DEG))
+    for turned, side in zip(BOX, straight, strict=True):
+        np.testing.assert_allclose(turned.corner_m, R @ side.corner_m + CENTER_M, atol=1e-12)
+        np.testing.assert_allclose(turned.normal, R @ side.normal, atol=1e-12)
+
+
+def test_a_rectangle_lies_around_its_centre() -> None:
+    surface = rectangle(np.array([1.0, 2.0, 3.0]), np.array([2.0, 0, 0]), np.array([0, 0.5, 0]), "wall")
+    np.testing.assert_allclose(center(surface), [1, 2, 3])
+    np.testing.assert_allclose(surface.at(np.array([0, 1]), np.array([0, 1])), [[0, 1.75, 3], [2, 2.25, 3]])
+    assert surface.size_m == (2.0, 0.5)
+    np.testing.assert_allclose(surface.normal, [0, 0, 1])
+
+
+def flux_lm(lamp: AreaLight, *, rings: int = 2000) -> float:
+    """Luminance of the panel integrated over its area and the half space before it, by the midpoint rule."""
+    width, height = lamp.surface.size_m
+    theta = (np.arange(rings) + 0.5) / rings * np.pi / 2
+    cosine_sum = (np.cos(theta) * np.sin(theta)).sum() * (np.pi / 2 / rings) * 2 * np.pi
+    return float(lamp.luminance_cd_m2 * width * height * cosine_sum)
+
+
+@pytest.mark.parametrize("size_m", [(0.6, 0.6), (1.2, 0.1)])
+def test_a_lamps_luminance_over_area_and_half_space_is_its_power(size_m: tuple[float, float]) -> None:
+    lamp = ceiling_light("lamp", np.array([0, 0, 2.9]), size_m, power_lm=4000)
+    assert flux_lm(lamp) == pytest.approx(4000, rel=1e-6)
+
+
+def test_a_ceiling_light_shines_down_from_where_it_hangs() -> None:
+    lamp = ceiling_light("lamp", np.array([0.3, -0.2, 2.9]), (1.2, 0.6), power_lm=1)
+    np.testing.assert_allclose(center(lamp.surface), [0.3, -0.2, 2.9])
+    np.testing.assert_allclose(lamp.surface.normal, [0, 0, -1])
+    corners = lamp.surface.at(np.array([0, 1]), np.array([0, 1]))
+    np.testing.assert_allclose(np.ptp(corners, 0), [1.2, 0.6, 0])
