@@ -78,6 +78,19 @@ def test_behind_a_box_there_is_no_direct_light_and_beside_it_all_of_it() -> None
     assert 0.2 < half_lit.mean() < 0.7
 
 
+def test_half_shadows_are_smooth() -> None:
+    lamp = ceiling_light("lamp", np.array([0, 0, 2.0]), (0.2, 0.2), power_lm=1000)
+    blocker = box(np.array([0, 0, 1.0]), (0.8, 0.8, 0.1), yaw_deg=0, material="grey")
+    shaded, fine = (
+        floor_light(bake(scene(lamp, surfaces=(FLOOR, *blocker)), replace(DIRECT, spacing_m=0.03, light_rays=rays)))[2]
+        for rays in (16, 400)
+    )
+    open_light = floor_light(bake(scene(lamp), replace(DIRECT, spacing_m=0.03)))[2]
+    half = (fine > 0) & (fine < 0.97 * open_light)
+    # Sixteen rays alone would leave a grain of 5 %.
+    assert np.sqrt(np.mean(((shaded - fine) / open_light)[half] ** 2)) < 0.03
+
+
 def test_nothing_shines_through_the_corners_of_a_closed_box() -> None:
     lamp = ceiling_light("lamp", np.array([0.5, 0.4, 2.0]), (0.2, 0.2), power_lm=1000)
     crate = box(np.array([0, 0, 0.5]), (1.0, 1.0, 1.0), yaw_deg=0, material="grey")

@@ -39,7 +39,7 @@ def run() -> None:
 
     signal.signal(signal.SIGINT, stop)
     for stream in filter(None, (sys.stdout, sys.stderr)):
-        stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a terminal without ° gets a ? for it
+        stream.reconfigure(errors="replace")  # a terminal without ° gets a ? for it
     try:
         # Nobody remembers whether --debug goes before the command or after it.
         app([word for word in sys.argv[1:] if word != DEBUG])

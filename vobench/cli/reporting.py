@@ -34,8 +34,10 @@ def _chosen(form: str | None, out: Path | None, *, as_json: bool) -> str:
     """The form asked for: --json's, --format's, or that of the file's ending. Raises UnknownNameError."""
     if as_json and out is None:
         return "json"
+    if form is None and out is not None and out.suffix.lower() not in ENDINGS:
+        raise UnknownNameError(f"no format goes with '{out.name}'; name one with --format: {', '.join(FORMS)}")
     if form is None:
-        form = ENDINGS.get(out.suffix.lower(), f"for '{out.name}'") if out else TERMINAL
+        form = ENDINGS[out.suffix.lower()] if out else TERMINAL
     known = FORMS if out else (TERMINAL, *FORMS)
     if form not in known:
         raise UnknownNameError(unknown("format", form, list(known)))

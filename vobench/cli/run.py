@@ -1,9 +1,11 @@
 """vobench run and vobench check."""
 
+import os
 from pathlib import Path
 from typing import Any
 
 from vobench.cli import terminal
+from vobench.errors import InputError
 from vobench.pipeline.run import run_suite
 from vobench.pipeline.simulate import drive_all, is_simulated
 from vobench.pipeline.workshop import Workshop
@@ -18,6 +20,8 @@ def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) ->
     """Run a suite and print its leaderboard and where everything lies."""
     planned = read_plan(suite, only_estimators=estimators)
     drive_all(planned)
+    _require_writable("--out", out)
+    _require_writable("VOBENCH_CACHE", default_store().root)
     shop = Workshop(default_store(), terminal.Bars())
     folder = run_suite(planned, root=out, shop=shop, finish=files.write_reports)
     boards = files.boards_of(folder, folder.scores())
@@ -26,6 +30,17 @@ def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) ->
         return
     terminal.print_boards(boards)
     terminal.console().print(f"Everything is in {folder.path}\nLook into it: vobench view {folder.path}")
+
+
+def _require_writable(what: str, folder: Path) -> None:
+    """Said before hours of work. Raises InputError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        cause = "" if os.access(folder, os.W_OK) else "Permission denied"
+    except OSError as error:
+        cause = str(error.strerror)
+    if cause:
+        raise InputError(f"{what} should be a folder that can be written ({cause}): {folder}")
 
 
 def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:

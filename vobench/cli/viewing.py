@@ -1,5 +1,6 @@
 """vobench view."""
 
+import os
 from pathlib import Path
 
 from vobench.cli import terminal
@@ -14,9 +15,9 @@ def show(run: Path, *, case: str | None, estimator: str | None, save: Path | Non
     folder = open_run(run)
     chosen = pick(folder.scores(), case=case, estimator=estimator)
     path = save or folder.estimate(chosen.case, chosen.estimator, chosen.repeat) / "run.rrd"
-    if path.is_dir() or not path.parent.is_dir():
-        wrong = "a folder" if path.is_dir() else "in a folder that is not there"
-        raise InputError(f"--save should be a file to write, but this is {wrong}: {path}")
+    if path.is_dir() or not os.access(path.parent, os.W_OK):
+        wrong = "is a folder" if path.is_dir() else "is in a folder that cannot be written"
+        raise InputError(f"--save should be a file to write, but this {wrong}: {path}")
     save_run(path, run_view(folder, chosen))
     if as_json:
         terminal.print_json(
@@ -30,7 +31,6 @@ def show(run: Path, *, case: str | None, estimator: str | None, save: Path | Non
 
 def _open(path: Path) -> None:
     """Hand the file to Rerun's viewer, which needs a display."""
-    import os
     import subprocess
     import sys
 

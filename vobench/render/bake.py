@@ -92,26 +92,40 @@ def _direct(scene: Scene, caster: RayCaster, where: Layout, settings: BakeSettin
     """Illuminance (H, W) in lux straight from the lamps."""
     samples = _samples(all_surfaces(scene), where)
     rng = np.random.default_rng([settings.seed, 1])
-    lamps = (_from_lamp(lamp, caster, samples, settings.light_rays, rng) for lamp in scene.lights)
+    lamps = (_from_lamp(lamp, caster, samples, where, rays=settings.light_rays, rng=rng) for lamp in scene.lights)
     return samples.on_map(sum(lamps, start=np.zeros(len(samples.points_m))), where)
 
 
-def _from_lamp(lamp: AreaLight, caster: RayCaster, samples: Samples, rays: int, rng: np.random.Generator) -> Array:
-    """Illuminance (P,) by stratified samples of the lamp's area, jittered for every point."""
-    side, panel = round(np.sqrt(rays)), lamp.surface
-    total = np.zeros(len(samples.points_m))
+def _from_lamp(
+    lamp: AreaLight, caster: RayCaster, samples: Samples, where: Layout, *, rays: int, rng: np.random.Generator
+) -> Array:
+    """Illuminance (P,) of points, with four times the rays in and around the lamp's half shadows."""
+    points, normals, side = samples.points_m, samples.normals, round(np.sqrt(rays))
+    light, blocked = _panel_light(lamp.surface, caster, points, normals, side=side, rng=rng)
+    half_shadow = samples.on_map(((light > 0) & blocked).astype(float), where) > 0
+    # Few rays can miss the rim of a lamp, so points beside a half shadow may lie in it too.
+    grainy = np.flatnonzero(ndimage.binary_dilation(half_shadow, iterations=3).ravel()[samples.indices] & blocked)
+    light[grainy] = _panel_light(lamp.surface, caster, points[grainy], normals[grainy], side=2 * side, rng=rng)[0]
+    return light * lamp.luminance_cd_m2
+
+
+def _panel_light(
+    panel: Surface, caster: RayCaster, points_m: Array, normals: Array, *, side: int, rng: np.random.Generator
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Illuminance (P,) by a panel of luminance 1, and whether anything is in the way; side² jittered rays a point."""
+    total, hidden = np.zeros(len(points_m)), np.zeros(len(points_m), bool)
     for cell in range(side * side):
         jitter = rng.random((2, len(total)))
         target = panel.at((cell % side + jitter[0]) / side, (cell // side + jitter[1]) / side)
-        way = target - samples.points_m
+        way = target - points_m
         squared = np.einsum("ij,ij->i", way, way)
-        arriving, leaving = np.einsum("ij,ij->i", way, samples.normals), -(way @ panel.normal)
+        arriving, leaving = np.einsum("ij,ij->i", way, normals), -(way @ panel.normal)
         faced = np.flatnonzero((arriving > 0) & (leaving > 0))
-        blocked = caster.occluded(samples.points_m[faced], target[faced] + RAY_OFFSET_M * panel.normal)
+        blocked = caster.occluded(points_m[faced], target[faced] + RAY_OFFSET_M * panel.normal)
         lit = faced[~blocked]
         total[lit] += arriving[lit] * leaving[lit] / squared[lit] ** 2
-    illuminance: Array = total * lamp.luminance_cd_m2 * np.prod(panel.size_m) / (side * side)
-    return illuminance
+        hidden[faced[blocked]] = True
+    return total * np.prod(panel.size_m) / (side * side), hidden
 
 
 def _indirect(scene: Scene, caster: RayCaster, where: Layout, reflect: Array, settings: BakeSettings) -> Array:

@@ -13,6 +13,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
@@ -99,15 +100,21 @@ def make_run(root: Path, suite: str, key: str, fill: Callable[[RunFolder], None]
     parent = root / suite
     with unfinished(parent) as folder:
         fill(RunFolder(folder))
-        final = _free(parent / f"{datetime.now(UTC):%Y%m%dT%H%M%S}_{key[:8]}")
-        folder.rename(final)
+        final = _published(folder, parent / f"{datetime.now(UTC):%Y%m%dT%H%M%S}_{key[:8]}")
         _point(parent / "latest", final.name)
     return RunFolder(final)
 
 
-def _free(path: Path) -> Path:
-    """The path itself, or with a number behind it where two runs ended in one second."""
-    return next(p for n in range(1, 1000) if not (p := path if n == 1 else Path(f"{path}.{n}")).exists())
+def _published(folder: Path, name: Path) -> Path:
+    """The folder under its final name, with a number behind it where two runs ended in one second."""
+    for number in count(1):
+        final = name if number == 1 else name.with_name(f"{name.name}.{number}")
+        try:
+            return folder.rename(final)
+        except OSError:
+            if not final.is_dir():
+                raise
+    raise AssertionError
 
 
 def _point(link: Path, target: str) -> None:

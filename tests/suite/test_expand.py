@@ -1,0 +1,105 @@
+"""From a suite to its plan: one factor a line, one case a combination."""
+
+import pytest
+
+from vobench.catalog import catalog
+from vobench.catalog.catalog import builtin_root
+from vobench.errors import SuiteError, UnknownNameError
+from vobench.suite.expand import AXES, plan, read_suite
+
+MORE = (
+    ("{down: {pitch_deg: 90}}", "{down: {pitch_deg: 90}, ahead: {pitch_deg: 10}, tilt: {pitch_deg: 45}}"),
+    ("{clean: {sensor: clean}}", "{clean: {sensor: clean}, noisy: {sensor: mt9v034}}"),
+)
+
+
+def test_cases_are_every_combination_and_have_names_of_their_own(bent):
+    cases = bent(*MORE).cases
+    assert len(cases) == 2 * 3 * 2
+    assert len({case.name for case in cases}) == len({tuple(case.variant.items()) for case in cases}) == 12
+
+
+def test_a_case_is_called_by_what_differs_in_its_suite(bent):
+    assert [case.name for case in bent().cases] == ["full", "dim"]
+    assert [case.name for case in bent(*MORE[:1]).cases][:2] == ["full-down", "full-ahead"]
+
+
+def test_a_case_without_any_choice_is_called_by_its_trajectory(bent):
+    assert [case.name for case in bent((", dim: {lamp: {power_lm: 150}}", "")).cases] == ["short"]
+
+
+@pytest.mark.parametrize(
+    ("axis", "change"),
+    [
+        ("lighting", ("power_lm: 150", "power_lm: 100")),
+        ("rig", ("pitch_deg: 90", "pitch_deg: 80")),
+        ("trajectory", ("[[0.5, 0]]", "[[0.5, 0.1]]")),
+        ("camera", ("sensor: clean", "sensor: mt9v034")),
+    ],
+)
+def test_one_line_changes_one_factor(bent, axis, change):
+    before, after = (bent(*changes).cases[-1] for changes in ((), (change,)))
+    assert [name for name in AXES if getattr(before, name) != getattr(after, name)] == [axis]
+
+
+def test_a_lighting_sets_the_lamps_it_names_and_leaves_the_others(bent):
+    powers = [case.build_scene().lights[0].power_lm for case in bent().cases]
+    assert powers == [600, 150]
+
+
+def test_a_suites_parameters_go_over_the_manifests(bent):
+    assert [entrant.params for entrant in bent().entrants] == [{}, {"speed_mps": 0.1}]
+
+
+def test_one_estimator_takes_part_twice_under_two_labels(bent):
+    planned = bent(("stand_still,", "{name: constant_velocity, label: slow, params: {speed_mps: 1}},"))
+    assert [(e.label, e.params["speed_mps"]) for e in planned.entrants] == [("slow", 1), ("constant_velocity", 0.1)]
+
+
+def test_parameters_reach_an_estimator_as_plain_python(bent):
+    (value,) = bent().entrants[1].params.values()
+    assert type(value) is float
+
+
+def test_every_estimator_runs_repeats_times_on_every_case(bent):
+    planned = bent(("seed: 1", "seed: 1\nrepeats: 3"))
+    runs = [run for case in planned.cases for run in planned.runs(case)]
+    assert len(runs) == len({(run.case.name, run.entrant.label, run.repeat) for run in runs}) == 2 * 2 * 3
+
+
+def test_asking_for_estimators_takes_the_suites_own_settings_first(bent):
+    planned = bent(only=("constant_velocity", "wheel_odometry"))
+    assert [(e.label, e.params) for e in planned.entrants] == [
+        ("constant_velocity", {"speed_mps": 0.1}),
+        ("wheel_odometry", {}),
+    ]
+
+
+def test_asking_for_one_estimator_twice_is_an_error(bent):
+    with pytest.raises(SuiteError, match="two estimators are called 'stand_still'"):
+        bent(only=("stand_still", "stand_still"))
+
+
+def test_asking_for_an_unknown_estimator_names_the_nearest(bent):
+    with pytest.raises(UnknownNameError, match="Did you mean 'stand_still'"):
+        bent(only=("stand_stil",))
+
+
+def test_merge_keys_and_aliases_keep_a_suite_short(bent):
+    planned = bent(("{down: {pitch_deg: 90}}", "\n  down: &down {pitch_deg: 90}\n  wide: {<<: *down, baseline_m: 0.2}"))
+    assert planned.suite.rigs["wide"].pitch_deg == 90
+    assert planned.suite.rigs["wide"].baseline_m == 0.2
+
+
+def test_a_plan_goes_through_json_unchanged(bent):
+    suite = bent().suite
+    assert type(suite).model_validate_json(suite.model_dump_json()) == suite
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in (builtin_root() / "suites").glob("*.yaml")))
+def test_every_suite_of_the_house_is_valid_and_called_as_its_file(name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    suite = read_suite(name)
+    assert suite.name == name
+    assert plan(suite).cases
+    assert catalog.find("suite", name).origin == "built in"

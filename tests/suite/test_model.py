@@ -1,0 +1,131 @@
+"""What a suite or scene may not say, and the one sentence that it gets."""
+
+import pytest
+
+from vobench.errors import SuiteError, VobenchError
+from vobench.pipeline.simulate import drive_all
+
+KNOWN = "Known: lens, pitch_deg, baseline_m, forward_m, height_m"
+SUITE_KEYS = "cameras, estimators, lightings, name, repeats, rigs, scenes, seed, summary, trajectories"
+RIG_KEYS = "baseline_m, forward_m, height_m, lens, pitch_deg"
+ESTIMATORS = "constant_velocity, lk_epipolar, stand_still, wheel_odometry"
+A_NAME = "should be lower-case letters, digits, _ and ., a letter or digit first"
+
+# What is replaced, what with, and what comes after the file's path.
+WRONG = [
+    ("seed:", "sed:", f":2: sed: unknown key. Did you mean 'seed'? Known: {SUITE_KEYS}"),
+    ("seed: 1", "xyz: 1", f":2: xyz: unknown key. Known: {SUITE_KEYS}"),
+    ("pitch_deg", "pich_deg", f":5: rigs.down.pich_deg: unknown key. Did you mean 'pitch_deg'? Known: {RIG_KEYS} (and 1 more)"),
+    ("{power_lm: 150}", "{power: 1, power_lm: 1}", ":4: lightings.dim.lamp.power: unknown key. Did you mean 'power_lm'? Known: power_lm"),
+    ("params:", "parms:", ":8: estimators.1.parms: unknown key. Did you mean 'params'? Known: label, name, params"),
+    ("pitch_deg: 90", "", ":5: rigs.down.pitch_deg: this key is missing"),
+    ("seed: 1", "seed: one", ":2: seed: should be a whole number (got 'one')"),
+    ("seed: 1", "seed: '1'", ":2: seed: should be a whole number (got '1')"),
+    ("seed: 1", "seed: true", ":2: seed: should be a whole number (got true)"),
+    ("seed: 1", "seed: 1.5", ":2: seed: should be a whole number (got 1.5)"),
+    ("seed: 1", "seed:", ":2: seed: should be a whole number (got nothing)"),
+    ("seed: 1", "seed: -1", ":2: seed: should be 0 or more (got -1)"),
+    ("seed: 1", "seed: 1\nrepeats: 101", ":3: repeats: should be 100 or less (got 101)"),
+    ("seed: 1", "seed: 1\nseed: 2", ':3:1: found duplicate key "seed" with value "2" (original value: "1")'),
+    ("seed: 1", "3: 1", ":2: 3: a key should be text (put it in quotes; got 3)"),
+    ("name: tiny", "name: 12", ":1: name: should be text (a number or a date needs quotes) (got 12)"),
+    ("name: tiny", "name: My Suite", f":1: name: {A_NAME} (got 'My Suite')"),
+    ("down:", "a/b:", f":5: rigs.a/b: {A_NAME} (got 'a/b')"),
+    ("pitch_deg: 90", "pitch_deg: .nan", ":5: rigs.down.pitch_deg: should be a finite number (got nan)"),
+    ("pitch_deg: 90", "pitch_deg: -.inf", ":5: rigs.down.pitch_deg: should be a finite number (got -inf)"),
+    ("pitch_deg: 90", "pitch_deg: 91", ":5: rigs.down.pitch_deg: should be 90 or less (got 91)"),
+    ("pitch_deg: 90", "pitch_deg: down", ":5: rigs.down.pitch_deg: should be a number (got 'down')"),
+    ("pitch_deg: 90", "pitch_deg: 90, baseline_m: -1", ":5: rigs.down.baseline_m: should be greater than 0 (got -1)"),
+    ("{pitch_deg: 90}", "90", ":5: rigs.down: should be keys with values (got 90)"),
+    ("{down: {pitch_deg: 90}}", "{}", ":5: rigs: should have 1 or more entries, but has 0"),
+    ("[closet]", "closet", ":3: scenes: should be a list, as in [a, b] (got 'closet')"),
+    ("[closet]", "[closset]", ":3: scenes.0: no scene named 'closset'. Did you mean 'closet'? Known: closet, room"),
+    ("[closet]", "[./no.yaml]", ":3: scenes.0: no scene file at no.yaml. Known by name: closet, room"),
+    ("[closet]", "[closet, closet]", ":3: scenes.1: two scenes are called 'closet'; give each once, from files of different names"),
+    ("{lamp:", "{lmp:", ":4: lightings.dim: lighting: no lamp named 'lmp'. Did you mean 'lamp'? Known: lamp"),
+    ("pitch_deg: 90", "pitch_deg: 90, lens: x", ":5: rigs.down.lens: no lens named 'x'. Known: paper_blender, paper_literal"),
+    ("[[0.5, 0]]", "[[0.5, 0]], slip: slipery", ":6: trajectories.short.slip: no slip named 'slipery'. Did you mean 'slippery'? Known: nominal, none, slippery"),
+    ("[[0.5, 0]]", "[[0.5, 0]], controller: smoth", ":6: trajectories.short.controller: no controller named 'smoth'. Did you mean 'smooth'? Known: easy, paper, smooth"),
+    ("[[0.5, 0]]", "[]", ":6: trajectories.short.targets_m: should have 1 or more entries, but has 0"),
+    ("[[0.5, 0]]", "[[0.5, 0, 1]]", ":6: trajectories.short.targets_m.0: should have 2 or fewer entries, but has 3 (and 1 more)"),
+    ("[[0.5, 0]]", "[[0.5, a]]", ":6: trajectories.short.targets_m.0.1: should be a number (got 'a')"),
+    ("sensor: clean", "sensor: grainy", ":7: cameras.clean.sensor: no camera sensor named 'grainy'. Known: clean, mt9v034"),
+    ("stand_still,", "stnd_still,", f":8: estimators.0: no estimator named 'stnd_still'. Did you mean 'stand_still'? Known: {ESTIMATORS}"),
+    ("stand_still,", "./stand_still,", f":8: estimators.0: no estimator file at stand_still/estimator.yaml. Known by name: {ESTIMATORS}"),
+    ("stand_still,", "3,", ":8: estimators.0: should be keys with values (got 3)"),
+    ("stand_still,", "constant_velocity,", ":8: estimators.1: two estimators are called 'constant_velocity'; give one a label of its own"),
+    ("speed_mps", "sped_mps", ":8: estimators.1: no parameter named 'sped_mps'. Did you mean 'speed_mps'? Known: speed_mps"),
+    ("speed_mps: 0.1", "speed_mps: fast", ":8: estimators.1: parameter 'speed_mps' should be of the kind of its default 0.3, got 'fast'"),
+    ("speed_mps: 0.1", "speed_mps: 2020-01-01", ":8: estimators.1.params.speed_mps: should be a number, text, a list or keys with values (got 2020-01-01)"),
+    ("rigs:", "\trigs:", r":5:1: found character '\t' that cannot start any token"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "sentence"), WRONG, ids=[f"{new.strip()}" for _, new, _ in WRONG])
+def test_a_wrong_suite_gets_one_line_with_file_line_key_value_and_remedy(bent, tmp_path, old, new, sentence):
+    with pytest.raises(SuiteError) as refused:
+        bent((old, new))
+    said = str(refused.value).removeprefix(str(tmp_path / "tiny.yaml"))
+    # Names of pydantic's own bounds count the errors behind the first; the first is what is promised.
+    assert said == sentence or (said.startswith(sentence) and said.endswith("more)"))
+    assert "\n" not in said
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"", ": should be keys with values, but is empty"),
+        (b"# nothing\n", ": should be keys with values, but is empty"),
+        (b"- a\n", ": should be keys with values, but is a list"),
+        (b"hello\n", ": should be keys with values, but is the single value 'hello'"),
+        (b"name: [\n", ":2:1: expected the node content, but found '<stream end>'"),
+        (b"\xff\xfe\x00", ": not a text file in UTF-8"),
+        (b"a: [" * 3000, ": brackets or indents are nested too deep"),
+        (b"name: !!python/object:os.system x\n", ":1: name: should be a number, text, a list or keys with values (got x)"),
+        (b"name: a\n---\nname: b\n", ":2:1: but found another document"),
+    ],
+    ids=["empty", "comment", "list", "scalar", "torn", "binary", "deep", "tag", "two"],
+)  # fmt: skip
+def test_a_file_that_is_no_suite_at_all_is_refused_by_name(bent, tmp_path, content, sentence):
+    bent()
+    (tmp_path / "tiny.yaml").write_bytes(content)
+    from vobench.suite.expand import read_plan
+
+    with pytest.raises(SuiteError) as refused:
+        read_plan("./tiny.yaml")
+    assert str(refused.value) == f"{tmp_path / 'tiny.yaml'}{sentence}"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("floor: grain", "floor: grane", ":4: room"),
+        ("wall: grain", "wall: grane", "no material named 'grane'. Did you mean 'grain'? Known: grain"),
+        ("albedo: 0.5", "albedo: 1", ":3: materials.grain.albedo: should be less than 1 (got 1)"),
+        ("terrazzo", "tiles", ":3: materials.grain.pattern: should be 'plain', 'terrazzo', 'plaster', 'wood', 'poster' or"),
+        ("power_lm: 600", "power_lm: -1", ":5: lamps.0.power_lm: should be 0 or more (got -1)"),
+        ("size_m: [3, 3, 1.5]", "size_m: [3, 3]", ":4: room.size_m.2: this key is missing"),
+    ],
+)  # fmt: skip
+def test_a_wrong_scene_is_named_with_the_line_of_the_suite_that_asks_for_it(bent, tmp_path, old, new, sentence):
+    with pytest.raises(SuiteError) as refused:
+        bent(scene=(old, new))
+    said = str(refused.value)
+    assert said.startswith(f"{tmp_path / 'tiny.yaml'}:3: scenes.0: {tmp_path / 'scenes' / 'closet.yaml'}")
+    assert sentence in said or "no material named" in said
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("[[0.5, 0]]", "[[0.5, 0], [9, 9]], max_time_s: 3", "target 2 at (9, 9) m was not entered in max_time_s"),
+        ("[[0.5, 0]]", "[[1.4, 0]]", "a camera of rig 'down' leaves the room of scene 'closet' (3 × 3 × 1.5 m around the origin) after"),
+        ("pitch_deg: 90", "pitch_deg: 90, height_m: 1.5", "a camera of rig 'down' leaves the room"),
+        ("[[0.5, 0]]", "[[0.5, 0]], rate_hz: 0.1", "gain_per_s 0.8 at 0.1 Hz"),
+    ],
+)  # fmt: skip
+def test_a_drive_that_cannot_be_is_said_before_anything_is_rendered(bent, tmp_path, old, new, sentence):
+    planned = bent((old, new))
+    with pytest.raises(VobenchError) as refused:
+        drive_all(planned)
+    assert str(refused.value).startswith(f"{tmp_path / 'tiny.yaml'}:6: trajectories.short: {sentence}")
