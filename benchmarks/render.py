@@ -26,7 +26,7 @@ from vobench.render.geometry import corners
 from vobench.render.raster import FAR_M, NEAR_M, T_CV_GL, RasterRenderer
 from vobench.scene.scene import AreaLight
 from vobench.scene.texture import Map
-from vobench.sensor.camera import CAMERAS, expose
+from vobench.sensor.camera import CAMERAS, NoiseStreams, expose
 from vobench.sequence import SequenceWriter
 from vobench.suite.scene_file import SceneFile, build
 
@@ -65,14 +65,14 @@ class Recorder:
 
     def __init__(self, renderer: RasterRenderer, rig: Rig, writer: SequenceWriter, white_cd_m2: float) -> None:
         self._renderer, self._rig, self._writer, self._white_cd_m2 = renderer, rig, writer, white_cd_m2
-        self._rng, self._frames = np.random.default_rng(0), 0
+        self._noise, self._frames = NoiseStreams(*np.random.default_rng(0).spawn(2)), 0
 
     def record(self, T_world_body: Array) -> None:
         """Add one pair and its truth."""
         rig, t_ns = self._rig, self._frames * NS_PER_FRAME
         eyes = ((rig.left, T_world_body @ rig.T_body_left), (rig.right, T_world_body @ rig.T_body_right))
         light = (self._renderer.radiance(*eye) / self._white_cd_m2 for eye in eyes)
-        left, right = (expose(picture, CAMERAS["clean"], self._rng) for picture in light)
+        left, right = (expose(picture, CAMERAS["clean"], self._noise) for picture in light)
         self._writer.write_frame(t_ns, left, right)
         self._writer.write_truth(t_ns, T_world_body, np.zeros(6))
         self._frames += 1

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vobench.suite.expand import plan, read_suite
+from vobench.suite.expand import read_plan
 from vobench.trajectory.text import format_tum
 from vobench.trajectory.trajectory import Trajectory
 
@@ -16,7 +16,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 @pytest.mark.parametrize("suite", sorted(EXAMPLES.glob("*.yaml")), ids=lambda path: path.stem)
 def test_an_example_suite_is_valid_and_named_as_its_file(suite):
-    planned = plan(read_suite(str(suite)))
+    planned = read_plan(str(suite))
     assert planned.suite.name == suite.stem
     assert len(planned.cases) > 1
 

@@ -78,11 +78,11 @@ def first(bench: Bench) -> RunFolder:
 def plugin(tmp_path: Path) -> Callable[[str], Path]:
     """Makes an estimator's folder from the body of its process()."""
 
-    def make(body: str, *, head: str = "") -> Path:
+    def make(body: str, *, head: str = "", needs: str = "[]") -> Path:
         folder = tmp_path / "mine"
         folder.mkdir()
         (folder / "estimator.yaml").write_text(
-            "name: mine\nversion: '1'\nclass: estimator:Mine\npose_of: left_camera\nsummary: Mine\n"
+            f"name: mine\nversion: '1'\nclass: estimator:Mine\nneeds: {needs}\npose_of: left_camera\nsummary: Mine\n"
         )
         (folder / "estimator.py").write_text(
             f"import numpy as np\nfrom vobench.estimator import Result, Status\n{head}\n"

@@ -29,6 +29,7 @@ def never(*_, **__):
 def test_a_run_holds_all_that_its_folder_promises(first):
     assert {p.name for p in first.path.iterdir()} == {
         "suite.json",
+        "estimators.json",
         "environment.json",
         "cases",
         *(f"leaderboard.{suffix}" for suffix in ("md", "json", "csv", "html")),
@@ -131,25 +132,30 @@ def test_a_failure_is_a_row_and_is_tried_again_when_its_cause_may_be_gone(bench,
     assert {s.status for s in bench.run(change).scores()} == {"ok"}
 
 
-def test_a_pose_beyond_all_numbers_is_a_divergence_and_does_not_stop_the_suite(bench, first, plugin):
-    folder = plugin("T = np.eye(4); T[0, 3] = 1e200 * frame.index; return Result(T)")
+@pytest.mark.parametrize(("step_m", "status"), [("1e5", "diverged"), ("1e200", "invalid_output")])
+def test_a_pose_beyond_the_world_or_all_numbers_does_not_stop_the_suite(bench, first, plugin, step_m, status):
+    folder = plugin(f"T = np.eye(4); T[0, 3] = {step_m} * (frame.index % 3); return Result(T)")
     run = bench.run(("[wheel_odometry, stand_still]", f"[{folder}, stand_still]"))
-    assert [(s.estimator, s.status) for s in run.scores()] == [("mine", "diverged"), ("stand_still", "ok")] * 2
+    assert [(s.estimator, s.status) for s in run.scores()] == [("mine", status), ("stand_still", "ok")] * 2
 
 
 def test_what_an_estimator_says_while_it_is_lost_is_no_pose(bench, first, plugin):
     folder = plugin("return Result(np.eye(4), Status.LOST if frame.index == 3 else Status.OK, 'dark')")
     score = bench.run(("[wheel_odometry, stand_still]", f"[{folder}]")).scores()[0]
     assert score.status == "partial"
-    assert score.reason == "no pose for 1 frames in a row; first at frame 3"
+    assert score.reason == f"no pose for 1 of {score.frames} frames; the first is 3"
 
 
-def test_memory_does_not_grow_with_the_length_of_a_sequence(bench):
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux lets a process forget its peak")
+def test_memory_does_not_grow_with_the_length_of_a_sequence(bench, plugin):
     script = Path(__file__).with_name("measure_memory.py")
-    suites = [bench.suite(("rate_hz: 5", f"rate_hz: {rate}"), ("dim: {lamp: {power_lm: 150}}", "")) for rate in (5, 30)]
+    looker = plugin("return Result(np.eye(4), stats={'grey': frame.left.mean()})", needs="[stereo]")
+    fewer = (("dim: {lamp: {power_lm: 150}}", ""), ("[wheel_odometry, stand_still]", f"[{looker}]"))
+    suites = [bench.suite(("rate_hz: 5", f"rate_hz: {rate}"), *fewer) for rate in (5, 6, 40)]
     command = [sys.executable, str(script), str(bench.folder / "long"), *map(str, suites)]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
-    frames, peaks_mb = [int(x) for x in said[::2]], [float(x) for x in said[1::2]]
-    assert frames[1] > 5 * frames[0]
-    # Measured: 315 MB at 19 frames, 318 MB at 371. One forgotten pair of grey pictures a frame would be 40 MB here.
-    assert peaks_mb[1] - peaks_mb[0] < 20, peaks_mb
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    # The first suite also pays for the light, which the others find in the cache.
+    _, (few, *short_mb), (many, *long_mb) = [map(float, line.split()) for line in said.splitlines()]
+    assert many > few + 60
+    # One grey picture kept of each frame would be 20 MB here.
+    assert all(longer - shorter < 10 for shorter, longer in zip(short_mb, long_mb, strict=True)), said

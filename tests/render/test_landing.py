@@ -14,7 +14,7 @@ from vobench.geometry.rig import LENSES, Rig, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.scene.scene import Scene, box, room
 from vobench.scene.texture import Texture
-from vobench.sensor.camera import CAMERAS, expose
+from vobench.sensor.camera import CAMERAS, NoiseStreams, expose
 from vobench.sequence import Sequence, SequenceWriter, read_truth
 
 LIMIT_PX = 0.05
@@ -103,11 +103,12 @@ def test_pictures_lie_on_those_that_geometry_alone_predicts(hall: Any, lens: Pin
 def test_corners_read_back_from_a_recording_are_where_its_truth_says(
     hall: Any, corner_finder: Any, tmp_path: Path, lens: Pinhole
 ) -> None:
-    rig, rng, errors = stereo_rig(lens, pitch_deg=55), np.random.default_rng(0), []
+    rig, errors = stereo_rig(lens, pitch_deg=55), []
+    noise = NoiseStreams(*np.random.default_rng(0).spawn(2))
     with SequenceWriter(tmp_path, rig, case_json=b"{}") as writer:
         for index, T_world_body in enumerate(body_poses()):
             views = [hall.renderer.radiance(*eye) for eye in eyes(rig, T_world_body)]
-            left, right = (expose(view / np.float32(35.0), CAMERAS["clean"], rng) for view in views)
+            left, right = (expose(view / np.float32(35.0), CAMERAS["clean"], noise) for view in views)
             writer.write_frame(index * 100_000_000, left, right)
             writer.write_truth(index * 100_000_000, T_world_body, np.zeros(6))
     sequence, truth = Sequence.open(tmp_path), read_truth(tmp_path)

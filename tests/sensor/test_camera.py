@@ -7,11 +7,25 @@ import pytest
 
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
-from vobench.sensor.camera import CAMERAS, CameraSensor, Radiance, Response, decode, encode, expose, fixed_pattern
+from vobench.sensor.camera import (
+    CAMERAS,
+    CameraSensor,
+    NoiseStreams,
+    Radiance,
+    Response,
+    decode,
+    encode,
+    expose,
+    fixed_pattern,
+)
 
 CLEAN, NOISY = CAMERAS["clean"], CAMERAS["mt9v034"]
 # A linear picture with raised black and four times the amplification: noise is well above one grey value.
 BENCH = replace(NOISY, response=Response.LINEAR, amplifier=4.0, black_dn=20.0)
+
+
+def streams(seed: int) -> NoiseStreams:
+    return NoiseStreams(*np.random.default_rng(seed).spawn(2))
 
 
 def flat(level: float, *, side: int = 400) -> Radiance:
@@ -20,7 +34,7 @@ def flat(level: float, *, side: int = 400) -> Radiance:
 
 def photon_transfer(sensor: CameraSensor, levels: Array) -> tuple[Array, Array]:
     """Mean and temporal variance in grey values at each level, from pairs of pictures of one flat field."""
-    rng, means, variances = np.random.default_rng(11), [], []
+    rng, means, variances = streams(11), [], []
     for level in levels:
         first, second = (expose(flat(level), sensor, rng).astype(float) for _ in range(2))
         means.append((first + second).mean() / 2)
@@ -54,8 +68,8 @@ def test_a_shorter_exposure_is_noisier_than_a_weaker_amplifier_for_the_same_grey
 @pytest.mark.parametrize("response", Response)
 def test_the_clean_chip_puts_white_at_200_and_repeats_itself_whatever_the_generator(response: Response) -> None:
     sensor, picture = replace(CLEAN, response=response), np.random.default_rng(1).random((40, 50), np.float32)
-    assert expose(flat(1.0), sensor, np.random.default_rng(0))[0, 0] == 200
-    first, second = (expose(picture, sensor, np.random.default_rng(seed)) for seed in (2, 3))
+    assert expose(flat(1.0), sensor, streams(0))[0, 0] == 200
+    first, second = (expose(picture, sensor, streams(seed)) for seed in (2, 3))
     np.testing.assert_array_equal(first, second)
     assert first.dtype == np.uint8
 
@@ -63,7 +77,7 @@ def test_the_clean_chip_puts_white_at_200_and_repeats_itself_whatever_the_genera
 @pytest.mark.parametrize("response", Response)
 def test_the_clean_chip_is_monotone_and_uses_every_grey_value(response: Response) -> None:
     ramp = np.linspace(0, 2, 50_000, dtype=np.float32)[None]
-    grey = expose(ramp, replace(CLEAN, response=response), np.random.default_rng(0))[0].astype(int)
+    grey = expose(ramp, replace(CLEAN, response=response), streams(0))[0].astype(int)
     assert (np.diff(grey) >= 0).all()
     assert np.unique(grey).tolist() == list(range(256))
 
@@ -77,19 +91,19 @@ def test_decoding_undoes_encoding(response: Response) -> None:
 
 def test_more_light_than_a_well_holds_is_white_and_infinite_light_too() -> None:
     for sensor in (CLEAN, replace(NOISY, read_noise_e=0.0)):
-        assert (expose(flat(100.0, side=8), sensor, np.random.default_rng(0)) == 255).all()
-        assert (expose(flat(np.inf, side=8), sensor, np.random.default_rng(0)) == 255).all()
+        assert (expose(flat(100.0, side=8), sensor, streams(0)) == 255).all()
+        assert (expose(flat(np.inf, side=8), sensor, streams(0)) == 255).all()
 
 
 def test_one_generator_state_gives_one_noisy_picture() -> None:
-    first, second, other = (expose(flat(0.5, side=64), NOISY, np.random.default_rng(seed)) for seed in (5, 5, 6))
+    first, second, other = (expose(flat(0.5, side=64), NOISY, streams(seed)) for seed in (5, 5, 6))
     np.testing.assert_array_equal(first, second)
     assert (first != other).any()
 
 
 def test_a_chips_pattern_stays_where_noise_averages_out() -> None:
     sensor = replace(BENCH, gain_spread=0.02, offset_spread_e=20.0)
-    pattern, rng = fixed_pattern((64, 64), sensor, np.random.default_rng(8)), np.random.default_rng(9)
+    pattern, rng = fixed_pattern((64, 64), sensor, np.random.default_rng(8)), streams(9)
     mean = np.mean([expose(flat(0.2, side=64), sensor, rng, pattern=pattern) for _ in range(60)], axis=0)
     mean_e = 0.2 * sensor.white_e * pattern.gain + pattern.offset_e
     np.testing.assert_allclose(mean, sensor.black_dn + sensor.dn_per_electron * mean_e, atol=2.5)
@@ -101,4 +115,14 @@ def test_negative_light_or_nan_is_refused_with_its_pixel() -> None:
         picture = flat(0.5, side=4)
         picture[1, 2] = bad
         with pytest.raises(RenderError, match=r"pixel \(2, 1\)"):
-            expose(picture, CLEAN, np.random.default_rng(0))
+            expose(picture, CLEAN, streams(0))
+
+
+@pytest.mark.parametrize("changed", [{"shot_noise": False}, {"exposure_gain": 0.01}])
+def test_the_draws_of_the_electronics_do_not_depend_on_the_light(changed):
+    def state_after(sensor: CameraSensor):
+        noise = streams(4)
+        expose(flat(0.5, side=16), sensor, noise)
+        return noise.read.bit_generator.state
+
+    assert state_after(BENCH) == state_after(replace(BENCH, **changed))

@@ -1,11 +1,13 @@
 """What a suite or scene may not say, and the one sentence that it gets."""
 
+# ruff: noqa: E501 - a sentence stands in one line
+
 import pytest
 
 from vobench.errors import SuiteError, VobenchError
-from vobench.pipeline.simulate import drive_all
+from vobench.pipeline.motion import drive_all
+from vobench.suite.expand import read_plan
 
-KNOWN = "Known: lens, pitch_deg, baseline_m, forward_m, height_m"
 SUITE_KEYS = "cameras, estimators, lightings, name, repeats, rigs, scenes, seed, summary, trajectories"
 RIG_KEYS = "baseline_m, forward_m, height_m, lens, pitch_deg"
 ESTIMATORS = "constant_velocity, lk_epipolar, stand_still, wheel_odometry"
@@ -48,7 +50,7 @@ WRONG = [
     ("[[0.5, 0]]", "[[0.5, 0]], controller: smoth", ":6: trajectories.short.controller: no controller named 'smoth'. Did you mean 'smooth'? Known: easy, paper, smooth"),
     ("[[0.5, 0]]", "[]", ":6: trajectories.short.targets_m: should have 1 or more entries, but has 0"),
     ("[[0.5, 0]]", "[[0.5, 0, 1]]", ":6: trajectories.short.targets_m.0: should have 2 or fewer entries, but has 3 (and 1 more)"),
-    ("[[0.5, 0]]", "[[0.5, a]]", ":6: trajectories.short.targets_m.0.1: should be a number (got 'a')"),
+    ("[[0.5, 0]]", "[[0.5, a]]", ":6: trajectories.short.targets_m.0.1: should be a number (got 'a') (and 1 more)"),
     ("sensor: clean", "sensor: grainy", ":7: cameras.clean.sensor: no camera sensor named 'grainy'. Known: clean, mt9v034"),
     ("stand_still,", "stnd_still,", f":8: estimators.0: no estimator named 'stnd_still'. Did you mean 'stand_still'? Known: {ESTIMATORS}"),
     ("stand_still,", "./stand_still,", f":8: estimators.0: no estimator file at stand_still/estimator.yaml. Known by name: {ESTIMATORS}"),
@@ -66,9 +68,7 @@ def test_a_wrong_suite_gets_one_line_with_file_line_key_value_and_remedy(bent, t
     with pytest.raises(SuiteError) as refused:
         bent((old, new))
     said = str(refused.value).removeprefix(str(tmp_path / "tiny.yaml"))
-    # Names of pydantic's own bounds count the errors behind the first; the first is what is promised.
-    assert said == sentence or (said.startswith(sentence) and said.endswith("more)"))
-    assert "\n" not in said
+    assert said == sentence
 
 
 @pytest.mark.parametrize(
@@ -89,8 +89,6 @@ def test_a_wrong_suite_gets_one_line_with_file_line_key_value_and_remedy(bent, t
 def test_a_file_that_is_no_suite_at_all_is_refused_by_name(bent, tmp_path, content, sentence):
     bent()
     (tmp_path / "tiny.yaml").write_bytes(content)
-    from vobench.suite.expand import read_plan
-
     with pytest.raises(SuiteError) as refused:
         read_plan("./tiny.yaml")
     assert str(refused.value) == f"{tmp_path / 'tiny.yaml'}{sentence}"
@@ -99,8 +97,7 @@ def test_a_file_that_is_no_suite_at_all_is_refused_by_name(bent, tmp_path, conte
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("floor: grain", "floor: grane", ":4: room"),
-        ("wall: grain", "wall: grane", "no material named 'grane'. Did you mean 'grain'? Known: grain"),
+        ("wall: grain", "wall: grane", ": room.wall: no material named 'grane'. Did you mean 'grain'? Known: grain"),
         ("albedo: 0.5", "albedo: 1", ":3: materials.grain.albedo: should be less than 1 (got 1)"),
         ("terrazzo", "tiles", ":3: materials.grain.pattern: should be 'plain', 'terrazzo', 'plaster', 'wood', 'poster' or"),
         ("power_lm: 600", "power_lm: -1", ":5: lamps.0.power_lm: should be 0 or more (got -1)"),
@@ -110,16 +107,15 @@ def test_a_file_that_is_no_suite_at_all_is_refused_by_name(bent, tmp_path, conte
 def test_a_wrong_scene_is_named_with_the_line_of_the_suite_that_asks_for_it(bent, tmp_path, old, new, sentence):
     with pytest.raises(SuiteError) as refused:
         bent(scene=(old, new))
-    said = str(refused.value)
-    assert said.startswith(f"{tmp_path / 'tiny.yaml'}:3: scenes.0: {tmp_path / 'scenes' / 'closet.yaml'}")
-    assert sentence in said or "no material named" in said
+    files = f"{tmp_path / 'tiny.yaml'}:3: scenes.0: {tmp_path / 'scenes' / 'closet.yaml'}"
+    assert str(refused.value).startswith(f"{files}{sentence}")
 
 
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
         ("[[0.5, 0]]", "[[0.5, 0], [9, 9]], max_time_s: 3", "target 2 at (9, 9) m was not entered in max_time_s"),
-        ("[[0.5, 0]]", "[[1.4, 0]]", "a camera of rig 'down' leaves the room of scene 'closet' (3 × 3 × 1.5 m around the origin) after"),
+        ("[[0.5, 0]]", "[[1.5, 0]]", "a camera of rig 'down' leaves the room (3 × 3 × 1.5 m around the origin) of scene 'closet' after"),
         ("pitch_deg: 90", "pitch_deg: 90, height_m: 1.5", "a camera of rig 'down' leaves the room"),
         ("[[0.5, 0]]", "[[0.5, 0]], rate_hz: 0.1", "gain_per_s 0.8 at 0.1 Hz"),
     ],

@@ -164,9 +164,11 @@ def report(
 def view(
     run: RunPath,
     *,
-    case: Annotated[str | None, typer.Option(help="The case to look into; the worst where left out.")] = None,
+    case: Annotated[
+        str | None, typer.Option(help="The case; the gravest failure or the worst error where left out.")
+    ] = None,
     estimator: Annotated[
-        str | None, typer.Option(help="The estimator; the worst run of lk_epipolar, or of all.")
+        str | None, typer.Option(help="The estimator; a failed one where left out, else the best.")
     ] = None,
     save: Annotated[Path | None, typer.Option(help="Write this .rrd instead of opening the viewer.")] = None,
     json: Json = False,

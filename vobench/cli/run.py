@@ -6,8 +6,9 @@ from typing import Any
 
 from vobench.cli import terminal
 from vobench.errors import InputError
+from vobench.pipeline.motion import drive_all
 from vobench.pipeline.run import run_suite
-from vobench.pipeline.simulate import drive_all, is_simulated
+from vobench.pipeline.simulate import is_simulated
 from vobench.pipeline.workshop import Workshop
 from vobench.report import files
 from vobench.report.table import as_json as boards_as_json

@@ -11,6 +11,9 @@ from vobench.estimator.protocol import Result, Status, Tracks
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
+# Beyond any path, and small enough for sums of squares to stay finite.
+FARTHEST_M = 1e12
+
 
 class InvalidOutputError(VobenchError):
     """An estimator's answer is not what the contract says."""
@@ -22,6 +25,8 @@ def checked(answer: Any, frame: int) -> Result:
         raise InvalidOutputError(
             f"frame {frame}: process() must return a vobench.estimator.Result, got {type(answer).__name__}"
         )
+    if answer.T_odom_frame is None and answer.status not in (Status.LOST, Status.INIT):
+        raise InvalidOutputError(f"frame {frame}: status '{answer.status}' needs a pose; without one say lost or init")
     try:
         return Result(
             T_odom_frame=None if answer.T_odom_frame is None else _pose(answer.T_odom_frame),
@@ -46,6 +51,8 @@ def _pose(T_odom_frame: Any) -> Array:
     T = _array(T_odom_frame, "the pose")
     if T.shape != (4, 4) or not np.isfinite(T).all():
         raise InvalidOutputError(f"the pose is no finite (4, 4) array (shape {T.shape})")
+    if np.abs(T[:3, 3]).max() > FARTHEST_M:
+        raise InvalidOutputError(f"the pose is farther than {FARTHEST_M:g} m away")
     if not se3.is_rotation(T[:3, :3]) or not np.array_equal(T[3], [0, 0, 0, 1]):
         raise InvalidOutputError("the pose is no rigid transform (R'R differs from I, or the last row from 0 0 0 1)")
     return T

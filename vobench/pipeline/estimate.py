@@ -44,12 +44,11 @@ def _inputs(run: Run, sequence: Path) -> dict[str, Any]:
     entrant = run.entrant
     return {
         "sequence": sequence.name,
-        "manifest": entrant.manifest.model_dump(mode="json"),
         "params": entrant.params,
         "repeat": run.repeat,
         "limits": repr(LIMITS),
         "code": folder_digest(entrant.folder),
-        "vobench": code_digest("geometry", "estimator", "sequence"),
+        "vobench": code_digest("geometry", "trajectory", "estimator", "sequence", "results", "pipeline"),
         "libraries": library_versions("numpy", "scipy", "opencv-python-headless"),
     }
 

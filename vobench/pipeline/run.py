@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from shutil import copyfile
+from typing import Any
 
 from vobench import __version__
 from vobench.pipeline.estimate import estimate
@@ -15,6 +16,7 @@ from vobench.results import estimate_file
 from vobench.results.run_folder import (
     CASE,
     ENVIRONMENT,
+    ESTIMATORS,
     GROUND_TRUTH,
     SCORE,
     SEQUENCE,
@@ -24,9 +26,9 @@ from vobench.results.run_folder import (
     make_run,
     write_json,
 )
-from vobench.results.store import digest, library_versions
+from vobench.results.store import digest, folder_digest, library_versions
 from vobench.sequence import Sequence, read_truth
-from vobench.suite.expand import Case, Plan
+from vobench.suite.expand import Case, Entrant, Plan
 from vobench.trajectory.text import format_tum
 from vobench.trajectory.trajectory import Trajectory
 
@@ -40,13 +42,15 @@ def run_suite(plan: Plan, *, root: Path, shop: Workshop, finish: Finish) -> RunF
     `finish` adds reports to the folder before it gets its final name under `root`.
     """
     suite = plan.suite.model_dump(mode="json")
+    entrants = [_entrant_facts(entrant) for entrant in plan.entrants]
 
     def fill(folder: RunFolder) -> None:
         write_json(folder.path / SUITE, suite)
+        write_json(folder.path / ESTIMATORS, entrants)
         write_json(folder.path / ENVIRONMENT, _environment())
         finish(folder, [score for case in plan.cases for score in _run_case(plan, case, folder, shop)])
 
-    return make_run(root, plan.suite.name, digest(suite), fill)
+    return make_run(root, plan.suite.name, digest({"suite": suite, "estimators": entrants}), fill)
 
 
 def left_truth(sequence: Path) -> Trajectory:
@@ -76,6 +80,17 @@ def _keep(estimated: Path, score: RunScore, target: Path) -> None:
     for name in ESTIMATE_FILES:
         copyfile(estimated / name, target / name)
     write_json(target / SCORE, score.model_dump(mode="json"))
+
+
+def _entrant_facts(entrant: Entrant) -> dict[str, Any]:
+    manifest = entrant.manifest
+    return {
+        "label": entrant.label,
+        "name": manifest.name,
+        "version": manifest.version,
+        "params": entrant.params,
+        "code": folder_digest(entrant.folder),
+    }
 
 
 def _environment() -> dict[str, object]:

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from vobench.errors import AlignmentError
 from vobench.metric.score import Score, score
 from vobench.results import estimate_file
 from vobench.results.run_folder import RunScore, RunStatus
@@ -16,12 +15,8 @@ LOST_COVERAGE = 0.5
 
 def score_run(run: Run, estimate: Path, gt: Trajectory) -> RunScore:
     """Score a run's estimate against the left camera's true path."""
-    outcome = estimate_file.read_outcome(estimate)
-    try:
-        scored = score_estimate(estimate, gt)
-        status, reason = _status(outcome, scored, gt)
-    except AlignmentError as error:
-        scored, status, reason = None, "diverged", str(error)
+    scored = score_estimate(estimate, gt)
+    status, reason = _status(estimate_file.read_outcome(estimate), scored, gt)
     return RunScore(
         case=run.case.name,
         variant=run.case.variant,
@@ -54,6 +49,6 @@ def _status(outcome: estimate_file.Outcome, scored: Score | None, gt: Trajectory
     if ate is not None and ate.statistics.rmse > max(path_m, 1e-3):
         return "diverged", f"ATE {ate.statistics.rmse:.3g} m on a path of {path_m:.3g} m"
     if scored.coverage.ratio < 1:
-        first = scored.coverage.first_lost_frame
-        return "partial", f"no pose for {scored.coverage.longest_gap_frames} frames in a row; first at frame {first}"
+        without = scored.association.gt_poses - scored.association.pairs
+        return "partial", f"no pose for {without} of {len(gt)} frames; the first is {scored.coverage.first_lost_frame}"
     return "ok", ""

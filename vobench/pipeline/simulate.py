@@ -1,6 +1,5 @@
 """Case to sequence: the robot drives, the renderer sees, the chip exposes, the recording keeps."""
 
-import hashlib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -8,20 +7,28 @@ from typing import Any
 
 import numpy as np
 
-from vobench.errors import MotionError
+from vobench.pipeline.motion import drive_case
+from vobench.pipeline.stream import generator
 from vobench.pipeline.workshop import Workshop
 from vobench.render.bake import BakedScene, BakeSettings, bake
 from vobench.render.baked_file import load_baked, save_baked
+from vobench.render.egl import require_drawing
 from vobench.render.renderer import Renderer
-from vobench.results.store import Store, code_digest, library_versions
-from vobench.robot.controller import CONTROLLERS
-from vobench.robot.drive import Drive, drive
-from vobench.robot.pioneer import THETAS
-from vobench.robot.slip import SLIPS, STREAMS
-from vobench.sensor.camera import CAMERAS, CameraSensor, FixedPattern, Grey, Radiance, expose, fixed_pattern
+from vobench.results.store import Store, canonical, code_digest, library_versions
+from vobench.robot.drive import Drive
+from vobench.sensor.camera import (
+    CAMERAS,
+    CameraSensor,
+    FixedPattern,
+    Grey,
+    NoiseStreams,
+    Radiance,
+    expose,
+    fixed_pattern,
+)
 from vobench.sensor.encoder import ENCODERS, ticks
 from vobench.sequence import SequenceWriter
-from vobench.suite.expand import Case, Plan
+from vobench.suite.expand import Case
 
 BAKE = BakeSettings()
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "pyrender", "embreex", "mcap", "rosbags")
@@ -40,72 +47,28 @@ def is_simulated(case: Case, store: Store) -> bool:
 def sequence_inputs(case: Case) -> dict[str, Any]:
     """All that a sequence's bytes depend on; the names of the variants are not among it."""
     return {
-        "case": case.model_dump(mode="json", exclude={"name": True, "variant": True, "scene": {"summary"}}),
-        "code": code_digest("geometry", "robot", "scene", "sensor", "render", "sequence"),
+        "case": _content(case),
+        "bake": repr(BAKE),
+        "code": code_digest("geometry", "robot", "scene", "sensor", "render", "sequence", "suite", "pipeline"),
         "libraries": library_versions(*LIBRARIES),
     }
 
 
-def drive_case(case: Case) -> Drive:
-    """The case's robot on its way; the same for every scene, rig and camera. Raises MotionError."""
-    t = case.trajectory
-    return drive(
-        t.targets_m,
-        theta=THETAS[t.robot],
-        controller=CONTROLLERS[t.controller],
-        slip=SLIPS[t.slip],
-        start=(*t.start_m, np.deg2rad(t.start_heading_deg)),
-        rate_hz=t.rate_hz,
-        tolerance_m=t.tolerance_m,
-        max_time_s=t.max_time_s,
-        rngs={stream: generator(case.seed, f"slip.{stream}") for stream in STREAMS},
-    )
-
-
-def drive_all(plan: Plan) -> dict[str, Drive]:
-    """The drive of each trajectory of a plan, by its name: said before hours of rendering.
-
-    Raises SuiteError or MotionError where a target cannot be reached, or a camera leaves the room.
-    """
-    drives: dict[str, Drive] = {}
-    for case in plan.cases:
-        name = case.variant["trajectory"]
-        with plan.at("trajectories", name):
-            if name not in drives:
-                drives[name] = drive_case(case)
-            _check_in_room(case, drives[name])
-    return drives
-
-
-def _check_in_room(case: Case, motion: Drive) -> None:
-    rig, size_m = case.build_rig(), np.array(case.scene.room.size_m)
-    for T_body_camera in (rig.T_body_left, rig.T_body_right):
-        at_m = (motion.T_world_body @ T_body_camera)[:, :3, 3]
-        outside = (np.abs(at_m[:, :2]) >= size_m[:2] / 2).any(1) | (at_m[:, 2] >= size_m[2])
-        if outside.any():
-            first, size = int(np.flatnonzero(outside)[0]), " × ".join(f"{side:g}" for side in size_m)
-            where = ", ".join(f"{x:.2f}" for x in at_m[first])
-            raise MotionError(
-                f"a camera of rig '{case.variant['rig']}' leaves the room of scene '{case.variant['scene']}' "
-                f"({size} m around the origin) after {motion.t_ns[first] / 1e9:.1f} s, at ({where}) m"
-            )
-
-
-def generator(seed: int, stream: str) -> np.random.Generator:
-    """The random stream of that name: no other stream, and nothing else in a case, changes its draws."""
-    name = int.from_bytes(hashlib.sha256(stream.encode()).digest()[:8], "big")
-    return np.random.default_rng([seed, name])
+def _content(case: Case) -> dict[str, Any]:
+    """What is simulated, without what the suite calls it: the same for equal cases of two suites."""
+    return case.model_dump(mode="json", exclude={"name": True, "variant": True, "scene": {"summary"}})
 
 
 def _record(case: Case, folder: Path, shop: Workshop) -> None:
     # OpenGL is loaded only where pictures are drawn, so that cached cases need none.
     from vobench.render.raster import RasterRenderer
 
+    require_drawing()  # said before the light is computed
     motion, rig = drive_case(case), case.build_rig()
     renderer = RasterRenderer(_baked(case, shop))
     try:
         frames = _pictures(case, motion, renderer)
-        with SequenceWriter(folder, rig, case_json=case.model_dump_json().encode()) as writer:
+        with SequenceWriter(folder, rig, case_json=canonical(_content(case)).encode()) as writer:
             _write(writer, case, motion, shop.progress.track(frames, f"simulate {case.name}", total=len(motion.t_ns)))
     finally:
         renderer.close()
@@ -137,7 +100,8 @@ class _Chip:
     def __init__(self, case: Case, side: str) -> None:
         self._sensor = _sensor(case)
         self._white_cd_m2 = case.scene.white_cd_m2
-        self._noise = generator(case.seed, f"camera.{side}.noise")
+        streams = (generator(case.seed, f"camera.{side}.{kind}") for kind in ("shot", "read"))
+        self._noise = NoiseStreams(*streams)
         self._pattern_rng = generator(case.seed, f"camera.{side}.pattern")
         self._pattern: FixedPattern | None = None
 

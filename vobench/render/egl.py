@@ -39,6 +39,11 @@ def context() -> Any:
     return platform
 
 
+def require_drawing() -> None:
+    """Raise MissingDependencyError where no picture could be drawn."""
+    release(context())
+
+
 def release(platform: Any) -> None:
     """Free the context that `context` made.
 

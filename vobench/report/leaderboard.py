@@ -14,15 +14,16 @@ from vobench.results.run_folder import STATUSES, SURVIVED, RunScore
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of a board; means over the runs that survived, None where none did.
+    """One line of a board; errors are means over the runs that survived, None where none did.
 
-    `ms_per_frame` is CPU time; `status` the worst of the runs.
+    `coverage` and `ms_per_frame`, which is CPU time, are means over all runs; `status` is the worst of them.
     """
 
     rank: int
     estimator: str
     status: str
     survived: int
+    partial: int
     runs: int
     ate_mm: float | None
     segment_percent: float | None
@@ -57,14 +58,13 @@ def board(title: str, scores: list[RunScore], cost_ms: dict[tuple[str, str], flo
 
     grouped = [list(group) for _, group in groupby(sorted(scores, key=name), key=name)]
     ranked = sorted((_row(runs, cost_ms) for runs in grouped), key=_place)
-    rows = [_with_rank(row, 1 + sum(_place(other)[:3] < _place(row)[:3] for other in ranked)) for row in ranked]
+    rows = [replace(row, rank=1 + sum(_place(other)[:3] < _place(row)[:3] for other in ranked)) for row in ranked]
     return Board(title, tuple(rows))
 
 
 def _place(row: Row) -> tuple[int, int, float, str]:
     """What a row is sorted by: failures, partial runs, error, and the name so that ties are stable."""
-    partial = 1 if row.status == "partial" else 0
-    return row.runs - row.survived, partial, float("inf") if row.ate_mm is None else row.ate_mm, row.estimator
+    return row.runs - row.survived, row.partial, float("inf") if row.ate_mm is None else row.ate_mm, row.estimator
 
 
 def _row(runs: list[RunScore], cost_ms: dict[tuple[str, str], float]) -> Row:
@@ -76,6 +76,7 @@ def _row(runs: list[RunScore], cost_ms: dict[tuple[str, str], float]) -> Row:
         estimator=runs[0].estimator,
         status=worst.status,
         survived=len(survivors),
+        partial=sum(run.status == "partial" for run in runs),
         runs=len(runs),
         ate_mm=_mean(survivors, "ate_trans", "rmse", 1e3),
         segment_percent=_mean(survivors, "segment_trans", "mean", 100),
@@ -83,14 +84,12 @@ def _row(runs: list[RunScore], cost_ms: dict[tuple[str, str], float]) -> Row:
         rpe_deg=_mean(survivors, "rpe_rot", "rmse", 1),
         coverage=fmean(run.coverage for run in runs),
         ms_per_frame=fmean(costs) if costs else None,
-        reason=worst.reason,
+        reason=f"{worst.case}: {worst.reason}"
+        if worst.reason and len({run.case for run in runs}) > 1
+        else worst.reason,
     )
 
 
 def _mean(runs: list[RunScore], metric: str, statistic: str, scale: float) -> float | None:
     values = [value for run in runs if (value := run.value(metric, statistic)) is not None]
     return scale * fmean(values) if values else None
-
-
-def _with_rank(row: Row, rank: int) -> Row:
-    return replace(row, rank=rank)

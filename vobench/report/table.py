@@ -31,7 +31,7 @@ COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
 HEADINGS = tuple(heading for heading, _ in COLUMNS)
 LEGEND = (
     "ATE: RMSE of position after SE(3) alignment; segments: mean drift over 0.5, 1, 1.5 and 2 m; "
-    "RPE: RMSE from frame to frame. Means over the runs that survived."
+    "RPE: RMSE from frame to frame. Errors are means over the runs that survived."
 )
 
 

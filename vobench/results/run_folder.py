@@ -1,7 +1,8 @@
 """The folder of a run of a suite, as a person reads it.
 
 runs/<suite>/<UTC stamp>_<short hash>/
-    suite.json        the suite as resolved
+    suite.json        the suite as it was read, defaults filled in
+    estimators.json   who took part: versions, parameters, hashes of their code
     environment.json  versions and machine
     leaderboard.*     md, html, csv, json
     cases/<case>/     case.json, ground_truth.tum, sequence -> cache
@@ -23,7 +24,7 @@ from vobench.errors import InputError
 from vobench.results.unfinished import unfinished
 
 GROUND_TRUTH, CASE, SCORE, SEQUENCE = "ground_truth.tum", "case.json", "score.json", "sequence"
-ENVIRONMENT, SUITE = "environment.json", "suite.json"
+ENVIRONMENT, SUITE, ESTIMATORS = "environment.json", "suite.json", "estimators.json"
 
 RunStatus = Literal[
     "ok", "partial", "lost", "diverged", "invalid_output", "timeout", "out_of_memory", "crashed", "refused"

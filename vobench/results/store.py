@@ -3,7 +3,8 @@
 import hashlib
 import json
 import os
-from collections.abc import Callable, Mapping
+import platform
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
@@ -79,13 +80,19 @@ def folder_digest(*folders: Path) -> str:
     """A hash over names and contents of all files below these folders, compiled Python left out."""
     state = hashlib.sha256()
     for folder in folders:
-        for path in sorted(p for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts):
+        for path in sorted(_files(folder)):
             state.update(f"{path.relative_to(folder)}\0".encode())
             state.update(hashlib.sha256(path.read_bytes()).digest())
     return state.hexdigest()[:32]
 
 
+def _files(folder: Path) -> Iterator[Path]:
+    for place, folders, names in os.walk(folder, followlinks=True):
+        folders[:] = [name for name in folders if name != "__pycache__"]
+        yield from (path for name in names if (path := Path(place, name)).is_file())
+
+
 @cache
 def library_versions(*names: str) -> dict[str, str]:
-    """Installed versions of the distributions whose release can change a result's bytes."""
-    return {name: version(name) for name in names}
+    """Versions of Python and of the installed distributions whose release can change a result's bytes."""
+    return {"python": platform.python_version(), **{name: version(name) for name in names}}

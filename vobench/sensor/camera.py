@@ -83,6 +83,14 @@ CAMERAS = {
 
 
 @dataclass(frozen=True, slots=True)
+class NoiseStreams:
+    """A generator for each kind of noise: how much light there is must not change the draws of the electronics."""
+
+    shot: np.random.Generator
+    read: np.random.Generator
+
+
+@dataclass(frozen=True, slots=True)
 class FixedPattern:
     """What sets one pixel of a chip apart for good: relative gain and offset in electrons, both (H, W)."""
 
@@ -97,18 +105,18 @@ def fixed_pattern(shape: tuple[int, int], sensor: CameraSensor, rng: np.random.G
 
 
 def expose(
-    radiance: Radiance, sensor: CameraSensor, rng: np.random.Generator, *, pattern: FixedPattern | None = None
+    radiance: Radiance, sensor: CameraSensor, noise: NoiseStreams, *, pattern: FixedPattern | None = None
 ) -> Grey:
     """One picture (H, W) of linear radiance (H, W), where 1 is matt white in the scene's own light.
 
     The converter is taken to be finer than the 8 bits kept, so there is one rounding, after the response.
     Raises RenderError for radiance that is negative or not a number. Source: EMVA 1288, release 3.1, section 2.
     """
-    electrons = _collect(_mean_electrons(radiance, sensor, pattern), sensor, rng)
+    electrons = _collect(_mean_electrons(radiance, sensor, pattern), sensor, noise.shot)
     if pattern is not None:
         electrons += pattern.offset_e
     if sensor.read_noise_e > 0:
-        electrons += sensor.read_noise_e * rng.standard_normal(electrons.shape)
+        electrons += sensor.read_noise_e * noise.read.standard_normal(electrons.shape)
     linear = (sensor.dn_per_electron * electrons + sensor.black_dn) / FULL_SCALE_DN
     stored = encode(np.clip(linear, 0.0, 1.0), sensor.response)
     return np.floor(FULL_SCALE_DN * stored + 0.5).astype(np.uint8)

@@ -94,11 +94,6 @@ class Plan:
         return _at(self.source, *keys)
 
 
-def read_suite(name: str) -> Suite:
-    """The suite of that name, or in that file. Raises SuiteError or UnknownNameError."""
-    return yaml_file.read(catalog.find("suite", name).path, Suite)
-
-
 def read_plan(name: str, *, only_estimators: tuple[str, ...] = ()) -> Plan:
     """The plan of the suite of that name, or in that file. Raises SuiteError or UnknownNameError."""
     suite, source = yaml_file.read_marked(catalog.find("suite", name).path, Suite)

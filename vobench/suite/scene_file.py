@@ -13,6 +13,8 @@ from vobench.suite.model import LampOverride, Name, Positive, Strict
 
 Triple = tuple[float, float, float]
 Size = tuple[Positive, Positive, Positive]
+# The light of a larger room would take more memory than machines have, and the renderer sees 60 m far.
+RoomSide = Annotated[float, Field(gt=0, le=30)]
 
 
 class MaterialSpec(Strict):
@@ -29,7 +31,7 @@ class MaterialSpec(Strict):
 class RoomSpec(Strict):
     """Four walls, a floor at z = 0 and a ceiling, around the origin."""
 
-    size_m: Size
+    size_m: tuple[RoomSide, RoomSide, RoomSide]
     floor: str
     wall: str
     ceiling: str
@@ -66,10 +68,11 @@ class SceneFile(Strict):
 
     @model_validator(mode="after")
     def _materials_exist(self) -> "SceneFile":
-        used = [self.room.floor, self.room.wall, self.room.ceiling, *(b.material for b in self.boxes)]
-        for name in used:
+        used = {f"room.{part}": getattr(self.room, part) for part in ("floor", "wall", "ceiling")}
+        used |= {f"boxes.{index}.material": box.material for index, box in enumerate(self.boxes)}
+        for key, name in used.items():
             if name not in self.materials:
-                raise ValueError(unknown("material", name, list(self.materials)))
+                raise ValueError(f"{key}: {unknown('material', name, list(self.materials))}")
         return self
 
 

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.errors import TrajectoryError
-from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
 Stamps = NDArray[np.int64]
@@ -17,7 +16,7 @@ class Trajectory:
     """Poses of one moving frame in one fixed frame, in order of time.
 
     t_ns is (N,) int64, strictly increasing; T_world_frame is (N, 4, 4) in metres.
-    Raises TrajectoryError where shapes, order, finiteness or rotations are wrong.
+    Raises TrajectoryError where shapes, order or finiteness are wrong.
     """
 
     t_ns: Stamps
@@ -52,7 +51,3 @@ class Trajectory:
     def of_mounted(self, T_frame_mounted: Array) -> "Trajectory":
         """The trajectory of something fixed to this frame, such as a camera on a body."""
         return Trajectory(self.t_ns, self.T_world_frame @ T_frame_mounted)
-
-    def from_first(self) -> "Trajectory":
-        """The same motion seen from its first pose, which becomes the identity."""
-        return Trajectory(self.t_ns, se3.inverse(self.T_world_frame[0]) @ self.T_world_frame)

@@ -62,7 +62,7 @@ def run_view(folder: RunFolder, run: RunScore) -> RunView:
 
 
 def _trajectory(path: Path) -> Trajectory:
-    return parse_tum(path.read_text(), name=str(path))
+    return parse_tum(path.read_text(encoding="utf-8"), name=str(path))
 
 
 def _error(run: RunScore) -> float:

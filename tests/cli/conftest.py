@@ -1,0 +1,120 @@
+"""The command line in this process, in a folder of its own, with pictures that cost nothing."""
+
+import json
+import shutil
+import signal
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vobench.cli import main
+from vobench.pipeline import simulate
+from vobench.render import raster
+from vobench.render.bake import BakeSettings
+
+SUITE = """name: tiny
+scenes: [closet]
+rigs: {down: {pitch_deg: 90}}
+trajectories: {short: {targets_m: [[0.25, 0]], tolerance_m: 0.04, rate_hz: 5}}
+estimators: [wheel_odometry, stand_still]
+"""
+CLOSET = """name: closet
+white_cd_m2: 50
+materials: {grain: {pattern: plain, albedo: 0.5, resolution_px: 8}}
+room: {size_m: [2, 2, 1.5], floor: grain, wall: grain, ceiling: grain}
+lamps: [{name: lamp, center_m: [0, 0, 1.4], size_m: [0.4, 0.4], power_lm: 600}]
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What a command wrote, and how it ended."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        """Standard output as the one JSON object that it should be."""
+        content = json.loads(self.out)
+        assert isinstance(content, dict)
+        return content
+
+
+class FlatRenderer:
+    """Draws grey."""
+
+    def __init__(self, baked: object) -> None:
+        pass
+
+    def radiance(self, camera: Any, T_world_camera: object) -> np.ndarray:
+        return np.full((camera.height_px, camera.width_px), 20.0, np.float32)
+
+    def close(self) -> None:
+        pass
+
+
+def lay_out(folder: Path, patch: pytest.MonkeyPatch) -> None:
+    """Make a folder the working directory, with a suite and a scene, an empty cache and free pictures."""
+    for kind, name, text in (("suites", "tiny", SUITE), ("scenes", "closet", CLOSET)):
+        (folder / kind).mkdir()
+        (folder / kind / f"{name}.yaml").write_text(text)
+    patch.chdir(folder)
+    patch.setenv("VOBENCH_CACHE", str(folder / "cache"))
+    patch.delenv("VOBENCH_PATH", raising=False)
+    patch.setattr(raster, "RasterRenderer", FlatRenderer)
+    patch.setattr(simulate, "BAKE", BakeSettings(0.5, 1, 0.5, 1, 0))
+
+
+def call(words: tuple[object, ...], patch: pytest.MonkeyPatch) -> int:
+    """The exit code of a command, run in this process."""
+    patch.setattr(sys, "argv", ["vobench", *map(str, words)])
+    listens = signal.getsignal(signal.SIGINT)
+    try:
+        with pytest.raises(SystemExit) as ended:
+            main()
+    finally:
+        signal.signal(signal.SIGINT, listens)
+    return int(ended.value.code or 0)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory with a suite and a scene, and an empty cache."""
+    lay_out(tmp_path, monkeypatch)
+    return tmp_path
+
+
+@pytest.fixture
+def vobench(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Said]:
+    """Runs a command."""
+
+    def run(*words: object) -> Said:
+        code = call(words, monkeypatch)
+        said = capsys.readouterr()
+        return Said(code, said.out, said.err)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def one_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the suite has been run."""
+    folder = tmp_path_factory.mktemp("ran")
+    with pytest.MonkeyPatch.context() as patch:
+        lay_out(folder, patch)
+        assert call(("run", "tiny"), patch) == 0
+    return folder
+
+
+@pytest.fixture
+def ran(one_run: Path, here: Path) -> Path:
+    """The suite's folder in the working directory, with one run in it."""
+    shutil.copytree(one_run / "runs", here / "runs", symlinks=True)
+    return here / "runs" / "tiny"

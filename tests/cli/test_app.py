@@ -1,0 +1,167 @@
+"""Every command: its help, its JSON, its exit code, and one line for every mistake."""
+
+# ruff: noqa: E501 - a sentence stands in one line
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from vobench import __version__
+from vobench.cli import main
+from vobench.cli.app import app
+from vobench.errors import UnknownNameError
+from vobench.pipeline import simulate
+
+README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+COMMANDS = [command.name or command.callback.__name__ for command in app.registered_commands]
+HEAVY = ("numpy", "cv2", "pandas", "rerun", "scipy", "pydantic", "rich.table", "OpenGL", "trimesh")
+GT, EST = "runs/tiny/latest/cases/short/ground_truth.tum", "runs/tiny/latest/cases/short/stand_still/0/estimate.tum"
+
+
+def test_help_imports_no_heavy_library():
+    script = (
+        "import sys; from vobench.cli import main; sys.argv = ['vobench', '--help']\n"
+        "try: main()\nexcept SystemExit: pass\n"
+        f"print('heavy:', *(name for name in {HEAVY!r} if name in sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1].strip() == "heavy:"
+    assert "Usage: vobench" in done.stdout
+
+
+def test_every_command_is_in_the_readmes_table_and_the_table_has_no_other():
+    assert sorted(re.findall(r"^\| `vobench (\w+)", README, re.MULTILINE)) == sorted(COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_json_and_help(vobench, command):
+    said = vobench(command, "--help")
+    assert said.code == 0
+    assert "--json" in said.out
+
+
+JSON = [
+    (("run", "tiny"), "boards"),
+    (("run", "tiny", "--dry-run"), "cases"),
+    (("check", "tiny"), "cases"),
+    (("list",), "entries"),
+    (("list", "scenes"), "entries"),
+    (("score", GT, EST), "metrics"),
+    (("report", "runs/tiny"), "boards"),
+    (("report", "runs/tiny", "--out", "board.html"), "path"),
+    (("view", "runs/tiny"), "path"),
+    (("view", "runs/tiny", "--save", "look.rrd"), "path"),
+    (("doctor",), "checks"),
+    (("run", "nope"), "error"),
+    (("report", "nope"), "error"),
+    (("list", "nope"), "error"),
+]
+
+
+@pytest.mark.parametrize(("words", "key"), JSON, ids=[" ".join(words[:2]) for words, _ in JSON])
+def test_json_is_one_object_and_nothing_else(vobench, ran, words, key):
+    said = vobench(*words, "--json")
+    assert key in said.json
+    assert said.code == (1 if key == "error" else 0)
+
+
+def test_a_broken_file_beside_the_good_ones_is_listed_with_its_reason(vobench, here):
+    (here / "suites" / "broken.yaml").write_text("name: [\n")
+    (here / "scenes" / "binary.yaml").write_bytes(b"\xff\xfe")
+    (here / "suites" / "folder.yaml").mkdir()
+    said = vobench("list", "--json")
+    summaries = {entry["name"]: entry["summary"] for entry in said.json["entries"]}
+    assert said.code == 0
+    assert summaries["broken"].startswith("unreadable: ")
+    assert summaries["binary"].endswith("binary.yaml: not a text file in UTF-8")
+    assert summaries["folder"].endswith("Is a directory")
+
+
+WRONG = [
+    (("run", "tinny"), "no suite named 'tinny'. Did you mean 'tiny'? Known: paper, quickstart, tiny"),
+    (("check", "./no.yaml"), "no suite file at no.yaml. Known by name: paper, quickstart, tiny"),
+    (("run", "tiny", "-e", "stand_stil"), "no estimator named 'stand_stil'. Did you mean 'stand_still'? Known: constant_velocity, lk_epipolar, stand_still, wheel_odometry"),
+    (("run", "tiny", "--out", "suites/tiny.yaml"), "--out should be a folder that can be written (File exists): suites/tiny.yaml"),
+    (("list", "scene_s"), "no kind named 'scene_s'. Did you mean 'scenes'? Known: estimators, scenes, suites"),
+    (("score", "no.tum", "no.tum"), "cannot read no.tum: No such file or directory"),
+    (("score", "suites/tiny.yaml", "no.tum"), "suites/tiny.yaml:1: a pose has 8 columns (t x y z qx qy qz qw), this line has 2"),
+    (("score", "a", "b", "--align", "sm3"), "no alignment named 'sm3'. Did you mean 'sim3'? Known: none, origin, se3, sim3"),
+    (("score", "a", "b", "--t-max-diff", "nan"), "--t-max-diff should be 0 to 1e+06 seconds, got nan"),
+    (("report", "suites"), "not the folder of a run (no cases/*/*/*/score.json in it): suites"),
+    (("report", "suites", "--format", "htm"), "no format named 'htm'. Did you mean 'html'? Known: csv, html, json, latex, md, terminal"),
+    (("report", "suites", "--out", "a.xls"), "no format goes with 'a.xls'; name one with --format: md, json, csv, latex, html"),
+    (("view", "suites"), "not the folder of a run (no cases/*/*/*/score.json in it): suites"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "sentence"), WRONG, ids=[" ".join(words) for words, _ in WRONG])
+def test_a_mistake_is_one_line_and_exit_code_1(vobench, words, sentence):
+    said = vobench(*words)
+    assert (said.code, said.out, said.err) == (1, "", f"vobench: {sentence}\n")
+
+
+def test_a_mistake_in_the_words_themselves_is_exit_code_2(vobench):
+    for words in (("bogus",), ("run",), ("run", "tiny", "--bogus"), ("score", "a", "b", "--delta", "0")):
+        assert vobench(*words).code == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("report", "runs/tiny", "--out", "no/board.md"), "No such file or directory: no/board.md"),
+        (("report", "runs/tiny", "--format", "md", "--out", "runs"), "Is a directory: runs"),
+        (("view", "runs/tiny", "--save", "no/a.rrd"), "--save should be a file to write, but this is in a folder that cannot be written: no/a.rrd"),
+        (("view", "runs/tiny", "--save", "runs"), "--save should be a file to write, but this is a folder: runs"),
+        (("view", "runs/tiny", "--case", "long"), "no case 'long' in this run. Known: short"),
+        (("view", "runs/tiny", "--estimator", "me"), "no estimator 'me' in this run. Known: stand_still, wheel_odometry"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_read_or_written_is_one_line(vobench, ran, words, sentence):
+    said = vobench(*words)
+    assert (said.code, said.err) == (1, f"vobench: {sentence}\n")
+
+
+@pytest.mark.parametrize("words", [("--debug", "run", "nope"), ("run", "nope", "--debug"), ("run", "--debug", "nope")])
+def test_debug_lets_the_error_through_wherever_it_stands(here, monkeypatch, words):
+    monkeypatch.setattr(sys, "argv", ["vobench", *words])
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    with pytest.raises(UnknownNameError, match="no suite named 'nope'"):
+        main()
+
+
+def test_version_needs_no_command(vobench):
+    assert vobench("--version").out == f"{__version__}\n"
+
+
+def test_ctrl_c_is_one_line_and_exit_code_130_even_where_a_library_swallows_it(vobench, monkeypatch, here):
+    def interrupted(*_, **__):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except BaseException as error:
+            raise OSError("a library's own words") from error
+
+    monkeypatch.setattr(simulate, "drive_case", interrupted)
+    said = vobench("run", "tiny")
+    assert said.code == 130
+    assert said.err == "vobench: stopped; finished stages are kept, the same command goes on from there\n"
+    assert not list(here.glob("runs/*/*"))
+
+
+def test_a_terminal_that_knows_no_degree_sign_gets_a_table_all_the_same(ran, here):
+    script = "import sys; from vobench.cli import main; sys.argv = ['vobench', 'report', 'runs/tiny']; main()"
+    environment = os.environ | {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, env=environment, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"RPE ?/frame" in done.stdout
+
+
+def test_a_reader_that_has_seen_enough_gets_no_traceback(ran):
+    script = "import sys; from vobench.cli import main; sys.argv = ['vobench', 'list', '--json']; main()"
+    pipe = f"'{sys.executable}' -c \"{script}\" | true"
+    done = subprocess.run(["bash", "-c", pipe], capture_output=True, text=True, check=False)
+    assert done.stderr == ""

@@ -1,0 +1,95 @@
+"""vobench run, check, report and view on a suite whose pictures are grey."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from vobench.errors import MissingDependencyError
+from vobench.render import raster
+
+
+def test_run_ends_in_a_leaderboard_and_says_where_everything_is(vobench, here):
+    said = vobench("run", "tiny")
+    latest = (Path("runs") / "tiny" / "latest").readlink()
+    assert (said.code, said.err) == (0, "")
+    assert "wheel_odometry" in said.out
+    assert said.out.endswith(f"Everything is in runs/tiny/{latest}\nLook into it: vobench view runs/tiny/{latest}\n")
+
+
+def test_run_takes_the_estimators_that_are_asked_for(vobench, here):
+    said = vobench("run", "tiny", "-e", "stand_still", "-e", "constant_velocity", "--json")
+    assert {row["estimator"] for row in said.json["boards"][0]["rows"]} == {"stand_still", "constant_velocity"}
+
+
+def test_check_counts_what_run_would_do_and_does_none_of_it(vobench, here):
+    planned = vobench("check", "tiny", "--json").json
+    assert [(case["case"], case["simulated"]) for case in planned["cases"]] == [("short", False)]
+    assert planned["runs"] == 2
+    assert not (here / "runs").exists()
+    assert not (here / "cache").exists()
+    assert vobench("run", "tiny", "--dry-run", "--json").json == planned
+    vobench("run", "tiny")
+    assert vobench("check", "tiny", "--json").json["cases"][0]["simulated"]
+
+
+def test_paths_may_be_relative_to_wherever_one_stands(vobench, here, monkeypatch):
+    monkeypatch.setenv("VOBENCH_CACHE", "kept")
+    (here / "deep").mkdir()
+    monkeypatch.chdir(here / "deep")
+    monkeypatch.setenv("VOBENCH_PATH", str(here))
+    assert vobench("run", "../suites/tiny.yaml", "--out", "../out").code == 0
+    assert (here / "deep" / "kept" / "sequences").is_dir()
+    assert vobench("report", "../out/tiny").code == 0
+    assert vobench("view", "../out/tiny", "--save", "a.rrd").code == 0
+
+
+def test_without_its_cache_a_run_still_reports_and_view_says_how_to_get_the_pictures_back(vobench, here):
+    vobench("run", "tiny")
+    shutil.rmtree(here / "cache")
+    assert vobench("report", "runs/tiny").code == 0
+    said = vobench("view", "runs/tiny", "--save", "a.rrd")
+    assert said.code == 1
+    assert said.err.startswith("vobench: the sequence is gone from the cache; run the suite again to make it anew: ")
+    assert vobench("run", "tiny").code == 0
+    assert vobench("view", "runs/tiny", "--save", "a.rrd").code == 0
+
+
+def test_the_pictures_may_be_missing_for_a_reason_that_doctor_knows(vobench, here, monkeypatch):
+    def broken(*_):
+        raise MissingDependencyError("cannot draw without a display (missing libEGL); run: apt-get install -y libegl1")
+
+    monkeypatch.setattr(raster, "RasterRenderer", broken)
+    said = vobench("run", "tiny")
+    assert (said.code, said.out) == (1, "")
+    assert said.err.startswith("vobench: cannot draw without a display (")
+    assert not list((here / "runs" / "tiny").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "begin"),
+    [
+        ("b.md", "## short"),
+        ("b.html", "<!doctype html>"),
+        ("b.csv", "board,"),
+        ("b.json", "{"),
+        ("b.tex", "\\begin{tabular}"),
+    ],
+)
+def test_a_files_ending_says_its_form(vobench, ran, here, name, begin):
+    said = vobench("report", "runs/tiny", "--out", name)
+    assert (said.code, said.out) == (0, "")
+    assert (here / name).read_text(encoding="utf-8").startswith(begin)
+
+
+def test_view_of_a_run_without_a_single_pose_works_too(vobench, here):
+    plug = here / "estimators" / "blind"
+    plug.mkdir(parents=True)
+    (plug / "estimator.yaml").write_text(
+        "name: blind\nversion: '1'\nclass: estimator:Blind\npose_of: body\nsummary: Blind\n"
+    )
+    (plug / "estimator.py").write_text("raise ValueError('no eyes')\n")
+    assert vobench("run", "tiny", "-e", "blind", "-e", "stand_still").code == 0
+    said = vobench("view", "runs/tiny", "--save", "a.rrd", "--json")
+    assert said.json["estimator"] == "blind"
+    assert (here / "a.rrd").stat().st_size > 0

@@ -1,0 +1,50 @@
+"""Tables fit the terminal, and lose no digit on the way."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from vobench.cli import terminal
+from vobench.report.leaderboard import Board, Row
+
+ROW = Row(
+    rank=1,
+    estimator="wheel_odometry",
+    status="invalid_output",
+    survived=11,
+    partial=0,
+    runs=12,
+    ate_mm=1234.567,
+    segment_percent=12.345,
+    rpe_mm=1.234,
+    rpe_deg=0.1234,
+    coverage=0.999,
+    ms_per_frame=123.4,
+    reason="",
+)
+
+
+def drawn(width, monkeypatch):
+    file = io.StringIO()
+    out = Console(file=file, width=width, markup=False, highlight=False)
+    monkeypatch.setattr(terminal, "console", lambda: out)
+    terminal.print_boards([Board("short", (ROW,))])
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("width", [60, 80, 100, 140])
+def test_a_board_fits_with_every_cell_in_one_piece(width, monkeypatch):
+    lines = drawn(width, monkeypatch).splitlines()
+    assert max(map(len, lines)) <= width
+    (row,) = (line for line in lines if "wheel_odometry" in line)
+    assert "invalid_output" in row
+    assert "1234.57" in row
+
+
+def test_a_wide_terminal_shows_every_column(monkeypatch):
+    assert all(heading in drawn(140, monkeypatch) for heading in terminal.HEADINGS)
+
+
+def test_the_columns_that_may_go_exist():
+    assert set(terminal.LEAST_FIRST) < set(terminal.HEADINGS)

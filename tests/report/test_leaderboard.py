@@ -1,0 +1,110 @@
+"""The law of ranking: no failed run ever ranks before an estimator that survived."""
+
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vobench.report.leaderboard import board, boards
+from vobench.results.run_folder import STATUSES, SURVIVED, RunScore
+
+CASES = ("a", "b")
+ates = st.none() | st.floats(0, 1e6)
+runs = st.fixed_dictionaries(
+    {name: st.tuples(*[st.tuples(st.sampled_from(STATUSES), ates)] * len(CASES)) for name in ("p", "q", "r", "s")}
+)
+
+
+def scores_of(outcomes):
+    return [
+        RunScore(
+            case=case,
+            variant={},
+            estimator=name,
+            repeat=0,
+            status=status,
+            reason="",
+            coverage=1.0,
+            frames=9,
+            path_m=1.0,
+            score=None if ate is None else {"metrics": [{"name": "ate_trans", "rmse": ate}]},
+        )
+        for name, results in outcomes.items()
+        for case, (status, ate) in zip(CASES, results, strict=True)
+    ]
+
+
+def failures(results):
+    return sum(status not in SURVIVED for status, _ in results)
+
+
+@given(runs)
+def test_no_failure_ranks_before_a_survivor_however_small_its_error(outcomes):
+    for made in boards(scores_of(outcomes), {}):
+        failed = [row.runs - row.survived for row in made.rows]
+        assert failed == sorted(failed)
+        ranks = {row.estimator: row.rank for row in made.rows}
+        for one in made.rows:
+            for other in made.rows:
+                if one.survived == one.runs and other.survived < other.runs:
+                    assert ranks[one.estimator] < ranks[other.estimator]
+
+
+@given(runs)
+def test_everyone_who_ran_is_in_the_board_once(outcomes):
+    overall = boards(scores_of(outcomes), {})[0]
+    assert sorted(row.estimator for row in overall.rows) == sorted(outcomes)
+    assert {row.estimator: row.runs - row.survived for row in overall.rows} == {
+        name: failures(results) for name, results in outcomes.items()
+    }
+
+
+@given(runs, st.randoms(use_true_random=False))
+def test_the_order_of_scores_does_not_matter(outcomes, random):
+    shuffled = scores_of(outcomes)
+    random.shuffle(shuffled)
+    assert boards(shuffled, {}) == boards(scores_of(outcomes), {})
+
+
+@given(runs)
+def test_ranks_count_from_one_and_skip_as_many_as_are_tied(outcomes):
+    rows = boards(scores_of(outcomes), {})[0].rows
+    assert rows[0].rank == 1
+    for position, (above, below) in enumerate(pairwise(rows), start=2):
+        assert below.rank in (above.rank, position)
+
+
+@given(st.floats(0, 1e6), st.floats(0, 1e6))
+def test_among_survivors_the_smaller_error_is_first(one, other):
+    rows = board("", scores_of({"p": [("ok", one)] * 2, "q": [("ok", other)] * 2}), {}).rows
+    assert (rows[0].estimator, rows[0].rank) == ("p" if one <= other else "q", 1)
+    assert (rows[1].rank == 1) == (one == other)
+
+
+def test_one_that_was_blind_for_a_while_ranks_after_one_that_saw_all(scored):
+    rows = board("", [scored("sharp", "partial", ate_m=0.001), scored("blunt", ate_m=0.5)], {}).rows
+    assert [row.estimator for row in rows] == ["blunt", "sharp"]
+
+
+def test_equal_results_share_a_rank_and_the_next_is_skipped(scored):
+    rows = board("", [scored(name, ate_m=ate) for name, ate in (("b", 0.1), ("a", 0.1), ("c", 0.2))], {}).rows
+    assert [(row.estimator, row.rank) for row in rows] == [("a", 1), ("b", 1), ("c", 3)]
+
+
+def test_means_are_over_the_runs_that_survived(mixed):
+    (mad,) = (row for row in boards(mixed, {("ahead", "mad"): 4.0})[0].rows if row.estimator == "mad")
+    assert (mad.survived, mad.runs, mad.status, mad.reason) == (1, 2, "diverged", "down: it went dark")
+    assert mad.ate_mm == pytest.approx(1e-6)
+    assert mad.ms_per_frame == 4.0
+
+
+def test_one_that_never_survived_has_no_numbers_and_a_reason(mixed):
+    dead = boards(mixed, {})[0].rows[-1]
+    assert (dead.estimator, dead.survived, dead.ate_mm, dead.rpe_mm) == ("dead", 0, None, None)
+    assert dead.status == "crashed"
+
+
+def test_one_case_needs_no_board_over_all(scored):
+    assert [b.title for b in boards([scored("a")], {})] == ["down"]
+    assert [b.title for b in boards([scored("a"), scored("a", case="ahead")], {})] == ["all 2 cases", "ahead", "down"]

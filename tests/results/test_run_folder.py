@@ -1,0 +1,83 @@
+"""The folder of a run: whole or not there, never in another's place, and `latest` points to the newest."""
+
+import pytest
+from pydantic import ValidationError
+
+from vobench.errors import InputError
+from vobench.results.run_folder import SCORE, STATUSES, SURVIVED, RunScore, make_run, open_run, write_json
+
+
+def score(**changes):
+    facts = {
+        "case": "c",
+        "variant": {},
+        "estimator": "e",
+        "repeat": 0,
+        "status": "ok",
+        "reason": "",
+        "coverage": 1.0,
+        "frames": 9,
+        "path_m": 1.0,
+        "score": None,
+    }
+    return RunScore(**{**facts, **changes})
+
+
+def fill_with(*scores):
+    def fill(folder):
+        for s in scores:
+            target = folder.estimate(s.case, s.estimator, s.repeat)
+            target.mkdir(parents=True)
+            write_json(target / SCORE, s.model_dump(mode="json"))
+
+    return fill
+
+
+def test_scores_come_back_as_they_went_in(tmp_path):
+    scores = [score(case=c, estimator=e, reason="grün\n") for c in "ab" for e in "xy"]
+    assert make_run(tmp_path, "suite", "0123456789", fill_with(*scores)).scores() == scores
+
+
+def test_a_suites_folder_stands_for_its_latest_run(tmp_path):
+    for name in ("old", "new"):
+        made = make_run(tmp_path, "suite", "key", fill_with(score(estimator=name)))
+    assert open_run(tmp_path / "suite").path.resolve() == made.path
+    assert [s.estimator for s in open_run(tmp_path / "suite").scores()] == ["new"]
+    assert open_run(made.path) == made
+
+
+def test_runs_that_end_in_the_same_second_do_not_meet(tmp_path):
+    paths = {make_run(tmp_path, "suite", "samekey!", fill_with(score())).path for _ in range(5)}
+    assert len(paths) == 5
+    assert all(path.parent == tmp_path / "suite" and "samekey!" in path.name for path in paths)
+
+
+def test_a_run_that_stops_leaves_nothing_and_the_latest_where_it_was(tmp_path):
+    made = make_run(tmp_path, "suite", "key", fill_with(score()))
+
+    def stop(folder):
+        fill_with(score())(folder)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make_run(tmp_path, "suite", "key", stop)
+    assert {path.name for path in (tmp_path / "suite").iterdir()} == {made.path.name, "latest"}
+    assert open_run(tmp_path / "suite").path.resolve() == made.path
+
+
+def test_a_folder_that_is_no_run_is_refused_in_one_line(tmp_path):
+    with pytest.raises(InputError, match=r"^not the folder of a run \(no .*score\.json in it\): "):
+        open_run(tmp_path).scores()
+
+
+def test_a_statistic_that_was_not_computed_is_none_and_not_zero():
+    metrics = {"metrics": [{"name": "ate_trans", "rmse": 0.5}]}
+    assert score(score=metrics).value("ate_trans", "rmse") == 0.5
+    assert score(score=metrics).value("rpe_trans", "rmse") is None
+    assert score().value("ate_trans", "rmse") is None
+
+
+def test_a_status_outside_the_list_is_no_score():
+    assert STATUSES[:2] == SURVIVED
+    with pytest.raises(ValidationError):
+        score(status="fine")
