@@ -2,11 +2,14 @@
 
 # ruff: noqa: E501 - a sentence stands in one line
 
+from pathlib import Path
+
 import pytest
 
 from vobench.errors import SuiteError, VobenchError
 from vobench.pipeline.motion import drive_all
 from vobench.suite.expand import read_plan
+from vobench.suite.model import CameraSpec, EstimatorSpec, LampOverride, RigSpec, Suite, TrajectorySpec
 
 SUITE_KEYS = "cameras, estimators, lightings, name, repeats, rigs, scenes, seed, summary, trajectories"
 RIG_KEYS = "baseline_m, forward_m, height_m, lens, pitch_deg"
@@ -17,7 +20,7 @@ A_NAME = "should be lower-case letters, digits, _ and ., a letter or digit first
 WRONG = [
     ("seed:", "sed:", f":2: sed: unknown key. Did you mean 'seed'? Known: {SUITE_KEYS}"),
     ("seed: 1", "xyz: 1", f":2: xyz: unknown key. Known: {SUITE_KEYS}"),
-    ("pitch_deg", "pich_deg", f":5: rigs.down.pich_deg: unknown key. Did you mean 'pitch_deg'? Known: {RIG_KEYS} (and 1 more)"),
+    ("pitch_deg", "pich_deg", f":5: rigs.down.pich_deg: unknown key. Did you mean 'pitch_deg'? Known: {RIG_KEYS} (and 1 more mistake)"),
     ("{power_lm: 150}", "{power: 1, power_lm: 1}", ":4: lightings.dim.lamp.power: unknown key. Did you mean 'power_lm'? Known: power_lm"),
     ("params:", "parms:", ":8: estimators.1.parms: unknown key. Did you mean 'params'? Known: label, name, params"),
     ("pitch_deg: 90", "", ":5: rigs.down.pitch_deg: this key is missing"),
@@ -49,8 +52,8 @@ WRONG = [
     ("[[0.5, 0]]", "[[0.5, 0]], slip: slipery", ":6: trajectories.short.slip: no slip named 'slipery'. Did you mean 'slippery'? Known: nominal, none, slippery"),
     ("[[0.5, 0]]", "[[0.5, 0]], controller: smoth", ":6: trajectories.short.controller: no controller named 'smoth'. Did you mean 'smooth'? Known: easy, paper, smooth"),
     ("[[0.5, 0]]", "[]", ":6: trajectories.short.targets_m: should have 1 or more entries, but has 0"),
-    ("[[0.5, 0]]", "[[0.5, 0, 1]]", ":6: trajectories.short.targets_m.0: should have 2 or fewer entries, but has 3 (and 1 more)"),
-    ("[[0.5, 0]]", "[[0.5, a]]", ":6: trajectories.short.targets_m.0.1: should be a number (got 'a') (and 1 more)"),
+    ("[[0.5, 0]]", "[[0.5, 0, 1]]", ":6: trajectories.short.targets_m.0: should have 2 or fewer entries, but has 3 (and 1 more mistake)"),
+    ("[[0.5, 0]]", "[[0.5, a]]", ":6: trajectories.short.targets_m.0.1: should be a number (got 'a') (and 1 more mistake)"),
     ("sensor: clean", "sensor: grainy", ":7: cameras.clean.sensor: no camera sensor named 'grainy'. Known: clean, mt9v034"),
     ("stand_still,", "stnd_still,", f":8: estimators.0: no estimator named 'stnd_still'. Did you mean 'stand_still'? Known: {ESTIMATORS}"),
     ("stand_still,", "./stand_still,", f":8: estimators.0: no estimator file at stand_still/estimator.yaml. Known by name: {ESTIMATORS}"),
@@ -125,3 +128,23 @@ def test_a_drive_that_cannot_be_is_said_before_anything_is_rendered(bent, tmp_pa
     with pytest.raises(VobenchError) as refused:
         drive_all(planned)
     assert str(refused.value).startswith(f"{tmp_path / 'tiny.yaml'}:6: trajectories.short: {sentence}")
+
+
+DOCS = Path(__file__).parents[2] / "docs" / "suites.md"
+
+
+@pytest.mark.parametrize("model", [Suite, RigSpec, TrajectorySpec, CameraSpec, EstimatorSpec, LampOverride])
+def test_every_key_is_in_the_docs_with_its_default(model):
+    page = DOCS.read_text(encoding="utf-8")
+    for key, field in model.model_fields.items():
+        assert f"`{key}`" in page or f"{{{key}" in page or f", {key}" in page, key
+        if isinstance(field.default, str | int | float) and field.default != "":
+            (row,) = [line for line in page.splitlines() if line.startswith("| `") and f"`{key}`" in line.split("|")[1]]
+            default = f"{field.default:g}" if isinstance(field.default, float) else str(field.default)
+            assert default in row, f"{key}: {default} is not in: {row}"
+
+
+def test_the_suite_of_the_docs_is_valid(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lighting.yaml").write_text(DOCS.read_text(encoding="utf-8").split("```yaml\n")[1].split("```")[0])
+    assert [case.name for case in read_plan("./lighting.yaml").cases] == ["both", "one_lamp"]

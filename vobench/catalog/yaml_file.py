@@ -143,7 +143,8 @@ def _sentence(source: Source, error: ValidationError, model: type[BaseModel]) ->
     found = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
     # Pydantic marks a bad key, as opposed to its value, with a last part of its own.
     keys = tuple(part for part in found[0]["loc"] if part != "[key]")
-    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    others = len(found) - 1
+    more = f" (and {others} more mistake{'s' if others > 1 else ''})" if others else ""
     return f"{source.place(keys)}: {_complaint(found[0], model)}{more}"
 
 
