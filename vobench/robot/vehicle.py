@@ -38,7 +38,7 @@ class Vehicle:
             limit = min(self.theta.t4, self.theta.t6) / period
             raise MotionError(
                 f"gain_per_s {k:g} at {self.rate_hz:g} Hz with {self.integrator} in {self.substeps} sub-step(s) never "
-                f"settles: errors grow {growth:.4f} times a step; one Euler step needs a gain below {limit:.3g}"
+                f"settles: errors grow {growth:.4g} times a step; one Euler step needs a gain below {limit:.3g}"
             )
 
     def references(self, state: Array, target_m: Array) -> tuple[float, float]:
