@@ -1,6 +1,7 @@
 """All of vobench's commands; what they need is imported when they run, so that --help is instant."""
 
 import json as json_module
+import os
 import signal
 import sys
 from pathlib import Path
@@ -47,6 +48,16 @@ def run() -> None:
         if stops:
             _fail("stopped; finished stages are kept, the same command goes on from there", error, code=130)
         _fail(_sentence(error), error, code=1)
+    finally:
+        _flush()
+
+
+def _flush() -> None:
+    """Hand over what is printed now, not at exit, where a reader that has seen enough would make a traceback."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _sentence(error: BaseException) -> str:
