@@ -160,8 +160,10 @@ def test_a_terminal_that_knows_no_degree_sign_gets_a_table_all_the_same(ran, her
     assert b"RPE ?/frame" in done.stdout
 
 
-def test_a_reader_that_has_seen_enough_gets_no_traceback(ran):
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_reader_that_has_seen_enough_gets_no_traceback(ran, unbuffered):
     script = "import sys; from vobench.cli import main; sys.argv = ['vobench', 'list', '--json']; main()"
     pipe = f"'{sys.executable}' -c \"{script}\" | true"
-    done = subprocess.run(["bash", "-c", pipe], capture_output=True, text=True, check=False)
+    environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
+    done = subprocess.run(["bash", "-c", pipe], capture_output=True, text=True, check=False, env=environment)
     assert done.stderr == ""
