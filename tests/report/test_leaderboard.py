@@ -108,3 +108,17 @@ def test_one_that_never_survived_has_no_numbers_and_a_reason(mixed):
 def test_one_case_needs_no_board_over_all(scored):
     assert [b.title for b in boards([scored("a")], {})] == ["down"]
     assert [b.title for b in boards([scored("a"), scored("a", case="ahead")], {})] == ["all 2 cases", "ahead", "down"]
+
+
+@given(runs)
+def test_of_equal_failures_fewer_partial_runs_rank_first(outcomes):
+    places = [(row.runs - row.survived, row.partial) for row in boards(scores_of(outcomes), {})[0].rows]
+    assert places == sorted(places)
+    partial = {name: sum(status == "partial" for status, _ in results) for name, results in outcomes.items()}
+    assert {row.estimator: row.partial for row in boards(scores_of(outcomes), {})[0].rows} == partial
+
+
+def test_over_several_cases_a_reason_names_its_case():
+    both = scores_of({"p": (("ok", 0.1), ("crashed", None))})
+    told = [score.model_copy(update={"reason": "out of luck" if score.case == "b" else ""}) for score in both]
+    assert [made.rows[0].reason for made in boards(told, {})] == ["b: out of luck", "", "out of luck"]

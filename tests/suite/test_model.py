@@ -100,7 +100,7 @@ def test_a_file_that_is_no_suite_at_all_is_refused_by_name(bent, tmp_path, conte
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("wall: grain", "wall: grane", ": room.wall: no material named 'grane'. Did you mean 'grain'? Known: grain"),
+        ("wall: grain", "wall: grane", ":4: room.wall: no material named 'grane'. Did you mean 'grain'? Known: grain"),
         ("albedo: 0.5", "albedo: 1", ":3: materials.grain.albedo: should be less than 1 (got 1)"),
         ("terrazzo", "tiles", ":3: materials.grain.pattern: should be 'plain', 'terrazzo', 'plaster', 'wood', 'poster' or"),
         ("power_lm: 600", "power_lm: -1", ":5: lamps.0.power_lm: should be 0 or more (got -1)"),

@@ -8,7 +8,7 @@ from vobench.catalog.manifest import read_manifest
 from vobench.cli import terminal
 from vobench.errors import UnknownNameError, VobenchError
 from vobench.suite.model import Suite
-from vobench.suite.scene_file import SceneFile
+from vobench.suite.scene_file import read_scene
 
 
 def show(kind: str | None, *, as_json: bool) -> None:
@@ -44,7 +44,7 @@ def _summary(entry: Entry) -> str:
         if entry.kind == "estimator":
             return read_manifest(entry.path).summary
         if entry.kind == "scene":
-            return yaml_file.read(entry.path, SceneFile).summary
+            return read_scene(entry.path).summary
         return yaml_file.read(entry.path, Suite).summary
     except VobenchError as error:
         return f"unreadable: {error}"

@@ -173,5 +173,5 @@ def _scenes(suite: Suite, source: Source | None) -> dict[str, SceneFile]:
             entry = catalog.find("scene", name)
             if entry.name in scenes:
                 raise SuiteError(f"two scenes are called '{entry.name}'; give each once, from files of different names")
-            scenes[entry.name] = yaml_file.read(entry.path, SceneFile)
+            scenes[entry.name] = scene_file.read_scene(entry.path)
     return scenes

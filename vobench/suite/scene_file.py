@@ -1,11 +1,14 @@
 """What a scene's YAML may say, and the scene it describes."""
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
+from vobench.catalog import yaml_file
 from vobench.catalog.catalog import unknown
+from vobench.catalog.yaml_file import Keys
 from vobench.errors import SuiteError
 from vobench.scene.scene import AreaLight, Scene, box, ceiling_light, room
 from vobench.scene.texture import Texture
@@ -66,14 +69,17 @@ class SceneFile(Strict):
     boxes: tuple[BoxSpec, ...] = ()
     lamps: Annotated[tuple[LampSpec, ...], Field(min_length=1)]
 
-    @model_validator(mode="after")
-    def _materials_exist(self) -> "SceneFile":
-        used = {f"room.{part}": getattr(self.room, part) for part in ("floor", "wall", "ceiling")}
-        used |= {f"boxes.{index}.material": box.material for index, box in enumerate(self.boxes)}
-        for key, name in used.items():
-            if name not in self.materials:
-                raise ValueError(f"{key}: {unknown('material', name, list(self.materials))}")
-        return self
+
+def read_scene(path: Path) -> SceneFile:
+    """The scene in a file. Raises SuiteError, one line with its place, where it is wrong or names no material."""
+    spec, source = yaml_file.read_marked(path, SceneFile)
+    used: list[tuple[Keys, str]] = [(("room", part), getattr(spec.room, part)) for part in ("floor", "wall", "ceiling")]
+    used += [(("boxes", index, "material"), b.material) for index, b in enumerate(spec.boxes)]
+    for keys, name in used:
+        with source.at(*keys):
+            if name not in spec.materials:
+                raise SuiteError(unknown("material", name, list(spec.materials)))
+    return spec
 
 
 def build(spec: SceneFile, lighting: dict[str, LampOverride]) -> Scene:
