@@ -1,6 +1,8 @@
 """vobench run and vobench check."""
 
 import os
+import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +32,12 @@ def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) ->
         print(boards_as_json(boards), end="")
         return
     terminal.print_boards(boards)
-    terminal.console().print(f"Everything is in {folder.path}\nLook into it: vobench view {folder.path}")
+    terminal.console().print(f"Everything is in {folder.path}\nLook into it: {_command()} view {folder.path}")
+
+
+def _command() -> str:
+    """What to type for vobench: our own path where the environment is not activated."""
+    return "vobench" if shutil.which("vobench") else sys.argv[0]
 
 
 def _require_writable(what: str, folder: Path) -> None:
