@@ -8,10 +8,11 @@ import pytest
 
 from vobench.results import estimate_file
 from vobench.results.run_folder import GROUND_TRUTH, SCORE, RunFolder, RunScore, write_json
+from vobench.trajectory.align import Alignment
 from vobench.trajectory.text import format_tum
 from vobench.trajectory.trajectory import Trajectory
 
-IDENTITY = {"scale": 1.0, "rotation": np.eye(3).tolist(), "translation": [0.0, 0.0, 0.0]}
+IDENTITY = Alignment("none", np.eye(3), np.zeros(3), 1.0, ()).as_dict()
 
 
 def make_score(estimator: str, status: str = "ok", *, ate_m: float | None = 0.1, **changes: object) -> RunScore:

@@ -1,5 +1,7 @@
 """Alignment: what a similarity hides is found again, and what can't be found is said."""
 
+import json
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
-from vobench.trajectory.align import align, align_positions, turn
+from vobench.trajectory.align import Alignment, align, align_positions, turn
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -150,3 +152,14 @@ def test_positions_too_large_to_square_are_an_error_of_ours():
     T[:, :3, 3] *= 1e200
     with pytest.raises(AlignmentError, match="below 1e150 m"):
         align(T, T, kind="se3")
+
+
+@pytest.mark.parametrize("kind", ["none", "origin", "se3", "sim3"])
+def test_an_alignment_comes_back_from_json_as_it_was(kind):
+    rng = np.random.default_rng(3)
+    T_est, T_gt = (np.tile(np.eye(4), (9, 1, 1)) for _ in range(2))
+    T_est[:, :3, 3], T_gt[:, :3, 3] = rng.standard_normal((2, 9, 3))
+    made = align(T_est, T_gt, kind=kind)
+    back = Alignment.from_dict(json.loads(json.dumps(made.as_dict())))
+    assert back.as_dict() == made.as_dict()
+    np.testing.assert_array_equal(back.apply(T_est), made.apply(T_est))

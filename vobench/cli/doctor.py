@@ -11,6 +11,7 @@ from vobench.cli import terminal
 from vobench.errors import MissingDependencyError
 from vobench.render.egl import EGL_PACKAGES, EGL_REMEDY
 from vobench.results.store import default_store
+from vobench.results.unfinished import why_unwritable
 
 PROBE = "from vobench.render import egl; egl.context()"
 
@@ -94,10 +95,6 @@ def _apt_get(*words: str) -> None:
 
 def _cache() -> Check:
     root = default_store().root
-    try:
-        root.mkdir(parents=True, exist_ok=True)
-        writable = os.access(root, os.W_OK)
-    except OSError:
-        writable = False
+    writable = not why_unwritable(root)
     remedy = "set VOBENCH_CACHE to a folder that can be written"
     return Check("cache", writable, str(root) if writable else f"cannot write {root}", remedy)

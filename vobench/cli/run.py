@@ -1,6 +1,5 @@
 """vobench run and vobench check."""
 
-import os
 import shutil
 import sys
 from pathlib import Path
@@ -15,6 +14,7 @@ from vobench.pipeline.workshop import Workshop
 from vobench.report import files
 from vobench.report.table import as_json as boards_as_json
 from vobench.results.store import default_store
+from vobench.results.unfinished import why_unwritable
 from vobench.robot.drive import Drive
 from vobench.suite.expand import Case, read_plan
 
@@ -42,12 +42,7 @@ def _command() -> str:
 
 def _require_writable(what: str, folder: Path) -> None:
     """Said before hours of work. Raises InputError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        cause = "" if os.access(folder, os.W_OK) else "Permission denied"
-    except OSError as error:
-        cause = str(error.strerror)
-    if cause:
+    if cause := why_unwritable(folder):
         raise InputError(f"{what} should be a folder that can be written ({cause}): {folder}")
 
 

@@ -94,13 +94,7 @@ class Score:
             "metrics": [metric.as_dict() for metric in self.metrics],
             "association": asdict(self.association),
             "coverage": self.coverage.ratio,
-            "alignment": {
-                "kind": self.alignment.kind,
-                "rotation": self.alignment.rotation.tolist(),
-                "translation": self.alignment.translation.tolist(),
-                "scale": self.alignment.scale,
-                "unobservable": list(self.alignment.unobservable),
-            },
+            "alignment": self.alignment.as_dict(),
             "warnings": list(self.warnings),
         }
 

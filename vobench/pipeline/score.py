@@ -6,7 +6,6 @@ from vobench.metric.score import Score, score
 from vobench.results import estimate_file
 from vobench.results.run_folder import RunScore, RunStatus
 from vobench.suite.expand import Run
-from vobench.trajectory.text import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
 # Below this share of frames with a pose an estimate counts as lost.
@@ -33,9 +32,8 @@ def score_run(run: Run, estimate: Path, gt: Trajectory) -> RunScore:
 
 def score_estimate(estimate: Path, gt: Trajectory) -> Score | None:
     """The score of an estimate's folder, None where it holds no pose at all."""
-    file = estimate / estimate_file.ESTIMATE
-    text = file.read_text(encoding="utf-8")
-    return score(gt, parse_tum(text, name=str(file))) if text else None
+    est = estimate_file.read_tum(estimate / estimate_file.ESTIMATE)
+    return score(gt, est) if len(est) else None
 
 
 def _status(outcome: estimate_file.Outcome, scored: Score | None, gt: Trajectory) -> tuple[RunStatus, str]:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from vobench.report import table
 from vobench.report.leaderboard import Board
 from vobench.results import estimate_file
 from vobench.results.run_folder import GROUND_TRUTH, RunFolder, RunScore
-from vobench.trajectory.text import parse_tum
+from vobench.trajectory.align import Alignment
 
 TEMPLATES = Path(__file__).parent / "templates"
 PLOT_PX = 420
@@ -58,8 +59,7 @@ def html(folder: RunFolder, scores: list[RunScore], boards: list[Board]) -> str:
 
 
 def _plot(folder: RunFolder, case: str, scores: list[RunScore], colours: dict[str, str]) -> Plot:
-    truth_file = folder.case(case) / GROUND_TRUTH
-    truth = parse_tum(truth_file.read_text(encoding="utf-8"), name=str(truth_file)).positions_m[:, :2]
+    truth = estimate_file.read_tum(folder.case(case) / GROUND_TRUTH).positions_m[:, :2]
     low, span = truth.min(0), max(float(np.ptp(truth, axis=0).max()), 1e-3)
     px_per_m = (PLOT_PX - 2 * MARGIN_PX) / span
     middle = low + np.ptp(truth, axis=0) / 2
@@ -69,15 +69,14 @@ def _plot(folder: RunFolder, case: str, scores: list[RunScore], colours: dict[st
         points = PLOT_PX / 2 + (path - middle) * (px_per_m, -px_per_m)
         return Line(name, colour, " ".join(f"{x:.1f},{y:.1f}" for x, y in points))
 
-    estimates = [line(s.estimator, colours[s.estimator], _aligned(folder, s)) for s in scores if s.score]
+    estimates = [
+        line(s.estimator, colours[s.estimator], _aligned(folder, s, s.score["alignment"])) for s in scores if s.score
+    ]
     bar_m = 10.0 ** np.floor(np.log10(span))
     return Plot(case, (line("ground truth", "#000000", truth), *estimates), bar_m, bar_m * px_per_m)
 
 
-def _aligned(folder: RunFolder, score: RunScore) -> Array:
+def _aligned(folder: RunFolder, score: RunScore, stated: dict[str, Any]) -> Array:
     """An estimate's positions (N, 2) from above, after the alignment that its score states."""
-    file = folder.estimate(score.case, score.estimator, score.repeat) / estimate_file.ESTIMATE
-    positions = parse_tum(file.read_text(encoding="utf-8"), name=str(file)).positions_m
-    a = score.score["alignment"] if score.score else {}
-    aligned: Array = a["scale"] * positions @ np.array(a["rotation"]).T + a["translation"]
-    return aligned[:, :2]
+    est = estimate_file.read_tum(folder.estimate(score.case, score.estimator, score.repeat) / estimate_file.ESTIMATE)
+    return Alignment.from_dict(stated).apply(est.T_world_frame)[:, :2, 3]

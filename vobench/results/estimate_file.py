@@ -12,6 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from vobench.trajectory.text import parse_tum
+from vobench.trajectory.trajectory import Trajectory
+
 ESTIMATE = "estimate.tum"
 FRAMES = "frames.csv"
 TRACKS = "tracks.zip"
@@ -73,6 +76,11 @@ def read_frames(folder: Path) -> list[FrameRow]:
         )
         for r in rows
     ]
+
+
+def read_tum(path: Path) -> Trajectory:
+    """The trajectory in a TUM file of a run; empty where an estimator gave no pose at all."""
+    return parse_tum(path.read_text(encoding="utf-8"), name=str(path))
 
 
 def tracks_member(index: int) -> str:

@@ -11,6 +11,15 @@ from pathlib import Path
 PREFIX = ".unfinished-"
 
 
+def why_unwritable(folder: Path) -> str:
+    """Why files cannot be made in a folder, which is made where it is missing; empty where they can."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        return str(error.strerror)
+    return "" if os.access(folder, os.W_OK) else "Permission denied"
+
+
 @contextmanager
 def unfinished(parent: Path) -> Iterator[Path]:
     """An empty folder to fill and rename; one that keeps its name is gone after the block.

@@ -1,8 +1,9 @@
 """The motion (and scale) that lays an estimate over the ground truth, and what of it the data can't tell."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,6 +42,22 @@ class Alignment:
     translation: Array
     scale: float
     unobservable: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON values."""
+        return {
+            "kind": self.kind,
+            "rotation": self.rotation.tolist(),
+            "translation": self.translation.tolist(),
+            "scale": self.scale,
+            "unobservable": list(self.unobservable),
+        }
+
+    @classmethod
+    def from_dict(cls, stated: Mapping[str, Any]) -> "Alignment":
+        """The alignment that `as_dict` wrote."""
+        arrays = {key: np.array(stated[key]) for key in ("rotation", "translation")}
+        return cls(**{**stated, **arrays, "unobservable": tuple(stated["unobservable"])})
 
     def apply(self, T_est: Array) -> Array:
         """Poses (..., 4, 4) of the estimate, moved: positions are scaled, orientations only turned."""

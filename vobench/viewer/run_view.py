@@ -1,7 +1,6 @@
 """From a run's folder to what the viewer shows of it."""
 
 from collections.abc import Sequence as Rows
-from pathlib import Path
 from statistics import fmean
 
 import numpy as np
@@ -11,7 +10,6 @@ from vobench.metric.score import score
 from vobench.results import estimate_file
 from vobench.results.run_folder import GROUND_TRUTH, SEQUENCE, STATUSES, SURVIVED, RunFolder, RunScore
 from vobench.sequence import Sequence
-from vobench.trajectory.text import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 from vobench.viewer.recording import RunView
 
@@ -44,8 +42,8 @@ def run_view(folder: RunFolder, run: RunScore) -> RunView:
         raise InputError(f"the sequence is gone from the cache; run the suite again to make it anew: {link}")
     sequence = Sequence.open(link)
     place = folder.estimate(run.case, run.estimator, run.repeat)
-    gt = _trajectory(folder.case(run.case) / GROUND_TRUTH)
-    est = _trajectory(place / estimate_file.ESTIMATE)
+    gt = estimate_file.read_tum(folder.case(run.case) / GROUND_TRUTH)
+    est = estimate_file.read_tum(place / estimate_file.ESTIMATE)
     scored = score(gt, est) if len(est) else None
     return RunView(
         title=f"{run.estimator} on {run.case}",
@@ -59,10 +57,6 @@ def run_view(folder: RunFolder, run: RunScore) -> RunView:
         tracks={i: (table[:, 2:4].astype(float), table[:, 4] > 0) for i, table in estimate_file.read_tracks(place)},
         summary_md=_summary(run),
     )
-
-
-def _trajectory(path: Path) -> Trajectory:
-    return parse_tum(path.read_text(encoding="utf-8"), name=str(path))
 
 
 def _error(run: RunScore) -> float:
