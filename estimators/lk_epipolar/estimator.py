@@ -14,11 +14,10 @@ from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 
-from .motion import Mask, Matches, Motion, TwoViews, best_motion, scaled, two_views
+from .motion import Matches, Motion, TwoViews, best_motion, scaled, two_views
 from .refinement import refined
-from .tracking import Points, comparable, detect, disparity, follow, inside
-
-PARALLEL = 1e-6  # rad and share of the baseline
+from .stereo import flat_rays, stereo_pair
+from .tracking import Mask, Points, comparable, detect, follow, inside
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +49,10 @@ class LkEpipolar:
     """Direction of motion from the tracks of the left camera, its length from stereo."""
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Take the calibration. Raises VobenchError for a rig that is not rectified."""
+        """Take the calibration. Raises VobenchError for a rig that is no stereo pair."""
         cv2.setRNGSeed(seed)
         self._settings = settings_from(params)
-        self._rig = rectified(rig)
+        self._pair = stereo_pair(rig)
         self._last: View | None = None  # the view that corners are followed from, ...
         self._rho_last: Array = np.zeros(0)  # ... their inverse depths (N,) in 1/m, NaN for unknown, ...
         self._T_odom_last: Array = np.eye(4)  # ... and its pose
@@ -101,15 +100,16 @@ class LkEpipolar:
             return None
         s = self._settings
         corners = detect(frame.left, s.corners_per_cell, distance_px=s.corner_distance_px, margin_px=s.margin_px)
+        corners = corners[self._pair.seen(corners)]
         return View(frame.left, frame.right, corners) if len(corners) >= s.min_tracks else None
 
     def _follow(self, last: View, view: View) -> Matches:
         """Tracks from the last view's corners to this picture."""
         there, found = follow(*comparable(last.left, view.left), last.corners)
-        good = found & inside(there, view.left, self._settings.margin_px)
+        lens = self._pair.left.camera
+        good = found & inside(there, view.left, self._settings.margin_px) & self._pair.seen(there)
         uv0, uv1 = last.corners[good].astype(float), there[good].astype(float)
-        lens = self._rig.left
-        return Matches(lens.rays(uv0), lens.rays(uv1), uv0, uv1, self._rho_last[good], lens.K)
+        return Matches(flat_rays(lens, uv0), flat_rays(lens, uv1), uv0, uv1, self._rho_last[good], lens.K)
 
     def _step(self, view: View, matches: Matches, views: TwoViews, motion: Motion) -> Result:
         """Chain the motion on the pose of the last view."""
@@ -127,8 +127,7 @@ class LkEpipolar:
     def _remember(self, view: View) -> None:
         """Follow the next frame from this view, at the pose of now, with depths from stereo."""
         self._last, self._T_odom_last = view, self._T_odom_left
-        disparity_px = disparity(view.left, view.right, view.corners, self._settings.margin_px)
-        self._rho_last = disparity_px / (self._rig.left.fx_px * self._rig.baseline_m)
+        self._rho_last = self._pair.inverse_depth(view.left, view.right, view.corners, self._settings.margin_px)
 
     def _lost(self, view: View, reason: str, matches: Matches) -> Result:
         """No pose for this frame; the next one carries on from here with the last pose there was."""
@@ -157,19 +156,3 @@ def settings_from(params: Mapping[str, Any]) -> Settings:
         if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
             raise VobenchError(f"lk_epipolar: {name} is {value!r}, expected a number that is not negative")
     return Settings(**params)
-
-
-def rectified(rig: Rig) -> Rig:
-    """The same rig, if its cameras are equal, parallel and side by side; otherwise VobenchError."""
-    T_left_right = rig.T_left_right
-    turned_rad = float(se3.rotation_angle(T_left_right[:3, :3]))
-    right, *aside = T_left_right[:3, 3]
-    if turned_rad > PARALLEL or right <= 0 or np.abs(aside).max() > PARALLEL * right:
-        position = ", ".join(f"{x:.4g}" for x in T_left_right[:3, 3])
-        raise VobenchError(
-            f"lk_epipolar needs a rectified pair, the right camera at (b, 0, 0) m of the left and parallel to it; "
-            f"it is at ({position}) m and turned by {np.rad2deg(turned_rad):.3g} deg"
-        )
-    if rig.left != rig.right:
-        raise VobenchError(f"lk_epipolar needs two equal lenses, got {rig.left} and {rig.right}")
-    return rig

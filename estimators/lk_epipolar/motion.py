@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
-Mask = NDArray[np.bool_]
+from .tracking import Mask
 
 MIN_STEREO = 12  # points with depth that a length needs
 MAX_BEHIND = 0.1  # share of points that may land behind the camera
@@ -25,7 +24,10 @@ NO_TRANSLATION = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Matches:
-    """Tracks from the last view to this one, as rays, pixels and inverse depths."""
+    """Tracks from the last view to this one, as rays, pixels of the picture and inverse depths.
+
+    K is the pinhole that the lens is like about its axis: it gives the rays pixels without distortion.
+    """
 
     x0: Array
     x1: Array
@@ -38,6 +40,16 @@ class Matches:
     def focal_px(self) -> float:
         """Pixels per unit of a ray, for pixels that need not be square."""
         return float(np.sqrt(self.K[0, 0] * self.K[1, 1]))
+
+    @property
+    def flat0_px(self) -> Array:
+        """Pixels (N, 2) of the tracks in the last view, had the lens no distortion."""
+        return (self.x0 @ self.K.T)[:, :2]
+
+    @property
+    def flat1_px(self) -> Array:
+        """Pixels (N, 2) of the tracks in this view, had the lens no distortion."""
+        return (self.x1 @ self.K.T)[:, :2]
 
     @property
     def flow_px(self) -> float:
@@ -88,7 +100,7 @@ def two_views(matches: Matches, ransac_px: float) -> TwoViews:
 def essential(matches: Matches, ransac_px: float) -> tuple[Array | None, Mask]:
     """The essential matrix and its inliers; None where there is none. Source: Nistér (2004)."""
     E, inlier = cv2.findEssentialMat(
-        matches.uv0_px, matches.uv1_px, matches.K, cv2.USAC_MAGSAC, prob=0.9999, threshold=ransac_px
+        matches.flat0_px, matches.flat1_px, matches.K, cv2.USAC_MAGSAC, prob=0.9999, threshold=ransac_px
     )
     if E is None or E.shape[0] < 3 or not np.isfinite(E).all():
         return None, np.zeros(len(matches.x0), bool)
@@ -97,7 +109,7 @@ def essential(matches: Matches, ransac_px: float) -> tuple[Array | None, Mask]:
 
 def homography(matches: Matches, ransac_px: float) -> tuple[Array | None, Mask]:
     """The homography in px and its inliers; None where there is none."""
-    H, inlier = cv2.findHomography(matches.uv0_px, matches.uv1_px, cv2.USAC_MAGSAC, ransac_px, confidence=0.9999)
+    H, inlier = cv2.findHomography(matches.flat0_px, matches.flat1_px, cv2.USAC_MAGSAC, ransac_px, confidence=0.9999)
     if H is None or not np.isfinite(H).all():
         return None, np.zeros(len(matches.x0), bool)
     return H.astype(float), inlier.ravel() > 0

@@ -6,7 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from vobench.geometry.se3 import Array
 
-from .motion import Mask, Matches, Shape
+from .motion import Matches, Shape
+from .tracking import Mask
 
 HUBER_PX = 0.1  # about the noise of a good track
 MAX_EVALUATIONS = 20

@@ -17,8 +17,6 @@ CORNER_QUALITY = 0.01  # of the best corner in the cell
 WINDOW_PX, PYRAMID_LEVELS = 21, 3
 LK_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.01)
 ROUND_TRIP_PX = 0.5  # forward and backward tracking must meet
-ROW_PX = 1.0  # rectified: a point keeps its row from left to right
-MIN_DISPARITY_PX = 0.5
 COARSE_WIDTH_PX, COARSE_DISPARITIES = 180, 96  # sees disparities up to half the picture's width
 CONTRAST_WINDOW_PX, CONTRAST_FLOOR = 31, 4.0
 BRIGHTNESS_JUMP = 0.1  # of the mean or the contrast, beyond which plain grey values mislead
@@ -74,33 +72,30 @@ def inside(points: Points, image: Image, margin_px: int) -> Mask:
     return within
 
 
-def disparity(left: Image, right: Image, points: Points, margin_px: int) -> Array:
-    """Disparity (N,) in px of points (N, 2) of the left picture, NaN where the right one lacks them."""
-    left, right = comparable(left, right)
-    guess = points.copy()
-    guess[:, 0] -= coarse_disparity(left, right, points)
-    matched, found = follow(left, right, points, guess)
-    shift = points - matched
-    good = found & inside(matched, right, margin_px) & (np.abs(shift[:, 1]) < ROW_PX)
-    return np.where(good & (shift[:, 0] > MIN_DISPARITY_PX), shift[:, 0].astype(float), np.nan)
+def coarse_disparity(left: Image, right: Image, uv_px: Array, width_px: int) -> Array:
+    """Disparity (N,) in px at places (N, 2) of a view `width_px` wide, from small pictures of both views.
 
-
-def coarse_disparity(left: Image, right: Image, points: Points) -> Points:
-    """A first guess (N,) in px: far beyond what Lucas-Kanade would find on its own.
-
-    Source: Hirschmüller (2008), on pictures about 180 px wide.
+    It sees far beyond what Lucas-Kanade would find on its own. Source: Hirschmüller (2008).
     """
-    shrink = max(1, round(left.shape[1] / COARSE_WIDTH_PX))
-    size = (left.shape[1] // shrink, left.shape[0] // shrink)
-    small = [cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image in (left, right)]
     # The matcher skips columns from which the largest disparity would leave the picture: widen it.
-    wide = [cv2.copyMakeBorder(image, 0, 0, COARSE_DISPARITIES, 0, cv2.BORDER_REPLICATE) for image in small]
+    wide = [cv2.copyMakeBorder(image, 0, 0, COARSE_DISPARITIES, 0, cv2.BORDER_REPLICATE) for image in (left, right)]
     matcher = cv2.StereoSGBM.create(0, COARSE_DISPARITIES, 5, P1=200, P2=800, uniquenessRatio=5)
     coarse = matcher.compute(wide[0], wide[1])[:, COARSE_DISPARITIES:] / 16.0
     coarse[coarse < 0] = np.median(coarse[coarse >= 0]) if (coarse >= 0).any() else 0.0
-    column, row = (points / shrink).astype(int).T
-    guess_px: Points = (coarse[row.clip(max=size[1] - 1), column.clip(max=size[0] - 1)] * shrink).astype(np.float32)
-    return guess_px
+    shrink, (height, width) = shrinking(width_px), left.shape
+    column, row = (np.nan_to_num(uv_px) / shrink).astype(int).T
+    disparity_px: Array = coarse[row.clip(0, height - 1), column.clip(0, width - 1)] * shrink
+    return disparity_px
+
+
+def shrinking(width_px: int) -> int:
+    """How many pixels across become one in a small picture."""
+    return max(1, round(width_px / COARSE_WIDTH_PX))
+
+
+def small_size(width_px: int, height_px: int) -> tuple[int, int]:
+    """Width and height of a small picture."""
+    return width_px // shrinking(width_px), height_px // shrinking(width_px)
 
 
 def comparable(image: Image, other: Image) -> tuple[Image, Image]:

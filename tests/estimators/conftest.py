@@ -13,7 +13,7 @@ from vobench.catalog.manifest import read_manifest
 from vobench.estimator import Estimator, Frame, Result
 from vobench.estimator.load import load
 from vobench.geometry import se3
-from vobench.geometry.camera import Pinhole
+from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 
@@ -36,37 +36,58 @@ def texture_levels(size: int = 4096, seed: int = 5) -> list[np.ndarray]:
 
 
 def box_hit(origin: Array, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where rays (H, W, 3) from inside the room leave it: range (H, W) and wall axis (H, W)."""
-    wall = np.where(rays > 0, ROOM_HIGH_M, ROOM_LOW_M) - origin
-    reach = wall / np.where(np.abs(rays) < 1e-9, 1e-9, rays)
-    return reach.min(-1), reach.argmin(-1)
+    """Where rays (3, H, W) from inside the room leave it: range (H, W) and wall axis (H, W)."""
+    ways = zip(rays, np.float32(ROOM_LOW_M - origin), np.float32(ROOM_HIGH_M - origin), strict=True)
+    x, y, z = (np.where(ray > 0, high, low) / np.where(np.abs(ray) < 1e-9, 1e-9, ray) for ray, low, high in ways)
+    return np.minimum(np.minimum(x, y), z), np.where(z < np.minimum(x, y), 2, y < x)
 
 
-def snapshot(lens: Pinhole, T_world_camera: Array) -> np.ndarray:
+def snapshot(lens: Camera, T_world_camera: Array) -> np.ndarray:
     """What a perfect camera sees of the room: (H, W) uint8.
 
     One ray a pixel is enough: the level of the texture is chosen so that nothing finer than
-    two pixels is left in it.
+    two pixels is left in it. Where the lens has no ray, the picture is black.
     """
-    rays = lens.rays(lens.pixel_grid()) @ T_world_camera[:3, :3].T
+    optics = optics_of(lens)
+    rays = np.tensordot(T_world_camera[:3, :3].astype(np.float32), optics.rays, 1)
     origin = T_world_camera[:3, 3]
     reach, axis = box_hit(origin, rays)
-    texel = (origin + reach[..., None] * rays - ROOM_LOW_M) / TEXEL_M
-    texel_u = np.where(axis == 0, texel[..., 1], texel[..., 0])
-    texel_v = np.where(axis == 2, texel[..., 1], texel[..., 2] + 1500 * axis)
-    slant = np.abs(np.take_along_axis(rays, axis[..., None], -1)[..., 0])
-    level = np.log2(reach / (lens.fx_px * TEXEL_M * np.sqrt(slant)))
-    return np.round(sampled(texel_u, texel_v, np.clip(level, 0, 5))).astype(np.uint8)
+    corner = np.float32((origin - ROOM_LOW_M) / TEXEL_M)
+    x, y, z = (start + (reach / np.float32(TEXEL_M)) * ray for start, ray in zip(corner, rays, strict=True))
+    texel_u = np.where(axis == 0, y, x)
+    texel_v = np.where(axis == 2, y, z + np.float32(1500) * axis.astype(np.float32))
+    slant = np.abs(np.choose(axis, rays))
+    level = np.log2(reach * optics.pixel_rad / (TEXEL_M * np.sqrt(slant)))
+    picture = np.round(sampled(texel_u, texel_v, np.clip(level, 0, 5)))
+    return np.where(optics.seen, picture, 0).astype(np.uint8)
+
+
+@dataclass(frozen=True, slots=True)
+class Optics:
+    """A lens as float32 arrays: unit rays (3, H, W), which pixels have one, and how wide each is."""
+
+    rays: np.ndarray
+    seen: np.ndarray
+    pixel_rad: np.ndarray
+
+
+@cache
+def optics_of(lens: Camera) -> Optics:
+    rays = lens.rays(lens.pixel_grid())
+    seen = np.isfinite(rays).all(-1)
+    rays = np.where(seen[..., None], rays, [0.0, 0.0, 1.0])
+    pixel_rad = np.linalg.norm(np.diff(rays, axis=1, append=rays[:, -2:-1]), axis=-1)
+    planes = np.ascontiguousarray(np.moveaxis(rays, -1, 0), np.float32)
+    return Optics(planes, seen, np.clip(pixel_rad, 1e-4, 0.1).astype(np.float32))
 
 
 def sampled(texel_u: np.ndarray, texel_v: np.ndarray, level: np.ndarray) -> np.ndarray:
     """The texture at fractional texels, linear in place and in level."""
     out = np.zeros(level.shape, np.float32)
     for k, texture in enumerate(texture_levels()):
-        share = np.maximum(0, 1 - np.abs(level - k)).astype(np.float32)
+        share = np.maximum(0, 1 - np.abs(level - k))
         if share.any():
-            u, v = (texel_u / 2**k).astype(np.float32), (texel_v / 2**k).astype(np.float32)
-            out += share * cv2.remap(texture, u, v, cv2.INTER_LINEAR)
+            out += share * cv2.remap(texture, texel_u / 2**k, texel_v / 2**k, cv2.INTER_LINEAR)
     return out
 
 

@@ -8,8 +8,11 @@ import pytest
 from vobench.errors import VobenchError
 from vobench.estimator import Result, Status
 from vobench.geometry import se3
+from vobench.geometry.calibration import CalibrationError, true_rig
 from vobench.geometry.camera import Pinhole
-from vobench.geometry.rig import paper_lens, stereo_rig
+from vobench.geometry.preset import PRESETS
+from vobench.geometry.rig import mounted, paper_lens, stereo_rig
+from vobench.geometry.sphere import DoubleSphere, Equirectangular
 
 SQUARE, LITERAL = paper_lens(square_pixels=True), paper_lens(square_pixels=False)
 DOWN, AHEAD = stereo_rig(SQUARE, pitch_deg=90), stereo_rig(SQUARE, pitch_deg=10)
@@ -20,6 +23,11 @@ DOWN_LEGS, AHEAD_LEGS = ((12, 0.5, 0.0), (12, 0.4, 1.2)), ((10, 0.5, 0.0), (9, 0
 @pytest.fixture(scope="module")
 def down_frames(bed):
     return bed.film(DOWN, bed.drive(*DOWN_LEGS))
+
+
+@pytest.fixture(scope="module")
+def ahead_frames(bed):
+    return bed.film(AHEAD, bed.drive(*AHEAD_LEGS))
 
 
 @pytest.fixture(scope="module")
@@ -42,22 +50,18 @@ def test_a_camera_that_looks_at_the_floor_is_followed_to_three_thousandths_of_it
     assert [result.status for result in down_results] == [Status.INIT] + [Status.OK] * 24
 
 
-def test_a_camera_that_looks_ahead_is_followed_to_half_a_percent_of_its_path(bed):
-    T_world_body = bed.drive(*AHEAD_LEGS)
-    results = bed.estimated("lk_epipolar", AHEAD, bed.film(AHEAD, T_world_body))
-    accuracy = bed.accuracy(results, T_world_body @ AHEAD.T_body_left)
+def test_a_camera_that_looks_ahead_is_followed_to_half_a_percent_of_its_path(bed, ahead_frames):
+    results = bed.estimated("lk_epipolar", AHEAD, ahead_frames)
+    accuracy = bed.accuracy(results, bed.drive(*AHEAD_LEGS) @ AHEAD.T_body_left)
     assert accuracy.end_fraction < 0.005
     assert accuracy.end_rad < np.deg2rad(0.1)
     assert min(result.stats.get("h_ratio", 1.0) for result in results) < 0.8, "no frame was refined"
 
 
-def test_refining_helps_where_the_scene_is_no_plane(bed):
-    T_world_body = bed.drive((5, 0.5, 0.0))
-    frames = bed.film(AHEAD, T_world_body)
+def test_refining_helps_where_the_scene_is_no_plane(bed, ahead_frames):
+    truth = bed.drive(*AHEAD_LEGS)[:6] @ AHEAD.T_body_left
     errors = [
-        bed.accuracy(
-            bed.estimated("lk_epipolar", AHEAD, frames, refine_below_h_ratio=below), T_world_body @ AHEAD.T_body_left
-        ).end_m
+        bed.accuracy(bed.estimated("lk_epipolar", AHEAD, ahead_frames[:6], refine_below_h_ratio=below), truth).end_m
         for below in (0.0, 2.0)
     ]
     assert errors[1] < errors[0]
@@ -192,23 +196,79 @@ def test_tracks_and_numbers_come_with_every_pose(down_results):
     assert np.median(length) == pytest.approx(SQUARE.fx_px * 0.5 / 30 / 0.4, rel=0.01)
 
 
-def test_cameras_that_are_not_parallel_are_refused(bed):
-    T_left_right = np.eye(4)
-    T_left_right[:3, :3] = se3.rotation_z(0.01)
-    crooked = replace(DOWN, T_body_right=DOWN.T_body_right @ T_left_right)
-    with pytest.raises(VobenchError, match=r"rectified pair.*turned by 0\.573 deg"):
-        bed.started("lk_epipolar", crooked)
+LENS_LEGS = ((3, 0.5, 0.0), (3, 0.4, 1.0))
 
 
-def test_cameras_one_above_the_other_are_refused(bed):
-    raised = replace(DOWN, T_body_right=DOWN.T_body_left @ se3.transform(np.eye(3), [0, 0.12, 0]))
-    with pytest.raises(VobenchError, match=r"it is at \(0, 0\.12, 0\) m"):
-        bed.started("lk_epipolar", raised)
+def mounted_preset(name, **error):
+    preset = PRESETS[name]
+    rig = mounted(preset.left, preset.right, preset.T_left_right, pitch_deg=15)
+    return rig, true_rig(rig, CalibrationError(**error))
 
 
-def test_unequal_lenses_are_refused(bed):
-    with pytest.raises(VobenchError, match="two equal lenses"):
-        bed.started("lk_epipolar", replace(DOWN, right=LITERAL))
+@pytest.mark.parametrize("name", ["euroc", "fisheye"])
+def test_lenses_that_bend_lines_and_cameras_that_are_not_parallel_are_followed(bed, name):
+    rig, _ = mounted_preset(name)
+    T_world_body = bed.drive(*LENS_LEGS)
+    results = bed.estimated("lk_epipolar", rig, bed.film(rig, T_world_body))
+    accuracy = bed.accuracy(results, T_world_body @ rig.T_body_left)
+    assert {result.status for result in results[1:]} == {Status.OK}
+    assert accuracy.end_fraction < 0.01
+    assert accuracy.end_rad < np.deg2rad(0.2)
+
+
+@pytest.mark.parametrize("model", ["double_sphere", "equirectangular"])
+def test_cameras_that_see_behind_themselves_are_followed_by_what_lies_before_them(bed, model):
+    lens = {
+        "double_sphere": DoubleSphere(512, 512, 158.0, 157.0, 254.9, 256.9, -0.18, 0.59),
+        "equirectangular": Equirectangular(1024, 512),
+    }[model]
+    rig, T_world_body = stereo_rig(lens, pitch_deg=15), bed.drive(*LENS_LEGS)
+    results = bed.estimated("lk_epipolar", rig, bed.film(rig, T_world_body))
+    accuracy = bed.accuracy(results, T_world_body @ rig.T_body_left)
+    assert accuracy.end_fraction < 0.02
+    assert accuracy.end_rad < np.deg2rad(0.3)
+
+
+def test_a_baseline_told_too_short_makes_the_path_too_short(bed):
+    told, true = mounted_preset("euroc", baseline_ratio=0.1)
+    T_world_body = bed.drive((8, 0.5, 0.0))
+    results = bed.estimated("lk_epipolar", told, bed.film(true, T_world_body))
+    moved_m = np.linalg.norm(results[-1].T_odom_frame[:3, 3])
+    assert moved_m == pytest.approx(8 * 0.5 / 30 / 1.1, rel=0.01)
+
+
+def test_a_small_turn_between_the_cameras_that_is_told_does_no_harm(bed):
+    turn = np.eye(4)
+    turn[:3, :3] = se3.rotation_z(0.01)
+    crooked = replace(DOWN, T_body_right=DOWN.T_body_right @ turn)
+    T_world_body = bed.drive((6, 0.5, 0.0))
+    results = bed.estimated("lk_epipolar", crooked, bed.film(crooked, T_world_body))
+    assert bed.accuracy(results, T_world_body @ crooked.T_body_left).end_fraction < 0.005
+
+
+def test_unequal_lenses_are_followed(bed):
+    unequal = replace(DOWN, right=LITERAL)
+    T_world_body = bed.drive((6, 0.5, 0.0))
+    results = bed.estimated("lk_epipolar", unequal, bed.film(unequal, T_world_body))
+    assert bed.accuracy(results, T_world_body @ unequal.T_body_left).end_fraction < 0.01
+
+
+@pytest.mark.parametrize(
+    ("T_left_right", "where"),
+    [
+        (se3.transform(np.eye(3), [0, 0.12, 0]), r"it is at \(0, 0\.12, 0\) m and turned by 0 deg"),
+        (se3.transform(np.eye(3), [-0.12, 0, 0]), r"it is at \(-0\.12, 0, 0\) m"),
+        (se3.transform(np.diag([-1.0, 1.0, -1.0]), [0.12, 0, 0]), "turned by 180 deg"),
+    ],
+)
+def test_cameras_that_are_no_pair_side_by_side_are_refused(bed, T_left_right, where):
+    with pytest.raises(VobenchError, match=f"to the right of the left and both looking the same way.*{where}"):
+        bed.started("lk_epipolar", replace(DOWN, T_body_right=DOWN.T_body_left @ T_left_right))
+
+
+def test_pictures_of_two_sizes_are_refused(bed):
+    with pytest.raises(VobenchError, match=r"two pictures of one size, got \(720, 480\) and \(640, 480\) px"):
+        bed.started("lk_epipolar", replace(DOWN, right=PRESETS["tartanair"].right))
 
 
 @pytest.mark.parametrize(("name", "value"), [("min_trax", 3), ("margin_px", -1), ("ransac_px", "half")])

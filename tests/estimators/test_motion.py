@@ -25,17 +25,22 @@ def seen(motion, points, T_now_last, *, noise_px=0.0):
     rng = np.random.default_rng(3)
     uv0 = LENS.project(points) + rng.normal(0, noise_px, (len(points), 2))
     uv1 = LENS.project(se3.apply(T_now_last, points)) + rng.normal(0, noise_px, (len(points), 2))
-    return motion.Matches(LENS.rays(uv0), LENS.rays(uv1), uv0, uv1, 1 / points[:, 2], LENS.K)
+    return motion.Matches(flat(uv0), flat(uv1), uv0, uv1, 1 / points[:, 2], LENS.K)
+
+
+def flat(uv):
+    rays = LENS.rays(uv)
+    return rays / rays[:, 2:]
 
 
 def floor(n=400):
     uv = np.random.default_rng(4).uniform([20, 20], [700, 460], (n, 2))
-    return LENS.rays(uv) * 0.4
+    return flat(uv) * 0.4
 
 
 def cloud(n=400):
     rng = np.random.default_rng(5)
-    return LENS.rays(rng.uniform([60, 60], [660, 420], (n, 2))) * rng.uniform(0.8, 5.0, (n, 1))
+    return flat(rng.uniform([60, 60], [660, 420], (n, 2))) * rng.uniform(0.8, 5.0, (n, 1))
 
 
 def moved(rotvec, t):

@@ -1,11 +1,11 @@
-"""A stereo pair on a robot: lens presets, mounts, and what the wheels measure with."""
+"""A stereo pair on a robot: two cameras of any kind, their mounts, and what the wheels measure with."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from vobench.geometry import se3
-from vobench.geometry.camera import Pinhole
+from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
 
 # Focal length, sensor and resolution as the paper gives them (section II-B).
@@ -32,8 +32,8 @@ class Rig:
     The left camera is the reference; both look along their own z axis.
     """
 
-    left: Pinhole
-    right: Pinhole
+    left: Camera
+    right: Camera
     T_body_left: Array
     T_body_right: Array
     wheels: WheelGeometry
@@ -75,8 +75,24 @@ def looking(*, pitch_deg: float, position_m: tuple[float, float, float]) -> Arra
     return se3.transform(np.stack([right, np.cross(forward, right), forward], -1), position_m)
 
 
+def mounted(
+    left: Camera,
+    right: Camera,
+    T_left_right: Array,
+    *,
+    pitch_deg: float,
+    forward_m: float = 0.25,
+    height_m: float = 0.4,
+    wheels: WheelGeometry = PIONEER_WHEELS,
+) -> Rig:
+    """A pair astride the robot's middle, `forward_m` ahead of its axle; pitch and height are the left camera's."""
+    baseline_m = float(np.linalg.norm(T_left_right[:3, 3]))
+    T_body_left = looking(pitch_deg=pitch_deg, position_m=(forward_m, baseline_m / 2, height_m))
+    return Rig(left, right, T_body_left, T_body_left @ T_left_right, wheels)
+
+
 def stereo_rig(
-    lens: Pinhole,
+    lens: Camera,
     *,
     pitch_deg: float,
     baseline_m: float = 0.12,
@@ -85,6 +101,10 @@ def stereo_rig(
     wheels: WheelGeometry = PIONEER_WHEELS,
 ) -> Rig:
     """Two equal cameras side by side across the robot, `forward_m` ahead of its axle."""
-    T_body_left = looking(pitch_deg=pitch_deg, position_m=(forward_m, baseline_m / 2, height_m))
-    T_body_right = looking(pitch_deg=pitch_deg, position_m=(forward_m, -baseline_m / 2, height_m))
-    return Rig(lens, lens, T_body_left, T_body_right, wheels)
+    place = side_by_side(baseline_m)
+    return mounted(lens, lens, place, pitch_deg=pitch_deg, forward_m=forward_m, height_m=height_m, wheels=wheels)
+
+
+def side_by_side(baseline_m: float) -> Array:
+    """T_left_right of two parallel cameras."""
+    return se3.transform(np.eye(3), [baseline_m, 0.0, 0.0])
