@@ -1,4 +1,4 @@
-"""A camera's chip: linear light to electrons to 8-bit grey values, after EMVA 1288.
+"""A camera's chip: linear light to electrons to 8-bit grey values, after EMVA 1288. Pure.
 
 mu_e        electrons that light frees in a pixel on average; the number itself is Poisson
 sigma_d     read noise (electrons), Gaussian
@@ -6,85 +6,128 @@ K           system gain (grey values per electron, before the response curve)
 """
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.errors import RenderError
+from vobench.errors import InputError, RenderError
 from vobench.geometry.se3 import Array
+from vobench.sensor.exposure import Exposure
+from vobench.sensor.response import FULL_SCALE_DN, SRGB, Grey, Response, linear_of_grey, quantise
+from vobench.sensor.shot import poisson
 
 Radiance = NDArray[np.float32]
-Grey = NDArray[np.uint8]
-FULL_SCALE_DN = 255
 # Grey value of radiance 1, matt white in the scene's own light: what a careful photographer would expose for.
 WHITE_DN = 200
-
-
-class Response(StrEnum):
-    """The curve from the chip's linear signal to the stored grey value."""
-
-    LINEAR = "linear"
-    SRGB = "srgb"  # IEC 61966-2-1; pictures made by Blender, as the paper's were, carry it
-
-
-def encode(linear: Array, response: Response) -> Array:
-    """Stored value in 0..1 of a linear signal in 0..1; the two pieces of sRGB meet at 0.0031308."""
-    if response is Response.LINEAR:
-        return linear
-    power: Array = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
-    return np.where(linear <= 0.0031308, 12.92 * linear, power)
-
-
-def decode(stored: Array, response: Response) -> Array:
-    """Linear signal in 0..1 of a stored value in 0..1: the inverse of `encode`."""
-    if response is Response.LINEAR:
-        return stored
-    return np.where(stored <= 0.04045, stored / 12.92, ((np.maximum(stored, 0.04045) + 0.055) / 1.055) ** 2.4)
+ADC_BITS = (8, 10, 12)
+# Pictures are exposed some rows at a time: what is needed on the way then stays in the processor's cache.
+PIXELS_AT_A_TIME = 1 << 15
 
 
 @dataclass(frozen=True, slots=True)
 class CameraSensor:
-    """A chip, its electronics and one exposure; electrons saturate at `full_well_e`.
+    """A chip, its electronics and its aperture; electrons saturate at `full_well_e`.
 
-    `exposure_gain` multiplies the exposure that puts radiance 1 at 200 grey values with unit `amplifier`;
-    a shorter exposure takes photons away, a lower `amplifier` does not. `gain_spread` (PRNU, relative) and
-    `offset_spread_e` (DSNU) differ from pixel to pixel but not in time.
+    With an exposure of `nominal_s` and no gain, radiance 1 comes to 200 grey values; `exposure_gain` multiplies that
+    light. `prnu` (relative), `dsnu_e`, `column_e` and the hot pixels are fixed in time.
+    `adc_bits` none is a converter so fine that only the 8 bits kept are seen.
     """
 
     full_well_e: float = 20_000.0
     exposure_gain: float = 1.0
-    amplifier: float = 1.0
+    nominal_s: float = 0.005
     black_dn: float = 0.0
     shot_noise: bool = False
     read_noise_e: float = 0.0
-    gain_spread: float = 0.0
-    offset_spread_e: float = 0.0
-    response: Response = Response.SRGB
+    prnu: float = 0.0
+    dsnu_e: float = 0.0
+    column_e: float = 0.0
+    dark_e_per_s: float = 0.0
+    hot_share: float = 0.0
+    hot_e_per_s: float = 20_000.0
+    adc_bits: int | None = None
+    response: Response = SRGB
+
+    def __post_init__(self) -> None:
+        for name in ("full_well_e", "exposure_gain", "nominal_s"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise InputError(f"{name} should be greater than 0, got {getattr(self, name)}")
+        for name in ("read_noise_e", "prnu", "dsnu_e", "column_e", "dark_e_per_s", "hot_e_per_s", "black_dn"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise InputError(f"{name} should be 0 or more, got {getattr(self, name)}")
+        if not 0 <= self.hot_share <= 1:
+            raise InputError(f"hot_share should be within 0 and 1, got {self.hot_share}")
+        if self.adc_bits not in (None, *ADC_BITS):
+            raise InputError(f"adc_bits should be 8, 10 or 12, got {self.adc_bits}")
+
+    @property
+    def nominal(self) -> Exposure:
+        """The exposure that the aperture is set for."""
+        return Exposure(self.nominal_s)
 
     @property
     def dn_per_electron(self) -> float:
-        """K: with unit amplifier a full well is full scale."""
-        return self.amplifier * FULL_SCALE_DN / self.full_well_e
+        """K of an exposure without gain: a full well is full scale."""
+        return FULL_SCALE_DN / self.full_well_e
 
     @property
     def white_e(self) -> float:
-        """mu_e of radiance 1."""
-        share = decode(np.array(WHITE_DN / FULL_SCALE_DN), self.response)
+        """mu_e of radiance 1 at the nominal exposure."""
+        share = self.response.decode(np.array(WHITE_DN / FULL_SCALE_DN))
         return float(share) * self.full_well_e * self.exposure_gain
 
+    @property
+    def signal_of_grey(self) -> Array:
+        """Shares of full scale (256,) that light gives each grey value: what auto-exposure meters."""
+        return linear_of_grey(self.response) - self.black_dn / FULL_SCALE_DN
 
-# `clean` measures nothing but quantisation. mt9v034 is of the class in EuRoC's cameras; its noise figures
-# (full well 20 ke-, 25 e- read noise, PRNU 1 %, DSNU 10 e-) are this project's assumptions, not a data sheet's.
+
+# `clean` measures nothing but quantisation. Of the others, shot noise and the size of a converter are facts. Full wells
+# of the imx and of mt9m034 follow from the SNR in Balluff's tables (SNR = 10 log10 of it), read noise of the imx from
+# the dynamic range there. All else is this project's assumption about that class of chip, not its data sheet.
 CAMERAS = {
     "clean": CameraSensor(),
-    "mt9v034": CameraSensor(shot_noise=True, read_noise_e=25.0, gain_spread=0.01, offset_spread_e=10.0),
+    # EuRoC's cameras
+    "mt9v034": CameraSensor(
+        shot_noise=True, read_noise_e=25.0, prnu=0.01, dsnu_e=10.0, column_e=2.0, dark_e_per_s=100.0, adc_bits=10
+    ),
+    # small pixels (3 µm) behind a global shutter: RealSense D435i, OAK-D
+    "ov9282": CameraSensor(
+        full_well_e=7_000.0,
+        shot_noise=True,
+        read_noise_e=5.0,
+        prnu=0.01,
+        dsnu_e=3.0,
+        column_e=1.0,
+        dark_e_per_s=50.0,
+        hot_share=1e-4,
+        adc_bits=10,
+    ),
+    # 3.75 µm behind a rolling shutter
+    "mt9m034": CameraSensor(
+        full_well_e=24_500.0,
+        shot_noise=True,
+        read_noise_e=10.0,
+        prnu=0.01,
+        dsnu_e=5.0,
+        column_e=2.0,
+        dark_e_per_s=50.0,
+        hot_share=1e-4,
+        adc_bits=12,
+    ),
+    # machine vision with large (5.86 µm) and middling (3.45 µm) pixels
+    "imx249": CameraSensor(
+        full_well_e=32_400.0, shot_noise=True, read_noise_e=7.0, prnu=0.005, dsnu_e=2.0, dark_e_per_s=5.0, adc_bits=12
+    ),
+    "imx255": CameraSensor(
+        full_well_e=10_700.0, shot_noise=True, read_noise_e=3.0, prnu=0.005, dsnu_e=1.0, dark_e_per_s=5.0, adc_bits=12
+    ),
 }
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseStreams:
-    """A generator for each kind of noise: how much light there is must not change the draws of the electronics."""
+    """A generator for each kind of noise; each picture takes as many draws as any other, however bright it is."""
 
     shot: np.random.Generator
     read: np.random.Generator
@@ -92,50 +135,95 @@ class NoiseStreams:
 
 @dataclass(frozen=True, slots=True)
 class FixedPattern:
-    """What sets one pixel of a chip apart for good: relative gain and offset in electrons, both (H, W)."""
+    """What sets one pixel of a chip apart for good, all (H, W): relative gain, offset and dark current in electrons."""
 
     gain: Array
     offset_e: Array
+    dark_e_per_s: Array
+
+    def of(self, rows: slice) -> "FixedPattern":
+        """The pattern of some rows."""
+        return FixedPattern(self.gain[rows], self.offset_e[rows], self.dark_e_per_s[rows])
 
 
 def fixed_pattern(shape: tuple[int, int], sensor: CameraSensor, rng: np.random.Generator) -> FixedPattern:
-    """Draw one chip's pattern; draw it once per camera, from a generator of its own."""
-    gain = 1 + sensor.gain_spread * rng.standard_normal(shape)
-    return FixedPattern(np.maximum(gain, 0.0), sensor.offset_spread_e * rng.standard_normal(shape))
+    """Draw one chip's pattern, once per camera; each effect has a child of `rng` of its own.
+
+    Hot pixels stay hot when more are asked for; their dark current is exponential with mean `hot_e_per_s`.
+    """
+    prnu, dsnu, column, hot = rng.spawn(4)
+    gain = 1 + sensor.prnu * prnu.standard_normal(shape)
+    offset_e = sensor.dsnu_e * dsnu.standard_normal(shape) + sensor.column_e * column.standard_normal(shape[1])
+    is_hot = hot.random(shape) < sensor.hot_share
+    hot_e_per_s = is_hot * sensor.hot_e_per_s * hot.standard_exponential(shape)
+    return FixedPattern(np.maximum(gain, 0.0), offset_e, sensor.dark_e_per_s + hot_e_per_s)
 
 
 def expose(
-    radiance: Radiance, sensor: CameraSensor, noise: NoiseStreams, *, pattern: FixedPattern | None = None
+    radiance: Radiance,
+    sensor: CameraSensor,
+    noise: NoiseStreams,
+    *,
+    pattern: FixedPattern | None = None,
+    exposure: Exposure | None = None,
 ) -> Grey:
     """One picture (H, W) of linear radiance (H, W), where 1 is matt white in the scene's own light.
 
-    The converter is taken to be finer than the 8 bits kept, so there is one rounding, after the response.
+    Longer exposure is more electrons, gain only a larger K. Radiance is the mean over the exposure.
     Raises RenderError for radiance that is negative or not a number. Source: EMVA 1288, release 3.1, section 2.
     """
-    electrons = _collect(_mean_electrons(radiance, sensor, pattern), sensor, noise.shot)
+    if not radiance.min() >= 0:
+        v, u = np.argwhere(~(radiance >= 0))[0]
+        raise RenderError(f"radiance must be 0 or more, got {radiance[v, u]} at pixel ({u}, {v})")
+    grey, step = np.empty(radiance.shape, np.uint8), max(1, PIXELS_AT_A_TIME // radiance.shape[1])
+    for first in range(0, len(radiance), step):
+        rows = slice(first, first + step)
+        local = pattern.of(rows) if pattern else None
+        grey[rows] = _expose_rows(radiance[rows], sensor, noise, local, exposure or sensor.nominal)
+    return grey
+
+
+def _expose_rows(
+    radiance: Radiance, sensor: CameraSensor, noise: NoiseStreams, pattern: FixedPattern | None, exposure: Exposure
+) -> Grey:
+    electrons = _collect(_mean_electrons(radiance, sensor, pattern, exposure), sensor, noise.shot)
     if pattern is not None:
         electrons += pattern.offset_e
     if sensor.read_noise_e > 0:
         electrons += sensor.read_noise_e * noise.read.standard_normal(electrons.shape)
-    linear = (sensor.dn_per_electron * electrons + sensor.black_dn) / FULL_SCALE_DN
-    stored = encode(np.clip(linear, 0.0, 1.0), sensor.response)
-    return np.floor(FULL_SCALE_DN * stored + 0.5).astype(np.uint8)
+    return _convert(electrons, sensor, exposure)
 
 
-def _mean_electrons(radiance: Radiance, sensor: CameraSensor, pattern: FixedPattern | None) -> Array:
-    """mu_e (H, W)."""
-    bad = np.argwhere(~(radiance >= 0))
-    if bad.size:
-        v, u = bad[0]
-        raise RenderError(f"radiance must be 0 or more, got {radiance[v, u]} at pixel ({u}, {v})")
-    mean_e = radiance.astype(float) * sensor.white_e
-    return mean_e if pattern is None else mean_e * pattern.gain
+def _mean_electrons(
+    radiance: Radiance, sensor: CameraSensor, pattern: FixedPattern | None, exposure: Exposure
+) -> Array:
+    """mu_e (H, W), of light and of warmth."""
+    mean_e = radiance.astype(float)
+    mean_e *= sensor.white_e * (exposure.time_s / sensor.nominal_s)
+    if pattern is None:
+        return mean_e + sensor.dark_e_per_s * exposure.time_s
+    mean_e *= pattern.gain
+    mean_e += pattern.dark_e_per_s * exposure.time_s
+    return mean_e
 
 
 def _collect(mean_e: Array, sensor: CameraSensor, rng: np.random.Generator) -> Array:
-    """Electrons (H, W) in the wells: exact Poisson where shot noise is on, then saturation."""
-    # Twice a full well is as full as infinitely much, and within what the Poisson sampler takes.
-    bounded = np.minimum(mean_e, 2 * sensor.full_well_e)
-    electrons = rng.poisson(bounded).astype(float) if sensor.shot_noise else bounded
-    collected: Array = np.minimum(electrons, sensor.full_well_e)
-    return collected
+    """Electrons (H, W) in the wells: Poisson where shot noise is on, then saturation."""
+    if sensor.shot_noise:
+        # Twice a full well is as full as infinitely much.
+        mean_e = poisson(np.minimum(mean_e, 2 * sensor.full_well_e), rng.standard_normal(mean_e.shape))
+    return np.minimum(mean_e, sensor.full_well_e, out=mean_e)
+
+
+def _convert(electrons: Array, sensor: CameraSensor, exposure: Exposure) -> Grey:
+    """Grey values (H, W) of what the wells hold."""
+    electrons *= sensor.dn_per_electron * exposure.amplification
+    electrons += sensor.black_dn
+    electrons /= FULL_SCALE_DN
+    linear = np.clip(electrons, 0.0, 1.0, out=electrons)
+    if sensor.adc_bits is None:
+        return quantise(linear, sensor.response)
+    largest = (1 << sensor.adc_bits) - 1
+    linear *= largest
+    linear += 0.5
+    return quantise(np.arange(largest + 1) / largest, sensor.response).take(linear.astype(np.intp))

@@ -1,0 +1,205 @@
+"""Falloff is cos⁴, blur has its width and loses no light, dirt stays where it is; off is off."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vobench.errors import InputError
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.se3 import Array
+from vobench.sensor.camera import Radiance
+from vobench.sensor.lens import (
+    LensEffects,
+    LensMaps,
+    blur,
+    dirt,
+    disc_transfer,
+    gaussian_transfer,
+    lens_maps,
+    through_lens,
+    vignetting,
+)
+
+SHAPE = (120, 160)
+CLEAN = LensEffects()
+
+
+CAMERA = Pinhole(160, 120, 100.0, 100.0, 79.5, 59.5)
+
+
+def rays() -> Array:
+    """Unit rays (H, W, 3) of the camera."""
+    return CAMERA.rays(CAMERA.pixel_grid())
+
+
+def light(seed: int = 0) -> Radiance:
+    return np.random.default_rng(seed).random(SHAPE, np.float32)
+
+
+def maps(effects: LensEffects, seed: int = 0) -> LensMaps:
+    return lens_maps(effects, CAMERA, np.random.default_rng(seed))
+
+
+def test_a_lens_without_effects_hands_light_through_untouched() -> None:
+    radiance = light()
+    assert maps(CLEAN) == LensMaps()
+    assert through_lens(radiance, maps(CLEAN)) is radiance
+
+
+def test_falloff_is_the_fourth_power_of_the_cosine() -> None:
+    seen = through_lens(np.full(SHAPE, 0.7, np.float32), maps(replace(CLEAN, vignetting=1.0)))
+    cosine = rays()[..., 2]
+    np.testing.assert_allclose(seen, 0.7 * cosine**4, rtol=0.01)
+    exponent, _ = np.polyfit(np.log(cosine.ravel()), np.log(seen.ravel()), 1)
+    assert exponent == pytest.approx(4, rel=0.01)
+
+
+def test_falloff_does_not_ask_how_long_a_ray_is() -> None:
+    np.testing.assert_allclose(vignetting(rays()), vignetting(rays() / rays()[..., 2:]))
+
+
+def test_strength_is_an_exponent() -> None:
+    np.testing.assert_allclose(vignetting(rays(), strength=0.25), rays()[..., 2])
+
+
+def along(theta_deg: Array) -> Array:
+    theta = np.deg2rad(theta_deg)
+    return np.stack([np.sin(theta), 0 * theta, np.cos(theta)], -1)[None]
+
+
+def test_rims_cut_light_off_at_their_angle_and_less_before() -> None:
+    theta_deg = np.linspace(0, 60, 121)
+    share = vignetting(along(theta_deg), strength=0.0, cutoff_deg=50.0)[0]
+    assert share[0] == pytest.approx(1)
+    assert (share[theta_deg >= 50] < 1e-12).all()
+    assert (np.diff(share[theta_deg <= 50]) < 0).all()
+    # Two discs half a diameter apart share 39.1 % of their area.
+    halfway_deg = np.rad2deg(np.arctan(np.tan(np.deg2rad(50)) / 2))
+    assert vignetting(along(np.array([halfway_deg])), strength=0.0, cutoff_deg=50.0)[0, 0] == pytest.approx(
+        0.391, abs=5e-4
+    )
+
+
+def test_no_light_comes_from_behind_or_from_nowhere() -> None:
+    backwards = np.array([[[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [np.nan, np.nan, np.nan]]])
+    np.testing.assert_array_equal(vignetting(backwards), 0)
+
+
+def point(transfer: Array) -> Array:
+    lamp = np.zeros(SHAPE, np.float32)
+    lamp[60, 80] = 1e4
+    return blur(lamp, transfer) / 1e4
+
+
+def variance_px2(spread: Array) -> Array:
+    v, u = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    return np.array([(spread * (v - 60) ** 2).sum(), (spread * (u - 80) ** 2).sum()])
+
+
+@pytest.mark.parametrize("sigma_px", [0.05, 0.3, 0.7, 1.0, 3.0, 8.0])
+def test_blur_is_as_wide_as_it_says_and_loses_no_light(sigma_px: float) -> None:
+    spread = point(gaussian_transfer(SHAPE, sigma_px))
+    assert spread.sum() == pytest.approx(1, abs=1e-6)
+    np.testing.assert_allclose(np.sqrt(variance_px2(spread)), sigma_px, rtol=0.01)
+    assert spread.min() >= 0
+
+
+@pytest.mark.parametrize("sigma_px", [1.0, 2.0, 6.0])
+def test_blur_has_the_shape_of_a_gaussian(sigma_px: float) -> None:
+    row = point(gaussian_transfer(SHAPE, sigma_px)).sum(0)
+    exact = np.exp(-((np.arange(SHAPE[1]) - 80) ** 2) / (2 * sigma_px**2)) / (sigma_px * np.sqrt(2 * np.pi))
+    np.testing.assert_allclose(row, exact, atol=1e-6 + 1e-4 * exact.max())
+
+
+def test_two_blurs_are_one_of_the_root_of_their_squares() -> None:
+    once = blur(light(), gaussian_transfer(SHAPE, 5.0))
+    twice = blur(blur(light(), gaussian_transfer(SHAPE, 3.0)), gaussian_transfer(SHAPE, 4.0))
+    np.testing.assert_allclose(once, twice, atol=1e-6)
+
+
+@pytest.mark.parametrize("diameter_px", [4.7, 8.0, 15.5])
+def test_defocus_is_a_disc_seen_by_pixels(diameter_px: float) -> None:
+    spread = point(disc_transfer(SHAPE, diameter_px))
+    assert spread.sum() == pytest.approx(1, abs=1e-6)
+    # The disc's own variance is d²/16; sorting it into pixels adds that of a pixel, 1/12.
+    np.testing.assert_allclose(variance_px2(spread), diameter_px**2 / 16 + 1 / 12, rtol=0.03)
+    v, u = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    distance = np.hypot(v - 60, u - 80)
+    np.testing.assert_allclose(spread[distance < diameter_px / 2 - 1], 4 / (np.pi * diameter_px**2), rtol=0.02)
+    assert spread[distance > diameter_px / 2 + 1].max() < 1e-7
+
+
+def test_a_disc_within_a_pixel_changes_nothing() -> None:
+    np.testing.assert_allclose(disc_transfer(SHAPE, 0.9), 1)
+
+
+@pytest.mark.parametrize("effects", [LensEffects(blur_sigma_px=2.5), LensEffects(defocus_px=7.0)])
+def test_blur_keeps_the_sum_of_any_picture_and_even_light_even(effects: LensEffects) -> None:
+    assert through_lens(light(), maps(effects)).sum(dtype=float) == pytest.approx(light().sum(dtype=float), rel=1e-6)
+    np.testing.assert_allclose(through_lens(np.full(SHAPE, 0.3, np.float32), maps(effects)), 0.3, rtol=1e-6)
+
+
+def test_blurring_leaves_no_negative_light_beside_a_lamp() -> None:
+    radiance = light() * 1e-3
+    radiance[50:60, 70:80] = 1e5
+    blurred = through_lens(radiance, maps(LensEffects(blur_sigma_px=1.0)))
+    assert blurred.min() >= 0
+    assert blurred[:10].max() < 1.1e-3
+
+
+@pytest.mark.parametrize("amount", [0.01, 0.1, 0.4])
+def test_dirt_takes_the_share_of_light_it_says(amount: float) -> None:
+    taken = dirt(SHAPE, amount, np.random.default_rng(3))
+    assert taken.mean() == pytest.approx(amount, rel=1e-6)
+    assert taken.min() >= 0
+    assert taken.max() < 1
+
+
+def test_dirt_is_one_per_camera_and_only_thickens() -> None:
+    thin, thick, other = (
+        dirt(SHAPE, amount, np.random.default_rng(seed)) for amount, seed in ((0.05, 1), (0.2, 1), (0.05, 2))
+    )
+    np.testing.assert_array_equal(thin, dirt(SHAPE, 0.05, np.random.default_rng(1)))
+    assert (thick >= thin).all()
+    assert np.corrcoef(np.log1p(-thin).ravel(), np.log1p(-thick).ravel())[0, 1] == pytest.approx(1)
+    assert np.corrcoef(thin.ravel(), other.ravel())[0, 1] < 0.5
+
+
+def test_dirt_dims_what_is_bright_and_veils_what_is_dark() -> None:
+    dirty, radiance = maps(LensEffects(dirt=0.2)), np.zeros(SHAPE, np.float32)
+    radiance[:60] = 2.0
+    seen = through_lens(radiance, dirty)
+    assert (seen[:60] <= 2.0).all()
+    assert (seen[60:] > 0).any()
+    assert seen.sum() < radiance.sum()
+
+
+def test_effects_work_in_the_order_of_the_light() -> None:
+    effects = LensEffects(vignetting=1.0, dirt=0.1, blur_sigma_px=1.5)
+    dirty, shaded, blurred = (
+        maps(effect) for effect in (LensEffects(dirt=0.1), LensEffects(vignetting=1.0), LensEffects(blur_sigma_px=1.5))
+    )
+    stepwise = through_lens(through_lens(through_lens(light(), dirty), shaded), blurred)
+    np.testing.assert_allclose(through_lens(light(), maps(effects)), stepwise, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["vignetting", "blur_sigma_px", "defocus_px"])
+def test_only_dirt_draws(name: str) -> None:
+    rng = np.random.default_rng(1)
+    lens_maps(replace(CLEAN, **{name: 1.0}), CAMERA, rng)
+    assert rng.bit_generator.state == np.random.default_rng(1).bit_generator.state
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"vignetting": -1}, "vignetting should be 0 or more, got -1"),
+        ({"blur_sigma_px": np.nan}, "blur_sigma_px should be 0 or more, got nan"),
+        ({"dirt": 0.6}, "dirt should be within 0 and 0.5, got 0.6"),
+        ({"vignetting_cutoff_deg": 90}, "vignetting_cutoff_deg should be between 0 and 90, got 90"),
+    ],
+)
+def test_a_lens_that_cannot_be_is_refused(change: dict[str, float], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        LensEffects(**change)
