@@ -92,7 +92,7 @@ def test_an_unknown_name_gets_the_nearest_and_all_there_are(here):
 
 
 def test_a_name_far_from_all_gets_no_guess(here):
-    with pytest.raises(UnknownNameError, match=r"^no scene named 'zzzz'\. Known: room$"):
+    with pytest.raises(UnknownNameError, match=r"^no scene named 'zzzz'\. Known: office, room$"):
         catalog.find("scene", "zzzz")
 
 

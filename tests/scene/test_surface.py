@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
-from vobench.scene.scene import AreaLight, Surface, box, ceiling_light, rectangle, room
+from vobench.scene.light import AreaLight
+from vobench.scene.scene import ceiling_light
+from vobench.scene.surface import Surface, box, rectangle, room
 
 ROOM = room((4, 6, 3), floor="floor", wall="wall", ceiling="ceiling")
 CENTER_M, YAW_DEG = np.array([1.0, -2.0, 0.5]), 25.0
@@ -81,3 +83,17 @@ def test_a_ceiling_light_shines_down_from_where_it_hangs() -> None:
     np.testing.assert_allclose(lamp.surface.normal, [0, 0, -1])
     corners = lamp.surface.at(np.array([0, 1]), np.array([0, 1]))
     np.testing.assert_allclose(np.ptp(corners, 0), [1.2, 0.6, 0])
+
+
+def test_a_moved_surface_is_where_its_mover_is_and_keeps_its_texture() -> None:
+    surface = Surface(np.array([1.0, 0, 0]), np.array([0, 2.0, 0]), np.array([0, 0, 1.0]), "m", "thing", (0.3, 0.4))
+    T_world_mover = se3.transform(se3.rotation_z(np.pi / 2), [10.0, 0, 0])
+    moved = surface.moved(T_world_mover)
+    np.testing.assert_allclose(center(moved), se3.apply(T_world_mover, center(surface)[None])[0], atol=1e-12)
+    np.testing.assert_allclose(moved.normal, T_world_mover[:3, :3] @ surface.normal, atol=1e-12)
+    assert (moved.material, moved.instance, moved.texture_corner_m) == ("m", "thing", (0.3, 0.4))
+
+
+def test_places_on_a_texture_are_metres_from_its_corner() -> None:
+    surface = Surface(np.zeros(3), np.array([0, 2.0, 0]), np.array([0, 0, 3.0]), "m", "", (0.5, 0.25))
+    np.testing.assert_allclose(surface.on_texture_m(np.array([0, 1]), np.array([0, 0.5])), [[0.5, 0.25], [2.5, 1.75]])

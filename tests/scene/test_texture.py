@@ -36,6 +36,15 @@ def test_the_mean_of_a_texture_is_its_albedo(kind: str) -> None:
     assert reflectance(texture(kind)).mean() == pytest.approx(0.5, rel=0.002)
 
 
+@pytest.mark.parametrize("kind", NAMES)
+@pytest.mark.parametrize("tile_m", [0.05, 1.0, 10.0])
+def test_a_tile_too_coarse_for_its_detail_is_smooth_and_never_nothing(kind: str, tile_m: float) -> None:
+    tile = reflectance(replace(texture(kind), tile_m=tile_m, resolution_px=8))
+    assert tile.mean() == pytest.approx(0.5, rel=0.05)  # NaN, where no feature fits, would be no number
+    if kind == "checker":
+        np.testing.assert_allclose(np.unique(tile), [0.3, 0.7], rtol=1e-6)
+
+
 @pytest.mark.parametrize("kind", DETAILED)
 def test_contrast_is_half_the_step_from_dark_to_bright_over_the_mean(kind: str) -> None:
     dark, bright = np.percentile(reflectance(texture(kind)), [1, 99])

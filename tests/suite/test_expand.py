@@ -43,8 +43,8 @@ def test_one_line_changes_one_factor(bent, axis, change):
 
 
 def test_a_lighting_sets_the_lamps_it_names_and_leaves_the_others(bent):
-    powers = [case.build_scene().lights[0].power_lm for case in bent().cases]
-    assert powers == [600, 150]
+    levels = [case.build_scene().lights[0].level.mean(0, 0) for case in bent().cases]
+    assert levels == [1, 150 / 600]
 
 
 def test_a_suites_parameters_go_over_the_manifests(bent):
@@ -103,3 +103,25 @@ def test_every_suite_of_the_house_is_valid_and_called_as_its_file(name, monkeypa
     assert suite.name == name
     assert plan(suite).cases
     assert catalog.find("suite", name).origin == "built in"
+
+
+def test_a_rig_takes_lenses_and_their_places_from_its_preset_and_a_baseline_over_it(bent):
+    euroc = bent(("pitch_deg: 90", "pitch_deg: 90, lens: euroc")).cases[0].build_rig()
+    assert euroc.left != euroc.right
+    assert euroc.baseline_m == pytest.approx(0.110, abs=1e-3)
+    wide = bent(("pitch_deg: 90", "pitch_deg: 90, lens: euroc, baseline_m: 0.3")).cases[0].build_rig()
+    assert (wide.left, wide.right) == (euroc.left, euroc.right)
+    assert wide.baseline_m == pytest.approx(0.3)
+
+
+def test_a_calibration_error_makes_the_true_rig_another_and_the_told_one_not(bent):
+    plain, off = (
+        bent(("pitch_deg: 90", f"pitch_deg: 90{more}")).cases[0]
+        for more in ("", ", calibration_error: {focal_ratio: 0.02, right_yaw_deg: 0.5}")
+    )
+    told, true = off.build_rig(), off.build_true_rig()
+    assert told.left == plain.build_rig().left == plain.build_true_rig().left
+    assert told.T_body_right.tobytes() == plain.build_true_rig().T_body_right.tobytes()
+    assert true.left.fx_px == pytest.approx(1.02 * told.left.fx_px)
+    assert true.T_body_left.tobytes() == told.T_body_left.tobytes()
+    assert true.T_body_right.tobytes() != told.T_body_right.tobytes()

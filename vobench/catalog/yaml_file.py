@@ -25,6 +25,7 @@ COMPLAINTS = {
     "int_type": "should be a whole number",
     "int_from_float": "should be a whole number",
     "float_type": "should be a number",
+    "bool_type": "should be true or false",
     "finite_number": "should be a finite number",
     "tuple_type": "should be a list, as in [a, b]",
     "dict_type": "should be keys with values",

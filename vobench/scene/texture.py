@@ -30,14 +30,14 @@ def reflectance(texture: Texture) -> Map:
     """The tile as (resolution_px, resolution_px) float32 in [0.02, 0.98], row 0 at v = 0."""
     rng = np.random.default_rng([texture.seed, texture.resolution_px])
     pattern = PATTERNS[texture.kind](texture, rng)
-    low, high = np.percentile(pattern[::4, ::4], [1, 99]) if pattern.std() > 0 else (-1.0, 1.0)
-    unit = (pattern - pattern.mean()) / ((high - low) / 2)
+    low, high = np.percentile(pattern[::4, ::4] if len(pattern) > 64 else pattern, [1, 99])
+    unit = (pattern - pattern.mean()) / ((high - low) / 2 if high > low else 1.0)
     tile: Map = np.clip(texture.albedo * (1 + texture.contrast * unit), 0.02, 0.98).astype(np.float32)
     return tile
 
 
 def _noise(texture: Texture, rng: np.random.Generator, *, coarse_m: float, fine_m: float, slope: float) -> Map:
-    """Periodic noise of unit variance whose features are between `fine_m` and `coarse_m` wide.
+    """Periodic noise of unit variance whose features are between `fine_m` and `coarse_m` wide; 0 where none fits.
 
     White noise shaped in the frequency domain by f^-slope: isotropic, and a tile without seams.
     """
@@ -51,7 +51,7 @@ def _noise(texture: Texture, rng: np.random.Generator, *, coarse_m: float, fine_
     band = (f > 0.5 / coarse_m) & (f < 0.5 / fine_m)
     spectrum = spectrum * np.where(band, np.maximum(f, 1e-6) ** -slope, 0).astype(np.float32)
     noise = fft.irfft2(spectrum, s=(n, n), workers=-1)
-    unit: Map = noise / noise.std()
+    unit: Map = noise / (noise.std() or 1)
     return unit
 
 

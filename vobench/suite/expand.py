@@ -11,11 +11,17 @@ from vobench.catalog import catalog, yaml_file
 from vobench.catalog.manifest import Manifest, read_manifest
 from vobench.catalog.yaml_file import Source
 from vobench.errors import SuiteError
-from vobench.geometry.rig import LENSES, Rig, stereo_rig
+from vobench.geometry.calibration import CalibrationError, true_rig
+from vobench.geometry.preset import PRESETS
+from vobench.geometry.rig import Rig, mounted
 from vobench.scene.scene import Scene
 from vobench.suite import scene_file
-from vobench.suite.model import CameraSpec, EstimatorSpec, LampOverride, RigSpec, Strict, Suite, TrajectorySpec
-from vobench.suite.scene_file import SceneFile
+from vobench.suite.camera_spec import CameraSpec
+from vobench.suite.light_spec import LightOverride
+from vobench.suite.model import EstimatorSpec, RigSpec, Suite, TrajectorySpec
+from vobench.suite.rendering_spec import ChannelName, RenderingSpec
+from vobench.suite.scene_spec import SceneFile
+from vobench.suite.strict import Strict
 
 AXES = ("scene", "lighting", "rig", "trajectory", "camera")
 
@@ -30,10 +36,12 @@ class Case(Strict):
     name: str
     variant: dict[str, str]
     scene: SceneFile
-    lighting: dict[str, LampOverride]
+    lighting: dict[str, LightOverride]
     rig: RigSpec
     trajectory: TrajectorySpec
     camera: CameraSpec
+    rendering: RenderingSpec
+    truth: tuple[ChannelName, ...]
     seed: int
 
     def build_scene(self) -> Scene:
@@ -41,15 +49,20 @@ class Case(Strict):
         return scene_file.build(self.scene, self.lighting)
 
     def build_rig(self) -> Rig:
-        """The stereo pair on the robot."""
-        r = self.rig
-        return stereo_rig(
-            LENSES[r.lens],
+        """The stereo pair on the robot as its calibration has it: what estimators are told."""
+        r, preset = self.rig, PRESETS[self.rig.lens]
+        return mounted(
+            preset.left,
+            preset.right,
+            preset.T_left_right if r.baseline_m is None else preset.at_baseline(r.baseline_m),
             pitch_deg=r.pitch_deg,
-            baseline_m=r.baseline_m,
             forward_m=r.forward_m,
             height_m=r.height_m,
         )
+
+    def build_true_rig(self) -> Rig:
+        """The stereo pair as it is: what pictures are made with. Raises VobenchError, as `true_rig` does."""
+        return true_rig(self.build_rig(), CalibrationError(**self.rig.calibration_error.model_dump()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,10 +171,14 @@ def _cases(suite: Suite, source: Source | None) -> Iterator[Case]:
             rig=suite.rigs[rig],
             trajectory=suite.trajectories[trajectory],
             camera=suite.cameras[camera],
+            rendering=suite.rendering,
+            truth=suite.truth,
             seed=suite.seed,
         )
         with _at(source, "lightings", lighting):
             case.build_scene()  # a lighting that names no lamp is an error now, not after an hour
+        with _at(source, "rigs", rig):
+            case.build_true_rig()  # nor one whose distortion is off, on a lens without any
         yield case
 
 

@@ -2,31 +2,17 @@
 
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 
-from vobench.catalog.catalog import unknown
-from vobench.catalog.yaml_file import matching
-from vobench.geometry.rig import LENSES
+from vobench.geometry.preset import PRESETS
 from vobench.robot.controller import CONTROLLERS
 from vobench.robot.pioneer import THETAS
 from vobench.robot.slip import SLIPS
-from vobench.sensor.camera import CAMERAS
 from vobench.sensor.encoder import ENCODERS
-
-
-class Strict(BaseModel):
-    """A frozen model in which an unknown key is an error, as are NaN, infinity and a number in quotes."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-
-def _one_of(kind: str, known: dict[str, Any]) -> AfterValidator:
-    def check(name: str) -> str:
-        if name not in known:
-            raise ValueError(unknown(kind, name, list(known)))
-        return name
-
-    return AfterValidator(check)
+from vobench.suite.camera_spec import CameraSpec
+from vobench.suite.light_spec import LightOverride
+from vobench.suite.rendering_spec import ChannelName, RenderingSpec
+from vobench.suite.strict import Name, Positive, Strict, one_of
 
 
 def _named(value: Any) -> Any:
@@ -34,27 +20,35 @@ def _named(value: Any) -> Any:
     return {"name": value} if isinstance(value, str) else value
 
 
-# Names become folders, and a case's name joins several with a hyphen.
-NAME = matching(r"[a-z0-9][a-z0-9_.]*", "lower-case letters, digits, _ and ., a letter or digit first")
-Name = Annotated[str, NAME]
 Point = tuple[float, float]
-Positive = Annotated[float, Field(gt=0)]
+Ratio = Annotated[float, Field(gt=-1, lt=1)]
+Angle = Annotated[float, Field(ge=-10, le=10)]
 
 
-class LampOverride(Strict):
-    """A lamp as a lighting sets it."""
+class CalibrationErrorSpec(Strict):
+    """How the true rig differs from the one that estimators are told; see `geometry.calibration`."""
 
-    power_lm: Annotated[float, Field(ge=0)]
+    focal_ratio: Ratio = 0.0
+    center_px: Point = (0.0, 0.0)
+    distortion_ratio: Ratio = 0.0
+    baseline_ratio: Ratio = 0.0
+    right_roll_deg: Angle = 0.0
+    right_pitch_deg: Angle = 0.0
+    right_yaw_deg: Angle = 0.0
 
 
 class RigSpec(Strict):
-    """A stereo pair on the robot."""
+    """A stereo pair on the robot: a preset with both lenses, placed, and how far its calibration is off.
 
-    lens: Annotated[str, _one_of("lens", LENSES)] = "paper_blender"
+    Without `baseline_m` the cameras stand to each other as the preset has them.
+    """
+
+    lens: Annotated[str, one_of("lens", PRESETS)] = "paper_blender"
     pitch_deg: Annotated[float, Field(ge=-90, le=90)]
-    baseline_m: Positive = 0.12
+    baseline_m: Positive | None = None
     forward_m: float = 0.25
     height_m: Positive = 0.4
+    calibration_error: CalibrationErrorSpec = CalibrationErrorSpec()
 
 
 class TrajectorySpec(Strict):
@@ -63,20 +57,13 @@ class TrajectorySpec(Strict):
     targets_m: Annotated[tuple[Point, ...], Field(min_length=1)]
     start_m: Point = (0.0, 0.0)
     start_heading_deg: float = 0.0
-    robot: Annotated[str, _one_of("robot parameter set", THETAS)] = "pioneer_3dx"
-    controller: Annotated[str, _one_of("controller", CONTROLLERS)] = "smooth"
-    slip: Annotated[str, _one_of("slip", SLIPS)] = "nominal"
-    encoders: Annotated[str, _one_of("encoder error set", ENCODERS)] = "nominal"
+    robot: Annotated[str, one_of("robot parameter set", THETAS)] = "pioneer_3dx"
+    controller: Annotated[str, one_of("controller", CONTROLLERS)] = "smooth"
+    slip: Annotated[str, one_of("slip", SLIPS)] = "nominal"
+    encoders: Annotated[str, one_of("encoder error set", ENCODERS)] = "nominal"
     rate_hz: Annotated[float, Field(gt=0, le=1000)] = 30.0
     tolerance_m: Positive = 0.01
     max_time_s: Annotated[float, Field(gt=0, le=3600)] = 60.0
-
-
-class CameraSpec(Strict):
-    """The chip behind the lenses and how it is exposed."""
-
-    sensor: Annotated[str, _one_of("camera sensor", CAMERAS)] = "clean"
-    exposure_gain: Positive = 1.0
 
 
 class EstimatorSpec(Strict):
@@ -84,7 +71,7 @@ class EstimatorSpec(Strict):
 
     name: str
     label: Name | None = None
-    params: dict[str, Any] = {}
+    params: dict[str, Any] = Field(default_factory=dict)
 
 
 class Suite(Strict):
@@ -98,8 +85,10 @@ class Suite(Strict):
     seed: Annotated[int, Field(ge=0)] = 0
     repeats: Annotated[int, Field(ge=1, le=100)] = 1
     scenes: Annotated[tuple[str, ...], Field(min_length=1)]
-    lightings: Annotated[dict[Name, dict[str, LampOverride]], Field(min_length=1)] = {"as_built": {}}
+    lightings: dict[Name, dict[str, LightOverride]] = Field(default={"as_built": {}}, min_length=1)
     rigs: Annotated[dict[Name, RigSpec], Field(min_length=1)]
     trajectories: Annotated[dict[Name, TrajectorySpec], Field(min_length=1)]
-    cameras: Annotated[dict[Name, CameraSpec], Field(min_length=1)] = {"clean": CameraSpec()}
+    cameras: dict[Name, CameraSpec] = Field(default={"clean": CameraSpec()}, min_length=1)
+    rendering: RenderingSpec = RenderingSpec()
+    truth: tuple[ChannelName, ...] = ()
     estimators: Annotated[tuple[Annotated[EstimatorSpec, BeforeValidator(_named)], ...], Field(min_length=1)]

@@ -1,104 +1,244 @@
-"""What a scene's YAML may say, and the scene it describes."""
+"""Reads a scene's YAML, checks the names in it, and builds the scene it describes."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
 
 from vobench.catalog import yaml_file
 from vobench.catalog.catalog import unknown
 from vobench.catalog.yaml_file import Keys
 from vobench.errors import SuiteError
-from vobench.scene.scene import AreaLight, Scene, box, ceiling_light, room
+from vobench.geometry import se3
+from vobench.geometry.se3 import Array
+from vobench.scene import mover as scripted
+from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun, scaled
+from vobench.scene.material import Glass, Material, Matt, Mirror, Polished
+from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.surface import Surface, box, rectangle, room
 from vobench.scene.texture import Texture
-from vobench.suite.model import LampOverride, Name, Positive, Strict
+from vobench.scene.window import Window, with_windows
+from vobench.suite.light_spec import LightOverride
+from vobench.suite.scene_spec import (
+    BoardSpec,
+    LampSpec,
+    MaterialSpec,
+    MoverSpec,
+    SceneFile,
+    SkySpec,
+    SunSpec,
+    Triple,
+    WindowSpec,
+)
 
-Triple = tuple[float, float, float]
-Size = tuple[Positive, Positive, Positive]
-# The light of a larger room would take more memory than machines have, and the renderer sees 60 m far.
-RoomSide = Annotated[float, Field(gt=0, le=30)]
-
-
-class MaterialSpec(Strict):
-    """A diffuse material with a procedural texture."""
-
-    pattern: Literal["plain", "terrazzo", "plaster", "wood", "poster", "checker"]
-    albedo: Annotated[float, Field(gt=0, lt=1)]
-    contrast: Annotated[float, Field(ge=0, le=1)] = 0.0
-    tile_m: Positive = 1.0
-    resolution_px: Annotated[int, Field(ge=8, le=8192)] = 1024
-    seed: Annotated[int, Field(ge=0)] = 0
-
-
-class RoomSpec(Strict):
-    """Four walls, a floor at z = 0 and a ceiling, around the origin."""
-
-    size_m: tuple[RoomSide, RoomSide, RoomSide]
-    floor: str
-    wall: str
-    ceiling: str
-
-
-class BoxSpec(Strict):
-    """A piece of furniture."""
-
-    center_m: Triple
-    size_m: Size
-    yaw_deg: float = 0.0
-    material: str
-
-
-class LampSpec(Strict):
-    """A level panel that shines down from a rectangle of size_m."""
-
-    name: Name
-    center_m: Triple
-    size_m: tuple[Positive, Positive]
-    power_lm: Annotated[float, Field(ge=0)]
-
-
-class SceneFile(Strict):
-    """A scene: a room, boxes in it, lamps, and the luminance of matt white that cameras are exposed for."""
-
-    name: Name
-    summary: str = ""
-    white_cd_m2: Positive
-    materials: dict[Name, MaterialSpec]
-    room: RoomSpec
-    boxes: tuple[BoxSpec, ...] = ()
-    lamps: Annotated[tuple[LampSpec, ...], Field(min_length=1)]
+Lighting = dict[str, LightOverride]
+# Names of the lights that there is one of.
+SUN, SKY = "sun", "sky"
+MIRROR_TINT, CLEAR_TINT = 0.9, 1.0
+TOUCHING_M = 1e-6  # windows may share a border
 
 
 def read_scene(path: Path) -> SceneFile:
     """The scene in a file. Raises SuiteError, one line with its place, where it is wrong or names no material."""
     spec, source = yaml_file.read_marked(path, SceneFile)
-    used: list[tuple[Keys, str]] = [(("room", part), getattr(spec.room, part)) for part in ("floor", "wall", "ceiling")]
-    used += [(("boxes", index, "material"), b.material) for index, b in enumerate(spec.boxes)]
-    for keys, name in used:
+    for keys, name in _materials_used(spec):
         with source.at(*keys):
             if name not in spec.materials:
                 raise SuiteError(unknown("material", name, list(spec.materials)))
+            if keys[0] == "movers" and spec.materials[name].kind == "luminous":
+                raise SuiteError(f"'{name}' shines, and what moves cannot; choose a material of another kind")
+    strengths = [lamp.power_lm for lamp in spec.lamps] + [sky.illuminance_lx for sky in (spec.sun, spec.sky) if sky]
+    if not (any(strengths) or any(m.kind == "luminous" for m in spec.materials.values())):
+        zero = "; all that it has are 0" if strengths else ""
+        raise SuiteError(f"{path}: a scene needs a light: lamps, a sun, a sky or a luminous material{zero}")
+    for keys, place_m in _places(spec):
+        with source.at(*keys):
+            if not spec.room.holds(place_m):
+                raise SuiteError(f"should be inside the room, {spec.room.extent} (got {list(place_m)})")
+    for index in range(len(spec.room.windows)):
+        with source.at("room", "windows", index):
+            _check_window(index, spec)
+    _check_names(spec, source)
     return spec
 
 
-def build(spec: SceneFile, lighting: dict[str, LampOverride]) -> Scene:
-    """The scene under a lighting. Raises SuiteError where the lighting names a lamp that is not there."""
-    lamps = [lamp.name for lamp in spec.lamps]
+def build(spec: SceneFile, lighting: Lighting) -> Scene:
+    """The scene under a lighting. Raises SuiteError where the lighting names a light that is not there."""
+    surfaces = [*_room(spec), *_furniture(spec)]
+    luminous = {name: m.luminance_cd_m2 for name, m in spec.materials.items() if m.luminance_cd_m2 is not None}
+    lights = [*_lights(spec), *_glowing(surfaces, luminous)]
     for name in lighting:
-        if name not in lamps:
-            raise SuiteError(f"lighting: {unknown('lamp', name, lamps)}")
-    surfaces = room(spec.room.size_m, floor=spec.room.floor, wall=spec.room.wall, ceiling=spec.room.ceiling)
-    for b in spec.boxes:
-        surfaces += box(np.asarray(b.center_m), b.size_m, yaw_deg=b.yaw_deg, material=b.material)
-    textures = {name: _texture(material) for name, material in spec.materials.items()}
-    return Scene(spec.name, tuple(surfaces), textures, tuple(_lamp(lamp, lighting) for lamp in spec.lamps))
+        if name not in [light.name for light in lights]:
+            raise SuiteError(f"lighting: {unknown('light', name, [light.name for light in lights])}")
+    return Scene(
+        name=spec.name,
+        surfaces=tuple(surface for surface in surfaces if surface.material not in luminous),
+        materials={name: _material(m) for name, m in spec.materials.items() if name not in luminous},
+        lights=tuple(_lit(light, lighting[light.name]) if light.name in lighting else light for light in lights),
+        movers=tuple(_mover(mover) for mover in spec.movers),
+    )
 
 
-def _texture(m: MaterialSpec) -> Texture:
-    return Texture(m.pattern, m.albedo, m.contrast, m.tile_m, m.resolution_px, m.seed)
+def _materials_used(spec: SceneFile) -> Iterator[tuple[Keys, str]]:
+    for part in ("floor", "wall", "ceiling"):
+        yield ("room", part), getattr(spec.room, part)
+    for index, window in enumerate(spec.room.windows):
+        yield ("room", "windows", index, "pane"), window.pane
+        yield ("room", "windows", index, "reveal"), window.reveal
+    for kind in ("boxes", "boards", "movers"):
+        for index, thing in enumerate(getattr(spec, kind)):
+            yield (kind, index, "material"), thing.material
 
 
-def _lamp(lamp: LampSpec, lighting: dict[str, LampOverride]) -> AreaLight:
-    power_lm = lighting[lamp.name].power_lm if lamp.name in lighting else lamp.power_lm
-    return ceiling_light(lamp.name, np.asarray(lamp.center_m), lamp.size_m, power_lm=power_lm)
+def _places(spec: SceneFile) -> Iterator[tuple[Keys, Triple]]:
+    for kind in ("lamps", "boxes", "boards"):
+        yield from (((kind, index, "center_m"), thing.center_m) for index, thing in enumerate(getattr(spec, kind)))
+    for index, mover in enumerate(spec.movers):
+        yield from ((("movers", index, "path", nth), key.position_m) for nth, key in enumerate(mover.path))
+
+
+def _check_names(spec: SceneFile, source: yaml_file.Source) -> None:
+    """Lights are named by lightings, and things by ground truth: no name twice, a name given by us included."""
+    seen = {SUN, SKY, *(surface.instance for surface in _room(spec))}
+    for kind, unnamed in (("lamps", ""), ("boxes", "box"), ("boards", "board"), ("movers", "")):
+        for index, thing in enumerate(getattr(spec, kind)):
+            name = thing.name or f"{unnamed}_{index}"
+            with source.at(kind, index):
+                if name in seen:
+                    raise SuiteError(f"two things are called '{name}'; give one another name")
+            seen.add(name)
+
+
+def _check_window(index: int, spec: SceneFile) -> None:
+    """Raise SuiteError where a window reaches beyond its wall or into an earlier window."""
+    window, (x, y, height) = spec.room.windows[index], spec.room.size_m
+    length = y if window.wall in ("east", "west") else x
+    (along, up), (width, high) = window.center_m, window.size_m
+    if abs(along) + width / 2 >= length / 2 or up - high / 2 <= 0 or up + high / 2 >= height:
+        raise SuiteError(
+            f"the window reaches beyond its wall, which is {length:g} m long around 0 and {height:g} m high: "
+            f"center_m {list(window.center_m)}, size_m {list(window.size_m)}"
+        )
+    for earlier, other in enumerate(spec.room.windows[:index]):
+        apart = np.abs(np.subtract(window.center_m, other.center_m))
+        if window.wall == other.wall and (apart < np.add(window.size_m, other.size_m) / 2 - TOUCHING_M).all():
+            raise SuiteError(
+                f"the window overlaps window {earlier} of the {window.wall} wall, which has "
+                f"center_m {list(other.center_m)}, size_m {list(other.size_m)}; move one or make it smaller"
+            )
+
+
+def _room(spec: SceneFile) -> Iterator[Surface]:
+    parts = room(spec.room.size_m, floor=spec.room.floor, wall=spec.room.wall, ceiling=spec.room.ceiling)
+    for part in parts:
+        windows = [
+            _window(window, part, f"window_{index}")
+            for index, window in enumerate(spec.room.windows)
+            if part.instance == f"wall_{window.wall}"
+        ]
+        yield from with_windows(part, windows) if windows else [part]
+
+
+def _window(window: WindowSpec, wall: Surface, name: str) -> Window:
+    """The window in its wall's own directions, of which one is up and the other along x or y."""
+    axis_u, axis_v = (edge / np.linalg.norm(edge) for edge in (wall.edge_u_m, wall.edge_v_m))
+    along, up = window.center_m
+    center = np.array([along, along, up]) - wall.corner_m
+    upright_u = abs(axis_u[2]) > 0.5
+    size = window.size_m[::-1] if upright_u else window.size_m
+    at = (float(center @ np.abs(axis_u)), float(center @ np.abs(axis_v)))
+    return Window(at, size, window.depth_m, window.pane, window.reveal, name)
+
+
+def _furniture(spec: SceneFile) -> Iterator[Surface]:
+    for index, b in enumerate(spec.boxes):
+        name = b.name or f"box_{index}"
+        yield from box(np.asarray(b.center_m), b.size_m, yaw_deg=b.yaw_deg, material=b.material, instance=name)
+    for index, board in enumerate(spec.boards):
+        yield _board(board, board.name or f"board_{index}")
+
+
+def _board(board: BoardSpec, name: str) -> Surface:
+    across = se3.rotation_z(np.deg2rad(board.yaw_deg + 90))[:, 0] * board.size_m[0]
+    up = np.array([0.0, 0.0, board.size_m[1]])
+    return rectangle(np.asarray(board.center_m), across, up, board.material, name)
+
+
+def _material(m: MaterialSpec) -> Material:
+    if m.kind == "mirror":
+        return Mirror(MIRROR_TINT if m.tint is None else m.tint, m.roughness)
+    tint = CLEAR_TINT if m.tint is None else m.tint
+    if m.kind == "glass":
+        return Glass(m.eta, tint)
+    assert m.pattern is not None  # MaterialSpec sees to it
+    assert m.albedo is not None
+    texture = Texture(m.pattern, m.albedo, m.contrast, m.tile_m, m.resolution_px, m.seed)
+    return Polished(texture, m.eta, tint, m.roughness) if m.kind == "polished" else Matt(texture)
+
+
+def _lights(spec: SceneFile) -> Iterator[Light]:
+    yield from (_lamp(lamp) for lamp in spec.lamps)
+    if spec.sun:
+        yield _sun(spec.sun)
+    if spec.sky:
+        yield _sky(spec.sky, spec.sun)
+
+
+def _lamp(lamp: LampSpec) -> Light:
+    center, level = np.asarray(lamp.center_m), lamp.level.build()
+    if lamp.size_m:
+        return replace(ceiling_light(lamp.name, center, lamp.size_m, power_lm=lamp.power_lm), level=level)
+    if lamp.target_m:
+        way = np.asarray(lamp.target_m) - center
+        direction: Array = way / np.linalg.norm(way)
+        return SpotLight(lamp.name, center, direction, lamp.power_lm, lamp.inner_deg, lamp.outer_deg, level)
+    return PointLight(lamp.name, center, lamp.power_lm, level)
+
+
+def _sun(sun: SunSpec) -> Sun:
+    path = [(key.t_s, key.azimuth_deg, key.elevation_deg) for key in sun.path]
+    if sun.azimuth_deg is not None and sun.elevation_deg is not None:
+        path = [(0.0, sun.azimuth_deg, sun.elevation_deg)]
+    times_s, azimuth_deg, elevation_deg = zip(*path, strict=True)
+    return Sun(SUN, sun.illuminance_lx, times_s, azimuth_deg, elevation_deg, sun.level.build())
+
+
+def _sky(sky: SkySpec, sun: SunSpec | None) -> Sky:
+    """A clear sky is brightest around where the sun stands at first, or overhead without a sun."""
+    toward = _sun(sun).direction(0) if sun else np.array([0.0, 0.0, 1.0])
+    return Sky(SKY, sky.illuminance_lx, sky.kind, toward, level=sky.level.build())
+
+
+def _glowing(surfaces: list[Surface], luminous: dict[str, float]) -> Iterator[AreaLight]:
+    """Every surface of a luminous material as a light; those of one thing are numbered."""
+    count: dict[str, int] = {}
+    for surface in surfaces:
+        if surface.material in luminous:
+            nth = count[surface.instance] = count.get(surface.instance, -1) + 1
+            width, height = surface.size_m
+            power_lm = luminous[surface.material] * np.pi * width * height
+            yield AreaLight(f"{surface.instance}.{nth}" if nth else surface.instance, surface, float(power_lm))
+
+
+def _lit(light: Light, override: LightOverride) -> Light:
+    """The light with another level; another power counts as a level, so that its light is computed but once."""
+    level = override.level.build() if override.level else light.level
+    of_lamp = not isinstance(light, Sun | Sky)
+    wrong, asked = ("illuminance_lx", override.power_lm) if of_lamp else ("power_lm", override.illuminance_lx)
+    if getattr(override, wrong) is not None:
+        raise SuiteError(f"lighting: {wrong} does not belong to '{light.name}'")
+    if asked is None:
+        return replace(light, level=level)
+    nominal = light.illuminance_lx if isinstance(light, Sun | Sky) else light.power_lm
+    if nominal == 0 and asked > 0:
+        raise SuiteError(f"lighting: '{light.name}' is 0 in the scene, so it cannot be {asked:g}; give it more there")
+    return replace(light, level=scaled(level, asked / nominal if nominal else 0.0))
+
+
+def _mover(spec: MoverSpec) -> scripted.Mover:
+    surfaces = box(np.zeros(3), spec.size_m, yaw_deg=0.0, material=spec.material, instance=spec.name)
+    columns = zip(*((key.t_s, key.position_m, key.yaw_deg) for key in spec.path), strict=True)
+    times_s, positions_m, yaw_deg = (np.array(column, float) for column in columns)
+    path = scripted.Path(times_s, positions_m, yaw_deg, spec.repeats)
+    return scripted.Mover(spec.name, tuple(surfaces), path)

@@ -1,0 +1,192 @@
+"""A scene's YAML: every kind of thing it may hold is built where it says, and what is wrong is one line."""
+
+# ruff: noqa: E501 - tables of sentences are easier to read a line each
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vobench.errors import SuiteError
+from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Steady, Sun
+from vobench.scene.material import Glass, Matt, Mirror, Polished
+from vobench.scene.scene import Scene
+from vobench.suite.light_spec import LevelSpec, LightOverride
+from vobench.suite.scene_file import build, read_scene
+
+HALL = """name: hall
+white_cd_m2: 50
+materials:
+  grain: {pattern: terrazzo, albedo: 0.5, resolution_px: 8}
+  stone: {kind: polished, pattern: plain, albedo: 0.4, eta: 1.4, roughness: 0.1}
+  steel: {kind: mirror, tint: 0.6}
+  pane: {kind: glass}
+  glow: {kind: luminous, luminance_cd_m2: 100}
+room:
+  size_m: [6, 4, 3]
+  floor: stone
+  wall: grain
+  ceiling: grain
+  windows: [{wall: north, center_m: [1, 1.5], size_m: [1, 0.8], pane: pane, reveal: grain}]
+boxes: [{name: crate, center_m: [1, 0, 0.5], size_m: [0.4, 0.4, 1], material: grain}, {center_m: [-1, 0, 2], size_m: [0.1, 0.1, 0.1], material: glow}]
+boards: [{name: looking_glass, center_m: [-2.9, 0, 1.5], size_m: [1, 2], material: steel}]
+lamps:
+  - {name: panel, center_m: [0, 0, 2.9], size_m: [0.6, 0.6], power_lm: 800, level: {flicker: {depth: 0.3}}}
+  - {name: bulb, kind: point, center_m: [2, 1, 2], power_lm: 500}
+  - {name: spot, kind: spot, center_m: [2, -1, 2], target_m: [2, -1, 0], power_lm: 300}
+sun: {illuminance_lx: 30000, azimuth_deg: 90, elevation_deg: 30}
+sky: {illuminance_lx: 8000}
+movers:
+  - {name: cart, size_m: [0.5, 0.4, 0.6], material: grain, path: [{t_s: 0, position_m: [0, 0, 0.3]}, {t_s: 2, position_m: [1, 0, 0.3]}]}
+"""
+
+
+@pytest.fixture
+def hall(tmp_path: Path):
+    """Builds the hall with some text of it replaced, under some lighting."""
+
+    def bent(old: str = "", new: str = "", lighting: dict[str, LightOverride] | None = None) -> Scene:
+        assert old in HALL
+        (tmp_path / "hall.yaml").write_text(HALL.replace(old, new, 1) if old else HALL, encoding="utf-8")
+        return build(read_scene(tmp_path / "hall.yaml"), lighting or {})
+
+    return bent
+
+
+def named(scene: Scene, name: str) -> list[np.ndarray]:
+    """Middles of the surfaces of one thing."""
+    return [s.at(np.array(0.5), np.array(0.5)) for s in scene.surfaces if s.instance == name]
+
+
+def test_materials_are_of_the_kind_they_say(hall):
+    materials = hall().materials
+    assert [type(materials[name]) for name in ("grain", "stone", "steel", "pane")] == [Matt, Polished, Mirror, Glass]
+    assert (materials["stone"].eta, materials["stone"].roughness, materials["steel"].tint) == (1.4, 0.1, 0.6)
+
+
+def test_lights_are_of_the_kind_they_say_and_a_luminous_thing_is_a_light_on_each_side(hall):
+    lights = hall().lights
+    assert [type(light) for light in lights] == [AreaLight, PointLight, SpotLight, Sun, Sky, *[AreaLight] * 6]
+    assert [light.name for light in lights[5:]] == ["box_1", *(f"box_1.{n}" for n in range(1, 6))]
+    assert [light.luminance_cd_m2 for light in lights[5:]] == pytest.approx([100] * 6)
+
+
+def test_a_spot_points_at_its_target_and_the_sun_where_its_angles_say(hall):
+    by_name = {light.name: light for light in hall().lights}
+    np.testing.assert_allclose(by_name["spot"].direction, [0, 0, -1], atol=1e-12)
+    np.testing.assert_allclose(by_name["sun"].direction(0), [0, np.sqrt(3) / 2, 0.5], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("wall", "middle"),
+    [("north", [1, 2.15, 1.5]), ("south", [1, -2.15, 1.5]), ("east", [3.15, 1, 1.5]), ("west", [-3.15, 1, 1.5])],
+)
+def test_a_window_is_in_its_wall_at_its_place_along_the_world_axis(hall, wall, middle):
+    scene = hall("wall: north", f"wall: {wall}")
+    (pane,) = (s for s in scene.surfaces if s.material == "pane")
+    np.testing.assert_allclose(pane.at(np.array(0.5), np.array(0.5)), middle, atol=1e-12)
+    assert sorted(pane.size_m) == pytest.approx([0.8, 1.0])
+    upright = pane.edge_u_m if abs(pane.edge_u_m[2]) > 0 else pane.edge_v_m
+    assert np.linalg.norm(upright) == pytest.approx(0.8)
+
+
+def test_boards_stand_upright_and_look_where_they_face(hall):
+    for yaw_deg, normal in ((0, [1, 0, 0]), (90, [0, 1, 0]), (-90, [0, -1, 0])):
+        scene = hall("size_m: [1, 2], material: steel", f"size_m: [1, 2], yaw_deg: {yaw_deg}, material: steel")
+        (board,) = (s for s in scene.surfaces if s.instance == "looking_glass")
+        np.testing.assert_allclose(board.normal, normal, atol=1e-12)
+        assert abs(board.edge_v_m[2]) == 2
+
+
+def test_movers_go_with_their_path(hall):
+    (cart,) = hall().movers
+    np.testing.assert_allclose(cart.path.pose(1e9)[:3, 3], [0.5, 0, 0.3])
+    assert len(cart.surfaces) == 6
+
+
+def test_a_lighting_changes_levels_and_leaves_the_light_itself_alone(hall):
+    dim = hall(lighting={"bulb": LightOverride(power_lm=50), "sky": LightOverride(illuminance_lx=800)})
+    for before, after in zip(hall().lights, dim.lights, strict=True):
+        share = {"bulb": 0.1, "sky": 0.1}.get(after.name, 1.0)
+        assert after.level.mean(0, 10**9) == pytest.approx(share * before.level.mean(0, 10**9))
+        assert getattr(after, "power_lm", None) == getattr(before, "power_lm", None)
+        assert isinstance(after.level, Steady) == isinstance(before.level, Steady), "what is steady stays so"
+
+
+def test_a_lighting_may_let_a_light_flicker(hall):
+    flicker = LevelSpec.model_validate({"flicker": {"depth": 0.5}})
+    (bulb,) = (light for light in hall(lighting={"bulb": LightOverride(level=flicker)}).lights if light.name == "bulb")
+    assert (bulb.level.mean(0, 0), bulb.level.mean(5_000_000, 5_000_000)) == (pytest.approx(1.5), pytest.approx(0.5))
+
+
+@pytest.mark.parametrize(
+    ("lighting", "sentence"),
+    [
+        ({"blub": LightOverride(power_lm=1)}, "lighting: no light named 'blub'. Did you mean 'bulb'?"),
+        ({"bulb": LightOverride(illuminance_lx=1)}, "lighting: illuminance_lx does not belong to 'bulb'"),
+        ({"sun": LightOverride(power_lm=1)}, "lighting: power_lm does not belong to 'sun'"),
+    ],
+)
+def test_a_wrong_lighting_is_named(hall, lighting, sentence):
+    with pytest.raises(SuiteError) as refused:
+        hall(lighting=lighting)
+    assert str(refused.value).startswith(sentence)
+
+
+def test_a_light_that_is_nothing_cannot_be_made_brighter(hall):
+    with pytest.raises(SuiteError, match="'bulb' is 0 in the scene, so it cannot be 5; give it more there"):
+        hall("power_lm: 500", "power_lm: 0", lighting={"bulb": LightOverride(power_lm=5)})
+
+
+WRONG = [
+    ("{kind: mirror, tint: 0.6}", "{kind: mirror, albedo: 0.6}", ":6: materials.steel: albedo does not belong to kind 'mirror', which has tint, roughness"),
+    ("{kind: mirror, tint: 0.6}", "{kind: chrome}", ":6: materials.steel.kind: should be 'matt', 'polished', 'mirror', 'glass' or 'luminous' (got 'chrome')"),
+    ("pattern: terrazzo, ", "", ":4: materials.grain: pattern is missing for kind 'matt'"),
+    ("{kind: luminous, luminance_cd_m2: 100}", "{kind: luminous}", ":8: materials.glow: luminance_cd_m2 is missing for kind 'luminous'"),
+    ("target_m: [2, -1, 0], ", "", ":20: lamps.2: target_m is missing for kind 'spot'"),
+    ("target_m: [2, -1, 0], ", "target_m: [2, -1, 2], ", ":20: lamps.2: target_m should differ from center_m (got [2.0, -1.0, 2.0] for both)"),
+    ("kind: point", "kind: point, size_m: [1, 1]", ":19: lamps.1: size_m does not belong to kind 'point', which has center_m"),
+    ("center_m: [1, 1.5], size_m: [1, 0.8]", "center_m: [2.8, 1.5], size_m: [1, 0.8]", ":14: room.windows.0: the window reaches beyond its wall, which is 6 m long around 0 and 3 m high: center_m [2.8, 1.5], size_m [1.0, 0.8]"),
+    ("pane: pane, reveal", "pane: pain, reveal", ":14: room.windows.0.pane: no material named 'pain'. Did you mean 'pane'? Known: glow, grain, pane, steel, stone"),
+    ("name: crate", "name: cart", ":24: movers.0: two things are called 'cart'; give one another name"),
+    ("{name: bulb", "{name: sky", ":19: lamps.1: two things are called 'sky'; give one another name"),
+    ("name: crate", "name: window_0", ":15: boxes.0: two things are called 'window_0'; give one another name"),
+    ("{name: bulb", "{name: box_1", ":15: boxes.1: two things are called 'box_1'; give one another name"),
+    ("reveal: grain}]", "reveal: grain}, {wall: north, center_m: [1.9, 1.5], size_m: [1, 0.8], pane: pane, reveal: grain}]", ":14: room.windows.1: the window overlaps window 0 of the north wall, which has center_m [1.0, 1.5], size_m [1.0, 0.8]; move one or make it smaller"),
+    ("[-2.9, 0, 1.5]", "[-3, 0, 1.5]", ":16: boards.0.center_m: should be inside the room, 6 × 4 × 3 m around the origin (got [-3.0, 0.0, 1.5])"),
+    ("[0, 0, 2.9]", "[0, 0, 3.1]", ":18: lamps.0.center_m: should be inside the room, 6 × 4 × 3 m around the origin (got [0.0, 0.0, 3.1])"),
+    ("[1, 0, 0.3]", "[4, 0, 0.3]", ":24: movers.0.path.1: should be inside the room, 6 × 4 × 3 m around the origin (got [4.0, 0.0, 0.3])"),
+    ("size_m: [0.5, 0.4, 0.6], material: grain", "size_m: [0.5, 0.4, 0.6], material: glow", ":24: movers.0.material: 'glow' shines, and what moves cannot; choose a material of another kind"),
+    ("{t_s: 2, position", "{t_s: 0, position", ":24: movers.0: times should increase, but 0 follows 0"),
+    ("azimuth_deg: 90, elevation_deg: 30", "azimuth_deg: 90", ":21: sun: should have either azimuth_deg and elevation_deg, or a path"),
+    ("azimuth_deg: 90, elevation_deg: 30", "azimuth_deg: 90, path: [{t_s: 0, azimuth_deg: 0, elevation_deg: 9}]", ":21: sun: should have either azimuth_deg and elevation_deg, or a path"),
+    ("{flicker: {depth: 0.3}}", "{steady: null}", ":18: lamps.0.level: should have exactly one of steady, flicker, dimmer, switched"),
+    ("{flicker: {depth: 0.3}}", "{flicker: {depth: 0.3}, steady: 1}", ":18: lamps.0.level: should have exactly one of steady, flicker, dimmer, switched"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "sentence"), WRONG, ids=[new or f"no {old}" for old, new, _ in WRONG])
+def test_a_wrong_scene_gets_one_line_with_file_line_key_and_remedy(hall, tmp_path, old, new, sentence):
+    with pytest.raises(SuiteError) as refused:
+        hall(old, new)
+    assert str(refused.value).removeprefix(str(tmp_path / "hall.yaml")) == sentence
+
+
+def test_windows_may_touch(hall):
+    beside = "{wall: north, center_m: [2, 1.5], size_m: [1, 0.8], pane: pane, reveal: grain}]"
+    assert sum(s.material == "pane" for s in hall("reveal: grain}]", f"reveal: grain}}, {beside}").surfaces) == 2
+
+
+@pytest.mark.parametrize(("light", "zero"), [("", ""), ("sky: {illuminance_lx: 0}\n", "; all that it has are 0")])
+def test_a_scene_without_any_light_is_refused(tmp_path, light, zero):
+    text = f"name: cave\nwhite_cd_m2: 1\nmaterials: {{m: {{pattern: plain, albedo: 0.5}}}}\n{light}"
+    (tmp_path / "cave.yaml").write_text(f"{text}room: {{size_m: [3, 3, 3], floor: m, wall: m, ceiling: m}}\n")
+    with pytest.raises(SuiteError, match=f"a scene needs a light: lamps, a sun, a sky or a luminous material{zero}$"):
+        read_scene(tmp_path / "cave.yaml")
+
+
+@pytest.mark.parametrize("name", ["room", "office"])
+def test_our_own_scenes_are_valid(name):
+    path = Path(__file__).parents[2] / "scenes" / f"{name}.yaml"
+    scene = build(read_scene(path), {})
+    assert {s.material for s in scene.surfaces} <= set(scene.materials)

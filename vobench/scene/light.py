@@ -1,0 +1,246 @@
+"""What shines: panels, points, spots, the sun and the sky, each brighter or darker over time."""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+
+from vobench.geometry.se3 import Array
+from vobench.scene.surface import Surface
+
+NS_PER_S = 1e9
+SUN_RADIUS_RAD = np.deg2rad(0.533 / 2)  # seen from the Earth
+
+
+class Level(Protocol):
+    """A light's brightness over time, relative to its nominal one."""
+
+    def mean(self, start_ns: int, end_ns: int) -> float:
+        """The exact mean over an interval; the value where start and end are one instant."""
+
+
+@dataclass(frozen=True, slots=True)
+class Steady:
+    """The same at all times."""
+
+    level: float = 1.0
+
+    def mean(self, start_ns: int, end_ns: int) -> float:
+        """The level."""
+        del start_ns, end_ns
+        return self.level
+
+
+@dataclass(frozen=True, slots=True)
+class Flicker:
+    """1 + depth cos(2π 2 mains_hz t + phase): a lamp on alternating current is brightest twice a period."""
+
+    mains_hz: float
+    depth: float
+    phase_rad: float = 0.0
+
+    def mean(self, start_ns: int, end_ns: int) -> float:
+        """The integral of the cosine is its value amid the interval times a sinc."""
+        middle_s, length_s = (start_ns + end_ns) / 2 / NS_PER_S, (end_ns - start_ns) / NS_PER_S
+        swing = np.cos(4 * np.pi * self.mains_hz * middle_s + self.phase_rad)
+        return float(1 + self.depth * swing * np.sinc(2 * self.mains_hz * length_s))
+
+
+@dataclass(frozen=True, slots=True)
+class Dimmer:
+    """Straight lines between levels at increasing times; constant before the first and after the last."""
+
+    times_s: tuple[float, ...]
+    levels: tuple[float, ...]
+
+    def mean(self, start_ns: int, end_ns: int) -> float:
+        """The trapezia's area over the interval's length."""
+        start_s, end_s = start_ns / NS_PER_S, end_ns / NS_PER_S
+        inside = [t for t in self.times_s if start_s < t < end_s]
+        times = np.array([start_s, *inside, end_s])
+        levels = np.interp(times, self.times_s, self.levels)
+        return float(np.trapezoid(levels, times) / (end_s - start_s)) if end_ns > start_ns else float(levels[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Switched:
+    """On or off at first, and the other way round from each of the increasing instants times_s on."""
+
+    times_s: tuple[float, ...]
+    on_first: bool = True
+
+    def mean(self, start_ns: int, end_ns: int) -> float:
+        """The share of the interval in which the light is on."""
+        start_s, end_s = start_ns / NS_PER_S, end_ns / NS_PER_S
+        passed = int(np.searchsorted(self.times_s, start_s, side="right"))
+        is_on = self.on_first ^ bool(passed % 2)
+        if end_ns <= start_ns:
+            return float(is_on)
+        edges = np.array([start_s, *(t for t in self.times_s if start_s < t < end_s), end_s])
+        lengths = np.diff(edges)
+        return float(lengths[0 if is_on else 1 :: 2].sum() / (end_s - start_s))
+
+
+@dataclass(frozen=True, slots=True)
+class Scaled:
+    """Another function of time, `factor` times as bright."""
+
+    of: Level
+    factor: float
+
+    def mean(self, start_ns: int, end_ns: int) -> float:
+        """The other's mean, scaled."""
+        return self.factor * self.of.mean(start_ns, end_ns)
+
+
+STEADY = Steady()
+
+
+def scaled(level: Level, factor: float) -> Level:
+    """The function of time `factor` times as bright; what is steady stays so, as engines spare themselves work."""
+    return Steady(factor * level.level) if isinstance(level, Steady) else Scaled(level, factor)
+
+
+@dataclass(frozen=True, slots=True)
+class AreaLight:
+    """A rectangle that emits `power_lm` evenly and to all sides of its front (Lambert)."""
+
+    name: str
+    surface: Surface
+    power_lm: float
+    level: Level = STEADY
+
+    @property
+    def luminance_cd_m2(self) -> float:
+        """Luminance of the panel: power / (π area)."""
+        width, height = self.surface.size_m
+        return self.power_lm / (np.pi * width * height)
+
+
+@dataclass(frozen=True, slots=True)
+class PointLight:
+    """A bulb too small to see: `power_lm` evenly in all directions, hard shadows."""
+
+    name: str
+    position_m: Array
+    power_lm: float
+    level: Level = STEADY
+
+    def intensity_cd(self, directions: Array) -> Array:
+        """Luminous intensity (...) towards unit directions (..., 3)."""
+        return np.full(directions.shape[:-1], self.power_lm / (4 * np.pi))
+
+
+@dataclass(frozen=True, slots=True)
+class SpotLight:
+    """A bulb in a reflector: even light within inner_deg of its unit `direction`, none beyond outer_deg.
+
+    Between them the intensity falls linearly in the angle, as in Mitsuba; power_lm is all that leaves it.
+    """
+
+    name: str
+    position_m: Array
+    direction: Array
+    power_lm: float
+    inner_deg: float
+    outer_deg: float
+    level: Level = STEADY
+
+    @property
+    def peak_cd(self) -> float:
+        """Intensity amid the beam: the power over the integral of the fall-off."""
+        theta = np.linspace(0, np.deg2rad(self.outer_deg), 4001)
+        return float(self.power_lm / np.trapezoid(2 * np.pi * np.sin(theta) * self._falloff(theta), theta))
+
+    def intensity_cd(self, directions: Array) -> Array:
+        """Luminous intensity (...) towards unit directions (..., 3)."""
+        return self.peak_cd * self._falloff(np.arccos(np.clip(directions @ self.direction, -1, 1)))
+
+    def _falloff(self, theta_rad: Array) -> Array:
+        inner, outer = np.deg2rad([self.inner_deg, self.outer_deg])
+        falloff: Array = np.clip((outer - theta_rad) / max(outer - inner, 1e-9), 0.0, 1.0)
+        return falloff
+
+
+@dataclass(frozen=True, slots=True)
+class Sun:
+    """Direct sunlight: illuminance_lx on a surface that faces it, from a disc 0.53° wide.
+
+    The sun stands at azimuth_deg (0 along x, 90 along y) and elevation_deg at each of times_s, and
+    moves evenly between; one entry each is a sun that stands still.
+    """
+
+    name: str
+    illuminance_lx: float
+    times_s: tuple[float, ...]
+    azimuth_deg: tuple[float, ...]
+    elevation_deg: tuple[float, ...]
+    level: Level = STEADY
+
+    @property
+    def moves(self) -> bool:
+        """Whether its shadows wander."""
+        return len(self.times_s) > 1
+
+    def direction(self, t_ns: float) -> Array:
+        """Unit vector (3,) towards the sun at an instant."""
+        t_s = t_ns / NS_PER_S
+        azimuth = np.deg2rad(np.interp(t_s, self.times_s, self.azimuth_deg))
+        elevation = np.deg2rad(np.interp(t_s, self.times_s, self.elevation_deg))
+        return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+
+
+# Coefficients a to e of ISO 15469:2004 (CIE S 011), types 5, 1 and 12.
+SKIES = {
+    "uniform": (0.0, -1.0, 0.0, -1.0, 0.0),
+    "overcast": (4.0, -0.7, 0.0, -1.0, 0.0),
+    "clear": (-1.0, -0.32, 10.0, -3.0, 0.45),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Sky:
+    """A sky that gives illuminance_lx on open level ground, and that ground seen below the horizon.
+
+    `kind` is one of SKIES; only the clear one depends on where the sun stands (unit vector (3,)).
+    """
+
+    name: str
+    illuminance_lx: float
+    kind: str = "overcast"
+    sun_direction: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    ground_albedo: float = 0.2
+    level: Level = STEADY
+
+    def luminance_cd_m2(self, directions: Array) -> Array:
+        """Luminance (...) seen along unit directions (..., 3). Source: ISO 15469:2004, eqs 1 to 7."""
+        scale = self.illuminance_lx / _level_illuminance(self.kind, *map(float, self.sun_direction))
+        sky = _relative_luminance(self.kind, self.sun_direction, directions) * scale
+        ground = self.ground_albedo * self.illuminance_lx / np.pi
+        return np.where(directions[..., 2] >= 0, sky, ground)
+
+
+def _relative_luminance(kind: str, sun_direction: Array, directions: Array) -> Array:
+    a, b, c, d, e = SKIES[kind]
+    sine = np.maximum(directions[..., 2], 1e-3)
+    gradation: Array = 1 + a * np.exp(b / sine)
+    if c == e == 0:
+        return gradation
+    chi = np.arccos(np.clip(directions @ sun_direction, -1, 1))
+    scatter: Array = 1 + c * (np.exp(d * chi) - np.exp(d * np.pi / 2)) + e * np.cos(chi) ** 2
+    return gradation * scatter
+
+
+@lru_cache(maxsize=64)
+def _level_illuminance(kind: str, *sun_direction: float) -> float:
+    """Level illuminance by a sky of relative luminance, by the midpoint rule over the upper half sphere."""
+    sine_squared = (np.arange(256) + 0.5) / 256
+    azimuth = 2 * np.pi * (np.arange(512) + 0.5) / 512
+    cosine, angle = np.sqrt(1 - sine_squared)[:, None], azimuth[None, :]
+    up = np.broadcast_to(np.sqrt(sine_squared)[:, None], (256, 512))
+    directions = np.stack([cosine * np.cos(angle), cosine * np.sin(angle), up], -1)
+    return float(np.pi * _relative_luminance(kind, np.array(sun_direction), directions).mean())
+
+
+Light = AreaLight | PointLight | SpotLight | Sun | Sky
