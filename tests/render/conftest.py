@@ -1,32 +1,50 @@
 """Scenes small enough to light in a test, and a hall of chequers whose corners' places are known."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from vobench.geometry import se3
-from vobench.geometry.camera import Pinhole
+from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
 from vobench.render.bake import BakedScene
-from vobench.render.geometry import all_surfaces
+from vobench.render.geometry import inventory
 from vobench.render.lightmap import layout
 from vobench.render.raster import RasterRenderer
-from vobench.render.renderer import Radiance
-from vobench.scene.scene import Scene, Surface, room
-from vobench.scene.texture import Texture, reflectance
+from vobench.render.renderer import Radiance, still
+from vobench.scene.light import STEADY, Level, PointLight
+from vobench.scene.material import Matt, Polished, texture_of, under_coat
+from vobench.scene.scene import Scene
+from vobench.scene.surface import Surface, room
+from vobench.scene.texture import Map, Texture, reflectance
 
 EvenLight = Callable[..., BakedScene]
 Draw = Callable[[BakedScene], RasterRenderer]
 
 
-def light_evenly(scene: Scene, *, illuminance_lx: float = 100.0) -> BakedScene:
-    """A scene under the same illuminance everywhere, without a bake."""
-    where = layout(all_surfaces(scene), spacing_m=1.0)
-    light = np.full((where.height, where.width), illuminance_lx, np.float32)
-    return BakedScene(scene, where, light, {name: reflectance(t) for name, t in scene.textures.items()})
+def light_evenly(scene: Scene, *, illuminance_lx: float = 100.0, level: Level = STEADY) -> BakedScene:
+    """A scene under the same illuminance everywhere, without a bake, from a lamp that is too weak to count."""
+    lamp = PointLight("even", np.zeros(3), 1e-12, level)
+    lit = replace(scene, lights=(lamp, *scene.lights))
+    surfaces = inventory(lit).surfaces
+    where = layout(surfaces, spacing_m=1.0)
+    light = np.zeros((len(lit.lights), where.height, where.width), np.float32)
+    light[0] = illuminance_lx
+    return BakedScene(lit, where, light, {name: tile for name in scene.materials for tile in _tiles(scene, name)})
+
+
+def _tiles(scene: Scene, name: str) -> list[Map]:
+    material = scene.materials[name]
+    texture = texture_of(material)
+    if texture is None:
+        return []
+    tile = reflectance(texture)
+    return [under_coat(tile, material.eta).astype(np.float32) if isinstance(material, Polished) else tile]
 
 
 @pytest.fixture(scope="session")
@@ -69,13 +87,16 @@ class Hall:
     renderer: RasterRenderer
     lattices: tuple[Lattice, ...]
 
-    def corners(self, camera: Pinhole, T_world_camera: Array, *, apart_px: float = 50) -> list[tuple[Lattice, Array]]:
+    def picture(self, camera: Camera, T_world_camera: Array) -> Radiance:
+        return self.renderer.radiance(camera, still(camera, T_world_camera))
+
+    def corners(self, camera: Camera, T_world_camera: Array, *, apart_px: float = 50) -> list[tuple[Lattice, Array]]:
         """Per surface the corners' pixels (M, 2) by K and the pose: those well inside, with room around, not askew."""
         T_camera_world = se3.inverse(T_world_camera)
         return [(lattice, _in_sight(camera, T_camera_world, lattice, apart_px)) for lattice in self.lattices]
 
 
-def _in_sight(camera: Pinhole, T_camera_world: Array, lattice: Lattice, apart_px: float) -> Array:
+def _in_sight(camera: Camera, T_camera_world: Array, lattice: Lattice, apart_px: float) -> Array:
     def pixels(points_m: Array) -> Array:
         return camera.project(se3.apply(T_camera_world, points_m))
 
@@ -99,7 +120,7 @@ def _lattice(surface: Surface, square_m: float) -> Lattice:
 def hall(draw: Draw) -> Hall:
     fine, coarse = Texture("checker", 0.5, 0.8, 0.8, 512, 0), Texture("checker", 0.5, 0.8, 3.2, 1024, 0)
     surfaces = tuple(room((8, 8, 3), floor="fine", wall="coarse", ceiling="coarse"))
-    scene = Scene("hall", surfaces, {"fine": fine, "coarse": coarse}, ())
+    scene = Scene("hall", surfaces, {"fine": Matt(fine), "coarse": Matt(coarse)}, ())
     lattices = tuple(_lattice(s, 0.1 if s.material == "fine" else 0.4) for s in surfaces)
     return Hall(draw(light_evenly(scene)), lattices)
 
@@ -115,3 +136,49 @@ def find_corners(picture: Radiance, near_px: Array) -> Array:
 @pytest.fixture(scope="session")
 def corner_finder() -> Callable[[Radiance, Array], Array]:
     return find_corners
+
+
+LIMIT_PX = 0.05
+
+
+def check(error_px: Array, *, at_least: int) -> None:
+    """Points where they should be; `pytest -rP` shows the figures."""
+    distance = np.linalg.norm(error_px, axis=1)
+    figures = {"mean": distance.mean(), "95th percentile": np.percentile(distance, 95), "max": distance.max()}
+    print(", ".join(f"{name} {value:.4f} px" for name, value in figures.items()))
+    assert len(distance) >= at_least
+    assert distance.mean() <= 0.01, figures
+    assert figures["95th percentile"] < LIMIT_PX, figures
+    assert figures["max"] < 2 * LIMIT_PX, figures
+
+
+def exact_window(camera: Camera, T_world_camera: Array, lattice: Any, middle: Array, half: int) -> Array:
+    """Reflectance of a chequered plane in the pixels around `middle`, each the mean over 8 × 8 cells of it.
+
+    The point in each cell is drawn anew in every pixel: on a regular grid, edges along it would err together.
+    """
+    steps, cells = np.arange(-half, half + 1), (np.arange(8) + 0.5) / 8 - 0.5
+    centres = middle + np.stack(np.meshgrid(steps, steps), -1)
+    points = np.stack(np.meshgrid(cells, cells), -1).reshape(-1, 2)
+    jitter = np.random.default_rng(0).uniform(-1 / 16, 1 / 16, (*centres.shape[:2], 64, 2))
+    rays = camera.rays(centres[..., None, :] + points + jitter) @ T_world_camera[:3, :3].T
+    surface, origin = lattice.surface, T_world_camera[:3, 3]
+    distance = (surface.corner_m - origin) @ surface.normal / (rays @ surface.normal)
+    on_plane = origin + distance[..., None] * rays - surface.corner_m
+    squares = sum(np.floor(on_plane @ step / lattice.square_m**2) for step in lattice.steps_m)
+    return np.where(squares % 2 == 1, 0.9, 0.1).mean(-1)
+
+
+def shift_px(seen: Array, exact: Array) -> Array:
+    """How far `seen` lies right of and below `exact`: one least-squares step, gain and offset free."""
+    seen, exact = (cv2.GaussianBlur(window.astype(float), (0, 0), 2.0)[4:-4, 4:-4] for window in (seen, exact))
+    down, right = np.gradient(exact)
+    columns = np.stack([right.ravel(), down.ravel(), exact.ravel(), np.ones(exact.size)], -1)
+    fit = np.linalg.lstsq(columns, seen.ravel(), rcond=None)[0]
+    return -fit[:2] / fit[2]
+
+
+@pytest.fixture(scope="session")
+def measure() -> SimpleNamespace:
+    """How far a picture lies from where geometry alone puts it."""
+    return SimpleNamespace(LIMIT_PX=LIMIT_PX, check=check, exact_window=exact_window, shift_px=shift_px)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vobench.render.lightmap import ATLAS_WIDTH, layout
-from vobench.scene.scene import box, room
+from vobench.scene.surface import box, room
 
 SURFACES = [
     *room((10, 7, 3), floor="a", wall="a", ceiling="a"),

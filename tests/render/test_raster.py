@@ -5,20 +5,29 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vobench.geometry.camera import Pinhole
+from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.rig import LENSES, looking
+from vobench.geometry.se3 import Array
 from vobench.render.bake import BakedScene, BakeSettings, bake
+from vobench.render.geometry import RayCaster
 from vobench.render.raster import RasterRenderer
-from vobench.scene.scene import Scene, box, ceiling_light, rectangle, room
+from vobench.render.renderer import Radiance, still
+from vobench.scene.material import Matt
+from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.surface import box, rectangle, room
 from vobench.scene.texture import Texture
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 DOWN, AHEAD = looking(pitch_deg=90, position_m=(0.2, 0.1, 0.4)), looking(pitch_deg=20, position_m=(0.2, 0.1, 0.4))
 LAMP = ceiling_light("lamp", np.array([0.5, 0.2, 2.4]), (0.5, 0.3), power_lm=2000)
-TEXTURES = {
-    "plain": Texture("plain", 0.5, 0.0, 1.0, 8, 0),
-    "busy": Texture("terrazzo", 0.5, 0.6, 1.0, 512, 1),
+MATERIALS = {
+    "plain": Matt(Texture("plain", 0.5, 0.0, 1.0, 8, 0)),
+    "busy": Matt(Texture("terrazzo", 0.5, 0.6, 1.0, 512, 1)),
 }
+
+
+def snap(renderer: RasterRenderer, camera: Camera, T_world_camera: Array) -> Radiance:
+    return renderer.radiance(camera, still(camera, T_world_camera))
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +38,7 @@ def furnished() -> BakedScene:
         *box(np.array([1.2, -0.3, 0.3]), (0.5, 0.4, 0.6), yaw_deg=20, material="busy"),
     )
     settings = BakeSettings(spacing_m=0.1, light_rays=4, indirect_spacing_m=0.3, indirect_rays=16)
-    return bake(Scene("furnished", surfaces, TEXTURES, (LAMP,)), settings)
+    return bake(Scene("furnished", surfaces, MATERIALS, (LAMP,)), settings)
 
 
 @pytest.fixture(scope="module")
@@ -39,35 +48,35 @@ def renderer(furnished: BakedScene, draw: Any) -> RasterRenderer:
 
 
 def test_the_same_picture_twice_is_the_same_bytes(renderer: RasterRenderer) -> None:
-    assert renderer.radiance(CAMERA, AHEAD).tobytes() == renderer.radiance(CAMERA, AHEAD).tobytes()
+    assert snap(renderer, CAMERA, AHEAD).tobytes() == snap(renderer, CAMERA, AHEAD).tobytes()
 
 
 def test_a_picture_does_not_depend_on_what_was_drawn_before(renderer: RasterRenderer) -> None:
-    first, second = renderer.radiance(CAMERA, DOWN), renderer.radiance(CAMERA, AHEAD)
-    large = renderer.radiance(LENSES["paper_literal"], DOWN)
-    assert renderer.radiance(CAMERA, AHEAD).tobytes() == second.tobytes()
-    assert renderer.radiance(LENSES["paper_literal"], DOWN).tobytes() == large.tobytes()
-    assert renderer.radiance(CAMERA, DOWN).tobytes() == first.tobytes()
+    first, second = snap(renderer, CAMERA, DOWN), snap(renderer, CAMERA, AHEAD)
+    large = snap(renderer, LENSES["paper_literal"], DOWN)
+    assert snap(renderer, CAMERA, AHEAD).tobytes() == second.tobytes()
+    assert snap(renderer, LENSES["paper_literal"], DOWN).tobytes() == large.tobytes()
+    assert snap(renderer, CAMERA, DOWN).tobytes() == first.tobytes()
 
 
 def test_a_picture_is_its_own_array_that_others_can_work_on(renderer: RasterRenderer) -> None:
-    picture = renderer.radiance(CAMERA, DOWN)
+    picture = snap(renderer, CAMERA, DOWN)
     assert (picture.shape, picture.dtype) == ((120, 180), np.float32)
     assert picture.flags.c_contiguous
     before = picture.copy()
-    renderer.radiance(CAMERA, AHEAD)
+    snap(renderer, CAMERA, AHEAD)
     np.testing.assert_array_equal(picture, before)
 
 
 def test_renderers_live_side_by_side_and_one_outlives_the_others(furnished: BakedScene) -> None:
     first, second = RasterRenderer(furnished), RasterRenderer(furnished)
-    expected = first.radiance(CAMERA, AHEAD).tobytes()
-    assert second.radiance(CAMERA, AHEAD).tobytes() == expected
+    expected = snap(first, CAMERA, AHEAD).tobytes()
+    assert snap(second, CAMERA, AHEAD).tobytes() == expected
     first.close()
-    assert second.radiance(CAMERA, AHEAD).tobytes() == expected
+    assert snap(second, CAMERA, AHEAD).tobytes() == expected
     second.close()
     third = RasterRenderer(furnished)
-    assert third.radiance(CAMERA, AHEAD).tobytes() == expected
+    assert snap(third, CAMERA, AHEAD).tobytes() == expected
     third.close()
 
 
@@ -75,8 +84,9 @@ def test_luminance_of_a_plain_floor_is_reflectance_times_illuminance_over_pi(dra
     floor = rectangle(np.zeros(3), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]), "plain")
     lamp = ceiling_light("lamp", np.array([0.3, -0.2, 2.0]), (0.04, 0.04), power_lm=1000)
     settings = BakeSettings(spacing_m=0.02, light_rays=16, indirect_spacing_m=1.0, indirect_rays=1, bounces=0)
-    picture = draw(bake(Scene("floor", (floor,), TEXTURES, (lamp,)), settings)).radiance(CAMERA, DOWN)
-    x, y, _ = np.moveaxis(DOWN[:3, 3] + 0.4 * CAMERA.rays(CAMERA.pixel_grid()) @ DOWN[:3, :3].T, -1, 0)
+    picture = snap(draw(bake(Scene("floor", (floor,), MATERIALS, (lamp,)), settings)), CAMERA, DOWN)
+    rays = CAMERA.rays(CAMERA.pixel_grid())
+    x, y, _ = np.moveaxis(DOWN[:3, 3] + 0.4 * rays / rays[..., 2:] @ DOWN[:3, :3].T, -1, 0)
     squared = (x - 0.3) ** 2 + (y + 0.2) ** 2 + 4.0
     np.testing.assert_allclose(picture, 0.5 / np.pi * 1000 / np.pi * 4.0 / squared**2, rtol=0.01)
 
@@ -85,23 +95,22 @@ def test_luminance_of_a_plain_floor_is_reflectance_times_illuminance_over_pi(dra
 def test_luminance_is_linear_from_moonlight_to_beyond_the_sun(
     draw: Any, even_light: Any, illuminance_lx: float
 ) -> None:
-    scene = Scene("room", tuple(room((4, 4, 2), floor="plain", wall="plain", ceiling="plain")), TEXTURES, ())
-    picture = draw(even_light(scene, illuminance_lx=illuminance_lx)).radiance(CAMERA, AHEAD)
+    scene = Scene("room", tuple(room((4, 4, 2), floor="plain", wall="plain", ceiling="plain")), MATERIALS, ())
+    picture = snap(draw(even_light(scene, illuminance_lx=illuminance_lx)), CAMERA, AHEAD)
     np.testing.assert_allclose(picture, 0.5 * illuminance_lx / np.pi, rtol=2e-5)
 
 
 def test_twice_the_light_is_exactly_twice_the_picture(draw: Any, even_light: Any) -> None:
     surfaces = tuple(room((4, 4, 2), floor="busy", wall="busy", ceiling="plain"))
-    scene = Scene("room", surfaces, TEXTURES, ())
-    once, twice = (draw(even_light(scene, illuminance_lx=lx)).radiance(CAMERA, AHEAD) for lx in (70.0, 140.0))
+    scene = Scene("room", surfaces, MATERIALS, ())
+    once, twice = (snap(draw(even_light(scene, illuminance_lx=lx)), CAMERA, AHEAD) for lx in (70.0, 140.0))
     np.testing.assert_array_equal(twice, 2 * once)
 
 
 def test_a_far_texture_fades_to_its_mean_and_keeps_its_brightness(draw: Any, even_light: Any) -> None:
     board = rectangle(np.array([40.0, 0, 0]), np.array([0, -60.0, 0]), np.array([0, 0, 40.0]), "busy")
-    picture = draw(even_light(Scene("board", (board,), TEXTURES, ()), illuminance_lx=np.pi)).radiance(
-        CAMERA, looking(pitch_deg=0, position_m=(0, 0, 0))
-    )
+    renderer = draw(even_light(Scene("board", (board,), MATERIALS, ()), illuminance_lx=np.pi))
+    picture = snap(renderer, CAMERA, looking(pitch_deg=0, position_m=(0, 0, 0)))
     assert picture.mean() == pytest.approx(0.5, rel=0.003)
     assert picture.std() < 0.03
 
@@ -109,27 +118,36 @@ def test_a_far_texture_fades_to_its_mean_and_keeps_its_brightness(draw: Any, eve
 def test_a_lamp_in_view_shows_its_luminance_and_its_back_is_not_there(renderer: RasterRenderer) -> None:
     lamp = LAMP.luminance_cd_m2
     up = looking(pitch_deg=-90, position_m=(0.5, 0.2, 1.5))
-    assert renderer.radiance(CAMERA, up)[60, 90] == pytest.approx(lamp, rel=1e-5)
+    assert snap(renderer, CAMERA, up)[60, 90] == pytest.approx(lamp, rel=1e-5)
     from_above = looking(pitch_deg=90, position_m=(0.5, 0.2, 2.49))
-    assert renderer.radiance(CAMERA, from_above)[60, 90] < lamp / 10
+    assert snap(renderer, CAMERA, from_above)[60, 90] < lamp / 10
 
 
-def test_where_nothing_is_the_picture_is_black_and_depth_is_not_a_number(draw: Any, even_light: Any) -> None:
+def hit_distance(scene: Scene, T_world_camera: Array) -> Array:
+    """Distance (H, W) in metres along the rays through the pixels' centres; NaN where nothing is."""
+    rays = CAMERA.rays(CAMERA.pixel_grid()).reshape(-1, 3) @ T_world_camera[:3, :3].T
+    caster = RayCaster(scene.surfaces, np.arange(len(scene.surfaces)))
+    hits = caster.hits(np.broadcast_to(T_world_camera[:3, 3], rays.shape), rays)
+    return hits.distance.reshape(CAMERA.height_px, CAMERA.width_px)
+
+
+def test_where_nothing_is_the_picture_is_black(draw: Any, even_light: Any) -> None:
     floor = rectangle(np.zeros(3), np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), "plain")
-    renderer = draw(even_light(Scene("floor", (floor,), TEXTURES, ()), illuminance_lx=np.pi))
-    picture, depth = (method(CAMERA, AHEAD) for method in (renderer.radiance, renderer.depth))
+    scene = Scene("floor", (floor,), MATERIALS, ())
+    picture = snap(draw(even_light(scene, illuminance_lx=np.pi)), CAMERA, AHEAD)
     assert picture[0, 90] == 0
-    assert np.isnan(depth[0, 90])
-    assert ((picture > 0) == np.isfinite(depth)).mean() > 0.99
+    assert ((picture > 0) == np.isfinite(hit_distance(scene, AHEAD))).mean() > 0.99
 
 
-def test_depth_and_picture_agree_on_where_the_crate_is(draw: Any, even_light: Any) -> None:
-    textures = {"dark": Texture("plain", 0.1, 0, 1, 8, 0), "bright": Texture("plain", 0.9, 0, 1, 8, 0)}
+def test_rays_and_picture_agree_on_where_the_crate_is(draw: Any, even_light: Any) -> None:
+    materials = {"dark": Matt(Texture("plain", 0.1, 0, 1, 8, 0)), "bright": Matt(Texture("plain", 0.9, 0, 1, 8, 0))}
     crate = box(np.array([1.5, 0.1, 0.4]), (0.5, 0.5, 0.5), yaw_deg=30, material="bright")
     surfaces = (*room((20, 20, 20), floor="dark", wall="dark", ceiling="dark"), *crate)
-    renderer = draw(even_light(Scene("crate", surfaces, textures, ()), illuminance_lx=np.pi))
+    scene = Scene("crate", surfaces, materials, ())
     view = looking(pitch_deg=0, position_m=(0, 0, 0.4))
-    picture, depth = renderer.radiance(CAMERA, view)[:75], renderer.depth(CAMERA, view)[:75]  # above the near floor
+    # Above the near floor, which is as near as the crate.
+    picture = snap(draw(even_light(scene, illuminance_lx=np.pi)), CAMERA, view)[:75]
+    distance = hit_distance(scene, view)[:75]
     whole = (picture < 0.11) | (picture > 0.89)  # pixels without an edge in them
-    np.testing.assert_array_equal(picture[whole] > 0.5, depth[whole] < 2.5)
+    np.testing.assert_array_equal(picture[whole] > 0.5, distance[whole] < 2.5)
     assert (picture[whole] > 0.5).sum() > 1000

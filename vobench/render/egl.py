@@ -30,8 +30,14 @@ def context() -> Any:
     try:
         from pyrender.platforms.egl import EGLPlatform
 
+        class Platform(EGLPlatform):  # type: ignore[misc]
+            """One that, forgotten, does not end the display that all contexts of a process share."""
+
+            def __del__(self) -> None:
+                """Nothing: see `release`."""
+
         # The size matters to windows only; we draw into framebuffers of our own.
-        platform = EGLPlatform(1, 1)
+        platform = Platform(1, 1)
         platform.init_context()
         platform.make_current()
     except Exception as error:  # PyOpenGL fails with whatever it trips over first

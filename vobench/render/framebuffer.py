@@ -1,123 +1,157 @@
-"""Where pyrender's drawing lands: a supersampled float framebuffer, averaged and read back as light.
+"""Where drawing lands: layers of float samples, their mean summed over sub-frames, and the way back to numpy.
 
-This module subclasses pyrender's Renderer and Texture and overrides their private hooks, because
-pyrender 0.1.45 offers no public way to choose a framebuffer's format or a texture's.
+Each layer of a `Canvas` is the whole picture with one sample a pixel, and each layer's viewport is shifted by a part
+of a pixel: supersampling on any grid, a strip of rows is one scissor box, and a mirror's picture has the same samples.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
-if not hasattr(np, "infty"):
-    setattr(np, "infty", np.inf)  # noqa: B010 - pyrender 0.1.45 still says infty, numpy 2 has none
-
 from OpenGL import GL
-from pyrender import RenderFlags
-from pyrender.renderer import Renderer
-from pyrender.shader_program import ShaderProgramCache
-from pyrender.texture import Texture
 
+from vobench.errors import RenderError
+from vobench.render.mirror import Box
 from vobench.render.renderer import Radiance
 
-FLAGS = RenderFlags.FLAT | RenderFlags.OFFSCREEN
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Where in a pixel samples lie, one a layer, and by how many mipmap levels finer than OpenGL's choice they look."""
+
+    points: tuple[tuple[float, float], ...]
+    lod_bias: float
 
 
-class FloatTexture(Texture):  # type: ignore[misc]
-    """A (H, W) float32 map without mipmaps, row 0 at v = 0."""
-
-    def __init__(self, values: Radiance) -> None:
-        super().__init__(source=None, source_channels="R", width=values.shape[1], height=values.shape[0])
-        self._values = values
-
-    def _add_to_context(self) -> None:
-        self._texid = _texture(GL.GL_R32F, self._values, GL.GL_FLOAT)
-        _texture_parameters(GL.GL_LINEAR, GL.GL_CLAMP_TO_EDGE)
+# Four rows and four columns: an edge along either is placed to an eighth of a pixel.
+TURNED = Grid(((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)), -2)
+# The same in two halves, each even about the centre, for sub-frames by turns.
+HALVES = (Grid((TURNED.points[0], TURNED.points[3]), -2), Grid((TURNED.points[1], TURNED.points[2]), -2))
+# For pictures of twice as many pixels each way.
+CENTRE = Grid(((0.5, 0.5),), -1)
 
 
-class ReflectanceTexture(Texture):  # type: ignore[misc]
-    """A (N, N) float32 tile in [0, 1] that repeats, with mipmaps; 16 bits, linear, row 0 at v = 0."""
+@dataclass(frozen=True, slots=True)
+class Canvas:
+    """A framebuffer with one layer a sample: one float channel and depth, as textures."""
 
-    def __init__(self, values: Radiance) -> None:
-        super().__init__(source=None, source_channels="R", width=values.shape[1], height=values.shape[0])
-        self._values = values
+    width_px: int
+    height_px: int
+    grid: Grid
+    framebuffer: Any
+    colour: Any
+    depth: Any
 
-    def _add_to_context(self) -> None:
-        # Eight bits would make steps of 2 % where a surface reflects 20 %.
-        counts = np.rint(self._values * 65535).astype(np.uint16)
-        self._texid = _texture(GL.GL_R16, counts, GL.GL_UNSIGNED_SHORT)
-        GL.glGenerateMipmap(GL.GL_TEXTURE_2D)
-        _texture_parameters(GL.GL_LINEAR_MIPMAP_LINEAR, GL.GL_REPEAT)
+    @property
+    def layers(self) -> int:
+        """How many samples a pixel has."""
+        return len(self.grid.points)
 
+    def begin(self, box: Box) -> None:
+        """Draw here from now on, within a box of the picture."""
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.framebuffer)
+        for index, (x, y) in enumerate(self.grid.points):
+            GL.glViewportIndexedf(index, 0.5 - x, 0.5 - y, self.width_px, self.height_px)
+        u0, u1, v0, v1 = box
+        GL.glScissor(u0, self.height_px - v1, u1 - u0, v1 - v0)
 
-def _texture(internal: int, values: np.ndarray[Any, Any], kind: int) -> Any:
-    texture = GL.glGenTextures(1)
-    GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
-    GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
-    rows, columns = values.shape
-    GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, columns, rows, 0, GL.GL_RED, kind, np.ascontiguousarray(values))
-    return texture
+    def clear(self, box: Box) -> None:
+        """Black and nothing near, within a box, in which to draw from now on."""
+        self.begin(box)
+        GL.glClear(GL.GL_COLOR_BUFFER_BIT | GL.GL_DEPTH_BUFFER_BIT)
 
+    @contextmanager
+    def mirrored(self) -> Iterator[None]:
+        """While drawing what a mirror shows: left and right swapped, and nothing from behind it."""
+        GL.glFrontFace(GL.GL_CW)
+        GL.glEnable(GL.GL_CLIP_DISTANCE0)
+        yield
+        GL.glDisable(GL.GL_CLIP_DISTANCE0)
+        GL.glFrontFace(GL.GL_CCW)
 
-def _texture_parameters(minify: int, wrap: int) -> None:
-    for key, value in (
-        (GL.GL_TEXTURE_MIN_FILTER, minify),
-        (GL.GL_TEXTURE_MAG_FILTER, GL.GL_LINEAR),
-        (GL.GL_TEXTURE_WRAP_S, wrap),
-        (GL.GL_TEXTURE_WRAP_T, wrap),
-    ):
-        GL.glTexParameteri(GL.GL_TEXTURE_2D, key, value)
-
-
-class LinearRenderer(Renderer):  # type: ignore[misc]
-    """pyrender's draw loop into a one-channel float framebuffer, several samples a pixel."""
-
-    def __init__(self, shader_dir: str, *, supersampling: int) -> None:
-        super().__init__(1, 1)
-        self._program_cache = ShaderProgramCache(shader_dir=shader_dir)
-        self._supersampling = supersampling
-        self._main_fb_dims: tuple[int | None, int | None] = (None, None)
-
-    def picture(self, scene: Any, *, width: int, height: int) -> Radiance:
-        """Draw the scene; (height, width) float32, top row first."""
-        self.viewport_width, self.viewport_height = width * self._supersampling, height * self._supersampling
-        picture: Radiance = self.render(scene, FLAGS)
-        return picture
-
-    def _configure_main_framebuffer(self) -> None:
-        size = (self.viewport_width, self.viewport_height)
-        if self._main_fb_dims == size:
-            return
-        self._delete_main_framebuffer()
-        small = (size[0] // self._supersampling, size[1] // self._supersampling)
-        self._main_fb_ms, self._main_cb_ms, self._main_db_ms = _framebuffer(*size)
-        self._main_fb, self._main_cb, self._main_db = _framebuffer(*small)
-        self._main_fb_dims = size
-
-    def _read_main_framebuffer(self, scene: Any, flags: int) -> Radiance:
-        del scene, flags
-        width, height = self.viewport_width, self.viewport_height
-        small = (width // self._supersampling, height // self._supersampling)
-        GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._main_fb_ms)
-        GL.glBindFramebuffer(GL.GL_DRAW_FRAMEBUFFER, self._main_fb)
-        # Halving with linear filtering reads amid each four samples: their exact mean.
-        GL.glBlitFramebuffer(0, 0, width, height, 0, 0, *small, GL.GL_COLOR_BUFFER_BIT, GL.GL_LINEAR)
-        GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._main_fb)
-        GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 1)
-        buffer = GL.glReadPixels(0, 0, *small, GL.GL_RED, GL.GL_FLOAT)
-        # OpenGL's first row is the lowest; a copy, as OpenCV takes no array that runs backwards.
-        return np.ascontiguousarray(np.frombuffer(buffer, np.float32).reshape(small[1], small[0])[::-1])
+    def delete(self) -> None:
+        """Free it on the graphics side."""
+        GL.glDeleteFramebuffers(1, [self.framebuffer])
+        GL.glDeleteTextures([self.colour, self.depth])
 
 
-def _framebuffer(width: int, height: int) -> tuple[Any, Any, Any]:
-    """A framebuffer of one float channel with depth: its name and those of its two buffers."""
-    colour, depth = GL.glGenRenderbuffers(2)
+def canvas(width_px: int, height_px: int, grid: Grid) -> Canvas:
+    """A canvas of some size. Raises RenderError where the driver has no room or form for it."""
     framebuffer = GL.glGenFramebuffers(1)
     GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
-    for buffer, form, attachment in (
-        (colour, GL.GL_R32F, GL.GL_COLOR_ATTACHMENT0),
-        (depth, GL.GL_DEPTH_COMPONENT24, GL.GL_DEPTH_ATTACHMENT),
+    names = []
+    for attachment, internal, form in (
+        (GL.GL_COLOR_ATTACHMENT0, GL.GL_R32F, GL.GL_RED),
+        (GL.GL_DEPTH_ATTACHMENT, GL.GL_DEPTH_COMPONENT32F, GL.GL_DEPTH_COMPONENT),
     ):
-        GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, buffer)
-        GL.glRenderbufferStorage(GL.GL_RENDERBUFFER, form, width, height)
-        GL.glFramebufferRenderbuffer(GL.GL_FRAMEBUFFER, attachment, GL.GL_RENDERBUFFER, buffer)
-    return framebuffer, colour, depth
+        names.append(GL.glGenTextures(1))
+        GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, names[-1])
+        size = (width_px, height_px, len(grid.points))
+        GL.glTexImage3D(GL.GL_TEXTURE_2D_ARRAY, 0, internal, *size, 0, form, GL.GL_FLOAT, None)
+        for filtering in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):
+            GL.glTexParameteri(GL.GL_TEXTURE_2D_ARRAY, filtering, GL.GL_NEAREST)
+        GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, attachment, names[-1], 0)
+    _require_complete(width_px, height_px)
+    return Canvas(width_px, height_px, grid, framebuffer, *names)
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """A picture of one float channel to which means of canvases are added."""
+
+    width_px: int
+    height_px: int
+    framebuffer: Any
+    colour: Any
+
+    def begin(self, box: Box) -> None:
+        """Draw here from now on, within a box of the picture."""
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.framebuffer)
+        GL.glViewport(0, 0, self.width_px, self.height_px)
+        u0, u1, v0, v1 = box
+        GL.glScissor(u0, self.height_px - v1, u1 - u0, v1 - v0)
+
+    def clear(self, box: Box, value: float = 0.0) -> None:
+        """One value all over a box."""
+        self.begin(box)
+        GL.glClearBufferfv(GL.GL_COLOR, 0, [value, 0.0, 0.0, 0.0])
+
+    def read(self, box: Box) -> Radiance:
+        """A box of the picture (rows, columns) float32, top row first; an array of its own."""
+        u0, u1, v0, v1 = box
+        GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self.framebuffer)
+        GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 1)
+        buffer = GL.glReadPixels(u0, self.height_px - v1, u1 - u0, v1 - v0, GL.GL_RED, GL.GL_FLOAT)
+        # OpenGL's first row is the lowest; a copy, as OpenCV takes no array that runs backwards.
+        return np.ascontiguousarray(np.frombuffer(buffer, np.float32).reshape(v1 - v0, u1 - u0)[::-1])
+
+    def delete(self) -> None:
+        """Free it on the graphics side."""
+        GL.glDeleteFramebuffers(1, [self.framebuffer])
+        GL.glDeleteTextures([self.colour])
+
+
+def summed(width_px: int, height_px: int) -> Sum:
+    """A sum of some size. Raises RenderError where the driver has no room or form for it."""
+    return Sum(width_px, height_px, *flat(width_px, height_px, GL.GL_R32F, GL.GL_RED))
+
+
+def flat(width_px: int, height_px: int, internal: Any, form: Any) -> tuple[Any, Any]:
+    """A framebuffer of float channels without depth, and its texture."""
+    framebuffer, colour = GL.glGenFramebuffers(1), GL.glGenTextures(1)
+    GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
+    GL.glBindTexture(GL.GL_TEXTURE_2D, colour)
+    GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, width_px, height_px, 0, form, GL.GL_FLOAT, None)
+    for filtering in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):
+        GL.glTexParameteri(GL.GL_TEXTURE_2D, filtering, GL.GL_NEAREST)
+    GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, colour, 0)
+    _require_complete(width_px, height_px)
+    return framebuffer, colour
+
+
+def _require_complete(width_px: int, height_px: int) -> None:
+    status = GL.glCheckFramebufferStatus(GL.GL_FRAMEBUFFER)
+    if status != GL.GL_FRAMEBUFFER_COMPLETE:
+        raise RenderError(f"OpenGL has no float framebuffer of {width_px} x {height_px} pixels (status {status:#x})")

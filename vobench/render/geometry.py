@@ -1,25 +1,51 @@
 """A scene as triangles and rays: what blocks what, and how far away it is."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from embreex import mesh_construction, rtcore_scene
 from numpy.typing import ArrayLike, NDArray
 
-from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
-from vobench.scene.scene import Scene, Surface
+from vobench.scene.material import Glass
+from vobench.scene.scene import Scene
+from vobench.scene.surface import Surface
 
-Floats = NDArray[np.float32]
+Floats = NDArray[Any]  # float32 where there are many, float64 inside formulas
 Indices = NDArray[np.int32]
 
 # Rays start this far off their surface; float32 resolves 1e-6 m at 10 m.
 RAY_OFFSET_M = 1e-4
 
 
-def all_surfaces(scene: Scene) -> list[Surface]:
-    """Every rectangle that can be seen, the lights' panels last."""
-    return [*scene.surfaces, *(light.surface for light in scene.lights)]
+@dataclass(frozen=True, slots=True)
+class Inventory:
+    """Every rectangle of a scene in one order: what stands still, the lights' panels, what moves.
+
+    surfaces are where they are at one instant; mover (S,) is the index of the mover a surface belongs to, -1 for
+    none; panel (S,) the index among scene.panels, -1 for none; pane (S,) whether it is glass.
+    """
+
+    surfaces: tuple[Surface, ...]
+    mover: Indices
+    panel: Indices
+    pane: NDArray[np.bool_]
+
+
+def inventory(scene: Scene, *, t_ns: float = 0) -> Inventory:
+    """All rectangles of a scene, the movers' where they are at t_ns; the order never changes."""
+    surfaces, mover, panel = list(scene.surfaces), [-1] * len(scene.surfaces), [-1] * len(scene.surfaces)
+    for index, light in enumerate(scene.panels):
+        surfaces, mover, panel = [*surfaces, light.surface], [*mover, -1], [*panel, index]
+    for index, thing in enumerate(scene.movers):
+        T_world_mover = thing.path.pose(t_ns)
+        surfaces += [surface.moved(T_world_mover) for surface in thing.surfaces]
+        mover += [index] * len(thing.surfaces)
+        panel += [-1] * len(thing.surfaces)
+    pane = [isinstance(scene.materials.get(s.material), Glass) for s in surfaces]
+    return Inventory(tuple(surfaces), np.array(mover, np.int32), np.array(panel, np.int32), np.array(pane, bool))
 
 
 def corners(surface: Surface) -> Array:
@@ -29,54 +55,76 @@ def corners(surface: Surface) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
+class Ball:
+    """A sphere around something: centre (..., 3) and radius (...)."""
+
+    centre_m: Array
+    radius_m: Any
+
+
+def ball(surfaces: Sequence[Surface]) -> Ball:
+    """Around the corners of them all."""
+    points = np.concatenate([corners(s) for s in surfaces])
+    centre = (points.min(0) + points.max(0)) / 2
+    return Ball(centre, float(np.linalg.norm(points - centre, axis=1).max()))
+
+
+@dataclass(frozen=True, slots=True)
 class Hits:
-    """Where rays end: surface (R,) int32, -1 for none; u, v (R,) fractions of its edges."""
+    """Where rays end: surface (R,) int32, -1 for none; u, v (R,) fractions of its edges.
+
+    distance (R,) is in lengths of the ray's direction, NaN for none.
+    """
 
     surface: Indices
     u: Floats
     v: Floats
+    distance: Floats
 
 
 class RayCaster:
-    """Rays against a scene, with Embree; two triangles a rectangle."""
+    """Rays against some of the surfaces of a list, with Embree; two triangles a rectangle.
 
-    def __init__(self, scene: Scene) -> None:
-        quads = np.stack([corners(s) for s in all_surfaces(scene)]).astype(np.float32)
-        triangles = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
+    `among` (K,) says which; hits name surfaces by their place in the whole list.
+    """
+
+    def __init__(self, surfaces: Sequence[Surface], among: ArrayLike) -> None:
+        self._among = np.asarray(among, np.int32)
+        quads = [corners(surfaces[i]) for i in self._among]
+        # A scene without triangles would make Embree fail; one beyond everything is never hit.
+        quads = quads or [np.full((4, 3), 1e7)]
+        triangles = np.stack(quads).astype(np.float32)[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
         self._scene = rtcore_scene.EmbreeScene()
         self._mesh = mesh_construction.TriangleMesh(self._scene, np.ascontiguousarray(triangles))
 
     def occluded(self, origins_m: ArrayLike, targets_m: ArrayLike) -> NDArray[np.bool_]:
         """Whether anything stands between each of (R, 3) origins and its target (R, 3)."""
         way = np.asarray(targets_m) - np.asarray(origins_m)
-        blocked: NDArray[np.int32] = self._scene.run(*_rays(origins_m, way, reach=1 - 1e-3), query="OCCLUDED")
-        return blocked >= 0
+        blocked = np.asarray(self._scene.run(*_rays(origins_m, way, reach=1 - 1e-3), query="OCCLUDED"))
+        is_blocked: NDArray[np.bool_] = blocked >= 0
+        return is_blocked
+
+    def nearest(self, origins_m: ArrayLike, directions: ArrayLike) -> Indices:
+        """Which surface each ray (R, 3) meets first, -1 for none: `hits` for those who work out the rest."""
+        triangle: Indices = self._scene.run(*_rays(origins_m, directions, reach=1e8), query="INTERSECT")
+        if not len(self._among):
+            return np.full(len(triangle), -1, np.int32)
+        # The triangle -1 halves to -1, the added last place.
+        surface: Indices = np.append(self._among, np.int32(-1))[triangle >> 1]
+        return surface
 
     def hits(self, origins_m: ArrayLike, directions: ArrayLike) -> Hits:
         """The nearest surface along each ray (R, 3)."""
-        hit = self._nearest(origins_m, directions)
-        second = hit["primID"] % 2 == 1
+        rays = _rays(origins_m, directions, reach=1e8)
+        hit: dict[str, NDArray[np.float32]] = self._scene.run(*rays, query="INTERSECT", output=1)
+        missed, second = hit["primID"] < 0, hit["primID"] % 2 == 1
         # Embree's (u, v) weigh a triangle's second and third corner; ours run along the edges.
         a, b = hit["u"], hit["v"]
         u, v = np.where(second, a, a + b), np.where(second, a + b, b)
-        surface = np.where(hit["primID"] < 0, -1, hit["primID"] // 2).astype(np.int32)
-        return Hits(surface, u.astype(np.float32), v.astype(np.float32))
-
-    def distance(self, origins_m: ArrayLike, directions: ArrayLike) -> Floats:
-        """How many lengths of its direction each ray (R, 3) travels; NaN where it meets nothing."""
-        hit = self._nearest(origins_m, directions)
-        return np.where(hit["primID"] < 0, np.nan, hit["tfar"]).astype(np.float32)
-
-    def depth(self, camera: Pinhole, T_world_camera: Array) -> Floats:
-        """Depth (H, W) in metres along the optical axis at the pixels' centres."""
-        rays = camera.rays(camera.pixel_grid()).reshape(-1, 3) @ T_world_camera[:3, :3].T
-        origins = np.broadcast_to(T_world_camera[:3, 3], rays.shape)
-        return self.distance(origins, rays).reshape(camera.height_px, camera.width_px)
-
-    def _nearest(self, origins_m: ArrayLike, directions: ArrayLike) -> dict[str, NDArray[np.float32]]:
-        rays = _rays(origins_m, directions, reach=1e8)
-        hit: dict[str, NDArray[np.float32]] = self._scene.run(*rays, query="INTERSECT", output=1)
-        return hit
+        surface = np.full(len(a), -1, np.int32)
+        surface[~missed] = self._among[hit["primID"][~missed].astype(np.int32) // 2]
+        distance = np.where(missed, np.nan, hit["tfar"])
+        return Hits(surface, u.astype(np.float32), v.astype(np.float32), distance.astype(np.float32))
 
 
 def _rays(origins_m: ArrayLike, directions: ArrayLike, *, reach: float) -> tuple[Floats, Floats, Floats]:

@@ -1,25 +1,44 @@
 """What every renderer promises, whatever draws the picture."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.geometry.camera import Pinhole
+from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
 
 Radiance = NDArray[np.float32]
 Depth = NDArray[np.float32]
 
 
+@dataclass(frozen=True, slots=True)
+class View:
+    """Rows of a picture that are exposed together, and how: the mean of M equally long sub-frames.
+
+    Sub-frame m lasts from start_ns[m] to end_ns[m] (M,) int64; lights count with their mean over it,
+    the camera and movers stand where they are amid it: T_world_camera (M, 4, 4).
+    """
+
+    rows: slice
+    T_world_camera: Array
+    start_ns: NDArray[np.int64]
+    end_ns: NDArray[np.int64]
+
+
+def still(camera: Camera, T_world_camera: Array, *, t_ns: int = 0) -> tuple[View]:
+    """The whole picture at one instant."""
+    instant = np.array([t_ns], np.int64)
+    return (View(slice(0, camera.height_px), T_world_camera[None], instant, instant),)
+
+
 class Renderer(Protocol):
     """Pictures of one scene."""
 
-    def radiance(self, camera: Pinhole, T_world_camera: Array) -> Radiance:
-        """Luminance (H, W) in cd/m², linear and unclipped, averaged over each pixel's area."""
-
-    def depth(self, camera: Pinhole, T_world_camera: Array) -> Depth:
-        """Depth (H, W) in metres along the optical axis at each pixel's centre; NaN where nothing is."""
+    def radiance(self, camera: Camera, views: Sequence[View]) -> Radiance:
+        """Luminance (H, W) in cd/m², linear and unclipped, averaged over each pixel's area; views tile the rows."""
 
     def close(self) -> None:
         """Give back what the renderer holds."""

@@ -1,0 +1,110 @@
+"""What light costs: baking the built-in scenes from nothing, then each picture's share while things change.
+
+    python benchmarks/bake.py [--scenes room office] [--pictures 5]
+
+Wall clock and CPU over all threads; compare within a run only.
+"""
+
+import argparse
+import os
+import platform
+import resource
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from vobench.catalog import catalog, yaml_file
+from vobench.render.bake import BakedScene, BakeSettings, bake
+from vobench.render.illumination import Illumination
+from vobench.scene.light import Flicker, Sun
+from vobench.scene.material import Matt
+from vobench.scene.mover import Mover, Path
+from vobench.scene.scene import Scene
+from vobench.scene.surface import box
+from vobench.scene.texture import Texture
+from vobench.suite.scene_file import SceneFile, build
+
+NS_PER_PICTURE = 100_000_000
+
+
+def main() -> None:
+    """Bake, then change; print what it took."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", nargs="+", default=["room", "office"])
+    parser.add_argument("--pictures", type=int, default=5)
+    arguments = parser.parse_args()
+    print(f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    for name in arguments.scenes:
+        scene = build(yaml_file.read(catalog.find("scene", name).path, SceneFile), {})
+        baked = _baked(scene)
+        for change, light in _changes(baked):
+            print(f"{name}: {change}: {_milliseconds(light, arguments.pictures)}")
+
+
+def _baked(scene: Scene) -> BakedScene:
+    started, cpu_started = time.perf_counter(), time.process_time()
+    baked = bake(scene, BakeSettings())
+    wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
+    texels = sum(patch.rows * patch.columns for patch in baked.layout.patches)
+    gigabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    lights = f"{len(scene.lights)} lights, {texels} samples"
+    print(f"{scene.name}: {lights}, bake {wall_s:.1f} s wall, {cpu_s:.1f} s CPU, peak {gigabytes:.2f} GB")
+    return baked
+
+
+def _changes(baked: BakedScene) -> Iterator[tuple[str, Illumination]]:
+    """The scene with more and more that changes. The bake stays as it is: what is timed does not depend on it."""
+    scene = baked.scene
+    flicker = tuple(replace(light, level=Flicker(50, 0.2)) for light in scene.lights)
+    yield "steady", Illumination(baked)
+    one = (flicker[0], *scene.lights[1:])
+    yield "one light flickers", Illumination(replace(baked, scene=replace(scene, lights=one)))
+    yield "all lights flicker", Illumination(replace(baked, scene=replace(scene, lights=flicker)))
+    suns = [light for light in scene.lights if isinstance(light, Sun)]
+    for sun in suns:
+        moving = replace(
+            sun,
+            times_s=(0.0, 60.0),
+            azimuth_deg=(sun.azimuth_deg[0], sun.azimuth_deg[0] + 10),
+            elevation_deg=2 * sun.elevation_deg,
+        )
+        yield (
+            "the sun moves",
+            Illumination(
+                bake(
+                    replace(scene, lights=tuple(moving if light is sun else light for light in scene.lights)),
+                    replace(BakeSettings(), light_rays=1, bounces=1, indirect_rays=4),
+                )
+            ),
+        )
+    for count in (1, 3):
+        walkers = replace(scene, movers=tuple(_walker(i) for i in range(count)))
+        walkers = replace(walkers, materials={**scene.materials, "walker": WALKER})
+        quick = replace(BakeSettings(), light_rays=1, bounces=0, indirect_rays=1)
+        yield f"{count} movers as tall as people", Illumination(replace(bake(walkers, quick), settings=BakeSettings()))
+
+
+WALKER = Matt(Texture("plain", 0.4, 0.0, 1.0, 8, 0))
+
+
+def _walker(index: int) -> Mover:
+    body = box(np.array([0, 0, 0.9]), (0.5, 0.3, 1.8), yaw_deg=0, material="walker")
+    positions = np.array([[-1.5 + index, -1.0, 0.0], [-1.5 + index, 4.0, 0.0]])
+    return Mover(f"walker_{index}", tuple(body), Path(np.array([0.0, 5.0]), positions, np.array([0.0, 90.0])))
+
+
+def _milliseconds(light: Illumination, pictures: int) -> str:
+    """Median per picture after the first."""
+    spent = []
+    for index in range(pictures + 1):
+        wall, cpu = time.perf_counter(), time.process_time()
+        light.at(index * NS_PER_PICTURE, index * NS_PER_PICTURE + 10_000_000 + index)
+        spent.append((time.perf_counter() - wall, time.process_time() - cpu))
+    wall_s, cpu_s = np.median(spent[1:], axis=0)
+    return f"{1e3 * wall_s:.1f} ms wall, {1e3 * cpu_s:.1f} ms CPU"
+
+
+if __name__ == "__main__":
+    main()

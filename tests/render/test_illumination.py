@@ -1,0 +1,155 @@
+"""Layers add up by their levels; a moving sun and movers give the light of the same things at rest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vobench.render.bake import BakedScene, BakeSettings, bake
+from vobench.render.illumination import Illumination
+from vobench.scene.light import NS_PER_S, Dimmer, Flicker, Light, PointLight, Sky, Sun, Switched
+from vobench.scene.material import Glass, Matt
+from vobench.scene.mover import Mover, Path
+from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.surface import Surface, box, rectangle, room
+from vobench.scene.texture import Map, Texture
+
+COARSE = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=0.3, indirect_rays=64, bounces=3)
+DIRECT = replace(COARSE, bounces=0)
+MATERIALS = {"grey": Matt(Texture("plain", 0.5, 0.0, 1.0, 8, 0)), "pane": Glass()}
+ROOM = tuple(room((4, 4, 2.5), floor="grey", wall="grey", ceiling="grey"))
+PANEL = ceiling_light("panel", np.array([0.5, 0.3, 2.4]), (0.4, 0.4), power_lm=1000)
+BULB = PointLight("bulb", np.array([-1.0, 0.5, 2.0]), 500.0)
+CRATE = tuple(box(np.array([0, 0, 0.5]), (0.4, 0.6, 1.0), yaw_deg=0, material="grey"))
+
+
+def scene(*lights: Light, surfaces: tuple[Surface, ...] = ROOM, movers: tuple[Mover, ...] = ()) -> Scene:
+    return Scene("test", surfaces, MATERIALS, lights, movers)
+
+
+def on(baked: BakedScene, light: Map, surface: int) -> Map:
+    return light[baked.layout.patches[surface].window]
+
+
+def ns(t_s: float) -> int:
+    return round(t_s * NS_PER_S)
+
+
+@pytest.fixture(scope="module")
+def lamps() -> BakedScene:
+    lights = (
+        PANEL,
+        replace(BULB, name="flickers", level=Flicker(50, 0.5)),
+        replace(BULB, name="switched", position_m=np.array([1.0, -1, 2]), level=Switched((1.0,))),
+    )
+    return bake(scene(*lights), COARSE)
+
+
+def test_the_light_is_the_sum_of_layers_by_their_levels(lamps: BakedScene) -> None:
+    light = Illumination(lamps)
+    for start, end in ((0, 0), (ns(0.1), ns(0.103)), (ns(0.9), ns(1.1)), (ns(2), ns(2.004))):
+        levels = [one.level.mean(start, end) for one in lamps.scene.lights]
+        np.testing.assert_allclose(light.at(start, end), np.tensordot(levels, lamps.light, 1), rtol=1e-5)
+
+
+def test_a_light_switched_off_leaves_what_the_others_give(lamps: BakedScene) -> None:
+    after = Illumination(lamps).at(ns(2), ns(2))
+    flicker = np.float32(lamps.scene.lights[1].level.mean(ns(2), ns(2)))
+    np.testing.assert_array_equal(after, lamps.light[0] + flicker * lamps.light[1])
+
+
+def test_nothing_is_computed_anew_where_nothing_has_changed(lamps: BakedScene) -> None:
+    light = Illumination(lamps)
+    first = light.at(ns(0.1), ns(0.105))
+    assert light.at(ns(0.1), ns(0.105)) is first
+    # A whole period on it is the same again; a quarter on it is not.
+    assert light.at(ns(0.101), ns(0.106)) is not first
+    steady = Illumination(bake(scene(PANEL), DIRECT))
+    assert steady.at(0, 0) is steady.at(ns(5), ns(6))
+
+
+def test_a_dimmer_scales_its_own_layer_only() -> None:
+    dimmed = replace(BULB, level=Dimmer((0.0, 10.0), (1.0, 0.0)))
+    baked = bake(scene(PANEL, dimmed), DIRECT)
+    light = Illumination(baked)
+    np.testing.assert_allclose(light.at(ns(5), ns(5)) - light.at(ns(10), ns(10)), 0.5 * baked.light[1], atol=1e-3)
+
+
+def window_room() -> tuple[Surface, ...]:
+    """A room whose north wall is glass."""
+    floor, ceiling, east, west, _, south = ROOM
+    pane = rectangle(np.array([0, 2.0, 1.25]), np.array([4.0, 0, 0]), np.array([0, 0, 2.5]), "pane")
+    return (floor, ceiling, east, west, pane, south)
+
+
+@pytest.mark.parametrize("t_s", [0.0, 4.3, 10.0])
+def test_a_moving_sun_lights_as_one_that_stands_where_it_is(t_s: float) -> None:
+    sun = Sun("sun", 1e4, (0.0, 10.0), (80.0, 100.0), (30.0, 40.0))
+    baked = bake(scene(sun, surfaces=window_room()), COARSE)
+    moved = Illumination(baked).at(ns(t_s), ns(t_s))
+    still = Sun("sun", 1e4, (0.0,), (80 + 2 * t_s,), (30 + t_s,))
+    alone = bake(scene(still, surfaces=window_room()), COARSE).light[0]
+    difference = np.abs(on(baked, moved, 0) - on(baked, alone, 0))
+    # The sun's patch may differ by a step of the sun at its rim; indirect light is interpolated.
+    assert np.median(difference) < 0.01 * alone.mean()
+    assert difference.mean() < 0.01 * on(baked, alone, 0).mean()
+
+
+def test_a_slow_sun_is_traced_anew_only_when_it_has_turned_a_little() -> None:
+    sun = Sun("sun", 1e4, (0.0, 3600.0), (80.0, 95.0), (30.0, 30.0))
+    light = Illumination(bake(scene(sun, surfaces=window_room()), DIRECT))
+    assert light.at(ns(10), ns(10)) is light.at(ns(10.1), ns(10.1))
+    assert light.at(ns(10), ns(10)) is not light.at(ns(60), ns(60))
+
+
+def walk(*positions_m: tuple[float, float, float]) -> Mover:
+    times = np.arange(len(positions_m), dtype=float)
+    return Mover("crate", CRATE, Path(times, np.array(positions_m), np.zeros(len(positions_m))))
+
+
+DAY = Sky("sky", 5_000.0, "uniform")
+
+
+@pytest.mark.parametrize("light", [PANEL, BULB, DAY], ids=["panel", "bulb", "sky"])
+def test_a_mover_shades_and_is_lit_as_the_same_thing_at_rest(light: Light) -> None:
+    place = np.array([-0.5, -0.3, 0.2])
+    surfaces = window_room() if light is DAY else ROOM
+    moving = bake(scene(light, surfaces=surfaces, movers=(walk(tuple(place)),)), DIRECT)
+    lit = Illumination(moving).at(0, 0)
+    crate = tuple(replace(s, corner_m=s.corner_m + place) for s in CRATE)
+    rest = bake(scene(light, surfaces=(*surfaces, *crate)), DIRECT)
+    straight = rest.light[0]
+    for surface in (0, 3, 5):
+        ours, theirs = on(moving, lit, surface), on(rest, straight, surface)
+        assert np.abs(ours - theirs).mean() < (0.03 if light is DAY else 0.02) * theirs.mean()
+        assert np.abs(ours - theirs).max() < 0.35 * theirs.max()
+    panels = len(moving.scene.panels)
+    for side in range(6):
+        theirs = on(rest, straight, len(surfaces) + side).mean()
+        ours = on(moving, lit, len(surfaces) + panels + side).mean()
+        assert ours == pytest.approx(theirs, rel=0.12, abs=1.0)
+
+
+def test_a_mover_takes_indirect_light_from_the_room() -> None:
+    baked = bake(scene(PANEL, movers=(walk((0.5, 0.3, 0.0)),)), COARSE)
+    lit = Illumination(baked).at(0, 0)
+    below = len(ROOM) + 1 + 2  # a side of the crate under the lamp: lit at a slant at most
+    room_around = np.mean([on(baked, lit, wall).mean() for wall in range(6)])
+    assert 0.2 * room_around < on(baked, lit, below).mean() < 2 * room_around
+
+
+def test_where_a_mover_was_the_light_comes_back_to_the_byte() -> None:
+    light = Illumination(bake(scene(PANEL, BULB, movers=(walk((0, 0, 0), (1, 0, 0), (0, 0, 0)),)), DIRECT))
+    first = light.at(0, 0).copy()
+    gone = light.at(ns(1), ns(1))
+    assert not np.array_equal(first, gone)
+    assert light.at(ns(2), ns(2)).tobytes() == first.tobytes()
+
+
+def test_a_mover_only_takes_light() -> None:
+    baked = bake(scene(PANEL, BULB, movers=(walk((0, 0, 0)),)), COARSE)
+    lit, empty = Illumination(baked).at(0, 0), baked.light.sum(0)
+    for surface in range(6):
+        assert (on(baked, lit, surface) <= on(baked, empty, surface) * (1 + 1e-6)).all()
+        assert (on(baked, lit, surface) >= 0).all()
+    assert on(baked, lit, 0).sum() < on(baked, empty, 0).sum()

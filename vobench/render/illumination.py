@@ -1,0 +1,112 @@
+"""The light on every surface over an interval of time: layers of baked light, weighted and added."""
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from vobench.render.bake import BakedScene, SunTrack, direct_layer, placed, stage
+from vobench.render.lightmap import Scales
+from vobench.render.moving import Moment, MoverLight
+from vobench.scene.light import NS_PER_S, Light, Steady, Sun
+from vobench.scene.texture import Map
+
+SUN_TURN_RAD = 1e-4  # a moving sun stands still within less than a fiftieth of its disc
+KEPT = 16  # maps and moments: enough for the strips of a stereo pair
+
+T = TypeVar("T")
+
+
+class Latest(Generic[T]):
+    """The last few values made, by what they were made of."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[Hashable, T] = OrderedDict()
+
+    def get(self, key: Hashable, make: Callable[[], T]) -> T:
+        """The value of a key, made where it is not at hand."""
+        if key not in self._kept:
+            self._kept[key] = make()
+        self._kept.move_to_end(key)
+        if len(self._kept) > KEPT:
+            self._kept.popitem(last=False)
+        return self._kept[key]
+
+
+class Illumination:
+    """A baked scene's light at any time. What stays as it is costs nothing; see docs/rendering.md for the rest.
+
+    A light counts with its mean over the interval; movers and a moving sun stand where they are amid it.
+    """
+
+    def __init__(self, baked: BakedScene) -> None:
+        self._baked, self._lights = baked, baked.scene.lights
+        self._tracks = {track.light: track for track in baked.tracks}
+        fixed = [i for i in range(len(self._lights)) if i not in self._tracks]
+        steady = [i for i in fixed if isinstance(self._lights[i].level, Steady)]
+        self._varying = [i for i in fixed if i not in steady]
+        self._steady = np.zeros(baked.light.shape[1:], np.float32)
+        self._add(self._steady, {i: self._lights[i].level.mean(0, 0) for i in steady})
+        if self._tracks or baked.scene.movers:
+            self._still = stage(baked.scene, baked.layout, seed=baked.settings.seed)
+        self._movers = MoverLight(baked, self._still) if baked.scene.movers else None
+        self._maps: Latest[Map] = Latest()
+        self._moments: Latest[Moment] = Latest()
+        self._suns: Latest[Map] = Latest()
+
+    def at(self, start_ns: int, end_ns: int) -> Map:
+        """Map (H, W): the mean from start_ns to end_ns. The very array of an earlier call where nothing differs."""
+        levels = tuple(light.level.mean(start_ns, end_ns) for light in self._lights)
+        amid_ns = (start_ns + end_ns) / 2
+        suns = tuple(_stepped_ns(light, amid_ns) for light in self._lights)
+        poses = tuple(mover.path.pose(amid_ns).tobytes() for mover in self._baked.scene.movers)
+        return self._maps.get((levels, suns, poses), lambda: self._map(levels, suns, poses, amid_ns))
+
+    def _map(self, levels: tuple[float, ...], suns: tuple[float, ...], poses: tuple[bytes, ...], amid_ns: float) -> Map:
+        total = self._steady.copy()
+        self._add(total, {i: levels[i] for i in self._varying})
+        for index in self._tracks:
+            total += np.float32(levels[index]) * self._sun(index, suns[index])
+        if self._movers:
+            movers = self._movers
+            is_on = tuple(level > 0 for level in levels)
+            moment = self._moments.get((suns, poses, is_on), lambda: movers.at(amid_ns, suns, is_on))
+            movers.add(moment, total, levels)
+        return total
+
+    def _add(self, total: Map, levels: dict[int, float]) -> None:
+        for index, level in levels.items():
+            total += np.float32(level) * self._baked.light[index]
+
+    def _sun(self, index: int, t_ns: float) -> Map:
+        """A moving sun's layer at an instant: straight light by rays, the rest between the baked ones."""
+
+        def make() -> Map:
+            scene, settings = self._baked.scene, self._baked.settings
+            coarse = placed(scene, spacing_m=settings.indirect_spacing_m)
+            around = Scales(self._still.where, coarse).refined(_between(self._tracks[index], t_ns)[None])[0]
+            layer: Map = direct_layer(scene, index, self._still, settings, t_ns=t_ns) + around
+            return layer
+
+        return self._suns.get((index, t_ns), make)
+
+
+def _stepped_ns(light: Light, t_ns: float) -> float:
+    """When a moving sun last took a step of SUN_TURN_RAD, so that it need not be traced for every picture; else 0."""
+    if not isinstance(light, Sun) or not light.moves:
+        return 0.0
+    first, last = (NS_PER_S * t for t in (light.times_s[0], light.times_s[-1]))
+    corners = np.array([light.direction(NS_PER_S * t) for t in light.times_s])
+    steps = np.ceil(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum() / SUN_TURN_RAD)
+    step_ns = (last - first) / max(steps, 1)
+    return float(first + step_ns * np.rint((np.clip(t_ns, first, last) - first) / step_ns))
+
+
+def _between(track: SunTrack, t_ns: float) -> Map:
+    """Indirect light (h, w) at an instant, straight lines between the baked ones."""
+    after = int(np.clip(np.searchsorted(track.times_ns, t_ns), 1, len(track.times_ns) - 1))
+    start, end = track.times_ns[after - 1 : after + 1]
+    share = np.float32((t_ns - start) / (end - start))
+    light: Map = (1 - share) * track.bounced[after - 1] + share * track.bounced[after]
+    return light

@@ -1,0 +1,34 @@
+#version 410 core
+#extension GL_ARB_shading_language_420pack : require
+#extension GL_ARB_shader_viewport_layer_array : require
+// Where a surface's corners fall in each sample's layer; texture and light coordinates pass through.
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec2 texcoord_0;
+layout(location = 2) in vec2 texcoord_1;
+
+layout(std140, binding = 0) uniform Pass {
+    mat4 view_projection;
+    vec4 eye;         // where the picture is seen from, mirrored in a mirror's pass
+    vec4 clip_plane;  // what lies behind it is not drawn
+    vec4 lod_bias;
+};
+uniform mat4 model;
+
+out vec2 uv_albedo;
+out vec2 uv_light;
+out vec3 to_eye;
+flat out int layer;
+out float gl_ClipDistance[1];
+
+void main()
+{
+    vec4 world = model * vec4(position, 1.0);
+    gl_Position = view_projection * world;
+    gl_ClipDistance[0] = dot(clip_plane, world);
+    gl_Layer = gl_InstanceID;
+    gl_ViewportIndex = gl_InstanceID;
+    layer = gl_InstanceID;
+    uv_albedo = texcoord_0;
+    uv_light = texcoord_1;
+    to_eye = eye.xyz - world.xyz;
+}

@@ -1,0 +1,269 @@
+"""What shines directly: for a point and two random numbers, where to look and how bright it is there.
+
+A source gives `towards(points)`, a function of numbers a and b (P,) in [0, 1) to the way (P, 3) to a
+spot of it and the strength (P,) in lux on a surface that faces it; the mean over a and b of
+strength x cosine x what passes on the way is the illuminance.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from vobench.render.geometry import RAY_OFFSET_M, Ball, Floats, ball, corners
+from vobench.render.sight import FAR_M, Sight
+from vobench.render.solid_angle import FLAT_M, SolidAngle, polygon_illuminance
+from vobench.render.texels import Texels, tangents
+from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
+from vobench.scene.surface import Surface
+
+Aim = Callable[[Floats, Floats], tuple[Floats, Floats]]
+FARTHEST_M = 1e7
+
+
+class Source(Protocol):
+    """One thing that shines."""
+
+    def ball(self) -> Ball:
+        """What encloses it; of infinite radius where it is all around."""
+
+    def width_rad(self, points_m: Floats) -> Floats:
+        """Roughly how wide it looks (P,) from points (P, 3); 0 for hard shadows."""
+
+    def towards(self, texels: Texels) -> Aim:
+        """Ways to it and strengths, see above."""
+
+    def unshadowed(self, texels: Texels) -> Floats | None:
+        """Exact illuminance (P,) if nothing were in the way, NaN where unknown: takes the grain out of open light."""
+
+    def passing(self, sight: Sight, origins_m: Floats, way: Floats) -> Floats:
+        """Share (R,) of light that comes from origins + way (R, 3) to the origins, of what `towards` does not count."""
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """A lamp's rectangle."""
+
+    light: AreaLight
+
+    def ball(self) -> Ball:
+        """Around its corners."""
+        return ball([self.light.surface])
+
+    def width_rad(self, points_m: Floats) -> Floats:
+        """The root of the solid angle."""
+        return np.sqrt(SolidAngle(self.light.surface, points_m).steradian).astype(np.float32)
+
+    def towards(self, texels: Texels) -> Aim:
+        """Only from in front."""
+        surface, points = self.light.surface, texels.points_m
+        angle = SolidAngle(surface, points)
+        in_front = (points - surface.corner_m) @ surface.normal > FLAT_M
+        strength = np.where(in_front, self.light.luminance_cd_m2 * angle.steradian, 0).astype(np.float32)
+
+        def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+            return angle.spot(a, b) + (RAY_OFFSET_M * surface.normal).astype(np.float32), strength
+
+        return aim
+
+    def unshadowed(self, texels: Texels) -> Floats:
+        """By the rectangle's edges, where all of it is above the horizon."""
+        return self.light.luminance_cd_m2 * polygon_illuminance(
+            corners(self.light.surface), texels.points_m, texels.normals
+        )
+
+    def passing(self, sight: Sight, origins_m: Floats, way: Floats) -> Floats:
+        """Past walls and through panes."""
+        return sight.passing(origins_m, way)
+
+
+@dataclass(frozen=True, slots=True)
+class Bulb:
+    """A point or spot."""
+
+    light: PointLight | SpotLight
+
+    def ball(self) -> Ball:
+        """A point."""
+        return Ball(self.light.position_m, 0.0)
+
+    def width_rad(self, points_m: Floats) -> Floats:
+        """None."""
+        return np.zeros(len(points_m), np.float32)
+
+    def towards(self, texels: Texels) -> Aim:
+        """Inverse square."""
+        way = (self.light.position_m - texels.points_m).astype(np.float32)
+        squared = np.einsum("ij,ij->i", way, way)
+        strength = (self.light.intensity_cd(-way / np.sqrt(squared)[:, None]) / squared).astype(np.float32)
+        return lambda _a, _b: (way, strength)
+
+    def unshadowed(self, texels: Texels) -> None:
+        """Nothing to add."""
+
+    def passing(self, sight: Sight, origins_m: Floats, way: Floats) -> Floats:
+        """Past walls and through panes."""
+        return sight.passing(origins_m, way)
+
+
+@dataclass(frozen=True, slots=True)
+class SunDisc:
+    """The sun where it stands at one instant."""
+
+    light: Sun
+    t_ns: float = 0
+
+    def ball(self) -> Ball:
+        """So far away that it stands in the same direction from everywhere."""
+        return Ball(FARTHEST_M * self.light.direction(self.t_ns), FARTHEST_M * SUN_RADIUS_RAD)
+
+    def width_rad(self, points_m: Floats) -> Floats:
+        """So narrow that most points need one ray."""
+        return np.zeros(len(points_m), np.float32)
+
+    def towards(self, texels: Texels) -> Aim:
+        """Rays spread evenly over the disc."""
+        centre = self.light.direction(self.t_ns)
+        axes = tangents(centre[None])
+        arriving = self.light.illuminance_lx * np.maximum(texels.normals @ centre, 0)
+
+        def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+            x, y = (np.tan(SUN_RADIUS_RAD) * part for part in disc(a, b))
+            direction = (centre + x[:, None] * axes[0] + y[:, None] * axes[1]).astype(np.float32)
+            # One ray alone must not tell where on the disc it went.
+            return FAR_M * direction, arriving / np.maximum(texels.cosine(direction), SUN_RADIUS_RAD)
+
+        return aim
+
+    def unshadowed(self, texels: Texels) -> None:
+        """Nothing to add."""
+
+    def passing(self, sight: Sight, origins_m: Floats, way: Floats) -> Floats:
+        """Past walls and through panes."""
+        return sight.passing(origins_m, way)
+
+
+@dataclass(frozen=True, slots=True)
+class SkyPane:
+    """The sky through one pane: only rays that cross no other pane behind it, so that none counts twice.
+
+    followed: whether other panes stand behind it for light that falls along its normal, and against it.
+    """
+
+    light: Sky
+    pane: int
+    sight: Sight
+    followed: tuple[bool, bool]
+
+    @property
+    def surface(self) -> Surface:
+        """The pane's rectangle."""
+        return self.sight.surfaces[self.pane]
+
+    def ball(self) -> Ball:
+        """Around the pane."""
+        return ball([self.surface])
+
+    def width_rad(self, points_m: Floats) -> Floats:
+        """The root of the solid angle."""
+        return np.sqrt(SolidAngle(self.surface, points_m).steradian).astype(np.float32)
+
+    def towards(self, texels: Texels) -> Aim:
+        """The sky's luminance beyond the pane."""
+        angle = SolidAngle(self.surface, texels.points_m)
+
+        def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+            spot = angle.spot(a, b)
+            direction = spot / np.linalg.norm(spot, axis=1, keepdims=True)
+            strength = angle.steradian * self.light.luminance_cd_m2(direction)
+            strength *= self.sight.pane_passes(self.pane, direction)
+            outward = direction @ self.surface.normal > 0
+            doubtful = np.flatnonzero(np.where(outward, self.followed[1], self.followed[0]))
+            beyond = (texels.points_m + spot + 2 * RAY_OFFSET_M * direction)[doubtful]
+            strength[doubtful] *= ~self.sight.crosses_pane(beyond, FAR_M * direction[doubtful])
+            return FAR_M * direction, strength.astype(np.float32)
+
+        return aim
+
+    def unshadowed(self, texels: Texels) -> None:
+        """Nothing to add."""
+
+    def passing(self, sight: Sight, origins_m: Floats, way: Floats) -> Floats:
+        """Past walls, and through panes before this one."""
+        share = sight.clear(origins_m, way).astype(np.float32)
+        some = np.flatnonzero(share)
+        start, ahead = origins_m[some], way[some]
+        reach = ((self.surface.corner_m - start) @ self.surface.normal) / (ahead @ self.surface.normal)
+        share[some] *= sight.through_panes(start, ahead * ((1 - 1e-4) * reach[:, None]).astype(np.float32))
+        return share
+
+
+@dataclass(frozen=True, slots=True)
+class OpenSky:
+    """The sky that no pane covers: rays all over the half sphere above each point."""
+
+    light: Sky
+    sight: Sight
+
+    def ball(self) -> Ball:
+        """All around."""
+        return Ball(np.zeros(3), np.inf)
+
+    def width_rad(self, points_m: Floats) -> Floats:
+        """All of it."""
+        return np.full(len(points_m), np.sqrt(2 * np.pi), np.float32)
+
+    def towards(self, texels: Texels) -> Aim:
+        """Cosine-weighted, hence strength over cosine."""
+
+        def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+            direction = cosine_weighted(texels.normals, a, b)
+            luminance = self.light.luminance_cd_m2(direction)
+            strength = np.pi * luminance / np.maximum(np.einsum("ij,ij->i", direction, texels.normals), 1e-6)
+            strength[self.sight.crosses_pane(texels.points_m, FAR_M * direction)] = 0
+            return FAR_M * direction, strength.astype(np.float32)
+
+        return aim
+
+    def unshadowed(self, texels: Texels) -> None:
+        """Nothing to add."""
+
+    def passing(self, sight: Sight, origins_m: Floats, way: Floats) -> Floats:
+        """Past walls and through panes."""
+        return sight.passing(origins_m, way)
+
+
+def disc(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Points x, y spread evenly over the unit disc."""
+    radius, angle = np.sqrt(a), np.float32(2 * np.pi) * b
+    return radius * np.cos(angle), radius * np.sin(angle)
+
+
+def cosine_weighted(normals: Floats, a: Floats, b: Floats) -> Floats:
+    """Unit directions (P, 3) around normals, as dense as their cosine."""
+    (x, y), (u_axis, v_axis) = disc(a, b), tangents(normals)
+    up = np.sqrt(np.maximum(1 - a, 1e-7))
+    directions: Floats = x[:, None] * u_axis + y[:, None] * v_axis + up[:, None] * normals
+    return directions
+
+
+def sources(light: Light, sight: Sight, *, t_ns: float = 0) -> list[Source]:
+    """All that one light is made of."""
+    match light:
+        case AreaLight():
+            return [Panel(light)]
+        case PointLight() | SpotLight():
+            return [Bulb(light)]
+        case Sun():
+            return [SunDisc(light, t_ns)]
+        case Sky():
+            panes = [SkyPane(light, i, sight, _followed(i, sight)) for i in sight.sky_panes()]
+            return [*panes, OpenSky(light, sight)]
+
+
+def _followed(pane: int, sight: Sight) -> tuple[bool, bool]:
+    """Whether any other pane reaches to the back of a pane, and to its front."""
+    surface = sight.surfaces[pane]
+    height = np.concatenate([(corners(sight.surfaces[i]) - surface.corner_m) @ surface.normal for i in sight.panes])
+    return bool((height < -RAY_OFFSET_M).any()), bool((height > RAY_OFFSET_M).any())
