@@ -40,6 +40,7 @@ class Recording:
                 until = int(np.searchsorted(self.encoder_t_ns, t_ns, side="right"))
                 sequence.write_encoders(self.encoder_t_ns[done:until], self.ticks[done:until])
                 sequence.write_frame(t_ns, self.left[i], self.right[i])
+                sequence.write_exposure(t_ns, 0.001 * (i + 1), 6.0)
                 sequence.write_truth(t_ns, self.T_map_body[i], self.twist[i])
                 done = until
         return folder

@@ -17,9 +17,16 @@ COUNTS = {
         "/cam_right/camera_info": 9,
         "/cam_left/image/compressed": 9,
         "/cam_right/image/compressed": 9,
+        "/exposure": 9,
         "/encoders": 26,
     },
-    "truth.mcap": {"/tf_static": 1, "/tf": 9, "/ground_truth/odometry": 9},
+    "truth.mcap": {
+        "/tf_static": 1,
+        "/tf": 9,
+        "/ground_truth/odometry": 9,
+        "/ground_truth/cam_left/camera_info": 1,
+        "/ground_truth/cam_right/camera_info": 1,
+    },
 }
 
 

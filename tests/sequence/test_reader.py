@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from vobench.errors import SequenceError
-from vobench.geometry.rig import WheelGeometry
-from vobench.sequence import Sequence, payload_hash, read_case, read_truth
+from vobench.geometry.calibration import CalibrationError, true_rig
+from vobench.geometry.preset import PRESETS
+from vobench.geometry.rig import WheelGeometry, mounted
+from vobench.sequence import Sequence, SequenceWriter, payload_hash, read_case, read_true_rig, read_truth
 
 
 def test_pixels_and_stamps_come_back_exactly(recording, folder):
@@ -43,13 +45,63 @@ def test_rig_comes_back(recording, folder):
     np.testing.assert_allclose(rig.T_body_right, recording.rig.T_body_right, rtol=0, atol=1e-15)
 
 
-def test_png_frames_are_the_frames_undecoded(recording, folder):
+@pytest.mark.parametrize("name", PRESETS)
+def test_estimators_are_told_the_nominal_rig_and_the_truth_holds_the_true_one(name, tmp_path):
+    preset = PRESETS[name]
+    nominal = mounted(preset.left, preset.right, preset.T_left_right, pitch_deg=12)
+    true = true_rig(
+        nominal, CalibrationError(focal_ratio=0.01, center_px=(2.0, -1.0), baseline_ratio=-0.02, right_yaw_deg=1)
+    )
+    black = [np.zeros((camera.height_px, camera.width_px), np.uint8) for camera in (nominal.left, nominal.right)]
+    with SequenceWriter(tmp_path, nominal, case_json=b"", true_rig=true) as sequence:
+        sequence.write_frame(0, *black)
+    for rig, read in ((nominal, Sequence.open(tmp_path).rig), (true, read_true_rig(tmp_path))):
+        assert (read.left, read.right, read.wheels) == (rig.left, rig.right, rig.wheels)
+        np.testing.assert_allclose(read.T_body_left, rig.T_body_left, rtol=0, atol=1e-15)
+        np.testing.assert_allclose(read.T_body_right, rig.T_body_right, rtol=0, atol=1e-15)
+
+
+def test_without_a_calibration_error_the_true_rig_is_the_one_that_is_told(folder):
+    told, true = Sequence.open(folder).rig, read_true_rig(folder)
+    assert (told.left, told.right, told.wheels) == (true.left, true.right, true.wheels)
+    np.testing.assert_array_equal(told.T_body_right, true.T_body_right)
+
+
+def test_payload_hash_follows_the_true_rig_though_no_sensor_shows_it(recording, tmp_path):
+    off = true_rig(recording.rig, CalibrationError(right_roll_deg=0.1))
+    for name, rig in (("exact", None), ("off", off)):
+        with SequenceWriter(tmp_path / name, recording.rig, case_json=b"", true_rig=rig) as sequence:
+            sequence.write_frame(0, recording.left[0], recording.right[0])
+    sensors = [(tmp_path / name / "sensors.mcap").read_bytes() for name in ("exact", "off")]
+    assert sensors[0] == sensors[1]
+    assert payload_hash(tmp_path / "exact") != payload_hash(tmp_path / "off")
+
+
+def test_encoded_frames_are_the_frames_undecoded(recording, folder):
     sequence = Sequence.open(folder)
     assert len(sequence) == len(recording.t_ns)
-    frame = next(islice(sequence.png_frames(), 4, None))
+    frame = next(islice(sequence.encoded_frames(), 4, None))
     assert (frame.index, frame.t_ns) == (4, recording.t_ns[4])
     picture = cv2.imdecode(np.frombuffer(frame.right, np.uint8), cv2.IMREAD_UNCHANGED)
     np.testing.assert_array_equal(picture, recording.right[4])
+
+
+def test_exposures_come_back_as_they_were(recording, folder):
+    t_ns, exposures = Sequence.open(folder).exposures()
+    np.testing.assert_array_equal(t_ns, recording.t_ns)
+    np.testing.assert_array_equal(exposures, [(0.001 * (i + 1), 6.0) for i in range(len(t_ns))])
+
+
+def test_jpeg_is_smaller_near_the_picture_and_says_what_it_is(recording, tmp_path):
+    smooth = cv2.GaussianBlur(recording.left[0], (0, 0), 4)
+    for name, quality in (("png", None), ("jpeg", 90)):
+        with SequenceWriter(tmp_path / name, recording.rig, case_json=b"", jpeg_quality=quality) as sequence:
+            sequence.write_frame(0, smooth, smooth)
+    png, jpeg = (next(Sequence.open(tmp_path / name).encoded_frames()) for name in ("png", "jpeg"))
+    assert (png.form, jpeg.form) == ("png", "jpeg")
+    assert len(jpeg.left) < len(png.left)
+    (decoded,) = Sequence.open(tmp_path / "jpeg").frames()
+    assert 0 < np.abs(decoded.left.astype(int) - smooth).max() <= 6
 
 
 def test_case_comes_back_from_the_truth_and_is_not_among_the_sensors(folder):

@@ -9,7 +9,7 @@ import pytest
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
-from vobench.sequence import PngFrame
+from vobench.sequence import EncodedFrame
 from vobench.trajectory.trajectory import Trajectory
 from vobench.viewer import RunView, save_run
 
@@ -29,7 +29,7 @@ def make_run() -> RunView:
     return RunView(
         title="room × stereo × 0",
         rig=RIG,
-        frames=lambda: (PngFrame(i, int(t), png, png) for i, t in enumerate(t_ns)),
+        frames=lambda: (EncodedFrame(i, int(t), "png", png, png) for i, t in enumerate(t_ns)),
         ground_truth=truth,
         estimate=estimate,
         error_t_ns=estimate.t_ns,

@@ -111,17 +111,28 @@ def _opened(path: Path) -> Iterator[McapReader]:
 
 def check_topics(path: Path, topics: Sequence[Topic]) -> dict[Topic, int]:
     """How many messages each topic has. Raises SequenceError where one is missing or of another type."""
-    with _parsing(path), _opened(path) as reader:
-        summary = reader.get_summary()
-        if summary is None or summary.statistics is None:
-            raise SequenceError(f"the recording has no summary, so it was not finished: {path}")
-        counts = summary.statistics.channel_message_counts
-        found = {c.topic: (summary.schemas[c.schema_id].name, counts.get(c.id, 0)) for c in summary.channels.values()}
+    found = _found(path)
     for topic in topics:
         type_name = found[topic.name][0] if topic.name in found else "missing"
         if type_name != topic.type_name:
             raise SequenceError(f"{topic.name} should be {topic.type_name} but is {type_name} in {path}")
     return {topic: found[topic.name][1] for topic in topics}
+
+
+def held(path: Path, topics: Sequence[Topic]) -> tuple[Topic, ...]:
+    """Those of some topics that a bag has."""
+    found = _found(path)
+    return tuple(topic for topic in topics if found.get(topic.name, ("", 0))[0] == topic.type_name)
+
+
+def _found(path: Path) -> dict[str, tuple[str, int]]:
+    """Type and number of messages of each topic, by name."""
+    with _parsing(path), _opened(path) as reader:
+        summary = reader.get_summary()
+        if summary is None or summary.statistics is None:
+            raise SequenceError(f"the recording has no summary, so it was not finished: {path}")
+        counts = summary.statistics.channel_message_counts
+        return {c.topic: (summary.schemas[c.schema_id].name, counts.get(c.id, 0)) for c in summary.channels.values()}
 
 
 def messages(path: Path, topics: Sequence[Topic]) -> Iterator[tuple[Topic, Any]]:

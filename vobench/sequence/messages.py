@@ -9,9 +9,12 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from vobench.errors import SequenceError
 from vobench.geometry import se3
-from vobench.geometry.camera import Pinhole
+from vobench.geometry.camera import Camera, Pinhole, camera_matrix
+from vobench.geometry.lens import BrownConrady, KannalaBrandt
+from vobench.geometry.rectify import projection, rectification
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
+from vobench.geometry.sphere import DoubleSphere, Equirectangular
 
 WORLD, BODY, LEFT, RIGHT = "map", "base_link", "cam_left", "cam_right"
 NS_PER_S = 1_000_000_000
@@ -31,12 +34,28 @@ LEFT_INFO = Topic(f"/{LEFT}/camera_info", "sensor_msgs/msg/CameraInfo")
 RIGHT_INFO = Topic(f"/{RIGHT}/camera_info", "sensor_msgs/msg/CameraInfo")
 LEFT_IMAGE = Topic(f"/{LEFT}/image/compressed", "sensor_msgs/msg/CompressedImage")
 RIGHT_IMAGE = Topic(f"/{RIGHT}/image/compressed", "sensor_msgs/msg/CompressedImage")
+EXPOSURE = Topic("/exposure", "vobench_msgs/msg/Exposure")
 ENCODERS = Topic("/encoders", "vobench_msgs/msg/WheelTicks")
 TF = Topic("/tf", "tf2_msgs/msg/TFMessage")
 ODOMETRY = Topic("/ground_truth/odometry", "nav_msgs/msg/Odometry")
 
-SENSOR_TOPICS = (TF_STATIC, LEFT_INFO, RIGHT_INFO, LEFT_IMAGE, RIGHT_IMAGE, ENCODERS)
+TRUE_LEFT_INFO = Topic(f"/ground_truth{LEFT_INFO.name}", LEFT_INFO.type_name, latched=True)
+TRUE_RIGHT_INFO = Topic(f"/ground_truth{RIGHT_INFO.name}", RIGHT_INFO.type_name, latched=True)
+
+SENSOR_TOPICS = (TF_STATIC, LEFT_INFO, RIGHT_INFO, LEFT_IMAGE, RIGHT_IMAGE, EXPOSURE, ENCODERS)
 TRUTH_TOPICS = (TF_STATIC, TF, ODOMETRY)
+TRUE_INFO_TOPICS = (TRUE_LEFT_INFO, TRUE_RIGHT_INFO)
+
+# ROS names the first two; the others it does not know, and their names are ours.
+PLUMB_BOB = "plumb_bob"
+EQUIDISTANT = "equidistant"
+DOUBLE_SPHERE = "double_sphere"
+FOCAL_MODELS: dict[str, type[BrownConrady] | type[KannalaBrandt] | type[DoubleSphere]] = {
+    PLUMB_BOB: BrownConrady,
+    EQUIDISTANT: KannalaBrandt,
+    DOUBLE_SPHERE: DoubleSphere,
+}
+ALL_AROUND = "equirectangular"
 
 WHEEL_TICKS_DEFINITION = """\
 # Counts of the two wheel encoders since the start of the recording, positive when the robot drives ahead.
@@ -45,8 +64,16 @@ int64 left
 int64 right
 """
 
+EXPOSURE_DEFINITION = """\
+# How both pictures of a stereo pair were exposed; the stamp is the middle of the exposure.
+std_msgs/Header header
+float64 time_s
+float64 gain_db
+"""
+
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 TYPES.register(get_types_from_msg(WHEEL_TICKS_DEFINITION, ENCODERS.type_name))
+TYPES.register(get_types_from_msg(EXPOSURE_DEFINITION, EXPOSURE.type_name))
 
 
 def _make(type_name: str, *fields: Any) -> Any:
@@ -86,29 +113,61 @@ def mounts(rig: Rig) -> Any:
     return transforms(0, BODY, {LEFT: rig.T_body_left, RIGHT: rig.T_body_right})
 
 
-def camera_info(t_ns: int, frame_id: str, camera: Pinhole, *, shift_m: float = 0.0) -> Any:
-    """A sensor_msgs/CameraInfo without distortion, of a camera `shift_m` to the right of its pair's left one."""
-    projection = np.hstack([camera.K, [[-camera.fx_px * shift_m], [0.0], [0.0]]])
+def stereo_info(t_ns: int, rig: Rig) -> tuple[Any, Any]:
+    """The sensor_msgs/CameraInfo of both cameras, with the R and P that rectify them where anything does."""
+    views = rectification(rig)
+    if views is None:
+        return camera_info(t_ns, LEFT, rig.left), camera_info(t_ns, RIGHT, rig.right)
+    left = camera_info(t_ns, LEFT, rig.left, R=views.R_view_left, P=views.P_left)
+    return left, camera_info(t_ns, RIGHT, rig.right, R=views.R_view_right, P=views.P_right)
+
+
+def camera_info(t_ns: int, frame_id: str, camera: Camera, *, R: Array | None = None, P: Array | None = None) -> Any:
+    """A sensor_msgs/CameraInfo; without R (3, 3) and P (3, 4) that of a camera on its own."""
     region = _make("sensor_msgs/msg/RegionOfInterest", 0, 0, 0, 0, False)  # all of the picture
     return _make(
         LEFT_INFO.type_name,
         header(t_ns, frame_id),
         camera.height_px,
         camera.width_px,
-        "plumb_bob",
-        np.zeros(5),
-        camera.K.ravel(),
-        np.eye(3).ravel(),
-        projection.ravel(),
+        _model_name(camera),
+        np.zeros(5) if isinstance(camera, Pinhole) else np.array([getattr(camera, k) for k in camera.coefficients]),
+        _own_matrix(camera).ravel(),
+        (np.eye(3) if R is None else R).ravel(),
+        (projection(camera.K, 0.0) if P is None else P).ravel(),
         0,
         0,
         region,
     )
 
 
-def png_image(t_ns: int, frame_id: str, png: bytes) -> Any:
-    """A sensor_msgs/CompressedImage that holds a PNG."""
-    return _make(LEFT_IMAGE.type_name, header(t_ns, frame_id), "png", np.frombuffer(png, np.uint8))
+def _model_name(camera: Camera) -> str:
+    """The distortion model; a pinhole is a plumb bob that does not bend."""
+    match camera:
+        case KannalaBrandt():
+            return EQUIDISTANT
+        case DoubleSphere():
+            return DOUBLE_SPHERE
+        case Equirectangular():
+            return ALL_AROUND
+    return PLUMB_BOB
+
+
+def _own_matrix(camera: Camera) -> Array:
+    """The camera matrix with the model's own focal length, which a double sphere does not have at its axis."""
+    if isinstance(camera, DoubleSphere):
+        return camera_matrix(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px)
+    return camera.K
+
+
+def image(t_ns: int, frame_id: str, encoded: bytes, form: str) -> Any:
+    """A sensor_msgs/CompressedImage; `form` is png or jpeg."""
+    return _make(LEFT_IMAGE.type_name, header(t_ns, frame_id), form, np.frombuffer(encoded, np.uint8))
+
+
+def exposure(t_ns: int, time_s: float, gain_db: float) -> Any:
+    """How a stereo pair was exposed, as a vobench_msgs/Exposure."""
+    return _make(EXPOSURE.type_name, header(t_ns, LEFT), float(time_s), float(gain_db))
 
 
 def wheel_ticks(t_ns: int, left: int, right: int) -> Any:
@@ -151,11 +210,20 @@ def poses(fields: ArrayLike) -> Array:
     return se3.transform(se3.from_quaternion(values[..., 3:]), values[..., :3])
 
 
-def pinhole(message: Any) -> Pinhole:
-    """The camera of a CameraInfo. Raises SequenceError where its lens bends lines."""
-    if np.any(message.d):
-        raise SequenceError(
-            f"camera {message.header.frame_id} has distortion {message.d.tolist()}, but should have none"
-        )
+def camera(message: Any) -> Camera:
+    """The camera of a CameraInfo. Raises SequenceError for a distortion model that is not ours."""
+    size, d = (int(message.width), int(message.height)), [float(value) for value in message.d]
+    name = message.distortion_model
+    if name == ALL_AROUND:
+        return Equirectangular(*size)
     fx, _, cx, _, fy, cy = message.k[:6].tolist()
-    return Pinhole(int(message.width), int(message.height), fx, fy, cx, cy)
+    if name == PLUMB_BOB and not any(d):
+        return Pinhole(*size, fx, fy, cx, cy)
+    model = FOCAL_MODELS.get(name)
+    if model is None or len(d) != len(model.coefficients):
+        known = ", ".join(f"{key} ({len(kind.coefficients)})" for key, kind in FOCAL_MODELS.items())
+        raise SequenceError(
+            f"camera {message.header.frame_id} has the distortion model '{name}' with {len(d)} coefficients. "
+            f"Known: {known}, {ALL_AROUND} (0)"
+        )
+    return model(*size, fx, fy, cx, cy, *d)

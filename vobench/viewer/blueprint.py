@@ -1,5 +1,7 @@
 """The first look at a run: which views, where they sit, and where the 3-D eye stands."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
@@ -23,8 +25,18 @@ FRAMES_AROUND_FOCUS = 15
 REPLAY_FPS = 5.0  # slow enough to see single frames
 
 
-def layout(truth_m: Array, estimate_m: Array, *, focus: tuple[int, int] | None) -> rrb.Blueprint:
-    """The default blueprint for paths (N, 3) and (M, 3); `focus` is a range of frames to start at."""
+def truth_entity(side: str, channel: str) -> str:
+    """Where one camera's truth channel is; apart from the world, for a depth map there hides the paths."""
+    return f"truth/{side}/{channel}"
+
+
+def layout(
+    truth_m: Array, estimate_m: Array, *, focus: tuple[int, int] | None, channels: Sequence[str] = ()
+) -> rrb.Blueprint:
+    """The default blueprint for paths (N, 3) and (M, 3); `focus` is a range of frames to start at.
+
+    Truth channels, where there are any, have tabs of their own.
+    """
     seen_m = _near(truth_m, estimate_m)
     paths = rrb.Vertical(
         _space(truth_m, seen_m),
@@ -44,9 +56,18 @@ def layout(truth_m: Array, estimate_m: Array, *, focus: tuple[int, int] | None) 
         row_shares=[3, 3, 3],
     )
     columns = rrb.Horizontal(paths, pictures, column_shares=[3, 2])
+    run = rrb.Tabs(rrb.Horizontal(columns, name="Run"), *_truth(channels), active_tab=0) if channels else columns
     return rrb.Blueprint(
-        columns, _time_panel(focus), rrb.SelectionPanel(state="hidden"), rrb.BlueprintPanel(state="hidden")
+        run, _time_panel(focus), rrb.SelectionPanel(state="hidden"), rrb.BlueprintPanel(state="hidden")
     )
+
+
+def _truth(channels: Sequence[str]) -> list[rrb.Grid]:
+    """A tab for each camera, a view for each channel."""
+    return [
+        rrb.Grid(*(rrb.Spatial2DView(origin=truth_entity(s, c), name=c) for c in channels), name=f"Truth, {s}")
+        for s in ("left", "right")
+    ]
 
 
 def _space(truth_m: Array, seen_m: Array) -> rrb.Spatial3DView:

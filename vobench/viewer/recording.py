@@ -10,12 +10,14 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from vobench.geometry.camera import Pinhole
+from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
-from vobench.sequence import PngFrame
+from vobench.sequence import EncodedFrame
 from vobench.trajectory.trajectory import Stamps, Trajectory
 from vobench.viewer import blueprint as bp
+from vobench.viewer.timeline import time_columns
+from vobench.viewer.truth import TruthView, log_truth
 
 Color = tuple[int, int, int]
 Tracks = tuple[Array, NDArray[np.bool_]]
@@ -43,12 +45,13 @@ class RunView:
 
     `frames` starts a fresh pass over the pictures. `error_m` belongs to the instants `error_t_ns`.
     `tracks` maps a frame's index to points (N, 2) in the left picture and which are inliers (N,).
-    There may be fewer `statuses` than frames, where an estimator stopped early.
+    There may be fewer `statuses` than frames, where an estimator stopped early. `truth` is None
+    where nothing was recorded of the pixels.
     """
 
     title: str
     rig: Rig
-    frames: Callable[[], Iterable[PngFrame]]
+    frames: Callable[[], Iterable[EncodedFrame]]
     ground_truth: Trajectory
     estimate: Trajectory
     error_t_ns: Stamps
@@ -56,6 +59,7 @@ class RunView:
     statuses: Sequence[str]
     tracks: Mapping[int, Tracks]
     summary_md: str
+    truth: TruthView | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +103,12 @@ def save_run(path: Path, run: RunView) -> None:
         _log_tracks(log, run.tracks)
         _log_statuses(log, statuses)
         log.static(bp.SUMMARY, rr.TextDocument(run.summary_md, media_type=rr.MediaType.MARKDOWN))
-        focus = first_failure(statuses)
-        stream.send_blueprint(bp.layout(run.ground_truth.positions_m, run.estimate.positions_m, focus=focus))
+        channels: tuple[str, ...] = ()
+        if run.truth is not None:
+            log_truth(stream, run.truth)
+            channels = run.truth.channels
+        focus, truth_m, estimate_m = first_failure(statuses), run.ground_truth.positions_m, run.estimate.positions_m
+        stream.send_blueprint(bp.layout(truth_m, estimate_m, focus=focus, channels=channels))
         stream.disconnect()
     part.replace(path)
 
@@ -108,12 +116,6 @@ def save_run(path: Path, run: RunView) -> None:
 def application_id(title: str) -> str:
     """One for each run, since Rerun keeps one layout per application; it takes few characters in them."""
     return "vobench-" + re.sub(r"[^A-Za-z0-9_]+", "-", title).strip("-")
-
-
-def time_columns(frames: NDArray[np.int64], t_ns: Stamps) -> list[rr.TimeColumn]:
-    """The two time lines of a recording: the frame's number, and seconds since the start."""
-    seconds = rr.TimeColumn("t", duration=t_ns.astype("timedelta64[ns]"))
-    return [rr.TimeColumn(bp.FRAME_TIMELINE, sequence=frames), seconds]
 
 
 def first_failure(statuses: Sequence[str]) -> tuple[int, int] | None:
@@ -125,13 +127,13 @@ def first_failure(statuses: Sequence[str]) -> tuple[int, int] | None:
     return max(0, failed[0] - around), min(len(statuses) - 1, failed[0] + around)
 
 
-def _log_pictures(stream: rr.RecordingStream, frames: Iterable[PngFrame]) -> Stamps:
-    """Log both pictures as the PNG they are, one frame in memory at a time; return the stamps."""
+def _log_pictures(stream: rr.RecordingStream, frames: Iterable[EncodedFrame]) -> Stamps:
+    """Log both pictures as they are encoded, one frame in memory at a time; return the stamps."""
     stamps = []
     for frame in frames:
         times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
-        for entity, png in ((bp.TRUTH_LEFT, frame.left), (bp.TRUTH_RIGHT, frame.right)):
-            columns = rr.EncodedImage.columns(blob=[png], media_type=[rr.MediaType.PNG])
+        for entity, encoded in ((bp.TRUTH_LEFT, frame.left), (bp.TRUTH_RIGHT, frame.right)):
+            columns = rr.EncodedImage.columns(blob=[encoded], media_type=[f"image/{frame.form}"])
             stream.send_columns(f"{entity}/image", times, columns)
         stamps.append(frame.t_ns)
     return np.array(stamps, np.int64)
@@ -160,7 +162,7 @@ def _log_cameras(log: _Log, run: RunView) -> None:
     log.columns(bp.ESTIMATE_LEFT, absent, rr.Clear.columns(is_recursive=[False] * len(absent)))
 
 
-def _log_camera(log: _Log, entity: str, camera: Pinhole, path: Trajectory, *, length_m: float, color: Color) -> None:
+def _log_camera(log: _Log, entity: str, camera: Camera, path: Trajectory, *, length_m: float, color: Color) -> None:
     frames, samples = log.frames_of(path.t_ns)
     poses, count = path.T_world_frame[samples], len(frames)
     log.columns(entity, frames, rr.Transform3D.columns(translation=poses[:, :3, 3], mat3x3=poses[:, :3, :3]))
@@ -175,7 +177,7 @@ def _log_camera(log: _Log, entity: str, camera: Pinhole, path: Trajectory, *, le
     log.columns(entity, frames, pinhole)
 
 
-def rerun_matrix(camera: Pinhole) -> Array:
+def rerun_matrix(camera: Camera) -> Array:
     """The camera matrix (3, 3) for Rerun's pixels, whose centres lie at halves."""
     K = camera.K
     K[:2, 2] += PIXEL_CENTRE

@@ -1,6 +1,7 @@
 """From a run's folder to what the viewer shows of it."""
 
 from collections.abc import Sequence as Rows
+from pathlib import Path
 from statistics import fmean
 
 import numpy as np
@@ -9,9 +10,10 @@ from vobench.errors import InputError, UnknownNameError
 from vobench.metric.score import score
 from vobench.results import estimate_file
 from vobench.results.run_folder import GROUND_TRUTH, SEQUENCE, STATUSES, SURVIVED, RunFolder, RunScore
-from vobench.sequence import Sequence
+from vobench.sequence import Sequence, read_truth_frames, read_truth_names, truth_channels
 from vobench.trajectory.trajectory import Trajectory
 from vobench.viewer.recording import RunView
+from vobench.viewer.truth import TruthView
 
 
 def pick(scores: Rows[RunScore], *, case: str | None, estimator: str | None) -> RunScore:
@@ -48,7 +50,7 @@ def run_view(folder: RunFolder, run: RunScore) -> RunView:
     return RunView(
         title=f"{run.estimator} on {run.case}",
         rig=sequence.rig,
-        frames=sequence.png_frames,
+        frames=sequence.encoded_frames,
         ground_truth=gt,
         estimate=Trajectory(est.t_ns, scored.alignment.apply(est.T_world_frame)) if scored else est,
         error_t_ns=scored.gt_t_ns if scored else est.t_ns,
@@ -56,7 +58,16 @@ def run_view(folder: RunFolder, run: RunScore) -> RunView:
         statuses=[row.status for row in estimate_file.read_frames(place)],
         tracks={i: (table[:, 2:4].astype(float), table[:, 4] > 0) for i, table in estimate_file.read_tracks(place)},
         summary_md=_summary(run),
+        truth=_truth(link),
     )
+
+
+def _truth(sequence: Path) -> TruthView | None:
+    """What was recorded of the pixels, None for most sequences."""
+    channels = truth_channels(sequence)
+    if not channels:
+        return None
+    return TruthView(channels, read_truth_names(sequence), lambda: read_truth_frames(sequence))
 
 
 def _error(run: RunScore) -> float:
