@@ -49,6 +49,7 @@ JSON = [
     (("run", "tiny"), "boards"),
     (("run", "tiny", "--dry-run"), "cases"),
     (("check", "tiny"), "cases"),
+    (("render", "closet", "--at", "0", "0", "1", "--out", "look.png"), "files"),
     (("list",), "entries"),
     (("list", "scenes"), "entries"),
     (("score", GT, EST), "metrics"),

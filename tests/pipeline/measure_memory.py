@@ -25,8 +25,9 @@ class Plain:
     def __init__(self, baked: object) -> None:
         pass
 
-    def radiance(self, camera: Any, T_world_camera: Any) -> Any:
-        slope = np.linspace(5, 45, camera.width_px, dtype=np.float32) + np.float32(20 * T_world_camera[0, 3])
+    def radiance(self, camera: Any, views: Any) -> Any:
+        x_m = views[0].T_world_camera[0, 0, 3]
+        slope = np.linspace(5, 45, camera.width_px, dtype=np.float32) + np.float32(20 * x_m)
         return np.repeat(slope[None], camera.height_px, 0)
 
     def close(self) -> None:

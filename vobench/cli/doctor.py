@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 
 from vobench.cli import terminal
 from vobench.errors import MissingDependencyError
+from vobench.render import llvm
 from vobench.render.egl import EGL_PACKAGES, EGL_REMEDY
 from vobench.results.store import default_store
 from vobench.results.unfinished import why_unwritable
@@ -18,25 +19,35 @@ PROBE = "from vobench.render import egl; egl.context()"
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing looked at: what was found, and the command that mends it where it is not well."""
+    """One thing looked at: what was found, and the command that mends it where it is not well.
+
+    What is optional may be missing without harm.
+    """
 
     check: str
     well: bool
     result: str
     remedy: str = ""
+    optional: bool = False
+
+    @property
+    def mark(self) -> str:
+        """What stands before it in the table."""
+        missing = "optional" if self.optional else "MISSING"
+        return "ok" if self.well else missing
 
 
 def show(*, fix: bool, as_json: bool) -> None:
     """Print every check; raise MissingDependencyError, with the commands that mend it, where one is not well."""
-    checks = [_python(), _libraries(), _drawing(), _cache()]
+    checks = [_python(), _libraries(), _drawing(), _cache(), _path_tracing()]
     if fix and not checks[2].well:
         checks[2] = _installed_drawing()
+    ill = [c for c in checks if not (c.well or c.optional)]
     if as_json:
-        terminal.print_json({"well": all(c.well for c in checks), "checks": [asdict(c) for c in checks]})
+        terminal.print_json({"well": not ill, "checks": [asdict(c) for c in checks]})
     else:
-        rows = [["ok" if c.well else "MISSING", c.check, c.result] for c in checks]
+        rows = [[c.mark, c.check, c.result] for c in checks]
         terminal.console().print(terminal.table("", ["", "check", "result"], rows))
-    ill = [c for c in checks if not c.well]
     if ill and as_json:
         raise SystemExit(1)  # the one object has said it all
     if ill:
@@ -98,3 +109,13 @@ def _cache() -> Check:
     writable = not why_unwritable(root)
     remedy = "set VOBENCH_CACHE to a folder that can be written"
     return Check("cache", writable, str(root) if writable else f"cannot write {root}", remedy)
+
+
+def _path_tracing() -> Check:
+    """Whether Mitsuba can render, tried in a process of its own: a wrong libLLVM would kill this one."""
+    try:
+        library = llvm.working_library()
+    except MissingDependencyError as error:
+        result, _, remedy = str(error).partition("; run: ")
+        return Check("path tracing (Mitsuba)", False, f"{result}; run: {_as_we_are(remedy)}", _as_we_are(remedy), True)
+    return Check("path tracing (Mitsuba)", True, f"works with {library}", optional=True)

@@ -77,7 +77,7 @@ def _frames(sequence: Sequence, needs: tuple[str, ...]) -> Iterator[Frame]:
     t_ns, ticks = sequence.encoders()
     seen = 0
     # Pictures that nobody asked for are not decoded.
-    for f in sequence.frames() if "stereo" in needs else sequence.png_frames():
+    for f in sequence.frames() if "stereo" in needs else sequence.encoded_frames():
         now = int(np.searchsorted(t_ns, f.t_ns, side="right"))
         encoders = EncoderReadings(t_ns[seen:now], ticks[seen:now]) if "encoders" in needs else None
         left, right = (f.left, f.right) if isinstance(f, StereoFrame) else (None, None)

@@ -21,8 +21,9 @@ class Drive:
     """What the robot did, at N frames and M = (N - 1) substeps + 1 encoder instants.
 
     state (N, 5): x, y of the point h in m, psi in rad, u in m/s, omega in rad/s. references (N, 2) hold
-    from their frame on. T_world_body and twist (vx, vy, vz, wx, wy, wz in body axes) are of the axle
-    midpoint B, sliding included. reached: the frame that entered each target. rim_rad (M, 2): left, right.
+    from their frame on. T_world_body and twist (vx, vy, vz, wx, wy, wz in body axes) are of the axle midpoint B,
+    sliding included; axle (M, 3) is its x, y and heading. reached: the frame that entered each target.
+    rim_rad (M, 2): left, right.
     """
 
     t_ns: NDArray[np.int64]
@@ -32,6 +33,7 @@ class Drive:
     twist: Array
     reached: tuple[int, ...]
     encoder_t_ns: NDArray[np.int64]
+    axle: Array
     rim_rad: Array
 
     @property
@@ -127,16 +129,18 @@ def _record(
 ) -> Drive:
     """The drive from its fine states (M, 7), references (N, 2) and side-slip angles (N,)."""
     state = fine[:: vehicle.substeps, :5]
-    x, y, psi, u, omega = state.T
+    u, omega = state[:, 3:].T
+    T_world_body = axle_poses(*fine[:, :3].T, a_m=vehicle.controller.a_m)
     side, still = u * np.tan(beta_rad) - skid_s * u * omega, np.zeros_like(u)
     return Drive(
         t_ns=_stamps(len(state), vehicle.rate_hz, 1),
         state=state,
         references=asked,
-        T_world_body=axle_poses(x, y, psi, a_m=vehicle.controller.a_m),
+        T_world_body=T_world_body[:: vehicle.substeps],
         twist=np.stack([u, side, still, still, still, omega], -1),
         reached=reached,
         encoder_t_ns=_stamps(len(fine), vehicle.rate_hz, vehicle.substeps),
+        axle=np.column_stack([T_world_body[:, :2, 3], fine[:, 2]]),
         rim_rad=fine[:, 5:],
     )
 

@@ -1,0 +1,44 @@
+"""What is true of every pixel that a case's cameras see: where each row of them stands, at which instant."""
+
+from typing import Literal
+
+import numpy as np
+
+from vobench.geometry.camera import Camera
+from vobench.pipeline.motion import BodyPath
+from vobench.render.stand import Shot
+from vobench.render.truth import TruthCaster
+from vobench.scene.scene import Scene
+from vobench.sensor.shutter import ShutterKind, row_stamps
+from vobench.sensor.truth import TruthFrame, TruthNames
+from vobench.suite.expand import Case
+
+Side = Literal["left", "right"]
+
+
+class PixelTruth:
+    """Ground truth of a case's pictures, amid each row's exposure; the true rig sees it."""
+
+    def __init__(self, case: Case, scene: Scene, path: BodyPath) -> None:
+        self._rig, self._shutter, self._path = case.build_true_rig(), case.camera.build_shutter(), path
+        self._channels, self._caster = case.truth, TruthCaster(scene)
+
+    @property
+    def names(self) -> TruthNames:
+        """What ids stand for."""
+        return self._caster.names
+
+    def frame(self, side: Side, t_ns: int, next_t_ns: int | None) -> TruthFrame:
+        """The channels of the picture stamped t_ns; the one stamped next_t_ns is where flow leads."""
+        later = None if next_t_ns is None else self._shot(side, next_t_ns)
+        return self._caster.frame(self._camera(side), self._shot(side, t_ns), self._channels, later=later)
+
+    def _camera(self, side: Side) -> Camera:
+        return self._rig.left if side == "left" else self._rig.right
+
+    def _shot(self, side: Side, t_ns: int) -> Shot:
+        T_body_camera = self._rig.T_body_left if side == "left" else self._rig.T_body_right
+        if self._shutter.kind is ShutterKind.GLOBAL:
+            return Shot(self._path(np.array([t_ns]))[0] @ T_body_camera, t_ns)
+        stamps = row_stamps(self._camera(side).height_px, self._shutter, t_ns)
+        return Shot(self._path(stamps) @ T_body_camera, stamps)
