@@ -65,9 +65,7 @@ def test_the_papers_presets_on_the_robot_are_its_rig_to_the_last_bit(name: str) 
 
 
 @every_preset
-def test_a_preset_names_its_chip_shutter_and_source(preset: StereoPreset) -> None:
-    assert preset.sensor == preset.sensor.lower() != ""
-    assert (preset.readout_s > 0) == (preset.shutter == "rolling")
+def test_a_preset_names_its_source(preset: StereoPreset) -> None:
     assert len(preset.source) > 20
 
 

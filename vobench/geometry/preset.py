@@ -1,10 +1,9 @@
-"""Stereo pairs by name: both lenses, how the cameras stand to each other, and the chip behind them.
+"""Stereo pairs by name: both lenses, and how the cameras stand to each other.
 
 Figures are published ones; each preset says by whom, and what in it is our assumption.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -17,18 +16,11 @@ from vobench.geometry.se3 import Array
 
 @dataclass(frozen=True, slots=True)
 class StereoPreset:
-    """Two cameras as one buys or publishes them, before they are put on a robot.
-
-    sensor      name of the image chip, a hint for whoever chooses a sensor model
-    readout_s   rows times the time from one row's exposure to the next one's; 0 for a global shutter
-    """
+    """Two cameras as one buys or publishes them, before they are put on a robot; `source` says whose figures."""
 
     left: Camera
     right: Camera
     T_left_right: Array
-    sensor: str
-    shutter: Literal["global", "rolling"]
-    readout_s: float
     source: str
 
     @property
@@ -63,9 +55,6 @@ def _paper(lens: Pinhole, reading: str) -> StereoPreset:
         left=lens,
         right=lens,
         T_left_right=side_by_side(0.12),
-        sensor="clean",
-        shutter="global",
-        readout_s=0.0,
         source=f"the paper, section II-B, {reading}; the baseline of 0.12 m is an assumption",
     )
 
@@ -89,9 +78,6 @@ EUROC = StereoPreset(
             (-0.0253898008918, 0.0179005838253, 0.999517347078, 0.00786212447038),
         ),
     ),
-    sensor="mt9v034",
-    shutter="global",
-    readout_s=0.0,
     source="EuRoC MAV data set (Burri et al., 2016), sensor.yaml of cam0 and cam1",
 )
 
@@ -100,9 +86,6 @@ D435I = StereoPreset(
     left=D435I_LENS,
     right=D435I_LENS,
     T_left_right=side_by_side(0.050028957),
-    sensor="ov9282",
-    shutter="global",
-    readout_s=0.0,
     source="infrared pair of one D435 as it reports itself, rectified: librealsense issue 11511 (lens), "
     "orb_slam_2_ros issue 46 (baseline); that a D435i has the same stereo module is by its data sheet",
 )
@@ -112,9 +95,6 @@ ZED2I = StereoPreset(
     left=ZED2I_LENS,
     right=ZED2I_LENS,
     T_left_right=side_by_side(0.12),
-    sensor="ov4689",
-    shutter="rolling",
-    readout_s=720 * 25.6e-6,
     source="HD720 at 30 frames/s: lens from a published factory calibration of the 2.1 mm ZED 2 family (left eye), "
     "baseline and chip from Stereolabs, 25.6 us a row from its support pages; "
     "that the right eye equals the left and both are parallel is an assumption",
@@ -125,9 +105,6 @@ TARTANAIR = StereoPreset(
     left=TARTANAIR_LENS,
     right=TARTANAIR_LENS,
     T_left_right=side_by_side(0.25),
-    sensor="clean",
-    shutter="global",
-    readout_s=0.0,
     source="TartanAir (Wang et al., 2020), tartanair_tools/data_type.md; a simulated camera",
 )
 
@@ -166,9 +143,6 @@ FISHEYE = StereoPreset(
             (0.0134102601601, 0.71140347541, -0.702611903198, 0.007859617077),
         ),
     ),
-    sensor="clean",
-    shutter="global",
-    readout_s=0.0,
     source="TUM VI (Schubert et al., 2018), calibration of the 512 x 512 export; no model of its chip here",
 )
 

@@ -21,6 +21,7 @@ from vobench.scene.scene import Scene
 from vobench.scene.texture import Map, reflectance
 
 MOVER_COARSER = 2
+SUNLIT_FINER = 2  # the half shadow of the sun is 1 cm wide for each metre to what casts it
 SUN_STEP_RAD = np.deg2rad(3)  # between the suns whose indirect light is baked
 
 
@@ -74,10 +75,16 @@ class Stage:
     holes: Holes
 
 
-def placed(scene: Scene, *, spacing_m: float) -> Layout:
-    """A map of a scene's inventory; movers' samples are coarser, as their light is found anew for each picture."""
+def placed(scene: Scene, *, spacing_m: float, sunlit: NDArray[np.bool_] | None = None) -> Layout:
+    """A map of a scene's inventory, finer where it is sunlit (S,).
+
+    Movers' samples are coarser, as their light is found anew for each picture.
+    """
     things = inventory(scene)
-    return layout(things.surfaces, spacing_m=np.where(things.mover < 0, 1, MOVER_COARSER) * spacing_m)
+    share = np.where(things.mover < 0, 1.0, MOVER_COARSER)
+    if sunlit is not None:
+        share = np.where(sunlit, 1 / SUNLIT_FINER, share)
+    return layout(things.surfaces, spacing_m=share * spacing_m)
 
 
 def stage(scene: Scene, where: Layout, *, seed: int) -> Stage:
@@ -93,8 +100,9 @@ def stage(scene: Scene, where: Layout, *, seed: int) -> Stage:
 def bake(scene: Scene, settings: BakeSettings) -> BakedScene:
     """Make the textures and compute the light of a scene; the same bytes for the same arguments."""
     albedo = tiles(scene)
-    fine = stage(scene, placed(scene, spacing_m=settings.spacing_m), seed=settings.seed)
     coarse = stage(scene, placed(scene, spacing_m=settings.indirect_spacing_m), seed=settings.seed)
+    where = placed(scene, spacing_m=settings.spacing_m, sunlit=_sunlit(scene, coarse, settings))
+    fine = stage(scene, where, seed=settings.seed)
     scales = Scales(fine.where, coarse.where)
     gathered = _gathered(scene, coarse, albedo, settings)
     instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
@@ -128,6 +136,16 @@ def _gathered(scene: Scene, coarse: Stage, albedo: dict[str, Map], settings: Bak
     answer = answers(coarse.things.surfaces, scene.materials, albedo, coarse.things.panel)
     skies = [light for light in scene.lights if isinstance(light, Sky)]
     return gathering(coarse.points, coarse.where, coarse.sight, answer, skies, rays=settings.indirect_rays)
+
+
+def _sunlit(scene: Scene, coarse: Stage, settings: BakeSettings) -> NDArray[np.bool_]:
+    """The surfaces (S,) on which the sun throws shadows, at any of the instants it is baked for."""
+    lit = np.zeros(len(coarse.things.surfaces), bool)
+    for index, light in enumerate(scene.lights):
+        for t_ns in key_times_ns(light) if isinstance(light, Sun) else ():
+            layer = direct_layer(scene, index, coarse, settings, t_ns=t_ns)
+            lit |= [bool(layer[patch.window].any()) for patch in coarse.where.patches]
+    return lit
 
 
 def _own_sky(scene: Scene, instants: list[tuple[int, float]]) -> dict[int, int]:

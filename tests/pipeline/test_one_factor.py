@@ -1,0 +1,136 @@
+"""One factor, one change: whatever is switched on, every other channel stays the same to the last bit."""
+
+import hashlib
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vobench.pipeline.progress import Silent
+from vobench.pipeline.simulate import simulate
+from vobench.pipeline.workshop import Workshop
+from vobench.results.store import Store
+from vobench.sequence import Sequence, payload_hash
+from vobench.sequence.bag import raw_messages
+from vobench.sequence.messages import Topic
+from vobench.suite.expand import read_plan
+
+SCENE = """name: cell
+white_cd_m2: 50
+materials:
+  grain: {pattern: terrazzo, albedo: 0.5, contrast: 0.6, resolution_px: 256}
+room: {size_m: [3, 3, 1.5], floor: grain, wall: grain, ceiling: grain}
+lamps: [{name: lamp, center_m: [0, 0, 1.4], size_m: [0.4, 0.4], power_lm: 600}]
+"""
+SUITE = """name: one
+seed: 3
+scenes: [SCENE]
+rigs: {down: {pitch_deg: 90CALIBRATION}}
+lightings: {it: LIGHTING}
+trajectories: {short: {targets_m: [[0.3, 0.05]], tolerance_m: 0.1, rate_hz: 5, slip: SLIP}}
+cameras: {it: {sensor: mt9v034CAMERA}}
+truth: TRUTH
+estimators: [stand_still]
+"""
+DEFAULTS = {"CALIBRATION": "", "LIGHTING": "{}", "SLIP": "nominal", "CAMERA": "", "TRUTH": "[]"}
+LEFT, RIGHT = "sensors/cam_left/image/compressed", "sensors/cam_right/image/compressed"
+PICTURES = {LEFT, RIGHT}
+# Says how to rectify both pictures, so it may know of the right camera.
+RECTIFIED_LEFT = "truth/ground_truth/cam_left/camera_info"
+# A factor, and the channels that it may change, and so must.
+FACTORS = {
+    "read noise": ({"CAMERA": ", chip: {read_noise_e: 0}"}, PICTURES),
+    "shot noise": ({"CAMERA": ", chip: {shot_noise: false}"}, PICTURES),
+    "fixed pattern": ({"CAMERA": ", chip: {prnu: 0, dsnu_e: 0}"}, PICTURES),
+    "hot pixels": ({"CAMERA": ", chip: {hot_share: 0.01}"}, PICTURES),
+    "response": ({"CAMERA": ", chip: {response: linear}"}, PICTURES),
+    "vignetting": ({"CAMERA": ", vignetting: 1"}, PICTURES),
+    "lens blur": ({"CAMERA": ", blur_sigma_px: 1"}, PICTURES),
+    "dirt": ({"CAMERA": ", dirt: 0.1"}, PICTURES),
+    "motion blur": ({"CAMERA": ", exposure_ms: 40, motion_blur: true"}, {*PICTURES, "sensors/exposure"}),
+    "rolling shutter": ({"CAMERA": ", shutter: rolling, readout_ms: 30"}, PICTURES),
+    "auto-exposure": (
+        {"CAMERA": ", auto_exposure: {target_share: 0.05, t_max_ms: 30}"},
+        {*PICTURES, "sensors/exposure"},
+    ),
+    "JPEG": ({"CAMERA": ", jpeg_quality: 90"}, PICTURES),
+    "light": ({"LIGHTING": "{lamp: {level: {flicker: {depth: 0.5}}}}"}, PICTURES),
+    "calibration": (
+        {"CALIBRATION": ", calibration_error: {right_yaw_deg: 1}"},
+        {RIGHT, "truth/tf_static", "truth/ground_truth/cam_right/camera_info", RECTIFIED_LEFT},
+    ),
+    "truth of pixels": ({"TRUTH": "[depth, flow, occlusion]"}, set()),
+}
+
+
+def recorded(folder: Path, *, cache: Path | None = None, **factors: str) -> Path:
+    """The sequence of the suite with these texts in place of its defaults; made anew without a cache."""
+    (folder / "scenes").mkdir(parents=True)
+    (folder / "scenes" / "cell.yaml").write_text(SCENE)
+    text = SUITE.replace("SCENE", str(folder / "scenes" / "cell.yaml"))
+    for key, value in {**DEFAULTS, **factors}.items():
+        text = text.replace(key, value)
+    (folder / "one.yaml").write_text(text)
+    (case,) = read_plan(str(folder / "one.yaml")).cases
+    return simulate(case, Workshop(Store(cache or folder / "cache"), Silent()))
+
+
+def channels(sequence: Path) -> dict[str, str]:
+    """A digest of each channel of both files."""
+    digests = {}
+    for name in ("sensors", "truth"):
+        for topic in _topics(sequence / f"{name}.mcap"):
+            digest = hashlib.sha256()
+            for _, data in raw_messages(sequence / f"{name}.mcap", (topic,)):
+                digest.update(data)
+            digests[f"{name}{topic.name}"] = digest.hexdigest()
+    return digests
+
+
+def _topics(path: Path) -> list[Topic]:
+    from mcap.reader import make_reader
+
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    schemas = summary.schemas
+    return [Topic(channel.topic, schemas[channel.schema_id].name) for channel in summary.channels.values()]
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the cases share their light."""
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory: pytest.TempPathFactory, cache: Path) -> Path:
+    return recorded(tmp_path_factory.mktemp("base") / "it", cache=cache)
+
+
+@pytest.mark.parametrize("name", FACTORS)
+def test_switching_one_effect_changes_its_own_channels_and_no_other(base, cache, tmp_path, name):
+    factors, may_change = FACTORS[name]
+    before, after = channels(base), channels(recorded(tmp_path / "it", cache=cache, **factors))
+    changed = {topic for topic in before if before[topic] != after[topic]}
+    assert changed <= may_change
+    assert changed >= may_change - {RECTIFIED_LEFT}
+
+
+def test_slip_changes_the_way_but_no_noise_of_the_chip(base, tmp_path):
+    """Before the robot has moved, both drives look from the same place: the first pictures are one and the same."""
+    dry = recorded(tmp_path / "it", SLIP="none")
+    first, other = (next(iter(Sequence.open(folder).frames())) for folder in (base, dry))
+    np.testing.assert_array_equal(first.left, other.left)
+    assert channels(base)["truth/ground_truth/odometry"] != channels(dry)["truth/ground_truth/odometry"]
+
+
+def test_three_recordings_in_one_process_and_two_at_once_in_others_have_equal_hashes(base, tmp_path):
+    again = [recorded(tmp_path / f"again{n}") for n in range(2)]
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as workers:
+        beside = list(workers.map(recorded, [tmp_path / f"worker{n}" for n in range(2)]))
+    assert len({payload_hash(sequence) for sequence in (base, *again, *beside)}) == 1
+    files = [(s / name).read_bytes() for s in (base, *again, *beside) for name in ("sensors.mcap", "truth.mcap")]
+    assert len(set(files)) == 2
