@@ -53,6 +53,10 @@ JSON = [
     (("list",), "entries"),
     (("list", "scenes"), "entries"),
     (("score", GT, EST), "metrics"),
+    (("diagnose", GT, GT), "findings"),
+    (("metrics",), "metrics"),
+    (("metrics", "ate_trans"), "formula"),
+    (("metrics", "ate"), "error"),
     (("report", "runs/tiny"), "boards"),
     (("report", "runs/tiny", "--out", "board.html"), "path"),
     (("view", "runs/tiny"), "path"),
@@ -90,8 +94,8 @@ WRONG = [
     (("run", "tiny", "--out", "suites/tiny.yaml"), "--out should be a folder that can be written (File exists): suites/tiny.yaml"),
     (("list", "scene_s"), "no kind named 'scene_s'. Did you mean 'scenes'? Known: estimators, scenes, suites"),
     (("score", "no.tum", "no.tum"), "cannot read no.tum: No such file or directory"),
-    (("score", "suites/tiny.yaml", "no.tum"), "suites/tiny.yaml:1: a pose has 8 columns (t x y z qx qy qz qw), this line has 2"),
-    (("score", "a", "b", "--align", "sm3"), "no alignment named 'sm3'. Did you mean 'sim3'? Known: none, origin, se3, sim3"),
+    (("score", "suites/tiny.yaml", "no.tum"), "suites/tiny.yaml:1: no form of trajectory has 2 columns: TUM has 8 (t x y z qx qy qz qw), KITTI 12, TartanAir 7, EuRoC 8 and commas"),
+    (("score", "a", "b", "--align", "sm3"), "no alignment named 'sm3'. Did you mean 'sim3'? Known: none, origin, scale, se3, sim3, yaw"),
     (("score", "a", "b", "--t-max-diff", "nan"), "--t-max-diff should be 0 to 1e+06 seconds, got nan"),
     (("report", "suites"), "not the folder of a run (no cases/*/*/*/score.json in it): suites"),
     (("report", "suites", "--format", "htm"), "no format named 'htm'. Did you mean 'html'? Known: csv, html, json, latex, md, terminal"),
@@ -107,7 +111,7 @@ def test_a_mistake_is_one_line_and_exit_code_1(vobench, words, sentence):
 
 
 def test_a_mistake_in_the_words_themselves_is_exit_code_2(vobench):
-    for words in (("bogus",), ("run",), ("run", "tiny", "--bogus"), ("score", "a", "b", "--delta", "0")):
+    for words in (("bogus",), ("run",), ("run", "tiny", "--bogus"), ("score", "a", "b", "--delta", "much")):
         assert vobench(*words).code == 2
 
 

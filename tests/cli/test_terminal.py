@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from vobench.cli import terminal
+from vobench.cli import boards, terminal
 from vobench.report.leaderboard import Board, Row
 
 ROW = Row(
@@ -29,7 +29,7 @@ def drawn(width, monkeypatch):
     file = io.StringIO()
     out = Console(file=file, width=width, markup=False, highlight=False)
     monkeypatch.setattr(terminal, "console", lambda: out)
-    terminal.print_boards([Board("short", (ROW,))])
+    boards.print_boards([Board("short", (ROW,))])
     return file.getvalue()
 
 
@@ -43,8 +43,8 @@ def test_a_board_fits_with_every_cell_in_one_piece(width, monkeypatch):
 
 
 def test_a_wide_terminal_shows_every_column(monkeypatch):
-    assert all(heading in drawn(140, monkeypatch) for heading in terminal.HEADINGS)
+    assert all(heading in drawn(140, monkeypatch) for heading in boards.HEADINGS)
 
 
 def test_the_columns_that_may_go_exist():
-    assert set(terminal.LEAST_FIRST) < set(terminal.HEADINGS)
+    assert set(boards.LEAST_FIRST) < set(boards.HEADINGS)

@@ -1,6 +1,9 @@
 """Scores that other tools publish for real trajectories, found again."""
 
 import json
+import shlex
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -9,68 +12,82 @@ import pytest
 from vobench.geometry import se3
 from vobench.metric.ate import absolute_errors
 from vobench.metric.rpe import relative_errors
-from vobench.metric.score import ScoreSettings, score
-from vobench.metric.segment import KITTI_LENGTHS_M, segment_errors
+from vobench.metric.scale import ate_scale, motion_scale
+from vobench.metric.score import ScoreSettings, compare, score
+from vobench.metric.segment import devkit_distances, mean_drift, segment_errors
+from vobench.metric.settings import KITTI_LENGTHS_M, LIKE, TARTANAIR_LENGTHS_M
 from vobench.metric.statistic import statistics
 from vobench.trajectory.align import align
-from vobench.trajectory.associate import associate
 from vobench.trajectory.text import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
 DATA = Path(__file__).parents[2] / ".." / "shared" / "data"
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="no folder ../shared/data with the published trajectories")
 
-ALIGNMENTS = ("none", "origin", "se3", "sim3")
-MOVED = [f"ape/{kind}/{part}" for kind in ALIGNMENTS for part in ("trans_part", "angle_deg")]
-RELATIVE = [f"rpe/{delta}/{part}" for delta in ("f1", "f10all") for part in ("trans_part", "angle_deg")]
+PARTS = {"trans_part": "trans", "angle_deg": "rot", "rot_part": "rot_chordal", "full": "full"}
 
 
+@cache
 def read_tum(path):
     return parse_tum((DATA / path).read_text(), name=path)
 
 
+@cache
 def read_kitti(path):
     """Matrices as the file has them, stamped with their row."""
     rows = np.loadtxt(DATA / path).reshape(-1, 3, 4)
-    return Trajectory(np.arange(len(rows)), se3.transform(rows[:, :, :3], rows[:, :, 3]))
+    return Trajectory(np.arange(len(rows)) * 10**8, se3.transform(rows[:, :, :3], rows[:, :, 3]))
 
 
-def read_tartanair(path):
-    rows = np.loadtxt(DATA / path)
+def read_tartanair(name):
+    rows = np.loadtxt(DATA / "trajectories" / "tartanair" / f"pose_{name}.txt")
     q_xyzw = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
-    return Trajectory(np.arange(len(rows)), se3.transform(se3.from_quaternion(q_xyzw), rows[:, :3]))
+    return se3.transform(se3.from_quaternion(q_xyzw), rows[:, :3])
 
 
 def evo_cases():
     if not DATA.is_dir():
         return []
     cases = json.loads((DATA / "evo_expected.json").read_text())["cases"]
-    wanted = (*MOVED, *RELATIVE, "ape/se3/tmax0.02")
-    return [pytest.param(case, id=case["id"]) for case in cases if case["id"].partition("/")[2] in wanted]
+    return [pytest.param(case, id=case["id"]) for case in cases]
 
 
-def measured(case):
-    """Errors as evo's command measures them; its `f10all` counts matched poses, not frames of the truth."""
-    read = read_tum if case["fmt"] == "tum" else read_kitti
-    gt, est = read(case["ref"]), read(case["est"])
-    _, tool, how, part = case["id"].split("/")
-    pairs = associate(gt.t_ns, est.t_ns, max_diff_ns=20_000_000 if part == "tmax0.02" else 10_000_000)
-    T_gt, T_est = gt.T_world_frame[pairs.gt], est.T_world_frame[pairs.est]
-    if tool == "ape":
-        errors = absolute_errors(T_gt, align(T_est, T_gt, kind=how).apply(T_est))
-    else:
-        errors = relative_errors(T_gt, T_est, np.arange(len(pairs)), delta={"f1": 1, "f10all": 10}[how])
-    return np.rad2deg(errors.rot_rad) if part == "angle_deg" else errors.trans_m
+def as_settings(flags):
+    """evo's options as changes to the settings that are like evo, and the part of the error that it asks for."""
+    words = shlex.split(flags)
+    after = dict(zip(words, [*words[1:], None], strict=True))
+    aligned = {("-a",): "se3", ("-a", "-s"): "sim3", ("--align_origin",): "origin", (): "none"}
+    changes = {
+        "alignment": aligned[tuple(w for w in words if w in ("-a", "-s", "--align_origin"))],
+        "max_diff_ns": round(float(after.get("--t_max_diff", 0.01)) * 1e9),
+        "rpe_delta": float(after.get("-d", 1)),
+        "rpe_unit": after.get("-u", "f"),
+        "rpe_all_pairs": "--all_pairs" in words,
+        "rpe_pairs_from": "gt" if "--pairs_from_reference" in words else "est",
+    }
+    return replace(LIKE["evo"], full=True, **changes), after.get("-r", "trans_part"), "--project_to_plane" in words
 
 
 @pytest.mark.parametrize("case", evo_cases())
 def test_evo_finds_the_same_statistics(case):
-    # No stamp of these files is wanted twice, so evo's many-to-one pairs are our one-to-one pairs.
-    ours = statistics(measured(case))
+    settings, part, on_xy = as_settings(case["flags"])
+    read = read_tum if case["fmt"] == "tum" else read_kitti
+    gt, est = read(case["ref"]), read(case["est"])
+    if on_xy:  # after the alignment evo drops z: what is left are our errors along x and y
+        of = compare(gt, est, settings)
+        errors = np.linalg.norm((of.T_aligned - of.matched.T_gt)[:, :2, 3], axis=1)
+        ours = statistics(errors)
+    else:
+        tool = {"ape": "ate", "rpe": "rpe"}[case["tool"]]
+        ours = score(gt, est, settings=settings).metric(f"{tool}_{PARTS[part]}").statistics
     assert ours.n == case["n"]
     for name, expected in case["stats"].items():
         # A minimum near zero holds the rounding of positions and matrices of size one.
         assert getattr(ours, name) == pytest.approx(expected, rel=1e-9, abs=1e-9 if name == "min" else 0), name
+
+
+def test_every_published_case_is_among_them():
+    assert len(evo_cases()) == len(json.loads((DATA / "evo_expected.json").read_text())["cases"])
 
 
 def test_the_score_of_defaults_is_evo_with_se3_alignment():
@@ -83,34 +100,73 @@ def test_the_score_of_defaults_is_evo_with_se3_alignment():
     assert rmse["rpe_rot"] == pytest.approx(0.35361316104479856, rel=1e-9)
 
 
-def test_the_kitti_devkit_finds_the_same_segments():
+def test_tums_own_scripts_find_the_same():
+    gt = read_tum("trajectories/freiburg1_xyz-groundtruth.txt")
+    result = score(gt, read_tum("trajectories/freiburg1_xyz-rgbdslam.txt"), settings=LIKE["tum"])
+    found = {m.name: m.statistics for m in result.metrics}
+    assert (found["ate_trans"].n, found["rpe_trans"].n, found["rpe_rot"].n) == (786, 753, 753)
+    assert f"{found['ate_trans'].rmse:.6f}" == "0.013473"
+    assert f"{found['rpe_trans'].rmse:.6f}" == "0.021217"
+    assert f"{found['rpe_rot'].rmse:.6f}" == "0.934480"
+
+
+def test_the_kitti_devkit_finds_the_same_segments_to_the_printed_digits():
     gt, est = (read_kitti(f"trajectories/KITTI_00_{name}.txt") for name in ("gt", "ORB"))
     s = segment_errors(
         gt.T_world_frame,
         est.T_world_frame,
         np.arange(len(gt)),
-        gt.distances_m(),
+        devkit_distances(gt.positions_m),
         lengths_m=KITTI_LENGTHS_M,
         step_frames=10,
+        precision="devkit",
     )
-    devkit = np.loadtxt(DATA / "kitti_devkit_00_ORB_segments.txt")
-    devkit = devkit[np.lexsort((devkit[:, 0], devkit[:, 3]))]
-    np.testing.assert_array_equal(np.stack([s.first, s.length_m], -1), devkit[:, [0, 3]])
-    # The devkit sums the path in float32, which ends 4 of the 3,283 segments a frame elsewhere.
-    same_end = np.abs(s.length_m / (0.1 * (s.last - s.first + 1)) - devkit[:, 4]) < 1e-5
-    assert np.count_nonzero(~same_end) == 4
-    # It prints six decimals, and its float32 arc cosine resolves 3.5e-4 rad.
-    np.testing.assert_allclose(s.trans_ratio[same_end], devkit[same_end, 2], rtol=0, atol=1e-6)
-    np.testing.assert_allclose(s.rot_radpm[same_end], devkit[same_end, 1], rtol=0, atol=2e-6)
-    assert s.trans_ratio.mean() == pytest.approx(0.00699733457787, rel=2e-5)
-    assert s.rot_radpm.mean() == pytest.approx(4.42183086317e-05, rel=7e-4)
+    speed_mps = (s.length_m / (0.1 * (s.last - s.first + 1))).astype(np.float32)
+    rows = zip(s.first, s.rot_radpm, s.trans_ratio, s.length_m, speed_mps, strict=True)
+    printed = (DATA / "kitti_devkit_00_ORB_segments.txt").read_text().splitlines()
+    assert [f"{first} {r:f} {t:f} {length:f} {speed:f}" for first, r, t, length, speed in rows] == printed
+    assert f"{mean_drift(s.trans_ratio, s.length_m):.8g}" == "0.0069973371"
+    assert f"{mean_drift(s.rot_radpm, s.length_m):.7g}" == "4.421829e-05"
 
 
-def test_tartanairs_evaluator_finds_the_same_scores_without_scale():
-    gt, est = (read_tartanair(f"trajectories/tartanair/pose_{name}.txt") for name in ("gt", "est"))
-    lengths = tuple(float(length) for length in range(5, 45, 5))
-    result = score(gt, est, settings=ScoreSettings(max_diff_ns=0))
-    assert result.metric("ate_trans").statistics.rmse == pytest.approx(1.204507439280004, rel=1e-12)
-    s = segment_errors(gt.T_world_frame, est.T_world_frame, np.arange(len(gt)), gt.distances_m(), lengths_m=lengths)
-    of_length = [s.rot_radpm[s.length_m == length].mean() for length in lengths]
-    assert np.rad2deg(np.mean(of_length)) == pytest.approx(0.07987194481751003, rel=1e-12)
+def test_like_kitti_quotes_the_devkits_means_and_float64_is_close():
+    gt, est = (read_kitti(f"trajectories/KITTI_00_{name}.txt") for name in ("gt", "ORB"))
+    devkit, ours = (score(gt, est, settings=settings) for settings in (LIKE["kitti"], ScoreSettings()))
+    t_rel, r_rel = (devkit.metric(name).statistics for name in ("kitti_t_rel", "kitti_r_rel"))
+    assert (t_rel.n, r_rel.n) == (3283, 3283)
+    assert t_rel.mean == pytest.approx(0.0069973371, rel=1e-8)
+    assert np.deg2rad(r_rel.mean) == pytest.approx(4.421829e-05, rel=2e-7)
+    # In float64 4 of 3,283 segments end a frame elsewhere, and no angle is rounded.
+    assert ours.metric("kitti_t_rel").statistics.mean == pytest.approx(t_rel.mean, rel=2e-5)
+    assert ours.metric("kitti_r_rel").statistics.mean == pytest.approx(r_rel.mean, rel=7e-4)
+
+
+def scaled(T, factor):
+    return se3.transform(T[:, :3, :3], factor * T[:, :3, 3])
+
+
+def test_tartanairs_evaluator_finds_the_same_absolute_errors():
+    gt, est = read_tartanair("gt"), read_tartanair("est")
+    for factor, rmse in ((1.0, 1.204507439280004), (ate_scale(gt, est), 0.8344983411575012)):
+        moved = scaled(est, factor)
+        errors = absolute_errors(gt, align(moved, gt, kind="se3").apply(moved)).trans_m
+        assert statistics(errors).rmse == pytest.approx(rmse, rel=1e-12)
+
+
+def test_tartanairs_evaluator_finds_the_same_drift():
+    t_ns = np.arange(734) * 10**8
+    gt, est = read_tartanair("gt"), read_tartanair("est")
+    moved = scaled(est, motion_scale(gt, est))
+    settings = ScoreSettings(alignment="none", segment_lengths_m=TARTANAIR_LENGTHS_M, segment_mean="macro")
+    result = score(Trajectory(t_ns, gt), Trajectory(t_ns, moved), settings=settings)
+    assert result.metric("kitti_r_rel").statistics.mean == pytest.approx(0.07987194481751003, rel=1e-12)
+    assert result.metric("kitti_t_rel").statistics.mean == pytest.approx(0.05710317871475973, rel=1e-12)
+
+
+def test_tartanairs_relative_errors_are_a_random_sample_of_ours():
+    # Their figures are means over 10,000 random pairs of frames: rotation 0.0303 rad, translation 1.2417 m.
+    gt, est = read_tartanair("gt"), read_tartanair("est")
+    first, last = np.nonzero(np.ones((len(gt), len(gt))))
+    errors = relative_errors(gt, scaled(est, motion_scale(gt, est)), (first, last))
+    for ours, theirs in ((errors.rot_rad, 0.030297256815805043), (errors.trans_m, 1.2416853348984116)):
+        assert abs(ours.mean() - theirs) < 3 * ours.std() / np.sqrt(10_000)

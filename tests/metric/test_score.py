@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vobench.errors import AlignmentError
@@ -14,7 +14,7 @@ from vobench.trajectory.trajectory import Trajectory
 
 N = 120
 T_NS = np.arange(N, dtype=np.int64) * 33_333_333
-NAMES = ["ate_trans", "ate_rot", "rpe_trans", "rpe_rot", "segment_trans", "segment_rot"]
+NAMES = ["ate_trans", "ate_rot", "rpe_trans", "rpe_rot", "kitti_t_rel", "kitti_r_rel"]
 UNITS = ["m", "deg", "m", "deg", "1", "deg/m"]
 STATISTICS = ["n", "rmse", "mean", "median", "std", "min", "max", "sse", "p95", "p99"]
 
@@ -62,6 +62,53 @@ def test_a_rigid_motion_of_the_estimate_changes_nothing(gt, seed):
     assert rmse(score(gt, elsewhere)) == pytest.approx(rmse(score(gt, est)), rel=1e-9)
 
 
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_rigid_motion_of_the_truth_changes_nothing_either(seed):
+    rng = np.random.default_rng(seed)
+    est = Trajectory(T_NS, noisy(GT.T_world_frame, rng))
+    elsewhere = Trajectory(T_NS, random_pose(rng) @ GT.T_world_frame)
+    assert rmse(score(elsewhere, est)) == pytest.approx(rmse(score(GT, est)), rel=1e-9)
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_truth_and_estimate_may_change_places(seed):
+    est = Trajectory(T_NS, noisy(GT.T_world_frame, np.random.default_rng(seed)))
+    here, there = rmse(score(GT, est)), rmse(score(est, GT))
+    for name in ("ate_trans", "ate_rot", "rpe_trans", "rpe_rot"):
+        assert there[name] == pytest.approx(here[name], rel=1e-9)
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_freer_the_alignment_the_smaller_the_error(seed):
+    rng = np.random.default_rng(seed)
+    est = Trajectory(T_NS, random_pose(rng) @ noisy(GT.T_world_frame, rng, 0.05))
+    of = {
+        kind: rmse(score(GT, est, settings=ScoreSettings(alignment=kind)))["ate_trans"]
+        for kind in ("none", "origin", "yaw", "se3", "sim3")
+    }
+    slack = 1 + 1e-12
+    assert of["sim3"] <= of["se3"] * slack
+    assert of["se3"] <= min(of["yaw"], of["origin"]) * slack
+    assert of["yaw"] <= of["none"] * slack
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1), factor=st.floats(1.001, 100))
+def test_larger_errors_score_larger_in_proportion(seed, factor):
+    offset_m = np.random.default_rng(seed).normal(size=(N, 3))
+
+    def errors_of(size_m):
+        T = se3.transform(GT.T_world_frame[:, :3, :3], GT.positions_m + size_m * offset_m)
+        return rmse(score(GT, Trajectory(T_NS, T), settings=ScoreSettings(alignment="none")))
+
+    small, large = errors_of(0.01), errors_of(0.01 * factor)
+    for name in ("ate_trans", "rpe_trans", "kitti_t_rel"):
+        assert large[name] == pytest.approx(factor * small[name], rel=1e-9)
+
+
 @given(seed=st.integers(0, 2**32 - 1), scale=st.floats(0.01, 100))
 def test_with_sim3_the_scale_of_the_estimate_changes_nothing(seed, scale):
     est = noisy(GT.T_world_frame, np.random.default_rng(seed))
@@ -91,7 +138,7 @@ def test_standing_still_scores_the_spread_of_the_truth_about_its_mean():
     assert rmse(result)["ate_trans"] == pytest.approx(spread_m)
     assert result.ate_rot_deg[0] == pytest.approx(0.0)
     # All that was driven is missing: at most the length and the one frame that a segment may exceed it by.
-    assert result.metric("segment_trans").statistics.max <= 1.0 + np.diff(GT.distances_m()).max() / 0.5
+    assert result.metric("kitti_t_rel").statistics.max <= 1.0 + np.diff(GT.distances_m()).max() / 0.5
     assert any("leave open: rotation;" in warning for warning in result.warnings)
 
 
@@ -133,23 +180,23 @@ def test_a_metric_without_samples_is_left_out_and_a_warning_says_why():
 
 
 def test_the_id_says_how_the_number_came_about():
-    settings = ScoreSettings(alignment="sim3", max_diff_ns=2_500_000, rpe_delta_frames=5, segment_lengths_m=(0.5, 1))
+    settings = ScoreSettings(alignment="sim3", max_diff_ns=2_500_000, rpe_delta=5, segment_lengths_m=(0.5, 1))
     result = score(GT, Trajectory(T_NS[10:], GT.T_world_frame[10:]), settings=settings)
     tail = "align=sim3; assoc=nearest<=2.5ms; n=110/120]"
     assert [metric.id for metric in result.metrics] == [
         f"ate.trans.rmse[{tail}",
         f"ate.rot.rmse[{tail}",
-        f"rpe.trans.rmse[delta=5 frames; {tail}",
-        f"rpe.rot.rmse[delta=5 frames; {tail}",
-        f"segment.trans.mean[lengths=0.5,1 m; step=1 frame; {tail}",
-        f"segment.rot.mean[lengths=0.5,1 m; step=1 frame; {tail}",
+        f"rpe.trans.rmse[delta=5f; pairs=consecutive/gt; {tail}",
+        f"rpe.rot.rmse[delta=5f; pairs=consecutive/gt; {tail}",
+        f"kitti.t_rel.mean[lengths=0.5,1m; step=1; {tail}",
+        f"kitti.r_rel.mean[lengths=0.5,1m; step=1; {tail}",
     ]
 
 
 def test_the_json_form_has_these_keys_and_plain_values():
     result = score(GT, Trajectory(T_NS, noisy(GT.T_world_frame, np.random.default_rng(2)))).as_dict()
     assert json.loads(json.dumps(result, allow_nan=False)) == result
-    assert list(result) == ["metrics", "association", "coverage", "alignment", "warnings"]
+    assert list(result) == ["metrics", "association", "coverage", "alignment", "failure", "warnings"]
     assert [metric["unit"] for metric in result["metrics"]] == UNITS
     assert all(list(metric) == ["id", "name", "unit", *STATISTICS] for metric in result["metrics"])
     assert result["association"] == {"pairs": N, "gt_poses": N, "est_poses": N, "max_diff_s": 0.01}
@@ -171,10 +218,20 @@ def test_the_series_are_one_entry_a_matched_frame():
     "wrong",
     [
         {"max_diff_ns": -1},
-        {"rpe_delta_frames": 0},
+        {"rpe_delta": 0},
+        {"rpe_delta": -1.0},
+        {"rpe_delta": float("nan")},
+        {"rpe_delta": 1.5},
+        {"rpe_delta": 181.0, "rpe_unit": "d"},
+        {"rpe_unit": "km"},
+        {"rpe_rule": "tum", "rpe_unit": "m"},
+        {"rpe_rule": "tum", "rpe_unit": "s", "rpe_all_pairs": False, "rpe_pairs_from": "est"},
+        {"alignment": "so3"},
+        {"align_n": 0},
         {"segment_step_frames": 0},
         {"segment_lengths_m": ()},
         {"segment_lengths_m": (1.0, 0.0)},
+        {"fail_ratio": 0.0},
     ],
 )
 def test_settings_that_measure_nothing_are_refused(wrong):

@@ -6,7 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vobench.geometry import se3
-from vobench.metric.segment import segment_errors, segment_pairs
+from vobench.metric.segment import (
+    SegmentErrors,
+    devkit_distances,
+    mean_drift,
+    pooled,
+    segment_errors,
+    segment_pairs,
+)
 
 STEP_M = 0.25  # a power of two, so that path lengths are exact and "strictly beyond" shows
 
@@ -70,3 +77,57 @@ def test_a_turn_of_a_tenth_of_a_radian_a_metre_is_found():
     T_est[:, :3, :3] = se3.rotation_z(0.1 * np.arange(n) / 1024)
     s = segment_errors(T_gt, T_est, np.arange(n), np.arange(n) / 1024, lengths_m=(0.1, 0.3))
     assert s.rot_radpm == pytest.approx(0.1, rel=0.01)
+
+
+def wandering(rng, n=500):
+    """A path of unequal steps that turns, and an estimate of it."""
+    yaw = np.cumsum(rng.normal(scale=0.05, size=n))
+    steps = rng.uniform(0.5, 1.5, n)[:, None] * np.stack([np.cos(yaw), np.sin(yaw), 0 * yaw], -1)
+    T_gt = se3.transform(se3.rotation_z(yaw), np.cumsum(steps, axis=0))
+    drift = se3.transform(se3.rotation_z(1e-4 * np.arange(n)), np.zeros((n, 3)))
+    return T_gt, drift @ T_gt
+
+
+def test_the_devkits_rounding_changes_little_and_only_the_last_digits():
+    T_gt, T_est = wandering(np.random.default_rng(1))
+    lengths = (20.0, 50.0, 100.0)
+    frames, way = np.arange(len(T_gt)), np.linalg.norm(np.diff(T_gt[:, :3, 3], axis=0), axis=1)
+    exact = segment_errors(T_gt, T_est, frames, np.concatenate([[0.0], np.cumsum(way)]), lengths_m=lengths)
+    sums = devkit_distances(T_gt[:, :3, 3])
+    rounded = segment_errors(T_gt, T_est, frames, sums, lengths_m=lengths, precision="devkit")
+    assert (sums.dtype, rounded.trans_ratio.dtype, rounded.rot_radpm.dtype) == (np.float32,) * 3
+    np.testing.assert_array_equal(rounded.first, exact.first)
+    same = rounded.last == exact.last
+    assert same.mean() > 0.99
+    np.testing.assert_allclose(rounded.trans_ratio[same], exact.trans_ratio[same], rtol=1e-5)
+    # Near 1 a float32 cosine has steps of 6e-8: angles below a milliradian drown in them.
+    np.testing.assert_allclose(rounded.rot_radpm[same], exact.rot_radpm[same], atol=3.5e-4 / 20)
+
+
+def test_segments_come_start_after_start():
+    T_gt, T_est = wandering(np.random.default_rng(2), 100)
+    s = segment_errors(T_gt, T_est, np.arange(100), np.arange(100.0), lengths_m=(20.0, 5.0, 10.0), step_frames=10)
+    assert list(zip(s.first, s.length_m, strict=True)) == sorted(zip(s.first, s.length_m, strict=True))
+
+
+def test_micro_counts_segments_and_macro_counts_lengths():
+    errors, length_m = np.array([1.0, 1.0, 1.0, 5.0]), np.array([10.0, 10.0, 10.0, 20.0])
+    assert mean_drift(errors, length_m) == 2.0
+    assert mean_drift(errors, length_m, mean="macro") == 3.0
+
+
+def test_several_sequences_are_pooled_by_segments_or_by_sequences():
+    def of(errors):
+        n = len(errors)
+        nothing = np.zeros(n, np.int64)
+        return SegmentErrors(nothing, nothing, np.ones(n), np.array(errors), 2 * np.array(errors))
+
+    sequences = [of([1.0, 1.0, 1.0]), of([5.0])]
+    assert pooled(sequences) == (2.0, 4.0)
+    assert pooled(sequences, mean="macro") == (3.0, 6.0)
+
+
+def test_a_float32_mean_rounds_after_every_sum():
+    errors = np.full(10**6, 0.1, np.float32)
+    assert mean_drift(errors, errors) != pytest.approx(0.1, rel=1e-4)
+    assert mean_drift(errors.astype(float), errors) == pytest.approx(0.1, rel=1e-7)

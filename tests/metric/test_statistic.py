@@ -21,6 +21,12 @@ def test_statistics_obey_their_laws(errors):
     assert s.min * (1 - 1e-12) <= s.mean <= s.rmse * (1 + 1e-12) + 1e-12
 
 
+@given(ERRORS)
+def test_percentiles_are_numpys(errors):
+    s = statistics(errors)
+    assert (s.median, s.p95, s.p99) == pytest.approx(tuple(np.percentile(errors, [50, 95, 99])), rel=1e-12)
+
+
 def test_statistics_of_a_hundred_and_one_numbers():
     s = statistics(np.arange(101.0))
     assert (s.n, s.mean, s.median, s.min, s.max, s.p95, s.p99) == (101, 50, 50, 0, 100, 95, 99)
@@ -31,3 +37,8 @@ def test_statistics_of_a_hundred_and_one_numbers():
 def test_nothing_has_no_statistics():
     with pytest.raises(ValueError, match="got none"):
         statistics([])
+
+
+def test_the_spread_of_a_sample_divides_by_one_less():
+    assert statistics([1.0, 2.0, 3.0], ddof=1).std == 1.0
+    assert statistics([4.0], ddof=1).std == 0.0

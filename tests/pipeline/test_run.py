@@ -146,6 +146,13 @@ def test_what_an_estimator_says_while_it_is_lost_is_no_pose(bench, first, plugin
     assert score.reason == f"no pose for 1 of {score.frames} frames; the first is 3"
 
 
+def test_who_gives_up_before_the_end_is_lost_however_much_it_covered(bench, first, plugin):
+    folder = plugin("return Result(np.eye(4), Status.OK if frame.index < 8 else Status.LOST, 'dark')")
+    score = bench.run(("[wheel_odometry, stand_still]", f"[{folder}]")).scores()[0]
+    assert score.status == "lost"
+    assert score.reason == f"a pose for {score.coverage:.0%} of the frames and none at the end"
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux lets a process forget its peak")
 def test_memory_does_not_grow_with_the_length_of_a_sequence(bench, plugin):
     script = Path(__file__).with_name("measure_memory.py")

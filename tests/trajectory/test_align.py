@@ -1,6 +1,7 @@
 """Alignment: what a similarity hides is found again, and what can't be found is said."""
 
 import json
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
-from vobench.trajectory.align import Alignment, align, align_positions, turn
+from vobench.trajectory.align import Alignment, Kind, align, align_positions, turn
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -154,7 +155,7 @@ def test_positions_too_large_to_square_are_an_error_of_ours():
         align(T, T, kind="se3")
 
 
-@pytest.mark.parametrize("kind", ["none", "origin", "se3", "sim3"])
+@pytest.mark.parametrize("kind", get_args(Kind))
 def test_an_alignment_comes_back_from_json_as_it_was(kind):
     rng = np.random.default_rng(3)
     T_est, T_gt = (np.tile(np.eye(4), (9, 1, 1)) for _ in range(2))
@@ -163,3 +164,95 @@ def test_an_alignment_comes_back_from_json_as_it_was(kind):
     back = Alignment.from_dict(json.loads(json.dumps(made.as_dict())))
     assert back.as_dict() == made.as_dict()
     np.testing.assert_array_equal(back.apply(T_est), made.apply(T_est))
+
+
+@given(SEEDS, st.floats(-3.1, 3.1))
+def test_yaw_undoes_any_turn_about_the_vertical_and_no_other(seed, angle):
+    rng = np.random.default_rng(seed)
+    T_gt, t = random_poses(rng), rng.normal(size=3)
+    fit = align(moved(T_gt, se3.rotation_z(angle), t), T_gt, kind="yaw")
+    assert (fit.unobservable, fit.scale) == ((), 1.0)
+    np.testing.assert_allclose(fit.rotation, se3.rotation_z(-angle), atol=1e-12)
+    tilted = align(moved(T_gt, random_rotation(rng), t), T_gt, kind="yaw")
+    np.testing.assert_allclose(tilted.rotation[2], [0, 0, 1], atol=1e-15)
+
+
+@given(SEEDS)
+def test_yaw_is_the_least_squares_answer(seed):
+    x, y = (random_poses(np.random.default_rng((seed, k))) for k in (0, 1))
+    fit = align(x, y, kind="yaw")
+
+    def residual(rotation):
+        turned = x[:, :3, 3] @ rotation.T
+        return np.sum((turned - turned.mean(0) - y[:, :3, 3] + y[:, :3, 3].mean(0)) ** 2)
+
+    for angle in (-1e-3, 1e-3, 1.0, 3.0):
+        assert residual(se3.rotation_z(angle) @ fit.rotation) >= residual(fit.rotation) * (1 - 1e-12)
+
+
+@pytest.mark.parametrize("positions", ["still", "vertical"])
+def test_where_level_motion_leaves_the_yaw_open_orientation_decides(positions):
+    T_gt = line(20, direction=(0.0, 0.0, float(positions == "vertical")))
+    T_gt[:, :3, 3] += [5.0, -2.0, 0.0]
+    fit = align(moved(T_gt, se3.rotation_z(0.4), np.ones(3)), T_gt, kind="yaw")
+    assert fit.unobservable == ("yaw",)
+    np.testing.assert_allclose(fit.rotation, se3.rotation_z(-0.4), atol=1e-12)
+
+
+@given(SEEDS, st.floats(1e-2, 1e2))
+def test_scale_takes_the_scale_of_sim3_and_moves_nothing(seed, scale):
+    rng = np.random.default_rng(seed)
+    T_gt = random_poses(rng)
+    T_est = moved(T_gt, random_rotation(rng), rng.normal(size=3), scale)
+    fit = align(T_est, T_gt, kind="scale")
+    assert fit.scale == align(T_est, T_gt, kind="sim3").scale == pytest.approx(1 / scale)
+    np.testing.assert_array_equal(fit.apply(T_est)[:, :3, :3], T_est[:, :3, :3])
+    np.testing.assert_allclose(fit.apply(T_est)[:, :3, 3], T_est[:, :3, 3] * fit.scale)
+
+
+@given(SEEDS)
+def test_the_scale_alone_of_a_nearly_straight_path_is_the_least_squares_one(seed):
+    rng = np.random.default_rng(seed)
+    T_gt, T_est = line(20), line(20)
+    for T in (T_gt, T_est):
+        T[:, :3, 3] += 1e-3 * rng.normal(size=(20, 3))
+    x, y = (T[:, :3, 3] - T[:, :3, 3].mean(axis=0) for T in (T_est, T_gt))
+    U, d, Vt = np.linalg.svd(y.T @ x)
+    d[2] *= np.sign(np.linalg.det(U @ Vt))  # Umeyama (1991), eq. 42
+    fit = align(T_est, T_gt, kind="scale")
+    assert (fit.scale, fit.unobservable) == (pytest.approx(d.sum() / np.sum(x * x), rel=1e-12), ())
+
+
+@pytest.mark.parametrize("kind", ["se3", "sim3", "yaw", "scale"])
+def test_the_first_poses_alone_may_decide(kind):
+    rng = np.random.default_rng(11)
+    T_est, T_gt = random_poses(rng), random_poses(rng)
+    first, all_of_those = align(T_est, T_gt, kind=kind, first_n=7), align(T_est[:7], T_gt[:7], kind=kind)
+    assert first.as_dict() == all_of_those.as_dict()
+    assert first.as_dict() != align(T_est, T_gt, kind=kind).as_dict()
+
+
+@given(SEEDS)
+def test_a_straight_drive_has_no_roll_that_noise_could_tell(seed):
+    rng = np.random.default_rng(seed)
+    T_gt, R = line(200), random_rotation(rng)
+    T_gt[:, 1:3, 3] += 1e-3 * rng.normal(size=(200, 2))  # the robot trembles by a millimetre on five metres
+    T_est = moved(T_gt, R, rng.normal(size=3))
+    T_est[:, :3, 3] += 5e-3 * rng.normal(size=(200, 3))
+    fit = align(T_est, T_gt, kind="se3")
+    if fit.unobservable:
+        assert fit.unobservable == ("roll about the path",)
+    assert se3.rotation_angle(fit.rotation @ R) < 0.8
+
+
+@given(SEEDS)
+def test_a_slight_bend_that_both_sides_show_does_tell_the_roll(seed):
+    rng = np.random.default_rng(seed)
+    T_gt, R = line(200), random_rotation(rng)
+    T_gt[:, 1, 3] += 0.02 * np.sin(np.linspace(0, 3, 200))  # two centimetres on five metres
+    T_est = moved(T_gt, R, rng.normal(size=3))
+    T_est[:, :3, 3] += 1e-3 * rng.normal(size=(200, 3))
+    T_est[:, :3, :3] = random_rotation(rng)  # orientations say something else
+    fit = align(T_est, T_gt, kind="se3")
+    assert fit.unobservable == ()
+    assert se3.rotation_angle(fit.rotation @ R) < 0.1

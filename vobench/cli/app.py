@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from vobench.cli import score_command
+from vobench.cli.score_command import Json
 from vobench.errors import VobenchError
 
 app = typer.Typer(
@@ -21,7 +23,6 @@ app = typer.Typer(
 )
 
 DEBUG = "--debug"
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 SuiteName = Annotated[str, typer.Argument(metavar="SUITE", help="A suite's name, or a path to its YAML.")]
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or runs/<suite> for its latest.")]
 
@@ -168,20 +169,8 @@ def list_command(
     listing.show(kind, as_json=json)
 
 
-@app.command()
-def score(
-    gt: Annotated[Path, typer.Argument(metavar="GT", help="Ground truth: a TUM file, or a sequence's folder.")],
-    est: Annotated[Path, typer.Argument(metavar="EST", help="Estimate: a TUM file.")],
-    *,
-    align: Annotated[str, typer.Option("--align", "-a", help="none, origin, se3 or sim3.")] = "se3",
-    delta: Annotated[int, typer.Option("--delta", "-d", min=1, help="RPE over so many frames.")] = 1,
-    t_max_diff: Annotated[float, typer.Option(help="Poses further apart than this are no pair, in seconds.")] = 0.01,
-    json: Json = False,
-) -> None:
-    """Score an estimate against ground truth: ATE, RPE, segments, coverage."""
-    from vobench.cli import scoring
-
-    scoring.show(gt, est, align=align, delta=delta, t_max_diff_s=t_max_diff, as_json=json)
+for command in (score_command.score, score_command.diagnose, score_command.metrics):
+    app.command()(command)
 
 
 @app.command()

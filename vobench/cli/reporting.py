@@ -4,6 +4,7 @@ from pathlib import Path
 
 from vobench.catalog.catalog import unknown
 from vobench.cli import terminal
+from vobench.cli.boards import print_boards
 from vobench.errors import UnknownNameError
 from vobench.report import files, page, table
 from vobench.report.leaderboard import Board
@@ -25,7 +26,7 @@ def show(run: Path, *, form: str | None, out: Path | None, as_json: bool) -> Non
         if as_json:
             terminal.print_json({"path": str(out), "format": chosen})
     elif chosen == TERMINAL:
-        terminal.print_boards(boards)
+        print_boards(boards)
     else:
         print(_text(chosen, folder, scores, boards), end="")
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from vobench.cli import terminal
+from vobench.cli.boards import print_boards
 from vobench.errors import InputError
 from vobench.pipeline.motion import drive_all
 from vobench.pipeline.run import run_suite
@@ -31,7 +32,7 @@ def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) ->
     if as_json:
         print(boards_as_json(boards), end="")
         return
-    terminal.print_boards(boards)
+    print_boards(boards)
     terminal.console().print(f"Everything is in {folder.path}\nLook into it: {_command()} view {folder.path}")
 
 

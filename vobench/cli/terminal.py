@@ -7,7 +7,6 @@ from typing import Any, TypeVar
 
 from rich import box
 from rich.console import Console
-from rich.measure import Measurement
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -19,15 +18,11 @@ from rich.progress import (
 )
 from rich.table import Table
 
-from vobench.report.leaderboard import Board
-from vobench.report.table import HEADINGS, LEGEND, cells
-
 Item = TypeVar("Item")
-LEFT_ALIGNED = {"estimator", "status", "name", "case", "kind", "summary", "path", "origin", "metric", "check", "result"}
-
-# A narrow terminal goes without these, in this order; every report has them all.
-LEAST_FIRST = ("RPE °/frame", "RPE mm/frame", "CPU ms/frame", "segments %", "survived", "coverage", "#")
-ENDLESS = 10_000
+LEFT_ALIGNED = {
+    *("estimator", "status", "name", "case", "kind", "summary", "path", "origin", "check", "result"),
+    *("metric", "headline", "is", "with"),
+}
 
 
 def print_json(content: Any) -> None:
@@ -49,29 +44,6 @@ def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) ->
     for row in rows:
         made.add_row(*row)
     return made
-
-
-def _fitting(board: Board, out: Console) -> Table:
-    """A board without the columns that matter least, where the terminal is too narrow for all of them."""
-    endless = out.options.update(max_width=ENDLESS)
-    for left_out in range(len(LEAST_FIRST) + 1):
-        kept = [i for i, heading in enumerate(HEADINGS) if heading not in LEAST_FIRST[:left_out]]
-        rows = [[cells(row)[i] for i in kept] for row in board.rows]
-        made = table(board.title, [HEADINGS[i] for i in kept], rows)
-        if Measurement.get(out, endless, made).maximum <= out.width:
-            break
-    return made
-
-
-def print_boards(boards: list[Board]) -> None:
-    """The leaderboards, and what went wrong."""
-    out = console()
-    for board in boards:
-        out.print(_fitting(board, out))
-        for row in board.rows:
-            if row.reason:
-                out.print(f"  {row.estimator}: {row.status}: {row.reason}", style="red")
-    out.print(LEGEND, style="dim")
 
 
 class Bars:

@@ -1,18 +1,27 @@
-"""How much of the ground truth an estimate covers: without it no error can be ranked."""
+"""How much of the ground truth an estimate covers, and where it doesn't: without it no error can be ranked."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from vobench.metric.settings import CoverageOf
 from vobench.trajectory.associate import Index
 from vobench.trajectory.trajectory import Stamps
+
+FRAME_NS = 30_000_000  # truth with less between its poses is motion capture's, and its poses are no frames
+SLOT_NS = 200_000_000  # of such truth; a camera of 10 Hz leaves none empty, whatever its jitter
+END_NS = 100_000_000  # before its end a camera of 10 Hz has its last picture
 
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """Share of ground-truth frames that have an estimate, and the gaps, runs of frames that don't.
+    """Share of the recording that has an estimate, and the gaps, stretches that have none.
 
-    A gap's time runs from the last covered frame before it to the first after it (or to the end).
+    `of` says what was counted: frames, the true poses, or time in slots of 0.2 s. A gap's time runs from the
+    last pose before it to the first after it, or to the end of the truth; `longest_gap_frames` counts the true
+    poses in it. A track is a stretch without gaps; every track after the first is a relocalisation.
+    It `ends_lost` without a pose in the last slot; by time, without one in the last 0.1 s.
     """
 
     ratio: float
@@ -20,20 +29,47 @@ class Coverage:
     longest_gap_frames: int
     longest_gap_s: float
     first_lost_frame: int | None
+    of: Literal["frames", "time"]
+    time_to_first_pose_s: float | None
+    longest_track_s: float
+    relocalisations: int
+    ends_lost: bool
 
 
-def coverage(gt_t_ns: Stamps, frames: Index) -> Coverage:
-    """Coverage of ground truth stamped gt_t_ns (N,), N > 0, by estimates of `frames` (K,), increasing."""
-    n = len(gt_t_ns)
-    around = np.concatenate([[-1], frames, [n]])
-    lost = np.diff(around) - 1
-    edges_ns = gt_t_ns[np.clip(around, 0, n - 1)]
-    longest = int(np.argmax(lost))
-    first = int(np.argmax(lost > 0))
+def slots(gt_t_ns: Stamps, of: CoverageOf) -> Index:
+    """The slot (N,) of each true pose, counted from 0, that should have an estimate.
+
+    "frames": each pose is one. "auto": so too, unless the truth is too dense to have a pose a frame; then
+    every 0.2 s of it is one. Nothing of the estimate decides, so that no pose it lacks can raise its coverage.
+    """
+    steps = np.diff(gt_t_ns)
+    if of == "frames" or not len(steps) or np.median(steps) >= FRAME_NS:
+        return np.arange(len(gt_t_ns))
+    since_ns = gt_t_ns - gt_t_ns[0]
+    whole = max(int(since_ns[-1] // SLOT_NS), 1)
+    return np.unique(np.minimum(since_ns // SLOT_NS, whole - 1), return_inverse=True)[1]
+
+
+def coverage(gt_t_ns: Stamps, frames: Index, *, of: CoverageOf = "frames") -> Coverage:
+    """Coverage of ground truth stamped gt_t_ns (N,), N > 0, by estimates of its `frames` (K,)."""
+    frames, slot = np.unique(frames), slots(gt_t_ns, of)
+    around = np.concatenate([[-1], frames, [len(gt_t_ns)]])
+    around_ns = gt_t_ns[np.clip(around, 0, len(gt_t_ns) - 1)]
+    lost = np.maximum(np.diff(np.concatenate([[-1], slot[frames], [slot[-1] + 1]])) - 1, 0)
+    is_time = bool(slot[-1] < len(gt_t_ns) - 1)
+    longest, first = int(np.argmax(lost)), int(np.argmax(lost > 0))
+    # Tracks are the matched poses edges[k] ... edges[k + 1] - 1.
+    edges = np.concatenate([[0], np.flatnonzero(lost[1:-1]) + 1, [len(frames)]])
+    tracks_ns = around_ns[edges[1:]] - around_ns[1:][edges[:-1]]
     return Coverage(
-        ratio=len(frames) / n,
+        ratio=len(np.unique(slot[frames])) / int(slot[-1] + 1),
         gaps=int(np.count_nonzero(lost)),
-        longest_gap_frames=int(lost[longest]),
-        longest_gap_s=float(edges_ns[longest + 1] - edges_ns[longest]) / 1e9 if lost[longest] else 0.0,
-        first_lost_frame=int(around[first]) + 1 if lost[first] else None,
+        longest_gap_frames=int(np.diff(around)[longest] - 1) if lost[longest] else 0,
+        longest_gap_s=float(around_ns[longest + 1] - around_ns[longest]) / 1e9 if lost[longest] else 0.0,
+        first_lost_frame=int(around[first] + 1) if lost[first] else None,
+        of="time" if is_time else "frames",
+        time_to_first_pose_s=float(around_ns[1] - gt_t_ns[0]) / 1e9 if len(frames) else None,
+        longest_track_s=float(tracks_ns.max()) / 1e9 if len(frames) else 0.0,
+        relocalisations=max(len(edges) - 2, 0),
+        ends_lost=bool(lost[-1] > 0 or (is_time and around_ns[-1] - around_ns[-2] > END_NS)),
     )

@@ -9,51 +9,18 @@ import numpy as np
 from vobench.errors import AlignmentError
 from vobench.geometry.se3 import Array
 from vobench.metric.ate import absolute_errors
-from vobench.metric.coverage import Coverage, coverage
-from vobench.metric.pose_error import PoseErrors
-from vobench.metric.rpe import relative_errors
-from vobench.metric.segment import INDOOR_LENGTHS_M, SegmentErrors, segment_errors
-from vobench.metric.statistic import Statistics, statistics
-from vobench.trajectory.align import Alignment, Kind, align
-from vobench.trajectory.associate import MAX_DIFF_NS, Pairs, associate
+from vobench.metric.coverage import SLOT_NS, Coverage, coverage, slots
+from vobench.metric.failure import Failure, failure
+from vobench.metric.identity import identity
+from vobench.metric.measure import Comparison, Metric, measured
+from vobench.metric.nees import consistency
+from vobench.metric.settings import ScoreSettings, settled
+from vobench.trajectory.align import Alignment, align
+from vobench.trajectory.associate import match
 from vobench.trajectory.text import seconds
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
-
-@dataclass(frozen=True, slots=True)
-class ScoreSettings:
-    """Everything that changes a score besides the two trajectories; it is written into each metric's id."""
-
-    alignment: Kind = "se3"
-    max_diff_ns: int = MAX_DIFF_NS
-    rpe_delta_frames: int = 1
-    segment_lengths_m: tuple[float, ...] = INDOOR_LENGTHS_M
-    segment_step_frames: int = 1
-
-    def __post_init__(self) -> None:
-        if self.max_diff_ns < 0:
-            raise AlignmentError(f"max_diff_ns should be 0 or more, but is {self.max_diff_ns}")
-        if min(self.rpe_delta_frames, self.segment_step_frames) < 1:
-            raise AlignmentError(
-                f"rpe_delta_frames and segment_step_frames should be 1 or more, "
-                f"but are {self.rpe_delta_frames} and {self.segment_step_frames}"
-            )
-        if not self.segment_lengths_m or min(self.segment_lengths_m) <= 0:
-            raise AlignmentError(f"segment_lengths_m should be positive, but are {self.segment_lengths_m}")
-
-
-@dataclass(frozen=True, slots=True)
-class Metric:
-    """One metric's statistics; `id` says how it was computed, so equal ids may be compared."""
-
-    id: str
-    name: str
-    unit: str
-    statistics: Statistics
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain JSON values: id, name, unit and each statistic."""
-        return {"id": self.id, "name": self.name, "unit": self.unit, **asdict(self.statistics)}
+__all__ = ["DEFAULTS", "Association", "Metric", "Score", "ScoreSettings", "score"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +43,8 @@ class Score:
     metrics: tuple[Metric, ...]
     association: Association
     coverage: Coverage
+    failure: Failure
+    lost_aware_id: str
     alignment: Alignment
     warnings: tuple[str, ...]
     gt_frames: Stamps
@@ -89,12 +58,14 @@ class Score:
         return next((metric for metric in self.metrics if metric.name == name), None)
 
     def as_dict(self) -> dict[str, Any]:
-        """The score as plain JSON values, without the series; coverage is the ratio."""
+        """The score as plain JSON values, without the series; coverage is the ratio, its details go to failure."""
+        covered = asdict(self.coverage)
         return {
             "metrics": [metric.as_dict() for metric in self.metrics],
             "association": asdict(self.association),
-            "coverage": self.coverage.ratio,
+            "coverage": covered.pop("ratio"),
             "alignment": self.alignment.as_dict(),
+            "failure": {"id": self.lost_aware_id, **asdict(self.failure), "coverage_of": covered.pop("of"), **covered},
             "warnings": list(self.warnings),
         }
 
@@ -102,102 +73,111 @@ class Score:
 DEFAULTS = ScoreSettings()
 
 
-def score(gt: Trajectory, est: Trajectory, *, settings: ScoreSettings = DEFAULTS) -> Score:
+def score(
+    gt: Trajectory, est: Trajectory, *, settings: ScoreSettings = DEFAULTS, covariance: Array | None = None
+) -> Score:
     """Score an estimate of the motion of one frame against the truth of the same frame.
 
-    A metric without samples is left out and a warning says why, never a zero.
-    Raises AlignmentError where no poses match in time.
+    `covariance` (N, 6, 6) of the estimate's poses adds their consistency (see `nees`). A metric without
+    samples is left out and a warning says why, never a zero. Raises AlignmentError where no poses match in time.
     """
-    pairs = associate(gt.t_ns, est.t_ns, max_diff_ns=settings.max_diff_ns)
-    if not len(pairs):
-        raise AlignmentError(_no_overlap(gt, est, settings))
-    T_gt, T_est = gt.T_world_frame[pairs.gt], est.T_world_frame[pairs.est]
-    alignment = align(T_est, T_gt, kind=settings.alignment)
-    T_aligned = alignment.apply(T_est)
-    ate = absolute_errors(T_gt, T_aligned)
-    rpe = relative_errors(T_gt, T_aligned, pairs.gt, delta=settings.rpe_delta_frames)
-    segments = segment_errors(
-        T_gt,
-        T_aligned,
-        pairs.gt,
-        gt.distances_m(),
-        lengths_m=settings.segment_lengths_m,
-        step_frames=settings.segment_step_frames,
-    )
-    metrics = tuple(_metrics(ate, rpe, segments, _identity(gt, pairs, settings), settings))
-    covered = coverage(gt.t_ns, pairs.gt)
+    of = compare(gt, est, settings)
+    ate = absolute_errors(of.matched.T_gt, of.T_aligned)
+    metrics = (*measured(of, ate), *_consistency(of, covariance))
+    frames = of.matched.pairs.gt
+    covered, slot = coverage(gt.t_ns, frames, of=settings.coverage_of), slots(gt.t_ns, settings.coverage_of)[frames]
     return Score(
         metrics=metrics,
-        association=Association(len(pairs), len(gt), len(est), settings.max_diff_ns / 1e9),
+        association=Association(len(frames), len(gt), len(est), settings.max_diff_ns / 1e9),
         coverage=covered,
-        alignment=alignment,
-        warnings=(
-            *_matching_warnings(gt, est, pairs, covered, alignment),
-            *_missing_warnings(gt, metrics, settings),
-        ),
-        gt_frames=pairs.gt,
-        gt_t_ns=gt.t_ns[pairs.gt],
+        failure=failure(ate.trans_m, slot, covered, fail_m=settings.fail_ratio * float(of.distances_m[-1])),
+        lost_aware_id=identity("lost.aware.score", of.settings, n=len(frames), of=len(gt)),
+        alignment=of.alignment,
+        warnings=(*_matching_warnings(of, covered), *_missing_warnings(of, metrics)),
+        gt_frames=frames,
+        gt_t_ns=gt.t_ns[frames],
         ate_trans_m=ate.trans_m,
         ate_rot_deg=np.rad2deg(ate.rot_rad),
-        aligned_positions_m=T_aligned[:, :3, 3],
+        aligned_positions_m=of.T_aligned[:, :3, 3],
     )
 
 
-def _metrics(
-    ate: PoseErrors, rpe: PoseErrors, segments: SegmentErrors, identity: str, settings: ScoreSettings
-) -> Iterator[Metric]:
-    lengths = ",".join(f"{length:g}" for length in settings.segment_lengths_m)
-    delta, step = f"delta={_frames(settings.rpe_delta_frames)}", f"step={_frames(settings.segment_step_frames)}"
-    of_segment = f"lengths={lengths} m; {step}; {identity}"
-    rows = [
-        ("ate_trans", "ate.trans.rmse", "m", identity, ate.trans_m),
-        ("ate_rot", "ate.rot.rmse", "deg", identity, np.rad2deg(ate.rot_rad)),
-        ("rpe_trans", "rpe.trans.rmse", "m", f"{delta}; {identity}", rpe.trans_m),
-        ("rpe_rot", "rpe.rot.rmse", "deg", f"{delta}; {identity}", np.rad2deg(rpe.rot_rad)),
-        ("segment_trans", "segment.trans.mean", "1", of_segment, segments.trans_ratio),
-        ("segment_rot", "segment.rot.mean", "deg/m", of_segment, np.rad2deg(segments.rot_radpm)),
-    ]
-    for name, headline, unit, how, errors in rows:
-        if len(errors):
-            yield Metric(f"{headline}[{how}]", name, unit, statistics(errors))
+def compare(gt: Trajectory, est: Trajectory, settings: ScoreSettings = DEFAULTS) -> Comparison:
+    """Match and align, ready to be measured. Raises AlignmentError where no poses match in time."""
+    window = {"max_diff_ns": settings.max_diff_ns, "offset_ns": settings.offset_ns}
+    matched = match(gt, est, method=settings.association, **window)
+    if not len(matched):
+        raise AlignmentError(_no_overlap(gt, est, settings))
+    alignment = align(matched.T_est, matched.T_gt, kind=settings.alignment, first_n=settings.align_n)
+    distances_m = gt.distances_m()
+    return Comparison(
+        gt=gt,
+        est=est,
+        matched=matched,
+        alignment=alignment,
+        T_aligned=alignment.apply(matched.T_est),
+        distances_m=distances_m,
+        settings=settled(settings, float(distances_m[-1])),
+    )
 
 
-def _identity(gt: Trajectory, pairs: Pairs, settings: ScoreSettings) -> str:
-    window = f"nearest<={settings.max_diff_ns / 1e6:g}ms"
-    return f"align={settings.alignment}; assoc={window}; n={len(pairs)}/{len(gt)}"
+def _consistency(of: Comparison, covariance: Array | None) -> Iterator[Metric]:
+    if covariance is None:
+        return
+    if covariance.shape != (len(of.est), 6, 6):
+        raise AlignmentError(f"covariance should be ({len(of.est)}, 6, 6), one a pose, but is {covariance.shape}")
+    of_pose = covariance[of.matched.pairs.est]
+    nees = consistency(of.matched.T_gt, of.matched.T_est, of_pose, of.alignment)
+    yield from of.metric("nees_pose", nees.pose)
+    yield from of.metric("nees_trans", nees.trans)
+    yield from of.metric("nees_rot", nees.rot)
 
 
-def _matching_warnings(
-    gt: Trajectory, est: Trajectory, pairs: Pairs, covered: Coverage, alignment: Alignment
-) -> Iterator[str]:
-    if alignment.unobservable:
+def _matching_warnings(of: Comparison, covered: Coverage) -> Iterator[str]:
+    if of.alignment.unobservable:
         yield (
-            f"the positions leave open: {', '.join(alignment.unobservable)}; "
+            f"the positions leave open: {', '.join(of.alignment.unobservable)}; "
             f"the first matched orientation decides, so rotation errors are relative to it"
         )
-    if covered.gaps:
+    if covered.of == "time":
+        yield _time_warning(covered)
+    elif covered.gaps:
         yield (
-            f"the estimate has {len(pairs)} of {_frames(len(gt))}; the first lost is {covered.first_lost_frame}, "
-            f"the longest gap {_frames(covered.longest_gap_frames)} ({covered.longest_gap_s:.3f} s)"
+            f"the estimate has {len(of.matched)} of {_frames(len(of.gt))}; the first lost is "
+            f"{covered.first_lost_frame}, the longest gap {_frames(covered.longest_gap_frames)} "
+            f"({covered.longest_gap_s:.3f} s)"
         )
-    if len(pairs) < len(est):
-        yield f"{len(est) - len(pairs)} of {len(est)} estimated poses have no ground truth of their own"
+    if len(of.matched) < len(of.est):
+        yield f"{len(of.est) - len(of.matched)} of {len(of.est)} estimated poses have no ground truth of their own"
 
 
-def _missing_warnings(gt: Trajectory, metrics: tuple[Metric, ...], settings: ScoreSettings) -> Iterator[str]:
+def _time_warning(covered: Coverage) -> str:
+    gaps = f"{covered.gaps} gap{'' if covered.gaps == 1 else 's'}"
+    longest = f", the longest of {covered.longest_gap_s:.3f} s" if covered.gaps else ""
+    return (
+        f"the truth is too dense to have a pose a frame, so coverage counts time, in slots of {SLOT_NS / 1e9:g} s: "
+        f"{covered.ratio:.1%}, the first pose after {covered.time_to_first_pose_s:.3f} s, {gaps}{longest}"
+    )
+
+
+def _missing_warnings(of: Comparison, metrics: tuple[Metric, ...]) -> Iterator[str]:
     present = {metric.name for metric in metrics}
+    settings, path_m = of.settings, float(of.distances_m[-1])
     if "rpe_trans" not in present:
-        yield f"no relative pose error: no two matched poses are {_frames(settings.rpe_delta_frames)} apart"
-    if "segment_trans" not in present:
+        yield f"no relative pose error: no two matched poses are {_delta(settings)} apart"
+    if "kitti_t_rel" not in present:
         yield (
-            f"no segment error: no two matched poses are more than {min(settings.segment_lengths_m):g} m of path "
-            f"apart; the whole path is {gt.distances_m()[-1]:.3g} m"
+            f"no segment error: no two matched poses are more than {min(settings.segment_lengths_m or (0.0,)):g} m of "
+            f"path apart; the whole path is {path_m:.3g} m"
         )
+    if not path_m:
+        yield "no lost-aware score: the truth stands still, so no error can be measured against its path"
 
 
 def _no_overlap(gt: Trajectory, est: Trajectory, settings: ScoreSettings) -> str:
+    moved = f" moved by {settings.offset_ns / 1e9:g} s" if settings.offset_ns else ""
     return (
-        f"no pose of the estimate is within {settings.max_diff_ns / 1e6:g} ms of a ground-truth pose: "
+        f"no pose of the estimate{moved} is within {settings.max_diff_ns / 1e6:g} ms of a ground-truth pose: "
         f"the truth has {_span(gt)}, the estimate {_span(est)}"
     )
 
@@ -211,3 +191,9 @@ def _span(trajectory: Trajectory) -> str:
 
 def _frames(count: int) -> str:
     return f"{count} frame{'' if count == 1 else 's'}"
+
+
+def _delta(settings: ScoreSettings) -> str:
+    if settings.rpe_unit == "f":
+        return _frames(int(settings.rpe_delta))
+    return f"{settings.rpe_delta:g} { {'m': 'm', 's': 's', 'd': '°', 'r': 'rad'}[settings.rpe_unit] }"

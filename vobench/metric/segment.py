@@ -4,13 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
-from vobench.metric.pose_error import motion_errors, motions
+from vobench.metric.pose_error import PoseErrors, Rows, errors_between, in_blocks
+from vobench.metric.settings import INDOOR_LENGTHS_M, Mean, Precision
 from vobench.trajectory.associate import Index
 
-INDOOR_LENGTHS_M = (0.5, 1.0, 1.5, 2.0)
-KITTI_LENGTHS_M = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
+Float32 = NDArray[np.float32]
+Distances = Float32 | Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,28 +33,34 @@ def segment_errors(
     T_gt: Array,
     T_est: Array,
     frames: Index,
-    distances_m: Array,
+    distances_m: Distances,
     *,
     lengths_m: Sequence[float] = INDOOR_LENGTHS_M,
     step_frames: int = 1,
+    precision: Precision = "float64",
 ) -> SegmentErrors:
-    """Errors of every segment that begins at a multiple of `step_frames`, length after length.
+    """Errors of every segment that begins at a multiple of `step_frames`, start after start.
 
     T_gt and T_est (K, 4, 4) are matched poses, `frames` (K,) their ground-truth frames, distances_m (N,)
-    the path from the start to every ground-truth frame. A length that the path doesn't hold gives no segment.
-    Source: Geiger et al. (2012), with the path in float64 where the devkit sums in float32.
+    the path from the start to every ground-truth frame (of `devkit_distances` for "devkit", which rounds
+    where the devkit rounds). A length that the path doesn't hold gives no segment. Source: Geiger et al. (2012).
     """
-    parts = []
-    for length_m in lengths_m:
-        first, last, over_m = segment_pairs(frames, distances_m, length_m, step_frames=step_frames)
-        errors = motion_errors(motions(T_gt, first, last), motions(T_est, first, last))
-        drift = errors.trans_m / over_m, errors.rot_rad / over_m
-        parts.append((frames[first], frames[last], np.full(len(first), length_m), *drift))
-    return SegmentErrors(*map(np.concatenate, zip(*parts, strict=True)))
+    found = [segment_pairs(frames, distances_m, length, step_frames=step_frames) for length in lengths_m]
+    first, last, over_m = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    length_m = np.repeat(np.asarray(lengths_m, float), [len(part[0]) for part in found])
+    order = np.lexsort((length_m, first))
+    first, last, over_m, length_m = first[order], last[order], over_m[order], length_m[order]
+    if precision == "devkit":
+        over_m = over_m.astype(np.float32)
+        rounded = in_blocks(len(first), lambda part: _devkit_errors(T_gt, T_est, first[part], last[part]))
+        errors = PoseErrors(*rounded)
+    else:
+        errors = errors_between(T_gt, T_est, first, last)
+    return SegmentErrors(frames[first], frames[last], length_m, errors.trans_m / over_m, errors.rot_rad / over_m)
 
 
 def segment_pairs(
-    frames: Index, distances_m: Array, length_m: float, *, step_frames: int = 1
+    frames: Index, distances_m: Distances, length_m: float, *, step_frames: int = 1
 ) -> tuple[Index, Index, Array]:
     """Matched poses (first, last) of each segment, each (N,), and the path (N,) in m to divide by.
 
@@ -61,9 +69,53 @@ def segment_pairs(
     segment, and the path really travelled divides.
     """
     first = np.flatnonzero(frames % step_frames == 0)
-    end = np.searchsorted(distances_m, distances_m[frames[first]] + length_m, side="right")
+    # A sum of float32 stays float32, as in the devkit.
+    end = np.searchsorted(distances_m, distances_m[frames[first]] + distances_m.dtype.type(length_m), side="right")
     last = np.searchsorted(frames, end, side="left")
     held = last < len(frames)
     first, last, end = first[held], last[held], end[held]
     travelled_m = distances_m[frames[last]] - distances_m[frames[first]]
     return first, last, np.where(frames[last] == end, length_m, travelled_m)
+
+
+def devkit_distances(positions_m: Array) -> Float32:
+    """Path (N,) to each position (N, 3), summed up in float32 one after the other like the devkit's."""
+    steps = np.diff(positions_m, axis=0).astype(np.float32)
+    x, y, z = steps.T
+    lengths = np.sqrt(x * x + y * y + z * z)
+    sums: Float32 = np.cumsum(np.concatenate([np.zeros(1, np.float32), lengths]), dtype=np.float32)
+    return sums[: len(positions_m)]
+
+
+def mean_drift(errors: Array, length_m: Array, *, mean: Mean = "micro") -> float:
+    """One number for segments' errors (N,): the mean of all, or "macro", the mean over lengths of their means.
+
+    In float32, as the devkit's errors are, it sums one after the other as the devkit does.
+    """
+    if mean == "macro":
+        return float(np.mean([errors[length_m == length].mean() for length in np.unique(length_m)]))
+    if errors.dtype == np.float32:
+        return float(np.cumsum(errors, dtype=np.float32)[-1] / np.float32(len(errors)))
+    return float(errors.mean())
+
+
+def pooled(sequences: Sequence[SegmentErrors], *, mean: Mean = "micro") -> tuple[float, float]:
+    """Translation (ratio) and rotation (rad/m) drift over several sequences with segments.
+
+    "micro" averages all their segments, as the KITTI table does, so that long sequences count for more;
+    "macro" averages the sequences' means, as many papers do.
+    """
+    trans, rot = ([getattr(s, part) for s in sequences] for part in ("trans_ratio", "rot_radpm"))
+    parts = [[np.concatenate(part)] if mean == "micro" else part for part in (trans, rot)]
+    trans_ratio, rot_radpm = (float(np.mean([mean_drift(e, np.zeros(len(e))) for e in part])) for part in parts)
+    return trans_ratio, rot_radpm
+
+
+def _devkit_errors(T_gt: Array, T_est: Array, first: Index, last: Index) -> Rows:
+    """Errors as the devkit rounds them: full inverses in float64, then float32, and the angle by its cosine."""
+    gt, est = (np.linalg.inv(T[first]) @ T[last] for T in (T_gt, T_est))
+    E = np.linalg.inv(est) @ gt
+    a, b, c = (E[:, k, k].astype(np.float32) for k in range(3))
+    cosine = (0.5 * ((a + b + c).astype(np.float64) - 1.0)).astype(np.float32)
+    x, y, z = (E[:, k, 3].astype(np.float32) for k in range(3))
+    return np.sqrt(x * x + y * y + z * z), np.arccos(np.clip(cosine, np.float32(-1), np.float32(1)))

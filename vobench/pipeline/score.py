@@ -3,13 +3,14 @@
 from pathlib import Path
 
 from vobench.metric.score import Score, score
+from vobench.metric.settings import INDOOR_LENGTHS_M, ScoreSettings
 from vobench.results import estimate_file
 from vobench.results.run_folder import RunScore, RunStatus
 from vobench.suite.expand import Run
 from vobench.trajectory.trajectory import Trajectory
 
-# Below this share of frames with a pose an estimate counts as lost.
-LOST_COVERAGE = 0.5
+# One for all runs, whatever their length; a simulated truth has one pose for each frame.
+SETTINGS = ScoreSettings(coverage_of="frames", segment_lengths_m=INDOOR_LENGTHS_M, segment_step_frames=1)
 
 
 def score_run(run: Run, estimate: Path, gt: Trajectory) -> RunScore:
@@ -33,16 +34,17 @@ def score_run(run: Run, estimate: Path, gt: Trajectory) -> RunScore:
 def score_estimate(estimate: Path, gt: Trajectory) -> Score | None:
     """The score of an estimate's folder, None where it holds no pose at all."""
     est = estimate_file.read_tum(estimate / estimate_file.ESTIMATE)
-    return score(gt, est) if len(est) else None
+    return score(gt, est, settings=SETTINGS) if len(est) else None
 
 
 def _status(outcome: estimate_file.Outcome, scored: Score | None, gt: Trajectory) -> tuple[RunStatus, str]:
     """How the run ended, the gravest first; a run that died is not saved by what it had answered before."""
     if outcome.kind != estimate_file.FINISHED:
         return outcome.kind, outcome.reason  # type: ignore[return-value]  # EstimatorFailure's kinds are statuses
-    if scored is None or scored.coverage.ratio < LOST_COVERAGE:
+    if scored is None or not scored.failure.survived:
         covered = scored.coverage.ratio if scored else 0.0
-        return "lost", f"a pose for {covered:.0%} of the frames"
+        at_the_end = " and none at the end" if covered and scored and scored.coverage.ends_lost else ""
+        return "lost", f"a pose for {covered:.0%} of the frames{at_the_end}"
     ate, path_m = scored.metric("ate_trans"), float(gt.distances_m()[-1])
     if ate is not None and ate.statistics.rmse > max(path_m, 1e-3):
         return "diverged", f"ATE {ate.statistics.rmse:.3g} m on a path of {path_m:.3g} m"

@@ -79,7 +79,7 @@ def _row(runs: list[RunScore], cost_ms: dict[tuple[str, str], float]) -> Row:
         partial=sum(run.status == "partial" for run in runs),
         runs=len(runs),
         ate_mm=_mean(survivors, "ate_trans", "rmse", 1e3),
-        segment_percent=_mean(survivors, "segment_trans", "mean", 100),
+        segment_percent=_mean(survivors, "kitti_t_rel", "mean", 100),
         rpe_mm=_mean(survivors, "rpe_trans", "rmse", 1e3),
         rpe_deg=_mean(survivors, "rpe_rot", "rmse", 1),
         coverage=fmean(run.coverage for run in runs),

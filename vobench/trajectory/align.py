@@ -12,13 +12,17 @@ from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
-Kind = Literal["none", "origin", "se3", "sim3"]
+Kind = Literal["none", "origin", "se3", "sim3", "scale", "yaw"]
 
 # A path that leaves its line, or moves against the other, by less than this share of its extent
 # shows rounding and not shape. Taking it for a line moves no point by more than this share.
 NEGLIGIBLE = 1e-6
 ROUNDING = 1e-14  # what a mean over equal float64 coordinates may be off, relative to them
 UNCORRELATED = 1e-12  # a normalised covariance this small is rounding
+# A path that leaves its line by less than this share of its extent is nearly straight. Its roll counts as
+# seen where the sides agree so well about it that chance leaves it uncertain by less than nine degrees.
+NEARLY_STRAIGHT = 1e-2
+MAX_ROLL_STD_RAD = 0.15
 IDENTITY = np.eye(3)
 
 
@@ -65,23 +69,34 @@ class Alignment:
         return se3.transform(self.rotation @ T_est[..., :3, :3], positions)
 
 
-def align(T_est: Array, T_gt: Array, *, kind: Kind) -> Alignment:
-    """Alignment of matched poses (K, 4, 4): se3 and sim3 fit the positions, origin the first pose.
+def align(T_est: Array, T_gt: Array, *, kind: Kind, first_n: int | None = None) -> Alignment:
+    """Alignment of matched poses (K, 4, 4), fitted to the first `first_n` of them, or to all.
 
-    A rotation that the positions leave open is taken as near as they allow to the one that
+    se3, sim3, yaw (a turn about z) and scale (sim3's, without its motion) fit the positions, origin the
+    first pose. A rotation that the positions leave open is taken as near as they allow to the one that
     lays the first orientation over the truth's, so that no score hangs on the estimate's own frame.
     Raises AlignmentError without pairs, or where positions are too large to square.
     """
     if kind == "none":
         return Alignment(kind, IDENTITY, np.zeros(3), 1.0, ())
+    T_est, T_gt = T_est[:first_n], T_gt[:first_n]
     _require_pairs(T_est, T_gt)
     T_origin = T_gt[0] @ se3.inverse(T_est[0])
     if kind == "origin":
         return Alignment(kind, T_origin[:3, :3], T_origin[:3, 3], 1.0, ())
-    return align_positions(T_est[:, :3, 3], T_gt[:, :3, 3], kind=kind, toward=T_origin[:3, :3])
+    est_m, gt_m, toward = T_est[:, :3, 3], T_gt[:, :3, 3], T_origin[:3, :3]
+    if kind == "yaw":
+        return align_yaw(est_m, gt_m, toward=toward)
+    fit = align_positions(est_m, gt_m, kind=kind, toward=toward)
+    if kind == "scale":
+        left_open = tuple(name for name in fit.unobservable if name == "scale")
+        return Alignment(kind, IDENTITY, np.zeros(3), fit.scale, left_open)
+    return fit
 
 
-def align_positions(est_m: Array, gt_m: Array, *, kind: Literal["se3", "sim3"], toward: Array = IDENTITY) -> Alignment:
+def align_positions(
+    est_m: Array, gt_m: Array, *, kind: Literal["se3", "sim3", "scale"], toward: Array = IDENTITY
+) -> Alignment:
     """Least-squares alignment of positions (K, 3); of equally good rotations the one nearest to `toward`.
 
     Where either side stands still the rotation is `toward` and the scale 1, so that what is left is
@@ -93,15 +108,41 @@ def align_positions(est_m: Array, gt_m: Array, *, kind: Literal["se3", "sim3"], 
     x, y = est_m - est_mean, gt_m - gt_mean
     covariance = _covariance(y, x)
     shape = _shape(x, y, rounding_m=ROUNDING * float(max(np.abs(est_mean).max(), np.abs(gt_mean).max())))
-    rotation = _rotation(covariance, shape, toward)
+    is_turned_anyhow = kind == "scale" and shape is _Shape.LINE  # the scale alone needs no roll that is true
+    rotation = _rotation(covariance, _Shape.FULL if is_turned_anyhow else shape, toward)
     known_scale = kind == "se3" or shape is _Shape.POINT
     scale = 1.0 if known_scale else float(np.sum(rotation * covariance) / np.mean(np.sum(x * x, axis=1)))
     unobservable = {
-        _Shape.POINT: ("rotation", "scale") if kind == "sim3" else ("rotation",),
+        _Shape.POINT: ("rotation",) if kind == "se3" else ("rotation", "scale"),
         _Shape.LINE: ("roll about the path",),
         _Shape.FULL: (),
     }[shape]
     return Alignment(kind, rotation, gt_mean - scale * rotation @ est_mean, scale, unobservable)
+
+
+def align_yaw(est_m: Array, gt_m: Array, *, toward: Array = IDENTITY) -> Alignment:
+    """Least-squares turn about z and translation of positions (K, 3), for worlds that know the vertical.
+
+    Where the level motion leaves the yaw open, that of `toward` is taken. Raises AlignmentError as `align`.
+    Source: Zhang and Scaramuzza (2018), section III-C.
+    """
+    _require_pairs(est_m, gt_m)
+    est_mean, gt_mean = est_m.mean(axis=0), gt_m.mean(axis=0)
+    x, y = est_m - est_mean, gt_m - gt_mean
+    covariance = _covariance(y, x)[:2, :2]
+    turning = np.array([covariance[0, 0] + covariance[1, 1], covariance[1, 0] - covariance[0, 1]])
+    extents = np.sqrt([np.trace(_covariance(path, path)) for path in (x[:, :2], y[:, :2])])
+    rounding_m = ROUNDING * float(max(np.abs(est_mean).max(), np.abs(gt_mean).max()))
+    if (
+        extents.min() <= max(NEGLIGIBLE * extents.max(), rounding_m)
+        or np.hypot(*turning) <= UNCORRELATED * extents.prod()
+    ):
+        turning = np.array([toward[0, 0] + toward[1, 1], toward[1, 0] - toward[0, 1]])
+        left_open: tuple[str, ...] = ("yaw",)
+    else:
+        left_open = ()
+    rotation = se3.rotation_z(np.arctan2(turning[1], turning[0]))
+    return Alignment("yaw", rotation, gt_mean - rotation @ est_mean, 1.0, left_open)
 
 
 def turn(from_direction: ArrayLike, to_direction: ArrayLike) -> Array:
@@ -140,7 +181,7 @@ def _shape(x: Array, y: Array, *, rounding_m: float) -> _Shape:
     common = np.linalg.svd(_covariance(y, x) / extents.prod(), compute_uv=False)
     if common[0] <= UNCORRELATED:
         return _Shape.POINT
-    if common[1] <= UNCORRELATED * common[0] or _is_line(x) or _is_line(y):
+    if common[1] <= UNCORRELATED * common[0] or _is_line(x) or _is_line(y) or _is_noise(x, y):
         return _Shape.LINE
     return _Shape.FULL
 
@@ -148,6 +189,21 @@ def _shape(x: Array, y: Array, *, rounding_m: float) -> _Shape:
 def _is_line(x: Array) -> bool:
     spread = np.linalg.eigvalsh(_covariance(x, x))
     return bool(spread[1] <= NEGLIGIBLE**2 * spread[2])
+
+
+def _is_noise(x: Array, y: Array) -> bool:
+    """Whether two paths (K, 3), one nearly straight, leave their lines in ways too unlike to tell the roll.
+
+    After the best roll, sideways motions with correlation r leave it uncertain by √((1 - r²) / (r² n)).
+    """
+    (x_spread, x_axes), (y_spread, y_axes) = (np.linalg.eigh(_covariance(path, path)) for path in (x, y))
+    if min(x_spread[1] / x_spread[2], y_spread[1] / y_spread[2]) > NEARLY_STRAIGHT**2:
+        return False
+    a, b = (x @ x_axes[:, :2]) @ [1, 1j], (y @ y_axes[:, :2]) @ [1, 1j]
+    power = float(np.linalg.norm(a) * np.linalg.norm(b))
+    r = min(max(abs(np.vdot(a, b)), abs(np.vdot(a, b.conj()))) / power, 1.0)
+    free = max(2 * len(x) - 5, 1)  # numbers measured, less two means, a roll, and a direction's two
+    return bool(1 - r**2 > r**2 * free * MAX_ROLL_STD_RAD**2)
 
 
 def _covariance(y: Array, x: Array) -> Array:

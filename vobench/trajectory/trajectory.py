@@ -9,6 +9,9 @@ from vobench.errors import TrajectoryError
 from vobench.geometry.se3 import Array
 
 Stamps = NDArray[np.int64]
+SKEW = 1e-2  # text with three digits leaves RᵀR up to 3e-3 off the identity; what is no rotation by far more
+LARGEST_M = 1e18  # a hundred light years; beyond it squares overflow float32, which the KITTI devkit sums in
+BLOCK = 1 << 14  # poses looked at together: little memory, and they stay in the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +19,7 @@ class Trajectory:
     """Poses of one moving frame in one fixed frame, in order of time.
 
     t_ns is (N,) int64, strictly increasing; T_world_frame is (N, 4, 4) in metres.
-    Raises TrajectoryError where shapes, order or finiteness are wrong.
+    Raises TrajectoryError where shapes, order or size are wrong, or a rotation is none.
     """
 
     t_ns: Stamps
@@ -31,9 +34,8 @@ class Trajectory:
         late = np.flatnonzero(np.diff(self.t_ns) <= 0)
         if late.size:
             raise TrajectoryError(f"stamps must increase, but pose {late[0] + 1} is not later than the one before it")
-        bad = np.flatnonzero(~np.isfinite(self.T_world_frame).all((1, 2)))
-        if bad.size:
-            raise TrajectoryError(f"pose {bad[0]} is not finite")
+        for begin in range(0, len(self.t_ns), BLOCK):
+            _require_poses(self.T_world_frame[begin : begin + BLOCK], begin)
 
     def __len__(self) -> int:
         return len(self.t_ns)
@@ -51,3 +53,19 @@ class Trajectory:
     def of_mounted(self, T_frame_mounted: Array) -> "Trajectory":
         """The trajectory of something fixed to this frame, such as a camera on a body."""
         return Trajectory(self.t_ns, self.T_world_frame @ T_frame_mounted)
+
+
+def _require_poses(T: Array, begin: int) -> None:
+    """Raise TrajectoryError for the first of poses (N, 4, 4) that is none; `begin` is the number of the first."""
+    if not (np.abs(T) < LARGEST_M).all():  # which nan isn't either
+        bad = int(np.flatnonzero(~(np.abs(T) < LARGEST_M).all((1, 2)))[0])
+        what = "is not finite" if not np.isfinite(T[bad]).all() else f"is {np.abs(T[bad]).max():.3g} m away"
+        raise TrajectoryError(f"pose {begin + bad} {what}; positions should be finite and below {LARGEST_M:g} m")
+    R = T[:, :3, :3]
+    skew = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max((1, 2))
+    mirrors = np.sum(np.cross(R[:, :, 0], R[:, :, 1]) * R[:, :, 2], axis=1) < 0
+    wrong = np.flatnonzero(mirrors | (skew > SKEW))
+    if wrong.size:
+        bad = int(wrong[0])
+        what = "is mirrored (determinant -1)" if mirrors[bad] else f"is off by {skew[bad]:.3g} (RᵀR - 1)"
+        raise TrajectoryError(f"the rotation of pose {begin + bad} {what}; it should be orthonormal and right-handed")

@@ -1,0 +1,320 @@
+"""vobench score: the JSON that others parse, the other forms, every kind of file, and what can't be scored."""
+
+# ruff: noqa: E501 - a sentence stands in one line
+
+import csv
+import io
+import json
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vobench.geometry import se3
+from vobench.trajectory.text import format_tum
+from vobench.trajectory.trajectory import Trajectory
+
+DATA = Path(__file__).parents[2] / ".." / "shared" / "data"
+WITH_DATA = pytest.mark.skipif(not DATA.is_dir(), reason="no folder ../shared/data with real trajectories")
+METRIC = {"id", "name", "unit", "n", "rmse", "mean", "median", "std", "min", "max", "sse", "p95", "p99"}
+
+
+def drive(n=200, noise_m=0.0, first_ns=0):
+    s = np.linspace(0, 5, n)
+    p = np.stack([4 * np.cos(s), 4 * np.sin(s), np.sin(2 * s)], -1)
+    p += noise_m * np.random.default_rng(1).normal(size=p.shape)
+    return Trajectory(first_ns + np.arange(n, dtype=np.int64) * 50_000_000, se3.transform(se3.rotation_z(s), p))
+
+
+def kitti(trajectory):
+    rows = trajectory.T_world_frame[:, :3].reshape(len(trajectory), 12)
+    return "".join(" ".join(map(repr, row)) + "\n" for row in rows.tolist())
+
+
+def tartanair(trajectory):
+    return "".join(line.partition(" ")[2] + "\n" for line in format_tum(trajectory).splitlines())
+
+
+def euroc(trajectory):
+    rows = [line.split()[1:] for line in format_tum(trajectory).splitlines()]
+    lines = [",".join([str(t), *p[:3], p[6], *p[3:6]]) for t, p in zip(trajectory.t_ns.tolist(), rows, strict=True)]
+    return "\n".join(["#timestamp [ns], p_x, p_y, p_z, q_w, q_x, q_y, q_z", *lines])
+
+
+@pytest.fixture
+def files(here):
+    """The same drive, true and estimated, in every form of text, each under a name that says nothing."""
+    for side, trajectory in (("g", drive()), ("e", drive(noise_m=0.05))):
+        for form in (format_tum, kitti, tartanair, euroc):
+            (here / f"{side}.{form.__name__}").write_text(form(trajectory))
+    (here / "times").write_text("".join(f"{t / 1e9!r}\n" for t in drive().t_ns.tolist()))
+    return here
+
+
+def test_the_json_has_every_key_of_the_contract(vobench, files):
+    scored = vobench("score", "g.format_tum", "e.format_tum", "--json").json
+    assert {"metrics", "association", "coverage", "alignment", "warnings"} <= scored.keys()
+    for metric in scored["metrics"]:
+        assert metric.keys() >= METRIC
+        assert isinstance(metric["n"], int)
+        assert all(np.isfinite(metric[key]) for key in METRIC - {"id", "name", "unit"})
+    assert {metric["name"] for metric in scored["metrics"]} >= {
+        "ate_trans",
+        "ate_rot",
+        "rpe_trans",
+        "rpe_rot",
+        "kitti_t_rel",
+        "kitti_r_rel",
+    }
+    assert {m["unit"] for m in scored["metrics"] if m["name"] in ("ate_rot", "rpe_rot")} == {"deg"}
+    assert scored["association"].keys() >= {"pairs", "gt_poses", "est_poses", "max_diff_s"}
+    assert scored["association"]["pairs"] == 200
+    assert scored["coverage"] == 1.0
+    assert scored["alignment"].keys() >= {"kind", "rotation", "translation", "scale", "unobservable"}
+    assert np.shape(scored["alignment"]["rotation"]) == (3, 3)
+    assert np.shape(scored["alignment"]["translation"]) == (3,)
+    assert isinstance(scored["alignment"]["unobservable"], list)
+    assert all(isinstance(warning, str) for warning in scored["warnings"])
+
+
+def test_csv_and_md_say_what_json_says(vobench, files):
+    scored = vobench("score", "g.format_tum", "e.format_tum", "--json").json["metrics"]
+    rows = list(csv.DictReader(io.StringIO(vobench("score", "g.format_tum", "e.format_tum", "--csv").out)))
+    assert [row["id"] for row in rows] == [metric["id"] for metric in scored]
+    assert [float(row["rmse"]) for row in rows] == [metric["rmse"] for metric in scored]
+    md = vobench("score", "g.format_tum", "e.format_tum", "--md").out
+    assert f"| ate_trans | m | 200 | {scored[0]['rmse']:.6g} |" in md
+    assert all(metric["id"] in md for metric in scored)
+
+
+def test_the_table_shows_every_metric_and_its_identity(vobench, files):
+    scored = vobench("score", "g.format_tum", "e.format_tum", "--json").json["metrics"]
+    out = vobench("score", "g.format_tum", "e.format_tum").out
+    assert all(metric["id"] in out and f"{metric['rmse']:.6g}" in out for metric in scored)
+    assert vobench("score", "g.format_tum", "e.format_tum", "--csv", "--md").code == 2
+
+
+@pytest.mark.parametrize("gt", ["format_tum", "euroc"])
+@pytest.mark.parametrize("est", ["format_tum", "euroc", "kitti", "tartanair"])
+def test_every_form_gives_the_same_score_whatever_the_file_is_called(vobench, files, gt, est):
+    times = ("--times", "times") if est in ("kitti", "tartanair") else ()
+    expected = vobench("score", "g.format_tum", "e.format_tum", "--json").json["metrics"]
+    scored = vobench("score", f"g.{gt}", f"e.{est}", *times, "--json").json["metrics"]
+    assert [metric["id"] for metric in scored] == [metric["id"] for metric in expected]
+    np.testing.assert_allclose([m["rmse"] for m in scored], [m["rmse"] for m in expected], rtol=1e-9, atol=1e-12)
+
+
+def test_files_without_stamps_pair_by_row_and_say_so(vobench, files):
+    scored = vobench("score", "g.kitti", "e.tartanair", "--json").json
+    assert scored["association"]["pairs"] == 200
+    assert scored["warnings"][0].startswith("neither file has stamps: poses are paired by row")
+
+
+def test_a_sequences_truth_is_ground_truth(vobench, ran):
+    sequence = ran / "latest" / "cases" / "short" / "sequence"
+    truth = ran / "latest" / "cases" / "short" / "ground_truth.tum"
+    for name in (sequence, sequence / "truth.mcap"):
+        assert vobench("score", name, truth, "-a", "none", "--json").json["metrics"][0]["max"] < 1e-9
+    body = vobench("score", sequence / "truth.mcap", truth, "--gt-topic", "/tf:map.base_link", "--json").json
+    assert body["association"]["pairs"] == scored_frames(truth)
+
+
+def scored_frames(truth):
+    return len(truth.read_text().splitlines())
+
+
+def test_flags_reach_the_settings_and_override_the_preset(vobench, files):
+    words = ("score", "g.format_tum", "e.format_tum", "--json")
+    ids = {
+        m["name"]: m["id"]
+        for m in vobench(
+            *words,
+            "--like",
+            "evo",
+            "-a",
+            "sim3",
+            "-d",
+            "0.5",
+            "-u",
+            "m",
+            "--all-pairs",
+            "--pairs-from",
+            "gt",
+            "--t-max-diff",
+            "0.02",
+            "--t-offset",
+            "0.001",
+        ).json["metrics"]
+    }
+    assert ids["rpe_trans"].startswith(
+        "rpe.trans.rmse[delta=0.5m; pairs=all/gt; rule=evo; align=sim3; assoc=evo<=20ms; offset=1ms; n="
+    )
+    plain = {m["name"]: m["id"] for m in vobench(*words, "--like", "evo").json["metrics"]}
+    assert "align=none; assoc=evo<=10ms" in plain["ate_trans"]
+
+
+@pytest.mark.parametrize("tool", ["evo", "kitti", "rpg", "tum", "openvins"])
+def test_every_preset_scores(vobench, files, tool):
+    assert vobench("score", "g.format_tum", "e.format_tum", "--like", tool, "--json").code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "pairs"),
+    [
+        ((), "delta=1s; pairs=all/est; rule=tum"),
+        (("-d", "2"), "delta=2s; pairs=all/est; rule=tum"),
+        (("-u", "m"), "delta=1m; pairs=all/est"),
+        (("--consecutive",), "delta=1s; pairs=consecutive/est"),
+        (("--pairs-from", "gt"), "delta=1s; pairs=all/gt"),
+    ],
+)
+def test_pairs_that_tums_script_does_not_have_are_ours_and_say_so(vobench, files, words, pairs):
+    scored = vobench("score", "g.format_tum", "e.format_tum", "--like", "tum", *words, "--json").json
+    assert f"rpe.trans.rmse[{pairs}; align=se3;" in {m["name"]: m["id"] for m in scored["metrics"]}["rpe_trans"]
+
+
+def test_an_estimate_that_gives_up_is_said_to(vobench, files):
+    (files / "crashed").write_text("".join((files / "e.format_tum").read_text().splitlines(keepends=True)[:190]))
+    out = vobench("score", "g.format_tum", "crashed").out
+    assert "coverage 0.950, lost-aware score 0.4" in out
+    assert "(not survived)" in out
+    failed = vobench("score", "g.format_tum", "crashed", "--json").json["failure"]
+    assert failed["id"] == "lost.aware.score[fail=0.1; slots=auto; align=se3; assoc=nearest<=10ms; n=190/200]"
+    assert failed["lost_aware"] < 0.5
+
+
+def test_what_a_file_is_said_to_be_is_undone(vobench, files):
+    expected = vobench("score", "g.format_tum", "e.format_tum", "-a", "none", "--json").json["metrics"]
+    est = drive(noise_m=0.05)
+    odd = [line.split() for line in format_tum(est).splitlines()]
+    (files / "odd").write_text(
+        "".join(
+            f"{t} {z} {x} {y} {w} {qz} {qx} {qy}\n"
+            for t, (_, x, y, z, qx, qy, qz, w) in zip(est.t_ns.tolist(), odd, strict=True)
+        )
+    )
+    scored = vobench(
+        "score",
+        "g.format_tum",
+        "odd",
+        "--est-as",
+        "ns",
+        "--est-as",
+        "wxyz",
+        "--est-as",
+        "axes:y,z,x",
+        "-a",
+        "none",
+        "--json",
+    ).json
+    np.testing.assert_allclose([m["rmse"] for m in scored["metrics"]], [m["rmse"] for m in expected], rtol=1e-6)
+
+
+BROKEN = [
+    ("nan", "0 0 0 0 0 0 0 1\n1 nan 0 0 0 0 0 1\n", "bad:2: x should be a finite number, but is 'nan'"),
+    ("infinite", "0 0 0 0 0 0 0 1\n1 0 1e400 0 0 0 0 1\n", "bad:2: y should be a finite number, but 1e400 overflows"),
+    ("zero quaternion", "0 0 0 0 0 0 0 0\n", "bad:1: the quaternion's norm should be 1 within 0.001, but (0, 0, 0, 0) has 0"),
+    ("duplicate stamp", "0 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n", "bad:2: stamps must increase by 1 ns or more, but 0 follows 0"),
+    ("cut off", "0 0 0 0 0 0 0 1\n1 0 0 0 0", "bad:2: a pose has 8 columns (t x y z qx qy qz qw), this line has 5 (the last row: was the file cut off?)"),
+    ("mirrored", "1 0 0 0 0 1 0 0 0 0 -1 0\n", "bad:1: the rotation is mirrored (its determinant is -1): these axes are left-handed, a pose's are right-handed"),
+    ("empty", "", "no pose, for the file is empty: bad"),
+    ("pointer", "version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 2\n", "a Git-LFS pointer, not the file itself; fetch it with git lfs pull: bad"),
+    ("garbage", b"\x00\x01\xfe garbage", "neither text, nor an MCAP file or ROS bag: bad"),
+    ("utf-16", "0 0 0 0 0 0 0 1\n".encode("utf-16"), "neither text, nor an MCAP file or ROS bag: bad"),
+    ("no overlap", "1000 0 0 0 0 0 0 1\n", "no pose of the estimate is within 10 ms of a ground-truth pose"),
+    ("unstamped", "0 0 0 0 0 0 1\n", "no stamps in bad; name the file that has them with --times"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "content", "sentence"), BROKEN, ids=[name for name, *_ in BROKEN])
+def test_what_cannot_be_scored_is_one_sentence(vobench, files, name, content, sentence):
+    (files / "bad").write_bytes(content if isinstance(content, bytes) else content.encode())
+    said = vobench("score", "g.format_tum", "bad")
+    assert (said.code, said.out) == (1, "")
+    assert said.err.startswith(f"vobench: {sentence}")
+    assert said.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("g.kitti", "short"), "files without stamps pair by row, but have 200 in g.kitti and 3 in short rows; stamp them with --times"),
+        (("g.kitti", "short", "--times", "times"), "200 stamps in times for 3 poses in short"),
+        (("g.kitti", "e.kitti", "-u", "s"), "a delta in seconds needs stamps, and neither file has any; name one with --times"),
+        (("g.format_tum", "e.format_tum", "--times", "times"), "--times is for files without stamps, but both files have theirs: times"),
+        (("g.format_tum", "e.format_tum", "--est-topic", "/a"), "a topic is for a recording, but this is a text file: e.format_tum"),
+        (("g.format_tum", "e.format_tum", "--like", "eva"), "no preset named 'eva'. Did you mean 'evo'? Known: evo, kitti, openvins, rpg, tum"),
+        (("g.format_tum", "e.format_tum", "-u", "x"), "no unit named 'x'. Known: d, f, m, r, s"),
+        (("g.format_tum", "e.format_tum", "-d", "0"), "--delta should be more than 0 and finite, got 0"),
+        (("g.format_tum", "e.format_tum", "-d", "inf", "-u", "m"), "--delta should be more than 0 and finite, got inf"),
+        (("g.kitti", "e.kitti", "--est-as", "wxyz"), "no quaternions to read as wxyz in e.kitti"),
+        (("g.kitti", "e.kitti", "--gt-as", "ns"), "no stamps to read as ns in g.kitti"),
+        (("g.format_tum", "e.format_tum", "--pairs-from", "tg"), "no side named 'tg'. Known: est, gt"),
+        (("g.format_tum", "e.format_tum", "--t-offset", "inf"), "--t-offset should be -2e+09 to 2e+09 seconds, got inf"),
+        (("suites", "e.format_tum"), "neither a sequence, nor a ROS 2 bag: suites"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_asked_is_one_sentence(vobench, files, words, sentence):
+    (files / "short").write_text("".join((files / "e.kitti").read_text().splitlines(keepends=True)[:3]))
+    said = vobench("score", *words)
+    assert (said.code, said.out, said.err) == (1, "", f"vobench: {sentence}\n")
+
+
+def test_one_pose_is_scored_without_inventing_motion(vobench, files):
+    (files / "one").write_text(format_tum(drive()).splitlines()[0])
+    scored = vobench("score", "g.format_tum", "one", "--json").json
+    assert scored["association"]["pairs"] == 1
+    assert not any(metric["name"].startswith("rpe") for metric in scored["metrics"])
+    assert any("no relative pose error" in warning for warning in scored["warnings"])
+
+
+def test_positions_too_far_apart_to_square_are_no_number(vobench, files):
+    (files / "far").write_text("0 1e200 0 0 0 0 0 1\n0.05 -1e200 0 0 0 0 0 1\n")
+    said = vobench("score", "g.format_tum", "far", "-a", "none")
+    assert (said.code, said.out) == (1, "")
+    assert "nan" not in said.err
+
+
+EVO = {
+    "-a": ("-a", "se3"),
+    "--align_origin": ("-a", "origin"),
+    "--all_pairs": ("--all-pairs",),
+    "--pairs_from_reference": ("--pairs-from", "gt"),
+}
+
+
+def evo_cases():
+    if not DATA.is_dir():
+        return []
+    names = {
+        "ape/se3/angle_deg",
+        "ape/sim3/trans_part",
+        "rpe/m0.5all_ref/trans_part",
+        "rpe/m100/angle_deg",
+        "ape/se3/tmax0.02",
+    }
+    cases = json.loads((DATA / "evo_expected.json").read_text())["cases"]
+    return [pytest.param(case, id=case["id"]) for case in cases if case["id"].partition("/")[2] in names]
+
+
+def ours(flags):
+    """evo's options in our words, which are nearly the same."""
+    if "-a -s" in flags:
+        return ("--like", "evo", "-a", "sim3")
+    words = []
+    for word in shlex.split(flags.replace("--t_max_diff", "--t-max-diff")):
+        words += EVO.get(word, (word,))
+    return ("--like", "evo", *words)
+
+
+@WITH_DATA
+@pytest.mark.parametrize("case", evo_cases())
+def test_evos_options_give_evos_numbers(vobench, case):
+    flags = case["flags"].replace("-r trans_part", "").replace("-r angle_deg", "")
+    said = vobench("score", DATA / case["ref"], DATA / case["est"], *ours(flags), "--json").json
+    name = f"{'ate' if case['tool'] == 'ape' else 'rpe'}_{'rot' if 'angle_deg' in case['id'] else 'trans'}"
+    (metric,) = (metric for metric in said["metrics"] if metric["name"] == name)
+    assert metric["n"] == case["n"]
+    for key, value in case["stats"].items():
+        assert metric[key] == pytest.approx(value, rel=1e-9, abs=1e-9 if key == "min" else 0), key

@@ -1,0 +1,127 @@
+"""Forms told by content; what is no trajectory gets one sentence with its file and line."""
+
+# ruff: noqa: E501 - a sentence stands in one line
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from vobench.errors import TrajectoryError
+from vobench.geometry import se3
+from vobench.trajectory.form import parse_any
+from vobench.trajectory.table import NUMBER
+
+TUM = "1.5 1 2 3 0 0 0.6 0.8\n2.5 2 3 4 0 0 0 1\n"
+KITTI = "1 0 0 5 0 0 -1 6 0 1 0 7\n"
+TARTANAIR = "1 2 3 0 0 0.6 0.8\n"
+EUROC = "#timestamp [ns],px,py,pz,qw,qx,qy,qz,vx\n1500000000,1,2,3,0.8,0,0,0.6,9\n"
+MIRRORED = "1 0 0 0 0 1 0 0 0 0 -1 0\n"
+
+
+def test_one_pose_is_the_same_in_every_form():
+    turned = parse_any(TUM, name="x").T[0]
+    np.testing.assert_allclose(turned, parse_any(TARTANAIR, name="x").T[0], atol=1e-15)
+    np.testing.assert_allclose(turned, parse_any(EUROC, name="x").T[0], atol=1e-15)
+    matrix = " ".join(f"{value!r}" for value in turned[:3].ravel().tolist())
+    np.testing.assert_array_equal(turned, parse_any(matrix, name="x").T[0])
+
+
+def test_the_form_says_unit_and_order_and_words_override_it():
+    tum, csv, kitti = (parse_any(text, name="x") for text in (TUM, EUROC, KITTI))
+    assert (tum.unit, tum.order, tum.t_ns.tolist()) == ("s", "xyzw", [1_500_000_000, 2_500_000_000])
+    assert (csv.unit, csv.order, csv.t_ns.tolist()) == ("ns", "wxyz", [1_500_000_000])
+    assert (kitti.unit, kitti.order, kitti.t_ns) == (None, None, None)
+    other = parse_any("1500 1 2 3 0.8 0 0 0.6", name="x", unit="ms", order="wxyz")
+    assert other.t_ns.tolist() == [1_500_000_000]
+    np.testing.assert_allclose(other.T[0], tum.T[0], atol=1e-15)
+
+
+def test_kittis_matrices_stay_as_they_are_given():
+    # Six digits leave a rotation 2e-7 off; tools that don't orthonormalise would else score otherwise.
+    skew = "1.000001 0 0 0 0 1 0 0 0 0 1 0"
+    assert parse_any(skew, name="x").T[0, 0, 0] == 1.000001
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "order"),
+    [
+        ("1500000000,1,2,3,1,0,0,0", "ns", "wxyz"),
+        ("1.5,1,2,3,1,0,0,0", "s", "wxyz"),
+        ("t [s],x,y,z,qw,qx,qy,qz\n1,1,2,3,1,0,0,0", "s", "wxyz"),
+        ("#time(ns), tx, ty, tz, qx, qy, qz, qw\n1,1,2,3,0,0,0,1", "ns", "xyzw"),
+    ],
+)
+def test_a_csv_is_believed_what_it_says_of_itself(text, unit, order):
+    parsed = parse_any(text, name="x")
+    assert (parsed.unit, parsed.order) == (unit, order)
+    np.testing.assert_array_equal(parsed.T[0, :3, :3], np.eye(3))
+
+
+@pytest.mark.parametrize("text", [TUM, KITTI, TARTANAIR, EUROC])
+def test_crlf_blank_lines_tabs_and_comments_change_nothing(text):
+    loose = "\ufeff" + text.replace(" ", "\t").replace("\n", "  \r\n\r\n# note\r\n")
+    first, second = (parse_any(t, name="x") for t in (text.replace(" [ns]", "[ns]"), loose))
+    np.testing.assert_array_equal(first.T, second.T)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "no pose, for the file is empty: run.txt"),
+        ("\n \r\n", "no pose, for the file is empty: run.txt"),
+        ("# only\n# comments\n", "no pose, for all lines are comments: run.txt"),
+        ("version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "a Git-LFS pointer, not the file itself; fetch it with git lfs pull: run.txt"),
+        ("a b c\n", "run.txt:1: no form of trajectory has 3 columns: TUM has 8 (t x y z qx qy qz qw), KITTI 12, TartanAir 7, EuRoC 8 and commas"),
+        (TUM + "3.5 1 2 3 0", "run.txt:3: a pose has 8 columns (t x y z qx qy qz qw), this line has 5 (the last row: was the file cut off?)"),
+        (KITTI + "1 0 0", "this line has 3 (the last row: was the file cut off?)"),
+        (EUROC + "1600000000,1,2", "run.txt:3: a pose has 8 columns (t x y z qw qx qy qz), this line has 3 (the last row: was the file cut off?)"),
+        (KITTI + MIRRORED, "run.txt:2: the rotation is mirrored (its determinant is -1)"),
+        (KITTI + KITTI.replace("1 0 0 5", "1.01 0 0 5"), "run.txt:2: the first three columns of the matrix should be a rotation within 0.001, but R^T R is 0.0201 off the identity"),
+        (KITTI.replace("7", "nan"), "run.txt:1: t3 should be a finite number, but is 'nan'"),
+        (TARTANAIR + "1 2 inf 0 0 0 1", "run.txt:2: z should be a finite number, but is 'inf'"),
+        (TARTANAIR + "1 2 3 0 0 0 0", "run.txt:2: the quaternion's norm should be 1 within 0.001, but (0, 0, 0, 0) has 0"),
+        (TARTANAIR + "1 2 3 0 0 0 2", "(0, 0, 0, 2) has 2"),
+        (EUROC + "1500000000,1,2,3,1,0,0,0", "run.txt:3: stamps must increase by 1 ns or more, but 1500000000 follows 1500000000"),
+        (TUM + "2.4 0 0 0 0 0 0 1", "run.txt:3: stamps must increase by 1 ns or more, but 2.4 follows 2.5"),
+        ("1305031102160407000 0 0 0 0 0 0 1", "run.txt:1: t should be seconds below 9223372036.854775807, but is 1305031102160407000 (is it in another unit?)"),
+    ],
+)  # fmt: skip
+def test_what_is_no_trajectory_is_named_with_its_line(text, sentence):
+    with pytest.raises(TrajectoryError) as caught:
+        parse_any(text, name="run.txt")
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+FIELD = st.sampled_from(
+    ["0", "1", "-1", "0.5", "1e3", "1e999", "nan", "-inf", "1_0", "0x1p3", "١", "x", "1.", ".5", "+2"]
+)
+
+
+@given(st.lists(FIELD, min_size=8, max_size=8))
+@example(["0x1p3", "0", "0", "0", "0", "0", "0", "1"])
+def test_a_row_is_read_exactly_or_refused(fields):
+    text = " ".join(fields)
+    right = all(NUMBER.fullmatch(f) and abs(float(f)) < 1e300 for f in fields)
+    q = np.array([float(f) for f in fields[4:]]) if right else np.zeros(4)
+    if right and abs(np.linalg.norm(q) - 1) <= 1e-3:
+        parsed = parse_any(text, name="x")
+        assert parsed.t_ns.tolist() == [round(float(fields[0]) * 1e9)]
+        assert parsed.T[0, :3, 3].tolist() == [float(f) for f in fields[1:4]]
+    else:
+        with pytest.raises(TrajectoryError, match="x:1: "):
+            parse_any(text, name="x")
+
+
+@given(st.text(max_size=200) | st.text("0123456789.,-e \t\r\n#", max_size=200))
+def test_any_text_is_a_trajectory_or_one_sentence(text):
+    try:
+        parsed = parse_any(text, name="x")
+    except TrajectoryError as error:
+        sentence = str(error)
+        if "\n" in sentence:
+            pytest.fail(sentence)
+        return
+    assert np.isfinite(parsed.T).all()
+    assert se3.is_rotation(parsed.T[:, :3, :3], tolerance=1e-2)

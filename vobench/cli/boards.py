@@ -1,0 +1,36 @@
+"""Leaderboards on a terminal, as many columns as fit."""
+
+from rich.console import Console
+from rich.measure import Measurement
+from rich.table import Table
+
+from vobench.cli import terminal
+from vobench.report.leaderboard import Board
+from vobench.report.table import HEADINGS, LEGEND, cells
+
+# A narrow terminal goes without these, in this order; every report has them all.
+LEAST_FIRST = ("RPE °/frame", "RPE mm/frame", "CPU ms/frame", "segments %", "survived", "coverage", "#")
+ENDLESS = 10_000
+
+
+def print_boards(boards: list[Board]) -> None:
+    """The leaderboards, and what went wrong."""
+    out = terminal.console()
+    for board in boards:
+        out.print(_fitting(board, out))
+        for row in board.rows:
+            if row.reason:
+                out.print(f"  {row.estimator}: {row.status}: {row.reason}", style="red")
+    out.print(LEGEND, style="dim")
+
+
+def _fitting(board: Board, out: Console) -> Table:
+    """A board without the columns that matter least, where the terminal is too narrow for all of them."""
+    endless = out.options.update(max_width=ENDLESS)
+    for left_out in range(len(LEAST_FIRST) + 1):
+        kept = [i for i, heading in enumerate(HEADINGS) if heading not in LEAST_FIRST[:left_out]]
+        rows = [[cells(row)[i] for i in kept] for row in board.rows]
+        made = terminal.table(board.title, [HEADINGS[i] for i in kept], rows)
+        if Measurement.get(out, endless, made).maximum <= out.width:
+            break
+    return made
