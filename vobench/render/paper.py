@@ -6,15 +6,21 @@ from vobench.render.framebuffer import Canvas, Grid, Sum, canvas, summed
 from vobench.render.haze import Haze, haze
 from vobench.render.mirror import Box
 
+MIRRORS = 3  # followed, each seen in the one before
+
 
 @dataclass(frozen=True, slots=True)
 class Paper:
-    """The picture's canvas, two that mirrors are worked out on, and the total of all sub-frames."""
+    """The picture's canvas, one for each mirror behind a mirror, what rough ones need, and the total of sub-frames."""
 
-    canvas: Canvas
-    reflections: Canvas
+    canvases: tuple[Canvas, ...]
     haze: Haze
     total: Sum
+
+    @property
+    def canvas(self) -> Canvas:
+        """What the picture itself is drawn on."""
+        return self.canvases[0]
 
     @property
     def whole(self) -> Box:
@@ -23,11 +29,14 @@ class Paper:
 
     def delete(self) -> None:
         """Free it on the graphics side."""
-        for sheet in (self.canvas, self.reflections, self.haze, self.total):
+        for sheet in self.canvases:
             sheet.delete()
+        self.haze.delete()
+        self.total.delete()
 
 
 def paper(width_px: int, height_px: int, grid: Grid) -> Paper:
     """Paper for pictures of some size and grid of samples."""
     size = width_px, height_px
-    return Paper(canvas(*size, grid), canvas(*size, grid), haze(*size), summed(*size))
+    canvases = tuple(canvas(*size, grid) for _ in range(1 + MIRRORS))
+    return Paper(canvases, haze(*size), summed(*size))

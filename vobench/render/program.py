@@ -26,26 +26,36 @@ class Program:
             raise RenderError(f"this OpenGL driver cannot run {fragment}, which needs OpenGL 4.2 ({reason})") from error
         self._id = shader._program_id
         self._locations: dict[str, Any] = {}
+        self._numbers: dict[str, float] = {}
+        self._vectors: dict[str, bytes] = {}
+        self._matrices: dict[str, Array] = {}
 
     def use(self) -> None:
         """Draw with this program from now on."""
         GL.glUseProgram(self._id)
 
     def number(self, name: str, value: float) -> None:
-        """Set a float of the program in use; one that its shaders do not need is left out."""
-        if (location := self._location(name)) >= 0:
-            GL.glUniform1f(location, value)
+        """Set a float of the program in use, where it has another one; it may be none that its shaders need."""
+        if self._numbers.get(name) != value:
+            self._numbers[name] = value
+            GL.glUniform1f(self._location(name), value)
 
     def count(self, name: str, value: int) -> None:
         """Set an integer of the program in use."""
         GL.glUniform1i(self._location(name), value)
 
     def vector(self, name: str, value: Array) -> None:
-        """Set a vector (4,) of the program in use."""
-        GL.glUniform4fv(self._location(name), 1, np.ascontiguousarray(value, np.float32))
+        """Set a vector (4,) of the program in use, where it has another one."""
+        data = np.ascontiguousarray(value, np.float32)
+        if self._vectors.get(name) != (key := data.tobytes()):
+            self._vectors[name] = key
+            GL.glUniform4fv(self._location(name), 1, data)
 
     def matrix(self, name: str, value: Array) -> None:
-        """Set a matrix (3, 3) or (4, 4) of the program in use."""
+        """Set a matrix (3, 3) or (4, 4) of the program in use; the very array that is there already costs nothing."""
+        if self._matrices.get(name) is value:
+            return
+        self._matrices[name] = value
         upload = GL.glUniformMatrix4fv if len(value) == 4 else GL.glUniformMatrix3fv
         upload(self._location(name), 1, GL.GL_TRUE, np.ascontiguousarray(value, np.float32))
 

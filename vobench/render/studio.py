@@ -9,6 +9,7 @@ from pyrender.renderer import Renderer
 
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
+from vobench.render.ambience import Ambience
 from vobench.render.background import Background
 from vobench.render.bake import BakedScene
 from vobench.render.framebuffer import CENTRE, HALVES, TURNED, Grid
@@ -38,7 +39,7 @@ class Studio:
 
     def __init__(self, baked: BakedScene) -> None:
         self._illumination, self._background = Illumination(baked), Background(baked.scene.lights)
-        self._movers = baked.scene.movers
+        self._ambience, self._movers = Ambience(baked), baked.scene.movers
         self._light = FloatTexture(self._illumination.at(0, 0))
         parts = batches(baked, self._light, copies=len(TURNED.points))
         self._uploader = Uploader()
@@ -94,14 +95,17 @@ class Studio:
             sheet = sheets[index % len(sheets)]
             sheet.canvas.clear(around)
             for view, box in zip(views, boxes, strict=True):
-                self._light.update(self._illumination.at(int(view.start_ns[index]), int(view.end_ns[index])))
                 self._painter.paint(self._look(camera, view, index), sheet, box)
             self._painter.add(sheet.canvas, total, around, 1 / count)
 
     def _look(self, camera: Pinhole, view: View, index: int) -> Look:
+        """What one sub-frame looks at, with the light brought up to date."""
         start_ns, end_ns = int(view.start_ns[index]), int(view.end_ns[index])
+        light = self._illumination.at(start_ns, end_ns)
+        self._light.update(light)
         poses = [mover.path.pose((start_ns + end_ns) / 2) for mover in self._movers]
-        return look(camera, view.T_world_camera[index], poses, self._background.coefficients(start_ns, end_ns))
+        skies = self._background.coefficients(start_ns, end_ns)
+        return look(camera, view.T_world_camera[index], poses, skies, self._ambience.cd_m2(light))
 
     def _paper(self, camera: Pinhole, grid: Grid) -> Paper:
         size = camera.width_px, camera.height_px

@@ -50,7 +50,7 @@ class ReflectanceTexture(Texture):  # type: ignore[misc]
         counts = np.rint(self._values * (65535 / self.scale)).astype(np.uint16)
         self._texid = _texture(GL.GL_R16, counts, GL.GL_UNSIGNED_SHORT)
         GL.glGenerateMipmap(GL.GL_TEXTURE_2D)
-        _texture_parameters(GL.GL_LINEAR_MIPMAP_LINEAR, GL.GL_REPEAT)
+        _texture_parameters(GL.GL_LINEAR_MIPMAP_NEAREST, GL.GL_REPEAT)
 
 
 def _texture(internal: int, values: NDArray[Any], kind: int) -> Any:

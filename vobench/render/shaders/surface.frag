@@ -45,6 +45,8 @@ void main()
 #endif
 #ifdef HAS_REFLECTION
     mirrored = F * texelFetch(reflection, ivec3(ivec2(gl_FragCoord.xy), layer), 0).r;
+#else
+    mirrored = F * eye.w;
 #endif
 #ifdef HAS_HAZE
     // Pixels whose middle is beside the mirror have none.
@@ -52,7 +54,7 @@ void main()
     mirrored = spread < 0.0 ? mirrored : spread;
 #endif
 #ifdef HAS_BODY
-    float albedo = body_scale * texture(body_texture, uv_albedo, lod_bias.x).r;
+    float albedo = body_scale * texture(body_texture, uv_albedo, lod_bias[layer]).r;
     luminance = albedo * textureLod(light_texture, uv_light, 0.0).r;
 #ifdef HAS_FRESNEL
     luminance *= 1.0 - F;

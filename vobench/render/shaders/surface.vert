@@ -8,9 +8,9 @@ layout(location = 2) in vec2 texcoord_1;
 
 layout(std140, binding = 0) uniform Pass {
     mat4 view_projection;
-    vec4 eye;         // where the picture is seen from, mirrored in a mirror's pass
+    vec4 eye;         // where the picture is seen from, and what mirrors show that are followed no further
     vec4 clip_plane;  // what lies behind it is not drawn
-    vec4 lod_bias;
+    vec4 lod_bias;    // of each layer
 };
 uniform mat4 model;
 
