@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from vobench.cli import main
-from vobench.pipeline import simulate
+from vobench.pipeline import engine
 from vobench.render import raster
 from vobench.render.bake import BakeSettings
 
@@ -69,7 +69,7 @@ def lay_out(folder: Path, patch: pytest.MonkeyPatch) -> None:
     patch.setenv("VOBENCH_CACHE", str(folder / "cache"))
     patch.delenv("VOBENCH_PATH", raising=False)
     patch.setattr(raster, "RasterRenderer", FlatRenderer)
-    patch.setattr(simulate, "BAKE", BakeSettings(0.5, 1, 0.5, 1, 0))
+    patch.setattr(engine, "BAKE", BakeSettings(0.5, 1, 0.5, 1, 0))
 
 
 def call(words: tuple[object, ...], patch: pytest.MonkeyPatch) -> int:

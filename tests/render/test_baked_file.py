@@ -41,9 +41,11 @@ def test_what_was_saved_is_what_is_loaded(baked: BakedScene, tmp_path: Path) -> 
         assert loaded.albedo[name].tobytes() == tile.tobytes()
 
 
-def test_a_torn_map_is_an_error_that_names_the_folder(baked: BakedScene, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", [LIGHT, "sun.1.npz"])
+@pytest.mark.parametrize("left", [0, 100])
+def test_an_empty_or_torn_file_is_an_error_that_names_the_folder(baked, tmp_path, name, left):
     save_baked(tmp_path, baked)
-    (tmp_path / LIGHT).write_bytes((tmp_path / LIGHT).read_bytes()[:100])
+    (tmp_path / name).write_bytes((tmp_path / name).read_bytes()[:left])
     with pytest.raises(RenderError, match=str(tmp_path)):
         load_baked(tmp_path, baked.scene)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vobench.render.bake import BakedScene, BakeSettings, bake
+from vobench.render.bake import SUN_STEP_RAD, BakedScene, BakeSettings, bake, key_times_ns
 from vobench.render.illumination import Illumination
 from vobench.scene.light import NS_PER_S, Dimmer, Flicker, Light, PointLight, Sky, Sun, Switched
 from vobench.scene.material import Glass, Matt
@@ -102,6 +102,36 @@ def test_a_slow_sun_is_traced_anew_only_when_it_has_turned_a_little() -> None:
     assert light.at(ns(10), ns(10)) is not light.at(ns(60), ns(60))
 
 
+@pytest.mark.parametrize(
+    ("azimuths", "elevations"),
+    [((0, 0, 90), (30, 30, 30)), ((0, 0, 0), (30, 30, 30)), ((0, 360), (20, 20)), ((10, 30, 30), (10, 80, 80))],
+    ids=["rests first", "rests", "all around", "rests last"],
+)
+def test_a_suns_light_is_baked_all_along_its_way(azimuths, elevations):
+    times = tuple(np.linspace(5.0, 25.0, len(azimuths)).tolist())
+    sun = Sun("sun", 1e4, times, azimuths, elevations)
+    keys = key_times_ns(sun)
+    assert (keys[0], keys[-1]) == (5 * NS_PER_S, 25 * NS_PER_S)
+    assert (np.diff(keys) > 0).all()
+    ways = np.array([sun.direction(t) for t in keys])
+    assert np.arccos(np.clip((ways[1:] * ways[:-1]).sum(1), -1, 1)).max() <= SUN_STEP_RAD * (1 + 1e-9)
+
+
+def test_a_sun_that_rests_first_lights_as_one_that_stands_there():
+    coarse = BakeSettings(spacing_m=0.5, light_rays=4, indirect_spacing_m=1.0, indirect_rays=16, bounces=2)
+    sun = Sun("sun", 1e4, (0.0, 10.0, 20.0), (90.0, 90.0, 100.0), (30.0, 30.0, 30.0))
+    baked = bake(scene(sun, surfaces=window_room()), coarse)
+    np.testing.assert_allclose(Illumination(baked).at(0, 0), baked.light[0], rtol=1e-5, atol=1e-3)
+
+
+def test_a_sun_that_ends_where_it_began_moves_meanwhile():
+    coarse = BakeSettings(spacing_m=0.5, light_rays=1, indirect_spacing_m=1.0, indirect_rays=4, bounces=1)
+    sun = Sun("sun", 1e4, (0.0, 10.0), (90.0, 450.0), (30.0, 30.0))
+    light = Illumination(bake(scene(sun, surfaces=window_room()), coarse))
+    north, south = light.at(0, 0), light.at(ns(5), ns(5))
+    assert north.sum() > 2 * south.sum()
+
+
 def walk(*positions_m: tuple[float, float, float]) -> Mover:
     times = np.arange(len(positions_m), dtype=float)
     return Mover("crate", CRATE, Path(times, np.array(positions_m), np.zeros(len(positions_m))))
@@ -138,12 +168,19 @@ def test_a_mover_takes_indirect_light_from_the_room() -> None:
     assert 0.2 * room_around < on(baked, lit, below).mean() < 2 * room_around
 
 
-def test_where_a_mover_was_the_light_comes_back_to_the_byte() -> None:
-    light = Illumination(bake(scene(PANEL, BULB, movers=(walk((0, 0, 0), (1, 0, 0), (0, 0, 0)),)), DIRECT))
-    first = light.at(0, 0).copy()
-    gone = light.at(ns(1), ns(1))
-    assert not np.array_equal(first, gone)
-    assert light.at(ns(2), ns(2)).tobytes() == first.tobytes()
+def test_where_a_mover_was_before_leaves_nothing_behind() -> None:
+    """Rays are kept from picture to picture: an illumination that has none gives the same light."""
+    baked = bake(scene(PANEL, BULB, DAY, surfaces=window_room(), movers=(walk((0, 0, 0), (1, 0.5, 0)),)), DIRECT)
+    light = Illumination(baked)
+    first, *_, last = (light.at(ns(t_s), ns(t_s)) for t_s in (0, 0.1, 0.3, 0.9))
+    assert not np.array_equal(first, last)
+    np.testing.assert_allclose(last, Illumination(baked).at(ns(0.9), ns(0.9)), rtol=1e-5, atol=1e-4)
+
+
+def test_a_mover_of_glass_takes_no_light() -> None:
+    pane = replace(walk((0.5, 0.3, 0)), surfaces=tuple(replace(side, material="pane") for side in CRATE))
+    baked = bake(scene(PANEL, movers=(pane,)), DIRECT)
+    np.testing.assert_array_equal(Illumination(baked).at(0, 0), baked.light[0])
 
 
 def test_a_mover_only_takes_light() -> None:

@@ -62,3 +62,8 @@ def test_a_file_that_is_no_library_is_refused_and_not_fatal(tmp_path):
 def test_a_process_that_dies_of_its_library_is_told_by_its_signal(monkeypatch):
     monkeypatch.setattr(llvm, "PROBE", "import os; os.abort()")
     assert llvm.failure(Path(os.devnull)) == "killed by SIGABRT"
+
+
+def test_a_process_that_ends_without_a_word_is_told_by_its_code(monkeypatch):
+    monkeypatch.setattr(llvm, "PROBE", "raise SystemExit(3)")
+    assert llvm.failure(Path(os.devnull)) == "died with 3"

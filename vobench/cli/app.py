@@ -143,16 +143,16 @@ def render(
     sensor: Annotated[str, typer.Option(help="The chip behind the lens.")] = "clean",
     gain: Annotated[float, typer.Option(min=1e-6, help="Multiplies the exposure.")] = 1.0,
     engine: Annotated[str, typer.Option(help="raster, or path for Mitsuba's path tracer.")] = "raster",
-    samples: Annotated[int, typer.Option(min=1, help="Light paths a pixel, for --engine path.")] = 64,
+    samples: Annotated[int | None, typer.Option(help="Light paths a pixel, for --engine path alone.")] = None,
     truth: Annotated[bool, typer.Option("--truth", help="Write ground truth beside the picture.")] = False,
     json: Json = False,
 ) -> None:
     """Draw one picture of a scene, to look at and to debug scenes with."""
     from vobench.cli import rendering
 
-    stand = rendering.Stand(at, yaw, pitch, time)
+    viewpoint = rendering.Viewpoint(at, yaw, pitch, time)
     look = rendering.Look(camera, sensor, gain, engine, samples)
-    rendering.show(scene, stand, look, out=out, truth=truth, as_json=json)
+    rendering.show(scene, viewpoint, look, out=out, truth=truth, as_json=json)
 
 
 @app.command("list")

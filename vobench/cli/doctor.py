@@ -1,6 +1,7 @@
 """vobench doctor: what this machine lacks, and the command that mends it."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -62,9 +63,9 @@ def _libraries() -> Check:
     """All that our distribution requires, extras aside, is installed."""
     missing = []
     for line in requires("vobench") or []:
-        name = line.split(";")[0].split("[")[0].split(">")[0].split("<")[0].split("=")[0].strip()
         if "extra ==" in line:
             continue
+        name = re.split(r"[^\w.-]", line, maxsplit=1)[0]
         try:
             version(name)
         except PackageNotFoundError:

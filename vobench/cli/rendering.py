@@ -21,29 +21,38 @@ from vobench.render.renderer import Radiance, still
 from vobench.render.stand import Shot
 from vobench.render.truth import TruthCaster
 from vobench.results.store import default_store
+from vobench.scene.light import NS_PER_S
 from vobench.scene.scene import Scene
 from vobench.sensor.camera import CAMERAS, CameraSensor, NoiseStreams, expose, fixed_pattern
 from vobench.sensor.response import Grey
 from vobench.sensor.truth import CHANNELS
 from vobench.sensor.truth_picture import picture
 from vobench.sequence.picture import write_png
-from vobench.suite.rendering_spec import ENGINES, RenderingSpec
+from vobench.suite.rendering_spec import ENGINES, MOST_SAMPLES, RenderingSpec
 from vobench.suite.scene_file import build, read_scene
 
 Place = tuple[float, float, float]
+LATEST_S = 1e9  # stamps are 64 bits of nanoseconds
 # Without a next picture nothing flows.
 STILL_CHANNELS = tuple(name for name in CHANNELS if name not in {"flow", "occlusion"})
-NS_PER_S = 1e9
 
 
 @dataclass(frozen=True, slots=True)
-class Stand:
+class Viewpoint:
     """Where a camera stands and looks, and when."""
 
     at_m: Place
     yaw_deg: float
     pitch_deg: float
     t_s: float
+
+    def check(self) -> None:
+        """Raise InputError where an angle or the time is no number, or a stamp cannot hold the time."""
+        for option, value in (("--yaw", self.yaw_deg), ("--pitch", self.pitch_deg), ("--time", self.t_s)):
+            if not np.isfinite(value):
+                raise InputError(f"{option} should be a finite number, got {value}")
+        if abs(self.t_s) > LATEST_S:
+            raise InputError(f"--time should be within {LATEST_S:.0e} s of the start, got {self.t_s:g}")
 
     @property
     def T_world_camera(self) -> Array:
@@ -65,11 +74,15 @@ class Look:
     sensor: str
     exposure_gain: float
     engine: str
-    samples: int
+    samples: int | None
 
     def rendering(self) -> RenderingSpec:
-        """The engine. Raises UnknownNameError."""
+        """The engine. Raises UnknownNameError, and InputError for samples that it does not take."""
         _require_known("engine", self.engine, ENGINES)
+        if self.samples is not None and self.engine != "path":
+            raise InputError(f"--samples belongs to --engine path, but the engine is {self.engine}; leave it out")
+        if self.samples is not None and not 1 <= self.samples <= MOST_SAMPLES:
+            raise InputError(f"--samples should be from 1 to {MOST_SAMPLES}, got {self.samples}")
         return RenderingSpec(engine=self.engine, samples=self.samples)
 
     def lens(self) -> Camera:
@@ -83,19 +96,20 @@ class Look:
         return replace(CAMERAS[self.sensor], exposure_gain=self.exposure_gain)
 
 
-def show(scene_name: str, stand: Stand, look: Look, *, out: Path, truth: bool, as_json: bool) -> None:
+def show(scene_name: str, viewpoint: Viewpoint, look: Look, *, out: Path, truth: bool, as_json: bool) -> None:
     """Draw one picture of a scene, and with `truth` its ground truth beside it."""
     rendering, lens, chip = look.rendering(), look.lens(), look.chip()
-    if out.suffix != ".png" or not out.parent.is_dir():
+    viewpoint.check()
+    if out.suffix != ".png" or out.is_dir() or not out.parent.is_dir():
         raise InputError(f"--out should be a .png in a folder that exists, got {out}")
     spec = read_scene(catalog.find("scene", scene_name).path)
-    if not spec.room.holds(stand.at_m):
-        raise InputError(f"--at should be inside the room ({spec.room.extent}), got {stand.at_m}")
+    if not spec.room.holds(viewpoint.at_m):
+        raise InputError(f"--at should be inside the room ({spec.room.extent}), got {viewpoint.at_m}")
     scene, shop = build(spec, {}), Workshop(default_store(), terminal.Bars())
     with closing(open_renderer(spec, scene, rendering, shop)) as renderer:
-        luminance_cd_m2 = renderer.radiance(lens, still(lens, stand.T_world_camera, t_ns=stand.t_ns))
+        luminance_cd_m2 = renderer.radiance(lens, still(lens, viewpoint.T_world_camera, t_ns=viewpoint.t_ns))
     write_png(out, _exposed(luminance_cd_m2 / np.float32(spec.white_cd_m2), chip))
-    written = [out, *(_write_truth(out, scene, lens, stand) if truth else [])]
+    written = [out, *(_write_truth(out, scene, lens, viewpoint) if truth else [])]
     if as_json:
         terminal.print_json({"files": [str(path) for path in written]})
     else:
@@ -113,9 +127,10 @@ def _exposed(radiance: Radiance, chip: CameraSensor) -> Grey:
     return expose(radiance, chip, NoiseStreams(shot, read), pattern=fixed_pattern(shape, chip, pattern))
 
 
-def _write_truth(out: Path, scene: Scene, camera: Camera, stand: Stand) -> Iterator[Path]:
+def _write_truth(out: Path, scene: Scene, camera: Camera, viewpoint: Viewpoint) -> Iterator[Path]:
     """Every channel as a picture for people beside `out`, and all values in one .npz."""
-    channels = TruthCaster(scene).frame(camera, Shot(stand.T_world_camera, stand.t_ns), STILL_CHANNELS).channels()
+    shot = Shot(viewpoint.T_world_camera, viewpoint.t_ns)
+    channels = TruthCaster(scene).frame(camera, shot, STILL_CHANNELS).channels()
     for name, values in channels.items():
         path = out.with_suffix(f".{name}.png")
         write_png(path, picture(name, values))

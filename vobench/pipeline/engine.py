@@ -31,9 +31,9 @@ def open_renderer(spec: SceneFile, scene: Scene, rendering: RenderingSpec, shop:
     """
     # Neither OpenGL nor Mitsuba is loaded where no picture is drawn, so that cached cases need none.
     if rendering.engine == "path":
-        from vobench.render.path import PathRenderer
+        from vobench.render.path import SAMPLES, PathRenderer
 
-        return PathRenderer(scene, samples=rendering.samples)
+        return PathRenderer(scene, samples=rendering.samples or SAMPLES)
     from vobench.render.raster import RasterRenderer
 
     require_drawing()

@@ -1,7 +1,6 @@
 """The stereo pair at work: light through the lens onto the chip, exposed by a shutter while the robot moves."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from vobench.sensor.exposure import Exposure, ExposureState, start, step
 from vobench.sensor.lens import lens_maps, through_lens
 from vobench.sensor.response import Grey
 from vobench.sensor.shutter import ShutterKind, strips
+from vobench.sequence.truth_image import Side
 from vobench.suite.expand import Case
 
 # Between two sub-frames, and between the first and last row of a strip, nothing should move further than this.
@@ -64,7 +64,7 @@ class StereoCamera:
 class Eye:
     """One camera: where it is, how its shutter cuts time, its lens, and its chip with noise of its own."""
 
-    def __init__(self, case: Case, side: Literal["left", "right"], world: World) -> None:
+    def __init__(self, case: Case, side: Side, world: World) -> None:
         def stream(name: str) -> np.random.Generator:
             return generator(case.seed, f"camera.{side}.{name}")
 

@@ -9,15 +9,15 @@ import numpy as np
 from vobench.pipeline.engine import BAKE, open_renderer
 from vobench.pipeline.motion import body_path, drive_case
 from vobench.pipeline.shoot import Pair, StereoCamera, World
-from vobench.pipeline.truth import PixelTruth, Side
+from vobench.pipeline.truth import PixelTruth
 from vobench.pipeline.workshop import Workshop
 from vobench.results.store import Store, canonical, code_digest, library_versions
 from vobench.robot.drive import Drive
 from vobench.sensor.encoder import ENCODERS, ticks
 from vobench.sequence import SequenceWriter
+from vobench.sequence.truth_image import SIDES
 from vobench.suite.expand import Case
 
-SIDES: tuple[Side, Side] = ("left", "right")
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "pyrender", "embreex", "mcap", "rosbags")
 
 

@@ -1,7 +1,5 @@
 """What is true of every pixel that a case's cameras see: where each row of them stands, at which instant."""
 
-from typing import Literal
-
 import numpy as np
 
 from vobench.geometry.camera import Camera
@@ -11,9 +9,8 @@ from vobench.render.truth import TruthCaster
 from vobench.scene.scene import Scene
 from vobench.sensor.shutter import ShutterKind, row_stamps
 from vobench.sensor.truth import TruthFrame, TruthNames
+from vobench.sequence.truth_image import Side
 from vobench.suite.expand import Case
-
-Side = Literal["left", "right"]
 
 
 class PixelTruth:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from vobench.geometry.se3 import Array
 from vobench.render.direct import SKY_SMOOTHING, direct_light, in_front, sees_open_sky
 from vobench.render.geometry import Floats, Inventory, inventory
 from vobench.render.image import images
@@ -169,11 +170,16 @@ def key_times_ns(light: Light) -> tuple[float, ...]:
     if not isinstance(light, Sun) or not light.moves:
         return (light.times_s[0] * NS_PER_S if isinstance(light, Sun) else 0.0,)
     times = np.array(light.times_s) * NS_PER_S
-    ways = [light.direction(t) for t in times]
-    angles = [np.arccos(np.clip(a @ b, -1, 1)) for a, b in pairwise(ways)]
-    spans = zip(pairwise(times), angles, strict=True)
-    inner = [np.linspace(*span, int(np.ceil(angle / SUN_STEP_RAD)) + 1)[:-1] for span, angle in spans]
+    steps = np.maximum(np.ceil(np.diff(wandered_rad(light)) / SUN_STEP_RAD), 1).astype(int)
+    inner = [np.linspace(*span, count, endpoint=False) for span, count in zip(pairwise(times), steps, strict=True)]
     return (*np.concatenate(inner).tolist(), float(times[-1]))
+
+
+def wandered_rad(sun: Sun) -> Array:
+    """How far (K,) a sun has gone along its way, at most, at each of its times: not how far it is from the start."""
+    azimuth, elevation = np.deg2rad(sun.azimuth_deg), np.abs(np.deg2rad(sun.elevation_deg))
+    across = np.diff(azimuth) * np.cos(np.minimum(elevation[1:], elevation[:-1]))
+    return np.concatenate([[0.0], np.cumsum(np.hypot(across, np.diff(np.deg2rad(sun.elevation_deg))))])
 
 
 def direct_layer(scene: Scene, index: int, fine: Stage, settings: BakeSettings, *, t_ns: float) -> Floats:
@@ -194,7 +200,7 @@ def direct_layer(scene: Scene, index: int, fine: Stage, settings: BakeSettings, 
 
 def reached(source: Source, fine: Stage) -> NDArray[np.bool_]:
     """The points (P,) a source may light."""
-    ahead = in_front(source.ball(), fine.points)
+    ahead = in_front(source.ball(), fine.points.points_m, fine.points.normals)
     return ahead & sees_open_sky(source, fine.points, fine.sight) if isinstance(source, OpenSky) else ahead
 
 

@@ -1,6 +1,7 @@
 """A baked scene on disk: one .npy per map, read back without a copy."""
 
 import json
+import zipfile
 from dataclasses import asdict
 from pathlib import Path
 
@@ -36,11 +37,11 @@ def load_baked(folder: Path, scene: Scene) -> BakedScene:
         bodies = [name for name, material in sorted(scene.materials.items()) if texture_of(material)]
         albedo = {name: np.load(folder / f"albedo.{name}.npy") for name in bodies}
         tracks = tuple(_track(folder / f"sun.{sun}.npz", sun) for sun in moving_suns(scene))
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
         raise RenderError(f"the scene's light cannot be read ({error}); delete this folder: {folder}") from error
     return BakedScene(scene, Layout(patches, *light.shape[1:]), light, albedo, settings, tracks)
 
 
 def _track(path: Path, sun: int) -> SunTrack:
-    with np.load(path) as stored:
+    with path.open("rb") as file, np.load(file) as stored:  # np.load leaves a torn file open
         return SunTrack(sun, tuple(stored["times_ns"].tolist()), stored["bounced"])

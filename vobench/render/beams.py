@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import Floats, Indices
+from vobench.render.geometry import Floats, Indices, Mask
 
-Mask = NDArray[np.bool_]
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 TILE_PX = 16
@@ -56,7 +55,7 @@ def spread(values: NDArray[Scalar], shape: tuple[int, ...]) -> NDArray[Scalar]:
 
 
 def balls(planes: Array, axis: Floats, sine: Floats) -> tuple[Array, Array]:
-    """Centres (T, 3) and radii (T,) of balls around what cones cut out of planes, as in `stand.Still`.
+    """Centres (T, 3) and radii (T,) of balls around what cones cut out of planes, as in `stand.Snapshot`.
 
     NaN or infinite where a cone does not end on its plane.
     """

@@ -12,11 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import RAY_OFFSET_M, Indices, RayCaster, corners, inventory
+from vobench.render.geometry import RAY_OFFSET_M, Indices, Mask, RayCaster, corners, inventory
 from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface
-
-Mask = NDArray[np.bool_]
 
 # A ray passes this many back sides before it counts as lost between surfaces that touch.
 MOST_BACK_SIDES = 64

@@ -42,9 +42,9 @@ def direct_light(source: Source, texels: Texels, where: Layout, sight: Sight, *,
     return light
 
 
-def in_front(what: Ball, texels: Texels) -> NDArray[np.bool_]:
-    """Points (P,) of which some of a ball is in front."""
-    ahead = np.einsum("ij,ij->i", what.centre_m - texels.points_m, texels.normals)
+def in_front(what: Ball, points_m: Floats, normals: Floats) -> NDArray[np.bool_]:
+    """Points (P, 3) with normals (P, 3) before which some of a ball lies."""
+    ahead = np.einsum("ij,ij->i", what.centre_m - points_m, normals)
     return np.asarray(ahead > -what.radius_m)
 
 

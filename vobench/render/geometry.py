@@ -15,6 +15,7 @@ from vobench.scene.surface import Surface
 
 Floats = NDArray[Any]  # float32 where there are many, float64 inside formulas
 Indices = NDArray[np.int32]
+Mask = NDArray[np.bool_]
 
 # Rays start this far off their surface; float32 resolves 1e-6 m at 10 m.
 RAY_OFFSET_M = 1e-4
@@ -31,7 +32,7 @@ class Inventory:
     surfaces: tuple[Surface, ...]
     mover: Indices
     panel: Indices
-    pane: NDArray[np.bool_]
+    pane: Mask
 
 
 def inventory(scene: Scene, *, t_ns: float = 0) -> Inventory:
@@ -60,6 +61,10 @@ class Ball:
 
     centre_m: Array
     radius_m: Any
+
+    def take(self, which: NDArray[np.int64]) -> "Ball":
+        """Some of many."""
+        return Ball(self.centre_m[which], self.radius_m[which])
 
 
 def ball(surfaces: Sequence[Surface]) -> Ball:
@@ -97,11 +102,14 @@ class RayCaster:
         self._scene = rtcore_scene.EmbreeScene()
         self._mesh = mesh_construction.TriangleMesh(self._scene, np.ascontiguousarray(triangles))
 
-    def occluded(self, origins_m: ArrayLike, targets_m: ArrayLike) -> NDArray[np.bool_]:
+    def occluded(self, origins_m: ArrayLike, targets_m: ArrayLike) -> Mask:
         """Whether anything stands between each of (R, 3) origins and its target (R, 3)."""
-        way = np.asarray(targets_m) - np.asarray(origins_m)
+        return self.stops(origins_m, np.asarray(targets_m) - np.asarray(origins_m))
+
+    def stops(self, origins_m: ArrayLike, way: ArrayLike) -> Mask:
+        """Whether anything stands between origins and origins + way (R, 3)."""
         blocked = np.asarray(self._scene.run(*_rays(origins_m, way, reach=1 - 1e-3), query="OCCLUDED"))
-        is_blocked: NDArray[np.bool_] = blocked >= 0
+        is_blocked: Mask = blocked >= 0
         return is_blocked
 
     def nearest(self, origins_m: ArrayLike, directions: ArrayLike) -> Indices:

@@ -6,7 +6,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from vobench.render.bake import BakedScene, SunTrack, direct_layer, placed, stage
+from vobench.render.bake import BakedScene, SunTrack, direct_layer, placed, stage, wandered_rad
 from vobench.render.lightmap import Scales
 from vobench.render.moving import Moment, MoverLight
 from vobench.scene.light import NS_PER_S, Light, Steady, Sun
@@ -96,11 +96,9 @@ def _stepped_ns(light: Light, t_ns: float) -> float:
     """When a moving sun last took a step of SUN_TURN_RAD, so that it need not be traced for every picture; else 0."""
     if not isinstance(light, Sun) or not light.moves:
         return 0.0
-    first, last = (NS_PER_S * t for t in (light.times_s[0], light.times_s[-1]))
-    corners = np.array([light.direction(NS_PER_S * t) for t in light.times_s])
-    steps = np.ceil(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum() / SUN_TURN_RAD)
-    step_ns = (last - first) / max(steps, 1)
-    return float(first + step_ns * np.rint((np.clip(t_ns, first, last) - first) / step_ns))
+    times_ns, way_rad = NS_PER_S * np.array(light.times_s), wandered_rad(light)
+    stepped_rad = SUN_TURN_RAD * np.rint(np.interp(t_ns, times_ns, way_rad) / SUN_TURN_RAD)
+    return float(np.interp(stepped_rad, way_rad, times_ns))
 
 
 def _between(track: SunTrack, t_ns: float) -> Map:

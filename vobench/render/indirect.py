@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from vobench.render.direct import cell_spot
+from vobench.render.direct import JITTER, cell_spot
 from vobench.render.geometry import RAY_OFFSET_M, Floats, Hits, Indices
 from vobench.render.lightmap import Holes, Layout
 from vobench.render.sight import FAR_M, Sight, smooth_mirror
@@ -194,7 +194,7 @@ def _start(points: Texels, side: int) -> _Front:
 def _facets(normals: Floats, roughness: Floats, dither: Floats, turn: NDArray[np.int64]) -> Floats:
     """Unit normals (R, 3) of facets around a surface's, by GGX. Source: Walter et al. (2007), eqs 35 and 36."""
     rough = np.flatnonzero(roughness)
-    a, b = ((dither[rough] + turn[rough, None] * np.array([0.7548776662, 0.5698402910])) % 1).T
+    a, b = ((dither[rough] + turn[rough, None] * JITTER) % 1).T
     slope = (roughness[rough] * np.sqrt(a / np.maximum(1 - a, 1e-6)))[:, None]
     u_axis, v_axis = tangents(normals[rough])
     angle = 2 * np.pi * b[:, None]

@@ -92,4 +92,5 @@ def failure(library: Path) -> str:
             return f"no picture after {PROBE_TIMEOUT_S} s"
     if done.returncode < 0:
         return f"killed by {signal.Signals(-done.returncode).name}"
-    return done.stderr.strip().splitlines()[-1][:200] if done.returncode else ""
+    silent = [f"died with {done.returncode}"]
+    return (done.stderr.strip().splitlines() or silent)[-1][:200] if done.returncode else ""

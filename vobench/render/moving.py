@@ -16,7 +16,7 @@ from vobench.render.geometry import Floats, Inventory, inventory
 from vobench.render.image import images
 from vobench.render.indirect import Gathering, answers, gathering
 from vobench.render.lightmap import Layout, Scales, layout
-from vobench.render.shade import Shade, Shaded, blocks
+from vobench.render.shade import Shade, Shaded, Target, blocks
 from vobench.render.sight import Sight
 from vobench.render.source import OpenSky, Source, sources
 from vobench.render.texels import Texels, texels
@@ -54,7 +54,7 @@ class MoverLight:
         self._scales = Scales(still.where, layout(still.things.surfaces, spacing_m=GATHER_SPACING_M))
         self._answer = answers(still.things.surfaces, self._scene.materials, baked.albedo, still.things.panel)
         self._skies = [light for light in self._scene.lights if isinstance(light, Sky)]
-        self._sources = [self._seen(sources(light, still.sight)) for light in self._scene.lights]
+        self._targets = [self._seen(sources(light, still.sight)) for light in self._scene.lights]
         self._layers = baked.light.reshape(len(baked.light), -1)
 
     def at(self, t_ns: float, suns_ns: Sequence[float], is_on: Sequence[bool]) -> Moment:
@@ -66,14 +66,15 @@ class MoverLight:
         lit = self._points(things, self._still.where)
         sight = Sight(things.surfaces, self._scene.materials, range(len(things.surfaces)))
         shining = [self._shining(index, suns_ns[index]) if on else [] for index, on in enumerate(is_on)]
-        movers = [self._opaque(things, index) for index in range(len(self._scene.movers))]
+        movers = [sides for index in range(len(self._scene.movers)) if (sides := self._opaque(things, index))]
         direct = np.zeros((len(shining), len(lit)), np.float32)
-        for row, light, parts, sun_ns in zip(direct, self._scene.lights, shining, suns_ns, strict=True):
-            for source in [*parts, *(images(light, sight, t_ns=sun_ns) if parts else [])]:
+        for row, light, targets, sun_ns in zip(direct, self._scene.lights, shining, suns_ns, strict=True):
+            shown = images(light, sight, t_ns=sun_ns) if targets else []
+            for source in [*(target.source for target in targets), *shown]:
                 for rays, some in first_rays(source, lit, side):
                     row[some] += arriving(source, lit.take(some), sight, rays)[0]
-        least_lx = UNNOTICED * np.asarray(is_on, np.float32) @ self._layers[:, self._still.points.index]
-        shaded = tuple(tuple(self._shade.by(movers, source, least_lx) for source in parts) for parts in shining)
+        least_lx = (UNNOTICED * np.asarray(is_on, np.float32) @ self._layers)[self._still.points.index]
+        shaded = tuple(tuple(self._shade.by(movers, target, least_lx) for target in targets) for targets in shining)
         coarse = self._points(things, self._scales.coarse)
         return Moment(lit.index, direct, shaded, self._gathered(coarse), coarse.index)
 
@@ -100,16 +101,16 @@ class MoverLight:
         rays = GATHER_RAYS if self._settings.bounces else 0
         return gathering(coarse, where, sight, self._answer, self._skies, rays=rays)
 
-    def _shining(self, index: int, t_ns: float) -> list[Source]:
+    def _shining(self, index: int, t_ns: float) -> list[Target]:
         light = self._scene.lights[index]
         if isinstance(light, Sun) and light.moves:
-            return sources(light, self._still.sight, t_ns=t_ns)
-        return self._sources[index]
+            return [Target(source) for source in sources(light, self._still.sight, t_ns=t_ns)]
+        return self._targets[index]
 
-    def _seen(self, parts: list[Source]) -> list[Source]:
+    def _seen(self, parts: list[Source]) -> list[Target]:
         """All but an open sky that few points see, such as undersides of things that stand on the floor."""
         some = [reached(source, self._still).mean() if isinstance(source, OpenSky) else 1 for source in parts]
-        return [source for source, share in zip(parts, some, strict=True) if share > SKY_SHARE]
+        return [Target(source) for source, share in zip(parts, some, strict=True) if share > SKY_SHARE]
 
     def _opaque(self, things: Inventory, mover: int) -> list[Surface]:
         return [things.surfaces[i] for i in np.flatnonzero((things.mover == mover) & ~things.pane)]

@@ -3,7 +3,6 @@
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +15,12 @@ from vobench.render.mitsuba_scene import MitsubaScene, State, state
 from vobench.render.renderer import Radiance, View
 from vobench.scene.scene import Scene
 
+SAMPLES = 64  # paths a pixel where nobody says how many
 MAX_LANES = 1 << 22  # paths traced at once; more cost memory and are no faster
 
 
 @dataclass(frozen=True, slots=True)
-class Exposure:
+class Batch:
     """Rows of the picture that see one state of the scene, each from a pose of its own; one light path per sample.
 
     rows (R,), start_ns (R,), T_world_camera (R, 4, 4), weight (R,): the share in the row's whole exposure.
@@ -39,12 +39,12 @@ class PathRenderer:
     and pose: the same picture has the same bytes, and no two pictures share their noise.
     """
 
-    def __init__(self, scene: Scene, *, samples: int = 64, seed: int = 0, max_depth: int | None = 8) -> None:
+    def __init__(self, scene: Scene, *, samples: int = SAMPLES, seed: int = 0, max_depth: int | None = 16) -> None:
         _check(samples, max_depth)
         llvm.prepare()
         self._scene, self._samples, self._seed = scene, samples, seed
         self._mitsuba = MitsubaScene(scene, max_depth=max_depth)
-        self._lens: tuple[Camera, Any] | None = None
+        self._lens: tuple[Camera, Radiance] | None = None
 
     def radiance(self, camera: Camera, views: Sequence[View]) -> Radiance:
         """Luminance (H, W) in cd/m², linear and unclipped, averaged over each pixel's area; views tile the rows.
@@ -52,10 +52,10 @@ class PathRenderer:
         A pixel one of whose corners the lens does not see is black.
         """
         picture = np.zeros((camera.height_px, camera.width_px), np.float32)
-        for (moment, samples), exposure in _exposures(self._scene, views, self._samples):
+        for (moment, samples), batch in _batches(self._scene, views, self._samples):
             self._mitsuba.become(moment)
-            light = self._expose(camera, exposure, samples)
-            np.add.at(picture, exposure.rows, light * exposure.weight[:, None].astype(np.float32))
+            light = self._trace(camera, batch, samples)
+            np.add.at(picture, batch.rows, light * batch.weight[:, None].astype(np.float32))
         return picture
 
     def close(self) -> None:
@@ -63,17 +63,17 @@ class PathRenderer:
         del self._mitsuba
         self._lens = None
 
-    def _expose(self, camera: Camera, exposure: Exposure, samples: int) -> Radiance:
-        """Mean radiance (R, W) of the rows of an exposure over `samples` paths a pixel, some at a time."""
-        at_once = max(1, min(samples, MAX_LANES // (len(exposure.rows) * camera.width_px)))
+    def _trace(self, camera: Camera, batch: Batch, samples: int) -> Radiance:
+        """Mean radiance (R, W) of the rows of a batch over `samples` paths a pixel, some at a time."""
+        at_once = max(1, min(samples, MAX_LANES // (len(batch.rows) * camera.width_px)))
         counts = [at_once] * (samples // at_once) + [samples % at_once] * (samples % at_once > 0)
         rays = self._corner_rays(camera)
-        total = np.zeros((len(exposure.rows), camera.width_px), np.float32)
-        for seed, count in zip(_seeds(self._seed, exposure, len(counts)), counts, strict=True):
-            total += self._mitsuba.trace(rays, exposure.rows, exposure.T_world_camera, count, seed)
+        total = np.zeros((len(batch.rows), camera.width_px), np.float32)
+        for seed, count in zip(_seeds(self._seed, batch, len(counts)), counts, strict=True):
+            total += self._mitsuba.trace(rays, batch.rows, batch.T_world_camera, count, seed)
         return total / np.float32(samples)
 
-    def _corner_rays(self, camera: Camera) -> Any:
+    def _corner_rays(self, camera: Camera) -> Radiance:
         """Directions (H + 1, W + 1, 3) float32 through the corners of the pixels, kept from picture to picture."""
         if self._lens is None or self._lens[0] != camera:
             u, v = np.meshgrid(np.arange(camera.width_px + 1) - 0.5, np.arange(camera.height_px + 1) - 0.5)
@@ -88,7 +88,7 @@ def _check(samples: int, max_depth: int | None) -> None:
         raise RenderError(f"cannot trace paths of {max_depth} segments; max_depth must be 1 or more, or None")
 
 
-def _exposures(scene: Scene, views: Sequence[View], samples: int) -> Iterator[tuple[tuple[State, int], Exposure]]:
+def _batches(scene: Scene, views: Sequence[View], samples: int) -> Iterator[tuple[tuple[State, int], Batch]]:
     """All rows at all their moments, gathered by the scene's state and by the paths a pixel has at that moment.
 
     A row exposed in M moments has its samples spread evenly over them, at least one for each.
@@ -103,11 +103,11 @@ def _exposures(scene: Scene, views: Sequence[View], samples: int) -> Iterator[tu
         yield key, _gather(members)
 
 
-def _gather(members: list[tuple[View, int]]) -> Exposure:
+def _gather(members: list[tuple[View, int]]) -> Batch:
     """The rows of views, each in one of its moments, one after another."""
     rows = [np.arange(view.rows.start, view.rows.stop) for view, _ in members]
     lengths = [len(r) for r in rows]
-    return Exposure(
+    return Batch(
         np.concatenate(rows),
         np.repeat([view.start_ns[m] for view, m in members], lengths),
         np.repeat([view.T_world_camera[m] for view, m in members], lengths, axis=0),
@@ -115,8 +115,8 @@ def _gather(members: list[tuple[View, int]]) -> Exposure:
     )
 
 
-def _seeds(seed: int, exposure: Exposure, count: int) -> list[int]:
+def _seeds(seed: int, batch: Batch, count: int) -> list[int]:
     """Seeds that differ between pictures from other places or times."""
-    moment = exposure.rows, exposure.start_ns, exposure.T_world_camera
+    moment = batch.rows, batch.start_ns, batch.T_world_camera
     words = [zlib.crc32(np.ascontiguousarray(part).tobytes()) for part in moment]
     return [int(word) for word in np.random.SeedSequence([seed, *words]).generate_state(count)]

@@ -1,14 +1,14 @@
 """Direct light that movers take from what stands still."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from vobench.render.direct import Rays, cell_spot, footprint, in_front
-from vobench.render.geometry import Ball, Floats, RayCaster, ball
+from vobench.render.geometry import Ball, Floats, Mask, RayCaster, ball, corners
 from vobench.render.lightmap import Layout, Patch
 from vobench.render.sight import Sight
 from vobench.render.source import SkyPane, Source
@@ -19,6 +19,7 @@ BLOCK = 4  # samples along a side
 SCOUTS, RAYS = Rays(2), Rays(3, spread=True)  # per point, source and picture
 SKY_REACH = 10  # radii beyond which a mover hides less than a hundredth of an open sky
 CHUNK = 1 << 12
+MOST_SLICES = 8  # of a mover
 SPREAD = 1.5  # samples, from every other one
 MARGIN = 6  # samples around a shadow that its smoothing reaches
 
@@ -42,7 +43,7 @@ def blocks(points: Texels, where: Layout) -> Blocks:
     return Blocks(of, Ball(centre, radius))
 
 
-def may_shade(mover: Ball, source: Ball, points: Ball) -> NDArray[np.bool_]:
+def may_shade(mover: Ball, source: Ball, points: Ball) -> Mask:
     """Whether a way from within each of `points` (N,) to within the source's ball can pass the mover's."""
     if np.isinf(source.radius_m):
         distance = np.linalg.norm(mover.centre_m - points.centre_m, axis=-1)
@@ -56,7 +57,7 @@ def may_shade(mover: Ball, source: Ball, points: Ball) -> NDArray[np.bool_]:
     )
     reach = far_source + source.radius_m + mover.radius_m + points.radius_m
     inside = far_mover <= mover.radius_m + points.radius_m
-    passes: NDArray[np.bool_] = inside | ((np.arccos(np.clip(cosine, -1, 1)) <= sum(angles)) & (far_mover <= reach))
+    passes: Mask = inside | ((np.arccos(np.clip(cosine, -1, 1)) <= sum(angles)) & (far_mover <= reach))
     return passes
 
 
@@ -77,35 +78,46 @@ class Shade:
     blocks: Blocks
     sight: Sight
 
-    def by(self, movers: Sequence[Sequence[Surface]], source: Source, least_lx: Floats) -> Shaded:
+    def by(self, movers: Sequence[Sequence[Surface]], target: "Target", least_lx: Floats) -> Shaded:
         """Light of a source that movers, each a list of surfaces, keep from the points.
 
         least_lx (P,): blocks of points that lose less than this are left alone.
         """
-        reach = source.ball()
-        near = np.zeros(len(self.blocks.balls.radius_m), bool)
-        for mover in movers:
-            near |= may_shade(ball(mover), reach, self.blocks.balls)
-        some = np.flatnonzero(near[self.blocks.of])
-        some = some[in_front(reach, self.points.take(some))]
+        source = target.source
+        some = np.flatnonzero(self._near(movers, source.ball())[self.blocks.of])
+        some = some[in_front(source.ball(), self.points.points_m[some], self.points.normals[some])]
         surfaces = [surface for mover in movers for surface in mover]
         caster = RayCaster(surfaces, range(len(surfaces)))
         scouts = some[self._every_other(some)] if isinstance(source, SkyPane) else some
-        found = scouts[self._lost(scouts, source, caster, SCOUTS) > least_lx[scouts]]
+        sent = target.sent(self.points, scouts, SCOUTS)
+        rich = np.flatnonzero(sent.light.mean(1) > least_lx[scouts])
+        found = scouts[rich][self._lost(sent.take(rich), target, caster) > least_lx[scouts[rich]]]
         # Scouts miss the rims of half shadows, but not whole blocks.
-        near = np.isin(self.blocks.of[some], self.blocks.of[found])
-        return self._shaded(some[near], source, caster)
+        shaded = np.zeros(len(self.blocks.balls.radius_m), bool)
+        shaded[self.blocks.of[found]] = True
+        return self._shaded(some[shaded[self.blocks.of[some]]], target, caster)
 
-    def _shaded(self, some: NDArray[np.int64], source: Source, caster: RayCaster) -> Shaded:
-        if not isinstance(source, SkyPane):
-            return Shaded(some, self._lost(some, source, caster, RAYS))
+    def _near(self, movers: Sequence[Sequence[Surface]], source: Ball) -> Mask:
+        """Blocks (B,) that movers may shade: by a ball around each, and of those by smaller ones that fit better."""
+        near = np.zeros(len(self.blocks.balls.radius_m), bool)
+        for mover in movers:
+            some = np.flatnonzero(~near)
+            for enclosing in ([ball(mover)], slices(mover)):
+                few = self.blocks.balls.take(some)
+                some = some[np.logical_or.reduce([may_shade(one, source, few) for one in enclosing])]
+            near[some] = True
+        return near
+
+    def _shaded(self, some: NDArray[np.int64], target: "Target", caster: RayCaster) -> Shaded:
+        if not isinstance(target.source, SkyPane):
+            return Shaded(some, self._lost(target.sent(self.points, some, RAYS), target, caster))
         few = some[self._every_other(some)]
-        return Shaded(some, self._filled(some, few, self._lost(few, source, caster, RAYS)))
+        return Shaded(some, self._filled(some, few, self._lost(target.sent(self.points, few, RAYS), target, caster)))
 
-    def _every_other(self, some: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _every_other(self, some: NDArray[np.int64]) -> Mask:
         """Every other row and column."""
         row, column = np.divmod(self.points.index[some], self.where.width)
-        even: NDArray[np.bool_] = (row % 2 == 0) & (column % 2 == 0)
+        even: Mask = (row % 2 == 0) & (column % 2 == 0)
         return even
 
     def _filled(self, some: NDArray[np.int64], few: NDArray[np.int64], lost: Floats) -> Floats:
@@ -121,27 +133,97 @@ class Shade:
         filled: Floats = light / np.maximum(weight, 1e-6)
         return filled
 
-    def _lost(self, some: NDArray[np.int64], source: Source, caster: RayCaster, rays: Rays) -> Floats:
-        parts = in_chunks(
-            lambda part: self._lost_of(self.points.take(some[part]), source, caster, rays), len(some), chunk=CHUNK
-        )
+    def _lost(self, sent: "Sent", target: "Target", caster: RayCaster) -> Floats:
+        """Illuminance (N,) that what a caster holds takes from the points of some rays."""
+        count = len(sent.some)
+        parts = in_chunks(lambda part: self._lost_of(sent.take(part), target.source, caster), count, chunk=CHUNK)
         return np.concatenate([*parts, np.zeros(0, np.float32)])
 
-    def _lost_of(self, points: Texels, source: Source, caster: RayCaster, rays: Rays) -> Floats:
-        total, towards = np.zeros(len(points), np.float32), source.towards(points)
+    def _lost_of(self, sent: "Sent", source: Source, caster: RayCaster) -> Floats:
+        start = np.broadcast_to(sent.start_m, sent.ahead_m.shape).reshape(-1, 3)
+        light, ahead = sent.light.ravel(), sent.ahead_m.reshape(-1, 3)
+        hidden = np.flatnonzero(caster.stops(start, ahead) & (light > 0))
+        lost = np.zeros(len(light), np.float32)
+        lost[hidden] = light[hidden] * source.passing(self.sight, start[hidden], ahead[hidden])
+        total: Floats = lost.reshape(sent.light.shape).mean(1)
+        return total
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """R rays from each of some points (N,), increasing, to a source: where from, (N, R, 3) or (N, 1, 3), and whereto.
+
+    light (N, R): the illuminance that each of the rays would bring if nothing stood in its way.
+    """
+
+    some: NDArray[np.int64]
+    start_m: Floats
+    ahead_m: Floats
+    light: Floats
+
+    def take(self, which: slice | NDArray[np.int64]) -> "Sent":
+        """Those of some of the points."""
+        return Sent(*(getattr(self, f.name)[which] for f in fields(self)))
+
+    def woven(self, other: "Sent", own: Mask) -> "Sent":
+        """Those of both, one after another; `own` (N,) says whose turn it is."""
+        woven = []
+        for mine, others in ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self)):
+            both = np.empty((len(own), *mine.shape[1:]), mine.dtype)
+            both[own], both[~own] = mine, others
+            woven.append(both)
+        return Sent(*woven)
+
+
+def _nobody(rays: Rays) -> Sent:
+    vectors = np.zeros((0, rays.side**2, 3), np.float32)
+    return Sent(np.zeros(0, np.int64), vectors if rays.spread else vectors[:, :1], vectors, vectors[..., 0])
+
+
+class Target:
+    """A source, and the rays that points sent to it for the last picture: movers go slowly, so most serve again."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self._kept: dict[Rays, Sent] = {}
+
+    def sent(self, points: Texels, some: NDArray[np.int64], rays: Rays) -> Sent:
+        """Rays from some points (N,), increasing."""
+        kept = self._kept.get(rays, _nobody(rays))
+        place = np.searchsorted(kept.some, some)
+        known = np.append(kept.some, -1)[place] == some
+        new = some[~known]
+        parts = in_chunks(lambda part: self._send(points, new[part], rays), len(new), chunk=CHUNK)
+        fresh = Sent(*(np.concatenate([getattr(p, f.name) for p in [_nobody(rays), *parts]]) for f in fields(Sent)))
+        self._kept[rays] = kept.take(place[known]).woven(fresh, known)
+        return self._kept[rays]
+
+    def _send(self, points: Texels, some: NDArray[np.int64], rays: Rays) -> Sent:
+        part, shape = points.take(some), (len(some), rays.side**2)
+        towards, every = self.source.towards(part), np.arange(len(some))
+        light, ahead_m = np.empty(shape, np.float32), np.empty((*shape, 3), np.float32)
+        start_m = part.points_m[:, None].repeat(shape[1] if rays.spread else 1, axis=1)
         for cell in range(rays.side**2):
-            way, strength = towards(*cell_spot(points, cell, rays.side))
-            cosine = points.cosine(way)
-            light = strength * cosine
-            faced = np.flatnonzero(light > 0)
-            start = points.points_m[faced] + (footprint(points, faced, cell) if rays.spread else 0)
-            end = points.points_m[faced] + way[faced]
-            hidden = np.flatnonzero(caster.occluded(start, end))
-            faced, start = faced[hidden], start[hidden]
-            ahead = end[hidden] - start
-            share = source.passing(self.sight, start, ahead)
-            total[faced] += light[faced] * share * points.take(faced).entering(cosine[faced])
-        return total / rays.side**2
+            way, strength = towards(*cell_spot(part, cell, rays.side))
+            cosine = part.cosine(way)
+            light[:, cell] = strength * np.maximum(cosine, 0) * part.entering(cosine)
+            ahead_m[:, cell] = way
+            if rays.spread:
+                aside_m = footprint(part, every, cell)
+                start_m[:, cell] += aside_m
+                ahead_m[:, cell] -= aside_m
+        return Sent(some, start_m, ahead_m, light)
+
+
+def slices(surfaces: Sequence[Surface]) -> list[Ball]:
+    """Balls that enclose surfaces together: slices of their upright box across its longest side."""
+    points = np.concatenate([corners(s) for s in surfaces])
+    low, size = points.min(0), np.ptp(points, axis=0)
+    longest = int(size.argmax())
+    count = int(np.clip(np.ceil(size[longest] / max(np.sort(size)[1], 1e-3)), 1, MOST_SLICES))
+    part = np.where(np.arange(3) == longest, size / count, size)
+    step = np.eye(3)[longest] * part
+    return [Ball(low + part / 2 + i * step, float(np.linalg.norm(part) / 2)) for i in range(count)]
 
 
 def _around(place: NDArray[np.int64], where: Layout, patch: Patch) -> tuple[slice, slice]:

@@ -4,19 +4,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
 from vobench.render.bodies import Bodies
-from vobench.render.geometry import RAY_OFFSET_M
+from vobench.render.geometry import RAY_OFFSET_M, Mask
+from vobench.render.source import FARTHEST_M
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface
 
-Mask = NDArray[np.bool_]
-
-# Far enough for its rays to be parallel within a scene to a tenth of a millimetre.
-SUN_DISTANCE_M = 1e7
 # From there the sun's rays would fall this far beside where they do, within 30 m around the origin.
 BEACON_M, BEACON_SLACK_M = 3e4, 0.03
 
@@ -32,7 +28,7 @@ class Lamp:
     def beacon(self) -> tuple[Array, float]:
         """A point (3,) not too far for float32, and how much farther than from it light may strike, in metres."""
         if isinstance(self.light, Sun):
-            return self.center_m * (BEACON_M / SUN_DISTANCE_M), BEACON_SLACK_M
+            return self.center_m * (BEACON_M / FARTHEST_M), BEACON_SLACK_M
         return self.center_m, 0.0
 
     @property
@@ -78,7 +74,7 @@ def lamps(scene: Scene, t_ns: int) -> Iterator[Lamp]:
 
 def _center(light: AreaLight | PointLight | SpotLight | Sun, t_ns: int) -> Array:
     if isinstance(light, Sun):
-        return SUN_DISTANCE_M * light.direction(t_ns)
+        return FARTHEST_M * light.direction(t_ns)
     if isinstance(light, AreaLight):
         return light.surface.at(np.array(0.5), np.array(0.5))
     return light.position_m

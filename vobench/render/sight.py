@@ -43,7 +43,7 @@ class Sight:
 
     def clear(self, origins_m: Floats, way: Floats) -> NDArray[np.bool_]:
         """Whether nothing opaque stands between origins and origins + way (R, 3)."""
-        return ~self.opaque.occluded(origins_m, origins_m + way)
+        return ~self.opaque.stops(origins_m, way)
 
     def pane_passes(self, pane: int, directions: Floats) -> Floats:
         """Share (R,) that one pane lets through along unit directions (R, 3)."""
@@ -55,7 +55,7 @@ class Sight:
         """Whether a pane stands between origins and origins + way (R, 3)."""
         if not self.panes:
             return np.zeros(len(origins_m), bool)
-        return self._glass.occluded(origins_m, origins_m + way)
+        return self._glass.stops(origins_m, way)
 
     def first_panes(self, origins_m: Floats, way: Floats) -> tuple[NDArray[np.int64], Hits]:
         """Which rays from origins along way (R, 3) cross a pane (K,), and where they meet their first."""
@@ -97,5 +97,5 @@ class Sight:
         up = np.sqrt(1 - radius**2) * pane.normal
         directions = np.concatenate([flat + up, flat - up])
         origins = np.tile(pane.at(u, v), (2, 1)) + RAY_OFFSET_M * directions
-        blocked = self.opaque.occluded(origins, origins + FAR_M * directions)
+        blocked = self.opaque.stops(origins, FAR_M * directions)
         return bool((~blocked & ~self.crosses_pane(origins, FAR_M * directions)).any())

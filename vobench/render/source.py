@@ -19,7 +19,7 @@ from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sk
 from vobench.scene.surface import Surface
 
 Aim = Callable[[Floats, Floats], tuple[Floats, Floats]]
-FARTHEST_M = 1e7
+FARTHEST_M = 1e7  # from there rays are parallel within a scene to a tenth of a millimetre
 
 
 class Source(Protocol):

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.render.bodies import Bodies, Mask
+from vobench.render.bodies import Bodies
+from vobench.render.geometry import Mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +21,7 @@ class Shot:
 
 
 @dataclass(frozen=True, slots=True)
-class Still:
+class Snapshot:
     """All surfaces from a camera at one instant: corners (S, 4, 3) in its frame, planes (S + 1, 3), what it faces (S,).
 
     A plane's product with a unit ray is one over the distance along that ray.
@@ -33,17 +34,16 @@ class Still:
 
 @dataclass(frozen=True, slots=True)
 class Stand:
-    """A shot as transforms, there and back: each body's (4, 4), or (H, 4, 4) by row; t_ns is its mean instant.
+    """A shot as transforms, there and back: each body's (4, 4), or (H, 4, 4) by row.
 
-    `still` is None where the camera or a body moves meanwhile.
+    `snapshot` is None where the camera or a body moves meanwhile.
     """
 
     T_world_bodies: list[Array]
     T_bodies_world: list[Array]
     T_bodies_camera: list[Array]
     T_camera_bodies: list[Array]
-    t_ns: int
-    still: Still | None
+    snapshot: Snapshot | None
 
 
 def stand(bodies: Bodies, shot: Shot) -> Stand:
@@ -53,19 +53,18 @@ def stand(bodies: Bodies, shot: Shot) -> Stand:
     T_bodies_camera = [T @ shot.T_world_camera for T in T_bodies_world]
     T_camera_bodies = [se3.inverse(T) for T in T_bodies_camera]
     rolling = any(T.ndim == 3 for T in T_bodies_camera)
-    still = None if rolling else _still(bodies, np.stack(T_camera_bodies))
-    t_ns = int(np.mean(shot.t_ns))
-    return Stand(T_world_bodies, T_bodies_world, T_bodies_camera, T_camera_bodies, t_ns, still)
+    snapshot = None if rolling else _snapshot(bodies, np.stack(T_camera_bodies))
+    return Stand(T_world_bodies, T_bodies_world, T_bodies_camera, T_camera_bodies, snapshot)
 
 
-def _still(bodies: Bodies, T_camera_bodies: Array) -> Still:
+def _snapshot(bodies: Bodies, T_camera_bodies: Array) -> Snapshot:
     T_camera_surfaces = T_camera_bodies[bodies.of_surface]
     corners_m = se3.apply(T_camera_surfaces, bodies.corners_m)
     normals = np.einsum("sij,sj->si", T_camera_surfaces[:, :3, :3], bodies.normals[:-1])
     away_m = np.einsum("si,si->s", normals, corners_m[:, 0])
     with np.errstate(divide="ignore", invalid="ignore"):  # a plane through the camera is seen edge-on: never
         planes = normals / away_m[:, None]
-    return Still(corners_m, np.append(planes, np.full((1, 3), np.nan), axis=0), away_m < 0)
+    return Snapshot(corners_m, np.append(planes, np.full((1, 3), np.nan), axis=0), away_m < 0)
 
 
 def at_rows(tables: Sequence[Array], rows: Array) -> list[Array]:

@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -69,11 +70,16 @@ def texels(
 ) -> Texels:
     """The points of those surfaces `among` (K,) names that light can show on."""
     flat = np.arange(where.height * where.width).reshape(where.height, where.width)
-    dither = np.random.default_rng([seed, 1]).random((flat.size, 2), dtype=np.float32)
     parts = [_of_surface(i, surfaces[i], materials, where, flat) for i in among if _has_body(surfaces[i], materials)]
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)] if parts else _nothing()
-    columns.append(dither[columns[4]])
+    columns.append(_dither(seed, flat.size)[columns[4]])
     return Texels(*columns)
+
+
+@lru_cache(maxsize=4)
+def _dither(seed: int, count: int) -> Floats:
+    """Numbers (count, 2) in [0, 1); kept, as movers ask for the same ones for each picture."""
+    return np.random.default_rng([seed, 1]).random((count, 2), dtype=np.float32)
 
 
 def _has_body(surface: Surface, materials: Mapping[str, Material]) -> bool:

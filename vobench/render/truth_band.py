@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
 from vobench.render.beams import TILE_PX, Scalar, spread
-from vobench.render.bodies import Mask, moved, turn
-from vobench.render.geometry import Indices
+from vobench.render.bodies import moved, turn
+from vobench.render.geometry import Indices, Mask
 from vobench.render.stand import Stand, at_rows, of
 from vobench.render.truth_plan import Plan
 
@@ -65,10 +65,10 @@ class Band:
 
     def _look(self) -> tuple[Indices, Array]:
         """Surfaces and distances (R,): by planes where tiles are sure, by rays elsewhere."""
-        surface, still = spread(self._plan.sure[self._tiles], self._shape).ravel(), self._plan.here.still
+        surface, snapshot = spread(self._plan.sure[self._tiles], self._shape).ravel(), self._plan.here.snapshot
         distance_m = np.full(len(surface), np.nan)
-        if still is not None:
-            distance_m = 1 / np.einsum("ri,ri->r", still.planes[surface], self._rays)
+        if snapshot is not None:
+            distance_m = 1 / np.einsum("ri,ri->r", snapshot.planes[surface], self._rays)
         unsure = np.flatnonzero(surface < 0)
         seen = self._bodies.look(self._rays[unsure], [of(T, unsure) for T in self._T_bodies_camera])
         surface[unsure], distance_m[unsure] = seen.surface, seen.distance_m
@@ -127,7 +127,7 @@ class Band:
         for _ in range(MOST_ROUNDS):
             next_m = self._carried(points_m, there, rows)
             uv_px = self._plan.camera.project(next_m)
-            change_px = np.nanmax(np.abs(uv_px[:, 1] - rows), initial=0.0) if there.still is None else 0.0
+            change_px = np.nanmax(np.abs(uv_px[:, 1] - rows), initial=0.0) if there.snapshot is None else 0.0
             if change_px < SETTLED_PX:
                 break
             rows = uv_px[:, 1]

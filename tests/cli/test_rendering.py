@@ -1,0 +1,38 @@
+"""What `vobench render` refuses, before anything is drawn."""
+
+import pytest
+
+WRONG = [
+    (("--at", "9", "0", "1"), "--at should be inside the room (2 × 2 × 1.5 m around the origin), got (9.0, 0.0, 1.0)"),
+    (("--at", "nan", "0", "1"), "--at should be inside the room"),
+    (("--yaw", "nan"), "--yaw should be a finite number, got nan"),
+    (("--pitch", "inf"), "--pitch should be a finite number, got inf"),
+    (("--time", "nan"), "--time should be a finite number, got nan"),
+    (("--time", "1e12"), "--time should be within 1e+09 s of the start, got 1e+12"),
+    (("--out", "look.jpg"), "--out should be a .png in a folder that exists, got look.jpg"),
+    (("--out", "nowhere/look.png"), "--out should be a .png in a folder that exists, got nowhere/look.png"),
+    (("--camera", "fisheyes"), "no camera named 'fisheyes'. Did you mean 'fisheye'?"),
+    (("--sensor", "film"), "no camera sensor named 'film'. Known: clean"),
+    (("--engine", "rater"), "no engine named 'rater'. Did you mean 'raster'?"),
+    (("--samples", "4"), "--samples belongs to --engine path, but the engine is raster; leave it out"),
+    (("--engine", "path", "--samples", "0"), "--samples should be from 1 to 65536, got 0"),
+    (("--engine", "path", "--samples", "65537"), "--samples should be from 1 to 65536, got 65537"),
+]
+
+
+@pytest.mark.parametrize(("words", "sentence"), WRONG, ids=[" ".join(words) for words, _ in WRONG])
+def test_what_cannot_be_drawn_gets_one_sentence(vobench, here, words, sentence):
+    said = vobench("render", "closet", "--at", "0", "0", "1", "--out", "look.png", *words)
+    assert said.code == 1
+    assert sentence in said.err
+    assert len(said.err.splitlines()) == 1
+    assert not list(here.glob("*.png"))
+
+
+def test_truth_lies_beside_the_picture(vobench, here):
+    said = vobench("render", "closet", "--at", "0", "0", "1", "--out", "look.png", "--truth")
+    assert said.code == 0
+    written = said.out.split()
+    assert written[0] == "look.png"
+    assert {"look.depth.png", "look.normals.png", "look.truth.npz"} < set(written)
+    assert sorted(written) == sorted(path.name for path in here.glob("look.*"))
