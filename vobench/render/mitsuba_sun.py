@@ -59,7 +59,4 @@ def register() -> None:
         def bbox(self) -> Any:
             return mi.ScalarBoundingBox3f()
 
-        def to_string(self) -> str:
-            return "SunDisc[]"
-
     mi.register_emitter(PLUGIN, SunDisc)

@@ -101,13 +101,18 @@ def _places(spec: SceneFile) -> Iterator[tuple[Keys, Triple]]:
 def _check_names(spec: SceneFile, source: yaml_file.Source) -> None:
     """Lights are named by lightings, and things by ground truth: no name twice, a name given by us included."""
     seen = {SUN, SKY, *(surface.instance for surface in _room(spec))}
+    for kind, index, name in _named(spec):
+        if name in seen:
+            with source.at(kind, index):
+                raise SuiteError(f"two things are called '{name}'; give one another name")
+        seen.add(name)
+
+
+def _named(spec: SceneFile) -> Iterator[tuple[str, int, str]]:
+    """Every lamp, box, board and mover: its kind, its place in the list, and what it is called."""
     for kind, unnamed in (("lamps", ""), ("boxes", "box"), ("boards", "board"), ("movers", "")):
         for index, thing in enumerate(getattr(spec, kind)):
-            name = thing.name or f"{unnamed}_{index}"
-            with source.at(kind, index):
-                if name in seen:
-                    raise SuiteError(f"two things are called '{name}'; give one another name")
-            seen.add(name)
+            yield kind, index, thing.name or f"{unnamed}_{index}"
 
 
 def _check_window(index: int, spec: SceneFile) -> None:
