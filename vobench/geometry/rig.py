@@ -1,6 +1,7 @@
 """A stereo pair on a robot: two cameras of any kind, their mounts, and what the wheels measure with."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -25,6 +26,10 @@ class WheelGeometry:
 PIONEER_WHEELS = WheelGeometry(radius_m=0.0975, track_m=0.331, ticks_per_revolution=76_600)
 
 
+Side = Literal["left", "right"]
+SIDES: tuple[Side, ...] = ("left", "right")
+
+
 @dataclass(frozen=True, slots=True)
 class Rig:
     """A stereo pair, where it sits on the body, and the wheels: all the calibration there is.
@@ -37,6 +42,14 @@ class Rig:
     T_body_left: Array
     T_body_right: Array
     wheels: WheelGeometry
+
+    def camera(self, side: Side) -> Camera:
+        """One of the two cameras."""
+        return self.left if side == "left" else self.right
+
+    def T_body_camera(self, side: Side) -> Array:
+        """Where it sits on the body."""
+        return self.T_body_left if side == "left" else self.T_body_right
 
     @property
     def T_left_right(self) -> Array:

@@ -10,6 +10,7 @@ from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.metric.mismatch import find_mismatch
+from vobench.metric.settings import Side
 from vobench.metric.swap import signs_of_swap
 from vobench.trajectory.align import align
 from vobench.trajectory.associate import MAX_DIFF_NS, associate
@@ -30,7 +31,6 @@ Fault = Literal[
     "scale",
     "swapped_inputs",
 ]
-Side = Literal["gt", "est"]
 WHO: dict[Side, str] = {"gt": "ground truth", "est": "estimate"}
 
 MIN_POSES, MAX_POSES = 8, 1000

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vobench.geometry.rig import SIDES, Side
 from vobench.pipeline.displacement import Displacement
 from vobench.pipeline.motion import BodyPath
 from vobench.pipeline.stream import generator
@@ -15,7 +16,6 @@ from vobench.sensor.exposure import Exposure, ExposureState, start, step
 from vobench.sensor.lens import lens_maps, through_lens
 from vobench.sensor.response import Grey
 from vobench.sensor.shutter import ShutterKind, strips
-from vobench.sequence.truth_image import Side
 from vobench.suite.expand import Case
 
 # Between two sub-frames, and between the first and last row of a strip, nothing should move further than this.
@@ -47,7 +47,8 @@ class StereoCamera:
     """Both cameras of a case on the true rig; the exposure loop watches the left picture and sets both."""
 
     def __init__(self, case: Case, world: World) -> None:
-        self._left, self._right = Eye(case, "left", world), Eye(case, "right", world)
+        displacement = Displacement(world.scene)
+        self._left, self._right = (Eye(case, side, world, displacement) for side in SIDES)
         self._chip, self._loop = case.camera.build_chip(), case.camera.build_auto_exposure()
         first = case.camera.build_exposure()
         self._state = start(self._loop, first) if self._loop else ExposureState((first,))
@@ -64,15 +65,13 @@ class StereoCamera:
 class Eye:
     """One camera: where it is, how its shutter cuts time, its lens, and its chip with noise of its own."""
 
-    def __init__(self, case: Case, side: Side, world: World) -> None:
+    def __init__(self, case: Case, side: Side, world: World, displacement: Displacement) -> None:
         def stream(name: str) -> np.random.Generator:
             return generator(case.seed, f"camera.{side}.{name}")
 
         rig = case.build_true_rig()
-        self._camera, self._T_body_camera = (
-            (rig.left, rig.T_body_left) if side == "left" else (rig.right, rig.T_body_right)
-        )
-        self._world, self._displacement = world, Displacement(world.scene)
+        self._camera, self._T_body_camera = rig.camera(side), rig.T_body_camera(side)
+        self._world, self._displacement = world, displacement
         self._light_changes = not all(isinstance(light.level, Steady) for light in world.scene.lights)
         self._shutter, self._blurs = case.camera.build_shutter(), case.camera.motion_blur
         self._white_cd_m2, self._chip = np.float32(case.scene.white_cd_m2), case.camera.build_chip()

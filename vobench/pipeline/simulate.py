@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from vobench.geometry.rig import SIDES
 from vobench.pipeline.engine import BAKE, open_renderer
 from vobench.pipeline.motion import body_path, drive_case
 from vobench.pipeline.shoot import Pair, StereoCamera, World
@@ -15,7 +16,6 @@ from vobench.results.store import Store, canonical, code_digest, library_version
 from vobench.robot.drive import Drive
 from vobench.sensor.encoder import ENCODERS, ticks
 from vobench.sequence import SequenceWriter
-from vobench.sequence.truth_image import SIDES
 from vobench.suite.expand import Case
 
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "pyrender", "embreex", "mcap", "rosbags")

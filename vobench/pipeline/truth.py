@@ -2,14 +2,13 @@
 
 import numpy as np
 
-from vobench.geometry.camera import Camera
+from vobench.geometry.rig import Side
 from vobench.pipeline.motion import BodyPath
 from vobench.render.stand import Shot
 from vobench.render.truth import TruthCaster
 from vobench.scene.scene import Scene
 from vobench.sensor.shutter import ShutterKind, row_stamps
 from vobench.sensor.truth import TruthFrame, TruthNames
-from vobench.sequence.truth_image import Side
 from vobench.suite.expand import Case
 
 
@@ -28,14 +27,11 @@ class PixelTruth:
     def frame(self, side: Side, t_ns: int, next_t_ns: int | None) -> TruthFrame:
         """The channels of the picture stamped t_ns; the one stamped next_t_ns is where flow leads."""
         later = None if next_t_ns is None else self._shot(side, next_t_ns)
-        return self._caster.frame(self._camera(side), self._shot(side, t_ns), self._channels, later=later)
-
-    def _camera(self, side: Side) -> Camera:
-        return self._rig.left if side == "left" else self._rig.right
+        return self._caster.frame(self._rig.camera(side), self._shot(side, t_ns), self._channels, later=later)
 
     def _shot(self, side: Side, t_ns: int) -> Shot:
-        T_body_camera = self._rig.T_body_left if side == "left" else self._rig.T_body_right
+        T_body_camera = self._rig.T_body_camera(side)
         if self._shutter.kind is ShutterKind.GLOBAL:
             return Shot(self._path(np.array([t_ns]))[0] @ T_body_camera, t_ns)
-        stamps = row_stamps(self._camera(side).height_px, self._shutter, t_ns)
+        stamps = row_stamps(self._rig.camera(side).height_px, self._shutter, t_ns)
         return Shot(self._path(stamps) @ T_body_camera, stamps)

@@ -3,19 +3,18 @@
 import json
 from collections.abc import Iterable
 from dataclasses import asdict
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vobench.errors import SequenceError
 from vobench.geometry.camera import Camera
+from vobench.geometry.rig import SIDES, Side
 from vobench.sensor.truth import CHANNELS, Channel, TruthFrame, TruthNames
 from vobench.sequence.messages import LEFT, RIGHT, TYPES, Topic, header
 
-Side = Literal["left", "right"]
-SIDES: tuple[Side, ...] = ("left", "right")
-FRAME_IDS = {"left": LEFT, "right": RIGHT}
+FRAME_IDS: dict[Side, str] = {"left": LEFT, "right": RIGHT}
 
 IMAGE = "sensor_msgs/msg/Image"
 MASK_IS_SET = 255  # what viewers show as white

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from vobench.errors import SequenceError
+from vobench.geometry.rig import SIDES
 from vobench.sensor.truth import CHANNELS, TruthFrame, TruthNames, check_channels
 from vobench.sequence import bag
 from vobench.sequence import messages as ros
-from vobench.sequence.truth_image import SIDES, names_from_json, truth_topic, truth_topics, truth_values
+from vobench.sequence.truth_image import names_from_json, truth_topic, truth_topics, truth_values
 from vobench.sequence.writer import NAMES_ATTACHMENT, TRUTH_FILE
 
 

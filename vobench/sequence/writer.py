@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
-from vobench.geometry.rig import Rig
+from vobench.geometry.rig import Rig, Side
 from vobench.geometry.se3 import Array
 from vobench.sensor.truth import TruthFrame, TruthNames, check_channels
 from vobench.sequence import messages as ros
 from vobench.sequence.bag import BagWriter
-from vobench.sequence.truth_image import Side, check_truth, names_to_json, truth_image, truth_topic, truth_topics
+from vobench.sequence.truth_image import check_truth, names_to_json, truth_image, truth_topic, truth_topics
 
 SENSORS_FILE, TRUTH_FILE = "sensors.mcap", "truth.mcap"
 WHEELS_NOTE, CASE_ATTACHMENT, NAMES_ATTACHMENT = "vobench.wheels", "case.json", "truth_names.json"
@@ -96,7 +96,7 @@ class SequenceWriter:
 
     def write_truth_frame(self, t_ns: int, side: Side, frame: TruthFrame) -> None:
         """Add what is true of every pixel of one camera's picture: the channels that the writer was opened for."""
-        check_truth(frame, self._channels, self._true_rig.left if side == "left" else self._true_rig.right, side)
+        check_truth(frame, self._channels, self._true_rig.camera(side), side)
         for channel, values in frame.channels().items():
             self._truth.write(truth_topic(side, channel), t_ns, truth_image(t_ns, side, channel, values))
 
