@@ -15,7 +15,7 @@ from vobench.estimator.protocol import Image
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.rectify import rectification
-from vobench.geometry.rig import Rig
+from vobench.geometry.rig import SIDES, Rig
 from vobench.geometry.se3 import Array
 
 from .tracking import Mask, Points, coarse_disparity, comparable, follow, inside, small_size
@@ -120,10 +120,10 @@ def stereo_pair(rig: Rig) -> Pair:
             f"lk_epipolar needs the right camera to the right of the left and both looking the same way, within 30 "
             f"deg; it is at ({position}) m and turned by {turned_deg:.3g} deg"
         )
-    sizes = [(camera.width_px, camera.height_px) for camera in (rig.left, rig.right)]
+    sizes = [(camera.width_px, camera.height_px) for camera in map(rig.camera, SIDES)]
     if sizes[0] != sizes[1]:
         raise VobenchError(f"lk_epipolar needs two pictures of one size, got {sizes[0]} and {sizes[1]} px")
-    left, right = Eye(rig.left, views.R_view_left, views.K), Eye(rig.right, views.R_view_right, views.K)
+    left, right = Eye(rig.left, views.R_view_left, views.K), Eye(rig.camera("right"), views.R_view_right, views.K)
     return Pair(left, right, views.baseline_m, (left.small_map(), right.small_map()))
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vobench.errors import VobenchError
 from vobench.estimator import Frame, Result, Status
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
@@ -20,8 +21,11 @@ class WheelOdometry:
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:  # noqa: ARG002
         """Take the nominal radius, track and resolution; counts start at zero."""
-        self._metres_per_tick = 2 * np.pi * rig.wheels.radius_m / rig.wheels.ticks_per_revolution
-        self._track_m = rig.wheels.track_m
+        wheels = rig.wheels
+        if wheels is None:
+            raise VobenchError("wheel_odometry needs wheels, and this recording has none")
+        self._metres_per_tick = 2 * np.pi * wheels.radius_m / wheels.ticks_per_revolution
+        self._track_m = wheels.track_m
         self._ticks: NDArray[np.int64] = np.zeros((1, 2), np.int64)
         self._x_m = self._y_m = self._psi_rad = 0.0
 

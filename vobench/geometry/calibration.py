@@ -36,7 +36,7 @@ def true_rig(nominal: Rig, error: CalibrationError) -> Rig:
     return replace(
         nominal,
         left=true_camera(nominal.left, error),
-        right=true_camera(nominal.right, error),
+        right=true_camera(nominal.camera("right"), error),
         T_body_right=_true_right(nominal, error),
     )
 
@@ -61,8 +61,8 @@ def true_camera(nominal: Camera, error: CalibrationError) -> Camera:
 
 def _true_right(nominal: Rig, error: CalibrationError) -> Array:
     # Written so that no error at all changes no bit.
-    T_body_right = nominal.T_body_right.copy()
-    T_body_right[:3, 3] += error.baseline_ratio * (nominal.T_body_right - nominal.T_body_left)[:3, 3]
+    T_body_right = nominal.T_body_camera("right").copy()
+    T_body_right[:3, 3] += error.baseline_ratio * (T_body_right - nominal.T_body_left)[:3, 3]
     angles_deg = [error.right_roll_deg, error.right_pitch_deg, error.right_yaw_deg]
     if any(angles_deg):
         T_body_right[:3, :3] @= Rotation.from_euler("ZXY", np.array(angles_deg), degrees=True).as_matrix()

@@ -43,11 +43,13 @@ def projection(K: Array, shift_m: float) -> Array:
 
 
 def rectification(rig: Rig) -> Rectification | None:
-    """The views of a pair, turned as little as may be; None where the right camera is not to the right.
+    """The views of a pair, turned as little as may be; None where there is no right camera, or it is not to the right.
 
     Their x runs along the baseline, their z as near as possible to the mean of the optical axes.
     Source: Fusiello, Trucco and Verri (2000).
     """
+    if rig.right is None:
+        return None
     R_left_right, t = rig.T_left_right[:3, :3], rig.T_left_right[:3, 3]
     if t[0] <= 0:
         return None

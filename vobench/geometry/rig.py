@@ -1,10 +1,11 @@
-"""A stereo pair on a robot: two cameras of any kind, their mounts, and what the wheels measure with."""
+"""What a body carries: one or two cameras of any kind, their mounts, wheels and an IMU."""
 
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
@@ -26,35 +27,65 @@ class WheelGeometry:
 PIONEER_WHEELS = WheelGeometry(radius_m=0.0975, track_m=0.331, ticks_per_revolution=76_600)
 
 
+@dataclass(frozen=True, slots=True)
+class ImuCalibration:
+    """An IMU on the body as its calibration has it: where it sits, and how noisy it is said to be.
+
+    White noise as densities in rad/s/√Hz and m/s²/√Hz, the walks of both biases in rad/s²/√Hz and
+    m/s³/√Hz: the four numbers of Kalibr's imu.yaml.
+    """
+
+    T_body_imu: Array
+    rate_hz: float
+    gyro_noise: float
+    accel_noise: float
+    gyro_walk: float
+    accel_walk: float
+
+
 Side = Literal["left", "right"]
 SIDES: tuple[Side, ...] = ("left", "right")
+ONE_CAMERA = "this rig has one camera, and a stereo pair is asked for"
 
 
 @dataclass(frozen=True, slots=True)
 class Rig:
-    """A stereo pair, where it sits on the body, and the wheels: all the calibration there is.
+    """The cameras, where they sit on the body, the wheels and the IMU: all the calibration there is.
 
-    The left camera is the reference; both look along their own z axis.
+    The left camera is the reference; all look along their own z axis. A rig of one camera has no
+    right one; wheels and imu are None where the recording has none.
     """
 
     left: Camera
-    right: Camera
+    right: Camera | None
     T_body_left: Array
-    T_body_right: Array
-    wheels: WheelGeometry
+    T_body_right: Array | None
+    wheels: WheelGeometry | None = None
+    imu: ImuCalibration | None = None
+
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """The cameras there are."""
+        return SIDES if self.right else SIDES[:1]
 
     def camera(self, side: Side) -> Camera:
-        """One of the two cameras."""
-        return self.left if side == "left" else self.right
+        """One of the cameras. Raises InputError where the rig has no right one."""
+        camera = self.left if side == "left" else self.right
+        if camera is None:
+            raise InputError(ONE_CAMERA)
+        return camera
 
     def T_body_camera(self, side: Side) -> Array:
-        """Where it sits on the body."""
-        return self.T_body_left if side == "left" else self.T_body_right
+        """Where it sits on the body. Raises InputError where the rig has no right one."""
+        T_body_camera = self.T_body_left if side == "left" else self.T_body_right
+        if T_body_camera is None:
+            raise InputError(ONE_CAMERA)
+        return T_body_camera
 
     @property
     def T_left_right(self) -> Array:
         """Pose of the right camera seen from the left one."""
-        return se3.inverse(self.T_body_left) @ self.T_body_right
+        return se3.inverse(self.T_body_left) @ self.T_body_camera("right")
 
     @property
     def baseline_m(self) -> float:

@@ -87,7 +87,7 @@ def _check_fits_frame(case: Case) -> None:
 
 def _check_in_room(case: Case, motion: Drive) -> None:
     rig, room = case.build_rig(), case.scene.room
-    for T_body_camera in (rig.T_body_left, rig.T_body_right):
+    for T_body_camera in map(rig.T_body_camera, rig.sides):
         at_m = (motion.T_world_body @ T_body_camera)[:, :3, 3]
         _refuse(case, motion, at_m, ~room.holds(at_m), f"leaves the room ({room.extent})")
         for b in case.scene.boxes:

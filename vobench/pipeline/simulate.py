@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from vobench.geometry.rig import SIDES
+from vobench.geometry.rig import PIONEER_WHEELS, SIDES
 from vobench.pipeline.engine import BAKE, open_renderer
 from vobench.pipeline.motion import body_path, drive_case
 from vobench.pipeline.shoot import Pair, StereoCamera, World
@@ -74,7 +74,7 @@ def _writer(case: Case, folder: Path, truth: PixelTruth | None) -> SequenceWrite
 
 
 def _write(writer: SequenceWriter, case: Case, motion: Drive, pairs: Iterator[Pair], truth: PixelTruth | None) -> None:
-    counts = ticks(motion.rim_rad, case.build_rig().wheels, ENCODERS[case.trajectory.encoders])
+    counts = ticks(motion.rim_rad, PIONEER_WHEELS, ENCODERS[case.trajectory.encoders])
     # Readings up to each frame's stamp go before it.
     ends = np.searchsorted(motion.encoder_t_ns, motion.t_ns, side="right")
     starts = np.concatenate([[0], ends[:-1]])

@@ -110,16 +110,16 @@ def transforms(t_ns: int, parent: str, T_parent_child: dict[str, Array]) -> Any:
 
 def mounts(rig: Rig) -> Any:
     """Where the two cameras sit on the body, for /tf_static."""
-    return transforms(0, BODY, {LEFT: rig.T_body_left, RIGHT: rig.T_body_right})
+    return transforms(0, BODY, {LEFT: rig.T_body_left, RIGHT: rig.T_body_camera("right")})
 
 
 def stereo_info(t_ns: int, rig: Rig) -> tuple[Any, Any]:
     """The sensor_msgs/CameraInfo of both cameras, with the R and P that rectify them where anything does."""
     views = rectification(rig)
     if views is None:
-        return camera_info(t_ns, LEFT, rig.left), camera_info(t_ns, RIGHT, rig.right)
+        return camera_info(t_ns, LEFT, rig.left), camera_info(t_ns, RIGHT, rig.camera("right"))
     left = camera_info(t_ns, LEFT, rig.left, R=views.R_view_left, P=views.P_left)
-    return left, camera_info(t_ns, RIGHT, rig.right, R=views.R_view_right, P=views.P_right)
+    return left, camera_info(t_ns, RIGHT, rig.camera("right"), R=views.R_view_right, P=views.P_right)
 
 
 def camera_info(t_ns: int, frame_id: str, camera: Camera, *, R: Array | None = None, P: Array | None = None) -> Any:

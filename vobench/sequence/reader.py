@@ -84,7 +84,7 @@ class Sequence:
         """The stereo pairs in order; only the current one is held in memory."""
         for frame in self.encoded_frames():
             left = _decode(frame.left, self.rig.left, f"left picture {frame.index} of {self.path}")
-            right = _decode(frame.right, self.rig.right, f"right picture {frame.index} of {self.path}")
+            right = _decode(frame.right, self.rig.camera("right"), f"right picture {frame.index} of {self.path}")
             yield StereoFrame(frame.index, frame.t_ns, left, right)
 
     def encoders(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
-from vobench.geometry.rig import Rig, Side
+from vobench.geometry.rig import Rig, Side, WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.sensor.truth import TruthFrame, TruthNames, check_channels
 from vobench.sequence import messages as ros
@@ -59,7 +59,8 @@ class SequenceWriter:
             names = names_to_json(truth_names or TruthNames())
             self._truth.attach(NAMES_ATTACHMENT, "application/json", names)
         for bag, its_rig in ((self._sensors, rig), (self._truth, true_rig or rig)):
-            bag.note(WHEELS_NOTE, _wheel_entries(its_rig))
+            if its_rig.wheels:
+                bag.note(WHEELS_NOTE, _wheel_entries(its_rig.wheels))
             bag.write(ros.TF_STATIC, 0, ros.mounts(its_rig))
         for topic, info in zip(ros.TRUE_INFO_TOPICS, ros.stereo_info(0, true_rig or rig), strict=True):
             self._truth.write(topic, 0, info)
@@ -70,7 +71,7 @@ class SequenceWriter:
         form = "png" if self._jpeg_quality is None else "jpeg"
         encoded = [
             encode(picture, camera, name, jpeg_quality=self._jpeg_quality)
-            for picture, camera, name in ((left, rig.left, ros.LEFT), (right, rig.right, ros.RIGHT))
+            for picture, camera, name in ((left, rig.left, ros.LEFT), (right, rig.camera("right"), ros.RIGHT))
         ]
         for topic, info in zip((ros.LEFT_INFO, ros.RIGHT_INFO), ros.stereo_info(t_ns, rig), strict=True):
             bag.write(topic, t_ns, info)
@@ -109,8 +110,7 @@ class SequenceWriter:
         self._stack.__exit__(kind, error, trace)
 
 
-def _wheel_entries(rig: Rig) -> dict[str, str]:
-    wheels = rig.wheels
+def _wheel_entries(wheels: WheelGeometry) -> dict[str, str]:
     return {
         "radius_m": repr(float(wheels.radius_m)),
         "track_m": repr(float(wheels.track_m)),

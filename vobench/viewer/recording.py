@@ -152,10 +152,11 @@ def _log_paths(log: _Log, run: RunView) -> None:
 
 def _log_cameras(log: _Log, run: RunView) -> None:
     """True left and right camera, and the estimated left one, which vanishes while there is no pose."""
-    right = run.ground_truth.of_mounted(run.rig.T_left_right)
     length_m = bp.frustum_m(run.ground_truth.positions_m)
     _log_camera(log, bp.TRUTH_LEFT, run.rig.left, run.ground_truth, length_m=length_m, color=GREEN)
-    _log_camera(log, bp.TRUTH_RIGHT, run.rig.right, right, length_m=length_m, color=GREEN)
+    if run.rig.right:
+        right = run.ground_truth.of_mounted(run.rig.T_left_right)
+        _log_camera(log, bp.TRUTH_RIGHT, run.rig.right, right, length_m=length_m, color=GREEN)
     _log_camera(log, bp.ESTIMATE_LEFT, run.rig.left, run.estimate, length_m=length_m, color=ORANGE)
     frames, _ = log.frames_of(run.estimate.t_ns)
     absent = np.setdiff1d(np.arange(len(log.t_ns)), frames)
