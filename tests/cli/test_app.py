@@ -15,7 +15,7 @@ from vobench import __version__
 from vobench.cli import main
 from vobench.cli.app import app
 from vobench.errors import UnknownNameError
-from vobench.pipeline import motion
+from vobench.pipeline import passage
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 COMMANDS = [command.name or command.callback.__name__ for command in app.registered_commands]
@@ -90,7 +90,7 @@ def test_a_broken_file_beside_the_good_ones_is_listed_with_its_reason(vobench, h
 WRONG = [
     (("run", "tinny"), "no suite named 'tinny'. Did you mean 'tiny'? Known: paper, quickstart, tiny"),
     (("check", "./no.yaml"), "no suite file at no.yaml. Known by name: paper, quickstart, tiny"),
-    (("run", "tiny", "-e", "stand_stil"), "no estimator named 'stand_stil'. Did you mean 'stand_still'? Known: constant_velocity, lk_epipolar, stand_still, wheel_odometry"),
+    (("run", "tiny", "-e", "stand_stil"), "no estimator named 'stand_stil'. Did you mean 'stand_still'? Known: constant_velocity, imu_dead_reckoning, lk_epipolar, stand_still, wheel_odometry"),
     (("run", "tiny", "--out", "suites/tiny.yaml"), "--out should be a folder that can be written (File exists): suites/tiny.yaml"),
     (("list", "scene_s"), "no kind named 'scene_s'. Did you mean 'scenes'? Known: estimators, scenes, suites"),
     (("score", "no.tum", "no.tum"), "cannot read no.tum: No such file or directory"),
@@ -150,7 +150,7 @@ def test_ctrl_c_is_one_line_and_exit_code_130_even_where_a_library_swallows_it(v
         except BaseException as error:
             raise OSError("a library's own words") from error
 
-    monkeypatch.setattr(motion, "drive_case", interrupted)
+    monkeypatch.setattr(passage, "travel_of", interrupted)
     said = vobench("run", "tiny")
     assert said.code == 130
     assert said.err == "vobench: stopped; finished stages are kept, the same command goes on from there\n"

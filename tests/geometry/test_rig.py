@@ -1,8 +1,11 @@
 """The paper's lens in both readings, and a rig that looks where it says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import LENSES, PIONEER_WHEELS, looking, paper_lens, stereo_rig
@@ -66,3 +69,10 @@ def test_the_cameras_sit_astride_the_robots_middle() -> None:
     middle = (rig.T_body_left[:3, 3] + rig.T_body_right[:3, 3]) / 2
     np.testing.assert_allclose(middle, [0.25, 0, 0.4], atol=1e-15)
     assert rig.wheels == PIONEER_WHEELS
+
+
+@pytest.mark.parametrize("name", ["radius_m", "track_m", "ticks_per_revolution"])
+@pytest.mark.parametrize("value", [0, -1, float("nan"), float("inf")])
+def test_a_wheel_without_size_is_refused_by_name(name: str, value: float) -> None:
+    with pytest.raises(InputError, match=f"a wheel's {name} must be finite and above 0, got {value}"):
+        replace(PIONEER_WHEELS, **{name: value})

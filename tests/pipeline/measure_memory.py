@@ -47,7 +47,7 @@ raster.RasterRenderer = Plain
 shop = Workshop(Store(Path(sys.argv[1])), Silent())
 for suite in sys.argv[2:]:
     plan = read_plan(suite)
-    case = plan.cases[0]
+    case = plan.simulated[0]
     forget_peak()
     sequence = simulate(case, shop)
     simulating = peak_mb()

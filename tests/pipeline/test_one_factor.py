@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
 from vobench.pipeline.progress import Silent
 from vobench.pipeline.simulate import simulate
 from vobench.pipeline.workshop import Workshop
 from vobench.results.store import Store
 from vobench.sequence import Sequence, payload_hash
-from vobench.sequence.bag import raw_messages
-from vobench.sequence.messages import Topic
 from vobench.suite.expand import read_plan
 
 SCENE = """name: cell
@@ -27,16 +26,25 @@ lamps: [{name: lamp, center_m: [0, 0, 1.4], size_m: [0.4, 0.4], power_lm: 600}]
 SUITE = """name: one
 seed: 3
 scenes: [SCENE]
-rigs: {down: {pitch_deg: 90CALIBRATION}}
+rigs: {down: {pitch_deg: 90, imu: IMUCALIBRATION}}
 lightings: {it: LIGHTING}
-trajectories: {short: {targets_m: [[0.3, 0.05]], tolerance_m: 0.1, rate_hz: 5, slip: SLIP}}
+trajectories: {short: {targets_m: [[0.3, 0.05]], tolerance_m: 0.1, rate_hz: 5, slip: SLIP, encoders: ENCODERS}}
 cameras: {it: {sensor: mt9v034CAMERA}}
 truth: TRUTH
 estimators: [stand_still]
 """
-DEFAULTS = {"CALIBRATION": "", "LIGHTING": "{}", "SLIP": "nominal", "CAMERA": "", "TRUTH": "[]"}
+DEFAULTS = {
+    "CALIBRATION": "",
+    "IMU": "{like: adis16448}",
+    "LIGHTING": "{}",
+    "SLIP": "nominal",
+    "ENCODERS": "nominal",
+    "CAMERA": "",
+    "TRUTH": "[]",
+}
 LEFT, RIGHT = "sensors/cam_left/image/compressed", "sensors/cam_right/image/compressed"
 PICTURES = {LEFT, RIGHT}
+READINGS, BIAS = "sensors/imu", "truth/ground_truth/imu_bias"
 # Says how to rectify both pictures, so it may know of the right camera.
 RECTIFIED_LEFT = "truth/ground_truth/cam_left/camera_info"
 # A factor, and the channels that it may change, and so must.
@@ -61,6 +69,14 @@ FACTORS = {
         {"CALIBRATION": ", calibration_error: {right_yaw_deg: 1}"},
         {RIGHT, "truth/tf_static", "truth/ground_truth/cam_right/camera_info", RECTIFIED_LEFT},
     ),
+    "IMU noise": ({"IMU": "{like: adis16448, gyro: {noise: 1.0e-3}}"}, {READINGS}),
+    "IMU bias": ({"IMU": "{like: adis16448, accel: {bias: [0.1, 0, 0]}}"}, {READINGS, BIAS}),
+    "IMU walk": ({"IMU": "{like: adis16448, gyro: {walk: 1.0e-3}}"}, {READINGS, BIAS}),
+    "IMU place": (
+        {"IMU": "{like: adis16448, position_m: [0.1, 0, 0]}"},
+        {READINGS, "sensors/tf_static", "truth/tf_static"},
+    ),
+    "encoders": ({"ENCODERS": "exact"}, {"sensors/encoders"}),
     "truth of pixels": ({"TRUTH": "[depth, flow, occlusion]"}, set()),
 }
 
@@ -81,22 +97,11 @@ def channels(sequence: Path) -> dict[str, str]:
     """A digest of each channel of both files."""
     digests = {}
     for name in ("sensors", "truth"):
-        for topic in _topics(sequence / f"{name}.mcap"):
-            digest = hashlib.sha256()
-            for _, data in raw_messages(sequence / f"{name}.mcap", (topic,)):
-                digest.update(data)
-            digests[f"{name}{topic.name}"] = digest.hexdigest()
-    return digests
-
-
-def _topics(path: Path) -> list[Topic]:
-    from mcap.reader import make_reader
-
-    with path.open("rb") as file:
-        summary = make_reader(file).get_summary()
-    assert summary is not None
-    schemas = summary.schemas
-    return [Topic(channel.topic, schemas[channel.schema_id].name) for channel in summary.channels.values()]
+        with (sequence / f"{name}.mcap").open("rb") as file:
+            for _, channel, message in make_reader(file).iter_messages():
+                digest = digests.setdefault(f"{name}{channel.topic}", hashlib.sha256())
+                digest.update(message.data)
+    return {topic: digest.hexdigest() for topic, digest in digests.items()}
 
 
 @pytest.fixture(scope="module")

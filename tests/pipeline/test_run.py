@@ -31,6 +31,7 @@ def test_a_run_holds_all_that_its_folder_promises(first):
         "suite.json",
         "estimators.json",
         "environment.json",
+        "hashes.json",
         "cases",
         *(f"leaderboard.{suffix}" for suffix in ("md", "json", "csv", "html")),
     }
@@ -72,6 +73,19 @@ def test_the_name_of_a_variant_is_no_part_of_what_is_cached(bench):
     plans = [bench.plan(), bench.plan(("full:", "bright:"), ("name: tiny", "name: other"))]
     keys = [simulate.sequence_inputs(plan.cases[0]) for plan in plans]
     assert keys[0] == keys[1]
+
+
+def test_a_replayed_file_counts_by_what_it_holds_and_not_by_where_it_lies(bench):
+    rows = [f"{k / 10} {k / 40} 0 0 0 0 0 1\n" for k in range(20)]
+    for name, lines in (("a.tum", rows), ("b.tum", ["# moved\n", *rows]), ("c.tum", rows[:-1])):
+        (bench.folder / name).write_text("".join(lines))
+    old = "{targets_m: [[0.3, 0]], tolerance_m: 0.03, rate_hz: 5}"
+    here, moved, other = (
+        simulate.sequence_inputs(bench.plan((old, f"{{kind: replay, file: {name}, rate_hz: 5}}")).cases[0])
+        for name in ("a.tum", "b.tum", "c.tum")
+    )
+    assert here == moved
+    assert here != other
 
 
 @pytest.mark.parametrize(

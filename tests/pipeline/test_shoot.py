@@ -9,11 +9,10 @@ import pytest
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.pipeline.displacement import Displacement
-from vobench.pipeline.motion import body_path, drive_case
+from vobench.pipeline.motion import travel_of
 from vobench.pipeline.shoot import StereoCamera, World
 from vobench.render.renderer import Radiance, View
 from vobench.suite.expand import Case, read_plan
-from vobench.trajectory.trajectory import Stamps
 
 WHITE_CD_M2 = 50
 SCENE = """name: cell
@@ -63,9 +62,9 @@ def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 def shot(case: Case, renderer: Recorder, t_ns: int = 2_000_000_000):
     """The views of the left picture taken at a time, and where the body was, as a function."""
-    scene, path = case.build_scene(), body_path(drive_case(case))
-    StereoCamera(case, World(scene, renderer, path)).shoot(t_ns)
-    return renderer.asked[0], path
+    scene, motion = case.build_scene(), travel_of(case).motion
+    StereoCamera(case, World(scene, renderer, motion)).shoot(t_ns)
+    return renderer.asked[0], lambda t_ns: motion.at(t_ns).T_world_body
 
 
 def test_a_plain_camera_sees_once_from_where_the_stamp_is(case) -> None:
@@ -130,8 +129,8 @@ def test_under_changing_light_strips_of_a_rolling_shutter_are_thin(case) -> None
 
 def settled(case: Case, luminance_cd_m2: float, frames: int) -> list[float]:
     """Shares of full scale of the left picture's mean, frame after frame."""
-    scene, path = case.build_scene(), body_path(drive_case(case))
-    camera = StereoCamera(case, World(scene, Recorder(luminance_cd_m2), path))
+    scene, motion = case.build_scene(), travel_of(case).motion
+    camera = StereoCamera(case, World(scene, Recorder(luminance_cd_m2), motion))
     chip = case.camera.build_chip()
     return [float(chip.signal_of_grey[camera.shoot(t).left].mean()) for t in range(frames)]
 
@@ -173,16 +172,3 @@ class TestDisplacement:
             rig.left, rig.T_body_left, rig.T_body_left, start_ns=0, end_ns=100_000_000
         )
         assert largest == pytest.approx(658.2857 / (0.4 - 0.2) * 0.01, rel=1e-4)
-
-
-def test_the_bodys_path_passes_through_every_frame_and_moves_evenly_between(case) -> None:
-    motion = drive_case(case())
-    stamps: Stamps = motion.t_ns
-    path = body_path(motion)
-    np.testing.assert_allclose(path(stamps), motion.T_world_body, atol=1e-12)
-    h_ns = 100_000
-    amid = stamps[10:-10]
-    velocity = (path(amid + h_ns) - path(amid - h_ns))[:, :2, 3] / (2 * h_ns / 1e9)
-    np.testing.assert_allclose(
-        np.linalg.norm(velocity, axis=1), np.linalg.norm(motion.twist[10:-10, :2], axis=1), atol=2e-3
-    )

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vobench.errors import MotionError
-from vobench.robot.controller import CONTROLLERS, ControllerSettings, loop_growth, references
-from vobench.robot.pioneer import THETAS, velocities
+from vobench.robot.controller import CONTROLLERS, ControllerSettings, loop_growth, references, settling_gain
+from vobench.robot.pioneer import THETAS, Theta, velocities
 
 FREE = ControllerSettings(10.0, 10.0)
 PAPER_THETA = THETAS["pioneer_3dx_paper"]
@@ -48,6 +48,29 @@ def test_one_euler_step_a_period_is_stable_exactly_below_theta4_over_the_period(
 def test_the_papers_gain_is_unstable_with_euler_at_ten_hertz_and_stable_with_runge_kutta() -> None:
     assert loop_growth(10, PAPER_THETA, period_s=0.1, substeps=1, integrator="euler") == pytest.approx(1.0041, abs=5e-5)
     assert loop_growth(10, PAPER_THETA, period_s=0.1, substeps=4, integrator="rk4") == pytest.approx(0.9588, abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("theta", "substeps", "integrator"),
+    [(PAPER_THETA, 1, "euler"), (PAPER_THETA, 4, "euler"), (PAPER_THETA, 4, "rk4"), (None, 4, "rk4")],
+)
+def test_below_the_settling_gain_errors_shrink_and_above_it_they_grow(
+    theta: Theta | None, substeps: int, integrator: str
+) -> None:
+    cut = {"period_s": 0.1, "substeps": substeps, "integrator": integrator}
+    limit = settling_gain(100.0, theta, **cut)
+    assert loop_growth(0.999 * limit, theta, **cut) < 1 < loop_growth(1.001 * limit, theta, **cut)
+
+
+def test_the_ideal_unicycle_settles_below_two_over_the_period() -> None:
+    assert settling_gain(100.0, None, period_s=0.1, substeps=1, integrator="rk4") == pytest.approx(20.0)
+
+
+def test_the_velocity_of_a_moving_target_is_added_to_what_h_is_asked_to_do() -> None:
+    for x, y, psi in ERRORS:
+        still = velocities(psi, *references(x, y, psi, FREE), a_m=FREE.a_m)
+        moving = velocities(psi, *references(x, y, psi, FREE, path_mps=(0.3, -0.2)), a_m=FREE.a_m)
+        np.testing.assert_allclose(np.subtract(moving, still)[:2], [0.3, -0.2], atol=1e-12)
 
 
 @pytest.mark.parametrize("field", ["gain_per_s", "axis_speed_mps", "a_m", "max_speed_mps"])

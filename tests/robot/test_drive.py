@@ -8,9 +8,11 @@ import pytest
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
-from vobench.robot.controller import CONTROLLERS
+from vobench.geometry.se3 import Array
+from vobench.robot.controller import CONTROLLERS, references
 from vobench.robot.drive import Drive, drive
-from vobench.robot.pioneer import THETAS, Theta
+from vobench.robot.integrate import over_period
+from vobench.robot.pioneer import THETAS, Theta, accelerations, velocities
 from vobench.robot.slip import SLIPS, STREAMS, SlipSettings
 
 PATHS = {"figure_10": ((1, 1), (0, 1), (1, 0), (2, 2)), "figure_12": ((0, 1), (1, 1), (2, 2))}
@@ -110,6 +112,23 @@ def test_every_robot_of_the_table_drives_the_short_course(name: str) -> None:
     assert drive(SHORT, theta=THETAS[name]).reached
 
 
+@pytest.mark.parametrize("integrator", ["rk4", "euler"])
+def test_without_disturbance_a_drive_is_18_to_21_and_nothing_else_to_the_last_bit(integrator: str) -> None:
+    theta, settings = THETAS["pioneer_3dx"], CONTROLLERS["smooth"]
+    run = drive(SHORT, integrator=integrator)
+    states = [np.zeros(5)]
+    for _ in run.t_ns[1:]:
+        x, y, psi = states[-1][:3].tolist()
+        asked = references(SHORT[0][0] - x, SHORT[0][1] - y, psi, settings)
+
+        def rates(state: Array, asked: tuple[float, float] = asked) -> Array:
+            _, _, psi, u, omega = state.tolist()
+            return np.array([*velocities(psi, u, omega, a_m=0.2), *accelerations(u, omega, *asked, theta=theta)])
+
+        states.append(over_period(rates, states[-1], period_s=1 / 30, substeps=4, integrator=integrator)[-1])
+    np.testing.assert_array_equal(run.state, states)
+
+
 def test_slip_moves_the_truth_and_the_same_seed_moves_it_the_same() -> None:
     first, clean = driven("figure_12", "smooth", "slippery", seed=1), driven("figure_12", "smooth")
     again = driven.__wrapped__("figure_12", "smooth", "slippery", seed=1)
@@ -162,9 +181,14 @@ def test_a_motion_that_runs_away_is_stopped() -> None:
         ([(1, 2, 3)], {}, "two coordinates"),
         (SHORT, {"start": (0.0, 0.0, float("inf"))}, "start"),
         (SHORT, {"rate_hz": 0.0}, "rate_hz"),
+        (SHORT, {"rate_hz": 1e6}, "at most 10000, got 1000000"),
+        (SHORT, {"rate_hz": 0.1}, "no gain does; raise rate_hz or substeps"),
         (SHORT, {"substeps": 0}, "substeps"),
+        (SHORT, {"substeps": 4.0}, "whole number of substeps"),
+        (SHORT, {"substeps": 2.5}, "whole number of substeps"),
         (SHORT, {"tolerance_m": 0.0}, "tolerance_m"),
         (SHORT, {"max_time_s": float("nan")}, "max_time_s"),
+        (SHORT, {"max_time_s": 1e12}, "max_time_s must be above 0 and at most 3600, got 1000000000000"),
         (SHORT, {"settle_s": -1.0}, "settle_s"),
         (SHORT, {"integrator": "ode3"}, "no integrator named 'ode3'"),
     ],

@@ -1,8 +1,11 @@
 """Laws of the identified model, equations (18)-(19)."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.robot.pioneer import THETAS, Theta, accelerations, axle_poses, velocities, wheel_speeds
 
@@ -71,3 +74,9 @@ def test_the_axle_midpoint_is_a_behind_h_on_the_floor() -> None:
 
 def test_both_wheels_of_a_robot_that_turns_on_the_spot_run_oppositely() -> None:
     assert wheel_speeds(0.0, 2.0, track_m=0.331) == (-0.331, 0.331)
+
+
+@pytest.mark.parametrize(("name", "value"), [("t1", 0.0), ("t2", -0.2), ("t3", float("nan")), ("t6", float("inf"))])
+def test_a_theta_without_finite_values_and_positive_lags_is_refused(name: str, value: float) -> None:
+    with pytest.raises(MotionError, match="six finite values with positive lags"):
+        replace(THETAS["pioneer_3dx"], **{name: value})

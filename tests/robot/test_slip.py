@@ -60,11 +60,33 @@ def test_skid_pushes_the_robot_out_of_its_turn() -> None:
 
 def test_without_slip_no_generator_is_needed_and_with_slip_its_lack_is_named() -> None:
     assert not slip_path(10, SLIPS["none"], step_s=0.1, rngs=None).any()
-    with pytest.raises(MotionError, match=r"'side' is missing"):
+    with pytest.raises(MotionError, match="needs a random generator for 'side', and rngs has none"):
         slip_path(10, NOMINAL, step_s=0.1, rngs={k: v for k, v in generators(0).items() if k != "side"})
 
 
-@pytest.mark.parametrize("bad", [{"ratio_std": -0.1}, {"ratio_std": 0.5}, {"correlation_s": 0.0}])
+def test_between_two_instants_slip_is_on_the_straight_line() -> None:
+    first, second = SlipNow(0.1, -0.2, 0.3, 0.02, 0.0, 1.0, -1.0), SlipNow(0.3, 0.0, -0.1, 0.02, 0.0, 0.0, 0.0)
+    assert first.towards(second, 0.0) == first
+    np.testing.assert_allclose(first.towards(second, 0.25), [0.15, -0.15, 0.2, 0.02, 0.0, 0.75, -0.75])
+
+
+@pytest.mark.parametrize("speed", [0.4, -0.4])
+def test_a_strained_rim_runs_ahead_of_the_ground_where_it_is_driven_on_and_behind_where_it_brakes(speed: float) -> None:
+    slip = SlipNow(traction_s2pm=0.1)
+    on, braked = (slip.rim_rates(speed, speed, radius_m=0.1, driven_mps2=(s * speed, s * speed)) for s in (1, -1))
+    assert abs(on[0]) > abs(speed) / 0.1 > abs(braked[0])
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"ratio_std": -0.1},
+        {"ratio_std": 0.5},
+        {"correlation_s": 0.0},
+        {"skid_s": float("nan")},
+        {"traction_s2pm": -0.1},
+    ],
+)
 def test_settings_out_of_range_are_refused(bad: dict[str, float]) -> None:
     with pytest.raises(MotionError, match="slip needs"):
         SlipSettings(**bad)

@@ -15,6 +15,7 @@ from vobench.robot.slip import SLIPS, STREAMS
 from vobench.sensor.encoder import ENCODERS, EncoderErrors, ticks, true_rims
 
 FIGURE_12 = ((0, 1), (1, 1), (2, 2))
+ROUND = ((0, 2), (2, 0), (-1, 1), (1, -1), (0, 0), (0, 1), (1, 1), (2, 2), (0, 2), (2, 0), (-1, 1), (1, -1))
 COARSE = WheelGeometry(radius_m=0.1, track_m=0.3, ticks_per_revolution=4)
 
 
@@ -44,6 +45,18 @@ def worst_position_error(run: Drive, errors: EncoderErrors) -> float:
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_counts_without_noise_give_the_path_back_to_less_than_a_millimetre(controller: str) -> None:
     assert worst_position_error(driven(controller, "none"), ENCODERS["exact"]) < 1e-3
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_counts_without_noise_give_over_a_minute_back_to_a_thousandth_of_the_path(controller: str) -> None:
+    run = drive((*FIGURE_12, *ROUND), controller=CONTROLLERS[controller])
+    x, y, psi = dead_reckoned(ticks(run.rim_rad, PIONEER_WHEELS), PIONEER_WHEELS).T
+    assert run.encoder_t_ns[-1] > 60e9
+    steps_m = np.linalg.norm(np.diff(run.axle[:, :2], axis=0), axis=1)
+    turned = (run.axle - run.axle[0]) @ se3.rotation_z(run.axle[0, 2])
+    off_m = np.hypot(x - turned[:, 0], y - turned[:, 1])
+    assert off_m.max() < 1e-3 * steps_m.sum()
+    assert np.abs(psi - turned[:, 2]).max() < 1e-3
 
 
 def test_slip_costs_centimetres_and_more_slip_costs_more() -> None:

@@ -82,7 +82,7 @@ def test_rectified_rays_of_both_cameras_meet_in_one_row_and_a_disparity():
     point_left = np.array([0.3, -0.2, 2.0])
     point_right = se3.apply(se3.inverse(rig.T_left_right), point_left[None])[0]
     rays = (rig.left.rays(rig.left.project(point_left)), rig.right.rays(rig.right.project(point_right)))
-    left, right = (_rectified(info, ray) for info, ray in zip(ros.stereo_info(0, rig), rays, strict=True))
+    left, right = (_rectified(info, ray) for info, ray in zip(ros.camera_infos(0, rig), rays, strict=True))
     views = rectification(rig)
     depth_m = (views.R_view_left @ point_left)[2]
     np.testing.assert_allclose(left - right, [views.K[0, 0] * rig.baseline_m / depth_m, 0], atol=1e-8)
@@ -96,6 +96,6 @@ def _rectified(info, ray):
 def test_a_pair_that_nothing_rectifies_states_each_camera_on_its_own():
     rig = stereo_rig(CAMERA, pitch_deg=0)
     above = replace(rig, T_body_right=rig.T_body_left @ se3.transform(np.eye(3), [0, -0.1, 0]))
-    for info in ros.stereo_info(0, above):
+    for info in ros.camera_infos(0, above):
         np.testing.assert_array_equal(info.r.reshape(3, 3), np.eye(3))
         np.testing.assert_array_equal(info.p.reshape(3, 4)[:, 3], np.zeros(3))

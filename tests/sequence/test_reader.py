@@ -12,8 +12,26 @@ import pytest
 from vobench.errors import SequenceError
 from vobench.geometry.calibration import CalibrationError, true_rig
 from vobench.geometry.preset import PRESETS
-from vobench.geometry.rig import WheelGeometry, mounted
-from vobench.sequence import Sequence, SequenceWriter, payload_hash, read_case, read_true_rig, read_truth
+from vobench.geometry.rig import ImuCalibration, WheelGeometry, mounted
+from vobench.sensor.imu import ImuReadings
+from vobench.sequence import (
+    Sequence,
+    SequenceWriter,
+    has_truth,
+    payload_hash,
+    read_case,
+    read_import_notes,
+    read_imu_bias,
+    read_provenance,
+    read_true_rig,
+    read_truth,
+    read_twist,
+)
+from vobench.sequence import messages as ros
+from vobench.sequence.bag import Bag, BagWriter
+from vobench.sequence.calibration import write_mounts
+from vobench.sequence.cdr import serialise
+from vobench.sequence.picture import encode
 
 
 def test_pixels_and_stamps_come_back_exactly(recording, folder):
@@ -178,3 +196,123 @@ def test_foreign_recording_says_which_topic_it_lacks(folder, tmp_path):
         SequenceError, match=r"^/cam_left/camera_info should be sensor_msgs/msg/CameraInfo but is missing"
     ):
         Sequence.open(tmp_path)
+
+
+def test_a_frame_by_its_number_or_its_instant_is_the_one_of_the_stream(make, tmp_path):
+    """95 frames lie in several chunks."""
+    recording = make(95)
+    sequence = Sequence.open(recording.write(tmp_path))
+    np.testing.assert_array_equal(sequence.frame_stamps(), recording.t_ns)
+    for index in (0, 1, 29, 30, 31, 64, 94):
+        frame, t_ns = sequence.frame(index), int(recording.t_ns[index])
+        assert (frame.index, frame.t_ns) == (index, t_ns)
+        np.testing.assert_array_equal([frame.left, frame.right], [recording.left[index], recording.right[index]])
+        assert [sequence.frame_at(t).index for t in (t_ns, t_ns + 5)] == [index, index]
+        assert index == 0 or sequence.frame_at(t_ns - 1).index == index - 1
+
+
+def test_a_frame_that_is_not_there_is_refused(folder):
+    sequence = Sequence.open(folder)
+    for index in (-1, 9):
+        with pytest.raises(SequenceError, match=rf"has 9 messages and none numbered {index} in"):
+            sequence.frame(index)
+    with pytest.raises(SequenceError, match=r"^there is no frame at or before -1 ns in"):
+        sequence.frame_at(-1)
+
+
+@pytest.mark.parametrize(("form", "options"), [("png", [cv2.IMWRITE_PNG_COMPRESSION, 9]), ("jpeg", [])])
+def test_pictures_that_are_encoded_already_pass_bit_for_bit(recording, tmp_path, form, options):
+    pair = [cv2.imencode(f".{form}", picture[0], options)[1].tobytes() for picture in (recording.left, recording.right)]
+    with SequenceWriter(tmp_path, recording.rig, case_json=None) as writer:
+        writer.write_encoded_frame(5, *pair, form)
+        with pytest.raises(SequenceError, match=rf"^cam_left should be gif but is {form}$"):
+            writer.write_encoded_frame(6, *pair, "gif")
+        with pytest.raises(SequenceError, match=r"^not an 8-bit grey PNG or JPEG: cam_right$"):
+            writer.write_encoded_frame(6, pair[0], b"gif", form)
+    (frame,) = Sequence.open(tmp_path).encoded_frames()
+    assert (frame.t_ns, frame.form, frame.left, frame.right) == (5, form, *pair)
+
+
+def test_an_imported_recording_keeps_its_stamps_its_notes_and_says_what_is_not_known(recording, tmp_path):
+    first_ns = 1_403_636_579_763_555_584
+    notes, versions = {"form": "euroc", "notes": "no wheels"}, {"vobench": "1.2", "numpy": "2"}
+    with SequenceWriter(
+        tmp_path, recording.rig, case_json=None, start_ns=first_ns, notes=notes, provenance=versions
+    ) as writer:
+        writer.write_frame(first_ns, recording.left[0], recording.right[0])
+        assert not (tmp_path / "truth.mcap").exists()
+        writer.write_truth(first_ns + 7, recording.T_map_body[0], None)
+        writer.write_truth(first_ns + 9, recording.T_map_body[1], recording.twist[1])
+    assert Sequence.open(tmp_path).frame_stamps().tolist() == [first_ns]
+    assert read_truth(tmp_path).t_ns.tolist() == [first_ns + 7, first_ns + 9]
+    assert read_twist(tmp_path) is None
+    assert (read_import_notes(tmp_path), read_provenance(tmp_path)) == (notes, versions)
+    with pytest.raises(SequenceError, match=r"^no attachment 'case\.json' in"):
+        read_case(tmp_path)
+    (first, _) = (m for _, m in Bag.open(tmp_path / "truth.mcap").messages((ros.ODOMETRY,)))
+    assert (first.twist.covariance[0], first.twist.twist.linear.x, first.pose.covariance[0]) == (-1, 0, 0)
+
+
+def test_twist_comes_back_and_truth_is_there_or_not(recording, folder, tmp_path):
+    np.testing.assert_array_equal(read_twist(folder), recording.twist)
+    assert has_truth(folder)
+    assert (read_import_notes(folder), read_provenance(folder)) == ({}, {})
+    assert not has_truth(tmp_path)
+    with SequenceWriter(tmp_path, recording.rig, case_json=b""):
+        pass
+    assert not has_truth(tmp_path)
+    assert len(read_truth(tmp_path)) == 0
+    assert read_twist(tmp_path) is None
+
+
+def test_a_recording_of_the_time_before_exposure_imu_and_true_rig_still_reads(recording, tmp_path):
+    rig, infos = recording.rig, [serialise(info) for info in ros.camera_infos(0, recording.rig)]
+    with BagWriter(
+        tmp_path / "sensors.mcap", (ros.TF_STATIC, *ros.INFO_TOPICS, *ros.IMAGE_TOPICS), encoded=False
+    ) as bag:
+        write_mounts(bag, rig, 0)
+        for topic, info in zip(ros.INFO_TOPICS, infos, strict=True):
+            bag.write(topic, 0, info)
+        for topic, picture in zip(ros.IMAGE_TOPICS, (recording.left[0], recording.right[0]), strict=True):
+            bag.write(topic, 0, serialise(ros.image(0, "cam_left", encode(picture, rig.left, "a"), "png")))
+    with BagWriter(tmp_path / "truth.mcap", ros.TRUTH_TOPICS, encoded=False) as bag:
+        write_mounts(bag, rig, 0)
+        bag.write(ros.ODOMETRY, 0, serialise(ros.odometry(0, np.eye(4), np.zeros(6))))
+    sequence = Sequence.open(tmp_path)
+    (frame,) = sequence.frames()
+    np.testing.assert_array_equal(frame.right, recording.right[0])
+    assert sequence.rig.imu is None
+    assert [len(stamps) for stamps in (sequence.exposures()[0], sequence.encoders()[0], sequence.imu().t_ns)] == [
+        0,
+        0,
+        0,
+    ]
+    assert len(read_truth(tmp_path)) == 1
+    assert len(read_imu_bias(tmp_path).t_ns) == 0
+    assert len(payload_hash(tmp_path)) == 64
+    with pytest.raises(SequenceError, match=r"^/ground_truth/cam_left/camera_info should be .* but is missing"):
+        read_true_rig(tmp_path)
+
+
+def test_a_git_lfs_pointer_and_a_text_are_named_as_what_they_are(folder, tmp_path):
+    path = tmp_path / "sensors.mcap"
+    for start, said in (
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:00", r"^this is a Git-LFS pointer .*`git lfs pull`"),
+        (b"hello", r"^not an MCAP recording by its first bytes: .*sensors\.mcap$"),
+        ((folder / "sensors.mcap").read_bytes()[:-1], r"^the recording was cut off, .*`vobench salvage` recovers"),
+    ):
+        path.write_bytes(start)
+        with pytest.raises(SequenceError, match=said):
+            Sequence.open(tmp_path)
+
+
+def test_payload_hash_follows_what_the_imu_says_and_how_it_is_described(recording, tmp_path):
+    imu = ImuCalibration(np.eye(4), 200.0, 1e-4, 1e-3, 1e-5, 1e-4)
+    hashes = set()
+    for name, rate_hz, gyro in (("a", 200.0, 0.0), ("b", 100.0, 0.0), ("c", 200.0, 1.0)):
+        rig = replace(recording.rig, imu=replace(imu, rate_hz=rate_hz, gyro_noise=1e-4 * (200 / rate_hz) ** 0.5))
+        with SequenceWriter(tmp_path / name, rig, case_json=b"") as writer:
+            writer.write_imu(ImuReadings(np.array([1]), np.full((1, 3), gyro), np.zeros((1, 3))))
+            writer.write_frame(5, recording.left[0], recording.right[0])
+        hashes.add(payload_hash(tmp_path / name))
+    assert len(hashes) == 3

@@ -7,17 +7,17 @@ from pathlib import Path
 import pytest
 
 from vobench.errors import SuiteError, VobenchError
-from vobench.pipeline.motion import drive_all
+from vobench.pipeline.passage import travel_all
 from vobench.suite.expand import read_plan
 from vobench.suite.light_spec import LightOverride
-from vobench.suite.model import CalibrationErrorSpec, CameraSpec, EstimatorSpec, RigSpec, Suite, TrajectorySpec
+from vobench.suite.model import CalibrationErrorSpec, CameraSpec, EstimatorSpec, RigSpec, Suite
 
 SUITE_KEYS = (
-    "cameras, estimators, lightings, name, rendering, repeats, rigs, scenes, seed, summary, trajectories, truth"
+    "cameras, estimators, lightings, name, rendering, repeats, rigs, scenes, seed, source, summary, trajectories, truth"
 )
-RIG_KEYS = "baseline_m, calibration_error, forward_m, height_m, lens, pitch_deg"
+RIG_KEYS = "baseline_m, calibration_error, forward_m, height_m, imu, lens, pitch_deg"
 LENSES = "d435i, euroc, fisheye, paper_blender, paper_literal, tartanair, zed2i"
-ESTIMATORS = "constant_velocity, lk_epipolar, stand_still, wheel_odometry"
+ESTIMATORS = "constant_velocity, imu_dead_reckoning, lk_epipolar, stand_still, wheel_odometry"
 A_NAME = "should be lower-case letters, digits, _ and ., a letter or digit first"
 
 # What is replaced, what with, and what comes after the file's path.
@@ -60,7 +60,7 @@ WRONG = [
     ("pitch_deg: 90", "pitch_deg: 90, calibration_error: {right_yaw_deg: 11}", ":5: rigs.down.calibration_error.right_yaw_deg: should be 10 or less (got 11)"),
     ("pitch_deg: 90", "pitch_deg: 90, calibration_error: {focal_ratio: -1}", ":5: rigs.down.calibration_error.focal_ratio: should be greater than -1 (got -1)"),
     ("pitch_deg: 90", "pitch_deg: 90, lens: d435i, calibration_error: {distortion_ratio: 0.1}", ":5: rigs.down: distortion_ratio 0.1 needs a lens with distortion, got Pinhole(width_px=848, height_px=480, fx_px=427.259765625, fy_px=427.259765625, cx_px=422.357269287109, cy_px=233.807525634766)"),
-    ("[[0.5, 0]]", "[[0.5, 0]], slip: slipery", ":6: trajectories.short.slip: no slip named 'slipery'. Did you mean 'slippery'? Known: nominal, none, slippery"),
+    ("[[0.5, 0]]", "[[0.5, 0]], slip: slipery", ":6: trajectories.short.slip: no slip named 'slipery'. Did you mean 'slippery'? Known: nominal, none, slippery, straining"),
     ("[[0.5, 0]]", "[[0.5, 0]], controller: smoth", ":6: trajectories.short.controller: no controller named 'smoth'. Did you mean 'smooth'? Known: easy, paper, smooth"),
     ("[[0.5, 0]]", "[]", ":6: trajectories.short.targets_m: should have 1 or more entries, but has 0"),
     ("[[0.5, 0]]", "[[0.5, 0, 1]]", ":6: trajectories.short.targets_m.0: should have 2 or fewer entries, but has 3 (and 1 more mistake)"),
@@ -137,16 +137,14 @@ def test_a_wrong_scene_is_named_with_the_line_of_the_suite_that_asks_for_it(bent
 def test_a_drive_that_cannot_be_is_said_before_anything_is_rendered(bent, tmp_path, old, new, sentence):
     planned = bent((old, new))
     with pytest.raises(VobenchError) as refused:
-        drive_all(planned)
+        travel_all(planned)
     assert str(refused.value).startswith(f"{tmp_path / 'tiny.yaml'}:6: trajectories.short: {sentence}")
 
 
 DOCS = Path(__file__).parents[2] / "docs" / "suites.md"
 
 
-@pytest.mark.parametrize(
-    "model", [Suite, RigSpec, CalibrationErrorSpec, TrajectorySpec, CameraSpec, EstimatorSpec, LightOverride]
-)
+@pytest.mark.parametrize("model", [Suite, RigSpec, CalibrationErrorSpec, CameraSpec, EstimatorSpec, LightOverride])
 def test_every_key_is_in_the_docs_with_its_default(model):
     page = DOCS.read_text(encoding="utf-8")
     for key, field in model.model_fields.items():

@@ -20,7 +20,7 @@ class Manifest(BaseModel):
     name: Annotated[str, matching(r"[a-z][a-z0-9_]*", "lower-case letters, digits and _, a letter first")]
     version: Annotated[str, Field(min_length=1)]
     class_path: Annotated[str, Field(alias="class"), matching(CLASS_PATH, "file:Class, as in 'estimator:Mine'")]
-    needs: tuple[Literal["stereo", "encoders"], ...] = ()
+    needs: tuple[Literal["stereo", "mono", "encoders", "imu"], ...] = ()
     pose_of: Literal["left_camera", "body"]
     summary: Annotated[str, Field(min_length=1)]
     paper: str = ""

@@ -30,6 +30,7 @@ COMPLAINTS = {
     "tuple_type": "should be a list, as in [a, b]",
     "dict_type": "should be keys with values",
     "model_type": "should be keys with values",
+    "model_attributes_type": "should be keys with values",
     "too_short": "should have {min_length} or more entries, but has {actual_length}",
     "too_long": "should have {max_length} or fewer entries, but has {actual_length}",
     "string_too_short": "should not be empty",
@@ -143,7 +144,7 @@ def _sentence(source: Source, error: ValidationError, model: type[BaseModel]) ->
     """The first thing wrong, unknown keys before missing ones: the one is often the other misspelt."""
     found = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
     # Pydantic marks a bad key, as opposed to its value, with a last part of its own.
-    keys = tuple(part for part in found[0]["loc"] if part != "[key]")
+    keys, _ = _walk(model, tuple(part for part in found[0]["loc"] if part != "[key]"))
     others = len(found) - 1
     more = f" (and {others} more mistake{'s' if others > 1 else ''})" if others else ""
     return f"{source.place(keys)}: {_complaint(found[0], model)}{more}"
@@ -151,7 +152,7 @@ def _sentence(source: Source, error: ValidationError, model: type[BaseModel]) ->
 
 def _complaint(error: Any, model: type[BaseModel]) -> str:
     if error["type"] == "extra_forbidden":
-        known = _keys_at(model, error["loc"][:-1])
+        known = sorted(_walk(model, error["loc"][:-1])[1].get("properties", {}))
         near = get_close_matches(str(error["loc"][-1]), known, n=1)
         return f"unknown key.{f' Did you mean {near[0]!r}?' if near else ''} Known: {', '.join(known)}"
     template, seen = COMPLAINTS.get(error["type"]), error["input"]
@@ -166,13 +167,24 @@ def _as_yaml(value: Any) -> str:
     return "nothing" if value is None else str(value).lower() if isinstance(value, bool) else repr(value)
 
 
-def _keys_at(model: type[BaseModel], loc: Keys) -> list[str]:
-    """The keys that a model knows at a place in its tree."""
+def _walk(model: type[BaseModel], loc: Keys) -> tuple[Keys, dict[str, Any]]:
+    """The keys of a place in the file, and the part of the model's schema there.
+
+    Pydantic's own place also names the kind that was chosen where the model offers several.
+    """
     schema = model.model_json_schema()
-    part = schema
+    keys, part = list[int | str](), schema
     for key in loc:
+        if reference := part.get("discriminator", {}).get("mapping", {}).get(key):
+            part = _referred(schema, {"$ref": reference})
+            continue
+        keys.append(key)
         part = part.get("properties", {}).get(key) or part.get("additionalProperties") or part.get("items") or {}
         # An optional section is a choice between itself and nothing.
-        part = next(iter(part.get("anyOf", [part])))
-        part = schema["$defs"][part["$ref"].rpartition("/")[2]] if "$ref" in part else part
-    return sorted(part.get("properties", {}))
+        part = _referred(schema, next(iter(part.get("anyOf", [part]))))
+    return tuple(keys), part
+
+
+def _referred(schema: dict[str, Any], part: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = schema["$defs"][part["$ref"].rpartition("/")[2]] if "$ref" in part else part
+    return found

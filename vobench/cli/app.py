@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from vobench.cli import score_command
+from vobench.cli import score_command, sequence_command
 from vobench.cli.score_command import Json
 from vobench.errors import VobenchError
 
@@ -127,6 +127,22 @@ def check(suite: SuiteName, *, json: Json = False) -> None:
 
 
 @app.command()
+def drive(
+    suite: SuiteName,
+    *,
+    trajectory: Annotated[str | None, typer.Option("--trajectory", "-t", help="Only this one of the suite's.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Plot paths and speeds to this .svg, .png or .pdf.")] = None,
+    tum: Annotated[Path | None, typer.Option(help="Write the body's true path of one trajectory, as TUM.")] = None,
+    csv: Annotated[Path | None, typer.Option(help="The same with velocities and accelerations, as CSV.")] = None,
+    json: Json = False,
+) -> None:
+    """Drive a suite's trajectories without rendering: a summary, and plots."""
+    from vobench.cli import driving
+
+    driving.show(suite, trajectory, out=out, tum=tum, csv=csv, as_json=json)
+
+
+@app.command()
 def render(
     scene: Annotated[str, typer.Argument(metavar="SCENE", help="A scene's name, or a path to its YAML.")],
     *,
@@ -171,6 +187,11 @@ def list_command(
 
 for command in (score_command.score, score_command.diagnose, score_command.metrics):
     app.command()(command)
+app.command("import")(sequence_command.import_)
+app.command()(sequence_command.export)
+app.command()(sequence_command.info)
+app.command()(sequence_command.salvage)
+app.command()(sequence_command.verify)
 
 
 @app.command()

@@ -181,7 +181,7 @@ def _recorded(path: Path, topic: str | None) -> Trajectory:
     folder = path if path.is_dir() else path.parent
     is_sequence = (folder / TRUTH).is_file() and (folder / SENSORS).is_file()
     if topic is None and is_sequence and (path.is_dir() or path.name == TRUTH):
-        from vobench.pipeline.run import left_truth
+        from vobench.pipeline.truth_path import left_truth
 
         return left_truth(folder)
     from vobench.sequence.pose_topic import is_recording, read_poses

@@ -2,13 +2,17 @@
 
 import shutil
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from vobench.cli import terminal
 from vobench.cli.boards import print_boards
+from vobench.dataset.recording import Recording
 from vobench.errors import InputError
-from vobench.pipeline.motion import drive_all
+from vobench.pipeline.motion import Travel
+from vobench.pipeline.passage import travel_all
+from vobench.pipeline.recorded import is_imported, read_all
 from vobench.pipeline.run import run_suite
 from vobench.pipeline.simulate import is_simulated
 from vobench.pipeline.workshop import Workshop
@@ -16,14 +20,15 @@ from vobench.report import files
 from vobench.report.table import as_json as boards_as_json
 from vobench.results.store import default_store
 from vobench.results.unfinished import why_unwritable
-from vobench.robot.drive import Drive
 from vobench.suite.expand import Case, read_plan
+from vobench.suite.source_spec import RecordedCase
 
 
 def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) -> None:
     """Run a suite and print its leaderboard and where everything lies."""
     planned = read_plan(suite, only_estimators=estimators)
-    drive_all(planned)
+    travel_all(planned)
+    read_all(planned)
     _require_writable("--out", out)
     _require_writable("VOBENCH_CACHE", default_store().root)
     shop = Workshop(default_store(), terminal.Bars())
@@ -50,8 +55,9 @@ def _require_writable(what: str, folder: Path) -> None:
 def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     """Validate a suite and print what it comes to."""
     planned = read_plan(suite, only_estimators=estimators)
-    drives = drive_all(planned)
-    cases = [_case_facts(case, drives[case.variant["trajectory"]]) for case in planned.cases]
+    travels, recordings = travel_all(planned), read_all(planned)
+    cases = [_case_facts(case, travels) for case in planned.simulated]
+    cases += [_recorded_facts(case, recordings[case.name]) for case in planned.recorded]
     entrants = [
         {"estimator": e.label, "version": e.manifest.version, "needs": list(e.manifest.needs), "path": str(e.folder)}
         for e in planned.entrants
@@ -60,24 +66,41 @@ def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     if as_json:
         terminal.print_json({"suite": planned.suite.name, "cases": cases, "estimators": entrants, "runs": runs})
         return
-    rows = [[f["case"], str(f["frames"]), f"{f['duration_s']:.1f}", _cached(f)] for f in cases]
+    rows = [[f["case"], str(f["frames"]), f"{f['duration_s']:.1f}", f["sequence"]] for f in cases]
     out = terminal.console()
     out.print(terminal.table(f"{planned.suite.name}: cases", ["case", "frames", "seconds", "sequence"], rows))
     lines = [
         [e.label, e.manifest.version, ", ".join(e.manifest.needs) or "nothing", str(e.folder)] for e in planned.entrants
     ]
     out.print(terminal.table("estimators", ["estimator", "version", "needs", "path"], lines))
+    for case in cases:
+        for note in case.get("notes", []):
+            out.print(f"{case['case']}: {note}")
     out.print(f"{len(cases)} cases, {len(entrants)} estimators, {runs} runs: the suite is valid")
 
 
-def _case_facts(case: Case, motion: Drive) -> dict[str, Any]:
+def _case_facts(case: Case, travels: Mapping[str, Travel]) -> dict[str, Any]:
+    """What is known of a case before it is made."""
+    t_ns, is_there = travels[case.variant["trajectory"]].t_ns, is_simulated(case, default_store())
     return {
         "case": case.name,
-        "frames": len(motion.t_ns),
-        "duration_s": float(motion.t_ns[-1]) / 1e9,
-        "simulated": is_simulated(case, default_store()),
+        "frames": len(t_ns),
+        "duration_s": float(t_ns[-1] - t_ns[0]) / 1e9,
+        "simulated": is_there,
+        "sequence": "in the cache" if is_there else "to simulate",
     }
 
 
-def _cached(facts: dict[str, Any]) -> str:
-    return "in the cache" if facts["simulated"] else "to simulate"
+def _recorded_facts(case: RecordedCase, recording: Recording) -> dict[str, Any]:
+    """The same of a recording, whose length is that of its ground truth; its pictures are not read yet."""
+    truth = recording.truth
+    duration_s = float(truth.t_ns[-1] - truth.t_ns[0]) / 1e9 if truth else 0.0
+    is_there = is_imported(case, default_store())
+    return {
+        "case": case.name,
+        "frames": recording.frame_count,
+        "duration_s": duration_s,
+        "simulated": False,
+        "sequence": "in the cache" if is_there else f"to import from {case.source.path}",
+        "notes": list(recording.notes),
+    }

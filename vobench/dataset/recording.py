@@ -9,13 +9,15 @@ from numpy.typing import NDArray
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
-from vobench.sequence import StereoFrame
+from vobench.sequence import EncodedFrame, StereoFrame
 from vobench.trajectory.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True)
 class Recording:
     """A recording of any form, its pictures not yet read: `frames` reads and checks them one at a time.
+
+    `encoded_frames` are the same as files, untouched where they were 8-bit grey PNG or JPEG.
 
     `truth` is the path of the body in its world, at stamps of its own; exposures are their stamps (N,) and times in
     s and gains in dB (N, 2), encoders their stamps (M,) and counts (M, 2). None stands for what there is not.
@@ -25,6 +27,7 @@ class Recording:
     form: str
     rig: Rig
     frames: Callable[[], Iterator[StereoFrame]]
+    encoded_frames: Callable[[], Iterator[EncodedFrame]]
     frame_count: int
     start_ns: int
     truth: Trajectory | None = None

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
+from vobench.sensor.imu import ImuReadings
 
 Image = NDArray[np.uint8]
 
@@ -34,10 +35,10 @@ class EncoderReadings:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """All that an estimator sees of one instant: two grey pictures and the encoder readings up to it.
+    """All that an estimator sees of one instant: grey pictures, and the encoders' and the IMU's readings up to it.
 
-    Pictures are (H, W) uint8, None where the estimator did not ask for stereo. `encoders` holds
-    the readings after the last frame up to and including this one's stamp, None where not asked for.
+    Pictures are (H, W) uint8: both for an estimator that needs stereo, the left one for mono. `encoders` and `imu`
+    hold the readings after the last frame up to and including this one's stamp. What was not asked for is None.
     """
 
     index: int
@@ -45,6 +46,7 @@ class Frame:
     left: Image | None = None
     right: Image | None = None
     encoders: EncoderReadings | None = None
+    imu: ImuReadings | None = None
 
 
 @dataclass(frozen=True, slots=True)

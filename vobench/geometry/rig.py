@@ -16,11 +16,16 @@ PAPER_FOCAL_MM, PAPER_SENSOR_MM, PAPER_SIZE_PX = 32.0, (35.0, 28.18), (720, 480)
 
 @dataclass(frozen=True, slots=True)
 class WheelGeometry:
-    """Nominal geometry of the two driven wheels, as an odometer believes it."""
+    """Nominal geometry of the two driven wheels, as an odometer believes it. Raises InputError where it is none."""
 
     radius_m: float
     track_m: float
     ticks_per_revolution: int
+
+    def __post_init__(self) -> None:
+        for name in ("radius_m", "track_m", "ticks_per_revolution"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise InputError(f"a wheel's {name} must be finite and above 0, got {getattr(self, name)}")
 
 
 # Radius and track: CoppeliaSim's Pioneer 3-DX; 500 lines x 4 edges x gear 38.3, from the data sheet.

@@ -5,8 +5,9 @@ import io
 import json
 import zipfile
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,12 +21,14 @@ from vobench.results import estimate_file
 from vobench.results.estimate_file import FINISHED, FrameRow, Outcome
 from vobench.results.run_folder import write_json
 from vobench.results.store import code_digest, folder_digest, library_versions
+from vobench.sensor.imu import ImuReadings
 from vobench.sequence import Sequence, StereoFrame
 from vobench.suite.expand import Run
 from vobench.trajectory.text import format_tum
 from vobench.trajectory.trajectory import Trajectory
 
 LIMITS = Limits()
+Readings = TypeVar("Readings", EncoderReadings, ImuReadings)
 
 
 def estimate(run: Run, sequence: Path, shop: Workshop) -> Path:
@@ -55,34 +58,59 @@ def _inputs(run: Run, sequence: Path) -> dict[str, Any]:
 
 def _run(run: Run, recording: Path, folder: Path, shop: Workshop) -> None:
     """Feed the sequence to the estimator; whatever happens, the folder is complete afterwards."""
-    sequence, manifest, log = Sequence.open(recording), run.entrant.manifest, folder / estimate_file.LOG
-    outcome = Outcome(kind=FINISHED, reason="")
-    with (
-        _Keeper(folder, sequence.rig, manifest.pose_of) as keeper,
-        EstimatorProcess(
-            run.entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=LIMITS
-        ) as process,
-    ):
+    sequence, outcome = Sequence.open(recording), Outcome(kind=FINISHED, reason="")
+    log = folder / estimate_file.LOG
+    log.touch()
+    with _Keeper(folder, sequence.rig, run.entrant.manifest.pose_of) as keeper:
         try:
-            process.start(sequence.rig, run.entrant.params, run.repeat)
-            for frame in shop.progress.track(_frames(sequence, manifest.needs), run.name, total=len(sequence)):
-                keeper.keep(frame, process.process(frame))
+            _check_needs(run.entrant.manifest.needs, sequence)
+            _feed(run, sequence, keeper, log, shop)
         except EstimatorFailure as failure:
             outcome = Outcome(kind=failure.kind, reason=failure.reason)
     write_json(folder / estimate_file.OUTCOME, outcome.model_dump())
 
 
+def _check_needs(needs: tuple[str, ...], sequence: Sequence) -> None:
+    """Refuse, with a sentence, an estimator that this recording cannot serve."""
+    rig = sequence.rig
+    has = {
+        "stereo": "" if rig.right else "one camera",
+        "encoders": "" if rig.wheels else "no wheels",
+        "imu": "" if rig.imu else "no IMU",
+    }
+    for need in needs:
+        if short := has.get(need):
+            raise EstimatorFailure("refused", f"it needs {need!r}, but this recording has {short}")
+
+
+def _feed(run: Run, sequence: Sequence, keeper: "_Keeper", log: Path, shop: Workshop) -> None:
+    """Start the estimator, hand it frame after frame, and keep what it says. Raises EstimatorFailure."""
+    entrant, manifest = run.entrant, run.entrant.manifest
+    with EstimatorProcess(entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=LIMITS) as process:
+        process.start(sequence.rig, entrant.params, run.repeat)
+        for frame in shop.progress.track(_frames(sequence, manifest.needs), run.name, total=len(sequence)):
+            keeper.keep(frame, process.process(frame))
+
+
 def _frames(sequence: Sequence, needs: tuple[str, ...]) -> Iterator[Frame]:
     """What the estimator asked for, one instant at a time."""
-    t_ns, ticks = sequence.encoders()
-    seen = 0
+    encoders = EncoderReadings(*sequence.encoders()) if "encoders" in needs else None
+    imu = sequence.imu() if "imu" in needs else None
+    last_ns = np.iinfo(np.int64).min
     # Pictures that nobody asked for are not decoded.
-    for f in sequence.frames() if "stereo" in needs else sequence.encoded_frames():
-        now = int(np.searchsorted(t_ns, f.t_ns, side="right"))
-        encoders = EncoderReadings(t_ns[seen:now], ticks[seen:now]) if "encoders" in needs else None
+    looks, stereo = "stereo" in needs or "mono" in needs, "stereo" in needs
+    for f in sequence.frames(right=stereo) if looks else sequence.encoded_frames():
         left, right = (f.left, f.right) if isinstance(f, StereoFrame) else (None, None)
-        yield Frame(f.index, f.t_ns, left, right, encoders)
-        seen = now
+        yield Frame(f.index, f.t_ns, left, right, _between(encoders, last_ns, f.t_ns), _between(imu, last_ns, f.t_ns))
+        last_ns = f.t_ns
+
+
+def _between(readings: Readings | None, last_ns: int, now_ns: int) -> Readings | None:
+    """The readings after one frame, up to and including the next."""
+    if readings is None:
+        return None
+    first, end = np.searchsorted(readings.t_ns, [last_ns, now_ns], side="right")
+    return type(readings)(*(getattr(readings, field.name)[first:end] for field in fields(readings)))
 
 
 class _Keeper:

@@ -1,118 +1,154 @@
-"""Where each case's robot goes, and whether it can: known before anything is rendered."""
+"""Where each case's body goes: its motion, its wheels, and what the controller asked of it."""
 
-from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.pipeline.stream import generator
-from vobench.robot.controller import CONTROLLERS
-from vobench.robot.drive import Drive, drive
+from vobench.robot.ackermann import ACKERMANNS, ackermann
+from vobench.robot.controller import CONTROLLERS, ControllerSettings
+from vobench.robot.disturbance import DELTAS, STREAMS
+from vobench.robot.drive import Drive, drive, follow
 from vobench.robot.pioneer import THETAS
-from vobench.robot.slip import SLIPS, STREAMS
-from vobench.suite.expand import Case, Plan
+from vobench.robot.roll import rolled
+from vobench.robot.slip import SLIPS
+from vobench.suite.expand import Case
+from vobench.suite.ground_spec import GroundSpec
+from vobench.suite.planar_spec import CurveSpec, WaypointsSpec
+from vobench.suite.replay_spec import ReplaySpec
+from vobench.suite.spatial_spec import HandheldSpec
+from vobench.suite.trajectory_spec import SpatialSpec
+from vobench.trajectory.curve import CurveMotion
+from vobench.trajectory.kinematics import Instants, Kinematics, Motion
+
+NS_PER_S = 1e9
+ENCODERS_PER_FRAME = 4
+# Nearly two hours at 30 Hz.
+MOST_FRAMES = 200_000
 
 
-def drive_case(case: Case) -> Drive:
-    """The case's robot on its way; the same for every scene, rig and camera. Raises MotionError."""
-    t = case.trajectory
+@dataclass(frozen=True, slots=True)
+class Rims:
+    """What the encoders measure: angles (M, 2) in rad of the left and right rim at t_ns (M,)."""
+
+    t_ns: Instants
+    rim_rad: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Travel:
+    """A body's way: its motion, the stamps t_ns (N,) of its pictures; `rims` where it rolls, `drive` where it is led.
+
+    All that is true of it comes from `motion`: poses, twists, accelerations, at these stamps or any other.
+    """
+
+    motion: Motion
+    t_ns: Instants
+    rims: Rims | None = None
+    drive: Drive | None = None
+
+    def at_frames(self) -> Kinematics:
+        """Where the body is and how it moves at its pictures' stamps."""
+        return self.motion.at(self.t_ns)
+
+
+def travel_of(case: Case) -> Travel:
+    """The case's body on its way; the same for every scene, rig and camera. Raises MotionError."""
+    spec = case.trajectory
+    if isinstance(spec, WaypointsSpec):
+        return _led(_through_targets(case, spec))
+    if isinstance(spec, GroundSpec):
+        return _led(_after(spec.way(), case, spec)) if spec.mover == "pioneer" else _rolling(spec)
+    motion = _through_space(case, spec)
+    return Travel(motion, stamps(motion, spec.rate_hz))
+
+
+def stamps(motion: Motion, rate_hz: float, *, per_frame: int = 1) -> Instants:
+    """Stamps from a motion's start to its end, `per_frame` to a frame, every `per_frame`-th exactly a frame's.
+
+    Raises MotionError where there would be more than MOST_FRAMES.
+    """
+    lasts_s = (motion.end_ns - motion.start_ns) / NS_PER_S
+    frames = int(lasts_s * rate_hz + 1e-6)
+    if frames > MOST_FRAMES:
+        raise MotionError(f"{lasts_s:.4g} s at {rate_hz:g} Hz are {frames} frames, and {MOST_FRAMES} are the most")
+    index = np.arange(frames * per_frame + 1)
+    return np.rint(index * NS_PER_S / per_frame / rate_hz).astype(np.int64) + motion.start_ns
+
+
+def _led(driven: Drive) -> Travel:
+    return Travel(driven.motion, driven.t_ns, Rims(driven.encoder_t_ns, driven.rim_rad), driven)
+
+
+def _through_targets(case: Case, spec: WaypointsSpec) -> Drive:
+    is_ideal = spec.mover == "unicycle"
     return drive(
-        t.targets_m,
-        theta=THETAS[t.robot],
-        controller=CONTROLLERS[t.controller],
-        slip=SLIPS[t.slip],
-        start=(*t.start_m, np.deg2rad(t.start_heading_deg)),
-        rate_hz=t.rate_hz,
-        tolerance_m=t.tolerance_m,
-        max_time_s=t.max_time_s,
-        rngs={stream: generator(case.seed, f"slip.{stream}") for stream in STREAMS},
+        spec.targets_m,
+        start=spec.start,
+        theta=None if is_ideal else THETAS[spec.robot],
+        theta_std=0.0 if is_ideal else spec.robot_spread,
+        controller=CONTROLLERS[spec.controller],
+        limits=spec.build_limits(),
+        slip=SLIPS["none" if is_ideal else spec.slip],
+        delta=DELTAS["none" if is_ideal else spec.delta],
+        floor=() if is_ideal else [patch.build() for patch in spec.floor],
+        rate_hz=spec.rate_hz,
+        substeps=spec.substeps,
+        integrator=spec.integrator,
+        tolerance_m=spec.tolerance_m,
+        max_time_s=spec.max_time_s,
+        leg_s=spec.leg_s,
+        rngs=_chance(case),
     )
 
 
-BodyPath = Callable[[NDArray[np.int64]], Array]
+def _after(way: CurveMotion, case: Case, spec: CurveSpec) -> Drive:
+    """The Pioneer, led along a way: its point h goes after where an ideal robot's would be."""
+    controller = CONTROLLERS[spec.controller]
+    path_m, path_mps = _path_of_h(way, stamps(way, spec.rate_hz), controller)
+    x, y = path_m[0].tolist()
+    return follow(
+        path_m,
+        path_mps,
+        start=(x, y, spec.start[2]),
+        theta=THETAS[spec.robot],
+        theta_std=spec.robot_spread,
+        controller=controller,
+        limits=spec.build_limits(),
+        slip=SLIPS[spec.slip],
+        delta=DELTAS[spec.delta],
+        floor=[patch.build() for patch in spec.floor],
+        rate_hz=spec.rate_hz,
+        substeps=spec.substeps,
+        integrator=spec.integrator,
+        rngs=_chance(case),
+    )
 
 
-def body_path(motion: Drive) -> BodyPath:
-    """T_world_body (K, 4, 4) at any instants (K,) of a drive; at rest before it, going on evenly for a hair after.
-
-    A cubic spline through the encoder instants, where the integrator's own states lie.
-    """
-    t_s = motion.encoder_t_ns / 1e9
-    if len(t_s) < 2:
-        return lambda t_ns: np.broadcast_to(motion.T_world_body[0], (len(t_ns), 4, 4))
-    spline = CubicSpline(t_s, motion.axle)
-
-    def poses(t_ns: NDArray[np.int64]) -> Array:
-        x, y, heading = spline(np.maximum(t_ns / 1e9, t_s[0])).T
-        return se3.transform(se3.rotation_z(heading), np.stack([x, y, np.zeros_like(x)], -1))
-
-    return poses
+def _path_of_h(way: Motion, t_ns: Instants, controller: ControllerSettings) -> tuple[Array, Array]:
+    """Places and velocities (N, 2) in the world of the point h of a body that goes this way exactly."""
+    h = way.at(t_ns).of_mounted(se3.transform(np.eye(3), [controller.a_m, 0.0, 0.0]))
+    velocity_mps = np.einsum("kij,kj->ki", h.T_world_body[:, :3, :3], h.velocity_mps)
+    return h.T_world_body[:, :2, 3], velocity_mps[:, :2]
 
 
-def drive_all(plan: Plan) -> dict[str, Drive]:
-    """The drive of each trajectory of a plan, by its name: said before hours of rendering.
-
-    Raises SuiteError or MotionError where a target cannot be reached, a camera leaves the room, or
-    its pictures take longer than a frame.
-    """
-    drives: dict[str, Drive] = {}
-    for case in plan.cases:
-        name = case.variant["trajectory"]
-        with plan.at("trajectories", name):
-            if name not in drives:
-                drives[name] = drive_case(case)
-            _check_in_room(case, drives[name])
-        with plan.at("cameras", case.variant["camera"]):
-            _check_fits_frame(case)
-    return drives
+def _chance(case: Case) -> dict[str, np.random.Generator]:
+    return {stream: generator(case.seed, f"slip.{stream}") for stream in STREAMS}
 
 
-def _check_fits_frame(case: Case) -> None:
-    """Raise MotionError where a picture would still be exposed or read out when the next one begins."""
-    camera, frame_ms = case.camera, 1e3 / case.trajectory.rate_hz
-    durations = {"exposure_ms": camera.exposure_ms, "readout_ms": camera.readout_ms or 0.0}
-    if camera.auto_exposure:
-        durations["auto_exposure.t_max_ms"] = camera.auto_exposure.t_max_ms
-    for key, lasts_ms in durations.items():
-        if lasts_ms > frame_ms:
-            raise MotionError(
-                f"{key} {lasts_ms:g} is longer than a frame of trajectory '{case.variant['trajectory']}', "
-                f"which lasts {frame_ms:.3g} ms at {case.trajectory.rate_hz:g} Hz"
-            )
+def _rolling(spec: CurveSpec) -> Travel:
+    """A body whose wheels do as they are told; a car's as its steering lets them."""
+    way = spec.way()
+    fine = stamps(way, spec.rate_hz, per_frame=ENCODERS_PER_FRAME)
+    motion: Motion = ackermann(way, ACKERMANNS[spec.car]) if spec.mover == "ackermann" else way
+    return Travel(motion, fine[::ENCODERS_PER_FRAME], Rims(fine, rolled(motion, fine, spec.wheels)))
 
 
-def _check_in_room(case: Case, motion: Drive) -> None:
-    rig, room = case.build_rig(), case.scene.room
-    for T_body_camera in map(rig.T_body_camera, rig.sides):
-        at_m = (motion.T_world_body @ T_body_camera)[:, :3, 3]
-        _refuse(case, motion, at_m, ~room.holds(at_m), f"leaves the room ({room.extent})")
-        for b in case.scene.boxes:
-            T_world_box = se3.transform(se3.rotation_z(np.deg2rad(b.yaw_deg)), b.center_m)
-            inside = _within(at_m, T_world_box, b.size_m)
-            _refuse(case, motion, at_m, inside, f"is inside the box of {b.material} at {b.center_m} m")
-        for spec, mover in zip(case.scene.movers, case.build_scene().movers, strict=True):
-            T_world_mover = np.stack([mover.path.pose(t_ns) for t_ns in motion.t_ns])
-            inside = _within(at_m, T_world_mover, spec.size_m)
-            _refuse(case, motion, at_m, inside, f"is inside the mover '{spec.name}'")
-
-
-def _within(at_m: Array, T_world_box: Array, size_m: tuple[float, float, float]) -> NDArray[np.bool_]:
-    """Which points (N, 3) are within a box around the origin of its frame, (4, 4) or (N, 4, 4)."""
-    in_box_m = se3.apply(se3.inverse(T_world_box), at_m[:, None])[:, 0]
-    within: NDArray[np.bool_] = np.all(np.abs(in_box_m) <= np.array(size_m) / 2, axis=-1)
-    return within
-
-
-def _refuse(case: Case, motion: Drive, at_m: Array, wrong: NDArray[np.bool_], what: str) -> None:
-    """Raise MotionError for the first instant at which a camera is where it cannot be."""
-    if wrong.any():
-        first = int(np.flatnonzero(wrong)[0])
-        where = ", ".join(f"{x:.2f}" for x in at_m[first])
-        raise MotionError(
-            f"a camera of rig '{case.variant['rig']}' {what} of scene '{case.variant['scene']}' "
-            f"after {motion.t_ns[first] / 1e9:.1f} s, at ({where}) m"
-        )
+def _through_space(case: Case, spec: SpatialSpec | ReplaySpec) -> Motion:
+    if isinstance(spec, ReplaySpec):
+        assert case.replayed is not None  # read with the suite
+        return spec.motion(case.replayed)
+    return spec.motion(generator(case.seed, "shake")) if isinstance(spec, HandheldSpec) else spec.motion()

@@ -9,10 +9,13 @@ from typing import Any
 
 from vobench import __version__
 from vobench.pipeline.estimate import estimate
+from vobench.pipeline.recorded import import_case
 from vobench.pipeline.score import score_run
 from vobench.pipeline.simulate import LIBRARIES, simulate
+from vobench.pipeline.truth_path import left_truth
 from vobench.pipeline.workshop import Workshop
 from vobench.results import estimate_file
+from vobench.results.hashes import write_hashes
 from vobench.results.run_folder import (
     CASE,
     ENVIRONMENT,
@@ -27,10 +30,10 @@ from vobench.results.run_folder import (
     write_json,
 )
 from vobench.results.store import digest, folder_digest, library_versions
-from vobench.sequence import Sequence, read_truth
+from vobench.sequence import read_import_notes
 from vobench.suite.expand import Case, Entrant, Plan
+from vobench.suite.source_spec import RecordedCase
 from vobench.trajectory.text import format_tum
-from vobench.trajectory.trajectory import Trajectory
 
 Finish = Callable[[RunFolder, list[RunScore]], None]
 ESTIMATE_FILES = (estimate_file.ESTIMATE, estimate_file.FRAMES, estimate_file.TRACKS, estimate_file.LOG)
@@ -49,22 +52,23 @@ def run_suite(plan: Plan, *, root: Path, shop: Workshop, finish: Finish) -> RunF
         write_json(folder.path / ESTIMATORS, entrants)
         write_json(folder.path / ENVIRONMENT, _environment())
         finish(folder, [score for case in plan.cases for score in _run_case(plan, case, folder, shop)])
+        write_hashes(folder)
 
     return make_run(root, plan.suite.name, digest({"suite": suite, "estimators": entrants}), fill)
 
 
-def left_truth(sequence: Path) -> Trajectory:
-    """The left camera's true path: what every estimate is compared with."""
-    return read_truth(sequence).of_mounted(Sequence.open(sequence).rig.T_body_left)
+def sequence_of(case: Case | RecordedCase, shop: Workshop) -> Path:
+    """The folder of the case's sequence: simulated, or imported from what somebody recorded."""
+    return simulate(case, shop) if isinstance(case, Case) else import_case(case, shop)
 
 
-def _run_case(plan: Plan, case: Case, folder: RunFolder, shop: Workshop) -> list[RunScore]:
-    sequence = simulate(case, shop)
-    gt = left_truth(sequence)
+def _run_case(plan: Plan, case: Case | RecordedCase, folder: RunFolder, shop: Workshop) -> list[RunScore]:
+    sequence = sequence_of(case, shop)
     target = folder.case(case.name)
     target.mkdir(parents=True)
-    write_json(target / CASE, case.model_dump(mode="json"))
-    (target / GROUND_TRUTH).write_text(format_tum(gt), encoding="utf-8")
+    write_json(target / CASE, {**case.model_dump(mode="json"), **_assumed(case, sequence)})
+    (target / GROUND_TRUTH).write_text(format_tum(left_truth(sequence)), encoding="utf-8")
+    gt = estimate_file.read_tum(target / GROUND_TRUTH)  # what is scored is what anybody can score again
     (target / SEQUENCE).symlink_to(sequence.resolve())
     scores = []
     for run in plan.runs(case):
@@ -72,6 +76,11 @@ def _run_case(plan: Plan, case: Case, folder: RunFolder, shop: Workshop) -> list
         scores.append(score_run(run, estimated, gt))
         _keep(estimated, scores[-1], folder.estimate(case.name, run.entrant.label, run.repeat))
     return scores
+
+
+def _assumed(case: Case | RecordedCase, sequence: Path) -> dict[str, dict[str, str]]:
+    """Of a recording: all that its import assumed, converted or dropped."""
+    return {"import": read_import_notes(sequence)} if isinstance(case, RecordedCase) else {}
 
 
 def _keep(estimated: Path, score: RunScore, target: Path) -> None:

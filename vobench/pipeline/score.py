@@ -3,14 +3,14 @@
 from pathlib import Path
 
 from vobench.metric.score import Score, score
-from vobench.metric.settings import INDOOR_LENGTHS_M, ScoreSettings
+from vobench.metric.settings import ScoreSettings
 from vobench.results import estimate_file
 from vobench.results.run_folder import RunScore, RunStatus
 from vobench.suite.expand import Run
 from vobench.trajectory.trajectory import Trajectory
 
-# One for all runs, whatever their length; a simulated truth has one pose for each frame.
-SETTINGS = ScoreSettings(coverage_of="frames", segment_lengths_m=INDOOR_LENGTHS_M, segment_step_frames=1)
+# The truth that a run is scored against has one pose for each frame.
+SETTINGS = ScoreSettings(coverage_of="frames")
 
 
 def score_run(run: Run, estimate: Path, gt: Trajectory) -> RunScore:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vobench.geometry.rig import SIDES, Side
+from vobench.geometry.se3 import Array
 from vobench.pipeline.displacement import Displacement
-from vobench.pipeline.motion import BodyPath
 from vobench.pipeline.stream import generator
 from vobench.render.renderer import Radiance, Renderer, View
 from vobench.scene.light import Steady
@@ -17,6 +17,7 @@ from vobench.sensor.lens import lens_maps, through_lens
 from vobench.sensor.response import Grey
 from vobench.sensor.shutter import ShutterKind, strips
 from vobench.suite.expand import Case
+from vobench.trajectory.kinematics import Instants, Motion
 
 # Between two sub-frames, and between the first and last row of a strip, nothing should move further than this.
 SUB_FRAME_PX, STRIP_PX = 1.0, 0.25
@@ -40,7 +41,7 @@ class World:
 
     scene: Scene
     renderer: Renderer
-    path: BodyPath
+    motion: Motion
 
 
 class StereoCamera:
@@ -97,7 +98,7 @@ class Eye:
             row_strips=self._row_strips(t_ns),
             sub_frames=self._sub_frames(t_ns, exposure),
         )
-        return [View(s.rows, self._world.path(s.mid_ns) @ self._T_body_camera, s.start_ns, s.end_ns) for s in cut]
+        return [View(s.rows, self._seen_from(s.mid_ns), s.start_ns, s.end_ns) for s in cut]
 
     def _sub_frames(self, t_ns: int, exposure: Exposure) -> int:
         if not self._blurs:
@@ -116,5 +117,10 @@ class Eye:
     def _moved_px(self, t_ns: int, duration_s: float) -> float:
         half_ns = round(duration_s * 1e9) // 2
         start_ns, end_ns = t_ns - half_ns, t_ns + half_ns
-        first, last = self._world.path(np.array([start_ns, end_ns])) @ self._T_body_camera
+        first, last = self._seen_from(np.array([start_ns, end_ns]))
         return self._displacement.largest_px(self._camera, first, last, start_ns=start_ns, end_ns=end_ns)
+
+    def _seen_from(self, t_ns: Instants) -> Array:
+        """T_world_camera (K, 4, 4) at instants (K,)."""
+        T_world_camera: Array = self._world.motion.at(t_ns).T_world_body @ self._T_body_camera
+        return T_world_camera

@@ -1,23 +1,29 @@
-"""Case to sequence: the robot drives, the cameras shoot, the recording keeps."""
+"""Case to sequence: the body goes its way, the cameras shoot, the other sensors read, the recording keeps."""
 
+import platform
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from vobench.geometry.rig import PIONEER_WHEELS, SIDES
+from vobench import __version__
+from vobench.geometry.rig import SIDES
 from vobench.pipeline.engine import BAKE, open_renderer
-from vobench.pipeline.motion import body_path, drive_case
+from vobench.pipeline.motion import Travel, travel_of
+from vobench.pipeline.sense import SensorFeed
 from vobench.pipeline.shoot import Pair, StereoCamera, World
 from vobench.pipeline.truth import PixelTruth
 from vobench.pipeline.workshop import Workshop
 from vobench.results.store import Store, canonical, code_digest, library_versions
-from vobench.robot.drive import Drive
-from vobench.sensor.encoder import ENCODERS, ticks
 from vobench.sequence import SequenceWriter
 from vobench.suite.expand import Case
 
+# What of a case is for people: names, and where the poses of a replay were found.
+UNSIMULATED: dict[str, Any] = {
+    "name": True,
+    "variant": True,
+    "scene": {"summary"},
+    "trajectory": {"file", "times", "recorded_hz", "axes"},
+}
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "pyrender", "embreex", "mcap", "rosbags")
 
 
@@ -36,27 +42,28 @@ def sequence_inputs(case: Case) -> dict[str, Any]:
     return {
         "case": _content(case),
         "bake": repr(BAKE),
-        "code": code_digest("geometry", "robot", "scene", "sensor", "render", "sequence", "suite", "pipeline"),
+        "code": code_digest(
+            "geometry", "trajectory", "robot", "scene", "sensor", "render", "sequence", "suite", "pipeline"
+        ),
         "libraries": library_versions(*LIBRARIES, *(["mitsuba"] if case.rendering.engine == "path" else [])),
     }
 
 
 def _content(case: Case) -> dict[str, Any]:
     """What is simulated, without what the suite calls it: the same for equal cases of two suites."""
-    return case.model_dump(mode="json", exclude={"name": True, "variant": True, "scene": {"summary"}})
+    return case.model_dump(mode="json", exclude=UNSIMULATED)
 
 
 def _record(case: Case, folder: Path, shop: Workshop) -> None:
-    motion, scene = drive_case(case), case.build_scene()
-    path = body_path(motion)
-    truth = PixelTruth(case, scene, path) if case.truth else None
+    travel, scene = travel_of(case), case.build_scene()
+    truth = PixelTruth(case, scene, travel.motion) if case.truth else None
     renderer = open_renderer(case.scene, scene, case.rendering, shop)
     try:
-        camera = StereoCamera(case, World(scene, renderer, path))
-        pairs = (camera.shoot(t_ns) for t_ns in motion.t_ns.tolist())
-        watched = shop.progress.track(pairs, f"simulate {case.name}", total=len(motion.t_ns))
+        camera = StereoCamera(case, World(scene, renderer, travel.motion))
+        pairs = (camera.shoot(t_ns) for t_ns in travel.t_ns.tolist())
+        watched = shop.progress.track(pairs, f"simulate {case.name}", total=len(travel.t_ns))
         with _writer(case, folder, truth) as writer:
-            _write(writer, case, motion, watched, truth)
+            _write(writer, travel, SensorFeed(case, travel), watched, truth)
     finally:
         renderer.close()
 
@@ -70,21 +77,21 @@ def _writer(case: Case, folder: Path, truth: PixelTruth | None) -> SequenceWrite
         jpeg_quality=case.camera.jpeg_quality,
         truth_channels=case.truth,
         truth_names=truth.names if truth else None,
+        provenance={"vobench": __version__, "python": platform.python_version(), **library_versions(*LIBRARIES)},
     )
 
 
-def _write(writer: SequenceWriter, case: Case, motion: Drive, pairs: Iterator[Pair], truth: PixelTruth | None) -> None:
-    counts = ticks(motion.rim_rad, PIONEER_WHEELS, ENCODERS[case.trajectory.encoders])
-    # Readings up to each frame's stamp go before it.
-    ends = np.searchsorted(motion.encoder_t_ns, motion.t_ns, side="right")
-    starts = np.concatenate([[0], ends[:-1]])
-    stamps = [*motion.t_ns.tolist(), None]
+def _write(
+    writer: SequenceWriter, travel: Travel, feed: SensorFeed, pairs: Iterator[Pair], truth: PixelTruth | None
+) -> None:
+    body = travel.at_frames()
+    stamps = [*travel.t_ns.tolist(), None]
     for index, pair in enumerate(pairs):
-        t_ns, new = stamps[index], slice(starts[index], ends[index])
-        writer.write_encoders(motion.encoder_t_ns[new], counts[new])
+        t_ns = stamps[index]
+        feed.write_until(t_ns, writer)
         writer.write_frame(t_ns, pair.left, pair.right)
         writer.write_exposure(t_ns, pair.exposure.time_s, pair.exposure.gain_db)
-        writer.write_truth(t_ns, motion.T_world_body[index], motion.twist[index])
+        writer.write_truth(t_ns, body.T_world_body[index], body.twist[index])
         if truth:
             _write_pixel_truth(writer, truth, t_ns, stamps[index + 1])
 

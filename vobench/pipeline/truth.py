@@ -3,20 +3,20 @@
 import numpy as np
 
 from vobench.geometry.rig import Side
-from vobench.pipeline.motion import BodyPath
 from vobench.render.stand import Shot
 from vobench.render.truth import TruthCaster
 from vobench.scene.scene import Scene
 from vobench.sensor.shutter import ShutterKind, row_stamps
 from vobench.sensor.truth import TruthFrame, TruthNames
 from vobench.suite.expand import Case
+from vobench.trajectory.kinematics import Motion
 
 
 class PixelTruth:
     """Ground truth of a case's pictures, amid each row's exposure; the true rig sees it."""
 
-    def __init__(self, case: Case, scene: Scene, path: BodyPath) -> None:
-        self._rig, self._shutter, self._path = case.build_true_rig(), case.camera.build_shutter(), path
+    def __init__(self, case: Case, scene: Scene, motion: Motion) -> None:
+        self._rig, self._shutter, self._motion = case.build_true_rig(), case.camera.build_shutter(), motion
         self._channels, self._caster = case.truth, TruthCaster(scene)
 
     @property
@@ -32,6 +32,6 @@ class PixelTruth:
     def _shot(self, side: Side, t_ns: int) -> Shot:
         T_body_camera = self._rig.T_body_camera(side)
         if self._shutter.kind is ShutterKind.GLOBAL:
-            return Shot(self._path(np.array([t_ns]))[0] @ T_body_camera, t_ns)
+            return Shot(self._motion.at(np.array([t_ns])).T_world_body[0] @ T_body_camera, t_ns)
         stamps = row_stamps(self._rig.camera(side).height_px, self._shutter, t_ns)
-        return Shot(self._path(stamps) @ T_body_camera, stamps)
+        return Shot(self._motion.at(stamps).T_world_body @ T_body_camera, stamps)

@@ -5,6 +5,7 @@ runs/<suite>/<UTC stamp>_<short hash>/
     estimators.json   who took part: versions, parameters, hashes of their code
     environment.json  versions and machine
     leaderboard.*     md, html, csv, json
+    hashes.json       SHA-256 of every file, for vobench verify
     cases/<case>/     case.json, ground_truth.tum, sequence -> cache
     cases/<case>/<estimator>/<repeat>/   estimate.tum, frames.csv, tracks.zip, score.json, log.txt
 """

@@ -1,8 +1,8 @@
-"""A drive through waypoints: controller, dynamics and slip together, and the exact truth of where the robot was."""
+"""A drive through waypoints or along a path: controller, dynamics and slip together, and the exact truth of it."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from math import ceil, isfinite
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import ceil, inf
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,20 +10,30 @@ from numpy.typing import ArrayLike, NDArray
 from vobench.errors import MotionError
 from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
 from vobench.geometry.se3 import Array
+from vobench.robot.aim import AlongPath, ByTheClock, Errand, ThroughTargets
 from vobench.robot.controller import CONTROLLERS, ControllerSettings
+from vobench.robot.disturbance import DELTAS, DeltaSettings, Disturbances, drawn
+from vobench.robot.driven import DriveMotion, motion_of
+from vobench.robot.floor import FloorPatch
+from vobench.robot.limits import UNLIMITED, AccelerationLimits
 from vobench.robot.pioneer import THETAS, Theta, axle_poses
-from vobench.robot.slip import SLIPS, SlipNow, SlipSettings, slip_path
+from vobench.robot.slip import SLIPS, Generators, SlipNow, SlipSettings, generator_of
 from vobench.robot.vehicle import Vehicle
+
+# How long a drive is known after its end, where it goes on with its last references: for shutters open there.
+TAIL_S = 1.0
+# What is slower or faster is a slip of the pen, and would fill the memory.
+LONGEST_LEG_S, FASTEST_HZ = 3600.0, 1e4
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
     """What the robot did, at N frames and M = (N - 1) substeps + 1 encoder instants.
 
-    state (N, 5): x, y of the point h in m, psi in rad, u in m/s, omega in rad/s. references (N, 2) hold
-    from their frame on. T_world_body and twist (vx, vy, vz, wx, wy, wz in body axes) are of the axle midpoint B,
-    sliding included; axle (M, 3) is its x, y and heading. reached: the frame that entered each target.
-    rim_rad (M, 2): left, right.
+    state (N, 5): x, y of h in m, psi in rad, u, omega; references (N, 2) hold from their frame on. T_world_body
+    and twist (linear, angular, in body axes) are of the axle midpoint B, sliding included, as is `motion`; axle (M, 3):
+    its x, y, heading. reached: the frame that ended each leg, by entering its target or by the clock. rim_rad (M, 2):
+    left, right. slip (N, 3): both sigmas and beta in rad; delta (N, 2). theta: this very robot's, None if ideal.
     """
 
     t_ns: NDArray[np.int64]
@@ -35,6 +45,10 @@ class Drive:
     encoder_t_ns: NDArray[np.int64]
     axle: Array
     rim_rad: Array
+    slip: Array
+    delta: Array
+    theta: Theta | None
+    motion: DriveMotion = field(repr=False)
 
     @property
     def steps_per_leg(self) -> tuple[int, ...]:
@@ -45,9 +59,13 @@ class Drive:
 def drive(
     targets_m: ArrayLike,
     *,
-    theta: Theta = THETAS["pioneer_3dx"],
+    theta: Theta | None = THETAS["pioneer_3dx"],
+    theta_std: float = 0.0,
     controller: ControllerSettings = CONTROLLERS["smooth"],
+    limits: AccelerationLimits = UNLIMITED,
     slip: SlipSettings = SLIPS["none"],
+    delta: DeltaSettings = DELTAS["none"],
+    floor: Sequence[FloorPatch] = (),
     wheels: WheelGeometry = PIONEER_WHEELS,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
     rate_hz: float = 30.0,
@@ -56,92 +74,122 @@ def drive(
     tolerance_m: float = 0.01,
     settle_s: float = 0.0,
     max_time_s: float = 60.0,
-    rngs: Mapping[str, np.random.Generator] | None = None,
+    leg_s: float | None = None,
+    rngs: Generators | None = None,
 ) -> Drive:
     """Drive h from rest at `start` (x, y, psi) through targets (K, 2) in order, its speed carried over between them.
 
-    A target is reached in the first frame with h within `tolerance_m` on both axes; the drive ends
-    `settle_s` after the last. `max_time_s` is for each target; `rngs` holds the generators of slip.STREAMS.
+    A target is reached in the first frame with h within `tolerance_m` on both axes, for each within `max_time_s`;
+    with `leg_s` each is held for that time whatever happens. The drive ends `settle_s` after the last.
+    Without a theta the robot is an ideal unicycle; `theta_std` perturbs it. rngs: disturbance.STREAMS.
     Raises MotionError for values that are not finite, a loop that cannot settle, a target not reached in time.
     """
-    targets = _checked_targets(targets_m, start)
-    _check_clock(rate_hz, substeps, tolerance_m=tolerance_m, settle_s=settle_s, max_time_s=max_time_s)
-    vehicle = Vehicle(theta, controller, wheels, rate_hz, substeps, integrator)
-    course = _Course(targets, tolerance_m, ceil(max_time_s * rate_hz), ceil(settle_s * rate_hz))
-    slips = slip_path(course.longest, slip, step_s=1 / rate_hz, rngs=rngs)
+    targets = _checked_rows(targets_m, "target")
+    _check_clock(rate_hz, substeps, settle_s=settle_s, max_time_s=max_time_s, leg_s=leg_s)
+    if not 0 < tolerance_m < inf:
+        raise MotionError(f"tolerance_m must be above 0 and finite, got {tolerance_m}")
+    theta = _own_theta(theta, theta_std, rngs)
+    vehicle = Vehicle(theta, controller, wheels, rate_hz, substeps, integrator, limits)
+    settle = ceil(settle_s * rate_hz)
+    errand: Errand = ThroughTargets(targets, tolerance_m, ceil(max_time_s * rate_hz), settle)
+    if leg_s is not None:
+        errand = ByTheClock.every(leg_s * rate_hz, targets, settle)
+    disturbances = drawn(errand.longest, slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
+    return _driven(errand, vehicle, disturbances, start)
 
+
+def follow(
+    path_m: ArrayLike,
+    path_mps: ArrayLike,
+    *,
+    start: tuple[float, float, float],
+    theta: Theta | None = THETAS["pioneer_3dx"],
+    theta_std: float = 0.0,
+    controller: ControllerSettings = CONTROLLERS["smooth"],
+    limits: AccelerationLimits = UNLIMITED,
+    slip: SlipSettings = SLIPS["none"],
+    delta: DeltaSettings = DELTAS["none"],
+    floor: Sequence[FloorPatch] = (),
+    wheels: WheelGeometry = PIONEER_WHEELS,
+    rate_hz: float = 30.0,
+    substeps: int = 4,
+    integrator: str = "rk4",
+    rngs: Generators | None = None,
+) -> Drive:
+    """Drive h from rest at `start` (x, y, psi) after a target that moves: one row (N, 2) of place and velocity a frame.
+
+    The path's velocity is fed forward and tanh pulls h back to it; a real robot lags where it speeds up, and
+    on a straight line stays (theta_4 - 1) / gain of its speed behind. Its other options are `drive`'s.
+    Raises MotionError as `drive` does, and where the path is faster than the controller's max_speed_mps.
+    """
+    path, path_rate = _checked_rows(path_m, "path point"), _checked_rows(path_mps, "path velocity")
+    _check_clock(rate_hz, substeps)
+    _check_path(path, path_rate, controller)
+    vehicle = Vehicle(_own_theta(theta, theta_std, rngs), controller, wheels, rate_hz, substeps, integrator, limits)
+    disturbances = drawn(len(path), slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
+    return _driven(AlongPath(path, path_rate), vehicle, disturbances, start)
+
+
+def _driven(errand: Errand, vehicle: Vehicle, disturbances: Disturbances, start: tuple[float, float, float]) -> Drive:
+    """The robot on its errand, frame by frame, and a little on."""
+    if np.shape(start) != (3,) or not np.isfinite(start).all():
+        raise MotionError(f"the start (x, y, psi) must be three finite values, got {start}")
     state = np.array([*start, 0.0, 0.0, 0.0, 0.0])
-    fine, asked, reached = [state[None]], [], list[int]()
-    for frame in range(course.longest):
-        reached += course.entered(state, frame, reached)
-        asked.append(vehicle.references(state, course.target(reached)))
-        if course.finished(frame, reached):
+    slips = [disturbances.at(0, vehicle.contacts_ahead(state, SlipNow()))]
+    fine, asked, ends, places = [state[None]], [], list[int](), [state[:2]]
+    for frame in range(errand.longest):
+        ends += errand.ended(state, frame, ends)
+        target_m, path_mps = errand.aim(frame, ends)
+        asked.append(vehicle.references(state, target_m, path_mps))
+        if errand.finished(frame, ends):
             break
-        course.check_patience(state, frame, reached)
-        left, right, beta = slips[frame].tolist()
-        fine.append(vehicle.advance(state, asked[-1], SlipNow(left, right, beta, slip.skid_s)))
+        errand.check_patience(places, ends)
+        slips.append(disturbances.at(frame + 1, vehicle.contacts_ahead(state, slips[-1])))
+        fine.append(vehicle.advance(state, asked[-1], *slips[-2:]))
         state = fine[-1][-1]
-    side = slips[: len(asked), 2]
-    return _record(np.concatenate(fine), np.array(asked), tuple(reached), side, vehicle=vehicle, skid_s=slip.skid_s)
-
-
-@dataclass(frozen=True, slots=True)
-class _Course:
-    """Which target is next, and when to stop; `reached` is always the frames of the targets already entered."""
-
-    targets_m: Array
-    tolerance_m: float
-    patience: int
-    settle: int
-
-    @property
-    def longest(self) -> int:
-        """Frames in the longest drive possible."""
-        return len(self.targets_m) * self.patience + self.settle + 1
-
-    def target(self, reached: list[int]) -> Array:
-        """The target (2,) to drive to: the last one for ever."""
-        target: Array = self.targets_m[min(len(reached), len(self.targets_m) - 1)]
-        return target
-
-    def entered(self, state: Array, frame: int, reached: list[int]) -> list[int]:
-        """This frame, once for each target in turn that h is inside of."""
-        inside = (np.abs(self.targets_m[len(reached) :] - state[:2]) < self.tolerance_m).all(1)
-        return [frame] * int(np.logical_and.accumulate(inside).sum())
-
-    def finished(self, frame: int, reached: list[int]) -> bool:
-        return len(reached) == len(self.targets_m) and frame >= reached[-1] + self.settle
-
-    def check_patience(self, state: Array, frame: int, reached: list[int]) -> None:
-        leg_start = reached[-1] if reached else 0
-        if len(reached) == len(self.targets_m) or frame - leg_start < self.patience:
-            return
-        x, y = self.target(reached)
-        away = float(np.hypot(x - state[0], y - state[1]))
-        raise MotionError(
-            f"target {len(reached) + 1} at ({x:g}, {y:g}) m was not entered in max_time_s ({self.patience} frames): "
-            f"the robot is {away:.3g} m away; allow more time, a wider tolerance_m or another controller"
-        )
+        places.append(state[:2])
+    return _record(fine, np.array(asked), tuple(ends), slips, vehicle=vehicle)
 
 
 def _record(
-    fine: Array, asked: Array, reached: tuple[int, ...], beta_rad: Array, *, vehicle: Vehicle, skid_s: float
+    periods: list[Array], asked: Array, ends: tuple[int, ...], slips: list[SlipNow], *, vehicle: Vehicle
 ) -> Drive:
-    """The drive from its fine states (M, 7), references (N, 2) and side-slip angles (N,)."""
+    """The drive from the states (1 or substeps, 7) of its periods, references (N, 2) and slip at N frames."""
+    fine, disturbed = np.concatenate(periods), np.array(slips)
     state = fine[:: vehicle.substeps, :5]
     u, omega = state[:, 3:].T
     T_world_body = axle_poses(*fine[:, :3].T, a_m=vehicle.controller.a_m)
-    side, still = u * np.tan(beta_rad) - skid_s * u * omega, np.zeros_like(u)
+    side, still = u * np.tan(disturbed[:, 2]) - slips[-1].skid_s * u * omega, np.zeros_like(u)
     return Drive(
         t_ns=_stamps(len(state), vehicle.rate_hz, 1),
         state=state,
         references=asked,
         T_world_body=T_world_body[:: vehicle.substeps],
         twist=np.stack([u, side, still, still, still, omega], -1),
-        reached=reached,
+        reached=ends,
         encoder_t_ns=_stamps(len(fine), vehicle.rate_hz, vehicle.substeps),
         axle=np.column_stack([T_world_body[:, :2, 3], fine[:, 2]]),
         rim_rad=fine[:, 5:],
+        slip=disturbed[:, :3],
+        delta=disturbed[:, 5:],
+        theta=vehicle.theta,
+        motion=_with_tail(fine, asked, slips, vehicle),
+    )
+
+
+def _with_tail(fine: Array, asked: Array, slips: list[SlipNow], vehicle: Vehicle) -> DriveMotion:
+    """The motion of the drive, its last references and slip held for a while after it."""
+    tail, last = [fine], slips[-1]
+    more = ceil(TAIL_S * vehicle.rate_hz)
+    for _ in range(more):
+        tail.append(vehicle.advance(tail[-1][-1], tuple(asked[-1].tolist()), last))
+    return motion_of(
+        np.concatenate(tail),
+        np.concatenate([asked, np.repeat(asked[-1:], more - 1, 0)]),
+        np.array([*slips, *[last] * more])[:, [2, 5, 6]],
+        frames=len(asked),
+        vehicle=vehicle,
+        skid_s=last.skid_s,
     )
 
 
@@ -150,23 +198,45 @@ def _stamps(count: int, rate_hz: float, substeps: int) -> NDArray[np.int64]:
     return np.rint(np.arange(count) * 1e9 / substeps / rate_hz).astype(np.int64)
 
 
-def _checked_targets(targets_m: ArrayLike, start: tuple[float, float, float]) -> Array:
-    targets = np.asarray(targets_m, float)
-    if targets.ndim != 2 or targets.shape[1] != 2 or not len(targets):
-        raise MotionError(f"a drive needs one or more targets of two coordinates (K, 2), got shape {targets.shape}")
-    if not np.isfinite(targets).all():
-        bad = int(np.flatnonzero(~np.isfinite(targets).all(1))[0])
+def _own_theta(theta: Theta | None, std: float, rngs: Generators | None) -> Theta | None:
+    """The parameters of this very robot."""
+    if std == 0:
+        return theta
+    if theta is None:
+        raise MotionError("an ideal unicycle has no theta that theta_std could perturb")
+    return theta.perturbed(std, generator_of(rngs, "theta"))
+
+
+def _checked_rows(rows: ArrayLike, what: str) -> Array:
+    pairs = np.asarray(rows, float)
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or not len(pairs):
+        raise MotionError(f"a drive needs one or more {what}s of two coordinates (K, 2), got shape {pairs.shape}")
+    if not np.isfinite(pairs).all():
+        bad = int(np.flatnonzero(~np.isfinite(pairs).all(1))[0])
+        raise MotionError(f"{what} {bad + 1} is ({pairs[bad, 0]}, {pairs[bad, 1]}); both coordinates must be finite")
+    return pairs
+
+
+def _check_path(path_m: Array, path_mps: Array, controller: ControllerSettings) -> None:
+    if path_m.shape != path_mps.shape:
         raise MotionError(
-            f"target {bad + 1} is ({targets[bad, 0]}, {targets[bad, 1]}); both coordinates must be finite"
+            f"a path needs a velocity for every point, got {len(path_m)} points and {len(path_mps)} velocities"
         )
-    if not np.isfinite(start).all():
-        raise MotionError(f"the start (x, y, psi) must be finite, got {start}")
-    return targets
+    speed = np.hypot(*path_mps.T)
+    if speed.max() > controller.max_speed_mps:
+        raise MotionError(
+            f"the path moves at {speed.max():.3g} m/s at point {int(speed.argmax()) + 1}, "
+            f"and the controller gives {controller.max_speed_mps:g} m/s at most"
+        )
 
 
-def _check_clock(rate_hz: float, substeps: int, **durations: float) -> None:
-    if not (rate_hz > 0 and isfinite(rate_hz)) or substeps < 1:
-        raise MotionError(f"a drive needs a positive rate_hz and 1 or more substeps, got {rate_hz} and {substeps}")
+def _check_clock(rate_hz: float, substeps: int, **durations: float | None) -> None:
+    if not 0 < rate_hz <= FASTEST_HZ:
+        raise MotionError(f"a drive needs a rate_hz above 0 and at most {FASTEST_HZ:g}, got {rate_hz}")
+    if not (isinstance(substeps, int | np.integer) and substeps >= 1):
+        raise MotionError(f"a drive needs a whole number of substeps, 1 or more, got {substeps}")
     for name, value in durations.items():
-        if not (value >= 0 and isfinite(value)) or (value == 0 and name != "settle_s"):
-            raise MotionError(f"{name} must be finite and positive, got {value}")
+        may_be_0 = name == "settle_s"
+        if value is not None and not (0 < value <= LONGEST_LEG_S or (value == 0 and may_be_0)):
+            least = "0 or more" if may_be_0 else "above 0"
+            raise MotionError(f"{name} must be {least} and at most {LONGEST_LEG_S:g}, got {value}")

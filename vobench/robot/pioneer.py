@@ -6,13 +6,18 @@ x, y          the controlled point h, `a` metres ahead of B
 theta_1..6    identified parameters; d, r: track and wheel radius (m)
 """
 
-from dataclasses import dataclass
-from math import cos, sin
+from dataclasses import astuple, dataclass
+from math import cos, isfinite, sin
+from typing import TypeVar
 
 import numpy as np
 
-from vobench.geometry import se3
+from vobench.errors import MotionError
 from vobench.geometry.se3 import Array
+from vobench.trajectory.kinematics import level
+
+# Formulas that hold for one instant and for arrays of them.
+Number = TypeVar("Number", float, Array)
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +26,7 @@ class Theta:
 
     t1, t2 in s are the lags of u and omega; t3 in s m/rad^2 and t5 in s/m couple them, because the
     centre of mass is not on the axle; t4 and t6 are 1 for a robot that reaches what it is asked.
+    Raises MotionError where one is not finite, or a lag not positive.
     """
 
     t1: float
@@ -29,6 +35,19 @@ class Theta:
     t4: float
     t5: float
     t6: float
+
+    def __post_init__(self) -> None:
+        if not (all(map(isfinite, astuple(self))) and self.t1 > 0 and self.t2 > 0):
+            raise MotionError(f"theta must be six finite values with positive lags t1 and t2, got {astuple(self)}")
+
+    def perturbed(self, relative_std: float, rng: np.random.Generator) -> "Theta":
+        """Another robot of the kind: each parameter times exp(relative_std N(0, 1)), so that none changes sign.
+
+        Raises MotionError where `relative_std` is not in 0..0.5.
+        """
+        if not 0 <= relative_std <= 0.5:
+            raise MotionError(f"theta_std is a fraction of each parameter, 0..0.5, got {relative_std}")
+        return Theta(*(np.array(astuple(self)) * np.exp(relative_std * rng.standard_normal(6))).tolist())
 
 
 # Source: help text of Martins' Simulink toolbox, and Laut (2011) where named; the first as the paper prints it.
@@ -48,8 +67,8 @@ THETAS = {
 
 
 def accelerations(
-    u: float, omega: float, u_ref: float, omega_ref: float, *, theta: Theta, delta: tuple[float, float] = (0.0, 0.0)
-) -> tuple[float, float]:
+    u: Number, omega: Number, u_ref: Number, omega_ref: Number, *, theta: Theta, delta: tuple[float, float] = (0.0, 0.0)
+) -> tuple[Number, Number]:
     """Accelerations u' in m/s^2 and omega' in rad/s^2 of (18); `delta` is the paper's (delta_u, delta_omega)."""
     u_rate = (theta.t3 * omega**2 - theta.t4 * u + u_ref) / theta.t1 + delta[0]
     omega_rate = (-theta.t5 * u * omega - theta.t6 * omega + omega_ref) / theta.t2 + delta[1]
@@ -66,7 +85,7 @@ def velocities(psi: float, u: float, omega: float, *, a_m: float, side_mps: floa
     return u * cos(psi) - left * sin(psi), u * sin(psi) + left * cos(psi), omega
 
 
-def wheel_speeds(u: float, omega: float, *, track_m: float) -> tuple[float, float]:
+def wheel_speeds(u: Number, omega: Number, *, track_m: float) -> tuple[Number, Number]:
     """Ground speeds of the left and the right wheel in m/s: (9) and (10) solved for the wheels."""
     half = omega * track_m / 2
     return u - half, u + half
@@ -74,5 +93,4 @@ def wheel_speeds(u: float, omega: float, *, track_m: float) -> tuple[float, floa
 
 def axle_poses(x_h_m: Array, y_h_m: Array, psi_rad: Array, *, a_m: float) -> Array:
     """T_world_body (N, 4, 4) of the axle midpoint B, from the point h that is `a_m` ahead of it."""
-    x, y = x_h_m - a_m * np.cos(psi_rad), y_h_m - a_m * np.sin(psi_rad)
-    return se3.transform(se3.rotation_z(psi_rad), np.stack([x, y, np.zeros_like(x)], -1))
+    return level(x_h_m - a_m * np.cos(psi_rad), y_h_m - a_m * np.sin(psi_rad), psi_rad)

@@ -1,28 +1,42 @@
-"""Recordings: stereo pictures, encoders and ground truth as two MCAP files in ROS 2 form."""
+"""Recordings: pictures, encoders, IMU and ground truth as two MCAP files in ROS 2 form."""
 
 from vobench.sequence.reader import (
     EncodedFrame,
     Sequence,
     StereoFrame,
+    has_truth,
     payload_hash,
     read_case,
+    read_import_notes,
+    read_imu_bias,
+    read_provenance,
     read_true_rig,
     read_truth,
+    read_twist,
 )
+from vobench.sequence.salvage import Salvaged, salvage, salvage_sequence
 from vobench.sequence.truth_reader import StereoTruth, read_truth_frames, read_truth_names, truth_channels
 from vobench.sequence.writer import SequenceWriter
 
 __all__ = [
     "EncodedFrame",
+    "Salvaged",
     "Sequence",
     "SequenceWriter",
     "StereoFrame",
     "StereoTruth",
+    "has_truth",
     "payload_hash",
     "read_case",
+    "read_import_notes",
+    "read_imu_bias",
+    "read_provenance",
     "read_true_rig",
     "read_truth",
     "read_truth_frames",
     "read_truth_names",
+    "read_twist",
+    "salvage",
+    "salvage_sequence",
     "truth_channels",
 ]

@@ -16,8 +16,10 @@ from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.geometry.sphere import DoubleSphere, Equirectangular
 
-WORLD, BODY, LEFT, RIGHT = "map", "base_link", "cam_left", "cam_right"
+WORLD, BODY, LEFT, RIGHT, IMU_FRAME = "map", "base_link", "cam_left", "cam_right", "imu"
 NS_PER_S = 1_000_000_000
+END_OF_STAMPS_NS = 2**31 * NS_PER_S  # ROS counts seconds in 31 bits
+UNKNOWN = -1.0  # in the first element of a covariance: "there is no estimate of this", says sensor_msgs/Imu
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +38,18 @@ LEFT_IMAGE = Topic(f"/{LEFT}/image/compressed", "sensor_msgs/msg/CompressedImage
 RIGHT_IMAGE = Topic(f"/{RIGHT}/image/compressed", "sensor_msgs/msg/CompressedImage")
 EXPOSURE = Topic("/exposure", "vobench_msgs/msg/Exposure")
 ENCODERS = Topic("/encoders", "vobench_msgs/msg/WheelTicks")
+IMU = Topic("/imu", "sensor_msgs/msg/Imu")
 TF = Topic("/tf", "tf2_msgs/msg/TFMessage")
 ODOMETRY = Topic("/ground_truth/odometry", "nav_msgs/msg/Odometry")
+IMU_BIAS = Topic("/ground_truth/imu_bias", "vobench_msgs/msg/ImuBias")
 
 TRUE_LEFT_INFO = Topic(f"/ground_truth{LEFT_INFO.name}", LEFT_INFO.type_name, latched=True)
 TRUE_RIGHT_INFO = Topic(f"/ground_truth{RIGHT_INFO.name}", RIGHT_INFO.type_name, latched=True)
 
-SENSOR_TOPICS = (TF_STATIC, LEFT_INFO, RIGHT_INFO, LEFT_IMAGE, RIGHT_IMAGE, EXPOSURE, ENCODERS)
-TRUTH_TOPICS = (TF_STATIC, TF, ODOMETRY)
+INFO_TOPICS, IMAGE_TOPICS = (LEFT_INFO, RIGHT_INFO), (LEFT_IMAGE, RIGHT_IMAGE)
 TRUE_INFO_TOPICS = (TRUE_LEFT_INFO, TRUE_RIGHT_INFO)
+SENSOR_TOPICS = (TF_STATIC, *INFO_TOPICS, *IMAGE_TOPICS, EXPOSURE, ENCODERS, IMU)
+TRUTH_TOPICS = (TF_STATIC, TF, ODOMETRY)
 
 # ROS names the first two; the others it does not know, and their names are ours.
 PLUMB_BOB = "plumb_bob"
@@ -71,9 +76,33 @@ float64 time_s
 float64 gain_db
 """
 
+IMU_BIAS_DEFINITION = """\
+# What an IMU's readings are off by, slowly varying, in its own axes: rad/s and m/s^2.
+std_msgs/Header header
+geometry_msgs/Vector3 gyro
+geometry_msgs/Vector3 accel
+"""
+
 TYPES = get_typestore(Stores.ROS2_JAZZY)
-TYPES.register(get_types_from_msg(WHEEL_TICKS_DEFINITION, ENCODERS.type_name))
-TYPES.register(get_types_from_msg(EXPOSURE_DEFINITION, EXPOSURE.type_name))
+for _definition, _topic in (
+    (WHEEL_TICKS_DEFINITION, ENCODERS),
+    (EXPOSURE_DEFINITION, EXPOSURE),
+    (IMU_BIAS_DEFINITION, IMU_BIAS),
+):
+    TYPES.register(get_types_from_msg(_definition, _topic.type_name))
+
+
+def sensor_topics(rig: Rig) -> tuple[Topic, ...]:
+    """The topics that a recording of this rig can have."""
+    eyes = len(rig.sides)
+    moved = ((ENCODERS, rig.wheels), (IMU, rig.imu))
+    there = [topic for topic, sensor in moved if sensor]
+    return (TF_STATIC, *INFO_TOPICS[:eyes], *IMAGE_TOPICS[:eyes], EXPOSURE, *there)
+
+
+def truth_topics(rig: Rig) -> tuple[Topic, ...]:
+    """The topics that the truth about this rig can have, those of pixels apart."""
+    return (*TRUTH_TOPICS, *TRUE_INFO_TOPICS[: len(rig.sides)], *((IMU_BIAS,) if rig.imu else ()))
 
 
 def _make(type_name: str, *fields: Any) -> Any:
@@ -88,10 +117,16 @@ def _quaternion(R: Array) -> Any:
     return _make("geometry_msgs/msg/Quaternion", *se3.to_quaternion(R).tolist())
 
 
+def split_stamp(t_ns: int) -> tuple[int, int]:
+    """Seconds and nanoseconds of a stamp, as ROS has it. Raises SequenceError outside the years 1970 to 2038."""
+    if not 0 <= t_ns < END_OF_STAMPS_NS:
+        raise SequenceError(f"a ROS stamp lies between 0 and {END_OF_STAMPS_NS - 1} ns (in 2038), got {t_ns} ns")
+    return divmod(int(t_ns), NS_PER_S)
+
+
 def header(t_ns: int, frame_id: str) -> Any:
-    """A std_msgs/Header; ROS splits a stamp into seconds and nanoseconds."""
-    stamp = _make("builtin_interfaces/msg/Time", *divmod(int(t_ns), NS_PER_S))
-    return _make("std_msgs/msg/Header", stamp, frame_id)
+    """A std_msgs/Header."""
+    return _make("std_msgs/msg/Header", _make("builtin_interfaces/msg/Time", *split_stamp(t_ns)), frame_id)
 
 
 def transforms(t_ns: int, parent: str, T_parent_child: dict[str, Array]) -> Any:
@@ -108,16 +143,12 @@ def transforms(t_ns: int, parent: str, T_parent_child: dict[str, Array]) -> Any:
     return _make(TF.type_name, stamped)
 
 
-def mounts(rig: Rig) -> Any:
-    """Where the two cameras sit on the body, for /tf_static."""
-    return transforms(0, BODY, {LEFT: rig.T_body_left, RIGHT: rig.T_body_camera("right")})
-
-
-def stereo_info(t_ns: int, rig: Rig) -> tuple[Any, Any]:
-    """The sensor_msgs/CameraInfo of both cameras, with the R and P that rectify them where anything does."""
+def camera_infos(t_ns: int, rig: Rig) -> tuple[Any, ...]:
+    """The sensor_msgs/CameraInfo of each camera, with the R and P that rectify a pair where anything does."""
     views = rectification(rig)
     if views is None:
-        return camera_info(t_ns, LEFT, rig.left), camera_info(t_ns, RIGHT, rig.camera("right"))
+        names = (LEFT, RIGHT)
+        return tuple(camera_info(t_ns, name, rig.camera(side)) for name, side in zip(names, rig.sides, strict=False))
     left = camera_info(t_ns, LEFT, rig.left, R=views.R_view_left, P=views.P_left)
     return left, camera_info(t_ns, RIGHT, rig.camera("right"), R=views.R_view_right, P=views.P_right)
 
@@ -175,19 +206,37 @@ def wheel_ticks(t_ns: int, left: int, right: int) -> Any:
     return _make(ENCODERS.type_name, header(t_ns, BODY), int(left), int(right))
 
 
-def odometry(t_ns: int, T_world_body: Array, twist_body: ArrayLike) -> Any:
-    """A nav_msgs/Odometry: the body's pose in the world, its (6,) twist (m/s, rad/s) in its own axes."""
-    unknown = np.zeros(36)  # ground truth states no covariance
+def imu(t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike, variances: tuple[float, float]) -> Any:
+    """One reading as a sensor_msgs/Imu that knows no orientation.
+
+    `variances` are those of one axis, of the gyro and of the accelerometer; 0 where they are not known.
+    """
+    upright, unknown = _make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0), np.zeros(9)
+    unknown[0] = UNKNOWN
+    gyro, accel = (np.eye(3).ravel() * variance for variance in variances)
+    fields = (header(t_ns, IMU_FRAME), upright, unknown, _vector(gyro_radps), gyro, _vector(accel_mps2), accel)
+    return _make(IMU.type_name, *fields)
+
+
+def imu_bias(t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike) -> Any:
+    """An IMU's biases as a vobench_msgs/ImuBias."""
+    return _make(IMU_BIAS.type_name, header(t_ns, IMU_FRAME), _vector(gyro_radps), _vector(accel_mps2))
+
+
+def odometry(t_ns: int, T_world_body: Array, twist_body: ArrayLike | None) -> Any:
+    """A nav_msgs/Odometry: the body's pose in the world, its (6,) twist (m/s, rad/s) in its own axes, or None."""
+    unstated, unknown = np.zeros(36), np.zeros(36)  # ground truth states no covariance
+    unknown[0] = UNKNOWN
     position = _make("geometry_msgs/msg/Point", *T_world_body[:3, 3].tolist())
     pose = _make("geometry_msgs/msg/Pose", position, _quaternion(T_world_body[:3, :3]))
-    linear, angular = np.asarray(twist_body, float).reshape(2, 3)
+    linear, angular = np.zeros((2, 3)) if twist_body is None else np.asarray(twist_body, float).reshape(2, 3)
     twist = _make("geometry_msgs/msg/Twist", _vector(linear), _vector(angular))
     return _make(
         ODOMETRY.type_name,
         header(t_ns, WORLD),
         BODY,
-        _make("geometry_msgs/msg/PoseWithCovariance", pose, unknown),
-        _make("geometry_msgs/msg/TwistWithCovariance", twist, unknown),
+        _make("geometry_msgs/msg/PoseWithCovariance", pose, unstated),
+        _make("geometry_msgs/msg/TwistWithCovariance", twist, unknown if twist_body is None else unstated),
     )
 
 

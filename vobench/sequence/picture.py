@@ -1,5 +1,6 @@
-"""Pictures as PNG files."""
+"""Pictures as PNG and JPEG bytes, looked at before they are decoded."""
 
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -7,8 +8,81 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vobench.errors import SequenceError
+from vobench.geometry.camera import Camera
+
+Image = NDArray[np.uint8]
+Encoded = bytes | memoryview | Image
+
+PNG_START, JPEG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR", b"\xff\xd8\xff"
+PNG_HEADER = struct.Struct(">IIBB")  # width, height, bits, colour type; 0 is grey
+JPEG_SEGMENT, JPEG_FRAME = struct.Struct(">BBH"), struct.Struct(">BHHB")  # bits, height, width, components
+# Those of the markers C0 to CF that begin no frame: Huffman tables, extensions, arithmetic coding.
+NO_FRAME = (0xC4, 0xC8, 0xCC)
+MAX_PX = 1 << 28  # a larger one is a damaged or a hostile header
+
 
 def write_png(path: Path, picture: NDArray[np.unsignedinteger[Any]]) -> None:
     """Write (H, W) grey or (H, W, 3) red, green, blue, 8 or 16 bits. Raises OSError where the file can't be written."""
     in_cv_order = picture[..., ::-1] if picture.ndim == 3 else picture
     path.write_bytes(cv2.imencode(".png", np.ascontiguousarray(in_cv_order))[1].tobytes())
+
+
+def encode(image: Image, camera: Camera, name: str, *, jpeg_quality: int | None = None) -> bytes:
+    """A grey picture as PNG, or as JPEG of a quality. Raises SequenceError where it is not what the camera takes.
+
+    PNG gets no compression level: OpenCV's default strategy is both faster and smaller than any level.
+    """
+    if image.shape != (camera.height_px, camera.width_px) or image.dtype != np.uint8:
+        raise SequenceError(
+            f"{name} takes ({camera.height_px}, {camera.width_px}) uint8 pictures, got {image.shape} {image.dtype}"
+        )
+    if jpeg_quality is None:
+        return cv2.imencode(".png", image)[1].tobytes()
+    return cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality])[1].tobytes()
+
+
+def decode(encoded: Encoded, camera: Camera | None, name: str) -> Image:
+    """A grey picture (H, W) from its PNG or JPEG. Raises SequenceError where it is none, or not of the camera's size.
+
+    The header is looked at first, so that a false one costs no memory.
+    """
+    size = require_grey(encoded, camera, name)[1:]
+    image = cv2.imdecode(np.frombuffer(encoded, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None or image.shape != size or image.dtype != np.uint8:
+        raise SequenceError(f"not a whole 8-bit grey PNG or JPEG: {name}")
+    return image.astype(np.uint8, copy=False)
+
+
+def require_grey(encoded: Encoded, camera: Camera | None, name: str) -> tuple[str, int, int]:
+    """Form (png or jpeg), height and width by a picture's header.
+
+    Raises SequenceError where it is not 8-bit grey, or not of the camera's size.
+    """
+    try:
+        form, height, width, bits, components = _header(
+            encoded.data if isinstance(encoded, np.ndarray) else memoryview(encoded)
+        )
+    except struct.error:
+        raise SequenceError(f"the picture ends within its header: {name}") from None
+    if bits != 8 or components != 1 or not 0 < height * width <= MAX_PX:
+        raise SequenceError(f"not an 8-bit grey PNG or JPEG: {name}")
+    if camera and (height, width) != (camera.height_px, camera.width_px):
+        raise SequenceError(f"{(height, width)} pixels, but the camera has {camera.height_px, camera.width_px}: {name}")
+    return form, height, width
+
+
+def _header(encoded: memoryview) -> tuple[str, int, int, int, int]:
+    """Form, height, width, bits and components; no components where it is neither PNG nor JPEG."""
+    if encoded[: len(PNG_START)] == PNG_START:
+        width, height, bits, colour = PNG_HEADER.unpack_from(encoded, len(PNG_START))
+        return "png", height, width, bits, 1 if colour == 0 else 3
+    if encoded[: len(JPEG_START)] == JPEG_START:
+        at = 2
+        while True:
+            _, marker, length = JPEG_SEGMENT.unpack_from(encoded, at)
+            if 0xC0 <= marker <= 0xCF and marker not in NO_FRAME:
+                bits, height, width, components = JPEG_FRAME.unpack_from(encoded, at + JPEG_SEGMENT.size)
+                return "jpeg", height, width, bits, components
+            at += 2 + length
+    return "", 0, 0, 0, 0

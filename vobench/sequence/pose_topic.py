@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rosbags.highlevel import AnyReader
 
-from vobench.errors import SequenceError
+from vobench.errors import SequenceError, VobenchError
 from vobench.geometry.se3 import Array
 from vobench.sequence import messages as ros
 from vobench.trajectory.trajectory import Stamps, Trajectory
@@ -37,7 +37,7 @@ def read_poses(path: Path, topic: str | None) -> Trajectory:
     Without a topic, the only one with poses. Raises SequenceError naming the topics there are
     where that is not one, where the recording is torn, or where a pose is none.
     """
-    with _opened(path) as reader:
+    with opened(path) as reader:
         rows = list(_rows(reader, path, topic))
     if not rows:
         raise SequenceError(f"no pose on {topic or 'its topic'} in {path}")
@@ -54,8 +54,11 @@ def _suffix(path: Path) -> str | None:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[AnyReader]:
-    """A reader of the recording, whatever its file is called: rosbags goes by endings, so it gets one."""
+def opened(path: Path) -> Iterator[AnyReader]:
+    """A reader of the recording, whatever its file is called: rosbags goes by endings, so it gets one.
+
+    Raises SequenceError for whatever its reader raises inside.
+    """
     with TemporaryDirectory() as folder:
         link = path
         if not path.is_dir():
@@ -64,7 +67,7 @@ def _opened(path: Path) -> Iterator[AnyReader]:
         try:
             with AnyReader([link], default_typestore=ros.TYPES) as reader:
                 yield reader
-        except (SequenceError, OSError):
+        except VobenchError:
             raise
         except Exception as error:  # a torn file makes its reader raise errors of a dozen kinds
             reason = str(error).splitlines()[0] if str(error) else "no reason given"

@@ -1,48 +1,49 @@
-"""Reading a sequence: sensors and truth through separate doors, frames one at a time."""
+"""Reading a sequence: sensors and truth through separate doors, frames one at a time or by number."""
 
 import hashlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from array import array
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from vobench.errors import SequenceError
-from vobench.geometry.camera import Camera
-from vobench.geometry.rig import Rig, WheelGeometry
+from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
-from vobench.sequence import bag
+from vobench.sensor.imu import ImuBias, ImuReadings
 from vobench.sequence import messages as ros
+from vobench.sequence.bag import Bag
+from vobench.sequence.calibration import IMU_NOTE, WHEELS_NOTE, read_rig
+from vobench.sequence.cdr import picture_in
+from vobench.sequence.picture import Image, decode
+from vobench.sequence.record import parsing
 from vobench.sequence.truth_image import truth_topics
-from vobench.sequence.writer import CASE_ATTACHMENT, SENSORS_FILE, TRUTH_FILE, WHEELS_NOTE
-from vobench.trajectory.trajectory import Trajectory
-
-Image = NDArray[np.uint8]
-IMAGE_TOPICS = (ros.LEFT_IMAGE, ros.RIGHT_IMAGE)
+from vobench.sequence.writer import CASE_ATTACHMENT, IMPORT_NOTE, PROVENANCE_NOTE, SENSORS_FILE, TRUTH_FILE
+from vobench.trajectory.trajectory import Stamps, Trajectory
 
 
 @dataclass(frozen=True, slots=True)
 class StereoFrame:
-    """Two grey pictures (H, W) uint8 of one instant."""
+    """Grey pictures (H, W) uint8 of one instant; no `right` one where the rig has one camera."""
 
     index: int
     t_ns: int
     left: Image
-    right: Image
+    right: Image | None
 
 
 @dataclass(frozen=True, slots=True)
 class EncodedFrame:
-    """The same two pictures as they lie in the file; `form` is png or jpeg."""
+    """The same pictures as they lie in the file; `form` is png or jpeg."""
 
     index: int
     t_ns: int
     form: str
     left: bytes
-    right: bytes
+    right: bytes | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,61 +53,137 @@ class Sequence:
     path: Path
     rig: Rig
     frame_count: int
+    bag: Bag = field(repr=False)
 
     @classmethod
     def open(cls, folder: Path) -> "Sequence":
         """Check the sensors of a recording and read its calibration. Raises SequenceError."""
-        path = Path(folder) / SENSORS_FILE
-        counts = bag.check_topics(path, ros.SENSOR_TOPICS)
-        if counts[ros.LEFT_IMAGE] != counts[ros.RIGHT_IMAGE] or not counts[ros.LEFT_IMAGE]:
+        bag = Bag.open(Path(folder) / SENSORS_FILE)
+        bag.require((ros.LEFT_INFO, ros.LEFT_IMAGE))
+        rig = read_rig(bag, ros.INFO_TOPICS)
+        counts = [bag.count(topic) for topic in ros.IMAGE_TOPICS[: len(rig.sides)]]
+        if len(set(counts)) > 1 or not counts[0]:
             raise SequenceError(
                 f"a recording needs as many left as right pictures and at least one, "
-                f"got {counts[ros.LEFT_IMAGE]} and {counts[ros.RIGHT_IMAGE]}: {path}"
+                f"got {' and '.join(map(str, counts))}: {bag.path}"
             )
-        return cls(path, _read_rig(path, (ros.LEFT_INFO, ros.RIGHT_INFO)), counts[ros.LEFT_IMAGE])
+        return cls(bag.path, rig, counts[0], bag)
 
     def __len__(self) -> int:
         return self.frame_count
 
+    @property
+    def _image_topics(self) -> tuple[ros.Topic, ...]:
+        return ros.IMAGE_TOPICS[: len(self.rig.sides)]
+
     def encoded_frames(self) -> Iterator[EncodedFrame]:
-        """The stereo pairs in order, undecoded."""
-        images, count = bag.messages(self.path, IMAGE_TOPICS), 0
-        for (left_topic, left), (right_topic, right) in zip(images, images, strict=False):
-            t_ns = ros.stamp_ns(left)
-            if (left_topic, right_topic) != IMAGE_TOPICS or ros.stamp_ns(right) != t_ns:
-                raise SequenceError(f"frame {count} is no left and right picture of one stamp in {self.path}")
-            yield EncodedFrame(count, t_ns, left.format, left.data.tobytes(), right.data.tobytes())
+        """The frames in order, undecoded."""
+        images, eyes, count = self.bag.raw(self._image_topics), len(self._image_topics), 0
+        for pictures in zip(*[images] * eyes, strict=False):
+            yield self._encoded(count, pictures)
             count += 1
         if count != self.frame_count:
             raise SequenceError(f"{count} frames found, but its summary says {self.frame_count}: {self.path}")
 
-    def frames(self) -> Iterator[StereoFrame]:
-        """The stereo pairs in order; only the current one is held in memory."""
-        for frame in self.encoded_frames():
-            left = _decode(frame.left, self.rig.left, f"left picture {frame.index} of {self.path}")
-            right = _decode(frame.right, self.rig.camera("right"), f"right picture {frame.index} of {self.path}")
-            yield StereoFrame(frame.index, frame.t_ns, left, right)
+    def _encoded(self, index: int, pictures: Iterable[tuple[ros.Topic, memoryview]]) -> EncodedFrame:
+        """One message of each camera. Raises SequenceError where they are not of one instant."""
+        topics, messages = zip(*pictures, strict=True)
+        with parsing(self.path):
+            stamps, forms, encoded = zip(*map(picture_in, messages), strict=True)
+        if topics != self._image_topics or len(set(stamps)) > 1:
+            raise SequenceError(f"frame {index} is no left and right picture of one stamp in {self.path}")
+        left, *others = map(bytes, encoded)
+        return EncodedFrame(index, stamps[0], forms[0], left, others[0] if others else None)
 
-    def encoders(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Stamps (M,) and counts (M, 2) of all encoder readings, left and right."""
-        readings = [(ros.stamp_ns(m), m.left, m.right) for _, m in bag.messages(self.path, (ros.ENCODERS,))]
+    def frames(self, *, right: bool = True) -> Iterator[StereoFrame]:
+        """The frames in order, the right picture only where it is wanted; one frame at a time is held in memory."""
+        for frame in self.encoded_frames():
+            yield self._decoded(frame if right else replace(frame, right=None))
+
+    def _decoded(self, frame: EncodedFrame) -> StereoFrame:
+        name = f"picture {frame.index} of {self.path}"
+        left, right = decode(frame.left, self.rig.left, f"left {name}"), None
+        if frame.right is not None:
+            right = decode(frame.right, self.rig.camera("right"), f"right {name}")
+        return StereoFrame(frame.index, frame.t_ns, left, right)
+
+    def frame(self, index: int) -> StereoFrame:
+        """One frame, of which only its part of the file is read. Raises SequenceError where there is none."""
+        topics = self._image_topics
+        return self._decoded(self._encoded(index, zip(topics, self.bag.nth(topics, index), strict=True)))
+
+    def frame_at(self, t_ns: int) -> StereoFrame:
+        """The last frame at or before an instant. Raises SequenceError where there is none yet."""
+        until = self.bag.count_until(ros.LEFT_IMAGE, t_ns)
+        if not until:
+            raise SequenceError(f"there is no frame at or before {t_ns} ns in {self.path}")
+        return self.frame(until - 1)
+
+    def frame_stamps(self) -> Stamps:
+        """The stamps (N,) of all frames, without reading a picture."""
+        return self.bag.stamps(ros.LEFT_IMAGE)
+
+    def encoders(self) -> tuple[Stamps, NDArray[np.int64]]:
+        """Stamps (M,) and counts (M, 2) of all encoder readings, left and right; empty where there are no encoders."""
+        readings = [(ros.stamp_ns(m), m.left, m.right) for _, m in self.bag.messages((ros.ENCODERS,))]
         table = np.array(readings, np.int64).reshape(-1, 3)
         return table[:, 0].copy(), table[:, 1:].copy()
 
-    def exposures(self) -> tuple[NDArray[np.int64], Array]:
-        """Stamps (N,) of all pairs, and their exposure times in s and gains in dB (N, 2)."""
-        found = [(ros.stamp_ns(m), m.time_s, m.gain_db) for _, m in bag.messages(self.path, (ros.EXPOSURE,))]
-        stamps = np.array([t for t, _, _ in found], np.int64)
-        return stamps, np.array([(time_s, gain_db) for _, time_s, gain_db in found], float).reshape(-1, 2)
+    def exposures(self) -> tuple[Stamps, Array]:
+        """Stamps (N,) of all frames, and their exposure times in s and gains in dB (N, 2); empty where not known."""
+        return _table(self.bag, ros.EXPOSURE, lambda m: (m.time_s, m.gain_db), 2)
+
+    def imu(self) -> ImuReadings:
+        """All readings of the IMU, in its own axes; empty where there is none."""
+        stamps, rows = _table(self.bag, ros.IMU, lambda m: (*_xyz(m.angular_velocity), *_xyz(m.linear_acceleration)), 6)
+        return ImuReadings(stamps, rows[:, :3].copy(), rows[:, 3:].copy())
+
+
+def _xyz(vector: Any) -> tuple[float, float, float]:
+    return vector.x, vector.y, vector.z
+
+
+def _table(bag: Bag, topic: ros.Topic, row: Callable[[Any], Iterable[float]], width: int) -> tuple[Stamps, Array]:
+    """Stamps (M,) of a topic's messages and what `row` makes of each (M, width)."""
+    stamps, values = array("q"), array("d")
+    for _, message in bag.messages((topic,)):
+        stamps.append(ros.stamp_ns(message))
+        values.extend(row(message))
+    return np.array(stamps, np.int64), np.array(values, float).reshape(-1, width)
 
 
 def read_truth(folder: Path) -> Trajectory:
     """The true path of base_link in map. Raises SequenceError where the file is not whole."""
+    bag = Bag.open(Path(folder) / TRUTH_FILE)
+    bag.require(ros.TRUTH_TOPICS)
+    stamps, fields = _table(bag, ros.ODOMETRY, lambda m: ros.pose_fields(m.pose.pose), 7)
+    return Trajectory(stamps, ros.poses(fields))
+
+
+def has_truth(folder: Path) -> bool:
+    """Whether the true path is known: not of every imported recording. Raises SequenceError where its file is torn."""
     path = Path(folder) / TRUTH_FILE
-    bag.check_topics(path, ros.TRUTH_TOPICS)
-    rows = [(ros.stamp_ns(m), ros.pose_fields(m.pose.pose)) for _, m in bag.messages(path, (ros.ODOMETRY,))]
-    fields = np.array([pose for _, pose in rows], float).reshape(-1, 7)
-    return Trajectory(np.array([t for t, _ in rows], np.int64), ros.poses(fields))
+    return path.exists() and Bag.open(path).count(ros.ODOMETRY) > 0
+
+
+def read_twist(folder: Path) -> Array | None:
+    """The true twist (N, 6) at the poses of `read_truth`, m/s then rad/s, in body axes; None where it is not known."""
+    bag = Bag.open(Path(folder) / TRUTH_FILE)
+    _, rows = _table(bag, ros.ODOMETRY, _twist_fields, 7)
+    return None if not len(rows) or np.any(rows[:, 6] == ros.UNKNOWN) else rows[:, :6].copy()
+
+
+def _twist_fields(message: Any) -> tuple[float, ...]:
+    """The six numbers of a twist and the first of its covariance, which says whether it is known."""
+    twist = message.twist.twist
+    return *_xyz(twist.linear), *_xyz(twist.angular), message.twist.covariance[0]
+
+
+def read_imu_bias(folder: Path) -> ImuBias:
+    """What the IMU's readings were off by; empty where there is no IMU."""
+    bag = Bag.open(Path(folder) / TRUTH_FILE)
+    stamps, rows = _table(bag, ros.IMU_BIAS, lambda m: (*_xyz(m.gyro), *_xyz(m.accel)), 6)
+    return ImuBias(stamps, rows[:, :3].copy(), rows[:, 3:].copy())
 
 
 def read_true_rig(folder: Path) -> Rig:
@@ -114,76 +191,42 @@ def read_true_rig(folder: Path) -> Rig:
 
     Raises SequenceError where the file is not whole, or is of the time before it held the true rig.
     """
-    path = Path(folder) / TRUTH_FILE
-    bag.check_topics(path, (ros.TF_STATIC, *ros.TRUE_INFO_TOPICS))
-    return _read_rig(path, ros.TRUE_INFO_TOPICS)
+    return read_rig(Bag.open(Path(folder) / TRUTH_FILE), ros.TRUE_INFO_TOPICS)
 
 
 def read_case(folder: Path) -> bytes:
-    """The case that a recording was made from, as its writer gave it."""
-    return bag.attachment(Path(folder) / TRUTH_FILE, CASE_ATTACHMENT)
+    """The case that a recording was made from, as its writer gave it. Raises SequenceError where it was imported."""
+    return Bag.open(Path(folder) / TRUTH_FILE).attachment(CASE_ATTACHMENT)
+
+
+def read_provenance(folder: Path) -> dict[str, str]:
+    """The versions of what made a recording, by name; nothing in it for one of the time before they were noted."""
+    return Bag.open(Path(folder) / TRUTH_FILE).note(PROVENANCE_NOTE)
+
+
+def read_import_notes(folder: Path) -> dict[str, str]:
+    """What was noted when a recording was imported; nothing in it where it was not."""
+    return Bag.open(Path(folder) / TRUTH_FILE).note(IMPORT_NOTE)
 
 
 def payload_hash(folder: Path) -> str:
     """SHA-256 over all that was recorded: pixels instead of encoded bytes, which change with libpng."""
     digest = hashlib.sha256()
-    for name, topics, later in (
-        (SENSORS_FILE, ros.SENSOR_TOPICS, ()),
-        (TRUTH_FILE, ros.TRUTH_TOPICS, (*ros.TRUE_INFO_TOPICS, *truth_topics())),
-    ):
-        path = Path(folder) / name
-        bag.check_topics(path, topics)
-        for topic, data in bag.raw_messages(path, (*topics, *later)):
-            payload = _pixels(data, path) if topic in IMAGE_TOPICS else data
+    later = (*ros.TRUE_INFO_TOPICS, ros.IMU_BIAS, *truth_topics())
+    sensors, truth = (Bag.open(Path(folder) / name) for name in (SENSORS_FILE, TRUTH_FILE))
+    for bag, topics in ((sensors, ros.SENSOR_TOPICS), (truth, (*ros.TRUTH_TOPICS, *later))):
+        for topic, data in bag.raw(topics):
+            payload = _pixels(data, bag.path) if topic in ros.IMAGE_TOPICS else data
             digest.update(f"{topic.name} {len(payload)}\n".encode())
             digest.update(payload)
-    wheels = bag.note(Path(folder) / SENSORS_FILE, WHEELS_NOTE)
-    digest.update(repr(sorted(wheels.items())).encode())
+    digest.update(repr(sorted(sensors.note(WHEELS_NOTE).items())).encode())
+    if imu := sensors.note(IMU_NOTE):
+        digest.update(repr(sorted(imu.items())).encode())
     return digest.hexdigest()
 
 
-def _pixels(data: bytes, path: Path) -> bytes:
-    message: Any = ros.TYPES.deserialize_cdr(data, ros.LEFT_IMAGE.type_name)
-    image = _decode(message.data.tobytes(), None, f"a picture of {path}")
-    return f"{ros.stamp_ns(message)} {image.shape}\n".encode() + image.tobytes()
-
-
-def _decode(encoded: bytes, camera: Camera | None, name: str) -> Image:
-    """A grey picture from its PNG or JPEG. Raises SequenceError where it is none, or not of the camera's size."""
-    image = cv2.imdecode(np.frombuffer(encoded, np.uint8), cv2.IMREAD_UNCHANGED) if encoded else None
-    if image is None or image.ndim != 2 or image.dtype != np.uint8:
-        raise SequenceError(f"not an 8-bit grey PNG or JPEG: {name}")
-    if camera and image.shape != (camera.height_px, camera.width_px):
-        raise SequenceError(f"{image.shape} pixels, but the camera has {camera.height_px, camera.width_px}: {name}")
-    return image.astype(np.uint8, copy=False)
-
-
-def _read_rig(path: Path, info_topics: tuple[ros.Topic, ros.Topic]) -> Rig:
-    """The rig from calibration, static transforms and the wheels' metadata."""
-    left, right = (_first(path, topic) for topic in info_topics)
-    T_body_left, T_body_right = _read_mounts(path)
-    return Rig(ros.camera(left), ros.camera(right), T_body_left, T_body_right, _read_wheels(path))
-
-
-def _first(path: Path, topic: ros.Topic) -> Any:
-    for _, message in bag.messages(path, (topic,)):
-        return message
-    raise SequenceError(f"{topic.name} has no message in {path}")
-
-
-def _read_mounts(path: Path) -> tuple[Array, Array]:
-    stamped = _first(path, ros.TF_STATIC).transforms
-    T_body = {t.child_frame_id: ros.poses(ros.pose_fields(t.transform)) for t in stamped}
-    missing = {ros.LEFT, ros.RIGHT} - T_body.keys()
-    if missing:
-        raise SequenceError(f"{ros.TF_STATIC.name} does not say where {min(missing)} is mounted in {path}")
-    return T_body[ros.LEFT], T_body[ros.RIGHT]
-
-
-def _read_wheels(path: Path) -> WheelGeometry:
-    entries = bag.note(path, WHEELS_NOTE)
-    try:
-        radius_m, track_m = float(entries["radius_m"]), float(entries["track_m"])
-        return WheelGeometry(radius_m, track_m, int(entries["ticks_per_revolution"]))
-    except (KeyError, ValueError) as error:
-        raise SequenceError(f"the wheels are not described as radius, track and ticks ({error!r}) in {path}") from error
+def _pixels(data: memoryview, path: Path) -> bytes:
+    with parsing(path):
+        t_ns, _, encoded = picture_in(data)
+    image = decode(encoded, None, f"a picture of {path}")
+    return f"{t_ns} {image.shape}\n".encode() + image.tobytes()

@@ -25,10 +25,10 @@ def truth_topic(side: Side, channel: str) -> Topic:
     return Topic(f"/ground_truth/{FRAME_IDS[side]}/{channel}", IMAGE)
 
 
-def truth_topics(channels: Iterable[str] = tuple(CHANNELS)) -> tuple[Topic, ...]:
-    """The topics of some channels of both cameras, the left one's first."""
+def truth_topics(channels: Iterable[str] = tuple(CHANNELS), sides: Iterable[Side] = SIDES) -> tuple[Topic, ...]:
+    """The topics of some channels of some cameras, the left one's first."""
     channels = tuple(channels)
-    return tuple(truth_topic(side, channel) for side in SIDES for channel in channels)
+    return tuple(truth_topic(side, channel) for side in sides for channel in channels)
 
 
 def truth_image(t_ns: int, side: Side, channel: str, values: NDArray[np.generic]) -> Any:

@@ -9,54 +9,64 @@ from typing import Any
 from vobench.errors import SequenceError
 from vobench.geometry.rig import SIDES
 from vobench.sensor.truth import CHANNELS, TruthFrame, TruthNames, check_channels
-from vobench.sequence import bag
 from vobench.sequence import messages as ros
-from vobench.sequence.truth_image import names_from_json, truth_topic, truth_topics, truth_values
+from vobench.sequence.bag import Bag
+from vobench.sequence.salvage import SALVAGE_NOTE
+from vobench.sequence.truth_image import names_from_json, truth_topic, truth_values
 from vobench.sequence.writer import NAMES_ATTACHMENT, TRUTH_FILE
 
 
 @dataclass(frozen=True, slots=True)
 class StereoTruth:
-    """What is true of the two pictures of one instant."""
+    """What is true of the pictures of one instant; no `right` where there is one camera."""
 
     index: int
     t_ns: int
     left: TruthFrame
-    right: TruthFrame
+    right: TruthFrame | None
 
 
 def truth_channels(folder: Path) -> tuple[str, ...]:
     """The channels that were recorded with a sequence; none for most. Raises SequenceError for a torn file."""
-    held = set(bag.held(Path(folder) / TRUTH_FILE, truth_topics()))
-    return tuple(name for name in CHANNELS if truth_topic("left", name) in held)
+    return _channels(Bag.open(Path(folder) / TRUTH_FILE))
+
+
+def _channels(bag: Bag) -> tuple[str, ...]:
+    return tuple(name for name in CHANNELS if bag.has(truth_topic("left", name)))
 
 
 def read_truth_names(folder: Path) -> TruthNames:
     """What the ids of `instance` and `material` mean. Raises SequenceError where no channels were recorded."""
-    return names_from_json(bag.attachment(Path(folder) / TRUTH_FILE, NAMES_ATTACHMENT))
+    return names_from_json(Bag.open(Path(folder) / TRUTH_FILE).attachment(NAMES_ATTACHMENT))
 
 
 def read_truth_frames(folder: Path, channels: Iterable[str] | None = None) -> Iterator[StereoTruth]:
-    """Some channels (None: all there are) of each stereo pair; only the current one is held in memory.
+    """Some channels (None: all there are) of each instant's pictures; only the current ones are held in memory.
 
-    Raises SequenceError where one was not recorded, or a picture lacks one.
+    Raises SequenceError where one was not recorded, or a picture lacks one; in a salvaged file that one is left out.
     """
-    path, there = Path(folder) / TRUTH_FILE, truth_channels(folder)
+    bag = Bag.open(Path(folder) / TRUTH_FILE)
+    there = _channels(bag)
     wanted = there if channels is None else check_channels(channels)
     for name in wanted:
         if name not in there:
-            raise SequenceError(f"no truth channel '{name}' was recorded, only {', '.join(there) or 'none'}: {path}")
-    return _frames(path, wanted)
+            recorded = ", ".join(there) or "none"
+            raise SequenceError(f"no truth channel '{name}' was recorded, only {recorded}: {bag.path}")
+    return _frames(bag, wanted)
 
 
-def _frames(path: Path, channels: tuple[str, ...]) -> Iterator[StereoTruth]:
-    places = {truth_topic(side, name): (side, name) for side in SIDES for name in channels}
-    pictures = bag.messages(path, tuple(places))
+def _frames(bag: Bag, channels: tuple[str, ...]) -> Iterator[StereoTruth]:
+    present = [side for side in SIDES if any(bag.has(truth_topic(side, name)) for name in channels)]
+    places = {truth_topic(side, name): (side, name) for side in present for name in channels}
+    pictures = bag.messages(places)
     for index, (t_ns, group) in enumerate(groupby(pictures, key=lambda found: ros.stamp_ns(found[1]))):
-        sides: dict[str, dict[str, Any]] = {side: {} for side in SIDES}
+        found: dict[str, dict[str, Any]] = {side: {} for side in present}
         for topic, message in group:
             side, name = places[topic]
-            sides[side][name] = truth_values(name, message)
-        if any(len(found) != len(channels) for found in sides.values()):
-            raise SequenceError(f"truth frame {index} at {t_ns} ns lacks channels in {path}")
-        yield StereoTruth(index, t_ns, TruthFrame(**sides["left"]), TruthFrame(**sides["right"]))
+            found[side][name] = truth_values(name, message)
+        if any(len(values) != len(channels) for values in found.values()):
+            if bag.note(SALVAGE_NOTE):
+                continue
+            raise SequenceError(f"truth frame {index} at {t_ns} ns lacks channels in {bag.path}")
+        right = TruthFrame(**found["right"]) if "right" in found else None
+        yield StereoTruth(index, t_ns, TruthFrame(**found["left"]), right)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -18,10 +18,13 @@ from vobench.scene.scene import Scene
 from vobench.suite import scene_file
 from vobench.suite.camera_spec import CameraSpec
 from vobench.suite.light_spec import LightOverride
-from vobench.suite.model import EstimatorSpec, RigSpec, Suite, TrajectorySpec
+from vobench.suite.model import EstimatorSpec, RigSpec, Suite
 from vobench.suite.rendering_spec import ChannelName, RenderingSpec
+from vobench.suite.replay_spec import ReplaySpec, read_replayed
 from vobench.suite.scene_spec import SceneFile
+from vobench.suite.source_spec import RecordedCase, recorded_cases
 from vobench.suite.strict import Strict
+from vobench.suite.trajectory_spec import TrajectorySpec, wheels_of
 
 AXES = ("scene", "lighting", "rig", "trajectory", "camera")
 
@@ -30,7 +33,8 @@ class Case(Strict):
     """One sequence to be made: everything it depends on, resolved.
 
     `variant` names the case's place on each of AXES; `name` keeps those that differ within the suite,
-    and so is unique there and fit for a folder. `seed` is the suite's.
+    and so is unique there and fit for a folder. `seed` is the suite's; `replayed` is what the trajectory's
+    file holds, as TUM text, where it has one.
     """
 
     name: str
@@ -39,6 +43,7 @@ class Case(Strict):
     lighting: dict[str, LightOverride]
     rig: RigSpec
     trajectory: TrajectorySpec
+    replayed: str | None = None
     camera: CameraSpec
     rendering: RenderingSpec
     truth: tuple[ChannelName, ...]
@@ -49,9 +54,9 @@ class Case(Strict):
         return scene_file.build(self.scene, self.lighting)
 
     def build_rig(self) -> Rig:
-        """The stereo pair on the robot as its calibration has it: what estimators are told."""
+        """The sensors on the body as their calibration has them: what estimators are told."""
         r, preset = self.rig, PRESETS[self.rig.lens]
-        return mounted(
+        cameras = mounted(
             preset.left,
             preset.right,
             preset.T_left_right if r.baseline_m is None else preset.at_baseline(r.baseline_m),
@@ -59,6 +64,8 @@ class Case(Strict):
             forward_m=r.forward_m,
             height_m=r.height_m,
         )
+        imu = r.imu.build().calibration if r.imu else None
+        return replace(cameras, wheels=wheels_of(self.trajectory), imu=imu)
 
     def build_true_rig(self) -> Rig:
         """The stereo pair as it is: what pictures are made with. Raises VobenchError, as `true_rig` does."""
@@ -79,7 +86,7 @@ class Entrant:
 class Run:
     """One entrant on one case, for the `repeat`-th time."""
 
-    case: Case
+    case: Case | RecordedCase
     entrant: Entrant
     repeat: int
 
@@ -94,11 +101,17 @@ class Plan:
     """What a suite comes to: cases × entrants × repeats; `source` is the suite's file."""
 
     suite: Suite
-    cases: tuple[Case, ...]
+    simulated: tuple[Case, ...]
+    recorded: tuple[RecordedCase, ...]
     entrants: tuple[Entrant, ...]
     source: Source | None = None
 
-    def runs(self, case: Case) -> list[Run]:
+    @property
+    def cases(self) -> tuple[Case | RecordedCase, ...]:
+        """All cases."""
+        return *self.simulated, *self.recorded
+
+    def runs(self, case: Case | RecordedCase) -> list[Run]:
         """Every run on one case."""
         return [Run(case, entrant, n) for entrant in self.entrants for n in range(self.suite.repeats)]
 
@@ -123,7 +136,9 @@ def plan(suite: Suite, *, source: Source | None = None, only_estimators: tuple[s
         if entrant.label in [earlier.label for earlier in entrants[:index]]:
             with nullcontext() if only_estimators else _at(source, "estimators", index):
                 raise SuiteError(f"two estimators are called '{entrant.label}'; give one a label of its own")
-    return Plan(suite, tuple(_cases(suite, source)), tuple(entrants), source)
+    simulated = tuple(_cases(suite, source))
+    recorded = tuple(_recorded(suite, source, taken={case.name for case in simulated}))
+    return Plan(suite, simulated, recorded, tuple(entrants), source)
 
 
 def _at(source: Source | None, *keys: int | str) -> AbstractContextManager[None]:
@@ -158,7 +173,7 @@ def _check_param(key: str, value: Any, defaults: dict[str, Any]) -> None:
 
 
 def _cases(suite: Suite, source: Source | None) -> Iterator[Case]:
-    scenes = _scenes(suite, source)
+    scenes, replayed = _scenes(suite, source), _replayed(suite, source)
     axes: list[dict[str, Any]] = [scenes, suite.lightings, suite.rigs, suite.trajectories, suite.cameras]
     for names in product(*axes):
         scene, lighting, rig, trajectory, camera = names
@@ -170,6 +185,7 @@ def _cases(suite: Suite, source: Source | None) -> Iterator[Case]:
             lighting=suite.lightings[lighting],
             rig=suite.rigs[rig],
             trajectory=suite.trajectories[trajectory],
+            replayed=replayed.get(trajectory),
             camera=suite.cameras[camera],
             rendering=suite.rendering,
             truth=suite.truth,
@@ -180,6 +196,28 @@ def _cases(suite: Suite, source: Source | None) -> Iterator[Case]:
         with _at(source, "rigs", rig):
             case.build_true_rig()  # nor one whose distortion is off, on a lens without any
         yield case
+
+
+def _recorded(suite: Suite, source: Source | None, *, taken: set[str]) -> Iterator[RecordedCase]:
+    """The recordings of a suite; a relative path starts at the suite's file."""
+    folder = source.path.parent if source else Path.cwd()
+    for index, spec in enumerate(suite.source):
+        with _at(source, "source", index):
+            for case in recorded_cases(spec, folder):
+                if case.name in taken:
+                    raise SuiteError(f"two cases are called '{case.name}'; name one another: {case.source.path}")
+                taken = taken | {case.name}
+                yield case
+
+
+def _replayed(suite: Suite, source: Source | None) -> dict[str, str]:
+    """What the files of replayed trajectories hold, by the trajectories' names; a relative path as for recordings."""
+    texts: dict[str, str] = {}
+    for name, spec in suite.trajectories.items():
+        if isinstance(spec, ReplaySpec):
+            with _at(source, "trajectories", name, "file"):
+                texts[name] = read_replayed(spec, source.path.parent if source else Path.cwd())
+    return texts
 
 
 def _scenes(suite: Suite, source: Source | None) -> dict[str, SceneFile]:

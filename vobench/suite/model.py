@@ -1,18 +1,18 @@
 """What a suite's YAML may say: the axes of its cases, and the estimators that run on each."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from vobench.geometry.preset import PRESETS
-from vobench.robot.controller import CONTROLLERS
-from vobench.robot.pioneer import THETAS
-from vobench.robot.slip import SLIPS
-from vobench.sensor.encoder import ENCODERS
 from vobench.suite.camera_spec import CameraSpec
+from vobench.suite.imu_spec import ImuSpec
+from vobench.suite.imu_spec import named as named_imu
 from vobench.suite.light_spec import LightOverride
 from vobench.suite.rendering_spec import ChannelName, RenderingSpec
+from vobench.suite.source_spec import SourceSpec, as_sources
 from vobench.suite.strict import Name, Positive, Strict, one_of
+from vobench.suite.trajectory_spec import TrajectorySpec
 
 
 def _named(value: Any) -> Any:
@@ -38,7 +38,7 @@ class CalibrationErrorSpec(Strict):
 
 
 class RigSpec(Strict):
-    """A stereo pair on the robot: a preset with both lenses, placed, and how far its calibration is off.
+    """A stereo pair on the body: a preset with both lenses, placed, how far its calibration is off, and an IMU.
 
     Without `baseline_m` the cameras stand to each other as the preset has them.
     """
@@ -47,23 +47,9 @@ class RigSpec(Strict):
     pitch_deg: Annotated[float, Field(ge=-90, le=90)]
     baseline_m: Positive | None = None
     forward_m: float = 0.25
-    height_m: Positive = 0.4
+    height_m: float = 0.4
     calibration_error: CalibrationErrorSpec = CalibrationErrorSpec()
-
-
-class TrajectorySpec(Strict):
-    """Waypoints that the paper's controller steers the Pioneer through."""
-
-    targets_m: Annotated[tuple[Point, ...], Field(min_length=1)]
-    start_m: Point = (0.0, 0.0)
-    start_heading_deg: float = 0.0
-    robot: Annotated[str, one_of("robot parameter set", THETAS)] = "pioneer_3dx"
-    controller: Annotated[str, one_of("controller", CONTROLLERS)] = "smooth"
-    slip: Annotated[str, one_of("slip", SLIPS)] = "nominal"
-    encoders: Annotated[str, one_of("encoder error set", ENCODERS)] = "nominal"
-    rate_hz: Annotated[float, Field(gt=0, le=1000)] = 30.0
-    tolerance_m: Positive = 0.01
-    max_time_s: Annotated[float, Field(gt=0, le=3600)] = 60.0
+    imu: Annotated[ImuSpec, BeforeValidator(named_imu)] | None = None
 
 
 class EstimatorSpec(Strict):
@@ -75,20 +61,30 @@ class EstimatorSpec(Strict):
 
 
 class Suite(Strict):
-    """The cases are every combination of scene, lighting, rig, trajectory and camera.
+    """The cases are every combination of scene, lighting, rig, trajectory and camera, and every recording of `source`.
 
-    Each axis names its variants; change one axis to change one factor.
+    Each axis names its variants; change one axis to change one factor. A suite of recordings alone has no axes.
     """
 
     name: Name
     summary: str = ""
     seed: Annotated[int, Field(ge=0)] = 0
     repeats: Annotated[int, Field(ge=1, le=100)] = 1
-    scenes: Annotated[tuple[str, ...], Field(min_length=1)]
+    source: Annotated[tuple[SourceSpec, ...], BeforeValidator(as_sources)] = ()
+    scenes: Annotated[tuple[str, ...], Field(min_length=1)] = ()
     lightings: dict[Name, dict[str, LightOverride]] = Field(default={"as_built": {}}, min_length=1)
-    rigs: Annotated[dict[Name, RigSpec], Field(min_length=1)]
-    trajectories: Annotated[dict[Name, TrajectorySpec], Field(min_length=1)]
+    rigs: dict[Name, RigSpec] = Field(default={}, min_length=1)
+    trajectories: dict[Name, TrajectorySpec] = Field(default={}, min_length=1)
     cameras: dict[Name, CameraSpec] = Field(default={"clean": CameraSpec()}, min_length=1)
     rendering: RenderingSpec = RenderingSpec()
     truth: tuple[ChannelName, ...] = ()
     estimators: Annotated[tuple[Annotated[EstimatorSpec, BeforeValidator(_named)], ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _has_cases(self) -> Self:
+        """Scenes, rigs and trajectories are all there, or none of them and a source."""
+        axes = {"scenes": self.scenes, "rigs": self.rigs, "trajectories": self.trajectories}
+        missing = [name for name, variants in axes.items() if not variants]
+        if missing and not (self.source and len(missing) == len(axes)):
+            raise ValueError(f"{missing[0]}: this key is missing; a suite has {', '.join(axes)}, or a source alone")
+        return self

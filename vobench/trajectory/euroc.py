@@ -3,11 +3,21 @@
 import re
 from dataclasses import dataclass
 
+import numpy as np
+
 from vobench.geometry import se3
+from vobench.geometry.se3 import Array
 from vobench.trajectory.table import Order, Unit, content, read_table, rotations, stamps_ns
-from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.trajectory import Stamps, Trajectory
 
 COLUMNS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")
+# EuRoC's own names, for what a state may say: the pose, then the velocity in the world, then the biases.
+STATE = (
+    *("p_RS_R_x [m]", "p_RS_R_y [m]", "p_RS_R_z [m]", "q_RS_w []", "q_RS_x []", "q_RS_y []", "q_RS_z []"),
+    *("v_RS_R_x [m s^-1]", "v_RS_R_y [m s^-1]", "v_RS_R_z [m s^-1]"),
+    *("b_w_RS_S_x [rad s^-1]", "b_w_RS_S_y [rad s^-1]", "b_w_RS_S_z [rad s^-1]"),
+    *("b_a_RS_S_x [m s^-2]", "b_a_RS_S_y [m s^-2]", "b_a_RS_S_z [m s^-2]"),
+)
 IN_SECONDS = re.compile(r"\[\s*s(?:ec(?:onds?)?)?\s*\]")
 WORD = re.compile(r"[a-df-z]", re.IGNORECASE)  # an e may be an exponent's
 
@@ -42,6 +52,24 @@ def parse_euroc(text: str, *, name: str, unit: Unit | None = None, order: Order 
     table = read_table(found.rows, name=name, columns=COLUMNS, separator=",")
     R = rotations(table, table.values[:, 4:8], order or found.order)
     return Trajectory(stamps_ns(table, unit or found.unit), se3.transform(R, table.values[:, 1:4]))
+
+
+def format_euroc(trajectory: Trajectory, more: Array | None = None) -> str:
+    """EuRoC's csv, stamps in ns, every digit of the values.
+
+    `more` (N, 3) or (N, 9): velocities in the world, then the biases of gyroscope and accelerometer.
+    """
+    T = trajectory.T_world_frame
+    q_xyzw = se3.to_quaternion(T[:, :3, :3])
+    values = np.hstack([T[:, :3, 3], q_xyzw[:, [3, 0, 1, 2]], *([] if more is None else [more])])
+    header = ", ".join(STATE[: values.shape[1]])
+    return f"#timestamp [ns], {header}\n" + csv_rows(trajectory.t_ns, values)
+
+
+def csv_rows(t_ns: Stamps, values: Array) -> str:
+    """Rows `t,...` of stamps (N,) in ns and values (N, K), every digit of them."""
+    rows = zip(t_ns.tolist(), values.tolist(), strict=True)
+    return "".join(f"{t},{','.join(map(repr, row))}\n" for t, row in rows)
 
 
 def _unit(header: str, rows: list[tuple[int, str]]) -> Unit:

@@ -11,6 +11,8 @@ from vobench.geometry.se3 import Array
 
 Instants = NDArray[np.int64]
 
+STANDARD_GRAVITY_MPS2 = 9.80665  # exact by definition (3rd CGPM, 1901); it pulls down the world's z axis
+
 
 @dataclass(frozen=True, slots=True)
 class Kinematics:

@@ -49,16 +49,22 @@ def content(text: str) -> list[tuple[int, str]]:
 
 
 def read_table(
-    rows: Sequence[tuple[int, str]], *, name: str, columns: Sequence[str], separator: str | None = None
+    rows: Sequence[tuple[int, str]],
+    *,
+    name: str,
+    columns: Sequence[str],
+    separator: str | None = None,
+    row: str = "a pose",
 ) -> Table:
     """The numbers of `content`, one per column and line; with a `separator` more columns may follow.
 
+    `row` is what a line stands for, for the error message.
     Raises TrajectoryError naming file, line and value for what is no finite number.
     """
     bodies = [body for _, body in rows]
     values = _read_fast(bodies, len(columns), separator)
     if values is None:
-        values = _read_checked(rows, name, columns, separator)
+        values = _read_checked(rows, name, columns, separator, row)
     first = [body.split(separator, 1)[0].strip() for body in bodies]
     return Table(name, [number for number, _ in rows], first, values)
 
@@ -102,20 +108,23 @@ def _read_fast(bodies: list[str], columns: int, separator: str | None) -> Array 
     return values if values.shape[1] == columns and np.isfinite(values).all() else None
 
 
-def _read_checked(rows: Sequence[tuple[int, str]], name: str, columns: Sequence[str], separator: str | None) -> Array:
+def _read_checked(
+    rows: Sequence[tuple[int, str]], name: str, columns: Sequence[str], separator: str | None, what: str
+) -> Array:
     values = np.empty((len(rows), len(columns)))
     for row, (number, body) in enumerate(rows):
         fields = [field.strip() for field in body.split(separator)]
         end = " (the last row: was the file cut off?)" if row == len(rows) - 1 and row else ""
-        values[row] = _numbers(fields, f"{name}:{number}", columns, end, more=separator is not None)
+        if len(fields) < len(columns) or (len(fields) > len(columns) and not separator):
+            raise TrajectoryError(
+                f"{name}:{number}: {what} has {len(columns)} columns ({' '.join(columns)}), "
+                f"this line has {len(fields)}{end}"
+            )
+        values[row] = _numbers(fields, f"{name}:{number}", columns)
     return values
 
 
-def _numbers(fields: list[str], place: str, columns: Sequence[str], end: str, *, more: bool) -> list[float]:
-    if len(fields) < len(columns) or (len(fields) > len(columns) and not more):
-        raise TrajectoryError(
-            f"{place}: a pose has {len(columns)} columns ({' '.join(columns)}), this line has {len(fields)}{end}"
-        )
+def _numbers(fields: list[str], place: str, columns: Sequence[str]) -> list[float]:
     return [_number(field, column, place) for field, column in zip(fields, columns, strict=False)]
 
 

@@ -6,6 +6,7 @@ from vobench.errors import TrajectoryError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.trajectory.table import Order, Table, content, read_table, rotations, stamps_ns
+from vobench.trajectory.text import seconds
 from vobench.trajectory.trajectory import Stamps
 
 KITTI_COLUMNS = tuple(f"{part}{row}" for row in (1, 2, 3) for part in ("r1", "r2", "r3", "t"))
@@ -23,6 +24,17 @@ def parse_kitti(text: str, *, name: str) -> Array:
     matrices = table.values.reshape(-1, 3, 4)
     _require_rotations(table, matrices[:, :, :3])
     return se3.transform(matrices[:, :, :3], matrices[:, :, 3])
+
+
+def format_kitti(T: Array) -> str:
+    """KITTI text of poses (N, 4, 4), every digit of them."""
+    rows = T[:, :3].reshape(-1, len(KITTI_COLUMNS)).tolist()
+    return "".join(f"{' '.join(map(repr, row))}\n" for row in rows)
+
+
+def format_times(t_ns: Stamps) -> str:
+    """KITTI's file of times (N,): seconds with 9 decimals, exact."""
+    return "".join(f"{seconds(t)}\n" for t in t_ns.tolist())
 
 
 def parse_tartanair(text: str, *, name: str, order: Order = "xyzw") -> Array:

@@ -132,7 +132,8 @@ def _log_pictures(stream: rr.RecordingStream, frames: Iterable[EncodedFrame]) ->
     stamps = []
     for frame in frames:
         times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
-        for entity, encoded in ((bp.TRUTH_LEFT, frame.left), (bp.TRUTH_RIGHT, frame.right)):
+        pictures = ((bp.TRUTH_LEFT, frame.left), (bp.TRUTH_RIGHT, frame.right))
+        for entity, encoded in ((entity, encoded) for entity, encoded in pictures if encoded is not None):
             columns = rr.EncodedImage.columns(blob=[encoded], media_type=[f"image/{frame.form}"])
             stream.send_columns(f"{entity}/image", times, columns)
         stamps.append(frame.t_ns)

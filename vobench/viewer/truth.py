@@ -38,8 +38,8 @@ def log_truth(stream: rr.RecordingStream, view: TruthView) -> None:
             _log_side(stream, times, side, truth)
 
 
-def _log_side(stream: rr.RecordingStream, times: list[rr.TimeColumn], side: str, truth: TruthFrame) -> None:
-    for channel, values in truth.channels().items():
+def _log_side(stream: rr.RecordingStream, times: list[rr.TimeColumn], side: str, truth: TruthFrame | None) -> None:
+    for channel, values in truth.channels().items() if truth else ():
         stream.send_columns(truth_entity(side, channel), times, _columns(channel, values))
 
 

@@ -1,0 +1,27 @@
+"""Draws the sheet of docs/trajectories.md from the suite in it: python benchmarks/trajectories.py [FILE.svg]."""
+
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from vobench.cli.driving import drive_one, log_of
+from vobench.report.drive_plot import save_sheet
+from vobench.suite.expand import read_plan
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+def main() -> None:
+    """Drive the first suite of the page, and draw every path."""
+    page = (DOCS / "trajectories.md").read_text(encoding="utf-8")
+    with TemporaryDirectory() as folder:
+        suite = Path(folder) / "ways.yaml"
+        suite.write_text(page.split("```yaml\n")[1].split("```")[0], encoding="utf-8")
+        plan = read_plan(str(suite))
+    out = Path(sys.argv[1]) if len(sys.argv) > 1 else DOCS / "images" / "trajectories.svg"
+    save_sheet(out, [log_of(drive_one(plan, name)) for name in plan.suite.trajectories])
+    print(out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,99 @@
+"""vobench import, export, info, salvage and verify, as they are typed."""
+
+import shutil
+
+import pytest
+
+from vobench.results.run_folder import SEQUENCE
+
+
+@pytest.fixture
+def sequence(ran):
+    """The folder of a sequence."""
+    return (ran / "latest" / "cases" / "short" / SEQUENCE).resolve()
+
+
+@pytest.mark.parametrize("form", ["euroc", "kitti", "tum", "ros2"])
+def test_what_is_exported_can_be_imported_and_keeps_its_pictures(vobench, sequence, here, form):
+    exported = vobench("export", sequence, "out", "--form", form, "--json").json
+    assert exported["files"] == sum(path.is_file() for path in (here / "out").rglob("*"))
+    assert exported["notes"]
+    imported = vobench("import", "out", "back", "--json").json
+    assert imported["form"] == form
+    frames = vobench("info", sequence, "--json").json["frames"]
+    assert vobench("info", "back", "--json").json["frames"] == imported["frames"] == frames
+
+
+def test_an_import_says_all_that_it_assumed(vobench, sequence):
+    vobench("export", sequence, "out", "--form", "kitti")
+    said = vobench("import", "out", "back")
+    assert "- The body is the left grey camera" in said.out
+    assert said.out.endswith("frames of a recording in the form 'kitti': back\n")
+    assert "The body is the left grey camera" in vobench("info", "back").out
+
+
+def test_info_names_topics_cameras_truth_and_the_hash(vobench, sequence):
+    facts = vobench("info", sequence, "--json").json
+    topics = {topic["name"]: topic for topic in facts["files"]["sensors.mcap"]}
+    assert topics["/cam_left/image/compressed"]["count"] == facts["frames"]
+    assert topics["/cam_left/image/compressed"]["rate_hz"] == pytest.approx(5)
+    assert facts["calibration"]["left"]["model"] == "Pinhole"
+    assert facts["ground_truth"]["poses"] == facts["frames"]
+    assert len(facts["payload_sha256"]) == 64
+    assert facts["provenance"]["vobench"]
+    assert facts["payload_sha256"] in vobench("info", sequence).out
+
+
+def test_info_of_one_file_is_of_that_file(vobench, sequence):
+    assert list(vobench("info", sequence / "sensors.mcap", "--json").json["files"]) == ["sensors.mcap"]
+
+
+def test_a_torn_sequence_is_recognised_and_what_is_whole_comes_back(vobench, sequence, here):
+    torn = here / "torn"
+    shutil.copytree(sequence, torn)
+    whole = (torn / "sensors.mcap").read_bytes()
+    (torn / "sensors.mcap").write_bytes(whole[: len(whole) * 2 // 3])
+    said = vobench("info", torn)
+    assert said.code == 1
+    assert "cut off" in said.err
+    assert "vobench salvage" in said.err
+    found = vobench("salvage", torn, "back", "--json").json["files"]
+    assert found["sensors.mcap"]["lost"]
+    assert not found["truth.mcap"]["lost"]
+    assert vobench("info", "back", "--json").json["frames"] > 0
+
+
+def test_a_run_verifies_and_a_changed_one_does_not(vobench, ran):
+    said = vobench("verify", "runs/tiny")
+    assert said.code == 0
+    assert "score: 2 of 2 as they were" in said.out
+    estimate = ran / "latest" / "cases" / "short" / "stand_still" / "0" / "estimate.tum"
+    estimate.write_text(estimate.read_text().replace("0.000000000 0.0 ", "0.000000000 0.1 ", 1))
+    said = vobench("verify", "runs/tiny")
+    assert said.code == 1
+    assert "not the bytes that the run wrote" in said.out
+    assert vobench("verify", "runs/tiny", "--json").json["wrong"] == 2
+
+
+WRONG = [
+    (("import", "nowhere", "out"), "no file or folder at nowhere"),
+    (("import", "suites", "out"), "suites"),
+    (("import", "suites", "scenes"), "should be a new or empty folder, but there is something: scenes"),
+    (("import", "suites", "out", "--form", "eurok"), "no form 'eurok'. Did you mean 'euroc'?"),
+    (("import", "suites", "out", "--topic", "lft=/a"), "no topic named 'lft'. Did you mean 'left'?"),
+    (("export", "suites", "out", "--form", "euroc"), "no recording at suites/sensors.mcap"),
+    (("export", "suites", "out", "--form", "eurok"), "eurok"),
+    (("salvage", "suites/tiny.yaml", "out.mcap"), "not an MCAP recording by its first bytes: suites/tiny.yaml"),
+    (("salvage", "nothing.mcap", "out.mcap"), "nothing.mcap"),
+    (("verify", "suites"), "not the folder of a run"),
+]
+
+
+@pytest.mark.parametrize(("words", "sentence"), WRONG, ids=[" ".join(words) for words, _ in WRONG])
+def test_a_mistake_is_one_line_and_leaves_nothing_behind(vobench, here, words, sentence):
+    before = sorted(here.rglob("*"))
+    said = vobench(*words)
+    assert (said.code, said.out) == (1, "")
+    assert sentence in said.err
+    assert said.err.count("\n") == 1
+    assert sorted(here.rglob("*")) == before

@@ -1,0 +1,71 @@
+"""The form of a recording is told by what is in it."""
+
+import pytest
+
+from vobench.dataset.read import READERS, read
+from vobench.dataset.sniff import FORMS, sniff
+from vobench.errors import VobenchError
+
+
+def test_every_form_that_is_told_has_a_reader():
+    assert list(READERS) != []
+    assert READERS.keys() == FORMS.keys()
+
+
+@pytest.mark.parametrize("form", ["euroc", "kitti", "tum", "tartanair"])
+def test_a_folder_is_known_by_what_it_holds(scene, tmp_path, form):
+    assert sniff(getattr(scene, form)(tmp_path)) == form
+
+
+def test_a_sequence_of_our_own_by_its_folder_or_its_file(scene, tmp_path, imported):
+    folder = imported(scene.kitti(tmp_path / "in"))
+    assert sniff(folder) == sniff(folder / "sensors.mcap") == "vobench"
+    assert read(folder / "sensors.mcap").frame_count == len(scene.t_ns)
+
+
+@pytest.mark.parametrize(
+    ("start", "form"), [(b"#ROSBAG V2.0\n", "ros1"), (b"SQLite format 3\x00", "ros2"), (b"\x89MCAP0\r\n", "mcap")]
+)
+def test_a_file_is_known_by_its_first_bytes(tmp_path, start, form):
+    (tmp_path / "thing").write_bytes(start + bytes(100))
+    assert sniff(tmp_path / "thing") == form
+
+
+def test_a_folder_one_level_too_high_names_those_below(scene, tmp_path):
+    scene.euroc(tmp_path / "V1_01_easy")
+    scene.euroc(tmp_path / "V1_02_medium")
+    with pytest.raises(VobenchError) as caught:
+        sniff(tmp_path)
+    said = str(caught.value)
+    assert "name one of V1_01_easy (euroc), V1_02_medium (euroc)" in said
+    assert said.endswith(str(tmp_path))
+
+
+def test_two_levels_too_high_is_seen_too(scene, tmp_path):
+    scene.kitti(tmp_path / "dataset")
+    with pytest.raises(VobenchError, match=r"one of sequences/00 \(kitti\)"):
+        sniff(tmp_path / "dataset")
+
+
+def test_a_folder_of_something_else_says_what_it_has(tmp_path):
+    for name in ("notes.txt", "photos"):
+        (tmp_path / name).mkdir()
+    with pytest.raises(
+        VobenchError, match=r"none of the forms that are read \(a sequence.*\)\. It has notes\.txt, photos: "
+    ):
+        sniff(tmp_path)
+
+
+def test_an_archive_is_to_be_unpacked(tmp_path):
+    path = tmp_path / "V1_01_easy.zip"
+    path.write_bytes(b"PK\x03\x04" + bytes(50))
+    with pytest.raises(VobenchError, match="a zip archive; unpack it"):
+        sniff(path)
+
+
+def test_nothing_at_all(tmp_path):
+    with pytest.raises(VobenchError, match="no file or folder at"):
+        sniff(tmp_path / "gone")
+    (tmp_path / "empty").touch()
+    with pytest.raises(VobenchError, match="for it is empty"):
+        sniff(tmp_path / "empty")

@@ -1,0 +1,56 @@
+"""The layout of the TUM RGB-D benchmark."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vobench.dataset.options import Options
+from vobench.dataset.read import read
+from vobench.errors import VobenchError
+from vobench.sequence import Sequence, read_truth
+from vobench.trajectory.text import parse_tum
+
+TRUTH = Path(__file__).parents[4] / "shared" / "data" / "trajectories" / "freiburg1_xyz-groundtruth.txt"
+
+
+def test_everything_of_a_recording_arrives(scene, tmp_path, imported):
+    folder = imported(scene.tum(tmp_path / "in"))
+    sequence, truth = Sequence.open(folder), read_truth(folder)
+    assert sequence.frame_stamps().tolist() == [1305031102_175304000 + i * 1_000_001_000 for i in range(5)]
+    assert sequence.rig.right is None
+    assert sequence.rig.left.fx_px == 517.3
+    assert sequence.rig.left.k3 == 1.1633
+    assert truth.t_ns.tolist() == [1305031101_500000000 + i * 10**9 for i in range(6)]  # the seventh is too late
+
+
+def test_what_was_assumed_and_dropped_is_said(scene, tmp_path):
+    notes = read(scene.tum(tmp_path)).notes
+    for said in ("one camera", "freiburg1's colour camera", "Depth pictures were dropped", "turned grey", "outside"):
+        assert any(said in note for note in notes), said
+
+
+def test_a_camera_that_nobody_names_needs_a_calibration(scene, tmp_path, camchain):
+    folder = scene.tum(tmp_path).rename(tmp_path / "desk")
+    listed = folder / "rgb.txt"
+    listed.write_text(listed.read_text().replace("freiburg1", "kitchen"))
+    with pytest.raises(VobenchError, match="the calibration is missing"):
+        read(folder)
+    chain = tmp_path / "chain.yaml"
+    chain.write_text(camchain(cameras=1, imu=False, size=(640, 480)))
+    assert read(folder, options=Options(calibration=chain)).rig.left.fx_px == 40.5
+
+
+def test_the_list_names_the_robot_where_the_folder_does_not(scene, tmp_path):
+    folder = scene.tum(tmp_path).rename(tmp_path / "desk")
+    assert read(folder).rig.left.fx_px == 517.3
+
+
+@pytest.mark.skipif(not TRUTH.is_file(), reason="no folder ../shared/data with real trajectories")
+def test_the_real_truth_of_freiburg1_xyz_goes_through(scene, tmp_path, imported):
+    folder = scene.tum(tmp_path / "in")
+    (folder / "groundtruth.txt").write_text(TRUTH.read_text())
+    truth, given = read_truth(imported(folder)), parse_tum(TRUTH.read_text(), name="truth")
+    kept = np.isin(given.t_ns, truth.t_ns)
+    assert truth.t_ns.tolist() == given.t_ns[kept].tolist()
+    assert np.abs(truth.T_world_frame - given.T_world_frame[kept]).max() < 1e-12

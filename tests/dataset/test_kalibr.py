@@ -1,0 +1,167 @@
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vobench.dataset.kalibr import camchain, number, read_camchain, read_imu
+from vobench.dataset.reproject import PIXEL_TOLERANCE, check_rig, known_points, pixel_difference
+from vobench.errors import InputError, SequenceError
+from vobench.geometry import se3
+from vobench.geometry.camera import Camera
+from vobench.geometry.preset import PRESETS
+from vobench.geometry.rig import Rig, mounted
+from vobench.geometry.sphere import DoubleSphere, Equirectangular
+from vobench.sensor.imu_text import kalibr_imu_yaml
+
+SPHERES = DoubleSphere(512, 512, 156.8, 156.9, 254.9, 256.9, -0.18, 0.59)
+
+
+def preset_rig(name: str) -> Rig:
+    pair = PRESETS[name]
+    return mounted(pair.left, pair.right, pair.T_left_right, pitch_deg=20.0)
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "camchain.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", sorted(PRESETS))
+def test_every_preset_comes_back_with_every_digit(name: str, tmp_path: Path) -> None:
+    rig = preset_rig(name)
+    assert pixel_difference(rig, read_camchain(written(tmp_path, camchain(rig)))) < 1e-9
+
+
+def test_a_double_sphere_and_a_lone_camera_come_back(rig_of: Callable[..., Rig], tmp_path: Path) -> None:
+    for rig in (rig_of(SPHERES), rig_of(stereo=False), rig_of(SPHERES, stereo=False, imu=True)):
+        found = read_camchain(written(tmp_path, camchain(rig)))
+        assert found.left == rig.left
+        assert found.sides == rig.sides
+        assert pixel_difference(rig, found) < 1e-9
+
+
+def test_the_imu_comes_back_as_the_body_where_it_sat(rig_of: Callable[..., Rig], tmp_path: Path) -> None:
+    rig = rig_of(imu=True)
+    assert rig.imu
+    imu_path = tmp_path / "imu.yaml"
+    imu_path.write_text(kalibr_imu_yaml(rig.imu, topic="/imu0"), encoding="utf-8")
+    found = read_camchain(written(tmp_path, camchain(rig)), imu_path)
+    assert found.imu
+    np.testing.assert_allclose(found.T_body_left, se3.inverse(rig.imu.T_body_imu) @ rig.T_body_left, atol=1e-12)
+    assert replace(found.imu, T_body_imu=rig.imu.T_body_imu) == replace(rig.imu, T_body_imu=rig.imu.T_body_imu)
+    assert found.imu.gyro_walk == rig.imu.gyro_walk
+    check_rig("the chain", rig, found)
+
+
+def test_the_chain_takes_points_from_the_camera_before_to_this_one(rig_of: Callable[..., Rig]) -> None:
+    yaml = pytest.importorskip("yaml")  # what Kalibr reads with
+    rig = preset_rig("euroc")
+    rig = replace(rig, imu=rig_of(imu=True).imu)
+    chain = yaml.safe_load(camchain(rig))
+    T_cam1_cam0 = np.array(chain["cam1"]["T_cn_cnm1"])
+    point_left = np.array([[0.3, -0.2, 4.0]])
+    seen = rig.camera("right").project(se3.apply(T_cam1_cam0, point_left))
+    body_point = se3.apply(rig.T_body_left, point_left)
+    there = rig.camera("right").project(se3.apply(se3.inverse(rig.T_body_camera("right")), body_point))
+    np.testing.assert_allclose(seen, there, atol=1e-9)
+    np.testing.assert_allclose(
+        np.array(chain["cam1"]["T_cam_imu"]), T_cam1_cam0 @ np.array(chain["cam0"]["T_cam_imu"]), atol=1e-12
+    )
+    assert chain["cam0"]["cam_overlaps"] == [1]
+    assert chain["cam0"]["timeshift_cam_imu"] == 0.0
+    assert all(isinstance(value, float) for value in chain["cam0"]["distortion_coeffs"])
+
+
+def test_opencv_reads_the_chain_below_the_line_that_openvins_asks_for() -> None:
+    rig = preset_rig("fisheye")
+    storage = cv2.FileStorage("%YAML:1.0\n---\n" + camchain(rig), cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+    cam1 = storage.getNode("cam1")
+    linear = [cam1.getNode("intrinsics").at(i).real() for i in range(4)]
+    assert linear == rig.camera("right").K[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
+    rows = cam1.getNode("T_cn_cnm1")
+    T = np.array([[rows.at(i).at(j).real() for j in range(4)] for i in range(4)])
+    np.testing.assert_array_equal(T, se3.inverse(rig.T_body_camera("right")) @ rig.T_body_left)
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_a_number_keeps_its_bits_and_is_one_to_a_reader_of_yaml_1_1(value: float) -> None:
+    yaml = pytest.importorskip("yaml")
+    read = yaml.safe_load(number(value))
+    assert isinstance(read, float)
+    assert read == value
+
+
+def test_a_camera_that_sees_all_around_is_refused_with_a_sentence(rig_of: Callable[..., Rig]) -> None:
+    with pytest.raises(SequenceError, match="sees all around"):
+        camchain(rig_of(Equirectangular(128, 64), stereo=False))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("camera_model: pinhole", "camera_model: omni"), "cam0 is omni"),
+        (("  resolution: [752, 480]\n", ""), "cam0.resolution is missing"),
+        (("distortion_model: radtan", "distortion_model: fov"), "distortion model 'fov'"),
+        (("cam0:", "cam7:"), "cam0.camera_model is missing"),
+    ],
+)
+def test_a_chain_that_says_something_else_is_refused_by_file_and_key(
+    change: tuple[str, str], said: str, tmp_path: Path
+) -> None:
+    path = written(tmp_path, camchain(preset_rig("euroc")).replace(*change))
+    with pytest.raises(InputError, match=said) as caught:
+        read_camchain(path)
+    assert str(path) in str(caught.value)
+
+
+def test_an_imu_is_read_under_its_name_too(rig_of: Callable[..., Rig], tmp_path: Path) -> None:
+    imu = rig_of(imu=True).imu
+    assert imu
+    flat = kalibr_imu_yaml(imu, topic="/imu0")
+    path = tmp_path / "imu.yaml"
+    path.write_text("imu0:\n" + "".join(f"  {line}\n" for line in flat.splitlines()), encoding="utf-8")
+    found = read_imu(path, imu.T_body_imu)
+    assert (found.rate_hz, found.gyro_noise, found.accel_walk) == (imu.rate_hz, imu.gyro_noise, imu.accel_walk)
+
+
+@pytest.mark.parametrize("field", ["fx_px", "cy_px", "k1", "p2"])
+def test_a_lens_off_by_little_is_found_by_the_points(field: str) -> None:
+    rig = preset_rig("euroc")
+    off: Camera = replace(rig.left, **{field: getattr(rig.left, field) * (1 + 1e-6) + 1e-6})  # type: ignore[type-var]
+    assert PIXEL_TOLERANCE < pixel_difference(rig, replace(rig, left=off)) < 0.1
+    with pytest.raises(SequenceError, match="known points come to lie"):
+        check_rig("the chain", rig, replace(rig, left=off))
+
+
+def test_a_moved_right_camera_or_imu_or_a_missing_one_is_found(rig_of: Callable[..., Rig]) -> None:
+    rig = rig_of(imu=True)
+    assert rig.imu
+    assert rig.T_body_right is not None
+    nudge = se3.transform(np.eye(3), [0.0, 1e-6, 0.0])
+    assert pixel_difference(rig, replace(rig, T_body_right=rig.T_body_right @ nudge)) > PIXEL_TOLERANCE
+    assert pixel_difference(rig, rig_of(stereo=False)) == np.inf
+    with pytest.raises(SequenceError, match="puts the IMU"):
+        check_rig("the chain", rig, replace(rig, imu=replace(rig.imu, T_body_imu=rig.imu.T_body_imu @ nudge)))
+
+
+def test_where_the_body_is_makes_no_difference_to_what_is_seen(rig_of: Callable[..., Rig]) -> None:
+    rig, T = rig_of(), se3.transform(se3.rotation_z(np.array(0.7)), [1.0, 2.0, 3.0])
+    assert rig.T_body_right is not None
+    moved = replace(rig, T_body_left=T @ rig.T_body_left, T_body_right=T @ rig.T_body_right)
+    assert pixel_difference(rig, moved) < 1e-9
+
+
+def test_known_points_fill_the_picture_from_near_to_far() -> None:
+    camera = preset_rig("fisheye").left
+    points = known_points(camera)
+    pixels = camera.project(points)
+    assert np.isfinite(pixels).all()
+    assert pixels.min() < 1
+    assert pixels.max() > 510
+    assert np.linalg.norm(points, axis=1).max() > 100 * np.linalg.norm(points, axis=1).min()

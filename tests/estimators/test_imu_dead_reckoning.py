@@ -1,0 +1,148 @@
+"""Dead reckoning from an IMU: exact for an exact IMU, and what it learns from a standstill."""
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from vobench.errors import VobenchError
+from vobench.estimator import Frame, ImuReadings, Status
+from vobench.geometry import se3
+from vobench.geometry.rig import LENSES, looking, stereo_rig
+from vobench.geometry.se3 import Array
+from vobench.robot.drive import drive
+from vobench.sensor.imu import STREAMS, ImuSettings, measure
+from vobench.sensor.imu_preset import IMUS
+from vobench.sensor.triad import Triad
+from vobench.trajectory.kinematics import Kinematics, Motion
+
+PLACE = looking(pitch_deg=20, position_m=(0.25, -0.1, 0.3))
+EXACT = replace(IMUS["exact"], T_body_imu=PLACE)
+BIASED = replace(EXACT, gyro=Triad(bias=(0.01, -0.02, 0.01)), accel=Triad(bias=(0.1, 0.2, -0.1)))
+NAME = "imu_dead_reckoning"
+
+
+@cache
+def driven() -> Motion:
+    return drive(((0, 1), (1, 1))).motion
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """Another motion, after so many seconds at its start."""
+
+    motion: Motion
+    waits_s: float
+    start_ns: int = 0
+
+    @property
+    def end_ns(self) -> int:
+        return self.motion.end_ns + round(self.waits_s * 1e9)
+
+    @property
+    def breaks_ns(self) -> Array:
+        return self.motion.breaks_ns + self.waits_s * 1e9
+
+    def at(self, t_ns: Array) -> Kinematics:
+        return self.motion.at(np.asarray(t_ns, float) - self.waits_s * 1e9)
+
+
+def rig_with(settings: ImuSettings):
+    return replace(stereo_rig(LENSES["paper_blender"], pitch_deg=15), imu=settings.calibration)
+
+
+def frames_of(motion: Motion, settings: ImuSettings, *, rate_hz: float = 30.0, seed: int = 0) -> list[Frame]:
+    rngs = dict(zip(STREAMS, np.random.default_rng(seed).spawn(len(STREAMS)), strict=True))
+    readings, _ = measure(motion, settings, rngs=rngs)
+    stamps = np.rint(np.arange(int(motion.end_ns * rate_hz / 1e9) + 1) * 1e9 / rate_hz).astype(np.int64)
+    ends = np.searchsorted(readings.t_ns, stamps, side="right")
+    cuts = zip(np.concatenate([[0], ends[:-1]]), ends, strict=True)
+    return [
+        Frame(
+            k, int(stamps[k]), imu=ImuReadings(readings.t_ns[a:b], readings.gyro_radps[a:b], readings.accel_mps2[a:b])
+        )
+        for k, (a, b) in enumerate(cuts)
+    ]
+
+
+def off_m(results, frames, motion: Motion) -> Array:
+    """Distance (N,) of the estimate from the truth at all frames, both seen from the first pose."""
+    T = motion.at(np.array([frame.t_ns for frame in frames])).T_world_body
+    truth = se3.inverse(T[0]) @ T
+    return np.linalg.norm(np.stack([r.T_odom_frame for r in results])[:, :3, 3] - truth[:, :3, 3], axis=1)
+
+
+@pytest.mark.parametrize("rate_hz", [30.0, 24.0, 300.0])
+def test_an_exact_imu_follows_the_body_from_its_own_place_at_every_frame(bed, rate_hz):
+    frames = frames_of(driven(), EXACT, rate_hz=rate_hz)
+    results = bed.estimated(NAME, rig_with(EXACT), frames)
+    assert frames[-1].t_ns > 5e9
+    assert off_m(results, frames, driven()).max() < 3e-3
+    assert results[-1].status is Status.OK
+
+
+def test_more_readings_a_second_follow_it_better(bed):
+    off = []
+    for hz in (100.0, 400.0):
+        settings = replace(EXACT, rate_hz=hz)
+        frames = frames_of(driven(), settings)
+        off.append(off_m(bed.estimated(NAME, rig_with(settings), frames), frames, driven()).max())
+    assert off[0] > 4 * off[1]
+
+
+def test_a_standstill_teaches_it_the_bias_that_would_else_carry_it_away(bed):
+    moved = Waiting(driven(), 1.5)
+    waited, at_once = (frames_of(motion, BIASED) for motion in (moved, driven()))
+    taught = off_m(bed.estimated(NAME, rig_with(BIASED), waited), waited, moved)
+    untaught = off_m(bed.estimated(NAME, rig_with(BIASED), at_once), at_once, driven())
+    assert untaught[-1] > 2.0
+    # What is left is tilt: the accelerometers' bias looks like it.
+    assert taught[-1] < 0.5 * untaught[-1]
+
+
+def test_who_stands_still_stays_where_it_is_and_a_noisy_imu_alone_drifts_away(bed):
+    still = Waiting(driven(), 60.0)
+    for settings, low, high in ((BIASED, 0.0, 1e-9), (IMUS["adis16448"], 0.1, 1000.0)):
+        frames = [frame for frame in frames_of(still, settings) if frame.t_ns < 59e9]
+        results = bed.estimated(NAME, rig_with(settings), frames)
+        assert low <= np.linalg.norm(results[-1].T_odom_frame[:3, 3]) < high
+
+
+def test_it_says_so_while_it_does_not_yet_know_whether_it_stands_still(bed):
+    frames = frames_of(Waiting(driven(), 2.0), IMUS["adis16448"])[:60]
+    statuses = [result.status for result in bed.estimated(NAME, rig_with(IMUS["adis16448"]), frames)]
+    assert statuses == [Status.INIT] * 30 + [Status.OK] * 30
+    short = bed.estimated(NAME, rig_with(IMUS["adis16448"]), frames, standstill_s=0.5)
+    assert [result.status for result in short].count(Status.INIT) == 15
+
+
+def test_how_the_readings_are_shared_out_among_frames_does_not_matter(bed):
+    ends = [
+        bed.estimated(NAME, rig_with(EXACT), frames_of(driven(), EXACT, rate_hz=hz)[: int(4 * hz) + 1])[-1]
+        for hz in (5.0, 100.0)
+    ]
+    np.testing.assert_allclose(ends[0].T_odom_frame, ends[1].T_odom_frame, atol=1e-9)
+
+
+def test_where_on_the_body_the_imu_sits_does_not_matter(bed):
+    paths = []
+    for place in (np.eye(4), PLACE):
+        settings = replace(EXACT, rate_hz=1000.0, T_body_imu=place)
+        results = bed.estimated(NAME, rig_with(settings), frames_of(driven(), settings))
+        paths.append(np.stack([r.T_odom_frame for r in results]))
+    np.testing.assert_allclose(paths[0], paths[1], atol=1e-3)
+
+
+def test_a_frame_without_new_readings_goes_on_with_the_last(bed):
+    frames = frames_of(driven(), EXACT)
+    frames[100] = replace(frames[100], imu=ImuReadings(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3))))
+    results = bed.estimated(NAME, rig_with(EXACT), frames[:101])
+    assert off_m(results, frames[:101], driven())[-1] < 5e-3
+
+
+def test_without_an_imu_it_is_lost_and_refuses_a_rig_that_has_none(bed):
+    (result,) = bed.estimated(NAME, rig_with(EXACT), [Frame(0, 0)])
+    assert (result.status, result.reason) == (Status.LOST, "no_imu")
+    with pytest.raises(VobenchError, match="imu_dead_reckoning needs an IMU, and this recording has none"):
+        bed.started(NAME, stereo_rig(LENSES["paper_blender"], pitch_deg=15))

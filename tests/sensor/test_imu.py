@@ -1,0 +1,236 @@
+"""What an IMU says adds up to the motion, and its errors come one by one."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from vobench.errors import InputError
+from vobench.geometry import se3
+from vobench.geometry.rig import looking
+from vobench.geometry.se3 import Array
+from vobench.robot.controller import CONTROLLERS
+from vobench.robot.drive import drive
+from vobench.robot.slip import SLIPS
+from vobench.robot.slip import STREAMS as SLIP_STREAMS
+from vobench.sensor.imu import STREAMS, ImuSettings, measure
+from vobench.sensor.imu_preset import IMUS
+from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, Kinematics, level
+
+PLACE = looking(pitch_deg=20, position_m=(0.25, -0.1, 0.3))
+TILTED = se3.transform(Rotation.from_euler("ZYX", [0.3, -0.5, 0.7]).as_matrix(), [1, 2, 3])
+TOUR = ((1, 1), (2, 2), (0, 2), (2, 0), (-1, 1), (1, -1), (0, 0), (0, 1))
+NOISY = replace(IMUS["bmi055"], T_body_imu=PLACE)
+
+
+def generators(seed: int) -> dict[str, np.random.Generator]:
+    return dict(zip(STREAMS, np.random.default_rng(seed).spawn(len(STREAMS)), strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Jerky:
+    """Straight ahead from rest, with an acceleration of its own in each third of a tenth of a second."""
+
+    accelerations: Array
+    breaks_ns: Array
+    start_ns: int = 0
+
+    @property
+    def end_ns(self) -> int:
+        return round(len(self.accelerations) * 1e9 / 30)
+
+    def at(self, t_ns: Array) -> Kinematics:
+        t_s, step_s = np.asarray(t_ns, float) / 1e9, 1 / 30
+        piece = np.clip((t_s / step_s).astype(int), 0, len(self.accelerations) - 1)
+        a = np.where((t_s < 0) | (t_s > self.end_ns / 1e9), 0.0, self.accelerations[piece])
+        v_before = np.concatenate([[0.0], np.cumsum(self.accelerations) * step_s])[piece]
+        v = v_before + self.accelerations[piece] * (t_s - piece * step_s)
+        still = np.zeros_like(t_s)
+        ahead = [np.stack([x, still, still], -1) for x in (v, a)]
+        none = np.zeros((len(t_s), 3))
+        return Kinematics(level(still, still, still), ahead[0], none, ahead[1], none)
+
+
+def jerky() -> Jerky:
+    accelerations = np.random.default_rng(3).normal(size=60)
+    return Jerky(accelerations, np.arange(61) * 1e9 / 30)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("T_body_imu", "rate_hz"), [(np.eye(4), 200), (PLACE, 400)], ids=["at the body's origin", "on an arm"]
+)
+def test_a_minute_of_fast_motion_in_six_degrees_closes(bed, seed, T_body_imu, rate_hz):
+    motion = bed.shaken(seed)
+    readings, _ = measure(motion, ImuSettings(rate_hz=rate_hz, T_body_imu=T_body_imu))
+    closed = bed.closure(motion, readings, rate_hz, T_body_imu)
+    assert closed.off_m < 1e-3
+    assert closed.off_deg < 1e-4
+
+
+@pytest.mark.parametrize("T_body_imu", [np.eye(4), PLACE], ids=["at the axle", "on an arm"])
+@pytest.mark.parametrize(("controller", "slip"), [("paper", "none"), ("smooth", "slippery")])
+def test_a_minute_of_a_robots_drive_closes(bed, controller, slip, T_body_imu):
+    rngs = dict(zip(SLIP_STREAMS, np.random.default_rng(1).spawn(len(SLIP_STREAMS)), strict=True))
+    motion = drive(TOUR * 2, controller=CONTROLLERS[controller], slip=SLIPS[slip], rngs=rngs).motion
+    assert motion.end_ns > 60e9
+    readings, _ = measure(motion, ImuSettings(rate_hz=200, T_body_imu=T_body_imu))
+    closed = bed.closure(motion, readings, 200, T_body_imu)
+    assert closed.off_m < 1e-3
+    assert closed.off_deg < 1e-6
+
+
+def test_what_does_not_close_is_the_integrators_and_goes_at_least_with_the_third_power_of_the_step(bed):
+    motion = bed.shaken(4, lasts_s=20)
+    off_m = [
+        bed.closure(motion, measure(motion, ImuSettings(rate_hz=hz, T_body_imu=PLACE))[0], hz, PLACE).off_m
+        for hz in (100, 200, 400)
+    ]
+    assert off_m[0] > 7 * off_m[1] > 49 * off_m[2]
+
+
+def test_readings_add_up_to_the_change_of_speed_where_acceleration_jumps():
+    motion = jerky()
+    readings, _ = measure(motion, ImuSettings(rate_hz=200))
+    gained = np.cumsum(readings.accel_mps2[:, 0]) / 200
+    true = motion.at(readings.t_ns + 0.5e9 / 200).velocity_mps[:, 0]
+    np.testing.assert_allclose(gained[:-1], true[:-1], atol=1e-12)
+    blind, _ = measure(replace(motion, breaks_ns=np.zeros(0)), ImuSettings(rate_hz=200))
+    assert np.abs(blind.accel_mps2 - readings.accel_mps2).max() > 1e-2
+
+
+def test_standing_still_reads_no_turn_and_gravity_upwards(bed):
+    readings, bias = measure(bed.at_rest(TILTED, end_ns=60 * 10**9), ImuSettings(T_body_imu=PLACE))
+    up = (TILTED @ PLACE)[2, :3]
+    assert not readings.gyro_radps.any()
+    np.testing.assert_allclose(readings.accel_mps2, np.tile(9.80665 * up, (12_001, 1)), atol=1e-13)
+    assert not bias.gyro_radps.any()
+    assert not bias.accel_mps2.any()
+
+
+def test_an_imu_on_an_arm_feels_its_own_path(bed):
+    """Against differences of where it is, not the formula of the lever arm."""
+    motion, hz = bed.shaken(5, lasts_s=0.2), 10_000
+    readings, _ = measure(motion, ImuSettings(rate_hz=hz, T_body_imu=PLACE))
+    steps_ns = readings.t_ns + np.array([[-1], [0], [1]]) * 1e9 / hz
+    before, T, after = (motion.at(t_ns).T_world_body @ PLACE for t_ns in steps_ns)
+    in_world = (before + after - 2 * T)[:, :3, 3] * hz**2 + [0, 0, STANDARD_GRAVITY_MPS2]
+    R_imu_world = np.swapaxes(T[:, :3, :3], -1, -2)
+    np.testing.assert_allclose(readings.accel_mps2, (R_imu_world @ in_world[..., None])[..., 0], atol=2e-4)
+    turned = Rotation.from_matrix((se3.inverse(before) @ after)[:, :3, :3]).as_rotvec() * hz / 2
+    np.testing.assert_allclose(readings.gyro_radps, turned, atol=1e-4)
+
+
+@pytest.mark.parametrize("rate_hz", [200.0, 30.0, 37.5, 1000 / 3])
+def test_stamps_are_index_over_rate_from_start_to_end(bed, rate_hz):
+    start_ns = 7_000_000_001
+    motion = bed.at_rest(np.eye(4), start_ns=start_ns, end_ns=start_ns + 2_000_000_000)
+    t_ns = measure(motion, ImuSettings(rate_hz=rate_hz))[0].t_ns
+    assert t_ns.dtype == np.int64
+    assert t_ns[0] == start_ns
+    assert motion.end_ns - 1e9 / rate_hz < t_ns[-1] <= motion.end_ns
+    np.testing.assert_allclose(t_ns - start_ns, np.arange(len(t_ns)) * 1e9 / rate_hz, atol=0.5)
+
+
+def test_a_longer_motion_begins_with_the_readings_of_a_shorter_one_across_the_seams(bed):
+    short, long = (bed.shaken(6, lasts_s=s) for s in (30, 70))
+    exact = ImuSettings(rate_hz=200)
+    fewer, more = (measure(motion, exact)[0] for motion in (short, long))
+    assert len(fewer.t_ns) > 4096
+    np.testing.assert_allclose(more.accel_mps2[: len(fewer.t_ns)], fewer.accel_mps2, rtol=0, atol=1e-8)
+
+
+def test_a_start_long_after_zero_changes_nothing(bed):
+    early = bed.at_rest(TILTED, end_ns=10**10)
+    late = replace(early, start_ns=1_403_636_579_758_555_392, end_ns=1_403_636_589_758_555_392)
+    one, other = (measure(motion, NOISY, rngs=generators(1))[0] for motion in (early, late))
+    np.testing.assert_array_equal(one.accel_mps2, other.accel_mps2)
+    np.testing.assert_array_equal(one.gyro_radps, other.gyro_radps)
+
+
+def test_the_same_seed_reads_the_same_and_another_does_not(bed):
+    motion = bed.at_rest(TILTED, end_ns=10**9)
+    one, same, other = (measure(motion, NOISY, rngs=generators(seed))[0] for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one.gyro_radps, same.gyro_radps)
+    assert (one.gyro_radps != other.gyro_radps).any()
+
+
+OFF = {
+    "gyro_white": ("gyro", "noise"),
+    "accel_white": ("accel", "noise"),
+    "gyro_walk": ("gyro", "walk"),
+    "accel_walk": ("accel", "walk"),
+}
+
+
+@pytest.mark.parametrize("stream", OFF)
+def test_switching_one_stream_off_leaves_the_draws_of_the_others(bed, stream):
+    """Without the chip's rounding, whatever the stream added is the whole difference."""
+    triad, field = OFF[stream]
+    smooth = replace(NOISY, gyro=replace(NOISY.gyro, step=0.0), accel=replace(NOISY.accel, step=0.0))
+    quiet = replace(smooth, **{triad: replace(getattr(smooth, triad), **{field: 0.0})})
+    motion = bed.at_rest(TILTED, end_ns=10**9)
+    rngs = generators(1)
+    del rngs[stream]
+    (loud_readings, loud_bias), (readings, bias) = (
+        measure(motion, settings, rngs=some) for settings, some in ((smooth, generators(1)), (quiet, rngs))
+    )
+    array = {"gyro": "gyro_radps", "accel": "accel_mps2"}
+    other = array["accel" if triad == "gyro" else "gyro"]
+    np.testing.assert_array_equal(getattr(readings, other), getattr(loud_readings, other))
+    np.testing.assert_array_equal(getattr(bias, other), getattr(loud_bias, other))
+    lost = getattr(loud_readings, array[triad]) - getattr(readings, array[triad])
+    alone = generators(1)[stream].standard_normal(lost.shape)
+    if field == "noise":
+        np.testing.assert_allclose(lost, alone * getattr(smooth, triad).noise * np.sqrt(200), atol=1e-12)
+    else:
+        np.testing.assert_allclose(lost, getattr(loud_bias, array[triad]) - getattr(bias, array[triad]), atol=1e-12)
+
+
+def test_the_recorded_bias_is_what_is_left_of_the_readings_without_white_noise(bed):
+    silent = [replace(triad, noise=0.0, step=0.0) for triad in (NOISY.gyro, NOISY.accel)]
+    settings = replace(NOISY, gyro=silent[0], accel=silent[1])
+    motion = bed.shaken(7, lasts_s=2)
+    readings, bias = measure(motion, settings, rngs=generators(3))
+    truth, _ = measure(motion, ImuSettings(T_body_imu=PLACE))
+    np.testing.assert_allclose(readings.gyro_radps - truth.gyro_radps, bias.gyro_radps, atol=1e-12)
+    np.testing.assert_allclose(readings.accel_mps2 - truth.accel_mps2, bias.accel_mps2, atol=1e-12)
+    np.testing.assert_array_equal(bias.t_ns, readings.t_ns)
+
+
+def test_each_start_has_a_bias_of_its_own_of_the_size_that_was_asked_for(bed):
+    motion = bed.at_rest(np.eye(4), end_ns=0)
+    firsts = [measure(motion, NOISY, rngs=generators(seed))[1] for seed in range(300)]
+    gyro, accel = (np.concatenate([getattr(b, name) for b in firsts]) for name in ("gyro_radps", "accel_mps2"))
+    assert gyro.std() == pytest.approx(np.deg2rad(1.0), rel=0.1)
+    assert accel.std() == pytest.approx(0.07 * 9.80665, rel=0.1)
+
+
+def test_a_calibration_says_what_the_imu_is():
+    calibration = NOISY.calibration
+    assert (calibration.gyro_noise, calibration.accel_walk) == (NOISY.gyro.noise, NOISY.accel.walk)
+    assert calibration.rate_hz == 200
+    np.testing.assert_array_equal(calibration.T_body_imu, PLACE)
+
+
+def test_chance_without_a_generator_is_refused_by_name(bed):
+    motion = bed.at_rest(np.eye(4), end_ns=10**9)
+    with pytest.raises(InputError, match=r"generator for each of gyro_white, .*'start_bias' is missing"):
+        measure(motion, NOISY)
+    lacking = generators(1)
+    del lacking["accel_walk"]
+    with pytest.raises(InputError, match="'accel_walk' is missing"):
+        measure(motion, NOISY, rngs=lacking)
+
+
+@pytest.mark.parametrize("rate_hz", [0, -200, float("nan"), float("inf"), 1e9])
+def test_a_rate_that_is_none_is_refused(rate_hz):
+    with pytest.raises(InputError, match=r"rate_hz should be within 1 and 100000, got"):
+        ImuSettings(rate_hz=rate_hz)
+
+
+@pytest.mark.parametrize("place", [np.eye(3), 2 * np.eye(4), np.full((4, 4), np.nan)])
+def test_a_place_that_is_none_is_refused(place):
+    with pytest.raises(InputError, match="T_body_imu should be a rigid transform"):
+        ImuSettings(T_body_imu=place)

@@ -1,0 +1,128 @@
+"""The index says where messages lie, and is believed only where it agrees with itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, IndexType, Writer
+
+from vobench.errors import SequenceError
+from vobench.sequence import messages as ros
+from vobench.sequence.bag import Bag, BagWriter
+from vobench.sequence.cdr import serialise
+from vobench.sequence.salvage import salvage
+
+
+@pytest.fixture(scope="module")
+def long_folder(recording, tmp_path_factory):
+    """A recording of several chunks."""
+    count = 95
+    t_ns = np.arange(count) * 1_000_000_000 // 30
+    pick = np.arange(count) % len(recording.t_ns)
+    encoder_t_ns = np.arange(1, int(t_ns[-1]) // 10_000_000 + 1) * 10_000_000
+    return replace(
+        recording,
+        t_ns=t_ns,
+        left=recording.left[pick],
+        right=recording.right[pick],
+        encoder_t_ns=encoder_t_ns,
+        ticks=np.zeros((len(encoder_t_ns), 2), np.int64),
+        T_map_body=recording.T_map_body[pick],
+        twist=recording.twist[pick],
+    ).write(tmp_path_factory.mktemp("long"))
+
+
+@pytest.mark.parametrize("name", ["sensors.mcap", "truth.mcap"])
+def test_counts_and_stamps_are_those_of_the_messages_that_another_reader_finds(long_folder, name):
+    bag = Bag.open(long_folder / name)
+    found: dict[str, list[int]] = {topic: [] for topic in bag.counts()}
+    with (long_folder / name).open("rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages():
+            found[channel.topic].append(message.log_time)
+            assert bag.has(ros.Topic(channel.topic, schema.name))
+    assert len(bag.index.offset) > 3
+    assert bag.counts() == {topic: len(stamps) for topic, stamps in found.items()}
+    for topic in (*ros.SENSOR_TOPICS, *ros.TRUTH_TOPICS):
+        assert bag.stamps(topic).tolist() == found.get(topic.name, [])
+
+
+def test_so_many_messages_lie_until_an_instant_as_their_stamps_say(long_folder):
+    bag = Bag.open(long_folder / "sensors.mcap")
+    for topic in (ros.LEFT_IMAGE, ros.ENCODERS, ros.TF_STATIC, ros.IMU):
+        stamps = bag.stamps(topic)
+        for t_ns in np.random.default_rng(0).integers(-(10**8), 4 * 10**9, 100).tolist() + stamps[:40].tolist():
+            assert bag.count_until(topic, t_ns) == np.searchsorted(stamps, t_ns, side="right")
+
+
+def test_what_has_one_stamp_is_in_one_chunk_and_a_chunk_lasts_no_longer_than_a_second(long_folder):
+    index = Bag.open(long_folder / "sensors.mcap").index
+    assert np.all(index.end_ns[:-1] < index.start_ns[1:] + (np.arange(len(index.offset) - 1) == 0))
+    assert np.all(index.end_ns - index.start_ns < 1_000_000_000)
+
+
+def test_a_chunk_ends_at_the_first_new_stamp_after_a_mebibyte(tmp_path):
+    with BagWriter(tmp_path / "a", ros.IMAGE_TOPICS, encoded=True) as bag:
+        for t_ns in range(10):
+            for topic in ros.IMAGE_TOPICS:
+                bag.write(topic, t_ns, serialise(ros.image(t_ns, "cam_left", bytes(400_000), "png")))
+    assert Bag.open(tmp_path / "a").index.start_ns.tolist() == [0, 2, 4, 6, 8]
+
+
+def write_foreign(path, count=30, **options):
+    """A file as the library writes it, with two topics."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=200, **options)
+        writer.start(profile="ros2")
+        schema = writer.register_schema(ros.ENCODERS.type_name, "ros2msg", b"")
+        channels = [writer.register_channel(name, "cdr", schema) for name in (ros.ENCODERS.name, "/other")]
+        for t_ns in range(count):
+            writer.add_message(channels[t_ns % 2], t_ns, serialise(ros.wheel_ticks(t_ns, t_ns, -t_ns)), t_ns)
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize("packing", CompressionType)
+def test_every_packing_is_read(tmp_path, packing):
+    bag = Bag.open(write_foreign(tmp_path / "a", compression=packing))
+    assert [m.left for _, m in bag.messages([ros.ENCODERS])] == list(range(0, 30, 2))
+    assert [bag.message(ros.ENCODERS, *bag.nth((ros.ENCODERS,), n)).right for n in (0, 7, 14)] == [0, -14, -28]
+
+
+@pytest.mark.parametrize(
+    "options", [{"use_chunking": False}, {"index_types": IndexType.NONE}, {"use_statistics": False}]
+)
+def test_a_file_without_an_index_is_refused_and_comes_back_with_one(tmp_path, options):
+    path = write_foreign(tmp_path / "a", **options)
+    with pytest.raises(SequenceError, match=r"the recording is damaged .*; `vobench salvage` recovers what is whole"):
+        Bag.open(path)
+    salvage(path, tmp_path / "b")
+    assert Bag.open(tmp_path / "b").counts() == {"/encoders": 15, "/other": 15}
+
+
+def test_messages_that_fall_back_in_time_are_refused_when_they_come(tmp_path):
+    with (tmp_path / "a").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel(
+            ros.ENCODERS.name, "cdr", writer.register_schema(ros.ENCODERS.type_name, "ros2msg", b"")
+        )
+        for t_ns in (5, 4):
+            writer.add_message(channel, t_ns, serialise(ros.wheel_ticks(t_ns, 0, 0)), t_ns)
+        writer.finish()
+    messages = Bag.open(tmp_path / "a").raw([ros.ENCODERS])
+    next(messages)
+    with pytest.raises(SequenceError, match="after 5 ns comes 4 ns"):
+        next(messages)
+
+
+def test_two_senders_of_a_topic_are_refused(tmp_path):
+    with (tmp_path / "a").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        for _ in range(2):
+            schema = writer.register_schema(ros.ENCODERS.type_name, "ros2msg", b"")
+            writer.register_channel(ros.ENCODERS.name, "cdr", schema)
+        writer.finish()
+    with pytest.raises(SequenceError, match=r"^/encoders should be vobench_msgs/msg/WheelTicks but is 2 channels in"):
+        Bag.open(tmp_path / "a").has(ros.ENCODERS)

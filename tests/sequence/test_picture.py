@@ -1,0 +1,67 @@
+"""A picture's header is read before anything is made of it."""
+
+import struct
+
+import cv2
+import numpy as np
+import pytest
+
+from vobench.errors import SequenceError
+from vobench.geometry.camera import Pinhole
+from vobench.sequence.picture import decode, encode, require_grey
+
+CAMERA = Pinhole(48, 32, 40.5, 41.25, 23.5, 15.5)
+GREY = np.random.default_rng(0).integers(0, 256, (32, 48), np.uint8)
+
+
+def coded(end, picture, *options):
+    return cv2.imencode(end, picture, list(options))[1].tobytes()
+
+
+@pytest.mark.parametrize(
+    ("form", "options"),
+    [
+        ("png", ()),
+        ("jpeg", ()),
+        ("jpeg", (cv2.IMWRITE_JPEG_PROGRESSIVE, 1)),
+        ("jpeg", (cv2.IMWRITE_JPEG_RST_INTERVAL, 2)),
+    ],
+)
+def test_form_and_size_are_in_the_header(form, options):
+    assert require_grey(coded(f".{form}", GREY, *options), CAMERA, "a") == (form, 32, 48)
+
+
+@pytest.mark.parametrize("form", [".png", ".jpeg"])
+def test_colour_is_refused(form):
+    with pytest.raises(SequenceError, match=r"^not an 8-bit grey PNG or JPEG: a$"):
+        require_grey(coded(form, np.dstack([GREY] * 3)), CAMERA, "a")
+
+
+def test_sixteen_bits_text_and_nothing_are_refused():
+    for encoded in (coded(".png", GREY.astype(np.uint16)), b"P5 48 32 255", b""):
+        with pytest.raises(SequenceError, match="not an 8-bit grey PNG or JPEG"):
+            decode(encoded, None, "a")
+
+
+def test_another_size_is_refused_with_both():
+    with pytest.raises(SequenceError, match=r"^\(31, 48\) pixels, but the camera has \(32, 48\): a$"):
+        decode(coded(".png", GREY[1:]), CAMERA, "a")
+
+
+@pytest.mark.parametrize("form", [".png", ".jpeg"])
+def test_a_picture_cut_within_its_header_is_refused(form):
+    with pytest.raises(SequenceError, match=r"the picture ends within its header: a"):
+        require_grey(coded(form, GREY)[:20], CAMERA, "a")
+
+
+def test_a_header_that_states_a_billion_pixels_costs_nothing():
+    data = bytearray(coded(".png", GREY))
+    struct.pack_into(">II", data, 16, 1 << 15, 1 << 15)
+    with pytest.raises(SequenceError, match="not an 8-bit grey PNG or JPEG"):
+        decode(bytes(data), None, "a")
+
+
+def test_png_comes_back_bit_for_bit_from_bytes_and_from_a_view_of_them():
+    encoded = encode(GREY, CAMERA, "a")
+    for form in (encoded, memoryview(encoded), np.frombuffer(encoded, np.uint8)):
+        np.testing.assert_array_equal(decode(form, CAMERA, "a"), GREY)

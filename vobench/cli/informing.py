@@ -1,0 +1,118 @@
+"""vobench info."""
+
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+from vobench.cli import terminal
+from vobench.cli.importing import Given
+from vobench.geometry.camera import Camera
+from vobench.geometry.rig import Rig
+from vobench.sequence.contents import TopicFacts, topic_facts
+from vobench.trajectory.trajectory import Trajectory
+
+
+def show(path: Path, given: Given, *, as_json: bool) -> None:
+    """Print what is in a recording of any form; its pictures are read only for the hash of a sequence of ours."""
+    from vobench.dataset.read import read
+
+    recording = read(path, form=given.form, options=given.options())
+    folder = path.parent if path.is_file() else path
+    files = _mcap_files(path)
+    facts = {
+        "path": str(path),
+        "form": recording.form,
+        "frames": recording.frame_count,
+        "calibration": _calibration(recording.rig),
+        "ground_truth": _truth(recording.truth),
+        "imu_readings": len(recording.imu.t_ns) if recording.imu else 0,
+        "encoder_readings": len(recording.encoders[0]) if recording.encoders else 0,
+        "files": {file.name: [_topic(facts) for facts in topic_facts(file)] for file in files},
+        **(_identity(folder) if recording.form == "vobench" else {"notes": list(recording.notes)}),
+    }
+    if as_json:
+        terminal.print_json(facts)
+    else:
+        _print(facts)
+
+
+def _mcap_files(path: Path) -> list[Path]:
+    return [path] if path.is_file() and path.suffix == ".mcap" else sorted(path.glob("*.mcap"))
+
+
+def _topic(facts: TopicFacts) -> dict[str, Any]:
+    return {**asdict(facts), "rate_hz": facts.rate_hz}
+
+
+def _calibration(rig: Rig) -> dict[str, Any]:
+    cameras: dict[str, Any] = {side: _camera(rig.camera(side)) for side in rig.sides}
+    return {
+        **cameras,
+        "baseline_m": rig.baseline_m if rig.right else None,
+        "imu_rate_hz": rig.imu.rate_hz if rig.imu else None,
+        "wheels": asdict(rig.wheels) if rig.wheels else None,
+    }
+
+
+def _camera(camera: Camera) -> dict[str, Any]:
+    numbers = {field.name: getattr(camera, field.name) for field in fields(camera)}  # type: ignore[arg-type]
+    return {"model": type(camera).__name__, **numbers}
+
+
+def _truth(truth: Trajectory | None) -> dict[str, Any] | None:
+    if truth is None:
+        return None
+    duration_s = (int(truth.t_ns[-1]) - int(truth.t_ns[0])) / 1e9
+    return {"poses": len(truth), "path_m": float(truth.distances_m()[-1]), "duration_s": duration_s}
+
+
+def _identity(folder: Path) -> dict[str, Any]:
+    """Of a sequence of ours: what its import assumed, the hash of all that was recorded, and what made it."""
+    from vobench.sequence import has_truth, payload_hash, read_import_notes, read_provenance
+
+    if not has_truth(folder):
+        return {"notes": []}
+    return {
+        "notes": [text for key, text in read_import_notes(folder).items() if key.startswith("note_")],
+        "payload_sha256": payload_hash(folder),
+        "provenance": read_provenance(folder),
+    }
+
+
+def _print(facts: dict[str, Any]) -> None:
+    out = terminal.console()
+    out.print(f"{facts['path']}: form '{facts['form']}', {facts['frames']} frames")
+    for name, topics in facts["files"].items():
+        rows = [[t["name"], t["type_name"], str(t["count"]), _rate(t), _span(t)] for t in topics]
+        out.print(terminal.table(name, ["name", "kind", "messages", "Hz", "seconds"], rows))
+    for side in ("left", "right"):
+        if camera := facts["calibration"].get(side):
+            out.print(f"{side} camera: " + ", ".join(_entry(*item) for item in camera.items()))
+    rest = {key: facts["calibration"][key] for key in ("baseline_m", "imu_rate_hz", "wheels")}
+    out.print("; ".join(_entry(key, value) for key, value in rest.items()))
+    out.print(_truth_line(facts["ground_truth"]))
+    for note in facts["notes"]:
+        out.print(f"- {note}")
+    if "payload_sha256" in facts:
+        out.print(f"payload SHA-256: {facts['payload_sha256']}")
+        out.print(", ".join(f"{name} {version}" for name, version in facts["provenance"].items()) or "no provenance")
+
+
+def _entry(key: str, value: Any) -> str:
+    if isinstance(value, dict):
+        return f"{key}: " + ", ".join(_entry(*item) for item in value.items())
+    return f"{key} {'none' if value is None else f'{value:.6g}' if isinstance(value, float) else value}"
+
+
+def _rate(topic: dict[str, Any]) -> str:
+    return f"{topic['rate_hz']:.2f}" if topic["rate_hz"] else ""
+
+
+def _span(topic: dict[str, Any]) -> str:
+    return "" if topic["start_ns"] is None else f"{(topic['end_ns'] - topic['start_ns']) / 1e9:.3f}"
+
+
+def _truth_line(truth: dict[str, Any] | None) -> str:
+    if truth is None:
+        return "ground truth: none"
+    return f"ground truth: {truth['poses']} poses, {truth['path_m']:.3f} m, {truth['duration_s']:.3f} s"

@@ -1,0 +1,73 @@
+"""The parts of a recording put together, and held against each other."""
+
+from collections.abc import Iterable
+
+from vobench.dataset.recording import Recording
+from vobench.dataset.stream import PictureStream
+from vobench.dataset.truth import cut_to
+from vobench.errors import InputError
+from vobench.geometry.rectify import rectification
+from vobench.geometry.rig import Rig
+from vobench.sensor.imu import ImuReadings
+from vobench.trajectory.trajectory import Stamps, Trajectory
+
+LEAST_BASELINE_M = 1e-6
+UNRECTIFIABLE = "The right camera is not to the right of the left one and looking the same way: nothing rectifies them."
+MOST_NS = 2**31 * 10**9 - 1  # ROS keeps seconds in 32 bits
+
+
+def assemble(
+    form: str,
+    rig: Rig,
+    stream: PictureStream,
+    t_ns: Stamps,
+    *,
+    truth: Trajectory | None,
+    imu: ImuReadings | None = None,
+    notes: Iterable[str] = (),
+    calibration: str,
+) -> Recording:
+    """A recording with pictures at t_ns (N,); `calibration` is the file that says what the rig is.
+
+    Raises InputError where pictures are not of the rig's size, or stamps are before 0 or beyond ROS's seconds.
+    """
+    stream.require(rig, calibration)
+    said = [*notes, *_pair_notes(rig, calibration), *stream.notes()]
+    if truth is None:
+        said.append("There is no ground truth.")
+    else:
+        truth, cut = cut_to(truth, t_ns)
+        said += cut
+    starts = [_span(t_ns, "picture")]
+    if truth is not None:
+        starts.append(_span(truth.t_ns, "true pose"))
+    if imu is not None and len(imu.t_ns):
+        starts.append(_span(imu.t_ns, "IMU reading"))
+    return Recording(
+        form=form,
+        rig=rig,
+        frames=stream.frames,
+        encoded_frames=stream.encoded_frames,
+        frame_count=len(t_ns),
+        start_ns=min(starts),
+        truth=truth,
+        imu=imu,
+        notes=tuple(dict.fromkeys(said)),
+    )
+
+
+def _pair_notes(rig: Rig, calibration: str) -> tuple[str, ...]:
+    """What is odd about a pair. Raises InputError where both cameras are in one place."""
+    if rig.right is None:
+        return ()
+    if not rig.baseline_m > LEAST_BASELINE_M:
+        raise InputError(f"left and right camera are in the same place, {rig.baseline_m:g} m apart: {calibration}")
+    return () if rectification(rig) else (UNRECTIFIABLE,)
+
+
+def _span(t_ns: Stamps, what: str) -> int:
+    """The first stamp. Raises InputError where one is no ROS time."""
+    first, last = int(t_ns[0]), int(t_ns[-1])
+    if first < 0 or last > MOST_NS:
+        raise InputError(f"stamps should be within 0 and {MOST_NS} ns, but a {what} has {first if first < 0 else last}")
+    return first

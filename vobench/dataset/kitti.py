@@ -1,0 +1,134 @@
+"""Recordings in the layout of KITTI's odometry benchmark: rectified pinholes, one pose a picture."""
+
+from pathlib import Path
+
+import numpy as np
+
+from vobench.dataset.assemble import assemble
+from vobench.dataset.calibration import chain_rig, no_calibration
+from vobench.dataset.files import read_text, unread
+from vobench.dataset.options import Options
+from vobench.dataset.picture_list import in_step, numbered, shots_of
+from vobench.dataset.recording import Recording
+from vobench.dataset.stream import PictureStream
+from vobench.dataset.truth import read_truth_file
+from vobench.errors import InputError
+from vobench.geometry import se3
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import Rig, looking
+from vobench.geometry.se3 import Array
+from vobench.trajectory.table import content, read_table
+from vobench.trajectory.trajectory import Stamps, Trajectory
+from vobench.trajectory.unstamped import parse_times
+
+PAIRS = (("image_0", "image_1"), ("image_2", "image_3"))  # grey, colour
+CALIBRATION, TIMES, POSES = "calib.txt", "times.txt", "poses.txt"
+T_BODY_GREY = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))
+SKEW_TOLERANCE = 1e-6  # of KITTI's seven digits: K's lower triangle is zero
+
+Notes = tuple[str, ...]
+
+
+def read_kitti(folder: Path, options: Options) -> Recording:
+    """A folder such as sequences/00; the body is the camera of image_0, its axes ahead, left, up. Raises InputError."""
+    names, pair_notes = _pair(folder)
+    eyes = [numbered(folder / name) for name in names]
+    in_step(eyes[0], eyes[1] if len(eyes) > 1 else None)
+    t_ns = _times(folder / TIMES, len(eyes[0]), folder / names[0])
+    stream = PictureStream.open(shots_of(t_ns, *eyes))
+    rig, calibration, lens_notes = _rig(folder, names, stream.size_px, options)
+    truth, truth_notes = _truth(folder, t_ns, options)
+    notes = ("The body is the left grey camera, x ahead, y left, z up.", *pair_notes, *lens_notes, *truth_notes)
+    notes += unread(folder, *PAIRS[0], *PAIRS[1], CALIBRATION, TIMES, POSES, f"{folder.absolute().name}.txt")
+    return assemble("kitti", rig, stream, t_ns, truth=truth, notes=notes, calibration=str(calibration))
+
+
+def _pair(folder: Path) -> tuple[tuple[str, ...], Notes]:
+    """The folders of the eyes: grey ones before colour ones, two before one."""
+    there = [tuple(name for name in pair if (folder / name).is_dir()) for pair in PAIRS]
+    whole = [pair for pair in PAIRS if pair in there]
+    if whole:
+        others = [name for pair in there for name in pair if name not in whole[0]]
+        return whole[0], ((f"The pictures of {' and '.join(others)} were dropped.",) if others else ())
+    single = next((pair[:1] for pair in PAIRS if pair[0] in there[0] + there[1]), None)
+    if single is None:
+        wanted = " or ".join(" and ".join(pair) for pair in PAIRS)
+        raise InputError(f"no folders {wanted} with pictures in {folder}")
+    return single, (f"There is one camera: {single[0]} has no partner.",)
+
+
+def _times(path: Path, count: int, pictures: Path) -> Stamps:
+    """A stamp for each picture, exact to the nanosecond."""
+    t_ns = parse_times(read_text(path), name=str(path))
+    if len(t_ns) != count:
+        raise InputError(f"{len(t_ns)} times for {count} pictures in {pictures}: {path}")
+    return t_ns
+
+
+def _rig(folder: Path, names: tuple[str, ...], size_px: tuple[int, int], options: Options) -> tuple[Rig, Path, Notes]:
+    """The cameras by calib.txt, which knows no picture's size, or by Kalibr's chain; and which file that was."""
+    if options.calibration is not None:
+        rig, notes = chain_rig(options.calibration, len(names), "left")
+        return _level(rig), options.calibration, (f"The calibration is that of {options.calibration.name}.", *notes)
+    path = folder / CALIBRATION
+    if not path.exists():
+        raise no_calibration(path)
+    matrices = read_calibration(path)
+    needed = [f"P{name[-1]}" for name in names]
+    missing = [name for name in needed if name not in matrices]
+    if missing:
+        raise InputError(f"{path}: no matrix {missing[0]}, which is that of {names[needed.index(missing[0])]}")
+    eyes = [_camera(matrices[name], size_px, f"{path}: {name}") for name in needed]
+    (left, T_grey_left), (right, T_grey_right) = eyes[0], eyes[1] if len(eyes) > 1 else (None, None)
+    return _level(Rig(left, right, T_grey_left, T_grey_right)), path, _other_matrices(matrices, needed)
+
+
+def _level(rig: Rig) -> Rig:
+    """A rig on the grey camera's axes, on the body's."""
+    T_grey_right = rig.T_body_right
+    T_body_right = None if T_grey_right is None else T_BODY_GREY @ T_grey_right
+    return Rig(rig.left, rig.right, T_BODY_GREY @ rig.T_body_left, T_body_right)
+
+
+def read_calibration(path: Path) -> dict[str, Array]:
+    """The matrices (3, 4) of calib.txt by name. Raises TrajectoryError naming the line that is none."""
+    rows = [(line, *body.partition(":")) for line, body in content(read_text(path))]
+    odd = next((line for line, _, colon, _ in rows if not colon), None)
+    if odd is not None:
+        raise InputError(f"{path}:{odd}: a line should be a name, a colon and a matrix, as in `P0: 718.9 0 607.2 ...`")
+    named = [(line, name.strip(), rest) for line, name, _, rest in rows if name.strip()[:1] in "PT"]
+    columns = tuple(f"{row}{column}" for row in range(3) for column in range(4))
+    table = read_table([(line, rest) for line, _, rest in named], name=str(path), columns=columns, row="a matrix")
+    return {name: values.reshape(3, 4) for (_, name, _), values in zip(named, table.values, strict=True)}
+
+
+def _camera(P: Array, size_px: tuple[int, int], place: str) -> tuple[Pinhole, Array]:
+    """A pinhole K and its place T_body_camera, of P = K [1 | t] where the body is what P takes points from."""
+    K = P[:, :3]
+    upright = np.abs([K[0, 1], *K[1:, 0], K[2, 1], K[2, 2] - 1]).max() <= SKEW_TOLERANCE
+    if not (upright and K[0, 0] > 0 and K[1, 1] > 0):
+        raise InputError(f"{place} should be a rectified camera, fx 0 cx / 0 fy cy / 0 0 1, but is {K.tolist()}")
+    camera = Pinhole(*size_px, float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
+    return camera, se3.transform(np.eye(3), -np.linalg.solve(K, P[:, 3]))
+
+
+def _other_matrices(matrices: dict[str, Array], used: list[str]) -> Notes:
+    others = [name for name in matrices if name not in used]
+    return (f"{', '.join(others)} of {CALIBRATION} were not used.",) if others else ()
+
+
+def _truth(folder: Path, t_ns: Stamps, options: Options) -> tuple[Trajectory | None, Notes]:
+    """The poses beside the pictures or where KITTI has them, one a picture."""
+    folder = folder.absolute()
+    named = f"{folder.name}.txt"
+    beside = (folder / POSES, folder / named, folder.parent.parent / "poses" / named)
+    path = options.truth or next((path for path in beside if path.is_file()), None)
+    if path is None:
+        return None, ()
+    truth, notes = read_truth_file(path, t_ns)
+    turned = Trajectory(truth.t_ns, T_BODY_GREY @ truth.T_world_frame @ T_BODY_GREY.T)
+    return turned, (
+        f"The truth is {path.name}, of the left grey camera; its world is that camera at the start, turned from "
+        "x right, y down, z ahead to x ahead, y left, z up.",
+        *notes,
+    )

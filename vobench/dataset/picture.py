@@ -1,0 +1,158 @@
+"""Pictures as datasets have them, told by their headers, to 8-bit grey ones; what is that already stays bit for bit."""
+
+import struct
+import zlib
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench.dataset.files import require_itself
+from vobench.errors import InputError
+
+Image = NDArray[np.uint8]
+Form = Literal["png", "jpeg", "pixels"]
+PNG, JPEG, JPEG_END = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\xff\xd9"
+PNG_CHANNELS = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}  # by colour type; a palette's colours count
+MOST_PIXELS = 1 << 26  # 67 megapixels; a header that asks for more is a mistake or a trap
+GREY_SHARES = "0.299 red + 0.587 green + 0.114 blue"
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture as it was found: a PNG's or JPEG's bytes, or pixels (H, W) or (H, W, 3) blue, green, red, 8 or 16 bits.
+
+    `name` is for messages.
+    """
+
+    name: str
+    content: bytes | NDArray[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What a picture's header says: size, channels and bits of each. A grey one has one channel and no alpha."""
+
+    width_px: int
+    height_px: int
+    channels: int
+    bits: int
+    form: Form
+
+    @property
+    def is_grey8(self) -> bool:
+        """Whether nothing needs to be converted."""
+        return self.channels == 1 and self.bits == 8
+
+    def __str__(self) -> str:
+        colour = {1: "grey", 2: "grey with alpha", 3: "colour", 4: "colour with alpha"}[self.channels]
+        return f"{self.width_px} x {self.height_px} pixels, {self.bits}-bit {colour}"
+
+
+def kind_of(picture: Picture) -> Kind:
+    """The kind of a picture, and that it is whole. Raises InputError for what is no PNG or JPEG, or cut off."""
+    if not isinstance(picture.content, bytes):
+        height, width = picture.content.shape[:2]
+        channels = 1 if picture.content.ndim == 2 else picture.content.shape[2]
+        return Kind(width, height, channels, picture.content.itemsize * 8, "pixels")
+    require_itself(picture.content, picture.name)
+    if picture.content.startswith(PNG):
+        kind = _png_kind(picture.content, picture.name)
+    elif picture.content.startswith(JPEG):
+        kind = _jpeg_kind(picture.content, picture.name)
+    else:
+        begins = "it is empty" if not picture.content else f"it begins with {picture.content[:8]!r}"
+        raise InputError(f"a picture should be a PNG or JPEG file, but {begins}: {picture.name}")
+    if not 0 < kind.width_px * kind.height_px <= MOST_PIXELS:
+        raise InputError(f"{kind.width_px} x {kind.height_px} pixels are no picture: {picture.name}")
+    return kind
+
+
+def grey(picture: Picture, kind: Kind) -> Image:
+    """The picture (H, W) in 8-bit grey; of 16 bits the upper eight. Raises InputError where it does not decode."""
+    pixels = picture.content if isinstance(picture.content, np.ndarray) else _decoded(picture, kind)
+    if pixels.ndim == 3:
+        pixels = cv2.cvtColor(np.ascontiguousarray(pixels[..., :3]), cv2.COLOR_BGR2GRAY)
+    if pixels.dtype == np.uint16:
+        pixels = pixels >> 8
+    return np.ascontiguousarray(pixels, np.uint8)
+
+
+def as_file(picture: Picture, kind: Kind) -> tuple[bytes, str]:
+    """An 8-bit grey PNG or JPEG and which it is: the found file itself where it is that. Raises InputError."""
+    if isinstance(picture.content, bytes) and kind.is_grey8:
+        return picture.content, kind.form
+    return cv2.imencode(".png", grey(picture, kind))[1].tobytes(), "png"
+
+
+def conversions(kind: Kind) -> tuple[str, ...]:
+    """Sentences on what `grey` does to pictures of a kind."""
+    said = []
+    if kind.channels > 2:
+        said.append(f"Colour pictures were turned grey: {GREY_SHARES} (ITU-R BT.601).")
+    if kind.channels in (2, 4):
+        said.append("The pictures' alpha channel was dropped.")
+    if kind.bits == 16:
+        said.append("Pictures of 16 bits were cut to their upper 8 bits (divided by 256, rounded down).")
+    elif kind.bits < 8:
+        said.append(f"Pictures of {kind.bits} bits were spread over 8 bits.")
+    return tuple(said)
+
+
+def _decoded(picture: Picture, kind: Kind) -> NDArray[Any]:
+    """The pixels of a whole file. Raises InputError."""
+    try:
+        pixels = cv2.imdecode(np.frombuffer(bytes(picture.content), np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        pixels = None
+    if pixels is None or pixels.dtype not in (np.uint8, np.uint16):
+        raise InputError(f"the {kind.form.upper()} file does not decode: {picture.name}")
+    if pixels.shape[:2] != (kind.height_px, kind.width_px):
+        raise InputError(f"the header says {kind}, but {pixels.shape[1]} x {pixels.shape[0]} decode: {picture.name}")
+    if pixels.ndim == 3 and kind.channels == 2:
+        return pixels[..., 0]  # OpenCV repeats a grey channel that has an alpha
+    return pixels
+
+
+def _png_kind(data: bytes, name: str) -> Kind:
+    """Size and depth by the first chunk; every chunk's checksum is right, and the last is the end."""
+    place, first, transparent = len(PNG), b"", 0
+    while place + 12 <= len(data):
+        length, kind = struct.unpack_from(">I4s", data, place)
+        end = place + 12 + length
+        if end > len(data):
+            break
+        if zlib.crc32(memoryview(data)[place + 4 : end - 4]) != struct.unpack_from(">I", data, end - 4)[0]:
+            raise InputError(f"the PNG is damaged (checksum of its chunk at byte {place}): {name}")
+        first = first or data[place + 8 : end - 4]
+        transparent |= kind == b"tRNS"
+        place = end
+        if kind == b"IEND":
+            return _png_header(first, name, alpha=bool(transparent))
+    raise InputError(f"the PNG is cut off after {len(data)} bytes: {name}")
+
+
+def _png_header(header: bytes, name: str, *, alpha: bool) -> Kind:
+    if len(header) != 13 or header[9] not in PNG_CHANNELS:
+        raise InputError(f"the PNG has no header that makes sense: {name}")
+    width, height, bits, colour = struct.unpack_from(">IIBB", header)
+    channels = PNG_CHANNELS[colour] + (alpha and colour != 3)
+    return Kind(width, height, channels + (alpha and colour == 3), 8 if colour == 3 else bits, "png")
+
+
+def _jpeg_kind(data: bytes, name: str) -> Kind:
+    """Size by the frame's header, the first of the segments named so. Raises InputError."""
+    if not data.rstrip(b"\0").endswith(JPEG_END):
+        raise InputError(f"the JPEG is cut off after {len(data)} bytes: {name}")
+    place = 2
+    while place + 9 < len(data) and data[place] == 0xFF:
+        marker = data[place + 1]
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
+            bits, height, width, channels = struct.unpack_from(">BHHB", data, place + 4)
+            if bits != 8 or channels not in (1, 3):
+                raise InputError(f"a JPEG should have 8 bits and 1 or 3 channels, not {bits} and {channels}: {name}")
+            return Kind(width, height, channels, bits, "jpeg")
+        place += 2 + struct.unpack_from(">H", data, place + 2)[0]
+    raise InputError(f"the JPEG has no header that makes sense: {name}")

@@ -1,0 +1,53 @@
+"""Ground truth beside pictures: read from its file, its rotations made exact, cut to the pictures' time."""
+
+from pathlib import Path
+
+import numpy as np
+
+from vobench.dataset.files import read_text
+from vobench.errors import InputError
+from vobench.geometry import se3
+from vobench.trajectory.form import parse_any
+from vobench.trajectory.trajectory import Stamps, Trajectory
+
+EXACT = 1e-9  # a rotation this far off its transpose's inverse was written with all its digits
+
+
+def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, tuple[str, ...]]:
+    """A trajectory in any form of text, and what was done to it; a row without a stamp has that of its picture.
+
+    Raises TrajectoryError naming file and line for a pose that is none, InputError where rows and pictures differ.
+    """
+    parsed = parse_any(read_text(path), name=str(path))
+    if parsed.t_ns is None and len(parsed.T) != len(frames_ns):
+        raise InputError(f"{len(parsed.T)} poses without stamps for {len(frames_ns)} pictures: {path}")
+    T, off = parsed.T, _skew(parsed.T)
+    notes = []
+    if off > EXACT:
+        T = se3.transform(se3.nearest_rotation(T[:, :3, :3]), T[:, :3, 3])
+        notes.append(f"Rotations of {path.name} were made exact; they were up to {off:.1g} off.")
+    return Trajectory(frames_ns if parsed.t_ns is None else parsed.t_ns, T), tuple(notes)
+
+
+def cut_to(truth: Trajectory, frames_ns: Stamps) -> tuple[Trajectory | None, tuple[str, ...]]:
+    """The truth from the last pose before the first picture to the first after the last one, and what that dropped."""
+    first, last = int(frames_ns[0]), int(frames_ns[-1])
+    t_ns = truth.t_ns
+    if not len(t_ns) or t_ns[-1] < first or t_ns[0] > last:
+        when = f" ({t_ns[0]} to {t_ns[-1]} ns)" if len(t_ns) else ""
+        return None, (f"The truth{when} was dropped: it shares no time with the pictures ({first} to {last} ns).",)
+    begin = max(int(np.searchsorted(t_ns, first, side="right")) - 1, 0)
+    end = int(np.searchsorted(t_ns, last, side="left")) + 1
+    kept = Trajectory(t_ns[begin:end], truth.T_world_frame[begin:end])
+    notes = []
+    if len(kept) < len(truth):
+        notes.append(f"{len(truth) - len(kept)} of {len(truth)} true poses lie outside the pictures' time; dropped.")
+    bare = int(np.sum((frames_ns < t_ns[0]) | (frames_ns > t_ns[-1])))
+    if bare:
+        notes.append(f"{bare} of {len(frames_ns)} pictures lie outside the truth's time; they have no true pose.")
+    return kept, tuple(notes)
+
+
+def _skew(T: np.ndarray) -> float:
+    R = T[:, :3, :3]
+    return float(np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0))

@@ -1,0 +1,91 @@
+"""Recordings that were made elsewhere: read before anything is run, and kept in the store as sequences."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from vobench import __version__
+from vobench.dataset.options import Options, Topics
+from vobench.dataset.recording import Recording
+from vobench.errors import SuiteError
+from vobench.pipeline.workshop import Workshop
+from vobench.results.store import Store, code_digest, library_versions
+from vobench.suite.expand import Plan
+from vobench.suite.source_spec import RecordedCase
+
+LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "mcap", "rosbags")
+
+
+def read_all(plan: Plan) -> dict[str, Recording]:
+    """The recording of each recorded case by its name: said before hours of work.
+
+    Raises SuiteError, at the place in the suite's file, where one cannot be read or has no ground truth.
+    """
+    recordings = {}
+    for case in plan.recorded:
+        with plan.at("source"):
+            recordings[case.name] = recording = read_case(case)
+            if recording.truth is None:
+                raise SuiteError(f"no ground truth, so nothing could be scored: {case.source.path}")
+    return recordings
+
+
+def read_case(case: RecordedCase) -> Recording:
+    """The recording of a case. Raises VobenchError, naming the file, for whatever is wrong with it."""
+    from vobench.dataset.read import read
+
+    source = case.source
+    options = Options(
+        calibration=_path(source.calibration),
+        imu=_path(source.imu),
+        truth=_path(source.truth),
+        rate_hz=source.rate_hz,
+        topics=Topics(**source.topics.model_dump()),
+    )
+    return read(Path(source.path), form=source.form, options=options)
+
+
+def _path(file: str | None) -> Path | None:
+    return None if file is None else Path(file)
+
+
+def import_case(case: RecordedCase, shop: Workshop) -> Path:
+    """The folder of the case's sequence; made where the store has none of these files as they are now."""
+    return shop.store.get("sequences", _inputs(case), lambda folder: _convert(case, folder, shop))
+
+
+def is_imported(case: RecordedCase, store: Store) -> bool:
+    """Whether the store has the case's sequence already."""
+    return store.path("sequences", _inputs(case)).is_dir()
+
+
+def _convert(case: RecordedCase, folder: Path, shop: Workshop) -> None:
+    with shop.progress.step(f"import {case.name}"):
+        import_recording(read_case(case), folder)
+
+
+def import_recording(recording: Recording, folder: Path) -> None:
+    """Write a recording as a sequence, and with which versions. Raises VobenchError where a picture is wrong."""
+    from vobench.dataset.convert import convert
+
+    convert(recording, folder, provenance={"vobench": __version__, **library_versions(*LIBRARIES)})
+
+
+def _inputs(case: RecordedCase) -> dict[str, Any]:
+    """All that an imported sequence depends on; files by size and time of change, for reading gigabytes is slow."""
+    source, truth = case.source, read_case(case).truth
+    files = [Path(file) for file in (source.path, source.calibration, source.imu) if file]
+    return {
+        "source": source.model_dump(mode="json", exclude={"name"}),
+        "files": [line for path in files for line in _listing(path)],
+        # KITTI's lies outside the folder.
+        "truth": hashlib.sha256(truth.t_ns.tobytes() + truth.T_world_frame.tobytes()).hexdigest() if truth else "",
+        "code": code_digest("geometry", "trajectory", "sensor", "sequence", "dataset"),
+        "libraries": library_versions(*LIBRARIES),
+    }
+
+
+def _listing(path: Path) -> list[str]:
+    """A line for each file: its path, size and time of change."""
+    files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+    return [f"{file.relative_to(path)} {(stat := file.stat()).st_size} {stat.st_mtime_ns}" for file in files]

@@ -1,0 +1,93 @@
+"""A rig as a bag tells it: static transforms, CameraInfo, and notes for what ROS has no message for."""
+
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any
+
+from vobench.errors import InputError, SequenceError
+from vobench.geometry.rig import ImuCalibration, Rig, WheelGeometry
+from vobench.geometry.se3 import Array
+from vobench.sequence import messages as ros
+from vobench.sequence.bag import Bag, BagWriter
+from vobench.sequence.cdr import serialise
+
+WHEELS_NOTE, IMU_NOTE = "vobench.wheels", "vobench.imu"
+IMU_NUMBERS = tuple(field.name for field in fields(ImuCalibration) if field.name != "T_body_imu")
+
+
+def write_mounts(bag: BagWriter, rig: Rig, t_ns: int) -> None:
+    """Note the wheels and the IMU, and write where everything sits on the body."""
+    if rig.wheels:
+        bag.note(WHEELS_NOTE, _wheel_entries(rig.wheels))
+    if rig.imu:
+        bag.note(IMU_NOTE, {name: repr(float(getattr(rig.imu, name))) for name in IMU_NUMBERS})
+    bag.write(ros.TF_STATIC, t_ns, serialise(ros.transforms(t_ns, ros.BODY, _mounts(rig))))
+
+
+def read_rig(bag: Bag, info_topics: Sequence[ros.Topic]) -> Rig:
+    """The rig of a bag, its cameras by their topics: the left one, and the right one where there is one.
+
+    Raises SequenceError where the calibration is missing or makes no sense.
+    """
+    bag.require((ros.TF_STATIC, *info_topics[:1]))
+    cameras = [ros.camera(_first(bag, topic)) for topic in info_topics if bag.has(topic)]
+    T_body = _read_mounts(bag)
+    left, right = cameras[0], cameras[1] if len(cameras) > 1 else None
+    T_body_right = _mount(bag, T_body, ros.RIGHT) if right else None
+    return Rig(left, right, _mount(bag, T_body, ros.LEFT), T_body_right, _read_wheels(bag), _read_imu(bag, T_body))
+
+
+def _mounts(rig: Rig) -> dict[str, Array]:
+    T_body = dict(zip((ros.LEFT, ros.RIGHT), (rig.T_body_camera(side) for side in rig.sides), strict=False))
+    return {**T_body, ros.IMU_FRAME: rig.imu.T_body_imu} if rig.imu else T_body
+
+
+def _wheel_entries(wheels: WheelGeometry) -> dict[str, str]:
+    return {
+        "radius_m": repr(float(wheels.radius_m)),
+        "track_m": repr(float(wheels.track_m)),
+        "ticks_per_revolution": str(wheels.ticks_per_revolution),
+    }
+
+
+def _first(bag: Bag, topic: ros.Topic) -> Any:
+    if not bag.count(topic):
+        raise SequenceError(f"{topic.name} has no message in {bag.path}")
+    return bag.message(topic, *bag.nth((topic,), 0))
+
+
+def _read_mounts(bag: Bag) -> dict[str, Array]:
+    stamped = _first(bag, ros.TF_STATIC).transforms
+    return {t.child_frame_id: ros.poses(ros.pose_fields(t.transform)) for t in stamped}
+
+
+def _mount(bag: Bag, T_body: dict[str, Array], frame: str) -> Array:
+    if frame not in T_body:
+        raise SequenceError(f"{ros.TF_STATIC.name} does not say where {frame} is mounted in {bag.path}")
+    return T_body[frame]
+
+
+def _read_wheels(bag: Bag) -> WheelGeometry | None:
+    entries = bag.note(WHEELS_NOTE)
+    if not entries:
+        return None
+    try:
+        radius_m, track_m = float(entries["radius_m"]), float(entries["track_m"])
+        return WheelGeometry(radius_m, track_m, int(entries["ticks_per_revolution"]))
+    except (KeyError, ValueError, InputError) as error:
+        raise SequenceError(
+            f"the wheels are not described as radius, track and ticks ({error!r}) in {bag.path}"
+        ) from error
+
+
+def _read_imu(bag: Bag, T_body: dict[str, Array]) -> ImuCalibration | None:
+    entries = bag.note(IMU_NOTE)
+    if not entries:
+        return None
+    try:
+        numbers = [float(entries[name]) for name in IMU_NUMBERS]
+    except (KeyError, ValueError) as error:
+        raise SequenceError(
+            f"the IMU is not described as {', '.join(IMU_NUMBERS)} ({error!r}) in {bag.path}"
+        ) from error
+    return ImuCalibration(_mount(bag, T_body, ros.IMU_FRAME), *numbers)

@@ -1,0 +1,146 @@
+"""MCAP records read within bounds: no length that a file states is believed before it is checked.
+
+The `mcap` library believes them: a few bytes then ask for exabytes. Source: mcap.dev/spec.
+"""
+
+import os
+import struct
+import zlib
+from collections.abc import Container, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+import lz4.frame
+import zstandard
+from mcap.opcode import Opcode
+
+from vobench.errors import SequenceError
+
+MAGIC = b"\x89MCAP0\r\n"
+LFS_START = b"version https://git-lfs"
+MAX_BYTES = 1 << 28  # of a record, and of a chunk unpacked; a writer's chunks are a thousand times smaller
+MAX_RECORDS = 1 << 20  # in a chunk or a summary; a few bytes of zstd could unpack to endless empty ones
+
+HEAD = struct.Struct("<BQ")  # opcode, length of what follows
+CHUNK = struct.Struct("<QQQII")  # first and last log time, size and checksum unpacked, length of the name that follows
+MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+DATA_LENGTH = struct.Struct("<Q")
+
+
+@contextmanager
+def parsing(path: Path) -> Iterator[None]:
+    """Say of any failure inside, in one line, what is wrong with the file at `path`.
+
+    A torn or foreign file makes parsers raise errors of a dozen unrelated kinds.
+    """
+    try:
+        yield
+    except SequenceError:
+        raise
+    except FileNotFoundError:
+        raise SequenceError(_missing(path)) from None
+    except Exception as error:
+        raise SequenceError(f"{_ailment(path, error)}: {path}") from error
+
+
+def _missing(path: Path) -> str:
+    part = part_of(path)
+    if part.exists():
+        return f"the recording was never finished; `vobench salvage` recovers what is whole: {part}"
+    return f"no recording at {path}"
+
+
+def part_of(path: Path) -> Path:
+    """Where a file is while it is being written."""
+    return path.with_name(path.name + ".part")
+
+
+def _ailment(path: Path, error: Exception) -> str:
+    """What is wrong with a file that could not be read, by its first and its last bytes."""
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(len(LFS_START))
+            stream.seek(max(0, os.fstat(stream.fileno()).st_size - len(MAGIC)))
+            end = stream.read()
+    except OSError as unreadable:
+        return f"the recording cannot be opened ({unreadable.strerror})"
+    if start == LFS_START:
+        return "this is a Git-LFS pointer instead of the recording; `git lfs pull` fetches it"
+    if not start.startswith(MAGIC):
+        return "not an MCAP recording by its first bytes"
+    if end != MAGIC:
+        return "the recording was cut off, its end is missing; `vobench salvage` recovers what is whole"
+    reason = str(error).splitlines()[0] if str(error) else "no reason given"
+    return f"the recording is damaged ({type(error).__name__}: {reason}); `vobench salvage` recovers what is whole"
+
+
+def read_at(stream: BinaryIO, offset: int, length: int) -> bytes:
+    """Just these bytes of a file. Raises ValueError where they are too many, or not all there."""
+    if length > MAX_BYTES:
+        raise ValueError(f"{length} bytes are stated where at most {MAX_BYTES} are read")
+    stream.seek(offset)
+    left = os.fstat(stream.fileno()).st_size - offset
+    if length > left:
+        raise ValueError(f"{length} bytes are stated at {offset}, but {max(0, left)} are left")
+    return stream.read(length)
+
+
+def read_record(stream: BinaryIO, offset: int, opcode: Opcode) -> bytes:
+    """What a record of this kind holds. Raises ValueError where there is none."""
+    found, length = HEAD.unpack(read_at(stream, offset, HEAD.size))
+    if found != opcode:
+        raise ValueError(f"{opcode.name.lower()} should begin at {offset}, but record {found} does")
+    return read_at(stream, offset + HEAD.size, length)
+
+
+def unpacked(chunk: bytes | memoryview) -> memoryview:
+    """The records of a chunk, from what its record holds. Raises ValueError where it is damaged or too large."""
+    _, _, size, checksum, name_length = CHUNK.unpack_from(chunk)
+    packing = bytes(chunk[CHUNK.size : CHUNK.size + name_length]).decode()
+    at = CHUNK.size + name_length
+    (length,) = DATA_LENGTH.unpack_from(chunk, at)
+    packed = memoryview(chunk)[at + DATA_LENGTH.size :]
+    if length != len(packed) or size > MAX_BYTES:
+        raise ValueError(f"a chunk of {len(packed)} bytes states {length}, and {size} unpacked")
+    records = memoryview(_unpack(packing, packed, size))
+    if len(records) != size or (checksum and zlib.crc32(records) != checksum):
+        raise ValueError("the checksum of a chunk differs from its content")
+    return records
+
+
+def _unpack(packing: str, packed: memoryview, size: int) -> bytes | memoryview:
+    """Raises an error of the packing's own where it is none, and never unpacks more than `size` bytes."""
+    if not packing:
+        return packed
+    if packing == "zstd":
+        stated = zstandard.frame_content_size(packed)
+        if stated not in (-1, size):  # the library goes by this number, and by ours where it is not there
+            raise ValueError(f"a chunk states {size} bytes unpacked and {stated}")
+        return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
+    if packing == "lz4":
+        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size))
+    raise ValueError(f"a chunk is packed as {packing!r}; zstd and lz4 are known")
+
+
+def records_in(records: memoryview) -> Iterator[tuple[int, memoryview]]:
+    """Opcode and content of each record of an unpacked chunk. Raises ValueError where one runs over the end."""
+    at, end = 0, len(records)
+    for _ in range(MAX_RECORDS):
+        if at >= end:
+            return
+        opcode, length = HEAD.unpack_from(records, at)
+        at += HEAD.size + length
+        if at > end:
+            raise ValueError("a record runs over the end of its chunk")
+        yield opcode, records[at - length : at]
+    raise ValueError(f"{MAX_RECORDS} records and more lie in one place")
+
+
+def messages_in(records: memoryview, channels: Container[int]) -> Iterator[tuple[int, int, memoryview]]:
+    """Channel, log time in ns and data of each message of some channels, as they lie in an unpacked chunk."""
+    for opcode, content in records_in(records):
+        if opcode == Opcode.MESSAGE:
+            channel, _, log_ns, _ = MESSAGE.unpack_from(content)
+            if channel in channels:
+                yield channel, log_ns, content[MESSAGE.size :]
