@@ -1,8 +1,8 @@
 """What a recording costs to write and to read, beside the `mcap` library moving the same messages without a meaning.
 
-    python benchmarks/sequence.py [--seconds 10] [--repeats 5] [--minutes 10] [--folder FOLDER]
+    python benchmarks/sequence.py [--seconds 20] [--repeats 5] [--minutes 10] [--folder FOLDER]
 
-Stereo pairs of 720 x 480 at 30 Hz, about 150 kB of PNG a picture, thirty of them over and over. The library is given
+Stereo pairs of 720 x 480 at 30 Hz, about 190 kB of PNG a picture, thirty of them over and over. The library is given
 serialised messages and gives them back, in chunks packed by zstd or, as vobench writes pictures, not packed; it tests
 checksums when reading, as vobench does, or nothing. Times are CPU and best of the repeats, taken by turns; the files
 of `--minutes` (0: none) need 0.7 GB a minute.

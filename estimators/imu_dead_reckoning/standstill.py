@@ -5,12 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from vobench.estimator import ImuReadings
+from vobench.geometry.camera import unit
 from vobench.geometry.rig import ImuCalibration
 from vobench.geometry.se3 import Array
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2
 
 # Readings at rest stay within so many sigma of their mean, and a little more for a chip's rounding.
 SIGMAS = 5.0
+COS_TILTED = float(np.cos(np.deg2rad(20)))  # a body on wheels feels no such slant; EuRoC's, with x up, does
 ROUNDING_RADPS, ROUNDING_MPS2 = 2e-3, 0.02
 
 
@@ -42,8 +44,8 @@ class Standstill:
     def verdict(self) -> Rest | None:
         """What is known of rest by now; None as long as it is undecided.
 
-        One who moves is taken to be level and its IMU without bias. One who stands still shows gravity, in which the
-        accelerometers' bias is then included, and the gyroscopes' bias.
+        One who moves is taken to be level, or tilted as it feels where that is plain, and its IMU without bias. One
+        who stands still shows gravity, in which the accelerometers' bias is then included, and the gyroscopes' bias.
         """
         r = self.readings
         if not len(r.t_ns):
@@ -51,11 +53,16 @@ class Standstill:
         root_hz = np.sqrt(self._imu.rate_hz)
         turns = _strays(r.gyro_radps, SIGMAS * self._imu.gyro_noise * root_hz + ROUNDING_RADPS)
         if turns or _strays(r.accel_mps2, SIGMAS * self._imu.accel_noise * root_hz + ROUNDING_MPS2):
-            up = self._imu.T_body_imu[2, :3]  # the body's z axis in the IMU's axes
-            return Rest(np.zeros(3), -STANDARD_GRAVITY_MPS2 * up)
+            return Rest(np.zeros(3), -STANDARD_GRAVITY_MPS2 * self._up())
         if r.t_ns[-1] - r.t_ns[0] < self._lasts_ns:
             return None
         return Rest(r.gyro_radps.mean(0), -r.accel_mps2.mean(0))
+
+    def _up(self) -> Array:
+        """Upwards (3,) in the IMU's axes: the body's z, unless what is felt so far is far from it."""
+        level, felt_mps2 = self._imu.T_body_imu[2, :3], self.readings.accel_mps2.mean(0)
+        is_tilted = felt_mps2 @ level < COS_TILTED * np.linalg.norm(felt_mps2)
+        return unit(felt_mps2) if is_tilted else level
 
 
 def _strays(readings: Array, tolerance: float) -> bool:

@@ -12,7 +12,7 @@ scenes: [closet]
 rigs: {it: {pitch_deg: 45, height_m: 0.3, forward_m: 0}}
 trajectories:
   legs: {targets_m: [[0.3, 0], [0.3, 0.3]], tolerance_m: 0.05}
-  spin: {kind: pure_rotation, angle_deg: 90, encoders: exact}
+  spin: {kind: pure_rotation, angle_deg: 90, mover: unicycle, encoders: exact}
   away: {kind: stop_and_go, legs_m: [2], mover: unicycle}
   lift: {kind: rail, points_m: [[0, 0, 0.2], [0.5, 0, 0.6]]}
 estimators: [stand_still]
@@ -41,6 +41,7 @@ def test_json_has_the_facts_in_full(vobench, ways):
     assert legs["reached_s"][-1] == pytest.approx(legs["duration_s"])
     assert legs["frames"] == round(legs["duration_s"] * 30) + 1
     assert spin["max_turn_degps"] == pytest.approx(np.rad2deg(1), rel=1e-3)
+    assert spin["max_turn_per_frame_deg"] == pytest.approx(np.rad2deg(1 / 30), rel=1e-3)
     assert spin["path_m"] == pytest.approx(0, abs=1e-9)
     assert spin["wheel_error_m"] == pytest.approx(0, abs=1e-3)
     assert away["path_m"] == pytest.approx(2, abs=1e-3)
@@ -58,6 +59,18 @@ def test_one_trajectory_may_be_chosen_and_exported(vobench, ways):
         rows = list(csv.DictReader(file))
     assert [int(row["t_ns"]) for row in rows] == true.t_ns.tolist()
     assert max(float(row["vx_mps"]) for row in rows) == pytest.approx(0.3, rel=1e-3)
+    assert max(float(row["ax_mps2"]) for row in rows) == pytest.approx(0.5, rel=0.05)
+
+
+def test_the_plot_shows_the_floor_and_the_point_that_is_led_where_there_are_such(vobench, ways):
+    suite = ways / "suites" / "ways.yaml"
+    patch = "floor: [{surface: carpet, center_m: [0.2, 0.1], size_m: [0.1, 0.4], yaw_deg: 90}]"
+    suite.write_text(WAYS.replace("mover: unicycle, encoders: exact", patch))
+    for name in ("legs", "spin"):
+        assert vobench("drive", "ways", "-t", name, "--out", f"{name}.svg").code == 0
+    legs, spin = ((ways / f"{name}.svg").read_text() for name in ("legs", "spin"))
+    assert [word in legs for word in ("point h", "carpet", "u asked for")] == [True, False, True]
+    assert [word in spin for word in ("point h", "carpet", "u asked for")] == [False, True, True]
 
 
 @pytest.mark.parametrize("ending", ["svg", "png", "pdf"])

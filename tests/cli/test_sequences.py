@@ -24,6 +24,24 @@ def test_what_is_exported_can_be_imported_and_keeps_its_pictures(vobench, sequen
     assert vobench("info", "back", "--json").json["frames"] == imported["frames"] == frames
 
 
+@pytest.mark.parametrize(("form", "files"), [("euroc", 1), ("kitti", 2), ("tum", 1)])
+def test_a_trajectory_is_exported_as_text(vobench, here, ran, form, files):
+    truth = ran / "latest" / "cases" / "short" / "ground_truth.tum"
+    exported = vobench("export", truth, "path.txt", "--form", form, "--json").json
+    assert exported["files"] == len(list(here.glob("path*.txt"))) == files
+    times = ("--times", "path.times.txt") if form == "kitti" else ()
+    errors = vobench("score", truth, "path.txt", *times, "--json").json
+    assert next(m for m in errors["metrics"] if m["name"] == "ate_trans")["max"] < 1e-9
+    again = vobench("export", truth, "path.txt", "--form", form)
+    assert again.err.endswith("choose another name or take it away: path.txt\n")
+
+
+def test_a_trajectory_without_stamps_is_not_exported(vobench, here):
+    (here / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 2)
+    said = vobench("export", "poses.txt", "out.tum", "--form", "tum")
+    assert said.err == "vobench: poses without stamps, which the other forms need: poses.txt\n"
+
+
 def test_an_import_says_all_that_it_assumed(vobench, sequence):
     vobench("export", sequence, "out", "--form", "kitti")
     said = vobench("import", "out", "back")
@@ -81,7 +99,10 @@ WRONG = [
     (("import", "suites", "scenes"), "should be a new or empty folder, but there is something: scenes"),
     (("import", "suites", "out", "--form", "eurok"), "no form 'eurok'. Did you mean 'euroc'?"),
     (("import", "suites", "out", "--topic", "lft=/a"), "no topic named 'lft'. Did you mean 'left'?"),
-    (("export", "suites", "out", "--form", "euroc"), "no recording at suites/sensors.mcap"),
+    (
+        ("export", "suites", "out", "--form", "euroc"),
+        "no sequence of ours (it has no sensors.mcap); vobench import makes one: suites",
+    ),
     (("export", "suites", "out", "--form", "eurok"), "eurok"),
     (("salvage", "suites/tiny.yaml", "out.mcap"), "not an MCAP recording by its first bytes: suites/tiny.yaml"),
     (("salvage", "nothing.mcap", "out.mcap"), "nothing.mcap"),

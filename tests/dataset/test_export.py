@@ -74,7 +74,7 @@ def test_a_folder_in_use_a_file_and_an_unknown_form_are_sentences(make_sequence:
     (tmp_path / "used/mine.txt").write_text("keep")
     (tmp_path / "file").write_text("keep")
     for out in (tmp_path / "used", tmp_path / "file", made.folder):
-        with pytest.raises(InputError, match="a folder of its own") as caught:
+        with pytest.raises(InputError, match="a new or empty folder") as caught:
             export(made.folder, out, "euroc")
         assert str(out) in str(caught.value)
     with pytest.raises(InputError, match=r"no form 'rosbag' to export to\. Known: euroc, kitti, tum, ros2"):

@@ -1,3 +1,4 @@
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -7,8 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from ruamel.yaml import YAML
 
-from vobench.dataset.kalibr import camchain, number, read_camchain, read_imu
+from vobench.dataset.kalibr import camchain, imu_yaml, number, read_camchain, read_imu
 from vobench.dataset.reproject import PIXEL_TOLERANCE, check_rig, known_points, pixel_difference
 from vobench.errors import InputError, SequenceError
 from vobench.geometry import se3
@@ -16,8 +18,11 @@ from vobench.geometry.camera import Camera
 from vobench.geometry.preset import PRESETS
 from vobench.geometry.rig import Rig, mounted
 from vobench.geometry.sphere import DoubleSphere, Equirectangular
-from vobench.sensor.imu_text import kalibr_imu_yaml
+from vobench.sensor.imu_preset import IMUS
 
+# What YAML 1.1 resolves to a float (PyYAML, which Kalibr reads with): a point, and a sign in the exponent.
+FLOAT_1_1 = r"[0-9]+\.[0-9]*([eE][-+][0-9]+)?"
+MPU = IMUS["mpu6000"].calibration
 SPHERES = DoubleSphere(512, 512, 156.8, 156.9, 254.9, 256.9, -0.18, 0.59)
 
 
@@ -50,13 +55,11 @@ def test_the_imu_comes_back_as_the_body_where_it_sat(rig_of: Callable[..., Rig],
     rig = rig_of(imu=True)
     assert rig.imu
     imu_path = tmp_path / "imu.yaml"
-    imu_path.write_text(kalibr_imu_yaml(rig.imu, topic="/imu0"), encoding="utf-8")
-    found = read_camchain(written(tmp_path, camchain(rig)), imu_path)
-    assert found.imu
+    imu_path.write_text(imu_yaml(rig.imu, topic="/imu0"), encoding="utf-8")
+    found = read_camchain(written(tmp_path, camchain(rig)))
     np.testing.assert_allclose(found.T_body_left, se3.inverse(rig.imu.T_body_imu) @ rig.T_body_left, atol=1e-12)
-    assert replace(found.imu, T_body_imu=rig.imu.T_body_imu) == replace(rig.imu, T_body_imu=rig.imu.T_body_imu)
-    assert found.imu.gyro_walk == rig.imu.gyro_walk
-    check_rig("the chain", rig, found)
+    assert read_imu(imu_path, rig.imu.T_body_imu) == rig.imu
+    check_rig("the chain", rig, replace(found, imu=read_imu(imu_path, np.eye(4))))
 
 
 def test_the_chain_takes_points_from_the_camera_before_to_this_one(rig_of: Callable[..., Rig]) -> None:
@@ -123,11 +126,49 @@ def test_a_chain_that_says_something_else_is_refused_by_file_and_key(
 def test_an_imu_is_read_under_its_name_too(rig_of: Callable[..., Rig], tmp_path: Path) -> None:
     imu = rig_of(imu=True).imu
     assert imu
-    flat = kalibr_imu_yaml(imu, topic="/imu0")
+    flat = imu_yaml(imu, topic="/imu0")
     path = tmp_path / "imu.yaml"
     path.write_text("imu0:\n" + "".join(f"  {line}\n" for line in flat.splitlines()), encoding="utf-8")
     found = read_imu(path, imu.T_body_imu)
     assert (found.rate_hz, found.gyro_noise, found.accel_walk) == (imu.rate_hz, imu.gyro_noise, imu.accel_walk)
+
+
+def test_kalibr_finds_all_that_it_asks_for_to_the_last_digit() -> None:
+    assert YAML(typ="safe").load(imu_yaml(MPU, topic="/imu")) == {
+        "rostopic": "/imu",
+        "update_rate": 200.0,
+        "accelerometer_noise_density": MPU.accel_noise,
+        "accelerometer_random_walk": MPU.accel_walk,
+        "gyroscope_noise_density": MPU.gyro_noise,
+        "gyroscope_random_walk": MPU.gyro_walk,
+    }
+
+
+@pytest.mark.parametrize("value", [1e-5, 3e-7, 0.002, 1.0, 2.5e-4])
+def test_a_number_is_a_number_to_yaml_1_1(value: float) -> None:
+    stated = imu_yaml(replace(MPU, gyro_walk=value), topic="/imu").split("gyroscope_random_walk: ")[1].strip()
+    assert re.fullmatch(FLOAT_1_1, stated)
+    assert float(stated) == value
+
+
+@pytest.mark.parametrize("value", [0.0, -1e-3, float("nan")])
+def test_what_kalibr_refuses_is_refused_by_name(value: float) -> None:
+    with pytest.raises(InputError, match="Kalibr reads no IMU whose accelerometer_random_walk is"):
+        imu_yaml(replace(MPU, accel_walk=value), topic="/imu")
+
+
+@pytest.mark.parametrize(("key", "value"), [("gyroscope_noise_density", "-1.0e-4"), ("update_rate", "0.0")])
+def test_an_imu_with_less_than_no_noise_or_no_rate_is_none(key: str, value: str, tmp_path: Path) -> None:
+    path = tmp_path / "imu.yaml"
+    path.write_text(re.sub(f"{key}: .*", f"{key}: {value}", imu_yaml(MPU, topic="/imu")), encoding="utf-8")
+    with pytest.raises(InputError, match=rf"imu\.yaml: {key} should be (above 0|0 or more), but is"):
+        read_imu(path, np.eye(4))
+
+
+def test_a_head_as_opencv_wants_it_is_passed_over(rig_of: Callable[..., Rig], tmp_path: Path) -> None:
+    rig = rig_of(imu=True)
+    headed = read_camchain(written(tmp_path, "%YAML:1.0 # for OpenVINS\n\n" + camchain(rig)))
+    assert pixel_difference(rig, headed) < 1e-9
 
 
 @pytest.mark.parametrize("field", ["fx_px", "cy_px", "k1", "p2"])

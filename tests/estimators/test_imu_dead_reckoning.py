@@ -12,6 +12,7 @@ from vobench.geometry import se3
 from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.robot.drive import drive
+from vobench.robot.planar import circle
 from vobench.sensor.imu import STREAMS, ImuSettings, measure
 from vobench.sensor.imu_preset import IMUS
 from vobench.sensor.triad import Triad
@@ -20,12 +21,32 @@ from vobench.trajectory.kinematics import Kinematics, Motion
 PLACE = looking(pitch_deg=20, position_m=(0.25, -0.1, 0.3))
 EXACT = replace(IMUS["exact"], T_body_imu=PLACE)
 BIASED = replace(EXACT, gyro=Triad(bias=(0.01, -0.02, 0.01)), accel=Triad(bias=(0.1, 0.2, -0.1)))
+AXES = se3.transform(np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]]), np.zeros(3))  # of a camera, its z axis first
 NAME = "imu_dead_reckoning"
 
 
 @cache
 def driven() -> Motion:
     return drive(((0, 1), (1, 1))).motion
+
+
+@dataclass(frozen=True, slots=True)
+class Tilted:
+    """Another motion, of a body whose x axis looks up, as EuRoC's."""
+
+    motion: Motion
+    start_ns: int = 0
+
+    @property
+    def end_ns(self) -> int:
+        return self.motion.end_ns
+
+    @property
+    def breaks_ns(self) -> Array:
+        return self.motion.breaks_ns
+
+    def at(self, t_ns: Array) -> Kinematics:
+        return self.motion.at(t_ns).of_mounted(looking(pitch_deg=-90, position_m=(0, 0, 0)) @ AXES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +128,15 @@ def test_who_stands_still_stays_where_it_is_and_a_noisy_imu_alone_drifts_away(be
         frames = [frame for frame in frames_of(still, settings) if frame.t_ns < 59e9]
         results = bed.estimated(NAME, rig_with(settings), frames)
         assert low <= np.linalg.norm(results[-1].T_odom_frame[:3, 3]) < high
+
+
+def test_a_body_that_is_plainly_tilted_is_not_taken_for_level(bed):
+    motion = Tilted(circle(1.0, speed_mps=0.3))
+    assert motion.at(np.zeros(1)).T_world_body[0, :3, 0] == pytest.approx([0, 0, 1])
+    settings = IMUS["exact"]
+    frames = [frame for frame in frames_of(motion, settings) if frame.t_ns < 5e9]
+    results = bed.estimated(NAME, rig_with(settings), frames)
+    assert off_m(results, frames, motion).max() < 0.3  # as level it would fall by g t² / 2: 120 m
 
 
 def test_it_says_so_while_it_does_not_yet_know_whether_it_stands_still(bed):

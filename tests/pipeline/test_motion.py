@@ -25,8 +25,10 @@ WAYS = {
     "figure_8": "kind: figure_8, length_m: 1.5, mover: unicycle",
     "lissajous": "kind: lissajous, size_m: [2, 1.5], mover: unicycle, speed_mps: 0.7",
     "stop_and_go": "kind: stop_and_go, legs_m: [0.3, 0.2]",
-    "pure_rotation": "kind: pure_rotation, angle_deg: -180",
-    "reverse": "kind: reverse, length_m: 0.5, radius_m: 1, pause_s: 0.3",
+    "pure_rotation": "kind: pure_rotation, angle_deg: -180, slip: slippery",
+    "rotation_ideal": "kind: pure_rotation, angle_deg: -180, mover: unicycle",
+    "reverse": "kind: reverse, length_m: 0.5, radius_m: 1, pause_s: 0.3, delta: nominal",
+    "reverse_car": "kind: reverse, length_m: 0.5, radius_m: 1, pause_s: 0.3, mover: ackermann",
     "pose_spline": f"kind: pose_spline, poses: {POSES}",
     "handheld": f"kind: handheld, poses: {POSES}, ease_s: 0.5",
     "rail": "kind: rail, points_m: [[0, 0, 1], [1, 0.2, 1.3], [1, 1, 1]]",
@@ -90,7 +92,16 @@ def test_stamps_begin_at_0_and_are_index_over_rate_and_every_one_is_an_encoders_
 def test_the_same_seed_goes_the_same_way_to_the_last_bit(case, name):
     once, again, other = (travel_of(case(WAYS[name], seed=seed)).at_frames() for seed in (1, 1, 2))
     assert once.T_world_body.tobytes() == again.T_world_body.tobytes()
-    has_chance = name in {"waypoints", "clock", "rough", "circle", "stop_and_go", "handheld"}
+    has_chance = name in {
+        "waypoints",
+        "clock",
+        "rough",
+        "circle",
+        "stop_and_go",
+        "pure_rotation",
+        "reverse",
+        "handheld",
+    }
     assert (once.T_world_body.tobytes() != other.T_world_body.tobytes()) == has_chance
 
 
@@ -100,16 +111,43 @@ def test_waypoints_are_the_controllers_drive_and_nothing_else(case):
     start = (0.1, 0.0, np.deg2rad(20))
     alone = drive([[0.5, 0.3], [0, 1]], start=start, controller=CONTROLLERS["smooth"], slip=SLIPS["nominal"], rngs=rngs)
     assert travel.drive.state.tobytes() == alone.state.tobytes()
-    np.testing.assert_allclose(travel.at_frames().T_world_body, alone.T_world_body, atol=1e-9)  # stamps are whole ns
+    assert travel.motion.pieces.tobytes() == alone.motion.pieces.tobytes()
 
 
-def test_one_disturbance_more_leaves_the_draws_of_the_others(case):
-    plain, pushed = (
-        travel_of(case(f"targets_m: [[0.5, 0.3]], leg_s: 1{more}")).drive for more in ("", ", delta: bumpy")
+@pytest.mark.parametrize("more", ["delta: bumpy", "robot_spread: 0.2", "controller: easy", "max_accel_mps2: 0.1"])
+def test_whatever_else_moves_the_robot_leaves_the_draws_of_slip(case, more):
+    plain, moved = (travel_of(case(f"targets_m: [[0.5, 0.3]], leg_s: 1{text}")).drive for text in ("", f", {more}"))
+    assert plain.slip.any()
+    assert plain.slip.tobytes() == moved.slip.tobytes()
+    assert plain.state.tobytes() != moved.state.tobytes()
+    assert (plain.delta.any(), moved.delta.any()) == (False, more == "delta: bumpy")
+
+
+@pytest.mark.parametrize("more", ["slip: slippery", "slip: none", "robot_spread: 0.2"])
+def test_whatever_else_moves_the_robot_leaves_the_draws_of_the_pushes(case, more):
+    way = "targets_m: [[0.5, 0.3]], leg_s: 1, delta: bumpy"
+    plain, moved = (travel_of(case(f"{way}{text}")).drive for text in ("", f", {more}"))
+    assert plain.delta.tobytes() == moved.delta.tobytes()
+    assert plain.state.tobytes() != moved.state.tobytes()
+
+
+def test_the_perturbed_robot_is_the_same_one_however_it_slips(case):
+    way = "targets_m: [[0.5, 0.3]], leg_s: 1, robot_spread: 0.2"
+    thetas = [
+        travel_of(case(f"{way}, slip: {slip}", seed=seed)).drive.theta
+        for slip, seed in (("none", 1), ("slippery", 1), ("none", 2))
+    ]
+    assert thetas[0] == thetas[1] != thetas[2]
+
+
+def test_a_wet_floor_under_wheels_that_do_not_slide_sideways_turns_the_rims_further_and_nothing_else(case):
+    way = "targets_m: [[0.5, 0.3]], leg_s: 3, slip: none"
+    dry, wet = (
+        travel_of(case(f"{way}, floor: [{{surface: wet, center_m: [0, 0], size_m: {size}}}]"))
+        for size in ("[0.01, 0.01]", "[4, 4]")
     )
-    assert plain.slip.tobytes() == pushed.slip.tobytes()
-    assert not plain.delta.any()
-    assert pushed.delta.any()
+    assert dry.at_frames().T_world_body.tobytes() == wet.at_frames().T_world_body.tobytes()
+    np.testing.assert_allclose(wet.rims.rim_rad[-1] * 0.96, dry.rims.rim_rad[-1], rtol=1e-3)
 
 
 def test_the_pioneer_comes_after_the_ideal_robot_within_its_lag(case):
@@ -123,6 +161,25 @@ def test_the_pioneer_comes_after_the_ideal_robot_within_its_lag(case):
 
 
 @pytest.mark.parametrize(
+    "way", ["kind: pure_rotation, angle_deg: 400", "kind: reverse, length_m: 1.5, radius_m: -1, pause_s: 1"]
+)
+def test_the_pioneer_goes_back_and_turns_on_the_spot_as_the_ideal_robot_does_but_for_slip(case, way):
+    ideal, dry, wet = (
+        travel_of(case(f"{way}, {more}, start_m: [0.3, 1], start_heading_deg: 70")).at_frames().T_world_body
+        for more in ("mover: unicycle", "slip: none", "slip: slippery, delta: bumpy")
+    )
+    np.testing.assert_allclose(dry, ideal, atol=2e-4)
+    assert 0.01 < np.abs(wet - ideal).max() < 1
+
+
+def test_another_robot_of_the_kind_is_told_the_same_and_ends_elsewhere(case):
+    way = "kind: reverse, length_m: 1, radius_m: 2, slip: none"
+    this, other = (travel_of(case(f"{way}, robot_spread: {spread}")).drive for spread in (0, 0.2))
+    assert this.references.tobytes() == other.references.tobytes()
+    assert np.linalg.norm(this.state[-1, :2] - other.state[-1, :2]) > 1e-4
+
+
+@pytest.mark.parametrize(
     ("mover", "half_track_m", "radius_m"), [("unicycle", 0.1655, 0.0975), ("ackermann", 0.125, 0.05)]
 )
 def test_wheels_roll_as_far_as_the_ground_goes_by_under_them(case, mover, half_track_m, radius_m):
@@ -131,6 +188,14 @@ def test_wheels_roll_as_far_as_the_ground_goes_by_under_them(case, mover, half_t
     # A car comes in late by its steering's lag.
     tolerance = {"unicycle": 1e-6, "ackermann": 0.02}[mover]
     np.testing.assert_allclose(rims.rim_rad[-1] * radius_m, around_m, rtol=tolerance)
+
+
+def test_a_car_steers_late_and_keeps_near_its_way(case):
+    car, ideal = (
+        travel_of(case(f"kind: figure_8, length_m: 8, mover: {mover}")).at_frames().T_world_body
+        for mover in ("ackermann", "unicycle")
+    )
+    assert 1e-4 < np.linalg.norm(car[:, :2, 3] - ideal[:, :2, 3], axis=1).max() < 0.3
 
 
 def test_a_replay_starts_where_it_is_sent_and_keeps_its_shape(case):

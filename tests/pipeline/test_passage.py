@@ -88,10 +88,14 @@ class TestWaysOfAllKinds:
             ("kind: rail, points_m: [[0, 0, 1], [1, 0, -0.5]]", "a camera of rig 'it' is under the floor of scene 'room' after"),
             ("kind: quadrotor, points_m: [[0, 0, 1], [0, 0, 4]]", "a camera of rig 'it' leaves the room (10 × 10 × 3 m around the origin) of scene 'room' after"),
             ("kind: circle, radius_m: 1", "a camera of rig 'it' is under the floor of scene 'room' after 0.0 s"),
-            ("kind: circle, radius_m: 1, speed_mps: 3", "the path moves at 1.32 m/s at point 147, and the controller gives 0.75 m/s at most"),
+            ("kind: circle, radius_m: 1, speed_mps: 3", "the path of h moves at 1.32 m/s after 4.9 s, and the controller gives 0.75 m/s at most"),
             ("kind: circle, radius_m: 1000, mover: unicycle, rate_hz: 100", "2.095e+04 s at 100 Hz are 20945"),
             ("kind: square, side_m: 1, mover: ackermann", "a car cannot turn on the spot"),
-            ("kind: pose_spline, poses: [{t_s: 0, position_m: [0, 0, 1]}, {t_s: 1, position_m: [1, 0, 1]}, {t_s: 1, position_m: [2, 0, 1]}]", "pose 2 is at 1 s, the same time as pose 1"),
+            ("kind: pose_spline, poses: [{t_s: 5, position_m: [0, 0, 1]}, {t_s: 6, position_m: [1, 0, 1]}, {t_s: 6, position_m: [2, 0, 1]}]", "pose 2 is at 6 s, the same time as pose 1 at 6 s; times should rise"),
+            ("kind: quadrotor, points_m: [[0, 0, 1], [0, 0.1, 1]], t_s: [0, 0.02]", "the way ends within its first frame at 30 Hz"),
+            ("targets_m: [[0, 0]]", "the way ends within its first frame at 30 Hz"),
+            ("kind: quadrotor, points_m: [[0, 0, 1], [1, 0, 1]], t_s: [5, 4]", "point 1 is at 4 s, earlier than point 0 at 5 s"),
+            ("kind: pure_rotation, angle_deg: 720, turn_radps: 3", "the robot would be asked for 3.21 rad/s after 2.4 s, and 1.745 rad/s is the most"),
             ("targets_m: [[1, 0]], controller: paper, integrator: euler, substeps: 1, rate_hz: 10", "gain_per_s 10 at 10 Hz with euler"),
         ],
     )  # fmt: skip
@@ -99,6 +103,13 @@ class TestWaysOfAllKinds:
         with pytest.raises(SuiteError) as refused:
             self.travelled(tmp_path, trajectory)
         assert str(refused.value).startswith(f"{tmp_path / 'air.yaml'}:4: trajectories.way: {sentence}")
+
+    @pytest.mark.parametrize("y_m", [-4.5, 4.5])
+    def test_either_camera_may_be_the_one_that_leaves_the_room(self, tmp_path, y_m):
+        way = f"kind: rail, points_m: [[-1, {y_m}, 1], [-0.5, {y_m}, 1]]"
+        assert len(self.travelled(tmp_path, way).t_ns) > 50
+        with pytest.raises(SuiteError, match="leaves the room"):
+            self.travelled(tmp_path, way, "pitch_deg: 10, forward_m: 0, height_m: 0, baseline_m: 1.5")
 
     @pytest.mark.parametrize(("exact", "imu"), [(True, False), (False, True), (True, True)])
     def test_an_imu_and_an_exact_replay_do_not_go_together(self, tmp_path, exact, imu):

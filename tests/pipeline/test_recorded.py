@@ -1,6 +1,8 @@
 """Recordings that were made elsewhere, from the suite to the leaderboard, and whether a run is what it says."""
 
 import json
+import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +12,17 @@ from vobench.dataset.export import export
 from vobench.errors import SequenceError, SuiteError
 from vobench.pipeline.recorded import import_case, read_all
 from vobench.pipeline.run import run_suite
+from vobench.pipeline.score import score_estimate
 from vobench.pipeline.truth_path import LONGEST_GAP_NS, left_truth
 from vobench.pipeline.verify import verify_run
 from vobench.report import files
+from vobench.results.estimate_file import ESTIMATE
 from vobench.results.hashes import HASHES
 from vobench.results.run_folder import CASE, SCORE, SEQUENCE
 from vobench.sequence import Sequence, SequenceWriter, read_truth
 from vobench.suite.expand import read_plan
+from vobench.trajectory.text import format_tum
+from vobench.trajectory.trajectory import Trajectory
 
 
 @pytest.fixture(scope="session")
@@ -78,6 +84,28 @@ def test_a_recording_without_truth_is_said_before_anything_is_run(layouts, tmp_p
         bare.rename(layouts / "kitti")
 
 
+def test_why_nothing_could_be_scored_is_said_before_anything_is_run(layouts, tmp_path):
+    suite, folder = tmp_path / "late.yaml", tmp_path / "late"
+    suite.write_text("name: late\nsource: late\nestimators: [stand_still]\n")
+    shutil.copytree(layouts / "euroc", folder)
+    truth = folder / "mav0/state_groundtruth_estimate0/data.csv"
+    head, first, second, *_ = truth.read_text().splitlines(keepends=True)
+    for rows, said in (
+        (first, "the ground truth covers 1 of "),
+        (f"9{second}", r"no ground truth \(The truth .* was dropped: it shares no time"),
+    ):
+        truth.write_text(head + rows)
+        with pytest.raises(SuiteError, match=rf"late\.yaml:2: source: {said}.*, so nothing could be scored: .*late"):
+            read_all(read_plan(str(suite)))
+
+
+def test_an_estimate_with_poses_outside_the_truth_alone_has_no_score(tmp_path):
+    estimate = Trajectory(np.array([5]), np.eye(4)[None])
+    (tmp_path / ESTIMATE).write_text(format_tum(estimate))
+    truth = Trajectory(np.array([10, 20]), np.stack([np.eye(4)] * 2))
+    assert score_estimate(tmp_path, truth) is None
+
+
 def wrong(run):
     return [(finding.kind, finding.what) for finding in verify_run(run) if finding.wrong]
 
@@ -92,8 +120,6 @@ def test_a_run_verifies_as_it_was_left(first, recorded):
 @pytest.fixture
 def changed(first, tmp_path):
     """A copy of a run, one of whose files is written anew."""
-    import shutil
-
     from vobench.results.run_folder import RunFolder
 
     def change(name: str, old: str, new: str) -> RunFolder:
@@ -113,6 +139,8 @@ def test_a_changed_score_is_found(changed):
         ("hash", f"cases/full/stand_still/0/{SCORE}"),
         ("score", "stand_still on full, 0"),
     ]
+    (said,) = (finding.wrong for finding in verify_run(run) if finding.wrong and finding.kind == "score")
+    assert re.fullmatch(r"the score differs: metrics ate_trans rmse: 1\.\d+ is 0\.\d+ now", said)
 
 
 def test_a_changed_estimate_is_found_by_its_hash_and_by_its_score(changed):
@@ -121,6 +149,17 @@ def test_a_changed_estimate_is_found_by_its_hash_and_by_its_score(changed):
         ("hash", "cases/full/wheel_odometry/0/estimate.tum"),
         ("score", "wheel_odometry on full, 0"),
     ]
+
+
+def test_a_score_that_cannot_be_read_and_one_that_was_added_are_found_beside_all_else(changed):
+    run = changed(f"cases/full/stand_still/0/{SCORE}", "{", "{{")
+    (run.case("full") / "mine").symlink_to("wheel_odometry")
+    sentences = {
+        finding.what: finding.wrong for finding in verify_run(run) if finding.wrong and finding.kind == "score"
+    }
+    assert sorted(sentences) == ["mine on full, 0", "stand_still on full, 0"]
+    assert "not a score as vobench writes it (Invalid JSON" in sentences["stand_still on full, 0"]
+    assert sentences["mine on full, 0"] == "not of this run, whose hashes do not name it"
 
 
 def test_a_changed_truth_is_found_even_where_its_hash_is_changed_too(changed):

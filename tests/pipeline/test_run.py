@@ -90,11 +90,65 @@ def test_a_replayed_file_counts_by_what_it_holds_and_not_by_where_it_lies(bench)
 
 @pytest.mark.parametrize(
     ("old", "new"),
-    [("seed: 1", "seed: 2"), ("pitch_deg: 90", "pitch_deg: 89"), ("0.03", "0.02"), ("power_lm: 150", "power_lm: 151")],
+    [
+        ("seed: 1", "seed: 2"),
+        ("pitch_deg: 90", "pitch_deg: 89"),
+        ("pitch_deg: 90", "pitch_deg: 90, imu: exact"),
+        ("0.03", "0.02"),
+        ("rate_hz: 5", "rate_hz: 5, encoders: exact"),
+        ("rate_hz: 5", "rate_hz: 5, slip: none"),
+        ("rate_hz: 5", "rate_hz: 5, delta: nominal"),
+        ("rate_hz: 5", "rate_hz: 5, robot: pioneer_3dx_paper"),
+        ("rate_hz: 5", "rate_hz: 5, leg_s: 1"),
+        ("rate_hz: 5", "rate_hz: 5, mover: unicycle"),
+        ("rate_hz: 5", "rate_hz: 5, floor: [{surface: seam, center_m: [0, 0], size_m: [1, 1]}]"),
+        ("power_lm: 150", "power_lm: 151"),
+    ],
 )
 def test_whatever_a_suite_changes_makes_another_sequence(bench, old, new):
     before, after = (simulate.sequence_inputs(plan.cases[-1]) for plan in (bench.plan(), bench.plan((old, new))))
     assert before != after
+
+
+@pytest.mark.parametrize(
+    "change",
+    ["rate_hz: 200", "position_m: [0.1, 0, 0]", "gyro: {walk: 0}", "accel: {bias: [0, 0, 0.1]}", "like: exact"],
+)
+def test_every_key_of_an_imu_makes_another_sequence(bench, change):
+    imu = "like: bmi055, rate_hz: 100"
+    changed = change if change.startswith("like") else f"like: bmi055, {change}"
+    before, after = (
+        simulate.sequence_inputs(bench.plan(("pitch_deg: 90", f"pitch_deg: 90, imu: {{{text}}}")).cases[0])
+        for text in (imu, changed)
+    )
+    assert before != after
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("short:", "long:"),
+        ("rate_hz: 5", "rate_hz: 5, kind: waypoints, mover: pioneer"),
+        ("rate_hz: 5}", "rate_hz: 5}, other: {kind: circle, radius_m: 0.3}"),
+        ("{down:", "{other: {pitch_deg: 60, imu: exact}, down:"),
+        ("estimators: [wheel_odometry, stand_still]", "estimators: [constant_velocity]\nrepeats: 3"),
+    ],
+)
+def test_what_a_case_does_not_depend_on_is_no_part_of_what_is_cached(bench, old, new):
+    before, after = (
+        {case.lighting["lamp"].power_lm: simulate.sequence_inputs(case) for case in plan.cases if _is_first(case)}
+        for plan in (
+            bench.plan(("full: {}", "full: {lamp: {power_lm: 300}}")),
+            bench.plan(("full: {}", "full: {lamp: {power_lm: 300}}"), (old, new)),
+        )
+    )
+    assert before == after
+    assert len(before) == 2
+
+
+def _is_first(case):
+    """Whether a case is of the suite as it was."""
+    return case.rig.pitch_deg == 90 and case.trajectory.kind == "waypoints"
 
 
 def test_a_killed_run_goes_on_and_ends_byte_identical_with_nothing_left_behind(bench, first):

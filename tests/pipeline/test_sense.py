@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vobench.pipeline.motion import travel_of
-from vobench.pipeline.sense import SensorFeed, wheel_error_m
+from vobench.pipeline.sense import SensorFeed, _felt, wheel_error_m
 from vobench.suite.expand import read_plan
 
 SUITE = """name: it
@@ -70,6 +70,36 @@ def test_every_reading_up_to_the_last_picture_comes_once_and_in_order_of_time(ca
     assert [t for t, _ in writer.truth] == readings
 
 
+def test_the_noise_of_an_imu_is_the_same_whatever_it_rides_on(case):
+    """Its readings less those of one without errors, for two motions that last equally long."""
+    errors = []
+    for slip in ("none", "slippery"):
+        way = f"kind: circle, radius_m: 0.5, laps: 0.2, slip: {slip}"
+        for imu in ("{like: adis16448, gyro: {step: 0}, accel: {step: 0}}", "exact"):
+            it = case(way, imu)
+            errors.append(_felt(it, travel_of(it)))
+    (real, bias), (true, _), (other, its_bias), (its_true, _) = errors
+    assert np.abs(true.gyro_radps - its_true.gyro_radps).max() > 1e-3
+    np.testing.assert_array_equal(bias.gyro_radps, its_bias.gyro_radps)
+    np.testing.assert_array_equal(bias.accel_mps2, its_bias.accel_mps2)
+    for key in ("gyro_radps", "accel_mps2"):
+        noise, its_noise = (getattr(a, key) - getattr(b, key) for a, b in ((real, true), (other, its_true)))
+        assert noise.std() > 1e-4
+        np.testing.assert_allclose(noise, its_noise, atol=1e-12)
+
+
+def test_every_error_of_an_imu_draws_by_itself(case):
+    way = "kind: circle, radius_m: 0.5, laps: 0.5, slip: none"
+    unrounded, exact = (case(way, imu) for imu in ("{like: adis16448, gyro: {step: 0}, accel: {step: 0}}", "exact"))
+    (real, bias), (true, _) = (_felt(it, travel_of(it)) for it in (unrounded, exact))
+    white = [getattr(real, key) - getattr(true, key) - getattr(bias, key) for key in ("gyro_radps", "accel_mps2")]
+    walk = [np.diff(getattr(bias, key), axis=0) for key in ("gyro_radps", "accel_mps2")]
+    drawn = np.stack([draws[: len(walk[0])].ravel() for draws in (*white, *walk)])
+    for shift in (0, 3):  # a walk starts from the first reading on, and each reading has three axes
+        alike = np.corrcoef(np.roll(drawn[:2], shift, 1), drawn[2:])
+        np.testing.assert_allclose(alike, np.eye(4), atol=0.1)
+
+
 def test_what_flies_has_no_wheels_to_read(case):
     _, writer = fed(case("kind: rail, points_m: [[0, 0, 1], [1, 0, 1]]"))
     assert writer.of("encoders") == []
@@ -80,9 +110,10 @@ def test_what_flies_has_no_wheels_to_read(case):
     ("way", "least_m", "most_m"),
     [
         (f"{CIRCLE}, encoders: exact", 0, 2e-4),
+        (f"{CIRCLE}, laps: 0.5, rate_hz: 5, encoders: exact", 0, 2e-4),
         (f"{CIRCLE}", 2e-3, 0.1),
         ("kind: square, side_m: 0.5, mover: unicycle, encoders: exact", 0, 2e-4),
-        ("kind: reverse, length_m: 0.5, encoders: exact", 0, 2e-4),
+        ("kind: reverse, length_m: 0.5, mover: unicycle, encoders: exact", 0, 2e-4),
         ("kind: circle, radius_m: 1, mover: ackermann, encoders: exact", 0, 2e-3),
         ("targets_m: [[0.5, 0.5]], slip: none, encoders: exact", 0, 1e-3),
         ("targets_m: [[0.5, 0.5]], slip: slippery, encoders: exact", 1e-3, 0.3),

@@ -53,6 +53,21 @@ def test_what_nobody_leads_has_no_references_and_what_flies_a_height(log, tmp_pa
     assert {"height z (m)", "|v| (m/s)", "|ω| (rad/s)"} <= set(words(tmp_path / "air.svg"))
 
 
+def test_each_leg_is_measured_to_its_own_target_and_from_its_end_on_to_the_next(log):
+    legs = replace(log, targets_m=np.array([[1.2, 0.0], [2.2, 0.5]]), reached_s=np.array([2.0, 4.0]))
+    np.testing.assert_allclose(legs.to_target_m[[0, 19, 20, 40]], [[1.0, 0.0], [0.05, 0.0], [1.0, 0.5], [0.0, 0.5]])
+    assert replace(legs, reached_s=None).to_target_m is None
+
+
+def test_patches_of_floor_are_drawn_and_each_surface_is_named_once(log, tmp_path):
+    corners_m = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]])
+    save_plot(
+        tmp_path / "it.svg", [replace(log, patches=(("wet", corners_m), ("wet", corners_m + 1), ("seam", corners_m)))]
+    )
+    named = [word for word in words(tmp_path / "it.svg") if word in {"wet", "seam"}]
+    assert sorted(named) == ["seam", "wet"]
+
+
 def test_several_logs_are_rows_of_one_figure_and_the_same_file_twice(log, tmp_path):
     logs = [log, replace(log, title="again")]
     for name in ("a.svg", "b.svg"):

@@ -7,8 +7,9 @@ import zipfile
 import numpy as np
 import pytest
 
+from vobench.errors import TrajectoryError
 from vobench.results import estimate_file
-from vobench.results.estimate_file import FrameRow
+from vobench.results.estimate_file import FrameRow, read_tum
 
 
 def test_rows_survive_commas_quotes_and_other_alphabets(tmp_path):
@@ -37,3 +38,9 @@ def test_an_outcome_with_an_unknown_key_is_refused(tmp_path):
     (tmp_path / estimate_file.OUTCOME).write_text('{"kind": "finished", "reason": "", "mood": "good"}')
     with pytest.raises(ValueError, match="mood"):
         estimate_file.read_outcome(tmp_path)
+
+
+def test_a_trajectory_with_bytes_of_no_text_is_one_sentence_with_its_place(tmp_path):
+    (tmp_path / "a.tum").write_bytes(b"0 0\xff")
+    with pytest.raises(TrajectoryError, match=r"^not a text file in UTF-8 \(byte 3\): .*a\.tum$"):
+        read_tum(tmp_path / "a.tum")

@@ -49,6 +49,7 @@ def test_a_file_longer_than_what_is_read_at_once_is_hashed_whole(tmp_path):
     [
         (None, "kept no hashes"),
         ("{", "not readable as JSON"),
+        ("[" * 100_000, "not readable as JSON"),
         ("[]", "should hold one hash for each file"),
         ('{"a": 1}', "should hold one hash for each file"),
         (json.dumps({"../../etc/passwd": "0"}), "names a file outside the run's folder"),

@@ -4,7 +4,17 @@ import pytest
 from pydantic import ValidationError
 
 from vobench.errors import InputError
-from vobench.results.run_folder import SCORE, STATUSES, SURVIVED, RunScore, make_run, open_run, write_json
+from vobench.results.run_folder import (
+    SCORE,
+    STATUSES,
+    SURVIVED,
+    RunFolder,
+    RunScore,
+    make_run,
+    open_run,
+    read_score,
+    write_json,
+)
 
 
 def score(**changes):
@@ -81,3 +91,17 @@ def test_a_status_outside_the_list_is_no_score():
     assert STATUSES[:2] == SURVIVED
     with pytest.raises(ValidationError):
         score(status="fine")
+
+
+def test_a_score_or_a_folder_that_is_none_is_one_sentence_with_its_place(tmp_path):
+    with pytest.raises(InputError, match=r"^no such folder: .*nowhere$"):
+        RunFolder(tmp_path / "nowhere").scores()
+    file = tmp_path / "score.json"
+    for content, said in (
+        (b"{", r"Invalid JSON"),
+        (b"\xff", "Invalid JSON"),
+        (b'{"schema_version": "x"}', "schema_version: "),
+    ):
+        file.write_bytes(content)
+        with pytest.raises(InputError, match=rf"^not a score as vobench writes it \({said}.*score\.json$"):
+            read_score(file)

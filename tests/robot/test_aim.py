@@ -1,4 +1,4 @@
-"""A moving target is followed, the clock is kept, and a leg that never ends says how."""
+"""A moving target is followed, the clock is kept, what is told is done, and a leg that never ends says how."""
 
 from dataclasses import replace
 
@@ -10,10 +10,14 @@ from vobench.geometry import se3
 from vobench.geometry.rig import PIONEER_WHEELS
 from vobench.geometry.se3 import Array
 from vobench.robot.controller import CONTROLLERS, ControllerSettings
-from vobench.robot.drive import drive, follow
-from vobench.robot.pioneer import THETAS
+from vobench.robot.disturbance import DELTAS
+from vobench.robot.drive import Drive, drive, follow, led_by
+from vobench.robot.pioneer import THETAS, feed_forward
+from vobench.robot.planar import circle as around
+from vobench.robot.planar import pure_rotation, reverse
 from vobench.robot.roll import rolled
 from vobench.robot.slip import SLIPS
+from vobench.trajectory.curve import CurveMotion
 
 SQUARE = ((1, 1), (0, 1), (1, 0), (2, 2))
 SECONDS = np.arange(601) / 30
@@ -150,7 +154,7 @@ def test_side_slip_that_holds_the_robot_off_its_path_is_corrected() -> None:
         (([(0, 0), (1, 0)], [(0.1, 0)]), {}, "2 points and 1 velocities"),
         (([(0, float("nan"))], [(0, 0)]), {}, "path point 1"),
         (([(0, 0)], [(0, float("inf"))]), {}, "path velocity 1"),
-        (([(0, 0), (1, 0)], [(0.1, 0), (0.9, 0)]), {}, r"0\.9 m/s at point 2.*0\.75 m/s at most"),
+        (([(0, 0), (1, 0)], [(0.1, 0), (0.9, 0)]), {}, r"0\.9 m/s after 0\.0 s.*0\.75 m/s at most"),
         (straight(0.3), {"rate_hz": float("nan")}, "rate_hz"),
         (straight(0.3), {"start": (0.0, 0.0)}, "three finite values"),
     ],
@@ -164,3 +168,78 @@ def test_a_path_that_cannot_be_followed_is_refused(path: object, options: dict[s
 def test_a_clock_that_cannot_be_kept_is_refused(leg_s: float, sentence: str) -> None:
     with pytest.raises(MotionError, match=sentence):
         drive(SQUARE, leg_s=leg_s)
+
+
+WAYS = {
+    "back": reverse(1.5, speed_mps=0.3),
+    "back on an arc": reverse(1.5, speed_mps=0.3, radius_m=-1.0, start=(0.3, -0.2, 2.0)),
+    "turn": pure_rotation(-6.0, rate_radps=1.0),
+    "circle": around(1.0, speed_mps=0.3),
+}
+
+
+def told(
+    way: CurveMotion, *, theta: str = "pioneer_3dx", rate_hz: float = 30.0, **options: object
+) -> tuple[Drive, Array]:
+    """The robot told what would take it along a way, and how far (N,) from there it is."""
+    t_ns = np.arange(int(way.end_ns * rate_hz / 1e9) + 1) * 1e9 / rate_hz
+    ideal, amid = way.at(t_ns).T_world_body, way.at(t_ns + 0.5e9 / rate_hz)
+    speeds = amid.velocity_mps[:, 0], amid.turn_radps[:, 2]
+    rates = amid.acceleration_mps2[:, 0], amid.turn_rate_radps2[:, 2]
+    asked = np.stack(feed_forward(*speeds, *rates, theta=THETAS[theta]), -1)
+    h_m = ideal[0, :2, 3] + 0.2 * ideal[0, :2, 0]
+    start = (*h_m.tolist(), float(np.arctan2(*ideal[0, 1::-1, 0])))
+    run = led_by(asked, start=start, theta=THETAS[theta], rate_hz=rate_hz, **options)
+    return run, np.linalg.norm(run.motion.at(run.t_ns).T_world_body[:, :2, 3] - ideal[:, :2, 3], axis=1)
+
+
+@pytest.mark.parametrize("theta", ["pioneer_3dx", "pioneer_3dx_laser", "wheelchair_125kg"])
+@pytest.mark.parametrize("name", WAYS)
+def test_a_robot_that_is_told_what_its_dynamics_need_goes_the_way_exactly(name: str, theta: str) -> None:
+    _, off_m = told(WAYS[name], theta=theta)
+    assert off_m.max() < 5e-5
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_what_is_left_is_that_references_are_held_and_falls_with_the_square_of_the_period(name: str) -> None:
+    coarse, fine = (told(WAYS[name], rate_hz=rate_hz)[1].max() for rate_hz in (20.0, 80.0))
+    assert 1.8 < np.log(coarse / fine) / np.log(4) < 2.3
+
+
+def test_after_going_back_the_robot_stands_where_it_began() -> None:
+    run, _ = told(WAYS["back on an arc"])
+    assert run.state[:, 3].min() < -0.29
+    T_world_body = run.motion.at(run.t_ns).T_world_body
+    np.testing.assert_allclose(T_world_body[-1], T_world_body[0], atol=1e-4)
+    assert np.linalg.norm(T_world_body[len(run.t_ns) // 2, :2, 3] - T_world_body[0, :2, 3]) > 1
+
+
+def test_what_disturbs_a_robot_that_nothing_leads_is_never_made_good() -> None:
+    rngs = {
+        name: np.random.default_rng(n) for n, name in enumerate(("left", "right", "side", "delta_u", "delta_omega"))
+    }
+    _, slid_m = told(WAYS["back"], slip=SLIPS["slippery"], rngs=rngs)
+    pushed, pushed_m = told(WAYS["back"], delta=DELTAS["bumpy"], rngs=rngs)
+    assert 1e-3 < slid_m[-1] < 0.3
+    assert 1e-2 < pushed_m[-1] < 0.5
+    assert abs(pushed.state[-1, 2]) > 1e-3
+
+
+def test_what_is_told_does_not_depend_on_where_the_robot_is() -> None:
+    asked = np.tile([0.2, -0.5], (40, 1))
+    here, there = (led_by(asked, start=start) for start in ((0.0, 0.0, 0.0), (5.0, -3.0, 1.0)))
+    np.testing.assert_array_equal(here.references, asked)
+    np.testing.assert_allclose(there.state[:, 3:], here.state[:, 3:], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("asked", "sentence"),
+    [
+        ([(0.1, 0.0), (-0.8, 0.0)], r"asked for 0\.8 m/s after 0\.0 s, and 0\.75 m/s is the most"),
+        ([(0.0, 0.0)] * 30 + [(0.0, 2.0)], r"asked for 2 rad/s after 1\.0 s, and 1\.745 rad/s is the most"),
+        ([(0.0, float("nan"))], "reference 1"),
+    ],
+)
+def test_what_a_robot_cannot_be_asked_for_is_refused(asked: object, sentence: str) -> None:
+    with pytest.raises(MotionError, match=sentence):
+        led_by(asked, start=(0.0, 0.0, 0.0))

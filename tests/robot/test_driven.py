@@ -76,17 +76,18 @@ def test_the_turn_is_the_derivative_of_heading_and_its_rate_that_of_the_turn(kin
     ends = run.motion.at(np.stack([knots[:-1] + 1e-3, knots[1:] - 1e-3], -1).ravel())
     turned = now.turn_radps[:, 2].reshape(-1, 4) @ weights * half[:, 0] / 1e9
     sped_up = now.turn_rate_radps2[:, 2].reshape(-1, 4) @ weights * half[:, 0] / 1e9
-    np.testing.assert_allclose(turned, np.diff(run.axle[:, 2]), atol=1e-11)
+    np.testing.assert_allclose(turned.reshape(-1, KINDS[kind]["substeps"]).sum(1), np.diff(run.state[:, 2]), atol=1e-11)
     np.testing.assert_allclose(sped_up, np.diff(ends.turn_radps[:, 2].reshape(-1, 2))[:, 0], atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_pose_and_twist_at_the_frames_are_those_of_the_drive(kind: str) -> None:
+def test_pose_and_speeds_at_the_frames_are_those_of_the_states(kind: str) -> None:
     run = driven(kind)
-    at_frames, at_encoders = run.motion.at(run.t_ns), run.motion.at(run.encoder_t_ns)
-    np.testing.assert_allclose(at_frames.T_world_body, run.T_world_body, atol=1e-12)
-    np.testing.assert_allclose(at_frames.twist, run.twist, atol=1e-11)
-    np.testing.assert_allclose(at_encoders.T_world_body[:, :2, 3], run.axle[:, :2], atol=1e-12)
+    now = run.motion.at(run.t_ns)
+    np.testing.assert_allclose(now.T_world_body, axle_poses(*run.state[:, :3].T, a_m=0.2), atol=1e-12)
+    speeds = np.stack([now.velocity_mps[:, 0], now.turn_radps[:, 2]], -1)
+    np.testing.assert_allclose(speeds, run.state[:, 3:], atol=1e-11)
+    assert not now.twist[:, 2:5].any()
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -143,10 +144,15 @@ def test_before_its_start_the_robot_rests_and_after_its_end_it_goes_on_with_its_
     run = drive(COURSE[:1], rate_hz=25.0)
     longer = drive(COURSE[:1], rate_hz=25.0, settle_s=0.04)
     before, after = run.motion.at(np.array([-5e8, -1.0])), run.motion.at(run.t_ns[-1:] + 40_000_000)
-    np.testing.assert_array_equal(before.T_world_body, run.T_world_body[[0, 0]])
+    np.testing.assert_array_equal(before.T_world_body, run.motion.at(np.zeros(2)).T_world_body)
     assert not before.twist.any()
     assert not before.acceleration_mps2.any()
-    np.testing.assert_allclose(after.T_world_body, longer.T_world_body[-1:], atol=1e-12)
+    np.testing.assert_allclose(after.T_world_body, longer.motion.at(longer.t_ns[-1:]).T_world_body, atol=1e-12)
+    late = run.motion.at(run.t_ns[-1:] + np.arange(80_000_000, 960_000_000, 40_000_000))
+    speeds = late.velocity_mps[:, 0], late.turn_radps[:, 2]
+    u_rate, omega_rate = accelerations(*speeds, *run.references[-1].tolist(), theta=THETAS["pioneer_3dx"])
+    np.testing.assert_allclose(late.acceleration_mps2[:, 0], u_rate, atol=1e-9)
+    np.testing.assert_allclose(late.turn_rate_radps2[:, 2], omega_rate, atol=1e-9)
     assert (run.motion.start_ns, run.motion.end_ns) == (0, run.t_ns[-1])
 
 

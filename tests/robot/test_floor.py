@@ -58,7 +58,7 @@ def test_a_patch_under_everything_is_the_slip_settings_times_its_factor() -> Non
 
 def test_slip_changes_within_one_frame_of_the_axle_entering_and_leaving_the_patch() -> None:
     run = driven(FloorPatch(Surface(5.0), (0.7, 0.0), (0.4, 3.0)))
-    x_m, clean = run.T_world_body[:, 0, 3], driven()
+    x_m, clean = run.motion.at(run.t_ns).T_world_body[:, 0, 3], driven()
     shared = slice(0, min(len(run.slip), len(clean.slip)))
     factor = run.slip[shared, 2] / clean.slip[shared, 2]
     inside = np.abs(x_m[shared] - 0.7) <= 0.2
@@ -79,7 +79,7 @@ def test_a_pull_to_the_left_is_added_to_the_angle_at_which_the_robot_slides() ->
     run, clean = driven(FloorPatch(Surface(angle_bias_rad=0.1), *EVERYWHERE)), driven()
     shared = min(len(run.slip), len(clean.slip))
     np.testing.assert_allclose(run.slip[:shared, 2], clean.slip[:shared, 2] + 0.1, atol=1e-12)
-    assert (run.twist[1:shared, 1] > 0).all()
+    assert (run.motion.at(run.t_ns).velocity_mps[1:shared, 1] > 0).all()
 
 
 def test_slip_is_cut_before_the_formulas_lose_their_meaning() -> None:

@@ -53,6 +53,21 @@ def test_its_spectrum_lies_in_the_band(name):
     assert (power[frequency_hz > high_hz / 2].sum(0) > 1e-6 * power.sum(0)).all()
 
 
+def test_every_octave_shakes_as_hard():
+    shake = draw_shake(SETTINGS, np.random.default_rng(0))
+    accelerations = shake.amplitude[:, :-1] * shake.frequency_hz[:, :-1] ** 2  # the last column holds the steps
+    np.testing.assert_allclose(accelerations, np.broadcast_to(accelerations[:, :1], accelerations.shape))
+    in_octave = np.floor(np.log2(shake.frequency_hz[:, :-1] / BAND_HZ[0])).astype(int)
+    assert [np.bincount(row).tolist() for row in in_octave] == [[4, 4, 4, 4]] * 6
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_in_the_middle_between_two_sways_a_step_is_at_the_middle_of_its_lift(seed):
+    """Sway and lift trace one figure, whichever step they begin with."""
+    sway, lift = shaken(ShakeSettings(step_hz=2.0, bounce_m=0.02), seed)[:, 1:3].T / [[0.01], [0.02]]
+    np.testing.assert_allclose(lift**2, 4 * sway**2 * (1 - sway**2), atol=1e-9)
+
+
 def test_steps_lift_the_body_at_their_pace_and_sway_it_at_half():
     translation = shaken(ShakeSettings(step_hz=2.0, bounce_m=0.02))
     amplitude = np.sqrt(2 * (translation**2).mean(0))

@@ -62,8 +62,8 @@ SPATIAL = {
     "handheld": lambda: handheld(*poses(), rng=np.random.default_rng(1), shake=SHAKES["running"]),
     "quadrotor": lambda: quadrotor(POINTS),
     "quadrotor, fixed yaw": lambda: quadrotor(POINTS, t_s=[0, 2, 4, 6, 8, 11], yaw_rad=1.0),
-    "replay, interpolated": lambda: interpolated(recording(), speed=0.5).motion,
-    "replay, smoothed": lambda: smoothed(recording(), start=(1, 2, 3, 0.5)).motion,
+    "replay, interpolated": lambda: interpolated(recording(), speed=0.5),
+    "replay, smoothed": lambda: smoothed(recording(), start=(1, 2, 3, 0.5)),
 }
 KINDS = {**PLANAR, **CARS, **SPATIAL}
 AT_REST = [*PLANAR, *CARS, "pose spline, eased", "rail", "straight rail", "quadrotor", "quadrotor, fixed yaw"]

@@ -7,7 +7,7 @@ import pytest
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
-from vobench.robot.pioneer import THETAS, Theta, accelerations, axle_poses, velocities, wheel_speeds
+from vobench.robot.pioneer import THETAS, Theta, accelerations, axle_poses, feed_forward, velocities, wheel_speeds
 
 ALL = pytest.mark.parametrize("theta", THETAS.values(), ids=THETAS.keys())
 PIONEER = THETAS["pioneer_3dx"]
@@ -26,30 +26,10 @@ def test_mirroring_turn_and_turn_reference_mirrors_the_motion_exactly(theta: The
 
 
 @ALL
-def test_the_model_is_linear_in_theta_so_least_squares_finds_theta_again(theta: Theta) -> None:
-    rows, right = [], []
-    for u, omega, u_ref, omega_ref in random_inputs(1):
-        du, dw = accelerations(u, omega, u_ref, omega_ref, theta=theta)
-        rows += [[du, 0, -(omega**2), u, 0, 0], [0, dw, 0, 0, u * omega, omega]]
-        right += [u_ref, omega_ref]
-    found = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
-    expected = [theta.t1, theta.t2, theta.t3, theta.t4, theta.t5, theta.t6]
-    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
-
-
-def test_coupling_moves_energy_between_speed_and_turn_but_makes_none() -> None:
-    c = PIONEER.t3 / PIONEER.t5
-    for u, omega, u_ref, omega_ref in random_inputs(2):
-        du, dw = accelerations(u, omega, u_ref, omega_ref, theta=PIONEER)
-        power = PIONEER.t1 * u * du + c * PIONEER.t2 * omega * dw
-        supplied = u * u_ref + c * omega * omega_ref - PIONEER.t4 * u**2 - c * PIONEER.t6 * omega**2
-        assert power == pytest.approx(supplied, abs=1e-13)
-
-
-def test_a_disturbance_adds_to_the_accelerations() -> None:
-    free = np.array(accelerations(0.4, 0.7, 0.5, 1.0, theta=PIONEER))
-    pushed = np.array(accelerations(0.4, 0.7, 0.5, 1.0, theta=PIONEER, delta=(0.3, -0.2)))
-    np.testing.assert_allclose(pushed - free, [0.3, -0.2], atol=1e-15)
+def test_what_is_fed_forward_for_an_acceleration_gives_that_acceleration(theta: Theta) -> None:
+    for u, omega, u_rate, omega_rate in random_inputs(7):
+        references = feed_forward(u, omega, u_rate, omega_rate, theta=theta)
+        np.testing.assert_allclose(accelerations(u, omega, *references, theta=theta), (u_rate, omega_rate), atol=1e-12)
 
 
 @pytest.mark.parametrize("psi", [-2.0, 0.0, 0.3, 3.0])

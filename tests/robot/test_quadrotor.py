@@ -51,6 +51,12 @@ def test_it_looks_along_the_way_at_its_points():
     assert cosine.min() > np.cos(np.deg2rad(3))
 
 
+def test_its_nose_turns_the_shorter_way_also_across_the_rear():
+    around = [[0, 0, 1], [-2, 0.5, 1], [-4, 0, 1], [-6, -0.8, 1]]
+    turned_rad = sampled(quadrotor(around)).turn_radps[:, 2]
+    assert np.abs(np.cumsum(turned_rad)).max() * quadrotor(around).end_ns / 1e9 / 2000 < np.pi / 3
+
+
 @pytest.mark.parametrize("leg", range(5))
 def test_no_detour_between_the_points_has_less_snap(leg):
     best, (begin, end) = minimum_snap(TIMES_S, POINTS), TIMES_S[leg : leg + 2]
@@ -94,6 +100,15 @@ def test_free_times_are_the_best_near_them():
 def test_straight_up_and_down_is_flown_level():
     k = sampled(quadrotor([[0, 0, 0], [0, 0, 2], [0, 0, 1]]))
     np.testing.assert_allclose(k.T_world_body[:, :3, :3], np.broadcast_to(np.eye(3), (2000, 3, 3)), atol=1e-12)
+
+
+def test_a_fall_that_leaves_less_than_a_tenth_of_the_weight_to_lift_is_refused():
+    drop = [[0, 0, 10], [0, 0, 0]]  # the septic from rest to rest accelerates by 7.513 lengths over time squared
+    lift = {lasts_s: 1 - 7.513 * 10 / lasts_s**2 / 9.80665 for lasts_s in (2.84, 3.0)}
+    assert lift[2.84] < 0.1 < lift[3.0] < 0.15
+    assert quadrotor(drop, t_s=[0, 3.0]).end_ns == 3 * 10**9
+    with pytest.raises(MotionError, match=r"the rotors would lift 0\.05\d* of the weight; .* 0\.1 or more"):
+        quadrotor(drop, t_s=[0, 2.84])
 
 
 @pytest.mark.parametrize(

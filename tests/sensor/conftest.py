@@ -93,7 +93,7 @@ def strapdown(T_world_imu: Array, v_mps: Array, readings: ImuReadings, step_s: f
     """The pose after the last reading, from pose and velocity before the first.
 
     Each reading times the step is an increment of angle and of velocity over the step around its stamp. Increments
-    are corrected for coning and sculling with the one before, and turned exactly (Savage 1998, parts 1 and 2).
+    are corrected for coning and sculling with their neighbours, and turned exactly (after Savage 1998, parts 1 and 2).
     """
     angle, speed = readings.gyro_radps * step_s, readings.accel_mps2 * step_s
     angle_rise, speed_rise = np.gradient(angle, axis=0), np.gradient(speed, axis=0)

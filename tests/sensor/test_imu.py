@@ -16,6 +16,7 @@ from vobench.robot.slip import SLIPS
 from vobench.robot.slip import STREAMS as SLIP_STREAMS
 from vobench.sensor.imu import STREAMS, ImuSettings, measure
 from vobench.sensor.imu_preset import IMUS
+from vobench.sensor.triad import Triad
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, Kinematics, level
 
 PLACE = looking(pitch_deg=20, position_m=(0.25, -0.1, 0.3))
@@ -54,7 +55,7 @@ class Jerky:
 
 def jerky() -> Jerky:
     accelerations = np.random.default_rng(3).normal(size=60)
-    return Jerky(accelerations, np.arange(61) * 1e9 / 30)
+    return Jerky(accelerations, np.arange(1, 60) * 1e9 / 30)  # start and end are breaks of any motion
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -98,6 +99,16 @@ def test_readings_add_up_to_the_change_of_speed_where_acceleration_jumps():
     np.testing.assert_allclose(gained[:-1], true[:-1], atol=1e-12)
     blind, _ = measure(replace(motion, breaks_ns=np.zeros(0)), ImuSettings(rate_hz=200))
     assert np.abs(blind.accel_mps2 - readings.accel_mps2).max() > 1e-2
+
+
+@pytest.mark.parametrize(("slow_hz", "fast_hz"), [(8, 200), (40, 200)])
+def test_a_slow_reading_is_the_mean_of_all_fast_ones_in_its_time(bed, slow_hz, fast_hz):
+    motion, ratio = bed.shaken(8, lasts_s=5), fast_hz // slow_hz
+    slow, fast = (measure(motion, ImuSettings(rate_hz=hz, T_body_imu=PLACE))[0] for hz in (slow_hz, fast_hz))
+    for name in ("gyro_radps", "accel_mps2"):
+        within = getattr(fast, name)[ratio // 2 + 1 :][: ratio * (len(slow.t_ns) - 2)]
+        means = within.reshape(-1, ratio, 3).mean(1)
+        np.testing.assert_allclose(getattr(slow, name)[1:-1], means, atol=1e-6)
 
 
 def test_standing_still_reads_no_turn_and_gravity_upwards(bed):
@@ -205,6 +216,15 @@ def test_each_start_has_a_bias_of_its_own_of_the_size_that_was_asked_for(bed):
     gyro, accel = (np.concatenate([getattr(b, name) for b in firsts]) for name in ("gyro_radps", "accel_mps2"))
     assert gyro.std() == pytest.approx(np.deg2rad(1.0), rel=0.1)
     assert accel.std() == pytest.approx(0.07 * 9.80665, rel=0.1)
+
+
+@pytest.mark.parametrize(("biased", "exact"), [("gyro", "accel"), ("accel", "gyro")])
+def test_one_triad_may_start_with_a_bias_and_the_other_without(bed, biased, exact):
+    settings = replace(ImuSettings(), **{biased: Triad(bias_std=0.1)})
+    _, bias = measure(bed.at_rest(np.eye(4), end_ns=0), settings, rngs=generators(1))
+    array = {"gyro": bias.gyro_radps, "accel": bias.accel_mps2}
+    assert array[biased].all()
+    assert not array[exact].any()
 
 
 def test_a_calibration_says_what_the_imu_is():

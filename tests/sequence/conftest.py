@@ -13,6 +13,7 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import Rig, WheelGeometry, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.sequence import SequenceWriter
+from vobench.sequence.contents import topic_facts
 
 CASE = b'{"seed": 7}'
 RIG = stereo_rig(
@@ -61,6 +62,12 @@ def make_recording(count: int = 9) -> Recording:
 @pytest.fixture(name="make")
 def make_fixture() -> Callable[[int], Recording]:
     return make_recording
+
+
+@pytest.fixture(name="counts", scope="session")
+def counts_fixture() -> Callable[[Path], dict[str, int]]:
+    """How many messages each topic of a file has."""
+    return lambda path: {facts.name: facts.count for facts in topic_facts(path)}
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,6 @@
 """Every rig comes back: with one camera or two, with wheels or without, with an IMU or without."""
 
+import re
 from dataclasses import replace
 from itertools import product
 
@@ -10,11 +11,12 @@ from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.geometry.rig import ImuCalibration
 from vobench.sensor.imu import ImuBias, ImuReadings
-from vobench.sequence import Sequence, SequenceWriter, read_imu_bias, read_true_rig
+from vobench.sequence import Sequence, SequenceWriter, read_imu_bias, read_true_rig, salvage
 from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag, BagWriter
 from vobench.sequence.calibration import read_rig, write_mounts
 from vobench.sequence.cdr import serialise
+from vobench.sequence.contents import topic_facts
 
 T_BODY_IMU = se3.transform(se3.from_quaternion(np.array([0.5, -0.5, 0.5, -0.5])), [0.1, -0.2, 0.3])
 IMU = ImuCalibration(T_BODY_IMU, 200.0, 1.7e-4, 2e-3, 2e-5, 3e-3)
@@ -47,7 +49,7 @@ def test_every_rig_comes_back_and_only_its_topics_are_declared(recording, tmp_pa
     same(read_true_rig(tmp_path), rig)
     (frame,) = sequence.frames()
     assert (frame.right is None) == (eyes == 1)
-    topics = sequence.bag.counts().keys()
+    topics = [facts.name for facts in topic_facts(sequence.path)]
     assert [any(part in topic for topic in topics) for part in ("cam_right", "encoders", "imu")] == [
         eyes == 2,
         wheeled,
@@ -93,6 +95,21 @@ def test_what_the_rig_does_not_have_cannot_be_written(recording, tmp_path):
         SequenceWriter(tmp_path, recording.rig, case_json=b"") as writer,
     ):
         writer.write_frame(1, recording.left[0], None)
+
+
+def test_a_note_with_a_flipped_bit_is_refused_and_one_without_a_checksum_is_read(recording, tmp_path):
+    path = recording.write(tmp_path) / "sensors.mcap"
+    whole = path.read_bytes()
+    assert whole.count(b"4096") == 1
+    path.write_bytes(whole.replace(b"4096", b"4097"))
+    said = r"the checksum of the note 'vobench\.wheels' differs from its content"
+    with pytest.raises(SequenceError, match=said):
+        Sequence.open(tmp_path)
+    found = salvage(path, tmp_path / "out")
+    assert found.notes == ()
+    assert re.search(said, *found.lost)
+    path.write_bytes(whole.replace(b"vobench.crc32", b"of.no.meaning"))
+    same(Sequence.open(tmp_path).rig, recording.rig)
 
 
 def bag_with(path, rig, *, mounts=True, info=True, notes=()):

@@ -1,9 +1,11 @@
 """The index says where messages lie, and is believed only where it agrees with itself."""
 
+import struct
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
@@ -11,6 +13,8 @@ from vobench.errors import SequenceError
 from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag, BagWriter
 from vobench.sequence.cdr import serialise
+from vobench.sequence.index import FOOTER
+from vobench.sequence.record import HEAD, MAGIC
 from vobench.sequence.salvage import salvage
 
 
@@ -34,15 +38,15 @@ def long_folder(recording, tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", ["sensors.mcap", "truth.mcap"])
-def test_counts_and_stamps_are_those_of_the_messages_that_another_reader_finds(long_folder, name):
+def test_counts_and_stamps_are_those_of_the_messages_that_another_reader_finds(long_folder, counts, name):
     bag = Bag.open(long_folder / name)
-    found: dict[str, list[int]] = {topic: [] for topic in bag.counts()}
+    found: dict[str, list[int]] = {topic: [] for topic in counts(bag.path)}
     with (long_folder / name).open("rb") as stream:
         for schema, channel, message in make_reader(stream).iter_messages():
             found[channel.topic].append(message.log_time)
             assert bag.has(ros.Topic(channel.topic, schema.name))
     assert len(bag.index.offset) > 3
-    assert bag.counts() == {topic: len(stamps) for topic, stamps in found.items()}
+    assert counts(bag.path) == {topic: len(stamps) for topic, stamps in found.items()}
     for topic in (*ros.SENSOR_TOPICS, *ros.TRUTH_TOPICS):
         assert bag.stamps(topic).tolist() == found.get(topic.name, [])
 
@@ -92,12 +96,12 @@ def test_every_packing_is_read(tmp_path, packing):
 @pytest.mark.parametrize(
     "options", [{"use_chunking": False}, {"index_types": IndexType.NONE}, {"use_statistics": False}]
 )
-def test_a_file_without_an_index_is_refused_and_comes_back_with_one(tmp_path, options):
+def test_a_file_without_an_index_is_refused_and_comes_back_with_one(tmp_path, counts, options):
     path = write_foreign(tmp_path / "a", **options)
     with pytest.raises(SequenceError, match=r"the recording is damaged .*; `vobench salvage` recovers what is whole"):
         Bag.open(path)
     salvage(path, tmp_path / "b")
-    assert Bag.open(tmp_path / "b").counts() == {"/encoders": 15, "/other": 15}
+    assert counts(tmp_path / "b") == {"/encoders": 15, "/other": 15}
 
 
 def test_messages_that_fall_back_in_time_are_refused_when_they_come(tmp_path):
@@ -126,3 +130,58 @@ def test_two_senders_of_a_topic_are_refused(tmp_path):
         writer.finish()
     with pytest.raises(SequenceError, match=r"^/encoders should be vobench_msgs/msg/WheelTicks but is 2 channels in"):
         Bag.open(tmp_path / "a").has(ros.ENCODERS)
+
+
+def record_places(data, begin):
+    """Opcode and place of what each record holds, from one record on."""
+    while data[begin:] != MAGIC:
+        opcode, length = HEAD.unpack_from(data, begin)
+        yield opcode, begin + HEAD.size
+        begin += HEAD.size + length
+
+
+@pytest.fixture
+def summary(tmp_path):
+    """A foreign file without a checksum of its summary, where each of its records lies, and how to change a number."""
+    path = write_foreign(tmp_path / "a")
+    data = bytearray(path.read_bytes())
+    footer_at = len(data) - len(MAGIC) - FOOTER.size
+    data[footer_at + FOOTER.size - 4 : footer_at + FOOTER.size] = bytes(4)
+    path.write_bytes(data)
+    assert Bag.open(path).count(ros.ENCODERS) == 15
+    places = list(record_places(data, FOOTER.unpack_from(data, footer_at)[0]))
+
+    def change(opcode, number, at, form, change_by):
+        begin = [place for kind, place in places if kind == opcode][number] + at
+        struct.pack_into(form, data, begin, struct.unpack_from(form, data, begin)[0] + change_by)
+        path.write_bytes(data)
+        return path
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("where", "form", "change_by", "said"),
+    [
+        ((Opcode.CHUNK_INDEX, 0, 24), "<Q", 8, "ends within an entry"),
+        ((Opcode.CHUNK_INDEX, 1, 48), "<Q", 16 * 20, "ends within an entry"),
+        ((Opcode.CHUNK_INDEX, 0, 24), "<Q", 1 << 63, "recording is damaged"),
+        ((Opcode.CHANNEL, 0, 0), "<H", 77, "names a channel or a message type that it does not describe"),
+        ((Opcode.CHANNEL, 0, 2), "<H", 77, "names a channel or a message type that it does not describe"),
+        ((Opcode.STATISTICS, 0, 48), "<Q", 1, "counts other messages than its message indexes do"),
+        ((Opcode.FOOTER, 0, 16), "<I", 1, "the checksum of its summary is wrong"),
+        ((Opcode.FOOTER, 0, 0), "<Q", 1 << 40, "it has no summary"),
+    ],
+)
+def test_a_summary_that_contradicts_itself_or_the_file_is_refused(summary, where, form, change_by, said):
+    path = summary(*where, form, change_by)
+    with pytest.raises(SequenceError, match=said):
+        Bag.open(path)
+
+
+def test_chunks_that_overlap_are_refused(summary):
+    """Else few bytes could state the same chunk again and again."""
+    summary(Opcode.CHUNK_INDEX, 1, 16, "<Q", -150)
+    path = summary(Opcode.CHUNK_INDEX, 1, 24, "<Q", 150)
+    with pytest.raises(SequenceError, match="the chunks of its summary overlap"):
+        Bag.open(path)

@@ -15,7 +15,6 @@ import pytest
 from vobench.geometry.rig import ImuCalibration
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import Sequence, SequenceWriter
-from vobench.sequence.bag import Bag
 
 PACKAGES = "@mcap/core @foxglove/rosmsg @foxglove/rosmsg2-serialization fzstd"
 INSTALL = f"npm install --prefix FOLDER {PACKAGES}, then set NODE_PATH to FOLDER/node_modules"
@@ -67,9 +66,9 @@ def written(request, recording, tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", ["sensors.mcap", "truth.mcap"])
-def test_foxgloves_libraries_decode_every_message(written, name):
+def test_foxgloves_libraries_decode_every_message(written, counts, name):
     found = javascript(written / name)
-    assert {topic: row["count"] for topic, row in found.items()} == Bag.open(written / name).counts()
+    assert {topic: row["count"] for topic, row in found.items()} == counts(written / name)
     last = {row["last"] for topic, row in found.items() if row["count"] > 1}
     assert last == {"1000000002 800000000"}
     if name == "sensors.mcap":
@@ -89,15 +88,15 @@ def javascript(path):
 
 
 @pytest.mark.parametrize("name", ["sensors.mcap", "truth.mcap"])
-def test_rerun_lists_every_topic_and_has_no_complaint(written, name):
+def test_rerun_lists_every_topic_and_has_no_complaint(written, counts, name):
     """By its text: its exit code is 0 whatever it finds."""
-    counts = Bag.open(written / name).counts()
+    there = counts(written / name)
     listed = rerun("info", written / name)
     rows = re.findall(r"^\s*\d+\s+(/\S+)\s+(\d+)\s.*ros2msg / cdr$", listed, re.MULTILINE)
-    assert {topic: int(count) for topic, count in rows} == counts
+    assert {topic: int(count) for topic, count in rows} == there
     assert re.search(r"Profile +ros2", listed)
     checked = rerun("check", "--full", written / name)
-    assert set(re.findall(r"^ok\s+\d+\s+\d+\s+(/\S+)\s+—\s*$", checked, re.MULTILINE)) == counts.keys()
+    assert set(re.findall(r"^ok\s+\d+\s+\d+\s+(/\S+)\s+—\s*$", checked, re.MULTILINE)) == there.keys()
 
 
 def rerun(*arguments):

@@ -2,10 +2,14 @@
 
 # ruff: noqa: E501 - a sentence stands in one line
 
+import struct
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
+from mcap.opcode import Opcode
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
@@ -15,6 +19,7 @@ from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.sequence import messages as ros
 from vobench.sequence.pose_topic import is_recording, read_poses
+from vobench.sequence.record import MAGIC
 from vobench.trajectory.trajectory import Trajectory
 
 POSE, ODOMETRY = "geometry_msgs/msg/PoseStamped", "nav_msgs/msg/Odometry"
@@ -111,6 +116,28 @@ def test_a_torn_recording_is_one_sentence(tmp_path, share):
     with pytest.raises(SequenceError, match="not a whole recording") as caught:
         read_poses(path, None)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("stated", "sentence"), [(100, "ZstdError"), (2**31, "at most 268435456 are read")])
+def test_a_chunk_that_unpacks_to_more_than_it_states_or_anyone_needs_is_never_unpacked(tmp_path, stated, sentence):
+    """64 MiB of zeros in 6 kB, in a file of somebody else's."""
+    packer = zstandard.ZstdCompressor(write_content_size=False).compressobj()
+    packed = b"".join([*(packer.compress(bytes(1 << 20)) for _ in range(64)), packer.flush()])
+    head = record(Opcode.HEADER, struct.pack("<I4sI", 4, b"ros2", 0))
+    chunk = struct.pack("<QQQII4sQ", 0, 0, stated, 0, 4, b"zstd", len(packed)) + packed
+    footer = record(Opcode.FOOTER, bytes(20))
+    (tmp_path / "a").write_bytes(MAGIC + head + record(Opcode.CHUNK, chunk) + footer + MAGIC)
+    tracemalloc.start()
+    try:
+        with pytest.raises(SequenceError, match=sentence):
+            read_poses(tmp_path / "a", None)
+        assert tracemalloc.get_traced_memory()[1] < 16 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def record(opcode, content):
+    return struct.pack("<BQ", opcode, len(content)) + content
 
 
 def test_poses_that_are_none_and_stamps_that_fall_are_refused(tmp_path):

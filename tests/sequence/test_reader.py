@@ -31,6 +31,7 @@ from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag, BagWriter
 from vobench.sequence.calibration import write_mounts
 from vobench.sequence.cdr import serialise
+from vobench.sequence.index import MESSAGE_INDEX_ENTRY, MESSAGE_INDEX_HEAD
 from vobench.sequence.picture import encode
 
 
@@ -316,3 +317,23 @@ def test_payload_hash_follows_what_the_imu_says_and_how_it_is_described(recordin
             writer.write_frame(5, recording.left[0], recording.right[0])
         hashes.add(payload_hash(tmp_path / name))
     assert len(hashes) == 3
+
+
+def test_a_flipped_bit_in_the_index_of_stamps_is_refused(folder, tmp_path):
+    """A stamp that its chunk has not, and one that only the calibration's own index denies."""
+    bad = Path(shutil.copytree(folder, tmp_path / "bad"))
+    bag, whole = Bag.open(folder / "sensors.mcap"), (folder / "sensors.mcap").read_bytes()
+    channel = next(c.id for c in bag.index.channels.values() if c.topic == ros.LEFT_IMAGE.name)
+    at = int(bag.index.entries[channel].offset[-1]) + MESSAGE_INDEX_HEAD
+    for byte, said in ((7, "has stamps that its chunk has not"), (0, "pictures and calibration should have the same")):
+        data = bytearray(whole)
+        data[at + MESSAGE_INDEX_ENTRY.itemsize + byte] ^= 1
+        (bad / "sensors.mcap").write_bytes(data)
+        with pytest.raises(SequenceError, match=said):
+            Sequence.open(bad).frame_stamps()
+
+
+def test_a_truth_that_was_never_finished_is_not_taken_for_none(folder, tmp_path):
+    shutil.copy(folder / "truth.mcap", tmp_path / "truth.mcap.part")
+    with pytest.raises(SequenceError, match="was never finished; `vobench salvage` recovers"):
+        has_truth(tmp_path)

@@ -30,6 +30,7 @@ from vobench.sequence import (
     salvage_sequence,
 )
 from vobench.sequence.bag import Bag
+from vobench.sequence.record import HEAD, MAGIC
 
 KILLS = 20
 
@@ -99,7 +100,7 @@ def long_folder(make, tmp_path):
     return make(95).write(tmp_path / "long")
 
 
-def test_a_file_cut_anywhere_gives_back_every_chunk_that_is_whole(long_folder, tmp_path):
+def test_a_file_cut_anywhere_gives_back_every_chunk_that_is_whole(long_folder, tmp_path, counts):
     data = (long_folder / "sensors.mcap").read_bytes()
     before = 0
     for cut in np.linspace(0, len(data) - 1, 60, dtype=int).tolist():
@@ -114,7 +115,7 @@ def test_a_file_cut_anywhere_gives_back_every_chunk_that_is_whole(long_folder, t
         assert sum(found.values()) == whole >= before
         assert found.get("/cam_left/image/compressed") == found.get("/cam_right/image/compressed")
         before = whole
-    assert before == messages_of_whole_chunks(data) == sum(Bag.open(long_folder / "sensors.mcap").counts().values())
+    assert before == messages_of_whole_chunks(data) == sum(counts(long_folder / "sensors.mcap").values())
 
 
 def messages_of_whole_chunks(data):
@@ -193,6 +194,24 @@ def test_messages_outside_of_chunks_and_of_other_packings_are_rescued(tmp_path):
         assert rows == [("/a", "A", t_ns, b"%d" % t_ns * 30, t_ns) for t_ns in range(20)]
 
 
+def test_schemas_and_channels_that_are_stated_again_stay_one(tmp_path):
+    """As rosbag2 states them in every chunk."""
+    stream = BytesIO()
+    for number in range(2):
+        part = BytesIO()
+        writer = Writer(part, use_chunking=False)
+        writer.start()
+        channel = writer.register_channel("/a", "json", writer.register_schema("A", "jsonschema", b"{}"))
+        writer.add_message(channel, number, b"{}", number)
+        writer.flush()
+        begin = 0 if number == 0 else len(MAGIC) + HEAD.size + HEAD.unpack_from(part.getvalue(), len(MAGIC))[1]
+        stream.write(part.getvalue()[begin:])
+    (tmp_path / "torn").write_bytes(stream.getvalue())
+    assert salvage(tmp_path / "torn", tmp_path / "whole").messages == {"/a": 2}
+    index = Bag.open(tmp_path / "whole").index
+    assert (len(index.schemas), len(index.channels)) == (1, 1)
+
+
 def test_attachments_called_like_paths_outside_stay_inside_the_file(tmp_path):
     with (tmp_path / "torn").open("wb") as stream:
         writer = Writer(stream)
@@ -203,6 +222,23 @@ def test_attachments_called_like_paths_outside_stay_inside_the_file(tmp_path):
     (tmp_path / "deep" / "er").mkdir(parents=True)
     assert salvage(tmp_path / "torn", tmp_path / "deep" / "er" / "whole").attachments == ("../../evil",)
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["deep", "er", "torn", "whole"]
+
+
+def test_of_a_sequence_whose_truth_is_lost_the_sensors_come_back(folder, tmp_path):
+    (tmp_path / "torn").mkdir()
+    (tmp_path / "torn" / "sensors.mcap").write_bytes((folder / "sensors.mcap").read_bytes()[:-500])
+    (tmp_path / "torn" / "truth.mcap.part").write_bytes(b"")
+    found = salvage_sequence(tmp_path / "torn", tmp_path / "deep" / "whole")
+    assert found["truth.mcap"].messages == {}
+    assert "not an MCAP recording" in found["truth.mcap"].lost[0]
+    assert [path.name for path in (tmp_path / "deep" / "whole").iterdir()] == ["sensors.mcap"]
+    assert len(list(Sequence.open(tmp_path / "deep" / "whole").frames())) > 0
+
+
+def test_a_place_that_cannot_be_written_is_an_error_and_no_loss(folder, tmp_path):
+    (tmp_path / "truth.mcap").mkdir()
+    with pytest.raises(SequenceError, match=r"^cannot salvage \(Is a directory\): .*truth\.mcap"):
+        salvage_sequence(folder, tmp_path)
 
 
 def test_what_is_no_recording_or_has_nothing_whole_is_refused_and_leaves_no_file(tmp_path, folder):

@@ -1,6 +1,7 @@
 """Writing is deterministic, ordered, whole or absent, and needs no more memory for a longer path."""
 
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,6 +30,21 @@ def test_sequence_that_fails_half_way_leaves_no_file(recording, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         fail()
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_sensors_never_get_their_name_before_the_truth_is_whole(recording, tmp_path, monkeypatch, name):
+    replace = Path.replace
+
+    def full(path, target):
+        if target.name == name:
+            raise OSError("disk full")
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(OSError, match="disk full"):
+        recording.write(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == (["truth.mcap"] if name == "sensors.mcap" else [])
 
 
 @pytest.mark.parametrize("second_ns", [100, 99])

@@ -1,10 +1,12 @@
 """Recordings in a suite: paths, patterns, names, and what is said where there is none."""
 
+from pathlib import Path
+
 import pytest
 
 from vobench.errors import SuiteError
 from vobench.suite.expand import read_plan
-from vobench.suite.source_spec import SourceSpec, as_sources, case_name, recorded_cases
+from vobench.suite.source_spec import SourceSpec, TopicsSpec, as_sources, case_name, recorded_cases
 
 
 @pytest.fixture
@@ -40,6 +42,7 @@ def test_a_source_is_a_path_a_pattern_or_a_list_of_either_from_the_suites_folder
     assert [case.name for case in cases] == names
     assert all(case.source.path.startswith(str(tmp_path / "data")) for case in cases)
     assert [case.variant for case in cases] == [{"source": name} for name in names]
+    assert [case.entry for case in cases] == sorted(case.entry for case in cases)
 
 
 def test_files_beside_a_recording_are_found_from_the_suites_folder_too(suite, tmp_path):
@@ -59,11 +62,11 @@ def test_home_is_found(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("source", "sentence"),
     [
-        ("data/none", r":2: source.*: no folder or file at .*/data/none$"),
+        ("data/none", r":2: source: no folder or file at .*/data/none$"),
         ("[data/V1, 'data/x*']", r":2: source\.1: no folder or file matches .*/data/x\*$"),
         ("{path: 'data/MH*', name: one}", "2 recordings match 'data/MH\\*', so one name 'one' is not enough"),
         ("[data/V1, data/V1/mav0]", "two cases are called 'v1'; name one another: .*/data/V1/mav0"),
-        ("{pth: data/V1}", "pth: unknown key. Did you mean 'path'"),
+        ("{pth: data/V1}", r":2: source\.pth: unknown key. Did you mean 'path'"),
         ("{path: data/V1, rate_hz: 0}", "rate_hz: should be greater than 0"),
         ("{path: data/V1, topics: {lft: /cam0}}", "lft: unknown key. Did you mean 'left'"),
     ],
@@ -104,3 +107,10 @@ def test_any_folder_has_a_name_that_is_fit_for_a_case(tmp_path, called, name):
 
 def test_one_path_is_a_list_of_one():
     assert as_sources("a") == as_sources(("a",)) == as_sources({"path": "a"}) == ({"path": "a"},)
+
+
+def test_every_key_of_a_source_is_in_the_docs():
+    page = (Path(__file__).parents[2] / "docs" / "suites.md").read_text(encoding="utf-8")
+    section = page.partition("## Recordings")[2].partition("\n## ")[0]
+    assert all(f"| `{key}` |" in section for key in SourceSpec.model_fields)
+    assert ", ".join(TopicsSpec.model_fields) in section

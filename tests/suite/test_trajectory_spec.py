@@ -85,7 +85,10 @@ WRONG = [
     ("{kind: circle}", ".radius_m: this key is missing"),
     ("{kind: circle, radius_m: -1}", ".radius_m: should be greater than 0 (got -1)"),
     ("{kind: rail, points_m: [[0, 0, 1], [1, 0, 1]], speed: 1}", ".speed: unknown key. Did you mean 'speed_mps'? Known: accel_mps2, kind, points_m, rate_hz, speed_mps"),
-    ("{kind: rail, points_m: [[0, 0, 1], [1, 0, 1]], slip: none}", ".slip: unknown key. Known: accel_mps2, kind, points_m, rate_hz, speed_mps"),
+    ("{kind: rail, points_m: [[0, 0, 1], [1, 0, 1]], slip: none}", ".slip: belongs to waypoints, circle, square, figure_8, lissajous, stop_and_go, pure_rotation, reverse; this is rail"),
+    ("{radius_m: 1}", ".radius_m: belongs to circle, reverse; without a kind this is waypoints"),
+    ("{kind: circle, targets_m: [[1, 1]]}", ".targets_m: belongs to waypoints; this is circle"),
+    ("{kind: circle, radius_m: 1, side_m: 2}", ".side_m: belongs to square; this is circle"),
     ("{kind: circle, radius_m: 1, mover: unicycle, slip: none}", ".slip: does not belong to mover 'unicycle', which has accel_mps2, clockwise, encoders, kind, laps, mover, radius_m, rate_hz, speed_mps, start_heading_deg, start_m"),
     ("{kind: circle, radius_m: 1, car: small_robot}", ".car: does not belong to mover 'pioneer'"),
     ("{targets_m: [[1, 0]], mover: unicycle, floor: [{surface: wet, center_m: [0, 0], size_m: [1, 1]}]}", ".floor: does not belong to mover 'unicycle'"),
@@ -95,6 +98,8 @@ WRONG = [
     ("{targets_m: [[1, 0]], floor: [{surface: wett, center_m: [0, 0], size_m: [1, 1]}]}", ".floor.0.surface: no surface named 'wett'. Did you mean 'wet'? Known: carpet, seam, wet"),
     ("{kind: handheld, poses: [{t_s: 0, position_m: [0, 0, 1]}]}", ".poses: should have 3 or more entries, but has 1"),
     ("{kind: handheld, poses: [{t_s: 0, position_m: [0, 0, 1], yaw: 3}, {}, {}]}", ".poses.0.yaw: unknown key. Did you mean 'yaw_deg'? Known: pitch_deg, position_m, roll_deg, t_s, yaw_deg (and 5 more mistakes)"),
+    ("{kind: pure_rotation, angle_deg: 0}", ".angle_deg: should be another angle than 0"),
+    ("{kind: reverse, length_m: 1, controller: paper}", ".controller: does not belong to mover 'pioneer'"),
     ("{kind: replay, file: path.tum, axes: eurok}", ".axes: no convention of axes named 'eurok'. Did you mean 'euroc'? Known: body, camera, euroc, kitti, tartanair"),
     ("{kind: replay, file: path.tum, axes: 'axes:x,x,z'}", ".axes: axes are x, y and z, each once, with or without a minus, such as z,-x,-y; not 'axes:x,x,z'"),
     ("{kind: replay, file: path.tum, start_heading_deg: 90}", ".start_heading_deg: belongs to start_m; without it the body starts as recorded"),
@@ -113,6 +118,15 @@ def test_a_wrong_trajectory_is_one_sentence_with_file_line_and_key(trajectory, t
 def test_the_line_is_that_of_the_key_also_where_the_trajectory_has_many(trajectory):
     with pytest.raises(SuiteError, match=r"tiny\.yaml:10: trajectories\.short\.slip: does not belong"):
         trajectory("{\n kind: circle,\n radius_m: 1,\n mover: unicycle,\n slip: none}")
+
+
+def test_a_patch_ends_at_its_corners(trajectory):
+    patch = trajectory(
+        "{targets_m: [[1, 0]], floor: [{surface: wet, center_m: [1, 2], size_m: [0.4, 0.2], yaw_deg: 30}]}"
+    ).floor[0]
+    corners, built = patch.corners_m - patch.center_m, patch.build()
+    assert [built.holds(*(0.999 * corner + patch.center_m)) for corner in corners] == [True] * 4
+    assert [built.holds(*(1.001 * corner + patch.center_m)) for corner in corners] == [False] * 4
 
 
 class TestReplay:
@@ -167,6 +181,19 @@ class TestReplay:
         with pytest.raises(SuiteError) as refused:
             self.case(bent, **more)
         assert str(refused.value) == f"{tmp_path / 'tiny.yaml'}:6: trajectories.short.file: {sentence.format(tmp_path)}"
+
+    @pytest.mark.parametrize(
+        ("times", "sentence"),
+        [(None, "cannot read {0}/t.txt: No such file or directory"), ("0.1 2\n", "{0}/t.txt:1: ")],
+    )
+    def test_a_file_of_times_that_is_none_is_said_of_that_key(self, bent, tmp_path, times, sentence):
+        (tmp_path / "k.txt").write_text(format_kitti(np.tile(np.eye(4), (3, 1, 1))))
+        if times:
+            (tmp_path / "t.txt").write_text(times)
+        with pytest.raises(SuiteError) as refused:
+            self.case(bent, file="k.txt", times="t.txt")
+        said = f"{tmp_path / 'tiny.yaml'}:6: trajectories.short.times: {sentence.format(tmp_path)}"
+        assert str(refused.value).startswith(said)
 
 
 class TestImu:

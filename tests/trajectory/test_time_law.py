@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import PPoly
 
 from vobench.errors import MotionError
-from vobench.trajectory.time_law import evenly, in_stages, rest_to_rest
+from vobench.trajectory.time_law import TimeLaw, evenly, in_stages, rest_to_rest
 
 SIZES = st.floats(1e-2, 1e2)
 
@@ -66,6 +67,11 @@ def test_evenly_is_even_within_its_time_and_without():
     s, rate, change = law.at(np.array([1.0, 2.0, 4.0, 6.0]))
     np.testing.assert_allclose(s, [-2, 1, 7, 13])
     np.testing.assert_array_equal([rate, change], [[3] * 4, [0] * 4])
+
+
+def test_a_law_that_ends_while_it_speeds_up_goes_on_evenly():
+    law = TimeLaw(PPoly(np.array([[1.0], [0.0], [0.0]]), np.array([0.0, 2.0])))
+    np.testing.assert_array_equal(np.array(law.at(np.array([-1.0, 1.0, 3.0]))), [[0, 1, 8], [0, 2, 4], [0, 2, 0]])
 
 
 @pytest.mark.parametrize(

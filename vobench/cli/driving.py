@@ -18,7 +18,7 @@ from vobench.pipeline.sense import wheel_error_m
 from vobench.report.drive_plot import ENDINGS, DriveLog, save_plot
 from vobench.suite.expand import Case, Plan, read_plan
 from vobench.suite.ground_spec import GroundSpec
-from vobench.suite.planar_spec import WaypointsSpec
+from vobench.suite.planar_spec import UnledSpec, WaypointsSpec
 from vobench.trajectory.kinematics import Kinematics
 from vobench.trajectory.text import format_tum
 from vobench.trajectory.trajectory import Trajectory
@@ -115,10 +115,11 @@ def log_of(driven: Driven) -> DriveLog:
         t_s=driven.travel.t_ns / 1e9,
         T_world_body=driven.body.T_world_body,
         twist=driven.body.twist,
-        point_m=drive.state[:, :2] if drive else None,
+        point_m=drive.state[:, :2] if drive and not isinstance(spec, UnledSpec) else None,
         references=drive.references if drive else None,
         targets_m=np.array(spec.targets_m) if isinstance(spec, WaypointsSpec) else None,
         reached_s=driven.reached_s,
+        patches=tuple((patch.surface, patch.corners_m) for patch in spec.floor) if isinstance(spec, GroundSpec) else (),
     )
 
 

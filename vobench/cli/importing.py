@@ -5,8 +5,9 @@ from pathlib import Path
 
 from vobench.catalog.catalog import unknown
 from vobench.cli import terminal
+from vobench.dataset.files import require_free
 from vobench.dataset.options import Options, Topics
-from vobench.errors import InputError, UnknownNameError
+from vobench.errors import UnknownNameError
 from vobench.results.unfinished import unfinished
 
 TOPICS = tuple(Topics.__dataclass_fields__)
@@ -48,12 +49,6 @@ def show(path: Path, out: Path, given: Given, *, as_json: bool) -> None:
     for note in recording.notes:
         print(f"- {note}")
     print(f"{frames} frames of a recording in the form '{recording.form}': {out}")
-
-
-def require_free(out: Path) -> None:
-    """Raise InputError unless a folder may be made there."""
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(f"should be a new or empty folder, but there is something: {out}")
 
 
 def _topics(given: tuple[str, ...]) -> Topics:

@@ -1,5 +1,6 @@
 """vobench info."""
 
+from collections.abc import Iterator
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from vobench.cli import terminal
 from vobench.cli.importing import Given
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
-from vobench.sequence.contents import TopicFacts, topic_facts
+from vobench.sequence.contents import TopicFacts, bag_facts, topic_facts
 from vobench.trajectory.trajectory import Trajectory
 
 
@@ -18,16 +19,16 @@ def show(path: Path, given: Given, *, as_json: bool) -> None:
 
     recording = read(path, form=given.form, options=given.options())
     folder = path.parent if path.is_file() else path
-    files = _mcap_files(path)
     facts = {
         "path": str(path),
         "form": recording.form,
         "frames": recording.frame_count,
+        "duration_s": float(recording.t_ns[-1] - recording.t_ns[0]) / 1e9,
         "calibration": _calibration(recording.rig),
         "ground_truth": _truth(recording.truth),
         "imu_readings": len(recording.imu.t_ns) if recording.imu else 0,
         "encoder_readings": len(recording.encoders[0]) if recording.encoders else 0,
-        "files": {file.name: [_topic(facts) for facts in topic_facts(file)] for file in files},
+        "files": {name: [_topic(facts) for facts in found] for name, found in _files(path, recording.form)},
         **(_identity(folder) if recording.form == "vobench" else {"notes": list(recording.notes)}),
     }
     if as_json:
@@ -36,8 +37,13 @@ def show(path: Path, given: Given, *, as_json: bool) -> None:
         _print(facts)
 
 
-def _mcap_files(path: Path) -> list[Path]:
-    return [path] if path.is_file() and path.suffix == ".mcap" else sorted(path.glob("*.mcap"))
+def _files(path: Path, form: str) -> Iterator[tuple[str, tuple[TopicFacts, ...]]]:
+    """What is in each file of a sequence of ours, or in somebody's bag."""
+    if form == "vobench":
+        files = [path] if path.is_file() else sorted(path.glob("*.mcap"))
+        yield from ((file.name, topic_facts(file)) for file in files)
+    elif form in ("ros1", "ros2", "mcap"):
+        yield path.name, bag_facts(path)
 
 
 def _topic(facts: TopicFacts) -> dict[str, Any]:
@@ -81,7 +87,7 @@ def _identity(folder: Path) -> dict[str, Any]:
 
 def _print(facts: dict[str, Any]) -> None:
     out = terminal.console()
-    out.print(f"{facts['path']}: form '{facts['form']}', {facts['frames']} frames")
+    out.print(f"{facts['path']}: form '{facts['form']}', {facts['frames']} frames in {facts['duration_s']:.3f} s")
     for name, topics in facts["files"].items():
         rows = [[t["name"], t["type_name"], str(t["count"]), _rate(t), _span(t)] for t in topics]
         out.print(terminal.table(name, ["name", "kind", "messages", "Hz", "seconds"], rows))

@@ -92,14 +92,12 @@ def _case_facts(case: Case, travels: Mapping[str, Travel]) -> dict[str, Any]:
 
 
 def _recorded_facts(case: RecordedCase, recording: Recording) -> dict[str, Any]:
-    """The same of a recording, whose length is that of its ground truth; its pictures are not read yet."""
-    truth = recording.truth
-    duration_s = float(truth.t_ns[-1] - truth.t_ns[0]) / 1e9 if truth else 0.0
+    """The same of a recording; its pictures are not read yet."""
     is_there = is_imported(case, default_store())
     return {
         "case": case.name,
         "frames": recording.frame_count,
-        "duration_s": duration_s,
+        "duration_s": float(recording.t_ns[-1] - recording.t_ns[0]) / 1e9,
         "simulated": False,
         "sequence": "in the cache" if is_there else f"to import from {case.source.path}",
         "notes": list(recording.notes),

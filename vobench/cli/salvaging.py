@@ -4,7 +4,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from vobench.cli import terminal
-from vobench.cli.importing import require_free
+from vobench.dataset.files import require_free
 from vobench.errors import InputError
 from vobench.sequence.salvage import Salvaged, salvage, salvage_sequence
 

@@ -10,7 +10,9 @@ from vobench.cli.score_command import Json
 Recorded = Annotated[
     Path, typer.Argument(metavar="PATH", help="A dataset's folder, a bag, or a sequence; its form is told by content.")
 ]
-SequencePath = Annotated[Path, typer.Argument(metavar="SEQUENCE", help="The folder of a sequence.")]
+Imu = Annotated[Path | None, typer.Option(help="Kalibr's imu.yaml.")]
+Truth = Annotated[Path | None, typer.Option(help="A trajectory file with the ground truth.")]
+Rate = Annotated[float | None, typer.Option(help="Pictures a second, for layouts without stamps.")]
 Form = Annotated[str | None, typer.Option(help="The form, where its content should not tell.")]
 Calibration = Annotated[Path | None, typer.Option(help="Kalibr's camchain.yaml, where the layout has none of its own.")]
 TopicOf = Annotated[
@@ -25,9 +27,9 @@ def import_(
     *,
     form: Form = None,
     calibration: Calibration = None,
-    imu: Annotated[Path | None, typer.Option(help="Kalibr's imu.yaml.")] = None,
-    truth: Annotated[Path | None, typer.Option(help="A trajectory file with the ground truth.")] = None,
-    rate: Annotated[float | None, typer.Option(help="Pictures a second, for layouts without stamps.")] = None,
+    imu: Imu = None,
+    truth: Truth = None,
+    rate: Rate = None,
     topic: TopicOf = None,
     json: Json = False,
 ) -> None:
@@ -39,16 +41,18 @@ def import_(
 
 
 def export(
-    sequence: SequencePath,
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder to write, which must not exist or be empty.")],
+    source: Annotated[
+        Path, typer.Argument(metavar="SOURCE", help="The folder of a sequence, or the file of a trajectory.")
+    ],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder or file to write, which should be new.")],
     *,
-    form: Annotated[str, typer.Option(help="euroc, kitti, tum or ros2.")],
+    form: Annotated[str, typer.Option(help="euroc, kitti, tum or, of a sequence, ros2.")],
     json: Json = False,
 ) -> None:
-    """Write a sequence in the layout of EuRoC, KITTI, TUM or a ROS 2 bag, and say all that is lost."""
+    """Write a sequence as EuRoC, KITTI, TUM or a ROS 2 bag, or a trajectory as their text; say all that is lost."""
     from vobench.cli import exporting
 
-    exporting.show(sequence, out, form=form, as_json=json)
+    exporting.show(source, out, form=form, as_json=json)
 
 
 def info(
@@ -56,13 +60,17 @@ def info(
     *,
     form: Form = None,
     calibration: Calibration = None,
+    imu: Imu = None,
+    truth: Truth = None,
+    rate: Rate = None,
     topic: TopicOf = None,
     json: Json = False,
 ) -> None:
     """Say what is in a recording: topics, rates, duration, calibration, ground truth, hash."""
     from vobench.cli import importing, informing
 
-    informing.show(path, importing.Given(form, calibration, topics=tuple(topic or ())), as_json=json)
+    given = importing.Given(form, calibration, imu, truth, rate, tuple(topic or ()))
+    informing.show(path, given, as_json=json)
 
 
 def salvage(

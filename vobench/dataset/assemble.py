@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from vobench.dataset.recording import Recording
+from vobench.dataset.recording import NO_TRUTH, Recording
 from vobench.dataset.stream import PictureStream
 from vobench.dataset.truth import cut_to
 from vobench.errors import InputError
@@ -34,7 +34,7 @@ def assemble(
     stream.require(rig, calibration)
     said = [*notes, *_pair_notes(rig, calibration), *stream.notes()]
     if truth is None:
-        said.append("There is no ground truth.")
+        said.append(NO_TRUTH)
     else:
         truth, cut = cut_to(truth, t_ns)
         said += cut
@@ -48,7 +48,7 @@ def assemble(
         rig=rig,
         frames=stream.frames,
         encoded_frames=stream.encoded_frames,
-        frame_count=len(t_ns),
+        t_ns=t_ns,
         start_ns=min(starts),
         truth=truth,
         imu=imu,

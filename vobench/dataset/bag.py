@@ -188,7 +188,7 @@ def _body(chosen: Chosen, found: Contents) -> tuple[str | None, Notes]:
             return frame, (f"The body is {frame}{whose}.",)
     if stated:
         return None, (f"The body is the left camera; where {stated} is, of which the truth is, is not said.",)
-    return None, ("The body is the left camera, and the truth was taken to be of it.",)
+    return None, (f"The body is the left camera{', and the truth was taken to be of it' if truth else ''}.",)
 
 
 def _rig(path: Path, chosen: Chosen, found: Contents, body: str | None, options: Options) -> tuple[Rig, str, Notes]:

@@ -103,7 +103,7 @@ def _truth(root: Path, frames_ns: Stamps, options: Options) -> tuple[Trajectory 
         if (root / name / DATA).is_file():
             return _tracked(root / name, frames_ns)
     if (root / POSITIONS / DATA).is_file():
-        return None, (f"{POSITIONS} has positions alone, without rotations; it was dropped.",)
+        return None, (f"{POSITIONS} has positions alone, without rotations, which are no truth; it was dropped.",)
     return None, ()
 
 

@@ -13,6 +13,7 @@ from vobench.dataset.export_euroc import write_euroc
 from vobench.dataset.export_kitti import covered, kitti_path, write_kitti
 from vobench.dataset.export_ros2 import write_ros2
 from vobench.dataset.export_tum import left_alone, write_tum
+from vobench.dataset.files import require_free
 from vobench.dataset.kitti import T_BODY_GREY
 from vobench.dataset.photometric import write_photometric
 from vobench.dataset.read import read
@@ -22,7 +23,6 @@ from vobench.dataset.truth import cut_to
 from vobench.dataset.views import Views, rectified
 from vobench.errors import InputError, SequenceError
 from vobench.geometry.rig import ImuCalibration, Rig
-from vobench.sensor.imu_text import kalibr_imu_yaml
 from vobench.sequence.messages import IMU, LEFT_IMAGE, RIGHT_IMAGE
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
@@ -83,7 +83,7 @@ def export(sequence: Path, out: Path, form: str) -> Exported:
     if form not in LAYOUTS:
         raise InputError(f"no form '{form}' to export to. Known: {', '.join(FORMS)}")
     out = out.resolve()
-    _require_free(out)
+    require_free(out)
     source, layout = open_source(sequence), LAYOUTS[form]
     views = layout.views(source.rig)
     stamps = _stamps(source, layout)
@@ -96,11 +96,6 @@ def export(sequence: Path, out: Path, form: str) -> Exported:
         _test(source, views, stamps, form, folder)
         files = tuple(sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()))
     return Exported(out, form, tuple(notes), files)
-
-
-def _require_free(out: Path) -> None:
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(f"there is something already, and an export needs a folder of its own: {out}")
 
 
 @contextmanager
@@ -138,7 +133,7 @@ def _write_calibration(rig: Rig, layout: Layout, folder: Path) -> list[str]:
         return [f"There is no {CHAIN}: {error}."]
     if rig.imu:
         try:
-            (folder / IMU_FILE).write_text(kalibr_imu_yaml(rig.imu, topic=imu_topic), encoding="utf-8")
+            (folder / IMU_FILE).write_text(kalibr.imu_yaml(rig.imu, topic=imu_topic), encoding="utf-8")
         except InputError as error:
             notes.append(f"There is no {IMU_FILE}: {error}.")
     return notes

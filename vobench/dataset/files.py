@@ -69,6 +69,12 @@ def listed(folder: Path) -> list[str]:
         return []
 
 
+def require_free(out: Path) -> None:
+    """Raise InputError unless a folder may be made there."""
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(f"should be a new or empty folder, but there is something: {out}")
+
+
 def unread(folder: Path, *used: str) -> tuple[str, ...]:
     """The sentence on what lies in a folder and was not read, where there is something."""
     others = [name for name in listed(folder) if name not in used and not name.startswith(".")]

@@ -102,19 +102,30 @@ def _matrix(name: str, T: Array) -> list[str]:
     return [f"  {name}:", *(f"    - {numbers(row)}" for row in T)]
 
 
-def read_camchain(path: Path, imu: Path | None = None) -> Rig:
-    """The rig of a camchain.yaml, cam0 on the left, with the IMU of an imu.yaml.
+def imu_yaml(imu: ImuCalibration, *, topic: str) -> str:
+    """The imu.yaml of an IMU, without its place, which Kalibr finds out.
 
-    The body is the IMU, or cam0 where the chain says nothing of one. Raises InputError.
+    Raises InputError where one of the numbers is not positive, which Kalibr refuses.
+    """
+    found = {"update_rate": imu.rate_hz, **{name: getattr(imu, field) for field, name in DENSITIES.items()}}
+    for name, value in found.items():
+        if not 0 < value < np.inf:
+            raise InputError(f"Kalibr reads no IMU whose {name} is {value:g}; it must be more than 0")
+    return "".join([f"rostopic: {topic}\n", *(f"{name}: {number(value)}\n" for name, value in found.items())])
+
+
+def read_camchain(path: Path) -> Rig:
+    """The rig of a camchain.yaml, cam0 on the left; the body is the IMU, or cam0 where the chain says nothing of one.
+
+    Raises InputError.
     """
     chain = read_yaml(path)
     left, placed = _camera(chain, "cam0"), chain.has("cam0", "T_cam_imu")
     T_body_left = se3.inverse(chain.transform("cam0", "T_cam_imu")) if placed else np.eye(4)
-    calibration = read_imu(imu, np.eye(4)) if imu and placed else None
     if not chain.has("cam1"):
-        return Rig(left, None, T_body_left, None, imu=calibration)
+        return Rig(left, None, T_body_left, None)
     T_body_right = T_body_left @ se3.inverse(chain.transform("cam1", "T_cn_cnm1"))
-    return Rig(left, _camera(chain, "cam1"), T_body_left, T_body_right, imu=calibration)
+    return Rig(left, _camera(chain, "cam1"), T_body_left, T_body_right)
 
 
 def read_imu(path: Path, T_body_imu: Array) -> ImuCalibration:

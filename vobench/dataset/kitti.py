@@ -121,7 +121,7 @@ def _truth(folder: Path, t_ns: Stamps, options: Options) -> tuple[Trajectory | N
     """The poses beside the pictures or where KITTI has them, one a picture."""
     folder = folder.absolute()
     named = f"{folder.name}.txt"
-    beside = (folder / POSES, folder / named, folder.parent.parent / "poses" / named)
+    beside = (folder / POSES, folder / named, *(up / "poses" / named for up in folder.parents[:2]))
     path = options.truth or next((path for path in beside if path.is_file()), None)
     if path is None:
         return None, ()

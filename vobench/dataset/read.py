@@ -32,7 +32,7 @@ def read_own(folder: Path, _options: Options) -> Recording:
         rig=sequence.rig,
         frames=sequence.frames,
         encoded_frames=sequence.encoded_frames,
-        frame_count=len(sequence),
+        t_ns=stamps,
         start_ns=min(int(t_ns[0]) for t_ns in streams if len(t_ns)),
         truth=truth,
         imu=imu if len(imu.t_ns) else None,

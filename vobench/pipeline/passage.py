@@ -14,8 +14,8 @@ from vobench.suite.replay_spec import ReplaySpec
 def travel_all(plan: Plan) -> dict[str, Travel]:
     """The travel of each trajectory of a plan, by its name: said before hours of rendering.
 
-    Raises SuiteError or MotionError where a target cannot be reached, a camera leaves the room, its
-    pictures take longer than a frame, or an IMU would feel the noise of a recording.
+    Raises SuiteError or MotionError where a target cannot be reached, a way ends within a frame, a camera
+    leaves the room, its pictures take longer than a frame, or an IMU would feel the noise of a recording.
     """
     travels: dict[str, Travel] = {}
     for case in plan.simulated:
@@ -30,10 +30,20 @@ def travel_all(plan: Plan) -> dict[str, Travel]:
 def check_case(plan: Plan, case: Case, travel: Travel) -> None:
     """Raise SuiteError or MotionError where this case cannot be: `travel` is its trajectory's."""
     with plan.at("trajectories", case.variant["trajectory"]):
+        _check_lasts(case, travel)
         _check_in_room(case, travel)
         _check_smooth(case)
     with plan.at("cameras", case.variant["camera"]):
         _check_fits_frame(case)
+
+
+def _check_lasts(case: Case, travel: Travel) -> None:
+    """Raise MotionError where there would be a single picture."""
+    if len(travel.t_ns) < 2:
+        raise MotionError(
+            f"the way ends within its first frame at {case.trajectory.rate_hz:g} Hz: one picture shows no motion; "
+            "go further, more slowly or with a higher rate_hz"
+        )
 
 
 def _check_smooth(case: Case) -> None:

@@ -6,8 +6,9 @@ from typing import Any
 
 from vobench import __version__
 from vobench.dataset.options import Options, Topics
-from vobench.dataset.recording import Recording
+from vobench.dataset.recording import NO_TRUTH, Recording
 from vobench.errors import SuiteError
+from vobench.pipeline.truth_path import is_known
 from vobench.pipeline.workshop import Workshop
 from vobench.results.store import Store, code_digest, library_versions
 from vobench.suite.expand import Plan
@@ -23,11 +24,20 @@ def read_all(plan: Plan) -> dict[str, Recording]:
     """
     recordings = {}
     for case in plan.recorded:
-        with plan.at("source"):
+        with plan.at("source", case.entry):
             recordings[case.name] = recording = read_case(case)
-            if recording.truth is None:
-                raise SuiteError(f"no ground truth, so nothing could be scored: {case.source.path}")
+            if cause := _why_not_scored(recording):
+                raise SuiteError(f"{cause}, so nothing could be scored: {case.source.path}")
     return recordings
+
+
+def _why_not_scored(recording: Recording) -> str:
+    """Why a recording cannot be scored, and what its reader says of the truth; empty where it can."""
+    if recording.truth is None:
+        said = [note.rstrip(".") for note in recording.notes if "truth" in note and note != NO_TRUTH]
+        return f"no ground truth ({said[-1]})" if said else "no ground truth"
+    known = int(is_known(recording.truth.t_ns, recording.t_ns).sum())
+    return "" if known > 1 else f"the ground truth covers {known} of {recording.frame_count} pictures in time"
 
 
 def read_case(case: RecordedCase) -> Recording:

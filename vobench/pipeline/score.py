@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from vobench.metric.score import Score, score
 from vobench.metric.settings import ScoreSettings
 from vobench.results import estimate_file
@@ -32,9 +34,9 @@ def score_run(run: Run, estimate: Path, gt: Trajectory) -> RunScore:
 
 
 def score_estimate(estimate: Path, gt: Trajectory) -> Score | None:
-    """The score of an estimate's folder, None where it holds no pose at all."""
+    """The score of an estimate's folder, None where it holds no pose of a frame whose truth is known."""
     est = estimate_file.read_tum(estimate / estimate_file.ESTIMATE)
-    return score(gt, est, settings=SETTINGS) if len(est) else None
+    return score(gt, est, settings=SETTINGS) if np.isin(est.t_ns, gt.t_ns).any() else None
 
 
 def _status(outcome: estimate_file.Outcome, scored: Score | None, gt: Trajectory) -> tuple[RunStatus, str]:

@@ -9,7 +9,7 @@ from vobench.sensor.imu import STREAMS, ImuBias, ImuReadings, measure
 from vobench.sequence import SequenceWriter
 from vobench.suite.expand import Case
 from vobench.suite.ground_spec import GroundSpec
-from vobench.trajectory.kinematics import Instants
+from vobench.trajectory.trajectory import Stamps
 
 EMPTY = np.zeros(0, np.int64)
 
@@ -36,7 +36,7 @@ class SensorFeed:
         self._last_ns = t_ns
 
 
-def _counted(case: Case, travel: Travel) -> tuple[Instants, Instants]:
+def _counted(case: Case, travel: Travel) -> tuple[Stamps, Stamps]:
     """Stamps (M,) and counts (M, 2) of both encoders; none where nothing rolls."""
     spec = case.trajectory
     if travel.rims is None or not isinstance(spec, GroundSpec):
@@ -58,7 +58,7 @@ def _write_imu(readings: ImuReadings, bias: ImuBias, new: slice, writer: Sequenc
         writer.write_imu_bias(t_ns, gyro_radps, accel_mps2)
 
 
-def _between(t_ns: Instants, last_ns: int, now_ns: int) -> slice:
+def _between(t_ns: Stamps, last_ns: int, now_ns: int) -> slice:
     """The readings after one instant, up to and including another."""
     first, end = np.searchsorted(t_ns, [last_ns, now_ns], side="right").tolist()
     return slice(first, end)

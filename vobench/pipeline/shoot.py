@@ -17,7 +17,8 @@ from vobench.sensor.lens import lens_maps, through_lens
 from vobench.sensor.response import Grey
 from vobench.sensor.shutter import ShutterKind, strips
 from vobench.suite.expand import Case
-from vobench.trajectory.kinematics import Instants, Motion
+from vobench.trajectory.kinematics import Motion
+from vobench.trajectory.trajectory import Stamps
 
 # Between two sub-frames, and between the first and last row of a strip, nothing should move further than this.
 SUB_FRAME_PX, STRIP_PX = 1.0, 0.25
@@ -120,7 +121,7 @@ class Eye:
         first, last = self._seen_from(np.array([start_ns, end_ns]))
         return self._displacement.largest_px(self._camera, first, last, start_ns=start_ns, end_ns=end_ns)
 
-    def _seen_from(self, t_ns: Instants) -> Array:
+    def _seen_from(self, t_ns: Stamps) -> Array:
         """T_world_camera (K, 4, 4) at instants (K,)."""
         T_world_camera: Array = self._world.motion.at(t_ns).T_world_body @ self._T_body_camera
         return T_world_camera

@@ -25,14 +25,14 @@ def left_truth(folder: Path) -> Trajectory:
         raise SequenceError(f"no ground truth, so nothing can be scored: {folder}")
     stamps = sequence.frame_stamps()
     if not np.array_equal(stamps, truth.t_ns):
-        stamps = stamps[_known(truth.t_ns, stamps)]
+        stamps = stamps[is_known(truth.t_ns, stamps)]
         if not len(stamps):
             raise SequenceError(f"the ground truth covers none of the pictures in time: {folder}")
         truth = Trajectory(stamps, poses_at(truth, stamps))
     return truth.of_mounted(sequence.rig.T_body_left)
 
 
-def _known(truth_ns: Stamps, stamps: Stamps) -> NDArray[np.bool_]:
+def is_known(truth_ns: Stamps, stamps: Stamps) -> NDArray[np.bool_]:
     """Which stamps lie on a true pose, or between two that are near to each other in time."""
     after = np.searchsorted(truth_ns, stamps, side="left")
     before = np.searchsorted(truth_ns, stamps, side="right") - 1

@@ -4,13 +4,14 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from vobench.errors import VobenchError
 from vobench.pipeline.score import score_estimate
 from vobench.pipeline.truth_path import left_truth
 from vobench.results import estimate_file
 from vobench.results.hashes import file_hash, read_hashes
-from vobench.results.run_folder import GROUND_TRUTH, SEQUENCE, RunFolder, RunScore
+from vobench.results.run_folder import GROUND_TRUTH, SEQUENCE, RunFolder, read_score
 from vobench.trajectory.text import format_tum
 
 
@@ -25,13 +26,16 @@ class Finding:
 
 def verify_run(folder: RunFolder) -> Iterator[Finding]:
     """Recompute all hashes and scores of a run from its files. Raises InputError where the folder is no run."""
-    scores = folder.scores()
-    for name, held in read_hashes(folder).items():
+    files, hashes = folder.score_files(), read_hashes(folder)
+    for name, held in hashes.items():
         yield Finding("hash", name, _changed(folder.path / name, held))
-    for case in sorted({score.case for score in scores}):
+    for case in sorted({file.parents[2].name for file in files}):
         yield Finding("ground truth", case, _truth_differs(folder.case(case)))
-    for score in scores:
-        yield Finding("score", f"{score.estimator} on {score.case}, {score.repeat}", _rescored(folder, score))
+    for file in files:
+        place = file.relative_to(folder.path)
+        _, case, estimator, repeat, _ = place.parts
+        wrong = _rescored(file) if str(place) in hashes else "not of this run, whose hashes do not name it"
+        yield Finding("score", f"{estimator} on {case}, {repeat}", wrong)
 
 
 def _changed(path: Path, held: str) -> str:
@@ -47,25 +51,40 @@ def _truth_differs(case: Path) -> str:
     if not link.exists():
         return "its sequence is gone from the cache; run the suite again to make it anew"
     try:
-        same = format_tum(left_truth(link)) == (case / GROUND_TRUTH).read_text(encoding="utf-8")
+        same = format_tum(left_truth(link)).encode() == (case / GROUND_TRUTH).read_bytes()
     except (VobenchError, OSError) as error:
         return str(error)
     return "" if same else f"{GROUND_TRUTH} is not the path in its sequence"
 
 
-def _rescored(folder: RunFolder, held: RunScore) -> str:
+def _rescored(file: Path) -> str:
     """A run's score, computed anew and compared digit by digit."""
     try:
-        gt = estimate_file.read_tum(folder.case(held.case) / GROUND_TRUTH)
-        scored = score_estimate(folder.estimate(held.case, held.estimator, held.repeat), gt)
+        held = read_score(file)
+        gt = estimate_file.read_tum(file.parents[2] / GROUND_TRUTH)
+        scored = score_estimate(file.parent, gt)
     except (VobenchError, OSError) as error:
         return str(error)
     anew = json.loads(json.dumps(scored.as_dict())) if scored else None
     if anew == held.score:
         return ""
-    before, now = held.value("ate_trans", "rmse"), held.model_copy(update={"score": anew}).value("ate_trans", "rmse")
-    return f"the score differs: ATE {_number(before)} is {_number(now)} now"
+    return f"the score differs: {_difference(held.score, anew)}"
 
 
-def _number(value: float | None) -> str:
-    return "none" if value is None else f"{value:.9g} m"
+def _difference(held: Any, anew: Any, place: str = "") -> str:
+    """Where two JSON values differ first, and how; empty where they don't."""
+    if isinstance(held, list) and isinstance(anew, list) and len(held) == len(anew):
+        named = ((str(row.get("name", at)) if isinstance(row, dict) else str(at)) for at, row in enumerate(held))
+        pairs = list(zip(named, held, anew, strict=True))
+    elif isinstance(held, dict) and isinstance(anew, dict) and held.keys() == anew.keys():
+        pairs = [(name, value, anew[name]) for name, value in held.items()]
+    else:
+        return "" if held == anew else f"{place or 'all of it'}: {_brief(held)} is {_brief(anew)} now"
+    found = (_difference(before, now, f"{place} {name}".strip()) for name, before, now in pairs)
+    return next(filter(None, found), "")
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, dict | list):
+        return f"{len(value)} entries"
+    return "none" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)

@@ -18,6 +18,7 @@ ENDINGS = (".svg", ".png", ".pdf")
 ROW_INCHES, CELL_INCHES = (9.0, 3.6), 2.3
 # Okabe and Ito (2008): colours that colour-blind readers tell apart.
 BODY, POINT, ASKED, QUIET = "#0072B2", "#009E73", "#D55E00", "#7f7f7f"
+FLOORS = {"wet": "#56B4E9", "carpet": "#CC79A7", "seam": "#E69F00"}
 # The same drive is the same file: no dates, and ids that come from content.
 SETTINGS: Any = {
     "svg.hashsalt": "vobench",
@@ -37,7 +38,8 @@ class DriveLog:
     """What a body did at N instants t_s (N,): its poses (N, 4, 4) and twist (N, 6) in its own axes.
 
     A robot under the controller has more: point_m (N, 2), where the point h was; references (N, 2), the speed
-    and the yaw rate asked for; targets_m (K, 2), and reached_s (K,), when the leg to each ended.
+    and the yaw rate asked for; targets_m (K, 2), and reached_s (K,), when the leg to each ended; patches of floor
+    by their surface, with corners (4, 2).
     """
 
     title: str
@@ -48,6 +50,16 @@ class DriveLog:
     references: Array | None = None
     targets_m: Array | None = None
     reached_s: Array | None = None
+    patches: tuple[tuple[str, Array], ...] = ()
+
+    @property
+    def to_target_m(self) -> Array | None:
+        """The way (N, 2) from the point h to its leg's target, the last one's after it; None without targets."""
+        if self.targets_m is None or self.point_m is None or self.reached_s is None:
+            return None
+        leg = np.searchsorted(self.reached_s, self.t_s, side="right")
+        error_m: Array = self.targets_m[np.minimum(leg, len(self.targets_m) - 1)] - self.point_m
+        return error_m
 
     @property
     def leaves_the_floor(self) -> bool:
@@ -120,6 +132,8 @@ def _draw(row: "SubFigure", log: DriveLog) -> None:
 
 def _path(axes: "Axes", log: DriveLog, *, legend: bool = True) -> None:
     x, y = log.T_world_body[:, :2, 3].T
+    for surface, corners_m in log.patches:
+        axes.fill(*corners_m.T, color=FLOORS.get(surface, QUIET), alpha=0.25, lw=0, label=surface)
     axes.plot(x, y, color=BODY, lw=1.4, label="body B")
     if log.point_m is not None:
         axes.plot(*log.point_m.T, color=POINT, lw=0.9, label="point h")
@@ -133,7 +147,8 @@ def _path(axes: "Axes", log: DriveLog, *, legend: bool = True) -> None:
     _widen(axes, log.T_world_body[0, :2, 3])
     axes.set_aspect("equal", adjustable="datalim")
     if legend:
-        axes.legend(loc="best")
+        named = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+        axes.legend(named.values(), named.keys(), loc="best")
 
 
 def _headings(axes: "Axes", log: DriveLog, *, length: float) -> None:
@@ -165,11 +180,10 @@ def _speeds(speed: "Axes", turn: "Axes", log: DriveLog) -> None:
 
 def _rest(axes: "Axes", log: DriveLog) -> None:
     """The error to the next target as in the paper's Fig. 11, else the height, else the heading."""
-    if log.targets_m is not None and log.point_m is not None and log.reached_s is not None:
-        following = np.searchsorted(log.reached_s, log.t_s, side="right")
-        error_m = log.targets_m[np.minimum(following, len(log.targets_m) - 1)] - log.point_m
-        axes.plot(log.t_s, error_m[:, 0], color=BODY, lw=1.2, label="x")
-        axes.plot(log.t_s, error_m[:, 1], color=POINT, lw=1.2, label="y")
+    if log.to_target_m is not None:
+        x, y = log.to_target_m.T
+        axes.plot(log.t_s, x, color=BODY, lw=1.2, label="x")
+        axes.plot(log.t_s, y, color=POINT, lw=1.2, label="y")
         axes.set_ylabel("to target (m)")
         _legend_above(axes)
     elif log.leaves_the_floor:

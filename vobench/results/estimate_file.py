@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from vobench.errors import TrajectoryError
 from vobench.trajectory.text import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
@@ -79,8 +80,15 @@ def read_frames(folder: Path) -> list[FrameRow]:
 
 
 def read_tum(path: Path) -> Trajectory:
-    """The trajectory in a TUM file of a run; empty where an estimator gave no pose at all."""
-    return parse_tum(path.read_text(encoding="utf-8"), name=str(path))
+    """The trajectory in a TUM file of a run; empty where an estimator gave no pose at all.
+
+    Raises TrajectoryError where the file is none.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise TrajectoryError(f"not a text file in UTF-8 (byte {error.start}): {path}") from None
+    return parse_tum(text, name=str(path))
 
 
 def tracks_member(index: int) -> str:

@@ -24,7 +24,7 @@ def read_hashes(folder: RunFolder) -> dict[str, str]:
         held = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(f"this run kept no hashes (its vobench was older, or it is no run): {path}") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"not readable as JSON ({error}): {path}") from None
     if not isinstance(held, dict) or not all(isinstance(value, str) for value in held.values()):
         raise InputError(f"should hold one hash for each file: {path}")

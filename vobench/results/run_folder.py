@@ -19,7 +19,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from vobench.errors import InputError
 from vobench.results.unfinished import unfinished
@@ -84,12 +84,29 @@ class RunFolder:
         """The folder of an estimator's run on a case."""
         return self.case(case) / estimator / str(repeat)
 
-    def scores(self) -> list[RunScore]:
-        """Every run's score, in order of folders. Raises InputError where the folder is none of ours."""
+    def score_files(self) -> list[Path]:
+        """Where every run's score lies, in order of folders. Raises InputError where the folder is none of ours."""
         files = sorted((self.path / "cases").glob(f"*/*/*/{SCORE}"))
         if not files:
-            raise InputError(f"not the folder of a run (no cases/*/*/*/{SCORE} in it): {self.path}")
-        return [RunScore.model_validate_json(file.read_text(encoding="utf-8")) for file in files]
+            what = f"not the folder of a run (no cases/*/*/*/{SCORE} in it)" if self.path.is_dir() else "no such folder"
+            raise InputError(f"{what}: {self.path}")
+        return files
+
+    def scores(self) -> list[RunScore]:
+        """Every run's score, in order of folders. Raises InputError where the folder or a score is none of ours."""
+        return [read_score(file) for file in self.score_files()]
+
+
+def read_score(path: Path) -> RunScore:
+    """One run's score. Raises InputError where the file is none."""
+    try:
+        return RunScore.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise InputError(
+            f"not a score as vobench writes it ({f'{place}: ' if place else ''}{first['msg']}): {path}"
+        ) from None
 
 
 def open_run(path: Path) -> RunFolder:

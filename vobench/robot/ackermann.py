@@ -9,12 +9,12 @@ from math import isfinite, pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.errors import MotionError
 from vobench.geometry.se3 import Array
 from vobench.trajectory.curve import CurveMotion
 from vobench.trajectory.kinematics import Kinematics, level
+from vobench.trajectory.trajectory import Stamps
 
 STEP_S = 0.01
 LOOKS = 8192
@@ -107,7 +107,7 @@ class AckermannMotion:
         """Those of the target, and where the steering begins to answer them."""
         return _breaks_s(self.target, self.settings) * 1e9
 
-    def at(self, t_ns: NDArray[np.int64] | Array) -> Kinematics:
+    def at(self, t_ns: Stamps | Array) -> Kinematics:
         """One Runge-Kutta step from the last node."""
         t_s = np.asarray(t_ns, float) / 1e9
         k = np.clip(np.searchsorted(self.nodes_s, t_s, side="right") - 1, 0, len(self.advance) - 1)

@@ -1,4 +1,4 @@
-"""Where h is to go, frame by frame: through targets by tolerance or by the clock, or along a moving one."""
+"""What a robot is asked for, frame by frame: to lead h through targets or along a path, or speeds set beforehand."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -7,10 +7,11 @@ import numpy as np
 
 from vobench.errors import MotionError
 from vobench.geometry.se3 import Array
+from vobench.robot.vehicle import Vehicle
 
 
 class Errand(Protocol):
-    """What h is to do; `ends` is always the frames at which legs have ended so far."""
+    """What the robot is to do; `ends` is always the frames at which legs have ended so far."""
 
     @property
     def longest(self) -> int:
@@ -19,8 +20,8 @@ class Errand(Protocol):
     def ended(self, state: Array, frame: int, ends: list[int]) -> list[int]:
         """This frame, once for each leg that ends in it."""
 
-    def aim(self, frame: int, ends: list[int]) -> tuple[Array, tuple[float, float]]:
-        """The target (2,) in m to drive to, and its velocity in m/s."""
+    def asked(self, vehicle: Vehicle, state: Array, frame: int, ends: list[int]) -> tuple[float, float]:
+        """u_ref in m/s and omega_ref in rad/s, to be held until the next frame."""
 
     def finished(self, frame: int, ends: list[int]) -> bool:
         """Whether the drive is over with this frame."""
@@ -48,9 +49,9 @@ class ThroughTargets:
         inside = (np.abs(self.targets_m[len(ends) :] - state[:2]) < self.tolerance_m).all(1)
         return [frame] * int(np.logical_and.accumulate(inside).sum())
 
-    def aim(self, frame: int, ends: list[int]) -> tuple[Array, tuple[float, float]]:  # noqa: ARG002
-        """The next target, the last one for ever; it rests."""
-        return self.targets_m[min(len(ends), len(self.targets_m) - 1)], (0.0, 0.0)
+    def asked(self, vehicle: Vehicle, state: Array, frame: int, ends: list[int]) -> tuple[float, float]:  # noqa: ARG002
+        """Towards the next target, the last one for ever."""
+        return vehicle.references(state, self.targets_m[min(len(ends), len(self.targets_m) - 1)])
 
     def finished(self, frame: int, ends: list[int]) -> bool:
         """Whether the last target was entered long enough ago."""
@@ -103,9 +104,9 @@ class ByTheClock:
         """This frame where a leg's time is over."""
         return [frame] * self.leg_ends[len(ends) :].count(frame)
 
-    def aim(self, frame: int, ends: list[int]) -> tuple[Array, tuple[float, float]]:  # noqa: ARG002
-        """The target of this leg, the last one for ever; it rests."""
-        return self.targets_m[min(len(ends), len(self.targets_m) - 1)], (0.0, 0.0)
+    def asked(self, vehicle: Vehicle, state: Array, frame: int, ends: list[int]) -> tuple[float, float]:  # noqa: ARG002
+        """Towards the target of this leg, the last one for ever."""
+        return vehicle.references(state, self.targets_m[min(len(ends), len(self.targets_m) - 1)])
 
     def finished(self, frame: int, ends: list[int]) -> bool:  # noqa: ARG002
         """Whether the last leg's time was over long enough ago."""
@@ -131,10 +132,10 @@ class AlongPath:
         """A path has no legs."""
         return []
 
-    def aim(self, frame: int, ends: list[int]) -> tuple[Array, tuple[float, float]]:  # noqa: ARG002
-        """Where the target is now, and how it moves."""
+    def asked(self, vehicle: Vehicle, state: Array, frame: int, ends: list[int]) -> tuple[float, float]:  # noqa: ARG002
+        """After the target where it is now, and as it moves."""
         v_x, v_y = self.path_mps[frame].tolist()
-        return self.path_m[frame], (v_x, v_y)
+        return vehicle.references(state, self.path_m[frame], (v_x, v_y))
 
     def finished(self, frame: int, ends: list[int]) -> bool:  # noqa: ARG002
         """Whether this is the path's last row."""
@@ -142,3 +143,31 @@ class AlongPath:
 
     def check_patience(self, place_m: list[Array], ends: list[int]) -> None:
         """A path takes its time."""
+
+
+@dataclass(frozen=True, slots=True)
+class AsTold:
+    """References (N, 2) that were set beforehand, one row a frame, whatever comes of them."""
+
+    references: Array
+
+    @property
+    def longest(self) -> int:
+        """Frames in the drive."""
+        return len(self.references)
+
+    def ended(self, state: Array, frame: int, ends: list[int]) -> list[int]:  # noqa: ARG002
+        """There are no legs."""
+        return []
+
+    def asked(self, vehicle: Vehicle, state: Array, frame: int, ends: list[int]) -> tuple[float, float]:  # noqa: ARG002
+        """This frame's row; where the robot is does not matter."""
+        u_ref, omega_ref = self.references[frame].tolist()
+        return u_ref, omega_ref
+
+    def finished(self, frame: int, ends: list[int]) -> bool:  # noqa: ARG002
+        """Whether this is the last row."""
+        return frame == len(self.references) - 1
+
+    def check_patience(self, place_m: list[Array], ends: list[int]) -> None:
+        """Nothing is waited for."""

@@ -1,24 +1,25 @@
-"""A drive through waypoints or along a path: controller, dynamics and slip together, and the exact truth of it."""
+"""A drive through waypoints, along a path or as told: control, dynamics and slip together, and its exact truth."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import ceil, inf
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vobench.errors import MotionError
 from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
 from vobench.geometry.se3 import Array
-from vobench.robot.aim import AlongPath, ByTheClock, Errand, ThroughTargets
+from vobench.robot.aim import AlongPath, AsTold, ByTheClock, Errand, ThroughTargets
 from vobench.robot.controller import CONTROLLERS, ControllerSettings
 from vobench.robot.disturbance import DELTAS, DeltaSettings, Disturbances, drawn
 from vobench.robot.driven import DriveMotion, motion_of
 from vobench.robot.floor import FloorPatch
 from vobench.robot.limits import UNLIMITED, AccelerationLimits
-from vobench.robot.pioneer import THETAS, Theta, axle_poses
+from vobench.robot.pioneer import THETAS, Theta
 from vobench.robot.slip import SLIPS, Generators, SlipNow, SlipSettings, generator_of
 from vobench.robot.vehicle import Vehicle
+from vobench.trajectory.trajectory import Stamps
 
 # How long a drive is known after its end, where it goes on with its last references: for shutters open there.
 TAIL_S = 1.0
@@ -30,20 +31,17 @@ LONGEST_LEG_S, FASTEST_HZ = 3600.0, 1e4
 class Drive:
     """What the robot did, at N frames and M = (N - 1) substeps + 1 encoder instants.
 
-    state (N, 5): x, y of h in m, psi in rad, u, omega; references (N, 2) hold from their frame on. T_world_body
-    and twist (linear, angular, in body axes) are of the axle midpoint B, sliding included, as is `motion`; axle (M, 3):
-    its x, y, heading. reached: the frame that ended each leg, by entering its target or by the clock. rim_rad (M, 2):
-    left, right. slip (N, 3): both sigmas and beta in rad; delta (N, 2). theta: this very robot's, None if ideal.
+    state (N, 5): x, y of h in m, psi in rad, u, omega; references (N, 2) hold from their frame on. `motion` is of the
+    axle midpoint B, sliding included. reached: the frame that ended each leg, by entering its target or by the clock.
+    rim_rad (M, 2): left, right. slip (N, 3): both sigmas and beta in rad; delta (N, 2). theta: this very robot's,
+    None if ideal.
     """
 
-    t_ns: NDArray[np.int64]
+    t_ns: Stamps
     state: Array
     references: Array
-    T_world_body: Array
-    twist: Array
     reached: tuple[int, ...]
-    encoder_t_ns: NDArray[np.int64]
-    axle: Array
+    encoder_t_ns: Stamps
     rim_rad: Array
     slip: Array
     delta: Array
@@ -124,10 +122,41 @@ def follow(
     """
     path, path_rate = _checked_rows(path_m, "path point"), _checked_rows(path_mps, "path velocity")
     _check_clock(rate_hz, substeps)
-    _check_path(path, path_rate, controller)
+    _check_path(path, path_rate, controller, rate_hz)
     vehicle = Vehicle(_own_theta(theta, theta_std, rngs), controller, wheels, rate_hz, substeps, integrator, limits)
     disturbances = drawn(len(path), slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
     return _driven(AlongPath(path, path_rate), vehicle, disturbances, start)
+
+
+def led_by(
+    references: ArrayLike,
+    *,
+    start: tuple[float, float, float],
+    theta: Theta = THETAS["pioneer_3dx"],
+    theta_std: float = 0.0,
+    controller: ControllerSettings = CONTROLLERS["smooth"],
+    limits: AccelerationLimits = UNLIMITED,
+    slip: SlipSettings = SLIPS["none"],
+    delta: DeltaSettings = DELTAS["none"],
+    floor: Sequence[FloorPatch] = (),
+    wheels: WheelGeometry = PIONEER_WHEELS,
+    rate_hz: float = 30.0,
+    substeps: int = 4,
+    integrator: str = "rk4",
+    rngs: Generators | None = None,
+) -> Drive:
+    """Drive from rest with references (N, 2) of u in m/s and omega in rad/s, one row a frame, nothing fed back.
+
+    This is how a robot goes backwards or turns on the spot, where no point h ahead of the axle can lead it.
+    Of the controller it takes the place of h and the largest references. Its other options are `drive`'s.
+    Raises MotionError as `drive` does, and where a reference is larger than the controller gives.
+    """
+    asked = _checked_rows(references, "reference")
+    _check_clock(rate_hz, substeps)
+    _check_references(asked, controller, rate_hz)
+    vehicle = Vehicle(_own_theta(theta, theta_std, rngs), controller, wheels, rate_hz, substeps, integrator, limits)
+    disturbances = drawn(len(asked), slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
+    return _driven(AsTold(asked), vehicle, disturbances, start)
 
 
 def _driven(errand: Errand, vehicle: Vehicle, disturbances: Disturbances, start: tuple[float, float, float]) -> Drive:
@@ -139,8 +168,7 @@ def _driven(errand: Errand, vehicle: Vehicle, disturbances: Disturbances, start:
     fine, asked, ends, places = [state[None]], [], list[int](), [state[:2]]
     for frame in range(errand.longest):
         ends += errand.ended(state, frame, ends)
-        target_m, path_mps = errand.aim(frame, ends)
-        asked.append(vehicle.references(state, target_m, path_mps))
+        asked.append(errand.asked(vehicle, state, frame, ends))
         if errand.finished(frame, ends):
             break
         errand.check_patience(places, ends)
@@ -156,19 +184,12 @@ def _record(
 ) -> Drive:
     """The drive from the states (1 or substeps, 7) of its periods, references (N, 2) and slip at N frames."""
     fine, disturbed = np.concatenate(periods), np.array(slips)
-    state = fine[:: vehicle.substeps, :5]
-    u, omega = state[:, 3:].T
-    T_world_body = axle_poses(*fine[:, :3].T, a_m=vehicle.controller.a_m)
-    side, still = u * np.tan(disturbed[:, 2]) - slips[-1].skid_s * u * omega, np.zeros_like(u)
     return Drive(
-        t_ns=_stamps(len(state), vehicle.rate_hz, 1),
-        state=state,
+        t_ns=_stamps(len(slips), vehicle.rate_hz, 1),
+        state=fine[:: vehicle.substeps, :5],
         references=asked,
-        T_world_body=T_world_body[:: vehicle.substeps],
-        twist=np.stack([u, side, still, still, still, omega], -1),
         reached=ends,
         encoder_t_ns=_stamps(len(fine), vehicle.rate_hz, vehicle.substeps),
-        axle=np.column_stack([T_world_body[:, :2, 3], fine[:, 2]]),
         rim_rad=fine[:, 5:],
         slip=disturbed[:, :3],
         delta=disturbed[:, 5:],
@@ -193,7 +214,7 @@ def _with_tail(fine: Array, asked: Array, slips: list[SlipNow], vehicle: Vehicle
     )
 
 
-def _stamps(count: int, rate_hz: float, substeps: int) -> NDArray[np.int64]:
+def _stamps(count: int, rate_hz: float, substeps: int) -> Stamps:
     """Stamps index / (rate substeps), divided in the order that lets every `substeps`-th be exactly a frame's."""
     return np.rint(np.arange(count) * 1e9 / substeps / rate_hz).astype(np.int64)
 
@@ -217,7 +238,7 @@ def _checked_rows(rows: ArrayLike, what: str) -> Array:
     return pairs
 
 
-def _check_path(path_m: Array, path_mps: Array, controller: ControllerSettings) -> None:
+def _check_path(path_m: Array, path_mps: Array, controller: ControllerSettings, rate_hz: float) -> None:
     if path_m.shape != path_mps.shape:
         raise MotionError(
             f"a path needs a velocity for every point, got {len(path_m)} points and {len(path_mps)} velocities"
@@ -225,9 +246,19 @@ def _check_path(path_m: Array, path_mps: Array, controller: ControllerSettings) 
     speed = np.hypot(*path_mps.T)
     if speed.max() > controller.max_speed_mps:
         raise MotionError(
-            f"the path moves at {speed.max():.3g} m/s at point {int(speed.argmax()) + 1}, "
+            f"the path of h moves at {speed.max():.3g} m/s after {speed.argmax() / rate_hz:.1f} s, "
             f"and the controller gives {controller.max_speed_mps:g} m/s at most"
         )
+
+
+def _check_references(asked: Array, controller: ControllerSettings, rate_hz: float) -> None:
+    mosts = (controller.max_speed_mps, "m/s"), (controller.max_turn_radps, "rad/s")
+    for sizes, (most, unit) in zip(np.abs(asked).T, mosts, strict=True):
+        if sizes.max() > most:
+            raise MotionError(
+                f"the robot would be asked for {sizes.max():.3g} {unit} after {sizes.argmax() / rate_hz:.1f} s, "
+                f"and {most:g} {unit} is the most"
+            )
 
 
 def _check_clock(rate_hz: float, substeps: int, **durations: float | None) -> None:

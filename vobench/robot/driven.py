@@ -9,6 +9,7 @@ from vobench.errors import MotionError
 from vobench.geometry.se3 import Array
 from vobench.robot.vehicle import Vehicle
 from vobench.trajectory.kinematics import Kinematics, level
+from vobench.trajectory.trajectory import Stamps
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,7 @@ class DriveMotion:
         """The control instants, those after the end included."""
         return np.arange(len(self.pieces) // self.substeps + 1, dtype=float) * (1e9 / self.rate_hz)
 
-    def at(self, t_ns: NDArray[np.int64] | Array) -> Kinematics:
+    def at(self, t_ns: Stamps | Array) -> Kinematics:
         """Where the axle's middle is and how it moves at instants (K,).
 
         Raises MotionError for an instant more than a second after the end, or not finite.

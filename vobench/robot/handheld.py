@@ -6,7 +6,7 @@ SHAKES: the presets by name. handheld: the motion.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
@@ -14,6 +14,7 @@ from vobench.geometry.se3 import Array
 from vobench.trajectory.attitude import turned
 from vobench.trajectory.kinematics import Kinematics, Motion
 from vobench.trajectory.spline import pose_spline
+from vobench.trajectory.trajectory import Stamps
 
 BAND_HZ = (0.5, 8.0)
 WAVES = 16  # for each degree of freedom
@@ -95,7 +96,7 @@ class HandheldMotion:
         """The carrier's: a shake has none."""
         return self.carrier.breaks_ns
 
-    def at(self, t_ns: NDArray[np.int64] | Array) -> Kinematics:
+    def at(self, t_ns: Stamps | Array) -> Kinematics:
         """The carrier's kinematics and the shake's, composed."""
         return composed(self.carrier.at(t_ns), self.shake.at(np.asarray(t_ns, float) / 1e9))
 

@@ -75,6 +75,15 @@ def accelerations(
     return u_rate, omega_rate
 
 
+def feed_forward(
+    u: Number, omega: Number, u_rate: Number, omega_rate: Number, *, theta: Theta
+) -> tuple[Number, Number]:
+    """u_ref in m/s and omega_ref in rad/s that (18) turns into these accelerations: it, solved for them."""
+    u_ref = theta.t1 * u_rate - theta.t3 * omega**2 + theta.t4 * u
+    omega_ref = theta.t2 * omega_rate + theta.t5 * u * omega + theta.t6 * omega
+    return u_ref, omega_ref
+
+
 def velocities(psi: float, u: float, omega: float, *, a_m: float, side_mps: float = 0.0) -> tuple[float, float, float]:
     """x', y' of the point h and psi', equation (19).
 

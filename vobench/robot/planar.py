@@ -116,7 +116,7 @@ def pure_rotation(
 ) -> CurveMotion:
     """A turn on the spot, about the middle of the axle: to the left, or to the right where the angle is negative."""
     if not (np.isfinite(angle_rad) and angle_rad):
-        raise MotionError(f"angle_rad is {angle_rad:g}; it should be a finite angle other than 0")
+        raise MotionError(f"the angle is {angle_rad:g} rad; it should be finite and other than 0")
     law = rest_to_rest(abs(angle_rad), speed=rate_radps, acceleration=accel_radps2)
     return CurveMotion(
         course([Piece(abs(angle_rad), _side(clockwise=angle_rad < 0), advance=0.0)]), law, _placed(start)

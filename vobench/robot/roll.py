@@ -1,18 +1,18 @@
 """What the wheels of any level motion turn by, where they roll without slip."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.geometry.rig import WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.robot.pioneer import wheel_speeds
 from vobench.trajectory.kinematics import Motion
+from vobench.trajectory.trajectory import Stamps
 
 # Pieces no longer than this are integrated with four Gauss-Legendre nodes: exact for polynomials of degree 7.
 LONGEST_NS = 2e7
 
 
-def rolled(motion: Motion, t_ns: NDArray[np.int64], wheels: WheelGeometry) -> Array:
+def rolled(motion: Motion, t_ns: Stamps, wheels: WheelGeometry) -> Array:
     """Rim angles (M, 2) in rad, left and right, at rising instants (M,) of a body whose axle's middle moves so.
 
     Both are 0 at the motion's start. Only the forward speed turns wheels: a body that slides sideways does not.

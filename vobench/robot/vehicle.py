@@ -40,7 +40,11 @@ class Vehicle:
         growth = loop_growth(k, self.theta, period_s=period_s, substeps=self.substeps, integrator=self.integrator)
         if growth > 1 - 1e-9:
             limit = settling_gain(k, self.theta, period_s=period_s, substeps=self.substeps, integrator=self.integrator)
-            cure = f"the gain must be below {limit:.3g}" if limit > 1e-6 else "no gain does; raise rate_hz or substeps"
+            cure = (
+                f"take a gain below {limit:.3g} or a higher rate_hz"
+                if limit > 1e-6
+                else "no gain does; raise rate_hz or substeps"
+            )
             raise MotionError(
                 f"gain_per_s {k:g} at {self.rate_hz:g} Hz with {self.integrator} in {self.substeps} sub-step(s) never "
                 f"settles: errors do not shrink; {cure}"

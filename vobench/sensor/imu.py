@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.errors import InputError
 from vobench.geometry import se3
@@ -14,6 +13,7 @@ from vobench.geometry.se3 import Array
 from vobench.sensor.imu_mean import mean_inertia, reading_stamps
 from vobench.sensor.triad import FLAWLESS, Triad, read_out, started, walked
 from vobench.trajectory.kinematics import Motion
+from vobench.trajectory.trajectory import Stamps
 
 # The random streams, one for each process: switching one off leaves the others as they were.
 STREAMS = ("gyro_white", "accel_white", "gyro_walk", "accel_walk", "start_bias")
@@ -24,7 +24,7 @@ Generators = Mapping[str, np.random.Generator]
 class ImuReadings:
     """What an IMU says, in its own axes: t_ns (M,), gyro_radps (M, 3), accel_mps2 (M, 3) with gravity's reaction."""
 
-    t_ns: NDArray[np.int64]
+    t_ns: Stamps
     gyro_radps: Array
     accel_mps2: Array
 
@@ -33,7 +33,7 @@ class ImuReadings:
 class ImuBias:
     """The biases in readings, in the IMU's axes: t_ns (M,), gyro_radps (M, 3), accel_mps2 (M, 3)."""
 
-    t_ns: NDArray[np.int64]
+    t_ns: Stamps
     gyro_radps: Array
     accel_mps2: Array
 

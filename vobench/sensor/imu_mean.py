@@ -1,19 +1,19 @@
 """What a perfect IMU would say: angular rate and specific force, averaged over each reading's time."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, Kinematics, Motion
+from vobench.trajectory.trajectory import Stamps
 
 AT_ONCE = 4096  # readings: what is held in memory does not grow with the motion's length
 
 
-def reading_stamps(motion: Motion, rate_hz: float) -> NDArray[np.int64]:
+def reading_stamps(motion: Motion, rate_hz: float) -> Stamps:
     """Stamps (M,) index / rate from a motion's start up to its end."""
     lasts_ns = motion.end_ns - motion.start_ns
     since_ns = np.rint(np.arange(int(lasts_ns * rate_hz / 1e9) + 2) * 1e9 / rate_hz).astype(np.int64)
-    stamps: NDArray[np.int64] = motion.start_ns + since_ns[since_ns <= lasts_ns]
+    stamps: Stamps = motion.start_ns + since_ns[since_ns <= lasts_ns]
     return stamps
 
 

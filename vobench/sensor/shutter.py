@@ -5,11 +5,10 @@ from enum import StrEnum
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.errors import InputError
+from vobench.trajectory.trajectory import Stamps
 
-Instants = NDArray[np.int64]
 NS_PER_S = 1_000_000_000
 
 
@@ -39,11 +38,11 @@ class Strip:
     """Rows that are exposed together, and the M parts of their exposure: [start_ns, end_ns), each (M,)."""
 
     rows: slice
-    start_ns: Instants
-    end_ns: Instants
+    start_ns: Stamps
+    end_ns: Stamps
 
     @property
-    def mid_ns(self) -> Instants:
+    def mid_ns(self) -> Stamps:
         """Where to look from in each part (M,): stratified, so that their mean is the exposure's."""
         return self.start_ns + (self.end_ns - self.start_ns) // 2
 
@@ -71,7 +70,7 @@ def strips(
     return cut
 
 
-def row_stamps(height: int, shutter: Shutter, t_ns: int) -> Instants:
+def row_stamps(height: int, shutter: Shutter, t_ns: int) -> Stamps:
     """The middle of each row's exposure (H,) in a picture stamped t_ns."""
     readout_ns = round(shutter.readout_s * NS_PER_S)
     return np.array([t_ns + _late_ns(row, row + 1, height, readout_ns) for row in range(height)], np.int64)

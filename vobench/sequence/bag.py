@@ -19,7 +19,17 @@ from mcap.writer import CompressionType, Writer
 from vobench.errors import SequenceError
 from vobench.sequence.index import MESSAGE_INDEX_ENTRY, MESSAGE_INDEX_HEAD, Entries, Index, Numbers, read_index
 from vobench.sequence.messages import NS_PER_S, TYPES, Topic
-from vobench.sequence.record import messages_in, parsing, part_of, read_at, read_record, unpacked
+from vobench.sequence.record import (
+    CHECKSUM,
+    checksum,
+    messages_in,
+    parsing,
+    part_of,
+    read_at,
+    read_record,
+    unpacked,
+    whole_note,
+)
 
 NO_CHANNEL = -1
 PROFILE, SCHEMA_ENCODING, MESSAGE_ENCODING = "ros2", "ros2msg", "cdr"
@@ -96,8 +106,8 @@ class BagWriter:
         self._mcap.add_attachment(0, 0, name, media_type, data)
 
     def note(self, name: str, entries: Mapping[str, str]) -> None:
-        """Add a metadata record."""
-        self._mcap.add_metadata(name, dict(entries))
+        """Add a metadata record, with a checksum among its entries, for MCAP gives it none."""
+        self._mcap.add_metadata(name, {**entries, CHECKSUM: checksum(entries)})
 
     def write(self, topic: Topic, t_ns: int, data: bytes) -> None:
         """Add a serialised message.
@@ -161,13 +171,6 @@ class Bag:
         """How many messages a topic has; none where there is no such topic."""
         return self._entries(topic).total
 
-    def counts(self) -> dict[str, int]:
-        """How many messages each topic has, by its name."""
-        found = dict.fromkeys((channel.topic for channel in self.index.channels.values()), 0)
-        for number, entries in self.index.entries.items():
-            found[self.index.channels[number].topic] += entries.total
-        return found
-
     def raw(self, topics: Iterable[Topic]) -> Iterator[tuple[Topic, memoryview]]:
         """The serialised messages of those topics that there are, in order of time, one chunk in memory at a time."""
         there = {self._channel(topic): topic for topic in topics if self.has(topic)}
@@ -219,7 +222,7 @@ class Bag:
         """Log times in ns (N,) of a topic's messages, which no chunk is read for."""
         entries = self._entries(topic)
         with parsing(self.path), self._opened() as stream:
-            found = [_stamps(stream, entries, chunk) for chunk in np.flatnonzero(entries.count).tolist()]
+            found = [self._stamps(stream, entries, chunk) for chunk in np.flatnonzero(entries.count).tolist()]
         return np.concatenate([np.zeros(0, np.int64), *found])
 
     def count_until(self, topic: Topic, t_ns: int) -> int:
@@ -228,7 +231,7 @@ class Bag:
         begun = np.flatnonzero((entries.count > 0) & (self.index.start_ns <= t_ns))
         with parsing(self.path), self._opened() as stream:
             for chunk in begun[::-1].tolist():
-                within = int(np.searchsorted(_stamps(stream, entries, chunk), t_ns, side="right"))
+                within = int(np.searchsorted(self._stamps(stream, entries, chunk), t_ns, side="right"))
                 if within:
                     return int(entries.ends[chunk] - entries.count[chunk]) + within
         return 0
@@ -239,7 +242,7 @@ class Bag:
             return {}
         with parsing(self.path), self._opened() as stream:
             content = read_record(stream, self.index.notes[name], Opcode.METADATA)
-            return dict(Metadata.read(ReadDataStream(BytesIO(content))).metadata)
+            return whole_note(Metadata.read(ReadDataStream(BytesIO(content))))
 
     def attachment(self, name: str) -> bytes:
         """The attached file of that name. Raises SequenceError where there is none."""
@@ -255,6 +258,15 @@ class Bag:
     def _chunk(self, stream: BinaryIO, number: int) -> memoryview:
         return unpacked(read_record(stream, int(self.index.offset[number]), Opcode.CHUNK))
 
+    def _stamps(self, stream: BinaryIO, entries: Entries, chunk: int) -> Numbers:
+        """Log times in ns of one channel's messages in one chunk, by its message index, which has no checksum."""
+        place, size = int(entries.offset[chunk]) + MESSAGE_INDEX_HEAD, MESSAGE_INDEX_ENTRY.itemsize
+        found = np.frombuffer(read_at(stream, place, int(entries.count[chunk]) * size), MESSAGE_INDEX_ENTRY)
+        stamps = found["log_ns"].astype(np.int64)
+        if stamps.min() < self.index.start_ns[chunk] or stamps.max() > self.index.end_ns[chunk]:
+            raise ValueError(f"the message index at {place} has stamps that its chunk has not")
+        return stamps
+
     def _channel(self, topic: Topic) -> int:
         found = [channel for channel in self.index.channels.values() if channel.topic == topic.name]
         types = {self.index.schemas[c.schema_id].name if c.schema_id else "" for c in found}
@@ -266,10 +278,3 @@ class Bag:
     def _entries(self, topic: Topic) -> Entries:
         nothing = np.zeros_like(self.index.offset)
         return self.index.entries.get(self._channel(topic), Entries(nothing, nothing))
-
-
-def _stamps(stream: BinaryIO, entries: Entries, chunk: int) -> Numbers:
-    """Log times in ns of one channel's messages in one chunk, by its message index."""
-    place, size = int(entries.offset[chunk]) + MESSAGE_INDEX_HEAD, MESSAGE_INDEX_ENTRY.itemsize
-    found = np.frombuffer(read_at(stream, place, int(entries.count[chunk]) * size), MESSAGE_INDEX_ENTRY)
-    return found["log_ns"].astype(np.int64)

@@ -1,10 +1,11 @@
-"""What is in an MCAP file, by its summary: topics, types, counts and rates."""
+"""What is in an MCAP file by its summary, or in any bag by going through it: topics, types, counts and rates."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 from vobench.sequence.bag import Bag
 from vobench.sequence.messages import Topic
+from vobench.sequence.pose_topic import opened
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,16 @@ def topic_facts(path: Path) -> tuple[TopicFacts, ...]:
         for channel in index.channels.values()
     }
     return tuple(_facts(bag, Topic(name, type_name)) for name, type_name in sorted(named.items()))
+
+
+def bag_facts(path: Path) -> tuple[TopicFacts, ...]:
+    """The same of a bag of any make, gone through once; no message is decoded. Raises SequenceError."""
+    found: dict[tuple[str, str], list[int]] = {}
+    with opened(path) as reader:
+        for connection, t_ns, _ in reader.messages():
+            facts = found.setdefault((connection.topic, connection.msgtype), [0, t_ns, t_ns])
+            facts[:] = facts[0] + 1, min(facts[1], t_ns), max(facts[2], t_ns)
+    return tuple(TopicFacts(*names, *facts) for names, facts in sorted(found.items()))
 
 
 def _facts(bag: Bag, topic: Topic) -> TopicFacts:

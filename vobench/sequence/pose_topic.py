@@ -2,16 +2,19 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from rosbags.highlevel import AnyReader
+from rosbags.rosbag2.storage_mcap import DECOMPRESSORS
 
 from vobench.errors import SequenceError, VobenchError
 from vobench.geometry.se3 import Array
 from vobench.sequence import messages as ros
+from vobench.sequence.record import unpack
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 MAGICS = {b"\x89MCAP": ".mcap", b"#ROSBAG V2.0": ".bag", b"SQLite format 3\x00": ".db3"}
@@ -24,6 +27,7 @@ POSES = {
 }
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 NORM_TOLERANCE = 1e-3
+PACKINGS = ("zstd", "lz4")
 
 
 def is_recording(path: Path) -> bool:
@@ -59,6 +63,8 @@ def opened(path: Path) -> Iterator[AnyReader]:
 
     Raises SequenceError for whatever its reader raises inside.
     """
+    # rosbags looks at the size of a chunk after it has unpacked it: a few kB can make many GB.
+    DECOMPRESSORS.update({packing: partial(_unpacked, packing) for packing in PACKINGS})
     with TemporaryDirectory() as folder:
         link = path
         if not path.is_dir():
@@ -69,9 +75,15 @@ def opened(path: Path) -> Iterator[AnyReader]:
                 yield reader
         except VobenchError:
             raise
+        except MemoryError as error:
+            raise SequenceError(f"not a whole recording (it states more bytes than fit into memory): {path}") from error
         except Exception as error:  # a torn file makes its reader raise errors of a dozen kinds
             reason = str(error).splitlines()[0] if str(error) else "no reason given"
             raise SequenceError(f"not a whole recording ({type(error).__name__}: {reason}): {path}") from error
+
+
+def _unpacked(packing: str, packed: bytes, size: int) -> bytes:
+    return bytes(unpack(packing, packed, size))
 
 
 def _rows(reader: AnyReader, path: Path, topic: str | None) -> Iterator[tuple[int, tuple[float, ...]]]:

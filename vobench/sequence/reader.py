@@ -19,7 +19,7 @@ from vobench.sequence.bag import Bag
 from vobench.sequence.calibration import IMU_NOTE, WHEELS_NOTE, read_rig
 from vobench.sequence.cdr import picture_in
 from vobench.sequence.picture import Image, decode
-from vobench.sequence.record import parsing
+from vobench.sequence.record import parsing, part_of
 from vobench.sequence.truth_image import truth_topics
 from vobench.sequence.writer import CASE_ATTACHMENT, IMPORT_NOTE, PROVENANCE_NOTE, SENSORS_FILE, TRUTH_FILE
 from vobench.trajectory.trajectory import Stamps, Trajectory
@@ -120,8 +120,14 @@ class Sequence:
         return self.frame(until - 1)
 
     def frame_stamps(self) -> Stamps:
-        """The stamps (N,) of all frames, without reading a picture."""
-        return self.bag.stamps(ros.LEFT_IMAGE)
+        """The stamps (N,) of all frames, without reading a picture. Raises SequenceError where they are damaged.
+
+        An index has no checksum, but the calibration of each frame has one of its own.
+        """
+        stamps, again = (self.bag.stamps(topic) for topic in (ros.LEFT_IMAGE, ros.LEFT_INFO))
+        if len(stamps) == len(again) and not np.array_equal(stamps, again):
+            raise SequenceError(f"pictures and calibration should have the same stamps, but do not in {self.path}")
+        return stamps
 
     def encoders(self) -> tuple[Stamps, NDArray[np.int64]]:
         """Stamps (M,) and counts (M, 2) of all encoder readings, left and right; empty where there are no encoders."""
@@ -163,7 +169,7 @@ def read_truth(folder: Path) -> Trajectory:
 def has_truth(folder: Path) -> bool:
     """Whether the true path is known: not of every imported recording. Raises SequenceError where its file is torn."""
     path = Path(folder) / TRUTH_FILE
-    return path.exists() and Bag.open(path).count(ros.ODOMETRY) > 0
+    return (path.exists() or part_of(path).exists()) and Bag.open(path).count(ros.ODOMETRY) > 0
 
 
 def read_twist(folder: Path) -> Array | None:

@@ -6,7 +6,7 @@ The `mcap` library believes them: a few bytes then ask for exabytes. Source: mca
 import os
 import struct
 import zlib
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
@@ -14,6 +14,7 @@ from typing import BinaryIO
 import lz4.frame
 import zstandard
 from mcap.opcode import Opcode
+from mcap.records import Metadata
 
 from vobench.errors import SequenceError
 
@@ -26,6 +27,9 @@ HEAD = struct.Struct("<BQ")  # opcode, length of what follows
 CHUNK = struct.Struct("<QQQII")  # first and last log time, size and checksum unpacked, length of the name that follows
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 DATA_LENGTH = struct.Struct("<Q")
+CHECKSUM = "vobench.crc32"  # the entry of a note of ours that is the checksum of the others
+
+Packed = bytes | memoryview
 
 
 @contextmanager
@@ -101,16 +105,21 @@ def unpacked(chunk: bytes | memoryview) -> memoryview:
     at = CHUNK.size + name_length
     (length,) = DATA_LENGTH.unpack_from(chunk, at)
     packed = memoryview(chunk)[at + DATA_LENGTH.size :]
-    if length != len(packed) or size > MAX_BYTES:
-        raise ValueError(f"a chunk of {len(packed)} bytes states {length}, and {size} unpacked")
-    records = memoryview(_unpack(packing, packed, size))
+    if length != len(packed):
+        raise ValueError(f"a chunk of {len(packed)} bytes states {length}")
+    records = memoryview(unpack(packing, packed, size))
     if len(records) != size or (checksum and zlib.crc32(records) != checksum):
         raise ValueError("the checksum of a chunk differs from its content")
     return records
 
 
-def _unpack(packing: str, packed: memoryview, size: int) -> bytes | memoryview:
-    """Raises an error of the packing's own where it is none, and never unpacks more than `size` bytes."""
+def unpack(packing: str, packed: Packed, size: int) -> Packed:
+    """The bytes of a chunk, never more than `size` and MAX_BYTES.
+
+    Raises ValueError, or an error of the packing's own, where it is none.
+    """
+    if size > MAX_BYTES:
+        raise ValueError(f"a chunk states {size} bytes unpacked where at most {MAX_BYTES} are read")
     if not packing:
         return packed
     if packing == "zstd":
@@ -119,7 +128,11 @@ def _unpack(packing: str, packed: memoryview, size: int) -> bytes | memoryview:
             raise ValueError(f"a chunk states {size} bytes unpacked and {stated}")
         return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
     if packing == "lz4":
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size))
+        unpacker = lz4.frame.LZ4FrameDecompressor()
+        found = bytes(unpacker.decompress(packed, max_length=size))
+        if not unpacker.eof:
+            raise ValueError(f"a chunk states {size} bytes unpacked and has more, or was cut off")
+        return found
     raise ValueError(f"a chunk is packed as {packing!r}; zstd and lz4 are known")
 
 
@@ -144,3 +157,17 @@ def messages_in(records: memoryview, channels: Container[int]) -> Iterator[tuple
             channel, _, log_ns, _ = MESSAGE.unpack_from(content)
             if channel in channels:
                 yield channel, log_ns, content[MESSAGE.size :]
+
+
+def checksum(entries: Mapping[str, str]) -> str:
+    """The CRC-32 of a note's entries, whatever their order."""
+    return f"{zlib.crc32(repr(sorted(entries.items())).encode()):08x}"
+
+
+def whole_note(note: Metadata) -> dict[str, str]:
+    """The entries of a note, less their checksum. Raises ValueError where it differs from them."""
+    entries = dict(note.metadata)
+    stated = entries.pop(CHECKSUM, None)
+    if stated is not None and stated != checksum(entries):
+        raise ValueError(f"the checksum of the note {note.name!r} differs from its content")
+    return entries

@@ -17,7 +17,7 @@ from mcap.writer import Writer
 from vobench.errors import SequenceError
 from vobench.sequence.bag import replacing
 from vobench.sequence.index import read_index
-from vobench.sequence.record import HEAD, MAGIC, MESSAGE, part_of, read_at, records_in, unpacked
+from vobench.sequence.record import HEAD, MAGIC, MESSAGE, part_of, read_at, records_in, unpacked, whole_note
 from vobench.sequence.writer import SENSORS_FILE, TRUTH_FILE
 
 SALVAGE_NOTE = "vobench.salvage"
@@ -37,17 +37,27 @@ class Salvaged:
 def salvage_sequence(folder: Path, out: Path) -> dict[str, Salvaged]:
     """Salvage both files of a sequence, finished or not, into another folder; by the names of the files.
 
-    Raises SequenceError where there is neither, or one has nothing whole in it.
+    Of one that has nothing whole no file is made. Raises SequenceError where that is so of both, or there is neither.
     """
     found = {}
     for name in (SENSORS_FILE, TRUTH_FILE):
         whole = Path(folder) / name
         if torn := next((path for path in (whole, part_of(whole)) if path.exists()), None):
-            Path(out).mkdir(parents=True, exist_ok=True)
-            found[name] = salvage(torn, Path(out) / name)
+            found[name] = _salvaged(torn, Path(out) / name)
     if not found:
         raise SequenceError(f"no {SENSORS_FILE}, {TRUTH_FILE} or a .part of one in {folder}")
+    if not any(what.messages for what in found.values()):
+        raise SequenceError("; ".join(sentence for what in found.values() for sentence in what.lost))
     return found
+
+
+def _salvaged(torn: Path, whole: Path) -> Salvaged:
+    try:
+        return salvage(torn, whole)
+    except SequenceError as error:
+        if error.__cause__:  # the disk
+            raise
+        return Salvaged({}, (), (), (str(error),))
 
 
 def salvage(torn: Path, whole: Path) -> Salvaged:
@@ -58,8 +68,10 @@ def salvage(torn: Path, whole: Path) -> Salvaged:
     if Path(torn).resolve() in (Path(whole).resolve(), part_of(Path(whole)).resolve()):
         raise SequenceError(f"what is salvaged needs a file of its own, not the torn one: {torn}")
     try:
-        with Path(torn).open("rb") as stream, replacing(Path(whole)) as out:
-            return _rescue(stream, out, Path(torn))
+        with Path(torn).open("rb") as stream:
+            Path(whole).parent.mkdir(parents=True, exist_ok=True)
+            with replacing(Path(whole)) as out:
+                return _rescue(stream, out, Path(torn))
     except OSError as error:
         raise SequenceError(f"cannot salvage ({error.strerror}): {error.filename or torn}") from error
 
@@ -169,6 +181,7 @@ class _Rescue:
                 self._copy_attachment(content)
             case Opcode.METADATA:
                 note = Metadata.read(_stream(content))
+                whole_note(note)
                 self.writer.add_metadata(note.name, note.metadata)
                 self.notes.append(note.name)
 

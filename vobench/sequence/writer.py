@@ -61,8 +61,9 @@ class SequenceWriter:
         folder.mkdir(parents=True, exist_ok=True)
         topics = (*ros.truth_topics(self._true_rig), *truth_topics(self._channels, self._true_rig.sides))
         with ExitStack() as stack:
-            self._truth = stack.enter_context(BagWriter(folder / TRUTH_FILE, topics, encoded=False))
+            # What is entered first ends last: where there are sensors, the truth is whole.
             self._sensors = stack.enter_context(BagWriter(folder / SENSORS_FILE, ros.sensor_topics(rig), encoded=True))
+            self._truth = stack.enter_context(BagWriter(folder / TRUTH_FILE, topics, encoded=False))
             if case_json is not None:
                 self._truth.attach(CASE_ATTACHMENT, "application/json", case_json)
             if self._channels:

@@ -20,7 +20,7 @@ from vobench.suite.camera_spec import CameraSpec
 from vobench.suite.light_spec import LightOverride
 from vobench.suite.model import EstimatorSpec, RigSpec, Suite
 from vobench.suite.rendering_spec import ChannelName, RenderingSpec
-from vobench.suite.replay_spec import ReplaySpec, read_replayed
+from vobench.suite.replay_spec import ReplaySpec, read_replayed, read_times
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source_spec import RecordedCase, recorded_cases
 from vobench.suite.strict import Strict
@@ -145,6 +145,11 @@ def _at(source: Source | None, *keys: int | str) -> AbstractContextManager[None]
     return source.at(*keys) if source else nullcontext()
 
 
+def _folder(source: Source | None) -> Path:
+    """Where relative paths in a suite start: at its file."""
+    return source.path.parent if source else Path.cwd()
+
+
 def _asked_for(name: str, specs: tuple[EstimatorSpec, ...]) -> EstimatorSpec:
     """The suite's own entry of that label, else the estimator of that name with its defaults."""
     return next((spec for spec in specs if name == (spec.label or spec.name)), EstimatorSpec(name=name))
@@ -200,10 +205,10 @@ def _cases(suite: Suite, source: Source | None) -> Iterator[Case]:
 
 def _recorded(suite: Suite, source: Source | None, *, taken: set[str]) -> Iterator[RecordedCase]:
     """The recordings of a suite; a relative path starts at the suite's file."""
-    folder = source.path.parent if source else Path.cwd()
+    folder = _folder(source)
     for index, spec in enumerate(suite.source):
         with _at(source, "source", index):
-            for case in recorded_cases(spec, folder):
+            for case in recorded_cases(spec, folder, entry=index):
                 if case.name in taken:
                     raise SuiteError(f"two cases are called '{case.name}'; name one another: {case.source.path}")
                 taken = taken | {case.name}
@@ -212,11 +217,13 @@ def _recorded(suite: Suite, source: Source | None, *, taken: set[str]) -> Iterat
 
 def _replayed(suite: Suite, source: Source | None) -> dict[str, str]:
     """What the files of replayed trajectories hold, by the trajectories' names; a relative path as for recordings."""
-    texts: dict[str, str] = {}
+    texts, folder = dict[str, str](), _folder(source)
     for name, spec in suite.trajectories.items():
         if isinstance(spec, ReplaySpec):
+            with _at(source, "trajectories", name, "times"):
+                times = read_times(spec, folder)
             with _at(source, "trajectories", name, "file"):
-                texts[name] = read_replayed(spec, source.path.parent if source else Path.cwd())
+                texts[name] = read_replayed(spec, folder, times)
     return texts
 
 

@@ -4,9 +4,12 @@ from collections.abc import Mapping
 from math import inf, radians
 from typing import Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from vobench.geometry import se3
 from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
+from vobench.geometry.se3 import Array
 from vobench.robot.ackermann import ACKERMANNS
 from vobench.robot.controller import CONTROLLERS
 from vobench.robot.disturbance import DELTAS
@@ -44,6 +47,13 @@ class FloorPatchSpec(Strict):
     center_m: Point
     size_m: tuple[Positive, Positive]
     yaw_deg: float = 0.0
+
+    @property
+    def corners_m(self) -> Array:
+        """Its corners (4, 2) on the floor, in turn."""
+        half = np.array(self.size_m) / 2 * [[1, 1], [-1, 1], [-1, -1], [1, -1]]
+        corners: Array = half @ se3.rotation_z(radians(self.yaw_deg))[:2, :2].T + self.center_m
+        return corners
 
     def build(self) -> FloorPatch:
         """The patch."""

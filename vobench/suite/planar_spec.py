@@ -7,11 +7,13 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from vobench.robot import planar
-from vobench.suite.ground_spec import PIONEER_KEYS, GroundSpec, Mover, Point
+from vobench.suite.ground_spec import MOVER_KEYS, PIONEER_KEYS, GroundSpec, Mover, Point
 from vobench.suite.strict import Acceleration, Length, Pause, Positive, Speed, wrong_key
 from vobench.trajectory.curve import CurveMotion
 
 Laps = Annotated[int, Field(ge=1, le=1000)]
+# Where the Pioneer is told its speeds beforehand, no controller leads it.
+UNLED_KEYS = tuple(key for key in PIONEER_KEYS if key != "controller")
 
 
 class WaypointsSpec(GroundSpec):
@@ -144,16 +146,21 @@ class StopAndGoSpec(GroundSpec):
 class PureRotationSpec(GroundSpec):
     """A turn on the spot about the middle of the axle, to the left; to the right for a negative angle.
 
-    The Pioneer drifts as it turns: its controller holds the point h, not the axle.
+    The Pioneer does it without feedback: its controller holds the point h, not the axle.
     """
 
-    mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = {"pioneer": PIONEER_KEYS, "unicycle": ()}
+    mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = {"pioneer": UNLED_KEYS, "unicycle": ()}
 
-    mover: Mover = "unicycle"
     kind: Literal["pure_rotation"] = "pure_rotation"
     angle_deg: Annotated[float, Field(ge=-36_000, le=36_000)]
     turn_radps: Speed = 1.0
     turn_accel_radps2: Acceleration = 2.0
+
+    @model_validator(mode="after")
+    def _turns(self) -> Self:
+        if self.angle_deg == 0:
+            raise wrong_key("angle_deg", "should be another angle than 0, or less than 0 for right")
+        return self
 
     def way(self) -> CurveMotion:
         """As an ideal robot drives it. Raises MotionError."""
@@ -165,10 +172,11 @@ class PureRotationSpec(GroundSpec):
 class ReverseSpec(GroundSpec):
     """Ahead and back to the start, straight or on an arc to the left (radius_m < 0: to the right).
 
-    The Pioneer swings round on its way back, as all do that are led backwards by a point ahead of the axle.
+    The Pioneer does it without feedback: led backwards by a point ahead of its axle it would swing round.
     """
 
-    mover: Mover = "unicycle"
+    mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = {**MOVER_KEYS, "pioneer": UNLED_KEYS}
+
     kind: Literal["reverse"] = "reverse"
     length_m: Length
     radius_m: float | None = None
@@ -194,4 +202,6 @@ class ReverseSpec(GroundSpec):
         )
 
 
-CurveSpec = CircleSpec | SquareSpec | Figure8Spec | LissajousSpec | StopAndGoSpec | PureRotationSpec | ReverseSpec
+# Where no point ahead of the axle can lead a robot.
+UnledSpec = PureRotationSpec | ReverseSpec
+CurveSpec = CircleSpec | SquareSpec | Figure8Spec | LissajousSpec | StopAndGoSpec | UnledSpec

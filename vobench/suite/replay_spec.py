@@ -15,17 +15,12 @@ from vobench.trajectory import replay
 from vobench.trajectory.correction import Move, parse_move
 from vobench.trajectory.curve import CurveMotion
 from vobench.trajectory.form import parse_any
+from vobench.trajectory.replay import AXES
 from vobench.trajectory.text import NS_PER_S, format_tum, parse_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory
 from vobench.trajectory.unstamped import parse_times
 
 Triple = tuple[float, float, float]
-# EuRoC's body is its IMU: x up, y right, z ahead. TartanAir is x ahead, y right, z down.
-AXES: dict[str, Move | None] = {
-    **replay.AXES,
-    "euroc": parse_move("mount:0,0,0,0.70710678118654752,0,0.70710678118654752,0"),
-    "tartanair": parse_move("axes:x,-y,-z"),
-}
 
 
 def _known_axes(word: str) -> str:
@@ -76,16 +71,21 @@ class ReplaySpec(Strict):
         recorded = parse_tum(replayed, name=self.file)
         start = (*self.start_m, radians(self.start_heading_deg)) if self.start_m else None
         if self.exact:
-            return replay.interpolated(recorded, start=start, speed=self.speed, max_gap_s=self.max_gap_s).motion
-        made = replay.smoothed(recorded, knot_hz=self.knot_hz, start=start, speed=self.speed, max_gap_s=self.max_gap_s)
-        return made.motion
+            return replay.interpolated(recorded, start=start, speed=self.speed, max_gap_s=self.max_gap_s)
+        return replay.smoothed(recorded, knot_hz=self.knot_hz, start=start, speed=self.speed, max_gap_s=self.max_gap_s)
 
 
-def read_replayed(spec: ReplaySpec, folder: Path) -> str:
+def read_times(spec: ReplaySpec, folder: Path) -> Stamps | None:
+    """The stamps in the file `times`, where there is one. Raises InputError."""
+    path = folder / spec.times if spec.times else None
+    return parse_times(_text(path), name=str(path)) if path else None
+
+
+def read_replayed(spec: ReplaySpec, folder: Path, times: Stamps | None) -> str:
     """The poses of the file as TUM text, in our axes; relative paths start in `folder`. Raises InputError."""
     path = folder / spec.file
     parsed = parse_any(_text(path), name=str(path))
-    t_ns = parsed.t_ns if parsed.t_ns is not None else _stamps(spec, folder, len(parsed.T))
+    t_ns = parsed.t_ns if parsed.t_ns is not None else _stamps(spec, times, len(parsed.T))
     if parsed.t_ns is not None and (spec.times or spec.recorded_hz):
         raise SuiteError(f"times and recorded_hz are for files without stamps, but this one has its own: {path}")
     move = _move(spec.axes)
@@ -94,12 +94,11 @@ def read_replayed(spec: ReplaySpec, folder: Path) -> str:
     return format_tum(Trajectory(t_ns, se3.transform(se3.nearest_rotation(T[:, :3, :3]), T[:, :3, 3])))
 
 
-def _stamps(spec: ReplaySpec, folder: Path, count: int) -> Stamps:
-    if spec.times:
-        t_ns = parse_times(_text(folder / spec.times), name=str(folder / spec.times))
-        if len(t_ns) != count:
-            raise TrajectoryError(f"{len(t_ns)} stamps in {spec.times} for {count} poses in {spec.file}")
-        return t_ns
+def _stamps(spec: ReplaySpec, times: Stamps | None, count: int) -> Stamps:
+    if times is not None:
+        if len(times) != count:
+            raise TrajectoryError(f"{len(times)} stamps in {spec.times} for {count} poses in {spec.file}")
+        return times
     if spec.recorded_hz:
         return np.rint(np.arange(count) * NS_PER_S / spec.recorded_hz).astype(np.int64)
     raise SuiteError(f"no stamps in {spec.file}; give times, a file that has them, or recorded_hz")

@@ -53,11 +53,15 @@ class SourceSpec(Strict):
 
 
 class RecordedCase(Strict):
-    """One recording that was made elsewhere; `variant` names it on the axis `source`."""
+    """One recording that was made elsewhere; `variant` names it on the axis `source`.
+
+    `entry` is which of the suite's sources it is of.
+    """
 
     name: str
     variant: dict[str, str]
     source: SourceSpec
+    entry: int = 0
 
 
 def as_sources(value: Any) -> Any:
@@ -66,7 +70,7 @@ def as_sources(value: Any) -> Any:
     return tuple({"path": entry} if isinstance(entry, str) else entry for entry in entries)
 
 
-def recorded_cases(spec: SourceSpec, folder: Path) -> Iterator[RecordedCase]:
+def recorded_cases(spec: SourceSpec, folder: Path, *, entry: int = 0) -> Iterator[RecordedCase]:
     """The cases of one source; `folder` is where relative paths start. Raises SuiteError where a pattern finds none."""
     paths = _found(spec.path, folder)
     if spec.name and len(paths) > 1:
@@ -74,7 +78,7 @@ def recorded_cases(spec: SourceSpec, folder: Path) -> Iterator[RecordedCase]:
     for path in paths:
         placed = spec.placed(path, folder)
         name = placed.name or case_name(path)
-        yield RecordedCase(name=name, variant={"source": name}, source=placed)
+        yield RecordedCase(name=name, variant={"source": name}, source=placed, entry=entry)
 
 
 def case_name(path: Path) -> str:

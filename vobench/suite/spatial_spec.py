@@ -1,5 +1,6 @@
 """What YAML may say of ways through space, which nothing on wheels could go."""
 
+from collections.abc import Sequence
 from math import radians
 from typing import Annotated, Literal
 
@@ -14,7 +15,7 @@ from vobench.robot.quadrotor import quadrotor
 from vobench.robot.rail import rail
 from vobench.suite.strict import Acceleration, NonNegative, Speed, Strict, one_of
 from vobench.trajectory.curve import CurveMotion
-from vobench.trajectory.spline import pose_spline
+from vobench.trajectory.spline import check_times, pose_spline
 
 Triple = tuple[float, float, float]
 Rate = Annotated[float, Field(gt=0, le=1000)]
@@ -97,10 +98,18 @@ class QuadrotorSpec(Strict):
     def motion(self) -> CurveMotion:
         """The motion. Raises MotionError."""
         yaw_rad = None if self.yaw_deg is None else radians(self.yaw_deg)
-        t_s = [t - self.t_s[0] for t in self.t_s] if self.t_s else None
+        t_s = None if self.t_s is None else _from_zero(self.t_s, of="point")
         return quadrotor(self.points_m, t_s=t_s, speed_mps=self.speed_mps, yaw_rad=yaw_rad)
 
 
 def _columns(poses: tuple[PoseSpec, ...]) -> tuple[Array, Array]:
-    """Times (N,) from the first pose on, and poses (N, 4, 4)."""
-    return np.array([pose.t_s - poses[0].t_s for pose in poses]), np.stack([pose.T_world_body for pose in poses])
+    """Times (N,) from the first pose on, and poses (N, 4, 4). Raises MotionError where times do not rise."""
+    return _from_zero([pose.t_s for pose in poses], of="pose"), np.stack([pose.T_world_body for pose in poses])
+
+
+def _from_zero(t_s: Sequence[float], *, of: str) -> Array:
+    """Times (N,) since the first; what is wrong with them is said in the times that were written."""
+    written: Array = np.array(t_s)
+    check_times(written, fewest=2, of=of)
+    since: Array = written - written[0]
+    return since

@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
 from vobench.trajectory.kinematics import Kinematics
 from vobench.trajectory.time_law import TimeLaw
+from vobench.trajectory.trajectory import Stamps
 
 AT_REST = 1e-9  # progress per second: slower than that, a break of the curve is also one of the law
 
@@ -50,7 +50,7 @@ class CurveMotion:
         passed_s = passed_s[(rate > AT_REST) & (passed_s > self.law.start_s) & (passed_s < self.law.end_s)]
         return np.unique(np.concatenate([self.law.breaks_s, passed_s])) * 1e9
 
-    def at(self, t_ns: NDArray[np.int64] | Array) -> Kinematics:
+    def at(self, t_ns: Stamps | Array) -> Kinematics:
         """The curve where the law says, by the chain rule."""
         s, rate, change = self.law.at(np.asarray(t_ns, float) / 1e9)
         by_s, rate, change = self.curve.at(s), rate[:, None], change[:, None]

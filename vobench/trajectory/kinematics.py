@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-
-Instants = NDArray[np.int64]
+from vobench.trajectory.trajectory import Stamps
 
 STANDARD_GRAVITY_MPS2 = 9.80665  # exact by definition (3rd CGPM, 1901); it pulls down the world's z axis
 
@@ -72,7 +70,7 @@ class Motion(Protocol):
     def breaks_ns(self) -> Array:
         """Instants (B,) float64 in ns, rising, between which acceleration is smooth: where it may jump."""
 
-    def at(self, t_ns: NDArray[np.int64] | Array) -> Kinematics:
+    def at(self, t_ns: Stamps | Array) -> Kinematics:
         """Where the body is and how it moves at instants (K,), whole nanoseconds or fractions of them."""
 
 

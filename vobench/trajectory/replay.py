@@ -3,8 +3,6 @@
 AXES: what a recording's axes are, by name. interpolated, smoothed: the motions.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.interpolate import BSpline, make_lsq_spline
 
@@ -18,66 +16,44 @@ from vobench.trajectory.time_law import evenly
 from vobench.trajectory.trajectory import Trajectory
 
 DEGREE = 5
-# A hole in the recording: so many times the usual time between poses.
-GAP = 5.0
 FEWEST_SMOOTHED = 2 * (DEGREE + 1)
 
-# body: x forward, y left, z up. camera: an optical camera (z forward, y down) in a world with z up, as TUM RGB-D.
-# kitti: an optical camera in the axes of the first camera, as KITTI; its world is taken for level.
-# In both the body's origin is the camera's. EuRoC's body has its own axes: give a `mount:` instead.
-AXES = {
+# What takes a recording's poses to a body with x ahead, y left and z up, in a world with z up. camera: an optical one
+# in such a world, as TUM RGB-D; kitti: an optical one in the axes of the first, taken for level. In both the body's
+# origin is the camera's. EuRoC's body is its IMU: x up, y right, z ahead. TartanAir is x ahead, y right, z down.
+AXES: dict[str, Move | None] = {
     "body": None,
     "camera": parse_move("mount:0,0,0,0.5,-0.5,0.5,0.5"),
     "kitti": parse_move("axes:z,-x,-y"),
+    "euroc": parse_move("mount:0,0,0,0.70710678118654752,0,0.70710678118654752,0"),
+    "tartanair": parse_move("axes:x,-y,-z"),
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Residual:
-    """How far the motion is from the recorded poses."""
-
-    position_rms_m: float
-    position_max_m: float
-    rotation_rms_rad: float
-    rotation_max_rad: float
-
-
-@dataclass(frozen=True, slots=True)
-class Replay:
-    """The motion, its distance from the recorded poses, and the holes (from, to) in s of the recording."""
-
-    motion: CurveMotion
-    residual: Residual
-    gaps_s: tuple[tuple[float, float], ...]
 
 
 def interpolated(
     trajectory: Trajectory,
     *,
-    axes: Move | None = None,
     start: tuple[float, float, float, float] | None = None,
     speed: float = 1.0,
     max_gap_s: float = 1.0,
-) -> Replay:
+) -> CurveMotion:
     """Through every pose, for cameras only: the noise of a recording becomes metres per second squared.
 
     start: the body's x, y, z in m and heading in rad at first, else as recorded; the vertical stays.
     speed: how many times as fast as recorded. Raises MotionError for what makes no motion.
     """
-    t_s, T = _recorded(trajectory, axes, fewest=FEWEST)
-    gaps_s = _gaps(t_s, max_gap_s)
-    return _replay(through(t_s, T), t_s, T, gaps_s=gaps_s, start=start, speed=speed)
+    t_s, T = _recorded(trajectory, fewest=FEWEST, max_gap_s=max_gap_s)
+    return _replayed(through(t_s, T), t_s[-1], start=start, speed=speed)
 
 
 def smoothed(
     trajectory: Trajectory,
     *,
     knot_hz: float = 10.0,
-    axes: Move | None = None,
     start: tuple[float, float, float, float] | None = None,
     speed: float = 1.0,
     max_gap_s: float = 1.0,
-) -> Replay:
+) -> CurveMotion:
     """The quintic B-spline of least squares, of positions and of quaternions, with knots at knot_hz or fewer.
 
     Knots are left out until two poses lie between each two, so that a gap is one stretch of the spline.
@@ -85,44 +61,36 @@ def smoothed(
     """
     if not (np.isfinite(knot_hz) and knot_hz > 0):
         raise MotionError(f"knot_hz is {knot_hz:g}; it should be a finite number above 0")
-    t_s, T = _recorded(trajectory, axes, fewest=FEWEST_SMOOTHED)
-    gaps_s = _gaps(t_s, max_gap_s)
+    t_s, T = _recorded(trajectory, fewest=FEWEST_SMOOTHED, max_gap_s=max_gap_s)
     columns = np.column_stack([T[:, :3, 3], _unbroken(se3.to_quaternion(T[:, :3, :3]))])
     spline = _least_squares(t_s, columns, knot_hz=knot_hz)
     position, quaternion = (BSpline(spline.t, spline.c[:, part], DEGREE) for part in (slice(3), slice(3, 7)))
     curve = PoseCurve(position, by_quaternion(quaternion), breaks=np.zeros(0))
-    return _replay(curve, t_s, T, gaps_s=gaps_s, start=start, speed=speed)
+    return _replayed(curve, t_s[-1], start=start, speed=speed)
 
 
-def _recorded(trajectory: Trajectory, axes: Move | None, *, fewest: int) -> tuple[Array, Array]:
-    """Times (N,) in s from 0, and the body's poses (N, 4, 4)."""
+def _recorded(trajectory: Trajectory, *, fewest: int, max_gap_s: float) -> tuple[Array, Array]:
+    """Times (N,) in s from 0, and poses (N, 4, 4). Raises MotionError where they are too few or too far apart."""
     if len(trajectory) < fewest:
         raise MotionError(f"a replay needs {fewest} poses or more, but the recording has {len(trajectory)}")
-    T = trajectory.T_world_frame if axes is None else axes.apply(trajectory.T_world_frame)
-    t_s = (trajectory.t_ns - trajectory.t_ns[0]) / 1e9
+    t_s, T = (trajectory.t_ns - trajectory.t_ns[0]) / 1e9, trajectory.T_world_frame
+    lasts_s = np.diff(t_s)
+    worst = int(np.argmax(lasts_s))
+    if not lasts_s[worst] <= max_gap_s:
+        raise MotionError(
+            f"the recording has no pose from {t_s[worst]:.3f} s to {t_s[worst + 1]:.3f} s after its start; "
+            f"a gap may last max_gap_s {max_gap_s:g}: replay one side of it, or allow more"
+        )
     return t_s, se3.transform(se3.nearest_rotation(T[:, :3, :3]), T[:, :3, 3])
 
 
-def _replay(
-    curve: PoseCurve,
-    t_s: Array,
-    T: Array,
-    *,
-    gaps_s: tuple[tuple[float, float], ...],
-    start: tuple[float, float, float, float] | None,
-    speed: float,
-) -> Replay:
+def _replayed(
+    curve: PoseCurve, lasts_s: float, *, start: tuple[float, float, float, float] | None, speed: float
+) -> CurveMotion:
     if not (np.isfinite(speed) and speed > 0):
         raise MotionError(f"speed is {speed:g}; it should be a finite factor above 0")
-    T_curve = curve.at(t_s).T_world_body
-    law = evenly(0.0, t_s[-1] / speed, rate=speed)
-    return Replay(CurveMotion(curve, law, _placed(T_curve[0], start)), _residual(T_curve, T), gaps_s)
-
-
-def _residual(T_curve: Array, T: Array) -> Residual:
-    off_m = np.linalg.norm(T_curve[:, :3, 3] - T[:, :3, 3], axis=1)
-    off_rad = se3.rotation_angle(np.swapaxes(T_curve[:, :3, :3], -1, -2) @ T[:, :3, :3])
-    return Residual(_rms(off_m), float(off_m.max()), _rms(off_rad), float(off_rad.max()))
+    law = evenly(0.0, lasts_s / speed, rate=speed)
+    return CurveMotion(curve, law, _placed(curve.at(np.zeros(1)).T_world_body[0], start))
 
 
 def _placed(T_first: Array, start: tuple[float, float, float, float] | None) -> Array:
@@ -133,19 +101,6 @@ def _placed(T_first: Array, start: tuple[float, float, float, float] | None) -> 
         raise MotionError(f"start is {tuple(start)}; it should be four finite numbers: x, y, z in m, heading in rad")
     R = se3.rotation_z(start[3] - np.arctan2(T_first[1, 0], T_first[0, 0]))
     return se3.transform(R, np.array(start[:3]) - R @ T_first[:3, 3])
-
-
-def _gaps(t_s: Array, max_gap_s: float) -> tuple[tuple[float, float], ...]:
-    """The holes of the recording. Raises MotionError where one is longer than max_gap_s."""
-    lasts_s = np.diff(t_s)
-    worst = int(np.argmax(lasts_s))
-    if not lasts_s[worst] <= max_gap_s:
-        raise MotionError(
-            f"the recording has no pose from {t_s[worst]:.3f} s to {t_s[worst + 1]:.3f} s after its start; "
-            f"a gap may last max_gap_s {max_gap_s:g}: replay one side of it, or allow more"
-        )
-    holes = np.flatnonzero(lasts_s > GAP * np.median(lasts_s))
-    return tuple((float(t_s[k]), float(t_s[k + 1])) for k in holes)
 
 
 def _unbroken(q_xyzw: Array) -> Array:
@@ -167,7 +122,3 @@ def _least_squares(t_s: Array, columns: Array, *, knot_hz: float) -> BSpline:
             last = count
     knots = np.concatenate([np.full(DEGREE + 1, t_s[0]), kept, np.full(DEGREE + 1, t_s[-1])])
     return make_lsq_spline(t_s, columns, knots, k=DEGREE)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -116,7 +116,7 @@ def _check_poses(t_s: Array, T: Array) -> None:
     if wide.size:
         k = int(wide[0])
         raise MotionError(
-            f"pose {k + 1} at {t_s[k + 1]:.12g} s is turned by {np.rad2deg(turned[k]):.0f} deg against the one before, "
+            f"pose {k + 1} is turned by {np.rad2deg(turned[k]):.0f} deg against the one before, "
             "which could be either way round; set a pose between them"
         )
 

@@ -45,7 +45,7 @@ def parse_tartanair(text: str, *, name: str, order: Order = "xyzw") -> Array:
 
 def parse_times(text: str, *, name: str) -> Stamps:
     """Stamps (N,) of a file with one time in seconds a line. Raises TrajectoryError."""
-    return stamps_ns(read_table(content(text), name=name, columns=("t",)), "s")
+    return stamps_ns(read_table(content(text), name=name, columns=("t",), row="a line of times"), "s")
 
 
 def _require_rotations(table: Table, R: Array) -> None:

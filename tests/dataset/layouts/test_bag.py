@@ -1,6 +1,5 @@
 """Bags of every make: the eyes are found, the calibration understood, and what is missing is said."""
 
-import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
@@ -367,21 +365,12 @@ def test_a_bag_that_is_cut_off(scene, tmp_path):
         read(path)
 
 
-@pytest.mark.parametrize(("profile", "said"), [("", "that names no profile"), ("ros1", "ROS 1 messages"), ("x", "'x'")])
-def test_an_mcap_file_of_another_kind_is_told_what_is_read(tmp_path, profile, said):
-    with (tmp_path / "a.mcap").open("wb") as stream:
-        writer = McapWriter(stream)
-        writer.start(profile=profile, library="somebody")
-        writer.finish()
-    with pytest.raises(VobenchError, match=f"{said}.*read are MCAP files in ROS 2 form"):
-        read(tmp_path / "a.mcap")
-
-
-def test_an_mcap_header_that_claims_to_be_endless(tmp_path):
-    path = tmp_path / "a.mcap"
-    path.write_bytes(b"\x89MCAP0\r\n" + struct.pack("<BQI", 1, 2**63, 2**32 - 1) + b"ros")
-    with pytest.raises(VobenchError, match="an MCAP file of the profile"):
-        read(path)
+@pytest.mark.parametrize("name", ["metadata.yaml", "in.mcap"])
+def test_a_pointer_within_a_bag_s_folder_is_named(scene, tmp_path, name):
+    folder = whole(scene).write(tmp_path / "in")
+    (folder / name).write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
+    with pytest.raises(VobenchError, match=f"a Git-LFS pointer.*{name}$"):
+        read(folder)
 
 
 @pytest.fixture(scope="module")

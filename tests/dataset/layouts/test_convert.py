@@ -1,12 +1,13 @@
 """Recordings into sequences: what goes in comes out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vobench.dataset.convert import convert
 from vobench.dataset.export import export
 from vobench.dataset.read import read
-from vobench.dataset.recording import Recording
 from vobench.errors import VobenchError
 from vobench.geometry import se3
 from vobench.sequence import Sequence, read_truth
@@ -116,10 +117,7 @@ def test_readings_of_two_sensors_are_merged_in_order_of_time(scene, tmp_path, ma
     recording = read(made.folder)
     t_ns = np.sort(np.concatenate([recording.imu.t_ns[::3], recording.imu.t_ns[1::3] + 7]))
     ticks = np.stack([np.arange(len(t_ns)), -np.arange(len(t_ns))], -1)
-    mixed = Recording(
-        **{name: getattr(recording, name) for name in Recording.__slots__ if name != "encoders"}, encoders=(t_ns, ticks)
-    )
-    convert(mixed, tmp_path / "out")
+    convert(replace(recording, encoders=(t_ns, ticks)), tmp_path / "out")
     after = Sequence.open(tmp_path / "out")
     assert after.encoders()[0].tolist() == t_ns.tolist()
     assert np.array_equal(after.encoders()[1], ticks)
@@ -129,14 +127,24 @@ def test_readings_of_two_sensors_are_merged_in_order_of_time(scene, tmp_path, ma
 def test_a_truth_that_ends_early_is_kept_as_far_as_it_goes(scene, tmp_path):
     recording = read(scene.kitti(tmp_path))
     short = Trajectory(recording.truth.t_ns[:2], recording.truth.T_world_frame[:2])
-    fields = {name: getattr(recording, name) for name in Recording.__slots__ if name != "truth"}
-    convert(Recording(**fields, truth=short), tmp_path / "out")
+    convert(replace(recording, truth=short), tmp_path / "out")
     assert len(read_truth(tmp_path / "out")) == 2
 
 
 def test_pictures_that_fail_to_come_are_missed(scene, tmp_path):
     recording = read(scene.kitti(tmp_path))
-    fields = {name: getattr(recording, name) for name in Recording.__slots__ if name != "frame_count"}
+    more = replace(recording, t_ns=np.append(recording.t_ns, recording.t_ns[-1] + 1))
     with pytest.raises(VobenchError, match="5 pictures came, but the recording should have 6"):
-        convert(Recording(**fields, frame_count=6), tmp_path / "out")
+        convert(more, tmp_path / "out")
     assert not (tmp_path / "out" / "sensors.mcap").exists()
+
+
+def test_a_wrong_picture_leaves_no_sequence(scene, tmp_path):
+    euroc = scene.euroc(tmp_path / "in")
+    (euroc / f"mav0/cam0/data/{scene.t_ns[4]}.png").write_bytes(b"")
+    recording = read(euroc)
+    with pytest.raises(VobenchError, match="it is empty"):
+        convert(recording, tmp_path / "out")
+    assert list((tmp_path / "out").iterdir()) == []
+    with pytest.raises(VobenchError):
+        Sequence.open(tmp_path / "out")

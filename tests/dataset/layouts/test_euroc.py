@@ -239,3 +239,10 @@ def test_links_to_another_disk_are_followed(scene, tmp_path):
     data = (folder / "mav0/cam0/data").rename(tmp_path / "elsewhere")
     (folder / "mav0/cam0/data").symlink_to(data)
     assert np.array_equal(next(read(folder).frames()).left, scene.left[0])
+
+
+def test_a_pair_the_wrong_way_round_is_said(scene, tmp_path):
+    euroc = scene.euroc(tmp_path)
+    for was, name in (("cam0", "spare"), ("cam1", "cam0"), ("spare", "cam1")):
+        (euroc / "mav0" / was).rename(euroc / "mav0" / name)
+    assert any("nothing rectifies them" in note for note in read(euroc).notes)

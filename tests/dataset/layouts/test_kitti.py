@@ -55,6 +55,14 @@ def test_what_was_not_used_is_named(scene, tmp_path):
     assert any(note.startswith("The body is the left grey camera") for note in notes)
 
 
+@pytest.mark.parametrize("place", ["poses.txt", "00.txt", "../poses/00.txt", "../../poses/00.txt"])
+def test_poses_are_found_in_the_folder_and_above_it(scene, tmp_path, place):
+    folder = scene.kitti(tmp_path)
+    (folder / place).parent.mkdir(exist_ok=True)
+    (tmp_path / "poses/00.txt").rename(folder / place)
+    assert read(folder).truth.t_ns.tolist() == [t - scene.t_ns[0] for t in scene.t_ns]
+
+
 def test_poses_may_lie_anywhere(scene, tmp_path):
     folder = scene.kitti(tmp_path)
     (tmp_path / "poses/00.txt").rename(tmp_path / "mine.txt")

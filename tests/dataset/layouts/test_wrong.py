@@ -7,11 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
-from vobench.dataset.convert import convert
 from vobench.dataset.options import Options, Topics
 from vobench.dataset.read import read
 from vobench.errors import VobenchError
-from vobench.sequence import Sequence
 
 POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n"
 
@@ -241,6 +239,14 @@ def test_a_stamp_that_ros_cannot_hold(kitti):
     assert "a picture has -1500000000" in complaint(kitti)
 
 
+def test_two_cameras_in_one_place(euroc, kitti):
+    shutil.copy(euroc / "mav0/cam0/sensor.yaml", euroc / "mav0/cam1/sensor.yaml")
+    said = "left and right camera are in the same place, 0 m apart: "
+    assert complaint(euroc) == f"{said}{euroc / 'mav0/cam0/sensor.yaml'}"
+    edit(kitti / "calib.txt", lambda text: text.replace(" -20.0 ", " 0.0 "))
+    assert complaint(kitti) == f"{said}{kitti / 'calib.txt'}"
+
+
 def test_a_chain_with_one_camera_for_two(euroc, tmp_path, camchain):
     chain = tmp_path / "chain.yaml"
     chain.write_text(camchain(cameras=1))
@@ -265,16 +271,6 @@ def test_an_option_that_would_mean_nothing(kitti):
 def test_a_form_that_is_none(kitti):
     with pytest.raises(VobenchError, match=r"no form 'kity'\. Did you mean 'kitti'\? Known: vobench"):
         read(kitti, form="kity")
-
-
-def test_a_wrong_picture_leaves_no_sequence(euroc, scene, tmp_path):
-    picture(scene, euroc, 4).write_bytes(b"")
-    recording = read(euroc)
-    with pytest.raises(VobenchError, match="it is empty"):
-        convert(recording, tmp_path / "out")
-    assert list((tmp_path / "out").iterdir()) == []
-    with pytest.raises(VobenchError):
-        Sequence.open(tmp_path / "out")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
