@@ -81,6 +81,27 @@ def test_a_torn_sequence_is_recognised_and_what_is_whole_comes_back(vobench, seq
     assert vobench("info", "back", "--json").json["frames"] > 0
 
 
+def test_a_sequence_whose_truth_is_lost_says_so_and_keeps_its_pictures(vobench, sequence, here):
+    (here / "half").mkdir()
+    shutil.copy(sequence / "sensors.mcap", here / "half")
+    (here / "half" / "truth.mcap.part").write_bytes(b"")
+    assert "was never finished; `vobench salvage`" in vobench("info", "half").err
+    said = vobench("salvage", "half", "deep/rest")
+    assert said.code == 0
+    assert "truth.mcap: nothing" in said.out
+    assert "lost: not an MCAP recording by its first bytes" in said.out
+    assert vobench("info", "deep/rest", "--json").json["ground_truth"] is None
+
+
+def test_a_sequence_that_was_never_finished_is_recognised(vobench, sequence, here):
+    torn = here / "torn"
+    shutil.copytree(sequence, torn)
+    (torn / "sensors.mcap").rename(torn / "sensors.mcap.part")
+    said = vobench("info", torn)
+    assert said.code == 1
+    assert "never finished; `vobench salvage`" in said.err
+
+
 def test_a_run_verifies_and_a_changed_one_does_not(vobench, ran):
     said = vobench("verify", "runs/tiny")
     assert said.code == 0

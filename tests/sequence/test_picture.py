@@ -11,6 +11,7 @@ from vobench.geometry.camera import Pinhole
 from vobench.sequence.picture import decode, encode, require_grey
 
 CAMERA = Pinhole(48, 32, 40.5, 41.25, 23.5, 15.5)
+HUFFMAN_TABLES, START_OF_SCAN = 0xC4, 0xDA
 GREY = np.random.default_rng(0).integers(0, 256, (32, 48), np.uint8)
 
 
@@ -65,3 +66,17 @@ def test_png_comes_back_bit_for_bit_from_bytes_and_from_a_view_of_them():
     encoded = encode(GREY, CAMERA, "a")
     for form in (encoded, memoryview(encoded), np.frombuffer(encoded, np.uint8)):
         np.testing.assert_array_equal(decode(form, CAMERA, "a"), GREY)
+
+
+def test_the_size_is_found_behind_the_tables_that_some_write_before_it():
+    whole = coded(".jpeg", GREY)
+    segments, at = [], 2
+    while whole[at + 1] != START_OF_SCAN:
+        end = at + 2 + int.from_bytes(whole[at + 2 : at + 4])
+        segments.append(whole[at:end])
+        at = end
+    segments.sort(key=lambda segment: segment[1] != HUFFMAN_TABLES)
+    assert segments[0][1] == HUFFMAN_TABLES
+    moved = b"".join((whole[:2], *segments, whole[at:]))
+    assert require_grey(moved, CAMERA, "a") == ("jpeg", 32, 48)
+    np.testing.assert_array_equal(decode(moved, CAMERA, "a"), decode(whole, CAMERA, "a"))

@@ -183,15 +183,15 @@ def test_messages_outside_of_chunks_and_of_other_packings_are_rescued(tmp_path):
             writer.start(profile="x", library="y")
             channel = writer.register_channel("/a", "json", writer.register_schema("A", "jsonschema", b"{}"))
             for t_ns in range(20):
-                writer.add_message(channel, t_ns, b"%d" % t_ns * 30, t_ns, sequence=t_ns)
+                writer.add_message(channel, t_ns, b"%d" % t_ns * 30, t_ns + 7, sequence=t_ns)
             writer.flush()
         found = salvage(tmp_path / "torn", tmp_path / "whole")
         assert found.messages == {"/a": 20}
         with (tmp_path / "whole").open("rb") as stream:
             reader = make_reader(stream)
-            rows = [(c.topic, s.name, m.log_time, m.data, m.sequence) for s, c, m in reader.iter_messages()]
+            rows = [(s.name, m.log_time, m.publish_time, m.data, m.sequence) for s, _, m in reader.iter_messages()]
             assert reader.get_header().profile == "x"
-        assert rows == [("/a", "A", t_ns, b"%d" % t_ns * 30, t_ns) for t_ns in range(20)]
+        assert rows == [("A", t_ns, t_ns + 7, b"%d" % t_ns * 30, t_ns) for t_ns in range(20)]
 
 
 def test_schemas_and_channels_that_are_stated_again_stay_one(tmp_path):
@@ -239,6 +239,25 @@ def test_a_place_that_cannot_be_written_is_an_error_and_no_loss(folder, tmp_path
     (tmp_path / "truth.mcap").mkdir()
     with pytest.raises(SequenceError, match=r"^cannot salvage \(Is a directory\): .*truth\.mcap"):
         salvage_sequence(folder, tmp_path)
+
+
+def test_a_damaged_attachment_is_refused_and_lost_and_no_message_with_it(folder, tmp_path):
+    data = (folder / "truth.mcap").read_bytes()
+    assert data.count(b'{"seed": 7}') == 1
+    (tmp_path / "truth.mcap").write_bytes(data.replace(b'{"seed": 7}', b'{"seed": 8}'))
+    with pytest.raises(SequenceError, match=r"the checksum of the attachment 'case\.json' differs"):
+        read_case(tmp_path)
+    found = salvage(tmp_path / "truth.mcap", tmp_path / "whole")
+    assert found.attachments == ()
+    assert "the checksum of the attachment 'case.json' differs from its content" in found.lost[0]
+    assert found.messages == salvage(folder / "truth.mcap", tmp_path / "again").messages
+
+
+def test_what_is_lost_is_noted_in_the_new_file(long_folder, tmp_path):
+    data = (long_folder / "sensors.mcap").read_bytes()
+    (tmp_path / "torn").write_bytes(data[: len(data) // 2])
+    found = salvage(tmp_path / "torn", tmp_path / "whole")
+    assert Bag.open(tmp_path / "whole").note("vobench.salvage") == {"lost": "; ".join(found.lost)}
 
 
 def test_what_is_no_recording_or_has_nothing_whole_is_refused_and_leaves_no_file(tmp_path, folder):

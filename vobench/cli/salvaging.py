@@ -28,7 +28,7 @@ def show(torn: Path, out: Path, *, as_json: bool) -> None:
 def _print(name: str, what: Salvaged) -> None:
     out = terminal.console()
     rows = [[topic, str(count)] for topic, count in sorted(what.messages.items())]
-    out.print(terminal.table(name, ["name", "messages"], rows))
+    out.print(terminal.table(name, ["name", "messages"], rows) if rows else f"{name}: nothing")
     for sentence in what.lost:
         out.print(f"lost: {sentence}")
     if not what.lost:

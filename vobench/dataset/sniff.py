@@ -6,6 +6,7 @@ from pathlib import Path
 from vobench.dataset.files import listed, require_itself
 from vobench.errors import InputError
 from vobench.sequence.pose_topic import MAGICS, METADATA
+from vobench.sequence.record import part_of
 from vobench.sequence.writer import SENSORS_FILE
 
 # What each form is known by, in the order in which they are looked for.
@@ -59,7 +60,8 @@ def require_ros2(path: Path) -> None:
 
 def _folder_form(folder: Path) -> str | None:
     """The first of FORMS whose files a folder has."""
-    if (folder / SENSORS_FILE).is_file():
+    sensors = folder / SENSORS_FILE
+    if sensors.is_file() or part_of(sensors).is_file():  # a torn one is told by its reader
         return "vobench"
     if (folder / METADATA).is_file():
         return "ros2"

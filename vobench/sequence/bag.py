@@ -13,7 +13,7 @@ from typing import Any, BinaryIO, Self
 import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Metadata
+from mcap.records import Metadata
 from mcap.writer import CompressionType, Writer
 
 from vobench.errors import SequenceError
@@ -21,6 +21,7 @@ from vobench.sequence.index import MESSAGE_INDEX_ENTRY, MESSAGE_INDEX_HEAD, Entr
 from vobench.sequence.messages import NS_PER_S, TYPES, Topic
 from vobench.sequence.record import (
     CHECKSUM,
+    attached,
     checksum,
     messages_in,
     parsing,
@@ -36,8 +37,6 @@ PROFILE, SCHEMA_ENCODING, MESSAGE_ENCODING = "ros2", "ros2msg", "cdr"
 # A chunk ends when it is as large or as long as this: it is all that a killed writer loses.
 CHUNK_BYTES, CHUNK_NS = 1 << 20, NS_PER_S
 NEVER = 1 << 62  # the library would end chunks between two pictures of one instant
-# Unbuffered, but for Python's care with short writes: a chunk reaches the system when it is done.
-TINY_BUFFER = 2
 
 # A late listener still gets the last message; rosbag2 reads this to replay /tf_static as ROS publishes it.
 LATCHED_QOS = """\
@@ -58,7 +57,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     """A file to write that gets its name when the context ends without an error, and is gone after one."""
     part = part_of(path)
     try:
-        with part.open("wb", buffering=TINY_BUFFER) as stream:
+        with part.open("wb") as stream:
             yield stream
         part.replace(path)
     except BaseException:
@@ -245,12 +244,11 @@ class Bag:
             return whole_note(Metadata.read(ReadDataStream(BytesIO(content))))
 
     def attachment(self, name: str) -> bytes:
-        """The attached file of that name. Raises SequenceError where there is none."""
+        """The attached file of that name. Raises SequenceError where there is none, or it is damaged."""
         if name not in self.index.attachments:
             raise SequenceError(f"no attachment {name!r} in {self.path}")
         with parsing(self.path), self._opened() as stream:
-            content = read_record(stream, self.index.attachments[name], Opcode.ATTACHMENT)
-            return bytes(Attachment.read(ReadDataStream(BytesIO(content))).data)
+            return bytes(attached(read_record(stream, self.index.attachments[name], Opcode.ATTACHMENT)).data)
 
     def _opened(self) -> BinaryIO:
         return self.path.open("rb", buffering=0)

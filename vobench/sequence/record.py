@@ -8,13 +8,15 @@ import struct
 import zlib
 from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
 import lz4.frame
 import zstandard
+from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Metadata
+from mcap.records import Attachment, Metadata
 
 from vobench.errors import SequenceError
 
@@ -157,6 +159,15 @@ def messages_in(records: memoryview, channels: Container[int]) -> Iterator[tuple
             channel, _, log_ns, _ = MESSAGE.unpack_from(content)
             if channel in channels:
                 yield channel, log_ns, content[MESSAGE.size :]
+
+
+def attached(content: bytes | memoryview) -> Attachment:
+    """What an attachment's record holds. Raises ValueError where its checksum, the last four bytes, differs."""
+    found: Attachment = Attachment.read(ReadDataStream(BytesIO(content)))
+    stated = int.from_bytes(content[-4:], "little")
+    if stated and zlib.crc32(content[:-4]) != stated:
+        raise ValueError(f"the checksum of the attachment {found.name!r} differs from its content")
+    return found
 
 
 def checksum(entries: Mapping[str, str]) -> str:

@@ -1,6 +1,5 @@
 """All that is whole in a bag that was cut off or damaged, written as a proper one."""
 
-import zlib
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -11,13 +10,13 @@ from typing import BinaryIO
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Header, Metadata, Schema
+from mcap.records import Channel, Header, Metadata, Schema
 from mcap.writer import Writer
 
 from vobench.errors import SequenceError
 from vobench.sequence.bag import replacing
 from vobench.sequence.index import read_index
-from vobench.sequence.record import HEAD, MAGIC, MESSAGE, part_of, read_at, records_in, unpacked, whole_note
+from vobench.sequence.record import HEAD, MAGIC, MESSAGE, attached, part_of, read_at, records_in, unpacked, whole_note
 from vobench.sequence.writer import SENSORS_FILE, TRUTH_FILE
 
 SALVAGE_NOTE = "vobench.salvage"
@@ -198,10 +197,7 @@ class _Rescue:
         self.messages[topic] += 1
 
     def _copy_attachment(self, content: memoryview) -> None:
-        found = Attachment.read(_stream(content))
-        checksum = int.from_bytes(content[-4:], "little")
-        if checksum and zlib.crc32(content[:-4]) != checksum:
-            raise ValueError(f"the checksum of the attachment {found.name!r} differs from its content")
+        found = attached(content)
         self.writer.add_attachment(found.create_time, found.log_time, found.name, found.media_type, found.data)
         self.attachments.append(found.name)
 
