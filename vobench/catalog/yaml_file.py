@@ -72,13 +72,13 @@ class Source:
         """`file:line: a.b.c` of the deepest of these keys that the file has."""
         tree, line, named = self.marked, None, list[int | str]()
         for key in keys:
+            if isinstance(key, int) and isinstance(tree, str | dict) and key not in list(tree):
+                continue  # one value stands for a list of one
+            named.append(key)
             if isinstance(tree, dict) and key in tree:
                 tree, line = tree[key], tree.lc.key(key)[0] + 1
             elif isinstance(tree, list) and isinstance(key, int) and key < len(tree):
                 tree, line = tree[key], tree.lc.item(key)[0] + 1
-            elif isinstance(key, int) and isinstance(tree, str | dict):
-                continue  # one value stands for a list of one
-            named.append(key)
         where = f"{self.path}:{line}" if line else str(self.path)
         return f"{where}: {'.'.join(map(str, named))}" if named else where
 

@@ -1,7 +1,6 @@
 """Where each case's body goes: its motion, its wheels, and what the controller asked of it."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from vobench.pipeline.stream import generator
 from vobench.robot.ackermann import ACKERMANNS, ackermann
 from vobench.robot.controller import CONTROLLERS, ControllerSettings
 from vobench.robot.disturbance import DELTAS, STREAMS
-from vobench.robot.drive import Drive, drive, follow, led_by
+from vobench.robot.drive import Drive, Options, drive, follow, led_by
 from vobench.robot.pioneer import THETAS, Theta, feed_forward
 from vobench.robot.roll import rolled
 from vobench.robot.slip import SLIPS
@@ -108,12 +107,12 @@ def _along(way: CurveMotion, case: Case, spec: CurveSpec) -> Drive:
     start = (x, y, spec.start[2])
     if isinstance(spec, UnledSpec):
         amid_ns = t_ns + round(NS_PER_S / spec.rate_hz / 2)
-        return led_by(_fed_forward(way, amid_ns, robot["theta"]), start=start, **robot)
+        return led_by(_fed_forward(way, amid_ns, THETAS[spec.robot]), start=start, **robot)
     return follow(path_m, path_mps, start=start, **robot)
 
 
-def _robot(case: Case, spec: GroundSpec) -> dict[str, Any]:
-    """Which robot it is, and what is done to it: the options that all drives have in common."""
+def _robot(case: Case, spec: GroundSpec) -> Options:
+    """Which robot it is, and what is done to it."""
     is_ideal = spec.mover == "unicycle"
     return {
         "theta": None if is_ideal else THETAS[spec.robot],

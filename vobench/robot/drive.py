@@ -1,8 +1,9 @@
 """A drive through waypoints, along a path or as told: control, dynamics and slip together, and its exact truth."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import ceil, inf
+from typing import TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,53 +55,84 @@ class Drive:
         return tuple(np.diff(self.reached, prepend=0).tolist())
 
 
+class Options(TypedDict, total=False):
+    """Which robot it is, and what is done to it: the options of all drives; `_ready` has what they are by default.
+
+    Without a theta (None) the robot is an ideal unicycle; `theta_std` perturbs it. rngs: disturbance.STREAMS.
+    """
+
+    theta: Theta | None
+    theta_std: float
+    controller: ControllerSettings
+    limits: AccelerationLimits
+    slip: SlipSettings
+    delta: DeltaSettings
+    floor: Sequence[FloorPatch]
+    wheels: WheelGeometry
+    rate_hz: float
+    substeps: int
+    integrator: str
+    rngs: Generators | None
+
+
 def drive(
     targets_m: ArrayLike,
     *,
-    theta: Theta | None = THETAS["pioneer_3dx"],
-    theta_std: float = 0.0,
-    controller: ControllerSettings = CONTROLLERS["smooth"],
-    limits: AccelerationLimits = UNLIMITED,
-    slip: SlipSettings = SLIPS["none"],
-    delta: DeltaSettings = DELTAS["none"],
-    floor: Sequence[FloorPatch] = (),
-    wheels: WheelGeometry = PIONEER_WHEELS,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    rate_hz: float = 30.0,
-    substeps: int = 4,
-    integrator: str = "rk4",
     tolerance_m: float = 0.01,
     settle_s: float = 0.0,
     max_time_s: float = 60.0,
     leg_s: float | None = None,
-    rngs: Generators | None = None,
+    **options: Unpack[Options],
 ) -> Drive:
     """Drive h from rest at `start` (x, y, psi) through targets (K, 2) in order, its speed carried over between them.
 
     A target is reached in the first frame with h within `tolerance_m` on both axes, for each within `max_time_s`;
     with `leg_s` each is held for that time whatever happens. The drive ends `settle_s` after the last.
-    Without a theta the robot is an ideal unicycle; `theta_std` perturbs it. rngs: disturbance.STREAMS.
     Raises MotionError for values that are not finite, a loop that cannot settle, a target not reached in time.
     """
     targets = _checked_rows(targets_m, "target")
-    _check_clock(rate_hz, substeps, settle_s=settle_s, max_time_s=max_time_s, leg_s=leg_s)
+    _check_durations(settle_s=settle_s, max_time_s=max_time_s, leg_s=leg_s)
     if not 0 < tolerance_m < inf:
         raise MotionError(f"tolerance_m must be above 0 and finite, got {tolerance_m}")
-    theta = _own_theta(theta, theta_std, rngs)
-    vehicle = Vehicle(theta, controller, wheels, rate_hz, substeps, integrator, limits)
-    settle = ceil(settle_s * rate_hz)
-    errand: Errand = ThroughTargets(targets, tolerance_m, ceil(max_time_s * rate_hz), settle)
+    vehicle, disturbed = _ready(**options)
+    settle = ceil(settle_s * vehicle.rate_hz)
+    errand: Errand = ThroughTargets(targets, tolerance_m, ceil(max_time_s * vehicle.rate_hz), settle)
     if leg_s is not None:
-        errand = ByTheClock.every(leg_s * rate_hz, targets, settle)
-    disturbances = drawn(errand.longest, slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
-    return _driven(errand, vehicle, disturbances, start)
+        errand = ByTheClock.every(leg_s * vehicle.rate_hz, targets, settle)
+    return _driven(errand, vehicle, disturbed(errand.longest), start)
 
 
 def follow(
-    path_m: ArrayLike,
-    path_mps: ArrayLike,
+    path_m: ArrayLike, path_mps: ArrayLike, *, start: tuple[float, float, float], **options: Unpack[Options]
+) -> Drive:
+    """Drive h from rest at `start` (x, y, psi) after a target that moves: one row (N, 2) of place and velocity a frame.
+
+    The path's velocity is fed forward and tanh pulls h back to it; a real robot lags where it speeds up, and
+    on a straight line stays (theta_4 - 1) / gain of its speed behind.
+    Raises MotionError as `drive` does, and where the path is faster than the controller's max_speed_mps.
+    """
+    path, path_rate = _checked_rows(path_m, "path point"), _checked_rows(path_mps, "path velocity")
+    vehicle, disturbed = _ready(**options)
+    _check_path(path, path_rate, vehicle.controller, vehicle.rate_hz)
+    return _driven(AlongPath(path, path_rate), vehicle, disturbed(len(path)), start)
+
+
+def led_by(references: ArrayLike, *, start: tuple[float, float, float], **options: Unpack[Options]) -> Drive:
+    """Drive from rest with references (N, 2) of u in m/s and omega in rad/s, one row a frame, nothing fed back.
+
+    This is how a robot goes backwards or turns on the spot, where no point h ahead of the axle can lead it.
+    Of the controller it takes the place of h and the largest references.
+    Raises MotionError as `drive` does, and where a reference is larger than the controller gives.
+    """
+    asked = _checked_rows(references, "reference")
+    vehicle, disturbed = _ready(**options)
+    _check_references(asked, vehicle.controller, vehicle.rate_hz)
+    return _driven(AsTold(asked), vehicle, disturbed(len(asked)), start)
+
+
+def _ready(
     *,
-    start: tuple[float, float, float],
     theta: Theta | None = THETAS["pioneer_3dx"],
     theta_std: float = 0.0,
     controller: ControllerSettings = CONTROLLERS["smooth"],
@@ -113,50 +145,11 @@ def follow(
     substeps: int = 4,
     integrator: str = "rk4",
     rngs: Generators | None = None,
-) -> Drive:
-    """Drive h from rest at `start` (x, y, psi) after a target that moves: one row (N, 2) of place and velocity a frame.
-
-    The path's velocity is fed forward and tanh pulls h back to it; a real robot lags where it speeds up, and
-    on a straight line stays (theta_4 - 1) / gain of its speed behind. Its other options are `drive`'s.
-    Raises MotionError as `drive` does, and where the path is faster than the controller's max_speed_mps.
-    """
-    path, path_rate = _checked_rows(path_m, "path point"), _checked_rows(path_mps, "path velocity")
+) -> tuple[Vehicle, Callable[[int], Disturbances]]:
+    """The robot, and what disturbs it in so many frames."""
     _check_clock(rate_hz, substeps)
-    _check_path(path, path_rate, controller, rate_hz)
     vehicle = Vehicle(_own_theta(theta, theta_std, rngs), controller, wheels, rate_hz, substeps, integrator, limits)
-    disturbances = drawn(len(path), slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
-    return _driven(AlongPath(path, path_rate), vehicle, disturbances, start)
-
-
-def led_by(
-    references: ArrayLike,
-    *,
-    start: tuple[float, float, float],
-    theta: Theta = THETAS["pioneer_3dx"],
-    theta_std: float = 0.0,
-    controller: ControllerSettings = CONTROLLERS["smooth"],
-    limits: AccelerationLimits = UNLIMITED,
-    slip: SlipSettings = SLIPS["none"],
-    delta: DeltaSettings = DELTAS["none"],
-    floor: Sequence[FloorPatch] = (),
-    wheels: WheelGeometry = PIONEER_WHEELS,
-    rate_hz: float = 30.0,
-    substeps: int = 4,
-    integrator: str = "rk4",
-    rngs: Generators | None = None,
-) -> Drive:
-    """Drive from rest with references (N, 2) of u in m/s and omega in rad/s, one row a frame, nothing fed back.
-
-    This is how a robot goes backwards or turns on the spot, where no point h ahead of the axle can lead it.
-    Of the controller it takes the place of h and the largest references. Its other options are `drive`'s.
-    Raises MotionError as `drive` does, and where a reference is larger than the controller gives.
-    """
-    asked = _checked_rows(references, "reference")
-    _check_clock(rate_hz, substeps)
-    _check_references(asked, controller, rate_hz)
-    vehicle = Vehicle(_own_theta(theta, theta_std, rngs), controller, wheels, rate_hz, substeps, integrator, limits)
-    disturbances = drawn(len(asked), slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
-    return _driven(AsTold(asked), vehicle, disturbances, start)
+    return vehicle, lambda frames: drawn(frames, slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
 
 
 def _driven(errand: Errand, vehicle: Vehicle, disturbances: Disturbances, start: tuple[float, float, float]) -> Drive:
@@ -261,11 +254,14 @@ def _check_references(asked: Array, controller: ControllerSettings, rate_hz: flo
             )
 
 
-def _check_clock(rate_hz: float, substeps: int, **durations: float | None) -> None:
+def _check_clock(rate_hz: float, substeps: int) -> None:
     if not 0 < rate_hz <= FASTEST_HZ:
         raise MotionError(f"a drive needs a rate_hz above 0 and at most {FASTEST_HZ:g}, got {rate_hz}")
     if not (isinstance(substeps, int | np.integer) and substeps >= 1):
         raise MotionError(f"a drive needs a whole number of substeps, 1 or more, got {substeps}")
+
+
+def _check_durations(**durations: float | None) -> None:
     for name, value in durations.items():
         may_be_0 = name == "settle_s"
         if value is not None and not (0 < value <= LONGEST_LEG_S or (value == 0 and may_be_0)):

@@ -176,12 +176,12 @@ class Bag:
         chunks = np.flatnonzero(sum(self._entries(topic).count for topic in there.values()))
         last_ns = 0
         with parsing(self.path), self._opened() as stream:
-            for chunk in chunks.tolist():
-                for channel, log_ns, data in messages_in(self._chunk(stream, chunk), there):
-                    if log_ns < last_ns:
-                        raise ValueError(f"after {last_ns} ns comes {log_ns} ns")
-                    last_ns = log_ns
-                    yield there[channel], data
+            found = (found for chunk in chunks.tolist() for found in messages_in(self._chunk(stream, chunk), there))
+            for channel, log_ns, data in found:
+                if log_ns < last_ns:
+                    raise ValueError(f"after {last_ns} ns comes {log_ns} ns")
+                last_ns = log_ns
+                yield there[channel], data
 
     def messages(self, topics: Iterable[Topic]) -> Iterator[tuple[Topic, Any]]:
         """The messages of `raw`."""

@@ -208,11 +208,18 @@ def _recorded(suite: Suite, source: Source | None, *, taken: set[str]) -> Iterat
     folder = _folder(source)
     for index, spec in enumerate(suite.source):
         with _at(source, "source", index):
-            for case in recorded_cases(spec, folder, entry=index):
-                if case.name in taken:
-                    raise SuiteError(f"two cases are called '{case.name}'; name one another: {case.source.path}")
-                taken = taken | {case.name}
-                yield case
+            cases = list(recorded_cases(spec, folder, entry=index))
+            _require_new(cases, taken)
+        taken = taken | {case.name for case in cases}
+        yield from cases
+
+
+def _require_new(cases: list[RecordedCase], taken: set[str]) -> None:
+    """Raise SuiteError for the first that is called as another case is."""
+    for case in cases:
+        if case.name in taken:
+            raise SuiteError(f"two cases are called '{case.name}'; name one another: {case.source.path}")
+        taken = taken | {case.name}
 
 
 def _replayed(suite: Suite, source: Source | None) -> dict[str, str]:
