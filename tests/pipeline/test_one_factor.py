@@ -13,7 +13,7 @@ from vobench.pipeline.progress import Silent
 from vobench.pipeline.simulate import simulate
 from vobench.pipeline.workshop import Workshop
 from vobench.results.store import Store
-from vobench.sequence import Sequence, payload_hash
+from vobench.sequence import Sequence, payload_hash, read_disturbances, read_truth
 from vobench.suite.expand import read_plan
 
 SCENE = """name: cell
@@ -134,6 +134,15 @@ def test_slip_changes_the_way_but_no_noise_of_the_chip(base, tmp_path):
     first, other = (next(iter(Sequence.open(folder).frames())) for folder in (base, dry))
     np.testing.assert_array_equal(first.left, other.left)
     assert channels(base)["truth/ground_truth/odometry"] != channels(dry)["truth/ground_truth/odometry"]
+
+
+def test_the_slip_of_every_frame_is_recorded_as_truth(base, tmp_path):
+    dry = recorded(tmp_path / "it", SLIP="none")
+    (stamps, wet), (_, none) = read_disturbances(base), read_disturbances(dry)
+    np.testing.assert_array_equal(stamps, read_truth(base).t_ns)
+    assert (wet[:, :3].std(0) > 0).all()
+    assert not wet[:, 3:].any()
+    assert not none.any()
 
 
 def test_three_recordings_in_one_process_and_two_at_once_in_others_have_equal_hashes(base, tmp_path):

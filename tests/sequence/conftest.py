@@ -33,6 +33,8 @@ class Recording:
     ticks: NDArray[np.int64]
     T_map_body: Array
     twist: Array
+    slip: Array
+    push: Array
 
     def write(self, folder: Path) -> Path:
         with SequenceWriter(folder, self.rig, case_json=CASE) as sequence:
@@ -43,6 +45,7 @@ class Recording:
                 sequence.write_frame(t_ns, self.left[i], self.right[i])
                 sequence.write_exposure(t_ns, 0.001 * (i + 1), 6.0)
                 sequence.write_truth(t_ns, self.T_map_body[i], self.twist[i])
+                sequence.write_disturbance(t_ns, self.slip[i], self.push[i])
                 done = until
         return folder
 
@@ -56,7 +59,8 @@ def make_recording(count: int = 9) -> Recording:
     images = rng.integers(0, 256, (2, count, 32, 48), np.uint8)
     ticks = rng.integers(-(2**40), 2**40, (len(encoder_t_ns), 2))
     poses = se3.transform(R, rng.normal(size=(count, 3)))
-    return Recording(RIG, t_ns, images[0], images[1], encoder_t_ns, ticks, poses, rng.normal(size=(count, 6)))
+    twist, slip, push = (rng.normal(size=(count, width)) for width in (6, 3, 2))
+    return Recording(RIG, t_ns, images[0], images[1], encoder_t_ns, ticks, poses, twist, slip, push)
 
 
 @pytest.fixture(name="make")

@@ -24,6 +24,7 @@ COUNTS = {
         "/tf_static": 1,
         "/tf": 9,
         "/ground_truth/odometry": 9,
+        "/ground_truth/disturbance": 9,
         "/ground_truth/cam_left/camera_info": 1,
         "/ground_truth/cam_right/camera_info": 1,
     },

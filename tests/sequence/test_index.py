@@ -34,6 +34,8 @@ def long_folder(recording, tmp_path_factory):
         ticks=np.zeros((len(encoder_t_ns), 2), np.int64),
         T_map_body=recording.T_map_body[pick],
         twist=recording.twist[pick],
+        slip=recording.slip[pick],
+        push=recording.push[pick],
     ).write(tmp_path_factory.mktemp("long"))
 
 

@@ -59,6 +59,7 @@ def written(request, recording, tmp_path_factory):
                 writer.write_imu(ImuReadings(np.array([t_ns]), np.zeros((1, 3)), np.ones((1, 3))))
                 writer.write_imu_bias(t_ns, np.zeros(3), np.ones(3))
                 writer.write_encoders([t_ns], [[index, -index]])
+                writer.write_disturbance(t_ns, np.zeros(3), np.zeros(2))
             writer.write_frame(t_ns, recording.left[index], recording.right[index] if pair else None)
             writer.write_exposure(t_ns, 0.01, 6.0)
             writer.write_truth(t_ns, np.eye(4), None)

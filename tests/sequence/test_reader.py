@@ -19,6 +19,7 @@ from vobench.sequence import (
     has_truth,
     payload_hash,
     read_case,
+    read_disturbances,
     read_import_notes,
     read_imu_bias,
     read_provenance,
@@ -245,10 +246,21 @@ def test_a_recording_of_the_time_before_exposure_imu_and_true_rig_still_reads(re
         0,
     ]
     assert len(read_truth(tmp_path)) == 1
-    assert len(read_imu_bias(tmp_path).t_ns) == 0
+    assert len(read_imu_bias(tmp_path).t_ns) == len(read_disturbances(tmp_path)[0]) == 0
     assert len(payload_hash(tmp_path)) == 64
     with pytest.raises(SequenceError, match=r"^/ground_truth/cam_left/camera_info should be .* but is missing"):
         read_true_rig(tmp_path)
+
+
+def test_what_disturbs_the_robot_comes_back_as_it_was_written(recording, folder):
+    stamps, disturbed = read_disturbances(folder)
+    np.testing.assert_array_equal(stamps, recording.t_ns)
+    np.testing.assert_array_equal(disturbed, np.hstack([recording.slip, recording.push]))
+
+
+def test_payload_hash_follows_what_disturbs_the_robot(recording, folder, tmp_path):
+    other = replace(recording, push=recording.push + 1e-9).write(tmp_path)
+    assert payload_hash(other) != payload_hash(folder)
 
 
 def test_payload_hash_follows_what_the_imu_says_and_how_it_is_described(recording, tmp_path):

@@ -92,6 +92,8 @@ def _write(
         writer.write_frame(t_ns, pair.left, pair.right)
         writer.write_exposure(t_ns, pair.exposure.time_s, pair.exposure.gain_db)
         writer.write_truth(t_ns, body.T_world_body[index], body.twist[index])
+        if travel.drive:
+            writer.write_disturbance(t_ns, travel.drive.slip[index], travel.drive.delta[index])
         if truth:
             _write_pixel_truth(writer, truth, t_ns, stamps[index + 1])
 

@@ -42,6 +42,7 @@ IMU = Topic("/imu", "sensor_msgs/msg/Imu")
 TF = Topic("/tf", "tf2_msgs/msg/TFMessage")
 ODOMETRY = Topic("/ground_truth/odometry", "nav_msgs/msg/Odometry")
 IMU_BIAS = Topic("/ground_truth/imu_bias", "vobench_msgs/msg/ImuBias")
+DISTURBANCE = Topic("/ground_truth/disturbance", "vobench_msgs/msg/Disturbance")
 
 TRUE_LEFT_INFO = Topic(f"/ground_truth{LEFT_INFO.name}", LEFT_INFO.type_name, latched=True)
 TRUE_RIGHT_INFO = Topic(f"/ground_truth{RIGHT_INFO.name}", RIGHT_INFO.type_name, latched=True)
@@ -83,11 +84,23 @@ geometry_msgs/Vector3 gyro
 geometry_msgs/Vector3 accel
 """
 
+DISTURBANCE_DEFINITION = """\
+# What makes a robot move other than its wheels say, and than it was told: slip ratios (rim speed is ground speed
+# / (1 - slip)), the angle at which it slides to the left, and pushes on its speed and its yaw rate.
+std_msgs/Header header
+float64 left_slip
+float64 right_slip
+float64 side_slip_rad
+float64 push_mps2
+float64 turn_push_radps2
+"""
+
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 for _definition, _topic in (
     (WHEEL_TICKS_DEFINITION, ENCODERS),
     (EXPOSURE_DEFINITION, EXPOSURE),
     (IMU_BIAS_DEFINITION, IMU_BIAS),
+    (DISTURBANCE_DEFINITION, DISTURBANCE),
 ):
     TYPES.register(get_types_from_msg(_definition, _topic.type_name))
 
@@ -102,7 +115,8 @@ def sensor_topics(rig: Rig) -> tuple[Topic, ...]:
 
 def truth_topics(rig: Rig) -> tuple[Topic, ...]:
     """The topics that the truth about this rig can have, those of pixels apart."""
-    return (*TRUTH_TOPICS, *TRUE_INFO_TOPICS[: len(rig.sides)], *((IMU_BIAS,) if rig.imu else ()))
+    noise = ((IMU_BIAS, rig.imu), (DISTURBANCE, rig.wheels))
+    return (*TRUTH_TOPICS, *TRUE_INFO_TOPICS[: len(rig.sides)], *(topic for topic, source in noise if source))
 
 
 def _make(type_name: str, *fields: Any) -> Any:
@@ -216,6 +230,12 @@ def imu(t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike, variances: tupl
     gyro, accel = (np.eye(3).ravel() * variance for variance in variances)
     fields = (header(t_ns, IMU_FRAME), upright, unknown, _vector(gyro_radps), gyro, _vector(accel_mps2), accel)
     return _make(IMU.type_name, *fields)
+
+
+def disturbance(t_ns: int, slip: ArrayLike, push: ArrayLike) -> Any:
+    """Slip of the left and right wheel and to the side (3,), and pushes (2,), as a vobench_msgs/Disturbance."""
+    values = *np.asarray(slip, float).tolist(), *np.asarray(push, float).tolist()
+    return _make(DISTURBANCE.type_name, header(t_ns, BODY), *values)
 
 
 def imu_bias(t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike) -> Any:

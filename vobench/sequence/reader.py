@@ -192,6 +192,19 @@ def read_imu_bias(folder: Path) -> ImuBias:
     return ImuBias(stamps, rows[:, :3].copy(), rows[:, 3:].copy())
 
 
+def read_disturbances(folder: Path) -> tuple[Stamps, Array]:
+    """Stamps (N,) and what disturbed the robot (N, 5); empty where nothing was noted.
+
+    Slip ratios of the left and right wheel, side slip in rad, pushes in m/s² and rad/s².
+    """
+    bag = Bag.open(Path(folder) / TRUTH_FILE)
+    return _table(bag, ros.DISTURBANCE, _disturbance_fields, 5)
+
+
+def _disturbance_fields(m: Any) -> tuple[float, ...]:
+    return m.left_slip, m.right_slip, m.side_slip_rad, m.push_mps2, m.turn_push_radps2
+
+
 def read_true_rig(folder: Path) -> Rig:
     """The rig that the pictures were made with, where the one of `Sequence` is what estimators are told.
 
@@ -218,7 +231,7 @@ def read_import_notes(folder: Path) -> dict[str, str]:
 def payload_hash(folder: Path) -> str:
     """SHA-256 over all that was recorded: pixels instead of encoded bytes, which change with libpng."""
     digest = hashlib.sha256()
-    later = (*ros.TRUE_INFO_TOPICS, ros.IMU_BIAS, *truth_topics())
+    later = (*ros.TRUE_INFO_TOPICS, ros.IMU_BIAS, ros.DISTURBANCE, *truth_topics())
     sensors, truth = (Bag.open(Path(folder) / name) for name in (SENSORS_FILE, TRUTH_FILE))
     for bag, topics in ((sensors, ros.SENSOR_TOPICS), (truth, (*ros.TRUTH_TOPICS, *later))):
         for topic, data in bag.raw(topics):

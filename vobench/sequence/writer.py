@@ -141,6 +141,10 @@ class SequenceWriter:
         """Add what the IMU's readings are off by, (3,) each, slowly varying."""
         self._truth.write(ros.IMU_BIAS, int(t_ns), serialise(ros.imu_bias(t_ns, gyro_radps, accel_mps2)))
 
+    def write_disturbance(self, t_ns: int, slip: ArrayLike, push: ArrayLike) -> None:
+        """Add what disturbs the robot: slip of the left and right wheel and side slip in rad (3,), pushes (2,)."""
+        self._truth.write(ros.DISTURBANCE, int(t_ns), serialise(ros.disturbance(t_ns, slip, push)))
+
     def write_truth(self, t_ns: int, T_world_body: Array, twist_body: ArrayLike | None) -> None:
         """Add the body's true pose (4, 4) and its twist (6,), m/s then rad/s, in body axes; None where unknown."""
         if not (se3.is_rotation(T_world_body[:3, :3]) and np.isfinite(T_world_body).all()):
