@@ -93,7 +93,7 @@ def _case_facts(case: Case, travels: Mapping[str, Travel]) -> dict[str, Any]:
 
 def _recorded_facts(case: RecordedCase, recording: Recording) -> dict[str, Any]:
     """The same of a recording; its pictures are not read yet."""
-    is_there = is_imported(case, default_store())
+    is_there = is_imported(case, recording, default_store())
     return {
         "case": case.name,
         "frames": recording.frame_count,

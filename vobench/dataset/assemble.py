@@ -9,11 +9,11 @@ from vobench.errors import InputError
 from vobench.geometry.rectify import rectification
 from vobench.geometry.rig import Rig
 from vobench.sensor.imu import ImuReadings
+from vobench.sequence.messages import END_OF_STAMPS_NS
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 LEAST_BASELINE_M = 1e-6
 UNRECTIFIABLE = "The right camera is not to the right of the left one and looking the same way: nothing rectifies them."
-MOST_NS = 2**31 * 10**9 - 1  # ROS keeps seconds in 32 bits
 
 
 def assemble(
@@ -68,6 +68,8 @@ def _pair_notes(rig: Rig, calibration: str) -> tuple[str, ...]:
 def _span(t_ns: Stamps, what: str) -> int:
     """The first stamp. Raises InputError where one is no ROS time."""
     first, last = int(t_ns[0]), int(t_ns[-1])
-    if first < 0 or last > MOST_NS:
-        raise InputError(f"stamps should be within 0 and {MOST_NS} ns, but a {what} has {first if first < 0 else last}")
+    if first < 0 or last >= END_OF_STAMPS_NS:
+        raise InputError(
+            f"stamps should be within 0 and {END_OF_STAMPS_NS - 1} ns, but a {what} has {first if first < 0 else last}"
+        )
     return first

@@ -4,13 +4,12 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from vobench import __version__
 from vobench.dataset.options import Options, Topics
 from vobench.dataset.recording import NO_TRUTH, Recording
 from vobench.errors import SuiteError
 from vobench.pipeline.truth_path import is_known
 from vobench.pipeline.workshop import Workshop
-from vobench.results.store import Store, code_digest, library_versions
+from vobench.results.store import Store, code_digest, library_versions, versions
 from vobench.suite.expand import Plan
 from vobench.suite.source_spec import RecordedCase
 
@@ -61,29 +60,30 @@ def _path(file: str | None) -> Path | None:
 
 def import_case(case: RecordedCase, shop: Workshop) -> Path:
     """The folder of the case's sequence; made where the store has none of these files as they are now."""
-    return shop.store.get("sequences", _inputs(case), lambda folder: _convert(case, folder, shop))
+    recording = read_case(case)
+
+    def build(folder: Path) -> None:
+        with shop.progress.step(f"import {case.name}"):
+            import_recording(recording, folder)
+
+    return shop.store.get("sequences", _inputs(case, recording), build)
 
 
-def is_imported(case: RecordedCase, store: Store) -> bool:
-    """Whether the store has the case's sequence already."""
-    return store.path("sequences", _inputs(case)).is_dir()
-
-
-def _convert(case: RecordedCase, folder: Path, shop: Workshop) -> None:
-    with shop.progress.step(f"import {case.name}"):
-        import_recording(read_case(case), folder)
+def is_imported(case: RecordedCase, recording: Recording, store: Store) -> bool:
+    """Whether the store has the case's sequence already; `recording` is what `read_all` has of it."""
+    return store.path("sequences", _inputs(case, recording)).is_dir()
 
 
 def import_recording(recording: Recording, folder: Path) -> None:
     """Write a recording as a sequence, and with which versions. Raises VobenchError where a picture is wrong."""
     from vobench.dataset.convert import convert
 
-    convert(recording, folder, provenance={"vobench": __version__, **library_versions(*LIBRARIES)})
+    convert(recording, folder, provenance=versions(*LIBRARIES))
 
 
-def _inputs(case: RecordedCase) -> dict[str, Any]:
+def _inputs(case: RecordedCase, recording: Recording) -> dict[str, Any]:
     """All that an imported sequence depends on; files by size and time of change, for reading gigabytes is slow."""
-    source, truth = case.source, read_case(case).truth
+    source, truth = case.source, recording.truth
     files = [Path(file) for file in (source.path, source.calibration, source.imu) if file]
     return {
         "source": source.model_dump(mode="json", exclude={"name"}),

@@ -57,13 +57,13 @@ def run_suite(plan: Plan, *, root: Path, shop: Workshop, finish: Finish) -> RunF
     return make_run(root, plan.suite.name, digest({"suite": suite, "estimators": entrants}), fill)
 
 
-def sequence_of(case: Case | RecordedCase, shop: Workshop) -> Path:
+def _sequence_of(case: Case | RecordedCase, shop: Workshop) -> Path:
     """The folder of the case's sequence: simulated, or imported from what somebody recorded."""
     return simulate(case, shop) if isinstance(case, Case) else import_case(case, shop)
 
 
 def _run_case(plan: Plan, case: Case | RecordedCase, folder: RunFolder, shop: Workshop) -> list[RunScore]:
-    sequence = sequence_of(case, shop)
+    sequence = _sequence_of(case, shop)
     target = folder.case(case.name)
     target.mkdir(parents=True)
     write_json(target / CASE, {**case.model_dump(mode="json"), **_assumed(case, sequence)})

@@ -1,11 +1,9 @@
 """Case to sequence: the body goes its way, the cameras shoot, the other sensors read, the recording keeps."""
 
-import platform
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from vobench import __version__
 from vobench.geometry.rig import SIDES
 from vobench.pipeline.engine import BAKE, open_renderer
 from vobench.pipeline.motion import Travel, travel_of
@@ -13,7 +11,7 @@ from vobench.pipeline.sense import SensorFeed
 from vobench.pipeline.shoot import Pair, StereoCamera, World
 from vobench.pipeline.truth import PixelTruth
 from vobench.pipeline.workshop import Workshop
-from vobench.results.store import Store, canonical, code_digest, library_versions
+from vobench.results.store import Store, canonical, code_digest, library_versions, versions
 from vobench.sequence import SequenceWriter
 from vobench.suite.expand import Case
 
@@ -77,7 +75,7 @@ def _writer(case: Case, folder: Path, truth: PixelTruth | None) -> SequenceWrite
         jpeg_quality=case.camera.jpeg_quality,
         truth_channels=case.truth,
         truth_names=truth.names if truth else None,
-        provenance={"vobench": __version__, "python": platform.python_version(), **library_versions(*LIBRARIES)},
+        provenance=versions(*LIBRARIES),
     )
 
 

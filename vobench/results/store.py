@@ -11,6 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from vobench import __version__
 from vobench.results.unfinished import unfinished
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -90,6 +91,11 @@ def _files(folder: Path) -> Iterator[Path]:
     for place, folders, names in os.walk(folder, followlinks=True):
         folders[:] = [name for name in folders if name != "__pycache__"]
         yield from (path for name in names if (path := Path(place, name)).is_file())
+
+
+def versions(*libraries: str) -> dict[str, str]:
+    """What something is made with: the versions of vobench, Python and these distributions."""
+    return {"vobench": __version__, **library_versions(*libraries)}
 
 
 @cache

@@ -19,9 +19,8 @@ from vobench.robot.limits import AccelerationLimits
 from vobench.robot.pioneer import THETAS
 from vobench.robot.slip import SLIPS
 from vobench.sensor.encoder import ENCODERS
-from vobench.suite.strict import Acceleration, Positive, Strict, one_of, wrong_key
+from vobench.suite.strict import Acceleration, Point, Positive, Rate, Strict, one_of, wrong_key
 
-Point = tuple[float, float]
 Mover = Literal["pioneer", "unicycle", "ackermann"]
 
 # Which keys are of some movers only; a kind of trajectory may leave out more.
@@ -68,7 +67,7 @@ class GroundSpec(Strict):
     mover: Mover = "pioneer"
     start_m: Point = (0.0, 0.0)
     start_heading_deg: float = 0.0
-    rate_hz: Annotated[float, Field(gt=0, le=1000)] = 30.0
+    rate_hz: Rate = 30.0
     encoders: Annotated[str, one_of("encoder error set", ENCODERS)] = "nominal"
     car: Annotated[str, one_of("car", ACKERMANNS)] = "small_robot"
     robot: Annotated[str, one_of("robot parameter set", THETAS)] = "pioneer_3dx"

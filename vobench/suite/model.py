@@ -11,7 +11,7 @@ from vobench.suite.imu_spec import named as named_imu
 from vobench.suite.light_spec import LightOverride
 from vobench.suite.rendering_spec import ChannelName, RenderingSpec
 from vobench.suite.source_spec import SourceSpec, as_sources
-from vobench.suite.strict import Name, Positive, Strict, one_of
+from vobench.suite.strict import Name, Point, Positive, Strict, one_of
 from vobench.suite.trajectory_spec import TrajectorySpec
 
 
@@ -20,7 +20,6 @@ def _named(value: Any) -> Any:
     return {"name": value} if isinstance(value, str) else value
 
 
-Point = tuple[float, float]
 Ratio = Annotated[float, Field(gt=-1, lt=1)]
 Angle = Annotated[float, Field(ge=-10, le=10)]
 

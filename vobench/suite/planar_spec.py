@@ -7,8 +7,8 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from vobench.robot import planar
-from vobench.suite.ground_spec import MOVER_KEYS, PIONEER_KEYS, GroundSpec, Mover, Point
-from vobench.suite.strict import Acceleration, Length, Pause, Positive, Speed, wrong_key
+from vobench.suite.ground_spec import MOVER_KEYS, PIONEER_KEYS, GroundSpec, Mover
+from vobench.suite.strict import Acceleration, Length, Pause, Point, Positive, Speed, wrong_key
 from vobench.trajectory.curve import CurveMotion
 
 Laps = Annotated[int, Field(ge=1, le=1000)]

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, model_validator
 from vobench.catalog.catalog import unknown
 from vobench.errors import InputError, SuiteError, TrajectoryError
 from vobench.geometry import se3
-from vobench.suite.strict import Positive, Strict, wrong_key
+from vobench.suite.strict import Positive, Rate, Strict, Triple, wrong_key
 from vobench.trajectory import replay
 from vobench.trajectory.correction import Move, parse_move
 from vobench.trajectory.curve import CurveMotion
@@ -19,8 +19,6 @@ from vobench.trajectory.replay import AXES
 from vobench.trajectory.text import NS_PER_S, format_tum, parse_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory
 from vobench.trajectory.unstamped import parse_times
-
-Triple = tuple[float, float, float]
 
 
 def _known_axes(word: str) -> str:
@@ -58,7 +56,7 @@ class ReplaySpec(Strict):
     max_gap_s: Positive = 1.0
     start_m: Triple | None = None
     start_heading_deg: float = 0.0
-    rate_hz: Annotated[float, Field(gt=0, le=1000)] = 30.0
+    rate_hz: Rate = 30.0
 
     @model_validator(mode="after")
     def _heading_with_place(self) -> Self:

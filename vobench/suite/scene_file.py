@@ -28,9 +28,9 @@ from vobench.suite.scene_spec import (
     SceneFile,
     SkySpec,
     SunSpec,
-    Triple,
     WindowSpec,
 )
+from vobench.suite.strict import Triple
 
 Lighting = dict[str, LightOverride]
 # Names of the lights that there is one of.

@@ -10,9 +10,8 @@ from pydantic import Field, model_validator
 from vobench.scene.light import SKIES
 from vobench.scene.texture import PATTERNS
 from vobench.suite.light_spec import LevelSpec, require_increasing
-from vobench.suite.strict import Name, NonNegative, Positive, Share, Strict, one_of
+from vobench.suite.strict import Name, NonNegative, Positive, Share, Strict, Triple, one_of
 
-Triple = tuple[float, float, float]
 # The light of anything larger would take more memory than machines have, and the renderer sees 60 m far.
 Side = Annotated[float, Field(gt=0, le=30)]
 Size = tuple[Side, Side, Side]

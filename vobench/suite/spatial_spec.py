@@ -13,12 +13,9 @@ from vobench.geometry.se3 import Array
 from vobench.robot.handheld import SHAKES, HandheldMotion, handheld
 from vobench.robot.quadrotor import quadrotor
 from vobench.robot.rail import rail
-from vobench.suite.strict import Acceleration, NonNegative, Speed, Strict, one_of
+from vobench.suite.strict import Acceleration, NonNegative, Rate, Speed, Strict, Triple, one_of
 from vobench.trajectory.curve import CurveMotion
 from vobench.trajectory.spline import check_times, pose_spline
-
-Triple = tuple[float, float, float]
-Rate = Annotated[float, Field(gt=0, le=1000)]
 
 
 class PoseSpec(Strict):

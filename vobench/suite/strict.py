@@ -26,6 +26,9 @@ Share = Annotated[float, Field(ge=0, le=1)]
 Length = Annotated[float, Field(gt=0, le=1e5)]
 Speed = Annotated[float, Field(gt=0, le=100)]
 Acceleration = Annotated[float, Field(gt=0, le=1000)]
+Rate = Annotated[float, Field(gt=0, le=1000)]
+Point = tuple[float, float]
+Triple = tuple[float, float, float]
 Pause = Annotated[float, Field(ge=0, le=3600)]
 
 
