@@ -1,26 +1,66 @@
-"""Dead reckoning without a sensor: straight ahead, at one speed."""
+"""Dead reckoning without a sensor after the first second: straight ahead, at the speed that the wheels had."""
 
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from vobench.estimator import Frame, Result
+from vobench.errors import VobenchError
+from vobench.estimator import EncoderReadings, Frame, Result, Status
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 
 
 class ConstantVelocity:
-    """Knows the clock and nothing else."""
+    """Follows the wheels for `measure_s`, then holds the heading it has and the mean speed it had.
+
+    Between two readings it drives the chord of an arc, along the heading in the arc's middle.
+    """
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:  # noqa: ARG002
-        """Take the speed."""
-        self._speed_mps = float(params["speed_mps"])
-        self._first_ns: int | None = None
+        """Take the nominal wheels, and how long to look at them."""
+        wheels = rig.wheels
+        if wheels is None:
+            raise VobenchError("constant_velocity needs wheels, and this recording has none")
+        self._metres_per_tick = 2 * np.pi * wheels.radius_m / wheels.ticks_per_revolution
+        self._track_m = wheels.track_m
+        self._measure_ns = round(float(params["measure_s"]) * 1e9)
+        self._last: tuple[int, int] | None = None
+        self._first_ns = self._known_ns = 0
+        self._x_m = self._y_m = self._psi_rad = self._path_m = 0.0
 
     def process(self, frame: Frame) -> Result:
-        """As far ahead as the time since the first frame allows."""
-        if self._first_ns is None:
-            self._first_ns = frame.t_ns
-        distance_m = self._speed_mps * (frame.t_ns - self._first_ns) * 1e-9
-        return Result(se3.transform(np.eye(3), [distance_m, 0, 0]))
+        """The wheels' pose; once they were seen for long enough, as far ahead of it as the time since allows."""
+        if frame.encoders is None:
+            return Result(None, Status.LOST, "no_encoders")
+        self._measure(frame.encoders)
+        ahead_m = 0.0
+        if self._is_measured:
+            speed_mps = self._path_m * 1e9 / (self._known_ns - self._first_ns)
+            ahead_m = speed_mps * (frame.t_ns - self._known_ns) * 1e-9
+        x_m, y_m = self._x_m + ahead_m * np.cos(self._psi_rad), self._y_m + ahead_m * np.sin(self._psi_rad)
+        return Result(se3.transform(se3.rotation_z(self._psi_rad), [x_m, y_m, 0.0]))
+
+    @property
+    def _is_measured(self) -> bool:
+        return self._known_ns - self._first_ns >= max(self._measure_ns, 1)
+
+    def _measure(self, readings: EncoderReadings) -> None:
+        """Follow the wheels until they were seen for long enough."""
+        for t_ns, (left, right) in zip(readings.t_ns.tolist(), readings.ticks.tolist(), strict=True):
+            if self._is_measured:
+                return
+            if self._last is None:
+                self._first_ns = t_ns
+            else:
+                self._roll(left - self._last[0], right - self._last[1])
+            self._last, self._known_ns = (left, right), t_ns
+
+    def _roll(self, left_ticks: int, right_ticks: int) -> None:
+        left_m, right_m = left_ticks * self._metres_per_tick, right_ticks * self._metres_per_tick
+        ds, dpsi = (left_m + right_m) / 2, (right_m - left_m) / self._track_m
+        chord = ds * np.sinc(dpsi / 2 / np.pi)
+        self._x_m += chord * np.cos(self._psi_rad + dpsi / 2)
+        self._y_m += chord * np.sin(self._psi_rad + dpsi / 2)
+        self._psi_rad += dpsi
+        self._path_m += ds

@@ -1,5 +1,7 @@
 """The estimators that look at no picture."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -32,11 +34,36 @@ def test_one_who_stands_still_is_always_at_the_start(bed):
     assert all((result.T_odom_frame == np.eye(4)).all() for result in results)
 
 
-def test_constant_velocity_is_right_on_a_straight_line_and_counts_from_the_first_frame(bed):
-    frames = [Frame(k, 5_000_000_000 + k * 10**9 // 30) for k in range(31)]
-    results = bed.estimated("constant_velocity", RIG, frames, speed_mps=0.5)
-    truth = bed.drive((30, 0.5, 0.0))
-    np.testing.assert_allclose([r.T_odom_frame for r in results], truth, atol=1e-8)
+def poses(results):
+    return np.stack([result.T_odom_frame for result in results])
+
+
+@pytest.mark.parametrize("speed_mps", [0.5, 12.0, -0.2])
+def test_constant_velocity_is_right_on_a_straight_line_at_any_speed(bed, speed_mps):
+    frames = rolled(np.empty((121, 4, 4)), path_m=4 * speed_mps, turn_rad=0.0)
+    truth = bed.drive((120, speed_mps, 0.0))
+    # A tick at either end of the second that is measured, over four of them.
+    np.testing.assert_allclose(poses(bed.estimated("constant_velocity", RIG, frames)), truth, atol=4 * METRES_PER_TICK)
+
+
+def test_constant_velocity_follows_the_wheels_for_a_second_and_never_looks_again(bed):
+    bent = rolled(np.empty((121, 4, 4)), path_m=2.0, turn_rad=6.0)
+    stopped = [
+        replace(f, encoders=replace(f.encoders, ticks=0 * f.encoders.ticks)) if k > 30 else f
+        for k, f in enumerate(bent)
+    ]
+    held, wheels = (poses(bed.estimated(name, RIG, bent)) for name in ("constant_velocity", "wheel_odometry"))
+    np.testing.assert_allclose(held[:31], wheels[:31], atol=1e-12)
+    assert np.array_equal(poses(bed.estimated("constant_velocity", RIG, stopped)), held)
+    steps = se3.inverse(held[31:-1]) @ held[32:]
+    np.testing.assert_allclose(
+        steps, np.broadcast_to(se3.transform(np.eye(3), [0.5 / 30, 0, 0]), steps.shape), atol=1e-5
+    )
+
+
+def test_constant_velocity_without_encoders_is_lost(bed):
+    (result,) = bed.estimated("constant_velocity", RIG, [Frame(0, 0)])
+    assert (result.status, result.reason) == (Status.LOST, "no_encoders")
 
 
 def test_wheels_close_an_exact_circle(bed):

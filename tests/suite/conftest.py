@@ -13,7 +13,7 @@ lightings: {full: {}, dim: {lamp: {power_lm: 150}}}
 rigs: {down: {pitch_deg: 90}}
 trajectories: {short: {targets_m: [[0.5, 0]]}}
 cameras: {clean: {sensor: clean}}
-estimators: [stand_still, {name: constant_velocity, params: {speed_mps: 0.1}}]
+estimators: [stand_still, {name: constant_velocity, params: {measure_s: 0.1}}]
 """
 CLOSET = """name: closet
 white_cd_m2: 50

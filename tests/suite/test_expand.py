@@ -48,12 +48,12 @@ def test_a_lighting_sets_the_lamps_it_names_and_leaves_the_others(bent):
 
 
 def test_a_suites_parameters_go_over_the_manifests(bent):
-    assert [entrant.params for entrant in bent().entrants] == [{}, {"speed_mps": 0.1}]
+    assert [entrant.params for entrant in bent().entrants] == [{}, {"measure_s": 0.1}]
 
 
 def test_one_estimator_takes_part_twice_under_two_labels(bent):
-    planned = bent(("stand_still,", "{name: constant_velocity, label: slow, params: {speed_mps: 1}},"))
-    assert [(e.label, e.params["speed_mps"]) for e in planned.entrants] == [("slow", 1), ("constant_velocity", 0.1)]
+    planned = bent(("stand_still,", "{name: constant_velocity, label: slow, params: {measure_s: 1}},"))
+    assert [(e.label, e.params["measure_s"]) for e in planned.entrants] == [("slow", 1), ("constant_velocity", 0.1)]
 
 
 def test_parameters_reach_an_estimator_as_plain_python(bent):
@@ -70,7 +70,7 @@ def test_every_estimator_runs_repeats_times_on_every_case(bent):
 def test_asking_for_estimators_takes_the_suites_own_settings_first(bent):
     planned = bent(only=("constant_velocity", "wheel_odometry"))
     assert [(e.label, e.params) for e in planned.entrants] == [
-        ("constant_velocity", {"speed_mps": 0.1}),
+        ("constant_velocity", {"measure_s": 0.1}),
         ("wheel_odometry", {}),
     ]
 

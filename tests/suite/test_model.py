@@ -70,9 +70,9 @@ WRONG = [
     ("stand_still,", "./stand_still,", f":8: estimators.0: no estimator file at stand_still/estimator.yaml. Known by name: {ESTIMATORS}"),
     ("stand_still,", "3,", ":8: estimators.0: should be keys with values (got 3)"),
     ("stand_still,", "constant_velocity,", ":8: estimators.1: two estimators are called 'constant_velocity'; give one a label of its own"),
-    ("speed_mps", "sped_mps", ":8: estimators.1: no parameter named 'sped_mps'. Did you mean 'speed_mps'? Known: speed_mps"),
-    ("speed_mps: 0.1", "speed_mps: fast", ":8: estimators.1: parameter 'speed_mps' should be of the kind of its default 0.3, got 'fast'"),
-    ("speed_mps: 0.1", "speed_mps: 2020-01-01", ":8: estimators.1.params.speed_mps: should be a number, text, a list or keys with values (got 2020-01-01)"),
+    ("measure_s", "mesure_s", ":8: estimators.1: no parameter named 'mesure_s'. Did you mean 'measure_s'? Known: measure_s"),
+    ("measure_s: 0.1", "measure_s: fast", ":8: estimators.1: parameter 'measure_s' should be of the kind of its default 1.0, got 'fast'"),
+    ("measure_s: 0.1", "measure_s: 2020-01-01", ":8: estimators.1.params.measure_s: should be a number, text, a list or keys with values (got 2020-01-01)"),
     ("rigs:", "\trigs:", r":5:1: found character '\t' that cannot start any token"),
 ]  # fmt: skip
 

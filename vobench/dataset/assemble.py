@@ -1,10 +1,11 @@
 """The parts of a recording put together, and held against each other."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from vobench.dataset.recording import NO_TRUTH, Recording
 from vobench.dataset.stream import PictureStream
-from vobench.dataset.truth import cut_to
+from vobench.dataset.truth import apart, around, cut_to
 from vobench.errors import InputError
 from vobench.geometry.rectify import rectification
 from vobench.geometry.rig import Rig
@@ -38,6 +39,11 @@ def assemble(
     else:
         truth, cut = cut_to(truth, t_ns)
         said += cut
+    if imu is not None and len(imu.t_ns):
+        imu, cut = _imu_within(imu, t_ns)
+        said += cut
+    if imu is None:
+        rig = replace(rig, imu=None)
     starts = [_span(t_ns, "picture")]
     if truth is not None:
         starts.append(_span(truth.t_ns, "true pose"))
@@ -63,6 +69,21 @@ def _pair_notes(rig: Rig, calibration: str) -> tuple[str, ...]:
     if not rig.baseline_m > LEAST_BASELINE_M:
         raise InputError(f"left and right camera are in the same place, {rig.baseline_m:g} m apart: {calibration}")
     return () if rectification(rig) else (UNRECTIFIABLE,)
+
+
+def _imu_within(imu: ImuReadings, frames_ns: Stamps) -> tuple[ImuReadings | None, tuple[str, ...]]:
+    """The readings of the pictures' time, with one before and one after as the truth has, and what that dropped."""
+    inside, count = around(imu.t_ns, frames_ns), len(imu.t_ns)
+    if inside is None:
+        return None, (apart("IMU", imu.t_ns, frames_ns),)
+    kept = ImuReadings(imu.t_ns[inside], imu.gyro_radps[inside], imu.accel_mps2[inside])
+    if len(kept.t_ns) == count:
+        return kept, ()
+    lasts_s = [(t_ns[-1] - t_ns[0]) / 1e9 for t_ns in (imu.t_ns, frames_ns)]
+    return kept, (
+        f"{count - len(kept.t_ns)} of {count} IMU readings lie outside the pictures' time "
+        f"({lasts_s[0]:.1f} s beside {lasts_s[1]:.1f} s); dropped.",
+    )
 
 
 def _span(t_ns: Stamps, what: str) -> int:

@@ -27,7 +27,7 @@ from vobench.geometry.rig import ImuCalibration, Rig
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import messages as ros
-from vobench.sequence.pose_topic import opened, read_poses
+from vobench.sequence.pose_topic import opened, read_first_poses
 from vobench.trajectory.trajectory import Stamps
 
 TF_STATIC, BASE = "/tf_static", "base_link"
@@ -55,7 +55,7 @@ def read_bag(path: Path, options: Options, *, form: str) -> Recording:
         found = _walk(reader, chosen, path)
     shots, t_ns, pairing = _shots(path, chosen, found, options)
     stream = PictureStream.open(shots)
-    truth = read_poses(path, chosen.truth) if chosen.truth else None
+    truth, repeats = read_first_poses(path, chosen.truth) if chosen.truth else (None, 0)
     body, body_notes = _body(chosen, found)
     rig, calibration, rig_notes = _rig(path, chosen, found, body, options)
     rig_notes = rig_notes if options.calibration else (*body_notes, *rig_notes)
@@ -63,6 +63,8 @@ def read_bag(path: Path, options: Options, *, form: str) -> Recording:
     unread = sorted(types.keys() - {*_topics(chosen), TF_STATIC, (chosen.truth or "").partition(":")[0]})
     notes = [*chosen.notes, "Stamps are those in the messages' headers.", *pairing, *rig_notes, *imu_notes]
     notes += encoding_note(found.first[chosen.left])
+    if repeats:
+        notes.append(f"{repeats} poses of {chosen.truth} repeat a stamp; the first pose of each stamp was kept.")
     if unread:
         notes.append(f"Topics that were not read: {', '.join(unread)}.")
     rig = replace(rig, imu=imu_calibration)

@@ -11,7 +11,7 @@ from vobench.dataset.euroc_sensor import read_imu_csv, sensor_camera, sensor_imu
 from vobench.dataset.files import unread
 from vobench.dataset.kalibr import read_imu
 from vobench.dataset.options import Options
-from vobench.dataset.picture_list import PictureList, paired, read_list, shots_of
+from vobench.dataset.picture_list import PictureList, paired, present, read_list, shots_of
 from vobench.dataset.recording import Recording
 from vobench.dataset.stream import PictureStream
 from vobench.dataset.truth import read_truth_file
@@ -51,15 +51,17 @@ def read_euroc(folder: Path, options: Options, *, form: str = "euroc") -> Record
 
 
 def _pictures(root: Path, options: Options) -> tuple[list[PictureList], Notes]:
-    """The lists of the one or two cameras, in step."""
+    """The pictures of the one or two cameras that are there, in step."""
     if not (root / CAMERAS[0]).is_dir():
         raise InputError(f"no folder {CAMERAS[0]} with pictures in {root}")
     folders = [root / name for name in CAMERAS if (root / name).is_dir()]
     eyes = [read_list(folder / DATA, folder / "data", separator=",", unit="ns") for folder in folders]
     if len(eyes) == 1:
-        return eyes, (f"There is one camera: no folder {CAMERAS[1]}.",)
-    left, right, notes = paired(eyes[0], eyes[1], options.within_ns)
-    return [left, right], notes
+        notes: Notes = (f"There is one camera: no folder {CAMERAS[1]}.",)
+    else:
+        *eyes, notes = paired(eyes[0], eyes[1], options.within_ns)
+    found, missing = present(*eyes)
+    return found, (*notes, *missing)
 
 
 def _rig(root: Path, folder: Path, count: int, options: Options) -> tuple[Rig, Path, Notes]:

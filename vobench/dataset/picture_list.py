@@ -2,11 +2,12 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os.path import isfile
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vobench.dataset.files import inside, listed, read_bytes, read_text
 from vobench.dataset.picture import Picture
@@ -21,17 +22,21 @@ NUMBERED = re.compile(r"([0-9]{1,12})[A-Za-z_]*\.(?:png|jpg|jpeg)", re.IGNORECAS
 
 @dataclass(frozen=True, slots=True)
 class PictureList:
-    """One eye's pictures, in order of time: stamps (N,) and files."""
+    """One eye's pictures, in order of time: stamps (N,) and files, which may be absent."""
 
     name: str
     t_ns: Stamps
     paths: tuple[Path, ...]
 
+    def at(self, index: Stamps) -> "PictureList":
+        """The pictures (K,) of these indices."""
+        return PictureList(self.name, self.t_ns[index], tuple(self.paths[i] for i in index.tolist()))
+
 
 def read_list(path: Path, folder: Path, *, separator: str | None, unit: Unit) -> PictureList:
-    """A list of stamps and names of pictures below `folder`, all of which are there.
+    """A list of stamps and names of pictures below `folder`.
 
-    Raises InputError naming file and line for what is no stamp, does not rise, or names a file that is missing.
+    Raises InputError naming file and line for what is no stamp, does not rise, or names a file outside the folder.
     """
     rows = content(read_text(path))
     if not rows:
@@ -45,17 +50,42 @@ def read_list(path: Path, folder: Path, *, separator: str | None, unit: Unit) ->
     stamps = [row[0] for row in fields]
     table = Table(str(path), [line for line, _ in rows], stamps, np.empty((len(rows), 0)))
     t_ns = stamps_ns(table, unit)
-    places = [table.place(row) for row in range(len(rows))]
-    return PictureList(str(path), t_ns, _files(folder, [row[1] for row in fields], places))
+    paths = tuple(inside(folder, row[1], table.place(index)) for index, row in enumerate(fields))
+    return PictureList(str(path), t_ns, paths)
 
 
-def _files(folder: Path, names: list[str], places: list[str]) -> tuple[Path, ...]:
-    """The files of a list's names. Raises InputError for the first that is not there."""
-    paths = tuple(inside(folder, name, place) for name, place in zip(names, places, strict=True))
-    for path, place in zip(paths, places, strict=True):
-        if not isfile(path):  # pathlib's own raises for a name that is too long
-            raise InputError(f"{place} names a picture that is missing: {path}")
-    return paths
+def present(*eyes: PictureList) -> tuple[list[PictureList], tuple[str, ...]]:
+    """The pictures of lists in step whose files are there for every eye, and what is to be said of the others.
+
+    Raises InputError where none is.
+    """
+    # pathlib's own is_file raises for a name that is too long.
+    is_there = np.array([all(map(isfile, paths)) for paths in zip(*(eye.paths for eye in eyes), strict=True)])
+    if is_there.all():
+        return list(eyes), ()
+    absent = [path for at in np.flatnonzero(~is_there) for eye in eyes if not isfile(path := eye.paths[at])]
+    what = "pairs" if len(eyes) > 1 else "pictures"
+    if not is_there.any():
+        named = " and ".join(eye.name for eye in eyes)
+        raise InputError(f"of none of the {len(is_there)} {what} in {named} the files are there; missing: {absent[0]}")
+    found = np.flatnonzero(is_there)
+    first = "/".join(absent[0].parts[-3:])
+    return [eye.at(found) for eye in eyes], (f"{_dropped(is_there, eyes[0].t_ns, what)} The first is {first}.",)
+
+
+def _dropped(is_there: NDArray[np.bool_], t_ns: Stamps, what: str) -> str:
+    """How many pictures are missing, and where: those amid the others leave gaps."""
+    found = np.flatnonzero(is_there)
+    ends = int(found[0]), len(is_there) - 1 - int(found[-1])
+    amid = len(is_there) - len(found) - sum(ends)
+    longest_s = np.diff(t_ns[found]).max(initial=0) / 1e9
+    counts = {
+        "at the start": ends[0],
+        f"amid the others (a gap of up to {longest_s:.3g} s)": amid,
+        "at the end": ends[1],
+    }
+    where = ", ".join(f"{count} {place}" for place, count in counts.items() if count)
+    return f"{len(is_there) - len(found)} of {len(is_there)} {what} were dropped, for files are missing: {where}."
 
 
 def numbered(folder: Path) -> tuple[Path, ...]:
@@ -108,12 +138,7 @@ def partners(left_ns: Stamps, right_ns: Stamps, within_ns: int, name: str) -> tu
 def paired(left: PictureList, right: PictureList, within_ns: int) -> tuple[PictureList, PictureList, tuple[str, ...]]:
     """Both lists with the same stamps, and sentences on what that took. Raises InputError where there is no pair."""
     at_left, at_right, notes = partners(left.t_ns, right.t_ns, within_ns, f"{left.name} and {right.name}")
-    t_ns = left.t_ns[at_left]
-    return (
-        PictureList(left.name, t_ns, tuple(left.paths[i] for i in at_left.tolist())),
-        PictureList(right.name, t_ns, tuple(right.paths[i] for i in at_right.tolist())),
-        notes,
-    )
+    return left.at(at_left), replace(right.at(at_right), t_ns=left.t_ns[at_left]), notes
 
 
 def shots_of(t_ns: Stamps, *eyes: Sequence[Path]) -> Shots:

@@ -9,7 +9,7 @@ from vobench.dataset.assemble import assemble
 from vobench.dataset.calibration import chain_rig, find_chain, no_calibration
 from vobench.dataset.files import read_text, unread
 from vobench.dataset.options import Options
-from vobench.dataset.picture_list import read_list, shots_of
+from vobench.dataset.picture_list import present, read_list, shots_of
 from vobench.dataset.recording import Recording
 from vobench.dataset.stream import PictureStream
 from vobench.dataset.truth import read_truth_file
@@ -32,11 +32,12 @@ Notes = tuple[str, ...]
 
 def read_tum(folder: Path, options: Options) -> Recording:
     """A folder with rgb.txt; the body is its camera. Raises InputError, one sentence, naming the file."""
-    pictures = read_list(folder / LIST, folder, separator=None, unit="s")
+    (pictures,), missing = present(read_list(folder / LIST, folder, separator=None, unit="s"))
     stream = PictureStream.open(shots_of(pictures.t_ns, pictures.paths))
     rig, calibration, lens_notes = _rig(folder, options)
     truth, truth_notes = _truth(folder, pictures.t_ns, options)
-    notes = ["There is one camera, and it is the body: x right, y down, z ahead.", *lens_notes, *truth_notes]
+    notes = ["There is one camera, and it is the body: x right, y down, z ahead."]
+    notes += [*missing, *lens_notes, *truth_notes]
     if (folder / DEPTH).exists():
         notes.append("Depth pictures were dropped.")
     notes += unread(folder, LIST, TRUTH, "rgb", DEPTH, "depth", Path(calibration).name)

@@ -41,11 +41,27 @@ def read_poses(path: Path, topic: str | None) -> Trajectory:
     Without a topic, the only one with poses. Raises SequenceError naming the topics there are
     where that is not one, where the recording is torn, or where a pose is none.
     """
+    return _trajectory(*_read(path, topic), path)
+
+
+def read_first_poses(path: Path, topic: str | None) -> tuple[Trajectory, int]:
+    """The same, of poses in a row that have one stamp the first; and how many that left out."""
+    t_ns, fields = _read(path, topic)
+    first = np.diff(t_ns, prepend=t_ns[0] - 1) != 0
+    return _trajectory(t_ns[first], fields[first], path), int(np.sum(~first))
+
+
+def _read(path: Path, topic: str | None) -> tuple[Stamps, Array]:
+    """Stamps (N,) and `pose_fields` (N, 7) of a topic, as they are."""
     with opened(path) as reader:
         rows = list(_rows(reader, path, topic))
     if not rows:
         raise SequenceError(f"no pose on {topic or 'its topic'} in {path}")
-    t_ns, fields = np.array([t for t, _ in rows], np.int64), np.array([pose for _, pose in rows], float)
+    return np.array([t for t, _ in rows], np.int64), np.array([pose for _, pose in rows], float)
+
+
+def _trajectory(t_ns: Stamps, fields: Array, path: Path) -> Trajectory:
+    """Poses of these fields. Raises SequenceError where one is none, or stamps do not rise."""
     _require_valid(t_ns, fields, path)
     fields[:, 3:] /= np.linalg.norm(fields[:, 3:], axis=1, keepdims=True)
     return Trajectory(t_ns, ros.poses(fields))

@@ -157,8 +157,8 @@ def scene() -> Scene:
     s = np.arange(COUNT)
     R = Rotation.from_rotvec(np.stack([0.1 * s, -0.2 * s, 0.3 * s], -1)).as_matrix()
     poses = se3.transform(R, np.stack([0.5 * s, np.sin(s), 0.1 * s], -1))
-    imu_ns = START_NS - 5_000_001 + np.arange(45) * 5_000_003
-    return Scene(left, right, t_ns, poses, imu_ns, rng.normal(size=(45, 6)))
+    imu_ns = START_NS - 5_000_001 + np.arange(42) * 5_000_003  # one beyond the pictures on either side
+    return Scene(left, right, t_ns, poses, imu_ns, rng.normal(size=(42, 6)))
 
 
 @pytest.fixture

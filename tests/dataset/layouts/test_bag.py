@@ -333,6 +333,16 @@ def test_a_pair_of_which_nothing_says_how_it_stands(scene, tmp_path):
         read(bag.write(tmp_path / "bag"))
 
 
+@pytest.mark.parametrize("ros1", [True, False])
+def test_of_true_poses_with_one_stamp_the_first_is_kept_and_it_is_said(scene, tmp_path, ros1):
+    bag = whole(scene, ros1=ros1)
+    bag.odometry("/ground_truth/odometry", scene.t_ns[-1], "base_link", np.eye(4))
+    recording = read(bag.write(tmp_path / "bag"))
+    assert np.abs(recording.truth.T_world_frame - scene.T_world_body).max() < 1e-12
+    said = "1 poses of /ground_truth/odometry repeat a stamp; the first pose of each stamp was kept."
+    assert said in recording.notes
+
+
 def test_stamps_that_repeat(scene, tmp_path):
     bag = Bag()
     for late, pixels in zip((0, 0, 5), scene.left, strict=False):

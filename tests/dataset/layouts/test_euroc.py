@@ -1,5 +1,6 @@
 """The ASL layout, EuRoC's and TUM-VI's."""
 
+import re
 import shutil
 
 import cv2
@@ -66,6 +67,67 @@ def test_a_picture_without_a_partner_is_dropped_and_said(scene, tmp_path):
     recording = read(folder)
     assert [frame.t_ns for frame in recording.frames()] == np.delete(scene.t_ns, 1).tolist()
     assert "1 left and 0 right pictures without a partner were dropped." in recording.notes
+
+
+@pytest.mark.parametrize(
+    ("gone", "where"),
+    [
+        ({"cam1": (3, 4)}, "2 of 5 pairs were dropped, for files are missing: 2 at the end."),
+        ({"cam0": (0,)}, "1 of 5 pairs were dropped, for files are missing: 1 at the start."),
+        ({"cam0": (2,), "cam1": (1, 2)}, "2 of 5 pairs .*: 2 amid the others \\(a gap of up to 0.15 s\\)."),
+        ({"cam0": (0, 2), "cam1": (4,)}, "3 of 5 pairs .*: 1 at the start, 1 amid .*0.1 s\\), 1 at the end."),
+    ],
+)
+def test_pairs_whose_files_are_missing_are_dropped_and_all_others_arrive(scene, tmp_path, imported, gone, where):
+    folder = scene.euroc(tmp_path / "in")
+    for eye, indices in gone.items():
+        for index in indices:
+            (folder / "mav0" / eye / "data" / f"{scene.t_ns[index]}.png").unlink()
+    kept = [index for index in range(5) if not any(index in indices for indices in gone.values())]
+    assert any(re.match(where, note) for note in read(folder).notes)
+    sequence = Sequence.open(imported(folder))
+    assert sequence.frame_stamps().tolist() == scene.t_ns[kept].tolist()
+    for frame, index in zip(sequence.frames(), kept, strict=True):
+        assert np.array_equal(frame.left, scene.left[index])
+        assert np.array_equal(frame.right, scene.right[index])
+
+
+def test_readings_beyond_the_pictures_are_cut_but_for_one_each_side(scene, tmp_path):
+    folder = scene.euroc(tmp_path)
+    for index in (0, 4):
+        (folder / "mav0/cam1/data" / f"{scene.t_ns[index]}.png").unlink()
+    recording = read(folder)
+    first, last = scene.t_ns[1], scene.t_ns[3]
+    begin, end = np.searchsorted(scene.imu_ns, first, "right") - 1, np.searchsorted(scene.imu_ns, last)
+    assert recording.imu.t_ns.tolist() == scene.imu_ns[begin : end + 1].tolist()
+    assert np.array_equal(recording.imu.gyro_radps, scene.imu[begin : end + 1, :3])
+    outside = 42 - (end + 1 - begin)
+    said = f"{outside} of 42 IMU readings lie outside the pictures' time (0.2 s beside 0.1 s); dropped."
+    assert said in recording.notes
+
+
+def test_readings_of_another_clock_are_dropped_and_said(scene, tmp_path):
+    folder = scene.euroc(tmp_path)
+    (folder / "mav0/imu0/data.csv").write_text("1000,0,0,0,0,0,9.8\n2000,0,0,0,0,0,9.8\n")
+    recording = read(folder)
+    assert recording.imu is None
+    assert recording.rig.imu is None
+    assert any(note.startswith("The IMU (1000 to 2000 ns) was dropped: it shares no time") for note in recording.notes)
+
+
+def test_of_true_poses_with_one_stamp_the_first_is_kept_and_it_is_said(scene, tmp_path):
+    folder = scene.euroc(tmp_path)
+    path = folder / "mav0/state_groundtruth_estimate0/data.csv"
+    rows = path.read_text().splitlines()
+    again = rows[3].split(",", 2)
+    path.write_text("\n".join([*rows[:4], f"{again[0]},77.0,{again[2]}", *rows[4:]]))
+    recording = read(folder)
+    assert np.abs(recording.truth.T_world_frame - scene.T_world_body).max() < 1e-12
+    said = "1 of 6 rows of data.csv repeat a stamp, first in line 5; the first pose of each stamp was kept."
+    assert said in recording.notes
+    path.write_text("\n".join([*rows[:3], rows[1], *rows[3:]]))
+    with pytest.raises(VobenchError, match=r"data\.csv:4: stamps must increase"):
+        read(folder)
 
 
 def test_eyes_a_little_apart_are_a_pair_and_it_is_said(scene, tmp_path):

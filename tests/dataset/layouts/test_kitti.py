@@ -75,7 +75,26 @@ def test_a_pose_for_each_picture_or_none(scene, tmp_path):
     folder = scene.kitti(tmp_path)
     path = tmp_path / "poses/00.txt"
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
-    with pytest.raises(VobenchError, match=r"4 poses without stamps for 5 pictures: .*00\.txt"):
+    with pytest.raises(VobenchError, match=r"4 poses without stamps for 5 pictures: give .* picture's number.*00\.txt"):
+        read(folder)
+
+
+def test_poses_behind_their_picture_s_number_may_be_fewer(scene, tmp_path):
+    folder, path = scene.kitti(tmp_path), tmp_path / "poses/00.txt"
+    rows, whole = path.read_text().splitlines(), read(folder).truth
+    path.write_text("\n".join(f"{k} {rows[k]}" for k in (0, 1, 4)))
+    recording = read(folder)
+    assert recording.truth.t_ns.tolist() == whole.t_ns[[0, 1, 4]].tolist()
+    assert np.array_equal(recording.truth.T_world_frame, whole.T_world_frame[[0, 1, 4]])
+    assert "00.txt has poses of 3 of 5 pictures, by their numbers." in recording.notes
+
+
+@pytest.mark.parametrize("numbers", [(0, 1, 5), (0, 2, 1), (0, 0, 1), (0, 1, -2), (0, 1, 2.5)])
+def test_a_number_that_no_picture_has_or_that_does_not_rise_is_refused(scene, tmp_path, numbers):
+    folder, path = scene.kitti(tmp_path), tmp_path / "poses/00.txt"
+    rows = path.read_text().splitlines()
+    path.write_text("\n".join(f"{number} {row}" for number, row in zip(numbers, rows, strict=False)))
+    with pytest.raises(VobenchError, match=r"00\.txt:[23]: the first of 13 columns should be a picture's number"):
         read(folder)
 
 

@@ -54,3 +54,18 @@ def test_the_real_truth_of_freiburg1_xyz_goes_through(scene, tmp_path, imported)
     kept = np.isin(given.t_ns, truth.t_ns)
     assert truth.t_ns.tolist() == given.t_ns[kept].tolist()
     assert np.abs(truth.T_world_frame - given.T_world_frame[kept]).max() < 1e-12
+
+
+def test_of_true_poses_with_one_stamp_the_first_is_kept_and_a_missing_picture_is_a_gap(scene, tmp_path):
+    folder = scene.tum(tmp_path)
+    path, whole = folder / "groundtruth.txt", read(folder)
+    path.write_text(path.read_text().replace("1305031103.5000 1.0 2.25", "1305031102.5000 1.0 2.25"))
+    (folder / "rgb" / "1305031104.175306.png").unlink()
+    recording = read(folder)
+    assert "1 of 8 rows of groundtruth.txt repeat a stamp, first in line 4; the first pose of each stamp was kept." in (
+        recording.notes
+    )
+    assert len(recording.truth) == len(whole.truth) - 1
+    assert recording.truth.positions_m[:2, 1].tolist() == [0.25, 1.25]
+    assert recording.frame_count == 4
+    assert any("1 amid the others (a gap of up to 2 s)" in note for note in recording.notes)

@@ -52,9 +52,11 @@ def test_a_missing_calibration(euroc, kitti):
 
 
 def test_a_missing_image(euroc, kitti, scene):
-    gone = picture(scene, euroc)
-    gone.unlink()
-    assert complaint(euroc) == f"{euroc / 'mav0/cam0/data.csv'}:4 names a picture that is missing: {gone}"
+    for gone in (euroc / "mav0/cam1/data").iterdir():
+        gone.unlink()
+    lists = " and ".join(str(euroc / "mav0" / name / "data.csv") for name in ("cam0", "cam1"))
+    first = picture(scene, euroc, 0, "cam1")
+    assert complaint(euroc) == f"of none of the 5 pairs in {lists} the files are there; missing: {first}"
     (kitti / "image_1/000002.png").unlink()
     assert complaint(kitti) == f"a picture is missing: {kitti / 'image_1' / '000002.png'}"
 
@@ -202,7 +204,7 @@ def test_a_list_that_points_out_of_its_folder(euroc, name):
 
 def test_columns_that_are_too_few(euroc):
     path = edit(euroc / "mav0/imu0/data.csv", lambda text: text + "1503636579763555584,1,2,3\n")
-    assert complaint(euroc).startswith(f"{path}:47: a reading has 7 columns (t wx wy wz ax ay az), this line has 4")
+    assert complaint(euroc).startswith(f"{path}:44: a reading has 7 columns (t wx wy wz ax ay az), this line has 4")
 
 
 @pytest.mark.parametrize(
