@@ -10,9 +10,10 @@ import pytest
 
 from vobench.dataset.export import export
 from vobench.errors import SequenceError, SuiteError
+from vobench.geometry import se3
 from vobench.pipeline.recorded import import_case, read_all
 from vobench.pipeline.run import run_suite
-from vobench.pipeline.score import score_estimate
+from vobench.pipeline.score import score_estimate, stands_still
 from vobench.pipeline.truth_path import LONGEST_GAP_NS, left_truth
 from vobench.pipeline.verify import verify_run
 from vobench.report import files
@@ -97,6 +98,40 @@ def test_why_nothing_could_be_scored_is_said_before_anything_is_run(layouts, tmp
         truth.write_text(head + rows)
         with pytest.raises(SuiteError, match=rf"late\.yaml:2: source: {said}.*, so nothing could be scored: .*late"):
             read_all(read_plan(str(suite)))
+
+
+def test_a_recording_that_stands_still_has_a_drift_and_no_error_among_others(bench, layouts, tmp_path):
+    shutil.copytree(layouts / "kitti", tmp_path / "rest")
+    poses = tmp_path / "rest/poses.txt"
+    rows = poses.read_text().splitlines()
+    poses.write_text("\n".join([rows[0]] * len(rows)))
+    suite = tmp_path / "rest.yaml"
+    suite.write_text(
+        f"name: rest\nsource: [rest, {layouts / 'kitti'}]\nestimators: [lk_epipolar, stand_still, constant_velocity]\n"
+    )
+    run = run_suite(read_plan(str(suite)), root=tmp_path / "runs", shop=bench.shop("rest"), finish=files.write_reports)
+    scores = {(s.case, s.estimator): s for s in run.scores()}
+    assert scores["rest", "stand_still"].drift_m == 0.0
+    drift_m = scores["rest", "lk_epipolar"].drift_m
+    assert drift_m > 0.1  # it sees the pictures of a drive
+    assert scores["rest", "lk_epipolar"].status == "ok"
+    assert scores["kitti", "lk_epipolar"].drift_m is None
+    refused = scores["rest", "constant_velocity"]
+    assert (refused.status, refused.reason) == ("refused", "it needs 'encoders', but this recording has no wheels")
+    board = (run.path / "leaderboard.md").read_text()
+    assert f"- lk_epipolar: stood still: drift {1e3 * drift_m:.1f} mm" in board
+    overall, kitti = (made.rows[0].ate_mm for made in files.boards_of(run, run.scores())[:2])
+    assert overall == kitti
+
+
+@pytest.mark.parametrize(
+    ("moved_m", "turned_deg", "still"), [(1.9e-3, 0.19, True), (2.1e-3, 0, False), (0, 0.21, False)]
+)
+def test_a_path_stands_still_by_how_far_it_strays_and_not_by_its_length(moved_m, turned_deg, still):
+    there = np.arange(1000) % 2
+    T = se3.transform(se3.rotation_z(np.deg2rad(turned_deg) * there), np.outer(there, [0.6, 0.0, 0.8]) * moved_m)
+    anywhere = se3.transform(se3.rotation_z(1.0), [100.0, -20.0, 3.0])
+    assert stands_still(Trajectory(np.arange(1000), anywhere @ T)) is still
 
 
 def test_an_estimate_with_poses_outside_the_truth_alone_has_no_score(tmp_path):

@@ -31,7 +31,7 @@ def make_score(estimator: str, status: str = "ok", *, ate_m: float | None = 0.1,
     return RunScore(estimator=estimator, status=status, **facts)
 
 
-def write_run(path: Path, scores: list[RunScore]) -> RunFolder:
+def make_run(path: Path, scores: list[RunScore]) -> RunFolder:
     folder = RunFolder(path)
     T = np.tile(np.eye(4), (3, 1, 1))
     T[:, 0, 3] = [0.0, 0.5, 1.0]
@@ -55,6 +55,12 @@ def scored() -> Callable[..., RunScore]:
 
 
 @pytest.fixture
+def write_run() -> Callable[..., RunFolder]:
+    """Writes scores and the files around them."""
+    return make_run
+
+
+@pytest.fixture
 def mixed() -> list[RunScore]:
     """Two cases; one estimator survives both, one loses a case, one dies twice; names and reasons that need care."""
     return [
@@ -70,4 +76,4 @@ def mixed() -> list[RunScore]:
 @pytest.fixture
 def run(tmp_path: Path, mixed: list[RunScore]) -> RunFolder:
     """The same as a folder."""
-    return write_run(tmp_path / "suite" / "stamp", mixed)
+    return make_run(tmp_path / "suite" / "stamp", mixed)

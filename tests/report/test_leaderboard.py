@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vobench.report.leaderboard import board, boards
+from vobench.report.leaderboard import Answers, answers, board, boards
+from vobench.results.estimate_file import FrameRow
 from vobench.results.run_folder import STATUSES, SURVIVED, RunScore
 
 CASES = ("a", "b")
@@ -93,7 +94,7 @@ def test_equal_results_share_a_rank_and_the_next_is_skipped(scored):
 
 
 def test_means_are_over_the_runs_that_survived(mixed):
-    (mad,) = (row for row in boards(mixed, {("ahead", "mad"): 4.0})[0].rows if row.estimator == "mad")
+    (mad,) = (row for row in boards(mixed, {("ahead", "mad"): Answers(4.0)})[0].rows if row.estimator == "mad")
     assert (mad.survived, mad.runs, mad.status, mad.reason) == (1, 2, "diverged", "down: it went dark")
     assert mad.ate_mm == pytest.approx(1e-6)
     assert mad.ms_per_frame == 4.0
@@ -122,3 +123,38 @@ def test_over_several_cases_a_reason_names_its_case():
     both = scores_of({"p": (("ok", 0.1), ("crashed", None))})
     told = [score.model_copy(update={"reason": "out of luck" if score.case == "b" else ""}) for score in both]
     assert [made.rows[0].reason for made in boards(told, {})] == ["b: out of luck", "", "out of luck"]
+
+
+@given(runs, st.floats(0, 1e3))
+def test_a_case_that_stands_still_changes_no_error_and_no_rank(outcomes, drift_m):
+    """Nothing but whether it was survived counts of it."""
+    moving = scores_of(outcomes)
+    still = [
+        s.model_copy(update={"case": "still", "drift_m": drift_m, "status": "ok"}) for s in moving if s.case == "a"
+    ]
+    before, after = (boards(scores, {})[0].rows for scores in (moving, [*moving, *still]))
+    shown = [[(r.rank, r.estimator, r.ate_mm, r.segment_percent, r.rpe_mm) for r in rows] for rows in (before, after)]
+    assert shown[0] == shown[1]
+
+
+def test_a_still_case_shows_the_largest_drift_of_its_runs_and_no_error(scored):
+    scores = [scored("a", repeat=n, drift_m=drift, ate_m=9.0) for n, drift in enumerate((0.0023, 0.001))]
+    (row,) = board("down", scores, {}).rows
+    assert (row.drift_mm, row.ate_mm, row.survived) == (2.3, None, 2)
+
+
+def frames(*reasons):
+    return [FrameRow(10 + k, k, "lost", reason, "{}", 1.0, 2.0) for k, reason in enumerate(reasons)]
+
+
+def test_the_commonest_reason_of_frames_is_counted_whatever_its_numbers(scored):
+    rows = frames("", "blurred", "too few tracks (7)", "", "too few tracks (-1.5e3)", "too few tracks")
+    found = answers([rows])
+    assert found == Answers(2.0, "too few tracks (7)", 2, 12)
+    (row,) = board("down", [scored("a")], {("down", "a"): found}).rows
+    assert (row.frame_reason, row.frame_reason_count, row.frame_reason_first) == ("too few tracks (7)", 2, 12)
+
+
+def test_frames_without_a_reason_have_none_and_no_frame_no_answer():
+    assert answers([frames("", ""), []]) == Answers(2.0)
+    assert answers([[], []]) is None

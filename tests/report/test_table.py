@@ -1,5 +1,6 @@
 """Every form of a leaderboard parses back into the same numbers."""
 
+import html
 import io
 import json
 import re
@@ -9,6 +10,7 @@ import pytest
 
 from vobench.report import files, table
 from vobench.report.table import HEADINGS
+from vobench.results.estimate_file import FRAMES
 
 
 @pytest.fixture
@@ -59,3 +61,23 @@ def test_the_reports_of_a_run_are_written_beside_it(run, mixed):
 
 def test_cost_is_the_mean_over_frames_and_none_where_no_frame_was_answered(made):
     assert {row.estimator: row.ms_per_frame for row in made[0].rows} == {"good_one": 2.0, "mad": 2.0, "dead": None}
+
+
+@pytest.mark.parametrize("form", ["md", "json", "csv", "html"])
+def test_every_form_shows_drift_and_the_commonest_reason_of_frames(tmp_path, scored, write_run, form):
+    scores = [scored("still_one", drift_m=0.00234, ate_m=5.0), scored("moving_one", case="ahead")]
+    folder = write_run(tmp_path / "suite" / "stamp", scores)
+    path = folder.estimate("down", "still_one", 0) / FRAMES
+    path.write_text(path.read_text() + "1,1,lost,few <7>,{},1.0,2.0\n2,2,lost,few <5>,{},1.0,2.0\n")
+    files.write_reports(folder, scores)
+    text = (folder.path / f"leaderboard.{form}").read_text(encoding="utf-8")
+    if form in ("md", "html"):
+        assert "still_one: stood still: drift 2.3 mm" in text
+        assert 'still_one: 2 frames "few <7>", first at frame 1' in html.unescape(text)
+        assert "5000.00" not in text
+    elif form == "csv":
+        (row,) = pd.read_csv(io.StringIO(text)).query("estimator == 'still_one' and board == 'down'").to_dict("records")
+        assert (row["drift_mm"], row["frame_reason"], row["frame_reason_count"]) == (2.34, "few <7>", 2)
+    else:
+        (row,) = next(b["rows"] for b in json.loads(text)["boards"] if b["title"] == "down")
+        assert (row["drift_mm"], row["ate_mm"], row["frame_reason_first"]) == (2.34, None, 1)

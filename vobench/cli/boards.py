@@ -6,7 +6,7 @@ from rich.table import Table
 
 from vobench.cli import terminal
 from vobench.report.leaderboard import Board
-from vobench.report.table import HEADINGS, LEGEND, cells
+from vobench.report.table import HEADINGS, LEGEND, cells, notes
 
 # A narrow terminal goes without these, in this order; every report has them all.
 LEAST_FIRST = ("RPE °/frame", "RPE mm/frame", "CPU ms/frame", "segments %", "survived", "coverage", "#")
@@ -14,13 +14,13 @@ ENDLESS = 10_000
 
 
 def print_boards(boards: list[Board]) -> None:
-    """The leaderboards, and what went wrong."""
+    """The leaderboards, and what their numbers don't say."""
     out = terminal.console()
     for board in boards:
         out.print(_fitting(board, out))
         for row in board.rows:
-            if row.reason:
-                out.print(f"  {row.estimator}: {row.status}: {row.reason}", style="red")
+            for note in notes(row):
+                out.print(f"  {note}", style="red" if row.reason and note == notes(row)[0] else None)
     out.print(LEGEND, style="dim")
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vobench.geometry import se3
 from vobench.metric.score import Score, score
 from vobench.metric.settings import ScoreSettings
 from vobench.results import estimate_file
@@ -13,6 +14,8 @@ from vobench.trajectory.trajectory import Trajectory
 
 # The truth that a run is scored against has one pose for each frame.
 SETTINGS = ScoreSettings(coverage_of="frames")
+# What trackers of resting things jitter by. Extents, not path lengths: jitter adds up along a path.
+STILL_M, STILL_RAD = 2e-3, np.deg2rad(0.2)
 
 
 def score_run(run: Run, estimate: Path, gt: Trajectory) -> RunScore:
@@ -30,7 +33,23 @@ def score_run(run: Run, estimate: Path, gt: Trajectory) -> RunScore:
         frames=len(gt),
         path_m=float(gt.distances_m()[-1]),
         score=scored.as_dict() if scored else None,
+        drift_m=_drift_m(estimate) if scored and stands_still(gt) else None,
     )
+
+
+def stands_still(gt: Trajectory) -> bool:
+    """Whether the truth stays within 2 mm and 0.2° of its first pose: an error of its path would mean nothing."""
+    turned_rad = se3.rotation_angle(se3.inverse(gt.T_world_frame[:1])[:, :3, :3] @ gt.T_world_frame[:, :3, :3])
+    return bool(_extent_m(gt) <= STILL_M and np.max(turned_rad) <= STILL_RAD)
+
+
+def _drift_m(estimate: Path) -> float:
+    return _extent_m(estimate_file.read_tum(estimate / estimate_file.ESTIMATE))
+
+
+def _extent_m(trajectory: Trajectory) -> float:
+    """The largest distance from the first position."""
+    return float(np.linalg.norm(trajectory.positions_m - trajectory.positions_m[:1], axis=1).max())
 
 
 def score_estimate(estimate: Path, gt: Trajectory) -> Score | None:
@@ -48,7 +67,7 @@ def _status(outcome: estimate_file.Outcome, scored: Score | None, gt: Trajectory
         at_the_end = " and none at the end" if covered and scored and scored.coverage.ends_lost else ""
         return "lost", f"a pose for {covered:.0%} of the frames{at_the_end}"
     ate, path_m = scored.metric("ate_trans"), float(gt.distances_m()[-1])
-    if ate is not None and ate.statistics.rmse > max(path_m, 1e-3):
+    if ate is not None and ate.statistics.rmse > max(path_m, 1e-3) and not stands_still(gt):
         return "diverged", f"ATE {ate.statistics.rmse:.3g} m on a path of {path_m:.3g} m"
     if scored.coverage.ratio < 1:
         without = scored.association.gt_poses - scored.association.pairs

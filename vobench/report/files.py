@@ -1,9 +1,7 @@
 """The reports that lie in a run's folder."""
 
-from statistics import fmean
-
 from vobench.report import page, table
-from vobench.report.leaderboard import Board, boards
+from vobench.report.leaderboard import Answers, Board, answers, boards
 from vobench.results import estimate_file
 from vobench.results.run_folder import RunFolder, RunScore
 
@@ -11,8 +9,8 @@ STEM = "leaderboard"
 
 
 def boards_of(folder: RunFolder, scores: list[RunScore]) -> list[Board]:
-    """All boards of a run, with what each frame cost."""
-    return boards(scores, _costs(folder, scores))
+    """All boards of a run, with what each frame cost and was said of it."""
+    return boards(scores, _answers(folder, scores))
 
 
 def write_reports(folder: RunFolder, scores: list[RunScore]) -> None:
@@ -23,10 +21,10 @@ def write_reports(folder: RunFolder, scores: list[RunScore]) -> None:
     (folder.path / f"{STEM}.html").write_text(page.html(folder, scores, made), encoding="utf-8")
 
 
-def _costs(folder: RunFolder, scores: list[RunScore]) -> dict[tuple[str, str], float]:
-    """Mean CPU milliseconds per frame of each case and estimator that answered at all."""
-    spent: dict[tuple[str, str], list[float]] = {}
+def _answers(folder: RunFolder, scores: list[RunScore]) -> dict[tuple[str, str], Answers]:
+    """What the frames of each case and estimator that answered at all come to."""
+    runs: dict[tuple[str, str], list[list[estimate_file.FrameRow]]] = {}
     for score in scores:
         rows = estimate_file.read_frames(folder.estimate(score.case, score.estimator, score.repeat))
-        spent.setdefault((score.case, score.estimator), []).extend(row.cpu_ms for row in rows)
-    return {key: fmean(values) for key, values in spent.items() if values}
+        runs.setdefault((score.case, score.estimator), []).append(rows)
+    return {key: found for key, rows in runs.items() if (found := answers(rows))}

@@ -52,6 +52,7 @@ def html(folder: RunFolder, scores: list[RunScore], boards: list[Board]) -> str:
         boards=boards,
         headings=table.HEADINGS,
         cells=table.cells,
+        notes=table.notes,
         legend=table.LEGEND,
         plots=[_plot(folder, case, [s for s in scores if s.case == case and s.repeat == 0], colours) for case in cases],
         size=PLOT_PX,

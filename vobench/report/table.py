@@ -32,13 +32,25 @@ HEADINGS = tuple(heading for heading, _ in COLUMNS)
 LEGEND = (
     "ATE: RMSE of position after SE(3) alignment; segments: mean drift over 0.5 to 2 m "
     "(5 to 40 m on paths from 40 m on, 100 to 800 m from 300 m on); "
-    "RPE: RMSE from frame to frame. Errors are means over the runs that survived."
+    "RPE: RMSE from frame to frame. Errors are means over the runs that survived, of cases that move."
 )
 
 
 def cells(row: Row) -> list[str]:
     """The cells of one line, in the order of HEADINGS."""
     return [cell(row) for _, cell in COLUMNS]
+
+
+def notes(row: Row) -> list[str]:
+    """What a line's numbers don't say: how it failed, how far it drifted standing still, what its frames lacked."""
+    said = [f"{row.status}: {row.reason}"] if row.reason else []
+    if row.drift_mm is not None:
+        said.append(f"stood still: drift {row.drift_mm:.1f} mm")
+    if row.frame_reason:
+        frames = "1 frame" if row.frame_reason_count == 1 else f"{row.frame_reason_count} frames"
+        over = f" of {row.runs} runs" if row.runs > 1 else ""
+        said.append(f'{frames}{over} "{row.frame_reason}", first at frame {row.frame_reason_first}')
+    return [f"{row.estimator}: {sentence}" for sentence in said]
 
 
 def markdown(boards: list[Board]) -> str:
@@ -49,8 +61,8 @@ def markdown(boards: list[Board]) -> str:
 def _markdown_board(board: Board) -> str:
     lines = [f"## {board.title}", "", "| " + " | ".join(HEADINGS) + " |", "|" + "---|" * len(HEADINGS)]
     lines += ["| " + " | ".join(cells(row)) + " |" for row in board.rows]
-    notes = [f"- {row.estimator}: {row.status}: {row.reason}" for row in board.rows if row.reason]
-    return "\n".join([*lines, "", *notes, *([""] if notes else [])])
+    below = [f"- {note}" for row in board.rows for note in notes(row)]
+    return "\n".join([*lines, "", *below, *([""] if below else [])])
 
 
 def as_json(boards: list[Board]) -> str:

@@ -46,7 +46,10 @@ SURVIVED = ("ok", "partial")
 
 
 class RunScore(BaseModel):
-    """One estimator on one case: its status and, where there is any estimate, its score."""
+    """One estimator on one case: its status and, where there is any estimate, its score.
+
+    `drift_m` is the largest distance of the estimate from its start, in a case that stands still; else None.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -61,6 +64,7 @@ class RunScore(BaseModel):
     frames: int
     path_m: float
     score: dict[str, Any] | None
+    drift_m: float | None = None
 
     def value(self, metric: str, statistic: str) -> float | None:
         """One statistic of one metric, None where the run has no such score."""
