@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from vobench.cli import terminal
-from vobench.cli.pair import Source, read_pair
 from vobench.metric.diagnose import Finding, diagnose
+from vobench.pipeline.pair import Source, read_pair
 
 
 def show(gt: Source, est: Source, *, times: Path | None, as_json: bool) -> None:

@@ -1,14 +1,19 @@
 """vobench list."""
 
+import re
 from typing import Any
 
-from vobench.catalog import catalog, yaml_file
+from vobench.catalog import catalog
 from vobench.catalog.catalog import KINDS, Entry, Kind
-from vobench.catalog.manifest import read_manifest
 from vobench.cli import terminal
 from vobench.errors import UnknownNameError, VobenchError
-from vobench.suite.model import Suite
-from vobench.suite.scene_file import read_scene
+
+# The values of a top-level key `summary` that say the same without a YAML parser: on one line, in quotes without
+# escapes, or two words or more of plain text without a colon or a comment.
+QUOTED = r"""(?:"(?P<double>[^"\\\x00-\x1f]*)"|'(?P<single>[^'\x00-\x1f]*)') *$"""
+PLAIN = r"(?P<plain>[^\W\d_][^:#\x00-\x1f]* [^:#\x00-\x1f]*\w[.!?)]?) *$(?=\n+\S|\s*\Z)"
+SUMMARY = re.compile(rf"^summary: +(?:{QUOTED}|{PLAIN})", re.MULTILINE)
+SUMMARY_KEY = re.compile(r"^[\"']?summary\b", re.MULTILINE)
 
 
 def show(kind: str | None, *, as_json: bool) -> None:
@@ -39,12 +44,30 @@ def _facts(entry: Entry) -> dict[str, Any]:
 
 
 def _summary(entry: Entry) -> str:
-    """What the file says of itself; one that cannot be read says why."""
+    """What the file says of itself; one that is read whole and cannot be says why."""
     try:
-        if entry.kind == "estimator":
-            return read_manifest(entry.path).summary
-        if entry.kind == "scene":
-            return read_scene(entry.path).summary
-        return yaml_file.read(entry.path, Suite).summary
+        path = entry.path / "estimator.yaml" if entry.kind == "estimator" else entry.path
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        text = ""
+    found = SUMMARY.search(text)
+    if found and len(SUMMARY_KEY.findall(text)) == 1:
+        return next(value for value in found.groups() if value is not None)
+    try:
+        return _checked_summary(entry)
     except VobenchError as error:
         return f"unreadable: {error}"
+
+
+def _checked_summary(entry: Entry) -> str:
+    """The same by the checked models. Raises VobenchError."""
+    from vobench.catalog import yaml_file
+    from vobench.catalog.manifest import read_manifest
+    from vobench.suite.model import Suite
+    from vobench.suite.scene_file import read_scene
+
+    if entry.kind == "estimator":
+        return read_manifest(entry.path).summary
+    if entry.kind == "scene":
+        return read_scene(entry.path).summary
+    return yaml_file.read(entry.path, Suite).summary

@@ -4,31 +4,32 @@ import shutil
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vobench.cli import terminal
-from vobench.cli.boards import print_boards
-from vobench.dataset.recording import Recording
 from vobench.errors import InputError
 from vobench.pipeline.motion import Travel
 from vobench.pipeline.passage import travel_all
-from vobench.pipeline.recorded import is_imported, read_all
-from vobench.pipeline.run import run_suite
 from vobench.pipeline.simulate import is_simulated
-from vobench.pipeline.workshop import Workshop
-from vobench.report import files
-from vobench.report.table import as_json as boards_as_json
 from vobench.results.store import default_store
-from vobench.results.unfinished import why_unwritable
-from vobench.suite.expand import Case, read_plan
+from vobench.suite.expand import Case, Plan, read_plan
 from vobench.suite.source_spec import RecordedCase
+
+if TYPE_CHECKING:
+    from vobench.dataset.recording import Recording
 
 
 def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) -> None:
     """Run a suite and print its leaderboard and where everything lies."""
+    from vobench.cli.boards import print_boards
+    from vobench.pipeline.run import run_suite
+    from vobench.pipeline.workshop import Workshop
+    from vobench.report import files
+    from vobench.report.table import as_json as boards_as_json
+
     planned = read_plan(suite, only_estimators=estimators)
     travel_all(planned)
-    read_all(planned)
+    _read_recordings(planned)
     _require_writable("--out", out)
     _require_writable("VOBENCH_CACHE", default_store().root)
     shop = Workshop(default_store(), terminal.Bars())
@@ -48,6 +49,8 @@ def _command() -> str:
 
 def _require_writable(what: str, folder: Path) -> None:
     """Said before hours of work. Raises InputError."""
+    from vobench.results.unfinished import why_unwritable
+
     if cause := why_unwritable(folder):
         raise InputError(f"{what} should be a folder that can be written ({cause}): {folder}")
 
@@ -55,7 +58,7 @@ def _require_writable(what: str, folder: Path) -> None:
 def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     """Validate a suite and print what it comes to."""
     planned = read_plan(suite, only_estimators=estimators)
-    travels, recordings = travel_all(planned), read_all(planned)
+    travels, recordings = travel_all(planned), _read_recordings(planned)
     cases = [_case_facts(case, travels) for case in planned.simulated]
     cases += [_recorded_facts(case, recordings[case.name]) for case in planned.recorded]
     entrants = [
@@ -79,6 +82,15 @@ def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     out.print(f"{len(cases)} cases, {len(entrants)} estimators, {runs} runs: the suite is valid")
 
 
+def _read_recordings(planned: Plan) -> "dict[str, Recording]":
+    """The plan's recordings by their cases' names; what reads them is imported where there are any."""
+    if not planned.recorded:
+        return {}
+    from vobench.pipeline.recorded import read_all
+
+    return read_all(planned)
+
+
 def _case_facts(case: Case, travels: Mapping[str, Travel]) -> dict[str, Any]:
     """What is known of a case before it is made."""
     t_ns, is_there = travels[case.variant["trajectory"]].t_ns, is_simulated(case, default_store())
@@ -91,8 +103,10 @@ def _case_facts(case: Case, travels: Mapping[str, Travel]) -> dict[str, Any]:
     }
 
 
-def _recorded_facts(case: RecordedCase, recording: Recording) -> dict[str, Any]:
+def _recorded_facts(case: RecordedCase, recording: "Recording") -> dict[str, Any]:
     """The same of a recording; its pictures are not read yet."""
+    from vobench.pipeline.recorded import is_imported
+
     is_there = is_imported(case, recording, default_store())
     return {
         "case": case.name,

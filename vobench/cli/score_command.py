@@ -53,7 +53,7 @@ def score(
 ) -> None:
     """Score an estimate against ground truth: ATE, RPE, segments, coverage."""
     from vobench.cli import scoring
-    from vobench.cli.pair import Source
+    from vobench.pipeline.pair import Source
 
     forms = [form for form, asked in (("json", json), ("csv", csv), ("md", md)) if asked]
     if len(forms) > 1:
@@ -82,7 +82,7 @@ def diagnose(
 ) -> None:
     """Say what is wrong between two trajectories (frames, axes, scale, clocks, quaternions), and what mends it."""
     from vobench.cli import diagnosing
-    from vobench.cli.pair import Source
+    from vobench.pipeline.pair import Source
 
     diagnosing.show(
         Source(gt, gt_topic, tuple(gt_as or ())),

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, get_args
 
 from vobench.cli import terminal
-from vobench.cli.pair import Source, read_pair
 from vobench.errors import AlignmentError, InputError, UnknownNameError
 from vobench.metric.score import Score, score
 from vobench.metric.settings import LIKE, ScoreSettings, Side, Unit
+from vobench.pipeline.pair import Source, read_pair
 from vobench.trajectory.align import Kind
 from vobench.trajectory.associate import Method
 

@@ -3,20 +3,12 @@
 import json as json_module
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from rich import box
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    SpinnerColumn,
-    TextColumn,
-    TimeRemainingColumn,
-)
-from rich.table import Table
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress, ProgressColumn
+    from rich.table import Table
 
 Item = TypeVar("Item")
 LEFT_ALIGNED = {
@@ -30,14 +22,19 @@ def print_json(content: Any) -> None:
     print(json_module.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
 
 
-def console() -> Console:
+def console() -> "Console":
     """Standard output; lines are as long as they are where nobody watches."""
+    from rich.console import Console
+
     plain = Console(markup=False, highlight=False)
     return plain if plain.is_terminal else Console(markup=False, highlight=False, width=200)
 
 
-def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> "Table":
     """A table with a bold title; words to the left, numbers to the right."""
+    from rich import box
+    from rich.table import Table
+
     made = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE, pad_edge=False)
     for heading in headings:
         made.add_column(heading, justify="left" if heading in LEFT_ALIGNED else "right", overflow="fold")
@@ -50,10 +47,14 @@ class Bars:
     """Progress as bars on standard error; nothing where that is no terminal."""
 
     def __init__(self) -> None:
+        from rich.console import Console
+
         self._console = Console(stderr=True, markup=False)
 
     def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
         """The same items, counted on a bar that goes when they are through."""
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
         with self._progress(*columns) as progress:
             yield from progress.track(items, total=total, description=what)
@@ -61,9 +62,13 @@ class Bars:
     @contextmanager
     def step(self, what: str) -> Iterator[None]:
         """A spinner around work of unknown length."""
+        from rich.progress import SpinnerColumn, TextColumn
+
         with self._progress(SpinnerColumn(), TextColumn(what)) as progress:
             progress.add_task(what)
             yield
 
-    def _progress(self, *columns: ProgressColumn) -> Progress:
+    def _progress(self, *columns: "ProgressColumn") -> "Progress":
+        from rich.progress import Progress
+
         return Progress(*columns, console=self._console, transient=True, disable=not self._console.is_terminal)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from vobench.errors import VobenchError
 from vobench.geometry.camera import Camera, Pinhole
@@ -65,5 +64,7 @@ def _true_right(nominal: Rig, error: CalibrationError) -> Array:
     T_body_right[:3, 3] += error.baseline_ratio * (T_body_right - nominal.T_body_left)[:3, 3]
     angles_deg = [error.right_roll_deg, error.right_pitch_deg, error.right_yaw_deg]
     if any(angles_deg):
+        from scipy.spatial.transform import Rotation
+
         T_body_right[:3, :3] @= Rotation.from_euler("ZXY", np.array(angles_deg), degrees=True).as_matrix()
     return T_body_right

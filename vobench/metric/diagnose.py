@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
+from textwrap import shorten
 from typing import Any, Literal
 
 import numpy as np
@@ -37,6 +38,7 @@ MIN_POSES, MAX_POSES = 8, 1000
 # Real pairs without a fault (KITTI, TUM, TartanAir) keep clear of these.
 SCALE_OFF, SCALE_MENDED = 0.02, 0.5
 LAG_NS, LAG_MENDED, LAG_BY, LAG_ALIKE = 10_000_000, 0.75, 5e-4, 0.5
+LONGEST_REPR = 100  # characters of a finding in one line
 SAME_SPAN = 30.0  # times; units are 1000 apart
 
 
@@ -61,6 +63,9 @@ class Finding:
     sentence: str
     evidence: tuple[Evidence, ...]
     options: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"Finding({shorten(f'{self.fault}: {self.sentence}', LONGEST_REPR, placeholder=' …')})"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values."""

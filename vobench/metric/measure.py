@@ -52,6 +52,10 @@ class Comparison:
     distances_m: Array
     settings: ScoreSettings
 
+    def __repr__(self) -> str:
+        matched = f"{len(self.matched)} pairs of {len(self.gt)} true and {len(self.est)} estimated poses"
+        return f"Comparison({matched}, alignment {self.settings.alignment})"
+
     def metric(self, name: str, errors: Array, *, mean: float | None = None) -> Iterator[Metric]:
         """The metric of errors (N,) in its own unit, none where N is 0; `mean` replaces the plain mean."""
         if not len(errors):

@@ -1,8 +1,8 @@
 """One estimate against one ground truth: associate, align, measure, and say what the numbers mean."""
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from vobench.trajectory.align import Alignment, align
 from vobench.trajectory.associate import match
 from vobench.trajectory.text import seconds
 from vobench.trajectory.trajectory import Stamps, Trajectory
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["DEFAULTS", "Association", "Metric", "Score", "ScoreSettings", "score"]
 
@@ -56,6 +59,22 @@ class Score:
     def metric(self, name: str) -> Metric | None:
         """The metric of that name, None where the trajectories gave it no sample."""
         return next((metric for metric in self.metrics if metric.name == name), None)
+
+    def __repr__(self) -> str:
+        shown = [f"{m.name} {m.statistics.rmse:.4g} {m.unit}" for m in self.metrics[:3]]
+        said = f"{len(self.metrics)} metrics, {len(self.warnings)} warning{'' if len(self.warnings) == 1 else 's'}"
+        return f"Score({', '.join(shown)}, coverage {self.coverage.ratio:.3f}; {said})"
+
+    def noted(self, notes: tuple[str, ...]) -> "Score":
+        """The same with notes on how its files were read before the warnings."""
+        return replace(self, warnings=(*notes, *self.warnings))
+
+    def to_frame(self) -> "pd.DataFrame":
+        """A pandas table, one row a metric by its name: unit, every statistic, and the id."""
+        import pandas as pd
+
+        rows = [{"name": m.name, "unit": m.unit, **asdict(m.statistics), "id": m.id} for m in self.metrics]
+        return pd.DataFrame(rows).set_index("name")
 
     def as_dict(self) -> dict[str, Any]:
         """The score as plain JSON values, without the series; coverage is the ratio, its details go to failure."""

@@ -2,18 +2,20 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vobench.geometry.rig import SIDES
 from vobench.pipeline.engine import BAKE, open_renderer
 from vobench.pipeline.motion import Travel, travel_of
-from vobench.pipeline.sense import SensorFeed
-from vobench.pipeline.shoot import Pair, StereoCamera, World
-from vobench.pipeline.truth import PixelTruth
 from vobench.pipeline.workshop import Workshop
 from vobench.results.store import Store, canonical, code_digest, library_versions, versions
-from vobench.sequence import SequenceWriter
 from vobench.suite.expand import Case
+
+if TYPE_CHECKING:
+    from vobench.pipeline.sense import SensorFeed
+    from vobench.pipeline.shoot import Pair
+    from vobench.pipeline.truth import PixelTruth
+    from vobench.sequence import SequenceWriter
 
 # What of a case is for people: names, and where the poses of a replay were found.
 UNSIMULATED: dict[str, Any] = {
@@ -53,6 +55,11 @@ def _content(case: Case) -> dict[str, Any]:
 
 
 def _record(case: Case, folder: Path, shop: Workshop) -> None:
+    # What draws and writes is imported here: whoever asks whether a sequence is there needs none of it.
+    from vobench.pipeline.sense import SensorFeed
+    from vobench.pipeline.shoot import StereoCamera, World
+    from vobench.pipeline.truth import PixelTruth
+
     travel, scene = travel_of(case), case.build_scene()
     truth = PixelTruth(case, scene, travel.motion) if case.truth else None
     renderer = open_renderer(case.scene, scene, case.rendering, shop)
@@ -66,7 +73,9 @@ def _record(case: Case, folder: Path, shop: Workshop) -> None:
         renderer.close()
 
 
-def _writer(case: Case, folder: Path, truth: PixelTruth | None) -> SequenceWriter:
+def _writer(case: Case, folder: Path, truth: "PixelTruth | None") -> "SequenceWriter":
+    from vobench.sequence import SequenceWriter
+
     return SequenceWriter(
         folder,
         case.build_rig(),
@@ -80,7 +89,7 @@ def _writer(case: Case, folder: Path, truth: PixelTruth | None) -> SequenceWrite
 
 
 def _write(
-    writer: SequenceWriter, travel: Travel, feed: SensorFeed, pairs: Iterator[Pair], truth: PixelTruth | None
+    writer: "SequenceWriter", travel: Travel, feed: "SensorFeed", pairs: "Iterator[Pair]", truth: "PixelTruth | None"
 ) -> None:
     body = travel.at_frames()
     stamps = [*travel.t_ns.tolist(), None]
@@ -96,6 +105,6 @@ def _write(
             _write_pixel_truth(writer, truth, t_ns, stamps[index + 1])
 
 
-def _write_pixel_truth(writer: SequenceWriter, truth: PixelTruth, t_ns: int, next_t_ns: int | None) -> None:
+def _write_pixel_truth(writer: "SequenceWriter", truth: "PixelTruth", t_ns: int, next_t_ns: int | None) -> None:
     for side in SIDES:
         writer.write_truth_frame(t_ns, side, truth.frame(side, t_ns, next_t_ns))

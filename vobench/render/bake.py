@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from vobench.geometry.se3 import Array
 from vobench.render.direct import SKY_SMOOTHING, direct_light, in_front, sees_open_sky
@@ -208,5 +208,5 @@ def _smoothed(layer: Floats, where: Layout) -> Floats:
     """The sky's shadows are so soft that averaging neighbours takes noise away, and nothing else."""
     smooth = layer.copy()
     for patch in where.patches:
-        smooth[patch.window] = ndimage.gaussian_filter(layer[patch.window], SKY_SMOOTHING, mode="nearest")
+        smooth[patch.window] = scipy.ndimage.gaussian_filter(layer[patch.window], SKY_SMOOTHING, mode="nearest")
     return smooth

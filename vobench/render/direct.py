@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from vobench.render.geometry import Ball, Floats
 from vobench.render.lightmap import Layout
@@ -107,7 +107,9 @@ def _half_shadow(clear: Floats, texels: Texels, where: Layout) -> NDArray[np.boo
     Few rays can miss the rim of a lamp, hence the three.
     """
     near = [
-        ndimage.binary_dilation(texels.on_map(part.astype(np.float32), where) > 0, iterations=3).ravel()[texels.index]
+        scipy.ndimage.binary_dilation(texels.on_map(part.astype(np.float32), where) > 0, iterations=3).ravel()[
+            texels.index
+        ]
         for part in (clear > 0, clear < 1)
     ]
     half: NDArray[np.bool_] = near[0] & near[1] & ~np.isnan(clear)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from embreex import mesh_construction, rtcore_scene
 from numpy.typing import ArrayLike, NDArray
 
 from vobench.geometry.se3 import Array
@@ -99,6 +98,8 @@ class RayCaster:
         # A scene without triangles would make Embree fail; one beyond everything is never hit.
         quads = quads or [np.full((4, 3), 1e7)]
         triangles = np.stack(quads).astype(np.float32)[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
+        from embreex import mesh_construction, rtcore_scene
+
         self._scene = rtcore_scene.EmbreeScene()
         self._mesh = mesh_construction.TriangleMesh(self._scene, np.ascontiguousarray(triangles))
 

@@ -6,10 +6,11 @@ Monte Carlo form factors (Cohen and Wallace, Radiosity and Realistic Image Synth
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from vobench.render.direct import JITTER, cell_spot
 from vobench.render.geometry import RAY_OFFSET_M, Floats, Hits, Indices
@@ -21,6 +22,9 @@ from vobench.scene.light import Sky
 from vobench.scene.material import Material, Mirror, Polished, fresnel
 from vobench.scene.surface import Surface
 from vobench.scene.texture import Map
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 MIRRORS = 4  # followed by one ray
 FAINT = 1e-3  # what a mirror returns of a ray is dropped below this
@@ -74,7 +78,7 @@ def answers(
 class Gathering:
     """Illuminance of points: table (P, H·W) times the map of light, plus sky (K, P), what each sky sends by mirrors."""
 
-    table: sparse.csr_matrix
+    table: "csr_matrix"
     sky: Floats
 
 
@@ -84,12 +88,12 @@ def gathering(
     """Send `rays` rays from every point and note where in the map they end."""
     side = round(np.sqrt(rays))
     if not side or not len(points):
-        nothing = sparse.csr_matrix((len(points), where.height * where.width), dtype=np.float32)
+        nothing = scipy.sparse.csr_matrix((len(points), where.height * where.width), dtype=np.float32)
         return Gathering(nothing, np.zeros((len(skies), len(points)), np.float32))
     seeker = _Seeker(where, sight, answer, skies)
     parts = in_chunks(lambda part: seeker.seek(points.take(part), side), len(points), chunk=ROWS)
     tables, sky = zip(*parts, strict=True)
-    return Gathering(sparse.vstack(tables, "csr"), np.concatenate(sky, 1))
+    return Gathering(scipy.sparse.vstack(tables, "csr"), np.concatenate(sky, 1))
 
 
 @dataclass(slots=True)
@@ -119,7 +123,7 @@ class _Seeker:
     answer: Answer
     skies: Sequence[Sky]
 
-    def seek(self, points: Texels, side: int) -> tuple[sparse.csr_matrix, Floats]:
+    def seek(self, points: Texels, side: int) -> "tuple[csr_matrix, Floats]":
         """The rows of the table, and the skies' light by mirrors, of some points."""
         front, entries = _start(points, side), []
         sky = np.zeros((len(self.skies), len(points)), np.float32)
@@ -142,7 +146,7 @@ class _Seeker:
         factor, row, column = (np.concatenate(part) for part in zip(*entries, strict=True))
         shape = (len(points), self.where.height * self.where.width)
         rays = np.float32(side * side)
-        return sparse.csr_matrix((factor / rays, (row, column)), shape, dtype=np.float32), sky / rays
+        return scipy.sparse.csr_matrix((factor / rays, (row, column)), shape, dtype=np.float32), sky / rays
 
     def _add_sky(self, sky: Floats, gone: _Front) -> None:
         for row, light in enumerate(self.skies):

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage
 
 from vobench.geometry.se3 import Array
 from vobench.scene.surface import Surface
@@ -100,7 +100,7 @@ def holes(where: Layout, index: NDArray[np.int64]) -> Holes:
     for patch in where.patches:
         own = nearest[patch.window]
         if (own < 0).any() and (own >= 0).any():
-            rows, columns = ndimage.distance_transform_edt(own < 0, return_distances=False, return_indices=True)
+            rows, columns = scipy.ndimage.distance_transform_edt(own < 0, return_distances=False, return_indices=True)
             nearest[patch.window] = own[rows, columns]
     return Holes(index, nearest.ravel())
 
@@ -136,7 +136,7 @@ SMOOTHING = 0.7  # coarse samples
 @lru_cache(maxsize=1024)
 def _between(few: int, many: int) -> NDArray[np.float32]:
     """(many, few): linear interpolation of smoothed values."""
-    smooth = ndimage.gaussian_filter1d(np.eye(few), SMOOTHING, axis=0, mode="nearest")
+    smooth = scipy.ndimage.gaussian_filter1d(np.eye(few), SMOOTHING, axis=0, mode="nearest")
     weights: NDArray[np.float32] = (_linear(few, many) @ smooth).astype(np.float32)
     return weights
 

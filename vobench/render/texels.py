@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from vobench.render.geometry import RAY_OFFSET_M, Floats, Indices
 from vobench.render.lightmap import Layout
@@ -116,7 +116,7 @@ def outside(points: Texels, where: Layout, sight: Sight, is_panel: NDArray[np.bo
     """Those that do not lie inside a thing, as does the floor under a crate; next to it they shrink to their middle."""
     parts = in_chunks(lambda part: _buried(points.take(part), sight, is_panel), len(points))
     inside = np.concatenate([*parts, np.zeros(0, bool)])
-    beside = ndimage.binary_dilation(points.on_map(inside.astype(np.float32), where) > 0).ravel()[points.index]
+    beside = scipy.ndimage.binary_dilation(points.on_map(inside.astype(np.float32), where) > 0).ravel()[points.index]
     kept, open_area = points.take(~inside), ~beside[~inside, None]
     return replace(kept, step_u_m=kept.step_u_m * open_area, step_v_m=kept.step_v_m * open_area)
 

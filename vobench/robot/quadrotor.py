@@ -5,11 +5,11 @@ quadrotor: the motion from hover to hover. Source: Mellinger and Kumar (2011), m
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.interpolate import BSpline, make_interp_spline
-from scipy.optimize import minimize
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
@@ -20,6 +20,9 @@ from vobench.trajectory.curve import CurveMotion
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, Kinematics
 from vobench.trajectory.spline import check_times
 from vobench.trajectory.time_law import evenly
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 HELD_MPS2 = np.array([0.0, 0.0, STANDARD_GRAVITY_MPS2])  # what the rotors give beyond the acceleration
 LEAST_LIFT = 0.1  # of the weight: below it the rotors all but stop, and which way is up is lost
@@ -32,8 +35,8 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact for the square of a
 class QuadrotorCurve:
     """A Curve by time in s: position (3 columns) of degree 7, yaw of degree 5."""
 
-    position: BSpline
-    yaw_rad: BSpline
+    position: "BSpline"
+    yaw_rad: "BSpline"
     breaks: Array
 
     def at(self, s: Array) -> Kinematics:
@@ -73,17 +76,17 @@ def quadrotor(
     return CurveMotion(curve, evenly(times_s[0], times_s[-1], begin=times_s[0]))
 
 
-def minimum_snap(t_s: Array, points_m: Array) -> BSpline:
+def minimum_snap(t_s: Array, points_m: Array) -> "BSpline":
     """Of all ways through points (N, 3) at t_s (N,), from hover to hover, the one of the least integral of snap².
 
     That is the interpolating spline of degree 7 with velocity, acceleration and jerk 0 at both ends.
     Source: the optimality of odd-degree splines, de Boor (1963).
     """
     hover = [(order, np.zeros(3)) for order in (1, 2, 3)]
-    return make_interp_spline(t_s, points_m, k=7, bc_type=(hover, hover))
+    return scipy.interpolate.make_interp_spline(t_s, points_m, k=7, bc_type=(hover, hover))
 
 
-def snap_cost(position: BSpline, t_s: Array) -> float:
+def snap_cost(position: "BSpline", t_s: Array) -> float:
     """∫ |snap|² dt between the times t_s (N,) that are its knots."""
     half = np.diff(t_s) / 2
     at_s = (t_s[:-1] + half)[:, None] + half[:, None] * NODES
@@ -105,21 +108,21 @@ def _least_snap_times(points: Array, speed_mps: float) -> Array:
         t = times(log_shares)
         return float(np.log(snap_cost(minimum_snap(t, points), t)))
 
-    found = minimize(cost, np.log(legs_m) / 2, method="L-BFGS-B")
+    found = scipy.optimize.minimize(cost, np.log(legs_m) / 2, method="L-BFGS-B")
     lasts_s: float = legs_m.sum() / speed_mps
     return times(found.x) * lasts_s
 
 
-def _yaw(position: BSpline, t_s: Array, points: Array, yaw_rad: float | None) -> BSpline:
+def _yaw(position: "BSpline", t_s: Array, points: Array, yaw_rad: float | None) -> "BSpline":
     """Yaw by time, at rest at both ends."""
     if yaw_rad is not None and not np.isfinite(yaw_rad):
         raise MotionError(f"yaw_rad is {yaw_rad:g}; it should be finite, or none to look along the way")
     yaw = np.full(len(t_s), yaw_rad) if yaw_rad is not None else _headings(position, t_s, points)
     rest = [(1, 0.0), (2, 0.0)]
-    return make_interp_spline(t_s, yaw, k=5, bc_type=(rest, rest))
+    return scipy.interpolate.make_interp_spline(t_s, yaw, k=5, bc_type=(rest, rest))
 
 
-def _headings(position: BSpline, t_s: Array, points: Array) -> Array:
+def _headings(position: "BSpline", t_s: Array, points: Array) -> Array:
     """The direction of flight (N,) over ground at each point, turning the shorter way; where it has none, the last."""
     ways = position(t_s, 1)
     ways[0], ways[-1] = points[1] - points[0], points[-1] - points[-2]

@@ -4,10 +4,10 @@ rail: the motion along the rail.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import BSpline
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
@@ -20,6 +20,9 @@ from vobench.trajectory.kinematics import Kinematics
 from vobench.trajectory.spline import quintic
 from vobench.trajectory.time_law import rest_to_rest
 
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
 KNOTS_PER_POINT = 256
 STEEPEST_RAD = np.deg2rad(85.0)
 UP = np.array([0.0, 0.0, 1.0])
@@ -29,7 +32,7 @@ UP = np.array([0.0, 0.0, 1.0])
 class RailCurve:
     """A Curve by arc length in m: x along the rail, y level."""
 
-    position: BSpline
+    position: "BSpline"
     arc: ArcLength
 
     @property

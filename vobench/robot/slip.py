@@ -8,11 +8,11 @@ kappa    traction (s^2/m): each wheel's sigma grows by kappa for every m/s^2 at 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import accumulate
 from math import exp, radians, sqrt, tan
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
 from vobench.errors import MotionError
 from vobench.geometry.se3 import Array
@@ -102,8 +102,7 @@ def ornstein_uhlenbeck(
     keep = exp(-step_s / correlation_s)
     shocks = std * rng.standard_normal(count)
     shocks[1:] *= sqrt(1 - keep**2)
-    path: Array = lfilter([1.0], [1.0, -keep], shocks)
-    return path
+    return np.array(list(accumulate(shocks.tolist(), lambda last, shock: keep * last + shock)))
 
 
 def generator_of(rngs: Generators | None, stream: str) -> np.random.Generator:

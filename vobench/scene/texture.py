@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
 
 Map = NDArray[np.float32]
 
@@ -43,14 +43,14 @@ def _noise(texture: Texture, rng: np.random.Generator, *, coarse_m: float, fine_
     """
     n = texture.resolution_px
     per_m = n / texture.tile_m
-    f_u = fft.rfftfreq(n) * per_m
+    f_u = scipy.fft.rfftfreq(n) * per_m
     # Columns above the band are zero, and the inverse transform adds them back as such.
     f_u = f_u[f_u < 0.5 / fine_m]
-    spectrum = fft.rfft2(rng.standard_normal((n, n), dtype=np.float32), workers=-1)[:, : len(f_u)]
-    f = np.hypot(fft.fftfreq(n)[:, None] * per_m, f_u).astype(np.float32)
+    spectrum = scipy.fft.rfft2(rng.standard_normal((n, n), dtype=np.float32), workers=-1)[:, : len(f_u)]
+    f = np.hypot(scipy.fft.fftfreq(n)[:, None] * per_m, f_u).astype(np.float32)
     band = (f > 0.5 / coarse_m) & (f < 0.5 / fine_m)
     spectrum = spectrum * np.where(band, np.maximum(f, 1e-6) ** -slope, 0).astype(np.float32)
-    noise = fft.irfft2(spectrum, s=(n, n), workers=-1)
+    noise = scipy.fft.irfft2(spectrum, s=(n, n), workers=-1)
     unit: Map = noise / (noise.std() or 1)
     return unit
 

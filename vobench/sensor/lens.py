@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import dctn, idctn
-from scipy.optimize import brentq
+import scipy
 
 from vobench.errors import InputError
 from vobench.geometry.camera import Camera
@@ -102,7 +101,7 @@ def blur(radiance: Radiance, transfer: Array) -> Radiance:
 
     What leaves a pixel arrives in others: the sum stays.
     """
-    blurred = idctn(dctn(radiance.astype(np.float64)) * transfer, overwrite_x=True)
+    blurred = scipy.fft.idctn(scipy.fft.dctn(radiance.astype(np.float64)) * transfer, overwrite_x=True)
     # Rounding may leave -1e-17 where there was no light.
     arrived: Radiance = np.maximum(blurred, 0.0, out=blurred).astype(np.float32)
     return arrived
@@ -145,7 +144,7 @@ def _gaussian(sigma_px: float) -> Array:
     def excess_px2(width_px: float) -> float:
         return float(weights(width_px) @ squares) - sigma_px**2
 
-    return weights(brentq(excess_px2, 0.03, sigma_px + 1) if sigma_px > 0 else 0.03)
+    return weights(scipy.optimize.brentq(excess_px2, 0.03, sigma_px + 1) if sigma_px > 0 else 0.03)
 
 
 def _disc(diameter_px: float) -> Array:
@@ -165,7 +164,7 @@ def dirt(shape: tuple[int, int], amount: float, rng: np.random.Generator) -> Arr
     More of it is the same dirt, thicker: light falls off exponentially in it (Beer and Lambert).
     """
     thickness = _smudges(shape, rng) + _specks(shape, rng)
-    grown = brentq(lambda by: float(np.mean(-np.expm1(-by * thickness))) - amount, 0.0, 1e6, xtol=1e-12)
+    grown = scipy.optimize.brentq(lambda by: float(np.mean(-np.expm1(-by * thickness))) - amount, 0.0, 1e6, xtol=1e-12)
     taken: Array = -np.expm1(-grown * thickness)
     return taken
 

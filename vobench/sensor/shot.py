@@ -1,8 +1,8 @@
 """Photon noise: Poisson counts from normal draws, one a pixel however bright it is. Pure."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from vobench.geometry.se3 import Array
 
@@ -22,7 +22,7 @@ def poisson(mean: Array, normal: Array) -> Array:
     counts = _expansion(mean, normal)
     small = mean < EXPANSION_FROM
     if small.any():
-        counts[small] = _summed(mean[small], ndtr(normal[small]))
+        counts[small] = _summed(mean[small], scipy.special.ndtr(normal[small]))
     return counts
 
 

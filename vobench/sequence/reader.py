@@ -24,6 +24,8 @@ from vobench.sequence.truth_image import truth_topics
 from vobench.sequence.writer import CASE_ATTACHMENT, IMPORT_NOTE, PROVENANCE_NOTE, SENSORS_FILE, TRUTH_FILE
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
+LONGEST_PATH = 60  # characters of it in a repr
+
 
 @dataclass(frozen=True, slots=True)
 class StereoFrame:
@@ -71,6 +73,11 @@ class Sequence:
 
     def __len__(self) -> int:
         return self.frame_count
+
+    def __repr__(self) -> str:
+        path, cameras = str(self.path), " and ".join(self.rig.sides)
+        shown = path if len(path) <= LONGEST_PATH else f"…{path[-LONGEST_PATH:]}"
+        return f"Sequence({shown}, {self.frame_count} frames of {cameras})"
 
     @property
     def _image_topics(self) -> tuple[ros.Topic, ...]:

@@ -5,7 +5,6 @@ from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
-from scipy.spatial.transform import Rotation
 
 from vobench.geometry import se3
 from vobench.sensor.imu import ImuSettings
@@ -53,6 +52,8 @@ class ImuSpec(Strict):
 
     def build(self) -> ImuSettings:
         """The IMU as it is; `rotation_deg` is roll, pitch and yaw, turned about fixed axes in that order."""
+        from scipy.spatial.transform import Rotation
+
         preset = IMUS[self.like]
         R_body_imu = Rotation.from_euler("xyz", self.rotation_deg, degrees=True).as_matrix()
         return ImuSettings(

@@ -6,7 +6,6 @@ from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
-from scipy.spatial.transform import Rotation
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
@@ -30,6 +29,8 @@ class PoseSpec(Strict):
     @property
     def T_world_body(self) -> Array:
         """The pose (4, 4): rolled about x first, then pitched about y, then turned about z."""
+        from scipy.spatial.transform import Rotation
+
         angles = (self.roll_deg, self.pitch_deg, self.yaw_deg)
         return se3.transform(Rotation.from_euler("xyz", angles, degrees=True).as_matrix(), np.array(self.position_m))
 

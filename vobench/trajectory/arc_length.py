@@ -2,11 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
+import scipy
 
 from vobench.geometry.se3 import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 BLUNT = 0.05  # a curve whose derivative falls below this share of its largest all but comes to a point
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -16,7 +20,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 class ArcLength:
     """parameter(s) is the curve's parameter at arc length s, up to `length`."""
 
-    parameter: BSpline
+    parameter: "BSpline"
     length: float
 
 
@@ -30,4 +34,4 @@ def arc_length(speed: Callable[[Array], Array], knots: Array) -> ArcLength:
     parameters = (knots[:-1] + half)[:, None] + half[:, None] * NODES
     lengths = speed(parameters.ravel()).reshape(parameters.shape) @ WEIGHTS * half
     s = np.concatenate([[0.0], np.cumsum(lengths)])
-    return ArcLength(make_interp_spline(s, knots, k=5), float(s[-1]))
+    return ArcLength(scipy.interpolate.make_interp_spline(s, knots, k=5), float(s[-1]))

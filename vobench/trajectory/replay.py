@@ -3,8 +3,10 @@
 AXES: what a recording's axes are, by name. interpolated, smoothed: the motions.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.interpolate import BSpline, make_lsq_spline
+import scipy
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
@@ -14,6 +16,9 @@ from vobench.trajectory.curve import CurveMotion
 from vobench.trajectory.spline import FEWEST, PoseCurve, by_quaternion, through
 from vobench.trajectory.time_law import evenly
 from vobench.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 DEGREE = 5
 FEWEST_SMOOTHED = 2 * (DEGREE + 1)
@@ -64,7 +69,9 @@ def smoothed(
     t_s, T = _recorded(trajectory, fewest=FEWEST_SMOOTHED, max_gap_s=max_gap_s)
     columns = np.column_stack([T[:, :3, 3], _unbroken(se3.to_quaternion(T[:, :3, :3]))])
     spline = _least_squares(t_s, columns, knot_hz=knot_hz)
-    position, quaternion = (BSpline(spline.t, spline.c[:, part], DEGREE) for part in (slice(3), slice(3, 7)))
+    position, quaternion = (
+        scipy.interpolate.BSpline(spline.t, spline.c[:, part], DEGREE) for part in (slice(3), slice(3, 7))
+    )
     curve = PoseCurve(position, by_quaternion(quaternion), breaks=np.zeros(0))
     return _replayed(curve, t_s[-1], start=start, speed=speed)
 
@@ -111,7 +118,7 @@ def _unbroken(q_xyzw: Array) -> Array:
     return unbroken
 
 
-def _least_squares(t_s: Array, columns: Array, *, knot_hz: float) -> BSpline:
+def _least_squares(t_s: Array, columns: Array, *, knot_hz: float) -> "BSpline":
     """The spline (7 columns) nearest to rows (N, 7)."""
     wanted_s = np.arange(1, int(t_s[-1] * knot_hz) + 1) / knot_hz
     before = np.searchsorted(t_s, wanted_s)  # poses before each knot wanted
@@ -121,4 +128,4 @@ def _least_squares(t_s: Array, columns: Array, *, knot_hz: float) -> BSpline:
             kept.append(knot_s)
             last = count
     knots = np.concatenate([np.full(DEGREE + 1, t_s[0]), kept, np.full(DEGREE + 1, t_s[-1])])
-    return make_lsq_spline(t_s, columns, knots, k=DEGREE)
+    return scipy.interpolate.make_lsq_spline(t_s, columns, knots, k=DEGREE)

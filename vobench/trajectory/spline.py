@@ -5,11 +5,11 @@ pose_spline: the motion through poses at given times.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.interpolate import BSpline, PPoly, make_interp_spline
-from scipy.spatial.transform import Rotation, RotationSpline
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
@@ -19,6 +19,9 @@ from vobench.trajectory.attitude import Attitude, Jet
 from vobench.trajectory.curve import CurveMotion
 from vobench.trajectory.kinematics import Kinematics
 from vobench.trajectory.time_law import TimeLaw, evenly, rest_to_rest
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 FEWEST = 3
 WIDEST_TURN_RAD = np.deg2rad(175.0)  # beyond it rounding or noise decides which way round
@@ -31,7 +34,7 @@ class PoseCurve:
     breaks: where the spline of rotations changes its piece.
     """
 
-    position: BSpline
+    position: "BSpline"
     attitude: Callable[[Array], Attitude]
     breaks: Array
 
@@ -64,6 +67,8 @@ def pose_spline(t_s: ArrayLike, T_world_body: ArrayLike, *, ease_s: float = 0.0)
 
 def through(t_s: Array, T: Array) -> PoseCurve:
     """The curve through poses (N, 4, 4): SciPy's rotation spline, and positions of the least jerk."""
+    from scipy.spatial.transform import Rotation, RotationSpline
+
     rotation = RotationSpline(t_s, Rotation.from_matrix(se3.nearest_rotation(T[:, :3, :3])))
 
     def turned(s: Array) -> Attitude:
@@ -72,15 +77,15 @@ def through(t_s: Array, T: Array) -> PoseCurve:
     return PoseCurve(quintic(t_s, T[:, :3, 3]), turned, t_s[1:-1])
 
 
-def by_quaternion(spline: BSpline) -> Callable[[Array], Attitude]:
+def by_quaternion(spline: "BSpline") -> Callable[[Array], Attitude]:
     """Attitudes of a spline of quaternions (4 columns, scalar last), brought to length 1."""
     return lambda s: attitude.of_quaternion(Jet(spline(s), spline(s, 1), spline(s, 2)))
 
 
-def quintic(t: Array, values: Array) -> BSpline:
+def quintic(t: Array, values: Array) -> "BSpline":
     """The natural quintic through values (N, n) at t (N,), N >= 3: of all curves through them the one of least jerk."""
     natural = [(3, np.zeros(values.shape[1:])), (4, np.zeros(values.shape[1:]))]
-    return make_interp_spline(t, values, k=5, bc_type=(natural, natural))
+    return scipy.interpolate.make_interp_spline(t, values, k=5, bc_type=(natural, natural))
 
 
 def check_times(t_s: Array, *, fewest: int, of: str) -> None:
@@ -128,4 +133,4 @@ def _eased(t_s: Array, ease_s: float) -> TimeLaw:
     progress = rest_to_rest(lasts_s, speed=1.0, acceleration=15 / 8 / ease_s).progress
     c = progress.c.copy()
     c[-1] += t_s[0]
-    return TimeLaw(PPoly(c, progress.x + t_s[0]))
+    return TimeLaw(scipy.interpolate.PPoly(c, progress.x + t_s[0]))

@@ -3,12 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import PPoly
+import scipy
 
 from vobench.errors import MotionError
 from vobench.geometry.se3 import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 LONGEST_S = 86_400.0
 SHORTEST_S = 1e-9  # of speeding up: an instant is a whole nanosecond
@@ -22,7 +26,7 @@ class TimeLaw:
     Raises MotionError where it lasts longer than a day.
     """
 
-    progress: PPoly
+    progress: "PPoly"
 
     def __post_init__(self) -> None:
         if not self.end_s - self.start_s <= LONGEST_S:
@@ -91,7 +95,7 @@ def rest_to_rest(length: float, *, speed: float, acceleration: float) -> TimeLaw
 
 def evenly(start_s: float, end_s: float, *, begin: float = 0.0, rate: float = 1.0) -> TimeLaw:
     """From `begin` on at a constant rate."""
-    return TimeLaw(PPoly(np.array([[rate], [begin]]), np.array([start_s, end_s])))
+    return TimeLaw(scipy.interpolate.PPoly(np.array([[rate], [begin]]), np.array([start_s, end_s])))
 
 
 def in_stages(laws: Sequence[TimeLaw], *, pause_s: float = 0.0) -> TimeLaw:
@@ -115,4 +119,4 @@ def _in_turn(stages: Sequence[tuple[float, Array]]) -> TimeLaw:
     c[-1] = 0.0
     gained = [np.polyval(c[:, k], duration_s) for k, (duration_s, _) in enumerate(stages)]
     c[-1] = np.concatenate([[0.0], np.cumsum(gained)[:-1]])
-    return TimeLaw(PPoly(c, x))
+    return TimeLaw(scipy.interpolate.PPoly(c, x))

@@ -40,6 +40,12 @@ class Trajectory:
     def __len__(self) -> int:
         return len(self.t_ns)
 
+    def __repr__(self) -> str:
+        if not len(self):
+            return "Trajectory(no pose)"
+        first, last = (f"{t_ns / 1e9:.3f}" for t_ns in (self.t_ns[0], self.t_ns[-1]))
+        return f"Trajectory({len(self)} poses from {first} s to {last} s, path {self.distances_m()[-1]:.4g} m)"
+
     @property
     def positions_m(self) -> Array:
         """Positions (N, 3)."""

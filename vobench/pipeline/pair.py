@@ -72,6 +72,16 @@ def read_pair(gt: Source, est: Source, *, times: Path | None = None, any_unit: b
     return Pair(_reading(stamped["gt"]), _reading(stamped["est"]), notes)
 
 
+def read_one(source: Source, *, times: Path | None = None, any_unit: bool = False) -> Reading:
+    """Read one alone; a file without stamps needs `times`. Raises InputError."""
+    read = _read(source, any_unit=any_unit)
+    if times is not None:
+        read = _stamp(read, times)
+    if read.parsed.t_ns is None:
+        raise InputError(f"no stamps in {source.path}; name the file that has them as `times`")
+    return _reading(read)
+
+
 def _reading(read: _Read) -> Reading:
     parsed = read.parsed
     assert parsed.t_ns is not None

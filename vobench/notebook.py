@@ -1,0 +1,86 @@
+"""What a notebook calls: trajectories of any form, their scores and diagnoses, sequences, leaderboards."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vobench.metric import diagnose as diagnosis
+from vobench.metric import score as scoring
+from vobench.metric.diagnose import Finding
+from vobench.metric.score import DEFAULTS, Score
+from vobench.metric.settings import ScoreSettings
+from vobench.pipeline.pair import Pair, Source, read_one, read_pair
+from vobench.trajectory.form import Reading
+from vobench.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from vobench.sequence import Sequence
+
+Given = Trajectory | Path | str
+
+
+def read_trajectory(
+    path: Path | str, *, topic: str | None = None, read_as: Iterable[str] = (), times: Path | str | None = None
+) -> Trajectory:
+    """The trajectory in a file of any form, or the true path of a sequence's left camera.
+
+    `topic` chooses among a recording's; `read_as` are the words of `--gt-as`, such as ns or wxyz; `times` is a file
+    of stamps for forms without (KITTI, TartanAir). Raises InputError.
+    """
+    return read_one(Source(Path(path), topic, tuple(read_as)), times=_path(times)).trajectory
+
+
+def score(gt: Given, est: Given, *, settings: ScoreSettings = DEFAULTS, times: Path | str | None = None) -> Score:
+    """Score an estimate against ground truth, each a trajectory or its file, as `vobench score` does.
+
+    `settings=LIKE["evo"]` measures as evo would. Raises InputError or AlignmentError.
+    """
+    pair = _pair(gt, est, times)
+    return scoring.score(pair.gt.trajectory, pair.est.trajectory, settings=settings).noted(pair.notes)
+
+
+def diagnose(gt: Given, est: Given, *, times: Path | str | None = None) -> tuple[Finding, ...]:
+    """What is wrong between two trajectories or their files; nothing where they only differ by errors.
+
+    Files tell more than trajectories: in which unit their stamps and in which order their quaternions were written.
+    Raises InputError or AlignmentError.
+    """
+    pair = _pair(gt, est, times, any_unit=True)
+    return diagnosis.diagnose(pair.gt, pair.est)
+
+
+def read_sequence(folder: Path | str) -> "Sequence":
+    """The pictures and readings of a sequence, read when they are asked for. Raises SequenceError."""
+    from vobench.sequence import Sequence
+
+    return Sequence.open(Path(folder))
+
+
+def read_board(run: Path | str) -> "pd.DataFrame":
+    """The leaderboards of a run's folder, or of the latest of runs/<suite>: one row per board and estimator.
+
+    Raises InputError where the folder is none of a run.
+    """
+    from vobench.report import files, table
+    from vobench.results.run_folder import open_run
+
+    folder = open_run(Path(run))
+    return table.data_frame(files.boards_of(folder, folder.scores()))
+
+
+def _pair(gt: Given, est: Given, times: Path | str | None, *, any_unit: bool = False) -> Pair:
+    if isinstance(gt, Trajectory) or isinstance(est, Trajectory):
+        return Pair(_reading(gt, times, any_unit=any_unit), _reading(est, times, any_unit=any_unit))
+    return read_pair(Source(Path(gt)), Source(Path(est)), times=_path(times), any_unit=any_unit)
+
+
+def _reading(given: Given, times: Path | str | None, *, any_unit: bool) -> Reading:
+    if isinstance(given, Trajectory):
+        return Reading(given, unit="ns", form_unit="ns", order=None)
+    return read_one(Source(Path(given)), times=_path(times), any_unit=any_unit)
+
+
+def _path(file: Path | str | None) -> Path | None:
+    return None if file is None else Path(file)
