@@ -20,7 +20,7 @@ from vobench.pipeline import passage
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 COMMANDS = [command.name or command.callback.__name__ for command in app.registered_commands]
 HEAVY = ("numpy", "cv2", "pandas", "rerun", "scipy", "pydantic", "rich.table", "OpenGL", "trimesh")
-GT, EST = "runs/tiny/latest/cases/short/ground_truth.tum", "runs/tiny/latest/cases/short/stand_still/0/estimate.tum"
+GT, EST = "runs/tiny/latest/cases/short/ground_truth.tum", "runs/tiny/latest/cases/short/estimates/stand_still/0/estimate.tum"
 
 
 def test_help_imports_no_heavy_library():
@@ -97,10 +97,10 @@ WRONG = [
     (("score", "suites/tiny.yaml", "no.tum"), "suites/tiny.yaml:1: no form of trajectory has 2 columns: TUM has 8 (t x y z qx qy qz qw), KITTI 12, TartanAir 7, EuRoC 8 and commas"),
     (("score", "a", "b", "--align", "sm3"), "no alignment named 'sm3'. Did you mean 'sim3'? Known: none, origin, scale, se3, sim3, yaw"),
     (("score", "a", "b", "--t-max-diff", "nan"), "--t-max-diff should be 0 to 1e+06 seconds, got nan"),
-    (("report", "suites"), "not the folder of a run (no cases/*/*/*/score.json in it): suites"),
+    (("report", "suites"), "not the folder of a run (no cases/*/estimates/*/*/score.json in it): suites"),
     (("report", "suites", "--format", "htm"), "no format named 'htm'. Did you mean 'html'? Known: csv, html, json, latex, md, terminal"),
     (("report", "suites", "--out", "a.xls"), "no format goes with 'a.xls'; name one with --format: md, json, csv, latex, html"),
-    (("view", "suites"), "not the folder of a run (no cases/*/*/*/score.json in it): suites"),
+    (("view", "suites"), "not the folder of a run (no cases/*/estimates/*/*/score.json in it): suites"),
 ]  # fmt: skip
 
 

@@ -76,7 +76,7 @@ def _libraries() -> Check:
 
 def _drawing() -> Check:
     """Whether a picture can be drawn, tried in a process of its own: a broken driver may kill it."""
-    tried = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, check=False)
+    tried = subprocess.run([sys.executable, "-P", "-c", PROBE], capture_output=True, text=True, check=False)
     if tried.returncode == 0:
         return Check("drawing without a display (EGL)", True, "works")
     last = tried.stderr.strip().splitlines()[-1:] or [f"the probe died with {tried.returncode}"]

@@ -67,7 +67,7 @@ class EstimatorProcess:
         fd, memory = str(child.fileno()), str(limits.memory_bytes)
         self._log_path, self._log = log, log.open("wb")
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "vobench.estimator.worker", fd, str(folder), class_path, name, memory],
+            [sys.executable, "-P", "-m", "vobench.estimator.worker", fd, str(folder), class_path, name, memory],
             pass_fds=[child.fileno()],
             cwd=self._home.name,
             env={k: v for k, v in os.environ.items() if k in KEPT_ENVIRONMENT} | ONE_THREAD,

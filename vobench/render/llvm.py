@@ -83,7 +83,7 @@ def failure(library: Path) -> str:
     """Why Mitsuba does not render with this library, "" if it does: tried in a process with an empty kernel cache."""
     with tempfile.TemporaryDirectory() as home:
         environment = os.environ | {VARIABLE: str(library), "HOME": home}
-        command = [sys.executable, "-c", PROBE]
+        command = [sys.executable, "-P", "-c", PROBE]
         try:
             done = subprocess.run(
                 command, env=environment, capture_output=True, text=True, check=False, timeout=PROBE_TIMEOUT_S
