@@ -20,7 +20,10 @@ from vobench.pipeline import passage
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 COMMANDS = [command.name or command.callback.__name__ for command in app.registered_commands]
 HEAVY = ("numpy", "cv2", "pandas", "rerun", "scipy", "pydantic", "rich.table", "OpenGL", "trimesh")
-GT, EST = "runs/tiny/latest/cases/short/ground_truth.tum", "runs/tiny/latest/cases/short/estimates/stand_still/0/estimate.tum"
+GT, EST = (
+    "runs/tiny/latest/cases/short/ground_truth.tum",
+    "runs/tiny/latest/cases/short/estimates/stand_still/0/estimate.tum",
+)
 
 
 def test_help_imports_no_heavy_library():

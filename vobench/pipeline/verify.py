@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from vobench import stop
 from vobench.errors import VobenchError
 from vobench.pipeline.score import score_estimate
 from vobench.pipeline.truth_path import left_truth
@@ -28,10 +29,12 @@ def verify_run(folder: RunFolder) -> Iterator[Finding]:
     """Recompute all hashes and scores of a run from its files. Raises InputError where the folder is no run."""
     files, hashes = folder.score_files(), read_hashes(folder)
     for name, held in hashes.items():
+        stop.check()
         yield Finding("hash", name, _changed(folder.path / name, held))
     for case in sorted({file.parents[3].name for file in files}):
         yield Finding("ground truth", case, _truth_differs(folder.case(case)))
     for file in files:
+        stop.check()
         place = file.relative_to(folder.path)
         _, case, _, estimator, repeat, _ = place.parts
         wrong = _rescored(file) if str(place) in hashes else "not of this run, whose hashes do not name it"

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from vobench import stop
 from vobench.render.geometry import RAY_OFFSET_M, Floats, Indices
 from vobench.render.lightmap import Layout
 from vobench.render.sight import Sight
@@ -146,5 +147,10 @@ def tangents(normals: Floats) -> tuple[Floats, Floats]:
 def in_chunks(work: Callable[[slice], T], count: int, *, chunk: int = CHUNK) -> list[T]:
     """What `work` gives for each slice of `count` things, in their order, on all cores."""
     slices = [slice(start, min(start + chunk, count)) for start in range(0, count, chunk)]
+
+    def looked(part: slice) -> T:
+        stop.check()
+        return work(part)
+
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(work, slices))
+        return list(pool.map(looked, slices))
