@@ -1,7 +1,8 @@
 """What people see: tables on standard output, progress on standard error."""
 
 import json as json_module
-from collections.abc import Iterable, Iterator, Sequence
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
@@ -13,6 +14,7 @@ from rich.progress import (
     Progress,
     ProgressColumn,
     SpinnerColumn,
+    TaskProgressColumn,
     TextColumn,
     TimeRemainingColumn,
 )
@@ -47,7 +49,7 @@ def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) ->
 
 
 class Bars:
-    """Progress as bars on standard error; nothing where that is no terminal."""
+    """Progress on standard error: bars, or one line for each stage where that is no terminal."""
 
     def __init__(self) -> None:
         self._console = Console(stderr=True, markup=False)
@@ -55,15 +57,17 @@ class Bars:
     def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
         """The same items, counted on a bar that goes when they are through."""
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with self._progress(*columns) as progress:
+        with self._progress(f"{what}: {total} frames", *columns) as progress:
             yield from progress.track(items, total=total, description=what)
 
     @contextmanager
-    def step(self, what: str) -> Iterator[None]:
-        """A spinner around work of unknown length."""
-        with self._progress(SpinnerColumn(), TextColumn(what)) as progress:
-            progress.add_task(what)
-            yield
+    def step(self, what: str) -> Iterator[Callable[[float], object]]:
+        """A spinner around work of unknown length, and a percentage where it tells its share."""
+        with self._progress(what, SpinnerColumn(), TextColumn(what), TaskProgressColumn()) as progress:
+            task = progress.add_task(what, total=None)
+            yield lambda share: progress.update(task, total=1.0, completed=share)
 
-    def _progress(self, *columns: ProgressColumn) -> Progress:
+    def _progress(self, line: str, *columns: ProgressColumn) -> Progress:
+        if not self._console.is_terminal:
+            print(line, file=sys.stderr, flush=True)
         return Progress(*columns, console=self._console, transient=True, disable=not self._console.is_terminal)
