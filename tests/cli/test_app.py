@@ -15,7 +15,6 @@ from vobench import __version__
 from vobench.cli import main
 from vobench.cli.app import app
 from vobench.errors import UnknownNameError
-from vobench.pipeline import passage
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 COMMANDS = [command.name or command.callback.__name__ for command in app.registered_commands]
@@ -146,20 +145,6 @@ def test_version_needs_no_command(vobench):
     assert vobench("--version").out == f"{__version__}\n"
 
 
-def test_ctrl_c_is_one_line_and_exit_code_130_even_where_a_library_swallows_it(vobench, monkeypatch, here):
-    def interrupted(*_, **__):
-        try:
-            signal.raise_signal(signal.SIGINT)
-        except BaseException as error:
-            raise OSError("a library's own words") from error
-
-    monkeypatch.setattr(passage, "travel_of", interrupted)
-    said = vobench("run", "tiny")
-    assert said.code == 130
-    assert said.err == "vobench: stopped; finished stages are kept, the same command goes on from there\n"
-    assert not (here / "runs").exists()
-
-
 def test_a_terminal_that_knows_no_degree_sign_gets_a_table_all_the_same(ran, here):
     script = "import sys; from vobench.cli import main; sys.argv = ['vobench', 'report', 'runs/tiny']; main()"
     environment = os.environ | {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
@@ -168,10 +153,26 @@ def test_a_terminal_that_knows_no_degree_sign_gets_a_table_all_the_same(ran, her
     assert b"RPE ?/frame" in done.stdout
 
 
+@pytest.mark.parametrize("words", [("list", "--json"), ("metrics",), ("report", "runs/tiny")], ids=" ".join)
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_a_reader_that_has_seen_enough_gets_no_traceback(ran, unbuffered):
-    script = "import sys; from vobench.cli import main; sys.argv = ['vobench', 'list', '--json']; main()"
-    pipe = f"'{sys.executable}' -c \"{script}\" | true"
+def test_a_reader_that_has_seen_enough_is_no_failure_and_gets_no_traceback(ran, words, unbuffered):
+    script = f"import sys; from vobench.cli import main; sys.argv = ['vobench', *{words!r}]; main()"
+    pipe = 'set -o pipefail; "$0" -c "$1" | true'
     environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
-    done = subprocess.run(["bash", "-c", pipe], capture_output=True, text=True, check=False, env=environment)
-    assert done.stderr == ""
+    command = ["bash", "-c", pipe, sys.executable, script]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_every_shell_is_told_how_to_complete_and_is_offered_the_commands(vobench, monkeypatch, shell):
+    monkeypatch.setenv("_VOBENCH_COMPLETE", f"source_{shell}")
+    script = vobench().out
+    assert f"complete_{shell}" in script
+    asked = {"COMP_WORDS": "vobench sal", "COMP_CWORD": "1"}
+    asked |= {"_TYPER_COMPLETE_ARGS": "vobench sal", "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
+    for name, value in {**asked, "_VOBENCH_COMPLETE": f"complete_{shell}"}.items():
+        monkeypatch.setenv(name, value)
+    offered = vobench().out
+    assert "salvage" in offered
+    assert "report" not in offered

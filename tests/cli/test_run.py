@@ -1,5 +1,6 @@
 """vobench run, check, report and view on a suite whose pictures are grey."""
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -13,9 +14,20 @@ from vobench.render import raster
 def test_run_ends_in_a_leaderboard_and_says_where_everything_is(vobench, here):
     said = vobench("run", "tiny")
     latest = (Path("runs") / "tiny" / "latest").readlink()
-    assert (said.code, said.err) == (0, "")
+    assert said.code == 0
     assert "wheel_odometry" in said.out
     assert said.out.endswith(f"Everything is in runs/tiny/{latest}\nLook into it: vobench view runs/tiny/{latest}\n")
+
+
+def test_where_nobody_watches_each_stage_is_one_line_and_one_in_the_cache_is_none(vobench, here):
+    stages = re.fullmatch(
+        r"light of closet\nsimulate short: (\d+) frames\nwheel_odometry on short: (\d+) frames\n"
+        r"stand_still on short: (\d+) frames\n",
+        vobench("run", "tiny").err,
+    )
+    assert stages
+    assert len(set(stages.groups())) == 1
+    assert vobench("run", "tiny").err == ""
 
 
 def test_run_takes_the_estimators_that_are_asked_for(vobench, here):
