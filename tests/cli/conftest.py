@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vobench import cli
 from vobench.cli import main
 from vobench.pipeline import engine
 from vobench.render import raster
@@ -68,6 +69,11 @@ def lay_out(folder: Path, patch: pytest.MonkeyPatch) -> None:
     patch.chdir(folder)
     patch.setenv("VOBENCH_CACHE", str(folder / "cache"))
     patch.delenv("VOBENCH_PATH", raising=False)
+    make_cheap(patch)
+
+
+def make_cheap(patch: pytest.MonkeyPatch) -> None:
+    """Pictures and light that cost nothing."""
     patch.setattr(raster, "RasterRenderer", FlatRenderer)
     patch.setattr(engine, "BAKE", BakeSettings(0.5, 1, 0.5, 1, 0))
 
@@ -75,12 +81,14 @@ def lay_out(folder: Path, patch: pytest.MonkeyPatch) -> None:
 def call(words: tuple[object, ...], patch: pytest.MonkeyPatch) -> int:
     """The exit code of a command, run in this process."""
     patch.setattr(sys, "argv", ["vobench", *map(str, words)])
-    listens = signal.getsignal(signal.SIGINT)
+    patch.setattr(cli, "GRACE_S", 3600)  # a slow machine's frame should not end the process of the tests
+    listens = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         with pytest.raises(SystemExit) as ended:
             main()
     finally:
-        signal.signal(signal.SIGINT, listens)
+        for number, listener in listens.items():
+            signal.signal(number, listener)
     return int(ended.value.code or 0)
 
 

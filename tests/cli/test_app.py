@@ -15,12 +15,14 @@ from vobench import __version__
 from vobench.cli import main
 from vobench.cli.app import app
 from vobench.errors import UnknownNameError
-from vobench.pipeline import passage
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 COMMANDS = [command.name or command.callback.__name__ for command in app.registered_commands]
 HEAVY = ("numpy", "cv2", "pandas", "rerun", "scipy", "pydantic", "rich.table", "OpenGL", "trimesh")
-GT, EST = "runs/tiny/latest/cases/short/ground_truth.tum", "runs/tiny/latest/cases/short/stand_still/0/estimate.tum"
+GT, EST = (
+    "runs/tiny/latest/cases/short/ground_truth.tum",
+    "runs/tiny/latest/cases/short/estimates/stand_still/0/estimate.tum",
+)
 
 
 def test_help_imports_no_heavy_library():
@@ -97,10 +99,10 @@ WRONG = [
     (("score", "suites/tiny.yaml", "no.tum"), "suites/tiny.yaml:1: no form of trajectory has 2 columns: TUM has 8 (t x y z qx qy qz qw), KITTI 12, TartanAir 7, EuRoC 8 and commas"),
     (("score", "a", "b", "--align", "sm3"), "no alignment named 'sm3'. Did you mean 'sim3'? Known: none, origin, scale, se3, sim3, yaw"),
     (("score", "a", "b", "--t-max-diff", "nan"), "--t-max-diff should be 0 to 1e+06 seconds, got nan"),
-    (("report", "suites"), "not the folder of a run (no cases/*/*/*/score.json in it): suites"),
+    (("report", "suites"), "not the folder of a run (no cases/*/estimates/*/*/score.json in it): suites"),
     (("report", "suites", "--format", "htm"), "no format named 'htm'. Did you mean 'html'? Known: csv, html, json, latex, md, terminal"),
     (("report", "suites", "--out", "a.xls"), "no format goes with 'a.xls'; name one with --format: md, json, csv, latex, html"),
-    (("view", "suites"), "not the folder of a run (no cases/*/*/*/score.json in it): suites"),
+    (("view", "suites"), "not the folder of a run (no cases/*/estimates/*/*/score.json in it): suites"),
 ]  # fmt: skip
 
 
@@ -143,20 +145,6 @@ def test_version_needs_no_command(vobench):
     assert vobench("--version").out == f"{__version__}\n"
 
 
-def test_ctrl_c_is_one_line_and_exit_code_130_even_where_a_library_swallows_it(vobench, monkeypatch, here):
-    def interrupted(*_, **__):
-        try:
-            signal.raise_signal(signal.SIGINT)
-        except BaseException as error:
-            raise OSError("a library's own words") from error
-
-    monkeypatch.setattr(passage, "travel_of", interrupted)
-    said = vobench("run", "tiny")
-    assert said.code == 130
-    assert said.err == "vobench: stopped; finished stages are kept, the same command goes on from there\n"
-    assert not (here / "runs").exists()
-
-
 def test_a_terminal_that_knows_no_degree_sign_gets_a_table_all_the_same(ran, here):
     script = "import sys; from vobench.cli import main; sys.argv = ['vobench', 'report', 'runs/tiny']; main()"
     environment = os.environ | {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
@@ -165,10 +153,26 @@ def test_a_terminal_that_knows_no_degree_sign_gets_a_table_all_the_same(ran, her
     assert b"RPE ?/frame" in done.stdout
 
 
+@pytest.mark.parametrize("words", [("list", "--json"), ("metrics",), ("report", "runs/tiny")], ids=" ".join)
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_a_reader_that_has_seen_enough_gets_no_traceback(ran, unbuffered):
-    script = "import sys; from vobench.cli import main; sys.argv = ['vobench', 'list', '--json']; main()"
-    pipe = f"'{sys.executable}' -c \"{script}\" | true"
+def test_a_reader_that_has_seen_enough_is_no_failure_and_gets_no_traceback(ran, words, unbuffered):
+    script = f"import sys; from vobench.cli import main; sys.argv = ['vobench', *{words!r}]; main()"
+    pipe = 'set -o pipefail; "$0" -c "$1" | true'
     environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
-    done = subprocess.run(["bash", "-c", pipe], capture_output=True, text=True, check=False, env=environment)
-    assert done.stderr == ""
+    command = ["bash", "-c", pipe, sys.executable, script]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_every_shell_is_told_how_to_complete_and_is_offered_the_commands(vobench, monkeypatch, shell):
+    monkeypatch.setenv("_VOBENCH_COMPLETE", f"source_{shell}")
+    script = vobench().out
+    assert f"complete_{shell}" in script
+    asked = {"COMP_WORDS": "vobench sal", "COMP_CWORD": "1"}
+    asked |= {"_TYPER_COMPLETE_ARGS": "vobench sal", "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
+    for name, value in {**asked, "_VOBENCH_COMPLETE": f"complete_{shell}"}.items():
+        monkeypatch.setenv(name, value)
+    offered = vobench().out
+    assert "salvage" in offered
+    assert "report" not in offered

@@ -31,3 +31,9 @@ def test_where_paths_can_be_traced_doctor_names_the_library(vobench, monkeypatch
     monkeypatch.setattr(doctor.llvm, "working_library", lambda: "/opt/libLLVM.so.99")
     row = path_tracing(vobench("doctor", "--json"))
     assert (row["well"], row["result"]) == (True, "works with /opt/libLLVM.so.99")
+
+
+def test_no_file_of_the_working_folder_is_imported_where_drawing_is_tried(vobench, without_mitsuba, here):
+    (here / "ctypes.py").write_text("raise SystemExit('imported from the working folder')\n")
+    (drawing,) = (c for c in vobench("doctor", "--json").json["checks"] if c["check"].startswith("drawing"))
+    assert "working folder" not in drawing["result"]

@@ -1,6 +1,8 @@
 """vobench run, check, report and view on a suite whose pictures are grey."""
 
+import re
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -12,9 +14,20 @@ from vobench.render import raster
 def test_run_ends_in_a_leaderboard_and_says_where_everything_is(vobench, here):
     said = vobench("run", "tiny")
     latest = (Path("runs") / "tiny" / "latest").readlink()
-    assert (said.code, said.err) == (0, "")
+    assert said.code == 0
     assert "wheel_odometry" in said.out
     assert said.out.endswith(f"Everything is in runs/tiny/{latest}\nLook into it: vobench view runs/tiny/{latest}\n")
+
+
+def test_where_nobody_watches_each_stage_is_one_line_and_one_in_the_cache_is_none(vobench, here):
+    stages = re.fullmatch(
+        r"light of closet\nsimulate short: (\d+) frames\nwheel_odometry on short: (\d+) frames\n"
+        r"stand_still on short: (\d+) frames\n",
+        vobench("run", "tiny").err,
+    )
+    assert stages
+    assert len(set(stages.groups())) == 1
+    assert vobench("run", "tiny").err == ""
 
 
 def test_run_takes_the_estimators_that_are_asked_for(vobench, here):
@@ -80,6 +93,42 @@ def test_a_files_ending_says_its_form(vobench, ran, here, name, begin):
     said = vobench("report", "runs/tiny", "--out", name)
     assert (said.code, said.out) == (0, "")
     assert (here / name).read_text(encoding="utf-8").startswith(begin)
+
+
+@pytest.mark.parametrize("label", ["sequence", "case.json", "ground_truth.tum", "estimates", "0"])
+def test_no_label_reaches_anything_but_its_own_folder(vobench, here, label):
+    suite = here / "suites" / "tiny.yaml"
+    suite.write_text(suite.read_text().replace("[wheel_odometry,", f"[{{name: wheel_odometry, label: {label!r}}},"))
+    assert vobench("run", "tiny").code == 0
+    case = here / "runs" / "tiny" / "latest" / "cases" / "short"
+    assert {path.name for path in case.iterdir()} == {"case.json", "ground_truth.tum", "sequence", "estimates"}
+    assert {path.name for path in (case / "estimates").iterdir()} == {label, "stand_still"}
+    assert {path.name for path in (case / "sequence").iterdir()} == {"inputs.json", "sensors.mcap", "truth.mcap"}
+    assert vobench("verify", "runs/tiny").code == 0
+    assert vobench("view", "runs/tiny", "--estimator", label, "--save", "a.rrd").code == 0
+
+
+@pytest.mark.parametrize("label", ["..", ".", "a/b", "/tmp/x", "", "../sequence", ".hidden"])
+def test_a_label_that_is_no_plain_name_is_refused(vobench, here, label):
+    suite = here / "suites" / "tiny.yaml"
+    suite.write_text(suite.read_text().replace("[wheel_odometry,", f"[{{name: wheel_odometry, label: {label!r}}},"))
+    said = vobench("run", "tiny")
+    assert said.code == 1
+    assert f"letter or digit first (got {label!r})" in said.err
+    assert not (here / "runs").exists()
+
+
+def test_view_runs_no_file_of_the_working_folder(vobench, ran, here, monkeypatch):
+    (here / "rerun.py").write_text("open('executed', 'w')\n")
+    started = []
+    monkeypatch.setenv("DISPLAY", ":0")
+    with monkeypatch.context() as patch:
+        patch.setattr(subprocess, "Popen", lambda command, **_: started.append(command))
+        assert vobench("view", "runs/tiny").code == 0
+    (command,) = started
+    assert command[-1].endswith("run.rrd")
+    assert "Rerun" in subprocess.check_output([*command[:-1], "--help"], text=True)
+    assert not (here / "executed").exists()
 
 
 def test_view_of_a_run_without_a_single_pose_works_too(vobench, here):

@@ -106,7 +106,7 @@ def test_a_run_verifies_and_a_changed_one_does_not(vobench, ran):
     said = vobench("verify", "runs/tiny")
     assert said.code == 0
     assert "score: 2 of 2 as they were" in said.out
-    estimate = ran / "latest" / "cases" / "short" / "stand_still" / "0" / "estimate.tum"
+    estimate = ran / "latest" / "cases" / "short" / "estimates" / "stand_still" / "0" / "estimate.tum"
     estimate.write_text(estimate.read_text().replace("0.000000000 0.0 ", "0.000000000 0.1 ", 1))
     said = vobench("verify", "runs/tiny")
     assert said.code == 1

@@ -48,3 +48,11 @@ def test_a_wide_terminal_shows_every_column(monkeypatch):
 
 def test_the_columns_that_may_go_exist():
     assert set(boards.LEAST_FIRST) < set(boards.HEADINGS)
+
+
+def test_work_that_tells_its_share_shows_it_in_percent(monkeypatch):
+    file, bars = io.StringIO(), terminal.Bars()
+    monkeypatch.setattr(bars, "_console", Console(file=file, force_terminal=True, width=80))
+    with bars.step("light of office") as tell:
+        tell(0.42)
+    assert " 42%" in file.getvalue()

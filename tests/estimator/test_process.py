@@ -166,6 +166,13 @@ def test_it_sees_its_parameters_and_neither_our_files_nor_our_variables(tmp_path
     assert said.rstrip().endswith("[]")
 
 
+def test_it_imports_nothing_from_the_folder_that_it_starts_in(tmp_path):
+    start = "open('wave.py', 'w').write('at_home = True')\n        import wave; print(wave.__file__, flush=True)"
+    with running(tmp_path, "return Result(I)", start=start) as process:
+        process.process(frame())
+    assert Path((tmp_path / "log.txt").read_text().strip()).parent == Path(os.__file__).parent
+
+
 def test_what_it_does_to_a_picture_stays_with_it(tmp_path):
     picture = np.zeros((480, 720), np.uint8)
     with running(tmp_path, "frame.left[:] = 9; return Result(I, stats={'max': frame.left.max()})") as process:

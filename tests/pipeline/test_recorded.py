@@ -169,9 +169,9 @@ def changed(first, tmp_path):
 
 
 def test_a_changed_score_is_found(changed):
-    run = changed(f"cases/full/stand_still/0/{SCORE}", '"rmse": 0.', '"rmse": 1.')
+    run = changed(f"cases/full/estimates/stand_still/0/{SCORE}", '"rmse": 0.', '"rmse": 1.')
     assert wrong(run) == [
-        ("hash", f"cases/full/stand_still/0/{SCORE}"),
+        ("hash", f"cases/full/estimates/stand_still/0/{SCORE}"),
         ("score", "stand_still on full, 0"),
     ]
     (said,) = (finding.wrong for finding in verify_run(run) if finding.wrong and finding.kind == "score")
@@ -179,16 +179,16 @@ def test_a_changed_score_is_found(changed):
 
 
 def test_a_changed_estimate_is_found_by_its_hash_and_by_its_score(changed):
-    run = changed("cases/full/wheel_odometry/0/estimate.tum", "0.000000000 0.0 ", "0.000000000 0.1 ")
+    run = changed("cases/full/estimates/wheel_odometry/0/estimate.tum", "0.000000000 0.0 ", "0.000000000 0.1 ")
     assert wrong(run) == [
-        ("hash", "cases/full/wheel_odometry/0/estimate.tum"),
+        ("hash", "cases/full/estimates/wheel_odometry/0/estimate.tum"),
         ("score", "wheel_odometry on full, 0"),
     ]
 
 
 def test_a_score_that_cannot_be_read_and_one_that_was_added_are_found_beside_all_else(changed):
-    run = changed(f"cases/full/stand_still/0/{SCORE}", "{", "{{")
-    (run.case("full") / "mine").symlink_to("wheel_odometry")
+    run = changed(f"cases/full/estimates/stand_still/0/{SCORE}", "{", "{{")
+    (run.case("full") / "estimates" / "mine").symlink_to("wheel_odometry")
     sentences = {
         finding.what: finding.wrong for finding in verify_run(run) if finding.wrong and finding.kind == "score"
     }

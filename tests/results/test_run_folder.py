@@ -80,6 +80,22 @@ def test_a_folder_that_is_no_run_is_refused_in_one_line(tmp_path):
         open_run(tmp_path).scores()
 
 
+def test_a_run_whose_estimates_lie_beside_the_sequence_is_an_older_one(tmp_path):
+    old = tmp_path / "cases" / "c" / "e" / "0"
+    old.mkdir(parents=True)
+    write_json(old / SCORE, score().model_dump(mode="json"))
+    with pytest.raises(InputError, match=r"^a run of an older vobench, .*; run the suite again: "):
+        RunFolder(tmp_path).scores()
+
+
+def test_a_score_that_names_another_place_than_its_own_is_refused(tmp_path):
+    made = make_run(tmp_path, "suite", "key", fill_with(score()))
+    file = made.estimate("c", "e", 0) / SCORE
+    write_json(file, score(estimator="../../..").model_dump(mode="json"))
+    with pytest.raises(InputError, match=r"^should be the score of the folder it lies in, but is of '\.\./"):
+        made.scores()
+
+
 def test_a_statistic_that_was_not_computed_is_none_and_not_zero():
     metrics = {"metrics": [{"name": "ate_trans", "rmse": 0.5}]}
     assert score(score=metrics).value("ate_trans", "rmse") == 0.5

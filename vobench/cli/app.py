@@ -2,13 +2,13 @@
 
 import json as json_module
 import os
-import signal
 import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from vobench import stop
 from vobench.cli import score_command, sequence_command
 from vobench.cli.score_command import Json
 from vobench.errors import VobenchError
@@ -17,7 +17,6 @@ app = typer.Typer(
     name="vobench",
     help="Simulate, run and score visual odometry, and see where it breaks.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -27,28 +26,20 @@ SuiteName = Annotated[str, typer.Argument(metavar="SUITE", help="A suite's name,
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or runs/<suite> for its latest.")]
 
 
-class Stopped(BaseException):
-    """Ctrl-C; not a KeyboardInterrupt, which some libraries take for a failed import of theirs."""
-
-
 def run() -> None:
-    """Run a command; a user's mistake or machine is one line and exit code 1, a stop by Ctrl-C is 130."""
-    stops: list[int] = []
-
-    def stop(number: int, _: object) -> None:
-        stops.append(number)
-        raise Stopped
-
-    signal.signal(signal.SIGINT, stop)
+    """Run a command; a user's mistake or machine is one line and exit code 1."""
     for stream in filter(None, (sys.stdout, sys.stderr)):
         stream.reconfigure(errors="replace")  # a terminal without ° gets a ? for it
     try:
         # Nobody remembers whether --debug goes before the command or after it.
         app([word for word in sys.argv[1:] if word != DEBUG])
-    except (VobenchError, OSError, Stopped) as error:
-        if stops:
-            _fail("stopped; finished stages are kept, the same command goes on from there", error, code=130)
-        _fail(_sentence(error), error, code=1)
+    except SystemExit as end:
+        if not isinstance(end.__context__, BrokenPipeError):
+            raise
+        _hang_up()  # a reader that has seen enough is no failure
+    except (VobenchError, OSError) as error:
+        stop.check()  # then it may come of that
+        _fail(_sentence(error), error)
     finally:
         _flush()
 
@@ -58,7 +49,12 @@ def _flush() -> None:
     try:
         sys.stdout.flush()
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _hang_up()
+
+
+def _hang_up() -> None:
+    """Let what is still to be printed go nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _sentence(error: BaseException) -> str:
@@ -68,13 +64,13 @@ def _sentence(error: BaseException) -> str:
     return " ".join(str(error).split())
 
 
-def _fail(sentence: str, error: BaseException, *, code: int) -> None:
+def _fail(sentence: str, error: BaseException) -> None:
     if DEBUG in sys.argv:
         raise error
     if "--json" in sys.argv:
         print(json_module.dumps({"error": sentence}, ensure_ascii=False))
     print(f"vobench: {sentence}", file=sys.stderr)
-    raise SystemExit(code) from None
+    raise SystemExit(1) from None
 
 
 def _print_version(asked: bool) -> None:

@@ -8,6 +8,7 @@ import sys
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 
+from vobench import stop
 from vobench.cli import terminal
 from vobench.errors import MissingDependencyError
 from vobench.render import llvm
@@ -76,7 +77,7 @@ def _libraries() -> Check:
 
 def _drawing() -> Check:
     """Whether a picture can be drawn, tried in a process of its own: a broken driver may kill it."""
-    tried = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, check=False)
+    tried = stop.run([sys.executable, "-P", "-c", PROBE])
     if tried.returncode == 0:
         return Check("drawing without a display (EGL)", True, "works")
     last = tried.stderr.strip().splitlines()[-1:] or [f"the probe died with {tried.returncode}"]

@@ -1,7 +1,8 @@
 """What people see: tables on standard output, progress on standard error."""
 
 import json as json_module
-from collections.abc import Iterable, Iterator, Sequence
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -44,7 +45,7 @@ def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) ->
 
 
 class Bars:
-    """Progress as bars on standard error; nothing where that is no terminal."""
+    """Progress on standard error: bars, or one line for each stage where that is no terminal."""
 
     def __init__(self) -> None:
         from rich.console import Console
@@ -56,19 +57,21 @@ class Bars:
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with self._progress(*columns) as progress:
+        with self._progress(f"{what}: {total} frames", *columns) as progress:
             yield from progress.track(items, total=total, description=what)
 
     @contextmanager
-    def step(self, what: str) -> Iterator[None]:
-        """A spinner around work of unknown length."""
-        from rich.progress import SpinnerColumn, TextColumn
+    def step(self, what: str) -> Iterator[Callable[[float], object]]:
+        """A spinner around work of unknown length, and a percentage where it tells its share."""
+        from rich.progress import SpinnerColumn, TaskProgressColumn, TextColumn
 
-        with self._progress(SpinnerColumn(), TextColumn(what)) as progress:
-            progress.add_task(what)
-            yield
+        with self._progress(what, SpinnerColumn(), TextColumn(what), TaskProgressColumn()) as progress:
+            task = progress.add_task(what, total=None)
+            yield lambda share: progress.update(task, total=1.0, completed=share)
 
-    def _progress(self, *columns: "ProgressColumn") -> "Progress":
+    def _progress(self, line: str, *columns: "ProgressColumn") -> "Progress":
         from rich.progress import Progress
 
+        if not self._console.is_terminal:
+            print(line, file=sys.stderr, flush=True)
         return Progress(*columns, console=self._console, transient=True, disable=not self._console.is_terminal)

@@ -36,4 +36,5 @@ def _open(path: Path) -> None:
 
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise MissingDependencyError(f"no display to open the viewer on; on a machine that has one, run: rerun {path}")
-    subprocess.Popen([sys.executable, "-m", "rerun", str(path)], start_new_session=True)
+    # Without -P, a rerun.py in the working folder would be run in its place.
+    subprocess.Popen([sys.executable, "-P", "-m", "rerun", str(path)], start_new_session=True)

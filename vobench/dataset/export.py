@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 
 import numpy as np
 
+from vobench import stop
 from vobench.dataset import kalibr
 from vobench.dataset.export_euroc import write_euroc
 from vobench.dataset.export_kitti import covered, kitti_path, write_kitti
@@ -106,8 +107,9 @@ def _building(out: Path) -> Iterator[Path]:
     """
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.", suffix=".part") as part:
-            folder = Path(part) / out.name
+        part = Path(mkdtemp(dir=out.parent, prefix=f".{out.name}.", suffix=".part"))
+        with stop.undone(lambda: stop.remove(part)):
+            folder = part / out.name
             folder.mkdir()
             yield folder
             if out.exists():

@@ -7,13 +7,14 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from multiprocessing import Pipe
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from vobench import stop
 from vobench.estimator.protocol import Frame, Result
 from vobench.geometry.rig import Rig
 
@@ -63,13 +64,13 @@ class EstimatorProcess:
     def __init__(self, folder: Path, class_path: str, *, name: str, log: Path, limits: Limits) -> None:
         self._limits = limits
         self._connection, child = Pipe()
-        self._home = tempfile.TemporaryDirectory(prefix="vobench-estimator-")
+        self._home = Path(tempfile.mkdtemp(prefix="vobench-estimator-"))
         fd, memory = str(child.fileno()), str(limits.memory_bytes)
         self._log_path, self._log = log, log.open("wb")
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "vobench.estimator.worker", fd, str(folder), class_path, name, memory],
+            [sys.executable, "-P", "-m", "vobench.estimator.worker", fd, str(folder), class_path, name, memory],
             pass_fds=[child.fileno()],
-            cwd=self._home.name,
+            cwd=self._home,
             env={k: v for k, v in os.environ.items() if k in KEPT_ENVIRONMENT} | ONE_THREAD,
             stdin=subprocess.DEVNULL,
             stdout=self._log,
@@ -77,6 +78,10 @@ class EstimatorProcess:
             start_new_session=True,
         )
         child.close()
+        with ExitStack() as undone:
+            undone.enter_context(stop.undone(lambda: stop.remove(self._home)))
+            undone.enter_context(stop.undone(lambda: stop.kill_session(self._process), is_awaited=True))
+            self._undone = undone.pop_all()
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
         """Hand over the calibration and the parameters."""
@@ -88,6 +93,14 @@ class EstimatorProcess:
         return Answer(result, wall_ms, cpu_ms)
 
     def _ask(self, message: Any, timeout_s: float) -> tuple[Any, ...]:
+        stop.check()
+        try:
+            return self._answer(message, timeout_s)
+        except EstimatorFailure:
+            stop.check()  # which kills the process that we are waiting for
+            raise
+
+    def _answer(self, message: Any, timeout_s: float) -> tuple[Any, ...]:
         try:
             self._connection.send(message)
             answered = self._connection.poll(timeout_s)
@@ -122,12 +135,11 @@ class EstimatorProcess:
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=0.5 if kind is None else 0)
         # The whole session goes: an estimator may have started processes of its own.
-        with suppress(ProcessLookupError):
-            os.killpg(self._process.pid, signal.SIGKILL)
+        stop.kill_session(self._process)
         self._process.wait()
         self._log.close()
         _cut(self._log_path)
-        self._home.cleanup()
+        self._undone.close()
 
 
 def _cut(log: Path) -> None:

@@ -1,6 +1,6 @@
 """The process that an estimator lives in: it is handed frames, and knows of nothing else.
 
-Started by `EstimatorProcess` as `python -m vobench.estimator.worker FD FOLDER CLASS NAME MEMORY`.
+Started by `EstimatorProcess` as `python -P -m vobench.estimator.worker FD FOLDER CLASS NAME MEMORY`.
 Messages on the connection: ("start", rig, params, seed) or a Frame in; ("ready",), ("result", Result,
 wall ms, CPU ms) or ("failed", kind, reason) out.
 """

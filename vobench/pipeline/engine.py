@@ -50,7 +50,7 @@ def _baked(spec: SceneFile, scene: Scene, shop: Workshop) -> BakedScene:
     }
 
     def build(folder: Path) -> None:
-        with shop.progress.step(f"light of {scene.name}"):
-            save_baked(folder, bake(scene, BAKE))
+        with shop.progress.step(f"light of {scene.name}") as tell:
+            save_baked(folder, bake(scene, BAKE, tell))
 
     return load_baked(shop.store.get("bakes", inputs, build), scene)

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from vobench import stop
 from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
@@ -19,6 +20,7 @@ def travel_all(plan: Plan) -> dict[str, Travel]:
     """
     travels: dict[str, Travel] = {}
     for case in plan.simulated:
+        stop.check()
         name = case.variant["trajectory"]
         with plan.at("trajectories", name):
             if name not in travels:

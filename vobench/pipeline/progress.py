@@ -1,6 +1,6 @@
 """How long work tells that it goes on; silent unless somebody listens."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol, TypeVar
 
@@ -13,8 +13,8 @@ class Progress(Protocol):
     def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
         """The same items; `total` of them are expected."""
 
-    def step(self, what: str) -> AbstractContextManager[None]:
-        """Work of unknown length."""
+    def step(self, what: str) -> AbstractContextManager[Callable[[float], object]]:
+        """Work of unknown length, which may tell what share of it is done."""
 
 
 class Silent:
@@ -25,7 +25,7 @@ class Silent:
         del what, total
         return iter(items)
 
-    def step(self, what: str) -> AbstractContextManager[None]:
+    def step(self, what: str) -> AbstractContextManager[Callable[[float], object]]:
         """Nothing around the work."""
         del what
-        return nullcontext()
+        return nullcontext(lambda _: None)

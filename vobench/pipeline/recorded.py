@@ -4,6 +4,7 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
+from vobench import stop
 from vobench.dataset.options import Options, Topics
 from vobench.dataset.recording import NO_TRUTH, Recording
 from vobench.errors import SuiteError
@@ -23,6 +24,7 @@ def read_all(plan: Plan) -> dict[str, Recording]:
     """
     recordings = {}
     for case in plan.recorded:
+        stop.check()
         with plan.at("source", case.entry):
             recordings[case.name] = recording = read_case(case)
             if cause := _why_not_scored(recording):

@@ -7,7 +7,7 @@ from pathlib import Path
 from shutil import copyfile
 from typing import Any
 
-from vobench import __version__
+from vobench import __version__, stop
 from vobench.pipeline.estimate import estimate
 from vobench.pipeline.recorded import import_case
 from vobench.pipeline.score import score_run
@@ -73,6 +73,7 @@ def _run_case(plan: Plan, case: Case | RecordedCase, folder: RunFolder, shop: Wo
     scores = []
     for run in plan.runs(case):
         estimated = estimate(run, sequence, shop)
+        stop.check()
         scores.append(score_run(run, estimated, gt))
         _keep(estimated, scores[-1], folder.estimate(case.name, run.entrant.label, run.repeat))
     return scores

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from vobench import stop
 from vobench.errors import VobenchError
 from vobench.pipeline.score import score_estimate
 from vobench.pipeline.truth_path import left_truth
@@ -28,12 +29,14 @@ def verify_run(folder: RunFolder) -> Iterator[Finding]:
     """Recompute all hashes and scores of a run from its files. Raises InputError where the folder is no run."""
     files, hashes = folder.score_files(), read_hashes(folder)
     for name, held in hashes.items():
+        stop.check()
         yield Finding("hash", name, _changed(folder.path / name, held))
-    for case in sorted({file.parents[2].name for file in files}):
+    for case in sorted({file.parents[3].name for file in files}):
         yield Finding("ground truth", case, _truth_differs(folder.case(case)))
     for file in files:
+        stop.check()
         place = file.relative_to(folder.path)
-        _, case, estimator, repeat, _ = place.parts
+        _, case, _, estimator, repeat, _ = place.parts
         wrong = _rescored(file) if str(place) in hashes else "not of this run, whose hashes do not name it"
         yield Finding("score", f"{estimator} on {case}, {repeat}", wrong)
 
@@ -61,7 +64,7 @@ def _rescored(file: Path) -> str:
     """A run's score, computed anew and compared digit by digit."""
     try:
         held = read_score(file)
-        gt = estimate_file.read_tum(file.parents[2] / GROUND_TRUTH)
+        gt = estimate_file.read_tum(file.parents[3] / GROUND_TRUTH)
         scored = score_estimate(file.parent, gt)
     except (VobenchError, OSError) as error:
         return str(error)

@@ -1,5 +1,6 @@
 """Light computed once: what each light alone gives every surface, soft shadows, mirrors and bounces included."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -7,6 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from vobench import stop
 from vobench.geometry.se3 import Array
 from vobench.render.direct import SKY_SMOOTHING, direct_light, in_front, sees_open_sky
 from vobench.render.geometry import Floats, Inventory, inventory
@@ -21,8 +23,11 @@ from vobench.scene.material import Polished, texture_of, under_coat
 from vobench.scene.scene import Scene
 from vobench.scene.texture import Map, reflectance
 
+Tell = Callable[[float], object]
 MOVER_COARSER = 2
 SUNLIT_FINER = 2  # the half shadow of the sun is 1 cm wide for each metre to what casts it
+# What work costs in rays sent straight to a light: a gathered ray meets surfaces, a pixel of a tile is drawn.
+GATHERED_RAY, TILE_PIXEL = 2.0, 0.4
 SUN_STEP_RAD = np.deg2rad(3)  # between the suns whose indirect light is baked
 
 
@@ -98,20 +103,43 @@ def stage(scene: Scene, where: Layout, *, seed: int) -> Stage:
     return Stage(things, static, sight, where, points, holes(where, points.index))
 
 
-def bake(scene: Scene, settings: BakeSettings) -> BakedScene:
-    """Make the textures and compute the light of a scene; the same bytes for the same arguments."""
-    albedo = tiles(scene)
+class _Work:
+    """How much of the work of a bake is done, in rays, and whom to tell."""
+
+    def __init__(self, scene: Scene, coarse: Stage, where: Layout, settings: BakeSettings, tell: Tell) -> None:
+        self._done, self._tell = 0.0, tell
+        self.tile = TILE_PIXEL
+        self.gathered = GATHERED_RAY * settings.indirect_rays
+        self.lit = float(settings.light_rays * sum(patch.rows * patch.columns for patch in where.patches))
+        pixels = sum(texture.resolution_px**2 for texture in map(texture_of, scene.materials.values()) if texture)
+        shone = sum(len(_shining(scene.lights[i], coarse, t_ns=t_ns)) for i, t_ns in _instants(scene))
+        self._all = self.tile * pixels + self.gathered * len(coarse.points) + self.lit * shone
+
+    def did(self, rays: float) -> None:
+        """Look whether to stop, and tell of the share that is done now."""
+        stop.check()
+        self._done += rays
+        self._tell(min(self._done / self._all, 1.0))
+
+
+def bake(scene: Scene, settings: BakeSettings, tell: Tell = lambda _: None) -> BakedScene:
+    """Make the textures and compute the light of a scene; the same bytes for the same arguments.
+
+    `tell` hears now and then which share of the work is done, about.
+    """
     coarse = stage(scene, placed(scene, spacing_m=settings.indirect_spacing_m), seed=settings.seed)
     where = placed(scene, spacing_m=settings.spacing_m, sunlit=_sunlit(scene, coarse, settings))
+    work = _Work(scene, coarse, where, settings, tell)
+    albedo = tiles(scene, done=lambda pixels: work.did(work.tile * pixels))
     fine = stage(scene, where, seed=settings.seed)
     scales = Scales(fine.where, coarse.where)
-    gathered = _gathered(scene, coarse, albedo, settings)
-    instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
+    gathered = _gathered(scene, coarse, albedo, settings, done=lambda points: work.did(work.gathered * points))
+    instants = _instants(scene)
     light = np.zeros((len(scene.lights), fine.where.height, fine.where.width), np.float32)
     straight = np.zeros((len(instants), coarse.where.height, coarse.where.width), np.float32)
     # Backwards, so that a moving sun's layer ends as that of its first instant.
     for row, (index, t_ns) in reversed(list(enumerate(instants))):
-        light[index] = direct_layer(scene, index, fine, settings, t_ns=t_ns)
+        light[index] = direct_layer(scene, index, fine, settings, t_ns=t_ns, done=lambda: work.did(work.lit))
         straight[row] = scales.coarsened(light[index, None])[0]
     own_sky = _own_sky(scene, instants)
     around = bounced(straight, gathered, own_sky, coarse.holes, bounces=settings.bounces)
@@ -120,8 +148,13 @@ def bake(scene: Scene, settings: BakeSettings) -> BakedScene:
     return BakedScene(scene, fine.where, light, albedo, settings, _tracks(scene, instants, around))
 
 
-def tiles(scene: Scene) -> dict[str, Map]:
-    """Every body's tile: reflectance, or what a coat makes of it."""
+def _instants(scene: Scene) -> list[tuple[int, float]]:
+    """Every light, by its index, at every time in ns that it is baked for."""
+    return [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
+
+
+def tiles(scene: Scene, done: Callable[[int], object]) -> dict[str, Map]:
+    """Every body's tile: reflectance, or what a coat makes of it; `done` is told of how many pixels."""
     made: dict[str, Map] = {}
     for name, material in sorted(scene.materials.items()):
         texture = texture_of(material)
@@ -130,13 +163,17 @@ def tiles(scene: Scene) -> dict[str, Map]:
             if isinstance(material, Polished):
                 tile = under_coat(tile.astype(float), material.eta).astype(np.float32)
             made[name] = tile
+            done(tile.size)
     return made
 
 
-def _gathered(scene: Scene, coarse: Stage, albedo: dict[str, Map], settings: BakeSettings) -> Gathering:
+def _gathered(
+    scene: Scene, coarse: Stage, albedo: dict[str, Map], settings: BakeSettings, *, done: Callable[[int], object]
+) -> Gathering:
     answer = answers(coarse.things.surfaces, scene.materials, albedo, coarse.things.panel)
     skies = [light for light in scene.lights if isinstance(light, Sky)]
-    return gathering(coarse.points, coarse.where, coarse.sight, answer, skies, rays=settings.indirect_rays)
+    rays = settings.indirect_rays
+    return gathering(coarse.points, coarse.where, coarse.sight, answer, skies, rays=rays, done=done)
 
 
 def _sunlit(scene: Scene, coarse: Stage, settings: BakeSettings) -> NDArray[np.bool_]:
@@ -182,13 +219,22 @@ def wandered_rad(sun: Sun) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.hypot(across, np.diff(np.deg2rad(sun.elevation_deg))))])
 
 
-def direct_layer(scene: Scene, index: int, fine: Stage, settings: BakeSettings, *, t_ns: float) -> Floats:
-    """What one light gives straight (H, W), its panel's glow included."""
+def direct_layer(
+    scene: Scene,
+    index: int,
+    fine: Stage,
+    settings: BakeSettings,
+    *,
+    t_ns: float,
+    done: Callable[[], object] = lambda: None,
+) -> Floats:
+    """What one light gives straight (H, W), its panel's glow included; `done` is told of each source that it has."""
     light, total = scene.lights[index], np.zeros(len(fine.points), np.float32)
-    for source in [*sources(light, fine.sight, t_ns=t_ns), *images(light, fine.sight, t_ns=t_ns)]:
+    for source in _shining(light, fine, t_ns=t_ns):
         some = np.flatnonzero(reached(source, fine))
         side = round(np.sqrt(settings.light_rays))
         total[some] += direct_light(source, fine.points.take(some), fine.where, fine.sight, side=side)
+        done()
     layer = fine.holes.filled(total).reshape(fine.where.height, fine.where.width)
     if isinstance(light, Sky):
         return _smoothed(layer, fine.where)
@@ -196,6 +242,11 @@ def direct_layer(scene: Scene, index: int, fine: Stage, settings: BakeSettings, 
         panel = int(np.flatnonzero(fine.things.panel == scene.panels.index(light))[0])
         layer[fine.where.patches[panel].window] = np.pi * light.luminance_cd_m2
     return layer
+
+
+def _shining(light: Light, on: Stage, *, t_ns: float) -> list[Source]:
+    """What of a light shines on a scene: itself, its panes, its images in mirrors."""
+    return [*sources(light, on.sight, t_ns=t_ns), *images(light, on.sight, t_ns=t_ns)]
 
 
 def reached(source: Source, fine: Stage) -> NDArray[np.bool_]:

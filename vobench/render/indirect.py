@@ -4,7 +4,7 @@ Illuminance gathered by cosine-weighted rays on a coarse map and iterated over b
 Monte Carlo form factors (Cohen and Wallace, Radiosity and Realistic Image Synthesis, 1993).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
@@ -83,15 +83,22 @@ class Gathering:
 
 
 def gathering(
-    points: Texels, where: Layout, sight: Sight, answer: Answer, skies: Sequence[Sky], *, rays: int
+    points: Texels,
+    where: Layout,
+    sight: Sight,
+    answer: Answer,
+    skies: Sequence[Sky],
+    *,
+    rays: int,
+    done: Callable[[int], object] | None = None,
 ) -> Gathering:
-    """Send `rays` rays from every point and note where in the map they end."""
+    """Send `rays` rays from every point and note where in the map they end; `done` is told of how many points."""
     side = round(np.sqrt(rays))
     if not side or not len(points):
         nothing = scipy.sparse.csr_matrix((len(points), where.height * where.width), dtype=np.float32)
         return Gathering(nothing, np.zeros((len(skies), len(points)), np.float32))
     seeker = _Seeker(where, sight, answer, skies)
-    parts = in_chunks(lambda part: seeker.seek(points.take(part), side), len(points), chunk=ROWS)
+    parts = in_chunks(lambda part: seeker.seek(points.take(part), side), len(points), chunk=ROWS, done=done)
     tables, sky = zip(*parts, strict=True)
     return Gathering(scipy.sparse.vstack(tables, "csr"), np.concatenate(sky, 1))
 

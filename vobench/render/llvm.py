@@ -11,6 +11,7 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
+from vobench import stop
 from vobench.errors import MissingDependencyError
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
@@ -81,13 +82,12 @@ def major(library: Path) -> int:
 
 def failure(library: Path) -> str:
     """Why Mitsuba does not render with this library, "" if it does: tried in a process with an empty kernel cache."""
-    with tempfile.TemporaryDirectory() as home:
+    home = tempfile.mkdtemp(prefix="vobench-llvm-")
+    with stop.undone(lambda: stop.remove(Path(home))):
         environment = os.environ | {VARIABLE: str(library), "HOME": home}
-        command = [sys.executable, "-c", PROBE]
+        command = [sys.executable, "-P", "-c", PROBE]
         try:
-            done = subprocess.run(
-                command, env=environment, capture_output=True, text=True, check=False, timeout=PROBE_TIMEOUT_S
-            )
+            done = stop.run(command, env=environment, timeout_s=PROBE_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             return f"no picture after {PROBE_TIMEOUT_S} s"
     if done.returncode < 0:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vobench import stop
 from vobench.errors import RenderError
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
@@ -70,6 +71,7 @@ class PathRenderer:
         rays = self._corner_rays(camera)
         total = np.zeros((len(batch.rows), camera.width_px), np.float32)
         for seed, count in zip(_seeds(self._seed, batch, len(counts)), counts, strict=True):
+            stop.check()
             total += self._mitsuba.trace(rays, batch.rows, batch.T_world_camera, count, seed)
         return total / np.float32(samples)
 

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from vobench import stop
 from vobench.render.geometry import RAY_OFFSET_M, Floats, Indices
 from vobench.render.lightmap import Layout
 from vobench.render.sight import Sight
@@ -143,8 +144,20 @@ def tangents(normals: Floats) -> tuple[Floats, Floats]:
     return u, np.cross(normals, u)
 
 
-def in_chunks(work: Callable[[slice], T], count: int, *, chunk: int = CHUNK) -> list[T]:
-    """What `work` gives for each slice of `count` things, in their order, on all cores."""
+def in_chunks(
+    work: Callable[[slice], T], count: int, *, chunk: int = CHUNK, done: Callable[[int], object] | None = None
+) -> list[T]:
+    """What `work` gives for each slice of `count` things, in their order, on all cores; `done` is told how many."""
     slices = [slice(start, min(start + chunk, count)) for start in range(0, count, chunk)]
+
+    def looked(part: slice) -> T:
+        stop.check()
+        return work(part)
+
+    results = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(work, slices))
+        for part, result in zip(slices, pool.map(looked, slices), strict=True):
+            results.append(result)
+            if done:
+                done(part.stop - part.start)
+    return results

@@ -1,5 +1,6 @@
 """The reports that lie in a run's folder."""
 
+from vobench import stop
 from vobench.report import page, table
 from vobench.report.leaderboard import Answers, Board, answers, boards
 from vobench.results import estimate_file
@@ -17,6 +18,7 @@ def write_reports(folder: RunFolder, scores: list[RunScore]) -> None:
     """Put leaderboard.md, .json, .csv and .html into a run's folder."""
     made = boards_of(folder, scores)
     for suffix in ("md", "json", "csv"):
+        stop.check()
         (folder.path / f"{STEM}.{suffix}").write_text(table.FORMATS[suffix](made), encoding="utf-8")
     (folder.path / f"{STEM}.html").write_text(page.html(folder, scores, made), encoding="utf-8")
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from vobench import stop
 from vobench.geometry.se3 import Array
 from vobench.report import table
 from vobench.report.leaderboard import Board
@@ -60,6 +61,7 @@ def html(folder: RunFolder, scores: list[RunScore], boards: list[Board]) -> str:
 
 
 def _plot(folder: RunFolder, case: str, scores: list[RunScore], colours: dict[str, str]) -> Plot:
+    stop.check()
     truth = estimate_file.read_tum(folder.case(case) / GROUND_TRUTH).positions_m[:, :2]
     low, span = truth.min(0), max(float(np.ptp(truth, axis=0).max()), 1e-3)
     px_per_m = (PLOT_PX - 2 * MARGIN_PX) / span

@@ -7,7 +7,9 @@ runs/<suite>/<UTC stamp>_<short hash>/
     leaderboard.*     md, html, csv, json
     hashes.json       SHA-256 of every file, for vobench verify
     cases/<case>/     case.json, ground_truth.tum, sequence -> cache
-    cases/<case>/<estimator>/<repeat>/   estimate.tum, frames.csv, tracks.zip, score.json, log.txt
+    cases/<case>/estimates/<estimator>/<repeat>/   estimate.tum, frames.csv, tracks.zip, score.json, log.txt
+
+Estimators have a folder of their own in a case, so that no label of theirs is the name of something else there.
 """
 
 import json
@@ -25,6 +27,7 @@ from vobench.errors import InputError
 from vobench.results.unfinished import unfinished
 
 GROUND_TRUTH, CASE, SCORE, SEQUENCE = "ground_truth.tum", "case.json", "score.json", "sequence"
+ESTIMATES = "estimates"
 ENVIRONMENT, SUITE, ESTIMATORS = "environment.json", "suite.json", "estimators.json"
 
 RunStatus = Literal[
@@ -86,19 +89,33 @@ class RunFolder:
 
     def estimate(self, case: str, estimator: str, repeat: int) -> Path:
         """The folder of an estimator's run on a case."""
-        return self.case(case) / estimator / str(repeat)
+        return self.case(case) / ESTIMATES / estimator / str(repeat)
 
     def score_files(self) -> list[Path]:
         """Where every run's score lies, in order of folders. Raises InputError where the folder is none of ours."""
-        files = sorted((self.path / "cases").glob(f"*/*/*/{SCORE}"))
-        if not files:
-            what = f"not the folder of a run (no cases/*/*/*/{SCORE} in it)" if self.path.is_dir() else "no such folder"
-            raise InputError(f"{what}: {self.path}")
-        return files
+        cases = self.path / "cases"
+        files = sorted(cases.glob(f"*/{ESTIMATES}/*/*/{SCORE}"))
+        if files:
+            return files
+        if not self.path.is_dir():
+            raise InputError(f"no such folder: {self.path}")
+        if any(cases.glob(f"*/*/*/{SCORE}")):
+            raise InputError(
+                f"a run of an older vobench, whose estimates do not lie in cases/*/{ESTIMATES}; "
+                f"run the suite again: {self.path}"
+            )
+        raise InputError(f"not the folder of a run (no cases/*/{ESTIMATES}/*/*/{SCORE} in it): {self.path}")
 
     def scores(self) -> list[RunScore]:
         """Every run's score, in order of folders. Raises InputError where the folder or a score is none of ours."""
-        return [read_score(file) for file in self.score_files()]
+        scores = []
+        for file in self.score_files():
+            score = read_score(file)
+            if self.estimate(score.case, score.estimator, score.repeat) / SCORE != file:
+                told = f"{score.estimator!r} on {score.case!r}, {score.repeat}"
+                raise InputError(f"should be the score of the folder it lies in, but is of {told}: {file}")
+            scores.append(score)
+        return scores
 
 
 def read_score(path: Path) -> RunScore:

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from vobench import __version__
+from vobench import __version__, stop
 from vobench.results.unfinished import unfinished
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -29,6 +29,7 @@ class Store:
 
     def get(self, kind: str, inputs: Mapping[str, Any], build: Callable[[Path], None]) -> Path:
         """The folder made from these inputs; `build` fills an empty one where there is none yet."""
+        stop.check()
         final = self.path(kind, inputs)
         if final.is_dir():
             return final

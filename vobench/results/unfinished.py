@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from vobench import stop
+
 PREFIX = ".unfinished-"
 
 
@@ -30,10 +32,10 @@ def unfinished(parent: Path) -> Iterator[Path]:
     _sweep(parent)
     folder, lock = _locked(parent)
     try:
-        yield folder
+        with stop.undone(lambda: stop.remove(folder)):
+            yield folder
     finally:
         os.close(lock)
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _locked(parent: Path) -> tuple[Path, int]:

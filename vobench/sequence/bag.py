@@ -16,6 +16,7 @@ from mcap.opcode import Opcode
 from mcap.records import Metadata
 from mcap.writer import CompressionType, Writer
 
+from vobench import stop
 from vobench.errors import SequenceError
 from vobench.sequence.index import MESSAGE_INDEX_ENTRY, MESSAGE_INDEX_HEAD, Entries, Index, Numbers, read_index
 from vobench.sequence.messages import NS_PER_S, TYPES, Topic
@@ -56,13 +57,10 @@ LATCHED_QOS = """\
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """A file to write that gets its name when the context ends without an error, and is gone after one."""
     part = part_of(path)
-    try:
+    with stop.undone(lambda: part.unlink(missing_ok=True)):
         with part.open("wb") as stream:
             yield stream
         part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
 
 
 @cache

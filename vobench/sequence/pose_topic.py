@@ -4,13 +4,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 from typing import Any
 
 import numpy as np
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2.storage_mcap import DECOMPRESSORS
 
+from vobench import stop
 from vobench.errors import SequenceError, VobenchError
 from vobench.geometry.se3 import Array
 from vobench.sequence import messages as ros
@@ -81,10 +82,11 @@ def opened(path: Path) -> Iterator[AnyReader]:
     """
     # rosbags looks at the size of a chunk after it has unpacked it: a few kB can make many GB.
     DECOMPRESSORS.update({packing: partial(_unpacked, packing) for packing in PACKINGS})
-    with TemporaryDirectory() as folder:
+    folder = Path(mkdtemp(prefix="vobench-bag-"))
+    with stop.undone(lambda: stop.remove(folder)):
         link = path
         if not path.is_dir():
-            link = Path(folder) / f"recording{_suffix(path)}"
+            link = folder / f"recording{_suffix(path)}"
             link.symlink_to(path.resolve())
         try:
             with AnyReader([link], default_typestore=ros.TYPES) as reader:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vobench import stop
 from vobench.errors import SequenceError
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
@@ -87,6 +88,7 @@ class Sequence:
         """The frames in order, undecoded."""
         images, eyes, count = self.bag.raw(self._image_topics), len(self._image_topics), 0
         for pictures in zip(*[images] * eyes, strict=False):
+            stop.check()
             yield self._encoded(count, pictures)
             count += 1
         if count != self.frame_count:

@@ -9,6 +9,7 @@ from typing import Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vobench import stop
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig, Side
@@ -110,6 +111,7 @@ class SequenceWriter:
         return there
 
     def _write_pictures(self, t_ns: int, encoded: Sequence[bytes], form: str) -> None:
+        stop.check()
         t_ns = int(t_ns)
         if form != self._form:
             self._form, self._blank = form, [serialise(ros.image(0, name, b"", form)) for name in NAMES]

@@ -10,6 +10,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from vobench import stop
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
@@ -91,8 +92,11 @@ class _Log:
 
 def save_run(path: Path, run: RunView) -> None:
     """Write a run to an .rrd file that opens in Rerun with its own layout."""
-    with rr.RecordingStream(application_id(run.title), recording_id=run.title, send_properties=False) as stream:
-        part = path.with_name(path.name + ".part")
+    part = path.with_name(path.name + ".part")
+    with (
+        stop.undone(lambda: part.unlink(missing_ok=True)),
+        rr.RecordingStream(application_id(run.title), recording_id=run.title, send_properties=False) as stream,
+    ):
         stream.save(part)
         stream.send_recording_name(run.title)
         log = _Log(stream, _log_pictures(stream, run.frames()))
@@ -110,7 +114,7 @@ def save_run(path: Path, run: RunView) -> None:
         focus, truth_m, estimate_m = first_failure(statuses), run.ground_truth.positions_m, run.estimate.positions_m
         stream.send_blueprint(bp.layout(truth_m, estimate_m, focus=focus, channels=channels))
         stream.disconnect()
-    part.replace(path)
+        part.replace(path)
 
 
 def application_id(title: str) -> str:
