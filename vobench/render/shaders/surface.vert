@@ -14,6 +14,8 @@ layout(std140, binding = 0) uniform Pass {
 };
 uniform mat4 model;
 
+// Surfaces that meet are drawn by several programs; each puts a corner in the same place, so that no gap opens.
+invariant gl_Position;
 out vec2 uv_albedo;
 out vec2 uv_light;
 out vec3 to_eye;
