@@ -23,7 +23,6 @@ from vobench.render.texture import FloatTexture, ReflectanceTexture
 from vobench.scene.material import Glass, Material, Mirror, Polished, texture_of
 from vobench.scene.surface import Surface
 
-
 # Corners nearer than this are one: float32 resolves 1e-6 m at 10 m.
 WELD_M = 1e-5
 
@@ -113,14 +112,14 @@ def _welded(points_m: Array) -> Array:
 def _split(outline: Array, points: Array, tree: Any) -> Array:
     """An outline (K, 3) with the points that lie on its edges."""
     ways = np.roll(outline, -1, axis=0) - outline
-    lengths = np.linalg.norm(ways, axis=1)
-    near = tree.query_ball_point(outline + ways / 2, lengths / 2)
-    edges = [_on_edge(*edge, points[among]) for *edge, among in zip(outline, ways, lengths, near, strict=True)]
-    return np.concatenate(edges)
+    near = tree.query_ball_point(outline + ways / 2, np.linalg.norm(ways, axis=1) / 2)
+    edges = zip(outline, ways, near, strict=True)
+    return np.concatenate([_on_edge(start, way, points[among]) for start, way, among in edges])
 
 
-def _on_edge(start: Array, way: Array, length: float, points: Array) -> Array:
+def _on_edge(start: Array, way: Array, points: Array) -> Array:
     """The start of an edge, then those of the points (N, 3) that lie on it, short of its end."""
+    length = float(np.linalg.norm(way))
     direction = way / max(length, WELD_M)
     along = (points - start) @ direction
     beside = np.linalg.norm(points - start - along[:, None] * direction, axis=1)
