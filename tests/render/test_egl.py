@@ -1,12 +1,53 @@
 """A machine that cannot draw says so in one line, with the command that mends it."""
 
 import ctypes.util
+import os
+import pkgutil
+import subprocess
 import sys
 
 import pytest
 
+import vobench.render
 from vobench.errors import MissingDependencyError
 from vobench.render import egl
+
+# Hides X11's libraries, by name as ctypes finds them and by file as it loads them, then imports modules.
+WITHOUT_X11 = """
+import ctypes, ctypes.util, importlib, sys
+
+def hidden(name):
+    return "libX" in str(name) or str(name).startswith("X")
+
+def refuse(self, name, *rest, load=ctypes.CDLL.__init__, **options):
+    if hidden(name):
+        raise OSError(f"{name}: cannot open shared object file")
+    load(self, name, *rest, **options)
+
+find = ctypes.util.find_library
+ctypes.util.find_library = lambda name: None if hidden(name) else find(name)
+ctypes.CDLL.__init__ = refuse
+for module in sys.argv[1:]:
+    importlib.import_module(module)
+"""
+MODULES = [module.name for module in pkgutil.iter_modules(vobench.render.__path__, "vobench.render.")]
+
+
+def run_without_x11(*modules: str) -> subprocess.CompletedProcess[str]:
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYGLET", "PYOPENGL"))}
+    command = [sys.executable, "-c", WITHOUT_X11, *modules]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_every_module_of_the_room_is_imported_without_a_library_of_x11() -> None:
+    finished = run_without_x11(*MODULES)
+    assert finished.returncode == 0, finished.stderr[-400:]
+
+
+def test_a_machine_without_x11_is_told_from_one_with_it() -> None:
+    finished = run_without_x11("pyglet.libs.x11.xlib")
+    assert finished.returncode == 1
+    assert "X11" in finished.stderr
 
 
 def test_missing_libraries_are_named_with_the_line_that_installs_them(monkeypatch: pytest.MonkeyPatch) -> None:

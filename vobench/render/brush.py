@@ -13,7 +13,7 @@ from vobench.render.program import PASS_BINDING, Program, Programs
 from vobench.render.texture import FloatTexture
 from vobench.scene.material import Glass, Mirror, Polished
 
-PASS_FLOATS = 28
+PASS_FLOATS = 56
 BODY_UNIT, LIGHT_UNIT, LAYERS_UNIT = GL.GL_TEXTURE0, GL.GL_TEXTURE1, GL.GL_TEXTURE2
 
 
@@ -39,6 +39,9 @@ class Brush:
         if look.mirror is not None:
             shared[20:23], shared[23] = look.mirror.normal, look.mirror.offset_m
         shared[24 : 24 + canvas.layers] = canvas.grid.lod_bias
+        shared[28:44] = look.direct.T.ravel()
+        for index, plane in enumerate(look.mirrors):
+            shared[44 + 4 * index : 48 + 4 * index] = *plane.normal, plane.offset_m
         # Each mirror swaps left and right, and shows nothing from behind it.
         GL.glFrontFace(GL.GL_CW if look.depth % 2 else GL.GL_CCW)
         (GL.glDisable if look.mirror is None else GL.glEnable)(GL.GL_CLIP_DISTANCE0)

@@ -1,7 +1,6 @@
 """The way to a picture without a display: OpenGL through EGL, or one sentence that says what is missing."""
 
 import ctypes.util
-import os
 import re
 import sys
 from importlib.metadata import version
@@ -24,9 +23,6 @@ def context() -> Any:
     Raises MissingDependencyError where the machine has no EGL or no driver for it, or PyOpenGL is too old.
     """
     _check_opengl()
-    os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
-    # pyrender imports its viewer, whose pyglet would load X11's libraries, which a bare machine lacks.
-    os.environ.setdefault("PYGLET_HEADLESS", "1")
     try:
         from pyrender.platforms.egl import EGLPlatform
 

@@ -23,7 +23,8 @@ class Look:
     """A pinhole at a place and time, perhaps by way of mirrors: then the picture is what the last one shows.
 
     Movers' poses T_world_mover, the skies' coefficients, ambient_cd_m2 for mirrors that are not followed further.
-    view_projection (4, 4): from the world to OpenGL's screen. eye_m (3,) is behind the last mirror, if any.
+    view_projection (4, 4): from the world to OpenGL's screen, and `direct` (4, 4) as if there were no mirrors.
+    eye_m (3,) is behind the last mirror, if any.
     images (4, 4) takes what the last mirror shows to where the camera sees it.
     """
 
@@ -33,6 +34,7 @@ class Look:
     skies: Array
     ambient_cd_m2: float
     eye_m: Array
+    direct: Array
     view_projection: Array
     images: Array
     mirrors: tuple[Plane, ...] = ()
@@ -94,6 +96,6 @@ def look(
     # OpenGL counts from the corner of the top-left pixel, OpenCV from its centre.
     lens = IntrinsicsCamera(camera.fx_px, camera.fy_px, camera.cx_px + 0.5, camera.cy_px + 0.5, NEAR_M, FAR_M)
     P = lens.get_projection_matrix(camera.width_px, camera.height_px)
-    view_projection = P @ T_CV_GL @ se3.inverse(T_world_camera)
+    direct = P @ T_CV_GL @ se3.inverse(T_world_camera)
     eye_m = T_world_camera[:3, 3]
-    return Look(camera, T_world_camera, T_world_movers, skies, ambient_cd_m2, eye_m, view_projection, IDENTITY)
+    return Look(camera, T_world_camera, T_world_movers, skies, ambient_cd_m2, eye_m, direct, direct, IDENTITY)

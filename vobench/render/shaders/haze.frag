@@ -7,6 +7,8 @@ layout(std140, binding = 0) uniform Pass {
     vec4 eye;
     vec4 clip_plane;
     vec4 lod_bias;
+    mat4 direct;
+    vec4 mirrors[3];
 };
 layout(binding = 2) uniform sampler2D mirrored;  // luminance and 1 / depth, times the third: what share is known
 uniform vec4 plane;

@@ -6,6 +6,8 @@ layout(std140, binding = 0) uniform Pass {
     vec4 eye;
     vec4 clip_plane;
     vec4 lod_bias;
+    mat4 direct;
+    vec4 mirrors[3];
 };
 layout(binding = 0) uniform sampler2D body_texture;
 layout(binding = 1) uniform sampler2D light_texture;

@@ -11,20 +11,36 @@ layout(std140, binding = 0) uniform Pass {
     vec4 eye;         // where the picture is seen from, and what mirrors show that are followed no further
     vec4 clip_plane;  // what lies behind it is not drawn
     vec4 lod_bias;    // of each layer
+    mat4 direct;      // view_projection as if there were no mirrors
+    vec4 mirrors[3];  // planes, the one seen first to begin with; 0 for none
 };
 uniform mat4 model;
 
+// Surfaces that meet are drawn by several programs; each puts a corner in the same place, so that no gap opens.
+invariant gl_Position;
 out vec2 uv_albedo;
 out vec2 uv_light;
 out vec3 to_eye;
 flat out int layer;
 out float gl_ClipDistance[1];
 
+const float TOUCHING_M = 1e-5;
+
+// How far a point is above a plane, 0 where it lies in it.
+float height(vec4 plane, vec3 point)
+{
+    float distance = dot(plane.xyz, point) + plane.w;
+    return abs(distance) < TOUCHING_M ? 0.0 : distance;
+}
+
 void main()
 {
     vec4 world = model * vec4(position, 1.0);
-    gl_Position = view_projection * world;
-    gl_ClipDistance[0] = dot(clip_plane, world);
+    // Mirror by mirror, so that what touches a mirror lands on its own image to the last bit, and leaves no gap.
+    vec3 image = world.xyz;
+    for (int i = 2; i >= 0; i--) image -= 2.0 * height(mirrors[i], image) * mirrors[i].xyz;
+    gl_Position = direct * vec4(image, 1.0);
+    gl_ClipDistance[0] = height(clip_plane, world.xyz);
     gl_Layer = gl_InstanceID;
     gl_ViewportIndex = gl_InstanceID;
     layer = gl_InstanceID;
