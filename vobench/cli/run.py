@@ -20,15 +20,14 @@ from vobench.report import files
 from vobench.report.table import as_json as boards_as_json
 from vobench.results.store import default_store
 from vobench.results.unfinished import why_unwritable
-from vobench.suite.expand import Case, read_plan
+from vobench.suite.expand import Case, Plan, read_plan
 from vobench.suite.source_spec import RecordedCase
 
 
 def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) -> None:
     """Run a suite and print its leaderboard and where everything lies."""
     planned = read_plan(suite, only_estimators=estimators)
-    travel_all(planned)
-    read_all(planned)
+    _preflight(planned)
     _require_writable("--out", out)
     _require_writable("VOBENCH_CACHE", default_store().root)
     shop = Workshop(default_store(), terminal.Bars())
@@ -52,27 +51,39 @@ def _require_writable(what: str, folder: Path) -> None:
         raise InputError(f"{what} should be a folder that can be written ({cause}): {folder}")
 
 
+def _preflight(planned: Plan) -> tuple[dict[str, Travel], dict[str, Recording]]:
+    """Where bodies go and what recordings hold. Raises SuiteError with all that cannot be."""
+    travels, recordings, wrong = dict[str, Travel](), dict[str, Recording](), planned.mistakes()
+    with wrong.at():
+        travels = travel_all(planned)
+    with wrong.at():
+        recordings = read_all(planned)
+    wrong.require_none()
+    return travels, recordings
+
+
 def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     """Validate a suite and print what it comes to."""
     planned = read_plan(suite, only_estimators=estimators)
-    travels, recordings = travel_all(planned), read_all(planned)
+    travels, recordings = _preflight(planned)
     cases = [_case_facts(case, travels) for case in planned.simulated]
     cases += [_recorded_facts(case, recordings[case.name]) for case in planned.recorded]
     entrants = [
         {"estimator": e.label, "version": e.manifest.version, "needs": list(e.manifest.needs), "path": str(e.folder)}
         for e in planned.entrants
     ]
+    found = [{"kind": e.kind, "name": e.name, "origin": e.origin, "path": str(e.path)} for e in planned.found]
     runs = sum(len(planned.runs(case)) for case in planned.cases)
     if as_json:
-        terminal.print_json({"suite": planned.suite.name, "cases": cases, "estimators": entrants, "runs": runs})
+        said = {"suite": planned.suite.name, "cases": cases, "estimators": entrants, "runs": runs, "found": found}
+        terminal.print_json(said)
         return
     rows = [[f["case"], str(f["frames"]), f"{f['duration_s']:.1f}", f["sequence"]] for f in cases]
     out = terminal.console()
     out.print(terminal.table(f"{planned.suite.name}: cases", ["case", "frames", "seconds", "sequence"], rows))
-    lines = [
-        [e.label, e.manifest.version, ", ".join(e.manifest.needs) or "nothing", str(e.folder)] for e in planned.entrants
-    ]
-    out.print(terminal.table("estimators", ["estimator", "version", "needs", "path"], lines))
+    lines = [[e.label, e.manifest.version, ", ".join(e.manifest.needs) or "nothing"] for e in planned.entrants]
+    out.print(terminal.table("estimators", ["estimator", "version", "needs"], lines))
+    out.print(terminal.table("found", ["kind", "name", "origin", "path"], [[*each.values()] for each in found]))
     for case in cases:
         for note in case.get("notes", []):
             out.print(f"{case['case']}: {note}")
