@@ -1,6 +1,7 @@
 """The one search order, and what is said of a name that nothing has."""
 
 import importlib.metadata
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -101,10 +102,13 @@ def test_what_lies_beside_a_suite_is_among_the_known(here, suite):
         catalog.find("scene", "halle", suite=suite)
 
 
-def test_a_name_is_no_pattern(here):
-    put(here, "scene", "hall")
-    with pytest.raises(UnknownNameError, match=r"no scene named 'h\*ll'"):
-        catalog.find("scene", "h*ll")
+@pytest.mark.parametrize("kind", catalog.KINDS)
+@pytest.mark.parametrize("name", ["h*ll", "*", "", ".", ".."])
+def test_a_name_is_no_pattern_and_no_other_folder(here, kind, name):
+    put(here, kind, "hall")
+    (here / "estimator.yaml").touch()
+    with pytest.raises(UnknownNameError, match=f"no {kind} named '{re.escape(name)}'"):
+        catalog.find(kind, name)
 
 
 def test_a_folder_that_two_stops_share_is_listed_once(here, monkeypatch):

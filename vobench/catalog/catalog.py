@@ -86,7 +86,7 @@ def _names(kind: Kind, suite: Path | None) -> list[str]:
     return sorted({entry.name for entry in _all(kind, suite)})
 
 
-def _all(kind: Kind, suite: Path | None = None, *, name: str = "*") -> Iterator[Entry]:
+def _all(kind: Kind, suite: Path | None = None, *, name: str | None = None) -> Iterator[Entry]:
     """Every entry of a kind, or those of a name, in the order of search."""
     if suite:
         yield from _in_folder(kind, suite.parent / f"{kind}s", "beside the suite", name)
@@ -94,7 +94,7 @@ def _all(kind: Kind, suite: Path | None = None, *, name: str = "*") -> Iterator[
     yield from _in_folder(kind, Path(f"{kind}s"), f"./{kind}s", name)
     for folder in filter(None, os.environ.get("VOBENCH_PATH", "").split(os.pathsep)):
         yield from _in_folder(kind, Path(folder) / f"{kind}s", "$VOBENCH_PATH", name)
-    yield from (entry for entry in _installed(kind) if name in ("*", entry.name))
+    yield from (entry for entry in _installed(kind) if name in (None, entry.name))
     yield from _in_folder(kind, builtin_root() / f"{kind}s", "built in", name)
 
 
@@ -106,8 +106,10 @@ def _installed(kind: Kind) -> Iterator[Entry]:
             yield Entry(kind, point.name, path, f"installed: {point.dist.name if point.dist else point.value}")
 
 
-def _in_folder(kind: Kind, folder: Path, origin: str, name: str) -> Iterator[Entry]:
-    named = name if name == "*" else escape(name)
+def _in_folder(kind: Kind, folder: Path, origin: str, name: str | None) -> Iterator[Entry]:
+    if name in ("", ".", ".."):
+        return
+    named = "*" if name is None else escape(name)
     if kind == "estimator":
         paths = (manifest.parent for manifest in folder.glob(f"{named}/estimator.yaml"))
     else:

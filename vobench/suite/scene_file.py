@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -97,12 +98,17 @@ def lit(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, ...]:
 
 def require_possible(name: str, source: Source) -> None:
     """Raise SuiteError where no light can be called so, in a scene that is read only in part."""
-    lists = [source.marked.get(kind) for kind in ("lamps", "boxes", "boards")]
-    things = [thing for entries in lists if isinstance(entries, list) for thing in entries if isinstance(thing, dict)]
-    named = [str(thing["name"]) for thing in things if "name" in thing]
-    named += [sky for sky in (SUN, SKY) if sky in source.marked]
+    named = [*_names_in(source.marked), *(sky for sky in (SUN, SKY) if sky in source.marked)]
     if name.partition(".")[0] not in named and not name.startswith(GIVEN_NAMES):
         raise SuiteError(f"lighting: {unknown('light', name, named)}")
+
+
+def _names_in(tree: Any) -> Iterator[str]:
+    """The names of all things that a file holds."""
+    for value in tree.values() if isinstance(tree, dict) else tree if isinstance(tree, list) else ():
+        if isinstance(value, dict) and isinstance(value.get("name"), str):
+            yield str(value["name"])
+        yield from _names_in(value)
 
 
 def movers(spec: SceneFile) -> tuple[scripted.Mover, ...]:
