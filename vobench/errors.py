@@ -2,7 +2,7 @@
 
 VobenchError               the user's mistake or machine: one line, exit code 1
 ├── InputError             a file does not say what it should
-│   ├── SuiteError         a suite, scene or manifest: names file, line, key and value
+│   ├── SuiteError         a suite, scene or manifest: names file, line, key and value of every mistake
 │   └── TrajectoryError    a trajectory file or array
 ├── UnknownNameError       no scene, suite or estimator of that name
 ├── MissingDependencyError this machine lacks something; the message says how to get it
@@ -12,9 +12,46 @@ VobenchError               the user's mistake or machine: one line, exit code 1
 └── SequenceError          a recording is incomplete, torn or of another form
 """
 
+from dataclasses import dataclass
+from typing import Any
+
+# More than fit a screen are counted.
+MOST_SAID = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place in a file: its line and column from 1 on, and the key and value there, as far as they are known."""
+
+    file: str
+    line: int | None = None
+    column: int | None = None
+    key: str = ""
+    value: Any = None
+
+    def __str__(self) -> str:
+        where = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
+        return f"{where}: {self.key}" if self.key else where
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """One thing that is wrong, in a sentence; its places lead from the file asked for to the one at fault."""
+
+    sentence: str
+    places: tuple[Place, ...] = ()
+
+    def __str__(self) -> str:
+        return ": ".join([*map(str, self.places), self.sentence])
+
 
 class VobenchError(Exception):
     """Something the person at the keyboard can mend; the message is one line."""
+
+    @property
+    def mistakes(self) -> tuple[Mistake, ...]:
+        """What is wrong, one by one."""
+        return (Mistake(str(self)),)
 
 
 class InputError(VobenchError):
@@ -22,7 +59,19 @@ class InputError(VobenchError):
 
 
 class SuiteError(InputError):
-    """A suite, scene or manifest is wrong; the message names file, line, key and value."""
+    """A suite, scene or manifest is wrong; the message names file, line, key and value, a line for each mistake."""
+
+    def __init__(self, *mistakes: Mistake | str) -> None:
+        self._mistakes = tuple(Mistake(each) if isinstance(each, str) else each for each in mistakes)
+        said = [*map(str, self._mistakes[:MOST_SAID])]
+        if more := len(self._mistakes) - len(said):
+            said.append(f"and {more} more mistake{'s' if more > 1 else ''}")
+        super().__init__("\n".join(said))
+
+    @property
+    def mistakes(self) -> tuple[Mistake, ...]:
+        """Every one, also those that the message only counts."""
+        return self._mistakes
 
 
 class TrajectoryError(InputError):

@@ -1,6 +1,7 @@
 """The one search order, and what is said of a name that nothing has."""
 
 import importlib.metadata
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -58,6 +59,62 @@ def test_the_first_stop_of_the_search_order_wins_and_the_rest_are_still_listed(h
 def test_every_kind_is_found_in_the_working_directory(here, kind):
     path = put(here, kind, "mine")
     assert catalog.find(kind, "mine").path == path
+
+
+@pytest.fixture
+def suite(tmp_path):
+    """The file of a suite in a folder where nobody stands."""
+    path = tmp_path / "some" / "where" / "my.yaml"
+    path.parent.mkdir(parents=True)
+    path.write_text("name: my\nestimators: [mine]\n")
+    return path
+
+
+@pytest.mark.parametrize("kind", ["scene", "estimator"])
+def test_beside_the_suite_comes_before_all_else_and_its_folder_of_the_kind_first(here, monkeypatch, suite, kind):
+    monkeypatch.setenv("VOBENCH_PATH", str(here))
+    elsewhere = put(here, kind, "mine")
+    assert catalog.find(kind, "mine", suite=suite).path == elsewhere
+    within = put(suite.parent, kind, "mine")
+    flat = suite.parent / within.name
+    if kind == "scene":
+        flat.write_text("name: mine\n")
+    else:
+        flat.mkdir()
+        (flat / "estimator.yaml").write_text("name: mine\n")
+    found = catalog.find(kind, "mine", suite=suite)
+    assert (found.path, found.origin) == (within, "beside the suite")
+    within.rename(within.with_name("other"))
+    assert catalog.find(kind, "mine", suite=suite).path == flat
+    assert catalog.find(kind, "mine").path == elsewhere
+
+
+def test_a_suite_may_be_called_as_its_scene_is(here, suite):
+    namesake = suite.with_name("office.yaml")
+    namesake.write_text("name: office\nscenes: [office]\nestimators: [stand_still]\n")
+    for asking in (suite, namesake):
+        assert catalog.find("scene", "office", suite=asking).origin == "built in"
+
+
+def test_what_lies_beside_a_suite_is_among_the_known(here, suite):
+    put(suite.parent, "scene", "hall")
+    with pytest.raises(UnknownNameError, match=r"Did you mean 'hall'\? Known: hall, office, room"):
+        catalog.find("scene", "halle", suite=suite)
+
+
+@pytest.mark.parametrize("kind", catalog.KINDS)
+@pytest.mark.parametrize("name", ["h*ll", "*", "", ".", ".."])
+def test_a_name_is_no_pattern_and_no_other_folder(here, kind, name):
+    put(here, kind, "hall")
+    (here / "estimator.yaml").touch()
+    with pytest.raises(UnknownNameError, match=f"no {kind} named '{re.escape(name)}'"):
+        catalog.find(kind, name)
+
+
+def test_a_folder_that_two_stops_share_is_listed_once(here, monkeypatch):
+    put(here, "scene", "hall")
+    monkeypatch.setenv("VOBENCH_PATH", str(here))
+    assert [entry.origin for entry in catalog.entries("scene") if entry.name == "hall"] == ["./scenes"]
 
 
 @pytest.mark.parametrize("kind", catalog.KINDS)

@@ -46,6 +46,37 @@ def test_check_counts_what_run_would_do_and_does_none_of_it(vobench, here):
     assert vobench("check", "tiny", "--json").json["cases"][0]["simulated"]
 
 
+def test_all_mistakes_of_a_suite_are_said_a_line_each_and_as_a_list(vobench, here):
+    path = here / "suites" / "tiny.yaml"
+    path.write_text(path.read_text().replace("closet", "closset").replace("pitch_deg: 90", "pitch_deg: 91"))
+    said = vobench("check", "tiny")
+    assert (said.code, said.out) == (1, "")
+    assert [line.split(":")[2:4] for line in said.err.splitlines()] == [
+        ["2", " scenes.0"],
+        ["3", " rigs.down.pitch_deg"],
+    ]
+    assert all(line.startswith(f"vobench: {path}:") for line in said.err.splitlines())
+    listed = vobench("check", "tiny", "--json").json
+    assert listed["error"].endswith("(and 1 more mistake)")
+    assert [(each["file"], each["line"], each["key"], each["value"]) for each in listed["mistakes"]] == [
+        (str(path), 2, "scenes.0", "closset"),
+        (str(path), 3, "rigs.down.pitch_deg", 91),
+    ]
+    assert listed["mistakes"][1]["sentence"] == "should be 90 or less (got 91)"
+
+
+def test_check_and_list_say_where_a_name_was_found(vobench, here):
+    (here / "suites" / "scenes").mkdir()
+    nearer = here / "suites" / "scenes" / "closet.yaml"
+    nearer.write_text((here / "scenes" / "closet.yaml").read_text())
+    found = vobench("check", "tiny", "--json").json["found"]
+    (scene,) = [each for each in found if each["kind"] == "scene"]
+    assert scene == {"kind": "scene", "name": "closet", "origin": "beside the suite", "path": str(nearer)}
+    assert "beside the suite" in vobench("check", "tiny").out
+    origins = {each["name"]: each["origin"] for each in vobench("list", "scenes", "--json").json["entries"]}
+    assert (origins["closet"], origins["office"]) == ("./scenes", "built in")
+
+
 def test_paths_may_be_relative_to_wherever_one_stands(vobench, here, monkeypatch):
     monkeypatch.setenv("VOBENCH_CACHE", "kept")
     (here / "deep").mkdir()

@@ -25,17 +25,22 @@ lamps: [{name: lamp, center_m: [0, 0, 1.4], size_m: [0.4, 0.4], power_lm: 600}]
 
 @pytest.fixture
 def bent(tmp_path, monkeypatch) -> Callable[..., Plan]:
-    """Reads the plan of the suite with some text of it, or of its scene, replaced."""
+    """Reads the plan of the suite with some text of it, or of its scene, replaced, and `more` at its end."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scenes").mkdir()
 
-    def read(*changes: tuple[str, str], scene: tuple[str, str] = ("", ""), only: tuple[str, ...] = ()) -> Plan:
-        text = SUITE
+    def read(
+        *changes: tuple[str, str], scene: tuple[str, ...] = ("", ""), only: tuple[str, ...] = (), more: str = ""
+    ) -> Plan:
+        text = SUITE + more
         for old, new in changes:
             assert old in text
             text = text.replace(old, new, 1)
         (tmp_path / "tiny.yaml").write_text(text, encoding="utf-8")
-        (tmp_path / "scenes" / "closet.yaml").write_text(CLOSET.replace(*scene, 1), encoding="utf-8")
+        closet = CLOSET
+        for old, new in zip(scene[::2], scene[1::2], strict=True):
+            closet = closet.replace(old, new, 1)
+        (tmp_path / "scenes" / "closet.yaml").write_text(closet, encoding="utf-8")
         return read_plan("./tiny.yaml", only_estimators=only)
 
     return read

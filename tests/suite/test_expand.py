@@ -5,6 +5,7 @@ import pytest
 from vobench.catalog import catalog
 from vobench.catalog.catalog import builtin_root
 from vobench.errors import SuiteError, UnknownNameError
+from vobench.suite import expand, scene_file
 from vobench.suite.expand import AXES, plan, read_plan
 
 MORE = (
@@ -83,6 +84,42 @@ def test_asking_for_one_estimator_twice_is_an_error(bent):
 def test_asking_for_an_unknown_estimator_names_the_nearest(bent):
     with pytest.raises(UnknownNameError, match="Did you mean 'stand_still'"):
         bent(only=("stand_stil",))
+
+
+def test_scenes_and_estimators_are_found_beside_their_suite_from_anywhere(bent, tmp_path, monkeypatch):
+    manifest = "name: stand_still\nversion: mine\nclass: estimator:Mine\npose_of: body\nsummary: Mine.\n"
+    bent()
+    (tmp_path / "estimators" / "stand_still").mkdir(parents=True)
+    (tmp_path / "estimators" / "stand_still" / "estimator.yaml").write_text(manifest)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    for only in ((), ("stand_still",)):
+        planned = read_plan("../tiny.yaml", only_estimators=only)
+        assert planned.entrants[0].manifest.version == "mine"
+    assert [(e.kind, e.name, e.origin) for e in read_plan("../tiny.yaml").found] == [
+        ("estimator", "stand_still", "beside the suite"),
+        ("estimator", "constant_velocity", "built in"),
+        ("scene", "closet", "beside the suite"),
+    ]
+
+
+def test_what_cases_share_is_made_once_however_many_there_are(bent, monkeypatch):
+    calls = []
+    for module, name in (
+        (scene_file, "survey"),
+        (scene_file, "build"),
+        (scene_file, "lights"),
+        (expand, "read_manifest"),
+    ):
+        made = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *args, made=made, name=name: (calls.append(name), made(*args))[1])
+    ways = ", ".join(f"way_{k}: {{targets_m: [[0.{k + 1}, 0]]}}" for k in range(9))
+    cameras = ", ".join(f"camera_{k}: {{blur_sigma_px: {k}}}" for k in range(5))
+    few = bent(), sorted(calls)
+    calls.clear()
+    many = bent(("short: {targets_m: [[0.5, 0]]}", ways), ("clean: {sensor: clean}", cameras)), sorted(calls)
+    assert (len(few[0].cases), len(many[0].cases)) == (2, 90)
+    assert few[1] == many[1] == ["build", "lights", "read_manifest", "read_manifest", "survey"]
 
 
 def test_merge_keys_and_aliases_keep_a_suite_short(bent):

@@ -97,7 +97,7 @@ WRONG = [
     ("{targets_m: [[1, 0]], mover: tank}", ".mover: should be 'pioneer', 'unicycle' or 'ackermann' (got 'tank')"),
     ("{targets_m: [[1, 0]], floor: [{surface: wett, center_m: [0, 0], size_m: [1, 1]}]}", ".floor.0.surface: no surface named 'wett'. Did you mean 'wet'? Known: carpet, seam, wet"),
     ("{kind: handheld, poses: [{t_s: 0, position_m: [0, 0, 1]}]}", ".poses: should have 3 or more entries, but has 1"),
-    ("{kind: handheld, poses: [{t_s: 0, position_m: [0, 0, 1], yaw: 3}, {}, {}]}", ".poses.0.yaw: unknown key. Did you mean 'yaw_deg'? Known: pitch_deg, position_m, roll_deg, t_s, yaw_deg (and 5 more mistakes)"),
+    ("{kind: handheld, poses: [{t_s: 0, position_m: [0, 0, 1], yaw: 3}, {t_s: 1, position_m: [0, 0, 1]}, {t_s: 2, position_m: [0, 0, 1]}]}", ".poses.0.yaw: unknown key. Did you mean 'yaw_deg'? Known: pitch_deg, position_m, roll_deg, t_s, yaw_deg"),
     ("{kind: pure_rotation, angle_deg: 0}", ".angle_deg: should be another angle than 0"),
     ("{kind: reverse, length_m: 1, controller: paper}", ".controller: does not belong to mover 'pioneer'"),
     ("{kind: replay, file: path.tum, axes: eurok}", ".axes: no convention of axes named 'eurok'. Did you mean 'euroc'? Known: body, camera, euroc, kitti, tartanair"),

@@ -2,18 +2,19 @@
 
 import math
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ValidationError
+from pydantic import AfterValidator, BaseModel, TypeAdapter, ValidationError
 from ruamel.yaml import YAML
+from ruamel.yaml.constructor import RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from vobench.errors import SuiteError, VobenchError
+from vobench.errors import Mistake, Place, SuiteError, VobenchError
 
 Model = TypeVar("Model", bound=BaseModel)
 Keys = tuple[int | str, ...]
@@ -55,10 +56,14 @@ def matching(pattern: str, words: str) -> AfterValidator:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A YAML file as it was read: what it holds, and on which line each key stands."""
+    """A YAML file as it was read: what it holds, and on which line each key stands.
+
+    `kept` says which entries of its lists are left, by their numbers in the file, where some are left out.
+    """
 
     path: Path
     marked: Any
+    kept: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
     @contextmanager
     def at(self, *keys: int | str) -> Iterator[None]:
@@ -66,10 +71,18 @@ class Source:
         try:
             yield
         except VobenchError as error:
-            raise SuiteError(f"{self.place(keys)}: {error}") from error
+            raise SuiteError(*self.placed(error, *keys)) from error
 
-    def place(self, keys: Keys) -> str:
-        """`file:line: a.b.c` of the deepest of these keys that the file has."""
+    def placed(self, error: VobenchError, *keys: int | str) -> tuple[Mistake, ...]:
+        """The mistakes of an error, this place in front of their own; without keys, where they have none."""
+        place = self.place(self.written(keys))
+        return tuple(
+            replace(mistake, places=(place, *mistake.places)) if keys or not mistake.places else mistake
+            for mistake in error.mistakes
+        )
+
+    def place(self, keys: Keys) -> Place:
+        """The place of the deepest of these keys that the file has."""
         tree, line, named = self.marked, None, list[int | str]()
         for key in keys:
             if isinstance(key, int) and isinstance(tree, str | dict) and key not in list(tree):
@@ -79,85 +92,204 @@ class Source:
                 tree, line = tree[key], tree.lc.key(key)[0] + 1
             elif isinstance(tree, list) and isinstance(key, int) and key < len(tree):
                 tree, line = tree[key], tree.lc.item(key)[0] + 1
-        where = f"{self.path}:{line}" if line else str(self.path)
-        return f"{where}: {'.'.join(map(str, named))}" if named else where
+            else:
+                tree = None
+        value = tree if isinstance(tree, str | bool | int | float) else None
+        return Place(str(self.path), line, key=".".join(map(str, named)), value=value)
+
+    def written(self, keys: Keys) -> Keys:
+        """The keys with an entry's number as it is in the file."""
+        if len(keys) > 1 and isinstance(keys[1], int) and keys[0] in self.kept:
+            return keys[0], self.kept[str(keys[0])][keys[1]], *keys[2:]
+        return keys
+
+
+@dataclass(frozen=True, slots=True)
+class Mistakes:
+    """Gathers what is wrong with a file, so that all of it is said at once."""
+
+    source: Source | None
+    found: list[Mistake] = field(default_factory=list)
+
+    @contextmanager
+    def at(self, *keys: int | str) -> Iterator[None]:
+        """Errors of the block are gathered, with the place of these keys in front; what follows it is done."""
+        try:
+            yield
+        except VobenchError as error:
+            self.found.extend(self.source.placed(error, *keys) if self.source else error.mistakes)
+
+    def require_none(self) -> None:
+        """Raise SuiteError with all that was gathered, each once, in the order of the file."""
+        once = {str(mistake): mistake for mistake in self.found}.values()
+        if once:
+            raise SuiteError(*sorted(once, key=_line))
+
+
+def _line(mistake: Mistake) -> int:
+    return mistake.places[0].line or 0 if mistake.places else 0
+
+
+@dataclass(frozen=True, slots=True)
+class Reading(Generic[Model]):
+    """A file as `model`, or what is wrong with it.
+
+    Where there are mistakes, `model` has the entries in which there are none, unchecked as a whole, and lacks
+    sections that are wrong altogether.
+    """
+
+    model: Model
+    source: Source
+    mistakes: tuple[Mistake, ...] = ()
 
 
 def read(path: Path, model: type[Model]) -> Model:
-    """The file as `model`. Raises SuiteError, one line, for whatever is wrong first."""
-    return read_marked(path, model)[0]
+    """The file as `model`. Raises SuiteError with all that is wrong."""
+    reading = read_all(path, model)
+    if reading.mistakes:
+        raise SuiteError(*reading.mistakes)
+    return reading.model
 
 
-def read_marked(path: Path, model: type[Model]) -> tuple[Model, Source]:
-    """The file as `model`, and where its keys stand. Raises SuiteError, one line."""
-    source = Source(path, _parse(path))
+def read_all(path: Path, model: type[Model]) -> Reading[Model]:
+    """The file as far as it can be read, and where its keys stand. Raises SuiteError where it is no such file."""
+    source, twice = _parse(path)
     if not isinstance(source.marked, dict):
-        raise SuiteError(f"{path}: should be keys with values, but is {_kind(source.marked)}")
+        raise SuiteError(Mistake(f"should be keys with values, but is {_kind(source.marked)}", (source.place(()),)))
+    unread = dict(_unreadable(source.marked, ()))
+    mistakes = [*twice, *(Mistake(sentence, (source.place(keys),)) for keys, sentence in unread.items())]
+    data, wrong = _plain(source.marked), [*unread]
     try:
-        return model.model_validate(_plain(source, source.marked, ())), source
+        whole = model.model_validate(data)
+        if not mistakes:
+            return Reading(whole, source)
     except ValidationError as error:
-        raise SuiteError(_sentence(source, error, model)) from None
+        wrong += [each["loc"] for each in error.errors()]
+        mistakes += _complaints(source, error, model.model_json_schema(), unread)
+    parts, kept = _intact(model, data, wrong)
+    left = model.model_construct(None, **parts)
+    return Reading(left, replace(source, kept=kept), tuple(sorted(mistakes, key=_line)))
 
 
-def _parse(path: Path) -> Any:
+class _Constructor(RoundTripConstructor):
+    """Builds what a file holds, of keys that are there twice the first, and remembers the second."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.twice: list[tuple[Any, str]] = []
+
+    def check_mapping_key(self, node: Any, key_node: Any, mapping: Any, key: Any, value: Any) -> bool:
+        """Whether a key is new."""
+        del node
+        if key in mapping:
+            sentence = f'found duplicate key "{key}" with value "{value}" (original value: "{mapping[key]}")'
+            self.twice.append((key_node.start_mark, sentence))
+            return False
+        return True
+
+
+def _parse(path: Path) -> tuple[Source, list[Mistake]]:
+    """The file as YAML, and the keys that are in it twice. Raises SuiteError where it is none."""
+    # YAML 1.2: 1e-3 is a number, 'no' a word.
+    yaml = YAML(typ="rt", pure=True)
+    yaml.Constructor = _Constructor
     try:
-        text = path.read_text(encoding="utf-8")
-        # YAML 1.2: 1e-3 is a number, 'no' a word, a key twice an error.
-        return YAML(typ="rt", pure=True).load(text)
+        tree = yaml.load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SuiteError(f"cannot read {path}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise SuiteError(f"{path}: not a text file in UTF-8") from None
+        raise SuiteError(Mistake("not a text file in UTF-8", (Place(str(path)),))) from None
     except MarkedYAMLError as error:
-        mark = error.problem_mark
-        place = f"{path}:{mark.line + 1}:{mark.column + 1}" if mark else str(path)
-        raise SuiteError(f"{place}: {' '.join(str(error.problem).split())}") from None
+        raise SuiteError(_at_mark(path, error.problem_mark, " ".join(str(error.problem).split()))) from None
     except YAMLError as error:
-        raise SuiteError(f"{path}: {' '.join(str(error).split())}") from None
+        raise SuiteError(Mistake(" ".join(str(error).split()), (Place(str(path)),))) from None
     except RecursionError:
-        raise SuiteError(f"{path}: brackets or indents are nested too deep") from None
+        raise SuiteError(Mistake("brackets or indents are nested too deep", (Place(str(path)),))) from None
+    return Source(path, tree), [_at_mark(path, mark, sentence) for mark, sentence in yaml.constructor.twice]
 
 
-def _plain(source: Source, tree: Any, keys: Keys) -> Any:
-    """The tree in Python's own types, lists as tuples. Raises SuiteError for what JSON could not hold either."""
+def _at_mark(path: Path, mark: Any, sentence: str) -> Mistake:
+    return Mistake(sentence, (Place(str(path), mark.line + 1, mark.column + 1) if mark else Place(str(path)),))
+
+
+def _unreadable(tree: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
+    """What JSON could not hold either: where it is, and what would be right."""
     if isinstance(tree, dict):
-        for key in tree:
-            if not isinstance(key, str):
-                raise SuiteError(f"{source.place((*keys, key))}: a key should be text (put it in quotes; got {key!r})")
-        return {str(key): _plain(source, value, (*keys, key)) for key, value in tree.items()}
+        for key, value in tree.items():
+            if isinstance(key, str):
+                yield from _unreadable(value, (*keys, key))
+            else:
+                yield (*keys, key), f"a key should be text (put it in quotes; got {key!r})"
+    elif isinstance(tree, list):
+        for index, value in enumerate(tree):
+            yield from _unreadable(value, (*keys, index))
+    elif isinstance(tree, float) and not math.isfinite(tree):
+        yield keys, f"{COMPLAINTS['finite_number']} (got {tree})"
+    elif not (tree is None or isinstance(tree, str | bool | int | float)):
+        yield keys, f"should be a number, text, a list or keys with values (got {tree})"
+
+
+def _plain(tree: Any) -> Any:
+    """The tree in Python's own types, lists as tuples, without keys that are no text."""
+    if isinstance(tree, dict):
+        return {str(key): _plain(value) for key, value in tree.items() if isinstance(key, str)}
     if isinstance(tree, list):
-        return tuple(_plain(source, value, (*keys, index)) for index, value in enumerate(tree))
-    for made in (str, bool, int):
+        return tuple(map(_plain, tree))
+    for made in (str, bool, int, float):
         if isinstance(tree, made):
             return made(tree)
-    if isinstance(tree, float):
-        if not math.isfinite(tree):
-            raise SuiteError(f"{source.place(keys)}: {COMPLAINTS['finite_number']} (got {tree})")
-        return float(tree)
-    if tree is not None:
-        raise SuiteError(f"{source.place(keys)}: should be a number, text, a list or keys with values (got {tree})")
-    return None
+    return tree
+
+
+def _intact(model: type[BaseModel], data: dict[str, Any], wrong: list[Keys]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The sections of a file without the entries in which something is wrong, and which are left of each list."""
+    parts, kept = dict[str, Any](), dict[str, tuple[int, ...]]()
+    for key in data.keys() & model.model_fields.keys():
+        value, bad = data[key], [keys[1:2] for keys in wrong if keys[0:1] == (key,)]
+        if isinstance(value, dict):
+            value = {name: entry for name, entry in value.items() if (name,) not in bad}
+        elif isinstance(value, tuple):
+            kept[key] = tuple(index for index in range(len(value)) if (index,) not in bad)
+            value = tuple(value[index] for index in kept[key])
+        with suppress(ValidationError):  # what is wrong with it has been said
+            parts[key] = TypeAdapter(model.model_fields[key].rebuild_annotation()).validate_python(value)
+    return parts, kept
 
 
 def _kind(tree: Any) -> str:
     return "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
 
 
-def _sentence(source: Source, error: ValidationError, model: type[BaseModel]) -> str:
-    """The first thing wrong, unknown keys before missing ones: the one is often the other misspelt."""
-    found = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
-    # Pydantic marks a bad key, as opposed to its value, with a last part of its own.
-    keys, _ = _walk(model, tuple(part for part in found[0]["loc"] if part != "[key]"))
-    others = len(found) - 1
-    more = f" (and {others} more mistake{'s' if others > 1 else ''})" if others else ""
-    return f"{source.place(keys)}: {_complaint(found[0], model)}{more}"
+def _complaints(
+    source: Source, error: ValidationError, schema: dict[str, Any], unread: Collection[Keys]
+) -> Iterator[Mistake]:
+    """What is wrong, unknown keys first, but for `unread` ones and for what is wrong only because others are."""
+    found = sorted(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
+    places = [*unread, *(each["loc"] for each in found)]
+    meant = {(*each["loc"][:-1], _nearest(each, schema)) for each in found if each["type"] == "extra_forbidden"}
+    for each in found:
+        loc, keys = each["loc"], _walk(schema, each["loc"])[0]
+        is_misspelt = each["type"] == "missing" and loc in meant
+        lost_some = each["type"] == "too_short" and any(loc == other[: len(loc)] != other for other in places)
+        if not (keys in unread or is_misspelt or lost_some):
+            yield Mistake(_complaint(each, schema), (source.place(keys),))
 
 
-def _complaint(error: Any, model: type[BaseModel]) -> str:
+def _nearest(error: Any, schema: dict[str, Any]) -> str | None:
+    """The key that an unknown one may be meant for."""
+    near = get_close_matches(str(error["loc"][-1]), _known(error, schema), n=1)
+    return near[0] if near else None
+
+
+def _known(error: Any, schema: dict[str, Any]) -> list[str]:
+    return sorted(_walk(schema, error["loc"][:-1])[1].get("properties", {}))
+
+
+def _complaint(error: Any, schema: dict[str, Any]) -> str:
     if error["type"] == "extra_forbidden":
-        known = sorted(_walk(model, error["loc"][:-1])[1].get("properties", {}))
-        near = get_close_matches(str(error["loc"][-1]), known, n=1)
-        return f"unknown key.{f' Did you mean {near[0]!r}?' if near else ''} Known: {', '.join(known)}"
+        near = _nearest(error, schema)
+        guess = f" Did you mean {near!r}?" if near else ""
+        return f"unknown key.{guess} Known: {', '.join(_known(error, schema))}"
     template, seen = COMPLAINTS.get(error["type"]), error["input"]
     context = {key: f"{value:g}" if isinstance(value, float) else value for key, value in error.get("ctx", {}).items()}
     text = template.format(**context) if template else error["msg"].removeprefix("Value error, ")
@@ -170,14 +302,16 @@ def _as_yaml(value: Any) -> str:
     return "nothing" if value is None else str(value).lower() if isinstance(value, bool) else repr(value)
 
 
-def _walk(model: type[BaseModel], loc: Keys) -> tuple[Keys, dict[str, Any]]:
+def _walk(schema: dict[str, Any], loc: Keys) -> tuple[Keys, dict[str, Any]]:
     """The keys of a place in the file, and the part of the model's schema there.
 
-    Pydantic's own place also names the kind that was chosen where the model offers several.
+    Pydantic's own place also names the kind that was chosen where the model offers several, and ends in a part
+    of its own where a key is wrong, as opposed to its value.
     """
-    schema = model.model_json_schema()
     keys, part = list[int | str](), schema
     for key in loc:
+        if key == "[key]":
+            continue
         if reference := part.get("discriminator", {}).get("mapping", {}).get(key):
             part = _referred(schema, {"$ref": reference})
             continue

@@ -3,15 +3,16 @@
 import json as json_module
 import os
 import sys
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from vobench import stop
 from vobench.cli import score_command, sequence_command
 from vobench.cli.score_command import Json
-from vobench.errors import VobenchError
+from vobench.errors import SuiteError, VobenchError
 
 app = typer.Typer(
     name="vobench",
@@ -61,6 +62,8 @@ def _sentence(error: BaseException) -> str:
     """One line; the system's errors with what it is about in front."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.strerror}: {error.filename}"
+    if isinstance(error, SuiteError) and (more := len(error.mistakes) - 1):
+        return f"{error.mistakes[0]} (and {more} more mistake{'s' if more > 1 else ''})"
     return " ".join(str(error).split())
 
 
@@ -68,9 +71,24 @@ def _fail(sentence: str, error: BaseException) -> None:
     if DEBUG in sys.argv:
         raise error
     if "--json" in sys.argv:
-        print(json_module.dumps({"error": sentence}, ensure_ascii=False))
-    print(f"vobench: {sentence}", file=sys.stderr)
+        print(json_module.dumps({"error": sentence, **_mistakes(error)}, ensure_ascii=False))
+    for line in str(error).splitlines() if isinstance(error, SuiteError) else [sentence]:
+        print(f"vobench: {line}", file=sys.stderr)
     raise SystemExit(1) from None
+
+
+def _mistakes(error: BaseException) -> dict[str, Any]:
+    """Of a file that is wrong: every mistake with its file, line, key and value; `asked_by` is what named the file."""
+    if not isinstance(error, SuiteError):
+        return {}
+    said = list[dict[str, Any]]()
+    for mistake in error.mistakes:
+        place = {"file": None, "line": None, "column": None, "key": None, "value": None}
+        if mistake.places:
+            place = asdict(mistake.places[-1])
+        asked_by = [str(outer) for outer in mistake.places[:-1]]
+        said.append({**place, "sentence": mistake.sentence, "asked_by": asked_by})
+    return {"mistakes": said}
 
 
 def _print_version(asked: bool) -> None:

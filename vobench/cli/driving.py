@@ -1,6 +1,5 @@
 """vobench drive."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,11 +8,11 @@ import numpy as np
 
 from vobench.catalog import catalog
 from vobench.cli import terminal
-from vobench.errors import InputError, UnknownNameError, VobenchError
+from vobench.errors import InputError, UnknownNameError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.pipeline.motion import Travel, travel_of
-from vobench.pipeline.passage import check_case
+from vobench.pipeline.passage import check_cases
 from vobench.pipeline.sense import wheel_error_m
 from vobench.report.drive_plot import ENDINGS, DriveLog, save_plot
 from vobench.suite.expand import Case, Plan, read_plan
@@ -96,15 +95,9 @@ def drive_one(plan: Plan, name: str) -> Driven:
     cases = [case for case in plan.simulated if case.variant["trajectory"] == name]
     with plan.at("trajectories", name):
         travel = travel_of(cases[0])
-    refusals = dict.fromkeys(said for case in cases for said in _refusals(plan, case, travel))
-    return Driven(name, cases[0], travel, travel.at_frames(), tuple(refusals))
-
-
-def _refusals(plan: Plan, case: Case, travel: Travel) -> Iterator[str]:
-    try:
-        check_case(plan, case, travel)
-    except VobenchError as error:
-        yield str(error)
+    wrong = plan.mistakes()
+    check_cases(cases, travel, wrong)
+    return Driven(name, cases[0], travel, travel.at_frames(), tuple(dict.fromkeys(map(str, wrong.found))))
 
 
 def log_of(driven: Driven) -> DriveLog:

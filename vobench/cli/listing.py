@@ -26,8 +26,11 @@ def show(kind: str | None, *, as_json: bool) -> None:
     if as_json:
         terminal.print_json({"entries": facts})
         return
-    rows = [[f["kind"], f["name"] + (" (hidden)" if f["hidden"] else ""), f["summary"], f["path"]] for f in facts]
-    terminal.console().print(terminal.table("", ["kind", "name", "summary", "path"], rows))
+    columns = ["kind", "name", "summary", "origin", "path"]
+    rows = [
+        [f[column] + (" (hidden)" if column == "name" and f["hidden"] else "") for column in columns] for f in facts
+    ]
+    terminal.console().print(terminal.table("", columns, rows))
 
 
 def _kinds(kind: str | None) -> tuple[Kind, ...]:
@@ -40,7 +43,13 @@ def _kinds(kind: str | None) -> tuple[Kind, ...]:
 
 
 def _facts(entry: Entry) -> dict[str, Any]:
-    return {"kind": entry.kind, "name": entry.name, "summary": _summary(entry), "path": str(entry.path)}
+    return {
+        "kind": entry.kind,
+        "name": entry.name,
+        "summary": _summary(entry),
+        "origin": entry.origin,
+        "path": str(entry.path),
+    }
 
 
 def _summary(entry: Entry) -> str:
@@ -56,7 +65,8 @@ def _summary(entry: Entry) -> str:
     try:
         return _checked_summary(entry)
     except VobenchError as error:
-        return f"unreadable: {error}"
+        more = len(error.mistakes) - 1
+        return f"unreadable: {error.mistakes[0]}{f' (and {more} more)' if more else ''}"
 
 
 def _checked_summary(entry: Entry) -> str:

@@ -28,8 +28,7 @@ def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) ->
     from vobench.report.table import as_json as boards_as_json
 
     planned = read_plan(suite, only_estimators=estimators)
-    travel_all(planned)
-    _read_recordings(planned)
+    _preflight(planned)
     _require_writable("--out", out)
     _require_writable("VOBENCH_CACHE", default_store().root)
     shop = Workshop(default_store(), terminal.Bars())
@@ -55,27 +54,40 @@ def _require_writable(what: str, folder: Path) -> None:
         raise InputError(f"{what} should be a folder that can be written ({cause}): {folder}")
 
 
+def _preflight(planned: Plan) -> "tuple[dict[str, Travel], dict[str, Recording]]":
+    """Where bodies go and what recordings hold. Raises SuiteError with all that cannot be."""
+    travels, wrong = dict[str, Travel](), planned.mistakes()
+    recordings: dict[str, Recording] = {}
+    with wrong.at():
+        travels = travel_all(planned)
+    with wrong.at():
+        recordings = _read_recordings(planned)
+    wrong.require_none()
+    return travels, recordings
+
+
 def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     """Validate a suite and print what it comes to."""
     planned = read_plan(suite, only_estimators=estimators)
-    travels, recordings = travel_all(planned), _read_recordings(planned)
+    travels, recordings = _preflight(planned)
     cases = [_case_facts(case, travels) for case in planned.simulated]
     cases += [_recorded_facts(case, recordings[case.name]) for case in planned.recorded]
     entrants = [
         {"estimator": e.label, "version": e.manifest.version, "needs": list(e.manifest.needs), "path": str(e.folder)}
         for e in planned.entrants
     ]
+    found = [{"kind": e.kind, "name": e.name, "origin": e.origin, "path": str(e.path)} for e in planned.found]
     runs = sum(len(planned.runs(case)) for case in planned.cases)
     if as_json:
-        terminal.print_json({"suite": planned.suite.name, "cases": cases, "estimators": entrants, "runs": runs})
+        said = {"suite": planned.suite.name, "cases": cases, "estimators": entrants, "runs": runs, "found": found}
+        terminal.print_json(said)
         return
     rows = [[f["case"], str(f["frames"]), f"{f['duration_s']:.1f}", f["sequence"]] for f in cases]
     out = terminal.console()
     out.print(terminal.table(f"{planned.suite.name}: cases", ["case", "frames", "seconds", "sequence"], rows))
-    lines = [
-        [e.label, e.manifest.version, ", ".join(e.manifest.needs) or "nothing", str(e.folder)] for e in planned.entrants
-    ]
-    out.print(terminal.table("estimators", ["estimator", "version", "needs", "path"], lines))
+    lines = [[e.label, e.manifest.version, ", ".join(e.manifest.needs) or "nothing"] for e in planned.entrants]
+    out.print(terminal.table("estimators", ["estimator", "version", "needs"], lines))
+    out.print(terminal.table("found", ["kind", "name", "origin", "path"], [[*each.values()] for each in found]))
     for case in cases:
         for note in case.get("notes", []):
             out.print(f"{case['case']}: {note}")

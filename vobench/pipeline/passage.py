@@ -1,42 +1,57 @@
 """Whether a suite's bodies can go where they are sent: known before anything is rendered."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from vobench import stop
+from vobench.catalog.yaml_file import Mistakes
 from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.pipeline.motion import Travel, travel_of
 from vobench.suite.expand import Case, Plan
 from vobench.suite.replay_spec import ReplaySpec
+from vobench.suite.scene_file import movers
 
 
 def travel_all(plan: Plan) -> dict[str, Travel]:
     """The travel of each trajectory of a plan, by its name: said before hours of rendering.
 
-    Raises SuiteError or MotionError where a target cannot be reached, a way ends within a frame, a camera
+    Raises SuiteError with all that is wrong: a target cannot be reached, a way ends within a frame, a camera
     leaves the room, its pictures take longer than a frame, or an IMU would feel the noise of a recording.
     """
-    travels: dict[str, Travel] = {}
-    for case in plan.simulated:
+    travels, wrong = dict[str, Travel](), plan.mistakes()
+    for name, cases in _by(plan.simulated, "trajectory").items():
         stop.check()
-        name = case.variant["trajectory"]
-        with plan.at("trajectories", name):
-            if name not in travels:
-                travels[name] = travel_of(case)
-        check_case(plan, case, travels[name])
+        with wrong.at("trajectories", name):
+            travels[name] = travel_of(cases[0])
+            check_cases(cases, travels[name], wrong)
+    wrong.require_none()
     return travels
 
 
-def check_case(plan: Plan, case: Case, travel: Travel) -> None:
-    """Raise SuiteError or MotionError where this case cannot be: `travel` is its trajectory's."""
-    with plan.at("trajectories", case.variant["trajectory"]):
-        _check_lasts(case, travel)
-        _check_in_room(case, travel)
-        _check_smooth(case)
-    with plan.at("cameras", case.variant["camera"]):
-        _check_fits_frame(case)
+def check_cases(cases: Sequence[Case], travel: Travel, wrong: Mistakes) -> None:
+    """Gather why these cases of one trajectory cannot be: `travel` is the trajectory's."""
+    trajectory = cases[0].variant["trajectory"]
+    with wrong.at("trajectories", trajectory):
+        _check_lasts(cases[0], travel)
+    for case, *_ in _by(cases, "scene", "rig").values():
+        with wrong.at("trajectories", trajectory):
+            _check_in_room(case, travel)
+            _check_smooth(case)
+    for camera, (case, *_) in _by(cases, "camera").items():
+        with wrong.at("cameras", camera):
+            _check_fits_frame(case)
+
+
+def _by(cases: Sequence[Case], *axes: str) -> dict[str, list[Case]]:
+    """The cases of each combination of variants on these axes."""
+    of = dict[str, list[Case]]()
+    for case in cases:
+        of.setdefault(" ".join(case.variant[axis] for axis in axes), []).append(case)
+    return of
 
 
 def _check_lasts(case: Case, travel: Travel) -> None:
@@ -81,7 +96,7 @@ def _check_in_room(case: Case, travel: Travel) -> None:
             T_world_box = se3.transform(se3.rotation_z(np.deg2rad(b.yaw_deg)), b.center_m)
             inside = _within(at_m, T_world_box, b.size_m)
             _refuse(case, travel, at_m, inside, f"is inside the box of {b.material} at {b.center_m} m")
-        for spec, mover in zip(case.scene.movers, case.build_scene().movers, strict=True):
+        for spec, mover in zip(case.scene.movers, movers(case.scene), strict=True):
             T_world_mover = np.stack([mover.path.pose(t_ns) for t_ns in travel.t_ns])
             inside = _within(at_m, T_world_mover, spec.size_m)
             _refuse(case, travel, at_m, inside, f"is inside the mover '{spec.name}'")

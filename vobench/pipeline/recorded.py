@@ -20,15 +20,16 @@ LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "mcap", "rosbags")
 def read_all(plan: Plan) -> dict[str, Recording]:
     """The recording of each recorded case by its name: said before hours of work.
 
-    Raises SuiteError, at the place in the suite's file, where one cannot be read or has no ground truth.
+    Raises SuiteError, with the places in the suite's file, where some cannot be read or have no ground truth.
     """
-    recordings = {}
+    recordings, wrong = dict[str, Recording](), plan.mistakes()
     for case in plan.recorded:
         stop.check()
-        with plan.at("source", case.entry):
+        with wrong.at("source", case.entry):
             recordings[case.name] = recording = read_case(case)
             if cause := _why_not_scored(recording):
                 raise SuiteError(f"{cause}, so nothing could be scored: {case.source.path}")
+    wrong.require_none()
     return recordings
 
 

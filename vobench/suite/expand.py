@@ -2,23 +2,23 @@
 
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 from vobench.catalog import catalog, yaml_file
+from vobench.catalog.catalog import Entry, Kind
 from vobench.catalog.manifest import Manifest, read_manifest
-from vobench.catalog.yaml_file import Source
+from vobench.catalog.yaml_file import Mistakes, Source
 from vobench.errors import SuiteError
-from vobench.geometry.calibration import CalibrationError, true_rig
-from vobench.geometry.preset import PRESETS
-from vobench.geometry.rig import Rig, mounted
+from vobench.geometry.rig import Rig
 from vobench.scene.scene import Scene
 from vobench.suite import scene_file
 from vobench.suite.camera_spec import CameraSpec
 from vobench.suite.light_spec import LightOverride
-from vobench.suite.model import EstimatorSpec, RigSpec, Suite
+from vobench.suite.model import EstimatorSpec, RigSpec, Suite, missing_axis
 from vobench.suite.rendering_spec import ChannelName, RenderingSpec
 from vobench.suite.replay_spec import ReplaySpec, read_replayed, read_times
 from vobench.suite.scene_spec import SceneFile
@@ -55,21 +55,11 @@ class Case(Strict):
 
     def build_rig(self) -> Rig:
         """The sensors on the body as their calibration has them: what estimators are told."""
-        r, preset = self.rig, PRESETS[self.rig.lens]
-        cameras = mounted(
-            preset.left,
-            preset.right,
-            preset.T_left_right if r.baseline_m is None else preset.at_baseline(r.baseline_m),
-            pitch_deg=r.pitch_deg,
-            forward_m=r.forward_m,
-            height_m=r.height_m,
-        )
-        imu = r.imu.build().calibration if r.imu else None
-        return replace(cameras, wheels=wheels_of(self.trajectory), imu=imu)
+        return replace(self.rig.build(), wheels=wheels_of(self.trajectory))
 
     def build_true_rig(self) -> Rig:
         """The stereo pair as it is: what pictures are made with. Raises VobenchError, as `true_rig` does."""
-        return true_rig(self.build_rig(), CalibrationError(**self.rig.calibration_error.model_dump()))
+        return self.rig.made_true(self.build_rig())
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,12 +88,16 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What a suite comes to: cases × entrants × repeats; `source` is the suite's file."""
+    """What a suite comes to: cases × entrants × repeats.
+
+    `found` are the scenes and estimators that its names were taken for; `source` is the suite's file.
+    """
 
     suite: Suite
     simulated: tuple[Case, ...]
     recorded: tuple[RecordedCase, ...]
     entrants: tuple[Entrant, ...]
+    found: tuple[Entry, ...] = ()
     source: Source | None = None
 
     @property
@@ -117,55 +111,182 @@ class Plan:
 
     def at(self, *keys: int | str) -> AbstractContextManager[None]:
         """Errors of the block name this place in the suite's file."""
-        return _at(self.source, *keys)
+        return self.source.at(*keys) if self.source else nullcontext()
+
+    def mistakes(self) -> Mistakes:
+        """To gather what is wrong with the suite."""
+        return Mistakes(self.source)
 
 
 def read_plan(name: str, *, only_estimators: tuple[str, ...] = ()) -> Plan:
     """The plan of the suite of that name, or in that file. Raises SuiteError or UnknownNameError."""
-    suite, source = yaml_file.read_marked(catalog.find("suite", name).path, Suite)
-    return plan(suite, source=source, only_estimators=only_estimators)
+    reading = yaml_file.read_all(catalog.find("suite", name).path, Suite)
+    wrong = Mistakes(reading.source, list(reading.mistakes))
+    meant = {key for said in reading.source.marked for key in get_close_matches(str(said), Suite.model_fields, n=1)}
+    with wrong.at():
+        if wrong.found and (missing := missing_axis(meant)):
+            raise SuiteError(missing)
+    return _Planner(reading.model, wrong).plan(only_estimators)
 
 
-def plan(suite: Suite, *, source: Source | None = None, only_estimators: tuple[str, ...] = ()) -> Plan:
+def plan(suite: Suite) -> Plan:
     """Resolve all names in a suite; nothing is simulated and no estimator's code is imported."""
-    if only_estimators:
-        entrants = [_entrant(_asked_for(name, suite.estimators)) for name in only_estimators]
-    else:
-        entrants = [_listed(spec, index, source) for index, spec in enumerate(suite.estimators)]
-    for index, entrant in enumerate(entrants):
-        if entrant.label in [earlier.label for earlier in entrants[:index]]:
-            with nullcontext() if only_estimators else _at(source, "estimators", index):
-                raise SuiteError(f"two estimators are called '{entrant.label}'; give one a label of its own")
-    simulated = tuple(_cases(suite, source))
-    recorded = tuple(_recorded(suite, source, taken={case.name for case in simulated}))
-    return Plan(suite, simulated, recorded, tuple(entrants), source)
+    return _Planner(suite, Mistakes(None)).plan()
 
 
-def _at(source: Source | None, *keys: int | str) -> AbstractContextManager[None]:
-    return source.at(*keys) if source else nullcontext()
+@dataclass(frozen=True, slots=True)
+class _Planner:
+    """Resolves the names in a suite, of which entries or sections may be missing, and gathers what is wrong."""
+
+    suite: Suite
+    wrong: Mistakes
+    found: list[Entry] = field(default_factory=list)
+
+    def plan(self, only_estimators: tuple[str, ...] = ()) -> Plan:
+        """The plan. Raises SuiteError with all that is wrong."""
+        entrants = self._entrants(only_estimators)
+        scenes, replayed = self._scenes(), self._replayed()
+        self._check_rigs()
+        axes = self._axes(scenes)
+        recorded = self._recorded({name for name, _ in _combinations(axes)})
+        self.wrong.require_none()
+        simulated = tuple(self._case(name, variant, scenes, replayed) for name, variant in _combinations(axes))
+        return Plan(self.suite, simulated, recorded, entrants, tuple(self.found), self.wrong.source)
+
+    def _file(self) -> Path | None:
+        return self.wrong.source.path.resolve() if self.wrong.source else None
+
+    def _folder(self) -> Path:
+        """Where relative paths in a suite start: at its file."""
+        return self.wrong.source.path.parent if self.wrong.source else Path.cwd()
+
+    def _find(self, kind: Kind, name: str) -> Entry:
+        entry = catalog.find(kind, name, suite=self._file())
+        self.found.append(entry)
+        return entry
+
+    def _entrants(self, only: tuple[str, ...]) -> tuple[Entrant, ...]:
+        listed = dict(enumerate(getattr(self.suite, "estimators", ())))
+        if only:
+            return self._asked_for(only, listed)
+        entrants = list[Entrant]()
+        for index, spec in listed.items():
+            with self.wrong.at("estimators", index):
+                entrant = self._entrant(spec, index)
+                _require_new_label(entrant, entrants)
+                entrants.append(entrant)
+        return tuple(entrants)
+
+    def _asked_for(self, only: tuple[str, ...], listed: dict[int, EstimatorSpec]) -> tuple[Entrant, ...]:
+        """The suite's own entries of these labels, else estimators of these names with their defaults.
+
+        Raises UnknownNameError and SuiteError, for it is not the suite that is wrong.
+        """
+        entrants = list[Entrant]()
+        for name in only:
+            indexes = [index for index, spec in listed.items() if name == (spec.label or spec.name)]
+            entrant = (
+                self._entrant(listed[indexes[0]], indexes[0]) if indexes else self._entrant(EstimatorSpec(name=name))
+            )
+            _require_new_label(entrant, entrants)
+            entrants.append(entrant)
+        return tuple(entrants)
+
+    def _entrant(self, spec: EstimatorSpec, index: int | None = None) -> Entrant:
+        folder = self._find("estimator", spec.name).path
+        manifest = read_manifest(folder)
+        for key, value in spec.params.items():
+            with self.wrong.at("estimators", index or 0, "params", key):
+                _check_param(key, value, manifest.params)
+        return Entrant(spec.label or manifest.name, folder, manifest, {**manifest.params, **spec.params})
+
+    def _scenes(self) -> dict[str, SceneFile]:
+        """The scenes by their files' names, which name a case's place on this axis; lightings are checked on each."""
+        scenes: dict[str, SceneFile] = {}
+        for index, name in enumerate(self.suite.scenes):
+            with self.wrong.at("scenes", index):
+                entry = self._find("scene", name)
+                if entry.name in scenes:
+                    raise SuiteError(
+                        f"two scenes are called '{entry.name}'; give each once, from files of different names"
+                    )
+                scenes[entry.name], wrong = scene_file.survey(entry.path)
+                self._check_lightings(scenes[entry.name], wrong)
+                wrong.require_none()
+                scene_file.build(scenes[entry.name], {})
+        return scenes
+
+    def _check_lightings(self, scene: SceneFile, wrong: Mistakes) -> None:
+        """A lighting that names no lamp is an error now, not after an hour."""
+        lights = () if wrong.found else scene_file.lights(scene)
+        for lighting, overrides in self.suite.lightings.items():
+            for name, override in overrides.items():
+                with self.wrong.at("lightings", lighting, name):
+                    if wrong.found and wrong.source:
+                        scene_file.require_possible(name, wrong.source)
+                    else:
+                        scene_file.lit(lights, {name: override})
+
+    def _check_rigs(self) -> None:
+        """So is a rig whose distortion is off, on a lens without any."""
+        for name, rig in self.suite.rigs.items():
+            with self.wrong.at("rigs", name):
+                rig.made_true(rig.build())
+
+    def _replayed(self) -> dict[str, str]:
+        """What the files of replayed trajectories hold, by the trajectories' names."""
+        texts = dict[str, str]()
+        for name, spec in self.suite.trajectories.items():
+            if isinstance(spec, ReplaySpec):
+                with self.wrong.at("trajectories", name, "times"):
+                    times = read_times(spec, self._folder())
+                    with self.wrong.at("trajectories", name, "file"):
+                        texts[name] = read_replayed(spec, self._folder(), times)
+        return texts
+
+    def _axes(self, scenes: dict[str, SceneFile]) -> tuple[dict[str, Any], ...]:
+        suite = self.suite
+        return scenes, suite.lightings, suite.rigs, suite.trajectories, suite.cameras
+
+    def _case(self, name: str, variant: dict[str, str], scenes: dict[str, SceneFile], replayed: dict[str, str]) -> Case:
+        suite = self.suite
+        return Case(
+            name=name,
+            variant=variant,
+            scene=scenes[variant["scene"]],
+            lighting=suite.lightings[variant["lighting"]],
+            rig=suite.rigs[variant["rig"]],
+            trajectory=suite.trajectories[variant["trajectory"]],
+            replayed=replayed.get(variant["trajectory"]),
+            camera=suite.cameras[variant["camera"]],
+            rendering=suite.rendering,
+            truth=suite.truth,
+            seed=suite.seed,
+        )
+
+    def _recorded(self, taken: set[str]) -> tuple[RecordedCase, ...]:
+        """The recordings, none of them called as another case is."""
+        recorded = list[RecordedCase]()
+        for index, spec in enumerate(self.suite.source):
+            with self.wrong.at("source", index):
+                cases = list(recorded_cases(spec, self._folder(), entry=index))
+                recorded += cases
+                _require_new(cases, taken)
+            taken = taken | {case.name for case in recorded}
+        return tuple(recorded)
 
 
-def _folder(source: Source | None) -> Path:
-    """Where relative paths in a suite start: at its file."""
-    return source.path.parent if source else Path.cwd()
+def _combinations(axes: tuple[dict[str, Any], ...]) -> Iterator[tuple[str, dict[str, str]]]:
+    """The name of each case, of those variants that there is a choice of, and its place on each axis."""
+    for names in product(*axes):
+        differing = [name for name, axis in zip(names, axes, strict=True) if len(axis) > 1]
+        variant = dict(zip(AXES, names, strict=True))
+        yield "-".join(differing) or variant["trajectory"], variant
 
 
-def _asked_for(name: str, specs: tuple[EstimatorSpec, ...]) -> EstimatorSpec:
-    """The suite's own entry of that label, else the estimator of that name with its defaults."""
-    return next((spec for spec in specs if name == (spec.label or spec.name)), EstimatorSpec(name=name))
-
-
-def _listed(spec: EstimatorSpec, index: int, source: Source | None) -> Entrant:
-    with _at(source, "estimators", index):
-        return _entrant(spec)
-
-
-def _entrant(spec: EstimatorSpec) -> Entrant:
-    folder = catalog.find("estimator", spec.name).path
-    manifest = read_manifest(folder)
-    for key, value in spec.params.items():
-        _check_param(key, value, manifest.params)
-    return Entrant(spec.label or manifest.name, folder, manifest, {**manifest.params, **spec.params})
+def _require_new_label(entrant: Entrant, earlier: list[Entrant]) -> None:
+    if entrant.label in [other.label for other in earlier]:
+        raise SuiteError(f"two estimators are called '{entrant.label}'; give one a label of its own")
 
 
 def _check_param(key: str, value: Any, defaults: dict[str, Any]) -> None:
@@ -177,70 +298,12 @@ def _check_param(key: str, value: Any, defaults: dict[str, Any]) -> None:
         raise SuiteError(f"parameter '{key}' should be of the kind of its default {defaults[key]!r}, got {value!r}")
 
 
-def _cases(suite: Suite, source: Source | None) -> Iterator[Case]:
-    scenes, replayed = _scenes(suite, source), _replayed(suite, source)
-    axes: list[dict[str, Any]] = [scenes, suite.lightings, suite.rigs, suite.trajectories, suite.cameras]
-    for names in product(*axes):
-        scene, lighting, rig, trajectory, camera = names
-        differing = [name for name, axis in zip(names, axes, strict=True) if len(axis) > 1]
-        case = Case(
-            name="-".join(differing) or trajectory,
-            variant=dict(zip(AXES, names, strict=True)),
-            scene=scenes[scene],
-            lighting=suite.lightings[lighting],
-            rig=suite.rigs[rig],
-            trajectory=suite.trajectories[trajectory],
-            replayed=replayed.get(trajectory),
-            camera=suite.cameras[camera],
-            rendering=suite.rendering,
-            truth=suite.truth,
-            seed=suite.seed,
-        )
-        with _at(source, "lightings", lighting):
-            case.build_scene()  # a lighting that names no lamp is an error now, not after an hour
-        with _at(source, "rigs", rig):
-            case.build_true_rig()  # nor one whose distortion is off, on a lens without any
-        yield case
-
-
-def _recorded(suite: Suite, source: Source | None, *, taken: set[str]) -> Iterator[RecordedCase]:
-    """The recordings of a suite; a relative path starts at the suite's file."""
-    folder = _folder(source)
-    for index, spec in enumerate(suite.source):
-        with _at(source, "source", index):
-            cases = list(recorded_cases(spec, folder, entry=index))
-            _require_new(cases, taken)
-        taken = taken | {case.name for case in cases}
-        yield from cases
-
-
 def _require_new(cases: list[RecordedCase], taken: set[str]) -> None:
-    """Raise SuiteError for the first that is called as another case is."""
+    """Raise SuiteError with all that are called as another case is."""
+    wrong = list[str]()
     for case in cases:
         if case.name in taken:
-            raise SuiteError(f"two cases are called '{case.name}'; name one another: {case.source.path}")
+            wrong.append(f"two cases are called '{case.name}'; name one another: {case.source.path}")
         taken = taken | {case.name}
-
-
-def _replayed(suite: Suite, source: Source | None) -> dict[str, str]:
-    """What the files of replayed trajectories hold, by the trajectories' names; a relative path as for recordings."""
-    texts, folder = dict[str, str](), _folder(source)
-    for name, spec in suite.trajectories.items():
-        if isinstance(spec, ReplaySpec):
-            with _at(source, "trajectories", name, "times"):
-                times = read_times(spec, folder)
-            with _at(source, "trajectories", name, "file"):
-                texts[name] = read_replayed(spec, folder, times)
-    return texts
-
-
-def _scenes(suite: Suite, source: Source | None) -> dict[str, SceneFile]:
-    """The scenes by their files' names, which name a case's place on this axis."""
-    scenes: dict[str, SceneFile] = {}
-    for index, name in enumerate(suite.scenes):
-        with _at(source, "scenes", index):
-            entry = catalog.find("scene", name)
-            if entry.name in scenes:
-                raise SuiteError(f"two scenes are called '{entry.name}'; give each once, from files of different names")
-            scenes[entry.name] = scene_file.read_scene(entry.path)
-    return scenes
+    if wrong:
+        raise SuiteError(*wrong)

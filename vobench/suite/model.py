@@ -1,10 +1,14 @@
 """What a suite's YAML may say: the axes of its cases, and the estimators that run on each."""
 
+from collections.abc import Collection
+from dataclasses import replace
 from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from vobench.geometry.calibration import CalibrationError, true_rig
 from vobench.geometry.preset import PRESETS
+from vobench.geometry.rig import Rig, mounted
 from vobench.suite.camera_spec import CameraSpec
 from vobench.suite.imu_spec import ImuSpec
 from vobench.suite.imu_spec import named as named_imu
@@ -20,6 +24,7 @@ def _named(value: Any) -> Any:
     return {"name": value} if isinstance(value, str) else value
 
 
+NEEDED = ("scenes", "rigs", "trajectories")
 Ratio = Annotated[float, Field(gt=-1, lt=1)]
 Angle = Annotated[float, Field(ge=-10, le=10)]
 
@@ -49,6 +54,23 @@ class RigSpec(Strict):
     height_m: float = 0.4
     calibration_error: CalibrationErrorSpec = CalibrationErrorSpec()
     imu: Annotated[ImuSpec, BeforeValidator(named_imu)] | None = None
+
+    def build(self) -> Rig:
+        """The sensors on the body as their calibration has them."""
+        preset = PRESETS[self.lens]
+        cameras = mounted(
+            preset.left,
+            preset.right,
+            preset.T_left_right if self.baseline_m is None else preset.at_baseline(self.baseline_m),
+            pitch_deg=self.pitch_deg,
+            forward_m=self.forward_m,
+            height_m=self.height_m,
+        )
+        return replace(cameras, imu=self.imu.build().calibration if self.imu else None)
+
+    def made_true(self, nominal: Rig) -> Rig:
+        """The rig as it is, of one as its calibration has it. Raises VobenchError, as `true_rig` does."""
+        return true_rig(nominal, CalibrationError(**self.calibration_error.model_dump()))
 
 
 class EstimatorSpec(Strict):
@@ -81,9 +103,15 @@ class Suite(Strict):
 
     @model_validator(mode="after")
     def _has_cases(self) -> Self:
-        """Scenes, rigs and trajectories are all there, or none of them and a source."""
-        axes = {"scenes": self.scenes, "rigs": self.rigs, "trajectories": self.trajectories}
-        missing = [name for name, variants in axes.items() if not variants]
-        if missing and not (self.source and len(missing) == len(axes)):
-            raise ValueError(f"{missing[0]}: this key is missing; a suite has {', '.join(axes)}, or a source alone")
+        if missing := missing_axis({name for name in type(self).model_fields if getattr(self, name)}):
+            raise ValueError(missing)
         return self
+
+
+def missing_axis(given: Collection[str]) -> str | None:
+    """What a suite with these keys lacks: it has scenes, rigs and trajectories, or none of them and a source."""
+    missing = [name for name in NEEDED if name not in given]
+    if missing and not ("source" in given and len(missing) == len(NEEDED)):
+        said = "this key is missing" if len(missing) == 1 else "these keys are missing"
+        return f"{', '.join(missing)}: {said}; a suite has {', '.join(NEEDED)}, or a source alone"
+    return None

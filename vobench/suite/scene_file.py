@@ -1,14 +1,15 @@
 """Reads a scene's YAML, checks the names in it, and builds the scene it describes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from vobench.catalog import yaml_file
 from vobench.catalog.catalog import unknown
-from vobench.catalog.yaml_file import Keys
+from vobench.catalog.yaml_file import Keys, Mistakes, Source
 from vobench.errors import SuiteError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
@@ -35,57 +36,120 @@ from vobench.suite.strict import Triple
 Lighting = dict[str, LightOverride]
 # Names of the lights that there is one of.
 SUN, SKY = "sun", "sky"
+# How names begin that we give to what has none.
+GIVEN_NAMES = ("box_", "board_", "window_", "wall_", "floor", "ceiling")
 MIRROR_TINT, CLEAR_TINT = 0.9, 1.0
 TOUCHING_M = 1e-6  # windows may share a border
 
 
 def read_scene(path: Path) -> SceneFile:
-    """The scene in a file. Raises SuiteError, one line with its place, where it is wrong or names no material."""
-    spec, source = yaml_file.read_marked(path, SceneFile)
-    for keys, name in _materials_used(spec):
-        with source.at(*keys):
-            if name not in spec.materials:
-                raise SuiteError(unknown("material", name, list(spec.materials)))
-            if keys[0] == "movers" and spec.materials[name].kind == "luminous":
-                raise SuiteError(f"'{name}' shines, and what moves cannot; choose a material of another kind")
-    strengths = [lamp.power_lm for lamp in spec.lamps] + [sky.illuminance_lx for sky in (spec.sun, spec.sky) if sky]
-    if not (any(strengths) or any(m.kind == "luminous" for m in spec.materials.values())):
-        zero = "; all that it has are 0" if strengths else ""
-        raise SuiteError(f"{path}: a scene needs a light: lamps, a sun, a sky or a luminous material{zero}")
-    for keys, place_m in _places(spec):
-        with source.at(*keys):
-            if not spec.room.holds(place_m):
-                raise SuiteError(f"should be inside the room, {spec.room.extent} (got {list(place_m)})")
-    for index in range(len(spec.room.windows)):
-        with source.at("room", "windows", index):
-            _check_window(index, spec)
-    _check_names(spec, source)
+    """The scene in a file. Raises SuiteError with all that is wrong, each with its place."""
+    spec, wrong = survey(path)
+    wrong.require_none()
     return spec
+
+
+def survey(path: Path) -> tuple[SceneFile, Mistakes]:
+    """The scene in a file and all that is wrong with it; where anything is, the scene lacks sections and entries."""
+    reading = yaml_file.read_all(path, SceneFile)
+    spec, source = reading.model, reading.source
+    wrong = Mistakes(source, list(reading.mistakes))
+    materials = source.marked.get("materials")
+    for keys, name in _materials_used(spec) if isinstance(materials, dict) else ():
+        with wrong.at(*keys):
+            if name not in materials:
+                raise SuiteError(unknown("material", name, list(materials)))
+            if keys[0] == "movers" and name in spec.materials and spec.materials[name].kind == "luminous":
+                raise SuiteError(f"'{name}' shines, and what moves cannot; choose a material of another kind")
+    if not reading.mistakes:
+        with wrong.at():
+            _check_light(spec)
+    if "room" in spec.model_fields_set:
+        _check_room(spec, wrong)
+    _check_names(spec, source, wrong)
+    return spec, wrong
 
 
 def build(spec: SceneFile, lighting: Lighting) -> Scene:
     """The scene under a lighting. Raises SuiteError where the lighting names a light that is not there."""
-    surfaces = [*_room(spec), *_furniture(spec)]
-    luminous = {name: m.luminance_cd_m2 for name, m in spec.materials.items() if m.luminance_cd_m2 is not None}
-    lights = [*_lights(spec), *_glowing(surfaces, luminous)]
-    for name in lighting:
-        if name not in [light.name for light in lights]:
-            raise SuiteError(f"lighting: {unknown('light', name, [light.name for light in lights])}")
+    surfaces, luminous = _surfaces(spec), _luminous(spec)
     return Scene(
         name=spec.name,
         surfaces=tuple(surface for surface in surfaces if surface.material not in luminous),
         materials={name: _material(m) for name, m in spec.materials.items() if name not in luminous},
-        lights=tuple(_lit(light, lighting[light.name]) if light.name in lighting else light for light in lights),
-        movers=tuple(_mover(mover) for mover in spec.movers),
+        lights=lit(tuple(_lights(spec, surfaces)), lighting),
+        movers=movers(spec),
     )
 
 
+def lights(spec: SceneFile) -> tuple[Light, ...]:
+    """The lights as the scene has them."""
+    return tuple(_lights(spec, _surfaces(spec)))
+
+
+def lit(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, ...]:
+    """The lights under a lighting. Raises SuiteError where it names one that is not there, or asks what cannot be."""
+    names = {light.name: None for light in lights}
+    for name in lighting:
+        if name not in names:
+            raise SuiteError(f"lighting: {unknown('light', name, list(names))}")
+    return tuple(_lit(light, lighting[light.name]) if light.name in lighting else light for light in lights)
+
+
+def require_possible(name: str, source: Source) -> None:
+    """Raise SuiteError where no light can be called so, in a scene that is read only in part."""
+    named = [*_names_in(source.marked), *(sky for sky in (SUN, SKY) if sky in source.marked)]
+    if name.partition(".")[0] not in named and not name.startswith(GIVEN_NAMES):
+        raise SuiteError(f"lighting: {unknown('light', name, named)}")
+
+
+def _names_in(tree: Any) -> Iterator[str]:
+    """The names of all things that a file holds."""
+    for value in tree.values() if isinstance(tree, dict) else tree if isinstance(tree, list) else ():
+        if isinstance(value, dict) and isinstance(value.get("name"), str):
+            yield str(value["name"])
+        yield from _names_in(value)
+
+
+def movers(spec: SceneFile) -> tuple[scripted.Mover, ...]:
+    """What moves."""
+    return tuple(_mover(mover) for mover in spec.movers)
+
+
+def _luminous(spec: SceneFile) -> dict[str, float]:
+    return {name: m.luminance_cd_m2 for name, m in spec.materials.items() if m.luminance_cd_m2 is not None}
+
+
+def _surfaces(spec: SceneFile) -> list[Surface]:
+    return [*_room(spec), *_furniture(spec)]
+
+
+def _check_light(spec: SceneFile) -> None:
+    """Raise SuiteError where all would be dark."""
+    strengths = [lamp.power_lm for lamp in spec.lamps] + [sky.illuminance_lx for sky in (spec.sun, spec.sky) if sky]
+    if not (any(strengths) or _luminous(spec)):
+        zero = "; all that it has are 0" if strengths else ""
+        raise SuiteError(f"a scene needs a light: lamps, a sun, a sky or a luminous material{zero}")
+
+
+def _check_room(spec: SceneFile, wrong: Mistakes) -> None:
+    """Gather what is outside the room, and windows that do not fit their wall."""
+    for keys, place_m in _places(spec):
+        with wrong.at(*keys):
+            if not spec.room.holds(place_m):
+                raise SuiteError(f"should be inside the room, {spec.room.extent} (got {list(place_m)})")
+    for index in range(len(spec.room.windows)):
+        with wrong.at("room", "windows", index):
+            _check_window(index, spec)
+
+
 def _materials_used(spec: SceneFile) -> Iterator[tuple[Keys, str]]:
-    for part in ("floor", "wall", "ceiling"):
-        yield ("room", part), getattr(spec.room, part)
-    for index, window in enumerate(spec.room.windows):
-        yield ("room", "windows", index, "pane"), window.pane
-        yield ("room", "windows", index, "reveal"), window.reveal
+    if "room" in spec.model_fields_set:
+        for part in ("floor", "wall", "ceiling"):
+            yield ("room", part), getattr(spec.room, part)
+        for index, window in enumerate(spec.room.windows):
+            yield ("room", "windows", index, "pane"), window.pane
+            yield ("room", "windows", index, "reveal"), window.reveal
     for kind in ("boxes", "boards", "movers"):
         for index, thing in enumerate(getattr(spec, kind)):
             yield (kind, index, "material"), thing.material
@@ -98,21 +162,17 @@ def _places(spec: SceneFile) -> Iterator[tuple[Keys, Triple]]:
         yield from ((("movers", index, "path", nth), key.position_m) for nth, key in enumerate(mover.path))
 
 
-def _check_names(spec: SceneFile, source: yaml_file.Source) -> None:
+def _check_names(spec: SceneFile, source: Source, wrong: Mistakes) -> None:
     """Lights are named by lightings, and things by ground truth: no name twice, a name given by us included."""
-    seen = {SUN, SKY, *(surface.instance for surface in _room(spec))}
-    for kind, index, name in _named(spec):
-        if name in seen:
-            with source.at(kind, index):
-                raise SuiteError(f"two things are called '{name}'; give one another name")
-        seen.add(name)
-
-
-def _named(spec: SceneFile) -> Iterator[tuple[str, int, str]]:
-    """Every lamp, box, board and mover: its kind, its place in the list, and what it is called."""
+    has_room = "room" in spec.model_fields_set
+    seen = {SUN, SKY, *(surface.instance for surface in (_room(spec) if has_room else ()))}
     for kind, unnamed in (("lamps", ""), ("boxes", "box"), ("boards", "board"), ("movers", "")):
         for index, thing in enumerate(getattr(spec, kind)):
-            yield kind, index, thing.name or f"{unnamed}_{index}"
+            name = thing.name or f"{unnamed}_{source.written((kind, index))[1]}"
+            with wrong.at(kind, index):
+                if name in seen:
+                    raise SuiteError(f"two things are called '{name}'; give one another name")
+            seen.add(name)
 
 
 def _check_window(index: int, spec: SceneFile) -> None:
@@ -182,12 +242,13 @@ def _material(m: MaterialSpec) -> Material:
     return Polished(texture, m.eta, tint, m.roughness) if m.kind == "polished" else Matt(texture)
 
 
-def _lights(spec: SceneFile) -> Iterator[Light]:
+def _lights(spec: SceneFile, surfaces: list[Surface]) -> Iterator[Light]:
     yield from (_lamp(lamp) for lamp in spec.lamps)
     if spec.sun:
         yield _sun(spec.sun)
     if spec.sky:
         yield _sky(spec.sky, spec.sun)
+    yield from _glowing(surfaces, _luminous(spec))
 
 
 def _lamp(lamp: LampSpec) -> Light:
