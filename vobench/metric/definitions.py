@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-POSES = ("alignment", "align_n", "association", "max_diff_ns", "offset_ns")
+POSES = ("alignment", "align_n", "scale_rule", "project", "association", "max_diff_ns", "offset_ns")
 MOTIONS = ("rpe_delta", "rpe_unit", "rpe_all_pairs", "rpe_pairs_from", "rpe_rule", *POSES)
 SEGMENTS = ("segment_lengths_m", "segment_step_frames", "segment_precision", "segment_mean", *POSES)
 RELATIVE = ("relative_rule", *POSES)
