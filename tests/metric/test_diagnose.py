@@ -9,6 +9,8 @@ import pytest
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.metric.diagnose import diagnose
+from vobench.metric.mismatch import misfit
+from vobench.trajectory.align import align
 from vobench.trajectory.correction import parse_move
 from vobench.trajectory.form import Reading, parse_any
 from vobench.trajectory.trajectory import Trajectory
@@ -108,6 +110,18 @@ def test_a_fault_of_a_made_up_drive_is_named(fault, variant):
     gt, est = loop()
     broken = (FRAMES | CLOCKS)[fault][variant](est.trajectory)
     assert_named(fault, gt, replace(est, trajectory=broken))
+
+
+@pytest.mark.parametrize("factor", [0.01, 0.5, 30.0])
+def test_the_misfit_does_not_see_world_nor_scale_and_is_a_share_of_the_truths_extent(factor):
+    gt, est = (reading.trajectory for reading in loop())
+    left = misfit(gt.T_world_frame, scaled(changed(est, TILT @ est.T_world_frame), factor).T_world_frame)
+    known = misfit(gt.T_world_frame, est.T_world_frame)
+    assert (left.trans, left.rot_rad) == pytest.approx((known.trans, known.rot_rad), rel=1e-6)
+    aligned = align(est.T_world_frame, gt.T_world_frame, kind="sim3").apply(est.T_world_frame)
+    off_m = np.linalg.norm((aligned - gt.T_world_frame)[:, :3, 3], axis=1)
+    from_middle_m = np.linalg.norm(gt.positions_m - gt.positions_m.mean(axis=0), axis=1)
+    assert known.trans == pytest.approx(np.sqrt(np.mean(off_m**2) / np.mean(from_middle_m**2)))
 
 
 def test_a_clean_drive_has_no_fault_however_noisy():

@@ -45,8 +45,7 @@ def ate_scale(T_gt: Array, T_est: Array) -> float:
     gt_m, est_m = T_gt[:, :3, 3], T_est[:, :3, 3]
     fit = align_positions(gt_m, est_m, kind="se3")
     x, y = (gt_m - gt_m.mean(axis=0)) @ fit.rotation.T, est_m - est_m.mean(axis=0)
-    common = float(np.sum(x * y))
-    return float(np.sum(x * x)) / common if common > 0 else 1.0
+    return 1.0 if "rotation" in fit.unobservable else float(np.sum(x * x) / np.sum(x * y))
 
 
 def motion_scale(T_gt: Array, T_est: Array) -> float:
