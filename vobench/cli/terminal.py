@@ -21,7 +21,7 @@ from rich.table import Table
 Item = TypeVar("Item")
 LEFT_ALIGNED = {
     *("estimator", "status", "name", "case", "kind", "summary", "path", "origin", "check", "result"),
-    *("metric", "headline", "is", "with", "trajectory"),
+    *("sequence", "metric", "headline", "is", "with", "trajectory"),
 }
 
 

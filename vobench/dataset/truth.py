@@ -19,14 +19,15 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, tuple[st
     Raises TrajectoryError naming file and line for a pose that is none, InputError where rows and pictures differ.
     """
     parsed = parse_any(read_text(path), name=str(path))
-    if parsed.t_ns is None and len(parsed.T) != len(frames_ns):
+    t_ns = parsed.stamped_by(frames_ns) if parsed.t_ns is None else parsed.t_ns
+    if t_ns is None:
         raise InputError(f"{len(parsed.T)} poses without stamps for {len(frames_ns)} pictures: {path}")
     T, off = parsed.T, _skew(parsed.T)
-    notes = []
+    notes = list(parsed.notes)
     if off > EXACT:
         T = se3.transform(se3.nearest_rotation(T[:, :3, :3]), T[:, :3, 3])
         notes.append(f"Rotations of {path.name} were made exact; they were up to {off:.1g} off.")
-    return Trajectory(frames_ns if parsed.t_ns is None else parsed.t_ns, T), tuple(notes)
+    return Trajectory(t_ns, T), tuple(notes)
 
 
 def cut_to(truth: Trajectory, frames_ns: Stamps) -> tuple[Trajectory | None, tuple[str, ...]]:
