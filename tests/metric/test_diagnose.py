@@ -46,6 +46,8 @@ FRAMES = {
     "quaternion_order": [reordered],
     "axis_swap": [moved("axes:z,-x,-y"), moved("positions:y,x,z"), moved("positions:y,z,x"), moved("axes:y,x,z")],
     "mirrored_axes": [moved("positions:x,-y,z"), moved("positions:-x,y,z"), moved("axes:x,y,-z")],
+    "inverse_poses": [moved("inverse")],
+    "inverse_rotations": [moved("rotations:inverse")],
     "body_frame_offset": [lambda est: est.of_mounted(CAMERA), lambda est: est.of_mounted(TILT)],
     "scale": [lambda est: scaled(est, 0.5), lambda est: scaled(est, 1000.0)],
 }
@@ -218,6 +220,64 @@ def test_poor_motion_is_no_fault(shape):
     assert found(Reading(gt), Reading(changed(gt, se3.transform(R, p + noise)))) == ()
 
 
+@pytest.mark.parametrize("word", ["inverse", "rotations:inverse"])
+def test_inverses_are_known_in_any_world_and_on_either_side(word):
+    gt, est = loop()
+    elsewhere = TILT @ est.trajectory.T_world_frame
+    est = replace(est, trajectory=changed(est.trajectory, elsewhere))
+    for side, given in (
+        ("est", (gt, replace(est, trajectory=moved(word)(est.trajectory)))),
+        ("gt", (replace(gt, trajectory=moved(word)(gt.trajectory)), est)),
+    ):
+        (finding,) = found(*given)
+        assert (finding.fault, finding.options) == (
+            {"inverse": "inverse_poses", "rotations:inverse": "inverse_rotations"}[word],
+            (f"--{side}-as", word),
+        )
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 200.0])
+def test_trajectories_with_nothing_in_common_are_called_so_and_nothing_else(seed, factor):
+    rng = np.random.default_rng(seed)
+    gt, _ = loop()
+    s = np.linspace(0, 6, 400)
+    waves = np.sin(rng.uniform(0.5, 4, (3, 5, 1)) * s + rng.uniform(0, 6, (3, 5, 1))).sum(axis=1).T
+    other = Trajectory(gt.trajectory.t_ns, se3.transform(se3.rotation_z(waves[:, 0]), factor * waves))
+    finding = assert_named("unrelated", gt, Reading(other))
+    assert finding.options == ()
+    assert finding.evidence[0].after >= 50
+
+
+def test_an_estimate_that_is_merely_bad_is_not_called_unrelated():
+    gt, est = loop()
+    drifted = est.trajectory.T_world_frame.copy()
+    drifted[:, :3, 3] += np.linspace(0, 5, len(drifted))[:, None] * [0.5, 0.3, 0.2]
+    assert "unrelated" not in [f.fault for f in found(gt, replace(est, trajectory=changed(est.trajectory, drifted)))]
+
+
+def test_a_unit_and_an_order_that_were_told_are_believed():
+    gt, est = loop()
+    assert found(replace(gt, unit="ns", form_unit="ns", is_unit_told=True), est) == ()
+    slow = replace(gt, trajectory=changed(gt.trajectory, t_ns=gt.trajectory.t_ns * 1000))
+    assert found(slow, est)[0].fault == "stamp_unit"
+    with pytest.raises(AlignmentError, match="1 match"):
+        diagnose(replace(slow, is_unit_told=True), est)
+    told = replace(est, trajectory=reordered(est.trajectory), order=None)
+    assert "quaternion_order" not in [finding.fault for finding in found(replace(gt, order=None), told)]
+
+
+@pytest.mark.parametrize("offset_ns", [-60_000_000, -40_000_000, 40_000_000, 60_000_000])
+@pytest.mark.parametrize("noise_m", [0.0, 5e-3])
+def test_a_clock_about_a_frame_off_is_found_where_speeds_change(offset_ns, noise_m):
+    gt, est = loop()
+    T = est.trajectory.T_world_frame.copy()
+    T[:, :3, 3] += noise_m * np.random.default_rng(4).normal(size=(len(T), 3))
+    shifted = changed(est.trajectory, T, est.trajectory.t_ns + offset_ns)
+    finding = assert_named("time_offset", gt, replace(est, trajectory=shifted))
+    assert float(finding.options[0].partition("=")[2]) == pytest.approx(-offset_ns / 1e9, abs=0.01)
+
+
 def test_too_little_to_compare_is_an_error():
     gt, est = loop()
     few = Trajectory(gt.trajectory.t_ns[:3], gt.trajectory.T_world_frame[:3])
@@ -258,6 +318,27 @@ def test_a_fault_of_clocks_put_into_a_real_pair_is_named(real, name, fault):
         faults = [finding.fault for finding in found(gt, broken)]
         assert faults[0] == fault
         assert set(faults) <= set(CLOCKS)
+
+
+@WITH_DATA
+@pytest.mark.parametrize("name", ["tum", "kitti"])
+@pytest.mark.parametrize("offset_ns", [50_000_000, -50_000_000])
+def test_a_clock_of_a_real_pair_may_be_a_twentieth_of_a_second_off(real, name, offset_ns):
+    gt, est = real[name]
+    late = changed(est.trajectory, t_ns=est.trajectory.t_ns + offset_ns)
+    finding = assert_named("time_offset", gt, replace(est, trajectory=late))
+    own_ns = 10_400_000 if name == "tum" else 0  # fr1/xyz came with an offset
+    assert float(finding.options[0].partition("=")[2]) * 1e9 == pytest.approx(-offset_ns - own_ns, abs=1e6)
+
+
+@WITH_DATA
+@pytest.mark.parametrize(("one", "other"), [("tum", "kitti"), ("kitti", "tartanair"), ("tartanair", "tum")])
+def test_real_trajectories_of_other_places_are_not_of_one_motion(real, one, other):
+    gt, est = real[one][0].trajectory, real[other][1].trajectory
+    n = min(len(gt), len(est))
+    t_ns = np.arange(n) * 10**8
+    pair = (Reading(Trajectory(t_ns, t.T_world_frame[:n])) for t in (gt, est))
+    assert_named("unrelated", *pair)
 
 
 @WITH_DATA

@@ -10,14 +10,23 @@ from vobench.cli import terminal
 from vobench.cli.pair import Source, read_pair
 from vobench.metric.diagnose import Finding, diagnose
 
+WITHOUT_OPTION = {
+    "swapped_inputs": "give the two files in the other order",
+    "unrelated": "none; see whether both files are of the same recording",
+}
+
 
 def show(gt: Source, est: Source, *, times: Sequence[Path], as_json: bool) -> None:
     """Print what is wrong between two trajectories, its evidence, and the command that scores without it."""
     pair = read_pair(gt, est, times=times, any_unit=True)
     findings = diagnose(pair.gt, pair.est)
+    is_unrelated = any(finding.fault == "unrelated" for finding in findings)
     content = {
-        "findings": [{**finding.as_dict(), "command": _command(gt, est, times, [finding])} for finding in findings],
-        "command": _command(gt, est, times, findings) if findings else None,
+        "findings": [
+            {**finding.as_dict(), "command": None if is_unrelated else _command(gt, est, times, [finding])}
+            for finding in findings
+        ],
+        "command": _command(gt, est, times, findings) if findings and not is_unrelated else None,
         "warnings": [pair.by_frame] if pair.by_frame else [],
         "notes": list(pair.notes),
     }
@@ -71,5 +80,6 @@ def _print(content: dict[str, Any]) -> None:
             unit = "" if figure["unit"] == "1" else f" {figure['unit']}"
             before = "none" if figure["before"] is None else f"{figure['before']:.4g}{unit}"
             out.print(f"  {figure['name']}: {before}, mended {figure['after']:.4g}{unit}", soft_wrap=True)
-        out.print(f"  mend: {' '.join(finding['options']) or 'give the two files in the other order'}", soft_wrap=True)
-    out.print(f"all of it: {content['command']}", soft_wrap=True)
+        out.print(f"  mend: {' '.join(finding['options']) or WITHOUT_OPTION[finding['fault']]}", soft_wrap=True)
+    if content["command"]:
+        out.print(f"all of it: {content['command']}", soft_wrap=True)
