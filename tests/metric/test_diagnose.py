@@ -236,6 +236,15 @@ def test_inverses_are_known_in_any_world_and_on_either_side(word):
         )
 
 
+@WITH_DATA
+@pytest.mark.parametrize("name", ["tum", "kitti", "tartanair"])
+@pytest.mark.parametrize("word", ["inverse", "rotations:inverse"])
+def test_inverses_of_real_estimates_are_mended_on_the_estimates_side(real, name, word):
+    gt, est = real[name]
+    finding = found(gt, replace(est, trajectory=moved(word)(est.trajectory)))[0]
+    assert finding.options == ("--est-as", word)
+
+
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 200.0])
 def test_trajectories_with_nothing_in_common_are_called_so_and_nothing_else(seed, factor):

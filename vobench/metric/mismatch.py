@@ -109,8 +109,11 @@ def find_mismatch(T_gt: Array, T_est: Array, *, gt_order: Order | None, est_orde
     A change that is said in one word comes before a fitted one, unless that fits plainly better.
     """
     before = misfit(T_gt, T_est)
-    tried = suspects(T_gt, T_est, gt_order=gt_order, est_order=est_order)
-    worded = min(tried, key=lambda suspect: suspect.misfit.total)
+    tried = list(suspects(T_gt, T_est, gt_order=gt_order, est_order=est_order))
+    # In one world the inverse of either side mends; truths are seldom given so.
+    inverted = [s for s in tried if s.side == "est" and s.move and s.move.kind in INVERSE and _mends(before, s)]
+    doubted = [s for s in tried if not (inverted and s.side == "gt" and s.move)]
+    worded = min(doubted, key=lambda suspect: suspect.misfit.total)
     fitted = mounted(T_gt, T_est)
     if _mends(before, worded) and not _is_rather_mounted(worded, fitted):
         return Mismatch(_kind(worded), worded, before, None)
