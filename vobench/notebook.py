@@ -29,7 +29,7 @@ def read_trajectory(
     `topic` chooses among a recording's; `read_as` are the words of `--gt-as`, such as ns or wxyz; `times` is a file
     of stamps for forms without (KITTI, TartanAir). Raises InputError.
     """
-    return read_one(Source(Path(path), topic, tuple(read_as)), times=_path(times)).trajectory
+    return read_one(Source(Path(path), topic, tuple(read_as)), times=_paths(times)).trajectory
 
 
 def score(gt: Given, est: Given, *, settings: ScoreSettings = DEFAULTS, times: Path | str | None = None) -> Score:
@@ -73,14 +73,14 @@ def read_board(run: Path | str) -> "pd.DataFrame":
 def _pair(gt: Given, est: Given, times: Path | str | None, *, any_unit: bool = False) -> Pair:
     if isinstance(gt, Trajectory) or isinstance(est, Trajectory):
         return Pair(_reading(gt, times, any_unit=any_unit), _reading(est, times, any_unit=any_unit))
-    return read_pair(Source(Path(gt)), Source(Path(est)), times=_path(times), any_unit=any_unit)
+    return read_pair(Source(Path(gt)), Source(Path(est)), times=_paths(times), any_unit=any_unit)
 
 
 def _reading(given: Given, times: Path | str | None, *, any_unit: bool) -> Reading:
     if isinstance(given, Trajectory):
         return Reading(given, unit="ns", form_unit="ns", order=None)
-    return read_one(Source(Path(given)), times=_path(times), any_unit=any_unit)
+    return read_one(Source(Path(given)), times=_paths(times), any_unit=any_unit)
 
 
-def _path(file: Path | str | None) -> Path | None:
-    return None if file is None else Path(file)
+def _paths(file: Path | str | None) -> tuple[Path, ...]:
+    return () if file is None else (Path(file),)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
+from vobench.trajectory.correction import parse_move
 from vobench.trajectory.text import format_tum
 from vobench.trajectory.trajectory import Trajectory
 
@@ -113,6 +114,65 @@ def test_swapped_files_are_put_in_order_by_the_command(vobench, here):
     said = vobench("diagnose", est, gt, "--json").json
     assert [finding["fault"] for finding in said["findings"]] == ["swapped_inputs"]
     assert shlex.split(said["command"]) == ["vobench", "score", gt, est]
+
+
+@WITH_DATA
+def test_swapped_files_with_an_offset_get_a_command_that_exchanges_both(vobench, here):
+    gt, est = (TRAJECTORIES / name for name in TUM)
+    (here / "late").write_text(rewritten(est.read_text(), lambda row: [f"{float(row[0]) + 1.25:.9f}", *row[1:]]))
+    said = vobench("diagnose", "late", gt, "--gt-as", "xyzw", "--json").json
+    assert [finding["fault"] for finding in said["findings"]] == ["time_offset", "swapped_inputs"]
+    words = shlex.split(said["command"])
+    assert words[:6] == ["vobench", "score", str(gt), "late", "--est-as", "xyzw"]
+    assert words[6].startswith("--t-offset=-1.2")
+    mended = vobench(*words[1:], "--json")
+    assert rmse(mended, "ate_trans") == pytest.approx(rmse(vobench("score", gt, est, "--json"), "ate_trans"), rel=0.1)
+
+
+def test_a_mend_of_the_estimate_is_one_of_the_truth_once_they_have_changed_places(vobench, files):
+    lines = (files / "true").read_text().splitlines(keepends=True)
+    smooth = "".join(rewritten(line, FAULTS["axis_swap"]) for line in lines)
+    (files / "smooth").write_text("# ground truth\n" + smooth)
+    said = vobench("diagnose", "estimated", "smooth", "--json").json
+    assert [finding["fault"] for finding in said["findings"]] == ["axis_swap", "swapped_inputs"]
+    assert said["command"].startswith("vobench score smooth estimated --gt-as positions:")
+    assert rmse(vobench(*shlex.split(said["command"])[1:], "--json"), "ate_rot") < 5
+
+
+@pytest.mark.parametrize(("fault", "word"), [("inverse_poses", "inverse"), ("inverse_rotations", "rotations:inverse")])
+def test_inverse_poses_and_inverse_rotations_are_mended_by_one_word(vobench, files, fault, word):
+    T = parse_move(word).apply(drive(noise_m=0.02).T_world_frame)
+    (files / "broken").write_text(format_tum(Trajectory(drive().t_ns, T)))
+    said = vobench("diagnose", "true", "broken", "--json").json
+    assert [finding["fault"] for finding in said["findings"]] == [fault]
+    assert said["command"] == f"vobench score true broken --est-as {word}"
+    mended, clean = (
+        vobench("score", "true", *words, "--json").json["metrics"]
+        for words in (("broken", "--est-as", word), ("estimated",))
+    )
+    np.testing.assert_allclose([m["rmse"] for m in mended], [m["rmse"] for m in clean], rtol=1e-6, atol=1e-12)
+
+
+def test_unrelated_files_get_no_command(vobench, files):
+    other = Trajectory(drive().t_ns, np.roll(drive().T_world_frame, 137, axis=0)[:, [2, 0, 1, 3]][:, :, [2, 0, 1, 3]])
+    T = other.T_world_frame.copy()
+    T[:, :3, 3] = np.random.default_rng(5).normal(size=(300, 3)).cumsum(axis=0)
+    (files / "other").write_text(format_tum(Trajectory(other.t_ns, T)))
+    said = vobench("diagnose", "true", "other", "--json").json
+    assert ([finding["fault"] for finding in said["findings"]], said["command"]) == (["unrelated"], None)
+    out = vobench("diagnose", "true", "other").out
+    assert out.startswith("unrelated: these trajectories are not of one motion")
+    assert "mend: none" in out
+    assert "vobench score" not in out
+
+
+def test_what_was_told_of_stamps_and_quaternions_is_believed(vobench, files):
+    (files / "ns").write_text(rewritten((files / "true").read_text(), FAULTS["stamp_unit"]))
+    (files / "odd").write_text(rewritten((files / "ns").read_text(), FAULTS["quaternion_order"]))
+    told = vobench("diagnose", "odd", "estimated", "--gt-as", "ns", "--gt-as", "wxyz", "--json").json
+    assert (told["findings"], told["command"]) == ([], None)
+    untold = vobench("diagnose", "odd", "estimated", "--json").json
+    assert untold["command"] == "vobench score odd estimated --gt-as ns --gt-as wxyz"
 
 
 def test_files_that_cannot_be_compared_are_one_sentence(vobench, files):

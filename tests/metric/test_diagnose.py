@@ -9,6 +9,8 @@ import pytest
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.metric.diagnose import diagnose
+from vobench.metric.mismatch import misfit
+from vobench.trajectory.align import align
 from vobench.trajectory.correction import parse_move
 from vobench.trajectory.form import Reading, parse_any
 from vobench.trajectory.trajectory import Trajectory
@@ -44,6 +46,8 @@ FRAMES = {
     "quaternion_order": [reordered],
     "axis_swap": [moved("axes:z,-x,-y"), moved("positions:y,x,z"), moved("positions:y,z,x"), moved("axes:y,x,z")],
     "mirrored_axes": [moved("positions:x,-y,z"), moved("positions:-x,y,z"), moved("axes:x,y,-z")],
+    "inverse_poses": [moved("inverse")],
+    "inverse_rotations": [moved("rotations:inverse")],
     "body_frame_offset": [lambda est: est.of_mounted(CAMERA), lambda est: est.of_mounted(TILT)],
     "scale": [lambda est: scaled(est, 0.5), lambda est: scaled(est, 1000.0)],
 }
@@ -108,6 +112,18 @@ def test_a_fault_of_a_made_up_drive_is_named(fault, variant):
     gt, est = loop()
     broken = (FRAMES | CLOCKS)[fault][variant](est.trajectory)
     assert_named(fault, gt, replace(est, trajectory=broken))
+
+
+@pytest.mark.parametrize("factor", [0.01, 0.5, 30.0])
+def test_the_misfit_does_not_see_world_nor_scale_and_is_a_share_of_the_truths_extent(factor):
+    gt, est = (reading.trajectory for reading in loop())
+    left = misfit(gt.T_world_frame, scaled(changed(est, TILT @ est.T_world_frame), factor).T_world_frame)
+    known = misfit(gt.T_world_frame, est.T_world_frame)
+    assert (left.trans, left.rot_rad) == pytest.approx((known.trans, known.rot_rad), rel=1e-6)
+    aligned = align(est.T_world_frame, gt.T_world_frame, kind="sim3").apply(est.T_world_frame)
+    off_m = np.linalg.norm((aligned - gt.T_world_frame)[:, :3, 3], axis=1)
+    from_middle_m = np.linalg.norm(gt.positions_m - gt.positions_m.mean(axis=0), axis=1)
+    assert known.trans == pytest.approx(np.sqrt(np.mean(off_m**2) / np.mean(from_middle_m**2)))
 
 
 def test_a_clean_drive_has_no_fault_however_noisy():
@@ -204,6 +220,73 @@ def test_poor_motion_is_no_fault(shape):
     assert found(Reading(gt), Reading(changed(gt, se3.transform(R, p + noise)))) == ()
 
 
+@pytest.mark.parametrize("word", ["inverse", "rotations:inverse"])
+def test_inverses_are_known_in_any_world_and_on_either_side(word):
+    gt, est = loop()
+    elsewhere = TILT @ est.trajectory.T_world_frame
+    est = replace(est, trajectory=changed(est.trajectory, elsewhere))
+    for side, given in (
+        ("est", (gt, replace(est, trajectory=moved(word)(est.trajectory)))),
+        ("gt", (replace(gt, trajectory=moved(word)(gt.trajectory)), est)),
+    ):
+        (finding,) = found(*given)
+        assert (finding.fault, finding.options) == (
+            {"inverse": "inverse_poses", "rotations:inverse": "inverse_rotations"}[word],
+            (f"--{side}-as", word),
+        )
+
+
+@WITH_DATA
+@pytest.mark.parametrize("name", ["tum", "kitti", "tartanair"])
+@pytest.mark.parametrize("word", ["inverse", "rotations:inverse"])
+def test_inverses_of_real_estimates_are_mended_on_the_estimates_side(real, name, word):
+    gt, est = real[name]
+    finding = found(gt, replace(est, trajectory=moved(word)(est.trajectory)))[0]
+    assert finding.options == ("--est-as", word)
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 200.0])
+def test_trajectories_with_nothing_in_common_are_called_so_and_nothing_else(seed, factor):
+    rng = np.random.default_rng(seed)
+    gt, _ = loop()
+    s = np.linspace(0, 6, 400)
+    waves = np.sin(rng.uniform(0.5, 4, (3, 5, 1)) * s + rng.uniform(0, 6, (3, 5, 1))).sum(axis=1).T
+    other = Trajectory(gt.trajectory.t_ns, se3.transform(se3.rotation_z(waves[:, 0]), factor * waves))
+    finding = assert_named("unrelated", gt, Reading(other))
+    assert finding.options == ()
+    assert finding.evidence[0].after >= 50
+
+
+def test_an_estimate_that_is_merely_bad_is_not_called_unrelated():
+    gt, est = loop()
+    drifted = est.trajectory.T_world_frame.copy()
+    drifted[:, :3, 3] += np.linspace(0, 5, len(drifted))[:, None] * [0.5, 0.3, 0.2]
+    assert "unrelated" not in [f.fault for f in found(gt, replace(est, trajectory=changed(est.trajectory, drifted)))]
+
+
+def test_a_unit_and_an_order_that_were_told_are_believed():
+    gt, est = loop()
+    assert found(replace(gt, unit="ns", form_unit="ns", is_unit_told=True), est) == ()
+    slow = replace(gt, trajectory=changed(gt.trajectory, t_ns=gt.trajectory.t_ns * 1000))
+    assert found(slow, est)[0].fault == "stamp_unit"
+    with pytest.raises(AlignmentError, match="1 match"):
+        diagnose(replace(slow, is_unit_told=True), est)
+    told = replace(est, trajectory=reordered(est.trajectory), order=None)
+    assert "quaternion_order" not in [finding.fault for finding in found(replace(gt, order=None), told)]
+
+
+@pytest.mark.parametrize("offset_ns", [-60_000_000, -40_000_000, 40_000_000, 60_000_000])
+@pytest.mark.parametrize("noise_m", [0.0, 5e-3])
+def test_a_clock_about_a_frame_off_is_found_where_speeds_change(offset_ns, noise_m):
+    gt, est = loop()
+    T = est.trajectory.T_world_frame.copy()
+    T[:, :3, 3] += noise_m * np.random.default_rng(4).normal(size=(len(T), 3))
+    shifted = changed(est.trajectory, T, est.trajectory.t_ns + offset_ns)
+    finding = assert_named("time_offset", gt, replace(est, trajectory=shifted))
+    assert float(finding.options[0].partition("=")[2]) == pytest.approx(-offset_ns / 1e9, abs=0.01)
+
+
 def test_too_little_to_compare_is_an_error():
     gt, est = loop()
     few = Trajectory(gt.trajectory.t_ns[:3], gt.trajectory.T_world_frame[:3])
@@ -244,6 +327,27 @@ def test_a_fault_of_clocks_put_into_a_real_pair_is_named(real, name, fault):
         faults = [finding.fault for finding in found(gt, broken)]
         assert faults[0] == fault
         assert set(faults) <= set(CLOCKS)
+
+
+@WITH_DATA
+@pytest.mark.parametrize("name", ["tum", "kitti"])
+@pytest.mark.parametrize("offset_ns", [50_000_000, -50_000_000])
+def test_a_clock_of_a_real_pair_may_be_a_twentieth_of_a_second_off(real, name, offset_ns):
+    gt, est = real[name]
+    late = changed(est.trajectory, t_ns=est.trajectory.t_ns + offset_ns)
+    finding = assert_named("time_offset", gt, replace(est, trajectory=late))
+    own_ns = 10_400_000 if name == "tum" else 0  # fr1/xyz came with an offset
+    assert float(finding.options[0].partition("=")[2]) * 1e9 == pytest.approx(-offset_ns - own_ns, abs=1e6)
+
+
+@WITH_DATA
+@pytest.mark.parametrize(("one", "other"), [("tum", "kitti"), ("kitti", "tartanair"), ("tartanair", "tum")])
+def test_real_trajectories_of_other_places_are_not_of_one_motion(real, one, other):
+    gt, est = real[one][0].trajectory, real[other][1].trajectory
+    n = min(len(gt), len(est))
+    t_ns = np.arange(n) * 10**8
+    pair = (Reading(Trajectory(t_ns, t.T_world_frame[:n])) for t in (gt, est))
+    assert_named("unrelated", *pair)
 
 
 @WITH_DATA

@@ -19,6 +19,7 @@ COMMON = {
     "association": st.sampled_from(["nearest", "evo", "interpolate", "greedy", "in_order"]),
     "max_diff_ns": st.integers(0, 10**18),
     "offset_ns": st.integers(-(10**18), 10**18),
+    "project": st.sampled_from([None, "xy", "xz", "yz"]),
     "std_ddof": st.integers(0, 1),
 }
 OF_RPE = {

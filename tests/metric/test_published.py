@@ -10,14 +10,9 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
-from vobench.metric.ate import absolute_errors
-from vobench.metric.rpe import relative_errors
-from vobench.metric.scale import ate_scale, motion_scale
-from vobench.metric.score import ScoreSettings, compare, score
+from vobench.metric.score import ScoreSettings, score
 from vobench.metric.segment import devkit_distances, mean_drift, segment_errors
-from vobench.metric.settings import KITTI_LENGTHS_M, LIKE, TARTANAIR_LENGTHS_M
-from vobench.metric.statistic import statistics
-from vobench.trajectory.align import align
+from vobench.metric.settings import KITTI_LENGTHS_M, LIKE
 from vobench.trajectory.text import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
@@ -64,22 +59,18 @@ def as_settings(flags):
         "rpe_unit": after.get("-u", "f"),
         "rpe_all_pairs": "--all_pairs" in words,
         "rpe_pairs_from": "gt" if "--pairs_from_reference" in words else "est",
+        "project": after.get("--project_to_plane"),
     }
-    return replace(LIKE["evo"], full=True, **changes), after.get("-r", "trans_part"), "--project_to_plane" in words
+    return replace(LIKE["evo"], full=True, **changes), after.get("-r", "trans_part")
 
 
 @pytest.mark.parametrize("case", evo_cases())
 def test_evo_finds_the_same_statistics(case):
-    settings, part, on_xy = as_settings(case["flags"])
+    settings, part = as_settings(case["flags"])
     read = read_tum if case["fmt"] == "tum" else read_kitti
     gt, est = read(case["ref"]), read(case["est"])
-    if on_xy:  # after the alignment evo drops z: what is left are our errors along x and y
-        of = compare(gt, est, settings)
-        errors = np.linalg.norm((of.T_aligned - of.matched.T_gt)[:, :2, 3], axis=1)
-        ours = statistics(errors)
-    else:
-        tool = {"ape": "ate", "rpe": "rpe"}[case["tool"]]
-        ours = score(gt, est, settings=settings).metric(f"{tool}_{PARTS[part]}").statistics
+    tool = {"ape": "ate", "rpe": "rpe"}[case["tool"]]
+    ours = score(gt, est, settings=settings).metric(f"{tool}_{PARTS[part]}").statistics
     assert ours.n == case["n"]
     for name, expected in case["stats"].items():
         # A minimum near zero holds the rounding of positions and matrices of size one.
@@ -141,32 +132,21 @@ def test_like_kitti_quotes_the_devkits_means_and_float64_is_close():
     assert ours.metric("kitti_r_rel").statistics.mean == pytest.approx(r_rel.mean, rel=7e-4)
 
 
-def scaled(T, factor):
-    return se3.transform(T[:, :3, :3], factor * T[:, :3, 3])
+@pytest.mark.parametrize(("like", "ate_m"), [("tartanair", 1.204507439280004), ("tartanair_mono", 0.8344983411575012)])
+def test_tartanairs_evaluator_finds_the_same_absolute_errors(like, ate_m):
+    t_ns = np.arange(734) * 10**9
+    result = score(Trajectory(t_ns, read_tartanair("gt")), Trajectory(t_ns, read_tartanair("est")), settings=LIKE[like])
+    assert result.metric("ate_trans").statistics.rmse == pytest.approx(ate_m, rel=1e-12)
 
 
-def test_tartanairs_evaluator_finds_the_same_absolute_errors():
-    gt, est = read_tartanair("gt"), read_tartanair("est")
-    for factor, rmse in ((1.0, 1.204507439280004), (ate_scale(gt, est), 0.8344983411575012)):
-        moved = scaled(est, factor)
-        errors = absolute_errors(gt, align(moved, gt, kind="se3").apply(moved)).trans_m
-        assert statistics(errors).rmse == pytest.approx(rmse, rel=1e-12)
-
-
-def test_tartanairs_evaluator_finds_the_same_drift():
-    t_ns = np.arange(734) * 10**8
-    gt, est = read_tartanair("gt"), read_tartanair("est")
-    moved = scaled(est, motion_scale(gt, est))
-    settings = ScoreSettings(alignment="none", segment_lengths_m=TARTANAIR_LENGTHS_M, segment_mean="macro")
-    result = score(Trajectory(t_ns, gt), Trajectory(t_ns, moved), settings=settings)
+def test_tartanairs_evaluator_finds_the_same_drift_and_a_sample_of_our_motions():
+    t_ns = np.arange(734) * 10**9
+    gt, est = (Trajectory(t_ns, read_tartanair(name)) for name in ("gt", "est"))
+    result = score(gt, est, settings=LIKE["tartanair_mono"])
     assert result.metric("kitti_r_rel").statistics.mean == pytest.approx(0.07987194481751003, rel=1e-12)
     assert result.metric("kitti_t_rel").statistics.mean == pytest.approx(0.05710317871475973, rel=1e-12)
-
-
-def test_tartanairs_relative_errors_are_a_random_sample_of_ours():
-    # Their figures are means over 10,000 random pairs of frames: rotation 0.0303 rad, translation 1.2417 m.
-    gt, est = read_tartanair("gt"), read_tartanair("est")
-    first, last = np.nonzero(np.ones((len(gt), len(gt))))
-    errors = relative_errors(gt, scaled(est, motion_scale(gt, est)), (first, last))
-    for ours, theirs in ((errors.rot_rad, 0.030297256815805043), (errors.trans_m, 1.2416853348984116)):
-        assert abs(ours.mean() - theirs) < 3 * ours.std() / np.sqrt(10_000)
+    # Theirs are means over 10,000 random pairs of frames, ours over all: rotation in rad, translation in m.
+    for name, theirs in (("rpe_rot", np.rad2deg(0.030297256815805043)), ("rpe_trans", 1.2416853348984116)):
+        ours = result.metric(name).statistics
+        assert ours.n == 734**2
+        assert abs(ours.mean - theirs) < 3 * ours.std / np.sqrt(10_000)

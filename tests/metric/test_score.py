@@ -9,7 +9,10 @@ from hypothesis import strategies as st
 
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
-from vobench.metric.score import ScoreSettings, score
+from vobench.metric.score import ScoreSettings, pooled, score
+from vobench.metric.segment import devkit_distances, segment_errors
+from vobench.metric.settings import LIKE
+from vobench.metric.statistic import statistics
 from vobench.trajectory.trajectory import Trajectory
 
 N = 120
@@ -226,7 +229,11 @@ def test_the_series_are_one_entry_a_matched_frame():
         {"rpe_unit": "km"},
         {"rpe_rule": "tum", "rpe_unit": "m"},
         {"rpe_rule": "tum", "rpe_unit": "s", "rpe_all_pairs": False, "rpe_pairs_from": "est"},
+        {"rpe_rule": "tum", "rpe_unit": "s", "rpe_all_pairs": True, "rpe_pairs_from": "est", "project": "xy"},
+        {"rpe_rule": "tartanair"},
+        {"project": "zx"},
         {"alignment": "so3"},
+        {"alignment": "sim3", "scale_rule": "tartanair"},
         {"align_n": 0},
         {"segment_step_frames": 0},
         {"segment_lengths_m": ()},
@@ -237,3 +244,127 @@ def test_the_series_are_one_entry_a_matched_frame():
 def test_settings_that_measure_nothing_are_refused(wrong):
     with pytest.raises(AlignmentError, match=f"{next(iter(wrong))}.* should be"):
         ScoreSettings(**wrong)
+
+
+def drives(seed, n, step_m=1.0):
+    """A way that turns, with a pose every metre or so, and an estimate of it that drifts."""
+    rng = np.random.default_rng(seed)
+    yaw = np.cumsum(rng.normal(scale=0.02, size=n))
+    steps = step_m * rng.uniform(0.5, 1.5, n)[:, None] * np.stack([np.cos(yaw), np.sin(yaw), 0 * yaw], -1)
+    T_gt = se3.transform(se3.rotation_z(yaw), np.cumsum(steps, axis=0))
+    drift = se3.transform(se3.rotation_z(1e-4 * np.arange(n)), 0.01 * np.cumsum(rng.normal(size=(n, 3)), axis=0))
+    t_ns = np.arange(n, dtype=np.int64) * 10**8
+    return Trajectory(t_ns, T_gt), Trajectory(t_ns, drift @ T_gt)
+
+
+def devkit_sum(values):
+    """One float32 after the other, as the devkit adds up."""
+    total = np.float32(0.0)
+    for value in values:
+        total = np.float32(total + value)
+    return total
+
+
+def devkit_segments(gt, est):
+    return segment_errors(
+        gt.T_world_frame,
+        est.T_world_frame,
+        np.arange(len(gt)),
+        devkit_distances(gt.positions_m),
+        lengths_m=LIKE["kitti"].segment_lengths_m,
+        step_frames=10,
+        precision="devkit",
+    )
+
+
+def test_like_kitti_takes_its_means_in_float32_one_after_the_other():
+    gt, est = drives(1, 3000)
+    found, scored = devkit_segments(gt, est), score(gt, est, settings=LIKE["kitti"])
+    t_rel, r_rel = (scored.metric(name).statistics for name in ("kitti_t_rel", "kitti_r_rel"))
+    assert t_rel.n == len(found) > 1000
+    assert t_rel.mean == float(devkit_sum(found.trans_ratio) / np.float32(len(found)))
+    assert r_rel.mean == float(np.rad2deg(float(devkit_sum(found.rot_radpm) / np.float32(len(found)))))
+    assert t_rel.mean != found.trans_ratio.astype(float).mean()
+
+
+def test_per_length_is_the_mean_over_the_segments_of_that_length():
+    gt, est = drives(2, 1000)
+    found, scored = devkit_segments(gt, est), score(gt, est, settings=LIKE["kitti"])
+    rows = {(row.name, row.length_m): row.statistics for row in scored.per_length}
+    assert {length for _, length in rows} == set(found.length_m)
+    for length in set(found.length_m):
+        chosen = found.length_m == length
+        assert rows["kitti_t_rel", length].n == chosen.sum()
+        assert rows["kitti_t_rel", length].mean == pytest.approx(found.trans_ratio[chosen].mean(), rel=1e-6)
+        expected = np.rad2deg(found.rot_radpm[chosen].astype(float).mean())
+        assert rows["kitti_r_rel", length].mean == pytest.approx(expected, rel=1e-6)
+
+
+def test_sequences_are_pooled_over_all_their_segments_and_not_over_their_means():
+    pairs = [drives(3, 2500), drives(4, 400, step_m=1.2)]
+    found = [devkit_segments(*pair) for pair in pairs]
+    together = pooled([score(*pair, settings=LIKE["kitti"]) for pair in pairs])
+    metrics = {metric.name: metric.statistics for metric in together.metrics}
+    ratios = np.concatenate([s.trans_ratio for s in found])
+    assert metrics["kitti_t_rel"].n == len(ratios)
+    assert metrics["kitti_t_rel"].mean == float(devkit_sum(ratios) / np.float32(len(ratios)))
+    of_means = np.mean([s.trans_ratio.mean() for s in found])
+    assert metrics["kitti_t_rel"].mean != pytest.approx(of_means, rel=0.01)
+    assert metrics["ate_trans"].n == 2900
+    assert "; n=2900/2900]" in together.metrics[0].id
+
+
+def test_every_pooled_statistic_is_that_of_all_errors_together():
+    pairs = [drives(5, 300), drives(6, 200)]
+    full = ScoreSettings(full=True, segment_lengths_m=(5.0, 10.0), segment_step_frames=1)
+    scores = [score(*pair, settings=full) for pair in pairs]
+    by_name = {metric.name: metric.statistics for metric in pooled(scores).metrics}
+    assert list(by_name) == [metric.name for metric in scores[0].metrics]
+    for name, found in by_name.items():
+        errors = np.concatenate([part.errors for scored in scores for part in scored.samples if part.name == name])
+        assert found.rmse == pytest.approx(statistics(errors).rmse, rel=1e-12)
+        assert found.p95 == pytest.approx(statistics(errors).p95, rel=1e-12)
+    assert pooled(scores[:1]).metrics == scores[0].metrics
+
+
+def test_segments_of_other_lengths_are_not_pooled_and_that_is_said():
+    together = pooled([score(*drives(7, 100)), score(*drives(8, 1000))])
+    assert [metric.name for metric in together.metrics] == NAMES[:4]
+    assert [warning.partition(",")[0] for warning in together.warnings] == [
+        "kitti_t_rel is not pooled",
+        "kitti_r_rel is not pooled",
+    ]
+
+
+def test_tartanairs_motions_are_those_between_every_two_poses_in_either_order():
+    gt, est = drives(9, 30)
+    scored = score(gt, est, settings=LIKE["tartanair"])
+    lengths = []
+    for i in range(30):
+        for j in range(30):
+            Q, P = (np.linalg.inv(t.T_world_frame[i]) @ t.T_world_frame[j] for t in (gt, est))
+            lengths.append(np.linalg.norm((np.linalg.inv(Q) @ P)[:3, 3]))
+    found = scored.metric("rpe_trans").statistics
+    assert (found.n, found.mean) == (900, pytest.approx(np.mean(lengths), rel=1e-10))
+    assert scored.metric("rpe_trans").id.startswith("rpe.trans.rmse[pairs=all/gt; rule=tartanair; align=se3;")
+
+
+def test_tartanairs_scale_takes_a_wrong_one_out_of_positions_and_of_motions():
+    gt, est = drives(10, 60)
+    half = Trajectory(est.t_ns, se3.transform(est.T_world_frame[:, :3, :3], 0.5 * est.positions_m))
+    settings = LIKE["tartanair_mono"]
+    assert rmse(score(gt, half, settings=settings)) == pytest.approx(rmse(score(gt, est, settings=settings)), rel=1e-9)
+    still = Trajectory(gt.t_ns, np.broadcast_to(gt.T_world_frame[0], gt.T_world_frame.shape).copy())
+    assert score(gt, still, settings=settings).alignment.scale == 1.0
+
+
+def test_in_a_plane_what_is_off_it_has_no_error():
+    gt, est = drives(11, 80)
+    lifted = est.T_world_frame.copy()
+    lifted[:, 2, 3] += np.sin(np.arange(80.0))
+    settings = ScoreSettings(alignment="none", project="xy", full=True)
+    once, again = (rmse(score(gt, Trajectory(gt.t_ns, T), settings=settings)) for T in (est.T_world_frame, lifted))
+    flat = {name: value for name, value in once.items() if not name.startswith("ate_z")}
+    assert {name: again[name] for name in flat} == pytest.approx(flat, rel=1e-12)
+    assert once["ate_z"] == again["ate_z"] == 0.0
+    assert "align=none; project=xy;" in score(gt, est, settings=settings).metrics[0].id

@@ -6,14 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vobench.geometry import se3
-from vobench.metric.segment import (
-    SegmentErrors,
-    devkit_distances,
-    mean_drift,
-    pooled,
-    segment_errors,
-    segment_pairs,
-)
+from vobench.metric.segment import devkit_distances, mean_drift, segment_errors, segment_pairs
 
 STEP_M = 0.25  # a power of two, so that path lengths are exact and "strictly beyond" shows
 
@@ -114,17 +107,6 @@ def test_micro_counts_segments_and_macro_counts_lengths():
     errors, length_m = np.array([1.0, 1.0, 1.0, 5.0]), np.array([10.0, 10.0, 10.0, 20.0])
     assert mean_drift(errors, length_m) == 2.0
     assert mean_drift(errors, length_m, mean="macro") == 3.0
-
-
-def test_several_sequences_are_pooled_by_segments_or_by_sequences():
-    def of(errors):
-        n = len(errors)
-        nothing = np.zeros(n, np.int64)
-        return SegmentErrors(nothing, nothing, np.ones(n), np.array(errors), 2 * np.array(errors))
-
-    sequences = [of([1.0, 1.0, 1.0]), of([5.0])]
-    assert pooled(sequences) == (2.0, 4.0)
-    assert pooled(sequences, mean="macro") == (3.0, 6.0)
 
 
 def test_a_float32_mean_rounds_after_every_sum():

@@ -173,6 +173,7 @@ def test_yaw_undoes_any_turn_about_the_vertical_and_no_other(seed, angle):
     fit = align(moved(T_gt, se3.rotation_z(angle), t), T_gt, kind="yaw")
     assert (fit.unobservable, fit.scale) == ((), 1.0)
     np.testing.assert_allclose(fit.rotation, se3.rotation_z(-angle), atol=1e-12)
+    np.testing.assert_allclose(fit.apply(moved(T_gt, se3.rotation_z(angle), t)), T_gt, atol=1e-12)
     tilted = align(moved(T_gt, random_rotation(rng), t), T_gt, kind="yaw")
     np.testing.assert_allclose(tilted.rotation[2], [0, 0, 1], atol=1e-15)
 
@@ -186,6 +187,8 @@ def test_yaw_is_the_least_squares_answer(seed):
         turned = x[:, :3, 3] @ rotation.T
         return np.sum((turned - turned.mean(0) - y[:, :3, 3] + y[:, :3, 3].mean(0)) ** 2)
 
+    middle = (x[:, :3, 3] @ fit.rotation.T + fit.translation - y[:, :3, 3]).mean(0)
+    np.testing.assert_allclose(middle, 0.0, atol=1e-12)
     for angle in (-1e-3, 1e-3, 1.0, 3.0):
         assert residual(se3.rotation_z(angle) @ fit.rotation) >= residual(fit.rotation) * (1 - 1e-12)
 

@@ -51,6 +51,17 @@ def test_a_mount_is_a_constant_motion_in_the_bodys_own_frame():
     assert str(move) == "mount:0.1,0.2,0.3,0,0,0.6,0.8"
 
 
+@pytest.mark.parametrize("word", ["inverse", "rotations:inverse"])
+def test_an_inverse_reads_back_and_undoes_itself(word):
+    T, move = poses(), parse_move(word)
+    assert str(move) == word
+    np.testing.assert_allclose(move.apply(move.apply(T)), T, atol=1e-14)
+    undone = T @ move.apply(T) if word == "inverse" else T[:, :3, :3] @ move.apply(T)[:, :3, :3]
+    np.testing.assert_allclose(undone, np.broadcast_to(np.eye(undone.shape[-1]), undone.shape), atol=1e-14)
+    if word == "rotations:inverse":
+        np.testing.assert_array_equal(move.apply(T)[:, :3, 3], T[:, :3, 3])
+
+
 @pytest.mark.parametrize(
     ("word", "sentence"),
     [
@@ -60,7 +71,10 @@ def test_a_mount_is_a_constant_motion_in_the_bodys_own_frame():
         ("mount:1,2,3", "a mount is x,y,z,qx,qy,qz,qw in metres with a quaternion of norm 1"),
         ("mount:1,2,3,0,0,0,2", "a mount is x,y,z,qx,qy,qz,qw in metres with a quaternion of norm 1"),
         ("mount:a,2,3,0,0,0,1", "a mount is x,y,z,qx,qy,qz,qw in metres with a quaternion of norm 1"),
-        ("sideways", "a file may be read as axes:…, positions:… or mount:…, but not as 'sideways'"),
+        (
+            "sideways",
+            "a file may be read as axes:…, positions:…, mount:…, inverse or rotations:inverse, but not as 'sideways'",
+        ),
     ],
 )
 def test_a_word_that_means_nothing_is_named(word, sentence):

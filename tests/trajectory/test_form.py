@@ -72,7 +72,7 @@ def test_crlf_blank_lines_tabs_and_comments_change_nothing(text):
         ("\n \r\n", "no pose, for the file is empty: run.txt"),
         ("# only\n# comments\n", "no pose, for all lines are comments: run.txt"),
         ("version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "a Git-LFS pointer, not the file itself; fetch it with git lfs pull: run.txt"),
-        ("a b c\n", "run.txt:1: no form of trajectory has 3 columns: TUM has 8 (t x y z qx qy qz qw), KITTI 12, TartanAir 7, EuRoC 8 and commas"),
+        ("a b c\n", "run.txt:1: no form of trajectory has 3 columns: TUM has 8 (t x y z qx qy qz qw), KITTI 12, or 13 with a frame number first, TartanAir 7, EuRoC 8 and commas"),
         (TUM + "3.5 1 2 3 0", "run.txt:3: a pose has 8 columns (t x y z qx qy qz qw), this line has 5 (the last row: was the file cut off?)"),
         (KITTI + "1 0 0", "this line has 3 (the last row: was the file cut off?)"),
         (EUROC + "1600000000,1,2", "run.txt:3: a pose has 8 columns (t x y z qw qx qy qz), this line has 3 (the last row: was the file cut off?)"),
@@ -82,8 +82,11 @@ def test_crlf_blank_lines_tabs_and_comments_change_nothing(text):
         (TARTANAIR + "1 2 inf 0 0 0 1", "run.txt:2: z should be a finite number, but is 'inf'"),
         (TARTANAIR + "1 2 3 0 0 0 0", "run.txt:2: the quaternion's norm should be 1 within 0.001, but (0, 0, 0, 0) has 0"),
         (TARTANAIR + "1 2 3 0 0 0 2", "(0, 0, 0, 2) has 2"),
-        (EUROC + "1500000000,1,2,3,1,0,0,0", "run.txt:3: stamps must increase by 1 ns or more, but 1500000000 follows 1500000000"),
-        (TUM + "2.4 0 0 0 0 0 0 1", "run.txt:3: stamps must increase by 1 ns or more, but 2.4 follows 2.5"),
+        (EUROC + "1499999999,1,2,3,1,0,0,0", "run.txt:3: stamps must increase, but 1499999999 follows 1500000000"),
+        (TUM + "2.4 0 0 0 0 0 0 1", "run.txt:3: stamps must increase, but 2.4 follows 2.5"),
+        ("0 " + KITTI + "0.5 " + KITTI, "run.txt:2: the first of 13 columns should be the number of a frame, whole and from 0 on, but is 0.5"),
+        ("-1 " + KITTI, "run.txt:1: the first of 13 columns should be the number of a frame, whole and from 0 on, but is -1"),
+        ("7 " + KITTI + "6 " + KITTI, "run.txt:2: frame numbers must increase, but 6 follows 7"),
         ("1305031102160407000 0 0 0 0 0 0 1", "run.txt:1: t should be seconds below 9223372036.854775807, but is 1305031102160407000 (is it in another unit?)"),
     ],
 )  # fmt: skip
@@ -92,6 +95,35 @@ def test_what_is_no_trajectory_is_named_with_its_line(text, sentence):
         parse_any(text, name="run.txt")
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_of_rows_that_repeat_a_stamp_the_first_counts_and_that_is_said():
+    again = TUM + "2.500000000 9 9 9 0 0 0 1\n2.5 8 8 8 0 0 0 1\n3.5 3 4 5 0 0 0 1\n"
+    parsed = parse_any(again, name="run.txt")
+    assert parsed.t_ns.tolist() == [1_500_000_000, 2_500_000_000, 3_500_000_000]
+    assert parsed.T[:, 0, 3].tolist() == [1.0, 2.0, 3.0]
+    said = "rows that repeat the stamp of the row before were left out: 2 of 5, the first at run.txt:3"
+    assert parsed.notes == (said,)
+    assert parse_any(TUM, name="run.txt").notes == ()
+    assert parse_any(EUROC + EUROC.splitlines()[1], name="run.txt").T.shape == (1, 4, 4)
+
+
+def test_kitti_may_have_the_frames_number_first_and_frames_missing():
+    turned = "0 -1 0 5 1 0 0 6 0 0 1 7\n"
+    parsed = parse_any(f"0 {KITTI}3.000000e+00 {turned}3 {KITTI}12 {turned}", name="run.txt")
+    assert (parsed.t_ns, parsed.frames.tolist()) == (None, [0, 3, 12])
+    np.testing.assert_array_equal(parsed.T[1], parse_any(turned, name="x").T[0])
+    said = "rows that repeat the frame number of the row before were left out: 1 of 4, the first at run.txt:3"
+    assert parsed.notes == (said,)
+
+
+def test_stamps_of_frames_go_to_those_rows_that_have_the_number_or_the_place():
+    clock = np.arange(0, 130, 10, dtype=np.int64)
+    numbered = parse_any(f"0 {KITTI}12 {KITTI}", name="x")
+    assert numbered.stamped_by(clock).tolist() == [0, 120]
+    assert numbered.stamped_by(clock[:12]) is None
+    assert parse_any(KITTI * 13, name="x").stamped_by(clock).tolist() == clock.tolist()
+    assert parse_any(KITTI * 12, name="x").stamped_by(clock) is None
 
 
 FIELD = st.sampled_from(

@@ -14,16 +14,34 @@ Est = Annotated[
 Topic = Annotated[str | None, typer.Option(help="The topic with the poses, or /tf:parent.child.")]
 As = Annotated[
     list[str] | None,
-    typer.Option(help="s|ms|us|ns, xyzw|wxyz, axes:z,-x,-y, positions:y,x,z or mount:x,y,z,qx,qy,qz,qw; repeatable."),
+    typer.Option(
+        help="s|ms|us|ns, xyzw|wxyz, inverse, rotations:inverse, axes:z,-x,-y, positions:y,x,z or "
+        "mount:x,y,z,qx,qy,qz,qw; repeatable."
+    ),
 ]
-Times = Annotated[Path | None, typer.Option(help="Stamps in seconds, one a line, for files without (KITTI).")]
+Times = Annotated[
+    list[Path] | None,
+    typer.Option(help="Stamps in seconds, one a line, for files without (KITTI); repeatable: each takes what fits it."),
+]
 
 
 def score(
-    gt: Gt,
-    est: Est,
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="GT EST",
+            help="Ground truth and estimate: TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, by content, or the truth "
+            "of a sequence's folder. Several pairs are scored one by one and all together.",
+        ),
+    ] = None,
     *,
-    like: Annotated[str | None, typer.Option(help="Set what evo, kitti, rpg, tum or openvins would.")] = None,
+    listed: Annotated[
+        Path | None, typer.Option("--list", help="A file with GT and EST on each line, besides those given here.")
+    ] = None,
+    like: Annotated[
+        str | None,
+        typer.Option(help="Set what evo, kitti, rpg, tum, openvins, tartanair or tartanair_mono would."),
+    ] = None,
     align: Annotated[
         str | None, typer.Option("--align", "-a", help="none, origin, se3 (our default), sim3, scale or yaw.")
     ] = None,
@@ -41,7 +59,13 @@ def score(
     t_max_diff: Annotated[float | None, typer.Option(help="Poses further apart are no pair, in s; 0.01.")] = None,
     t_offset: Annotated[float | None, typer.Option(help="Added to the estimate's stamps, in s.")] = None,
     assoc: Annotated[str | None, typer.Option(help="nearest, evo, interpolate, greedy or in_order.")] = None,
+    project: Annotated[
+        str | None, typer.Option(help="Compare in the plane xy, xz or yz of the truth, once aligned.")
+    ] = None,
     full: Annotated[bool | None, typer.Option("--full", help="Every metric, not only the headlines.")] = None,
+    per_length: Annotated[
+        bool, typer.Option("--per-length", help="Segments and parts over each length too; --json always has them.")
+    ] = False,
     gt_topic: Topic = None,
     est_topic: Topic = None,
     gt_as: As = None,
@@ -51,21 +75,30 @@ def score(
     csv: Annotated[bool, typer.Option("--csv", help="Print CSV.")] = False,
     md: Annotated[bool, typer.Option("--md", help="Print Markdown.")] = False,
 ) -> None:
-    """Score an estimate against ground truth: ATE, RPE, segments, coverage."""
+    """Score estimates against ground truth: ATE, RPE, segments, coverage."""
     from vobench.cli import scoring
     from vobench.pipeline.pair import Source
 
     forms = [form for form, asked in (("json", json), ("csv", csv), ("md", md)) if asked]
     if len(forms) > 1:
         raise typer.BadParameter(f"choose one of --{' and --'.join(forms)}")
+    paths = [*(files or ()), *(scoring.read_list(listed) if listed else ())]
+    if not paths or len(paths) % 2:
+        raise typer.BadParameter(
+            f"files come in pairs, GT EST, but there {'is' if len(paths) == 1 else 'are'} {len(paths)}"
+        )
+    pairs = [
+        (Source(gt, gt_topic, tuple(gt_as or ())), Source(est, est_topic, tuple(est_as or ())))
+        for gt, est in zip(paths[::2], paths[1::2], strict=True)
+    ]
     scoring.show(
-        Source(gt, gt_topic, tuple(gt_as or ())),
-        Source(est, est_topic, tuple(est_as or ())),
+        pairs,
         scoring.Asked(
-            like, align, align_n, assoc, t_max_diff, t_offset, delta, delta_unit, all_pairs, pairs_from, full
+            like, align, align_n, assoc, t_max_diff, t_offset, delta, delta_unit, all_pairs, pairs_from, full, project
         ),
-        times=times,
+        times=times or (),
         form=forms[0] if forms else "table",
+        per_length=per_length,
     )
 
 
@@ -87,7 +120,7 @@ def diagnose(
     diagnosing.show(
         Source(gt, gt_topic, tuple(gt_as or ())),
         Source(est, est_topic, tuple(est_as or ())),
-        times=times,
+        times=times or (),
         as_json=json,
     )
 

@@ -1,15 +1,18 @@
 """vobench score."""
 
 import csv
+import shlex
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, get_args
 
 from vobench.cli import terminal
 from vobench.errors import AlignmentError, InputError, UnknownNameError
-from vobench.metric.score import Score, score
-from vobench.metric.settings import LIKE, ScoreSettings, Side, Unit
+from vobench.metric.definitions import DEFINITIONS
+from vobench.metric.score import Score, pooled, score
+from vobench.metric.settings import LIKE, PAIRS_OF_RULE, Plane, ScoreSettings, Side, Unit
 from vobench.pipeline.pair import Source, read_pair
 from vobench.trajectory.align import Kind
 from vobench.trajectory.associate import Method
@@ -18,6 +21,10 @@ MAX_WINDOW_S = 1e6
 MAX_OFFSET_S = 2e9  # from a clock that starts at 0 to one that counts from 1970
 COLUMNS = ("n", "rmse", "mean", "median", "std", "min", "max", "sse", "p95", "p99")
 SHOWN = ("n", "rmse", "mean", "median", "std", "min", "max", "p95", "p99")
+WORDS = ("metric", "unit", "sequence")  # headings of columns that hold words
+ABREAST = 6  # metrics in one table of sequences
+Content = dict[str, Any]
+Rows = list[list[str]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +42,7 @@ class Asked:
     rpe_all_pairs: bool | None = None
     rpe_pairs_from: str | None = None
     full: bool | None = None
+    project: str | None = None
 
     def settings(self) -> ScoreSettings:
         """What to score with. Raises UnknownNameError, InputError or AlignmentError for what can't be asked."""
@@ -43,6 +51,7 @@ class Asked:
         _require_known("association", self.association, get_args(Method))
         _require_known("unit", self.rpe_unit, get_args(Unit))
         _require_known("side", self.rpe_pairs_from, get_args(Side))
+        _require_known("plane", self.project, get_args(Plane))
         if self.rpe_delta is not None and not 0 < self.rpe_delta < float("inf"):
             raise InputError(f"--delta should be more than 0 and finite, got {self.rpe_delta:g}")
         own = {field.name for field in fields(ScoreSettings)} & set(self.__slots__)
@@ -50,27 +59,84 @@ class Asked:
         asked["max_diff_ns"] = _ns("--t-max-diff", self.max_diff_s, 0, MAX_WINDOW_S)
         asked["offset_ns"] = _ns("--t-offset", self.offset_s, -MAX_OFFSET_S, MAX_OFFSET_S)
         base = LIKE[self.like] if self.like else ScoreSettings()
-        if base.rpe_rule == "tum" and not _are_tums(self.rpe_unit, self.rpe_all_pairs, self.rpe_pairs_from):
-            asked["rpe_rule"] = ScoreSettings().rpe_rule  # other pairs than TUM's script has are ours
+        if base.rpe_rule in PAIRS_OF_RULE and not self._keeps_pairs(base):
+            asked["rpe_rule"] = ScoreSettings().rpe_rule  # other pairs than that tool has are ours
         return replace(base, **{name: value for name, value in asked.items() if value is not None})
 
+    def _keeps_pairs(self, base: ScoreSettings) -> bool:
+        """Whether the pairs asked for are those of a tool whose rule knows no others."""
+        asked = (self.rpe_unit, self.rpe_all_pairs, self.rpe_pairs_from)
+        are_own = all(mine in (None, own) for mine, own in zip(asked, PAIRS_OF_RULE[base.rpe_rule], strict=True))
+        return are_own and (self.project is None if base.rpe_rule == "tum" else self.rpe_delta is None)
 
-def show(gt: Source, est: Source, asked: Asked, *, times: Path | None, form: str) -> None:
-    """Score two trajectories and print every metric with its identity, as a table, json, csv or md."""
+
+def show(
+    pairs: Sequence[tuple[Source, Source]], asked: Asked, *, times: Sequence[Path], form: str, per_length: bool
+) -> None:
+    """Score one pair of trajectories, or several and all of them together, and print every metric with its identity.
+
+    `form` is table, json, csv or md; `per_length` adds the metrics over each length of path, which json always has.
+    """
     settings = asked.settings()
+    scored = [_scored(gt, est, settings, times) for gt, est in pairs]
+    if len(scored) == 1:
+        content = scored[0][1]
+        _require_finite(content["metrics"])
+    else:
+        content = _together(pairs, scored)
+    if form == "json":
+        terminal.print_json(content)
+        return
+    for part in content.get("sequences", [content]):
+        for note in part["notes"]:
+            print(f"note: {note}", file=sys.stderr)
+    FORMS[form](content, [result for result, _ in scored], per_length)
+
+
+def read_list(path: Path) -> list[Path]:
+    """The files that a list names, truth and estimate on each line, from the list's own folder. Raises InputError."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read {path}: {getattr(error, 'strerror', None) or 'not a text in UTF-8'}") from None
+    found: list[Path] = []
+    for number, line in enumerate(lines, 1):
+        words = shlex.split(line, comments=True)
+        if len(words) not in (0, 2):
+            raise InputError(f"{path}:{number}: a line should name a truth and an estimate, but has {len(words)} words")
+        found += [path.parent / word for word in words]
+    if not found:
+        raise InputError(f"no line names a truth and an estimate: {path}")
+    return found
+
+
+def _scored(gt: Source, est: Source, settings: ScoreSettings, times: Sequence[Path]) -> tuple[Score, Content]:
     pair = read_pair(gt, est, times=times)
-    if pair.notes and settings.rpe_unit == "s":
+    if pair.by_frame and settings.rpe_unit == "s":
         raise InputError("a delta in seconds needs stamps, and neither file has any; name one with --times")
     scored = score(pair.gt.trajectory, pair.est.trajectory, settings=settings)
     content = scored.as_dict()
-    content["warnings"] = [*pair.notes, *content["warnings"]]
-    _require_finite(content["metrics"])
-    FORMS[form](content, scored)
+    content["warnings"] = [*([pair.by_frame] if pair.by_frame else []), *content["warnings"]]
+    content["notes"] = list(pair.notes)
+    content["per_length"] = [row.as_dict() for row in scored.per_length]
+    return scored, content
 
 
-def _are_tums(unit: str | None, all_pairs: bool | None, side: str | None) -> bool:
-    """Whether the pairs asked for are those of TUM's script, the only ones that its rule knows."""
-    return unit in (None, "s") and all_pairs is not False and side in (None, "est")
+def _together(pairs: Sequence[tuple[Source, Source]], scored: Sequence[tuple[Score, Content]]) -> Content:
+    """Several sequences, and their errors pooled."""
+    sequences = [
+        {"gt": str(gt.path), "est": str(est.path), **content}
+        for (gt, est), (_, content) in zip(pairs, scored, strict=True)
+    ]
+    pool = pooled([result for result, _ in scored])
+    metrics = [metric.as_dict() for metric in pool.metrics]
+    for part in (*(sequence["metrics"] for sequence in sequences), metrics):
+        _require_finite(part)
+    lengths = [row.as_dict() for row in pool.per_length]
+    return {
+        "sequences": sequences,
+        "pooled": {"metrics": metrics, "per_length": lengths, "warnings": list(pool.warnings)},
+    }
 
 
 def _require_known(what: str, name: str | None, known: tuple[str, ...]) -> None:
@@ -96,44 +162,96 @@ def _require_finite(metrics: list[dict[str, Any]]) -> None:
                 raise AlignmentError(f"the {name} of {metric['name']} is {metric[name]}: positions are too far apart")
 
 
-def _print_json(content: dict[str, Any], scored: Score) -> None:
+def _print_csv(content: Content, scored: Sequence[Score], per_length: bool) -> None:
     del scored
-    terminal.print_json(content)
-
-
-def _print_csv(content: dict[str, Any], scored: Score) -> None:
-    del scored
-    writer = csv.DictWriter(sys.stdout, ["name", "unit", *COLUMNS, "id"], extrasaction="ignore", lineterminator="\n")
+    named = [(part["est"], part) for part in content.get("sequences", [])]
+    named += [("pooled", content["pooled"])] if named else [("", content)]
+    columns = [*(["sequence"] if len(named) > 1 else []), "name", "unit", *(["length_m"] if per_length else [])]
+    writer = csv.DictWriter(sys.stdout, [*columns, *COLUMNS, "id"], extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
-    writer.writerows(content["metrics"])
+    for name, part in named:
+        rows = [*part["metrics"], *(part["per_length"] if per_length else [])]
+        writer.writerows({"sequence": name, **row} for row in rows)
 
 
-def _print_md(content: dict[str, Any], scored: Score) -> None:
-    print(f"| metric | unit | {' | '.join(SHOWN)} |\n|---|---|{'---:|' * len(SHOWN)}")
-    for metric in content["metrics"]:
-        print(f"| {metric['name']} | {metric['unit']} | {' | '.join(_cells(metric))} |")
-    print()
-    for sentence in [*_ids(content), _summary(scored), *(f"warning: {w}" for w in content["warnings"])]:
+def _print_md(content: Content, scored: Sequence[Score], per_length: bool) -> None:
+    for headings, rows in _tables(content, per_length):
+        words = sum(heading in WORDS for heading in headings)
+        print(f"| {' | '.join(headings)} |\n|{'---|' * words}{'---:|' * (len(headings) - words)}")
+        for row in rows:
+            print(f"| {' | '.join(row)} |")
+        print()
+    for sentence in (*_ids(content), *_summaries(content, scored), *(f"warning: {w}" for w in _warnings(content))):
         print(f"- {sentence}")
 
 
-def _print_table(content: dict[str, Any], scored: Score) -> None:
-    rows = [[metric["name"], metric["unit"], *_cells(metric)] for metric in content["metrics"]]
+def _print_table(content: Content, scored: Sequence[Score], per_length: bool) -> None:
     out = terminal.console()
-    out.print(terminal.table("", ["metric", "unit", *SHOWN], rows))
+    for headings, rows in _tables(content, per_length):
+        out.print(terminal.table("", headings, rows))
     for identity in _ids(content):
         out.print(identity, style="dim", soft_wrap=True)
-    out.print(_summary(scored), soft_wrap=True)
-    for warning in content["warnings"]:
+    for summary in _summaries(content, scored):
+        out.print(summary, soft_wrap=True)
+    for warning in _warnings(content):
         out.print(f"warning: {warning}", style="yellow", soft_wrap=True)
+
+
+def _tables(content: Content, per_length: bool) -> list[tuple[list[str], Rows]]:
+    """Headings and rows of each table: the metrics, or the sequences with all of them pooled, then the lengths."""
+    whole = content.get("pooled", content)
+    if "sequences" in content:
+        tables = _sequence_tables(content)
+    else:
+        rows = [[metric["name"], metric["unit"], *_cells(metric)] for metric in content["metrics"]]
+        tables = [(["metric", "unit", *SHOWN], rows)]
+    if per_length:
+        cut = [[row["name"], row["unit"], f"{row['length_m']:g}", *_cells(row)] for row in whole["per_length"]]
+        tables.append((["metric", "unit", "length m", *SHOWN], cut))
+    return tables
+
+
+def _sequence_tables(content: Content) -> list[tuple[list[str], Rows]]:
+    """A row for each sequence and one for all of them, with the statistic to quote of each metric."""
+    parts = [*content["sequences"], {"est": "pooled", **content["pooled"]}]
+    units = {metric["name"]: metric["unit"] for part in parts for metric in part["metrics"]}
+    names = list(units)
+    tables: list[tuple[list[str], Rows]] = []
+    for begin in range(0, len(names), ABREAST):
+        chosen = names[begin : begin + ABREAST]
+        rows = []
+        for part in parts:
+            quoted = {metric["name"]: f"{metric[_quoted(metric['name'])]:.6g}" for metric in part["metrics"]}
+            coverage = f"{part['coverage']:.3f}" if "coverage" in part else ""
+            rows.append([part["est"], coverage, *(quoted.get(name, "") for name in chosen)])
+        headings = [f"{name} {_quoted(name)}{'' if units[name] == '1' else ' ' + units[name]}" for name in chosen]
+        tables.append((["sequence", "coverage", *headings], rows))
+    return tables
+
+
+def _quoted(name: str) -> str:
+    """The statistic of a metric that is quoted."""
+    return DEFINITIONS[name].headline
 
 
 def _cells(metric: dict[str, Any]) -> list[str]:
     return [str(metric["n"]), *(f"{metric[name]:.6g}" for name in SHOWN[1:])]
 
 
-def _ids(content: dict[str, Any]) -> list[str]:
-    return [metric["id"] for metric in content["metrics"]]
+def _ids(content: Content) -> list[str]:
+    return [metric["id"] for metric in content.get("pooled", content)["metrics"]]
+
+
+def _warnings(content: Content) -> list[str]:
+    if "sequences" not in content:
+        return list(content["warnings"])
+    said = [f"{part['est']}: {warning}" for part in content["sequences"] for warning in part["warnings"]]
+    return [*said, *content["pooled"]["warnings"]]
+
+
+def _summaries(content: Content, scored: Sequence[Score]) -> list[str]:
+    names = [f"{part['est']}: " for part in content.get("sequences", [])] or [""]
+    return [f"{name}{_summary(result)}" for name, result in zip(names, scored, strict=True)]
 
 
 def _summary(scored: Score) -> str:
@@ -145,4 +263,4 @@ def _summary(scored: Score) -> str:
     )
 
 
-FORMS = {"table": _print_table, "json": _print_json, "csv": _print_csv, "md": _print_md}
+FORMS = {"table": _print_table, "csv": _print_csv, "md": _print_md}

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 Item = TypeVar("Item")
 LEFT_ALIGNED = {
     *("estimator", "status", "name", "case", "kind", "summary", "path", "origin", "check", "result"),
-    *("metric", "headline", "is", "with", "trajectory"),
+    *("sequence", "metric", "headline", "is", "with", "trajectory"),
 }
 
 

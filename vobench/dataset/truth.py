@@ -7,12 +7,9 @@ import numpy as np
 from vobench.dataset.files import read_text
 from vobench.errors import InputError
 from vobench.geometry import se3
-from vobench.trajectory.form import KITTI, TUM, parse_any
-from vobench.trajectory.table import content
+from vobench.trajectory.form import parse_any
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
-Rows = list[tuple[int, str]]  # line numbers and what the lines say
-NUMBERED_KITTI = KITTI + 1
 EXACT = 1e-9  # a rotation this far off its transpose's inverse was written with all its digits
 
 
@@ -22,61 +19,19 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, tuple[st
     A row of 13 numbers is KITTI's behind the picture's number, from 0. Of rows with one stamp the first is kept.
     Raises TrajectoryError naming file and line for a pose that is none, InputError where rows and pictures differ.
     """
-    text, notes = read_text(path), []
-    rows = content(text)
-    numbers = _numbers(rows, len(frames_ns), path)
-    if numbers is not None:
-        text = _with_rows(text, {line: body.split(None, 1)[1] for line, body in rows})
-        notes.append(f"{path.name} has poses of {len(numbers)} of {len(frames_ns)} pictures, by their numbers.")
-    elif repeats := _repeats(rows):
-        text = _with_rows(text, dict.fromkeys(repeats, ""))
-        notes.append(
-            f"{len(repeats)} of {len(rows)} rows of {path.name} repeat a stamp, first in line {repeats[0]}; "
-            "the first pose of each stamp was kept."
-        )
-    parsed = parse_any(text, name=str(path))
-    t_ns = frames_ns if numbers is None else frames_ns[numbers]
-    if parsed.t_ns is None and len(parsed.T) != len(t_ns):
+    parsed = parse_any(read_text(path), name=str(path))
+    t_ns = parsed.stamped_by(frames_ns) if parsed.t_ns is None else parsed.t_ns
+    if t_ns is None:
         raise InputError(
             f"{len(parsed.T)} poses without stamps for {len(frames_ns)} pictures: give one pose a picture, or each "
             f"row its picture's number, from 0, as a first of 13 columns: {path}"
         )
     T, off = parsed.T, _skew(parsed.T)
+    notes = list(parsed.notes)
     if off > EXACT:
         T = se3.transform(se3.nearest_rotation(T[:, :3, :3]), T[:, :3, 3])
         notes.append(f"Rotations of {path.name} were made exact; they were up to {off:.1g} off.")
-    return Trajectory(t_ns if parsed.t_ns is None else parsed.t_ns, T), tuple(notes)
-
-
-def _numbers(rows: Rows, count: int, path: Path) -> Stamps | None:
-    """The pictures (N,) that rows of 13 columns name; None for other rows. Raises InputError for what is no picture."""
-    if not rows or "," in rows[0][1] or len(rows[0][1].split()) != NUMBERED_KITTI:
-        return None
-    last = -1
-    for line, body in rows:
-        first = body.split(None, 1)
-        number = int(first[0]) if len(first) > 1 and first[0].isascii() and first[0].isdigit() else -1
-        if not last < number < count:
-            raise InputError(
-                f"{path}:{line}: the first of 13 columns should be a picture's number, rising, from 0 to {count - 1}, "
-                f"but is {first[0][:80]}"
-            )
-        last = number
-    return np.array([int(body.split(None, 1)[0]) for _, body in rows], np.int64)
-
-
-def _repeats(rows: Rows) -> list[int]:
-    """The lines whose stamp is that of the row before; none in forms without stamps."""
-    first = rows[0][1] if rows else ""
-    if "," not in first and len(first.split()) != TUM:
-        return []
-    stamps = [body.replace(",", " ").split(None, 1)[:1] for _, body in rows]
-    return [line for (line, _), this, last in zip(rows[1:], stamps[1:], stamps, strict=False) if this == last]
-
-
-def _with_rows(text: str, bodies: dict[int, str]) -> str:
-    """Text with other bodies in some lines, each still of its number."""
-    return "\n".join(bodies.get(line, body) for line, body in enumerate(text.split("\n"), 1))
+    return Trajectory(t_ns, T), tuple(notes)
 
 
 def cut_to(truth: Trajectory, frames_ns: Stamps) -> tuple[Trajectory | None, tuple[str, ...]]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-POSES = ("alignment", "align_n", "association", "max_diff_ns", "offset_ns")
+POSES = ("alignment", "align_n", "scale_rule", "project", "association", "max_diff_ns", "offset_ns")
 MOTIONS = ("rpe_delta", "rpe_unit", "rpe_all_pairs", "rpe_pairs_from", "rpe_rule", *POSES)
 SEGMENTS = ("segment_lengths_m", "segment_step_frames", "segment_precision", "segment_mean", *POSES)
 RELATIVE = ("relative_rule", *POSES)
@@ -17,6 +17,7 @@ HARTLEY = "Hartley et al. (2013), section 4.3; evo's rot_part"
 STRASDAT = "Strasdat et al. (2010), section II, as a ratio of distances"
 DRIFT = "where along the path an error was made: one early turn moves everything after it"
 LOST = "frames without a pose: read coverage beside it"
+ALL_PAIRS = "; like tartanair over all ordered pairs i, j, of which its own script draws 10,000 at random"
 GLOBAL = "a slow drift that stays below the size of a step"
 
 
@@ -107,7 +108,7 @@ _ALL = (
         "rpe_trans",
         "relative pose error, translation",
         "m",
-        "‖t‖ of (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j), Q true and P estimated",
+        f"‖t‖ of (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j), Q true and P estimated{ALL_PAIRS}",
         STURM_RPE,
         MOTIONS,
         GLOBAL,
@@ -117,7 +118,7 @@ _ALL = (
         "rpe_rot",
         "relative pose error, angle",
         "deg",
-        "angle of (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j), Q true and P estimated",
+        f"angle of (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j), Q true and P estimated{ALL_PAIRS}",
         STURM_RPE,
         MOTIONS,
         GLOBAL,
@@ -223,7 +224,8 @@ _ALL = (
         "rel_yaw",
         "yaw error over parts of the path: the turn about gravity that inertia can't see",
         "deg",
-        "|yaw| of the error turned into the world: R_est,j R_E R_est,j⁻¹ = Rz(yaw) Ry(pitch) Rx(roll)",
+        "|yaw| of the error turned into the world: R_est,j R_E R_est,j⁻¹ = Rz(yaw) Ry(pitch) Rx(roll); "
+        "rpg's is the estimate's own world, openvins' the truth's",
         ZHANG,
         RELATIVE,
         "gravity is the z of the world: another vertical mixes it with rel_gravity",

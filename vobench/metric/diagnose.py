@@ -10,14 +10,14 @@ import numpy as np
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.metric.mismatch import find_mismatch
+from vobench.metric.mismatch import Mismatch, find_mismatch, misfit
 from vobench.metric.settings import Side
 from vobench.metric.swap import signs_of_swap
 from vobench.trajectory.align import align
 from vobench.trajectory.associate import MAX_DIFF_NS, associate
 from vobench.trajectory.correction import Move
 from vobench.trajectory.form import Reading
-from vobench.trajectory.offset import estimate_offset, likeness
+from vobench.trajectory.offset import estimate_offset, likeness, offsets_in_stretches
 from vobench.trajectory.table import DIGITS, WORDS
 from vobench.trajectory.text import seconds
 from vobench.trajectory.trajectory import Trajectory
@@ -28,9 +28,12 @@ Fault = Literal[
     "quaternion_order",
     "axis_swap",
     "mirrored_axes",
+    "inverse_poses",
+    "inverse_rotations",
     "body_frame_offset",
     "scale",
     "swapped_inputs",
+    "unrelated",
 ]
 WHO: dict[Side, str] = {"gt": "ground truth", "est": "estimate"}
 
@@ -39,6 +42,8 @@ MIN_POSES, MAX_POSES = 8, 1000
 SCALE_OFF, SCALE_MENDED = 0.02, 0.5
 LAG_NS, LAG_MENDED, LAG_BY, LAG_ALIKE = 10_000_000, 0.75, 5e-4, 0.5
 LONGEST_REPR = 100  # characters of a finding in one line
+STEADY_LAG_NS, STEADY_SHARE = 25_000_000, 0.875  # fr1/xyz has 10 ms, the same in all of its stretches
+UNRELATED = 0.5  # of the extent, left by the best mend
 SAME_SPAN = 30.0  # times; units are 1000 apart
 
 
@@ -56,7 +61,7 @@ class Evidence:
 class Finding:
     """A fault, a sentence about it, its evidence, and the options of `vobench score` that mend it.
 
-    Swapped inputs are mended by swapping them, for which there is no option.
+    Swapped inputs are mended by swapping them, for which there is no option; nothing mends unrelated ones.
     """
 
     fault: Fault
@@ -101,10 +106,22 @@ def diagnose(gt: Reading, est: Reading) -> tuple[Finding, ...]:
             return tuple(findings)
         raise AlignmentError(f"a diagnosis needs {MIN_POSES} matched poses or more, but {len(pair.T_gt)} match")
     if min(_extent_m(pair.T_gt), _extent_m(pair.T_est)) > 0:
+        given = misfit(pair.T_gt, pair.T_est).trans
         pair = _in_right_frames(pair, gt, est, findings)
+        left = misfit(pair.T_gt, pair.T_est).trans
+        if left >= UNRELATED:
+            return (*(finding for finding in findings if finding.fault == "stamp_unit"), _unrelated(given, left))
         findings += _wrong_scale(pair)
         findings += _swapped(gt, est)
     return tuple(findings)
+
+
+def _unrelated(given: float, left: float) -> Finding:
+    return Finding(
+        "unrelated",
+        "these trajectories are not of one motion, or the estimate lost it: no mend brings them together",
+        (Evidence("position left, of the path's extent (rms)", "%", 100 * given, 100 * left),),
+    )
 
 
 def _in_right_units(gt: Reading, est: Reading, findings: list[Finding]) -> tuple[Reading, Reading]:
@@ -123,7 +140,7 @@ def _right_unit(read: Reading, other: Reading) -> Reading:
     Lost track shortens the one and keyframes lengthen the other, but neither does both.
     """
     duration, wanted = _duration_ns(read), max(_duration_ns(other), 1)
-    if read.unit is None or min(duration / wanted, _step_ns(read) / _step_ns(other)) < SAME_SPAN:
+    if read.unit is None or read.is_unit_told or min(duration / wanted, _step_ns(read) / _step_ns(other)) < SAME_SPAN:
         return read
     finer = [unit for unit in DIGITS if DIGITS[unit] < DIGITS[read.unit]]
     factors = {unit: 10 ** (DIGITS[read.unit] - DIGITS[unit]) for unit in finer}
@@ -160,7 +177,8 @@ def _on_one_clock(gt: Reading, est: Reading, findings: list[Finding]) -> Reading
     before, after = likeness(gt.trajectory, est.trajectory, 0), lag.correlation
     if abs(lag.offset_ns) <= LAG_NS or after < LAG_ALIKE:
         return est
-    if before is not None and (1 - after > LAG_MENDED * (1 - before) or after - before < LAG_BY):
+    is_plain = before is None or (1 - after <= LAG_MENDED * (1 - before) and after - before >= LAG_BY)
+    if not is_plain and not _is_steady(gt.trajectory, est.trajectory, lag.offset_ns):
         return est
     offset = seconds(lag.offset_ns).rstrip("0").rstrip(".")
     sentence = f"the estimate's clock is {abs(lag.offset_ns) / 1e9:.3f} s {'behind' if lag.offset_ns > 0 else 'ahead'}"
@@ -168,6 +186,15 @@ def _on_one_clock(gt: Reading, est: Reading, findings: list[Finding]) -> Reading
     findings.append(Finding("time_offset", sentence, (evidence,), (f"--t-offset={offset}",)))
     moved = est.trajectory.t_ns + lag.offset_ns
     return replace(est, trajectory=Trajectory(moved, est.trajectory.T_world_frame))
+
+
+def _is_steady(gt: Trajectory, est: Trajectory, offset_ns: int) -> bool:
+    """Whether nearly every stretch of the recording shows the offset by itself, to within half of it."""
+    if abs(offset_ns) <= STEADY_LAG_NS:
+        return False
+    found = offsets_in_stretches(gt, est, within_ns=round(1.5 * abs(offset_ns)))
+    alike = np.abs(found - offset_ns) <= 0.5 * abs(offset_ns)
+    return len(found) > 0 and bool(np.mean(alike) >= STEADY_SHARE)
 
 
 def _matched(gt: Reading, est: Reading) -> _Pair:
@@ -193,18 +220,27 @@ def _in_right_frames(pair: _Pair, gt: Reading, est: Reading, findings: list[Find
         evidence.append(
             Evidence("translation of short motions left (rms)", "m", found.lever.before_m, found.lever.after_m)
         )
-    sentence, options = _frame_words(found.kind, found.suspect.what, gt, est)
+    sentence, options = _frame_words(found, gt, est)
     findings.append(Finding(found.kind, sentence, tuple(evidence), options))
     return _Pair(found.suspect.T_gt, found.suspect.T_est)
 
 
-def _frame_words(kind: Fault, what: Move | Side, gt: Reading, est: Reading) -> tuple[str, tuple[str, ...]]:
+def _frame_words(found: Mismatch, gt: Reading, est: Reading) -> tuple[str, tuple[str, ...]]:
     """A sentence about a fault of frames, and the options that mend it."""
-    if isinstance(what, Move):
-        return _move_words(kind, what), ("--est-as", str(what))
-    read_as = (gt if what == "gt" else est).order
-    order = "wxyz" if read_as == "xyzw" else "xyzw"
-    return f"the {WHO[what]}'s quaternions are {order}", (f"--{what}-as", order)
+    side, move = found.suspect.side, found.suspect.move
+    if move is None:
+        read_as = (gt if side == "gt" else est).order
+        order = "wxyz" if read_as == "xyzw" else "xyzw"
+        return f"the {WHO[side]}'s quaternions are {order}", (f"--{side}-as", order)
+    option = (f"--{side}-as", str(move))
+    if found.kind == "inverse_poses":
+        return (
+            f"the {WHO[side]}'s poses take the world to the frame (T_cw): they are the inverse of what is wanted",
+            option,
+        )
+    if found.kind == "inverse_rotations":
+        return f"the {WHO[side]}'s rotations are inverse (JPL's, not Hamilton's), but its positions are not", option
+    return _move_words(found.kind, move), option
 
 
 def _move_words(kind: Fault, move: Move) -> str:

@@ -54,6 +54,8 @@ def parse_identity(text: str) -> Identity:
 def _own_parts(metric: str, s: ScoreSettings) -> list[str]:
     """What concerns this kind of metric only."""
     family = metric.partition(".")[0]
+    if family == "rpe" and s.rpe_rule == "tartanair":
+        return ["pairs=all/gt", "rule=tartanair"]
     if family == "rpe":
         rule = [] if s.rpe_rule == _DEFAULTS.rpe_rule else [f"rule={s.rpe_rule}"]
         pairs = f"pairs={_PAIRS[s.rpe_all_pairs]}/{s.rpe_pairs_from}"
@@ -73,8 +75,11 @@ def _own_parts(metric: str, s: ScoreSettings) -> list[str]:
 def _shared_parts(s: ScoreSettings) -> list[str]:
     first = "" if s.align_n is None else f"/first{s.align_n}"
     offset = [f"offset={_ms(s.offset_ns)}ms"] if s.offset_ns else []
+    scale = [] if s.scale_rule == _DEFAULTS.scale_rule else [f"scale={s.scale_rule}"]
+    project = [f"project={s.project}"] if s.project else []
     ddof = [f"ddof={s.std_ddof}"] if s.std_ddof else []
-    return [f"align={s.alignment}{first}", f"assoc={s.association}<={_ms(s.max_diff_ns)}ms", *offset, *ddof]
+    assoc = f"assoc={s.association}<={_ms(s.max_diff_ns)}ms"
+    return [f"align={s.alignment}{first}", *scale, *project, assoc, *offset, *ddof]
 
 
 def _number(value: float) -> str:
@@ -126,6 +131,8 @@ _READERS: Mapping[str, Callable[[str], dict[str, Any]]] = {
     "align": _read_align,
     "assoc": _read_assoc,
     "offset": lambda value: {"offset_ns": _ns(value)},
+    "scale": lambda value: {"scale_rule": value},
+    "project": lambda value: {"project": value},
     "ddof": lambda value: {"std_ddof": int(value)},
     "delta": lambda value: {"rpe_delta": float(value[:-1]), "rpe_unit": value[-1:]},
     "pairs": _read_pairs,

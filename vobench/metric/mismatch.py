@@ -1,4 +1,4 @@
-"""Wrong axes, wrong quaternions or another frame of the body: which of them one mend takes away."""
+"""Wrong axes, wrong quaternions, inverses or another frame of the body: which of them one mend takes away."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,11 +9,15 @@ import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.metric.settings import Side
 from vobench.trajectory.align import align
+from vobench.trajectory.correction import Kind as MoveKind
 from vobench.trajectory.correction import Move
 from vobench.trajectory.table import Order
 
-Kind = Literal["quaternion_order", "axis_swap", "mirrored_axes", "body_frame_offset"]
+Kind = Literal[
+    "quaternion_order", "axis_swap", "mirrored_axes", "body_frame_offset", "inverse_poses", "inverse_rotations"
+]
 
 # Real pairs without such a fault (KITTI, TUM, TartanAir) keep 0.73 of their misfit and more, or lose 0.045 at most.
 MENDED = 0.6  # a mend leaves at most this share of the misfit
@@ -22,6 +26,7 @@ LEVER_MENDED_BY = 0.002  # a lever of 1 m on KITTI 00 takes 0.003
 BELIEVED = 0.5  # rad and share of the extent; an estimate that is worse than this has no frame to speak of
 AS_GOOD = 1.6  # a mend in one word is preferred to a fitted one up to this ratio of misfits
 
+INVERSE: dict[MoveKind, Kind] = {"inverse": "inverse_poses", "rotations": "inverse_rotations"}
 IDENTITY = np.eye(3)
 SIGNED_AXES = [
     np.diag(signs) @ IDENTITY[list(order)]
@@ -57,9 +62,10 @@ class Misfit:
 
 @dataclass(frozen=True, slots=True)
 class Suspect:
-    """One thing that may be wrong, and the misfit once it is mended; `what` is a move, or whose quaternions."""
+    """One thing that may be wrong on one side, and the misfit once it is mended: a move, or the quaternions' order."""
 
-    what: Move | Literal["gt", "est"]
+    side: Side
+    move: Move | None
     misfit: Misfit
     T_gt: Array
     T_est: Array
@@ -103,12 +109,15 @@ def find_mismatch(T_gt: Array, T_est: Array, *, gt_order: Order | None, est_orde
     A change that is said in one word comes before a fitted one, unless that fits plainly better.
     """
     before = misfit(T_gt, T_est)
-    tried = suspects(T_gt, T_est, gt_order=gt_order, est_order=est_order)
-    worded = min(tried, key=lambda suspect: suspect.misfit.total)
+    tried = list(suspects(T_gt, T_est, gt_order=gt_order, est_order=est_order))
+    # In one world the inverse of either side mends; truths are seldom given so.
+    inverted = [s for s in tried if s.side == "est" and s.move and s.move.kind in INVERSE and _mends(before, s)]
+    doubted = [s for s in tried if not (inverted and s.side == "gt" and s.move)]
+    worded = min(doubted, key=lambda suspect: suspect.misfit.total)
     fitted = mounted(T_gt, T_est)
     if _mends(before, worded) and not _is_rather_mounted(worded, fitted):
         return Mismatch(_kind(worded), worded, before, None)
-    lever = find_lever(T_gt, T_est, fitted.what.matrix[:3, :3]) if isinstance(fitted.what, Move) else None
+    lever = find_lever(T_gt, T_est, fitted.move.matrix[:3, :3]) if fitted.move else None
     if _mends(before, fitted) or (lever is not None and lever.is_plain and _matters(before, fitted)):
         return Mismatch("body_frame_offset", fitted, before, lever if lever and lever.is_plain else None)
     return None
@@ -129,15 +138,17 @@ def _is_rather_mounted(worded: Suspect, fitted: Suspect) -> bool:
     """Turned axes look the same to motions as a turned body; then the one that leaves the world in place is meant."""
     if fitted.misfit.total * AS_GOOD < worded.misfit.total:
         return True
-    is_turn = isinstance(worded.what, Move) and worded.what.kind == "axes" and np.linalg.det(worded.what.matrix) > 0
+    is_turn = worded.move is not None and worded.move.kind == "axes" and np.linalg.det(worded.move.matrix) > 0
     as_good = fitted.misfit.total <= AS_GOOD * worded.misfit.total
     return is_turn and as_good and fitted.misfit.turned_rad < worded.misfit.turned_rad
 
 
 def _kind(suspect: Suspect) -> Kind:
-    if not isinstance(suspect.what, Move):
+    if suspect.move is None:
         return "quaternion_order"
-    return "mirrored_axes" if np.count_nonzero(np.diag(suspect.what.matrix)) == 3 else "axis_swap"
+    if suspect.move.kind in INVERSE:
+        return INVERSE[suspect.move.kind]
+    return "mirrored_axes" if np.count_nonzero(np.diag(suspect.move.matrix)) == 3 else "axis_swap"
 
 
 def misfit(T_gt: Array, T_est: Array) -> Misfit:
@@ -152,17 +163,20 @@ def misfit(T_gt: Array, T_est: Array) -> Misfit:
 
 
 def suspects(T_gt: Array, T_est: Array, *, gt_order: Order | None, est_order: Order | None) -> Iterator[Suspect]:
-    """The other quaternion order of either side, and all 47 other signed axes of positions, or of everything.
+    """The other quaternion order and the inverses of either side, and all 47 other signed axes of the estimate.
 
     The orders are those that the files were read in, None where they hold matrices.
     """
     if est_order:
-        yield _suspect("est", T_gt, _reordered(T_est, est_order))
+        yield _suspect("est", None, T_gt, _reordered(T_est, est_order))
     if gt_order:
-        yield _suspect("gt", _reordered(T_gt, gt_order), T_est)
+        yield _suspect("gt", None, _reordered(T_gt, gt_order), T_est)
+    for kind in INVERSE:
+        yield _suspect("est", Move(kind), T_gt, Move(kind).apply(T_est))
+        yield _suspect("gt", Move(kind), Move(kind).apply(T_gt), T_est)
     for axes in SIGNED_AXES:
         for move in (Move("positions", axes), Move("axes", axes)):
-            yield _suspect(move, T_gt, move.apply(T_est))
+            yield _suspect("est", move, T_gt, move.apply(T_est))
 
 
 def mounted(T_gt: Array, T_est: Array) -> Suspect:
@@ -177,7 +191,7 @@ def mounted(T_gt: Array, T_est: Array) -> Suspect:
         lever_m = _limit(path[-3:]) if len(path) % 3 == 0 else lever.m
     lever_m = lever_m if lever.is_plain else np.zeros(3)
     move = Move("mount", se3.transform(_rotation_left(T_gt, T_est, lever_m), lever_m))
-    return _suspect(move, T_gt, move.apply(T_est))
+    return _suspect("est", move, T_gt, move.apply(T_est))
 
 
 def _limit(steps: list[Array]) -> Array:
@@ -232,8 +246,8 @@ def _lever(T_gt: Array, T_est: Array, rotation: Array, window: int) -> Lever:
     return Lever(solution / scale if scale > 0 else np.zeros(3), before, after)
 
 
-def _suspect(what: Move | Literal["gt", "est"], T_gt: Array, T_est: Array) -> Suspect:
-    return Suspect(what, misfit(T_gt, T_est), T_gt, T_est)
+def _suspect(side: Side, move: Move | None, T_gt: Array, T_est: Array) -> Suspect:
+    return Suspect(side, move, misfit(T_gt, T_est), T_gt, T_est)
 
 
 def _reordered(T: Array, read_as: Order) -> Array:

@@ -16,6 +16,7 @@ from vobench.trajectory.trajectory import Stamps
 TOLERANCE = 0.1  # of delta, that a pair may be off among all pairs; evo's
 GAP_STEPS = 1.5  # a step so many times the usual one is a gap
 MAX_PAIRS = 20_000_000  # all pairs by angle grow with the square of the poses; this many need 3 GB
+MAX_POSES = 2000  # whose every pair is looked at: 4 million
 CHUNK = 4_000_000  # relative angles looked at in one go: 32 MB
 
 IndexPairs = tuple[Index, Index]
@@ -40,6 +41,17 @@ def select_pairs(
         return _chain(_moves(T) if unit == "m" else np.diff(t_ns), delta if unit == "m" else delta * 1e9)
     along = np.concatenate([[0.0], np.cumsum(_moves(T))]) if unit == "m" else (t_ns - t_ns[:1]) / 1e9
     return pairs_along(along[: len(T)], delta, tolerance=TOLERANCE * delta, gaps=_gaps(t_ns) if spanning else None)
+
+
+def every_pair(n: int) -> IndexPairs:
+    """All ordered pairs (first, last) of n poses, each with itself too: what TartanAir draws 10,000 at random of.
+
+    Of more than MAX_POSES poses, as many pairs as these have are drawn, always the same.
+    """
+    if n <= MAX_POSES:
+        return np.repeat(np.arange(n), n), np.tile(np.arange(n), n)
+    first, last = np.random.default_rng(0).integers(n, size=(2, MAX_POSES**2))
+    return first, last
 
 
 def pairs_along(along: Array, delta: float, *, tolerance: float, gaps: NDArray[np.bool_] | None = None) -> IndexPairs:

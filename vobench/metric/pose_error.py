@@ -7,6 +7,7 @@ import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.metric.settings import Plane
 from vobench.trajectory.associate import Index
 
 Rows = tuple[Array, ...]
@@ -101,6 +102,17 @@ def motions(T_world_frame: Array, first: Index, last: Index) -> Array:
     """Pose of frame `last` seen from frame `first`, (N, 4, 4), for index arrays (N,)."""
     T_first_last: Array = se3.inverse(T_world_frame[first]) @ T_world_frame[last]
     return T_first_last
+
+
+def in_plane(T: Array, plane: Plane) -> Array:
+    """Poses (N, 4, 4) without what leaves a plane of the world: on it, and turned about its normal alone.
+
+    The angle is the normal's one of `roll_pitch_yaw_rad`. Source: evo's project_to_plane.
+    """
+    normal = {"yz": 0, "xz": 1, "xy": 2}[plane]
+    axes = np.roll(range(3), normal + 1)  # where x, y and z stand when the normal takes the place of z
+    turned = se3.rotation_z(roll_pitch_yaw_rad(T[:, :3, :3])[:, normal])[:, axes][:, :, axes]
+    return se3.transform(turned, np.where(np.arange(3) == normal, 0.0, T[:, :3, 3]))
 
 
 def roll_pitch_yaw_rad(R: Array) -> Array:

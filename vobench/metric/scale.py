@@ -39,22 +39,25 @@ def scale_errors(T_gt: Array, T_est: Array, along_m: Array, first: Index, last: 
 def ate_scale(T_gt: Array, T_est: Array) -> float:
     """TartanAir's factor on the estimate (K, 4, 4) before an SE(3) alignment: Σ‖gt‖² / Σ gt·est about the means.
 
-    Umeyama's is Σ gt·est / Σ‖est‖², and never larger. Source: Wang et al. (2020), the evaluation script.
+    Umeyama's is Σ gt·est / Σ‖est‖², and never larger; 1 where either side stands still.
+    Source: Wang et al. (2020), the evaluation script.
     """
     gt_m, est_m = T_gt[:, :3, 3], T_est[:, :3, 3]
     fit = align_positions(gt_m, est_m, kind="se3")
     x, y = (gt_m - gt_m.mean(axis=0)) @ fit.rotation.T, est_m - est_m.mean(axis=0)
-    return float(np.sum(x * x) / np.sum(x * y))
+    return 1.0 if "rotation" in fit.unobservable else float(np.sum(x * x) / np.sum(x * y))
 
 
 def motion_scale(T_gt: Array, T_est: Array) -> float:
     """TartanAir's factor on the estimate (K, 4, 4) before relative and segment errors.
 
-    It is 1 / mean of the estimate's steps over the truth's. Source: Wang et al. (2020), the evaluation script.
+    It is 1 / mean of the estimate's steps over the truth's, 1 where either side stands still.
+    Source: Wang et al. (2020), the evaluation script.
     """
     gt_m, est_m = (np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1) for T in (T_gt, T_est))
     moving = gt_m > STILL_M
-    return float(1.0 / np.mean(est_m[moving] / gt_m[moving]))
+    ratio = float(np.mean(est_m[moving] / gt_m[moving])) if moving.any() else 0.0
+    return 1.0 / ratio if ratio > 0 else 1.0
 
 
 def _slope(x: Array, y: Array) -> float:

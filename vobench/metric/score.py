@@ -1,29 +1,32 @@
 """One estimate against one ground truth: associate, align, measure, and say what the numbers mean."""
 
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vobench.errors import AlignmentError
+from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.metric.ate import absolute_errors
 from vobench.metric.coverage import SLOT_NS, Coverage, coverage, slots
 from vobench.metric.failure import Failure, failure
 from vobench.metric.identity import identity
-from vobench.metric.measure import Comparison, Metric, measured
+from vobench.metric.measure import Comparison, LengthMetric, Metric, Samples, joined, measured
 from vobench.metric.nees import consistency
+from vobench.metric.pose_error import in_plane
+from vobench.metric.scale import ate_scale, motion_scale
 from vobench.metric.settings import ScoreSettings, settled
 from vobench.trajectory.align import Alignment, align
-from vobench.trajectory.associate import match
+from vobench.trajectory.associate import Matched, match
 from vobench.trajectory.text import seconds
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["DEFAULTS", "Association", "Metric", "Score", "ScoreSettings", "score"]
+__all__ = ["DEFAULTS", "Association", "LengthMetric", "Metric", "Pooled", "Score", "ScoreSettings", "pooled", "score"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +44,7 @@ class Score:
     """An estimate's metrics, and for plots the error and aligned position of every matched frame.
 
     gt_frames, gt_t_ns, ate_trans_m and ate_rot_deg are (K,), aligned_positions_m is (K, 3), in truth's frame.
+    `settings` leave nothing open; `samples` are the errors behind the metrics, in their order.
     """
 
     metrics: tuple[Metric, ...]
@@ -55,6 +59,13 @@ class Score:
     ate_trans_m: Array
     ate_rot_deg: Array
     aligned_positions_m: Array
+    settings: ScoreSettings
+    samples: tuple[Samples, ...] = field(repr=False)
+
+    @property
+    def per_length(self) -> tuple[LengthMetric, ...]:
+        """The metrics that go by lengths of path, over each length alone."""
+        return tuple(row for samples in self.samples for row in samples.per_length(self.settings))
 
     def metric(self, name: str) -> Metric | None:
         """The metric of that name, None where the trajectories gave it no sample."""
@@ -102,7 +113,8 @@ def score(
     """
     of = compare(gt, est, settings)
     ate = absolute_errors(of.matched.T_gt, of.T_aligned)
-    metrics = (*measured(of, ate), *_consistency(of, covariance))
+    samples = tuple(found for found in (*measured(of, ate), *_consistency(of, covariance)) if len(found.errors))
+    metrics = tuple(found.metric(of.settings, n=len(of.matched), of=len(gt)) for found in samples)
     frames = of.matched.pairs.gt
     covered, slot = coverage(gt.t_ns, frames, of=settings.coverage_of), slots(gt.t_ns, settings.coverage_of)[frames]
     return Score(
@@ -118,7 +130,40 @@ def score(
         ate_trans_m=ate.trans_m,
         ate_rot_deg=np.rad2deg(ate.rot_rad),
         aligned_positions_m=of.T_aligned[:, :3, 3],
+        settings=of.settings,
+        samples=samples,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Pooled:
+    """Several sequences as one: the statistics of all their errors together, and what could not be pooled."""
+
+    metrics: tuple[Metric, ...]
+    per_length: tuple[LengthMetric, ...]
+    warnings: tuple[str, ...]
+
+
+def pooled(scores: Sequence[Score]) -> Pooled:
+    """The statistics over all errors of all sequences, so that each counts by its number of errors.
+
+    For segments this is the mean of KITTI's table. A metric that the sequences measured in different ways, such
+    as over other lengths of path, is left out with a warning.
+    """
+    n, of = (sum(getattr(scored.association, side) for scored in scores) for side in ("pairs", "gt_poses"))
+    metrics: list[Metric] = []
+    lengths: list[LengthMetric] = []
+    warnings: list[str] = []
+    for name in dict.fromkeys(metric.name for scored in scores for metric in scored.metrics):
+        found = [(part, scored.settings) for scored in scores for part in scored.samples if part.name == name]
+        ids = {part.metric(settings, n=0, of=0).id for part, settings in found}
+        if len(ids) > 1:
+            warnings.append(f"{name} is not pooled, for the sequences measure it in different ways: compare their ids")
+            continue
+        together = joined([part for part, _ in found])
+        metrics.append(together.metric(found[0][1], n=n, of=of))
+        lengths += together.per_length(found[0][1])
+    return Pooled(tuple(metrics), tuple(lengths), tuple(warnings))
 
 
 def compare(gt: Trajectory, est: Trajectory, settings: ScoreSettings = DEFAULTS) -> Comparison:
@@ -127,29 +172,49 @@ def compare(gt: Trajectory, est: Trajectory, settings: ScoreSettings = DEFAULTS)
     matched = match(gt, est, method=settings.association, **window)
     if not len(matched):
         raise AlignmentError(_no_overlap(gt, est, settings))
-    alignment = align(matched.T_est, matched.T_gt, kind=settings.alignment, first_n=settings.align_n)
+    alignment, T_aligned, T_moving = _aligned(matched, settings)
+    if settings.project:
+        gt = Trajectory(gt.t_ns, in_plane(gt.T_world_frame, settings.project))
+        matched = replace(matched, T_gt=in_plane(matched.T_gt, settings.project))
+        T_aligned, T_moving = (in_plane(T, settings.project) for T in (T_aligned, T_moving))
     distances_m = gt.distances_m()
     return Comparison(
         gt=gt,
         est=est,
         matched=matched,
         alignment=alignment,
-        T_aligned=alignment.apply(matched.T_est),
+        T_aligned=T_aligned,
+        T_moving=T_moving,
         distances_m=distances_m,
         settings=settled(settings, float(distances_m[-1])),
     )
 
 
-def _consistency(of: Comparison, covariance: Array | None) -> Iterator[Metric]:
+def _aligned(matched: Matched, settings: ScoreSettings) -> tuple[Alignment, Array, Array]:
+    """The alignment, and the poses (K, 4, 4) that it makes: to compare as they are, and to compare their motions."""
+    T_est, T_gt = matched.T_est, matched.T_gt
+    if settings.scale_rule == "alignment":
+        alignment = align(T_est, T_gt, kind=settings.alignment, first_n=settings.align_n)
+        T_aligned = alignment.apply(T_est)
+        return alignment, T_aligned, T_aligned
+    scale = ate_scale(T_gt, T_est)
+    scaled = se3.transform(T_est[:, :3, :3], scale * T_est[:, :3, 3])
+    alignment = replace(align(scaled, T_gt, kind=settings.alignment, first_n=settings.align_n), scale=scale)
+    return alignment, alignment.apply(T_est), replace(alignment, scale=motion_scale(T_gt, T_est)).apply(T_est)
+
+
+def _consistency(of: Comparison, covariance: Array | None) -> Iterator[Samples]:
     if covariance is None:
         return
+    if of.settings.project:
+        raise AlignmentError(f"covariances should be of poses in space, but project={of.settings.project} is asked for")
     if covariance.shape != (len(of.est), 6, 6):
         raise AlignmentError(f"covariance should be ({len(of.est)}, 6, 6), one a pose, but is {covariance.shape}")
     of_pose = covariance[of.matched.pairs.est]
     nees = consistency(of.matched.T_gt, of.matched.T_est, of_pose, of.alignment)
-    yield from of.metric("nees_pose", nees.pose)
-    yield from of.metric("nees_trans", nees.trans)
-    yield from of.metric("nees_rot", nees.rot)
+    yield Samples("nees_pose", nees.pose)
+    yield Samples("nees_trans", nees.trans)
+    yield Samples("nees_rot", nees.rot)
 
 
 def _matching_warnings(of: Comparison, covered: Coverage) -> Iterator[str]:

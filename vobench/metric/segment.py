@@ -87,7 +87,7 @@ def devkit_distances(positions_m: Array) -> Float32:
     return sums[: len(positions_m)]
 
 
-def mean_drift(errors: Array, length_m: Array, *, mean: Mean = "micro") -> float:
+def mean_drift(errors: Distances, length_m: Array, *, mean: Mean = "micro") -> float:
     """One number for segments' errors (N,): the mean of all, or "macro", the mean over lengths of their means.
 
     In float32, as the devkit's errors are, it sums one after the other as the devkit does.
@@ -97,18 +97,6 @@ def mean_drift(errors: Array, length_m: Array, *, mean: Mean = "micro") -> float
     if errors.dtype == np.float32:
         return float(np.cumsum(errors, dtype=np.float32)[-1] / np.float32(len(errors)))
     return float(errors.mean())
-
-
-def pooled(sequences: Sequence[SegmentErrors], *, mean: Mean = "micro") -> tuple[float, float]:
-    """Translation (ratio) and rotation (rad/m) drift over several sequences with segments.
-
-    "micro" averages all their segments, as the KITTI table does, so that long sequences count for more;
-    "macro" averages the sequences' means, as many papers do.
-    """
-    trans, rot = ([getattr(s, part) for s in sequences] for part in ("trans_ratio", "rot_radpm"))
-    parts = [[np.concatenate(part)] if mean == "micro" else part for part in (trans, rot)]
-    trans_ratio, rot_radpm = (float(np.mean([mean_drift(e, np.zeros(len(e))) for e in part])) for part in parts)
-    return trans_ratio, rot_radpm
 
 
 def _devkit_errors(T_gt: Array, T_est: Array, first: Index, last: Index) -> Rows:

@@ -10,7 +10,9 @@ from vobench.trajectory.associate import MAX_DIFF_NS, Method
 
 Unit = Literal["f", "m", "s", "d", "r"]  # evo's letters: frames, metres, degrees, radians; and s for seconds
 Side = Literal["gt", "est"]
-PairRule = Literal["spanning", "evo", "tum"]
+PairRule = Literal["spanning", "evo", "tum", "tartanair"]
+Plane = Literal["xy", "xz", "yz"]
+ScaleRule = Literal["alignment", "tartanair"]
 Precision = Literal["float64", "devkit"]
 Mean = Literal["micro", "macro"]
 RelativeRule = Literal["rpg", "openvins"]
@@ -27,6 +29,7 @@ class ScoreSettings:
     """What is asked of a score; the part that concerns a metric is written into its identity.
 
     `align_n` fits only the first so many matched poses; `offset_ns` is added to the estimate's stamps;
+    `project` drops, after the alignment, what is not in a plane of the truth's world, as evo does;
     segment lengths and step left None follow the length of the true path (`settled`); `full`
     measures everything, not only the headline metrics. Raises AlignmentError for what measures nothing.
     """
@@ -36,6 +39,8 @@ class ScoreSettings:
     association: Method = "nearest"
     max_diff_ns: int = MAX_DIFF_NS
     offset_ns: int = 0
+    project: Plane | None = None
+    scale_rule: ScaleRule = "alignment"
     rpe_delta: float = 1.0
     rpe_unit: Unit = "f"
     rpe_all_pairs: bool = False
@@ -60,20 +65,22 @@ class ScoreSettings:
         """(name, value, whether it is right, what is right) of each setting that can be wrong."""
         choices = [(name, getattr(self, name), known) for name, known in _CHOICES.items()]
         whole = self.rpe_delta == round(self.rpe_delta) if isfinite(self.rpe_delta) else False
-        pairs = (self.rpe_unit, self.rpe_all_pairs, self.rpe_pairs_from)
+        pairs, own_pairs = (self.rpe_unit, self.rpe_all_pairs, self.rpe_pairs_from), PAIRS_OF_RULE.get(self.rpe_rule)
         lengths, step = self.segment_lengths_m, self.segment_step_frames
         return [
-            *((name, value, value in known, f"one of {', '.join(known)}") for name, value, known in choices),
+            *((name, value, value in known, f"one of {', '.join(map(str, known))}") for name, value, known in choices),
             ("align_n", self.align_n, self.align_n is None or self.align_n >= 1, "1 or more"),
             ("max_diff_ns", self.max_diff_ns, self.max_diff_ns >= 0, "0 or more"),
             ("rpe_delta", self.rpe_delta, isfinite(self.rpe_delta) and self.rpe_delta > 0, "more than 0 and finite"),
             ("rpe_delta", self.rpe_delta, self.rpe_unit != "f" or whole, "a whole number of frames"),
             ("rpe_delta", self.rpe_delta, self.rpe_delta <= _LARGEST.get(self.rpe_unit, inf), "half a turn or less"),
+            ("rpe_rule", self.rpe_rule, own_pairs in (None, pairs), f"spanning but for {self.rpe_rule}'s own pairs"),
+            ("rpe_rule", self.rpe_rule, self.rpe_rule != "tum" or not self.project, "spanning in a plane"),
             (
-                "rpe_rule",
-                self.rpe_rule,
-                self.rpe_rule != "tum" or pairs == _TUM_PAIRS,
-                "spanning but for TUM's own pairs",
+                "alignment",
+                self.alignment,
+                self.scale_rule == "alignment" or self.alignment == "se3",
+                "se3 where TartanAir's own scale is asked for",
             ),
             ("segment_lengths_m", lengths, lengths is None or _positive(lengths), "positive"),
             ("segment_step_frames", step, step is None or step >= 1, "1 or more"),
@@ -91,9 +98,12 @@ _CHOICES = {
     "segment_precision": get_args(Precision),
     "segment_mean": get_args(Mean),
     "relative_rule": get_args(RelativeRule),
+    "scale_rule": get_args(ScaleRule),
+    "project": (None, *get_args(Plane)),
     "coverage_of": get_args(CoverageOf),
 }
-_TUM_PAIRS = ("s", True, "est")  # all its script has
+# Unit, all pairs and side: the only pairs that these tools have.
+PAIRS_OF_RULE: dict[PairRule, tuple[Unit, bool, Side]] = {"tum": ("s", True, "est"), "tartanair": ("f", True, "gt")}
 _LARGEST = {"d": 180.0, "r": pi}
 
 
@@ -115,6 +125,14 @@ def settled(settings: ScoreSettings, path_m: float) -> ScoreSettings:
     return replace(settings, segment_lengths_m=lengths, segment_step_frames=step)
 
 
+_TARTANAIR = ScoreSettings(
+    alignment="se3",
+    rpe_all_pairs=True,
+    rpe_rule="tartanair",
+    segment_lengths_m=TARTANAIR_LENGTHS_M,
+    segment_step_frames=1,
+    segment_mean="macro",
+)
 # The settings with which other tools score, so that their numbers come out here.
 # Sources: each tool's own defaults, as its code has them; docs/metrics.md has the table.
 LIKE: dict[str, ScoreSettings] = {
@@ -158,4 +176,6 @@ LIKE: dict[str, ScoreSettings] = {
         std_ddof=1,
         full=True,
     ),
+    "tartanair": _TARTANAIR,
+    "tartanair_mono": replace(_TARTANAIR, scale_rule="tartanair"),
 }

@@ -1,7 +1,7 @@
 """Two trajectories out of whatever files they lie in, on one clock."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -12,7 +12,7 @@ from vobench.errors import InputError, TrajectoryError
 from vobench.trajectory.correction import Move, parse_move
 from vobench.trajectory.form import Parsed, Reading, parse_any
 from vobench.trajectory.table import Order, Unit
-from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.trajectory import Stamps, Trajectory
 from vobench.trajectory.unstamped import parse_times
 
 NS_PER_S = 10**9
@@ -21,6 +21,12 @@ TRUTH, SENSORS = "truth.mcap", "sensors.mcap"
 HEAD_BYTES = 4096  # enough to tell text from a recording
 SAYS_TRUTH = re.compile(r"(?<![a-z])(gt|ground[ _-]?truth|truth|reference)(?![a-z])", re.IGNORECASE)
 BY_ROW = "neither file has stamps: poses are paired by row, and a second is a row; --times names a file with stamps"
+BY_FRAME = (
+    "neither file has stamps: poses are paired by frame, and a second is a frame; --times names a file with stamps"
+)
+SAY_WHICH = (
+    "say which with the frame's number as a column in front (13 columns), or stamp each file with a --times of its own"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +40,12 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Ground truth and estimate, and what a reader of their scores should know."""
+    """Ground truth and estimate, what was done to the files, and how they are paired where neither has stamps."""
 
     gt: Reading
     est: Reading
     notes: tuple[str, ...] = ()
+    by_frame: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,36 +54,66 @@ class _Read:
     path: Path
     moves: tuple[Move, ...]
     says_truth: bool
+    unit: Unit | None = None  # as told, which nothing in the file can make wrong
+    order: Order | None = None
 
 
-def read_pair(gt: Source, est: Source, *, times: Path | None = None, any_unit: bool = False) -> Pair:
-    """Read both; files without stamps get them from `times`, or are paired by row where both have none.
+def read_pair(gt: Source, est: Source, *, times: Sequence[Path] = (), any_unit: bool = False) -> Pair:
+    """Read both; files without stamps get them from `times`, or are paired by frame where both have none.
 
     `any_unit` tries the finer units where stamps are too large for seconds. Raises InputError.
     """
-    reads = {"gt": _read(gt, any_unit=any_unit), "est": _read(est, any_unit=any_unit)}
-    unstamped = [read for read in reads.values() if read.parsed.t_ns is None]
-    notes: tuple[str, ...] = ()
-    if times is not None:
-        stamped = {side: _stamp(read, times) for side, read in reads.items()}
+    reads = [_read(gt, any_unit=any_unit), _read(est, any_unit=any_unit)]
+    unstamped = [read for read in reads if read.parsed.t_ns is None]
+    by_frame = None
+    if times:
         if not unstamped:
-            raise InputError(f"--times is for files without stamps, but both files have theirs: {times}")
+            raise InputError(f"--times is for files without stamps, but both files have theirs: {times[0]}")
+        clocks = _clocks(times)
+        stamped = [_stamp(read, clocks) for read in reads]
     elif len(unstamped) == 1:
         raise InputError(f"no stamps in {unstamped[0].path}; name the file that has them with --times")
-    elif unstamped and len({len(read.parsed.T) for read in unstamped}) != 1:
-        counts = " and ".join(f"{len(read.parsed.T)} in {read.path}" for read in unstamped)
-        raise InputError(f"files without stamps pair by row, but have {counts} rows; stamp them with --times")
     else:
-        stamped = {side: _numbered(read) for side, read in reads.items()}
-        notes = (BY_ROW,) if unstamped else ()
-    return Pair(_reading(stamped["gt"]), _reading(stamped["est"]), notes)
+        _require_same_frames(unstamped)
+        stamped = [_numbered(read) for read in reads]
+        by_frame = None if not unstamped else BY_ROW if all(r.parsed.frames is None for r in reads) else BY_FRAME
+    notes = [note for read in reads for note in (*read.parsed.notes, *_frame_notes(read))]
+    return Pair(_reading(stamped[0]), _reading(stamped[1]), tuple(notes), by_frame)
 
 
-def read_one(source: Source, *, times: Path | None = None, any_unit: bool = False) -> Reading:
+def _require_same_frames(reads: Sequence[_Read]) -> None:
+    """Raise InputError where files without stamps can't be of the same frames."""
+    rows = {len(read.parsed.T) for read in reads if read.parsed.frames is None}
+    if len(rows) > 1:
+        counts = " and ".join(f"{len(read.parsed.T)} in {read.path}" for read in reads)
+        raise InputError(f"files without stamps pair by row, but have {counts} rows; {SAY_WHICH}")
+    for read in reads:
+        frames = read.parsed.frames
+        if frames is not None and rows and frames[-1] >= min(rows):
+            other = next(other for other in reads if other.parsed.frames is None)
+            raise InputError(
+                f"frames should be below {min(rows)}, the number of rows in {other.path}, but there is {frames[-1]} "
+                f"in {read.path}"
+            )
+
+
+def _frame_notes(read: _Read) -> list[str]:
+    frames = read.parsed.frames
+    if frames is None:
+        return []
+    count = f"{len(frames)} poses for frames {frames[0]} to {frames[-1]}"
+    return [f"the first of 13 columns was read as the number of a frame ({count}): {read.path}"]
+
+
+def _clocks(times: Sequence[Path]) -> list[tuple[Path, Stamps]]:
+    return [(path, parse_times(_text(path), name=str(path))) for path in times]
+
+
+def read_one(source: Source, *, times: Sequence[Path] = (), any_unit: bool = False) -> Reading:
     """Read one alone; a file without stamps needs `times`. Raises InputError."""
     read = _read(source, any_unit=any_unit)
-    if times is not None:
-        read = _stamp(read, times)
+    if times:
+        read = _stamp(read, _clocks(times))
     if read.parsed.t_ns is None:
         raise InputError(f"no stamps in {source.path}; name the file that has them as `times`")
     return _reading(read)
@@ -88,22 +125,36 @@ def _reading(read: _Read) -> Reading:
     T = parsed.T
     for move in read.moves:
         T = move.apply(T)
-    return Reading(Trajectory(parsed.t_ns, T), parsed.unit, parsed.form_unit, parsed.order, read.says_truth)
+    return Reading(
+        Trajectory(parsed.t_ns, T),
+        parsed.unit,
+        read.unit or parsed.form_unit,
+        None if read.order else parsed.order,
+        read.says_truth,
+        is_unit_told=read.unit is not None,
+    )
 
 
-def _stamp(read: _Read, times: Path) -> _Read:
+def _stamp(read: _Read, clocks: Sequence[tuple[Path, Stamps]]) -> _Read:
+    """The poses with their stamps out of the one file of times that fits them."""
     if read.parsed.t_ns is not None:
         return read
-    t_ns = parse_times(_text(times), name=str(times))
-    if len(t_ns) != len(read.parsed.T):
-        raise InputError(f"{len(t_ns)} stamps in {times} for {len(read.parsed.T)} poses in {read.path}")
-    return replace(read, parsed=replace(read.parsed, t_ns=t_ns, unit="s", form_unit="s"))
+    fitting = [(path, t_ns) for path, clock in clocks if (t_ns := read.parsed.stamped_by(clock)) is not None]
+    if not fitting:
+        path, clock = clocks[0]
+        given = f"{len(clock)} stamps in {path}" if len(clocks) == 1 else f"none of {len(clocks)} files of times is"
+        raise InputError(f"{given} for {len(read.parsed.T)} poses in {read.path}; {SAY_WHICH}")
+    if any(not np.array_equal(t_ns, fitting[0][1]) for _, t_ns in fitting):
+        names = " and ".join(str(path) for path, _ in fitting)
+        raise InputError(f"one file of times should fit the {len(read.parsed.T)} poses in {read.path}, but {names} do")
+    return replace(read, parsed=replace(read.parsed, t_ns=fitting[0][1], unit="s", form_unit="s"))
 
 
 def _numbered(read: _Read) -> _Read:
     if read.parsed.t_ns is not None:
         return read
-    return replace(read, parsed=replace(read.parsed, t_ns=np.arange(len(read.parsed.T), dtype=np.int64) * NS_PER_S))
+    frames = np.arange(len(read.parsed.T), dtype=np.int64) if read.parsed.frames is None else read.parsed.frames
+    return replace(read, parsed=replace(read.parsed, t_ns=frames * NS_PER_S))
 
 
 def _read(source: Source, *, any_unit: bool) -> _Read:
@@ -121,7 +172,7 @@ def _read(source: Source, *, any_unit: bool) -> _Read:
     parsed = _parse(written, str(path), unit, order, any_unit=any_unit)
     if (unit and parsed.t_ns is None) or (order and parsed.order is None):
         raise InputError(f"no {'stamps' if unit else 'quaternions'} to read as {unit or order} in {path}")
-    return _Read(parsed, path, moves, says_truth)
+    return _Read(parsed, path, moves, says_truth, unit, order)
 
 
 def _parse(written: str, name: str, unit: Unit | None, order: Order | None, *, any_unit: bool) -> Parsed:

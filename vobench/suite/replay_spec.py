@@ -14,7 +14,7 @@ from vobench.suite.strict import Positive, Rate, Strict, Triple, wrong_key
 from vobench.trajectory import replay
 from vobench.trajectory.correction import Move, parse_move
 from vobench.trajectory.curve import CurveMotion
-from vobench.trajectory.form import parse_any
+from vobench.trajectory.form import Parsed, parse_any
 from vobench.trajectory.replay import AXES
 from vobench.trajectory.text import NS_PER_S, format_tum, parse_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory
@@ -83,7 +83,7 @@ def read_replayed(spec: ReplaySpec, folder: Path, times: Stamps | None) -> str:
     """The poses of the file as TUM text, in our axes; relative paths start in `folder`. Raises InputError."""
     path = folder / spec.file
     parsed = parse_any(_text(path), name=str(path))
-    t_ns = parsed.t_ns if parsed.t_ns is not None else _stamps(spec, times, len(parsed.T))
+    t_ns = parsed.t_ns if parsed.t_ns is not None else _stamps(spec, times, parsed)
     if parsed.t_ns is not None and (spec.times or spec.recorded_hz):
         raise SuiteError(f"times and recorded_hz are for files without stamps, but this one has its own: {path}")
     move = _move(spec.axes)
@@ -92,13 +92,15 @@ def read_replayed(spec: ReplaySpec, folder: Path, times: Stamps | None) -> str:
     return format_tum(Trajectory(t_ns, se3.transform(se3.nearest_rotation(T[:, :3, :3]), T[:, :3, 3])))
 
 
-def _stamps(spec: ReplaySpec, times: Stamps | None, count: int) -> Stamps:
+def _stamps(spec: ReplaySpec, times: Stamps | None, parsed: Parsed) -> Stamps:
     if times is not None:
-        if len(times) != count:
-            raise TrajectoryError(f"{len(times)} stamps in {spec.times} for {count} poses in {spec.file}")
-        return times
+        t_ns = parsed.stamped_by(times)
+        if t_ns is None:
+            raise TrajectoryError(f"{len(times)} stamps in {spec.times} for {len(parsed.T)} poses in {spec.file}")
+        return t_ns
     if spec.recorded_hz:
-        return np.rint(np.arange(count) * NS_PER_S / spec.recorded_hz).astype(np.int64)
+        frames = np.arange(len(parsed.T)) if parsed.frames is None else parsed.frames
+        return np.rint(frames * NS_PER_S / spec.recorded_hz).astype(np.int64)
     raise SuiteError(f"no stamps in {spec.file}; give times, a file that has them, or recorded_hz")
 
 

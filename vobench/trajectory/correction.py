@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -11,7 +11,8 @@ from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
-Kind = Literal["axes", "positions", "mount"]
+Kind = Literal["axes", "positions", "mount", "inverse", "rotations"]
+INVERSES: dict[str, Kind] = {"inverse": "inverse", "rotations:inverse": "rotations"}
 AXIS = re.compile(r"([+-]?)([xyz])")
 MOUNT_VALUES = 7
 
@@ -22,21 +23,29 @@ class Move:
 
     `axes`: the file's axes are others, T' = S T S⁻¹. `positions`: only its positions are in
     other axes, p' = S p. `mount`: it is of another frame of the same body, T' = T T_est_gt.
+    `inverse`: it takes the world to the frame, T' = T⁻¹. `rotations`: only its rotations do, R' = Rᵀ.
     """
 
     kind: Kind
-    matrix: Array
+    matrix: Array = field(default_factory=lambda: np.eye(3))
 
     def apply(self, T: Array) -> Array:
         """Poses (..., 4, 4), changed."""
         if self.kind == "mount":
             moved: Array = T @ self.matrix
             return moved
+        if self.kind == "inverse":
+            return se3.inverse(T)
+        if self.kind == "rotations":
+            return se3.transform(np.swapaxes(T[..., :3, :3], -1, -2), T[..., :3, 3])
         S = self.matrix
         R = S @ T[..., :3, :3] @ S.T if self.kind == "axes" else T[..., :3, :3]
         return se3.transform(R, T[..., :3, 3] @ S.T)
 
     def __str__(self) -> str:
+        for word, kind in INVERSES.items():
+            if kind == self.kind:
+                return word
         if self.kind != "mount":
             return f"{self.kind}:{','.join(map(_axis_name, self.matrix))}"
         q_xyzw = se3.to_quaternion(self.matrix[:3, :3])
@@ -44,14 +53,18 @@ class Move:
 
 
 def parse_move(word: str) -> Move:
-    """The move in words such as `axes:z,-x,-y` or `mount:x,y,z,qx,qy,qz,qw`. Raises InputError."""
+    """The move in words such as `axes:z,-x,-y`, `inverse` or `mount:x,y,z,qx,qy,qz,qw`. Raises InputError."""
+    if word in INVERSES:
+        return Move(INVERSES[word])
     kind, _, stated = word.partition(":")
     values = [part.strip() for part in stated.split(",")]
     if kind == "mount":
         return Move("mount", _mount(values, word))
     if kind in ("axes", "positions"):
         return Move("axes" if kind == "axes" else "positions", _axes(values, word))
-    raise InputError(f"a file may be read as axes:…, positions:… or mount:…, but not as {word!r}")
+    raise InputError(
+        f"a file may be read as axes:…, positions:…, mount:…, inverse or rotations:inverse, but not as {word!r}"
+    )
 
 
 def _axes(values: Sequence[str], word: str) -> Array:

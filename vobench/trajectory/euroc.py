@@ -7,7 +7,7 @@ import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.trajectory.table import Order, Unit, content, read_table, rotations, stamps_ns
+from vobench.trajectory.table import Order, Unit, content
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 COLUMNS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")
@@ -41,17 +41,6 @@ def layout(text: str) -> Layout:
     names = [cell.partition("[")[0].strip() for cell in header[4:8]]
     order: Order = "xyzw" if [name[-1:] for name in names] == ["x", "y", "z", "w"] else "wxyz"
     return Layout(tuple(rows), _unit(header[0], rows), order)
-
-
-def parse_euroc(text: str, *, name: str, unit: Unit | None = None, order: Order | None = None) -> Trajectory:
-    """The trajectory in a csv, read as `layout` says where `unit` and `order` don't.
-
-    Raises TrajectoryError as `parse_tum` does.
-    """
-    found = layout(text)
-    table = read_table(found.rows, name=name, columns=COLUMNS, separator=",")
-    R = rotations(table, table.values[:, 4:8], order or found.order)
-    return Trajectory(stamps_ns(table, unit or found.unit), se3.transform(R, table.values[:, 1:4]))
 
 
 def format_euroc(trajectory: Trajectory, more: Array | None = None) -> str:

@@ -15,6 +15,7 @@ MIN_OVERLAP = 0.5  # share of the shorter recording that has to overlap
 MIN_SAMPLES = 20
 WINDOW_STEPS = 5  # that a speed is measured over: noise of single poses goes, the shape in time stays
 ROUNDS, TRIES = 3, 17  # each search is 8 times as fine as the one before: 1/500 of a step at last
+STRETCHES = 8
 INSTANTS = 800  # looked at in a finer search
 MIN_INSTANTS = 8
 SAME_CLOCK_NS = 1_000_000  # stamps that stay this close to a constant difference come from one clock
@@ -61,6 +62,17 @@ def likeness(gt: Trajectory, est: Trajectory, offset_ns: int) -> float | None:
     step_ns = int(max(_median_step(gt), _median_step(est)))
     found = _likeness(gt, est, np.array([offset_ns]), WINDOW_STEPS * step_ns)
     return found[0] if found else None
+
+
+def offsets_in_stretches(gt: Trajectory, est: Trajectory, *, within_ns: int) -> Array:
+    """The offset (N,) that each of 8 stretches of the estimate's poses shows by itself, of those up to `within_ns`.
+
+    A stretch too short to tell shows 0.
+    """
+    step_ns = max(_median_step(gt), _median_step(est))
+    parts = np.array_split(np.arange(len(est)), STRETCHES)
+    stretches = [Trajectory(est.t_ns[part], est.T_world_frame[part]) for part in parts if len(part) > 1]
+    return np.array([_refined(gt, part, 0, step_ns, reach_ns=max(step_ns, within_ns)) for part in stretches], float)
 
 
 def _median_step(trajectory: Trajectory) -> float:
@@ -121,12 +133,12 @@ def _slide(a: Array, b: Array) -> Array:
     return product
 
 
-def _refined(gt: Trajectory, est: Trajectory, coarse_ns: int, step_ns: int) -> int:
-    """Search around the coarse offset, finer and finer."""
-    best_ns, reach_ns = coarse_ns, float(step_ns)
+def _refined(gt: Trajectory, est: Trajectory, coarse_ns: int, step_ns: float, *, reach_ns: float | None = None) -> int:
+    """Search around the coarse offset, finer and finer, up to a step or `reach_ns` away."""
+    best_ns, reach_ns = coarse_ns, step_ns if reach_ns is None else reach_ns
     for _ in range(ROUNDS):
         tries = best_ns + np.linspace(-reach_ns, reach_ns, TRIES).round().astype(np.int64)
-        found = _likeness(gt, est, tries, WINDOW_STEPS * step_ns)
+        found = _likeness(gt, est, tries, round(WINDOW_STEPS * step_ns))
         if found is None:
             return coarse_ns
         best_ns, reach_ns = int(tries[int(np.argmax(found))]), reach_ns / 8

@@ -7,12 +7,14 @@ from decimal import ROUND_HALF_EVEN, Context, Decimal
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vobench.errors import TrajectoryError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.trajectory.trajectory import Stamps
 
+Rows = NDArray[np.intp]
 Unit = Literal["s", "ms", "us", "ns"]
 Order = Literal["xyzw", "wxyz"]  # of a quaternion's four numbers
 
@@ -71,14 +73,29 @@ def read_table(
 
 def stamps_ns(table: Table, unit: Unit) -> Stamps:
     """The first column, exact to the nanosecond. Raises TrajectoryError unless it increases within int64."""
-    t_ns = np.array([_ns(text, unit, table, row) for row, text in enumerate(table.first)], np.int64)
-    late = np.flatnonzero(np.diff(t_ns) <= 0)
-    if late.size:
-        last, this = (table.first[late[0] + i] for i in (0, 1))
-        raise TrajectoryError(
-            f"{table.place(late[0] + 1)}: stamps must increase by 1 ns or more, but {this} follows {last}"
-        )
+    t_ns = _all_ns(table, unit)
+    _require_rising(table, t_ns, "stamps must increase by 1 ns or more", least=1)
     return t_ns
+
+
+def first_stamps_ns(table: Table, unit: Unit) -> tuple[Stamps, Rows, tuple[str, ...]]:
+    """The stamps, the rows (K,) that they are of, and a note where rows with the stamp of the one before are left out.
+
+    Raises TrajectoryError where stamps go back or leave int64.
+    """
+    return first_of_equal(table, _all_ns(table, unit), "stamp")
+
+
+def first_of_equal(table: Table, numbers: Stamps, what: str) -> tuple[Stamps, Rows, tuple[str, ...]]:
+    """Of the rows' numbers (N,), such as stamps, the first of those that repeat; rows and note as `first_stamps_ns`."""
+    _require_rising(table, numbers, f"{what}s must increase", least=0)
+    rows = np.flatnonzero(np.diff(numbers, prepend=numbers[:1] - 1))
+    again = np.flatnonzero(np.diff(numbers) == 0) + 1
+    if not again.size:
+        return numbers, rows, ()
+    place = f"the first at {table.place(again[0])}"
+    note = f"rows that repeat the {what} of the row before were left out: {again.size} of {len(numbers)}, {place}"
+    return numbers[rows], rows, (note,)
 
 
 def rotations(table: Table, q: Array, order: Order) -> Array:
@@ -94,6 +111,17 @@ def rotations(table: Table, q: Array, order: Order) -> Array:
         )
     unit = q / norm[:, None]
     return se3.from_quaternion(unit[:, SCALAR_FIRST] if order == "wxyz" else unit)
+
+
+def _all_ns(table: Table, unit: Unit) -> Stamps:
+    return np.array([_ns(text, unit, table, row) for row, text in enumerate(table.first)], np.int64)
+
+
+def _require_rising(table: Table, numbers: Stamps, demand: str, *, least: int) -> None:
+    late = np.flatnonzero(np.diff(numbers) < least)
+    if late.size:
+        last, this = (table.first[late[0] + i] for i in (0, 1))
+        raise TrajectoryError(f"{table.place(late[0] + 1)}: {demand}, but {this} follows {last}")
 
 
 def _read_fast(bodies: list[str], columns: int, separator: str | None) -> Array | None:

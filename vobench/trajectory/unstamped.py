@@ -1,18 +1,20 @@
-"""Pose files without stamps, one row a frame: KITTI's 12 columns and TartanAir's 7, and KITTI's file of times."""
+"""Pose files without stamps, one row a frame: KITTI's 12 or 13 columns, TartanAir's 7, and KITTI's file of times."""
 
 import numpy as np
 
 from vobench.errors import TrajectoryError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.trajectory.table import Order, Table, content, read_table, rotations, stamps_ns
+from vobench.trajectory.table import Order, Table, content, first_of_equal, read_table, rotations, stamps_ns
 from vobench.trajectory.text import seconds
 from vobench.trajectory.trajectory import Stamps
 
 KITTI_COLUMNS = tuple(f"{part}{row}" for row in (1, 2, 3) for part in ("r1", "r2", "r3", "t"))
+NUMBERED_COLUMNS = ("frame", *KITTI_COLUMNS)
 TARTANAIR_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
 # KITTI prints six digits, so its matrices are 1e-6 off a rotation; nothing that means to be one is this far off.
 SKEW_TOLERANCE = 1e-3
+MAX_FRAME = 10**9
 
 
 def parse_kitti(text: str, *, name: str) -> Array:
@@ -24,6 +26,25 @@ def parse_kitti(text: str, *, name: str) -> Array:
     matrices = table.values.reshape(-1, 3, 4)
     _require_rotations(table, matrices[:, :, :3])
     return se3.transform(matrices[:, :, :3], matrices[:, :, 3])
+
+
+def parse_numbered_kitti(text: str, *, name: str) -> tuple[Stamps, Array, tuple[str, ...]]:
+    """Frame numbers (N,), their poses (N, 4, 4) as `parse_kitti` reads them, and a note where frames repeat.
+
+    Raises TrajectoryError as it does, and where a frame is no whole number from 0 on or comes after a later one.
+    """
+    table = read_table(content(text), name=name, columns=NUMBERED_COLUMNS)
+    stated = table.values[:, 0]
+    bad = np.flatnonzero((stated != np.floor(stated)) | (stated < 0) | (stated > MAX_FRAME))
+    if bad.size:
+        raise TrajectoryError(
+            f"{table.place(bad[0])}: the first of 13 columns should be the number of a frame, whole and from 0 on, "
+            f"but is {table.first[bad[0]]}"
+        )
+    frames, rows, notes = first_of_equal(table, stated.astype(np.int64), "frame number")
+    matrices = table.values[:, 1:].reshape(-1, 3, 4)
+    _require_rotations(table, matrices[:, :, :3])
+    return frames, se3.transform(matrices[rows, :, :3], matrices[rows, :, 3]), notes
 
 
 def format_kitti(T: Array) -> str:
