@@ -22,6 +22,10 @@ ROW = Row(
     coverage=0.999,
     ms_per_frame=123.4,
     reason="",
+    drift_mm=None,
+    frame_reason="",
+    frame_reason_count=0,
+    frame_reason_first=None,
 )
 
 
