@@ -1,6 +1,8 @@
 """The command line in this process, in a folder of its own, with pictures that cost nothing."""
 
+import atexit
 import json
+import os
 import shutil
 import signal
 import sys
@@ -87,6 +89,7 @@ def call(words: tuple[object, ...], patch: pytest.MonkeyPatch) -> int:
         with pytest.raises(SystemExit) as ended:
             main()
     finally:
+        atexit.unregister(os._exit)  # a command that was stopped ends its process so
         for number, listener in listens.items():
             signal.signal(number, listener)
     return int(ended.value.code or 0)

@@ -1,5 +1,6 @@
 """The command line: a command parses, calls one function and prints."""
 
+import atexit
 import os
 import select
 import signal
@@ -13,7 +14,7 @@ from vobench import stop
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SENTENCE = "stopped; finished stages are kept, the same command goes on from there"
-GRACE_S = 1.0  # hardly a frame takes as long, but an import may
+GRACE_S = 0.8  # hardly a frame takes as long, but an import may
 CLEAR_LINE, SHOW_CURSOR = "\r\033[K", "\033[?25h"  # what a progress bar leaves behind
 
 
@@ -69,7 +70,9 @@ def _end_softly() -> None:
         traceback.print_exc()
     for stream, text in zip((sys.stdout, sys.stderr), _last_words(), strict=True):
         print(text, end="", file=stream, flush=True)
-    raise SystemExit(128 + stop.requested()) from None
+    code = 128 + stop.requested()
+    atexit.register(os._exit, code)  # the last to come is called first: libraries take a second or two to go
+    raise SystemExit(code) from None
 
 
 def _watch(heard: int) -> None:
