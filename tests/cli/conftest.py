@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vobench import cli
+from vobench import cli, stop
 from vobench.cli import main
 from vobench.pipeline import engine
 from vobench.render import raster
@@ -90,6 +90,7 @@ def call(words: tuple[object, ...], patch: pytest.MonkeyPatch) -> int:
             main()
     finally:
         atexit.unregister(os._exit)  # a command that was stopped ends its process so
+        stop.forget()
         for number, listener in listens.items():
             signal.signal(number, listener)
     return int(ended.value.code or 0)

@@ -111,7 +111,7 @@ TEN = [
     ("[[0.5, 0]]", "[[0.5, a]]"),
     ("{sensor: clean}", "{shutter: rolling}"),
     ("[stand_still,", "[stand_stil,"),
-    ("speed_mps:", "sped_mps:"),
+    ("measure_s:", "mesure_s:"),
 ]
 TOLD = [
     ":2: seed: should be a whole number (got 'one')",
@@ -127,7 +127,7 @@ TOLD = [
     ":8: trajectories.short.targets_m.0.1: should be a number (got 'a')",
     ":9: cameras.clean: a rolling shutter needs readout_ms",
     ":10: estimators.0: no estimator named 'stand_stil'. Did you mean 'stand_still'?",
-    ":10: estimators.1.params.sped_mps: no parameter named 'sped_mps'. Did you mean 'speed_mps'?",
+    ":10: estimators.1.params.mesure_s: no parameter named 'mesure_s'. Did you mean 'measure_s'?",
 ]
 IN_SCENE = ("albedo: 0.5", "albedo: 2", "[0, 0, 1.4]", "[0, 0, 1.6]")
 

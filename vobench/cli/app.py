@@ -33,7 +33,7 @@ def run() -> None:
         stream.reconfigure(errors="replace")  # a terminal without ° gets a ? for it
     try:
         # Nobody remembers whether --debug goes before the command or after it.
-        app([word for word in sys.argv[1:] if word != DEBUG])
+        app([word for word in sys.argv[1:] if word != DEBUG], prog_name=app.info.name)
     except SystemExit as end:
         if not isinstance(end.__context__, BrokenPipeError):
             raise

@@ -21,6 +21,11 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, tuple[st
     """
     parsed = parse_any(read_text(path), name=str(path))
     t_ns = parsed.stamped_by(frames_ns) if parsed.t_ns is None else parsed.t_ns
+    if t_ns is None and parsed.frames is not None:
+        raise InputError(
+            f"the first of 13 columns should be a picture's number, from 0 to {len(frames_ns) - 1}, "
+            f"but there is {parsed.frames[-1]}: {path}"
+        )
     if t_ns is None:
         raise InputError(
             f"{len(parsed.T)} poses without stamps for {len(frames_ns)} pictures: give one pose a picture, or each "
@@ -28,6 +33,8 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, tuple[st
         )
     T, off = parsed.T, _skew(parsed.T)
     notes = list(parsed.notes)
+    if parsed.frames is not None:
+        notes.append(f"{path.name} has poses of {len(T)} of {len(frames_ns)} pictures, by their numbers.")
     if off > EXACT:
         T = se3.transform(se3.nearest_rotation(T[:, :3, :3]), T[:, :3, 3])
         notes.append(f"Rotations of {path.name} were made exact; they were up to {off:.1g} off.")

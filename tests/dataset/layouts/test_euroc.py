@@ -123,7 +123,7 @@ def test_of_true_poses_with_one_stamp_the_first_is_kept_and_it_is_said(scene, tm
     path.write_text("\n".join([*rows[:4], f"{again[0]},77.0,{again[2]}", *rows[4:]]))
     recording = read(folder)
     assert np.abs(recording.truth.T_world_frame - scene.T_world_body).max() < 1e-12
-    said = "1 of 6 rows of data.csv repeat a stamp, first in line 5; the first pose of each stamp was kept."
+    said = f"rows that repeat the stamp of the row before were left out: 1 of 6, the first at {path}:5"
     assert said in recording.notes
     path.write_text("\n".join([*rows[:3], rows[1], *rows[3:]]))
     with pytest.raises(VobenchError, match=r"data\.csv:4: stamps must increase"):

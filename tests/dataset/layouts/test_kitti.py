@@ -89,13 +89,30 @@ def test_poses_behind_their_picture_s_number_may_be_fewer(scene, tmp_path):
     assert "00.txt has poses of 3 of 5 pictures, by their numbers." in recording.notes
 
 
-@pytest.mark.parametrize("numbers", [(0, 1, 5), (0, 2, 1), (0, 0, 1), (0, 1, -2), (0, 1, 2.5)])
-def test_a_number_that_no_picture_has_or_that_does_not_rise_is_refused(scene, tmp_path, numbers):
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [
+        ((0, 1, 5), r"a picture's number, from 0 to 4, but there is 5: .*00\.txt"),
+        ((0, 2, 1), r"00\.txt:3: frame numbers must increase, but 1 follows 2"),
+        ((0, 1, -2), r"00\.txt:3: .* whole and from 0 on, but is -2"),
+        ((0, 1, 2.5), r"00\.txt:3: .* whole and from 0 on, but is 2\.5"),
+    ],
+)
+def test_a_number_that_no_picture_has_or_that_does_not_rise_is_refused(scene, tmp_path, numbers, said):
     folder, path = scene.kitti(tmp_path), tmp_path / "poses/00.txt"
     rows = path.read_text().splitlines()
     path.write_text("\n".join(f"{number} {row}" for number, row in zip(numbers, rows, strict=False)))
-    with pytest.raises(VobenchError, match=r"00\.txt:[23]: the first of 13 columns should be a picture's number"):
+    with pytest.raises(VobenchError, match=said):
         read(folder)
+
+
+def test_of_poses_with_one_number_the_first_is_kept_and_it_is_said(scene, tmp_path):
+    folder, path = scene.kitti(tmp_path), tmp_path / "poses/00.txt"
+    rows, whole = path.read_text().splitlines(), read(folder).truth
+    path.write_text("\n".join(f"{k} {row}" for k, row in zip((0, 0, 1), rows, strict=False)))
+    recording = read(folder)
+    assert np.array_equal(recording.truth.T_world_frame, whole.T_world_frame[[0, 2]])
+    assert any("left out: 1 of 3" in note for note in recording.notes)
 
 
 def test_a_matrix_that_is_not_rectified_is_refused(scene, tmp_path):
