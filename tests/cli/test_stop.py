@@ -82,7 +82,7 @@ PLACES = {
     "pipeline.run": "score_run",
     "report.page": "html",
     "pipeline.run.RunFolder": "estimate",
-    "cli.run": "print_boards",
+    "cli.boards": "print_boards",
 }
 
 

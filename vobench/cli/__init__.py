@@ -71,6 +71,7 @@ def _end_softly() -> None:
     for stream, text in zip((sys.stdout, sys.stderr), _last_words(), strict=True):
         print(text, end="", file=stream, flush=True)
     code = 128 + stop.requested()
+    stop.forget()
     atexit.register(os._exit, code)  # the last to come is called first: libraries take a second or two to go
     raise SystemExit(code) from None
 
