@@ -165,14 +165,16 @@ def test_a_reader_that_has_seen_enough_is_no_failure_and_gets_no_traceback(ran, 
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_every_shell_is_told_how_to_complete_and_is_offered_the_commands(vobench, monkeypatch, shell):
-    monkeypatch.setenv("_VOBENCH_COMPLETE", f"source_{shell}")
-    script = vobench().out
-    assert f"complete_{shell}" in script
+def test_every_shell_is_told_how_to_complete_and_is_offered_the_commands(shell):
     asked = {"COMP_WORDS": "vobench sal", "COMP_CWORD": "1"}
     asked |= {"_TYPER_COMPLETE_ARGS": "vobench sal", "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
-    for name, value in {**asked, "_VOBENCH_COMPLETE": f"complete_{shell}"}.items():
-        monkeypatch.setenv(name, value)
-    offered = vobench().out
+    script = "import sys; from vobench.cli import main; sys.argv = ['vobench']; main()"
+
+    def said(instruction):
+        environment = os.environ | asked | {"_VOBENCH_COMPLETE": f"{instruction}_{shell}"}
+        return subprocess.check_output([sys.executable, "-c", script], env=environment, text=True)
+
+    assert f"complete_{shell}" in said("source")
+    offered = said("complete")
     assert "salvage" in offered
     assert "report" not in offered

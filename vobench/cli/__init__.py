@@ -48,7 +48,7 @@ def _stoppable() -> Iterator[None]:
         yield
     finally:
         for number in SIGNALS:  # from here on there is nothing to tidy up
-            signal.signal(number, signal.SIG_DFL)
+            signal.signal(number, _leave)
         signal.set_wakeup_fd(before)
         os.close(hears)
         watch.join()
@@ -58,6 +58,10 @@ def _stoppable() -> Iterator[None]:
 
 def _request(number: int, _: FrameType | None) -> None:
     stop.request(number)
+
+
+def _leave(number: int, _: FrameType | None) -> None:
+    os._exit(128 + number)
 
 
 def _end_softly() -> None:
@@ -71,6 +75,7 @@ def _end_softly() -> None:
     for stream, text in zip((sys.stdout, sys.stderr), _last_words(), strict=True):
         print(text, end="", file=stream, flush=True)
     code = 128 + stop.requested()
+    stop.forget()
     atexit.register(os._exit, code)  # the last to come is called first: libraries take a second or two to go
     raise SystemExit(code) from None
 
