@@ -38,7 +38,7 @@ def score(gt: Given, est: Given, *, settings: ScoreSettings = DEFAULTS, times: P
     `settings=LIKE["evo"]` measures as evo would. Raises InputError or AlignmentError.
     """
     pair = _pair(gt, est, times)
-    return scoring.score(pair.gt.trajectory, pair.est.trajectory, settings=settings).noted(pair.notes)
+    return scoring.score(pair.gt.trajectory, pair.est.trajectory, settings=settings).noted(_notes(pair))
 
 
 def diagnose(gt: Given, est: Given, *, times: Path | str | None = None) -> tuple[Finding, ...]:
@@ -74,6 +74,10 @@ def _pair(gt: Given, est: Given, times: Path | str | None, *, any_unit: bool = F
     if isinstance(gt, Trajectory) or isinstance(est, Trajectory):
         return Pair(_reading(gt, times, any_unit=any_unit), _reading(est, times, any_unit=any_unit))
     return read_pair(Source(Path(gt)), Source(Path(est)), times=_paths(times), any_unit=any_unit)
+
+
+def _notes(pair: Pair) -> tuple[str, ...]:
+    return (*pair.notes, pair.by_frame) if pair.by_frame else pair.notes
 
 
 def _reading(given: Given, times: Path | str | None, *, any_unit: bool) -> Reading:
