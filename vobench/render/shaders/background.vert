@@ -3,13 +3,11 @@
 // One triangle over the whole picture, behind everything; the ray through each of its points in the world.
 uniform mat3 world_from_screen;
 out vec3 ray;
-out float gl_ClipDistance[1];
 
 void main()
 {
     vec2 at = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2) * 2.0 - 1.0;
     gl_Position = vec4(at, 1.0, 1.0);
-    gl_ClipDistance[0] = 1.0;
     gl_Layer = gl_InstanceID;
     gl_ViewportIndex = gl_InstanceID;
     ray = world_from_screen * vec3(at, 1.0);

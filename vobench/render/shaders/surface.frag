@@ -26,6 +26,9 @@ in vec2 uv_albedo;
 in vec2 uv_light;
 in vec3 to_eye;
 flat in int layer;
+#ifdef IS_MIRRORED
+in float before_mirror;
+#endif
 out vec4 frag_color;
 
 // Share of unpolarised light that a boundary from air to eta reflects (Born and Wolf, section 1.5).
@@ -39,6 +42,10 @@ float fresnel(float c)
 
 void main()
 {
+#ifdef IS_MIRRORED
+    // Not clipped by OpenGL, which would move the ends of edges that must stay the same from mirror to mirror.
+    if (before_mirror < 0.0) discard;
+#endif
     float luminance = 0.0, passes = 1.0, mirrored = 0.0;
 #ifdef HAS_FRESNEL
     float F = fresnel(clamp(eye_height / length(to_eye), 0.0, 1.0));

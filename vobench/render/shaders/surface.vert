@@ -22,7 +22,7 @@ out vec2 uv_albedo;
 out vec2 uv_light;
 out vec3 to_eye;
 flat out int layer;
-out float gl_ClipDistance[1];
+out float before_mirror;
 
 const float TOUCHING_M = 1e-5;
 
@@ -40,7 +40,7 @@ void main()
     vec3 image = world.xyz;
     for (int i = 2; i >= 0; i--) image -= 2.0 * height(mirrors[i], image) * mirrors[i].xyz;
     gl_Position = direct * vec4(image, 1.0);
-    gl_ClipDistance[0] = height(clip_plane, world.xyz);
+    before_mirror = dot(clip_plane, world);
     gl_Layer = gl_InstanceID;
     gl_ViewportIndex = gl_InstanceID;
     layer = gl_InstanceID;
