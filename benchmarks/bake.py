@@ -15,15 +15,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from vobench.catalog import catalog, yaml_file
 from vobench.render.bake import BakedScene, BakeSettings, bake
 from vobench.render.illumination import Illumination
 from vobench.scene.light import Flicker, Sun
-from vobench.scene.material import Matt
-from vobench.scene.mover import Mover, Path
-from vobench.scene.scene import Scene
+from vobench.scene.material import Matt, Texture
+from vobench.scene.scene import Mover, Path, Scene
 from vobench.scene.surface import box
-from vobench.scene.texture import Texture
+from vobench.suite import catalog, yaml_file
 from vobench.suite.scene_file import SceneFile, build
 
 NS_PER_PICTURE = 100_000_000

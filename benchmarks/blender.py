@@ -20,18 +20,17 @@ from typing import Any
 import numpy as np
 from light import PLACES, decibels, lens, lit, stand
 
-from vobench.catalog import catalog
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
 from vobench.render.geometry import corners
-from vobench.render.mitsuba_plugins import on_texture_m, tile_m
+from vobench.render.mitsuba import on_texture_m, tile_m
 from vobench.render.path import PathRenderer
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
-from vobench.scene.material import texture_of
+from vobench.scene.material import reflectance, texture_of
 from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface
-from vobench.scene.texture import reflectance
+from vobench.suite import catalog
 from vobench.suite.scene_file import build, read_scene
 
 # Paths a pixel, and whether Cycles' own Open Image Denoise follows.

@@ -20,19 +20,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.catalog import catalog
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
-from vobench.render.bake import BakedScene, BakeSettings, bake
-from vobench.render.baked_file import load_baked, save_baked
+from vobench.render.bake import BakedScene, BakeSettings, bake, load_baked, save_baked
 from vobench.render.geometry import RayCaster, inventory
 from vobench.render.path import PathRenderer
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
 from vobench.scene.material import Glass, Matt, Mirror, Polished
 from vobench.scene.scene import Scene
+from vobench.suite import catalog
 from vobench.suite.scene_file import build, read_scene
 
 # x, y in metres, heading and downward pitch in degrees: where a robot could stand, and its camera 0.4 m above.

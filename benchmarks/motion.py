@@ -13,18 +13,17 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
-# One thread: what a core can do. Set before numpy is loaded.
-os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-
 import numpy as np
 
 from vobench.geometry.rig import PIONEER_WHEELS, looking
-from vobench.robot.drive import Drive, drive
-from vobench.robot.slip import SLIPS
-from vobench.robot.slip import STREAMS as SLIP_STREAMS
+from vobench.motion.drive import Drive, drive
+from vobench.motion.slip import SLIP_STREAMS, SLIPS
 from vobench.sensor.encoder import ENCODERS, ticks
-from vobench.sensor.imu import STREAMS, ImuSettings, measure
-from vobench.sensor.imu_preset import IMUS
+from vobench.sensor.imu import IMUS, STREAMS, ImuSettings, measure
+
+# One thread: what a core can do. Set before numpy is loaded.
+os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+
 
 TOUR = ((1.0, 0.0), (2.0, 1.0), (0.0, 2.0), (-1.0, 1.0), (1.0, -1.0), (0.0, 0.0))
 RATE_HZ, IMU_HZ = 30.0, 200.0

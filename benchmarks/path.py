@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from vobench.catalog import catalog
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
-from vobench.render import llvm
-from vobench.render.mitsuba_plugins import load
+from vobench.render import mitsuba as llvm
+from vobench.render.mitsuba import load
 from vobench.render.path import PathRenderer
 from vobench.render.renderer import still
 from vobench.scene.scene import Scene
+from vobench.suite import catalog
 from vobench.suite.scene_file import build, read_scene
 
 LENS = LENSES["paper_blender"]  # square pixels: Mitsuba's camera has no others

@@ -19,22 +19,21 @@ from typing import Any
 
 import numpy as np
 
-from vobench.catalog import catalog
 from vobench.geometry import se3
-from vobench.geometry.lens import KannalaBrandt
+from vobench.geometry.camera import KannalaBrandt
 from vobench.geometry.rig import LENSES, Rig, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.render.bake import BakeSettings, bake
 from vobench.render.geometry import corners
-from vobench.render.look import FAR_M, NEAR_M, T_CV_GL
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import View, still
+from vobench.render.view import FAR_M, NEAR_M, T_CV_GL
 from vobench.scene.light import AreaLight
-from vobench.scene.material import Material, Matt, Polished, texture_of
+from vobench.scene.material import Map, Material, Matt, Polished, reflectance, texture_of
 from vobench.scene.scene import Scene
-from vobench.scene.texture import Map, reflectance
-from vobench.sensor.camera import CAMERAS, NoiseStreams, expose
+from vobench.sensor.image_sensor import CAMERAS, NoiseStreams, expose
 from vobench.sequence import SequenceWriter
+from vobench.suite import catalog
 from vobench.suite.scene_file import build, read_scene
 
 VIEWS = {"down": 90.0, "ahead": 15.0}

@@ -22,10 +22,8 @@ import numpy as np
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.metric.ate import absolute_errors
-from vobench.metric.pairs import select_pairs
-from vobench.metric.rpe import relative_errors
-from vobench.metric.score import ScoreSettings, score
-from vobench.metric.statistic import statistics
+from vobench.metric.rpe import relative_errors, select_pairs
+from vobench.metric.score import ScoreSettings, score, statistics
 from vobench.trajectory.align import align
 from vobench.trajectory.associate import match
 from vobench.trajectory.trajectory import Stamps, Trajectory

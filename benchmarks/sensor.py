@@ -15,11 +15,10 @@ from dataclasses import replace
 import numpy as np
 
 from vobench.geometry.rig import LENSES
-from vobench.sensor.camera import CAMERAS, CameraSensor, NoiseStreams, Radiance, expose, fixed_pattern
-from vobench.sensor.exposure import AutoExposure, start, step
+from vobench.sensor.exposure import AutoExposure, Shutter, ShutterKind, start, step, strips
+from vobench.sensor.image_sensor import CAMERAS, CameraSensor, NoiseStreams, Radiance, expose, fixed_pattern
 from vobench.sensor.lens import LensEffects, lens_maps, through_lens
 from vobench.sensor.response import LINEAR, Power
-from vobench.sensor.shutter import Shutter, ShutterKind, strips
 
 LENS = LENSES["paper_literal"]
 SHAPE = (LENS.height_px, LENS.width_px)

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from vobench.geometry import se3
-from vobench.trajectory.text import format_tum
+from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
 
 NS_PER_FRAME = 33_333_333

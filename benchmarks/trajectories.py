@@ -4,9 +4,9 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from vobench.cli.driving import drive_one, log_of
+from vobench.cli.drive import drive_one, log_of
 from vobench.report.drive_plot import save_sheet
-from vobench.suite.expand import read_plan
+from vobench.suite.suite import read_plan
 
 DOCS = Path(__file__).parents[1] / "docs"
 

@@ -16,13 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
-from vobench.catalog import catalog
 from vobench.geometry import se3
 from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.render.truth import Shot, TruthCaster
-from vobench.sensor.truth import CHANNELS
+from vobench.sensor.pixel_truth import CHANNELS
 from vobench.sequence import SequenceWriter
+from vobench.suite import catalog
 from vobench.suite.scene_file import build, read_scene
 
 LENS, PITCH_DEG = LENSES["paper_literal"], 15.0

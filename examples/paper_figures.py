@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vobench.robot.controller import CONTROLLERS, ControllerSettings
-from vobench.robot.drive import Drive, drive
-from vobench.robot.pioneer import THETAS, Theta
+from vobench.motion.controller import CONTROLLERS, ControllerSettings
+from vobench.motion.drive import Drive, drive
+from vobench.motion.pioneer import THETAS, Theta
 
 START, *TARGETS = (0, 0), (1, 1), (0, 1), (1, 0), (2, 2)
 AS_PRINTED = THETAS["pioneer_3dx_paper"]

@@ -13,6 +13,7 @@ VobenchError               the user's mistake or machine: one line, exit code 1
 """
 
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any
 
 # More than fit a screen are counted.
@@ -100,3 +101,10 @@ class RenderError(VobenchError):
 
 class SequenceError(VobenchError):
     """A recording is incomplete, torn or of another form."""
+
+
+def unknown(kind: str, name: str, known: list[str]) -> str:
+    """One line for a name that nothing has, with the nearest one and all there are."""
+    near = get_close_matches(name, known, n=1)
+    guess = f" Did you mean '{near[0]}'?" if near else ""
+    return f"no {kind} named '{name}'.{guess} Known: {', '.join(sorted(known)) or 'none'}"

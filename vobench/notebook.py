@@ -4,13 +4,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vobench.metric import diagnose as diagnosis
+from vobench.analysis import diagnose as diagnosis
+from vobench.analysis.diagnose import Finding
 from vobench.metric import score as scoring
-from vobench.metric.diagnose import Finding
 from vobench.metric.score import DEFAULTS, Score
 from vobench.metric.settings import ScoreSettings
-from vobench.pipeline.pair import Pair, Source, read_one, read_pair
-from vobench.trajectory.form import Reading
+from vobench.run.trajectory_pair import TrajectoryPair, TrajectorySource, read_one, read_pair
+from vobench.trajectory.formats import Reading
 from vobench.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def read_trajectory(
     `topic` chooses among a recording's; `read_as` are the words of `--gt-as`, such as ns or wxyz; `times` is a file
     of stamps for forms without (KITTI, TartanAir). Raises InputError.
     """
-    return read_one(Source(Path(path), topic, tuple(read_as)), times=_paths(times)).trajectory
+    return read_one(TrajectorySource(Path(path), topic, tuple(read_as)), times=_paths(times)).trajectory
 
 
 def score(gt: Given, est: Given, *, settings: ScoreSettings = DEFAULTS, times: Path | str | None = None) -> Score:
@@ -63,27 +63,27 @@ def read_board(run: Path | str) -> "pd.DataFrame":
 
     Raises InputError where the folder is none of a run.
     """
-    from vobench.report import files, table
-    from vobench.results.run_folder import open_run
+    from vobench.report import leaderboard, page
+    from vobench.run.folder import open_run
 
     folder = open_run(Path(run))
-    return table.data_frame(files.boards_of(folder, folder.scores()))
+    return leaderboard.data_frame(page.boards_of(folder, folder.scores()))
 
 
-def _pair(gt: Given, est: Given, times: Path | str | None, *, any_unit: bool = False) -> Pair:
+def _pair(gt: Given, est: Given, times: Path | str | None, *, any_unit: bool = False) -> TrajectoryPair:
     if isinstance(gt, Trajectory) or isinstance(est, Trajectory):
-        return Pair(_reading(gt, times, any_unit=any_unit), _reading(est, times, any_unit=any_unit))
-    return read_pair(Source(Path(gt)), Source(Path(est)), times=_paths(times), any_unit=any_unit)
+        return TrajectoryPair(_reading(gt, times, any_unit=any_unit), _reading(est, times, any_unit=any_unit))
+    return read_pair(TrajectorySource(Path(gt)), TrajectorySource(Path(est)), times=_paths(times), any_unit=any_unit)
 
 
-def _notes(pair: Pair) -> tuple[str, ...]:
+def _notes(pair: TrajectoryPair) -> tuple[str, ...]:
     return (*pair.notes, pair.by_frame) if pair.by_frame else pair.notes
 
 
 def _reading(given: Given, times: Path | str | None, *, any_unit: bool) -> Reading:
     if isinstance(given, Trajectory):
         return Reading(given, unit="ns", form_unit="ns", order=None)
-    return read_one(Source(Path(given)), times=_paths(times), any_unit=any_unit)
+    return read_one(TrajectorySource(Path(given)), times=_paths(times), any_unit=any_unit)
 
 
 def _paths(file: Path | str | None) -> tuple[Path, ...]:

@@ -1,7 +1,5 @@
 """Every command: its help, its JSON, its exit code, and one line for every mistake."""
 
-# ruff: noqa: E501 - a sentence stands in one line
-
 import os
 import re
 import signal
@@ -15,6 +13,9 @@ from vobench import __version__
 from vobench.cli import main
 from vobench.cli.app import app
 from vobench.errors import UnknownNameError
+
+# ruff: noqa: E501 - a sentence stands in one line
+
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 COMMANDS = [command.name or command.callback.__name__ for command in app.registered_commands]

@@ -9,7 +9,7 @@ def without_mitsuba(monkeypatch):
     def missing():
         raise MissingDependencyError("path tracing needs Mitsuba; run: python -m pip install mitsuba")
 
-    monkeypatch.setattr(doctor.llvm, "working_library", missing)
+    monkeypatch.setattr(doctor.mitsuba, "working_library", missing)
 
 
 def path_tracing(said) -> dict:
@@ -28,7 +28,7 @@ def test_a_machine_that_cannot_trace_paths_is_well_and_told_how_it_could(vobench
 
 
 def test_where_paths_can_be_traced_doctor_names_the_library(vobench, monkeypatch):
-    monkeypatch.setattr(doctor.llvm, "working_library", lambda: "/opt/libLLVM.so.99")
+    monkeypatch.setattr(doctor.mitsuba, "working_library", lambda: "/opt/libLLVM.so.99")
     row = path_tracing(vobench("doctor", "--json"))
     assert (row["well"], row["result"]) == (True, "works with /opt/libLLVM.so.99")
 

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from vobench.trajectory.text import format_tum
+from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
 
 # Each costs a tenth of a second or more, and is for pictures, recordings, tables of others or the viewer.
@@ -39,8 +39,8 @@ def walk(here):
 @pytest.mark.parametrize(
     ("words", "unused"),
     [
-        (["list"], ("numpy", "scipy", "ruamel.yaml", "vobench.suite.model")),
-        (["list", "--json"], ("numpy", "scipy", "ruamel.yaml", "vobench.suite.model", "rich")),
+        (["list"], ("numpy", "scipy", "ruamel.yaml", "vobench.suite.suite")),
+        (["list", "--json"], ("numpy", "scipy", "ruamel.yaml", "vobench.suite.suite", "rich")),
         (["check", "tiny"], ("vobench.sequence", "vobench.dataset", "vobench.report")),
         (["check", "tiny", "--json"], ("vobench.sequence", "vobench.dataset", "vobench.report", "rich")),
         (["score", "walk.tum", "walk.tum"], ("scipy", "ruamel.yaml", "vobench.suite", "vobench.sequence")),

@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from vobench.results.run_folder import SEQUENCE
+from vobench.run.folder import SEQUENCE
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from vobench import stop
-from vobench.pipeline import passage
+from vobench.run import motion
 
 SENTENCE = "vobench: stopped; finished stages are kept, the same command goes on from there"
 HANGING = """
@@ -28,7 +28,7 @@ import sys, time
 import pytest
 from conftest import make_cheap
 from vobench import cli
-from vobench.pipeline import simulate
+from vobench.run import simulate
 def sleep(case, folder, shop):
     (folder / "begun").write_text("")
     print("asleep", file=sys.stderr, flush=True)
@@ -75,13 +75,13 @@ def left_behind(folder):
 
 
 PLACES = {
-    "pipeline.passage": "travel_of",
-    "pipeline.engine": "bake",
+    "run.motion": "body_motion",
+    "run.simulate": "bake",
     "render.raster.RasterRenderer": "radiance",
     "estimator.process.EstimatorProcess": "process",
-    "pipeline.run": "score_run",
+    "run.run": "score_trial",
     "report.page": "html",
-    "pipeline.run.RunFolder": "estimate",
+    "run.folder.RunFolder": "estimate",
     "cli.boards": "print_boards",
 }
 
@@ -107,7 +107,7 @@ def test_an_error_that_comes_of_a_stop_is_not_said_as_well(vobench, here, monkey
         signal.raise_signal(signal.SIGINT)
         raise OSError("a library's own words")
 
-    monkeypatch.setattr(passage, "travel_of", failing)
+    monkeypatch.setattr(motion, "body_motion", failing)
     assert vobench("run", "tiny").err == f"{SENTENCE}\n"
     said = vobench("run", "tiny", "--json")
     assert (said.code, said.json["error"], said.err) == (130, SENTENCE.removeprefix("vobench: "), f"{SENTENCE}\n")

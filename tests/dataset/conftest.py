@@ -16,7 +16,7 @@ from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.rig import ImuCalibration, Rig, WheelGeometry, mounted, side_by_side
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
-from vobench.sensor.truth import TruthFrame
+from vobench.sensor.pixel_truth import TruthFrame
 from vobench.sequence import SequenceWriter
 
 START_NS = 1_403_636_579_763_555_584  # EuRoC's first stamp: float64 would round it

@@ -12,15 +12,12 @@ from scipy.spatial.transform import Rotation
 from vobench.dataset.export import export
 from vobench.dataset.photometric import camera_text
 from vobench.dataset.reproject import known_points
-from vobench.dataset.views import rectified
+from vobench.dataset.source import rectified
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera
-from vobench.geometry.lens import BrownConrady
-from vobench.geometry.preset import PRESETS
-from vobench.geometry.rig import Rig
-from vobench.geometry.sphere import DoubleSphere
-from vobench.sensor.camera import CAMERAS, CameraSensor, NoiseStreams, expose
+from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere
+from vobench.geometry.rig import PRESETS, Rig
 from vobench.sensor.exposure import Exposure
+from vobench.sensor.image_sensor import CAMERAS, CameraSensor, NoiseStreams, expose
 from vobench.sensor.response import Power
 
 Make = Callable[..., Any]

@@ -6,16 +6,14 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vobench.dataset.euroc_sensor import read_imu_csv, sensor_camera, sensor_imu
-from vobench.dataset.files import read_text
-from vobench.dataset.kalibr import read_camchain, read_imu
+from vobench.dataset.euroc import read_imu_csv, sensor_camera, sensor_imu
+from vobench.dataset.kalibr import read_camchain, read_imu, read_yaml
 from vobench.dataset.kitti import read_calibration
-from vobench.dataset.picture_list import read_list
-from vobench.dataset.truth import read_truth_file
-from vobench.dataset.yaml_values import read_yaml
+from vobench.dataset.picture import read_text
+from vobench.dataset.recording import read_list, read_truth_file
 from vobench.errors import VobenchError
+from vobench.trajectory.formats import parse_times
 from vobench.trajectory.trajectory import Trajectory
-from vobench.trajectory.unstamped import parse_times
 
 MANY, SOME = (
     settings(max_examples=count, suppress_health_check=[HealthCheck.function_scoped_fixture]) for count in (200, 80)

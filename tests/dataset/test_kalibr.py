@@ -14,11 +14,9 @@ from vobench.dataset.kalibr import camchain, imu_yaml, number, read_camchain, re
 from vobench.dataset.reproject import PIXEL_TOLERANCE, check_rig, known_points, pixel_difference
 from vobench.errors import InputError, SequenceError
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera
-from vobench.geometry.preset import PRESETS
-from vobench.geometry.rig import Rig, mounted
-from vobench.geometry.sphere import DoubleSphere, Equirectangular
-from vobench.sensor.imu_preset import IMUS
+from vobench.geometry.camera import Camera, DoubleSphere, Equirectangular
+from vobench.geometry.rig import PRESETS, Rig, mounted
+from vobench.sensor.imu import IMUS
 
 # What YAML 1.1 resolves to a float (PyYAML, which Kalibr reads with): a point, and a sign in the exponent.
 FLOAT_1_1 = r"[0-9]+\.[0-9]*([eE][-+][0-9]+)?"

@@ -12,12 +12,10 @@ from vobench.dataset.convert import convert
 from vobench.dataset.export import FORMS, export
 from vobench.dataset.read import read
 from vobench.dataset.reproject import pixel_difference
-from vobench.dataset.views import rectified
+from vobench.dataset.source import rectified
 from vobench.geometry import se3
-from vobench.geometry.lens import BrownConrady, KannalaBrandt
-from vobench.geometry.preset import PRESETS
-from vobench.geometry.rig import Rig, looking
-from vobench.geometry.sphere import DoubleSphere
+from vobench.geometry.camera import BrownConrady, DoubleSphere, KannalaBrandt
+from vobench.geometry.rig import PRESETS, Rig, looking
 from vobench.sequence import Sequence, read_truth
 
 Make = Callable[..., Any]

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from vobench.catalog.manifest import read_manifest
 from vobench.errors import SuiteError, VobenchError
 from vobench.estimator import Frame
-from vobench.estimator.load import load
+from vobench.estimator.worker import load
+from vobench.suite.manifest import read_manifest
 
 ESTIMATORS = Path(__file__).parents[2] / "estimators"
 GOOD = {
@@ -64,7 +64,7 @@ def test_a_manifest_does_not_change(tmp_path):
 
 def test_reading_a_manifest_imports_neither_opencv_nor_the_code():
     script = (
-        "import sys; from pathlib import Path; from vobench.catalog.manifest import read_manifest;"
+        "import sys; from pathlib import Path; from vobench.suite.manifest import read_manifest;"
         "read_manifest(Path(sys.argv[1]));"
         "print('cv2' in sys.modules, any('vobench_estimators' in m for m in sys.modules))"
     )

@@ -1,7 +1,5 @@
 """An estimator's process: whatever it does, the answer is a checked result or a failure with its status."""
 
-# ruff: noqa: E501 - one way to fail is one line
-
 import os
 import subprocess
 import sys
@@ -15,6 +13,9 @@ import pytest
 from vobench.estimator import Frame, Status
 from vobench.estimator.process import LOG_BYTES, EstimatorFailure, EstimatorProcess, Limits
 from vobench.geometry.rig import LENSES, stereo_rig
+
+# ruff: noqa: E501 - one way to fail is one line
+
 
 RIG = stereo_rig(LENSES["paper_blender"], pitch_deg=90)
 PICTURE = np.zeros((480, 720), np.uint8)

@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 import pytest
 
-from vobench.catalog.manifest import read_manifest
 from vobench.estimator import Estimator, Frame, Result
-from vobench.estimator.load import load
+from vobench.estimator.worker import load
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
+from vobench.suite.manifest import read_manifest
 
 ESTIMATORS = Path(__file__).parents[2] / "estimators"
 FRAME_RATE_HZ = 30

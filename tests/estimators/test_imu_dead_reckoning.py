@@ -11,11 +11,9 @@ from vobench.estimator import Frame, ImuReadings, Status
 from vobench.geometry import se3
 from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
-from vobench.robot.drive import drive
-from vobench.robot.planar import circle
-from vobench.sensor.imu import STREAMS, ImuSettings, measure
-from vobench.sensor.imu_preset import IMUS
-from vobench.sensor.triad import Triad
+from vobench.motion.course import circle
+from vobench.motion.drive import drive
+from vobench.sensor.imu import IMUS, STREAMS, ImuSettings, Triad, measure
 from vobench.trajectory.kinematics import Kinematics, Motion
 
 PLACE = looking(pitch_deg=20, position_m=(0.25, -0.1, 0.3))

@@ -8,11 +8,8 @@ import pytest
 from vobench.errors import VobenchError
 from vobench.estimator import Result, Status
 from vobench.geometry import se3
-from vobench.geometry.calibration import CalibrationError, true_rig
-from vobench.geometry.camera import Pinhole
-from vobench.geometry.preset import PRESETS
-from vobench.geometry.rig import mounted, paper_lens, stereo_rig
-from vobench.geometry.sphere import DoubleSphere, Equirectangular
+from vobench.geometry.camera import DoubleSphere, Equirectangular, Pinhole
+from vobench.geometry.rig import PRESETS, CalibrationError, mounted, paper_lens, stereo_rig, true_rig
 
 SQUARE, LITERAL = paper_lens(square_pixels=True), paper_lens(square_pixels=False)
 DOWN, AHEAD = stereo_rig(SQUARE, pitch_deg=90), stereo_rig(SQUARE, pitch_deg=10)

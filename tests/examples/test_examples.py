@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vobench.suite.expand import read_plan
-from vobench.trajectory.text import format_tum
+from vobench.suite.suite import read_plan
+from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

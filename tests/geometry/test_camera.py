@@ -4,10 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from vobench.geometry.camera import Camera, Pinhole
-from vobench.geometry.lens import BrownConrady, KannalaBrandt
-from vobench.geometry.preset import PRESETS
-from vobench.geometry.sphere import DoubleSphere, Equirectangular
+from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Equirectangular, KannalaBrandt, Pinhole
+from vobench.geometry.rig import PRESETS
 
 LENS = Pinhole(72, 48, 65.83, 54.51, 35.2, 23.9)  # neither square pixels nor a central axis
 RADTAN, FISHEYE = PRESETS["euroc"].left, PRESETS["fisheye"].left

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
-from vobench.metric.score import ScoreSettings, pooled, score
+from vobench.metric.score import ScoreSettings, pooled, score, statistics
 from vobench.metric.segment import devkit_distances, segment_errors
 from vobench.metric.settings import LIKE
-from vobench.metric.statistic import statistics
 from vobench.trajectory.trajectory import Trajectory
 
 N = 120
@@ -368,3 +367,40 @@ def test_in_a_plane_what_is_off_it_has_no_error():
     assert {name: again[name] for name in flat} == pytest.approx(flat, rel=1e-12)
     assert once["ate_z"] == again["ate_z"] == 0.0
     assert "align=none; project=xy;" in score(gt, est, settings=settings).metrics[0].id
+
+
+ERRORS = st.lists(st.floats(0, 1e6), min_size=1, max_size=50)
+
+
+@given(ERRORS)
+def test_statistics_obey_their_laws(errors):
+    s = statistics(errors)
+    assert s.n == len(errors)
+    assert s.rmse**2 == pytest.approx(s.mean**2 + s.std**2, rel=1e-9, abs=1e-9)
+    assert s.sse == pytest.approx(s.n * s.rmse**2)
+    ordered = [s.min, s.median, s.p95, s.p99, s.max]
+    assert ordered == pytest.approx(sorted(ordered), rel=1e-12)
+    assert s.min * (1 - 1e-12) <= s.mean <= s.rmse * (1 + 1e-12) + 1e-12
+
+
+@given(ERRORS)
+def test_percentiles_are_numpys(errors):
+    s = statistics(errors)
+    assert (s.median, s.p95, s.p99) == pytest.approx(tuple(np.percentile(errors, [50, 95, 99])), rel=1e-12)
+
+
+def test_statistics_of_a_hundred_and_one_numbers():
+    s = statistics(np.arange(101.0))
+    assert (s.n, s.mean, s.median, s.min, s.max, s.p95, s.p99) == (101, 50, 50, 0, 100, 95, 99)
+    assert s.sse == 338_350
+    assert s.std == pytest.approx(np.sqrt(850))
+
+
+def test_nothing_has_no_statistics():
+    with pytest.raises(ValueError, match="got none"):
+        statistics([])
+
+
+def test_the_spread_of_a_sample_divides_by_one_less():
+    assert statistics([1.0, 2.0, 3.0], ddof=1).std == 1.0
+    assert statistics([4.0], ddof=1).std == 0.0

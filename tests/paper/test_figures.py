@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from vobench.geometry.se3 import Array
-from vobench.robot.controller import CONTROLLERS, ControllerSettings
-from vobench.robot.drive import Drive, drive
-from vobench.robot.pioneer import THETAS, Theta, velocities
+from vobench.motion.controller import CONTROLLERS, ControllerSettings
+from vobench.motion.drive import Drive, drive
+from vobench.motion.pioneer import THETAS, Theta, velocities
 
 AS_PRINTED = THETAS["pioneer_3dx_paper"]
 PAPER = CONTROLLERS["paper"]

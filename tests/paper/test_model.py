@@ -7,8 +7,7 @@ import pytest
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.robot.integrate import over_period
-from vobench.robot.pioneer import THETAS, Theta, accelerations, velocities
+from vobench.motion.pioneer import THETAS, Theta, accelerations, over_period, velocities
 
 AS_PRINTED = THETAS["pioneer_3dx_paper"]
 A_M = 0.2

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vobench.geometry.se3 import Array
-from vobench.robot.motor import (
+from vobench.motion.motor import (
     REPRESENTATIVE,
     PhysicalRobot,
     accelerations_at,
@@ -21,7 +21,7 @@ from vobench.robot.motor import (
     voltage_theta_of,
     wheel_voltages,
 )
-from vobench.robot.pioneer import THETAS, Theta, accelerations, velocities
+from vobench.motion.pioneer import THETAS, Theta, accelerations, velocities
 
 A_M = 0.2
 DIFFERENT = PhysicalRobot(

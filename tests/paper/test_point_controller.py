@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from vobench.errors import MotionError
-from vobench.robot.controller import CONTROLLERS, ControllerSettings, references
-from vobench.robot.drive import drive
-from vobench.robot.integrate import over_period
-from vobench.robot.pioneer import THETAS, accelerations, velocities
+from vobench.motion.controller import CONTROLLERS, ControllerSettings, references
+from vobench.motion.drive import drive
+from vobench.motion.pioneer import THETAS, accelerations, over_period, velocities
 
 AS_PRINTED = THETAS["pioneer_3dx_paper"]
 PAPER = CONTROLLERS["paper"]

@@ -14,14 +14,13 @@ from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
 from vobench.render.bake import BakedScene
 from vobench.render.geometry import inventory
-from vobench.render.lightmap import layout
+from vobench.render.lightmap import pack_atlas
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
 from vobench.scene.light import STEADY, Level, PointLight
-from vobench.scene.material import Matt, Polished, texture_of, under_coat
+from vobench.scene.material import Map, Matt, Polished, Texture, reflectance, texture_of, under_coat
 from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface, room
-from vobench.scene.texture import Map, Texture, reflectance
 
 EvenLight = Callable[..., BakedScene]
 Draw = Callable[[BakedScene], RasterRenderer]
@@ -32,7 +31,7 @@ def light_evenly(scene: Scene, *, illuminance_lx: float = 100.0, level: Level = 
     lamp = PointLight("even", np.zeros(3), 1e-12, level)
     lit = replace(scene, lights=(lamp, *scene.lights))
     surfaces = inventory(lit).surfaces
-    where = layout(surfaces, spacing_m=1.0)
+    where = pack_atlas(surfaces, spacing_m=1.0)
     light = np.zeros((len(lit.lights), where.height, where.width), np.float32)
     light[0] = illuminance_lx
     return BakedScene(lit, where, light, {name: tile for name in scene.materials for tile in _tiles(scene, name)})

@@ -4,11 +4,9 @@ import numpy as np
 
 from vobench.geometry.se3 import Array
 from vobench.render.geometry import RayCaster, ball, corners, inventory
-from vobench.scene.material import Glass, Material, Matt
-from vobench.scene.mover import Mover, Path
-from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.material import Glass, Material, Matt, Texture
+from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 from vobench.scene.surface import box, rectangle, room
-from vobench.scene.texture import Texture
 
 MATERIALS: dict[str, Material] = {"a": Matt(Texture("plain", 0.5, 0.0, 1.0, 8, 0)), "pane": Glass()}
 LAMP = ceiling_light("lamp", np.array([0.5, 0.5, 2.9]), (0.6, 0.6), power_lm=1)

@@ -8,11 +8,9 @@ import pytest
 from vobench.render.bake import SUN_STEP_RAD, BakedScene, BakeSettings, bake, key_times_ns
 from vobench.render.illumination import Illumination
 from vobench.scene.light import NS_PER_S, Dimmer, Flicker, Light, PointLight, Sky, Sun, Switched
-from vobench.scene.material import Glass, Matt
-from vobench.scene.mover import Mover, Path
-from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.material import Glass, Map, Matt, Texture
+from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 from vobench.scene.surface import Surface, box, rectangle, room
-from vobench.scene.texture import Map, Texture
 
 COARSE = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=0.3, indirect_rays=64, bounces=3)
 DIRECT = replace(COARSE, bounces=0)

@@ -8,17 +8,14 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera, Pinhole
-from vobench.geometry.lens import BrownConrady, KannalaBrandt
+from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Equirectangular, KannalaBrandt, Pinhole
 from vobench.geometry.rig import LENSES, Rig, stereo_rig
 from vobench.geometry.se3 import Array
-from vobench.geometry.sphere import DoubleSphere, Equirectangular
 from vobench.render.renderer import still
-from vobench.scene.material import Matt
+from vobench.scene.material import Matt, Texture
 from vobench.scene.scene import Scene
 from vobench.scene.surface import box, room
-from vobench.scene.texture import Texture
-from vobench.sensor.camera import CAMERAS, NoiseStreams, expose
+from vobench.sensor.image_sensor import CAMERAS, NoiseStreams, expose
 from vobench.sequence import Sequence, SequenceWriter, read_truth
 
 POSES = ((0.0, 0.0, 17.0), (0.31, -0.47, 71.0), (-1.1, 0.83, 200.0), (0.5, 0.5, -40.0))  # x, y in m, heading in deg

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vobench.render.lightmap import ATLAS_WIDTH, layout
+from vobench.render.lightmap import ATLAS_WIDTH, pack_atlas
 from vobench.scene.surface import box, room
 
 SURFACES = [
@@ -14,7 +14,7 @@ SURFACES = [
 
 @pytest.mark.parametrize("spacing_m", [0.02, 0.1, 5.0])
 def test_patches_do_not_overlap_and_lie_within_the_map(spacing_m: float) -> None:
-    where = layout(SURFACES, spacing_m=spacing_m)
+    where = pack_atlas(SURFACES, spacing_m=spacing_m)
     taken = np.zeros((where.height, where.width), int)
     for patch in where.patches:
         taken[patch.window] += 1
@@ -24,7 +24,7 @@ def test_patches_do_not_overlap_and_lie_within_the_map(spacing_m: float) -> None
 
 @pytest.mark.parametrize("spacing_m", [0.02, 0.1, 5.0])
 def test_samples_are_no_further_apart_than_asked_and_reach_both_edges(spacing_m: float) -> None:
-    for surface, patch in zip(SURFACES, layout(SURFACES, spacing_m=spacing_m).patches, strict=True):
+    for surface, patch in zip(SURFACES, pack_atlas(SURFACES, spacing_m=spacing_m).patches, strict=True):
         u, v = patch.fractions()
         assert (u.min(), u.max(), v.min(), v.max()) == (0, 1, 0, 1)
         points = surface.at(u, v)
@@ -33,7 +33,7 @@ def test_samples_are_no_further_apart_than_asked_and_reach_both_edges(spacing_m:
 
 
 def test_corners_are_looked_up_at_the_middle_of_their_samples() -> None:
-    where = layout(SURFACES, spacing_m=0.1)
+    where = pack_atlas(SURFACES, spacing_m=0.1)
     for index, patch in enumerate(where.patches):
         first, _, last, _ = where.texture_coordinates(index) * (where.width, where.height)
         np.testing.assert_allclose(first, (patch.column + 0.5, patch.row + 0.5))
@@ -41,5 +41,5 @@ def test_corners_are_looked_up_at_the_middle_of_their_samples() -> None:
 
 
 def test_a_surface_wider_than_the_map_widens_the_map() -> None:
-    where = layout(SURFACES[:1], spacing_m=0.003)
+    where = pack_atlas(SURFACES[:1], spacing_m=0.003)
     assert where.width == where.patches[0].columns > ATLAS_WIDTH

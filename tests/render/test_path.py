@@ -9,18 +9,15 @@ import pytest
 
 from vobench.errors import MissingDependencyError, RenderError
 from vobench.geometry import se3
-from vobench.geometry.camera import Pinhole
-from vobench.geometry.lens import KannalaBrandt
+from vobench.geometry.camera import KannalaBrandt, Pinhole
 from vobench.geometry.rig import looking
-from vobench.render import llvm
+from vobench.render import mitsuba
 from vobench.render.path import PathRenderer
 from vobench.render.renderer import View, still
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Sky, SpotLight, Sun, Switched
-from vobench.scene.material import Glass, Matt, Mirror, Polished, fresnel, pane_reflectance, under_coat
-from vobench.scene.mover import Mover, Path
-from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.material import Glass, Matt, Mirror, Polished, Texture, fresnel, pane_reflectance, under_coat
+from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 from vobench.scene.surface import rectangle, room
-from vobench.scene.texture import Texture
 
 X, Y, Z = np.eye(3)
 SMALL = Pinhole(12, 8, 200.0, 200.0, 5.5, 3.5)
@@ -34,7 +31,7 @@ Trace = Callable[..., np.ndarray]
 def trace() -> Trace:
     """Pictures of scenes, or a skip where this machine cannot trace paths."""
     try:
-        llvm.prepare()
+        mitsuba.prepare()
     except MissingDependencyError as error:
         pytest.skip(str(error))
 

@@ -12,10 +12,9 @@ from vobench.render.bake import BakedScene, BakeSettings, bake
 from vobench.render.geometry import RayCaster
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
-from vobench.scene.material import Matt
+from vobench.scene.material import Matt, Texture
 from vobench.scene.scene import Scene, ceiling_light
 from vobench.scene.surface import box, rectangle, room
-from vobench.scene.texture import Texture
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 DOWN, AHEAD = looking(pitch_deg=90, position_m=(0.2, 0.1, 0.4)), looking(pitch_deg=20, position_m=(0.2, 0.1, 0.4))

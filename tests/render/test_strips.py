@@ -8,19 +8,15 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera, Pinhole
-from vobench.geometry.lens import KannalaBrandt
+from vobench.geometry.camera import Camera, DoubleSphere, KannalaBrandt, Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
-from vobench.geometry.sphere import DoubleSphere
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import View, still
 from vobench.scene.light import Dimmer, Flicker, Sky
-from vobench.scene.material import Glass, Matt, Mirror, Polished
-from vobench.scene.mover import Mover, Path
-from vobench.scene.scene import Scene
+from vobench.scene.material import Glass, Matt, Mirror, Polished, Texture
+from vobench.scene.scene import Mover, Path, Scene
 from vobench.scene.surface import box, rectangle, room
-from vobench.scene.texture import Texture
 
 PINHOLE = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 CAMERAS = {

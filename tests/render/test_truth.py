@@ -7,20 +7,16 @@ import pytest
 
 from vobench.errors import UnknownNameError
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera, Pinhole
-from vobench.geometry.lens import BrownConrady, KannalaBrandt
+from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Equirectangular, KannalaBrandt, Pinhole
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
-from vobench.geometry.sphere import DoubleSphere, Equirectangular
 from vobench.render.geometry import inventory
 from vobench.render.truth import Shot, TruthCaster
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
-from vobench.scene.material import Glass, Matt, Mirror, Polished
-from vobench.scene.mover import Mover, Path
-from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.material import Glass, Matt, Mirror, Polished, Texture
+from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 from vobench.scene.surface import Surface, box, rectangle, room
-from vobench.scene.texture import Texture
-from vobench.sensor.truth import CHANNELS, TruthFrame
+from vobench.sensor.pixel_truth import CHANNELS, TruthFrame
 
 PLAIN = Texture("plain", 0.5, 0.0, 1.0, 8, 0)
 MATERIALS = {
@@ -378,7 +374,9 @@ def test_shadow_follows_a_mover():
 def test_shadows_in_a_room_are_those_of_rays_without_tiles(caster, monkeypatch):
     camera, shot = LENSES["paper_literal"], Shot(HERE, 0)
     by_tiles = caster.frame(camera, shot, later=LATER)
-    monkeypatch.setattr("vobench.render.beams.Outlook.fills", lambda self, axis, sine: np.full(len(axis), -1, np.int32))
+    monkeypatch.setattr(
+        "vobench.render.culling.PointView.fills", lambda self, axis, sine: np.full(len(axis), -1, np.int32)
+    )
     by_rays = TruthCaster(HALL).frame(camera, shot, later=LATER)
     for name, values in by_rays.channels().items():
         if values.dtype == np.float32:

@@ -3,19 +3,25 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
-from vobench.results import estimate_file
-from vobench.results.run_folder import GROUND_TRUTH, SCORE, RunFolder, RunScore, write_json
+from vobench.geometry import se3
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import stereo_rig
+from vobench.report import TrialView, save_run
+from vobench.run import estimate as estimate_file
+from vobench.run.folder import GROUND_TRUTH, SCORE, RunFolder, TrialScore, write_json
+from vobench.sequence import EncodedFrame
 from vobench.trajectory.align import Alignment
-from vobench.trajectory.text import format_tum
+from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
 
 IDENTITY = Alignment("none", np.eye(3), np.zeros(3), 1.0, ()).as_dict()
 
 
-def make_score(estimator: str, status: str = "ok", *, ate_m: float | None = 0.1, **changes: object) -> RunScore:
+def make_score(estimator: str, status: str = "ok", *, ate_m: float | None = 0.1, **changes: object) -> TrialScore:
     metrics = [] if ate_m is None else [{"name": "ate_trans", "rmse": ate_m}]
     facts = {
         "case": "down",
@@ -28,10 +34,10 @@ def make_score(estimator: str, status: str = "ok", *, ate_m: float | None = 0.1,
         "score": None if ate_m is None else {"metrics": metrics, "alignment": IDENTITY},
         **changes,
     }
-    return RunScore(estimator=estimator, status=status, **facts)
+    return TrialScore(estimator=estimator, status=status, **facts)
 
 
-def make_run(path: Path, scores: list[RunScore]) -> RunFolder:
+def make_run(path: Path, scores: list[TrialScore]) -> RunFolder:
     folder = RunFolder(path)
     T = np.tile(np.eye(4), (3, 1, 1))
     T[:, 0, 3] = [0.0, 0.5, 1.0]
@@ -49,7 +55,7 @@ def make_run(path: Path, scores: list[RunScore]) -> RunFolder:
 
 
 @pytest.fixture
-def scored() -> Callable[..., RunScore]:
+def scored() -> Callable[..., TrialScore]:
     """Makes a score."""
     return make_score
 
@@ -61,7 +67,7 @@ def write_run() -> Callable[..., RunFolder]:
 
 
 @pytest.fixture
-def mixed() -> list[RunScore]:
+def mixed() -> list[TrialScore]:
     """Two cases; one estimator survives both, one loses a case, one dies twice; names and reasons that need care."""
     return [
         make_score("good_one", ate_m=0.2),
@@ -74,6 +80,45 @@ def mixed() -> list[RunScore]:
 
 
 @pytest.fixture
-def run(tmp_path: Path, mixed: list[RunScore]) -> RunFolder:
+def run(tmp_path: Path, mixed: list[TrialScore]) -> RunFolder:
     """The same as a folder."""
     return make_run(tmp_path / "suite" / "stamp", mixed)
+
+
+COUNT, LOST = 12, (5, 6)
+RIG = stereo_rig(Pinhole(48, 32, 40.0, 40.0, 23.5, 15.5), pitch_deg=20)
+
+
+def make_run_viewer() -> TrialView:
+    t_ns = np.arange(COUNT) * 1_000_000_000 // 30
+    turn = np.linspace(0, 1, COUNT)
+    body = se3.transform(se3.rotation_z(turn), np.stack([3 * np.sin(turn), 3 - 3 * np.cos(turn), 0 * turn], -1))
+    truth = Trajectory(t_ns, body).of_mounted(RIG.T_body_left)
+    kept = np.setdiff1d(np.arange(COUNT), LOST)
+    estimate = Trajectory(t_ns[kept], se3.transform(np.eye(3), [0.1, 0, 0]) @ truth.T_world_frame[kept])
+    png = cv2.imencode(".png", np.full((32, 48), 99, np.uint8))[1].tobytes()
+    tracks = {i: (np.array([[0.0, 0.0], [3.0, 2.0], [47.0, 31.0]]), np.array([True, True, False])) for i in (1, 3)}
+    return TrialView(
+        title="room × stereo × 0",
+        rig=RIG,
+        frames=lambda: (EncodedFrame(i, int(t), "png", png, png) for i, t in enumerate(t_ns)),
+        ground_truth=truth,
+        estimate=estimate,
+        error_t_ns=estimate.t_ns,
+        error_m=np.full(len(kept), 0.1),
+        statuses=["lost" if i in LOST else "ok" for i in range(COUNT)],
+        tracks=tracks,
+        summary_md="# score",
+    )
+
+
+@pytest.fixture(scope="session")
+def run_viewer() -> TrialView:
+    return make_run_viewer()
+
+
+@pytest.fixture(scope="session")
+def rrd(run_viewer: TrialView, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("viewer") / "run.rrd"
+    save_run(path, run_viewer)
+    return path

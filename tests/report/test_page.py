@@ -4,8 +4,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from vobench.report import files, page
-from vobench.results.run_folder import RunFolder
+from vobench.report import page
+from vobench.report import page as files
+from vobench.run.folder import RunFolder
 
 VOID = {"meta", "br", "polyline", "path"}
 

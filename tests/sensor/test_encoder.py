@@ -9,9 +9,9 @@ from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
 from vobench.geometry.se3 import Array
-from vobench.robot.controller import CONTROLLERS
-from vobench.robot.drive import Drive, drive
-from vobench.robot.slip import SLIPS, STREAMS
+from vobench.motion.controller import CONTROLLERS
+from vobench.motion.drive import Drive, drive
+from vobench.motion.slip import SLIP_STREAMS, SLIPS
 from vobench.sensor.encoder import ENCODERS, EncoderErrors, ticks, true_rims
 
 FIGURE_12 = ((0, 1), (1, 1), (2, 2))
@@ -21,7 +21,7 @@ COARSE = WheelGeometry(radius_m=0.1, track_m=0.3, ticks_per_revolution=4)
 
 @cache
 def driven(controller: str, slip: str, seed: int = 0) -> Drive:
-    rngs = dict(zip(STREAMS, np.random.default_rng(seed).spawn(3), strict=True))
+    rngs = dict(zip(SLIP_STREAMS, np.random.default_rng(seed).spawn(3), strict=True))
     return drive(FIGURE_12, controller=CONTROLLERS[controller], slip=SLIPS[slip], rngs=rngs)
 
 

@@ -1,6 +1,7 @@
 """What an IMU says adds up to the motion, and its errors come one by one."""
 
 from dataclasses import dataclass, replace
+from math import inf, nan
 
 import numpy as np
 import pytest
@@ -10,13 +11,10 @@ from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
-from vobench.robot.controller import CONTROLLERS
-from vobench.robot.drive import drive
-from vobench.robot.slip import SLIPS
-from vobench.robot.slip import STREAMS as SLIP_STREAMS
-from vobench.sensor.imu import STREAMS, ImuSettings, measure
-from vobench.sensor.imu_preset import IMUS
-from vobench.sensor.triad import Triad
+from vobench.motion.controller import CONTROLLERS
+from vobench.motion.drive import drive
+from vobench.motion.slip import SLIP_STREAMS, SLIPS
+from vobench.sensor.imu import FLAWLESS, IMUS, STREAMS, ImuSettings, Triad, measure, read_out, started, walked
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, Kinematics, level
 
 PLACE = looking(pitch_deg=20, position_m=(0.25, -0.1, 0.3))
@@ -254,3 +252,125 @@ def test_a_rate_that_is_none_is_refused(rate_hz):
 def test_a_place_that_is_none_is_refused(place):
     with pytest.raises(InputError, match="T_body_imu should be a rigid transform"):
         ImuSettings(T_body_imu=place)
+
+
+# gyro in rad/s, accel in m/s²: white noise, walk.
+SAID = {
+    "exact": (0, 0, 0, 0),
+    "adis16448": (1.6968e-4, 1.9393e-5, 2e-3, 3e-3),
+    "mpu6000": (8.727e-5, 1.4105e-6, 2.3536e-3, 1.7652e-5),
+    "bmi055": (2.4435e-4, 1.3713e-6, 1.47100e-3, 4.1606e-5),
+}
+
+
+@pytest.mark.parametrize("name", IMUS)
+def test_a_preset_has_the_densities_of_its_source(name):
+    c = IMUS[name].calibration
+    assert (c.gyro_noise, c.gyro_walk, c.accel_noise, c.accel_walk) == pytest.approx(SAID[name], rel=1e-4)
+    assert c.rate_hz == 200
+
+
+@pytest.mark.parametrize(("name", "gyro_deg_per_hour", "accel_micro_g"), [("mpu6000", 4.6, 36), ("bmi055", 2.0, 30)])
+def test_a_walk_that_is_forgotten_keeps_within_its_stability(name, gyro_deg_per_hour, accel_micro_g):
+    gyro, accel = (t.walk * np.sqrt(t.correlation_s / 2) for t in (IMUS[name].gyro, IMUS[name].accel))
+    assert np.rad2deg(gyro) * 3600 == pytest.approx(gyro_deg_per_hour)
+    assert accel / 9.80665 * 1e6 == pytest.approx(accel_micro_g)
+
+
+@pytest.mark.parametrize("name", sorted(set(IMUS) - {"exact"}))
+def test_a_chip_counts_to_its_limit_in_no_more_than_sixteen_bits(name):
+    for triad in (IMUS[name].gyro, IMUS[name].accel):
+        assert 2**10 < triad.limit / triad.step < 2**15 * 1.01
+
+
+def draws(count: int, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal((count, 3))
+
+
+@pytest.mark.parametrize("rate_hz", [10.0, 200.0])
+def test_the_mean_over_a_second_is_as_noisy_at_any_rate(rate_hz):
+    silence = np.zeros((round(2000 * rate_hz), 3))
+    readings = read_out(Triad(noise=0.01), silence, silence, draws(len(silence)), step_s=1 / rate_hz)
+    seconds = readings.reshape(2000, -1, 3).mean(1)
+    assert seconds.std() == pytest.approx(0.01, rel=0.03)
+
+
+@pytest.mark.parametrize("rate_hz", [10.0, 200.0])
+def test_a_walk_goes_as_far_in_a_second_at_any_rate(rate_hz):
+    path = walked(Triad(walk=0.01), draws(round(2000 * rate_hz) + 1), step_s=1 / rate_hz)
+    assert not path[0].any()
+    assert np.diff(path[:: round(rate_hz)], axis=0).std() == pytest.approx(0.01, rel=0.03)
+
+
+@pytest.mark.parametrize("rate_hz", [10.0, 100.0])
+def test_a_walk_that_is_forgotten_has_spread_and_memory_at_any_rate(rate_hz):
+    triad = Triad(walk=0.01, correlation_s=0.5)
+    lag = round(0.5 * rate_hz)
+    path = walked(triad, draws(200_000), step_s=1 / rate_hz)
+    assert path.std() == pytest.approx(0.01 * np.sqrt(0.5 / 2), rel=0.03)
+    assert np.corrcoef(path[:-lag, 0], path[lag:, 0])[0, 1] == pytest.approx(np.exp(-1), abs=0.03)
+
+
+def test_a_walk_that_is_forgotten_has_its_spread_from_the_first_reading_on():
+    triad = Triad(walk=0.01, correlation_s=0.5)
+    firsts = np.stack([walked(triad, draws(1, seed), step_s=0.01)[0] for seed in range(1000)])
+    assert firsts.std() == pytest.approx(0.005, rel=0.05)
+
+
+def test_a_memory_of_ages_is_a_walk_that_is_never_forgotten():
+    numbers = draws(1000)
+    numbers[0] = 0.0
+    never, ages = (walked(Triad(walk=0.01, correlation_s=tau), numbers, step_s=0.01) for tau in (inf, 1e7))
+    np.testing.assert_allclose(ages, never, atol=1e-6)
+
+
+@pytest.mark.parametrize("correlation_s", [0.5, inf])
+def test_a_longer_walk_begins_with_the_shorter_one(correlation_s):
+    triad, numbers = Triad(walk=0.01, correlation_s=correlation_s), draws(500)
+    short, long = (walked(triad, numbers[:n], step_s=0.01) for n in (50, 500))
+    np.testing.assert_array_equal(long[:50], short)
+
+
+def test_walking_leaves_the_numbers_it_was_given_alone():
+    numbers = draws(10)
+    walked(Triad(walk=1.0), numbers, step_s=0.1)
+    np.testing.assert_array_equal(numbers, draws(10))
+
+
+def test_without_flaws_the_truth_is_read():
+    true, none = draws(100), np.zeros((100, 3))
+    np.testing.assert_array_equal(read_out(FLAWLESS, true, none, draws(100, 1), step_s=0.01), true)
+
+
+def test_scale_and_misalignment_act_on_the_truth_and_not_on_the_bias():
+    triad = Triad(bias=(0.1, 0.2, 0.3), gain=((1.01, 0.02, 0), (0, 0.98, 0), (0, 0, 1)))
+    bias = started(triad, np.zeros(3))[None]
+    (reading,) = read_out(triad, np.array([[1.0, 2.0, 3.0]]), bias, np.zeros((1, 3)), step_s=0.01)
+    np.testing.assert_allclose(reading, [1.05 + 0.1, 1.96 + 0.2, 3.3])
+
+
+def test_a_chip_reads_whole_steps_within_its_range():
+    chip, none = Triad(limit=1.0, step=0.25), np.zeros((4, 3))
+    true = np.array([[0.12, -0.13, 0.9], [5.0, -5.0, 0.0], [0.24, 0.26, 0.5], [np.pi, 1e9, -1e9]])
+    said = [[0, -0.25, 1], [1, -1, 0], [0.25, 0.25, 0.5], [1, 1, -1]]
+    np.testing.assert_array_equal(read_out(chip, true, none, none, step_s=0.01), said)
+
+
+@pytest.mark.parametrize("field", ["noise", "walk", "bias_std", "step"])
+@pytest.mark.parametrize("value", [-1e-9, nan, inf])
+def test_a_size_that_is_none_is_refused_by_name(field, value):
+    with pytest.raises(InputError, match=rf"an IMU's {field} should be finite and 0 or more, got {value}"):
+        replace(FLAWLESS, **{field: value})
+
+
+@pytest.mark.parametrize("field", ["correlation_s", "limit"])
+@pytest.mark.parametrize("value", [0.0, -1.0, nan])
+def test_a_bound_that_is_none_is_refused_by_name(field, value):
+    with pytest.raises(InputError, match=rf"an IMU's {field} should be more than 0, or inf for none, got {value}"):
+        replace(FLAWLESS, **{field: value})
+
+
+@pytest.mark.parametrize(("field", "value"), [("bias", (0, 1)), ("bias", (0, nan, 0)), ("gain", (1.0, 1.0, 1.0))])
+def test_numbers_that_are_too_few_or_none_are_refused_by_name(field, value):
+    with pytest.raises(InputError, match=rf"an IMU's {field} should be \(3, ?3?\) finite numbers, got"):
+        replace(FLAWLESS, **{field: value})

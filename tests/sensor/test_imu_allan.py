@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from vobench.geometry.se3 import Array
-from vobench.sensor.imu import STREAMS, ImuReadings, measure
-from vobench.sensor.imu_preset import IMUS
+from vobench.sensor.imu import IMUS, STREAMS, ImuReadings, measure
 
 HOURS_NS = 3600 * 10**9
 # The chip's rounding would add a noise of its own.

@@ -8,7 +8,7 @@ import pytest
 from vobench.errors import InputError
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
-from vobench.sensor.camera import Radiance
+from vobench.sensor.image_sensor import Radiance
 from vobench.sensor.lens import (
     LensEffects,
     LensMaps,

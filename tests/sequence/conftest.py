@@ -13,7 +13,7 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import Rig, WheelGeometry, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.sequence import SequenceWriter
-from vobench.sequence.contents import topic_facts
+from vobench.sequence.recording import topic_facts
 
 CASE = b'{"seed": 7}'
 RIG = stereo_rig(

@@ -15,8 +15,8 @@ from vobench.sequence import Sequence, SequenceWriter, read_imu_bias, read_true_
 from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag, BagWriter
 from vobench.sequence.calibration import read_rig, write_mounts
-from vobench.sequence.cdr import serialise
-from vobench.sequence.contents import topic_facts
+from vobench.sequence.messages import serialise
+from vobench.sequence.recording import topic_facts
 
 T_BODY_IMU = se3.transform(se3.from_quaternion(np.array([0.5, -0.5, 0.5, -0.5])), [0.1, -0.2, 0.3])
 IMU = ImuCalibration(T_BODY_IMU, 200.0, 1.7e-4, 2e-3, 2e-5, 3e-3)

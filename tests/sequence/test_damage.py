@@ -8,20 +8,13 @@ import numpy as np
 import pytest
 
 from vobench.errors import SequenceError
-from vobench.sequence import (
-    Sequence,
-    SequenceWriter,
-    has_truth,
-    read_case,
-    read_truth,
-)
+from vobench.sequence import Sequence, SequenceWriter, has_truth, read_case, read_truth
 from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag, BagWriter
 from vobench.sequence.calibration import write_mounts
-from vobench.sequence.cdr import serialise
-from vobench.sequence.index import MESSAGE_INDEX_ENTRY, MESSAGE_INDEX_HEAD
+from vobench.sequence.mcap_index import CHUNK, DATA_LENGTH, HEAD, MESSAGE_INDEX_ENTRY, MESSAGE_INDEX_HEAD
+from vobench.sequence.messages import serialise
 from vobench.sequence.picture import encode
-from vobench.sequence.record import CHUNK, DATA_LENGTH, HEAD
 
 
 def read_all(folder: Path) -> None:

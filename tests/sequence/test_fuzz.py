@@ -17,7 +17,7 @@ from vobench.errors import VobenchError
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import ImuCalibration, stereo_rig
 from vobench.sensor.imu import ImuReadings
-from vobench.sensor.truth import TruthFrame
+from vobench.sensor.pixel_truth import TruthFrame
 from vobench.sequence import (
     Sequence,
     SequenceWriter,
@@ -31,8 +31,8 @@ from vobench.sequence import (
     read_twist,
     salvage_sequence,
 )
-from vobench.sequence.pose_topic import read_poses
-from vobench.sequence.record import MAX_BYTES
+from vobench.sequence.mcap_index import MAX_BYTES
+from vobench.sequence.recording import read_poses
 
 COUNT, LIMIT_S = 1000, 5
 HEADROOM_BYTES = 1_200_000_000  # four times what a record may hold

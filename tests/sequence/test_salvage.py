@@ -17,7 +17,7 @@ from mcap.writer import CompressionType, Writer
 from vobench.errors import SequenceError
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
-from vobench.sensor.truth import TruthFrame
+from vobench.sensor.pixel_truth import TruthFrame
 from vobench.sequence import (
     Sequence,
     SequenceWriter,
@@ -30,7 +30,7 @@ from vobench.sequence import (
     salvage_sequence,
 )
 from vobench.sequence.bag import Bag
-from vobench.sequence.record import HEAD, MAGIC
+from vobench.sequence.mcap_index import HEAD, MAGIC
 
 KILLS = 20
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from vobench.suite.expand import Plan, read_plan
+from vobench.suite.suite import Plan, read_plan
 
 SUITE = """name: tiny
 seed: 1

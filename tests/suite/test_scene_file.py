@@ -1,7 +1,5 @@
 """A scene's YAML: every kind of thing it may hold is built where it says, and what is wrong is one line."""
 
-# ruff: noqa: E501 - tables of sentences are easier to read a line each
-
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +9,11 @@ from vobench.errors import SuiteError
 from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Steady, Sun
 from vobench.scene.material import Glass, Matt, Mirror, Polished
 from vobench.scene.scene import Scene
-from vobench.suite.light_spec import LevelSpec, LightOverride
 from vobench.suite.scene_file import build, read_scene
+from vobench.suite.scene_spec import LevelSpec, LightOverride
+
+# ruff: noqa: E501 - tables of sentences are easier to read a line each
+
 
 HALL = """name: hall
 white_cd_m2: 50

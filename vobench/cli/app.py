@@ -1,4 +1,4 @@
-"""All of vobench's commands; what they need is imported when they run, so that --help is instant."""
+"""All commands of vobench; what they need is imported when they run, so that --help is instant."""
 
 import json as json_module
 import os
@@ -10,9 +10,229 @@ from typing import Annotated, Any
 import typer
 
 from vobench import stop
-from vobench.cli import score_command, sequence_command
-from vobench.cli.score_command import Json
 from vobench.errors import SuiteError, VobenchError
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Gt = Annotated[Path, typer.Argument(metavar="GT", help="Ground truth: a file of any form, or a sequence's folder.")]
+Est = Annotated[
+    Path,
+    typer.Argument(metavar="EST", help="Estimate: TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, by content."),
+]
+Topic = Annotated[str | None, typer.Option(help="The topic with the poses, or /tf:parent.child.")]
+As = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="s|ms|us|ns, xyzw|wxyz, inverse, rotations:inverse, axes:z,-x,-y, positions:y,x,z or "
+        "mount:x,y,z,qx,qy,qz,qw; repeatable."
+    ),
+]
+Times = Annotated[
+    list[Path] | None,
+    typer.Option(help="Stamps in seconds, one a line, for files without (KITTI); repeatable: each takes what fits it."),
+]
+
+
+def score_command(
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="GT EST",
+            help="Ground truth and estimate: TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, by content, or the truth "
+            "of a sequence's folder. Several pairs are scored one by one and all together.",
+        ),
+    ] = None,
+    *,
+    listed: Annotated[
+        Path | None, typer.Option("--list", help="A file with GT and EST on each line, besides those given here.")
+    ] = None,
+    like: Annotated[
+        str | None,
+        typer.Option(help="Set what evo, kitti, rpg, tum, openvins, tartanair or tartanair_mono would."),
+    ] = None,
+    align: Annotated[
+        str | None, typer.Option("--align", "-a", help="none, origin, se3 (our default), sim3, scale or yaw.")
+    ] = None,
+    align_n: Annotated[int | None, typer.Option(min=1, help="Align by the first so many matched poses.")] = None,
+    delta: Annotated[
+        float | None, typer.Option("--delta", "-d", help="RPE over so much, more than 0; 1 by default.")
+    ] = None,
+    delta_unit: Annotated[
+        str | None, typer.Option("--delta-unit", "-u", help="f (frames), m, s, d (degrees) or r (radians).")
+    ] = None,
+    all_pairs: Annotated[
+        bool | None, typer.Option("--all-pairs/--consecutive", help="RPE over all pairs, or end to end.")
+    ] = None,
+    pairs_from: Annotated[str | None, typer.Option(help="RPE's pairs are chosen on gt or est.")] = None,
+    t_max_diff: Annotated[float | None, typer.Option(help="Poses further apart are no pair, in s; 0.01.")] = None,
+    t_offset: Annotated[float | None, typer.Option(help="Added to the estimate's stamps, in s.")] = None,
+    assoc: Annotated[str | None, typer.Option(help="nearest, evo, interpolate, greedy or in_order.")] = None,
+    project: Annotated[
+        str | None, typer.Option(help="Compare in the plane xy, xz or yz of the truth, once aligned.")
+    ] = None,
+    full: Annotated[bool | None, typer.Option("--full", help="Every metric, not only the headlines.")] = None,
+    per_length: Annotated[
+        bool, typer.Option("--per-length", help="Segments and parts over each length too; --json always has them.")
+    ] = False,
+    gt_topic: Topic = None,
+    est_topic: Topic = None,
+    gt_as: As = None,
+    est_as: As = None,
+    times: Times = None,
+    json: Json = False,
+    csv: Annotated[bool, typer.Option("--csv", help="Print CSV.")] = False,
+    md: Annotated[bool, typer.Option("--md", help="Print Markdown.")] = False,
+) -> None:
+    """Score estimates against ground truth: ATE, RPE, segments, coverage."""
+    from vobench.cli import score as scoring
+    from vobench.run.trajectory_pair import TrajectorySource
+
+    forms = [form for form, asked in (("json", json), ("csv", csv), ("md", md)) if asked]
+    if len(forms) > 1:
+        raise typer.BadParameter(f"choose one of --{' and --'.join(forms)}")
+    paths = [*(files or ()), *(scoring.read_list(listed) if listed else ())]
+    if not paths or len(paths) % 2:
+        raise typer.BadParameter(
+            f"files come in pairs, GT EST, but there {'is' if len(paths) == 1 else 'are'} {len(paths)}"
+        )
+    pairs = [
+        (TrajectorySource(gt, gt_topic, tuple(gt_as or ())), TrajectorySource(est, est_topic, tuple(est_as or ())))
+        for gt, est in zip(paths[::2], paths[1::2], strict=True)
+    ]
+    scoring.show_score(
+        pairs,
+        scoring.Asked(
+            like, align, align_n, assoc, t_max_diff, t_offset, delta, delta_unit, all_pairs, pairs_from, full, project
+        ),
+        times=times or (),
+        form=forms[0] if forms else "table",
+        per_length=per_length,
+    )
+
+
+def diagnose_command(
+    gt: Gt,
+    est: Est,
+    *,
+    gt_topic: Topic = None,
+    est_topic: Topic = None,
+    gt_as: As = None,
+    est_as: As = None,
+    times: Times = None,
+    json: Json = False,
+) -> None:
+    """Say what is wrong between two trajectories (frames, axes, scale, clocks, quaternions), and what mends it."""
+    from vobench.cli import score as diagnosing
+    from vobench.run.trajectory_pair import TrajectorySource
+
+    diagnosing.show_diagnosis(
+        TrajectorySource(gt, gt_topic, tuple(gt_as or ())),
+        TrajectorySource(est, est_topic, tuple(est_as or ())),
+        times=times or (),
+        as_json=json,
+    )
+
+
+def metrics_command(
+    metric: Annotated[str | None, typer.Argument(metavar="[ID]", help="All where left out.")] = None,
+    *,
+    json: Json = False,
+) -> None:
+    """Define a metric: formula, source, settings, and what it cannot see."""
+    from vobench.cli import score as defining
+
+    defining.show_metrics(metric, as_json=json)
+
+
+Recorded = Annotated[
+    Path, typer.Argument(metavar="PATH", help="A dataset's folder, a bag, or a sequence; its form is told by content.")
+]
+Imu = Annotated[Path | None, typer.Option(help="Kalibr's imu.yaml.")]
+Truth = Annotated[Path | None, typer.Option(help="A trajectory file with the ground truth.")]
+Rate = Annotated[float | None, typer.Option(help="Pictures a second, for layouts without stamps.")]
+Form = Annotated[str | None, typer.Option(help="The form, where its content should not tell.")]
+Calibration = Annotated[Path | None, typer.Option(help="Kalibr's camchain.yaml, where the layout has none of its own.")]
+TopicOf = Annotated[
+    list[str] | None,
+    typer.Option("--topic", help="left=, right=, left_info=, right_info=, truth= or imu=NAME of a bag; repeatable."),
+]
+
+
+def import_command(
+    path: Recorded,
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder of the new sequence.")],
+    *,
+    form: Form = None,
+    calibration: Calibration = None,
+    imu: Imu = None,
+    truth: Truth = None,
+    rate: Rate = None,
+    topic: TopicOf = None,
+    json: Json = False,
+) -> None:
+    """Make a sequence from a dataset's folder or a bag, and say all that was assumed or dropped."""
+    from vobench.cli import sequence
+
+    given = sequence.Given(form, calibration, imu, truth, rate, tuple(topic or ()))
+    sequence.show_import(path, out, given, as_json=json)
+
+
+def export_command(
+    source: Annotated[
+        Path, typer.Argument(metavar="SOURCE", help="The folder of a sequence, or the file of a trajectory.")
+    ],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder or file to write, which should be new.")],
+    *,
+    form: Annotated[str, typer.Option(help="euroc, kitti, tum or, of a sequence, ros2.")],
+    json: Json = False,
+) -> None:
+    """Write a sequence as EuRoC, KITTI, TUM or a ROS 2 bag, or a trajectory as their text; say all that is lost."""
+    from vobench.cli import sequence
+
+    sequence.show_export(source, out, form=form, as_json=json)
+
+
+def info_command(
+    path: Recorded,
+    *,
+    form: Form = None,
+    calibration: Calibration = None,
+    imu: Imu = None,
+    truth: Truth = None,
+    rate: Rate = None,
+    topic: TopicOf = None,
+    json: Json = False,
+) -> None:
+    """Say what is in a recording: topics, rates, duration, calibration, ground truth, hash."""
+    from vobench.cli import sequence
+
+    given = sequence.Given(form, calibration, imu, truth, rate, tuple(topic or ()))
+    sequence.show_info(path, given, as_json=json)
+
+
+def salvage_command(
+    torn: Annotated[
+        Path, typer.Argument(metavar="TORN", help="An MCAP file that was cut off, or a sequence's folder.")
+    ],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="The whole file or folder to write.")],
+    *,
+    json: Json = False,
+) -> None:
+    """Recover what is whole in a torn MCAP file."""
+    from vobench.cli import sequence
+
+    sequence.show_salvaged(torn, out, as_json=json)
+
+
+def verify_command(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or runs/<suite> for its latest.")],
+    *,
+    json: Json = False,
+) -> None:
+    """Recompute all hashes and scores of a run from its files; exit code 1 where anything differs."""
+    from vobench.cli import report
+
+    report.show_verification(run, as_json=json)
+
 
 app = typer.Typer(
     name="vobench",
@@ -151,7 +371,7 @@ def drive(
     json: Json = False,
 ) -> None:
     """Drive a suite's trajectories without rendering: a summary, and plots."""
-    from vobench.cli import driving
+    from vobench.cli import drive as driving
 
     driving.show(suite, trajectory, out=out, tum=tum, csv=csv, as_json=json)
 
@@ -178,7 +398,7 @@ def render(
     json: Json = False,
 ) -> None:
     """Draw one picture of a scene, to look at and to debug scenes with."""
-    from vobench.cli import rendering
+    from vobench.cli import render as rendering
 
     viewpoint = rendering.Viewpoint(at, yaw, pitch, time)
     look = rendering.Look(camera, sensor, gain, engine, samples)
@@ -194,18 +414,19 @@ def list_command(
     json: Json = False,
 ) -> None:
     """List the suites, scenes and estimators that can be found, and where."""
-    from vobench.cli import listing
+    from vobench.cli import list as listing
 
     listing.show(kind, as_json=json)
 
 
-for command in (score_command.score, score_command.diagnose, score_command.metrics):
-    app.command()(command)
-app.command("import")(sequence_command.import_)
-app.command()(sequence_command.export)
-app.command()(sequence_command.info)
-app.command()(sequence_command.salvage)
-app.command()(sequence_command.verify)
+app.command("score")(score_command)
+app.command("diagnose")(diagnose_command)
+app.command("metrics")(metrics_command)
+app.command("import")(import_command)
+app.command("export")(export_command)
+app.command("info")(info_command)
+app.command("salvage")(salvage_command)
+app.command("verify")(verify_command)
 
 
 @app.command()
@@ -219,9 +440,9 @@ def report(
     json: Json = False,
 ) -> None:
     """Print a run's leaderboard, in any form."""
-    from vobench.cli import reporting
+    from vobench.cli import report as reporting
 
-    reporting.show(run, form=form, out=out, as_json=json)
+    reporting.show_report(run, form=form, out=out, as_json=json)
 
 
 @app.command()
@@ -238,9 +459,9 @@ def view(
     json: Json = False,
 ) -> None:
     """Open one run in Rerun, failures first."""
-    from vobench.cli import viewing
+    from vobench.cli import view as viewing
 
-    viewing.show(run, case=case, estimator=estimator, save=save, as_json=json)
+    viewing.show_view(run, case=case, estimator=estimator, save=save, as_json=json)
 
 
 @app.command()

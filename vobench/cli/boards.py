@@ -5,8 +5,7 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from vobench.cli import terminal
-from vobench.report.leaderboard import Board
-from vobench.report.table import HEADINGS, LEGEND, cells, notes
+from vobench.report.leaderboard import HEADINGS, LEGEND, Board, cells, notes
 
 # A narrow terminal goes without these, in this order; every report has them all.
 LEAST_FIRST = ("RPE °/frame", "RPE mm/frame", "CPU ms/frame", "segments %", "survived", "coverage", "#")

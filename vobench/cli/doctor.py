@@ -11,10 +11,9 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from vobench import stop
 from vobench.cli import terminal
 from vobench.errors import MissingDependencyError
-from vobench.render import llvm
-from vobench.render.egl import EGL_PACKAGES, EGL_REMEDY
-from vobench.results.store import default_store
-from vobench.results.unfinished import why_unwritable
+from vobench.render import mitsuba
+from vobench.render.opengl import EGL_PACKAGES, EGL_REMEDY
+from vobench.run.store import default_store, why_unwritable
 
 PROBE = "from vobench.render import egl; egl.context()"
 
@@ -116,7 +115,7 @@ def _cache() -> Check:
 def _path_tracing() -> Check:
     """Whether Mitsuba can render, tried in a process of its own: a wrong libLLVM would kill this one."""
     try:
-        library = llvm.working_library()
+        library = mitsuba.working_library()
     except MissingDependencyError as error:
         result, _, remedy = str(error).partition("; run: ")
         return Check("path tracing (Mitsuba)", False, f"{result}; run: {_as_we_are(remedy)}", _as_we_are(remedy), True)

@@ -1,4 +1,4 @@
-"""vobench run and vobench check."""
+"""vobench run and check."""
 
 import shutil
 import sys
@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from vobench.cli import terminal
 from vobench.errors import InputError
-from vobench.pipeline.motion import Travel
-from vobench.pipeline.passage import travel_all
-from vobench.pipeline.simulate import is_simulated
-from vobench.results.store import default_store
-from vobench.suite.expand import Case, Plan, read_plan
-from vobench.suite.source_spec import RecordedCase
+from vobench.run.motion import BodyMotion, body_motions
+from vobench.run.simulate import is_simulated
+from vobench.run.store import default_store
+from vobench.suite.source import RecordedCase
+from vobench.suite.suite import Case, Plan, read_plan
 
 if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
@@ -22,18 +21,18 @@ if TYPE_CHECKING:
 def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) -> None:
     """Run a suite and print its leaderboard and where everything lies."""
     from vobench.cli.boards import print_boards
-    from vobench.pipeline.run import run_suite
-    from vobench.pipeline.workshop import Workshop
-    from vobench.report import files
-    from vobench.report.table import as_json as boards_as_json
+    from vobench.report import page
+    from vobench.report.leaderboard import as_json as boards_as_json
+    from vobench.run.run import run_suite
+    from vobench.run.store import Context
 
     planned = read_plan(suite, only_estimators=estimators)
     _preflight(planned)
     _require_writable("--out", out)
     _require_writable("VOBENCH_CACHE", default_store().root)
-    shop = Workshop(default_store(), terminal.Bars())
-    folder = run_suite(planned, root=out, shop=shop, finish=files.write_reports)
-    boards = files.boards_of(folder, folder.scores())
+    shop = Context(default_store(), terminal.Bars())
+    folder = run_suite(planned, root=out, shop=shop, finish=page.write_reports)
+    boards = page.boards_of(folder, folder.scores())
     if as_json:
         print(boards_as_json(boards), end="")
         return
@@ -48,18 +47,18 @@ def _command() -> str:
 
 def _require_writable(what: str, folder: Path) -> None:
     """Said before hours of work. Raises InputError."""
-    from vobench.results.unfinished import why_unwritable
+    from vobench.run.store import why_unwritable
 
     if cause := why_unwritable(folder):
         raise InputError(f"{what} should be a folder that can be written ({cause}): {folder}")
 
 
-def _preflight(planned: Plan) -> "tuple[dict[str, Travel], dict[str, Recording]]":
+def _preflight(planned: Plan) -> "tuple[dict[str, BodyMotion], dict[str, Recording]]":
     """Where bodies go and what recordings hold. Raises SuiteError with all that cannot be."""
-    travels, wrong = dict[str, Travel](), planned.mistakes()
+    travels, wrong = dict[str, BodyMotion](), planned.mistakes()
     recordings: dict[str, Recording] = {}
     with wrong.at():
-        travels = travel_all(planned)
+        travels = body_motions(planned)
     with wrong.at():
         recordings = _read_recordings(planned)
     wrong.require_none()
@@ -98,12 +97,12 @@ def _read_recordings(planned: Plan) -> "dict[str, Recording]":
     """The plan's recordings by their cases' names; what reads them is imported where there are any."""
     if not planned.recorded:
         return {}
-    from vobench.pipeline.recorded import read_all
+    from vobench.run.import_recording import read_all
 
     return read_all(planned)
 
 
-def _case_facts(case: Case, travels: Mapping[str, Travel]) -> dict[str, Any]:
+def _case_facts(case: Case, travels: Mapping[str, BodyMotion]) -> dict[str, Any]:
     """What is known of a case before it is made."""
     t_ns, is_there = travels[case.variant["trajectory"]].t_ns, is_simulated(case, default_store())
     return {
@@ -117,7 +116,7 @@ def _case_facts(case: Case, travels: Mapping[str, Travel]) -> dict[str, Any]:
 
 def _recorded_facts(case: RecordedCase, recording: "Recording") -> dict[str, Any]:
     """The same of a recording; its pictures are not read yet."""
-    from vobench.pipeline.recorded import is_imported
+    from vobench.run.import_recording import is_imported
 
     is_there = is_imported(case, recording, default_store())
     return {

@@ -1,36 +1,96 @@
-"""Recordings in bags: ROS 1, ROS 2, and MCAP files in ROS 2 form, whatever wrote them."""
+"""ROS 1 and ROS 2 bags and foreign MCAP files, read, and ROS 2 bags written."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Final
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
+from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, ReaderError, StoragePlugin, Writer
 
-from vobench.dataset.assemble import assemble
-from vobench.dataset.bag_picture import encoding_note, picture
-from vobench.dataset.bag_rig import Info, Tree, info_rig, is_rectified, plain, tree_of
-from vobench.dataset.bag_topics import Chosen, choose
-from vobench.dataset.calibration import chain_rig, find_imu
-from vobench.dataset.files import require_themselves
-from vobench.dataset.kalibr import read_imu
-from vobench.dataset.options import Options
-from vobench.dataset.picture import Picture
-from vobench.dataset.picture_list import partners
-from vobench.dataset.recording import Recording
-from vobench.dataset.stream import PictureStream, Shot
-from vobench.dataset.yaml_values import read_yaml
-from vobench.errors import InputError
+from vobench.dataset.bag_rig import Chosen, Info, Tree, choose, info_rig, is_rectified, plain, tree_of
+from vobench.dataset.kalibr import chain_rig, find_imu, read_imu, read_yaml
+from vobench.dataset.picture import Picture, require_themselves
+from vobench.dataset.recording import PictureStream, ReadOptions, RecordedFrame, Recording, assemble, partners
+from vobench.dataset.source import ExportSource, Views
+from vobench.errors import InputError, SequenceError
 from vobench.geometry.rig import ImuCalibration, Rig
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import messages as ros
-from vobench.sequence.pose_topic import opened, read_first_poses
+from vobench.sequence.bag import Bag
+from vobench.sequence.calibration import IMU_NOTE, WHEELS_NOTE
+from vobench.sequence.messages import TYPES
+from vobench.sequence.recording import opened, read_first_poses
+from vobench.sequence.writer import (
+    CASE_ATTACHMENT,
+    IMPORT_NOTE,
+    NAMES_ATTACHMENT,
+    PROVENANCE_NOTE,
+    SENSORS_FILE,
+    TRUTH_FILE,
+)
 from vobench.trajectory.trajectory import Stamps
 
-TF_STATIC, BASE = "/tf_static", "base_link"
+# Channels and bytes of each; where the colours come the wrong way round; what makes mosaics grey.
+GREY = {"mono8": 1, "8uc1": 1, "mono16": 2, "16uc1": 2}
+COLOURS = {"bgr8": 3, "8uc3": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4}
+MOSAICS = {
+    "bayer_rggb8": cv2.COLOR_BayerRGGB2GRAY,
+    "bayer_bggr8": cv2.COLOR_BayerBGGR2GRAY,
+    "bayer_gbrg8": cv2.COLOR_BayerGBRG2GRAY,
+    "bayer_grbg8": cv2.COLOR_BayerGRBG2GRAY,
+}
+
+
+def picture(message: Any, name: str) -> Picture:
+    """The picture of an Image or CompressedImage. Raises InputError for an encoding that is not read."""
+    if not hasattr(message, "encoding"):
+        return Picture(name, message.data.tobytes())
+    encoding = message.encoding.lower()
+    if encoding in GREY:
+        return Picture(name, _pixels(message, name, 1, GREY[encoding])[..., 0])
+    if encoding in COLOURS:
+        pixels = _pixels(message, name, COLOURS[encoding], 1)[..., :3]
+        return Picture(name, np.ascontiguousarray(pixels[..., ::-1] if encoding.startswith("rgb") else pixels))
+    if encoding in MOSAICS:
+        return Picture(name, np.asarray(cv2.cvtColor(_pixels(message, name, 1, 1)[..., 0], MOSAICS[encoding])))
+    known = ", ".join((*GREY, *COLOURS, *MOSAICS))
+    raise InputError(f"the encoding {message.encoding!r} is not read. Known: {known}: {name}")
+
+
+def encoding_note(message: Any) -> tuple[str, ...]:
+    """What `picture` makes of a message, beyond what its kind says."""
+    if getattr(message, "encoding", "").lower() in MOSAICS:
+        return (f"The colour mosaic ({message.encoding}) was turned grey by OpenCV's bilinear interpolation.",)
+    return ()
+
+
+def _pixels(message: Any, name: str, channels: int, size: int) -> NDArray[Any]:
+    """Pixels (H, W, channels) of `size` bytes each; rows may be longer than their pixels need."""
+    height, width, step = int(message.height), int(message.width), int(message.step)
+    needed = width * channels * size
+    if height < 1 or width < 1 or step < needed or message.data.size < height * step:
+        raise InputError(
+            f"{message.data.size} bytes are no {width} x {height} picture in {message.encoding} "
+            f"with {step} bytes a row: {name}"
+        )
+    rows = np.asarray(message.data[: height * step], np.uint8).reshape(height, step)[:, :needed]
+    if size == 1:
+        return rows.reshape(height, width, channels).copy()
+    order = ">u2" if message.is_bigendian else "<u2"
+    words = np.ascontiguousarray(rows).view(order).reshape(height, width, channels)
+    return words.astype(np.uint16)
+
+
+BASE = "base_link"
 MOST_WAITING = 64  # pictures held while their partner has not come yet
 
 Notes = tuple[str, ...]
@@ -46,7 +106,7 @@ class Contents:
     tree: Tree
 
 
-def read_bag(path: Path, options: Options, *, form: str) -> Recording:
+def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
     """The pictures, calibration, IMU and truth of a bag; pictures are read as one goes. Raises InputError."""
     require_themselves(path)
     with opened(path) as reader:
@@ -60,7 +120,7 @@ def read_bag(path: Path, options: Options, *, form: str) -> Recording:
     rig, calibration, rig_notes = _rig(path, chosen, found, body, options)
     rig_notes = rig_notes if options.calibration else (*body_notes, *rig_notes)
     imu, imu_calibration, imu_notes = _imu(path, chosen, found, body, options)
-    unread = sorted(types.keys() - {*_topics(chosen), TF_STATIC, (chosen.truth or "").partition(":")[0]})
+    unread = sorted(types.keys() - {*_topics(chosen), ros.TF_STATIC.name, (chosen.truth or "").partition(":")[0]})
     notes = [*chosen.notes, "Stamps are those in the messages' headers.", *pairing, *rig_notes, *imu_notes]
     notes += encoding_note(found.first[chosen.left])
     if repeats:
@@ -79,7 +139,7 @@ def _topics(chosen: Chosen) -> list[str]:
 def _walk(reader: Any, chosen: Chosen, path: Path) -> Contents:
     """Go through the chosen topics once; no picture is decoded, and none is kept."""
     truth = (chosen.truth or "").partition(":")[0]
-    wanted = [c for c in reader.connections if c.topic in {*_topics(chosen), TF_STATIC, truth}]
+    wanted = [c for c in reader.connections if c.topic in {*_topics(chosen), ros.TF_STATIC.name, truth}]
     stamps: dict[str, list[int]] = {}
     first: dict[str, Any] = {}
     readings: list[tuple[float, ...]] = []
@@ -89,7 +149,7 @@ def _walk(reader: Any, chosen: Chosen, path: Path) -> Contents:
         if topic in first and topic in (truth, chosen.left_info, chosen.right_info):
             continue
         message = reader.deserialize(raw, connection.msgtype)
-        if topic == TF_STATIC:
+        if topic == ros.TF_STATIC.name:
             static.append(message)
             continue
         if topic not in first:
@@ -137,7 +197,7 @@ def _rising(t_ns: Stamps, topic: str, path: Path) -> Stamps:
     return t_ns
 
 
-def _shots(path: Path, chosen: Chosen, found: Contents, options: Options) -> tuple[Any, Stamps, Notes]:
+def _shots(path: Path, chosen: Chosen, found: Contents, options: ReadOptions) -> tuple[Any, Stamps, Notes]:
     """The pictures in pairs, their stamps (N,), and what pairing them took."""
     left_ns = found.stamps[chosen.left]
     places = {chosen.left: {int(t): index for index, t in enumerate(left_ns)}}
@@ -153,7 +213,7 @@ def _shots(path: Path, chosen: Chosen, found: Contents, options: Options) -> tup
     return partial(_pictures, path, places, left_ns), left_ns, notes
 
 
-def _pictures(path: Path, places: dict[str, dict[int, int]], t_ns: Stamps) -> Iterator[Shot]:
+def _pictures(path: Path, places: dict[str, dict[int, int]], t_ns: Stamps) -> Iterator[RecordedFrame]:
     """Shots in order; a picture waits for its partner, and few may wait at once."""
     waiting: dict[int, dict[str, Picture]] = {}
     due = 0
@@ -169,7 +229,7 @@ def _pictures(path: Path, places: dict[str, dict[int, int]], t_ns: Stamps) -> It
                 raise InputError(f"left and right pictures lie more than {MOST_WAITING} apart in {path}")
             while len(waiting.get(due, ())) == len(places):
                 shot = waiting.pop(due)
-                yield Shot(int(t_ns[due]), tuple(shot[topic] for topic in places))
+                yield RecordedFrame(int(t_ns[due]), tuple(shot[topic] for topic in places))
                 due += 1
 
 
@@ -193,7 +253,7 @@ def _body(chosen: Chosen, found: Contents) -> tuple[str | None, Notes]:
     return None, (f"The body is the left camera{', and the truth was taken to be of it' if truth else ''}.",)
 
 
-def _rig(path: Path, chosen: Chosen, found: Contents, body: str | None, options: Options) -> tuple[Rig, str, Notes]:
+def _rig(path: Path, chosen: Chosen, found: Contents, body: str | None, options: ReadOptions) -> tuple[Rig, str, Notes]:
     """The cameras by Kalibr's chain where one is given, or by the bag; and what says so."""
     if options.calibration is not None:
         about = "imu" if read_yaml(options.calibration).has("cam0", "T_cam_imu") else "left"
@@ -216,7 +276,7 @@ def _rig(path: Path, chosen: Chosen, found: Contents, body: str | None, options:
 
 
 def _imu(
-    path: Path, chosen: Chosen, found: Contents, body: str | None, options: Options
+    path: Path, chosen: Chosen, found: Contents, body: str | None, options: ReadOptions
 ) -> tuple[ImuReadings | None, ImuCalibration | None, Notes]:
     """The readings and their calibration; neither where nothing says how noisy the IMU is, or where it sits."""
     if found.imu is None or chosen.imu is None:
@@ -232,3 +292,68 @@ def _imu(
     if T_body_imu is None:
         return None, None, (f"{chosen.imu} was dropped: nothing says where it sits.",)
     return found.imu, read_imu(noise, T_body_imu), (f"The IMU's noise is that of {noise.name}.",)
+
+
+TRUE_TF_STATIC = f"/ground_truth{ros.TF_STATIC.name}"
+VERSION: Final = 8  # of rosbag2's metadata; ROS 2 Iron and later read it
+
+
+def write_ros2(source: ExportSource, views: Views, folder: Path) -> list[str]:
+    """Write every message of both files, bit for bit, and say what became of the rest."""
+    del views  # a bag holds the pictures as they were recorded
+    paths = [path for path in (source.folder / SENSORS_FILE, source.folder / TRUTH_FILE) if path.is_file()]
+    mounts = [tuple(bytes(data) for _, data in Bag.open(path).raw((ros.TF_STATIC,))) for path in paths]
+    folder.rmdir()  # rosbags makes its own
+    writer = Writer(folder, version=VERSION, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    for name, text in _records(paths).items():
+        writer.set_custom_data(name, text)
+    try:
+        with AnyReader(paths, default_typestore=TYPES) as reader, writer:
+            _copy(reader, writer, true_mounts_differ=len(set(mounts)) > 1)
+    except (AnyReaderError, ReaderError) as error:
+        raise SequenceError(f"rosbags does not read this sequence ({error}): {source.folder}") from error
+    notes = ["Notes and attachments (wheels, IMU, case, versions) became custom_data of metadata.yaml."]
+    if len(set(mounts)) > 1:
+        notes.append(f"The true mounts differ from those told: they are on {TRUE_TF_STATIC}.")
+    return notes
+
+
+def _records(paths: list[Path]) -> dict[str, str]:
+    """What no message holds, by the name it has in the sequence."""
+    records = {}
+    for path in paths:
+        bag = Bag.open(path)
+        for name in (WHEELS_NOTE, IMU_NOTE, PROVENANCE_NOTE, IMPORT_NOTE):
+            if entries := bag.note(name):
+                records[name] = json.dumps(entries, sort_keys=True)
+        for name in (CASE_ATTACHMENT, NAMES_ATTACHMENT):
+            if name in bag.index.attachments:
+                records[name] = bag.attachment(name).decode()
+    return records
+
+
+def _copy(reader: AnyReader, writer: Writer, *, true_mounts_differ: bool) -> None:
+    """Every message at its time; both files' /tf_static would be one topic, so the truth's is renamed or dropped."""
+    names = [_name(connection, reader, true_mounts_differ=true_mounts_differ) for connection in reader.connections]
+    into = {
+        id(connection): writer.add_connection(
+            name,
+            connection.msgtype,
+            msgdef=connection.msgdef.data,
+            rihs01=TYPES.hash_rihs01(connection.msgtype),
+            offered_qos_profiles=getattr(connection.ext, "offered_qos_profiles", ()),
+        )
+        for connection, name in zip(reader.connections, names, strict=True)
+        if name and connection.msgcount
+    }
+    for connection, t_ns, data in reader.messages():
+        if id(connection) in into:
+            writer.write(into[id(connection)], t_ns, data)
+
+
+def _name(connection: Connection, reader: AnyReader, *, true_mounts_differ: bool) -> str | None:
+    """A topic's name in the bag; None for a message that is there already. The sensors' file comes first."""
+    if connection.topic != ros.TF_STATIC.name or connection.owner is reader.connections[0].owner:
+        return connection.topic
+    return TRUE_TF_STATIC if true_mounts_differ else None

@@ -1,4 +1,4 @@
-"""A sequence in the layouts of others, with its calibration in their words, and tested before it gets its name."""
+"""A sequence exported in the layouts of others, with its calibration, tested before it gets its name."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,22 +10,53 @@ import numpy as np
 
 from vobench import stop
 from vobench.dataset import kalibr
-from vobench.dataset.export_euroc import write_euroc
-from vobench.dataset.export_kitti import covered, kitti_path, write_kitti
-from vobench.dataset.export_ros2 import write_ros2
-from vobench.dataset.export_tum import left_alone, write_tum
-from vobench.dataset.files import require_free
-from vobench.dataset.kitti import T_BODY_GREY
+from vobench.dataset.bag import write_ros2
+from vobench.dataset.euroc import write_euroc
+from vobench.dataset.kitti import T_BODY_GREY, covered, kitti_path, write_kitti
 from vobench.dataset.photometric import write_photometric
+from vobench.dataset.picture import require_free
 from vobench.dataset.read import read
+from vobench.dataset.recording import cut_to
 from vobench.dataset.reproject import check_path, check_rig
-from vobench.dataset.source import PNG, Source, open_source
-from vobench.dataset.truth import cut_to
-from vobench.dataset.views import Views, rectified
+from vobench.dataset.source import PNG, ExportSource, Views, open_source, rectified
+from vobench.dataset.tum import left_alone, write_tum
 from vobench.errors import InputError, SequenceError
 from vobench.geometry.rig import ImuCalibration, Rig
 from vobench.sequence.messages import IMU, LEFT_IMAGE, RIGHT_IMAGE
+from vobench.trajectory.formats import format_euroc, format_kitti, format_times, format_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory
+
+TRAJECTORY_FORMS = ("tum", "kitti", "euroc")
+TIMES_SUFFIX = ".times.txt"
+
+
+def export_trajectory(trajectory: Trajectory, path: Path, form: str) -> tuple[Path, ...]:
+    """Write a trajectory and say which files it became; KITTI's has no stamps, so its times go beside it.
+
+    Stamps come back exactly and poses to 1e-15. Raises InputError for another form, or a file that is there already.
+    """
+    texts = {path: _text(trajectory, form)}
+    if form == "kitti":
+        texts[path.with_name(path.stem + TIMES_SUFFIX)] = format_times(trajectory.t_ns)
+    for file in texts:
+        if file.exists():
+            raise InputError(f"there is a file already; choose another name or take it away: {file}")
+    for file, text in texts.items():
+        part = file.with_name(file.name + ".part")
+        part.write_text(text, encoding="utf-8")
+        part.replace(file)
+    return tuple(texts)
+
+
+def _text(trajectory: Trajectory, form: str) -> str:
+    if form == "tum":
+        return format_tum(trajectory)
+    if form == "euroc":
+        return format_euroc(trajectory)
+    if form == "kitti":
+        return format_kitti(trajectory.T_world_frame)
+    raise InputError(f"no form of trajectory '{form}'. Known: {', '.join(TRAJECTORY_FORMS)}")
+
 
 NOTES, PHOTOMETRIC, CHAIN, IMU_FILE = "NOTES.txt", "photometric", "camchain.yaml", "imu.yaml"
 TOLD = (
@@ -40,11 +71,11 @@ def _as_recorded(rig: Rig) -> Views:
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class WritableLayout:
     """How a form is written: its pictures, its files, the topics it has; what it keeps besides pictures and truth."""
 
     views: Callable[[Rig], Views]
-    write: Callable[[Source, Views, Path], list[str]]
+    write: Callable[[ExportSource, Views, Path], list[str]]
     topics: tuple[str, str, str] = KALIBR_TOPICS
     keeps: tuple[str, ...] = ()
     keeps_all: bool = False
@@ -62,10 +93,10 @@ class Exported:
 
 
 LAYOUTS = {
-    "euroc": Layout(_as_recorded, write_euroc, keeps=("imu",)),
-    "kitti": Layout(rectified, write_kitti, needs_truth=True),
-    "tum": Layout(left_alone, write_tum, keeps=("imu", "depth")),
-    "ros2": Layout(
+    "euroc": WritableLayout(_as_recorded, write_euroc, keeps=("imu",)),
+    "kitti": WritableLayout(rectified, write_kitti, needs_truth=True),
+    "tum": WritableLayout(left_alone, write_tum, keeps=("imu", "depth")),
+    "ros2": WritableLayout(
         _as_recorded,
         write_ros2,
         (LEFT_IMAGE.name, RIGHT_IMAGE.name, IMU.name),
@@ -119,13 +150,13 @@ def _building(out: Path) -> Iterator[Path]:
         raise SequenceError(f"cannot write the export ({error.strerror or error}): {out}") from error
 
 
-def _stamps(source: Source, layout: Layout) -> Stamps:
+def _stamps(source: ExportSource, layout: WritableLayout) -> Stamps:
     """The stamps (N,) of the frames that are exported."""
     stamps = source.sequence.frame_stamps()
     return stamps[covered(source.truth, stamps)] if layout.needs_truth else stamps
 
 
-def _write_calibration(rig: Rig, layout: Layout, folder: Path) -> list[str]:
+def _write_calibration(rig: Rig, layout: WritableLayout, folder: Path) -> list[str]:
     """Kalibr's two files, and what to say of them."""
     *image_topics, imu_topic = layout.topics
     notes = kalibr.remarks(rig)
@@ -141,7 +172,7 @@ def _write_calibration(rig: Rig, layout: Layout, folder: Path) -> list[str]:
     return notes
 
 
-def _left_out(source: Source, layout: Layout) -> list[str]:
+def _left_out(source: ExportSource, layout: WritableLayout) -> list[str]:
     """Sentences on what a form has no place for."""
     if layout.keeps_all:
         return []
@@ -158,13 +189,13 @@ def _left_out(source: Source, layout: Layout) -> list[str]:
     return [sentence for is_there, sentence in found if is_there]
 
 
-def _told_truly(source: Source) -> bool:
+def _told_truly(source: ExportSource) -> bool:
     told, true = source.rig, source.true_rig
     cameras = all(told.camera(side) == true.camera(side) for side in told.sides)
     return cameras and all((told.T_body_camera(side) == true.T_body_camera(side)).all() for side in told.sides)
 
 
-def _test(source: Source, views: Views, stamps: Stamps, form: str, folder: Path) -> None:
+def _test(source: ExportSource, views: Views, stamps: Stamps, form: str, folder: Path) -> None:
     """Read the export back and send known points and the true path through it. Raises SequenceError."""
     found = read(folder, form=form)
     check_rig(f"the {form} folder, read back,", views.rig, found.rig)
@@ -183,7 +214,7 @@ def _chain_rig(path: Path, imu: ImuCalibration | None) -> Rig:
     return replace(rig, imu=replace(imu, T_body_imu=np.eye(4))) if imu else rig
 
 
-def _expected_path(source: Source, rig: Rig, stamps: Stamps, form: str) -> Trajectory | None:
+def _expected_path(source: ExportSource, rig: Rig, stamps: Stamps, form: str) -> Trajectory | None:
     """The left camera's path as the form should give it, cut to the pictures as every reader cuts it."""
     if source.truth is None:
         return None

@@ -1,25 +1,183 @@
-"""Calibration as Kalibr writes it: chains of cameras, and the IMU.
+"""Calibration files: Kalibr's camera chains and IMUs, and YAML values checked."""
 
-T_cam_imu takes points in the IMU's axes to the camera's, T_cn_cnm1 those of the camera before to this one's.
-Source: the Kalibr wiki's pages "Yaml formats" and "Supported models".
-"""
-
+import math
+import re
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError
+from ruamel.yaml.events import AliasEvent
 
-from vobench.dataset.lens import focal_camera
-from vobench.dataset.yaml_values import Values, read_yaml
+from vobench.dataset.picture import listed, read_text
+from vobench.dataset.recording import ReadOptions
 from vobench.errors import InputError, SequenceError
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera
-from vobench.geometry.lens import BrownConrady, KannalaBrandt
+from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Equirectangular, KannalaBrandt, Pinhole
 from vobench.geometry.rig import ImuCalibration, Rig
 from vobench.geometry.se3 import Array
-from vobench.geometry.sphere import DoubleSphere, Equirectangular
 
-RADTAN, EQUI, NO_BEND = "radtan", "equidistant", "none"
+MOST_CHARACTERS = 1 << 16  # calibrations have a thousand or two
+OPENCV_HEAD = re.compile(r"\A%YAML:1\.0[^\n]*")  # what OpenCV wants first, and no YAML allows
+MOST_BRACKETS = 500  # a camera has a dozen; the parser takes time by the square of their depth
+SKEW_TOLERANCE = 1e-3  # of a mount as people print it
+
+
+@dataclass(frozen=True, slots=True)
+class Values:
+    """A YAML file as a tree; keys lead to what it says."""
+
+    path: Path
+    tree: Any
+
+    def has(self, *keys: str) -> bool:
+        """Whether there is something at a place."""
+        return self._find(keys) is not None
+
+    def at(self, *keys: str) -> Any:
+        """What stands at a place. Raises InputError where nothing does."""
+        found = self._find(keys)
+        if found is None:
+            raise InputError(f"{self.path}: the key {'.'.join(keys)} is missing")
+        return found
+
+    def text(self, *keys: str) -> str:
+        """A text. Raises InputError."""
+        found = self.at(*keys)
+        if not isinstance(found, str):
+            raise self._wrong(keys, "text", found)
+        return found
+
+    def number(self, *keys: str) -> float:
+        """A finite number. Raises InputError."""
+        found = self.at(*keys)
+        if not _is_number(found):
+            raise self._wrong(keys, "a finite number", found)
+        return float(found)
+
+    def positive(self, *keys: str, or_zero: bool = False) -> float:
+        """A finite number above 0, or from 0 on. Raises InputError."""
+        found = self.number(*keys)
+        if found < 0 or not (found or or_zero):
+            raise self._wrong(keys, "0 or more" if or_zero else "above 0", found)
+        return found
+
+    def numbers(self, *keys: str) -> list[float]:
+        """A list of finite numbers. Raises InputError."""
+        found = self.at(*keys)
+        if not isinstance(found, list) or not all(map(_is_number, found)):
+            raise self._wrong(keys, "a list of finite numbers", found)
+        return [float(value) for value in found]
+
+    def size(self, *keys: str) -> tuple[int, int]:
+        """Width and height in pixels. Raises InputError."""
+        found = self.numbers(*keys)
+        if len(found) != 2 or any(value < 1 or value % 1 or value > 1e5 for value in found):
+            raise self._wrong(keys, "a width and a height in pixels", found)
+        return int(found[0]), int(found[1])
+
+    def transform(self, *keys: str) -> Array:
+        """A rigid transform (4, 4), as rows or as EuRoC's rows, cols and data; its rotation is made exact.
+
+        Raises InputError.
+        """
+        found = self.at(*keys)
+        flat = found.get("data") if isinstance(found, dict) else found
+        rows = flat if isinstance(flat, list) else []
+        cells = [cell for row in rows for cell in (row if isinstance(row, list) else [row])]
+        if len(cells) != 16 or not all(map(_is_number, cells)):
+            raise self._wrong(keys, "a 4 x 4 matrix of finite numbers", found)
+        T = np.array(cells, float).reshape(4, 4)
+        if not se3.is_rotation(T[:3, :3], tolerance=SKEW_TOLERANCE) or T[3].tolist() != [0, 0, 0, 1]:
+            raise self._wrong(keys, "a rigid transform with the last row 0 0 0 1", T.tolist())
+        return se3.transform(se3.nearest_rotation(T[:3, :3]), T[:3, 3])
+
+    def _find(self, keys: tuple[str, ...]) -> Any:
+        tree = self.tree
+        for key in keys:
+            tree = tree.get(key) if isinstance(tree, dict) else None
+        return tree
+
+    def _wrong(self, keys: tuple[str, ...], wanted: str, found: Any) -> InputError:
+        return InputError(f"{self.path}: {'.'.join(keys)} should be {wanted}, but is {_short(found)}")
+
+
+def read_yaml(path: Path) -> Values:
+    """A YAML 1.2 file with keys and values. Raises InputError, with line and column where there are some."""
+    text = OPENCV_HEAD.sub("", read_text(path), count=1)
+    if len(text) > MOST_CHARACTERS:
+        raise InputError(f"{len(text)} characters are no calibration (at most {MOST_CHARACTERS}): {path}")
+    if text.count("[") + text.count("{") > MOST_BRACKETS:
+        raise InputError(f"{path}: no YAML of a calibration has more than {MOST_BRACKETS} brackets")
+    try:
+        _refuse_aliases(text, path)
+        tree = YAML(typ="safe", pure=True).load(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark
+        place = f"{path}:{mark.line + 1}:{mark.column + 1}" if mark else str(path)
+        raise InputError(f"{place}: no YAML: {_one_line(error.problem or error)}") from None
+    except InputError:
+        raise
+    except Exception as error:  # odd text makes the parser raise errors of many kinds
+        raise InputError(f"{path}: no YAML: {type(error).__name__} {_one_line(error)}") from None
+    if not isinstance(tree, dict):
+        raise InputError(f"{path}: should be keys with values, but is {_short(tree)}")
+    return Values(path, tree)
+
+
+def _refuse_aliases(text: str, path: Path) -> None:
+    """No calibration has an alias, and a few nested ones stand for more than fits in memory."""
+    for event in YAML(typ="safe", pure=True).parse(text):
+        if isinstance(event, AliasEvent):
+            raise InputError(f"{path}:{event.start_mark.line + 1}: an alias (*{event.anchor}) has no place here")
+
+
+def _is_number(value: Any) -> bool:
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return abs(value) < 1e300 and math.isfinite(value)
+
+
+def _one_line(error: object) -> str:
+    return " ".join(str(error).split())[:200]
+
+
+def _short(value: Any) -> str:
+    shown = "nothing" if value is None else repr(value)
+    return shown if len(shown) <= 120 else f"{shown[:117]}..."
+
+
+RADTAN = ("radtan", "radial-tangential", "plumb_bob", "rational_polynomial")
+EQUIDISTANT = ("equidistant", "equi", "fisheye", "kannala_brandt")
+NONE = ("none", "")
+
+
+def focal_camera(
+    size_px: tuple[int, int], focal_px: list[float], model: str, coefficients: list[float], *, place: str
+) -> Camera:
+    """The camera of fx, fy, cx, cy, a distortion model by any of its names and its coefficients.
+
+    Raises InputError where that is no lens known here; `place` is the file or topic that says so.
+    """
+    if len(focal_px) != 4 or not all(value > 0 for value in focal_px[:2]):
+        raise InputError(f"{place}: a camera should have fx, fy, cx, cy with fx and fy above 0, but has {focal_px}")
+    name = model.strip().lower()
+    if name in (*NONE, *RADTAN) and not any(coefficients):
+        return Pinhole(*size_px, *focal_px)
+    if name in RADTAN and len(coefficients) in (4, 5, 8, 12, 14) and not any(coefficients[5:]):
+        return BrownConrady(*size_px, *focal_px, *coefficients[:5])
+    if name in EQUIDISTANT and len(coefficients) == 4:
+        return KannalaBrandt(*size_px, *focal_px, *coefficients)
+    raise InputError(
+        f"{place}: no lens here has the distortion model '{model}' with the coefficients {coefficients}. "
+        f"Known: radtan or plumb_bob (4 or 5), equidistant (4), none (0)"
+    )
+
+
+KALIBR_RADTAN, EQUI, NO_BEND = "radtan", "equidistant", "none"
 PINHOLE, SPHERES = "pinhole", "ds"
 RADTAN_TERMS = ("k1", "k2", "p1", "p2")
 ALL_AROUND = "neither Kalibr nor EuRoC has words for a camera that sees all around (ros2 keeps it)"
@@ -66,9 +224,9 @@ def intrinsics(camera: Camera) -> tuple[str, Array, str, Array]:
             bend = EQUI, np.array([getattr(camera, name) for name in camera.coefficients])
         case BrownConrady():
             names = camera.coefficients if camera.k3 else RADTAN_TERMS
-            bend = RADTAN, np.array([getattr(camera, name) for name in names])
+            bend = KALIBR_RADTAN, np.array([getattr(camera, name) for name in names])
         case _:
-            bend = RADTAN, np.zeros(len(RADTAN_TERMS))  # "none" is a word that OpenVINS lacks
+            bend = KALIBR_RADTAN, np.zeros(len(RADTAN_TERMS))  # "none" is a word that OpenVINS lacks
     return PINHOLE, camera.K[[0, 1, 0, 1], [0, 1, 2, 2]], *bend
 
 
@@ -152,3 +310,56 @@ def _camera(chain: Values, name: str) -> Camera:
         raise InputError(f"{chain.path}: {name} is {model} with {len(linear)} numbers, and {known} are known here")
     d = chain.numbers(name, "distortion_coeffs")
     return focal_camera(size, linear, chain.text(name, "distortion_model"), d, place=f"{chain.path}: {name}")
+
+
+CHAIN_NAME = re.compile(r".*camchain.*\.ya?ml")
+IMU_NAMES = ("imu.yaml", "imu_config.yaml", "imu0.yaml")
+BESIDE = (".", "dso", "mav0")  # folders of a dataset that Kalibr's files may lie in
+
+
+def find_chain(folder: Path, options: ReadOptions) -> Path | None:
+    """The camera chain that the options name, or else the only one that lies in a dataset's folder."""
+    if options.calibration is not None:
+        return options.calibration
+    found = [folder / at / name for at in BESIDE for name in listed(folder / at) if CHAIN_NAME.fullmatch(name)]
+    if len(found) > 1:
+        raise InputError(f"{len(found)} calibrations; name the one to use: {', '.join(map(str, found))}")
+    return found[0] if found else None
+
+
+def find_imu(folder: Path, options: ReadOptions) -> Path | None:
+    """Kalibr's imu.yaml that the options name, or that lies in a dataset's folder."""
+    if options.imu is not None:
+        return options.imu
+    return next((folder / at / name for at in BESIDE for name in IMU_NAMES if (folder / at / name).is_file()), None)
+
+
+def chain_rig(path: Path, cameras: int, body: Literal["imu", "left"]) -> tuple[Rig, tuple[str, ...]]:
+    """The first one or two cameras of Kalibr's chain on a body that is the IMU or the left camera, and what to note.
+
+    Raises InputError where the chain has fewer cameras, or does not say where the IMU is.
+    """
+    values = read_yaml(path)
+    if cameras > 1 and not values.has("cam1"):
+        raise InputError(f"a recording with two cameras needs cam1, which is missing in {path}")
+    if body == "imu" and not values.has("cam0", "T_cam_imu"):
+        raise InputError(f"the recording is about its IMU, so the chain should say cam0: T_cam_imu: {path}")
+    rig = read_camchain(path)
+    if cameras == 1:
+        rig = replace(rig, right=None, T_body_right=None)
+    elif rig.right and body == "left":
+        rig = replace(rig, T_body_right=rig.T_left_right)
+    if body == "left":
+        rig = replace(rig, T_body_left=np.eye(4))
+    names = [name for name in ("cam0", "cam1")[:cameras] if values.has(name, "timeshift_cam_imu")]
+    shifts_s = [(name, values.number(name, "timeshift_cam_imu")) for name in names]
+    return rig, tuple(
+        f"By the calibration the clock of {name} is {shift_s:g} s off the IMU's; stamps were left as they are."
+        for name, shift_s in shifts_s
+        if shift_s
+    )
+
+
+def no_calibration(looked_for: Path) -> InputError:
+    """The complaint that there is none, with the file that was looked for."""
+    return InputError(f"the calibration is missing; name a camchain.yaml of Kalibr's or put it here: {looked_for}")

@@ -1,25 +1,30 @@
-"""Recordings in the layout of KITTI's odometry benchmark: rectified pinholes, one pose a picture."""
+"""The layout of KITTI's odometry benchmark, read and written."""
 
 from pathlib import Path
 
 import numpy as np
 
-from vobench.dataset.assemble import assemble
-from vobench.dataset.calibration import chain_rig, no_calibration
-from vobench.dataset.files import read_text, unread
-from vobench.dataset.options import Options
-from vobench.dataset.picture_list import in_step, numbered, shots_of
-from vobench.dataset.recording import Recording
-from vobench.dataset.stream import PictureStream
-from vobench.dataset.truth import read_truth_file
+from vobench.dataset.kalibr import chain_rig, no_calibration
+from vobench.dataset.picture import read_text, unread
+from vobench.dataset.recording import (
+    PictureStream,
+    ReadOptions,
+    Recording,
+    assemble,
+    in_step,
+    numbered,
+    read_truth_file,
+    recorded_frames,
+)
+from vobench.dataset.source import ExportSource, Views, png_frames
 from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
+from vobench.geometry.rectify import projection
 from vobench.geometry.rig import Rig, looking
 from vobench.geometry.se3 import Array
-from vobench.trajectory.table import content, read_table
-from vobench.trajectory.trajectory import Stamps, Trajectory
-from vobench.trajectory.unstamped import parse_times
+from vobench.trajectory.formats import content, format_kitti, format_times, parse_times, read_table
+from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
 PAIRS = (("image_0", "image_1"), ("image_2", "image_3"))  # grey, colour
 CALIBRATION, TIMES, POSES = "calib.txt", "times.txt", "poses.txt"
@@ -29,13 +34,13 @@ SKEW_TOLERANCE = 1e-6  # of KITTI's seven digits: K's lower triangle is zero
 Notes = tuple[str, ...]
 
 
-def read_kitti(folder: Path, options: Options) -> Recording:
+def read_kitti(folder: Path, options: ReadOptions) -> Recording:
     """A folder such as sequences/00; the body is the camera of image_0, its axes ahead, left, up. Raises InputError."""
     names, pair_notes = _pair(folder)
     eyes = [numbered(folder / name) for name in names]
     in_step(eyes[0], eyes[1] if len(eyes) > 1 else None)
     t_ns = _times(folder / TIMES, len(eyes[0]), folder / names[0])
-    stream = PictureStream.open(shots_of(t_ns, *eyes))
+    stream = PictureStream.open(recorded_frames(t_ns, *eyes))
     rig, calibration, lens_notes = _rig(folder, names, stream.size_px, options)
     truth, truth_notes = _truth(folder, t_ns, options)
     notes = ("The body is the left grey camera, x ahead, y left, z up.", *pair_notes, *lens_notes, *truth_notes)
@@ -65,7 +70,9 @@ def _times(path: Path, count: int, pictures: Path) -> Stamps:
     return t_ns
 
 
-def _rig(folder: Path, names: tuple[str, ...], size_px: tuple[int, int], options: Options) -> tuple[Rig, Path, Notes]:
+def _rig(
+    folder: Path, names: tuple[str, ...], size_px: tuple[int, int], options: ReadOptions
+) -> tuple[Rig, Path, Notes]:
     """The cameras by calib.txt, which knows no picture's size, or by Kalibr's chain; and which file that was."""
     if options.calibration is not None:
         rig, notes = chain_rig(options.calibration, len(names), "left")
@@ -117,7 +124,7 @@ def _other_matrices(matrices: dict[str, Array], used: list[str]) -> Notes:
     return (f"{', '.join(others)} of {CALIBRATION} were not used.",) if others else ()
 
 
-def _truth(folder: Path, t_ns: Stamps, options: Options) -> tuple[Trajectory | None, Notes]:
+def _truth(folder: Path, t_ns: Stamps, options: ReadOptions) -> tuple[Trajectory | None, Notes]:
     """The poses beside the pictures or where KITTI has them, one a picture."""
     folder = folder.absolute()
     named = f"{folder.name}.txt"
@@ -132,3 +139,73 @@ def _truth(folder: Path, t_ns: Stamps, options: Options) -> tuple[Trajectory | N
         "x right, y down, z ahead to x ahead, y left, z up.",
         *notes,
     )
+
+
+def write_kitti(source: ExportSource, views: Views, folder: Path) -> list[str]:
+    """Fill `folder` and say what was converted."""
+    stamps = source.sequence.frame_stamps()
+    kept = covered(source.truth, stamps)
+    for index in range(len(views.rig.sides)):
+        (folder / f"image_{index}").mkdir()
+    frames = (frame for frame in png_frames(source.sequence, views) if kept[frame.index])
+    for number, frame in enumerate(frames):
+        for index, picture in enumerate(frame.pictures.values()):
+            (folder / f"image_{index}" / f"{number:06d}.png").write_bytes(picture)
+    (folder / "calib.txt").write_text(_calibration(views.rig), encoding="utf-8")
+    (folder / "times.txt").write_text(format_times(stamps[kept]), encoding="utf-8")
+    notes = _picture_notes(source, views)
+    if not kept.all():
+        notes.append(f"{np.sum(~kept)} of {len(kept)} frames lie before or after the truth and were left out.")
+    return notes + _write_poses(source, views, stamps[kept], folder)
+
+
+def covered(truth: Trajectory | None, stamps: Stamps) -> np.ndarray:
+    """Which frames (N,) the layout can have: those within the truth's time; all where there is no truth for any."""
+    everything = np.ones(len(stamps), bool)
+    if truth is None:
+        return everything
+    within = (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])
+    return within if within.any() else everything
+
+
+def kitti_path(truth: Trajectory, rig: Rig, stamps: Stamps) -> Trajectory | None:
+    """The left camera's poses at some stamps, since the first of them, as KITTI counts; None outside the truth."""
+    if stamps[-1] < truth.t_ns[0] or stamps[0] > truth.t_ns[-1]:
+        return None
+    T_world_left = poses_at(truth, stamps) @ rig.T_body_left
+    return Trajectory(stamps, se3.inverse(T_world_left[:1]) @ T_world_left)
+
+
+def _calibration(rig: Rig) -> str:
+    """P0 and P1, each (3, 4) in a row: what sends points in the left camera's axes to pixels."""
+    shifts_m = [0.0, rig.baseline_m] if rig.right else [0.0]
+    matrices = [projection(rig.left.K, shift_m) for shift_m in shifts_m]
+    return "".join(f"P{index}: {_row(P)}\n" for index, P in enumerate(matrices))
+
+
+def _row(values: Array) -> str:
+    return " ".join(repr(value + 0.0) for value in values.ravel().tolist())  # no -0.0
+
+
+def _picture_notes(source: ExportSource, views: Views) -> list[str]:
+    if views.source_px is None:
+        return ["The pair is rectified as it was recorded, so its pixels are unchanged."] if views.rig.right else []
+    dark = max(views.dark_share(side, source.rig.camera(side)) for side in views.rig.sides)
+    rest = f"; up to {dark:.1%} of a picture shows nothing and is black" if dark else ""
+    return [f"KITTI means rectified pictures: these were resampled, linear between pixels, which loses detail{rest}."]
+
+
+def _write_poses(source: ExportSource, views: Views, stamps: Stamps, folder: Path) -> list[str]:
+    truth = source.truth
+    if truth is None:
+        return ["No truth was recorded, so there is no poses.txt."]
+    path = kitti_path(truth, views.rig, stamps)
+    if path is None:
+        return ["The truth shares no time with the pictures, so there is no poses.txt."]
+    (folder / "poses.txt").write_text(format_kitti(path.T_world_frame), encoding="utf-8")
+    notes = ["The poses are those of the left camera since the first picture, as KITTI counts: no world, no gravity."]
+    between = int(np.sum(~np.isin(stamps, truth.t_ns)))
+    if between:
+        gap_ms = np.diff(truth.t_ns).max() / 1e6
+        notes.append(f"{between} poses lie between true ones, which are at most {gap_ms:.3g} ms apart: interpolated.")
+    return notes

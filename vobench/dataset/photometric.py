@@ -12,17 +12,15 @@ from typing import Any
 import numpy as np
 
 from vobench.dataset import kalibr
-from vobench.dataset.source import Source
-from vobench.dataset.views import Views
+from vobench.dataset.source import ExportSource, Views
 from vobench.errors import InputError
-from vobench.geometry.camera import Camera, Pinhole
-from vobench.geometry.lens import BrownConrady, KannalaBrandt
+from vobench.geometry.camera import BrownConrady, Camera, KannalaBrandt, Pinhole
 from vobench.geometry.se3 import Array
-from vobench.sensor.camera import CAMERAS
+from vobench.sensor.image_sensor import CAMERAS
 from vobench.sensor.lens import vignetting
 from vobench.sensor.response import FULL_SCALE_DN, RESPONSES, Power, Response, Table, linear_of_grey
 from vobench.sequence.picture import write_png
-from vobench.trajectory.text import seconds
+from vobench.trajectory.formats import seconds
 from vobench.trajectory.trajectory import Stamps
 
 WHITE_16 = 65535
@@ -79,7 +77,7 @@ def response_of(said: str | float | list[float]) -> Response:
     return Table(tuple(map(float, said))) if isinstance(said, list) else Power(float(said))
 
 
-def write_photometric(source: Source, views: Views, stamps: Stamps, folder: Path) -> list[str]:
+def write_photometric(source: ExportSource, views: Views, stamps: Stamps, folder: Path) -> list[str]:
     """Fill `folder` with cam0 and cam1, and say what is not known; `stamps` are those of the exported frames."""
     photometry = photometry_of(source.case)
     times, notes = _times(source, stamps)
@@ -133,7 +131,7 @@ def _lines(model: str, values: list[float], fit: str, width: int, height: int) -
     return f"{model} {' '.join(map(repr, values))}\n{width} {height}\n{fit}\n{width} {height}\n"
 
 
-def _times(source: Source, stamps: Stamps) -> tuple[str, list[str]]:
+def _times(source: ExportSource, stamps: Stamps) -> tuple[str, list[str]]:
     """times.txt of some frames, and what to say of it."""
     exposed_ns, settings = source.sequence.exposures()
     row_of = dict(zip(exposed_ns.tolist(), settings.tolist(), strict=True))

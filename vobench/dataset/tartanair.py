@@ -5,14 +5,18 @@ from pathlib import Path
 
 import numpy as np
 
-from vobench.dataset.assemble import assemble
-from vobench.dataset.calibration import chain_rig
-from vobench.dataset.files import unread
-from vobench.dataset.options import Options
-from vobench.dataset.picture_list import in_step, numbered, shots_of
-from vobench.dataset.recording import Recording
-from vobench.dataset.stream import PictureStream
-from vobench.dataset.truth import read_truth_file
+from vobench.dataset.kalibr import chain_rig
+from vobench.dataset.picture import unread
+from vobench.dataset.recording import (
+    PictureStream,
+    ReadOptions,
+    Recording,
+    assemble,
+    in_step,
+    numbered,
+    read_truth_file,
+    recorded_frames,
+)
 from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
@@ -43,7 +47,7 @@ LAYOUTS = (
 )
 
 
-def read_tartanair(folder: Path, options: Options) -> Recording:
+def read_tartanair(folder: Path, options: ReadOptions) -> Recording:
     """A folder such as P000; the body is the left camera, its axes ahead, left, up. Raises InputError."""
     names = next((names for names in LAYOUTS if (folder / names.left).is_dir()), None)
     if names is None:
@@ -54,7 +58,7 @@ def read_tartanair(folder: Path, options: Options) -> Recording:
     if not 0 < rate_hz <= MOST_HZ:
         raise InputError(f"rate_hz should be above 0 and at most {MOST_HZ:g}, got {rate_hz:g}")
     t_ns = np.array([round(index * 1e9 / rate_hz) for index in range(len(eyes[0]))], np.int64)
-    stream = PictureStream.open(shots_of(t_ns, *eyes))
+    stream = PictureStream.open(recorded_frames(t_ns, *eyes))
     rig, calibration, lens_notes = _rig(folder, stream.size_px, len(eyes), options)
     truth, truth_notes = _truth(folder / names.poses, t_ns, options)
     notes = [f"There are no stamps: pictures were taken to come at {rate_hz:g} Hz from 0.", *lens_notes, *truth_notes]
@@ -64,7 +68,7 @@ def read_tartanair(folder: Path, options: Options) -> Recording:
     return assemble("tartanair", rig, stream, t_ns, truth=truth, notes=notes, calibration=calibration)
 
 
-def _rig(folder: Path, size_px: tuple[int, int], count: int, options: Options) -> tuple[Rig, str, Notes]:
+def _rig(folder: Path, size_px: tuple[int, int], count: int, options: ReadOptions) -> tuple[Rig, str, Notes]:
     """The simulator's camera, or that of Kalibr's chain, on a body with x ahead, y left, z up."""
     T_body_left = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))
     if options.calibration is not None:
@@ -85,7 +89,7 @@ def _rig(folder: Path, size_px: tuple[int, int], count: int, options: Options) -
     return rig, "TartanAir's own", (f"{known}, baseline {BASELINE_M:g} m.",)
 
 
-def _truth(beside: Path, t_ns: Stamps, options: Options) -> tuple[Trajectory | None, Notes]:
+def _truth(beside: Path, t_ns: Stamps, options: ReadOptions) -> tuple[Trajectory | None, Notes]:
     """The path of the left camera, its axes and the world's turned from north-east-down to z up."""
     path = options.truth or beside
     if options.truth is None and not path.exists():

@@ -1,15 +1,78 @@
-"""What a camera is: directions to pixels and back. OpenCV axes (x right, y down, z forward), pixel centres at integers.
+"""Camera models: pinhole, Brown-Conrady, Kannala-Brandt, double sphere, equirectangular."""
 
-(0, 0) is the centre of the top-left pixel, for every model. The other models are in `lens` and `sphere`.
-"""
-
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vobench.geometry.se3 import Array
+
+TOLERANCE = 1e-13  # of a focal length: 1e-10 px
+KNOTS = 1025
+MOST_STEPS = 60
+
+Plane = Callable[[Array, Array], tuple[Array, Array, Array, Array, Array]]
+
+
+def rising_root(g: Callable[[Array], Array], slope: Callable[[Array], Array], target: Array, limit: float) -> Array:
+    """The x (N,) in [0, limit] with g(x) = target, for a g that rises from g(0) = 0; NaN where there is none.
+
+    A table brackets each root, and a Newton step that leaves its bracket becomes a bisection.
+    """
+    knots = np.linspace(0.0, limit, KNOTS)
+    values = g(knots)
+    reached = (target >= 0) & (target <= values[-1])
+    target = np.where(reached, target, 0.0)
+    above = np.searchsorted(values, target).clip(1, KNOTS - 1)
+    low, high = knots[above - 1], knots[above]
+    x = np.interp(target, values, knots)
+    for _ in range(MOST_STEPS):
+        error = g(x) - target
+        if np.abs(error).max(initial=0.0) <= TOLERANCE:
+            break
+        low, high = np.where(error > 0, low, x), np.where(error > 0, x, high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = x - error / slope(x)
+        x = np.where((step >= low) & (step <= high), step, (low + high) / 2)
+    return np.where(reached, x, np.nan)
+
+
+def plane_root(f: Plane, target: tuple[Array, Array], start: tuple[Array, Array], limit: float) -> Array:
+    """The places (2, N) within `limit` of the origin that f sends to the target; NaN where there are none.
+
+    `f` gives its value and the distinct entries xx, xy, yy of its symmetric Jacobian, which is positive
+    within the limit. So every Newton step points downhill, and is halved until it gets there.
+    """
+    x, goal = np.stack(start), np.stack(target)
+    state, share, left = _missed(f, x, goal), np.ones(x.shape[1]), np.arange(x.shape[1])
+    enough = TOLERANCE * np.maximum(1.0, np.hypot(*goal))
+    for _ in range(MOST_STEPS):
+        left = left[state[0, left] > enough[left]]
+        if not len(left):
+            break
+        trial = x[:, left] - share[left] * _newton_step(state[:, left])
+        trial_state = _missed(f, trial, goal[:, left])
+        better = (trial_state[0] < state[0, left]) & (np.hypot(*trial) <= limit)
+        x[:, left[better]], state[:, left[better]] = trial[:, better], trial_state[:, better]
+        share[left] = np.where(better, 1.0, share[left] / 2)
+    return np.where(state[0] <= enough, x, np.nan)
+
+
+def _missed(f: Plane, x: Array, goal: Array) -> Array:
+    """How far, right and down f misses the goal, and its Jacobian's xx, xy, yy: rows of (6, N)."""
+    u, v, *jacobian = f(*x)
+    u, v = u - goal[0], v - goal[1]
+    return np.stack([np.hypot(u, v), u, v, *jacobian])
+
+
+def _newton_step(state: Array) -> Array:
+    _, u, v, xx, xy, yy = state
+    step: Array = np.stack([yy * u - xy * v, xx * v - xy * u]) / (xx * yy - xy * xy)
+    return step
+
 
 DepthAlong = Literal["axis", "ray"]
 
@@ -139,3 +202,268 @@ def unit(vectors: Array) -> Array:
     """Vectors (..., n) with their length taken out."""
     directions: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
     return directions
+
+
+@dataclass(frozen=True, slots=True)
+class BrownConrady:
+    """Radial and tangential distortion (ROS: plumb_bob, Kalibr: radtan). Source: Brown (1966), OpenCV.
+
+    Beyond `fold_radius` the polynomials turn back and far directions would land on near ones: no pixel.
+    """
+
+    depth_along: ClassVar[DepthAlong] = "axis"
+    coefficients: ClassVar[tuple[str, ...]] = ("k1", "k2", "p1", "p2", "k3")
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    k1: float
+    k2: float
+    p1: float = 0.0
+    p2: float = 0.0
+    k3: float = 0.0
+
+    @property
+    def K(self) -> Array:
+        """The (3, 3) camera matrix."""
+        return camera_matrix(self.fx_px, self.fy_px, self.cx_px, self.cy_px)
+
+    @property
+    def fold_radius(self) -> float:
+        """Radius on the plane z = 1 up to which the lens is one-to-one; infinite for most."""
+        return _fold_radius(self.k1, self.k2, self.k3, float(np.hypot(self.p1, self.p2)))
+
+    def project(self, points_camera: ArrayLike) -> Array:
+        """Pixels (..., 2) of points (..., 3); NaN behind the camera and beyond the fold."""
+        x, y = on_plane(points_camera)
+        seen = x * x + y * y < self.fold_radius**2
+        x, y = np.where(seen, x, np.nan), np.where(seen, y, np.nan)
+        return to_pixels(self, *self._bent(x, y)[:2])
+
+    def rays(self, uv_px: ArrayLike) -> Array:
+        """Unit directions (..., 3) through pixels (..., 2); NaN for pixels beyond the fold."""
+        x, y = from_pixels(self, uv_px)
+        x, y = self._straight(x.ravel(), y.ravel()).reshape(2, *x.shape)
+        return unit(np.stack([x, y, np.ones_like(x)], -1))
+
+    def pixel_grid(self) -> Array:
+        """Centres (H, W, 2) of all pixels."""
+        return pixel_centres(self.width_px, self.height_px)
+
+    def _bent(self, x: Array, y: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Where the lens sends x and y, and the entries xx, xy, yy of the Jacobian, which is symmetric."""
+        k1, k2, k3, p1, p2 = self.k1, self.k2, self.k3, self.p1, self.p2
+        s = x * x + y * y
+        radial = 1 + s * (k1 + s * (k2 + s * k3))
+        slope = 2 * (k1 + s * (2 * k2 + s * 3 * k3))
+        u = x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x)
+        v = y * radial + 2 * p2 * x * y + p1 * (s + 2 * y * y)
+        xx = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
+        yy = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
+        return u, v, xx, x * y * slope + 2 * (p1 * x + p2 * y), yy
+
+    def _straight(self, u: Array, v: Array) -> Array:
+        """The places (2, N) that the lens sends to u and v; NaN beyond the fold."""
+
+        def radial(r: Array) -> Array:
+            return r * (1 + r**2 * (self.k1 + r**2 * (self.k2 + r**2 * self.k3)))
+
+        def radial_slope(r: Array) -> Array:
+            return 1 + r**2 * (3 * self.k1 + r**2 * (5 * self.k2 + r**2 * 7 * self.k3))
+
+        far = np.hypot(u, v)
+        limit = _reach(radial, far.max(initial=1.0, where=np.isfinite(far)), self.fold_radius)
+        # Tangential terms move a point by at most 3 |p| s, so what is farther out has no origin.
+        edge = float(radial(np.array(limit))) * (1 - 1e-12)
+        possible = far <= edge + 3 * np.hypot(self.p1, self.p2) * limit**2
+        u, v, far = u[possible], v[possible], far[possible]
+        scale = rising_root(radial, radial_slope, np.minimum(far, edge), limit) / np.maximum(far, 1e-300)
+        out = np.full((2, len(possible)), np.nan)
+        out[:, possible] = plane_root(self._bent, (u, v), (u * scale, v * scale), limit)
+        return out
+
+
+@dataclass(frozen=True, slots=True)
+class KannalaBrandt:
+    """A fisheye by a polynomial in the angle (ROS: equidistant, Kalibr: equi). Source: Kannala and Brandt (2006).
+
+    Works on directions, so it sees past 180°, up to `fold_rad` from the axis.
+    """
+
+    depth_along: ClassVar[DepthAlong] = "axis"
+    coefficients: ClassVar[tuple[str, ...]] = ("k1", "k2", "k3", "k4")
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    k1: float
+    k2: float
+    k3: float
+    k4: float
+
+    @property
+    def K(self) -> Array:
+        """The (3, 3) matrix of the pinhole that the lens is like about its axis."""
+        return camera_matrix(self.fx_px, self.fy_px, self.cx_px, self.cy_px)
+
+    @property
+    def fold_rad(self) -> float:
+        """Angle from the axis up to which the lens is one-to-one; at most 180°."""
+        return min(np.pi, _first_root((1, 0, 3 * self.k1, 0, 5 * self.k2, 0, 7 * self.k3, 0, 9 * self.k4)))
+
+    def project(self, points_camera: ArrayLike) -> Array:
+        """Pixels (..., 2) of points (..., 3); NaN beyond the fold, straight behind and at the centre."""
+        x, y, z = np.moveaxis(np.asarray(points_camera, float), -1, 0)
+        aside = np.hypot(x, y)
+        theta = np.arctan2(aside, z)
+        seen = (theta < self.fold_rad) & ((aside > 0) | (z > 0))
+        scale = np.where(seen, self._bent(theta), np.nan) / np.where(aside > 0, aside, 1.0)
+        return to_pixels(self, x * scale, y * scale)
+
+    def rays(self, uv_px: ArrayLike) -> Array:
+        """Unit directions (..., 3) through pixels (..., 2); NaN for pixels beyond the fold."""
+        x, y = from_pixels(self, uv_px)
+        far = np.hypot(x, y)
+        theta = rising_root(self._bent, self._slope, far.ravel(), self.fold_rad).reshape(far.shape)
+        aside = np.sin(theta) / np.where(far > 0, far, 1.0)
+        return np.stack([x * aside, y * aside, np.cos(theta)], -1)
+
+    def pixel_grid(self) -> Array:
+        """Centres (H, W, 2) of all pixels."""
+        return pixel_centres(self.width_px, self.height_px)
+
+    def _bent(self, theta: Array) -> Array:
+        t = theta * theta
+        return theta * (1 + t * (self.k1 + t * (self.k2 + t * (self.k3 + t * self.k4))))
+
+    def _slope(self, theta: Array) -> Array:
+        t = theta * theta
+        return 1 + t * (3 * self.k1 + t * (5 * self.k2 + t * (7 * self.k3 + t * 9 * self.k4)))
+
+
+@cache
+def _fold_radius(k1: float, k2: float, k3: float, p: float) -> float:
+    """Where the smallest eigenvalue of the Jacobian may first reach zero.
+
+    Along the radius the radial part has d(r R)/dr, across it R. At radius r the tangential part has
+    eigenvalues within 6 p r. While both stay above that the symmetric Jacobian is positive on a disc,
+    which is convex, so the lens is one-to-one there.
+    """
+    along = _first_root((1, -6 * p, 3 * k1, 0, 5 * k2, 0, 7 * k3))
+    across = _first_root((1, -6 * p, k1, 0, k2, 0, k3))
+    return min(along, across)
+
+
+@cache
+def _first_root(coefficients: tuple[float, ...]) -> float:
+    """The smallest positive root of a polynomial, lowest power first; infinite without one."""
+    roots = np.roots(np.trim_zeros(np.array(coefficients[::-1], float), "f"))
+    positive = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0)]
+    return float(positive.min(initial=np.inf))
+
+
+def _reach(g: Callable[[Array], Array], farthest: float, limit: float) -> float:
+    """The limit, or a smaller radius that g sends beyond the farthest."""
+    radius = 1.0
+    while radius < limit and g(np.array(radius)) < farthest:
+        radius *= 2
+    return min(radius, limit)
+
+
+@dataclass(frozen=True, slots=True)
+class DoubleSphere:
+    """A fisheye with an inverse in closed form. Source: Usenko, Demmel and Cremers (2018), equations 40 to 46.
+
+    |xi| < 1 shifts the second sphere, 0 <= alpha < 1 the pinhole behind it.
+    """
+
+    depth_along: ClassVar[DepthAlong] = "axis"
+    coefficients: ClassVar[tuple[str, ...]] = ("xi", "alpha")
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    xi: float
+    alpha: float
+
+    @property
+    def K(self) -> Array:
+        """The (3, 3) matrix of the pinhole that the lens is like about its axis."""
+        magnified = 1 + self.xi
+        return camera_matrix(self.fx_px / magnified, self.fy_px / magnified, self.cx_px, self.cy_px)
+
+    @property
+    def least_cosine(self) -> float:
+        """Cosine of the angle on the second sphere at which the lens folds over or its picture ends at infinity."""
+        larger, smaller = max(self.alpha, 1 - self.alpha), min(self.alpha, 1 - self.alpha)
+        return -smaller / larger
+
+    def project(self, points_camera: ArrayLike) -> Array:
+        """Pixels (..., 2) of points (..., 3); NaN outside the cone that the lens sees."""
+        x, y, z = np.moveaxis(np.asarray(points_camera, float), -1, 0)
+        # The paper states its bound in z; on the second sphere it is exact, and short.
+        z = self.xi * np.sqrt(x * x + y * y + z * z) + z
+        d = np.sqrt(x * x + y * y + z * z)
+        seen = z > self.least_cosine * d
+        scale = np.where(seen, self.alpha * d + (1 - self.alpha) * z, np.nan)
+        return to_pixels(self, x / scale, y / scale)
+
+    def rays(self, uv_px: ArrayLike) -> Array:
+        """Unit directions (..., 3) through pixels (..., 2); NaN for pixels beyond the fold."""
+        x, y = from_pixels(self, uv_px)
+        s = x * x + y * y
+        under_root = 1 - (2 * self.alpha - 1) * s
+        root = np.sqrt(np.where(under_root > 0, under_root, np.nan))
+        z = (1 - self.alpha**2 * s) / (self.alpha * root + 1 - self.alpha)
+        scale = (z * self.xi + np.sqrt(z * z + (1 - self.xi**2) * s)) / (z * z + s)
+        return unit(np.stack([scale * x, scale * y, scale * z - self.xi], -1))
+
+    def pixel_grid(self) -> Array:
+        """Centres (H, W, 2) of all pixels."""
+        return pixel_centres(self.width_px, self.height_px)
+
+
+@dataclass(frozen=True, slots=True)
+class Equirectangular:
+    """All directions in one picture: columns are longitudes, rows latitudes, ahead is in the middle.
+
+    Its depth is the distance along the ray, since z would be negative for half of what it sees.
+    """
+
+    depth_along: ClassVar[DepthAlong] = "ray"
+    coefficients: ClassVar[tuple[str, ...]] = ()
+    width_px: int
+    height_px: int
+
+    @property
+    def K(self) -> Array:
+        """The (3, 3) matrix of the pinhole that the picture is like about its middle."""
+        fx, fy = self.width_px / (2 * np.pi), self.height_px / np.pi
+        return camera_matrix(fx, fy, (self.width_px - 1) / 2, (self.height_px - 1) / 2)
+
+    def project(self, points_camera: ArrayLike) -> Array:
+        """Pixels (..., 2) of points (..., 3); NaN for the camera's own place only."""
+        x, y, z = np.moveaxis(np.asarray(points_camera, float), -1, 0)
+        somewhere = np.where((x != 0) | (y != 0) | (z != 0), 1.0, np.nan)
+        longitude, latitude = np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))
+        (fx, _, cx), (_, fy, cy), _ = self.K
+        return np.stack([fx * longitude + cx, fy * latitude + cy], -1) * somewhere[..., None]
+
+    def rays(self, uv_px: ArrayLike) -> Array:
+        """Unit directions (..., 3) through pixels (..., 2); NaN for what lies off the picture's sphere."""
+        (fx, _, cx), (_, fy, cy), _ = self.K
+        u, v = np.moveaxis(np.asarray(uv_px, float), -1, 0)
+        longitude, latitude = (u - cx) / fx, (v - cy) / fy
+        latitude = np.where((np.abs(longitude) <= np.pi) & (np.abs(latitude) <= np.pi / 2), latitude, np.nan)
+        across = np.cos(latitude)
+        return np.stack([across * np.sin(longitude), np.sin(latitude), across * np.cos(longitude)], -1)
+
+    def pixel_grid(self) -> Array:
+        """Centres (H, W, 2) of all pixels."""
+        return pixel_centres(self.width_px, self.height_px)

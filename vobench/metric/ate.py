@@ -1,20 +1,127 @@
-"""Absolute trajectory error: how far each aligned pose is from the truth."""
+"""Absolute trajectory error, and the errors between poses that all metrics are made of."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.metric.pose_error import (
-    MatrixErrors,
-    PoseErrors,
-    Rows,
-    angle_rad,
-    in_blocks,
-    matrix_norms,
-    roll_pitch_yaw_rad,
-)
+from vobench.metric.settings import Plane
+from vobench.trajectory.associate import Index
+
+Rows = tuple[Array, ...]
+BLOCK = 1 << 14  # poses worked on at once: their matrices stay in the processor's cache, and memory small
+
+
+@dataclass(frozen=True, slots=True)
+class PoseErrors:
+    """Translation errors (N,) in metres and rotation errors (N,) in radians, both non-negative."""
+
+    trans_m: Array
+    rot_rad: Array
+
+    def __len__(self) -> int:
+        return len(self.trans_m)
+
+
+@dataclass(frozen=True, slots=True)
+class MatrixErrors:
+    """Frobenius norms (N,) of an error's rotation less the identity, and of the whole (4, 4) less it."""
+
+    rot: Array
+    full: Array
+
+
+def angle_rad(R: Array) -> Array:
+    """Angles (...) of rotations (..., 3, 3) that text with few digits has left slightly skew.
+
+    One Newton step towards the nearest rotation first: KITTI's six digits leave R 2e-7 off
+    orthonormal, which alone would shift an angle by 3e-7 rad. Source: Higham (1986), eq. 3.6.
+    """
+    steps = 1.5 * np.eye(3) - 0.5 * np.swapaxes(R, -1, -2) @ R
+    return se3.rotation_angle(R @ steps)
+
+
+def matrix_norms(E: Array) -> Rows:
+    """Norms (N,) of errors (N, 4, 4) less the identity: the rotation's, and the whole's with its metres."""
+    squares = np.square(E - np.eye(4))
+    return np.sqrt(squares[:, :3, :3].sum((1, 2))), np.sqrt(squares.sum((1, 2)))
+
+
+def motion_errors(T_gt_first_last: Array, T_est_first_last: Array) -> PoseErrors:
+    """What is left of true motions (N, 4, 4) after the estimated ones are undone."""
+    return PoseErrors(*_left(_columns(T_gt_first_last), _columns(T_est_first_last)))
+
+
+def errors_between(T_gt: Array, T_est: Array, first: Index, last: Index) -> PoseErrors:
+    """`motion_errors` of the motions from poses `first` to `last` (N,) of trajectories (K, 4, 4)."""
+    gt, est = _columns(T_gt), _columns(T_est)
+
+    def moved(T: Array, part: slice) -> Array:
+        return _moved(T.take(first[part], axis=-1), T.take(last[part], axis=-1))
+
+    found = in_blocks(len(first), lambda part: _left(moved(gt, part), moved(est, part)))
+    return PoseErrors(*found)
+
+
+# Below, N poses are (3, 4, N): each number of all of them side by side, which is faster than N small matrices.
+
+
+def _columns(T: Array) -> Array:
+    return np.ascontiguousarray(np.moveaxis(T[:, :3], 0, -1))
+
+
+def _moved(first: Array, last: Array) -> Array:
+    """Poses `last` seen from `first`."""
+    back = first[:, :3]
+    R = np.einsum("kin,kjn->ijn", back, last[:, :3])
+    t = np.einsum("kin,kn->in", back, last[:, 3] - first[:, 3])
+    return np.concatenate([R, t[:, None]], axis=1)
+
+
+def _left(gt: Array, est: Array) -> Rows:
+    """Lengths and angles (N,) of est seen from gt; the angles as `angle_rad` takes them."""
+    E = _moved(gt, est)
+    R, t = E[:, :3], E[:, 3]
+    steps = -0.5 * np.einsum("kin,kjn->ijn", R, R)
+    steps[range(3), range(3)] += 1.5
+    R = np.einsum("ikn,kjn->ijn", R, steps)
+    vee = np.stack([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    cosine = R[0, 0] + R[1, 1] + R[2, 2] - 1.0
+    return np.sqrt(np.einsum("in,in->n", t, t)), np.arctan2(np.sqrt(np.einsum("in,in->n", vee, vee)), cosine)
+
+
+def in_blocks(n: int, work: Callable[[slice], Rows]) -> Rows:
+    """What `work` makes of n samples, each a tuple of arrays (n,), a block at a time."""
+    found = [work(slice(begin, min(begin + BLOCK, n))) for begin in range(0, max(n, 1), BLOCK)]
+    return tuple(np.concatenate(arrays) for arrays in zip(*found, strict=True))
+
+
+def motions(T_world_frame: Array, first: Index, last: Index) -> Array:
+    """Pose of frame `last` seen from frame `first`, (N, 4, 4), for index arrays (N,)."""
+    T_first_last: Array = se3.inverse(T_world_frame[first]) @ T_world_frame[last]
+    return T_first_last
+
+
+def in_plane(T: Array, plane: Plane) -> Array:
+    """Poses (N, 4, 4) without what leaves a plane of the world: on it, and turned about its normal alone.
+
+    The angle is the normal's one of `roll_pitch_yaw_rad`. Source: evo's project_to_plane.
+    """
+    normal = {"yz": 0, "xz": 1, "xy": 2}[plane]
+    axes = np.roll(range(3), normal + 1)  # where x, y and z stand when the normal takes the place of z
+    turned = se3.rotation_z(roll_pitch_yaw_rad(T[:, :3, :3])[:, normal])[:, axes][:, :, axes]
+    return se3.transform(turned, np.where(np.arange(3) == normal, 0.0, T[:, :3, 3]))
+
+
+def roll_pitch_yaw_rad(R: Array) -> Array:
+    """Angles (..., 3) of R = Rz(yaw) Ry(pitch) Rx(roll); at 90° of pitch, where they merge, roll is 0."""
+    pitch = np.arctan2(-R[..., 2, 0], np.hypot(R[..., 0, 0], R[..., 1, 0]))
+    merged = np.hypot(R[..., 2, 1], R[..., 2, 2]) < 1e-12
+    roll = np.where(merged, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
+    yaw = np.where(merged, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
+    return np.stack([roll, pitch, yaw], -1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,24 +1,156 @@
-"""Relative pose error: how wrong the motion between two poses is."""
+"""Relative pose error over frames, metres, seconds and angles, and over parts of the path."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.metric.pairs import IndexPairs
-from vobench.metric.pose_error import (
+from vobench.metric.ate import (
     MatrixErrors,
     PoseErrors,
     Rows,
+    angle_rad,
     errors_between,
     in_blocks,
     matrix_norms,
     motion_errors,
     motions,
+    roll_pitch_yaw_rad,
 )
-from vobench.trajectory.associate import nearest
-from vobench.trajectory.trajectory import Trajectory
+from vobench.metric.settings import RelativeRule, Unit
+from vobench.trajectory.associate import Index, nearest
+from vobench.trajectory.trajectory import Stamps, Trajectory
+
+TOLERANCE = 0.1  # of delta, that a pair may be off among all pairs; evo's
+GAP_STEPS = 1.5  # a step so many times the usual one is a gap
+MAX_PAIRS = 20_000_000  # all pairs by angle grow with the square of the poses; this many need 3 GB
+MAX_POSES = 2000  # whose every pair is looked at: 4 million
+CHUNK = 4_000_000  # relative angles looked at in one go: 32 MB
+
+IndexPairs = tuple[Index, Index]
+
+
+def select_pairs(
+    T: Array, t_ns: Stamps, *, delta: float, unit: Unit, all_pairs: bool, spanning: bool = True
+) -> IndexPairs:
+    """Indices (first, last), each (P,), of matched poses T (K, 4, 4), stamped t_ns (K,), that are `delta` apart.
+
+    Consecutive: from the first pose on, each pair begins where the one before ended, at the first pose
+    `delta` or more further along. All pairs: every pose with the later one nearest to `delta` away, if it
+    is within a tenth; with `spanning` a pose whose partner fell into a gap goes with the one after the gap,
+    so that what went wrong meanwhile is counted. Frames count matched poses. Source: evo's rules; gaps ours.
+    """
+    if unit == "f":
+        return _frame_pairs(len(T), int(delta), all_pairs=all_pairs)
+    if unit in ("d", "r"):
+        delta = float(np.deg2rad(delta)) if unit == "d" else delta
+        return _all_by_angle(T[:, :3, :3], delta) if all_pairs else _chain(_turns(T), delta)
+    if not all_pairs:
+        return _chain(_moves(T) if unit == "m" else np.diff(t_ns), delta if unit == "m" else delta * 1e9)
+    along = np.concatenate([[0.0], np.cumsum(_moves(T))]) if unit == "m" else (t_ns - t_ns[:1]) / 1e9
+    return pairs_along(along[: len(T)], delta, tolerance=TOLERANCE * delta, gaps=_gaps(t_ns) if spanning else None)
+
+
+def every_pair(n: int) -> IndexPairs:
+    """All ordered pairs (first, last) of n poses, each with itself too: what TartanAir draws 10,000 at random of.
+
+    Of more than MAX_POSES poses, as many pairs as these have are drawn, always the same.
+    """
+    if n <= MAX_POSES:
+        return np.repeat(np.arange(n), n), np.tile(np.arange(n), n)
+    first, last = np.random.default_rng(0).integers(n, size=(2, MAX_POSES**2))
+    return first, last
+
+
+def pairs_along(along: Array, delta: float, *, tolerance: float, gaps: NDArray[np.bool_] | None = None) -> IndexPairs:
+    """Of every pose the later one whose way `along` (K,), not decreasing, is nearest to delta further on.
+
+    Pairs that miss it by more than `tolerance` are dropped, unless the partner fell into one of the `gaps`
+    (K-1,), the steps that have holes in them: then the pose after the gap is taken. O(K log K).
+    """
+    n = len(along)
+    first = np.arange(max(n - 1, 0))
+    beyond = np.clip(np.searchsorted(along, along[first] + delta, side="left"), first + 1, max(n - 1, 0))
+    # Poses that stand still share a distance; the first of them is the one that arrives there.
+    beyond, short = (
+        np.maximum(np.searchsorted(along, along[last], side="left"), first + 1) for last in (beyond, beyond - 1)
+    )
+    miss_beyond, miss_short = (np.abs(along[last] - along[first] - delta) for last in (beyond, short))
+    last = np.where(miss_short <= miss_beyond, short, beyond)
+    near = np.minimum(miss_short, miss_beyond) <= tolerance
+    spans = np.zeros(len(first), bool) if gaps is None else gaps[beyond - 1] & (along[beyond] - along[first] > delta)
+    kept = near | spans
+    return first[kept], np.where(near, last, beyond)[kept]
+
+
+def _frame_pairs(n: int, delta: int, *, all_pairs: bool) -> IndexPairs:
+    first = np.arange(0, max(n - delta, 0), 1 if all_pairs else delta)
+    return first, first + delta
+
+
+def _moves(T: Array) -> Array:
+    return np.asarray(np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1))
+
+
+def _turns(T: Array) -> Array:
+    R = T[:, :3, :3]
+    return angle_rad(np.swapaxes(R[:-1], -1, -2) @ R[1:])
+
+
+def _gaps(t_ns: Stamps) -> NDArray[np.bool_]:
+    """Which steps (K-1,) between matched poses take longer than usual."""
+    steps = np.diff(t_ns)
+    return steps > GAP_STEPS * np.median(steps) if len(steps) else np.zeros(0, bool)
+
+
+def _chain(steps: NDArray[Any], delta: float) -> IndexPairs:
+    """Pairs end to end, each as soon as its steps sum up to delta: one sum after the other, as it rounds."""
+    chosen, total = [0], 0.0
+    for end, step in enumerate(steps.tolist(), 1):
+        total += step
+        if total >= delta:
+            chosen.append(end)
+            total = 0.0
+    ends = np.array(chosen, np.int64)
+    return ends[:-1], ends[1:]
+
+
+def _all_by_angle(R: Array, delta_rad: float) -> IndexPairs:
+    """Every two rotations (K, 3, 3) that are delta ± a tenth apart, whatever the way between them."""
+    found: list[IndexPairs] = []
+    total = 0
+    for first, last in _candidates(R, delta_rad):
+        angle = angle_rad(np.swapaxes(R[first], -1, -2) @ R[last])
+        kept = np.abs(angle - delta_rad) <= TOLERANCE * delta_rad
+        found.append((first[kept], last[kept]))
+        total += int(np.count_nonzero(kept))
+        if total > MAX_PAIRS:
+            raise AlignmentError(
+                f"all pairs {np.rad2deg(delta_rad):g} degrees apart should be {MAX_PAIRS} or fewer, but {len(R)} poses "
+                f"have more; take consecutive pairs"
+            )
+    firsts, lasts = zip(*found, strict=True) if found else ((np.zeros(0, np.int64),), (np.zeros(0, np.int64),))
+    return np.concatenate(firsts), np.concatenate(lasts)
+
+
+def _candidates(R: Array, delta_rad: float) -> Iterator[IndexPairs]:
+    """Pairs whose trace says that they may fit, chunk after chunk; the margin is more than six digits lose."""
+    flat = R.reshape(-1, 9)
+    margin = 1e-4
+    low = 1 + 2 * np.cos(min((1 + TOLERANCE) * delta_rad, np.pi)) - margin
+    high = 1 + 2 * np.cos(max((1 - TOLERANCE) * delta_rad, 0.0)) + margin
+    rows = max(1, CHUNK // max(len(R), 1))
+    for begin in range(0, len(R) - 1, rows):
+        traces = flat[begin : begin + rows] @ flat[begin + 1 :].T
+        first, last = np.nonzero((traces >= low) & (traces <= high))
+        later = last >= first
+        yield first[later] + begin, last[later] + begin + 1
+
 
 MAX_TRUTH_STEPS = 2.0  # TUM's: a truth further off than this many of its usual steps is none
 STILL_M = 1e-100  # a motion of the truth below it has no percentage that could be squared
@@ -87,3 +219,60 @@ def _tum_pairs(gt: Trajectory, est: Trajectory, delta_s: float, offset_ns: int) 
     off_ns = np.maximum(np.abs(gt.t_ns[gt_first] - t_ns[first]), np.abs(gt.t_ns[gt_last] - t_ns[last]))
     near = off_ns <= longest_ns
     return first[near], last[near], gt_first[near], gt_last[near]
+
+
+OPENVINS_LENGTHS_M = (8.0, 16.0, 24.0, 32.0, 40.0, 48.0)
+OPENVINS_TOLERANCE_M = 0.5
+RPG_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5)
+RPG_TOLERANCE = 0.2  # of the length
+MIN_SAMPLES = 2  # a length with fewer is left out
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeErrors:
+    """Errors of N parts: nominal length, translation in m, angle, its yaw and its tilt in rad, each (N,)."""
+
+    length_m: Array
+    trans_m: Array
+    rot_rad: Array
+    yaw_rad: Array
+    gravity_rad: Array
+
+    def __len__(self) -> int:
+        return len(self.length_m)
+
+
+def relative_lengths(path_m: float, rule: RelativeRule) -> tuple[float, ...]:
+    """The rule's lengths: 8 to 48 m, or 10 to 50 % of the path with two decimals cut off."""
+    if rule == "openvins":
+        return OPENVINS_LENGTHS_M
+    shares = (float(np.trunc(share * path_m * 100) / 100) for share in RPG_SHARES)
+    return tuple(length for length in shares if length > 0)
+
+
+def part_errors(T_gt: Array, T_est: Array, lengths_m: Sequence[float], *, rule: RelativeRule) -> RelativeErrors:
+    """Errors of the motions from each pose (K, 4, 4) to the one whose true path is nearest to each length.
+
+    Gravity points along z of the world. Source: Zhang and Scaramuzza (2018), section IV.
+    """
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(T_gt[:, :3, 3], axis=0), axis=1))])[: len(T_gt)]
+    found = [(length, *_parts(along, length, rule)) for length in lengths_m]
+    kept = [part for part in found if len(part[1]) >= MIN_SAMPLES]
+    first, last = (np.concatenate([np.zeros(0, np.int64), *(part[side] for part in kept)]) for side in (1, 2))
+    lengths = np.repeat([part[0] for part in kept], [len(part[1]) for part in kept])
+    errors = in_blocks(len(first), lambda part: _errors(T_gt, T_est, first[part], last[part]))
+    return RelativeErrors(lengths, *errors)
+
+
+def _errors(T_gt: Array, T_est: Array, first: Index, last: Index) -> Rows:
+    """Translation, angle, yaw and tilt (N,) of what is left between motions."""
+    E = se3.inverse(motions(T_gt, first, last)) @ motions(T_est, first, last)
+    R_est = T_est[last, :3, :3]
+    roll, pitch, yaw = roll_pitch_yaw_rad(R_est @ E[:, :3, :3] @ np.swapaxes(R_est, -1, -2)).T
+    return np.linalg.norm(E[:, :3, 3], axis=1), angle_rad(E[:, :3, :3]), np.abs(yaw), np.hypot(pitch, roll)
+
+
+def _parts(along: Array, length_m: float, rule: RelativeRule) -> IndexPairs:
+    if rule == "openvins":
+        return pairs_along(along, length_m, tolerance=OPENVINS_TOLERANCE_M)
+    return pairs_along(along, length_m, tolerance=float(np.nextafter(RPG_TOLERANCE * length_m, 0.0)))  # strictly less

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
-from vobench.metric.pose_error import PoseErrors, Rows, errors_between, in_blocks
+from vobench.metric.ate import PoseErrors, Rows, errors_between, in_blocks
 from vobench.metric.settings import INDOOR_LENGTHS_M, Mean, Precision
 from vobench.trajectory.associate import Index
 

@@ -1,27 +1,28 @@
-"""Light computed once: what each light alone gives every surface, soft shadows, mirrors and bounces included."""
+"""Baked light: what each light alone gives every surface; on disk, and read back."""
 
+import json
+import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from vobench import stop
+from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
-from vobench.render.direct import SKY_SMOOTHING, direct_light, in_front, sees_open_sky
-from vobench.render.geometry import Floats, Inventory, inventory
-from vobench.render.image import images
-from vobench.render.indirect import Gathering, answers, bounced, gathering
-from vobench.render.lightmap import Holes, Layout, Scales, holes, layout
-from vobench.render.sight import Sight
-from vobench.render.source import OpenSky, Source, sources
-from vobench.render.texels import Texels, outside, texels
+from vobench.render.direct_light import SKY_SMOOTHING, direct_light, in_front, mirror_images, sees_open_sky
+from vobench.render.emitter import Emitter, OpenSky, emitters
+from vobench.render.geometry import Floats, SurfaceList, inventory
+from vobench.render.indirect_light import FinalGather, bounced, final_gather, surface_responses
+from vobench.render.lightmap import Atlas, Chart, Holes, Scales, Texels, holes, outside, pack_atlas, texels
+from vobench.render.visibility import Visibility
 from vobench.scene.light import NS_PER_S, AreaLight, Light, Sky, Sun
-from vobench.scene.material import Polished, texture_of, under_coat
+from vobench.scene.material import Map, Polished, reflectance, texture_of, under_coat
 from vobench.scene.scene import Scene
-from vobench.scene.texture import Map, reflectance
 
 Tell = Callable[[float], object]
 MOVER_COARSER = 2
@@ -62,7 +63,7 @@ class BakedScene:
     """
 
     scene: Scene
-    layout: Layout
+    layout: Atlas
     light: Floats
     albedo: dict[str, Map]
     settings: BakeSettings = BakeSettings()
@@ -70,18 +71,18 @@ class BakedScene:
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class StaticScene:
     """What still stands of a scene, as rays and as points."""
 
-    things: Inventory
+    things: SurfaceList
     static: tuple[int, ...]
-    sight: Sight
-    where: Layout
+    sight: Visibility
+    where: Atlas
     points: Texels
     holes: Holes
 
 
-def placed(scene: Scene, *, spacing_m: float, sunlit: NDArray[np.bool_] | None = None) -> Layout:
+def placed(scene: Scene, *, spacing_m: float, sunlit: NDArray[np.bool_] | None = None) -> Atlas:
     """A map of a scene's inventory, finer where it is sunlit (S,).
 
     Movers' samples are coarser, as their light is found anew for each picture.
@@ -90,23 +91,23 @@ def placed(scene: Scene, *, spacing_m: float, sunlit: NDArray[np.bool_] | None =
     share = np.where(things.mover < 0, 1.0, MOVER_COARSER)
     if sunlit is not None:
         share = np.where(sunlit, 1 / SUNLIT_FINER, share)
-    return layout(things.surfaces, spacing_m=share * spacing_m)
+    return pack_atlas(things.surfaces, spacing_m=share * spacing_m)
 
 
-def stage(scene: Scene, where: Layout, *, seed: int) -> Stage:
+def static_scene(scene: Scene, where: Atlas, *, seed: int) -> StaticScene:
     """A scene without its movers."""
     things = inventory(scene)
     static = tuple(np.flatnonzero(things.mover < 0).tolist())
-    sight = Sight(things.surfaces, scene.materials, static)
+    sight = Visibility(things.surfaces, scene.materials, static)
     points = texels(things.surfaces, scene.materials, where, among=static, seed=seed)
     points = outside(points, where, sight, things.panel >= 0)
-    return Stage(things, static, sight, where, points, holes(where, points.index))
+    return StaticScene(things, static, sight, where, points, holes(where, points.index))
 
 
 class _Work:
     """How much of the work of a bake is done, in rays, and whom to tell."""
 
-    def __init__(self, scene: Scene, coarse: Stage, where: Layout, settings: BakeSettings, tell: Tell) -> None:
+    def __init__(self, scene: Scene, coarse: StaticScene, where: Atlas, settings: BakeSettings, tell: Tell) -> None:
         self._done, self._tell = 0.0, tell
         self.tile = TILE_PIXEL
         self.gathered = GATHERED_RAY * settings.indirect_rays
@@ -127,11 +128,11 @@ def bake(scene: Scene, settings: BakeSettings, tell: Tell = lambda _: None) -> B
 
     `tell` hears now and then which share of the work is done, about.
     """
-    coarse = stage(scene, placed(scene, spacing_m=settings.indirect_spacing_m), seed=settings.seed)
+    coarse = static_scene(scene, placed(scene, spacing_m=settings.indirect_spacing_m), seed=settings.seed)
     where = placed(scene, spacing_m=settings.spacing_m, sunlit=_sunlit(scene, coarse, settings))
     work = _Work(scene, coarse, where, settings, tell)
     albedo = tiles(scene, done=lambda pixels: work.did(work.tile * pixels))
-    fine = stage(scene, where, seed=settings.seed)
+    fine = static_scene(scene, where, seed=settings.seed)
     scales = Scales(fine.where, coarse.where)
     gathered = _gathered(scene, coarse, albedo, settings, done=lambda points: work.did(work.gathered * points))
     instants = _instants(scene)
@@ -168,15 +169,15 @@ def tiles(scene: Scene, done: Callable[[int], object]) -> dict[str, Map]:
 
 
 def _gathered(
-    scene: Scene, coarse: Stage, albedo: dict[str, Map], settings: BakeSettings, *, done: Callable[[int], object]
-) -> Gathering:
-    answer = answers(coarse.things.surfaces, scene.materials, albedo, coarse.things.panel)
+    scene: Scene, coarse: StaticScene, albedo: dict[str, Map], settings: BakeSettings, *, done: Callable[[int], object]
+) -> FinalGather:
+    answer = surface_responses(coarse.things.surfaces, scene.materials, albedo, coarse.things.panel)
     skies = [light for light in scene.lights if isinstance(light, Sky)]
     rays = settings.indirect_rays
-    return gathering(coarse.points, coarse.where, coarse.sight, answer, skies, rays=rays, done=done)
+    return final_gather(coarse.points, coarse.where, coarse.sight, answer, skies, rays=rays, done=done)
 
 
-def _sunlit(scene: Scene, coarse: Stage, settings: BakeSettings) -> NDArray[np.bool_]:
+def _sunlit(scene: Scene, coarse: StaticScene, settings: BakeSettings) -> NDArray[np.bool_]:
     """The surfaces (S,) on which the sun throws shadows, at any of the instants it is baked for."""
     lit = np.zeros(len(coarse.things.surfaces), bool)
     for index, light in enumerate(scene.lights):
@@ -222,7 +223,7 @@ def wandered_rad(sun: Sun) -> Array:
 def direct_layer(
     scene: Scene,
     index: int,
-    fine: Stage,
+    fine: StaticScene,
     settings: BakeSettings,
     *,
     t_ns: float,
@@ -244,20 +245,54 @@ def direct_layer(
     return layer
 
 
-def _shining(light: Light, on: Stage, *, t_ns: float) -> list[Source]:
+def _shining(light: Light, on: StaticScene, *, t_ns: float) -> list[Emitter]:
     """What of a light shines on a scene: itself, its panes, its images in mirrors."""
-    return [*sources(light, on.sight, t_ns=t_ns), *images(light, on.sight, t_ns=t_ns)]
+    return [*emitters(light, on.sight, t_ns=t_ns), *mirror_images(light, on.sight, t_ns=t_ns)]
 
 
-def reached(source: Source, fine: Stage) -> NDArray[np.bool_]:
+def reached(source: Emitter, fine: StaticScene) -> NDArray[np.bool_]:
     """The points (P,) a source may light."""
     ahead = in_front(source.ball(), fine.points.points_m, fine.points.normals)
     return ahead & sees_open_sky(source, fine.points, fine.sight) if isinstance(source, OpenSky) else ahead
 
 
-def _smoothed(layer: Floats, where: Layout) -> Floats:
+def _smoothed(layer: Floats, where: Atlas) -> Floats:
     """The sky's shadows are so soft that averaging neighbours takes noise away, and nothing else."""
     smooth = layer.copy()
     for patch in where.patches:
         smooth[patch.window] = scipy.ndimage.gaussian_filter(layer[patch.window], SKY_SMOOTHING, mode="nearest")
     return smooth
+
+
+LIGHT, PATCHES, SETTINGS = "light.npy", "patches.npy", "settings.json"
+
+
+def save_baked(folder: Path, baked: BakedScene) -> None:
+    """Write the maps of a baked scene into a folder."""
+    (folder / SETTINGS).write_text(json.dumps(asdict(baked.settings)))
+    np.save(folder / LIGHT, baked.light)
+    patches = [(p.row, p.column, p.rows, p.columns) for p in baked.layout.patches]
+    np.save(folder / PATCHES, np.array(patches, np.int32))
+    for name, tile in baked.albedo.items():
+        np.save(folder / f"albedo.{name}.npy", tile)
+    for track in baked.tracks:
+        np.savez(folder / f"sun.{track.light}.npz", times_ns=track.times_ns, bounced=track.bounced)
+
+
+def load_baked(folder: Path, scene: Scene) -> BakedScene:
+    """The maps that `save_baked` wrote, for the same scene. Raises RenderError where they are damaged."""
+    try:
+        settings = BakeSettings(**json.loads((folder / SETTINGS).read_text()))
+        light = np.load(folder / LIGHT)
+        patches = tuple(Chart(*row) for row in np.load(folder / PATCHES).tolist())
+        bodies = [name for name, material in sorted(scene.materials.items()) if texture_of(material)]
+        albedo = {name: np.load(folder / f"albedo.{name}.npy") for name in bodies}
+        tracks = tuple(_track(folder / f"sun.{sun}.npz", sun) for sun in moving_suns(scene))
+    except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+        raise RenderError(f"the scene's light cannot be read ({error}); delete this folder: {folder}") from error
+    return BakedScene(scene, Atlas(patches, *light.shape[1:]), light, albedo, settings, tracks)
+
+
+def _track(path: Path, sun: int) -> SunTrack:
+    with path.open("rb") as file, np.load(file) as stored:  # np.load leaves a torn file open
+        return SunTrack(sun, tuple(stored["times_ns"].tolist()), stored["bounced"])

@@ -1,16 +1,74 @@
-"""The light on every surface over an interval of time: layers of baked light, weighted and added."""
+"""The light on every surface over an interval, the sky behind it, and the mean luminance of a scene."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from typing import Generic, TypeVar
 
 import numpy as np
 
-from vobench.render.bake import BakedScene, SunTrack, direct_layer, placed, stage, wandered_rad
+from vobench.geometry.se3 import Array
+from vobench.render.bake import BakedScene, SunTrack, direct_layer, placed, static_scene, wandered_rad
+from vobench.render.geometry import inventory
 from vobench.render.lightmap import Scales
-from vobench.render.moving import Moment, MoverLight
-from vobench.scene.light import NS_PER_S, Light, Steady, Sun
-from vobench.scene.texture import Map
+from vobench.render.mover_light import MoverLight, MoverLightAt
+from vobench.scene.light import NS_PER_S, SKIES, Light, Sky, Steady, Sun
+from vobench.scene.material import Map
+
+
+class AmbientLight:
+    """Mean over the area of a scene's textured surfaces, in whatever light.
+
+    Lamps and the sky do not count: few directions lead there, and in all others their share would be too bright.
+    """
+
+    def __init__(self, baked: BakedScene) -> None:
+        things, patches = inventory(baked.scene), baked.layout.patches
+        albedo = {name: float(tile.mean()) for name, tile in baked.albedo.items()}
+        self._weights = np.zeros(baked.light.shape[1:], np.float32)
+        area_m2 = 0.0
+        for surface, panel, patch in zip(things.surfaces, things.panel, patches, strict=True):
+            if panel < 0 and surface.material in albedo:
+                own_m2 = float(np.prod(surface.size_m))
+                self._weights[patch.window] = albedo[surface.material] / np.pi * own_m2 / (patch.rows * patch.columns)
+                area_m2 += own_m2
+        self._weights /= max(area_m2, 1e-12)
+        self._light, self._mean_cd_m2 = self._weights, 0.0
+
+    def cd_m2(self, light: Map) -> float:
+        """The mean under a map of light (H, W); the very array of the last call costs nothing."""
+        if light is not self._light:
+            # No dot product, whose order of adding up hangs on the number of threads.
+            self._light, self._mean_cd_m2 = light, float(np.sum(self._weights * light, dtype=np.float64))
+        return self._mean_cd_m2
+
+
+ZENITH = np.array([0.0, 0.0, 1.0])
+
+
+class Background:
+    """The skies among a scene's lights."""
+
+    def __init__(self, lights: Sequence[Light]) -> None:
+        self.skies = [light for light in lights if isinstance(light, Sky)]
+        self._nominal = np.array([_coefficients(sky) for sky in self.skies]).reshape(-1, 3, 4)
+
+    def coefficients(self, start_ns: int, end_ns: int) -> Array:
+        """(S, 3, 4): `gradation`, `scatter` and `sun` of the shader, with the mean level over an interval."""
+        now = self._nominal.copy()
+        levels = [sky.level.mean(start_ns, end_ns) for sky in self.skies]
+        now[:, 0, 2:] *= np.reshape(levels, (-1, 1))
+        return now
+
+
+def _coefficients(sky: Sky) -> Array:
+    """Source: ISO 15469:2004, eqs 1 to 7; the scale follows from the luminance at the zenith."""
+    a, b, c, d, e = SKIES[sky.kind]
+    across = np.exp(d * np.pi / 2)
+    chi = np.arccos(np.clip(ZENITH @ sky.sun_direction, -1, 1))
+    relative = (1 + a * np.exp(b)) * (1 + c * (np.exp(d * chi) - across) + e * np.cos(chi) ** 2)
+    zenith, ground = sky.luminance_cd_m2(np.stack([ZENITH, -ZENITH]))
+    return np.array([[a, b, zenith / relative, ground], [c, d, e, across], [*sky.sun_direction, 0]])
+
 
 SUN_TURN_RAD = 1e-4  # a moving sun stands still within less than a fiftieth of its disc
 KEPT = 16  # maps and moments: enough for the strips of a stereo pair
@@ -18,7 +76,7 @@ KEPT = 16  # maps and moments: enough for the strips of a stereo pair
 T = TypeVar("T")
 
 
-class Latest(Generic[T]):
+class RecentCache(Generic[T]):
     """The last few values made, by what they were made of."""
 
     def __init__(self) -> None:
@@ -49,11 +107,11 @@ class Illumination:
         self._steady = np.zeros(baked.light.shape[1:], np.float32)
         self._add(self._steady, {i: self._lights[i].level.mean(0, 0) for i in steady})
         if self._tracks or baked.scene.movers:
-            self._still = stage(baked.scene, baked.layout, seed=baked.settings.seed)
+            self._still = static_scene(baked.scene, baked.layout, seed=baked.settings.seed)
         self._movers = MoverLight(baked, self._still) if baked.scene.movers else None
-        self._maps: Latest[Map] = Latest()
-        self._moments: Latest[Moment] = Latest()
-        self._suns: Latest[Map] = Latest()
+        self._maps: RecentCache[Map] = RecentCache()
+        self._moments: RecentCache[MoverLightAt] = RecentCache()
+        self._suns: RecentCache[Map] = RecentCache()
 
     def at(self, start_ns: int, end_ns: int) -> Map:
         """Map (H, W): the mean from start_ns to end_ns. The very array of an earlier call where nothing differs."""

@@ -1,8 +1,9 @@
-"""The path tracer: pictures by Mitsuba, with everything that light does; slow, and the judge of the raster engine."""
+"""The path tracer: pictures by Mitsuba, the judge of the raster engine."""
 
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,17 +12,136 @@ from vobench import stop
 from vobench.errors import RenderError
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
-from vobench.render import llvm
-from vobench.render.mitsuba_scene import MitsubaScene, State, state
+from vobench.render import mitsuba
+from vobench.render.geometry import inventory
+from vobench.render.mitsuba import STRENGTH, groups, light_key, load, nominal, positions
 from vobench.render.renderer import Radiance, View
+from vobench.scene.light import Light, Sun
+from vobench.scene.material import Glass
 from vobench.scene.scene import Scene
+
+Floats = NDArray[np.float32]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class SceneState:
+    """What of a scene changes: each light's level, and the instant at which movers and suns are looked at."""
+
+    levels: tuple[float, ...]
+    t_ns: float
+
+
+def state(scene: Scene, start_ns: int, end_ns: int) -> SceneState:
+    """Lights at their mean over an interval, things where they are amid it; 0 where nothing ever moves."""
+    moves = bool(scene.movers) or any(isinstance(light, Sun) and light.moves for light in scene.lights)
+    levels = tuple(light.level.mean(start_ns, end_ns) for light in scene.lights)
+    return SceneState(levels, (start_ns + end_ns) / 2 if moves else 0.0)
+
+
+class MitsubaScene:
+    """A scene in Mitsuba's memory; llvm.prepare() must have been called."""
+
+    def __init__(self, scene: Scene, *, max_depth: int | None) -> None:
+        import mitsuba as mi
+
+        self._scene, self._state = scene, SceneState((1.0,) * len(scene.lights), 0.0)
+        self._groups = groups(inventory(scene))
+        self._world = load(mi, scene)
+        self._parameters = mi.traverse(self._world)
+        # `path` is faster, but sees through panes only by chance; `volpath` looks for lights through them.
+        self._has_panes = any(isinstance(material, Glass) for material in scene.materials.values())
+        kind = "volpath" if self._has_panes else "path"
+        self._integrator = mi.load_dict({"type": kind, "max_depth": -1 if max_depth is None else max_depth})
+
+    def become(self, wanted: SceneState) -> None:
+        """Set every light's level, and move suns and movers to where they are."""
+        if wanted == self._state:
+            return
+        for index, light in enumerate(self._scene.lights):
+            self._shine(index, light, wanted)
+        if wanted.t_ns != self._state.t_ns:
+            self._move(wanted.t_ns)
+        self._parameters.update()
+        self._state = wanted
+
+    def _shine(self, index: int, light: Light, wanted: SceneState) -> None:
+        import drjit as dr
+        import mitsuba as mi
+
+        key = f"{light_key(index)}.{STRENGTH[type(light)]}"
+        self._parameters[key] = dr.opaque(mi.Float, wanted.levels[index] * nominal(light))
+        if isinstance(light, Sun) and light.moves:
+            self._parameters[f"{light_key(index)}.direction"] = mi.Vector3f(*light.direction(wanted.t_ns).tolist())
+
+    def _move(self, t_ns: float) -> None:
+        surfaces = inventory(self._scene, t_ns=t_ns).surfaces
+        for group in self._groups:
+            if group.mover >= 0:
+                vertices = positions([surfaces[i] for i in group.surfaces]).ravel().astype(np.float32)
+                self._parameters[f"{group.key}.vertex_positions"] = vertices
+
+    def trace(self, rays: Floats, rows: Indices, T_world_camera: Array, samples: int, seed: int) -> Floats:
+        """Radiance (R, W), the sum over `samples` paths a pixel, of rows (R,) seen from T_world_camera (R, 4, 4).
+
+        rays (H + 1, W + 1, 3) are directions in the camera's frame through the corners of its pixels.
+        """
+        import drjit as dr
+        import mitsuba as mi
+
+        columns = rays.shape[1] - 1
+        sampler = mi.load_dict({"type": "independent"})
+        sampler.seed(seed, len(rows) * columns * samples)
+        ray = _primary_rays(rays, rows, T_world_camera, samples, sampler.next_2d())
+        seen = dr.isfinite(ray.d.x)
+        ray.o = self._past_backs(ray, seen)
+        radiance, _, _ = self._integrator.sample(self._world, sampler, ray, None, seen)
+        light = dr.select(seen, radiance[0], 0.0).numpy().reshape(len(rows), columns, samples)
+        total: Floats = light.sum(-1)
+        return total
+
+    def _past_backs(self, ray: Any, seen: Any) -> Any:
+        """Origins of rays moved on past surfaces that they see from behind, which no picture shows."""
+        import drjit as dr
+        import mitsuba as mi
+
+        def step(origin: Any, looking: Any) -> tuple[Any, Any]:
+            si = self._world.ray_intersect(mi.Ray3f(origin, ray.d), mi.RayFlags.Minimal, True, looking)
+            behind = looking & si.is_valid() & (dr.dot(si.n, ray.d) > 0)
+            if self._has_panes:
+                behind &= ~mi.has_flag(si.bsdf().flags(), mi.BSDFFlags.Null)
+            return dr.select(behind, si.spawn_ray(ray.d).o, origin), behind
+
+        return dr.while_loop((mi.Point3f(ray.o), mi.Bool(seen)), lambda _, looking: looking, step)[0]
+
+
+def _primary_rays(rays: Floats, rows: Indices, T_world_camera: Array, samples: int, within: Any) -> Any:
+    """Rays `within` [0, 1)² of the pixels, sample by sample, pixel by pixel, row by row.
+
+    Bilinear between the directions of a pixel's corners, which is exact to 1e-3 px.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    grid, width = mi.Float(rays.ravel()), rays.shape[1]
+    # Opaque, for a constant would be compiled into the kernel.
+    pixel = dr.arange(mi.UInt32, dr.width(within)) // dr.opaque(mi.UInt32, samples)
+    entry, column = pixel // (width - 1), pixel % (width - 1)
+    corner = dr.gather(mi.UInt32, mi.UInt32(rows.astype(np.uint32)), entry) * width + column
+    top = dr.lerp(*(dr.gather(mi.Vector3f, grid, corner + i) for i in (0, 1)), within.x)
+    bottom = dr.lerp(*(dr.gather(mi.Vector3f, grid, corner + width + i) for i in (0, 1)), within.x)
+    direction = dr.lerp(top, bottom, within.y)
+    columns = [mi.Float(T_world_camera[:, :3, k].ravel().astype(np.float32)) for k in range(4)]
+    x, y, z, origin = (dr.gather(mi.Vector3f, c, entry) for c in columns)
+    return mi.RayDifferential3f(mi.Point3f(origin), dr.normalize(direction.x * x + direction.y * y + direction.z * z))
+
 
 SAMPLES = 64  # paths a pixel where nobody says how many
 MAX_LANES = 1 << 22  # paths traced at once; more cost memory and are no faster
 
 
 @dataclass(frozen=True, slots=True)
-class Batch:
+class RowBatch:
     """Rows of the picture that see one state of the scene, each from a pose of its own; one light path per sample.
 
     rows (R,), start_ns (R,), T_world_camera (R, 4, 4), weight (R,): the share in the row's whole exposure.
@@ -42,7 +162,7 @@ class PathRenderer:
 
     def __init__(self, scene: Scene, *, samples: int = SAMPLES, seed: int = 0, max_depth: int | None = 16) -> None:
         _check(samples, max_depth)
-        llvm.prepare()
+        mitsuba.prepare()
         self._scene, self._samples, self._seed = scene, samples, seed
         self._mitsuba = MitsubaScene(scene, max_depth=max_depth)
         self._lens: tuple[Camera, Radiance] | None = None
@@ -64,7 +184,7 @@ class PathRenderer:
         del self._mitsuba
         self._lens = None
 
-    def _trace(self, camera: Camera, batch: Batch, samples: int) -> Radiance:
+    def _trace(self, camera: Camera, batch: RowBatch, samples: int) -> Radiance:
         """Mean radiance (R, W) of the rows of a batch over `samples` paths a pixel, some at a time."""
         at_once = max(1, min(samples, MAX_LANES // (len(batch.rows) * camera.width_px)))
         counts = [at_once] * (samples // at_once) + [samples % at_once] * (samples % at_once > 0)
@@ -90,12 +210,12 @@ def _check(samples: int, max_depth: int | None) -> None:
         raise RenderError(f"cannot trace paths of {max_depth} segments; max_depth must be 1 or more, or None")
 
 
-def _batches(scene: Scene, views: Sequence[View], samples: int) -> Iterator[tuple[tuple[State, int], Batch]]:
+def _batches(scene: Scene, views: Sequence[View], samples: int) -> Iterator[tuple[tuple[SceneState, int], RowBatch]]:
     """All rows at all their moments, gathered by the scene's state and by the paths a pixel has at that moment.
 
     A row exposed in M moments has its samples spread evenly over them, at least one for each.
     """
-    gathered: dict[tuple[State, int], list[tuple[View, int]]] = {}
+    gathered: dict[tuple[SceneState, int], list[tuple[View, int]]] = {}
     for view in views:
         moments = len(view.start_ns)
         for m in range(moments):
@@ -105,11 +225,11 @@ def _batches(scene: Scene, views: Sequence[View], samples: int) -> Iterator[tupl
         yield key, _gather(members)
 
 
-def _gather(members: list[tuple[View, int]]) -> Batch:
+def _gather(members: list[tuple[View, int]]) -> RowBatch:
     """The rows of views, each in one of its moments, one after another."""
     rows = [np.arange(view.rows.start, view.rows.stop) for view, _ in members]
     lengths = [len(r) for r in rows]
-    return Batch(
+    return RowBatch(
         np.concatenate(rows),
         np.repeat([view.start_ns[m] for view, m in members], lengths),
         np.repeat([view.T_world_camera[m] for view, m in members], lengths, axis=0),
@@ -117,7 +237,7 @@ def _gather(members: list[tuple[View, int]]) -> Batch:
     )
 
 
-def _seeds(seed: int, batch: Batch, count: int) -> list[int]:
+def _seeds(seed: int, batch: RowBatch, count: int) -> list[int]:
     """Seeds that differ between pictures from other places or times."""
     moment = batch.rows, batch.start_ns, batch.T_world_camera
     words = [zlib.crc32(np.ascontiguousarray(part).tobytes()) for part in moment]

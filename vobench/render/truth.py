@@ -1,27 +1,356 @@
-"""Exact ground truth of a picture: rays through its pixels' centres, for any camera, rolling shutter and movers.
-
-Light plays no part but in `shadow`. Glass is looked through: every channel speaks of the first opaque
-surface, and only `mirror` of the pane before it. Back sides are not seen.
-"""
+"""Exact ground truth of a picture by rays through its pixels' centres."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vobench.geometry import se3
 from vobench.geometry.camera import Camera
-from vobench.render.beams import TILE_PX
-from vobench.render.bodies import Bodies
-from vobench.render.shadow import lamps
-from vobench.render.stand import Shot, stand
-from vobench.render.truth_band import Band, Looks
-from vobench.render.truth_plan import plan
+from vobench.geometry.se3 import Array
+from vobench.render.culling import TILE_PX, PointView, Scalar, Tiles, balls, spread, tiles
+from vobench.render.emitter import FARTHEST_M
+from vobench.render.geometry import (
+    RAY_OFFSET_M,
+    Bodies,
+    Indices,
+    Mask,
+    Shot,
+    ShotSurfaces,
+    ShotTransforms,
+    at_rows,
+    moved,
+    of,
+    shot_transforms,
+    turn,
+)
+from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import Matt, Mirror, Polished
 from vobench.scene.scene import Scene
-from vobench.sensor.truth import CHANNELS, TruthFrame, TruthNames, check_channels
+from vobench.scene.surface import Surface
+from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, check_channels
+
+# From there the sun's rays would fall this far beside where they do, within 30 m around the origin.
+BEACON_M, BEACON_SLACK_M = 3e4, 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class Lamp:
+    """A light that is on, and its middle (3,)."""
+
+    light: Light
+    center_m: Array
+
+    @property
+    def beacon(self) -> tuple[Array, float]:
+        """A point (3,) not too far for float32, and how much farther than from it light may strike, in metres."""
+        if isinstance(self.light, Sun):
+            return self.center_m * (BEACON_M / FARTHEST_M), BEACON_SLACK_M
+        return self.center_m, 0.0
+
+    @property
+    def panel(self) -> Surface | None:
+        """The rectangle that shines, which does not stand in its own light."""
+        return self.light.surface if isinstance(self.light, AreaLight) else None
+
+    def shines(self, points_m: Array, normals: Array) -> Mask:
+        """Whether places (R, 3) lie before the light, within its cone, and turn their normals (R, 3) to it."""
+        return self.reaches(points_m, np.zeros(len(points_m)), normals)[1]
+
+    def reaches(self, centers_m: Array, radii_m: Array, normals: Array) -> tuple[Mask, Mask]:
+        """Flat things in balls (R, 3), (R,) that it surely does not shine on, and that it surely shines on all of."""
+        way = centers_m - self.center_m
+        facing = np.asarray(np.einsum("ri,ri->r", way, normals) < 0)
+        if isinstance(self.light, AreaLight):
+            before_m = way @ self.light.surface.normal
+            return ~facing | (before_m <= -radii_m), facing & (before_m > radii_m)
+        if isinstance(self.light, SpotLight):
+            reach_m = np.maximum(np.linalg.norm(way, axis=1), 1e-9)
+            aside_rad = np.arccos(np.clip(way @ self.light.direction / reach_m, -1, 1))
+            half_rad = np.arcsin(np.clip(radii_m / reach_m, 0, 1))
+            outer_rad = np.deg2rad(self.light.outer_deg)
+            return ~facing | (aside_rad - half_rad >= outer_rad), facing & (aside_rad + half_rad < outer_rad)
+        return ~facing, facing
+
+    def hidden(self, bodies: Bodies, points_m: Array, normals: Array, T_bodies_world: Sequence[Array]) -> Mask:
+        """Whether something stands between the light and places (R, 3) that it would shine on."""
+        hidden = self.shines(points_m, normals)
+        lit = np.flatnonzero(hidden)
+        starts = points_m[lit] + RAY_OFFSET_M * normals[lit]
+        to_bodies = [T if T.ndim == 2 else T[lit] for T in T_bodies_world]
+        hidden[lit] = bodies.blocked(starts, np.broadcast_to(self.center_m, starts.shape), to_bodies)
+        return hidden
+
+
+def lamps(scene: Scene, t_ns: int) -> Iterator[Lamp]:
+    """The lights that are on at an instant, but for the sky, which has no middle."""
+    for light in scene.lights:
+        if not isinstance(light, Sky) and light.level.mean(t_ns, t_ns) > 0:
+            yield Lamp(light, _center(light, t_ns))
+
+
+def _center(light: AreaLight | PointLight | SpotLight | Sun, t_ns: int) -> Array:
+    if isinstance(light, Sun):
+        return FARTHEST_M * light.direction(t_ns)
+    if isinstance(light, AreaLight):
+        return light.surface.at(np.array(0.5), np.array(0.5))
+    return light.position_m
+
+
+@dataclass(frozen=True, slots=True)
+class TilePlan:
+    """A picture to tell the truth of, and what is known of its tiles (V, U) beforehand.
+
+    sure: the one surface of a tile, -1 where rays must tell; glazed: panes may stand before it; visible: the next
+    camera surely sees all of it, as far as its picture reaches; hidden: how many lights surely are from all of it;
+    each lamp has the tiles where it is in doubt. All are while camera or movers move.
+    """
+
+    bodies: Bodies
+    camera: Camera
+    tiles: Tiles
+    here: ShotTransforms
+    there: ShotTransforms | None
+    sure: Indices
+    glazed: Mask
+    visible: Mask
+    hidden: NDArray[np.uint16]
+    lamps: tuple[tuple[Lamp, Mask], ...]
+
+
+def tile_plan(
+    bodies: Bodies, camera: Camera, here: ShotTransforms, there: ShotTransforms | None, lamps: Iterable[Lamp]
+) -> TilePlan:
+    """What whole tiles show."""
+    cones, snapshot = tiles(camera), here.snapshot
+    parts, shape = (bodies, camera, cones, here, there), cones.sine.shape
+    if snapshot is None:
+        none, nothing, glass = np.full(shape, -1, np.int32), np.zeros(shape, bool), not bodies.opaque.all()
+        doubts = tuple((lamp, ~nothing) for lamp in lamps)
+        return TilePlan(*parts, none, np.full(shape, glass), nothing, np.zeros(shape, np.uint16), doubts)
+    axis, sine = cones.axis.reshape(-1, 3), cones.sine.ravel()
+    sure = PointView(snapshot.corners_m, snapshot.facing & bodies.opaque).fills(axis, sine)
+    glazed = PointView(snapshot.corners_m, ~bodies.opaque).touches(axis, sine)
+    patches = _Patches(sure, *balls(snapshot.planes[sure], axis, sine))
+    visible = _visible(bodies, here, there, patches)
+    hidden, doubted = np.zeros(len(sure), np.uint16), []
+    for lamp in lamps:
+        dark, doubt = _cast(bodies, here, snapshot, lamp, patches)
+        hidden += dark
+        doubted.append((lamp, doubt.reshape(shape)))
+    known = sure.reshape(shape), glazed.reshape(shape), visible.reshape(shape), hidden.reshape(shape)
+    return TilePlan(*parts, *known, tuple(doubted))
+
+
+@dataclass(frozen=True, slots=True)
+class _Patches:
+    """What tiles show of their sure surfaces (T,), within balls: centres (T, 3) in the camera's frame, radii (T,)."""
+
+    sure: Indices
+    centers_m: Array
+    radii_m: Array
+
+
+def _visible(bodies: Bodies, here: ShotTransforms, there: ShotTransforms | None, patches: _Patches) -> Mask:
+    if there is None or there.snapshot is None:
+        return np.zeros(len(patches.sure), bool)
+    T_there_here = np.stack(there.T_camera_bodies) @ np.stack(here.T_bodies_camera)
+    body = np.append(bodies.of_surface, 0)[patches.sure]
+    centers_m = moved(T_there_here[body], patches.centers_m)
+    outlook = PointView(there.snapshot.corners_m, there.snapshot.facing & bodies.opaque)
+    facing = np.append(there.snapshot.facing, False)[patches.sure]
+    return np.asarray(facing & outlook.shading(centers_m, patches.radii_m, patches.sure)[0])
+
+
+def _cast(
+    bodies: Bodies, here: ShotTransforms, snapshot: ShotSurfaces, lamp: Lamp, patches: _Patches
+) -> tuple[Mask, Mask]:
+    """Tiles (T,) that a lamp would light but for what stands before them, and those where that is not sure.
+
+    Glass does not count, and a panel does not stand in its own light.
+    """
+    T_world_camera = here.T_bodies_camera[0]
+    beacon_m, slack_m = lamp.beacon
+    T_lamp_camera = se3.transform(np.eye(3), -beacon_m) @ T_world_camera
+    others = np.array([surface is not lamp.panel for surface in bodies.surfaces])
+    outlook = PointView(se3.apply(T_lamp_camera, snapshot.corners_m), others & bodies.opaque)
+    radii_m = patches.radii_m + slack_m
+    clear, dark = outlook.shading(moved(T_lamp_camera, patches.centers_m), radii_m, patches.sure)
+    normals = turn(T_world_camera, snapshot.planes)[patches.sure]  # longer than 1, which matters to no sign
+    unlit, lit = lamp.reaches(moved(T_world_camera, patches.centers_m), radii_m, -normals)
+    return dark & lit, (patches.sure < 0) | ~(clear | unlit | (dark & lit))
+
+
+Values = dict[str, NDArray[np.generic]]
+Pixels = NDArray[np.intp]
+
+# With a rolling shutter the row that sees a point next is looked for until it settles to this, or so many times.
+SETTLED_PX, MOST_ROUNDS = 1e-5, 20
+# A point is seen where sight ends no more than this share of the way before it.
+SIGHT_TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceIds:
+    """Of each surface, the last one none (S + 1,): ids, whether it mirrors, whether it shows what light falls on it."""
+
+    instance: NDArray[np.uint16]
+    material: NDArray[np.uint16]
+    mirrors: Mask
+    matt: Mask
+
+
+class Band:
+    """Rows of a picture that begin with a tile's first: R pixels in T tiles."""
+
+    def __init__(self, plan: TilePlan, looks: SurfaceIds, rows: slice) -> None:
+        self._plan, self._bodies, self._looks = plan, plan.bodies, looks
+        self._shape = (rows.stop - rows.start, plan.camera.width_px)
+        self._rays = plan.tiles.rays[rows].reshape(-1, 3)
+        self._uv_px = plan.tiles.uv_px[rows].reshape(-1, 2)
+        self._tiles = slice(rows.start // TILE_PX, -(-rows.stop // TILE_PX))
+        self._T_bodies_camera = at_rows(plan.here.T_bodies_camera, self._uv_px[:, 1])
+        self._surface, self._distance_m = self._look()
+        self._points_m = self._distance_m[:, None] * self._rays
+        movers = np.append(self._bodies.of_surface, 0)[self._surface] if len(self._T_bodies_camera) > 1 else None
+        self._body = movers if movers is not None and movers.any() else None
+
+    def values(self, names: Sequence[str]) -> Values:
+        """The channels asked for, (R,) or (R, n)."""
+        found: Values = {}
+        if "flow" in names or "occlusion" in names:
+            found["flow"], found["occlusion"] = self._flow()
+        makers: dict[str, Callable[[], NDArray[np.generic]]] = {
+            "depth": self._depth,
+            "normals": self._normals,
+            "instance": lambda: self._looks.instance[self._surface],
+            "material": lambda: self._looks.material[self._surface],
+            "mirror": self._mirror,
+            "shadow": self._shadow,
+            "moving": lambda: np.zeros(len(self._rays), bool) if self._body is None else self._body > 0,
+        }
+        return {name: found[name] if name in found else makers[name]() for name in names}
+
+    def _look(self) -> tuple[Indices, Array]:
+        """Surfaces and distances (R,): by planes where tiles are sure, by rays elsewhere."""
+        surface, snapshot = spread(self._plan.sure[self._tiles], self._shape).ravel(), self._plan.here.snapshot
+        distance_m = np.full(len(surface), np.nan)
+        if snapshot is not None:
+            distance_m = 1 / np.einsum("ri,ri->r", snapshot.planes[surface], self._rays)
+        unsure = np.flatnonzero(surface < 0)
+        seen = self._bodies.look(self._rays[unsure], [of(T, unsure) for T in self._T_bodies_camera])
+        surface[unsure], distance_m[unsure] = seen.surface, seen.distance_m
+        return surface, distance_m
+
+    def _depth(self) -> Array:
+        return self._points_m[:, 2] if self._plan.camera.depth_along == "axis" else self._distance_m
+
+    def _normals(self) -> Array:
+        T_camera_bodies = at_rows(self._plan.here.T_camera_bodies, self._uv_px[:, 1])
+        return self._turned_normals(T_camera_bodies, np.arange(len(self._rays)))
+
+    def _turned_normals(self, T_frame_bodies: Sequence[Array], pixels: Pixels) -> Array:
+        """Normals (P, 3) of some pixels in a frame that the transforms, (4, 4) or (P, 4, 4) each, lead to."""
+        surface, normals, T_frame_world = self._surface[pixels], self._bodies.normals, T_frame_bodies[0]
+        if T_frame_world.ndim == 2:
+            turned = turn(T_frame_world, normals)[surface]
+        else:
+            turned = turn(T_frame_world, normals[surface])
+        for body, these in self._movers(pixels):
+            turned[these] = turn(of(T_frame_bodies[body], these), normals[surface[these]])
+        return turned
+
+    def _mirror(self) -> Mask:
+        mirror = self._looks.mirrors[self._surface]
+        pixels = np.flatnonzero(self._spread(self._plan.glazed) & ~mirror)
+        T_bodies_camera = [of(T, pixels) for T in self._T_bodies_camera]
+        mirror[pixels] = self._bodies.behind_panes(self._rays[pixels], T_bodies_camera, self._distance_m[pixels])
+        return mirror
+
+    def _shadow(self) -> NDArray[np.uint16]:
+        lamps, matt = self._plan.lamps, self._looks.matt[self._surface]
+        count = self._spread(self._plan.hidden) * matt
+        doubts = [self._spread(doubt) for _, doubt in lamps]
+        pixels = np.flatnonzero(matt & np.logical_or.reduce(doubts, axis=0))
+        rows, here = self._uv_px[pixels, 1], self._plan.here
+        T_world_bodies, T_bodies_world = at_rows(here.T_world_bodies, rows), at_rows(here.T_bodies_world, rows)
+        points_m = moved(of(self._T_bodies_camera[0], pixels), self._points_m[pixels])
+        normals = self._turned_normals(T_world_bodies, pixels)
+        for (lamp, _), doubt in zip(lamps, doubts, strict=True):
+            these = np.flatnonzero(doubt[pixels])
+            to_bodies = [of(T, these) for T in T_bodies_world]
+            count[pixels[these]] += lamp.hidden(self._bodies, points_m[these], normals[these], to_bodies)
+        return count
+
+    def _spread(self, tiles: NDArray[Scalar]) -> NDArray[Scalar]:
+        """A picture's tiles (V, U) as this band's pixels (R,)."""
+        return spread(tiles[self._tiles], self._shape).ravel()
+
+    def _flow(self) -> tuple[Array, Mask]:
+        """Pixels (R, 2) to the place in the next picture, and whether the point is hidden or outside there (R,)."""
+        there, seen = self._plan.there, self._surface >= 0
+        if there is None:
+            return np.full((len(self._rays), 2), np.nan), seen
+        rows, points_m = self._uv_px[:, 1], self._own_points_m()
+        for _ in range(MOST_ROUNDS):
+            next_m = self._carried(points_m, there, rows)
+            uv_px = self._plan.camera.project(next_m)
+            change_px = np.nanmax(np.abs(uv_px[:, 1] - rows), initial=0.0) if there.snapshot is None else 0.0
+            if change_px < SETTLED_PX:
+                break
+            rows = uv_px[:, 1]
+        return uv_px - self._uv_px, seen & self._gone(there, next_m, uv_px)
+
+    def _own_points_m(self) -> Array:
+        """The seen points (R, 3), each in the frame of the body that it is on."""
+        points_m = moved(self._T_bodies_camera[0], self._points_m)
+        for body, these in self._movers():
+            points_m[these] = moved(of(self._T_bodies_camera[body], these), self._points_m[these])
+        return points_m
+
+    def _carried(self, own_points_m: Array, there: ShotTransforms, rows: Array) -> Array:
+        """The points (R, 3) in the next camera's frame, where it stands on the rows (R,) that see them."""
+        carried = moved(at_rows(there.T_camera_bodies[:1], rows)[0], own_points_m)
+        for body, these in self._movers():
+            (T_there_body,) = at_rows(there.T_camera_bodies[body : body + 1], rows[these])
+            carried[these] = moved(T_there_body, own_points_m[these])
+        return carried
+
+    def _gone(self, there: ShotTransforms, points_m: Array, uv_px: Array) -> Mask:
+        """Whether points (R, 3) in the next camera's frame are outside its picture (R, 2), or hidden from it."""
+        camera = self._plan.camera
+        u, v = uv_px[:, 0], uv_px[:, 1]
+        gone: Mask = ~((u >= -0.5) & (u < camera.width_px - 0.5) & (v >= -0.5) & (v < camera.height_px - 0.5))
+        doubtful = np.flatnonzero(~gone & ~self._spread(self._plan.visible))
+        T_bodies_there = at_rows(there.T_bodies_camera, v[doubtful])
+        gone[doubtful] = self._hidden(points_m[doubtful], self._surface[doubtful], T_bodies_there)
+        return gone
+
+    def _hidden(self, points_m: Array, surface: Indices, T_bodies_camera: Sequence[Array]) -> Mask:
+        """Whether a camera that has surfaces' points (P, 3) before it sees something nearer, or the surface's back."""
+        reach_m = np.linalg.norm(points_m, axis=1)
+        rays = points_m / reach_m[:, None]
+        met = self._bodies.look(rays, T_bodies_camera)
+        hidden: Mask = (met.surface != surface) & (met.distance_m < reach_m * (1 - SIGHT_TOLERANCE))
+        other = np.flatnonzero((met.surface != surface) & ~hidden)
+        body = self._bodies.of_surface[surface[other]]
+        for index in np.unique(body):
+            these = other[body == index]
+            turned = turn(of(T_bodies_camera[index], these), rays[these])
+            hidden[these] = np.einsum("ri,ri->r", turned, self._bodies.normals[surface[these]]) >= 0
+        return hidden
+
+    def _movers(self, pixels: Pixels | None = None) -> list[tuple[int, Pixels]]:
+        """The movers that some pixels (None: all) see, and which of these see each."""
+        if self._body is None:
+            return []
+        body = self._body if pixels is None else self._body[pixels]
+        return [(int(b), np.flatnonzero(body == b)) for b in np.unique(body) if b]
+
 
 __all__ = ["Shot", "TruthCaster"]
 
@@ -40,7 +369,7 @@ class TruthCaster:
         materials = [s.material for s in surfaces]
         self.names = TruthNames(_table(instances), _table(materials))
         kinds = [*(scene.materials.get(name) for name in materials), None]
-        self._looks = Looks(
+        self._looks = SurfaceIds(
             _ids(instances, self.names.instance),
             _ids(materials, self.names.material),
             np.array([isinstance(kind, Mirror | Polished) for kind in kinds]),
@@ -59,8 +388,8 @@ class TruthCaster:
         wanted = {name: CHANNELS[name] for name in check_channels(channels)}
         values: dict[str, Any] = {name: np.empty(c.shape(height, width), c.dtype) for name, c in wanted.items()}
         lit = lamps(self._scene, int(np.mean(now.t_ns))) if "shadow" in wanted else ()
-        there = stand(self._bodies, later) if later else None
-        whole = plan(self._bodies, camera, stand(self._bodies, now), there, lit)
+        there = shot_transforms(self._bodies, later) if later else None
+        whole = tile_plan(self._bodies, camera, shot_transforms(self._bodies, now), there, lit)
 
         def fill(rows: slice) -> None:
             for name, found in Band(whole, self._looks, rows).values(tuple(wanted)).items():

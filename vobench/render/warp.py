@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
-from vobench.render.mirror import Box
 from vobench.render.renderer import Radiance
+from vobench.render.view import Box
 
 POINTS = 2  # each way in a pixel
 MARGIN_PX = 3

@@ -1,1 +1,5 @@
-"""Leaderboards: scores as ranked tables, for a terminal, a page or another program."""
+"""Leaderboards, pages, plots, and the Rerun recording of a trial."""
+
+from vobench.report.rerun import TrialView, TruthView, save_run
+
+__all__ = ["TrialView", "TruthView", "save_run"]

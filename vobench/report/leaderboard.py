@@ -1,18 +1,16 @@
-"""Scores to ranks: one board over all cases, and one per case.
+"""Scores to ranked boards, and boards as text for a terminal, Markdown, CSV, LaTeX or JSON."""
 
-An estimator's place: how many of its runs failed, then how many are partial, then its mean ATE. So no
-crash, loss or divergence can rank before an estimator that survived every case.
-"""
-
+import json
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
 from itertools import groupby
 from statistics import fmean
+from typing import TYPE_CHECKING
 
-from vobench.results.estimate_file import FrameRow
-from vobench.results.run_folder import STATUSES, SURVIVED, RunScore
+from vobench.run.estimate import FrameRow
+from vobench.run.folder import STATUSES, SURVIVED, TrialScore
 
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
@@ -54,7 +52,7 @@ class Board:
 
 
 @dataclass(frozen=True, slots=True)
-class Answers:
+class EstimatorStatistics:
     """What an estimator answered on a case: mean CPU time of a frame, and its commonest reason for single frames."""
 
     ms_per_frame: float
@@ -63,10 +61,10 @@ class Answers:
     first: int | None = None
 
 
-Answered = Mapping[tuple[str, str], Answers]
+Answered = Mapping[tuple[str, str], EstimatorStatistics]
 
 
-def answers(runs: Iterable[list[FrameRow]]) -> Answers | None:
+def answers(runs: Iterable[list[FrameRow]]) -> EstimatorStatistics | None:
     """What the frames of all runs of one estimator on one case come to; None where it answered none.
 
     Reasons that differ in numbers alone, as `too few tracks (7)` and `(5)`, are one.
@@ -76,14 +74,14 @@ def answers(runs: Iterable[list[FrameRow]]) -> Answers | None:
         return None
     cost_ms, given = fmean(row.cpu_ms for row in rows), [row for row in rows if row.reason]
     if not given:
-        return Answers(cost_ms)
+        return EstimatorStatistics(cost_ms)
     kinds = Counter(NUMBER.sub("0", row.reason) for row in given)
     kind, count = min(kinds.items(), key=lambda item: (-item[1], item[0]))
     first = min((row for row in given if NUMBER.sub("0", row.reason) == kind), key=lambda row: row.frame)
-    return Answers(cost_ms, first.reason, count, first.frame)
+    return EstimatorStatistics(cost_ms, first.reason, count, first.frame)
 
 
-def boards(scores: Iterable[RunScore], answered: Answered) -> list[Board]:
+def boards(scores: Iterable[TrialScore], answered: Answered) -> list[Board]:
     """The board over all cases, then one per case; `answered` is per (case, estimator) and may lack some."""
     every = list(scores)
     cases = sorted({score.case for score in every})
@@ -91,10 +89,10 @@ def boards(scores: Iterable[RunScore], answered: Answered) -> list[Board]:
     return [board(f"all {len(cases)} cases", every, answered), *per_case] if len(cases) > 1 else per_case
 
 
-def board(title: str, scores: list[RunScore], answered: Answered) -> Board:
+def board(title: str, scores: list[TrialScore], answered: Answered) -> Board:
     """One ranked table of these runs, one row for each estimator."""
 
-    def name(score: RunScore) -> str:
+    def name(score: TrialScore) -> str:
         return score.estimator
 
     grouped = [list(group) for _, group in groupby(sorted(scores, key=name), key=name)]
@@ -108,14 +106,14 @@ def _place(row: Row) -> tuple[int, int, float, str]:
     return row.runs - row.survived, row.partial, float("inf") if row.ate_mm is None else row.ate_mm, row.estimator
 
 
-def _row(runs: list[RunScore], answered: Answered) -> Row:
+def _row(runs: list[TrialScore], answered: Answered) -> Row:
     survivors = [run for run in runs if run.status in SURVIVED]
     moving = [run for run in survivors if run.drift_m is None]
     worst = max(runs, key=lambda run: STATUSES.index(run.status))
     found = [answered[run.case, run.estimator] for run in runs if (run.case, run.estimator) in answered]
     is_one_case = len({run.case for run in runs}) == 1
     drifts = [1e3 * run.drift_m for run in runs if run.drift_m is not None and is_one_case]
-    said = found[0] if found and is_one_case else Answers(0.0)
+    said = found[0] if found and is_one_case else EstimatorStatistics(0.0)
     return Row(
         rank=0,
         estimator=runs[0].estimator,
@@ -137,6 +135,96 @@ def _row(runs: list[RunScore], answered: Answered) -> Row:
     )
 
 
-def _mean(runs: list[RunScore], metric: str, statistic: str, scale: float) -> float | None:
+def _mean(runs: list[TrialScore], metric: str, statistic: str, scale: float) -> float | None:
     values = [value for run in runs if (value := run.value(metric, statistic)) is not None]
     return scale * fmean(values) if values else None
+
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"
+
+
+# Heading and cell of each column, as people read them.
+COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
+    ("#", lambda row: str(row.rank)),
+    ("estimator", lambda row: row.estimator),
+    ("status", lambda row: row.status),
+    ("survived", lambda row: f"{row.survived}/{row.runs}"),
+    ("ATE mm", lambda row: _number(row.ate_mm, 2)),
+    ("segments %", lambda row: _number(row.segment_percent, 3)),
+    ("RPE mm/frame", lambda row: _number(row.rpe_mm, 3)),
+    ("RPE °/frame", lambda row: _number(row.rpe_deg, 4)),
+    ("coverage", lambda row: _number(row.coverage, 3)),
+    ("CPU ms/frame", lambda row: _number(row.ms_per_frame, 1)),
+)
+HEADINGS = tuple(heading for heading, _ in COLUMNS)
+LEGEND = (
+    "ATE: RMSE of position after SE(3) alignment; segments: mean drift over 0.5 to 2 m "
+    "(5 to 40 m on paths from 40 m on, 100 to 800 m from 300 m on); "
+    "RPE: RMSE from frame to frame. Errors are means over the runs that survived, of cases that move."
+)
+
+
+def cells(row: Row) -> list[str]:
+    """The cells of one line, in the order of HEADINGS."""
+    return [cell(row) for _, cell in COLUMNS]
+
+
+def notes(row: Row) -> list[str]:
+    """What a line's numbers don't say: how it failed, how far it drifted standing still, what its frames lacked."""
+    said = [f"{row.status}: {row.reason}"] if row.reason else []
+    if row.drift_mm is not None:
+        said.append(f"stood still: drift {row.drift_mm:.1f} mm")
+    if row.frame_reason:
+        frames = "1 frame" if row.frame_reason_count == 1 else f"{row.frame_reason_count} frames"
+        over = f" of {row.runs} runs" if row.runs > 1 else ""
+        said.append(f'{frames}{over} "{row.frame_reason}", first at frame {row.frame_reason_first}')
+    return [f"{row.estimator}: {sentence}" for sentence in said]
+
+
+def markdown(boards: list[Board]) -> str:
+    """All boards as Markdown tables, with what went wrong below each."""
+    return "\n".join(_markdown_board(board) for board in boards) + f"\n{LEGEND}\n"
+
+
+def _markdown_board(board: Board) -> str:
+    lines = [f"## {board.title}", "", "| " + " | ".join(HEADINGS) + " |", "|" + "---|" * len(HEADINGS)]
+    lines += ["| " + " | ".join(cells(row)) + " |" for row in board.rows]
+    below = [f"- {note}" for row in board.rows for note in notes(row)]
+    return "\n".join([*lines, "", *below, *([""] if below else [])])
+
+
+def as_json(boards: list[Board]) -> str:
+    """All boards as one JSON object, numbers in full."""
+    content = {"boards": [{"title": b.title, "rows": [asdict(row) for row in b.rows]} for b in boards]}
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def csv(boards: list[Board]) -> str:
+    """All boards as one CSV table, with the board's title in front."""
+    text: str = data_frame(boards).to_csv(index=False)
+    return text
+
+
+def latex(boards: list[Board]) -> str:
+    """The first board as a LaTeX table with booktabs rules."""
+    import pandas as pd
+
+    table = pd.DataFrame([cells(row) for row in boards[0].rows], columns=[h.replace("%", "\\%") for h in HEADINGS])
+    escaped = table.replace({"_": r"\_"}, regex=True).rename(columns={"#": r"\#", "RPE °/frame": r"RPE $^\circ$/frame"})
+    text: str = escaped.style.hide(axis="index").to_latex(hrules=True)
+    return text
+
+
+def data_frame(boards: list[Board]) -> "pd.DataFrame":
+    """All boards as a pandas table, numbers in full, one row per board and estimator."""
+    import pandas as pd
+
+    return pd.DataFrame([{"board": board.title, **asdict(row)} for board in boards for row in board.rows])
+
+
+FORMATS: dict[str, Callable[[list[Board]], str]] = {"md": markdown, "json": as_json, "csv": csv, "latex": latex}

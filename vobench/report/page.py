@@ -1,4 +1,4 @@
-"""The leaderboard as one page that needs no network: tables, and each case's paths from above."""
+"""The leaderboard as one HTML page, and the reports in a run's folder."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,10 +8,10 @@ import numpy as np
 
 from vobench import stop
 from vobench.geometry.se3 import Array
-from vobench.report import table
-from vobench.report.leaderboard import Board
-from vobench.results import estimate_file
-from vobench.results.run_folder import GROUND_TRUTH, RunFolder, RunScore
+from vobench.report import leaderboard as table
+from vobench.report.leaderboard import Board, EstimatorStatistics, answers, boards
+from vobench.run import estimate as estimate_file
+from vobench.run.folder import GROUND_TRUTH, RunFolder, TrialScore
 from vobench.trajectory.align import Alignment
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -40,7 +40,7 @@ class Plot:
     bar_px: float
 
 
-def html(folder: RunFolder, scores: list[RunScore], boards: list[Board]) -> str:
+def html(folder: RunFolder, scores: list[TrialScore], boards: list[Board]) -> str:
     """The page."""
     from jinja2 import Environment, FileSystemLoader
 
@@ -60,7 +60,7 @@ def html(folder: RunFolder, scores: list[RunScore], boards: list[Board]) -> str:
     )
 
 
-def _plot(folder: RunFolder, case: str, scores: list[RunScore], colours: dict[str, str]) -> Plot:
+def _plot(folder: RunFolder, case: str, scores: list[TrialScore], colours: dict[str, str]) -> Plot:
     stop.check()
     truth = estimate_file.read_tum(folder.case(case) / GROUND_TRUTH).positions_m[:, :2]
     low, span = truth.min(0), max(float(np.ptp(truth, axis=0).max()), 1e-3)
@@ -79,7 +79,33 @@ def _plot(folder: RunFolder, case: str, scores: list[RunScore], colours: dict[st
     return Plot(case, (line("ground truth", "#000000", truth), *estimates), bar_m, bar_m * px_per_m)
 
 
-def _aligned(folder: RunFolder, score: RunScore, stated: dict[str, Any]) -> Array:
+def _aligned(folder: RunFolder, score: TrialScore, stated: dict[str, Any]) -> Array:
     """An estimate's positions (N, 2) from above, after the alignment that its score states."""
     est = estimate_file.read_tum(folder.estimate(score.case, score.estimator, score.repeat) / estimate_file.ESTIMATE)
     return Alignment.from_dict(stated).apply(est.T_world_frame)[:, :2, 3]
+
+
+STEM = "leaderboard"
+
+
+def boards_of(folder: RunFolder, scores: list[TrialScore]) -> list[Board]:
+    """All boards of a run, with what each frame cost and was said of it."""
+    return boards(scores, _answers(folder, scores))
+
+
+def write_reports(folder: RunFolder, scores: list[TrialScore]) -> None:
+    """Put leaderboard.md, .json, .csv and .html into a run's folder."""
+    made = boards_of(folder, scores)
+    for suffix in ("md", "json", "csv"):
+        stop.check()
+        (folder.path / f"{STEM}.{suffix}").write_text(table.FORMATS[suffix](made), encoding="utf-8")
+    (folder.path / f"{STEM}.html").write_text(html(folder, scores, made), encoding="utf-8")
+
+
+def _answers(folder: RunFolder, scores: list[TrialScore]) -> dict[tuple[str, str], EstimatorStatistics]:
+    """What the frames of each case and estimator that answered at all come to."""
+    runs: dict[tuple[str, str], list[list[estimate_file.FrameRow]]] = {}
+    for score in scores:
+        rows = estimate_file.read_frames(folder.estimate(score.case, score.estimator, score.repeat))
+        runs.setdefault((score.case, score.estimator), []).append(rows)
+    return {key: found for key, rows in runs.items() if (found := answers(rows))}

@@ -8,7 +8,7 @@ import scipy
 from vobench.errors import InputError
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
-from vobench.sensor.camera import Radiance
+from vobench.sensor.image_sensor import Radiance
 
 SMUDGES, SPECKS = 5, 60
 SMUDGE_SHARE, SPECK_SHARE = (0.05, 0.2), (0.004, 0.015)  # radii over the picture's width

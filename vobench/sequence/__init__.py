@@ -4,6 +4,7 @@ from vobench.sequence.reader import (
     EncodedFrame,
     Sequence,
     StereoFrame,
+    StereoTruth,
     has_truth,
     payload_hash,
     read_case,
@@ -13,10 +14,12 @@ from vobench.sequence.reader import (
     read_provenance,
     read_true_rig,
     read_truth,
+    read_truth_frames,
+    read_truth_names,
     read_twist,
+    truth_channels,
 )
 from vobench.sequence.salvage import Salvaged, salvage, salvage_sequence
-from vobench.sequence.truth_reader import StereoTruth, read_truth_frames, read_truth_names, truth_channels
 from vobench.sequence.writer import SequenceWriter
 
 __all__ = [

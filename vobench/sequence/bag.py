@@ -18,20 +18,25 @@ from mcap.writer import CompressionType, Writer
 
 from vobench import stop
 from vobench.errors import SequenceError
-from vobench.sequence.index import MESSAGE_INDEX_ENTRY, MESSAGE_INDEX_HEAD, Entries, Index, Numbers, read_index
-from vobench.sequence.messages import NS_PER_S, TYPES, Topic
-from vobench.sequence.record import (
+from vobench.sequence.mcap_index import (
     CHECKSUM,
+    MESSAGE_INDEX_ENTRY,
+    MESSAGE_INDEX_HEAD,
+    Entries,
+    Index,
+    Numbers,
     attached,
     checksum,
     messages_in,
     parsing,
     part_of,
     read_at,
+    read_index,
     read_record,
     unpacked,
     whole_note,
 )
+from vobench.sequence.messages import NS_PER_S, TYPES, Topic
 
 NO_CHANNEL = -1
 PROFILE, SCHEMA_ENCODING, MESSAGE_ENCODING = "ros2", "ros2msg", "cdr"

@@ -9,7 +9,7 @@ from vobench.geometry.rig import ImuCalibration, Rig, WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag, BagWriter
-from vobench.sequence.cdr import serialise
+from vobench.sequence.messages import serialise
 
 WHEELS_NOTE, IMU_NOTE = "vobench.wheels", "vobench.imu"
 IMU_NUMBERS = tuple(field.name for field in fields(ImuCalibration) if field.name != "T_body_imu")

@@ -1,5 +1,6 @@
-"""ROS 2 messages: the topics of a sequence, and geometry to and from their fields."""
+"""ROS 2 messages and topics of a sequence, and their CDR form."""
 
+import struct
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,12 +10,18 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from vobench.errors import SequenceError
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera, Pinhole, camera_matrix
-from vobench.geometry.lens import BrownConrady, KannalaBrandt
+from vobench.geometry.camera import (
+    BrownConrady,
+    Camera,
+    DoubleSphere,
+    Equirectangular,
+    KannalaBrandt,
+    Pinhole,
+    camera_matrix,
+)
 from vobench.geometry.rectify import projection, rectification
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
-from vobench.geometry.sphere import DoubleSphere, Equirectangular
 
 WORLD, BODY, LEFT, RIGHT, IMU_FRAME = "map", "base_link", "cam_left", "cam_right", "imu"
 NS_PER_S = 1_000_000_000
@@ -296,3 +303,52 @@ def camera(message: Any) -> Camera:
             f"Known: {known}, {ALL_AROUND} (0)"
         )
     return model(*size, fx, fy, cx, cy, *d)
+
+
+# A serialised message begins with four bytes that tell its byte order, then the stamp of its header.
+STAMP, STAMP_AT = struct.Struct("<iI"), 4
+LENGTH = struct.Struct("<I")
+LITTLE_ENDIAN = b"\x00\x01"
+
+
+def serialise(message: Any) -> bytes:
+    """The CDR bytes of a message."""
+    return bytes(TYPES.serialize_cdr(message, message.__msgtype__, little_endian=True))
+
+
+def stamped(template: bytes, t_ns: int) -> bytes:
+    """A serialised message that begins with a header, at another stamp."""
+    return b"".join((template[:STAMP_AT], STAMP.pack(*split_stamp(t_ns)), template[STAMP_AT + STAMP.size :]))
+
+
+def pictured(template: bytes, t_ns: int, encoded: bytes) -> bytes:
+    """A serialised CompressedImage without a picture, given a stamp and one: the picture is its last field."""
+    head = template[:STAMP_AT], STAMP.pack(*split_stamp(t_ns)), template[STAMP_AT + STAMP.size : -LENGTH.size]
+    return b"".join((*head, LENGTH.pack(len(encoded)), encoded))
+
+
+def picture_in(data: memoryview) -> tuple[int, str, memoryview]:
+    """Stamp in ns, form and picture of a serialised CompressedImage. Raises ValueError where it is none."""
+    if data[: len(LITTLE_ENDIAN)] != LITTLE_ENDIAN:
+        raise ValueError("a picture's message is not in little-endian CDR")
+    sec, nanosec = STAMP.unpack_from(data, STAMP_AT)
+    _, at = _string(data, STAMP_AT + STAMP.size)  # the frame
+    form, at = _string(data, at)
+    begin, end = _counted(data, at)
+    return sec * NS_PER_S + nanosec, form, data[begin:end]
+
+
+def _string(data: memoryview, at: int) -> tuple[str, int]:
+    """A string, which ends with a zero, and where what follows it begins."""
+    begin, end = _counted(data, at)
+    return bytes(data[begin : max(begin, end - 1)]).decode(), end
+
+
+def _counted(data: memoryview, at: int) -> tuple[int, int]:
+    """Where the bytes begin and end whose number is stated at `at` or up to three bytes later, for it is aligned."""
+    at += -at % LENGTH.size
+    (length,) = LENGTH.unpack_from(data, at)
+    begin = at + LENGTH.size
+    if begin + length > len(data):
+        raise ValueError(f"a message of {len(data)} bytes states {length} more at {at}")
+    return begin, begin + length

@@ -15,8 +15,18 @@ from mcap.writer import Writer
 
 from vobench.errors import SequenceError
 from vobench.sequence.bag import replacing
-from vobench.sequence.index import read_index
-from vobench.sequence.record import HEAD, MAGIC, MESSAGE, attached, part_of, read_at, records_in, unpacked, whole_note
+from vobench.sequence.mcap_index import (
+    HEAD,
+    MAGIC,
+    MESSAGE,
+    attached,
+    part_of,
+    read_at,
+    read_index,
+    records_in,
+    unpacked,
+    whole_note,
+)
 from vobench.sequence.writer import SENSORS_FILE, TRUTH_FILE
 
 SALVAGE_NOTE = "vobench.salvage"

@@ -15,13 +15,13 @@ from vobench.geometry import se3
 from vobench.geometry.rig import Rig, Side
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
-from vobench.sensor.truth import TruthFrame, TruthNames, check_channels
+from vobench.sensor.pixel_truth import TruthFrame, TruthNames, check_channels
 from vobench.sequence import messages as ros
 from vobench.sequence.bag import BagWriter
 from vobench.sequence.calibration import write_mounts
-from vobench.sequence.cdr import pictured, serialise, stamped
+from vobench.sequence.messages import pictured, serialise, stamped
 from vobench.sequence.picture import Image, encode, require_grey
-from vobench.sequence.truth_image import check_truth, names_to_json, truth_image, truth_topic, truth_topics
+from vobench.sequence.pixel_truth import check_truth, names_to_json, truth_image, truth_topic, truth_topics
 
 SENSORS_FILE, TRUTH_FILE = "sensors.mcap", "truth.mcap"
 CASE_ATTACHMENT, NAMES_ATTACHMENT = "case.json", "truth_names.json"

@@ -1,1 +1,1 @@
-"""What a suite says, and the cases and runs that follow from it."""
+"""What a suite says, and the cases and trials that follow from it."""

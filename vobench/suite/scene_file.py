@@ -7,23 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from vobench.catalog import yaml_file
-from vobench.catalog.catalog import unknown
-from vobench.catalog.yaml_file import Keys, Mistakes, Source
-from vobench.errors import SuiteError
+from vobench.errors import SuiteError, unknown
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.scene import mover as scripted
+from vobench.scene import scene as scripted
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun, scaled
-from vobench.scene.material import Glass, Material, Matt, Mirror, Polished
+from vobench.scene.material import Glass, Material, Matt, Mirror, Polished, Texture
 from vobench.scene.scene import Scene, ceiling_light
-from vobench.scene.surface import Surface, box, rectangle, room
-from vobench.scene.texture import Texture
-from vobench.scene.window import Window, with_windows
-from vobench.suite.light_spec import LightOverride
+from vobench.scene.surface import Surface, Window, box, rectangle, room, with_windows
+from vobench.suite import yaml_file
 from vobench.suite.scene_spec import (
     BoardSpec,
     LampSpec,
+    LightOverride,
     MaterialSpec,
     MoverSpec,
     SceneFile,
@@ -31,7 +27,7 @@ from vobench.suite.scene_spec import (
     SunSpec,
     WindowSpec,
 )
-from vobench.suite.strict import Triple
+from vobench.suite.yaml_file import Keys, Mistakes, Triple, YamlFile
 
 Lighting = dict[str, LightOverride]
 # Names of the lights that there is one of.
@@ -96,7 +92,7 @@ def lit(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, ...]:
     return tuple(_lit(light, lighting[light.name]) if light.name in lighting else light for light in lights)
 
 
-def require_possible(name: str, source: Source) -> None:
+def require_possible(name: str, source: YamlFile) -> None:
     """Raise SuiteError where no light can be called so, in a scene that is read only in part."""
     named = [*_names_in(source.marked), *(sky for sky in (SUN, SKY) if sky in source.marked)]
     if name.partition(".")[0] not in named and not name.startswith(GIVEN_NAMES):
@@ -162,7 +158,7 @@ def _places(spec: SceneFile) -> Iterator[tuple[Keys, Triple]]:
         yield from ((("movers", index, "path", nth), key.position_m) for nth, key in enumerate(mover.path))
 
 
-def _check_names(spec: SceneFile, source: Source, wrong: Mistakes) -> None:
+def _check_names(spec: SceneFile, source: YamlFile, wrong: Mistakes) -> None:
     """Lights are named by lightings, and things by ground truth: no name twice, a name given by us included."""
     has_room = "room" in spec.model_fields_set
     seen = {SUN, SKY, *(surface.instance for surface in (_room(spec) if has_room else ()))}

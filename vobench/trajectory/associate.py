@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from vobench.errors import AlignmentError
 from vobench.geometry.se3 import Array
-from vobench.trajectory.interpolate import poses_at
-from vobench.trajectory.trajectory import Stamps, Trajectory
+from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
 Index = NDArray[np.int64]
 Method = Literal["nearest", "evo", "interpolate", "greedy", "in_order"]

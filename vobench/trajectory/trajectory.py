@@ -1,11 +1,15 @@
-"""A trajectory is two arrays: when, and where."""
+"""A trajectory: stamps and poses; interpolation, and changes of axes and frame."""
 
-from dataclasses import dataclass
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.errors import TrajectoryError
+from vobench.errors import InputError, TrajectoryError
+from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
 Stamps = NDArray[np.int64]
@@ -75,3 +79,109 @@ def _require_poses(T: Array, begin: int) -> None:
         bad = int(wrong[0])
         what = "is mirrored (determinant -1)" if mirrors[bad] else f"is off by {skew[bad]:.3g} (RᵀR - 1)"
         raise TrajectoryError(f"the rotation of pose {begin + bad} {what}; it should be orthonormal and right-handed")
+
+
+def poses_at(trajectory: Trajectory, t_ns: Stamps) -> Array:
+    """Poses (N, 4, 4) of a trajectory of one pose or more at t_ns (N,); before and after it its ends.
+
+    Source: Shoemake (1985), eq. of slerp, along the shorter way round.
+    """
+    stamps, T = trajectory.t_ns, trajectory.T_world_frame
+    before = np.clip(np.searchsorted(stamps, t_ns, side="right") - 1, 0, max(len(stamps) - 2, 0))
+    after = np.minimum(before + 1, len(stamps) - 1)
+    step_ns = np.maximum(stamps[after] - stamps[before], 1)
+    share = np.clip((t_ns - stamps[before]) / step_ns, 0.0, 1.0)[:, None]
+    positions = (1 - share) * T[before, :3, 3] + share * T[after, :3, 3]
+    return se3.transform(_slerp(T[before, :3, :3], T[after, :3, :3], share), positions)
+
+
+def _slerp(R_begin: Array, R_end: Array, share: Array) -> Array:
+    a, b = se3.to_quaternion(R_begin), se3.to_quaternion(R_end)
+    cosine = np.sum(a * b, axis=-1, keepdims=True)
+    b, cosine = np.where(cosine < 0, -b, b), np.abs(cosine)
+    sine = np.linalg.norm(b - cosine * a, axis=-1, keepdims=True)
+    angle = np.arctan2(sine, cosine)
+    near = sine < 1e-9  # there the weights of a straight line are exact
+    safe = np.where(near, 1.0, sine)
+    q = np.where(near, 1 - share, np.sin((1 - share) * angle) / safe) * a
+    q = q + np.where(near, share, np.sin(share * angle) / safe) * b
+    return se3.from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
+
+
+Kind = Literal["axes", "positions", "mount", "inverse", "rotations"]
+INVERSES: dict[str, Kind] = {"inverse": "inverse", "rotations:inverse": "rotations"}
+AXIS = re.compile(r"([+-]?)([xyz])")
+MOUNT_VALUES = 7
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A change of poses: `matrix` is signed axes S (3, 3), or for a mount T_est_gt (4, 4).
+
+    `axes`: the file's axes are others, T' = S T S⁻¹. `positions`: only its positions are in
+    other axes, p' = S p. `mount`: it is of another frame of the same body, T' = T T_est_gt.
+    `inverse`: it takes the world to the frame, T' = T⁻¹. `rotations`: only its rotations do, R' = Rᵀ.
+    """
+
+    kind: Kind
+    matrix: Array = field(default_factory=lambda: np.eye(3))
+
+    def apply(self, T: Array) -> Array:
+        """Poses (..., 4, 4), changed."""
+        if self.kind == "mount":
+            moved: Array = T @ self.matrix
+            return moved
+        if self.kind == "inverse":
+            return se3.inverse(T)
+        if self.kind == "rotations":
+            return se3.transform(np.swapaxes(T[..., :3, :3], -1, -2), T[..., :3, 3])
+        S = self.matrix
+        R = S @ T[..., :3, :3] @ S.T if self.kind == "axes" else T[..., :3, :3]
+        return se3.transform(R, T[..., :3, 3] @ S.T)
+
+    def __str__(self) -> str:
+        for word, kind in INVERSES.items():
+            if kind == self.kind:
+                return word
+        if self.kind != "mount":
+            return f"{self.kind}:{','.join(map(_axis_name, self.matrix))}"
+        q_xyzw = se3.to_quaternion(self.matrix[:3, :3])
+        return f"mount:{','.join(f'{v:.6g}' for v in (*self.matrix[:3, 3], *q_xyzw))}"
+
+
+def parse_move(word: str) -> Move:
+    """The move in words such as `axes:z,-x,-y`, `inverse` or `mount:x,y,z,qx,qy,qz,qw`. Raises InputError."""
+    if word in INVERSES:
+        return Move(INVERSES[word])
+    kind, _, stated = word.partition(":")
+    values = [part.strip() for part in stated.split(",")]
+    if kind == "mount":
+        return Move("mount", _mount(values, word))
+    if kind in ("axes", "positions"):
+        return Move("axes" if kind == "axes" else "positions", _axes(values, word))
+    raise InputError(
+        f"a file may be read as axes:…, positions:…, mount:…, inverse or rotations:inverse, but not as {word!r}"
+    )
+
+
+def _axes(values: Sequence[str], word: str) -> Array:
+    found = [AXIS.fullmatch(value) for value in values]
+    if len(values) != 3 or sorted(match[2] for match in found if match) != ["x", "y", "z"]:
+        raise InputError(f"axes are x, y and z, each once, with or without a minus, such as z,-x,-y; not {word!r}")
+    rows = [(-1.0 if m[1] == "-" else 1.0) * np.eye(3)["xyz".index(m[2])] for m in found if m]
+    return np.stack(rows)
+
+
+def _mount(values: Sequence[str], word: str) -> Array:
+    try:
+        numbers = np.array([float(value) for value in values])
+    except ValueError:
+        numbers = np.zeros(0)
+    if len(numbers) != MOUNT_VALUES or not np.isfinite(numbers).all() or abs(np.linalg.norm(numbers[3:]) - 1) > 1e-3:
+        raise InputError(f"a mount is x,y,z,qx,qy,qz,qw in metres with a quaternion of norm 1, not {word!r}")
+    return se3.transform(se3.from_quaternion(numbers[3:] / np.linalg.norm(numbers[3:])), numbers[:3])
+
+
+def _axis_name(row: Array) -> str:
+    axis = int(np.argmax(np.abs(row)))
+    return f"{'-' if row[axis] < 0 else ''}{'xyz'[axis]}"

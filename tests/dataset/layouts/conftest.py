@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from vobench.dataset.convert import convert
-from vobench.dataset.options import Options
 from vobench.dataset.read import read
+from vobench.dataset.recording import ReadOptions
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
@@ -167,7 +167,7 @@ def imported(tmp_path: Path) -> Callable[..., Path]:
 
     def through(path: Path, **options: Any) -> Path:
         folder = tmp_path / "imported"
-        convert(read(path, options=Options(**options)), folder)
+        convert(read(path, options=ReadOptions(**options)), folder)
         return folder
 
     return through

@@ -15,13 +15,11 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
-from vobench.dataset.options import Options, Topics
-from vobench.dataset.read import read
-from vobench.dataset.sniff import sniff
+from vobench.dataset.read import read, sniff
+from vobench.dataset.recording import ReadOptions, Topics
 from vobench.errors import VobenchError
 from vobench.geometry import se3
-from vobench.geometry.camera import Pinhole
-from vobench.geometry.lens import BrownConrady, KannalaBrandt
+from vobench.geometry.camera import BrownConrady, KannalaBrandt, Pinhole
 from vobench.sequence import Sequence, read_truth
 
 IMAGE, COMPRESSED, INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/CameraInfo"
@@ -294,7 +292,7 @@ def test_an_imu_without_its_noise_is_dropped_and_said(scene, tmp_path):
 def test_a_given_chain_takes_the_place_of_the_bag_s_calibration(scene, tmp_path, camchain, placed):
     chain = tmp_path / "chain.yaml"
     chain.write_text(camchain())
-    rig = read(whole(scene).write(tmp_path / "bag"), options=Options(calibration=chain)).rig
+    rig = read(whole(scene).write(tmp_path / "bag"), options=ReadOptions(calibration=chain)).rig
     assert np.abs(rig.T_body_left - placed[0]).max() < 1e-12
 
 
@@ -302,12 +300,12 @@ def test_topics_of_any_name_may_be_named(scene, tmp_path):
     path = whole(scene, left="/port/image", right="/starboard/image").write(tmp_path / "bag")
     with pytest.raises(VobenchError, match=r"name the left and the right topic .* /port/image, /starboard/image"):
         read(path)
-    recording = read(path, options=Options(topics=Topics(left="/port/image", right="/starboard/image")))
+    recording = read(path, options=ReadOptions(topics=Topics(left="/port/image", right="/starboard/image")))
     assert recording.rig.right is not None
     with pytest.raises(VobenchError, match="no topic '/port/pictures' in"):
-        read(path, options=Options(topics=Topics(left="/port/pictures", right="/starboard/image")))
+        read(path, options=ReadOptions(topics=Topics(left="/port/pictures", right="/starboard/image")))
     with pytest.raises(VobenchError, match=r"/imu should be .*Image, but is sensor_msgs/msg/Imu"):
-        read(path, options=Options(topics=Topics(left="/imu", right="/starboard/image")))
+        read(path, options=ReadOptions(topics=Topics(left="/imu", right="/starboard/image")))
 
 
 @pytest.mark.parametrize("ros1", [True, False])

@@ -7,16 +7,15 @@ import cv2
 import numpy as np
 import pytest
 
-from vobench.dataset.euroc_sensor import sensor_camera
-from vobench.dataset.options import Options
-from vobench.dataset.read import read
-from vobench.dataset.sniff import sniff
-from vobench.dataset.yaml_values import read_yaml
+from vobench.dataset.euroc import sensor_camera
+from vobench.dataset.kalibr import read_yaml
+from vobench.dataset.read import read, sniff
+from vobench.dataset.recording import ReadOptions
 from vobench.errors import VobenchError
 from vobench.geometry import se3
-from vobench.geometry.lens import BrownConrady
-from vobench.geometry.preset import EUROC
+from vobench.geometry.camera import BrownConrady
 from vobench.geometry.rectify import rectification
+from vobench.geometry.rig import EUROC
 from vobench.sequence import Sequence, read_truth
 
 
@@ -138,7 +137,7 @@ def test_eyes_a_little_apart_are_a_pair_and_it_is_said(scene, tmp_path):
     assert [frame.t_ns for frame in recording.frames()] == scene.t_ns.tolist()
     assert any("up to 700 ns apart" in note for note in recording.notes)
     with pytest.raises(VobenchError, match="within 500 ns of each other"):
-        read(folder, options=Options(within_ns=500))
+        read(folder, options=ReadOptions(within_ns=500))
 
 
 def test_truth_is_moved_from_the_marker_to_the_body(scene, tmp_path, placed):
@@ -219,13 +218,13 @@ def test_an_imu_of_unknown_noise_is_dropped_and_said(scene, tmp_path):
 def test_a_given_chain_wins_over_the_sensors_own(scene, tmp_path, camchain):
     folder, chain = scene.euroc(tmp_path / "in"), tmp_path / "mine.yaml"
     chain.write_text(camchain().replace("40.5", "44.5"))
-    assert read(folder, options=Options(calibration=chain)).rig.left.fx_px == 44.5
+    assert read(folder, options=ReadOptions(calibration=chain)).rig.left.fx_px == 44.5
 
 
 def test_a_clock_that_is_off_by_calibration_is_said(scene, tmp_path, camchain):
     folder, chain = scene.euroc(tmp_path / "in"), tmp_path / "mine.yaml"
     chain.write_text(camchain() + "  timeshift_cam_imu: 0.012\n")
-    assert any("cam1 is 0.012 s off" in note for note in read(folder, options=Options(calibration=chain)).notes)
+    assert any("cam1 is 0.012 s off" in note for note in read(folder, options=ReadOptions(calibration=chain)).notes)
 
 
 def test_sensors_that_nobody_asked_for_are_named(scene, tmp_path):

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vobench.dataset.options import Options
 from vobench.dataset.read import read
+from vobench.dataset.recording import ReadOptions
 from vobench.errors import VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
@@ -68,7 +68,7 @@ def test_poses_may_lie_anywhere(scene, tmp_path):
     (tmp_path / "poses/00.txt").rename(tmp_path / "mine.txt")
     assert read(folder).truth is None
     assert "There is no ground truth." in read(folder).notes
-    assert len(read(folder, options=Options(truth=tmp_path / "mine.txt")).truth) == len(scene.t_ns)
+    assert len(read(folder, options=ReadOptions(truth=tmp_path / "mine.txt")).truth) == len(scene.t_ns)
 
 
 def test_a_pose_for_each_picture_or_none(scene, tmp_path):

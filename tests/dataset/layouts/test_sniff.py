@@ -5,8 +5,7 @@ import struct
 import pytest
 from mcap.writer import Writer as McapWriter
 
-from vobench.dataset.read import READERS, read
-from vobench.dataset.sniff import FORMS, sniff
+from vobench.dataset.read import FORMS, READERS, read, sniff
 from vobench.errors import VobenchError
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vobench.dataset.options import Options
 from vobench.dataset.read import read
+from vobench.dataset.recording import ReadOptions
 from vobench.errors import VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
@@ -36,7 +36,7 @@ def test_the_camera_looks_where_ned_s_x_points(scene, tmp_path):
 
 
 def test_another_rate_may_be_given(scene, tmp_path):
-    recording = read(scene.tartanair(tmp_path), options=Options(rate_hz=30.0))
+    recording = read(scene.tartanair(tmp_path), options=ReadOptions(rate_hz=30.0))
     assert [frame.t_ns for frame in recording.frames()] == [0, 33_333_333, 66_666_667, 100_000_000, 133_333_333]
     assert any("30 Hz" in note for note in recording.notes)
 

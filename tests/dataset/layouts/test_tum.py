@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vobench.dataset.options import Options
 from vobench.dataset.read import read
+from vobench.dataset.recording import ReadOptions
 from vobench.errors import VobenchError
 from vobench.sequence import Sequence, read_truth
-from vobench.trajectory.text import parse_tum
+from vobench.trajectory.formats import parse_tum
 
 TRUTH = Path(__file__).parents[4] / "shared" / "data" / "trajectories" / "freiburg1_xyz-groundtruth.txt"
 
@@ -38,7 +38,7 @@ def test_a_camera_that_nobody_names_needs_a_calibration(scene, tmp_path, camchai
         read(folder)
     chain = tmp_path / "chain.yaml"
     chain.write_text(camchain(cameras=1, imu=False, size=(640, 480)))
-    assert read(folder, options=Options(calibration=chain)).rig.left.fx_px == 40.5
+    assert read(folder, options=ReadOptions(calibration=chain)).rig.left.fx_px == 40.5
 
 
 def test_the_list_names_the_robot_where_the_folder_does_not(scene, tmp_path):

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from vobench.dataset.options import Options, Topics
 from vobench.dataset.read import read
+from vobench.dataset.recording import ReadOptions, Topics
 from vobench.errors import VobenchError
 
 POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n"
@@ -17,7 +17,7 @@ POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 123
 def complaint(path, **options) -> str:
     """What is said of a recording, at once or when its pictures come; it is one line."""
     with pytest.raises(VobenchError) as caught:
-        list(read(path, options=Options(**options)).frames())
+        list(read(path, options=ReadOptions(**options)).frames())
     assert "\n" not in str(caught.value)
     return str(caught.value)
 

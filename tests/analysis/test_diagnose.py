@@ -1,0 +1,354 @@
+"""Each fault is named, on real and made-up trajectories, and what is only noisy gets no name."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vobench.analysis.diagnose import diagnose
+from vobench.analysis.mismatch import misfit
+from vobench.errors import AlignmentError
+from vobench.geometry import se3
+from vobench.trajectory.align import align
+from vobench.trajectory.formats import Reading, parse_any, parse_times
+from vobench.trajectory.trajectory import Trajectory, parse_move
+
+DATA = Path(__file__).parents[2] / ".." / "shared" / "data" / "trajectories"
+WITH_DATA = pytest.mark.skipif(not DATA.is_dir(), reason="no folder ../shared/data with real trajectories")
+CAMERA = se3.transform([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], [0.0, 0.0, 0.0])  # T_body_camera, optical axes
+TILT = se3.transform(se3.rotation_z(0.6) @ CAMERA[:3, :3] @ se3.rotation_z(0.3), [0.2, 0.1, 0.4])
+
+
+def changed(trajectory, T=None, t_ns=None):
+    new_t = trajectory.t_ns if t_ns is None else t_ns
+    return Trajectory(new_t, trajectory.T_world_frame if T is None else T)
+
+
+def reordered(trajectory):
+    """As a file with w first reads where w is taken to come last."""
+    q = se3.to_quaternion(trajectory.T_world_frame[:, :3, :3])[:, [3, 0, 1, 2]]
+    return changed(trajectory, se3.transform(se3.from_quaternion(q), trajectory.positions_m))
+
+
+def scaled(trajectory, factor):
+    R = trajectory.T_world_frame[:, :3, :3]
+    return changed(trajectory, se3.transform(R, factor * trajectory.positions_m))
+
+
+def moved(word):
+    return lambda est: changed(est, parse_move(word).apply(est.T_world_frame))
+
+
+FRAMES = {
+    "quaternion_order": [reordered],
+    "axis_swap": [moved("axes:z,-x,-y"), moved("positions:y,x,z"), moved("positions:y,z,x"), moved("axes:y,x,z")],
+    "mirrored_axes": [moved("positions:x,-y,z"), moved("positions:-x,y,z"), moved("axes:x,y,-z")],
+    "inverse_poses": [moved("inverse")],
+    "inverse_rotations": [moved("rotations:inverse")],
+    "body_frame_offset": [lambda est: est.of_mounted(CAMERA), lambda est: est.of_mounted(TILT)],
+    "scale": [lambda est: scaled(est, 0.5), lambda est: scaled(est, 1000.0)],
+}
+CLOCKS = {
+    "time_offset": [
+        lambda est: changed(est, t_ns=est.t_ns + 250_000_000),
+        lambda est: changed(est, t_ns=est.t_ns - int(est.t_ns[0]) + 10**12),
+    ],
+    "stamp_unit": [lambda est: changed(est, t_ns=(est.t_ns - est.t_ns[0]) * 1000)],
+}
+PLAIN = [(fault, i) for fault, makers in FRAMES.items() for i in range(len(makers))]
+ALL = [*PLAIN, *((fault, i) for fault, makers in CLOCKS.items() for i in range(len(makers)))]
+
+
+def read(name):
+    parsed = parse_any((DATA / name).read_text(), name=name)
+    t_ns = parsed.t_ns
+    if t_ns is None and "KITTI" in name:
+        t_ns = parse_times((DATA / "KITTI_00_gt_times.txt").read_text(), name="times")
+    unit = None if t_ns is None else "s"
+    t_ns = np.arange(len(parsed.T)) * 10**9 if t_ns is None else t_ns
+    return Reading(Trajectory(t_ns, parsed.T), unit, unit)
+
+
+@pytest.fixture(scope="module")
+def real():
+    return {
+        "tum": (read("freiburg1_xyz-groundtruth.txt"), read("freiburg1_xyz-rgbdslam.txt")),
+        "kitti": (read("KITTI_00_gt.txt"), read("KITTI_00_ORB.txt")),
+        "tartanair": (read("tartanair/pose_gt.txt"), read("tartanair/pose_est.txt")),
+    }
+
+
+def loop(n=400, seed=1):
+    """A drive with hills and turns at 20 Hz, and what a good estimator makes of it: its noise grows like a walk."""
+    rng = np.random.default_rng(seed)
+    s = np.linspace(0, 6, n)
+    s = s + 0.1 * np.sin(9 * s)
+    p = np.stack([5 * np.cos(s), 4 * np.sin(2 * s), 0.7 * np.sin(2.5 * s)], -1)
+    axes = CAMERA[:3, :3]
+    R = se3.rotation_z(s + np.pi / 2) @ axes @ se3.rotation_z(0.4 * np.sin(3 * s)) @ axes.T  # heading, roll
+    gt = Trajectory(np.arange(n, dtype=np.int64) * 50_000_000, se3.transform(R, p))
+    noisy = se3.transform(gt.T_world_frame[:, :3, :3], p + np.cumsum(rng.normal(scale=2e-3, size=p.shape), axis=0))
+    return Reading(gt), Reading(Trajectory(gt.t_ns, noisy))
+
+
+def found(gt, est):
+    return diagnose(gt, est)
+
+
+def assert_named(fault, gt, est):
+    findings = found(gt, est)
+    assert [finding.fault for finding in findings] == [fault]
+    (finding,) = findings
+    assert finding.evidence
+    assert all(np.isfinite(e.after) and (e.before is None or np.isfinite(e.before)) for e in finding.evidence)
+    return finding
+
+
+@pytest.mark.parametrize(("fault", "variant"), ALL)
+def test_a_fault_of_a_made_up_drive_is_named(fault, variant):
+    gt, est = loop()
+    broken = (FRAMES | CLOCKS)[fault][variant](est.trajectory)
+    assert_named(fault, gt, replace(est, trajectory=broken))
+
+
+@pytest.mark.parametrize("factor", [0.01, 0.5, 30.0])
+def test_the_misfit_does_not_see_world_nor_scale_and_is_a_share_of_the_truths_extent(factor):
+    gt, est = (reading.trajectory for reading in loop())
+    left = misfit(gt.T_world_frame, scaled(changed(est, TILT @ est.T_world_frame), factor).T_world_frame)
+    known = misfit(gt.T_world_frame, est.T_world_frame)
+    assert (left.trans, left.rot_rad) == pytest.approx((known.trans, known.rot_rad), rel=1e-6)
+    aligned = align(est.T_world_frame, gt.T_world_frame, kind="sim3").apply(est.T_world_frame)
+    off_m = np.linalg.norm((aligned - gt.T_world_frame)[:, :3, 3], axis=1)
+    from_middle_m = np.linalg.norm(gt.positions_m - gt.positions_m.mean(axis=0), axis=1)
+    assert known.trans == pytest.approx(np.sqrt(np.mean(off_m**2) / np.mean(from_middle_m**2)))
+
+
+def test_a_clean_drive_has_no_fault_however_noisy():
+    gt, est = loop()
+    assert found(gt, est) == ()
+    assert found(gt, gt) == ()
+    rng = np.random.default_rng(0)
+    shaken = est.trajectory.T_world_frame.copy()
+    shaken[:, :3, 3] += rng.normal(scale=0.1, size=(len(shaken), 3))
+    assert found(gt, replace(est, trajectory=changed(est.trajectory, shaken))) == ()
+
+
+def test_another_world_is_no_fault():
+    gt, est = loop()
+    elsewhere = TILT @ est.trajectory.T_world_frame
+    assert found(gt, replace(est, trajectory=changed(est.trajectory, elsewhere))) == ()
+
+
+def test_several_faults_are_named_one_after_the_other():
+    gt, est = loop()
+    broken = scaled(est.trajectory, 3.0)
+    broken = changed(broken, parse_move("axes:z,-x,-y").apply(broken.T_world_frame), broken.t_ns + 700_000_000)
+    findings = found(gt, replace(est, trajectory=broken))
+    assert [finding.fault for finding in findings] == ["time_offset", "axis_swap", "scale"]
+    assert [finding.options for finding in findings] == [
+        ("--t-offset=-0.7",),
+        ("--est-as", "axes:-y,-z,x"),
+        ("-a", "sim3"),
+    ]
+
+
+def test_the_move_that_mends_is_the_inverse_of_the_one_that_broke():
+    gt, est = loop()
+    for word in ("axes:z,-x,-y", "positions:y,z,x", "positions:x,-y,z", "axes:y,x,z"):
+        broken = moved(word)(est.trajectory)
+        finding = diagnose(gt, replace(est, trajectory=broken))[0]
+        mended = parse_move(finding.options[1]).apply(broken.T_world_frame)
+        np.testing.assert_allclose(mended, est.trajectory.T_world_frame, atol=1e-12)
+
+
+def test_a_mount_that_mends_is_the_inverse_of_the_one_that_broke():
+    gt, est = loop()
+    finding = assert_named("body_frame_offset", gt, replace(est, trajectory=est.trajectory.of_mounted(TILT)))
+    left = TILT @ parse_move(finding.options[1]).matrix
+    assert np.rad2deg(se3.rotation_angle(left[:3, :3])) < 2
+    assert np.linalg.norm(left[:3, 3]) < 0.05
+
+
+def test_the_offset_that_mends_is_exact_where_stamps_meet():
+    gt, est = loop()
+    late = changed(est.trajectory, t_ns=est.trajectory.t_ns + 330_000_007)
+    assert_named("time_offset", gt, replace(est, trajectory=late))
+    assert diagnose(gt, replace(est, trajectory=late))[0].options == ("--t-offset=-0.330000007",)
+
+
+def test_quaternions_of_either_side_may_be_in_the_wrong_order():
+    gt, est = loop()
+    finding = assert_named("quaternion_order", replace(gt, trajectory=reordered(gt.trajectory)), est)
+    assert finding.options == ("--gt-as", "wxyz")
+    read_first = replace(est, trajectory=reordered(est.trajectory))
+    assert diagnose(gt, read_first)[0].options == ("--est-as", "wxyz")
+
+
+def test_files_of_matrices_have_no_quaternion_order():
+    gt, est = loop()
+    broken = replace(est, trajectory=reordered(est.trajectory), order=None)
+    assert all(finding.fault != "quaternion_order" for finding in diagnose(replace(gt, order=None), broken))
+
+
+def test_stamps_that_could_only_be_read_in_another_unit_are_a_fault():
+    gt, est = loop()
+    finding = assert_named("stamp_unit", gt, replace(est, unit="ns"))
+    assert finding.options == ("--est-as", "ns")
+    assert finding.evidence[0].before == pytest.approx(1e9)
+    assert finding.evidence[0].after == pytest.approx(1.0)
+
+
+def test_a_truth_in_another_unit_is_told_from_an_estimate_in_one():
+    gt, est = loop()
+    slow = replace(gt, trajectory=changed(gt.trajectory, t_ns=gt.trajectory.t_ns * 1000))
+    assert assert_named("stamp_unit", slow, est).options == ("--gt-as", "ms")
+
+
+@pytest.mark.parametrize("shape", ["line", "still", "plane"])
+def test_poor_motion_is_no_fault(shape):
+    n = 100
+    s = np.linspace(0, 1, n)
+    p = np.zeros((n, 3)) if shape == "still" else np.stack([10 * s, 3 * s, s], -1)
+    if shape == "plane":
+        p = np.stack([5 * np.cos(6 * s), 5 * np.sin(6 * s), 0 * s], -1)
+    R = se3.rotation_z(6 * s) if shape == "plane" else np.broadcast_to(np.eye(3), (n, 3, 3))
+    gt = Trajectory(np.arange(n) * 10**8, se3.transform(R, p))
+    noise = np.random.default_rng(2).normal(scale=1e-3, size=(n, 3))
+    assert found(Reading(gt), Reading(changed(gt, se3.transform(R, p + noise)))) == ()
+
+
+@pytest.mark.parametrize("word", ["inverse", "rotations:inverse"])
+def test_inverses_are_known_in_any_world_and_on_either_side(word):
+    gt, est = loop()
+    elsewhere = TILT @ est.trajectory.T_world_frame
+    est = replace(est, trajectory=changed(est.trajectory, elsewhere))
+    for side, given in (
+        ("est", (gt, replace(est, trajectory=moved(word)(est.trajectory)))),
+        ("gt", (replace(gt, trajectory=moved(word)(gt.trajectory)), est)),
+    ):
+        (finding,) = found(*given)
+        assert (finding.fault, finding.options) == (
+            {"inverse": "inverse_poses", "rotations:inverse": "inverse_rotations"}[word],
+            (f"--{side}-as", word),
+        )
+
+
+@WITH_DATA
+@pytest.mark.parametrize("name", ["tum", "kitti", "tartanair"])
+@pytest.mark.parametrize("word", ["inverse", "rotations:inverse"])
+def test_inverses_of_real_estimates_are_mended_on_the_estimates_side(real, name, word):
+    gt, est = real[name]
+    finding = found(gt, replace(est, trajectory=moved(word)(est.trajectory)))[0]
+    assert finding.options == ("--est-as", word)
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 200.0])
+def test_trajectories_with_nothing_in_common_are_called_so_and_nothing_else(seed, factor):
+    rng = np.random.default_rng(seed)
+    gt, _ = loop()
+    s = np.linspace(0, 6, 400)
+    waves = np.sin(rng.uniform(0.5, 4, (3, 5, 1)) * s + rng.uniform(0, 6, (3, 5, 1))).sum(axis=1).T
+    other = Trajectory(gt.trajectory.t_ns, se3.transform(se3.rotation_z(waves[:, 0]), factor * waves))
+    finding = assert_named("unrelated", gt, Reading(other))
+    assert finding.options == ()
+    assert finding.evidence[0].after >= 50
+
+
+def test_an_estimate_that_is_merely_bad_is_not_called_unrelated():
+    gt, est = loop()
+    drifted = est.trajectory.T_world_frame.copy()
+    drifted[:, :3, 3] += np.linspace(0, 5, len(drifted))[:, None] * [0.5, 0.3, 0.2]
+    assert "unrelated" not in [f.fault for f in found(gt, replace(est, trajectory=changed(est.trajectory, drifted)))]
+
+
+def test_a_unit_and_an_order_that_were_told_are_believed():
+    gt, est = loop()
+    assert found(replace(gt, unit="ns", form_unit="ns", is_unit_told=True), est) == ()
+    slow = replace(gt, trajectory=changed(gt.trajectory, t_ns=gt.trajectory.t_ns * 1000))
+    assert found(slow, est)[0].fault == "stamp_unit"
+    with pytest.raises(AlignmentError, match="1 match"):
+        diagnose(replace(slow, is_unit_told=True), est)
+    told = replace(est, trajectory=reordered(est.trajectory), order=None)
+    assert "quaternion_order" not in [finding.fault for finding in found(replace(gt, order=None), told)]
+
+
+@pytest.mark.parametrize("offset_ns", [-60_000_000, -40_000_000, 40_000_000, 60_000_000])
+@pytest.mark.parametrize("noise_m", [0.0, 5e-3])
+def test_a_clock_about_a_frame_off_is_found_where_speeds_change(offset_ns, noise_m):
+    gt, est = loop()
+    T = est.trajectory.T_world_frame.copy()
+    T[:, :3, 3] += noise_m * np.random.default_rng(4).normal(size=(len(T), 3))
+    shifted = changed(est.trajectory, T, est.trajectory.t_ns + offset_ns)
+    finding = assert_named("time_offset", gt, replace(est, trajectory=shifted))
+    assert float(finding.options[0].partition("=")[2]) == pytest.approx(-offset_ns / 1e9, abs=0.01)
+
+
+def test_too_little_to_compare_is_an_error():
+    gt, est = loop()
+    few = Trajectory(gt.trajectory.t_ns[:3], gt.trajectory.T_world_frame[:3])
+    assert len(few) == 3
+    with pytest.raises(AlignmentError, match="a diagnosis needs 8 matched poses or more, but 3 match"):
+        diagnose(gt, replace(est, trajectory=few))
+
+
+@WITH_DATA
+@pytest.mark.parametrize("name", ["tum", "kitti", "tartanair"])
+def test_real_pairs_have_no_fault(real, name):
+    assert found(*real[name]) == ()
+
+
+@WITH_DATA
+@pytest.mark.parametrize("name", ["tum", "kitti", "tartanair"])
+def test_real_pairs_given_in_the_wrong_order_are_named(real, name):
+    gt, est = real[name]
+    assert_named("swapped_inputs", est, gt)
+
+
+@WITH_DATA
+@pytest.mark.parametrize(("name", "variant"), [("tum", 0), ("kitti", 1), ("tartanair", 2)])
+@pytest.mark.parametrize("fault", FRAMES)
+def test_a_fault_of_frames_put_into_a_real_pair_is_named(real, name, variant, fault):
+    gt, est = (replace(reading, unit=None) for reading in real[name])
+    variants = FRAMES[fault]
+    assert_named(fault, gt, replace(est, trajectory=variants[variant % len(variants)](est.trajectory)))
+
+
+@WITH_DATA
+@pytest.mark.parametrize("name", ["tum", "kitti"])
+@pytest.mark.parametrize("fault", CLOCKS)
+def test_a_fault_of_clocks_put_into_a_real_pair_is_named(real, name, fault):
+    gt, est = real[name]
+    for make in CLOCKS[fault][:1]:
+        broken = replace(est, trajectory=make(est.trajectory))
+        faults = [finding.fault for finding in found(gt, broken)]
+        assert faults[0] == fault
+        assert set(faults) <= set(CLOCKS)
+
+
+@WITH_DATA
+@pytest.mark.parametrize("name", ["tum", "kitti"])
+@pytest.mark.parametrize("offset_ns", [50_000_000, -50_000_000])
+def test_a_clock_of_a_real_pair_may_be_a_twentieth_of_a_second_off(real, name, offset_ns):
+    gt, est = real[name]
+    late = changed(est.trajectory, t_ns=est.trajectory.t_ns + offset_ns)
+    finding = assert_named("time_offset", gt, replace(est, trajectory=late))
+    own_ns = 10_400_000 if name == "tum" else 0  # fr1/xyz came with an offset
+    assert float(finding.options[0].partition("=")[2]) * 1e9 == pytest.approx(-offset_ns - own_ns, abs=1e6)
+
+
+@WITH_DATA
+@pytest.mark.parametrize(("one", "other"), [("tum", "kitti"), ("kitti", "tartanair"), ("tartanair", "tum")])
+def test_real_trajectories_of_other_places_are_not_of_one_motion(real, one, other):
+    gt, est = real[one][0].trajectory, real[other][1].trajectory
+    n = min(len(gt), len(est))
+    t_ns = np.arange(n) * 10**8
+    pair = (Reading(Trajectory(t_ns, t.T_world_frame[:n])) for t in (gt, est))
+    assert_named("unrelated", *pair)
+
+
+@WITH_DATA
+def test_a_monocular_path_is_known_by_its_scale(real):
+    gt, est = real["tum"][0], read("freiburg1_xyz-ORB_kf_mono.txt")
+    assert_named("scale", gt, est)

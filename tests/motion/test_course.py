@@ -1,0 +1,372 @@
+"""Pieces of a course against their closed forms."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.special import ellipe, fresnel
+
+from vobench.errors import MotionError
+from vobench.geometry.rig import PIONEER_WHEELS
+from vobench.geometry.se3 import Array
+from vobench.motion.course import (
+    Piece,
+    arc_length,
+    circle,
+    course,
+    figure_8,
+    lissajous,
+    lissajous_curve,
+    pure_rotation,
+    reverse,
+    rolled,
+    square,
+    stop_and_go,
+)
+from vobench.motion.drive import drive
+from vobench.trajectory.kinematics import Kinematics, level
+
+
+def place(pieces, s):
+    return course(pieces).at(np.atleast_1d(np.asarray(s, float))).T_world_body[:, :2, 3]
+
+
+@given(st.floats(0.1, 10), st.floats(0.1, 50))
+def test_an_arc_lies_on_its_circle(radius_m, length_m):
+    s = np.linspace(0, length_m, 50)
+    x, y = place([Piece(length_m, 1 / radius_m)], s).T
+    np.testing.assert_allclose(x, radius_m * np.sin(s / radius_m), atol=1e-12 * (radius_m + length_m))
+    np.testing.assert_allclose(y, radius_m * (1 - np.cos(s / radius_m)), atol=1e-12 * (radius_m + length_m))
+
+
+@given(st.floats(0.05, 3), st.floats(0.5, 6))
+def test_a_clothoid_is_fresnels(bent, length_m):
+    s, scale = np.linspace(0, length_m, 50), np.sqrt(np.pi / bent)
+    sine, cosine = fresnel(s / scale)
+    np.testing.assert_allclose(place([Piece(length_m, bent=bent)], s), scale * np.stack([cosine, sine], -1), atol=1e-11)
+
+
+def test_a_line_back_ends_behind():
+    np.testing.assert_allclose(place([Piece(3.0, advance=-1.0)], 3.0), [[-3, 0]], atol=1e-15)
+
+
+def test_a_turn_on_the_spot_changes_the_heading_alone():
+    k = course([Piece(1.0), Piece(np.pi / 2, 1.0, advance=0.0), Piece(2.0)]).at(
+        np.array([1.0 + np.pi / 2, 3 + np.pi / 2])
+    )
+    np.testing.assert_allclose(k.T_world_body[:, :2, 3], [[1, 0], [1, 2]], atol=1e-15)
+    np.testing.assert_allclose(k.T_world_body[:, :2, 0], [[0, 1], [0, 1]], atol=1e-15)
+
+
+def test_ahead_and_back_along_a_clothoid_is_nowhere():
+    there, back = Piece(4.0, 0.3, 0.2), Piece(4.0, -1.1, 0.2, advance=-1.0)
+    k = course([there, back]).at(np.array([8.0]))
+    np.testing.assert_allclose(k.T_world_body[0], np.eye(4), atol=1e-13)
+
+
+def test_breaks_are_where_pieces_meet_however_far_they_turn():
+    np.testing.assert_allclose(course([Piece(30.0, 2.0), Piece(1.0), Piece(5.0, -3.0)]).breaks, [30, 31])
+
+
+@pytest.mark.parametrize("laps", [1, 100, 1000])
+def test_many_laps_close(laps):
+    np.testing.assert_allclose(place([Piece(2 * np.pi * laps, 1.0)], 2 * np.pi * laps), [[0, 0]], atol=1e-12 * laps)
+
+
+SHAPES = [
+    ((4.0, 2.0), (1, 2), 0.0),
+    ((3.0, 3.0), (1, 1), np.pi / 2),
+    ((5.0, 3.0), (3, 2), 0.4),
+    ((2.0, 4.0), (4, 5), 0.1),
+]
+
+
+@pytest.mark.parametrize(("size_m", "ratio", "phase_rad"), SHAPES)
+def test_its_points_satisfy_its_equation(size_m, ratio, phase_rad):
+    curve = lissajous_curve(size_m, ratio=ratio, phase_rad=phase_rad)
+    s = np.linspace(0, curve.arc.length, 2000)
+    phi = curve.arc.parameter(s)
+    x = size_m[0] / 2 * (np.sin(ratio[0] * phi + phase_rad) - np.sin(phase_rad))
+    y = size_m[1] / 2 * np.sin(ratio[1] * phi)
+    found = curve.at(s).T_world_body[:, :2, 3]
+    np.testing.assert_allclose(np.hypot(*found.T), np.hypot(x, y), atol=1e-12)
+    np.testing.assert_allclose([np.ptp(x), np.ptp(y)], size_m, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("size_m", "ratio", "phase_rad"), SHAPES)
+def test_arc_length_is_even_to_twelve_digits(size_m, ratio, phase_rad):
+    curve = lissajous_curve(size_m, ratio=ratio, phase_rad=phase_rad)
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    phi = np.linspace(0, 2 * np.pi, 2001)
+    half = np.diff(phi) / 2
+    at = (phi[:-1] + half)[:, None] + half[:, None] * nodes
+    dx = size_m[0] / 2 * ratio[0] * np.cos(ratio[0] * at + phase_rad)
+    dy = size_m[1] / 2 * ratio[1] * np.cos(ratio[1] * at)
+    s = np.concatenate([[0], np.cumsum(np.hypot(dx, dy) @ weights * half)])
+    assert curve.arc.length == pytest.approx(s[-1], rel=1e-12)
+    np.testing.assert_allclose(curve.arc.parameter(s), phi, atol=1e-11)
+
+
+def test_a_circle_is_one_of_them():
+    curve = lissajous_curve((6.0, 6.0), ratio=(1, 1), phase_rad=np.pi / 2)
+    k = curve.at(np.linspace(0, curve.arc.length, 100))
+    assert curve.arc.length == pytest.approx(6 * np.pi, rel=1e-13)
+    np.testing.assert_allclose(k.turn_radps[:, 2], 1 / 3, rtol=1e-12)
+    np.testing.assert_allclose(k.turn_rate_radps2, 0, atol=1e-12)
+
+
+def test_it_begins_at_the_origin_along_x_and_every_lap_again():
+    curve = lissajous_curve((5.0, 3.0), ratio=(3, 2), phase_rad=0.4)
+    k = curve.at(np.array([0.0, 1.0, curve.arc.length + 1.0, 7 * curve.arc.length + 1.0]))
+    np.testing.assert_allclose(k.T_world_body[0], np.eye(4), atol=1e-15)
+    np.testing.assert_allclose(k.T_world_body[2:], k.T_world_body[[1, 1]], atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("size_m", "ratio", "phase_rad", "sentence"),
+    [
+        ((0.0, 1.0), (1, 2), 0.0, "of 0.0 m by 1.0 m, phase 0 rad, cannot be driven; both sizes should be above 0"),
+        ((1.0, np.nan), (1, 2), 0.0, "both sizes should be above 0"),
+        ((1.0, 1.0), (1, 2), np.inf, "phase inf rad"),
+        ((1.0, 1.0), (2, 4), 0.0, "2:4; it should be two whole numbers from 1 to 20 without a common divisor"),
+        ((1.0, 1.0), (0, 1), 0.0, "0:1"),
+        ((1.0, 1.0), (1.5, 2), 0.0, r"1\.5:2"),
+        ((1.0,), (1, 2), 0.0, "cannot be driven"),
+        ((1.0, 1.0), (1, 1), 0.0, "comes to a point where it turns back; choose another phase"),
+        ((1.0, 1.0), (1, 2), np.pi / 4, "comes to a point"),
+    ],
+)
+def test_a_curve_that_cannot_be_driven_is_a_sentence(size_m, ratio, phase_rad, sentence):
+    with pytest.raises(MotionError, match=sentence):
+        lissajous_curve(size_m, ratio=ratio, phase_rad=phase_rad)
+
+
+@pytest.mark.parametrize("ratio", [(1, 1), (1, 2), (2, 1), (1, 3), (3, 2), (3, 5), (5, 4), (7, 9)])
+def test_the_phase_that_the_sentence_names_can_be_driven(ratio):
+    with pytest.raises(MotionError, match="0 where one number of the ratio is even, a quarter turn where both are odd"):
+        lissajous_curve(
+            (1.0, 1.0), ratio=ratio, phase_rad=0.0 if ratio[0] % 2 and ratio[1] % 2 else np.pi / 2 / ratio[1]
+        )
+    both_odd = ratio[0] % 2 and ratio[1] % 2
+    assert lissajous_curve((1.0, 1.0), ratio=ratio, phase_rad=np.pi / 2 if both_odd else 0.0).arc.length > 1
+
+
+def states(motion, count=4001):
+    k = motion.at(np.linspace(motion.start_ns, motion.end_ns, count))
+    return k, k.T_world_body[:, :2, 3]
+
+
+@given(st.floats(0.2, 10), st.floats(0.1, 5), st.floats(0.1, 3))
+def test_a_circle_is_laps_times_its_circumference_on_its_circle(radius_m, laps, speed_mps):
+    motion = circle(radius_m, speed_mps=speed_mps, laps=laps)
+    assert motion.law.length == pytest.approx(2 * np.pi * radius_m * laps)
+    k, p = states(motion, 101)
+    np.testing.assert_allclose(np.hypot(p[:, 0], p[:, 1] - radius_m), radius_m, rtol=1e-10)
+    np.testing.assert_allclose(k.turn_radps[:, 2] * radius_m, k.velocity_mps[:, 0], atol=1e-12)
+    assert k.velocity_mps[:, 0].max() <= speed_mps * (1 + 1e-12)
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        lambda clockwise: circle(2, speed_mps=1, clockwise=clockwise),
+        lambda clockwise: square(2, speed_mps=1, clockwise=clockwise),
+        lambda clockwise: square(2, speed_mps=1, corner_radius_m=0.2, clockwise=clockwise),
+        lambda clockwise: pure_rotation(-2.0 if clockwise else 2.0, rate_radps=1),
+        lambda clockwise: reverse(2, speed_mps=1, radius_m=-3 if clockwise else 3),
+    ],
+)
+def test_clockwise_is_the_mirror_image(kind):
+    (left, p_left), (right, p_right) = states(kind(False), 200), states(kind(True), 200)
+    np.testing.assert_allclose(p_right, p_left * [1, -1], atol=1e-12)
+    np.testing.assert_allclose(right.turn_radps, -left.turn_radps, atol=1e-12)
+    np.testing.assert_allclose(right.velocity_mps, left.velocity_mps, atol=1e-12)
+    assert p_left[:, 1].max() >= 0
+
+
+def test_a_square_with_stops_has_its_four_corners_and_no_others():
+    motion = square(2.0, speed_mps=1, laps=2, turn_radps=1.5)
+    k, p = states(motion)
+    turning = np.abs(k.turn_radps[:, 2]) > 1e-6
+    assert not np.abs(k.velocity_mps[turning]).max() > 1e-9
+    corners = np.unique(np.round(p[turning], 9) + 0.0, axis=0)
+    np.testing.assert_allclose(corners, [[0, 0], [0, 2], [2, 0], [2, 2]], atol=1e-9)
+    assert np.diff(motion.breaks_ns).min() > 1e7  # where it stops, the way's break and the law's are one
+    assert k.turn_radps[:, 2].max() == pytest.approx(1.2944, rel=1e-3)  # sqrt(8/15 pi/2 2): too short for 1.5
+
+
+@pytest.mark.parametrize("radius_m", [0.05, 0.3])
+def test_a_rounded_square_stays_within_its_sides_and_never_turns_tighter(radius_m):
+    motion = square(3.0, speed_mps=1, corner_radius_m=radius_m)
+    k, p = states(motion)
+    assert np.ptp(p, axis=0) == pytest.approx([3, 3], abs=1e-6)
+    moving = k.velocity_mps[:, 0] > 1e-3
+    bend = k.turn_radps[moving, 2] / k.velocity_mps[moving, 0]
+    assert bend.max() == pytest.approx(1 / radius_m, rel=0.02)
+    assert bend.min() > -1e-12
+    np.testing.assert_allclose(motion.law.length, np.linalg.norm(np.diff(p, axis=0), axis=1).sum(), rtol=1e-5)
+
+
+def test_a_figure_8_turns_as_much_to_either_side_and_has_its_size():
+    motion = figure_8(4, speed_mps=1, laps=3)
+    k, p = states(motion)
+    assert k.turn_radps[:, 2].max() == pytest.approx(-k.turn_radps[:, 2].min(), rel=1e-4)
+    assert np.hypot(*p.T).max() == pytest.approx(2.0, abs=0.02)
+    assert motion.law.length == pytest.approx(3 * figure_8(4, speed_mps=1).law.length)
+
+
+def test_stop_and_go_rests_for_its_pause_between_its_legs():
+    k, p = states(stop_and_go([1.0, 2.0, 0.5], speed_mps=1, pause_s=2.0), 10_001)
+    rests = np.abs(k.velocity_mps[:, 0]) < 1e-12
+    inner = p[rests & (p[:, 0] > 1e-6) & (p[:, 0] < 3.5 - 1e-6), 0]
+    np.testing.assert_allclose(np.unique(np.round(inner, 6)), [1, 3])
+    assert not p[:, 1].any()
+
+
+def test_a_pure_rotation_turns_by_its_angle_and_goes_nowhere():
+    motion = pure_rotation(9.0, rate_radps=0.7)
+    k, p = states(motion)
+    assert np.trapezoid(k.turn_radps[:, 2], dx=motion.end_ns / 1e9 / 4000) == pytest.approx(9.0, rel=1e-6)
+    assert k.turn_radps[:, 2].max() == pytest.approx(0.7)
+    assert not p.any()
+
+
+@pytest.mark.parametrize("radius_m", [None, 2.0])
+def test_reverse_goes_back_over_the_same_poses(radius_m):
+    motion = reverse(3.0, speed_mps=1, radius_m=radius_m, pause_s=1.0)
+    t_ns = np.linspace(0, motion.end_ns / 2, 100)
+    there, back = motion.at(t_ns), motion.at(motion.end_ns - t_ns)
+    np.testing.assert_allclose(back.T_world_body, there.T_world_body, atol=1e-8)
+    assert there.velocity_mps[:, 0].min() > -1e-9
+    assert back.velocity_mps[:, 0].max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: circle(0, speed_mps=1), "radius_m is 0; it should be a finite number of metres above 0"),
+        (lambda: circle(np.nan, speed_mps=1), "radius_m is nan"),
+        (lambda: circle(1, speed_mps=0), "the speed on it is 0"),
+        (lambda: circle(1, speed_mps=1e-9), "from a nanosecond to a day"),
+        (lambda: circle(1, speed_mps=1, accel_mps2=0), "the acceleration on it is 0"),
+        (lambda: circle(1e-300, speed_mps=1), "it should be from a nanosecond to a day"),
+        (lambda: circle(1, speed_mps=1, laps=0), "laps is 0; it should be above 0 and at most 1000"),
+        (lambda: circle(1, speed_mps=1, laps=np.nan), "laps is nan"),
+        (lambda: circle(1, speed_mps=1, start=(0, np.inf, 0)), "start is .* three finite numbers"),
+        (lambda: circle(1, speed_mps=1, start=(0, 0)), "start is .* three finite numbers"),
+        (lambda: square(-1, speed_mps=1), "side_m is -1"),
+        (lambda: square(1, speed_mps=1, laps=1.5), "laps is 1.5; it should be a whole number from 1 to 1000"),
+        (lambda: square(1, speed_mps=1, laps=0.5), "laps is 0.5; it should be a whole number"),
+        (
+            lambda: square(1, speed_mps=1, corner_radius_m=0.3),
+            r"too wide for a side of 1 m: .* it should be below 0\.267",
+        ),
+        (lambda: square(1, speed_mps=1, corner_radius_m=-0.1), "corner_radius_m is -0.1"),
+        (lambda: square(1, speed_mps=1, turn_radps=0), "the speed on it is 0"),
+        (lambda: figure_8(0, speed_mps=1), "cannot be driven"),
+        (lambda: lissajous((1, 1), ratio=(1, 1), speed_mps=1), "comes to a point"),
+        (lambda: stop_and_go([], speed_mps=1, pause_s=1), "legs_m is empty"),
+        (lambda: stop_and_go([1, 0], speed_mps=1, pause_s=1), "the length of the way is 0"),
+        (lambda: stop_and_go([1], speed_mps=1, pause_s=-1), "pause_s is -1"),
+        (lambda: pure_rotation(0, rate_radps=1), "the angle is 0 rad; it should be finite and other than 0"),
+        (lambda: pure_rotation(np.nan, rate_radps=1), "the angle is nan rad"),
+        (lambda: reverse(1, speed_mps=1, radius_m=0), "radius_m is 0"),
+        (lambda: reverse(np.inf, speed_mps=1), "length_m is inf"),
+    ],
+)
+def test_what_cannot_be_driven_is_a_sentence(call, sentence):
+    with pytest.raises(MotionError, match=sentence):
+        call()
+
+
+RADIUS, TRACK = PIONEER_WHEELS.radius_m, PIONEER_WHEELS.track_m
+
+
+@dataclass(frozen=True, slots=True)
+class Circling:
+    """A body that goes round with speed u and turn w, and slides left, from `start_ns` on."""
+
+    u: float
+    w: float
+    side: float = 0.0
+    start_ns: int = 0
+    end_ns: int = 10**10
+
+    @property
+    def breaks_ns(self) -> Array:
+        return np.array([float(self.start_ns)])
+
+    def at(self, t_ns: Array) -> Kinematics:
+        t, still = np.asarray(t_ns) / 1e9, np.zeros(len(t_ns))
+        velocity, turn = np.array([self.u, self.side, 0.0]), np.array([0.0, 0.0, self.w])
+        poses = level(self.u * np.sin(self.w * t), still, self.w * t)
+        rows = [np.tile(v, (len(t), 1)) for v in (velocity, turn, np.cross(turn, velocity), 0 * turn)]
+        return Kinematics(poses, *rows)
+
+
+def test_on_a_circle_each_wheel_goes_round_its_own() -> None:
+    t_ns = np.array([0, 1, 10**9, 3 * 10**9 + 7])
+    rims = rolled(Circling(0.5, 0.8), t_ns, PIONEER_WHEELS)
+    expected = (0.5 + 0.8 * TRACK / 2 * np.array([-1, 1])) / RADIUS * t_ns[:, None] / 1e9
+    np.testing.assert_allclose(rims, expected, atol=1e-12)
+
+
+def test_backwards_they_roll_back_and_on_the_spot_against_each_other() -> None:
+    ahead, back = (rolled(Circling(u, 0.0), np.array([10**9]), PIONEER_WHEELS) for u in (0.4, -0.4))
+    np.testing.assert_array_equal(back, -ahead)
+    left, right = rolled(Circling(0.0, 1.0), np.array([10**9]), PIONEER_WHEELS)[0]
+    assert left == -right == pytest.approx(-TRACK / 2 / RADIUS)
+
+
+def test_a_slide_to_the_side_turns_no_wheel() -> None:
+    assert not rolled(Circling(0.0, 0.0, side=0.7), np.array([10**9]), PIONEER_WHEELS).any()
+
+
+def test_they_stand_at_zero_at_the_start_wherever_the_first_instant_asked_is() -> None:
+    early, late = Circling(0.5, 0.8), Circling(0.5, 0.8, start_ns=5 * 10**8)
+    t_ns = np.array([10**9, 2 * 10**9])
+    np.testing.assert_allclose(
+        rolled(late, t_ns, PIONEER_WHEELS), rolled(early, t_ns - 5 * 10**8, PIONEER_WHEELS), atol=1e-12
+    )
+
+
+def test_before_the_start_they_have_yet_to_turn_there() -> None:
+    rims = rolled(Circling(0.5, 0.0, start_ns=10**9), np.array([0, 10**9, 2 * 10**9]), PIONEER_WHEELS)
+    np.testing.assert_allclose(rims[:, 0] * RADIUS, [-0.5, 0.0, 0.5], atol=1e-12)
+
+
+def test_of_a_drive_without_slip_they_are_the_rims_that_its_own_equations_turned() -> None:
+    run = drive([(0.5, 0.3), (0.2, -0.4)], rate_hz=25.0, substeps=20)
+    np.testing.assert_allclose(rolled(run.motion, run.encoder_t_ns, PIONEER_WHEELS), run.rim_rad, atol=1e-9)
+
+
+def test_with_four_sub_steps_they_are_as_near_as_the_integrator() -> None:
+    run = drive([(0.5, 0.3), (0.2, -0.4)])
+    np.testing.assert_allclose(rolled(run.motion, run.t_ns, PIONEER_WHEELS), run.rim_rad[::4], atol=1e-7)
+
+
+def test_no_instant_no_angle() -> None:
+    assert rolled(Circling(0.5, 0.8), np.array([], np.int64), PIONEER_WHEELS).shape == (0, 2)
+
+
+KNOTS = np.linspace(0, 2 * np.pi, 2049)
+
+
+def test_a_circle_has_its_circumference_and_even_parameter():
+    arc = arc_length(lambda phi: np.full_like(phi, 3.0), KNOTS)
+    assert arc.length == pytest.approx(6 * np.pi, rel=1e-14)
+    s = np.linspace(0, arc.length, 100)
+    np.testing.assert_allclose(arc.parameter(s), s / 3, atol=1e-13)
+
+
+@pytest.mark.parametrize("narrow", [0.9, 0.5, 0.2])
+def test_an_ellipse_has_the_length_of_its_elliptic_integral(narrow):
+    def speed(phi):
+        return np.hypot(np.sin(phi), narrow * np.cos(phi))
+
+    arc = arc_length(speed, KNOTS)
+    assert arc.length == pytest.approx(4 * ellipe(1 - narrow**2), rel=1e-13)
+    s = np.linspace(0, arc.length, 1000)
+    np.testing.assert_allclose(arc.parameter(s, 1) * speed(arc.parameter(s)), 1, atol=1e-9)

@@ -1,0 +1,215 @@
+"""What is not drawn would not have been seen."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from vobench.geometry import se3
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import looking
+from vobench.geometry.se3 import Array
+from vobench.render.culling import Batch, CullingSet, sealed
+from vobench.render.raster import RasterRenderer
+from vobench.render.renderer import still
+from vobench.render.view import NEAR_M, PinholeView, Plane, pinhole_view
+from vobench.scene.light import Sky
+from vobench.scene.material import Glass, Material, Matt, Polished, Texture
+from vobench.scene.scene import Scene
+from vobench.suite.scene_file import build, read_scene
+
+CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
+MATERIALS: list[Material] = [Matt(Texture("plain", 0.5, 0, 1, 8, 0)), Glass()]
+BOXES = [(0, 180, 0, 120), (0, 180, 40, 48), (60, 120, 20, 50)]
+PLACES = np.stack(np.meshgrid(np.linspace(0, 1, 40), np.linspace(0, 1, 40)), -1).reshape(-1, 2)
+
+
+def crowd(rng: np.random.Generator, count: int) -> list[Batch]:
+    """One random rectangle a batch, every third on a mover."""
+    corner, along, up = rng.normal(0, 3, (count, 3)), *rng.normal(0, 1.5, (2, count, 3))
+    quads = np.stack([corner, corner + along, corner + along + up, corner + up], 1)
+    return [Batch(i, None, MATERIALS[i % 2], -1 + (i % 3 == 0), None, quads[i : i + 1], 1.0) for i in range(count)]
+
+
+def shown(batch: Batch, view: PinholeView, box: Any) -> bool:
+    """Whether one of many points of a batch, that faces the eye, is in the box."""
+    corner, right, _, top = batch.quads_m[0]
+    T = view.pose(batch.mover)
+    on = se3.apply(T, corner + PLACES[:, :1] * (right - corner) + PLACES[:, 1:] * (top - corner))
+    normal: Array = T[:3, :3] @ np.cross(right - corner, top - corner)
+    if isinstance(batch.material, Matt) and normal @ (view.eye_m - on[0]) <= 0:
+        return False
+    if view.mirror is not None:
+        on = on[on @ view.mirror.normal + view.mirror.offset_m > 0]
+    seen = se3.apply(view.T_camera_world, on)
+    u, v = CAMERA.project(seen[seen[:, 2] > NEAR_M]).T
+    return bool(((u > box[0] - 1) & (u < box[1]) & (v > box[2] - 1) & (v < box[3])).any())
+
+
+@pytest.mark.parametrize("mirrors", [0, 1, 2])
+@pytest.mark.parametrize("box", BOXES)
+def test_no_rectangle_that_can_be_seen_is_left_out_and_most_others_are(mirrors: int, box: Any) -> None:
+    rng = np.random.default_rng(mirrors)
+    batches = crowd(rng, 600)
+    R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    T_mover = se3.transform(se3.rotation_z(1.0), (0.3, 0.2, -0.4))
+    view = pinhole_view(
+        CAMERA, se3.transform(R * np.linalg.det(R), (0.1, 0.2, 0.3)), [T_mover], np.zeros((0, 3, 4)), 0.0
+    )
+    for turn in rng.normal(0, 0.2, (mirrors, 3)):
+        towards_camera = turn - view.T_camera_world[2, :3]
+        view = view.through(Plane(towards_camera / np.linalg.norm(towards_camera), 2.0))
+    found = CullingSet(batches).in_sight(view, box)
+    must = {batch.index for batch in batches if shown(batch, view, box)}
+    assert must <= found
+    assert len(must) > 0
+    assert len(found) < 2 * len(must) + 15
+
+
+SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.yaml"))
+CAMERA_mesh = Pinhole(320, 240, 144.0, 144.0, 159.5, 119.5)
+PLAIN = Texture("plain", 0.5, 0, 1, 8, 0)
+SKY_CD_M2 = 1e9  # so bright that one sample of it shows, by way of a mirror too
+WHITE_CD_M2 = 240
+FRAMES = 24
+WINDOWS = """
+name: chamber
+white_cd_m2: 240
+materials:
+  plain: {pattern: plain, albedo: 0.5, resolution_px: 8}
+  wax: {kind: polished, pattern: plain, albedo: 0.5, resolution_px: 8}
+  pane: {kind: glass, eta: 1.5}
+room:
+  size_m: [4.9, 4.1, 2.65]
+  floor: wax
+  wall: plain
+  ceiling: plain
+  windows:
+    - {wall: south, center_m: [-0.6, 1.5], size_m: [1.3, 1.1], pane: pane, reveal: plain}
+    - {wall: south, center_m: [1.2, 1.6], size_m: [0.7, 1.4], pane: pane, reveal: plain}
+    - {wall: east, center_m: [0.3, 1.4], size_m: [1.1, 1.2], pane: pane, reveal: plain}
+sky: {illuminance_lx: 9000, kind: clear}
+"""
+
+
+def outline(*points: tuple[float, float]) -> Array:
+    return np.array([(x, y, 0.0) for x, y in points])
+
+
+def area_m2(polygon: Array) -> float:
+    return float(np.linalg.norm(np.cross(polygon, np.roll(polygon, -1, axis=0)).sum(0)) / 2)
+
+
+def edges(polygons: list[Array]) -> list[tuple[bytes, bytes]]:
+    """Directed edges of all outlines, by the bits that OpenGL is given."""
+    ends = [[(corner + 0.0).astype(np.float32).tobytes() for corner in polygon] for polygon in polygons]
+    return [(here, there) for ring in ends for here, there in zip(ring, ring[1:] + ring[:1], strict=True)]
+
+
+def tiling(rng: np.random.Generator, u: tuple[float, float], v: tuple[float, float], depth: int) -> Iterator[Array]:
+    """A rectangle cut into rectangles at random, again and again, its corners blurred as sums of floats are."""
+    if depth == 0:
+        corners = np.array([(u[0], v[0], 1.0), (u[1], v[0], 1.0), (u[1], v[1], 1.0), (u[0], v[1], 1.0)])
+        yield corners + rng.uniform(-1e-6, 1e-6, corners.shape)
+        return
+    share = rng.uniform(0.2, 0.8)
+    sides = (u, v) if depth % 2 else (v, u)
+    middle = sides[0][0] + share * (sides[0][1] - sides[0][0])
+    for half in ((sides[0][0], middle), (middle, sides[0][1])):
+        yield from tiling(rng, *((half, v) if depth % 2 else (u, half)), depth - 1)
+
+
+def test_in_a_wall_of_any_rectangles_each_edge_but_the_outer_ones_is_met_by_the_same_edge_backwards() -> None:
+    rng = np.random.default_rng(0)
+    polygons = sealed(list(tiling(rng, (-3.0, 4.0), (0.0, 2.6), 6)))
+    directed = edges(polygons)
+    alone = [(a, b) for a, b in directed if (b, a) not in set(directed)]
+    assert len(polygons) == 64
+    assert len(set(directed)) == len(directed)
+    # What is not met is the outer border: one closed ring.
+    followed, at = 0, alone[0][0]
+    following = dict(alone)
+    while followed == 0 or at != alone[0][0]:
+        followed, at = followed + 1, following[at]
+    assert followed == len(alone) >= 4
+    assert sum(map(area_m2, polygons)) == pytest.approx(7 * 2.6, rel=1e-5)
+
+
+def test_sealing_what_is_sealed_changes_nothing() -> None:
+    once = sealed(list(tiling(np.random.default_rng(1), (0.0, 5.0), (0.0, 3.0), 5)))
+    for before, after in zip(once, sealed(once), strict=True):
+        np.testing.assert_array_equal(before, after)
+
+
+def test_what_only_comes_near_is_left_as_it_is() -> None:
+    square, beside = outline((0, 0), (1, 0), (1, 1), (0, 1)), outline((0.2, -1), (0.7, -1), (0.7, -1e-3), (0.2, -1e-3))
+    for before, after in zip((square, beside), sealed([square, beside]), strict=True):
+        np.testing.assert_array_equal(before, after)
+
+
+def plainly(material: Material, *, closed: bool) -> Material:
+    """Without a texture, in which single bright pixels would be nothing special; panes walled up if `closed`."""
+    if isinstance(material, Glass):
+        return Matt(PLAIN) if closed else material
+    return replace(material, texture=PLAIN) if isinstance(material, Matt | Polished) else material
+
+
+def scene_in(path: Path, *, closed: bool) -> Scene:
+    scene = build(read_scene(path), {})
+    materials = {name: plainly(material, closed=closed) for name, material in scene.materials.items()}
+    lamps = tuple(light for light in scene.lights if not isinstance(light, Sky))
+    outside = Sky("outside", np.pi * SKY_CD_M2, "uniform", ground_albedo=1.0)
+    return replace(scene, materials=materials, lights=(*lamps, outside) if closed else scene.lights)
+
+
+def drive(renderer: RasterRenderer, scene: Scene, *, frames: int = FRAMES) -> Iterator[Array]:
+    """Pictures from 1 m above the floor, once around the room, all around and up and down."""
+    half_m = np.max([np.abs(surface.corner_m[:2]) for surface in scene.surfaces], axis=0)
+    for index in range(frames):
+        turn = 2 * np.pi * (index + 0.3) / frames
+        at = (*0.62 * half_m * [np.cos(turn), np.sin(turn)], 0)
+        camera = looking(pitch_deg=15 * np.sin(1.7 * index), position_m=(0, 0, 1.0))
+        T = se3.transform(se3.rotation_z(2.4 * index), at) @ camera
+        yield renderer.radiance(CAMERA_mesh, still(CAMERA_mesh, T))
+
+
+def specks(picture: Array) -> int:
+    """Pixels 25 grey levels brighter than all of their eight neighbours, which are within 25 of one another."""
+    grey = np.clip(255 / WHITE_CD_M2 * picture, 0, 255).astype(np.float32)
+    ring = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
+    brightest, darkest = cv2.dilate(grey, ring), cv2.erode(grey, ring)
+    found = (grey > brightest + 25) & (brightest < darkest + 25)
+    return int(found[1:-1, 1:-1].sum())  # at the rim, half of the neighbours are not seen
+
+
+@pytest.fixture(params=[*SCENES, "chamber"], ids=[*(path.stem for path in SCENES), "chamber"])
+def path(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    if isinstance(request.param, Path):
+        return request.param
+    path = tmp_path / "chamber.yaml"
+    path.write_text(WINDOWS)
+    return path
+
+
+def test_no_sample_sees_the_sky_from_a_room_whose_windows_are_walled_up(path: Path, draw: Any, even_light: Any) -> None:
+    scene = scene_in(path, closed=True)
+    pictures = list(drive(draw(even_light(scene)), scene))
+    assert [int((picture > 1e-4 * SKY_CD_M2).sum()) for picture in pictures] == [0] * FRAMES
+    assert all((picture > 0).all() for picture in pictures)
+
+
+def test_no_pixel_is_a_bright_speck_on_a_drive_past_all_seams(path: Path, draw: Any, even_light: Any) -> None:
+    scene = scene_in(path, closed=False)
+    assert [specks(picture) for picture in drive(draw(even_light(scene, illuminance_lx=300)), scene)] == [0] * FRAMES
+
+
+def test_a_speck_is_counted_and_an_edge_is_not() -> None:
+    picture = np.full((9, 9), 50.0, np.float32)
+    picture[:, 6:] = 150
+    assert specks(picture) == 0
+    picture[4, 2] = 110
+    assert specks(picture) == 1

@@ -1,0 +1,212 @@
+"""A saved run reads back with everything in it, at the right frames and pixels."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from vobench.report import TruthView, save_run
+from vobench.report.rerun import application_id, first_failure, rerun_matrix
+from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames
+from vobench.sequence import StereoTruth
+from vobench.trajectory.trajectory import Trajectory
+
+LEFT = "/world/ground_truth/left"
+
+
+def rows(path, entity, *, static=False):
+    """Every row of an entity as a dict of its columns."""
+    chunks = [c for c in RrdReader(path).stream() if c.entity_path == entity and c.is_static == static]
+    return [row for chunk in chunks for row in chunk.to_record_batch().to_pylist()]
+
+
+def values(path, entity, column):
+    """What a column holds at each frame that has it."""
+    return {row["frame"]: row[column] for row in rows(path, entity) if row.get(column) is not None}
+
+
+def test_every_entity_has_its_rows(rrd):
+    found = Counter()
+    for chunk in RrdReader(rrd).stream():
+        found[chunk.entity_path, chunk.is_static] += chunk.num_rows
+    for entity in ("left/image", "left/tracks", "right/image"):
+        assert found[f"/world/ground_truth/{entity}", False] == 12
+    assert found["/error_mm", False] == found["/world/error", False] == 12
+    assert found["/status", False] == 3
+    for entity in ("/world/ground_truth/path", "/world/estimate/path", "/summary", "/status"):
+        assert found[entity, True] == 1
+
+
+def test_recording_opens_with_a_layout_of_its_own(rrd):
+    reader = RrdReader(rrd)
+    (layout,) = reader.blueprints()
+    assert layout.application_id == reader.recordings()[0].application_id == "vobench-room-stereo-0"
+    entities = {chunk.entity_path.split("/")[-1] for chunk in reader.stream(store=layout)}
+    assert {"EyeControls3D", "time_panel"} <= entities
+
+
+def test_tracks_move_by_half_a_pixel_because_rerun_counts_from_the_corner(rrd):
+    points = values(rrd, f"{LEFT}/tracks", "Points2D:positions")
+    assert points[1] == [[0.5, 0.5], [3.5, 2.5], [47.5, 31.5]]
+    colors = values(rrd, f"{LEFT}/tracks", "Points2D:colors")[1]
+    assert colors[0] == colors[1] != colors[2]
+
+
+def test_frame_without_tracks_clears_those_before_it(rrd):
+    points = values(rrd, f"{LEFT}/tracks", "Points2D:positions")
+    assert {frame: len(p) for frame, p in points.items()} == {i: 3 if i in {1, 3} else 0 for i in range(12)}
+
+
+def test_camera_matrix_projects_to_rerun_pixels(run_viewer):
+    camera, point = run_viewer.rig.left, np.array([0.3, -0.2, 2.0])
+    projected = rerun_matrix(camera) @ point
+    np.testing.assert_allclose(projected[:2] / projected[2], camera.project(point) + 0.5)
+
+
+def test_pictures_are_the_png_bytes_of_the_sequence(run_viewer, rrd):
+    (blob,) = values(rrd, f"{LEFT}/image", "EncodedImage:blob")[4]
+    assert bytes(blob) == next(iter(run_viewer.frames())).left
+
+
+def test_estimated_camera_vanishes_while_lost(rrd):
+    entity = "/world/estimate/left"
+    assert sorted(values(rrd, entity, "Transform3D:translation")) == [0, 1, 2, 3, 4, 7, 8, 9, 10, 11]
+    assert sorted(values(rrd, entity, "Clear:is_recursive")) == [5, 6]
+
+
+def test_estimated_path_and_error_have_a_gap_where_lost(rrd):
+    (path,) = rows(rrd, "/world/estimate/path", static=True)
+    assert [len(strip) for strip in path["LineStrips3D:strips"]] == [5, 5]
+    error = values(rrd, "/error_mm", "Scalars:scalars")
+    assert [frame for frame, (value,) in error.items() if np.isnan(value)] == [5, 6]
+    lines = values(rrd, "/world/error", "LineStrips3D:strips")
+    assert [frame for frame, strips in lines.items() if not strips] == [5, 6]
+    np.testing.assert_allclose(np.diff(lines[0][0], axis=0), [[0.1, 0, 0]], atol=1e-6)
+
+
+def test_status_has_a_row_where_it_changes(rrd):
+    assert values(rrd, "/status", "StateChange:state") == {0: ["ok"], 5: ["lost"], 7: ["ok"]}
+
+
+def test_stamps_off_by_rounding_still_find_their_frame(run_viewer, tmp_path):
+    shifted = Trajectory(run_viewer.estimate.t_ns + 333, run_viewer.estimate.T_world_frame)
+    save_run(tmp_path / "run.rrd", replace(run_viewer, estimate=shifted))
+    assert 7 in values(tmp_path / "run.rrd", "/world/estimate/left", "Transform3D:translation")
+
+
+@pytest.mark.parametrize("kept", [0, 1])
+def test_run_that_failed_at_once_can_still_be_looked_at(run_viewer, tmp_path, kept):
+    path = tmp_path / "run.rrd"
+    estimate = Trajectory(run_viewer.estimate.t_ns[:kept], run_viewer.estimate.T_world_frame[:kept])
+    failed = replace(
+        run_viewer, estimate=estimate, error_t_ns=estimate.t_ns, error_m=np.zeros(kept), statuses=["init"], tracks={}
+    )
+    save_run(path, failed)
+    assert values(path, "/status", "StateChange:state") == {0: ["init"], 1: ["no output"]}
+    assert len(values(path, f"{LEFT}/image", "EncodedImage:blob")) == 12
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_saving_twice_holds_the_same(run_viewer, rrd, tmp_path):
+    save_run(tmp_path / "again.rrd", run_viewer)
+    for entity in (f"{LEFT}/tracks", LEFT, "/error_mm"):
+        again, before = rows(tmp_path / "again.rrd", entity), rows(rrd, entity)
+        for row in (*again, *before):
+            row.pop("rerun.controls.RowId")
+        np.testing.assert_equal(again, before)
+
+
+def test_first_failure_is_framed_within_the_run():
+    assert first_failure(["ok"] * 50) is None
+    assert first_failure(["ok"] * 40 + ["lost"] + ["ok"] * 40) == (25, 55)
+    assert first_failure(["init", "lost"]) == (0, 1)
+
+
+def test_application_id_needs_no_mending_by_rerun():
+    assert application_id("room/low light × stereo_vo × 0") == "vobench-room-low-light-stereo_vo-0"
+
+
+def test_right_camera_stands_beside_the_left(run_viewer, rrd):
+    left = values(rrd, LEFT, "Transform3D:translation")
+    right = values(rrd, "/world/ground_truth/right", "Transform3D:translation")
+    gap = np.array([right[i][0] for i in range(12)]) - np.array([left[i][0] for i in range(12)])
+    np.testing.assert_allclose(np.linalg.norm(gap, axis=1), run_viewer.rig.baseline_m, atol=1e-6)
+    axis = run_viewer.ground_truth.T_world_frame[:, :3, 0]
+    np.testing.assert_allclose(gap, run_viewer.rig.baseline_m * axis, atol=1e-6)
+
+
+COUNT = 3
+
+
+def make_truth(index: int) -> TruthFrame:
+    rng = np.random.default_rng(index)
+    values = {}
+    for name, channel in CHANNELS.items():
+        shape = channel.shape(32, 48)
+        values[name] = rng.uniform(0, 3, shape).astype(channel.dtype)
+    values["depth"][0] = np.nan
+    return TruthFrame(**values)
+
+
+@pytest.fixture(scope="module")
+def view() -> TruthView:
+    names = TruthNames(("", "floor", "cart"), ("", "oak", "glass"))
+    frames = [StereoTruth(i, i * 33_000_000, make_truth(i), make_truth(i + 100)) for i in range(COUNT)]
+    return TruthView(tuple(CHANNELS), names, lambda: frames)
+
+
+@pytest.fixture(scope="module")
+def path(run_viewer, view, tmp_path_factory):
+    path = tmp_path_factory.mktemp("truth") / "run.rrd"
+    save_run(path, replace(run_viewer, truth=view))
+    return path
+
+
+def rows_truth(path, entity, *, static=False):
+    chunks = [c for c in RrdReader(path).stream() if c.entity_path == entity and c.is_static == static]
+    return [row for chunk in chunks for row in chunk.to_record_batch().to_pylist()]
+
+
+def test_depth_is_the_same_numbers_on_the_frames_time_line(path, view):
+    for side in ("left", "right"):
+        found = rows_truth(path, f"/truth/{side}/depth")
+        assert [row["frame"] for row in found] == list(range(COUNT))
+        for row, frame in zip(found, view.frames(), strict=True):
+            depth = np.frombuffer(bytes(row["DepthImage:buffer"][0]), np.float32).reshape(32, 48)
+            np.testing.assert_array_equal(depth, getattr(frame, side).depth)
+
+
+@pytest.mark.parametrize("channel", ["instance", "material", "shadow", "occlusion", "mirror", "moving"])
+def test_ids_counts_and_masks_are_classes_with_names(path, view, channel):
+    (last,) = [row for row in rows_truth(path, f"/truth/left/{channel}") if row["frame"] == COUNT - 1]
+    classes = np.frombuffer(bytes(last["SegmentationImage:buffer"][0]), np.uint16).reshape(32, 48)
+    np.testing.assert_array_equal(classes, list(view.frames())[-1].left.channels()[channel].astype(np.uint16))
+    (context,) = rows_truth(path, f"/truth/left/{channel}", static=True)
+    text = str(context)
+    named = {"instance": "floor", "material": "glass", "shadow": "one light hidden"}
+    assert named.get(channel, channel) in text
+
+
+@pytest.mark.parametrize("channel", ["flow", "normals"])
+def test_directions_are_colours(path, channel):
+    buffers = [bytes(row["Image:buffer"][0]) for row in rows_truth(path, f"/truth/right/{channel}")]
+    assert [len(b) for b in buffers] == [32 * 48 * 3] * COUNT
+    assert len(set(buffers)) == COUNT
+
+
+def test_layout_has_a_view_for_each_channel_of_each_camera(path, rrd):
+    def origins(of):
+        reader = RrdReader(of)
+        (layout,) = reader.blueprints()
+        found = [row for c in reader.stream(store=layout) for row in c.to_record_batch().to_pylist()]
+        return [origin for row in found for origin in row.get("ViewBlueprint:space_origin") or []]
+
+    asked = {f"truth/{side}/{channel}" for side in ("left", "right") for channel in CHANNELS}
+    assert {origin for origin in origins(path) if origin.startswith("truth/")} == asked
+    assert not asked & set(origins(rrd))
+
+
+def test_run_without_truth_has_no_entity_of_it(rrd):
+    assert not [c for c in RrdReader(rrd).stream() if c.entity_path.startswith("/truth")]

@@ -1,0 +1,408 @@
+"""From a suite to its plan: one factor a line, one case a combination."""
+
+from pathlib import Path
+
+import pytest
+
+from vobench.errors import MOST_SAID, Place, SuiteError, UnknownNameError, VobenchError
+from vobench.run.motion import body_motions
+from vobench.suite import catalog, scene_file
+from vobench.suite import suite as expand
+from vobench.suite.catalog import builtin_root
+from vobench.suite.scene_spec import LightOverride
+from vobench.suite.suite import AXES, CalibrationErrorSpec, CameraSpec, EstimatorSpec, RigSpec, Suite, plan, read_plan
+
+MORE = (
+    ("{down: {pitch_deg: 90}}", "{down: {pitch_deg: 90}, ahead: {pitch_deg: 10}, tilt: {pitch_deg: 45}}"),
+    ("{clean: {sensor: clean}}", "{clean: {sensor: clean}, noisy: {sensor: mt9v034}}"),
+)
+
+
+def test_cases_are_every_combination_and_have_names_of_their_own(bent):
+    cases = bent(*MORE).cases
+    assert len(cases) == 2 * 3 * 2
+    assert len({case.name for case in cases}) == len({tuple(case.variant.items()) for case in cases}) == 12
+
+
+def test_a_case_is_called_by_what_differs_in_its_suite(bent):
+    assert [case.name for case in bent().cases] == ["full", "dim"]
+    assert [case.name for case in bent(*MORE[:1]).cases][:2] == ["full-down", "full-ahead"]
+
+
+def test_a_case_without_any_choice_is_called_by_its_trajectory(bent):
+    assert [case.name for case in bent((", dim: {lamp: {power_lm: 150}}", "")).cases] == ["short"]
+
+
+@pytest.mark.parametrize(
+    ("axis", "change"),
+    [
+        ("lighting", ("power_lm: 150", "power_lm: 100")),
+        ("rig", ("pitch_deg: 90", "pitch_deg: 80")),
+        ("trajectory", ("[[0.5, 0]]", "[[0.5, 0.1]]")),
+        ("camera", ("sensor: clean", "sensor: mt9v034")),
+    ],
+)
+def test_one_line_changes_one_factor(bent, axis, change):
+    before, after = (bent(*changes).cases[-1] for changes in ((), (change,)))
+    assert [name for name in AXES if getattr(before, name) != getattr(after, name)] == [axis]
+
+
+def test_a_lighting_sets_the_lamps_it_names_and_leaves_the_others(bent):
+    levels = [case.build_scene().lights[0].level.mean(0, 0) for case in bent().cases]
+    assert levels == [1, 150 / 600]
+
+
+def test_a_suites_parameters_go_over_the_manifests(bent):
+    assert [entrant.params for entrant in bent().entrants] == [{}, {"measure_s": 0.1}]
+
+
+def test_one_estimator_takes_part_twice_under_two_labels(bent):
+    planned = bent(("stand_still,", "{name: constant_velocity, label: slow, params: {measure_s: 1}},"))
+    assert [(e.label, e.params["measure_s"]) for e in planned.entrants] == [("slow", 1), ("constant_velocity", 0.1)]
+
+
+def test_parameters_reach_an_estimator_as_plain_python(bent):
+    (value,) = bent().entrants[1].params.values()
+    assert type(value) is float
+
+
+def test_every_estimator_runs_repeats_times_on_every_case(bent):
+    planned = bent(("seed: 1", "seed: 1\nrepeats: 3"))
+    runs = [run for case in planned.cases for run in planned.runs(case)]
+    assert len(runs) == len({(run.case.name, run.entrant.label, run.repeat) for run in runs}) == 2 * 2 * 3
+
+
+def test_asking_for_estimators_takes_the_suites_own_settings_first(bent):
+    planned = bent(only=("constant_velocity", "wheel_odometry"))
+    assert [(e.label, e.params) for e in planned.entrants] == [
+        ("constant_velocity", {"measure_s": 0.1}),
+        ("wheel_odometry", {}),
+    ]
+
+
+def test_asking_for_one_estimator_twice_is_an_error(bent):
+    with pytest.raises(SuiteError, match="two estimators are called 'stand_still'"):
+        bent(only=("stand_still", "stand_still"))
+
+
+def test_asking_for_an_unknown_estimator_names_the_nearest(bent):
+    with pytest.raises(UnknownNameError, match="Did you mean 'stand_still'"):
+        bent(only=("stand_stil",))
+
+
+def test_scenes_and_estimators_are_found_beside_their_suite_from_anywhere(bent, tmp_path, monkeypatch):
+    manifest = "name: stand_still\nversion: mine\nclass: estimator:Mine\npose_of: body\nsummary: Mine.\n"
+    bent()
+    (tmp_path / "estimators" / "stand_still").mkdir(parents=True)
+    (tmp_path / "estimators" / "stand_still" / "estimator.yaml").write_text(manifest)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    for only in ((), ("stand_still",)):
+        planned = read_plan("../tiny.yaml", only_estimators=only)
+        assert planned.entrants[0].manifest.version == "mine"
+    assert [(e.kind, e.name, e.origin) for e in read_plan("../tiny.yaml").found] == [
+        ("estimator", "stand_still", "beside the suite"),
+        ("estimator", "constant_velocity", "built in"),
+        ("scene", "closet", "beside the suite"),
+    ]
+
+
+def test_what_cases_share_is_made_once_however_many_there_are(bent, monkeypatch):
+    calls = []
+    for module, name in (
+        (scene_file, "survey"),
+        (scene_file, "build"),
+        (scene_file, "lights"),
+        (expand, "read_manifest"),
+    ):
+        made = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *args, made=made, name=name: (calls.append(name), made(*args))[1])
+    ways = ", ".join(f"way_{k}: {{targets_m: [[0.{k + 1}, 0]]}}" for k in range(9))
+    cameras = ", ".join(f"camera_{k}: {{blur_sigma_px: {k}}}" for k in range(5))
+    few = bent(), sorted(calls)
+    calls.clear()
+    many = bent(("short: {targets_m: [[0.5, 0]]}", ways), ("clean: {sensor: clean}", cameras)), sorted(calls)
+    assert (len(few[0].cases), len(many[0].cases)) == (2, 90)
+    assert few[1] == many[1] == ["build", "lights", "read_manifest", "read_manifest", "survey"]
+
+
+def test_merge_keys_and_aliases_keep_a_suite_short(bent):
+    planned = bent(("{down: {pitch_deg: 90}}", "\n  down: &down {pitch_deg: 90}\n  wide: {<<: *down, baseline_m: 0.2}"))
+    assert planned.suite.rigs["wide"].pitch_deg == 90
+    assert planned.suite.rigs["wide"].baseline_m == 0.2
+
+
+def test_a_plan_goes_through_json_unchanged(bent):
+    suite = bent().suite
+    assert type(suite).model_validate_json(suite.model_dump_json()) == suite
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in (builtin_root() / "suites").glob("*.yaml")))
+def test_every_suite_of_the_house_is_valid_and_called_as_its_file(name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    suite = read_plan(name).suite
+    assert suite.name == name
+    assert plan(suite).cases
+    assert catalog.find("suite", name).origin == "built in"
+
+
+def test_a_rig_takes_lenses_and_their_places_from_its_preset_and_a_baseline_over_it(bent):
+    euroc = bent(("pitch_deg: 90", "pitch_deg: 90, lens: euroc")).cases[0].build_rig()
+    assert euroc.left != euroc.right
+    assert euroc.baseline_m == pytest.approx(0.110, abs=1e-3)
+    wide = bent(("pitch_deg: 90", "pitch_deg: 90, lens: euroc, baseline_m: 0.3")).cases[0].build_rig()
+    assert (wide.left, wide.right) == (euroc.left, euroc.right)
+    assert wide.baseline_m == pytest.approx(0.3)
+
+
+def test_a_calibration_error_makes_the_true_rig_another_and_the_told_one_not(bent):
+    plain, off = (
+        bent(("pitch_deg: 90", f"pitch_deg: 90{more}")).cases[0]
+        for more in ("", ", calibration_error: {focal_ratio: 0.02, right_yaw_deg: 0.5}")
+    )
+    told, true = off.build_rig(), off.build_true_rig()
+    assert told.left == plain.build_rig().left == plain.build_true_rig().left
+    assert told.T_body_right.tobytes() == plain.build_true_rig().T_body_right.tobytes()
+    assert true.left.fx_px == pytest.approx(1.02 * told.left.fx_px)
+    assert true.T_body_left.tobytes() == told.T_body_left.tobytes()
+    assert true.T_body_right.tobytes() != told.T_body_right.tobytes()
+
+
+# ruff: noqa: E501 - a sentence stands in one line
+
+
+SUITE_KEYS = (
+    "cameras, estimators, lightings, name, rendering, repeats, rigs, scenes, seed, source, summary, trajectories, truth"
+)
+RIG_KEYS = "baseline_m, calibration_error, forward_m, height_m, imu, lens, pitch_deg"
+LENSES = "d435i, euroc, fisheye, paper_blender, paper_literal, tartanair, zed2i"
+ESTIMATORS = "constant_velocity, imu_dead_reckoning, lk_epipolar, stand_still, wheel_odometry"
+A_NAME = "should be lower-case letters, digits, _ and ., a letter or digit first"
+
+# What is replaced, what with, and what comes after the file's path.
+WRONG = [
+    ("seed:", "sed:", f":2: sed: unknown key. Did you mean 'seed'? Known: {SUITE_KEYS}"),
+    ("seed: 1", "xyz: 1", f":2: xyz: unknown key. Known: {SUITE_KEYS}"),
+    ("pitch_deg", "pich_deg", f":5: rigs.down.pich_deg: unknown key. Did you mean 'pitch_deg'? Known: {RIG_KEYS}"),
+    ("{power_lm: 150}", "{power: 1, power_lm: 1}", ":4: lightings.dim.lamp.power: unknown key. Did you mean 'power_lm'? Known: illuminance_lx, level, power_lm"),
+    ("params:", "parms:", ":8: estimators.1.parms: unknown key. Did you mean 'params'? Known: label, name, params"),
+    ("pitch_deg: 90", "", ":5: rigs.down.pitch_deg: this key is missing"),
+    ("seed: 1", "seed: one", ":2: seed: should be a whole number (got 'one')"),
+    ("seed: 1", "seed: '1'", ":2: seed: should be a whole number (got '1')"),
+    ("seed: 1", "seed: true", ":2: seed: should be a whole number (got true)"),
+    ("seed: 1", "seed: 1.5", ":2: seed: should be a whole number (got 1.5)"),
+    ("seed: 1", "seed:", ":2: seed: should be a whole number (got nothing)"),
+    ("seed: 1", "seed: -1", ":2: seed: should be 0 or more (got -1)"),
+    ("seed: 1", "seed: 1\nrendering: {samples: 4}", ":3: rendering: samples belongs to engine path, but the engine is raster; leave samples out"),
+    ("seed: 1", "seed: 1\nrendering: {engine: path, samples: 65537}", ":3: rendering.samples: should be 65536 or less (got 65537)"),
+    ("seed: 1", "seed: 1\nrepeats: 101", ":3: repeats: should be 100 or less (got 101)"),
+    ("seed: 1", "seed: 1\nseed: 2", ':3:1: found duplicate key "seed" with value "2" (original value: "1")'),
+    ("seed: 1", "3: 1", ":2: 3: a key should be text (put it in quotes; got 3)"),
+    ("name: tiny", "name: 12", ":1: name: should be text (a number or a date needs quotes) (got 12)"),
+    ("name: tiny", "name: My Suite", f":1: name: {A_NAME} (got 'My Suite')"),
+    ("name: tiny", "name: !!python/object:os.system x", ":1: name: should be a number, text, a list or keys with values (got x)"),
+    ("rigs:", "rig:", f":5: rig: unknown key. Did you mean 'rigs'? Known: {SUITE_KEYS}"),
+    ("{down: {pitch_deg: 90}}", "{3: {pitch_deg: 90}}", ":5: rigs.3: a key should be text (put it in quotes; got 3)"),
+    ("down:", "a/b:", f":5: rigs.a/b: {A_NAME} (got 'a/b')"),
+    ("pitch_deg: 90", "pitch_deg: .nan", ":5: rigs.down.pitch_deg: should be a finite number (got nan)"),
+    ("pitch_deg: 90", "pitch_deg: -.inf", ":5: rigs.down.pitch_deg: should be a finite number (got -inf)"),
+    ("pitch_deg: 90", "pitch_deg: 91", ":5: rigs.down.pitch_deg: should be 90 or less (got 91)"),
+    ("pitch_deg: 90", "pitch_deg: down", ":5: rigs.down.pitch_deg: should be a number (got 'down')"),
+    ("pitch_deg: 90", "pitch_deg: 90, baseline_m: -1", ":5: rigs.down.baseline_m: should be greater than 0 (got -1)"),
+    ("{pitch_deg: 90}", "90", ":5: rigs.down: should be keys with values (got 90)"),
+    ("{down: {pitch_deg: 90}}", "{}", ":5: rigs: should have 1 or more entries, but has 0"),
+    ("[closet]", "closet", ":3: scenes: should be a list, as in [a, b] (got 'closet')"),
+    ("[closet]", "[closset]", ":3: scenes.0: no scene named 'closset'. Did you mean 'closet'? Known: closet, office, room"),
+    ("[closet]", "[./no.yaml]", ":3: scenes.0: no scene file at no.yaml. Known by name: closet, office, room"),
+    ("[closet]", "[closet, closet]", ":3: scenes.1: two scenes are called 'closet'; give each once, from files of different names"),
+    ("{lamp:", "{lmp:", ":4: lightings.dim.lmp: lighting: no light named 'lmp'. Did you mean 'lamp'? Known: lamp"),
+    ("pitch_deg: 90", "pitch_deg: 90, lens: x", f":5: rigs.down.lens: no lens named 'x'. Known: {LENSES}"),
+    ("pitch_deg: 90", "pitch_deg: 90, lens: eurok", f":5: rigs.down.lens: no lens named 'eurok'. Did you mean 'euroc'? Known: {LENSES}"),
+    ("pitch_deg: 90", "pitch_deg: 90, calibration_error: {right_yaw: 1}", ":5: rigs.down.calibration_error.right_yaw: unknown key. Did you mean 'right_yaw_deg'? Known: baseline_ratio, center_px, distortion_ratio, focal_ratio, right_pitch_deg, right_roll_deg, right_yaw_deg"),
+    ("pitch_deg: 90", "pitch_deg: 90, calibration_error: {right_yaw_deg: 11}", ":5: rigs.down.calibration_error.right_yaw_deg: should be 10 or less (got 11)"),
+    ("pitch_deg: 90", "pitch_deg: 90, calibration_error: {focal_ratio: -1}", ":5: rigs.down.calibration_error.focal_ratio: should be greater than -1 (got -1)"),
+    ("pitch_deg: 90", "pitch_deg: 90, lens: d435i, calibration_error: {distortion_ratio: 0.1}", ":5: rigs.down: distortion_ratio 0.1 needs a lens with distortion, got Pinhole(width_px=848, height_px=480, fx_px=427.259765625, fy_px=427.259765625, cx_px=422.357269287109, cy_px=233.807525634766)"),
+    ("[[0.5, 0]]", "[[0.5, 0]], slip: slipery", ":6: trajectories.short.slip: no slip named 'slipery'. Did you mean 'slippery'? Known: nominal, none, slippery, straining"),
+    ("[[0.5, 0]]", "[[0.5, 0]], controller: smoth", ":6: trajectories.short.controller: no controller named 'smoth'. Did you mean 'smooth'? Known: easy, paper, smooth"),
+    ("[[0.5, 0]]", "[]", ":6: trajectories.short.targets_m: should have 1 or more entries, but has 0"),
+    ("[[0.5, 0]]", "[[0.5, 0, 1]]", ":6: trajectories.short.targets_m.0: should have 2 or fewer entries, but has 3"),
+    ("[[0.5, 0]]", "[[0.5, a]]", ":6: trajectories.short.targets_m.0.1: should be a number (got 'a')"),
+    ("sensor: clean", "sensor: grainy", ":7: cameras.clean.sensor: no camera sensor named 'grainy'. Known: clean, imx249, imx255, mt9m034, mt9v034, ov9282"),
+    ("stand_still,", "stnd_still,", f":8: estimators.0: no estimator named 'stnd_still'. Did you mean 'stand_still'? Known: {ESTIMATORS}"),
+    ("stand_still,", "./stand_still,", f":8: estimators.0: no estimator file at stand_still/estimator.yaml. Known by name: {ESTIMATORS}"),
+    ("stand_still,", "3,", ":8: estimators.0: should be keys with values (got 3)"),
+    ("stand_still,", "constant_velocity,", ":8: estimators.1: two estimators are called 'constant_velocity'; give one a label of its own"),
+    ("measure_s", "mesure_s", ":8: estimators.1.params.mesure_s: no parameter named 'mesure_s'. Did you mean 'measure_s'? Known: measure_s"),
+    ("measure_s: 0.1", "measure_s: fast", ":8: estimators.1.params.measure_s: parameter 'measure_s' should be of the kind of its default 1.0, got 'fast'"),
+    ("measure_s: 0.1", "measure_s: 2020-01-01", ":8: estimators.1.params.measure_s: should be a number, text, a list or keys with values (got 2020-01-01)"),
+    ("rigs:", "\trigs:", r":5:1: found character '\t' that cannot start any token"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "sentence"), WRONG, ids=[f"{new.strip()}" for _, new, _ in WRONG])
+def test_a_wrong_suite_gets_one_line_with_file_line_key_value_and_remedy(bent, tmp_path, old, new, sentence):
+    assert said_of(tmp_path, lambda: bent((old, new))) == [sentence]
+
+
+ANOTHER = "truth: [dpth]\n"
+IS_SAID = "truth.0: no ground-truth channel named 'dpth'. Did you mean 'depth'? Known: "
+
+
+@pytest.mark.parametrize(("old", "new", "sentence"), WRONG[:-1], ids=[new.strip() for _, new, _ in WRONG[:-1]])
+def test_a_mistake_is_said_as_well_where_there_is_another(bent, tmp_path, old, new, sentence):
+    said = said_of(tmp_path, lambda: bent((old, new), more=ANOTHER))
+    assert sorted(line for line in said if IS_SAID not in line) == [sentence]
+    assert len(said) == 2
+
+
+def said_of(folder, read):
+    """The lines that are said of the suite when it is read."""
+    with pytest.raises(SuiteError) as refused:
+        read()
+    return [line.removeprefix(str(folder / "tiny.yaml")) for line in str(refused.value).splitlines()]
+
+
+TEN = [
+    ("seed: 1", "seed: one\nseed: 2\nreapeats: 3"),
+    ("[closet]", "[closet, atic]"),
+    ("power_lm: 150}}", "power_lm: -1}}, dark: {lmp: {power_lm: 0}}"),
+    ("{down: {pitch_deg: 90}}", "{down: {pitch_deg: 90, lens: eurok}, up: {pitch_deg: .nan}}"),
+    ("[[0.5, 0]]", "[[0.5, a]]"),
+    ("{sensor: clean}", "{shutter: rolling}"),
+    ("[stand_still,", "[stand_stil,"),
+    ("measure_s:", "mesure_s:"),
+]
+TOLD = [
+    ":2: seed: should be a whole number (got 'one')",
+    ':3:1: found duplicate key "seed" with value "2" (original value: "one")',
+    ":4: reapeats: unknown key. Did you mean 'repeats'?",
+    ":5: scenes.0: {}/scenes/closet.yaml:3: materials.grain.albedo: should be less than 1 (got 2)",
+    ":5: scenes.0: {}/scenes/closet.yaml:5: lamps.0.center_m: should be inside the room",
+    ":5: scenes.1: no scene named 'atic'.",
+    ":6: lightings.dim.lamp.power_lm: should be 0 or more (got -1)",
+    ":6: lightings.dark.lmp: lighting: no light named 'lmp'. Did you mean 'lamp'?",
+    ":7: rigs.down.lens: no lens named 'eurok'. Did you mean 'euroc'?",
+    ":7: rigs.up.pitch_deg: should be a finite number (got nan)",
+    ":8: trajectories.short.targets_m.0.1: should be a number (got 'a')",
+    ":9: cameras.clean: a rolling shutter needs readout_ms",
+    ":10: estimators.0: no estimator named 'stand_stil'. Did you mean 'stand_still'?",
+    ":10: estimators.1.params.mesure_s: no parameter named 'mesure_s'. Did you mean 'measure_s'?",
+]
+IN_SCENE = ("albedo: 0.5", "albedo: 2", "[0, 0, 1.4]", "[0, 0, 1.6]")
+
+
+def test_mistakes_of_every_sort_are_said_at_once_in_the_order_of_the_file(bent, tmp_path):
+    with pytest.raises(SuiteError) as refused:
+        bent(*TEN, scene=IN_SCENE)
+    said = [str(mistake).removeprefix(str(tmp_path / "tiny.yaml")) for mistake in refused.value.mistakes]
+    for line, told in zip(sorted(said), sorted(TOLD), strict=True):
+        assert line.startswith(told.format(tmp_path))
+    assert [int(line.split(":")[1]) for line in said] == sorted(int(told.split(":")[1]) for told in TOLD)
+    lines = str(refused.value).splitlines()
+    assert len(lines) == MOST_SAID + 1
+    assert lines[-1] == f"and {len(TOLD) - MOST_SAID} more mistakes"
+
+
+def test_every_mistake_has_its_file_line_key_and_value_apart(bent, tmp_path):
+    with pytest.raises(SuiteError) as refused:
+        bent(("seed: 1", "seed: one"), scene=("wall: grain", "wall: grane"))
+    seed, wall = refused.value.mistakes
+    assert seed.places == (Place(str(tmp_path / "tiny.yaml"), 2, key="seed", value="one"),)
+    asking, at_fault = wall.places
+    assert (asking.line, asking.key, asking.value) == (3, "scenes.0", "closet")
+    assert at_fault == Place(str(tmp_path / "scenes" / "closet.yaml"), 4, key="room.wall", value="grane")
+    assert wall.sentence == "no material named 'grane'. Did you mean 'grain'? Known: grain"
+
+
+def test_entries_after_a_wrong_one_keep_their_number(bent, tmp_path):
+    said = said_of(tmp_path, lambda: bent(("[stand_still,", "[3, stnd_still,")))
+    assert [line.partition(" no ")[0] for line in said] == [
+        ":8: estimators.0: should be keys with values (got 3)",
+        ":8: estimators.1:",
+    ]
+
+
+def test_what_is_wrong_with_an_axis_is_said_once_for_all_its_cases(bent, tmp_path):
+    planned = bent(
+        ("[[0.5, 0]]}", "[[0.5, 0]]}, far: {targets_m: [[1.5, 0]]}, never: {targets_m: [[9, 9]], max_time_s: 1}"),
+        ("{sensor: clean}", "{sensor: clean}, slow: {exposure_ms: 100}"),
+    )
+    said = said_of(tmp_path, lambda: body_motions(planned))
+    assert len(planned.cases) == 12
+    assert [line.split(": ")[1] for line in said] == ["trajectories.far", "trajectories.never", *["cameras.slow"] * 2]
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"", ": should be keys with values, but is empty"),
+        (b"# nothing\n", ": should be keys with values, but is empty"),
+        (b"- a\n", ": should be keys with values, but is a list"),
+        (b"hello\n", ": should be keys with values, but is the single value 'hello'"),
+        (b"name: [\n", ":2:1: expected the node content, but found '<stream end>'"),
+        (b"\xff\xfe\x00", ": not a text file in UTF-8"),
+        (b"a: [" * 3000, ": brackets or indents are nested too deep"),
+        (b"name: a\n---\nname: b\n", ":2:1: but found another document"),
+    ],
+    ids=["empty", "comment", "list", "scalar", "torn", "binary", "deep", "two"],
+)  # fmt: skip
+def test_a_file_that_is_no_suite_at_all_is_refused_by_name(bent, tmp_path, content, sentence):
+    bent()
+    (tmp_path / "tiny.yaml").write_bytes(content)
+    with pytest.raises(SuiteError) as refused:
+        read_plan("./tiny.yaml")
+    assert str(refused.value) == f"{tmp_path / 'tiny.yaml'}{sentence}"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("wall: grain", "wall: grane", ":4: room.wall: no material named 'grane'. Did you mean 'grain'? Known: grain"),
+        ("albedo: 0.5", "albedo: 1", ":3: materials.grain.albedo: should be less than 1 (got 1)"),
+        ("terrazzo", "tiles", ":3: materials.grain.pattern: no pattern named 'tiles'"),
+        ("power_lm: 600", "power_lm: -1", ":5: lamps.0.power_lm: should be 0 or more (got -1)"),
+        ("size_m: [3, 3, 1.5]", "size_m: [3, 3]", ":4: room.size_m.2: this key is missing"),
+    ],
+)  # fmt: skip
+def test_a_wrong_scene_is_named_with_the_line_of_the_suite_that_asks_for_it(bent, tmp_path, old, new, sentence):
+    with pytest.raises(SuiteError) as refused:
+        bent(scene=(old, new))
+    files = f"{tmp_path / 'tiny.yaml'}:3: scenes.0: {tmp_path / 'scenes' / 'closet.yaml'}"
+    assert str(refused.value).startswith(f"{files}{sentence}")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("[[0.5, 0]]", "[[0.5, 0], [9, 9]], max_time_s: 3", "target 2 at (9, 9) m was not entered in max_time_s"),
+        ("[[0.5, 0]]", "[[1.5, 0]]", "a camera of rig 'down' leaves the room (3 × 3 × 1.5 m around the origin) of scene 'closet' after"),
+        ("pitch_deg: 90", "pitch_deg: 90, height_m: 1.5", "a camera of rig 'down' leaves the room"),
+        ("[[0.5, 0]]", "[[0.5, 0]], rate_hz: 0.1", "gain_per_s 0.8 at 0.1 Hz"),
+    ],
+)  # fmt: skip
+def test_a_drive_that_cannot_be_is_said_before_anything_is_rendered(bent, tmp_path, old, new, sentence):
+    planned = bent((old, new))
+    with pytest.raises(VobenchError) as refused:
+        body_motions(planned)
+    assert str(refused.value).startswith(f"{tmp_path / 'tiny.yaml'}:6: trajectories.short: {sentence}")
+
+
+DOCS = Path(__file__).parents[2] / "docs" / "suites.md"
+
+
+@pytest.mark.parametrize("model", [Suite, RigSpec, CalibrationErrorSpec, CameraSpec, EstimatorSpec, LightOverride])
+def test_every_key_is_in_the_docs_with_its_default(model):
+    page = DOCS.read_text(encoding="utf-8")
+    for key, field in model.model_fields.items():
+        assert f"`{key}`" in page or f"{{{key}" in page or f", {key}" in page, key
+        if isinstance(field.default, str | int | float) and field.default != "":
+            (row,) = [line for line in page.splitlines() if line.startswith("| `") and f"`{key}`" in line.split("|")[1]]
+            default = f"{field.default:g}" if isinstance(field.default, float) else str(field.default)
+            default = default.lower() if isinstance(field.default, bool) else default
+            assert default in row, f"{key}: {default} is not in: {row}"
+
+
+def test_the_suite_of_the_docs_is_valid(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lighting.yaml").write_text(DOCS.read_text(encoding="utf-8").split("```yaml\n")[1].split("```")[0])
+    assert [case.name for case in read_plan("./lighting.yaml").cases] == ["both", "one_lamp"]

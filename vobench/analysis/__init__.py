@@ -1,0 +1,1 @@
+"""What is wrong between an estimate and its ground truth, and why."""

@@ -1,0 +1,385 @@
+"""vobench score, diagnose and metrics."""
+
+import csv
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any, get_args
+
+from vobench.analysis.diagnose import Finding, diagnose
+from vobench.cli import terminal
+from vobench.errors import AlignmentError, InputError, UnknownNameError, unknown
+from vobench.metric.definitions import DEFINITIONS, MetricDefinition
+from vobench.metric.score import Score, pooled, score
+from vobench.metric.settings import LIKE, PAIRS_OF_RULE, Plane, ScoreSettings, Side, Unit
+from vobench.run.trajectory_pair import TrajectorySource, read_pair
+from vobench.trajectory.align import Kind
+from vobench.trajectory.associate import Method
+
+
+def show_metrics(metric: str | None, *, as_json: bool) -> None:
+    """Print every metric in a line, or all there is to say of one; ids of scores are taken as well."""
+    if metric is None:
+        _show_all(as_json=as_json)
+        return
+    found = _find(metric)
+    if as_json:
+        terminal.print_json(asdict(found))
+        return
+    out = terminal.console()
+    for name, value in asdict(found).items():
+        stated = ", ".join(value) if isinstance(value, tuple) else str(value)
+        out.print(f"{name:9}  {stated}", soft_wrap=True)
+
+
+def _show_all(*, as_json: bool) -> None:
+    definitions = list(DEFINITIONS.values())
+    if as_json:
+        terminal.print_json({"metrics": [asdict(definition) for definition in definitions]})
+        return
+    rows = [[d.id, d.unit, d.headline, d.title, "--full" if d.full else ""] for d in definitions]
+    terminal.console().print(terminal.table("", ["metric", "unit", "headline", "is", "with"], rows))
+
+
+def _find(metric: str) -> MetricDefinition:
+    """The definition of a metric's name, or of the start of an id such as ate.trans.rmse[…]."""
+    if metric.lower() in DEFINITIONS:
+        return DEFINITIONS[metric.lower()]
+    stem = metric.partition("[")[0]
+    for definition in DEFINITIONS.values():
+        if definition.identity in (stem, stem.rpartition(".")[0]):
+            return definition
+    raise UnknownNameError(unknown("metric", metric, list(DEFINITIONS)))
+
+
+WITHOUT_OPTION = {
+    "swapped_inputs": "give the two files in the other order",
+    "unrelated": "none; see whether both files are of the same recording",
+}
+
+
+def show_diagnosis(gt: TrajectorySource, est: TrajectorySource, *, times: Sequence[Path], as_json: bool) -> None:
+    """Print what is wrong between two trajectories, its evidence, and the command that scores without it."""
+    pair = read_pair(gt, est, times=times, any_unit=True)
+    findings = diagnose(pair.gt, pair.est)
+    is_unrelated = any(finding.fault == "unrelated" for finding in findings)
+    content = {
+        "findings": [
+            {**finding.as_dict(), "command": None if is_unrelated else _command(gt, est, times, [finding])}
+            for finding in findings
+        ],
+        "command": _command(gt, est, times, findings) if findings and not is_unrelated else None,
+        "warnings": [pair.by_frame] if pair.by_frame else [],
+        "notes": list(pair.notes),
+    }
+    if as_json:
+        terminal.print_json(content)
+        return
+    for note in pair.notes:
+        print(f"note: {note}", file=sys.stderr)
+    _print_diagnosis(content)
+
+
+def _command(gt: TrajectorySource, est: TrajectorySource, times: Sequence[Path], findings: Sequence[Finding]) -> str:
+    """The score that all these findings mend: of swapped files each is named for what it is."""
+    is_swapped = any(finding.fault == "swapped_inputs" for finding in findings)
+    files = [str(gt.path), str(est.path)]
+    words = [part for side in (("gt", gt), ("est", est)) for part in _source_words(*side)]
+    words += [option for finding in findings for option in finding.options]
+    if is_swapped:
+        files.reverse()
+        words = [_exchanged(word) for word in words]
+    words += [part for path in times for part in ("--times", str(path))]
+    return shlex.join(["vobench", "score", *files, *words])
+
+
+def _exchanged(word: str) -> str:
+    """An option as it reads once truth and estimate have changed places."""
+    for side, other in (("gt", "est"), ("est", "gt")):
+        if word.startswith(f"--{side}-"):
+            return f"--{other}-{word.removeprefix(f'--{side}-')}"
+    if word.startswith("--t-offset="):
+        offset = word.removeprefix("--t-offset=")
+        return f"--t-offset={offset[1:] if offset.startswith('-') else f'-{offset}'}"
+    return word
+
+
+def _source_words(side: str, source: TrajectorySource) -> list[str]:
+    topic = [f"--{side}-topic", source.topic] if source.topic else []
+    return topic + [part for word in source.words for part in (f"--{side}-as", word)]
+
+
+def _print_diagnosis(content: dict[str, Any]) -> None:
+    out = terminal.console()
+    for warning in content["warnings"]:
+        out.print(f"warning: {warning}", style="yellow", soft_wrap=True)
+    if not content["findings"]:
+        out.print("nothing wrong was found: what differs are errors of the estimate")
+        return
+    for finding in content["findings"]:
+        out.print(f"{finding['fault']}: {finding['sentence']}", style="bold", soft_wrap=True)
+        for figure in finding["evidence"]:
+            unit = "" if figure["unit"] == "1" else f" {figure['unit']}"
+            before = "none" if figure["before"] is None else f"{figure['before']:.4g}{unit}"
+            out.print(f"  {figure['name']}: {before}, mended {figure['after']:.4g}{unit}", soft_wrap=True)
+        out.print(f"  mend: {' '.join(finding['options']) or WITHOUT_OPTION[finding['fault']]}", soft_wrap=True)
+    if content["command"]:
+        out.print(f"all of it: {content['command']}", soft_wrap=True)
+
+
+MAX_WINDOW_S = 1e6
+MAX_OFFSET_S = 2e9  # from a clock that starts at 0 to one that counts from 1970
+COLUMNS = ("n", "rmse", "mean", "median", "std", "min", "max", "sse", "p95", "p99")
+SHOWN = ("n", "rmse", "mean", "median", "std", "min", "max", "p95", "p99")
+WORDS = ("metric", "unit", "sequence")  # headings of columns that hold words
+ABREAST = 6  # metrics in one table of sequences
+Content = dict[str, Any]
+Rows = list[list[str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The settings asked for; None leaves them to the preset `like`, or to our own defaults without one."""
+
+    like: str | None = None
+    alignment: str | None = None
+    align_n: int | None = None
+    association: str | None = None
+    max_diff_s: float | None = None
+    offset_s: float | None = None
+    rpe_delta: float | None = None
+    rpe_unit: str | None = None
+    rpe_all_pairs: bool | None = None
+    rpe_pairs_from: str | None = None
+    full: bool | None = None
+    project: str | None = None
+
+    def settings(self) -> ScoreSettings:
+        """What to score with. Raises UnknownNameError, InputError or AlignmentError for what can't be asked."""
+        _require_known("preset", self.like, tuple(LIKE))
+        _require_known("alignment", self.alignment, get_args(Kind))
+        _require_known("association", self.association, get_args(Method))
+        _require_known("unit", self.rpe_unit, get_args(Unit))
+        _require_known("side", self.rpe_pairs_from, get_args(Side))
+        _require_known("plane", self.project, get_args(Plane))
+        if self.rpe_delta is not None and not 0 < self.rpe_delta < float("inf"):
+            raise InputError(f"--delta should be more than 0 and finite, got {self.rpe_delta:g}")
+        own = {field.name for field in fields(ScoreSettings)} & set(self.__slots__)
+        asked = {name: getattr(self, name) for name in own}
+        asked["max_diff_ns"] = _ns("--t-max-diff", self.max_diff_s, 0, MAX_WINDOW_S)
+        asked["offset_ns"] = _ns("--t-offset", self.offset_s, -MAX_OFFSET_S, MAX_OFFSET_S)
+        base = LIKE[self.like] if self.like else ScoreSettings()
+        if base.rpe_rule in PAIRS_OF_RULE and not self._keeps_pairs(base):
+            asked["rpe_rule"] = ScoreSettings().rpe_rule  # other pairs than that tool has are ours
+        return replace(base, **{name: value for name, value in asked.items() if value is not None})
+
+    def _keeps_pairs(self, base: ScoreSettings) -> bool:
+        """Whether the pairs asked for are those of a tool whose rule knows no others."""
+        asked = (self.rpe_unit, self.rpe_all_pairs, self.rpe_pairs_from)
+        are_own = all(mine in (None, own) for mine, own in zip(asked, PAIRS_OF_RULE[base.rpe_rule], strict=True))
+        return are_own and (self.project is None if base.rpe_rule == "tum" else self.rpe_delta is None)
+
+
+def show_score(
+    pairs: Sequence[tuple[TrajectorySource, TrajectorySource]],
+    asked: Asked,
+    *,
+    times: Sequence[Path],
+    form: str,
+    per_length: bool,
+) -> None:
+    """Score one pair of trajectories, or several and all of them together, and print every metric with its identity.
+
+    `form` is table, json, csv or md; `per_length` adds the metrics over each length of path, which json always has.
+    """
+    settings = asked.settings()
+    scored = [_scored(gt, est, settings, times) for gt, est in pairs]
+    if len(scored) == 1:
+        content = scored[0][1]
+        _require_finite(content["metrics"])
+    else:
+        content = _together(pairs, scored)
+    if form == "json":
+        terminal.print_json(content)
+        return
+    for part in content.get("sequences", [content]):
+        for note in part["notes"]:
+            print(f"note: {note}", file=sys.stderr)
+    FORMS[form](content, [result for result, _ in scored], per_length)
+
+
+def read_list(path: Path) -> list[Path]:
+    """The files that a list names, truth and estimate on each line, from the list's own folder. Raises InputError."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read {path}: {getattr(error, 'strerror', None) or 'not a text in UTF-8'}") from None
+    found: list[Path] = []
+    for number, line in enumerate(lines, 1):
+        words = shlex.split(line, comments=True)
+        if len(words) not in (0, 2):
+            raise InputError(f"{path}:{number}: a line should name a truth and an estimate, but has {len(words)} words")
+        found += [path.parent / word for word in words]
+    if not found:
+        raise InputError(f"no line names a truth and an estimate: {path}")
+    return found
+
+
+def _scored(
+    gt: TrajectorySource, est: TrajectorySource, settings: ScoreSettings, times: Sequence[Path]
+) -> tuple[Score, Content]:
+    pair = read_pair(gt, est, times=times)
+    if pair.by_frame and settings.rpe_unit == "s":
+        raise InputError("a delta in seconds needs stamps, and neither file has any; name one with --times")
+    scored = score(pair.gt.trajectory, pair.est.trajectory, settings=settings)
+    content = scored.as_dict()
+    content["warnings"] = [*([pair.by_frame] if pair.by_frame else []), *content["warnings"]]
+    content["notes"] = list(pair.notes)
+    content["per_length"] = [row.as_dict() for row in scored.per_length]
+    return scored, content
+
+
+def _together(
+    pairs: Sequence[tuple[TrajectorySource, TrajectorySource]], scored: Sequence[tuple[Score, Content]]
+) -> Content:
+    """Several sequences, and their errors pooled."""
+    sequences = [
+        {"gt": str(gt.path), "est": str(est.path), **content}
+        for (gt, est), (_, content) in zip(pairs, scored, strict=True)
+    ]
+    pool = pooled([result for result, _ in scored])
+    metrics = [metric.as_dict() for metric in pool.metrics]
+    for part in (*(sequence["metrics"] for sequence in sequences), metrics):
+        _require_finite(part)
+    lengths = [row.as_dict() for row in pool.per_length]
+    return {
+        "sequences": sequences,
+        "pooled": {"metrics": metrics, "per_length": lengths, "warnings": list(pool.warnings)},
+    }
+
+
+def _require_known(what: str, name: str | None, known: tuple[str, ...]) -> None:
+    if name is not None and name not in known:
+        raise UnknownNameError(unknown(what, name, list(known)))
+
+
+def _ns(option: str, value_s: float | None, least_s: float, most_s: float) -> int | None:
+    if value_s is None:
+        return None
+    if not least_s <= value_s <= most_s:
+        raise InputError(f"{option} should be {least_s:g} to {most_s:g} seconds, got {value_s:g}")
+    return round(value_s * 1e9)
+
+
+def _require_finite(metrics: list[dict[str, Any]]) -> None:
+    """No score is printed with a nan in it. Raises AlignmentError."""
+    for metric in metrics:
+        for name in COLUMNS:
+            if not abs(metric[name]) < float("inf"):
+                raise AlignmentError(f"the {name} of {metric['name']} is {metric[name]}: positions are too far apart")
+
+
+def _print_csv(content: Content, scored: Sequence[Score], per_length: bool) -> None:
+    del scored
+    named = [(part["est"], part) for part in content.get("sequences", [])]
+    named += [("pooled", content["pooled"])] if named else [("", content)]
+    columns = [*(["sequence"] if len(named) > 1 else []), "name", "unit", *(["length_m"] if per_length else [])]
+    writer = csv.DictWriter(sys.stdout, [*columns, *COLUMNS, "id"], extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    for name, part in named:
+        rows = [*part["metrics"], *(part["per_length"] if per_length else [])]
+        writer.writerows({"sequence": name, **row} for row in rows)
+
+
+def _print_md(content: Content, scored: Sequence[Score], per_length: bool) -> None:
+    for headings, rows in _tables(content, per_length):
+        words = sum(heading in WORDS for heading in headings)
+        print(f"| {' | '.join(headings)} |\n|{'---|' * words}{'---:|' * (len(headings) - words)}")
+        for row in rows:
+            print(f"| {' | '.join(row)} |")
+        print()
+    for sentence in (*_ids(content), *_summaries(content, scored), *(f"warning: {w}" for w in _warnings(content))):
+        print(f"- {sentence}")
+
+
+def _print_table(content: Content, scored: Sequence[Score], per_length: bool) -> None:
+    out = terminal.console()
+    for headings, rows in _tables(content, per_length):
+        out.print(terminal.table("", headings, rows))
+    for identity in _ids(content):
+        out.print(identity, style="dim", soft_wrap=True)
+    for summary in _summaries(content, scored):
+        out.print(summary, soft_wrap=True)
+    for warning in _warnings(content):
+        out.print(f"warning: {warning}", style="yellow", soft_wrap=True)
+
+
+def _tables(content: Content, per_length: bool) -> list[tuple[list[str], Rows]]:
+    """Headings and rows of each table: the metrics, or the sequences with all of them pooled, then the lengths."""
+    whole = content.get("pooled", content)
+    if "sequences" in content:
+        tables = _sequence_tables(content)
+    else:
+        rows = [[metric["name"], metric["unit"], *_cells(metric)] for metric in content["metrics"]]
+        tables = [(["metric", "unit", *SHOWN], rows)]
+    if per_length:
+        cut = [[row["name"], row["unit"], f"{row['length_m']:g}", *_cells(row)] for row in whole["per_length"]]
+        tables.append((["metric", "unit", "length m", *SHOWN], cut))
+    return tables
+
+
+def _sequence_tables(content: Content) -> list[tuple[list[str], Rows]]:
+    """A row for each sequence and one for all of them, with the statistic to quote of each metric."""
+    parts = [*content["sequences"], {"est": "pooled", **content["pooled"]}]
+    units = {metric["name"]: metric["unit"] for part in parts for metric in part["metrics"]}
+    names = list(units)
+    tables: list[tuple[list[str], Rows]] = []
+    for begin in range(0, len(names), ABREAST):
+        chosen = names[begin : begin + ABREAST]
+        rows = []
+        for part in parts:
+            quoted = {metric["name"]: f"{metric[_quoted(metric['name'])]:.6g}" for metric in part["metrics"]}
+            coverage = f"{part['coverage']:.3f}" if "coverage" in part else ""
+            rows.append([part["est"], coverage, *(quoted.get(name, "") for name in chosen)])
+        headings = [f"{name} {_quoted(name)}{'' if units[name] == '1' else ' ' + units[name]}" for name in chosen]
+        tables.append((["sequence", "coverage", *headings], rows))
+    return tables
+
+
+def _quoted(name: str) -> str:
+    """The statistic of a metric that is quoted."""
+    return DEFINITIONS[name].headline
+
+
+def _cells(metric: dict[str, Any]) -> list[str]:
+    return [str(metric["n"]), *(f"{metric[name]:.6g}" for name in SHOWN[1:])]
+
+
+def _ids(content: Content) -> list[str]:
+    return [metric["id"] for metric in content.get("pooled", content)["metrics"]]
+
+
+def _warnings(content: Content) -> list[str]:
+    if "sequences" not in content:
+        return list(content["warnings"])
+    said = [f"{part['est']}: {warning}" for part in content["sequences"] for warning in part["warnings"]]
+    return [*said, *content["pooled"]["warnings"]]
+
+
+def _summaries(content: Content, scored: Sequence[Score]) -> list[str]:
+    names = [f"{part['est']}: " for part in content.get("sequences", [])] or [""]
+    return [f"{name}{_summary(result)}" for name, result in zip(names, scored, strict=True)]
+
+
+def _summary(scored: Score) -> str:
+    met, ratio, failed = scored.association, scored.coverage.ratio, scored.failure
+    lost_aware = "" if failed.lost_aware is None else f", lost-aware score {failed.lost_aware:.3f}"
+    return (
+        f"{met.pairs} pairs of {met.gt_poses} true and {met.est_poses} estimated poses, coverage {ratio:.3f}"
+        f"{lost_aware} ({'survived' if failed.survived else 'not survived'})"
+    )
+
+
+FORMS = {"table": _print_table, "csv": _print_csv, "md": _print_md}

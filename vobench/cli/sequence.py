@@ -1,0 +1,249 @@
+"""vobench import, export, info and salvage."""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from vobench.cli import terminal
+from vobench.dataset.picture import require_free
+from vobench.dataset.recording import ReadOptions, Topics
+from vobench.errors import InputError, UnknownNameError, unknown
+from vobench.geometry.camera import Camera
+from vobench.geometry.rig import Rig
+from vobench.run.store import unfinished
+from vobench.sequence.recording import TopicFacts, bag_facts, topic_facts
+from vobench.sequence.salvage import Salvaged, salvage, salvage_sequence
+from vobench.trajectory.trajectory import Trajectory
+
+SENSORS_FILE = "sensors.mcap"
+
+
+def show_export(source: Path, out: Path, *, form: str, as_json: bool) -> None:
+    """Write a sequence in another layout, or a trajectory in another form, and print what was converted or lost."""
+    path = source.parent if source.name == SENSORS_FILE else source
+    notes, files = _trajectory(path, out, form) if path.is_file() else _sequence(path, out, form)
+    if as_json:
+        terminal.print_json({"form": form, "path": str(out), "files": files, "notes": notes})
+        return
+    for note in notes:
+        print(f"- {note}")
+    print(f"{files} {'file' if files == 1 else 'files'} in the form '{form}': {out}")
+
+
+def _sequence(folder: Path, out: Path, form: str) -> tuple[tuple[str, ...], int]:
+    from vobench.dataset.export import FORMS, export
+
+    if form in FORMS and folder.is_dir() and not (folder / SENSORS_FILE).is_file():
+        raise InputError(f"no sequence of ours (it has no {SENSORS_FILE}); vobench import makes one: {folder}")
+    exported = export(folder, out, form)
+    return exported.notes, len(exported.files)
+
+
+def _trajectory(path: Path, out: Path, form: str) -> tuple[tuple[str, ...], int]:
+    from vobench.dataset.export import export_trajectory
+
+    files = export_trajectory(_read(path), out, form)
+    return tuple(f"KITTI's poses have no stamps: those are in {file.name}." for file in files[1:]), len(files)
+
+
+def _read(path: Path) -> Trajectory:
+    """The poses of a text in any form, or the only ones of a recording."""
+    from vobench.dataset.picture import read_text
+    from vobench.sequence.recording import is_recording, read_poses
+    from vobench.trajectory.formats import parse_any
+
+    if is_recording(path):
+        return read_poses(path, None)
+    parsed = parse_any(read_text(path), name=str(path))
+    if parsed.t_ns is None:
+        raise InputError(f"poses without stamps, which the other forms need: {path}")
+    return Trajectory(parsed.t_ns, parsed.T)
+
+
+TOPICS = tuple(Topics.__dataclass_fields__)
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What was said on the command line of a recording."""
+
+    form: str | None = None
+    calibration: Path | None = None
+    imu: Path | None = None
+    truth: Path | None = None
+    rate_hz: float | None = None
+    topics: tuple[str, ...] = ()
+
+    def options(self) -> ReadOptions:
+        """The same as a reader takes it. Raises UnknownNameError for a topic that no reader looks for."""
+        return ReadOptions(self.calibration, self.imu, self.truth, self.rate_hz, topics=_topics(self.topics))
+
+
+def show_import(path: Path, out: Path, given: Given, *, as_json: bool) -> None:
+    """Convert a recording into a sequence, and print what was found, assumed and dropped."""
+    from vobench.dataset.read import read
+    from vobench.run.import_recording import import_recording
+    from vobench.sequence import Sequence
+
+    require_free(out)
+    recording = read(path, form=given.form, options=given.options())
+    with unfinished(out.resolve().parent) as folder:
+        import_recording(recording, folder)
+        if out.is_dir():
+            out.rmdir()
+        folder.rename(out)
+    frames = len(Sequence.open(out))
+    if as_json:
+        terminal.print_json({"form": recording.form, "path": str(out), "frames": frames, "notes": recording.notes})
+        return
+    for note in recording.notes:
+        print(f"- {note}")
+    print(f"{frames} frames of a recording in the form '{recording.form}': {out}")
+
+
+def _topics(given: tuple[str, ...]) -> Topics:
+    chosen = {}
+    for entry in given:
+        role, _, name = entry.partition("=")
+        if role not in TOPICS or not name:
+            raise UnknownNameError(f"--topic {entry}: {unknown('topic', role, list(TOPICS))}; as in --topic left=/cam0")
+        chosen[role] = name
+    return Topics(**chosen)
+
+
+def show_info(path: Path, given: Given, *, as_json: bool) -> None:
+    """Print what is in a recording of any form; its pictures are read only for the hash of a sequence of ours."""
+    from vobench.dataset.read import read
+
+    recording = read(path, form=given.form, options=given.options())
+    folder = path.parent if path.is_file() else path
+    facts = {
+        "path": str(path),
+        "form": recording.form,
+        "frames": recording.frame_count,
+        "duration_s": float(recording.t_ns[-1] - recording.t_ns[0]) / 1e9,
+        "calibration": _calibration(recording.rig),
+        "ground_truth": _truth(recording.truth),
+        "imu_readings": len(recording.imu.t_ns) if recording.imu else 0,
+        "encoder_readings": len(recording.encoders[0]) if recording.encoders else 0,
+        "files": {name: [_topic(facts) for facts in found] for name, found in _files(path, recording.form)},
+        **(_identity(folder) if recording.form == "vobench" else {"notes": list(recording.notes)}),
+    }
+    if as_json:
+        terminal.print_json(facts)
+    else:
+        _print_info(facts)
+
+
+def _files(path: Path, form: str) -> Iterator[tuple[str, tuple[TopicFacts, ...]]]:
+    """What is in each file of a sequence of ours, or in somebody's bag."""
+    if form == "vobench":
+        files = [path] if path.is_file() else sorted(path.glob("*.mcap"))
+        yield from ((file.name, topic_facts(file)) for file in files)
+    elif form in ("ros1", "ros2", "mcap"):
+        yield path.name, bag_facts(path)
+
+
+def _topic(facts: TopicFacts) -> dict[str, Any]:
+    return {**asdict(facts), "rate_hz": facts.rate_hz}
+
+
+def _calibration(rig: Rig) -> dict[str, Any]:
+    cameras: dict[str, Any] = {side: _camera(rig.camera(side)) for side in rig.sides}
+    return {
+        **cameras,
+        "baseline_m": rig.baseline_m if rig.right else None,
+        "imu_rate_hz": rig.imu.rate_hz if rig.imu else None,
+        "wheels": asdict(rig.wheels) if rig.wheels else None,
+    }
+
+
+def _camera(camera: Camera) -> dict[str, Any]:
+    numbers = {field.name: getattr(camera, field.name) for field in fields(camera)}  # type: ignore[arg-type]
+    return {"model": type(camera).__name__, **numbers}
+
+
+def _truth(truth: Trajectory | None) -> dict[str, Any] | None:
+    if truth is None:
+        return None
+    duration_s = (int(truth.t_ns[-1]) - int(truth.t_ns[0])) / 1e9
+    return {"poses": len(truth), "path_m": float(truth.distances_m()[-1]), "duration_s": duration_s}
+
+
+def _identity(folder: Path) -> dict[str, Any]:
+    """Of a sequence of ours: what its import assumed, the hash of all that was recorded, and what made it."""
+    from vobench.sequence import has_truth, payload_hash, read_import_notes, read_provenance
+
+    if not has_truth(folder):
+        return {"notes": []}
+    return {
+        "notes": [text for key, text in read_import_notes(folder).items() if key.startswith("note_")],
+        "payload_sha256": payload_hash(folder),
+        "provenance": read_provenance(folder),
+    }
+
+
+def _print_info(facts: dict[str, Any]) -> None:
+    out = terminal.console()
+    out.print(f"{facts['path']}: form '{facts['form']}', {facts['frames']} frames in {facts['duration_s']:.3f} s")
+    for name, topics in facts["files"].items():
+        rows = [[t["name"], t["type_name"], str(t["count"]), _rate(t), _span(t)] for t in topics]
+        out.print(terminal.table(name, ["name", "kind", "messages", "Hz", "seconds"], rows))
+    for side in ("left", "right"):
+        if camera := facts["calibration"].get(side):
+            out.print(f"{side} camera: " + ", ".join(_entry(*item) for item in camera.items()))
+    rest = {key: facts["calibration"][key] for key in ("baseline_m", "imu_rate_hz", "wheels")}
+    out.print("; ".join(_entry(key, value) for key, value in rest.items()))
+    out.print(_truth_line(facts["ground_truth"]))
+    for note in facts["notes"]:
+        out.print(f"- {note}")
+    if "payload_sha256" in facts:
+        out.print(f"payload SHA-256: {facts['payload_sha256']}")
+        out.print(", ".join(f"{name} {version}" for name, version in facts["provenance"].items()) or "no provenance")
+
+
+def _entry(key: str, value: Any) -> str:
+    if isinstance(value, dict):
+        return f"{key}: " + ", ".join(_entry(*item) for item in value.items())
+    return f"{key} {'none' if value is None else f'{value:.6g}' if isinstance(value, float) else value}"
+
+
+def _rate(topic: dict[str, Any]) -> str:
+    return f"{topic['rate_hz']:.2f}" if topic["rate_hz"] else ""
+
+
+def _span(topic: dict[str, Any]) -> str:
+    return "" if topic["start_ns"] is None else f"{(topic['end_ns'] - topic['start_ns']) / 1e9:.3f}"
+
+
+def _truth_line(truth: dict[str, Any] | None) -> str:
+    if truth is None:
+        return "ground truth: none"
+    return f"ground truth: {truth['poses']} poses, {truth['path_m']:.3f} m, {truth['duration_s']:.3f} s"
+
+
+def show_salvaged(torn: Path, out: Path, *, as_json: bool) -> None:
+    """Recover a torn file, or both files of a torn sequence, and print what came and what is lost."""
+    if torn.is_dir():
+        require_free(out)
+        found = salvage_sequence(torn, out)
+    else:
+        if out.exists():
+            raise InputError(f"should be a new file, but there is something: {out}")
+        found = {out.name: salvage(torn, out)}
+    if as_json:
+        terminal.print_json({"path": str(out), "files": {name: asdict(what) for name, what in found.items()}})
+        return
+    for name, what in found.items():
+        _print_salvaged(name, what)
+
+
+def _print_salvaged(name: str, what: Salvaged) -> None:
+    out = terminal.console()
+    rows = [[topic, str(count)] for topic, count in sorted(what.messages.items())]
+    out.print(terminal.table(name, ["name", "messages"], rows) if rows else f"{name}: nothing")
+    for sentence in what.lost:
+        out.print(f"lost: {sentence}")
+    if not what.lost:
+        out.print("nothing was lost")

@@ -1,0 +1,1 @@
+"""Bodies and their motion: the Pioneer and its controller, cars, rails, hands, quadrotors, recorded paths. Pure."""

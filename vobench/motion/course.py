@@ -1,0 +1,430 @@
+"""Planar courses: circles, squares, figures of eight, arcs and clothoids, as ideal wheeled robots drive them."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from math import ceil, gcd, pi
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike
+
+from vobench.errors import MotionError
+from vobench.geometry.rig import WheelGeometry
+from vobench.geometry.se3 import Array
+from vobench.motion.pioneer import wheel_speeds
+from vobench.trajectory.kinematics import CurveMotion, Kinematics, Motion, in_stages, level, rest_to_rest
+from vobench.trajectory.trajectory import Stamps
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+BLUNT = 0.05  # a curve whose derivative falls below this share of its largest all but comes to a point
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+
+@dataclass(frozen=True, slots=True)
+class ArcLength:
+    """parameter(s) is the curve's parameter at arc length s, up to `length`."""
+
+    parameter: "BSpline"
+    length: float
+
+
+def arc_length(speed: Callable[[Array], Array], knots: Array) -> ArcLength:
+    """The inverse of the integral of `speed`, the length of the derivative (K,) at parameters (K,), from knots[0] on.
+
+    Gauss-Legendre between knots (N,), so close that speed hardly changes between them, then a quintic through
+    the inverse; a place where the speed is not smooth should be a knot.
+    """
+    half = np.diff(knots) / 2
+    parameters = (knots[:-1] + half)[:, None] + half[:, None] * NODES
+    lengths = speed(parameters.ravel()).reshape(parameters.shape) @ WEIGHTS * half
+    s = np.concatenate([[0.0], np.cumsum(lengths)])
+    return ArcLength(scipy.interpolate.make_interp_spline(s, knots, k=5), float(s[-1]))
+
+
+# Twelve nodes integrate a heading's cosine over a quarter turn to rounding.
+COURSE_NODES, COURSE_WEIGHTS = np.polynomial.legendre.leggauss(12)
+QUARTER_RAD = pi / 2
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A stretch of progress: metres driven ahead (advance 1) or back (-1), or radians turned on the spot (0).
+
+    The turn in rad per unit of progress runs evenly from `bend` to `bend + bent * length`.
+    """
+
+    length: float
+    bend: float = 0.0
+    bent: float = 0.0
+    advance: float = 1.0
+
+    @property
+    def turned_rad(self) -> float:
+        """The change of heading over it."""
+        return self.bend * self.length + self.bent * self.length**2 / 2
+
+    def parts(self) -> Iterator["Piece"]:
+        """The same in parts that turn by a quarter at most."""
+        most = max(abs(self.bend), abs(self.bend + self.bent * self.length)) * self.length
+        count = max(1, ceil(most / QUARTER_RAD))
+        length = self.length / count
+        for k in range(count):
+            yield Piece(length, self.bend + self.bent * k * length, self.bent, self.advance)
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """Pieces in a row, from the origin along x: a Curve. Arrays (P,) are of the parts, at their beginnings."""
+
+    breaks: Array
+    begin: Array
+    bend: Array
+    bent: Array
+    advance: Array
+    heading_rad: Array
+    x_m: Array
+    y_m: Array
+
+    def at(self, s: Array) -> Kinematics:
+        """Poses (K, 4, 4) at progress s (K,), and their derivatives by s."""
+        k = np.clip(np.searchsorted(self.begin, s, side="right") - 1, 0, len(self.begin) - 1)
+        into, bend, bent, advance = s - self.begin[k], self.bend[k], self.bent[k], self.advance[k]
+        x_m, y_m = _steps(into, bend, bent, heading_rad=self.heading_rad[k])
+        heading = self.heading_rad[k] + into * (bend + bent * into / 2)
+        return along(
+            self.x_m[k] + advance * x_m,
+            self.y_m[k] + advance * y_m,
+            heading,
+            advance=advance,
+            bend=bend + bent * into,
+            bent=bent,
+        )
+
+
+def course(pieces: Iterable[Piece]) -> Course:
+    """The pieces laid end to end, each with the heading that the one before ended with."""
+    pieces = list(pieces)
+    parts = [part for piece in pieces for part in piece.parts()]
+    length, bend, bent, advance = np.array([(p.length, p.bend, p.bent, p.advance) for p in parts]).T
+    heading_rad = _sums([part.turned_rad for part in parts])
+    x_m, y_m = _steps(length, bend, bent, heading_rad=heading_rad[:-1])
+    return Course(
+        breaks=_sums([piece.length for piece in pieces])[1:-1],
+        begin=_sums(length)[:-1],
+        bend=bend,
+        bent=bent,
+        advance=advance,
+        heading_rad=heading_rad[:-1],
+        x_m=_sums(advance * x_m)[:-1],
+        y_m=_sums(advance * y_m)[:-1],
+    )
+
+
+def along(x_m: Array, y_m: Array, heading_rad: Array, *, advance: Array, bend: Array, bent: Array) -> Kinematics:
+    """A level body (K,) that goes along its own x axis alone, as wheels do: its derivatives by progress."""
+    still = np.zeros_like(x_m)
+    return Kinematics(
+        T_world_body=level(x_m, y_m, heading_rad),
+        velocity_mps=np.stack([advance, still, still], -1),
+        turn_radps=np.stack([still, still, bend], -1),
+        acceleration_mps2=np.stack([still, advance * bend, still], -1),
+        turn_rate_radps2=np.stack([still, still, bent], -1),
+    )
+
+
+def _steps(length: Array, bend: Array, bent: Array, *, heading_rad: Array) -> tuple[Array, Array]:
+    """Displacements (K,) over `length` of clothoids that begin at a heading: the integrals of cosine and sine."""
+    s = length[:, None] * (COURSE_NODES + 1) / 2
+    heading = heading_rad[:, None] + s * (bend[:, None] + bent[:, None] * s / 2)
+    weights = COURSE_WEIGHTS / 2
+    return np.cos(heading) @ weights * length, np.sin(heading) @ weights * length
+
+
+def _sums(steps: ArrayLike) -> Array:
+    """Sums of the first 0, 1, ... all of the steps."""
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+KNOTS_PER_WAVE = 4096
+MOST_WAVES = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Lissajous:
+    """x = A sin(a phi + phase), y = B sin(b phi): a closed Curve, from the origin along x at s = 0.
+
+    half_m (2,) is A, B; waves (2,) is a, b; phase_rad (2,) is phase, 0.
+    """
+
+    half_m: Array
+    waves: Array
+    phase_rad: Array
+    arc: ArcLength
+
+    @property
+    def breaks(self) -> Array:
+        """None: it is smooth."""
+        return np.zeros(0)
+
+    def at(self, s: Array) -> Kinematics:
+        """Poses (K, 4, 4) at arc length s (K,), and their derivatives by s."""
+        s = np.mod(s, self.arc.length)
+        (x0, y0), *first = _derivatives(self.half_m, self.waves, self.phase_rad, np.zeros(1))[..., 0]
+        ahead = np.arctan2(first[0][1], first[0][0])
+        (x, y), d1, d2, d3 = _derivatives(self.half_m, self.waves, self.phase_rad, self.arc.parameter(s))
+        speed = np.hypot(*d1)
+        bend = _cross(d1, d2) / speed**3
+        bent = (_cross(d1, d3) / speed**3 - 3 * bend * (d1 * d2).sum(0) / speed**2) / speed
+        place = (x - x0 + 1j * (y - y0)) * np.exp(-1j * ahead)
+        heading = np.arctan2(d1[1], d1[0]) - ahead
+        return along(place.real, place.imag, heading, advance=np.ones_like(s), bend=bend, bent=bent)
+
+
+def lissajous_curve(size_m: tuple[float, float], *, ratio: tuple[int, int], phase_rad: float) -> Lissajous:
+    """One of the given length and width. Raises MotionError where it has no size, or has points for bends."""
+    if not (len(size_m) == 2 and np.isfinite([*size_m, phase_rad]).all() and min(size_m) > 0):
+        raise MotionError(
+            f"a Lissajous curve of {' m by '.join(map(str, size_m))} m, phase {phase_rad:g} rad, cannot be driven; "
+            "both sizes should be above 0, and all finite"
+        )
+    if any(n not in range(1, MOST_WAVES + 1) for n in ratio) or gcd(*map(int, ratio)) != 1:
+        raise MotionError(
+            f"the ratio of a Lissajous curve is {':'.join(map(str, ratio))}; it should be two whole numbers "
+            f"from 1 to {MOST_WAVES} without a common divisor"
+        )
+    half_m, waves = np.array(size_m)[:, None] / 2, np.array(ratio, float)[:, None]
+    phases = np.array([[phase_rad], [0.0]])
+
+    def speed(phi: Array) -> Array:
+        length: Array = np.hypot(*_derivatives(half_m, waves, phases, phi)[1])
+        return length
+
+    knots = np.linspace(0, 2 * np.pi, KNOTS_PER_WAVE * max(ratio) + 1)
+    _require_blunt(speed(knots), phase_rad)
+    return Lissajous(half_m, waves, phases, arc_length(speed, knots))
+
+
+def _require_blunt(speeds: Array, phase_rad: float) -> None:
+    if speeds.min() < BLUNT * speeds.max():
+        raise MotionError(
+            f"with a phase of {phase_rad:g} rad the Lissajous curve comes to a point where it turns back; "
+            "choose another phase: 0 where one number of the ratio is even, a quarter turn where both are odd"
+        )
+
+
+def _derivatives(half_m: Array, waves: Array, phases: Array, phi: Array) -> Array:
+    """Position and its first three derivatives by phi: (4, 2, K)."""
+    angle = waves * phi + phases
+    sine, cosine = half_m * np.sin(angle), half_m * np.cos(angle)
+    return np.stack([sine, waves * cosine, -(waves**2) * sine, -(waves**3) * cosine])
+
+
+def _cross(a: Array, b: Array) -> Array:
+    product: Array = a[0] * b[1] - a[1] * b[0]
+    return product
+
+
+Start = tuple[float, float, float]
+ORIGIN: Start = (0.0, 0.0, 0.0)
+CORNERS = 4
+MOST_LAPS = 1000
+
+
+def circle(
+    radius_m: float,
+    *,
+    speed_mps: float,
+    laps: float = 1.0,
+    clockwise: bool = False,
+    accel_mps2: float = 0.5,
+    start: Start = ORIGIN,
+) -> CurveMotion:
+    """A circle to the left of the start, or to its right if clockwise; laps need not be whole."""
+    _require_positive("radius_m", radius_m)
+    _require_laps(laps, whole=False)
+    length_m = 2 * pi * radius_m * laps
+    law = rest_to_rest(length_m, speed=speed_mps, acceleration=accel_mps2)
+    return CurveMotion(course([Piece(length_m, bend=_side(clockwise=clockwise) / radius_m)]), law, _placed(start))
+
+
+def square(
+    side_m: float,
+    *,
+    speed_mps: float,
+    laps: int = 1,
+    corner_radius_m: float = 0.0,
+    turn_radps: float = 1.0,
+    clockwise: bool = False,
+    accel_mps2: float = 0.5,
+    turn_accel_radps2: float = 2.0,
+    start: Start = ORIGIN,
+) -> CurveMotion:
+    """A square from one end of a straight stretch; where corner_radius_m is 0, with stops to turn on the spot.
+
+    Else each corner is two clothoids that meet where the way is tightest, at corner_radius_m.
+    """
+    _require_positive("side_m", side_m)
+    _require_laps(laps, whole=True)
+    if corner_radius_m:
+        straight_m, corner = _rounded(side_m, corner_radius_m, side=_side(clockwise=clockwise))
+        pieces = [Piece(straight_m), *corner] * (CORNERS * int(laps))
+        law = rest_to_rest(sum(piece.length for piece in pieces), speed=speed_mps, acceleration=accel_mps2)
+        return CurveMotion(course(pieces), law, _placed(start))
+    ahead = rest_to_rest(side_m, speed=speed_mps, acceleration=accel_mps2)
+    turn = rest_to_rest(pi / 2, speed=turn_radps, acceleration=turn_accel_radps2)
+    pieces = [Piece(side_m), Piece(pi / 2, bend=_side(clockwise=clockwise), advance=0.0)] * (CORNERS * int(laps))
+    return CurveMotion(course(pieces), in_stages([ahead, turn] * (CORNERS * int(laps))), _placed(start))
+
+
+def figure_8(
+    length_m: float,
+    *,
+    width_m: float | None = None,
+    speed_mps: float,
+    laps: int = 1,
+    accel_mps2: float = 0.5,
+    start: Start = ORIGIN,
+) -> CurveMotion:
+    """A figure of eight (Gerono's) from its crossing, half as wide as long where no width is given."""
+    size_m = (length_m, length_m / 2 if width_m is None else width_m)
+    return lissajous(size_m, speed_mps=speed_mps, laps=laps, accel_mps2=accel_mps2, start=start)
+
+
+def lissajous(
+    size_m: tuple[float, float],
+    *,
+    ratio: tuple[int, int] = (1, 2),
+    phase_rad: float = 0.0,
+    speed_mps: float,
+    laps: int = 1,
+    accel_mps2: float = 0.5,
+    start: Start = ORIGIN,
+) -> CurveMotion:
+    """The curve x = A sin(a phi + phase), y = B sin(b phi) of length 2A and width 2B, ratio a:b, from phi = 0."""
+    _require_laps(laps, whole=True)
+    curve: Lissajous = lissajous_curve(size_m, ratio=ratio, phase_rad=phase_rad)
+    law = rest_to_rest(curve.arc.length * int(laps), speed=speed_mps, acceleration=accel_mps2)
+    return CurveMotion(curve, law, _placed(start))
+
+
+def stop_and_go(
+    legs_m: Sequence[float], *, speed_mps: float, pause_s: float, accel_mps2: float = 0.5, start: Start = ORIGIN
+) -> CurveMotion:
+    """Straight ahead by each length in turn, with a pause between them."""
+    if not len(legs_m):
+        raise MotionError("legs_m is empty; it should hold the length of each stretch between two stops")
+    laws = [rest_to_rest(leg_m, speed=speed_mps, acceleration=accel_mps2) for leg_m in legs_m]
+    return CurveMotion(course(map(Piece, legs_m)), in_stages(laws, pause_s=pause_s), _placed(start))
+
+
+def pure_rotation(
+    angle_rad: float, *, rate_radps: float, accel_radps2: float = 2.0, start: Start = ORIGIN
+) -> CurveMotion:
+    """A turn on the spot, about the middle of the axle: to the left, or to the right where the angle is negative."""
+    if not (np.isfinite(angle_rad) and angle_rad):
+        raise MotionError(f"the angle is {angle_rad:g} rad; it should be finite and other than 0")
+    law = rest_to_rest(abs(angle_rad), speed=rate_radps, acceleration=accel_radps2)
+    return CurveMotion(
+        course([Piece(abs(angle_rad), _side(clockwise=angle_rad < 0), advance=0.0)]), law, _placed(start)
+    )
+
+
+def reverse(
+    length_m: float,
+    *,
+    speed_mps: float,
+    radius_m: float | None = None,
+    pause_s: float = 0.0,
+    accel_mps2: float = 0.5,
+    start: Start = ORIGIN,
+) -> CurveMotion:
+    """Ahead and back to the start on a straight line, or on an arc to the left (to the right if radius_m < 0)."""
+    _require_positive("length_m", length_m)
+    if radius_m is not None and not (np.isfinite(radius_m) and radius_m):
+        raise MotionError(
+            f"radius_m is {radius_m:g}; it should be finite and other than 0, or none for a straight line"
+        )
+    bend = 1 / radius_m if radius_m else 0.0
+    law = rest_to_rest(length_m, speed=speed_mps, acceleration=accel_mps2)
+    pieces = [Piece(length_m, bend), Piece(length_m, -bend, advance=-1.0)]
+    return CurveMotion(course(pieces), in_stages([law, law], pause_s=pause_s), _placed(start))
+
+
+def _rounded(side_m: float, radius_m: float, *, side: float) -> tuple[float, list[Piece]]:
+    """What is left of a side between its corners, and a corner. Raises MotionError where nothing is left."""
+    _require_positive("corner_radius_m", radius_m)
+    half_m = pi / 2 * radius_m  # a clothoid to 1/radius turns by half of that curvature times its length
+    bent = side / (radius_m * half_m)
+    corner = [Piece(half_m, 0.0, bent), Piece(half_m, side / radius_m, -bent)]
+    reach_m = float(abs(_end(corner)[0]))  # by symmetry as far along the side it leaves as along the next
+    straight_m = side_m - 2 * reach_m
+    if straight_m <= 0:
+        most_m = radius_m * side_m / (2 * reach_m)
+        raise MotionError(
+            f"corner_radius_m is {radius_m:g}, too wide for a side of {side_m:g} m: its corners begin "
+            f"{reach_m:.3g} m before the corner; it should be below {most_m:.3g}"
+        )
+    return straight_m, corner
+
+
+def _end(pieces: Sequence[Piece]) -> Array:
+    """Where pieces from the origin end (2,)."""
+    end: Array = course(pieces).at(np.array([sum(piece.length for piece in pieces)])).T_world_body[0, :2, 3]
+    return end
+
+
+def _placed(start: Start) -> Array:
+    """T_world_start (4, 4)."""
+    if np.shape(start) != (3,) or not np.isfinite(start).all():
+        raise MotionError(f"start is {tuple(start)}; it should be three finite numbers: x and y in m, heading in rad")
+    T_world_start: Array = level(*(np.array([value], float) for value in start))[0]
+    return T_world_start
+
+
+def _side(*, clockwise: bool) -> float:
+    return -1.0 if clockwise else 1.0
+
+
+def _require_positive(name: str, value: float) -> None:
+    if not (np.isfinite(value) and value > 0):
+        raise MotionError(f"{name} is {value:g}; it should be a finite number of metres above 0")
+
+
+def _require_laps(laps: float, *, whole: bool) -> None:
+    if not 0 < laps <= MOST_LAPS or (whole and laps != round(laps)):
+        what = "a whole number from 1 to" if whole else "above 0 and at most"
+        raise MotionError(f"laps is {laps:g}; it should be {what} {MOST_LAPS}")
+
+
+# Pieces no longer than this are integrated with four Gauss-Legendre nodes: exact for polynomials of degree 7.
+LONGEST_NS = 2e7
+
+
+def rolled(motion: Motion, t_ns: Stamps, wheels: WheelGeometry) -> Array:
+    """Rim angles (M, 2) in rad, left and right, at rising instants (M,) of a body whose axle's middle moves so.
+
+    Both are 0 at the motion's start. Only the forward speed turns wheels: a body that slides sideways does not.
+    """
+    knots = _knots(motion, np.asarray(t_ns, float))
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    middle, half = (knots[1:] + knots[:-1]) / 2, np.diff(knots) / 2
+    moved = motion.at((middle[:, None] + half[:, None] * nodes).ravel())
+    speeds = wheel_speeds(moved.velocity_mps[:, 0], moved.turn_radps[:, 2], track_m=wheels.track_m)
+    travel = np.stack(speeds, -1).reshape(-1, 4, 2).transpose(0, 2, 1) @ weights * half[:, None] / 1e9
+    rims: Array = np.concatenate([np.zeros((1, 2)), np.cumsum(travel, 0)]) / wheels.radius_m
+    since_start: Array = rims - rims[np.searchsorted(knots, motion.start_ns)]
+    return since_start[np.searchsorted(knots, t_ns)]
+
+
+def _knots(motion: Motion, t_ns: Array) -> Array:
+    """All instants asked, the start, and every break between them; cut where they are too far apart."""
+    ends = np.unique(np.append(t_ns, motion.start_ns))
+    inside = (motion.breaks_ns > ends[0]) & (motion.breaks_ns < ends[-1])
+    knots = np.unique(np.concatenate([ends, motion.breaks_ns[inside]]))
+    cuts = np.ceil(np.diff(knots) / LONGEST_NS).astype(int)
+    begins = np.repeat(knots[:-1], cuts)
+    nth = np.arange(len(begins)) - np.repeat(np.cumsum(cuts) - cuts, cuts)
+    return np.append(begins + nth * np.repeat(np.diff(knots) / np.maximum(cuts, 1), cuts), knots[-1])

@@ -1,0 +1,236 @@
+"""The differential robot of the paper: dynamics (18), kinematics (19), wheels (9)-(10), and theta identified."""
+
+from collections.abc import Callable
+from dataclasses import astuple, dataclass
+from math import cos, inf, isfinite, sin
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vobench.errors import MotionError
+from vobench.geometry.se3 import Array
+from vobench.trajectory.kinematics import level
+
+# Formulas that hold for one instant and for arrays of them.
+Number = TypeVar("Number", float, Array)
+
+
+@dataclass(frozen=True, slots=True)
+class Theta:
+    """The six parameters of (18), from a least-squares fit to a real robot (Martins et al., 2009).
+
+    t1, t2 in s are the lags of u and omega; t3 in s m/rad^2 and t5 in s/m couple them, because the
+    centre of mass is not on the axle; t4 and t6 are 1 for a robot that reaches what it is asked.
+    Raises MotionError where one is not finite, or a lag not positive.
+    """
+
+    t1: float
+    t2: float
+    t3: float
+    t4: float
+    t5: float
+    t6: float
+
+    def __post_init__(self) -> None:
+        if not (all(map(isfinite, astuple(self))) and self.t1 > 0 and self.t2 > 0):
+            raise MotionError(f"theta must be six finite values with positive lags t1 and t2, got {astuple(self)}")
+
+    def perturbed(self, relative_std: float, rng: np.random.Generator) -> "Theta":
+        """Another robot of the kind: each parameter times exp(relative_std N(0, 1)), so that none changes sign.
+
+        Raises MotionError where `relative_std` is not in 0..0.5.
+        """
+        if not 0 <= relative_std <= 0.5:
+            raise MotionError(f"theta_std is a fraction of each parameter, 0..0.5, got {relative_std}")
+        return Theta(*(np.array(astuple(self)) * np.exp(relative_std * rng.standard_normal(6))).tolist())
+
+
+# Source: help text of Martins' Simulink toolbox, and Laut (2011) where named; the first as the paper prints it.
+THETAS = {
+    # A mixture: theta_2 belongs to the robot with the laser scanner, the other five to the one without.
+    "pioneer_3dx_paper": Theta(0.5338, 0.2509, -0.0134, 0.9560, -0.0843, 1.0590),
+    "pioneer_3dx": Theta(0.5338, 0.2168, -0.0134, 0.9560, -0.0843, 1.0590),
+    "pioneer_3dx_laser": Theta(0.2604, 0.2509, -0.000499, 0.9965, 0.00263, 1.0768),
+    "pioneer_3dx_laut": Theta(0.2183, 0.1918, -0.0050, 0.9993, -0.0279, 1.0142),
+    "pioneer_2": Theta(0.1992, 0.13736, 0.001954, 0.9907, 0.01554, 0.9866),
+    "pioneer_2_computer": Theta(0.3037, 0.2768, -0.0004018, 0.9835, 0.003818, 1.0725),
+    "wheelchair_55kg": Theta(0.3759, 0.0188, 0.0128, 1.0027, -0.0015, 0.9808),
+    "wheelchair_125kg": Theta(0.4263, 0.0289, 0.0058, 0.9883, 0.0134, 0.9931),
+    "khepera_3": Theta(0.0228, 0.0568, -0.0001, 1.0030, 0.0732, 0.9981),
+    "robulab_10": Theta(6.06, 0.284, 0.54, 6.48, 1.26, 1.8),
+}
+
+
+def accelerations(
+    u: Number, omega: Number, u_ref: Number, omega_ref: Number, *, theta: Theta, delta: tuple[float, float] = (0.0, 0.0)
+) -> tuple[Number, Number]:
+    """Accelerations u' in m/s^2 and omega' in rad/s^2 of (18); `delta` is the paper's (delta_u, delta_omega)."""
+    u_rate = (theta.t3 * omega**2 - theta.t4 * u + u_ref) / theta.t1 + delta[0]
+    omega_rate = (-theta.t5 * u * omega - theta.t6 * omega + omega_ref) / theta.t2 + delta[1]
+    return u_rate, omega_rate
+
+
+def feed_forward(
+    u: Number, omega: Number, u_rate: Number, omega_rate: Number, *, theta: Theta
+) -> tuple[Number, Number]:
+    """u_ref in m/s and omega_ref in rad/s that (18) turns into these accelerations: it, solved for them."""
+    u_ref = theta.t1 * u_rate - theta.t3 * omega**2 + theta.t4 * u
+    omega_ref = theta.t2 * omega_rate + theta.t5 * u * omega + theta.t6 * omega
+    return u_ref, omega_ref
+
+
+def velocities(psi: float, u: float, omega: float, *, a_m: float, side_mps: float = 0.0) -> tuple[float, float, float]:
+    """x', y' of the point h and psi', equation (19).
+
+    `side_mps` is the speed at which the whole robot slides to its left: the paper's
+    delta_x = -side sin(psi), delta_y = side cos(psi). Sliding turns nothing, so psi' = omega stays exact.
+    """
+    left = a_m * omega + side_mps
+    return u * cos(psi) - left * sin(psi), u * sin(psi) + left * cos(psi), omega
+
+
+def wheel_speeds(u: Number, omega: Number, *, track_m: float) -> tuple[Number, Number]:
+    """Ground speeds of the left and the right wheel in m/s: (9) and (10) solved for the wheels."""
+    half = omega * track_m / 2
+    return u - half, u + half
+
+
+def axle_poses(x_h_m: Array, y_h_m: Array, psi_rad: Array, *, a_m: float) -> Array:
+    """T_world_body (N, 4, 4) of the axle midpoint B, from the point h that is `a_m` ahead of it."""
+    return level(x_h_m - a_m * np.cos(psi_rad), y_h_m - a_m * np.sin(psi_rad), psi_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class AccelerationLimits:
+    """Largest |u'| in m/s^2 and |omega'| in rad/s^2 that (18) may give, before delta pushes.
+
+    Where one is reached the equations have a corner: the integrator's order drops to 2 in that sub-step.
+    Raises MotionError where one is not positive.
+    """
+
+    speed_mps2: float = inf
+    turn_radps2: float = inf
+
+    def __post_init__(self) -> None:
+        for name in ("speed_mps2", "turn_radps2"):
+            if not getattr(self, name) > 0:
+                raise MotionError(f"the acceleration limit {name} must be positive, got {getattr(self, name)}")
+
+    def held(self, u_rate: Number, omega_rate: Number) -> tuple[Number, Number]:
+        """Both rates, each cut at its limit."""
+        if self.speed_mps2 == self.turn_radps2 == inf:
+            return u_rate, omega_rate
+        return _cut(u_rate, self.speed_mps2), _cut(omega_rate, self.turn_radps2)
+
+
+UNLIMITED = AccelerationLimits()
+# Source: block defaults of Martins' Simulink toolbox. From .75 m/s they need .94 m to stop.
+TOOLBOX = AccelerationLimits(0.3, 1.745)
+
+
+def _cut(rate: Number, limit: float) -> Number:
+    if isinstance(rate, np.ndarray):
+        return np.clip(rate, -limit, limit)
+    return max(-limit, min(limit, rate))
+
+
+Rates = Callable[[Array], Array]
+
+
+def euler(rates: Rates, state: Array, step_s: float) -> Array:
+    """One explicit Euler step, order 1: what the paper's 33 ms script does."""
+    return state + step_s * rates(state)
+
+
+def rk4(rates: Rates, state: Array, step_s: float) -> Array:
+    """One classical Runge-Kutta step, order 4 (Kutta, 1901)."""
+    k1 = rates(state)
+    k2 = rates(state + step_s / 2 * k1)
+    k3 = rates(state + step_s / 2 * k2)
+    k4 = rates(state + step_s * k3)
+    return state + step_s / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+
+INTEGRATORS = {"rk4": rk4, "euler": euler}
+
+
+def integrator_named(name: str) -> Callable[[Rates, Array, float], Array]:
+    """The step function of that name. Raises MotionError where there is none."""
+    if name not in INTEGRATORS:
+        raise MotionError(f"no integrator named {name!r}. Known: {', '.join(INTEGRATORS)}")
+    return INTEGRATORS[name]
+
+
+def over_period(rates: Rates, state: Array, *, period_s: float, substeps: int, integrator: str = "rk4") -> Array:
+    """States (substeps, n) at the end of every sub-step of one period; the last is the period's end.
+
+    `rates` must be smooth over the period: change the inputs between periods, never inside one,
+    and the method keeps its order.
+    """
+    step = integrator_named(integrator)
+    states = np.empty((substeps, len(state)))
+    for i in range(substeps):
+        states[i] = state = step(rates, state, period_s / substeps)
+    return states
+
+
+# By how much a relative error of the run may grow on its way into theta. A drive through waypoints has 2 to 4;
+# from here on, noise of a thousandth would leave nothing of the answer.
+WORST_CONDITION = 1e3
+# A parameter with less than this share of an undetermined combination is told well enough by itself.
+SHARE = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Theta of a run, what it leaves of the references (RMS), and how ill the fit is conditioned (1: not at all)."""
+
+    theta: Theta
+    u_ref_rms_mps: float
+    omega_ref_rms_radps: float
+    condition: float
+
+
+def identify(speeds: ArrayLike, accelerations: ArrayLike, references: ArrayLike) -> Fit:
+    """Theta from N instants of (u, omega), (u', omega') and (u_ref, omega_ref), each (N, 2), in m, rad and s.
+
+    Raises MotionError where the run does not tell all six parameters, and says which.
+    Source: Martins et al. (2009), the regression of equation (18).
+    """
+    u, omega, u_rate, omega_rate, u_ref, omega_ref = _checked(speeds, accelerations, references)
+    no = np.zeros_like(u)
+    on_u = np.stack([u_rate, no, -(omega**2), u, no, no], -1)
+    on_omega = np.stack([no, omega_rate, no, no, u * omega, omega], -1)
+    values, condition = _solved(np.concatenate([on_u, on_omega]), np.concatenate([u_ref, omega_ref]))
+    return Fit(Theta(*values.tolist()), _rms(on_u @ values - u_ref), _rms(on_omega @ values - omega_ref), condition)
+
+
+def _solved(rows: Array, asked: Array) -> tuple[Array, float]:
+    """Six parameters and the condition number, with every column scaled to length 1."""
+    lengths = np.linalg.norm(rows, axis=0)
+    lengths = np.where(lengths > 0, lengths, 1.0)
+    left, strengths, right = np.linalg.svd(rows / lengths, full_matrices=False)
+    weak = strengths * WORST_CONDITION < max(strengths[0], 1.0)
+    untold = np.flatnonzero((np.abs(right[weak]) > SHARE).any(0)) + 1
+    if len(untold):
+        raise MotionError(
+            f"the run does not tell {', '.join(f'theta_{number}' for number in untold)}: "
+            f"drive with speed and turn that both change, not in step with each other"
+        )
+    return right.T @ (left.T @ asked / strengths) / lengths, float(strengths[0] / strengths[-1])
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _checked(*pairs: ArrayLike) -> Array:
+    """The columns of all pairs (N, 2), as rows."""
+    arrays = [np.asarray(pair, float) for pair in pairs]
+    shapes = [array.shape for array in arrays]
+    if len(set(shapes)) != 1 or len(shapes[0]) != 2 or shapes[0][0] < 3 or shapes[0][1] != 2:
+        raise MotionError(f"a run to identify needs three arrays (N, 2) of one length, 3 or more, got {shapes}")
+    if not np.isfinite(arrays).all():
+        raise MotionError("a run to identify must be finite everywhere; leave out the instants that are not")
+    return np.concatenate(arrays, -1).T

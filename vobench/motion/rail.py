@@ -1,0 +1,103 @@
+"""A carriage on a rail through points in space: it looks along the rail, level from side to side.
+
+rail: the motion along the rail.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vobench.errors import MotionError
+from vobench.geometry import se3
+from vobench.geometry.se3 import Array
+from vobench.motion import spline as attitude
+from vobench.motion.course import BLUNT, ArcLength, arc_length
+from vobench.motion.spline import Jet, quintic
+from vobench.trajectory.kinematics import CurveMotion, Kinematics, rest_to_rest
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+KNOTS_PER_POINT = 256
+STEEPEST_RAD = np.deg2rad(85.0)
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class RailCurve:
+    """A Curve by arc length in m: x along the rail, y level."""
+
+    position: "BSpline"
+    arc: ArcLength
+
+    @property
+    def breaks(self) -> Array:
+        """None: positions are four times smooth at the points."""
+        return np.zeros(0)
+
+    def at(self, s: Array) -> Kinematics:
+        """Poses (K, 4, 4) at arc length s (K,), and their derivatives by s."""
+        u = self.arc.parameter(s)
+        d1, d2, d3 = (self.position(u, order) for order in (1, 2, 3))
+        x = attitude.unit(Jet(d1, d2, d3))
+        y = attitude.unit(attitude.cross(_constant(UP, len(u)), x))
+        by_u = attitude.of_axes(x, y, attitude.cross(x, y))
+        speed = np.linalg.norm(d1, axis=-1, keepdims=True)
+        speed_rate = np.sum(x.value * d2, axis=-1, keepdims=True)
+        return Kinematics(
+            T_world_body=se3.transform(by_u.R, self.position(u)),
+            velocity_mps=np.broadcast_to([1.0, 0.0, 0.0], (len(u), 3)),
+            turn_radps=by_u.turn / speed,
+            acceleration_mps2=by_u.in_body(x.rate) / speed,
+            turn_rate_radps2=(by_u.turn_rate - by_u.turn * speed_rate / speed) / speed**2,
+        )
+
+
+def rail(points_m: ArrayLike, *, speed_mps: float, accel_mps2: float = 0.5) -> CurveMotion:
+    """From rest to rest along the smooth way through points (N, 3), two or more.
+
+    Raises MotionError for points that are not finite or the same as the one before, and where the rail
+    stands on end or turns back on itself.
+    """
+    points = np.asarray(points_m, float)
+    _check_points(points)
+    if len(points) == 2:
+        points = np.insert(points, 1, points.mean(0), axis=0)
+    u = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    position = quintic(u, points)
+    parts = np.arange(KNOTS_PER_POINT) / KNOTS_PER_POINT
+    knots = np.append((u[:-1, None] + np.diff(u)[:, None] * parts).ravel(), u[-1])
+    _check_way(position(knots, 1), position(knots))
+    arc = arc_length(lambda at: np.linalg.norm(position(at, 1), axis=-1), knots)
+    law = rest_to_rest(arc.length, speed=speed_mps, acceleration=accel_mps2)
+    return CurveMotion(RailCurve(position, arc), law)
+
+
+def _check_points(points: Array) -> None:
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:
+        raise MotionError(f"a rail needs two points or more of x, y and z in m, but they have the shape {points.shape}")
+    if not np.isfinite(points).all():
+        raise MotionError(f"point {int(np.flatnonzero(~np.isfinite(points).all(1))[0])} of the rail is not finite")
+    same = np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) == 0)
+    if same.size:
+        raise MotionError(f"points {same[0]} and {same[0] + 1} of the rail are the same; leave one of them out")
+
+
+def _check_way(tangents: Array, at_m: Array) -> None:
+    """Raise MotionError where the rail, of derivative (K, 3), is a point or stands on end."""
+    speed = np.linalg.norm(tangents, axis=1)
+    slope_rad = np.arcsin(np.abs(tangents[:, 2]) / np.maximum(speed, np.finfo(float).tiny))
+    for wrong, what in (
+        (speed < BLUNT * speed.max(), "turns back on itself; set its points wider apart there"),
+        (slope_rad > STEEPEST_RAD, f"is steeper than {np.rad2deg(STEEPEST_RAD):.0f} deg, where level has no meaning"),
+    ):
+        if wrong.any():
+            x, y, z = at_m[int(np.flatnonzero(wrong)[0])].round(2) + 0.0  # which makes -0 a 0
+            raise MotionError(f"near ({x:.2f}, {y:.2f}, {z:.2f}) m the rail {what}")
+
+
+def _constant(vector: Array, count: int) -> Jet:
+    still = np.zeros((count, 3))
+    return Jet(np.broadcast_to(vector, (count, 3)), still, still)

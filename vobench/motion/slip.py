@@ -1,0 +1,271 @@
+"""Wheel slip, patches of floor, and the pushes delta of (18)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass
+from itertools import accumulate
+from math import cos, exp, isfinite, radians, sin, sqrt, tan
+from typing import NamedTuple
+
+import numpy as np
+
+from vobench.errors import MotionError
+from vobench.geometry.se3 import Array
+
+# The random streams, one for each process: switching one off leaves the others as they were.
+SLIP_STREAMS = ("left", "right", "side")
+Generators = Mapping[str, np.random.Generator]
+
+
+@dataclass(frozen=True, slots=True)
+class SlipSettings:
+    """Three independent, stationary, zero-mean Ornstein-Uhlenbeck processes, and two deterministic terms.
+
+    `ratio_std` is the standard deviation of both wheels' sigma, `angle_std_rad` that of beta,
+    `correlation_s` the time over which they forget; `skid_s` is c and `traction_s2pm` kappa.
+    Engineering choices: no published values exist.
+    """
+
+    ratio_std: float = 0.0
+    angle_std_rad: float = 0.0
+    skid_s: float = 0.0
+    correlation_s: float = 0.3
+    traction_s2pm: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.skid_s <= 0.5 and 0 <= self.traction_s2pm <= 0.1):
+            raise MotionError(
+                f"slip needs skid_s in 0..0.5 and traction_s2pm in 0..0.1, got {self.skid_s} and {self.traction_s2pm}"
+            )
+        if not (0 <= self.ratio_std <= 0.1 and 0 <= self.angle_std_rad <= 0.15 and self.correlation_s > 0):
+            raise MotionError(
+                f"slip needs ratio_std in 0..0.1, angle_std_rad in 0..0.15 and correlation_s > 0, "
+                f"got {self.ratio_std}, {self.angle_std_rad} and {self.correlation_s}"
+            )
+
+
+SLIPS = {
+    "none": SlipSettings(),
+    "nominal": SlipSettings(ratio_std=0.01, angle_std_rad=radians(0.5), skid_s=0.005),
+    "slippery": SlipSettings(ratio_std=0.05, angle_std_rad=radians(2.0), skid_s=0.02),
+    "straining": SlipSettings(ratio_std=0.01, angle_std_rad=radians(0.5), skid_s=0.005, traction_s2pm=0.03),
+}
+
+
+class SlipNow(NamedTuple):
+    """What disturbs the robot at one instant: both sigmas, beta (rad), c (s), kappa (s^2/m), and the delta of (18)."""
+
+    left: float = 0.0
+    right: float = 0.0
+    beta: float = 0.0
+    skid_s: float = 0.0
+    traction_s2pm: float = 0.0
+    delta_u: float = 0.0
+    delta_omega: float = 0.0
+
+    def towards(self, later: "SlipNow", share: float) -> "SlipNow":
+        """On the straight line from this (share 0) to a later one (share 1)."""
+        return SlipNow(*[a + share * (b - a) for a, b in zip(self, later, strict=True)])
+
+    def side_speed(self, u: float, omega: float) -> float:
+        """Speed of sliding to the left in m/s."""
+        return u * tan(self.beta) - self.skid_s * u * omega
+
+    def rim_rates(
+        self, left_mps: float, right_mps: float, *, radius_m: float, driven_mps2: tuple[float, float] = (0.0, 0.0)
+    ) -> tuple[float, float]:
+        """Angular rates of the left and right rim in rad/s that carry the wheels at these speeds and accelerations."""
+        left, right = self.left, self.right
+        if self.traction_s2pm:
+            left += self.traction_s2pm * _driven_on(left_mps, driven_mps2[0])
+            right += self.traction_s2pm * _driven_on(right_mps, driven_mps2[1])
+        return left_mps / (radius_m * (1 - left)), right_mps / (radius_m * (1 - right))
+
+
+def _driven_on(speed_mps: float, rate_mps2: float) -> float:
+    """Acceleration along the way that a wheel goes: negative where it brakes."""
+    return rate_mps2 if speed_mps > 0 else -rate_mps2
+
+
+def ornstein_uhlenbeck(
+    count: int, *, std: float, step_s: float, correlation_s: float, rng: np.random.Generator
+) -> Array:
+    """A stationary first-order Gauss-Markov path (count,), exact for any step: the variance does not depend on it.
+
+    A longer path of the same generator begins with the same values. Source: Gillespie (1996).
+    """
+    keep = exp(-step_s / correlation_s)
+    shocks = std * rng.standard_normal(count)
+    shocks[1:] *= sqrt(1 - keep**2)
+    return np.array(list(accumulate(shocks.tolist(), lambda last, shock: keep * last + shock)))
+
+
+def generator_of(rngs: Generators | None, stream: str) -> np.random.Generator:
+    """The generator of a stream. Raises MotionError where it is missing."""
+    if rngs is None or stream not in rngs:
+        raise MotionError(f"this drive needs a random generator for {stream!r}, and rngs has none")
+    return rngs[stream]
+
+
+def slip_path(count: int, settings: SlipSettings, *, step_s: float, rngs: Generators | None) -> Array:
+    """Slip ratios of the left and right wheel and beta in rad, (count, 3), each from its own generator in `rngs`.
+
+    Raises MotionError where the settings ask for chance and a generator is missing.
+    """
+    stds = (settings.ratio_std, settings.ratio_std, settings.angle_std_rad)
+    path = np.zeros((count, 3))
+    for column, (stream, std) in enumerate(zip(SLIP_STREAMS, stds, strict=True)):
+        if std > 0:
+            path[:, column] = ornstein_uhlenbeck(
+                count, std=std, step_s=step_s, correlation_s=settings.correlation_s, rng=generator_of(rngs, stream)
+            )
+    return path
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """What a floor does to slip: it multiplies slip ratios and side-slip angle by `factor`, then adds to them.
+
+    `ratio_bias`: both rims run ahead by that; `angle_bias_rad`: pulled to the left, as by a carpet's nap.
+    """
+
+    factor: float = 1.0
+    ratio_bias: float = 0.0
+    angle_bias_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.factor <= 50 and abs(self.ratio_bias) <= 0.3 and abs(self.angle_bias_rad) <= 0.3):
+            raise MotionError(
+                f"a surface needs a factor in 0..50, ratio_bias and angle_bias_rad within 0.3, got {astuple(self)}"
+            )
+
+
+# Engineering choices: a wet patch spins the wheels, a carpet holds less well and pulls along its nap, a seam is a jolt.
+SURFACES = {
+    "wet": Ground(factor=6.0, ratio_bias=0.04),
+    "carpet": Ground(factor=1.5, ratio_bias=0.01, angle_bias_rad=radians(1.0)),
+    "seam": Ground(factor=10.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class FloorPatch:
+    """A rectangle (two sides in m, turned by yaw) around a point of the floor, all of one surface.
+
+    Raises MotionError where it has no area or a value is not finite.
+    """
+
+    surface: Ground
+    center_m: tuple[float, float]
+    size_m: tuple[float, float]
+    yaw_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (all(map(isfinite, (*self.center_m, *self.size_m, self.yaw_rad))) and min(self.size_m) > 0):
+            raise MotionError(
+                f"a floor patch needs a finite center_m, yaw and positive size_m, "
+                f"got {self.center_m}, {self.yaw_rad} and {self.size_m}"
+            )
+
+    def holds(self, x_m: float, y_m: float) -> bool:
+        """Whether a point of the floor is on it."""
+        x, y = x_m - self.center_m[0], y_m - self.center_m[1]
+        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
+        return abs(c * x + s * y) <= self.size_m[0] / 2 and abs(c * y - s * x) <= self.size_m[1] / 2
+
+
+def under(patches: Sequence[FloorPatch], x_m: float, y_m: float) -> tuple[float, float, float]:
+    """Factor, ratio bias and angle bias (rad) under a point: where patches overlap factors multiply, biases add."""
+    factor, ratio_bias, angle_bias_rad = 1.0, 0.0, 0.0
+    for patch in patches:
+        if patch.holds(x_m, y_m):
+            factor *= patch.surface.factor
+            ratio_bias += patch.surface.ratio_bias
+            angle_bias_rad += patch.surface.angle_bias_rad
+    return factor, ratio_bias, angle_bias_rad
+
+
+# The random streams of a drive: slip's three, delta's two, and the one that perturbs theta.
+DELTA_STREAMS = ("delta_u", "delta_omega")
+DISTURBANCE_STREAMS = (*SLIP_STREAMS, *DELTA_STREAMS, "theta")
+
+# Beyond this a slip ratio or an angle (rad) is cut: nearer 1 and pi/2 the formulas lose their meaning.
+MOST_SLIP = 0.5
+
+Contacts = Sequence[tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class DeltaSettings:
+    """The pushes delta_u (m/s^2) and delta_omega (rad/s^2) of (18) as Ornstein-Uhlenbeck processes.
+
+    Standard deviations, and the time over which both forget. Raises MotionError where one is out of range.
+    """
+
+    speed_std_mps2: float = 0.0
+    turn_std_radps2: float = 0.0
+    correlation_s: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.speed_std_mps2 <= 10 and 0 <= self.turn_std_radps2 <= 50 and self.correlation_s > 0):
+            raise MotionError(
+                f"delta needs speed_std_mps2 in 0..10, turn_std_radps2 in 0..50 and correlation_s > 0, "
+                f"got {self.speed_std_mps2}, {self.turn_std_radps2} and {self.correlation_s}"
+            )
+
+
+# Engineering choices: an even floor, and one whose bumps shove the robot as it goes.
+DELTAS = {"none": DeltaSettings(), "nominal": DeltaSettings(0.05, 0.1), "bumpy": DeltaSettings(0.2, 0.5, 0.15)}
+
+
+def delta_path(count: int, settings: DeltaSettings, *, step_s: float, rngs: Generators | None) -> Array:
+    """delta_u in m/s^2 and delta_omega in rad/s^2 at every frame, (count, 2). Raises as `generator_of`."""
+    path = np.zeros((count, 2))
+    for column, std in enumerate((settings.speed_std_mps2, settings.turn_std_radps2)):
+        if std > 0:
+            rng = generator_of(rngs, DELTA_STREAMS[column])
+            path[:, column] = ornstein_uhlenbeck(
+                count, std=std, step_s=step_s, correlation_s=settings.correlation_s, rng=rng
+            )
+    return path
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbances:
+    """What disturbs a drive at its frames: rows (N, 5) of both sigmas, beta (rad) and both deltas as drawn.
+
+    The floor changes the first three where the wheels are; between frames all run on straight lines,
+    so that no velocity jumps. At the edge of a patch they take one frame to change.
+    """
+
+    rows: Array
+    skid_s: float
+    traction_s2pm: float
+    floor: tuple[FloorPatch, ...]
+
+    def at(self, frame: int, contacts_m: Contacts) -> SlipNow:
+        """What disturbs at a frame with the left wheel, the right wheel and the axle's middle at these places."""
+        left, right, beta, delta_u, delta_omega = self.rows[frame].tolist()
+        if self.floor:
+            on_left, on_right, on_middle = (under(self.floor, *place) for place in contacts_m)
+            left, right = left * on_left[0] + on_left[1], right * on_right[0] + on_right[1]
+            beta = beta * on_middle[0] + on_middle[2]
+        return SlipNow(_cut(left), _cut(right), _cut(beta), self.skid_s, self.traction_s2pm, delta_u, delta_omega)
+
+
+def drawn(
+    count: int,
+    slip: SlipSettings,
+    delta: DeltaSettings,
+    floor: Sequence[FloorPatch],
+    *,
+    step_s: float,
+    rngs: Generators | None,
+) -> Disturbances:
+    """The disturbances of `count` frames. Raises MotionError where they ask for chance and a stream is missing."""
+    slip_rows = slip_path(count, slip, step_s=step_s, rngs=rngs)
+    delta_rows = delta_path(count, delta, step_s=step_s, rngs=rngs)
+    return Disturbances(np.column_stack([slip_rows, delta_rows]), slip.skid_s, slip.traction_s2pm, tuple(floor))
+
+
+def _cut(value: float) -> float:
+    return max(-MOST_SLIP, min(MOST_SLIP, value))

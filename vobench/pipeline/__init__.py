@@ -1,1 +1,0 @@
-"""The stages of a benchmark: simulate, estimate, score, and the run that chains them."""

@@ -1,0 +1,233 @@
+"""Indirect light: which surfaces see each other, by rays that follow mirrors and pass panes."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from vobench.render.direct_light import JITTER, cell_spot
+from vobench.render.emitter import cosine_weighted
+from vobench.render.geometry import RAY_OFFSET_M, Floats, Hits, Indices
+from vobench.render.lightmap import Atlas, Holes, Texels, in_chunks, tangents
+from vobench.render.visibility import FAR_M, Visibility, smooth_mirror
+from vobench.scene.light import Sky
+from vobench.scene.material import Map, Material, Mirror, Polished, fresnel
+from vobench.scene.surface import Surface
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+MIRRORS = 4  # followed by one ray
+FAINT = 1e-3  # what a mirror returns of a ray is dropped below this
+ROWS = 1 << 10  # points at once: times their rays
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceResponse:
+    """What each surface (S,) does with light.
+
+    matt: the share it scatters of the light that enters; eta of its coat, 0 for none; tint and roughness of what
+    it mirrors; panels shine; what shows_lamps does so to direct light already.
+    """
+
+    matt: Floats
+    eta: Floats
+    tint: Floats
+    roughness: Floats
+    is_panel: NDArray[np.bool_]
+    shows_lamps: NDArray[np.bool_]
+
+    def mirrored(self, surface: Indices, cosine: Floats) -> Floats:
+        """Share (R,) that goes on as from a mirror."""
+        reflected = fresnel(cosine, np.maximum(self.eta[surface], 1.0)).astype(np.float32)
+        return self.tint[surface] * np.where(self.eta[surface] > 0, reflected, 1)
+
+    def scattered(self, surface: Indices, cosine: Floats) -> Floats:
+        """Luminance times pi (R,) towards a cosine, per light that entered."""
+        reflected = fresnel(cosine, np.maximum(self.eta[surface], 1.0)).astype(np.float32)
+        return self.matt[surface] * np.where(self.eta[surface] > 0, 1 - reflected, 1)
+
+
+def surface_responses(
+    surfaces: Sequence[Surface], materials: Mapping[str, Material], albedo: Mapping[str, Map], panel: Indices
+) -> SurfaceResponse:
+    """The answers of an inventory's surfaces."""
+    own = [materials.get(s.material) for s in surfaces]
+    shiny = [m if isinstance(m, Polished | Mirror) else None for m in own]
+    return SurfaceResponse(
+        np.array([albedo[s.material].mean() if s.material in albedo else 0 for s in surfaces], np.float32)
+        * (panel < 0),
+        np.array([m.eta if isinstance(m, Polished) else 0 for m in own], np.float32),
+        np.array([m.tint if m else 0 for m in shiny], np.float32),
+        np.array([m.roughness if m else 0 for m in shiny], np.float32),
+        panel >= 0,
+        np.array([smooth_mirror(s, materials) is not None for s in surfaces]),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class FinalGather:
+    """Illuminance of points: table (P, H·W) times the map of light, plus sky (K, P), what each sky sends by mirrors."""
+
+    table: "csr_matrix"
+    sky: Floats
+
+
+def final_gather(
+    points: Texels,
+    where: Atlas,
+    sight: Visibility,
+    answer: SurfaceResponse,
+    skies: Sequence[Sky],
+    *,
+    rays: int,
+    done: Callable[[int], object] | None = None,
+) -> FinalGather:
+    """Send `rays` rays from every point and note where in the map they end; `done` is told of how many points."""
+    side = round(np.sqrt(rays))
+    if not side or not len(points):
+        nothing = scipy.sparse.csr_matrix((len(points), where.height * where.width), dtype=np.float32)
+        return FinalGather(nothing, np.zeros((len(skies), len(points)), np.float32))
+    seeker = _Seeker(where, sight, answer, skies)
+    parts = in_chunks(lambda part: seeker.seek(points.take(part), side), len(points), chunk=ROWS, done=done)
+    tables, sky = zip(*parts, strict=True)
+    return FinalGather(scipy.sparse.vstack(tables, "csr"), np.concatenate(sky, 1))
+
+
+@dataclass(slots=True)
+class _Front:
+    """The rays under way: the point they belong to, from where, whereto, and what they weigh.
+
+    is_direct: whether a lamp that they meet next is direct light, and counted as such.
+    """
+
+    point: NDArray[np.int64]
+    origins_m: Floats
+    directions: Floats
+    weight: Floats
+    is_direct: NDArray[np.bool_]
+
+    def take(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> "_Front":
+        return _Front(*(getattr(self, f.name)[which] for f in fields(self)))
+
+    def joined(self, other: "_Front") -> "_Front":
+        return _Front(*(np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(self)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Seeker:
+    where: Atlas
+    sight: Visibility
+    answer: SurfaceResponse
+    skies: Sequence[Sky]
+
+    def seek(self, points: Texels, side: int) -> "tuple[csr_matrix, Floats]":
+        """The rows of the table, and the skies' light by mirrors, of some points."""
+        front, entries = _start(points, side), []
+        sky = np.zeros((len(self.skies), len(points)), np.float32)
+        for depth in range(MIRRORS + 1):
+            hits = self.sight.opaque.hits(front.origins_m, front.directions)
+            reach = np.where(hits.surface < 0, FAR_M, hits.distance)[:, None]
+            glints = self._off_panes(front, front.directions * reach)
+            front.weight *= self.sight.through_panes(front.origins_m, front.directions * reach)
+            if depth:
+                self._add_sky(sky, front.take(hits.surface < 0))
+            facing = np.einsum("ij,ij->i", front.directions, self.sight.normals[hits.surface])
+            met = np.flatnonzero((hits.surface >= 0) & (facing < 0))
+            front, hits, cosine = front.take(met), _taken(hits, met), -facing[met]
+            shining = self.answer.is_panel[hits.surface] & ~front.is_direct
+            factor = front.weight * np.where(shining, 1, self.answer.scattered(hits.surface, cosine))
+            entries.append((factor, front.point, texel_at(self.where, hits)))
+            front = self._mirrored(front, hits, cosine, points.dither)
+            front.is_direct &= depth == 0
+            front = front.joined(glints)
+        factor, row, column = (np.concatenate(part) for part in zip(*entries, strict=True))
+        shape = (len(points), self.where.height * self.where.width)
+        rays = np.float32(side * side)
+        return scipy.sparse.csr_matrix((factor / rays, (row, column)), shape, dtype=np.float32), sky / rays
+
+    def _add_sky(self, sky: Floats, gone: _Front) -> None:
+        for row, light in enumerate(self.skies):
+            luminance = light.luminance_cd_m2(gone.directions)
+            sky[row] += np.bincount(gone.point, np.pi * luminance * gone.weight, minlength=sky.shape[1])
+
+    def _off_panes(self, front: _Front, way: Floats) -> _Front:
+        """The rays that go back from the first pane in their way; a lamp that they meet is no direct light."""
+        rays, hits = self.sight.first_panes(front.origins_m, way)
+        front, way, normals = front.take(rays), way[rays], self.sight.normals[hits.surface]
+        along = np.einsum("ij,ij->i", front.directions, normals)
+        ends = front.origins_m + hits.distance[:, None] * way - RAY_OFFSET_M * front.directions
+        directions = front.directions - 2 * along[:, None] * normals
+        weight = front.weight * self.sight.pane_mirrors(hits.surface, along)
+        return _Front(front.point, ends, directions, weight, np.zeros(len(weight), bool)).take(weight > FAINT)
+
+    def _mirrored(self, front: _Front, hits: Hits, cosine: Floats, dither: Floats) -> _Front:
+        """The rays that go on from mirrors and coats."""
+        weight = front.weight * self.answer.mirrored(hits.surface, cosine)
+        on = np.flatnonzero(weight > FAINT)
+        front, surface = front.take(on), hits.surface[on]
+        normals = _facets(self.sight.normals[surface], self.answer.roughness[surface], dither[front.point], on)
+        along = np.einsum("ij,ij->i", front.directions, normals)[:, None]
+        directions = front.directions - 2 * along * normals
+        ends = front.origins_m + hits.distance[on, None] * front.directions
+        plain = self.sight.normals[surface]
+        # A facet may throw a ray into its own surface.
+        leaving = np.einsum("ij,ij->i", directions, plain) > 0
+        shown = self.answer.shows_lamps[surface]
+        return _Front(front.point, ends + RAY_OFFSET_M * plain, directions, weight[on], shown).take(leaving)
+
+
+def _taken(hits: Hits, which: NDArray[np.int64]) -> Hits:
+    return Hits(hits.surface[which], hits.u[which], hits.v[which], hits.distance[which])
+
+
+def _start(points: Texels, side: int) -> _Front:
+    """Side x side cosine-weighted rays from each point; their weights average to what enters its coat."""
+    rays, count = side * side, len(points)
+    spots = [cell_spot(points, cell, side) for cell in range(rays)]
+    everywhere = points.take(np.tile(np.arange(count), rays))
+    a, b = (np.concatenate(part) for part in zip(*spots, strict=True))
+    directions = cosine_weighted(everywhere.normals, a, b)
+    weight = everywhere.entering(everywhere.cosine(directions))
+    direct = np.ones(len(weight), bool)
+    return _Front(np.tile(np.arange(count), rays), everywhere.points_m, directions, weight, direct)
+
+
+def _facets(normals: Floats, roughness: Floats, dither: Floats, turn: NDArray[np.int64]) -> Floats:
+    """Unit normals (R, 3) of facets around a surface's, by GGX. Source: Walter et al. (2007), eqs 35 and 36."""
+    rough = np.flatnonzero(roughness)
+    a, b = ((dither[rough] + turn[rough, None] * JITTER) % 1).T
+    slope = (roughness[rough] * np.sqrt(a / np.maximum(1 - a, 1e-6)))[:, None]
+    u_axis, v_axis = tangents(normals[rough])
+    angle = 2 * np.pi * b[:, None]
+    tilted = normals[rough] + slope * (np.cos(angle) * u_axis + np.sin(angle) * v_axis)
+    facets = normals.copy()
+    facets[rough] = tilted / np.linalg.norm(tilted, axis=1, keepdims=True)
+    return facets
+
+
+def texel_at(where: Atlas, hits: Hits) -> NDArray[np.int64]:
+    """Flat index (R,) in the map of the sample nearest to where each ray ended."""
+    row, column, rows, columns = np.array([(p.row, p.column, p.rows, p.columns) for p in where.patches]).T
+    r = row[hits.surface] + np.rint(hits.v * (rows[hits.surface] - 1)).astype(np.int64)
+    c = column[hits.surface] + np.rint(hits.u * (columns[hits.surface] - 1)).astype(np.int64)
+    flat: NDArray[np.int64] = r * where.width + c
+    return flat
+
+
+def bounced(direct: Floats, gathered: FinalGather, own_sky: Mapping[int, int], holes: Holes, *, bounces: int) -> Floats:
+    """Illuminance (L, H, W) after one bounce or more, of direct light (L, H, W).
+
+    own_sky: which of gathered.sky belongs to which layer; holes: see lightmap.
+    """
+    straight = direct.reshape(len(direct), -1).T
+    by_mirrors = np.zeros((len(holes.index), len(direct)), np.float32)
+    for layer, sky in own_sky.items():
+        by_mirrors[:, layer] = gathered.sky[sky]
+    total = np.zeros_like(straight)
+    for _ in range(bounces):
+        total = holes.filled(gathered.table @ (straight + total) + by_mirrors)
+    return np.ascontiguousarray(total.T).reshape(direct.shape)

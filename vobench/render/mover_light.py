@@ -1,0 +1,334 @@
+"""Light on movers, and what they keep from the rest."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from vobench.render.bake import BakedScene, StaticScene, reached
+from vobench.render.direct_light import Rays, arriving, cell_spot, first_rays, footprint, in_front, mirror_images
+from vobench.render.emitter import Emitter, OpenSky, SkyPane, emitters
+from vobench.render.geometry import Ball, Floats, Mask, RayCaster, SurfaceList, ball, corners, inventory
+from vobench.render.indirect_light import FinalGather, final_gather, surface_responses
+from vobench.render.lightmap import Atlas, Chart, Scales, Texels, in_chunks, pack_atlas, texels
+from vobench.render.visibility import Visibility
+from vobench.scene.light import Sky, Sun
+from vobench.scene.material import Map
+from vobench.scene.surface import Surface
+
+BLOCK = 4  # samples along a side
+SCOUTS, RAYS = Rays(2), Rays(3, spread=True)  # per point, source and picture
+SKY_REACH = 10  # radii beyond which a mover hides less than a hundredth of an open sky
+CHUNK = 1 << 12
+MOST_SLICES = 8  # of a mover
+SPREAD = 1.5  # samples, from every other one
+MARGIN = 6  # samples around a shadow that its smoothing reaches
+
+
+@dataclass(frozen=True, slots=True)
+class Blocks:
+    """Points in groups of neighbours: `of` (P,) names each point's group, `balls` (B,) enclose them."""
+
+    of: NDArray[np.int64]
+    balls: Ball
+
+
+def blocks(points: Texels, where: Atlas) -> Blocks:
+    """Squares of BLOCK x BLOCK samples of one surface."""
+    row, column = points.index // where.width // BLOCK, points.index % where.width // BLOCK
+    key = (points.surface.astype(np.int64) * (where.height // BLOCK + 1) + row) * (where.width // BLOCK + 1) + column
+    _, of, count = np.unique(key, return_inverse=True, return_counts=True)
+    centre = np.stack([np.bincount(of, axis) for axis in points.points_m.T], -1) / count[:, None]
+    radius = np.zeros(len(count))
+    np.maximum.at(radius, of, np.linalg.norm(points.points_m - centre[of], axis=1))
+    return Blocks(of, Ball(centre, radius))
+
+
+def may_shade(mover: Ball, source: Ball, points: Ball) -> Mask:
+    """Whether a way from within each of `points` (N,) to within the source's ball can pass the mover's."""
+    if np.isinf(source.radius_m):
+        distance = np.linalg.norm(mover.centre_m - points.centre_m, axis=-1)
+        return np.asarray(distance <= SKY_REACH * mover.radius_m + points.radius_m)
+    to_mover, to_source = mover.centre_m - points.centre_m, source.centre_m - points.centre_m
+    far_mover, far_source = (np.linalg.norm(way, axis=-1) for way in (to_mover, to_source))
+    cosine = np.einsum("ij,ij->i", to_mover, to_source) / np.maximum(far_mover * far_source, 1e-9)
+    angles = (
+        np.arcsin(np.clip((one.radius_m + points.radius_m) / np.maximum(far, 1e-9), 0, 1))
+        for one, far in ((mover, far_mover), (source, far_source))
+    )
+    reach = far_source + source.radius_m + mover.radius_m + points.radius_m
+    inside = far_mover <= mover.radius_m + points.radius_m
+    passes: Mask = inside | ((np.arccos(np.clip(cosine, -1, 1)) <= sum(angles)) & (far_mover <= reach))
+    return passes
+
+
+@dataclass(frozen=True, slots=True)
+class Shaded:
+    """Points (N,) of a stage and the illuminance (N,) that movers take from them."""
+
+    some: NDArray[np.int64]
+    lost: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class StaticShading:
+    """What stands still, ready to be shaded."""
+
+    points: Texels
+    where: Atlas
+    blocks: Blocks
+    sight: Visibility
+
+    def by(self, movers: Sequence[Sequence[Surface]], target: "Target", least_lx: Floats) -> Shaded:
+        """Light of a source that movers, each a list of surfaces, keep from the points.
+
+        least_lx (P,): blocks of points that lose less than this are left alone.
+        """
+        source = target.source
+        some = np.flatnonzero(self._near(movers, source.ball())[self.blocks.of])
+        some = some[in_front(source.ball(), self.points.points_m[some], self.points.normals[some])]
+        surfaces = [surface for mover in movers for surface in mover]
+        caster = RayCaster(surfaces, range(len(surfaces)))
+        scouts = some[self._every_other(some)] if isinstance(source, SkyPane) else some
+        sent = target.sent(self.points, scouts, SCOUTS)
+        rich = np.flatnonzero(sent.light.mean(1) > least_lx[scouts])
+        found = scouts[rich][self._lost(sent.take(rich), target, caster) > least_lx[scouts[rich]]]
+        # Scouts miss the rims of half shadows, but not whole blocks.
+        shaded = np.zeros(len(self.blocks.balls.radius_m), bool)
+        shaded[self.blocks.of[found]] = True
+        return self._shaded(some[shaded[self.blocks.of[some]]], target, caster)
+
+    def _near(self, movers: Sequence[Sequence[Surface]], source: Ball) -> Mask:
+        """Blocks (B,) that movers may shade: by a ball around each, and of those by smaller ones that fit better."""
+        near = np.zeros(len(self.blocks.balls.radius_m), bool)
+        for mover in movers:
+            some = np.flatnonzero(~near)
+            for enclosing in ([ball(mover)], slices(mover)):
+                few = self.blocks.balls.take(some)
+                some = some[np.logical_or.reduce([may_shade(one, source, few) for one in enclosing])]
+            near[some] = True
+        return near
+
+    def _shaded(self, some: NDArray[np.int64], target: "Target", caster: RayCaster) -> Shaded:
+        if not isinstance(target.source, SkyPane):
+            return Shaded(some, self._lost(target.sent(self.points, some, RAYS), target, caster))
+        few = some[self._every_other(some)]
+        return Shaded(some, self._filled(some, few, self._lost(target.sent(self.points, few, RAYS), target, caster)))
+
+    def _every_other(self, some: NDArray[np.int64]) -> Mask:
+        """Every other row and column."""
+        row, column = np.divmod(self.points.index[some], self.where.width)
+        even: Mask = (row % 2 == 0) & (column % 2 == 0)
+        return even
+
+    def _filled(self, some: NDArray[np.int64], few: NDArray[np.int64], lost: Floats) -> Floats:
+        """The loss of few points, smoothed as the sky's own light is, at all of some."""
+        weighted = np.zeros((2, self.where.height, self.where.width), np.float32)
+        weighted.reshape(2, -1)[:, self.points.index[few]] = lost, np.ones_like(lost)
+        place, surface = self.points.index[some], self.points.surface[some]
+        for index in np.unique(surface):
+            window = _around(place[surface == index], self.where, self.where.patches[index])
+            for layer in weighted:
+                layer[window] = ndimage.gaussian_filter(layer[window], SPREAD, mode="nearest")
+        light, weight = weighted.reshape(2, -1)[:, place]
+        filled: Floats = light / np.maximum(weight, 1e-6)
+        return filled
+
+    def _lost(self, sent: "ShadowRays", target: "Target", caster: RayCaster) -> Floats:
+        """Illuminance (N,) that what a caster holds takes from the points of some rays."""
+        count = len(sent.some)
+        parts = in_chunks(lambda part: self._lost_of(sent.take(part), target.source, caster), count, chunk=CHUNK)
+        return np.concatenate([*parts, np.zeros(0, np.float32)])
+
+    def _lost_of(self, sent: "ShadowRays", source: Emitter, caster: RayCaster) -> Floats:
+        start = np.broadcast_to(sent.start_m, sent.ahead_m.shape).reshape(-1, 3)
+        light, ahead = sent.light.ravel(), sent.ahead_m.reshape(-1, 3)
+        hidden = np.flatnonzero(caster.stops(start, ahead) & (light > 0))
+        lost = np.zeros(len(light), np.float32)
+        lost[hidden] = light[hidden] * source.passing(self.sight, start[hidden], ahead[hidden])
+        total: Floats = lost.reshape(sent.light.shape).mean(1)
+        return total
+
+
+@dataclass(frozen=True, slots=True)
+class ShadowRays:
+    """R rays from each of some points (N,), increasing, to a source: where from, (N, R, 3) or (N, 1, 3), and whereto.
+
+    light (N, R): the illuminance that each of the rays would bring if nothing stood in its way.
+    """
+
+    some: NDArray[np.int64]
+    start_m: Floats
+    ahead_m: Floats
+    light: Floats
+
+    def take(self, which: slice | NDArray[np.int64]) -> "ShadowRays":
+        """Those of some of the points."""
+        return ShadowRays(*(getattr(self, f.name)[which] for f in fields(self)))
+
+    def woven(self, other: "ShadowRays", own: Mask) -> "ShadowRays":
+        """Those of both, one after another; `own` (N,) says whose turn it is."""
+        woven = []
+        for mine, others in ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self)):
+            both = np.empty((len(own), *mine.shape[1:]), mine.dtype)
+            both[own], both[~own] = mine, others
+            woven.append(both)
+        return ShadowRays(*woven)
+
+
+def _nobody(rays: Rays) -> ShadowRays:
+    vectors = np.zeros((0, rays.side**2, 3), np.float32)
+    return ShadowRays(np.zeros(0, np.int64), vectors if rays.spread else vectors[:, :1], vectors, vectors[..., 0])
+
+
+class Target:
+    """A source, and the rays that points sent to it for the last picture: movers go slowly, so most serve again."""
+
+    def __init__(self, source: Emitter) -> None:
+        self.source = source
+        self._kept: dict[Rays, ShadowRays] = {}
+
+    def sent(self, points: Texels, some: NDArray[np.int64], rays: Rays) -> ShadowRays:
+        """Rays from some points (N,), increasing."""
+        kept = self._kept.get(rays, _nobody(rays))
+        place = np.searchsorted(kept.some, some)
+        known = np.append(kept.some, -1)[place] == some
+        new = some[~known]
+        parts = in_chunks(lambda part: self._send(points, new[part], rays), len(new), chunk=CHUNK)
+        fresh = ShadowRays(
+            *(np.concatenate([getattr(p, f.name) for p in [_nobody(rays), *parts]]) for f in fields(ShadowRays))
+        )
+        self._kept[rays] = kept.take(place[known]).woven(fresh, known)
+        return self._kept[rays]
+
+    def _send(self, points: Texels, some: NDArray[np.int64], rays: Rays) -> ShadowRays:
+        part, shape = points.take(some), (len(some), rays.side**2)
+        towards, every = self.source.towards(part), np.arange(len(some))
+        light, ahead_m = np.empty(shape, np.float32), np.empty((*shape, 3), np.float32)
+        start_m = part.points_m[:, None].repeat(shape[1] if rays.spread else 1, axis=1)
+        for cell in range(rays.side**2):
+            way, strength = towards(*cell_spot(part, cell, rays.side))
+            cosine = part.cosine(way)
+            light[:, cell] = strength * np.maximum(cosine, 0) * part.entering(cosine)
+            ahead_m[:, cell] = way
+            if rays.spread:
+                aside_m = footprint(part, every, cell)
+                start_m[:, cell] += aside_m
+                ahead_m[:, cell] -= aside_m
+        return ShadowRays(some, start_m, ahead_m, light)
+
+
+def slices(surfaces: Sequence[Surface]) -> list[Ball]:
+    """Balls that enclose surfaces together: slices of their upright box across its longest side."""
+    points = np.concatenate([corners(s) for s in surfaces])
+    low, size = points.min(0), np.ptp(points, axis=0)
+    longest = int(size.argmax())
+    count = int(np.clip(np.ceil(size[longest] / max(np.sort(size)[1], 1e-3)), 1, MOST_SLICES))
+    part = np.where(np.arange(3) == longest, size / count, size)
+    step = np.eye(3)[longest] * part
+    return [Ball(low + part / 2 + i * step, float(np.linalg.norm(part) / 2)) for i in range(count)]
+
+
+def _around(place: NDArray[np.int64], where: Atlas, patch: Chart) -> tuple[slice, slice]:
+    """The part of a patch, with a margin, that flat places lie in."""
+    row, column = np.divmod(place, where.width)
+    return (
+        slice(max(int(row.min()) - MARGIN, patch.row), min(int(row.max()) + MARGIN, patch.row + patch.rows)),
+        slice(
+            max(int(column.min()) - MARGIN, patch.column), min(int(column.max()) + MARGIN, patch.column + patch.columns)
+        ),
+    )
+
+
+GATHER_RAYS = 64
+GATHER_SPACING_M = 0.2
+SKY_SHARE = 0.05  # of all points
+UNNOTICED = 1 / 300  # share of a place's light, less than a step of 8 bits
+
+
+@dataclass(frozen=True, slots=True)
+class MoverLightAt:
+    """Movers at one instant: each light's direct light (L, P) on their points, and what they shade of it.
+
+    gathered: what reaches their coarse points, at `coarse` (C,) in the coarse map.
+    """
+
+    index: NDArray[np.int64]
+    direct: Floats
+    shaded: tuple[tuple[Shaded, ...], ...]
+    gathered: FinalGather
+    coarse: NDArray[np.int64]
+
+
+class MoverLight:
+    """The light of a baked scene's movers."""
+
+    def __init__(self, baked: BakedScene, still: StaticScene) -> None:
+        self._scene, self._settings, self._still = baked.scene, baked.settings, still
+        self._shade = StaticShading(still.points, still.where, blocks(still.points, still.where), still.sight)
+        self._movers = tuple(np.flatnonzero(still.things.mover >= 0).tolist())
+        self._scales = Scales(still.where, pack_atlas(still.things.surfaces, spacing_m=GATHER_SPACING_M))
+        self._answer = surface_responses(still.things.surfaces, self._scene.materials, baked.albedo, still.things.panel)
+        self._skies = [light for light in self._scene.lights if isinstance(light, Sky)]
+        self._targets = [self._seen(emitters(light, still.sight)) for light in self._scene.lights]
+        self._layers = baked.light.reshape(len(baked.light), -1)
+
+    def at(self, t_ns: float, suns_ns: Sequence[float], is_on: Sequence[bool]) -> MoverLightAt:
+        """All that the movers' places decide.
+
+        suns_ns (L,): when to look for each sun that moves; is_on (L,): which lights shine at all.
+        """
+        things, side = inventory(self._scene, t_ns=t_ns), round(np.sqrt(self._settings.light_rays))
+        lit = self._points(things, self._still.where)
+        sight = Visibility(things.surfaces, self._scene.materials, range(len(things.surfaces)))
+        shining = [self._shining(index, suns_ns[index]) if on else [] for index, on in enumerate(is_on)]
+        movers = [sides for index in range(len(self._scene.movers)) if (sides := self._opaque(things, index))]
+        direct = np.zeros((len(shining), len(lit)), np.float32)
+        for row, light, targets, sun_ns in zip(direct, self._scene.lights, shining, suns_ns, strict=True):
+            shown = mirror_images(light, sight, t_ns=sun_ns) if targets else []
+            for source in [*(target.source for target in targets), *shown]:
+                for rays, some in first_rays(source, lit, side):
+                    row[some] += arriving(source, lit.take(some), sight, rays)[0]
+        least_lx = (UNNOTICED * np.asarray(is_on, np.float32) @ self._layers)[self._still.points.index]
+        shaded = tuple(tuple(self._shade.by(movers, target, least_lx) for target in targets) for targets in shining)
+        coarse = self._points(things, self._scales.coarse)
+        return MoverLightAt(lit.index, direct, shaded, self._gathered(coarse), coarse.index)
+
+    def add(self, moment: MoverLightAt, total: Map, levels: Sequence[float]) -> None:
+        """Put the movers' light and shade into the sum of all layers (H, W) of what stands still."""
+        flat = total.reshape(-1)
+        for level, parts in zip(levels, moment.shaded, strict=True):
+            for part in parts:
+                place = self._still.points.index[part.some]
+                flat[place] = np.maximum(flat[place] - np.float32(level) * part.lost, 0)
+        of_sky = [level for level, light in zip(levels, self._scene.lights, strict=True) if isinstance(light, Sky)]
+        around = np.zeros((1, self._scales.coarse.height * self._scales.coarse.width), np.float32)
+        around[0, moment.coarse] = moment.gathered.table @ flat + np.asarray(of_sky, np.float32) @ moment.gathered.sky
+        on_map = around.reshape(1, self._scales.coarse.height, -1)
+        indirect = self._scales.refined(on_map, self._movers).reshape(-1)
+        flat[moment.index] = np.asarray(levels, np.float32) @ moment.direct + indirect[moment.index]
+
+    def _points(self, things: SurfaceList, where: Atlas) -> Texels:
+        materials, seed = self._scene.materials, self._settings.seed
+        return texels(things.surfaces, materials, where, among=self._movers, seed=seed)
+
+    def _gathered(self, coarse: Texels) -> FinalGather:
+        where, sight = self._still.where, self._still.sight
+        rays = GATHER_RAYS if self._settings.bounces else 0
+        return final_gather(coarse, where, sight, self._answer, self._skies, rays=rays)
+
+    def _shining(self, index: int, t_ns: float) -> list[Target]:
+        light = self._scene.lights[index]
+        if isinstance(light, Sun) and light.moves:
+            return [Target(source) for source in emitters(light, self._still.sight, t_ns=t_ns)]
+        return self._targets[index]
+
+    def _seen(self, parts: list[Emitter]) -> list[Target]:
+        """All but an open sky that few points see, such as undersides of things that stand on the floor."""
+        some = [reached(source, self._still).mean() if isinstance(source, OpenSky) else 1 for source in parts]
+        return [Target(source) for source, share in zip(parts, some, strict=True) if share > SKY_SHARE]
+
+    def _opaque(self, things: SurfaceList, mover: int) -> list[Surface]:
+        return [things.surfaces[i] for i in np.flatnonzero((things.mover == mover) & ~things.pane)]

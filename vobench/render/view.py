@@ -1,0 +1,167 @@
+"""Views of a camera as matrices, and of its images behind planar mirrors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pyrender import IntrinsicsCamera
+
+from vobench.geometry import se3
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.se3 import Array
+
+Box = tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """All points x with normal · x + offset_m = 0; the normal is a unit vector (3,)."""
+
+    normal: Array
+    offset_m: float
+
+    def distance_m(self, point_m: Array) -> float:
+        """Signed distance of a point (3,): positive on the side of the normal."""
+        return float(self.normal @ point_m + self.offset_m)
+
+    def flipped(self) -> "Plane":
+        """The same plane, seen from its other side."""
+        return Plane(-self.normal, -self.offset_m)
+
+    def moved(self, T_world_mover: Array) -> "Plane":
+        """The plane of a mover's frame where the mover is."""
+        normal = T_world_mover[:3, :3] @ self.normal
+        return Plane(normal, self.offset_m - float(normal @ T_world_mover[:3, 3]))
+
+    @property
+    def reflection(self) -> Array:
+        """Matrix (4, 4) that takes each point to its image behind the plane (Householder, 1958)."""
+        reflection = np.eye(4)
+        reflection[:3, :3] -= 2 * np.outer(self.normal, self.normal)
+        reflection[:3, 3] = -2 * self.offset_m * self.normal
+        return reflection
+
+    @property
+    def key(self) -> tuple[float, ...]:
+        """Equal for planes that coincide to 10 µm."""
+        return tuple(float(x) + 0.0 for x in np.round([*self.normal, self.offset_m], 5))
+
+
+def visible_box(camera: Pinhole, quads_camera_m: Array, within: Box, *, near_m: float) -> Box | None:
+    """Columns and rows (first, end, first, end) that quads (K, 4, 3) can touch, None for none.
+
+    Edges are cut at the near plane, behind which a projection has no meaning.
+    """
+    here, there = quads_camera_m.reshape(-1, 3), np.roll(quads_camera_m, -1, axis=1).reshape(-1, 3)
+    z0, z1 = here[:, 2] - near_m, there[:, 2] - near_m
+    crossing = (z0 < 0) != (z1 < 0)
+    share = (z0[crossing] / (z0[crossing] - z1[crossing]))[:, None]
+    cut = here[crossing] + share * (there[crossing] - here[crossing])
+    points = np.concatenate([here[z0 >= 0], cut])
+    if len(points) == 0:
+        return None
+    u = points[:, 0] / points[:, 2] * camera.fx_px + camera.cx_px
+    v = points[:, 1] / points[:, 2] * camera.fy_px + camera.cy_px
+    return overlap(within, _whole_pixels(u, v))
+
+
+def _whole_pixels(u: Array, v: Array) -> Box:
+    limits = np.array([u.min() - 1, u.max() + 2, v.min() - 1, v.max() + 2])
+    first_u, end_u, first_v, end_v = np.floor(np.clip(limits, -1e6, 1e6)).astype(int).tolist()
+    return first_u, end_u, first_v, end_v
+
+
+def overlap(a: Box, b: Box) -> Box | None:
+    """The pixels in both boxes, None for none."""
+    u0, u1, v0, v1 = max(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), min(a[3], b[3])
+    return (u0, u1, v0, v1) if u0 < u1 and v0 < v1 else None
+
+
+NEAR_M, FAR_M = 0.05, 60.0
+STATIC = -1
+IDENTITY = np.eye(4)
+# OpenCV's camera looks along +z with y down, OpenGL's along -z with y up.
+T_CV_GL = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class PinholeView:
+    """A pinhole at a place and time, perhaps by way of mirrors: then the picture is what the last one shows.
+
+    Movers' poses T_world_mover, the skies' coefficients, ambient_cd_m2 for mirrors that are not followed further.
+    view_projection (4, 4): from the world to OpenGL's screen, and `direct` (4, 4) as if there were no mirrors.
+    eye_m (3,) is behind the last mirror, if any.
+    images (4, 4) takes what the last mirror shows to where the camera sees it.
+    """
+
+    camera: Pinhole
+    T_world_camera: Array
+    T_world_movers: Sequence[Array]
+    skies: Array
+    ambient_cd_m2: float
+    eye_m: Array
+    direct: Array
+    view_projection: Array
+    images: Array
+    mirrors: tuple[Plane, ...] = ()
+
+    def through(self, mirror: Plane) -> "PinholeView":
+        """The look into a mirror."""
+        reflection = mirror.reflection
+        return replace(
+            self,
+            eye_m=reflection[:3, :3] @ self.eye_m + reflection[:3, 3],
+            view_projection=self.view_projection @ reflection,
+            images=self.images @ reflection,
+            mirrors=(*self.mirrors, mirror),
+        )
+
+    @property
+    def depth(self) -> int:
+        """How many mirrors lie between."""
+        return len(self.mirrors)
+
+    @property
+    def mirror(self) -> Plane | None:
+        """The mirror whose picture it is."""
+        return self.mirrors[-1] if self.mirrors else None
+
+    @property
+    def T_camera_world(self) -> Array:
+        """(4, 4), mirrored where the picture is: from the world to where the camera sees it."""
+        return se3.inverse(self.T_world_camera) @ self.images
+
+    @property
+    def world_from_screen(self) -> Array:
+        """(3, 3): from (x, y, 1) on OpenGL's screen, -1 to 1 and upwards, to the ray there in the world."""
+        c = self.camera
+        # The camera matrix's inverse, after the step from the screen to pixels.
+        rays = np.array(
+            [
+                [c.width_px / 2 / c.fx_px, 0, (c.width_px / 2 - 0.5 - c.cx_px) / c.fx_px],
+                [0, -c.height_px / 2 / c.fy_px, (c.height_px / 2 - 0.5 - c.cy_px) / c.fy_px],
+                [0, 0, 1],
+            ]
+        )
+        world: Array = self.images[:3, :3].T @ self.T_world_camera[:3, :3] @ rays
+        return world
+
+    def pose(self, mover: int) -> Array:
+        """T_world_mover, the identity for what stands still."""
+        return IDENTITY if mover == STATIC else self.T_world_movers[mover]
+
+    def plane(self, mirror: Plane, mover: int) -> Plane:
+        """Where a plane of a mover's frame is."""
+        return mirror if mover == STATIC else mirror.moved(self.T_world_movers[mover])
+
+
+def pinhole_view(
+    camera: Pinhole, T_world_camera: Array, T_world_movers: Sequence[Array], skies: Array, ambient_cd_m2: float
+) -> PinholeView:
+    """The look without a mirror."""
+    # OpenGL counts from the corner of the top-left pixel, OpenCV from its centre.
+    lens = IntrinsicsCamera(camera.fx_px, camera.fy_px, camera.cx_px + 0.5, camera.cy_px + 0.5, NEAR_M, FAR_M)
+    P = lens.get_projection_matrix(camera.width_px, camera.height_px)
+    direct = P @ T_CV_GL @ se3.inverse(T_world_camera)
+    eye_m = T_world_camera[:3, 3]
+    return PinholeView(camera, T_world_camera, T_world_movers, skies, ambient_cd_m2, eye_m, direct, direct, IDENTITY)

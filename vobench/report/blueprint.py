@@ -1,0 +1,136 @@
+"""The first view of a recording in Rerun: which panels, where, and where the 3-D eye stands."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from vobench.geometry.se3 import Array
+
+FRAME_TIMELINE = "frame"
+
+# Entities: what a recording holds and the views below show.
+WORLD = "world"
+TRUTH_PATH, ESTIMATE_PATH = f"{WORLD}/ground_truth/path", f"{WORLD}/estimate/path"
+TRUTH_LEFT, TRUTH_RIGHT = f"{WORLD}/ground_truth/left", f"{WORLD}/ground_truth/right"
+ESTIMATE_LEFT = f"{WORLD}/estimate/left"
+ERROR_LINE = f"{WORLD}/error"
+LEFT_TRACKS = f"{TRUTH_LEFT}/tracks"
+ERROR_PLOT, STATUS, SUMMARY = "error_mm", "status", "summary"
+
+EYE_PITCH_DEG = 38.0
+EYE_DISTANCE_PER_RADIUS = 1.6  # fills the view with Rerun's default field of view, with a margin for frusta
+FRAMES_AROUND_FOCUS = 15
+REPLAY_FPS = 5.0  # slow enough to see single frames
+
+
+def truth_entity(side: str, channel: str) -> str:
+    """Where one camera's truth channel is; apart from the world, for a depth map there hides the paths."""
+    return f"truth/{side}/{channel}"
+
+
+def layout(
+    truth_m: Array, estimate_m: Array, *, focus: tuple[int, int] | None, channels: Sequence[str] = ()
+) -> rrb.Blueprint:
+    """The default blueprint for paths (N, 3) and (M, 3); `focus` is a range of frames to start at.
+
+    Truth channels, where there are any, have tabs of their own.
+    """
+    seen_m = _near(truth_m, estimate_m)
+    paths = rrb.Vertical(
+        _space(truth_m, seen_m),
+        rrb.TimeSeriesView(
+            origin=ERROR_PLOT,
+            name="Position error (mm)",
+            axis_y=rrb.ScalarAxis(zoom_lock=True),
+            plot_legend=rrb.PlotLegend(visible=False),
+        ),
+        rrb.StateTimelineView(origin=STATUS, name="Status of each frame"),
+        row_shares=[6, 2.2, 1.2],
+    )
+    pictures = rrb.Vertical(
+        rrb.Spatial2DView(origin=TRUTH_LEFT, name="Left: inliers green, outliers red"),
+        rrb.Spatial2DView(origin=TRUTH_RIGHT, name="Right"),
+        rrb.TextDocumentView(origin=SUMMARY, name="Score"),
+        row_shares=[3, 3, 3],
+    )
+    columns = rrb.Horizontal(paths, pictures, column_shares=[3, 2])
+    run = rrb.Tabs(rrb.Horizontal(columns, name="Run"), *_truth(channels), active_tab=0) if channels else columns
+    return rrb.Blueprint(
+        run, _time_panel(focus), rrb.SelectionPanel(state="hidden"), rrb.BlueprintPanel(state="hidden")
+    )
+
+
+def _truth(channels: Sequence[str]) -> list[rrb.Grid]:
+    """A tab for each camera, a view for each channel."""
+    return [
+        rrb.Grid(*(rrb.Spatial2DView(origin=truth_entity(s, c), name=c) for c in channels), name=f"Truth, {s}")
+        for s in ("left", "right")
+    ]
+
+
+def _space(truth_m: Array, seen_m: Array) -> rrb.Spatial3DView:
+    eye, target = eye_and_target(seen_m)
+    return rrb.Spatial3DView(
+        origin=WORLD,
+        name="Truth green, estimate orange, error red",
+        contents=["$origin/**", f"- {TRUTH_RIGHT}/**", f"- {LEFT_TRACKS}"],
+        eye_controls=rrb.EyeControls3D(position=eye, look_target=target, eye_up=(0, 0, 1)),
+        line_grid=rrb.LineGrid3D(
+            visible=True,
+            spacing=grid_spacing_m(2 * _radius_m(truth_m)),
+            plane=rr.components.Plane3D.XY,
+            color=(255, 255, 255, 24),
+        ),
+    )
+
+
+def _time_panel(focus: tuple[int, int] | None) -> rrb.TimePanel:
+    """The `frame` time line: at rest at its start, or replaying the frames around a failure.
+
+    A blueprint cannot place the time cursor, but a playing loop pulls it to where the loop starts.
+    """
+    if focus is None:
+        return rrb.TimePanel(timeline=FRAME_TIMELINE, play_state="paused", state="collapsed")
+    first, last = focus
+    return rrb.TimePanel(
+        timeline=FRAME_TIMELINE,
+        play_state="playing",
+        state="collapsed",
+        fps=REPLAY_FPS,
+        loop_mode="selection",
+        time_selection=rrb.components.AbsoluteTimeRange(min=first, max=last),
+    )
+
+
+def eye_and_target(points_m: Array) -> tuple[Array, Array]:
+    """Where to stand and where to look so that points (N, 3) fill the view: beside their longer side."""
+    target = (points_m.min(0) + points_m.max(0)) / 2
+    _, axes = np.linalg.eigh(np.cov(points_m[:, :2].T, bias=True) if len(points_m) > 1 else np.eye(2))
+    side = axes[:, 0] * (-1.0 if axes[1, 0] > 0 else 1.0)  # of the two sides, the one towards -y
+    pitch = np.deg2rad(EYE_PITCH_DEG)
+    direction = np.array([*(np.cos(pitch) * side), np.sin(pitch)])
+    return target + EYE_DISTANCE_PER_RADIUS * _radius_m(points_m) * direction, target
+
+
+def grid_spacing_m(extent_m: float) -> float:
+    """A power of ten that cuts `extent_m` into 3 to 30 parts."""
+    return float(10.0 ** np.floor(np.log10(extent_m / 3)))
+
+
+def frustum_m(truth_m: Array) -> float:
+    """How long to draw a camera so that it is seen, but does not hide a path (N, 3)."""
+    return 0.16 * _radius_m(truth_m)
+
+
+def _radius_m(points_m: Array) -> float:
+    """Half the diagonal of the bounding box, at least 0.25 m so that a robot at rest is framed too."""
+    return max(0.25, float(np.linalg.norm(np.ptp(points_m, axis=0))) / 2)
+
+
+def _near(truth_m: Array, estimate_m: Array) -> Array:
+    """The truth and what of the estimate stays near it: one that flies off must not shrink the rest."""
+    centre, reach_m = (truth_m.min(0) + truth_m.max(0)) / 2, 2 * _radius_m(truth_m)
+    near = np.linalg.norm(estimate_m - centre, axis=1) <= reach_m
+    return np.concatenate([truth_m, estimate_m[near]])

@@ -1,0 +1,385 @@
+"""A trial as a Rerun recording: pictures, tracks, both paths and the error on one time line."""
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Sequence as Rows
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from vobench import stop
+from vobench.errors import InputError, UnknownNameError
+from vobench.geometry.camera import Camera
+from vobench.geometry.rig import Rig
+from vobench.geometry.se3 import Array
+from vobench.metric.score import score
+from vobench.report import blueprint as bp
+from vobench.report.blueprint import FRAME_TIMELINE, truth_entity
+from vobench.run import estimate as estimate_file
+from vobench.run.folder import GROUND_TRUTH, SEQUENCE, STATUSES, SURVIVED, RunFolder, TrialScore
+from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, picture
+from vobench.sequence import EncodedFrame, Sequence, StereoTruth, read_truth_frames, read_truth_names, truth_channels
+from vobench.trajectory.trajectory import Stamps, Trajectory
+
+
+def time_columns(frames: NDArray[np.int64], t_ns: Stamps) -> list[rr.TimeColumn]:
+    """The frame's number, and seconds since the start."""
+    seconds = rr.TimeColumn("t", duration=t_ns.astype("timedelta64[ns]"))
+    return [rr.TimeColumn(FRAME_TIMELINE, sequence=frames), seconds]
+
+
+UNSET, SET = (0, 0, 0, 0), (255, 255, 255, 160)
+
+
+@dataclass(frozen=True, slots=True)
+class TruthView:
+    """The channels that were recorded, what their ids mean, and a fresh pass over the frames."""
+
+    channels: tuple[str, ...]
+    names: TruthNames
+    frames: Callable[[], Iterable[StereoTruth]]
+
+
+def log_truth(stream: rr.RecordingStream, view: TruthView) -> None:
+    """Log all channels of both cameras, one frame in memory at a time."""
+    for side in ("left", "right"):
+        for channel in view.channels:
+            if classes := _classes(channel, view.names):
+                stream.log(truth_entity(side, channel), rr.AnnotationContext(classes), static=True)
+    for frame in view.frames():
+        times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
+        for side, truth in (("left", frame.left), ("right", frame.right)):
+            _log_side(stream, times, side, truth)
+
+
+def _log_side(stream: rr.RecordingStream, times: list[rr.TimeColumn], side: str, truth: TruthFrame | None) -> None:
+    for channel, values in truth.channels().items() if truth else ():
+        stream.send_columns(truth_entity(side, channel), times, _columns(channel, values))
+
+
+def _columns(channel: str, values: NDArray[np.generic]) -> Any:
+    """Depth as depth, ids, counts and masks as classes, directions as colours."""
+    if channel == "depth":
+        return rr.DepthImage.columns(buffer=[_bytes(values)], format=[_format(values, "F32")], meter=[1.0])
+    if CHANNELS[channel].depth == 1:
+        classes = values.astype(np.uint16)
+        return rr.SegmentationImage.columns(buffer=[_bytes(classes)], format=[_format(classes, "U16")])
+    colors = picture(channel, values)
+    return rr.Image.columns(buffer=[_bytes(colors)], format=[_format(colors, "U8", rr.ColorModel.RGB)])
+
+
+def _format(values: NDArray[np.generic], kind: str, colors: rr.ColorModel | None = None) -> rr.components.ImageFormat:
+    height, width = values.shape[:2]
+    datatype = getattr(rr.ChannelDatatype, kind)
+    return rr.components.ImageFormat(width, height, color_model=colors, channel_datatype=datatype)
+
+
+def _bytes(values: NDArray[np.generic]) -> NDArray[np.uint8]:
+    return np.ascontiguousarray(values).reshape(-1).view(np.uint8)
+
+
+def _classes(channel: str, names: TruthNames) -> list[rr.AnnotationInfo]:
+    """What an id, a count or a mask's value is called, and its colour; none for other channels."""
+    if channel in {"instance", "material"}:
+        table = names.instance if channel == "instance" else names.material
+        colors = picture(channel, np.arange(len(table), dtype=np.uint16)[None])[0]
+        return [rr.AnnotationInfo(i, name, tuple(colors[i].tolist())) for i, name in enumerate(table)]
+    if CHANNELS[channel].dtype is np.bool_:
+        return [rr.AnnotationInfo(0, "", UNSET), rr.AnnotationInfo(1, channel, SET)]
+    if channel == "shadow":
+        return [rr.AnnotationInfo(0, "lit", UNSET), rr.AnnotationInfo(1, "one light hidden", SET)]
+    return []
+
+
+Color = tuple[int, int, int]
+Tracks = tuple[Array, NDArray[np.bool_]]
+
+GREEN, ORANGE, RED = (60, 200, 90), (255, 150, 40), (235, 60, 60)
+STATUS_COLORS = {
+    "init": (90, 140, 220),
+    "ok": GREEN,
+    "stationary": (70, 180, 190),
+    "degraded": (235, 205, 70),
+    "lost": RED,
+    "no output": (150, 40, 110),
+}
+NO_OUTPUT = "no output"
+NS_PER_S = 1_000_000_000
+FAILED = ("lost", NO_OUTPUT)
+PIXEL_CENTRE = 0.5  # Rerun puts the corner of the top-left pixel at (0, 0), we its centre
+FRUSTUM_LINE = -1.5  # negative: in screen points, whatever the zoom
+TRACK_RADIUS = rr.Radius.ui_points(3.5)
+
+
+@dataclass(frozen=True, slots=True)
+class TrialView:
+    """All that is shown of a run; both trajectories are of the left camera, in the same world.
+
+    `frames` starts a fresh pass over the pictures. `error_m` belongs to the instants `error_t_ns`.
+    `tracks` maps a frame's index to points (N, 2) in the left picture and which are inliers (N,).
+    There may be fewer `statuses` than frames, where an estimator stopped early. `truth` is None
+    where nothing was recorded of the pixels.
+    """
+
+    title: str
+    rig: Rig
+    frames: Callable[[], Iterable[EncodedFrame]]
+    ground_truth: Trajectory
+    estimate: Trajectory
+    error_t_ns: Stamps
+    error_m: Array
+    statuses: Rows[str]
+    tracks: Mapping[int, Tracks]
+    summary_md: str
+    truth: TruthView | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Log:
+    """A Rerun stream, and the frames' stamps (N,) that place anything stamped on the `frame` time line."""
+
+    stream: rr.RecordingStream
+    t_ns: Stamps
+
+    def static(self, entity: str, *what: Any) -> None:
+        self.stream.log(entity, *what, static=True)
+
+    def columns(self, entity: str, frames: NDArray[np.int64], columns: Any) -> None:
+        """Send rows for some frames, on the time lines `frame` and `t`."""
+        if len(frames):
+            self.stream.send_columns(entity, time_columns(frames, self.t_ns[frames]), columns)
+
+    def frames_of(self, t_ns: Stamps) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """The frames that have a sample closer than half the time between frames, and which sample it is."""
+        if not len(t_ns):
+            return np.zeros(0, np.int64), np.zeros(0, np.int64)
+        after = np.searchsorted(t_ns, self.t_ns).clip(max=len(t_ns) - 1)
+        before = (after - 1).clip(min=0)
+        nearest = np.where(self.t_ns - t_ns[before] < t_ns[after] - self.t_ns, before, after)
+        step_ns = np.diff(self.t_ns).min(initial=NS_PER_S)
+        frames = np.flatnonzero(2 * np.abs(t_ns[nearest] - self.t_ns) < step_ns)
+        return frames, nearest[frames]
+
+
+def save_run(path: Path, run: TrialView) -> None:
+    """Write a run to an .rrd file that opens in Rerun with its own layout."""
+    part = path.with_name(path.name + ".part")
+    with (
+        stop.undone(lambda: part.unlink(missing_ok=True)),
+        rr.RecordingStream(application_id(run.title), recording_id=run.title, send_properties=False) as stream,
+    ):
+        stream.save(part)
+        stream.send_recording_name(run.title)
+        log = _Log(stream, _log_pictures(stream, run.frames()))
+        statuses = [*run.statuses, *[NO_OUTPUT] * (len(log.t_ns) - len(run.statuses))]
+        _log_paths(log, run)
+        _log_cameras(log, run)
+        _log_error(log, run)
+        _log_tracks(log, run.tracks)
+        _log_statuses(log, statuses)
+        log.static(bp.SUMMARY, rr.TextDocument(run.summary_md, media_type=rr.MediaType.MARKDOWN))
+        channels: tuple[str, ...] = ()
+        if run.truth is not None:
+            log_truth(stream, run.truth)
+            channels = run.truth.channels
+        focus, truth_m, estimate_m = first_failure(statuses), run.ground_truth.positions_m, run.estimate.positions_m
+        stream.send_blueprint(bp.layout(truth_m, estimate_m, focus=focus, channels=channels))
+        stream.disconnect()
+        part.replace(path)
+
+
+def application_id(title: str) -> str:
+    """One for each run, since Rerun keeps one layout per application; it takes few characters in them."""
+    return "vobench-" + re.sub(r"[^A-Za-z0-9_]+", "-", title).strip("-")
+
+
+def first_failure(statuses: Rows[str]) -> tuple[int, int] | None:
+    """The frames around the first failed one, or None where all went well."""
+    failed = [i for i, status in enumerate(statuses) if status in FAILED]
+    if not failed:
+        return None
+    around = bp.FRAMES_AROUND_FOCUS
+    return max(0, failed[0] - around), min(len(statuses) - 1, failed[0] + around)
+
+
+def _log_pictures(stream: rr.RecordingStream, frames: Iterable[EncodedFrame]) -> Stamps:
+    """Log both pictures as they are encoded, one frame in memory at a time; return the stamps."""
+    stamps = []
+    for frame in frames:
+        times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
+        pictures = ((bp.TRUTH_LEFT, frame.left), (bp.TRUTH_RIGHT, frame.right))
+        for entity, encoded in ((entity, encoded) for entity, encoded in pictures if encoded is not None):
+            columns = rr.EncodedImage.columns(blob=[encoded], media_type=[f"image/{frame.form}"])
+            stream.send_columns(f"{entity}/image", times, columns)
+        stamps.append(frame.t_ns)
+    return np.array(stamps, np.int64)
+
+
+def _log_paths(log: _Log, run: TrialView) -> None:
+    """Both whole paths; the estimate is broken where frames have no pose."""
+    log.static(bp.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    width = rr.Radius.ui_points(1.8)
+    truth_m, estimate_m = run.ground_truth.positions_m, run.estimate.positions_m
+    log.static(bp.TRUTH_PATH, rr.LineStrips3D([truth_m], colors=GREEN, radii=width))
+    frames, samples = log.frames_of(run.estimate.t_ns)
+    strips = np.split(estimate_m[samples], np.flatnonzero(np.diff(frames) > 1) + 1)
+    log.static(bp.ESTIMATE_PATH, rr.LineStrips3D(strips, colors=ORANGE, radii=width))
+
+
+def _log_cameras(log: _Log, run: TrialView) -> None:
+    """True left and right camera, and the estimated left one, which vanishes while there is no pose."""
+    length_m = bp.frustum_m(run.ground_truth.positions_m)
+    _log_camera(log, bp.TRUTH_LEFT, run.rig.left, run.ground_truth, length_m=length_m, color=GREEN)
+    if run.rig.right:
+        right = run.ground_truth.of_mounted(run.rig.T_left_right)
+        _log_camera(log, bp.TRUTH_RIGHT, run.rig.right, right, length_m=length_m, color=GREEN)
+    _log_camera(log, bp.ESTIMATE_LEFT, run.rig.left, run.estimate, length_m=length_m, color=ORANGE)
+    frames, _ = log.frames_of(run.estimate.t_ns)
+    absent = np.setdiff1d(np.arange(len(log.t_ns)), frames)
+    log.columns(bp.ESTIMATE_LEFT, absent, rr.Clear.columns(is_recursive=[False] * len(absent)))
+
+
+def _log_camera(log: _Log, entity: str, camera: Camera, path: Trajectory, *, length_m: float, color: Color) -> None:
+    frames, samples = log.frames_of(path.t_ns)
+    poses, count = path.T_world_frame[samples], len(frames)
+    log.columns(entity, frames, rr.Transform3D.columns(translation=poses[:, :3, 3], mat3x3=poses[:, :3, :3]))
+    pinhole = rr.Pinhole.columns(
+        image_from_camera=[rerun_matrix(camera)] * count,
+        resolution=[[camera.width_px, camera.height_px]] * count,
+        camera_xyz=[rr.components.ViewCoordinates.RDF] * count,
+        image_plane_distance=[length_m] * count,
+        color=[color] * count,
+        line_width=[FRUSTUM_LINE] * count,
+    )
+    log.columns(entity, frames, pinhole)
+
+
+def rerun_matrix(camera: Camera) -> Array:
+    """The camera matrix (3, 3) for Rerun's pixels, whose centres lie at halves."""
+    K = camera.K
+    K[:2, 2] += PIXEL_CENTRE
+    return K
+
+
+def _log_error(log: _Log, run: TrialView) -> None:
+    """The error of each frame as a plot with gaps, and in 3-D as a line from truth to estimate."""
+    frames, samples = log.frames_of(run.error_t_ns)
+    error_mm = np.full(len(log.t_ns), np.nan)
+    error_mm[frames] = 1e3 * run.error_m[samples]
+    log.static(bp.ERROR_PLOT, rr.SeriesLines(colors=RED, widths=1.5, names="position error (mm)"))
+    log.columns(bp.ERROR_PLOT, np.arange(len(error_mm)), rr.Scalars.columns(scalars=error_mm))
+    _log_error_lines(log, run)
+
+
+def _log_error_lines(log: _Log, run: TrialView) -> None:
+    truth, estimate = (dict(zip(*log.frames_of(path.t_ns), strict=True)) for path in (run.ground_truth, run.estimate))
+    both = sorted(truth.keys() & estimate.keys())
+    truth_m = run.ground_truth.positions_m[[truth[i] for i in both]]
+    estimate_m = run.estimate.positions_m[[estimate[i] for i in both]]
+    lengths = np.isin(np.arange(len(log.t_ns)), both).astype(int)  # no line, where there is no pose
+    lines = rr.LineStrips3D.columns(strips=np.stack([truth_m, estimate_m], 1)).partition(lengths)
+    log.static(bp.ERROR_LINE, rr.LineStrips3D.from_fields(colors=RED, radii=rr.Radius.ui_points(1.5)))
+    log.columns(bp.ERROR_LINE, np.arange(len(lengths)), lines)
+
+
+def _log_tracks(log: _Log, tracks: Mapping[int, Tracks]) -> None:
+    """Points in the left picture; a frame without any clears those of the frame before."""
+    count = len(log.t_ns)
+    nothing = (np.zeros((0, 2)), np.zeros(0, bool))
+    rows = [tracks.get(index, nothing) for index in range(count)]
+    uv_px = np.concatenate([uv.reshape(-1, 2) for uv, _ in rows])
+    inlier = np.concatenate([inlier for _, inlier in rows])
+    lengths = [len(uv) for uv, _ in rows]
+    colors = np.where(inlier[:, None], np.array(GREEN, np.uint8), np.array(RED, np.uint8))
+    columns = rr.Points2D.columns(positions=uv_px + PIXEL_CENTRE, colors=colors).partition(lengths)
+    log.static(bp.LEFT_TRACKS, rr.Points2D.from_fields(radii=TRACK_RADIUS))
+    log.columns(bp.LEFT_TRACKS, np.arange(count), columns)
+
+
+def _log_statuses(log: _Log, statuses: Rows[str]) -> None:
+    """A row where the status changes: Rerun draws it until the next one."""
+    known = dict.fromkeys([*STATUS_COLORS, *statuses])
+    colors = [STATUS_COLORS.get(status, (128, 128, 128)) for status in known]
+    log.static(bp.STATUS, rr.StateConfiguration(values=list(known), colors=colors))
+    changes = [i for i, status in enumerate(statuses) if i == 0 or status != statuses[i - 1]]
+    states = rr.StateChange.columns(state=[statuses[i] for i in changes])
+    log.columns(bp.STATUS, np.array(changes, np.int64), states)
+
+
+def pick(scores: Rows[TrialScore], *, case: str | None, estimator: str | None) -> TrialScore:
+    """The run most worth a look among those asked for: the gravest failure, else the best estimator's worst case.
+
+    Raises UnknownNameError where no run is of that case or estimator.
+    """
+    for kind, name, known in (
+        ("case", case, {s.case for s in scores}),
+        ("estimator", estimator, {s.estimator for s in scores}),
+    ):
+        if name is not None and name not in known:
+            raise UnknownNameError(f"no {kind} '{name}' in this run. Known: {', '.join(sorted(known))}")
+    wanted = [s for s in scores if case in (None, s.case) and estimator in (None, s.estimator)]
+    failed = [s for s in wanted if s.status not in SURVIVED]
+    if failed:
+        return max(failed, key=lambda s: STATUSES.index(s.status))
+    best = min(
+        {s.estimator for s in wanted}, key=lambda name: (_mean_error([s for s in wanted if s.estimator == name]), name)
+    )
+    return max((s for s in wanted if s.estimator == best), key=_error)
+
+
+def trial_view(folder: RunFolder, run: TrialScore) -> TrialView:
+    """All that is shown of one run. Raises InputError where its sequence is no longer in the cache."""
+    link = folder.case(run.case) / SEQUENCE
+    if not link.exists():
+        raise InputError(f"the sequence is gone from the cache; run the suite again to make it anew: {link}")
+    sequence = Sequence.open(link)
+    place = folder.estimate(run.case, run.estimator, run.repeat)
+    gt = estimate_file.read_tum(folder.case(run.case) / GROUND_TRUTH)
+    est = estimate_file.read_tum(place / estimate_file.ESTIMATE)
+    scored = score(gt, est) if len(est) else None
+    return TrialView(
+        title=f"{run.estimator} on {run.case}",
+        rig=sequence.rig,
+        frames=sequence.encoded_frames,
+        ground_truth=gt,
+        estimate=Trajectory(est.t_ns, scored.alignment.apply(est.T_world_frame)) if scored else est,
+        error_t_ns=scored.gt_t_ns if scored else est.t_ns,
+        error_m=scored.ate_trans_m if scored else np.zeros(0),
+        statuses=[row.status for row in estimate_file.read_frames(place)],
+        tracks={i: (table[:, 2:4].astype(float), table[:, 4] > 0) for i, table in estimate_file.read_tracks(place)},
+        summary_md=_summary(run),
+        truth=_truth(link),
+    )
+
+
+def _truth(sequence: Path) -> TruthView | None:
+    """What was recorded of the pixels, None for most sequences."""
+    channels = truth_channels(sequence)
+    if not channels:
+        return None
+    return TruthView(channels, read_truth_names(sequence), lambda: read_truth_frames(sequence))
+
+
+def _error(run: TrialScore) -> float:
+    value = run.value("ate_trans", "rmse")
+    return float("inf") if value is None else value
+
+
+def _mean_error(runs: Rows[TrialScore]) -> float:
+    return fmean(_error(run) for run in runs)
+
+
+def _summary(run: TrialScore) -> str:
+    """The run's score in Markdown."""
+    lines = [f"# {run.estimator} on {run.case}", "", f"**{run.status}**{f' — {run.reason}' if run.reason else ''}", ""]
+    lines += [f"{run.frames} frames, {run.path_m:.2f} m, coverage {run.coverage:.1%}", ""]
+    if run.score:
+        lines += ["| metric | rmse | mean | max |", "|---|---|---|---|"]
+        for m in run.score["metrics"]:
+            lines.append(f"| {m['name']} ({m['unit']}) | {m['rmse']:.4g} | {m['mean']:.4g} | {m['max']:.4g} |")
+    return "\n".join(lines)

@@ -1,1 +1,0 @@
-"""How the robot moves: the identified model, its controller, wheel slip, and a drive through waypoints. Pure."""

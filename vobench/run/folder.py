@@ -1,0 +1,202 @@
+"""The folder of a run, as a person reads it, and the hashes of its files."""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from itertools import count
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from vobench.errors import InputError
+from vobench.run.store import unfinished
+
+GROUND_TRUTH, CASE, SCORE, SEQUENCE = "ground_truth.tum", "case.json", "score.json", "sequence"
+ESTIMATES = "estimates"
+ENVIRONMENT, SUITE, ESTIMATORS = "environment.json", "suite.json", "estimators.json"
+
+RunStatus = Literal[
+    "ok", "partial", "lost", "diverged", "invalid_output", "timeout", "out_of_memory", "crashed", "refused"
+]
+# Best first; the last seven are failures, and no failure ranks before a survivor.
+STATUSES: tuple[RunStatus, ...] = (
+    "ok",
+    "partial",
+    "lost",
+    "diverged",
+    "invalid_output",
+    "timeout",
+    "out_of_memory",
+    "crashed",
+    "refused",
+)
+SURVIVED = ("ok", "partial")
+
+
+class TrialScore(BaseModel):
+    """One estimator on one case: its status and, where there is any estimate, its score.
+
+    `drift_m` is the largest distance of the estimate from its start, in a case that stands still; else None.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    schema_version: int = 1
+    case: str
+    variant: dict[str, str]
+    estimator: str
+    repeat: int
+    status: RunStatus
+    reason: str
+    coverage: float
+    frames: int
+    path_m: float
+    score: dict[str, Any] | None
+    drift_m: float | None = None
+
+    def value(self, metric: str, statistic: str) -> float | None:
+        """One statistic of one metric, None where the run has no such score."""
+        for entry in (self.score or {"metrics": []})["metrics"]:
+            if entry["name"] == metric:
+                return float(entry[statistic])
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class RunFolder:
+    """A finished run of a suite."""
+
+    path: Path
+
+    def case(self, case: str) -> Path:
+        """The folder of a case."""
+        return self.path / "cases" / case
+
+    def estimate(self, case: str, estimator: str, repeat: int) -> Path:
+        """The folder of an estimator's run on a case."""
+        return self.case(case) / ESTIMATES / estimator / str(repeat)
+
+    def score_files(self) -> list[Path]:
+        """Where every run's score lies, in order of folders. Raises InputError where the folder is none of ours."""
+        cases = self.path / "cases"
+        files = sorted(cases.glob(f"*/{ESTIMATES}/*/*/{SCORE}"))
+        if files:
+            return files
+        if not self.path.is_dir():
+            raise InputError(f"no such folder: {self.path}")
+        if any(cases.glob(f"*/*/*/{SCORE}")):
+            raise InputError(
+                f"a run of an older vobench, whose estimates do not lie in cases/*/{ESTIMATES}; "
+                f"run the suite again: {self.path}"
+            )
+        raise InputError(f"not the folder of a run (no cases/*/{ESTIMATES}/*/*/{SCORE} in it): {self.path}")
+
+    def scores(self) -> list[TrialScore]:
+        """Every run's score, in order of folders. Raises InputError where the folder or a score is none of ours."""
+        scores = []
+        for file in self.score_files():
+            score = read_score(file)
+            if self.estimate(score.case, score.estimator, score.repeat) / SCORE != file:
+                told = f"{score.estimator!r} on {score.case!r}, {score.repeat}"
+                raise InputError(f"should be the score of the folder it lies in, but is of {told}: {file}")
+            scores.append(score)
+        return scores
+
+
+def read_score(path: Path) -> TrialScore:
+    """One run's score. Raises InputError where the file is none."""
+    try:
+        return TrialScore.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise InputError(
+            f"not a score as vobench writes it ({f'{place}: ' if place else ''}{first['msg']}): {path}"
+        ) from None
+
+
+def open_run(path: Path) -> RunFolder:
+    """The run at a path; a suite's folder stands for its latest run."""
+    return RunFolder((path / "latest") if (path / "latest").exists() else path)
+
+
+def make_run(root: Path, suite: str, key: str, fill: Callable[[RunFolder], None]) -> RunFolder:
+    """A new run's folder, which gets its name when `fill` is through with it without an error."""
+    parent = root / suite
+    with unfinished(parent) as folder:
+        fill(RunFolder(folder))
+        final = _published(folder, parent / f"{datetime.now(UTC):%Y%m%dT%H%M%S}_{key[:8]}")
+        _point(parent / "latest", final.name)
+    return RunFolder(final)
+
+
+def _published(folder: Path, name: Path) -> Path:
+    """The folder under its final name, with a number behind it where two runs ended in one second."""
+    for number in count(1):
+        final = name if number == 1 else name.with_name(f"{name.name}.{number}")
+        try:
+            return folder.rename(final)
+        except OSError:
+            if not final.is_dir():
+                raise
+    raise AssertionError
+
+
+def _point(link: Path, target: str) -> None:
+    """Make a link point elsewhere in one step."""
+    fresh = link.with_name(f".{link.name}-{os.getpid()}")
+    fresh.symlink_to(target)
+    fresh.replace(link)
+
+
+def write_json(path: Path, content: Any) -> None:
+    """JSON that people can read."""
+    path.write_text(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+
+
+HASHES = "hashes.json"
+CHUNK = 1 << 20
+
+
+def write_hashes(folder: RunFolder) -> None:
+    """Hash all that lies in a run's folder, and the sequences that it links to."""
+    write_json(folder.path / HASHES, {name: file_hash(folder.path / name) for name in _names(folder.path)})
+
+
+def read_hashes(folder: RunFolder) -> dict[str, str]:
+    """The hash of each file by its path in the folder. Raises InputError where none were kept."""
+    path = folder.path / HASHES
+    try:
+        held = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"this run kept no hashes (its vobench was older, or it is no run): {path}") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"not readable as JSON ({error}): {path}") from None
+    if not isinstance(held, dict) or not all(isinstance(value, str) for value in held.values()):
+        raise InputError(f"should hold one hash for each file: {path}")
+    escaped = [name for name in held if Path(name).is_absolute() or ".." in Path(name).parts]
+    if escaped:
+        raise InputError(f"names a file outside the run's folder ({escaped[0]!r}): {path}")
+    return held
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file's bytes."""
+    state = hashlib.sha256()
+    with path.open("rb") as file:
+        while chunk := file.read(CHUNK):
+            state.update(chunk)
+    return state.hexdigest()
+
+
+def _names(root: Path) -> Iterator[str]:
+    """Paths of all files below a run's folder; a sequence is a link to a folder in the cache."""
+    linked = (file for link in root.glob(f"cases/*/{SEQUENCE}") for file in link.glob("*.mcap"))
+    for path in sorted({*(p for p in root.rglob("*") if p.is_file()), *linked}):
+        name = str(path.relative_to(root))
+        if name != HASHES:
+            yield name

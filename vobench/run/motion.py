@@ -1,0 +1,277 @@
+"""Where a case's body goes, and whether it can: motion, wheels, preflight checks."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench import stop
+from vobench.errors import MotionError
+from vobench.geometry import se3
+from vobench.geometry.se3 import Array
+from vobench.motion.ackermann import ACKERMANNS, ackermann
+from vobench.motion.controller import CONTROLLERS, ControllerSettings
+from vobench.motion.course import rolled
+from vobench.motion.drive import Drive, DriveOptions, drive, follow, led_by
+from vobench.motion.pioneer import THETAS, Theta, feed_forward
+from vobench.motion.slip import DELTAS, DISTURBANCE_STREAMS, SLIPS
+from vobench.suite.scene_file import movers
+from vobench.suite.suite import Case, Plan
+from vobench.suite.trajectory import (
+    CurveSpec,
+    GroundSpec,
+    HandheldSpec,
+    ReplaySpec,
+    SpatialSpec,
+    UnledSpec,
+    WaypointsSpec,
+)
+from vobench.suite.yaml_file import Mistakes
+from vobench.trajectory.kinematics import CurveMotion, Kinematics, Motion
+from vobench.trajectory.trajectory import Stamps
+
+
+def generator(seed: int, stream: str) -> np.random.Generator:
+    """The random stream of that name: no other stream, and nothing else in a case, changes its draws."""
+    name = int.from_bytes(hashlib.sha256(stream.encode()).digest()[:8], "big")
+    return np.random.default_rng([seed, name])
+
+
+NS_PER_S = 1e9
+ENCODERS_PER_FRAME = 4
+# Nearly two hours at 30 Hz.
+MOST_FRAMES = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class Rims:
+    """What the encoders measure: angles (M, 2) in rad of the left and right rim at t_ns (M,)."""
+
+    t_ns: Stamps
+    rim_rad: Array
+
+
+@dataclass(frozen=True, slots=True)
+class BodyMotion:
+    """A body's way: its motion, the stamps t_ns (N,) of its pictures; `rims` where it rolls, `drive` where it is led.
+
+    All that is true of it comes from `motion`: poses, twists, accelerations, at these stamps or any other.
+    """
+
+    motion: Motion
+    t_ns: Stamps
+    rims: Rims | None = None
+    drive: Drive | None = None
+
+    def at_frames(self) -> Kinematics:
+        """Where the body is and how it moves at its pictures' stamps."""
+        return self.motion.at(self.t_ns)
+
+
+def body_motion(case: Case) -> BodyMotion:
+    """The case's body on its way; the same for every scene, rig and camera. Raises MotionError."""
+    spec = case.trajectory
+    if isinstance(spec, WaypointsSpec):
+        return _led(_through_targets(case, spec))
+    if isinstance(spec, GroundSpec):
+        return _led(_along(spec.way(), case, spec)) if spec.mover == "pioneer" else _rolling(spec)
+    motion = _through_space(case, spec)
+    return BodyMotion(motion, stamps(motion, spec.rate_hz))
+
+
+def stamps(motion: Motion, rate_hz: float, *, per_frame: int = 1) -> Stamps:
+    """Stamps from a motion's start to its end, `per_frame` to a frame, every `per_frame`-th exactly a frame's.
+
+    Raises MotionError where there would be more than MOST_FRAMES.
+    """
+    lasts_s = (motion.end_ns - motion.start_ns) / NS_PER_S
+    frames = int(lasts_s * rate_hz + 1e-6)
+    if frames > MOST_FRAMES:
+        raise MotionError(f"{lasts_s:.4g} s at {rate_hz:g} Hz are {frames} frames, and {MOST_FRAMES} are the most")
+    index = np.arange(frames * per_frame + 1)
+    return np.rint(index * NS_PER_S / per_frame / rate_hz).astype(np.int64) + motion.start_ns
+
+
+def _led(driven: Drive) -> BodyMotion:
+    return BodyMotion(driven.motion, driven.t_ns, Rims(driven.encoder_t_ns, driven.rim_rad), driven)
+
+
+def _through_targets(case: Case, spec: WaypointsSpec) -> Drive:
+    return drive(
+        spec.targets_m,
+        start=spec.start,
+        tolerance_m=spec.tolerance_m,
+        max_time_s=spec.max_time_s,
+        leg_s=spec.leg_s,
+        **_robot(case, spec),
+    )
+
+
+def _along(way: CurveMotion, case: Case, spec: CurveSpec) -> Drive:
+    """The Pioneer on a way: its point h goes after where an ideal robot's would be.
+
+    Where no point ahead of the axle can lead it, it gets the speeds that would take it there undisturbed.
+    """
+    robot = _robot(case, spec)
+    t_ns = stamps(way, spec.rate_hz)
+    path_m, path_mps = _path_of_h(way, t_ns, robot["controller"])
+    x, y = path_m[0].tolist()
+    start = (x, y, spec.start[2])
+    if isinstance(spec, UnledSpec):
+        amid_ns = t_ns + round(NS_PER_S / spec.rate_hz / 2)
+        return led_by(_fed_forward(way, amid_ns, THETAS[spec.robot]), start=start, **robot)
+    return follow(path_m, path_mps, start=start, **robot)
+
+
+def _robot(case: Case, spec: GroundSpec) -> DriveOptions:
+    """Which robot it is, and what is done to it."""
+    is_ideal = spec.mover == "unicycle"
+    return {
+        "theta": None if is_ideal else THETAS[spec.robot],
+        "theta_std": 0.0 if is_ideal else spec.robot_spread,
+        "controller": CONTROLLERS[spec.controller],
+        "limits": spec.build_limits(),
+        "slip": SLIPS["none" if is_ideal else spec.slip],
+        "delta": DELTAS["none" if is_ideal else spec.delta],
+        "floor": () if is_ideal else [patch.build() for patch in spec.floor],
+        "rate_hz": spec.rate_hz,
+        "substeps": spec.substeps,
+        "integrator": spec.integrator,
+        "rngs": {stream: generator(case.seed, f"slip.{stream}") for stream in DISTURBANCE_STREAMS},
+    }
+
+
+def _path_of_h(way: Motion, t_ns: Stamps, controller: ControllerSettings) -> tuple[Array, Array]:
+    """Places and velocities (N, 2) in the world of the point h of a body that goes this way exactly."""
+    h = way.at(t_ns).of_mounted(se3.transform(np.eye(3), [controller.a_m, 0.0, 0.0]))
+    velocity_mps = np.einsum("kij,kj->ki", h.T_world_body[:, :3, :3], h.velocity_mps)
+    return h.T_world_body[:, :2, 3], velocity_mps[:, :2]
+
+
+def _fed_forward(way: Motion, t_ns: Stamps, theta: Theta) -> Array:
+    """References (N, 2) with which the robot of (18) moves as this way does at t_ns: the middles of its frames."""
+    ideal = way.at(t_ns)
+    u, omega = ideal.velocity_mps[:, 0], ideal.turn_radps[:, 2]
+    u_rate, omega_rate = ideal.acceleration_mps2[:, 0], ideal.turn_rate_radps2[:, 2]
+    return np.stack(feed_forward(u, omega, u_rate, omega_rate, theta=theta), -1)
+
+
+def _rolling(spec: CurveSpec) -> BodyMotion:
+    """A body whose wheels do as they are told; a car's as its steering lets them."""
+    way = spec.way()
+    fine = stamps(way, spec.rate_hz, per_frame=ENCODERS_PER_FRAME)
+    motion: Motion = ackermann(way, ACKERMANNS[spec.car]) if spec.mover == "ackermann" else way
+    return BodyMotion(motion, fine[::ENCODERS_PER_FRAME], Rims(fine, rolled(motion, fine, spec.wheels)))
+
+
+def _through_space(case: Case, spec: SpatialSpec | ReplaySpec) -> Motion:
+    if isinstance(spec, ReplaySpec):
+        assert case.replayed is not None  # read with the suite
+        return spec.motion(case.replayed)
+    return spec.motion(generator(case.seed, "shake")) if isinstance(spec, HandheldSpec) else spec.motion()
+
+
+def body_motions(plan: Plan) -> dict[str, BodyMotion]:
+    """The travel of each trajectory of a plan, by its name: said before hours of rendering.
+
+    Raises SuiteError with all that is wrong: a target cannot be reached, a way ends within a frame, a camera
+    leaves the room, its pictures take longer than a frame, or an IMU would feel the noise of a recording.
+    """
+    travels, wrong = dict[str, BodyMotion](), plan.mistakes()
+    for name, cases in _by(plan.simulated, "trajectory").items():
+        stop.check()
+        with wrong.at("trajectories", name):
+            travels[name] = body_motion(cases[0])
+            check_cases(cases, travels[name], wrong)
+    wrong.require_none()
+    return travels
+
+
+def check_cases(cases: Sequence[Case], travel: BodyMotion, wrong: Mistakes) -> None:
+    """Gather why these cases of one trajectory cannot be: `travel` is the trajectory's."""
+    trajectory = cases[0].variant["trajectory"]
+    with wrong.at("trajectories", trajectory):
+        _check_lasts(cases[0], travel)
+    for case, *_ in _by(cases, "scene", "rig").values():
+        with wrong.at("trajectories", trajectory):
+            _check_in_room(case, travel)
+            _check_smooth(case)
+    for camera, (case, *_) in _by(cases, "camera").items():
+        with wrong.at("cameras", camera):
+            _check_fits_frame(case)
+
+
+def _by(cases: Sequence[Case], *axes: str) -> dict[str, list[Case]]:
+    """The cases of each combination of variants on these axes."""
+    of = dict[str, list[Case]]()
+    for case in cases:
+        of.setdefault(" ".join(case.variant[axis] for axis in axes), []).append(case)
+    return of
+
+
+def _check_lasts(case: Case, travel: BodyMotion) -> None:
+    """Raise MotionError where there would be a single picture."""
+    if len(travel.t_ns) < 2:
+        raise MotionError(
+            f"the way ends within its first frame at {case.trajectory.rate_hz:g} Hz: one picture shows no motion; "
+            "go further, more slowly or with a higher rate_hz"
+        )
+
+
+def _check_smooth(case: Case) -> None:
+    if isinstance(case.trajectory, ReplaySpec) and case.trajectory.exact and case.rig.imu:
+        raise MotionError(
+            f"the IMU of rig '{case.variant['rig']}' would feel the noise of an exact replay; "
+            "leave exact out, or the IMU"
+        )
+
+
+def _check_fits_frame(case: Case) -> None:
+    """Raise MotionError where a picture would still be exposed or read out when the next one begins."""
+    camera, frame_ms = case.camera, 1e3 / case.trajectory.rate_hz
+    durations = {"exposure_ms": camera.exposure_ms, "readout_ms": camera.readout_ms or 0.0}
+    if camera.auto_exposure:
+        durations["auto_exposure.t_max_ms"] = camera.auto_exposure.t_max_ms
+    for key, lasts_ms in durations.items():
+        if lasts_ms > frame_ms:
+            raise MotionError(
+                f"{key} {lasts_ms:g} is longer than a frame of trajectory '{case.variant['trajectory']}', "
+                f"which lasts {frame_ms:.3g} ms at {case.trajectory.rate_hz:g} Hz"
+            )
+
+
+def _check_in_room(case: Case, travel: BodyMotion) -> None:
+    rig, room, T_world_body = case.build_rig(), case.scene.room, travel.at_frames().T_world_body
+    for T_body_camera in map(rig.T_body_camera, rig.sides):
+        at_m = (T_world_body @ T_body_camera)[:, :3, 3]
+        outside = ~room.holds(at_m)
+        is_under = at_m[np.argmax(outside), 2] <= 0
+        _refuse(case, travel, at_m, outside, "is under the floor" if is_under else f"leaves the room ({room.extent})")
+        for b in case.scene.boxes:
+            T_world_box = se3.transform(se3.rotation_z(np.deg2rad(b.yaw_deg)), b.center_m)
+            inside = _within(at_m, T_world_box, b.size_m)
+            _refuse(case, travel, at_m, inside, f"is inside the box of {b.material} at {b.center_m} m")
+        for spec, mover in zip(case.scene.movers, movers(case.scene), strict=True):
+            T_world_mover = np.stack([mover.path.pose(t_ns) for t_ns in travel.t_ns])
+            inside = _within(at_m, T_world_mover, spec.size_m)
+            _refuse(case, travel, at_m, inside, f"is inside the mover '{spec.name}'")
+
+
+def _within(at_m: Array, T_world_box: Array, size_m: tuple[float, float, float]) -> NDArray[np.bool_]:
+    """Which points (N, 3) are within a box around the origin of its frame, (4, 4) or (N, 4, 4)."""
+    in_box_m = se3.apply(se3.inverse(T_world_box), at_m[:, None])[:, 0]
+    within: NDArray[np.bool_] = np.all(np.abs(in_box_m) <= np.array(size_m) / 2, axis=-1)
+    return within
+
+
+def _refuse(case: Case, travel: BodyMotion, at_m: Array, wrong: NDArray[np.bool_], what: str) -> None:
+    """Raise MotionError for the first instant at which a camera is where it cannot be."""
+    if wrong.any():
+        first = int(np.flatnonzero(wrong)[0])
+        where = ", ".join(f"{x:.2f}" for x in at_m[first])
+        raise MotionError(
+            f"a camera of rig '{case.variant['rig']}' {what} of scene '{case.variant['scene']}' "
+            f"after {travel.t_ns[first] / 1e9:.1f} s, at ({where}) m"
+        )

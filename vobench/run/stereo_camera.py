@@ -1,0 +1,197 @@
+"""The stereo pair at work: light through the lens onto the chip, exposed by a shutter while the body moves."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench.geometry import se3
+from vobench.geometry.camera import Camera
+from vobench.geometry.rig import SIDES, Side
+from vobench.geometry.se3 import Array
+from vobench.render.geometry import RayCaster, inventory
+from vobench.render.renderer import Radiance, Renderer, View
+from vobench.run.motion import generator
+from vobench.scene.light import Steady
+from vobench.scene.scene import Scene
+from vobench.sensor.exposure import Exposure, ExposureState, ShutterKind, start, step, strips
+from vobench.sensor.image_sensor import NoiseStreams, expose, fixed_pattern
+from vobench.sensor.lens import lens_maps, through_lens
+from vobench.sensor.response import Grey
+from vobench.suite.suite import Case
+from vobench.trajectory.kinematics import Motion
+from vobench.trajectory.trajectory import Stamps
+
+# Rays that meet nothing look at the sky, which is as good as this far.
+FAR_M = 1e3
+GRID = (9, 7)
+
+
+class Displacement:
+    """Measures one scene's displacements, at a grid of pixels."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._at_rest = _Seen(scene, 0)
+
+    def largest_px(
+        self, camera: Camera, T_world_first: Array, T_world_last: Array, *, start_ns: int, end_ns: int
+    ) -> float:
+        """How far what the first pose sees at start_ns has moved for the last one at end_ns, in pixels, at most."""
+        rays = _grid_rays(camera) @ T_world_first[:3, :3].T
+        seen = _Seen(self._scene, start_ns) if self._scene.movers else self._at_rest
+        before = seen.points(T_world_first[:3, 3], rays)
+        after = seen.later(before, end_ns)
+        first, last = (
+            camera.project(se3.apply(se3.inverse(T), points.at_m))
+            for T, points in ((T_world_first, before), (T_world_last, after))
+        )
+        moved = np.linalg.norm(last - first, axis=-1)
+        return float(np.nanmax(moved)) if np.isfinite(moved).any() else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Points:
+    """Points at_m (K, 3), and the mover each is on, -1 for none."""
+
+    at_m: Array
+    mover: NDArray[np.int32]
+
+
+class _Seen:
+    """What rays meet in a scene at an instant; panes are seen through."""
+
+    def __init__(self, scene: Scene, t_ns: int) -> None:
+        held = inventory(scene, t_ns=t_ns)
+        self._scene, self._t_ns, self._mover = scene, t_ns, held.mover
+        self._caster = RayCaster(held.surfaces, np.flatnonzero(~held.pane))
+
+    def points(self, origin_m: Array, rays: Array) -> _Points:
+        """The ends of unit rays (K, 3) from one origin."""
+        hits = self._caster.hits(np.broadcast_to(origin_m, rays.shape), rays)
+        distance = np.nan_to_num(hits.distance, nan=FAR_M)[:, None]
+        return _Points(origin_m + distance * rays, np.where(hits.surface < 0, -1, self._mover[hits.surface]))
+
+    def later(self, points: _Points, t_ns: int) -> _Points:
+        """The same points of the same things at another instant."""
+        at_m = points.at_m.copy()
+        for index, mover in enumerate(self._scene.movers):
+            T_later_now = mover.path.pose(t_ns) @ se3.inverse(mover.path.pose(self._t_ns))
+            at_m[points.mover == index] = se3.apply(T_later_now, at_m[points.mover == index])
+        return _Points(at_m, points.mover)
+
+
+@lru_cache(maxsize=8)
+def _grid_rays(camera: Camera) -> Array:
+    """Rays (K, 3) through pixels spread over the whole picture, borders included, where the lens has any."""
+    u, v = np.meshgrid(np.linspace(0, camera.width_px - 1, GRID[0]), np.linspace(0, camera.height_px - 1, GRID[1]))
+    rays = camera.rays(np.stack([u, v], -1)).reshape(-1, 3)
+    return rays[np.isfinite(rays).all(1)]
+
+
+# Between two sub-frames, and between the first and last row of a strip, nothing should move further than this.
+SUB_FRAME_PX, STRIP_PX = 1.0, 0.25
+MOST_SUB_FRAMES = 32
+# Where lamps change in time, a strip has so few rows that it sees one phase of theirs.
+ROWS_UNDER_CHANGING_LIGHT = 4
+
+
+@dataclass(frozen=True, slots=True)
+class StereoPair:
+    """A stereo pair (H, W) uint8 each, and the exposure that both had."""
+
+    left: Grey
+    right: Grey
+    exposure: Exposure
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """What there is to see, who draws it, and the way through it."""
+
+    scene: Scene
+    renderer: Renderer
+    motion: Motion
+
+
+class StereoCamera:
+    """Both cameras of a case on the true rig; the exposure loop watches the left picture and sets both."""
+
+    def __init__(self, case: Case, world: World) -> None:
+        displacement = Displacement(world.scene)
+        self._left, self._right = (SimulatedCamera(case, side, world, displacement) for side in SIDES)
+        self._chip, self._loop = case.camera.build_chip(), case.camera.build_auto_exposure()
+        first = case.camera.build_exposure()
+        self._state = start(self._loop, first) if self._loop else ExposureState((first,))
+
+    def shoot(self, t_ns: int) -> StereoPair:
+        """The pictures stamped t_ns, the middle of their exposure; call in order of time."""
+        exposure = self._state.now
+        pair = StereoPair(self._left.picture(t_ns, exposure), self._right.picture(t_ns, exposure), exposure)
+        if self._loop:
+            self._state = step(self._loop, self._state, pair.left, self._chip.signal_of_grey)
+        return pair
+
+
+class SimulatedCamera:
+    """One camera: where it is, how its shutter cuts time, its lens, and its chip with noise of its own."""
+
+    def __init__(self, case: Case, side: Side, world: World, displacement: Displacement) -> None:
+        def stream(name: str) -> np.random.Generator:
+            return generator(case.seed, f"camera.{side}.{name}")
+
+        rig = case.build_true_rig()
+        self._camera, self._T_body_camera = rig.camera(side), rig.T_body_camera(side)
+        self._world, self._displacement = world, displacement
+        self._light_changes = not all(isinstance(light.level, Steady) for light in world.scene.lights)
+        self._shutter, self._blurs = case.camera.build_shutter(), case.camera.motion_blur
+        self._white_cd_m2, self._chip = np.float32(case.scene.white_cd_m2), case.camera.build_chip()
+        self._lens = lens_maps(case.camera.build_lens(), self._camera, stream("dirt"))
+        self._noise = NoiseStreams(stream("shot"), stream("read"))
+        shape = (self._camera.height_px, self._camera.width_px)
+        self._pattern = fixed_pattern(shape, self._chip, stream("pattern"))
+
+    def picture(self, t_ns: int, exposure: Exposure) -> Grey:
+        """The grey values (H, W) of a picture stamped t_ns."""
+        luminance_cd_m2 = self._world.renderer.radiance(self._camera, self.views(t_ns, exposure))
+        at_chip: Radiance = through_lens(luminance_cd_m2 / self._white_cd_m2, self._lens)
+        return expose(at_chip, self._chip, self._noise, pattern=self._pattern, exposure=exposure)
+
+    def views(self, t_ns: int, exposure: Exposure) -> list[View]:
+        """How the rows are exposed, in strips and sub-frames as fine as the motion asks for."""
+        height = self._camera.height_px
+        cut = strips(
+            height,
+            self._shutter,
+            t_ns,
+            exposure.time_s,
+            row_strips=self._row_strips(t_ns),
+            sub_frames=self._sub_frames(t_ns, exposure),
+        )
+        return [View(s.rows, self._seen_from(s.mid_ns), s.start_ns, s.end_ns) for s in cut]
+
+    def _sub_frames(self, t_ns: int, exposure: Exposure) -> int:
+        if not self._blurs:
+            return 1
+        moved_px = self._moved_px(t_ns, exposure.time_s)
+        return int(np.clip(np.ceil(moved_px / SUB_FRAME_PX), 1, MOST_SUB_FRAMES))
+
+    def _row_strips(self, t_ns: int) -> int:
+        height = self._camera.height_px
+        if self._shutter.kind is ShutterKind.GLOBAL:
+            return 1
+        least = -(-height // ROWS_UNDER_CHANGING_LIGHT) if self._light_changes else 1
+        moved_px = self._moved_px(t_ns, self._shutter.readout_s)
+        return int(np.clip(np.ceil(moved_px / STRIP_PX), least, height))
+
+    def _moved_px(self, t_ns: int, duration_s: float) -> float:
+        half_ns = round(duration_s * 1e9) // 2
+        start_ns, end_ns = t_ns - half_ns, t_ns + half_ns
+        first, last = self._seen_from(np.array([start_ns, end_ns]))
+        return self._displacement.largest_px(self._camera, first, last, start_ns=start_ns, end_ns=end_ns)
+
+    def _seen_from(self, t_ns: Stamps) -> Array:
+        """T_world_camera (K, 4, 4) at instants (K,)."""
+        T_world_camera: Array = self._world.motion.at(t_ns).T_world_body @ self._T_body_camera
+        return T_world_camera

@@ -1,0 +1,195 @@
+"""The store of finished results, addressed by a hash of all that they depend on; unfinished folders, progress."""
+
+import fcntl
+import hashlib
+import json
+import os
+import platform
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+from vobench import __version__, stop
+
+PREFIX = ".unfinished-"
+
+
+def why_unwritable(folder: Path) -> str:
+    """Why files cannot be made in a folder, which is made where it is missing; empty where they can."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        return str(error.strerror)
+    return "" if os.access(folder, os.W_OK) else "Permission denied"
+
+
+@contextmanager
+def unfinished(parent: Path) -> Iterator[Path]:
+    """An empty folder to fill and rename; one that keeps its name is gone after the block.
+
+    What killed processes left behind in `parent` is swept away first: a living one holds a lock.
+    """
+    parent.mkdir(parents=True, exist_ok=True)
+    _sweep(parent)
+    folder, lock = _locked(parent)
+    try:
+        with stop.undone(lambda: stop.remove(folder)):
+            yield folder
+    finally:
+        os.close(lock)
+
+
+def _locked(parent: Path) -> tuple[Path, int]:
+    """A new folder, and the descriptor whose lock ends with this process, however that ends."""
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
+        folder.chmod(0o755)
+        lock = os.open(folder, os.O_RDONLY)
+        with suppress(OSError):  # a file system without locks has no sweeping either
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        if folder.is_dir():
+            return folder, lock
+        os.close(lock)  # another process swept it between its making and its lock
+
+
+def _sweep(parent: Path) -> None:
+    for folder in parent.glob(f"{PREFIX}*"):
+        with suppress(OSError):
+            lock = os.open(folder, os.O_RDONLY)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(folder, ignore_errors=True)
+            finally:
+                os.close(lock)
+
+
+PACKAGE = Path(__file__).resolve().parents[1]
+
+
+class Store:
+    """Finished folders under a root; what is not finished is never seen under its final name."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    def path(self, kind: str, inputs: Mapping[str, Any]) -> Path:
+        """Where the result of these inputs lies, or will lie."""
+        return self.root / kind / digest(inputs)
+
+    def get(self, kind: str, inputs: Mapping[str, Any], build: Callable[[Path], None]) -> Path:
+        """The folder made from these inputs; `build` fills an empty one where there is none yet."""
+        stop.check()
+        final = self.path(kind, inputs)
+        if final.is_dir():
+            return final
+        with unfinished(final.parent) as folder:
+            build(folder)
+            (folder / "inputs.json").write_text(canonical(inputs), encoding="utf-8")
+            _publish(folder, final)
+        return final
+
+    def forget(self, kind: str, inputs: Mapping[str, Any]) -> None:
+        """Take the result of these inputs out of the store, in one step."""
+        final = self.path(kind, inputs)
+        if final.is_dir():
+            with unfinished(final.parent) as folder, suppress(FileNotFoundError):
+                final.rename(folder / "forgotten")
+
+
+def _publish(folder: Path, final: Path) -> None:
+    """Give a folder its final name; where another process was faster, both hold the same."""
+    try:
+        folder.rename(final)
+    except OSError:
+        if not final.is_dir():
+            raise
+
+
+def default_store() -> Store:
+    """$VOBENCH_CACHE, or vobench/ in the user's cache folder."""
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return Store(Path(os.environ.get("VOBENCH_CACHE") or home / "vobench"))
+
+
+def canonical(inputs: Mapping[str, Any]) -> str:
+    """JSON with sorted keys: the same text for the same content."""
+    return json.dumps(inputs, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False)
+
+
+def digest(inputs: Mapping[str, Any]) -> str:
+    """128 bits of SHA-256 over the canonical text, in hex."""
+    return hashlib.sha256(canonical(inputs).encode()).hexdigest()[:32]
+
+
+@cache
+def code_digest(*rooms: str) -> str:
+    """A hash of the source of these rooms of vobench: results of older code are not taken for new ones."""
+    return folder_digest(*(PACKAGE / room for room in rooms))
+
+
+def folder_digest(*folders: Path) -> str:
+    """A hash over names and contents of all files below these folders, compiled Python left out."""
+    state = hashlib.sha256()
+    for folder in folders:
+        for path in sorted(_files(folder)):
+            state.update(f"{path.relative_to(folder)}\0".encode())
+            state.update(hashlib.sha256(path.read_bytes()).digest())
+    return state.hexdigest()[:32]
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for place, folders, names in os.walk(folder, followlinks=True):
+        folders[:] = [name for name in folders if name != "__pycache__"]
+        yield from (path for name in names if (path := Path(place, name)).is_file())
+
+
+def versions(*libraries: str) -> dict[str, str]:
+    """What something is made with: the versions of vobench, Python and these distributions."""
+    return {"vobench": __version__, **library_versions(*libraries)}
+
+
+@cache
+def library_versions(*names: str) -> dict[str, str]:
+    """Versions of Python and of the installed distributions whose release can change a result's bytes."""
+    return {"python": platform.python_version(), **{name: version(name) for name in names}}
+
+
+Item = TypeVar("Item")
+
+
+class Progress(Protocol):
+    """Receives news of the work, for a bar on a terminal or for nobody."""
+
+    def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
+        """The same items; `total` of them are expected."""
+
+    def step(self, what: str) -> AbstractContextManager[Callable[[float], object]]:
+        """Work of unknown length, which may tell what share of it is done."""
+
+
+class SilentProgress:
+    """Nobody listens."""
+
+    def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
+        """The same items."""
+        del what, total
+        return iter(items)
+
+    def step(self, what: str) -> AbstractContextManager[Callable[[float], object]]:
+        """Nothing around the work."""
+        del what
+        return nullcontext(lambda _: None)
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """Where results are kept, and who hears of the work."""
+
+    store: Store
+    progress: Progress

@@ -1,0 +1,91 @@
+"""Whether a run is still what it says: files against their hashes, scores against estimates and truth."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from vobench import stop
+from vobench.errors import VobenchError
+from vobench.run import estimate as estimate_file
+from vobench.run.folder import GROUND_TRUTH, SEQUENCE, RunFolder, file_hash, read_hashes, read_score
+from vobench.run.score import left_truth, score_estimate
+from vobench.trajectory.formats import format_tum
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at: `wrong` says what is the matter with it, empty where nothing is."""
+
+    kind: str
+    what: str
+    wrong: str = ""
+
+
+def verify_run(folder: RunFolder) -> Iterator[Finding]:
+    """Recompute all hashes and scores of a run from its files. Raises InputError where the folder is no run."""
+    files, hashes = folder.score_files(), read_hashes(folder)
+    for name, held in hashes.items():
+        stop.check()
+        yield Finding("hash", name, _changed(folder.path / name, held))
+    for case in sorted({file.parents[3].name for file in files}):
+        yield Finding("ground truth", case, _truth_differs(folder.case(case)))
+    for file in files:
+        stop.check()
+        place = file.relative_to(folder.path)
+        _, case, _, estimator, repeat, _ = place.parts
+        wrong = _rescored(file) if str(place) in hashes else "not of this run, whose hashes do not name it"
+        yield Finding("score", f"{estimator} on {case}, {repeat}", wrong)
+
+
+def _changed(path: Path, held: str) -> str:
+    if not path.is_file():
+        gone = "gone from the cache; run the suite again to make it anew" if SEQUENCE in path.parts else "missing"
+        return f"the file is {gone}"
+    return "" if file_hash(path) == held else "not the bytes that the run wrote"
+
+
+def _truth_differs(case: Path) -> str:
+    """The path that was scored against, compared with that in the recording."""
+    link = case / SEQUENCE
+    if not link.exists():
+        return "its sequence is gone from the cache; run the suite again to make it anew"
+    try:
+        same = format_tum(left_truth(link)).encode() == (case / GROUND_TRUTH).read_bytes()
+    except (VobenchError, OSError) as error:
+        return str(error)
+    return "" if same else f"{GROUND_TRUTH} is not the path in its sequence"
+
+
+def _rescored(file: Path) -> str:
+    """A run's score, computed anew and compared digit by digit."""
+    try:
+        held = read_score(file)
+        gt = estimate_file.read_tum(file.parents[3] / GROUND_TRUTH)
+        scored = score_estimate(file.parent, gt)
+    except (VobenchError, OSError) as error:
+        return str(error)
+    anew = json.loads(json.dumps(scored.as_dict())) if scored else None
+    if anew == held.score:
+        return ""
+    return f"the score differs: {_difference(held.score, anew)}"
+
+
+def _difference(held: Any, anew: Any, place: str = "") -> str:
+    """Where two JSON values differ first, and how; empty where they don't."""
+    if isinstance(held, list) and isinstance(anew, list) and len(held) == len(anew):
+        named = ((str(row.get("name", at)) if isinstance(row, dict) else str(at)) for at, row in enumerate(held))
+        pairs = list(zip(named, held, anew, strict=True))
+    elif isinstance(held, dict) and isinstance(anew, dict) and held.keys() == anew.keys():
+        pairs = [(name, value, anew[name]) for name, value in held.items()]
+    else:
+        return "" if held == anew else f"{place or 'all of it'}: {_brief(held)} is {_brief(anew)} now"
+    found = (_difference(before, now, f"{place} {name}".strip()) for name, before, now in pairs)
+    return next(filter(None, found), "")
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, dict | list):
+        return f"{len(value)} entries"
+    return "none" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)

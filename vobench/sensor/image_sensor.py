@@ -1,0 +1,277 @@
+"""A camera's image sensor after EMVA 1288: photons to electrons to 8-bit grey values. Pure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from vobench.errors import InputError, RenderError
+from vobench.geometry.se3 import Array
+from vobench.sensor.exposure import Exposure
+from vobench.sensor.response import FULL_SCALE_DN, SRGB, Grey, Response, linear_of_grey, quantise
+
+# From this mean on the expansion below is off by less than 6e-4 in total variation, 1e-4 in variance and 1e-5 in mean.
+EXPANSION_FROM = 10.0
+# A Poisson count of mean 10 exceeds this with probability 1e-25.
+MOST_SMALL = 60
+
+
+def poisson(mean: Array, normal: Array) -> Array:
+    """Counts (...) of means (...), as float64: the quantile of each draw of a standard normal (...).
+
+    The draws don't depend on the light, so a brighter frame leaves the noise of the next one as it was.
+    Means of 10 or more by the expansion of the quantile in powers of 1/√mean, smaller ones by summing the distribution.
+    Source: Giles (2016), Algorithm 955, ACM TOMS 42(1), Q_N1.
+    """
+    counts = _expansion(mean, normal)
+    small = mean < EXPANSION_FROM
+    if small.any():
+        counts[small] = _summed(mean[small], scipy.special.ndtr(normal[small]))
+    return counts
+
+
+def _expansion(mean: Array, w: Array) -> Array:
+    """floor(mean + √mean w + 1/3 + w²/6 - (w³ + 2 w) / (72 √mean)), step by step in place, as pictures are large."""
+    root = np.sqrt(mean)
+    square = w * w
+    counts: Array = root * w
+    counts += mean
+    counts += 1 / 3
+    counts += square / 6
+    square += 2.0
+    square *= w
+    # Below 1 the sum takes over; this only keeps the division finite.
+    square /= 72 * np.maximum(root, 1.0, out=root)
+    counts -= square
+    np.floor(counts, out=counts)
+    # At mean 10, one draw in a million would come out at -1.
+    return np.maximum(counts, 0.0, out=counts)
+
+
+def _summed(mean: Array, probability: Array) -> NDArray[np.int8]:
+    """The smallest counts (M,) whose distribution function reaches the probabilities (M,)."""
+    counts, term = np.zeros(len(mean), np.int8), np.exp(-mean)
+    reached = term.copy()
+    for count in range(1, MOST_SMALL + 1):
+        beyond = probability > reached
+        if not beyond.any():
+            break
+        counts += beyond.view(np.int8)
+        term *= mean
+        term *= 1 / count
+        reached += term
+    return counts
+
+
+Radiance = NDArray[np.float32]
+# Grey value of radiance 1, matt white in the scene's own light: what a careful photographer would expose for.
+WHITE_DN = 200
+ADC_BITS = (8, 10, 12)
+# Pictures are exposed some rows at a time: what is needed on the way then stays in the processor's cache.
+PIXELS_AT_A_TIME = 1 << 15
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSensor:
+    """A chip, its electronics and its aperture; electrons saturate at `full_well_e`.
+
+    With an exposure of `nominal_s` and no gain, radiance 1 comes to 200 grey values; `exposure_gain` multiplies that
+    light. `prnu` (relative), `dsnu_e`, `column_e` and the hot pixels are fixed in time.
+    `adc_bits` none is a converter so fine that only the 8 bits kept are seen.
+    """
+
+    full_well_e: float = 20_000.0
+    exposure_gain: float = 1.0
+    nominal_s: float = 0.005
+    black_dn: float = 0.0
+    shot_noise: bool = False
+    read_noise_e: float = 0.0
+    prnu: float = 0.0
+    dsnu_e: float = 0.0
+    column_e: float = 0.0
+    dark_e_per_s: float = 0.0
+    hot_share: float = 0.0
+    hot_e_per_s: float = 20_000.0
+    adc_bits: int | None = None
+    response: Response = SRGB
+
+    def __post_init__(self) -> None:
+        for name in ("full_well_e", "exposure_gain", "nominal_s"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise InputError(f"{name} should be greater than 0, got {getattr(self, name)}")
+        for name in ("read_noise_e", "prnu", "dsnu_e", "column_e", "dark_e_per_s", "hot_e_per_s", "black_dn"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise InputError(f"{name} should be 0 or more, got {getattr(self, name)}")
+        if not 0 <= self.hot_share <= 1:
+            raise InputError(f"hot_share should be within 0 and 1, got {self.hot_share}")
+        if self.adc_bits not in (None, *ADC_BITS):
+            raise InputError(f"adc_bits should be 8, 10 or 12, got {self.adc_bits}")
+
+    @property
+    def nominal(self) -> Exposure:
+        """The exposure that the aperture is set for."""
+        return Exposure(self.nominal_s)
+
+    @property
+    def dn_per_electron(self) -> float:
+        """K of an exposure without gain: a full well is full scale."""
+        return FULL_SCALE_DN / self.full_well_e
+
+    @property
+    def white_e(self) -> float:
+        """mu_e of radiance 1 at the nominal exposure."""
+        share = self.response.decode(np.array(WHITE_DN / FULL_SCALE_DN))
+        return float(share) * self.full_well_e * self.exposure_gain
+
+    @property
+    def signal_of_grey(self) -> Array:
+        """Shares of full scale (256,) that light gives each grey value: what auto-exposure meters."""
+        return linear_of_grey(self.response) - self.black_dn / FULL_SCALE_DN
+
+
+# `clean` measures nothing but quantisation. Of the others, shot noise and the size of a converter are facts. Full wells
+# of the imx and of mt9m034 follow from the SNR in Balluff's tables (SNR = 10 log10 of it), read noise of the imx from
+# the dynamic range there. All else is this project's assumption about that class of chip, not its data sheet.
+CAMERAS = {
+    "clean": CameraSensor(),
+    # EuRoC's cameras
+    "mt9v034": CameraSensor(
+        shot_noise=True, read_noise_e=25.0, prnu=0.01, dsnu_e=10.0, column_e=2.0, dark_e_per_s=100.0, adc_bits=10
+    ),
+    # small pixels (3 µm) behind a global shutter: RealSense D435i, OAK-D
+    "ov9282": CameraSensor(
+        full_well_e=7_000.0,
+        shot_noise=True,
+        read_noise_e=5.0,
+        prnu=0.01,
+        dsnu_e=3.0,
+        column_e=1.0,
+        dark_e_per_s=50.0,
+        hot_share=1e-4,
+        adc_bits=10,
+    ),
+    # 3.75 µm behind a rolling shutter
+    "mt9m034": CameraSensor(
+        full_well_e=24_500.0,
+        shot_noise=True,
+        read_noise_e=10.0,
+        prnu=0.01,
+        dsnu_e=5.0,
+        column_e=2.0,
+        dark_e_per_s=50.0,
+        hot_share=1e-4,
+        adc_bits=12,
+    ),
+    # machine vision with large (5.86 µm) and middling (3.45 µm) pixels
+    "imx249": CameraSensor(
+        full_well_e=32_400.0, shot_noise=True, read_noise_e=7.0, prnu=0.005, dsnu_e=2.0, dark_e_per_s=5.0, adc_bits=12
+    ),
+    "imx255": CameraSensor(
+        full_well_e=10_700.0, shot_noise=True, read_noise_e=3.0, prnu=0.005, dsnu_e=1.0, dark_e_per_s=5.0, adc_bits=12
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseStreams:
+    """A generator for each kind of noise; each picture takes as many draws as any other, however bright it is."""
+
+    shot: np.random.Generator
+    read: np.random.Generator
+
+
+@dataclass(frozen=True, slots=True)
+class FixedPattern:
+    """What sets one pixel of a chip apart for good, all (H, W): relative gain, offset and dark current in electrons."""
+
+    gain: Array
+    offset_e: Array
+    dark_e_per_s: Array
+
+    def of(self, rows: slice) -> "FixedPattern":
+        """The pattern of some rows."""
+        return FixedPattern(self.gain[rows], self.offset_e[rows], self.dark_e_per_s[rows])
+
+
+def fixed_pattern(shape: tuple[int, int], sensor: CameraSensor, rng: np.random.Generator) -> FixedPattern:
+    """Draw one chip's pattern, once per camera; each effect has a child of `rng` of its own.
+
+    Hot pixels stay hot when more are asked for; their dark current is exponential with mean `hot_e_per_s`.
+    """
+    prnu, dsnu, column, hot = rng.spawn(4)
+    gain = 1 + sensor.prnu * prnu.standard_normal(shape)
+    offset_e = sensor.dsnu_e * dsnu.standard_normal(shape) + sensor.column_e * column.standard_normal(shape[1])
+    is_hot = hot.random(shape) < sensor.hot_share
+    hot_e_per_s = is_hot * sensor.hot_e_per_s * hot.standard_exponential(shape)
+    return FixedPattern(np.maximum(gain, 0.0), offset_e, sensor.dark_e_per_s + hot_e_per_s)
+
+
+def expose(
+    radiance: Radiance,
+    sensor: CameraSensor,
+    noise: NoiseStreams,
+    *,
+    pattern: FixedPattern | None = None,
+    exposure: Exposure | None = None,
+) -> Grey:
+    """One picture (H, W) of linear radiance (H, W), where 1 is matt white in the scene's own light.
+
+    Longer exposure is more electrons, gain only a larger K. Radiance is the mean over the exposure.
+    Raises RenderError for radiance that is negative or not a number. Source: EMVA 1288, release 3.1, section 2.
+    """
+    if not radiance.min() >= 0:
+        v, u = np.argwhere(~(radiance >= 0))[0]
+        raise RenderError(f"radiance must be 0 or more, got {radiance[v, u]} at pixel ({u}, {v})")
+    grey, step = np.empty(radiance.shape, np.uint8), max(1, PIXELS_AT_A_TIME // radiance.shape[1])
+    for first in range(0, len(radiance), step):
+        rows = slice(first, first + step)
+        local = pattern.of(rows) if pattern else None
+        grey[rows] = _expose_rows(radiance[rows], sensor, noise, local, exposure or sensor.nominal)
+    return grey
+
+
+def _expose_rows(
+    radiance: Radiance, sensor: CameraSensor, noise: NoiseStreams, pattern: FixedPattern | None, exposure: Exposure
+) -> Grey:
+    electrons = _collect(_mean_electrons(radiance, sensor, pattern, exposure), sensor, noise.shot)
+    if pattern is not None:
+        electrons += pattern.offset_e
+    if sensor.read_noise_e > 0:
+        electrons += sensor.read_noise_e * noise.read.standard_normal(electrons.shape)
+    return _convert(electrons, sensor, exposure)
+
+
+def _mean_electrons(
+    radiance: Radiance, sensor: CameraSensor, pattern: FixedPattern | None, exposure: Exposure
+) -> Array:
+    """mu_e (H, W), of light and of warmth."""
+    mean_e = radiance.astype(float)
+    mean_e *= sensor.white_e * (exposure.time_s / sensor.nominal_s)
+    if pattern is None:
+        return mean_e + sensor.dark_e_per_s * exposure.time_s
+    mean_e *= pattern.gain
+    mean_e += pattern.dark_e_per_s * exposure.time_s
+    return mean_e
+
+
+def _collect(mean_e: Array, sensor: CameraSensor, rng: np.random.Generator) -> Array:
+    """Electrons (H, W) in the wells: Poisson where shot noise is on, then saturation."""
+    if sensor.shot_noise:
+        # Twice a full well is as full as infinitely much.
+        mean_e = poisson(np.minimum(mean_e, 2 * sensor.full_well_e), rng.standard_normal(mean_e.shape))
+    return np.minimum(mean_e, sensor.full_well_e, out=mean_e)
+
+
+def _convert(electrons: Array, sensor: CameraSensor, exposure: Exposure) -> Grey:
+    """Grey values (H, W) of what the wells hold."""
+    electrons *= sensor.dn_per_electron * exposure.amplification
+    electrons += sensor.black_dn
+    electrons /= FULL_SCALE_DN
+    linear = np.clip(electrons, 0.0, 1.0, out=electrons)
+    if sensor.adc_bits is None:
+        return quantise(linear, sensor.response)
+    largest = (1 << sensor.adc_bits) - 1
+    linear *= largest
+    linear += 0.5
+    return quantise(np.arange(largest + 1) / largest, sensor.response).take(linear.astype(np.intp))

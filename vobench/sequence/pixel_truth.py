@@ -1,0 +1,90 @@
+"""Truth channels as ROS pictures: one topic for each camera and channel, raw, so that nothing is lost."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench.errors import SequenceError
+from vobench.geometry.camera import Camera
+from vobench.geometry.rig import SIDES, Side
+from vobench.sensor.pixel_truth import CHANNELS, Channel, TruthFrame, TruthNames
+from vobench.sequence.messages import LEFT, RIGHT, TYPES, Topic, header
+
+FRAME_IDS: dict[Side, str] = {"left": LEFT, "right": RIGHT}
+
+IMAGE = "sensor_msgs/msg/Image"
+MASK_IS_SET = 255  # what viewers show as white
+
+
+def truth_topic(side: Side, channel: str) -> Topic:
+    """The topic of one camera's channel."""
+    return Topic(f"/ground_truth/{FRAME_IDS[side]}/{channel}", IMAGE)
+
+
+def truth_topics(channels: Iterable[str] = tuple(CHANNELS), sides: Iterable[Side] = SIDES) -> tuple[Topic, ...]:
+    """The topics of some channels of some cameras, the left one's first."""
+    channels = tuple(channels)
+    return tuple(truth_topic(side, channel) for side in sides for channel in channels)
+
+
+def truth_image(t_ns: int, side: Side, channel: str, values: NDArray[np.generic]) -> Any:
+    """A sensor_msgs/Image of a channel's values (H, W) or (H, W, n); masks as 0 and 255."""
+    height, width = values.shape[:2]
+    pixels = values.astype(np.uint8) * np.uint8(MASK_IS_SET) if values.dtype == np.bool_ else values
+    data = np.ascontiguousarray(pixels).reshape(-1).view(np.uint8)
+    encoding, step = _encoding(CHANNELS[channel]), data.size // height
+    make: Any = TYPES.types[IMAGE]
+    return make(header(t_ns, FRAME_IDS[side]), height, width, encoding, 0, step, data)
+
+
+def truth_values(channel: str, message: Any) -> NDArray[np.generic]:
+    """A channel's values as they were written. Raises SequenceError where the picture is of another kind."""
+    kind = CHANNELS[channel]
+    stored = np.dtype(np.uint8 if kind.dtype is np.bool_ else kind.dtype).newbyteorder("<")
+    shape = kind.shape(message.height, message.width)
+    if message.encoding != _encoding(kind) or message.data.size != np.prod(shape) * stored.itemsize:
+        raise SequenceError(
+            f"truth channel {channel} should be {_encoding(kind)}, got {message.data.size} bytes of "
+            f"{message.height} × {message.width} {message.encoding}"
+        )
+    values: NDArray[np.generic] = message.data.view(stored).reshape(shape).astype(kind.dtype)
+    return values
+
+
+def check_truth(frame: TruthFrame, channels: tuple[str, ...], camera: Camera, side: Side) -> None:
+    """Raises SequenceError unless the frame has just these channels, in the camera's size and their own types."""
+    found = {name: (v.shape, v.dtype.name) for name, v in frame.channels().items()}
+    size = (camera.height_px, camera.width_px)
+    right = {name: (CHANNELS[name].shape(*size), np.dtype(CHANNELS[name].dtype).name) for name in channels}
+    for name in (*right, *found):
+        if found.get(name) != right.get(name):
+            raise SequenceError(
+                f"truth channel {name} of the {side} camera should be {right.get(name)}, got {found.get(name)}"
+            )
+
+
+def names_to_json(names: TruthNames) -> bytes:
+    """The names as the file that is attached to the truth."""
+    return json.dumps(asdict(names), ensure_ascii=False, indent=1).encode()
+
+
+def names_from_json(data: bytes) -> TruthNames:
+    """The names of an attached file. Raises SequenceError where it is none."""
+    try:
+        entries = json.loads(data)
+        return TruthNames(tuple(map(str, entries["instance"])), tuple(map(str, entries["material"])))
+    except (ValueError, KeyError, TypeError) as error:
+        raise SequenceError(
+            f"the names of the truth's ids are not lists of instances and materials: {error!r}"
+        ) from error
+
+
+def _encoding(channel: Channel) -> str:
+    """ROS's name for a pixel's type."""
+    if channel.dtype is np.bool_:
+        return "mono8"
+    return f"{'32F' if channel.dtype is np.float32 else '16U'}C{channel.depth}"

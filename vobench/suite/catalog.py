@@ -1,0 +1,115 @@
+"""One search order for scenes, suites and estimators; the first of a name wins.
+
+Beside the suite that asks, in <kind>s/ and then in its own folder; ./<kind>s/; <folder>/<kind>s/ for each folder of
+$VOBENCH_PATH; installed entry points (groups vobench.scenes, vobench.suites, vobench.estimators); what vobench
+brings along. A scene or suite is <name>.yaml, an estimator a folder <name>/ with an estimator.yaml.
+"""
+
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from glob import escape
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Literal
+
+from vobench.errors import UnknownNameError, unknown
+
+Kind = Literal["scene", "suite", "estimator"]
+KINDS: tuple[Kind, ...] = ("suite", "scene", "estimator")
+SUITE_KEY = re.compile(rb"^estimators\s*:", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """Something with a name, where it lies, and which stop of the search order it came from.
+
+    `path` is the YAML file of a scene or suite, the folder of an estimator.
+    """
+
+    kind: Kind
+    name: str
+    path: Path
+    origin: str
+
+
+def builtin_root() -> Path:
+    """The folder that holds the scenes, suites and estimators that vobench brings along."""
+    package = Path(__file__).resolve().parents[1]
+    wheel = package / "builtin"
+    return wheel if wheel.is_dir() else package.parent
+
+
+def entries(kind: Kind) -> list[Entry]:
+    """Everything of a kind, by name; where a name is there twice, the one that wins comes first."""
+    by_path: dict[Path, Entry] = {}
+    for entry in _all(kind):
+        by_path.setdefault(entry.path, entry)
+    return sorted(by_path.values(), key=lambda entry: entry.name)
+
+
+def find(kind: Kind, name: str, *, suite: Path | None = None) -> Entry:
+    """The entry of that name that wins; a path, which has a / or ends in .yaml, is taken as it is.
+
+    `suite` is the file that asks, beside which is looked first. Raises UnknownNameError with the nearest name and
+    all known ones.
+    """
+    path = Path(name)
+    if path.suffix in {".yaml", ".yml"} or "/" in name or os.sep in name:
+        return _at(kind, path, suite)
+    for entry in _all(kind, suite, name=name):
+        return entry
+    raise UnknownNameError(unknown(kind, name, _names(kind, suite)))
+
+
+def _at(kind: Kind, path: Path, suite: Path | None) -> Entry:
+    if kind == "estimator" and path.name == "estimator.yaml":
+        path = path.parent
+    wanted = path / "estimator.yaml" if kind == "estimator" else path
+    if not wanted.is_file():
+        known = ", ".join(_names(kind, suite)) or "none"
+        raise UnknownNameError(f"no {kind} file at {wanted}. Known by name: {known}")
+    return Entry(kind, path.resolve().name if kind == "estimator" else path.stem, path.resolve(), "path")
+
+
+def _names(kind: Kind, suite: Path | None) -> list[str]:
+    return sorted({entry.name for entry in _all(kind, suite)})
+
+
+def _all(kind: Kind, suite: Path | None = None, *, name: str | None = None) -> Iterator[Entry]:
+    """Every entry of a kind, or those of a name, in the order of search."""
+    if suite:
+        yield from _in_folder(kind, suite.parent / f"{kind}s", "beside the suite", name)
+        yield from (e for e in _in_folder(kind, suite.parent, "beside the suite", name) if not _is_suite(e.path))
+    yield from _in_folder(kind, Path(f"{kind}s"), f"./{kind}s", name)
+    for folder in filter(None, os.environ.get("VOBENCH_PATH", "").split(os.pathsep)):
+        yield from _in_folder(kind, Path(folder) / f"{kind}s", "$VOBENCH_PATH", name)
+    yield from (entry for entry in _installed(kind) if name in (None, entry.name))
+    yield from _in_folder(kind, builtin_root() / f"{kind}s", "built in", name)
+
+
+def _installed(kind: Kind) -> Iterator[Entry]:
+    for point in entry_points(group=f"vobench.{kind}s"):
+        spec = find_spec(point.value)
+        for folder in spec.submodule_search_locations or [] if spec else []:
+            path = Path(folder) if kind == "estimator" else Path(folder) / f"{point.name}.yaml"
+            yield Entry(kind, point.name, path, f"installed: {point.dist.name if point.dist else point.value}")
+
+
+def _in_folder(kind: Kind, folder: Path, origin: str, name: str | None) -> Iterator[Entry]:
+    if name in ("", ".", ".."):
+        return
+    named = "*" if name is None else escape(name)
+    if kind == "estimator":
+        paths = (manifest.parent for manifest in folder.glob(f"{named}/estimator.yaml"))
+    else:
+        paths = iter(folder.glob(f"{named}.yaml"))
+    for path in sorted(paths):
+        yield Entry(kind, path.name if kind == "estimator" else path.stem, path.resolve(), origin)
+
+
+def _is_suite(path: Path) -> bool:
+    """Whether this file is a suite, which may be called as its scene is: only suites have estimators."""
+    return path.is_file() and SUITE_KEY.search(path.read_bytes()) is not None

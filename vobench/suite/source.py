@@ -1,0 +1,104 @@
+"""What YAML may say of recordings made elsewhere."""
+
+import re
+from collections.abc import Iterator
+from glob import glob
+from pathlib import Path
+from typing import Any
+
+from vobench.errors import SuiteError
+from vobench.suite.yaml_file import Name, Positive, Strict
+
+FILE_KEYS = ("calibration", "imu", "truth")
+GLOB = re.compile(r"[*?\[]")
+
+
+class TopicsSpec(Strict):
+    """Which topics of a bag are meant, where its own names do not say so."""
+
+    left: str | None = None
+    right: str | None = None
+    left_info: str | None = None
+    right_info: str | None = None
+    truth: str | None = None
+    imu: str | None = None
+
+
+class SourceSpec(Strict):
+    """A recording, or several by a pattern: a sequence of vobench, a dataset's folder, or a bag.
+
+    Paths are relative to the suite's file; the form is told by content where it is not given. `calibration` and
+    `imu` are Kalibr's camchain.yaml and imu.yaml, `truth` a trajectory, `rate_hz` for pictures without stamps.
+    """
+
+    path: str
+    name: Name | None = None
+    form: str | None = None
+    calibration: str | None = None
+    imu: str | None = None
+    truth: str | None = None
+    rate_hz: Positive | None = None
+    topics: TopicsSpec = TopicsSpec()
+
+    def placed(self, path: Path, folder: Path) -> "SourceSpec":
+        """The source of one recording, its files where they are seen from everywhere."""
+        files = {key: getattr(self, key) for key in FILE_KEYS}
+        return self.model_copy(
+            update={
+                "path": str(path),
+                "name": self.name or case_name(path),
+                **{key: str(_placed(file, folder)) for key, file in files.items() if file},
+            }
+        )
+
+
+class RecordedCase(Strict):
+    """One recording that was made elsewhere; `variant` names it on the axis `source`.
+
+    `entry` is which of the suite's sources it is of.
+    """
+
+    name: str
+    variant: dict[str, str]
+    source: SourceSpec
+    entry: int = 0
+
+
+def as_sources(value: Any) -> Any:
+    """One path or mapping stands for a list of one; a bare path for a source with nothing else to say."""
+    entries = value if isinstance(value, tuple | list) else (value,)
+    return tuple({"path": entry} if isinstance(entry, str) else entry for entry in entries)
+
+
+def recorded_cases(spec: SourceSpec, folder: Path, *, entry: int = 0) -> Iterator[RecordedCase]:
+    """The cases of one source; `folder` is where relative paths start. Raises SuiteError where a pattern finds none."""
+    paths = _found(spec.path, folder)
+    if spec.name and len(paths) > 1:
+        raise SuiteError(f"{len(paths)} recordings match '{spec.path}', so one name '{spec.name}' is not enough")
+    for path in paths:
+        placed = spec.placed(path, folder)
+        name = placed.name or case_name(path)
+        yield RecordedCase(name=name, variant={"source": name}, source=placed, entry=entry)
+
+
+def case_name(path: Path) -> str:
+    """What a recording is called: its folder or file, in characters that are fit for a case; ASL's mav0 is no name."""
+    called = path.parent if path.name == "mav0" else path
+    stem = called.name if called.is_dir() else called.stem
+    return re.sub(r"[^a-z0-9_.]+", "_", stem.lower()).strip("_.") or "recording"
+
+
+def _found(written: str, folder: Path) -> list[Path]:
+    placed = _placed(written, folder)
+    if not GLOB.search(written):
+        if not placed.exists():
+            raise SuiteError(f"no folder or file at {placed}")
+        return [placed]
+    paths = sorted(map(Path, glob(str(placed), recursive=True)))
+    if not paths:
+        raise SuiteError(f"no folder or file matches {placed}")
+    return paths
+
+
+def _placed(written: str, folder: Path) -> Path:
+    return folder.resolve() / Path(written).expanduser()
