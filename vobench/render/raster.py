@@ -7,7 +7,7 @@ mirrors. Here each pixel is the mean of four samples of linear light, read back 
 from collections.abc import Sequence
 
 from vobench.geometry.camera import Camera
-from vobench.render import opengl
+from vobench.render import egl
 from vobench.render.bake import BakedScene
 from vobench.render.renderer import Radiance, View
 
@@ -16,7 +16,7 @@ class RasterRenderer:
     """Pictures of a baked scene by OpenGL. One per process is enough."""
 
     def __init__(self, baked: BakedScene) -> None:
-        self._platform = opengl.context()
+        self._platform = egl.context()
         # Imported late: they need the context's library to be loadable.
         from vobench.render.frame import FrameRenderer
 
@@ -31,4 +31,4 @@ class RasterRenderer:
         """Free the OpenGL context and all in it."""
         self._platform.make_current()
         self._studio.delete()
-        opengl.release(self._platform)
+        egl.release(self._platform)

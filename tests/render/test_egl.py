@@ -10,7 +10,7 @@ import pytest
 
 import vobench.render
 from vobench.errors import MissingDependencyError
-from vobench.render import opengl
+from vobench.render import egl
 
 # Hides X11's libraries, by name as ctypes finds them and by file as it loads them, then imports modules.
 WITHOUT_X11 = """
@@ -54,16 +54,16 @@ def test_missing_libraries_are_named_with_the_line_that_installs_them(monkeypatc
     monkeypatch.setattr(ctypes.util, "find_library", lambda name: None)
     monkeypatch.setitem(sys.modules, "pyrender.platforms.egl", None)
     with pytest.raises(MissingDependencyError) as caught:
-        opengl.context()
+        egl.context()
     message = str(caught.value)
     assert "missing libEGL, libGL, libOpenGL" in message
-    assert message.endswith(opengl.EGL_REMEDY)
+    assert message.endswith(egl.EGL_REMEDY)
     assert "\n" not in message
 
 
 def test_only_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ctypes.util, "find_library", lambda name: None if name == "EGL" else f"lib{name}.so.1")
-    assert opengl.missing_libraries() == ["EGL"]
+    assert egl.missing_libraries() == ["EGL"]
 
 
 def test_a_driver_that_fails_is_one_line_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,9 +76,9 @@ def test_a_driver_that_fails_is_one_line_too(monkeypatch: pytest.MonkeyPatch) ->
     with pytest.raises(
         MissingDependencyError, match=r"EGL says AssertionError: eglInitialize returned 0\); run: apt-get"
     ):
-        opengl.context()
+        egl.context()
 
 
 def test_a_machine_that_can_draw_lacks_nothing() -> None:
-    assert opengl.missing_libraries() == []
-    opengl.release(opengl.context())
+    assert egl.missing_libraries() == []
+    egl.release(egl.context())
