@@ -4,14 +4,15 @@ import csv
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, get_args
 
 from vobench.analysis.diagnose import Finding, diagnose
 from vobench.cli import terminal
 from vobench.errors import AlignmentError, InputError, UnknownNameError, unknown
-from vobench.metric.definitions import DEFINITIONS, MetricDefinition
+from vobench.metric.comparison import MetricDefinition
+from vobench.metric.definitions import DEFINITIONS
 from vobench.metric.score import Score, pooled, score
 from vobench.metric.settings import LIKE, PAIRS_OF_RULE, Plane, ScoreSettings, Side, Unit
 from vobench.run.trajectory_pair import TrajectorySource, read_pair
@@ -26,10 +27,10 @@ def show_metrics(metric: str | None, *, as_json: bool) -> None:
         return
     found = _find(metric)
     if as_json:
-        terminal.print_json(asdict(found))
+        terminal.print_json(found.as_dict())
         return
     out = terminal.console()
-    for name, value in asdict(found).items():
+    for name, value in found.as_dict().items():
         stated = ", ".join(value) if isinstance(value, tuple) else str(value)
         out.print(f"{name:9}  {stated}", soft_wrap=True)
 
@@ -37,7 +38,7 @@ def show_metrics(metric: str | None, *, as_json: bool) -> None:
 def _show_all(*, as_json: bool) -> None:
     definitions = list(DEFINITIONS.values())
     if as_json:
-        terminal.print_json({"metrics": [asdict(definition) for definition in definitions]})
+        terminal.print_json({"metrics": [definition.as_dict() for definition in definitions]})
         return
     rows = [[d.id, d.unit, d.headline, d.title, "--full" if d.full else ""] for d in definitions]
     terminal.console().print(terminal.table("", ["metric", "unit", "headline", "is", "with"], rows))
