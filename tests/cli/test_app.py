@@ -11,14 +11,14 @@ import pytest
 
 from vobench import __version__
 from vobench.cli import main
-from vobench.cli.app import app
+from vobench.cli.app import VERBS
 from vobench.errors import UnknownNameError
 
 # ruff: noqa: E501 - a sentence stands in one line
 
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-COMMANDS = [command.name or command.callback.__name__ for command in app.registered_commands]
+COMMANDS = list(VERBS)
 HEAVY = ("numpy", "cv2", "pandas", "rerun", "scipy", "pydantic", "rich.table", "OpenGL", "trimesh")
 GT, EST = (
     "runs/tiny/latest/cases/short/ground_truth.tum",
@@ -35,6 +35,37 @@ def test_help_imports_no_heavy_library():
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1].strip() == "heavy:"
     assert "Usage: vobench" in done.stdout
+
+
+OUTSIDE = """
+import numpy as np
+from vobench.metric.comparison import POSES, MetricDefinition
+
+def greet(name: str = "you", *, json: bool = False) -> None:
+    \"\"\"Say hello.\"\"\"
+    print('{"hello": "%s"}' % name if json else f"hello {name}")
+
+HEIGHT = MetricDefinition(
+    "ate_height", "height", "m", "|z|", "a test", POSES, "the floor",
+    measure=lambda of: np.abs(of.T_aligned[:, 2, 3] - of.matched.T_gt[:, 2, 3]),
+)
+"""
+
+
+def test_a_verb_and_a_metric_from_outside_are_there_once_they_are_installed(vobench, ran, tmp_path, monkeypatch):
+    site = tmp_path / "site"
+    (site / "outside-1.dist-info").mkdir(parents=True)
+    (site / "outside.py").write_text(OUTSIDE)
+    (site / "outside-1.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: outside\nVersion: 1\n")
+    groups = "[vobench.commands]\ngreet = outside:greet\n[vobench.metrics]\nheight = outside:HEIGHT\n"
+    (site / "outside-1.dist-info" / "entry_points.txt").write_text(groups)
+    assert vobench("greet").code == 2
+    monkeypatch.syspath_prepend(str(site))
+    assert vobench("greet", "--name", "Ada", "--json").json == {"hello": "Ada"}
+    assert "Say hello." in vobench("--help").out
+    assert vobench("metrics", "ate_height", "--json").json["unit"] == "m"
+    assert "ate_height" in [metric["name"] for metric in vobench("score", GT, EST, "--full", "--json").json["metrics"]]
+    assert "ate_height" not in vobench("score", GT, EST).out
 
 
 def test_every_command_is_in_the_readmes_table_and_the_table_has_no_other():

@@ -8,7 +8,7 @@ import pytest
 
 import vobench
 from vobench.errors import InputError
-from vobench.metric.score import compare
+from vobench.metric.comparison import compare
 from vobench.sequence import Sequence
 from vobench.trajectory.formats import format_tum
 

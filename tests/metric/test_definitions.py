@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from vobench.errors import AlignmentError, InputError
 from vobench.geometry import se3
+from vobench.metric.comparison import POSES, MetricDefinition
 from vobench.metric.definitions import DEFINITIONS, identity, parse_identity
 from vobench.metric.score import score
 from vobench.metric.settings import LIKE, ScoreSettings, settled
@@ -42,7 +43,6 @@ def test_a_definition_is_complete_and_names_settings_that_there_are(name):
 
 
 LENGTHS = st.floats(1e-6, 1e6)
-HEADLINES = sorted(f"{d.identity}.{d.headline}" for d in DEFINITIONS.values())
 COMMON = {
     "alignment": st.sampled_from(["none", "origin", "se3", "sim3", "scale", "yaw"]),
     "align_n": st.none() | st.integers(1, 10**6),
@@ -66,11 +66,11 @@ OF_SEGMENTS = {
     "segment_mean": st.sampled_from(["micro", "macro"]),
 }
 FAMILIES = [
-    ("ate.trans.rmse", {}),
-    ("rpe.rot.rmse", OF_RPE),
-    ("kitti.t_rel.mean", OF_SEGMENTS),
-    ("lost.aware.score", {"fail_ratio": st.floats(1e-3, 1e3), "coverage_of": st.sampled_from(["auto", "frames"])}),
-    ("rel.yaw.rmse", {"relative_rule": st.sampled_from(["rpg", "openvins"])}),
+    ("ate_trans", {}),
+    ("rpe_rot", OF_RPE),
+    ("kitti_t_rel", OF_SEGMENTS),
+    ("lost_aware", {"fail_ratio": st.floats(1e-3, 1e3), "coverage_of": st.sampled_from(["auto", "frames"])}),
+    ("rel_yaw", {"relative_rule": st.sampled_from(["rpg", "openvins"])}),
 ]
 
 
@@ -78,23 +78,25 @@ FAMILIES = [
 @given(data=st.data(), n=st.integers(0, 10**9), of=st.integers(0, 10**9))
 def test_an_identity_reads_back_as_the_settings_it_was_made_of(metric, own, data, n, of):
     settings = ScoreSettings(**{name: data.draw(values) for name, values in (COMMON | own).items()})
-    back = parse_identity(identity(metric, settings, n=n, of=of))
-    assert (back.metric, back.settings, back.n, back.of) == (metric, settings, n, of)
+    defined = DEFINITIONS[metric]
+    back = parse_identity(identity(defined, settings, n=n, of=of))
+    assert back.metric == f"{defined.identity}.{defined.headline}"
+    assert (back.settings, back.n, back.of) == (settings, n, of)
 
 
 @pytest.mark.parametrize("like", sorted(LIKE))
-@pytest.mark.parametrize("metric", HEADLINES)
-def test_every_metric_of_every_tool_has_an_identity_that_reads_back(metric, like):
-    text = identity(metric, settled(LIKE[like], 10.0), n=7, of=9)
-    back = parse_identity(text)
-    assert identity(back.metric, back.settings, n=back.n, of=back.of) == text
+def test_every_metric_of_every_tool_has_an_identity_that_reads_back(like):
+    for defined in DEFINITIONS.values():
+        text = identity(defined, settled(LIKE[like], 10.0), n=7, of=9)
+        back = parse_identity(text)
+        assert identity(defined, back.settings, n=back.n, of=back.of) == text
 
 
 def test_an_identity_looks_like_this():
     settings = replace(ScoreSettings(), align_n=100, offset_ns=-1_500_000)
     text = "ate.trans.rmse[align=se3/first100; assoc=nearest<=10ms; offset=-1.5ms; n=785/798]"
-    assert identity("ate.trans.rmse", settings, n=785, of=798) == text
-    assert identity("ate.trans.rmse", ScoreSettings(), n=785, of=798) == (
+    assert identity(DEFINITIONS["ate_trans"], settings, n=785, of=798) == text
+    assert identity(DEFINITIONS["ate_trans"], ScoreSettings(), n=785, of=798) == (
         "ate.trans.rmse[align=se3; assoc=nearest<=10ms; n=785/798]"
     )
 
@@ -131,3 +133,23 @@ def test_segments_suit_the_path_unless_they_are_given():
     assert (kitti.segment_lengths_m[-1], kitti.segment_step_frames) == (800.0, 10)
     given_m = settled(ScoreSettings(segment_lengths_m=(7.0,), segment_step_frames=3), 3000.0)
     assert (given_m.segment_lengths_m, given_m.segment_step_frames) == ((7.0,), 3)
+
+
+def test_a_metric_from_outside_is_one_definition():
+    height = MetricDefinition(
+        "ate_height",
+        "error of the height alone",
+        "m",
+        "|z of p_est - p_gt|",
+        "a test",
+        POSES,
+        "errors along the floor",
+        full=False,
+        measure=lambda of: np.abs(of.T_aligned[:, 2, 3] - of.matched.T_gt[:, 2, 3]),
+    )
+    raised = Trajectory(PATH.t_ns, PATH.T_world_frame.copy())
+    raised.T_world_frame[:, 2, 3] += 0.25
+    found = score(PATH, raised, settings=ScoreSettings(alignment="none"), metrics=[*DEFINITIONS.values(), height])
+    metric = found.metric("ate_height")
+    assert (metric.unit, metric.statistics.n, metric.statistics.rmse) == ("m", N, pytest.approx(0.25))
+    assert metric.id == f"ate.height.rmse[align=none; assoc=nearest<=10ms; n={N}/{N}]"

@@ -14,7 +14,7 @@ from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.metric import ate
 from vobench.metric import rpe as pairs_module
-from vobench.metric.ate import in_plane, roll_pitch_yaw_rad
+from vobench.metric.comparison import in_plane
 from vobench.metric.rpe import (
     distance_errors,
     part_errors,
@@ -193,7 +193,7 @@ def circle(n=N, radius_m=5.0):
 def test_roll_pitch_and_yaw_make_the_rotation_again(seed):
     q = np.random.default_rng(seed).normal(size=(20, 4))
     R = se3.from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
-    roll, pitch, yaw = roll_pitch_yaw_rad(R).T
+    roll, pitch, yaw = se3.roll_pitch_yaw_rad(R).T
     Ry = rotation_x(pitch)[..., [2, 0, 1], :][..., [2, 0, 1]]
     np.testing.assert_allclose(se3.rotation_z(yaw) @ Ry @ rotation_x(roll), R, atol=1e-12)
 
@@ -201,7 +201,7 @@ def test_roll_pitch_and_yaw_make_the_rotation_again(seed):
 @pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2])
 def test_where_roll_and_yaw_are_one_yaw_has_it_all(pitch):
     Ry = rotation_x(pitch)[[2, 0, 1], :][:, [2, 0, 1]]
-    roll, found, yaw = roll_pitch_yaw_rad(se3.rotation_z(0.3) @ Ry)
+    roll, found, yaw = se3.roll_pitch_yaw_rad(se3.rotation_z(0.3) @ Ry)
     assert (roll, found, yaw) == pytest.approx((0.0, pitch, 0.3))
 
 

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vobench.geometry import se3
-from vobench.metric.scale import ate_scale, motion_scale, scale_errors
+from vobench.metric.comparison import ate_scale, motion_scale
+from vobench.metric.scale import scale_errors
 from vobench.metric.score import ScoreSettings, score
 from vobench.trajectory.align import align
 from vobench.trajectory.trajectory import Trajectory

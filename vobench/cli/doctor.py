@@ -7,6 +7,9 @@ import subprocess
 import sys
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
+from typing import Annotated
+
+import typer
 
 from vobench import stop
 from vobench.cli import terminal
@@ -120,3 +123,12 @@ def _path_tracing() -> Check:
         result, _, remedy = str(error).partition("; run: ")
         return Check("path tracing (Mitsuba)", False, f"{result}; run: {_as_we_are(remedy)}", _as_we_are(remedy), True)
     return Check("path tracing (Mitsuba)", True, f"works with {library}", optional=True)
+
+
+def doctor_command(
+    *,
+    fix: Annotated[bool, typer.Option("--fix", help="Install what is missing, where we may.")] = False,
+    json: terminal.Json = False,
+) -> None:
+    """Say what this machine lacks, and the command that mends it."""
+    show(fix=fix, as_json=json)

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from vobench.cli import terminal
 from vobench.errors import InputError, UnknownNameError, unknown
@@ -169,3 +170,16 @@ def _csv(driven: Driven) -> str:
     columns = np.concatenate([T[:, :3, 3], q_xyzw, body.twist, body.acceleration_mps2], -1)
     rows = zip(driven.travel.t_ns.tolist(), columns.tolist(), strict=True)
     return "".join([f"{CSV_COLUMNS}\n", *(f"{t},{','.join(map(repr, row))}\n" for t, row in rows)])
+
+
+def drive_command(
+    suite: terminal.SuiteName,
+    *,
+    trajectory: Annotated[str | None, typer.Option("--trajectory", "-t", help="Only this one of the suite's.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Plot paths and speeds to this .svg, .png or .pdf.")] = None,
+    tum: Annotated[Path | None, typer.Option(help="Write the body's true path of one trajectory, as TUM.")] = None,
+    csv: Annotated[Path | None, typer.Option(help="The same with velocities and accelerations, as CSV.")] = None,
+    json: terminal.Json = False,
+) -> None:
+    """Drive a suite's trajectories without rendering: a summary, and plots."""
+    show(suite, trajectory, out=out, tum=tum, csv=csv, as_json=json)

@@ -1,7 +1,9 @@
 """vobench list."""
 
 import re
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from vobench.cli import terminal
 from vobench.errors import UnknownNameError, VobenchError, unknown
@@ -81,3 +83,14 @@ def _checked_summary(entry: Entry) -> str:
     if entry.kind == "scene":
         return read_scene(entry.path).summary
     return yaml_file.read(entry.path, Suite).summary
+
+
+def list_command(
+    kind: Annotated[
+        str | None, typer.Argument(metavar="[suites|scenes|estimators]", help="All where left out.")
+    ] = None,
+    *,
+    json: terminal.Json = False,
+) -> None:
+    """List the suites, scenes and estimators that can be found, and where."""
+    show(kind, as_json=json)

@@ -4,8 +4,10 @@ from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 
 from vobench.cli import terminal
 from vobench.errors import InputError, UnknownNameError, unknown
@@ -135,3 +137,29 @@ def _write_truth(out: Path, scene: Scene, camera: Camera, viewpoint: Viewpoint) 
     arrays = out.with_suffix(".truth.npz")
     np.savez_compressed(arrays, allow_pickle=False, **channels)
     yield arrays
+
+
+def render_command(
+    scene: Annotated[str, typer.Argument(metavar="SCENE", help="A scene's name, or a path to its YAML.")],
+    *,
+    out: Annotated[Path, typer.Option(help="The picture to write.")] = Path("frame.png"),
+    camera: Annotated[str, typer.Option(help="The left lens of this rig preset.")] = "paper_blender",
+    at: Annotated[tuple[float, float, float], typer.Option(metavar="X Y Z", help="Where it stands, in metres.")] = (
+        0.0,
+        0.0,
+        1.2,
+    ),
+    yaw: Annotated[float, typer.Option(help="Where it looks, in degrees: 0 along x, 90 along y.")] = 0.0,
+    pitch: Annotated[float, typer.Option(help="How far below the horizon it looks, in degrees.")] = 10.0,
+    time: Annotated[float, typer.Option(help="When, in seconds; lights and things may move.")] = 0.0,
+    sensor: Annotated[str, typer.Option(help="The chip behind the lens.")] = "clean",
+    gain: Annotated[float, typer.Option(min=1e-6, help="Multiplies the exposure.")] = 1.0,
+    engine: Annotated[str, typer.Option(help="raster, or path for Mitsuba's path tracer.")] = "raster",
+    samples: Annotated[int | None, typer.Option(help="Light paths a pixel, for --engine path alone.")] = None,
+    truth: Annotated[bool, typer.Option("--truth", help="Write ground truth beside the picture.")] = False,
+    json: terminal.Json = False,
+) -> None:
+    """Draw one picture of a scene, to look at and to debug scenes with."""
+    viewpoint = Viewpoint(at, yaw, pitch, time)
+    look = Look(camera, sensor, gain, engine, samples)
+    show(scene, viewpoint, look, out=out, truth=truth, as_json=json)

@@ -1,6 +1,9 @@
 """vobench report and verify."""
 
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from vobench.cli import terminal
 from vobench.cli.boards import print_boards
@@ -71,3 +74,25 @@ def _print_verified(findings: list[Finding], wrong: list[Finding]) -> None:
     for kind in dict.fromkeys(f.kind for f in findings):
         of_kind = [f for f in findings if f.kind == kind]
         out.print(f"{kind}: {sum(not f.wrong for f in of_kind)} of {len(of_kind)} as they were")
+
+
+def report_command(
+    run: terminal.RunPath,
+    *,
+    form: Annotated[
+        str | None, typer.Option("--format", help="terminal, md, csv, json, latex or html; --out's ending says it too.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Write to this file instead of the terminal.")] = None,
+    json: terminal.Json = False,
+) -> None:
+    """Print a run's leaderboard, in any form."""
+    show_report(run, form=form, out=out, as_json=json)
+
+
+def verify_command(
+    run: terminal.RunPath,
+    *,
+    json: terminal.Json = False,
+) -> None:
+    """Recompute all hashes and scores of a run from its files; exit code 1 where anything differs."""
+    show_verification(run, as_json=json)

@@ -4,7 +4,9 @@ import shutil
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from vobench.cli import terminal
 from vobench.errors import InputError
@@ -127,3 +129,26 @@ def _recorded_facts(case: RecordedCase, recording: "Recording") -> dict[str, Any
         "sequence": "in the cache" if is_there else f"to import from {case.source.path}",
         "notes": list(recording.notes),
     }
+
+
+def run_command(
+    suite: terminal.SuiteName,
+    *,
+    estimator: Annotated[
+        list[str] | None, typer.Option("--estimator", "-e", help="Run only this one; may be given several times.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Where the folders of runs go.")] = Path("runs"),
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
+    json: terminal.Json = False,
+) -> None:
+    """Run a suite: simulate, estimate, score, and print the leaderboard."""
+    names = tuple(estimator or ())
+    if dry_run:
+        check(suite, names, as_json=json)
+    else:
+        run(suite, names, out=out, as_json=json)
+
+
+def check_command(suite: terminal.SuiteName, *, json: terminal.Json = False) -> None:
+    """Validate a suite and print its plan; nothing is rendered."""
+    check(suite, (), as_json=json)

@@ -1,43 +1,75 @@
 """vobench score, diagnose and metrics."""
 
-import csv
+import csv as csv_module
 import shlex
 import sys
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, get_args
+from typing import Annotated, Any
+
+import typer
 
 from vobench.analysis.diagnose import Finding, diagnose
 from vobench.cli import terminal
 from vobench.errors import AlignmentError, InputError, UnknownNameError, unknown
-from vobench.metric.definitions import DEFINITIONS, MetricDefinition
+from vobench.metric.comparison import MetricDefinition
+from vobench.metric.definitions import DEFINITIONS
 from vobench.metric.score import Score, pooled, score
-from vobench.metric.settings import LIKE, PAIRS_OF_RULE, Plane, ScoreSettings, Side, Unit
+from vobench.metric.settings import CHOICES, LIKE, PAIRS_OF_RULE, ScoreSettings
 from vobench.run.trajectory_pair import TrajectorySource, read_pair
-from vobench.trajectory.align import Kind
-from vobench.trajectory.associate import Method
+
+GROUP = "vobench.metrics"  # of entry points, each a MetricDefinition
+
+Gt = Annotated[Path, typer.Argument(metavar="GT", help="Ground truth: a file of any form, or a sequence's folder.")]
+Est = Annotated[
+    Path,
+    typer.Argument(metavar="EST", help="Estimate: TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, by content."),
+]
+Topic = Annotated[str | None, typer.Option(help="The topic with the poses, or /tf:parent.child.")]
+As = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="s|ms|us|ns, xyzw|wxyz, inverse, rotations:inverse, axes:z,-x,-y, positions:y,x,z or "
+        "mount:x,y,z,qx,qy,qz,qw; repeatable."
+    ),
+]
+Times = Annotated[
+    list[Path] | None,
+    typer.Option(help="Stamps in seconds, one a line, for files without (KITTI); repeatable: each takes what fits it."),
+]
 
 
-def show_metrics(metric: str | None, *, as_json: bool) -> None:
-    """Print every metric in a line, or all there is to say of one; ids of scores are taken as well."""
+def metrics_command(
+    metric: Annotated[str | None, typer.Argument(metavar="[ID]", help="All where left out.")] = None,
+    *,
+    json: terminal.Json = False,
+) -> None:
+    """Define a metric: formula, source, settings, and what it cannot see."""
     if metric is None:
-        _show_all(as_json=as_json)
+        _show_all(as_json=json)
         return
     found = _find(metric)
-    if as_json:
-        terminal.print_json(asdict(found))
+    if json:
+        terminal.print_json(found.as_dict())
         return
     out = terminal.console()
-    for name, value in asdict(found).items():
+    for name, value in found.as_dict().items():
         stated = ", ".join(value) if isinstance(value, tuple) else str(value)
         out.print(f"{name:9}  {stated}", soft_wrap=True)
 
 
+def _definitions() -> list[MetricDefinition]:
+    """Our own metrics, and those installed as entry points."""
+    installed = [point.load() for point in entry_points(group=GROUP)]
+    return [*DEFINITIONS.values(), *(metric for metric in installed if metric.id not in DEFINITIONS)]
+
+
 def _show_all(*, as_json: bool) -> None:
-    definitions = list(DEFINITIONS.values())
+    definitions = _definitions()
     if as_json:
-        terminal.print_json({"metrics": [asdict(definition) for definition in definitions]})
+        terminal.print_json({"metrics": [definition.as_dict() for definition in definitions]})
         return
     rows = [[d.id, d.unit, d.headline, d.title, "--full" if d.full else ""] for d in definitions]
     terminal.console().print(terminal.table("", ["metric", "unit", "headline", "is", "with"], rows))
@@ -45,13 +77,11 @@ def _show_all(*, as_json: bool) -> None:
 
 def _find(metric: str) -> MetricDefinition:
     """The definition of a metric's name, or of the start of an id such as ate.trans.rmse[…]."""
-    if metric.lower() in DEFINITIONS:
-        return DEFINITIONS[metric.lower()]
-    stem = metric.partition("[")[0]
-    for definition in DEFINITIONS.values():
-        if definition.identity in (stem, stem.rpartition(".")[0]):
+    stem, known = metric.partition("[")[0], _definitions()
+    for definition in known:
+        if definition.id == metric.lower() or definition.identity in (stem, stem.rpartition(".")[0]):
             return definition
-    raise UnknownNameError(unknown("metric", metric, list(DEFINITIONS)))
+    raise UnknownNameError(unknown("metric", metric, [definition.id for definition in known]))
 
 
 WITHOUT_OPTION = {
@@ -60,8 +90,23 @@ WITHOUT_OPTION = {
 }
 
 
-def show_diagnosis(gt: TrajectorySource, est: TrajectorySource, *, times: Sequence[Path], as_json: bool) -> None:
-    """Print what is wrong between two trajectories, its evidence, and the command that scores without it."""
+def diagnose_command(
+    gt: Gt,
+    est: Est,
+    *,
+    gt_topic: Topic = None,
+    est_topic: Topic = None,
+    gt_as: As = None,
+    est_as: As = None,
+    times: Times = None,
+    json: terminal.Json = False,
+) -> None:
+    """Say what is wrong between two trajectories (frames, axes, scale, clocks, quaternions), and what mends it."""
+    truth = TrajectorySource(gt, gt_topic, tuple(gt_as or ()))
+    _show_diagnosis(truth, TrajectorySource(est, est_topic, tuple(est_as or ())), times=times or (), as_json=json)
+
+
+def _show_diagnosis(gt: TrajectorySource, est: TrajectorySource, *, times: Sequence[Path], as_json: bool) -> None:
     pair = read_pair(gt, est, times=times, any_unit=True)
     findings = diagnose(pair.gt, pair.est)
     is_unrelated = any(finding.fault == "unrelated" for finding in findings)
@@ -129,6 +174,14 @@ def _print_diagnosis(content: dict[str, Any]) -> None:
         out.print(f"all of it: {content['command']}", soft_wrap=True)
 
 
+# Settings that are one of a few names, and what these are names of.
+CHOSEN = {
+    "alignment": "alignment",
+    "association": "association",
+    "rpe_unit": "unit",
+    "rpe_pairs_from": "side",
+    "project": "plane",
+}
 MAX_WINDOW_S = 1e6
 MAX_OFFSET_S = 2e9  # from a clock that starts at 0 to one that counts from 1970
 COLUMNS = ("n", "rmse", "mean", "median", "std", "min", "max", "sse", "p95", "p99")
@@ -139,63 +192,130 @@ Content = dict[str, Any]
 Rows = list[list[str]]
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """The settings asked for; None leaves them to the preset `like`, or to our own defaults without one."""
+def score_command(
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="GT EST",
+            help="Ground truth and estimate: TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, by content, or the truth "
+            "of a sequence's folder. Several pairs are scored one by one and all together.",
+        ),
+    ] = None,
+    *,
+    listed: Annotated[
+        Path | None, typer.Option("--list", help="A file with GT and EST on each line, besides those given here.")
+    ] = None,
+    like: Annotated[
+        str | None,
+        typer.Option(help="Set what evo, kitti, rpg, tum, openvins, tartanair or tartanair_mono would."),
+    ] = None,
+    alignment: Annotated[
+        str | None, typer.Option("--align", "-a", help="none, origin, se3 (our default), sim3, scale or yaw.")
+    ] = None,
+    align_n: Annotated[int | None, typer.Option(min=1, help="Align by the first so many matched poses.")] = None,
+    rpe_delta: Annotated[
+        float | None, typer.Option("--delta", "-d", help="RPE over so much, more than 0; 1 by default.")
+    ] = None,
+    rpe_unit: Annotated[
+        str | None, typer.Option("--delta-unit", "-u", help="f (frames), m, s, d (degrees) or r (radians).")
+    ] = None,
+    rpe_all_pairs: Annotated[
+        bool | None, typer.Option("--all-pairs/--consecutive", help="RPE over all pairs, or end to end.")
+    ] = None,
+    rpe_pairs_from: Annotated[
+        str | None, typer.Option("--pairs-from", help="RPE's pairs are chosen on gt or est.")
+    ] = None,
+    t_max_diff: Annotated[float | None, typer.Option(help="Poses further apart are no pair, in s; 0.01.")] = None,
+    t_offset: Annotated[float | None, typer.Option(help="Added to the estimate's stamps, in s.")] = None,
+    association: Annotated[
+        str | None, typer.Option("--assoc", help="nearest, evo, interpolate, greedy or in_order.")
+    ] = None,
+    project: Annotated[
+        str | None, typer.Option(help="Compare in the plane xy, xz or yz of the truth, once aligned.")
+    ] = None,
+    full: Annotated[bool | None, typer.Option("--full", help="Every metric, not only the headlines.")] = None,
+    per_length: Annotated[
+        bool, typer.Option("--per-length", help="Segments and parts over each length too; --json always has them.")
+    ] = False,
+    gt_topic: Topic = None,
+    est_topic: Topic = None,
+    gt_as: As = None,
+    est_as: As = None,
+    times: Times = None,
+    json: terminal.Json = False,
+    csv: Annotated[bool, typer.Option("--csv", help="Print CSV.")] = False,
+    md: Annotated[bool, typer.Option("--md", help="Print Markdown.")] = False,
+) -> None:
+    """Score estimates against ground truth: ATE, RPE, segments, coverage."""
+    form = _form(json=json, csv=csv, md=md)
+    paths = [*(files or ()), *(_read_list(listed) if listed else ())]
+    if not paths or len(paths) % 2:
+        raise typer.BadParameter(
+            f"files come in pairs, GT EST, but there {'is' if len(paths) == 1 else 'are'} {len(paths)}"
+        )
+    settings = _settings(
+        like,
+        alignment=alignment,
+        align_n=align_n,
+        association=association,
+        max_diff_ns=_ns("--t-max-diff", t_max_diff, 0, MAX_WINDOW_S),
+        offset_ns=_ns("--t-offset", t_offset, -MAX_OFFSET_S, MAX_OFFSET_S),
+        rpe_delta=rpe_delta,
+        rpe_unit=rpe_unit,
+        rpe_all_pairs=rpe_all_pairs,
+        rpe_pairs_from=rpe_pairs_from,
+        full=full,
+        project=project,
+    )
+    pairs = [
+        (TrajectorySource(gt, gt_topic, tuple(gt_as or ())), TrajectorySource(est, est_topic, tuple(est_as or ())))
+        for gt, est in zip(paths[::2], paths[1::2], strict=True)
+    ]
+    _show_score(pairs, settings, times=times or (), form=form, per_length=per_length)
 
-    like: str | None = None
-    alignment: str | None = None
-    align_n: int | None = None
-    association: str | None = None
-    max_diff_s: float | None = None
-    offset_s: float | None = None
-    rpe_delta: float | None = None
-    rpe_unit: str | None = None
-    rpe_all_pairs: bool | None = None
-    rpe_pairs_from: str | None = None
-    full: bool | None = None
-    project: str | None = None
 
-    def settings(self) -> ScoreSettings:
-        """What to score with. Raises UnknownNameError, InputError or AlignmentError for what can't be asked."""
-        _require_known("preset", self.like, tuple(LIKE))
-        _require_known("alignment", self.alignment, get_args(Kind))
-        _require_known("association", self.association, get_args(Method))
-        _require_known("unit", self.rpe_unit, get_args(Unit))
-        _require_known("side", self.rpe_pairs_from, get_args(Side))
-        _require_known("plane", self.project, get_args(Plane))
-        if self.rpe_delta is not None and not 0 < self.rpe_delta < float("inf"):
-            raise InputError(f"--delta should be more than 0 and finite, got {self.rpe_delta:g}")
-        own = {field.name for field in fields(ScoreSettings)} & set(self.__slots__)
-        asked = {name: getattr(self, name) for name in own}
-        asked["max_diff_ns"] = _ns("--t-max-diff", self.max_diff_s, 0, MAX_WINDOW_S)
-        asked["offset_ns"] = _ns("--t-offset", self.offset_s, -MAX_OFFSET_S, MAX_OFFSET_S)
-        base = LIKE[self.like] if self.like else ScoreSettings()
-        if base.rpe_rule in PAIRS_OF_RULE and not self._keeps_pairs(base):
-            asked["rpe_rule"] = ScoreSettings().rpe_rule  # other pairs than that tool has are ours
-        return replace(base, **{name: value for name, value in asked.items() if value is not None})
-
-    def _keeps_pairs(self, base: ScoreSettings) -> bool:
-        """Whether the pairs asked for are those of a tool whose rule knows no others."""
-        asked = (self.rpe_unit, self.rpe_all_pairs, self.rpe_pairs_from)
-        are_own = all(mine in (None, own) for mine, own in zip(asked, PAIRS_OF_RULE[base.rpe_rule], strict=True))
-        return are_own and (self.project is None if base.rpe_rule == "tum" else self.rpe_delta is None)
+def _form(**asked: bool) -> str:
+    forms = [form for form, is_asked in asked.items() if is_asked]
+    if len(forms) > 1:
+        raise typer.BadParameter(f"choose one of --{' and --'.join(forms)}")
+    return forms[0] if forms else "table"
 
 
-def show_score(
+def _settings(like: str | None, **asked: Any) -> ScoreSettings:
+    """The preset's settings, or our own without one, with what else was asked for, which is not None.
+
+    Raises UnknownNameError, InputError or AlignmentError for what can't be asked.
+    """
+    _require_known("preset", like, list(LIKE))
+    for name, what in CHOSEN.items():
+        _require_known(what, asked[name], [choice for choice in CHOICES[name] if choice])
+    delta = asked["rpe_delta"]
+    if delta is not None and not 0 < delta < float("inf"):
+        raise InputError(f"--delta should be more than 0 and finite, got {delta:g}")
+    base = LIKE[like] if like else ScoreSettings()
+    if base.rpe_rule in PAIRS_OF_RULE and not _keeps_pairs(base, asked):
+        asked["rpe_rule"] = ScoreSettings().rpe_rule  # other pairs than that tool has are ours
+    return replace(base, **{name: value for name, value in asked.items() if value is not None})
+
+
+def _keeps_pairs(base: ScoreSettings, asked: Mapping[str, Any]) -> bool:
+    """Whether the pairs asked for are those of a tool whose rule knows no others."""
+    own = dict(zip(("rpe_unit", "rpe_all_pairs", "rpe_pairs_from"), PAIRS_OF_RULE[base.rpe_rule], strict=True))
+    are_own = all(asked[name] in (None, value) for name, value in own.items())
+    return are_own and asked["project" if base.rpe_rule == "tum" else "rpe_delta"] is None
+
+
+def _show_score(
     pairs: Sequence[tuple[TrajectorySource, TrajectorySource]],
-    asked: Asked,
+    settings: ScoreSettings,
     *,
     times: Sequence[Path],
     form: str,
     per_length: bool,
 ) -> None:
-    """Score one pair of trajectories, or several and all of them together, and print every metric with its identity.
-
-    `form` is table, json, csv or md; `per_length` adds the metrics over each length of path, which json always has.
-    """
-    settings = asked.settings()
-    scored = [_scored(gt, est, settings, times) for gt, est in pairs]
+    """Score one pair of trajectories, or several and all of them together, and print every metric with its identity."""
+    metrics = tuple(_definitions() if settings.full else DEFINITIONS.values())
+    scored = [_scored(gt, est, settings, times, metrics) for gt, est in pairs]
     if len(scored) == 1:
         content = scored[0][1]
         _require_finite(content["metrics"])
@@ -210,7 +330,7 @@ def show_score(
     FORMS[form](content, [result for result, _ in scored], per_length)
 
 
-def read_list(path: Path) -> list[Path]:
+def _read_list(path: Path) -> list[Path]:
     """The files that a list names, truth and estimate on each line, from the list's own folder. Raises InputError."""
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -228,12 +348,16 @@ def read_list(path: Path) -> list[Path]:
 
 
 def _scored(
-    gt: TrajectorySource, est: TrajectorySource, settings: ScoreSettings, times: Sequence[Path]
+    gt: TrajectorySource,
+    est: TrajectorySource,
+    settings: ScoreSettings,
+    times: Sequence[Path],
+    metrics: Sequence[MetricDefinition],
 ) -> tuple[Score, Content]:
     pair = read_pair(gt, est, times=times)
     if pair.by_frame and settings.rpe_unit == "s":
         raise InputError("a delta in seconds needs stamps, and neither file has any; name one with --times")
-    scored = score(pair.gt.trajectory, pair.est.trajectory, settings=settings)
+    scored = score(pair.gt.trajectory, pair.est.trajectory, settings=settings, metrics=metrics)
     content = scored.as_dict()
     content["warnings"] = [*([pair.by_frame] if pair.by_frame else []), *content["warnings"]]
     content["notes"] = list(pair.notes)
@@ -260,9 +384,9 @@ def _together(
     }
 
 
-def _require_known(what: str, name: str | None, known: tuple[str, ...]) -> None:
+def _require_known(what: str, name: str | None, known: list[str]) -> None:
     if name is not None and name not in known:
-        raise UnknownNameError(unknown(what, name, list(known)))
+        raise UnknownNameError(unknown(what, name, known))
 
 
 def _ns(option: str, value_s: float | None, least_s: float, most_s: float) -> int | None:
@@ -286,7 +410,7 @@ def _print_csv(content: Content, scored: Sequence[Score], per_length: bool) -> N
     named = [(part["est"], part) for part in content.get("sequences", [])]
     named += [("pooled", content["pooled"])] if named else [("", content)]
     columns = [*(["sequence"] if len(named) > 1 else []), "name", "unit", *(["length_m"] if per_length else [])]
-    writer = csv.DictWriter(sys.stdout, [*columns, *COLUMNS, "id"], extrasaction="ignore", lineterminator="\n")
+    writer = csv_module.DictWriter(sys.stdout, [*columns, *COLUMNS, "id"], extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     for name, part in named:
         rows = [*part["metrics"], *(part["per_length"] if per_length else [])]
@@ -334,23 +458,24 @@ def _sequence_tables(content: Content) -> list[tuple[list[str], Rows]]:
     """A row for each sequence and one for all of them, with the statistic to quote of each metric."""
     parts = [*content["sequences"], {"est": "pooled", **content["pooled"]}]
     units = {metric["name"]: metric["unit"] for part in parts for metric in part["metrics"]}
+    quoted = {metric["name"]: _quoted(metric) for part in parts for metric in part["metrics"]}
     names = list(units)
     tables: list[tuple[list[str], Rows]] = []
     for begin in range(0, len(names), ABREAST):
         chosen = names[begin : begin + ABREAST]
         rows = []
         for part in parts:
-            quoted = {metric["name"]: f"{metric[_quoted(metric['name'])]:.6g}" for metric in part["metrics"]}
+            values = {metric["name"]: f"{metric[_quoted(metric)]:.6g}" for metric in part["metrics"]}
             coverage = f"{part['coverage']:.3f}" if "coverage" in part else ""
-            rows.append([part["est"], coverage, *(quoted.get(name, "") for name in chosen)])
-        headings = [f"{name} {_quoted(name)}{'' if units[name] == '1' else ' ' + units[name]}" for name in chosen]
+            rows.append([part["est"], coverage, *(values.get(name, "") for name in chosen)])
+        headings = [f"{name} {quoted[name]}{'' if units[name] == '1' else ' ' + units[name]}" for name in chosen]
         tables.append((["sequence", "coverage", *headings], rows))
     return tables
 
 
-def _quoted(name: str) -> str:
-    """The statistic of a metric that is quoted."""
-    return DEFINITIONS[name].headline
+def _quoted(metric: dict[str, Any]) -> str:
+    """The statistic of a metric that is quoted, which its id says."""
+    return str(metric["id"].partition("[")[0].rpartition(".")[2])
 
 
 def _cells(metric: dict[str, Any]) -> list[str]:

@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from vobench.cli import terminal
 from vobench.dataset.picture import require_free
@@ -247,3 +249,75 @@ def _print_salvaged(name: str, what: Salvaged) -> None:
         out.print(f"lost: {sentence}")
     if not what.lost:
         out.print("nothing was lost")
+
+
+Recorded = Annotated[
+    Path, typer.Argument(metavar="PATH", help="A dataset's folder, a bag, or a sequence; its form is told by content.")
+]
+Imu = Annotated[Path | None, typer.Option(help="Kalibr's imu.yaml.")]
+Truth = Annotated[Path | None, typer.Option(help="A trajectory file with the ground truth.")]
+Rate = Annotated[float | None, typer.Option(help="Pictures a second, for layouts without stamps.")]
+Form = Annotated[str | None, typer.Option(help="The form, where its content should not tell.")]
+Calibration = Annotated[Path | None, typer.Option(help="Kalibr's camchain.yaml, where the layout has none of its own.")]
+TopicOf = Annotated[
+    list[str] | None,
+    typer.Option("--topic", help="left=, right=, left_info=, right_info=, truth= or imu=NAME of a bag; repeatable."),
+]
+
+
+def import_command(
+    path: Recorded,
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder of the new sequence.")],
+    *,
+    form: Form = None,
+    calibration: Calibration = None,
+    imu: Imu = None,
+    truth: Truth = None,
+    rate: Rate = None,
+    topic: TopicOf = None,
+    json: terminal.Json = False,
+) -> None:
+    """Make a sequence from a dataset's folder or a bag, and say all that was assumed or dropped."""
+    given = Given(form, calibration, imu, truth, rate, tuple(topic or ()))
+    show_import(path, out, given, as_json=json)
+
+
+def export_command(
+    source: Annotated[
+        Path, typer.Argument(metavar="SOURCE", help="The folder of a sequence, or the file of a trajectory.")
+    ],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder or file to write, which should be new.")],
+    *,
+    form: Annotated[str, typer.Option(help="euroc, kitti, tum or, of a sequence, ros2.")],
+    json: terminal.Json = False,
+) -> None:
+    """Write a sequence as EuRoC, KITTI, TUM or a ROS 2 bag, or a trajectory as their text; say all that is lost."""
+    show_export(source, out, form=form, as_json=json)
+
+
+def info_command(
+    path: Recorded,
+    *,
+    form: Form = None,
+    calibration: Calibration = None,
+    imu: Imu = None,
+    truth: Truth = None,
+    rate: Rate = None,
+    topic: TopicOf = None,
+    json: terminal.Json = False,
+) -> None:
+    """Say what is in a recording: topics, rates, duration, calibration, ground truth, hash."""
+    given = Given(form, calibration, imu, truth, rate, tuple(topic or ()))
+    show_info(path, given, as_json=json)
+
+
+def salvage_command(
+    torn: Annotated[
+        Path, typer.Argument(metavar="TORN", help="An MCAP file that was cut off, or a sequence's folder.")
+    ],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="The whole file or folder to write.")],
+    *,
+    json: terminal.Json = False,
+) -> None:
+    """Recover what is whole in a torn MCAP file."""
+    show_salvaged(torn, out, as_json=json)

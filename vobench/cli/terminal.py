@@ -4,7 +4,10 @@ import json as json_module
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -12,6 +15,10 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 Item = TypeVar("Item")
+# Options and arguments that many verbs have.
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+SuiteName = Annotated[str, typer.Argument(metavar="SUITE", help="A suite's name, or a path to its YAML.")]
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or runs/<suite> for its latest.")]
 LEFT_ALIGNED = {
     *("estimator", "status", "name", "case", "kind", "summary", "path", "origin", "check", "result"),
     *("sequence", "metric", "headline", "is", "with", "trajectory"),

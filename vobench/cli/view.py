@@ -2,6 +2,9 @@
 
 import os
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from vobench.cli import terminal
 from vobench.errors import InputError, MissingDependencyError
@@ -38,3 +41,19 @@ def _open(path: Path) -> None:
         raise MissingDependencyError(f"no display to open the viewer on; on a machine that has one, run: rerun {path}")
     # Without -P, a rerun.py in the working folder would be run in its place.
     subprocess.Popen([sys.executable, "-P", "-m", "rerun", str(path)], start_new_session=True)
+
+
+def view_command(
+    run: terminal.RunPath,
+    *,
+    case: Annotated[
+        str | None, typer.Option(help="The case; the gravest failure or the worst error where left out.")
+    ] = None,
+    estimator: Annotated[
+        str | None, typer.Option(help="The estimator; a failed one where left out, else the best.")
+    ] = None,
+    save: Annotated[Path | None, typer.Option(help="Write this .rrd instead of opening the viewer.")] = None,
+    json: terminal.Json = False,
+) -> None:
+    """Open one run in Rerun, failures first."""
+    show_view(run, case=case, estimator=estimator, save=save, as_json=json)

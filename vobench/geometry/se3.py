@@ -32,6 +32,15 @@ def rotation_angle(R: Array) -> Array:
     return angle
 
 
+def roll_pitch_yaw_rad(R: Array) -> Array:
+    """Angles (..., 3) of R = Rz(yaw) Ry(pitch) Rx(roll); at 90° of pitch, where they merge, roll is 0."""
+    pitch = np.arctan2(-R[..., 2, 0], np.hypot(R[..., 0, 0], R[..., 1, 0]))
+    merged = np.hypot(R[..., 2, 1], R[..., 2, 2]) < 1e-12
+    roll = np.where(merged, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
+    yaw = np.where(merged, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
+    return np.stack([roll, pitch, yaw], -1)
+
+
 def is_rotation(R: Array, *, tolerance: float = 1e-6) -> bool:
     """Whether every (..., 3, 3) is finite, orthonormal to `tolerance` and right-handed."""
     if not np.isfinite(R).all():

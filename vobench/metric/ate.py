@@ -7,7 +7,7 @@ import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.metric.settings import Plane
+from vobench.metric.comparison import HARTLEY, OURS, POSES, STURM_ATE, ZHANG, Comparison, MetricDefinition
 from vobench.trajectory.associate import Index
 
 Rows = tuple[Array, ...]
@@ -104,34 +104,6 @@ def motions(T_world_frame: Array, first: Index, last: Index) -> Array:
     return T_first_last
 
 
-def in_plane(T: Array, plane: Plane) -> Array:
-    """Poses (N, 4, 4) without what leaves a plane of the world: on it, and turned about its normal alone.
-
-    The angle is the normal's one of `roll_pitch_yaw_rad`. Source: evo's project_to_plane.
-    """
-    normal = {"yz": 0, "xz": 1, "xy": 2}[plane]
-    axes = np.roll(range(3), normal + 1)  # where x, y and z stand when the normal takes the place of z
-    turned = se3.rotation_z(roll_pitch_yaw_rad(T[:, :3, :3])[:, normal])[:, axes][:, :, axes]
-    return se3.transform(turned, np.where(np.arange(3) == normal, 0.0, T[:, :3, 3]))
-
-
-def roll_pitch_yaw_rad(R: Array) -> Array:
-    """Angles (..., 3) of R = Rz(yaw) Ry(pitch) Rx(roll); at 90° of pitch, where they merge, roll is 0."""
-    pitch = np.arctan2(-R[..., 2, 0], np.hypot(R[..., 0, 0], R[..., 1, 0]))
-    merged = np.hypot(R[..., 2, 1], R[..., 2, 2]) < 1e-12
-    roll = np.where(merged, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
-    yaw = np.where(merged, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
-    return np.stack([roll, pitch, yaw], -1)
-
-
-@dataclass(frozen=True, slots=True)
-class AxisErrors:
-    """Signed errors along and about the world's axes: x, y, z (K, 3) in m; roll, pitch, yaw (K, 3) in rad."""
-
-    xyz_m: Array
-    rpy_rad: Array
-
-
 def absolute_errors(T_gt: Array, T_est: Array) -> PoseErrors:
     """Distances and angles between matched poses (K, 4, 4), the estimate already aligned.
 
@@ -152,10 +124,103 @@ def absolute_matrix_errors(T_gt: Array, T_est: Array) -> MatrixErrors:
     return MatrixErrors(*norms)
 
 
-def axis_errors(T_gt: Array, T_est: Array) -> AxisErrors:
-    """Where matched poses (K, 4, 4) are off, axis by axis of the truth's world.
+def axis_errors(T_gt: Array, T_est: Array) -> tuple[Array, Array]:
+    """Signed errors of matched poses (K, 4, 4): x, y, z (K, 3) in m and roll, pitch, yaw (K, 3) in rad.
 
-    Source: Zhang and Scaramuzza (2018), section IV: R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll).
+    In the truth's world. Source: Zhang and Scaramuzza (2018), section IV: R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll).
     """
     R = T_est[:, :3, :3] @ np.swapaxes(T_gt[:, :3, :3], -1, -2)
-    return AxisErrors(T_est[:, :3, 3] - T_gt[:, :3, 3], roll_pitch_yaw_rad(R))
+    return T_est[:, :3, 3] - T_gt[:, :3, 3], se3.roll_pitch_yaw_rad(R)
+
+
+def absolute(of: Comparison) -> PoseErrors:
+    """`absolute_errors` of a comparison."""
+    return absolute_errors(of.matched.T_gt, of.T_aligned)
+
+
+def _matrices(of: Comparison) -> MatrixErrors:
+    return absolute_matrix_errors(of.matched.T_gt, of.T_aligned)
+
+
+def _axes(of: Comparison) -> dict[str, Array]:
+    xyz_m, rpy_rad = axis_errors(of.matched.T_gt, of.T_aligned)
+    names = ("x", "y", "z", "roll", "pitch", "yaw")
+    return dict(zip(names, (*xyz_m.T, *np.rad2deg(rpy_rad).T), strict=True))
+
+
+def _of_axis(axis: str) -> Callable[[Comparison], Array]:
+    return lambda of: of.once(_axes)[axis]
+
+
+DRIFT = "where along the path an error was made: one early turn moves everything after it"
+LOST = "frames without a pose: read coverage beside it"
+METRICS = (
+    MetricDefinition(
+        "ate_trans",
+        "absolute trajectory error, position",
+        "m",
+        "‖p_est − p_gt‖ of each aligned pose",
+        STURM_ATE,
+        POSES,
+        f"{DRIFT}; {LOST}",
+        full=False,
+        measure=lambda of: of.once(absolute).trans_m,
+    ),
+    MetricDefinition(
+        "ate_rot",
+        "absolute trajectory error, angle",
+        "deg",
+        "angle of R_est⁻¹ R_gt of each aligned pose",
+        STURM_ATE,
+        POSES,
+        f"a roll that the alignment had to guess: read alignment.unobservable; {LOST}",
+        full=False,
+        measure=lambda of: np.rad2deg(of.once(absolute).rot_rad),
+    ),
+    MetricDefinition(
+        "ate_rot_chordal",
+        "absolute trajectory error, rotation as a matrix",
+        "1",
+        "‖R_est⁻¹ R_gt − I‖_F = 2√2 sin(angle / 2)",
+        HARTLEY,
+        POSES,
+        f"the same as ate_rot on another scale; {LOST}",
+        measure=lambda of: of.once(_matrices).rot,
+    ),
+    MetricDefinition(
+        "ate_full",
+        "absolute trajectory error, whole pose",
+        "1",
+        "‖T_est⁻¹ T_gt − I‖_F",
+        "evo's full",
+        POSES,
+        f"metres and rotations are added: it changes with the unit of length; {LOST}",
+        measure=lambda of: of.once(_matrices).full,
+    ),
+    *(
+        MetricDefinition(
+            f"ate_{axis}",
+            f"absolute trajectory error along the truth's {axis}",
+            "m",
+            f"{axis} of p_est − p_gt, with its sign",
+            OURS,
+            POSES,
+            f"errors along the other axes; {LOST}",
+            measure=_of_axis(axis),
+        )
+        for axis in ("x", "y", "z")
+    ),
+    *(
+        MetricDefinition(
+            f"ate_{axis}",
+            f"absolute trajectory error in {axis}",
+            "deg",
+            f"{axis} of R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll), with its sign",
+            ZHANG,
+            POSES,
+            f"the angles of rotations near 90° of pitch, where roll and yaw are one; {LOST}",
+            measure=_of_axis(axis),
+        )
+        for axis in ("roll", "pitch", "yaw")
+    ),
+)

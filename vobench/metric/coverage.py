@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from vobench.geometry.se3 import Array
+from vobench.metric.comparison import OURS, POSES, MetricDefinition
 from vobench.metric.settings import CoverageOf
 from vobench.trajectory.associate import Index
 from vobench.trajectory.trajectory import Stamps
@@ -121,3 +122,30 @@ def lost_aware_score(errors_m: Array, coverage: float, *, survived: bool, fail_m
     area = right * coverage
     # A failed run that was perfect in all frames but few comes near 1/2, and must not round to it.
     return 0.5 + 0.5 * area if survived else min(0.5 * area, float(np.nextafter(0.5, 0.0)))
+
+
+TIMES = ("coverage_of", "association", "max_diff_ns", "offset_ns")
+METRICS = (
+    MetricDefinition(
+        "coverage",
+        "share of the recording with a pose",
+        "1",
+        "slots with a pose / slots; a slot is a true pose, or 0.2 s of truth with more than 33 poses a second",
+        OURS,
+        TIMES,
+        "whether the poses are right",
+        headline="ratio",
+        full=False,
+    ),
+    MetricDefinition(
+        "lost_aware",
+        "accuracy with lost counted as failed, 1 best and 0 worst",
+        "1",
+        "A/2 of a failed run, 1/2 + A/2 of a survivor; A: mean of 1 − e / (fail_ratio · path), cut at 0, lost slots 0",
+        OURS,
+        ("fail_ratio", *TIMES, *POSES),
+        "differences beyond fail_ratio of the path: all of them are failures",
+        headline="score",
+        full=False,
+    ),
+)

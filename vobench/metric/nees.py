@@ -1,5 +1,6 @@
 """Consistency: whether an estimator's errors are as large as its own covariances say."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from vobench.errors import TrajectoryError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.metric.comparison import POSES, Comparison, MetricDefinition
 from vobench.trajectory.align import Alignment
 
 POSE, POSITION, ROTATION = slice(0, 6), slice(0, 3), slice(3, 6)
@@ -59,3 +61,34 @@ def _checked(covariance: Array) -> Array:
             f"but its least eigenvalue is {least[bad[0]]:.3g}"
         )
     return covariance
+
+
+def _consistency(of: Comparison) -> Consistency:
+    if of.covariance is None:
+        return Consistency(*np.zeros((3, 0)))
+    of_pose = of.covariance[of.matched.pairs.est]
+    return consistency(of.matched.T_gt, of.matched.T_est, of_pose, of.alignment)
+
+
+def _of_part(part: str) -> Callable[[Comparison], Array]:
+    return lambda of: np.asarray(getattr(of.once(_consistency), part))
+
+
+METRICS = tuple(
+    MetricDefinition(
+        name,
+        title,
+        "1",
+        f"{error}ᵀ P⁻¹ {error} of each pose, P the covariance that the estimator states",
+        "Bar-Shalom et al. (2001), section 5.4",
+        POSES,
+        f"the size of the error: a large one that was announced is consistent; honest ones give {dof} on average",
+        headline="mean",
+        measure=_of_part(part),
+    )
+    for name, title, error, dof, part in (
+        ("nees_pose", "consistency of the stated covariance", "e", "6", "pose"),
+        ("nees_trans", "consistency of the stated covariance, position", "e_p", "3", "trans"),
+        ("nees_rot", "consistency of the stated covariance, orientation", "e_R", "3", "rot"),
+    )
+)

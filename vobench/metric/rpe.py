@@ -1,6 +1,6 @@
 """Relative pose error over frames, metres, seconds and angles, and over parts of the path."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,8 +20,8 @@ from vobench.metric.ate import (
     matrix_norms,
     motion_errors,
     motions,
-    roll_pitch_yaw_rad,
 )
+from vobench.metric.comparison import HARTLEY, POSES, STURM_RPE, ZHANG, Comparison, MetricDefinition, OverLengths
 from vobench.metric.settings import RelativeRule, Unit
 from vobench.trajectory.associate import Index, nearest
 from vobench.trajectory.trajectory import Stamps, Trajectory
@@ -268,7 +268,7 @@ def _errors(T_gt: Array, T_est: Array, first: Index, last: Index) -> Rows:
     """Translation, angle, yaw and tilt (N,) of what is left between motions."""
     E = se3.inverse(motions(T_gt, first, last)) @ motions(T_est, first, last)
     R_est = T_est[last, :3, :3]
-    roll, pitch, yaw = roll_pitch_yaw_rad(R_est @ E[:, :3, :3] @ np.swapaxes(R_est, -1, -2)).T
+    roll, pitch, yaw = se3.roll_pitch_yaw_rad(R_est @ E[:, :3, :3] @ np.swapaxes(R_est, -1, -2)).T
     return np.linalg.norm(E[:, :3, 3], axis=1), angle_rad(E[:, :3, :3]), np.abs(yaw), np.hypot(pitch, roll)
 
 
@@ -276,3 +276,180 @@ def _parts(along: Array, length_m: float, rule: RelativeRule) -> IndexPairs:
     if rule == "openvins":
         return pairs_along(along, length_m, tolerance=OPENVINS_TOLERANCE_M)
     return pairs_along(along, length_m, tolerance=float(np.nextafter(RPG_TOLERANCE * length_m, 0.0)))  # strictly less
+
+
+def _pairs(of: Comparison) -> IndexPairs:
+    s = of.settings
+    if s.rpe_rule == "tartanair":
+        return every_pair(len(of.matched))
+    if s.rpe_rule == "tum":  # their script pairs other poses, and has no other forms of errors than theirs
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    return select_pairs(
+        of.matched.T_gt if s.rpe_pairs_from == "gt" else of.T_moving,
+        of.matched.t_ns,
+        delta=s.rpe_delta,
+        unit=s.rpe_unit,
+        all_pairs=s.rpe_all_pairs,
+        spanning=s.rpe_rule == "spanning",
+    )
+
+
+def _relative(of: Comparison) -> PoseErrors:
+    s = of.settings
+    if s.rpe_rule == "tum":
+        return tum_errors(of.gt, of.est, delta_s=s.rpe_delta, offset_ns=s.offset_ns, scale=of.alignment.scale)
+    return relative_errors(of.matched.T_gt, of.T_moving, of.once(_pairs))
+
+
+def _matrices(of: Comparison) -> MatrixErrors:
+    return relative_matrix_errors(of.matched.T_gt, of.T_moving, of.once(_pairs))
+
+
+def _distances(of: Comparison) -> DistanceErrors:
+    return distance_errors(of.matched.T_gt, of.T_moving, of.once(_pairs))
+
+
+def _parts_of(of: Comparison) -> RelativeErrors:
+    rule = of.settings.relative_rule
+    T_est = of.T_moving
+    if rule == "rpg" and not of.settings.project:  # rpg turns errors into the estimate's own world
+        T_est = se3.transform(of.matched.T_est[:, :3, :3], of.alignment.scale * of.matched.T_est[:, :3, 3])
+    lengths_m = relative_lengths(float(of.distances_m[-1]), rule)
+    return part_errors(of.matched.T_gt, T_est, lengths_m, rule=rule)
+
+
+def _over_parts(chosen: Callable[[RelativeErrors], Array]) -> Callable[[Comparison], OverLengths]:
+    return lambda of: OverLengths(chosen(of.once(_parts_of)), of.once(_parts_of).length_m)
+
+
+MOTIONS = ("rpe_delta", "rpe_unit", "rpe_all_pairs", "rpe_pairs_from", "rpe_rule", *POSES)
+RELATIVE = ("relative_rule", *POSES)
+ALL_PAIRS = "; like tartanair over all ordered pairs i, j, of which its own script draws 10,000 at random"
+GLOBAL = "a slow drift that stays below the size of a step"
+METRICS = (
+    MetricDefinition(
+        "rpe_trans",
+        "relative pose error, translation",
+        "m",
+        f"‖t‖ of (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j), Q true and P estimated{ALL_PAIRS}",
+        STURM_RPE,
+        MOTIONS,
+        GLOBAL,
+        full=False,
+        measure=lambda of: of.once(_relative).trans_m,
+    ),
+    MetricDefinition(
+        "rpe_rot",
+        "relative pose error, angle",
+        "deg",
+        f"angle of (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j), Q true and P estimated{ALL_PAIRS}",
+        STURM_RPE,
+        MOTIONS,
+        GLOBAL,
+        full=False,
+        measure=lambda of: np.rad2deg(of.once(_relative).rot_rad),
+    ),
+    MetricDefinition(
+        "rpe_rot_chordal",
+        "relative pose error, rotation as a matrix",
+        "1",
+        "‖R − I‖_F of the same E as rpe_rot",
+        HARTLEY,
+        MOTIONS,
+        GLOBAL,
+        measure=lambda of: of.once(_matrices).rot,
+    ),
+    MetricDefinition(
+        "rpe_full",
+        "relative pose error, whole motion",
+        "1",
+        "‖E − I‖_F",
+        "evo's full",
+        MOTIONS,
+        f"metres and rotations are added: it changes with the unit of length; {GLOBAL}",
+        measure=lambda of: of.once(_matrices).full,
+    ),
+    MetricDefinition(
+        "rpe_point",
+        "difference of the distances moved",
+        "m",
+        "| ‖q_j − q_i‖ − ‖p_j − p_i‖ |",
+        "evo's point_distance",
+        MOTIONS,
+        "every direction: a motion of the right length to the wrong side has no error",
+        measure=lambda of: of.once(_distances).point_m,
+    ),
+    MetricDefinition(
+        "rpe_point_percent",
+        "difference of the distances moved, of the true one",
+        "%",
+        "100 | ‖q_j − q_i‖ − ‖p_j − p_i‖ | / ‖q_j − q_i‖, pairs where the truth stood still left out",
+        "evo's point_distance_error_ratio",
+        MOTIONS,
+        "every direction, and drift while the truth stands still",
+        measure=lambda of: of.once(_distances).percent,
+    ),
+    MetricDefinition(
+        "rel_trans",
+        "translation error over parts of the path",
+        "m",
+        "‖t‖ of (T_gt,ij)⁻¹ T_est,ij, j nearest to the length along the true path",
+        ZHANG,
+        RELATIVE,
+        "lengths are mixed: the longest decide",
+        measure=_over_parts(lambda parts: parts.trans_m),
+    ),
+    MetricDefinition(
+        "rel_trans_percent",
+        "translation error over parts of the path, of their length",
+        "%",
+        "100 ‖t‖ / length of the same parts",
+        ZHANG,
+        RELATIVE,
+        "jitter on long parts",
+        headline="mean",
+        measure=_over_parts(lambda parts: 100 * parts.trans_m / parts.length_m),
+    ),
+    MetricDefinition(
+        "rel_rot",
+        "angle error over parts of the path",
+        "deg",
+        "angle of (T_gt,ij)⁻¹ T_est,ij",
+        ZHANG,
+        RELATIVE,
+        "lengths are mixed: the longest decide",
+        measure=_over_parts(lambda parts: np.rad2deg(parts.rot_rad)),
+    ),
+    MetricDefinition(
+        "rel_rot_per_m",
+        "angle error over parts of the path, per metre",
+        "deg/m",
+        "angle / length of the same parts",
+        ZHANG,
+        RELATIVE,
+        "jitter on long parts",
+        headline="mean",
+        measure=_over_parts(lambda parts: np.rad2deg(parts.rot_rad) / parts.length_m),
+    ),
+    MetricDefinition(
+        "rel_yaw",
+        "yaw error over parts of the path: the turn about gravity that inertia can't see",
+        "deg",
+        "|yaw| of the error turned into the world: R_est,j R_E R_est,j⁻¹ = Rz(yaw) Ry(pitch) Rx(roll); "
+        "rpg's is the estimate's own world, openvins' the truth's",
+        ZHANG,
+        RELATIVE,
+        "gravity is the z of the world: another vertical mixes it with rel_gravity",
+        measure=_over_parts(lambda parts: np.rad2deg(parts.yaw_rad)),
+    ),
+    MetricDefinition(
+        "rel_gravity",
+        "tilt error over parts of the path: the turn against gravity that inertia sees",
+        "deg",
+        "√(pitch² + roll²) of the same rotation as rel_yaw",
+        ZHANG,
+        RELATIVE,
+        "gravity is the z of the world: another vertical mixes it with rel_yaw",
+        measure=_over_parts(lambda parts: np.rad2deg(parts.gravity_rad)),
+    ),
+)

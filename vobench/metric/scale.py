@@ -1,15 +1,15 @@
-"""Scale: by what factor an estimate's distances are wrong, how that drifts, and TartanAir's two factors for it."""
+"""Scale: by what factor an estimate's distances are wrong, and how that drifts."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.trajectory.align import align_positions
+from vobench.metric.comparison import Comparison, MetricDefinition
+from vobench.metric.segment import SEGMENTS, segments
 from vobench.trajectory.associate import Index
 
 LEAST_SHARE = 0.1  # of the median true distance; a segment that ends nearer to its begin shows no scale
-STILL_M = 1e-4  # their least step that has a speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,31 +36,40 @@ def scale_errors(T_gt: Array, T_est: Array, along_m: Array, first: Index, last: 
     return ScaleErrors(ratio - 1.0, middle_m, _slope(middle_m[ratio > 0], np.log(ratio[ratio > 0])))
 
 
-def ate_scale(T_gt: Array, T_est: Array) -> float:
-    """TartanAir's factor on the estimate (K, 4, 4) before an SE(3) alignment: Σ‖gt‖² / Σ gt·est about the means.
-
-    Umeyama's is Σ gt·est / Σ‖est‖², and never larger; 1 where either side stands still.
-    Source: Wang et al. (2020), the evaluation script.
-    """
-    gt_m, est_m = T_gt[:, :3, 3], T_est[:, :3, 3]
-    fit = align_positions(gt_m, est_m, kind="se3")
-    x, y = (gt_m - gt_m.mean(axis=0)) @ fit.rotation.T, est_m - est_m.mean(axis=0)
-    return 1.0 if "rotation" in fit.unobservable else float(np.sum(x * x) / np.sum(x * y))
-
-
-def motion_scale(T_gt: Array, T_est: Array) -> float:
-    """TartanAir's factor on the estimate (K, 4, 4) before relative and segment errors.
-
-    It is 1 / mean of the estimate's steps over the truth's, 1 where either side stands still.
-    Source: Wang et al. (2020), the evaluation script.
-    """
-    gt_m, est_m = (np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1) for T in (T_gt, T_est))
-    moving = gt_m > STILL_M
-    ratio = float(np.mean(est_m[moving] / gt_m[moving])) if moving.any() else 0.0
-    return 1.0 / ratio if ratio > 0 else 1.0
-
-
 def _slope(x: Array, y: Array) -> float:
     centred = x - x.mean() if len(x) else x
     power = float(centred @ centred)
     return float(centred @ (y - y.mean())) / power if power > 0 else 0.0
+
+
+def _scale(of: Comparison) -> ScaleErrors:
+    frames, found = of.matched.pairs.gt, of.once(segments)
+    first, last = (np.searchsorted(frames, ends) for ends in (found.first, found.last))
+    return scale_errors(of.matched.T_gt, of.T_moving, of.distances_m[frames], first, last)
+
+
+STRASDAT = "Strasdat et al. (2010), section II, as a ratio of distances"
+METRICS = (
+    MetricDefinition(
+        "scale_error",
+        "scale error of the segments",
+        "1",
+        "‖p_j − p_i‖ / ‖q_j − q_i‖ − 1 of the segments of kitti_t_rel, with its sign",
+        STRASDAT,
+        SEGMENTS,
+        "scale where a segment ends near where it began; an alignment with scale has taken the mean out",
+        headline="mean",
+        measure=lambda of: of.once(_scale).error,
+    ),
+    MetricDefinition(
+        "scale_drift",
+        "drift of the scale per metre of path",
+        "1/m",
+        "slope by least squares of log(1 + scale_error) over the true path, one number",
+        STRASDAT,
+        SEGMENTS,
+        "a scale that goes up and comes down again",
+        headline="mean",
+        measure=lambda of: np.full(min(len(of.once(_scale)), 1), of.once(_scale).drift_per_m),
+    ),
+)

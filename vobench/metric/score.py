@@ -1,36 +1,21 @@
 """One estimate scored against one ground truth: associate, align, measure."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vobench.errors import AlignmentError
-from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.metric.ate import PoseErrors, absolute_errors, absolute_matrix_errors, axis_errors, in_plane
+from vobench.metric import nees
+from vobench.metric.ate import absolute
+from vobench.metric.comparison import DEFAULTS, Comparison, MetricDefinition, OverLengths, compare
 from vobench.metric.coverage import SLOT_NS, Coverage, Failure, coverage, failure, slots
 from vobench.metric.definitions import DEFINITIONS, identity
-from vobench.metric.nees import consistency
-from vobench.metric.rpe import (
-    IndexPairs,
-    distance_errors,
-    every_pair,
-    part_errors,
-    relative_errors,
-    relative_lengths,
-    relative_matrix_errors,
-    select_pairs,
-    tum_errors,
-)
-from vobench.metric.scale import ate_scale, motion_scale, scale_errors
-from vobench.metric.segment import Float32, SegmentErrors, devkit_distances, mean_drift, segment_errors
-from vobench.metric.settings import ScoreSettings, settled
-from vobench.trajectory.align import Alignment, align
-from vobench.trajectory.associate import Matched, match
-from vobench.trajectory.formats import seconds
+from vobench.metric.segment import mean_drift
+from vobench.metric.settings import ScoreSettings
+from vobench.trajectory.align import Alignment
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 PERCENTILES = np.array([0.5, 0.95, 0.99])
@@ -101,184 +86,54 @@ class LengthMetric:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """All errors (N,) of one metric, in its unit; `length_m` (N,) where each is of a segment or part of the path.
+    """All errors (N,) of one metric, in its unit; `over` has their lengths where each is of a stretch of the path."""
 
-    `drift` (N,): segments' errors as their mean is taken of them, which for the devkit is float32, in 1 or rad/m.
-    """
-
-    name: str
+    of: MetricDefinition
     errors: Array
-    length_m: Array | None = None
-    drift: Array | Float32 | None = None
+    over: OverLengths | None = None
+
+    @classmethod
+    def measured(cls, metric: MetricDefinition, of: Comparison) -> "Samples":
+        """The errors of a metric in a comparison; there may be none."""
+        found = metric.measure(of) if metric.measure else np.zeros(0)
+        return cls(metric, found.errors, found) if isinstance(found, OverLengths) else cls(metric, found)
+
+    @property
+    def name(self) -> str:
+        """The metric's name."""
+        return self.of.id
 
     def statistics(self, settings: ScoreSettings) -> Statistics:
         """The statistics of one error or more."""
         found = statistics(self.errors, ddof=settings.std_ddof)
-        if self.drift is None or self.length_m is None:
+        if self.over is None or self.over.drift is None:
             return found
-        mean = mean_drift(self.drift, self.length_m, mean=settings.segment_mean)
-        return replace(found, mean=float(np.rad2deg(mean)) if self.unit == "deg/m" else mean)
+        mean = mean_drift(self.over.drift, self.over.length_m, mean=settings.segment_mean)
+        return replace(found, mean=float(np.rad2deg(mean)) if self.of.unit == "deg/m" else mean)
 
     def metric(self, settings: ScoreSettings, *, n: int, of: int) -> Metric:
         """The metric of errors of n matched out of so many true poses."""
-        defined = DEFINITIONS[self.name]
-        text = identity(f"{defined.identity}.{defined.headline}", settings, n=n, of=of)
-        return Metric(text, self.name, self.unit, self.statistics(settings))
+        text = identity(self.of, settings, n=n, of=of)
+        return Metric(text, self.of.id, self.of.unit, self.statistics(settings))
 
     def per_length(self, settings: ScoreSettings) -> Iterator[LengthMetric]:
         """The metric over each length alone, none where it has no lengths."""
-        for length in [] if self.length_m is None else np.unique(self.length_m):
-            of_length = self.chosen(self.length_m == length)
-            yield LengthMetric(self.name, self.unit, float(length), of_length.statistics(settings))
-
-    def chosen(self, which: NDArray[np.bool_]) -> "Samples":
-        """Some of the samples (N,)."""
-        length_m = None if self.length_m is None else self.length_m[which]
-        return Samples(self.name, self.errors[which], length_m, None if self.drift is None else self.drift[which])
-
-    @property
-    def unit(self) -> str:
-        """The unit of the errors."""
-        return DEFINITIONS[self.name].unit
+        lengths_m = np.zeros(0) if self.over is None else self.over.length_m
+        for length in np.unique(lengths_m):
+            of_length = _joined([self], lengths_m == length)
+            yield LengthMetric(self.of.id, self.of.unit, float(length), of_length.statistics(settings))
 
 
-def joined(parts: Sequence[Samples]) -> Samples:
-    """The samples of one metric of several sequences, one after the other."""
-    lengths_m = [part.length_m for part in parts if part.length_m is not None]
-    drifts: list[Any] = [part.drift for part in parts if part.drift is not None]
-    return Samples(
-        parts[0].name,
-        np.concatenate([part.errors for part in parts]),
-        np.concatenate(lengths_m) if lengths_m else None,
-        np.concatenate(drifts) if drifts else None,
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """Truth and estimate as matched and aligned, with settings that leave nothing open.
-
-    T_aligned is (K, 4, 4), T_moving (K, 4, 4) the poses whose motions are compared, which differ from them only
-    where scale_rule gives motions another scale; distances_m (N,) is the true path to each pose of the truth.
-    """
-
-    gt: Trajectory
-    est: Trajectory
-    matched: Matched
-    alignment: Alignment
-    T_aligned: Array
-    T_moving: Array
-    distances_m: Array
-    settings: ScoreSettings
-
-    def __repr__(self) -> str:
-        matched = f"{len(self.matched)} pairs of {len(self.gt)} true and {len(self.est)} estimated poses"
-        return f"Comparison({matched}, alignment {self.settings.alignment})"
-
-
-def measured(of: Comparison, ate: PoseErrors) -> Iterator[Samples]:
-    """The errors of the headline metrics, and with `full` of the others; some may have none."""
-    pairs = _rpe_pairs(of)
-    segments = _segments(of)
-    yield Samples("ate_trans", ate.trans_m)
-    yield Samples("ate_rot", np.rad2deg(ate.rot_rad))
-    rpe = _rpe(of, pairs)
-    yield Samples("rpe_trans", rpe.trans_m)
-    yield Samples("rpe_rot", np.rad2deg(rpe.rot_rad))
-    trans, rot, length_m = segments.trans_ratio, segments.rot_radpm, segments.length_m
-    yield Samples("kitti_t_rel", trans, length_m, drift=trans)
-    yield Samples("kitti_r_rel", np.rad2deg(rot, dtype=float), length_m, drift=rot)
-    if of.settings.full:
-        yield from _more_absolute(of)
-        yield from _more_relative(of, pairs)
-        yield from _parts(of)
-        yield from _scale(of, segments)
-
-
-def _rpe_pairs(of: Comparison) -> IndexPairs:
-    s = of.settings
-    if s.rpe_rule == "tartanair":
-        return every_pair(len(of.matched))
-    return select_pairs(
-        of.matched.T_gt if s.rpe_pairs_from == "gt" else of.T_moving,
-        of.matched.t_ns,
-        delta=s.rpe_delta,
-        unit=s.rpe_unit,
-        all_pairs=s.rpe_all_pairs,
-        spanning=s.rpe_rule == "spanning",
-    )
-
-
-def _rpe(of: Comparison, pairs: IndexPairs) -> PoseErrors:
-    s = of.settings
-    if s.rpe_rule == "tum":
-        return tum_errors(of.gt, of.est, delta_s=s.rpe_delta, offset_ns=s.offset_ns, scale=of.alignment.scale)
-    return relative_errors(of.matched.T_gt, of.T_moving, pairs)
-
-
-def _segments(of: Comparison) -> SegmentErrors:
-    s = of.settings
-    return segment_errors(
-        of.matched.T_gt,
-        of.T_moving,
-        of.matched.pairs.gt,
-        devkit_distances(of.gt.positions_m) if s.segment_precision == "devkit" else of.distances_m,
-        lengths_m=s.segment_lengths_m or (),
-        step_frames=s.segment_step_frames or 1,
-        precision=s.segment_precision,
-    )
-
-
-def _more_absolute(of: Comparison) -> Iterator[Samples]:
-    norms = absolute_matrix_errors(of.matched.T_gt, of.T_aligned)
-    yield Samples("ate_rot_chordal", norms.rot)
-    yield Samples("ate_full", norms.full)
-    axes = axis_errors(of.matched.T_gt, of.T_aligned)
-    for name, errors in zip("xyz", axes.xyz_m.T, strict=True):
-        yield Samples(f"ate_{name}", errors)
-    for name, errors in zip(("roll", "pitch", "yaw"), np.rad2deg(axes.rpy_rad).T, strict=True):
-        yield Samples(f"ate_{name}", errors)
-
-
-def _more_relative(of: Comparison, pairs: IndexPairs) -> Iterator[Samples]:
-    if of.settings.rpe_rule == "tum":  # their script pairs other poses, and has no other forms
-        return
-    norms = relative_matrix_errors(of.matched.T_gt, of.T_moving, pairs)
-    yield Samples("rpe_rot_chordal", norms.rot)
-    yield Samples("rpe_full", norms.full)
-    distances = distance_errors(of.matched.T_gt, of.T_moving, pairs)
-    yield Samples("rpe_point", distances.point_m)
-    yield Samples("rpe_point_percent", distances.percent)
-
-
-def _parts(of: Comparison) -> Iterator[Samples]:
-    rule = of.settings.relative_rule
-    lengths_m = relative_lengths(float(of.distances_m[-1]), rule)
-    errors = part_errors(of.matched.T_gt, _part_poses(of), lengths_m, rule=rule)
-    length_m, rot_deg = errors.length_m, np.rad2deg(errors.rot_rad)
-    yield Samples("rel_trans", errors.trans_m, length_m)
-    yield Samples("rel_trans_percent", 100 * errors.trans_m / length_m, length_m)
-    yield Samples("rel_rot", rot_deg, length_m)
-    yield Samples("rel_rot_per_m", rot_deg / length_m, length_m)
-    yield Samples("rel_yaw", np.rad2deg(errors.yaw_rad), length_m)
-    yield Samples("rel_gravity", np.rad2deg(errors.gravity_rad), length_m)
-
-
-def _part_poses(of: Comparison) -> Array:
-    """The poses whose parts are compared: rpg turns errors into the estimate's own world, ov_eval into the truth's."""
-    if of.settings.relative_rule == "openvins" or of.settings.project:
-        return of.T_moving
-    T_est = of.matched.T_est
-    return se3.transform(T_est[:, :3, :3], of.alignment.scale * T_est[:, :3, 3])
-
-
-def _scale(of: Comparison, segments: SegmentErrors) -> Iterator[Samples]:
-    frames = of.matched.pairs.gt
-    first, last = (np.searchsorted(frames, ends) for ends in (segments.first, segments.last))
-    found = scale_errors(of.matched.T_gt, of.T_moving, of.distances_m[frames], first, last)
-    yield Samples("scale_error", found.error)
-    if len(found):
-        yield Samples("scale_drift", np.array([found.drift_per_m]))
+def _joined(parts: Sequence[Samples], which: "NDArray[np.bool_] | slice" = slice(None)) -> Samples:
+    """The samples of one metric of several sequences one after the other, or `which` of them."""
+    errors = np.concatenate([part.errors for part in parts])[which]
+    overs = [part.over for part in parts if part.over is not None]
+    if not overs:
+        return Samples(parts[0].of, errors)
+    length_m = np.concatenate([over.length_m for over in overs])[which]
+    drifts = [over.drift for over in overs if over.drift is not None]
+    drift = np.concatenate(drifts)[which] if drifts else None
+    return Samples(parts[0].of, errors, OverLengths(errors, length_m, drift))
 
 
 if TYPE_CHECKING:
@@ -358,31 +213,35 @@ class Score:
         }
 
 
-DEFAULTS = ScoreSettings()
-
-
 def score(
-    gt: Trajectory, est: Trajectory, *, settings: ScoreSettings = DEFAULTS, covariance: Array | None = None
+    gt: Trajectory,
+    est: Trajectory,
+    *,
+    settings: ScoreSettings = DEFAULTS,
+    covariance: Array | None = None,
+    metrics: Iterable[MetricDefinition] = tuple(DEFINITIONS.values()),
 ) -> Score:
     """Score an estimate of the motion of one frame against the truth of the same frame.
 
     `covariance` (N, 6, 6) of the estimate's poses adds their consistency (see `nees`). A metric without
     samples is left out and a warning says why, never a zero. Raises AlignmentError where no poses match in time.
     """
-    of = compare(gt, est, settings)
-    ate = absolute_errors(of.matched.T_gt, of.T_aligned)
-    samples = tuple(found for found in (*measured(of, ate), *_consistency(of, covariance)) if len(found.errors))
-    metrics = tuple(found.metric(of.settings, n=len(of.matched), of=len(gt)) for found in samples)
+    of = compare(gt, est, settings, covariance=covariance)
+    ate = of.once(absolute)
+    asked = [metric for metric in metrics if settings.full or not metric.full or metric in nees.METRICS]
+    headlines_first = sorted(asked, key=lambda metric: metric.full)
+    samples = tuple(found for metric in headlines_first if len((found := Samples.measured(metric, of)).errors))
+    scored = tuple(found.metric(of.settings, n=len(of.matched), of=len(gt)) for found in samples)
     frames = of.matched.pairs.gt
     covered, slot = coverage(gt.t_ns, frames, of=settings.coverage_of), slots(gt.t_ns, settings.coverage_of)[frames]
     return Score(
-        metrics=metrics,
+        metrics=scored,
         association=Association(len(frames), len(gt), len(est), settings.max_diff_ns / 1e9),
         coverage=covered,
         failure=failure(ate.trans_m, slot, covered, fail_m=settings.fail_ratio * float(of.distances_m[-1])),
-        lost_aware_id=identity("lost.aware.score", of.settings, n=len(frames), of=len(gt)),
+        lost_aware_id=identity(DEFINITIONS["lost_aware"], of.settings, n=len(frames), of=len(gt)),
         alignment=of.alignment,
-        warnings=(*_matching_warnings(of, covered), *_missing_warnings(of, metrics)),
+        warnings=(*_matching_warnings(of, covered), *_missing_warnings(of, scored)),
         gt_frames=frames,
         gt_t_ns=gt.t_ns[frames],
         ate_trans_m=ate.trans_m,
@@ -418,61 +277,10 @@ def pooled(scores: Sequence[Score]) -> Pooled:
         if len(ids) > 1:
             warnings.append(f"{name} is not pooled, for the sequences measure it in different ways: compare their ids")
             continue
-        together = joined([part for part, _ in found])
+        together = _joined([part for part, _ in found])
         metrics.append(together.metric(found[0][1], n=n, of=of))
         lengths += together.per_length(found[0][1])
     return Pooled(tuple(metrics), tuple(lengths), tuple(warnings))
-
-
-def compare(gt: Trajectory, est: Trajectory, settings: ScoreSettings = DEFAULTS) -> Comparison:
-    """Match and align, ready to be measured. Raises AlignmentError where no poses match in time."""
-    window = {"max_diff_ns": settings.max_diff_ns, "offset_ns": settings.offset_ns}
-    matched = match(gt, est, method=settings.association, **window)
-    if not len(matched):
-        raise AlignmentError(_no_overlap(gt, est, settings))
-    alignment, T_aligned, T_moving = _aligned(matched, settings)
-    if settings.project:
-        gt = Trajectory(gt.t_ns, in_plane(gt.T_world_frame, settings.project))
-        matched = replace(matched, T_gt=in_plane(matched.T_gt, settings.project))
-        T_aligned, T_moving = (in_plane(T, settings.project) for T in (T_aligned, T_moving))
-    distances_m = gt.distances_m()
-    return Comparison(
-        gt=gt,
-        est=est,
-        matched=matched,
-        alignment=alignment,
-        T_aligned=T_aligned,
-        T_moving=T_moving,
-        distances_m=distances_m,
-        settings=settled(settings, float(distances_m[-1])),
-    )
-
-
-def _aligned(matched: Matched, settings: ScoreSettings) -> tuple[Alignment, Array, Array]:
-    """The alignment, and the poses (K, 4, 4) that it makes: to compare as they are, and to compare their motions."""
-    T_est, T_gt = matched.T_est, matched.T_gt
-    if settings.scale_rule == "alignment":
-        alignment = align(T_est, T_gt, kind=settings.alignment, first_n=settings.align_n)
-        T_aligned = alignment.apply(T_est)
-        return alignment, T_aligned, T_aligned
-    scale = ate_scale(T_gt, T_est)
-    scaled = se3.transform(T_est[:, :3, :3], scale * T_est[:, :3, 3])
-    alignment = replace(align(scaled, T_gt, kind=settings.alignment, first_n=settings.align_n), scale=scale)
-    return alignment, alignment.apply(T_est), replace(alignment, scale=motion_scale(T_gt, T_est)).apply(T_est)
-
-
-def _consistency(of: Comparison, covariance: Array | None) -> Iterator[Samples]:
-    if covariance is None:
-        return
-    if of.settings.project:
-        raise AlignmentError(f"covariances should be of poses in space, but project={of.settings.project} is asked for")
-    if covariance.shape != (len(of.est), 6, 6):
-        raise AlignmentError(f"covariance should be ({len(of.est)}, 6, 6), one a pose, but is {covariance.shape}")
-    of_pose = covariance[of.matched.pairs.est]
-    nees = consistency(of.matched.T_gt, of.matched.T_est, of_pose, of.alignment)
-    yield Samples("nees_pose", nees.pose)
-    yield Samples("nees_trans", nees.trans)
-    yield Samples("nees_rot", nees.rot)
 
 
 def _matching_warnings(of: Comparison, covered: Coverage) -> Iterator[str]:
@@ -514,21 +322,6 @@ def _missing_warnings(of: Comparison, metrics: tuple[Metric, ...]) -> Iterator[s
         )
     if not path_m:
         yield "no lost-aware score: the truth stands still, so no error can be measured against its path"
-
-
-def _no_overlap(gt: Trajectory, est: Trajectory, settings: ScoreSettings) -> str:
-    moved = f" moved by {settings.offset_ns / 1e9:g} s" if settings.offset_ns else ""
-    return (
-        f"no pose of the estimate{moved} is within {settings.max_diff_ns / 1e6:g} ms of a ground-truth pose: "
-        f"the truth has {_span(gt)}, the estimate {_span(est)}"
-    )
-
-
-def _span(trajectory: Trajectory) -> str:
-    if not len(trajectory):
-        return "no pose"
-    first, last = seconds(int(trajectory.t_ns[0])), seconds(int(trajectory.t_ns[-1]))
-    return f"{len(trajectory)} poses from {first} s to {last} s"
 
 
 def _frames(count: int) -> str:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
 from vobench.metric.ate import PoseErrors, Rows, errors_between, in_blocks
+from vobench.metric.comparison import POSES, Comparison, MetricDefinition, OverLengths
 from vobench.metric.settings import INDOOR_LENGTHS_M, Mean, Precision
 from vobench.trajectory.associate import Index
 
@@ -107,3 +108,52 @@ def _devkit_errors(T_gt: Array, T_est: Array, first: Index, last: Index) -> Rows
     cosine = (0.5 * ((a + b + c).astype(np.float64) - 1.0)).astype(np.float32)
     x, y, z = (E[:, k, 3].astype(np.float32) for k in range(3))
     return np.sqrt(x * x + y * y + z * z), np.arccos(np.clip(cosine, np.float32(-1), np.float32(1)))
+
+
+def segments(of: Comparison) -> SegmentErrors:
+    """`segment_errors` of a comparison."""
+    s = of.settings
+    return segment_errors(
+        of.matched.T_gt,
+        of.T_moving,
+        of.matched.pairs.gt,
+        devkit_distances(of.gt.positions_m) if s.segment_precision == "devkit" else of.distances_m,
+        lengths_m=s.segment_lengths_m or (),
+        step_frames=s.segment_step_frames or 1,
+        precision=s.segment_precision,
+    )
+
+
+def _drift(of: Comparison, drift: Distances, *, in_degrees: bool = False) -> OverLengths:
+    errors: Array = np.rad2deg(drift, dtype=float) if in_degrees else drift  # type: ignore[assignment]
+    return OverLengths(errors, of.once(segments).length_m, drift)
+
+
+SEGMENTS = ("segment_lengths_m", "segment_step_frames", "segment_precision", "segment_mean", *POSES)
+GEIGER = "Geiger et al. (2012), section 3.2, and its development kit"
+METRICS = (
+    MetricDefinition(
+        "kitti_t_rel",
+        "translation drift per metre of path",
+        "1",
+        "‖t‖ of (T_est,ij)⁻¹ T_gt,ij / length, j the first frame further than the length along the true path",
+        GEIGER,
+        SEGMENTS,
+        "jitter: it is small against segments of a hundred metres",
+        headline="mean",
+        full=False,
+        measure=lambda of: _drift(of, of.once(segments).trans_ratio),
+    ),
+    MetricDefinition(
+        "kitti_r_rel",
+        "rotation drift per metre of path",
+        "deg/m",
+        "angle of (T_est,ij)⁻¹ T_gt,ij / length, segments as of kitti_t_rel",
+        GEIGER,
+        SEGMENTS,
+        "jitter, and errors that turn back within a segment",
+        headline="mean",
+        full=False,
+        measure=lambda of: _drift(of, of.once(segments).rot_radpm, in_degrees=True),
+    ),
+)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from math import inf, isfinite, pi
-from typing import Any, Literal, get_args
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from vobench.errors import AlignmentError
 from vobench.trajectory.align import Kind
@@ -63,7 +63,7 @@ class ScoreSettings:
 
     def _demands(self) -> list[tuple[str, Any, bool, str]]:
         """(name, value, whether it is right, what is right) of each setting that can be wrong."""
-        choices = [(name, getattr(self, name), known) for name, known in _CHOICES.items()]
+        choices = [(name, getattr(self, name), known) for name, known in CHOICES.items()]
         whole = self.rpe_delta == round(self.rpe_delta) if isfinite(self.rpe_delta) else False
         pairs, own_pairs = (self.rpe_unit, self.rpe_all_pairs, self.rpe_pairs_from), PAIRS_OF_RULE.get(self.rpe_rule)
         lengths, step = self.segment_lengths_m, self.segment_step_frames
@@ -89,19 +89,16 @@ class ScoreSettings:
         ]
 
 
-_CHOICES = {
-    "alignment": get_args(Kind),
-    "association": get_args(Method),
-    "rpe_unit": get_args(Unit),
-    "rpe_pairs_from": get_args(Side),
-    "rpe_rule": get_args(PairRule),
-    "segment_precision": get_args(Precision),
-    "segment_mean": get_args(Mean),
-    "relative_rule": get_args(RelativeRule),
-    "scale_rule": get_args(ScaleRule),
-    "project": (None, *get_args(Plane)),
-    "coverage_of": get_args(CoverageOf),
-}
+def _names(hint: Any) -> tuple[Any, ...]:
+    """What an annotation of a literal, or of a literal or None, allows; nothing for any other."""
+    if get_origin(hint) is Literal:
+        return get_args(hint)
+    own = [name for part in get_args(hint) for name in _names(part)]
+    return (None, *own) if own else ()
+
+
+# The names that a setting may have, where it is one of a few.
+CHOICES = {name: names for name, hint in get_type_hints(ScoreSettings).items() if (names := _names(hint))}
 # Unit, all pairs and side: the only pairs that these tools have.
 PAIRS_OF_RULE: dict[PairRule, tuple[Unit, bool, Side]] = {"tum": ("s", True, "est"), "tartanair": ("f", True, "gt")}
 _LARGEST = {"d": 180.0, "r": pi}
