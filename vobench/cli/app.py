@@ -209,20 +209,6 @@ def info_command(
     sequence.show_info(path, given, as_json=json)
 
 
-def salvage_command(
-    torn: Annotated[
-        Path, typer.Argument(metavar="TORN", help="An MCAP file that was cut off, or a sequence's folder.")
-    ],
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="The whole file or folder to write.")],
-    *,
-    json: Json = False,
-) -> None:
-    """Recover what is whole in a torn MCAP file."""
-    from vobench.cli import sequence
-
-    sequence.show_salvaged(torn, out, as_json=json)
-
-
 def verify_command(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or runs/<suite> for its latest.")],
     *,
@@ -425,7 +411,6 @@ app.command("metrics")(metrics_command)
 app.command("import")(import_command)
 app.command("export")(export_command)
 app.command("info")(info_command)
-app.command("salvage")(salvage_command)
 app.command("verify")(verify_command)
 
 

@@ -1,4 +1,4 @@
-"""vobench import, export, info and salvage."""
+"""vobench import, export and info."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
@@ -12,8 +12,7 @@ from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.run.store import unfinished
-from vobench.sequence.recording import TopicFacts, bag_facts, topic_facts
-from vobench.sequence.salvage import Salvaged, salvage, salvage_sequence
+from vobench.sequence.recording import TopicFacts, topic_facts
 from vobench.trajectory.trajectory import Trajectory
 
 SENSORS_FILE = "sensors.mcap"
@@ -142,7 +141,7 @@ def _files(path: Path, form: str) -> Iterator[tuple[str, tuple[TopicFacts, ...]]
         files = [path] if path.is_file() else sorted(path.glob("*.mcap"))
         yield from ((file.name, topic_facts(file)) for file in files)
     elif form in ("ros1", "ros2", "mcap"):
-        yield path.name, bag_facts(path)
+        yield path.name, topic_facts(path)
 
 
 def _topic(facts: TopicFacts) -> dict[str, Any]:
@@ -221,29 +220,3 @@ def _truth_line(truth: dict[str, Any] | None) -> str:
     if truth is None:
         return "ground truth: none"
     return f"ground truth: {truth['poses']} poses, {truth['path_m']:.3f} m, {truth['duration_s']:.3f} s"
-
-
-def show_salvaged(torn: Path, out: Path, *, as_json: bool) -> None:
-    """Recover a torn file, or both files of a torn sequence, and print what came and what is lost."""
-    if torn.is_dir():
-        require_free(out)
-        found = salvage_sequence(torn, out)
-    else:
-        if out.exists():
-            raise InputError(f"should be a new file, but there is something: {out}")
-        found = {out.name: salvage(torn, out)}
-    if as_json:
-        terminal.print_json({"path": str(out), "files": {name: asdict(what) for name, what in found.items()}})
-        return
-    for name, what in found.items():
-        _print_salvaged(name, what)
-
-
-def _print_salvaged(name: str, what: Salvaged) -> None:
-    out = terminal.console()
-    rows = [[topic, str(count)] for topic, count in sorted(what.messages.items())]
-    out.print(terminal.table(name, ["name", "messages"], rows) if rows else f"{name}: nothing")
-    for sentence in what.lost:
-        out.print(f"lost: {sentence}")
-    if not what.lost:
-        out.print("nothing was lost")
