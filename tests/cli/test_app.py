@@ -198,8 +198,8 @@ def test_a_reader_that_has_seen_enough_is_no_failure_and_gets_no_traceback(ran, 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_every_shell_is_told_how_to_complete_and_is_offered_the_commands(shell):
-    asked = {"COMP_WORDS": "vobench sal", "COMP_CWORD": "1"}
-    asked |= {"_TYPER_COMPLETE_ARGS": "vobench sal", "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
+    asked = {"COMP_WORDS": "vobench ver", "COMP_CWORD": "1"}
+    asked |= {"_TYPER_COMPLETE_ARGS": "vobench ver", "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
     script = "import sys; from vobench.cli import main; sys.argv = ['vobench']; main()"
 
     def said(instruction):
@@ -208,5 +208,5 @@ def test_every_shell_is_told_how_to_complete_and_is_offered_the_commands(shell):
 
     assert f"complete_{shell}" in said("source")
     offered = said("complete")
-    assert "salvage" in offered
+    assert "verify" in offered
     assert "report" not in offered

@@ -1,4 +1,4 @@
-"""vobench import, export, info, salvage and verify, as they are typed."""
+"""vobench import, export, info and verify, as they are typed."""
 
 import shutil
 
@@ -66,7 +66,7 @@ def test_info_of_one_file_is_of_that_file(vobench, sequence):
     assert list(vobench("info", sequence / "sensors.mcap", "--json").json["files"]) == ["sensors.mcap"]
 
 
-def test_a_torn_sequence_is_recognised_and_what_is_whole_comes_back(vobench, sequence, here):
+def test_a_torn_sequence_is_recognised(vobench, sequence, here):
     torn = here / "torn"
     shutil.copytree(sequence, torn)
     whole = (torn / "sensors.mcap").read_bytes()
@@ -74,23 +74,6 @@ def test_a_torn_sequence_is_recognised_and_what_is_whole_comes_back(vobench, seq
     said = vobench("info", torn)
     assert said.code == 1
     assert "cut off" in said.err
-    assert "vobench salvage" in said.err
-    found = vobench("salvage", torn, "back", "--json").json["files"]
-    assert found["sensors.mcap"]["lost"]
-    assert not found["truth.mcap"]["lost"]
-    assert vobench("info", "back", "--json").json["frames"] > 0
-
-
-def test_a_sequence_whose_truth_is_lost_says_so_and_keeps_its_pictures(vobench, sequence, here):
-    (here / "half").mkdir()
-    shutil.copy(sequence / "sensors.mcap", here / "half")
-    (here / "half" / "truth.mcap.part").write_bytes(b"")
-    assert "was never finished; `vobench salvage`" in vobench("info", "half").err
-    said = vobench("salvage", "half", "deep/rest")
-    assert said.code == 0
-    assert "truth.mcap: nothing" in said.out
-    assert "lost: not an MCAP recording by its first bytes" in said.out
-    assert vobench("info", "deep/rest", "--json").json["ground_truth"] is None
 
 
 def test_a_sequence_that_was_never_finished_is_recognised(vobench, sequence, here):
@@ -99,7 +82,7 @@ def test_a_sequence_that_was_never_finished_is_recognised(vobench, sequence, her
     (torn / "sensors.mcap").rename(torn / "sensors.mcap.part")
     said = vobench("info", torn)
     assert said.code == 1
-    assert "never finished; `vobench salvage`" in said.err
+    assert "was never finished" in said.err
 
 
 def test_a_run_verifies_and_a_changed_one_does_not(vobench, ran):
@@ -125,8 +108,6 @@ WRONG = [
         "no sequence of ours (it has no sensors.mcap); vobench import makes one: suites",
     ),
     (("export", "suites", "out", "--form", "eurok"), "eurok"),
-    (("salvage", "suites/tiny.yaml", "out.mcap"), "not an MCAP recording by its first bytes: suites/tiny.yaml"),
-    (("salvage", "nothing.mcap", "out.mcap"), "nothing.mcap"),
     (("verify", "suites"), "not the folder of a run"),
 ]
 

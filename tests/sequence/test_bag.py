@@ -1,14 +1,40 @@
-"""Other people's readers open both files and see the same messages in order of time."""
+"""A bag opens in other people's readers, and ours believes no more of one than agrees with itself."""
+
+import struct
+import zlib
+from dataclasses import replace
 
 import cv2
+import lz4.frame
 import numpy as np
 import pytest
+import zstandard
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from mcap.records import Chunk, Metadata
+from mcap.writer import CompressionType, IndexType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 
+from vobench.errors import SequenceError
 from vobench.geometry import se3
+from vobench.sequence import messages as ros
+from vobench.sequence.bag import (
+    HEAD,
+    MAGIC,
+    MAX_BYTES,
+    MAX_RECORDS,
+    MESSAGE,
+    Bag,
+    BagWriter,
+    BoundedFile,
+    messages_in,
+    read_record,
+)
+from vobench.sequence.messages import serialise
+
+FOOTER = struct.Struct("<QQI")
 
 COUNTS = {
     "sensors.mcap": {
@@ -101,3 +127,233 @@ def test_odometry_is_the_pose_and_the_twist_of_the_body(recording, folder):
     assert {(m.header.frame_id, m.child_frame_id) for m in odometry} == {("map", "base_link")}
     twists = [[getattr(v, a) for v in (m.twist.twist.linear, m.twist.twist.angular) for a in "xyz"] for m in odometry]
     np.testing.assert_array_equal(twists, recording.twist)
+
+
+@pytest.fixture(scope="module")
+def long_folder(recording, tmp_path_factory):
+    """A recording of several chunks."""
+    count = 95
+    t_ns = np.arange(count) * 1_000_000_000 // 30
+    pick = np.arange(count) % len(recording.t_ns)
+    encoder_t_ns = np.arange(1, int(t_ns[-1]) // 10_000_000 + 1) * 10_000_000
+    return replace(
+        recording,
+        t_ns=t_ns,
+        left=recording.left[pick],
+        right=recording.right[pick],
+        encoder_t_ns=encoder_t_ns,
+        ticks=np.zeros((len(encoder_t_ns), 2), np.int64),
+        T_map_body=recording.T_map_body[pick],
+        twist=recording.twist[pick],
+        slip=recording.slip[pick],
+        push=recording.push[pick],
+    ).write(tmp_path_factory.mktemp("long"))
+
+
+@pytest.mark.parametrize("name", ["sensors.mcap", "truth.mcap"])
+def test_counts_and_stamps_are_those_of_the_messages_that_another_reader_finds(long_folder, counts, name):
+    bag = Bag.open(long_folder / name)
+    found: dict[str, list[int]] = {topic: [] for topic in counts(bag.path)}
+    with (long_folder / name).open("rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages():
+            found[channel.topic].append(message.log_time)
+            assert bag.has(ros.Topic(channel.topic, schema.name))
+    assert len(bag.counts) > 3
+    assert counts(bag.path) == {topic: len(stamps) for topic, stamps in found.items()}
+    for topic in (*ros.SENSOR_TOPICS, *ros.TRUTH_TOPICS):
+        assert bag.stamps(topic).tolist() == found.get(topic.name, [])
+
+
+def test_what_has_one_stamp_is_in_one_chunk_and_a_chunk_lasts_no_longer_than_a_second(long_folder):
+    chunks = Bag.open(long_folder / "sensors.mcap").summary.chunk_indexes
+    start_ns, end_ns = np.array([(c.message_start_time, c.message_end_time) for c in chunks], np.int64).T
+    assert np.all(end_ns[:-1] < start_ns[1:] + (np.arange(len(chunks) - 1) == 0))
+    assert np.all(end_ns - start_ns < 1_000_000_000)
+
+
+def test_a_chunk_ends_at_the_first_new_stamp_after_a_mebibyte(tmp_path):
+    with BagWriter(tmp_path / "a", ros.IMAGE_TOPICS, encoded=True) as bag:
+        for t_ns in range(10):
+            for topic in ros.IMAGE_TOPICS:
+                bag.write(topic, t_ns, serialise(ros.image(t_ns, "cam_left", bytes(400_000), "png")))
+    chunks = Bag.open(tmp_path / "a").summary.chunk_indexes
+    assert [chunk.message_start_time for chunk in chunks] == [0, 2, 4, 6, 8]
+
+
+def write_foreign(path, count=30, **options):
+    """A file as the library writes it, with two topics."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=200, **options)
+        writer.start(profile="ros2")
+        schema = writer.register_schema(ros.ENCODERS.type_name, "ros2msg", b"")
+        channels = [writer.register_channel(name, "cdr", schema) for name in (ros.ENCODERS.name, "/other")]
+        for t_ns in range(count):
+            writer.add_message(channels[t_ns % 2], t_ns, serialise(ros.wheel_ticks(t_ns, t_ns, -t_ns)), t_ns)
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize("packing", CompressionType)
+def test_every_packing_is_read(tmp_path, packing):
+    bag = Bag.open(write_foreign(tmp_path / "a", compression=packing))
+    assert [m.left for _, m in bag.messages([ros.ENCODERS])] == list(range(0, 30, 2))
+    messages = [serialise(ros.wheel_ticks(2 * n, 2 * n, -2 * n)) for n in range(15)]
+    assert [bytes(bag.nth(ros.ENCODERS, n)) for n in (0, 7, 14)] == [messages[n] for n in (0, 7, 14)]
+
+
+@pytest.mark.parametrize(
+    "options", [{"use_chunking": False}, {"index_types": IndexType.NONE}, {"use_statistics": False}]
+)
+def test_a_file_without_an_index_is_refused(tmp_path, options):
+    path = write_foreign(tmp_path / "a", **options)
+    with pytest.raises(SequenceError, match=r"^the recording is damaged \(ValueError: .*a$"):
+        Bag.open(path)
+
+
+def test_messages_that_fall_back_in_time_are_refused_when_they_come(tmp_path):
+    with (tmp_path / "a").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel(
+            ros.ENCODERS.name, "cdr", writer.register_schema(ros.ENCODERS.type_name, "ros2msg", b"")
+        )
+        for t_ns in (5, 4):
+            writer.add_message(channel, t_ns, serialise(ros.wheel_ticks(t_ns, 0, 0)), t_ns)
+        writer.finish()
+    messages = Bag.open(tmp_path / "a").raw([ros.ENCODERS])
+    next(messages)
+    with pytest.raises(SequenceError, match="after 5 ns comes 4 ns"):
+        next(messages)
+
+
+def test_two_senders_of_a_topic_are_refused(tmp_path):
+    with (tmp_path / "a").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        for _ in range(2):
+            schema = writer.register_schema(ros.ENCODERS.type_name, "ros2msg", b"")
+            writer.register_channel(ros.ENCODERS.name, "cdr", schema)
+        writer.finish()
+    with pytest.raises(SequenceError, match=r"^/encoders should be vobench_msgs/msg/WheelTicks but is 2 channels in"):
+        Bag.open(tmp_path / "a").has(ros.ENCODERS)
+
+
+def record_places(data, begin):
+    """Opcode and place of what each record holds, from one record on."""
+    while data[begin:] != MAGIC:
+        opcode, length = HEAD.unpack_from(data, begin)
+        yield opcode, begin + HEAD.size
+        begin += HEAD.size + length
+
+
+@pytest.fixture
+def summary(tmp_path):
+    """A foreign file without a checksum of its summary, where each of its records lies, and how to change a number."""
+    path = write_foreign(tmp_path / "a")
+    data = bytearray(path.read_bytes())
+    footer_at = len(data) - len(MAGIC) - FOOTER.size
+    data[footer_at + FOOTER.size - 4 : footer_at + FOOTER.size] = bytes(4)
+    path.write_bytes(data)
+    assert Bag.open(path).count(ros.ENCODERS) == 15
+    places = list(record_places(data, FOOTER.unpack_from(data, footer_at)[0]))
+
+    def change(opcode, number, at, form, change_by):
+        begin = [place for kind, place in places if kind == opcode][number] + at
+        struct.pack_into(form, data, begin, struct.unpack_from(form, data, begin)[0] + change_by)
+        path.write_bytes(data)
+        return path
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("where", "form", "change_by", "said"),
+    [
+        ((Opcode.CHUNK_INDEX, 0, 24), "<Q", 8, "ends within an entry"),
+        ((Opcode.CHUNK_INDEX, 1, 48), "<Q", 16 * 20, "ends within an entry"),
+        ((Opcode.CHUNK_INDEX, 0, 24), "<Q", 1 << 63, "recording is damaged"),
+        ((Opcode.CHANNEL, 0, 0), "<H", 77, "names a channel or a message type that it does not describe"),
+        ((Opcode.CHANNEL, 0, 2), "<H", 77, "names a channel or a message type that it does not describe"),
+        ((Opcode.STATISTICS, 0, 48), "<Q", 1, "counts other messages than its message indexes do"),
+        ((Opcode.FOOTER, 0, 16), "<I", 1, "the checksum of its summary is wrong"),
+        ((Opcode.FOOTER, 0, 0), "<Q", 1 << 40, "it has no summary"),
+    ],
+)
+def test_a_summary_that_contradicts_itself_or_the_file_is_refused(summary, where, form, change_by, said):
+    path = summary(*where, form, change_by)
+    with pytest.raises(SequenceError, match=said):
+        Bag.open(path)
+
+
+def test_chunks_that_overlap_are_refused(summary):
+    """Else few bytes could state the same chunk again and again."""
+    summary(Opcode.CHUNK_INDEX, 1, 16, "<Q", -150)
+    path = summary(Opcode.CHUNK_INDEX, 1, 24, "<Q", 150)
+    with pytest.raises(SequenceError, match="the chunks of its summary overlap"):
+        Bag.open(path)
+
+
+DATA = b"abcd"
+RECORDS = (
+    HEAD.pack(99, 2) + b"??" + HEAD.pack(Opcode.MESSAGE, MESSAGE.size + len(DATA)) + MESSAGE.pack(3, 0, 7, 7) + DATA
+)
+PACK = {"": bytes, "zstd": zstandard.ZstdCompressor().compress, "lz4": lz4.frame.compress}
+SIZE = len(RECORDS)
+
+
+def chunk(packing, packed, *, size=SIZE, checksum=0):
+    return Chunk(packing, packed, 7, 7, checksum, size)
+
+
+@pytest.mark.parametrize("packing", PACK)
+def test_a_chunk_unpacks_to_its_messages_and_one_that_states_another_size_is_refused(packing):
+    packed = PACK[packing](RECORDS)
+    for checksum in (0, zlib.crc32(RECORDS)):
+        ((channel, log_ns, data),) = messages_in(chunk(packing, packed, checksum=checksum), {3})
+        assert (channel, log_ns, bytes(data)) == (3, 7, DATA)
+    assert list(messages_in(chunk(packing, packed), {4})) == []
+    for size in (SIZE - 1, SIZE + 1, MAX_BYTES + 1, 2**63):
+        with pytest.raises((ValueError, RuntimeError)):
+            list(messages_in(chunk(packing, packed, size=size), {3}))
+
+
+@pytest.mark.parametrize(
+    ("bad", "said"),
+    [
+        (chunk("", RECORDS, checksum=1), "the checksum of a chunk differs"),
+        (chunk("zstd", PACK["zstd"](RECORDS), size=12), f"a chunk states 12 bytes unpacked and {SIZE}"),
+        (chunk("gzip", RECORDS), "packed as 'gzip'; zstd and lz4 are known"),
+        (chunk("", RECORDS[:-1], size=SIZE - 1), "runs over the end of its chunk"),
+        (chunk("", bytes(9 * (MAX_RECORDS + 1)), size=9 * (MAX_RECORDS + 1)), f"{MAX_RECORDS} records and more"),
+    ],
+)
+def test_a_damaged_chunk_is_told_by_what_is_wrong(bad, said):
+    with pytest.raises(ValueError, match=said):
+        list(messages_in(bad, {3}))
+
+
+def test_no_more_is_read_than_there_is(tmp_path):
+    (tmp_path / "a").write_bytes(bytes(range(13)))
+    with BoundedFile(tmp_path / "a") as stream:
+        stream.seek(9)
+        assert stream.read(4) == bytes(range(9, 13))
+        for offset, length, said in ((9, 5, "but 4 are left"), (99, 1, "but 0 are left"), (0, 1 << 60, "at most 13")):
+            stream.seek(offset)
+            with pytest.raises(ValueError, match=said):
+                stream.read(length)
+        for length in (-1, None):
+            with pytest.raises(ValueError, match="at most 13 are read"):
+                stream.read(length)
+
+
+def test_a_record_of_another_kind_or_with_a_false_length_within_is_refused(tmp_path):
+    """The length of a note's name says 4 GiB: the library would ask for them."""
+    (tmp_path / "a").write_bytes(HEAD.pack(Opcode.METADATA, 8) + struct.pack("<II", 0xFFFFFFFF, 0))
+    said = "4294967295 bytes are stated where at most 17 are read"
+    with BoundedFile(tmp_path / "a") as stream, pytest.raises(ValueError, match=said):
+        read_record(stream, 0, Metadata)
+    (tmp_path / "b").write_bytes(HEAD.pack(Opcode.METADATA, 8) + bytes(8))
+    with BoundedFile(tmp_path / "b") as stream:
+        assert read_record(stream, 0, Metadata).name == ""
+        with pytest.raises(ValueError, match="a Chunk should begin at 0, but a Metadata does"):
+            read_record(stream, 0, Chunk)

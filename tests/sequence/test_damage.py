@@ -10,9 +10,8 @@ import pytest
 from vobench.errors import SequenceError
 from vobench.sequence import Sequence, SequenceWriter, has_truth, read_case, read_truth
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import Bag, BagWriter
+from vobench.sequence.bag import HEAD, MESSAGE_INDEX_ENTRY, MESSAGE_INDEX_HEAD, Bag, BagWriter
 from vobench.sequence.calibration import write_mounts
-from vobench.sequence.mcap_index import CHUNK, DATA_LENGTH, HEAD, MESSAGE_INDEX_ENTRY, MESSAGE_INDEX_HEAD
 from vobench.sequence.messages import serialise
 from vobench.sequence.picture import encode
 
@@ -64,7 +63,10 @@ def test_a_git_lfs_pointer_and_a_text_are_named_as_what_they_are(folder, tmp_pat
     for start, said in (
         (b"version https://git-lfs.github.com/spec/v1\noid sha256:00", r"^this is a Git-LFS pointer .*`git lfs pull`"),
         (b"hello", r"^not an MCAP recording by its first bytes: .*sensors\.mcap$"),
-        ((folder / "sensors.mcap").read_bytes()[:-1], r"^the recording was cut off, .*`vobench salvage` recovers"),
+        (
+            (folder / "sensors.mcap").read_bytes()[:-1],
+            r"^the recording was cut off, .*`mcap recover`",
+        ),
     ):
         path.write_bytes(start)
         with pytest.raises(SequenceError, match=said):
@@ -75,11 +77,11 @@ def test_a_flipped_bit_in_the_index_of_stamps_is_refused(folder, tmp_path):
     """A stamp that its chunk has not, and one that only the calibration's own index denies."""
     bad = Path(shutil.copytree(folder, tmp_path / "bad"))
     bag, whole = Bag.open(folder / "sensors.mcap"), (folder / "sensors.mcap").read_bytes()
-    channel = next(c.id for c in bag.index.channels.values() if c.topic == ros.LEFT_IMAGE.name)
-    at = int(bag.index.entries[channel].offset[-1]) + MESSAGE_INDEX_HEAD
+    channel = next(c.id for c in bag.summary.channels.values() if c.topic == ros.LEFT_IMAGE.name)
+    at = bag.summary.chunk_indexes[-1].message_index_offsets[channel] + MESSAGE_INDEX_HEAD
     for byte, said in ((7, "has stamps that its chunk has not"), (0, "pictures and calibration should have the same")):
         data = bytearray(whole)
-        data[at + MESSAGE_INDEX_ENTRY.itemsize + byte] ^= 1
+        data[at + MESSAGE_INDEX_ENTRY + byte] ^= 1
         (bad / "sensors.mcap").write_bytes(data)
         with pytest.raises(SequenceError, match=said):
             Sequence.open(bad).frame_stamps()
@@ -87,7 +89,7 @@ def test_a_flipped_bit_in_the_index_of_stamps_is_refused(folder, tmp_path):
 
 def test_a_truth_that_was_never_finished_is_not_taken_for_none(folder, tmp_path):
     shutil.copy(folder / "truth.mcap", tmp_path / "truth.mcap.part")
-    with pytest.raises(SequenceError, match="was never finished; `vobench salvage` recovers"):
+    with pytest.raises(SequenceError, match="was never finished, its writer was stopped"):
         has_truth(tmp_path)
 
 
@@ -120,12 +122,12 @@ def test_a_chunk_with_fewer_frames_than_the_summary_says_is_refused(recording, t
             writer.write_frame(t_ns, recording.left[0], None)
     path = tmp_path / "sensors.mcap"
     bag, data = Bag.open(path), bytearray(path.read_bytes())
-    channel = next(c.id for c in bag.index.channels.values() if c.topic == ros.LEFT_IMAGE.name)
-    chunk = int(bag.index.offset[-1]) + HEAD.size
-    entry = int(bag.index.entries[channel].offset[-1]) + MESSAGE_INDEX_HEAD + MESSAGE_INDEX_ENTRY.itemsize
-    message = int(np.frombuffer(data, MESSAGE_INDEX_ENTRY, 1, entry)["offset"][0])
-    data[chunk + CHUNK.size - 8 : chunk + CHUNK.size - 4] = bytes(4)
-    data[chunk + CHUNK.size + DATA_LENGTH.size + message] = 99
+    channel = next(c.id for c in bag.summary.channels.values() if c.topic == ros.LEFT_IMAGE.name)
+    chunk = bag.summary.chunk_indexes[-1].chunk_start_offset + HEAD.size
+    entry = bag.summary.chunk_indexes[-1].message_index_offsets[channel] + MESSAGE_INDEX_HEAD + MESSAGE_INDEX_ENTRY
+    message = int(np.frombuffer(data, "<u8", 2, entry)[1])
+    data[chunk + 24 : chunk + 28] = bytes(4)
+    data[chunk + 40 + message] = 99  # behind times, size, checksum, no name and the length
     path.write_bytes(data)
     with pytest.raises(SequenceError, match=r"^1 frames found, but its summary says 2: "):
         list(Sequence.open(tmp_path).frames())

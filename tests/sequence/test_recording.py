@@ -16,16 +16,19 @@ from rosbags.typesys import Stores, get_typestore
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.sequence import messages as ros
-from vobench.sequence.mcap_index import MAGIC
-from vobench.sequence.recording import TopicFacts, bag_facts, is_recording, read_poses, topic_facts
+from vobench.sequence.bag import MAGIC, Bag
+from vobench.sequence.recording import TopicFacts, is_recording, read_poses, topic_facts
 from vobench.trajectory.trajectory import Trajectory
 
 
 @pytest.mark.parametrize("name", ["sensors.mcap", "truth.mcap"])
 def test_the_summary_and_the_messages_say_the_same(folder: Path, name: str) -> None:
+    bag = Bag.open(folder / name)
     facts = topic_facts(folder / name)
-    assert facts == bag_facts(folder / name)
-    assert facts
+    assert len(facts) > 5
+    for each in facts:
+        stamps = bag.stamps(ros.Topic(each.name, each.type_name))
+        assert (each.count, each.start_ns, each.end_ns) == (len(stamps), stamps[0], stamps[-1])
 
 
 def test_a_rate_takes_two_instants() -> None:
@@ -37,9 +40,8 @@ def test_a_rate_takes_two_instants() -> None:
 def test_a_torn_file_is_a_sentence(folder: Path, tmp_path: Path) -> None:
     torn = tmp_path / "torn.mcap"
     torn.write_bytes((folder / "sensors.mcap").read_bytes()[:-100])
-    for facts in (topic_facts, bag_facts):
-        with pytest.raises(SequenceError, match=r"torn\.mcap"):
-            facts(torn)
+    with pytest.raises(SequenceError, match=r"torn\.mcap"):
+        topic_facts(torn)
 
 
 # ruff: noqa: E501 - a sentence stands in one line

@@ -30,7 +30,6 @@ VERBS = {
     "import": "vobench.cli.sequence:import_command",
     "export": "vobench.cli.sequence:export_command",
     "info": "vobench.cli.sequence:info_command",
-    "salvage": "vobench.cli.sequence:salvage_command",
     "verify": "vobench.cli.report:verify_command",
     "report": "vobench.cli.report:report_command",
     "view": "vobench.cli.view:view_command",

@@ -1,4 +1,4 @@
-"""vobench import, export, info and salvage."""
+"""vobench import, export and info."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
@@ -14,8 +14,7 @@ from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.run.store import unfinished
-from vobench.sequence.recording import TopicFacts, bag_facts, topic_facts
-from vobench.sequence.salvage import Salvaged, salvage, salvage_sequence
+from vobench.sequence.recording import TopicFacts, topic_facts
 from vobench.trajectory.trajectory import Trajectory
 
 SENSORS_FILE = "sensors.mcap"
@@ -144,7 +143,7 @@ def _files(path: Path, form: str) -> Iterator[tuple[str, tuple[TopicFacts, ...]]
         files = [path] if path.is_file() else sorted(path.glob("*.mcap"))
         yield from ((file.name, topic_facts(file)) for file in files)
     elif form in ("ros1", "ros2", "mcap"):
-        yield path.name, bag_facts(path)
+        yield path.name, topic_facts(path)
 
 
 def _topic(facts: TopicFacts) -> dict[str, Any]:
@@ -225,32 +224,6 @@ def _truth_line(truth: dict[str, Any] | None) -> str:
     return f"ground truth: {truth['poses']} poses, {truth['path_m']:.3f} m, {truth['duration_s']:.3f} s"
 
 
-def show_salvaged(torn: Path, out: Path, *, as_json: bool) -> None:
-    """Recover a torn file, or both files of a torn sequence, and print what came and what is lost."""
-    if torn.is_dir():
-        require_free(out)
-        found = salvage_sequence(torn, out)
-    else:
-        if out.exists():
-            raise InputError(f"should be a new file, but there is something: {out}")
-        found = {out.name: salvage(torn, out)}
-    if as_json:
-        terminal.print_json({"path": str(out), "files": {name: asdict(what) for name, what in found.items()}})
-        return
-    for name, what in found.items():
-        _print_salvaged(name, what)
-
-
-def _print_salvaged(name: str, what: Salvaged) -> None:
-    out = terminal.console()
-    rows = [[topic, str(count)] for topic, count in sorted(what.messages.items())]
-    out.print(terminal.table(name, ["name", "messages"], rows) if rows else f"{name}: nothing")
-    for sentence in what.lost:
-        out.print(f"lost: {sentence}")
-    if not what.lost:
-        out.print("nothing was lost")
-
-
 Recorded = Annotated[
     Path, typer.Argument(metavar="PATH", help="A dataset's folder, a bag, or a sequence; its form is told by content.")
 ]
@@ -309,15 +282,3 @@ def info_command(
     """Say what is in a recording: topics, rates, duration, calibration, ground truth, hash."""
     given = Given(form, calibration, imu, truth, rate, tuple(topic or ()))
     show_info(path, given, as_json=json)
-
-
-def salvage_command(
-    torn: Annotated[
-        Path, typer.Argument(metavar="TORN", help="An MCAP file that was cut off, or a sequence's folder.")
-    ],
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="The whole file or folder to write.")],
-    *,
-    json: terminal.Json = False,
-) -> None:
-    """Recover what is whole in a torn MCAP file."""
-    show_salvaged(torn, out, as_json=json)

@@ -328,7 +328,7 @@ def _records(paths: list[Path]) -> dict[str, str]:
             if entries := bag.note(name):
                 records[name] = json.dumps(entries, sort_keys=True)
         for name in (CASE_ATTACHMENT, NAMES_ATTACHMENT):
-            if name in bag.index.attachments:
+            if bag.has_attachment(name):
                 records[name] = bag.attachment(name).decode()
     return records
 

@@ -16,7 +16,7 @@ from vobench.dataset.tartanair import read_tartanair
 from vobench.dataset.tum import read_tum
 from vobench.errors import InputError
 from vobench.sequence import Sequence, has_truth, read_truth
-from vobench.sequence.mcap_index import part_of
+from vobench.sequence.bag import part_of
 from vobench.sequence.recording import MAGICS, METADATA
 from vobench.sequence.writer import SENSORS_FILE
 

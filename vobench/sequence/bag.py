@@ -1,41 +1,35 @@
-"""One MCAP file in ROS 2 form: written in order of time and whole or not at all, read lazily and by index."""
+"""One MCAP file in ROS 2 form: written in order of time and whole or not at all, read lazily and within bounds.
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+The `mcap` library writes and parses; a `BoundedFile` keeps it from believing a length that a file states.
+"""
+
+import os
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
-from io import BytesIO
-from itertools import islice
+from io import BufferedReader, FileIO
+from itertools import islice, pairwise
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Self
+from typing import Any, BinaryIO, Self, TypeVar
 
+import lz4.frame
 import numpy as np
-from mcap.data_stream import ReadDataStream
+import zstandard
 from mcap.opcode import Opcode
-from mcap.records import Metadata
+from mcap.reader import make_reader
+from mcap.records import Attachment, Chunk, ChunkIndex, Footer, MessageIndex, Metadata
+from mcap.stream_reader import StreamReader
+from mcap.summary import Summary
 from mcap.writer import CompressionType, Writer
+from numpy.typing import NDArray
 
 from vobench import stop
 from vobench.errors import SequenceError
-from vobench.sequence.mcap_index import (
-    CHECKSUM,
-    MESSAGE_INDEX_ENTRY,
-    MESSAGE_INDEX_HEAD,
-    Entries,
-    Index,
-    Numbers,
-    attached,
-    checksum,
-    messages_in,
-    parsing,
-    part_of,
-    read_at,
-    read_index,
-    read_record,
-    unpacked,
-    whole_note,
-)
 from vobench.sequence.messages import NS_PER_S, TYPES, Topic
 
 NO_CHANNEL = -1
@@ -43,6 +37,19 @@ PROFILE, SCHEMA_ENCODING, MESSAGE_ENCODING = "ros2", "ros2msg", "cdr"
 # A chunk ends when it is as large or as long as this: it is all that a killed writer loses.
 CHUNK_BYTES, CHUNK_NS = 1 << 20, NS_PER_S
 NEVER = 1 << 62  # the library would end chunks between two pictures of one instant
+
+MAGIC, LFS_START = b"\x89MCAP0\r\n", b"version https://git-lfs"
+MAX_BYTES = 1 << 28  # of a record, and of a chunk unpacked; a writer's chunks are a thousand times smaller
+MAX_RECORDS = 1 << 20  # in a chunk; a few bytes of zstd could unpack to endless empty ones
+HEAD = struct.Struct("<BQ")  # opcode, length of what follows
+MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+FOOTER_BYTES = HEAD.size + struct.calcsize("<QQI")  # places of summary and summary offsets, checksum of both
+CRC_BYTES = 4
+MESSAGE_INDEX_HEAD, MESSAGE_INDEX_ENTRY = HEAD.size + struct.calcsize("<HI"), 16
+CHECKSUM = "vobench.crc32"  # the entry of a note of ours that is the checksum of the others
+
+Numbers = NDArray[np.int64]
+Record = TypeVar("Record")
 
 # A late listener still gets the last message; rosbag2 reads this to replay /tf_static as ROS publishes it.
 LATCHED_QOS = """\
@@ -109,7 +116,7 @@ class BagWriter:
 
     def note(self, name: str, entries: Mapping[str, str]) -> None:
         """Add a metadata record, with a checksum among its entries, for MCAP gives it none."""
-        self._mcap.add_metadata(name, {**entries, CHECKSUM: checksum(entries)})
+        self._mcap.add_metadata(name, {**entries, CHECKSUM: _checksum(entries)})
 
     def write(self, topic: Topic, t_ns: int, data: bytes) -> None:
         """Add a serialised message.
@@ -146,18 +153,182 @@ class BagWriter:
         self._stack.__exit__(kind, error, trace)
 
 
+class BoundedFile(BufferedReader):
+    """A file to read, of which nobody gets more than there is, whatever length its records state."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(FileIO(path))
+        self._most = min(os.fstat(self.fileno()).st_size, MAX_BYTES)
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Just so many bytes. Raises ValueError where they are too many, or not all there."""
+        if size is None or not 0 <= size <= self._most:
+            raise ValueError(f"{size} bytes are stated where at most {self._most} are read")
+        found = super().read(size)
+        if len(found) < size:
+            raise ValueError(f"{size} bytes are stated, but {len(found)} are left")
+        return found
+
+
+@contextmanager
+def parsing(path: Path) -> Iterator[None]:
+    """Say of any failure inside, in one line, what is wrong with the file at `path`.
+
+    A torn or foreign file makes parsers raise errors of a dozen unrelated kinds.
+    """
+    try:
+        yield
+    except SequenceError:
+        raise
+    except FileNotFoundError:
+        part = part_of(path)
+        if part.exists():
+            raise SequenceError(f"the recording was never finished, its writer was stopped: {part}") from None
+        raise SequenceError(f"no recording at {path}") from None
+    except Exception as error:
+        raise SequenceError(f"{_ailment(path, error)}: {path}") from error
+
+
+def part_of(path: Path) -> Path:
+    """Where a file is while it is being written."""
+    return path.with_name(path.name + ".part")
+
+
+def _ailment(path: Path, error: Exception) -> str:
+    """What is wrong with a file that could not be read, by its first and its last bytes."""
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(len(LFS_START))
+            stream.seek(max(0, os.fstat(stream.fileno()).st_size - len(MAGIC)))
+            end = stream.read()
+    except OSError as unreadable:
+        return f"the recording cannot be opened ({unreadable.strerror})"
+    if start == LFS_START:
+        return "this is a Git-LFS pointer instead of the recording; `git lfs pull` fetches it"
+    if not start.startswith(MAGIC):
+        return "not an MCAP recording by its first bytes"
+    if end != MAGIC:
+        return "the recording was cut off, its end is missing; `mcap recover` (mcap.dev) saves what is whole"
+    reason = str(error).splitlines()[0] if str(error) else "no reason given"
+    return f"the recording is damaged ({type(error).__name__}: {reason})"
+
+
+def unpack(packing: str, packed: bytes, size: int) -> bytes:
+    """The bytes of a chunk, never more than `size` and MAX_BYTES.
+
+    Raises ValueError, or an error of the packing's own, where it is none.
+    """
+    if size > MAX_BYTES:
+        raise ValueError(f"a chunk states {size} bytes unpacked where at most {MAX_BYTES} are read")
+    if not packing:
+        return packed
+    if packing == "zstd":
+        stated = zstandard.frame_content_size(packed)
+        if stated not in (-1, size):  # the library goes by this number, and by ours where it is not there
+            raise ValueError(f"a chunk states {size} bytes unpacked and {stated}")
+        return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
+    if packing == "lz4":
+        unpacker = lz4.frame.LZ4FrameDecompressor()
+        found = bytes(unpacker.decompress(packed, max_length=size))
+        if not unpacker.eof:
+            raise ValueError(f"a chunk states {size} bytes unpacked and has more, or was cut off")
+        return found
+    raise ValueError(f"a chunk is packed as {packing!r}; zstd and lz4 are known")
+
+
+def messages_in(chunk: Chunk, channels: Container[int]) -> Iterator[tuple[int, int, memoryview]]:
+    """Channel, log time in ns and data of each message of some channels, as they lie in a chunk.
+
+    Raises ValueError where the chunk is damaged. The library's own walk has no bound on empty records.
+    """
+    records = memoryview(unpack(chunk.compression, chunk.data, chunk.uncompressed_size))
+    checksum = chunk.uncompressed_crc
+    if len(records) != chunk.uncompressed_size or (checksum and zlib.crc32(records) != checksum):
+        raise ValueError("the checksum of a chunk differs from its content")
+    at = 0
+    for _ in range(MAX_RECORDS):
+        if at == len(records):
+            return
+        opcode, length = HEAD.unpack_from(records, at)
+        begin, at = at + HEAD.size, at + HEAD.size + length
+        if at > len(records):
+            raise ValueError("a record runs over the end of its chunk")
+        if opcode == Opcode.MESSAGE:
+            channel, _, log_ns, _ = MESSAGE.unpack_from(records, begin)
+            if channel in channels:
+                yield channel, log_ns, records[begin + MESSAGE.size : at]
+    raise ValueError(f"{MAX_RECORDS} records and more lie in one chunk")
+
+
+def read_record(stream: BinaryIO, offset: int, kind: type[Record]) -> Record:
+    """The record of a kind that begins at a place. Raises ValueError where there is none."""
+    stream.seek(offset)
+    found = next(StreamReader(stream, skip_magic=True, emit_chunks=True).records)
+    if not isinstance(found, kind):
+        raise ValueError(f"a {kind.__name__} should begin at {offset}, but a {type(found).__name__} does")
+    return found
+
+
+def read_summary(stream: BinaryIO) -> Summary:
+    """The records behind the data, their checksum tested. Raises ValueError where a file has none."""
+    footer_at = stream.seek(-FOOTER_BYTES - len(MAGIC), os.SEEK_END)
+    footer = read_record(stream, footer_at, Footer)
+    if not 0 < footer.summary_start <= footer_at:
+        raise ValueError("it has no summary")
+    stream.seek(footer.summary_start)
+    tested = stream.read(footer_at + FOOTER_BYTES - CRC_BYTES - footer.summary_start)
+    if footer.summary_crc and zlib.crc32(tested) != footer.summary_crc:
+        raise ValueError("the checksum of its summary is wrong")
+    stream.seek(0)
+    summary = make_reader(stream).get_summary()
+    if summary is None or summary.statistics is None:
+        raise ValueError("its summary has no statistics")
+    chunks = summary.chunk_indexes
+    if any(b.chunk_start_offset < a.chunk_start_offset + a.chunk_length for a, b in pairwise(chunks)):
+        raise ValueError("the chunks of its summary overlap")  # few bytes could state endless chunks
+    stated = Counter(summary.statistics.channel_message_counts)
+    if stated != sum((Counter(_counts(chunk)) for chunk in chunks), Counter()):
+        raise ValueError("its summary counts other messages than its message indexes do")
+    unknown = {channel.schema_id for channel in summary.channels.values()} - {0, *summary.schemas}
+    if unknown or stated.keys() - summary.channels.keys():
+        raise ValueError("its summary names a channel or a message type that it does not describe")
+    return summary
+
+
+def _counts(chunk: ChunkIndex) -> dict[int, int]:
+    """How many messages of each channel a chunk has, by the size of their indexes.
+
+    These lie one behind the other; each ends where the next one begins.
+    """
+    places = sorted((at, channel) for channel, at in chunk.message_index_offsets.items())
+    ends = [*(at for at, _ in places[1:]), chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length]
+    counts = {}
+    for (at, channel), end in zip(places, ends, strict=False):
+        counts[channel], over = divmod(end - at - MESSAGE_INDEX_HEAD, MESSAGE_INDEX_ENTRY)
+        if over or counts[channel] < 0:
+            raise ValueError(f"the message index at {at} ends within an entry")
+    return counts
+
+
+def _checksum(entries: Mapping[str, str]) -> str:
+    """The CRC-32 of a note's entries, whatever their order."""
+    return f"{zlib.crc32(repr(sorted(entries.items())).encode()):08x}"
+
+
 @dataclass(frozen=True, slots=True)
 class Bag:
-    """A bag to read: its index in memory, its messages one chunk at a time."""
+    """A bag to read: its summary in memory, its messages one chunk at a time; `counts` by chunk and channel."""
 
     path: Path
-    index: Index
+    summary: Summary
+    counts: tuple[dict[int, int], ...]
 
     @classmethod
     def open(cls, path: Path) -> "Bag":
         """Read the summary. Raises SequenceError where the file is none, torn or damaged."""
-        with parsing(path), path.open("rb") as stream:
-            return cls(path, read_index(stream))
+        with parsing(path), BoundedFile(path) as stream:
+            summary = read_summary(stream)
+            return cls(path, summary, tuple(map(_counts, summary.chunk_indexes)))
 
     def has(self, topic: Topic) -> bool:
         """Whether there is such a topic, empty or not. Raises SequenceError where it is of another type."""
@@ -171,20 +342,19 @@ class Bag:
 
     def count(self, topic: Topic) -> int:
         """How many messages a topic has; none where there is no such topic."""
-        return self._entries(topic).total
+        return self._total(self._channel(topic))
 
     def raw(self, topics: Iterable[Topic]) -> Iterator[tuple[Topic, memoryview]]:
         """The serialised messages of those topics that there are, in order of time, one chunk in memory at a time."""
         there = {self._channel(topic): topic for topic in topics if self.has(topic)}
-        chunks = np.flatnonzero(sum(self._entries(topic).count for topic in there.values()))
         last_ns = 0
-        with parsing(self.path), self._opened() as stream:
-            found = (found for chunk in chunks.tolist() for found in messages_in(self._chunk(stream, chunk), there))
-            for channel, log_ns, data in found:
-                if log_ns < last_ns:
-                    raise ValueError(f"after {last_ns} ns comes {log_ns} ns")
-                last_ns = log_ns
-                yield there[channel], data
+        with parsing(self.path), BoundedFile(self.path) as stream:
+            for chunk, counts in zip(self.summary.chunk_indexes, self.counts, strict=True):
+                for channel, log_ns, data in self._messages(stream, chunk, there) if there.keys() & counts else ():
+                    if log_ns < last_ns:
+                        raise ValueError(f"after {last_ns} ns comes {log_ns} ns")
+                    last_ns = log_ns
+                    yield there[channel], data
 
     def messages(self, topics: Iterable[Topic]) -> Iterator[tuple[Topic, Any]]:
         """The messages of `raw`."""
@@ -192,90 +362,80 @@ class Bag:
             for topic, data in self.raw(topics):
                 yield topic, TYPES.deserialize_cdr(data, topic.type_name)
 
-    def message(self, topic: Topic, data: memoryview) -> Any:
-        """A message from its bytes. Raises SequenceError where they are none."""
-        with parsing(self.path):
-            return TYPES.deserialize_cdr(data, topic.type_name)
-
-    def nth(self, topics: Sequence[Topic], number: int) -> list[memoryview]:
-        """The bytes of the message of that number of each topic, of which only their chunk is read, mostly one.
+    def nth(self, topic: Topic, number: int) -> memoryview:
+        """The bytes of a topic's message of that number, of which only its chunk is read.
 
         Raises SequenceError where there is none.
         """
-        places = [self._place(topic, number) for topic in topics]
-        with parsing(self.path), self._opened() as stream:
-            chunks = {chunk: self._chunk(stream, chunk) for chunk in dict(places)}
-            return [self._pick(chunks[place[0]], topic, place[1]) for topic, place in zip(topics, places, strict=True)]
-
-    def _place(self, topic: Topic, number: int) -> tuple[int, int]:
-        """In which chunk a message is, and how many of its topic lie before it there."""
-        entries = self._entries(topic)
-        if not 0 <= number < entries.total:
-            raise SequenceError(f"{topic.name} has {entries.total} messages and none numbered {number} in {self.path}")
-        chunk = int(np.searchsorted(entries.ends, number, side="right"))
-        return chunk, number - int(entries.ends[chunk] - entries.count[chunk])
-
-    def _pick(self, records: memoryview, topic: Topic, skipped: int) -> memoryview:
-        for _, _, data in islice(messages_in(records, {self._channel(topic)}), skipped, None):
-            return data
-        raise ValueError(f"a chunk has {skipped} messages of {topic.name} where the index has more")
+        channel, skipped = self._channel(topic), number
+        with parsing(self.path), BoundedFile(self.path) as stream:
+            for chunk, counts in zip(self.summary.chunk_indexes, self.counts, strict=True):
+                if 0 <= skipped < counts.get(channel, 0):
+                    for _, _, data in islice(self._messages(stream, chunk, {channel}), skipped, None):
+                        return data
+                    raise ValueError(f"a chunk has {skipped} messages of {topic.name} where the index has more")
+                skipped -= counts.get(channel, 0)
+        raise SequenceError(f"{topic.name} has {self.count(topic)} messages and none numbered {number} in {self.path}")
 
     def stamps(self, topic: Topic) -> Numbers:
-        """Log times in ns (N,) of a topic's messages, which no chunk is read for."""
-        entries = self._entries(topic)
-        with parsing(self.path), self._opened() as stream:
-            found = [self._stamps(stream, entries, chunk) for chunk in np.flatnonzero(entries.count).tolist()]
-        return np.concatenate([np.zeros(0, np.int64), *found])
-
-    def count_until(self, topic: Topic, t_ns: int) -> int:
-        """How many messages of a topic are logged at `t_ns` or before."""
-        entries = self._entries(topic)
-        begun = np.flatnonzero((entries.count > 0) & (self.index.start_ns <= t_ns))
-        with parsing(self.path), self._opened() as stream:
-            for chunk in begun[::-1].tolist():
-                within = int(np.searchsorted(self._stamps(stream, entries, chunk), t_ns, side="right"))
-                if within:
-                    return int(entries.ends[chunk] - entries.count[chunk]) + within
-        return 0
+        """Log times in ns (N,) of a topic's messages by their indexes, which have no checksum; no chunk is read."""
+        channel = self._channel(topic)
+        found = [np.zeros(0, np.int64)]
+        with parsing(self.path), BoundedFile(self.path) as stream:
+            for chunk, counts in zip(self.summary.chunk_indexes, self.counts, strict=True):
+                if not counts.get(channel):
+                    continue
+                place = chunk.message_index_offsets[channel]
+                index = read_record(stream, place, MessageIndex)
+                stamps = np.array([log_ns for log_ns, _ in index.records], np.int64)
+                low, high = chunk.message_start_time, chunk.message_end_time
+                if len(stamps) != counts[channel] or stamps.min() < low or stamps.max() > high:
+                    raise ValueError(f"the message index at {place} has stamps that its chunk has not")
+                found.append(stamps)
+        return np.concatenate(found)
 
     def note(self, name: str) -> dict[str, str]:
         """The metadata record of that name; nothing in it where there is none. Raises SequenceError if damaged."""
-        if name not in self.index.notes:
+        place = next((entry.offset for entry in self.summary.metadata_indexes if entry.name == name), None)
+        if place is None:
             return {}
-        with parsing(self.path), self._opened() as stream:
-            content = read_record(stream, self.index.notes[name], Opcode.METADATA)
-            return whole_note(Metadata.read(ReadDataStream(BytesIO(content))))
+        with parsing(self.path), BoundedFile(self.path) as stream:
+            entries = dict(read_record(stream, place, Metadata).metadata)
+            stated = entries.pop(CHECKSUM, None)
+            if stated is not None and stated != _checksum(entries):
+                raise ValueError(f"the checksum of the note {name!r} differs from its content")
+            return entries
+
+    def has_attachment(self, name: str) -> bool:
+        """Whether a file of that name is attached."""
+        return any(entry.name == name for entry in self.summary.attachment_indexes)
 
     def attachment(self, name: str) -> bytes:
         """The attached file of that name. Raises SequenceError where there is none, or it is damaged."""
-        if name not in self.index.attachments:
+        place = next((entry.offset for entry in self.summary.attachment_indexes if entry.name == name), None)
+        if place is None:
             raise SequenceError(f"no attachment {name!r} in {self.path}")
-        with parsing(self.path), self._opened() as stream:
-            return bytes(attached(read_record(stream, self.index.attachments[name], Opcode.ATTACHMENT)).data)
+        with parsing(self.path), BoundedFile(self.path) as stream:
+            data = bytes(read_record(stream, place, Attachment).data)
+            length = stream.tell() - CRC_BYTES - stream.seek(place + HEAD.size)
+            tested = zlib.crc32(stream.read(length))
+            stated = int.from_bytes(stream.read(CRC_BYTES), "little")
+            if stated and stated != tested:
+                raise ValueError(f"the checksum of the attachment {name!r} differs from its content")
+            return data
 
-    def _opened(self) -> BinaryIO:
-        return self.path.open("rb", buffering=0)
-
-    def _chunk(self, stream: BinaryIO, number: int) -> memoryview:
-        return unpacked(read_record(stream, int(self.index.offset[number]), Opcode.CHUNK))
-
-    def _stamps(self, stream: BinaryIO, entries: Entries, chunk: int) -> Numbers:
-        """Log times in ns of one channel's messages in one chunk, by its message index, which has no checksum."""
-        place, size = int(entries.offset[chunk]) + MESSAGE_INDEX_HEAD, MESSAGE_INDEX_ENTRY.itemsize
-        found = np.frombuffer(read_at(stream, place, int(entries.count[chunk]) * size), MESSAGE_INDEX_ENTRY)
-        stamps = found["log_ns"].astype(np.int64)
-        if stamps.min() < self.index.start_ns[chunk] or stamps.max() > self.index.end_ns[chunk]:
-            raise ValueError(f"the message index at {place} has stamps that its chunk has not")
-        return stamps
+    def _messages(
+        self, stream: BinaryIO, chunk: ChunkIndex, channels: Container[int]
+    ) -> Iterator[tuple[int, int, memoryview]]:
+        return messages_in(read_record(stream, chunk.chunk_start_offset, Chunk), channels)
 
     def _channel(self, topic: Topic) -> int:
-        found = [channel for channel in self.index.channels.values() if channel.topic == topic.name]
-        types = {self.index.schemas[c.schema_id].name if c.schema_id else "" for c in found}
+        found = [channel for channel in self.summary.channels.values() if channel.topic == topic.name]
+        types = {self.summary.schemas[c.schema_id].name if c.schema_id else "" for c in found}
         if found and (types != {topic.type_name} or len(found) > 1):
             kinds = " and ".join(sorted(types)) or "of no type" if len(found) == 1 else f"{len(found)} channels"
             raise SequenceError(f"{topic.name} should be {topic.type_name} but is {kinds} in {self.path}")
-        return int(found[0].id) if found else NO_CHANNEL
+        return found[0].id if found else NO_CHANNEL
 
-    def _entries(self, topic: Topic) -> Entries:
-        nothing = np.zeros_like(self.index.offset)
-        return self.index.entries.get(self._channel(topic), Entries(nothing, nothing))
+    def _total(self, channel: int) -> int:
+        return sum(counts.get(channel, 0) for counts in self.counts)

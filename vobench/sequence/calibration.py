@@ -17,8 +17,9 @@ IMU_NUMBERS = tuple(field.name for field in fields(ImuCalibration) if field.name
 
 def write_mounts(bag: BagWriter, rig: Rig, t_ns: int) -> None:
     """Note the wheels and the IMU, and write where everything sits on the body."""
-    if rig.wheels:
-        bag.note(WHEELS_NOTE, _wheel_entries(rig.wheels))
+    if wheels := rig.wheels:
+        lengths = {"radius_m": repr(float(wheels.radius_m)), "track_m": repr(float(wheels.track_m))}
+        bag.note(WHEELS_NOTE, {**lengths, "ticks_per_revolution": str(wheels.ticks_per_revolution)})
     if rig.imu:
         bag.note(IMU_NOTE, {name: repr(float(getattr(rig.imu, name))) for name in IMU_NUMBERS})
     bag.write(ros.TF_STATIC, t_ns, serialise(ros.transforms(t_ns, ros.BODY, _mounts(rig))))
@@ -42,18 +43,10 @@ def _mounts(rig: Rig) -> dict[str, Array]:
     return {**T_body, ros.IMU_FRAME: rig.imu.T_body_imu} if rig.imu else T_body
 
 
-def _wheel_entries(wheels: WheelGeometry) -> dict[str, str]:
-    return {
-        "radius_m": repr(float(wheels.radius_m)),
-        "track_m": repr(float(wheels.track_m)),
-        "ticks_per_revolution": str(wheels.ticks_per_revolution),
-    }
-
-
 def _first(bag: Bag, topic: ros.Topic) -> Any:
-    if not bag.count(topic):
-        raise SequenceError(f"{topic.name} has no message in {bag.path}")
-    return bag.message(topic, *bag.nth((topic,), 0))
+    for _, message in bag.messages((topic,)):
+        return message
+    raise SequenceError(f"{topic.name} has no message in {bag.path}")
 
 
 def _read_mounts(bag: Bag) -> dict[str, Array]:

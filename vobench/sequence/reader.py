@@ -18,13 +18,11 @@ from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuBias, ImuReadings
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, check_channels
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import Bag
+from vobench.sequence.bag import Bag, parsing, part_of
 from vobench.sequence.calibration import IMU_NOTE, WHEELS_NOTE, read_rig
-from vobench.sequence.mcap_index import parsing, part_of
 from vobench.sequence.messages import picture_in
 from vobench.sequence.picture import Image, decode
 from vobench.sequence.pixel_truth import names_from_json, truth_topic, truth_topics, truth_values
-from vobench.sequence.salvage import SALVAGE_NOTE
 from vobench.sequence.writer import (
     CASE_ATTACHMENT,
     IMPORT_NOTE,
@@ -128,12 +126,11 @@ class Sequence:
 
     def frame(self, index: int) -> StereoFrame:
         """One frame, of which only its part of the file is read. Raises SequenceError where there is none."""
-        topics = self._image_topics
-        return self._decoded(self._encoded(index, zip(topics, self.bag.nth(topics, index), strict=True)))
+        return self._decoded(self._encoded(index, [(t, self.bag.nth(t, index)) for t in self._image_topics]))
 
     def frame_at(self, t_ns: int) -> StereoFrame:
         """The last frame at or before an instant. Raises SequenceError where there is none yet."""
-        until = self.bag.count_until(ros.LEFT_IMAGE, t_ns)
+        until = int(np.searchsorted(self.bag.stamps(ros.LEFT_IMAGE), t_ns, side="right"))
         if not until:
             raise SequenceError(f"there is no frame at or before {t_ns} ns in {self.path}")
         return self.frame(until - 1)
@@ -177,9 +174,13 @@ def _table(bag: Bag, topic: ros.Topic, row: Callable[[Any], Iterable[float]], wi
     return np.array(stamps, np.int64), np.array(values, float).reshape(-1, width)
 
 
+def _truth_bag(folder: Path) -> Bag:
+    return Bag.open(Path(folder) / TRUTH_FILE)
+
+
 def read_truth(folder: Path) -> Trajectory:
     """The true path of base_link in map. Raises SequenceError where the file is not whole."""
-    bag = Bag.open(Path(folder) / TRUTH_FILE)
+    bag = _truth_bag(folder)
     bag.require(ros.TRUTH_TOPICS)
     stamps, fields = _table(bag, ros.ODOMETRY, lambda m: ros.pose_fields(m.pose.pose), 7)
     return Trajectory(stamps, ros.poses(fields))
@@ -193,8 +194,7 @@ def has_truth(folder: Path) -> bool:
 
 def read_twist(folder: Path) -> Array | None:
     """The true twist (N, 6) at the poses of `read_truth`, m/s then rad/s, in body axes; None where it is not known."""
-    bag = Bag.open(Path(folder) / TRUTH_FILE)
-    _, rows = _table(bag, ros.ODOMETRY, _twist_fields, 7)
+    _, rows = _table(_truth_bag(folder), ros.ODOMETRY, _twist_fields, 7)
     return None if not len(rows) or np.any(rows[:, 6] == ros.UNKNOWN) else rows[:, :6].copy()
 
 
@@ -206,8 +206,7 @@ def _twist_fields(message: Any) -> tuple[float, ...]:
 
 def read_imu_bias(folder: Path) -> ImuBias:
     """What the IMU's readings were off by; empty where there is no IMU."""
-    bag = Bag.open(Path(folder) / TRUTH_FILE)
-    stamps, rows = _table(bag, ros.IMU_BIAS, lambda m: (*_xyz(m.gyro), *_xyz(m.accel)), 6)
+    stamps, rows = _table(_truth_bag(folder), ros.IMU_BIAS, lambda m: (*_xyz(m.gyro), *_xyz(m.accel)), 6)
     return ImuBias(stamps, rows[:, :3].copy(), rows[:, 3:].copy())
 
 
@@ -216,12 +215,8 @@ def read_disturbances(folder: Path) -> tuple[Stamps, Array]:
 
     Slip ratios of the left and right wheel, side slip in rad, pushes in m/s² and rad/s².
     """
-    bag = Bag.open(Path(folder) / TRUTH_FILE)
-    return _table(bag, ros.DISTURBANCE, _disturbance_fields, 5)
-
-
-def _disturbance_fields(m: Any) -> tuple[float, ...]:
-    return m.left_slip, m.right_slip, m.side_slip_rad, m.push_mps2, m.turn_push_radps2
+    names = ("left_slip", "right_slip", "side_slip_rad", "push_mps2", "turn_push_radps2")
+    return _table(_truth_bag(folder), ros.DISTURBANCE, lambda m: [getattr(m, name) for name in names], 5)
 
 
 def read_true_rig(folder: Path) -> Rig:
@@ -229,22 +224,22 @@ def read_true_rig(folder: Path) -> Rig:
 
     Raises SequenceError where the file is not whole, or is of the time before it held the true rig.
     """
-    return read_rig(Bag.open(Path(folder) / TRUTH_FILE), ros.TRUE_INFO_TOPICS)
+    return read_rig(_truth_bag(folder), ros.TRUE_INFO_TOPICS)
 
 
 def read_case(folder: Path) -> bytes:
     """The case that a recording was made from, as its writer gave it. Raises SequenceError where it was imported."""
-    return Bag.open(Path(folder) / TRUTH_FILE).attachment(CASE_ATTACHMENT)
+    return _truth_bag(folder).attachment(CASE_ATTACHMENT)
 
 
 def read_provenance(folder: Path) -> dict[str, str]:
     """The versions of what made a recording, by name; nothing in it for one of the time before they were noted."""
-    return Bag.open(Path(folder) / TRUTH_FILE).note(PROVENANCE_NOTE)
+    return _truth_bag(folder).note(PROVENANCE_NOTE)
 
 
 def read_import_notes(folder: Path) -> dict[str, str]:
     """What was noted when a recording was imported; nothing in it where it was not."""
-    return Bag.open(Path(folder) / TRUTH_FILE).note(IMPORT_NOTE)
+    return _truth_bag(folder).note(IMPORT_NOTE)
 
 
 def payload_hash(folder: Path) -> str:
@@ -282,25 +277,21 @@ class StereoTruth:
 
 def truth_channels(folder: Path) -> tuple[str, ...]:
     """The channels that were recorded with a sequence; none for most. Raises SequenceError for a torn file."""
-    return _channels(Bag.open(Path(folder) / TRUTH_FILE))
-
-
-def _channels(bag: Bag) -> tuple[str, ...]:
+    bag = _truth_bag(folder)
     return tuple(name for name in CHANNELS if bag.has(truth_topic("left", name)))
 
 
 def read_truth_names(folder: Path) -> TruthNames:
     """What the ids of `instance` and `material` mean. Raises SequenceError where no channels were recorded."""
-    return names_from_json(Bag.open(Path(folder) / TRUTH_FILE).attachment(NAMES_ATTACHMENT))
+    return names_from_json(_truth_bag(folder).attachment(NAMES_ATTACHMENT))
 
 
 def read_truth_frames(folder: Path, channels: Iterable[str] | None = None) -> Iterator[StereoTruth]:
     """Some channels (None: all there are) of each instant's pictures; only the current ones are held in memory.
 
-    Raises SequenceError where one was not recorded, or a picture lacks one; in a salvaged file that one is left out.
+    Raises SequenceError where one was not recorded, or a picture lacks one.
     """
-    bag = Bag.open(Path(folder) / TRUTH_FILE)
-    there = _channels(bag)
+    bag, there = _truth_bag(folder), truth_channels(folder)
     wanted = there if channels is None else check_channels(channels)
     for name in wanted:
         if name not in there:
@@ -319,8 +310,6 @@ def _frames(bag: Bag, channels: tuple[str, ...]) -> Iterator[StereoTruth]:
             side, name = places[topic]
             found[side][name] = truth_values(name, message)
         if any(len(values) != len(channels) for values in found.values()):
-            if bag.note(SALVAGE_NOTE):
-                continue
             raise SequenceError(f"truth frame {index} at {t_ns} ns lacks channels in {bag.path}")
         right = TruthFrame(**found["right"]) if "right" in found else None
         yield StereoTruth(index, t_ns, TruthFrame(**found["left"]), right)

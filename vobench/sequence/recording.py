@@ -16,9 +16,7 @@ from vobench import stop
 from vobench.errors import SequenceError, VobenchError
 from vobench.geometry.se3 import Array
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import Bag
-from vobench.sequence.mcap_index import unpack
-from vobench.sequence.messages import Topic
+from vobench.sequence.bag import unpack
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 MAGICS = {b"\x89MCAP": ".mcap", b"#ROSBAG V2.0": ".bag", b"SQLite format 3\x00": ".db3"}
@@ -84,7 +82,7 @@ def opened(path: Path) -> Iterator[AnyReader]:
     Raises SequenceError for whatever its reader raises inside.
     """
     # rosbags looks at the size of a chunk after it has unpacked it: a few kB can make many GB.
-    DECOMPRESSORS.update({packing: partial(_unpacked, packing) for packing in PACKINGS})
+    DECOMPRESSORS.update({packing: partial(unpack, packing) for packing in PACKINGS})
     folder = Path(mkdtemp(prefix="vobench-bag-"))
     with stop.undone(lambda: stop.remove(folder)):
         link = path
@@ -101,10 +99,6 @@ def opened(path: Path) -> Iterator[AnyReader]:
         except Exception as error:  # a torn file makes its reader raise errors of a dozen kinds
             reason = str(error).splitlines()[0] if str(error) else "no reason given"
             raise SequenceError(f"not a whole recording ({type(error).__name__}: {reason}): {path}") from error
-
-
-def _unpacked(packing: str, packed: bytes, size: int) -> bytes:
-    return bytes(unpack(packing, packed, size))
 
 
 def _rows(reader: AnyReader, path: Path, topic: str | None) -> Iterator[tuple[int, tuple[float, ...]]]:
@@ -186,27 +180,14 @@ class TopicFacts:
 
 
 def topic_facts(path: Path) -> tuple[TopicFacts, ...]:
-    """All topics of a file, by name. Raises SequenceError where it is no whole MCAP file."""
-    bag = Bag.open(path)
-    index = bag.index
-    named = {
-        channel.topic: index.schemas[channel.schema_id].name if channel.schema_id else ""
-        for channel in index.channels.values()
-    }
-    return tuple(_facts(bag, Topic(name, type_name)) for name, type_name in sorted(named.items()))
-
-
-def bag_facts(path: Path) -> tuple[TopicFacts, ...]:
-    """The same of a bag of any make, gone through once; no message is decoded. Raises SequenceError."""
-    found: dict[tuple[str, str], list[int]] = {}
+    """All topics of a bag of any make, by name; no message is decoded. Raises SequenceError where it is torn."""
+    stamps: dict[tuple[str, str], list[int]] = {}
     with opened(path) as reader:
+        for connection in reader.connections:
+            stamps[connection.topic, connection.msgtype] = []
         for connection, t_ns, _ in reader.messages():
-            facts = found.setdefault((connection.topic, connection.msgtype), [0, t_ns, t_ns])
-            facts[:] = facts[0] + 1, min(facts[1], t_ns), max(facts[2], t_ns)
-    return tuple(TopicFacts(*names, *facts) for names, facts in sorted(found.items()))
-
-
-def _facts(bag: Bag, topic: Topic) -> TopicFacts:
-    stamps = bag.stamps(topic)
-    start_ns, end_ns = (int(stamps.min()), int(stamps.max())) if len(stamps) else (None, None)
-    return TopicFacts(topic.name, topic.type_name, len(stamps), start_ns, end_ns)
+            stamps[connection.topic, connection.msgtype].append(t_ns)
+    return tuple(
+        TopicFacts(*names, len(found), min(found, default=None), max(found, default=None))
+        for names, found in sorted(stamps.items())
+    )
