@@ -13,7 +13,7 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import PRESETS, looking
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import Shot
+from vobench.render.occlusion import Shot
 from vobench.render.renderer import Radiance, still
 from vobench.render.truth import TruthCaster
 from vobench.run.simulate import open_renderer

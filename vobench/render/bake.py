@@ -16,10 +16,9 @@ from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
 from vobench.render.direct_light import SKY_SMOOTHING, direct_light, in_front, mirror_images, sees_open_sky
 from vobench.render.emitter import Emitter, OpenSky, emitters
-from vobench.render.geometry import Floats, SurfaceList, inventory
+from vobench.render.geometry import Floats, SurfaceList, Visibility, inventory
 from vobench.render.indirect_light import FinalGather, bounced, final_gather, surface_responses
 from vobench.render.lightmap import Atlas, Chart, Holes, Scales, Texels, holes, outside, pack_atlas, texels
-from vobench.render.visibility import Visibility
 from vobench.scene.light import NS_PER_S, AreaLight, Light, Sky, Sun
 from vobench.scene.material import Map, Polished, reflectance, texture_of, under_coat
 from vobench.scene.scene import Scene

@@ -7,9 +7,8 @@ import scipy
 from numpy.typing import NDArray
 
 from vobench.render.emitter import Aim, Emitter, OpenSky, SkyPane, emitters
-from vobench.render.geometry import RAY_OFFSET_M, Ball, Floats
+from vobench.render.geometry import RAY_OFFSET_M, Ball, Floats, Visibility
 from vobench.render.lightmap import Atlas, Texels, in_chunks
-from vobench.render.visibility import Visibility
 from vobench.scene.light import Light, Sky
 from vobench.scene.surface import Surface
 

@@ -7,9 +7,8 @@ from typing import Protocol
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import RAY_OFFSET_M, Ball, Floats, ball, corners
+from vobench.render.geometry import FAR_M, RAY_OFFSET_M, Ball, Floats, Visibility, ball, corners
 from vobench.render.lightmap import Texels, tangents
-from vobench.render.visibility import FAR_M, Visibility
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.surface import Surface
 

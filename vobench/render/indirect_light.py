@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from vobench.render.direct_light import JITTER, cell_spot
 from vobench.render.emitter import cosine_weighted
-from vobench.render.geometry import RAY_OFFSET_M, Floats, Hits, Indices
+from vobench.render.geometry import FAR_M, RAY_OFFSET_M, Floats, Hits, Indices, Visibility, smooth_mirror
 from vobench.render.lightmap import Atlas, Holes, Texels, in_chunks, tangents
-from vobench.render.visibility import FAR_M, Visibility, smooth_mirror
 from vobench.scene.light import Sky
 from vobench.scene.material import Map, Material, Mirror, Polished, fresnel
 from vobench.scene.surface import Surface

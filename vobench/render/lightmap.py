@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vobench import stop
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import RAY_OFFSET_M, Floats, Indices
-from vobench.render.visibility import Visibility
+from vobench.render.geometry import RAY_OFFSET_M, Floats, Indices, Visibility
 from vobench.scene.material import Material, Polished, fresnel, texture_of
 from vobench.scene.surface import Surface
 

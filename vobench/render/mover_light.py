@@ -10,10 +10,9 @@ from scipy import ndimage
 from vobench.render.bake import BakedScene, StaticScene, reached
 from vobench.render.direct_light import Rays, arriving, cell_spot, first_rays, footprint, in_front, mirror_images
 from vobench.render.emitter import Emitter, OpenSky, SkyPane, emitters
-from vobench.render.geometry import Ball, Floats, Mask, RayCaster, SurfaceList, ball, corners, inventory
+from vobench.render.geometry import Ball, Floats, Mask, RayCaster, SurfaceList, Visibility, ball, corners, inventory
 from vobench.render.indirect_light import FinalGather, final_gather, surface_responses
 from vobench.render.lightmap import Atlas, Chart, Scales, Texels, in_chunks, pack_atlas, texels
-from vobench.render.visibility import Visibility
 from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Map
 from vobench.scene.surface import Surface

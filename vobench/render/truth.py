@@ -12,20 +12,24 @@ from numpy.typing import NDArray
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
-from vobench.render.culling import TILE_PX, PointView, Scalar, Tiles, balls, spread, tiles
 from vobench.render.emitter import FARTHEST_M
-from vobench.render.geometry import (
-    RAY_OFFSET_M,
+from vobench.render.geometry import RAY_OFFSET_M, Indices, Mask
+from vobench.render.occlusion import (
+    TILE_PX,
     Bodies,
-    Indices,
-    Mask,
+    PointView,
+    Scalar,
     Shot,
     ShotSurfaces,
     ShotTransforms,
+    Tiles,
     at_rows,
+    balls,
     moved,
     of,
     shot_transforms,
+    spread,
+    tiles,
     turn,
 )
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from vobench.geometry.rig import SIDES
 from vobench.render.bake import BakedScene, BakeSettings, bake, load_baked, save_baked
-from vobench.render.opengl import require_drawing
+from vobench.render.raster import require_drawing
 from vobench.render.renderer import Renderer
 from vobench.run.motion import BodyMotion, body_motion
 from vobench.run.store import Context, Store, canonical, code_digest, library_versions, versions
