@@ -401,8 +401,8 @@ def render(
     from vobench.cli import render as rendering
 
     viewpoint = rendering.Viewpoint(at, yaw, pitch, time)
-    look = rendering.Look(camera, sensor, gain, engine, samples)
-    rendering.show(scene, viewpoint, look, out=out, truth=truth, as_json=json)
+    settings = rendering.PictureSettings(camera, sensor, gain, engine, samples)
+    rendering.show(scene, viewpoint, settings, out=out, truth=truth, as_json=json)
 
 
 @app.command("list")

@@ -178,7 +178,7 @@ def _fractions(surface: Surface, points_m: Array) -> Array:
 
 def _on_light(baked: BakedScene, part: BatchPart, fractions: Array) -> Array:
     """Coordinates (N, 2) on the map of light of points at fractions (N, 2) of a part's edges."""
-    first, along, _, up = baked.layout.texture_coordinates(part.index)
+    first, along, _, up = baked.atlas.texture_coordinates(part.index)
     coordinates: Array = first + fractions @ np.stack([along - first, up - first])
     return coordinates
 

@@ -22,7 +22,7 @@ RAY_OFFSET_M = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class SurfaceList:
-    """Every rectangle of a scene in one order: what stands still, the lights' panels, what moves.
+    """Every rectangle of a scene in one order: static ones, the lights' panels, movers'.
 
     surfaces are where they are at one instant; mover (S,) is the index of the mover a surface belongs to, -1 for
     none; panel (S,) the index among scene.panels, -1 for none; pane (S,) whether it is glass.
@@ -104,11 +104,11 @@ class RayCaster:
         self._mesh = mesh_construction.TriangleMesh(self._scene, np.ascontiguousarray(triangles))
 
     def occluded(self, origins_m: ArrayLike, targets_m: ArrayLike) -> Mask:
-        """Whether anything stands between each of (R, 3) origins and its target (R, 3)."""
+        """Whether anything is between each of (R, 3) origins and its target (R, 3)."""
         return self.stops(origins_m, np.asarray(targets_m) - np.asarray(origins_m))
 
     def stops(self, origins_m: ArrayLike, way: ArrayLike) -> Mask:
-        """Whether anything stands between origins and origins + way (R, 3)."""
+        """Whether anything is between origins and origins + way (R, 3)."""
         blocked = np.asarray(self._scene.run(*_rays(origins_m, way, reach=1 - 1e-3), query="OCCLUDED"))
         is_blocked: Mask = blocked >= 0
         return is_blocked
@@ -175,7 +175,7 @@ class Visibility:
         return share
 
     def clear(self, origins_m: Floats, way: Floats) -> NDArray[np.bool_]:
-        """Whether nothing opaque stands between origins and origins + way (R, 3)."""
+        """Whether nothing opaque is between origins and origins + way (R, 3)."""
         return ~self.opaque.stops(origins_m, way)
 
     def pane_passes(self, pane: int, directions: Floats) -> Floats:
@@ -185,7 +185,7 @@ class Visibility:
         return share
 
     def crosses_pane(self, origins_m: Floats, way: Floats) -> NDArray[np.bool_]:
-        """Whether a pane stands between origins and origins + way (R, 3)."""
+        """Whether a pane is between origins and origins + way (R, 3)."""
         if not self.panes:
             return np.zeros(len(origins_m), bool)
         return self._glass.stops(origins_m, way)
@@ -196,7 +196,7 @@ class Visibility:
         return rays, self._glass.hits(origins_m[rays], way[rays])
 
     def pane_mirrors(self, panes: Indices, cosine: Floats) -> Floats:
-        """Share (R,) that panes (R,) throw back at cosines (R,)."""
+        """Share (R,) that panes (R,) reflect at cosines (R,)."""
         return pane_reflectance(cosine, self._eta[panes]).astype(np.float32)
 
     def through_panes(self, origins_m: Floats, way: Floats) -> Floats:

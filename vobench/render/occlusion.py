@@ -21,7 +21,7 @@ MOST_BACK_SIDES = 64
 
 @dataclass(frozen=True, slots=True)
 class VisibleSurfaces:
-    """Where sight ends: surface (R,) by its place in the inventory, -1 for none; distance_m (R,), NaN for none."""
+    """Where rays end: surface (R,) by its place in the inventory, -1 for none; distance_m (R,), NaN for none."""
 
     surface: Indices
     distance_m: Array
@@ -48,17 +48,17 @@ class Bodies:
     """The surfaces of a scene in the inventory's order, each in its body's frame, and rays against them."""
 
     def __init__(self, scene: Scene) -> None:
-        stock = inventory(scene)
+        things = inventory(scene)
         moving = [surface for mover in scene.movers for surface in mover.surfaces]
         self.surfaces = (*scene.surfaces, *(panel.surface for panel in scene.panels), *moving)
-        self.of_surface = stock.mover + 1
+        self.of_surface = things.mover + 1
         # The last entry is that of the surface -1: nothing.
         self.normals = np.array([*(s.normal for s in self.surfaces), np.full(3, np.nan)])
         self.corners_m = np.array([corners(s) for s in self.surfaces]).reshape(-1, 4, 3)
-        self.opaque = ~stock.pane
+        self.opaque = ~things.pane
         self._offsets_m = np.array([*(s.normal @ s.corner_m for s in self.surfaces), np.nan])
         members = [self.of_surface == index for index in range(len(scene.movers) + 1)]
-        self._bodies = [_body(self.surfaces, member, stock.pane) for member in members]
+        self._bodies = [_body(self.surfaces, member, things.pane) for member in members]
         self._paths = [mover.path for mover in scene.movers]
 
     def T_world_bodies(self, t_ns: NDArray[np.int64]) -> list[Array]:
@@ -66,7 +66,7 @@ class Bodies:
         poses = [np.array([path.pose(t) for t in np.ravel(t_ns).tolist()]) for path in self._paths]
         return [np.eye(4), *(T if np.ndim(t_ns) else T[0] for T in poses)]
 
-    def look(self, directions: Array, T_bodies_camera: Sequence[Array]) -> VisibleSurfaces:
+    def visible_surfaces(self, directions: Array, T_bodies_camera: Sequence[Array]) -> VisibleSurfaces:
         """What a camera sees along unit directions (R, 3) in its own frame; nothing along NaN."""
         world, *movers = self._bodies
         seen = self._meet(world, *into(T_bodies_camera[0], directions))
@@ -79,7 +79,7 @@ class Bodies:
         return seen
 
     def behind_panes(self, directions: Array, T_bodies_camera: Sequence[Array], distance_m: Array) -> Mask:
-        """Whether glass stands before what is seen at some distance (R,), or before nothing where that is NaN."""
+        """Whether glass is before what is seen at some distance (R,), or before nothing where that is NaN."""
         behind = np.zeros(len(directions), bool)
         limit_m = np.nan_to_num(distance_m, nan=np.inf)
         for body, T_body_camera in zip(self._bodies, T_bodies_camera, strict=True):
@@ -90,7 +90,7 @@ class Bodies:
         return behind
 
     def blocked(self, starts_m: Array, targets_m: Array, T_bodies_world: Sequence[Array]) -> Mask:
-        """Whether anything but glass stands between starts (R, 3) and targets (R, 3), both in the world."""
+        """Whether anything but glass is between starts (R, 3) and targets (R, 3), both in the world."""
         world, *movers = self._bodies
         hidden = world.solid.occluded(starts_m, targets_m)
         for body, T_body_world in zip(movers, T_bodies_world[1:], strict=True):
@@ -165,7 +165,7 @@ def _dot(a: Array, b: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """Where a camera stands and when it takes a picture: a pose (4, 4) and an instant, or (H, 4, 4) and (H,) by row."""
+    """Where a camera is and when it takes a picture: a pose (4, 4) and an instant, or (H, 4, 4) and (H,) by row."""
 
     T_world_camera: Array
     t_ns: NDArray[np.int64] | int
@@ -331,13 +331,13 @@ class PointView:
             return np.full(len(axis), -1, np.int32)
         best = covering.argmin(1)
         limit_m = np.take_along_axis(covering, best[:, None], 1)
-        rival = (inside >= -sine[:, None]) & (nearest_m < limit_m)
-        np.put_along_axis(rival, best[:, None], values=False, axis=1)
-        sure = np.isfinite(limit_m[:, 0]) & ~rival.any(1)
+        other = (inside >= -sine[:, None]) & (nearest_m < limit_m)
+        np.put_along_axis(other, best[:, None], values=False, axis=1)
+        sure = np.isfinite(limit_m[:, 0]) & ~other.any(1)
         return np.where(sure, self._which[best], -1).astype(np.int32)
 
     def shading(self, centers_m: Array, radii_m: Array, own: Indices) -> tuple[Mask, Mask]:
-        """Balls (T, 3), (T,) of points of surfaces `own` (T,) that are surely in plain sight, and surely all hidden."""
+        """Balls (T, 3), (T,) of points of surfaces `own` (T,) that are surely all visible, and surely all hidden."""
         reach_m = np.linalg.norm(centers_m, axis=-1)
         outside = reach_m > 2 * radii_m
         reach_m, centers_m = np.where(outside, reach_m, 1), np.where(outside[:, None], centers_m, 1)

@@ -25,7 +25,7 @@ class FloatTexture:
         _texture_parameters(GL.GL_LINEAR, GL.GL_LINEAR, GL.GL_CLAMP_TO_EDGE)
 
     def bind(self, unit: int) -> None:
-        """Let shaders look it up by a unit."""
+        """Let shaders sample it by a unit."""
         GL.glActiveTexture(unit)
         GL.glBindTexture(GL.GL_TEXTURE_2D, self._id)
 
@@ -54,7 +54,7 @@ class ReflectanceTexture:
         _texture_parameters(GL.GL_LINEAR_MIPMAP_NEAREST, GL.GL_LINEAR, GL.GL_REPEAT)
 
     def bind(self, unit: int) -> None:
-        """Let shaders look it up by a unit."""
+        """Let shaders sample it by a unit."""
         GL.glActiveTexture(unit)
         GL.glBindTexture(GL.GL_TEXTURE_2D, self._id)
 
@@ -140,14 +140,14 @@ class Programs:
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Where in a pixel samples lie, one a layer, and how many mipmap levels finer than OpenGL would each looks."""
+    """Where in a pixel samples lie, one a layer, and how many mipmap levels finer than OpenGL's each takes."""
 
     points: tuple[tuple[float, float], ...]
     lod_bias: tuple[float, ...]
 
 
 # Four rows and four columns: an edge along either is placed to an eighth of a pixel.
-# Each sample looks at the one nearest mipmap level: by different choices, levels blend from one into the next.
+# Each sample takes the one nearest mipmap level: by different choices, levels blend from one into the next.
 TURNED = Grid(((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)), (-2.875, -2.375, -2.625, -2.125))
 # The same in two halves, each even about the centre, for sub-frames by turns.
 HALVES = tuple(
@@ -208,7 +208,7 @@ def canvas(width_px: int, height_px: int, grid: Grid) -> Canvas:
 
 @dataclass(frozen=True, slots=True)
 class FlatTarget:
-    """A framebuffer of one float sample a pixel, without depth: its texture can be looked up."""
+    """A framebuffer of one float sample a pixel, without depth: its texture can be sampled."""
 
     width_px: int
     height_px: int

@@ -79,7 +79,7 @@ def overlap(a: Box, b: Box) -> Box | None:
 NEAR_M, FAR_M = 0.05, 60.0
 STATIC = -1
 IDENTITY = np.eye(4)
-# OpenCV's camera looks along +z with y down, OpenGL's along -z with y up.
+# OpenCV's camera faces +z with y down, OpenGL's -z with y up.
 T_CV_GL = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
@@ -146,7 +146,7 @@ class PinholeView:
         return world
 
     def pose(self, mover: int) -> Array:
-        """T_world_mover, the identity for what stands still."""
+        """T_world_mover, the identity for what is static."""
         return IDENTITY if mover == STATIC else self.T_world_movers[mover]
 
     def plane(self, mirror: Plane, mover: int) -> Plane:
