@@ -31,10 +31,10 @@ def light_evenly(scene: Scene, *, illuminance_lx: float = 100.0, level: Level = 
     lamp = PointLight("even", np.zeros(3), 1e-12, level)
     lit = replace(scene, lights=(lamp, *scene.lights))
     surfaces = inventory(lit).surfaces
-    where = pack_atlas(surfaces, spacing_m=1.0)
-    light = np.zeros((len(lit.lights), where.height, where.width), np.float32)
+    atlas = pack_atlas(surfaces, spacing_m=1.0)
+    light = np.zeros((len(lit.lights), atlas.height, atlas.width), np.float32)
     light[0] = illuminance_lx
-    return BakedScene(lit, where, light, {name: tile for name in scene.materials for tile in _tiles(scene, name)})
+    return BakedScene(lit, atlas, light, {name: tile for name in scene.materials for tile in _tiles(scene, name)})
 
 
 def _tiles(scene: Scene, name: str) -> list[Map]:

@@ -27,7 +27,7 @@ def scene(*lamps: Light, surfaces: tuple[Surface, ...] = (FLOOR,)) -> Scene:
 
 def floor_light(baked: BakedScene) -> tuple[Array, Array, Array]:
     """Places x, y and illuminance (rows, columns) on the first surface."""
-    patch = baked.layout.patches[0]
+    patch = baked.atlas.charts[0]
     points = baked.scene.surfaces[0].at(*patch.fractions())
     return points[..., 0], points[..., 1], baked.light.sum(0)[patch.window].astype(float)
 
@@ -106,7 +106,7 @@ def test_nothing_shines_through_the_corners_of_a_closed_box() -> None:
 def flux_lm(baked: BakedScene) -> float:
     """Light that arrives on all surfaces but the lamps' panels: trapezoids over each patch."""
     total = 0.0
-    for surface, patch in zip(baked.scene.surfaces, baked.layout.patches, strict=False):
+    for surface, patch in zip(baked.scene.surfaces, baked.atlas.charts, strict=False):
         weights = np.outer(*(_trapezoid(n) for n in (patch.rows, patch.columns)))
         total += float((weights * baked.light.sum(0)[patch.window]).sum() * np.prod(surface.size_m))
     return total
@@ -143,7 +143,7 @@ def test_a_bake_is_the_same_bytes_twice_and_another_seed_changes_only_noise() ->
 
 def test_a_lamps_panel_shows_its_own_luminance() -> None:
     baked = bake(scene(LAMP), DIRECT)
-    panel = baked.light[0][baked.layout.patches[-1].window]
+    panel = baked.light[0][baked.atlas.charts[-1].window]
     np.testing.assert_allclose(panel, np.pi * LAMP.luminance_cd_m2, rtol=1e-6)
 
 
@@ -189,7 +189,7 @@ def test_in_a_closed_grey_box_indirect_light_is_that_of_the_integrating_sphere()
     indirect = (flux_lm(light) - flux_lm(straight)) / 24
     # Ulbricht: E = Φ ρ / (A (1 - ρ)).
     assert indirect == pytest.approx(1000 * 0.8 / (24 * (1 - 0.8)), rel=0.01)
-    on_floor = (light.light - straight.light)[0][light.layout.patches[0].window]
+    on_floor = (light.light - straight.light)[0][light.atlas.charts[0].window]
     # A cube's corners are darker than its walls, but not by much.
     np.testing.assert_allclose(np.quantile(on_floor, [0.1, 0.9]), indirect, rtol=0.1)
 
@@ -204,7 +204,7 @@ def test_each_light_has_a_layer_of_its_own_and_dimming_one_leaves_the_others_byt
     alone = bake(scene(bulb, surfaces=GLOBE), settings).light[0]
     floor = both.shape[1:]
     assert alone.shape[1:] == floor[1:]
-    patch = bake(scene(bulb, surfaces=GLOBE), settings).layout.patches[0].window
+    patch = bake(scene(bulb, surfaces=GLOBE), settings).atlas.charts[0].window
     assert alone[patch].mean() == pytest.approx(both[1][patch].mean(), rel=0.03)
 
 
@@ -227,7 +227,7 @@ def test_a_white_coated_box_keeps_its_light_as_a_white_matt_one_does() -> None:
         walls = tuple(room((2, 2, 2), floor="grey", wall="matt", ceiling="matt"))
         materials = {"grey": material, "matt": Matt(replace(BODY, albedo=0.5))}
         baked = bake(Scene("box", walls, materials, (lamp,)), settings)
-        kept.append(np.mean([baked.light[0][p.window].mean() for p in baked.layout.patches[1:]]))
+        kept.append(np.mean([baked.light[0][p.window].mean() for p in baked.atlas.charts[1:]]))
     assert kept[1] == pytest.approx(kept[0], rel=0.02)
 
 
@@ -311,7 +311,7 @@ def baked() -> BakedScene:
 def test_what_was_saved_is_what_is_loaded(baked: BakedScene, tmp_path: Path) -> None:
     save_baked(tmp_path, baked)
     loaded = load_baked(tmp_path, baked.scene)
-    assert loaded.layout == baked.layout
+    assert loaded.atlas == baked.atlas
     assert loaded.settings == baked.settings
     assert loaded.light.tobytes() == baked.light.tobytes()
     assert loaded.light.dtype == baked.light.dtype

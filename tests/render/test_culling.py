@@ -28,11 +28,11 @@ BOXES = [(0, 180, 0, 120), (0, 180, 40, 48), (60, 120, 20, 50)]
 PLACES = np.stack(np.meshgrid(np.linspace(0, 1, 40), np.linspace(0, 1, 40)), -1).reshape(-1, 2)
 
 
-def crowd(rng: np.random.Generator, count: int) -> list[Batch]:
+def random_batches(rng: np.random.Generator, count: int) -> list[Batch]:
     """One random rectangle a batch, every third on a mover."""
     corner, along, up = rng.normal(0, 3, (count, 3)), *rng.normal(0, 1.5, (2, count, 3))
     quads = np.stack([corner, corner + along, corner + along + up, corner + up], 1)
-    return [Batch(i, None, MATERIALS[i % 2], -1 + (i % 3 == 0), None, quads[i : i + 1], 1.0) for i in range(count)]
+    return [Batch(i, None, MATERIALS[i % 2], -1 + (i % 3 == 0), None, quads[i : i + 1], None) for i in range(count)]
 
 
 def shown(batch: Batch, view: PinholeView, box: Any) -> bool:
@@ -54,7 +54,7 @@ def shown(batch: Batch, view: PinholeView, box: Any) -> bool:
 @pytest.mark.parametrize("box", BOXES)
 def test_no_rectangle_that_can_be_seen_is_left_out_and_most_others_are(mirrors: int, box: Any) -> None:
     rng = np.random.default_rng(mirrors)
-    batches = crowd(rng, 600)
+    batches = random_batches(rng, 600)
     R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     T_mover = se3.transform(se3.rotation_z(1.0), (0.3, 0.2, -0.4))
     view = pinhole_view(
@@ -63,7 +63,7 @@ def test_no_rectangle_that_can_be_seen_is_left_out_and_most_others_are(mirrors: 
     for turn in rng.normal(0, 0.2, (mirrors, 3)):
         towards_camera = turn - view.T_camera_world[2, :3]
         view = view.through(Plane(towards_camera / np.linalg.norm(towards_camera), 2.0))
-    found = CullingSet(batches).in_sight(view, box)
+    found = CullingSet(batches).visible(view, box)
     must = {batch.index for batch in batches if shown(batch, view, box)}
     assert must <= found
     assert len(must) > 0

@@ -24,9 +24,9 @@ X, Y, Z = np.eye(3)
 def floor_light(light: Light, *others: Surface, settings: BakeSettings = DIRECT) -> tuple[Array, Array, Array]:
     """Places x, y and illuminance (rows, columns) on the floor."""
     baked = bake(Scene("day", (FLOOR, *others), PANES, (light,)), settings)
-    patch = baked.layout.patches[0]
-    points = FLOOR.at(*patch.fractions())
-    return points[..., 0], points[..., 1], baked.light[0][patch.window].astype(float)
+    chart = baked.atlas.charts[0]
+    points = FLOOR.at(*chart.fractions())
+    return points[..., 0], points[..., 1], baked.light[0][chart.window].astype(float)
 
 
 def roof_with_opening(half_m: float, height_m: float, glazing: str | None) -> list[Surface]:

@@ -26,7 +26,7 @@ def scene(*lights: Light, surfaces: tuple[Surface, ...] = ROOM, movers: tuple[Mo
 
 
 def on(baked: BakedScene, light: Map, surface: int) -> Map:
-    return light[baked.layout.patches[surface].window]
+    return light[baked.atlas.charts[surface].window]
 
 
 def ns(t_s: float) -> int:

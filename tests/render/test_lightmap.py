@@ -14,18 +14,18 @@ SURFACES = [
 
 @pytest.mark.parametrize("spacing_m", [0.02, 0.1, 5.0])
 def test_patches_do_not_overlap_and_lie_within_the_map(spacing_m: float) -> None:
-    where = pack_atlas(SURFACES, spacing_m=spacing_m)
-    taken = np.zeros((where.height, where.width), int)
-    for patch in where.patches:
-        taken[patch.window] += 1
+    atlas = pack_atlas(SURFACES, spacing_m=spacing_m)
+    taken = np.zeros((atlas.height, atlas.width), int)
+    for chart in atlas.charts:
+        taken[chart.window] += 1
     assert taken.max() == 1
-    assert taken.sum() == sum(patch.rows * patch.columns for patch in where.patches)
+    assert taken.sum() == sum(chart.rows * chart.columns for chart in atlas.charts)
 
 
 @pytest.mark.parametrize("spacing_m", [0.02, 0.1, 5.0])
 def test_samples_are_no_further_apart_than_asked_and_reach_both_edges(spacing_m: float) -> None:
-    for surface, patch in zip(SURFACES, pack_atlas(SURFACES, spacing_m=spacing_m).patches, strict=True):
-        u, v = patch.fractions()
+    for surface, chart in zip(SURFACES, pack_atlas(SURFACES, spacing_m=spacing_m).charts, strict=True):
+        u, v = chart.fractions()
         assert (u.min(), u.max(), v.min(), v.max()) == (0, 1, 0, 1)
         points = surface.at(u, v)
         for axis in (0, 1):
@@ -33,13 +33,13 @@ def test_samples_are_no_further_apart_than_asked_and_reach_both_edges(spacing_m:
 
 
 def test_corners_are_looked_up_at_the_middle_of_their_samples() -> None:
-    where = pack_atlas(SURFACES, spacing_m=0.1)
-    for index, patch in enumerate(where.patches):
-        first, _, last, _ = where.texture_coordinates(index) * (where.width, where.height)
-        np.testing.assert_allclose(first, (patch.column + 0.5, patch.row + 0.5))
-        np.testing.assert_allclose(last, (patch.column + patch.columns - 0.5, patch.row + patch.rows - 0.5))
+    atlas = pack_atlas(SURFACES, spacing_m=0.1)
+    for index, chart in enumerate(atlas.charts):
+        first, _, last, _ = atlas.texture_coordinates(index) * (atlas.width, atlas.height)
+        np.testing.assert_allclose(first, (chart.column + 0.5, chart.row + 0.5))
+        np.testing.assert_allclose(last, (chart.column + chart.columns - 0.5, chart.row + chart.rows - 0.5))
 
 
 def test_a_surface_wider_than_the_map_widens_the_map() -> None:
-    where = pack_atlas(SURFACES[:1], spacing_m=0.003)
-    assert where.width == where.patches[0].columns > ATLAS_WIDTH
+    atlas = pack_atlas(SURFACES[:1], spacing_m=0.003)
+    assert atlas.width == atlas.charts[0].columns > ATLAS_WIDTH

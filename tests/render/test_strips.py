@@ -40,14 +40,14 @@ SURFACES = (
     rectangle(np.array([3.0, 0, 1.5]), np.array([0, 0, 3.0]), np.array([0, 5.0, 0]), "glass"),
     rectangle(np.array([1.0, 2.4, 1.0]), np.array([2.0, 0, 0]), np.array([0, 0, 1.6]), "steel"),
 )
-SHOP = Scene("shop", SURFACES, MATERIALS, (Sky("sky", 1000.0, "clear"),), (CART,))
-DARK = replace(SHOP, lights=())  # without daylight, which movers would shade
+GALLERY = Scene("gallery", SURFACES, MATERIALS, (Sky("sky", 1000.0, "clear"),), (CART,))
+DARK = replace(GALLERY, lights=())  # without daylight, which movers would shade
 every_camera = pytest.mark.parametrize("camera", CAMERAS.values(), ids=list(CAMERAS))
 
 
 @pytest.fixture(scope="module")
-def shop(draw: Any, even_light: Any) -> RasterRenderer:
-    renderer: RasterRenderer = draw(even_light(SHOP))
+def gallery(draw: Any, even_light: Any) -> RasterRenderer:
+    renderer: RasterRenderer = draw(even_light(GALLERY))
     return renderer
 
 
@@ -68,54 +68,54 @@ def cut(height: int, T_world_camera: Array, times_ns: Any, *, count: int) -> lis
 
 @every_camera
 @pytest.mark.parametrize("count", [3, 40])
-def test_strips_of_one_pose_are_the_whole_picture(shop: RasterRenderer, camera: Camera, count: int) -> None:
+def test_strips_of_one_pose_are_the_whole_picture(gallery: RasterRenderer, camera: Camera, count: int) -> None:
     strips = cut(camera.height_px, AHEAD[None], instants(SECOND_NS), count=count)
-    whole = shop.radiance(camera, still(camera, AHEAD, t_ns=SECOND_NS))
-    assert shop.radiance(camera, strips).tobytes() == whole.tobytes()
+    whole = gallery.radiance(camera, still(camera, AHEAD, t_ns=SECOND_NS))
+    assert gallery.radiance(camera, strips).tobytes() == whole.tobytes()
     assert whole.std() > 0
 
 
 @every_camera
-def test_strips_of_many_poses_are_cut_from_the_pictures_of_those_poses(shop: RasterRenderer, camera: Camera) -> None:
+def test_strips_of_many_poses_are_cut_from_the_pictures_of_those_poses(gallery: RasterRenderer, camera: Camera) -> None:
     way, edges = poses(4), [0, 30, 60, 90, camera.height_px]
     rows = [slice(a, b) for a, b in pairwise(edges)]
     now = instants(SECOND_NS)
-    rolled = shop.radiance(camera, [View(r, T[None], now, now) for r, T in zip(rows, way, strict=True)])
+    rolled = gallery.radiance(camera, [View(r, T[None], now, now) for r, T in zip(rows, way, strict=True)])
     for r, T in zip(rows, way, strict=True):
-        np.testing.assert_array_equal(rolled[r], shop.radiance(camera, still(camera, T, t_ns=SECOND_NS))[r])
+        np.testing.assert_array_equal(rolled[r], gallery.radiance(camera, still(camera, T, t_ns=SECOND_NS))[r])
 
 
 @every_camera
 @pytest.mark.parametrize("count", [2, 3, 8])
-def test_sub_frames_of_one_pose_are_the_still(shop: RasterRenderer, camera: Camera, count: int) -> None:
+def test_sub_frames_of_one_pose_are_the_still(gallery: RasterRenderer, camera: Camera, count: int) -> None:
     now = instants(*[SECOND_NS] * count)
     view = View(slice(0, camera.height_px), np.repeat(AHEAD[None], count, 0), now, now)
-    whole = shop.radiance(camera, still(camera, AHEAD, t_ns=SECOND_NS))
+    whole = gallery.radiance(camera, still(camera, AHEAD, t_ns=SECOND_NS))
     # What a rough mirror spreads of half the samples differs a little from what it spreads of all.
-    np.testing.assert_allclose(shop.radiance(camera, [view]), whole, rtol=3e-5)
+    np.testing.assert_allclose(gallery.radiance(camera, [view]), whole, rtol=3e-5)
 
 
 @every_camera
-def test_a_blurred_picture_is_the_mean_of_its_sub_frames(shop: RasterRenderer, camera: Camera) -> None:
+def test_a_blurred_picture_is_the_mean_of_its_sub_frames(gallery: RasterRenderer, camera: Camera) -> None:
     times = instants(0, SECOND_NS // 2, SECOND_NS)
-    blurred = shop.radiance(camera, [View(slice(0, camera.height_px), poses(3), times, times)])
+    blurred = gallery.radiance(camera, [View(slice(0, camera.height_px), poses(3), times, times)])
     sharp = [
-        shop.radiance(camera, still(camera, T, t_ns=int(t))) for T, t in zip(poses(3), times.tolist(), strict=True)
+        gallery.radiance(camera, still(camera, T, t_ns=int(t))) for T, t in zip(poses(3), times.tolist(), strict=True)
     ]
     np.testing.assert_allclose(blurred, np.mean(sharp, 0), rtol=1e-4, atol=1e-4)
 
 
-def test_strips_with_sub_frames_are_the_picture_with_sub_frames(shop: RasterRenderer) -> None:
+def test_strips_with_sub_frames_are_the_picture_with_sub_frames(gallery: RasterRenderer) -> None:
     times = instants(0, SECOND_NS // 2, SECOND_NS)
-    blurred = shop.radiance(PINHOLE, [View(slice(0, 120), poses(3), times, times)])
-    assert shop.radiance(PINHOLE, cut(120, poses(3), times, count=7)).tobytes() == blurred.tobytes()
+    blurred = gallery.radiance(PINHOLE, [View(slice(0, 120), poses(3), times, times)])
+    assert gallery.radiance(PINHOLE, cut(120, poses(3), times, count=7)).tobytes() == blurred.tobytes()
 
 
-def test_two_renderers_side_by_side_draw_the_same_bytes(shop: RasterRenderer, even_light: Any) -> None:
-    other = RasterRenderer(even_light(SHOP))
+def test_two_renderers_side_by_side_draw_the_same_bytes(gallery: RasterRenderer, even_light: Any) -> None:
+    other = RasterRenderer(even_light(GALLERY))
     for camera in CAMERAS.values():
         view = still(camera, AHEAD, t_ns=SECOND_NS // 3)
-        assert other.radiance(camera, view).tobytes() == shop.radiance(camera, view).tobytes()
+        assert other.radiance(camera, view).tobytes() == gallery.radiance(camera, view).tobytes()
     other.close()
 
 
@@ -165,7 +165,7 @@ def test_the_sky_follows_its_level(draw: Any, even_light: Any) -> None:
 
 
 @pytest.mark.parametrize("rows", [[(0, 50), (60, 120)], [(0, 119)], [(0, 70), (60, 120)]])
-def test_views_that_do_not_tile_the_picture_are_refused(shop: RasterRenderer, rows: list[tuple[int, int]]) -> None:
+def test_views_that_do_not_tile_the_picture_are_refused(gallery: RasterRenderer, rows: list[tuple[int, int]]) -> None:
     now = instants(0)
     with pytest.raises(ValueError, match="views must tile the rows 0 to 120"):
-        shop.radiance(PINHOLE, [View(slice(a, b), AHEAD[None], now, now) for a, b in rows])
+        gallery.radiance(PINHOLE, [View(slice(a, b), AHEAD[None], now, now) for a, b in rows])

@@ -56,16 +56,16 @@ NOW, LATER = Shot(HERE, 0), Shot(NEXT, STEP_NS)
 
 def nearest(scene: Scene, origin_m: Array, directions: Array, *, t_ns: float) -> tuple[Array, Array]:
     """The first opaque front along each direction (R, 3): surface, -1 for none, and lengths, infinite for none."""
-    stock, best = inventory(scene, t_ns=t_ns), np.full(len(directions), np.inf)
+    listed, best = inventory(scene, t_ns=t_ns), np.full(len(directions), np.inf)
     which = np.full(len(directions), -1)
-    for index, surface in enumerate(stock.surfaces):
+    for index, surface in enumerate(listed.surfaces):
         along = directions @ surface.normal
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = (surface.corner_m - origin_m) @ surface.normal / along
             local = origin_m + distance[:, None] * directions - surface.corner_m
         u, v = (local @ edge / (edge @ edge) for edge in (surface.edge_u_m, surface.edge_v_m))
         hit = (along < 0) & (distance > 0) & (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1) & (distance < best)
-        if not stock.pane[index]:
+        if not listed.pane[index]:
             best[hit], which[hit] = distance[hit], index
     return which, best
 
@@ -145,21 +145,21 @@ def test_normals_are_those_of_the_surfaces_in_the_cameras_frame(truth, expected)
 
 
 def test_ids_name_what_is_seen_and_movers_by_their_own_name(truth, expected, caster):
-    surface, stock = expected[0], inventory(HALL, t_ns=0)
-    things = ["cart" if stock.mover[i] >= 0 else s.instance for i, s in enumerate(stock.surfaces)]
+    surface, listed = expected[0], inventory(HALL, t_ns=0)
+    things = ["cart" if listed.mover[i] >= 0 else s.instance for i, s in enumerate(listed.surfaces)]
     instance = np.array(caster.names.instance)[flat(truth.instance)]
     material = np.array(caster.names.material)[flat(truth.material)]
     off_edges(instance == np.array([*things, ""])[surface])
-    off_edges(material == np.array([*(s.material for s in stock.surfaces), ""])[surface])
-    off_edges(flat(truth.moving) == (np.append(stock.mover, -1)[surface] >= 0))
+    off_edges(material == np.array([*(s.material for s in listed.surfaces), ""])[surface])
+    off_edges(flat(truth.moving) == (np.append(listed.mover, -1)[surface] >= 0))
     assert {"cart", "crate", "floor", "wall_east"} <= set(instance)
     assert caster.names.instance[0] == caster.names.material[0] == ""
 
 
 def test_mirrors_coats_and_what_stands_behind_panes_are_in_the_mask(truth, expected):
     surface, distance_m, rays = expected
-    stock = inventory(HALL, t_ns=0)
-    shiny = np.array([*(s.material in {"wax", "steel"} for s in stock.surfaces), False])[surface]
+    listed = inventory(HALL, t_ns=0)
+    shiny = np.array([*(s.material in {"wax", "steel"} for s in listed.surfaces), False])[surface]
     pane = HALL.surfaces[-1]
     directions = rays @ HERE[:3, :3].T
     with np.errstate(invalid="ignore"):
@@ -214,7 +214,7 @@ def test_flow_there_and_back_returns_to_the_pixel(caster):
     floor = caster.names.instance.index("floor")
     rows, columns = np.nonzero((there.instance == floor) & ~there.occlusion)
     uv_px = np.stack([columns, rows], -1) + there.flow[rows, columns]
-    # The floor's depth from the next place is that of its plane, so the way back needs no look at pixels between.
+    # The floor's depth from the next place is that of its plane, so the way back needs no pixels between.
     rays = camera.rays(uv_px)
     directions = rays @ NEXT[:3, :3].T
     points_m = NEXT[:3, 3] - NEXT[2, 3] / directions[:, 2:] * directions

@@ -15,10 +15,10 @@ from vobench import stop
 from vobench.cli import terminal
 from vobench.errors import MissingDependencyError
 from vobench.render import mitsuba
-from vobench.render.egl import EGL_PACKAGES, EGL_REMEDY
+from vobench.render.raster import EGL_PACKAGES, EGL_REMEDY
 from vobench.run.store import default_store, why_unwritable
 
-PROBE = "from vobench.render import egl; egl.context()"
+PROBE = "from vobench.render import raster; raster.context()"
 
 
 @dataclass(frozen=True, slots=True)

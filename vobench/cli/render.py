@@ -1,4 +1,4 @@
-"""vobench render."""
+"""Draw one picture of a scene: vobench render."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import closing
@@ -15,7 +15,7 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import PRESETS, looking
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import Shot
+from vobench.render.occlusion import Shot
 from vobench.render.renderer import Radiance, still
 from vobench.render.truth import TruthCaster
 from vobench.run.simulate import open_renderer
@@ -38,7 +38,7 @@ STILL_CHANNELS = tuple(name for name in CHANNELS if name not in {"flow", "occlus
 
 @dataclass(frozen=True, slots=True)
 class Viewpoint:
-    """Where a camera stands and looks, and when."""
+    """A camera's place, direction and time."""
 
     at_m: Place
     yaw_deg: float
@@ -66,7 +66,7 @@ class Viewpoint:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class PictureSettings:
     """What draws and takes the picture: the lens of a preset, a chip, an exposure, an engine."""
 
     camera: str
@@ -95,17 +95,19 @@ class Look:
         return replace(CAMERAS[self.sensor], exposure_gain=self.exposure_gain)
 
 
-def show(scene_name: str, viewpoint: Viewpoint, look: Look, *, out: Path, truth: bool, as_json: bool) -> None:
+def show(
+    scene_name: str, viewpoint: Viewpoint, settings: PictureSettings, *, out: Path, truth: bool, as_json: bool
+) -> None:
     """Draw one picture of a scene, and with `truth` its ground truth beside it."""
-    rendering, lens, chip = look.rendering(), look.lens(), look.chip()
+    rendering, lens, chip = settings.rendering(), settings.lens(), settings.chip()
     viewpoint.check()
     if out.suffix != ".png" or out.is_dir() or not out.parent.is_dir():
         raise InputError(f"--out should be a .png in a folder that exists, got {out}")
     spec = read_scene(catalog.find("scene", scene_name).path)
     if not spec.room.holds(viewpoint.at_m):
         raise InputError(f"--at should be inside the room ({spec.room.extent}), got {viewpoint.at_m}")
-    scene, shop = build(spec, {}), Context(default_store(), terminal.Bars())
-    with closing(open_renderer(spec, scene, rendering, shop)) as renderer:
+    scene, context = build(spec, {}), Context(default_store(), terminal.Bars())
+    with closing(open_renderer(spec, scene, rendering, context)) as renderer:
         luminance_cd_m2 = renderer.radiance(lens, still(lens, viewpoint.T_world_camera, t_ns=viewpoint.t_ns))
     write_png(out, _exposed(luminance_cd_m2 / np.float32(spec.white_cd_m2), chip))
     written = [out, *(_write_truth(out, scene, lens, viewpoint) if truth else [])]
@@ -161,5 +163,5 @@ def render_command(
 ) -> None:
     """Draw one picture of a scene, to look at and to debug scenes with."""
     viewpoint = Viewpoint(at, yaw, pitch, time)
-    look = Look(camera, sensor, gain, engine, samples)
-    show(scene, viewpoint, look, out=out, truth=truth, as_json=json)
+    settings = PictureSettings(camera, sensor, gain, engine, samples)
+    show(scene, viewpoint, settings, out=out, truth=truth, as_json=json)

@@ -6,35 +6,28 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from vobench.render.emitter import Aim, Emitter, OpenSky, SkyPane, emitters
-from vobench.render.geometry import RAY_OFFSET_M, Ball, Floats
+from vobench.render.emitter import Aim, Emitter, emitters
+from vobench.render.geometry import RAY_OFFSET_M, Ball, Floats, Visibility
 from vobench.render.lightmap import Atlas, Texels, in_chunks
-from vobench.render.visibility import Visibility
 from vobench.scene.light import Light, Sky
 from vobench.scene.surface import Surface
 
 
 @dataclass(frozen=True, slots=True)
-class MirrorImage:
-    """A source in a mirror: rays go straight to where it seems to be, through the mirror's rectangle."""
+class _MirrorImage:
+    """An emitter in a mirror: rays go straight to where its image is, through the mirror's rectangle."""
 
-    source: Emitter
+    emitter: Emitter
     mirror: Surface
     tint: float
 
-    def ball(self) -> Ball:
-        """The source's, behind the mirror."""
-        ball = self.source.ball()
-        return Ball(self._behind(ball.centre_m[None])[0], ball.radius_m)
-
     def width_rad(self, points_m: Floats) -> Floats:
-        """As wide as the source looks from behind the mirror."""
-        return self.source.width_rad(self._behind(points_m))
+        return self.emitter.width_rad(self.behind(points_m))
 
     def towards(self, texels: Texels) -> Aim:
-        """What the source gives the points' own images."""
-        images = replace(texels, points_m=self._behind(texels.points_m), normals=self._turned(texels.normals))
-        aim_from_behind = self.source.towards(images)
+        """What the emitter gives the points' own images."""
+        images = replace(texels, points_m=self.behind(texels.points_m), normals=self._turned(texels.normals))
+        aim_from_behind = self.emitter.towards(images)
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
             way, strength = aim_from_behind(a, b)
@@ -43,17 +36,19 @@ class MirrorImage:
 
         return aim
 
-    def unshadowed(self, texels: Texels) -> None:
-        """The mirror's rim may cut it."""
-
-    def passing(self, sight: Visibility, origins_m: Floats, way: Floats) -> Floats:
-        """To the mirror, and from there to the source."""
+    def passing(self, visibility: Visibility, origins_m: Floats, way: Floats) -> Floats:
+        """To the mirror, and from there to the emitter."""
         reach = self._reach(origins_m, way)[:, None]
-        share = sight.passing(origins_m, reach * way)
+        share = visibility.passing(origins_m, reach * way)
         some = np.flatnonzero(share)
         met = origins_m[some] + reach[some] * way[some] + (RAY_OFFSET_M * self.mirror.normal).astype(np.float32)
-        share[some] *= self.source.passing(sight, met, self._turned((1 - reach[some]) * way[some]))
+        share[some] *= self.emitter.passing(visibility, met, self._turned((1 - reach[some]) * way[some]))
         return share
+
+    def behind(self, points_m: Floats) -> Floats:
+        normal = self.mirror.normal
+        height = (points_m - self.mirror.corner_m) @ normal
+        return (points_m - 2 * height[:, None] * normal).astype(points_m.dtype)
 
     def _reach(self, points_m: Floats, way: Floats) -> Floats:
         """The share (P,) of each way at which it meets the mirror's plane."""
@@ -71,51 +66,52 @@ class MirrorImage:
         inside: Floats = ahead & (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1)
         return inside
 
-    def _behind(self, points_m: Floats) -> Floats:
-        normal = self.mirror.normal
-        height = (points_m - self.mirror.corner_m) @ normal
-        return (points_m - 2 * height[:, None] * normal).astype(points_m.dtype)
-
     def _turned(self, vectors: Floats) -> Floats:
         normal = self.mirror.normal
         return (vectors - 2 * (vectors @ normal)[:, None] * normal).astype(vectors.dtype)
 
 
-def mirror_images(light: Light, sight: Visibility, *, t_ns: float) -> list[Emitter]:
+def mirror_images(light: Light, visibility: Visibility, *, t_ns: float) -> list[Emitter]:
     """A lamp or the sun in every smooth mirror; the sky's come with the rays that gather indirect light."""
     if isinstance(light, Sky):
         return []
-    shown = emitters(light, sight, t_ns=t_ns)
-    return [MirrorImage(source, mirror, tint) for mirror, tint in sight.mirrors for source in shown]
+    own = emitters(light, visibility, t_ns=t_ns)
+    images = [_MirrorImage(emitter, mirror, tint) for mirror, tint in visibility.mirrors for emitter in own]
+    return [Emitter(_ball_behind(image), image.towards, image.width_rad, image.passing) for image in images]
+
+
+def _ball_behind(image: _MirrorImage) -> Ball:
+    ball = image.emitter.ball
+    return Ball(image.behind(ball.centre_m[None])[0], ball.radius_m)
 
 
 # Steps of additive recurrences that fill the unit interval evenly: Roberts (2018), R2 and the golden ratio.
 JITTER = np.array([0.7548776662, 0.5698402910], np.float32)
 FOOTPRINT = np.array([0.6180339887, 0.3247179572], np.float32)
-NARROW_RAD, WIDE_RAD = 0.15, 0.6  # sources that look narrower or wider get a quarter or four times the rays
+NARROW_RAD, WIDE_RAD = 0.15, 0.6  # emitters that are seen narrower or wider get a quarter or four times the rays
 SKY_SMOOTHING = 1.0  # samples; its shadows are so soft that averaging neighbours takes noise away, and nothing else
 PROBE_STEP, PROBE_SIDE, OPEN_SHARE = 7, 4, 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class Rays:
-    """side x side rays to a source; where `spread`, they start all over a texel's area instead of its middle."""
+    """side x side rays to an emitter; where `spread`, they start all over a texel's area instead of its middle."""
 
     side: int
     spread: bool = False
 
 
-def direct_light(source: Emitter, texels: Texels, where: Atlas, sight: Visibility, *, side: int) -> Floats:
-    """Illuminance (P,) in lux that one source gives at level 1; under a coat the part that enters."""
+def direct_light(emitter: Emitter, texels: Texels, atlas: Atlas, visibility: Visibility, *, side: int) -> Floats:
+    """Illuminance (P,) in lux that one emitter gives at level 1; under a coat the part that enters."""
     light, clear = np.zeros(len(texels), np.float32), np.full(len(texels), np.nan, np.float32)
     coarse = np.zeros(len(texels), bool)
-    for rays, some in first_rays(source, texels, side):
-        light[some], clear[some] = arriving(source, texels.take(some), sight, rays)
+    for rays, some in first_rays(emitter, texels, side):
+        light[some], clear[some] = arriving(emitter, texels.take(some), visibility, rays)
         coarse[some] = rays.side < 2 * side
-    if isinstance(source, SkyPane):
+    if emitter.sky == "pane":
         return light  # so soft that the map is smoothed instead
-    grainy = np.flatnonzero(_half_shadow(clear, texels, where) & coarse)
-    light[grainy], _ = arriving(source, texels.take(grainy), sight, Rays(2 * side, spread=True))
+    grainy = np.flatnonzero(_half_shadow(clear, texels, atlas) & coarse)
+    light[grainy], _ = arriving(emitter, texels.take(grainy), visibility, Rays(2 * side, spread=True))
     return light
 
 
@@ -125,24 +121,24 @@ def in_front(what: Ball, points_m: Floats, normals: Floats) -> NDArray[np.bool_]
     return np.asarray(ahead > -what.radius_m)
 
 
-def first_rays(source: Emitter, texels: Texels, side: int) -> list[tuple[Rays, NDArray[np.int64]]]:
-    """How many rays which points need where nothing is in the way: more for what looks wider."""
+def first_rays(emitter: Emitter, texels: Texels, side: int) -> list[tuple[Rays, NDArray[np.int64]]]:
+    """How many rays which points need where nothing is in the way: more for what is seen wider."""
     points = texels.points_m
-    width = np.concatenate(in_chunks(lambda part: source.width_rad(points[part]), len(points)) or [np.zeros(0)])
+    width = np.concatenate(in_chunks(lambda part: emitter.width_rad(points[part]), len(points)) or [np.zeros(0)])
     kinds = np.select([width == 0, width < NARROW_RAD, width < WIDE_RAD], [1, max(1, side // 2), side], 2 * side)
     return [(Rays(int(kind)), np.flatnonzero(kinds == kind)) for kind in np.unique(kinds)]
 
 
-def arriving(source: Emitter, texels: Texels, sight: Visibility, rays: Rays) -> tuple[Floats, Floats]:
-    """Illuminance (P,), and the share of rays that met nothing opaque (P,), NaN where the source lies behind."""
-    parts = in_chunks(lambda part: _arriving(source, texels.take(part), sight, rays), len(texels))
+def arriving(emitter: Emitter, texels: Texels, visibility: Visibility, rays: Rays) -> tuple[Floats, Floats]:
+    """Illuminance (P,), and the share of rays that met nothing opaque (P,), NaN where the emitter lies behind."""
+    parts = in_chunks(lambda part: _arriving(emitter, texels.take(part), visibility, rays), len(texels))
     light, clear = zip(*parts, strict=True) if parts else ([np.zeros(0, np.float32)], [np.zeros(0, np.float32)])
     return np.concatenate(light), np.concatenate(clear)
 
 
-def _arriving(source: Emitter, texels: Texels, sight: Visibility, rays: Rays) -> tuple[Floats, Floats]:
+def _arriving(emitter: Emitter, texels: Texels, visibility: Visibility, rays: Rays) -> tuple[Floats, Floats]:
     total, open_light, passed, cast = (np.zeros(len(texels), np.float32) for _ in range(4))
-    towards = source.towards(texels)
+    towards = emitter.towards(texels)
     for cell in range(rays.side**2):
         way, strength = towards(*cell_spot(texels, cell, rays.side))
         cosine = texels.cosine(way)
@@ -152,11 +148,11 @@ def _arriving(source: Emitter, texels: Texels, sight: Visibility, rays: Rays) ->
         light *= texels.entering(cosine)
         start = texels.points_m[faced] + (footprint(texels, faced, cell) if rays.spread else 0)
         ahead = texels.points_m[faced] + way[faced] - start
-        share = source.passing(sight, start, ahead)
+        share = emitter.passing(visibility, start, ahead)
         total[faced] += light[faced] * share
         passed[faced] += share > 0
         cast[faced] += 1
-    exact = source.unshadowed(texels)
+    exact = emitter.unshadowed(texels) if emitter.unshadowed else None
     known = np.zeros(0, np.int64) if exact is None else np.flatnonzero((open_light > 0) & ~np.isnan(exact))
     total /= rays.side**2
     if exact is not None:
@@ -166,7 +162,7 @@ def _arriving(source: Emitter, texels: Texels, sight: Visibility, rays: Rays) ->
 
 
 def cell_spot(texels: Texels, cell: int, side: int) -> tuple[Floats, Floats]:
-    """Where in one of side x side cells of the unit square each point looks (P,): turned by its own dither."""
+    """Where in one of side x side cells of the unit square each point aims (P,): turned by its own dither."""
     jitter = (texels.dither + cell * JITTER) % 1
     return (cell % side + jitter[:, 0]) / side, (cell // side + jitter[:, 1]) / side
 
@@ -178,13 +174,13 @@ def footprint(texels: Texels, some: NDArray[np.int64], cell: int) -> Floats:
     return steps
 
 
-def _half_shadow(clear: Floats, texels: Texels, where: Atlas) -> NDArray[np.bool_]:
-    """Points (P,) beside which, within three texels, the source is both seen and hidden.
+def _half_shadow(clear: Floats, texels: Texels, atlas: Atlas) -> NDArray[np.bool_]:
+    """Points (P,) beside which, within three texels, the emitter is both seen and hidden.
 
     Few rays can miss the rim of a lamp, hence the three.
     """
     near = [
-        scipy.ndimage.binary_dilation(texels.on_map(part.astype(np.float32), where) > 0, iterations=3).ravel()[
+        scipy.ndimage.binary_dilation(texels.on_map(part.astype(np.float32), atlas) > 0, iterations=3).ravel()[
             texels.index
         ]
         for part in (clear > 0, clear < 1)
@@ -193,10 +189,10 @@ def _half_shadow(clear: Floats, texels: Texels, where: Atlas) -> NDArray[np.bool
     return half
 
 
-def sees_open_sky(source: OpenSky, texels: Texels, sight: Visibility) -> NDArray[np.bool_]:
+def sees_open_sky(emitter: Emitter, texels: Texels, visibility: Visibility) -> NDArray[np.bool_]:
     """Points (P,) on surfaces of which one probe in a thousand or more leaves the scene without meeting a pane."""
     probe = texels.take(slice(None, None, PROBE_STEP))
-    lit, _ = arriving(source, probe, sight, Rays(PROBE_SIDE))
-    count = np.bincount(probe.surface, lit > 0, minlength=len(sight.surfaces))
-    total = np.bincount(probe.surface, minlength=len(sight.surfaces))
+    lit, _ = arriving(emitter, probe, visibility, Rays(PROBE_SIDE))
+    count = np.bincount(probe.surface, lit > 0, minlength=len(visibility.surfaces))
+    total = np.bincount(probe.surface, minlength=len(visibility.surfaces))
     return (count > OPEN_SHARE * total)[texels.surface]

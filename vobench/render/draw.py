@@ -10,113 +10,57 @@ from OpenGL import GL
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.render.culling import Batch, CullingSet
-from vobench.render.opengl import PASS_BINDING, Canvas, FloatTexture, Grid, Program, Programs, Sum, canvas, flat, summed
+from vobench.render.opengl import (
+    PASS_BINDING,
+    Canvas,
+    FlatTarget,
+    FloatTexture,
+    Grid,
+    Program,
+    Programs,
+    canvas,
+    flat_target,
+)
 from vobench.render.view import FAR_M, NEAR_M, Box, PinholeView, Plane, visible_box
 from vobench.scene.material import Glass, Mirror, Polished
 
-MIRRORED_UNIT, DEPTH_UNIT, HAZE_UNIT = GL.GL_TEXTURE2, GL.GL_TEXTURE3, GL.GL_TEXTURE3
+# As the shaders say.
+BODY_UNIT, LIGHT_UNIT, LAYERS_UNIT, DEPTH_UNIT, ROUGH_UNIT = (GL.GL_TEXTURE0 + unit for unit in (0, 1, 2, 3, 3))
+PASS_FLOATS = 56
+MIRRORS = 3  # followed, each seen in the one before
 NONE = -1.0
 
 
 @dataclass(frozen=True, slots=True)
-class RoughBlur:
-    """The mirrored picture as luminance, 1 / depth and presence, with mipmaps; and its spread by a rough mirror."""
-
-    smooth_framebuffer: Any
-    smooth: Any
-    spread: Sum
-
-    def settle(self, reflections: Canvas, program: Program) -> None:
-        """What is drawn from now on with the program is the smooth picture of a mirror."""
-        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.smooth_framebuffer)
-        GL.glViewport(0, 0, self.spread.width_px, self.spread.height_px)
-        GL.glScissor(0, 0, self.spread.width_px, self.spread.height_px)
-        GL.glClearBufferfv(GL.GL_COLOR, 0, [0.0, 0.0, 0.0, 0.0])
-        for unit, texture in ((MIRRORED_UNIT, reflections.colour), (DEPTH_UNIT, reflections.depth)):
-            GL.glActiveTexture(unit)
-            GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, texture)
-        program.use()
-        program.count("count", reflections.layers)
-        program.number("near_m", NEAR_M)
-        program.number("far_m", FAR_M)
-
-    def finish(self) -> None:
-        """What is drawn from now on is the spread."""
-        self.spread.clear((0, self.spread.width_px, 0, self.spread.height_px), NONE)
-        GL.glActiveTexture(MIRRORED_UNIT)
-        GL.glBindTexture(GL.GL_TEXTURE_2D, self.smooth)
-        GL.glGenerateMipmap(GL.GL_TEXTURE_2D)
-
-    def bind(self) -> None:
-        """Let surfaces view the spread up."""
-        GL.glActiveTexture(HAZE_UNIT)
-        GL.glBindTexture(GL.GL_TEXTURE_2D, self.spread.colour)
-
-    def delete(self) -> None:
-        """Free it on the graphics side."""
-        GL.glDeleteFramebuffers(1, [self.smooth_framebuffer])
-        GL.glDeleteTextures([self.smooth])
-        self.spread.delete()
-
-
-def rough_blur(width_px: int, height_px: int) -> RoughBlur:
-    """Target for the mirrors of pictures of some size."""
-    framebuffer, smooth = flat(width_px, height_px, GL.GL_RGBA32F, GL.GL_RGBA)
-    for key, value in (
-        (GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR_MIPMAP_LINEAR),
-        (GL.GL_TEXTURE_MAG_FILTER, GL.GL_LINEAR),
-        (GL.GL_TEXTURE_WRAP_S, GL.GL_CLAMP_TO_EDGE),
-        (GL.GL_TEXTURE_WRAP_T, GL.GL_CLAMP_TO_EDGE),
-    ):
-        GL.glTexParameteri(GL.GL_TEXTURE_2D, key, value)
-    return RoughBlur(framebuffer, smooth, summed(width_px, height_px))
-
-
-MIRRORS = 3  # followed, each seen in the one before
-
-
-@dataclass(frozen=True, slots=True)
 class RenderTarget:
-    """The picture's canvas, one for each mirror behind a mirror, what rough ones need, and the total of sub-frames."""
+    """The picture's canvas and one for each mirror behind a mirror; what rough ones need; the total of sub-frames.
+
+    smooth: a mirrored picture as luminance, 1 / depth and presence, with mipmaps; rough: what a rough mirror shows.
+    """
 
     canvases: tuple[Canvas, ...]
-    haze: RoughBlur
-    total: Sum
+    smooth: FlatTarget
+    rough: FlatTarget
+    total: FlatTarget
 
     @property
     def canvas(self) -> Canvas:
         """What the picture itself is drawn on."""
         return self.canvases[0]
 
-    @property
-    def whole(self) -> Box:
-        """The box of the whole picture."""
-        return 0, self.canvas.width_px, 0, self.canvas.height_px
-
-    def delete(self) -> None:
-        """Free it on the graphics side."""
-        for sheet in self.canvases:
-            sheet.delete()
-        self.haze.delete()
-        self.total.delete()
-
 
 def render_target(width_px: int, height_px: int, grid: Grid) -> RenderTarget:
     """Target for pictures of some size and grid of samples."""
     size = width_px, height_px
     canvases = tuple(canvas(*size, grid) for _ in range(1 + MIRRORS))
-    return RenderTarget(canvases, rough_blur(*size), summed(*size))
+    return RenderTarget(canvases, flat_target(*size, mipmaps=True), flat_target(*size), flat_target(*size))
 
 
-PASS_FLOATS = 56
-BODY_UNIT, LIGHT_UNIT, LAYERS_UNIT = GL.GL_TEXTURE0, GL.GL_TEXTURE1, GL.GL_TEXTURE2
-
-
-class DrawPrograms:
-    """Holds programs and what they share, as long as its context is current."""
+class DrawCalls:
+    """Single draw calls, with the programs and state they share, as long as their context is current."""
 
     def __init__(self, light: FloatTexture) -> None:
-        self.programs, self._light = Programs(), light
+        self._programs, self._light = Programs(), light
         self._block = GL.glGenBuffers(1)
         GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._block)
         GL.glBufferData(GL.GL_UNIFORM_BUFFER, 4 * PASS_FLOATS, None, GL.GL_DYNAMIC_DRAW)
@@ -127,7 +71,7 @@ class DrawPrograms:
         GL.glDepthFunc(GL.GL_LEQUAL)
 
     def begin(self, view: PinholeView, canvas: Canvas) -> None:
-        """Set what all strokes of one view share."""
+        """Set what all draw calls of one view share."""
         shared = np.zeros(PASS_FLOATS, np.float32)
         shared[:16] = view.view_projection.T.ravel()
         shared[16:19], shared[19] = view.eye_m, view.ambient_cd_m2
@@ -143,86 +87,82 @@ class DrawPrograms:
         GL.glFrontFace(GL.GL_CW if view.depth % 2 else GL.GL_CCW)
         GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._block)
         GL.glBufferSubData(GL.GL_UNIFORM_BUFFER, 0, shared.nbytes, shared)
-        GL.glActiveTexture(LIGHT_UNIT)
-        self._light._bind()
+        self._light.bind(LIGHT_UNIT)
 
     def surface(self, batch: Batch, view: PinholeView, copies: int, *abilities: str) -> None:
-        """A batch as it looks from there; the reflection and haze it is able to show must be bound."""
-        program = self.programs.surface(*abilities, *_abilities(batch, view))
-        program.use()
-        _set_material(program, batch, view)
+        """A batch as it is seen; the reflections that it is able to show must be bound."""
+        program = self._programs.get("surface", "surface", *abilities, *_abilities(batch, view))
+        program.use(**_uniforms(batch, view))
         if isinstance(batch.material, Glass):
             self._pane(batch, copies)
             return
-        if not isinstance(batch.material, Mirror):
-            GL.glActiveTexture(BODY_UNIT)
-            batch.primitive.material.baseColorTexture._bind()
+        if batch.texture:
+            batch.texture.bind(BODY_UNIT)
         _rectangles(batch, copies)
 
-    def haze(self, batch: Batch, view: PinholeView, plane: Sequence[float]) -> None:
-        """What a rough mirror in a plane (normal, offset) shows, without its tint."""
-        material = batch.material
-        if not isinstance(material, Mirror | Polished):
-            raise TypeError(f"{material} is no rough mirror")
-        program = self.programs.haze(*(["HAS_FRESNEL"] if isinstance(material, Polished) else []))
-        program.use()
-        program.vector("plane", np.asarray(plane))
-        program.number("roughness", material.roughness)
-        program.number("focal_px", max(view.camera.fx_px, view.camera.fy_px))
-        if isinstance(material, Polished):
-            program.number("eta", material.eta)
-        self.flat(batch, view, program)
+    def resolve(self, group: "Group", view: PinholeView, reflections: Canvas, target: FlatTarget) -> None:
+        """The smooth picture of mirrors in one plane, from the samples of their reflections."""
+        target.clear(target.whole)
+        _bind_layers(LAYERS_UNIT, reflections.colour)
+        _bind_layers(DEPTH_UNIT, reflections.depth)
+        program = self._programs.get("surface", "resolve")
+        for batch in group:
+            program.use(count=reflections.layers, near_m=NEAR_M, far_m=FAR_M)
+            self._flat(batch, view, program)
 
-    def flat(self, batch: Batch, view: PinholeView, program: Program) -> None:
-        """A batch in one sample a pixel, whatever is in front of it, by the program in use."""
-        program.matrix("model", view.pose(batch.mover))
+    def rough(self, group: "Group", view: PinholeView, plane: Plane, target: RenderTarget) -> None:
+        """What rough mirrors in a plane show, without their tint, from its smooth picture."""
+        target.rough.clear(target.rough.whole, NONE)
+        GL.glActiveTexture(LAYERS_UNIT)
+        GL.glBindTexture(GL.GL_TEXTURE_2D, target.smooth.texture)
+        GL.glGenerateMipmap(GL.GL_TEXTURE_2D)
+        facing, focal_px = np.array([*plane.normal, plane.offset_m]), max(view.camera.fx_px, view.camera.fy_px)
+        for batch in group:
+            coated = isinstance(batch.material, Polished)
+            program = self._programs.get("surface", "rough", *(["HAS_FRESNEL"] if coated else []))
+            program.use(plane=facing, roughness=_roughness(batch), focal_px=focal_px)
+            if isinstance(batch.material, Polished):
+                program.use(eta=batch.material.eta)
+            self._flat(batch, view, program)
+        GL.glActiveTexture(ROUGH_UNIT)
+        GL.glBindTexture(GL.GL_TEXTURE_2D, target.rough.texture)
+
+    def background(self, view: PinholeView, copies: int) -> None:
+        """The skies, wherever nothing has been drawn."""
+        # Nothing has been drawn there yet, so that several skies add up.
+        GL.glEnable(GL.GL_BLEND)
+        GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
+        for gradation, scatter, sun in view.skies:
+            program = self._programs.get("background", "background")
+            program.use(world_from_screen=view.world_from_screen, gradation=gradation, scatter=scatter, sun=sun)
+            self._cover(copies)
+        GL.glDisable(GL.GL_BLEND)
+
+    def add(self, canvas: Canvas, total: FlatTarget, box: Box, weight: float) -> None:
+        """Add the mean of a canvas's samples in a box, weighted, to a total."""
+        total.begin(box)
+        _bind_layers(LAYERS_UNIT, canvas.colour)
+        self._programs.get("fullscreen", "mean").use(count=canvas.layers, weight=weight / canvas.layers)
+        GL.glEnable(GL.GL_BLEND)
+        GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
+        GL.glDisable(GL.GL_DEPTH_TEST)
+        self._cover(1)
+        GL.glEnable(GL.GL_DEPTH_TEST)
+        GL.glDisable(GL.GL_BLEND)
+
+    def _flat(self, batch: Batch, view: PinholeView, program: Program) -> None:
+        """A batch in one sample a pixel, whatever is in front of it."""
+        program.use(model=view.pose(batch.mover))
         GL.glDisable(GL.GL_DEPTH_TEST)
         _rectangles(batch, 1)
         GL.glEnable(GL.GL_DEPTH_TEST)
 
-    def background(self, view: PinholeView, copies: int) -> None:
-        """The skies, wherever nothing has been drawn."""
-        if len(view.skies) == 0:
-            return
-        program = self.programs.background()
-        program.use()
-        program.matrix("world_from_screen", view.world_from_screen)
-        # Nothing has been drawn there yet, so that several skies add up.
-        GL.glEnable(GL.GL_BLEND)
-        GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
-        for sky in view.skies:
-            for name, vector in zip(("gradation", "scatter", "sun"), sky, strict=True):
-                program.vector(name, vector)
-            self.cover(copies)
-        GL.glDisable(GL.GL_BLEND)
-
-    def mean(self, canvas: Canvas, weight: float) -> None:
-        """Add the weighted mean of a canvas's samples."""
-        GL.glActiveTexture(LAYERS_UNIT)
-        GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, canvas.colour)
-        program = self.programs.mean()
-        program.use()
-        program.count("count", canvas.layers)
-        program.number("weight", weight / canvas.layers)
-        GL.glEnable(GL.GL_BLEND)
-        GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
-        GL.glDisable(GL.GL_DEPTH_TEST)
-        self.cover(1)
-        GL.glEnable(GL.GL_DEPTH_TEST)
-        GL.glDisable(GL.GL_BLEND)
-
-    def cover(self, copies: int) -> None:
+    def _cover(self, copies: int) -> None:
         """A triangle over the whole picture, in the program in use."""
         GL.glDisable(GL.GL_CULL_FACE)
         GL.glBindVertexArray(self._vertices)
         GL.glDrawArraysInstanced(GL.GL_TRIANGLES, 0, 3, copies)
         GL.glEnable(GL.GL_CULL_FACE)
-
-    def delete(self) -> None:
-        """Free programs and buffers on the graphics side."""
-        self.programs.delete()
-        GL.glDeleteBuffers(1, [self._block])
-        GL.glDeleteVertexArrays(1, [self._vertices])
 
     def _pane(self, batch: Batch, copies: int) -> None:
         """Seen from both sides, and what is behind it shines through: the alpha drawn is the share that passes."""
@@ -253,20 +193,21 @@ def _abilities(batch: Batch, view: PinholeView) -> list[str]:
     return [name for name, has in names.items() if has]
 
 
-def _set_material(program: Program, batch: Batch, view: PinholeView) -> None:
-    program.matrix("model", view.pose(batch.mover))
-    if not isinstance(batch.material, Mirror | Glass):
-        program.number("body_scale", batch.body_scale)
-    if isinstance(batch.material, Polished | Mirror | Glass):
-        program.number("tint", batch.material.tint)
-    if isinstance(batch.material, Polished | Glass) and batch.plane is not None:
-        program.number("eta", batch.material.eta)
-        program.number("eye_height", abs(view.plane(batch.plane, batch.mover).distance_m(view.eye_m)))
+def _uniforms(batch: Batch, view: PinholeView) -> dict[str, float | Array]:
+    material = batch.material
+    values: dict[str, float | Array] = {"model": view.pose(batch.mover)}
+    if batch.texture:
+        values["body_scale"] = batch.texture.scale / np.pi
+    if isinstance(material, Polished | Mirror | Glass):
+        values["tint"] = material.tint
+    if isinstance(material, Polished | Glass) and batch.plane is not None:
+        values["eta"] = material.eta
+        values["eye_height"] = abs(view.plane(batch.plane, batch.mover).distance_m(view.eye_m))
+    return values
 
 
-def bind_layers(texture: Any) -> None:
-    """Let surfaces view a canvas's colour up."""
-    GL.glActiveTexture(LAYERS_UNIT)
+def _bind_layers(unit: int, texture: Any) -> None:
+    GL.glActiveTexture(unit)
     GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, texture)
 
 
@@ -274,41 +215,36 @@ Group = Sequence[Batch]
 
 
 class BatchDraw:
-    """Draws batches onto target, as long as its context is current."""
+    """Draws batches onto targets, as long as its context is current."""
 
     def __init__(self, batches: Sequence[Batch], light: FloatTexture) -> None:
-        self._brush, self._crowd = DrawPrograms(light), CullingSet(batches)
+        self._calls, self._culling = DrawCalls(light), CullingSet(batches)
         # Small things first: they hide much of what is large, which is then not shaded there.
         self._plain = sorted((batch for batch in batches if batch.plane is None), key=_area_m2)
         self._mirrors = _by_plane(batch for batch in batches if isinstance(batch.material, Polished | Mirror))
         self._panes = _by_plane(batch for batch in batches if isinstance(batch.material, Glass))
 
-    def paint(self, view: PinholeView, target: RenderTarget, box: Box) -> None:
+    def draw(self, view: PinholeView, target: RenderTarget, box: Box) -> None:
         """Fill a box of the target's canvas for as many mirrors as the view goes by, which must be clear there."""
-        in_sight = self._crowd.in_sight(view, box)
+        visible = self._culling.visible(view, box)
         canvas = self._begin(view, target, box)
         for batch in self._plain:
-            if batch.index in in_sight:
-                self._brush.surface(batch, view, canvas.layers)
-        for group in _among(in_sight, self._mirrors):
+            if batch.index in visible:
+                self._calls.surface(batch, view, canvas.layers)
+        for group in _among(visible, self._mirrors):
             self._draw_mirror(group, view, target, box)
-        self._brush.background(view, canvas.layers)
-        for group in sorted(_among(in_sight, self._panes), key=lambda panes: -_nearest_m(panes, view)):
+        self._calls.background(view, canvas.layers)
+        for group in sorted(_among(visible, self._panes), key=lambda panes: -_nearest_m(panes, view)):
             self._draw_mirror(group, view, target, box)
 
-    def add(self, canvas: Canvas, total: Sum, box: Box, weight: float) -> None:
-        """Add a box of a canvas, weighted, to a total."""
-        total.begin(box)
-        self._brush.mean(canvas, weight)
-
-    def delete(self) -> None:
-        """Free everything on the graphics side."""
-        self._brush.delete()
+    def add(self, target: RenderTarget, total: FlatTarget, box: Box, weight: float) -> None:
+        """Add the mean of a target's samples in a box, weighted, to a total."""
+        self._calls.add(target.canvas, total, box, weight)
 
     def _begin(self, view: PinholeView, target: RenderTarget, box: Box) -> Canvas:
         canvas = target.canvases[view.depth]
         canvas.begin(box)
-        self._brush.begin(view, canvas)
+        self._calls.begin(view, canvas)
         return canvas
 
     def _draw_mirror(self, group: Group, view: PinholeView, target: RenderTarget, box: Box) -> None:
@@ -319,42 +255,29 @@ class BatchDraw:
         copies = target.canvas.layers
         if view.depth == MIRRORS:
             for batch in group:
-                self._brush.surface(batch, view, copies)
+                self._calls.surface(batch, view, copies)
             return
-        rough = [batch for batch in group if _is_rough(batch)]
-        within = target.whole if rough else box  # a rough one gathers from beyond a strip
+        rough = [batch for batch in group if _roughness(batch) > 0]
+        within = target.total.whole if rough else box  # a rough one gathers from beyond a strip
         seen = visible_box(view.camera, _in_camera(group, view), within, near_m=NEAR_M)
         if seen is None:
             return
-        self._reflect(view.through(plane), target, seen)
+        reflections = target.canvases[view.depth + 1]
+        reflections.clear(seen)
+        self.draw(view.through(plane), target, seen)
         if rough:
-            self._draw_haze(group, plane, view, target)
+            self._calls.begin(view, target.canvas)
+            self._calls.resolve(group, view, reflections, target.smooth)
+            self._calls.rough(rough, view, plane, target)
         self._begin(view, target, box)
-        bind_layers(target.canvases[view.depth + 1].colour)
+        _bind_layers(LAYERS_UNIT, reflections.colour)
         for batch in group:
-            abilities = ("HAS_REFLECTION", "HAS_HAZE") if batch in rough else ("HAS_REFLECTION",)
-            self._brush.surface(batch, view, copies, *abilities)
-
-    def _reflect(self, view: PinholeView, target: RenderTarget, box: Box) -> None:
-        """What a mirror shows is painted as everything is, by way of one mirror more."""
-        target.canvases[view.depth].clear(box)
-        self.paint(view, target, box)
-
-    def _draw_haze(self, group: Group, plane: Plane, view: PinholeView, target: RenderTarget) -> None:
-        """Spread the reflections in a plane, for the rough mirrors in it to view up."""
-        program = self._brush.programs.settle()
-        self._brush.begin(view, target.canvas)
-        target.haze.settle(target.canvases[view.depth + 1], program)
-        for batch in group:
-            self._brush.flat(batch, view, program)
-        target.haze.finish()
-        for batch in filter(_is_rough, group):
-            self._brush.haze(batch, view, [*plane.normal, plane.offset_m])
-        target.haze.bind()
+            abilities = ("HAS_REFLECTION", "HAS_ROUGHNESS") if batch in rough else ("HAS_REFLECTION",)
+            self._calls.surface(batch, view, copies, *abilities)
 
 
-def _among(in_sight: set[int], groups: Sequence[Group]) -> list[Group]:
-    return [group for group in groups if any(batch.index in in_sight for batch in group)]
+def _among(visible: set[int], groups: Sequence[Group]) -> list[Group]:
+    return [group for group in groups if any(batch.index in visible for batch in group)]
 
 
 def _area_m2(batch: Batch) -> float:
@@ -371,8 +294,8 @@ def _by_plane(batches: Iterable[Batch]) -> list[list[Batch]]:
     return list(groups.values())
 
 
-def _is_rough(batch: Batch) -> bool:
-    return isinstance(batch.material, Polished | Mirror) and batch.material.roughness > 0
+def _roughness(batch: Batch) -> float:
+    return batch.material.roughness if isinstance(batch.material, Polished | Mirror) else 0.0
 
 
 def _plane_towards(eye_m: Array, batch: Batch, view: PinholeView) -> Plane | None:

@@ -1,15 +1,13 @@
-"""Emitters: for a point and two random numbers, where to look and how bright it is there."""
+"""Emitters: for a point and two random numbers, in which direction an emitter lies and how bright it is there."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import RAY_OFFSET_M, Ball, Floats, ball, corners
+from vobench.render.geometry import FAR_M, RAY_OFFSET_M, Ball, Floats, Visibility, ball, corners
 from vobench.render.lightmap import Texels, tangents
-from vobench.render.visibility import FAR_M, Visibility
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.surface import Surface
 
@@ -73,111 +71,59 @@ Aim = Callable[[Floats, Floats], tuple[Floats, Floats]]
 FARTHEST_M = 1e7  # from there rays are parallel within a scene to a tenth of a millimetre
 
 
-class Emitter(Protocol):
-    """One thing that shines."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Emitter:
+    """One thing that shines; `ball` encloses it, of infinite radius where it is all around. `sky`: "pane", "open".
 
-    def ball(self) -> Ball:
-        """What encloses it; of infinite radius where it is all around."""
+    towards: for points and two random numbers each, vectors (P, 3) to it and illuminance (P,) square to them.
+    width_rad: roughly how wide it is (P,) seen from points (P, 3), 0 for hard shadows.
+    passing: share (R,) of light that comes from origins + way (R, 3) to the origins, of what `towards` does not count.
+    unshadowed: exact illuminance (P,) if nothing were in the way, NaN where unknown: takes the grain out of open light.
+    """
 
-    def width_rad(self, points_m: Floats) -> Floats:
-        """Roughly how wide it looks (P,) from points (P, 3); 0 for hard shadows."""
-
-    def towards(self, texels: Texels) -> Aim:
-        """Ways to it and strengths, see above."""
-
-    def unshadowed(self, texels: Texels) -> Floats | None:
-        """Exact illuminance (P,) if nothing were in the way, NaN where unknown: takes the grain out of open light."""
-
-    def passing(self, sight: Visibility, origins_m: Floats, way: Floats) -> Floats:
-        """Share (R,) of light that comes from origins + way (R, 3) to the origins, of what `towards` does not count."""
-
-
-@dataclass(frozen=True, slots=True)
-class Panel:
-    """A lamp's rectangle."""
-
-    light: AreaLight
-
-    def ball(self) -> Ball:
-        """Around its corners."""
-        return ball([self.light.surface])
-
-    def width_rad(self, points_m: Floats) -> Floats:
-        """The root of the solid angle."""
-        return np.sqrt(SolidAngle(self.light.surface, points_m).steradian).astype(np.float32)
-
-    def towards(self, texels: Texels) -> Aim:
-        """Only from in front."""
-        surface, points = self.light.surface, texels.points_m
-        angle = SolidAngle(surface, points)
-        in_front = (points - surface.corner_m) @ surface.normal > FLAT_M
-        strength = np.where(in_front, self.light.luminance_cd_m2 * angle.steradian, 0).astype(np.float32)
-
-        def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-            return angle.spot(a, b) + (RAY_OFFSET_M * surface.normal).astype(np.float32), strength
-
-        return aim
-
-    def unshadowed(self, texels: Texels) -> Floats:
-        """By the rectangle's edges, where all of it is above the horizon."""
-        return self.light.luminance_cd_m2 * polygon_illuminance(
-            corners(self.light.surface), texels.points_m, texels.normals
-        )
-
-    def passing(self, sight: Visibility, origins_m: Floats, way: Floats) -> Floats:
-        """Past walls and through panes."""
-        return sight.passing(origins_m, way)
+    ball: Ball
+    towards: Callable[[Texels], Aim]
+    width_rad: Callable[[Floats], Floats]
+    passing: Callable[[Visibility, Floats, Floats], Floats] = Visibility.passing
+    unshadowed: Callable[[Texels], Floats] | None = None
+    sky: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Bulb:
-    """A point or spot."""
+def panel_emitter(light: AreaLight) -> Emitter:
+    """A lamp's rectangle, which shines only to its front."""
+    surface = light.surface
 
-    light: PointLight | SpotLight
+    def towards(texels: Texels) -> Aim:
+        angle = SolidAngle(surface, texels.points_m)
+        in_front = (texels.points_m - surface.corner_m) @ surface.normal > FLAT_M
+        strength = np.where(in_front, light.luminance_cd_m2 * angle.steradian, 0).astype(np.float32)
+        return lambda a, b: (angle.spot(a, b) + (RAY_OFFSET_M * surface.normal).astype(np.float32), strength)
 
-    def ball(self) -> Ball:
-        """A point."""
-        return Ball(self.light.position_m, 0.0)
+    def unshadowed(texels: Texels) -> Floats:
+        return light.luminance_cd_m2 * polygon_illuminance(corners(surface), texels.points_m, texels.normals)
 
-    def width_rad(self, points_m: Floats) -> Floats:
-        """None."""
-        return np.zeros(len(points_m), np.float32)
+    return Emitter(ball([surface]), towards, _width_rad(surface), unshadowed=unshadowed)
 
-    def towards(self, texels: Texels) -> Aim:
-        """Inverse square."""
-        way = (self.light.position_m - texels.points_m).astype(np.float32)
+
+def bulb_emitter(light: PointLight | SpotLight) -> Emitter:
+    """A point or spot: inverse square."""
+
+    def towards(texels: Texels) -> Aim:
+        way = (light.position_m - texels.points_m).astype(np.float32)
         squared = np.einsum("ij,ij->i", way, way)
-        strength = (self.light.intensity_cd(-way / np.sqrt(squared)[:, None]) / squared).astype(np.float32)
+        strength = (light.intensity_cd(-way / np.sqrt(squared)[:, None]) / squared).astype(np.float32)
         return lambda _a, _b: (way, strength)
 
-    def unshadowed(self, texels: Texels) -> None:
-        """Nothing to add."""
-
-    def passing(self, sight: Visibility, origins_m: Floats, way: Floats) -> Floats:
-        """Past walls and through panes."""
-        return sight.passing(origins_m, way)
+    return Emitter(Ball(light.position_m, 0.0), towards, _hard)
 
 
-@dataclass(frozen=True, slots=True)
-class SunDisc:
-    """The sun where it stands at one instant."""
+def sun_emitter(light: Sun, t_ns: float) -> Emitter:
+    """The sun at one instant, so narrow that most points need one ray; rays are spread evenly over its disc."""
+    centre = light.direction(t_ns)
 
-    light: Sun
-    t_ns: float = 0
-
-    def ball(self) -> Ball:
-        """So far away that it stands in the same direction from everywhere."""
-        return Ball(FARTHEST_M * self.light.direction(self.t_ns), FARTHEST_M * SUN_RADIUS_RAD)
-
-    def width_rad(self, points_m: Floats) -> Floats:
-        """So narrow that most points need one ray."""
-        return np.zeros(len(points_m), np.float32)
-
-    def towards(self, texels: Texels) -> Aim:
-        """Rays spread evenly over the disc."""
-        centre = self.light.direction(self.t_ns)
+    def towards(texels: Texels) -> Aim:
         axes = tangents(centre[None])
-        arriving = self.light.illuminance_lx * np.maximum(texels.normals @ centre, 0)
+        arriving = light.illuminance_lx * np.maximum(texels.normals @ centre, 0)
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
             x, y = (np.tan(SUN_RADIUS_RAD) * part for part in disc(a, b))
@@ -187,102 +133,68 @@ class SunDisc:
 
         return aim
 
-    def unshadowed(self, texels: Texels) -> None:
-        """Nothing to add."""
-
-    def passing(self, sight: Visibility, origins_m: Floats, way: Floats) -> Floats:
-        """Past walls and through panes."""
-        return sight.passing(origins_m, way)
+    return Emitter(Ball(FARTHEST_M * centre, FARTHEST_M * SUN_RADIUS_RAD), towards, _hard)
 
 
-@dataclass(frozen=True, slots=True)
-class SkyPane:
-    """The sky through one pane: only rays that cross no other pane behind it, so that none counts twice.
+def _pane_emitter(light: Sky, pane: int, visibility: Visibility) -> Emitter:
+    """The sky through one pane: only rays that cross no other pane behind it, so that none counts twice."""
+    surface, (followed_back, followed_front) = visibility.surfaces[pane], _followed(pane, visibility)
 
-    followed: whether other panes stand behind it for light that falls along its normal, and against it.
-    """
-
-    light: Sky
-    pane: int
-    sight: Visibility
-    followed: tuple[bool, bool]
-
-    @property
-    def surface(self) -> Surface:
-        """The pane's rectangle."""
-        return self.sight.surfaces[self.pane]
-
-    def ball(self) -> Ball:
-        """Around the pane."""
-        return ball([self.surface])
-
-    def width_rad(self, points_m: Floats) -> Floats:
-        """The root of the solid angle."""
-        return np.sqrt(SolidAngle(self.surface, points_m).steradian).astype(np.float32)
-
-    def towards(self, texels: Texels) -> Aim:
-        """The sky's luminance beyond the pane."""
-        angle = SolidAngle(self.surface, texels.points_m)
+    def towards(texels: Texels) -> Aim:
+        angle = SolidAngle(surface, texels.points_m)
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
             spot = angle.spot(a, b)
             direction = spot / np.linalg.norm(spot, axis=1, keepdims=True)
-            strength = angle.steradian * self.light.luminance_cd_m2(direction)
-            strength *= self.sight.pane_passes(self.pane, direction)
-            outward = direction @ self.surface.normal > 0
-            doubtful = np.flatnonzero(np.where(outward, self.followed[1], self.followed[0]))
+            strength = angle.steradian * light.luminance_cd_m2(direction)
+            strength *= visibility.pane_passes(pane, direction)
+            outward = direction @ surface.normal > 0
+            doubtful = np.flatnonzero(np.where(outward, followed_front, followed_back))
             beyond = (texels.points_m + spot + 2 * RAY_OFFSET_M * direction)[doubtful]
-            strength[doubtful] *= ~self.sight.crosses_pane(beyond, FAR_M * direction[doubtful])
+            strength[doubtful] *= ~visibility.crosses_pane(beyond, FAR_M * direction[doubtful])
             return FAR_M * direction, strength.astype(np.float32)
 
         return aim
 
-    def unshadowed(self, texels: Texels) -> None:
-        """Nothing to add."""
-
-    def passing(self, sight: Visibility, origins_m: Floats, way: Floats) -> Floats:
+    def passing(visibility: Visibility, origins_m: Floats, way: Floats) -> Floats:
         """Past walls, and through panes before this one."""
-        share = sight.clear(origins_m, way).astype(np.float32)
+        share = visibility.clear(origins_m, way).astype(np.float32)
         some = np.flatnonzero(share)
         start, ahead = origins_m[some], way[some]
-        reach = ((self.surface.corner_m - start) @ self.surface.normal) / (ahead @ self.surface.normal)
-        share[some] *= sight.through_panes(start, ahead * ((1 - 1e-4) * reach[:, None]).astype(np.float32))
+        reach = ((surface.corner_m - start) @ surface.normal) / (ahead @ surface.normal)
+        share[some] *= visibility.through_panes(start, ahead * ((1 - 1e-4) * reach[:, None]).astype(np.float32))
         return share
 
+    return Emitter(ball([surface]), towards, _width_rad(surface), passing, sky="pane")
 
-@dataclass(frozen=True, slots=True)
-class OpenSky:
+
+def _open_sky_emitter(light: Sky, visibility: Visibility) -> Emitter:
     """The sky that no pane covers: rays all over the half sphere above each point."""
 
-    light: Sky
-    sight: Visibility
-
-    def ball(self) -> Ball:
-        """All around."""
-        return Ball(np.zeros(3), np.inf)
-
-    def width_rad(self, points_m: Floats) -> Floats:
-        """All of it."""
-        return np.full(len(points_m), np.sqrt(2 * np.pi), np.float32)
-
-    def towards(self, texels: Texels) -> Aim:
-        """Cosine-weighted, hence strength over cosine."""
-
+    def towards(texels: Texels) -> Aim:
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
             direction = cosine_weighted(texels.normals, a, b)
-            luminance = self.light.luminance_cd_m2(direction)
+            luminance = light.luminance_cd_m2(direction)
+            # The rays are as dense as their cosine, hence over it.
             strength = np.pi * luminance / np.maximum(np.einsum("ij,ij->i", direction, texels.normals), 1e-6)
-            strength[self.sight.crosses_pane(texels.points_m, FAR_M * direction)] = 0
+            strength[visibility.crosses_pane(texels.points_m, FAR_M * direction)] = 0
             return FAR_M * direction, strength.astype(np.float32)
 
         return aim
 
-    def unshadowed(self, texels: Texels) -> None:
-        """Nothing to add."""
+    def width_rad(points_m: Floats) -> Floats:
+        return np.full(len(points_m), np.sqrt(2 * np.pi), np.float32)
 
-    def passing(self, sight: Visibility, origins_m: Floats, way: Floats) -> Floats:
-        """Past walls and through panes."""
-        return sight.passing(origins_m, way)
+    return Emitter(Ball(np.zeros(3), np.inf), towards, width_rad, sky="open")
+
+
+def _width_rad(surface: Surface) -> Callable[[Floats], Floats]:
+    """The root of a rectangle's solid angle."""
+    return lambda points_m: np.sqrt(SolidAngle(surface, points_m).steradian).astype(np.float32)
+
+
+def _hard(points_m: Floats) -> Floats:
+    return np.zeros(len(points_m), np.float32)
 
 
 def disc(a: Floats, b: Floats) -> tuple[Floats, Floats]:
@@ -299,22 +211,22 @@ def cosine_weighted(normals: Floats, a: Floats, b: Floats) -> Floats:
     return directions
 
 
-def emitters(light: Light, sight: Visibility, *, t_ns: float = 0) -> list[Emitter]:
+def emitters(light: Light, visibility: Visibility, *, t_ns: float = 0) -> list[Emitter]:
     """All that one light is made of."""
     match light:
         case AreaLight():
-            return [Panel(light)]
+            return [panel_emitter(light)]
         case PointLight() | SpotLight():
-            return [Bulb(light)]
+            return [bulb_emitter(light)]
         case Sun():
-            return [SunDisc(light, t_ns)]
+            return [sun_emitter(light, t_ns)]
         case Sky():
-            panes = [SkyPane(light, i, sight, _followed(i, sight)) for i in sight.sky_panes()]
-            return [*panes, OpenSky(light, sight)]
+            panes = [_pane_emitter(light, pane, visibility) for pane in visibility.sky_panes()]
+            return [*panes, _open_sky_emitter(light, visibility)]
 
 
-def _followed(pane: int, sight: Visibility) -> tuple[bool, bool]:
+def _followed(pane: int, visibility: Visibility) -> tuple[bool, bool]:
     """Whether any other pane reaches to the back of a pane, and to its front."""
-    surface = sight.surfaces[pane]
-    height = np.concatenate([(corners(sight.surfaces[i]) - surface.corner_m) @ surface.normal for i in sight.panes])
+    surface, panes = visibility.surfaces[pane], [visibility.surfaces[i] for i in visibility.panes]
+    height = np.concatenate([(corners(other) - surface.corner_m) @ surface.normal for other in panes])
     return bool((height < -RAY_OFFSET_M).any()), bool((height > RAY_OFFSET_M).any())

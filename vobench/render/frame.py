@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import pyrender
-from pyrender.renderer import Renderer
 
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
@@ -19,28 +17,15 @@ from vobench.render.view import Box, PinholeView, pinhole_view
 from vobench.render.warp import Warp, warp
 
 
-class Uploader(Renderer):  # type: ignore[misc]
-    """pyrender's upload and release of meshes and textures."""
-
-    def __init__(self) -> None:
-        super().__init__(1, 1)
-
-    def __del__(self) -> None:
-        """Nothing: pyrender would free by name in whatever context is current by then, another renderer's included."""
-
-
 class FrameRenderer:
     """Draws in the context that is current when it is made, and must be current when it is used."""
 
     def __init__(self, baked: BakedScene) -> None:
         self._illumination, self._background = Illumination(baked), Background(baked.scene.lights)
-        self._ambience, self._movers = AmbientLight(baked), baked.scene.movers
+        self._ambient, self._movers = AmbientLight(baked), baked.scene.movers
         self._light = FloatTexture(self._illumination.at(0, 0))
-        parts = batches(baked, self._light, copies=len(TURNED.points))
-        self._uploader = Uploader()
-        self._uploader._update_context(_scene_graph([batch.primitive for batch in parts]), 0)
-        self._painter = BatchDraw(parts, self._light)
-        self._papers: dict[tuple[int, int, Grid], RenderTarget] = {}
+        self._draw = BatchDraw(batches(baked, copies=len(TURNED.points)), self._light)
+        self._targets: dict[tuple[int, int, Grid], RenderTarget] = {}
         self._warps: dict[Camera, Warp] = {}
 
     def picture(self, camera: Camera, views: Sequence[View]) -> Radiance:
@@ -49,20 +34,13 @@ class FrameRenderer:
         if isinstance(camera, Pinhole):
             boxes = [(0, camera.width_px, view.rows.start, view.rows.stop) for view in views]
             grids = _grids(len(views[0].start_ns))
-            sheets = [self._paper(camera, grid) for grid in grids]
-            self._expose(sheets, camera, views, boxes, sheets[0].whole)
-            return sheets[0].total.read(sheets[0].whole)
+            targets = [self._target(camera, grid) for grid in grids]
+            self._expose(targets, camera, views, boxes, targets[0].total.whole)
+            return targets[0].total.read(targets[0].total.whole)
         if camera not in self._warps:
             self._warps[camera] = warp(camera)
         lens = self._warps[camera]
         return np.concatenate([self._strip(lens, view) for view in sorted(views, key=lambda v: v.rows.start)])
-
-    def delete(self) -> None:
-        """Free everything on the graphics side."""
-        for sheet in self._papers.values():
-            sheet.delete()
-        self._painter.delete()
-        self._uploader.delete()
 
     def _strip(self, lens: Warp, view: View) -> Radiance:
         """Rows of a picture through a lens that is no pinhole."""
@@ -71,54 +49,48 @@ class FrameRenderer:
             box = face.needed_for(view.rows)
             if box is None:
                 continue
-            sheet = self._paper(face.camera, CENTRE)
+            target = self._target(face.camera, CENTRE)
             T_world_face = view.T_world_camera @ se3.transform(face.R_camera_face, np.zeros(3))
-            self._expose([sheet], face.camera, [replace(view, T_world_camera=T_world_face)], [box], box)
-            lens.put(atlas, face, box, sheet.total.read(box))
+            self._expose([target], face.camera, [replace(view, T_world_camera=T_world_face)], [box], box)
+            lens.put(atlas, face, box, target.total.read(box))
         return lens.picture(atlas, view.rows)
 
     def _expose(
-        self, sheets: Sequence[RenderTarget], camera: Pinhole, views: Sequence[View], boxes: Sequence[Box], around: Box
+        self, targets: Sequence[RenderTarget], camera: Pinhole, views: Sequence[View], boxes: Sequence[Box], around: Box
     ) -> None:
-        """The mean over sub-frames, drawn on the sheets by turns, of all views, each in its box.
+        """The mean over sub-frames, drawn on the targets by turns, of all views, each in its box.
 
-        It is in the first sheet's total, in the box around all boxes.
+        It is in the first target's total, in the box around all boxes.
         """
-        count, total = len(views[0].start_ns), sheets[0].total
+        count, total = len(views[0].start_ns), targets[0].total
         total.clear(around)
         for index in range(count):
-            sheet = sheets[index % len(sheets)]
-            sheet.canvas.clear(around)
+            target = targets[index % len(targets)]
+            target.canvas.clear(around)
             for view, box in zip(views, boxes, strict=True):
-                self._painter.paint(self._look(camera, view, index), sheet, box)
-            self._painter.add(sheet.canvas, total, around, 1 / count)
+                self._draw.draw(self._view(camera, view, index), target, box)
+            self._draw.add(target, total, around, 1 / count)
 
-    def _look(self, camera: Pinhole, view: View, index: int) -> PinholeView:
-        """What one sub-frame looks at, with the light brought up to date."""
+    def _view(self, camera: Pinhole, view: View, index: int) -> PinholeView:
+        """The view of one sub-frame, with the light brought up to date."""
         start_ns, end_ns = int(view.start_ns[index]), int(view.end_ns[index])
         light = self._illumination.at(start_ns, end_ns)
         self._light.update(light)
         poses = [mover.path.pose((start_ns + end_ns) / 2) for mover in self._movers]
         skies = self._background.coefficients(start_ns, end_ns)
-        return pinhole_view(camera, view.T_world_camera[index], poses, skies, self._ambience.cd_m2(light))
+        return pinhole_view(camera, view.T_world_camera[index], poses, skies, self._ambient.cd_m2(light))
 
-    def _paper(self, camera: Pinhole, grid: Grid) -> RenderTarget:
+    def _target(self, camera: Pinhole, grid: Grid) -> RenderTarget:
         size = camera.width_px, camera.height_px
         key = (*size, grid)
-        if key not in self._papers:
-            self._papers[key] = render_target(*size, grid)
-        return self._papers[key]
+        if key not in self._targets:
+            self._targets[key] = render_target(*size, grid)
+        return self._targets[key]
 
 
 def _grids(sub_frames: int) -> tuple[Grid, ...]:
     """Sub-frames of even number, four or more, share the samples between them at half the cost."""
     return HALVES if sub_frames >= 4 and sub_frames % 2 == 0 else (TURNED,)
-
-
-def _scene_graph(primitives: Sequence[pyrender.Primitive]) -> pyrender.Scene:
-    scene = pyrender.Scene()
-    scene.add(pyrender.Mesh(list(primitives)))
-    return scene
 
 
 def _check(camera: Camera, views: Sequence[View]) -> None:

@@ -1,15 +1,14 @@
-"""What rays hit: triangles of a scene that stands, bodies that move, and cameras among them."""
+"""Every rectangle of a scene, rays against them, and how much light passes between two points."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.scene.material import Glass
+from vobench.scene.material import Glass, Material, Mirror, pane_reflectance
 from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface
 
@@ -23,7 +22,7 @@ RAY_OFFSET_M = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class SurfaceList:
-    """Every rectangle of a scene in one order: what stands still, the lights' panels, what moves.
+    """Every rectangle of a scene in one order: static ones, the lights' panels, movers'.
 
     surfaces are where they are at one instant; mover (S,) is the index of the mover a surface belongs to, -1 for
     none; panel (S,) the index among scene.panels, -1 for none; pane (S,) whether it is glass.
@@ -105,11 +104,11 @@ class RayCaster:
         self._mesh = mesh_construction.TriangleMesh(self._scene, np.ascontiguousarray(triangles))
 
     def occluded(self, origins_m: ArrayLike, targets_m: ArrayLike) -> Mask:
-        """Whether anything stands between each of (R, 3) origins and its target (R, 3)."""
+        """Whether anything is between each of (R, 3) origins and its target (R, 3)."""
         return self.stops(origins_m, np.asarray(targets_m) - np.asarray(origins_m))
 
     def stops(self, origins_m: ArrayLike, way: ArrayLike) -> Mask:
-        """Whether anything stands between origins and origins + way (R, 3)."""
+        """Whether anything is between origins and origins + way (R, 3)."""
         blocked = np.asarray(self._scene.run(*_rays(origins_m, way, reach=1 - 1e-3), query="OCCLUDED"))
         is_blocked: Mask = blocked >= 0
         return is_blocked
@@ -143,228 +142,93 @@ def _rays(origins_m: ArrayLike, directions: ArrayLike, *, reach: float) -> tuple
     return origins, np.ascontiguousarray(directions, np.float32), np.full(len(origins), reach, np.float32)
 
 
-# A ray passes this many back sides before it counts as lost between surfaces that touch.
-MOST_BACK_SIDES = 64
+FAR_M = 1e3  # beyond every scene
+MOST_PANES = 16  # crossed by one ray
 
 
-@dataclass(frozen=True, slots=True)
-class VisibleSurfaces:
-    """Where sight ends: surface (R,) by its place in the inventory, -1 for none; distance_m (R,), NaN for none."""
-
-    surface: Indices
-    distance_m: Array
+def smooth_mirror(surface: Surface, materials: Mapping[str, Material]) -> Mirror | None:
+    """The mirror, where a surface is one that shows lamps as sharp as they are. Coats mirror too, but faintly."""
+    material = materials.get(surface.material)
+    return material if isinstance(material, Mirror) and material.roughness == 0 else None
 
 
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A body's opaque surfaces, its panes (None without any), and a sphere around both."""
+class Visibility:
+    """Opaque surfaces and panes of a list, of those `among` (K,) names."""
 
-    solid: RayCaster
-    panes: RayCaster | None
-    center_m: Array
-    radius_m: float
+    def __init__(self, surfaces: Sequence[Surface], materials: Mapping[str, Material], among: Sequence[int]) -> None:
+        glass = {i: m for i in among if isinstance(m := materials.get(surfaces[i].material), Glass)}
+        self.surfaces = surfaces
+        self.normals = np.array([s.normal for s in surfaces], np.float32).reshape(-1, 3)
+        self.opaque = RayCaster(surfaces, [i for i in among if i not in glass])
+        self.panes = tuple(glass)
+        self.mirrors = [(surfaces[i], m.tint) for i in among if (m := smooth_mirror(surfaces[i], materials))]
+        self._glass = RayCaster(surfaces, self.panes)
+        self._eta, self._tint = np.ones(len(surfaces)), np.ones(len(surfaces), np.float32)
+        for index, pane in glass.items():
+            self._eta[index], self._tint[index] = pane.eta, pane.tint
 
-    def near(self, origins_m: Array, directions: Array, reach_m: Array | float = np.inf) -> Mask:
-        """Which rays (R, 3) of unit length pass the sphere within `reach_m` of their origins (R, 3)."""
-        away = self.center_m - origins_m
-        beside = _dot(away, directions)
-        along = np.clip(beside, 0, reach_m)
-        return np.asarray(_dot(away, away) - along * (2 * beside - along) <= self.radius_m**2)
+    def passing(self, origins_m: Floats, way: Floats) -> Floats:
+        """Share (R,) of light that comes from origins + way (R, 3) to the origins (R, 3)."""
+        clear = np.flatnonzero(self.clear(origins_m, way))
+        share = np.zeros(len(origins_m), np.float32)
+        share[clear] = self.through_panes(origins_m[clear], way[clear])
+        return share
 
+    def clear(self, origins_m: Floats, way: Floats) -> NDArray[np.bool_]:
+        """Whether nothing opaque is between origins and origins + way (R, 3)."""
+        return ~self.opaque.stops(origins_m, way)
 
-class Bodies:
-    """The surfaces of a scene in the inventory's order, each in its body's frame, and rays against them."""
+    def pane_passes(self, pane: int, directions: Floats) -> Floats:
+        """Share (R,) that one pane lets through along unit directions (R, 3)."""
+        cosine = directions @ self.normals[pane]
+        share: Floats = self._tint[pane] * (1 - pane_reflectance(cosine, float(self._eta[pane])))
+        return share
 
-    def __init__(self, scene: Scene) -> None:
-        stock = inventory(scene)
-        moving = [surface for mover in scene.movers for surface in mover.surfaces]
-        self.surfaces = (*scene.surfaces, *(panel.surface for panel in scene.panels), *moving)
-        self.of_surface = stock.mover + 1
-        # The last entry is that of the surface -1: nothing.
-        self.normals = np.array([*(s.normal for s in self.surfaces), np.full(3, np.nan)])
-        self.corners_m = np.array([corners(s) for s in self.surfaces]).reshape(-1, 4, 3)
-        self.opaque = ~stock.pane
-        self._offsets_m = np.array([*(s.normal @ s.corner_m for s in self.surfaces), np.nan])
-        members = [self.of_surface == index for index in range(len(scene.movers) + 1)]
-        self._bodies = [_body(self.surfaces, member, stock.pane) for member in members]
-        self._paths = [mover.path for mover in scene.movers]
+    def crosses_pane(self, origins_m: Floats, way: Floats) -> NDArray[np.bool_]:
+        """Whether a pane is between origins and origins + way (R, 3)."""
+        if not self.panes:
+            return np.zeros(len(origins_m), bool)
+        return self._glass.stops(origins_m, way)
 
-    def T_world_bodies(self, t_ns: NDArray[np.int64]) -> list[Array]:
-        """Where the bodies are at an instant () or at some (H,): (4, 4) each, or (H, 4, 4) for what moves."""
-        poses = [np.array([path.pose(t) for t in np.ravel(t_ns).tolist()]) for path in self._paths]
-        return [np.eye(4), *(T if np.ndim(t_ns) else T[0] for T in poses)]
+    def first_panes(self, origins_m: Floats, way: Floats) -> tuple[NDArray[np.int64], Hits]:
+        """Which rays from origins along way (R, 3) cross a pane (K,), and where they meet their first."""
+        rays = np.flatnonzero(self.crosses_pane(origins_m, way))
+        return rays, self._glass.hits(origins_m[rays], way[rays])
 
-    def look(self, directions: Array, T_bodies_camera: Sequence[Array]) -> VisibleSurfaces:
-        """What a camera sees along unit directions (R, 3) in its own frame; nothing along NaN."""
-        world, *movers = self._bodies
-        seen = self._meet(world, *into(T_bodies_camera[0], directions))
-        for body, T_body_camera in zip(movers, T_bodies_camera[1:], strict=True):
-            origins, turned = into(T_body_camera, directions)
-            near = np.flatnonzero(body.near(origins, turned))
-            met = self._meet(body, origins[near], turned[near])
-            nearer = met.distance_m < np.nan_to_num(seen.distance_m[near], nan=np.inf)
-            seen.surface[near[nearer]], seen.distance_m[near[nearer]] = met.surface[nearer], met.distance_m[nearer]
-        return seen
+    def pane_mirrors(self, panes: Indices, cosine: Floats) -> Floats:
+        """Share (R,) that panes (R,) reflect at cosines (R,)."""
+        return pane_reflectance(cosine, self._eta[panes]).astype(np.float32)
 
-    def behind_panes(self, directions: Array, T_bodies_camera: Sequence[Array], distance_m: Array) -> Mask:
-        """Whether glass stands before what is seen at some distance (R,), or before nothing where that is NaN."""
-        behind = np.zeros(len(directions), bool)
-        limit_m = np.nan_to_num(distance_m, nan=np.inf)
-        for body, T_body_camera in zip(self._bodies, T_bodies_camera, strict=True):
-            if body.panes is not None:
-                origins, turned = into(T_body_camera, directions)
-                pane = body.panes.nearest(origins, turned)
-                behind |= (pane >= 0) & (self._distance_m(pane, origins, turned)[0] < limit_m)
-        return behind
-
-    def blocked(self, starts_m: Array, targets_m: Array, T_bodies_world: Sequence[Array]) -> Mask:
-        """Whether anything but glass stands between starts (R, 3) and targets (R, 3), both in the world."""
-        world, *movers = self._bodies
-        hidden = world.solid.occluded(starts_m, targets_m)
-        for body, T_body_world in zip(movers, T_bodies_world[1:], strict=True):
-            start, target = moved(T_body_world, starts_m), moved(T_body_world, targets_m)
-            way = target - start
-            reach_m = np.linalg.norm(way, axis=1)
-            near = np.flatnonzero(body.near(start, way / reach_m[:, None], reach_m))
-            hidden[near] |= body.solid.occluded(start[near], target[near])
-        return hidden
-
-    def _meet(self, body: Body, origins_m: Array, directions: Array) -> VisibleSurfaces:
-        """The first front side of a body along rays (R, 3) in its frame."""
-        surface = body.solid.nearest(origins_m, directions)
-        distance_m, cosine = self._distance_m(surface, origins_m, directions)
-        for _ in range(MOST_BACK_SIDES):
-            backs = np.flatnonzero((surface >= 0) & (cosine >= 0))
-            if not len(backs):
+    def through_panes(self, origins_m: Floats, way: Floats) -> Floats:
+        """Share (R,) that all panes between origins and origins + way (R, 3) let through."""
+        share = np.ones(len(origins_m), np.float32)
+        rays = np.flatnonzero(self.crosses_pane(origins_m, way))
+        gone = np.zeros(len(rays), np.float32)
+        for _ in range(MOST_PANES):
+            if not len(rays):
                 break
-            passed_m, onward = distance_m[backs] + RAY_OFFSET_M, directions[backs]
-            start = origins_m[backs] + passed_m[:, None] * onward
-            surface[backs] = body.solid.nearest(start, onward)
-            farther_m, cosine[backs] = self._distance_m(surface[backs], start, onward)
-            distance_m[backs] = passed_m + farther_m
-        return VisibleSurfaces(surface, distance_m)
+            ahead = way[rays] * (1 - gone)[:, None]
+            hits = self._glass.hits(origins_m[rays] + way[rays] * gone[:, None], ahead)
+            met = np.flatnonzero((hits.surface >= 0) & (hits.distance < 1))
+            rays, pane, ahead = rays[met], hits.surface[met], ahead[met]
+            length = np.linalg.norm(ahead, axis=1)
+            cosine = np.einsum("ij,ij->i", ahead, self.normals[pane]) / length
+            share[rays] *= self._tint[pane] * (1 - pane_reflectance(cosine, self._eta[pane])).astype(np.float32)
+            gone = gone[met] + (1 - gone[met]) * (hits.distance[met] + RAY_OFFSET_M / length)
+        return share
 
-    def _distance_m(self, surface: Indices, origins_m: Array, directions: Array) -> tuple[Array, Array]:
-        """How far the surfaces' planes are along rays (R, 3), and the cosines to their normals; NaN for none.
+    def sky_panes(self) -> tuple[int, ...]:
+        """The panes behind which, on either side, something of the sky can be seen."""
+        return tuple(pane for pane in self.panes if self._sees_sky(self.surfaces[pane]))
 
-        Embree works in float32: it says which surface a ray meets, the plane's equation where.
-        """
-        normals = self.normals[surface]
-        cosine = _dot(normals, directions)
-        return (self._offsets_m[surface] - _dot(normals, origins_m)) / cosine, cosine
-
-
-def _body(surfaces: Sequence[Surface], member: Mask, pane: Mask) -> Body:
-    points = np.array([corners(surfaces[i]) for i in np.flatnonzero(member).tolist()]).reshape(-1, 3)
-    center_m = (points.min(0) + points.max(0)) / 2 if len(points) else np.zeros(3)
-    panes = np.flatnonzero(member & pane)
-    return Body(
-        RayCaster(surfaces, np.flatnonzero(member & ~pane)),
-        RayCaster(surfaces, panes) if len(panes) else None,
-        center_m,
-        float(np.linalg.norm(points - center_m, axis=1).max(initial=0.0)) + RAY_OFFSET_M,
-    )
-
-
-def into(T_body_camera: Array, directions: Array) -> tuple[Array, Array]:
-    """Rays from a camera's centre along unit directions (R, 3): origins (R, 3) and directions in a body's frame."""
-    turned = turn(T_body_camera, directions)
-    return np.broadcast_to(T_body_camera[..., :3, 3], turned.shape), turned
-
-
-def turn(T_a_b: Array, vectors: Array) -> Array:
-    """Directions (R, 3) in b as directions in a."""
-    R = T_a_b[..., :3, :3]
-    # Not by BLAS: its threads spin on products as narrow as these.
-    turned: Array = np.einsum("ij,rj->ri" if R.ndim == 2 else "rij,rj->ri", R, vectors)
-    return turned
-
-
-def moved(T_a_b: Array, points: Array) -> Array:
-    """Points (R, 3) in b as points in a."""
-    return turn(T_a_b, points) + T_a_b[..., :3, 3]
-
-
-def _dot(a: Array, b: Array) -> Array:
-    """Products (R,) of vectors (R, 3)."""
-    product: Array = np.einsum("ri,ri->r", a, b)
-    return product
-
-
-@dataclass(frozen=True, slots=True)
-class Shot:
-    """Where a camera stands and when it takes a picture: a pose (4, 4) and an instant, or (H, 4, 4) and (H,) by row."""
-
-    T_world_camera: Array
-    t_ns: NDArray[np.int64] | int
-
-
-@dataclass(frozen=True, slots=True)
-class ShotSurfaces:
-    """All surfaces from a camera at one instant: corners (S, 4, 3) in its frame, planes (S + 1, 3), what it faces (S,).
-
-    A plane's product with a unit ray is one over the distance along that ray.
-    """
-
-    corners_m: Array
-    planes: Array
-    facing: Mask
-
-
-@dataclass(frozen=True, slots=True)
-class ShotTransforms:
-    """A shot as transforms, there and back: each body's (4, 4), or (H, 4, 4) by row.
-
-    `snapshot` is None where the camera or a body moves meanwhile.
-    """
-
-    T_world_bodies: list[Array]
-    T_bodies_world: list[Array]
-    T_bodies_camera: list[Array]
-    T_camera_bodies: list[Array]
-    snapshot: ShotSurfaces | None
-
-
-def shot_transforms(bodies: Bodies, shot: Shot) -> ShotTransforms:
-    """The transforms of a shot."""
-    T_world_bodies = bodies.T_world_bodies(np.asarray(shot.t_ns, np.int64))
-    T_bodies_world = [se3.inverse(T) for T in T_world_bodies]
-    T_bodies_camera = [T @ shot.T_world_camera for T in T_bodies_world]
-    T_camera_bodies = [se3.inverse(T) for T in T_bodies_camera]
-    rolling = any(T.ndim == 3 for T in T_bodies_camera)
-    snapshot = None if rolling else _snapshot(bodies, np.stack(T_camera_bodies))
-    return ShotTransforms(T_world_bodies, T_bodies_world, T_bodies_camera, T_camera_bodies, snapshot)
-
-
-def _snapshot(bodies: Bodies, T_camera_bodies: Array) -> ShotSurfaces:
-    T_camera_surfaces = T_camera_bodies[bodies.of_surface]
-    corners_m = se3.apply(T_camera_surfaces, bodies.corners_m)
-    normals = np.einsum("sij,sj->si", T_camera_surfaces[:, :3, :3], bodies.normals[:-1])
-    away_m = np.einsum("si,si->s", normals, corners_m[:, 0])
-    with np.errstate(divide="ignore", invalid="ignore"):  # a plane through the camera is seen edge-on: never
-        planes = normals / away_m[:, None]
-    return ShotSurfaces(corners_m, np.append(planes, np.full((1, 3), np.nan), axis=0), away_m < 0)
-
-
-def at_rows(tables: Sequence[Array], rows: Array) -> list[Array]:
-    """The transforms of each table for rays on rows (R,): (4, 4) as it is, (H, 4, 4) as (R, 4, 4)."""
-    return [_between(T, rows) if T.ndim == 3 else T for T in tables]
-
-
-def _between(table: Array, rows: Array) -> Array:
-    """Transforms (R, 4, 4) at rows between those of a table (H, 4, 4); beyond its ends the last ones.
-
-    Two rows differ by so little that a straight line between matrices is a rotation to the last bits.
-    """
-    place = np.clip(np.nan_to_num(rows), 0, len(table) - 1)
-    first = np.minimum(place.astype(np.int64), max(len(table) - 2, 0))
-    share = (place - first)[:, None, None]
-    if not share.any():
-        return table[first]
-    blend: Array = (1 - share) * table[first] + share * table[np.minimum(first + 1, len(table) - 1)]
-    return blend
-
-
-def of(T: Array, rays: NDArray[np.intp]) -> Array:
-    """Some rays' transforms: the only one, or their own of (R, 4, 4)."""
-    return T if T.ndim == 2 else T[rays]
+    def _sees_sky(self, pane: Surface) -> bool:
+        """Whether any of 1024 fixed rays, half to each side, leaves the scene without another pane."""
+        u, v, tilt, turn = np.random.default_rng(0).random((4, 512))
+        x_axis, y_axis = (edge / np.linalg.norm(edge) for edge in (pane.edge_u_m, pane.edge_v_m))
+        radius, angle = np.sqrt(tilt)[:, None], 2 * np.pi * turn[:, None]
+        flat = radius * (np.cos(angle) * x_axis + np.sin(angle) * y_axis)
+        up = np.sqrt(1 - radius**2) * pane.normal
+        directions = np.concatenate([flat + up, flat - up])
+        origins = np.tile(pane.at(u, v), (2, 1)) + RAY_OFFSET_M * directions
+        blocked = self.opaque.stops(origins, FAR_M * directions)
+        return bool((~blocked & ~self.crosses_pane(origins, FAR_M * directions)).any())

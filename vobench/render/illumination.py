@@ -22,14 +22,14 @@ class AmbientLight:
     """
 
     def __init__(self, baked: BakedScene) -> None:
-        things, patches = inventory(baked.scene), baked.layout.patches
+        things, charts = inventory(baked.scene), baked.atlas.charts
         albedo = {name: float(tile.mean()) for name, tile in baked.albedo.items()}
         self._weights = np.zeros(baked.light.shape[1:], np.float32)
         area_m2 = 0.0
-        for surface, panel, patch in zip(things.surfaces, things.panel, patches, strict=True):
+        for surface, panel, chart in zip(things.surfaces, things.panel, charts, strict=True):
             if panel < 0 and surface.material in albedo:
                 own_m2 = float(np.prod(surface.size_m))
-                self._weights[patch.window] = albedo[surface.material] / np.pi * own_m2 / (patch.rows * patch.columns)
+                self._weights[chart.window] = albedo[surface.material] / np.pi * own_m2 / (chart.rows * chart.columns)
                 area_m2 += own_m2
         self._weights /= max(area_m2, 1e-12)
         self._light, self._mean_cd_m2 = self._weights, 0.0
@@ -70,7 +70,7 @@ def _coefficients(sky: Sky) -> Array:
     return np.array([[a, b, zenith / relative, ground], [c, d, e, across], [*sky.sun_direction, 0]])
 
 
-SUN_TURN_RAD = 1e-4  # a moving sun stands still within less than a fiftieth of its disc
+SUN_TURN_RAD = 1e-4  # a moving sun counts as still within less than a fiftieth of its disc
 KEPT = 16  # maps and moments: enough for the strips of a stereo pair
 
 T = TypeVar("T")
@@ -95,7 +95,7 @@ class RecentCache(Generic[T]):
 class Illumination:
     """A baked scene's light at any time. What stays as it is costs nothing; see docs/rendering.md for the rest.
 
-    A light counts with its mean over the interval; movers and a moving sun stand where they are amid it.
+    A light counts with its mean over the interval; movers and a moving sun are where they are amid it.
     """
 
     def __init__(self, baked: BakedScene) -> None:
@@ -107,7 +107,7 @@ class Illumination:
         self._steady = np.zeros(baked.light.shape[1:], np.float32)
         self._add(self._steady, {i: self._lights[i].level.mean(0, 0) for i in steady})
         if self._tracks or baked.scene.movers:
-            self._still = static_scene(baked.scene, baked.layout, seed=baked.settings.seed)
+            self._still = static_scene(baked.scene, baked.atlas, seed=baked.settings.seed)
         self._movers = MoverLight(baked, self._still) if baked.scene.movers else None
         self._maps: RecentCache[Map] = RecentCache()
         self._moments: RecentCache[MoverLightAt] = RecentCache()
@@ -143,7 +143,7 @@ class Illumination:
         def make() -> Map:
             scene, settings = self._baked.scene, self._baked.settings
             coarse = placed(scene, spacing_m=settings.indirect_spacing_m)
-            around = Scales(self._still.where, coarse).refined(_between(self._tracks[index], t_ns)[None])[0]
+            around = Scales(self._still.atlas, coarse).refined(_between(self._tracks[index], t_ns)[None])[0]
             layer: Map = direct_layer(scene, index, self._still, settings, t_ns=t_ns) + around
             return layer
 

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from vobench.render.direct_light import JITTER, cell_spot
 from vobench.render.emitter import cosine_weighted
-from vobench.render.geometry import RAY_OFFSET_M, Floats, Hits, Indices
+from vobench.render.geometry import FAR_M, RAY_OFFSET_M, Floats, Hits, Indices, Visibility, smooth_mirror
 from vobench.render.lightmap import Atlas, Holes, Texels, in_chunks, tangents
-from vobench.render.visibility import FAR_M, Visibility, smooth_mirror
 from vobench.scene.light import Sky
 from vobench.scene.material import Map, Material, Mirror, Polished, fresnel
 from vobench.scene.surface import Surface
@@ -54,7 +53,7 @@ class SurfaceResponse:
 def surface_responses(
     surfaces: Sequence[Surface], materials: Mapping[str, Material], albedo: Mapping[str, Map], panel: Indices
 ) -> SurfaceResponse:
-    """The answers of an inventory's surfaces."""
+    """How an inventory's surfaces respond to light."""
     own = [materials.get(s.material) for s in surfaces]
     shiny = [m if isinstance(m, Polished | Mirror) else None for m in own]
     return SurfaceResponse(
@@ -78,27 +77,27 @@ class FinalGather:
 
 def final_gather(
     points: Texels,
-    where: Atlas,
-    sight: Visibility,
-    answer: SurfaceResponse,
+    atlas: Atlas,
+    visibility: Visibility,
+    response: SurfaceResponse,
     skies: Sequence[Sky],
     *,
     rays: int,
-    done: Callable[[int], object] | None = None,
+    done: Callable[[float], object] | None = None,
 ) -> FinalGather:
-    """Send `rays` rays from every point and note where in the map they end; `done` is told of how many points."""
+    """Send `rays` rays from every point and note where they end; `done` is called with shares."""
     side = round(np.sqrt(rays))
     if not side or not len(points):
-        nothing = scipy.sparse.csr_matrix((len(points), where.height * where.width), dtype=np.float32)
+        nothing = scipy.sparse.csr_matrix((len(points), atlas.height * atlas.width), dtype=np.float32)
         return FinalGather(nothing, np.zeros((len(skies), len(points)), np.float32))
-    seeker = _Seeker(where, sight, answer, skies)
-    parts = in_chunks(lambda part: seeker.seek(points.take(part), side), len(points), chunk=ROWS, done=done)
+    gatherer = _Gatherer(atlas, visibility, response, skies)
+    parts = in_chunks(lambda part: gatherer.gather(points.take(part), side), len(points), chunk=ROWS, done=done)
     tables, sky = zip(*parts, strict=True)
     return FinalGather(scipy.sparse.vstack(tables, "csr"), np.concatenate(sky, 1))
 
 
 @dataclass(slots=True)
-class _Front:
+class _RayBatch:
     """The rays under way: the point they belong to, from where, whereto, and what they weigh.
 
     is_direct: whether a lamp that they meet next is direct light, and counted as such.
@@ -110,81 +109,81 @@ class _Front:
     weight: Floats
     is_direct: NDArray[np.bool_]
 
-    def take(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> "_Front":
-        return _Front(*(getattr(self, f.name)[which] for f in fields(self)))
+    def take(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> "_RayBatch":
+        return _RayBatch(*(getattr(self, f.name)[which] for f in fields(self)))
 
-    def joined(self, other: "_Front") -> "_Front":
-        return _Front(*(np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(self)))
+    def joined(self, other: "_RayBatch") -> "_RayBatch":
+        return _RayBatch(*(np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(self)))
 
 
 @dataclass(frozen=True, slots=True)
-class _Seeker:
-    where: Atlas
-    sight: Visibility
-    answer: SurfaceResponse
+class _Gatherer:
+    atlas: Atlas
+    visibility: Visibility
+    response: SurfaceResponse
     skies: Sequence[Sky]
 
-    def seek(self, points: Texels, side: int) -> "tuple[csr_matrix, Floats]":
+    def gather(self, points: Texels, side: int) -> "tuple[csr_matrix, Floats]":
         """The rows of the table, and the skies' light by mirrors, of some points."""
-        front, entries = _start(points, side), []
+        batch, entries = _start(points, side), []
         sky = np.zeros((len(self.skies), len(points)), np.float32)
         for depth in range(MIRRORS + 1):
-            hits = self.sight.opaque.hits(front.origins_m, front.directions)
+            hits = self.visibility.opaque.hits(batch.origins_m, batch.directions)
             reach = np.where(hits.surface < 0, FAR_M, hits.distance)[:, None]
-            glints = self._off_panes(front, front.directions * reach)
-            front.weight *= self.sight.through_panes(front.origins_m, front.directions * reach)
+            off_panes = self._off_panes(batch, batch.directions * reach)
+            batch.weight *= self.visibility.through_panes(batch.origins_m, batch.directions * reach)
             if depth:
-                self._add_sky(sky, front.take(hits.surface < 0))
-            facing = np.einsum("ij,ij->i", front.directions, self.sight.normals[hits.surface])
+                self._add_sky(sky, batch.take(hits.surface < 0))
+            facing = np.einsum("ij,ij->i", batch.directions, self.visibility.normals[hits.surface])
             met = np.flatnonzero((hits.surface >= 0) & (facing < 0))
-            front, hits, cosine = front.take(met), _taken(hits, met), -facing[met]
-            shining = self.answer.is_panel[hits.surface] & ~front.is_direct
-            factor = front.weight * np.where(shining, 1, self.answer.scattered(hits.surface, cosine))
-            entries.append((factor, front.point, texel_at(self.where, hits)))
-            front = self._mirrored(front, hits, cosine, points.dither)
-            front.is_direct &= depth == 0
-            front = front.joined(glints)
+            batch, hits, cosine = batch.take(met), _taken(hits, met), -facing[met]
+            shining = self.response.is_panel[hits.surface] & ~batch.is_direct
+            factor = batch.weight * np.where(shining, 1, self.response.scattered(hits.surface, cosine))
+            entries.append((factor, batch.point, texel_at(self.atlas, hits)))
+            batch = self._mirrored(batch, hits, cosine, points.dither)
+            batch.is_direct &= depth == 0
+            batch = batch.joined(off_panes)
         factor, row, column = (np.concatenate(part) for part in zip(*entries, strict=True))
-        shape = (len(points), self.where.height * self.where.width)
+        shape = (len(points), self.atlas.height * self.atlas.width)
         rays = np.float32(side * side)
         return scipy.sparse.csr_matrix((factor / rays, (row, column)), shape, dtype=np.float32), sky / rays
 
-    def _add_sky(self, sky: Floats, gone: _Front) -> None:
+    def _add_sky(self, sky: Floats, gone: _RayBatch) -> None:
         for row, light in enumerate(self.skies):
             luminance = light.luminance_cd_m2(gone.directions)
             sky[row] += np.bincount(gone.point, np.pi * luminance * gone.weight, minlength=sky.shape[1])
 
-    def _off_panes(self, front: _Front, way: Floats) -> _Front:
+    def _off_panes(self, batch: _RayBatch, way: Floats) -> _RayBatch:
         """The rays that go back from the first pane in their way; a lamp that they meet is no direct light."""
-        rays, hits = self.sight.first_panes(front.origins_m, way)
-        front, way, normals = front.take(rays), way[rays], self.sight.normals[hits.surface]
-        along = np.einsum("ij,ij->i", front.directions, normals)
-        ends = front.origins_m + hits.distance[:, None] * way - RAY_OFFSET_M * front.directions
-        directions = front.directions - 2 * along[:, None] * normals
-        weight = front.weight * self.sight.pane_mirrors(hits.surface, along)
-        return _Front(front.point, ends, directions, weight, np.zeros(len(weight), bool)).take(weight > FAINT)
+        rays, hits = self.visibility.first_panes(batch.origins_m, way)
+        batch, way, normals = batch.take(rays), way[rays], self.visibility.normals[hits.surface]
+        along = np.einsum("ij,ij->i", batch.directions, normals)
+        ends = batch.origins_m + hits.distance[:, None] * way - RAY_OFFSET_M * batch.directions
+        directions = batch.directions - 2 * along[:, None] * normals
+        weight = batch.weight * self.visibility.pane_mirrors(hits.surface, along)
+        return _RayBatch(batch.point, ends, directions, weight, np.zeros(len(weight), bool)).take(weight > FAINT)
 
-    def _mirrored(self, front: _Front, hits: Hits, cosine: Floats, dither: Floats) -> _Front:
+    def _mirrored(self, batch: _RayBatch, hits: Hits, cosine: Floats, dither: Floats) -> _RayBatch:
         """The rays that go on from mirrors and coats."""
-        weight = front.weight * self.answer.mirrored(hits.surface, cosine)
+        weight = batch.weight * self.response.mirrored(hits.surface, cosine)
         on = np.flatnonzero(weight > FAINT)
-        front, surface = front.take(on), hits.surface[on]
-        normals = _facets(self.sight.normals[surface], self.answer.roughness[surface], dither[front.point], on)
-        along = np.einsum("ij,ij->i", front.directions, normals)[:, None]
-        directions = front.directions - 2 * along * normals
-        ends = front.origins_m + hits.distance[on, None] * front.directions
-        plain = self.sight.normals[surface]
-        # A facet may throw a ray into its own surface.
+        batch, surface = batch.take(on), hits.surface[on]
+        normals = _facets(self.visibility.normals[surface], self.response.roughness[surface], dither[batch.point], on)
+        along = np.einsum("ij,ij->i", batch.directions, normals)[:, None]
+        directions = batch.directions - 2 * along * normals
+        ends = batch.origins_m + hits.distance[on, None] * batch.directions
+        plain = self.visibility.normals[surface]
+        # A facet may reflect a ray into its own surface.
         leaving = np.einsum("ij,ij->i", directions, plain) > 0
-        shown = self.answer.shows_lamps[surface]
-        return _Front(front.point, ends + RAY_OFFSET_M * plain, directions, weight[on], shown).take(leaving)
+        shown = self.response.shows_lamps[surface]
+        return _RayBatch(batch.point, ends + RAY_OFFSET_M * plain, directions, weight[on], shown).take(leaving)
 
 
 def _taken(hits: Hits, which: NDArray[np.int64]) -> Hits:
     return Hits(hits.surface[which], hits.u[which], hits.v[which], hits.distance[which])
 
 
-def _start(points: Texels, side: int) -> _Front:
+def _start(points: Texels, side: int) -> _RayBatch:
     """Side x side cosine-weighted rays from each point; their weights average to what enters its coat."""
     rays, count = side * side, len(points)
     spots = [cell_spot(points, cell, side) for cell in range(rays)]
@@ -193,7 +192,7 @@ def _start(points: Texels, side: int) -> _Front:
     directions = cosine_weighted(everywhere.normals, a, b)
     weight = everywhere.entering(everywhere.cosine(directions))
     direct = np.ones(len(weight), bool)
-    return _Front(np.tile(np.arange(count), rays), everywhere.points_m, directions, weight, direct)
+    return _RayBatch(np.tile(np.arange(count), rays), everywhere.points_m, directions, weight, direct)
 
 
 def _facets(normals: Floats, roughness: Floats, dither: Floats, turn: NDArray[np.int64]) -> Floats:
@@ -209,12 +208,12 @@ def _facets(normals: Floats, roughness: Floats, dither: Floats, turn: NDArray[np
     return facets
 
 
-def texel_at(where: Atlas, hits: Hits) -> NDArray[np.int64]:
+def texel_at(atlas: Atlas, hits: Hits) -> NDArray[np.int64]:
     """Flat index (R,) in the map of the sample nearest to where each ray ended."""
-    row, column, rows, columns = np.array([(p.row, p.column, p.rows, p.columns) for p in where.patches]).T
+    row, column, rows, columns = np.array([(p.row, p.column, p.rows, p.columns) for p in atlas.charts]).T
     r = row[hits.surface] + np.rint(hits.v * (rows[hits.surface] - 1)).astype(np.int64)
     c = column[hits.surface] + np.rint(hits.u * (columns[hits.surface] - 1)).astype(np.int64)
-    flat: NDArray[np.int64] = r * where.width + c
+    flat: NDArray[np.int64] = r * atlas.width + c
     return flat
 
 

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vobench import stop
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import RAY_OFFSET_M, Floats, Indices
-from vobench.render.visibility import Visibility
+from vobench.render.geometry import RAY_OFFSET_M, Floats, Indices, Visibility
 from vobench.scene.material import Material, Polished, fresnel, texture_of
 from vobench.scene.surface import Surface
 
@@ -35,7 +34,7 @@ class Chart:
 
     @property
     def window(self) -> tuple[slice, slice]:
-        """The patch as an index into the map."""
+        """The chart as an index into the map."""
         return slice(self.row, self.row + self.rows), slice(self.column, self.column + self.columns)
 
     def fractions(self) -> tuple[Array, Array]:
@@ -46,15 +45,15 @@ class Chart:
 
 @dataclass(frozen=True, slots=True)
 class Atlas:
-    """All patches and the size of the map that holds them."""
+    """All charts and the size of the map that holds them."""
 
-    patches: tuple[Chart, ...]
+    charts: tuple[Chart, ...]
     height: int
     width: int
 
     def texture_coordinates(self, index: int) -> Array:
         """Coordinates (4, 2) in [0, 1] of a surface's corners: centres of its outer samples."""
-        p = self.patches[index]
+        p = self.charts[index]
         u0, u1 = p.column + 0.5, p.column + p.columns - 0.5
         v0, v1 = p.row + 0.5, p.row + p.rows - 0.5
         return np.array([[u0, v0], [u1, v0], [u1, v1], [u0, v1]]) / (self.width, self.height)
@@ -73,8 +72,8 @@ def pack_atlas(surfaces: Sequence[Surface], *, spacing_m: ArrayLike) -> Atlas:
             row, column, shelf = row + shelf, 0, 0
         places[index] = (row, column)
         column, shelf = column + columns, max(shelf, rows)
-    patches = tuple(Chart(*places[i], *sizes[i]) for i in range(len(sizes)))
-    return Atlas(patches, row + shelf, width)
+    charts = tuple(Chart(*places[i], *sizes[i]) for i in range(len(sizes)))
+    return Atlas(charts, row + shelf, width)
 
 
 def _samples(surface: Surface, spacing_m: float) -> tuple[int, int]:
@@ -86,7 +85,7 @@ def _samples(surface: Surface, spacing_m: float) -> tuple[int, int]:
 class Holes:
     """How values of P points fill a map: index (P,) is where each belongs, nearest (H·W,) whose value each sample has.
 
-    Samples inside things have no value of their own and take that of the nearest of their patch, so that
+    Samples inside things have no value of their own and take that of the nearest of their chart, so that
     their darkness does not reach out by interpolation. -1: nobody's.
     """
 
@@ -99,16 +98,16 @@ class Holes:
         return padded[self.nearest]
 
 
-def holes(where: Atlas, index: NDArray[np.int64]) -> Holes:
+def holes(atlas: Atlas, index: NDArray[np.int64]) -> Holes:
     """For points that belong at flat places `index` (P,)."""
-    owner = np.full(where.height * where.width, -1)
+    owner = np.full(atlas.height * atlas.width, -1)
     owner[index] = np.arange(len(index))
-    nearest = owner.reshape(where.height, where.width)
-    for patch in where.patches:
-        own = nearest[patch.window]
+    nearest = owner.reshape(atlas.height, atlas.width)
+    for chart in atlas.charts:
+        own = nearest[chart.window]
         if (own < 0).any() and (own >= 0).any():
             rows, columns = scipy.ndimage.distance_transform_edt(own < 0, return_distances=False, return_indices=True)
-            nearest[patch.window] = own[rows, columns]
+            nearest[chart.window] = own[rows, columns]
     return Holes(index, nearest.ravel())
 
 
@@ -122,7 +121,7 @@ class Scales:
     def coarsened(self, light: NDArray[np.float32]) -> NDArray[np.float32]:
         """Of (L, H, W) the means (L, h, w) around each coarse sample; keeps a surface's total."""
         result = np.zeros((len(light), self.coarse.height, self.coarse.width), np.float32)
-        for many, few in zip(self.fine.patches, self.coarse.patches, strict=True):
+        for many, few in zip(self.fine.charts, self.coarse.charts, strict=True):
             down_v, down_u = _means(many.rows, few.rows), _means(many.columns, few.columns)
             result[:, *few.window] = down_v @ light[:, *many.window] @ down_u.T
         return result
@@ -130,8 +129,8 @@ class Scales:
     def refined(self, light: NDArray[np.float32], among: Sequence[int] | None = None) -> NDArray[np.float32]:
         """Light (L, h, w) smoothed against ray noise, at the fine samples (L, H, W), of some surfaces or all."""
         result = np.zeros((len(light), self.fine.height, self.fine.width), np.float32)
-        for index in range(len(self.fine.patches)) if among is None else among:
-            many, few = self.fine.patches[index], self.coarse.patches[index]
+        for index in range(len(self.fine.charts)) if among is None else among:
+            many, few = self.fine.charts[index], self.coarse.charts[index]
             up_v, up_u = _between(few.rows, many.rows), _between(few.columns, many.columns)
             result[:, *many.window] = up_v @ light[:, *few.window] @ up_u.T
         return result
@@ -165,7 +164,7 @@ def _linear(few: int, many: int) -> Array:
 
 
 T = TypeVar("T")
-TILTS = ((0.0, 0.0), (1.0, 0.4), (-1.0, -0.3), (0.3, -1.0), (-0.4, 1.0))  # of rays that look for a way out
+TILTS = ((0.0, 0.0), (1.0, 0.4), (-1.0, -0.3), (0.3, -1.0), (-0.4, 1.0))  # of rays that search a way out
 CHUNK = 1 << 14  # points at once: their arrays fit the processor's cache
 
 
@@ -205,19 +204,19 @@ class Texels:
         cosine: Floats = np.einsum("ij,ij->i", way, self.normals) / np.linalg.norm(way, axis=1)
         return cosine
 
-    def on_map(self, values: Floats, where: Atlas) -> Floats:
+    def on_map(self, values: Floats, atlas: Atlas) -> Floats:
         """Values (P,) laid out as the map (H, W); 0 where no point is."""
-        flat = np.zeros(where.height * where.width, np.float32)
+        flat = np.zeros(atlas.height * atlas.width, np.float32)
         flat[self.index] = values
-        return flat.reshape(where.height, where.width)
+        return flat.reshape(atlas.height, atlas.width)
 
 
 def texels(
-    surfaces: Sequence[Surface], materials: Mapping[str, Material], where: Atlas, *, among: Sequence[int], seed: int
+    surfaces: Sequence[Surface], materials: Mapping[str, Material], atlas: Atlas, *, among: Sequence[int], seed: int
 ) -> Texels:
     """The points of those surfaces `among` (K,) names that light can show on."""
-    flat = np.arange(where.height * where.width).reshape(where.height, where.width)
-    parts = [_of_surface(i, surfaces[i], materials, where, flat) for i in among if _has_body(surfaces[i], materials)]
+    flat = np.arange(atlas.height * atlas.width).reshape(atlas.height, atlas.width)
+    parts = [_of_surface(i, surfaces[i], materials, atlas, flat) for i in among if _has_body(surfaces[i], materials)]
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)] if parts else _nothing()
     columns.append(_dither(seed, flat.size)[columns[4]])
     return Texels(*columns)
@@ -240,35 +239,35 @@ def _nothing() -> list[NDArray[Any]]:
 
 
 def _of_surface(
-    index: int, surface: Surface, materials: Mapping[str, Material], where: Atlas, flat: NDArray[np.int64]
+    index: int, surface: Surface, materials: Mapping[str, Material], atlas: Atlas, flat: NDArray[np.int64]
 ) -> list[NDArray[Any]]:
     """All columns of Texels but the last for one surface."""
-    patch, material = where.patches[index], materials[surface.material]
+    chart, material = atlas.charts[index], materials[surface.material]
     # Samples on an edge touch the neighbour; a hair inwards they see past it.
-    u, v = (np.clip(fraction.ravel(), 1e-3, 1 - 1e-3) for fraction in patch.fractions())
+    u, v = (np.clip(fraction.ravel(), 1e-3, 1 - 1e-3) for fraction in chart.fractions())
     vectors = [surface.at(u, v) + RAY_OFFSET_M * surface.normal, surface.normal]
     # Half of an outer sample's area would lie beyond the edge.
-    inner_u, inner_v = ((fraction > 0) & (fraction < 1) for fraction in (f.ravel()[:, None] for f in patch.fractions()))
-    vectors += [inner_u * surface.edge_u_m / (patch.columns - 1), inner_v * surface.edge_v_m / (patch.rows - 1)]
+    inner_u, inner_v = ((fraction > 0) & (fraction < 1) for fraction in (f.ravel()[:, None] for f in chart.fractions()))
+    vectors += [inner_u * surface.edge_u_m / (chart.columns - 1), inner_v * surface.edge_v_m / (chart.rows - 1)]
     eta = material.eta if isinstance(material, Polished) else 0.0
     return [
         *(np.broadcast_to(vector, (len(u), 3)).astype(np.float32) for vector in vectors),
-        flat[patch.window].ravel(),
+        flat[chart.window].ravel(),
         np.full(len(u), index, np.int32),
         np.full(len(u), eta, np.float32),
     ]
 
 
-def outside(points: Texels, where: Atlas, sight: Visibility, is_panel: NDArray[np.bool_]) -> Texels:
+def outside(points: Texels, atlas: Atlas, visibility: Visibility, is_panel: NDArray[np.bool_]) -> Texels:
     """Those that do not lie inside a thing, as does the floor under a crate; next to it they shrink to their middle."""
-    parts = in_chunks(lambda part: _buried(points.take(part), sight, is_panel), len(points))
+    parts = in_chunks(lambda part: _buried(points.take(part), visibility, is_panel), len(points))
     inside = np.concatenate([*parts, np.zeros(0, bool)])
-    beside = scipy.ndimage.binary_dilation(points.on_map(inside.astype(np.float32), where) > 0).ravel()[points.index]
+    beside = scipy.ndimage.binary_dilation(points.on_map(inside.astype(np.float32), atlas) > 0).ravel()[points.index]
     kept, open_area = points.take(~inside), ~beside[~inside, None]
     return replace(kept, step_u_m=kept.step_u_m * open_area, step_v_m=kept.step_v_m * open_area)
 
 
-def _buried(points: Texels, sight: Visibility, is_panel: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _buried(points: Texels, visibility: Visibility, is_panel: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which points (P,) see only backs of surfaces."""
     inside = np.ones(len(points), bool)
     for a, b in TILTS:
@@ -276,8 +275,8 @@ def _buried(points: Texels, sight: Visibility, is_panel: NDArray[np.bool_]) -> N
         p = points.take(some)
         u_axis, v_axis = tangents(p.normals)
         along = a * u_axis + b * v_axis + p.normals
-        hits = sight.opaque.hits(p.points_m, along)
-        behind = np.einsum("ij,ij->i", along, sight.normals[hits.surface]) > 0
+        hits = visibility.opaque.hits(p.points_m, along)
+        behind = np.einsum("ij,ij->i", along, visibility.normals[hits.surface]) > 0
         inside[some] = (hits.surface >= 0) & behind & ~is_panel[hits.surface]
     return inside
 
@@ -291,19 +290,19 @@ def tangents(normals: Floats) -> tuple[Floats, Floats]:
 
 
 def in_chunks(
-    work: Callable[[slice], T], count: int, *, chunk: int = CHUNK, done: Callable[[int], object] | None = None
+    work: Callable[[slice], T], count: int, *, chunk: int = CHUNK, done: Callable[[float], object] | None = None
 ) -> list[T]:
-    """What `work` gives for each slice of `count` things, in their order, on all cores; `done` is told how many."""
+    """What `work` gives for each slice of `count` things, in order, on all cores; `done` is called with shares."""
     slices = [slice(start, min(start + chunk, count)) for start in range(0, count, chunk)]
 
-    def looked(part: slice) -> T:
+    def checked(part: slice) -> T:
         stop.check()
         return work(part)
 
     results = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for part, result in zip(slices, pool.map(looked, slices), strict=True):
+        for result in pool.map(checked, slices):
             results.append(result)
             if done:
-                done(part.stop - part.start)
+                done(len(results) / len(slices))
     return results

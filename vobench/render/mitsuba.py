@@ -169,7 +169,7 @@ Plugin = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Surfaces that share a mesh: one material, and one mover (-1 for what stands still)."""
+    """Surfaces that share a mesh: one material, and one mover (-1 for what is static)."""
 
     mover: int
     material: str

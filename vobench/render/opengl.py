@@ -1,4 +1,4 @@
-"""OpenGL: shader programs, textures, framebuffers."""
+"""What OpenGL holds: shader programs, textures, framebuffers; pyrender's private parts are used here and in raster."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from OpenGL import GL
-from pyrender.shader_program import ShaderProgramCache
-from pyrender.texture import Texture
+from pyrender.shader_program import ShaderProgram
 
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
@@ -18,12 +17,17 @@ from vobench.render.view import Box
 Floats = NDArray[np.float32]
 
 
-class FloatTexture(Texture):  # type: ignore[misc]
+class FloatTexture:
     """A (H, W) float32 map without mipmaps, row 0 at v = 0."""
 
     def __init__(self, values: Floats) -> None:
-        super().__init__(source=None, source_channels="R", width=values.shape[1], height=values.shape[0])
-        self._values = values
+        self._values, self._id = values, _texture(GL.GL_R32F, values, GL.GL_FLOAT)
+        _texture_parameters(GL.GL_LINEAR, GL.GL_LINEAR, GL.GL_CLAMP_TO_EDGE)
+
+    def bind(self, unit: int) -> None:
+        """Let shaders sample it by a unit."""
+        GL.glActiveTexture(unit)
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self._id)
 
     def update(self, values: Floats) -> None:
         """Replace the map by another (H, W); the very array that is there already costs nothing."""
@@ -31,31 +35,28 @@ class FloatTexture(Texture):  # type: ignore[misc]
             return
         self._values = values
         rows, columns = values.shape
-        self._bind()
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self._id)
         GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
         data = np.ascontiguousarray(values, np.float32)
         GL.glTexSubImage2D(GL.GL_TEXTURE_2D, 0, 0, 0, columns, rows, GL.GL_RED, GL.GL_FLOAT, data)
 
-    def _add_to_context(self) -> None:
-        self._texid = _texture(GL.GL_R32F, self._values, GL.GL_FLOAT)
-        _texture_parameters(GL.GL_LINEAR, GL.GL_CLAMP_TO_EDGE)
 
-
-class ReflectanceTexture(Texture):  # type: ignore[misc]
+class ReflectanceTexture:
     """A (N, N) float32 tile that repeats, with mipmaps; 16 bits of `scale`, linear, row 0 at v = 0."""
 
     def __init__(self, values: Floats) -> None:
-        super().__init__(source=None, source_channels="R", width=values.shape[1], height=values.shape[0])
-        self._values = values
         # Under a coat a bright texture may give back more than 1.
         self.scale = max(1.0, float(values.max()))
-
-    def _add_to_context(self) -> None:
         # Eight bits would make steps of 2 % where a surface reflects 20 %.
-        counts = np.rint(self._values * (65535 / self.scale)).astype(np.uint16)
-        self._texid = _texture(GL.GL_R16, counts, GL.GL_UNSIGNED_SHORT)
+        counts = np.rint(values * (65535 / self.scale)).astype(np.uint16)
+        self._id = _texture(GL.GL_R16, counts, GL.GL_UNSIGNED_SHORT)
         GL.glGenerateMipmap(GL.GL_TEXTURE_2D)
-        _texture_parameters(GL.GL_LINEAR_MIPMAP_NEAREST, GL.GL_REPEAT)
+        _texture_parameters(GL.GL_LINEAR_MIPMAP_NEAREST, GL.GL_LINEAR, GL.GL_REPEAT)
+
+    def bind(self, unit: int) -> None:
+        """Let shaders sample it by a unit."""
+        GL.glActiveTexture(unit)
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self._id)
 
 
 def _texture(internal: int, values: NDArray[Any], kind: int) -> Any:
@@ -67,10 +68,10 @@ def _texture(internal: int, values: NDArray[Any], kind: int) -> Any:
     return texture
 
 
-def _texture_parameters(minify: int, wrap: int) -> None:
+def _texture_parameters(minify: int, magnify: int, wrap: int) -> None:
     for key, value in (
         (GL.GL_TEXTURE_MIN_FILTER, minify),
-        (GL.GL_TEXTURE_MAG_FILTER, GL.GL_LINEAR),
+        (GL.GL_TEXTURE_MAG_FILTER, magnify),
         (GL.GL_TEXTURE_WRAP_S, wrap),
         (GL.GL_TEXTURE_WRAP_T, wrap),
     ):
@@ -84,103 +85,69 @@ PASS_BINDING = 0  # as the shaders say
 class Program:
     """One linked program. pyrender's own `set_uniform` asks for the location each time and hides every error."""
 
-    def __init__(self, cache: ShaderProgramCache, vertex: str, fragment: str, defines: frozenset[str]) -> None:
-        shader = cache.get_program(vertex, fragment, defines=dict.fromkeys(sorted(defines), 1))
+    def __init__(self, vertex: str, fragment: str, defines: frozenset[str]) -> None:
+        files = {"vertex_shader": str(SHADERS / f"{vertex}.vert"), "fragment_shader": str(SHADERS / f"{fragment}.frag")}
+        shader = ShaderProgram(**files, defines=dict.fromkeys(sorted(defines), 1))
         try:
             shader._add_to_context()
         except Exception as error:  # PyOpenGL's, whichever stage fails
             reason = " ".join(str(error).split())[:200]
-            raise RenderError(f"this OpenGL driver cannot run {fragment}, which needs OpenGL 4.2 ({reason})") from error
+            raise RenderError(
+                f"this OpenGL driver cannot run {fragment}.frag, which needs OpenGL 4.2 ({reason})"
+            ) from error
         self._id = shader._program_id
         self._locations: dict[str, Any] = {}
-        self._numbers: dict[str, float] = {}
-        self._vectors: dict[str, bytes] = {}
-        self._matrices: dict[str, Array] = {}
+        self._values: dict[str, float | bytes] = {}
 
-    def use(self) -> None:
-        """Draw with this program from now on."""
+    def use(self, **uniforms: float | Array) -> None:
+        """Draw with this program from now on, with some of its uniforms: numbers, vectors (4,), matrices."""
         GL.glUseProgram(self._id)
+        for name, value in uniforms.items():
+            data = value if isinstance(value, int | float) else np.ascontiguousarray(value, np.float32)
+            key = data.tobytes() if isinstance(data, np.ndarray) else data
+            if self._values.get(name) != key:
+                self._values[name] = key
+                self._upload(name, data)
 
-    def number(self, name: str, value: float) -> None:
-        """Set a float of the program in use, where it has another one; it may be none that its shaders need."""
-        if self._numbers.get(name) != value:
-            self._numbers[name] = value
-            GL.glUniform1f(self._location(name), value)
-
-    def count(self, name: str, value: int) -> None:
-        """Set an integer of the program in use."""
-        GL.glUniform1i(self._location(name), value)
-
-    def vector(self, name: str, value: Array) -> None:
-        """Set a vector (4,) of the program in use, where it has another one."""
-        data = np.ascontiguousarray(value, np.float32)
-        if self._vectors.get(name) != (key := data.tobytes()):
-            self._vectors[name] = key
-            GL.glUniform4fv(self._location(name), 1, data)
-
-    def matrix(self, name: str, value: Array) -> None:
-        """Set a matrix (3, 3) or (4, 4) of the program in use; the very array that is there already costs nothing."""
-        if self._matrices.get(name) is value:
-            return
-        self._matrices[name] = value
-        upload = GL.glUniformMatrix4fv if len(value) == 4 else GL.glUniformMatrix3fv
-        upload(self._location(name), 1, GL.GL_TRUE, np.ascontiguousarray(value, np.float32))
-
-    def _location(self, name: str) -> Any:
+    def _upload(self, name: str, value: float | NDArray[np.float32]) -> None:
         if name not in self._locations:
             self._locations[name] = GL.glGetUniformLocation(self._id, name)
-        return self._locations[name]
+        location = self._locations[name]
+        if isinstance(value, int):
+            GL.glUniform1i(location, value)
+        elif isinstance(value, float):
+            GL.glUniform1f(location, value)
+        elif value.ndim == 1:
+            GL.glUniform4fv(location, 1, value)
+        else:
+            upload = GL.glUniformMatrix4fv if len(value) == 4 else GL.glUniformMatrix3fv
+            upload(location, 1, GL.GL_TRUE, value)
 
 
 class Programs:
     """All programs of one context, each linked when it is first needed."""
 
     def __init__(self) -> None:
-        self._cache = ShaderProgramCache(shader_dir=str(SHADERS))
-        self._known: dict[tuple[str, str, frozenset[str]], Program] = {}
+        self._linked: dict[tuple[str, str, frozenset[str]], Program] = {}
 
-    def surface(self, *abilities: str) -> Program:
-        """What draws surfaces, with some of its abilities."""
-        return self._get("surface", "surface", *abilities)
-
-    def haze(self, *abilities: str) -> Program:
-        """What spreads a mirror's picture."""
-        return self._get("surface", "haze", *abilities)
-
-    def background(self) -> Program:
-        """What draws the skies."""
-        return self._get("background", "background")
-
-    def mean(self) -> Program:
-        """What averages samples."""
-        return self._get("whole", "mean")
-
-    def settle(self) -> Program:
-        """What makes a smooth picture of a mirror's samples."""
-        return self._get("surface", "settle")
-
-    def delete(self) -> None:
-        """Free them on the graphics side."""
-        self._cache.clear()
-        self._known.clear()
-
-    def _get(self, vertex: str, fragment: str, *abilities: str) -> Program:
-        key = vertex, fragment, frozenset(abilities)
-        if key not in self._known:
-            self._known[key] = Program(self._cache, f"{vertex}.vert", f"{fragment}.frag", key[2])
-        return self._known[key]
+    def get(self, vertex: str, fragment: str, *defines: str) -> Program:
+        """The program of two shaders with some of their abilities."""
+        key = vertex, fragment, frozenset(defines)
+        if key not in self._linked:
+            self._linked[key] = Program(*key)
+        return self._linked[key]
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Where in a pixel samples lie, one a layer, and how many mipmap levels finer than OpenGL would each looks."""
+    """Where in a pixel samples lie, one a layer, and how many mipmap levels finer than OpenGL's each takes."""
 
     points: tuple[tuple[float, float], ...]
     lod_bias: tuple[float, ...]
 
 
 # Four rows and four columns: an edge along either is placed to an eighth of a pixel.
-# Each sample looks at the one nearest mipmap level: by different choices, levels blend from one into the next.
+# Each sample takes the one nearest mipmap level: by different choices, levels blend from one into the next.
 TURNED = Grid(((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)), (-2.875, -2.375, -2.625, -2.125))
 # The same in two halves, each even about the centre, for sub-frames by turns.
 HALVES = tuple(
@@ -211,18 +178,12 @@ class Canvas:
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.framebuffer)
         for index, (x, y) in enumerate(self.grid.points):
             GL.glViewportIndexedf(index, 0.5 - x, 0.5 - y, self.width_px, self.height_px)
-        u0, u1, v0, v1 = box
-        GL.glScissor(u0, self.height_px - v1, u1 - u0, v1 - v0)
+        _scissor(box, self.height_px)
 
     def clear(self, box: Box) -> None:
         """Black and nothing near, within a box, in which to draw from now on."""
         self.begin(box)
         GL.glClear(GL.GL_COLOR_BUFFER_BIT | GL.GL_DEPTH_BUFFER_BIT)
-
-    def delete(self) -> None:
-        """Free it on the graphics side."""
-        GL.glDeleteFramebuffers(1, [self.framebuffer])
-        GL.glDeleteTextures([self.colour, self.depth])
 
 
 def canvas(width_px: int, height_px: int, grid: Grid) -> Canvas:
@@ -246,23 +207,27 @@ def canvas(width_px: int, height_px: int, grid: Grid) -> Canvas:
 
 
 @dataclass(frozen=True, slots=True)
-class Sum:
-    """A picture of one float channel to which means of canvases are added."""
+class FlatTarget:
+    """A framebuffer of one float sample a pixel, without depth: its texture can be sampled."""
 
     width_px: int
     height_px: int
     framebuffer: Any
-    colour: Any
+    texture: Any
+
+    @property
+    def whole(self) -> Box:
+        """The box of the whole picture."""
+        return 0, self.width_px, 0, self.height_px
 
     def begin(self, box: Box) -> None:
         """Draw here from now on, within a box of the picture."""
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.framebuffer)
         GL.glViewport(0, 0, self.width_px, self.height_px)
-        u0, u1, v0, v1 = box
-        GL.glScissor(u0, self.height_px - v1, u1 - u0, v1 - v0)
+        _scissor(box, self.height_px)
 
     def clear(self, box: Box, value: float = 0.0) -> None:
-        """One value all over a box."""
+        """One value all over a box, in which to draw from now on."""
         self.begin(box)
         GL.glClearBufferfv(GL.GL_COLOR, 0, [value, 0.0, 0.0, 0.0])
 
@@ -275,28 +240,26 @@ class Sum:
         # OpenGL's first row is the lowest; a copy, as OpenCV takes no array that runs backwards.
         return np.ascontiguousarray(np.frombuffer(buffer, np.float32).reshape(v1 - v0, u1 - u0)[::-1])
 
-    def delete(self) -> None:
-        """Free it on the graphics side."""
-        GL.glDeleteFramebuffers(1, [self.framebuffer])
-        GL.glDeleteTextures([self.colour])
 
-
-def summed(width_px: int, height_px: int) -> Sum:
-    """A sum of some size. Raises RenderError where the driver has no room or form for it."""
-    return Sum(width_px, height_px, *flat(width_px, height_px, GL.GL_R32F, GL.GL_RED))
-
-
-def flat(width_px: int, height_px: int, internal: Any, form: Any) -> tuple[Any, Any]:
-    """A framebuffer of float channels without depth, and its texture."""
-    framebuffer, colour = GL.glGenFramebuffers(1), GL.glGenTextures(1)
+def flat_target(width_px: int, height_px: int, *, mipmaps: bool = False) -> FlatTarget:
+    """A target of one channel, or of four with mipmaps. Raises RenderError where the driver has no such size."""
+    internal, form = (GL.GL_RGBA32F, GL.GL_RGBA) if mipmaps else (GL.GL_R32F, GL.GL_RED)
+    framebuffer, texture = GL.glGenFramebuffers(1), GL.glGenTextures(1)
     GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
-    GL.glBindTexture(GL.GL_TEXTURE_2D, colour)
+    GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
     GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, width_px, height_px, 0, form, GL.GL_FLOAT, None)
-    for filtering in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):
-        GL.glTexParameteri(GL.GL_TEXTURE_2D, filtering, GL.GL_NEAREST)
-    GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, colour, 0)
+    if mipmaps:
+        _texture_parameters(GL.GL_LINEAR_MIPMAP_LINEAR, GL.GL_LINEAR, GL.GL_CLAMP_TO_EDGE)
+    else:
+        _texture_parameters(GL.GL_NEAREST, GL.GL_NEAREST, GL.GL_CLAMP_TO_EDGE)
+    GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, texture, 0)
     _require_complete(width_px, height_px)
-    return framebuffer, colour
+    return FlatTarget(width_px, height_px, framebuffer, texture)
+
+
+def _scissor(box: Box, height_px: int) -> None:
+    u0, u1, v0, v1 = box
+    GL.glScissor(u0, height_px - v1, u1 - u0, v1 - v0)
 
 
 def _require_complete(width_px: int, height_px: int) -> None:

@@ -1,4 +1,4 @@
-"""The path tracer: pictures by Mitsuba, the judge of the raster engine."""
+"""The path tracer: pictures by Mitsuba, the reference of the raster engine."""
 
 import zlib
 from collections.abc import Iterator, Sequence
@@ -26,7 +26,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class SceneState:
-    """What of a scene changes: each light's level, and the instant at which movers and suns are looked at."""
+    """What of a scene changes: each light's level, and the instant that decides where movers and suns are."""
 
     levels: tuple[float, ...]
     t_ns: float
@@ -49,7 +49,7 @@ class MitsubaScene:
         self._groups = groups(inventory(scene))
         self._world = load(mi, scene)
         self._parameters = mi.traverse(self._world)
-        # `path` is faster, but sees through panes only by chance; `volpath` looks for lights through them.
+        # `path` is faster, but sees through panes only by chance; `volpath` samples lights through them.
         self._has_panes = any(isinstance(material, Glass) for material in scene.materials.values())
         kind = "volpath" if self._has_panes else "path"
         self._integrator = mi.load_dict({"type": kind, "max_depth": -1 if max_depth is None else max_depth})

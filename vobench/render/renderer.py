@@ -19,7 +19,7 @@ class View:
     """Rows of a picture that are exposed together, and how: the mean of M equally long sub-frames.
 
     Sub-frame m lasts from start_ns[m] to end_ns[m] (M,) int64; lights count with their mean over it,
-    the camera and movers stand where they are amid it: T_world_camera (M, 4, 4).
+    the camera and movers are where they are amid it: T_world_camera (M, 4, 4).
     """
 
     rows: slice

@@ -12,20 +12,24 @@ from numpy.typing import NDArray
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
-from vobench.render.culling import TILE_PX, PointView, Scalar, Tiles, balls, spread, tiles
 from vobench.render.emitter import FARTHEST_M
-from vobench.render.geometry import (
-    RAY_OFFSET_M,
+from vobench.render.geometry import RAY_OFFSET_M, Indices, Mask
+from vobench.render.occlusion import (
+    TILE_PX,
     Bodies,
-    Indices,
-    Mask,
+    PointView,
+    Scalar,
     Shot,
     ShotSurfaces,
     ShotTransforms,
+    Tiles,
     at_rows,
+    balls,
     moved,
     of,
     shot_transforms,
+    spread,
+    tiles,
     turn,
 )
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
@@ -35,7 +39,7 @@ from vobench.scene.surface import Surface
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, check_channels
 
 # From there the sun's rays would fall this far beside where they do, within 30 m around the origin.
-BEACON_M, BEACON_SLACK_M = 3e4, 0.03
+NEAR_POINT_M, NEAR_POINT_SLACK_M = 3e4, 0.03
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,15 +50,15 @@ class Lamp:
     center_m: Array
 
     @property
-    def beacon(self) -> tuple[Array, float]:
+    def near_point(self) -> tuple[Array, float]:
         """A point (3,) not too far for float32, and how much farther than from it light may strike, in metres."""
         if isinstance(self.light, Sun):
-            return self.center_m * (BEACON_M / FARTHEST_M), BEACON_SLACK_M
+            return self.center_m * (NEAR_POINT_M / FARTHEST_M), NEAR_POINT_SLACK_M
         return self.center_m, 0.0
 
     @property
     def panel(self) -> Surface | None:
-        """The rectangle that shines, which does not stand in its own light."""
+        """The rectangle that shines, which does not shade itself."""
         return self.light.surface if isinstance(self.light, AreaLight) else None
 
     def shines(self, points_m: Array, normals: Array) -> Mask:
@@ -77,7 +81,7 @@ class Lamp:
         return ~facing, facing
 
     def hidden(self, bodies: Bodies, points_m: Array, normals: Array, T_bodies_world: Sequence[Array]) -> Mask:
-        """Whether something stands between the light and places (R, 3) that it would shine on."""
+        """Whether something is between the light and places (R, 3) that it would shine on."""
         hidden = self.shines(points_m, normals)
         lit = np.flatnonzero(hidden)
         starts = points_m[lit] + RAY_OFFSET_M * normals[lit]
@@ -105,7 +109,7 @@ def _center(light: AreaLight | PointLight | SpotLight | Sun, t_ns: int) -> Array
 class TilePlan:
     """A picture to tell the truth of, and what is known of its tiles (V, U) beforehand.
 
-    sure: the one surface of a tile, -1 where rays must tell; glazed: panes may stand before it; visible: the next
+    sure: the one surface of a tile, -1 where rays must tell; glazed: panes may be before it; visible: the next
     camera surely sees all of it, as far as its picture reaches; hidden: how many lights surely are from all of it;
     each lamp has the tiles where it is in doubt. All are while camera or movers move.
     """
@@ -161,25 +165,25 @@ def _visible(bodies: Bodies, here: ShotTransforms, there: ShotTransforms | None,
     T_there_here = np.stack(there.T_camera_bodies) @ np.stack(here.T_bodies_camera)
     body = np.append(bodies.of_surface, 0)[patches.sure]
     centers_m = moved(T_there_here[body], patches.centers_m)
-    outlook = PointView(there.snapshot.corners_m, there.snapshot.facing & bodies.opaque)
+    point_view = PointView(there.snapshot.corners_m, there.snapshot.facing & bodies.opaque)
     facing = np.append(there.snapshot.facing, False)[patches.sure]
-    return np.asarray(facing & outlook.shading(centers_m, patches.radii_m, patches.sure)[0])
+    return np.asarray(facing & point_view.shading(centers_m, patches.radii_m, patches.sure)[0])
 
 
 def _cast(
     bodies: Bodies, here: ShotTransforms, snapshot: ShotSurfaces, lamp: Lamp, patches: _Patches
 ) -> tuple[Mask, Mask]:
-    """Tiles (T,) that a lamp would light but for what stands before them, and those where that is not sure.
+    """Tiles (T,) that a lamp would light but for what is before them, and those where that is not sure.
 
-    Glass does not count, and a panel does not stand in its own light.
+    Glass does not count, and a panel does not shade itself.
     """
     T_world_camera = here.T_bodies_camera[0]
-    beacon_m, slack_m = lamp.beacon
-    T_lamp_camera = se3.transform(np.eye(3), -beacon_m) @ T_world_camera
+    near_point_m, slack_m = lamp.near_point
+    T_lamp_camera = se3.transform(np.eye(3), -near_point_m) @ T_world_camera
     others = np.array([surface is not lamp.panel for surface in bodies.surfaces])
-    outlook = PointView(se3.apply(T_lamp_camera, snapshot.corners_m), others & bodies.opaque)
+    point_view = PointView(se3.apply(T_lamp_camera, snapshot.corners_m), others & bodies.opaque)
     radii_m = patches.radii_m + slack_m
-    clear, dark = outlook.shading(moved(T_lamp_camera, patches.centers_m), radii_m, patches.sure)
+    clear, dark = point_view.shading(moved(T_lamp_camera, patches.centers_m), radii_m, patches.sure)
     normals = turn(T_world_camera, snapshot.planes)[patches.sure]  # longer than 1, which matters to no sign
     unlit, lit = lamp.reaches(moved(T_world_camera, patches.centers_m), radii_m, -normals)
     return dark & lit, (patches.sure < 0) | ~(clear | unlit | (dark & lit))
@@ -188,10 +192,10 @@ def _cast(
 Values = dict[str, NDArray[np.generic]]
 Pixels = NDArray[np.intp]
 
-# With a rolling shutter the row that sees a point next is looked for until it settles to this, or so many times.
-SETTLED_PX, MOST_ROUNDS = 1e-5, 20
-# A point is seen where sight ends no more than this share of the way before it.
-SIGHT_TOLERANCE = 1e-4
+# With a rolling shutter the row that sees a point next is found by iteration, to this or in so many rounds.
+CONVERGED_PX, MOST_ROUNDS = 1e-5, 20
+# A point is seen where the ray ends no more than this share of the way before it.
+DEPTH_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,14 +211,14 @@ class SurfaceIds:
 class Band:
     """Rows of a picture that begin with a tile's first: R pixels in T tiles."""
 
-    def __init__(self, plan: TilePlan, looks: SurfaceIds, rows: slice) -> None:
-        self._plan, self._bodies, self._looks = plan, plan.bodies, looks
+    def __init__(self, plan: TilePlan, ids: SurfaceIds, rows: slice) -> None:
+        self._plan, self._bodies, self._ids_of = plan, plan.bodies, ids
         self._shape = (rows.stop - rows.start, plan.camera.width_px)
         self._rays = plan.tiles.rays[rows].reshape(-1, 3)
         self._uv_px = plan.tiles.uv_px[rows].reshape(-1, 2)
         self._tiles = slice(rows.start // TILE_PX, -(-rows.stop // TILE_PX))
         self._T_bodies_camera = at_rows(plan.here.T_bodies_camera, self._uv_px[:, 1])
-        self._surface, self._distance_m = self._look()
+        self._surface, self._distance_m = self._visible_surfaces()
         self._points_m = self._distance_m[:, None] * self._rays
         movers = np.append(self._bodies.of_surface, 0)[self._surface] if len(self._T_bodies_camera) > 1 else None
         self._body = movers if movers is not None and movers.any() else None
@@ -227,22 +231,22 @@ class Band:
         makers: dict[str, Callable[[], NDArray[np.generic]]] = {
             "depth": self._depth,
             "normals": self._normals,
-            "instance": lambda: self._looks.instance[self._surface],
-            "material": lambda: self._looks.material[self._surface],
+            "instance": lambda: self._ids_of.instance[self._surface],
+            "material": lambda: self._ids_of.material[self._surface],
             "mirror": self._mirror,
             "shadow": self._shadow,
             "moving": lambda: np.zeros(len(self._rays), bool) if self._body is None else self._body > 0,
         }
         return {name: found[name] if name in found else makers[name]() for name in names}
 
-    def _look(self) -> tuple[Indices, Array]:
+    def _visible_surfaces(self) -> tuple[Indices, Array]:
         """Surfaces and distances (R,): by planes where tiles are sure, by rays elsewhere."""
         surface, snapshot = spread(self._plan.sure[self._tiles], self._shape).ravel(), self._plan.here.snapshot
         distance_m = np.full(len(surface), np.nan)
         if snapshot is not None:
             distance_m = 1 / np.einsum("ri,ri->r", snapshot.planes[surface], self._rays)
         unsure = np.flatnonzero(surface < 0)
-        seen = self._bodies.look(self._rays[unsure], [of(T, unsure) for T in self._T_bodies_camera])
+        seen = self._bodies.visible_surfaces(self._rays[unsure], [of(T, unsure) for T in self._T_bodies_camera])
         surface[unsure], distance_m[unsure] = seen.surface, seen.distance_m
         return surface, distance_m
 
@@ -265,14 +269,14 @@ class Band:
         return turned
 
     def _mirror(self) -> Mask:
-        mirror = self._looks.mirrors[self._surface]
+        mirror = self._ids_of.mirrors[self._surface]
         pixels = np.flatnonzero(self._spread(self._plan.glazed) & ~mirror)
         T_bodies_camera = [of(T, pixels) for T in self._T_bodies_camera]
         mirror[pixels] = self._bodies.behind_panes(self._rays[pixels], T_bodies_camera, self._distance_m[pixels])
         return mirror
 
     def _shadow(self) -> NDArray[np.uint16]:
-        lamps, matt = self._plan.lamps, self._looks.matt[self._surface]
+        lamps, matt = self._plan.lamps, self._ids_of.matt[self._surface]
         count = self._spread(self._plan.hidden) * matt
         doubts = [self._spread(doubt) for _, doubt in lamps]
         pixels = np.flatnonzero(matt & np.logical_or.reduce(doubts, axis=0))
@@ -300,7 +304,7 @@ class Band:
             next_m = self._carried(points_m, there, rows)
             uv_px = self._plan.camera.project(next_m)
             change_px = np.nanmax(np.abs(uv_px[:, 1] - rows), initial=0.0) if there.snapshot is None else 0.0
-            if change_px < SETTLED_PX:
+            if change_px < CONVERGED_PX:
                 break
             rows = uv_px[:, 1]
         return uv_px - self._uv_px, seen & self._gone(there, next_m, uv_px)
@@ -313,7 +317,7 @@ class Band:
         return points_m
 
     def _carried(self, own_points_m: Array, there: ShotTransforms, rows: Array) -> Array:
-        """The points (R, 3) in the next camera's frame, where it stands on the rows (R,) that see them."""
+        """The points (R, 3) in the next camera's frame, where it is on the rows (R,) that see them."""
         carried = moved(at_rows(there.T_camera_bodies[:1], rows)[0], own_points_m)
         for body, these in self._movers():
             (T_there_body,) = at_rows(there.T_camera_bodies[body : body + 1], rows[these])
@@ -334,8 +338,8 @@ class Band:
         """Whether a camera that has surfaces' points (P, 3) before it sees something nearer, or the surface's back."""
         reach_m = np.linalg.norm(points_m, axis=1)
         rays = points_m / reach_m[:, None]
-        met = self._bodies.look(rays, T_bodies_camera)
-        hidden: Mask = (met.surface != surface) & (met.distance_m < reach_m * (1 - SIGHT_TOLERANCE))
+        met = self._bodies.visible_surfaces(rays, T_bodies_camera)
+        hidden: Mask = (met.surface != surface) & (met.distance_m < reach_m * (1 - DEPTH_TOLERANCE))
         other = np.flatnonzero((met.surface != surface) & ~hidden)
         body = self._bodies.of_surface[surface[other]]
         for index in np.unique(body):
@@ -369,7 +373,7 @@ class TruthCaster:
         materials = [s.material for s in surfaces]
         self.names = TruthNames(_table(instances), _table(materials))
         kinds = [*(scene.materials.get(name) for name in materials), None]
-        self._looks = SurfaceIds(
+        self._ids_of = SurfaceIds(
             _ids(instances, self.names.instance),
             _ids(materials, self.names.material),
             np.array([isinstance(kind, Mirror | Polished) for kind in kinds]),
@@ -392,7 +396,7 @@ class TruthCaster:
         whole = tile_plan(self._bodies, camera, shot_transforms(self._bodies, now), there, lit)
 
         def fill(rows: slice) -> None:
-            for name, found in Band(whole, self._looks, rows).values(tuple(wanted)).items():
+            for name, found in Band(whole, self._ids_of, rows).values(tuple(wanted)).items():
                 values[name][rows] = found.reshape(values[name][rows].shape)
 
         starts = range(0, height, BAND_ROWS)

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pyrender import IntrinsicsCamera
 
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
@@ -80,7 +79,7 @@ def overlap(a: Box, b: Box) -> Box | None:
 NEAR_M, FAR_M = 0.05, 60.0
 STATIC = -1
 IDENTITY = np.eye(4)
-# OpenCV's camera looks along +z with y down, OpenGL's along -z with y up.
+# OpenCV's camera faces +z with y down, OpenGL's -z with y up.
 T_CV_GL = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
@@ -106,7 +105,7 @@ class PinholeView:
     mirrors: tuple[Plane, ...] = ()
 
     def through(self, mirror: Plane) -> "PinholeView":
-        """The look into a mirror."""
+        """The view into a mirror."""
         reflection = mirror.reflection
         return replace(
             self,
@@ -147,7 +146,7 @@ class PinholeView:
         return world
 
     def pose(self, mover: int) -> Array:
-        """T_world_mover, the identity for what stands still."""
+        """T_world_mover, the identity for what is static."""
         return IDENTITY if mover == STATIC else self.T_world_movers[mover]
 
     def plane(self, mirror: Plane, mover: int) -> Plane:
@@ -158,10 +157,17 @@ class PinholeView:
 def pinhole_view(
     camera: Pinhole, T_world_camera: Array, T_world_movers: Sequence[Array], skies: Array, ambient_cd_m2: float
 ) -> PinholeView:
-    """The look without a mirror."""
-    # OpenGL counts from the corner of the top-left pixel, OpenCV from its centre.
-    lens = IntrinsicsCamera(camera.fx_px, camera.fy_px, camera.cx_px + 0.5, camera.cy_px + 0.5, NEAR_M, FAR_M)
-    P = lens.get_projection_matrix(camera.width_px, camera.height_px)
-    direct = P @ T_CV_GL @ se3.inverse(T_world_camera)
+    """The view without a mirror."""
+    direct = _projection(camera) @ T_CV_GL @ se3.inverse(T_world_camera)
     eye_m = T_world_camera[:3, 3]
     return PinholeView(camera, T_world_camera, T_world_movers, skies, ambient_cd_m2, eye_m, direct, direct, IDENTITY)
+
+
+def _projection(camera: Pinhole) -> Array:
+    """From OpenGL's camera to its screen (4, 4), which counts from the corner of the top-left pixel."""
+    P = np.zeros((4, 4))
+    P[0, 0], P[0, 2] = 2 * camera.fx_px / camera.width_px, 1 - 2 * (camera.cx_px + 0.5) / camera.width_px
+    P[1, 1], P[1, 2] = 2 * camera.fy_px / camera.height_px, 2 * (camera.cy_px + 0.5) / camera.height_px - 1
+    P[2, 2:] = (FAR_M + NEAR_M) / (NEAR_M - FAR_M), 2 * FAR_M * NEAR_M / (NEAR_M - FAR_M)
+    P[3, 2] = -1
+    return P

@@ -132,7 +132,7 @@ def _focal_px(plane: Array, face_of: NDArray[np.int8], focal_lengths: Array) -> 
     )
     within = (face_of[here] >= 0) & (face_of[here] == face_of[right]) & (face_of[here] == face_of[down])
     steps = np.sort([np.hypot(*(plane[there] - plane[here])[within].T) for there in (right, down)], 0)
-    # Towards a fisheye's rim and a full sphere's poles, points crowd along one direction without showing more.
+    # Towards a fisheye's rim and a full sphere's poles, points lie close along one direction without showing more.
     return float(focal_lengths.max() / focal_lengths.min() / steps[1].min())
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vobench.geometry.rig import Side
-from vobench.render.geometry import Shot
+from vobench.render.occlusion import Shot
 from vobench.render.truth import TruthCaster
 from vobench.run.motion import BodyMotion, generator
 from vobench.scene.scene import Scene

@@ -35,7 +35,6 @@ def open_renderer(spec: SceneFile, scene: Scene, rendering: RenderingSpec, shop:
         from vobench.render.path import SAMPLES, PathRenderer
 
         return PathRenderer(scene, samples=rendering.samples or SAMPLES)
-    from vobench.render.egl import require_drawing
     from vobench.render.raster import RasterRenderer
 
     require_drawing()

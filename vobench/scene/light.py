@@ -1,4 +1,4 @@
-"""What shines: panels, points, spots, the sun and the sky, each brighter or darker over time."""
+"""Lights: panels, points, spots, the sun and the sky, each brighter or darker over time."""
 
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -167,8 +167,8 @@ class SpotLight:
 class Sun:
     """Direct sunlight: illuminance_lx on a surface that faces it, from a disc 0.53° wide.
 
-    The sun stands at azimuth_deg (0 along x, 90 along y) and elevation_deg at each of times_s, and
-    moves evenly between; one entry each is a sun that stands still.
+    The sun is at azimuth_deg (0 along x, 90 along y) and elevation_deg at each of times_s, and
+    moves evenly between; one entry each is a sun that does not move.
     """
 
     name: str
@@ -203,7 +203,7 @@ SKIES = {
 class Sky:
     """A sky that gives illuminance_lx on open level ground, and that ground seen below the horizon.
 
-    `kind` is one of SKIES; only the clear one depends on where the sun stands (unit vector (3,)).
+    `kind` is one of SKIES; only the clear one depends on where the sun is (unit vector (3,)).
     """
 
     name: str

@@ -44,7 +44,7 @@ class Mover:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Surfaces that stand still, their materials by name, the lights that shine on them, and movers."""
+    """Static surfaces, their materials by name, the lights that shine on them, and movers."""
 
     name: str
     surfaces: tuple[Surface, ...]

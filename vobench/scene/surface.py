@@ -58,7 +58,7 @@ def rectangle(center_m: Array, edge_u_m: Array, edge_v_m: Array, material: str, 
 
 
 def room(size_m: tuple[float, float, float], *, floor: str, wall: str, ceiling: str) -> list[Surface]:
-    """The six inner sides of a box that stands on z = 0 around the origin."""
+    """The six inner sides of a box whose floor is z = 0 around the origin."""
     x, y, z = np.diag(np.asarray(size_m, float))
     middle = z / 2
     return [

@@ -18,8 +18,8 @@ uniform float eye_height;  // distance of the eye from the mirroring plane
 #ifdef HAS_REFLECTION
 layout(binding = 2) uniform sampler2DArray reflection;
 #endif
-#ifdef HAS_HAZE
-layout(binding = 3) uniform sampler2D haze;
+#ifdef HAS_ROUGHNESS
+layout(binding = 3) uniform sampler2D rough_reflection;
 #endif
 
 in vec2 uv_albedo;
@@ -57,9 +57,9 @@ void main()
 #else
     mirrored = F * eye.w;
 #endif
-#ifdef HAS_HAZE
+#ifdef HAS_ROUGHNESS
     // Pixels whose middle is beside the mirror have none.
-    float spread = texelFetch(haze, ivec2(gl_FragCoord.xy), 0).r;
+    float spread = texelFetch(rough_reflection, ivec2(gl_FragCoord.xy), 0).r;
     mirrored = spread < 0.0 ? mirrored : spread;
 #endif
 #ifdef HAS_BODY

@@ -1,6 +1,6 @@
 #version 410 core
 #extension GL_ARB_shading_language_420pack : require
-// What a rough mirror shows: rays spread by its facets (GGX, visible normals: Heitz 2018), each looked up where it
+// What a rough mirror shows: rays spread by its facets (GGX, visible normals: Heitz 2018), each sampled where it
 // ends in the mirrored picture; the depths in that picture say how far they go.
 layout(std140, binding = 0) uniform Pass {
     mat4 view_projection;
@@ -47,7 +47,7 @@ float seen(float cosine)
     return 2.0 / (1.0 + sqrt(1.0 + roughness * roughness * (1.0 - squared) / squared));
 }
 
-// Solid angle that one of the rays stands for.
+// Solid angle that one of the rays covers.
 float spread(vec3 view, vec3 h)
 {
     float t = h.z * h.z * (roughness * roughness - 1.0) + 1.0;
@@ -56,8 +56,8 @@ float spread(vec3 view, vec3 h)
 }
 
 // Luminance and distance from the mirror of what is met on a ray that is thought to go `reach` far, and how much of
-// it is known. Each ray looks at as much of the picture as it stands for.
-vec3 look_up(vec3 from, vec3 direction, float reach, float solid_angle)
+// it is known. Each ray samples as much of the picture as it covers.
+vec3 sample_at(vec3 from, vec3 direction, float reach, float solid_angle)
 {
     vec4 screen = view_projection * vec4(from + reach * direction, 1.0);
     float size = reach * focal_px / screen.w, lod = 0.5 * log2(max(1.0, solid_angle * size * size));
@@ -81,7 +81,7 @@ void main()
     // How far rays go on the whole: at the mirror's image, then around it as far as they spread.
     vec2 nearness = texelFetch(mirrored, ivec2(gl_FragCoord.xy), 0).gb;
     float straight = length(to_eye) * max(0.0, gl_FragCoord.w * nearness.y / nearness.x - 1.0);
-    straight = look_up(from, -view_world, straight, float(RAYS) * spread(view, vec3(0.0, 0.0, 1.0))).y;
+    straight = sample_at(from, -view_world, straight, float(RAYS) * spread(view, vec3(0.0, 0.0, 1.0))).y;
 
     float light = 0.0, known = 0.0, shares = 0.0;
     for (int i = 0; i < RAYS; i++) {
@@ -91,7 +91,7 @@ void main()
         // Behind the mirror, where its picture is.
         vec3 direction = axes * vec3(ray.xy, -ray.z);
         float solid_angle = spread(view, h);
-        vec3 found = look_up(from, direction, look_up(from, direction, straight, solid_angle).y, solid_angle);
+        vec3 found = sample_at(from, direction, sample_at(from, direction, straight, solid_angle).y, solid_angle);
         float share = seen(ray.z);
 #ifdef HAS_FRESNEL
         share *= fresnel(dot(view, h));
