@@ -113,3 +113,12 @@ def test_a_float32_mean_rounds_after_every_sum():
     errors = np.full(10**6, 0.1, np.float32)
     assert mean_drift(errors, errors) != pytest.approx(0.1, rel=1e-4)
     assert mean_drift(errors.astype(float), errors) == pytest.approx(0.1, rel=1e-7)
+
+
+@pytest.mark.parametrize(("angle", "half_turns"), [(0.0, 0.0), (np.pi, 1.0)])
+def test_the_devkits_cosine_that_six_digits_push_beyond_one_is_cut(angle, half_turns):
+    T_gt = straight(4, 1.0)
+    T_est = T_gt.copy()
+    T_est[1:, :3, :3] = (1 - 1e-6) * se3.rotation_z(angle)  # its inverse is as much too large
+    s = segment_errors(T_gt, T_est, np.arange(4), np.arange(4.0), lengths_m=(2.5,), precision="devkit")
+    assert s.rot_radpm == pytest.approx(half_turns * np.pi / 2.5)

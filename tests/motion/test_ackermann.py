@@ -9,6 +9,7 @@ from vobench.errors import MotionError
 from vobench.motion import ackermann as module
 from vobench.motion.ackermann import ACKERMANNS, ackermann
 from vobench.motion.course import circle, figure_8, pure_rotation, reverse, square, stop_and_go
+from vobench.trajectory.kinematics import CurveMotion, Kinematics, evenly, level
 
 SMALL = ACKERMANNS["small_robot"]
 
@@ -124,3 +125,19 @@ def test_a_car_of_impossible_figures_is_refused_by_name(name, value):
 def test_a_steering_too_quick_or_too_wide_for_the_model_is_refused(name, value):
     with pytest.raises(MotionError, match=rf"a lag of 0\.01 s or more, got .*{name} {value}"):
         replace(SMALL, **{name: value})
+
+
+class Unwinding:
+    """A way that begins with a radius of 0.1 m and straightens out, smooth all along."""
+
+    breaks = np.zeros(0)
+
+    def at(self, s):
+        ahead, up, none = np.array([1.0, 0, 0]), np.array([0, 0, 1.0]), np.zeros((len(s), 3))
+        turn = 1 / (0.1 + s)
+        return Kinematics(level(s, 0 * s, turn), none + ahead, turn[:, None] * up, none, none)
+
+
+def test_a_way_too_sharp_in_its_first_metre_alone_is_a_sentence():
+    with pytest.raises(MotionError, match=r"the way turns with a radius of 0\.1 m, but a wheelbase"):
+        ackermann(CurveMotion(Unwinding(), evenly(0.0, 40.0)), ACKERMANNS["kitti_like"])

@@ -1,6 +1,6 @@
 """Pieces of a course against their closed forms."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -370,3 +370,20 @@ def test_an_ellipse_has_the_length_of_its_elliptic_integral(narrow):
     assert arc.length == pytest.approx(4 * ellipe(1 - narrow**2), rel=1e-13)
     s = np.linspace(0, arc.length, 1000)
     np.testing.assert_allclose(arc.parameter(s, 1) * speed(arc.parameter(s)), 1, atol=1e-9)
+
+
+@dataclass(frozen=True, slots=True)
+class Swaying(Circling):
+    """The same, at a speed that comes and goes each second."""
+
+    def at(self, t_ns: Array) -> Kinematics:
+        even, t = Circling.at(self, t_ns), np.asarray(t_ns) / 1e9
+        return replace(even, velocity_mps=even.velocity_mps * np.sin(2 * np.pi * t)[:, None] ** 2)
+
+
+def test_how_far_wheels_have_rolled_does_not_hang_on_how_often_it_is_asked() -> None:
+    seldom, often = np.array([0, 37 * 10**8]), np.arange(0, 37 * 10**8 + 1, 10**7)
+    rims = [rolled(Swaying(0.5, 0.8), t_ns, PIONEER_WHEELS)[-1] for t_ns in (seldom, often)]
+    np.testing.assert_allclose(rims[0], rims[1], rtol=1e-11)
+    distance_m = 0.5 * (3.7 / 2 - np.sin(4 * np.pi * 3.7) / (8 * np.pi))
+    assert RADIUS * rims[0].mean() == pytest.approx(distance_m, rel=1e-11)

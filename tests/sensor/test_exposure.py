@@ -10,7 +10,7 @@ from scipy.optimize import curve_fit
 from vobench.errors import InputError
 from vobench.geometry.se3 import Array
 from vobench.scene.light import Flicker
-from vobench.sensor.exposure import AutoExposure, Exposure, Shutter, ShutterKind, Strip, start, step, strips
+from vobench.sensor.exposure import AutoExposure, Exposure, Shutter, ShutterKind, Strip, row_stamps, start, step, strips
 from vobench.sensor.image_sensor import CAMERAS, CameraSensor, NoiseStreams, Radiance, expose
 from vobench.sensor.response import LINEAR, SRGB, Response
 
@@ -284,3 +284,10 @@ def test_shutters_that_cannot_be_are_refused() -> None:
         rolling(-1)
     with pytest.raises(InputError, match="reads all rows at once"):
         Shutter(ShutterKind.GLOBAL, 0.01)
+
+
+@pytest.mark.parametrize("height", [1, 4, 5])
+def test_rows_are_stamped_from_the_top_down_one_line_after_another(height: int) -> None:
+    stamps = row_stamps(height, Shutter(ShutterKind.ROLLING, 0.02), 10**9)
+    assert stamps[0] == 10**9 - round(0.02e9 * (height - 1) / height / 2)
+    np.testing.assert_allclose(np.diff(stamps), 0.02e9 / height, atol=1)
