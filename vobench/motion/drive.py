@@ -165,8 +165,9 @@ LONGEST_LEG_S, FASTEST_HZ = 3600.0, 1e4
 class Drive:
     """What the robot did, at N frames and M = (N - 1) substeps + 1 encoder instants.
 
-    state (N, 5): x, y of h in m, psi in rad, u, omega; references (N, 2) hold from their frame on. `motion` is of the
-    axle midpoint B, sliding included. reached: the frame that ended each leg, by entering its target or by the clock.
+    state (N, 5): x, y of h in m, psi in rad, u, omega; references (N, 2) hold from their frame on, and rates (N, 2) are
+    u' and omega' as they begin to. `motion` is of the axle midpoint B, sliding included. reached: the frame that ended
+    each leg, by entering its target or by the clock.
     rim_rad (M, 2): left, right. slip (N, 3): both sigmas and beta in rad; delta (N, 2). theta: this very robot's,
     None if ideal.
     """
@@ -174,6 +175,7 @@ class Drive:
     t_ns: Stamps
     state: Array
     references: Array
+    rates: Array
     reached: tuple[int, ...]
     encoder_t_ns: Stamps
     rim_rad: Array
@@ -310,10 +312,14 @@ def _record(
 ) -> Drive:
     """The drive from the states (1 or substeps, 7) of its periods, references (N, 2) and slip at N frames."""
     fine, disturbed = np.concatenate(periods), np.array(slips)
+    state = fine[:: vehicle.substeps, :5]
+    u, omega = speeds = state[:, 3], state[:, 4]
+    u_ref, omega_ref, delta_u, delta_omega = *asked.T, *disturbed[:, 5:].T
     return Drive(
         t_ns=_stamps(len(slips), vehicle.rate_hz, 1),
-        state=fine[:: vehicle.substeps, :5],
+        state=state,
         references=asked,
+        rates=np.stack(vehicle.speed_rates(u, omega, (u_ref, omega_ref), speeds, (delta_u, delta_omega)), -1),
         reached=ends,
         encoder_t_ns=_stamps(len(fine), vehicle.rate_hz, vehicle.substeps),
         rim_rad=fine[:, 5:],
