@@ -2,6 +2,7 @@
 
 VobenchError               the user's mistake or machine: one line, exit code 1
 ├── InputError             a file does not say what it should
+│   ├── SettingError       a setting is not what its field takes, or does not fit the others
 │   ├── SuiteError         a suite, scene or manifest: names file, line, key and value of every mistake
 │   └── TrajectoryError    a trajectory file or array
 ├── UnknownNameError       no scene, suite or estimator of that name
@@ -57,6 +58,14 @@ class VobenchError(Exception):
 
 class InputError(VobenchError):
     """A file does not say what it should."""
+
+
+class SettingError(InputError, ValueError):
+    """A setting is wrong; `keys` lead to it from the object that has it. A ValueError, so that pydantic gathers it."""
+
+    def __init__(self, sentence: str, *keys: int | str) -> None:
+        self.sentence, self.keys = sentence, keys
+        super().__init__(f"{'.'.join(map(str, keys))}: {sentence}" if keys else sentence)
 
 
 class SuiteError(InputError):

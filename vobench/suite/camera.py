@@ -14,7 +14,8 @@ from vobench.sensor.imu import IMUS, ImuSettings, Triad
 from vobench.sensor.lens import LensEffects
 from vobench.sensor.pixel_truth import CHANNELS
 from vobench.sensor.response import RESPONSES, Power, Response, Table
-from vobench.suite.yaml_file import NonNegative, Positive, Share, Strict, one_of, tupled
+from vobench.setting import NonNegative, Positive, Share, tupled
+from vobench.suite.yaml_file import Strict, one_of
 
 ResponseKey = str | float | tuple[float, ...]
 

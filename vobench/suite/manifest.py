@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from vobench.setting import Matching
 from vobench.suite import yaml_file
-from vobench.suite.yaml_file import matching
 
 MANIFEST_FILE = "estimator.yaml"
 CLASS_PATH = r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*"
@@ -17,9 +17,9 @@ class Manifest(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, populate_by_name=True)
 
-    name: Annotated[str, matching(r"[a-z][a-z0-9_]*", "lower-case letters, digits and _, a letter first")]
+    name: Annotated[str, Matching(r"[a-z][a-z0-9_]*", "lower-case letters, digits and _, a letter first")]
     version: Annotated[str, Field(min_length=1)]
-    class_path: Annotated[str, Field(alias="class"), matching(CLASS_PATH, "file:Class, as in 'estimator:Mine'")]
+    class_path: Annotated[str, Field(alias="class"), Matching(CLASS_PATH, "file:Class, as in 'estimator:Mine'")]
     needs: tuple[Literal["stereo", "mono", "encoders", "imu"], ...] = ()
     pose_of: Literal["left_camera", "body"]
     summary: Annotated[str, Field(min_length=1)]

@@ -15,6 +15,7 @@ from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Su
 from vobench.scene.material import Glass, Material, Matt, Mirror, Polished, Texture
 from vobench.scene.scene import Scene, ceiling_light
 from vobench.scene.surface import Surface, Window, box, rectangle, room, with_windows
+from vobench.setting import Triple
 from vobench.suite import yaml_file
 from vobench.suite.scene_spec import (
     BoardSpec,
@@ -27,7 +28,7 @@ from vobench.suite.scene_spec import (
     SunSpec,
     WindowSpec,
 )
-from vobench.suite.yaml_file import Keys, Mistakes, Triple, YamlFile
+from vobench.suite.yaml_file import Keys, Mistakes, YamlFile
 
 Lighting = dict[str, LightOverride]
 # Names of the lights that there is one of.

@@ -10,7 +10,8 @@ from pydantic import Field, model_validator
 
 from vobench.scene.light import SKIES, Dimmer, Flicker, Level, Steady, Switched
 from vobench.scene.material import PATTERNS
-from vobench.suite.yaml_file import Name, NonNegative, Positive, Share, Strict, Triple, one_of
+from vobench.setting import Name, NonNegative, Positive, Share, Triple
+from vobench.suite.yaml_file import Strict, one_of
 
 
 class FlickerSpec(Strict):

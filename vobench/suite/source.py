@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from vobench.errors import SuiteError
-from vobench.suite.yaml_file import Name, Positive, Strict
+from vobench.setting import Name, Positive
+from vobench.suite.yaml_file import Strict
 
 FILE_KEYS = ("calibration", "imu", "truth")
 GLOB = re.compile(r"[*?\[]")

@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from vobench.errors import SuiteError, unknown
 from vobench.geometry.rig import PRESETS, CalibrationError, Rig, mounted, true_rig
 from vobench.scene.scene import Scene
+from vobench.setting import Name, Positive
 from vobench.suite import catalog, scene_file, yaml_file
 from vobench.suite.camera import CameraSpec, ChannelName, ImuSpec, RenderingSpec
 from vobench.suite.camera import named as named_imu
@@ -21,7 +22,7 @@ from vobench.suite.manifest import Manifest, read_manifest
 from vobench.suite.scene_spec import LightOverride, SceneFile
 from vobench.suite.source import RecordedCase, SourceSpec, as_sources, recorded_cases
 from vobench.suite.trajectory import ReplaySpec, TrajectorySpec, read_replayed, read_times, wheels_of
-from vobench.suite.yaml_file import Mistakes, Name, Point, Positive, Strict, YamlFile, one_of
+from vobench.suite.yaml_file import Mistakes, Point, Strict, YamlFile, one_of
 
 
 def _named(value: Any) -> Any:

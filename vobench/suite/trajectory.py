@@ -30,19 +30,16 @@ from vobench.motion.replay import AXES
 from vobench.motion.slip import DELTAS, SLIPS, SURFACES, FloorPatch
 from vobench.motion.spline import check_times, pose_spline
 from vobench.sensor.encoder import ENCODERS
+from vobench.setting import NonNegative, Positive, Triple, tupled
 from vobench.suite.yaml_file import (
     Acceleration,
     Length,
-    NonNegative,
     Pause,
     Point,
-    Positive,
     Rate,
     Speed,
     Strict,
-    Triple,
     one_of,
-    tupled,
     wrong_key,
 )
 from vobench.trajectory.formats import NS_PER_S, Parsed, format_tum, parse_any, parse_times, parse_tum

@@ -1,11 +1,12 @@
 """YAML into checked settings, with errors that name file, line, key, the value seen and what would be right."""
 
+import json
 import math
-import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 from difflib import get_close_matches
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Generic, TypeVar
 
@@ -15,44 +16,11 @@ from ruamel.yaml import YAML
 from ruamel.yaml.constructor import RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from vobench.errors import Mistake, Place, SuiteError, VobenchError, unknown
+from vobench.errors import Mistake, Place, SettingError, SuiteError, VobenchError, unknown
+from vobench.setting import COMPLAINTS, complaint, hints
 
-Model = TypeVar("Model", bound=BaseModel)
+Model = TypeVar("Model")
 Keys = tuple[int | str, ...]
-
-# What pydantic finds, in the words of somebody who writes YAML; {} are filled from its context.
-COMPLAINTS = {
-    "missing": "this key is missing",
-    "string_type": "should be text (a number or a date needs quotes)",
-    "int_type": "should be a whole number",
-    "int_from_float": "should be a whole number",
-    "float_type": "should be a number",
-    "bool_type": "should be true or false",
-    "finite_number": "should be a finite number",
-    "tuple_type": "should be a list, as in [a, b]",
-    "dict_type": "should be keys with values",
-    "model_type": "should be keys with values",
-    "model_attributes_type": "should be keys with values",
-    "too_short": "should have {min_length} or more entries, but has {actual_length}",
-    "too_long": "should have {max_length} or fewer entries, but has {actual_length}",
-    "string_too_short": "should not be empty",
-    "literal_error": "should be {expected}",
-    "greater_than": "should be greater than {gt}",
-    "greater_than_equal": "should be {ge} or more",
-    "less_than": "should be less than {lt}",
-    "less_than_equal": "should be {le} or less",
-}
-
-
-def matching(pattern: str, words: str) -> AfterValidator:
-    """A check that text matches all of a pattern; `words` say what would be right."""
-
-    def check(text: str) -> str:
-        if not re.fullmatch(pattern, text):
-            raise ValueError(f"should be {words} (got {text!r})")
-        return text
-
-    return AfterValidator(check)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +65,14 @@ class YamlFile:
                 tree = None
         value = tree if isinstance(tree, str | bool | int | float) else None
         return Place(str(self.path), line, key=".".join(map(str, named)), value=value)
+
+    def at_keys(self, keys: Keys) -> Any:
+        """What the file has at a place; None where it has nothing there."""
+        tree = self.marked
+        for key in keys:
+            inside = (isinstance(tree, dict) and key in tree) or (isinstance(tree, list) and key in range(len(tree)))
+            tree = tree[key] if inside else None
+        return tree
 
     def written(self, keys: Keys) -> Keys:
         """The keys with an entry's number as it is in the file."""
@@ -161,15 +137,36 @@ def read_all(path: Path, model: type[Model]) -> Reading[Model]:
     mistakes = [*twice, *(Mistake(sentence, (source.place(keys),)) for keys, sentence in unread.items())]
     data, wrong = _plain(source.marked), [*unread]
     try:
-        whole = model.model_validate(data)
+        whole = checked(model, data)
         if not mistakes:
             return Reading(whole, source)
     except ValidationError as error:
-        wrong += [each["loc"] for each in error.errors()]
-        mistakes += _complaints(source, error, model.model_json_schema(), unread)
+        wrong += [_loc(each) for each in error.errors()]
+        mistakes += _complaints(source, error, json_schema(model), unread)
     parts, kept = _intact(model, data, wrong)
-    left = model.model_construct(None, **parts)
-    return Reading(left, replace(source, kept=kept), tuple(sorted(mistakes, key=_line)))
+    return Reading(_partial(model, parts), replace(source, kept=kept), tuple(sorted(mistakes, key=_line)))
+
+
+_adapter: Callable[[Any], TypeAdapter[Any]] = cache(TypeAdapter)
+
+
+def checked(kind: type[Model], data: Any) -> Model:
+    """Plain data as settings. Raises pydantic's ValidationError with all that is wrong.
+
+    Strict as JSON is: lists and sections become tuples and objects, but no text a number, and no number a truth.
+    """
+    read: Model = _adapter(kind).validate_json(json.dumps(data), strict=True)
+    return read
+
+
+def plain(settings: Any) -> Any:
+    """Settings as JSON can hold them; `checked` reads them again."""
+    return _adapter(type(settings)).dump_python(settings, mode="json")
+
+
+def json_schema(kind: Any) -> dict[str, Any]:
+    """The JSON Schema of settings."""
+    return _adapter(kind).json_schema()
 
 
 class _Constructor(RoundTripConstructor):
@@ -231,49 +228,76 @@ def _unreadable(tree: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
 
 
 def _plain(tree: Any) -> Any:
-    """The tree in Python's own types, lists as tuples, without keys that are no text."""
+    """The tree in Python's own types, without keys that are no text and what JSON has not."""
     if isinstance(tree, dict):
         return {str(key): _plain(value) for key, value in tree.items() if isinstance(key, str)}
     if isinstance(tree, list):
-        return tuple(map(_plain, tree))
+        return list(map(_plain, tree))
     for made in (str, bool, int, float):
         if isinstance(tree, made):
             return made(tree)
-    return tree
+    return None
 
 
-def _intact(model: type[BaseModel], data: dict[str, Any], wrong: list[Keys]) -> tuple[dict[str, Any], dict[str, Any]]:
+def _intact(model: type, data: dict[str, Any], wrong: list[Keys]) -> tuple[dict[str, Any], dict[str, Any]]:
     """The sections of a file without the entries in which something is wrong, and which are left of each list."""
-    parts, kept = dict[str, Any](), dict[str, tuple[int, ...]]()
-    for key in data.keys() & model.model_fields.keys():
+    parts, kept, known = dict[str, Any](), dict[str, tuple[int, ...]](), _annotations(model)
+    for key in data.keys() & known.keys():
         value, bad = data[key], [keys[1:2] for keys in wrong if keys[0:1] == (key,)]
         if isinstance(value, dict):
             value = {name: entry for name, entry in value.items() if (name,) not in bad}
-        elif isinstance(value, tuple):
+        elif isinstance(value, list):
             kept[key] = tuple(index for index in range(len(value)) if (index,) not in bad)
-            value = tuple(value[index] for index in kept[key])
+            value = [value[index] for index in kept[key]]
         with suppress(ValidationError):  # what is wrong with it has been said
-            parts[key] = TypeAdapter(model.model_fields[key].rebuild_annotation()).validate_python(value)
+            parts[key] = TypeAdapter(known[key]).validate_json(json.dumps(value), strict=True)
     return parts, kept
+
+
+def _annotations(model: type) -> dict[str, Any]:
+    if issubclass(model, BaseModel):
+        return {key: each.rebuild_annotation() for key, each in model.model_fields.items()}
+    return hints(model)
+
+
+def _partial(model: type[Model], parts: dict[str, Any]) -> Model:
+    """An object with these fields and the defaults of others, unchecked; what else it needs, it lacks."""
+    if issubclass(model, BaseModel):
+        return model.model_construct(None, **parts)
+    lacking = object.__new__(model)
+    for each in fields(model):  # type: ignore[arg-type]
+        default = each.default if each.default_factory is MISSING else each.default_factory()
+        if each.name in parts or default is not MISSING:
+            object.__setattr__(lacking, each.name, parts.get(each.name, default))
+    return lacking
 
 
 def _kind(tree: Any) -> str:
     return "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
 
 
+UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
+
+
 def _complaints(
     source: YamlFile, error: ValidationError, schema: dict[str, Any], unread: Collection[Keys]
 ) -> Iterator[Mistake]:
     """What is wrong, unknown keys first, but for `unread` ones and for what is wrong only because others are."""
-    found = sorted(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
-    places = [*unread, *(each["loc"] for each in found)]
-    meant = {(*each["loc"][:-1], _nearest(each, schema)) for each in found if each["type"] == "extra_forbidden"}
+    found = sorted(error.errors(), key=lambda each: each["type"] not in UNKNOWN_KEY)
+    places = [*unread, *map(_loc, found)]
+    meant = {(*each["loc"][:-1], _nearest(each, schema)) for each in found if each["type"] in UNKNOWN_KEY}
     for each in found:
-        loc, keys = each["loc"], _walk(schema, each["loc"])[0]
+        loc, keys = _loc(each), _walk(schema, _loc(each))[0]
         is_misspelt = each["type"] == "missing" and loc in meant
         lost_some = each["type"] == "too_short" and any(loc == other[: len(loc)] != other for other in places)
         if not (keys in unread or is_misspelt or lost_some):
-            yield Mistake(_complaint(each, schema), (source.place(keys),))
+            yield Mistake(_complaint(each, schema, source), (source.place(keys),))
+
+
+def _loc(error: Any) -> Keys:
+    """Where an error is, by pydantic's reckoning; our own know which key of a section is at fault."""
+    cause = error.get("ctx", {}).get("error")
+    return (*error["loc"], *cause.keys) if isinstance(cause, SettingError) else error["loc"]
 
 
 def _nearest(error: Any, schema: dict[str, Any]) -> str | None:
@@ -286,30 +310,42 @@ def _known(error: Any, schema: dict[str, Any]) -> list[str]:
     return sorted(_walk(schema, error["loc"][:-1])[1].get("properties", {}))
 
 
-def _complaint(error: Any, schema: dict[str, Any]) -> str:
-    if error["type"] == "extra_forbidden":
+def _complaint(error: Any, schema: dict[str, Any], source: YamlFile) -> str:
+    if error["type"] in UNKNOWN_KEY:
+        if elsewhere := _of_other_kinds(error["loc"], schema, source):
+            return elsewhere
         near = _nearest(error, schema)
         guess = f" Did you mean {near!r}?" if near else ""
         return f"unknown key.{guess} Known: {', '.join(_known(error, schema))}"
-    template, seen = COMPLAINTS.get(error["type"]), error["input"]
-    context = {key: f"{value:g}" if isinstance(value, float) else value for key, value in error.get("ctx", {}).items()}
-    text = template.format(**context) if template else error["msg"].removeprefix("Value error, ")
-    # Our own checks name the value themselves; a whole section is no help in a line.
-    shown = "" if error["type"] == "value_error" or isinstance(seen, dict | tuple) else f" (got {_as_yaml(seen)})"
-    return f"{text}{shown}"
+    context, template = error.get("ctx", {}), COMPLAINTS.get(error["type"])
+    if isinstance(context.get("error"), SettingError):
+        return str(context["error"].sentence)
+    # Our own checks name the value themselves.
+    if error["type"] == "value_error":
+        return str(error["msg"].removeprefix("Value error, "))
+    return complaint(template or error["msg"], error["input"], context if template else {})
 
 
-def _as_yaml(value: Any) -> str:
-    return "nothing" if value is None else str(value).lower() if isinstance(value, bool) else repr(value)
+def _of_other_kinds(loc: Keys, schema: dict[str, Any], source: YamlFile) -> str:
+    """What to say of an unknown key that other kinds of the section have; nothing where only its unit is missing."""
+    keys, section = _walk(schema, loc[:-2])
+    kind, key, own = str(loc[-2:][0]), str(loc[-1]), _known({"loc": loc}, schema)
+    members = section.get("discriminator", {}).get("mapping", {})
+    owners = [name for name in members if key in _referred(schema, {"$ref": members[name]})["properties"]]
+    if not owners or kind not in members or any(name.startswith(f"{key}_") for name in own):
+        return ""
+    written = source.at_keys(keys)
+    is_said = isinstance(written, dict) and "kind" in written
+    return f"belongs to {', '.join(owners)}; {'this is' if is_said else 'without a kind this is'} {kind}"
 
 
 def _walk(schema: dict[str, Any], loc: Keys) -> tuple[Keys, dict[str, Any]]:
-    """The keys of a place in the file, and the part of the model's schema there.
+    """The keys of a place in the file, and the part of the schema there.
 
-    Pydantic's own place also names the kind that was chosen where the model offers several, and ends in a part
+    Pydantic's own place also names the kind that was chosen where there are several, and ends in a part
     of its own where a key is wrong, as opposed to its value.
     """
-    keys, part = list[int | str](), schema
+    keys, part = list[int | str](), _chosen(schema, schema)
     for key in loc:
         if key == "[key]":
             continue
@@ -317,10 +353,17 @@ def _walk(schema: dict[str, Any], loc: Keys) -> tuple[Keys, dict[str, Any]]:
             part = _referred(schema, {"$ref": reference})
             continue
         keys.append(key)
-        part = part.get("properties", {}).get(key) or part.get("additionalProperties") or part.get("items") or {}
-        # An optional section is a choice between itself and nothing.
-        part = _referred(schema, next(iter(part.get("anyOf", [part]))))
+        named = part.get("patternProperties", {None: part.get("additionalProperties")})
+        entry = next(iter(named.values())) or part.get("items") or {}
+        part = _chosen(schema, part.get("properties", {}).get(key) or entry)
     return tuple(keys), part
+
+
+def _chosen(schema: dict[str, Any], part: dict[str, Any]) -> dict[str, Any]:
+    """A part that is no choice: an optional section is one between itself and nothing, a preset one with a name."""
+    while "anyOf" in part or "$ref" in part:
+        part = _referred(schema, part) if "$ref" in part else part["anyOf"][0]
+    return part
 
 
 def _referred(schema: dict[str, Any], part: dict[str, Any]) -> dict[str, Any]:
@@ -334,27 +377,13 @@ class Strict(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-# Names become folders, and a case's name joins several with a hyphen.
-NAME = matching(r"[a-z0-9][a-z0-9_.]*", "lower-case letters, digits, _ and ., a letter or digit first")
-Name = Annotated[str, NAME]
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
-Share = Annotated[float, Field(ge=0, le=1)]
 # Wide enough for a car on a motorway, and narrow enough that no square of one overflows.
 Length = Annotated[float, Field(gt=0, le=1e5)]
 Speed = Annotated[float, Field(gt=0, le=100)]
 Acceleration = Annotated[float, Field(gt=0, le=1000)]
 Rate = Annotated[float, Field(gt=0, le=1000)]
 Point = tuple[float, float]
-Triple = tuple[float, float, float]
 Pause = Annotated[float, Field(ge=0, le=3600)]
-
-
-def tupled(value: Any) -> Any:
-    """Lists as tuples, all the way down: what runs before pydantic's own checks has to hand on what YAML gives."""
-    if isinstance(value, dict):
-        return {key: tupled(part) for key, part in value.items()}
-    return tuple(map(tupled, value)) if isinstance(value, list | tuple) else value
 
 
 def one_of(kind: str, known: Collection[str]) -> AfterValidator:

@@ -1,0 +1,151 @@
+"""Settings in YAML: every mistake is a sentence with its line, whether settings are dataclasses or models."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import pytest
+from annotated_types import Ge, Gt, Le
+
+from vobench.errors import SettingError, SuiteError
+from vobench.setting import SETTINGS, ByKind, Like, Name, OneOf, Share, require
+from vobench.suite.yaml_file import Strict, read, read_all
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chip:
+    """A chip."""
+
+    __pydantic_config__ = SETTINGS
+    read_noise_e: Annotated[float, Ge(0)] = 0.0
+    prnu: Share = 0.0
+    adc_bits: Literal[8, 10] | None = None
+
+    def __post_init__(self) -> None:
+        require(self)
+
+
+CHIPS = {"clean": Chip(), "noisy": Chip(read_noise_e=25.0, adc_bits=10)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Least and most."""
+
+    __pydantic_config__ = SETTINGS
+    least_ms: float = 1.0
+    most_ms: float = 2.0
+
+    def __post_init__(self) -> None:
+        require(self)
+        if self.least_ms > self.most_ms:
+            raise SettingError(f"should be at most most_ms (got {self.least_ms:g})", "least_ms")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circle:
+    """A circle."""
+
+    __pydantic_config__ = SETTINGS
+    radius_m: Annotated[float, Gt(0)]
+    kind: Literal["circle"] = "circle"
+
+    def __post_init__(self) -> None:
+        require(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Square:
+    """A square."""
+
+    __pydantic_config__ = SETTINGS
+    side_m: Annotated[float, Gt(0)]
+    kind: Literal["square"] = "square"
+
+    def __post_init__(self) -> None:
+        require(self)
+
+
+Course = Annotated[Circle | Square, ByKind("course", default="circle")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class File:
+    """All of it."""
+
+    __pydantic_config__ = SETTINGS
+    name: Name
+    seed: Annotated[int, Ge(0), Le(9)] = 0
+    lens: Annotated[str, OneOf("lens", ("wide", "tele"))] = "wide"
+    chips: dict[Name, Annotated[Chip, Like("chip", CHIPS)]] | None = None
+    courses: dict[Name, Course] | None = None
+    limits: Limits | None = None
+    times_s: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        require(self)
+
+
+class Model(Strict):
+    """The same as a model."""
+
+    name: Name
+    seed: Annotated[int, Ge(0), Le(9)] = 0
+    lens: Annotated[str, OneOf("lens", ("wide", "tele"))] = "wide"
+    chips: dict[Name, Annotated[Chip, Like("chip", CHIPS)]] | None = None
+    courses: dict[Name, Course] | None = None
+    limits: Limits | None = None
+    times_s: tuple[float, ...] = ()
+
+
+COURSES = "Known: circle, square"
+WRONG = [
+    ("name: 12", "name: should be text (a number or a date needs quotes) (got 12)"),
+    ("sed: 1", "sed: unknown key. Did you mean 'seed'? Known: chips, courses, lens, limits, name, seed, times_s"),
+    ("seed: 1.5", "seed: should be a whole number (got 1.5)"),
+    ("seed: 10", "seed: should be 9 or less (got 10)"),
+    ("lens: wild", "lens: no lens named 'wild'. Did you mean 'wide'? Known: tele, wide"),
+    ("times_s: 1", "times_s: should be a list, as in [a, b] (got 1)"),
+    ("times_s: [1, '2']", "times_s.1: should be a number (got '2')"),
+    ("limits: 3", "limits: should be keys with values (got 3)"),
+    ("limits: {least_ms: 3}", "limits.least_ms: should be at most most_ms (got 3)"),
+    ("chips: {A: clean}", "chips.A: should be lower-case letters, digits, _ and ., a letter or digit first (got 'A')"),
+    ("chips: {a: noizy}", "chips.a: no chip named 'noizy'. Did you mean 'noisy'? Known: clean, noisy"),
+    ("chips: {a: {like: noizy}}", "chips.a.like: no chip named 'noizy'. Did you mean 'noisy'? Known: clean, noisy"),
+    ("chips: {a: {like: noisy, prnu: 2}}", "chips.a.prnu: should be 1 or less (got 2)"),
+    ("chips: {a: {pr: 0}}", "chips.a.pr: unknown key. Did you mean 'prnu'? Known: adc_bits, like, prnu, read_noise_e"),
+    ("chips: {a: {adc_bits: 9}}", "chips.a.adc_bits: should be 8 or 10 (got 9)"),
+    ("courses: {a: {kind: cir}}", f"courses.a.kind: no kind of course named 'cir'. Did you mean 'circle'? {COURSES}"),
+    ("courses: {a: {kind: 3}}", f"courses.a.kind: no kind of course named '3'. {COURSES}"),
+    ("courses: {a: {}}", "courses.a.radius_m: this key is missing"),
+    ("courses: {a: {radius: 1}}", "courses.a.radius: unknown key. Did you mean 'radius_m'? Known: kind, radius_m"),
+    ("courses: {a: {radius_m: 1, side_m: 1}}", "courses.a.side_m: belongs to square; without a kind this is circle"),
+    ("courses: {a: {kind: square, side_m: 1, radius_m: 1}}", "courses.a.radius_m: belongs to circle; this is square"),
+    ("courses: {a: 3}", "courses.a: should be keys with values (got 3)"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", [File, Model])
+@pytest.mark.parametrize(("line", "sentence"), WRONG, ids=[line for line, _ in WRONG])
+def test_a_mistake_is_one_sentence_with_line_key_value_and_remedy(tmp_path, kind, line, sentence):
+    path = tmp_path / "file.yaml"
+    path.write_text("# settings\n" + line + ("" if line.startswith("name") else "\nname: a") + "\n")
+    with pytest.raises(SuiteError) as refused:
+        read(path, kind)
+    assert str(refused.value) == f"{path}:2: {sentence}"
+
+
+@pytest.mark.parametrize("kind", [File, Model])
+def test_what_is_right_in_a_wrong_file_is_read(tmp_path, kind):
+    (tmp_path / "file.yaml").write_text("chips: {a: clean, b: {prnu: 3}}\ntimes_s: [1, x, 3]\nlens: x\n")
+    reading = read_all(tmp_path / "file.yaml", kind)
+    assert sorted(m.places[0].key for m in reading.mistakes) == ["chips.b.prnu", "lens", "name", "times_s.1"]
+    assert (reading.model.chips, reading.model.times_s, reading.model.seed) == ({"a": Chip()}, (1.0, 3.0), 0)
+    assert reading.source.written(("times_s", 1)) == ("times_s", 2)
+    assert not hasattr(reading.model, "name")
+
+
+def test_the_same_file_is_the_same_settings(tmp_path):
+    (tmp_path / "file.yaml").write_text("{name: a, chips: {a: noisy}, courses: {b: {radius_m: 1}}, times_s: [1]}")
+    course, chips = Circle(radius_m=1.0), {"a": CHIPS["noisy"]}
+    assert read(tmp_path / "file.yaml", File) == File(name="a", chips=chips, courses={"b": course}, times_s=(1.0,))
+    assert read(tmp_path / "file.yaml", Model) == Model(name="a", chips=chips, courses={"b": course}, times_s=(1.0,))

@@ -1,0 +1,330 @@
+"""Settings: frozen dataclasses whose fields state the name with its unit, the default and the bounds of each once.
+
+A class of settings says what it takes, and holds it whoever builds one:
+
+    @dataclass(frozen=True, slots=True, kw_only=True)
+    class Shutter:
+        __pydantic_config__ = SETTINGS
+        readout_ms: Annotated[float, Ge(0), Le(1000)] = 0.0
+
+        def __post_init__(self) -> None:
+            require(self)
+
+YAML files are read into such classes, and JSON Schemas and the tables of the docs are made from them: see `suite`.
+"""
+
+import re
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import asdict, dataclass, fields
+from functools import cache
+from math import isfinite
+from numbers import Integral, Real
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
+
+from vobench.errors import SettingError, unknown
+
+# Every class of settings has this as `__pydantic_config__`: unknown keys, NaN and infinity are errors.
+SETTINGS = {"extra": "forbid", "allow_inf_nan": False}
+
+# What may be wrong with a value, in the words of somebody who writes YAML, by pydantic's names; {} are filled in.
+COMPLAINTS = {
+    "missing": "this key is missing",
+    "string_type": "should be text (a number or a date needs quotes)",
+    "int_type": "should be a whole number",
+    "int_from_float": "should be a whole number",
+    "float_type": "should be a number",
+    "bool_type": "should be true or false",
+    "finite_number": "should be a finite number",
+    "tuple_type": "should be a list, as in [a, b]",
+    "dict_type": "should be keys with values",
+    "model_type": "should be keys with values",
+    "model_attributes_type": "should be keys with values",
+    "dataclass_type": "should be keys with values",
+    "dataclass_exact_type": "should be keys with values",
+    "too_short": "should have {min_length} or more entries, but has {actual_length}",
+    "too_long": "should have {max_length} or fewer entries, but has {actual_length}",
+    "string_too_short": "should not be empty",
+    "literal_error": "should be {expected}",
+    "greater_than": "should be greater than {gt}",
+    "greater_than_equal": "should be {ge} or more",
+    "less_than": "should be less than {lt}",
+    "less_than_equal": "should be {le} or less",
+}
+# What a suffix of a name says of its value.
+UNITS = {
+    **{unit: unit for unit in ("m", "s", "ms", "ns", "rad", "deg", "px", "kg", "V", "lm", "lx")},
+    "hz": "Hz",
+    "db": "dB",
+    "e": "electrons",
+    "dn": "grey values",
+    "e_per_s": "electrons/s",
+    "cd_m2": "cd/m²",
+    "mps": "m/s",
+    "mps2": "m/s²",
+    "radps": "rad/s",
+    "radps2": "rad/s²",
+}
+
+
+def unit_of(name: str) -> str:
+    """The unit that a setting's name ends in; empty where it has none."""
+    parts = name.split("_")
+    return next((UNITS[end] for end in ("_".join(parts[n:]) for n in range(1, len(parts))) if end in UNITS), "")
+
+
+def tupled(value: Any) -> Any:
+    """Lists as tuples, all the way down."""
+    if isinstance(value, dict):
+        return {key: tupled(part) for key, part in value.items()}
+    return tuple(map(tupled, value)) if isinstance(value, list | tuple) else value
+
+
+# Marks in annotations. Pydantic asks them how to read and describe a value; nobody else needs it.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OneOf:
+    """Text is one of the known names; a near one is suggested. `what` says what they are names of."""
+
+    what: str
+    known: Collection[str]
+
+    def check(self, name: str) -> None:
+        """Raise SettingError for a name that is not known."""
+        if name not in self.known:
+            raise SettingError(unknown(self.what, name, list(self.known)))
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> Any:
+        return _checked_after(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Callable[[Any], Any]) -> dict[str, Any]:
+        return {**handler(schema), "enum": sorted(self.known)}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Matching:
+    """Text matches all of a pattern; `words` say what would be right."""
+
+    pattern: str
+    words: str
+
+    def check(self, text: str) -> None:
+        """Raise SettingError for text that does not match."""
+        if not re.fullmatch(self.pattern, text):
+            raise SettingError(f"should be {self.words} (got {text!r})")
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> Any:
+        return _checked_after(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Callable[[Any], Any]) -> dict[str, Any]:
+        return {**handler(schema), "pattern": f"^{self.pattern}$"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Like:
+    """A section may begin as a preset: `like: name` and what differs from it; a bare name is the preset as it is."""
+
+    what: str
+    presets: Mapping[str, Any]
+
+    def merged(self, value: Any) -> Any:
+        """The section with the values of its preset where it has none. Raises SettingError."""
+        given = {"like": value} if isinstance(value, str) else tupled(value)
+        if not isinstance(given, dict) or "like" not in given:
+            return given
+        name = given.pop("like")
+        if name not in self.presets:
+            raise SettingError(unknown(self.what, str(name), list(self.presets)), *([] if value == name else ["like"]))
+        return _over(asdict(self.presets[name]), given)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> Any:
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_before_validator_function(self.merged, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        section = handler.resolve_ref_schema(handler(schema))
+        name = {"type": "string", "enum": sorted(self.presets)}
+        return {"anyOf": [{**section, "properties": {"like": name, **section["properties"]}}, name]}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ByKind:
+    """A union of classes of settings, told apart by the literal of their field `kind`; `what` says kinds of what.
+
+    Where a section has no kind, it is of the `default` one, if there is any.
+    """
+
+    what: str
+    default: str | None = None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> Any:
+        from pydantic_core import core_schema
+
+        members = {get_args(hints(member)["kind"])[0]: handler(member) for member in get_args(source)}
+
+        def with_kind(value: Any) -> Any:
+            if not isinstance(value, dict):
+                return value
+            kind = value.get("kind", self.default)
+            if kind is None:
+                raise SettingError(f"this key is missing; it is one of {', '.join(sorted(members))}", "kind")
+            if not isinstance(kind, str) or kind not in members:
+                raise SettingError(unknown(f"kind of {self.what}", str(kind), list(members)), "kind")
+            return {**tupled(value), "kind": kind}
+
+        told_apart = core_schema.tagged_union_schema(members, discriminator="kind")
+        return core_schema.no_info_before_validator_function(with_kind, told_apart)
+
+
+def _checked_after(check: Callable[[Any], None], schema: Any) -> Any:
+    from pydantic_core import core_schema
+
+    def passed(value: Any) -> Any:
+        check(value)
+        return value
+
+    return core_schema.no_info_after_validator_function(passed, schema)
+
+
+def _over(preset: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    """What is given, and the preset's values elsewhere, section by section."""
+    nested = {key: _over(preset[key], part) for key, part in given.items() if _are_sections(preset.get(key), part)}
+    return {**preset, **given, **nested}
+
+
+def _are_sections(*values: Any) -> bool:
+    return all(isinstance(value, dict) for value in values)
+
+
+Positive = Annotated[float, Gt(0)]
+NonNegative = Annotated[float, Ge(0)]
+Share = Annotated[float, Ge(0), Le(1)]
+Triple = tuple[float, float, float]
+# Names become folders, and a case's name joins several with a hyphen.
+Name = Annotated[str, Matching(r"[a-z0-9][a-z0-9_.]*", "lower-case letters, digits, _ and ., a letter or digit first")]
+
+
+def _hints(settings: Any) -> dict[str, Any]:
+    found = get_type_hints(settings, include_extras=True)
+    return {field.name: found[field.name] for field in fields(settings)}
+
+
+# The annotation of each field of a class of settings, marks included.
+hints: Callable[[Any], dict[str, Any]] = cache(_hints)
+
+
+def require(settings: Any) -> None:
+    """Hold an object's fields to their annotations: types, bounds, marks; to be called by `__post_init__`.
+
+    Whole numbers become fractions where those are meant, so that 5 and 5.0 are one setting. Raises SettingError.
+    """
+    for name, hint in hints(type(settings)).items():
+        object.__setattr__(settings, name, _at(name, getattr(settings, name), hint))
+
+
+def _at(key: int | str, value: Any, hint: Any) -> Any:
+    try:
+        return _held(value, hint)
+    except SettingError as error:
+        raise SettingError(error.sentence, key, *error.keys) from None
+
+
+def _held(value: Any, hint: Any) -> Any:
+    """The value as an annotation has it. Raises SettingError where it is none such."""
+    origin, args = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        value = _held(value, args[0])
+        for mark in args[1:]:
+            _hold_to(mark, value)
+        return value
+    if origin in (Union, UnionType):
+        return value if value is None and NoneType in args else _held(value, _meant(value, args))
+    if origin is tuple and isinstance(value, tuple | list):
+        return _held_entries(tuple(value), args)
+    if origin is dict and isinstance(value, dict):
+        return {_held(key, args[0]): _at(key, entry, args[1]) for key, entry in value.items()}
+    if origin is Literal and value not in args:
+        raise _wrong("literal_error", value, expected=" or ".join(map(repr, args)))
+    return value if origin is Literal or hint is Any else _held_plain(value, origin or hint)
+
+
+def _held_entries(entries: tuple[Any, ...], args: tuple[Any, ...]) -> tuple[Any, ...]:
+    if args[1:] == (...,):
+        args = args[:1] * len(entries)
+    if len(entries) < len(args):
+        raise SettingError(COMPLAINTS["missing"], len(entries))
+    if len(entries) > len(args):
+        raise _wrong("too_long", entries, max_length=len(args), actual_length=len(entries))
+    return tuple(_at(index, entry, hint) for index, (entry, hint) in enumerate(zip(entries, args, strict=True)))
+
+
+# How pydantic calls a value that is not of a type, and what is.
+TYPES: dict[Any, tuple[str, Any]] = {
+    float: ("float_type", Real),
+    int: ("int_type", Integral),
+    str: ("string_type", str),
+    bool: ("bool_type", bool),
+    tuple: ("tuple_type", (tuple, list)),
+    dict: ("dict_type", dict),
+}
+
+
+def _held_plain(value: Any, kind: Any) -> Any:
+    name, wanted = TYPES.get(kind, ("dataclass_type", kind))
+    if not isinstance(value, wanted) or (isinstance(value, bool) and kind is not bool):
+        raise _wrong(name, value)
+    if kind is float and not isfinite(value):
+        raise _wrong("finite_number", value)
+    return kind(value) if kind in (float, int) else value
+
+
+def _meant(value: Any, choices: tuple[Any, ...]) -> Any:
+    """The one of several annotations that fits a value's type; the first where none does."""
+    some = [choice for choice in choices if choice is not NoneType]
+    return next((choice for choice in some if _is_type(value, choice)), some[0])
+
+
+def _is_type(value: Any, hint: Any) -> bool:
+    while get_origin(hint) is Annotated:
+        hint = get_args(hint)[0]
+    kind = get_origin(hint) or hint
+    if kind is Literal:
+        return value in get_args(hint)
+    wanted = TYPES[kind][1] if kind in TYPES else kind
+    return isinstance(value, wanted) and (kind is bool or not isinstance(value, bool))
+
+
+def _hold_to(mark: Any, value: Any) -> None:
+    match mark:
+        case Gt(bound) if not value > bound:
+            raise _wrong("greater_than", value, gt=bound)
+        case Ge(bound) if not value >= bound:
+            raise _wrong("greater_than_equal", value, ge=bound)
+        case Lt(bound) if not value < bound:
+            raise _wrong("less_than", value, lt=bound)
+        case Le(bound) if not value <= bound:
+            raise _wrong("less_than_equal", value, le=bound)
+        case MinLen(bound) if len(value) < bound:
+            name = "string_too_short" if isinstance(value, str) else "too_short"
+            raise _wrong(name, value, min_length=bound, actual_length=len(value))
+        case MaxLen(bound) if len(value) > bound:
+            raise _wrong("too_long", value, max_length=bound, actual_length=len(value))
+        case OneOf() | Matching():
+            mark.check(value)
+
+
+def _wrong(name: str, value: Any, **context: Any) -> SettingError:
+    return SettingError(complaint(COMPLAINTS[name], value, context))
+
+
+def complaint(template: str, value: Any, context: Mapping[str, Any]) -> str:
+    """What is wrong with a value, and the value; a whole section is no help in a line."""
+    said = template.format(**{k: f"{v:g}" if isinstance(v, float) else v for k, v in context.items()})
+    if isinstance(value, dict | list | tuple):
+        return said
+    seen = "nothing" if value is None else str(value).lower() if isinstance(value, bool) else repr(value)
+    return f"{said} (got {seen})"
