@@ -43,7 +43,7 @@ def identify(speeds: ArrayLike, accelerations: ArrayLike, references: ArrayLike)
     if not np.isfinite(pairs).all():
         raise MotionError("a drive to identify must be finite everywhere; leave out the instants that are not")
     u, omega = pairs[0].T
-    return _fit(*pairs, np.stack([omega**2, u * omega], -1))
+    return _fit(np.array([*pairs, np.stack([omega**2, u * omega], -1)]))
 
 
 def identify_odometry(t_s: Array, odometry: Array, held_s: Array, references: Array) -> Fit:
@@ -72,13 +72,13 @@ def identify_odometry(t_s: Array, odometry: Array, held_s: Array, references: Ar
         rates = np.trapezoid(WEIGHT.deriv(2)(x)[:, None] * moved, x, axis=0) * (2 / WINDOW_S) ** 2
         products_mean = np.trapezoid(WEIGHT(x)[:, None] * products[inside], x, axis=0)
         rows.append([speeds, rates, share @ references, products_mean])
-    return _fit(*np.array(rows).transpose(1, 0, 2))
+    return _fit(np.array(rows).transpose(1, 0, 2))
 
 
-def _fit(speeds: Array, rates: Array, references: Array, products: Array) -> Fit:
-    """Theta of (N, 2) each; products: omega^2 and u omega."""
-    no = np.zeros(len(speeds))
-    (u, omega), (u_rate, omega_rate), (squared, crossed) = speeds.T, rates.T, products.T
+def _fit(instants: Array) -> Fit:
+    """Theta of (4, N, 2): speeds, their rates, references, and omega^2 with u omega."""
+    no, references = np.zeros(instants.shape[1]), instants[2]
+    (u, omega), (u_rate, omega_rate), _, (squared, crossed) = instants.transpose(0, 2, 1)
     on_u = np.stack([u_rate, no, -squared, u, no, no], -1)
     on_omega = np.stack([no, omega_rate, no, no, crossed, omega], -1)
     values, condition = _solved(np.concatenate([on_u, on_omega]), references.T.ravel())

@@ -4,13 +4,10 @@ u, omega: forward speed of the axle midpoint (m/s), yaw rate (rad/s); v_u, v_ome
 No slip, no inductance, no limit on voltage. The equations are the paper's as docs/paper.md mends them.
 """
 
-from dataclasses import dataclass, fields
-from math import isfinite
+from dataclasses import dataclass
 
-from vobench.errors import MotionError
 from vobench.motion.pioneer import Number, Theta
-
-POSITIVE = ("r_m", "d_m", "m_kg", "Iz_kgm2", "Ra_ohm", "ka_NmpA", "kPT_Vspm", "kPR_Vsprad")
+from vobench.setting import SETTINGS, NonNegative, Positive, require
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,32 +19,26 @@ class MotorConstants:
     ratio, voltage constant; Be: a wheel's friction; kPT, kDT and kPR, kDR: gains of the loops on u and on omega.
     """
 
+    __pydantic_config__ = SETTINGS
     # None are published of a Pioneer 3-DX. r and d are the robot's; m and the sign of b fit it; the rest was chosen so
     # that a drive at 0.8 m/s asks a 12 V motor for about 7 V.
-    r_m: float = 0.0975
-    d_m: float = 0.331
-    m_kg: float = 12.0
+    r_m: Positive = 0.0975
+    d_m: Positive = 0.331
+    m_kg: Positive = 12.0
     b_m: float = -0.02
-    Iz_kgm2: float = 0.35
-    Ie_kgm2: float = 0.02
-    Ra_ohm: float = 0.71
-    ka_NmpA: float = 0.88
-    kb_Vsprad: float = 0.88
-    Be_Nmsprad: float = 0.01
-    kPT_Vspm: float = 40.0
-    kPR_Vsprad: float = 38.4172
-    kDT_Vs2pm: float = 20.0
-    kDR_Vs2prad: float = 3.0
+    Iz_kgm2: Positive = 0.35
+    Ie_kgm2: NonNegative = 0.02
+    Ra_ohm: Positive = 0.71
+    ka_NmpA: Positive = 0.88
+    kb_Vsprad: NonNegative = 0.88
+    Be_Nmsprad: NonNegative = 0.01
+    kPT_Vspm: Positive = 40.0
+    kPR_Vsprad: Positive = 38.4172
+    kDT_Vs2pm: NonNegative = 20.0
+    kDR_Vs2prad: NonNegative = 3.0
 
     def __post_init__(self) -> None:
-        for name in (field.name for field in fields(self)):
-            value = getattr(self, name)
-            if not isfinite(value):
-                raise MotionError(f"the robot's {name} must be finite, got {value}")
-            if name in POSITIVE and value <= 0:
-                raise MotionError(f"the robot's {name} must be positive, got {value}")
-            if value < 0 and name != "b_m":  # the centre of mass may lie behind the axle
-                raise MotionError(f"the robot's {name} must not be negative, got {value}")
+        require(self)
 
 
 @dataclass(frozen=True, slots=True)
