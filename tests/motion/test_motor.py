@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from vobench.errors import MotionError
+from vobench.errors import SettingError
 from vobench.motion.controller import CONTROLLERS
 from vobench.motion.drive import drive
 from vobench.motion.motor import MotorConstants, accelerations_at, loop_voltages, theta_of, wheel_voltages
@@ -96,20 +96,20 @@ def test_a_drive_of_the_representative_robot_asks_its_motors_for_less_than_a_bat
 @pytest.mark.parametrize("name", [f.name for f in fields(MotorConstants)])
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_a_value_that_is_no_number_is_refused_by_name(name: str, value: float) -> None:
-    with pytest.raises(MotionError, match=f"the robot's {name} must be finite, got {value}"):
+    with pytest.raises(SettingError, match=rf"{name}: should be a finite number \(got {value}\)"):
         replace(REPRESENTATIVE, **{name: value})
 
 
 @pytest.mark.parametrize("name", ["r_m", "d_m", "m_kg", "Iz_kgm2", "Ra_ohm", "ka_NmpA", "kPT_Vspm", "kPR_Vsprad"])
 def test_a_value_that_must_be_positive_is_refused_at_nought(name: str) -> None:
-    with pytest.raises(MotionError, match=f"{name} must be positive, got 0"):
+    with pytest.raises(SettingError, match=rf"{name}: should be greater than 0 \(got 0.0\)"):
         replace(REPRESENTATIVE, **{name: 0.0})
 
 
 @pytest.mark.parametrize("name", ["Ie_kgm2", "kb_Vsprad", "Be_Nmsprad", "kDT_Vs2pm", "kDR_Vs2prad"])
 def test_a_loss_or_a_gain_may_be_nought_but_not_less(name: str) -> None:
     assert getattr(replace(REPRESENTATIVE, **{name: 0.0}), name) == 0
-    with pytest.raises(MotionError, match=f"{name} must not be negative, got -1"):
+    with pytest.raises(SettingError, match=rf"{name}: should be 0 or more \(got -1.0\)"):
         replace(REPRESENTATIVE, **{name: -1.0})
 
 
