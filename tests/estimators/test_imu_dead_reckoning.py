@@ -11,7 +11,7 @@ from vobench.estimator import Frame, ImuReadings, Status
 from vobench.geometry import se3
 from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
-from vobench.motion.course import circle
+from vobench.motion.course import Circle
 from vobench.motion.drive import drive
 from vobench.sensor.imu import IMUS, STREAMS, ImuSettings, Triad, measure
 from vobench.trajectory.kinematics import Kinematics, Motion
@@ -129,7 +129,7 @@ def test_who_stands_still_stays_where_it_is_and_a_noisy_imu_alone_drifts_away(be
 
 
 def test_a_body_that_is_plainly_tilted_is_not_taken_for_level(bed):
-    motion = Tilted(circle(1.0, speed_mps=0.3))
+    motion = Tilted(Circle(radius_m=1.0, speed_mps=0.3).way())
     assert motion.at(np.zeros(1)).T_world_body[0, :3, 0] == pytest.approx([0, 0, 1])
     settings = IMUS["exact"]
     frames = [frame for frame in frames_of(motion, settings) if frame.t_ns < 5e9]

@@ -10,8 +10,7 @@ from vobench.geometry import se3
 from vobench.geometry.rig import PIONEER_WHEELS
 from vobench.geometry.se3 import Array
 from vobench.motion.controller import CONTROLLERS, ControllerSettings, Vehicle, loop_growth, references, settling_gain
-from vobench.motion.course import circle as around
-from vobench.motion.course import pure_rotation, reverse, rolled
+from vobench.motion.course import Circle, PureRotation, Reverse, rolled
 from vobench.motion.drive import Drive, drive, follow, led_by
 from vobench.motion.pioneer import THETAS, AccelerationLimits, Theta, axle_poses, feed_forward, velocities
 from vobench.motion.slip import DELTAS, SLIPS, SlipNow
@@ -169,10 +168,12 @@ def test_a_clock_that_cannot_be_kept_is_refused(leg_s: float, sentence: str) -> 
 
 
 WAYS = {
-    "back": reverse(1.5, speed_mps=0.3),
-    "back on an arc": reverse(1.5, speed_mps=0.3, radius_m=-1.0, start=(0.3, -0.2, 2.0)),
-    "turn": pure_rotation(-6.0, rate_radps=1.0),
-    "circle": around(1.0, speed_mps=0.3),
+    "back": Reverse(length_m=1.5, speed_mps=0.3).way(),
+    "back on an arc": Reverse(
+        length_m=1.5, speed_mps=0.3, radius_m=-1.0, start_m=(0.3, -0.2), start_heading_deg=np.rad2deg(2.0)
+    ).way(),
+    "turn": PureRotation(angle_deg=np.rad2deg(-6.0), turn_radps=1.0).way(),
+    "circle": Circle(radius_m=1.0, speed_mps=0.3).way(),
 }
 
 

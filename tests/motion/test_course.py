@@ -8,22 +8,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ellipe, fresnel
 
-from vobench.errors import MotionError
+from vobench.errors import MotionError, SettingError
 from vobench.geometry.rig import PIONEER_WHEELS
 from vobench.geometry.se3 import Array
 from vobench.motion.course import (
+    Circle,
+    Figure8,
+    Lissajous,
     Piece,
+    PureRotation,
+    Reverse,
+    Square,
+    StopAndGo,
     arc_length,
-    circle,
     course,
-    figure_8,
-    lissajous,
     lissajous_curve,
-    pure_rotation,
-    reverse,
     rolled,
-    square,
-    stop_and_go,
 )
 from vobench.motion.drive import drive
 from vobench.trajectory.kinematics import Kinematics, level
@@ -85,7 +85,7 @@ SHAPES = [
 
 @pytest.mark.parametrize(("size_m", "ratio", "phase_rad"), SHAPES)
 def test_its_points_satisfy_its_equation(size_m, ratio, phase_rad):
-    curve = lissajous_curve(size_m, ratio=ratio, phase_rad=phase_rad)
+    curve = lissajous_curve(size_m, ratio, phase_rad=phase_rad)
     s = np.linspace(0, curve.arc.length, 2000)
     phi = curve.arc.parameter(s)
     x = size_m[0] / 2 * (np.sin(ratio[0] * phi + phase_rad) - np.sin(phase_rad))
@@ -97,7 +97,7 @@ def test_its_points_satisfy_its_equation(size_m, ratio, phase_rad):
 
 @pytest.mark.parametrize(("size_m", "ratio", "phase_rad"), SHAPES)
 def test_arc_length_is_even_to_twelve_digits(size_m, ratio, phase_rad):
-    curve = lissajous_curve(size_m, ratio=ratio, phase_rad=phase_rad)
+    curve = lissajous_curve(size_m, ratio, phase_rad=phase_rad)
     nodes, weights = np.polynomial.legendre.leggauss(16)
     phi = np.linspace(0, 2 * np.pi, 2001)
     half = np.diff(phi) / 2
@@ -110,7 +110,7 @@ def test_arc_length_is_even_to_twelve_digits(size_m, ratio, phase_rad):
 
 
 def test_a_circle_is_one_of_them():
-    curve = lissajous_curve((6.0, 6.0), ratio=(1, 1), phase_rad=np.pi / 2)
+    curve = lissajous_curve((6.0, 6.0), (1, 1), phase_rad=np.pi / 2)
     k = curve.at(np.linspace(0, curve.arc.length, 100))
     assert curve.arc.length == pytest.approx(6 * np.pi, rel=1e-13)
     np.testing.assert_allclose(k.turn_radps[:, 2], 1 / 3, rtol=1e-12)
@@ -118,39 +118,18 @@ def test_a_circle_is_one_of_them():
 
 
 def test_it_begins_at_the_origin_along_x_and_every_lap_again():
-    curve = lissajous_curve((5.0, 3.0), ratio=(3, 2), phase_rad=0.4)
+    curve = lissajous_curve((5.0, 3.0), (3, 2), phase_rad=0.4)
     k = curve.at(np.array([0.0, 1.0, curve.arc.length + 1.0, 7 * curve.arc.length + 1.0]))
     np.testing.assert_allclose(k.T_world_body[0], np.eye(4), atol=1e-15)
     np.testing.assert_allclose(k.T_world_body[2:], k.T_world_body[[1, 1]], atol=1e-11)
 
 
-@pytest.mark.parametrize(
-    ("size_m", "ratio", "phase_rad", "sentence"),
-    [
-        ((0.0, 1.0), (1, 2), 0.0, "of 0.0 m by 1.0 m, phase 0 rad, cannot be driven; both sizes should be above 0"),
-        ((1.0, np.nan), (1, 2), 0.0, "both sizes should be above 0"),
-        ((1.0, 1.0), (1, 2), np.inf, "phase inf rad"),
-        ((1.0, 1.0), (2, 4), 0.0, "2:4; it should be two whole numbers from 1 to 20 without a common divisor"),
-        ((1.0, 1.0), (0, 1), 0.0, "0:1"),
-        ((1.0, 1.0), (1.5, 2), 0.0, r"1\.5:2"),
-        ((1.0,), (1, 2), 0.0, "cannot be driven"),
-        ((1.0, 1.0), (1, 1), 0.0, "comes to a point where it turns back; choose another phase"),
-        ((1.0, 1.0), (1, 2), np.pi / 4, "comes to a point"),
-    ],
-)
-def test_a_curve_that_cannot_be_driven_is_a_sentence(size_m, ratio, phase_rad, sentence):
-    with pytest.raises(MotionError, match=sentence):
-        lissajous_curve(size_m, ratio=ratio, phase_rad=phase_rad)
-
-
 @pytest.mark.parametrize("ratio", [(1, 1), (1, 2), (2, 1), (1, 3), (3, 2), (3, 5), (5, 4), (7, 9)])
 def test_the_phase_that_the_sentence_names_can_be_driven(ratio):
     with pytest.raises(MotionError, match="0 where one number of the ratio is even, a quarter turn where both are odd"):
-        lissajous_curve(
-            (1.0, 1.0), ratio=ratio, phase_rad=0.0 if ratio[0] % 2 and ratio[1] % 2 else np.pi / 2 / ratio[1]
-        )
+        lissajous_curve((1.0, 1.0), ratio, phase_rad=0.0 if ratio[0] % 2 and ratio[1] % 2 else np.pi / 2 / ratio[1])
     both_odd = ratio[0] % 2 and ratio[1] % 2
-    assert lissajous_curve((1.0, 1.0), ratio=ratio, phase_rad=np.pi / 2 if both_odd else 0.0).arc.length > 1
+    assert lissajous_curve((1.0, 1.0), ratio, phase_rad=np.pi / 2 if both_odd else 0.0).arc.length > 1
 
 
 def states(motion, count=4001):
@@ -160,7 +139,7 @@ def states(motion, count=4001):
 
 @given(st.floats(0.2, 10), st.floats(0.1, 5), st.floats(0.1, 3))
 def test_a_circle_is_laps_times_its_circumference_on_its_circle(radius_m, laps, speed_mps):
-    motion = circle(radius_m, speed_mps=speed_mps, laps=laps)
+    motion = Circle(radius_m=radius_m, speed_mps=speed_mps, laps=laps).way()
     assert motion.law.length == pytest.approx(2 * np.pi * radius_m * laps)
     k, p = states(motion, 101)
     np.testing.assert_allclose(np.hypot(p[:, 0], p[:, 1] - radius_m), radius_m, rtol=1e-10)
@@ -171,11 +150,11 @@ def test_a_circle_is_laps_times_its_circumference_on_its_circle(radius_m, laps, 
 @pytest.mark.parametrize(
     "kind",
     [
-        lambda clockwise: circle(2, speed_mps=1, clockwise=clockwise),
-        lambda clockwise: square(2, speed_mps=1, clockwise=clockwise),
-        lambda clockwise: square(2, speed_mps=1, corner_radius_m=0.2, clockwise=clockwise),
-        lambda clockwise: pure_rotation(-2.0 if clockwise else 2.0, rate_radps=1),
-        lambda clockwise: reverse(2, speed_mps=1, radius_m=-3 if clockwise else 3),
+        lambda clockwise: Circle(radius_m=2, speed_mps=1, clockwise=clockwise).way(),
+        lambda clockwise: Square(side_m=2, speed_mps=1, clockwise=clockwise).way(),
+        lambda clockwise: Square(side_m=2, speed_mps=1, corner_radius_m=0.2, clockwise=clockwise).way(),
+        lambda clockwise: PureRotation(angle_deg=np.rad2deg(-2.0 if clockwise else 2.0), turn_radps=1).way(),
+        lambda clockwise: Reverse(length_m=2, speed_mps=1, radius_m=-3 if clockwise else 3).way(),
     ],
 )
 def test_clockwise_is_the_mirror_image(kind):
@@ -187,7 +166,7 @@ def test_clockwise_is_the_mirror_image(kind):
 
 
 def test_a_square_with_stops_has_its_four_corners_and_no_others():
-    motion = square(2.0, speed_mps=1, laps=2, turn_radps=1.5)
+    motion = Square(side_m=2.0, speed_mps=1, laps=2, turn_radps=1.5).way()
     k, p = states(motion)
     turning = np.abs(k.turn_radps[:, 2]) > 1e-6
     assert not np.abs(k.velocity_mps[turning]).max() > 1e-9
@@ -199,7 +178,7 @@ def test_a_square_with_stops_has_its_four_corners_and_no_others():
 
 @pytest.mark.parametrize("radius_m", [0.05, 0.3])
 def test_a_rounded_square_stays_within_its_sides_and_never_turns_tighter(radius_m):
-    motion = square(3.0, speed_mps=1, corner_radius_m=radius_m)
+    motion = Square(side_m=3.0, speed_mps=1, corner_radius_m=radius_m).way()
     k, p = states(motion)
     assert np.ptp(p, axis=0) == pytest.approx([3, 3], abs=1e-6)
     moving = k.velocity_mps[:, 0] > 1e-3
@@ -210,15 +189,15 @@ def test_a_rounded_square_stays_within_its_sides_and_never_turns_tighter(radius_
 
 
 def test_a_figure_8_turns_as_much_to_either_side_and_has_its_size():
-    motion = figure_8(4, speed_mps=1, laps=3)
+    motion = Figure8(length_m=4, speed_mps=1, laps=3).way()
     k, p = states(motion)
     assert k.turn_radps[:, 2].max() == pytest.approx(-k.turn_radps[:, 2].min(), rel=1e-4)
     assert np.hypot(*p.T).max() == pytest.approx(2.0, abs=0.02)
-    assert motion.law.length == pytest.approx(3 * figure_8(4, speed_mps=1).law.length)
+    assert motion.law.length == pytest.approx(3 * Figure8(length_m=4, speed_mps=1).way().law.length)
 
 
 def test_stop_and_go_rests_for_its_pause_between_its_legs():
-    k, p = states(stop_and_go([1.0, 2.0, 0.5], speed_mps=1, pause_s=2.0), 10_001)
+    k, p = states(StopAndGo(legs_m=[1.0, 2.0, 0.5], speed_mps=1, pause_s=2.0).way(), 10_001)
     rests = np.abs(k.velocity_mps[:, 0]) < 1e-12
     inner = p[rests & (p[:, 0] > 1e-6) & (p[:, 0] < 3.5 - 1e-6), 0]
     np.testing.assert_allclose(np.unique(np.round(inner, 6)), [1, 3])
@@ -226,7 +205,7 @@ def test_stop_and_go_rests_for_its_pause_between_its_legs():
 
 
 def test_a_pure_rotation_turns_by_its_angle_and_goes_nowhere():
-    motion = pure_rotation(9.0, rate_radps=0.7)
+    motion = PureRotation(angle_deg=np.rad2deg(9.0), turn_radps=0.7).way()
     k, p = states(motion)
     assert np.trapezoid(k.turn_radps[:, 2], dx=motion.end_ns / 1e9 / 4000) == pytest.approx(9.0, rel=1e-6)
     assert k.turn_radps[:, 2].max() == pytest.approx(0.7)
@@ -235,7 +214,7 @@ def test_a_pure_rotation_turns_by_its_angle_and_goes_nowhere():
 
 @pytest.mark.parametrize("radius_m", [None, 2.0])
 def test_reverse_goes_back_over_the_same_poses(radius_m):
-    motion = reverse(3.0, speed_mps=1, radius_m=radius_m, pause_s=1.0)
+    motion = Reverse(length_m=3.0, speed_mps=1, radius_m=radius_m, pause_s=1.0).way()
     t_ns = np.linspace(0, motion.end_ns / 2, 100)
     there, back = motion.at(t_ns), motion.at(motion.end_ns - t_ns)
     np.testing.assert_allclose(back.T_world_body, there.T_world_body, atol=1e-8)
@@ -244,41 +223,58 @@ def test_reverse_goes_back_over_the_same_poses(radius_m):
 
 
 @pytest.mark.parametrize(
-    ("call", "sentence"),
+    ("kind", "keys", "sentence"),
     [
-        (lambda: circle(0, speed_mps=1), "radius_m is 0; it should be a finite number of metres above 0"),
-        (lambda: circle(np.nan, speed_mps=1), "radius_m is nan"),
-        (lambda: circle(1, speed_mps=0), "the speed on it is 0"),
-        (lambda: circle(1, speed_mps=1e-9), "from a nanosecond to a day"),
-        (lambda: circle(1, speed_mps=1, accel_mps2=0), "the acceleration on it is 0"),
-        (lambda: circle(1e-300, speed_mps=1), "it should be from a nanosecond to a day"),
-        (lambda: circle(1, speed_mps=1, laps=0), "laps is 0; it should be above 0 and at most 1000"),
-        (lambda: circle(1, speed_mps=1, laps=np.nan), "laps is nan"),
-        (lambda: circle(1, speed_mps=1, start=(0, np.inf, 0)), "start is .* three finite numbers"),
-        (lambda: circle(1, speed_mps=1, start=(0, 0)), "start is .* three finite numbers"),
-        (lambda: square(-1, speed_mps=1), "side_m is -1"),
-        (lambda: square(1, speed_mps=1, laps=1.5), "laps is 1.5; it should be a whole number from 1 to 1000"),
-        (lambda: square(1, speed_mps=1, laps=0.5), "laps is 0.5; it should be a whole number"),
+        (Circle, {"radius_m": 0}, r"radius_m: should be greater than 0 \(got 0.0\)"),
+        (Circle, {"radius_m": np.nan}, "radius_m: should be a finite number"),
+        (Circle, {"radius_m": 1, "speed_mps": 0}, "speed_mps: should be greater than 0"),
+        (Circle, {"radius_m": 1, "accel_mps2": 0}, "accel_mps2: should be greater than 0"),
+        (Circle, {"radius_m": 1, "laps": 0}, "laps: should be greater than 0"),
+        (Circle, {"radius_m": 1, "laps": 1001}, "laps: should be 1000 or less"),
+        (Circle, {"radius_m": 1, "start_m": (0, np.inf)}, r"start_m\.1: should be a finite number"),
+        (Circle, {"radius_m": 1, "start_m": (0,)}, r"start_m\.1: this key is missing"),
+        (Square, {"side_m": -1}, "side_m: should be greater than 0"),
+        (Square, {"side_m": 1, "laps": 1.5}, "laps: should be a whole number"),
+        (Square, {"side_m": 1, "corner_radius_m": -0.1}, "corner_radius_m: should be 0 or more"),
+        (Square, {"side_m": 1, "turn_radps": 0}, "turn_radps: should be greater than 0"),
+        (Figure8, {"length_m": 0}, "length_m: should be greater than 0"),
+        (Lissajous, {"size_m": (0.0, 1.0)}, r"size_m\.0: should be greater than 0"),
+        (Lissajous, {"size_m": (1.0,)}, r"size_m\.1: this key is missing"),
+        (Lissajous, {"size_m": (1, 1), "phase_deg": np.inf}, "phase_deg: should be a finite number"),
         (
-            lambda: square(1, speed_mps=1, corner_radius_m=0.3),
-            r"too wide for a side of 1 m: .* it should be below 0\.267",
+            Lissajous,
+            {"size_m": (1, 1), "ratio": (2, 4)},
+            r"ratio: .* 1 to 20 without a common divisor \(got \[2, 4\]",
         ),
-        (lambda: square(1, speed_mps=1, corner_radius_m=-0.1), "corner_radius_m is -0.1"),
-        (lambda: square(1, speed_mps=1, turn_radps=0), "the speed on it is 0"),
-        (lambda: figure_8(0, speed_mps=1), "cannot be driven"),
-        (lambda: lissajous((1, 1), ratio=(1, 1), speed_mps=1), "comes to a point"),
-        (lambda: stop_and_go([], speed_mps=1, pause_s=1), "legs_m is empty"),
-        (lambda: stop_and_go([1, 0], speed_mps=1, pause_s=1), "the length of the way is 0"),
-        (lambda: stop_and_go([1], speed_mps=1, pause_s=-1), "pause_s is -1"),
-        (lambda: pure_rotation(0, rate_radps=1), "the angle is 0 rad; it should be finite and other than 0"),
-        (lambda: pure_rotation(np.nan, rate_radps=1), "the angle is nan rad"),
-        (lambda: reverse(1, speed_mps=1, radius_m=0), "radius_m is 0"),
-        (lambda: reverse(np.inf, speed_mps=1), "length_m is inf"),
+        (Lissajous, {"size_m": (1, 1), "ratio": (0, 1)}, r"got \[0, 1\]"),
+        (Lissajous, {"size_m": (1, 1), "ratio": (1.5, 2)}, r"ratio\.0: should be a whole number"),
+        (StopAndGo, {"legs_m": []}, "legs_m: should have 1 or more entries"),
+        (StopAndGo, {"legs_m": [1, 0]}, r"legs_m\.1: should be greater than 0"),
+        (StopAndGo, {"legs_m": [1], "pause_s": -1}, "pause_s: should be 0 or more"),
+        (PureRotation, {"angle_deg": 0}, "angle_deg: should be another angle than 0"),
+        (PureRotation, {"angle_deg": np.nan}, "angle_deg: should be a finite number"),
+        (Reverse, {"length_m": 1, "radius_m": 0}, "radius_m: should be from 0.01 to 1e5, or less than 0 for right"),
+        (Reverse, {"length_m": np.inf}, "length_m: should be a finite number"),
     ],
 )
-def test_what_cannot_be_driven_is_a_sentence(call, sentence):
+def test_a_setting_that_cannot_be_is_a_sentence_with_its_key(kind, keys, sentence):
+    with pytest.raises(SettingError, match=sentence):
+        kind(**keys)
+
+
+@pytest.mark.parametrize(
+    ("course_kind", "sentence"),
+    [
+        (Circle(radius_m=1, speed_mps=1e-9), "from a nanosecond to a day"),
+        (Circle(radius_m=1e-300), "it should be from a nanosecond to a day"),
+        (Square(side_m=1, corner_radius_m=0.3), r"too wide for a side of 1 m: .* it should be below 0\.267"),
+        (Lissajous(size_m=(1, 1), ratio=(1, 1)), "comes to a point where it turns back; choose another phase"),
+        (Lissajous(size_m=(1, 1), phase_deg=45), "comes to a point"),
+    ],
+)
+def test_what_cannot_be_driven_is_a_sentence(course_kind, sentence):
     with pytest.raises(MotionError, match=sentence):
-        call()
+        course_kind.way()
 
 
 RADIUS, TRACK = PIONEER_WHEELS.radius_m, PIONEER_WHEELS.track_m

@@ -13,7 +13,7 @@ from vobench.geometry.se3 import Array
 from vobench.motion.controller import CONTROLLERS, references
 from vobench.motion.drive import Drive, drive
 from vobench.motion.pioneer import THETAS, TOOLBOX, Theta, accelerations, axle_poses, over_period, velocities
-from vobench.motion.slip import DELTAS, DISTURBANCE_STREAMS, SLIP_STREAMS, SLIPS, SURFACES, FloorPatch, SlipSettings
+from vobench.motion.slip import DELTAS, DISTURBANCE_STREAMS, SLIP_STREAMS, SLIPS, FloorPatch, SlipSettings
 
 PATHS = {"figure_10": ((1, 1), (0, 1), (1, 0), (2, 2)), "figure_12": ((0, 1), (1, 1), (2, 2))}
 SHORT = ((0.5, 0.3),)
@@ -199,7 +199,7 @@ def test_what_cannot_be_driven_is_refused(targets: object, options: dict[str, ob
 
 
 COURSE = ((0.5, 0.3), (0.2, -0.4))
-WET = FloorPatch(SURFACES["wet"], (0.3, 0.1), (0.2, 0.4), 0.3)
+WET = FloorPatch(surface="wet", center_m=(0.3, 0.1), size_m=(0.2, 0.4), yaw_deg=17)
 # Rates whose sub-steps are whole nanoseconds, so that a stamp is the very instant of its state.
 KINDS = {
     "clean": {"substeps": 4},

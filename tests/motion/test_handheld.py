@@ -5,10 +5,10 @@ import pytest
 from scipy.signal import welch
 from scipy.spatial.transform import Rotation
 
-from vobench.errors import MotionError
+from vobench.errors import SettingError
 from vobench.geometry import se3
-from vobench.motion.course import circle
-from vobench.motion.handheld import BAND_HZ, SHAKES, ShakeSettings, composed, draw_shake, handheld
+from vobench.motion.course import Circle
+from vobench.motion.handheld import BAND_HZ, SHAKES, HandheldMotion, ShakeSettings, composed, draw_shake
 from vobench.motion.spline import pose_spline
 
 RATE_HZ = 32.0
@@ -29,7 +29,8 @@ def shaken(settings, seed=0):
 
 
 def test_without_shake_it_is_its_spline():
-    motion, spline = handheld(*poses(), rng=np.random.default_rng(0), shake=SHAKES["none"]), pose_spline(*poses())
+    spline = pose_spline(*poses())
+    motion = HandheldMotion(spline, draw_shake(SHAKES["none"], np.random.default_rng(0)))
     t_ns = np.linspace(0, 7e9, 100)
     np.testing.assert_allclose(motion.at(t_ns).T_world_body, spline.at(t_ns).T_world_body, atol=1e-15)
     np.testing.assert_allclose(motion.at(t_ns).twist, spline.at(t_ns).twist, atol=1e-14)
@@ -87,7 +88,7 @@ def test_more_of_one_axis_leaves_the_others_as_they_were():
 
 
 def test_something_mounted_is_a_body_carried_without_moving():
-    carrier = circle(2, speed_mps=1).at(np.linspace(0, 5e9, 20))
+    carrier = Circle(radius_m=2, speed_mps=1).way().at(np.linspace(0, 5e9, 20))
     T_body_sensor = se3.transform(Rotation.random(random_state=2).as_matrix(), [0.3, -0.2, 0.5])
     still = np.zeros((20, 3))
     load = type(carrier)(np.broadcast_to(T_body_sensor, (20, 4, 4)), still, still, still, still)
@@ -99,11 +100,11 @@ def test_something_mounted_is_a_body_carried_without_moving():
 @pytest.mark.parametrize(
     ("settings", "sentence"),
     [
-        (ShakeSettings(rms_m=(-1.0, 0, 0)), "finite sizes of 0 or more"),
-        (ShakeSettings(rms_rad=(0, np.nan, 0)), "finite sizes of 0 or more"),
-        (ShakeSettings(bounce_m=0.1, step_hz=0.5), "step_hz is 0.5; it should be from 1 to 8"),
+        ({"rms_m": (-1.0, 0, 0)}, r"rms_m\.0: should be 0 or more"),
+        ({"rms_rad": (0, np.nan, 0)}, r"rms_rad\.1: should be a finite number"),
+        ({"bounce_m": 0.1, "step_hz": 0.5}, r"step_hz: should be from 1 to 8 \(got 0.5\)"),
     ],
 )
 def test_a_shake_that_is_none_is_a_sentence(settings, sentence):
-    with pytest.raises(MotionError, match=sentence):
-        handheld(*poses(), rng=np.random.default_rng(0), shake=settings)
+    with pytest.raises(SettingError, match=sentence):
+        ShakeSettings(**settings)

@@ -8,11 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from vobench.geometry import se3
 from vobench.motion.ackermann import ACKERMANNS, ackermann
-from vobench.motion.course import circle, figure_8, lissajous, pure_rotation, reverse, square, stop_and_go
-from vobench.motion.handheld import SHAKES, handheld
-from vobench.motion.quadrotor import quadrotor
-from vobench.motion.rail import rail
-from vobench.motion.replay import interpolated, smoothed
+from vobench.motion.course import Circle, Figure8, Lissajous, PureRotation, Reverse, Square, StopAndGo
+from vobench.motion.handheld import SHAKES, HandheldMotion, draw_shake
+from vobench.motion.quadrotor import Quadrotor
+from vobench.motion.rail import Rail
+from vobench.motion.replay import Replay
 from vobench.motion.spline import pose_spline
 from vobench.trajectory.trajectory import Trajectory
 
@@ -35,35 +35,60 @@ def recording():
     return Trajectory(t_ns, motion.at(t_ns).T_world_body)
 
 
+def at(start):
+    return {"start_m": start[:2], "start_heading_deg": np.rad2deg(start[2])}
+
+
 PLANAR = {
-    "circle": lambda start=START: circle(2, speed_mps=1, laps=2, start=start),
-    "circle to the right": lambda start=START: circle(2, speed_mps=1, laps=0.7, clockwise=True, start=start),
-    "square": lambda start=START: square(2, speed_mps=1, start=start),
-    "square, rounded": lambda start=START: square(4, speed_mps=1, corner_radius_m=0.5, laps=2, start=start),
-    "figure 8": lambda start=START: figure_8(4, speed_mps=1, laps=2, start=start),
-    "lissajous": lambda start=START: lissajous((8, 6), ratio=(3, 2), phase_rad=0.4, speed_mps=1, start=start),
-    "stop and go": lambda start=START: stop_and_go([1, 2, 0.05], speed_mps=0.5, pause_s=1, start=start),
-    "pure rotation": lambda start=START: pure_rotation(-7, rate_radps=1, start=start),
-    "reverse": lambda start=START: reverse(3, speed_mps=1, pause_s=0.5, start=start),
-    "reverse on an arc": lambda start=START: reverse(3, speed_mps=1, radius_m=-2, start=start),
+    "circle": lambda start=START: Circle(radius_m=2, speed_mps=1, laps=2, **at(start)).way(),
+    "circle to the right": lambda start=START: Circle(
+        radius_m=2, speed_mps=1, laps=0.7, clockwise=True, **at(start)
+    ).way(),
+    "square": lambda start=START: Square(side_m=2, speed_mps=1, **at(start)).way(),
+    "square, rounded": lambda start=START: Square(
+        side_m=4, speed_mps=1, corner_radius_m=0.5, laps=2, **at(start)
+    ).way(),
+    "figure 8": lambda start=START: Figure8(length_m=4, speed_mps=1, laps=2, **at(start)).way(),
+    "lissajous": lambda start=START: Lissajous(
+        size_m=(8, 6),
+        ratio=(3, 2),
+        phase_deg=np.rad2deg(0.4),
+        speed_mps=1,
+        **at(start),
+    ).way(),
+    "stop and go": lambda start=START: StopAndGo(legs_m=[1, 2, 0.05], speed_mps=0.5, pause_s=1, **at(start)).way(),
+    "pure rotation": lambda start=START: PureRotation(angle_deg=np.rad2deg(-7), turn_radps=1, **at(start)).way(),
+    "reverse": lambda start=START: Reverse(length_m=3, speed_mps=1, pause_s=0.5, **at(start)).way(),
+    "reverse on an arc": lambda start=START: Reverse(length_m=3, speed_mps=1, radius_m=-2, **at(start)).way(),
 }
 CARS = {
-    "car on an 8": lambda start=START: ackermann(figure_8(10, speed_mps=1, start=start)),
-    "car, ahead and back": lambda start=START: ackermann(reverse(3, speed_mps=1, radius_m=2, start=start)),
+    "car on an 8": lambda start=START: ackermann(Figure8(length_m=10, speed_mps=1, **at(start)).way()),
+    "car, ahead and back": lambda start=START: ackermann(
+        Reverse(length_m=3, speed_mps=1, radius_m=2, **at(start)).way()
+    ),
     "car in town": lambda start=START: ackermann(
-        square(60, speed_mps=8, corner_radius_m=10, accel_mps2=1.5, start=start), ACKERMANNS["kitti_like"]
+        Square(
+            side_m=60,
+            speed_mps=8,
+            corner_radius_m=10,
+            accel_mps2=1.5,
+            **at(start),
+        ).way(),
+        ACKERMANNS["kitti_like"],
     ),
 }
 SPATIAL = {
     "pose spline": lambda: pose_spline(*poses()),
     "pose spline, eased": lambda: pose_spline(*poses(), ease_s=1.0),
-    "rail": lambda: rail(POINTS[2:], speed_mps=1),
-    "straight rail": lambda: rail(POINTS[1:3], speed_mps=1),
-    "handheld": lambda: handheld(*poses(), rng=np.random.default_rng(1), shake=SHAKES["running"]),
-    "quadrotor": lambda: quadrotor(POINTS),
-    "quadrotor, fixed yaw": lambda: quadrotor(POINTS, t_s=[0, 2, 4, 6, 8, 11], yaw_rad=1.0),
-    "replay, interpolated": lambda: interpolated(recording(), speed=0.5),
-    "replay, smoothed": lambda: smoothed(recording(), start=(1, 2, 3, 0.5)),
+    "rail": lambda: Rail(points_m=POINTS[2:], speed_mps=1).motion(),
+    "straight rail": lambda: Rail(points_m=POINTS[1:3], speed_mps=1).motion(),
+    "handheld": lambda: HandheldMotion(pose_spline(*poses()), draw_shake(SHAKES["running"], np.random.default_rng(1))),
+    "quadrotor": lambda: Quadrotor(points_m=POINTS, speed_mps=1).motion(),
+    "quadrotor, fixed yaw": lambda: Quadrotor(
+        points_m=POINTS, speed_mps=1, t_s=[0, 2, 4, 6, 8, 11], yaw_deg=np.rad2deg(1.0)
+    ).motion(),
+    "replay, interpolated": lambda: Replay(file="", exact=True, speed=0.5).motion(recording()),
+    "replay, smoothed": lambda: Replay(file="", start_m=(1, 2, 3), start_heading_deg=30).motion(recording()),
 }
 KINDS = {**PLANAR, **CARS, **SPATIAL}
 AT_REST = [*PLANAR, *CARS, "pose spline, eased", "rail", "straight rail", "quadrotor", "quadrotor, fixed yaw"]

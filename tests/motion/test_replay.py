@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from vobench.errors import MotionError
+from vobench.errors import MotionError, SettingError
 from vobench.geometry import se3
-from vobench.motion.replay import AXES, interpolated, smoothed
+from vobench.motion.replay import AXES, Replay
 from vobench.motion.spline import pose_spline
 from vobench.trajectory.formats import parse_kitti, parse_tum
 from vobench.trajectory.trajectory import Trajectory
@@ -16,6 +16,14 @@ from vobench.trajectory.trajectory import Trajectory
 DATA = Path(__file__).parents[2] / ".." / "shared" / "data" / "trajectories"
 WITH_DATA = pytest.mark.skipif(not DATA.is_dir(), reason="no folder ../shared/data with real trajectories")
 NOISE_M, NOISE_RAD = 1e-4, 1e-3
+
+
+def interpolated(trajectory, **keys):
+    return Replay(file="", exact=True, **keys).motion(trajectory)
+
+
+def smoothed(trajectory, **keys):
+    return Replay(file="", **keys).motion(trajectory)
 
 
 def carried():
@@ -131,7 +139,7 @@ def test_twice_the_speed_is_half_the_time_on_the_same_way(replayed):
 @pytest.mark.parametrize("replayed", [interpolated, smoothed])
 def test_a_start_moves_the_recording_and_keeps_the_vertical(replayed):
     trajectory = recorded()
-    placed, plain = replayed(trajectory, start=(1, 2, 3, 0.5)), replayed(trajectory)
+    placed, plain = replayed(trajectory, start_m=(1, 2, 3), start_heading_deg=np.rad2deg(0.5)), replayed(trajectory)
     first = placed.at(np.array([0])).T_world_body[0]
     np.testing.assert_allclose([*first[:3, 3], np.arctan2(first[1, 0], first[0, 0])], [1, 2, 3, 0.5], atol=1e-12)
     t_ns = np.linspace(0, plain.end_ns, 50)
@@ -166,16 +174,16 @@ def test_a_level_drive_in_any_convention_of_axes_is_the_drive_of_the_body(name):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"speed": 0.0}, "speed is 0; it should be a finite factor above 0"),
-        ({"speed": np.nan}, "speed is nan"),
-        ({"start": (0, 0, np.nan, 0)}, "start is .*; it should be four finite numbers"),
-        ({"start": (0, 0, 0)}, "start is .*; it should be four finite numbers"),
-        ({"knot_hz": 0.0}, "knot_hz is 0"),
+        ({"speed": 0.0}, "speed: should be 0.01 or more"),
+        ({"speed": np.nan}, "speed: should be a finite number"),
+        ({"start_m": (0, 0, np.nan)}, r"start_m\.2: should be a finite number"),
+        ({"start_m": (0, 0)}, r"start_m\.2: this key is missing"),
+        ({"knot_hz": 0.0}, "knot_hz: should be greater than 0"),
     ],
 )
 def test_options_that_make_no_motion_are_a_sentence(options, sentence):
-    with pytest.raises(MotionError, match=sentence):
-        smoothed(recorded(), **options)
+    with pytest.raises(SettingError, match=sentence):
+        Replay(file="", **options)
 
 
 @pytest.mark.parametrize(("replayed", "fewest"), [(interpolated, 3), (smoothed, 12)])

@@ -3,12 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import astuple, replace
 from functools import cache
-from math import pi
 
 import numpy as np
 import pytest
 
-from vobench.errors import MotionError
+from vobench.errors import MotionError, SettingError
 from vobench.geometry import se3
 from vobench.motion import slip as slips
 from vobench.motion.controller import CONTROLLERS
@@ -33,6 +32,7 @@ from vobench.motion.slip import (
 )
 
 BUMPY = DELTAS["bumpy"]
+Pair = tuple[float, float]
 COURSE = ((0.5, 0.3),)
 
 
@@ -152,12 +152,31 @@ def test_what_chance_cannot_do_is_refused(options: dict[str, object], sentence: 
 
 @pytest.mark.parametrize("bad", [(-0.1, 0.0), (0.1, float("nan")), (float("inf"), 0.0), (0.1, 0.1, 0.0)])
 def test_delta_out_of_range_is_refused(bad: tuple[float, ...]) -> None:
-    with pytest.raises(MotionError, match="delta needs"):
+    with pytest.raises(SettingError, match=r"_(mps2|radps2|s): should be"):
         DeltaSettings(*bad)
 
 
 NOMINAL = SLIPS["nominal"]
 FAR, EVERYWHERE = ((9.0, 9.0), (1.0, 1.0)), ((0.0, 0.0), (20.0, 20.0))
+GROUNDS = {
+    "double": Ground(2.0),
+    "fivefold": Ground(5.0),
+    "doubly biased": Ground(2.0, 0.01, -0.01),
+    "triply biased": Ground(3.0, 0.02, -0.02),
+    "sticky": Ground(ratio_bias=0.1, angle_bias_rad=0.2),
+    "sloping": Ground(angle_bias_rad=0.1),
+    "icy": Ground(50.0, 0.3, 0.3),
+}
+
+
+@pytest.fixture(autouse=True)
+def _grounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, ground in GROUNDS.items():
+        monkeypatch.setitem(SURFACES, name, ground)
+
+
+def patch_of(surface: str, center_m: Pair, size_m: Pair, yaw_deg: float = 0.0) -> FloorPatch:
+    return FloorPatch(surface=surface, center_m=center_m, size_m=size_m, yaw_deg=yaw_deg)
 
 
 @cache
@@ -167,26 +186,26 @@ def driven(*patches: FloorPatch) -> Drive:
 
 
 def test_a_patch_holds_the_points_inside_its_turned_rectangle() -> None:
-    patch = FloorPatch(SURFACES["wet"], (1.0, 2.0), (2.0, 0.2), yaw_rad=pi / 2)
+    patch = patch_of("wet", (1.0, 2.0), (2.0, 0.2), 90)
     assert [patch.holds(1.05, y) for y in (1.01, 2.99, 3.01)] == [True, True, False]
     assert not patch.holds(1.11, 2.0)
 
 
 def test_a_patch_turns_with_its_yaw_about_its_center() -> None:
-    flat, turned = (FloorPatch(SURFACES["wet"], (1.0, 2.0), (2.0, 0.5), yaw_rad=yaw) for yaw in (0.0, 0.7))
-    R = se3.rotation_z(0.7)[:2, :2]
+    flat, turned = (patch_of("wet", (1.0, 2.0), (2.0, 0.5), yaw_deg) for yaw_deg in (0, 40))
+    R = se3.rotation_z(np.deg2rad(40))[:2, :2]
     for offset in np.random.default_rng(0).uniform(-1.5, 1.5, (200, 2)):
         assert turned.holds(*np.add(R @ offset, [1, 2]).tolist()) == flat.holds(*np.add(offset, [1, 2]).tolist())
 
 
 def test_where_patches_overlap_factors_multiply_and_biases_add() -> None:
-    patches = [FloorPatch(Ground(f, b, -b), (0.0, 0.0), (1.0, 1.0)) for f, b in ((2.0, 0.01), (3.0, 0.02))]
+    patches = [patch_of(f"{times} biased", (0.0, 0.0), (1.0, 1.0)) for times in ("doubly", "triply")]
     assert under(patches, 0.2, 0.2) == (6.0, pytest.approx(0.03), pytest.approx(-0.03))
     assert under(patches, 0.6, 0.2) == (1.0, 0.0, 0.0)
 
 
 def test_a_patch_that_is_never_crossed_changes_nothing_to_the_last_bit() -> None:
-    clean, patched = driven(), driven(FloorPatch(SURFACES["wet"], *FAR))
+    clean, patched = driven(), driven(patch_of("wet", *FAR))
     np.testing.assert_array_equal(patched.state, clean.state)
     np.testing.assert_array_equal(patched.rim_rad, clean.rim_rad)
 
@@ -195,11 +214,11 @@ def test_a_patch_under_everything_is_the_slip_settings_times_its_factor() -> Non
     rngs = dict(zip(DISTURBANCE_STREAMS, np.random.default_rng(1).spawn(6), strict=True))
     stronger = replace(NOMINAL, ratio_std=2 * NOMINAL.ratio_std, angle_std_rad=2 * NOMINAL.angle_std_rad)
     scaled = drive([(1.5, 0.0)], slip=stronger, rngs=rngs)
-    np.testing.assert_allclose(driven(FloorPatch(Ground(2.0), *EVERYWHERE)).state, scaled.state, atol=1e-12)
+    np.testing.assert_allclose(driven(patch_of("double", *EVERYWHERE)).state, scaled.state, atol=1e-12)
 
 
 def test_slip_changes_within_one_frame_of_the_axle_entering_and_leaving_the_patch() -> None:
-    run = driven(FloorPatch(Ground(5.0), (0.7, 0.0), (0.4, 3.0)))
+    run = driven(patch_of("fivefold", (0.7, 0.0), (0.4, 3.0)))
     x_m, clean = run.motion.at(run.t_ns).T_world_body[:, 0, 3], driven()
     shared = slice(0, min(len(run.slip), len(clean.slip)))
     factor = run.slip[shared, 2] / clean.slip[shared, 2]
@@ -210,7 +229,7 @@ def test_slip_changes_within_one_frame_of_the_axle_entering_and_leaving_the_patc
 
 
 def test_a_patch_under_one_wheel_makes_only_that_rim_run_ahead() -> None:
-    left = driven(FloorPatch(Ground(ratio_bias=0.1, angle_bias_rad=0.2), (0.7, 0.3), (4.0, 0.5)))
+    left = driven(patch_of("sticky", (0.7, 0.3), (4.0, 0.5)))
     clean = driven()
     np.testing.assert_allclose(left.slip[:, 0], clean.slip[: len(left.slip), 0] + 0.1, atol=1e-12)
     np.testing.assert_array_equal(left.slip[:, 1], clean.slip[: len(left.slip), 1])
@@ -218,28 +237,29 @@ def test_a_patch_under_one_wheel_makes_only_that_rim_run_ahead() -> None:
 
 
 def test_a_pull_to_the_left_is_added_to_the_angle_at_which_the_robot_slides() -> None:
-    run, clean = driven(FloorPatch(Ground(angle_bias_rad=0.1), *EVERYWHERE)), driven()
+    run, clean = driven(patch_of("sloping", *EVERYWHERE)), driven()
     shared = min(len(run.slip), len(clean.slip))
     np.testing.assert_allclose(run.slip[:shared, 2], clean.slip[:shared, 2] + 0.1, atol=1e-12)
     assert (run.motion.at(run.t_ns).velocity_mps[1:shared, 1] > 0).all()
 
 
 def test_slip_is_cut_before_the_formulas_lose_their_meaning() -> None:
-    run = driven(FloorPatch(Ground(50.0, 0.3, 0.3), *EVERYWHERE))
+    run = driven(patch_of("icy", *EVERYWHERE))
     assert np.abs(run.slip).max() == MOST_SLIP
 
 
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: Ground(factor=-1.0), "factor in 0..50"),
-        (lambda: Ground(ratio_bias=float("nan")), "ratio_bias"),
-        (lambda: FloorPatch(SURFACES["wet"], (0.0, float("nan")), (1.0, 1.0)), "finite center_m"),
-        (lambda: FloorPatch(SURFACES["wet"], (0.0, 0.0), (1.0, 0.0)), "positive size_m"),
+        (lambda: Ground(factor=-1.0), "factor: should be 0 or more"),
+        (lambda: Ground(ratio_bias=float("nan")), "ratio_bias: should be a finite number"),
+        (lambda: patch_of("wett", *FAR), "surface: no surface named 'wett'. Did you mean 'wet'"),
+        (lambda: patch_of("wet", (0.0, float("nan")), (1.0, 1.0)), r"center_m\.1: should be a finite number"),
+        (lambda: patch_of("wet", (0.0, 0.0), (1.0, 0.0)), r"size_m\.1: should be greater than 0"),
     ],
 )
 def test_what_is_no_floor_is_refused(make: object, sentence: str) -> None:
-    with pytest.raises(MotionError, match=sentence):
+    with pytest.raises(SettingError, match=sentence):
         make()
 
 
@@ -320,5 +340,5 @@ def test_a_strained_rim_runs_ahead_of_the_ground_where_it_is_driven_on_and_behin
     ],
 )
 def test_settings_out_of_range_are_refused(bad: dict[str, float]) -> None:
-    with pytest.raises(MotionError, match="slip needs"):
+    with pytest.raises(SettingError, match=f"^{next(iter(bad))}: should be"):
         SlipSettings(**bad)

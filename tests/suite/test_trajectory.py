@@ -1,15 +1,22 @@
 """What a trajectory, a replayed file and an IMU may say, and the one sentence for what they may not."""
 
+from dataclasses import fields, is_dataclass
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
 from vobench.errors import SuiteError
 from vobench.geometry import se3
+from vobench.motion.motor import MotorConstants, theta_of
+from vobench.motion.wheeled import Wheeled
+from vobench.sensor.encoder import ENCODERS
+from vobench.setting import hints
 from vobench.suite.camera import ImuSpec, TriadOverride
 from vobench.suite.suite import read_plan
-from vobench.suite.trajectory import KINDS
+from vobench.suite.trajectory import KINDS, TrajectorySpec
 from vobench.trajectory.formats import format_kitti, format_tum, parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
@@ -35,6 +42,7 @@ LEAST = {
     "replay": "file: path.tum",
 }
 ON_WHEELS = tuple(LEAST)[:8]
+KIND = TypeAdapter(TrajectorySpec)
 
 
 @pytest.fixture
@@ -61,7 +69,7 @@ def test_every_kind_needs_few_keys_and_goes_through_json_unchanged(trajectory, k
     spec = trajectory(f"{{kind: {kind}, {LEAST[kind]}}}")
     assert spec.kind == kind
     assert type(spec) is KINDS[kind]
-    assert type(spec).model_validate_json(spec.model_dump_json()) == spec
+    assert KIND.validate_json(KIND.dump_json(spec)) == spec
 
 
 def test_without_a_kind_it_is_waypoints_as_ever(trajectory):
@@ -69,9 +77,22 @@ def test_without_a_kind_it_is_waypoints_as_ever(trajectory):
     assert trajectory(DEFAULT).mover == "pioneer"
 
 
+def test_motors_stand_in_for_theta_and_for_the_wheels_and_leave_no_trace_where_they_are_not_given(trajectory):
+    motors = trajectory("{targets_m: [[1, 0]], motors: {r_m: 0.1, d_m: 0.4}}")
+    assert motors.theta == theta_of(MotorConstants(r_m=0.1, d_m=0.4))
+    assert (motors.wheels.radius_m, motors.wheels.track_m) == (0.1, 0.4)
+    assert KIND.validate_json(KIND.dump_json(motors)) == motors
+    assert [key in KIND.dump_python(motors) for key in ("robot", "motors")] == [False, True]
+    assert [key in KIND.dump_python(trajectory(DEFAULT)) for key in ("robot", "motors")] == [True, False]
+
+
+def test_encoders_have_one_set_of_errors_for_each_name():
+    assert set(ENCODERS) == set(get_args(hints(Wheeled)["encoders"]))
+
+
 @pytest.mark.parametrize("kind", ON_WHEELS)
 def test_what_is_dumped_holds_no_key_of_another_mover(trajectory, kind):
-    dumped = trajectory(f"{{kind: {kind}, {LEAST[kind]}, mover: unicycle}}").model_dump()
+    dumped = KIND.dump_python(trajectory(f"{{kind: {kind}, {LEAST[kind]}, mover: unicycle}}"))
     assert "slip" not in dumped
     assert "car" not in dumped
     assert {"mover", "encoders", "rate_hz", *KINDS[kind].__annotations__} - {"mover_keys"} <= set(dumped)
@@ -102,6 +123,12 @@ WRONG = [
     ("{kind: reverse, length_m: 1, controller: paper}", ".controller: does not belong to mover 'pioneer'"),
     ("{kind: replay, file: path.tum, axes: eurok}", ".axes: no convention of axes named 'eurok'. Did you mean 'euroc'? Known: body, camera, euroc, kitti, tartanair"),
     ("{kind: replay, file: path.tum, axes: 'axes:x,x,z'}", ".axes: axes are x, y and z, each once, with or without a minus, such as z,-x,-y; not 'axes:x,x,z'"),
+    ("{kind: lissajous, size_m: [1, 1], ratio: [2, 4]}", ".ratio: should be two whole numbers from 1 to 20 without a common divisor (got [2, 4])"),
+    ("{targets_m: [[1, 0]], encoders: bad}", ".encoders: should be 'exact' or 'nominal' (got 'bad')"),
+    ("{targets_m: [[1, 0]], robot: pioneer_2, motors: {}}", ".motors: gives the robot anew, which is given by robot; leave one of them out"),
+    ("{targets_m: [[1, 0]], mover: unicycle, motors: {}}", ".motors: does not belong to mover 'unicycle'"),
+    ("{targets_m: [[1, 0]], motors: {m_kg: 0}}", ".motors.m_kg: should be greater than 0 (got 0)"),
+    ("{targets_m: [[1, 0]], motors: {m: 9}}", ".motors.m: unknown key. Did you mean 'r_m'?"),
     ("{kind: replay, file: path.tum, start_heading_deg: 90}", ".start_heading_deg: belongs to start_m; without it the body starts as recorded"),
 ]  # fmt: skip
 
@@ -124,9 +151,9 @@ def test_a_patch_ends_at_its_corners(trajectory):
     patch = trajectory(
         "{targets_m: [[1, 0]], floor: [{surface: wet, center_m: [1, 2], size_m: [0.4, 0.2], yaw_deg: 30}]}"
     ).floor[0]
-    corners, built = patch.corners_m - patch.center_m, patch.build()
-    assert [built.holds(*(0.999 * corner + patch.center_m)) for corner in corners] == [True] * 4
-    assert [built.holds(*(1.001 * corner + patch.center_m)) for corner in corners] == [False] * 4
+    corners = patch.corners_m - patch.center_m
+    assert [patch.holds(*(0.999 * corner + patch.center_m)) for corner in corners] == [True] * 4
+    assert [patch.holds(*(1.001 * corner + patch.center_m)) for corner in corners] == [False] * 4
 
 
 class TestReplay:
@@ -246,14 +273,20 @@ class TestImu:
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-@pytest.mark.parametrize("spec", [*KINDS.values(), ImuSpec, TriadOverride], ids=lambda spec: spec.__name__)
+@pytest.mark.parametrize(
+    "spec", [*KINDS.values(), MotorConstants, ImuSpec, TriadOverride], ids=lambda spec: spec.__name__
+)
 def test_every_key_is_in_the_docs_with_its_default(spec):
-    page = (DOCS / ("trajectories.md" if spec in KINDS.values() else "suites.md")).read_text(encoding="utf-8")
-    for key, field in spec.model_fields.items():
+    page = (DOCS / ("trajectories.md" if spec in (*KINDS.values(), MotorConstants) else "suites.md")).read_text(
+        encoding="utf-8"
+    )
+    defaults = {field.name: field.default for field in fields(spec)} if is_dataclass(spec) else spec.model_fields
+    for key, default in defaults.items():
         assert f"`{key}`" in page, key
-        if isinstance(field.default, float) and field.default:
+        value = getattr(default, "default", default)
+        if isinstance(value, float) and value:
             rows = [line for line in page.splitlines() if line.startswith("|") and f"`{key}`" in line.split("|")[1]]
-            assert any(f"{field.default:g}" in row for row in rows), (key, rows)
+            assert any(f"{value:g}" in row for row in rows), (key, rows)
 
 
 def test_the_suite_of_the_docs_has_every_kind_but_replay(tmp_path, monkeypatch):

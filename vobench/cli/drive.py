@@ -11,11 +11,13 @@ from vobench.cli import terminal
 from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.motion.course import Unled
+from vobench.motion.drive import Waypoints
+from vobench.motion.wheeled import Wheeled
 from vobench.report.drive_plot import ENDINGS, DriveLog, save_plot
 from vobench.run.motion import BodyMotion, body_motion, check_cases
 from vobench.run.sensors import wheel_error_m
 from vobench.suite.suite import Case, Plan, read_plan
-from vobench.suite.trajectory import GroundSpec, UnledSpec, WaypointsSpec
 from vobench.trajectory.formats import format_tum
 from vobench.trajectory.kinematics import Kinematics
 from vobench.trajectory.trajectory import Trajectory
@@ -41,12 +43,12 @@ class Driven:
     def kind(self) -> str:
         """What it is, and who goes it."""
         spec = self.case.trajectory
-        return f"{spec.kind}, {spec.mover}" if isinstance(spec, GroundSpec) else spec.kind
+        return f"{spec.kind}, {spec.mover}" if isinstance(spec, Wheeled) else spec.kind
 
     @property
     def reached_s(self) -> Array | None:
         """When the leg to each target ended, where there are targets."""
-        if self.travel.drive is None or not isinstance(self.case.trajectory, WaypointsSpec):
+        if self.travel.drive is None or not isinstance(self.case.trajectory, Waypoints):
             return None
         return self.travel.t_ns[list(self.travel.drive.reached)] / 1e9
 
@@ -106,11 +108,11 @@ def log_of(driven: Driven) -> DriveLog:
         t_s=driven.travel.t_ns / 1e9,
         T_world_body=driven.body.T_world_body,
         twist=driven.body.twist,
-        point_m=drive.state[:, :2] if drive and not isinstance(spec, UnledSpec) else None,
+        point_m=drive.state[:, :2] if drive and not isinstance(spec, Unled) else None,
         references=drive.references if drive else None,
-        targets_m=np.array(spec.targets_m) if isinstance(spec, WaypointsSpec) else None,
+        targets_m=np.array(spec.targets_m) if isinstance(spec, Waypoints) else None,
         reached_s=driven.reached_s,
-        patches=tuple((patch.surface, patch.corners_m) for patch in spec.floor) if isinstance(spec, GroundSpec) else (),
+        patches=tuple((patch.surface, patch.corners_m) for patch in spec.floor) if isinstance(spec, Wheeled) else (),
     )
 
 

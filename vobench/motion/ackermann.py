@@ -5,13 +5,15 @@ x' = u cos psi, y' = u sin psi, psi' = u tan(delta) / L, delta' = (asked - delta
 """
 
 from dataclasses import dataclass
-from math import isfinite, pi
-from typing import NamedTuple
+from math import pi
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from annotated_types import Ge, Gt, Lt
 
 from vobench.errors import MotionError
 from vobench.geometry.se3 import Array
+from vobench.setting import Positive, require
 from vobench.trajectory.kinematics import CurveMotion, Kinematics, level
 from vobench.trajectory.trajectory import Stamps
 
@@ -21,24 +23,16 @@ LOOKS = 8192
 
 @dataclass(frozen=True, slots=True)
 class AckermannSettings:
-    """A vehicle and its driver, who comes back to the way over about lookahead_m. Raises MotionError."""
+    """A vehicle and its driver, who comes back to the way over about lookahead_m."""
 
-    wheelbase_m: float
-    max_steer_rad: float
-    max_steer_radps: float
-    steer_lag_s: float
-    lookahead_m: float
+    wheelbase_m: Positive
+    max_steer_rad: Annotated[float, Gt(0), Lt(pi / 2)]
+    max_steer_radps: Positive
+    steer_lag_s: Annotated[float, Ge(STEP_S)]
+    lookahead_m: Positive
 
     def __post_init__(self) -> None:
-        for name in ("wheelbase_m", "max_steer_rad", "max_steer_radps", "steer_lag_s", "lookahead_m"):
-            value = getattr(self, name)
-            if not (isfinite(value) and value > 0):
-                raise MotionError(f"a car's {name} should be finite and above 0, got {value}")
-        if self.max_steer_rad >= pi / 2 or self.steer_lag_s < STEP_S:
-            raise MotionError(
-                f"a car steers by less than pi / 2 with a lag of {STEP_S:g} s or more, "
-                f"got max_steer_rad {self.max_steer_rad} and steer_lag_s {self.steer_lag_s}"
-            )
+        require(self)
 
     @property
     def sharpest_radius_m(self) -> float:

@@ -1,18 +1,20 @@
 """Planar courses: circles, squares, figures of eight, arcs and clothoids, as ideal wheeled robots drive them."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil, gcd, pi
-from typing import TYPE_CHECKING
+from math import ceil, gcd, pi, radians
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 import scipy
+from annotated_types import Ge, Gt, Le, MinLen
 from numpy.typing import ArrayLike
 
-from vobench.errors import MotionError
+from vobench.errors import MotionError, SettingError
 from vobench.geometry.rig import WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.motion.pioneer import wheel_speeds
+from vobench.motion.wheeled import MOVER_KEYS, UNLED_KEYS, Acceleration, Length, Mover, Pause, Speed, Wheeled
 from vobench.trajectory.kinematics import CurveMotion, Kinematics, Motion, in_stages, level, rest_to_rest
 from vobench.trajectory.trajectory import Stamps
 
@@ -153,7 +155,7 @@ MOST_WAVES = 20
 
 
 @dataclass(frozen=True, slots=True)
-class Lissajous:
+class LissajousCurve:
     """x = A sin(a phi + phase), y = B sin(b phi): a closed Curve, from the origin along x at s = 0.
 
     half_m (2,) is A, B; waves (2,) is a, b; phase_rad (2,) is phase, 0.
@@ -183,18 +185,8 @@ class Lissajous:
         return along(place.real, place.imag, heading, advance=np.ones_like(s), bend=bend, bent=bent)
 
 
-def lissajous_curve(size_m: tuple[float, float], *, ratio: tuple[int, int], phase_rad: float) -> Lissajous:
-    """One of the given length and width. Raises MotionError where it has no size, or has points for bends."""
-    if not (len(size_m) == 2 and np.isfinite([*size_m, phase_rad]).all() and min(size_m) > 0):
-        raise MotionError(
-            f"a Lissajous curve of {' m by '.join(map(str, size_m))} m, phase {phase_rad:g} rad, cannot be driven; "
-            "both sizes should be above 0, and all finite"
-        )
-    if any(n not in range(1, MOST_WAVES + 1) for n in ratio) or gcd(*map(int, ratio)) != 1:
-        raise MotionError(
-            f"the ratio of a Lissajous curve is {':'.join(map(str, ratio))}; it should be two whole numbers "
-            f"from 1 to {MOST_WAVES} without a common divisor"
-        )
+def lissajous_curve(size_m: tuple[float, float], ratio: tuple[int, int], *, phase_rad: float) -> LissajousCurve:
+    """One of the given length and width. Raises MotionError where it has points for bends."""
     half_m, waves = np.array(size_m)[:, None] / 2, np.array(ratio, float)[:, None]
     phases = np.array([[phase_rad], [0.0]])
 
@@ -204,7 +196,7 @@ def lissajous_curve(size_m: tuple[float, float], *, ratio: tuple[int, int], phas
 
     knots = np.linspace(0, 2 * np.pi, KNOTS_PER_WAVE * max(ratio) + 1)
     _require_blunt(speed(knots), phase_rad)
-    return Lissajous(half_m, waves, phases, arc_length(speed, knots))
+    return LissajousCurve(half_m, waves, phases, arc_length(speed, knots))
 
 
 def _require_blunt(speeds: Array, phase_rad: float) -> None:
@@ -227,135 +219,188 @@ def _cross(a: Array, b: Array) -> Array:
     return product
 
 
-Start = tuple[float, float, float]
-ORIGIN: Start = (0.0, 0.0, 0.0)
 CORNERS = 4
-MOST_LAPS = 1000
+Laps = Annotated[int, Ge(1), Le(1000)]
 
 
-def circle(
-    radius_m: float,
-    *,
-    speed_mps: float,
-    laps: float = 1.0,
-    clockwise: bool = False,
-    accel_mps2: float = 0.5,
-    start: Start = ORIGIN,
-) -> CurveMotion:
-    """A circle to the left of the start, or to its right if clockwise; laps need not be whole."""
-    _require_positive("radius_m", radius_m)
-    _require_laps(laps, whole=False)
-    length_m = 2 * pi * radius_m * laps
-    law = rest_to_rest(length_m, speed=speed_mps, acceleration=accel_mps2)
-    return CurveMotion(course([Piece(length_m, bend=_side(clockwise=clockwise) / radius_m)]), law, _placed(start))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circle(Wheeled):
+    """A circle to the left, or clockwise to the right; laps need not be whole."""
+
+    kind: Literal["circle"] = "circle"
+    radius_m: Length
+    laps: Annotated[float, Gt(0), Le(1000)] = 1.0
+    clockwise: bool = False
+    speed_mps: Speed = 0.3
+    accel_mps2: Acceleration = 0.5
+
+    def way(self) -> CurveMotion:
+        """As an ideal robot drives it. Raises MotionError."""
+        length_m = 2 * pi * self.radius_m * self.laps
+        law = rest_to_rest(length_m, speed=self.speed_mps, acceleration=self.accel_mps2)
+        bend = _side(clockwise=self.clockwise) / self.radius_m
+        return CurveMotion(course([Piece(length_m, bend)]), law, self.T_world_start)
 
 
-def square(
-    side_m: float,
-    *,
-    speed_mps: float,
-    laps: int = 1,
-    corner_radius_m: float = 0.0,
-    turn_radps: float = 1.0,
-    clockwise: bool = False,
-    accel_mps2: float = 0.5,
-    turn_accel_radps2: float = 2.0,
-    start: Start = ORIGIN,
-) -> CurveMotion:
-    """A square from one end of a straight stretch; where corner_radius_m is 0, with stops to turn on the spot.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Square(Wheeled):
+    """A square from one end of a side: it turns on the spot at each corner, or goes round it on two clothoids.
 
-    Else each corner is two clothoids that meet where the way is tightest, at corner_radius_m.
+    These meet where the way is tightest, at corner_radius_m.
     """
-    _require_positive("side_m", side_m)
-    _require_laps(laps, whole=True)
-    if corner_radius_m:
-        straight_m, corner = _rounded(side_m, corner_radius_m, side=_side(clockwise=clockwise))
-        pieces = [Piece(straight_m), *corner] * (CORNERS * int(laps))
-        law = rest_to_rest(sum(piece.length for piece in pieces), speed=speed_mps, acceleration=accel_mps2)
-        return CurveMotion(course(pieces), law, _placed(start))
-    ahead = rest_to_rest(side_m, speed=speed_mps, acceleration=accel_mps2)
-    turn = rest_to_rest(pi / 2, speed=turn_radps, acceleration=turn_accel_radps2)
-    pieces = [Piece(side_m), Piece(pi / 2, bend=_side(clockwise=clockwise), advance=0.0)] * (CORNERS * int(laps))
-    return CurveMotion(course(pieces), in_stages([ahead, turn] * (CORNERS * int(laps))), _placed(start))
+
+    kind: Literal["square"] = "square"
+    side_m: Length
+    corner_radius_m: Annotated[float, Ge(0), Le(1e5)] = 0.0
+    laps: Laps = 1
+    clockwise: bool = False
+    speed_mps: Speed = 0.3
+    accel_mps2: Acceleration = 0.5
+    turn_radps: Speed = 1.0
+    turn_accel_radps2: Acceleration = 2.0
+
+    def way(self) -> CurveMotion:
+        """As an ideal robot drives it. Raises MotionError."""
+        side, count = _side(clockwise=self.clockwise), CORNERS * self.laps
+        if self.corner_radius_m:
+            straight_m, corner = _rounded(self.side_m, self.corner_radius_m, side=side)
+            pieces = [Piece(straight_m), *corner] * count
+            length_m = sum(piece.length for piece in pieces)
+            law = rest_to_rest(length_m, speed=self.speed_mps, acceleration=self.accel_mps2)
+            return CurveMotion(course(pieces), law, self.T_world_start)
+        ahead = rest_to_rest(self.side_m, speed=self.speed_mps, acceleration=self.accel_mps2)
+        turn = rest_to_rest(pi / 2, speed=self.turn_radps, acceleration=self.turn_accel_radps2)
+        pieces = [Piece(self.side_m), Piece(pi / 2, bend=side, advance=0.0)] * count
+        return CurveMotion(course(pieces), in_stages([ahead, turn] * count), self.T_world_start)
 
 
-def figure_8(
-    length_m: float,
-    *,
-    width_m: float | None = None,
-    speed_mps: float,
-    laps: int = 1,
-    accel_mps2: float = 0.5,
-    start: Start = ORIGIN,
-) -> CurveMotion:
-    """A figure of eight (Gerono's) from its crossing, half as wide as long where no width is given."""
-    size_m = (length_m, length_m / 2 if width_m is None else width_m)
-    return lissajous(size_m, speed_mps=speed_mps, laps=laps, accel_mps2=accel_mps2, start=start)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure8(Wheeled):
+    """A figure of eight (Gerono's) from its crossing; half as wide as long where no width is given."""
+
+    kind: Literal["figure_8"] = "figure_8"
+    length_m: Length
+    width_m: Length | None = None
+    laps: Laps = 1
+    speed_mps: Speed = 0.3
+    accel_mps2: Acceleration = 0.5
+
+    def way(self) -> CurveMotion:
+        """As an ideal robot drives it. Raises MotionError."""
+        width_m = self.length_m / 2 if self.width_m is None else self.width_m
+        curve = lissajous_curve((self.length_m, width_m), (1, 2), phase_rad=0.0)
+        law = rest_to_rest(curve.arc.length * self.laps, speed=self.speed_mps, acceleration=self.accel_mps2)
+        return CurveMotion(curve, law, self.T_world_start)
 
 
-def lissajous(
-    size_m: tuple[float, float],
-    *,
-    ratio: tuple[int, int] = (1, 2),
-    phase_rad: float = 0.0,
-    speed_mps: float,
-    laps: int = 1,
-    accel_mps2: float = 0.5,
-    start: Start = ORIGIN,
-) -> CurveMotion:
-    """The curve x = A sin(a phi + phase), y = B sin(b phi) of length 2A and width 2B, ratio a:b, from phi = 0."""
-    _require_laps(laps, whole=True)
-    curve: Lissajous = lissajous_curve(size_m, ratio=ratio, phase_rad=phase_rad)
-    law = rest_to_rest(curve.arc.length * int(laps), speed=speed_mps, acceleration=accel_mps2)
-    return CurveMotion(curve, law, _placed(start))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lissajous(Wheeled):
+    """The closed curve x = A sin(a φ + phase), y = B sin(b φ) from φ = 0, of length 2A and width 2B, ratio [a, b]."""
+
+    kind: Literal["lissajous"] = "lissajous"
+    size_m: tuple[Length, Length]
+    ratio: tuple[int, int] = (1, 2)
+    phase_deg: float = 0.0
+    laps: Laps = 1
+    speed_mps: Speed = 0.3
+    accel_mps2: Acceleration = 0.5
+
+    def __post_init__(self) -> None:
+        Wheeled.__post_init__(self)
+        if not all(1 <= n <= MOST_WAVES for n in self.ratio) or gcd(*self.ratio) != 1:
+            raise SettingError(
+                f"should be two whole numbers from 1 to {MOST_WAVES} without a common divisor (got {list(self.ratio)})",
+                "ratio",
+            )
+
+    def way(self) -> CurveMotion:
+        """As an ideal robot drives it. Raises MotionError."""
+        curve = lissajous_curve(self.size_m, self.ratio, phase_rad=radians(self.phase_deg))
+        law = rest_to_rest(curve.arc.length * self.laps, speed=self.speed_mps, acceleration=self.accel_mps2)
+        return CurveMotion(curve, law, self.T_world_start)
 
 
-def stop_and_go(
-    legs_m: Sequence[float], *, speed_mps: float, pause_s: float, accel_mps2: float = 0.5, start: Start = ORIGIN
-) -> CurveMotion:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopAndGo(Wheeled):
     """Straight ahead by each length in turn, with a pause between them."""
-    if not len(legs_m):
-        raise MotionError("legs_m is empty; it should hold the length of each stretch between two stops")
-    laws = [rest_to_rest(leg_m, speed=speed_mps, acceleration=accel_mps2) for leg_m in legs_m]
-    return CurveMotion(course(map(Piece, legs_m)), in_stages(laws, pause_s=pause_s), _placed(start))
+
+    kind: Literal["stop_and_go"] = "stop_and_go"
+    legs_m: Annotated[tuple[Length, ...], MinLen(1)]
+    pause_s: Pause = 1.0
+    speed_mps: Speed = 0.3
+    accel_mps2: Acceleration = 0.5
+
+    def way(self) -> CurveMotion:
+        """As an ideal robot drives it. Raises MotionError."""
+        laws = [rest_to_rest(leg_m, speed=self.speed_mps, acceleration=self.accel_mps2) for leg_m in self.legs_m]
+        return CurveMotion(course(map(Piece, self.legs_m)), in_stages(laws, pause_s=self.pause_s), self.T_world_start)
 
 
-def pure_rotation(
-    angle_rad: float, *, rate_radps: float, accel_radps2: float = 2.0, start: Start = ORIGIN
-) -> CurveMotion:
-    """A turn on the spot, about the middle of the axle: to the left, or to the right where the angle is negative."""
-    if not (np.isfinite(angle_rad) and angle_rad):
-        raise MotionError(f"the angle is {angle_rad:g} rad; it should be finite and other than 0")
-    law = rest_to_rest(abs(angle_rad), speed=rate_radps, acceleration=accel_radps2)
-    return CurveMotion(
-        course([Piece(abs(angle_rad), _side(clockwise=angle_rad < 0), advance=0.0)]), law, _placed(start)
-    )
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PureRotation(Wheeled):
+    """A turn on the spot about the middle of the axle, to the left; to the right for a negative angle.
+
+    The Pioneer does it without feedback: its controller holds the point h, not the axle.
+    """
+
+    mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = {"pioneer": UNLED_KEYS, "unicycle": ()}
+
+    kind: Literal["pure_rotation"] = "pure_rotation"
+    angle_deg: Annotated[float, Ge(-36_000), Le(36_000)]
+    turn_radps: Speed = 1.0
+    turn_accel_radps2: Acceleration = 2.0
+
+    def __post_init__(self) -> None:
+        Wheeled.__post_init__(self)
+        if self.angle_deg == 0:
+            raise SettingError("should be another angle than 0, or less than 0 for right", "angle_deg")
+
+    def way(self) -> CurveMotion:
+        """As an ideal robot drives it. Raises MotionError."""
+        angle_rad = abs(radians(self.angle_deg))
+        law = rest_to_rest(angle_rad, speed=self.turn_radps, acceleration=self.turn_accel_radps2)
+        turn = Piece(angle_rad, _side(clockwise=self.angle_deg < 0), advance=0.0)
+        return CurveMotion(course([turn]), law, self.T_world_start)
 
 
-def reverse(
-    length_m: float,
-    *,
-    speed_mps: float,
-    radius_m: float | None = None,
-    pause_s: float = 0.0,
-    accel_mps2: float = 0.5,
-    start: Start = ORIGIN,
-) -> CurveMotion:
-    """Ahead and back to the start on a straight line, or on an arc to the left (to the right if radius_m < 0)."""
-    _require_positive("length_m", length_m)
-    if radius_m is not None and not (np.isfinite(radius_m) and radius_m):
-        raise MotionError(
-            f"radius_m is {radius_m:g}; it should be finite and other than 0, or none for a straight line"
-        )
-    bend = 1 / radius_m if radius_m else 0.0
-    law = rest_to_rest(length_m, speed=speed_mps, acceleration=accel_mps2)
-    pieces = [Piece(length_m, bend), Piece(length_m, -bend, advance=-1.0)]
-    return CurveMotion(course(pieces), in_stages([law, law], pause_s=pause_s), _placed(start))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reverse(Wheeled):
+    """Ahead and back to the start, straight or on an arc to the left (radius_m < 0: to the right).
+
+    The Pioneer does it without feedback: led backwards by a point ahead of its axle it would swing round.
+    """
+
+    mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = {**MOVER_KEYS, "pioneer": UNLED_KEYS}
+
+    kind: Literal["reverse"] = "reverse"
+    length_m: Length
+    radius_m: float | None = None
+    pause_s: Pause = 0.0
+    speed_mps: Speed = 0.3
+    accel_mps2: Acceleration = 0.5
+
+    def __post_init__(self) -> None:
+        Wheeled.__post_init__(self)
+        if self.radius_m is not None and not 0.01 <= abs(self.radius_m) <= 1e5:
+            raise SettingError(
+                f"should be from 0.01 to 1e5, or less than 0 for right (got {self.radius_m:g})", "radius_m"
+            )
+
+    def way(self) -> CurveMotion:
+        """As an ideal robot drives it. Raises MotionError."""
+        bend = 1 / self.radius_m if self.radius_m else 0.0
+        law = rest_to_rest(self.length_m, speed=self.speed_mps, acceleration=self.accel_mps2)
+        pieces = [Piece(self.length_m, bend), Piece(self.length_m, -bend, advance=-1.0)]
+        return CurveMotion(course(pieces), in_stages([law, law], pause_s=self.pause_s), self.T_world_start)
+
+
+# Where no point ahead of the axle can lead a robot.
+Unled = PureRotation | Reverse
+Planar = Circle | Square | Figure8 | Lissajous | StopAndGo | Unled
 
 
 def _rounded(side_m: float, radius_m: float, *, side: float) -> tuple[float, list[Piece]]:
     """What is left of a side between its corners, and a corner. Raises MotionError where nothing is left."""
-    _require_positive("corner_radius_m", radius_m)
     half_m = pi / 2 * radius_m  # a clothoid to 1/radius turns by half of that curvature times its length
     bent = side / (radius_m * half_m)
     corner = [Piece(half_m, 0.0, bent), Piece(half_m, side / radius_m, -bent)]
@@ -376,27 +421,8 @@ def _end(pieces: Sequence[Piece]) -> Array:
     return end
 
 
-def _placed(start: Start) -> Array:
-    """T_world_start (4, 4)."""
-    if np.shape(start) != (3,) or not np.isfinite(start).all():
-        raise MotionError(f"start is {tuple(start)}; it should be three finite numbers: x and y in m, heading in rad")
-    T_world_start: Array = level(*(np.array([value], float) for value in start))[0]
-    return T_world_start
-
-
 def _side(*, clockwise: bool) -> float:
     return -1.0 if clockwise else 1.0
-
-
-def _require_positive(name: str, value: float) -> None:
-    if not (np.isfinite(value) and value > 0):
-        raise MotionError(f"{name} is {value:g}; it should be a finite number of metres above 0")
-
-
-def _require_laps(laps: float, *, whole: bool) -> None:
-    if not 0 < laps <= MOST_LAPS or (whole and laps != round(laps)):
-        what = "a whole number from 1 to" if whole else "above 0 and at most"
-        raise MotionError(f"laps is {laps:g}; it should be {what} {MOST_LAPS}")
 
 
 # Pieces no longer than this are integrated with four Gauss-Legendre nodes: exact for polynomials of degree 7.

@@ -1,11 +1,12 @@
 """A drive of the Pioneer: control, dynamics and slip together, and its exact motion."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import ceil, inf
-from typing import TypedDict, Unpack
+from typing import Annotated, ClassVar, Literal, TypedDict, Unpack
 
 import numpy as np
+from annotated_types import Gt, Le, MinLen
 from numpy.typing import ArrayLike, NDArray
 
 from vobench.errors import MotionError
@@ -34,6 +35,8 @@ from vobench.motion.slip import (
     drawn,
     generator_of,
 )
+from vobench.motion.wheeled import PIONEER_KEYS, Mover, Wheeled
+from vobench.setting import Positive
 from vobench.trajectory.kinematics import Kinematics, level
 from vobench.trajectory.trajectory import Stamps
 
@@ -159,14 +162,16 @@ def _kinematics(place: Array, speed: Array, rate: Array) -> Kinematics:
 TAIL_S = 1.0
 # What is slower or faster is a slip of the pen, and would fill the memory.
 LONGEST_LEG_S, FASTEST_HZ = 3600.0, 1e4
+LegTime = Annotated[float, Gt(0), Le(LONGEST_LEG_S)]
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
     """What the robot did, at N frames and M = (N - 1) substeps + 1 encoder instants.
 
-    state (N, 5): x, y of h in m, psi in rad, u, omega; references (N, 2) hold from their frame on. `motion` is of the
-    axle midpoint B, sliding included. reached: the frame that ended each leg, by entering its target or by the clock.
+    state (N, 5): x, y of h in m, psi in rad, u, omega; references (N, 2) hold from their frame on, and rates (N, 2) are
+    u' and omega' as they begin to. `motion` is of the axle midpoint B, sliding included. reached: the frame that ended
+    each leg, by entering its target or by the clock.
     rim_rad (M, 2): left, right. slip (N, 3): both sigmas and beta in rad; delta (N, 2). theta: this very robot's,
     None if ideal.
     """
@@ -174,6 +179,7 @@ class Drive:
     t_ns: Stamps
     state: Array
     references: Array
+    rates: Array
     reached: tuple[int, ...]
     encoder_t_ns: Stamps
     rim_rad: Array
@@ -206,6 +212,52 @@ class DriveOptions(TypedDict, total=False):
     substeps: int
     integrator: str
     rngs: Generators | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waypoints(Wheeled):
+    """Targets that the paper's controller steers the point h through, `start_m` being h's."""
+
+    mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = {
+        "pioneer": PIONEER_KEYS,
+        "unicycle": ("controller", "max_accel_mps2", "max_turn_accel_radps2", "integrator", "substeps"),
+    }
+
+    kind: Literal["waypoints"] = "waypoints"
+    targets_m: Annotated[tuple[tuple[float, float], ...], MinLen(1)]
+    tolerance_m: Positive = 0.01
+    leg_s: LegTime | None = None
+    max_time_s: LegTime = 60.0
+
+    def drive(self, rngs: Generators) -> Drive:
+        """From rest through the targets. Raises MotionError."""
+        return drive(
+            self.targets_m,
+            start=self.start,
+            tolerance_m=self.tolerance_m,
+            max_time_s=self.max_time_s,
+            leg_s=self.leg_s,
+            **options(self, rngs),
+        )
+
+
+def options(robot: Wheeled, rngs: Generators) -> DriveOptions:
+    """Which robot it is, and what is done to it."""
+    is_ideal = robot.mover == "unicycle"
+    return {
+        "theta": None if is_ideal else robot.theta,
+        "theta_std": 0.0 if is_ideal else robot.robot_spread,
+        "controller": CONTROLLERS[robot.controller],
+        "limits": robot.limits,
+        "slip": SLIPS["none" if is_ideal else robot.slip],
+        "delta": DELTAS["none" if is_ideal else robot.delta],
+        "floor": () if is_ideal else robot.floor,
+        "wheels": robot.wheels,
+        "rate_hz": robot.rate_hz,
+        "substeps": robot.substeps,
+        "integrator": robot.integrator,
+        "rngs": rngs,
+    }
 
 
 def drive(
@@ -310,10 +362,14 @@ def _record(
 ) -> Drive:
     """The drive from the states (1 or substeps, 7) of its periods, references (N, 2) and slip at N frames."""
     fine, disturbed = np.concatenate(periods), np.array(slips)
+    state = fine[:: vehicle.substeps, :5]
+    u, omega = speeds = state[:, 3], state[:, 4]
+    u_ref, omega_ref, delta_u, delta_omega = *asked.T, *disturbed[:, 5:].T
     return Drive(
         t_ns=_stamps(len(slips), vehicle.rate_hz, 1),
-        state=fine[:: vehicle.substeps, :5],
+        state=state,
         references=asked,
+        rates=np.stack(vehicle.speed_rates(u, omega, (u_ref, omega_ref), speeds, (delta_u, delta_omega)), -1),
         reached=ends,
         encoder_t_ns=_stamps(len(fine), vehicle.rate_hz, vehicle.substeps),
         rim_rad=fine[:, 5:],

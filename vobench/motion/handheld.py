@@ -1,17 +1,16 @@
-"""A body carried by hand: a smooth way through poses, with a shake of six degrees of freedom on top.
-
-SHAKES: the presets by name. handheld: the motion.
-"""
+"""A body carried by hand: a smooth way through poses, with a shake of six degrees of freedom on top."""
 
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from vobench.errors import MotionError
+from vobench.errors import SettingError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.motion.spline import pose_spline, turned
+from vobench.motion.spline import Poses, columns, pose_spline, turned
+from vobench.motion.wheeled import Rate
+from vobench.setting import SETTINGS, NonNegative, OneOf, require
 from vobench.trajectory.kinematics import Kinematics, Motion
 from vobench.trajectory.trajectory import Stamps
 
@@ -19,6 +18,9 @@ BAND_HZ = (0.5, 8.0)
 WAVES = 16  # for each degree of freedom
 # How amplitude falls with frequency: as its square, so that every octave shakes as hard, as a mass would.
 FALL = 2.0
+
+
+Sizes = tuple[NonNegative, NonNegative, NonNegative]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +31,16 @@ class ShakeSettings:
     much to one side and the other. Both are 0 for one who stands.
     """
 
-    rms_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    rms_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    step_hz: float = 0.0
-    bounce_m: float = 0.0
+    rms_m: Sizes = (0.0, 0.0, 0.0)
+    rms_rad: Sizes = (0.0, 0.0, 0.0)
+    step_hz: NonNegative = 0.0
+    bounce_m: NonNegative = 0.0
+
+    def __post_init__(self) -> None:
+        require(self)
+        low_hz, high_hz = BAND_HZ
+        if self.bounce_m and not 2 * low_hz <= self.step_hz <= high_hz:
+            raise SettingError(f"should be from {2 * low_hz:g} to {high_hz:g} (got {self.step_hz:g})", "step_hz")
 
 
 # Engineering choices: plausible for a person with a camera in both hands, not taken from a measurement. Only the
@@ -100,26 +108,30 @@ class HandheldMotion:
         return composed(self.carrier.at(t_ns), self.shake.at(np.asarray(t_ns, float) / 1e9))
 
 
-def handheld(
-    t_s: ArrayLike,
-    T_world_body: ArrayLike,
-    *,
-    rng: np.random.Generator,
-    shake: ShakeSettings = SHAKES["walking"],
-    ease_s: float = 0.0,
-) -> HandheldMotion:
-    """The pose_spline through the poses, shaken; the shake goes on where the way is at rest. Raises MotionError."""
-    return HandheldMotion(pose_spline(t_s, T_world_body, ease_s=ease_s), draw_shake(shake, rng))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Handheld:
+    """A smooth way through poses, carried by somebody whose hands shake, also where the way is at rest."""
+
+    __pydantic_config__ = SETTINGS
+    kind: Literal["handheld"] = "handheld"
+    poses: Poses
+    shake: Annotated[str, OneOf("shake", SHAKES)] = "walking"
+    ease_s: NonNegative = 0.0
+    rate_hz: Rate = 30.0
+
+    def __post_init__(self) -> None:
+        require(self)
+
+    def motion(self, rng: np.random.Generator) -> HandheldMotion:
+        """The motion with its shake drawn from `rng`. Raises MotionError."""
+        carrier = pose_spline(*columns(self.poses), ease_s=self.ease_s)
+        return HandheldMotion(carrier, draw_shake(SHAKES[self.shake], rng))
 
 
 def draw_shake(settings: ShakeSettings, rng: np.random.Generator) -> Shake:
-    """One shake: a sine in each of equal steps of log frequency, of random frequency and phase. Raises MotionError."""
+    """One shake: a sine in each of equal steps of log frequency, of random frequency and phase."""
     rms = np.array([*settings.rms_m, *settings.rms_rad])
     low_hz, high_hz = BAND_HZ
-    if not (np.isfinite([*rms, settings.bounce_m]).all() and min(*rms, settings.bounce_m) >= 0):
-        raise MotionError(f"a shake is of finite sizes of 0 or more, not {settings}")
-    if settings.bounce_m and not 2 * low_hz <= settings.step_hz <= high_hz:
-        raise MotionError(f"step_hz is {settings.step_hz:g}; it should be from {2 * low_hz:g} to {high_hz:g}")
     cells = (np.arange(WAVES) + rng.random((6, WAVES))) / WAVES
     frequency_hz = low_hz * (high_hz / low_hz) ** cells
     amplitude = frequency_hz**-FALL

@@ -1,21 +1,25 @@
 """A quadrotor through points on the way of least snap, tilted as its thrust must be.
 
-quadrotor: the motion from hover to hover. Source: Mellinger and Kumar (2011), minimum snap and differential flatness.
+Source: Mellinger and Kumar (2011), minimum snap and differential flatness.
 """
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from math import radians
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
+from annotated_types import Ge, Le, MinLen
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion import spline as attitude
-from vobench.motion.spline import Jet, check_times
+from vobench.motion.rail import check_apart
+from vobench.motion.spline import Jet, from_zero
+from vobench.motion.wheeled import Rate, Speed
+from vobench.setting import SETTINGS, Triple, require
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, CurveMotion, Kinematics, evenly
 
 if TYPE_CHECKING:
@@ -53,24 +57,44 @@ class QuadrotorCurve:
         return Jet(ahead, left * rate, left * change - ahead * rate**2)
 
 
-def quadrotor(
-    points_m: ArrayLike, *, t_s: ArrayLike | None = None, speed_mps: float = 1.0, yaw_rad: float | None = None
-) -> CurveMotion:
-    """Through points (N, 3) at times t_s (N,), or at the times of least snap for a mean speed between the points.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quadrotor:
+    """Through points on the way of least snap, from hover to hover, tilted as thrust must be.
 
-    yaw_rad None: at each point it looks the way it flies, and between them it turns smoothly.
-    Raises MotionError for points or times that make no way, and for a flight in which the rotors would have to pull.
+    Without `t_s` each leg has the time that snap asks for, and all of them the mean speed; without `yaw_deg`
+    it looks the way it flies.
     """
-    points = np.asarray(points_m, float)
-    _check_points(points)
-    times_s = _least_snap_times(points, speed_mps) if t_s is None else np.atleast_1d(np.asarray(t_s, float))
-    if len(times_s) != len(points):
-        raise MotionError(f"there are {len(times_s)} times for {len(points)} points; each point needs one")
-    check_times(times_s, fewest=2, of="point")
-    position = minimum_snap(times_s, points)
-    curve = QuadrotorCurve(position, _yaw(position, times_s, points, yaw_rad), times_s[1:-1])
-    _check_lift(curve, times_s)
-    return CurveMotion(curve, evenly(times_s[0], times_s[-1], begin=times_s[0]))
+
+    __pydantic_config__ = SETTINGS
+    kind: Literal["quadrotor"] = "quadrotor"
+    points_m: Annotated[tuple[Triple, ...], MinLen(2)]
+    t_s: tuple[float, ...] | None = None
+    speed_mps: Speed = 0.5
+    yaw_deg: Annotated[float, Ge(-360), Le(360)] | None = None
+    rate_hz: Rate = 30.0
+
+    def __post_init__(self) -> None:
+        require(self)
+
+    def motion(self) -> CurveMotion:
+        """The motion. Raises MotionError for points or times that make no way, or rotors that would have to pull."""
+        points = np.array(self.points_m)
+        check_apart(points, of="flight")
+        t_s = _least_snap_times(points, self.speed_mps) if self.t_s is None else from_zero(self.t_s, of="point")
+        if len(t_s) != len(points):
+            raise MotionError(f"there are {len(t_s)} times for {len(points)} points; each point needs one")
+        position = minimum_snap(t_s, points)
+        curve = QuadrotorCurve(position, self._yaw(position, t_s, points), t_s[1:-1])
+        _check_lift(curve, t_s)
+        return CurveMotion(curve, evenly(t_s[0], t_s[-1], begin=t_s[0]))
+
+    def _yaw(self, position: "BSpline", t_s: Array, points: Array) -> "BSpline":
+        """Yaw by time, at rest at both ends."""
+        yaw = _headings(position, t_s, points)
+        if self.yaw_deg is not None:
+            yaw = np.full(len(t_s), radians(self.yaw_deg))
+        rest = [(1, 0.0), (2, 0.0)]
+        return scipy.interpolate.make_interp_spline(t_s, yaw, k=5, bc_type=(rest, rest))
 
 
 def minimum_snap(t_s: Array, points_m: Array) -> "BSpline":
@@ -93,8 +117,6 @@ def snap_cost(position: "BSpline", t_s: Array) -> float:
 
 def _least_snap_times(points: Array, speed_mps: float) -> Array:
     """Times of the points, the whole as long as `speed_mps` asks, shared out so that snap is least."""
-    if not (np.isfinite(speed_mps) and speed_mps > 0):
-        raise MotionError(f"speed_mps is {speed_mps:g}; it should be a finite speed above 0")
     legs_m = np.linalg.norm(np.diff(points, axis=0), axis=1)
 
     def times(log_shares: Array) -> Array:
@@ -110,15 +132,6 @@ def _least_snap_times(points: Array, speed_mps: float) -> Array:
     return times(found.x) * lasts_s
 
 
-def _yaw(position: "BSpline", t_s: Array, points: Array, yaw_rad: float | None) -> "BSpline":
-    """Yaw by time, at rest at both ends."""
-    if yaw_rad is not None and not np.isfinite(yaw_rad):
-        raise MotionError(f"yaw_rad is {yaw_rad:g}; it should be finite, or none to look along the way")
-    yaw = np.full(len(t_s), yaw_rad) if yaw_rad is not None else _headings(position, t_s, points)
-    rest = [(1, 0.0), (2, 0.0)]
-    return scipy.interpolate.make_interp_spline(t_s, yaw, k=5, bc_type=(rest, rest))
-
-
 def _headings(position: "BSpline", t_s: Array, points: Array) -> Array:
     """The direction of flight (N,) over ground at each point, turning the shorter way; where it has none, the last."""
     ways = position(t_s, 1)
@@ -130,18 +143,6 @@ def _headings(position: "BSpline", t_s: Array, points: Array) -> Array:
     known = np.maximum.accumulate(np.where(has_heading, np.arange(len(t_s)), int(np.argmax(has_heading))))
     headings: Array = np.unwrap(np.arctan2(ways[known, 1], ways[known, 0]))
     return headings
-
-
-def _check_points(points: Array) -> None:
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:
-        raise MotionError(
-            f"a flight needs two points or more of x, y and z in m, but they have the shape {points.shape}"
-        )
-    if not np.isfinite(points).all():
-        raise MotionError(f"point {int(np.flatnonzero(~np.isfinite(points).all(1))[0])} of the flight is not finite")
-    same = np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) == 0)
-    if same.size:
-        raise MotionError(f"points {same[0]} and {same[0] + 1} of the flight are the same; leave one of them out")
 
 
 def _check_lift(curve: QuadrotorCurve, t_s: Array) -> None:

@@ -1,13 +1,10 @@
-"""A carriage on a rail through points in space: it looks along the rail, level from side to side.
-
-rail: the motion along the rail.
-"""
+"""A carriage on a rail through points in space: it looks along the rail, level from side to side."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from annotated_types import MinLen
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
@@ -15,6 +12,8 @@ from vobench.geometry.se3 import Array
 from vobench.motion import spline as attitude
 from vobench.motion.course import BLUNT, ArcLength, arc_length
 from vobench.motion.spline import Jet, quintic
+from vobench.motion.wheeled import Acceleration, Rate, Speed
+from vobench.setting import SETTINGS, Triple, require
 from vobench.trajectory.kinematics import CurveMotion, Kinematics, rest_to_rest
 
 if TYPE_CHECKING:
@@ -55,34 +54,41 @@ class RailCurve:
         )
 
 
-def rail(points_m: ArrayLike, *, speed_mps: float, accel_mps2: float = 0.5) -> CurveMotion:
-    """From rest to rest along the smooth way through points (N, 3), two or more.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rail:
+    """Along a rail through points from rest to rest, looking along it, level from side to side."""
 
-    Raises MotionError for points that are not finite or the same as the one before, and where the rail
-    stands on end or turns back on itself.
-    """
-    points = np.asarray(points_m, float)
-    _check_points(points)
-    if len(points) == 2:
-        points = np.insert(points, 1, points.mean(0), axis=0)
-    u = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    position = quintic(u, points)
-    parts = np.arange(KNOTS_PER_POINT) / KNOTS_PER_POINT
-    knots = np.append((u[:-1, None] + np.diff(u)[:, None] * parts).ravel(), u[-1])
-    _check_way(position(knots, 1), position(knots))
-    arc = arc_length(lambda at: np.linalg.norm(position(at, 1), axis=-1), knots)
-    law = rest_to_rest(arc.length, speed=speed_mps, acceleration=accel_mps2)
-    return CurveMotion(RailCurve(position, arc), law)
+    __pydantic_config__ = SETTINGS
+    kind: Literal["rail"] = "rail"
+    points_m: Annotated[tuple[Triple, ...], MinLen(2)]
+    speed_mps: Speed = 0.3
+    accel_mps2: Acceleration = 0.5
+    rate_hz: Rate = 30.0
+
+    def __post_init__(self) -> None:
+        require(self)
+
+    def motion(self) -> CurveMotion:
+        """The motion. Raises MotionError where two points are the same, or the rail stands on end or turns back."""
+        points = np.array(self.points_m)
+        check_apart(points, of="rail")
+        if len(points) == 2:
+            points = np.insert(points, 1, points.mean(0), axis=0)
+        u = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        position = quintic(u, points)
+        parts = np.arange(KNOTS_PER_POINT) / KNOTS_PER_POINT
+        knots = np.append((u[:-1, None] + np.diff(u)[:, None] * parts).ravel(), u[-1])
+        _check_way(position(knots, 1), position(knots))
+        arc = arc_length(lambda at: np.linalg.norm(position(at, 1), axis=-1), knots)
+        law = rest_to_rest(arc.length, speed=self.speed_mps, acceleration=self.accel_mps2)
+        return CurveMotion(RailCurve(position, arc), law)
 
 
-def _check_points(points: Array) -> None:
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:
-        raise MotionError(f"a rail needs two points or more of x, y and z in m, but they have the shape {points.shape}")
-    if not np.isfinite(points).all():
-        raise MotionError(f"point {int(np.flatnonzero(~np.isfinite(points).all(1))[0])} of the rail is not finite")
+def check_apart(points: Array, *, of: str) -> None:
+    """Raise MotionError where two points (N, 3) in a row are the same; `of` names what goes through them."""
     same = np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) == 0)
     if same.size:
-        raise MotionError(f"points {same[0]} and {same[0] + 1} of the rail are the same; leave one of them out")
+        raise MotionError(f"points {same[0]} and {same[0] + 1} of the {of} are the same; leave one of them out")
 
 
 def _check_way(tangents: Array, at_m: Array) -> None:

@@ -1,17 +1,19 @@
-"""A recorded trajectory as a motion: through its very poses for cameras, or smoothed where accelerations count.
+"""A recorded trajectory as a motion: through its very poses for cameras, or smoothed where accelerations count."""
 
-AXES: what a recording's axes are, by name. interpolated, smoothed: the motions.
-"""
-
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from math import radians
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 import scipy
+from annotated_types import Ge, Gt, Le
 
-from vobench.errors import MotionError
+from vobench.errors import InputError, MotionError, SettingError, unknown
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.spline import FEWEST, PoseCurve, by_quaternion, through
+from vobench.motion.wheeled import Rate
+from vobench.setting import SETTINGS, Positive, Triple, require
 from vobench.trajectory.kinematics import CurveMotion, evenly
 from vobench.trajectory.trajectory import Move, Trajectory, parse_move
 
@@ -33,45 +35,72 @@ AXES: dict[str, Move | None] = {
 }
 
 
-def interpolated(
-    trajectory: Trajectory,
-    *,
-    start: tuple[float, float, float, float] | None = None,
-    speed: float = 1.0,
-    max_gap_s: float = 1.0,
-) -> CurveMotion:
-    """Through every pose, for cameras only: the noise of a recording becomes metres per second squared.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replay:
+    """The poses of a TUM, EuRoC, KITTI or TartanAir file, told by content, and how the body goes through them.
 
-    start: the body's x, y, z in m and heading in rad at first, else as recorded; the vertical stays.
-    speed: how many times as fast as recorded. Raises MotionError for what makes no motion.
+    Smoothed by a least-squares spline with knots at `knot_hz`, or `exact`, which is for cameras alone. Files
+    without stamps need `times`, a file of them, or `recorded_hz`. Without `start_m` it starts as recorded.
     """
-    t_s, T = _recorded(trajectory, fewest=FEWEST, max_gap_s=max_gap_s)
-    return _replayed(through(t_s, T), t_s[-1], start=start, speed=speed)
+
+    __pydantic_config__ = SETTINGS
+    kind: Literal["replay"] = "replay"
+    file: str
+    times: str | None = None
+    recorded_hz: Positive | None = None
+    axes: str = "body"
+    exact: bool = False
+    knot_hz: Annotated[float, Gt(0), Le(1000)] = 10.0
+    speed: Annotated[float, Ge(0.01), Le(100)] = 1.0
+    max_gap_s: Positive = 1.0
+    start_m: Triple | None = None
+    start_heading_deg: float = 0.0
+    rate_hz: Rate = 30.0
+
+    def __post_init__(self) -> None:
+        require(self)
+        try:
+            self.move()
+        except InputError as error:
+            raise SettingError(str(error), "axes") from None
+        if self.start_m is None and self.start_heading_deg:
+            raise SettingError("belongs to start_m; without it the body starts as recorded", "start_heading_deg")
+
+    def move(self) -> Move | None:
+        """What takes the file's poses to the body's."""
+        if self.axes in AXES:
+            return AXES[self.axes]
+        if ":" not in self.axes:
+            raise InputError(unknown("convention of axes", self.axes, list(AXES)))
+        return parse_move(self.axes)
+
+    def motion(self, recorded: Trajectory) -> CurveMotion:
+        """The motion through, or near, recorded poses of the body. Raises MotionError for what makes no motion."""
+        fewest = FEWEST if self.exact else FEWEST_SMOOTHED
+        t_s, T = _recorded(recorded, fewest=fewest, max_gap_s=self.max_gap_s)
+        curve = through(t_s, T) if self.exact else _smoothed(t_s, T, knot_hz=self.knot_hz)
+        law = evenly(0.0, t_s[-1] / self.speed, rate=self.speed)
+        return CurveMotion(curve, law, self._placed(curve.at(np.zeros(1)).T_world_body[0]))
+
+    def _placed(self, T_first: Array) -> Array:
+        """T_world_start (4, 4) that brings the first pose to the start, turning about the vertical alone."""
+        if self.start_m is None:
+            return np.eye(4)
+        R = se3.rotation_z(radians(self.start_heading_deg) - np.arctan2(T_first[1, 0], T_first[0, 0]))
+        return se3.transform(R, np.array(self.start_m) - R @ T_first[:3, 3])
 
 
-def smoothed(
-    trajectory: Trajectory,
-    *,
-    knot_hz: float = 10.0,
-    start: tuple[float, float, float, float] | None = None,
-    speed: float = 1.0,
-    max_gap_s: float = 1.0,
-) -> CurveMotion:
+def _smoothed(t_s: Array, T: Array, *, knot_hz: float) -> PoseCurve:
     """The quintic B-spline of least squares, of positions and of quaternions, with knots at knot_hz or fewer.
 
     Knots are left out until two poses lie between each two, so that a gap is one stretch of the spline.
-    `start`, `speed` and errors are as `interpolated` has them.
     """
-    if not (np.isfinite(knot_hz) and knot_hz > 0):
-        raise MotionError(f"knot_hz is {knot_hz:g}; it should be a finite number above 0")
-    t_s, T = _recorded(trajectory, fewest=FEWEST_SMOOTHED, max_gap_s=max_gap_s)
     columns = np.column_stack([T[:, :3, 3], _unbroken(se3.to_quaternion(T[:, :3, :3]))])
     spline = _least_squares(t_s, columns, knot_hz=knot_hz)
     position, quaternion = (
         scipy.interpolate.BSpline(spline.t, spline.c[:, part], DEGREE) for part in (slice(3), slice(3, 7))
     )
-    curve = PoseCurve(position, by_quaternion(quaternion), breaks=np.zeros(0))
-    return _replayed(curve, t_s[-1], start=start, speed=speed)
+    return PoseCurve(position, by_quaternion(quaternion), breaks=np.zeros(0))
 
 
 def _recorded(trajectory: Trajectory, *, fewest: int, max_gap_s: float) -> tuple[Array, Array]:
@@ -87,25 +116,6 @@ def _recorded(trajectory: Trajectory, *, fewest: int, max_gap_s: float) -> tuple
             f"a gap may last max_gap_s {max_gap_s:g}: replay one side of it, or allow more"
         )
     return t_s, se3.transform(se3.nearest_rotation(T[:, :3, :3]), T[:, :3, 3])
-
-
-def _replayed(
-    curve: PoseCurve, lasts_s: float, *, start: tuple[float, float, float, float] | None, speed: float
-) -> CurveMotion:
-    if not (np.isfinite(speed) and speed > 0):
-        raise MotionError(f"speed is {speed:g}; it should be a finite factor above 0")
-    law = evenly(0.0, lasts_s / speed, rate=speed)
-    return CurveMotion(curve, law, _placed(curve.at(np.zeros(1)).T_world_body[0], start))
-
-
-def _placed(T_first: Array, start: tuple[float, float, float, float] | None) -> Array:
-    """T_world_start (4, 4) that brings the first pose to the start, turning about the vertical alone."""
-    if start is None:
-        return np.eye(4)
-    if np.shape(start) != (4,) or not np.isfinite(start).all():
-        raise MotionError(f"start is {tuple(start)}; it should be four finite numbers: x, y, z in m, heading in rad")
-    R = se3.rotation_z(start[3] - np.arctan2(T_first[1, 0], T_first[0, 0]))
-    return se3.transform(R, np.array(start[:3]) - R @ T_first[:3, 3])
 
 
 def _unbroken(q_xyzw: Array) -> Array:

@@ -1,15 +1,18 @@
 """Wheel slip, patches of floor, and the pushes delta of (18)."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from itertools import accumulate
-from math import cos, exp, isfinite, radians, sin, sqrt, tan
-from typing import NamedTuple
+from math import cos, exp, radians, sin, sqrt, tan
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from annotated_types import Ge, Le
 
 from vobench.errors import MotionError
+from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.setting import SETTINGS, OneOf, Positive, require
 
 # The random streams, one for each process: switching one off leaves the others as they were.
 SLIP_STREAMS = ("left", "right", "side")
@@ -25,22 +28,14 @@ class SlipSettings:
     Engineering choices: no published values exist.
     """
 
-    ratio_std: float = 0.0
-    angle_std_rad: float = 0.0
-    skid_s: float = 0.0
-    correlation_s: float = 0.3
-    traction_s2pm: float = 0.0
+    ratio_std: Annotated[float, Ge(0), Le(0.1)] = 0.0
+    angle_std_rad: Annotated[float, Ge(0), Le(0.15)] = 0.0
+    skid_s: Annotated[float, Ge(0), Le(0.5)] = 0.0
+    correlation_s: Positive = 0.3
+    traction_s2pm: Annotated[float, Ge(0), Le(0.1)] = 0.0
 
     def __post_init__(self) -> None:
-        if not (0 <= self.skid_s <= 0.5 and 0 <= self.traction_s2pm <= 0.1):
-            raise MotionError(
-                f"slip needs skid_s in 0..0.5 and traction_s2pm in 0..0.1, got {self.skid_s} and {self.traction_s2pm}"
-            )
-        if not (0 <= self.ratio_std <= 0.1 and 0 <= self.angle_std_rad <= 0.15 and self.correlation_s > 0):
-            raise MotionError(
-                f"slip needs ratio_std in 0..0.1, angle_std_rad in 0..0.15 and correlation_s > 0, "
-                f"got {self.ratio_std}, {self.angle_std_rad} and {self.correlation_s}"
-            )
+        require(self)
 
 
 SLIPS = {
@@ -121,6 +116,9 @@ def slip_path(count: int, settings: SlipSettings, *, step_s: float, rngs: Genera
     return path
 
 
+Bias = Annotated[float, Ge(-0.3), Le(0.3)]
+
+
 @dataclass(frozen=True, slots=True)
 class Ground:
     """What a floor does to slip: it multiplies slip ratios and side-slip angle by `factor`, then adds to them.
@@ -128,15 +126,12 @@ class Ground:
     `ratio_bias`: both rims run ahead by that; `angle_bias_rad`: pulled to the left, as by a carpet's nap.
     """
 
-    factor: float = 1.0
-    ratio_bias: float = 0.0
-    angle_bias_rad: float = 0.0
+    factor: Annotated[float, Ge(0), Le(50)] = 1.0
+    ratio_bias: Bias = 0.0
+    angle_bias_rad: Bias = 0.0
 
     def __post_init__(self) -> None:
-        if not (0 <= self.factor <= 50 and abs(self.ratio_bias) <= 0.3 and abs(self.angle_bias_rad) <= 0.3):
-            raise MotionError(
-                f"a surface needs a factor in 0..50, ratio_bias and angle_bias_rad within 0.3, got {astuple(self)}"
-            )
+        require(self)
 
 
 # Engineering choices: a wet patch spins the wheels, a carpet holds less well and pulls along its nap, a seam is a jolt.
@@ -147,29 +142,30 @@ SURFACES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FloorPatch:
-    """A rectangle (two sides in m, turned by yaw) around a point of the floor, all of one surface.
+    """A rectangle of the floor that is wet, covered or a seam: slip is another there."""
 
-    Raises MotionError where it has no area or a value is not finite.
-    """
-
-    surface: Ground
+    __pydantic_config__ = SETTINGS
+    surface: Annotated[str, OneOf("surface", SURFACES)]
     center_m: tuple[float, float]
-    size_m: tuple[float, float]
-    yaw_rad: float = 0.0
+    size_m: tuple[Positive, Positive]
+    yaw_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (all(map(isfinite, (*self.center_m, *self.size_m, self.yaw_rad))) and min(self.size_m) > 0):
-            raise MotionError(
-                f"a floor patch needs a finite center_m, yaw and positive size_m, "
-                f"got {self.center_m}, {self.yaw_rad} and {self.size_m}"
-            )
+        require(self)
+
+    @property
+    def corners_m(self) -> Array:
+        """Its corners (4, 2) on the floor, in turn."""
+        half = np.array(self.size_m) / 2 * [[1, 1], [-1, 1], [-1, -1], [1, -1]]
+        corners: Array = half @ se3.rotation_z(radians(self.yaw_deg))[:2, :2].T + self.center_m
+        return corners
 
     def holds(self, x_m: float, y_m: float) -> bool:
         """Whether a point of the floor is on it."""
         x, y = x_m - self.center_m[0], y_m - self.center_m[1]
-        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
+        c, s = cos(radians(self.yaw_deg)), sin(radians(self.yaw_deg))
         return abs(c * x + s * y) <= self.size_m[0] / 2 and abs(c * y - s * x) <= self.size_m[1] / 2
 
 
@@ -178,9 +174,10 @@ def under(patches: Sequence[FloorPatch], x_m: float, y_m: float) -> tuple[float,
     factor, ratio_bias, angle_bias_rad = 1.0, 0.0, 0.0
     for patch in patches:
         if patch.holds(x_m, y_m):
-            factor *= patch.surface.factor
-            ratio_bias += patch.surface.ratio_bias
-            angle_bias_rad += patch.surface.angle_bias_rad
+            ground = SURFACES[patch.surface]
+            factor *= ground.factor
+            ratio_bias += ground.ratio_bias
+            angle_bias_rad += ground.angle_bias_rad
     return factor, ratio_bias, angle_bias_rad
 
 
@@ -198,19 +195,15 @@ Contacts = Sequence[tuple[float, float]]
 class DeltaSettings:
     """The pushes delta_u (m/s^2) and delta_omega (rad/s^2) of (18) as Ornstein-Uhlenbeck processes.
 
-    Standard deviations, and the time over which both forget. Raises MotionError where one is out of range.
+    Standard deviations, and the time over which both forget.
     """
 
-    speed_std_mps2: float = 0.0
-    turn_std_radps2: float = 0.0
-    correlation_s: float = 0.5
+    speed_std_mps2: Annotated[float, Ge(0), Le(10)] = 0.0
+    turn_std_radps2: Annotated[float, Ge(0), Le(50)] = 0.0
+    correlation_s: Positive = 0.5
 
     def __post_init__(self) -> None:
-        if not (0 <= self.speed_std_mps2 <= 10 and 0 <= self.turn_std_radps2 <= 50 and self.correlation_s > 0):
-            raise MotionError(
-                f"delta needs speed_std_mps2 in 0..10, turn_std_radps2 in 0..50 and correlation_s > 0, "
-                f"got {self.speed_std_mps2}, {self.turn_std_radps2} and {self.correlation_s}"
-            )
+        require(self)
 
 
 # Engineering choices: an even floor, and one whose bumps shove the robot as it goes.

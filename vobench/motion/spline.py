@@ -1,16 +1,19 @@
 """Pose splines: positions and rotations through or near given poses, twice smooth."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
 import scipy
+from annotated_types import MinLen
 from numpy.typing import ArrayLike
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.motion.wheeled import Rate
+from vobench.setting import SETTINGS, NonNegative, Triple, require
 from vobench.trajectory.kinematics import CurveMotion, Kinematics, TimeLaw, evenly, rest_to_rest
 
 
@@ -110,6 +113,63 @@ class PoseCurve:
             acceleration_mps2=held.in_body(self.position(s, 2)),
             turn_rate_radps2=held.turn_rate,
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pose:
+    """Where the body is at a time, and how it is turned: yaw to the left, pitch down, roll to the right."""
+
+    __pydantic_config__ = SETTINGS
+    t_s: float
+    position_m: Triple
+    yaw_deg: float = 0.0
+    pitch_deg: float = 0.0
+    roll_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        require(self)
+
+    @property
+    def T_world_body(self) -> Array:
+        """The pose (4, 4): rolled about x first, then pitched about y, then turned about z."""
+        from scipy.spatial.transform import Rotation
+
+        angles = (self.roll_deg, self.pitch_deg, self.yaw_deg)
+        return se3.transform(Rotation.from_euler("xyz", angles, degrees=True).as_matrix(), np.array(self.position_m))
+
+
+Poses = Annotated[tuple[Pose, ...], MinLen(FEWEST)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseSpline:
+    """A smooth way through poses at given times; with ease_s from rest to rest."""
+
+    __pydantic_config__ = SETTINGS
+    kind: Literal["pose_spline"] = "pose_spline"
+    poses: Poses
+    ease_s: NonNegative = 0.0
+    rate_hz: Rate = 30.0
+
+    def __post_init__(self) -> None:
+        require(self)
+
+    def motion(self) -> CurveMotion:
+        """The motion. Raises MotionError."""
+        return pose_spline(*columns(self.poses), ease_s=self.ease_s)
+
+
+def columns(poses: Sequence[Pose]) -> tuple[Array, Array]:
+    """Times (N,) from the first pose on, and poses (N, 4, 4). Raises MotionError where times do not rise."""
+    return from_zero([pose.t_s for pose in poses], of="pose"), np.stack([pose.T_world_body for pose in poses])
+
+
+def from_zero(t_s: Sequence[float], *, of: str) -> Array:
+    """Times (N,) since the first; what is wrong with them is said in the times that were written."""
+    written: Array = np.array(t_s)
+    check_times(written, fewest=2, of=of)
+    since: Array = written - written[0]
+    return since
 
 
 def pose_spline(t_s: ArrayLike, T_world_body: ArrayLike, *, ease_s: float = 0.0) -> CurveMotion:

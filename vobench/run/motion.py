@@ -12,24 +12,19 @@ from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.ackermann import ACKERMANNS, ackermann
-from vobench.motion.controller import CONTROLLERS, ControllerSettings
-from vobench.motion.course import rolled
-from vobench.motion.drive import Drive, DriveOptions, drive, follow, led_by
-from vobench.motion.pioneer import THETAS, Theta, feed_forward
-from vobench.motion.slip import DELTAS, DISTURBANCE_STREAMS, SLIPS
+from vobench.motion.controller import ControllerSettings
+from vobench.motion.course import Planar, Unled, rolled
+from vobench.motion.drive import Drive, Waypoints, follow, led_by, options
+from vobench.motion.handheld import Handheld
+from vobench.motion.pioneer import Theta, feed_forward
+from vobench.motion.replay import Replay
+from vobench.motion.slip import DISTURBANCE_STREAMS, Generators
+from vobench.motion.wheeled import Wheeled
 from vobench.suite.scene_file import movers
 from vobench.suite.suite import Case, Plan
-from vobench.suite.trajectory import (
-    CurveSpec,
-    GroundSpec,
-    HandheldSpec,
-    ReplaySpec,
-    SpatialSpec,
-    UnledSpec,
-    WaypointsSpec,
-)
 from vobench.suite.yaml_file import Mistakes
-from vobench.trajectory.kinematics import CurveMotion, Kinematics, Motion
+from vobench.trajectory.formats import parse_tum
+from vobench.trajectory.kinematics import Kinematics, Motion
 from vobench.trajectory.trajectory import Stamps
 
 
@@ -73,12 +68,20 @@ class BodyMotion:
 def body_motion(case: Case) -> BodyMotion:
     """The case's body on its way; the same for every scene, rig and camera. Raises MotionError."""
     spec = case.trajectory
-    if isinstance(spec, WaypointsSpec):
-        return _led(_through_targets(case, spec))
-    if isinstance(spec, GroundSpec):
-        return _led(_along(spec.way(), case, spec)) if spec.mover == "pioneer" else _rolling(spec)
-    motion = _through_space(case, spec)
+    if isinstance(spec, Wheeled):
+        if isinstance(spec, Waypoints):
+            return _led(spec.drive(_disturbances(case.seed)))
+        return _led(_along(spec, _disturbances(case.seed))) if spec.mover == "pioneer" else _rolling(spec)
+    if isinstance(spec, Replay):
+        assert case.replayed is not None  # read with the suite
+        motion: Motion = spec.motion(parse_tum(case.replayed, name=spec.file))
+    else:
+        motion = spec.motion(generator(case.seed, "shake")) if isinstance(spec, Handheld) else spec.motion()
     return BodyMotion(motion, stamps(motion, spec.rate_hz))
+
+
+def _disturbances(seed: int) -> Generators:
+    return {stream: generator(seed, f"slip.{stream}") for stream in DISTURBANCE_STREAMS}
 
 
 def stamps(motion: Motion, rate_hz: float, *, per_frame: int = 1) -> Stamps:
@@ -98,49 +101,20 @@ def _led(driven: Drive) -> BodyMotion:
     return BodyMotion(driven.motion, driven.t_ns, Rims(driven.encoder_t_ns, driven.rim_rad), driven)
 
 
-def _through_targets(case: Case, spec: WaypointsSpec) -> Drive:
-    return drive(
-        spec.targets_m,
-        start=spec.start,
-        tolerance_m=spec.tolerance_m,
-        max_time_s=spec.max_time_s,
-        leg_s=spec.leg_s,
-        **_robot(case, spec),
-    )
-
-
-def _along(way: CurveMotion, case: Case, spec: CurveSpec) -> Drive:
+def _along(spec: Planar, rngs: Generators) -> Drive:
     """The Pioneer on a way: its point h goes after where an ideal robot's would be.
 
     Where no point ahead of the axle can lead it, it gets the speeds that would take it there undisturbed.
     """
-    robot = _robot(case, spec)
+    way, robot = spec.way(), options(spec, rngs)
     t_ns = stamps(way, spec.rate_hz)
     path_m, path_mps = _path_of_h(way, t_ns, robot["controller"])
     x, y = path_m[0].tolist()
     start = (x, y, spec.start[2])
-    if isinstance(spec, UnledSpec):
+    if isinstance(spec, Unled):
         amid_ns = t_ns + round(NS_PER_S / spec.rate_hz / 2)
-        return led_by(_fed_forward(way, amid_ns, THETAS[spec.robot]), start=start, **robot)
+        return led_by(_fed_forward(way, amid_ns, spec.theta), start=start, **robot)
     return follow(path_m, path_mps, start=start, **robot)
-
-
-def _robot(case: Case, spec: GroundSpec) -> DriveOptions:
-    """Which robot it is, and what is done to it."""
-    is_ideal = spec.mover == "unicycle"
-    return {
-        "theta": None if is_ideal else THETAS[spec.robot],
-        "theta_std": 0.0 if is_ideal else spec.robot_spread,
-        "controller": CONTROLLERS[spec.controller],
-        "limits": spec.build_limits(),
-        "slip": SLIPS["none" if is_ideal else spec.slip],
-        "delta": DELTAS["none" if is_ideal else spec.delta],
-        "floor": () if is_ideal else [patch.build() for patch in spec.floor],
-        "rate_hz": spec.rate_hz,
-        "substeps": spec.substeps,
-        "integrator": spec.integrator,
-        "rngs": {stream: generator(case.seed, f"slip.{stream}") for stream in DISTURBANCE_STREAMS},
-    }
 
 
 def _path_of_h(way: Motion, t_ns: Stamps, controller: ControllerSettings) -> tuple[Array, Array]:
@@ -158,19 +132,12 @@ def _fed_forward(way: Motion, t_ns: Stamps, theta: Theta) -> Array:
     return np.stack(feed_forward(u, omega, u_rate, omega_rate, theta=theta), -1)
 
 
-def _rolling(spec: CurveSpec) -> BodyMotion:
+def _rolling(spec: Planar) -> BodyMotion:
     """A body whose wheels do as they are told; a car's as its steering lets them."""
     way = spec.way()
     fine = stamps(way, spec.rate_hz, per_frame=ENCODERS_PER_FRAME)
     motion: Motion = ackermann(way, ACKERMANNS[spec.car]) if spec.mover == "ackermann" else way
     return BodyMotion(motion, fine[::ENCODERS_PER_FRAME], Rims(fine, rolled(motion, fine, spec.wheels)))
-
-
-def _through_space(case: Case, spec: SpatialSpec | ReplaySpec) -> Motion:
-    if isinstance(spec, ReplaySpec):
-        assert case.replayed is not None  # read with the suite
-        return spec.motion(case.replayed)
-    return spec.motion(generator(case.seed, "shake")) if isinstance(spec, HandheldSpec) else spec.motion()
 
 
 def body_motions(plan: Plan) -> dict[str, BodyMotion]:
@@ -221,7 +188,7 @@ def _check_lasts(case: Case, travel: BodyMotion) -> None:
 
 
 def _check_smooth(case: Case) -> None:
-    if isinstance(case.trajectory, ReplaySpec) and case.trajectory.exact and case.rig.imu:
+    if isinstance(case.trajectory, Replay) and case.trajectory.exact and case.rig.imu:
         raise MotionError(
             f"the IMU of rig '{case.variant['rig']}' would feel the noise of an exact replay; "
             "leave exact out, or the IMU"

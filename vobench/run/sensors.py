@@ -3,6 +3,7 @@
 import numpy as np
 
 from vobench.geometry.rig import Side
+from vobench.motion.wheeled import Wheeled
 from vobench.render.occlusion import Shot
 from vobench.render.truth import TruthCaster
 from vobench.run.motion import BodyMotion, generator
@@ -13,7 +14,6 @@ from vobench.sensor.imu import STREAMS, ImuBias, ImuReadings, measure
 from vobench.sensor.pixel_truth import TruthFrame, TruthNames
 from vobench.sequence import SequenceWriter
 from vobench.suite.suite import Case
-from vobench.suite.trajectory import GroundSpec
 from vobench.trajectory.kinematics import Motion
 from vobench.trajectory.trajectory import Stamps
 
@@ -45,7 +45,7 @@ class SensorFeed:
 def _counted(case: Case, travel: BodyMotion) -> tuple[Stamps, Stamps]:
     """Stamps (M,) and counts (M, 2) of both encoders; none where nothing rolls."""
     spec = case.trajectory
-    if travel.rims is None or not isinstance(spec, GroundSpec):
+    if travel.rims is None or not isinstance(spec, Wheeled):
         return EMPTY, EMPTY.reshape(0, 2)
     return travel.rims.t_ns, ticks(travel.rims.rim_rad, spec.wheels, ENCODERS[spec.encoders])
 
@@ -73,7 +73,7 @@ def _between(t_ns: Stamps, last_ns: int, now_ns: int) -> slice:
 def wheel_error_m(case: Case, travel: BodyMotion) -> float | None:
     """How far off an odometer is at the end that believes the wheels from a known start; None where nothing rolls."""
     spec = case.trajectory
-    if not isinstance(spec, GroundSpec):
+    if not isinstance(spec, Wheeled):
         return None
     _, counts = _counted(case, travel)
     left, right = np.diff(counts, axis=0).T * 2 * np.pi * spec.wheels.radius_m / spec.wheels.ticks_per_revolution

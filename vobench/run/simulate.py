@@ -35,7 +35,7 @@ def open_renderer(spec: SceneFile, scene: Scene, rendering: RenderingSpec, shop:
         from vobench.render.path import SAMPLES, PathRenderer
 
         return PathRenderer(scene, samples=rendering.samples or SAMPLES)
-    from vobench.render.raster import RasterRenderer
+    from vobench.render.raster import RasterRenderer, require_drawing
 
     require_drawing()
     return RasterRenderer(_baked(spec, scene, shop))

@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from vobench.errors import SuiteError, unknown
 from vobench.geometry.rig import PRESETS, CalibrationError, Rig, mounted, true_rig
+from vobench.motion.replay import Replay
 from vobench.scene.scene import Scene
 from vobench.setting import Name, Positive
 from vobench.suite import catalog, scene_file, yaml_file
@@ -21,7 +22,7 @@ from vobench.suite.catalog import Entry, Kind
 from vobench.suite.manifest import Manifest, read_manifest
 from vobench.suite.scene_spec import LightOverride, SceneFile
 from vobench.suite.source import RecordedCase, SourceSpec, as_sources, recorded_cases
-from vobench.suite.trajectory import ReplaySpec, TrajectorySpec, read_replayed, read_times, wheels_of
+from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times, wheels_of
 from vobench.suite.yaml_file import Mistakes, Point, Strict, YamlFile, one_of
 
 
@@ -334,7 +335,7 @@ class _Planner:
         """What the files of replayed trajectories hold, by the trajectories' names."""
         texts = dict[str, str]()
         for name, spec in self.suite.trajectories.items():
-            if isinstance(spec, ReplaySpec):
+            if isinstance(spec, Replay):
                 with self.wrong.at("trajectories", name, "times"):
                     times = read_times(spec, self._folder())
                     with self.wrong.at("trajectories", name, "file"):
