@@ -243,8 +243,7 @@ def test_inverses_of_real_estimates_are_mended_on_the_estimates_side(real, name,
     assert finding.options == ("--est-as", word)
 
 
-@pytest.mark.parametrize("seed", range(12))
-@pytest.mark.parametrize("factor", [1e-3, 1.0, 200.0])
+@pytest.mark.parametrize(("seed", "factor"), [(0, 1e-3), (1, 1.0), (2, 200.0), (3, 1.0), (4, 1e-3), (5, 200.0)])
 def test_trajectories_with_nothing_in_common_are_called_so_and_nothing_else(seed, factor):
     rng = np.random.default_rng(seed)
     gt, _ = loop()
@@ -274,8 +273,7 @@ def test_a_unit_and_an_order_that_were_told_are_believed():
     assert "quaternion_order" not in [finding.fault for finding in found(replace(gt, order=None), told)]
 
 
-@pytest.mark.parametrize("offset_ns", [-60_000_000, -40_000_000, 40_000_000, 60_000_000])
-@pytest.mark.parametrize("noise_m", [0.0, 5e-3])
+@pytest.mark.parametrize(("offset_ns", "noise_m"), [(-60_000_000, 0.0), (-40_000_000, 5e-3), (40_000_000, 5e-3)])
 def test_a_clock_about_a_frame_off_is_found_where_speeds_change(offset_ns, noise_m):
     gt, est = loop()
     T = est.trajectory.T_world_frame.copy()
@@ -307,12 +305,10 @@ def test_real_pairs_given_in_the_wrong_order_are_named(real, name):
 
 
 @WITH_DATA
-@pytest.mark.parametrize(("name", "variant"), [("tum", 0), ("kitti", 1), ("tartanair", 2)])
-@pytest.mark.parametrize("fault", FRAMES)
-def test_a_fault_of_frames_put_into_a_real_pair_is_named(real, name, variant, fault):
+@pytest.mark.parametrize(("fault", "name"), list(zip(FRAMES, ["tum", "kitti", "tartanair"] * 3, strict=False)))
+def test_a_fault_of_frames_put_into_a_real_pair_is_named(real, name, fault):
     gt, est = (replace(reading, unit=None) for reading in real[name])
-    variants = FRAMES[fault]
-    assert_named(fault, gt, replace(est, trajectory=variants[variant % len(variants)](est.trajectory)))
+    assert_named(fault, gt, replace(est, trajectory=FRAMES[fault][-1](est.trajectory)))
 
 
 @WITH_DATA
