@@ -419,6 +419,19 @@ def list_command(
     listing.show(kind, as_json=json)
 
 
+@app.command()
+def schema(
+    kind: Annotated[str, typer.Argument(metavar="[suite|scene|estimator]", help="Of which kind of file.")] = "suite",
+    *,
+    json: Annotated[bool, typer.Option("--json", help="It is JSON in any case.")] = False,
+) -> None:
+    """Print the JSON Schema of a suite's, scene's or estimator's YAML, for editors and other programs."""
+    from vobench.cli import schema
+
+    del json
+    schema.show(kind)
+
+
 app.command("score")(score_command)
 app.command("diagnose")(diagnose_command)
 app.command("metrics")(metrics_command)
