@@ -174,7 +174,8 @@ class Like:
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
         section, name = handler.resolve_ref_schema(handler(schema)), {"type": "string", "enum": sorted(self.presets)}
-        return {"anyOf": [{**section, "properties": {self.key: name, **section["properties"]}}, name]}
+        named = {self.key: {**name, "default": None}, **section["properties"]}
+        return {"anyOf": [{**section, "properties": named}, name]}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

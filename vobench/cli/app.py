@@ -24,6 +24,7 @@ VERBS = {
     "drive": "vobench.cli.drive:drive_command",
     "render": "vobench.cli.render:render_command",
     "list": "vobench.cli.list:list_command",
+    "schema": "vobench.cli.schema:schema_command",
     "score": "vobench.cli.score:score_command",
     "diagnose": "vobench.cli.score:diagnose_command",
     "metrics": "vobench.cli.score:metrics_command",

@@ -64,7 +64,7 @@ def as_sources(value: Any) -> Any:
     return tuple({"path": entry} if isinstance(entry, str) else entry for entry in entries)
 
 
-SOURCES = Short(as_sources, {"type": ["string", "object"]})
+SOURCES = Short(as_sources, {"anyOf": [{"type": "string"}, {"type": "object"}]})
 
 
 def recorded_cases(spec: Source, folder: Path, *, entry: int = 0) -> Iterator[RecordedCase]:

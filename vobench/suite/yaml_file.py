@@ -17,7 +17,7 @@ from ruamel.yaml.constructor import RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from vobench.errors import Mistake, Place, SettingError, SuiteError, VobenchError, unknown
-from vobench.setting import COMPLAINTS, complaint, hints
+from vobench.setting import COMPLAINTS, complaint, hints, unit_of
 
 Model = TypeVar("Model")
 Keys = tuple[int | str, ...]
@@ -165,8 +165,13 @@ def plain(settings: Any, *, exclude: Any = None) -> Any:
 
 
 def json_schema(kind: Any) -> dict[str, Any]:
-    """The JSON Schema of settings."""
-    return _adapter(kind).json_schema()
+    """The JSON Schema of settings, with the unit of each key that has one."""
+    found = _adapter(kind).json_schema()
+    for section in [found, *found.get("$defs", {}).values()]:
+        for key, part in section.get("properties", {}).items():
+            part.pop("title", None)
+            part.update({"unit": unit_of(key)} if unit_of(key) else {})
+    return found
 
 
 class _Constructor(RoundTripConstructor):
