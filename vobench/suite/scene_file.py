@@ -52,12 +52,12 @@ def survey(path: Path) -> tuple[SceneFile, Mistakes]:
         with wrong.at(*keys):
             if name not in materials:
                 raise SuiteError(unknown("material", name, list(materials)))
-            if keys[0] == "movers" and isinstance(spec.materials.get(name), Luminous):
+            if keys[0] == "movers" and isinstance(getattr(spec, "materials", {}).get(name), Luminous):
                 raise SuiteError(f"'{name}' shines, and what moves cannot; choose a material of another kind")
     if not reading.mistakes:
         with wrong.at():
             _check_light(spec)
-    if "room" in spec.model_fields_set:
+    if hasattr(spec, "room"):
         _check_room(spec, wrong)
     _check_names(spec, source, wrong)
     return spec, wrong
@@ -137,7 +137,7 @@ def _check_room(spec: SceneFile, wrong: Mistakes) -> None:
 
 
 def _materials_used(spec: SceneFile) -> Iterator[tuple[Keys, str]]:
-    if "room" in spec.model_fields_set:
+    if hasattr(spec, "room"):
         for part in ("floor", "wall", "ceiling"):
             yield ("room", part), getattr(spec.room, part)
         for index, window in enumerate(spec.room.windows):
@@ -157,7 +157,7 @@ def _places(spec: SceneFile) -> Iterator[tuple[Keys, Triple]]:
 
 def _check_names(spec: SceneFile, source: YamlFile, wrong: Mistakes) -> None:
     """Lights are named by lightings, and things by ground truth: no name twice, a name given by us included."""
-    has_room = "room" in spec.model_fields_set
+    has_room = hasattr(spec, "room")
     seen = {SUN, SKY, *(surface.instance for surface in (_room(spec) if has_room else ()))}
     for kind, unnamed in (("lamps", ""), ("boxes", "box"), ("boards", "board"), ("movers", "")):
         for index, thing in enumerate(getattr(spec, kind)):

@@ -27,7 +27,6 @@ from vobench.scene.light import (
 from vobench.scene.material import Glass, Matt, Mirror, Polished
 from vobench.scene.scene import ceiling_light
 from vobench.setting import SETTINGS, ByKind, Name, NonNegative, OneOf, Positive, Triple, require
-from vobench.suite.yaml_file import Strict
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -275,9 +274,11 @@ class MoverSpec:
         require_increasing([key.t_s for key in self.path])
 
 
-class SceneFile(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneFile:
     """A scene, and the luminance of matt white that cameras are exposed for."""
 
+    __pydantic_config__ = SETTINGS
     name: Name
     summary: str = ""
     white_cd_m2: Positive

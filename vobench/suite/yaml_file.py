@@ -159,9 +159,9 @@ def checked(kind: type[Model], data: Any) -> Model:
     return read
 
 
-def plain(settings: Any) -> Any:
-    """Settings as JSON can hold them; `checked` reads them again."""
-    return _adapter(type(settings)).dump_python(settings, mode="json")
+def plain(settings: Any, *, exclude: Any = None) -> Any:
+    """Settings as JSON can hold them, some left out; `checked` reads them again."""
+    return _adapter(type(settings)).dump_python(settings, mode="json", exclude=exclude)
 
 
 def json_schema(kind: Any) -> dict[str, Any]:
