@@ -146,7 +146,7 @@ WRONG = [
     ("{kind: luminous, luminance_cd_m2: 100}", "{kind: luminous}", ":8: materials.glow.luminance_cd_m2: this key is missing"),
     ("target_m: [2, -1, 0], ", "", ":20: lamps.2.target_m: this key is missing"),
     ("target_m: [2, -1, 0], ", "target_m: [2, -1, 0], inner_deg: 40, ", ":20: lamps.2.inner_deg: should be at most outer_deg, 30 (got 40)"),
-    ("albedo: 0.4, eta: 1.4", "albedo: 0.4, eta: 1", ":5: materials.stone.eta: should be greater than 1 (got 1)"),
+    ("albedo: 0.4, eta: 1.4", "albedo: 0.4, eta: 0.9", ":5: materials.stone.eta: should be 1 or more (got 0.9)"),
     ("target_m: [2, -1, 0], ", "target_m: [2, -1, 2], ", ":20: lamps.2.target_m: should differ from center_m (got [2.0, -1.0, 2.0] for both)"),
     ("kind: point", "kind: point, size_m: [1, 1]", ":19: lamps.1.size_m: belongs to panel; this is point"),
     ("center_m: [1, 1.5], size_m: [1, 0.8]", "center_m: [2.8, 1.5], size_m: [1, 0.8]", ":14: room.windows.0: the window reaches beyond its wall, which is 6 m long around 0 and 3 m high: center_m [2.8, 1.5], size_m [1.0, 0.8]"),

@@ -271,27 +271,19 @@ def _bsdf(mi: Any, material: Material) -> Plugin:
         case Matt():
             return {"type": "diffuse", "reflectance": _texture(mi, material)}
         case Polished():
-            return _polished(mi, material)
-        case Mirror(tint, roughness):
-            kind = {"type": "roughconductor", **_facets(roughness)} if roughness else {"type": "conductor"}
-            return {**kind, "material": "none", "specular_reflectance": _uniform(tint)}
-        case Glass(eta, tint):
-            return {"type": "thindielectric", **_boundary(eta), "specular_transmittance": _uniform(tint)}
+            coat = {"int_ior": material.eta, "ext_ior": 1.0, "nonlinear": True}
+            colours = {"specular_reflectance": _uniform(material.tint), "diffuse_reflectance": _texture(mi, material)}
+            return {**_polish("plastic", material.roughness), **coat, **colours}
+        case Mirror():
+            kind = _polish("conductor", material.roughness)
+            return {**kind, "material": "none", "specular_reflectance": _uniform(material.tint)}
+        case Glass():
+            passing = {"specular_transmittance": _uniform(material.tint)}
+            return {"type": "thindielectric", "int_ior": material.eta, "ext_ior": 1.0, **passing}
 
 
-def _polished(mi: Any, material: Polished) -> Plugin:
-    roughness = material.roughness
-    kind = {"type": "roughplastic", **_facets(roughness)} if roughness else {"type": "plastic"}
-    coat = {**_boundary(material.eta), "nonlinear": True, "specular_reflectance": _uniform(material.tint)}
-    return {**kind, **coat, "diffuse_reflectance": _texture(mi, material)}
-
-
-def _facets(roughness: float) -> Plugin:
-    return {"distribution": "ggx", "alpha": roughness}
-
-
-def _boundary(eta: float) -> Plugin:
-    return {"int_ior": eta, "ext_ior": 1.0}
+def _polish(kind: str, roughness: float) -> Plugin:
+    return {"type": f"rough{kind}", "distribution": "ggx", "alpha": roughness} if roughness else {"type": kind}
 
 
 def _uniform(value: float) -> Plugin:

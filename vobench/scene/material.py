@@ -111,7 +111,7 @@ Pattern = Annotated[str, OneOf("pattern", PATTERNS)]
 Albedo = Annotated[float, Gt(0), Lt(1)]
 Resolution = Annotated[int, Ge(8), Le(8192)]
 Seed = Annotated[int, Ge(0)]
-Eta = Annotated[float, Gt(1), Le(4)]
+Eta = Annotated[float, Ge(1), Le(4)]  # 1 is an open pane, or no coat
 Roughness = Annotated[float, Ge(0), Le(0.5)]
 
 
