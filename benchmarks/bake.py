@@ -18,7 +18,7 @@ import numpy as np
 from vobench.render.bake import BakedScene, BakeSettings, bake
 from vobench.render.illumination import Illumination
 from vobench.scene.light import Flicker, Sun
-from vobench.scene.material import Matt, Texture
+from vobench.scene.material import Matt
 from vobench.scene.scene import Mover, Path, Scene
 from vobench.scene.surface import box
 from vobench.suite import catalog, yaml_file
@@ -55,7 +55,7 @@ def _baked(scene: Scene) -> BakedScene:
 def _changes(baked: BakedScene) -> Iterator[tuple[str, Illumination]]:
     """The scene with more and more that changes. The bake stays as it is: what is timed does not depend on it."""
     scene = baked.scene
-    flicker = tuple(replace(light, level=Flicker(50, 0.2)) for light in scene.lights)
+    flicker = tuple(replace(light, level=Flicker(depth=0.2)) for light in scene.lights)
     yield "steady", Illumination(baked)
     one = (flicker[0], *scene.lights[1:])
     yield "one light flickers", Illumination(replace(baked, scene=replace(scene, lights=one)))
@@ -84,7 +84,7 @@ def _changes(baked: BakedScene) -> Iterator[tuple[str, Illumination]]:
         yield f"{count} movers as tall as people", Illumination(replace(bake(walkers, quick), settings=BakeSettings()))
 
 
-WALKER = Matt(Texture("plain", 0.4, 0.0, 1.0, 8, 0))
+WALKER = Matt("plain", 0.4, 0.0, 1.0, 8, 0)
 
 
 def _walker(index: int) -> Mover:

@@ -13,10 +13,10 @@ WRONG = [
     (("--out", "nowhere/look.png"), "--out should be a .png in a folder that exists, got nowhere/look.png"),
     (("--camera", "fisheyes"), "no camera named 'fisheyes'. Did you mean 'fisheye'?"),
     (("--sensor", "film"), "no camera sensor named 'film'. Known: clean"),
-    (("--engine", "rater"), "no engine named 'rater'. Did you mean 'raster'?"),
-    (("--samples", "4"), "--samples belongs to --engine path, but the engine is raster; leave it out"),
-    (("--engine", "path", "--samples", "0"), "--samples should be from 1 to 65536, got 0"),
-    (("--engine", "path", "--samples", "65537"), "--samples should be from 1 to 65536, got 65537"),
+    (("--engine", "rater"), "--engine: no engine named 'rater'. Did you mean 'raster'?"),
+    (("--samples", "4"), "samples belongs to engine path, but the engine is raster; leave samples out"),
+    (("--engine", "path", "--samples", "0"), "--samples: should be 1 or more (got 0)"),
+    (("--engine", "path", "--samples", "65537"), "--samples: should be 65536 or less (got 65537)"),
 ]
 
 

@@ -18,7 +18,7 @@ from vobench.render.lightmap import pack_atlas
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
 from vobench.scene.light import STEADY, Level, PointLight
-from vobench.scene.material import Map, Matt, Polished, Texture, reflectance, texture_of, under_coat
+from vobench.scene.material import Map, Matt, Polished, reflectance, texture_of, under_coat
 from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface, room
 
@@ -117,9 +117,9 @@ def _lattice(surface: Surface, square_m: float) -> Lattice:
 
 @pytest.fixture(scope="session")
 def hall(draw: Draw) -> Hall:
-    fine, coarse = Texture("checker", 0.5, 0.8, 0.8, 512, 0), Texture("checker", 0.5, 0.8, 3.2, 1024, 0)
+    fine, coarse = ("checker", 0.5, 0.8, 0.8, 512, 0), ("checker", 0.5, 0.8, 3.2, 1024, 0)
     surfaces = tuple(room((8, 8, 3), floor="fine", wall="coarse", ceiling="coarse"))
-    scene = Scene("hall", surfaces, {"fine": Matt(fine), "coarse": Matt(coarse)}, ())
+    scene = Scene("hall", surfaces, {"fine": Matt(*fine), "coarse": Matt(*coarse)}, ())
     lattices = tuple(_lattice(s, 0.1 if s.material == "fine" else 0.4) for s in surfaces)
     return Hall(draw(light_evenly(scene)), lattices)
 

@@ -10,13 +10,13 @@ from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
 from vobench.render.bake import LIGHT, BakedScene, BakeSettings, bake, load_baked, save_baked
 from vobench.scene.light import Flicker, Light, PointLight, SpotLight, Sun
-from vobench.scene.material import Matt, Mirror, Polished, Texture, fresnel, under_coat
+from vobench.scene.material import Matt, Mirror, Polished, fresnel, under_coat
 from vobench.scene.scene import Scene, ceiling_light
 from vobench.scene.surface import Surface, box, rectangle, room
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=1, bounces=0)
-BODY = Texture("plain", 0.5, 0.0, 1.0, 8, 0)
-GREY = {"grey": Matt(BODY)}
+BODY = ("plain", 0.5, 0.0, 1.0, 8, 0)
+GREY = {"grey": Matt(*BODY)}
 FLOOR = rectangle(np.zeros(3), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]), "grey")
 LAMP = ceiling_light("lamp", np.array([0.3, -0.2, 2.0]), (0.04, 0.06), power_lm=1000)
 
@@ -182,7 +182,7 @@ GLOBE = tuple(room((2, 2, 2), floor="grey", wall="grey", ceiling="grey"))
 
 
 def test_in_a_closed_grey_box_indirect_light_is_that_of_the_integrating_sphere() -> None:
-    white = {"grey": Matt(replace(BODY, albedo=0.8))}
+    white = {"grey": Matt("plain", 0.8, resolution_px=8)}
     lamp = PointLight("bulb", np.array([0, 0, 1.0]), 1000.0)
     light = bake(Scene("globe", GLOBE, white, (lamp,)), ALL_EQUAL)
     straight = bake(Scene("globe", GLOBE, white, (lamp,)), replace(ALL_EQUAL, bounces=0))
@@ -198,7 +198,7 @@ def test_each_light_has_a_layer_of_its_own_and_dimming_one_leaves_the_others_byt
     settings = replace(DIRECT, indirect_spacing_m=0.3, indirect_rays=16, bounces=2)
     bulb = PointLight("bulb", np.array([0.5, 0, 1.0]), 300.0)
     both = bake(scene(LAMP, bulb, surfaces=GLOBE), settings).light
-    dimmed = bake(scene(replace(LAMP, power_lm=10, level=Flicker(50, 0.5)), bulb, surfaces=GLOBE), settings).light
+    dimmed = bake(scene(replace(LAMP, power_lm=10, level=Flicker(depth=0.5)), bulb, surfaces=GLOBE), settings).light
     assert both[1].tobytes() == dimmed[1].tobytes()
     assert not np.array_equal(both[0], dimmed[0])
     alone = bake(scene(bulb, surfaces=GLOBE), settings).light[0]
@@ -211,7 +211,7 @@ def test_each_light_has_a_layer_of_its_own_and_dimming_one_leaves_the_others_byt
 def test_under_a_coat_light_counts_by_what_the_coat_lets_in() -> None:
     bulb = PointLight("bulb", np.array([0.0, 0.0, 1.0]), 1000.0)
     x, y, matt = floor_light(bake(scene(bulb), DIRECT))
-    coated = Scene("coat", (FLOOR,), {"grey": Polished(BODY)}, (bulb,))
+    coated = Scene("coat", (FLOOR,), {"grey": Polished(*BODY)}, (bulb,))
     _, _, let_in = floor_light(baked := bake(coated, DIRECT))
     cosine = 1 / np.sqrt(x**2 + y**2 + 1)
     np.testing.assert_allclose(let_in, matt * (1 - fresnel(cosine, 1.5)), rtol=1e-3)
@@ -222,10 +222,10 @@ def test_a_white_coated_box_keeps_its_light_as_a_white_matt_one_does() -> None:
     """What a coat mirrors and what its body scatters add up to everything."""
     lamp = PointLight("bulb", np.array([0.3, 0.2, 1.1]), 1000.0)
     kept = []
-    for material in (Matt(replace(BODY, albedo=0.98)), Polished(replace(BODY, albedo=0.98))):
+    for material in (Matt("plain", 0.98, resolution_px=8), Polished("plain", 0.98, resolution_px=8)):
         settings = replace(ALL_EQUAL, bounces=6, indirect_rays=64)
         walls = tuple(room((2, 2, 2), floor="grey", wall="matt", ceiling="matt"))
-        materials = {"grey": material, "matt": Matt(replace(BODY, albedo=0.5))}
+        materials = {"grey": material, "matt": Matt("plain", 0.5, resolution_px=8)}
         baked = bake(Scene("box", walls, materials, (lamp,)), settings)
         kept.append(np.mean([baked.light[0][p.window].mean() for p in baked.atlas.charts[1:]]))
     assert kept[1] == pytest.approx(kept[0], rel=0.02)
@@ -291,7 +291,7 @@ def test_the_floor_under_a_box_has_the_light_beside_it_so_that_no_darkness_leaks
 @pytest.mark.parametrize("threads", [1, 5])
 def test_the_number_of_threads_changes_no_byte(threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = replace(DIRECT, indirect_spacing_m=0.1, indirect_rays=16, bounces=2)
-    coated = {"grey": Polished(BODY, roughness=0.1)}
+    coated = {"grey": Polished(*BODY, roughness=0.1)}
     usual = bake(Scene("s", GLOBE, coated, (LAMP,)), settings).light
     monkeypatch.setattr("vobench.render.lightmap.os.cpu_count", lambda: threads)
     assert bake(Scene("s", GLOBE, coated, (LAMP,)), settings).light.tobytes() == usual.tobytes()
@@ -299,8 +299,8 @@ def test_the_number_of_threads_changes_no_byte(threads: int, monkeypatch: pytest
 
 @pytest.fixture(scope="module")
 def baked() -> BakedScene:
-    floor = Polished(Texture("terrazzo", 0.5, 0.5, 1.0, 64, 0))
-    materials = {"floor": floor, "wall": Matt(Texture("plain", 0.6, 0.0, 1.0, 8, 0))}
+    floor = Polished("terrazzo", 0.5, 0.5, 1.0, 64, 0)
+    materials = {"floor": floor, "wall": Matt("plain", 0.6, 0.0, 1.0, 8, 0)}
     surfaces = tuple(room((2, 2, 2), floor="floor", wall="wall", ceiling="wall"))[1:]
     sun = Sun("sun", 1e4, (0.0, 10.0), (0.0, 10.0), (60.0, 70.0))
     lamp = ceiling_light("lamp", np.array([0, 0, 1.9]), (0.2, 0.2), power_lm=100)

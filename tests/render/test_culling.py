@@ -18,12 +18,12 @@ from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import still
 from vobench.render.view import NEAR_M, PinholeView, Plane, pinhole_view
 from vobench.scene.light import Sky
-from vobench.scene.material import Glass, Material, Matt, Polished, Texture
+from vobench.scene.material import Glass, Material, Matt, Polished
 from vobench.scene.scene import Scene
 from vobench.suite.scene_file import build, read_scene
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
-MATERIALS: list[Material] = [Matt(Texture("plain", 0.5, 0, 1, 8, 0)), Glass()]
+MATERIALS: list[Material] = [Matt("plain", 0.5, 0, 1, 8, 0), Glass()]
 BOXES = [(0, 180, 0, 120), (0, 180, 40, 48), (60, 120, 20, 50)]
 PLACES = np.stack(np.meshgrid(np.linspace(0, 1, 40), np.linspace(0, 1, 40)), -1).reshape(-1, 2)
 
@@ -72,7 +72,7 @@ def test_no_rectangle_that_can_be_seen_is_left_out_and_most_others_are(mirrors: 
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.yaml"))
 CAMERA_mesh = Pinhole(320, 240, 144.0, 144.0, 159.5, 119.5)
-PLAIN = Texture("plain", 0.5, 0, 1, 8, 0)
+PLAIN = ("plain", 0.5, 0, 1, 8, 0)
 SKY_CD_M2 = 1e9  # so bright that one sample of it shows, by way of a mirror too
 WHITE_CD_M2 = 240
 FRAMES = 24
@@ -154,8 +154,12 @@ def test_what_only_comes_near_is_left_as_it_is() -> None:
 def plainly(material: Material, *, closed: bool) -> Material:
     """Without a texture, in which single bright pixels would be nothing special; panes walled up if `closed`."""
     if isinstance(material, Glass):
-        return Matt(PLAIN) if closed else material
-    return replace(material, texture=PLAIN) if isinstance(material, Matt | Polished) else material
+        return Matt(*PLAIN) if closed else material
+    return (
+        replace(material, pattern="plain", albedo=0.5, contrast=0.0, resolution_px=8)
+        if isinstance(material, Matt | Polished)
+        else material
+    )
 
 
 def scene_in(path: Path, *, closed: bool) -> Scene:

@@ -8,12 +8,12 @@ import pytest
 from vobench.geometry.se3 import Array
 from vobench.render.bake import BakeSettings, bake
 from vobench.scene.light import SUN_RADIUS_RAD, Light, Sky, Sun
-from vobench.scene.material import Glass, Material, Matt, Texture, pane_reflectance
+from vobench.scene.material import Glass, Material, Matt, pane_reflectance
 from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface, rectangle
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=4, bounces=0)
-GREY = {"grey": Matt(Texture("plain", 0.5, 0.0, 1.0, 8, 0))}
+GREY = {"grey": Matt("plain", 0.5, 0.0, 1.0, 8, 0)}
 PANES: dict[str, Material] = {**GREY, "pane": Glass(), "hole": Glass(eta=1.0), "dark": Glass(eta=1.0, tint=0.4)}
 FLOOR = rectangle(np.zeros(3), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]), "grey")
 SUN = Sun("sun", 80_000.0, (0.0,), (30.0,), (50.0,))

@@ -21,7 +21,6 @@ from vobench.scene.material import (
     Matt,
     Mirror,
     Polished,
-    Texture,
     fresnel,
     pane_reflectance,
     under_coat,
@@ -31,12 +30,12 @@ from vobench.scene.surface import Surface, box, rectangle, room
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 MATERIALS: dict[str, Material] = {
-    "grey": Matt(Texture("plain", 0.5, 0, 1, 8, 0)),
-    "bright": Matt(Texture("plain", 0.9, 0, 1, 8, 0)),
-    "coarse": Matt(Texture("checker", 0.5, 0.8, 3.2, 1024, 0)),
+    "grey": Matt("plain", 0.5, 0, 1, 8, 0),
+    "bright": Matt("plain", 0.9, 0, 1, 8, 0),
+    "coarse": Matt("checker", 0.5, 0.8, 3.2, 1024, 0),
     "steel": Mirror(0.8),
     "brushed": Mirror(0.8, roughness=0.05),
-    "wax": Polished(Texture("plain", 0.3, 0, 1, 8, 0), eta=1.7, tint=0.9),
+    "wax": Polished("plain", 0.3, 0, 1, 8, 0, eta=1.7, tint=0.9),
     "glass": Glass(eta=1.5, tint=0.7),
 }
 LUMINANCE, TINT = 0.5 * 100 / np.pi, 0.8  # of grey under 100 lx, of steel

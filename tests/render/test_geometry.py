@@ -4,11 +4,11 @@ import numpy as np
 
 from vobench.geometry.se3 import Array
 from vobench.render.geometry import RayCaster, ball, corners, inventory
-from vobench.scene.material import Glass, Material, Matt, Texture
+from vobench.scene.material import Glass, Material, Matt
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 from vobench.scene.surface import box, rectangle, room
 
-MATERIALS: dict[str, Material] = {"a": Matt(Texture("plain", 0.5, 0.0, 1.0, 8, 0)), "pane": Glass()}
+MATERIALS: dict[str, Material] = {"a": Matt("plain", 0.5, 0.0, 1.0, 8, 0), "pane": Glass()}
 LAMP = ceiling_light("lamp", np.array([0.5, 0.5, 2.9]), (0.6, 0.6), power_lm=1)
 CRATE = box(np.array([2.0, -0.5, 0.4]), (0.8, 0.6, 0.8), yaw_deg=30, material="a")
 PANE = rectangle(np.array([-2.0, 0, 1]), np.array([0, 1.0, 0]), np.array([0, 0, 1.0]), "pane")

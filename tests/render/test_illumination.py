@@ -8,13 +8,13 @@ import pytest
 from vobench.render.bake import SUN_STEP_RAD, BakedScene, BakeSettings, bake, key_times_ns
 from vobench.render.illumination import Illumination
 from vobench.scene.light import NS_PER_S, Dimmer, Flicker, Light, PointLight, Sky, Sun, Switched
-from vobench.scene.material import Glass, Map, Matt, Texture
+from vobench.scene.material import Glass, Map, Matt
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 from vobench.scene.surface import Surface, box, rectangle, room
 
 COARSE = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=0.3, indirect_rays=64, bounces=3)
 DIRECT = replace(COARSE, bounces=0)
-MATERIALS = {"grey": Matt(Texture("plain", 0.5, 0.0, 1.0, 8, 0)), "pane": Glass()}
+MATERIALS = {"grey": Matt("plain", 0.5, 0.0, 1.0, 8, 0), "pane": Glass()}
 ROOM = tuple(room((4, 4, 2.5), floor="grey", wall="grey", ceiling="grey"))
 PANEL = ceiling_light("panel", np.array([0.5, 0.3, 2.4]), (0.4, 0.4), power_lm=1000)
 BULB = PointLight("bulb", np.array([-1.0, 0.5, 2.0]), 500.0)
@@ -37,7 +37,7 @@ def ns(t_s: float) -> int:
 def lamps() -> BakedScene:
     lights = (
         PANEL,
-        replace(BULB, name="flickers", level=Flicker(50, 0.5)),
+        replace(BULB, name="flickers", level=Flicker(depth=0.5)),
         replace(BULB, name="switched", position_m=np.array([1.0, -1, 2]), level=Switched((1.0,))),
     )
     return bake(scene(*lights), COARSE)

@@ -9,13 +9,13 @@ from vobench.render.geometry import Ball, RayCaster
 from vobench.render.lightmap import pack_atlas, texels
 from vobench.render.mover_light import Target, may_shade, slices
 from vobench.scene.light import PointLight
-from vobench.scene.material import Matt, Texture
+from vobench.scene.material import Matt
 from vobench.scene.scene import ceiling_light
 from vobench.scene.surface import box, rectangle
 
 PILLAR = box(np.array([0.4, -0.2, 0.9]), (0.5, 0.3, 1.8), yaw_deg=25, material="grey")
 FLOOR = rectangle(np.zeros(3), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]), "grey")
-MATERIALS = {"grey": Matt(Texture("plain", 0.5, 0.0, 1.0, 8, 0))}
+MATERIALS = {"grey": Matt("plain", 0.5, 0.0, 1.0, 8, 0)}
 LAMP = ceiling_light("panel", np.array([1.0, 0.3, 2.4]), (0.8, 0.4), power_lm=1000)
 PANEL = panel_emitter(LAMP)
 BULB = bulb_emitter(PointLight("bulb", np.array([-1.0, 0.5, 2.0]), 500.0))

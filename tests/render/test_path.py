@@ -15,13 +15,13 @@ from vobench.render import mitsuba
 from vobench.render.path import PathRenderer
 from vobench.render.renderer import View, still
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Sky, SpotLight, Sun, Switched
-from vobench.scene.material import Glass, Matt, Mirror, Polished, Texture, fresnel, pane_reflectance, under_coat
+from vobench.scene.material import Glass, Matt, Mirror, Polished, fresnel, pane_reflectance, under_coat
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 from vobench.scene.surface import rectangle, room
 
 X, Y, Z = np.eye(3)
 SMALL = Pinhole(12, 8, 200.0, 200.0, 5.5, 3.5)
-CHECKER = Texture("checker", 0.5, 0.8, 0.8, 512, 0)
+CHECKER = ("checker", 0.5, 0.8, 0.8, 512, 0)
 DOWN = looking(pitch_deg=90, position_m=(0, 0, 1.5))
 
 Trace = Callable[..., np.ndarray]
@@ -44,8 +44,8 @@ def trace() -> Trace:
     return picture
 
 
-def tone(albedo: float) -> Texture:
-    return Texture("plain", albedo, 0.0, 1.0, 4, 0)
+def tone(albedo: float) -> tuple[str, float, float, float, int, int]:
+    return "plain", albedo, 0.0, 1.0, 8, 0
 
 
 def plate(material, z_m=0.0, *, side_m=8.0, up=True):
@@ -54,7 +54,7 @@ def plate(material, z_m=0.0, *, side_m=8.0, up=True):
 
 
 def floor_under(*lights, material=None, over=(), materials=None) -> Scene:
-    floor = material or Matt(tone(0.5))
+    floor = material or Matt(*tone(0.5))
     return Scene("floor", (plate("floor"), *over), {"floor": floor, **(materials or {})}, tuple(lights))
 
 
@@ -92,7 +92,7 @@ def test_a_spot_fades_as_its_intensity_says(trace):
 def test_the_sun_s_disc_softens_the_edge_of_a_shadow_by_its_width(trace):
     sun = Sun("sun", 1000.0, (0.0,), (0.0,), (90.0,))
     blade = rectangle(4 * X + 3 * Z, 8 * X, 8 * Y, "blade", "blade")  # its edge is at x = 0, 3 m above the floor
-    scene = floor_under(sun, over=(blade,), materials={"blade": Matt(tone(0.5))})
+    scene = floor_under(sun, over=(blade,), materials={"blade": Matt(*tone(0.5))})
     line = Pinhole(60, 1, 2000.0, 2000.0, 29.5, 0.0)  # 1 px is 0.5 mm of the floor
     T_world_camera = se3.transform(np.stack([X, -Y, -Z], -1), [0, 0, 1.0])
     shown = trace(scene, T_world_camera, line, samples=400)[0] / (0.5 * 1000 / np.pi)
@@ -108,7 +108,7 @@ def test_the_sun_s_disc_softens_the_edge_of_a_shadow_by_its_width(trace):
 def test_in_a_closed_box_light_adds_up_to_a_geometric_series(trace, albedo, max_depth):
     """A lamp amid a cube lights all sides alike, and each bounce keeps the share `albedo` of its flux."""
     sides = tuple(room((2, 2, 2), floor="skin", wall="skin", ceiling="skin"))
-    scene = Scene("box", sides, {"skin": Matt(tone(albedo))}, (PointLight("bulb", Z, 600.0),))
+    scene = Scene("box", sides, {"skin": Matt(*tone(albedo))}, (PointLight("bulb", Z, 600.0),))
     # From above, through the ceiling's back: the picture is just the floor, each pixel of the same area.
     camera = Pinhole(16, 16, 32.0, 32.0, 7.5, 7.5)
     shown = trace(scene, looking(pitch_deg=90, position_m=(0, 0, 4.0)), camera, samples=400, max_depth=max_depth)
@@ -118,7 +118,7 @@ def test_in_a_closed_box_light_adds_up_to_a_geometric_series(trace, albedo, max_
 
 def test_a_coat_takes_its_share_of_the_light_on_the_way_in_and_out(trace):
     bulb = PointLight("bulb", np.array([1.5, 0.0, 1.5]), 800.0)
-    shown = trace(floor_under(bulb, material=Polished(tone(0.6)))).mean()
+    shown = trace(floor_under(bulb, material=Polished(*tone(0.6)))).mean()
     cosine = np.array([np.cos(np.pi / 4), 1.0])
     entering = 800 / (4 * np.pi) / 4.5 * cosine[0] * (1 - fresnel(cosine, 1.5)[0])
     expected = under_coat(np.array(0.6), 1.5) * entering * (1 - fresnel(cosine, 1.5)[1]) / np.pi
@@ -129,7 +129,7 @@ def test_a_coat_takes_its_share_of_the_light_on_the_way_in_and_out(trace):
 def test_a_polished_floor_under_an_even_sky_shows_its_body_and_the_sky_by_fresnel_s_law(trace, pitch_deg):
     sky = Sky("sky", 1000.0, "uniform")
     eye = looking(pitch_deg=pitch_deg, position_m=(0, 0, 0.5))
-    shown = trace(floor_under(sky, material=Polished(tone(0.6), tint=0.7)), eye, samples=1000)
+    shown = trace(floor_under(sky, material=Polished(*tone(0.6), tint=0.7)), eye, samples=1000)
     F = fresnel(np.array(np.sin(np.deg2rad(pitch_deg))), 1.5)
     everywhere = fresnel(np.sqrt((np.arange(4096) + 0.5) / 4096), 1.5).mean()
     body = under_coat(np.array(0.6), 1.5) * (1 - everywhere) * (1 - F)
@@ -145,7 +145,7 @@ def test_a_mirror_keeps_the_share_tint(trace, roughness, least):
 
 def test_a_mirror_shows_what_the_mirrored_camera_sees(trace):
     poster = rectangle(np.array([2.0, 0.0, 1.0]), 2 * Z, 2 * Y, "poster")
-    materials = {"poster": Matt(Texture("checker", 0.5, 0.8, 1.6, 64, 0)), "mirror": Mirror(tint=0.8)}
+    materials = {"poster": Matt("checker", 0.5, 0.8, 1.6, 64, 0), "mirror": Mirror(tint=0.8)}
     bulb = (PointLight("bulb", np.array([0.0, 1.0, 3.0]), 800.0),)
     camera = Pinhole(32, 24, 30.0, 30.0, 15.5, 11.5)
     eye = looking(pitch_deg=50, position_m=(0.0, 0.0, 0.8))
@@ -162,7 +162,7 @@ def test_a_mirror_shows_what_the_mirrored_camera_sees(trace):
 def test_a_pane_lets_sunlight_through_and_is_looked_through(trace):
     sun = Sun("sun", 30_000.0, (0.0,), (0.0,), (30.0,))
     pane = Glass(eta=1.5, tint=0.9)
-    shown = trace(floor_under(sun, material=Matt(tone(0.02)), over=(plate("pane", 0.5),), materials={"pane": pane}))
+    shown = trace(floor_under(sun, material=Matt(*tone(0.02)), over=(plate("pane", 0.5),), materials={"pane": pane}))
     passes = 0.9 * (1 - pane_reflectance(np.array([0.5, 1.0]), 1.5))
     assert shown.mean() == pytest.approx(0.02 / np.pi * 15_000 * passes.prod(), rel=0.01)
 
@@ -211,7 +211,7 @@ def test_a_picture_in_two_views_of_rows_is_the_picture_in_one(trace):
 
 
 def test_more_paths_than_are_traced_at_once_give_one_picture(trace, monkeypatch):
-    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Matt(tone(0.5)))
+    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Matt(*tone(0.5)))
     at_once = trace(scene, samples=7)
     monkeypatch.setattr("vobench.render.path.MAX_LANES", 200)
     piece_by_piece = trace(scene, samples=7)
@@ -220,7 +220,7 @@ def test_more_paths_than_are_traced_at_once_give_one_picture(trace, monkeypatch)
 
 
 def test_each_row_is_seen_from_its_own_pose(trace):
-    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Matt(CHECKER))
+    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Matt(*CHECKER))
     poses = [looking(pitch_deg=90, position_m=(0.02 * r, 0, 1.5)) for r in range(8)]
     rolling = trace(scene, views=[instant(slice(r, r + 1), pose) for r, pose in enumerate(poses)], samples=400)
     for row, pose in enumerate(poses):
@@ -228,7 +228,7 @@ def test_each_row_is_seen_from_its_own_pose(trace):
 
 
 def test_sub_frames_are_averaged_in_linear_light(trace):
-    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Matt(CHECKER))
+    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Matt(*CHECKER))
     poses = np.array([looking(pitch_deg=90, position_m=(0.02 * m, 0, 1.5)) for m in range(3)])
     blurred = trace(scene, views=[instant(slice(0, 8), poses)], samples=600)
     expected = np.mean([trace(scene, pose, samples=400) for pose in poses], 0)
@@ -264,7 +264,7 @@ def test_one_renderer_shows_lights_suns_and_movers_as_they_are_at_each_time(trac
     way = Path(np.array([0.0, 1.0]), np.array([[0.0, 0, 0], [4.0, 0, 0]]), np.array([0.0, 90.0]))
     box = Mover("lid", (rectangle(0.5 * Z, X, Y, "lid"),), way)
     sun = Sun("sun", 1000.0, (0.0, 1.0), (0.0, 0.0), (90.0, 30.0))
-    scene = Scene("moving", (plate("floor"),), {"floor": Matt(tone(0.5)), "lid": Matt(tone(0.2))}, (sun,), (box,))
+    scene = Scene("moving", (plate("floor"),), {"floor": Matt(*tone(0.5)), "lid": Matt(*tone(0.2))}, (sun,), (box,))
     renderer = PathRenderer(scene, samples=64, max_depth=2)
     for t_s, albedo, elevation_deg in ((0.0, 0.2, 90.0), (1.0, 0.5, 30.0), (0.0, 0.2, 90.0)):
         shown = renderer.radiance(SMALL, still(SMALL, DOWN, t_ns=int(t_s * 1e9)))
@@ -282,7 +282,7 @@ def test_one_renderer_shows_lights_suns_and_movers_as_they_are_at_each_time(trac
     ids=["pinhole", "fisheye"],
 )
 def test_the_corners_of_a_checker_land_where_projection_says(trace, camera):
-    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Matt(CHECKER))
+    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Matt(*CHECKER))
     eye = looking(pitch_deg=80, position_m=(0.03, 0.02, 0.8))
     picture = trace(scene, eye, camera, samples=256, max_depth=2)
     lattice = np.stack(np.meshgrid(np.arange(-4, 4, 0.1), np.arange(-4, 4, 0.1), [0.0]), -1).reshape(-1, 3)
@@ -302,14 +302,14 @@ def test_a_floor_of_two_halves_is_the_floor_in_one(trace):
     whole = plate("floor")
     left = replace(whole, edge_u_m=4.05 * X)
     right = replace(whole, corner_m=whole.corner_m + 4.05 * X, edge_u_m=3.95 * X, texture_corner_m=(4.05, 0.0))
-    pictures = [trace(Scene("f", s, {"floor": Matt(CHECKER)}, sun)) for s in ((whole,), (left, right))]
+    pictures = [trace(Scene("f", s, {"floor": Matt(*CHECKER)}, sun)) for s in ((whole,), (left, right))]
     np.testing.assert_allclose(pictures[1], pictures[0], rtol=1e-3)
     assert pictures[0].std() > 0.2 * pictures[0].mean()
 
 
 def test_where_the_lens_sees_nothing_the_picture_is_black(trace):
     camera = KannalaBrandt(40, 40, 10.0, 10.0, 19.5, 19.5, -0.15, 0.0, 0.0, 0.0)
-    picture = trace(floor_under(Sky("sky", 1000.0, "uniform"), material=Matt(tone(0.9))), camera=camera)
+    picture = trace(floor_under(Sky("sky", 1000.0, "uniform"), material=Matt(*tone(0.9))), camera=camera)
     u, v = np.moveaxis(camera.pixel_grid() - 19.5, -1, 0)
     assert np.isnan(camera.rays(camera.pixel_grid())[np.hypot(u, v) > 11]).all()
     assert (picture[np.hypot(u, v) > 11] == 0).all()

@@ -20,7 +20,7 @@ from vobench.render.bake import BakedScene, BakeSettings, bake
 from vobench.render.geometry import RayCaster
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
-from vobench.scene.material import Matt, Texture
+from vobench.scene.material import Matt
 from vobench.scene.scene import Scene, ceiling_light
 from vobench.scene.surface import box, rectangle, room
 
@@ -28,8 +28,8 @@ CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 DOWN, AHEAD = looking(pitch_deg=90, position_m=(0.2, 0.1, 0.4)), looking(pitch_deg=20, position_m=(0.2, 0.1, 0.4))
 LAMP = ceiling_light("lamp", np.array([0.5, 0.2, 2.4]), (0.5, 0.3), power_lm=2000)
 MATERIALS = {
-    "plain": Matt(Texture("plain", 0.5, 0.0, 1.0, 8, 0)),
-    "busy": Matt(Texture("terrazzo", 0.5, 0.6, 1.0, 512, 1)),
+    "plain": Matt("plain", 0.5, 0.0, 1.0, 8, 0),
+    "busy": Matt("terrazzo", 0.5, 0.6, 1.0, 512, 1),
 }
 
 
@@ -147,7 +147,7 @@ def test_where_nothing_is_the_picture_is_black(draw: Any, even_light: Any) -> No
 
 
 def test_rays_and_picture_agree_on_where_the_crate_is(draw: Any, even_light: Any) -> None:
-    materials = {"dark": Matt(Texture("plain", 0.1, 0, 1, 8, 0)), "bright": Matt(Texture("plain", 0.9, 0, 1, 8, 0))}
+    materials = {"dark": Matt("plain", 0.1, 0, 1, 8, 0), "bright": Matt("plain", 0.9, 0, 1, 8, 0)}
     crate = box(np.array([1.5, 0.1, 0.4]), (0.5, 0.5, 0.5), yaw_deg=30, material="bright")
     surfaces = (*room((20, 20, 20), floor="dark", wall="dark", ceiling="dark"), *crate)
     scene = Scene("crate", surfaces, materials, ())

@@ -14,7 +14,7 @@ from vobench.geometry.se3 import Array
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import View, still
 from vobench.scene.light import Dimmer, Flicker, Sky
-from vobench.scene.material import Glass, Matt, Mirror, Polished, Texture
+from vobench.scene.material import Glass, Matt, Mirror, Polished
 from vobench.scene.scene import Mover, Path, Scene
 from vobench.scene.surface import box, rectangle, room
 
@@ -26,11 +26,11 @@ CAMERAS = {
 }
 AHEAD = looking(pitch_deg=20, position_m=(-1.0, 0.1, 0.6))
 MATERIALS = {
-    "wax": Polished(Texture("terrazzo", 0.4, 0.6, 1.0, 512, 1)),
-    "wall": Matt(Texture("plaster", 0.5, 0.4, 1.0, 512, 2)),
+    "wax": Polished("terrazzo", 0.4, 0.6, 1.0, 512, 1),
+    "wall": Matt("plaster", 0.5, 0.4, 1.0, 512, 2),
     "steel": Mirror(0.8, roughness=0.08),
     "glass": Glass(),
-    "board": Matt(Texture("checker", 0.5, 0.8, 0.5, 64, 0)),
+    "board": Matt("checker", 0.5, 0.8, 0.5, 64, 0),
 }
 SECOND_NS = 1_000_000_000
 PATH = Path(np.array([0.0, 2.0]), np.array([[1.0, -0.8, 0.3], [1.0, 0.8, 0.3]]), np.array([0.0, 60.0]))
@@ -144,7 +144,7 @@ def test_a_mirror_that_moves_mirrors_from_where_it_is(draw: Any, even_light: Any
 
 
 def test_a_light_counts_with_its_mean_over_each_sub_frame(draw: Any, even_light: Any) -> None:
-    flicker = Flicker(50.0, 0.8)
+    flicker = Flicker(depth=0.8)
     surfaces = tuple(room((4, 4, 2), floor="wall", wall="wall", ceiling="wall"))
     scene = Scene("room", surfaces, MATERIALS, ())
     lit, steady = (draw(even_light(scene, **level)) for level in ({"level": flicker}, {}))

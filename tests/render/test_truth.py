@@ -13,15 +13,15 @@ from vobench.geometry.se3 import Array
 from vobench.render.geometry import inventory
 from vobench.render.truth import Shot, TruthCaster
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
-from vobench.scene.material import Glass, Matt, Mirror, Polished, Texture
+from vobench.scene.material import Glass, Matt, Mirror, Polished
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 from vobench.scene.surface import Surface, box, rectangle, room
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame
 
-PLAIN = Texture("plain", 0.5, 0.0, 1.0, 8, 0)
+PLAIN = ("plain", 0.5, 0.0, 1.0, 8, 0)
 MATERIALS = {
-    "matt": Matt(PLAIN),
-    "wax": Polished(PLAIN),
+    "matt": Matt(*PLAIN),
+    "wax": Polished(*PLAIN),
     "steel": Mirror(),
     "glass": Glass(),
 }

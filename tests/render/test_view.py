@@ -14,18 +14,18 @@ from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
 from vobench.render.view import Plane, visible_box
 from vobench.scene.light import Sky
-from vobench.scene.material import Glass, Matt, Mirror, Polished, Texture, fresnel, pane_reflectance, under_coat
+from vobench.scene.material import Glass, Matt, Mirror, Polished, fresnel, pane_reflectance, under_coat
 from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface, box, rectangle, room
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 AHEAD = looking(pitch_deg=20, position_m=(0.2, 0.1, 0.4))
 MATERIALS = {
-    "grey": Matt(Texture("plain", 0.5, 0, 1, 8, 0)),
-    "bright": Matt(Texture("plain", 0.9, 0, 1, 8, 0)),
-    "busy": Matt(Texture("terrazzo", 0.5, 0.6, 1.0, 512, 1)),
+    "grey": Matt("plain", 0.5, 0, 1, 8, 0),
+    "bright": Matt("plain", 0.9, 0, 1, 8, 0),
+    "busy": Matt("terrazzo", 0.5, 0.6, 1.0, 512, 1),
     "steel": Mirror(0.8),
-    "wax": Polished(Texture("plain", 0.3, 0, 1, 8, 0), eta=1.7, tint=0.9),
+    "wax": Polished("plain", 0.3, 0, 1, 8, 0, eta=1.7, tint=0.9),
     "glass": Glass(eta=1.5, tint=0.7),
 }
 LUMINANCE = 0.5 * 100 / np.pi  # of grey under 100 lx
@@ -80,7 +80,7 @@ def test_the_box_around_a_quad_is_what_it_can_touch_and_no_more(quad: str) -> No
 def test_what_a_mirror_floor_shows_lies_where_reflection_puts_it(
     hall: Any, even_light: Any, draw: Any, measure: Any, lens: Pinhole
 ) -> None:
-    materials = {"steel": Mirror(1.0), "coarse": Matt(Texture("checker", 0.5, 0.8, 3.2, 1024, 0))}
+    materials = {"steel": Mirror(1.0), "coarse": Matt("checker", 0.5, 0.8, 3.2, 1024, 0)}
     surfaces = tuple(room((8, 8, 3), floor="steel", wall="coarse", ceiling="coarse"))
     renderer = draw(even_light(Scene("hall", surfaces, materials, ())))
     images = [replace(lattice, surface=upside_down(lattice.surface)) for lattice in hall.lattices[1:]]

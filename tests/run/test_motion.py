@@ -11,7 +11,7 @@ from vobench.motion.controller import CONTROLLERS
 from vobench.motion.drive import drive
 from vobench.motion.slip import DISTURBANCE_STREAMS, SLIPS
 from vobench.run.motion import body_motion, body_motions, generator
-from vobench.suite.scene_spec import MoverSpec
+from vobench.suite.scene_spec import MoverSpec, PathKey
 from vobench.suite.suite import read_plan
 
 POSES = "[{t_s: 5, position_m: [0, 0, 1]}, {t_s: 6, position_m: [1, 0, 1.2], pitch_deg: 10}, {t_s: 7, position_m: [1, 1, 1], yaw_deg: 60}]"  # fmt: skip
@@ -244,9 +244,9 @@ def test_a_camera_inside_the_furniture_is_refused_with_place_and_time(at_height,
 
 def test_a_camera_inside_a_mover_is_refused_with_place_and_time(at_height, tmp_path):
     plan = at_height(0.9)
-    keys = tuple({"t_s": float(t), "position_m": (4.0 - 2 * t, -1.5, 1.2)} for t in (0, 1))
+    keys = tuple(PathKey(t_s=t, position_m=(4.0 - 2 * t, -1.5, 1.2)) for t in (0, 1))
     cart = MoverSpec(name="cart", size_m=(0.4, 0.4, 0.8), material="wood", path=keys, repeats=True)
-    scene = plan.simulated[0].scene.model_copy(update={"movers": (cart,)})
+    scene = replace(plan.simulated[0].scene, movers=(cart,))
     with pytest.raises(SuiteError, match=r"a camera of rig 'down' is inside the mover 'cart' of scene 'room' after"):
         body_motions(replace(plan, simulated=(replace(plan.simulated[0], scene=scene),)))
 

@@ -24,7 +24,7 @@ from vobench.scene.surface import rectangle
 
 LEVELS: dict[str, Level] = {
     "steady": Steady(0.7),
-    "flicker": Flicker(mains_hz=50, depth=0.4, phase_rad=1.0),
+    "flicker": Flicker(mains_hz=50, depth=0.4, phase_deg=60.0),
     "dimmer": Dimmer((1.0, 1.2, 2.0), (0.2, 1.0, 0.5)),
     "switched": Switched((1.05, 1.3, 1.31)),
     "switched on": Switched((1.1,), on_first=False),

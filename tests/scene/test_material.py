@@ -12,7 +12,6 @@ from vobench.scene.material import (
     Matt,
     Mirror,
     Polished,
-    Texture,
     fresnel,
     inner_reflectance,
     pane_reflectance,
@@ -82,9 +81,8 @@ def test_without_a_step_in_index_a_coat_does_nothing() -> None:
 
 
 def test_only_matt_and_polished_things_have_a_body() -> None:
-    texture = Texture("plain", 0.5, 0.0, 1.0, 8, 0)
-    assert texture_of(Matt(texture)) is texture
-    assert texture_of(Polished(texture)) is texture
+    for material in (Matt("plain", 0.5), Polished("plain", 0.5)):
+        assert texture_of(material) is material
     assert texture_of(Mirror()) is None
     assert texture_of(Glass()) is None
 
@@ -93,8 +91,8 @@ NAMES = list(PATTERNS)
 DETAILED = [name for name in NAMES if name != "plain"]
 
 
-def texture(kind: str, *, seed: int = 3, contrast: float = 0.4) -> Texture:
-    return Texture(kind, albedo=0.5, contrast=contrast, tile_m=1.0, resolution_px=512, seed=seed)
+def texture(kind: str, *, seed: int = 3, contrast: float = 0.4) -> Matt:
+    return Matt(kind, albedo=0.5, contrast=contrast, tile_m=1.0, resolution_px=512, seed=seed)
 
 
 def steps(tile: Map) -> Map:

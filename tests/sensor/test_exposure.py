@@ -243,7 +243,7 @@ def test_a_rolling_shutter_leans_a_moving_edge_by_speed_times_line_delay(row_str
 
 def bands(flicker_hz: float, readout_s: float, exposure_s: float) -> Array:
     """Brightness (H,) of the rows of an even wall under a lamp that flickers, over each row's exposure."""
-    lamp = Flicker(mains_hz=flicker_hz / 2, depth=0.4, phase_rad=0.7)
+    lamp = Flicker(mains_hz=flicker_hz / 2, depth=0.4, phase_deg=40.0)
     cut = strips(HEIGHT, readout_s, 0, exposure_s, row_strips=HEIGHT, sub_frames=1)
     return np.array([lamp.mean(int(strip.start_ns[0]), int(strip.end_ns[0])) for strip in cut])
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vobench.errors import SuiteError
-from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Steady, Sun
+from vobench.scene.light import AreaLight, Flicker, PointLight, Sky, SpotLight, Steady, Sun
 from vobench.scene.material import Glass, Matt, Mirror, Polished
 from vobench.scene.scene import Scene
 from vobench.suite.scene_file import build, read_scene
@@ -115,7 +115,7 @@ def test_a_lighting_changes_levels_and_leaves_the_light_itself_alone(hall):
 
 
 def test_a_lighting_may_let_a_light_flicker(hall):
-    flicker = LevelSpec.model_validate({"flicker": {"depth": 0.5}})
+    flicker = LevelSpec(flicker=Flicker(depth=0.5))
     (bulb,) = (light for light in hall(lighting={"bulb": LightOverride(level=flicker)}).lights if light.name == "bulb")
     assert (bulb.level.mean(0, 0), bulb.level.mean(5_000_000, 5_000_000)) == (pytest.approx(1.5), pytest.approx(0.5))
 
@@ -140,13 +140,15 @@ def test_a_light_that_is_nothing_cannot_be_made_brighter(hall):
 
 
 WRONG = [
-    ("{kind: mirror, tint: 0.6}", "{kind: mirror, albedo: 0.6}", ":6: materials.steel: albedo does not belong to kind 'mirror', which has tint, roughness"),
-    ("{kind: mirror, tint: 0.6}", "{kind: chrome}", ":6: materials.steel.kind: should be 'matt', 'polished', 'mirror', 'glass' or 'luminous' (got 'chrome')"),
-    ("pattern: terrazzo, ", "", ":4: materials.grain: pattern is missing for kind 'matt'"),
-    ("{kind: luminous, luminance_cd_m2: 100}", "{kind: luminous}", ":8: materials.glow: luminance_cd_m2 is missing for kind 'luminous'"),
-    ("target_m: [2, -1, 0], ", "", ":20: lamps.2: target_m is missing for kind 'spot'"),
-    ("target_m: [2, -1, 0], ", "target_m: [2, -1, 2], ", ":20: lamps.2: target_m should differ from center_m (got [2.0, -1.0, 2.0] for both)"),
-    ("kind: point", "kind: point, size_m: [1, 1]", ":19: lamps.1: size_m does not belong to kind 'point', which has center_m"),
+    ("{kind: mirror, tint: 0.6}", "{kind: mirror, albedo: 0.6}", ":6: materials.steel.albedo: belongs to matt, polished; this is mirror"),
+    ("{kind: mirror, tint: 0.6}", "{kind: chrome}", ":6: materials.steel.kind: no kind of material named 'chrome'. Known: glass, luminous, matt, mirror, polished"),
+    ("pattern: terrazzo, ", "", ":4: materials.grain.pattern: this key is missing"),
+    ("{kind: luminous, luminance_cd_m2: 100}", "{kind: luminous}", ":8: materials.glow.luminance_cd_m2: this key is missing"),
+    ("target_m: [2, -1, 0], ", "", ":20: lamps.2.target_m: this key is missing"),
+    ("target_m: [2, -1, 0], ", "target_m: [2, -1, 0], inner_deg: 40, ", ":20: lamps.2.inner_deg: should be at most outer_deg, 30 (got 40)"),
+    ("albedo: 0.4, eta: 1.4", "albedo: 0.4, eta: 0.9", ":5: materials.stone.eta: should be 1 or more (got 0.9)"),
+    ("target_m: [2, -1, 0], ", "target_m: [2, -1, 2], ", ":20: lamps.2.target_m: should differ from center_m (got [2.0, -1.0, 2.0] for both)"),
+    ("kind: point", "kind: point, size_m: [1, 1]", ":19: lamps.1.size_m: belongs to panel; this is point"),
     ("center_m: [1, 1.5], size_m: [1, 0.8]", "center_m: [2.8, 1.5], size_m: [1, 0.8]", ":14: room.windows.0: the window reaches beyond its wall, which is 6 m long around 0 and 3 m high: center_m [2.8, 1.5], size_m [1.0, 0.8]"),
     ("pane: pane, reveal", "pane: pain, reveal", ":14: room.windows.0.pane: no material named 'pain'. Did you mean 'pane'? Known: glow, grain, pane, steel, stone"),
     ("name: crate", "name: cart", ":24: movers.0: two things are called 'cart'; give one another name"),

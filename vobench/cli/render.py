@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from vobench.cli import terminal
-from vobench.errors import InputError, UnknownNameError, unknown
+from vobench.errors import InputError, SettingError, UnknownNameError, unknown
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import PRESETS, looking
@@ -28,7 +28,7 @@ from vobench.sensor.response import Grey
 from vobench.sequence.picture import write_png
 from vobench.suite import catalog
 from vobench.suite.scene_file import build, read_scene
-from vobench.suite.suite import ENGINES, MOST_SAMPLES, Rendering
+from vobench.suite.suite import Rendering
 
 Place = tuple[float, float, float]
 LATEST_S = 1e9  # stamps are 64 bits of nanoseconds
@@ -76,13 +76,11 @@ class PictureSettings:
     samples: int | None
 
     def rendering(self) -> Rendering:
-        """The engine. Raises UnknownNameError, and InputError for samples that it does not take."""
-        _require_known("engine", self.engine, ENGINES)
-        if self.samples is not None and self.engine != "path":
-            raise InputError(f"--samples belongs to --engine path, but the engine is {self.engine}; leave it out")
-        if self.samples is not None and not 1 <= self.samples <= MOST_SAMPLES:
-            raise InputError(f"--samples should be from 1 to {MOST_SAMPLES}, got {self.samples}")
-        return Rendering(engine=self.engine, samples=self.samples)
+        """The engine. Raises InputError for one that is not known, and for samples that it does not take."""
+        try:
+            return Rendering(engine=self.engine, samples=self.samples)
+        except SettingError as error:
+            raise InputError(": ".join([*(f"--{key}" for key in error.keys), error.sentence])) from None
 
     def lens(self) -> Camera:
         """The lens. Raises UnknownNameError."""

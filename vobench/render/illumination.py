@@ -2,7 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -76,20 +76,14 @@ KEPT = 16  # maps and moments: enough for the strips of a stereo pair
 T = TypeVar("T")
 
 
-class RecentCache(Generic[T]):
-    """The last few values made, by what they were made of."""
-
-    def __init__(self) -> None:
-        self._kept: OrderedDict[Hashable, T] = OrderedDict()
-
-    def get(self, key: Hashable, make: Callable[[], T]) -> T:
-        """The value of a key, made where it is not at hand."""
-        if key not in self._kept:
-            self._kept[key] = make()
-        self._kept.move_to_end(key)
-        if len(self._kept) > KEPT:
-            self._kept.popitem(last=False)
-        return self._kept[key]
+def _recent(kept: OrderedDict[Hashable, T], key: Hashable, make: Callable[[], T]) -> T:
+    """The value of a key, made where it is not among the last few."""
+    if key not in kept:
+        kept[key] = make()
+    kept.move_to_end(key)
+    if len(kept) > KEPT:
+        kept.popitem(last=False)
+    return kept[key]
 
 
 class Illumination:
@@ -109,9 +103,9 @@ class Illumination:
         if self._tracks or baked.scene.movers:
             self._still = static_scene(baked.scene, baked.atlas, seed=baked.settings.seed)
         self._movers = MoverLight(baked, self._still) if baked.scene.movers else None
-        self._maps: RecentCache[Map] = RecentCache()
-        self._moments: RecentCache[MoverLightAt] = RecentCache()
-        self._suns: RecentCache[Map] = RecentCache()
+        self._maps: OrderedDict[Hashable, Map] = OrderedDict()
+        self._moments: OrderedDict[Hashable, MoverLightAt] = OrderedDict()
+        self._suns: OrderedDict[Hashable, Map] = OrderedDict()
 
     def at(self, start_ns: int, end_ns: int) -> Map:
         """Map (H, W): the mean from start_ns to end_ns. The very array of an earlier call where nothing differs."""
@@ -119,7 +113,7 @@ class Illumination:
         amid_ns = (start_ns + end_ns) / 2
         suns = tuple(_stepped_ns(light, amid_ns) for light in self._lights)
         poses = tuple(mover.path.pose(amid_ns).tobytes() for mover in self._baked.scene.movers)
-        return self._maps.get((levels, suns, poses), lambda: self._map(levels, suns, poses, amid_ns))
+        return _recent(self._maps, (levels, suns, poses), lambda: self._map(levels, suns, poses, amid_ns))
 
     def _map(self, levels: tuple[float, ...], suns: tuple[float, ...], poses: tuple[bytes, ...], amid_ns: float) -> Map:
         total = self._steady.copy()
@@ -129,7 +123,7 @@ class Illumination:
         if self._movers:
             movers = self._movers
             is_on = tuple(level > 0 for level in levels)
-            moment = self._moments.get((suns, poses, is_on), lambda: movers.at(amid_ns, suns, is_on))
+            moment = _recent(self._moments, (suns, poses, is_on), lambda: movers.at(amid_ns, suns, is_on))
             movers.add(moment, total, levels)
         return total
 
@@ -147,7 +141,7 @@ class Illumination:
             layer: Map = direct_layer(scene, index, self._still, settings, t_ns=t_ns) + around
             return layer
 
-        return self._suns.get((index, t_ns), make)
+        return _recent(self._suns, (index, t_ns), make)
 
 
 def _stepped_ns(light: Light, t_ns: float) -> float:

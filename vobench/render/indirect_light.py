@@ -41,13 +41,14 @@ class SurfaceResponse:
 
     def mirrored(self, surface: Indices, cosine: Floats) -> Floats:
         """Share (R,) that goes on as from a mirror."""
-        reflected = fresnel(cosine, np.maximum(self.eta[surface], 1.0)).astype(np.float32)
-        return self.tint[surface] * np.where(self.eta[surface] > 0, reflected, 1)
+        return self.tint[surface] * np.where(self.eta[surface] > 0, self._reflected(surface, cosine), 1)
 
     def scattered(self, surface: Indices, cosine: Floats) -> Floats:
         """Luminance times pi (R,) towards a cosine, per light that entered."""
-        reflected = fresnel(cosine, np.maximum(self.eta[surface], 1.0)).astype(np.float32)
-        return self.matt[surface] * np.where(self.eta[surface] > 0, 1 - reflected, 1)
+        return self.matt[surface] * np.where(self.eta[surface] > 0, 1 - self._reflected(surface, cosine), 1)
+
+    def _reflected(self, surface: Indices, cosine: Floats) -> Floats:
+        return fresnel(cosine, np.maximum(self.eta[surface], 1.0)).astype(np.float32)
 
 
 def surface_responses(

@@ -20,7 +20,7 @@ from vobench.errors import MissingDependencyError
 from vobench.geometry.se3 import Array
 from vobench.render.geometry import SurfaceList, corners, inventory
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
-from vobench.scene.material import Glass, Material, Matt, Mirror, Polished, Texture, reflectance
+from vobench.scene.material import Glass, Material, Matt, Mirror, Polished, Textured, reflectance, texture_of
 from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface
 
@@ -236,8 +236,8 @@ def light_key(index: int) -> str:
 
 def tile_m(scene: Scene, material: str) -> float:
     """Length of the side of a material's tile; 1 where it has none."""
-    found = scene.materials[material]
-    return found.texture.tile_m if isinstance(found, Matt | Polished) else 1.0
+    texture = texture_of(scene.materials[material])
+    return texture.tile_m if texture else 1.0
 
 
 def positions(surfaces: list[Surface]) -> Array:
@@ -268,37 +268,29 @@ def _mesh(mi: Any, name: str, surfaces: list[Surface], bsdf: Any, tile: float) -
 def _bsdf(mi: Any, material: Material) -> Plugin:
     """The material as one of Mitsuba's plugins."""
     match material:
-        case Matt(texture):
-            return {"type": "diffuse", "reflectance": _texture(mi, texture)}
+        case Matt():
+            return {"type": "diffuse", "reflectance": _texture(mi, material)}
         case Polished():
-            return _polished(mi, material)
-        case Mirror(tint, roughness):
-            kind = {"type": "roughconductor", **_facets(roughness)} if roughness else {"type": "conductor"}
-            return {**kind, "material": "none", "specular_reflectance": _uniform(tint)}
-        case Glass(eta, tint):
-            return {"type": "thindielectric", **_boundary(eta), "specular_transmittance": _uniform(tint)}
+            coat = {"int_ior": material.eta, "ext_ior": 1.0, "nonlinear": True}
+            colours = {"specular_reflectance": _uniform(material.tint), "diffuse_reflectance": _texture(mi, material)}
+            return {**_polish("plastic", material.roughness), **coat, **colours}
+        case Mirror():
+            kind = _polish("conductor", material.roughness)
+            return {**kind, "material": "none", "specular_reflectance": _uniform(material.tint)}
+        case Glass():
+            passing = {"specular_transmittance": _uniform(material.tint)}
+            return {"type": "thindielectric", "int_ior": material.eta, "ext_ior": 1.0, **passing}
 
 
-def _polished(mi: Any, material: Polished) -> Plugin:
-    roughness = material.roughness
-    kind = {"type": "roughplastic", **_facets(roughness)} if roughness else {"type": "plastic"}
-    coat = {**_boundary(material.eta), "nonlinear": True, "specular_reflectance": _uniform(material.tint)}
-    return {**kind, **coat, "diffuse_reflectance": _texture(mi, material.texture)}
-
-
-def _facets(roughness: float) -> Plugin:
-    return {"distribution": "ggx", "alpha": roughness}
-
-
-def _boundary(eta: float) -> Plugin:
-    return {"int_ior": eta, "ext_ior": 1.0}
+def _polish(kind: str, roughness: float) -> Plugin:
+    return {"type": f"rough{kind}", "distribution": "ggx", "alpha": roughness} if roughness else {"type": kind}
 
 
 def _uniform(value: float) -> Plugin:
     return {"type": "uniform", "value": value}
 
 
-def _texture(mi: Any, texture: Texture) -> Plugin:
+def _texture(mi: Any, texture: Textured) -> Plugin:
     """The tile as it is: linear reflectance, repeated, linear between texels, row 0 at v = 0."""
     tile = mi.Bitmap(np.ascontiguousarray(reflectance(texture)[..., None]))
     return {"type": "bitmap", "bitmap": tile, "raw": True, "wrap_mode": "repeat", "filter_type": "bilinear"}

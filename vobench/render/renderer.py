@@ -11,7 +11,6 @@ from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
 
 Radiance = NDArray[np.float32]
-Depth = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)

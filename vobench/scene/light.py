@@ -1,16 +1,28 @@
 """Lights: panels, points, spots, the sun and the sky, each brighter or darker over time."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Protocol
+from itertools import pairwise
+from typing import Annotated, Protocol
 
 import numpy as np
+from annotated_types import MinLen
 
+from vobench.errors import SettingError
 from vobench.geometry.se3 import Array
 from vobench.scene.surface import Surface
+from vobench.setting import SETTINGS, Positive, Share, require
 
 NS_PER_S = 1e9
 SUN_RADIUS_RAD = np.deg2rad(0.533 / 2)  # seen from the Earth
+
+
+def require_increasing(times_s: Sequence[float]) -> None:
+    """Raise SettingError where a time is not later than the one before it."""
+    for earlier, later in pairwise(times_s):
+        if later <= earlier:
+            raise SettingError(f"times should increase, but {later:g} follows {earlier:g}")
 
 
 class Level(Protocol):
@@ -34,16 +46,20 @@ class Steady:
 
 @dataclass(frozen=True, slots=True)
 class Flicker:
-    """1 + depth cos(2π 2 mains_hz t + phase): a lamp on alternating current is brightest twice a period."""
+    """A lamp on alternating current is brightest twice a period: 1 + depth cos(2π 2 mains_hz t + phase)."""
 
-    mains_hz: float
-    depth: float
-    phase_rad: float = 0.0
+    __pydantic_config__ = SETTINGS
+    depth: Share
+    mains_hz: Positive = 50.0
+    phase_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        require(self)
 
     def mean(self, start_ns: int, end_ns: int) -> float:
         """The integral of the cosine is its value amid the interval times a sinc."""
         middle_s, length_s = (start_ns + end_ns) / 2 / NS_PER_S, (end_ns - start_ns) / NS_PER_S
-        swing = np.cos(4 * np.pi * self.mains_hz * middle_s + self.phase_rad)
+        swing = np.cos(4 * np.pi * self.mains_hz * middle_s + float(np.deg2rad(self.phase_deg)))
         return float(1 + self.depth * swing * np.sinc(2 * self.mains_hz * length_s))
 
 
@@ -67,8 +83,13 @@ class Dimmer:
 class Switched:
     """On or off at first, and the other way round from each of the increasing instants times_s on."""
 
-    times_s: tuple[float, ...]
+    __pydantic_config__ = SETTINGS
+    times_s: Annotated[tuple[float, ...], MinLen(1)]
     on_first: bool = True
+
+    def __post_init__(self) -> None:
+        require(self)
+        require_increasing(self.times_s)
 
     def mean(self, start_ns: int, end_ns: int) -> float:
         """The share of the interval in which the light is on."""

@@ -2,43 +2,30 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 import scipy
+from annotated_types import Ge, Gt, Le, Lt
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
+from vobench.setting import SETTINGS, OneOf, Positive, Share, require
 
 Map = NDArray[np.float32]
 
 
-@dataclass(frozen=True, slots=True)
-class Texture:
-    """A square tile of reflectance that repeats every `tile_m`.
-
-    `albedo` is its mean, and `contrast` its spread over its mean: half the step from the darkest 1 %
-    to the brightest 1 %.
-    """
-
-    kind: str
-    albedo: float
-    contrast: float
-    tile_m: float
-    resolution_px: int
-    seed: int
-
-
-def reflectance(texture: Texture) -> Map:
+def reflectance(texture: "Textured") -> Map:
     """The tile as (resolution_px, resolution_px) float32 in [0.02, 0.98], row 0 at v = 0."""
     rng = np.random.default_rng([texture.seed, texture.resolution_px])
-    pattern = PATTERNS[texture.kind](texture, rng)
+    pattern = PATTERNS[texture.pattern](texture, rng)
     low, high = np.percentile(pattern[::4, ::4] if len(pattern) > 64 else pattern, [1, 99])
     unit = (pattern - pattern.mean()) / ((high - low) / 2 if high > low else 1.0)
     tile: Map = np.clip(texture.albedo * (1 + texture.contrast * unit), 0.02, 0.98).astype(np.float32)
     return tile
 
 
-def _noise(texture: Texture, rng: np.random.Generator, *, coarse_m: float, fine_m: float, slope: float) -> Map:
+def _noise(texture: "Textured", rng: np.random.Generator, *, coarse_m: float, fine_m: float, slope: float) -> Map:
     """Periodic noise of unit variance whose features are between `fine_m` and `coarse_m` wide; 0 where none fits.
 
     White noise shaped in the frequency domain by f^-slope: isotropic, and a tile without seams.
@@ -57,13 +44,13 @@ def _noise(texture: Texture, rng: np.random.Generator, *, coarse_m: float, fine_
     return unit
 
 
-def plain(texture: Texture, rng: np.random.Generator) -> Map:
+def plain(texture: "Textured", rng: np.random.Generator) -> Map:
     """One tone, without any detail."""
     del rng
     return np.zeros((texture.resolution_px, texture.resolution_px), np.float32)
 
 
-def terrazzo(texture: Texture, rng: np.random.Generator) -> Map:
+def terrazzo(texture: "Textured", rng: np.random.Generator) -> Map:
     """Chips of several tones and sizes with sharp edges in a ground with fine grain."""
     chips = _noise(texture, rng, coarse_m=0.06, fine_m=0.012, slope=0.5)
     small = _noise(texture, rng, coarse_m=0.015, fine_m=0.004, slope=0.5)
@@ -73,7 +60,7 @@ def terrazzo(texture: Texture, rng: np.random.Generator) -> Map:
     return pattern
 
 
-def plaster(texture: Texture, rng: np.random.Generator) -> Map:
+def plaster(texture: "Textured", rng: np.random.Generator) -> Map:
     """A trowelled wall: soft patches with pits."""
     patches = _noise(texture, rng, coarse_m=0.8, fine_m=0.006, slope=1.1)
     pits = _noise(texture, rng, coarse_m=0.04, fine_m=0.008, slope=0.3)
@@ -81,7 +68,7 @@ def plaster(texture: Texture, rng: np.random.Generator) -> Map:
     return pattern
 
 
-def wood(texture: Texture, rng: np.random.Generator) -> Map:
+def wood(texture: "Textured", rng: np.random.Generator) -> Map:
     """Grain that runs along u, in bent rings."""
     bend = _noise(texture, rng, coarse_m=0.6, fine_m=0.08, slope=1.5)
     fibre = _noise(texture, rng, coarse_m=0.05, fine_m=0.004, slope=0.6)
@@ -91,7 +78,7 @@ def wood(texture: Texture, rng: np.random.Generator) -> Map:
     return pattern
 
 
-def poster(texture: Texture, rng: np.random.Generator) -> Map:
+def poster(texture: "Textured", rng: np.random.Generator) -> Map:
     """Large flat patches with sharp borders, as on printed boards and book spines."""
     n = texture.resolution_px
     pattern = np.zeros((n, n), np.float32)
@@ -103,14 +90,14 @@ def poster(texture: Texture, rng: np.random.Generator) -> Map:
     return pattern + 0.15 * _noise(texture, rng, coarse_m=0.1, fine_m=0.004, slope=0.5)
 
 
-def checker(texture: Texture, rng: np.random.Generator) -> Map:
+def checker(texture: "Textured", rng: np.random.Generator) -> Map:
     """Eight by eight squares: the one with corners whose place is known."""
     del rng
     square = np.arange(texture.resolution_px) * 8 // texture.resolution_px
     return np.where((square[:, None] + square[None, :]) % 2, 1.0, -1.0).astype(np.float32)
 
 
-PATTERNS: dict[str, Callable[[Texture, np.random.Generator], Map]] = {
+PATTERNS: dict[str, Callable[["Textured", np.random.Generator], Map]] = {
     "plain": plain,
     "terrazzo": terrazzo,
     "plaster": plaster,
@@ -120,48 +107,91 @@ PATTERNS: dict[str, Callable[[Texture, np.random.Generator], Map]] = {
 }
 
 
+Pattern = Annotated[str, OneOf("pattern", PATTERNS)]
+Albedo = Annotated[float, Gt(0), Lt(1)]
+Resolution = Annotated[int, Ge(8), Le(8192)]
+Seed = Annotated[int, Ge(0)]
+Eta = Annotated[float, Ge(1), Le(4)]  # 1 is an open pane, or no coat
+Roughness = Annotated[float, Ge(0), Le(0.5)]
+
+
 @dataclass(frozen=True, slots=True)
 class Matt:
-    """Reflects its texture's share of the light alike in all directions (Lambert)."""
+    """Reflects its texture's share of the light alike in all directions (Lambert).
 
-    texture: Texture
+    The texture is a square tile that repeats every `tile_m`. `albedo` is its mean, and `contrast` its spread over
+    its mean: half the step from the darkest 1 % to the brightest 1 %.
+    """
+
+    __pydantic_config__ = SETTINGS
+    pattern: Pattern
+    albedo: Albedo
+    contrast: Share = 0.0
+    tile_m: Positive = 1.0
+    resolution_px: Resolution = 1024
+    seed: Seed = 0
+    kind: Literal["matt"] = "matt"
+
+    def __post_init__(self) -> None:
+        require(self)
 
 
 @dataclass(frozen=True, slots=True)
 class Polished:
-    """A texture under a clear coat, such as waxed stone: matt below, and a mirror that grows towards grazing.
+    """A texture as in Matt under a clear coat, such as waxed stone: matt below, and a mirror that grows to grazing.
 
     `tint` scales what the coat mirrors; `roughness` is the RMS slope of its facets (GGX alpha), 0 for none.
     """
 
-    texture: Texture
-    eta: float = 1.5
-    tint: float = 1.0
-    roughness: float = 0.0
+    __pydantic_config__ = SETTINGS
+    pattern: Pattern
+    albedo: Albedo
+    contrast: Share = 0.0
+    tile_m: Positive = 1.0
+    resolution_px: Resolution = 1024
+    seed: Seed = 0
+    eta: Eta = 1.5
+    tint: Share = 1.0
+    roughness: Roughness = 0.0
+    kind: Literal["polished"] = "polished"
+
+    def __post_init__(self) -> None:
+        require(self)
 
 
 @dataclass(frozen=True, slots=True)
 class Mirror:
     """A metal that reflects the share `tint` at every angle; `roughness` as in Polished."""
 
-    tint: float = 0.9
-    roughness: float = 0.0
+    __pydantic_config__ = SETTINGS
+    tint: Share = 0.9
+    roughness: Roughness = 0.0
+    kind: Literal["mirror"] = "mirror"
+
+    def __post_init__(self) -> None:
+        require(self)
 
 
 @dataclass(frozen=True, slots=True)
 class Glass:
     """A thin pane: mirrors a little, lets the rest pass straight; `tint` scales what passes. It dims light, no more."""
 
-    eta: float = 1.5
-    tint: float = 1.0
+    __pydantic_config__ = SETTINGS
+    eta: Eta = 1.5
+    tint: Share = 1.0
+    kind: Literal["glass"] = "glass"
+
+    def __post_init__(self) -> None:
+        require(self)
 
 
+Textured = Matt | Polished
 Material = Matt | Polished | Mirror | Glass
 
 
-def texture_of(material: Material) -> Texture | None:
-    """The texture a material shows, None for one without a body."""
-    return material.texture if isinstance(material, Matt | Polished) else None
+def texture_of(material: Material) -> Textured | None:
+    """The material where it shows a texture, None for one without a body."""
+    return material if isinstance(material, Matt | Polished) else None
 
 
 def fresnel(cosine: Array, eta: float | Array) -> Array:

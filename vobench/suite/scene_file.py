@@ -9,19 +9,16 @@ import numpy as np
 
 from vobench.errors import SuiteError, unknown
 from vobench.geometry import se3
-from vobench.geometry.se3 import Array
 from vobench.scene import scene as scripted
-from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun, scaled
-from vobench.scene.material import Glass, Material, Matt, Mirror, Polished, Texture
-from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.light import AreaLight, Light, Sky, Sun, scaled
+from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface, Window, box, rectangle, room, with_windows
 from vobench.setting import Triple
 from vobench.suite import yaml_file
 from vobench.suite.scene_spec import (
     BoardSpec,
-    LampSpec,
     LightOverride,
-    MaterialSpec,
+    Luminous,
     MoverSpec,
     SceneFile,
     SkySpec,
@@ -35,7 +32,6 @@ Lighting = dict[str, LightOverride]
 SUN, SKY = "sun", "sky"
 # How names begin that we give to what has none.
 GIVEN_NAMES = ("box_", "board_", "window_", "wall_", "floor", "ceiling")
-MIRROR_TINT, CLEAR_TINT = 0.9, 1.0
 TOUCHING_M = 1e-6  # windows may share a border
 
 
@@ -56,12 +52,12 @@ def survey(path: Path) -> tuple[SceneFile, Mistakes]:
         with wrong.at(*keys):
             if name not in materials:
                 raise SuiteError(unknown("material", name, list(materials)))
-            if keys[0] == "movers" and name in spec.materials and spec.materials[name].kind == "luminous":
+            if keys[0] == "movers" and isinstance(getattr(spec, "materials", {}).get(name), Luminous):
                 raise SuiteError(f"'{name}' shines, and what moves cannot; choose a material of another kind")
     if not reading.mistakes:
         with wrong.at():
             _check_light(spec)
-    if "room" in spec.model_fields_set:
+    if hasattr(spec, "room"):
         _check_room(spec, wrong)
     _check_names(spec, source, wrong)
     return spec, wrong
@@ -73,7 +69,7 @@ def build(spec: SceneFile, lighting: Lighting) -> Scene:
     return Scene(
         name=spec.name,
         surfaces=tuple(surface for surface in surfaces if surface.material not in luminous),
-        materials={name: _material(m) for name, m in spec.materials.items() if name not in luminous},
+        materials={name: m for name, m in spec.materials.items() if not isinstance(m, Luminous)},
         lights=lit(tuple(_lights(spec, surfaces)), lighting),
         movers=movers(spec),
     )
@@ -114,7 +110,7 @@ def movers(spec: SceneFile) -> tuple[scripted.Mover, ...]:
 
 
 def _luminous(spec: SceneFile) -> dict[str, float]:
-    return {name: m.luminance_cd_m2 for name, m in spec.materials.items() if m.luminance_cd_m2 is not None}
+    return {name: m.luminance_cd_m2 for name, m in spec.materials.items() if isinstance(m, Luminous)}
 
 
 def _surfaces(spec: SceneFile) -> list[Surface]:
@@ -141,7 +137,7 @@ def _check_room(spec: SceneFile, wrong: Mistakes) -> None:
 
 
 def _materials_used(spec: SceneFile) -> Iterator[tuple[Keys, str]]:
-    if "room" in spec.model_fields_set:
+    if hasattr(spec, "room"):
         for part in ("floor", "wall", "ceiling"):
             yield ("room", part), getattr(spec.room, part)
         for index, window in enumerate(spec.room.windows):
@@ -161,7 +157,7 @@ def _places(spec: SceneFile) -> Iterator[tuple[Keys, Triple]]:
 
 def _check_names(spec: SceneFile, source: YamlFile, wrong: Mistakes) -> None:
     """Lights are named by lightings, and things by ground truth: no name twice, a name given by us included."""
-    has_room = "room" in spec.model_fields_set
+    has_room = hasattr(spec, "room")
     seen = {SUN, SKY, *(surface.instance for surface in (_room(spec) if has_room else ()))}
     for kind, unnamed in (("lamps", ""), ("boxes", "box"), ("boards", "board"), ("movers", "")):
         for index, thing in enumerate(getattr(spec, kind)):
@@ -227,36 +223,13 @@ def _board(board: BoardSpec, name: str) -> Surface:
     return rectangle(np.asarray(board.center_m), across, up, board.material, name)
 
 
-def _material(m: MaterialSpec) -> Material:
-    if m.kind == "mirror":
-        return Mirror(MIRROR_TINT if m.tint is None else m.tint, m.roughness)
-    tint = CLEAR_TINT if m.tint is None else m.tint
-    if m.kind == "glass":
-        return Glass(m.eta, tint)
-    assert m.pattern is not None  # MaterialSpec sees to it
-    assert m.albedo is not None
-    texture = Texture(m.pattern, m.albedo, m.contrast, m.tile_m, m.resolution_px, m.seed)
-    return Polished(texture, m.eta, tint, m.roughness) if m.kind == "polished" else Matt(texture)
-
-
 def _lights(spec: SceneFile, surfaces: list[Surface]) -> Iterator[Light]:
-    yield from (_lamp(lamp) for lamp in spec.lamps)
+    yield from (lamp.build() for lamp in spec.lamps)
     if spec.sun:
         yield _sun(spec.sun)
     if spec.sky:
         yield _sky(spec.sky, spec.sun)
     yield from _glowing(surfaces, _luminous(spec))
-
-
-def _lamp(lamp: LampSpec) -> Light:
-    center, level = np.asarray(lamp.center_m), lamp.level.build()
-    if lamp.size_m:
-        return replace(ceiling_light(lamp.name, center, lamp.size_m, power_lm=lamp.power_lm), level=level)
-    if lamp.target_m:
-        way = np.asarray(lamp.target_m) - center
-        direction: Array = way / np.linalg.norm(way)
-        return SpotLight(lamp.name, center, direction, lamp.power_lm, lamp.inner_deg, lamp.outer_deg, level)
-    return PointLight(lamp.name, center, lamp.power_lm, level)
 
 
 def _sun(sun: SunSpec) -> Sun:

@@ -1,137 +1,106 @@
-"""What a scene's YAML may say."""
+"""What a scene's YAML may say, beside the materials and levels of the room `scene`.
 
-from collections.abc import Mapping
-from itertools import pairwise
-from typing import Annotated, Any, Literal
+The reader holds the bounds of what is only ever read; what has more to check holds them itself.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Ge, Gt, Le, Lt, MinLen
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, model_validator
 
-from vobench.scene.light import SKIES, Dimmer, Flicker, Level, Steady, Switched
-from vobench.scene.material import PATTERNS
-from vobench.setting import Name, NonNegative, Positive, Share, Triple
-from vobench.suite.yaml_file import Strict, one_of
-
-
-class FlickerSpec(Strict):
-    """A lamp on alternating current: 1 + depth cos(2π 2 mains_hz t + phase)."""
-
-    mains_hz: Positive = 50.0
-    depth: Share
-    phase_deg: float = 0.0
-
-
-class SwitchedSpec(Strict):
-    """On or off at first, and the other way round at each time."""
-
-    times_s: Annotated[tuple[float, ...], Field(min_length=1)]
-    on_first: bool = True
+from vobench.errors import SettingError
+from vobench.geometry.se3 import Array
+from vobench.scene.light import (
+    SKIES,
+    AreaLight,
+    Dimmer,
+    Flicker,
+    Level,
+    PointLight,
+    SpotLight,
+    Steady,
+    Switched,
+    require_increasing,
+)
+from vobench.scene.material import Glass, Matt, Mirror, Polished
+from vobench.scene.scene import ceiling_light
+from vobench.setting import SETTINGS, ByKind, Name, NonNegative, OneOf, Positive, Triple, require
 
 
-class LevelSpec(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LevelSpec:
     """A light's brightness over time, relative to its nominal one: exactly one of these."""
 
+    __pydantic_config__ = SETTINGS
     steady: NonNegative | None = None
-    flicker: FlickerSpec | None = None
-    dimmer: Annotated[tuple[tuple[float, NonNegative], ...], Field(min_length=2)] | None = None
-    switched: SwitchedSpec | None = None
+    flicker: Flicker | None = None
+    dimmer: Annotated[tuple[tuple[float, NonNegative], ...], MinLen(2)] | None = None
+    switched: Switched | None = None
 
-    @model_validator(mode="after")
-    def _exactly_one(self) -> "LevelSpec":
-        if len(self.model_dump(exclude_none=True)) != 1:
-            raise ValueError("should have exactly one of steady, flicker, dimmer, switched")
+    def __post_init__(self) -> None:
+        require(self)
+        if sum(way is not None for way in (self.steady, self.flicker, self.dimmer, self.switched)) != 1:
+            raise SettingError("should have exactly one of steady, flicker, dimmer, switched")
         require_increasing([t for t, _ in self.dimmer or ()])
-        require_increasing(list(self.switched.times_s) if self.switched else [])
-        return self
 
     def build(self) -> Level:
         """The function of time."""
-        if self.flicker:
-            return Flicker(self.flicker.mains_hz, self.flicker.depth, float(np.deg2rad(self.flicker.phase_deg)))
         if self.dimmer:
             return Dimmer(tuple(t for t, _ in self.dimmer), tuple(level for _, level in self.dimmer))
-        if self.switched:
-            return Switched(self.switched.times_s, self.switched.on_first)
-        assert self.steady is not None  # one of them is there
-        return Steady(self.steady)
+        return self.flicker or self.switched or Steady(self.steady or 0.0)
 
 
-class LightOverride(Strict):
+STEADY = LevelSpec(steady=1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LightOverride:
     """A light as a lighting sets it: another power (lamps) or illuminance (sun and sky), or a level over time."""
 
+    __pydantic_config__ = SETTINGS
     power_lm: NonNegative | None = None
     illuminance_lx: NonNegative | None = None
     level: LevelSpec | None = None
 
 
-def require_increasing(times_s: list[float]) -> None:
-    """Raise ValueError where a time is not later than the one before it."""
-    for earlier, later in pairwise(times_s):
-        if later <= earlier:
-            raise ValueError(f"times should increase, but {later:g} follows {earlier:g}")
-
-
 # The light of anything larger would take more memory than machines have, and the renderer sees 60 m far.
-Side = Annotated[float, Field(gt=0, le=30)]
+Side = Annotated[float, Gt(0), Le(30)]
 Size = tuple[Side, Side, Side]
-Elevation = Annotated[float, Field(gt=0, le=90)]
-MaterialKind = Literal["matt", "polished", "mirror", "glass", "luminous"]
-LampKind = Literal["panel", "point", "spot"]
-Wall = Literal["north", "east", "south", "west"]
-
-TEXTURE_KEYS = ("pattern", "albedo", "contrast", "tile_m", "resolution_px", "seed")
-# Which keys belong to which kind of material or lamp.
-MATERIAL_KEYS: dict[MaterialKind, tuple[str, ...]] = {
-    "matt": TEXTURE_KEYS,
-    "polished": (*TEXTURE_KEYS, "eta", "tint", "roughness"),
-    "mirror": ("tint", "roughness"),
-    "glass": ("eta", "tint"),
-    "luminous": ("luminance_cd_m2",),
-}
-LAMP_KEYS: dict[LampKind, tuple[str, ...]] = {
-    "panel": ("center_m", "size_m"),
-    "point": ("center_m",),
-    "spot": ("center_m", "target_m", "inner_deg", "outer_deg"),
-}
+Elevation = Annotated[float, Gt(0), Le(90)]
 
 
-class MaterialSpec(Strict):
-    """What a surface is made of; `kind` says which of the other keys belong here."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Luminous:
+    """A material of lamps: what has it shines evenly to all sides of its front."""
 
-    kind: MaterialKind = "matt"
-    pattern: Annotated[str, one_of("pattern", PATTERNS)] | None = None
-    albedo: Annotated[float, Field(gt=0, lt=1)] | None = None
-    contrast: Share = 0.0
-    tile_m: Positive = 1.0
-    resolution_px: Annotated[int, Field(ge=8, le=8192)] = 1024
-    seed: Annotated[int, Field(ge=0)] = 0
-    eta: Annotated[float, Field(gt=1, le=4)] = 1.5
-    tint: Share | None = None
-    roughness: Annotated[float, Field(ge=0, le=0.5)] = 0.0
-    luminance_cd_m2: Positive | None = None
-
-    @model_validator(mode="after")
-    def _fits_kind(self) -> "MaterialSpec":
-        needed = {"matt": ("pattern", "albedo"), "polished": ("pattern", "albedo"), "luminous": ("luminance_cd_m2",)}
-        _require_fitting(self, MATERIAL_KEYS, needed.get(self.kind, ()))
-        return self
+    __pydantic_config__ = SETTINGS
+    kind: Literal["luminous"] = "luminous"
+    luminance_cd_m2: Positive
 
 
-class WindowSpec(Strict):
+MaterialSpec = Annotated[Matt | Polished | Mirror | Glass | Luminous, ByKind("material", default="matt")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WindowSpec:
     """A hole in a wall with a pane depth_m behind it; center_m is the place along the wall (world x or y) and z."""
 
-    wall: Wall
+    __pydantic_config__ = SETTINGS
+    wall: Literal["north", "east", "south", "west"]
     center_m: tuple[float, float]
     size_m: tuple[Side, Side]
-    depth_m: Annotated[float, Field(gt=0, le=2)] = 0.15
+    depth_m: Annotated[float, Gt(0), Le(2)] = 0.15
     pane: str
     reveal: str
 
 
-class RoomSpec(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoomSpec:
     """Four walls, a floor at z = 0 and a ceiling, around the origin."""
 
+    __pydantic_config__ = SETTINGS
     size_m: Size
     floor: str
     wall: str
@@ -150,9 +119,11 @@ class RoomSpec(Strict):
         return within
 
 
-class BoxSpec(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoxSpec:
     """A piece of furniture."""
 
+    __pydantic_config__ = SETTINGS
     name: Name | None = None
     center_m: Triple
     size_m: Size
@@ -160,9 +131,11 @@ class BoxSpec(Strict):
     material: str
 
 
-class BoardSpec(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardSpec:
     """An upright rectangle seen from the side that faces yaw_deg (0 along x): a picture, a screen, a mirror, a pane."""
 
+    __pydantic_config__ = SETTINGS
     name: Name | None = None
     center_m: Triple
     size_m: tuple[Side, Side]
@@ -170,90 +143,142 @@ class BoardSpec(Strict):
     material: str
 
 
-class LampSpec(Strict):
-    """A level panel that shines down from a rectangle of size_m, or a bulb with or without a reflector."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PanelLamp:
+    """A level panel that shines down from a rectangle of size_m."""
 
+    __pydantic_config__ = SETTINGS
     name: Name
-    kind: LampKind = "panel"
+    kind: Literal["panel"] = "panel"
     center_m: Triple
-    size_m: tuple[Side, Side] | None = None
-    target_m: Triple | None = None
-    inner_deg: Annotated[float, Field(ge=0, lt=90)] = 20.0
-    outer_deg: Annotated[float, Field(gt=0, lt=90)] = 30.0
+    size_m: tuple[Side, Side]
     power_lm: NonNegative
-    level: LevelSpec = LevelSpec(steady=1.0)
+    level: LevelSpec = STEADY
 
-    @model_validator(mode="after")
-    def _fits_kind(self) -> "LampSpec":
-        needed = {"panel": ("size_m",), "spot": ("target_m",)}
-        _require_fitting(self, LAMP_KEYS, needed.get(self.kind, ()))
+    def build(self) -> AreaLight:
+        """The light."""
+        panel = ceiling_light(self.name, np.asarray(self.center_m), self.size_m, power_lm=self.power_lm)
+        return replace(panel, level=self.level.build())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointLamp:
+    """A bulb."""
+
+    __pydantic_config__ = SETTINGS
+    name: Name
+    kind: Literal["point"] = "point"
+    center_m: Triple
+    power_lm: NonNegative
+    level: LevelSpec = STEADY
+
+    def build(self) -> PointLight:
+        """The light."""
+        return PointLight(self.name, np.asarray(self.center_m), self.power_lm, self.level.build())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpotLamp:
+    """A bulb in a reflector that points at target_m."""
+
+    __pydantic_config__ = SETTINGS
+    name: Name
+    kind: Literal["spot"] = "spot"
+    center_m: Triple
+    target_m: Triple
+    inner_deg: Annotated[float, Ge(0), Lt(90)] = 20.0
+    outer_deg: Annotated[float, Gt(0), Lt(90)] = 30.0
+    power_lm: NonNegative
+    level: LevelSpec = STEADY
+
+    def __post_init__(self) -> None:
+        require(self)
         if self.inner_deg > self.outer_deg:
-            raise ValueError(f"inner_deg should be at most outer_deg (got {self.inner_deg:g} and {self.outer_deg:g})")
+            raise SettingError(f"should be at most outer_deg, {self.outer_deg:g} (got {self.inner_deg:g})", "inner_deg")
         if self.target_m == self.center_m:
-            raise ValueError(f"target_m should differ from center_m (got {list(self.center_m)} for both)")
-        return self
+            raise SettingError(f"should differ from center_m (got {list(self.center_m)} for both)", "target_m")
+
+    def build(self) -> SpotLight:
+        """The light."""
+        center, level = np.asarray(self.center_m), self.level.build()
+        way = np.asarray(self.target_m) - center
+        direction: Array = way / np.linalg.norm(way)
+        return SpotLight(self.name, center, direction, self.power_lm, self.inner_deg, self.outer_deg, level)
 
 
-class SunKey(Strict):
-    """Where the sun stands at a time."""
+LampSpec = Annotated[PanelLamp | PointLamp | SpotLamp, ByKind("lamp", default="panel")]
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SunKey:
+    """Where the sun is at a time."""
+
+    __pydantic_config__ = SETTINGS
     t_s: float
     azimuth_deg: float
     elevation_deg: Elevation
 
 
-class SunSpec(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SunSpec:
     """Direct sunlight on a surface that faces it; one place, or several in order of time."""
 
+    __pydantic_config__ = SETTINGS
     illuminance_lx: NonNegative
     azimuth_deg: float | None = None
     elevation_deg: Elevation | None = None
     path: tuple[SunKey, ...] = ()
-    level: LevelSpec = LevelSpec(steady=1.0)
+    level: LevelSpec = STEADY
 
-    @model_validator(mode="after")
-    def _one_place_or_path(self) -> "SunSpec":
+    def __post_init__(self) -> None:
+        require(self)
         angles = [angle for angle in (self.azimuth_deg, self.elevation_deg) if angle is not None]
         if len(angles) != (0 if self.path else 2):
-            raise ValueError("should have either azimuth_deg and elevation_deg, or a path")
+            raise SettingError("should have either azimuth_deg and elevation_deg, or a path")
         require_increasing([key.t_s for key in self.path])
-        return self
 
 
-class SkySpec(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SkySpec:
     """A sky that gives illuminance_lx on open level ground."""
 
+    __pydantic_config__ = SETTINGS
     illuminance_lx: NonNegative
-    kind: Annotated[str, one_of("sky", SKIES)] = "overcast"
-    level: LevelSpec = LevelSpec(steady=1.0)
+    kind: Annotated[str, OneOf("sky", SKIES)] = "overcast"
+    level: LevelSpec = STEADY
 
 
-class PathKey(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PathKey:
     """Where a mover is at a time."""
 
+    __pydantic_config__ = SETTINGS
     t_s: float
     position_m: Triple
     yaw_deg: float = 0.0
 
 
-class MoverSpec(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoverSpec:
     """A box that goes straight from key to key, its middle at position_m; again and again where it repeats."""
 
+    __pydantic_config__ = SETTINGS
     name: Name
     size_m: Size
     material: str
-    path: Annotated[tuple[PathKey, ...], Field(min_length=2)]
+    path: Annotated[tuple[PathKey, ...], MinLen(2)]
     repeats: bool = False
 
-    @model_validator(mode="after")
-    def _in_order(self) -> "MoverSpec":
+    def __post_init__(self) -> None:
+        require(self)
         require_increasing([key.t_s for key in self.path])
-        return self
 
 
-class SceneFile(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneFile:
     """A scene, and the luminance of matt white that cameras are exposed for."""
 
+    __pydantic_config__ = SETTINGS
     name: Name
     summary: str = ""
     white_cd_m2: Positive
@@ -265,15 +290,3 @@ class SceneFile(Strict):
     sun: SunSpec | None = None
     sky: SkySpec | None = None
     movers: tuple[MoverSpec, ...] = ()
-
-
-def _require_fitting(
-    spec: MaterialSpec | LampSpec, keys_of: Mapping[Any, tuple[str, ...]], needed: tuple[str, ...]
-) -> None:
-    known = keys_of[spec.kind]
-    for key in needed:
-        if getattr(spec, key) is None:
-            raise ValueError(f"{key} is missing for kind '{spec.kind}'")
-    for key in sorted({key for keys in keys_of.values() for key in keys}.difference(known)):
-        if key in spec.model_fields_set:
-            raise ValueError(f"{key} does not belong to kind '{spec.kind}', which has {', '.join(known)}")
