@@ -13,8 +13,8 @@ from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
 from vobench.dataset import export as exporting
-from vobench.dataset.export import FORMS, TRAJECTORY_FORMS, export, export_trajectory
-from vobench.dataset.read import read, sniff
+from vobench.dataset.export import TRAJECTORY_FORMS, export, export_trajectory
+from vobench.dataset.layout import read, sniff, writable
 from vobench.errors import InputError, SequenceError, VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import Equirectangular
@@ -24,6 +24,7 @@ from vobench.trajectory.formats import parse_any, parse_times
 from vobench.trajectory.trajectory import Trajectory
 
 Make = Callable[..., Any]
+FORMS = tuple(writable())
 # Nothing in a recording has a say in what files are called: stamps and numbers do.
 NAMES = re.compile(
     r"(mav0/(cam[01]/(data/\d+\.png|data\.csv|sensor\.yaml)|(imu0|state_groundtruth_estimate0)/(data\.csv|sensor\.yaml)"
@@ -78,7 +79,7 @@ def test_a_folder_in_use_a_file_and_an_unknown_form_are_sentences(make_sequence:
         with pytest.raises(InputError, match="a new or empty folder") as caught:
             export(made.folder, out, "euroc")
         assert str(out) in str(caught.value)
-    with pytest.raises(InputError, match=r"no form 'rosbag' to export to\. Known: euroc, kitti, tum, ros2"):
+    with pytest.raises(InputError, match=r"no form to export to named 'rosbag'\. Known: euroc, kitti, ros2, tum"):
         export(made.folder, tmp_path / "new", "rosbag")
     assert listing(tmp_path / "used") == {"mine.txt"}
 

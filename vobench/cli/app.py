@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from click import Context, HelpFormatter
+from typer.core import TyperCommand, TyperOption
 
 from vobench import stop
 from vobench.errors import SuiteError, VobenchError
@@ -149,12 +151,30 @@ Recorded = Annotated[
 Imu = Annotated[Path | None, typer.Option(help="Kalibr's imu.yaml.")]
 Truth = Annotated[Path | None, typer.Option(help="A trajectory file with the ground truth.")]
 Rate = Annotated[float | None, typer.Option(help="Pictures a second, for layouts without stamps.")]
-Form = Annotated[str | None, typer.Option(help="The form, where its content should not tell.")]
+Form = Annotated[str | None, typer.Option(help="The form, where its content should not tell")]
 Calibration = Annotated[Path | None, typer.Option(help="Kalibr's camchain.yaml, where the layout has none of its own.")]
 TopicOf = Annotated[
     list[str] | None,
     typer.Option("--topic", help="left=, right=, left_info=, right_info=, truth= or imu=NAME of a bag; repeatable."),
 ]
+
+
+class FormCommand(TyperCommand):
+    """A command with --form, whose help names the layouts that are found, looked for when somebody asks for it."""
+
+    def format_help(self, ctx: Context, formatter: HelpFormatter) -> None:
+        """Write the help, with the names of the layouts."""
+        from vobench.dataset.layout import layouts, writable
+
+        known = (
+            f"{', '.join(writable())}; of a trajectory, tum, kitti or euroc"
+            if self.name == "export"
+            else ", ".join(layouts())
+        )
+        for option in self.params:
+            if option.name == "form" and isinstance(option, TyperOption):
+                option.help = f"{option.help}: {known}."
+        super().format_help(ctx, formatter)
 
 
 def import_command(
@@ -182,10 +202,10 @@ def export_command(
     ],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder or file to write, which should be new.")],
     *,
-    form: Annotated[str, typer.Option(help="euroc, kitti, tum or, of a sequence, ros2.")],
+    form: Annotated[str, typer.Option(help="The form to write")],
     json: Json = False,
 ) -> None:
-    """Write a sequence as EuRoC, KITTI, TUM or a ROS 2 bag, or a trajectory as their text; say all that is lost."""
+    """Write a sequence in another layout, or a trajectory as another text; say all that is lost."""
     from vobench.cli import sequence
 
     sequence.show_export(source, out, form=form, as_json=json)
@@ -408,9 +428,9 @@ def list_command(
 app.command("score")(score_command)
 app.command("diagnose")(diagnose_command)
 app.command("metrics")(metrics_command)
-app.command("import")(import_command)
-app.command("export")(export_command)
-app.command("info")(info_command)
+app.command("import", cls=FormCommand)(import_command)
+app.command("export", cls=FormCommand)(export_command)
+app.command("info", cls=FormCommand)(info_command)
 app.command("verify")(verify_command)
 
 

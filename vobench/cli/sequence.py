@@ -12,7 +12,7 @@ from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.run.store import unfinished
-from vobench.sequence.recording import TopicFacts, topic_facts
+from vobench.sequence.recording import TopicFacts, is_recording, topic_facts
 from vobench.trajectory.trajectory import Trajectory
 
 SENSORS_FILE = "sensors.mcap"
@@ -31,9 +31,10 @@ def show_export(source: Path, out: Path, *, form: str, as_json: bool) -> None:
 
 
 def _sequence(folder: Path, out: Path, form: str) -> tuple[tuple[str, ...], int]:
-    from vobench.dataset.export import FORMS, export
+    from vobench.dataset.export import export
+    from vobench.dataset.layout import writable
 
-    if form in FORMS and folder.is_dir() and not (folder / SENSORS_FILE).is_file():
+    if form in writable() and folder.is_dir() and not (folder / SENSORS_FILE).is_file():
         raise InputError(f"no sequence of ours (it has no {SENSORS_FILE}); vobench import makes one: {folder}")
     exported = export(folder, out, form)
     return exported.notes, len(exported.files)
@@ -49,7 +50,7 @@ def _trajectory(path: Path, out: Path, form: str) -> tuple[tuple[str, ...], int]
 def _read(path: Path) -> Trajectory:
     """The poses of a text in any form, or the only ones of a recording."""
     from vobench.dataset.picture import read_text
-    from vobench.sequence.recording import is_recording, read_poses
+    from vobench.sequence.recording import read_poses
     from vobench.trajectory.formats import parse_any
 
     if is_recording(path):
@@ -81,7 +82,7 @@ class Given:
 
 def show_import(path: Path, out: Path, given: Given, *, as_json: bool) -> None:
     """Convert a recording into a sequence, and print what was found, assumed and dropped."""
-    from vobench.dataset.read import read
+    from vobench.dataset.layout import read
     from vobench.run.import_recording import import_recording
     from vobench.sequence import Sequence
 
@@ -113,7 +114,7 @@ def _topics(given: tuple[str, ...]) -> Topics:
 
 def show_info(path: Path, given: Given, *, as_json: bool) -> None:
     """Print what is in a recording of any form; its pictures are read only for the hash of a sequence of ours."""
-    from vobench.dataset.read import read
+    from vobench.dataset.layout import read
 
     recording = read(path, form=given.form, options=given.options())
     folder = path.parent if path.is_file() else path
@@ -140,7 +141,7 @@ def _files(path: Path, form: str) -> Iterator[tuple[str, tuple[TopicFacts, ...]]
     if form == "vobench":
         files = [path] if path.is_file() else sorted(path.glob("*.mcap"))
         yield from ((file.name, topic_facts(file)) for file in files)
-    elif form in ("ros1", "ros2", "mcap"):
+    elif is_recording(path):
         yield path.name, topic_facts(path)
 
 

@@ -1,6 +1,7 @@
 """The ASL layout of EuRoC and TUM-VI, read and written."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from vobench.dataset.kalibr import (
     read_imu,
     read_yaml,
 )
+from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
 from vobench.dataset.recording import (
     PictureList,
@@ -91,6 +93,14 @@ POSITIONS = "leica0"
 BASE = "base_link"  # of our own export: where our body sits on the IMU
 
 Notes = tuple[str, ...]
+
+
+def _is_asl(folder: Path) -> bool:
+    return (folder / "mav0").is_dir() or (folder / "cam0" / DATA).is_file() or (folder / "cam0" / "data").is_dir()
+
+
+def _has_dso(folder: Path) -> bool:
+    return (folder / "dso").is_dir() or (folder.name == "mav0" and (folder.parent / "dso").is_dir())
 
 
 def read_euroc(folder: Path, options: ReadOptions, *, form: str = "euroc") -> Recording:
@@ -307,3 +317,23 @@ def _biases(source: ExportSource) -> tuple[list[Array], str]:
     if np.isin(truth.t_ns, bias.t_ns).all():
         return [np.stack(at, -1)], "Velocity and biases in the truth are as recorded."
     return [np.stack(at, -1)], "The biases in the truth lie on straight lines between those recorded."
+
+
+HEEDS = frozenset({"calibration", "imu", "truth", "within_ns"})
+LAYOUTS = (
+    Layout(
+        "tumvi",
+        "TUM-VI: mav0/ and dso/",
+        lambda path: _is_asl(path) and _has_dso(path),
+        partial(read_euroc, form="tumvi"),
+        HEEDS,
+    ),
+    Layout(
+        "euroc",
+        "EuRoC or ASL: mav0/, or cam0/ with data.csv",
+        lambda path: _is_asl(path) and not _has_dso(path),
+        read_euroc,
+        HEEDS,
+        Writing(write_euroc, keeps=("imu",)),
+    ),
+)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from vobench.dataset.kalibr import chain_rig
+from vobench.dataset.layout import Layout
 from vobench.dataset.picture import unread
 from vobench.dataset.recording import (
     PictureStream,
@@ -41,7 +42,7 @@ class Names:
     poses: str
 
 
-LAYOUTS = (
+VERSIONS = (
     Names("image_left", "image_right", "pose_left.txt"),
     Names("image_lcam_front", "image_rcam_front", "pose_lcam_front.txt"),
 )
@@ -49,9 +50,9 @@ LAYOUTS = (
 
 def read_tartanair(folder: Path, options: ReadOptions) -> Recording:
     """A folder such as P000; the body is the left camera, its axes ahead, left, up. Raises InputError."""
-    names = next((names for names in LAYOUTS if (folder / names.left).is_dir()), None)
+    names = next((names for names in VERSIONS if (folder / names.left).is_dir()), None)
     if names is None:
-        raise InputError(f"no folder {' or '.join(names.left for names in LAYOUTS)} with pictures in {folder}")
+        raise InputError(f"no folder {' or '.join(names.left for names in VERSIONS)} with pictures in {folder}")
     eyes = [numbered(folder / name) for name in (names.left, names.right) if (folder / name).is_dir()]
     in_step(eyes[0], eyes[1] if len(eyes) > 1 else None)
     rate_hz = RATE_HZ if options.rate_hz is None else options.rate_hz
@@ -101,3 +102,14 @@ def _truth(beside: Path, t_ns: Stamps, options: ReadOptions) -> tuple[Trajectory
         "(NED) to x ahead, y left, z up.",
         *notes,
     )
+
+
+LAYOUTS = (
+    Layout(
+        "tartanair",
+        "TartanAir: image_left/ or image_lcam_front/",
+        lambda path: any((path / names.left).is_dir() for names in VERSIONS),
+        read_tartanair,
+        frozenset({"calibration", "truth", "rate_hz"}),
+    ),
+)

@@ -8,6 +8,7 @@ import numpy as np
 
 from vobench.dataset import kalibr
 from vobench.dataset.kalibr import chain_rig, find_chain, no_calibration
+from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
 from vobench.dataset.recording import (
     PictureStream,
@@ -89,7 +90,7 @@ FARTHEST_M = 65535 / DEPTH_PER_M
 DEPTH_TOPIC = "depth"
 
 
-def left_alone(rig: Rig) -> Views:
+def _left_alone(rig: Rig) -> Views:
     """The left camera as it was recorded."""
     return Views(replace(rig, right=None, T_body_right=None))
 
@@ -162,3 +163,15 @@ def _write_rows(path: Path, what: str, columns: str, t_ns: Stamps, values: Array
     rows = zip(t_ns.tolist(), values.tolist(), strict=True)
     text = "".join(f"{seconds(t)} {' '.join(map(repr, row))}\n" for t, row in rows)
     path.write_text(f"# {what}\n# file: vobench\n# timestamp {columns}\n{text}", encoding="utf-8")
+
+
+LAYOUTS = (
+    Layout(
+        "tum",
+        "TUM RGB-D: rgb.txt",
+        lambda path: (path / LIST).is_file(),
+        read_tum,
+        frozenset({"calibration", "truth"}),
+        Writing(write_tum, _left_alone, keeps=("imu", DEPTH_TOPIC)),
+    ),
+)
