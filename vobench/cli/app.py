@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from click import Context, HelpFormatter
 from typer.core import TyperCommand, TyperOption
 
 from vobench import stop
@@ -162,15 +161,14 @@ TopicOf = Annotated[
 class FormCommand(TyperCommand):
     """A command with --form, whose help names the layouts that are found, looked for when somebody asks for it."""
 
-    def format_help(self, ctx: Context, formatter: HelpFormatter) -> None:
+    def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help, with the names of the layouts."""
+        from vobench.dataset.export import TRAJECTORY_FORMS
         from vobench.dataset.layout import layouts, writable
 
-        known = (
-            f"{', '.join(writable())}; of a trajectory, tum, kitti or euroc"
-            if self.name == "export"
-            else ", ".join(layouts())
-        )
+        known = ", ".join(layouts())
+        if self.name == "export":
+            known = f"{', '.join(writable())}; of a trajectory, {', '.join(TRAJECTORY_FORMS)}"
         for option in self.params:
             if option.name == "form" and isinstance(option, TyperOption):
                 option.help = f"{option.help}: {known}."
