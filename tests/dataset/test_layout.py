@@ -98,7 +98,7 @@ def test_a_layout_from_outside_is_sniffed_read_and_written(
     np.testing.assert_array_equal(found.t_ns, made.t_ns)
     np.testing.assert_array_equal([frame.left for frame in found.frames()], made.left)
     assert found.truth is not None
-    np.testing.assert_array_equal(found.truth.T_world_frame, made.T_world_left)
+    np.testing.assert_allclose(found.truth.T_world_frame, made.T_world_left, rtol=0, atol=1e-12)
 
 
 def test_a_layout_that_reads_back_as_something_else_is_refused_from_outside_too(
