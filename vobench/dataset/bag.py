@@ -21,7 +21,7 @@ from vobench.dataset.bag_rig import Chosen, Info, Tree, choose, info_rig, is_rec
 from vobench.dataset.kalibr import chain_rig, find_imu, read_imu, read_yaml
 from vobench.dataset.layout import Layout, Writing, head
 from vobench.dataset.picture import Picture, require_themselves
-from vobench.dataset.recording import PictureStream, ReadOptions, RecordedFrame, Recording, assemble, partners
+from vobench.dataset.recording import Notes, PictureStream, ReadOptions, RecordedFrame, Recording, assemble, partners
 from vobench.dataset.source import ExportSource, Views
 from vobench.errors import InputError, SequenceError
 from vobench.geometry.rig import ImuCalibration, Rig
@@ -97,8 +97,6 @@ BASE = "base_link"
 MOST_PROFILE = 256
 READ = "read are MCAP files in ROS 2 form (profile ros2, CDR messages)"
 MOST_WAITING = 64  # pictures held while their partner has not come yet
-
-Notes = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,7 +280,7 @@ def _rig(path: Path, chosen: Chosen, found: Contents, body: str | None, options:
         rig, notes = chain_rig(options.calibration, 2 if chosen.right else 1, "imu" if about == "imu" else "left")
         whose = "the IMU" if about == "imu" else "the left camera"
         said = f"The calibration is that of {options.calibration.name}, and the body {whose}, whatever the bag says."
-        return rig, str(options.calibration), (said, *notes)
+        return rig, str(options.calibration), (said, *notes[1:])
     eyes = []
     for topic, info in ((chosen.left, chosen.left_info), (chosen.right, chosen.right_info)):
         if topic is not None:
@@ -342,7 +340,6 @@ def write_ros2(source: ExportSource, views: Views, folder: Path) -> list[str]:
 
 
 def _records(paths: list[Path]) -> dict[str, str]:
-    """What no message holds, by the name it has in the sequence."""
     records = {}
     for path in paths:
         bag = Bag.open(path)

@@ -1,6 +1,6 @@
 """A sequence exported in the layouts of others, with its calibration, tested before it gets its name."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,14 +14,18 @@ from vobench.dataset.layout import Writing, read, writable
 from vobench.dataset.photometric import write_photometric
 from vobench.dataset.picture import require_free
 from vobench.dataset.recording import cut_to
-from vobench.dataset.reproject import check_path, check_rig
-from vobench.dataset.source import PNG, ExportSource, Views, open_source
+from vobench.dataset.source import PNG, ExportSource, Views, check_path, check_rig, open_source
 from vobench.errors import InputError, SequenceError, unknown
 from vobench.geometry.rig import ImuCalibration, Rig
 from vobench.trajectory.formats import format_euroc, format_kitti, format_times, format_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
-TRAJECTORY_FORMS = ("tum", "kitti", "euroc")
+TRAJECTORY_TEXTS: dict[str, Callable[[Trajectory], str]] = {
+    "tum": format_tum,
+    "kitti": lambda trajectory: format_kitti(trajectory.T_world_frame),
+    "euroc": format_euroc,
+}
+TRAJECTORY_FORMS = tuple(TRAJECTORY_TEXTS)
 TIMES_SUFFIX = ".times.txt"
 
 
@@ -30,7 +34,9 @@ def export_trajectory(trajectory: Trajectory, path: Path, form: str) -> tuple[Pa
 
     Stamps come back exactly and poses to 1e-15. Raises InputError for another form, or a file that is there already.
     """
-    texts = {path: _text(trajectory, form)}
+    if form not in TRAJECTORY_TEXTS:
+        raise InputError(f"no form of trajectory '{form}'. Known: {', '.join(TRAJECTORY_FORMS)}")
+    texts = {path: TRAJECTORY_TEXTS[form](trajectory)}
     if form == "kitti":
         texts[path.with_name(path.stem + TIMES_SUFFIX)] = format_times(trajectory.t_ns)
     for file in texts:
@@ -41,16 +47,6 @@ def export_trajectory(trajectory: Trajectory, path: Path, form: str) -> tuple[Pa
         part.write_text(text, encoding="utf-8")
         part.replace(file)
     return tuple(texts)
-
-
-def _text(trajectory: Trajectory, form: str) -> str:
-    if form == "tum":
-        return format_tum(trajectory)
-    if form == "euroc":
-        return format_euroc(trajectory)
-    if form == "kitti":
-        return format_kitti(trajectory.T_world_frame)
-    raise InputError(f"no form of trajectory '{form}'. Known: {', '.join(TRAJECTORY_FORMS)}")
 
 
 NOTES, PHOTOMETRIC, CHAIN, IMU_FILE = "NOTES.txt", "photometric", "camchain.yaml", "imu.yaml"
@@ -115,7 +111,6 @@ def _building(out: Path) -> Iterator[Path]:
 
 
 def _write_calibration(rig: Rig, layout: Writing, folder: Path) -> list[str]:
-    """Kalibr's two files, and what to say of them."""
     *image_topics, imu_topic = layout.topics
     notes = kalibr.remarks(rig)
     try:
@@ -131,7 +126,6 @@ def _write_calibration(rig: Rig, layout: Writing, folder: Path) -> list[str]:
 
 
 def _left_out(source: ExportSource, layout: Writing) -> list[str]:
-    """Sentences on what a form has no place for."""
     if layout.keeps is None:
         return []
     channels = [name for name in source.channels if name not in layout.keeps]

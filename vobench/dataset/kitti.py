@@ -9,6 +9,7 @@ from vobench.dataset.kalibr import chain_rig, no_calibration
 from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
 from vobench.dataset.recording import (
+    Notes,
     PictureStream,
     ReadOptions,
     Recording,
@@ -32,8 +33,6 @@ PAIRS = (("image_0", "image_1"), ("image_2", "image_3"))  # grey, colour
 CALIBRATION, TIMES, POSES = "calib.txt", "times.txt", "poses.txt"
 T_BODY_GREY = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))
 SKEW_TOLERANCE = 1e-6  # of KITTI's seven digits: K's lower triangle is zero
-
-Notes = tuple[str, ...]
 
 
 def read_kitti(folder: Path, options: ReadOptions) -> Recording:
@@ -65,7 +64,6 @@ def _pair(folder: Path) -> tuple[tuple[str, ...], Notes]:
 
 
 def _times(path: Path, count: int, pictures: Path) -> Stamps:
-    """A stamp for each picture, exact to the nanosecond."""
     t_ns = parse_times(read_text(path), name=str(path))
     if len(t_ns) != count:
         raise InputError(f"{len(t_ns)} times for {count} pictures in {pictures}: {path}")
@@ -78,7 +76,7 @@ def _rig(
     """The cameras by calib.txt, which knows no picture's size, or by Kalibr's chain; and which file that was."""
     if options.calibration is not None:
         rig, notes = chain_rig(options.calibration, len(names), "left")
-        return _level(rig), options.calibration, (f"The calibration is that of {options.calibration.name}.", *notes)
+        return _level(rig), options.calibration, notes
     path = folder / CALIBRATION
     if not path.exists():
         raise no_calibration(path)
@@ -93,7 +91,6 @@ def _rig(
 
 
 def _level(rig: Rig) -> Rig:
-    """A rig on the grey camera's axes, on the body's."""
     T_grey_right = rig.T_body_right
     T_body_right = None if T_grey_right is None else T_BODY_GREY @ T_grey_right
     return Rig(rig.left, rig.right, T_BODY_GREY @ rig.T_body_left, T_body_right)

@@ -174,7 +174,6 @@ def read(path: Path, *, form: str | None = None, options: ReadOptions | None = N
 
 
 def _require_heeded(options: ReadOptions, layout: Layout) -> None:
-    """Raise InputError for an option that would make no difference."""
     plain = ReadOptions()
     said = [field.name for field in fields(ReadOptions) if getattr(options, field.name) != getattr(plain, field.name)]
     idle = [name for name in said if name not in layout.heeds]

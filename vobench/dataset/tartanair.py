@@ -9,6 +9,7 @@ from vobench.dataset.kalibr import chain_rig
 from vobench.dataset.layout import Layout
 from vobench.dataset.picture import unread
 from vobench.dataset.recording import (
+    Notes,
     PictureStream,
     ReadOptions,
     Recording,
@@ -29,8 +30,6 @@ BASELINE_M = 0.25
 FOCAL_PX = 320.0  # 90° across 640 pixels; the centre is half the size, as its authors give it
 SIZES_PX = ((640, 480), (640, 640))
 FLIP = se3.transform(np.diag([1.0, -1.0, -1.0]), np.zeros(3))  # ahead-right-down to ahead-left-up, and back
-
-Notes = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +74,7 @@ def _rig(folder: Path, size_px: tuple[int, int], count: int, options: ReadOption
     if options.calibration is not None:
         rig, notes = chain_rig(options.calibration, count, "left")
         right = None if rig.T_body_right is None else T_body_left @ rig.T_body_right
-        said = (f"The calibration is that of {options.calibration.name}.", *notes)
-        return Rig(rig.left, rig.right, T_body_left, right), str(options.calibration), said
+        return Rig(rig.left, rig.right, T_body_left, right), str(options.calibration), notes
     if size_px not in SIZES_PX:
         raise InputError(
             f"TartanAir's pictures have {' or '.join(f'{w} x {h}' for w, h in SIZES_PX)} pixels, these have "

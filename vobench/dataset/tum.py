@@ -11,6 +11,7 @@ from vobench.dataset.kalibr import chain_rig, find_chain, no_calibration
 from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
 from vobench.dataset.recording import (
+    Notes,
     PictureStream,
     ReadOptions,
     Recording,
@@ -40,8 +41,6 @@ CAMERAS: dict[str, Camera] = {
 }
 WHICH = re.compile(r"(?:freiburg|fr)_?([123])(?![0-9])", re.IGNORECASE)
 
-Notes = tuple[str, ...]
-
 
 def read_tum(folder: Path, options: ReadOptions) -> Recording:
     """A folder with rgb.txt; the body is its camera. Raises InputError, one sentence, naming the file."""
@@ -62,7 +61,7 @@ def _rig(folder: Path, options: ReadOptions) -> tuple[Rig, str, Notes]:
     chain = find_chain(folder, options)
     if chain is not None:
         rig, notes = chain_rig(chain, 1, "left")
-        return rig, str(chain), (f"The calibration is that of {chain.name}.", *notes)
+        return rig, str(chain), notes
     found = WHICH.search(folder.resolve().name) or WHICH.search(_title(folder / LIST))
     if found is None:
         raise no_calibration(folder / "camchain.yaml")
@@ -91,7 +90,6 @@ DEPTH_TOPIC = "depth"
 
 
 def _left_alone(rig: Rig) -> Views:
-    """The left camera as it was recorded."""
     return Views(replace(rig, right=None, T_body_right=None))
 
 
