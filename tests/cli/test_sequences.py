@@ -101,7 +101,7 @@ WRONG = [
     (("import", "nowhere", "out"), "no file or folder at nowhere"),
     (("import", "suites", "out"), "suites"),
     (("import", "suites", "scenes"), "should be a new or empty folder, but there is something: scenes"),
-    (("import", "suites", "out", "--form", "eurok"), "no form 'eurok'. Did you mean 'euroc'?"),
+    (("import", "suites", "out", "--form", "eurok"), "no form named 'eurok'. Did you mean 'euroc'?"),
     (("import", "suites", "out", "--topic", "lft=/a"), "no topic named 'lft'. Did you mean 'left'?"),
     (
         ("export", "suites", "out", "--form", "euroc"),

@@ -13,8 +13,9 @@ from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
 from vobench.dataset import export as exporting
-from vobench.dataset.export import FORMS, TRAJECTORY_FORMS, export, export_trajectory
-from vobench.dataset.read import read, sniff
+from vobench.dataset.export import TRAJECTORY_FORMS, export, export_trajectory
+from vobench.dataset.layout import read, sniff, writable
+from vobench.dataset.source import rectified
 from vobench.errors import InputError, SequenceError, VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import Equirectangular
@@ -24,6 +25,7 @@ from vobench.trajectory.formats import parse_any, parse_times
 from vobench.trajectory.trajectory import Trajectory
 
 Make = Callable[..., Any]
+FORMS = tuple(writable())
 # Nothing in a recording has a say in what files are called: stamps and numbers do.
 NAMES = re.compile(
     r"(mav0/(cam[01]/(data/\d+\.png|data\.csv|sensor\.yaml)|(imu0|state_groundtruth_estimate0)/(data\.csv|sensor\.yaml)"
@@ -78,7 +80,9 @@ def test_a_folder_in_use_a_file_and_an_unknown_form_are_sentences(make_sequence:
         with pytest.raises(InputError, match="a new or empty folder") as caught:
             export(made.folder, out, "euroc")
         assert str(out) in str(caught.value)
-    with pytest.raises(InputError, match=r"no form 'rosbag' to export to\. Known: euroc, kitti, tum, ros2"):
+    with pytest.raises(
+        InputError, match=r"no form to export to named 'rosbag'\. Did you mean 'ros2'\? Known: euroc, kitti, ros2, tum"
+    ):
         export(made.folder, tmp_path / "new", "rosbag")
     assert listing(tmp_path / "used") == {"mine.txt"}
 
@@ -145,7 +149,7 @@ def test_kitti_says_that_it_resampled_and_projects_as_the_recording_does(
     P_left, P_right = np.array(rows, float).reshape(2, 3, 4)
     # A point's places in the KITTI pictures, and in the recorded ones, carry the same grey value.
     points_left = np.array([[0.2, 0.1, 3.0], [-0.5, 0.3, 2.0], [1.0, -0.4, 6.0], [0.0, 0.0, 9.0]])
-    views = exporting.rectified(made.rig)
+    views = rectified(made.rig)
     R_view_left = views.rig.T_body_left[:3, :3].T @ made.rig.T_body_left[:3, :3]
     points_view = np.hstack([points_left @ R_view_left.T, np.ones((4, 1))])
     for side, P, picture, name in (

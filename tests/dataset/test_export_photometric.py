@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from vobench.dataset.export import export
 from vobench.dataset.photometric import camera_text
-from vobench.dataset.reproject import known_points
-from vobench.dataset.source import rectified
+from vobench.dataset.source import known_points, rectified
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere
 from vobench.geometry.rig import PRESETS, Rig

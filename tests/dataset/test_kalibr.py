@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from vobench.dataset.kalibr import camchain, imu_yaml, number, read_camchain, read_imu
-from vobench.dataset.reproject import PIXEL_TOLERANCE, check_rig, known_points, pixel_difference
+from vobench.dataset.source import PIXEL_TOLERANCE, check_rig, known_points, pixel_difference
 from vobench.errors import InputError, SequenceError
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, DoubleSphere, Equirectangular

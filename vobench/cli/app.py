@@ -53,7 +53,8 @@ class Verbs(TyperGroup):
             return None
         module, _, function = target.partition(":")
         verb = typer.Typer(add_completion=False, rich_markup_mode=None)
-        verb.command(cmd_name)(getattr(import_module(module), function))
+        family = import_module(module)
+        verb.command(cmd_name, cls=getattr(family, "COMMAND_CLASS", None))(getattr(family, function))
         return typer.main.get_command(verb)
 
     def format_commands(self, _: Any, formatter: Any) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperOption
 
 from vobench.cli import terminal
 from vobench.dataset.picture import require_free
@@ -14,7 +15,7 @@ from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.run.store import unfinished
-from vobench.sequence.recording import TopicFacts, topic_facts
+from vobench.sequence.recording import TopicFacts, is_recording, topic_facts
 from vobench.trajectory.trajectory import Trajectory
 
 SENSORS_FILE = "sensors.mcap"
@@ -33,9 +34,10 @@ def show_export(source: Path, out: Path, *, form: str, as_json: bool) -> None:
 
 
 def _sequence(folder: Path, out: Path, form: str) -> tuple[tuple[str, ...], int]:
-    from vobench.dataset.export import FORMS, export
+    from vobench.dataset.export import export
+    from vobench.dataset.layout import writable
 
-    if form in FORMS and folder.is_dir() and not (folder / SENSORS_FILE).is_file():
+    if form in writable() and folder.is_dir() and not (folder / SENSORS_FILE).is_file():
         raise InputError(f"no sequence of ours (it has no {SENSORS_FILE}); vobench import makes one: {folder}")
     exported = export(folder, out, form)
     return exported.notes, len(exported.files)
@@ -51,7 +53,7 @@ def _trajectory(path: Path, out: Path, form: str) -> tuple[tuple[str, ...], int]
 def _read(path: Path) -> Trajectory:
     """The poses of a text in any form, or the only ones of a recording."""
     from vobench.dataset.picture import read_text
-    from vobench.sequence.recording import is_recording, read_poses
+    from vobench.sequence.recording import read_poses
     from vobench.trajectory.formats import parse_any
 
     if is_recording(path):
@@ -83,7 +85,7 @@ class Given:
 
 def show_import(path: Path, out: Path, given: Given, *, as_json: bool) -> None:
     """Convert a recording into a sequence, and print what was found, assumed and dropped."""
-    from vobench.dataset.read import read
+    from vobench.dataset.layout import read
     from vobench.run.import_recording import import_recording
     from vobench.sequence import Sequence
 
@@ -115,7 +117,7 @@ def _topics(given: tuple[str, ...]) -> Topics:
 
 def show_info(path: Path, given: Given, *, as_json: bool) -> None:
     """Print what is in a recording of any form; its pictures are read only for the hash of a sequence of ours."""
-    from vobench.dataset.read import read
+    from vobench.dataset.layout import read
 
     recording = read(path, form=given.form, options=given.options())
     folder = path.parent if path.is_file() else path
@@ -142,7 +144,7 @@ def _files(path: Path, form: str) -> Iterator[tuple[str, tuple[TopicFacts, ...]]
     if form == "vobench":
         files = [path] if path.is_file() else sorted(path.glob("*.mcap"))
         yield from ((file.name, topic_facts(file)) for file in files)
-    elif form in ("ros1", "ros2", "mcap"):
+    elif is_recording(path):
         yield path.name, topic_facts(path)
 
 
@@ -230,7 +232,7 @@ Recorded = Annotated[
 Imu = Annotated[Path | None, typer.Option(help="Kalibr's imu.yaml.")]
 Truth = Annotated[Path | None, typer.Option(help="A trajectory file with the ground truth.")]
 Rate = Annotated[float | None, typer.Option(help="Pictures a second, for layouts without stamps.")]
-Form = Annotated[str | None, typer.Option(help="The form, where its content should not tell.")]
+Form = Annotated[str | None, typer.Option(help="The form, where its content should not tell")]
 Calibration = Annotated[Path | None, typer.Option(help="Kalibr's camchain.yaml, where the layout has none of its own.")]
 TopicOf = Annotated[
     list[str] | None,
@@ -261,10 +263,10 @@ def export_command(
     ],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder or file to write, which should be new.")],
     *,
-    form: Annotated[str, typer.Option(help="euroc, kitti, tum or, of a sequence, ros2.")],
+    form: Annotated[str, typer.Option(help="The form to write")],
     json: terminal.Json = False,
 ) -> None:
-    """Write a sequence as EuRoC, KITTI, TUM or a ROS 2 bag, or a trajectory as their text; say all that is lost."""
+    """Write a sequence in another layout, or a trajectory as another text; say all that is lost."""
     show_export(source, out, form=form, as_json=json)
 
 
@@ -282,3 +284,23 @@ def info_command(
     """Say what is in a recording: topics, rates, duration, calibration, ground truth, hash."""
     given = Given(form, calibration, imu, truth, rate, tuple(topic or ()))
     show_info(path, given, as_json=json)
+
+
+class FormCommand(TyperCommand):
+    """A command with --form, whose help names the layouts that are found, looked for when somebody asks for it."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help, with the names of the layouts."""
+        from vobench.dataset.export import TRAJECTORY_FORMS
+        from vobench.dataset.layout import layouts, writable
+
+        known = ", ".join(layouts())
+        if self.name == "export":
+            known = f"{', '.join(writable())}; of a trajectory, {', '.join(TRAJECTORY_FORMS)}"
+        for option in self.params:
+            if option.name == "form" and isinstance(option, TyperOption):
+                option.help = f"{option.help}: {known}."
+        super().format_help(ctx, formatter)
+
+
+COMMAND_CLASS = FormCommand

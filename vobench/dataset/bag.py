@@ -1,6 +1,7 @@
 """ROS 1 and ROS 2 bags and foreign MCAP files, read, and ROS 2 bags written."""
 
 import json
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -10,6 +11,7 @@ from typing import Any, Final
 
 import cv2
 import numpy as np
+from mcap.opcode import Opcode
 from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.interfaces import Connection
@@ -17,18 +19,19 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, ReaderError, Sto
 
 from vobench.dataset.bag_rig import Chosen, Info, Tree, choose, info_rig, is_rectified, plain, tree_of
 from vobench.dataset.kalibr import chain_rig, find_imu, read_imu, read_yaml
+from vobench.dataset.layout import Layout, Writing, head
 from vobench.dataset.picture import Picture, require_themselves
-from vobench.dataset.recording import PictureStream, ReadOptions, RecordedFrame, Recording, assemble, partners
+from vobench.dataset.recording import Notes, PictureStream, ReadOptions, RecordedFrame, Recording, assemble, partners
 from vobench.dataset.source import ExportSource, Views
 from vobench.errors import InputError, SequenceError
 from vobench.geometry.rig import ImuCalibration, Rig
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import Bag
+from vobench.sequence.bag import MAGIC, Bag
 from vobench.sequence.calibration import IMU_NOTE, WHEELS_NOTE
 from vobench.sequence.messages import TYPES
-from vobench.sequence.recording import opened, read_first_poses
+from vobench.sequence.recording import MAGICS, METADATA, opened, read_first_poses
 from vobench.sequence.writer import (
     CASE_ATTACHMENT,
     IMPORT_NOTE,
@@ -91,9 +94,9 @@ def _pixels(message: Any, name: str, channels: int, size: int) -> NDArray[Any]:
 
 
 BASE = "base_link"
+MOST_PROFILE = 256
+READ = "read are MCAP files in ROS 2 form (profile ros2, CDR messages)"
 MOST_WAITING = 64  # pictures held while their partner has not come yet
-
-Notes = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +112,8 @@ class Contents:
 def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
     """The pictures, calibration, IMU and truth of a bag; pictures are read as one goes. Raises InputError."""
     require_themselves(path)
+    if form == "mcap":
+        _require_ros2(path)
     with opened(path) as reader:
         types = {connection.topic: connection.msgtype for connection in reader.connections if connection.msgcount}
         chosen = choose(types, options.topics, str(path))
@@ -129,6 +134,21 @@ def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
         notes.append(f"Topics that were not read: {', '.join(unread)}.")
     rig = replace(rig, imu=imu_calibration)
     return assemble(form, rig, stream, t_ns, truth=truth, imu=imu, notes=notes, calibration=calibration)
+
+
+def _require_ros2(path: Path) -> None:
+    """Raise InputError where an MCAP file holds messages of another kind. Source: mcap.dev/spec, Header."""
+    start, at = head(path), len(MAGIC) + 13
+    if len(start) < at or start[len(MAGIC)] != Opcode.HEADER:
+        raise InputError(f"an MCAP file should begin with its header, this one does not: {path}")
+    (length,) = struct.unpack_from("<I", start, at - 4)
+    profile = start[at : at + min(length, MOST_PROFILE)].decode("utf-8", "replace")
+    if profile == "ros2":
+        return
+    if profile == "ros1":
+        raise InputError(f"an MCAP file with ROS 1 messages; {READ}, so turn it into a ROS 1 .bag or ROS 2: {path}")
+    said = f"of the profile {profile!r}" if profile else "that names no profile (Protobuf or JSON, as a rule)"
+    raise InputError(f"an MCAP file {said}; {READ}, so turn its messages into sensor_msgs first: {path}")
 
 
 def _topics(chosen: Chosen) -> list[str]:
@@ -260,7 +280,7 @@ def _rig(path: Path, chosen: Chosen, found: Contents, body: str | None, options:
         rig, notes = chain_rig(options.calibration, 2 if chosen.right else 1, "imu" if about == "imu" else "left")
         whose = "the IMU" if about == "imu" else "the left camera"
         said = f"The calibration is that of {options.calibration.name}, and the body {whose}, whatever the bag says."
-        return rig, str(options.calibration), (said, *notes)
+        return rig, str(options.calibration), (said, *notes[1:])
     eyes = []
     for topic, info in ((chosen.left, chosen.left_info), (chosen.right, chosen.right_info)):
         if topic is not None:
@@ -320,7 +340,6 @@ def write_ros2(source: ExportSource, views: Views, folder: Path) -> list[str]:
 
 
 def _records(paths: list[Path]) -> dict[str, str]:
-    """What no message holds, by the name it has in the sequence."""
     records = {}
     for path in paths:
         bag = Bag.open(path)
@@ -357,3 +376,24 @@ def _name(connection: Connection, reader: AnyReader, *, true_mounts_differ: bool
     if connection.topic != ros.TF_STATIC.name or connection.owner is reader.connections[0].owner:
         return connection.topic
     return TRUE_TF_STATIC if true_mounts_differ else None
+
+
+def _begins(path: Path, suffix: str) -> bool:
+    """Whether a file begins as those of an ending do; a sensors.mcap is a sequence of our own."""
+    magic = next(magic for magic, known in MAGICS.items() if known == suffix)
+    return path.name != SENSORS_FILE and head(path).startswith(magic)
+
+
+HEEDS = frozenset({"calibration", "imu", "within_ns", "topics"})
+LAYOUTS = (
+    Layout(
+        "ros2",
+        f"a ROS 2 bag: a folder with {METADATA}, or a .db3 file",
+        lambda path: (path / METADATA).is_file() or _begins(path, ".db3"),
+        partial(read_bag, form="ros2"),
+        HEEDS,
+        Writing(write_ros2, topics=(ros.LEFT_IMAGE.name, ros.RIGHT_IMAGE.name, ros.IMU.name), keeps=None),
+    ),
+    Layout("ros1", "a ROS 1 bag: a .bag file", partial(_begins, suffix=".bag"), partial(read_bag, form="ros1"), HEEDS),
+    Layout("mcap", "an .mcap file", partial(_begins, suffix=".mcap"), partial(read_bag, form="mcap"), HEEDS),
+)

@@ -1,26 +1,16 @@
 """The ASL layout of EuRoC and TUM-VI, read and written."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from vobench.dataset import kalibr
-from vobench.dataset.kalibr import (
-    Values,
-    chain_rig,
-    find_chain,
-    find_imu,
-    focal_camera,
-    imu_numbers,
-    no_calibration,
-    number,
-    numbers,
-    read_imu,
-    read_yaml,
-)
+from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
 from vobench.dataset.recording import (
+    Notes,
     PictureList,
     PictureStream,
     ReadOptions,
@@ -45,7 +35,7 @@ from vobench.trajectory.trajectory import Stamps, Trajectory
 IMU_COLUMNS = ("t", "wx", "wy", "wz", "ax", "ay", "az")
 
 
-def sensor_camera(values: Values) -> tuple[Camera, Array]:
+def sensor_camera(values: kalibr.Values) -> tuple[Camera, Array]:
     """A camera and its place T_body_camera by its sensor.yaml. Raises InputError."""
     kind, size, numbers = values.text("camera_model"), values.size("resolution"), values.numbers("intrinsics")
     bends = values.numbers("distortion_coefficients") if values.has("distortion_coefficients") else []
@@ -55,13 +45,13 @@ def sensor_camera(values: Values) -> tuple[Camera, Array]:
         raise InputError(
             f"{values.path}: camera_model should be pinhole or ds, but is {kind!r} of {len(numbers)} numbers"
         )
-    camera = focal_camera(size, numbers, values.text("distortion_model"), bends, place=str(values.path))
+    camera = kalibr.focal_camera(size, numbers, values.text("distortion_model"), bends, place=str(values.path))
     return camera, values.transform("T_BS")
 
 
-def sensor_imu(values: Values) -> ImuCalibration:
+def sensor_imu(values: kalibr.Values) -> ImuCalibration:
     """An IMU by its sensor.yaml. Raises InputError."""
-    return imu_numbers(values, values.transform("T_BS"), ("rate_hz",), ())
+    return kalibr.imu_numbers(values, values.transform("T_BS"), ("rate_hz",), ())
 
 
 def read_imu_csv(path: Path) -> ImuReadings:
@@ -80,7 +70,7 @@ def sensor_place(folder: Path) -> Array | None:
     path = folder / "sensor.yaml"
     if not path.is_file():
         return None
-    values = read_yaml(path)
+    values = kalibr.read_yaml(path)
     return values.transform("T_BS") if values.has("T_BS") else None
 
 
@@ -90,7 +80,13 @@ TRUTHS = ("state_groundtruth_estimate0", "mocap0", "vicon0")
 POSITIONS = "leica0"
 BASE = "base_link"  # of our own export: where our body sits on the IMU
 
-Notes = tuple[str, ...]
+
+def _is_asl(folder: Path) -> bool:
+    return (folder / "mav0").is_dir() or (folder / "cam0" / DATA).is_file() or (folder / "cam0" / "data").is_dir()
+
+
+def _has_dso(folder: Path) -> bool:
+    return (folder / "dso").is_dir() or (folder.name == "mav0" and (folder.parent / "dso").is_dir())
 
 
 def read_euroc(folder: Path, options: ReadOptions, *, form: str = "euroc") -> Recording:
@@ -112,7 +108,6 @@ def read_euroc(folder: Path, options: ReadOptions, *, form: str = "euroc") -> Re
 
 
 def _pictures(root: Path, options: ReadOptions) -> tuple[list[PictureList], Notes]:
-    """The pictures of the one or two cameras that are there, in step."""
     if not (root / CAMERAS[0]).is_dir():
         raise InputError(f"no folder {CAMERAS[0]} with pictures in {root}")
     folders = [root / name for name in CAMERAS if (root / name).is_dir()]
@@ -131,34 +126,34 @@ def _rig(root: Path, folder: Path, count: int, options: ReadOptions) -> tuple[Ri
     The path is that of the calibration.
     """
     sensors = [root / name / SENSOR for name in CAMERAS[:count]]
-    chain = options.calibration or (None if all(path.is_file() for path in sensors) else find_chain(folder, options))
+    chain = options.calibration or (
+        None if all(path.is_file() for path in sensors) else kalibr.find_chain(folder, options)
+    )
     if chain is not None:
-        rig, notes = chain_rig(chain, count, "imu")
-        return rig, chain, (f"The calibration is that of {chain.name}.", *notes)
+        rig, notes = kalibr.chain_rig(chain, count, "imu")
+        return rig, chain, notes
     missing = next((path for path in sensors if not path.is_file()), None)
     if missing is not None:
-        raise no_calibration(missing)
-    cameras = [sensor_camera(read_yaml(path)) for path in sensors]
+        raise kalibr.no_calibration(missing)
+    cameras = [sensor_camera(kalibr.read_yaml(path)) for path in sensors]
     (left, T_body_left), (right, T_body_right) = cameras[0], cameras[1] if count > 1 else (None, None)
     note = "Pictures stay as they are, not rectified; the lens is in the calibration (sensor.yaml)."
     return Rig(left, right, T_body_left, T_body_right), sensors[0], (note,)
 
 
 def _imu(root: Path, folder: Path, options: ReadOptions) -> tuple[ImuReadings | None, ImuCalibration | None, Notes]:
-    """Readings and calibration; neither where one is missing."""
     data, sensor = root / "imu0" / DATA, root / "imu0" / SENSOR
     if not data.is_file():
         return None, None, ("There are no readings of an IMU.",)
-    noise = options.imu or (None if sensor.is_file() else find_imu(folder, options))
+    noise = options.imu or (None if sensor.is_file() else kalibr.find_imu(folder, options))
     if noise is not None:
-        return read_imu_csv(data), read_imu(noise, np.eye(4)), (f"The IMU's noise is that of {noise.name}.",)
+        return read_imu_csv(data), kalibr.read_imu(noise, np.eye(4)), (f"The IMU's noise is that of {noise.name}.",)
     if not sensor.is_file():
         return None, None, (f"The IMU was dropped: nothing says how noisy it is ({sensor} or Kalibr's imu.yaml).",)
-    return read_imu_csv(data), sensor_imu(read_yaml(sensor)), ()
+    return read_imu_csv(data), sensor_imu(kalibr.read_yaml(sensor)), ()
 
 
 def _truth(root: Path, frames_ns: Stamps, options: ReadOptions) -> tuple[Trajectory | None, Notes]:
-    """The body's path by the best source there is."""
     if options.truth is not None:
         truth, notes = read_truth_file(options.truth, frames_ns)
         return truth, (f"The truth is {options.truth.name}, taken to be of the body.", *notes)
@@ -230,7 +225,6 @@ def _write(path: Path, text: str) -> None:
 
 
 def _write_pictures(source: ExportSource, views: Views, mav: Path) -> Stamps:
-    """The pictures and their lists; the stamps of the frames (N,)."""
     folders = {side: mav / f"cam{index}" for index, side in enumerate(views.rig.sides)}
     for cam in folders.values():
         (cam / "data").mkdir(parents=True)
@@ -248,22 +242,22 @@ def _write_pictures(source: ExportSource, views: Views, mav: Path) -> Stamps:
 def _camera_yaml(index: int, camera: Camera, T_BS: Array, rate: float) -> str:
     model, linear, bend, coefficients = kalibr.intrinsics(camera)
     return _sensor_yaml("camera", f"cam{index} of vobench", T_BS) + (
-        f"rate_hz: {number(rate)}\n"
+        f"rate_hz: {kalibr.number(rate)}\n"
         f"resolution: [{camera.width_px}, {camera.height_px}]\n"
         f"camera_model: {model}\n"
-        f"intrinsics: {numbers(linear)}\n"
+        f"intrinsics: {kalibr.numbers(linear)}\n"
         f"distortion_model: {BENDS[bend]}\n"
-        f"distortion_coefficients: {numbers(coefficients)}\n"
+        f"distortion_coefficients: {kalibr.numbers(coefficients)}\n"
     )
 
 
 def _sensor_yaml(kind: str, comment: str, T_BS: Array) -> str:
-    return f"sensor_type: {kind}\ncomment: {comment}\nT_BS:\n  cols: 4\n  rows: 4\n  data: {numbers(T_BS)}\n"
+    return f"sensor_type: {kind}\ncomment: {comment}\nT_BS:\n  cols: 4\n  rows: 4\n  data: {kalibr.numbers(T_BS)}\n"
 
 
 def _write_imu(source: ExportSource, imu: ImuCalibration, mav: Path) -> list[str]:
-    densities = "".join(f"{name}: {number(getattr(imu, field))}\n" for field, name in kalibr.DENSITIES.items())
-    text = f"{_sensor_yaml('imu', 'imu0 of vobench', np.eye(4))}rate_hz: {number(imu.rate_hz)}\n{densities}"
+    densities = "".join(f"{name}: {kalibr.number(getattr(imu, field))}\n" for field, name in kalibr.DENSITIES.items())
+    text = f"{_sensor_yaml('imu', 'imu0 of vobench', np.eye(4))}rate_hz: {kalibr.number(imu.rate_hz)}\n{densities}"
     _write(mav / "imu0" / "sensor.yaml", text)
     readings = source.imu
     rows = csv_rows(readings.t_ns, np.hstack([readings.gyro_radps, readings.accel_mps2])) if readings else ""
@@ -307,3 +301,23 @@ def _biases(source: ExportSource) -> tuple[list[Array], str]:
     if np.isin(truth.t_ns, bias.t_ns).all():
         return [np.stack(at, -1)], "Velocity and biases in the truth are as recorded."
     return [np.stack(at, -1)], "The biases in the truth lie on straight lines between those recorded."
+
+
+HEEDS = frozenset({"calibration", "imu", "truth", "within_ns"})
+LAYOUTS = (
+    Layout(
+        "tumvi",
+        "TUM-VI: mav0/ and dso/",
+        lambda path: _is_asl(path) and _has_dso(path),
+        partial(read_euroc, form="tumvi"),
+        HEEDS,
+    ),
+    Layout(
+        "euroc",
+        "EuRoC or ASL: mav0/, or cam0/ with data.csv",
+        lambda path: _is_asl(path) and not _has_dso(path),
+        read_euroc,
+        HEEDS,
+        Writing(write_euroc, keeps=("imu",)),
+    ),
+)

@@ -10,23 +10,22 @@ import numpy as np
 
 from vobench import stop
 from vobench.dataset import kalibr
-from vobench.dataset.bag import write_ros2
-from vobench.dataset.euroc import write_euroc
-from vobench.dataset.kitti import T_BODY_GREY, covered, kitti_path, write_kitti
+from vobench.dataset.layout import Writing, read, writable
 from vobench.dataset.photometric import write_photometric
 from vobench.dataset.picture import require_free
-from vobench.dataset.read import read
 from vobench.dataset.recording import cut_to
-from vobench.dataset.reproject import check_path, check_rig
-from vobench.dataset.source import PNG, ExportSource, Views, open_source, rectified
-from vobench.dataset.tum import left_alone, write_tum
-from vobench.errors import InputError, SequenceError
+from vobench.dataset.source import PNG, ExportSource, Views, check_path, check_rig, open_source
+from vobench.errors import InputError, SequenceError, unknown
 from vobench.geometry.rig import ImuCalibration, Rig
-from vobench.sequence.messages import IMU, LEFT_IMAGE, RIGHT_IMAGE
 from vobench.trajectory.formats import format_euroc, format_kitti, format_times, format_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
-TRAJECTORY_FORMS = ("tum", "kitti", "euroc")
+TRAJECTORY_TEXTS: dict[str, Callable[[Trajectory], str]] = {
+    "tum": format_tum,
+    "kitti": lambda trajectory: format_kitti(trajectory.T_world_frame),
+    "euroc": format_euroc,
+}
+TRAJECTORY_FORMS = tuple(TRAJECTORY_TEXTS)
 TIMES_SUFFIX = ".times.txt"
 
 
@@ -35,7 +34,9 @@ def export_trajectory(trajectory: Trajectory, path: Path, form: str) -> tuple[Pa
 
     Stamps come back exactly and poses to 1e-15. Raises InputError for another form, or a file that is there already.
     """
-    texts = {path: _text(trajectory, form)}
+    if form not in TRAJECTORY_TEXTS:
+        raise InputError(f"no form of trajectory '{form}'. Known: {', '.join(TRAJECTORY_FORMS)}")
+    texts = {path: TRAJECTORY_TEXTS[form](trajectory)}
     if form == "kitti":
         texts[path.with_name(path.stem + TIMES_SUFFIX)] = format_times(trajectory.t_ns)
     for file in texts:
@@ -48,38 +49,11 @@ def export_trajectory(trajectory: Trajectory, path: Path, form: str) -> tuple[Pa
     return tuple(texts)
 
 
-def _text(trajectory: Trajectory, form: str) -> str:
-    if form == "tum":
-        return format_tum(trajectory)
-    if form == "euroc":
-        return format_euroc(trajectory)
-    if form == "kitti":
-        return format_kitti(trajectory.T_world_frame)
-    raise InputError(f"no form of trajectory '{form}'. Known: {', '.join(TRAJECTORY_FORMS)}")
-
-
 NOTES, PHOTOMETRIC, CHAIN, IMU_FILE = "NOTES.txt", "photometric", "camchain.yaml", "imu.yaml"
 TOLD = (
     "The calibration is the one that estimators are told; the pictures were made with another one, as the case asks, "
     "and that one was left out."
 )
-KALIBR_TOPICS = ("/cam0/image_raw", "/cam1/image_raw", "/imu0")
-
-
-def _as_recorded(rig: Rig) -> Views:
-    return Views(rig)
-
-
-@dataclass(frozen=True, slots=True)
-class WritableLayout:
-    """How a form is written: its pictures, its files, the topics it has; what it keeps besides pictures and truth."""
-
-    views: Callable[[Rig], Views]
-    write: Callable[[ExportSource, Views, Path], list[str]]
-    topics: tuple[str, str, str] = KALIBR_TOPICS
-    keeps: tuple[str, ...] = ()
-    keeps_all: bool = False
-    needs_truth: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,40 +66,26 @@ class Exported:
     files: tuple[str, ...]
 
 
-LAYOUTS = {
-    "euroc": WritableLayout(_as_recorded, write_euroc, keeps=("imu",)),
-    "kitti": WritableLayout(rectified, write_kitti, needs_truth=True),
-    "tum": WritableLayout(left_alone, write_tum, keeps=("imu", "depth")),
-    "ros2": WritableLayout(
-        _as_recorded,
-        write_ros2,
-        (LEFT_IMAGE.name, RIGHT_IMAGE.name, IMU.name),
-        keeps_all=True,
-    ),
-}
-FORMS = tuple(LAYOUTS)
-
-
 def export(sequence: Path, out: Path, form: str) -> Exported:
     """Write a sequence's folder in another form into a new folder, and read it back: points and poses must agree.
 
     Raises InputError for an unknown form or a folder in use, SequenceError for what the form cannot hold or a
     sequence that is not whole.
     """
-    if form not in LAYOUTS:
-        raise InputError(f"no form '{form}' to export to. Known: {', '.join(FORMS)}")
+    layout = writable().get(form)
+    if layout is None:
+        raise InputError(unknown("form to export to", form, list(writable())))
     out = out.resolve()
     require_free(out)
-    source, layout = open_source(sequence), LAYOUTS[form]
-    views = layout.views(source.rig)
-    stamps = _stamps(source, layout)
+    source = open_source(sequence)
+    views, stamps = layout.views(source.rig), layout.stamps(source)
     with _building(out) as folder:
         notes = layout.write(source, views, folder)
         notes += _write_calibration(views.rig, layout, folder)
         notes += write_photometric(source, views, stamps, folder / PHOTOMETRIC)
         notes += _left_out(source, layout)
         (folder / NOTES).write_text("".join(f"{note}\n" for note in notes), encoding="utf-8")
-        _test(source, views, stamps, form, folder)
+        _test(views, _expected_path(source, views.rig, stamps, layout), form, folder)
         files = tuple(sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()))
     return Exported(out, form, tuple(notes), files)
 
@@ -150,14 +110,7 @@ def _building(out: Path) -> Iterator[Path]:
         raise SequenceError(f"cannot write the export ({error.strerror or error}): {out}") from error
 
 
-def _stamps(source: ExportSource, layout: WritableLayout) -> Stamps:
-    """The stamps (N,) of the frames that are exported."""
-    stamps = source.sequence.frame_stamps()
-    return stamps[covered(source.truth, stamps)] if layout.needs_truth else stamps
-
-
-def _write_calibration(rig: Rig, layout: WritableLayout, folder: Path) -> list[str]:
-    """Kalibr's two files, and what to say of them."""
+def _write_calibration(rig: Rig, layout: Writing, folder: Path) -> list[str]:
     *image_topics, imu_topic = layout.topics
     notes = kalibr.remarks(rig)
     try:
@@ -172,9 +125,8 @@ def _write_calibration(rig: Rig, layout: WritableLayout, folder: Path) -> list[s
     return notes
 
 
-def _left_out(source: ExportSource, layout: WritableLayout) -> list[str]:
-    """Sentences on what a form has no place for."""
-    if layout.keeps_all:
+def _left_out(source: ExportSource, layout: Writing) -> list[str]:
+    if layout.keeps is None:
         return []
     channels = [name for name in source.channels if name not in layout.keeps]
     is_jpeg = next(source.sequence.encoded_frames()).form != PNG
@@ -195,13 +147,13 @@ def _told_truly(source: ExportSource) -> bool:
     return cameras and all((told.T_body_camera(side) == true.T_body_camera(side)).all() for side in told.sides)
 
 
-def _test(source: ExportSource, views: Views, stamps: Stamps, form: str, folder: Path) -> None:
+def _test(views: Views, expected: Trajectory | None, form: str, folder: Path) -> None:
     """Read the export back and send known points and the true path through it. Raises SequenceError."""
     found = read(folder, form=form)
     check_rig(f"the {form} folder, read back,", views.rig, found.rig)
     if (folder / CHAIN).is_file():
         check_rig(f"{CHAIN}, read back,", views.rig, _chain_rig(folder / CHAIN, views.rig.imu))
-    expected, path = _expected_path(source, views.rig, stamps, form), found.truth
+    path = found.truth
     if expected is not None and path is not None:
         check_path(f"the {form} folder, read back,", expected, path.of_mounted(found.rig.T_body_left))
     elif expected is not None or path is not None:
@@ -214,11 +166,10 @@ def _chain_rig(path: Path, imu: ImuCalibration | None) -> Rig:
     return replace(rig, imu=replace(imu, T_body_imu=np.eye(4))) if imu else rig
 
 
-def _expected_path(source: ExportSource, rig: Rig, stamps: Stamps, form: str) -> Trajectory | None:
+def _expected_path(source: ExportSource, rig: Rig, stamps: Stamps, layout: Writing) -> Trajectory | None:
     """The left camera's path as the form should give it, cut to the pictures as every reader cuts it."""
     if source.truth is None:
         return None
-    if form == "kitti":
-        path = kitti_path(source.truth, rig, stamps)
-        return path and Trajectory(path.t_ns, T_BODY_GREY @ path.T_world_frame)
+    if layout.path:
+        return layout.path(source, rig, stamps)
     return cut_to(source.truth.of_mounted(rig.T_body_left), stamps)[0]

@@ -300,7 +300,6 @@ def imu_numbers(entries: Values, T_body_imu: Array, rate: tuple[str, ...], withi
 
 
 def _camera(chain: Values, name: str) -> Camera:
-    """One camera of a chain. Raises InputError for a model that is not known here."""
     model, linear = chain.text(name, "camera_model"), chain.numbers(name, "intrinsics")
     size = chain.size(name, "resolution")
     if model == SPHERES and len(linear) == 6:
@@ -353,11 +352,9 @@ def chain_rig(path: Path, cameras: int, body: Literal["imu", "left"]) -> tuple[R
         rig = replace(rig, T_body_left=np.eye(4))
     names = [name for name in ("cam0", "cam1")[:cameras] if values.has(name, "timeshift_cam_imu")]
     shifts_s = [(name, values.number(name, "timeshift_cam_imu")) for name in names]
-    return rig, tuple(
-        f"By the calibration the clock of {name} is {shift_s:g} s off the IMU's; stamps were left as they are."
-        for name, shift_s in shifts_s
-        if shift_s
-    )
+    off = "By the calibration the clock of {} is {:g} s off the IMU's; stamps were left as they are."
+    told = f"The calibration is that of {path.name}."
+    return rig, (told, *(off.format(*shift) for shift in shifts_s if shift[1]))
 
 
 def no_calibration(looked_for: Path) -> InputError:

@@ -3,10 +3,13 @@
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vobench.dataset.kalibr import chain_rig, no_calibration
+from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
 from vobench.dataset.recording import (
+    Notes,
     PictureStream,
     ReadOptions,
     Recording,
@@ -16,7 +19,7 @@ from vobench.dataset.recording import (
     read_truth_file,
     recorded_frames,
 )
-from vobench.dataset.source import ExportSource, Views, png_frames
+from vobench.dataset.source import ExportSource, Views, png_frames, rectified
 from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
@@ -30,8 +33,6 @@ PAIRS = (("image_0", "image_1"), ("image_2", "image_3"))  # grey, colour
 CALIBRATION, TIMES, POSES = "calib.txt", "times.txt", "poses.txt"
 T_BODY_GREY = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))
 SKEW_TOLERANCE = 1e-6  # of KITTI's seven digits: K's lower triangle is zero
-
-Notes = tuple[str, ...]
 
 
 def read_kitti(folder: Path, options: ReadOptions) -> Recording:
@@ -63,7 +64,6 @@ def _pair(folder: Path) -> tuple[tuple[str, ...], Notes]:
 
 
 def _times(path: Path, count: int, pictures: Path) -> Stamps:
-    """A stamp for each picture, exact to the nanosecond."""
     t_ns = parse_times(read_text(path), name=str(path))
     if len(t_ns) != count:
         raise InputError(f"{len(t_ns)} times for {count} pictures in {pictures}: {path}")
@@ -76,7 +76,7 @@ def _rig(
     """The cameras by calib.txt, which knows no picture's size, or by Kalibr's chain; and which file that was."""
     if options.calibration is not None:
         rig, notes = chain_rig(options.calibration, len(names), "left")
-        return _level(rig), options.calibration, (f"The calibration is that of {options.calibration.name}.", *notes)
+        return _level(rig), options.calibration, notes
     path = folder / CALIBRATION
     if not path.exists():
         raise no_calibration(path)
@@ -91,7 +91,6 @@ def _rig(
 
 
 def _level(rig: Rig) -> Rig:
-    """A rig on the grey camera's axes, on the body's."""
     T_grey_right = rig.T_body_right
     T_body_right = None if T_grey_right is None else T_BODY_GREY @ T_grey_right
     return Rig(rig.left, rig.right, T_BODY_GREY @ rig.T_body_left, T_body_right)
@@ -143,8 +142,7 @@ def _truth(folder: Path, t_ns: Stamps, options: ReadOptions) -> tuple[Trajectory
 
 def write_kitti(source: ExportSource, views: Views, folder: Path) -> list[str]:
     """Fill `folder` and say what was converted."""
-    stamps = source.sequence.frame_stamps()
-    kept = covered(source.truth, stamps)
+    stamps, kept = source.sequence.frame_stamps(), _covered(source)
     for index in range(len(views.rig.sides)):
         (folder / f"image_{index}").mkdir()
     frames = (frame for frame in png_frames(source.sequence, views) if kept[frame.index])
@@ -159,13 +157,13 @@ def write_kitti(source: ExportSource, views: Views, folder: Path) -> list[str]:
     return notes + _write_poses(source, views, stamps[kept], folder)
 
 
-def covered(truth: Trajectory | None, stamps: Stamps) -> np.ndarray:
+def _covered(source: ExportSource) -> NDArray[np.bool_]:
     """Which frames (N,) the layout can have: those within the truth's time; all where there is no truth for any."""
-    everything = np.ones(len(stamps), bool)
-    if truth is None:
-        return everything
-    within = (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])
-    return within if within.any() else everything
+    stamps, truth = source.sequence.frame_stamps(), source.truth
+    within = np.zeros(len(stamps), bool)
+    if truth is not None:
+        within = (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])
+    return within if within.any() else ~within
 
 
 def kitti_path(truth: Trajectory, rig: Rig, stamps: Stamps) -> Trajectory | None:
@@ -209,3 +207,20 @@ def _write_poses(source: ExportSource, views: Views, stamps: Stamps, folder: Pat
         gap_ms = np.diff(truth.t_ns).max() / 1e6
         notes.append(f"{between} poses lie between true ones, which are at most {gap_ms:.3g} ms apart: interpolated.")
     return notes
+
+
+def _path_read_back(source: ExportSource, rig: Rig, stamps: Stamps) -> Trajectory | None:
+    path = kitti_path(source.truth, rig, stamps) if source.truth else None
+    return path and Trajectory(path.t_ns, T_BODY_GREY @ path.T_world_frame)
+
+
+LAYOUTS = (
+    Layout(
+        "kitti",
+        "KITTI odometry: image_0/ or image_2/",
+        lambda path: any((path / left).is_dir() for left, _ in PAIRS),
+        read_kitti,
+        frozenset({"calibration", "truth"}),
+        Writing(write_kitti, rectified, lambda s: s.sequence.frame_stamps()[_covered(s)], _path_read_back),
+    ),
+)

@@ -130,7 +130,6 @@ def _lines(model: str, values: list[float], fit: str, width: int, height: int) -
 
 
 def _times(source: ExportSource, stamps: Stamps) -> tuple[str, list[str]]:
-    """times.txt of some frames, and what to say of it."""
     exposed_ns, settings = source.sequence.exposures()
     row_of = dict(zip(exposed_ns.tolist(), settings.tolist(), strict=True))
     found = [row_of.get(t) for t in stamps.tolist()]

@@ -180,7 +180,6 @@ def conversions(kind: Kind) -> tuple[str, ...]:
 
 
 def _decoded(picture: Picture, kind: Kind) -> NDArray[Any]:
-    """The pixels of a whole file. Raises InputError."""
     try:
         pixels = cv2.imdecode(np.frombuffer(bytes(picture.content), np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:

@@ -70,6 +70,7 @@ class RecordedFrame:
 
 
 Shots = Callable[[], Iterator[RecordedFrame]]
+Notes = tuple[str, ...]  # sentences on what was assumed, converted or dropped
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +103,7 @@ class PictureStream:
                     f"but the calibration is for {camera.width_px} x {camera.height_px}: {calibration}"
                 )
 
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> Notes:
         """What is done to make the pictures 8-bit grey."""
         return tuple(dict.fromkeys(sentence for kind in self.kinds for sentence in conversions(kind)))
 
@@ -125,12 +126,7 @@ class PictureStream:
     def _checked(self, shot: RecordedFrame) -> Iterator[tuple[Picture, Kind]]:
         for picture, first in zip(shot.pictures, self.kinds, strict=True):
             kind = kind_of(picture)
-            if (kind.width_px, kind.height_px, kind.channels, kind.bits) != (
-                first.width_px,
-                first.height_px,
-                first.channels,
-                first.bits,
-            ):
+            if replace(kind, form=first.form) != first:
                 raise InputError(f"the first picture has {first}, but this one has {kind}: {picture.name}")
             yield picture, kind
 
@@ -160,7 +156,7 @@ class Recording:
     imu: ImuReadings | None = None
     encoders: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None
     exposures: tuple[NDArray[np.int64], Array] | None = None
-    notes: tuple[str, ...] = ()
+    notes: Notes = ()
 
     @property
     def frame_count(self) -> int:
@@ -171,7 +167,7 @@ class Recording:
 EXACT = 1e-9  # a rotation this far off its transpose's inverse was written with all its digits
 
 
-def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, tuple[str, ...]]:
+def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
     """A trajectory in any form of text, and what was done to it; a row without a stamp has that of its picture.
 
     A row of 13 numbers is KITTI's behind the picture's number, from 0. Of rows with one stamp the first is kept.
@@ -199,7 +195,7 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, tuple[st
     return Trajectory(t_ns, T), tuple(notes)
 
 
-def cut_to(truth: Trajectory, frames_ns: Stamps) -> tuple[Trajectory | None, tuple[str, ...]]:
+def cut_to(truth: Trajectory, frames_ns: Stamps) -> tuple[Trajectory | None, Notes]:
     """The truth from the last pose before the first picture to the first after the last one, and what that dropped."""
     t_ns, inside = truth.t_ns, around(truth.t_ns, frames_ns)
     if inside is None:
@@ -265,11 +261,9 @@ def assemble(
         said += cut
     if imu is None:
         rig = replace(rig, imu=None)
-    starts = [_span(t_ns, "picture")]
-    if truth is not None:
-        starts.append(_span(truth.t_ns, "true pose"))
-    if imu is not None and len(imu.t_ns):
-        starts.append(_span(imu.t_ns, "IMU reading"))
+    streams = [(t_ns, "picture"), *([(truth.t_ns, "true pose")] if truth else [])]
+    streams += [(imu.t_ns, "IMU reading")] if imu and len(imu.t_ns) else []
+    starts = [_span(*stream) for stream in streams]
     return Recording(
         form=form,
         rig=rig,
@@ -283,8 +277,7 @@ def assemble(
     )
 
 
-def _pair_notes(rig: Rig, calibration: str) -> tuple[str, ...]:
-    """What is odd about a pair. Raises InputError where both cameras are in one place."""
+def _pair_notes(rig: Rig, calibration: str) -> Notes:
     if rig.right is None:
         return ()
     if not rig.baseline_m > LEAST_BASELINE_M:
@@ -292,7 +285,7 @@ def _pair_notes(rig: Rig, calibration: str) -> tuple[str, ...]:
     return () if rectification(rig) else (UNRECTIFIABLE,)
 
 
-def _imu_within(imu: ImuReadings, frames_ns: Stamps) -> tuple[ImuReadings | None, tuple[str, ...]]:
+def _imu_within(imu: ImuReadings, frames_ns: Stamps) -> tuple[ImuReadings | None, Notes]:
     """The readings of the pictures' time, with one before and one after as the truth has, and what that dropped."""
     inside, count = around(imu.t_ns, frames_ns), len(imu.t_ns)
     if inside is None:
@@ -329,7 +322,7 @@ class PictureList:
     paths: tuple[Path, ...]
 
     def at(self, index: Stamps) -> "PictureList":
-        """The pictures (K,) of these indices."""
+        """Those of some indices (K,)."""
         return PictureList(self.name, self.t_ns[index], tuple(self.paths[i] for i in index.tolist()))
 
 
@@ -354,7 +347,7 @@ def read_list(path: Path, folder: Path, *, separator: str | None, unit: Unit) ->
     return PictureList(str(path), t_ns, paths)
 
 
-def present(*eyes: PictureList) -> tuple[list[PictureList], tuple[str, ...]]:
+def present(*eyes: PictureList) -> tuple[list[PictureList], Notes]:
     """The pictures of lists in step whose files are there for every eye, and what is to be said of the others.
 
     Raises InputError where none is.
@@ -417,7 +410,7 @@ def in_step(left: Sequence[Path], right: Sequence[Path] | None) -> None:
         raise InputError(f"the first left and right pictures have other numbers: {left[0]} and {right[0]}")
 
 
-def partners(left_ns: Stamps, right_ns: Stamps, within_ns: int, name: str) -> tuple[Stamps, Stamps, tuple[str, ...]]:
+def partners(left_ns: Stamps, right_ns: Stamps, within_ns: int, name: str) -> tuple[Stamps, Stamps, Notes]:
     """Indices (K,) of the left and right stamps that make pairs, and what is to be said of the others.
 
     Raises InputError where there is no pair.
@@ -435,7 +428,7 @@ def partners(left_ns: Stamps, right_ns: Stamps, within_ns: int, name: str) -> tu
     return pairs.gt, pairs.est, tuple(notes)
 
 
-def paired(left: PictureList, right: PictureList, within_ns: int) -> tuple[PictureList, PictureList, tuple[str, ...]]:
+def paired(left: PictureList, right: PictureList, within_ns: int) -> tuple[PictureList, PictureList, Notes]:
     """Both lists with the same stamps, and sentences on what that took. Raises InputError where there is no pair."""
     at_left, at_right, notes = partners(left.t_ns, right.t_ns, within_ns, f"{left.name} and {right.name}")
     return left.at(at_left), replace(right.at(at_right), t_ns=left.t_ns[at_left]), notes

@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from vobench.dataset.kalibr import chain_rig
+from vobench.dataset.layout import Layout
 from vobench.dataset.picture import unread
 from vobench.dataset.recording import (
+    Notes,
     PictureStream,
     ReadOptions,
     Recording,
@@ -29,8 +31,6 @@ FOCAL_PX = 320.0  # 90° across 640 pixels; the centre is half the size, as its 
 SIZES_PX = ((640, 480), (640, 640))
 FLIP = se3.transform(np.diag([1.0, -1.0, -1.0]), np.zeros(3))  # ahead-right-down to ahead-left-up, and back
 
-Notes = tuple[str, ...]
-
 
 @dataclass(frozen=True, slots=True)
 class Names:
@@ -41,7 +41,7 @@ class Names:
     poses: str
 
 
-LAYOUTS = (
+VERSIONS = (
     Names("image_left", "image_right", "pose_left.txt"),
     Names("image_lcam_front", "image_rcam_front", "pose_lcam_front.txt"),
 )
@@ -49,9 +49,9 @@ LAYOUTS = (
 
 def read_tartanair(folder: Path, options: ReadOptions) -> Recording:
     """A folder such as P000; the body is the left camera, its axes ahead, left, up. Raises InputError."""
-    names = next((names for names in LAYOUTS if (folder / names.left).is_dir()), None)
+    names = next((names for names in VERSIONS if (folder / names.left).is_dir()), None)
     if names is None:
-        raise InputError(f"no folder {' or '.join(names.left for names in LAYOUTS)} with pictures in {folder}")
+        raise InputError(f"no folder {' or '.join(names.left for names in VERSIONS)} with pictures in {folder}")
     eyes = [numbered(folder / name) for name in (names.left, names.right) if (folder / name).is_dir()]
     in_step(eyes[0], eyes[1] if len(eyes) > 1 else None)
     rate_hz = RATE_HZ if options.rate_hz is None else options.rate_hz
@@ -74,8 +74,7 @@ def _rig(folder: Path, size_px: tuple[int, int], count: int, options: ReadOption
     if options.calibration is not None:
         rig, notes = chain_rig(options.calibration, count, "left")
         right = None if rig.T_body_right is None else T_body_left @ rig.T_body_right
-        said = (f"The calibration is that of {options.calibration.name}.", *notes)
-        return Rig(rig.left, rig.right, T_body_left, right), str(options.calibration), said
+        return Rig(rig.left, rig.right, T_body_left, right), str(options.calibration), notes
     if size_px not in SIZES_PX:
         raise InputError(
             f"TartanAir's pictures have {' or '.join(f'{w} x {h}' for w, h in SIZES_PX)} pixels, these have "
@@ -101,3 +100,14 @@ def _truth(beside: Path, t_ns: Stamps, options: ReadOptions) -> tuple[Trajectory
         "(NED) to x ahead, y left, z up.",
         *notes,
     )
+
+
+LAYOUTS = (
+    Layout(
+        "tartanair",
+        "TartanAir: image_left/ or image_lcam_front/",
+        lambda path: any((path / names.left).is_dir() for names in VERSIONS),
+        read_tartanair,
+        frozenset({"calibration", "truth", "rate_hz"}),
+    ),
+)

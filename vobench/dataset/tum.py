@@ -8,8 +8,10 @@ import numpy as np
 
 from vobench.dataset import kalibr
 from vobench.dataset.kalibr import chain_rig, find_chain, no_calibration
+from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
 from vobench.dataset.recording import (
+    Notes,
     PictureStream,
     ReadOptions,
     Recording,
@@ -39,8 +41,6 @@ CAMERAS: dict[str, Camera] = {
 }
 WHICH = re.compile(r"(?:freiburg|fr)_?([123])(?![0-9])", re.IGNORECASE)
 
-Notes = tuple[str, ...]
-
 
 def read_tum(folder: Path, options: ReadOptions) -> Recording:
     """A folder with rgb.txt; the body is its camera. Raises InputError, one sentence, naming the file."""
@@ -61,7 +61,7 @@ def _rig(folder: Path, options: ReadOptions) -> tuple[Rig, str, Notes]:
     chain = find_chain(folder, options)
     if chain is not None:
         rig, notes = chain_rig(chain, 1, "left")
-        return rig, str(chain), (f"The calibration is that of {chain.name}.", *notes)
+        return rig, str(chain), notes
     found = WHICH.search(folder.resolve().name) or WHICH.search(_title(folder / LIST))
     if found is None:
         raise no_calibration(folder / "camchain.yaml")
@@ -89,8 +89,7 @@ FARTHEST_M = 65535 / DEPTH_PER_M
 DEPTH_TOPIC = "depth"
 
 
-def left_alone(rig: Rig) -> Views:
-    """The left camera as it was recorded."""
+def _left_alone(rig: Rig) -> Views:
     return Views(replace(rig, right=None, T_body_right=None))
 
 
@@ -162,3 +161,15 @@ def _write_rows(path: Path, what: str, columns: str, t_ns: Stamps, values: Array
     rows = zip(t_ns.tolist(), values.tolist(), strict=True)
     text = "".join(f"{seconds(t)} {' '.join(map(repr, row))}\n" for t, row in rows)
     path.write_text(f"# {what}\n# file: vobench\n# timestamp {columns}\n{text}", encoding="utf-8")
+
+
+LAYOUTS = (
+    Layout(
+        "tum",
+        "TUM RGB-D: rgb.txt",
+        lambda path: (path / LIST).is_file(),
+        read_tum,
+        frozenset({"calibration", "truth"}),
+        Writing(write_tum, _left_alone, keeps=("imu", DEPTH_TOPIC)),
+    ),
+)

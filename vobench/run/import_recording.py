@@ -43,7 +43,7 @@ def _why_not_scored(recording: Recording) -> str:
 
 def read_case(case: RecordedCase) -> Recording:
     """The recording of a case. Raises VobenchError, naming the file, for whatever is wrong with it."""
-    from vobench.dataset.read import read
+    from vobench.dataset.layout import read
 
     source = case.source
     options = ReadOptions(
@@ -78,7 +78,7 @@ def is_imported(case: RecordedCase, recording: Recording, store: Store) -> bool:
 
 def import_recording(recording: Recording, folder: Path) -> None:
     """Write a recording as a sequence, and with which versions. Raises VobenchError where a picture is wrong."""
-    from vobench.dataset.convert import convert
+    from vobench.dataset.sequence import convert
 
     convert(recording, folder, provenance=versions(*LIBRARIES))
 

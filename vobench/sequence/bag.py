@@ -311,7 +311,6 @@ def _counts(chunk: ChunkIndex) -> dict[int, int]:
 
 
 def _checksum(entries: Mapping[str, str]) -> str:
-    """The CRC-32 of a note's entries, whatever their order."""
     return f"{zlib.crc32(repr(sorted(entries.items())).encode()):08x}"
 
 

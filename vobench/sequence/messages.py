@@ -69,6 +69,8 @@ FOCAL_MODELS: dict[str, type[BrownConrady] | type[KannalaBrandt] | type[DoubleSp
     DOUBLE_SPHERE: DoubleSphere,
 }
 ALL_AROUND = "equirectangular"
+# A pinhole is a plumb bob that does not bend.
+MODEL_NAMES: dict[type, str] = {Equirectangular: ALL_AROUND, **{kind: name for name, kind in FOCAL_MODELS.items()}}
 
 WHEEL_TICKS_DEFINITION = """\
 # Counts of the two wheel encoders since the start of the recording, positive when the robot drives ahead.
@@ -182,7 +184,7 @@ def camera_info(t_ns: int, frame_id: str, camera: Camera, *, R: Array | None = N
         header(t_ns, frame_id),
         camera.height_px,
         camera.width_px,
-        _model_name(camera),
+        MODEL_NAMES.get(type(camera), PLUMB_BOB),
         np.zeros(5) if isinstance(camera, Pinhole) else np.array([getattr(camera, k) for k in camera.coefficients]),
         _own_matrix(camera).ravel(),
         (np.eye(3) if R is None else R).ravel(),
@@ -191,18 +193,6 @@ def camera_info(t_ns: int, frame_id: str, camera: Camera, *, R: Array | None = N
         0,
         region,
     )
-
-
-def _model_name(camera: Camera) -> str:
-    """The distortion model; a pinhole is a plumb bob that does not bend."""
-    match camera:
-        case KannalaBrandt():
-            return EQUIDISTANT
-        case DoubleSphere():
-            return DOUBLE_SPHERE
-        case Equirectangular():
-            return ALL_AROUND
-    return PLUMB_BOB
 
 
 def _own_matrix(camera: Camera) -> Array:

@@ -84,7 +84,6 @@ def names_from_json(data: bytes) -> TruthNames:
 
 
 def _encoding(channel: Channel) -> str:
-    """ROS's name for a pixel's type."""
     if channel.dtype is np.bool_:
         return "mono8"
     return f"{'32F' if channel.dtype is np.float32 else '16U'}C{channel.depth}"

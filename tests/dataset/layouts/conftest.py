@@ -11,9 +11,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from vobench.dataset.convert import convert
-from vobench.dataset.read import read
+from vobench.dataset.layout import read
 from vobench.dataset.recording import ReadOptions
+from vobench.dataset.sequence import convert
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 

@@ -15,7 +15,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
-from vobench.dataset.read import read, sniff
+from vobench.dataset.layout import read, sniff
 from vobench.dataset.recording import ReadOptions, Topics
 from vobench.errors import VobenchError
 from vobench.geometry import se3

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vobench.dataset.convert import convert
 from vobench.dataset.export import export
-from vobench.dataset.read import read
+from vobench.dataset.layout import read
+from vobench.dataset.sequence import convert
 from vobench.errors import VobenchError
 from vobench.geometry import se3
 from vobench.sequence import Sequence, read_truth

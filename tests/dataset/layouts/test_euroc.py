@@ -9,7 +9,7 @@ import pytest
 
 from vobench.dataset.euroc import sensor_camera
 from vobench.dataset.kalibr import read_yaml
-from vobench.dataset.read import read, sniff
+from vobench.dataset.layout import read, sniff
 from vobench.dataset.recording import ReadOptions
 from vobench.errors import VobenchError
 from vobench.geometry import se3

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vobench.dataset.read import read
+from vobench.dataset.layout import read
 from vobench.dataset.recording import ReadOptions
 from vobench.errors import VobenchError
 from vobench.sequence import Sequence, read_truth

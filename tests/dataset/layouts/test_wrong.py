@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vobench.dataset.read import read
+from vobench.dataset.layout import read
 from vobench.dataset.recording import ReadOptions, Topics
 from vobench.errors import VobenchError
 
@@ -271,7 +271,7 @@ def test_an_option_that_would_mean_nothing(kitti):
 
 
 def test_a_form_that_is_none(kitti):
-    with pytest.raises(VobenchError, match=r"no form 'kity'\. Did you mean 'kitti'\? Known: vobench"):
+    with pytest.raises(VobenchError, match=r"no form named 'kity'\. Did you mean 'kitti'\? Known: euroc"):
         read(kitti, form="kity")
 
 

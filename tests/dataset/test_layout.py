@@ -1,0 +1,149 @@
+"""A layout from outside is a module and an entry point: sniffed, read and written without a touch of vobench."""
+
+import sys
+from collections.abc import Callable, Iterator
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vobench.dataset import layout
+from vobench.dataset.export import export
+from vobench.dataset.layout import GROUP, layouts, read, sniff, writable
+from vobench.errors import InputError, SequenceError
+from vobench.geometry.rig import Rig
+
+LENT = '''
+"""All of a recording in one frames.npz: stamps, pictures, lens and the left camera's path."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from vobench.dataset.layout import Layout, Writing
+from vobench.dataset.picture import Picture
+from vobench.dataset.recording import PictureStream, RecordedFrame, assemble
+from vobench.dataset.source import Views, png_frames
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import Rig
+from vobench.trajectory.trajectory import Trajectory
+
+
+def read(folder, options):
+    path = folder / "frames.npz"
+    with np.load(path) as found:
+        t_ns, pictures, lens, T = (found[name] for name in ("t_ns", "pictures", "lens", "T_world_left"))
+    height, width = pictures.shape[1:]
+    stream = PictureStream.open(lambda: (
+        RecordedFrame(int(t), (Picture(f"{path}: {i}", picture),)) for i, (t, picture) in enumerate(zip(t_ns, pictures))
+    ))
+    rig = Rig(Pinhole(width, height, *lens.tolist()), None, np.eye(4), None)
+    return assemble("npz", rig, stream, t_ns, truth=Trajectory(t_ns, T), calibration=str(path))
+
+
+def write(source, views, folder):
+    frames = list(png_frames(source.sequence, views))
+    pictures = [cv2.imdecode(np.frombuffer(f.pictures["left"], np.uint8), cv2.IMREAD_UNCHANGED) for f in frames]
+    lens = views.rig.left.K[[0, 1, 0, 1], [0, 1, 2, 2]]
+    path = source.truth.of_mounted(views.rig.T_body_left)
+    np.savez(folder / "frames.npz", t_ns=path.t_ns, pictures=pictures, lens=lens, T_world_left=path.T_world_frame)
+    return ["All is in frames.npz."]
+
+
+def left(rig):
+    return Views(replace(rig, right=None, T_body_right=None))
+
+
+LAYOUT = Layout(
+    "npz", "frames.npz", lambda path: (path / "frames.npz").is_file(), read, writing=Writing(write, views=left)
+)
+TWIN = replace(LAYOUT, name="npz2")
+SAME = replace(LAYOUT, name="kitti")
+NONE = "a layout"
+'''
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+    """A distribution whose entry points are these values of its module."""
+    site = tmp_path / "site"
+    site.mkdir()
+    (site / "lent_layout.py").write_text(LENT)
+    monkeypatch.syspath_prepend(str(site))
+    monkeypatch.delitem(sys.modules, "lent_layout", raising=False)
+
+    def lend(*values: str) -> None:
+        points = [EntryPoint(value.lower(), f"lent_layout:{value}", GROUP) for value in values]
+        monkeypatch.setattr(layout, "entry_points", lambda *, group: points if group == GROUP else [])
+
+    yield lend
+    sys.modules.pop("lent_layout", None)
+
+
+def test_a_layout_from_outside_is_sniffed_read_and_written(
+    install: Callable[..., None], make_sequence: Callable[..., Any], rig_of: Callable[..., Rig], tmp_path: Path
+) -> None:
+    install("LAYOUT")
+    made = make_sequence(rig_of())
+    exported = export(made.folder, tmp_path / "out", "npz")
+    assert {"frames.npz", "camchain.yaml", "NOTES.txt"} <= set(exported.files)
+    assert exported.notes[0] == "All is in frames.npz."
+    assert "Wheels and encoder readings were left out." in exported.notes
+    assert sniff(tmp_path / "out") == "npz"
+    found = read(tmp_path / "out")
+    assert (found.form, found.rig.left) == ("npz", made.rig.left)
+    np.testing.assert_array_equal(found.t_ns, made.t_ns)
+    np.testing.assert_array_equal([frame.left for frame in found.frames()], made.left)
+    assert found.truth is not None
+    np.testing.assert_allclose(found.truth.T_world_frame, made.T_world_left, rtol=0, atol=1e-12)
+
+
+def test_a_layout_that_reads_back_as_something_else_is_refused_from_outside_too(
+    install: Callable[..., None], make_sequence: Callable[..., Any], tmp_path: Path
+) -> None:
+    install("LAYOUT")
+    site = tmp_path / "site" / "lent_layout.py"
+    site.write_text(LENT.replace("lens=lens", "lens=lens + 1e-5"))
+    with pytest.raises(SequenceError, match="the npz folder, read back, does not say what was exported"):
+        export(make_sequence().folder, tmp_path / "out", "npz")
+
+
+def test_what_two_layouts_take_for_theirs_is_for_the_user_to_say_whatever_was_installed_first(
+    install: Callable[..., None], tmp_path: Path
+) -> None:
+    (tmp_path / "frames.npz").touch()
+    said = set()
+    for order in (("LAYOUT", "TWIN"), ("TWIN", "LAYOUT")):
+        install(*order)
+        assert list(layouts())[-2:] == ["npz", "npz2"]
+        with pytest.raises(InputError, match=r"^both npz and npz2 by what is in it; say the form that is meant: ") as e:
+            sniff(tmp_path)
+        said.add(str(e.value))
+    assert len(said) == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("SAME", r"^two layouts are called 'kitti'; one of them is lent_layout:SAME"),
+        ("NONE", r"^lent_layout:NONE should be a Layout, but is str$"),
+        ("GONE", r"^the layout lent_layout:GONE does not load \(AttributeError: .*'GONE'\)$"),
+    ],
+)
+def test_a_layout_that_is_none_or_has_another_ones_name_is_a_sentence(
+    install: Callable[..., None], value: str, said: str
+) -> None:
+    install(value)
+    with pytest.raises(InputError, match=said):
+        layouts()
+
+
+def test_the_names_of_the_layouts_are_those_of_the_documentation() -> None:
+    page = (Path(__file__).parents[2] / "docs/datasets.md").read_text(encoding="utf-8")
+    lines = page.splitlines()
+    for name in layouts():
+        assert any(line.startswith("| ") and f"`{name}`" in line.split("|")[1] for line in lines), name
+    assert set(writable()) == {"euroc", "kitti", "tum", "ros2"}

@@ -1,0 +1,92 @@
+"""Sequences of our own: read as a recording, and any recording written as one, a pair of pictures in memory."""
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from heapq import merge
+from operator import itemgetter
+from pathlib import Path
+
+from vobench.dataset.layout import Layout
+from vobench.dataset.recording import ReadOptions, Recording
+from vobench.errors import InputError
+from vobench.sensor.imu import ImuReadings
+from vobench.sequence import Sequence, SequenceWriter, has_truth, read_truth
+from vobench.sequence.bag import part_of
+from vobench.sequence.writer import SENSORS_FILE
+
+
+def is_sequence(path: Path) -> bool:
+    """Whether a folder has a sensors.mcap, finished or not, or a file is one; a torn one is told by its reader."""
+    sensors = path / SENSORS_FILE if path.is_dir() else path
+    return sensors.name == SENSORS_FILE and (sensors.is_file() or part_of(sensors).is_file())
+
+
+def read_own(path: Path, _options: ReadOptions) -> Recording:
+    """All that the sensors of a sequence of our own say, and its true path. Raises SequenceError."""
+    folder = path.parent if path.is_file() else path
+    sequence = Sequence.open(folder)
+    stamps, imu = sequence.frame_stamps(), sequence.imu()
+    encoders, exposures = sequence.encoders(), sequence.exposures()
+    truth = read_truth(folder) if has_truth(folder) else None
+    streams = [stamps, imu.t_ns, encoders[0], *([] if truth is None else [truth.t_ns])]
+    return Recording(
+        form="vobench",
+        rig=sequence.rig,
+        frames=sequence.frames,
+        encoded_frames=sequence.encoded_frames,
+        t_ns=stamps,
+        start_ns=min(int(t_ns[0]) for t_ns in streams if len(t_ns)),
+        truth=truth,
+        imu=imu if len(imu.t_ns) else None,
+        encoders=encoders if len(encoders[0]) else None,
+        exposures=exposures if len(exposures[0]) else None,
+        notes=("The sequence's case, true rig, true velocities and what is true of pixels were not carried over.",),
+    )
+
+
+LAYOUTS = (Layout("vobench", f"a sequence of vobench: {SENSORS_FILE}", is_sequence, read_own),)
+
+
+def convert(recording: Recording, folder: Path, *, provenance: Mapping[str, str] | None = None) -> None:
+    """Write a recording as a sequence: stamps exactly, 8-bit grey pictures bit for bit, notes beside the truth.
+
+    Raises VobenchError, and leaves no file that reads as a whole one, where a picture is wrong.
+    """
+    notes = {"form": recording.form, **{f"note_{index:02d}": note for index, note in enumerate(recording.notes, 1)}}
+    with SequenceWriter(
+        folder, recording.rig, case_json=None, start_ns=recording.start_ns, notes=notes, provenance=provenance
+    ) as writer:
+        if truth := recording.truth:  # how fast the body was is not known
+            for t_ns, T_world_body in zip(truth.t_ns.tolist(), truth.T_world_frame, strict=True):
+                writer.write_truth(t_ns, T_world_body, None)
+        for _, write in merge(*_readings(writer, recording), _pictures(writer, recording), key=itemgetter(0)):
+            write()
+
+
+Writes = Iterator[tuple[int, Callable[[], None]]]  # stamps in ns, and what writes something that has them
+
+
+def _readings(writer: SequenceWriter, recording: Recording) -> Iterator[Writes]:
+    """The readings of IMU and encoders, which come before the picture of their stamp."""
+    if imu := recording.imu:
+        yield ((int(t), partial(_write_imu, writer, imu, index)) for index, t in enumerate(imu.t_ns))
+    if encoders := recording.encoders:
+        yield ((int(t), partial(writer.write_encoders, [t], [ticks])) for t, ticks in zip(*encoders, strict=True))
+
+
+def _write_imu(writer: SequenceWriter, imu: ImuReadings, index: int) -> None:
+    one = slice(index, index + 1)
+    writer.write_imu(ImuReadings(imu.t_ns[one], imu.gyro_radps[one], imu.accel_mps2[one]))
+
+
+def _pictures(writer: SequenceWriter, recording: Recording) -> Writes:
+    """The pictures, each with its exposure. Raises InputError where they are not as many as the recording says."""
+    exposed_ns, settings = recording.exposures or ((), ())
+    exposure_of, count = dict(zip(map(int, exposed_ns), settings, strict=True)), 0
+    for frame in recording.encoded_frames():
+        yield frame.t_ns, partial(writer.write_encoded_frame, frame.t_ns, frame.left, frame.right, frame.form)
+        if frame.t_ns in exposure_of:
+            yield frame.t_ns, partial(writer.write_exposure, frame.t_ns, *exposure_of[frame.t_ns].tolist())
+        count += 1
+    if count != recording.frame_count:
+        raise InputError(f"{count} pictures came, but the recording should have {recording.frame_count}")
