@@ -68,7 +68,7 @@ def code_digest(*entries: str, package: Path = PACKAGE) -> str:
     found = closure((n for entry in entries for n in known if f"{n}.".startswith(f"{entry}.")), package=package)
     for name, module in sorted(found.items()):
         state.update(f"{name}\0{module.digest}".encode())
-    for folder in sorted({known[name].parent for name in found}):
+    for folder in sorted({known[name].parent for name in found} - {package}):
         for path in sorted(path for path in _files(folder) if path.suffix not in {".py", ".pyc"}):
             state.update(f"{path.relative_to(package)}\0{hashlib.sha256(path.read_bytes()).hexdigest()}".encode())
     return state.hexdigest()[:32]
