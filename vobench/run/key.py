@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -55,7 +55,14 @@ def versions(*libraries: str) -> dict[str, str]:
 @cache
 def library_versions(*names: str) -> dict[str, str]:
     """Versions of Python and of the installed distributions whose release can change a result's bytes."""
-    return {"python": platform.python_version(), **{name: version(name) for name in names}}
+    return {"python": platform.python_version(), **{name: _version(name) for name in names}}
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:  # whoever needs it says so, and how to install it
+        return "not installed"
 
 
 @cache
