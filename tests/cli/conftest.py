@@ -16,9 +16,8 @@ import pytest
 
 from vobench import cli, stop
 from vobench.cli import main
-from vobench.render import raster
+from vobench.render import bake, raster
 from vobench.render.bake import BakeSettings
-from vobench.run import simulate
 
 SUITE = """name: tiny
 scenes: [closet]
@@ -77,7 +76,8 @@ def lay_out(folder: Path, patch: pytest.MonkeyPatch) -> None:
 def make_cheap(patch: pytest.MonkeyPatch) -> None:
     """Pictures and light that cost nothing."""
     patch.setattr(raster, "RasterRenderer", FlatRenderer)
-    patch.setattr(simulate, "BAKE", BakeSettings(0.5, 1, 0.5, 1, 0))
+    whole = bake.bake
+    patch.setattr(bake, "bake", lambda scene, _, tell: whole(scene, BakeSettings(0.5, 1, 0.5, 1, 0), tell))
 
 
 def call(words: tuple[object, ...], patch: pytest.MonkeyPatch) -> int:

@@ -38,7 +38,7 @@ def test_run_takes_the_estimators_that_are_asked_for(vobench, here):
 def test_check_counts_what_run_would_do_and_does_none_of_it(vobench, here):
     planned = vobench("check", "tiny", "--json").json
     assert [(case["case"], case["simulated"]) for case in planned["cases"]] == [("short", False)]
-    assert planned["runs"] == 2
+    assert planned["trials"] == 2
     assert not (here / "runs").exists()
     assert not (here / "cache").exists()
     assert vobench("run", "tiny", "--dry-run", "--json").json == planned

@@ -29,7 +29,7 @@ import pytest
 from conftest import make_cheap
 from vobench import cli
 from vobench.run import simulate
-def sleep(case, folder, shop):
+def sleep(case, folder, **_):
     (folder / "begun").write_text("")
     print("asleep", file=sys.stderr, flush=True)
     time.sleep(600)
@@ -37,7 +37,7 @@ with pytest.MonkeyPatch.context() as patch:
     make_cheap(patch)
     if "asleep" in sys.argv:
         sys.argv.remove("asleep")
-        simulate._record = sleep
+        simulate.simulate = sleep
     if "patient" in sys.argv:
         sys.argv.remove("patient")
         cli.GRACE_S = 3600
@@ -76,10 +76,10 @@ def left_behind(folder):
 
 PLACES = {
     "run.motion": "body_motion",
-    "run.simulate": "bake",
+    "render.bake": "bake",
     "render.raster.RasterRenderer": "radiance",
     "estimator.process.EstimatorProcess": "process",
-    "run.run": "score_trial",
+    "run.score": "score_trial",
     "report.page": "html",
     "run.folder.RunFolder": "estimate",
     "cli.boards": "print_boards",

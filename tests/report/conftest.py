@@ -10,9 +10,12 @@ import pytest
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
-from vobench.report import TrialView, save_run
+from vobench.report import TrialView, save_trial
 from vobench.run import estimate as estimate_file
-from vobench.run.folder import GROUND_TRUTH, SCORE, RunFolder, TrialScore, write_json
+from vobench.run.folder import SCORE, RunFolder, TrialScore
+from vobench.run.frames import COLUMNS, FRAMES, TIME_COLUMNS, TIMES, new_table
+from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.store import write_json
 from vobench.sequence import EncodedFrame
 from vobench.trajectory.align import Alignment
 from vobench.trajectory.formats import format_tum
@@ -47,9 +50,10 @@ def make_run(path: Path, scores: list[TrialScore]) -> RunFolder:
         place.mkdir(parents=True)
         (folder.case(score.case) / GROUND_TRUTH).write_text(path_text)
         (place / estimate_file.ESTIMATE).write_text(path_text if score.score else "")
-        (place / estimate_file.FRAMES).write_text(
-            ",".join(estimate_file.FrameRow.columns()) + ("\n0,0,ok,,{},1.0,2.0" if score.score else "") + "\n"
-        )
+        with new_table(place / FRAMES, COLUMNS) as frames, new_table(place / TIMES, TIME_COLUMNS) as times:
+            frames.writerow({"frame": 0, "t_ns": 0, **({"status": "ok", "stats": "{}"} if score.score else {})})
+            if score.score:
+                times.writerow({"frame": 0, "wall_ms": 1.0, "cpu_ms": 2.0})
         write_json(place / SCORE, score.model_dump(mode="json"))
     return folder
 
@@ -104,8 +108,7 @@ def make_run_viewer() -> TrialView:
         frames=lambda: (EncodedFrame(i, int(t), "png", png, png) for i, t in enumerate(t_ns)),
         ground_truth=truth,
         estimate=estimate,
-        error_t_ns=estimate.t_ns,
-        error_m=np.full(len(kept), 0.1),
+        error_m=np.where(np.isin(np.arange(COUNT), kept), 0.1, np.nan),
         statuses=["lost" if i in LOST else "ok" for i in range(COUNT)],
         tracks=tracks,
         summary_md="# score",
@@ -120,5 +123,5 @@ def run_viewer() -> TrialView:
 @pytest.fixture(scope="session")
 def rrd(run_viewer: TrialView, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("viewer") / "run.rrd"
-    save_run(path, run_viewer)
+    save_trial(path, run_viewer)
     return path

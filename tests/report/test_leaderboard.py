@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from vobench.report import leaderboard, page
 from vobench.report.leaderboard import HEADINGS, EstimatorStatistics, answers, board, boards
-from vobench.run.estimate import FRAMES, FrameRow
 from vobench.run.folder import STATUSES, SURVIVED, TrialScore
+from vobench.run.frames import COLUMNS, FRAMES, TIMES, FrameRow, new_table
 
 CASES = ("a", "b")
 ates = st.none() | st.floats(0, 1e6)
@@ -152,7 +152,10 @@ def test_a_still_case_shows_the_largest_drift_of_its_runs_and_no_error(scored):
 
 
 def frames(*reasons):
-    return [FrameRow(10 + k, k, "lost", reason, "{}", 1.0, 2.0) for k, reason in enumerate(reasons)]
+    return [
+        FrameRow(10 + k, k, "lost", reason, None, None, None, None, None, None, "{}", 1.0, 2.0)
+        for k, reason in enumerate(reasons)
+    ]
 
 
 def test_the_commonest_reason_of_frames_is_counted_whatever_its_numbers(scored):
@@ -165,7 +168,7 @@ def test_the_commonest_reason_of_frames_is_counted_whatever_its_numbers(scored):
 
 def test_frames_without_a_reason_have_none_and_no_frame_no_answer():
     assert answers([frames("", ""), []]) == EstimatorStatistics(2.0)
-    assert answers([[], []]) is None
+    assert answers([[], []]) == EstimatorStatistics()
 
 
 @pytest.fixture
@@ -214,6 +217,16 @@ def test_the_reports_of_a_run_are_written_beside_it(run, mixed):
     assert json.loads((run.path / "leaderboard.json").read_text(encoding="utf-8"))
 
 
+def test_no_time_stands_in_a_report_but_in_a_file_of_its_own(run, mixed):
+    page.write_reports(run, mixed)
+    said = {path.suffix: path.read_text(encoding="utf-8") for path in run.path.glob("leaderboard.*")}
+    assert not any("CPU" in text for text in said.values())
+    assert {row["ms_per_frame"] for b in json.loads(said[".json"])["boards"] for row in b["rows"]} == {None}
+    costs = pd.read_csv(run.path / TIMES).set_index(["case", "estimator"])
+    assert costs.loc["down", "mad"].to_list() == [1.0, 2.0]
+    assert costs.loc["down", "dead"].isna().all()
+
+
 def test_cost_is_the_mean_over_frames_and_none_where_no_frame_was_answered(made):
     assert {row.estimator: row.ms_per_frame for row in made[0].rows} == {"good_one": 2.0, "mad": 2.0, "dead": None}
 
@@ -222,8 +235,8 @@ def test_cost_is_the_mean_over_frames_and_none_where_no_frame_was_answered(made)
 def test_every_form_shows_drift_and_the_commonest_reason_of_frames(tmp_path, scored, write_run, form):
     scores = [scored("still_one", drift_m=0.00234, ate_m=5.0), scored("moving_one", case="ahead")]
     folder = write_run(tmp_path / "suite" / "stamp", scores)
-    path = folder.estimate("down", "still_one", 0) / FRAMES
-    path.write_text(path.read_text() + "1,1,lost,few <7>,{},1.0,2.0\n2,2,lost,few <5>,{},1.0,2.0\n")
+    with new_table(folder.estimate("down", "still_one", 0) / FRAMES, COLUMNS) as table:
+        table.writerows({"frame": k, "t_ns": k, "status": "lost", "reason": f"few <{9 - 2 * k}>"} for k in (1, 2))
     page.write_reports(folder, scores)
     text = (folder.path / f"leaderboard.{form}").read_text(encoding="utf-8")
     if form in ("md", "html"):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from vobench.report import TruthView, save_run
+from vobench.report import TruthView, save_trial
 from vobench.report.rerun import application_id, first_failure, rerun_matrix
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames
 from vobench.sequence import StereoTruth
@@ -92,25 +92,25 @@ def test_status_has_a_row_where_it_changes(rrd):
 
 def test_stamps_off_by_rounding_still_find_their_frame(run_viewer, tmp_path):
     shifted = Trajectory(run_viewer.estimate.t_ns + 333, run_viewer.estimate.T_world_frame)
-    save_run(tmp_path / "run.rrd", replace(run_viewer, estimate=shifted))
+    save_trial(tmp_path / "run.rrd", replace(run_viewer, estimate=shifted))
     assert 7 in values(tmp_path / "run.rrd", "/world/estimate/left", "Transform3D:translation")
 
 
 @pytest.mark.parametrize("kept", [0, 1])
-def test_run_that_failed_at_once_can_still_be_looked_at(run_viewer, tmp_path, kept):
+def test_trial_that_failed_at_once_can_still_be_looked_at(run_viewer, tmp_path, kept):
     path = tmp_path / "run.rrd"
     estimate = Trajectory(run_viewer.estimate.t_ns[:kept], run_viewer.estimate.T_world_frame[:kept])
-    failed = replace(
-        run_viewer, estimate=estimate, error_t_ns=estimate.t_ns, error_m=np.zeros(kept), statuses=["init"], tracks={}
-    )
-    save_run(path, failed)
+    error_m, statuses = np.full(12, np.nan), ["init", *["no output"] * 11]
+    error_m[:kept] = 0.0
+    failed = replace(run_viewer, estimate=estimate, error_m=error_m, statuses=statuses, tracks={})
+    save_trial(path, failed)
     assert values(path, "/status", "StateChange:state") == {0: ["init"], 1: ["no output"]}
     assert len(values(path, f"{LEFT}/image", "EncodedImage:blob")) == 12
     assert list(tmp_path.iterdir()) == [path]
 
 
 def test_saving_twice_holds_the_same(run_viewer, rrd, tmp_path):
-    save_run(tmp_path / "again.rrd", run_viewer)
+    save_trial(tmp_path / "again.rrd", run_viewer)
     for entity in (f"{LEFT}/tracks", LEFT, "/error_mm"):
         again, before = rows(tmp_path / "again.rrd", entity), rows(rrd, entity)
         for row in (*again, *before):
@@ -160,7 +160,7 @@ def view() -> TruthView:
 @pytest.fixture(scope="module")
 def path(run_viewer, view, tmp_path_factory):
     path = tmp_path_factory.mktemp("truth") / "run.rrd"
-    save_run(path, replace(run_viewer, truth=view))
+    save_trial(path, replace(run_viewer, truth=view))
     return path
 
 

@@ -8,8 +8,9 @@ import pytest
 
 from vobench.report import page
 from vobench.run.folder import RunFolder
+from vobench.run.import_recording import read_all
 from vobench.run.run import run_suite
-from vobench.run.store import Context, SilentProgress, Store
+from vobench.run.store import SilentProgress
 from vobench.suite.suite import Plan, read_plan
 
 CLOSET = """
@@ -51,14 +52,14 @@ class Bench:
     def plan(self, *changes: tuple[str, str]) -> Plan:
         return read_plan(str(self.suite(*changes)))
 
-    def shop(self, cache: str) -> Context:
-        return Context(Store(self.folder / cache), SilentProgress())
-
     def run(self, *changes: tuple[str, str], cache: str = "cache") -> RunFolder:
         """Run the suite as the command line does."""
-        return run_suite(
-            self.plan(*changes), root=self.folder / "runs", shop=self.shop(cache), finish=page.write_reports
-        )
+        return self.run_plan(self.plan(*changes), root=self.folder / "runs", cache=cache)
+
+    def run_plan(self, plan: Plan, *, root: Path, cache: str) -> RunFolder:
+        """Run a plan, in silence."""
+        recordings, store, progress = read_all(plan), self.folder / cache, SilentProgress()
+        return run_suite(plan, recordings, root=root, store=store, progress=progress, finish=page.write_reports)
 
 
 @pytest.fixture(scope="session")

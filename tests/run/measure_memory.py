@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 
 from vobench.render import raster
-from vobench.run.estimate import estimate
-from vobench.run.simulate import simulate
-from vobench.run.store import Context, SilentProgress, Store
+from vobench.run.task import estimate_task, perform, sequence_tasks
 from vobench.sequence import Sequence
 from vobench.suite.suite import read_plan
 
@@ -42,14 +40,15 @@ def peak_mb() -> float:
 
 
 raster.RasterRenderer = Plain
-shop = Context(Store(Path(sys.argv[1])), SilentProgress())
+store = Path(sys.argv[1])
 for suite in sys.argv[2:]:
     plan = read_plan(suite)
     case = plan.simulated[0]
     forget_peak()
-    sequence = simulate(case, shop)
+    for task in sequence_tasks(case, {}):
+        sequence = perform(task, store)
     simulating = peak_mb()
     forget_peak()
-    for run in plan.runs(case):
-        estimate(run, sequence, shop)
+    for trial in plan.trials(case):
+        perform(estimate_task(trial, task.key), store)
     print(len(Sequence.open(sequence)), simulating, peak_mb())

@@ -1,6 +1,5 @@
 """An estimator gets what it needs of a recording, in time and no sooner; one that cannot be served is refused."""
 
-import csv
 import io
 import json
 import zipfile
@@ -14,8 +13,10 @@ from vobench.errors import TrajectoryError
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import ImuCalibration, Rig, stereo_rig
 from vobench.run import estimate as estimate_file
-from vobench.run.estimate import FrameRow, estimate, read_tum
-from vobench.run.store import Context, SilentProgress, Store
+from vobench.run.estimate import estimate
+from vobench.run.folder import read_tum
+from vobench.run.frames import ANSWERS, read_table
+from vobench.run.store import SilentProgress
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import SequenceWriter
 from vobench.suite.manifest import read_manifest
@@ -68,12 +69,14 @@ def recorded(folder: Path, rig: Rig, *, frames: int = 3) -> Path:
 
 
 def estimated(tmp_path: Path, sequence: Path, plugin: Path) -> Path:
-    entrant = Entrant("mine", plugin, read_manifest(plugin), {})
-    return estimate(Trial(Named(), entrant, 0), sequence, Context(Store(tmp_path / "store"), SilentProgress()))
+    entrant, folder = Entrant("mine", plugin, read_manifest(plugin), {}), tmp_path / "estimate"
+    folder.mkdir()
+    estimate(Trial(Named(), entrant, 0), sequence, folder, SilentProgress())
+    return folder
 
 
 def seen(folder: Path) -> list[dict[str, float]]:
-    return [json.loads(row.stats) for row in estimate_file.read_frames(folder)]
+    return [json.loads(row["stats"]) for row in read_table(folder / ANSWERS)]
 
 
 def test_the_imu_comes_in_pieces_up_to_each_frames_stamp_and_not_twice(tmp_path, plugin):
@@ -121,23 +124,13 @@ def test_what_the_recording_cannot_serve_is_refused_before_it_starts(tmp_path, p
     assert seen(folder) == []
 
 
-def test_rows_survive_commas_quotes_and_other_alphabets(tmp_path):
-    rows = [
-        FrameRow(0, 0, "init", "", "{}", 1.25, 0.5),
-        FrameRow(1, 33_333_333, "lost", 'zu dunkel, "é"', '{"a": 1}', 2.0, 0.125),
-    ]
-    with (tmp_path / estimate_file.FRAMES).open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows([FrameRow.columns(), *(row.as_text() for row in rows)])
-    assert estimate_file.read_frames(tmp_path) == rows
-
-
 def test_tracks_come_back_in_the_order_of_frames(tmp_path):
     tables = {index: np.full((index, 5), index, np.float32) for index in (2, 10, 100)}
     with zipfile.ZipFile(tmp_path / estimate_file.TRACKS, "w") as archive:
         for index, table in tables.items():
             buffer = io.BytesIO()
             np.save(buffer, table)
-            archive.writestr(estimate_file.tracks_member(index), buffer.getvalue())
+            archive.writestr(f"{index:08d}.npy", buffer.getvalue())
     read = list(estimate_file.read_tracks(tmp_path))
     assert [index for index, _ in read] == [2, 10, 100]
     assert all(np.array_equal(table, tables[index]) for index, table in read)

@@ -21,8 +21,8 @@ from vobench.run.folder import (
     read_hashes,
     read_score,
     write_hashes,
-    write_json,
 )
+from vobench.run.store import write_json
 
 
 @pytest.fixture

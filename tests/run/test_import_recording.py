@@ -14,9 +14,10 @@ from vobench.geometry import se3
 from vobench.report import page
 from vobench.run.estimate import ESTIMATE
 from vobench.run.folder import CASE, HASHES, SCORE, SEQUENCE
-from vobench.run.import_recording import import_case, read_all
-from vobench.run.run import run_suite
-from vobench.run.score import LONGEST_GAP_NS, left_truth, score_estimate, stands_still
+from vobench.run.ground_truth import LONGEST_GAP_NS, left_truth
+from vobench.run.import_recording import read_all
+from vobench.run.score import score_estimate, stands_still
+from vobench.run.task import is_done, perform, sequence_tasks
 from vobench.run.verify import verify_run
 from vobench.sequence import Sequence, SequenceWriter, read_truth
 from vobench.suite.suite import read_plan
@@ -39,7 +40,7 @@ def recorded(bench, layouts):
     suite = layouts / "real.yaml"
     suite.write_text("name: real\nsource: [euroc, kitti, {path: ros2, name: bag}]\nestimators: [stand_still]\n")
     plan = read_plan(str(suite))
-    return run_suite(plan, root=layouts / "runs", shop=bench.shop("real"), finish=page.write_reports)
+    return bench.run_plan(plan, root=layouts / "runs", cache="real")
 
 
 def test_layouts_of_one_sequence_score_as_it_does(first, recorded):
@@ -58,13 +59,16 @@ def test_a_case_keeps_what_its_import_assumed(recorded):
 def test_an_import_is_made_once_and_again_when_a_file_changes(bench, layouts, tmp_path):
     suite = tmp_path / "one.yaml"
     suite.write_text(f"name: one\nsource: {layouts / 'euroc'}\nestimators: [stand_still]\n")
-    (case,) = read_plan(str(suite)).recorded
-    shop = bench.shop("once")
-    before = import_case(case, shop)
-    assert import_case(case, shop) == before
+    plan, store = read_plan(str(suite)), bench.folder / "once"
+    (task,) = sequence_tasks(plan.recorded[0], read_all(plan))
+    before = perform(task, store)
+    assert perform(task, store) == before
     calibration = layouts / "euroc" / "mav0" / "cam0" / "sensor.yaml"
     calibration.write_text(calibration.read_text() + "# looked at\n")
-    assert import_case(case, shop) != before
+    (changed,) = sequence_tasks(plan.recorded[0], read_all(plan))
+    assert is_done(task, store)
+    assert not is_done(changed, store)
+    assert perform(changed, store) != before
 
 
 def test_a_recording_without_truth_is_said_before_anything_is_run(layouts, tmp_path):
@@ -107,7 +111,7 @@ def test_a_recording_that_stands_still_has_a_drift_and_no_error_among_others(ben
     suite.write_text(
         f"name: rest\nsource: [rest, {layouts / 'kitti'}]\nestimators: [lk_epipolar, stand_still, constant_velocity]\n"
     )
-    run = run_suite(read_plan(str(suite)), root=tmp_path / "runs", shop=bench.shop("rest"), finish=page.write_reports)
+    run = bench.run_plan(read_plan(str(suite)), root=tmp_path / "runs", cache="rest")
     scores = {(s.case, s.estimator): s for s in run.scores()}
     assert scores["rest", "stand_still"].drift_m == 0.0
     drift_m = scores["rest", "lk_epipolar"].drift_m

@@ -76,6 +76,7 @@ OTHER = {
     "integrator": "euler",
     "substeps": 3,
 }
+RATE_HZ = 6  # few pictures, for a body goes its way whatever is taken of it
 # What the encoders count, when a drive or a replay gives up, and whose poses a file's are (tests/suite).
 NOT_OF_THE_MOTION = {"kind", "encoders", "max_time_s", "max_gap_s", "file", "times", "recorded_hz", "axes"}
 # Nothing turns on a straight way, and nothing drives on in a turn on the spot.
@@ -97,7 +98,7 @@ def goes(tmp_path_factory):
     (case,) = read_plan(str(folder / "it.yaml")).simulated
 
     def travel(kind, **keys):
-        spec = KIND.validate_python({"kind": kind, **BASE[kind], **keys})
+        spec = KIND.validate_python({"kind": kind, "rate_hz": RATE_HZ, **BASE[kind], **keys})
         gone = body_motion(replace(case, trajectory=spec))
         return gone.at_frames().T_world_body, gone.rims.rim_rad if gone.rims else None
 

@@ -11,15 +11,22 @@ import numpy as np
 import pytest
 
 from vobench.render import raster
-from vobench.run import estimate, simulate
+from vobench.run import estimate
 from vobench.run import estimate as estimate_file
-from vobench.run.folder import GROUND_TRUTH, SCORE, SEQUENCE
+from vobench.run.folder import SCORE, SEQUENCE, TIMES_HASHES
+from vobench.run.frames import TIMES
+from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.task import sequence_tasks
 from vobench.sequence import Sequence, payload_hash, read_truth
 
 
 def contents(run, *names):
     """Bytes of all files of these names in a run, by their place in it."""
     return {str(p.relative_to(run.path)): p.read_bytes() for name in names for p in sorted(run.path.rglob(name))}
+
+
+def sequence_key(case):
+    return sequence_tasks(case, {})[-1].key
 
 
 def never(*_, **__):
@@ -32,6 +39,8 @@ def test_a_run_holds_all_that_its_folder_promises(first):
         "estimators.json",
         "environment.json",
         "hashes.json",
+        "times.csv",
+        "times_hashes.json",
         "cases",
         *(f"leaderboard.{suffix}" for suffix in ("md", "json", "csv", "html")),
     }
@@ -50,14 +59,22 @@ def test_the_second_run_renders_nothing_estimates_nothing_and_says_the_same(benc
     assert len(boards) == 4 + 4
 
 
-def test_two_fresh_caches_give_equal_pictures_and_equal_scores(bench, first):
+def test_two_fresh_caches_give_equal_pictures_and_all_files_but_those_of_times_equal(bench, first):
     other = bench.run(cache="fresh")
     for case in ("full", "dim"):
         sequences = [(run.case(case) / SEQUENCE).resolve() for run in (first, other)]
         assert sequences[0] != sequences[1]
         assert payload_hash(sequences[0]) == payload_hash(sequences[1])
-    names = (SCORE, estimate_file.ESTIMATE, GROUND_TRUTH)
-    assert contents(first, *names) == contents(other, *names)
+    differing = {TIMES, TIMES_HASHES}
+    files = [
+        {str(p.relative_to(run.path)): p.read_bytes() for p in run.path.rglob("*") if p.is_file()}
+        for run in (first, other)
+    ]
+    assert files[0].keys() == files[1].keys()
+    assert {name for name in files[0] if files[0][name] != files[1][name]} == {
+        name for name in files[0] if Path(name).name in differing
+    }
+    assert len(files[0]) > len(differing)
 
 
 def test_another_lighting_changes_the_pictures_and_nothing_else(first):
@@ -71,7 +88,7 @@ def test_another_lighting_changes_the_pictures_and_nothing_else(first):
 
 def test_the_name_of_a_variant_is_no_part_of_what_is_cached(bench):
     plans = [bench.plan(), bench.plan(("full:", "bright:"), ("name: tiny", "name: other"))]
-    keys = [simulate.sequence_inputs(plan.cases[0]) for plan in plans]
+    keys = [sequence_key(plan.cases[0]) for plan in plans]
     assert keys[0] == keys[1]
 
 
@@ -81,7 +98,7 @@ def test_a_replayed_file_counts_by_what_it_holds_and_not_by_where_it_lies(bench)
         (bench.folder / name).write_text("".join(lines))
     old = "{targets_m: [[0.3, 0]], tolerance_m: 0.03, rate_hz: 5}"
     here, moved, other = (
-        simulate.sequence_inputs(bench.plan((old, f"{{kind: replay, file: {name}, rate_hz: 5}}")).cases[0])
+        sequence_key(bench.plan((old, f"{{kind: replay, file: {name}, rate_hz: 5}}")).cases[0])
         for name in ("a.tum", "b.tum", "c.tum")
     )
     assert here == moved
@@ -106,7 +123,7 @@ def test_a_replayed_file_counts_by_what_it_holds_and_not_by_where_it_lies(bench)
     ],
 )
 def test_whatever_a_suite_changes_makes_another_sequence(bench, old, new):
-    before, after = (simulate.sequence_inputs(plan.cases[-1]) for plan in (bench.plan(), bench.plan((old, new))))
+    before, after = (sequence_key(plan.cases[-1]) for plan in (bench.plan(), bench.plan((old, new))))
     assert before != after
 
 
@@ -118,7 +135,7 @@ def test_every_key_of_an_imu_makes_another_sequence(bench, change):
     imu = "like: bmi055, rate_hz: 100"
     changed = change if change.startswith("like") else f"like: bmi055, {change}"
     before, after = (
-        simulate.sequence_inputs(bench.plan(("pitch_deg: 90", f"pitch_deg: 90, imu: {{{text}}}")).cases[0])
+        sequence_key(bench.plan(("pitch_deg: 90", f"pitch_deg: 90, imu: {{{text}}}")).cases[0])
         for text in (imu, changed)
     )
     assert before != after
@@ -136,7 +153,7 @@ def test_every_key_of_an_imu_makes_another_sequence(bench, change):
 )
 def test_what_a_case_does_not_depend_on_is_no_part_of_what_is_cached(bench, old, new):
     before, after = (
-        {case.lighting["lamp"].power_lm: simulate.sequence_inputs(case) for case in plan.cases if _is_first(case)}
+        {case.lighting["lamp"].power_lm: sequence_key(case) for case in plan.cases if _is_first(case)}
         for plan in (
             bench.plan(("full: {}", "full: {lamp: {power_lm: 300}}")),
             bench.plan(("full: {}", "full: {lamp: {power_lm: 300}}"), (old, new)),
@@ -157,9 +174,11 @@ def test_a_killed_run_goes_on_and_ends_byte_identical_with_nothing_left_behind(b
     script = f"import sys; from vobench.cli import main; sys.argv = {words!r}; main()"
     environment = os.environ | {"VOBENCH_CACHE": str(cache)}
     process = subprocess.Popen([sys.executable, "-c", script], env=environment, start_new_session=True)
-    await_file(cache, "sequences/.unfinished-*/*")
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+    try:
+        await_file(cache, "sequences/.unfinished-*/*")
+    finally:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
     assert list(cache.glob("sequences/.unfinished-*"))
 
     resumed = bench.run(cache="killed")
@@ -175,7 +194,7 @@ def contents_of(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def await_file(folder: Path, pattern: str, patience_s: float = 30.0) -> None:
+def await_file(folder: Path, pattern: str, patience_s: float = 120.0) -> None:
     until = time.monotonic() + patience_s
     while not list(folder.glob(pattern)):
         assert time.monotonic() < until, f"nothing like {pattern} in {patience_s} s"

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vobench.run.store import PREFIX, Store, canonical, default_store, digest, folder_digest
+from vobench.run.key import canonical, digest, folder_digest
+from vobench.run.store import PREFIX, Store, default_store
 
 Json = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),

@@ -85,7 +85,7 @@ def test_recordings_stand_beside_simulated_cases(suite):
         "scenes: [room]\nrigs: {down: {pitch_deg: 90}}\ntrajectories: {short: {targets_m: [[0.5, 0]]}}\n",
     )
     assert [case.name for case in plan.cases] == ["short", "v1"]
-    assert [run.case.name for case in plan.cases for run in plan.runs(case)] == ["short", "v1"]
+    assert [run.case.name for case in plan.cases for run in plan.trials(case)] == ["short", "v1"]
 
 
 def test_a_recording_may_not_take_a_simulated_cases_name(suite):

@@ -68,7 +68,7 @@ def test_parameters_reach_an_estimator_as_plain_python(bent):
 
 def test_every_estimator_runs_repeats_times_on_every_case(bent):
     planned = bent(("seed: 1", "seed: 1\nrepeats: 3"))
-    runs = [run for case in planned.cases for run in planned.runs(case)]
+    runs = [run for case in planned.cases for run in planned.trials(case)]
     assert len(runs) == len({(run.case.name, run.entrant.label, run.repeat) for run in runs}) == 2 * 2 * 3
 
 

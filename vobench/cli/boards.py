@@ -5,7 +5,7 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from vobench.cli import terminal
-from vobench.report.leaderboard import HEADINGS, LEGEND, Board, cells, notes
+from vobench.report.leaderboard import LEGEND, Board, lines_of, notes
 
 # A narrow terminal goes without these, in this order; every report has them all.
 LEAST_FIRST = ("RPE °/frame", "RPE mm/frame", "CPU ms/frame", "segments %", "survived", "coverage", "#")
@@ -25,11 +25,11 @@ def print_boards(boards: list[Board]) -> None:
 
 def _fitting(board: Board, out: Console) -> Table:
     """A board without the columns that matter least, where the terminal is too narrow for all of them."""
-    endless = out.options.update(max_width=ENDLESS)
+    endless, lines = out.options.update(max_width=ENDLESS), lines_of(board)
     for left_out in range(len(LEAST_FIRST) + 1):
-        kept = [i for i, heading in enumerate(HEADINGS) if heading not in LEAST_FIRST[:left_out]]
-        rows = [[cells(row)[i] for i in kept] for row in board.rows]
-        made = terminal.table(board.title, [HEADINGS[i] for i in kept], rows)
+        kept = [i for i, heading in enumerate(lines[0]) if heading not in LEAST_FIRST[:left_out]]
+        headings, *rows = [[cells[i] for i in kept] for cells in lines]
+        made = terminal.table(board.title, headings, rows)
         if Measurement.get(out, endless, made).maximum <= out.width:
             break
     return made

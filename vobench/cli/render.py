@@ -19,7 +19,8 @@ from vobench.render.occlusion import Shot
 from vobench.render.renderer import Radiance, still
 from vobench.render.truth import TruthCaster
 from vobench.run.simulate import open_renderer
-from vobench.run.store import Context, default_store
+from vobench.run.store import default_store
+from vobench.run.task import bake_task, perform
 from vobench.scene.light import NS_PER_S
 from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import CAMERAS, CameraSettings, NoiseStreams, expose, fixed_pattern
@@ -104,8 +105,9 @@ def show(
     spec = read_scene(catalog.find("scene", scene_name).path)
     if not spec.room.holds(viewpoint.at_m):
         raise InputError(f"--at should be inside the room ({spec.room.extent}), got {viewpoint.at_m}")
-    scene, context = build(spec, {}), Context(default_store(), terminal.Bars())
-    with closing(open_renderer(spec, scene, rendering, context)) as renderer:
+    scene, is_traced = build(spec, {}), rendering.engine == "path"
+    light = None if is_traced else perform(bake_task(spec), default_store().root, progress=terminal.Bars())
+    with closing(open_renderer(scene, rendering, light)) as renderer:
         luminance_cd_m2 = renderer.radiance(lens, still(lens, viewpoint.T_world_camera, t_ns=viewpoint.t_ns))
     write_png(out, _exposed(luminance_cd_m2 / np.float32(spec.white_cd_m2), chip))
     written = [out, *(_write_truth(out, scene, lens, viewpoint) if truth else [])]

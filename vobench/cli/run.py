@@ -11,8 +11,8 @@ import typer
 from vobench.cli import terminal
 from vobench.errors import InputError
 from vobench.run.motion import BodyMotion, body_motions
-from vobench.run.simulate import is_simulated
 from vobench.run.store import default_store
+from vobench.run.task import is_done, sequence_tasks
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite import Case, Plan, read_plan
 
@@ -26,14 +26,14 @@ def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) ->
     from vobench.report import page
     from vobench.report.leaderboard import as_json as boards_as_json
     from vobench.run.run import run_suite
-    from vobench.run.store import Context
 
     planned = read_plan(suite, only_estimators=estimators)
-    _preflight(planned)
+    _, recordings = _preflight(planned)
+    store = default_store().root
     _require_writable("--out", out)
-    _require_writable("VOBENCH_CACHE", default_store().root)
-    shop = Context(default_store(), terminal.Bars())
-    folder = run_suite(planned, root=out, shop=shop, finish=page.write_reports)
+    _require_writable("VOBENCH_CACHE", store)
+    finish, progress = page.write_reports, terminal.Bars()
+    folder = run_suite(planned, recordings, root=out, store=store, progress=progress, finish=finish)
     boards = page.boards_of(folder, folder.scores())
     if as_json:
         print(boards_as_json(boards), end="")
@@ -78,9 +78,9 @@ def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
         for e in planned.entrants
     ]
     found = [{"kind": e.kind, "name": e.name, "origin": e.origin, "path": str(e.path)} for e in planned.found]
-    runs = sum(len(planned.runs(case)) for case in planned.cases)
+    trials = sum(len(planned.trials(case)) for case in planned.cases)
     if as_json:
-        said = {"suite": planned.suite.name, "cases": cases, "estimators": entrants, "runs": runs, "found": found}
+        said = {"suite": planned.suite.name, "cases": cases, "estimators": entrants, "trials": trials, "found": found}
         terminal.print_json(said)
         return
     rows = [[f["case"], str(f["frames"]), f"{f['duration_s']:.1f}", f["sequence"]] for f in cases]
@@ -92,7 +92,7 @@ def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     for case in cases:
         for note in case.get("notes", []):
             out.print(f"{case['case']}: {note}")
-    out.print(f"{len(cases)} cases, {len(entrants)} estimators, {runs} runs: the suite is valid")
+    out.print(f"{len(cases)} cases, {len(entrants)} estimators, {trials} trials: the suite is valid")
 
 
 def _read_recordings(planned: Plan) -> "dict[str, Recording]":
@@ -106,7 +106,7 @@ def _read_recordings(planned: Plan) -> "dict[str, Recording]":
 
 def _case_facts(case: Case, travels: Mapping[str, BodyMotion]) -> dict[str, Any]:
     """What is known of a case before it is made."""
-    t_ns, is_there = travels[case.variant["trajectory"]].t_ns, is_simulated(case, default_store())
+    t_ns, is_there = travels[case.variant["trajectory"]].t_ns, _is_made(case, {})
     return {
         "case": case.name,
         "frames": len(t_ns),
@@ -118,9 +118,7 @@ def _case_facts(case: Case, travels: Mapping[str, BodyMotion]) -> dict[str, Any]
 
 def _recorded_facts(case: RecordedCase, recording: "Recording") -> dict[str, Any]:
     """The same of a recording; its pictures are not read yet."""
-    from vobench.run.import_recording import is_imported
-
-    is_there = is_imported(case, recording, default_store())
+    is_there = _is_made(case, {case.name: recording})
     return {
         "case": case.name,
         "frames": recording.frame_count,
@@ -129,6 +127,11 @@ def _recorded_facts(case: RecordedCase, recording: "Recording") -> dict[str, Any
         "sequence": "in the cache" if is_there else f"to import from {case.source.path}",
         "notes": list(recording.notes),
     }
+
+
+def _is_made(case: Case | RecordedCase, recordings: "Mapping[str, Recording]") -> bool:
+    """Whether the store holds the case's sequence."""
+    return is_done(sequence_tasks(case, recordings)[-1], default_store().root)
 
 
 def run_command(

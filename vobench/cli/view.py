@@ -8,7 +8,7 @@ import typer
 
 from vobench.cli import terminal
 from vobench.errors import InputError, MissingDependencyError
-from vobench.report import save_run
+from vobench.report import save_trial
 from vobench.report.rerun import pick, trial_view
 from vobench.run.folder import open_run
 
@@ -21,7 +21,7 @@ def show_view(run: Path, *, case: str | None, estimator: str | None, save: Path 
     if path.is_dir() or not os.access(path.parent, os.W_OK):
         wrong = "is a folder" if path.is_dir() else "is in a folder that cannot be written"
         raise InputError(f"--save should be a file to write, but this {wrong}: {path}")
-    save_run(path, trial_view(folder, chosen))
+    save_trial(path, trial_view(folder, chosen))
     if as_json:
         terminal.print_json(
             {"case": chosen.case, "estimator": chosen.estimator, "repeat": chosen.repeat, "path": str(path)}

@@ -1,5 +1,5 @@
 """Leaderboards, pages, plots, and the Rerun recording of a trial."""
 
-from vobench.report.rerun import TrialView, TruthView, save_run
+from vobench.report.rerun import TrialView, TruthView, save_trial
 
-__all__ = ["TrialView", "TruthView", "save_run"]
+__all__ = ["TrialView", "TruthView", "save_trial"]

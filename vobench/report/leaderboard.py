@@ -9,18 +9,21 @@ from itertools import groupby
 from statistics import fmean
 from typing import TYPE_CHECKING
 
-from vobench.run.estimate import FrameRow
 from vobench.run.folder import STATUSES, SURVIVED, TrialScore
+from vobench.run.frames import FrameRow
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of a board; errors are means over the runs that survived, None where none did.
+    """One line of a board, over one or more trials (`runs` of them): errors are means over those that survived.
 
-    `coverage` and `ms_per_frame`, which is CPU time, are means over all runs; `status` is the worst of them.
-    A case that stands still has no errors but `drift_mm`, the largest of its runs; `frame_reason` is the
+    `coverage` and `ms_per_frame`, which is CPU time, are means over all trials; `status` is the worst of them.
+    A case that stands still has no errors but `drift_mm`, the largest of its trials; `frame_reason` is the
     commonest that an estimator gave for single frames of a case, as it first stood, at `frame_reason_first`.
     """
 
@@ -55,7 +58,7 @@ class Board:
 class EstimatorStatistics:
     """What an estimator answered on a case: mean CPU time of a frame, and its commonest reason for single frames."""
 
-    ms_per_frame: float
+    ms_per_frame: float | None = None
     reason: str = ""
     count: int = 0
     first: int | None = None
@@ -64,15 +67,14 @@ class EstimatorStatistics:
 Answered = Mapping[tuple[str, str], EstimatorStatistics]
 
 
-def answers(runs: Iterable[list[FrameRow]]) -> EstimatorStatistics | None:
-    """What the frames of all runs of one estimator on one case come to; None where it answered none.
+def answers(trials: Iterable[list[FrameRow]]) -> EstimatorStatistics:
+    """What the frames of all trials of one estimator on one case come to.
 
     Reasons that differ in numbers alone, as `too few tracks (7)` and `(5)`, are one.
     """
-    rows = [row for run in runs for row in run]
-    if not rows:
-        return None
-    cost_ms, given = fmean(row.cpu_ms for row in rows), [row for row in rows if row.reason]
+    rows = [row for trial in trials for row in trial]
+    costs_ms, given = [row.cpu_ms for row in rows if row.cpu_ms is not None], [row for row in rows if row.reason]
+    cost_ms = fmean(costs_ms) if costs_ms else None
     if not given:
         return EstimatorStatistics(cost_ms)
     kinds = Counter(NUMBER.sub("0", row.reason) for row in given)
@@ -90,43 +92,44 @@ def boards(scores: Iterable[TrialScore], answered: Answered) -> list[Board]:
 
 
 def board(title: str, scores: list[TrialScore], answered: Answered) -> Board:
-    """One ranked table of these runs, one row for each estimator."""
+    """One ranked table of these trials, one row for each estimator."""
 
     def name(score: TrialScore) -> str:
         return score.estimator
 
     grouped = [list(group) for _, group in groupby(sorted(scores, key=name), key=name)]
-    ranked = sorted((_row(runs, answered) for runs in grouped), key=_place)
+    ranked = sorted((_row(trials, answered) for trials in grouped), key=_place)
     rows = [replace(row, rank=1 + sum(_place(other)[:3] < _place(row)[:3] for other in ranked)) for row in ranked]
     return Board(title, tuple(rows))
 
 
 def _place(row: Row) -> tuple[int, int, float, str]:
-    """What a row is sorted by: failures, partial runs, error, and the name so that ties are stable."""
+    """What a row is sorted by: failures, partial trials, error, and the name so that ties are stable."""
     return row.runs - row.survived, row.partial, float("inf") if row.ate_mm is None else row.ate_mm, row.estimator
 
 
-def _row(runs: list[TrialScore], answered: Answered) -> Row:
-    survivors = [run for run in runs if run.status in SURVIVED]
-    moving = [run for run in survivors if run.drift_m is None]
-    worst = max(runs, key=lambda run: STATUSES.index(run.status))
-    found = [answered[run.case, run.estimator] for run in runs if (run.case, run.estimator) in answered]
-    is_one_case = len({run.case for run in runs}) == 1
-    drifts = [1e3 * run.drift_m for run in runs if run.drift_m is not None and is_one_case]
-    said = found[0] if found and is_one_case else EstimatorStatistics(0.0)
+def _row(trials: list[TrialScore], answered: Answered) -> Row:
+    survivors = [trial for trial in trials if trial.status in SURVIVED]
+    moving = [trial for trial in survivors if trial.drift_m is None]
+    worst = max(trials, key=lambda trial: STATUSES.index(trial.status))
+    found = [answered.get((trial.case, trial.estimator), EstimatorStatistics()) for trial in trials]
+    costs_ms = [each.ms_per_frame for each in found if each.ms_per_frame is not None]
+    is_one_case = len({trial.case for trial in trials}) == 1
+    drifts = [1e3 * trial.drift_m for trial in trials if trial.drift_m is not None and is_one_case]
+    said = found[0] if is_one_case else EstimatorStatistics()
     return Row(
         rank=0,
-        estimator=runs[0].estimator,
+        estimator=trials[0].estimator,
         status=worst.status,
         survived=len(survivors),
-        partial=sum(run.status == "partial" for run in runs),
-        runs=len(runs),
+        partial=sum(trial.status == "partial" for trial in trials),
+        runs=len(trials),
         ate_mm=_mean(moving, "ate_trans", "rmse", 1e3),
         segment_percent=_mean(moving, "kitti_t_rel", "mean", 100),
         rpe_mm=_mean(moving, "rpe_trans", "rmse", 1e3),
         rpe_deg=_mean(moving, "rpe_rot", "rmse", 1),
-        coverage=fmean(run.coverage for run in runs),
-        ms_per_frame=fmean(each.ms_per_frame for each in found) if found else None,
+        coverage=fmean(trial.coverage for trial in trials),
+        ms_per_frame=fmean(costs_ms) if costs_ms else None,
         reason=worst.reason if is_one_case or not worst.reason else f"{worst.case}: {worst.reason}",
         drift_mm=max(drifts, default=None),
         frame_reason=said.reason,
@@ -135,19 +138,16 @@ def _row(runs: list[TrialScore], answered: Answered) -> Row:
     )
 
 
-def _mean(runs: list[TrialScore], metric: str, statistic: str, scale: float) -> float | None:
-    values = [value for run in runs if (value := run.value(metric, statistic)) is not None]
+def _mean(trials: list[TrialScore], metric: str, statistic: str, scale: float) -> float | None:
+    values = [value for trial in trials if (value := trial.value(metric, statistic)) is not None]
     return scale * fmean(values) if values else None
-
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def _number(value: float | None, digits: int) -> str:
     return "–" if value is None else f"{value:.{digits}f}"
 
 
+COST = "CPU ms/frame"
 # Heading and cell of each column, as people read them.
 COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("#", lambda row: str(row.rank)),
@@ -159,19 +159,21 @@ COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("RPE mm/frame", lambda row: _number(row.rpe_mm, 3)),
     ("RPE °/frame", lambda row: _number(row.rpe_deg, 4)),
     ("coverage", lambda row: _number(row.coverage, 3)),
-    ("CPU ms/frame", lambda row: _number(row.ms_per_frame, 1)),
+    (COST, lambda row: _number(row.ms_per_frame, 1)),
 )
 HEADINGS = tuple(heading for heading, _ in COLUMNS)
 LEGEND = (
     "ATE: RMSE of position after SE(3) alignment; segments: mean drift over 0.5 to 2 m "
     "(5 to 40 m on paths from 40 m on, 100 to 800 m from 300 m on); "
-    "RPE: RMSE from frame to frame. Errors are means over the runs that survived, of cases that move."
+    "RPE: RMSE from frame to frame. Errors are means over the trials that survived, of cases that move."
 )
 
 
-def cells(row: Row) -> list[str]:
-    """The cells of one line, in the order of HEADINGS."""
-    return [cell(row) for _, cell in COLUMNS]
+def lines_of(board: Board) -> list[list[str]]:
+    """The headings, then the cells of each row; the column of costs is left out where no row has one."""
+    is_timed = any(row.ms_per_frame is not None for row in board.rows)
+    shown = [(heading, cell) for heading, cell in COLUMNS if is_timed or heading != COST]
+    return [[heading for heading, _ in shown], *([cell(row) for _, cell in shown] for row in board.rows)]
 
 
 def notes(row: Row) -> list[str]:
@@ -181,7 +183,7 @@ def notes(row: Row) -> list[str]:
         said.append(f"stood still: drift {row.drift_mm:.1f} mm")
     if row.frame_reason:
         frames = "1 frame" if row.frame_reason_count == 1 else f"{row.frame_reason_count} frames"
-        over = f" of {row.runs} runs" if row.runs > 1 else ""
+        over = f" of {row.runs} trials" if row.runs > 1 else ""
         said.append(f'{frames}{over} "{row.frame_reason}", first at frame {row.frame_reason_first}')
     return [f"{row.estimator}: {sentence}" for sentence in said]
 
@@ -192,8 +194,8 @@ def markdown(boards: list[Board]) -> str:
 
 
 def _markdown_board(board: Board) -> str:
-    lines = [f"## {board.title}", "", "| " + " | ".join(HEADINGS) + " |", "|" + "---|" * len(HEADINGS)]
-    lines += ["| " + " | ".join(cells(row)) + " |" for row in board.rows]
+    headings, *rows = ["| " + " | ".join(cells) + " |" for cells in lines_of(board)]
+    lines = [f"## {board.title}", "", headings, "|" + "---|" * (headings.count("|") - 1), *rows]
     below = [f"- {note}" for row in board.rows for note in notes(row)]
     return "\n".join([*lines, "", *below, *([""] if below else [])])
 
@@ -214,7 +216,8 @@ def latex(boards: list[Board]) -> str:
     """The first board as a LaTeX table with booktabs rules."""
     import pandas as pd
 
-    table = pd.DataFrame([cells(row) for row in boards[0].rows], columns=[h.replace("%", "\\%") for h in HEADINGS])
+    headings, *rows = lines_of(boards[0])
+    table = pd.DataFrame(rows, columns=[heading.replace("%", "\\%") for heading in headings])
     escaped = table.replace({"_": r"\_"}, regex=True).rename(columns={"#": r"\#", "RPE °/frame": r"RPE $^\circ$/frame"})
     text: str = escaped.style.hide(axis="index").to_latex(hrules=True)
     return text

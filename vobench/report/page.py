@@ -1,7 +1,8 @@
 """The leaderboard as one HTML page, and the reports in a run's folder."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -9,9 +10,11 @@ import numpy as np
 from vobench import stop
 from vobench.geometry.se3 import Array
 from vobench.report import leaderboard as table
-from vobench.report.leaderboard import Board, EstimatorStatistics, answers, boards
-from vobench.run import estimate as estimate_file
-from vobench.run.folder import GROUND_TRUTH, RunFolder, TrialScore
+from vobench.report.leaderboard import Board, answers, boards
+from vobench.run.estimate import ESTIMATE
+from vobench.run.folder import RunFolder, TrialScore, read_tum
+from vobench.run.frames import TIMES, FrameRow, new_table, read_frames
+from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.trajectory.align import Alignment
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -51,8 +54,7 @@ def html(folder: RunFolder, scores: list[TrialScore], boards: list[Board]) -> st
     return environment.get_template("leaderboard.html").render(
         title=folder.path.resolve().parent.name,
         boards=boards,
-        headings=table.HEADINGS,
-        cells=table.cells,
+        lines_of=table.lines_of,
         notes=table.notes,
         legend=table.LEGEND,
         plots=[_plot(folder, case, [s for s in scores if s.case == case and s.repeat == 0], colours) for case in cases],
@@ -62,7 +64,7 @@ def html(folder: RunFolder, scores: list[TrialScore], boards: list[Board]) -> st
 
 def _plot(folder: RunFolder, case: str, scores: list[TrialScore], colours: dict[str, str]) -> Plot:
     stop.check()
-    truth = estimate_file.read_tum(folder.case(case) / GROUND_TRUTH).positions_m[:, :2]
+    truth = read_tum(folder.case(case) / GROUND_TRUTH).positions_m[:, :2]
     low, span = truth.min(0), max(float(np.ptp(truth, axis=0).max()), 1e-3)
     px_per_m = (PLOT_PX - 2 * MARGIN_PX) / span
     middle = low + np.ptp(truth, axis=0) / 2
@@ -81,31 +83,47 @@ def _plot(folder: RunFolder, case: str, scores: list[TrialScore], colours: dict[
 
 def _aligned(folder: RunFolder, score: TrialScore, stated: dict[str, Any]) -> Array:
     """An estimate's positions (N, 2) from above, after the alignment that its score states."""
-    est = estimate_file.read_tum(folder.estimate(score.case, score.estimator, score.repeat) / estimate_file.ESTIMATE)
+    est = read_tum(folder.estimate(score.case, score.estimator, score.repeat) / ESTIMATE)
     return Alignment.from_dict(stated).apply(est.T_world_frame)[:, :2, 3]
 
 
 STEM = "leaderboard"
+COST_COLUMNS = ("case", "estimator", "wall_ms", "cpu_ms")
 
 
 def boards_of(folder: RunFolder, scores: list[TrialScore]) -> list[Board]:
     """All boards of a run, with what each frame cost and was said of it."""
-    return boards(scores, _answers(folder, scores))
+    return boards(scores, {key: answers(trials) for key, trials in _frames(folder, scores).items()})
 
 
 def write_reports(folder: RunFolder, scores: list[TrialScore]) -> None:
-    """Put leaderboard.md, .json, .csv and .html into a run's folder."""
-    made = boards_of(folder, scores)
+    """Put leaderboard.md, .json, .csv and .html into a run's folder, without costs: these go to times.csv."""
+    frames = _frames(folder, scores)
+    said = {key: replace(answers(trials), ms_per_frame=None) for key, trials in frames.items()}
+    made = boards(scores, said)
     for suffix in ("md", "json", "csv"):
         stop.check()
         (folder.path / f"{STEM}.{suffix}").write_text(table.FORMATS[suffix](made), encoding="utf-8")
     (folder.path / f"{STEM}.html").write_text(html(folder, scores, made), encoding="utf-8")
+    _write_costs(folder, frames)
 
 
-def _answers(folder: RunFolder, scores: list[TrialScore]) -> dict[tuple[str, str], EstimatorStatistics]:
-    """What the frames of each case and estimator that answered at all come to."""
-    runs: dict[tuple[str, str], list[list[estimate_file.FrameRow]]] = {}
+def _frames(folder: RunFolder, scores: list[TrialScore]) -> dict[tuple[str, str], list[list[FrameRow]]]:
+    """The frames of each trial, by case and estimator."""
+    frames = dict[tuple[str, str], list[list[FrameRow]]]()
     for score in scores:
-        rows = estimate_file.read_frames(folder.estimate(score.case, score.estimator, score.repeat))
-        runs.setdefault((score.case, score.estimator), []).append(rows)
-    return {key: found for key, rows in runs.items() if (found := answers(rows))}
+        rows = read_frames(folder.estimate(score.case, score.estimator, score.repeat))
+        frames.setdefault((score.case, score.estimator), []).append(rows)
+    return frames
+
+
+def _write_costs(folder: RunFolder, frames: dict[tuple[str, str], list[list[FrameRow]]]) -> None:
+    """The mean cost of a frame, a row for each case and estimator; empty cells where it answered none."""
+    with new_table(folder.path / TIMES, COST_COLUMNS) as costs:
+        for (case, estimator), trials in frames.items():
+            named = {"case": case, "estimator": estimator}
+            rows = [row for trial in trials for row in trial]
+            for column in COST_COLUMNS[2:]:
+                values = [value for row in rows if (value := getattr(row, column)) is not None]
+                named[column] = f"{fmean(values):.3f}" if values else ""
+            costs.writerow(named)

@@ -17,13 +17,15 @@ from vobench.errors import InputError, UnknownNameError
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
-from vobench.metric.score import score
 from vobench.report import blueprint as bp
 from vobench.report.blueprint import FRAME_TIMELINE, truth_entity
-from vobench.run import estimate as estimate_file
-from vobench.run.folder import GROUND_TRUTH, SEQUENCE, STATUSES, SURVIVED, RunFolder, TrialScore
+from vobench.run.estimate import ESTIMATE, read_tracks
+from vobench.run.folder import SEQUENCE, STATUSES, SURVIVED, RunFolder, TrialScore, read_tum
+from vobench.run.frames import read_frames
+from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, picture
 from vobench.sequence import EncodedFrame, Sequence, StereoTruth, read_truth_frames, read_truth_names, truth_channels
+from vobench.trajectory.align import Alignment
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 
@@ -118,12 +120,11 @@ TRACK_RADIUS = rr.Radius.ui_points(3.5)
 
 @dataclass(frozen=True, slots=True)
 class TrialView:
-    """All that is shown of a run; both trajectories are of the left camera, in the same world.
+    """All that is shown of a trial; both trajectories are of the left camera, in the same world.
 
-    `frames` starts a fresh pass over the pictures. `error_m` belongs to the instants `error_t_ns`.
-    `tracks` maps a frame's index to points (N, 2) in the left picture and which are inliers (N,).
-    There may be fewer `statuses` than frames, where an estimator stopped early. `truth` is None
-    where nothing was recorded of the pixels.
+    `frames` starts a fresh pass over the N pictures. `error_m` (N,) is NaN for frames without a pose, and
+    `statuses` has one word for each. `tracks` maps a frame's index to points (K, 2) in the left picture and
+    which are inliers (K,). `truth` is None where nothing was recorded of the pixels.
     """
 
     title: str
@@ -131,7 +132,6 @@ class TrialView:
     frames: Callable[[], Iterable[EncodedFrame]]
     ground_truth: Trajectory
     estimate: Trajectory
-    error_t_ns: Stamps
     error_m: Array
     statuses: Rows[str]
     tracks: Mapping[int, Tracks]
@@ -166,35 +166,38 @@ class _Log:
         return frames, nearest[frames]
 
 
-def save_run(path: Path, run: TrialView) -> None:
-    """Write a run to an .rrd file that opens in Rerun with its own layout."""
+def save_trial(path: Path, trial: TrialView) -> None:
+    """Write a trial to an .rrd file that opens in Rerun with its own layout."""
     part = path.with_name(path.name + ".part")
     with (
         stop.undone(lambda: part.unlink(missing_ok=True)),
-        rr.RecordingStream(application_id(run.title), recording_id=run.title, send_properties=False) as stream,
+        rr.RecordingStream(application_id(trial.title), recording_id=trial.title, send_properties=False) as stream,
     ):
         stream.save(part)
-        stream.send_recording_name(run.title)
-        log = _Log(stream, _log_pictures(stream, run.frames()))
-        statuses = [*run.statuses, *[NO_OUTPUT] * (len(log.t_ns) - len(run.statuses))]
-        _log_paths(log, run)
-        _log_cameras(log, run)
-        _log_error(log, run)
-        _log_tracks(log, run.tracks)
-        _log_statuses(log, statuses)
-        log.static(bp.SUMMARY, rr.TextDocument(run.summary_md, media_type=rr.MediaType.MARKDOWN))
+        stream.send_recording_name(trial.title)
+        log = _Log(stream, _log_pictures(stream, trial.frames()))
+        _log_paths(log, trial)
+        _log_cameras(log, trial)
+        _log_error(log, trial)
+        _log_tracks(log, trial.tracks)
+        _log_statuses(log, trial.statuses)
+        log.static(bp.SUMMARY, rr.TextDocument(trial.summary_md, media_type=rr.MediaType.MARKDOWN))
         channels: tuple[str, ...] = ()
-        if run.truth is not None:
-            log_truth(stream, run.truth)
-            channels = run.truth.channels
-        focus, truth_m, estimate_m = first_failure(statuses), run.ground_truth.positions_m, run.estimate.positions_m
+        if trial.truth is not None:
+            log_truth(stream, trial.truth)
+            channels = trial.truth.channels
+        focus, truth_m, estimate_m = (
+            first_failure(trial.statuses),
+            trial.ground_truth.positions_m,
+            trial.estimate.positions_m,
+        )
         stream.send_blueprint(bp.layout(truth_m, estimate_m, focus=focus, channels=channels))
         stream.disconnect()
         part.replace(path)
 
 
 def application_id(title: str) -> str:
-    """One for each run, since Rerun keeps one layout per application; it takes few characters in them."""
+    """One for each trial, since Rerun keeps one layout per application; it takes few characters in them."""
     return "vobench-" + re.sub(r"[^A-Za-z0-9_]+", "-", title).strip("-")
 
 
@@ -220,26 +223,26 @@ def _log_pictures(stream: rr.RecordingStream, frames: Iterable[EncodedFrame]) ->
     return np.array(stamps, np.int64)
 
 
-def _log_paths(log: _Log, run: TrialView) -> None:
+def _log_paths(log: _Log, trial: TrialView) -> None:
     """Both whole paths; the estimate is broken where frames have no pose."""
     log.static(bp.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     width = rr.Radius.ui_points(1.8)
-    truth_m, estimate_m = run.ground_truth.positions_m, run.estimate.positions_m
+    truth_m, estimate_m = trial.ground_truth.positions_m, trial.estimate.positions_m
     log.static(bp.TRUTH_PATH, rr.LineStrips3D([truth_m], colors=GREEN, radii=width))
-    frames, samples = log.frames_of(run.estimate.t_ns)
+    frames, samples = log.frames_of(trial.estimate.t_ns)
     strips = np.split(estimate_m[samples], np.flatnonzero(np.diff(frames) > 1) + 1)
     log.static(bp.ESTIMATE_PATH, rr.LineStrips3D(strips, colors=ORANGE, radii=width))
 
 
-def _log_cameras(log: _Log, run: TrialView) -> None:
+def _log_cameras(log: _Log, trial: TrialView) -> None:
     """True left and right camera, and the estimated left one, which vanishes while there is no pose."""
-    length_m = bp.frustum_m(run.ground_truth.positions_m)
-    _log_camera(log, bp.TRUTH_LEFT, run.rig.left, run.ground_truth, length_m=length_m, color=GREEN)
-    if run.rig.right:
-        right = run.ground_truth.of_mounted(run.rig.T_left_right)
-        _log_camera(log, bp.TRUTH_RIGHT, run.rig.right, right, length_m=length_m, color=GREEN)
-    _log_camera(log, bp.ESTIMATE_LEFT, run.rig.left, run.estimate, length_m=length_m, color=ORANGE)
-    frames, _ = log.frames_of(run.estimate.t_ns)
+    length_m = bp.frustum_m(trial.ground_truth.positions_m)
+    _log_camera(log, bp.TRUTH_LEFT, trial.rig.left, trial.ground_truth, length_m=length_m, color=GREEN)
+    if trial.rig.right:
+        right = trial.ground_truth.of_mounted(trial.rig.T_left_right)
+        _log_camera(log, bp.TRUTH_RIGHT, trial.rig.right, right, length_m=length_m, color=GREEN)
+    _log_camera(log, bp.ESTIMATE_LEFT, trial.rig.left, trial.estimate, length_m=length_m, color=ORANGE)
+    frames, _ = log.frames_of(trial.estimate.t_ns)
     absent = np.setdiff1d(np.arange(len(log.t_ns)), frames)
     log.columns(bp.ESTIMATE_LEFT, absent, rr.Clear.columns(is_recursive=[False] * len(absent)))
 
@@ -266,21 +269,21 @@ def rerun_matrix(camera: Camera) -> Array:
     return K
 
 
-def _log_error(log: _Log, run: TrialView) -> None:
+def _log_error(log: _Log, trial: TrialView) -> None:
     """The error of each frame as a plot with gaps, and in 3-D as a line from truth to estimate."""
-    frames, samples = log.frames_of(run.error_t_ns)
-    error_mm = np.full(len(log.t_ns), np.nan)
-    error_mm[frames] = 1e3 * run.error_m[samples]
+    error_mm = 1e3 * trial.error_m
     log.static(bp.ERROR_PLOT, rr.SeriesLines(colors=RED, widths=1.5, names="position error (mm)"))
     log.columns(bp.ERROR_PLOT, np.arange(len(error_mm)), rr.Scalars.columns(scalars=error_mm))
-    _log_error_lines(log, run)
+    _log_error_lines(log, trial)
 
 
-def _log_error_lines(log: _Log, run: TrialView) -> None:
-    truth, estimate = (dict(zip(*log.frames_of(path.t_ns), strict=True)) for path in (run.ground_truth, run.estimate))
+def _log_error_lines(log: _Log, trial: TrialView) -> None:
+    truth, estimate = (
+        dict(zip(*log.frames_of(path.t_ns), strict=True)) for path in (trial.ground_truth, trial.estimate)
+    )
     both = sorted(truth.keys() & estimate.keys())
-    truth_m = run.ground_truth.positions_m[[truth[i] for i in both]]
-    estimate_m = run.estimate.positions_m[[estimate[i] for i in both]]
+    truth_m = trial.ground_truth.positions_m[[truth[i] for i in both]]
+    estimate_m = trial.estimate.positions_m[[estimate[i] for i in both]]
     lengths = np.isin(np.arange(len(log.t_ns)), both).astype(int)  # no line, where there is no pose
     lines = rr.LineStrips3D.columns(strips=np.stack([truth_m, estimate_m], 1)).partition(lengths)
     log.static(bp.ERROR_LINE, rr.LineStrips3D.from_fields(colors=RED, radii=rr.Radius.ui_points(1.5)))
@@ -312,16 +315,16 @@ def _log_statuses(log: _Log, statuses: Rows[str]) -> None:
 
 
 def pick(scores: Rows[TrialScore], *, case: str | None, estimator: str | None) -> TrialScore:
-    """The run most worth a look among those asked for: the gravest failure, else the best estimator's worst case.
+    """The trial most worth a look among those asked for: the gravest failure, else the best estimator's worst case.
 
-    Raises UnknownNameError where no run is of that case or estimator.
+    Raises UnknownNameError where no trial is of that case or estimator.
     """
     for kind, name, known in (
         ("case", case, {s.case for s in scores}),
         ("estimator", estimator, {s.estimator for s in scores}),
     ):
         if name is not None and name not in known:
-            raise UnknownNameError(f"no {kind} '{name}' in this run. Known: {', '.join(sorted(known))}")
+            raise UnknownNameError(f"no {kind} '{name}' in this trial. Known: {', '.join(sorted(known))}")
     wanted = [s for s in scores if case in (None, s.case) and estimator in (None, s.estimator)]
     failed = [s for s in wanted if s.status not in SURVIVED]
     if failed:
@@ -332,27 +335,27 @@ def pick(scores: Rows[TrialScore], *, case: str | None, estimator: str | None) -
     return max((s for s in wanted if s.estimator == best), key=_error)
 
 
-def trial_view(folder: RunFolder, run: TrialScore) -> TrialView:
-    """All that is shown of one run. Raises InputError where its sequence is no longer in the cache."""
-    link = folder.case(run.case) / SEQUENCE
+def trial_view(folder: RunFolder, trial: TrialScore) -> TrialView:
+    """All that is shown of one trial. Raises InputError where its sequence is no longer in the cache."""
+    link = folder.case(trial.case) / SEQUENCE
     if not link.exists():
         raise InputError(f"the sequence is gone from the cache; run the suite again to make it anew: {link}")
     sequence = Sequence.open(link)
-    place = folder.estimate(run.case, run.estimator, run.repeat)
-    gt = estimate_file.read_tum(folder.case(run.case) / GROUND_TRUTH)
-    est = estimate_file.read_tum(place / estimate_file.ESTIMATE)
-    scored = score(gt, est) if len(est) else None
+    place = folder.estimate(trial.case, trial.estimator, trial.repeat)
+    est, frames = read_tum(place / ESTIMATE), read_frames(place)
+    if trial.score:
+        alignment = Alignment.from_dict(trial.score["alignment"])
+        est = Trajectory(est.t_ns, alignment.apply(est.T_world_frame))
     return TrialView(
-        title=f"{run.estimator} on {run.case}",
+        title=f"{trial.estimator} on {trial.case}",
         rig=sequence.rig,
         frames=sequence.encoded_frames,
-        ground_truth=gt,
-        estimate=Trajectory(est.t_ns, scored.alignment.apply(est.T_world_frame)) if scored else est,
-        error_t_ns=scored.gt_t_ns if scored else est.t_ns,
-        error_m=scored.ate_trans_m if scored else np.zeros(0),
-        statuses=[row.status for row in estimate_file.read_frames(place)],
-        tracks={i: (table[:, 2:4].astype(float), table[:, 4] > 0) for i, table in estimate_file.read_tracks(place)},
-        summary_md=_summary(run),
+        ground_truth=read_tum(folder.case(trial.case) / GROUND_TRUTH),
+        estimate=est,
+        error_m=np.array([row.position_error_m for row in frames], float),
+        statuses=[row.status or NO_OUTPUT for row in frames],
+        tracks={i: (table[:, 2:4].astype(float), table[:, 4] > 0) for i, table in read_tracks(place)},
+        summary_md=_summary(trial),
         truth=_truth(link),
     )
 
@@ -365,21 +368,26 @@ def _truth(sequence: Path) -> TruthView | None:
     return TruthView(channels, read_truth_names(sequence), lambda: read_truth_frames(sequence))
 
 
-def _error(run: TrialScore) -> float:
-    value = run.value("ate_trans", "rmse")
+def _error(trial: TrialScore) -> float:
+    value = trial.value("ate_trans", "rmse")
     return float("inf") if value is None else value
 
 
-def _mean_error(runs: Rows[TrialScore]) -> float:
-    return fmean(_error(run) for run in runs)
+def _mean_error(trials: Rows[TrialScore]) -> float:
+    return fmean(_error(trial) for trial in trials)
 
 
-def _summary(run: TrialScore) -> str:
-    """The run's score in Markdown."""
-    lines = [f"# {run.estimator} on {run.case}", "", f"**{run.status}**{f' — {run.reason}' if run.reason else ''}", ""]
-    lines += [f"{run.frames} frames, {run.path_m:.2f} m, coverage {run.coverage:.1%}", ""]
-    if run.score:
+def _summary(trial: TrialScore) -> str:
+    """The trial's score in Markdown."""
+    lines = [
+        f"# {trial.estimator} on {trial.case}",
+        "",
+        f"**{trial.status}**{f' — {trial.reason}' if trial.reason else ''}",
+        "",
+    ]
+    lines += [f"{trial.frames} frames, {trial.path_m:.2f} m, coverage {trial.coverage:.1%}", ""]
+    if trial.score:
         lines += ["| metric | rmse | mean | max |", "|---|---|---|---|"]
-        for m in run.score["metrics"]:
+        for m in trial.score["metrics"]:
             lines.append(f"| {m['name']} ({m['unit']}) | {m['rmse']:.4g} | {m['mean']:.4g} | {m['max']:.4g} |")
     return "\n".join(lines)

@@ -8,32 +8,25 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from vobench.errors import InputError
-from vobench.run.store import unfinished
+from vobench.errors import InputError, TrajectoryError
+from vobench.run.frames import TIMES
+from vobench.run.store import unfinished, write_json
+from vobench.trajectory.formats import parse_tum
+from vobench.trajectory.trajectory import Trajectory
 
-GROUND_TRUTH, CASE, SCORE, SEQUENCE = "ground_truth.tum", "case.json", "score.json", "sequence"
+CASE, SCORE, SEQUENCE = "case.json", "score.json", "sequence"
 ESTIMATES = "estimates"
 ENVIRONMENT, SUITE, ESTIMATORS = "environment.json", "suite.json", "estimators.json"
 
-RunStatus = Literal[
+# Best first; the last seven are failures, and no failure ranks before a survivor.
+TrialStatus = Literal[
     "ok", "partial", "lost", "diverged", "invalid_output", "timeout", "out_of_memory", "crashed", "refused"
 ]
-# Best first; the last seven are failures, and no failure ranks before a survivor.
-STATUSES: tuple[RunStatus, ...] = (
-    "ok",
-    "partial",
-    "lost",
-    "diverged",
-    "invalid_output",
-    "timeout",
-    "out_of_memory",
-    "crashed",
-    "refused",
-)
+STATUSES: tuple[TrialStatus, ...] = get_args(TrialStatus)
 SURVIVED = ("ok", "partial")
 
 
@@ -50,7 +43,7 @@ class TrialScore(BaseModel):
     variant: dict[str, str]
     estimator: str
     repeat: int
-    status: RunStatus
+    status: TrialStatus
     reason: str
     coverage: float
     frames: int
@@ -59,7 +52,7 @@ class TrialScore(BaseModel):
     drift_m: float | None = None
 
     def value(self, metric: str, statistic: str) -> float | None:
-        """One statistic of one metric, None where the run has no such score."""
+        """One statistic of one metric, None where the trial has no such score."""
         for entry in (self.score or {"metrics": []})["metrics"]:
             if entry["name"] == metric:
                 return float(entry[statistic])
@@ -77,11 +70,11 @@ class RunFolder:
         return self.path / "cases" / case
 
     def estimate(self, case: str, estimator: str, repeat: int) -> Path:
-        """The folder of an estimator's run on a case."""
+        """The folder of a trial."""
         return self.case(case) / ESTIMATES / estimator / str(repeat)
 
     def score_files(self) -> list[Path]:
-        """Where every run's score lies, in order of folders. Raises InputError where the folder is none of ours."""
+        """Where every trial's score lies, in order of folders. Raises InputError where the folder is none of ours."""
         cases = self.path / "cases"
         files = sorted(cases.glob(f"*/{ESTIMATES}/*/*/{SCORE}"))
         if files:
@@ -96,7 +89,7 @@ class RunFolder:
         raise InputError(f"not the folder of a run (no cases/*/{ESTIMATES}/*/*/{SCORE} in it): {self.path}")
 
     def scores(self) -> list[TrialScore]:
-        """Every run's score, in order of folders. Raises InputError where the folder or a score is none of ours."""
+        """Every trial's score, in order of folders. Raises InputError where the folder or a score is none of ours."""
         scores = []
         for file in self.score_files():
             score = read_score(file)
@@ -108,7 +101,7 @@ class RunFolder:
 
 
 def read_score(path: Path) -> TrialScore:
-    """One run's score. Raises InputError where the file is none."""
+    """One trial's score. Raises InputError where the file is none."""
     try:
         return TrialScore.model_validate_json(path.read_bytes())
     except ValidationError as error:
@@ -153,23 +146,37 @@ def _point(link: Path, target: str) -> None:
     fresh.replace(link)
 
 
-def write_json(path: Path, content: Any) -> None:
-    """JSON that people can read."""
-    path.write_text(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+def read_tum(path: Path) -> Trajectory:
+    """The trajectory in a TUM file of a run; empty where an estimator gave no pose at all.
+
+    Raises TrajectoryError where the file is none.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise TrajectoryError(f"not a text file in UTF-8 (byte {error.start}): {path}") from None
+    return parse_tum(text, name=str(path))
 
 
-HASHES = "hashes.json"
+# Of runs of equal inputs the first are equal; the second are of the files of times, the only ones that differ.
+HASHES, TIMES_HASHES = "hashes.json", "times_hashes.json"
 CHUNK = 1 << 20
 
 
 def write_hashes(folder: RunFolder) -> None:
-    """Hash all that lies in a run's folder, and the sequences that it links to."""
-    write_json(folder.path / HASHES, {name: file_hash(folder.path / name) for name in _names(folder.path)})
+    """Hash all that lies in a run's folder, and the sequences that it links to; files of times apart."""
+    hashes = {name: file_hash(folder.path / name) for name in _names(folder.path)}
+    for file, are_times in ((HASHES, False), (TIMES_HASHES, True)):
+        chosen = {name: held for name, held in hashes.items() if (Path(name).name == TIMES) == are_times}
+        write_json(folder.path / file, chosen)
 
 
 def read_hashes(folder: RunFolder) -> dict[str, str]:
     """The hash of each file by its path in the folder. Raises InputError where none were kept."""
-    path = folder.path / HASHES
+    return {**_hashes_in(folder.path / HASHES), **_hashes_in(folder.path / TIMES_HASHES)}
+
+
+def _hashes_in(path: Path) -> dict[str, str]:
     try:
         held = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -198,5 +205,5 @@ def _names(root: Path) -> Iterator[str]:
     linked = (file for link in root.glob(f"cases/*/{SEQUENCE}") for file in link.glob("*.mcap"))
     for path in sorted({*(p for p in root.rglob("*") if p.is_file()), *linked}):
         name = str(path.relative_to(root))
-        if name != HASHES:
+        if name not in (HASHES, TIMES_HASHES):
             yield name

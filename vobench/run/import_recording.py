@@ -7,8 +7,8 @@ from typing import Any
 from vobench import stop
 from vobench.dataset.recording import NO_TRUTH, ReadOptions, Recording, Topics
 from vobench.errors import SuiteError
-from vobench.run.score import is_known
-from vobench.run.store import Context, Store, code_digest, library_versions, versions
+from vobench.run.ground_truth import is_known
+from vobench.run.key import versions
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite import Plan
 from vobench.suite.yaml_file import plain
@@ -60,22 +60,6 @@ def _path(file: str | None) -> Path | None:
     return None if file is None else Path(file)
 
 
-def import_case(case: RecordedCase, shop: Context) -> Path:
-    """The folder of the case's sequence; made where the store has none of these files as they are now."""
-    recording = read_case(case)
-
-    def build(folder: Path) -> None:
-        with shop.progress.step(f"import {case.name}"):
-            import_recording(recording, folder)
-
-    return shop.store.get("sequences", _inputs(case, recording), build)
-
-
-def is_imported(case: RecordedCase, recording: Recording, store: Store) -> bool:
-    """Whether the store has the case's sequence already; `recording` is what `read_all` has of it."""
-    return store.path("sequences", _inputs(case, recording)).is_dir()
-
-
 def import_recording(recording: Recording, folder: Path) -> None:
     """Write a recording as a sequence, and with which versions. Raises VobenchError where a picture is wrong."""
     from vobench.dataset.sequence import convert
@@ -83,8 +67,8 @@ def import_recording(recording: Recording, folder: Path) -> None:
     convert(recording, folder, provenance=versions(*LIBRARIES))
 
 
-def _inputs(case: RecordedCase, recording: Recording) -> dict[str, Any]:
-    """All that an imported sequence depends on; files by size and time of change, for reading gigabytes is slow."""
+def content(case: RecordedCase, recording: Recording) -> dict[str, Any]:
+    """What is imported: the recording as read; files by size and time of change, for reading gigabytes is slow."""
     source, truth = case.source, recording.truth
     files = [Path(file) for file in (source.path, source.calibration, source.imu) if file]
     return {
@@ -92,8 +76,6 @@ def _inputs(case: RecordedCase, recording: Recording) -> dict[str, Any]:
         "files": [line for path in files for line in _listing(path)],
         # KITTI's lies outside the folder.
         "truth": hashlib.sha256(truth.t_ns.tobytes() + truth.T_world_frame.tobytes()).hexdigest() if truth else "",
-        "code": code_digest("geometry", "trajectory", "sensor", "sequence", "dataset"),
-        "libraries": library_versions(*LIBRARIES),
     }
 
 

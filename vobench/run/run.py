@@ -1,94 +1,94 @@
-"""A suite, run: simulate, estimate, score, and put it all in one folder."""
+"""A run of a suite: its tasks are performed one after another, and what a person reads is gathered in one folder."""
 
 import platform
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from shutil import copyfile
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vobench import __version__, stop
-from vobench.run import estimate as estimate_file
-from vobench.run.estimate import estimate
+from vobench.run.estimate import ESTIMATE, LOG, TRACKS
 from vobench.run.folder import (
     CASE,
     ENVIRONMENT,
     ESTIMATORS,
-    GROUND_TRUTH,
     SCORE,
     SEQUENCE,
     SUITE,
     RunFolder,
     TrialScore,
     make_run,
+    read_score,
     write_hashes,
-    write_json,
 )
-from vobench.run.import_recording import import_case
-from vobench.run.score import left_truth, score_trial
-from vobench.run.simulate import LIBRARIES, simulate
-from vobench.run.store import Context, digest, folder_digest, library_versions
+from vobench.run.frames import FRAMES, TIMES
+from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.key import digest, folder_digest, library_versions
+from vobench.run.simulate import LIBRARIES
+from vobench.run.store import Progress, write_json
+from vobench.run.task import Task, missing, perform, plan
 from vobench.sequence import read_import_notes
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite import Case, Entrant, Plan
 from vobench.suite.yaml_file import plain
-from vobench.trajectory.formats import format_tum
+
+if TYPE_CHECKING:
+    from vobench.dataset.recording import Recording
 
 Finish = Callable[[RunFolder, list[TrialScore]], None]
-ESTIMATE_FILES = (estimate_file.ESTIMATE, estimate_file.FRAMES, estimate_file.TRACKS, estimate_file.LOG)
+OF_ESTIMATE, OF_SCORE = (ESTIMATE, TRACKS, LOG, TIMES), (SCORE, FRAMES)
 
 
-def run_suite(plan: Plan, *, root: Path, shop: Context, finish: Finish) -> RunFolder:
+def run_suite(
+    suite: Plan, recordings: "Mapping[str, Recording]", *, root: Path, store: Path, progress: Progress, finish: Finish
+) -> RunFolder:
     """Run every case, estimator and repeat; what the store holds already is not made again.
 
     `finish` adds reports to the folder before it gets its final name under `root`.
     """
-    suite = plain(plan.suite)
-    entrants = [_entrant_facts(entrant) for entrant in plan.entrants]
+    tasks = plan(suite, recordings)
+    for task in missing(tasks, store):
+        perform(task, store, progress=progress)
+    cases = {case.name: case for case in suite.cases}
+    stated = plain(suite.suite)
+    entrants = [_entrant_facts(entrant) for entrant in suite.entrants]
 
     def fill(folder: RunFolder) -> None:
-        write_json(folder.path / SUITE, suite)
+        write_json(folder.path / SUITE, stated)
         write_json(folder.path / ESTIMATORS, entrants)
         write_json(folder.path / ENVIRONMENT, _environment())
-        finish(folder, [score for case in plan.cases for score in _run_case(plan, case, folder, shop)])
+        finish(folder, [_gather(task, cases, store, folder) for task in tasks if task.stage == "score"])
         write_hashes(folder)
 
-    return make_run(root, plan.suite.name, digest({"suite": suite, "estimators": entrants}), fill)
+    return make_run(root, suite.suite.name, digest({"suite": stated, "estimators": entrants}), fill)
 
 
-def _sequence_of(case: Case | RecordedCase, shop: Context) -> Path:
-    """The folder of the case's sequence: simulated, or imported from what somebody recorded."""
-    return simulate(case, shop) if isinstance(case, Case) else import_case(case, shop)
+def _gather(task: Task, cases: Mapping[str, Case | RecordedCase], store: Path, folder: RunFolder) -> TrialScore:
+    """Copy a trial's files out of the store, and its case's before the first of them."""
+    stop.check()
+    sequence, estimate = (store / key for key in task.needs)
+    score = read_score(store / task.key / SCORE)
+    target = folder.estimate(score.case, score.estimator, score.repeat)
+    if not folder.case(score.case).is_dir():
+        _gather_case(cases[score.case], sequence, folder.case(score.case))
+    target.mkdir(parents=True)
+    for place, names in ((estimate, OF_ESTIMATE), (store / task.key, OF_SCORE)):
+        for name in names:
+            copyfile(place / name, target / name)
+    return score
 
 
-def _run_case(plan: Plan, case: Case | RecordedCase, folder: RunFolder, shop: Context) -> list[TrialScore]:
-    sequence = _sequence_of(case, shop)
-    target = folder.case(case.name)
+def _gather_case(case: Case | RecordedCase, sequence: Path, target: Path) -> None:
     target.mkdir(parents=True)
     write_json(target / CASE, {**plain(case), **_assumed(case, sequence)})
-    (target / GROUND_TRUTH).write_text(format_tum(left_truth(sequence)), encoding="utf-8")
-    gt = estimate_file.read_tum(target / GROUND_TRUTH)  # what is scored is what anybody can score again
+    copyfile(sequence / GROUND_TRUTH, target / GROUND_TRUTH)
     (target / SEQUENCE).symlink_to(sequence.resolve())
-    scores = []
-    for run in plan.runs(case):
-        estimated = estimate(run, sequence, shop)
-        stop.check()
-        scores.append(score_trial(run, estimated, gt))
-        _keep(estimated, scores[-1], folder.estimate(case.name, run.entrant.label, run.repeat))
-    return scores
 
 
 def _assumed(case: Case | RecordedCase, sequence: Path) -> dict[str, dict[str, str]]:
     """Of a recording: all that its import assumed, converted or dropped."""
     return {"import": read_import_notes(sequence)} if isinstance(case, RecordedCase) else {}
-
-
-def _keep(estimated: Path, score: TrialScore, target: Path) -> None:
-    """Copy an estimate out of the store, and put its score beside it."""
-    target.mkdir(parents=True)
-    for name in ESTIMATE_FILES:
-        copyfile(estimated / name, target / name)
-    write_json(target / SCORE, score.model_dump(mode="json"))
 
 
 def _entrant_facts(entrant: Entrant) -> dict[str, Any]:

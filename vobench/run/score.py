@@ -1,67 +1,39 @@
 """Estimate to score: one trial's numbers and its status."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.metric.score import Score, score
 from vobench.metric.settings import ScoreSettings
-from vobench.run import estimate as estimate_file
-from vobench.run.folder import RunStatus, TrialScore
-from vobench.sequence import Sequence, read_truth
-from vobench.suite.suite import Trial
-from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
+from vobench.run.estimate import ESTIMATE, FINISHED, Outcome, read_outcome
+from vobench.run.folder import SCORE, TrialScore, TrialStatus, read_tum
+from vobench.run.frames import write_frames
+from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.store import write_json
+from vobench.trajectory.trajectory import Trajectory
 
-# Between two true poses further apart than this nobody knows where the camera was.
-LONGEST_GAP_NS = 200_000_000
+if TYPE_CHECKING:
+    from vobench.suite.suite import Trial
 
-
-def left_truth(folder: Path) -> Trajectory:
-    """The left camera's true poses at all pictures that have one; the truth is interpolated where it is not theirs.
-
-    Pictures before, after or in a gap of the truth are left out, and so not scored.
-    Raises SequenceError where that leaves none.
-    """
-    sequence, truth = Sequence.open(folder), read_truth(folder)
-    if not len(truth):
-        raise SequenceError(f"no ground truth, so nothing can be scored: {folder}")
-    stamps = sequence.frame_stamps()
-    if not np.array_equal(stamps, truth.t_ns):
-        stamps = stamps[is_known(truth.t_ns, stamps)]
-        if not len(stamps):
-            raise SequenceError(f"the ground truth covers none of the pictures in time: {folder}")
-        truth = Trajectory(stamps, poses_at(truth, stamps))
-    return truth.of_mounted(sequence.rig.T_body_left)
-
-
-def is_known(truth_ns: Stamps, stamps: Stamps) -> NDArray[np.bool_]:
-    """Which stamps lie on a true pose, or between two that are near to each other in time."""
-    after = np.searchsorted(truth_ns, stamps, side="left")
-    before = np.searchsorted(truth_ns, stamps, side="right") - 1
-    inside = (before >= 0) & (after < len(truth_ns))
-    last = len(truth_ns) - 1
-    gap_ns = truth_ns[np.minimum(after, last)] - truth_ns[np.maximum(before, 0)]
-    return np.asarray(inside & (gap_ns <= LONGEST_GAP_NS))
-
-
-# The truth that a run is scored against has one pose for each frame.
+# The truth that a trial is scored against has one pose for each frame.
 SETTINGS = ScoreSettings(coverage_of="frames")
 # What trackers of resting things jitter by. Extents, not path lengths: jitter adds up along a path.
 STILL_M, STILL_RAD = 2e-3, np.deg2rad(0.2)
 
 
-def score_trial(run: Trial, estimate: Path, gt: Trajectory) -> TrialScore:
-    """Score a run's estimate against the left camera's true path."""
+def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) -> None:
+    """Score a trial's estimate against its sequence's true path: the score and the table of frames, in a folder."""
+    gt = read_tum(sequence / GROUND_TRUTH)  # what is scored is what anybody can score again
     scored = score_estimate(estimate, gt)
-    status, reason = _status(estimate_file.read_outcome(estimate), scored, gt)
-    return TrialScore(
-        case=run.case.name,
-        variant=run.case.variant,
-        estimator=run.entrant.label,
-        repeat=run.repeat,
+    status, reason = _status(read_outcome(estimate), scored, gt)
+    score = TrialScore(
+        case=trial.case.name,
+        variant=trial.case.variant,
+        estimator=trial.entrant.label,
+        repeat=trial.repeat,
         status=status,
         reason=reason,
         coverage=scored.coverage.ratio if scored else 0.0,
@@ -70,6 +42,8 @@ def score_trial(run: Trial, estimate: Path, gt: Trajectory) -> TrialScore:
         score=scored.as_dict() if scored else None,
         drift_m=_drift_m(estimate) if scored and stands_still(gt) else None,
     )
+    write_json(folder / SCORE, score.model_dump(mode="json"))
+    write_frames(sequence, estimate, scored, folder)
 
 
 def stands_still(gt: Trajectory) -> bool:
@@ -79,7 +53,7 @@ def stands_still(gt: Trajectory) -> bool:
 
 
 def _drift_m(estimate: Path) -> float:
-    return _extent_m(estimate_file.read_tum(estimate / estimate_file.ESTIMATE))
+    return _extent_m(read_tum(estimate / ESTIMATE))
 
 
 def _extent_m(trajectory: Trajectory) -> float:
@@ -89,13 +63,13 @@ def _extent_m(trajectory: Trajectory) -> float:
 
 def score_estimate(estimate: Path, gt: Trajectory) -> Score | None:
     """The score of an estimate's folder, None where it holds no pose of a frame whose truth is known."""
-    est = estimate_file.read_tum(estimate / estimate_file.ESTIMATE)
+    est = read_tum(estimate / ESTIMATE)
     return score(gt, est, settings=SETTINGS) if np.isin(est.t_ns, gt.t_ns).any() else None
 
 
-def _status(outcome: estimate_file.Outcome, scored: Score | None, gt: Trajectory) -> tuple[RunStatus, str]:
-    """How the run ended, the gravest first; a run that died is not saved by what it had answered before."""
-    if outcome.kind != estimate_file.FINISHED:
+def _status(outcome: Outcome, scored: Score | None, gt: Trajectory) -> tuple[TrialStatus, str]:
+    """How the trial ended, the gravest first; an estimator that died is not saved by what it answered before."""
+    if outcome.kind != FINISHED:
         return outcome.kind, outcome.reason  # type: ignore[return-value]  # EstimatorFailure's kinds are statuses
     if scored is None or not scored.failure.survived:
         covered = scored.coverage.ratio if scored else 0.0

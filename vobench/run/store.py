@@ -1,21 +1,17 @@
 """The store of finished results, addressed by a hash of all that they depend on; unfinished folders, progress."""
 
 import fcntl
-import hashlib
 import json
 import os
-import platform
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
-from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from vobench import __version__, stop
+from vobench import stop
+from vobench.run.key import canonical, digest
 
 PREFIX = ".unfinished-"
 
@@ -69,9 +65,6 @@ def _sweep(parent: Path) -> None:
                 os.close(lock)
 
 
-PACKAGE = Path(__file__).resolve().parents[1]
-
-
 class Store:
     """Finished folders under a root; what is not finished is never seen under its final name."""
 
@@ -111,53 +104,15 @@ def _publish(folder: Path, final: Path) -> None:
             raise
 
 
+def write_json(path: Path, content: Any) -> None:
+    """JSON that people can read."""
+    path.write_text(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+
+
 def default_store() -> Store:
     """$VOBENCH_CACHE, or vobench/ in the user's cache folder."""
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return Store(Path(os.environ.get("VOBENCH_CACHE") or home / "vobench"))
-
-
-def canonical(inputs: Mapping[str, Any]) -> str:
-    """JSON with sorted keys: the same text for the same content."""
-    return json.dumps(inputs, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False)
-
-
-def digest(inputs: Mapping[str, Any]) -> str:
-    """128 bits of SHA-256 over the canonical text, in hex."""
-    return hashlib.sha256(canonical(inputs).encode()).hexdigest()[:32]
-
-
-@cache
-def code_digest(*rooms: str) -> str:
-    """A hash of the source of these rooms of vobench: results of older code are not taken for new ones."""
-    return folder_digest(*(PACKAGE / room for room in rooms))
-
-
-def folder_digest(*folders: Path) -> str:
-    """A hash over names and contents of all files below these folders, compiled Python left out."""
-    state = hashlib.sha256()
-    for folder in folders:
-        for path in sorted(_files(folder)):
-            state.update(f"{path.relative_to(folder)}\0".encode())
-            state.update(hashlib.sha256(path.read_bytes()).digest())
-    return state.hexdigest()[:32]
-
-
-def _files(folder: Path) -> Iterator[Path]:
-    for place, folders, names in os.walk(folder, followlinks=True):
-        folders[:] = [name for name in folders if name != "__pycache__"]
-        yield from (path for name in names if (path := Path(place, name)).is_file())
-
-
-def versions(*libraries: str) -> dict[str, str]:
-    """What something is made with: the versions of vobench, Python and these distributions."""
-    return {"vobench": __version__, **library_versions(*libraries)}
-
-
-@cache
-def library_versions(*names: str) -> dict[str, str]:
-    """Versions of Python and of the installed distributions whose release can change a result's bytes."""
-    return {"python": platform.python_version(), **{name: version(name) for name in names}}
 
 
 Item = TypeVar("Item")
@@ -174,7 +129,7 @@ class Progress(Protocol):
 
 
 class SilentProgress:
-    """Nobody listens."""
+    """Progress that nobody hears of."""
 
     def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
         """The same items."""
@@ -182,14 +137,6 @@ class SilentProgress:
         return iter(items)
 
     def step(self, what: str) -> AbstractContextManager[Callable[[float], object]]:
-        """Nothing around the work."""
+        """No context around the work."""
         del what
         return nullcontext(lambda _: None)
-
-
-@dataclass(frozen=True, slots=True)
-class Context:
-    """Where results are kept, and who hears of the work."""
-
-    store: Store
-    progress: Progress

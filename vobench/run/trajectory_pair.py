@@ -241,7 +241,7 @@ def _recorded(path: Path, topic: str | None) -> Trajectory:
     folder = path if path.is_dir() else path.parent
     is_sequence = (folder / TRUTH).is_file() and (folder / SENSORS).is_file()
     if topic is None and is_sequence and (path.is_dir() or path.name == TRUTH):
-        from vobench.run.score import left_truth
+        from vobench.run.ground_truth import left_truth
 
         return left_truth(folder)
     from vobench.sequence.recording import is_recording, read_poses

@@ -8,9 +8,9 @@ from typing import Any
 
 from vobench import stop
 from vobench.errors import VobenchError
-from vobench.run import estimate as estimate_file
-from vobench.run.folder import GROUND_TRUTH, SEQUENCE, RunFolder, file_hash, read_hashes, read_score
-from vobench.run.score import left_truth, score_estimate
+from vobench.run.folder import SEQUENCE, RunFolder, file_hash, read_hashes, read_score, read_tum
+from vobench.run.ground_truth import GROUND_TRUTH, left_truth
+from vobench.run.score import score_estimate
 from vobench.trajectory.formats import format_tum
 
 
@@ -59,10 +59,10 @@ def _truth_differs(case: Path) -> str:
 
 
 def _rescored(file: Path) -> str:
-    """A run's score, computed anew and compared digit by digit."""
+    """A trial's score, computed anew and compared digit by digit."""
     try:
         held = read_score(file)
-        gt = estimate_file.read_tum(file.parents[3] / GROUND_TRUTH)
+        gt = read_tum(file.parents[3] / GROUND_TRUTH)
         scored = score_estimate(file.parent, gt)
     except (VobenchError, OSError) as error:
         return str(error)

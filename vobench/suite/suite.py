@@ -203,7 +203,7 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """For people who wait."""
+        """What progress calls it."""
         return f"{self.entrant.label} on {self.case.name}"
 
 
@@ -226,8 +226,8 @@ class Plan:
         """All cases."""
         return *self.simulated, *self.recorded
 
-    def runs(self, case: Case | RecordedCase) -> list[Trial]:
-        """Every run on one case."""
+    def trials(self, case: Case | RecordedCase) -> list[Trial]:
+        """Every trial on one case."""
         return [Trial(case, entrant, n) for entrant in self.entrants for n in range(self.suite.repeats)]
 
     def at(self, *keys: int | str) -> AbstractContextManager[None]:

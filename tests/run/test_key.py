@@ -1,0 +1,111 @@
+"""A key changes with all that a result depends on, and with nothing else: not with words about the code."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from vobench.run import key
+from vobench.run.key import PACKAGE, closure, code_digest, imported_by
+from vobench.run.task import ENTRIES
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory):
+    """A copy of the package's source."""
+    folder = tmp_path_factory.mktemp("tree") / "vobench"
+    shutil.copytree(PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+@pytest.fixture
+def digest_after(tree):
+    """The digest of a stage's code after a text in a file of it is replaced by another."""
+
+    def change(stage: str, file: str, old: str, new: str) -> tuple[str, str]:
+        path = tree / file
+        before, text = code_digest(*ENTRIES[stage], package=tree), path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new, 1))
+        code_digest.cache_clear()
+        after = code_digest(*ENTRIES[stage], package=tree)
+        path.write_text(text)
+        code_digest.cache_clear()
+        return before, after
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"""', '"""More words. '),
+        ("import numpy as np\n", "# A comment.\n\n\nimport numpy as np  # and another\n"),
+        ("\ndef inverse", "\n# A comment moves every line below.\ndef inverse"),
+    ],
+)
+def test_words_about_the_code_change_no_key(digest_after, old, new):
+    before, after = digest_after("sequence", "geometry/se3.py", old, new)
+    assert before == after == code_digest(*ENTRIES["sequence"])
+
+
+@pytest.mark.parametrize("stage", ["bake", "sequence", "import", "estimate", "score"])
+def test_an_operator_in_a_module_that_all_reach_changes_every_key(digest_after, stage):
+    before, after = digest_after(stage, "geometry/se3.py", " @ ", " * ")
+    assert before != after
+
+
+@pytest.mark.parametrize(
+    ("stage", "file", "is_of_it"),
+    [
+        ("sequence", "run/verify.py", False),
+        ("sequence", "run/score.py", False),
+        ("sequence", "metric/ate.py", False),
+        ("sequence", "render/raster.py", True),  # which is imported when the first picture is drawn
+        ("sequence", "run/stereo_camera.py", True),
+        ("bake", "motion/drive.py", False),
+        ("bake", "render/indirect_light.py", True),
+        ("estimate", "motion/drive.py", False),
+        ("estimate", "render/draw.py", False),
+        ("estimate", "suite/suite.py", False),
+        ("estimate", "estimator/worker.py", True),  # which runs in the estimator's process
+        ("import", "dataset/kitti.py", True),
+        ("import", "render/draw.py", False),
+        ("score", "metric/ate.py", True),
+        ("score", "render/draw.py", False),
+    ],
+)
+def test_code_counts_where_the_stage_reaches_it_and_nowhere_else(digest_after, stage, file, is_of_it):
+    before, after = digest_after(stage, file, "\nfrom ", "\nADDED = 1\nfrom ")
+    assert (before != after) is is_of_it
+
+
+def test_a_shader_counts_as_code_of_what_draws(tree, digest_after):
+    shader = next((tree / "render" / "shaders").glob("surface.frag")).relative_to(tree)
+    assert len(set(digest_after("sequence", str(shader), ";", "; "))) == 2
+    assert len(set(digest_after("estimate", str(shader), ";", "; "))) == 1
+
+
+def test_what_only_a_type_checker_imports_is_not_reached(tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "a.py").write_text(
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from vobench.run import b\n\n    X = 1\n\n"
+        "def f():\n    from vobench.run.c import g\n"
+    )
+    (tmp_path / "run" / "b.py").write_text("")
+    (tmp_path / "run" / "c.py").write_text("import vobench.run.a\n")
+    assert set(closure(["vobench.run.a"], package=tmp_path)) == {"vobench.run.a", "vobench.run.c"}
+
+
+def test_an_estimators_imports_are_found_and_one_that_is_no_python_has_none(tmp_path):
+    (tmp_path / "estimator.py").write_text("from vobench.geometry import se3\nimport vobench.motion.motor\n")
+    (tmp_path / "broken.py").write_text("def (")
+    assert {"vobench.geometry.se3", "vobench.motion.motor"} <= set(imported_by(tmp_path))
+    assert not any("vobench.render" in name for name in imported_by(tmp_path))
+    assert imported_by(Path(tmp_path / "nowhere")) == []
+
+
+def test_the_code_of_a_module_is_read_once_in_a_process(monkeypatch):
+    digest = code_digest(*ENTRIES["score"])
+    monkeypatch.setattr(key, "closure", None)
+    assert code_digest(*ENTRIES["score"]) == digest

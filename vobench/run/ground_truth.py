@@ -1,0 +1,55 @@
+"""The ground truth that trials are scored against, and the exposures of the frames: what a sequence tells of itself."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench.errors import SequenceError
+from vobench.run.frames import EXPOSURE_COLUMNS, EXPOSURES, new_table
+from vobench.sequence import Sequence, read_truth
+from vobench.trajectory.formats import format_tum
+from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
+
+GROUND_TRUTH = "ground_truth.tum"
+# Between two true poses further apart than this nobody knows where the camera was.
+LONGEST_GAP_NS = 200_000_000
+
+
+def left_truth(folder: Path) -> Trajectory:
+    """The left camera's true poses at all pictures that have one; the truth is interpolated where it is not theirs.
+
+    Pictures before, after or in a gap of the truth are left out, and so not scored.
+    Raises SequenceError where that leaves none.
+    """
+    sequence, truth = Sequence.open(folder), read_truth(folder)
+    if not len(truth):
+        raise SequenceError(f"no ground truth, so nothing can be scored: {folder}")
+    stamps = sequence.frame_stamps()
+    if not np.array_equal(stamps, truth.t_ns):
+        stamps = stamps[is_known(truth.t_ns, stamps)]
+        if not len(stamps):
+            raise SequenceError(f"the ground truth covers none of the pictures in time: {folder}")
+        truth = Trajectory(stamps, poses_at(truth, stamps))
+    return truth.of_mounted(sequence.rig.T_body_left)
+
+
+def is_known(truth_ns: Stamps, stamps: Stamps) -> NDArray[np.bool_]:
+    """Which stamps lie on a true pose, or between two that are near to each other in time."""
+    after = np.searchsorted(truth_ns, stamps, side="left")
+    before = np.searchsorted(truth_ns, stamps, side="right") - 1
+    inside = (before >= 0) & (after < len(truth_ns))
+    last = len(truth_ns) - 1
+    gap_ns = truth_ns[np.minimum(after, last)] - truth_ns[np.maximum(before, 0)]
+    return np.asarray(inside & (gap_ns <= LONGEST_GAP_NS))
+
+
+def write_ground_truth(folder: Path) -> None:
+    """Put beside a sequence's recordings what each of its trials reads: the true path, and every frame's exposure."""
+    (folder / GROUND_TRUTH).write_text(format_tum(left_truth(folder)), encoding="utf-8")
+    sequence = Sequence.open(folder)
+    known = dict(zip(*(part.tolist() for part in sequence.exposures()), strict=True))
+    with new_table(folder / EXPOSURES, EXPOSURE_COLUMNS) as table:
+        for frame, t_ns in enumerate(sequence.frame_stamps().tolist()):
+            exposure_s, gain_db = known.get(t_ns, ("", ""))
+            table.writerow({"frame": frame, "t_ns": t_ns, "exposure_s": exposure_s, "gain_db": gain_db})

@@ -1,0 +1,261 @@
+"""The stages from suite to scores as tasks: what each makes, of what, after which others, and how it is performed."""
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from shutil import copyfile
+from typing import TYPE_CHECKING, Any, Literal
+
+from vobench import stop
+from vobench.run.key import code_digest, digest, folder_digest, imported_by, library_versions
+from vobench.run.simulate import LIBRARIES, content
+from vobench.run.store import Progress, SilentProgress, Store
+from vobench.suite.scene_spec import SceneFile
+from vobench.suite.source import RecordedCase
+from vobench.suite.suite import Case, Plan, Trial
+from vobench.suite.yaml_file import plain
+
+if TYPE_CHECKING:
+    from vobench.dataset.recording import Recording
+
+Stage = Literal["bake", "sequence", "import", "estimate", "score"]
+# Where the results of each stage lie in the store.
+KINDS: dict[Stage, str] = {
+    "bake": "bakes",
+    "sequence": "sequences",
+    "import": "sequences",
+    "estimate": "estimates",
+    "score": "scores",
+}
+# The modules that a stage enters, of which its key hashes all that they import; a room stands for all of its modules.
+ENTRIES: dict[Stage, tuple[str, ...]] = {
+    "bake": ("vobench.render.bake", "vobench.suite.scene_file"),
+    "sequence": ("vobench.run.simulate", "vobench.run.ground_truth"),
+    "import": ("vobench.run.import_recording", "vobench.run.ground_truth", "vobench.dataset"),
+    "estimate": ("vobench.run.estimate", "vobench.estimator.worker"),
+    "score": ("vobench.run.score",),
+}
+# What of a scene's file its light does not depend on; levels weigh the light of each lamp later.
+UNLIT: dict[str, Any] = {
+    "summary": True,
+    "white_cd_m2": True,
+    "lamps": {"__all__": {"level"}},
+    "sun": {"level"},
+    "sky": {"level"},
+}
+
+
+# Mesa draws, and Embree and Mitsuba trace, on as many cores as there are; beyond these little is gained.
+MANY_CORES = 8
+GIB = 1 << 30
+NO_LIMIT = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Resources:
+    """What a task can make use of: cores, of which one is enough for any, and memory, as measured on `quickstart`."""
+
+    cores: int = 1
+    memory_bytes: int = GIB
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One unit of work, whose result is a folder in the store.
+
+    `inputs` is all that the result's bytes depend on, as JSON; `subject` is what it is made of, for whoever makes it;
+    `needs` are the keys of the tasks whose results it takes, in the order that its stage asks for.
+    """
+
+    stage: Stage
+    subject: "SceneFile | Case | RecordedCase | Trial"
+    inputs: Mapping[str, Any]
+    needs: tuple[str, ...]
+    resources: Resources
+
+    @property
+    def key(self) -> str:
+        """Where its result lies in the store, by which others name it."""
+        return f"{KINDS[self.stage]}/{digest(self.inputs)}"
+
+
+def plan(suite: Plan, recordings: "Mapping[str, Recording]") -> list[Task]:
+    """All tasks of a suite, each once and after those that it needs; `recordings` are its recorded cases' by name.
+
+    Nothing is made and nothing of a case is read; of code, the hashes.
+    """
+    tasks = dict[str, Task]()
+
+    def add(*made: Task) -> str:
+        tasks.update((task.key, task) for task in made if task.key not in tasks)
+        return made[-1].key
+
+    for case in suite.cases:
+        sequence = add(*sequence_tasks(case, recordings))
+        for trial in suite.trials(case):
+            add(score_task(trial, sequence, add(estimate_task(trial, sequence))))
+    return list(tasks.values())
+
+
+def sequence_tasks(case: Case | RecordedCase, recordings: "Mapping[str, Recording]") -> list[Task]:
+    """What makes a case's sequence, the sequence last: its scene's light is computed before, where it is drawn with."""
+    if isinstance(case, RecordedCase):
+        return [_import_task(case, recordings[case.name])]
+    many = Resources(MANY_CORES)
+    is_traced = case.rendering.engine == "path"
+    before = [] if is_traced else [bake_task(case.scene)]
+    needs = tuple(task.key for task in before)
+    libraries = library_versions(*LIBRARIES, *(["mitsuba"] if is_traced else []))
+    inputs = {"case": content(case), **_made_by("sequence", needs), "libraries": libraries}
+    return [*before, Task("sequence", case, inputs, needs, many)]
+
+
+def bake_task(spec: SceneFile) -> Task:
+    """What computes a scene's light, under whatever levels."""
+    scene = plain(spec, exclude=UNLIT)
+    libraries = library_versions("numpy", "scipy", "embreex")
+    inputs = {"scene": scene, **_made_by("bake"), "libraries": libraries}
+    return Task("bake", spec, inputs, (), Resources(MANY_CORES))
+
+
+def _import_task(case: RecordedCase, recording: "Recording") -> Task:
+    from vobench.run import import_recording
+
+    libraries = library_versions(*import_recording.LIBRARIES)
+    inputs = {**import_recording.content(case, recording), **_made_by("import"), "libraries": libraries}
+    return Task("import", case, inputs, (), Resources())
+
+
+def estimate_task(trial: Trial, sequence: str) -> Task:
+    """What lets an estimator run on the sequence of that key."""
+    from vobench.run.estimate import LIMITS
+
+    entrant, needs = trial.entrant, (sequence,)
+    inputs = {
+        "params": entrant.params,
+        "repeat": trial.repeat,
+        "limits": repr(LIMITS),
+        "estimator": folder_digest(entrant.folder),
+        **_made_by("estimate", needs, *imported_by(entrant.folder)),
+        "libraries": library_versions("numpy", "scipy", "opencv-python-headless"),
+    }
+    return Task("estimate", trial, inputs, needs, Resources(memory_bytes=GIB + LIMITS.memory_bytes))
+
+
+def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
+    """What scores the estimate of that key against the truth of its sequence."""
+    inputs = {
+        "case": trial.case.name,
+        "variant": trial.case.variant,
+        "estimator": trial.entrant.label,
+        "repeat": trial.repeat,
+        **_made_by("score", (sequence, estimate)),
+        "libraries": library_versions("numpy", "scipy"),
+    }
+    return Task("score", trial, inputs, (sequence, estimate), Resources())
+
+
+def _made_by(stage: Stage, needs: tuple[str, ...] = (), *modules: str) -> dict[str, Any]:
+    return {"needs": needs, "code": code_digest(*ENTRIES[stage], *modules)}
+
+
+def missing(tasks: Iterable[Task], root: Path) -> list[Task]:
+    """The tasks to perform, in order: what is there is not made again, nor light that no picture is drawn with."""
+    wanted, found = set[str](), list[Task]()
+    for task in reversed(list(tasks)):
+        if (task.stage != "bake" or task.key in wanted) and not is_done(task, root):
+            wanted.update(task.needs)
+            found.append(task)
+    return found[::-1]
+
+
+def is_done(task: Task, root: Path) -> bool:
+    """Whether the store holds the task's result; that of a failure is made anew, for its cause may be gone."""
+    folder = root / task.key
+    return folder.is_dir() and (task.stage not in ("estimate", "score") or not _has_failed(folder))
+
+
+def _has_failed(folder: Path) -> bool:
+    from vobench.run.estimate import FINISHED, read_outcome
+
+    return read_outcome(folder).kind != FINISHED
+
+
+def perform(
+    task: Task,
+    root: Path,
+    threads: int = NO_LIMIT,
+    *,
+    progress: Progress = SilentProgress(),  # noqa: B008 - no state
+) -> Path:
+    """Make a task's result in the store at `root`, out of those that it needs, and say where it lies.
+
+    `threads` is how many may draw and filter pictures, NO_LIMIT for as many as there are. It may be called in a
+    process of its own.
+    """
+    stop.check()
+    if threads != NO_LIMIT:
+        _limit(threads)
+    store, kind = Store(root), KINDS[task.stage]
+    if not is_done(task, root):
+        store.forget(kind, task.inputs)
+    needs = [root / key for key in task.needs]
+    return store.get(kind, task.inputs, lambda folder: PERFORMERS[task.stage](task.subject, needs, folder, progress))
+
+
+def _limit(threads: int) -> None:
+    import cv2
+
+    os.environ["LP_NUM_THREADS"] = str(threads)  # Mesa reads it when it first draws
+    cv2.setNumThreads(threads)
+
+
+# Each stage imports what it takes: a process that performs none of them loads none.
+
+
+def _bake(spec: SceneFile, _: list[Path], folder: Path, progress: Progress) -> None:
+    from vobench.run.simulate import bake_scene
+
+    bake_scene(spec, folder, progress)
+
+
+def _sequence(case: Case, needs: list[Path], folder: Path, progress: Progress) -> None:
+    from vobench.run.ground_truth import write_ground_truth
+    from vobench.run.simulate import simulate
+
+    simulate(case, folder, light=needs[0] if needs else None, progress=progress)
+    write_ground_truth(folder)
+
+
+def _import(case: RecordedCase, _: list[Path], folder: Path, progress: Progress) -> None:
+    from vobench.run.ground_truth import write_ground_truth
+    from vobench.run.import_recording import import_recording, read_case
+
+    with progress.step(f"import {case.name}"):
+        import_recording(read_case(case), folder)
+    write_ground_truth(folder)
+
+
+def _estimate(trial: Trial, needs: list[Path], folder: Path, progress: Progress) -> None:
+    from vobench.run.estimate import estimate
+
+    estimate(trial, needs[0], folder, progress)
+
+
+def _score(trial: Trial, needs: list[Path], folder: Path, _: Progress) -> None:
+    from vobench.run.estimate import OUTCOME
+    from vobench.run.score import score_trial
+
+    sequence, estimate = needs
+    score_trial(trial, sequence, estimate, folder)
+    copyfile(estimate / OUTCOME, folder / OUTCOME)
+
+
+PERFORMERS: dict[Stage, Callable[[Any, list[Path], Path, Progress], None]] = {
+    "bake": _bake,
+    "sequence": _sequence,
+    "import": _import,
+    "estimate": _estimate,
+    "score": _score,
+}
