@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from vobench.geometry.rig import PIONEER_WHEELS, looking
+from vobench.geometry.rig import PIONEER_WHEELS
 from vobench.motion.drive import Drive, drive
 from vobench.motion.slip import SLIP_STREAMS, SLIPS
 from vobench.sensor.encoder import ENCODERS, ticks
@@ -27,7 +27,8 @@ os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THR
 
 TOUR = ((1.0, 0.0), (2.0, 1.0), (0.0, 2.0), (-1.0, 1.0), (1.0, -1.0), (0.0, 0.0))
 RATE_HZ, IMU_HZ = 30.0, 200.0
-IMU = replace(IMUS["adis16448"], rate_hz=IMU_HZ, T_body_imu=looking(pitch_deg=10, position_m=(0.2, 0.0, 0.3)))
+PLACE = {"position_m": (0.2, 0.0, 0.3), "rotation_deg": (-100.0, 0.0, -90.0)}
+IMU = replace(IMUS["adis16448"], rate_hz=IMU_HZ, **PLACE)
 Made = TypeVar("Made")
 
 
@@ -61,7 +62,7 @@ def main() -> None:
     rounds = int(np.ceil(60 * asked.minutes / one_round_s)) + 1
     run, driven_s = best(lambda: tour(rounds), asked.repeats)
     _, posed_s = best(lambda: run.motion.at(run.t_ns), asked.repeats)
-    exact, exact_s = best(lambda: measure(run.motion, ImuSettings(IMU_HZ, T_body_imu=IMU.T_body_imu)), asked.repeats)
+    exact, exact_s = best(lambda: measure(run.motion, ImuSettings(rate_hz=IMU_HZ, **PLACE)), asked.repeats)
     _, noisy_s = best(lambda: measure(run.motion, IMU, rngs=generators(STREAMS)), asked.repeats)
     counts, counted_s = best(lambda: ticks(run.rim_rad, PIONEER_WHEELS, ENCODERS["nominal"]), asked.repeats)
     stages = {

@@ -15,30 +15,37 @@ from dataclasses import replace
 import numpy as np
 
 from vobench.geometry.rig import LENSES
-from vobench.sensor.exposure import AutoExposure, Shutter, ShutterKind, start, step, strips
-from vobench.sensor.image_sensor import CAMERAS, CameraSensor, NoiseStreams, Radiance, expose, fixed_pattern
-from vobench.sensor.lens import LensEffects, lens_maps, through_lens
-from vobench.sensor.response import LINEAR, Power
+from vobench.sensor.exposure import AutoExposure, Exposure, start, step, strips
+from vobench.sensor.image_sensor import (
+    CAMERAS,
+    CameraSensor,
+    CameraSettings,
+    NoiseStreams,
+    Radiance,
+    expose,
+    fixed_pattern,
+)
+from vobench.sensor.lens import lens_maps, through_lens
 
 LENS = LENSES["paper_literal"]
 SHAPE = (LENS.height_px, LENS.width_px)
 CLEAN = CAMERAS["clean"]
 CHIP_EFFECTS: dict[str, CameraSensor] = {
     "clean chip: rounding after the sRGB curve": CLEAN,
-    "  with a linear response": replace(CLEAN, response=LINEAR),
-    "  with gamma 2.2": replace(CLEAN, response=Power(2.2)),
+    "  with a linear response": replace(CLEAN, response="linear"),
+    "  with gamma 2.2": replace(CLEAN, response=2.2),
     "  with a converter of 10 bits": replace(CLEAN, adc_bits=10),
     "  with shot noise": replace(CLEAN, shot_noise=True),
     "  with shot noise, under 10 electrons everywhere": replace(CLEAN, shot_noise=True, full_well_e=8.0),
     "  with read noise": replace(CLEAN, read_noise_e=25.0),
     "  with PRNU, DSNU, columns, hot pixels": replace(CLEAN, prnu=0.01, dsnu_e=10.0, column_e=2.0, hot_share=1e-3),
 }
-LENS_EFFECTS: dict[str, LensEffects] = {
-    "vignetting": LensEffects(vignetting=1.0),
-    "blur, any width": LensEffects(blur_sigma_px=1.0),
-    "defocus, any width": LensEffects(defocus_px=6.0),
-    "dirt": LensEffects(dirt=0.05),
-    "all four": LensEffects(vignetting=1.0, blur_sigma_px=1.0, defocus_px=6.0, dirt=0.05),
+LENS_EFFECTS: dict[str, CameraSettings] = {
+    "vignetting": CameraSettings(vignetting=1.0),
+    "blur, any width": CameraSettings(blur_sigma_px=1.0),
+    "defocus, any width": CameraSettings(defocus_px=6.0),
+    "dirt": CameraSettings(dirt=0.05),
+    "all four": CameraSettings(vignetting=1.0, blur_sigma_px=1.0, defocus_px=6.0, dirt=0.05),
 }
 
 
@@ -67,7 +74,8 @@ def chips(sensors: dict[str, CameraSensor]) -> Iterator[tuple[str, Callable[[], 
     light, streams = picture(), noise()
     for name, sensor in sensors.items():
         pattern = fixed_pattern(SHAPE, sensor, np.random.default_rng(2))
-        yield name, lambda sensor=sensor, pattern=pattern: expose(light, sensor, streams, pattern=pattern)
+        camera = CameraSettings(chip=sensor)
+        yield name, lambda camera=camera, pattern=pattern: expose(light, camera, streams, pattern=pattern)
 
 
 def lenses() -> Iterator[tuple[str, Callable[[], object]]]:
@@ -81,10 +89,10 @@ def lenses() -> Iterator[tuple[str, Callable[[], object]]]:
 def the_rest() -> Iterator[tuple[str, Callable[[], object]]]:
     """What else happens per picture, and what happens once per camera."""
     loop, chip = AutoExposure(), CAMERAS["mt9v034"]
-    grey, signal, state = expose(picture(), CLEAN, noise()), chip.signal_of_grey, start(loop, chip.nominal)
-    rolling = Shutter(ShutterKind.ROLLING, 0.02)
+    grey, signal = expose(picture(), CameraSettings(), noise()), chip.signal_of_grey
+    state = start(loop, Exposure(0.005))
     yield "auto-exposure, a step", lambda: step(loop, state, grey, signal)
-    yield "32 strips of 8 sub-frames", lambda: strips(SHAPE[0], rolling, 0, 0.01, row_strips=32, sub_frames=8)
+    yield "32 strips of 8 sub-frames", lambda: strips(SHAPE[0], 0.02, 0, 0.01, row_strips=32, sub_frames=8)
     yield "once: a fixed pattern", lambda: fixed_pattern(SHAPE, chip, np.random.default_rng(2))
     yield (
         "once: a lens with all four effects",

@@ -15,7 +15,7 @@ YAML files are read into such classes, and JSON Schemas and the tables of the do
 
 import re
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from functools import cache
 from math import isfinite
 from numbers import Integral, Real
@@ -86,69 +86,95 @@ def tupled(value: Any) -> Any:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OneOf:
-    """Text is one of the known names; a near one is suggested. `what` says what they are names of."""
+class Check:
+    """A value that `check` raises no SettingError for; `schema` is what a JSON Schema can say of that.
 
-    what: str
-    known: Collection[str]
+    What is to be checked `first`, before its type is, is handed over as it was written, lists as tuples.
+    """
 
-    def check(self, name: str) -> None:
-        """Raise SettingError for a name that is not known."""
-        if name not in self.known:
-            raise SettingError(unknown(self.what, name, list(self.known)))
+    check: Callable[[Any], object]
+    schema: Mapping[str, Any] = field(default_factory=dict)
+    first: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> Any:
-        return _checked_after(self.check, handler(source))
+        if self.first:
+            return _before(lambda value: self._passed(tupled(value)), handler(source))
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_after_validator_function(self._passed, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Callable[[Any], Any]) -> dict[str, Any]:
-        return {**handler(schema), "enum": sorted(self.known)}
+        return {**handler(schema), **self.schema}
+
+    def _passed(self, value: Any) -> Any:
+        self.check(value)
+        return value
+
+
+def OneOf(what: str, known: Collection[str]) -> Check:
+    """Text that is one of the known names; a near one is suggested. `what` says what they are names of."""
+
+    def check(name: str) -> None:
+        if name not in known:
+            raise SettingError(unknown(what, name, list(known)))
+
+    return Check(check, {"enum": sorted(known)})
+
+
+def Matching(pattern: str, words: str) -> Check:
+    """Text that matches all of a pattern; `words` say what would be right."""
+
+    def check(text: str) -> None:
+        if not re.fullmatch(pattern, text):
+            raise SettingError(f"should be {words} (got {text!r})")
+
+    return Check(check, {"pattern": f"^{pattern}$"})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Matching:
-    """Text matches all of a pattern; `words` say what would be right."""
+class Short:
+    """What is written in a shorter form, too, which `expand` makes the full one of; `schema` describes it."""
 
-    pattern: str
-    words: str
-
-    def check(self, text: str) -> None:
-        """Raise SettingError for text that does not match."""
-        if not re.fullmatch(self.pattern, text):
-            raise SettingError(f"should be {self.words} (got {text!r})")
+    expand: Callable[[Any], Any]
+    schema: Mapping[str, Any]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> Any:
-        return _checked_after(self.check, handler(source))
+        return _before(lambda value: tupled(self.expand(value)), handler(source))
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Callable[[Any], Any]) -> dict[str, Any]:
-        return {**handler(schema), "pattern": f"^{self.pattern}$"}
+        return {"anyOf": [handler(schema), dict(self.schema)]}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Like:
-    """A section may begin as a preset: `like: name` and what differs from it; a bare name is the preset as it is."""
+    """A section may begin as a preset: `like: name` and what differs from it; a bare name is the preset as it is.
+
+    `key` is another word for `like`, and `section` the part that presets are of, where it is not the whole.
+    """
 
     what: str
     presets: Mapping[str, Any]
+    key: str = "like"
+    section: str = ""
 
     def merged(self, value: Any) -> Any:
         """The section with the values of its preset where it has none. Raises SettingError."""
-        given = {"like": value} if isinstance(value, str) else tupled(value)
-        if not isinstance(given, dict) or "like" not in given:
+        given = {self.key: value} if isinstance(value, str) else tupled(value)
+        if not isinstance(given, dict) or self.key not in given:
             return given
-        name = given.pop("like")
+        name = given.pop(self.key)
         if name not in self.presets:
-            raise SettingError(unknown(self.what, str(name), list(self.presets)), *([] if value == name else ["like"]))
-        return _over(asdict(self.presets[name]), given)
+            place = [] if value == name else [self.key]
+            raise SettingError(unknown(self.what, str(name), list(self.presets)), *place)
+        preset = asdict(self.presets[name])
+        return _over({self.section: preset} if self.section else preset, given)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> Any:
-        from pydantic_core import core_schema
-
-        return core_schema.no_info_before_validator_function(self.merged, handler(source))
+        return _before(self.merged, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
-        section = handler.resolve_ref_schema(handler(schema))
-        name = {"type": "string", "enum": sorted(self.presets)}
-        return {"anyOf": [{**section, "properties": {"like": name, **section["properties"]}}, name]}
+        section, name = handler.resolve_ref_schema(handler(schema)), {"type": "string", "enum": sorted(self.presets)}
+        return {"anyOf": [{**section, "properties": {self.key: name, **section["properties"]}}, name]}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -177,17 +203,13 @@ class ByKind:
             return {**tupled(value), "kind": kind}
 
         told_apart = core_schema.tagged_union_schema(members, discriminator="kind")
-        return core_schema.no_info_before_validator_function(with_kind, told_apart)
+        return _before(with_kind, told_apart)
 
 
-def _checked_after(check: Callable[[Any], None], schema: Any) -> Any:
+def _before(change: Callable[[Any], Any], schema: Any) -> Any:
     from pydantic_core import core_schema
 
-    def passed(value: Any) -> Any:
-        check(value)
-        return value
-
-    return core_schema.no_info_after_validator_function(passed, schema)
+    return core_schema.no_info_before_validator_function(change, schema)
 
 
 def _over(preset: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
@@ -210,7 +232,7 @@ Name = Annotated[str, Matching(r"[a-z0-9][a-z0-9_.]*", "lower-case letters, digi
 
 def _hints(settings: Any) -> dict[str, Any]:
     found = get_type_hints(settings, include_extras=True)
-    return {field.name: found[field.name] for field in fields(settings)}
+    return {each.name: found[each.name] for each in fields(settings)}
 
 
 # The annotation of each field of a class of settings, marks included.
@@ -237,6 +259,9 @@ def _held(value: Any, hint: Any) -> Any:
     """The value as an annotation has it. Raises SettingError where it is none such."""
     origin, args = get_origin(hint), get_args(hint)
     if origin is Annotated:
+        for mark in args[1:]:
+            if isinstance(mark, Check) and mark.first:
+                mark.check(value)
         value = _held(value, args[0])
         for mark in args[1:]:
             _hold_to(mark, value)
@@ -248,7 +273,7 @@ def _held(value: Any, hint: Any) -> Any:
     if origin is dict and isinstance(value, dict):
         return {_held(key, args[0]): _at(key, entry, args[1]) for key, entry in value.items()}
     if origin is Literal and value not in args:
-        raise _wrong("literal_error", value, expected=" or ".join(map(repr, args)))
+        raise _wrong("literal_error", value, expected=" or ".join([", ".join(map(repr, args[:-1])), repr(args[-1])]))
     return value if origin is Literal or hint is Any else _held_plain(value, origin or hint)
 
 
@@ -313,7 +338,7 @@ def _hold_to(mark: Any, value: Any) -> None:
             raise _wrong(name, value, min_length=bound, actual_length=len(value))
         case MaxLen(bound) if len(value) > bound:
             raise _wrong("too_long", value, max_length=bound, actual_length=len(value))
-        case OneOf() | Matching():
+        case Check(first=False):
             mark.check(value)
 
 

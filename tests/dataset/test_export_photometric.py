@@ -17,8 +17,7 @@ from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere
 from vobench.geometry.rig import PRESETS, Rig
 from vobench.sensor.exposure import Exposure
-from vobench.sensor.image_sensor import CAMERAS, CameraSensor, NoiseStreams, expose
-from vobench.sensor.response import Power
+from vobench.sensor.image_sensor import CAMERAS, CameraSensor, CameraSettings, NoiseStreams, expose
 
 Make = Callable[..., Any]
 
@@ -86,11 +85,11 @@ def test_a_grey_value_through_the_inverse_response_is_proportional_to_exposure(
     made = make_sequence(case_json=case_json(chip={"response": 2.2}))
     export(made.folder, tmp_path / "out", "euroc")
     inverse = np.array((tmp_path / "out/photometric/cam1/pcalib.txt").read_text().split(), float)
-    sensor = CameraSensor(response=Power(2.2))
+    camera = CameraSettings(chip=CameraSensor(response=2.2))
     radiance = np.linspace(0.1, 0.7, 400, dtype=np.float32)[None]
     rng = np.random.default_rng(0)
     once, twice = (
-        expose(radiance, sensor, NoiseStreams(rng, rng), exposure=Exposure(time_s)) for time_s in (0.0025, 0.005)
+        expose(radiance, camera, NoiseStreams(rng, rng), exposure=Exposure(time_s)) for time_s in (0.0025, 0.005)
     )
     np.testing.assert_allclose(inverse[twice] / inverse[once], 2.0, rtol=0.06)
 

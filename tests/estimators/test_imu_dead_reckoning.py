@@ -16,8 +16,8 @@ from vobench.motion.drive import drive
 from vobench.sensor.imu import IMUS, STREAMS, ImuSettings, Triad, measure
 from vobench.trajectory.kinematics import Kinematics, Motion
 
-PLACE = looking(pitch_deg=20, position_m=(0.25, -0.1, 0.3))
-EXACT = replace(IMUS["exact"], T_body_imu=PLACE)
+EXACT = replace(IMUS["exact"], position_m=(0.25, -0.1, 0.3), rotation_deg=(-110.0, 0.0, -90.0))
+PLACE = EXACT.T_body_imu
 BIASED = replace(EXACT, gyro=Triad(bias=(0.01, -0.02, 0.01)), accel=Triad(bias=(0.1, 0.2, -0.1)))
 AXES = se3.transform(np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]]), np.zeros(3))  # of a camera, its z axis first
 NAME = "imu_dead_reckoning"
@@ -155,8 +155,8 @@ def test_how_the_readings_are_shared_out_among_frames_does_not_matter(bed):
 
 def test_where_on_the_body_the_imu_sits_does_not_matter(bed):
     paths = []
-    for place in (np.eye(4), PLACE):
-        settings = replace(EXACT, rate_hz=1000.0, T_body_imu=place)
+    for imu in (IMUS["exact"], EXACT):
+        settings = replace(imu, rate_hz=1000.0)
         results = bed.estimated(NAME, rig_with(settings), frames_of(driven(), settings))
         paths.append(np.stack([r.T_odom_frame for r in results]))
     np.testing.assert_allclose(paths[0], paths[1], atol=1e-3)

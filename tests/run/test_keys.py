@@ -1,5 +1,7 @@
 """Every key of every trajectory is heeded, in the unit and towards the side that its name and the docs say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydantic import TypeAdapter
@@ -96,7 +98,7 @@ def goes(tmp_path_factory):
 
     def travel(kind, **keys):
         spec = KIND.validate_python({"kind": kind, **BASE[kind], **keys})
-        gone = body_motion(case.model_copy(update={"trajectory": spec}))
+        gone = body_motion(replace(case, trajectory=spec))
         return gone.at_frames().T_world_body, gone.rims.rim_rad if gone.rims else None
 
     return travel

@@ -248,7 +248,7 @@ def test_a_camera_inside_a_mover_is_refused_with_place_and_time(at_height, tmp_p
     cart = MoverSpec(name="cart", size_m=(0.4, 0.4, 0.8), material="wood", path=keys, repeats=True)
     scene = plan.simulated[0].scene.model_copy(update={"movers": (cart,)})
     with pytest.raises(SuiteError, match=r"a camera of rig 'down' is inside the mover 'cart' of scene 'room' after"):
-        body_motions(replace(plan, simulated=(plan.simulated[0].model_copy(update={"scene": scene}),)))
+        body_motions(replace(plan, simulated=(replace(plan.simulated[0], scene=scene),)))
 
 
 def test_a_camera_above_the_furniture_is_none_of_our_business(at_height):

@@ -130,7 +130,7 @@ def settled(case: Case, luminance_cd_m2: float, frames: int) -> list[float]:
     """Shares of full scale of the left picture's mean, frame after frame."""
     scene, motion = case.build_scene(), body_motion(case).motion
     camera = StereoCamera(case, World(scene, Recorder(luminance_cd_m2), motion))
-    chip = case.camera.build_chip()
+    chip = case.camera.chip
     return [float(chip.signal_of_grey[camera.shoot(t).left].mean()) for t in range(frames)]
 
 

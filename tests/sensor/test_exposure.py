@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from vobench.errors import InputError
+from vobench.errors import InputError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.scene.light import Flicker
-from vobench.sensor.exposure import AutoExposure, Exposure, Shutter, ShutterKind, Strip, start, step, strips
-from vobench.sensor.image_sensor import CAMERAS, CameraSensor, NoiseStreams, Radiance, expose
-from vobench.sensor.response import LINEAR, SRGB, Response
+from vobench.sensor.exposure import AutoExposure, Exposure, Strip, start, step, strips
+from vobench.sensor.image_sensor import CAMERAS, CameraSensor, CameraSettings, NoiseStreams, Radiance, expose
 
-FREE = AutoExposure(t_min_s=1e-6, t_max_s=10.0)
+FREE = AutoExposure(t_min_ms=1e-3, t_max_ms=1e4)
 RNG = np.random.default_rng(0)
 SCENES: dict[str, Radiance] = {
     "texture": np.exp(RNG.normal(-1.4, 0.7, (60, 80))).astype(np.float32),
@@ -28,7 +27,9 @@ def levels(loop: AutoExposure, chip: CameraSensor, scene: Radiance, first: Expos
     state, noise, taken = start(loop, first), NoiseStreams(*np.random.default_rng(1).spawn(2)), []
     for _ in range(pictures):
         taken.append(state.now.time_s * state.now.amplification)
-        state = step(loop, state, expose(scene, chip, noise, exposure=state.now), chip.signal_of_grey)
+        state = step(
+            loop, state, expose(scene, CameraSettings(chip=chip), noise, exposure=state.now), chip.signal_of_grey
+        )
     return np.array(taken)
 
 
@@ -36,10 +37,10 @@ def levels(loop: AutoExposure, chip: CameraSensor, scene: Radiance, first: Expos
     ("scene", "percentile"), [("texture", None), ("even", None), ("texture", 60.0), ("window", 60.0)]
 )
 @pytest.mark.parametrize("sensor", ["clean", "mt9v034"])
-@pytest.mark.parametrize("response", [LINEAR, SRGB], ids=["linear", "srgb"])
+@pytest.mark.parametrize("response", ["linear", "srgb"])
 @pytest.mark.parametrize("lag_frames", [1, 2, 3])
 def test_it_settles_within_ten_pictures_from_sixteen_times_wrong_and_never_swings(
-    scene: str, sensor: str, response: Response, percentile: float | None, lag_frames: int
+    scene: str, sensor: str, response: str, percentile: float | None, lag_frames: int
 ) -> None:
     chip = replace(CAMERAS[sensor], response=response)
     loop = replace(FREE, percentile=percentile, lag_frames=lag_frames)
@@ -63,7 +64,7 @@ def test_the_mean_of_a_picture_that_is_burnt_out_in_part_takes_longer_and_does_n
 def test_a_settled_picture_has_the_target_as_its_mean() -> None:
     chip, scene = CAMERAS["clean"], SCENES["texture"]
     level_s = levels(FREE, chip, scene, Exposure(0.02), 30)[-1]
-    grey = expose(scene, chip, NoiseStreams(RNG, RNG), exposure=Exposure(float(level_s)))
+    grey = expose(scene, CameraSettings(chip=chip), NoiseStreams(RNG, RNG), exposure=Exposure(float(level_s)))
     assert chip.signal_of_grey[grey].mean() == pytest.approx(FREE.target_share, rel=0.03)
 
 
@@ -82,12 +83,14 @@ def test_damping_is_the_share_of_the_error_that_a_picture_leaves() -> None:
 
 
 def test_time_comes_before_gain_and_both_keep_their_limits() -> None:
-    loop, chip = AutoExposure(t_min_s=1e-3, t_max_s=8e-3, gain_max_db=12.0), CAMERAS["clean"]
+    loop, chip = AutoExposure(t_min_ms=1.0, t_max_ms=8.0, gain_max_db=12.0), CAMERAS["clean"]
     noise, seen = NoiseStreams(RNG, RNG), []
     for level in (1e-6, 0.02, 0.05, 0.1, 0.3, 1.0, 1e3):
         state, scene = start(loop, Exposure(0.005)), np.full((8, 8), level, np.float32)
         for _ in range(30):
-            state = step(loop, state, expose(scene, chip, noise, exposure=state.now), chip.signal_of_grey)
+            state = step(
+                loop, state, expose(scene, CameraSettings(chip=chip), noise, exposure=state.now), chip.signal_of_grey
+            )
         seen.append(state.now)
     # The dead band may end a little before the limits.
     assert seen[0].gain_db == pytest.approx(12.0, abs=0.2)
@@ -99,14 +102,14 @@ def test_time_comes_before_gain_and_both_keep_their_limits() -> None:
 
 
 def test_a_start_beyond_the_limits_is_brought_within() -> None:
-    loop = AutoExposure(t_max_s=8e-3, gain_max_db=6.0)
+    loop = AutoExposure(t_max_ms=8.0, gain_max_db=6.0)
     assert start(loop, Exposure(1.0)).now == Exposure(8e-3, 6.0)
-    assert start(loop, Exposure(1e-6)).now == Exposure(loop.t_min_s)
+    assert start(loop, Exposure(1e-6)).now == Exposure(loop.t_min_ms / 1e3)
 
 
 def test_the_percentile_meters_the_share_of_pixels_it_says() -> None:
     scene = np.where(np.arange(100) < 30, 0.5, 0.05)[None].repeat(50, 0).astype(np.float32)
-    chip = replace(CAMERAS["clean"], response=LINEAR)
+    chip = replace(CAMERAS["clean"], response="linear")
     dark, bright = (
         levels(replace(FREE, percentile=percentile), chip, scene, Exposure(0.005), 30)[-1] for percentile in (50, 85)
     )
@@ -114,7 +117,7 @@ def test_the_percentile_meters_the_share_of_pixels_it_says() -> None:
 
 
 def test_a_raised_black_level_does_not_fool_it() -> None:
-    plain = replace(CAMERAS["clean"], response=LINEAR)
+    plain = replace(CAMERAS["clean"], response="linear")
     level = [levels(FREE, replace(plain, black_dn=b), SCENES["even"], Exposure(0.005), 30)[-1] for b in (0.0, 30.0)]
     assert level[0] == pytest.approx(level[1], rel=0.05)
 
@@ -126,41 +129,38 @@ def test_gain_is_a_factor_of_ten_for_twenty_decibels() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"target_share": 1.0}, "target_share should be between 0 and 1, got 1.0"),
-        ({"percentile": 0}, "percentile should be more than 0 and at most 100, got 0"),
-        ({"lag_frames": 0}, "lag_frames should be 1 or more, as a picture is first taken, got 0"),
-        ({"damping": 1}, "damping should be 0 or more and less than 1, got 1"),
-        ({"t_min_s": 1.0}, "exposure limits should rise, got 1.0 s to 0.02 s"),
-        ({"gain_max_db": -1}, "gain_max_db should be 0 or more, got -1"),
-        ({"gain_max_db": np.nan}, "gain_max_db should be 0 or more, got nan"),
+        ({"target_share": 1.0}, "target_share: should be less than 1 (got 1.0)"),
+        ({"percentile": 0}, "percentile: should be greater than 0 (got 0.0)"),
+        ({"lag_frames": 0}, "lag_frames: should be 1 or more (got 0)"),
+        ({"damping": 1}, "damping: should be less than 1 (got 1.0)"),
+        ({"t_min_ms": 1000}, "t_min_ms: should be at most t_max_ms, but is 1000 against 20"),
+        ({"gain_max_db": -1}, "gain_max_db: should be 0 or more (got -1.0)"),
+        ({"gain_max_db": np.nan}, "gain_max_db: should be a finite number (got nan)"),
     ],
 )
 def test_settings_that_cannot_be_are_refused(change: dict[str, float], said: str) -> None:
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(SettingError) as refused:
         AutoExposure(**change)
+    assert str(refused.value) == said
 
 
 def test_an_exposure_lasts_and_does_not_weaken() -> None:
-    with pytest.raises(InputError, match="more than 0 s, got 0"):
+    with pytest.raises(SettingError, match="time_s: should be greater than 0"):
         Exposure(0)
     for gain_db in (-6.0, np.nan):
-        with pytest.raises(InputError, match=f"gain_db should be 0 or more, got {gain_db}"):
+        with pytest.raises(SettingError, match="gain_db: should be"):
             Exposure(0.01, gain_db)
 
 
-GLOBAL = Shutter()
+GLOBAL = 0.0
 HEIGHT, WIDTH = 480, 720
 cuts = pytest.mark.parametrize(("row_strips", "sub_frames"), [(1, 1), (7, 3), (48, 13), (479, 2), (480, 1)])
-
-
-def rolling(readout_s: float) -> Shutter:
-    return Shutter(ShutterKind.ROLLING, readout_s)
 
 
 @cuts
 def test_strips_tile_the_picture_and_parts_the_exposure(row_strips: int, sub_frames: int) -> None:
     exposure_s, t_ns = 0.0100000037, 123_456_789_012_345_679
-    cut = strips(HEIGHT, rolling(0.0271234), t_ns, exposure_s, row_strips=row_strips, sub_frames=sub_frames)
+    cut = strips(HEIGHT, 0.0271234, t_ns, exposure_s, row_strips=row_strips, sub_frames=sub_frames)
     rows = np.concatenate([np.arange(HEIGHT)[strip.rows] for strip in cut])
     np.testing.assert_array_equal(rows, np.arange(HEIGHT))
     for strip in cut:
@@ -176,14 +176,14 @@ def middle_ns(strip: Strip) -> float:
 
 @cuts
 def test_the_stamp_is_the_middle_of_the_middle_row(row_strips: int, sub_frames: int) -> None:
-    cut = strips(HEIGHT, rolling(0.02), 5_000_000_000, 0.004, row_strips=row_strips, sub_frames=sub_frames)
+    cut = strips(HEIGHT, 0.02, 5_000_000_000, 0.004, row_strips=row_strips, sub_frames=sub_frames)
     late = np.array([middle_ns(strip) for strip in cut]) - 5_000_000_000
     centre = np.array([(strip.rows.start + strip.rows.stop - 1) / 2 for strip in cut])
     np.testing.assert_allclose(late, (centre - 239.5) * 20e6 / HEIGHT, atol=0.5)
 
 
 def test_rows_below_the_middle_are_as_late_as_those_above_are_early() -> None:
-    cut = strips(HEIGHT, rolling(0.0203777), 0, 0.004, row_strips=HEIGHT, sub_frames=1)
+    cut = strips(HEIGHT, 0.0203777, 0, 0.004, row_strips=HEIGHT, sub_frames=1)
     late = np.array([middle_ns(strip) for strip in cut])
     np.testing.assert_array_equal(late[::-1], -late)
 
@@ -201,7 +201,7 @@ def test_a_global_shutter_is_one_strip_around_its_stamp() -> None:
 
 
 def test_a_rolling_shutter_that_takes_no_time_is_a_global_one() -> None:
-    for strip in strips(HEIGHT, rolling(0.0), 7, 0.01, row_strips=8, sub_frames=4):
+    for strip in strips(HEIGHT, 0.0, 7, 0.01, row_strips=8, sub_frames=4):
         (whole,) = strips(HEIGHT, GLOBAL, 7, 0.01, row_strips=1, sub_frames=4)
         np.testing.assert_array_equal(strip.start_ns, whole.start_ns)
 
@@ -234,7 +234,7 @@ def test_a_moving_edge_is_blurred_over_speed_times_exposure(speed_px_per_s: floa
 @pytest.mark.parametrize("row_strips", [24, 48, 480])
 def test_a_rolling_shutter_leans_a_moving_edge_by_speed_times_line_delay(row_strips: int) -> None:
     speed, readout_s = 900.0, 0.03
-    cut = strips(HEIGHT, rolling(readout_s), 0, 0.001, row_strips=row_strips, sub_frames=1)
+    cut = strips(HEIGHT, readout_s, 0, 0.001, row_strips=row_strips, sub_frames=1)
     position = WIDTH - 0.5 - picture(edge(speed), cut).sum(1)
     lean = np.polyfit(np.arange(HEIGHT), position, 1)[0]
     assert lean == pytest.approx(speed * readout_s / HEIGHT, rel=0.01)
@@ -244,7 +244,7 @@ def test_a_rolling_shutter_leans_a_moving_edge_by_speed_times_line_delay(row_str
 def bands(flicker_hz: float, readout_s: float, exposure_s: float) -> Array:
     """Brightness (H,) of the rows of an even wall under a lamp that flickers, over each row's exposure."""
     lamp = Flicker(mains_hz=flicker_hz / 2, depth=0.4, phase_rad=0.7)
-    cut = strips(HEIGHT, rolling(readout_s), 0, exposure_s, row_strips=HEIGHT, sub_frames=1)
+    cut = strips(HEIGHT, readout_s, 0, exposure_s, row_strips=HEIGHT, sub_frames=1)
     return np.array([lamp.mean(int(strip.start_ns[0]), int(strip.end_ns[0])) for strip in cut])
 
 
@@ -276,11 +276,4 @@ def test_an_exposure_of_a_whole_period_has_no_bands() -> None:
 )
 def test_cuts_that_cannot_be_are_refused(exposure_s: float, row_strips: int, sub_frames: int, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        strips(HEIGHT, rolling(0.01), 0, exposure_s, row_strips=row_strips, sub_frames=sub_frames)
-
-
-def test_shutters_that_cannot_be_are_refused() -> None:
-    with pytest.raises(InputError, match="within 0 to 10 s, got -1"):
-        rolling(-1)
-    with pytest.raises(InputError, match="reads all rows at once"):
-        Shutter(ShutterKind.GLOBAL, 0.01)
+        strips(HEIGHT, 0.01, 0, exposure_s, row_strips=row_strips, sub_frames=sub_frames)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from vobench.errors import InputError
+from vobench.errors import InputError, SettingError
 from vobench.geometry import se3
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
@@ -17,10 +17,11 @@ from vobench.motion.slip import SLIP_STREAMS, SLIPS
 from vobench.sensor.imu import FLAWLESS, IMUS, STREAMS, ImuSettings, Triad, measure, read_out, started, walked
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, Kinematics, level
 
-PLACE = looking(pitch_deg=20, position_m=(0.25, -0.1, 0.3))
+PLACED = {"position_m": (0.25, -0.1, 0.3), "rotation_deg": (-110.0, 0.0, -90.0)}
+PLACE = ImuSettings(**PLACED).T_body_imu
 TILTED = se3.transform(Rotation.from_euler("ZYX", [0.3, -0.5, 0.7]).as_matrix(), [1, 2, 3])
 TOUR = ((1, 1), (2, 2), (0, 2), (2, 0), (-1, 1), (1, -1), (0, 0), (0, 1))
-NOISY = replace(IMUS["bmi055"], T_body_imu=PLACE)
+NOISY = replace(IMUS["bmi055"], **PLACED)
 
 
 def generators(seed: int) -> dict[str, np.random.Generator]:
@@ -57,25 +58,23 @@ def jerky() -> Jerky:
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize(
-    ("T_body_imu", "rate_hz"), [(np.eye(4), 200), (PLACE, 400)], ids=["at the body's origin", "on an arm"]
-)
-def test_a_minute_of_fast_motion_in_six_degrees_closes(bed, seed, T_body_imu, rate_hz):
+@pytest.mark.parametrize(("place", "rate_hz"), [({}, 200), (PLACED, 400)], ids=["at the body's origin", "on an arm"])
+def test_a_minute_of_fast_motion_in_six_degrees_closes(bed, seed, place, rate_hz):
     motion = bed.shaken(seed)
-    readings, _ = measure(motion, ImuSettings(rate_hz=rate_hz, T_body_imu=T_body_imu))
-    closed = bed.closure(motion, readings, rate_hz, T_body_imu)
+    imu = ImuSettings(rate_hz=rate_hz, **place)
+    closed = bed.closure(motion, measure(motion, imu)[0], rate_hz, imu.T_body_imu)
     assert closed.off_m < 1e-3
     assert closed.off_deg < 1e-4
 
 
-@pytest.mark.parametrize("T_body_imu", [np.eye(4), PLACE], ids=["at the axle", "on an arm"])
+@pytest.mark.parametrize("place", [{}, PLACED], ids=["at the axle", "on an arm"])
 @pytest.mark.parametrize(("controller", "slip"), [("paper", "none"), ("smooth", "slippery")])
-def test_a_minute_of_a_robots_drive_closes(bed, controller, slip, T_body_imu):
+def test_a_minute_of_a_robots_drive_closes(bed, controller, slip, place):
     rngs = dict(zip(SLIP_STREAMS, np.random.default_rng(1).spawn(len(SLIP_STREAMS)), strict=True))
     motion = drive(TOUR * 2, controller=CONTROLLERS[controller], slip=SLIPS[slip], rngs=rngs).motion
     assert motion.end_ns > 60e9
-    readings, _ = measure(motion, ImuSettings(rate_hz=200, T_body_imu=T_body_imu))
-    closed = bed.closure(motion, readings, 200, T_body_imu)
+    imu = ImuSettings(rate_hz=200, **place)
+    closed = bed.closure(motion, measure(motion, imu)[0], 200, imu.T_body_imu)
     assert closed.off_m < 1e-3
     assert closed.off_deg < 1e-6
 
@@ -83,7 +82,7 @@ def test_a_minute_of_a_robots_drive_closes(bed, controller, slip, T_body_imu):
 def test_what_does_not_close_is_the_integrators_and_goes_at_least_with_the_third_power_of_the_step(bed):
     motion = bed.shaken(4, lasts_s=20)
     off_m = [
-        bed.closure(motion, measure(motion, ImuSettings(rate_hz=hz, T_body_imu=PLACE))[0], hz, PLACE).off_m
+        bed.closure(motion, measure(motion, ImuSettings(rate_hz=hz, **PLACED))[0], hz, PLACE).off_m
         for hz in (100, 200, 400)
     ]
     assert off_m[0] > 7 * off_m[1] > 49 * off_m[2]
@@ -102,7 +101,7 @@ def test_readings_add_up_to_the_change_of_speed_where_acceleration_jumps():
 @pytest.mark.parametrize(("slow_hz", "fast_hz"), [(8, 200), (40, 200)])
 def test_a_slow_reading_is_the_mean_of_all_fast_ones_in_its_time(bed, slow_hz, fast_hz):
     motion, ratio = bed.shaken(8, lasts_s=5), fast_hz // slow_hz
-    slow, fast = (measure(motion, ImuSettings(rate_hz=hz, T_body_imu=PLACE))[0] for hz in (slow_hz, fast_hz))
+    slow, fast = (measure(motion, ImuSettings(rate_hz=hz, **PLACED))[0] for hz in (slow_hz, fast_hz))
     for name in ("gyro_radps", "accel_mps2"):
         within = getattr(fast, name)[ratio // 2 + 1 :][: ratio * (len(slow.t_ns) - 2)]
         means = within.reshape(-1, ratio, 3).mean(1)
@@ -110,7 +109,7 @@ def test_a_slow_reading_is_the_mean_of_all_fast_ones_in_its_time(bed, slow_hz, f
 
 
 def test_standing_still_reads_no_turn_and_gravity_upwards(bed):
-    readings, bias = measure(bed.at_rest(TILTED, end_ns=60 * 10**9), ImuSettings(T_body_imu=PLACE))
+    readings, bias = measure(bed.at_rest(TILTED, end_ns=60 * 10**9), ImuSettings(**PLACED))
     up = (TILTED @ PLACE)[2, :3]
     assert not readings.gyro_radps.any()
     np.testing.assert_allclose(readings.accel_mps2, np.tile(9.80665 * up, (12_001, 1)), atol=1e-13)
@@ -121,7 +120,7 @@ def test_standing_still_reads_no_turn_and_gravity_upwards(bed):
 def test_an_imu_on_an_arm_feels_its_own_path(bed):
     """Against differences of where it is, not the formula of the lever arm."""
     motion, hz = bed.shaken(5, lasts_s=0.2), 10_000
-    readings, _ = measure(motion, ImuSettings(rate_hz=hz, T_body_imu=PLACE))
+    readings, _ = measure(motion, ImuSettings(rate_hz=hz, **PLACED))
     steps_ns = readings.t_ns + np.array([[-1], [0], [1]]) * 1e9 / hz
     before, T, after = (motion.at(t_ns).T_world_body @ PLACE for t_ns in steps_ns)
     in_world = (before + after - 2 * T)[:, :3, 3] * hz**2 + [0, 0, STANDARD_GRAVITY_MPS2]
@@ -202,7 +201,7 @@ def test_the_recorded_bias_is_what_is_left_of_the_readings_without_white_noise(b
     settings = replace(NOISY, gyro=silent[0], accel=silent[1])
     motion = bed.shaken(7, lasts_s=2)
     readings, bias = measure(motion, settings, rngs=generators(3))
-    truth, _ = measure(motion, ImuSettings(T_body_imu=PLACE))
+    truth, _ = measure(motion, ImuSettings(**PLACED))
     np.testing.assert_allclose(readings.gyro_radps - truth.gyro_radps, bias.gyro_radps, atol=1e-12)
     np.testing.assert_allclose(readings.accel_mps2 - truth.accel_mps2, bias.accel_mps2, atol=1e-12)
     np.testing.assert_array_equal(bias.t_ns, readings.t_ns)
@@ -242,16 +241,15 @@ def test_chance_without_a_generator_is_refused_by_name(bed):
         measure(motion, NOISY, rngs=lacking)
 
 
-@pytest.mark.parametrize("rate_hz", [0, -200, float("nan"), float("inf"), 1e9])
+@pytest.mark.parametrize("rate_hz", [0, -200, nan, inf, 1e9])
 def test_a_rate_that_is_none_is_refused(rate_hz):
-    with pytest.raises(InputError, match=r"rate_hz should be within 1 and 100000, got"):
+    with pytest.raises(SettingError, match=r"^rate_hz: should be "):
         ImuSettings(rate_hz=rate_hz)
 
 
-@pytest.mark.parametrize("place", [np.eye(3), 2 * np.eye(4), np.full((4, 4), np.nan)])
-def test_a_place_that_is_none_is_refused(place):
-    with pytest.raises(InputError, match="T_body_imu should be a rigid transform"):
-        ImuSettings(T_body_imu=place)
+def test_an_imu_is_placed_as_a_camera_that_looks_there():
+    expected = looking(pitch_deg=20, position_m=(0.25, -0.1, 0.3))
+    np.testing.assert_allclose(PLACE, expected, atol=1e-15)
 
 
 # gyro in rad/s, accel in m/s²: white noise, walk.
@@ -320,11 +318,11 @@ def test_a_walk_that_is_forgotten_has_its_spread_from_the_first_reading_on():
 def test_a_memory_of_ages_is_a_walk_that_is_never_forgotten():
     numbers = draws(1000)
     numbers[0] = 0.0
-    never, ages = (walked(Triad(walk=0.01, correlation_s=tau), numbers, step_s=0.01) for tau in (inf, 1e7))
+    never, ages = (walked(Triad(walk=0.01, correlation_s=tau), numbers, step_s=0.01) for tau in (None, 1e7))
     np.testing.assert_allclose(ages, never, atol=1e-6)
 
 
-@pytest.mark.parametrize("correlation_s", [0.5, inf])
+@pytest.mark.parametrize("correlation_s", [0.5, None])
 def test_a_longer_walk_begins_with_the_shorter_one(correlation_s):
     triad, numbers = Triad(walk=0.01, correlation_s=correlation_s), draws(500)
     short, long = (walked(triad, numbers[:n], step_s=0.01) for n in (50, 500))
@@ -357,20 +355,20 @@ def test_a_chip_reads_whole_steps_within_its_range():
 
 
 @pytest.mark.parametrize("field", ["noise", "walk", "bias_std", "step"])
-@pytest.mark.parametrize("value", [-1e-9, nan, inf])
+@pytest.mark.parametrize("value", [-1e-9, nan, inf, 1e4])
 def test_a_size_that_is_none_is_refused_by_name(field, value):
-    with pytest.raises(InputError, match=rf"an IMU's {field} should be finite and 0 or more, got {value}"):
+    with pytest.raises(SettingError, match=f"^{field}: should be (0 or more|a finite number|1000 or less)"):
         replace(FLAWLESS, **{field: value})
 
 
 @pytest.mark.parametrize("field", ["correlation_s", "limit"])
 @pytest.mark.parametrize("value", [0.0, -1.0, nan])
 def test_a_bound_that_is_none_is_refused_by_name(field, value):
-    with pytest.raises(InputError, match=rf"an IMU's {field} should be more than 0, or inf for none, got {value}"):
+    with pytest.raises(SettingError, match=f"^{field}: should be (greater than 0|a finite number)"):
         replace(FLAWLESS, **{field: value})
 
 
 @pytest.mark.parametrize(("field", "value"), [("bias", (0, 1)), ("bias", (0, nan, 0)), ("gain", (1.0, 1.0, 1.0))])
 def test_numbers_that_are_too_few_or_none_are_refused_by_name(field, value):
-    with pytest.raises(InputError, match=rf"an IMU's {field} should be \(3, ?3?\) finite numbers, got"):
+    with pytest.raises(SettingError, match=rf"^{field}(\.\d)?: (this key is missing|should be a (finite number|list))"):
         replace(FLAWLESS, **{field: value})

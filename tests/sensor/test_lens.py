@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vobench.errors import InputError
+from vobench.errors import SettingError
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
-from vobench.sensor.image_sensor import Radiance
+from vobench.sensor.image_sensor import CameraSettings, Radiance
 from vobench.sensor.lens import (
-    LensEffects,
     LensMaps,
     blur,
     dirt,
@@ -22,7 +21,7 @@ from vobench.sensor.lens import (
 )
 
 SHAPE = (120, 160)
-CLEAN = LensEffects()
+CLEAN = CameraSettings()
 
 
 CAMERA = Pinhole(160, 120, 100.0, 100.0, 79.5, 59.5)
@@ -37,7 +36,7 @@ def light(seed: int = 0) -> Radiance:
     return np.random.default_rng(seed).random(SHAPE, np.float32)
 
 
-def maps(effects: LensEffects, seed: int = 0) -> LensMaps:
+def maps(effects: CameraSettings, seed: int = 0) -> LensMaps:
     return lens_maps(effects, CAMERA, np.random.default_rng(seed))
 
 
@@ -134,8 +133,8 @@ def test_a_disc_within_a_pixel_changes_nothing() -> None:
     np.testing.assert_allclose(disc_transfer(SHAPE, 0.9), 1)
 
 
-@pytest.mark.parametrize("effects", [LensEffects(blur_sigma_px=2.5), LensEffects(defocus_px=7.0)])
-def test_blur_keeps_the_sum_of_any_picture_and_even_light_even(effects: LensEffects) -> None:
+@pytest.mark.parametrize("effects", [CameraSettings(blur_sigma_px=2.5), CameraSettings(defocus_px=7.0)])
+def test_blur_keeps_the_sum_of_any_picture_and_even_light_even(effects: CameraSettings) -> None:
     assert through_lens(light(), maps(effects)).sum(dtype=float) == pytest.approx(light().sum(dtype=float), rel=1e-6)
     np.testing.assert_allclose(through_lens(np.full(SHAPE, 0.3, np.float32), maps(effects)), 0.3, rtol=1e-6)
 
@@ -143,7 +142,7 @@ def test_blur_keeps_the_sum_of_any_picture_and_even_light_even(effects: LensEffe
 def test_blurring_leaves_no_negative_light_beside_a_lamp() -> None:
     radiance = light() * 1e-3
     radiance[50:60, 70:80] = 1e5
-    blurred = through_lens(radiance, maps(LensEffects(blur_sigma_px=1.0)))
+    blurred = through_lens(radiance, maps(CameraSettings(blur_sigma_px=1.0)))
     assert blurred.min() >= 0
     assert blurred[:10].max() < 1.1e-3
 
@@ -167,7 +166,7 @@ def test_dirt_is_one_per_camera_and_only_thickens() -> None:
 
 
 def test_dirt_dims_what_is_bright_and_veils_what_is_dark() -> None:
-    dirty, radiance = maps(LensEffects(dirt=0.2)), np.zeros(SHAPE, np.float32)
+    dirty, radiance = maps(CameraSettings(dirt=0.2)), np.zeros(SHAPE, np.float32)
     radiance[:60] = 2.0
     seen = through_lens(radiance, dirty)
     assert (seen[:60] <= 2.0).all()
@@ -176,9 +175,10 @@ def test_dirt_dims_what_is_bright_and_veils_what_is_dark() -> None:
 
 
 def test_effects_work_in_the_order_of_the_light() -> None:
-    effects = LensEffects(vignetting=1.0, dirt=0.1, blur_sigma_px=1.5)
+    effects = CameraSettings(vignetting=1.0, dirt=0.1, blur_sigma_px=1.5)
     dirty, shaded, blurred = (
-        maps(effect) for effect in (LensEffects(dirt=0.1), LensEffects(vignetting=1.0), LensEffects(blur_sigma_px=1.5))
+        maps(effect)
+        for effect in (CameraSettings(dirt=0.1), CameraSettings(vignetting=1.0), CameraSettings(blur_sigma_px=1.5))
     )
     stepwise = through_lens(through_lens(through_lens(light(), dirty), shaded), blurred)
     np.testing.assert_allclose(through_lens(light(), maps(effects)), stepwise, atol=1e-6)
@@ -194,12 +194,13 @@ def test_only_dirt_draws(name: str) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"vignetting": -1}, "vignetting should be 0 or more, got -1"),
-        ({"blur_sigma_px": np.nan}, "blur_sigma_px should be 0 or more, got nan"),
-        ({"dirt": 0.6}, "dirt should be within 0 and 0.5, got 0.6"),
-        ({"vignetting_cutoff_deg": 90}, "vignetting_cutoff_deg should be between 0 and 90, got 90"),
+        ({"vignetting": -1}, "vignetting: should be 0 or more (got -1.0)"),
+        ({"blur_sigma_px": np.nan}, "blur_sigma_px: should be a finite number (got nan)"),
+        ({"dirt": 0.6}, "dirt: should be 0.5 or less (got 0.6)"),
+        ({"vignetting_cutoff_deg": 90}, "vignetting_cutoff_deg: should be less than 90 (got 90.0)"),
     ],
 )
 def test_a_lens_that_cannot_be_is_refused(change: dict[str, float], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        LensEffects(**change)
+    with pytest.raises(SettingError) as refused:
+        CameraSettings(**change)
+    assert str(refused.value) == said

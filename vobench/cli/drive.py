@@ -70,7 +70,7 @@ def show(
 
 
 def _chosen(plan: Plan, trajectory: str | None) -> list[str]:
-    known = list(plan.suite.trajectories)
+    known = list(plan.suite.trajectories or {})
     if not known:
         raise InputError(f"suite '{plan.suite.name}' has no trajectory to drive, only recordings")
     if trajectory is not None and trajectory not in known:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,13 +20,13 @@ from vobench.run.simulate import open_renderer
 from vobench.run.store import Context, default_store
 from vobench.scene.light import NS_PER_S
 from vobench.scene.scene import Scene
-from vobench.sensor.image_sensor import CAMERAS, CameraSensor, NoiseStreams, expose, fixed_pattern
+from vobench.sensor.image_sensor import CAMERAS, CameraSettings, NoiseStreams, expose, fixed_pattern
 from vobench.sensor.pixel_truth import CHANNELS, picture
 from vobench.sensor.response import Grey
 from vobench.sequence.picture import write_png
 from vobench.suite import catalog
-from vobench.suite.camera import ENGINES, MOST_SAMPLES, RenderingSpec
 from vobench.suite.scene_file import build, read_scene
+from vobench.suite.suite import ENGINES, MOST_SAMPLES, Rendering
 
 Place = tuple[float, float, float]
 LATEST_S = 1e9  # stamps are 64 bits of nanoseconds
@@ -73,24 +73,24 @@ class Look:
     engine: str
     samples: int | None
 
-    def rendering(self) -> RenderingSpec:
+    def rendering(self) -> Rendering:
         """The engine. Raises UnknownNameError, and InputError for samples that it does not take."""
         _require_known("engine", self.engine, ENGINES)
         if self.samples is not None and self.engine != "path":
             raise InputError(f"--samples belongs to --engine path, but the engine is {self.engine}; leave it out")
         if self.samples is not None and not 1 <= self.samples <= MOST_SAMPLES:
             raise InputError(f"--samples should be from 1 to {MOST_SAMPLES}, got {self.samples}")
-        return RenderingSpec(engine=self.engine, samples=self.samples)
+        return Rendering(engine=self.engine, samples=self.samples)
 
     def lens(self) -> Camera:
         """The lens. Raises UnknownNameError."""
         _require_known("camera", self.camera, PRESETS)
         return PRESETS[self.camera].left
 
-    def chip(self) -> CameraSensor:
+    def chip(self) -> CameraSettings:
         """The chip at its exposure. Raises UnknownNameError."""
         _require_known("camera sensor", self.sensor, CAMERAS)
-        return replace(CAMERAS[self.sensor], exposure_gain=self.exposure_gain)
+        return CameraSettings(chip=CAMERAS[self.sensor], exposure_gain=self.exposure_gain)
 
 
 def show(scene_name: str, viewpoint: Viewpoint, look: Look, *, out: Path, truth: bool, as_json: bool) -> None:
@@ -118,10 +118,10 @@ def _require_known(kind: str, name: str, known: Iterable[str]) -> None:
         raise UnknownNameError(unknown(kind, name, list(known)))
 
 
-def _exposed(radiance: Radiance, chip: CameraSensor) -> Grey:
+def _exposed(radiance: Radiance, camera: CameraSettings) -> Grey:
     pattern, shot, read = np.random.default_rng(0).spawn(3)
     shape = (radiance.shape[0], radiance.shape[1])
-    return expose(radiance, chip, NoiseStreams(shot, read), pattern=fixed_pattern(shape, chip, pattern))
+    return expose(radiance, camera, NoiseStreams(shot, read), pattern=fixed_pattern(shape, camera.chip, pattern))
 
 
 def _write_truth(out: Path, scene: Scene, camera: Camera, viewpoint: Viewpoint) -> Iterator[Path]:

@@ -16,9 +16,9 @@ from vobench.dataset.source import ExportSource, Views
 from vobench.errors import InputError
 from vobench.geometry.camera import BrownConrady, Camera, KannalaBrandt, Pinhole
 from vobench.geometry.se3 import Array
-from vobench.sensor.image_sensor import CAMERAS
+from vobench.sensor.image_sensor import SENSOR_PRESETS
 from vobench.sensor.lens import vignetting
-from vobench.sensor.response import FULL_SCALE_DN, RESPONSES, Power, Response, Table, linear_of_grey
+from vobench.sensor.response import FULL_SCALE_DN, Response, linear_of_grey, response_of
 from vobench.sequence.picture import write_png
 from vobench.trajectory.formats import seconds
 from vobench.trajectory.trajectory import Stamps
@@ -55,26 +55,24 @@ class Photometry:
 def photometry_of(case: Mapping[str, Any] | None) -> Photometry | None:
     """The camera of a case; None for a recording that has none, or one of another make."""
     try:
-        camera = (case or {})["camera"]
-        chip, sensor = camera.get("chip") or {}, CAMERAS[camera["sensor"]]
-        response, black_dn = chip.get("response"), chip.get("black_dn")
+        camera = SENSOR_PRESETS.merged(_without_nothing((case or {})["camera"]))
+        chip = camera["chip"]
         return Photometry(
-            response=sensor.response if response is None else response_of(response),
-            black_dn=sensor.black_dn if black_dn is None else float(black_dn),
-            vignetting=float(camera.get("vignetting") or 0.0),
+            response=response_of(chip["response"]),
+            black_dn=float(chip["black_dn"]),
+            vignetting=float(camera.get("vignetting", 0.0)),
             cutoff_deg=camera.get("vignetting_cutoff_deg"),
-            dirt=float(camera.get("dirt") or 0.0),
-            readout_ms=float(camera.get("readout_ms") or 0.0),
+            dirt=float(camera.get("dirt", 0.0)),
+            readout_ms=float(camera.get("readout_ms", 0.0)),
         )
     except (InputError, KeyError, TypeError, ValueError, AttributeError):
         return None
 
 
-def response_of(said: str | float | list[float]) -> Response:
-    """The response that a case names, gives the gamma of, or tabulates."""
-    if isinstance(said, str):
-        return RESPONSES[said]
-    return Table(tuple(map(float, said))) if isinstance(said, list) else Power(float(said))
+def _without_nothing(section: Mapping[str, Any]) -> dict[str, Any]:
+    """What is said: older cases say null of what they leave to the sensor that they name."""
+    said = {key: value for key, value in section.items() if value is not None}
+    return {**said, "chip": {key: value for key, value in said.get("chip", {}).items() if value is not None}}
 
 
 def write_photometric(source: ExportSource, views: Views, stamps: Stamps, folder: Path) -> list[str]:

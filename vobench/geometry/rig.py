@@ -1,14 +1,16 @@
 """Stereo rigs: cameras, mounts, wheels and IMU of a body; presets, and declared calibration error."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Ge, Gt, Le, Lt
 
 from vobench.errors import InputError, VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, KannalaBrandt, Pinhole
 from vobench.geometry.se3 import Array
+from vobench.setting import SETTINGS, Positive, require
 
 # Focal length, sensor and resolution as the paper gives them (section II-B).
 PAPER_FOCAL_MM, PAPER_SENSOR_MM, PAPER_SIZE_PX = 32.0, (35.0, 28.18), (720, 480)
@@ -16,16 +18,14 @@ PAPER_FOCAL_MM, PAPER_SENSOR_MM, PAPER_SIZE_PX = 32.0, (35.0, 28.18), (720, 480)
 
 @dataclass(frozen=True, slots=True)
 class WheelGeometry:
-    """Nominal geometry of the two driven wheels, as an odometer believes it. Raises InputError where it is none."""
+    """Nominal geometry of the two driven wheels, as an odometer believes it."""
 
-    radius_m: float
-    track_m: float
-    ticks_per_revolution: int
+    radius_m: Positive
+    track_m: Positive
+    ticks_per_revolution: Annotated[int, Gt(0)]
 
     def __post_init__(self) -> None:
-        for name in ("radius_m", "track_m", "ticks_per_revolution"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise InputError(f"a wheel's {name} must be finite and above 0, got {getattr(self, name)}")
+        require(self)
 
 
 # Radius and track: CoppeliaSim's Pioneer 3-DX; 500 lines x 4 edges x gear 38.3, from the data sheet.
@@ -302,7 +302,11 @@ PRESETS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+Ratio = Annotated[float, Gt(-1), Lt(1)]
+Angle = Annotated[float, Ge(-10), Le(10)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CalibrationError:
     """The true rig minus what its calibration says; ratios are shares of what it says.
 
@@ -311,13 +315,18 @@ class CalibrationError:
     shifted along the baseline: the left camera stays where the calibration has it.
     """
 
-    focal_ratio: float = 0.0
+    __pydantic_config__ = SETTINGS
+
+    focal_ratio: Ratio = 0.0
     center_px: tuple[float, float] = (0.0, 0.0)
-    distortion_ratio: float = 0.0
-    baseline_ratio: float = 0.0
-    right_roll_deg: float = 0.0
-    right_pitch_deg: float = 0.0
-    right_yaw_deg: float = 0.0
+    distortion_ratio: Ratio = 0.0
+    baseline_ratio: Ratio = 0.0
+    right_roll_deg: Angle = 0.0
+    right_pitch_deg: Angle = 0.0
+    right_yaw_deg: Angle = 0.0
+
+    def __post_init__(self) -> None:
+        require(self)
 
 
 def true_rig(nominal: Rig, error: CalibrationError) -> Rig:

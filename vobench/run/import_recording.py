@@ -11,6 +11,7 @@ from vobench.run.score import is_known
 from vobench.run.store import Context, Store, code_digest, library_versions, versions
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite import Plan
+from vobench.suite.yaml_file import plain
 
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "mcap", "rosbags")
 
@@ -50,7 +51,7 @@ def read_case(case: RecordedCase) -> Recording:
         imu=_path(source.imu),
         truth=_path(source.truth),
         rate_hz=source.rate_hz,
-        topics=Topics(**source.topics.model_dump()),
+        topics=Topics(**source.topics),
     )
     return read(Path(source.path), form=source.form, options=options)
 
@@ -87,7 +88,7 @@ def _inputs(case: RecordedCase, recording: Recording) -> dict[str, Any]:
     source, truth = case.source, recording.truth
     files = [Path(file) for file in (source.path, source.calibration, source.imu) if file]
     return {
-        "source": source.model_dump(mode="json", exclude={"name"}),
+        "source": plain(source, exclude={"name"}),
         "files": [line for path in files for line in _listing(path)],
         # KITTI's lies outside the folder.
         "truth": hashlib.sha256(truth.t_ns.tobytes() + truth.T_world_frame.tobytes()).hexdigest() if truth else "",

@@ -31,6 +31,7 @@ from vobench.run.store import Context, digest, folder_digest, library_versions
 from vobench.sequence import read_import_notes
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite import Case, Entrant, Plan
+from vobench.suite.yaml_file import plain
 from vobench.trajectory.formats import format_tum
 
 Finish = Callable[[RunFolder, list[TrialScore]], None]
@@ -42,7 +43,7 @@ def run_suite(plan: Plan, *, root: Path, shop: Context, finish: Finish) -> RunFo
 
     `finish` adds reports to the folder before it gets its final name under `root`.
     """
-    suite = plan.suite.model_dump(mode="json")
+    suite = plain(plan.suite)
     entrants = [_entrant_facts(entrant) for entrant in plan.entrants]
 
     def fill(folder: RunFolder) -> None:
@@ -64,7 +65,7 @@ def _run_case(plan: Plan, case: Case | RecordedCase, folder: RunFolder, shop: Co
     sequence = _sequence_of(case, shop)
     target = folder.case(case.name)
     target.mkdir(parents=True)
-    write_json(target / CASE, {**case.model_dump(mode="json"), **_assumed(case, sequence)})
+    write_json(target / CASE, {**plain(case), **_assumed(case, sequence)})
     (target / GROUND_TRUTH).write_text(format_tum(left_truth(sequence)), encoding="utf-8")
     gt = estimate_file.read_tum(target / GROUND_TRUTH)  # what is scored is what anybody can score again
     (target / SEQUENCE).symlink_to(sequence.resolve())

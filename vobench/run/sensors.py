@@ -9,7 +9,7 @@ from vobench.render.truth import TruthCaster
 from vobench.run.motion import BodyMotion, generator
 from vobench.scene.scene import Scene
 from vobench.sensor.encoder import ENCODERS, ticks
-from vobench.sensor.exposure import ShutterKind, row_stamps
+from vobench.sensor.exposure import row_stamps
 from vobench.sensor.imu import STREAMS, ImuBias, ImuReadings, measure
 from vobench.sensor.pixel_truth import TruthFrame, TruthNames
 from vobench.sequence import SequenceWriter
@@ -54,7 +54,7 @@ def _felt(case: Case, travel: BodyMotion) -> tuple[ImuReadings, ImuBias] | None:
     if case.rig.imu is None:
         return None
     rngs = {stream: generator(case.seed, f"imu.{stream}") for stream in STREAMS}
-    return measure(travel.motion, case.rig.imu.build(), rngs=rngs)
+    return measure(travel.motion, case.rig.imu, rngs=rngs)
 
 
 def _write_imu(readings: ImuReadings, bias: ImuBias, new: slice, writer: SequenceWriter) -> None:
@@ -90,7 +90,7 @@ class PixelTruth:
     """Ground truth of a case's pictures, amid each row's exposure; the true rig sees it."""
 
     def __init__(self, case: Case, scene: Scene, motion: Motion) -> None:
-        self._rig, self._shutter, self._motion = case.build_true_rig(), case.camera.build_shutter(), motion
+        self._rig, self._readout_s, self._motion = case.build_true_rig(), case.camera.readout_s, motion
         self._channels, self._caster = case.truth, TruthCaster(scene)
 
     @property
@@ -105,7 +105,7 @@ class PixelTruth:
 
     def _shot(self, side: Side, t_ns: int) -> Shot:
         T_body_camera = self._rig.T_body_camera(side)
-        if self._shutter.kind is ShutterKind.GLOBAL:
+        if not self._readout_s:
             return Shot(self._motion.at(np.array([t_ns])).T_world_body[0] @ T_body_camera, t_ns)
-        stamps = row_stamps(self._rig.camera(side).height_px, self._shutter, t_ns)
+        stamps = row_stamps(self._rig.camera(side).height_px, self._readout_s, t_ns)
         return Shot(self._motion.at(stamps).T_world_body @ T_body_camera, stamps)

@@ -11,9 +11,9 @@ from vobench.render.renderer import Renderer
 from vobench.run.motion import BodyMotion, body_motion
 from vobench.run.store import Context, Store, canonical, code_digest, library_versions, versions
 from vobench.scene.scene import Scene
-from vobench.suite.camera import RenderingSpec
 from vobench.suite.scene_spec import SceneFile
-from vobench.suite.suite import Case
+from vobench.suite.suite import Case, Rendering
+from vobench.suite.yaml_file import plain
 
 BAKE = BakeSettings()
 # What of a scene's file its light does not depend on; levels weigh the light of each lamp later.
@@ -26,7 +26,7 @@ UNLIT: dict[str, Any] = {
 }
 
 
-def open_renderer(spec: SceneFile, scene: Scene, rendering: RenderingSpec, shop: Context) -> Renderer:
+def open_renderer(spec: SceneFile, scene: Scene, rendering: Rendering, shop: Context) -> Renderer:
     """The renderer of a scene that was built from `spec`; the caller closes it.
 
     Raises MissingDependencyError where this machine cannot draw, before any light is computed.
@@ -45,7 +45,7 @@ def open_renderer(spec: SceneFile, scene: Scene, rendering: RenderingSpec, shop:
 def _baked(spec: SceneFile, scene: Scene, shop: Context) -> BakedScene:
     """The scene with its light, from the store where it has been computed before, under whatever levels."""
     inputs = {
-        "scene": spec.model_dump(mode="json", exclude=UNLIT),
+        "scene": plain(spec, exclude=UNLIT),
         "settings": repr(BAKE),
         "code": code_digest("geometry", "scene", "render", "suite"),
         "libraries": library_versions("numpy", "scipy", "embreex"),
@@ -97,7 +97,8 @@ def sequence_inputs(case: Case) -> dict[str, Any]:
 
 def _content(case: Case) -> dict[str, Any]:
     """What is simulated, without what the suite calls it: the same for equal cases of two suites."""
-    return case.model_dump(mode="json", exclude=UNSIMULATED)
+    content: dict[str, Any] = plain(case, exclude=UNSIMULATED)
+    return content
 
 
 def _record(case: Case, folder: Path, shop: Context) -> None:

@@ -15,7 +15,7 @@ from vobench.render.renderer import Radiance, Renderer, View
 from vobench.run.motion import generator
 from vobench.scene.light import Steady
 from vobench.scene.scene import Scene
-from vobench.sensor.exposure import Exposure, ExposureState, ShutterKind, start, step, strips
+from vobench.sensor.exposure import Exposure, ExposureState, start, step, strips
 from vobench.sensor.image_sensor import NoiseStreams, expose, fixed_pattern
 from vobench.sensor.lens import lens_maps, through_lens
 from vobench.sensor.response import Grey
@@ -121,16 +121,16 @@ class StereoCamera:
     def __init__(self, case: Case, world: World) -> None:
         displacement = Displacement(world.scene)
         self._left, self._right = (SimulatedCamera(case, side, world, displacement) for side in SIDES)
-        self._chip, self._loop = case.camera.build_chip(), case.camera.build_auto_exposure()
-        first = case.camera.build_exposure()
-        self._state = start(self._loop, first) if self._loop else ExposureState((first,))
+        self._settings, first = case.camera, case.camera.exposure
+        loop = case.camera.auto_exposure
+        self._state = start(loop, first) if loop else ExposureState((first,))
 
     def shoot(self, t_ns: int) -> StereoPair:
         """The pictures stamped t_ns, the middle of their exposure; call in order of time."""
         exposure = self._state.now
         pair = StereoPair(self._left.picture(t_ns, exposure), self._right.picture(t_ns, exposure), exposure)
-        if self._loop:
-            self._state = step(self._loop, self._state, pair.left, self._chip.signal_of_grey)
+        if loop := self._settings.auto_exposure:
+            self._state = step(loop, self._state, pair.left, self._settings.chip.signal_of_grey)
         return pair
 
 
@@ -145,25 +145,24 @@ class SimulatedCamera:
         self._camera, self._T_body_camera = rig.camera(side), rig.T_body_camera(side)
         self._world, self._displacement = world, displacement
         self._light_changes = not all(isinstance(light.level, Steady) for light in world.scene.lights)
-        self._shutter, self._blurs = case.camera.build_shutter(), case.camera.motion_blur
-        self._white_cd_m2, self._chip = np.float32(case.scene.white_cd_m2), case.camera.build_chip()
-        self._lens = lens_maps(case.camera.build_lens(), self._camera, stream("dirt"))
+        self._settings, self._white_cd_m2 = case.camera, np.float32(case.scene.white_cd_m2)
+        self._lens = lens_maps(case.camera, self._camera, stream("dirt"))
         self._noise = NoiseStreams(stream("shot"), stream("read"))
         shape = (self._camera.height_px, self._camera.width_px)
-        self._pattern = fixed_pattern(shape, self._chip, stream("pattern"))
+        self._pattern = fixed_pattern(shape, case.camera.chip, stream("pattern"))
 
     def picture(self, t_ns: int, exposure: Exposure) -> Grey:
         """The grey values (H, W) of a picture stamped t_ns."""
         luminance_cd_m2 = self._world.renderer.radiance(self._camera, self.views(t_ns, exposure))
         at_chip: Radiance = through_lens(luminance_cd_m2 / self._white_cd_m2, self._lens)
-        return expose(at_chip, self._chip, self._noise, pattern=self._pattern, exposure=exposure)
+        return expose(at_chip, self._settings, self._noise, pattern=self._pattern, exposure=exposure)
 
     def views(self, t_ns: int, exposure: Exposure) -> list[View]:
         """How the rows are exposed, in strips and sub-frames as fine as the motion asks for."""
         height = self._camera.height_px
         cut = strips(
             height,
-            self._shutter,
+            self._settings.readout_s,
             t_ns,
             exposure.time_s,
             row_strips=self._row_strips(t_ns),
@@ -172,17 +171,17 @@ class SimulatedCamera:
         return [View(s.rows, self._seen_from(s.mid_ns), s.start_ns, s.end_ns) for s in cut]
 
     def _sub_frames(self, t_ns: int, exposure: Exposure) -> int:
-        if not self._blurs:
+        if not self._settings.motion_blur:
             return 1
         moved_px = self._moved_px(t_ns, exposure.time_s)
         return int(np.clip(np.ceil(moved_px / SUB_FRAME_PX), 1, MOST_SUB_FRAMES))
 
     def _row_strips(self, t_ns: int) -> int:
         height = self._camera.height_px
-        if self._shutter.kind is ShutterKind.GLOBAL:
+        if not self._settings.readout_s:
             return 1
         least = -(-height // ROWS_UNDER_CHANGING_LIGHT) if self._light_changes else 1
-        moved_px = self._moved_px(t_ns, self._shutter.readout_s)
+        moved_px = self._moved_px(t_ns, self._settings.readout_s)
         return int(np.clip(np.ceil(moved_px / STRIP_PX), least, height))
 
     def _moved_px(self, t_ns: int, duration_s: float) -> float:

@@ -2,38 +2,19 @@
 
 import math
 from dataclasses import dataclass
-from enum import StrEnum
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Ge, Gt, Le, Lt
 
-from vobench.errors import InputError
+from vobench.errors import InputError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.sensor.response import FULL_SCALE_DN, Grey
+from vobench.setting import SETTINGS, NonNegative, Positive, require
 from vobench.trajectory.trajectory import Stamps
 
 NS_PER_S = 1_000_000_000
-
-
-class ShutterKind(StrEnum):
-    """Whether all rows are exposed together or one after the other."""
-
-    GLOBAL = "global"
-    ROLLING = "rolling"
-
-
-@dataclass(frozen=True, slots=True)
-class Shutter:
-    """`readout_s` is the time from the first row to the one that would follow the last: height × line delay."""
-
-    kind: ShutterKind = ShutterKind.GLOBAL
-    readout_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.readout_s < 10:
-            raise InputError(f"a picture should be read out within 0 to 10 s, got {self.readout_s}")
-        if self.kind is ShutterKind.GLOBAL and self.readout_s:
-            raise InputError(f"a global shutter reads all rows at once, got a readout of {self.readout_s} s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,19 +32,20 @@ class Strip:
 
 
 def strips(
-    height: int, shutter: Shutter, t_ns: int, exposure_s: float, *, row_strips: int, sub_frames: int
+    height: int, readout_s: float, t_ns: int, exposure_s: float, *, row_strips: int, sub_frames: int
 ) -> list[Strip]:
     """The exposure of a picture stamped t_ns, the middle of the exposure of its middle row, top strip first.
 
+    `readout_s` is the time from the first row to the one that would follow the last, 0 for a global shutter.
     Strips tile the rows, parts tile the exposure. A strip is timed by its middle row, so its outer rows are off by
     readout / (2 · row_strips); a global shutter needs and gets one strip. Source: Kalibr, row v is v · line delay late.
     """
-    exposure_ns, readout_ns = round(exposure_s * NS_PER_S), round(shutter.readout_s * NS_PER_S)
+    exposure_ns, readout_ns = round(exposure_s * NS_PER_S), round(readout_s * NS_PER_S)
     if exposure_ns < sub_frames or sub_frames < 1:
         raise InputError(f"an exposure of {exposure_ns} ns cannot be cut into {sub_frames} sub-frames")
     if not 1 <= row_strips <= height:
         raise InputError(f"{height} rows cannot be cut into {row_strips} strips")
-    count = row_strips if shutter.kind is ShutterKind.ROLLING else 1
+    count = row_strips if readout_ns else 1
     borders = [height * index // count for index in range(count + 1)]
     parts = np.arange(sub_frames + 1, dtype=np.int64) * exposure_ns // sub_frames
     cut = []
@@ -73,9 +55,9 @@ def strips(
     return cut
 
 
-def row_stamps(height: int, shutter: Shutter, t_ns: int) -> Stamps:
+def row_stamps(height: int, readout_s: float, t_ns: int) -> Stamps:
     """The middle of each row's exposure (H,) in a picture stamped t_ns."""
-    readout_ns = round(shutter.readout_s * NS_PER_S)
+    readout_ns = round(readout_s * NS_PER_S)
     return np.array([t_ns + _late_ns(row, row + 1, height, readout_ns) for row in range(height)], np.int64)
 
 
@@ -97,14 +79,11 @@ DEAD_BAND = 0.02
 class Exposure:
     """The exposure of one picture: the time that the shutter is open and the analogue gain."""
 
-    time_s: float
-    gain_db: float = 0.0
+    time_s: Positive
+    gain_db: NonNegative = 0.0
 
     def __post_init__(self) -> None:
-        if not 0 < self.time_s < math.inf:
-            raise InputError(f"an exposure should last more than 0 s, got {self.time_s}")
-        if not 0 <= self.gain_db < math.inf:
-            raise InputError(f"gain_db should be 0 or more, got {self.gain_db}")
+        require(self)
 
     @property
     def amplification(self) -> float:
@@ -112,7 +91,7 @@ class Exposure:
         return float(10 ** (self.gain_db / 20))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class AutoExposure:
     """A first-order loop in the logarithm of time × gain: first time, up to its limit, then gain.
 
@@ -121,27 +100,22 @@ class AutoExposure:
     Source: onsemi MT9V034 data sheet: exposure before gain, new settings reach the picture after the next.
     """
 
-    target_share: float = 0.18
-    percentile: float | None = None
-    lag_frames: int = 2
-    damping: float = 0.2
-    t_min_s: float = 50e-6
-    t_max_s: float = 20e-3
-    gain_max_db: float = 12.0
+    __pydantic_config__ = SETTINGS
+
+    target_share: Annotated[float, Gt(0), Lt(1)] = 0.18
+    percentile: Annotated[float, Gt(0), Le(100)] | None = None
+    lag_frames: Annotated[int, Ge(1), Le(10)] = 2
+    damping: Annotated[float, Ge(0), Lt(1)] = 0.2
+    t_min_ms: Positive = 0.05
+    t_max_ms: Positive = 20.0
+    gain_max_db: Annotated[float, Ge(0), Le(48)] = 12.0
 
     def __post_init__(self) -> None:
-        if not 0 < self.target_share < 1:
-            raise InputError(f"target_share should be between 0 and 1, got {self.target_share}")
-        if self.percentile is not None and not 0 < self.percentile <= 100:
-            raise InputError(f"percentile should be more than 0 and at most 100, got {self.percentile}")
-        if self.lag_frames < 1:
-            raise InputError(f"lag_frames should be 1 or more, as a picture is first taken, got {self.lag_frames}")
-        if not 0 <= self.damping < 1:
-            raise InputError(f"damping should be 0 or more and less than 1, got {self.damping}")
-        if not 0 < self.t_min_s <= self.t_max_s:
-            raise InputError(f"exposure limits should rise, got {self.t_min_s} s to {self.t_max_s} s")
-        if not 0 <= self.gain_max_db < math.inf:
-            raise InputError(f"gain_max_db should be 0 or more, got {self.gain_max_db}")
+        require(self)
+        if self.t_min_ms > self.t_max_ms:
+            raise SettingError(
+                f"should be at most t_max_ms, but is {self.t_min_ms:g} against {self.t_max_ms:g}", "t_min_ms"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +157,7 @@ def _level(exposure: Exposure) -> float:
 
 def _within(loop: AutoExposure, level_s: float) -> Exposure:
     """The exposure of this level: as much time as allowed, the rest by gain."""
-    time_s = min(max(level_s, loop.t_min_s), loop.t_max_s)
+    time_s = min(max(level_s, loop.t_min_ms / 1e3), loop.t_max_ms / 1e3)
     return Exposure(time_s, min(max(20 * math.log10(level_s / time_s), 0.0), loop.gain_max_db))
 
 

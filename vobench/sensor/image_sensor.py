@@ -1,15 +1,18 @@
 """A camera's image sensor after EMVA 1288: photons to electrons to 8-bit grey values. Pure."""
 
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 import scipy
+from annotated_types import Ge, Gt, Le, Lt
 from numpy.typing import NDArray
 
-from vobench.errors import InputError, RenderError
+from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
-from vobench.sensor.exposure import Exposure
-from vobench.sensor.response import FULL_SCALE_DN, SRGB, Grey, Response, linear_of_grey, quantise
+from vobench.sensor.exposure import AutoExposure, Exposure
+from vobench.sensor.response import FULL_SCALE_DN, Grey, Response, linear_of_grey, quantise, response_of
+from vobench.setting import SETTINGS, Check, Like, NonNegative, Positive, Share, require
 
 # From this mean on the expansion below is off by less than 6e-4 in total variation, 1e-4 in variance and 1e-5 in mean.
 EXPANSION_FROM = 10.0
@@ -67,51 +70,40 @@ def _summed(mean: Array, probability: Array) -> NDArray[np.int8]:
 Radiance = NDArray[np.float32]
 # Grey value of radiance 1, matt white in the scene's own light: what a careful photographer would expose for.
 WHITE_DN = 200
-ADC_BITS = (8, 10, 12)
 # Pictures are exposed some rows at a time: what is needed on the way then stays in the processor's cache.
 PIXELS_AT_A_TIME = 1 << 15
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CameraSensor:
-    """A chip, its electronics and its aperture; electrons saturate at `full_well_e`.
+    """A chip and its electronics; electrons saturate at `full_well_e`.
 
-    With an exposure of `nominal_s` and no gain, radiance 1 comes to 200 grey values; `exposure_gain` multiplies that
-    light. `prnu` (relative), `dsnu_e`, `column_e` and the hot pixels are fixed in time.
-    `adc_bits` none is a converter so fine that only the 8 bits kept are seen.
+    `prnu` (relative), `dsnu_e`, `column_e` and the hot pixels are fixed in time. `adc_bits` none is a converter so
+    fine that only the 8 bits kept are seen. A response is a name, a gamma or a table of signals.
     """
 
-    full_well_e: float = 20_000.0
-    exposure_gain: float = 1.0
-    nominal_s: float = 0.005
-    black_dn: float = 0.0
+    __pydantic_config__ = SETTINGS
+
+    full_well_e: Positive = 20_000.0
+    black_dn: Annotated[float, Ge(0), Le(128)] = 0.0
     shot_noise: bool = False
-    read_noise_e: float = 0.0
-    prnu: float = 0.0
-    dsnu_e: float = 0.0
-    column_e: float = 0.0
-    dark_e_per_s: float = 0.0
-    hot_share: float = 0.0
-    hot_e_per_s: float = 20_000.0
-    adc_bits: int | None = None
-    response: Response = SRGB
+    read_noise_e: NonNegative = 0.0
+    prnu: Share = 0.0
+    dsnu_e: NonNegative = 0.0
+    column_e: NonNegative = 0.0
+    dark_e_per_s: NonNegative = 0.0
+    hot_share: Share = 0.0
+    hot_e_per_s: NonNegative = 20_000.0
+    adc_bits: Literal[8, 10, 12] | None = None
+    response: Annotated[str | float | tuple[float, ...], Check(response_of, first=True)] = "srgb"
 
     def __post_init__(self) -> None:
-        for name in ("full_well_e", "exposure_gain", "nominal_s"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise InputError(f"{name} should be greater than 0, got {getattr(self, name)}")
-        for name in ("read_noise_e", "prnu", "dsnu_e", "column_e", "dark_e_per_s", "hot_e_per_s", "black_dn"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise InputError(f"{name} should be 0 or more, got {getattr(self, name)}")
-        if not 0 <= self.hot_share <= 1:
-            raise InputError(f"hot_share should be within 0 and 1, got {self.hot_share}")
-        if self.adc_bits not in (None, *ADC_BITS):
-            raise InputError(f"adc_bits should be 8, 10 or 12, got {self.adc_bits}")
+        require(self)
 
     @property
-    def nominal(self) -> Exposure:
-        """The exposure that the aperture is set for."""
-        return Exposure(self.nominal_s)
+    def curve(self) -> Response:
+        """The response."""
+        return response_of(self.response)
 
     @property
     def dn_per_electron(self) -> float:
@@ -119,15 +111,9 @@ class CameraSensor:
         return FULL_SCALE_DN / self.full_well_e
 
     @property
-    def white_e(self) -> float:
-        """mu_e of radiance 1 at the nominal exposure."""
-        share = self.response.decode(np.array(WHITE_DN / FULL_SCALE_DN))
-        return float(share) * self.full_well_e * self.exposure_gain
-
-    @property
     def signal_of_grey(self) -> Array:
         """Shares of full scale (256,) that light gives each grey value: what auto-exposure meters."""
-        return linear_of_grey(self.response) - self.black_dn / FULL_SCALE_DN
+        return linear_of_grey(self.curve) - self.black_dn / FULL_SCALE_DN
 
 
 # `clean` measures nothing but quantisation. Of the others, shot noise and the size of a converter are facts. Full wells
@@ -173,6 +159,64 @@ CAMERAS = {
 }
 
 
+# YAML names a sensor beside the rest of a camera, and says in `chip` what differs from it.
+SENSOR_PRESETS = Like("camera sensor", CAMERAS, key="sensor", section="chip")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraSettings:
+    """The chip behind the lens, how it is exposed, and what the lens does to the light.
+
+    The aperture is set for `exposure_ms`: then, and without gain, radiance 1 comes to 200 grey values;
+    `exposure_gain` multiplies that light. `readout_ms` of a rolling shutter is height × line delay.
+    `vignetting` 1 is cos⁴θ (the exponent is 4 · vignetting), cut off by the lens's rims at `vignetting_cutoff_deg`;
+    `blur_sigma_px` is a Gaussian's, `defocus_px` the diameter of the disc that a point out of focus makes,
+    `dirt` the mean share of light that dirt on the front lens keeps from its way.
+    """
+
+    __pydantic_config__ = SETTINGS
+
+    chip: CameraSensor = CAMERAS["clean"]
+    exposure_gain: Positive = 1.0
+    exposure_ms: Annotated[float, Ge(0.001), Le(1000)] = 5.0
+    gain_db: Annotated[float, Ge(0), Le(48)] = 0.0
+    auto_exposure: AutoExposure | None = None
+    shutter: Literal["global", "rolling"] = "global"
+    readout_ms: Annotated[float, Ge(0), Le(1000)] | None = None
+    motion_blur: bool = False
+    vignetting: Annotated[float, Ge(0), Le(4)] = 0.0
+    vignetting_cutoff_deg: Annotated[float, Gt(0), Lt(90)] | None = None
+    blur_sigma_px: Annotated[float, Ge(0), Le(100)] = 0.0
+    defocus_px: Annotated[float, Ge(0), Le(100)] = 0.0
+    dirt: Annotated[float, Ge(0), Le(0.5)] = 0.0
+    jpeg_quality: Annotated[int, Ge(1), Le(100)] | None = None
+
+    def __post_init__(self) -> None:
+        require(self)
+        if self.shutter == "rolling" and self.readout_ms is None:
+            raise SettingError(
+                "a rolling shutter needs readout_ms: rows × the time from one row to the next, such as 20"
+            )
+        if self.shutter == "global" and self.readout_ms is not None:
+            raise SettingError("readout_ms belongs to a rolling shutter; add shutter: rolling")
+
+    @property
+    def exposure(self) -> Exposure:
+        """The exposure of every picture, or of the first ones where auto-exposure follows."""
+        return Exposure(self.exposure_ms / 1e3, self.gain_db)
+
+    @property
+    def readout_s(self) -> float:
+        """The time from the first row to the one that would follow the last; 0 for a global shutter."""
+        return (self.readout_ms or 0.0) / 1e3
+
+    @property
+    def white_e(self) -> float:
+        """mu_e of radiance 1 at the exposure that the aperture is set for."""
+        share = self.chip.curve.decode(np.array(WHITE_DN / FULL_SCALE_DN))
+        return float(share) * self.chip.full_well_e * self.exposure_gain
+
+
 @dataclass(frozen=True, slots=True)
 class NoiseStreams:
     """A generator for each kind of noise; each picture takes as many draws as any other, however bright it is."""
@@ -209,7 +253,7 @@ def fixed_pattern(shape: tuple[int, int], sensor: CameraSensor, rng: np.random.G
 
 def expose(
     radiance: Radiance,
-    sensor: CameraSensor,
+    camera: CameraSettings,
     noise: NoiseStreams,
     *,
     pattern: FixedPattern | None = None,
@@ -217,6 +261,7 @@ def expose(
 ) -> Grey:
     """One picture (H, W) of linear radiance (H, W), where 1 is matt white in the scene's own light.
 
+    Without an exposure it is the one that the aperture is set for.
     Longer exposure is more electrons, gain only a larger K. Radiance is the mean over the exposure.
     Raises RenderError for radiance that is negative or not a number. Source: EMVA 1288, release 3.1, section 2.
     """
@@ -227,14 +272,15 @@ def expose(
     for first in range(0, len(radiance), step):
         rows = slice(first, first + step)
         local = pattern.of(rows) if pattern else None
-        grey[rows] = _expose_rows(radiance[rows], sensor, noise, local, exposure or sensor.nominal)
+        grey[rows] = _expose_rows(radiance[rows], camera, noise, local, exposure or Exposure(camera.exposure_ms / 1e3))
     return grey
 
 
 def _expose_rows(
-    radiance: Radiance, sensor: CameraSensor, noise: NoiseStreams, pattern: FixedPattern | None, exposure: Exposure
+    radiance: Radiance, camera: CameraSettings, noise: NoiseStreams, pattern: FixedPattern | None, exposure: Exposure
 ) -> Grey:
-    electrons = _collect(_mean_electrons(radiance, sensor, pattern, exposure), sensor, noise.shot)
+    sensor = camera.chip
+    electrons = _collect(_mean_electrons(radiance, camera, pattern, exposure), sensor, noise.shot)
     if pattern is not None:
         electrons += pattern.offset_e
     if sensor.read_noise_e > 0:
@@ -243,13 +289,13 @@ def _expose_rows(
 
 
 def _mean_electrons(
-    radiance: Radiance, sensor: CameraSensor, pattern: FixedPattern | None, exposure: Exposure
+    radiance: Radiance, camera: CameraSettings, pattern: FixedPattern | None, exposure: Exposure
 ) -> Array:
     """mu_e (H, W), of light and of warmth."""
     mean_e = radiance.astype(float)
-    mean_e *= sensor.white_e * (exposure.time_s / sensor.nominal_s)
+    mean_e *= camera.white_e * (exposure.time_s / (camera.exposure_ms / 1e3))
     if pattern is None:
-        return mean_e + sensor.dark_e_per_s * exposure.time_s
+        return mean_e + camera.chip.dark_e_per_s * exposure.time_s
     mean_e *= pattern.gain
     mean_e += pattern.dark_e_per_s * exposure.time_s
     return mean_e
@@ -270,8 +316,8 @@ def _convert(electrons: Array, sensor: CameraSensor, exposure: Exposure) -> Grey
     electrons /= FULL_SCALE_DN
     linear = np.clip(electrons, 0.0, 1.0, out=electrons)
     if sensor.adc_bits is None:
-        return quantise(linear, sensor.response)
+        return quantise(linear, sensor.curve)
     largest = (1 << sensor.adc_bits) - 1
     linear *= largest
     linear += 0.5
-    return quantise(np.arange(largest + 1) / largest, sensor.response).take(linear.astype(np.intp))
+    return quantise(np.arange(largest + 1) / largest, sensor.curve).take(linear.astype(np.intp))

@@ -1,53 +1,49 @@
 """An IMU after Kalibr's model: angular rate and specific force, noise, bias, presets."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from math import exp, expm1, inf, isfinite, pi, sqrt
+from dataclasses import dataclass
+from math import exp, expm1, pi, sqrt
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Ge, Le
 
 from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.rig import ImuCalibration
 from vobench.geometry.se3 import Array
+from vobench.setting import SETTINGS, Positive, require
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, Kinematics, Motion
 from vobench.trajectory.trajectory import Stamps
 
-Axes = tuple[float, float, float]
+Size = Annotated[float, Ge(0), Le(1e3)]
+Number = Annotated[float, Ge(-1e3), Le(1e3)]
+Axes = tuple[Number, Number, Number]
 EYE: tuple[Axes, Axes, Axes] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Triad:
     """Reading = gain · truth + bias + white noise, cut off at ± limit and rounded to whole steps.
 
-    With U the unit read: noise in U/√Hz, walk in U/s/√Hz, forgotten after correlation_s (inf: never); bias,
-    bias_std (what each start adds to it by chance), limit and step (0: not rounded) in U. The gain's diagonal is
-    scale, the rest misalignment. Raises InputError where a value is none.
+    With U the unit read: noise in U/√Hz, walk in U/s/√Hz, forgotten after correlation_s (None: never); bias,
+    bias_std (what each start adds to it by chance), limit (None: not cut off) and step (0: not rounded) in U.
+    The gain's diagonal is scale, the rest misalignment.
     """
 
-    noise: float = 0.0
-    walk: float = 0.0
-    correlation_s: float = inf
+    __pydantic_config__ = SETTINGS
+
+    noise: Size = 0.0
+    walk: Size = 0.0
+    correlation_s: Positive | None = None
     bias: Axes = (0.0, 0.0, 0.0)
-    bias_std: float = 0.0
+    bias_std: Size = 0.0
     gain: tuple[Axes, Axes, Axes] = EYE
-    limit: float = inf
-    step: float = 0.0
+    limit: Positive | None = None
+    step: Size = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("noise", "walk", "bias_std", "step"):
-            value = getattr(self, name)
-            if not (value >= 0 and isfinite(value)):
-                raise InputError(f"an IMU's {name} should be finite and 0 or more, got {value}")
-        for name in ("correlation_s", "limit"):
-            value = getattr(self, name)
-            if not value > 0:
-                raise InputError(f"an IMU's {name} should be more than 0, or inf for none, got {value}")
-        for name, shape in (("bias", (3,)), ("gain", (3, 3))):
-            value = np.asarray(getattr(self, name), float)
-            if value.shape != shape or not np.isfinite(value).all():
-                raise InputError(f"an IMU's {name} should be {shape} finite numbers, got {getattr(self, name)}")
+        require(self)
 
 
 FLAWLESS = Triad()
@@ -64,7 +60,7 @@ def walked(triad: Triad, draws: Array, *, step_s: float) -> Array:
     A walk that is never forgotten begins at 0. One that is has the spread walk √(correlation_s / 2) from the
     first reading on. Source: Kalibr's IMU noise model; Gillespie (1996) for the exact step with memory.
     """
-    if triad.correlation_s == inf:
+    if triad.correlation_s is None:
         shocks = triad.walk * sqrt(step_s) * draws
         shocks[:1] = 0.0
         return np.cumsum(shocks, axis=0)
@@ -84,7 +80,7 @@ def read_out(triad: Triad, true: Array, bias: Array, draws: Array, *, step_s: fl
     read half as often is less noisy. Source: Kalibr's IMU noise model.
     """
     analogue = true @ np.asarray(triad.gain).T + bias + triad.noise / sqrt(step_s) * draws
-    cut: Array = np.clip(analogue, -triad.limit, triad.limit)
+    cut: Array = analogue if triad.limit is None else np.clip(analogue, -triad.limit, triad.limit)
     return triad.step * np.rint(cut / triad.step) if triad.step else cut
 
 
@@ -162,24 +158,31 @@ class ImuBias:
     accel_mps2: Array
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ImuSettings:
-    """An IMU as it is: how often it reads, its gyroscopes (rad/s) and accelerometers (m/s²), where it sits.
+    """An IMU as it is: how often it reads, where it sits, its gyroscopes (rad/s) and accelerometers (m/s²).
 
-    Raises InputError where the rate or the place is none.
+    `rotation_deg` is roll, pitch and yaw, turned about fixed axes in that order.
     """
 
-    rate_hz: float = 200.0
+    __pydantic_config__ = SETTINGS
+
+    rate_hz: Annotated[float, Ge(1), Le(10_000)] = 200.0
+    position_m: Axes = (0.0, 0.0, 0.0)
+    rotation_deg: Axes = (0.0, 0.0, 0.0)
     gyro: Triad = FLAWLESS
     accel: Triad = FLAWLESS
-    T_body_imu: Array = field(default_factory=lambda: np.eye(4))
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.rate_hz) and 1 <= self.rate_hz <= 1e5):
-            raise InputError(f"an IMU's rate_hz should be within 1 and 100000, got {self.rate_hz}")
-        place = np.asarray(self.T_body_imu, float)
-        if place.shape != (4, 4) or not np.isfinite(place).all() or not se3.is_rotation(place[:3, :3]):
-            raise InputError(f"T_body_imu should be a rigid transform (4, 4), got {place.tolist()}")
+        require(self)
+
+    @property
+    def T_body_imu(self) -> Array:
+        """Its pose (4, 4) on the body."""
+        from scipy.spatial.transform import Rotation
+
+        R_body_imu = Rotation.from_euler("xyz", self.rotation_deg, degrees=True).as_matrix()
+        return se3.transform(R_body_imu, np.array(self.position_m))
 
     @property
     def calibration(self) -> ImuCalibration:

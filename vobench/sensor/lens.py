@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from vobench.errors import InputError
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
-from vobench.sensor.image_sensor import Radiance
+from vobench.sensor.image_sensor import CameraSettings, Radiance
 
 SMUDGES, SPECKS = 5, 60
 SMUDGE_SHARE, SPECK_SHARE = (0.05, 0.2), (0.004, 0.015)  # radii over the picture's width
@@ -16,30 +15,6 @@ SMUDGE_SHARE, SPECK_SHARE = (0.05, 0.2), (0.004, 0.015)  # radii over the pictur
 SCATTERED = 0.5
 # Points across a pixel for the share of it that a disc covers.
 FINE = 32
-
-
-@dataclass(frozen=True, slots=True)
-class LensEffects:
-    """`vignetting` 1 is cos⁴θ (the exponent is 4 · vignetting), cut off by the lens's rims at `vignetting_cutoff_deg`.
-
-    `blur_sigma_px` is a Gaussian's, `defocus_px` the diameter of the disc that a point out of focus makes,
-    `dirt` the mean share of light that dirt on the front lens keeps from its way. All off by default.
-    """
-
-    vignetting: float = 0.0
-    vignetting_cutoff_deg: float | None = None
-    blur_sigma_px: float = 0.0
-    defocus_px: float = 0.0
-    dirt: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("vignetting", "blur_sigma_px", "defocus_px"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise InputError(f"{name} should be 0 or more, got {getattr(self, name)}")
-        if not 0 <= self.dirt <= 0.5:
-            raise InputError(f"dirt should be within 0 and 0.5, got {self.dirt}")
-        if self.vignetting_cutoff_deg is not None and not 0 < self.vignetting_cutoff_deg < 90:
-            raise InputError(f"vignetting_cutoff_deg should be between 0 and 90, got {self.vignetting_cutoff_deg}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +30,7 @@ class LensMaps:
     transfer: Array | None = None
 
 
-def lens_maps(effects: LensEffects, camera: Camera, rng: np.random.Generator) -> LensMaps:
+def lens_maps(effects: CameraSettings, camera: Camera, rng: np.random.Generator) -> LensMaps:
     """The maps of a camera's lens; only dirt draws from `rng`."""
     shape = (camera.height_px, camera.width_px)
     shade = veil = transfer = None

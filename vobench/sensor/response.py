@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.errors import InputError
+from vobench.errors import SettingError, unknown
 from vobench.geometry.se3 import Array
 
 Grey = NDArray[np.uint8]
@@ -39,7 +39,7 @@ class Power:
 
     def __post_init__(self) -> None:
         if not 0.1 <= self.gamma <= 10:
-            raise InputError(f"the gamma of a response should be within 0.1 and 10, got {self.gamma}")
+            raise SettingError(f"the gamma of a response should be within 0.1 and 10, got {self.gamma}")
 
     def encode(self, linear: Array) -> Array:
         """Stored value in 0..1 of a linear signal in 0..1."""
@@ -64,12 +64,12 @@ class Table:
 
     def __post_init__(self) -> None:
         if len(self.inverse) < 2:
-            raise InputError(f"a tabulated response needs 2 or more values, got {len(self.inverse)}")
+            raise SettingError(f"a tabulated response needs 2 or more values, got {len(self.inverse)}")
         if self.inverse[0] != 0:
-            raise InputError(f"a tabulated response should begin with 0, the signal of black, got {self.inverse[0]}")
+            raise SettingError(f"a tabulated response should begin with 0, the signal of black, got {self.inverse[0]}")
         for index, (value, following) in enumerate(pairwise(self.inverse)):
             if not value < following < np.inf:
-                raise InputError(
+                raise SettingError(
                     f"a tabulated response should rise, but value {index + 1} is {following} after {value}"
                 )
 
@@ -91,6 +91,18 @@ class Table:
 Response = Srgb | Power | Table
 SRGB, LINEAR = Srgb(), Power(1.0)
 RESPONSES: dict[str, Response] = {"linear": LINEAR, "srgb": SRGB}
+
+
+def response_of(said: str | float | tuple[float, ...]) -> Response:
+    """The response of a name, a gamma or a table. Raises SettingError."""
+    if isinstance(said, str):
+        if said not in RESPONSES:
+            raise SettingError(unknown("response", said, list(RESPONSES)))
+        return RESPONSES[said]
+    numbers = said if isinstance(said, list | tuple) else [said]
+    if not all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers):
+        raise SettingError(f"should be linear, srgb, a gamma such as 2.2 or a list of rising signals (got {said!r})")
+    return Table(tuple(map(float, said))) if isinstance(said, list | tuple) else Power(float(said))
 
 
 def linear_of_grey(response: Response) -> Array:

@@ -1,30 +1,45 @@
 """What an estimator's `estimator.yaml` may say: read without importing its code."""
 
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from annotated_types import MinLen
 
-from vobench.setting import Matching
+from vobench.setting import SETTINGS, Matching, require
 from vobench.suite import yaml_file
 
 MANIFEST_FILE = "estimator.yaml"
 CLASS_PATH = r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*"
 
 
-class Manifest(BaseModel):
+Text = Annotated[str, MinLen(1)]
+
+
+def _key_of(name: str) -> str:
+    return "class" if name == "class_path" else name
+
+
+MANIFEST_CONFIG = {**SETTINGS, "alias_generator": _key_of}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Manifest:
     """One estimator: its name, where its class is, which sensors it needs and whose pose it gives."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, populate_by_name=True)
+    __pydantic_config__ = MANIFEST_CONFIG
 
     name: Annotated[str, Matching(r"[a-z][a-z0-9_]*", "lower-case letters, digits and _, a letter first")]
-    version: Annotated[str, Field(min_length=1)]
-    class_path: Annotated[str, Field(alias="class"), Matching(CLASS_PATH, "file:Class, as in 'estimator:Mine'")]
+    version: Text
+    class_path: Annotated[str, Matching(CLASS_PATH, "file:Class, as in 'estimator:Mine'")]
     needs: tuple[Literal["stereo", "mono", "encoders", "imu"], ...] = ()
     pose_of: Literal["left_camera", "body"]
-    summary: Annotated[str, Field(min_length=1)]
+    summary: Text
     paper: str = ""
-    params: dict[str, Any] = {}
+    params: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require(self)
 
 
 def read_manifest(folder: Path) -> Manifest:

@@ -2,35 +2,29 @@
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from glob import glob
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from vobench.errors import SuiteError
-from vobench.setting import Name, Positive
-from vobench.suite.yaml_file import Strict
+from vobench.setting import SETTINGS, Name, OneOf, Positive, Short, require
 
 FILE_KEYS = ("calibration", "imu", "truth")
+TOPICS = ("left", "right", "left_info", "right_info", "truth", "imu")
 GLOB = re.compile(r"[*?\[]")
 
 
-class TopicsSpec(Strict):
-    """Which topics of a bag are meant, where its own names do not say so."""
-
-    left: str | None = None
-    right: str | None = None
-    left_info: str | None = None
-    right_info: str | None = None
-    truth: str | None = None
-    imu: str | None = None
-
-
-class SourceSpec(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
     """A recording, or several by a pattern: a sequence of vobench, a dataset's folder, or a bag.
 
     Paths are relative to the suite's file; the form is told by content where it is not given. `calibration` and
     `imu` are Kalibr's camchain.yaml and imu.yaml, `truth` a trajectory, `rate_hz` for pictures without stamps.
+    `topics` says which of a bag are meant, where its own names do not.
     """
+
+    __pydantic_config__ = SETTINGS
 
     path: str
     name: Name | None = None
@@ -39,21 +33,20 @@ class SourceSpec(Strict):
     imu: str | None = None
     truth: str | None = None
     rate_hz: Positive | None = None
-    topics: TopicsSpec = TopicsSpec()
+    topics: dict[Annotated[str, OneOf("topic", TOPICS)], str] = field(default_factory=dict)
 
-    def placed(self, path: Path, folder: Path) -> "SourceSpec":
+    def __post_init__(self) -> None:
+        require(self)
+
+    def placed(self, path: Path, folder: Path) -> "Source":
         """The source of one recording, its files where they are seen from everywhere."""
         files = {key: getattr(self, key) for key in FILE_KEYS}
-        return self.model_copy(
-            update={
-                "path": str(path),
-                "name": self.name or case_name(path),
-                **{key: str(_placed(file, folder)) for key, file in files.items() if file},
-            }
-        )
+        placed: dict[str, Any] = {key: str(_placed(file, folder)) for key, file in files.items() if file}
+        return replace(self, path=str(path), name=self.name or case_name(path), **placed)
 
 
-class RecordedCase(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordedCase:
     """One recording that was made elsewhere; `variant` names it on the axis `source`.
 
     `entry` is which of the suite's sources it is of.
@@ -61,7 +54,7 @@ class RecordedCase(Strict):
 
     name: str
     variant: dict[str, str]
-    source: SourceSpec
+    source: Source
     entry: int = 0
 
 
@@ -71,7 +64,10 @@ def as_sources(value: Any) -> Any:
     return tuple({"path": entry} if isinstance(entry, str) else entry for entry in entries)
 
 
-def recorded_cases(spec: SourceSpec, folder: Path, *, entry: int = 0) -> Iterator[RecordedCase]:
+SOURCES = Short(as_sources, {"type": ["string", "object"]})
+
+
+def recorded_cases(spec: Source, folder: Path, *, entry: int = 0) -> Iterator[RecordedCase]:
     """The cases of one source; `folder` is where relative paths start. Raises SuiteError where a pattern finds none."""
     paths = _found(spec.path, folder)
     if spec.name and len(paths) > 1:

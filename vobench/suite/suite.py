@@ -2,65 +2,55 @@
 
 from collections.abc import Collection, Iterator
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, model_validator
+from annotated_types import Ge, Le, MinLen
 
-from vobench.errors import SuiteError, unknown
+from vobench.errors import SettingError, SuiteError, unknown
 from vobench.geometry.rig import PRESETS, CalibrationError, Rig, mounted, true_rig
 from vobench.motion.replay import Replay
 from vobench.scene.scene import Scene
-from vobench.setting import Name, Positive
+from vobench.sensor.image_sensor import SENSOR_PRESETS, CameraSettings
+from vobench.sensor.imu import IMUS, ImuSettings
+from vobench.sensor.pixel_truth import CHANNELS
+from vobench.setting import SETTINGS, Like, Name, OneOf, Positive, Short, hints, require
 from vobench.suite import catalog, scene_file, yaml_file
-from vobench.suite.camera import CameraSpec, ChannelName, ImuSpec, RenderingSpec
-from vobench.suite.camera import named as named_imu
 from vobench.suite.catalog import Entry, Kind
 from vobench.suite.manifest import Manifest, read_manifest
 from vobench.suite.scene_spec import LightOverride, SceneFile
-from vobench.suite.source import RecordedCase, SourceSpec, as_sources, recorded_cases
+from vobench.suite.source import SOURCES, RecordedCase, Source, recorded_cases
 from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times, wheels_of
-from vobench.suite.yaml_file import Mistakes, Point, Strict, YamlFile, one_of
-
-
-def _named(value: Any) -> Any:
-    """A bare name stands for an estimator with its manifest's parameters."""
-    return {"name": value} if isinstance(value, str) else value
-
+from vobench.suite.yaml_file import Mistakes, YamlFile
 
 NEEDED = ("scenes", "rigs", "trajectories")
-Ratio = Annotated[float, Field(gt=-1, lt=1)]
-Angle = Annotated[float, Field(ge=-10, le=10)]
+ENGINES = ("raster", "path")
+MOST_SAMPLES = 65536
+HONEST = CalibrationError()
 
 
-class CalibrationErrorSpec(Strict):
-    """How the true rig differs from the one that estimators are told; see `geometry.calibration`."""
-
-    focal_ratio: Ratio = 0.0
-    center_px: Point = (0.0, 0.0)
-    distortion_ratio: Ratio = 0.0
-    baseline_ratio: Ratio = 0.0
-    right_roll_deg: Angle = 0.0
-    right_pitch_deg: Angle = 0.0
-    right_yaw_deg: Angle = 0.0
-
-
-class RigSpec(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RigSettings:
     """A stereo pair on the body: a preset with both lenses, placed, how far its calibration is off, and an IMU.
 
     Without `baseline_m` the cameras stand to each other as the preset has them.
     """
 
-    lens: Annotated[str, one_of("lens", PRESETS)] = "paper_blender"
-    pitch_deg: Annotated[float, Field(ge=-90, le=90)]
+    __pydantic_config__ = SETTINGS
+
+    lens: Annotated[str, OneOf("lens", PRESETS)] = "paper_blender"
+    pitch_deg: Annotated[float, Ge(-90), Le(90)]
     baseline_m: Positive | None = None
     forward_m: float = 0.25
     height_m: float = 0.4
-    calibration_error: CalibrationErrorSpec = CalibrationErrorSpec()
-    imu: Annotated[ImuSpec, BeforeValidator(named_imu)] | None = None
+    calibration_error: CalibrationError = HONEST
+    imu: Annotated[ImuSettings, Like("IMU", IMUS)] | None = None
+
+    def __post_init__(self) -> None:
+        require(self)
 
     def build(self) -> Rig:
         """The sensors on the body as their calibration has them."""
@@ -73,46 +63,78 @@ class RigSpec(Strict):
             forward_m=self.forward_m,
             height_m=self.height_m,
         )
-        return replace(cameras, imu=self.imu.build().calibration if self.imu else None)
-
-    def made_true(self, nominal: Rig) -> Rig:
-        """The rig as it is, of one as its calibration has it. Raises VobenchError, as `true_rig` does."""
-        return true_rig(nominal, CalibrationError(**self.calibration_error.model_dump()))
+        return replace(cameras, imu=self.imu.calibration if self.imu else None)
 
 
-class EstimatorSpec(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rendering:
+    """The engine: `raster` draws with light computed once, `path` traces `samples` light paths through each pixel.
+
+    None are as many as the path tracer takes by itself.
+    """
+
+    __pydantic_config__ = SETTINGS
+
+    engine: Annotated[str, OneOf("engine", ENGINES)] = "raster"
+    samples: Annotated[int, Ge(1), Le(MOST_SAMPLES)] | None = None
+
+    def __post_init__(self) -> None:
+        require(self)
+        if self.engine != "path" and self.samples is not None:
+            raise SettingError(f"samples belongs to engine path, but the engine is {self.engine}; leave samples out")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EstimatorSettings:
     """An estimator with parameters other than its manifest's."""
+
+    __pydantic_config__ = SETTINGS
 
     name: str
     label: Name | None = None
-    params: dict[str, Any] = Field(default_factory=dict)
+    params: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require(self)
 
 
-class Suite(Strict):
+def _named(value: Any) -> Any:
+    return {"name": value} if isinstance(value, str) else value
+
+
+ChannelName = Annotated[str, OneOf("ground-truth channel", CHANNELS)]
+Camera = Annotated[CameraSettings, SENSOR_PRESETS]
+NamedEstimator = Annotated[EstimatorSettings, Short(_named, {"type": "string"})]
+Lighting = dict[str, LightOverride]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Suite:
     """The cases are every combination of scene, lighting, rig, trajectory and camera, and every recording of `source`.
 
     Each axis names its variants; change one axis to change one factor. A suite of recordings alone has no axes.
     """
 
+    __pydantic_config__ = SETTINGS
+
     name: Name
     summary: str = ""
-    seed: Annotated[int, Field(ge=0)] = 0
-    repeats: Annotated[int, Field(ge=1, le=100)] = 1
-    source: Annotated[tuple[SourceSpec, ...], BeforeValidator(as_sources)] = ()
-    scenes: Annotated[tuple[str, ...], Field(min_length=1)] = ()
-    lightings: dict[Name, dict[str, LightOverride]] = Field(default={"as_built": {}}, min_length=1)
-    rigs: dict[Name, RigSpec] = Field(default={}, min_length=1)
-    trajectories: dict[Name, TrajectorySpec] = Field(default={}, min_length=1)
-    cameras: dict[Name, CameraSpec] = Field(default={"clean": CameraSpec()}, min_length=1)
-    rendering: RenderingSpec = RenderingSpec()
+    seed: Annotated[int, Ge(0)] = 0
+    repeats: Annotated[int, Ge(1), Le(100)] = 1
+    source: Annotated[tuple[Source, ...], SOURCES] = ()
+    scenes: Annotated[tuple[str, ...], MinLen(1)] | None = None
+    lightings: Annotated[dict[Name, Lighting], MinLen(1)] = field(default_factory=lambda: {"as_built": {}})
+    rigs: Annotated[dict[Name, RigSettings], MinLen(1)] | None = None
+    trajectories: Annotated[dict[Name, TrajectorySpec], MinLen(1)] | None = None
+    cameras: Annotated[dict[Name, Camera], MinLen(1)] = field(default_factory=lambda: {"clean": CameraSettings()})
+    rendering: Rendering = Rendering()
     truth: tuple[ChannelName, ...] = ()
-    estimators: Annotated[tuple[Annotated[EstimatorSpec, BeforeValidator(_named)], ...], Field(min_length=1)]
+    estimators: Annotated[tuple[NamedEstimator, ...], MinLen(1)]
 
-    @model_validator(mode="after")
-    def _has_cases(self) -> Self:
-        if missing := missing_axis({name for name in type(self).model_fields if getattr(self, name)}):
-            raise ValueError(missing)
-        return self
+    def __post_init__(self) -> None:
+        require(self)
+        if missing := missing_axis({each.name for each in fields(self) if getattr(self, each.name)}):
+            raise SettingError(missing)
 
 
 def missing_axis(given: Collection[str]) -> str | None:
@@ -127,7 +149,8 @@ def missing_axis(given: Collection[str]) -> str | None:
 AXES = ("scene", "lighting", "rig", "trajectory", "camera")
 
 
-class Case(Strict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
     """One sequence to be made: everything it depends on, resolved.
 
     `variant` names the case's place on each of AXES; `name` keeps those that differ within the suite,
@@ -138,13 +161,13 @@ class Case(Strict):
     name: str
     variant: dict[str, str]
     scene: SceneFile
-    lighting: dict[str, LightOverride]
-    rig: RigSpec
+    lighting: Lighting
+    rig: RigSettings
     trajectory: TrajectorySpec
     replayed: str | None = None
-    camera: CameraSpec
-    rendering: RenderingSpec
-    truth: tuple[ChannelName, ...]
+    camera: CameraSettings
+    rendering: Rendering
+    truth: tuple[str, ...]
     seed: int
 
     def build_scene(self) -> Scene:
@@ -157,7 +180,7 @@ class Case(Strict):
 
     def build_true_rig(self) -> Rig:
         """The stereo pair as it is: what pictures are made with. Raises VobenchError, as `true_rig` does."""
-        return self.rig.made_true(self.build_rig())
+        return true_rig(self.build_rig(), self.rig.calibration_error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,7 +243,7 @@ def read_plan(name: str, *, only_estimators: tuple[str, ...] = ()) -> Plan:
     """The plan of the suite of that name, or in that file. Raises SuiteError or UnknownNameError."""
     reading = yaml_file.read_all(catalog.find("suite", name).path, Suite)
     wrong = Mistakes(reading.source, list(reading.mistakes))
-    meant = {key for said in reading.source.marked for key in get_close_matches(str(said), Suite.model_fields, n=1)}
+    meant = {key for said in reading.source.marked for key in get_close_matches(str(said), hints(Suite), n=1)}
     with wrong.at():
         if wrong.found and (missing := missing_axis(meant)):
             raise SuiteError(missing)
@@ -275,7 +298,7 @@ class _Planner:
                 entrants.append(entrant)
         return tuple(entrants)
 
-    def _asked_for(self, only: tuple[str, ...], listed: dict[int, EstimatorSpec]) -> tuple[Entrant, ...]:
+    def _asked_for(self, only: tuple[str, ...], listed: dict[int, EstimatorSettings]) -> tuple[Entrant, ...]:
         """The suite's own entries of these labels, else estimators of these names with their defaults.
 
         Raises UnknownNameError and SuiteError, for it is not the suite that is wrong.
@@ -283,14 +306,13 @@ class _Planner:
         entrants = list[Entrant]()
         for name in only:
             indexes = [index for index, spec in listed.items() if name == (spec.label or spec.name)]
-            entrant = (
-                self._entrant(listed[indexes[0]], indexes[0]) if indexes else self._entrant(EstimatorSpec(name=name))
-            )
+            index = indexes[0] if indexes else None
+            entrant = self._entrant(EstimatorSettings(name=name) if index is None else listed[index], index)
             _require_new_label(entrant, entrants)
             entrants.append(entrant)
         return tuple(entrants)
 
-    def _entrant(self, spec: EstimatorSpec, index: int | None = None) -> Entrant:
+    def _entrant(self, spec: EstimatorSettings, index: int | None = None) -> Entrant:
         folder = self._find("estimator", spec.name).path
         manifest = read_manifest(folder)
         for key, value in spec.params.items():
@@ -301,7 +323,7 @@ class _Planner:
     def _scenes(self) -> dict[str, SceneFile]:
         """The scenes by their files' names, which name a case's place on this axis; lightings are checked on each."""
         scenes: dict[str, SceneFile] = {}
-        for index, name in enumerate(self.suite.scenes):
+        for index, name in enumerate(self.suite.scenes or ()):
             with self.wrong.at("scenes", index):
                 entry = self._find("scene", name)
                 if entry.name in scenes:
@@ -327,14 +349,14 @@ class _Planner:
 
     def _check_rigs(self) -> None:
         """So is a rig whose distortion is off, on a lens without any."""
-        for name, rig in self.suite.rigs.items():
+        for name, rig in (self.suite.rigs or {}).items():
             with self.wrong.at("rigs", name):
-                rig.made_true(rig.build())
+                true_rig(rig.build(), rig.calibration_error)
 
     def _replayed(self) -> dict[str, str]:
         """What the files of replayed trajectories hold, by the trajectories' names."""
         texts = dict[str, str]()
-        for name, spec in self.suite.trajectories.items():
+        for name, spec in (self.suite.trajectories or {}).items():
             if isinstance(spec, Replay):
                 with self.wrong.at("trajectories", name, "times"):
                     times = read_times(spec, self._folder())
@@ -344,19 +366,16 @@ class _Planner:
 
     def _axes(self, scenes: dict[str, SceneFile]) -> tuple[dict[str, Any], ...]:
         suite = self.suite
-        return scenes, suite.lightings, suite.rigs, suite.trajectories, suite.cameras
+        return scenes, suite.lightings, suite.rigs or {}, suite.trajectories or {}, suite.cameras
 
     def _case(self, name: str, variant: dict[str, str], scenes: dict[str, SceneFile], replayed: dict[str, str]) -> Case:
         suite = self.suite
+        chosen = [axis[variant[kind]] for kind, axis in zip(AXES, self._axes(scenes), strict=True)]
         return Case(
             name=name,
             variant=variant,
-            scene=scenes[variant["scene"]],
-            lighting=suite.lightings[variant["lighting"]],
-            rig=suite.rigs[variant["rig"]],
-            trajectory=suite.trajectories[variant["trajectory"]],
+            **dict(zip(AXES, chosen, strict=True)),
             replayed=replayed.get(variant["trajectory"]),
-            camera=suite.cameras[variant["camera"]],
             rendering=suite.rendering,
             truth=suite.truth,
             seed=suite.seed,
