@@ -367,13 +367,31 @@ def drive(
     trajectory: Annotated[str | None, typer.Option("--trajectory", "-t", help="Only this one of the suite's.")] = None,
     out: Annotated[Path | None, typer.Option(help="Plot paths and speeds to this .svg, .png or .pdf.")] = None,
     tum: Annotated[Path | None, typer.Option(help="Write the body's true path of one trajectory, as TUM.")] = None,
-    csv: Annotated[Path | None, typer.Option(help="The same with velocities and accelerations, as CSV.")] = None,
+    csv: Annotated[
+        Path | None, typer.Option(help="The same with speeds, wheels, references and voltages, as CSV.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Drive a suite's trajectories without rendering: a summary, and plots."""
     from vobench.cli import drive as driving
 
     driving.show(suite, trajectory, out=out, tum=tum, csv=csv, as_json=json)
+
+
+@app.command()
+def identify(
+    path: Annotated[
+        Path, typer.Argument(metavar="PATH", help="A run's or a sequence's folder, or a CSV file of `vobench drive`.")
+    ],
+    *,
+    radius_m: Annotated[float | None, typer.Option(help="The wheels' radius, for a CSV; the Pioneer's.")] = None,
+    track_m: Annotated[float | None, typer.Option(help="The wheels' track, for a CSV; the Pioneer's.")] = None,
+    json: Json = False,
+) -> None:
+    """Find theta in recorded drives of the Pioneer, from its wheels and what it was asked for; say what is left."""
+    from vobench.cli import identify as identifying
+
+    identifying.show(path, radius_m=radius_m, track_m=track_m, as_json=json)
 
 
 @app.command()
