@@ -95,7 +95,7 @@ def _of_sequence(name: str, folder: Path) -> DriveLog:
         raise InputError(f"this version of vobench drives the case otherwise than it was recorded: {folder}")
     wheels, (t_ns, ticks) = sequence.rig.wheels, sequence.encoders()
     assert wheels is not None  # a controller drove them
-    rim_rad: Array = ticks * (2 * np.pi / wheels.ticks_per_revolution)
+    rim_rad = (ticks * (2 * np.pi / wheels.ticks_per_revolution)).astype(np.float64)
     return DriveLog(name, wheels, t_ns, rim_rad, drive.t_ns, drive.references, drive.theta)
 
 
