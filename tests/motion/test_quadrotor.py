@@ -15,9 +15,7 @@ def sampled(motion, count=2000):
 
 
 def test_it_passes_its_points_at_their_times():
-    found = (
-        Quadrotor(points_m=POINTS.tolist(), t_s=(TIMES_S + 3).tolist(), speed_mps=1).motion().at((TIMES_S + 3) * 1e9)
-    )
+    found = Quadrotor(points_m=POINTS.tolist(), t_s=(TIMES_S + 3).tolist()).motion().at(TIMES_S * 1e9)
     np.testing.assert_allclose(found.T_world_body[:, :3, 3], POINTS, atol=1e-12)
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
+from vobench.motion.spline import Pose
 from vobench.run.motion import body_motion
 from vobench.suite.suite import read_plan
-from vobench.suite.trajectory import KINDS, PoseSpec, TrajectorySpec
+from vobench.suite.trajectory import KINDS, TrajectorySpec
 from vobench.trajectory.formats import format_tum
 from vobench.trajectory.kinematics import level
 from vobench.trajectory.trajectory import Trajectory
@@ -111,7 +112,7 @@ def said(gone):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_key_changes_where_the_body_goes_or_how_its_wheels_turn(goes, kind):
-    mover = KIND.validate_python({"kind": kind, **BASE[kind]}).model_dump()
+    mover = KIND.dump_python(KIND.validate_python({"kind": kind, **BASE[kind]}))
     keys = set(mover) - NOT_OF_THE_MOTION - {key for its, key in IDLE if its == kind}
     assert keys <= set(OTHER)
     plain = said(goes(kind))
@@ -119,6 +120,15 @@ def test_every_key_changes_where_the_body_goes_or_how_its_wheels_turn(goes, kind
         other = {"lissajous": {"mover": "pioneer", "speed_mps": 0.1}}.get(kind, {}) if key == "mover" else {}
         value = [*OTHER[key], 1.5] if (kind, key) == ("replay", "start_m") else OTHER[key]
         assert said(goes(kind, **{key: value, **other})) != plain, key
+
+
+def test_motors_change_where_the_robot_goes_and_how_its_wheels_turn(goes):
+    fitted, light, heavy, wide = (
+        goes("stop_and_go", slip="none", **keys)
+        for keys in ({}, *({"motors": motors} for motors in ({}, {"m_kg": 30}, {"r_m": 0.2})))
+    )
+    assert len({said(gone)[0] for gone in (fitted, light, heavy, wide)}) == 4
+    assert light[1][-1, 0] / wide[1][-1, 0] == pytest.approx(0.2 / 0.0975, rel=0.05)
 
 
 def test_a_car_of_another_make_steers_and_rolls_differently(goes):
@@ -138,7 +148,7 @@ def test_clockwise_is_to_the_right(goes, kind):
     [("yaw_deg", 0, [0, 1, 0]), ("pitch_deg", 0, [0, 0, -1]), ("roll_deg", 1, [0, 0, 1])],
 )
 def test_yaw_is_to_the_left_pitch_down_and_roll_to_the_right(angle, column, towards):
-    T = PoseSpec(t_s=0.0, position_m=(1.0, 2.0, 3.0), **{angle: 90.0}).T_world_body
+    T = Pose(t_s=0.0, position_m=(1.0, 2.0, 3.0), **{angle: 90.0}).T_world_body
     np.testing.assert_allclose(T[:3, column], towards, atol=1e-12)
     np.testing.assert_allclose(T[:3, 3], [1, 2, 3])
 

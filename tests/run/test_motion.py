@@ -20,9 +20,9 @@ WAYS = {
     "ideal": "targets_m: [[0.5, 0.3]], tolerance_m: 0.05, mover: unicycle",
     "clock": "targets_m: [[0.5, 0.3], [0, 1]], leg_s: 1",
     "rough": "targets_m: [[0.5, 0.3]], tolerance_m: 0.05, slip: slippery, delta: bumpy, robot_spread: 0.1, floor: [{surface: wet, center_m: [0.2, 0.1], size_m: [0.2, 1]}]",
-    "circle": "kind: circle, radius_m: 0.5",
+    "circle": "kind: circle, radius_m: 0.5, laps: 0.4",
     "circle_ideal": "kind: circle, radius_m: 0.5, mover: unicycle, start_m: [1, 2], start_heading_deg: 30",
-    "circle_car": "kind: circle, radius_m: 1, mover: ackermann, speed_mps: 1",
+    "circle_car": "kind: circle, radius_m: 1, mover: ackermann, speed_mps: 1, laps: 0.3",
     "square": "kind: square, side_m: 0.5, mover: unicycle",
     "figure_8": "kind: figure_8, length_m: 1.5, mover: unicycle",
     "lissajous": "kind: lissajous, size_m: [2, 1.5], mover: unicycle, speed_mps: 0.7",
@@ -30,7 +30,7 @@ WAYS = {
     "pure_rotation": "kind: pure_rotation, angle_deg: -180, slip: slippery",
     "rotation_ideal": "kind: pure_rotation, angle_deg: -180, mover: unicycle",
     "reverse": "kind: reverse, length_m: 0.5, radius_m: 1, pause_s: 0.3, delta: nominal",
-    "reverse_car": "kind: reverse, length_m: 0.5, radius_m: 1, pause_s: 0.3, mover: ackermann",
+    "reverse_car": "kind: reverse, length_m: 0.5, radius_m: 1, pause_s: 0.3, mover: ackermann, speed_mps: 0.5",
     "pose_spline": f"kind: pose_spline, poses: {POSES}",
     "handheld": f"kind: handheld, poses: {POSES}, ease_s: 0.5",
     "rail": "kind: rail, points_m: [[0, 0, 1], [1, 0.2, 1.3], [1, 1, 1]]",
@@ -185,7 +185,7 @@ def test_another_robot_of_the_kind_is_told_the_same_and_ends_elsewhere(case):
     ("mover", "half_track_m", "radius_m"), [("unicycle", 0.1655, 0.0975), ("ackermann", 0.125, 0.05)]
 )
 def test_wheels_roll_as_far_as_the_ground_goes_by_under_them(case, mover, half_track_m, radius_m):
-    rims = body_motion(case(f"kind: circle, radius_m: 2, mover: {mover}")).rims
+    rims = body_motion(case(f"kind: circle, radius_m: 2, speed_mps: 1, mover: {mover}")).rims
     around_m = 2 * np.pi * np.array([2 - half_track_m, 2 + half_track_m])
     # A car comes in late by its steering's lag.
     tolerance = {"unicycle": 1e-6, "ackermann": 0.02}[mover]
@@ -194,7 +194,7 @@ def test_wheels_roll_as_far_as_the_ground_goes_by_under_them(case, mover, half_t
 
 def test_a_car_steers_late_and_keeps_near_its_way(case):
     car, ideal = (
-        body_motion(case(f"kind: figure_8, length_m: 8, mover: {mover}")).at_frames().T_world_body
+        body_motion(case(f"kind: figure_8, length_m: 8, speed_mps: 1, mover: {mover}")).at_frames().T_world_body
         for mover in ("ackermann", "unicycle")
     )
     assert 1e-4 < np.linalg.norm(car[:, :2, 3] - ideal[:, :2, 3], axis=1).max() < 0.3

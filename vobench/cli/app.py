@@ -22,6 +22,7 @@ VERBS = {
     "run": "vobench.cli.run:run_command",
     "check": "vobench.cli.run:check_command",
     "drive": "vobench.cli.drive:drive_command",
+    "identify": "vobench.cli.identify:identify_command",
     "render": "vobench.cli.render:render_command",
     "list": "vobench.cli.list:list_command",
     "schema": "vobench.cli.schema:schema_command",

@@ -8,11 +8,13 @@ import numpy as np
 import typer
 
 from vobench.cli import terminal
+from vobench.cli.identify import REFERENCES, RIMS
 from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.course import Unled
 from vobench.motion.drive import Waypoints
+from vobench.motion.motor import loop_voltages, wheel_voltages
 from vobench.motion.wheeled import Wheeled
 from vobench.report.drive_plot import ENDINGS, DriveLog, save_plot
 from vobench.run.motion import BodyMotion, body_motion, check_cases
@@ -24,9 +26,8 @@ from vobench.trajectory.trajectory import Trajectory
 
 HEADINGS = (
     *("trajectory", "kind", "frames", "seconds", "path m", "max m/s", "max °/s", "°/frame"),
-    *("wheels off m", "legs end at s"),
+    *("wheels off m", "max V", "legs end at s"),
 )
-CSV_COLUMNS = "t_ns,x_m,y_m,z_m,qx,qy,qz,qw,vx_mps,vy_mps,vz_mps,wx_radps,wy_radps,wz_radps,ax_mps2,ay_mps2,az_mps2"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,16 @@ class Driven:
         if self.travel.drive is None or not isinstance(self.case.trajectory, Waypoints):
             return None
         return self.travel.t_ns[list(self.travel.drive.reached)] / 1e9
+
+    @property
+    def volts(self) -> Array | None:
+        """Voltages (N, 2) that the left and the right motor are asked for, where their constants are given."""
+        drive, spec = self.travel.drive, self.case.trajectory
+        if drive is None or not isinstance(spec, Wheeled) or spec.motors is None:
+            return None
+        u, omega = drive.state[:, 3:].T
+        v_u, v_omega = loop_voltages((u, omega), tuple(drive.references.T), tuple(drive.rates.T), motors=spec.motors)
+        return np.stack(wheel_voltages(v_u, v_omega), -1)
 
 
 def show(
@@ -131,6 +142,7 @@ def _facts(driven: Driven) -> dict[str, Any]:
         "max_turn_degps": float(np.rad2deg(np.linalg.norm(body.turn_radps, axis=1).max())),
         "max_turn_per_frame_deg": float(np.rad2deg(turns.max())),
         "wheel_error_m": wheel_error_m(driven.case, travel),
+        "peak_V": None if driven.volts is None else float(np.abs(driven.volts).max()),
         "reached_s": None if driven.reached_s is None else driven.reached_s.tolist(),
         "refused": list(driven.refusals),
     }
@@ -150,7 +162,7 @@ def _print(driven: list[Driven], files: list[Path], *, as_json: bool) -> None:
 
 
 def _row(f: dict[str, Any]) -> list[str]:
-    off_m, reached_s = f["wheel_error_m"], f["reached_s"]
+    off_m, peak_V, reached_s = f["wheel_error_m"], f["peak_V"], f["reached_s"]
     return [
         f["trajectory"],
         f["kind"],
@@ -161,17 +173,30 @@ def _row(f: dict[str, Any]) -> list[str]:
         f"{f['max_turn_degps']:.0f}",
         f"{f['max_turn_per_frame_deg']:.1f}",
         "" if off_m is None else f"{off_m:.3f}",
+        "" if peak_V is None else f"{peak_V:.1f}",
         "" if reached_s is None else " ".join(f"{at_s:.2f}" for at_s in reached_s),
     ]
 
 
 def _csv(driven: Driven) -> str:
-    """The body's true motion at its frames; velocities and accelerations in its own axes."""
-    body = driven.body
-    T, q_xyzw = body.T_world_body, se3.to_quaternion(body.T_world_body[:, :3, :3])
-    columns = np.concatenate([T[:, :3, 3], q_xyzw, body.twist, body.acceleration_mps2], -1)
-    rows = zip(driven.travel.t_ns.tolist(), columns.tolist(), strict=True)
-    return "".join([f"{CSV_COLUMNS}\n", *(f"{t},{','.join(map(repr, row))}\n" for t, row in rows)])
+    """The body's true motion at its frames, velocities and accelerations in its own axes; then its wheels and motors.
+
+    What the wheels' rims turned, what the controller asked for and what the motors got are there where they exist.
+    """
+    body, travel = driven.body, driven.travel
+    at_m, q_xyzw = body.T_world_body[:, :3, 3], se3.to_quaternion(body.T_world_body[:, :3, :3])
+    columns: list[tuple[str, Array | None]] = [
+        ("x_m,y_m,z_m,qx,qy,qz,qw", np.concatenate([at_m, q_xyzw], -1)),
+        ("vx_mps,vy_mps,vz_mps,wx_radps,wy_radps,wz_radps", body.twist),
+        ("ax_mps2,ay_mps2,az_mps2", body.acceleration_mps2),
+        (",".join(RIMS), travel.rims.rim_rad[np.searchsorted(travel.rims.t_ns, travel.t_ns)] if travel.rims else None),
+        (",".join(REFERENCES), travel.drive.references if travel.drive else None),
+        ("left_V,right_V", driven.volts),
+    ]
+    known = [(names, values) for names, values in columns if values is not None]
+    rows = zip(travel.t_ns.tolist(), np.concatenate([values for _, values in known], -1).tolist(), strict=True)
+    heading = ",".join(["t_ns", *(names for names, _ in known)])
+    return "".join([f"{heading}\n", *(f"{t},{','.join(map(repr, row))}\n" for t, row in rows)])
 
 
 def drive_command(
@@ -180,7 +205,9 @@ def drive_command(
     trajectory: Annotated[str | None, typer.Option("--trajectory", "-t", help="Only this one of the suite's.")] = None,
     out: Annotated[Path | None, typer.Option(help="Plot paths and speeds to this .svg, .png or .pdf.")] = None,
     tum: Annotated[Path | None, typer.Option(help="Write the body's true path of one trajectory, as TUM.")] = None,
-    csv: Annotated[Path | None, typer.Option(help="The same with velocities and accelerations, as CSV.")] = None,
+    csv: Annotated[
+        Path | None, typer.Option(help="The same with speeds, wheels, references and voltages, as CSV.")
+    ] = None,
     json: terminal.Json = False,
 ) -> None:
     """Drive a suite's trajectories without rendering: a summary, and plots."""

@@ -1,14 +1,17 @@
 """Where a case's body goes, and whether it can: motion, wheels, preflight checks."""
 
 import hashlib
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from vobench import stop
-from vobench.errors import MotionError
+from vobench.errors import InputError, MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.ackermann import ACKERMANNS, ackermann
@@ -22,7 +25,8 @@ from vobench.motion.slip import DISTURBANCE_STREAMS, Generators
 from vobench.motion.wheeled import Wheeled
 from vobench.suite.scene_file import movers
 from vobench.suite.suite import Case, Plan
-from vobench.suite.yaml_file import Mistakes
+from vobench.suite.trajectory import TrajectorySpec
+from vobench.suite.yaml_file import Mistakes, checked
 from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.kinematics import Kinematics, Motion
 from vobench.trajectory.trajectory import Stamps
@@ -69,9 +73,10 @@ def body_motion(case: Case) -> BodyMotion:
     """The case's body on its way; the same for every scene, rig and camera. Raises MotionError."""
     spec = case.trajectory
     if isinstance(spec, Wheeled):
-        if isinstance(spec, Waypoints):
-            return _led(spec.drive(_disturbances(case.seed)))
-        return _led(_along(spec, _disturbances(case.seed))) if spec.mover == "pioneer" else _rolling(spec)
+        if not isinstance(spec, Waypoints) and spec.mover != "pioneer":
+            return _rolling(spec)
+        drive = _driven(spec, case.seed)
+        return BodyMotion(drive.motion, drive.t_ns, Rims(drive.encoder_t_ns, drive.rim_rad), drive)
     if isinstance(spec, Replay):
         assert case.replayed is not None  # read with the suite
         motion: Motion = spec.motion(parse_tum(case.replayed, name=spec.file))
@@ -80,8 +85,27 @@ def body_motion(case: Case) -> BodyMotion:
     return BodyMotion(motion, stamps(motion, spec.rate_hz))
 
 
-def _disturbances(seed: int) -> Generators:
-    return {stream: generator(seed, f"slip.{stream}") for stream in DISTURBANCE_STREAMS}
+def recorded_drive(folder: Path) -> Drive:
+    """The drive that a sequence was recorded on, driven again from its case.
+
+    Raises SequenceError where it has no case, InputError where its body is no Pioneer under control.
+    """
+    from vobench.sequence import read_case
+
+    case = json.loads(read_case(folder))
+    if case["trajectory"].get("mover") != "pioneer":
+        raise InputError(f"a drive to identify is one of mover pioneer, and this body is none: {folder}")
+    try:
+        spec: Waypoints | Planar = checked(TrajectorySpec, case["trajectory"])  # type: ignore[arg-type]
+    except ValidationError:
+        raise InputError(f"recorded by another vobench, whose trajectories this one cannot read: {folder}") from None
+    return _driven(spec, case["seed"])
+
+
+def _driven(spec: Waypoints | Planar, seed: int) -> Drive:
+    """Led through its targets or along its way, pushed and slipping as the seed has it."""
+    rngs = {stream: generator(seed, f"slip.{stream}") for stream in DISTURBANCE_STREAMS}
+    return spec.drive(rngs) if isinstance(spec, Waypoints) else _along(spec, rngs)
 
 
 def stamps(motion: Motion, rate_hz: float, *, per_frame: int = 1) -> Stamps:
@@ -95,10 +119,6 @@ def stamps(motion: Motion, rate_hz: float, *, per_frame: int = 1) -> Stamps:
         raise MotionError(f"{lasts_s:.4g} s at {rate_hz:g} Hz are {frames} frames, and {MOST_FRAMES} are the most")
     index = np.arange(frames * per_frame + 1)
     return np.rint(index * NS_PER_S / per_frame / rate_hz).astype(np.int64) + motion.start_ns
-
-
-def _led(driven: Drive) -> BodyMotion:
-    return BodyMotion(driven.motion, driven.t_ns, Rims(driven.encoder_t_ns, driven.rim_rad), driven)
 
 
 def _along(spec: Planar, rngs: Generators) -> Drive:

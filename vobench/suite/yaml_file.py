@@ -8,10 +8,9 @@ from dataclasses import MISSING, dataclass, field, fields, replace
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.constructor import RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
@@ -382,15 +381,6 @@ class Strict(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-# Wide enough for a car on a motorway, and narrow enough that no square of one overflows.
-Length = Annotated[float, Field(gt=0, le=1e5)]
-Speed = Annotated[float, Field(gt=0, le=100)]
-Acceleration = Annotated[float, Field(gt=0, le=1000)]
-Rate = Annotated[float, Field(gt=0, le=1000)]
-Point = tuple[float, float]
-Pause = Annotated[float, Field(ge=0, le=3600)]
-
-
 def one_of(kind: str, known: Collection[str]) -> AfterValidator:
     """A check that text is among the known names; a near one is suggested."""
 
@@ -400,9 +390,3 @@ def one_of(kind: str, known: Collection[str]) -> AfterValidator:
         return name
 
     return AfterValidator(check)
-
-
-def wrong_key(key: str, sentence: str) -> ValidationError:
-    """To be raised by a validator of a whole section, where one of its keys is at fault."""
-    error = PydanticCustomError("value_error", "{sentence}", {"sentence": sentence})
-    return ValidationError.from_exception_data(key, [InitErrorDetails(type=error, loc=(key,), input=None)])
