@@ -65,14 +65,6 @@ class YamlFile:
         value = tree if isinstance(tree, str | bool | int | float) else None
         return Place(str(self.path), line, key=".".join(map(str, named)), value=value)
 
-    def at_keys(self, keys: Keys) -> Any:
-        """What the file has at a place; None where it has nothing there."""
-        tree = self.marked
-        for key in keys:
-            inside = (isinstance(tree, dict) and key in tree) or (isinstance(tree, list) and key in range(len(tree)))
-            tree = tree[key] if inside else None
-        return tree
-
     def written(self, keys: Keys) -> Keys:
         """The keys with an entry's number as it is in the file."""
         if len(keys) > 1 and isinstance(keys[1], int) and keys[0] in self.kept:
@@ -338,8 +330,7 @@ def _of_other_kinds(loc: Keys, schema: dict[str, Any], source: YamlFile) -> str:
     owners = [name for name in members if key in _referred(schema, {"$ref": members[name]})["properties"]]
     if not owners or kind not in members or any(name.startswith(f"{key}_") for name in own):
         return ""
-    written = source.at_keys(keys)
-    is_said = isinstance(written, dict) and "kind" in written
+    is_said = source.place((*keys, "kind")).value is not None
     return f"belongs to {', '.join(owners)}; {'this is' if is_said else 'without a kind this is'} {kind}"
 
 
