@@ -375,7 +375,7 @@ def test_shadows_in_a_room_are_those_of_rays_without_tiles(caster, monkeypatch):
     camera, shot = LENSES["paper_literal"], Shot(HERE, 0)
     by_tiles = caster.frame(camera, shot, later=LATER)
     monkeypatch.setattr(
-        "vobench.render.culling.PointView.fills", lambda self, axis, sine: np.full(len(axis), -1, np.int32)
+        "vobench.render.occlusion.PointView.fills", lambda self, axis, sine: np.full(len(axis), -1, np.int32)
     )
     by_rays = TruthCaster(HALL).frame(camera, shot, later=LATER)
     for name, values in by_rays.channels().items():
