@@ -57,3 +57,10 @@ def test_too_short_or_without_a_change_of_speed_there_is_no_offset(n, step_m, me
     path = Trajectory(np.arange(n) * 10**8, T)
     with pytest.raises(AlignmentError, match=message):
         estimate_offset(path, path)
+
+
+def test_a_hole_after_the_first_pose_moves_no_clock():
+    stamps = np.arange(3000) * 10_000_000
+    truth, est = wander(np.r_[stamps[:1], stamps[300:]]), wander(stamps[400:2900:3])
+    found = estimate_offset(truth, Trajectory(est.t_ns - 2 * 10**9, est.T_world_frame))
+    assert found.offset_ns == pytest.approx(2 * 10**9, abs=1_000_000)
