@@ -28,8 +28,9 @@ def canonical(inputs: Mapping[str, Any]) -> str:
 
 
 def digest(inputs: Mapping[str, Any]) -> str:
-    """128 bits of SHA-256 over the canonical text, in hex."""
-    return hashlib.sha256(canonical(inputs).encode()).hexdigest()[:32]
+    """128 bits of SHA-256 over the same JSON on one line, which is written faster, in hex."""
+    text = json.dumps(inputs, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def folder_digest(folder: Path) -> str:
