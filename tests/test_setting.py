@@ -1,6 +1,6 @@
 """Settings hold their bounds whoever builds them, and YAML and Python are told the same."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, nan, nextafter
 from typing import Annotated, Any, Literal
 
@@ -10,56 +10,43 @@ from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic import ValidationError
 
 from vobench.errors import InputError, SettingError
-from vobench.setting import SETTINGS, ByKind, Like, Matching, Name, OneOf, hints, require, unit_of
+from vobench.setting import ByKind, Like, Matching, Name, OneOf, hints, settings, unit_of
 from vobench.suite.yaml_file import checked, json_schema, plain
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Spring:
     """A part of something larger."""
 
-    __pydantic_config__ = SETTINGS
     stiffness: Annotated[float, Gt(0), Lt(10)] = 1.0
     coils: Annotated[int, Ge(1), Le(9)] = 3
     is_wound: bool = False
 
-    def __post_init__(self) -> None:
-        require(self)
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Slide:
     """One of two ways to move."""
 
-    __pydantic_config__ = SETTINGS
     length_m: float
     kind: Literal["slide"] = "slide"
 
-    def __post_init__(self) -> None:
-        require(self)
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Swing:
     """The other."""
 
-    __pydantic_config__ = SETTINGS
     arm_m: float
     via_m: tuple[tuple[float, float], ...] = ()
     kind: Literal["swing"] = "swing"
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 SPRINGS = {"soft": Spring(stiffness=0.5), "stiff": Spring(stiffness=9.0, coils=9)}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Toy:
     """Something of every sort that a field can be."""
 
-    __pydantic_config__ = SETTINGS
     name: Name = "toy"
     wall: Literal["north", "south"] | None = None
     color: Annotated[str, OneOf("color", {"red": 1, "green": 2})] = "red"
@@ -75,7 +62,6 @@ class Toy:
     last_s: float = 1.0
 
     def __post_init__(self) -> None:
-        require(self)
         if self.first_s > self.last_s:
             raise SettingError(f"should be at most last_s, but is {self.first_s:g} against {self.last_s:g}", "first_s")
 

@@ -2,13 +2,9 @@
 
 A class of settings says what it takes, and holds it whoever builds one:
 
-    @dataclass(frozen=True, slots=True, kw_only=True)
+    @settings()
     class Shutter:
-        __pydantic_config__ = SETTINGS
         readout_ms: Annotated[float, Ge(0), Le(1000)] = 0.0
-
-        def __post_init__(self) -> None:
-            require(self)
 
 YAML files are read into such classes, and JSON Schemas and the tables of the docs are made from them: see `suite`.
 """
@@ -20,14 +16,11 @@ from functools import cache
 from math import isfinite
 from numbers import Integral, Real
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, Union, dataclass_transform, get_args, get_origin, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 
 from vobench.errors import SettingError, unknown
-
-# Every class of settings has this as `__pydantic_config__`: unknown keys, NaN and infinity are errors.
-SETTINGS = {"extra": "forbid", "allow_inf_nan": False}
 
 # What may be wrong with a value, in the words of somebody who writes YAML, by pydantic's names; {} are filled in.
 COMPLAINTS = {
@@ -68,6 +61,8 @@ UNITS = {
     "radps2": "rad/s²",
 }
 
+T = TypeVar("T")
+
 
 def unit_of(name: str) -> str:
     """The unit that a setting's name ends in; empty where it has none."""
@@ -80,6 +75,27 @@ def tupled(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: tupled(part) for key, part in value.items()}
     return tuple(map(tupled, value)) if isinstance(value, list | tuple) else value
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(field,))
+def settings(*, kw_only: bool = True) -> Callable[[type[T]], type[T]]:
+    """A frozen dataclass whose fields are held to their annotations, then to its own `__post_init__`."""
+
+    def decorate(cls: type[T]) -> type[T]:
+        further = getattr(cls, "__post_init__", None)
+
+        def checked(self: T) -> None:
+            require(self)
+            if further:
+                further(self)
+
+        # How pydantic reads the class: unknown keys, NaN and infinity are errors.
+        config = {"extra": "forbid", "allow_inf_nan": False, **vars(cls).get("__pydantic_config__", {})}
+        for name, value in (("__post_init__", checked), ("__pydantic_config__", config)):
+            setattr(cls, name, value)
+        return dataclass(frozen=True, slots=True, kw_only=kw_only)(cls)
+
+    return decorate
 
 
 # Marks in annotations. Pydantic asks them how to read and describe a value; nobody else needs it.

@@ -1,78 +1,62 @@
 """Settings in YAML: every mistake is a sentence with its line, whether settings are dataclasses or models."""
 
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import pytest
 from annotated_types import Ge, Gt, Le
 
 from vobench.errors import SettingError, SuiteError
-from vobench.setting import SETTINGS, ByKind, Like, Name, OneOf, Share, require
+from vobench.setting import ByKind, Like, Name, OneOf, Share, settings
 from vobench.suite.yaml_file import Strict, read, read_all
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Chip:
     """A chip."""
 
-    __pydantic_config__ = SETTINGS
     read_noise_e: Annotated[float, Ge(0)] = 0.0
     prnu: Share = 0.0
     adc_bits: Literal[8, 10] | None = None
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 CHIPS = {"clean": Chip(), "noisy": Chip(read_noise_e=25.0, adc_bits=10)}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Limits:
     """Least and most."""
 
-    __pydantic_config__ = SETTINGS
     least_ms: float = 1.0
     most_ms: float = 2.0
 
     def __post_init__(self) -> None:
-        require(self)
         if self.least_ms > self.most_ms:
             raise SettingError(f"should be at most most_ms (got {self.least_ms:g})", "least_ms")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Circle:
     """A circle."""
 
-    __pydantic_config__ = SETTINGS
     radius_m: Annotated[float, Gt(0)]
     kind: Literal["circle"] = "circle"
 
-    def __post_init__(self) -> None:
-        require(self)
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Square:
     """A square."""
 
-    __pydantic_config__ = SETTINGS
     side_m: Annotated[float, Gt(0)]
     kind: Literal["square"] = "square"
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 Course = Annotated[Circle | Square, ByKind("course", default="circle")]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class File:
     """All of it."""
 
-    __pydantic_config__ = SETTINGS
     name: Name
     seed: Annotated[int, Ge(0), Le(9)] = 0
     lens: Annotated[str, OneOf("lens", ("wide", "tele"))] = "wide"
@@ -80,9 +64,6 @@ class File:
     courses: dict[Name, Course] | None = None
     limits: Limits | None = None
     times_s: tuple[float, ...] = ()
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 class Model(Strict):

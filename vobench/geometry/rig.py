@@ -10,22 +10,19 @@ from vobench.errors import InputError, VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, KannalaBrandt, Pinhole
 from vobench.geometry.se3 import Array
-from vobench.setting import SETTINGS, Positive, require
+from vobench.setting import Positive, settings
 
 # Focal length, sensor and resolution as the paper gives them (section II-B).
 PAPER_FOCAL_MM, PAPER_SENSOR_MM, PAPER_SIZE_PX = 32.0, (35.0, 28.18), (720, 480)
 
 
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class WheelGeometry:
     """Nominal geometry of the two driven wheels, as an odometer believes it."""
 
     radius_m: Positive
     track_m: Positive
     ticks_per_revolution: Annotated[int, Gt(0)]
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 # Radius and track: CoppeliaSim's Pioneer 3-DX; 500 lines x 4 edges x gear 38.3, from the data sheet.
@@ -306,7 +303,7 @@ Ratio = Annotated[float, Gt(-1), Lt(1)]
 Angle = Annotated[float, Ge(-10), Le(10)]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class CalibrationError:
     """The true rig minus what its calibration says; ratios are shares of what it says.
 
@@ -315,8 +312,6 @@ class CalibrationError:
     shifted along the baseline: the left camera stays where the calibration has it.
     """
 
-    __pydantic_config__ = SETTINGS
-
     focal_ratio: Ratio = 0.0
     center_px: tuple[float, float] = (0.0, 0.0)
     distortion_ratio: Ratio = 0.0
@@ -324,9 +319,6 @@ class CalibrationError:
     right_roll_deg: Angle = 0.0
     right_pitch_deg: Angle = 0.0
     right_yaw_deg: Angle = 0.0
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 def true_rig(nominal: Rig, error: CalibrationError) -> Rig:

@@ -13,7 +13,7 @@ from annotated_types import Ge, Gt, Lt
 
 from vobench.errors import MotionError
 from vobench.geometry.se3 import Array
-from vobench.setting import Positive, require
+from vobench.setting import Positive, settings
 from vobench.trajectory.kinematics import CurveMotion, Kinematics, level
 from vobench.trajectory.trajectory import Stamps
 
@@ -21,7 +21,7 @@ STEP_S = 0.01
 LOOKS = 8192
 
 
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class AckermannSettings:
     """A vehicle and its driver, who comes back to the way over about lookahead_m."""
 
@@ -30,9 +30,6 @@ class AckermannSettings:
     max_steer_radps: Positive
     steer_lag_s: Annotated[float, Ge(STEP_S)]
     lookahead_m: Positive
-
-    def __post_init__(self) -> None:
-        require(self)
 
     @property
     def sharpest_radius_m(self) -> float:

@@ -10,7 +10,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.spline import Poses, columns, pose_spline, turned
 from vobench.motion.wheeled import Rate
-from vobench.setting import SETTINGS, NonNegative, OneOf, require
+from vobench.setting import NonNegative, OneOf, settings
 from vobench.trajectory.kinematics import Kinematics, Motion
 from vobench.trajectory.trajectory import Stamps
 
@@ -23,7 +23,7 @@ FALL = 2.0
 Sizes = tuple[NonNegative, NonNegative, NonNegative]
 
 
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class ShakeSettings:
     """How a hand shakes, in the axes of the body: rms along and about x, y, z over the band of 0.5 to 8 Hz.
 
@@ -37,7 +37,6 @@ class ShakeSettings:
     bounce_m: NonNegative = 0.0
 
     def __post_init__(self) -> None:
-        require(self)
         low_hz, high_hz = BAND_HZ
         if self.bounce_m and not 2 * low_hz <= self.step_hz <= high_hz:
             raise SettingError(f"should be from {2 * low_hz:g} to {high_hz:g} (got {self.step_hz:g})", "step_hz")
@@ -108,19 +107,15 @@ class HandheldMotion:
         return composed(self.carrier.at(t_ns), self.shake.at(np.asarray(t_ns, float) / 1e9))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Handheld:
     """A smooth way through poses, carried by somebody whose hands shake, also where the way is at rest."""
 
-    __pydantic_config__ = SETTINGS
     kind: Literal["handheld"] = "handheld"
     poses: Poses
     shake: Annotated[str, OneOf("shake", SHAKES)] = "walking"
     ease_s: NonNegative = 0.0
     rate_hz: Rate = 30.0
-
-    def __post_init__(self) -> None:
-        require(self)
 
     def motion(self, rng: np.random.Generator) -> HandheldMotion:
         """The motion with its shake drawn from `rng`. Raises MotionError."""

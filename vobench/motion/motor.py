@@ -7,10 +7,10 @@ No slip, no inductance, no limit on voltage. The equations are the paper's as do
 from dataclasses import dataclass
 
 from vobench.motion.pioneer import Number, Theta
-from vobench.setting import SETTINGS, NonNegative, Positive, require
+from vobench.setting import NonNegative, Positive, settings
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class MotorConstants:
     """What theta is made of, by the paper's symbols with their SI units; the defaults are no measured robot's.
 
@@ -19,7 +19,6 @@ class MotorConstants:
     ratio, voltage constant; Be: a wheel's friction; kPT, kDT and kPR, kDR: gains of the loops on u and on omega.
     """
 
-    __pydantic_config__ = SETTINGS
     # None are published of a Pioneer 3-DX. r and d are the robot's; m and the sign of b fit it; the rest was chosen so
     # that a drive at 0.8 m/s asks a 12 V motor for about 7 V.
     r_m: Positive = 0.0975
@@ -36,9 +35,6 @@ class MotorConstants:
     kPR_Vsprad: Positive = 38.4172
     kDT_Vs2pm: NonNegative = 20.0
     kDR_Vs2prad: NonNegative = 3.0
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from vobench.motion import spline as attitude
 from vobench.motion.rail import check_apart
 from vobench.motion.spline import Jet, from_zero
 from vobench.motion.wheeled import Rate, Speed
-from vobench.setting import SETTINGS, Triple, require
+from vobench.setting import Triple, settings
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, CurveMotion, Kinematics, evenly
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class QuadrotorCurve:
         return Jet(ahead, left * rate, left * change - ahead * rate**2)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Quadrotor:
     """Through points on the way of least snap, from hover to hover, tilted as thrust must be.
 
@@ -65,16 +65,12 @@ class Quadrotor:
     it looks the way it flies.
     """
 
-    __pydantic_config__ = SETTINGS
     kind: Literal["quadrotor"] = "quadrotor"
     points_m: Annotated[tuple[Triple, ...], MinLen(2)]
     t_s: tuple[float, ...] | None = None
     speed_mps: Speed = 0.5
     yaw_deg: Annotated[float, Ge(-360), Le(360)] | None = None
     rate_hz: Rate = 30.0
-
-    def __post_init__(self) -> None:
-        require(self)
 
     def motion(self) -> CurveMotion:
         """The motion. Raises MotionError for points or times that make no way, or rotors that would have to pull."""

@@ -13,7 +13,7 @@ from vobench.motion import spline as attitude
 from vobench.motion.course import BLUNT, ArcLength, arc_length
 from vobench.motion.spline import Jet, quintic
 from vobench.motion.wheeled import Acceleration, Rate, Speed
-from vobench.setting import SETTINGS, Triple, require
+from vobench.setting import Triple, settings
 from vobench.trajectory.kinematics import CurveMotion, Kinematics, rest_to_rest
 
 if TYPE_CHECKING:
@@ -54,19 +54,15 @@ class RailCurve:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Rail:
     """Along a rail through points from rest to rest, looking along it, level from side to side."""
 
-    __pydantic_config__ = SETTINGS
     kind: Literal["rail"] = "rail"
     points_m: Annotated[tuple[Triple, ...], MinLen(2)]
     speed_mps: Speed = 0.3
     accel_mps2: Acceleration = 0.5
     rate_hz: Rate = 30.0
-
-    def __post_init__(self) -> None:
-        require(self)
 
     def motion(self) -> CurveMotion:
         """The motion. Raises MotionError where two points are the same, or the rail stands on end or turns back."""

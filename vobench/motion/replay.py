@@ -1,6 +1,5 @@
 """A recorded trajectory as a motion: through its very poses for cameras, or smoothed where accelerations count."""
 
-from dataclasses import dataclass
 from math import radians
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -13,7 +12,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.spline import FEWEST, PoseCurve, by_quaternion, through
 from vobench.motion.wheeled import Rate
-from vobench.setting import SETTINGS, Positive, Triple, require
+from vobench.setting import Positive, Triple, settings
 from vobench.trajectory.kinematics import CurveMotion, evenly
 from vobench.trajectory.trajectory import Move, Trajectory, parse_move
 
@@ -35,7 +34,7 @@ AXES: dict[str, Move | None] = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Replay:
     """The poses of a TUM, EuRoC, KITTI or TartanAir file, told by content, and how the body goes through them.
 
@@ -43,7 +42,6 @@ class Replay:
     without stamps need `times`, a file of them, or `recorded_hz`. Without `start_m` it starts as recorded.
     """
 
-    __pydantic_config__ = SETTINGS
     kind: Literal["replay"] = "replay"
     file: str
     times: str | None = None
@@ -58,7 +56,6 @@ class Replay:
     rate_hz: Rate = 30.0
 
     def __post_init__(self) -> None:
-        require(self)
         try:
             self.move()
         except InputError as error:

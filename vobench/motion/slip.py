@@ -12,14 +12,14 @@ from annotated_types import Ge, Le
 from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.setting import SETTINGS, OneOf, Positive, require
+from vobench.setting import OneOf, Positive, settings
 
 # The random streams, one for each process: switching one off leaves the others as they were.
 SLIP_STREAMS = ("left", "right", "side")
 Generators = Mapping[str, np.random.Generator]
 
 
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class SlipSettings:
     """Three independent, stationary, zero-mean Ornstein-Uhlenbeck processes, and two deterministic terms.
 
@@ -33,9 +33,6 @@ class SlipSettings:
     skid_s: Annotated[float, Ge(0), Le(0.5)] = 0.0
     correlation_s: Positive = 0.3
     traction_s2pm: Annotated[float, Ge(0), Le(0.1)] = 0.0
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 SLIPS = {
@@ -119,7 +116,7 @@ def slip_path(count: int, settings: SlipSettings, *, step_s: float, rngs: Genera
 Bias = Annotated[float, Ge(-0.3), Le(0.3)]
 
 
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class Ground:
     """What a floor does to slip: it multiplies slip ratios and side-slip angle by `factor`, then adds to them.
 
@@ -130,9 +127,6 @@ class Ground:
     ratio_bias: Bias = 0.0
     angle_bias_rad: Bias = 0.0
 
-    def __post_init__(self) -> None:
-        require(self)
-
 
 # Engineering choices: a wet patch spins the wheels, a carpet holds less well and pulls along its nap, a seam is a jolt.
 SURFACES = {
@@ -142,18 +136,14 @@ SURFACES = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class FloorPatch:
     """A rectangle of the floor that is wet, covered or a seam: slip is another there."""
 
-    __pydantic_config__ = SETTINGS
     surface: Annotated[str, OneOf("surface", SURFACES)]
     center_m: tuple[float, float]
     size_m: tuple[Positive, Positive]
     yaw_deg: float = 0.0
-
-    def __post_init__(self) -> None:
-        require(self)
 
     @property
     def corners_m(self) -> Array:
@@ -191,7 +181,7 @@ MOST_SLIP = 0.5
 Contacts = Sequence[tuple[float, float]]
 
 
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class DeltaSettings:
     """The pushes delta_u (m/s^2) and delta_omega (rad/s^2) of (18) as Ornstein-Uhlenbeck processes.
 
@@ -201,9 +191,6 @@ class DeltaSettings:
     speed_std_mps2: Annotated[float, Ge(0), Le(10)] = 0.0
     turn_std_radps2: Annotated[float, Ge(0), Le(50)] = 0.0
     correlation_s: Positive = 0.5
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 # Engineering choices: an even floor, and one whose bumps shove the robot as it goes.

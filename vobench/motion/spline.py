@@ -13,7 +13,7 @@ from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.wheeled import Rate
-from vobench.setting import SETTINGS, NonNegative, Triple, require
+from vobench.setting import NonNegative, Triple, settings
 from vobench.trajectory.kinematics import CurveMotion, Kinematics, TimeLaw, evenly, rest_to_rest
 
 
@@ -115,19 +115,15 @@ class PoseCurve:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Pose:
     """Where the body is at a time, and how it is turned: yaw to the left, pitch down, roll to the right."""
 
-    __pydantic_config__ = SETTINGS
     t_s: float
     position_m: Triple
     yaw_deg: float = 0.0
     pitch_deg: float = 0.0
     roll_deg: float = 0.0
-
-    def __post_init__(self) -> None:
-        require(self)
 
     @property
     def T_world_body(self) -> Array:
@@ -141,18 +137,14 @@ class Pose:
 Poses = Annotated[tuple[Pose, ...], MinLen(FEWEST)]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class PoseSpline:
     """A smooth way through poses at given times; with ease_s from rest to rest."""
 
-    __pydantic_config__ = SETTINGS
     kind: Literal["pose_spline"] = "pose_spline"
     poses: Poses
     ease_s: NonNegative = 0.0
     rate_hz: Rate = 30.0
-
-    def __post_init__(self) -> None:
-        require(self)
 
     def motion(self) -> CurveMotion:
         """The motion. Raises MotionError."""

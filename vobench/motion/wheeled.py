@@ -1,7 +1,7 @@
 """What every trajectory on wheels says: who goes, from where, over what floor, and how it is driven."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, radians
 from typing import Annotated, ClassVar, Literal
 
@@ -16,7 +16,7 @@ from vobench.motion.controller import CONTROLLERS
 from vobench.motion.motor import MotorConstants, theta_of
 from vobench.motion.pioneer import INTEGRATORS, THETAS, AccelerationLimits, Theta
 from vobench.motion.slip import DELTAS, SLIPS, FloorPatch
-from vobench.setting import SETTINGS, OneOf, require
+from vobench.setting import OneOf, settings
 from vobench.trajectory.kinematics import level
 
 # Wide enough for a car on a motorway, and narrow enough that no square of one overflows.
@@ -43,11 +43,10 @@ CAR_WHEELS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Wheeled:
     """A robot on the floor, and how it is driven; `mover` says which of the keys belong here."""
 
-    __pydantic_config__ = SETTINGS
     mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = MOVER_KEYS
 
     mover: Mover = "pioneer"
@@ -69,7 +68,6 @@ class Wheeled:
     substeps: Annotated[int, Ge(1), Le(64)] = 4
 
     def __post_init__(self) -> None:
-        require(self)
         if self.mover not in self.mover_keys:
             raise SettingError(f"should be one of {', '.join(self.mover_keys)} here (got {self.mover!r})", "mover")
 

@@ -3,7 +3,7 @@
 import json
 import zipfile
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
@@ -24,7 +24,7 @@ from vobench.render.lightmap import Atlas, Chart, Holes, Scales, Texels, holes, 
 from vobench.scene.light import NS_PER_S, AreaLight, Light, Sky, Sun
 from vobench.scene.material import Map, Polished, reflectance, texture_of, under_coat
 from vobench.scene.scene import Scene
-from vobench.setting import SETTINGS, Positive, require
+from vobench.setting import Positive, settings
 
 Report = Callable[[float], object]
 MOVER_COARSER = 2
@@ -33,20 +33,16 @@ TEXTURES_DONE, GATHER_DONE = 0.05, 0.5  # the shares of a bake that are done aft
 SUN_STEP_RAD = np.deg2rad(3)  # between the suns whose indirect light is baked
 
 
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class BakeSettings:
     """How finely light is sampled; rays per sample are squares so that they can be stratified."""
 
-    __pydantic_config__ = SETTINGS
     spacing_m: Positive = 0.025
     light_rays: Annotated[int, Ge(1)] = 16
     indirect_spacing_m: Positive = 0.1
     indirect_rays: Annotated[int, Ge(0)] = 256
     bounces: Annotated[int, Ge(0)] = 12
     seed: Annotated[int, Ge(0)] = 0
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +67,7 @@ class BakedScene:
     atlas: Atlas
     light: Floats
     albedo: dict[str, Map]
-    settings: BakeSettings = BakeSettings()
+    settings: BakeSettings = field(default_factory=BakeSettings)
     tracks: tuple[SunTrack, ...] = ()
 
 

@@ -12,7 +12,7 @@ from annotated_types import MinLen
 from vobench.errors import SettingError
 from vobench.geometry.se3 import Array
 from vobench.scene.surface import Surface
-from vobench.setting import SETTINGS, Positive, Share, require
+from vobench.setting import Positive, Share, settings
 
 NS_PER_S = 1e9
 SUN_RADIUS_RAD = np.deg2rad(0.533 / 2)  # seen from the Earth
@@ -44,17 +44,13 @@ class Steady:
         return self.level
 
 
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class Flicker:
     """A lamp on alternating current is brightest twice a period: 1 + depth cos(2π 2 mains_hz t + phase)."""
 
-    __pydantic_config__ = SETTINGS
     depth: Share
     mains_hz: Positive = 50.0
     phase_deg: float = 0.0
-
-    def __post_init__(self) -> None:
-        require(self)
 
     def mean(self, start_ns: int, end_ns: int) -> float:
         """The integral of the cosine is its value amid the interval times a sinc."""
@@ -79,16 +75,14 @@ class Dimmer:
         return float(np.trapezoid(levels, times) / (end_s - start_s)) if end_ns > start_ns else float(levels[0])
 
 
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class Switched:
     """On or off at first, and the other way round from each of the increasing instants times_s on."""
 
-    __pydantic_config__ = SETTINGS
     times_s: Annotated[tuple[float, ...], MinLen(1)]
     on_first: bool = True
 
     def __post_init__(self) -> None:
-        require(self)
         require_increasing(self.times_s)
 
     def mean(self, start_ns: int, end_ns: int) -> float:

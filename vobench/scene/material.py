@@ -1,7 +1,6 @@
 """Materials: matt, polished, mirror, glass; and their procedural textures."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -10,7 +9,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
-from vobench.setting import SETTINGS, OneOf, Positive, Share, require
+from vobench.setting import OneOf, Positive, Share, settings
 
 Map = NDArray[np.float32]
 
@@ -115,7 +114,7 @@ Eta = Annotated[float, Ge(1), Le(4)]  # 1 is an open pane, or no coat
 Roughness = Annotated[float, Ge(0), Le(0.5)]
 
 
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class Matt:
     """Reflects its texture's share of the light alike in all directions (Lambert).
 
@@ -123,7 +122,6 @@ class Matt:
     its mean: half the step from the darkest 1 % to the brightest 1 %.
     """
 
-    __pydantic_config__ = SETTINGS
     pattern: Pattern
     albedo: Albedo
     contrast: Share = 0.0
@@ -132,18 +130,14 @@ class Matt:
     seed: Seed = 0
     kind: Literal["matt"] = "matt"
 
-    def __post_init__(self) -> None:
-        require(self)
 
-
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class Polished:
     """A texture as in Matt under a clear coat, such as waxed stone: matt below, and a mirror that grows to grazing.
 
     `tint` scales what the coat mirrors; `roughness` is the RMS slope of its facets (GGX alpha), 0 for none.
     """
 
-    __pydantic_config__ = SETTINGS
     pattern: Pattern
     albedo: Albedo
     contrast: Share = 0.0
@@ -155,34 +149,23 @@ class Polished:
     roughness: Roughness = 0.0
     kind: Literal["polished"] = "polished"
 
-    def __post_init__(self) -> None:
-        require(self)
 
-
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class Mirror:
     """A metal that reflects the share `tint` at every angle; `roughness` as in Polished."""
 
-    __pydantic_config__ = SETTINGS
     tint: Share = 0.9
     roughness: Roughness = 0.0
     kind: Literal["mirror"] = "mirror"
 
-    def __post_init__(self) -> None:
-        require(self)
 
-
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class Glass:
     """A thin pane: mirrors a little, lets the rest pass straight; `tint` scales what passes. It dims light, no more."""
 
-    __pydantic_config__ = SETTINGS
     eta: Eta = 1.5
     tint: Share = 1.0
     kind: Literal["glass"] = "glass"
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 Textured = Matt | Polished

@@ -11,7 +11,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from vobench.errors import InputError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.sensor.response import FULL_SCALE_DN, Grey
-from vobench.setting import SETTINGS, NonNegative, Positive, require
+from vobench.setting import NonNegative, Positive, settings
 from vobench.trajectory.trajectory import Stamps
 
 NS_PER_S = 1_000_000_000
@@ -75,15 +75,12 @@ def _late_ns(first: int, end: int, height: int, readout_ns: int) -> int:
 DEAD_BAND = 0.02
 
 
-@dataclass(frozen=True, slots=True)
+@settings(kw_only=False)
 class Exposure:
     """The exposure of one picture: the time that the shutter is open and the analogue gain."""
 
     time_s: Positive
     gain_db: NonNegative = 0.0
-
-    def __post_init__(self) -> None:
-        require(self)
 
     @property
     def amplification(self) -> float:
@@ -91,7 +88,7 @@ class Exposure:
         return float(10 ** (self.gain_db / 20))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class AutoExposure:
     """A first-order loop in the logarithm of time × gain: first time, up to its limit, then gain.
 
@@ -99,8 +96,6 @@ class AutoExposure:
     sets the exposure `lag_frames` later; `damping` is the share of the error that one picture leaves.
     Source: onsemi MT9V034 data sheet: exposure before gain, new settings reach the picture after the next.
     """
-
-    __pydantic_config__ = SETTINGS
 
     target_share: Annotated[float, Gt(0), Lt(1)] = 0.18
     percentile: Annotated[float, Gt(0), Le(100)] | None = None
@@ -111,7 +106,6 @@ class AutoExposure:
     gain_max_db: Annotated[float, Ge(0), Le(48)] = 12.0
 
     def __post_init__(self) -> None:
-        require(self)
         if self.t_min_ms > self.t_max_ms:
             raise SettingError(
                 f"should be at most t_max_ms, but is {self.t_min_ms:g} against {self.t_max_ms:g}", "t_min_ms"

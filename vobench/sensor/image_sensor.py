@@ -12,7 +12,7 @@ from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.sensor.exposure import AutoExposure, Exposure
 from vobench.sensor.response import FULL_SCALE_DN, Grey, Response, linear_of_grey, quantise, response_of
-from vobench.setting import SETTINGS, Check, Like, NonNegative, Positive, Share, require
+from vobench.setting import Check, Like, NonNegative, Positive, Share, settings
 
 # From this mean on the expansion below is off by less than 6e-4 in total variation, 1e-4 in variance and 1e-5 in mean.
 EXPANSION_FROM = 10.0
@@ -74,15 +74,13 @@ WHITE_DN = 200
 PIXELS_AT_A_TIME = 1 << 15
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class CameraSensor:
     """A chip and its electronics; electrons saturate at `full_well_e`.
 
     `prnu` (relative), `dsnu_e`, `column_e` and the hot pixels are fixed in time. `adc_bits` none is a converter so
     fine that only the 8 bits kept are seen. A response is a name, a gamma or a table of signals.
     """
-
-    __pydantic_config__ = SETTINGS
 
     full_well_e: Positive = 20_000.0
     black_dn: Annotated[float, Ge(0), Le(128)] = 0.0
@@ -96,9 +94,6 @@ class CameraSensor:
     hot_e_per_s: NonNegative = 20_000.0
     adc_bits: Literal[8, 10, 12] | None = None
     response: Annotated[str | float | tuple[float, ...], Check(response_of, first=True)] = "srgb"
-
-    def __post_init__(self) -> None:
-        require(self)
 
     @property
     def curve(self) -> Response:
@@ -163,7 +158,7 @@ CAMERAS = {
 SENSOR_PRESETS = Like("camera sensor", CAMERAS, key="sensor", section="chip")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class CameraSettings:
     """The chip behind the lens, how it is exposed, and what the lens does to the light.
 
@@ -173,8 +168,6 @@ class CameraSettings:
     `blur_sigma_px` is a Gaussian's, `defocus_px` the diameter of the disc that a point out of focus makes,
     `dirt` the mean share of light that dirt on the front lens keeps from its way.
     """
-
-    __pydantic_config__ = SETTINGS
 
     chip: CameraSensor = CAMERAS["clean"]
     exposure_gain: Positive = 1.0
@@ -192,7 +185,6 @@ class CameraSettings:
     jpeg_quality: Annotated[int, Ge(1), Le(100)] | None = None
 
     def __post_init__(self) -> None:
-        require(self)
         if self.shutter == "rolling" and self.readout_ms is None:
             raise SettingError(
                 "a rolling shutter needs readout_ms: rows × the time from one row to the next, such as 20"

@@ -12,7 +12,7 @@ from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.rig import ImuCalibration
 from vobench.geometry.se3 import Array
-from vobench.setting import SETTINGS, Positive, require
+from vobench.setting import Positive, settings
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, Kinematics, Motion
 from vobench.trajectory.trajectory import Stamps
 
@@ -22,7 +22,7 @@ Axes = tuple[Number, Number, Number]
 EYE: tuple[Axes, Axes, Axes] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Triad:
     """Reading = gain · truth + bias + white noise, cut off at ± limit and rounded to whole steps.
 
@@ -30,8 +30,6 @@ class Triad:
     bias_std (what each start adds to it by chance), limit (None: not cut off) and step (0: not rounded) in U.
     The gain's diagonal is scale, the rest misalignment.
     """
-
-    __pydantic_config__ = SETTINGS
 
     noise: Size = 0.0
     walk: Size = 0.0
@@ -41,9 +39,6 @@ class Triad:
     gain: tuple[Axes, Axes, Axes] = EYE
     limit: Positive | None = None
     step: Size = 0.0
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 FLAWLESS = Triad()
@@ -158,23 +153,18 @@ class ImuBias:
     accel_mps2: Array
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class ImuSettings:
     """An IMU as it is: how often it reads, where it sits, its gyroscopes (rad/s) and accelerometers (m/s²).
 
     `rotation_deg` is roll, pitch and yaw, turned about fixed axes in that order.
     """
 
-    __pydantic_config__ = SETTINGS
-
     rate_hz: Annotated[float, Ge(1), Le(10_000)] = 200.0
     position_m: Axes = (0.0, 0.0, 0.0)
     rotation_deg: Axes = (0.0, 0.0, 0.0)
     gyro: Triad = FLAWLESS
     accel: Triad = FLAWLESS
-
-    def __post_init__(self) -> None:
-        require(self)
 
     @property
     def T_body_imu(self) -> Array:

@@ -1,12 +1,12 @@
 """What an estimator's `estimator.yaml` may say: read without importing its code."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import MinLen
 
-from vobench.setting import SETTINGS, Matching, require
+from vobench.setting import Matching, settings
 from vobench.suite import yaml_file
 
 MANIFEST_FILE = "estimator.yaml"
@@ -20,14 +20,11 @@ def _key_of(name: str) -> str:
     return "class" if name == "class_path" else name
 
 
-MANIFEST_CONFIG = {**SETTINGS, "alias_generator": _key_of}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Manifest:
     """One estimator: its name, where its class is, which sensors it needs and whose pose it gives."""
 
-    __pydantic_config__ = MANIFEST_CONFIG
+    __pydantic_config__: ClassVar[dict[str, Any]] = {"alias_generator": _key_of}
 
     name: Annotated[str, Matching(r"[a-z][a-z0-9_]*", "lower-case letters, digits and _, a letter first")]
     version: Text
@@ -37,9 +34,6 @@ class Manifest:
     summary: Text
     paper: str = ""
     params: dict[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 def read_manifest(folder: Path) -> Manifest:

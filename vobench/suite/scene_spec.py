@@ -3,7 +3,7 @@
 The reader holds the bounds of what is only ever read; what has more to check holds them itself.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -26,21 +26,19 @@ from vobench.scene.light import (
 )
 from vobench.scene.material import Glass, Matt, Mirror, Polished
 from vobench.scene.scene import ceiling_light
-from vobench.setting import SETTINGS, ByKind, Name, NonNegative, OneOf, Positive, Triple, require
+from vobench.setting import ByKind, Name, NonNegative, OneOf, Positive, Triple, settings
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class LevelSpec:
     """A light's brightness over time, relative to its nominal one: exactly one of these."""
 
-    __pydantic_config__ = SETTINGS
     steady: NonNegative | None = None
     flicker: Flicker | None = None
     dimmer: Annotated[tuple[tuple[float, NonNegative], ...], MinLen(2)] | None = None
     switched: Switched | None = None
 
     def __post_init__(self) -> None:
-        require(self)
         if sum(way is not None for way in (self.steady, self.flicker, self.dimmer, self.switched)) != 1:
             raise SettingError("should have exactly one of steady, flicker, dimmer, switched")
         require_increasing([t for t, _ in self.dimmer or ()])
@@ -55,11 +53,10 @@ class LevelSpec:
 STEADY = LevelSpec(steady=1.0)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class LightOverride:
     """A light as a lighting sets it: another power (lamps) or illuminance (sun and sky), or a level over time."""
 
-    __pydantic_config__ = SETTINGS
     power_lm: NonNegative | None = None
     illuminance_lx: NonNegative | None = None
     level: LevelSpec | None = None
@@ -71,11 +68,10 @@ Size = tuple[Side, Side, Side]
 Elevation = Annotated[float, Gt(0), Le(90)]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Luminous:
     """A material of lamps: what has it shines evenly to all sides of its front."""
 
-    __pydantic_config__ = SETTINGS
     kind: Literal["luminous"] = "luminous"
     luminance_cd_m2: Positive
 
@@ -83,11 +79,10 @@ class Luminous:
 MaterialSpec = Annotated[Matt | Polished | Mirror | Glass | Luminous, ByKind("material", default="matt")]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class WindowSpec:
     """A hole in a wall with a pane depth_m behind it; center_m is the place along the wall (world x or y) and z."""
 
-    __pydantic_config__ = SETTINGS
     wall: Literal["north", "east", "south", "west"]
     center_m: tuple[float, float]
     size_m: tuple[Side, Side]
@@ -96,11 +91,10 @@ class WindowSpec:
     reveal: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class RoomSpec:
     """Four walls, a floor at z = 0 and a ceiling, around the origin."""
 
-    __pydantic_config__ = SETTINGS
     size_m: Size
     floor: str
     wall: str
@@ -119,11 +113,10 @@ class RoomSpec:
         return within
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class BoxSpec:
     """A piece of furniture."""
 
-    __pydantic_config__ = SETTINGS
     name: Name | None = None
     center_m: Triple
     size_m: Size
@@ -131,11 +124,10 @@ class BoxSpec:
     material: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class BoardSpec:
     """An upright rectangle seen from the side that faces yaw_deg (0 along x): a picture, a screen, a mirror, a pane."""
 
-    __pydantic_config__ = SETTINGS
     name: Name | None = None
     center_m: Triple
     size_m: tuple[Side, Side]
@@ -143,11 +135,10 @@ class BoardSpec:
     material: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class PanelLamp:
     """A level panel that shines down from a rectangle of size_m."""
 
-    __pydantic_config__ = SETTINGS
     name: Name
     kind: Literal["panel"] = "panel"
     center_m: Triple
@@ -161,11 +152,10 @@ class PanelLamp:
         return replace(panel, level=self.level.build())
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class PointLamp:
     """A bulb."""
 
-    __pydantic_config__ = SETTINGS
     name: Name
     kind: Literal["point"] = "point"
     center_m: Triple
@@ -177,11 +167,10 @@ class PointLamp:
         return PointLight(self.name, np.asarray(self.center_m), self.power_lm, self.level.build())
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class SpotLamp:
     """A bulb in a reflector that points at target_m."""
 
-    __pydantic_config__ = SETTINGS
     name: Name
     kind: Literal["spot"] = "spot"
     center_m: Triple
@@ -192,7 +181,6 @@ class SpotLamp:
     level: LevelSpec = STEADY
 
     def __post_init__(self) -> None:
-        require(self)
         if self.inner_deg > self.outer_deg:
             raise SettingError(f"should be at most outer_deg, {self.outer_deg:g} (got {self.inner_deg:g})", "inner_deg")
         if self.target_m == self.center_m:
@@ -209,21 +197,19 @@ class SpotLamp:
 LampSpec = Annotated[PanelLamp | PointLamp | SpotLamp, ByKind("lamp", default="panel")]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class SunKey:
     """Where the sun is at a time."""
 
-    __pydantic_config__ = SETTINGS
     t_s: float
     azimuth_deg: float
     elevation_deg: Elevation
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class SunSpec:
     """Direct sunlight on a surface that faces it; one place, or several in order of time."""
 
-    __pydantic_config__ = SETTINGS
     illuminance_lx: NonNegative
     azimuth_deg: float | None = None
     elevation_deg: Elevation | None = None
@@ -231,38 +217,34 @@ class SunSpec:
     level: LevelSpec = STEADY
 
     def __post_init__(self) -> None:
-        require(self)
         angles = [angle for angle in (self.azimuth_deg, self.elevation_deg) if angle is not None]
         if len(angles) != (0 if self.path else 2):
             raise SettingError("should have either azimuth_deg and elevation_deg, or a path")
         require_increasing([key.t_s for key in self.path])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class SkySpec:
     """A sky that gives illuminance_lx on open level ground."""
 
-    __pydantic_config__ = SETTINGS
     illuminance_lx: NonNegative
     kind: Annotated[str, OneOf("sky", SKIES)] = "overcast"
     level: LevelSpec = STEADY
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class PathKey:
     """Where a mover is at a time."""
 
-    __pydantic_config__ = SETTINGS
     t_s: float
     position_m: Triple
     yaw_deg: float = 0.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class MoverSpec:
     """A box that goes straight from key to key, its middle at position_m; again and again where it repeats."""
 
-    __pydantic_config__ = SETTINGS
     name: Name
     size_m: Size
     material: str
@@ -270,15 +252,13 @@ class MoverSpec:
     repeats: bool = False
 
     def __post_init__(self) -> None:
-        require(self)
         require_increasing([key.t_s for key in self.path])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class SceneFile:
     """A scene, and the luminance of matt white that cameras are exposed for."""
 
-    __pydantic_config__ = SETTINGS
     name: Name
     summary: str = ""
     white_cd_m2: Positive

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from vobench.errors import SuiteError
-from vobench.setting import SETTINGS, Name, OneOf, Positive, Short, require
+from vobench.setting import Name, OneOf, Positive, Short, settings
 
 FILE_KEYS = ("calibration", "imu", "truth")
 TOPICS = ("left", "right", "left_info", "right_info", "truth", "imu")
 GLOB = re.compile(r"[*?\[]")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Source:
     """A recording, or several by a pattern: a sequence of vobench, a dataset's folder, or a bag.
 
@@ -23,8 +23,6 @@ class Source:
     `imu` are Kalibr's camchain.yaml and imu.yaml, `truth` a trajectory, `rate_hz` for pictures without stamps.
     `topics` says which of a bag are meant, where its own names do not.
     """
-
-    __pydantic_config__ = SETTINGS
 
     path: str
     name: Name | None = None
@@ -34,9 +32,6 @@ class Source:
     truth: str | None = None
     rate_hz: Positive | None = None
     topics: dict[Annotated[str, OneOf("topic", TOPICS)], str] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        require(self)
 
     def placed(self, path: Path, folder: Path) -> "Source":
         """The source of one recording, its files where they are seen from everywhere."""

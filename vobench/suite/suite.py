@@ -17,7 +17,7 @@ from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import SENSOR_PRESETS, CameraSettings
 from vobench.sensor.imu import IMUS, ImuSettings
 from vobench.sensor.pixel_truth import CHANNELS
-from vobench.setting import SETTINGS, Like, Name, OneOf, Positive, Short, hints, require
+from vobench.setting import Like, Name, OneOf, Positive, Short, hints, settings
 from vobench.suite import catalog, scene_file, yaml_file
 from vobench.suite.catalog import Entry, Kind
 from vobench.suite.manifest import Manifest, read_manifest
@@ -32,14 +32,12 @@ MOST_SAMPLES = 65536
 HONEST = CalibrationError()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class RigSettings:
     """A stereo pair on the body: a preset with both lenses, placed, how far its calibration is off, and an IMU.
 
     Without `baseline_m` the cameras stand to each other as the preset has them.
     """
-
-    __pydantic_config__ = SETTINGS
 
     lens: Annotated[str, OneOf("lens", PRESETS)] = "paper_blender"
     pitch_deg: Annotated[float, Ge(-90), Le(90)]
@@ -48,9 +46,6 @@ class RigSettings:
     height_m: float = 0.4
     calibration_error: CalibrationError = HONEST
     imu: Annotated[ImuSettings, Like("IMU", IMUS)] | None = None
-
-    def __post_init__(self) -> None:
-        require(self)
 
     def build(self) -> Rig:
         """The sensors on the body as their calibration has them."""
@@ -66,36 +61,28 @@ class RigSettings:
         return replace(cameras, imu=self.imu.calibration if self.imu else None)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Rendering:
     """The engine: `raster` draws with light computed once, `path` traces `samples` light paths through each pixel.
 
     None are as many as the path tracer takes by itself.
     """
 
-    __pydantic_config__ = SETTINGS
-
     engine: Annotated[str, OneOf("engine", ENGINES)] = "raster"
     samples: Annotated[int, Ge(1), Le(MOST_SAMPLES)] | None = None
 
     def __post_init__(self) -> None:
-        require(self)
         if self.engine != "path" and self.samples is not None:
             raise SettingError(f"samples belongs to engine path, but the engine is {self.engine}; leave samples out")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class EstimatorSettings:
     """An estimator with parameters other than its manifest's."""
-
-    __pydantic_config__ = SETTINGS
 
     name: str
     label: Name | None = None
     params: dict[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        require(self)
 
 
 def _named(value: Any) -> Any:
@@ -108,14 +95,12 @@ NamedEstimator = Annotated[EstimatorSettings, Short(_named, {"type": "string"})]
 Lighting = dict[str, LightOverride]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@settings()
 class Suite:
     """The cases are every combination of scene, lighting, rig, trajectory and camera, and every recording of `source`.
 
     Each axis names its variants; change one axis to change one factor. A suite of recordings alone has no axes.
     """
-
-    __pydantic_config__ = SETTINGS
 
     name: Name
     summary: str = ""
@@ -132,7 +117,6 @@ class Suite:
     estimators: Annotated[tuple[NamedEstimator, ...], MinLen(1)]
 
     def __post_init__(self) -> None:
-        require(self)
         if missing := missing_axis({each.name for each in fields(self) if getattr(self, each.name)}):
             raise SettingError(missing)
 
