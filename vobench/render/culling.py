@@ -98,8 +98,7 @@ def _welded(points_m: Array) -> Array:
     graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
     _, cluster = connected_components(graph, directed=False)
     _, first = np.unique(cluster, return_index=True)
-    welded: Array = points_m[first[cluster]]
-    return welded
+    return np.asarray(points_m[first[cluster]])
 
 
 def _split(outline: Array, points: Array, tree: Any) -> Array:
@@ -172,15 +171,13 @@ def _primitive(baked: BakedScene, parts: list[BatchPart], copies: int) -> Any:
 def _fractions(surface: Surface, points_m: Array) -> Array:
     """Where points (N, 3) lie along a surface's two edges, as fractions (N, 2)."""
     edges = np.stack([surface.edge_u_m, surface.edge_v_m], -1)
-    fractions: Array = (points_m - surface.corner_m) @ edges / (edges**2).sum(0)
-    return fractions
+    return np.asarray((points_m - surface.corner_m) @ edges / (edges**2).sum(0))
 
 
 def _on_light(baked: BakedScene, part: BatchPart, fractions: Array) -> Array:
     """Coordinates (N, 2) on the map of light of points at fractions (N, 2) of a part's edges."""
     first, along, _, up = baked.atlas.texture_coordinates(part.index)
-    coordinates: Array = first + fractions @ np.stack([along - first, up - first])
-    return coordinates
+    return np.asarray(first + fractions @ np.stack([along - first, up - first]))
 
 
 MARGIN_PX = 1  # samples lie up to half a pixel from the middle
@@ -202,8 +199,7 @@ class RigidGroup:
         eye = se3.inverse(T_world_mover) @ [*view.eye_m, 1.0]
         faces = self.two_sided | (self.planes @ eye > 0)
         inside = (bounds @ T_world_mover @ self.corners).reshape(len(bounds), -1, 4).max(-1).min(0) > 0
-        found: NDArray[np.int64] = self.batch[faces & inside]
-        return found
+        return np.asarray(self.batch[faces & inside])
 
 
 class CullingSet:

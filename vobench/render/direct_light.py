@@ -63,8 +63,7 @@ class _MirrorImage:
         ahead = (way @ self.mirror.normal < 0) & (reach > 0) & (reach < 1)
         place = points_m + np.where(ahead, reach, 0)[:, None] * way - self.mirror.corner_m
         u, v = (place @ edge / (edge @ edge) for edge in (self.mirror.edge_u_m, self.mirror.edge_v_m))
-        inside: Floats = ahead & (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1)
-        return inside
+        return np.asarray(ahead & (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1))
 
     def _turned(self, vectors: Floats) -> Floats:
         normal = self.mirror.normal
@@ -170,8 +169,7 @@ def cell_spot(texels: Texels, cell: int, side: int) -> tuple[Floats, Floats]:
 def footprint(texels: Texels, some: NDArray[np.int64], cell: int) -> Floats:
     """Steps (N, 3) from the middle of texels to somewhere on their area."""
     a, b = ((texels.dither[some, ::-1] + cell * FOOTPRINT) % 1 - np.float32(0.5)).T
-    steps: Floats = a[:, None] * texels.step_u_m[some] + b[:, None] * texels.step_v_m[some]
-    return steps
+    return np.asarray(a[:, None] * texels.step_u_m[some] + b[:, None] * texels.step_v_m[some])
 
 
 def _half_shadow(clear: Floats, texels: Texels, atlas: Atlas) -> NDArray[np.bool_]:
@@ -185,8 +183,7 @@ def _half_shadow(clear: Floats, texels: Texels, atlas: Atlas) -> NDArray[np.bool
         ]
         for part in (clear > 0, clear < 1)
     ]
-    half: NDArray[np.bool_] = near[0] & near[1] & ~np.isnan(clear)
-    return half
+    return np.asarray(near[0] & near[1] & ~np.isnan(clear))
 
 
 def sees_open_sky(emitter: Emitter, texels: Texels, visibility: Visibility) -> NDArray[np.bool_]:

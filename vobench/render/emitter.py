@@ -47,8 +47,7 @@ class SolidAngle:
         hv = h0 + b * (h1 - h0)
         yv = np.clip(hv * d / np.sqrt(np.maximum(1 - hv * hv, 1e-30)), self._y0, self._y1)
         axes, flip = self._axes
-        spots: Floats = (np.stack([xu, yv, self._z0 * flip], -1) @ axes).astype(np.float32)
-        return spots
+        return np.asarray((np.stack([xu, yv, self._z0 * flip], -1) @ axes).astype(np.float32))
 
 
 def polygon_illuminance(corners_m: Array, points_m: Floats, normals: Floats) -> Floats:
@@ -207,8 +206,7 @@ def cosine_weighted(normals: Floats, a: Floats, b: Floats) -> Floats:
     """Unit directions (P, 3) around normals, as dense as their cosine."""
     (x, y), (u_axis, v_axis) = disc(a, b), tangents(normals)
     up = np.sqrt(np.maximum(1 - a, 1e-7))
-    directions: Floats = x[:, None] * u_axis + y[:, None] * v_axis + up[:, None] * normals
-    return directions
+    return np.asarray(x[:, None] * u_axis + y[:, None] * v_axis + up[:, None] * normals)
 
 
 def emitters(light: Light, visibility: Visibility, *, t_ns: float = 0) -> list[Emitter]:

@@ -110,8 +110,7 @@ class RayCaster:
     def stops(self, origins_m: ArrayLike, way: ArrayLike) -> Mask:
         """Whether anything is between origins and origins + way (R, 3)."""
         blocked = np.asarray(self._scene.run(*_rays(origins_m, way, reach=1 - 1e-3), query="OCCLUDED"))
-        is_blocked: Mask = blocked >= 0
-        return is_blocked
+        return np.asarray(blocked >= 0)
 
     def nearest(self, origins_m: ArrayLike, directions: ArrayLike) -> Indices:
         """Which surface each ray (R, 3) meets first, -1 for none: `hits` for those who work out the rest."""
@@ -119,8 +118,7 @@ class RayCaster:
         if not len(self._among):
             return np.full(len(triangle), -1, np.int32)
         # The triangle -1 halves to -1, the added last place.
-        surface: Indices = np.append(self._among, np.int32(-1))[triangle >> 1]
-        return surface
+        return np.asarray(np.append(self._among, np.int32(-1))[triangle >> 1])
 
     def hits(self, origins_m: ArrayLike, directions: ArrayLike) -> Hits:
         """The nearest surface along each ray (R, 3)."""
@@ -181,8 +179,7 @@ class Visibility:
     def pane_passes(self, pane: int, directions: Floats) -> Floats:
         """Share (R,) that one pane lets through along unit directions (R, 3)."""
         cosine = directions @ self.normals[pane]
-        share: Floats = self._tint[pane] * (1 - pane_reflectance(cosine, float(self._eta[pane])))
-        return share
+        return np.asarray(self._tint[pane] * (1 - pane_reflectance(cosine, float(self._eta[pane]))))
 
     def crosses_pane(self, origins_m: Floats, way: Floats) -> NDArray[np.bool_]:
         """Whether a pane is between origins and origins + way (R, 3)."""

@@ -138,8 +138,7 @@ class Illumination:
             scene, settings = self._baked.scene, self._baked.settings
             coarse = placed(scene, spacing_m=settings.indirect_spacing_m)
             around = Scales(self._still.atlas, coarse).refined(_between(self._tracks[index], t_ns)[None])[0]
-            layer: Map = direct_layer(scene, index, self._still, settings, t_ns=t_ns) + around
-            return layer
+            return np.asarray(direct_layer(scene, index, self._still, settings, t_ns=t_ns) + around)
 
         return _recent(self._suns, (index, t_ns), make)
 
@@ -158,5 +157,4 @@ def _between(track: SunTrack, t_ns: float) -> Map:
     after = int(np.clip(np.searchsorted(track.times_ns, t_ns), 1, len(track.times_ns) - 1))
     start, end = track.times_ns[after - 1 : after + 1]
     share = np.float32((t_ns - start) / (end - start))
-    light: Map = (1 - share) * track.bounced[after - 1] + share * track.bounced[after]
-    return light
+    return np.asarray((1 - share) * track.bounced[after - 1] + share * track.bounced[after])

@@ -214,8 +214,7 @@ def texel_at(atlas: Atlas, hits: Hits) -> NDArray[np.int64]:
     row, column, rows, columns = np.array([(p.row, p.column, p.rows, p.columns) for p in atlas.charts]).T
     r = row[hits.surface] + np.rint(hits.v * (rows[hits.surface] - 1)).astype(np.int64)
     c = column[hits.surface] + np.rint(hits.u * (columns[hits.surface] - 1)).astype(np.int64)
-    flat: NDArray[np.int64] = r * atlas.width + c
-    return flat
+    return np.asarray(r * atlas.width + c)
 
 
 def bounced(direct: Floats, gathered: FinalGather, own_sky: Mapping[int, int], holes: Holes, *, bounces: int) -> Floats:

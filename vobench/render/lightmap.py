@@ -143,8 +143,7 @@ SMOOTHING = 0.7  # coarse samples
 def _between(few: int, many: int) -> NDArray[np.float32]:
     """(many, few): linear interpolation of smoothed values."""
     smooth = scipy.ndimage.gaussian_filter1d(np.eye(few), SMOOTHING, axis=0, mode="nearest")
-    weights: NDArray[np.float32] = (_linear(few, many) @ smooth).astype(np.float32)
-    return weights
+    return np.asarray((_linear(few, many) @ smooth).astype(np.float32))
 
 
 @lru_cache(maxsize=1024)
@@ -152,15 +151,13 @@ def _means(many: int, few: int) -> NDArray[np.float32]:
     """(few, many): the mean weighted by the hat of linear interpolation; outer samples stand for half an interval."""
     hats = _linear(few, many).T.copy()
     hats[:, [0, -1]] /= 2
-    weights: NDArray[np.float32] = (hats / hats.sum(1, keepdims=True)).astype(np.float32)
-    return weights
+    return np.asarray((hats / hats.sum(1, keepdims=True)).astype(np.float32))
 
 
 def _linear(few: int, many: int) -> Array:
     """(many, few): what each of few evenly spaced values weighs at each of many places."""
     places = np.linspace(0, few - 1, many)
-    weights: Array = np.maximum(1 - np.abs(places[:, None] - np.arange(few)), 0)
-    return weights
+    return np.asarray(np.maximum(1 - np.abs(places[:, None] - np.arange(few)), 0))
 
 
 T = TypeVar("T")
@@ -201,8 +198,7 @@ class Texels:
 
     def cosine(self, way: Floats) -> Floats:
         """Cosine (P,) of the angle between each normal and a way (P, 3)."""
-        cosine: Floats = np.einsum("ij,ij->i", way, self.normals) / np.linalg.norm(way, axis=1)
-        return cosine
+        return np.asarray(np.einsum("ij,ij->i", way, self.normals) / np.linalg.norm(way, axis=1))
 
     def on_map(self, values: Floats, atlas: Atlas) -> Floats:
         """Values (P,) laid out as the map (H, W); 0 where no point is."""

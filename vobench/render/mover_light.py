@@ -59,8 +59,7 @@ def may_shade(mover: Ball, emitter: Ball, points: Ball) -> Mask:
     )
     reach = far_source + emitter.radius_m + mover.radius_m + points.radius_m
     inside = far_mover <= mover.radius_m + points.radius_m
-    passes: Mask = inside | ((np.arccos(np.clip(cosine, -1, 1)) <= sum(angles)) & (far_mover <= reach))
-    return passes
+    return np.asarray(inside | ((np.arccos(np.clip(cosine, -1, 1)) <= sum(angles)) & (far_mover <= reach)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +118,7 @@ class StaticShading:
     def _every_other(self, some: NDArray[np.int64]) -> Mask:
         """Every other row and column."""
         row, column = np.divmod(self.points.index[some], self.atlas.width)
-        even: Mask = (row % 2 == 0) & (column % 2 == 0)
-        return even
+        return np.asarray((row % 2 == 0) & (column % 2 == 0))
 
     def _filled(self, some: NDArray[np.int64], few: NDArray[np.int64], lost: Floats) -> Floats:
         """The loss of few points, smoothed as the sky's own light is, at all of some."""
@@ -132,8 +130,7 @@ class StaticShading:
             for layer in weighted:
                 layer[window] = ndimage.gaussian_filter(layer[window], SPREAD, mode="nearest")
         light, weight = weighted.reshape(2, -1)[:, place]
-        filled: Floats = light / np.maximum(weight, 1e-6)
-        return filled
+        return np.asarray(light / np.maximum(weight, 1e-6))
 
     def _lost(self, sent: "ShadowRays", target: "Target", caster: RayCaster) -> Floats:
         """Illuminance (N,) that what a caster holds takes from the points of some rays."""
@@ -147,8 +144,7 @@ class StaticShading:
         hidden = np.flatnonzero(caster.stops(start, ahead) & (light > 0))
         lost = np.zeros(len(light), np.float32)
         lost[hidden] = light[hidden] * emitter.passing(self.visibility, start[hidden], ahead[hidden])
-        total: Floats = lost.reshape(sent.light.shape).mean(1)
-        return total
+        return np.asarray(lost.reshape(sent.light.shape).mean(1))
 
 
 @dataclass(frozen=True, slots=True)

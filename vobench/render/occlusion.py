@@ -148,8 +148,7 @@ def turn(T_a_b: Array, vectors: Array) -> Array:
     """Directions (R, 3) in b as directions in a."""
     R = T_a_b[..., :3, :3]
     # Not by BLAS: its threads spin on products as narrow as these.
-    turned: Array = np.einsum("ij,rj->ri" if R.ndim == 2 else "rij,rj->ri", R, vectors)
-    return turned
+    return np.asarray(np.einsum("ij,rj->ri" if R.ndim == 2 else "rij,rj->ri", R, vectors))
 
 
 def moved(T_a_b: Array, points: Array) -> Array:
@@ -159,8 +158,7 @@ def moved(T_a_b: Array, points: Array) -> Array:
 
 def _dot(a: Array, b: Array) -> Array:
     """Products (R,) of vectors (R, 3)."""
-    product: Array = np.einsum("ri,ri->r", a, b)
-    return product
+    return np.asarray(np.einsum("ri,ri->r", a, b))
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,8 +231,7 @@ def _between(table: Array, rows: Array) -> Array:
     share = (place - first)[:, None, None]
     if not share.any():
         return table[first]
-    blend: Array = (1 - share) * table[first] + share * table[np.minimum(first + 1, len(table) - 1)]
-    return blend
+    return np.asarray((1 - share) * table[first] + share * table[np.minimum(first + 1, len(table) - 1)])
 
 
 def of(T: Array, rays: NDArray[np.intp]) -> Array:
@@ -356,8 +353,7 @@ class PointView:
     def _inside(self, axis: Floats) -> Floats:
         """The least sine (T, S) of the angle between axes and the planes through the point and an edge."""
         first, second, third, fourth = (np.einsum("tc,sc->ts", axis, self._edges[:, edge]) for edge in range(4))
-        least: Floats = np.minimum(np.minimum(first, second), np.minimum(third, fourth))
-        return least
+        return np.asarray(np.minimum(np.minimum(first, second), np.minimum(third, fourth)))
 
     def _range_m(self, axis: Floats, sine: Floats) -> tuple[Floats, Floats]:
         """How near and how far (T, S) the surfaces' planes may be along rays of cones."""

@@ -97,8 +97,7 @@ class MitsubaScene:
         ray.o = self._past_backs(ray, seen)
         radiance, _, _ = self._integrator.sample(self._world, sampler, ray, None, seen)
         light = dr.select(seen, radiance[0], 0.0).numpy().reshape(len(rows), columns, samples)
-        total: Floats = light.sum(-1)
-        return total
+        return np.asarray(light.sum(-1))
 
     def _past_backs(self, ray: Any, seen: Any) -> Any:
         """Origins of rays moved on past surfaces that they see from behind, which no picture shows."""

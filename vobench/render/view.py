@@ -142,8 +142,7 @@ class PinholeView:
                 [0, 0, 1],
             ]
         )
-        world: Array = self.images[:3, :3].T @ self.T_world_camera[:3, :3] @ rays
-        return world
+        return np.asarray(self.images[:3, :3].T @ self.T_world_camera[:3, :3] @ rays)
 
     def pose(self, mover: int) -> Array:
         """T_world_mover, the identity for what is static."""

@@ -104,8 +104,7 @@ def warp(camera: Camera) -> Warp:
 def _rays(camera: Camera) -> Array:
     """Unit directions (2 H, 2 W, 3) of all points."""
     v, u = np.indices((camera.height_px * POINTS, camera.width_px * POINTS)) + 0.5
-    rays: Array = camera.rays(np.stack([u, v], -1) / POINTS - 0.5)
-    return rays
+    return np.asarray(camera.rays(np.stack([u, v], -1) / POINTS - 0.5))
 
 
 def _faces(rays: Array) -> tuple[NDArray[np.int8], Array]:

@@ -174,8 +174,7 @@ class SpotLight:
 
     def _falloff(self, theta_rad: Array) -> Array:
         inner, outer = np.deg2rad([self.inner_deg, self.outer_deg])
-        falloff: Array = np.clip((outer - theta_rad) / max(outer - inner, 1e-9), 0.0, 1.0)
-        return falloff
+        return np.asarray(np.clip((outer - theta_rad) / max(outer - inner, 1e-9), 0.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True)

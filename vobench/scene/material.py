@@ -20,8 +20,7 @@ def reflectance(texture: "Textured") -> Map:
     pattern = PATTERNS[texture.pattern](texture, rng)
     low, high = np.percentile(pattern[::4, ::4] if len(pattern) > 64 else pattern, [1, 99])
     unit = (pattern - pattern.mean()) / ((high - low) / 2 if high > low else 1.0)
-    tile: Map = np.clip(texture.albedo * (1 + texture.contrast * unit), 0.02, 0.98).astype(np.float32)
-    return tile
+    return np.asarray(np.clip(texture.albedo * (1 + texture.contrast * unit), 0.02, 0.98).astype(np.float32))
 
 
 def _noise(texture: "Textured", rng: np.random.Generator, *, coarse_m: float, fine_m: float, slope: float) -> Map:
@@ -39,8 +38,7 @@ def _noise(texture: "Textured", rng: np.random.Generator, *, coarse_m: float, fi
     band = (f > 0.5 / coarse_m) & (f < 0.5 / fine_m)
     spectrum = spectrum * np.where(band, np.maximum(f, 1e-6) ** -slope, 0).astype(np.float32)
     noise = scipy.fft.irfft2(spectrum, s=(n, n), workers=-1)
-    unit: Map = noise / (noise.std() or 1)
-    return unit
+    return np.asarray(noise / (noise.std() or 1))
 
 
 def plain(texture: "Textured", rng: np.random.Generator) -> Map:
@@ -55,16 +53,14 @@ def terrazzo(texture: "Textured", rng: np.random.Generator) -> Map:
     small = _noise(texture, rng, coarse_m=0.015, fine_m=0.004, slope=0.5)
     grain = _noise(texture, rng, coarse_m=0.5, fine_m=0.002, slope=1.2)
     step = 0.08
-    pattern: Map = 0.9 * np.tanh((chips - 0.6) / step) - 0.6 * np.tanh((small - 0.8) / step) + 0.5 * grain
-    return pattern
+    return np.asarray(0.9 * np.tanh((chips - 0.6) / step) - 0.6 * np.tanh((small - 0.8) / step) + 0.5 * grain)
 
 
 def plaster(texture: "Textured", rng: np.random.Generator) -> Map:
     """A trowelled wall: soft patches with pits."""
     patches = _noise(texture, rng, coarse_m=0.8, fine_m=0.006, slope=1.1)
     pits = _noise(texture, rng, coarse_m=0.04, fine_m=0.008, slope=0.3)
-    pattern: Map = patches - 0.8 * np.tanh((pits - 1.4) / 0.1)
-    return pattern
+    return np.asarray(patches - 0.8 * np.tanh((pits - 1.4) / 0.1))
 
 
 def wood(texture: "Textured", rng: np.random.Generator) -> Map:
@@ -73,8 +69,7 @@ def wood(texture: "Textured", rng: np.random.Generator) -> Map:
     fibre = _noise(texture, rng, coarse_m=0.05, fine_m=0.004, slope=0.6)
     n = texture.resolution_px
     rings = np.arange(n, dtype=np.float32)[:, None] / n * 2 * np.pi * round(texture.tile_m / 0.05)
-    pattern: Map = np.sin(rings + 2.5 * bend) + 0.7 * fibre
-    return pattern
+    return np.asarray(np.sin(rings + 2.5 * bend) + 0.7 * fibre)
 
 
 def poster(texture: "Textured", rng: np.random.Generator) -> Map:
@@ -182,8 +177,7 @@ def fresnel(cosine: Array, eta: float | Array) -> Array:
     c = np.clip(np.abs(cosine), 0.0, 1.0)
     inside = np.sqrt(1 - (1 - c * c) / eta**2)
     across, along = (c - eta * inside) / (c + eta * inside), (inside - eta * c) / (inside + eta * c)
-    reflected: Array = 0.5 * (across**2 + along**2)
-    return reflected
+    return np.asarray(0.5 * (across**2 + along**2))
 
 
 def pane_reflectance(cosine: Array, eta: float | Array) -> Array:
@@ -207,5 +201,4 @@ def under_coat(albedo: Array, eta: float) -> Array:
     Outgoing luminance = under_coat · E_in (1 - F(out)) / π, where E_in is the illuminance that enters,
     weighted by 1 - F(in). Source: the plastic of Mitsuba 3 (nonlinear), after Jakob (2010).
     """
-    lit: Array = albedo / (1 - albedo * inner_reflectance(eta)) / eta**2
-    return lit
+    return np.asarray(albedo / (1 - albedo * inner_reflectance(eta)) / eta**2)
