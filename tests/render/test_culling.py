@@ -45,7 +45,7 @@ def shown(batch: Batch, view: PinholeView, box: Any) -> bool:
         return False
     if view.mirror is not None:
         on = on[on @ view.mirror.normal + view.mirror.offset_m > 0]
-    seen = se3.apply(view.T_camera_world, on)
+    seen = se3.apply((se3.inverse(view.T_world_camera) @ view.images), on)
     u, v = CAMERA.project(seen[seen[:, 2] > NEAR_M]).T
     return bool(((u > box[0] - 1) & (u < box[1]) & (v > box[2] - 1) & (v < box[3])).any())
 
@@ -61,7 +61,7 @@ def test_no_rectangle_that_can_be_seen_is_left_out_and_most_others_are(mirrors: 
         CAMERA, se3.transform(R * np.linalg.det(R), (0.1, 0.2, 0.3)), [T_mover], np.zeros((0, 3, 4)), 0.0
     )
     for turn in rng.normal(0, 0.2, (mirrors, 3)):
-        towards_camera = turn - view.T_camera_world[2, :3]
+        towards_camera = turn - (se3.inverse(view.T_world_camera) @ view.images)[2, :3]
         view = view.through(Plane(towards_camera / np.linalg.norm(towards_camera), 2.0))
     found = CullingSet(batches).visible(view, box)
     must = {batch.index for batch in batches if shown(batch, view, box)}

@@ -19,7 +19,7 @@ from vobench.geometry.se3 import Array
 from vobench.render.direct_light import SKY_SMOOTHING, direct_light, in_front, mirror_images, sees_open_sky
 from vobench.render.emitter import Emitter, emitters
 from vobench.render.geometry import Floats, SurfaceList, Visibility, inventory
-from vobench.render.indirect_light import FinalGather, bounced, final_gather, surface_responses
+from vobench.render.indirect_light import bounced, final_gather, surface_responses
 from vobench.render.lightmap import Atlas, Chart, Holes, Scales, Texels, holes, outside, pack_atlas, texels
 from vobench.scene.light import NS_PER_S, AreaLight, Light, Sky, Sun
 from vobench.scene.material import Map, Polished, reflectance, texture_of, under_coat
@@ -115,8 +115,16 @@ def bake(scene: Scene, settings: BakeSettings, report: Report = lambda _: None) 
     report(TEXTURES_DONE)
     fine = static_scene(scene, atlas, seed=settings.seed)
     scales = Scales(fine.atlas, coarse.atlas)
-    gathered = _gathered(scene, coarse, albedo, settings, report)
-    instants = _instants(scene)
+    gathered = final_gather(
+        coarse.points,
+        coarse.atlas,
+        coarse.visibility,
+        surface_responses(coarse.things.surfaces, scene.materials, albedo, coarse.things.panel),
+        [light for light in scene.lights if isinstance(light, Sky)],
+        rays=settings.indirect_rays,
+        done=lambda share: report(TEXTURES_DONE + (GATHER_DONE - TEXTURES_DONE) * share),
+    )
+    instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
     light = np.zeros((len(scene.lights), fine.atlas.height, fine.atlas.width), np.float32)
     straight = np.zeros((len(instants), coarse.atlas.height, coarse.atlas.width), np.float32)
     # Backwards, so that a moving sun's layer ends as that of its first instant.
@@ -124,16 +132,11 @@ def bake(scene: Scene, settings: BakeSettings, report: Report = lambda _: None) 
         light[index] = direct_layer(scene, index, fine, settings, t_ns=t_ns)
         straight[row] = scales.coarsened(light[index, None])[0]
         report(1 - (1 - GATHER_DONE) * row / len(instants))
-    own_sky = _own_sky(scene, instants)
-    around = bounced(straight, gathered, own_sky, coarse.holes, bounces=settings.bounces)
+    skies = [row for row, (index, _) in enumerate(instants) if isinstance(scene.lights[index], Sky)]
+    around = bounced(straight, gathered, skies, coarse.holes, bounces=settings.bounces)
     first = [instants.index((index, key_times_ns(one)[0])) for index, one in enumerate(scene.lights)]
     light += scales.refined(around[first])
     return BakedScene(scene, fine.atlas, light, albedo, settings, _tracks(scene, instants, around))
-
-
-def _instants(scene: Scene) -> list[tuple[int, float]]:
-    """Every light, by its index, at every time in ns that it is baked for."""
-    return [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
 
 
 def tiles(scene: Scene) -> dict[str, Map]:
@@ -143,24 +146,10 @@ def tiles(scene: Scene) -> dict[str, Map]:
         stop.check()
         texture = texture_of(material)
         if texture is not None:
-            tile = reflectance(texture)
-            made[name] = tile
-            if isinstance(material, Polished):
-                made[name] = under_coat(tile.astype(float), material.eta).astype(np.float32)
+            made[name] = reflectance(texture)
+        if isinstance(material, Polished):
+            made[name] = under_coat(made[name].astype(float), material.eta).astype(np.float32)
     return made
-
-
-def _gathered(
-    scene: Scene, coarse: StaticScene, albedo: dict[str, Map], settings: BakeSettings, report: Report
-) -> FinalGather:
-    response = surface_responses(coarse.things.surfaces, scene.materials, albedo, coarse.things.panel)
-    skies = [light for light in scene.lights if isinstance(light, Sky)]
-
-    def done(share: float) -> None:
-        report(TEXTURES_DONE + (GATHER_DONE - TEXTURES_DONE) * share)
-
-    rays = settings.indirect_rays
-    return final_gather(coarse.points, coarse.atlas, coarse.visibility, response, skies, rays=rays, done=done)
 
 
 def _sunlit(scene: Scene, coarse: StaticScene, settings: BakeSettings) -> NDArray[np.bool_]:
@@ -171,12 +160,6 @@ def _sunlit(scene: Scene, coarse: StaticScene, settings: BakeSettings) -> NDArra
             layer = direct_layer(scene, index, coarse, settings, t_ns=t_ns)
             lit |= [bool(layer[chart.window].any()) for chart in coarse.atlas.charts]
     return lit
-
-
-def _own_sky(scene: Scene, instants: list[tuple[int, float]]) -> dict[int, int]:
-    """Which of the skies' rows belongs to which layer."""
-    skies = [row for row, (index, _) in enumerate(instants) if isinstance(scene.lights[index], Sky)]
-    return {row: sky for sky, row in enumerate(skies)}
 
 
 def _tracks(scene: Scene, instants: list[tuple[int, float]], around: Floats) -> tuple[SunTrack, ...]:
@@ -216,8 +199,8 @@ def direct_layer(scene: Scene, index: int, fine: StaticScene, settings: BakeSett
         side = round(np.sqrt(settings.light_rays))
         total[some] += direct_light(emitter, fine.points.take(some), fine.atlas, fine.visibility, side=side)
     layer = fine.holes.filled(total).reshape(fine.atlas.height, fine.atlas.width)
-    if isinstance(light, Sky):
-        return _smoothed(layer, fine.atlas)
+    for chart in fine.atlas.charts if isinstance(light, Sky) else ():
+        layer[chart.window] = scipy.ndimage.gaussian_filter(layer[chart.window], SKY_SMOOTHING, mode="nearest")
     if isinstance(light, AreaLight):
         panel = int(np.flatnonzero(fine.things.panel == scene.panels.index(light))[0])
         layer[fine.atlas.charts[panel].window] = np.pi * light.luminance_cd_m2
@@ -228,14 +211,6 @@ def reached(emitter: Emitter, fine: StaticScene) -> NDArray[np.bool_]:
     """The points (P,) that an emitter may light."""
     ahead = in_front(emitter.ball, fine.points.points_m, fine.points.normals)
     return ahead & sees_open_sky(emitter, fine.points, fine.visibility) if emitter.sky == "open" else ahead
-
-
-def _smoothed(layer: Floats, atlas: Atlas) -> Floats:
-    """The sky's shadows are so soft that averaging neighbours takes noise away, and nothing else."""
-    smooth = layer.copy()
-    for chart in atlas.charts:
-        smooth[chart.window] = scipy.ndimage.gaussian_filter(layer[chart.window], SKY_SMOOTHING, mode="nearest")
-    return smooth
 
 
 LIGHT, CHARTS, SETTINGS_FILE = "light.npy", "charts.npy", "settings.json"

@@ -75,13 +75,11 @@ def mirror_images(light: Light, visibility: Visibility, *, t_ns: float) -> list[
     if isinstance(light, Sky):
         return []
     own = emitters(light, visibility, t_ns=t_ns)
-    images = [_MirrorImage(emitter, mirror, tint) for mirror, tint in visibility.mirrors for emitter in own]
-    return [Emitter(_ball_behind(image), image.towards, image.width_rad, image.passing) for image in images]
-
-
-def _ball_behind(image: _MirrorImage) -> Ball:
-    ball = image.emitter.ball
-    return Ball(image.behind(ball.centre_m[None])[0], ball.radius_m)
+    found = []
+    for image in [_MirrorImage(emitter, mirror, tint) for mirror, tint in visibility.mirrors for emitter in own]:
+        ball = Ball(image.behind(image.emitter.ball.centre_m[None])[0], image.emitter.ball.radius_m)
+        found.append(Emitter(ball, image.towards, image.width_rad, image.passing))
+    return found
 
 
 # Steps of additive recurrences that fill the unit interval evenly: Roberts (2018), R2 and the golden ratio.

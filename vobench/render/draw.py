@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cache
 
 import numpy as np
 from OpenGL import GL
@@ -17,7 +17,7 @@ from vobench.render.opengl import (
     FloatTexture,
     Grid,
     Program,
-    Programs,
+    bind,
     canvas,
     flat_target,
 )
@@ -26,6 +26,7 @@ from vobench.scene.material import Glass, Mirror, Polished
 
 # As the shaders say.
 BODY_UNIT, LIGHT_UNIT, LAYERS_UNIT, DEPTH_UNIT, ROUGH_UNIT = (GL.GL_TEXTURE0 + unit for unit in (0, 1, 2, 3, 3))
+LAYERS = GL.GL_TEXTURE_2D_ARRAY
 PASS_FLOATS = 56
 MIRRORS = 3  # followed, each seen in the one before
 NONE = -1.0
@@ -60,7 +61,7 @@ class DrawCalls:
     """Single draw calls, with the programs and state they share, as long as their context is current."""
 
     def __init__(self, light: FloatTexture) -> None:
-        self._programs, self._light = Programs(), light
+        self._program, self._light = cache(Program), light
         self._block = GL.glGenBuffers(1)
         GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._block)
         GL.glBufferData(GL.GL_UNIFORM_BUFFER, 4 * PASS_FLOATS, None, GL.GL_DYNAMIC_DRAW)
@@ -87,25 +88,25 @@ class DrawCalls:
         GL.glFrontFace(GL.GL_CW if view.depth % 2 else GL.GL_CCW)
         GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._block)
         GL.glBufferSubData(GL.GL_UNIFORM_BUFFER, 0, shared.nbytes, shared)
-        self._light.bind(LIGHT_UNIT)
+        bind(LIGHT_UNIT, self._light.id)
 
     def surface(self, batch: Batch, view: PinholeView, copies: int, *abilities: str) -> None:
         """A batch as it is seen; the reflections that it is able to show must be bound."""
-        program = self._programs.get("surface", "surface", *abilities, *_abilities(batch, view))
+        program = self._program("surface", "surface", *abilities, *_abilities(batch, view))
         program.use(**_uniforms(batch, view))
         if isinstance(batch.material, Glass):
             self._pane(batch, copies)
             return
         if batch.texture:
-            batch.texture.bind(BODY_UNIT)
+            bind(BODY_UNIT, batch.texture.id)
         _rectangles(batch, copies)
 
     def resolve(self, group: "Group", view: PinholeView, reflections: Canvas, target: FlatTarget) -> None:
         """The smooth picture of mirrors in one plane, from the samples of their reflections."""
         target.clear(target.whole)
-        _bind_layers(LAYERS_UNIT, reflections.colour)
-        _bind_layers(DEPTH_UNIT, reflections.depth)
-        program = self._programs.get("surface", "resolve")
+        bind(LAYERS_UNIT, reflections.colour, LAYERS)
+        bind(DEPTH_UNIT, reflections.depth, LAYERS)
+        program = self._program("surface", "resolve")
         for batch in group:
             program.use(count=reflections.layers, near_m=NEAR_M, far_m=FAR_M)
             self._flat(batch, view, program)
@@ -113,19 +114,17 @@ class DrawCalls:
     def rough(self, group: "Group", view: PinholeView, plane: Plane, target: RenderTarget) -> None:
         """What rough mirrors in a plane show, without their tint, from its smooth picture."""
         target.rough.clear(target.rough.whole, NONE)
-        GL.glActiveTexture(LAYERS_UNIT)
-        GL.glBindTexture(GL.GL_TEXTURE_2D, target.smooth.texture)
+        bind(LAYERS_UNIT, target.smooth.texture)
         GL.glGenerateMipmap(GL.GL_TEXTURE_2D)
         facing, focal_px = np.array([*plane.normal, plane.offset_m]), max(view.camera.fx_px, view.camera.fy_px)
         for batch in group:
             coated = isinstance(batch.material, Polished)
-            program = self._programs.get("surface", "rough", *(["HAS_FRESNEL"] if coated else []))
+            program = self._program("surface", "rough", *(["HAS_FRESNEL"] if coated else []))
             program.use(plane=facing, roughness=_roughness(batch), focal_px=focal_px)
             if isinstance(batch.material, Polished):
                 program.use(eta=batch.material.eta)
             self._flat(batch, view, program)
-        GL.glActiveTexture(ROUGH_UNIT)
-        GL.glBindTexture(GL.GL_TEXTURE_2D, target.rough.texture)
+        bind(ROUGH_UNIT, target.rough.texture)
 
     def background(self, view: PinholeView, copies: int) -> None:
         """The skies, wherever nothing has been drawn."""
@@ -133,7 +132,7 @@ class DrawCalls:
         GL.glEnable(GL.GL_BLEND)
         GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
         for gradation, scatter, sun in view.skies:
-            program = self._programs.get("background", "background")
+            program = self._program("background", "background")
             program.use(world_from_screen=view.world_from_screen, gradation=gradation, scatter=scatter, sun=sun)
             self._cover(copies)
         GL.glDisable(GL.GL_BLEND)
@@ -141,8 +140,8 @@ class DrawCalls:
     def add(self, canvas: Canvas, total: FlatTarget, box: Box, weight: float) -> None:
         """Add the mean of a canvas's samples in a box, weighted, to a total."""
         total.begin(box)
-        _bind_layers(LAYERS_UNIT, canvas.colour)
-        self._programs.get("fullscreen", "mean").use(count=canvas.layers, weight=weight / canvas.layers)
+        bind(LAYERS_UNIT, canvas.colour, LAYERS)
+        self._program("fullscreen", "mean").use(count=canvas.layers, weight=weight / canvas.layers)
         GL.glEnable(GL.GL_BLEND)
         GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
         GL.glDisable(GL.GL_DEPTH_TEST)
@@ -183,7 +182,6 @@ def _rectangles(batch: Batch, copies: int) -> None:
 
 
 def _abilities(batch: Batch, view: PinholeView) -> list[str]:
-    """What the shader must be able to do for a batch."""
     names = {
         "IS_MIRRORED": view.mirror is not None,
         "HAS_FRESNEL": isinstance(batch.material, Polished | Glass),
@@ -204,11 +202,6 @@ def _uniforms(batch: Batch, view: PinholeView) -> dict[str, float | Array]:
         values["eta"] = material.eta
         values["eye_height"] = abs(view.plane(batch.plane, batch.mover).distance_m(view.eye_m))
     return values
-
-
-def _bind_layers(unit: int, texture: Any) -> None:
-    GL.glActiveTexture(unit)
-    GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, texture)
 
 
 Group = Sequence[Batch]
@@ -234,7 +227,8 @@ class BatchDraw:
         for group in _among(visible, self._mirrors):
             self._draw_mirror(group, view, target, box)
         self._calls.background(view, canvas.layers)
-        for group in sorted(_among(visible, self._panes), key=lambda panes: -_nearest_m(panes, view)):
+        panes = _among(visible, self._panes)
+        for group in sorted(panes, key=lambda group: -np.linalg.norm(_in_camera(group, view), axis=-1).min()):
             self._draw_mirror(group, view, target, box)
 
     def add(self, target: RenderTarget, total: FlatTarget, box: Box, weight: float) -> None:
@@ -250,7 +244,7 @@ class BatchDraw:
     def _draw_mirror(self, group: Group, view: PinholeView, target: RenderTarget, box: Box) -> None:
         """What lies in one plane, with what it mirrors; nothing where the picture does not show it."""
         plane = _plane_towards(view.eye_m, group[0], view)
-        if plane is None or _lies_in(view.mirror, group[0], view):
+        if plane is None or (view.mirror is not None and view.mirror.key in (plane.key, plane.flipped().key)):
             return
         copies = target.canvas.layers
         if view.depth == MIRRORS:
@@ -270,7 +264,7 @@ class BatchDraw:
             self._calls.resolve(group, view, reflections, target.smooth)
             self._calls.rough(rough, view, plane, target)
         self._begin(view, target, box)
-        _bind_layers(LAYERS_UNIT, reflections.colour)
+        bind(LAYERS_UNIT, reflections.colour, LAYERS)
         for batch in group:
             abilities = ("HAS_REFLECTION", "HAS_ROUGHNESS") if batch in rough else ("HAS_REFLECTION",)
             self._calls.surface(batch, view, copies, *abilities)
@@ -286,7 +280,6 @@ def _area_m2(batch: Batch) -> float:
 
 
 def _by_plane(batches: Iterable[Batch]) -> list[list[Batch]]:
-    """Batches that lie in one plane of one thing, together."""
     groups: dict[tuple[object, ...], list[Batch]] = {}
     for batch in batches:
         if batch.plane is not None:
@@ -308,19 +301,8 @@ def _plane_towards(eye_m: Array, batch: Batch, view: PinholeView) -> Plane | Non
     return plane.flipped() if isinstance(batch.material, Glass) else None
 
 
-def _lies_in(plane: Plane | None, batch: Batch, view: PinholeView) -> bool:
-    if plane is None or batch.plane is None:
-        return False
-    here = view.plane(batch.plane, batch.mover)
-    return plane.key in (here.key, here.flipped().key)
-
-
 def _in_camera(group: Group, view: PinholeView) -> Array:
     """Corners (K, 4, 3) of a group's rectangles as the camera sees them."""
-    T_camera_mover = view.T_camera_world @ view.pose(group[0].mover)
+    T_camera_world = se3.inverse(view.T_world_camera) @ view.images
+    T_camera_mover = T_camera_world @ view.pose(group[0].mover)
     return se3.apply(T_camera_mover, np.concatenate([batch.quads_m for batch in group]))
-
-
-def _nearest_m(group: Group, view: PinholeView) -> float:
-    """How far away a group begins."""
-    return float(np.linalg.norm(_in_camera(group, view), axis=-1).min())

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from vobench.render.bake import BakedScene
 from vobench.render.culling import batches
 from vobench.render.draw import BatchDraw, RenderTarget, render_target
 from vobench.render.illumination import AmbientLight, Background, Illumination
-from vobench.render.opengl import CENTRE, HALVES, TURNED, FloatTexture, Grid
+from vobench.render.opengl import CENTRE, HALVES, TURNED, FloatTexture
 from vobench.render.renderer import Radiance, View
 from vobench.render.view import Box, PinholeView, pinhole_view
 from vobench.render.warp import Warp, warp
@@ -25,31 +26,29 @@ class FrameRenderer:
         self._ambient, self._movers = AmbientLight(baked), baked.scene.movers
         self._light = FloatTexture(self._illumination.at(0, 0))
         self._draw = BatchDraw(batches(baked, copies=len(TURNED.points)), self._light)
-        self._targets: dict[tuple[int, int, Grid], RenderTarget] = {}
-        self._warps: dict[Camera, Warp] = {}
+        self._target, self._warp = cache(render_target), cache(warp)
 
     def picture(self, camera: Camera, views: Sequence[View]) -> Radiance:
         """Luminance (H, W) of views that tile a picture's rows, each with the same number of sub-frames."""
         _check(camera, views)
         if isinstance(camera, Pinhole):
             boxes = [(0, camera.width_px, view.rows.start, view.rows.stop) for view in views]
-            grids = _grids(len(views[0].start_ns))
-            targets = [self._target(camera, grid) for grid in grids]
+            count = len(views[0].start_ns)
+            # Sub-frames of even number, four or more, share the samples between them at half the cost.
+            grids = HALVES if count >= 4 and count % 2 == 0 else (TURNED,)
+            targets = [self._target(camera.width_px, camera.height_px, grid) for grid in grids]
             self._expose(targets, camera, views, boxes, targets[0].total.whole)
             return targets[0].total.read(targets[0].total.whole)
-        if camera not in self._warps:
-            self._warps[camera] = warp(camera)
-        lens = self._warps[camera]
+        lens = self._warp(camera)
         return np.concatenate([self._strip(lens, view) for view in sorted(views, key=lambda v: v.rows.start)])
 
     def _strip(self, lens: Warp, view: View) -> Radiance:
-        """Rows of a picture through a lens that is no pinhole."""
         atlas = lens.blank()
         for face in lens.faces:
             box = face.needed_for(view.rows)
             if box is None:
                 continue
-            target = self._target(face.camera, CENTRE)
+            target = self._target(face.camera.width_px, face.camera.height_px, CENTRE)
             T_world_face = view.T_world_camera @ se3.transform(face.R_camera_face, np.zeros(3))
             self._expose([target], face.camera, [replace(view, T_world_camera=T_world_face)], [box], box)
             lens.put(atlas, face, box, target.total.read(box))
@@ -79,18 +78,6 @@ class FrameRenderer:
         poses = [mover.path.pose((start_ns + end_ns) / 2) for mover in self._movers]
         skies = self._background.coefficients(start_ns, end_ns)
         return pinhole_view(camera, view.T_world_camera[index], poses, skies, self._ambient.cd_m2(light))
-
-    def _target(self, camera: Pinhole, grid: Grid) -> RenderTarget:
-        size = camera.width_px, camera.height_px
-        key = (*size, grid)
-        if key not in self._targets:
-            self._targets[key] = render_target(*size, grid)
-        return self._targets[key]
-
-
-def _grids(sub_frames: int) -> tuple[Grid, ...]:
-    """Sub-frames of even number, four or more, share the samples between them at half the cost."""
-    return HALVES if sub_frames >= 4 and sub_frames % 2 == 0 else (TURNED,)
 
 
 def _check(camera: Camera, views: Sequence[View]) -> None:

@@ -1,8 +1,8 @@
 """Every rectangle of a scene, rays against them, and how much light passes between two points."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ from vobench.scene.surface import Surface
 Floats = NDArray[Any]  # float32 where there are many, float64 inside formulas
 Indices = NDArray[np.int32]
 Mask = NDArray[np.bool_]
+T = TypeVar("T")
 
 # Rays start this far off their surface; float32 resolves 1e-6 m at 10 m.
 RAY_OFFSET_M = 1e-4
@@ -54,6 +55,11 @@ def corners(surface: Surface) -> Array:
     return np.stack([o, o + u, o + u + v, o + v])
 
 
+def take(table: T, which: NDArray[np.int64] | Mask | slice) -> T:
+    """Some rows of all the arrays that a dataclass has."""
+    return type(table)(*(getattr(table, field.name)[which] for field in fields(table)))  # type: ignore[arg-type]
+
+
 @dataclass(frozen=True, slots=True)
 class Ball:
     """A sphere around something: centre (..., 3) and radius (...)."""
@@ -61,9 +67,7 @@ class Ball:
     centre_m: Array
     radius_m: Any
 
-    def take(self, which: NDArray[np.int64]) -> "Ball":
-        """Some of many."""
-        return Ball(self.centre_m[which], self.radius_m[which])
+    take = take
 
 
 def ball(surfaces: Sequence[Surface]) -> Ball:
@@ -84,6 +88,8 @@ class Hits:
     u: Floats
     v: Floats
     distance: Floats
+
+    take = take
 
 
 class RayCaster:

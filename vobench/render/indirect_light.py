@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vobench.render.direct_light import JITTER, cell_spot
 from vobench.render.emitter import cosine_weighted
-from vobench.render.geometry import FAR_M, RAY_OFFSET_M, Floats, Hits, Indices, Visibility, smooth_mirror
+from vobench.render.geometry import FAR_M, RAY_OFFSET_M, Floats, Hits, Indices, Visibility, smooth_mirror, take
 from vobench.render.lightmap import Atlas, Holes, Texels, in_chunks, tangents
 from vobench.scene.light import Sky
 from vobench.scene.material import Map, Material, Mirror, Polished, fresnel
@@ -110,8 +110,7 @@ class _RayBatch:
     weight: Floats
     is_direct: NDArray[np.bool_]
 
-    def take(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> "_RayBatch":
-        return _RayBatch(*(getattr(self, f.name)[which] for f in fields(self)))
+    take = take
 
     def joined(self, other: "_RayBatch") -> "_RayBatch":
         return _RayBatch(*(np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(self)))
@@ -125,7 +124,6 @@ class _Gatherer:
     skies: Sequence[Sky]
 
     def gather(self, points: Texels, side: int) -> "tuple[csr_matrix, Floats]":
-        """The rows of the table, and the skies' light by mirrors, of some points."""
         batch, entries = _start(points, side), []
         sky = np.zeros((len(self.skies), len(points)), np.float32)
         for depth in range(MIRRORS + 1):
@@ -133,11 +131,13 @@ class _Gatherer:
             reach = np.where(hits.surface < 0, FAR_M, hits.distance)[:, None]
             off_panes = self._off_panes(batch, batch.directions * reach)
             batch.weight *= self.visibility.through_panes(batch.origins_m, batch.directions * reach)
-            if depth:
-                self._add_sky(sky, batch.take(hits.surface < 0))
+            gone = batch.take(hits.surface < 0)
+            for nth, light in enumerate(self.skies) if depth else ():
+                luminance = light.luminance_cd_m2(gone.directions)
+                sky[nth] += np.bincount(gone.point, np.pi * luminance * gone.weight, minlength=sky.shape[1])
             facing = np.einsum("ij,ij->i", batch.directions, self.visibility.normals[hits.surface])
             met = np.flatnonzero((hits.surface >= 0) & (facing < 0))
-            batch, hits, cosine = batch.take(met), _taken(hits, met), -facing[met]
+            batch, hits, cosine = batch.take(met), hits.take(met), -facing[met]
             shining = self.response.is_panel[hits.surface] & ~batch.is_direct
             factor = batch.weight * np.where(shining, 1, self.response.scattered(hits.surface, cosine))
             entries.append((factor, batch.point, texel_at(self.atlas, hits)))
@@ -148,11 +148,6 @@ class _Gatherer:
         shape = (len(points), self.atlas.height * self.atlas.width)
         rays = np.float32(side * side)
         return scipy.sparse.csr_matrix((factor / rays, (row, column)), shape, dtype=np.float32), sky / rays
-
-    def _add_sky(self, sky: Floats, gone: _RayBatch) -> None:
-        for row, light in enumerate(self.skies):
-            luminance = light.luminance_cd_m2(gone.directions)
-            sky[row] += np.bincount(gone.point, np.pi * luminance * gone.weight, minlength=sky.shape[1])
 
     def _off_panes(self, batch: _RayBatch, way: Floats) -> _RayBatch:
         """The rays that go back from the first pane in their way; a lamp that they meet is no direct light."""
@@ -165,7 +160,6 @@ class _Gatherer:
         return _RayBatch(batch.point, ends, directions, weight, np.zeros(len(weight), bool)).take(weight > FAINT)
 
     def _mirrored(self, batch: _RayBatch, hits: Hits, cosine: Floats, dither: Floats) -> _RayBatch:
-        """The rays that go on from mirrors and coats."""
         weight = batch.weight * self.response.mirrored(hits.surface, cosine)
         on = np.flatnonzero(weight > FAINT)
         batch, surface = batch.take(on), hits.surface[on]
@@ -178,10 +172,6 @@ class _Gatherer:
         leaving = np.einsum("ij,ij->i", directions, plain) > 0
         shown = self.response.shows_lamps[surface]
         return _RayBatch(batch.point, ends + RAY_OFFSET_M * plain, directions, weight[on], shown).take(leaving)
-
-
-def _taken(hits: Hits, which: NDArray[np.int64]) -> Hits:
-    return Hits(hits.surface[which], hits.u[which], hits.v[which], hits.distance[which])
 
 
 def _start(points: Texels, side: int) -> _RayBatch:
@@ -217,15 +207,14 @@ def texel_at(atlas: Atlas, hits: Hits) -> NDArray[np.int64]:
     return np.asarray(r * atlas.width + c)
 
 
-def bounced(direct: Floats, gathered: FinalGather, own_sky: Mapping[int, int], holes: Holes, *, bounces: int) -> Floats:
+def bounced(direct: Floats, gathered: FinalGather, skies: Sequence[int], holes: Holes, *, bounces: int) -> Floats:
     """Illuminance (L, H, W) after one bounce or more, of direct light (L, H, W).
 
-    own_sky: which of gathered.sky belongs to which layer; holes: see lightmap.
+    skies: the layers that gathered.sky belong to, in order; holes: see lightmap.
     """
     straight = direct.reshape(len(direct), -1).T
     by_mirrors = np.zeros((len(holes.index), len(direct)), np.float32)
-    for layer, sky in own_sky.items():
-        by_mirrors[:, layer] = gathered.sky[sky]
+    by_mirrors[:, skies] = gathered.sky.T
     total = np.zeros_like(straight)
     for _ in range(bounces):
         total = holes.filled(gathered.table @ (straight + total) + by_mirrors)

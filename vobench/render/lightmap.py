@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, TypeVar
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vobench import stop
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import RAY_OFFSET_M, Floats, Indices, Visibility
+from vobench.render.geometry import RAY_OFFSET_M, Floats, Indices, Visibility, take
 from vobench.scene.material import Material, Polished, fresnel, texture_of
 from vobench.scene.surface import Surface
 
@@ -62,7 +62,10 @@ class Atlas:
 def pack_atlas(surfaces: Sequence[Surface], *, spacing_m: ArrayLike) -> Atlas:
     """Samples every `spacing_m`, one for all or (S,), packed in shelves, tallest first."""
     spacings = np.broadcast_to(np.asarray(spacing_m, float), len(surfaces))
-    sizes = [_samples(surface, spacing) for surface, spacing in zip(surfaces, spacings, strict=True)]
+    sizes = [
+        tuple(max(2, int(np.ceil(edge / spacing)) + 1) for edge in reversed(surface.size_m))
+        for surface, spacing in zip(surfaces, spacings, strict=True)
+    ]
     width = max(ATLAS_WIDTH, *(columns for _, columns in sizes))
     places: dict[int, tuple[int, int]] = {}
     row = column = shelf = 0
@@ -72,13 +75,7 @@ def pack_atlas(surfaces: Sequence[Surface], *, spacing_m: ArrayLike) -> Atlas:
             row, column, shelf = row + shelf, 0, 0
         places[index] = (row, column)
         column, shelf = column + columns, max(shelf, rows)
-    charts = tuple(Chart(*places[i], *sizes[i]) for i in range(len(sizes)))
-    return Atlas(charts, row + shelf, width)
-
-
-def _samples(surface: Surface, spacing_m: float) -> tuple[int, int]:
-    columns, rows = (max(2, int(np.ceil(edge / spacing_m)) + 1) for edge in surface.size_m)
-    return rows, columns
+    return Atlas(tuple(Chart(*places[i], *sizes[i]) for i in range(len(sizes))), row + shelf, width)
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,9 +182,7 @@ class Texels:
     def __len__(self) -> int:
         return len(self.index)
 
-    def take(self, which: NDArray[np.int64] | NDArray[np.bool_] | slice) -> "Texels":
-        """Some of the points."""
-        return Texels(*(getattr(self, f.name)[which] for f in fields(self)))
+    take = take
 
     def entering(self, cosine: Floats) -> Floats:
         """Share (P,) of light that arrives at a cosine (P,) and passes the coat, 1 where there is none."""

@@ -10,7 +10,18 @@ from scipy import ndimage
 from vobench.render.bake import BakedScene, StaticScene, reached
 from vobench.render.direct_light import Rays, arriving, cell_spot, first_rays, footprint, in_front, mirror_images
 from vobench.render.emitter import Emitter, emitters
-from vobench.render.geometry import Ball, Floats, Mask, RayCaster, SurfaceList, Visibility, ball, corners, inventory
+from vobench.render.geometry import (
+    Ball,
+    Floats,
+    Mask,
+    RayCaster,
+    SurfaceList,
+    Visibility,
+    ball,
+    corners,
+    inventory,
+    take,
+)
 from vobench.render.indirect_light import FinalGather, final_gather, surface_responses
 from vobench.render.lightmap import Atlas, Chart, Scales, Texels, in_chunks, pack_atlas, texels
 from vobench.scene.light import Sky, Sun
@@ -116,7 +127,6 @@ class StaticShading:
         return Shaded(some, self._filled(some, few, self._lost(target.sent(self.points, few, RAYS), target, caster)))
 
     def _every_other(self, some: NDArray[np.int64]) -> Mask:
-        """Every other row and column."""
         row, column = np.divmod(self.points.index[some], self.atlas.width)
         return np.asarray((row % 2 == 0) & (column % 2 == 0))
 
@@ -159,9 +169,7 @@ class ShadowRays:
     ahead_m: Floats
     light: Floats
 
-    def take(self, which: slice | NDArray[np.int64]) -> "ShadowRays":
-        """Those of some of the points."""
-        return ShadowRays(*(getattr(self, f.name)[which] for f in fields(self)))
+    take = take
 
     def merged(self, other: "ShadowRays", own: Mask) -> "ShadowRays":
         """Those of both, one after another; `own` (N,) says whose turn it is."""
@@ -281,7 +289,8 @@ class MoverLight:
         lit = self._points(things, self._still.atlas)
         visibility = Visibility(things.surfaces, self._scene.materials, range(len(things.surfaces)))
         shining = [self._shining(index, suns_ns[index]) if on else [] for index, on in enumerate(is_on)]
-        movers = [sides for index in range(len(self._scene.movers)) if (sides := self._opaque(things, index))]
+        opaque = [np.flatnonzero((things.mover == index) & ~things.pane) for index in range(len(self._scene.movers))]
+        movers = [[things.surfaces[i] for i in sides] for sides in opaque if len(sides)]
         direct = np.zeros((len(shining), len(lit)), np.float32)
         for row, light, targets, sun_ns in zip(direct, self._scene.lights, shining, suns_ns, strict=True):
             shown = mirror_images(light, visibility, t_ns=sun_ns) if targets else []
@@ -291,7 +300,9 @@ class MoverLight:
         least_lx = (UNNOTICED * np.asarray(is_on, np.float32) @ self._layers)[self._still.points.index]
         shaded = tuple(tuple(self._shade.by(movers, target, least_lx) for target in targets) for targets in shining)
         coarse = self._points(things, self._scales.coarse)
-        return MoverLightAt(lit.index, direct, shaded, self._gathered(coarse), coarse.index)
+        gather_rays, still = GATHER_RAYS if self._settings.bounces else 0, self._still
+        gathered = final_gather(coarse, still.atlas, still.visibility, self._response, self._skies, rays=gather_rays)
+        return MoverLightAt(lit.index, direct, shaded, gathered, coarse.index)
 
     def add(self, moment: MoverLightAt, total: Map, levels: Sequence[float]) -> None:
         """Put the movers' light and shade into the sum of all layers (H, W) of what is static."""
@@ -311,11 +322,6 @@ class MoverLight:
         materials, seed = self._scene.materials, self._settings.seed
         return texels(things.surfaces, materials, atlas, among=self._movers, seed=seed)
 
-    def _gathered(self, coarse: Texels) -> FinalGather:
-        atlas, visibility = self._still.atlas, self._still.visibility
-        rays = GATHER_RAYS if self._settings.bounces else 0
-        return final_gather(coarse, atlas, visibility, self._response, self._skies, rays=rays)
-
     def _shining(self, index: int, t_ns: float) -> list[Target]:
         light = self._scene.lights[index]
         if isinstance(light, Sun) and light.moves:
@@ -326,6 +332,3 @@ class MoverLight:
         """All but an open sky that few points see, such as undersides of things on the floor."""
         some = [reached(emitter, self._still).mean() if emitter.sky == "open" else 1 for emitter in parts]
         return [Target(emitter) for emitter, share in zip(parts, some, strict=True) if share > SKY_SHARE]
-
-    def _opaque(self, things: SurfaceList, mover: int) -> list[Surface]:
-        return [things.surfaces[i] for i in np.flatnonzero((things.mover == mover) & ~things.pane)]

@@ -21,13 +21,8 @@ class FloatTexture:
     """A (H, W) float32 map without mipmaps, row 0 at v = 0."""
 
     def __init__(self, values: Floats) -> None:
-        self._values, self._id = values, _texture(GL.GL_R32F, values, GL.GL_FLOAT)
+        self._values, self.id = values, _texture(GL.GL_R32F, values, GL.GL_FLOAT)
         _texture_parameters(GL.GL_LINEAR, GL.GL_LINEAR, GL.GL_CLAMP_TO_EDGE)
-
-    def bind(self, unit: int) -> None:
-        """Let shaders sample it by a unit."""
-        GL.glActiveTexture(unit)
-        GL.glBindTexture(GL.GL_TEXTURE_2D, self._id)
 
     def update(self, values: Floats) -> None:
         """Replace the map by another (H, W); the very array that is there already costs nothing."""
@@ -35,7 +30,7 @@ class FloatTexture:
             return
         self._values = values
         rows, columns = values.shape
-        GL.glBindTexture(GL.GL_TEXTURE_2D, self._id)
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
         GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
         data = np.ascontiguousarray(values, np.float32)
         GL.glTexSubImage2D(GL.GL_TEXTURE_2D, 0, 0, 0, columns, rows, GL.GL_RED, GL.GL_FLOAT, data)
@@ -49,14 +44,15 @@ class ReflectanceTexture:
         self.scale = max(1.0, float(values.max()))
         # Eight bits would make steps of 2 % where a surface reflects 20 %.
         counts = np.rint(values * (65535 / self.scale)).astype(np.uint16)
-        self._id = _texture(GL.GL_R16, counts, GL.GL_UNSIGNED_SHORT)
+        self.id = _texture(GL.GL_R16, counts, GL.GL_UNSIGNED_SHORT)
         GL.glGenerateMipmap(GL.GL_TEXTURE_2D)
         _texture_parameters(GL.GL_LINEAR_MIPMAP_NEAREST, GL.GL_LINEAR, GL.GL_REPEAT)
 
-    def bind(self, unit: int) -> None:
-        """Let shaders sample it by a unit."""
-        GL.glActiveTexture(unit)
-        GL.glBindTexture(GL.GL_TEXTURE_2D, self._id)
+
+def bind(unit: int, texture: Any, kind: int = GL.GL_TEXTURE_2D) -> None:
+    """Let shaders sample a texture by a unit."""
+    GL.glActiveTexture(unit)
+    GL.glBindTexture(kind, texture)
 
 
 def _texture(internal: int, values: NDArray[Any], kind: int) -> Any:
@@ -83,9 +79,12 @@ PASS_BINDING = 0  # as the shaders say
 
 
 class Program:
-    """One linked program. pyrender's own `set_uniform` asks for the location each time and hides every error."""
+    """Two linked shaders with some of their abilities.
 
-    def __init__(self, vertex: str, fragment: str, defines: frozenset[str]) -> None:
+    pyrender's own `set_uniform` asks for the location each time and hides every error.
+    """
+
+    def __init__(self, vertex: str, fragment: str, *defines: str) -> None:
         files = {"vertex_shader": str(SHADERS / f"{vertex}.vert"), "fragment_shader": str(SHADERS / f"{fragment}.frag")}
         shader = ShaderProgram(**files, defines=dict.fromkeys(sorted(defines), 1))
         try:
@@ -122,20 +121,6 @@ class Program:
         else:
             upload = GL.glUniformMatrix4fv if len(value) == 4 else GL.glUniformMatrix3fv
             upload(location, 1, GL.GL_TRUE, value)
-
-
-class Programs:
-    """All programs of one context, each linked when it is first needed."""
-
-    def __init__(self) -> None:
-        self._linked: dict[tuple[str, str, frozenset[str]], Program] = {}
-
-    def get(self, vertex: str, fragment: str, *defines: str) -> Program:
-        """The program of two shaders with some of their abilities."""
-        key = vertex, fragment, frozenset(defines)
-        if key not in self._linked:
-            self._linked[key] = Program(*key)
-        return self._linked[key]
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,10 +233,8 @@ def flat_target(width_px: int, height_px: int, *, mipmaps: bool = False) -> Flat
     GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
     GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
     GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, width_px, height_px, 0, form, GL.GL_FLOAT, None)
-    if mipmaps:
-        _texture_parameters(GL.GL_LINEAR_MIPMAP_LINEAR, GL.GL_LINEAR, GL.GL_CLAMP_TO_EDGE)
-    else:
-        _texture_parameters(GL.GL_NEAREST, GL.GL_NEAREST, GL.GL_CLAMP_TO_EDGE)
+    filters = (GL.GL_LINEAR_MIPMAP_LINEAR, GL.GL_LINEAR) if mipmaps else (GL.GL_NEAREST, GL.GL_NEAREST)
+    _texture_parameters(*filters, GL.GL_CLAMP_TO_EDGE)
     GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, texture, 0)
     _require_complete(width_px, height_px)
     return FlatTarget(width_px, height_px, framebuffer, texture)

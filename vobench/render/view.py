@@ -61,18 +61,10 @@ def visible_box(camera: Pinhole, quads_camera_m: Array, within: Box, *, near_m: 
         return None
     u = points[:, 0] / points[:, 2] * camera.fx_px + camera.cx_px
     v = points[:, 1] / points[:, 2] * camera.fy_px + camera.cy_px
-    return overlap(within, _whole_pixels(u, v))
-
-
-def _whole_pixels(u: Array, v: Array) -> Box:
     limits = np.array([u.min() - 1, u.max() + 2, v.min() - 1, v.max() + 2])
-    first_u, end_u, first_v, end_v = np.floor(np.clip(limits, -1e6, 1e6)).astype(int).tolist()
-    return first_u, end_u, first_v, end_v
-
-
-def overlap(a: Box, b: Box) -> Box | None:
-    """The pixels in both boxes, None for none."""
-    u0, u1, v0, v1 = max(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), min(a[3], b[3])
+    box = np.floor(np.clip(limits, -1e6, 1e6)).astype(int).tolist()
+    u0, v0 = np.maximum(box[::2], within[::2]).tolist()
+    u1, v1 = np.minimum(box[1::2], within[1::2]).tolist()
     return (u0, u1, v0, v1) if u0 < u1 and v0 < v1 else None
 
 
@@ -124,11 +116,6 @@ class PinholeView:
     def mirror(self) -> Plane | None:
         """The mirror whose picture it is."""
         return self.mirrors[-1] if self.mirrors else None
-
-    @property
-    def T_camera_world(self) -> Array:
-        """(4, 4), mirrored where the picture is: from the world to where the camera sees it."""
-        return se3.inverse(self.T_world_camera) @ self.images
 
     @property
     def world_from_screen(self) -> Array:
