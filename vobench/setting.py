@@ -32,11 +32,10 @@ COMPLAINTS = {
     "bool_type": "should be true or false",
     "finite_number": "should be a finite number",
     "tuple_type": "should be a list, as in [a, b]",
-    "dict_type": "should be keys with values",
-    "model_type": "should be keys with values",
-    "model_attributes_type": "should be keys with values",
-    "dataclass_type": "should be keys with values",
-    "dataclass_exact_type": "should be keys with values",
+    **dict.fromkeys(
+        ("dict_type", "model_type", "model_attributes_type", "dataclass_type", "dataclass_exact_type"),
+        "should be keys with values",
+    ),
     "too_short": "should have {min_length} or more entries, but has {actual_length}",
     "too_long": "should have {max_length} or fewer entries, but has {actual_length}",
     "string_too_short": "should not be empty",
@@ -231,12 +230,8 @@ def _before(change: Callable[[Any], Any], schema: Any) -> Any:
 
 def _over(preset: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     """What is given, and the preset's values elsewhere, section by section."""
-    nested = {key: _over(preset[key], part) for key, part in given.items() if _are_sections(preset.get(key), part)}
-    return {**preset, **given, **nested}
-
-
-def _are_sections(*values: Any) -> bool:
-    return all(isinstance(value, dict) for value in values)
+    both = [key for key in given if isinstance(given[key], dict) and isinstance(preset.get(key), dict)]
+    return {**preset, **given, **{key: _over(preset[key], given[key]) for key in both}}
 
 
 Positive = Annotated[float, Gt(0)]
@@ -284,7 +279,10 @@ def _held(value: Any, hint: Any) -> Any:
             _hold_to(mark, value)
         return value
     if origin in (Union, UnionType):
-        return value if value is None and NoneType in args else _held(value, _meant(value, args))
+        if value is None and NoneType in args:
+            return value
+        some = [choice for choice in args if choice is not NoneType]
+        return _held(value, next((choice for choice in some if _is_type(value, choice)), some[0]))
     if origin is tuple and isinstance(value, tuple | list):
         return _held_entries(tuple(value), args)
     if origin is dict and isinstance(value, dict):
@@ -322,12 +320,6 @@ def _held_plain(value: Any, kind: Any) -> Any:
     if kind is float and not isfinite(value):
         raise _wrong("finite_number", value)
     return kind(value) if kind in (float, int) else value
-
-
-def _meant(value: Any, choices: tuple[Any, ...]) -> Any:
-    """The one of several annotations that fits a value's type; the first where none does."""
-    some = [choice for choice in choices if choice is not NoneType]
-    return next((choice for choice in some if _is_type(value, choice)), some[0])
 
 
 def _is_type(value: Any, hint: Any) -> bool:

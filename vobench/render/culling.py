@@ -134,19 +134,13 @@ def _parts(baked: BakedScene) -> Iterator[BatchPart]:
     things = inventory(scene)
     first = len(things.surfaces) - len(own)  # movers come last in the inventory
     surfaces = [*things.surfaces[:first], *own]
-    outlines = _outlines(surfaces, things.mover)
+    outlines: dict[int, Array] = {}  # sealed among surfaces that move together
+    for body in np.unique(things.mover):
+        members = np.flatnonzero(things.mover == body).tolist()
+        outlines |= zip(members, sealed([corners(surfaces[index]) for index in members]), strict=True)
     for index, surface in enumerate(surfaces):
         material = None if things.panel[index] >= 0 else scene.materials[surface.material]
         yield BatchPart(index, surface, outlines[index], int(things.mover[index]), material)
-
-
-def _outlines(surfaces: Sequence[Surface], mover: NDArray[np.int32]) -> dict[int, Array]:
-    """Outlines (K, 3) of all surfaces, sealed among those that move together."""
-    outlines: dict[int, Array] = {}
-    for body in np.unique(mover):
-        members = np.flatnonzero(mover == body).tolist()
-        outlines |= zip(members, sealed([corners(surfaces[index]) for index in members]), strict=True)
-    return outlines
 
 
 def _primitive(baked: BakedScene, parts: list[BatchPart], copies: int) -> Any:

@@ -37,23 +37,15 @@ SPREAD = 1.5  # samples, from every other one
 MARGIN = 6  # samples around a shadow that its smoothing reaches
 
 
-@dataclass(frozen=True, slots=True)
-class Blocks:
-    """Points in groups of neighbours: `of` (P,) names each point's group, `balls` (B,) enclose them."""
-
-    of: NDArray[np.int64]
-    balls: Ball
-
-
-def blocks(points: Texels, atlas: Atlas) -> Blocks:
-    """Squares of BLOCK x BLOCK samples of one surface."""
+def blocks(points: Texels, atlas: Atlas) -> tuple[NDArray[np.int64], Ball]:
+    """Which square (P,) of BLOCK x BLOCK samples of one surface each point is in, and balls (B,) around these."""
     row, column = points.index // atlas.width // BLOCK, points.index % atlas.width // BLOCK
     key = (points.surface.astype(np.int64) * (atlas.height // BLOCK + 1) + row) * (atlas.width // BLOCK + 1) + column
     _, of, count = np.unique(key, return_inverse=True, return_counts=True)
     centre = np.stack([np.bincount(of, axis) for axis in points.points_m.T], -1) / count[:, None]
     radius = np.zeros(len(count))
     np.maximum.at(radius, of, np.linalg.norm(points.points_m - centre[of], axis=1))
-    return Blocks(of, Ball(centre, radius))
+    return of, Ball(centre, radius)
 
 
 def may_shade(mover: Ball, emitter: Ball, points: Ball) -> Mask:
@@ -73,21 +65,17 @@ def may_shade(mover: Ball, emitter: Ball, points: Ball) -> Mask:
     return np.asarray(inside | ((np.arccos(np.clip(cosine, -1, 1)) <= sum(angles)) & (far_mover <= reach)))
 
 
-@dataclass(frozen=True, slots=True)
-class Shaded:
-    """Points (N,) of a stage and the illuminance (N,) that movers take from them."""
-
-    some: NDArray[np.int64]
-    lost: Floats
+Shaded = tuple[NDArray[np.int64], Floats]  # some points (N,), and the illuminance (N,) that movers take from them
 
 
 @dataclass(frozen=True, slots=True)
 class StaticShading:
-    """What does not move, ready to be shaded."""
+    """What does not move, ready to be shaded; block_of and balls are its `blocks`."""
 
     points: Texels
     atlas: Atlas
-    blocks: Blocks
+    block_of: NDArray[np.int64]
+    balls: Ball
     visibility: Visibility
 
     def by(self, movers: Sequence[Sequence[Surface]], target: "Target", least_lx: Floats) -> Shaded:
@@ -96,7 +84,7 @@ class StaticShading:
         least_lx (P,): blocks of points that lose less than this are left alone.
         """
         emitter = target.emitter
-        some = np.flatnonzero(self._near(movers, emitter.ball)[self.blocks.of])
+        some = np.flatnonzero(self._near(movers, emitter.ball)[self.block_of])
         some = some[in_front(emitter.ball, self.points.points_m[some], self.points.normals[some])]
         surfaces = [surface for mover in movers for surface in mover]
         caster = RayCaster(surfaces, range(len(surfaces)))
@@ -105,26 +93,26 @@ class StaticShading:
         bright = np.flatnonzero(sent.light.mean(1) > least_lx[probes])
         found = probes[bright][self._lost(sent.take(bright), target, caster) > least_lx[probes[bright]]]
         # Probes miss the rims of half shadows, but not whole blocks.
-        shaded = np.zeros(len(self.blocks.balls.radius_m), bool)
-        shaded[self.blocks.of[found]] = True
-        return self._shaded(some[shaded[self.blocks.of[some]]], target, caster)
+        shaded = np.zeros(len(self.balls.radius_m), bool)
+        shaded[self.block_of[found]] = True
+        return self._shaded(some[shaded[self.block_of[some]]], target, caster)
 
     def _near(self, movers: Sequence[Sequence[Surface]], emitter: Ball) -> Mask:
         """Blocks (B,) that movers may shade: by a ball around each, and of those by smaller ones that fit better."""
-        near = np.zeros(len(self.blocks.balls.radius_m), bool)
+        near = np.zeros(len(self.balls.radius_m), bool)
         for mover in movers:
             some = np.flatnonzero(~near)
             for enclosing in ([ball(mover)], slices(mover)):
-                few = self.blocks.balls.take(some)
+                few = self.balls.take(some)
                 some = some[np.logical_or.reduce([may_shade(one, emitter, few) for one in enclosing])]
             near[some] = True
         return near
 
     def _shaded(self, some: NDArray[np.int64], target: "Target", caster: RayCaster) -> Shaded:
         if target.emitter.sky != "pane":
-            return Shaded(some, self._lost(target.sent(self.points, some, RAYS), target, caster))
+            return some, self._lost(target.sent(self.points, some, RAYS), target, caster)
         few = some[self._every_other(some)]
-        return Shaded(some, self._filled(some, few, self._lost(target.sent(self.points, few, RAYS), target, caster)))
+        return some, self._filled(some, few, self._lost(target.sent(self.points, few, RAYS), target, caster))
 
     def _every_other(self, some: NDArray[np.int64]) -> Mask:
         row, column = np.divmod(self.points.index[some], self.atlas.width)
@@ -270,7 +258,7 @@ class MoverLight:
 
     def __init__(self, baked: BakedScene, still: StaticScene) -> None:
         self._scene, self._settings, self._still = baked.scene, baked.settings, still
-        self._shade = StaticShading(still.points, still.atlas, blocks(still.points, still.atlas), still.visibility)
+        self._shade = StaticShading(still.points, still.atlas, *blocks(still.points, still.atlas), still.visibility)
         self._movers = tuple(np.flatnonzero(still.things.mover >= 0).tolist())
         self._scales = Scales(still.atlas, pack_atlas(still.things.surfaces, spacing_m=GATHER_SPACING_M))
         self._response = surface_responses(
@@ -308,9 +296,9 @@ class MoverLight:
         """Put the movers' light and shade into the sum of all layers (H, W) of what is static."""
         flat = total.reshape(-1)
         for level, parts in zip(levels, moment.shaded, strict=True):
-            for part in parts:
-                place = self._still.points.index[part.some]
-                flat[place] = np.maximum(flat[place] - np.float32(level) * part.lost, 0)
+            for some, lost in parts:
+                place = self._still.points.index[some]
+                flat[place] = np.maximum(flat[place] - np.float32(level) * lost, 0)
         of_sky = [level for level, light in zip(levels, self._scene.lights, strict=True) if isinstance(light, Sky)]
         around = np.zeros((1, self._scales.coarse.height * self._scales.coarse.width), np.float32)
         around[0, moment.coarse] = moment.gathered.table @ flat + np.asarray(of_sky, np.float32) @ moment.gathered.sky

@@ -3,6 +3,7 @@
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -160,11 +161,13 @@ class PathRenderer:
     """
 
     def __init__(self, scene: Scene, *, samples: int = SAMPLES, seed: int = 0, max_depth: int | None = 16) -> None:
-        _check(samples, max_depth)
+        if samples < 1:
+            raise RenderError(f"cannot trace {samples} paths a pixel; samples must be 1 or more")
+        if max_depth is not None and max_depth < 1:
+            raise RenderError(f"cannot trace paths of {max_depth} segments; max_depth must be 1 or more, or None")
         mitsuba.prepare()
         self._scene, self._samples, self._seed = scene, samples, seed
         self._mitsuba = MitsubaScene(scene, max_depth=max_depth)
-        self._lens: tuple[Camera, Radiance] | None = None
 
     def radiance(self, camera: Camera, views: Sequence[View]) -> Radiance:
         """Luminance (H, W) in cd/m², linear and unclipped, averaged over each pixel's area; views tile the rows.
@@ -181,32 +184,24 @@ class PathRenderer:
     def close(self) -> None:
         """Give back Mitsuba's copy of the scene."""
         del self._mitsuba
-        self._lens = None
 
     def _trace(self, camera: Camera, batch: RowBatch, samples: int) -> Radiance:
         """Mean radiance (R, W) of the rows of a batch over `samples` paths a pixel, some at a time."""
         at_once = max(1, min(samples, MAX_LANES // (len(batch.rows) * camera.width_px)))
         counts = [at_once] * (samples // at_once) + [samples % at_once] * (samples % at_once > 0)
-        rays = self._corner_rays(camera)
+        rays = _corner_rays(camera)
         total = np.zeros((len(batch.rows), camera.width_px), np.float32)
         for seed, count in zip(_seeds(self._seed, batch, len(counts)), counts, strict=True):
             stop.check()
             total += self._mitsuba.trace(rays, batch.rows, batch.T_world_camera, count, seed)
         return total / np.float32(samples)
 
-    def _corner_rays(self, camera: Camera) -> Radiance:
-        """Directions (H + 1, W + 1, 3) float32 through the corners of the pixels, kept from picture to picture."""
-        if self._lens is None or self._lens[0] != camera:
-            u, v = np.meshgrid(np.arange(camera.width_px + 1) - 0.5, np.arange(camera.height_px + 1) - 0.5)
-            self._lens = camera, camera.rays(np.stack([u, v], -1)).astype(np.float32)
-        return self._lens[1]
 
-
-def _check(samples: int, max_depth: int | None) -> None:
-    if samples < 1:
-        raise RenderError(f"cannot trace {samples} paths a pixel; samples must be 1 or more")
-    if max_depth is not None and max_depth < 1:
-        raise RenderError(f"cannot trace paths of {max_depth} segments; max_depth must be 1 or more, or None")
+@lru_cache(maxsize=1)
+def _corner_rays(camera: Camera) -> Radiance:
+    """Directions (H + 1, W + 1, 3) float32 through the corners of the pixels, kept from picture to picture."""
+    u, v = np.meshgrid(np.arange(camera.width_px + 1) - 0.5, np.arange(camera.height_px + 1) - 0.5)
+    return camera.rays(np.stack([u, v], -1)).astype(np.float32)
 
 
 def _batches(scene: Scene, views: Sequence[View], samples: int) -> Iterator[tuple[tuple[SceneState, int], RowBatch]]:
@@ -221,19 +216,15 @@ def _batches(scene: Scene, views: Sequence[View], samples: int) -> Iterator[tupl
             key = state(scene, int(view.start_ns[m]), int(view.end_ns[m])), -(-samples // moments)
             gathered.setdefault(key, []).append((view, m))
     for key, members in gathered.items():
-        yield key, _gather(members)
-
-
-def _gather(members: list[tuple[View, int]]) -> RowBatch:
-    """The rows of views, each in one of its moments, one after another."""
-    rows = [np.arange(view.rows.start, view.rows.stop) for view, _ in members]
-    lengths = [len(r) for r in rows]
-    return RowBatch(
-        np.concatenate(rows),
-        np.repeat([view.start_ns[m] for view, m in members], lengths),
-        np.repeat([view.T_world_camera[m] for view, m in members], lengths, axis=0),
-        np.repeat([1 / len(view.start_ns) for view, _ in members], lengths),
-    )
+        rows = [np.arange(view.rows.start, view.rows.stop) for view, _ in members]
+        lengths = [len(r) for r in rows]
+        batch = RowBatch(
+            np.concatenate(rows),
+            np.repeat([view.start_ns[m] for view, m in members], lengths),
+            np.repeat([view.T_world_camera[m] for view, m in members], lengths, axis=0),
+            np.repeat([1 / len(view.start_ns) for view, _ in members], lengths),
+        )
+        yield key, batch
 
 
 def _seeds(seed: int, batch: RowBatch, count: int) -> list[int]:

@@ -228,9 +228,11 @@ class Band:
         found: Values = {}
         if "flow" in names or "occlusion" in names:
             found["flow"], found["occlusion"] = self._flow()
+        along_axis, T_camera_bodies = self._plan.camera.depth_along == "axis", self._plan.here.T_camera_bodies
+        rows, pixels = self._uv_px[:, 1], np.arange(len(self._rays))
         makers: dict[str, Callable[[], NDArray[np.generic]]] = {
-            "depth": self._depth,
-            "normals": self._normals,
+            "depth": lambda: self._points_m[:, 2] if along_axis else self._distance_m,
+            "normals": lambda: self._turned_normals(at_rows(T_camera_bodies, rows), pixels),
             "instance": lambda: self._ids_of.instance[self._surface],
             "material": lambda: self._ids_of.material[self._surface],
             "mirror": self._mirror,
@@ -249,13 +251,6 @@ class Band:
         seen = self._bodies.visible_surfaces(self._rays[unsure], [of(T, unsure) for T in self._T_bodies_camera])
         surface[unsure], distance_m[unsure] = seen.surface, seen.distance_m
         return surface, distance_m
-
-    def _depth(self) -> Array:
-        return self._points_m[:, 2] if self._plan.camera.depth_along == "axis" else self._distance_m
-
-    def _normals(self) -> Array:
-        T_camera_bodies = at_rows(self._plan.here.T_camera_bodies, self._uv_px[:, 1])
-        return self._turned_normals(T_camera_bodies, np.arange(len(self._rays)))
 
     def _turned_normals(self, T_frame_bodies: Sequence[Array], pixels: Pixels) -> Array:
         """Normals (P, 3) of some pixels in a frame that the transforms, (4, 4) or (P, 4, 4) each, lead to."""

@@ -16,12 +16,10 @@ from vobench.scene.surface import Surface, Window, box, rectangle, room, with_wi
 from vobench.setting import Triple
 from vobench.suite import yaml_file
 from vobench.suite.scene_spec import (
-    BoardSpec,
     LightOverride,
     Luminous,
     MoverSpec,
     SceneFile,
-    SkySpec,
     SunSpec,
     WindowSpec,
 )
@@ -97,7 +95,6 @@ def require_possible(name: str, source: YamlFile) -> None:
 
 
 def _names_in(tree: Any) -> Iterator[str]:
-    """The names of all things that a file holds."""
     for value in tree.values() if isinstance(tree, dict) else tree if isinstance(tree, list) else ():
         if isinstance(value, dict) and isinstance(value.get("name"), str):
             yield str(value["name"])
@@ -214,13 +211,9 @@ def _furniture(spec: SceneFile) -> Iterator[Surface]:
         name = b.name or f"box_{index}"
         yield from box(np.asarray(b.center_m), b.size_m, yaw_deg=b.yaw_deg, material=b.material, instance=name)
     for index, board in enumerate(spec.boards):
-        yield _board(board, board.name or f"board_{index}")
-
-
-def _board(board: BoardSpec, name: str) -> Surface:
-    across = se3.rotation_z(np.deg2rad(board.yaw_deg + 90))[:, 0] * board.size_m[0]
-    up = np.array([0.0, 0.0, board.size_m[1]])
-    return rectangle(np.asarray(board.center_m), across, up, board.material, name)
+        across = se3.rotation_z(np.deg2rad(board.yaw_deg + 90))[:, 0] * board.size_m[0]
+        up = np.array([0.0, 0.0, board.size_m[1]])
+        yield rectangle(np.asarray(board.center_m), across, up, board.material, board.name or f"board_{index}")
 
 
 def _lights(spec: SceneFile, surfaces: list[Surface]) -> Iterator[Light]:
@@ -228,7 +221,9 @@ def _lights(spec: SceneFile, surfaces: list[Surface]) -> Iterator[Light]:
     if spec.sun:
         yield _sun(spec.sun)
     if spec.sky:
-        yield _sky(spec.sky, spec.sun)
+        # A clear sky is brightest around where the sun stands at first, or overhead without a sun.
+        toward = _sun(spec.sun).direction(0) if spec.sun else np.array([0.0, 0.0, 1.0])
+        yield Sky(SKY, spec.sky.illuminance_lx, spec.sky.kind, toward, level=spec.sky.level.build())
     yield from _glowing(surfaces, _luminous(spec))
 
 
@@ -238,12 +233,6 @@ def _sun(sun: SunSpec) -> Sun:
         path = [(0.0, sun.azimuth_deg, sun.elevation_deg)]
     times_s, azimuth_deg, elevation_deg = zip(*path, strict=True)
     return Sun(SUN, sun.illuminance_lx, times_s, azimuth_deg, elevation_deg, sun.level.build())
-
-
-def _sky(sky: SkySpec, sun: SunSpec | None) -> Sky:
-    """A clear sky is brightest around where the sun stands at first, or overhead without a sun."""
-    toward = _sun(sun).direction(0) if sun else np.array([0.0, 0.0, 1.0])
-    return Sky(SKY, sky.illuminance_lx, sky.kind, toward, level=sky.level.build())
 
 
 def _glowing(surfaces: list[Surface], luminous: dict[str, float]) -> Iterator[AreaLight]:

@@ -1,7 +1,4 @@
-"""What a scene's YAML may say, beside the materials and levels of the room `scene`.
-
-The reader holds the bounds of what is only ever read; what has more to check holds them itself.
-"""
+"""What a scene's YAML may say, beside the materials and levels of the room `scene`."""
 
 from dataclasses import replace
 from typing import Annotated, Literal
