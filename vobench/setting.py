@@ -268,7 +268,6 @@ def _at(key: int | str, value: Any, hint: Any) -> Any:
 
 
 def _held(value: Any, hint: Any) -> Any:
-    """The value as an annotation has it. Raises SettingError where it is none such."""
     origin, args = get_origin(hint), get_args(hint)
     if origin is Annotated:
         for mark in args[1:]:

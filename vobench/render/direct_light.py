@@ -25,7 +25,6 @@ class _MirrorImage:
         return self.emitter.width_rad(self.behind(points_m))
 
     def towards(self, texels: Texels) -> Aim:
-        """What the emitter gives the points' own images."""
         images = replace(texels, points_m=self.behind(texels.points_m), normals=self._turned(texels.normals))
         aim_from_behind = self.emitter.towards(images)
 
@@ -37,7 +36,6 @@ class _MirrorImage:
         return aim
 
     def passing(self, visibility: Visibility, origins_m: Floats, way: Floats) -> Floats:
-        """To the mirror, and from there to the emitter."""
         reach = self._reach(origins_m, way)[:, None]
         share = visibility.passing(origins_m, reach * way)
         some = np.flatnonzero(share)

@@ -188,7 +188,6 @@ def _open_sky_emitter(light: Sky, visibility: Visibility) -> Emitter:
 
 
 def _width_rad(surface: Surface) -> Callable[[Floats], Floats]:
-    """The root of a rectangle's solid angle."""
     return lambda points_m: np.sqrt(SolidAngle(surface, points_m).steradian).astype(np.float32)
 
 

@@ -71,7 +71,6 @@ class FrameRenderer:
             self._draw.add(target, total, around, 1 / count)
 
     def _view(self, camera: Pinhole, view: View, index: int) -> PinholeView:
-        """The view of one sub-frame, with the light brought up to date."""
         start_ns, end_ns = int(view.start_ns[index]), int(view.end_ns[index])
         light = self._illumination.at(start_ns, end_ns)
         self._light.update(light)

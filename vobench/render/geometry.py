@@ -121,8 +121,6 @@ class RayCaster:
     def nearest(self, origins_m: ArrayLike, directions: ArrayLike) -> Indices:
         """Which surface each ray (R, 3) meets first, -1 for none: `hits` for those who work out the rest."""
         triangle: Indices = self._scene.run(*_rays(origins_m, directions, reach=1e8), query="INTERSECT")
-        if not len(self._among):
-            return np.full(len(triangle), -1, np.int32)
         # The triangle -1 halves to -1, the added last place.
         return np.asarray(np.append(self._among, np.int32(-1))[triangle >> 1])
 

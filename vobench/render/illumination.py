@@ -77,7 +77,6 @@ T = TypeVar("T")
 
 
 def _recent(kept: OrderedDict[Hashable, T], key: Hashable, make: Callable[[], T]) -> T:
-    """The value of a key, made where it is not among the last few."""
     if key not in kept:
         kept[key] = make()
     kept.move_to_end(key)

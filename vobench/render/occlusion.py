@@ -157,7 +157,6 @@ def moved(T_a_b: Array, points: Array) -> Array:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    """Products (R,) of vectors (R, 3)."""
     return np.asarray(np.einsum("ri,ri->r", a, b))
 
 

@@ -61,10 +61,6 @@ class Lamp:
         """The rectangle that shines, which does not shade itself."""
         return self.light.surface if isinstance(self.light, AreaLight) else None
 
-    def shines(self, points_m: Array, normals: Array) -> Mask:
-        """Whether places (R, 3) lie before the light, within its cone, and turn their normals (R, 3) to it."""
-        return self.reaches(points_m, np.zeros(len(points_m)), normals)[1]
-
     def reaches(self, centers_m: Array, radii_m: Array, normals: Array) -> tuple[Mask, Mask]:
         """Flat things in balls (R, 3), (R,) that it surely does not shine on, and that it surely shines on all of."""
         way = centers_m - self.center_m
@@ -82,7 +78,7 @@ class Lamp:
 
     def hidden(self, bodies: Bodies, points_m: Array, normals: Array, T_bodies_world: Sequence[Array]) -> Mask:
         """Whether something is between the light and places (R, 3) that it would shine on."""
-        hidden = self.shines(points_m, normals)
+        _, hidden = self.reaches(points_m, np.zeros(len(points_m)), normals)
         lit = np.flatnonzero(hidden)
         starts = points_m[lit] + RAY_OFFSET_M * normals[lit]
         to_bodies = [T if T.ndim == 2 else T[lit] for T in T_bodies_world]
@@ -286,7 +282,6 @@ class Band:
         return count
 
     def _spread(self, tiles: NDArray[Scalar]) -> NDArray[Scalar]:
-        """A picture's tiles (V, U) as this band's pixels (R,)."""
         return spread(tiles[self._tiles], self._shape).ravel()
 
     def _flow(self) -> tuple[Array, Mask]:
@@ -400,7 +395,6 @@ class TruthCaster:
 
 
 def _table(names: Iterable[str]) -> tuple[str, ...]:
-    """Nothing, then each name once, in order."""
     return tuple(dict.fromkeys(["", *names]))
 
 

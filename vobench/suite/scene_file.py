@@ -115,7 +115,6 @@ def _surfaces(spec: SceneFile) -> list[Surface]:
 
 
 def _check_light(spec: SceneFile) -> None:
-    """Raise SuiteError where all would be dark."""
     strengths = [lamp.power_lm for lamp in spec.lamps] + [sky.illuminance_lx for sky in (spec.sun, spec.sky) if sky]
     if not (any(strengths) or _luminous(spec)):
         zero = "; all that it has are 0" if strengths else ""
@@ -123,7 +122,6 @@ def _check_light(spec: SceneFile) -> None:
 
 
 def _check_room(spec: SceneFile, wrong: Mistakes) -> None:
-    """Gather what is outside the room, and windows that do not fit their wall."""
     for keys, place_m in _places(spec):
         with wrong.at(*keys):
             if not spec.room.holds(place_m):
@@ -166,7 +164,6 @@ def _check_names(spec: SceneFile, source: YamlFile, wrong: Mistakes) -> None:
 
 
 def _check_window(index: int, spec: SceneFile) -> None:
-    """Raise SuiteError where a window reaches beyond its wall or into an earlier window."""
     window, (x, y, height) = spec.room.windows[index], spec.room.size_m
     length = y if window.wall in ("east", "west") else x
     (along, up), (width, high) = window.center_m, window.size_m
