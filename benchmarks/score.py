@@ -21,8 +21,8 @@ import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.metric.ate import absolute_errors
-from vobench.metric.rpe import relative_errors, select_pairs
+from vobench.metric.ate import absolute_errors, errors_between
+from vobench.metric.rpe import select_pairs
 from vobench.metric.score import ScoreSettings, score, statistics
 from vobench.trajectory.align import align
 from vobench.trajectory.associate import match
@@ -62,7 +62,7 @@ def with_vobench(gt: Rows, est: Rows) -> list[float]:
     matched = match(as_trajectory(gt), as_trajectory(est))
     T_est = align(matched.T_est, matched.T_gt, kind="se3").apply(matched.T_est)
     pairs = select_pairs(matched.T_gt, matched.t_ns, delta=1, unit="f", all_pairs=False)
-    ate, rpe = absolute_errors(matched.T_gt, T_est), relative_errors(matched.T_gt, T_est, pairs)
+    ate, rpe = absolute_errors(matched.T_gt, T_est), errors_between(matched.T_gt, T_est, *pairs)
     errors = [ate.trans_m, np.rad2deg(ate.rot_rad), rpe.trans_m, np.rad2deg(rpe.rot_rad)]
     return [statistics(e).rmse for e in errors]
 

@@ -1,13 +1,15 @@
 """What a notebook calls: trajectories of any form, their scores and diagnoses, sequences, leaderboards."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vobench.analysis import diagnose as diagnosis
 from vobench.analysis.diagnose import Finding
 from vobench.metric import score as scoring
-from vobench.metric.score import DEFAULTS, Score
+from vobench.metric.comparison import DEFAULTS
+from vobench.metric.score import Score
 from vobench.metric.settings import ScoreSettings
 from vobench.run.trajectory_pair import TrajectoryPair, TrajectorySource, read_one, read_pair
 from vobench.trajectory.formats import Reading
@@ -38,7 +40,9 @@ def score(gt: Given, est: Given, *, settings: ScoreSettings = DEFAULTS, times: P
     `settings=LIKE["evo"]` measures as evo would. Raises InputError or AlignmentError.
     """
     pair = _pair(gt, est, times)
-    return scoring.score(pair.gt.trajectory, pair.est.trajectory, settings=settings).noted(_notes(pair))
+    scored = scoring.score(pair.gt.trajectory, pair.est.trajectory, settings=settings)
+    notes = (*pair.notes, pair.by_frame) if pair.by_frame else pair.notes
+    return replace(scored, warnings=(*notes, *scored.warnings))
 
 
 def diagnose(gt: Given, est: Given, *, times: Path | str | None = None) -> tuple[Finding, ...]:
@@ -74,10 +78,6 @@ def _pair(gt: Given, est: Given, times: Path | str | None, *, any_unit: bool = F
     if isinstance(gt, Trajectory) or isinstance(est, Trajectory):
         return TrajectoryPair(_reading(gt, times, any_unit=any_unit), _reading(est, times, any_unit=any_unit))
     return read_pair(TrajectorySource(Path(gt)), TrajectorySource(Path(est)), times=_paths(times), any_unit=any_unit)
-
-
-def _notes(pair: TrajectoryPair) -> tuple[str, ...]:
-    return (*pair.notes, pair.by_frame) if pair.by_frame else pair.notes
 
 
 def _reading(given: Given, times: Path | str | None, *, any_unit: bool) -> Reading:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vobench.errors import AlignmentError, InputError
+from vobench.errors import InputError, SettingError
 from vobench.geometry import se3
 from vobench.metric.comparison import POSES, MetricDefinition
 from vobench.metric.definitions import DEFINITIONS, identity, parse_identity
@@ -47,7 +47,7 @@ COMMON = {
     "alignment": st.sampled_from(["none", "origin", "se3", "sim3", "scale", "yaw"]),
     "align_n": st.none() | st.integers(1, 10**6),
     "association": st.sampled_from(["nearest", "evo", "interpolate", "greedy", "in_order"]),
-    "max_diff_ns": st.integers(0, 10**18),
+    "max_diff_ns": st.integers(0, 10**15),
     "offset_ns": st.integers(-(10**18), 10**18),
     "project": st.sampled_from([None, "xy", "xz", "yz"]),
     "std_ddof": st.integers(0, 1),
@@ -122,7 +122,7 @@ def test_what_is_no_identity_is_an_error_of_ours(text):
 
 
 def test_settings_that_measure_nothing_are_refused_in_identities_too():
-    with pytest.raises(AlignmentError, match="alignment should be one of none, origin, se3"):
+    with pytest.raises(SettingError, match="alignment: should be 'none', 'origin', 'se3'"):
         parse_identity("ate.trans.rmse[align=so3; assoc=nearest<=10ms; n=1/2]")
 
 

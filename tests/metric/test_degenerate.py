@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vobench.errors import AlignmentError, TrajectoryError
+from vobench.errors import AlignmentError, SettingError, TrajectoryError
 from vobench.geometry import se3
 from vobench.metric.score import ScoreSettings, score
 from vobench.metric.settings import LIKE
@@ -157,7 +157,7 @@ def test_mirrored_positions_still_get_a_proper_rotation():
 @pytest.mark.parametrize("delta", [0, 0.0, -1, np.nan, np.inf])
 @pytest.mark.parametrize("unit", ["f", "m", "s", "d", "r"])
 def test_a_delta_that_measures_nothing_is_named(delta, unit):
-    with pytest.raises(AlignmentError, match="rpe_delta should be more than 0"):
+    with pytest.raises(SettingError, match=r"rpe_delta: should be (greater than 0|a finite number)"):
         ScoreSettings(rpe_delta=delta, rpe_unit=unit)
 
 

@@ -14,11 +14,11 @@ from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.metric import ate
 from vobench.metric import rpe as pairs_module
+from vobench.metric.ate import errors_between
 from vobench.metric.comparison import in_plane
 from vobench.metric.rpe import (
     distance_errors,
     part_errors,
-    relative_errors,
     relative_lengths,
     relative_matrix_errors,
     select_pairs,
@@ -362,7 +362,7 @@ def test_an_error_made_while_lost_is_counted():
     frames = np.r_[0:5, 15:20]
     T_est = T_gt[frames].copy()
     T_est[5:, 0, 3] -= 1.0  # stood still for the ten lost frames
-    errors = relative_errors(T_gt[frames], T_est, frames_apart(T_est, 1))
+    errors = errors_between(T_gt[frames], T_est, *frames_apart(T_est, 1))
     np.testing.assert_allclose(errors.trans_m, [0, 0, 0, 0, 1.0, 0, 0, 0, 0], atol=1e-12)
 
 
@@ -372,32 +372,32 @@ def test_a_drift_of_one_percent_is_one_percent_of_each_step(all_pairs):
     for delta in (1, 5):
         pairs = frames_apart(T_gt, delta, all_pairs=all_pairs)
         assert len(pairs[0]) == (20 - delta if all_pairs else 19 // delta)
-        errors = relative_errors(T_gt, T_est, pairs)
+        errors = errors_between(T_gt, T_est, *pairs)
         np.testing.assert_allclose(errors.trans_m, 0.001 * delta, atol=1e-12)
-        distances = distance_errors(T_gt, T_est, pairs)
-        np.testing.assert_allclose(distances.point_m, 0.001 * delta, atol=1e-12)
-        np.testing.assert_allclose(distances.percent, 1.0, rtol=1e-9)
+        point_m, percent = distance_errors(T_gt, T_est, pairs)
+        np.testing.assert_allclose(point_m, 0.001 * delta, atol=1e-12)
+        np.testing.assert_allclose(percent, 1.0, rtol=1e-9)
 
 
 def test_a_turn_is_the_same_by_its_angle_and_by_its_matrix():
     T_gt, T_est = straight(9), straight(9)
     T_est[:, :3, :3] = se3.rotation_z(0.3 * np.arange(9))
     pairs = frames_apart(T_gt, 1)
-    norms, errors = relative_matrix_errors(T_gt, T_est, pairs), relative_errors(T_gt, T_est, pairs)
+    (chordal, full), errors = relative_matrix_errors(T_gt, T_est, pairs), errors_between(T_gt, T_est, *pairs)
     np.testing.assert_allclose(errors.rot_rad, 0.3, rtol=1e-12)
-    np.testing.assert_allclose(norms.rot, 2 * np.sqrt(2) * np.sin(errors.rot_rad / 2), rtol=1e-12)
-    np.testing.assert_allclose(norms.full, np.hypot(norms.rot, errors.trans_m), rtol=1e-12)
+    np.testing.assert_allclose(chordal, 2 * np.sqrt(2) * np.sin(errors.rot_rad / 2), rtol=1e-12)
+    np.testing.assert_allclose(full, np.hypot(chordal, errors.trans_m), rtol=1e-12)
 
 
 def test_where_the_truth_stands_there_is_no_percentage():
     T_gt = straight(9, step_m=0.0)
-    distances = distance_errors(T_gt, straight(9), frames_apart(T_gt, 1))
-    assert len(distances.percent) == 0
-    np.testing.assert_allclose(distances.point_m, 0.1)
+    point_m, percent = distance_errors(T_gt, straight(9), frames_apart(T_gt, 1))
+    assert len(percent) == 0
+    np.testing.assert_allclose(point_m, 0.1)
 
 
 def test_one_pose_has_no_relative_error():
-    assert len(relative_errors(straight(1), straight(1), frames_apart(straight(1), 1))) == 0
+    assert len(errors_between(straight(1), straight(1), *frames_apart(straight(1), 1))) == 0
 
 
 @pytest.mark.parametrize("block", [1, 7, 1000])
@@ -408,9 +408,9 @@ def test_errors_do_not_depend_on_the_size_of_the_blocks(monkeypatch, block):
         straight(50) @ se3.transform(se3.rotation_z(rng.normal(size=50)), rng.normal(size=(50, 3))),
     )
     pairs = frames_apart(T_gt, 3)
-    expected = relative_errors(T_gt, T_est, pairs)
+    expected = errors_between(T_gt, T_est, *pairs)
     monkeypatch.setattr(ate, "BLOCK", block)
-    found = relative_errors(T_gt, T_est, pairs)
+    found = errors_between(T_gt, T_est, *pairs)
     np.testing.assert_array_equal(found.trans_m, expected.trans_m)
     np.testing.assert_array_equal(found.rot_rad, expected.rot_rad)
 

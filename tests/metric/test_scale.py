@@ -38,14 +38,14 @@ def test_segments_that_come_back_show_no_scale():
     there_and_back = np.concatenate([ALONG_M[:100], ALONG_M[100:0:-1]])
     found = scale_errors(line(there_and_back), line(1.1 * there_and_back), ALONG_M, FIRST, FIRST + 10)
     np.testing.assert_allclose(found.error, 0.1, atol=1e-9)
-    assert len(found) < len(FIRST)
+    assert len(found.error) < len(FIRST)
 
 
 def test_a_truth_that_stands_shows_no_scale():
     found = scale_errors(line(0 * ALONG_M), line(ALONG_M), ALONG_M, FIRST, FIRST + 10)
-    assert (len(found), found.drift_per_m) == (0, 0.0)
+    assert (len(found.error), found.drift_per_m) == (0, 0.0)
     none = scale_errors(line(ALONG_M), line(ALONG_M), ALONG_M, FIRST[:0], FIRST[:0])
-    assert (len(none), none.drift_per_m) == (0, 0.0)
+    assert (len(none.error), none.drift_per_m) == (0, 0.0)
 
 
 def test_a_score_in_full_has_the_ten_percent_that_rpgs_index_bug_hides():

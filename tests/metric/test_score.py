@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vobench.errors import AlignmentError
+from vobench.errors import AlignmentError, SettingError
 from vobench.geometry import se3
 from vobench.metric.score import ScoreSettings, pooled, score, statistics
 from vobench.metric.segment import devkit_distances, segment_errors
@@ -241,7 +241,7 @@ def test_the_series_are_one_entry_a_matched_frame():
     ],
 )
 def test_settings_that_measure_nothing_are_refused(wrong):
-    with pytest.raises(AlignmentError, match=f"{next(iter(wrong))}.* should be"):
+    with pytest.raises(SettingError, match=f"^{next(iter(wrong))}.*: should "):
         ScoreSettings(**wrong)
 
 
@@ -320,7 +320,7 @@ def test_every_pooled_statistic_is_that_of_all_errors_together():
     by_name = {metric.name: metric.statistics for metric in pooled(scores).metrics}
     assert list(by_name) == [metric.name for metric in scores[0].metrics]
     for name, found in by_name.items():
-        errors = np.concatenate([part.errors for scored in scores for part in scored.samples if part.name == name])
+        errors = np.concatenate([part.errors for scored in scores for part in scored.samples if part.of.id == name])
         assert found.rmse == pytest.approx(statistics(errors).rmse, rel=1e-12)
         assert found.p95 == pytest.approx(statistics(errors).p95, rel=1e-12)
     assert pooled(scores[:1]).metrics == scores[0].metrics

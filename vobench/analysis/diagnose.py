@@ -25,62 +25,6 @@ NOISE = 5e-3  # of a step; below it motion itself is what is seen
 ENOUGH = 2  # signs that have to agree; each alone has an innocent explanation
 MIN_POSES_SWAP = 8
 
-
-@dataclass(frozen=True, slots=True)
-class Signs:
-    """What speaks for swapped inputs: each figure is of the "truth" over the "estimate", as they were given."""
-
-    noise: float
-    density: float
-    only_gt_begins_at_origin: bool
-    only_est_says_truth: bool
-    votes: int
-
-    @property
-    def are_enough(self) -> bool:
-        """Whether the inputs look swapped."""
-        return self.votes >= ENOUGH
-
-
-def signs_of_swap(gt: Trajectory, est: Trajectory, *, says_truth: tuple[bool, bool]) -> Signs | None:
-    """The signs in two trajectories on one clock, None where either has no noise to compare.
-
-    `says_truth`: whether the files call themselves ground truth, first that of the truth.
-    """
-    pairs = associate(gt.t_ns, est.t_ns)
-    noises = [_noise(t.positions_m[chosen]) for t, chosen in ((gt, pairs.gt), (est, pairs.est))]
-    if len(pairs) < MIN_POSES_SWAP or not min(noises) > 0:
-        return None
-    noise, density = noises[0] / noises[1], _rate(gt) / _rate(est)
-    origins = _begins_at_origin(gt), _begins_at_origin(est)
-    # Truth that has a pose at exactly each estimated one was interpolated, and that makes it smooth.
-    is_noisy = noises[0] > NOISE
-    same_instants = len(gt) == len(est) == len(pairs)
-    votes = [
-        int(is_noisy and noise > NOISIER) + int(is_noisy and noise > PLAINLY_NOISIER and same_instants),
-        int(density < 1 / DENSER) - int(density > DENSER),
-        int(origins == (True, False)) - int(origins == (False, True)),
-        int(says_truth == (False, True)) - int(says_truth == (True, False)),
-    ]
-    return Signs(noise, density, origins == (True, False), says_truth == (False, True), sum(votes))
-
-
-def _noise(positions_m: Array) -> float:
-    """Median third difference as share of the median step: of steady motion nearly 0, of noise up to 20."""
-    if len(positions_m) < MIN_POSES_SWAP:
-        return 0.0
-    jerks, steps = (np.linalg.norm(np.diff(positions_m, order, axis=0), axis=1) for order in (3, 1))
-    return float(np.median(jerks) / max(np.median(steps), 1e-300))
-
-
-def _rate(trajectory: Trajectory) -> float:
-    return 1.0 / float(np.median(np.diff(trajectory.t_ns)))
-
-
-def _begins_at_origin(trajectory: Trajectory) -> bool:
-    return bool(np.abs(trajectory.T_world_frame[0] - np.eye(4)).max() <= AT_ORIGIN)
-
-
 Fault = Literal[
     "stamp_unit",
     "time_offset",
@@ -141,14 +85,6 @@ class Finding:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class _Pair:
-    """Matched poses (K, 4, 4), mended as far as faults were found."""
-
-    T_gt: Array
-    T_est: Array
-
-
 def diagnose(gt: Reading, est: Reading) -> tuple[Finding, ...]:
     """The faults between two trajectories of one motion; none where they only differ by errors.
 
@@ -159,18 +95,18 @@ def diagnose(gt: Reading, est: Reading) -> tuple[Finding, ...]:
     if gt.unit and est.unit:
         gt, est = _in_right_units(gt, est, findings)
         est = _on_one_clock(gt, est, findings)
-    pair = _matched(gt, est)
-    if len(pair.T_gt) < MIN_POSES:
+    T_gt, T_est = _matched(gt, est)
+    if len(T_gt) < MIN_POSES:
         if findings:
             return tuple(findings)
-        raise AlignmentError(f"a diagnosis needs {MIN_POSES} matched poses or more, but {len(pair.T_gt)} match")
-    if min(_extent_m(pair.T_gt), _extent_m(pair.T_est)) > 0:
-        given = misfit(pair.T_gt, pair.T_est).trans
-        pair = _in_right_frames(pair, gt, est, findings)
-        left = misfit(pair.T_gt, pair.T_est).trans
+        raise AlignmentError(f"a diagnosis needs {MIN_POSES} matched poses or more, but {len(T_gt)} match")
+    if min(_extent_m(T_gt), _extent_m(T_est)) > 0:
+        given = misfit(T_gt, T_est).trans
+        T_gt, T_est = _in_right_frames(T_gt, T_est, gt, est, findings)
+        left = misfit(T_gt, T_est).trans
         if left >= UNRELATED:
             return (*(finding for finding in findings if finding.fault == "stamp_unit"), _unrelated(given, left))
-        findings += _wrong_scale(pair)
+        findings += _wrong_scale(T_gt, T_est)
         findings += _swapped(gt, est)
     return tuple(findings)
 
@@ -256,20 +192,22 @@ def _is_steady(gt: Trajectory, est: Trajectory, offset_ns: int) -> bool:
     return len(found) > 0 and bool(np.mean(alike) >= STEADY_SHARE)
 
 
-def _matched(gt: Reading, est: Reading) -> _Pair:
+def _matched(gt: Reading, est: Reading) -> tuple[Array, Array]:
     """At most MAX_POSES matched poses, evenly chosen; as far apart as half a step of the slower truth."""
     steps_ns = np.diff(gt.trajectory.t_ns)
     window_ns = max(MAX_DIFF_NS, int(np.median(steps_ns)) // 2 if len(steps_ns) else 0)
     pairs = associate(gt.trajectory.t_ns, est.trajectory.t_ns, max_diff_ns=window_ns)
     chosen = np.linspace(0, len(pairs) - 1, min(len(pairs), MAX_POSES)).round().astype(int)
-    T_gt = gt.trajectory.T_world_frame[pairs.gt[chosen]]
-    return _Pair(T_gt, est.trajectory.T_world_frame[pairs.est[chosen]])
+    return gt.trajectory.T_world_frame[pairs.gt[chosen]], est.trajectory.T_world_frame[pairs.est[chosen]]
 
 
-def _in_right_frames(pair: _Pair, gt: Reading, est: Reading, findings: list[Finding]) -> _Pair:
-    found = find_mismatch(pair.T_gt, pair.T_est, gt_order=gt.order, est_order=est.order)
+def _in_right_frames(
+    T_gt: Array, T_est: Array, gt: Reading, est: Reading, findings: list[Finding]
+) -> tuple[Array, Array]:
+    """The matched poses (K, 4, 4) without their fault of frames."""
+    found = find_mismatch(T_gt, T_est, gt_order=gt.order, est_order=est.order)
     if found is None:
-        return pair
+        return T_gt, T_est
     before, after = found.before, found.suspect.misfit
     evidence = [
         Evidence("rotation left after alignment (rms)", "deg", *np.rad2deg([before.rot_rad, after.rot_rad]).tolist()),
@@ -281,7 +219,7 @@ def _in_right_frames(pair: _Pair, gt: Reading, est: Reading, findings: list[Find
         )
     sentence, options = _frame_words(found, gt, est)
     findings.append(Finding(found.kind, sentence, tuple(evidence), options))
-    return _Pair(found.suspect.T_gt, found.suspect.T_est)
+    return found.suspect.T_gt, found.suspect.T_est
 
 
 def _frame_words(found: Mismatch, gt: Reading, est: Reading) -> tuple[str, tuple[str, ...]]:
@@ -316,12 +254,12 @@ def _move_words(kind: Fault, move: Move) -> str:
     return f"the axes of the estimate's {of} are {how}: the truth's x,y,z are its {axes}"
 
 
-def _wrong_scale(pair: _Pair) -> Iterator[Finding]:
-    fits = {kind: align(pair.T_est, pair.T_gt, kind=kind) for kind in ("se3", "sim3")}
+def _wrong_scale(T_gt: Array, T_est: Array) -> Iterator[Finding]:
+    fits = {kind: align(T_est, T_gt, kind=kind) for kind in ("se3", "sim3")}
     scale = fits["sim3"].scale
     if not scale > 0:
         return
-    before, after = (_ate_m(fits[kind].apply(pair.T_est), pair.T_gt) for kind in ("se3", "sim3"))
+    before, after = (_ate_m(fits[kind].apply(T_est), T_gt) for kind in ("se3", "sim3"))
     if abs(np.log(scale)) > SCALE_OFF and after <= SCALE_MENDED * before:
         yield Finding(
             "scale",
@@ -332,17 +270,45 @@ def _wrong_scale(pair: _Pair) -> Iterator[Finding]:
 
 
 def _swapped(gt: Reading, est: Reading) -> Iterator[Finding]:
-    signs = signs_of_swap(gt.trajectory, est.trajectory, says_truth=(gt.says_truth, est.says_truth))
-    if signs is None or not signs.are_enough:
+    """Whether enough signs of two trajectories on one clock, where both have noise, speak for swapped inputs."""
+    truth, estimate = gt.trajectory, est.trajectory
+    pairs = associate(truth.t_ns, estimate.t_ns)
+    noises = [_noise(t.positions_m[chosen]) for t, chosen in ((truth, pairs.gt), (estimate, pairs.est))]
+    if len(pairs) < MIN_POSES_SWAP or not min(noises) > 0:
         return
-    evidence = [Evidence("noise of the truth over that of the estimate", "1", signs.noise, 1 / signs.noise)]
-    evidence.append(
-        Evidence("poses a second of the truth over those of the estimate", "1", signs.density, 1 / signs.density)
+    noise, density = noises[0] / noises[1], _step_ns(est) / _step_ns(gt)
+    origins, says_truth = (_begins_at_origin(truth), _begins_at_origin(estimate)), (gt.says_truth, est.says_truth)
+    # Truth that has a pose at exactly each estimated one was interpolated, and that makes it smooth.
+    is_noisy = noises[0] > NOISE
+    same_instants = len(truth) == len(estimate) == len(pairs)
+    votes = [
+        int(is_noisy and noise > NOISIER) + int(is_noisy and noise > PLAINLY_NOISIER and same_instants),
+        int(density < 1 / DENSER) - int(density > DENSER),
+        int(origins == (True, False)) - int(origins == (False, True)),
+        int(says_truth == (False, True)) - int(says_truth == (True, False)),
+    ]
+    if sum(votes) < ENOUGH:
+        return
+    evidence = (
+        Evidence("noise of the truth over that of the estimate", "1", noise, 1 / noise),
+        Evidence("poses a second of the truth over those of the estimate", "1", density, 1 / density),
     )
-    too = ["the truth begins at the identity and the estimate doesn't"] * signs.only_gt_begins_at_origin
-    too += ["the estimate's file calls itself ground truth"] * signs.only_est_says_truth
+    too = ["the truth begins at the identity and the estimate doesn't"] * (origins == (True, False))
+    too += ["the estimate's file calls itself ground truth"] * (says_truth == (False, True))
     sentence = "; ".join(["ground truth and estimate seem to be in each other's place", *too])
-    yield Finding("swapped_inputs", sentence, tuple(evidence))
+    yield Finding("swapped_inputs", sentence, evidence)
+
+
+def _noise(positions_m: Array) -> float:
+    """Median third difference as share of the median step: of steady motion nearly 0, of noise up to 20."""
+    if len(positions_m) < MIN_POSES_SWAP:
+        return 0.0
+    jerks, steps = (np.linalg.norm(np.diff(positions_m, order, axis=0), axis=1) for order in (3, 1))
+    return float(np.median(jerks) / max(np.median(steps), 1e-300))
+
+
+def _begins_at_origin(trajectory: Trajectory) -> bool:
+    return bool(np.abs(trajectory.T_world_frame[0] - np.eye(4)).max() <= AT_ORIGIN)
 
 
 def _ate_m(T_est: Array, T_gt: Array) -> float:

@@ -210,12 +210,8 @@ def _rotation_left(T_gt: Array, T_est: Array, lever_m: Array) -> Array:
 
 def find_lever(T_gt: Array, T_est: Array, rotation: Array) -> Lever:
     """The lever that explains most of the motions, given the rotation (3, 3) between both bodies."""
-    found = (_lever(T_gt, T_est, rotation, parts) for parts in _windows(len(T_gt)))
-    return min(found, key=lambda lever: lever.ratio)
-
-
-def _windows(count: int) -> list[int]:
-    return sorted({max(1, count // parts) for parts in WINDOWS})
+    windows = sorted({max(1, len(T_gt) // parts) for parts in WINDOWS})
+    return min((_lever(T_gt, T_est, rotation, window) for window in windows), key=lambda lever: lever.ratio)
 
 
 def _lever(T_gt: Array, T_est: Array, rotation: Array, window: int) -> Lever:

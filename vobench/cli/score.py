@@ -6,19 +6,23 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import entry_points
+from math import isfinite
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import typer
 
 from vobench.analysis.diagnose import Finding, diagnose
 from vobench.cli import terminal
-from vobench.errors import AlignmentError, InputError, UnknownNameError, unknown
+from vobench.errors import AlignmentError, InputError, SettingError, UnknownNameError, unknown
 from vobench.metric.comparison import MetricDefinition
 from vobench.metric.definitions import DEFINITIONS
 from vobench.metric.score import Score, pooled, score
-from vobench.metric.settings import CHOICES, LIKE, PAIRS_OF_RULE, ScoreSettings
+from vobench.metric.settings import LIKE, PAIRS_OF_RULE, Plane, ScoreSettings, Side, Unit
 from vobench.run.trajectory_pair import TrajectorySource, read_pair
+from vobench.setting import hints
+from vobench.trajectory.align import Kind
+from vobench.trajectory.associate import Method
 
 GROUP = "vobench.metrics"  # of entry points, each a MetricDefinition
 
@@ -47,17 +51,18 @@ def metrics_command(
     json: terminal.Json = False,
 ) -> None:
     """Define a metric: formula, source, settings, and what it cannot see."""
-    if metric is None:
-        _show_all(as_json=json)
-        return
-    found = _find(metric)
+    definitions = _definitions()
+    found = None if metric is None else _find(metric, definitions).as_dict()
     if json:
-        terminal.print_json(found.as_dict())
-        return
-    out = terminal.console()
-    for name, value in found.as_dict().items():
-        stated = ", ".join(value) if isinstance(value, tuple) else str(value)
-        out.print(f"{name:9}  {stated}", soft_wrap=True)
+        terminal.print_json(found or {"metrics": [definition.as_dict() for definition in definitions]})
+    elif found is None:
+        rows = [[d.id, d.unit, d.headline, d.title, "--full" if d.full else ""] for d in definitions]
+        terminal.console().print(terminal.table("", ["metric", "unit", "headline", "is", "with"], rows))
+    else:
+        out = terminal.console()
+        for name, value in found.items():
+            stated = ", ".join(value) if isinstance(value, tuple) else str(value)
+            out.print(f"{name:9}  {stated}", soft_wrap=True)
 
 
 def _definitions() -> list[MetricDefinition]:
@@ -66,18 +71,9 @@ def _definitions() -> list[MetricDefinition]:
     return [*DEFINITIONS.values(), *(metric for metric in installed if metric.id not in DEFINITIONS)]
 
 
-def _show_all(*, as_json: bool) -> None:
-    definitions = _definitions()
-    if as_json:
-        terminal.print_json({"metrics": [definition.as_dict() for definition in definitions]})
-        return
-    rows = [[d.id, d.unit, d.headline, d.title, "--full" if d.full else ""] for d in definitions]
-    terminal.console().print(terminal.table("", ["metric", "unit", "headline", "is", "with"], rows))
-
-
-def _find(metric: str) -> MetricDefinition:
+def _find(metric: str, known: list[MetricDefinition]) -> MetricDefinition:
     """The definition of a metric's name, or of the start of an id such as ate.trans.rmse[…]."""
-    stem, known = metric.partition("[")[0], _definitions()
+    stem = metric.partition("[")[0]
     for definition in known:
         if definition.id == metric.lower() or definition.identity in (stem, stem.rpartition(".")[0]):
             return definition
@@ -102,29 +98,30 @@ def diagnose_command(
     json: terminal.Json = False,
 ) -> None:
     """Say what is wrong between two trajectories (frames, axes, scale, clocks, quaternions), and what mends it."""
-    truth = TrajectorySource(gt, gt_topic, tuple(gt_as or ()))
-    _show_diagnosis(truth, TrajectorySource(est, est_topic, tuple(est_as or ())), times=times or (), as_json=json)
-
-
-def _show_diagnosis(gt: TrajectorySource, est: TrajectorySource, *, times: Sequence[Path], as_json: bool) -> None:
-    pair = read_pair(gt, est, times=times, any_unit=True)
+    truth, estimate = _source(gt, gt_topic, gt_as), _source(est, est_topic, est_as)
+    pair = read_pair(truth, estimate, times=times or (), any_unit=True)
     findings = diagnose(pair.gt, pair.est)
+
+    def command(findings: Sequence[Finding]) -> str | None:
+        return None if is_unrelated or not findings else _command(truth, estimate, times or (), findings)
+
     is_unrelated = any(finding.fault == "unrelated" for finding in findings)
     content = {
-        "findings": [
-            {**finding.as_dict(), "command": None if is_unrelated else _command(gt, est, times, [finding])}
-            for finding in findings
-        ],
-        "command": _command(gt, est, times, findings) if findings and not is_unrelated else None,
+        "findings": [{**finding.as_dict(), "command": command([finding])} for finding in findings],
+        "command": command(findings),
         "warnings": [pair.by_frame] if pair.by_frame else [],
         "notes": list(pair.notes),
     }
-    if as_json:
+    if json:
         terminal.print_json(content)
         return
     for note in pair.notes:
         print(f"note: {note}", file=sys.stderr)
     _print_diagnosis(content)
+
+
+def _source(path: Path, topic: str | None, words: list[str] | None) -> TrajectorySource:
+    return TrajectorySource(path, topic, tuple(words or ()))
 
 
 def _command(gt: TrajectorySource, est: TrajectorySource, times: Sequence[Path], findings: Sequence[Finding]) -> str:
@@ -153,7 +150,7 @@ def _exchanged(word: str) -> str:
 
 def _source_words(side: str, source: TrajectorySource) -> list[str]:
     topic = [f"--{side}-topic", source.topic] if source.topic else []
-    return topic + [part for word in source.words for part in (f"--{side}-as", word)]
+    return [*topic, *(part for word in source.words for part in (f"--{side}-as", word))]
 
 
 def _print_diagnosis(content: dict[str, Any]) -> None:
@@ -174,16 +171,15 @@ def _print_diagnosis(content: dict[str, Any]) -> None:
         out.print(f"all of it: {content['command']}", soft_wrap=True)
 
 
-# Settings that are one of a few names, and what these are names of.
+# Settings that are one of a few names, what these are names of, and the names.
 CHOSEN = {
-    "alignment": "alignment",
-    "association": "association",
-    "rpe_unit": "unit",
-    "rpe_pairs_from": "side",
-    "project": "plane",
+    "alignment": ("alignment", get_args(Kind)),
+    "association": ("association", get_args(Method)),
+    "rpe_unit": ("unit", get_args(Unit)),
+    "rpe_pairs_from": ("side", get_args(Side)),
+    "project": ("plane", get_args(Plane)),
 }
-MAX_WINDOW_S = 1e6
-MAX_OFFSET_S = 2e9  # from a clock that starts at 0 to one that counts from 1970
+OPTIONS = {"alignment": "--align", "align_n": "--align-n", "rpe_delta": "--delta"}
 COLUMNS = ("n", "rmse", "mean", "median", "std", "min", "max", "sse", "p95", "p99")
 SHOWN = ("n", "rmse", "mean", "median", "std", "min", "max", "p95", "p99")
 WORDS = ("metric", "unit", "sequence")  # headings of columns that hold words
@@ -212,7 +208,7 @@ def score_command(
     alignment: Annotated[
         str | None, typer.Option("--align", "-a", help="none, origin, se3 (our default), sim3, scale or yaw.")
     ] = None,
-    align_n: Annotated[int | None, typer.Option(min=1, help="Align by the first so many matched poses.")] = None,
+    align_n: Annotated[int | None, typer.Option(help="Align by the first so many matched poses.")] = None,
     rpe_delta: Annotated[
         float | None, typer.Option("--delta", "-d", help="RPE over so much, more than 0; 1 by default.")
     ] = None,
@@ -258,8 +254,8 @@ def score_command(
         alignment=alignment,
         align_n=align_n,
         association=association,
-        max_diff_ns=_ns("--t-max-diff", t_max_diff, 0, MAX_WINDOW_S),
-        offset_ns=_ns("--t-offset", t_offset, -MAX_OFFSET_S, MAX_OFFSET_S),
+        max_diff_ns=_ns("--t-max-diff", t_max_diff, "max_diff_ns"),
+        offset_ns=_ns("--t-offset", t_offset, "offset_ns"),
         rpe_delta=rpe_delta,
         rpe_unit=rpe_unit,
         rpe_all_pairs=rpe_all_pairs,
@@ -267,10 +263,8 @@ def score_command(
         full=full,
         project=project,
     )
-    pairs = [
-        (TrajectorySource(gt, gt_topic, tuple(gt_as or ())), TrajectorySource(est, est_topic, tuple(est_as or ())))
-        for gt, est in zip(paths[::2], paths[1::2], strict=True)
-    ]
+    truths, estimates = [_source(gt, gt_topic, gt_as) for gt in paths[::2]], paths[1::2]
+    pairs = [(gt, _source(est, est_topic, est_as)) for gt, est in zip(truths, estimates, strict=True)]
     _show_score(pairs, settings, times=times or (), form=form, per_length=per_length)
 
 
@@ -284,18 +278,19 @@ def _form(**asked: bool) -> str:
 def _settings(like: str | None, **asked: Any) -> ScoreSettings:
     """The preset's settings, or our own without one, with what else was asked for, which is not None.
 
-    Raises UnknownNameError, InputError or AlignmentError for what can't be asked.
+    Raises UnknownNameError or InputError for what can't be asked.
     """
-    _require_known("preset", like, list(LIKE))
-    for name, what in CHOSEN.items():
-        _require_known(what, asked[name], [choice for choice in CHOICES[name] if choice])
-    delta = asked["rpe_delta"]
-    if delta is not None and not 0 < delta < float("inf"):
-        raise InputError(f"--delta should be more than 0 and finite, got {delta:g}")
+    for name, what, known in [(like, "preset", tuple(LIKE)), *((asked[key], *named) for key, named in CHOSEN.items())]:
+        if name is not None and name not in known:
+            raise UnknownNameError(unknown(what, name, list(known)))
     base = LIKE[like] if like else ScoreSettings()
     if base.rpe_rule in PAIRS_OF_RULE and not _keeps_pairs(base, asked):
         asked["rpe_rule"] = ScoreSettings().rpe_rule  # other pairs than that tool has are ours
-    return replace(base, **{name: value for name, value in asked.items() if value is not None})
+    try:
+        return replace(base, **{name: value for name, value in asked.items() if value is not None})
+    except SettingError as error:
+        name = str(error.keys[0])
+        raise SettingError(error.sentence, OPTIONS.get(name, name)) from None
 
 
 def _keeps_pairs(base: ScoreSettings, asked: Mapping[str, Any]) -> bool:
@@ -316,11 +311,10 @@ def _show_score(
     """Score one pair of trajectories, or several and all of them together, and print every metric with its identity."""
     metrics = tuple(_definitions() if settings.full else DEFINITIONS.values())
     scored = [_scored(gt, est, settings, times, metrics) for gt, est in pairs]
-    if len(scored) == 1:
-        content = scored[0][1]
-        _require_finite(content["metrics"])
-    else:
-        content = _together(pairs, scored)
+    content = scored[0][1] if len(scored) == 1 else _together(pairs, scored)
+    parts = [*content["sequences"], content["pooled"]] if "sequences" in content else [content]
+    for metric in (metric for part in parts for metric in part["metrics"]):
+        _require_finite(metric)
     if form == "json":
         terminal.print_json(content)
         return
@@ -374,35 +368,28 @@ def _together(
         for (gt, est), (_, content) in zip(pairs, scored, strict=True)
     ]
     pool = pooled([result for result, _ in scored])
-    metrics = [metric.as_dict() for metric in pool.metrics]
-    for part in (*(sequence["metrics"] for sequence in sequences), metrics):
-        _require_finite(part)
-    lengths = [row.as_dict() for row in pool.per_length]
-    return {
-        "sequences": sequences,
-        "pooled": {"metrics": metrics, "per_length": lengths, "warnings": list(pool.warnings)},
+    together = {
+        "metrics": [metric.as_dict() for metric in pool.metrics],
+        "per_length": [row.as_dict() for row in pool.per_length],
+        "warnings": list(pool.warnings),
     }
+    return {"sequences": sequences, "pooled": together}
 
 
-def _require_known(what: str, name: str | None, known: list[str]) -> None:
-    if name is not None and name not in known:
-        raise UnknownNameError(unknown(what, name, known))
-
-
-def _ns(option: str, value_s: float | None, least_s: float, most_s: float) -> int | None:
+def _ns(option: str, value_s: float | None, setting: str) -> int | None:
     if value_s is None:
         return None
-    if not least_s <= value_s <= most_s:
-        raise InputError(f"{option} should be {least_s:g} to {most_s:g} seconds, got {value_s:g}")
+    _, least, most = get_args(hints(ScoreSettings)[setting])
+    if not least.ge / 1e9 <= value_s <= most.le / 1e9:
+        raise InputError(f"{option} should be {least.ge / 1e9:g} to {most.le / 1e9:g} seconds, got {value_s:g}")
     return round(value_s * 1e9)
 
 
-def _require_finite(metrics: list[dict[str, Any]]) -> None:
+def _require_finite(metric: dict[str, Any]) -> None:
     """No score is printed with a nan in it. Raises AlignmentError."""
-    for metric in metrics:
-        for name in COLUMNS:
-            if not abs(metric[name]) < float("inf"):
-                raise AlignmentError(f"the {name} of {metric['name']} is {metric[name]}: positions are too far apart")
+    for name in COLUMNS:
+        if not isfinite(metric[name]):
+            raise AlignmentError(f"the {name} of {metric['name']} is {metric[name]}: positions are too far apart")
 
 
 def _print_csv(content: Content, scored: Sequence[Score], per_length: bool) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -25,14 +26,6 @@ class PoseErrors:
         return len(self.trans_m)
 
 
-@dataclass(frozen=True, slots=True)
-class MatrixErrors:
-    """Frobenius norms (N,) of an error's rotation less the identity, and of the whole (4, 4) less it."""
-
-    rot: Array
-    full: Array
-
-
 def angle_rad(R: Array) -> Array:
     """Angles (...) of rotations (..., 3, 3) that text with few digits has left slightly skew.
 
@@ -44,7 +37,10 @@ def angle_rad(R: Array) -> Array:
 
 
 def matrix_norms(E: Array) -> Rows:
-    """Norms (N,) of errors (N, 4, 4) less the identity: the rotation's, and the whole's with its metres."""
+    """Norms (N,) of errors (N, 4, 4) less the identity: the rotation's, and the whole's with its metres.
+
+    They are evo's rot_part and full.
+    """
     squares = np.square(E - np.eye(4))
     return np.sqrt(squares[:, :3, :3].sum((1, 2))), np.sqrt(squares.sum((1, 2)))
 
@@ -55,7 +51,10 @@ def motion_errors(T_gt_first_last: Array, T_est_first_last: Array) -> PoseErrors
 
 
 def errors_between(T_gt: Array, T_est: Array, first: Index, last: Index) -> PoseErrors:
-    """`motion_errors` of the motions from poses `first` to `last` (N,) of trajectories (K, 4, 4)."""
+    """`motion_errors` of the motions from poses `first` to `last` (N,) of trajectories (K, 4, 4).
+
+    Source: Sturm et al. (2012), section V-A: (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j).
+    """
     gt, est = _columns(T_gt), _columns(T_est)
 
     def moved(T: Array, part: slice) -> Array:
@@ -118,32 +117,21 @@ def absolute_errors(T_gt: Array, T_est: Array) -> PoseErrors:
     return PoseErrors(*in_blocks(len(T_gt), block))
 
 
-def absolute_matrix_errors(T_gt: Array, T_est: Array) -> MatrixErrors:
-    """The same errors as norms of T_est⁻¹ T_gt less the identity: evo's rot_part and full."""
-    norms = in_blocks(len(T_gt), lambda part: matrix_norms(se3.inverse(T_est[part]) @ T_gt[part]))
-    return MatrixErrors(*norms)
-
-
-def axis_errors(T_gt: Array, T_est: Array) -> tuple[Array, Array]:
-    """Signed errors of matched poses (K, 4, 4): x, y, z (K, 3) in m and roll, pitch, yaw (K, 3) in rad.
-
-    In the truth's world. Source: Zhang and Scaramuzza (2018), section IV: R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll).
-    """
-    R = T_est[:, :3, :3] @ np.swapaxes(T_gt[:, :3, :3], -1, -2)
-    return T_est[:, :3, 3] - T_gt[:, :3, 3], se3.roll_pitch_yaw_rad(R)
-
-
 def absolute(of: Comparison) -> PoseErrors:
     """`absolute_errors` of a comparison."""
     return absolute_errors(of.matched.T_gt, of.T_aligned)
 
 
-def _matrices(of: Comparison) -> MatrixErrors:
-    return absolute_matrix_errors(of.matched.T_gt, of.T_aligned)
+def _matrices(of: Comparison) -> Rows:
+    T_gt, T_est = of.matched.T_gt, of.T_aligned
+    return in_blocks(len(T_gt), lambda part: matrix_norms(se3.inverse(T_est[part]) @ T_gt[part]))
 
 
 def _axes(of: Comparison) -> dict[str, Array]:
-    xyz_m, rpy_rad = axis_errors(of.matched.T_gt, of.T_aligned)
+    """Signed errors (K,) by axis, in m and degrees, in the truth's world: R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll)."""
+    T_gt, T_est = of.matched.T_gt, of.T_aligned
+    xyz_m = T_est[:, :3, 3] - T_gt[:, :3, 3]
+    rpy_rad = se3.roll_pitch_yaw_rad(T_est[:, :3, :3] @ np.swapaxes(T_gt[:, :3, :3], -1, -2))
     names = ("x", "y", "z", "roll", "pitch", "yaw")
     return dict(zip(names, (*xyz_m.T, *np.rad2deg(rpy_rad).T), strict=True))
 
@@ -154,71 +142,66 @@ def _of_axis(axis: str) -> Callable[[Comparison], Array]:
 
 DRIFT = "where along the path an error was made: one early turn moves everything after it"
 LOST = "frames without a pose: read coverage beside it"
+_pose_metric = partial(MetricDefinition, settings=POSES)
 METRICS = (
-    MetricDefinition(
+    _pose_metric(
         "ate_trans",
         "absolute trajectory error, position",
         "m",
         "‖p_est − p_gt‖ of each aligned pose",
         STURM_ATE,
-        POSES,
-        f"{DRIFT}; {LOST}",
+        blind=f"{DRIFT}; {LOST}",
         full=False,
         measure=lambda of: of.once(absolute).trans_m,
     ),
-    MetricDefinition(
+    _pose_metric(
         "ate_rot",
         "absolute trajectory error, angle",
         "deg",
         "angle of R_est⁻¹ R_gt of each aligned pose",
         STURM_ATE,
-        POSES,
-        f"a roll that the alignment had to guess: read alignment.unobservable; {LOST}",
+        blind=f"a roll that the alignment had to guess: read alignment.unobservable; {LOST}",
         full=False,
         measure=lambda of: np.rad2deg(of.once(absolute).rot_rad),
     ),
-    MetricDefinition(
+    _pose_metric(
         "ate_rot_chordal",
         "absolute trajectory error, rotation as a matrix",
         "1",
         "‖R_est⁻¹ R_gt − I‖_F = 2√2 sin(angle / 2)",
         HARTLEY,
-        POSES,
-        f"the same as ate_rot on another scale; {LOST}",
-        measure=lambda of: of.once(_matrices).rot,
+        blind=f"the same as ate_rot on another scale; {LOST}",
+        measure=lambda of: of.once(_matrices)[0],
     ),
-    MetricDefinition(
+    _pose_metric(
         "ate_full",
         "absolute trajectory error, whole pose",
         "1",
         "‖T_est⁻¹ T_gt − I‖_F",
         "evo's full",
-        POSES,
-        f"metres and rotations are added: it changes with the unit of length; {LOST}",
-        measure=lambda of: of.once(_matrices).full,
+        blind=f"metres and rotations are added: it changes with the unit of length; {LOST}",
+        measure=lambda of: of.once(_matrices)[1],
     ),
     *(
-        MetricDefinition(
+        _pose_metric(
             f"ate_{axis}",
             f"absolute trajectory error along the truth's {axis}",
             "m",
             f"{axis} of p_est − p_gt, with its sign",
             OURS,
-            POSES,
-            f"errors along the other axes; {LOST}",
+            blind=f"errors along the other axes; {LOST}",
             measure=_of_axis(axis),
         )
         for axis in ("x", "y", "z")
     ),
     *(
-        MetricDefinition(
+        _pose_metric(
             f"ate_{axis}",
             f"absolute trajectory error in {axis}",
             "deg",
             f"{axis} of R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll), with its sign",
             ZHANG,
-            POSES,
-            f"the angles of rotations near 90° of pitch, where roll and yaw are one; {LOST}",
+            blind=f"the angles of rotations near 90° of pitch, where roll and yaw are one; {LOST}",
             measure=_of_axis(axis),
         )
         for axis in ("roll", "pitch", "yaw")

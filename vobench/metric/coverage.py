@@ -116,8 +116,6 @@ def lost_aware_score(errors_m: Array, coverage: float, *, survived: bool, fail_m
     survivor scores 1/2 + A/2, a failed run A/2: so a crash, however accurate before, ranks below whoever
     got through, and among equals neither an added error nor a pose more lost ever raises the score.
     """
-    if fail_m <= 0:
-        raise ValueError(f"fail_m should be more than 0, but is {fail_m}")
     right = float(np.mean(np.clip(1.0 - errors_m / fail_m, 0.0, 1.0))) if len(errors_m) else 0.0
     area = right * coverage
     # A failed run that was perfect in all frames but few comes near 1/2, and must not round to it.

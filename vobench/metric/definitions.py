@@ -98,10 +98,6 @@ def _read_assoc(value: str) -> dict[str, Any]:
     return {"association": method, "max_diff_ns": _ns(window)}
 
 
-def _read_offset(value: str) -> dict[str, Any]:
-    return {"offset_ns": _ns(value)}
-
-
 def _read_pairs(value: str) -> dict[str, Any]:
     how, _, side = value.partition("/")
     all_pairs = {name: flag for flag, name in _PAIRS.items()}[how]
@@ -114,12 +110,21 @@ def _read_lengths(value: str) -> dict[str, Any]:
     return {"segment_lengths_m": tuple(float(length) for length in value.removesuffix("m").split(","))}
 
 
-def _unless_default(key: str, setting: str) -> Part:
-    def write(s: ScoreSettings) -> str | None:
-        value = getattr(s, setting)
-        return None if value == getattr(DEFAULTS, setting) else str(value)
+def _stated(
+    key: str,
+    setting: str,
+    read: Callable[[str], Any] = str,
+    write: Callable[[Any], str] = str,
+    *,
+    always: bool = False,
+) -> Part:
+    """The part of one setting, said where it differs from the default, or always."""
 
-    return Part(key, (setting,), write, lambda value: {setting: value})
+    def written(s: ScoreSettings) -> str | None:
+        value = getattr(s, setting)
+        return write(value) if always or value != getattr(DEFAULTS, setting) else None
+
+    return Part(key, (setting,), written, lambda value: {setting: read(value)})
 
 
 PARTS = (
@@ -130,31 +135,24 @@ PARTS = (
         lambda value: {"rpe_delta": float(value[:-1]), "rpe_unit": value[-1:]},
     ),
     Part("pairs", ("rpe_all_pairs",), lambda s: f"{_PAIRS[s.rpe_all_pairs]}/{s.rpe_pairs_from}", _read_pairs),
-    _unless_default("rule", "rpe_rule"),
+    _stated("rule", "rpe_rule"),
     Part(
         "lengths",
         ("segment_lengths_m",),
         lambda s: f"{','.join(map(_number, s.segment_lengths_m or ()))}m",
         _read_lengths,
     ),
-    Part(
-        "step",
-        ("segment_step_frames",),
-        lambda s: str(s.segment_step_frames),
-        lambda value: {"segment_step_frames": int(value)},
-    ),
-    _unless_default("precision", "segment_precision"),
-    _unless_default("mean", "segment_mean"),
+    _stated("step", "segment_step_frames", int, always=True),
+    _stated("precision", "segment_precision"),
+    _stated("mean", "segment_mean"),
     Part("lengths", ("relative_rule",), lambda s: s.relative_rule, _read_lengths),
-    Part("fail", ("fail_ratio",), lambda s: _number(s.fail_ratio), lambda value: {"fail_ratio": float(value)}),
-    Part("slots", ("coverage_of",), lambda s: s.coverage_of, lambda value: {"coverage_of": value}),
+    _stated("fail", "fail_ratio", float, _number, always=True),
+    _stated("slots", "coverage_of", always=True),
     Part("align", ("alignment",), _align, _read_align),
-    _unless_default("scale", "scale_rule"),
-    _unless_default("project", "project"),
+    _stated("scale", "scale_rule"),
+    _stated("project", "project"),
     Part("assoc", ("association",), lambda s: f"{s.association}<={_ms(s.max_diff_ns)}", _read_assoc),
-    Part(
-        "offset", ("offset_ns",), lambda s: _ms(s.offset_ns) if s.offset_ns else None, lambda v: {"offset_ns": _ns(v)}
-    ),
+    _stated("offset", "offset_ns", _ns, _ms),
     Part("ddof", (), lambda s: str(s.std_ddof) if s.std_ddof else None, lambda value: {"std_ddof": int(value)}),
 )
 READERS = {part.key: part.read for part in PARTS}

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.metric.ate import (
-    MatrixErrors,
     PoseErrors,
     Rows,
     angle_rad,
@@ -46,14 +46,16 @@ def select_pairs(
     so that what went wrong meanwhile is counted. Frames count matched poses. Source: evo's rules; gaps ours.
     """
     if unit == "f":
-        return _frame_pairs(len(T), int(delta), all_pairs=all_pairs)
+        first = np.arange(0, max(len(T) - int(delta), 0), 1 if all_pairs else int(delta))
+        return first, first + int(delta)
     if unit in ("d", "r"):
         delta = float(np.deg2rad(delta)) if unit == "d" else delta
-        return _all_by_angle(T[:, :3, :3], delta) if all_pairs else _chain(_turns(T), delta)
+        R = T[:, :3, :3]
+        return _all_by_angle(R, delta) if all_pairs else _chain(angle_rad(np.swapaxes(R[:-1], -1, -2) @ R[1:]), delta)
     if not all_pairs:
         return _chain(_moves(T) if unit == "m" else np.diff(t_ns), delta if unit == "m" else delta * 1e9)
-    along = np.concatenate([[0.0], np.cumsum(_moves(T))]) if unit == "m" else (t_ns - t_ns[:1]) / 1e9
-    return pairs_along(along[: len(T)], delta, tolerance=TOLERANCE * delta, gaps=_gaps(t_ns) if spanning else None)
+    along = _along(T) if unit == "m" else (t_ns - t_ns[:1]) / 1e9
+    return pairs_along(along, delta, tolerance=TOLERANCE * delta, gaps=_gaps(t_ns) if spanning else None)
 
 
 def every_pair(n: int) -> IndexPairs:
@@ -88,18 +90,12 @@ def pairs_along(along: Array, delta: float, *, tolerance: float, gaps: NDArray[n
     return first[kept], np.where(near, last, beyond)[kept]
 
 
-def _frame_pairs(n: int, delta: int, *, all_pairs: bool) -> IndexPairs:
-    first = np.arange(0, max(n - delta, 0), 1 if all_pairs else delta)
-    return first, first + delta
-
-
 def _moves(T: Array) -> Array:
     return np.asarray(np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1))
 
 
-def _turns(T: Array) -> Array:
-    R = T[:, :3, :3]
-    return angle_rad(np.swapaxes(R[:-1], -1, -2) @ R[1:])
+def _along(T: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(_moves(T))])[: len(T)]
 
 
 def _gaps(t_ns: Stamps) -> NDArray[np.bool_]:
@@ -156,42 +152,26 @@ MAX_TRUTH_STEPS = 2.0  # TUM's: a truth further off than this many of its usual 
 STILL_M = 1e-100  # a motion of the truth below it has no percentage that could be squared
 
 
-@dataclass(frozen=True, slots=True)
-class DistanceErrors:
-    """By how much distances moved are wrong: (P,) in m, and (Q,) in percent of the true ones above zero."""
-
-    point_m: Array
-    percent: Array
-
-
-def relative_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> PoseErrors:
-    """Errors of the motions between matched poses (K, 4, 4) from first to last, each (P,).
-
-    Source: Sturm et al. (2012), section V-A: (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j).
-    """
-    return errors_between(T_gt, T_est, *pairs)
-
-
-def relative_matrix_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> MatrixErrors:
-    """The same errors as norms of the matrix less the identity: evo's rot_part and full."""
+def relative_matrix_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> Rows:
+    """`matrix_norms` (P,) of the errors of the motions between matched poses (K, 4, 4) from first to last."""
     first, last = pairs
 
     def block(part: slice) -> Rows:
         gt, est = (motions(T, first[part], last[part]) for T in (T_gt, T_est))
         return matrix_norms(se3.inverse(gt) @ est)
 
-    return MatrixErrors(*in_blocks(len(first), block))
+    return in_blocks(len(first), block)
 
 
-def distance_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> DistanceErrors:
-    """| ‖q_j - q_i‖ - ‖p_j - p_i‖ | of matched poses (K, 4, 4), q true and p estimated.
+def distance_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> Rows:
+    """| ‖q_j - q_i‖ - ‖p_j - p_i‖ | of matched poses (K, 4, 4), q true and p estimated: in m, and in % of the true one.
 
     Pairs between which the truth didn't move have no percentage. Source: evo's point_distance and its ratio.
     """
     first, last = pairs
     gt_m, est_m = (np.linalg.norm(T[last, :3, 3] - T[first, :3, 3], axis=1) for T in (T_gt, T_est))
     point_m, moved = np.abs(gt_m - est_m), gt_m > STILL_M
-    return DistanceErrors(point_m, point_m[moved] / gt_m[moved] * 100)
+    return point_m, point_m[moved] / gt_m[moved] * 100
 
 
 def tum_errors(
@@ -255,9 +235,13 @@ def part_errors(T_gt: Array, T_est: Array, lengths_m: Sequence[float], *, rule: 
 
     Gravity points along z of the world. Source: Zhang and Scaramuzza (2018), section IV.
     """
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(T_gt[:, :3, 3], axis=0), axis=1))])[: len(T_gt)]
-    found = [(length, *_parts(along, length, rule)) for length in lengths_m]
-    kept = [part for part in found if len(part[1]) >= MIN_SAMPLES]
+    along = _along(T_gt)
+    kept: list[tuple[float, Index, Index]] = []
+    for length in lengths_m:
+        # rpg's tolerance is strictly less
+        tolerance_m = OPENVINS_TOLERANCE_M if rule == "openvins" else float(np.nextafter(RPG_TOLERANCE * length, 0.0))
+        first, last = pairs_along(along, length, tolerance=tolerance_m)
+        kept += [(length, first, last)] if len(first) >= MIN_SAMPLES else []
     first, last = (np.concatenate([np.zeros(0, np.int64), *(part[side] for part in kept)]) for side in (1, 2))
     lengths = np.repeat([part[0] for part in kept], [len(part[1]) for part in kept])
     errors = in_blocks(len(first), lambda part: _errors(T_gt, T_est, first[part], last[part]))
@@ -270,12 +254,6 @@ def _errors(T_gt: Array, T_est: Array, first: Index, last: Index) -> Rows:
     R_est = T_est[last, :3, :3]
     roll, pitch, yaw = se3.roll_pitch_yaw_rad(R_est @ E[:, :3, :3] @ np.swapaxes(R_est, -1, -2)).T
     return np.linalg.norm(E[:, :3, 3], axis=1), angle_rad(E[:, :3, :3]), np.abs(yaw), np.hypot(pitch, roll)
-
-
-def _parts(along: Array, length_m: float, rule: RelativeRule) -> IndexPairs:
-    if rule == "openvins":
-        return pairs_along(along, length_m, tolerance=OPENVINS_TOLERANCE_M)
-    return pairs_along(along, length_m, tolerance=float(np.nextafter(RPG_TOLERANCE * length_m, 0.0)))  # strictly less
 
 
 def _pairs(of: Comparison) -> IndexPairs:
@@ -298,14 +276,14 @@ def _relative(of: Comparison) -> PoseErrors:
     s = of.settings
     if s.rpe_rule == "tum":
         return tum_errors(of.gt, of.est, delta_s=s.rpe_delta, offset_ns=s.offset_ns, scale=of.alignment.scale)
-    return relative_errors(of.matched.T_gt, of.T_moving, of.once(_pairs))
+    return errors_between(of.matched.T_gt, of.T_moving, *of.once(_pairs))
 
 
-def _matrices(of: Comparison) -> MatrixErrors:
+def _matrices(of: Comparison) -> Rows:
     return relative_matrix_errors(of.matched.T_gt, of.T_moving, of.once(_pairs))
 
 
-def _distances(of: Comparison) -> DistanceErrors:
+def _distances(of: Comparison) -> Rows:
     return distance_errors(of.matched.T_gt, of.T_moving, of.once(_pairs))
 
 
@@ -326,130 +304,114 @@ MOTIONS = ("rpe_delta", "rpe_unit", "rpe_all_pairs", "rpe_pairs_from", "rpe_rule
 RELATIVE = ("relative_rule", *POSES)
 ALL_PAIRS = "; like tartanair over all ordered pairs i, j, of which its own script draws 10,000 at random"
 GLOBAL = "a slow drift that stays below the size of a step"
+_motion_metric = partial(MetricDefinition, settings=MOTIONS)
+_part_metric = partial(MetricDefinition, source=ZHANG, settings=RELATIVE)
 METRICS = (
-    MetricDefinition(
+    _motion_metric(
         "rpe_trans",
         "relative pose error, translation",
         "m",
         f"‖t‖ of (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j), Q true and P estimated{ALL_PAIRS}",
         STURM_RPE,
-        MOTIONS,
-        GLOBAL,
+        blind=GLOBAL,
         full=False,
         measure=lambda of: of.once(_relative).trans_m,
     ),
-    MetricDefinition(
+    _motion_metric(
         "rpe_rot",
         "relative pose error, angle",
         "deg",
         f"angle of (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j), Q true and P estimated{ALL_PAIRS}",
         STURM_RPE,
-        MOTIONS,
-        GLOBAL,
+        blind=GLOBAL,
         full=False,
         measure=lambda of: np.rad2deg(of.once(_relative).rot_rad),
     ),
-    MetricDefinition(
+    _motion_metric(
         "rpe_rot_chordal",
         "relative pose error, rotation as a matrix",
         "1",
         "‖R − I‖_F of the same E as rpe_rot",
         HARTLEY,
-        MOTIONS,
-        GLOBAL,
-        measure=lambda of: of.once(_matrices).rot,
+        blind=GLOBAL,
+        measure=lambda of: of.once(_matrices)[0],
     ),
-    MetricDefinition(
+    _motion_metric(
         "rpe_full",
         "relative pose error, whole motion",
         "1",
         "‖E − I‖_F",
         "evo's full",
-        MOTIONS,
-        f"metres and rotations are added: it changes with the unit of length; {GLOBAL}",
-        measure=lambda of: of.once(_matrices).full,
+        blind=f"metres and rotations are added: it changes with the unit of length; {GLOBAL}",
+        measure=lambda of: of.once(_matrices)[1],
     ),
-    MetricDefinition(
+    _motion_metric(
         "rpe_point",
         "difference of the distances moved",
         "m",
         "| ‖q_j − q_i‖ − ‖p_j − p_i‖ |",
         "evo's point_distance",
-        MOTIONS,
-        "every direction: a motion of the right length to the wrong side has no error",
-        measure=lambda of: of.once(_distances).point_m,
+        blind="every direction: a motion of the right length to the wrong side has no error",
+        measure=lambda of: of.once(_distances)[0],
     ),
-    MetricDefinition(
+    _motion_metric(
         "rpe_point_percent",
         "difference of the distances moved, of the true one",
         "%",
         "100 | ‖q_j − q_i‖ − ‖p_j − p_i‖ | / ‖q_j − q_i‖, pairs where the truth stood still left out",
         "evo's point_distance_error_ratio",
-        MOTIONS,
-        "every direction, and drift while the truth stands still",
-        measure=lambda of: of.once(_distances).percent,
+        blind="every direction, and drift while the truth stands still",
+        measure=lambda of: of.once(_distances)[1],
     ),
-    MetricDefinition(
+    _part_metric(
         "rel_trans",
         "translation error over parts of the path",
         "m",
         "‖t‖ of (T_gt,ij)⁻¹ T_est,ij, j nearest to the length along the true path",
-        ZHANG,
-        RELATIVE,
-        "lengths are mixed: the longest decide",
+        blind="lengths are mixed: the longest decide",
         measure=_over_parts(lambda parts: parts.trans_m),
     ),
-    MetricDefinition(
+    _part_metric(
         "rel_trans_percent",
         "translation error over parts of the path, of their length",
         "%",
         "100 ‖t‖ / length of the same parts",
-        ZHANG,
-        RELATIVE,
-        "jitter on long parts",
+        blind="jitter on long parts",
         headline="mean",
         measure=_over_parts(lambda parts: 100 * parts.trans_m / parts.length_m),
     ),
-    MetricDefinition(
+    _part_metric(
         "rel_rot",
         "angle error over parts of the path",
         "deg",
         "angle of (T_gt,ij)⁻¹ T_est,ij",
-        ZHANG,
-        RELATIVE,
-        "lengths are mixed: the longest decide",
+        blind="lengths are mixed: the longest decide",
         measure=_over_parts(lambda parts: np.rad2deg(parts.rot_rad)),
     ),
-    MetricDefinition(
+    _part_metric(
         "rel_rot_per_m",
         "angle error over parts of the path, per metre",
         "deg/m",
         "angle / length of the same parts",
-        ZHANG,
-        RELATIVE,
-        "jitter on long parts",
+        blind="jitter on long parts",
         headline="mean",
         measure=_over_parts(lambda parts: np.rad2deg(parts.rot_rad) / parts.length_m),
     ),
-    MetricDefinition(
+    _part_metric(
         "rel_yaw",
         "yaw error over parts of the path: the turn about gravity that inertia can't see",
         "deg",
         "|yaw| of the error turned into the world: R_est,j R_E R_est,j⁻¹ = Rz(yaw) Ry(pitch) Rx(roll); "
         "rpg's is the estimate's own world, openvins' the truth's",
-        ZHANG,
-        RELATIVE,
-        "gravity is the z of the world: another vertical mixes it with rel_gravity",
+        blind="gravity is the z of the world: another vertical mixes it with rel_gravity",
         measure=_over_parts(lambda parts: np.rad2deg(parts.yaw_rad)),
     ),
-    MetricDefinition(
+    _part_metric(
         "rel_gravity",
         "tilt error over parts of the path: the turn against gravity that inertia sees",
         "deg",
         "√(pitch² + roll²) of the same rotation as rel_yaw",
-        ZHANG,
-        RELATIVE,
-        "gravity is the z of the world: another vertical mixes it with rel_yaw",
+        blind="gravity is the z of the world: another vertical mixes it with rel_yaw",
         measure=_over_parts(lambda parts: np.rad2deg(parts.gravity_rad)),
     ),
 )

@@ -1,6 +1,7 @@
 """Scale: by what factor an estimate's distances are wrong, and how that drifts."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -14,14 +15,10 @@ LEAST_SHARE = 0.1  # of the median true distance; a segment that ends nearer to 
 
 @dataclass(frozen=True, slots=True)
 class ScaleErrors:
-    """Signed errors (N,) of the scale as ratio less one, where along the path (N,) in m, and their trend per metre."""
+    """Signed errors (N,) of the scale as ratio less one, and their trend per metre of path."""
 
     error: Array
-    along_m: Array
     drift_per_m: float
-
-    def __len__(self) -> int:
-        return len(self.error)
 
 
 def scale_errors(T_gt: Array, T_est: Array, along_m: Array, first: Index, last: Index) -> ScaleErrors:
@@ -33,7 +30,7 @@ def scale_errors(T_gt: Array, T_est: Array, along_m: Array, first: Index, last: 
     gt_m, est_m = (np.linalg.norm(T[last, :3, 3] - T[first, :3, 3], axis=1) for T in (T_gt, T_est))
     shown = (gt_m > LEAST_SHARE * np.median(gt_m)) & (gt_m > 0) if len(gt_m) else np.zeros(0, bool)
     ratio, middle_m = est_m[shown] / gt_m[shown], 0.5 * (along_m[first] + along_m[last])[shown]
-    return ScaleErrors(ratio - 1.0, middle_m, _slope(middle_m[ratio > 0], np.log(ratio[ratio > 0])))
+    return ScaleErrors(ratio - 1.0, _slope(middle_m[ratio > 0], np.log(ratio[ratio > 0])))
 
 
 def _slope(x: Array, y: Array) -> float:
@@ -49,27 +46,22 @@ def _scale(of: Comparison) -> ScaleErrors:
 
 
 STRASDAT = "Strasdat et al. (2010), section II, as a ratio of distances"
+_scale_metric = partial(MetricDefinition, source=STRASDAT, settings=SEGMENTS, headline="mean")
 METRICS = (
-    MetricDefinition(
+    _scale_metric(
         "scale_error",
         "scale error of the segments",
         "1",
         "‖p_j − p_i‖ / ‖q_j − q_i‖ − 1 of the segments of kitti_t_rel, with its sign",
-        STRASDAT,
-        SEGMENTS,
-        "scale where a segment ends near where it began; an alignment with scale has taken the mean out",
-        headline="mean",
+        blind="scale where a segment ends near where it began; an alignment with scale has taken the mean out",
         measure=lambda of: of.once(_scale).error,
     ),
-    MetricDefinition(
+    _scale_metric(
         "scale_drift",
         "drift of the scale per metre of path",
         "1/m",
         "slope by least squares of log(1 + scale_error) over the true path, one number",
-        STRASDAT,
-        SEGMENTS,
-        "a scale that goes up and comes down again",
-        headline="mean",
-        measure=lambda of: np.full(min(len(of.once(_scale)), 1), of.once(_scale).drift_per_m),
+        blind="a scale that goes up and comes down again",
+        measure=lambda of: np.full(min(len(of.once(_scale).error), 1), of.once(_scale).drift_per_m),
     ),
 )

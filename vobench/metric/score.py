@@ -98,11 +98,6 @@ class Samples:
         found = metric.measure(of) if metric.measure else np.zeros(0)
         return cls(metric, found.errors, found) if isinstance(found, OverLengths) else cls(metric, found)
 
-    @property
-    def name(self) -> str:
-        """The metric's name."""
-        return self.of.id
-
     def statistics(self, settings: ScoreSettings) -> Statistics:
         """The statistics of one error or more."""
         found = statistics(self.errors, ddof=settings.std_ddof)
@@ -138,8 +133,6 @@ def _joined(parts: Sequence[Samples], which: "NDArray[np.bool_] | slice" = slice
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["DEFAULTS", "Association", "LengthMetric", "Metric", "Pooled", "Score", "ScoreSettings", "pooled", "score"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,10 +181,6 @@ class Score:
         shown = [f"{m.name} {m.statistics.rmse:.4g} {m.unit}" for m in self.metrics[:3]]
         said = f"{len(self.metrics)} metrics, {len(self.warnings)} warning{'' if len(self.warnings) == 1 else 's'}"
         return f"Score({', '.join(shown)}, coverage {self.coverage.ratio:.3f}; {said})"
-
-    def noted(self, notes: tuple[str, ...]) -> "Score":
-        """The same with notes on how its files were read before the warnings."""
-        return replace(self, warnings=(*notes, *self.warnings))
 
     def to_frame(self) -> "pd.DataFrame":
         """A pandas table, one row a metric by its name: unit, every statistic, and the id."""
@@ -272,7 +261,7 @@ def pooled(scores: Sequence[Score]) -> Pooled:
     lengths: list[LengthMetric] = []
     warnings: list[str] = []
     for name in dict.fromkeys(metric.name for scored in scores for metric in scored.metrics):
-        found = [(part, scored.settings) for scored in scores for part in scored.samples if part.name == name]
+        found = [(part, scored.settings) for scored in scores for part in scored.samples if part.of.id == name]
         ids = {part.metric(settings, n=0, of=0).id for part, settings in found}
         if len(ids) > 1:
             warnings.append(f"{name} is not pooled, for the sequences measure it in different ways: compare their ids")

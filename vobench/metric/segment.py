@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,29 +132,22 @@ def _drift(of: Comparison, drift: Distances, *, in_degrees: bool = False) -> Ove
 
 SEGMENTS = ("segment_lengths_m", "segment_step_frames", "segment_precision", "segment_mean", *POSES)
 GEIGER = "Geiger et al. (2012), section 3.2, and its development kit"
+_drift_metric = partial(MetricDefinition, source=GEIGER, settings=SEGMENTS, headline="mean", full=False)
 METRICS = (
-    MetricDefinition(
+    _drift_metric(
         "kitti_t_rel",
         "translation drift per metre of path",
         "1",
         "‖t‖ of (T_est,ij)⁻¹ T_gt,ij / length, j the first frame further than the length along the true path",
-        GEIGER,
-        SEGMENTS,
-        "jitter: it is small against segments of a hundred metres",
-        headline="mean",
-        full=False,
+        blind="jitter: it is small against segments of a hundred metres",
         measure=lambda of: _drift(of, of.once(segments).trans_ratio),
     ),
-    MetricDefinition(
+    _drift_metric(
         "kitti_r_rel",
         "rotation drift per metre of path",
         "deg/m",
         "angle of (T_est,ij)⁻¹ T_gt,ij / length, segments as of kitti_t_rel",
-        GEIGER,
-        SEGMENTS,
-        "jitter, and errors that turn back within a segment",
-        headline="mean",
-        full=False,
+        blind="jitter, and errors that turn back within a segment",
         measure=lambda of: _drift(of, of.once(segments).rot_radpm, in_degrees=True),
     ),
 )

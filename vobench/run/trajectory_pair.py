@@ -2,18 +2,21 @@
 
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import reduce
 from pathlib import Path
-from typing import Any, get_args
+from typing import BinaryIO, get_args
 
 import numpy as np
 
 from vobench.errors import InputError, TrajectoryError
 from vobench.trajectory.formats import Order, Parsed, Reading, Unit, parse_any, parse_times
-from vobench.trajectory.trajectory import Move, Stamps, Trajectory, parse_move
+from vobench.trajectory.trajectory import Move, Trajectory, parse_move
 
 NS_PER_S = 10**9
 UNITS: tuple[Unit, ...] = get_args(Unit)
+ORDERS: tuple[Order, ...] = get_args(Order)
 TRUTH, SENSORS = "truth.mcap", "sensors.mcap"
 HEAD_BYTES = 4096  # enough to tell text from a recording
 SAYS_TRUTH = re.compile(r"(?<![a-z])(gt|ground[ _-]?truth|truth|reference)(?![a-z])", re.IGNORECASE)
@@ -68,15 +71,14 @@ def read_pair(
     if times:
         if not unstamped:
             raise InputError(f"--times is for files without stamps, but both files have theirs: {times[0]}")
-        clocks = _clocks(times)
-        stamped = [_stamp(read, clocks) for read in reads]
+        stamped = [_stamp(read, times) for read in reads]
     elif len(unstamped) == 1:
         raise InputError(f"no stamps in {unstamped[0].path}; name the file that has them with --times")
     else:
         _require_same_frames(unstamped)
         stamped = [_numbered(read) for read in reads]
         by_frame = None if not unstamped else BY_ROW if all(r.parsed.frames is None for r in reads) else BY_FRAME
-    notes = [note for read in reads for note in (*read.parsed.notes, *_frame_notes(read))]
+    notes = [note for read in reads for note in _notes(read)]
     return TrajectoryPair(_reading(stamped[0]), _reading(stamped[1]), tuple(notes), by_frame)
 
 
@@ -96,23 +98,19 @@ def _require_same_frames(reads: Sequence[_Read]) -> None:
             )
 
 
-def _frame_notes(read: _Read) -> list[str]:
-    frames = read.parsed.frames
-    if frames is None:
-        return []
-    count = f"{len(frames)} poses for frames {frames[0]} to {frames[-1]}"
-    return [f"the first of 13 columns was read as the number of a frame ({count}): {read.path}"]
-
-
-def _clocks(times: Sequence[Path]) -> list[tuple[Path, Stamps]]:
-    return [(path, parse_times(_text(path), name=str(path))) for path in times]
+def _notes(read: _Read) -> list[str]:
+    frames, notes = read.parsed.frames, list(read.parsed.notes)
+    if frames is not None:
+        count = f"{len(frames)} poses for frames {frames[0]} to {frames[-1]}"
+        notes.append(f"the first of 13 columns was read as the number of a frame ({count}): {read.path}")
+    return notes
 
 
 def read_one(source: TrajectorySource, *, times: Sequence[Path] = (), any_unit: bool = False) -> Reading:
     """Read one alone; a file without stamps needs `times`. Raises InputError."""
     read = _read(source, any_unit=any_unit)
     if times:
-        read = _stamp(read, _clocks(times))
+        read = _stamp(read, times)
     if read.parsed.t_ns is None:
         raise InputError(f"no stamps in {source.path}; name the file that has them as `times`")
     return _reading(read)
@@ -121,9 +119,7 @@ def read_one(source: TrajectorySource, *, times: Sequence[Path] = (), any_unit: 
 def _reading(read: _Read) -> Reading:
     parsed = read.parsed
     assert parsed.t_ns is not None
-    T = parsed.T
-    for move in read.moves:
-        T = move.apply(T)
+    T = reduce(lambda poses, move: move.apply(poses), read.moves, parsed.T)
     return Reading(
         Trajectory(parsed.t_ns, T),
         parsed.unit,
@@ -134,8 +130,9 @@ def _reading(read: _Read) -> Reading:
     )
 
 
-def _stamp(read: _Read, clocks: Sequence[tuple[Path, Stamps]]) -> _Read:
+def _stamp(read: _Read, times: Sequence[Path]) -> _Read:
     """The poses with their stamps out of the one file of times that fits them."""
+    clocks = [(path, parse_times(_text(path), name=str(path))) for path in times]
     if read.parsed.t_ns is not None:
         return read
     fitting = [(path, t_ns) for path, clock in clocks if (t_ns := read.parsed.stamped_by(clock)) is not None]
@@ -167,7 +164,8 @@ def _read(source: TrajectorySource, *, any_unit: bool) -> _Read:
     if source.topic:
         raise InputError(f"a topic is for a recording, but this is a text file: {path}")
     written = _text(path)
-    says_truth = bool(SAYS_TRUTH.search(path.stem) or SAYS_TRUTH.search(_leading_comments(written)))
+    comments = "\n".join(line for line in written[:HEAD_BYTES].splitlines() if line.startswith("#"))
+    says_truth = bool(SAYS_TRUTH.search(path.stem) or SAYS_TRUTH.search(comments))
     parsed = _parse(written, str(path), unit, order, any_unit=any_unit)
     if (unit and parsed.t_ns is None) or (order and parsed.order is None):
         raise InputError(f"no {'stamps' if unit else 'quaternions'} to read as {unit or order} in {path}")
@@ -178,13 +176,10 @@ def _parse(written: str, name: str, unit: Unit | None, order: Order | None, *, a
     try:
         return parse_any(written, name=name, unit=unit, order=order)
     except TrajectoryError:
-        if not any_unit or unit:
-            raise
-        for finer in UNITS[1:]:
-            try:
-                return parse_any(written, name=name, unit=finer, order=order)
-            except TrajectoryError:
-                continue
+        if any_unit and not unit:
+            for finer in UNITS[1:]:
+                with suppress(TrajectoryError):
+                    return parse_any(written, name=name, unit=finer, order=order)
         raise
 
 
@@ -194,9 +189,9 @@ def _words(words: Iterable[str]) -> tuple[Unit | None, Order | None, tuple[Move,
     moves = []
     for word in words:
         if word in UNITS:
-            unit = next(known for known in UNITS if known == word)
-        elif word in ("xyzw", "wxyz"):
-            order = "xyzw" if word == "xyzw" else "wxyz"
+            unit = word
+        elif word in ORDERS:
+            order = word
         else:
             moves.append(parse_move(word))
     return unit, order, tuple(moves)
@@ -214,7 +209,7 @@ def _is_recording(path: Path) -> bool:
     return b"\0" in head
 
 
-def _opened(path: Path) -> Any:
+def _opened(path: Path) -> BinaryIO:
     try:
         return path.open("rb")
     except OSError as error:
@@ -223,17 +218,12 @@ def _opened(path: Path) -> Any:
 
 def _text(path: Path) -> str:
     with _opened(path) as file:
-        content: bytes = file.read()
+        content = file.read()
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise TrajectoryError(f"{path}:{line}: not a text in UTF-8") from None
-
-
-def _leading_comments(written: str) -> str:
-    head = written[:HEAD_BYTES].splitlines()
-    return "\n".join(line for line in head if line.startswith("#"))
 
 
 def _recorded(path: Path, topic: str | None) -> Trajectory:
