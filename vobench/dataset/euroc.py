@@ -12,15 +12,13 @@ from vobench.dataset.picture import read_text, unread
 from vobench.dataset.recording import (
     Notes,
     PictureList,
-    PictureStream,
     ReadOptions,
     Recording,
     assemble,
-    paired,
-    present,
-    read_list,
+    listed_pictures,
+    picture_files,
     read_truth_file,
-    recorded_frames,
+    truth_file,
 )
 from vobench.dataset.source import ExportSource, Views, png_frames, rate_hz
 from vobench.errors import InputError
@@ -96,7 +94,7 @@ def read_euroc(folder: Path, options: ReadOptions, *, form: str = "euroc") -> Re
     """
     root = folder / "mav0" if (folder / "mav0").is_dir() else folder
     eyes, pairing = _pictures(root, options)
-    stream = PictureStream.open(recorded_frames(eyes[0].t_ns, *(eye.paths for eye in eyes)))
+    stream = picture_files(eyes[0].t_ns, *(eye.paths for eye in eyes))
     rig, calibration, lens_notes = _rig(root, folder, len(eyes), options)
     imu, imu_calibration, imu_notes = _imu(root, folder, options)
     truth, truth_notes = _truth(root, eyes[0].t_ns, options)
@@ -111,13 +109,9 @@ def _pictures(root: Path, options: ReadOptions) -> tuple[list[PictureList], Note
     if not (root / CAMERAS[0]).is_dir():
         raise InputError(f"no folder {CAMERAS[0]} with pictures in {root}")
     folders = [root / name for name in CAMERAS if (root / name).is_dir()]
-    eyes = [read_list(folder / DATA, folder / "data", separator=",", unit="ns") for folder in folders]
-    if len(eyes) == 1:
-        notes: Notes = (f"There is one camera: no folder {CAMERAS[1]}.",)
-    else:
-        *eyes, notes = paired(eyes[0], eyes[1], options.within_ns)
-    found, missing = present(*eyes)
-    return found, (*notes, *missing)
+    lists = [(folder / DATA, folder / "data") for folder in folders]
+    eyes, notes = listed_pictures(*lists, separator=",", unit="ns", within_ns=options.within_ns)
+    return eyes, notes if len(eyes) > 1 else (f"There is one camera: no folder {CAMERAS[1]}.", *notes)
 
 
 def _rig(root: Path, folder: Path, count: int, options: ReadOptions) -> tuple[Rig, Path, Notes]:
@@ -135,10 +129,9 @@ def _rig(root: Path, folder: Path, count: int, options: ReadOptions) -> tuple[Ri
     missing = next((path for path in sensors if not path.is_file()), None)
     if missing is not None:
         raise kalibr.no_calibration(missing)
-    cameras = [sensor_camera(kalibr.read_yaml(path)) for path in sensors]
-    (left, T_body_left), (right, T_body_right) = cameras[0], cameras[1] if count > 1 else (None, None)
+    rig = kalibr.rig_of(*(sensor_camera(kalibr.read_yaml(path)) for path in sensors))
     note = "Pictures stay as they are, not rectified; the lens is in the calibration (sensor.yaml)."
-    return Rig(left, right, T_body_left, T_body_right), sensors[0], (note,)
+    return rig, sensors[0], (note,)
 
 
 def _imu(root: Path, folder: Path, options: ReadOptions) -> tuple[ImuReadings | None, ImuCalibration | None, Notes]:
@@ -155,8 +148,7 @@ def _imu(root: Path, folder: Path, options: ReadOptions) -> tuple[ImuReadings | 
 
 def _truth(root: Path, frames_ns: Stamps, options: ReadOptions) -> tuple[Trajectory | None, Notes]:
     if options.truth is not None:
-        truth, notes = read_truth_file(options.truth, frames_ns)
-        return truth, (f"The truth is {options.truth.name}, taken to be of the body.", *notes)
+        return truth_file(options, (), frames_ns, "taken to be of the body.")
     for name in TRUTHS:
         if (root / name / DATA).is_file():
             return _tracked(root / name, frames_ns)
@@ -183,15 +175,8 @@ def _on_body(rig: Rig, truth: Trajectory | None, T_imu_base: Array | None) -> tu
     """Rig and truth on the body that a recording of our own had before it was exported, or on the IMU."""
     if T_imu_base is None:
         return rig, truth, "The body is the IMU."
-    T_base_imu = se3.inverse(T_imu_base)
-    moved = Rig(
-        rig.left,
-        rig.right,
-        T_base_imu @ rig.T_body_left,
-        None if rig.T_body_right is None else T_base_imu @ rig.T_body_right,
-        imu=replace(rig.imu, T_body_imu=T_base_imu @ rig.imu.T_body_imu) if rig.imu else None,
-    )
-    return moved, truth.of_mounted(T_imu_base) if truth else None, f"The body is {BASE}, as its sensor.yaml places it."
+    said = f"The body is {BASE}, as its sensor.yaml places it."
+    return kalibr.on_body(rig, se3.inverse(T_imu_base)), truth.of_mounted(T_imu_base) if truth else None, said
 
 
 # EuRoC's words for Kalibr's.

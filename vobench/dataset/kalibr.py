@@ -357,6 +357,18 @@ def chain_rig(path: Path, cameras: int, body: Literal["imu", "left"]) -> tuple[R
     return rig, (told, *(off.format(*shift) for shift in shifts_s if shift[1]))
 
 
+def rig_of(left: tuple[Camera, Array], right: tuple[Camera, Array] | None = None) -> Rig:
+    """The rig of one or two cameras, each with its T_body_camera."""
+    return Rig(left[0], right and right[0], left[1], None if right is None else right[1])
+
+
+def on_body(rig: Rig, T_body_old: Array) -> Rig:
+    """A rig without wheels on another body, on which the old one sits so."""
+    imu = rig.imu and replace(rig.imu, T_body_imu=T_body_old @ rig.imu.T_body_imu)
+    T_body_right = None if rig.T_body_right is None else T_body_old @ rig.T_body_right
+    return Rig(rig.left, rig.right, T_body_old @ rig.T_body_left, T_body_right, imu=imu)
+
+
 def no_calibration(looked_for: Path) -> InputError:
     """The complaint that there is none, with the file that was looked for."""
     return InputError(f"the calibration is missing; name a camchain.yaml of Kalibr's or put it here: {looked_for}")

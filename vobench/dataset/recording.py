@@ -195,6 +195,22 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
     return Trajectory(t_ns, T), tuple(notes)
 
 
+def truth_file(
+    options: ReadOptions, beside: Iterable[Path], frames_ns: Stamps, whose: str, turn: Array | None = None
+) -> tuple[Trajectory | None, Notes]:
+    """The truth that the options name, or the first one there beside the pictures; None where there is none.
+
+    `turn` (4, 4) turns the file's axes, those of the world and of what moves, into ours.
+    """
+    path = options.truth or next((path for path in beside if path.exists()), None)
+    if path is None:
+        return None, ()
+    truth, notes = read_truth_file(path, frames_ns)
+    if turn is not None:
+        truth = Trajectory(truth.t_ns, turn @ truth.T_world_frame @ turn.T)
+    return truth, (f"The truth is {path.name}, {whose}", *notes)
+
+
 def cut_to(truth: Trajectory, frames_ns: Stamps) -> tuple[Trajectory | None, Notes]:
     """The truth from the last pose before the first picture to the first after the last one, and what that dropped."""
     t_ns, inside = truth.t_ns, around(truth.t_ns, frames_ns)
@@ -347,11 +363,24 @@ def read_list(path: Path, folder: Path, *, separator: str | None, unit: Unit) ->
     return PictureList(str(path), t_ns, paths)
 
 
-def present(*eyes: PictureList) -> tuple[list[PictureList], Notes]:
-    """The pictures of lists in step whose files are there for every eye, and what is to be said of the others.
+def listed_pictures(
+    *lists: tuple[Path, Path], separator: str | None, unit: Unit, within_ns: int = 0
+) -> tuple[list[PictureList], Notes]:
+    """The pictures of one or two eyes, each by its list and the folder that its names start from, and what to note.
 
-    Raises InputError where none is.
+    Pictures up to `within_ns` apart are a pair. Raises InputError as `read_list` does, and where no pair is there.
     """
+    eyes, notes = [read_list(path, folder, separator=separator, unit=unit) for path, folder in lists], Notes()
+    if len(eyes) > 1:
+        left, right = eyes
+        at_left, at_right, notes = partners(left.t_ns, right.t_ns, within_ns, f"{left.name} and {right.name}")
+        eyes = [left.at(at_left), right.at(at_right)]
+    found, missing = _present(*eyes)
+    return found, (*notes, *missing)
+
+
+def _present(*eyes: PictureList) -> tuple[list[PictureList], Notes]:
+    """The pictures whose files are there for every eye, and what is to be said of the others."""
     # pathlib's own is_file raises for a name that is too long.
     is_there = np.array([all(map(isfile, paths)) for paths in zip(*(eye.paths for eye in eyes), strict=True)])
     if is_there.all():
@@ -381,8 +410,20 @@ def _dropped(is_there: NDArray[np.bool_], t_ns: Stamps, what: str) -> str:
     return f"{len(is_there) - len(found)} of {len(is_there)} {what} were dropped, for files are missing: {where}."
 
 
-def numbered(folder: Path) -> tuple[Path, ...]:
-    """The pictures of a folder that are numbered without a gap. Raises InputError naming the first that is missing."""
+def numbered(*folders: Path) -> list[tuple[Path, ...]]:
+    """The pictures of one or two eyes, of the same numbers without a gap. Raises InputError naming one that is not."""
+    eyes = [_numbered(folder) for folder in folders]
+    left, right = (tuple(eye.values()) for eye in (eyes[0], eyes[-1]))
+    if len(left) != len(right):
+        raise InputError(
+            f"{len(left)} left and {len(right)} right pictures; there should be as many: {folders[0]} and {folders[-1]}"
+        )
+    if min(eyes[0]) != min(eyes[-1]):
+        raise InputError(f"the first left and right pictures have other numbers: {left[0]} and {right[0]}")
+    return [left, right][: len(folders)]
+
+
+def _numbered(folder: Path) -> dict[int, Path]:
     found = sorted((int(match[1]), name) for name in listed(folder) if (match := NUMBERED.fullmatch(name)))
     if not found:
         raise InputError(f"no numbered PNG or JPEG picture in {folder}")
@@ -393,21 +434,7 @@ def numbered(folder: Path) -> tuple[Path, ...]:
         if number > expected:
             width = sum(character.isdigit() for character in pattern.partition(".")[0])
             raise InputError(f"a picture is missing: {folder / (f'{expected:0{width}d}' + pattern[width:])}")
-    return tuple(folder / name for _, name in found)
-
-
-def in_step(left: Sequence[Path], right: Sequence[Path] | None) -> None:
-    """Raise InputError unless two eyes have as many pictures, of the same numbers."""
-    if right is None:
-        return
-    if len(left) != len(right):
-        raise InputError(
-            f"{len(left)} left and {len(right)} right pictures; there should be as many: "
-            f"{left[0].parent} and {right[0].parent}"
-        )
-    first = [NUMBERED.fullmatch(paths[0].name) for paths in (left, right)]
-    if first[0] and first[1] and int(first[0][1]) != int(first[1][1]):
-        raise InputError(f"the first left and right pictures have other numbers: {left[0]} and {right[0]}")
+    return {number: folder / name for number, name in found}
 
 
 def partners(left_ns: Stamps, right_ns: Stamps, within_ns: int, name: str) -> tuple[Stamps, Stamps, Notes]:
@@ -428,17 +455,11 @@ def partners(left_ns: Stamps, right_ns: Stamps, within_ns: int, name: str) -> tu
     return pairs.gt, pairs.est, tuple(notes)
 
 
-def paired(left: PictureList, right: PictureList, within_ns: int) -> tuple[PictureList, PictureList, Notes]:
-    """Both lists with the same stamps, and sentences on what that took. Raises InputError where there is no pair."""
-    at_left, at_right, notes = partners(left.t_ns, right.t_ns, within_ns, f"{left.name} and {right.name}")
-    return left.at(at_left), replace(right.at(at_right), t_ns=left.t_ns[at_left]), notes
-
-
-def recorded_frames(t_ns: Stamps, *eyes: Sequence[Path]) -> Shots:
-    """The pictures of one or two eyes, read from their files as one goes."""
+def picture_files(t_ns: Stamps, *eyes: Sequence[Path]) -> PictureStream:
+    """The pictures of one or two eyes, read from their files as one goes. Raises InputError as `open` does."""
 
     def shots() -> Iterator[RecordedFrame]:
         for t, paths in zip(t_ns.tolist(), zip(*eyes, strict=True), strict=True):
             yield RecordedFrame(t, tuple(Picture(str(path), read_bytes(path)) for path in paths))
 
-    return shots
+    return PictureStream.open(shots)

@@ -12,14 +12,12 @@ from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
 from vobench.dataset.recording import (
     Notes,
-    PictureStream,
     ReadOptions,
     Recording,
     assemble,
-    present,
-    read_list,
-    read_truth_file,
-    recorded_frames,
+    listed_pictures,
+    picture_files,
+    truth_file,
 )
 from vobench.dataset.source import ExportSource, Views, png_frames
 from vobench.geometry.camera import BrownConrady, Camera, Pinhole
@@ -30,7 +28,7 @@ from vobench.sensor.pixel_truth import Floats, Ids
 from vobench.sequence import read_truth_frames
 from vobench.sequence.picture import write_png
 from vobench.trajectory.formats import format_tum, seconds
-from vobench.trajectory.trajectory import Stamps, Trajectory
+from vobench.trajectory.trajectory import Stamps
 
 LIST, TRUTH, DEPTH = "rgb.txt", "groundtruth.txt", "depth.txt"
 # The colour cameras of the three robots, 640 x 480. Source: the benchmark's page "File Formats".
@@ -44,10 +42,10 @@ WHICH = re.compile(r"(?:freiburg|fr)_?([123])(?![0-9])", re.IGNORECASE)
 
 def read_tum(folder: Path, options: ReadOptions) -> Recording:
     """A folder with rgb.txt; the body is its camera. Raises InputError, one sentence, naming the file."""
-    (pictures,), missing = present(read_list(folder / LIST, folder, separator=None, unit="s"))
-    stream = PictureStream.open(recorded_frames(pictures.t_ns, pictures.paths))
+    (pictures,), missing = listed_pictures((folder / LIST, folder), separator=None, unit="s")
+    stream = picture_files(pictures.t_ns, pictures.paths)
     rig, calibration, lens_notes = _rig(folder, options)
-    truth, truth_notes = _truth(folder, pictures.t_ns, options)
+    truth, truth_notes = truth_file(options, [folder / TRUTH], pictures.t_ns, "of the camera.")
     notes = ["There is one camera, and it is the body: x right, y down, z ahead."]
     notes += [*missing, *lens_notes, *truth_notes]
     if (folder / DEPTH).exists():
@@ -74,14 +72,6 @@ def _title(path: Path) -> str:
     """The comments at a list's start, which name the bag that it came from."""
     lines = read_text(path).splitlines()[:3]
     return " ".join(line for line in lines if line.startswith("#"))
-
-
-def _truth(folder: Path, t_ns: Stamps, options: ReadOptions) -> tuple[Trajectory | None, Notes]:
-    path = options.truth or folder / TRUTH
-    if options.truth is None and not path.exists():
-        return None, ()
-    truth, notes = read_truth_file(path, t_ns)
-    return truth, (f"The truth is {path.name}, of the camera.", *notes)
 
 
 DEPTH_PER_M = 5000  # grey values of 16 bits; 0 is unknown
