@@ -17,7 +17,7 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, ReaderError, StoragePlugin, Writer
 
-from vobench.dataset.bag_rig import Chosen, Info, Tree, choose, info_rig, is_rectified, plain, tree_of
+from vobench.dataset.bag_rig import Chosen, Info, Tree, between, choose, info_rig, is_rectified, plain, tree_of
 from vobench.dataset.kalibr import chain_rig, find_imu, read_imu, read_yaml
 from vobench.dataset.layout import Layout, Writing, head
 from vobench.dataset.picture import Picture, require_themselves
@@ -183,7 +183,8 @@ def _walk(reader: Any, chosen: Chosen, path: Path) -> Contents:
     if unheard:
         raise InputError(f"{unheard} is said to have messages, but has none that can be read in {path}")
     known = {topic: _rising(np.array(found, np.int64), topic, path) for topic, found in stamps.items()}
-    return Contents(known, first, _readings(chosen, known, readings, path), tree_of(static, str(path)))
+    imu = _readings(chosen.imu, known[chosen.imu], readings, path) if chosen.imu and readings else None
+    return Contents(known, first, imu, tree_of(static, str(path)))
 
 
 def _without_pixels(message: Any) -> Any:
@@ -193,18 +194,12 @@ def _without_pixels(message: Any) -> Any:
     return SimpleNamespace(header=message.header, encoding=getattr(message, "encoding", ""))
 
 
-def _readings(
-    chosen: Chosen, stamps: dict[str, Stamps], rows: list[tuple[float, ...]], path: Path
-) -> ImuReadings | None:
-    if not rows or chosen.imu is None:
-        return None
+def _readings(topic: str, t_ns: Stamps, rows: list[tuple[float, ...]], path: Path) -> ImuReadings:
     values = np.array(rows, float)
     bad = np.flatnonzero(~np.isfinite(values).all(1))
     if bad.size:
-        raise InputError(
-            f"reading {bad[0]} of {chosen.imu} should be finite, but is {values[bad[0]].tolist()} in {path}"
-        )
-    return ImuReadings(stamps[chosen.imu], values[:, :3].copy(), values[:, 3:].copy())
+        raise InputError(f"reading {bad[0]} of {topic} should be finite, but is {values[bad[0]].tolist()} in {path}")
+    return ImuReadings(t_ns, values[:, :3].copy(), values[:, 3:].copy())
 
 
 def _rising(t_ns: Stamps, topic: str, path: Path) -> Stamps:
@@ -218,19 +213,13 @@ def _rising(t_ns: Stamps, topic: str, path: Path) -> Stamps:
 
 
 def _shots(path: Path, chosen: Chosen, found: Contents, options: ReadOptions) -> tuple[Any, Stamps, Notes]:
-    """The pictures in pairs, their stamps (N,), and what pairing them took."""
-    left_ns = found.stamps[chosen.left]
-    places = {chosen.left: {int(t): index for index, t in enumerate(left_ns)}}
-    notes: Notes = ()
+    stamps, notes = {chosen.left: found.stamps[chosen.left]}, Notes()
     if chosen.right is not None:
-        right_ns = found.stamps[chosen.right]
+        left_ns, right_ns = found.stamps[chosen.left], found.stamps[chosen.right]
         at_left, at_right, notes = partners(left_ns, right_ns, options.within_ns, str(path))
-        places = {
-            topic: {int(t): index for index, t in enumerate(stamps)}
-            for topic, stamps in ((chosen.left, left_ns[at_left]), (chosen.right, right_ns[at_right]))
-        }
-        left_ns = left_ns[at_left]
-    return partial(_pictures, path, places, left_ns), left_ns, notes
+        stamps = {chosen.left: left_ns[at_left], chosen.right: right_ns[at_right]}
+    places = {topic: {int(t): index for index, t in enumerate(t_ns)} for topic, t_ns in stamps.items()}
+    return partial(_pictures, path, places, stamps[chosen.left]), stamps[chosen.left], notes
 
 
 def _pictures(path: Path, places: dict[str, dict[int, int]], t_ns: Stamps) -> Iterator[RecordedFrame]:
@@ -263,10 +252,9 @@ def _body(chosen: Chosen, found: Contents) -> tuple[str | None, Notes]:
     truth, _, pair = (chosen.truth or "").partition(":")
     stated = pair.rpartition(".")[2] or plain(getattr(found.first.get(truth), "child_frame_id", ""))
     for frame in (stated, BASE):
-        if frame and found.tree.between(frame, left) is not None:
-            whose = (
-                "" if frame == stated or not truth else f", and {truth}, which names no frame, was taken to be of it"
-            )
+        if frame and between(found.tree, frame, left) is not None:
+            taken = truth and frame != stated
+            whose = f", and {truth}, which names no frame, was taken to be of it" if taken else ""
             return frame, (f"The body is {frame}{whose}.",)
     if stated:
         return None, (f"The body is the left camera; where {stated} is, of which the truth is, is not said.",)
@@ -274,11 +262,10 @@ def _body(chosen: Chosen, found: Contents) -> tuple[str | None, Notes]:
 
 
 def _rig(path: Path, chosen: Chosen, found: Contents, body: str | None, options: ReadOptions) -> tuple[Rig, str, Notes]:
-    """The cameras by Kalibr's chain where one is given, or by the bag; and what says so."""
     if options.calibration is not None:
-        about = "imu" if read_yaml(options.calibration).has("cam0", "T_cam_imu") else "left"
-        rig, notes = chain_rig(options.calibration, 2 if chosen.right else 1, "imu" if about == "imu" else "left")
-        whose = "the IMU" if about == "imu" else "the left camera"
+        has_imu = read_yaml(options.calibration).has("cam0", "T_cam_imu")
+        rig, notes = chain_rig(options.calibration, 2 if chosen.right else 1, "imu" if has_imu else "left")
+        whose = "the IMU" if has_imu else "the left camera"
         said = f"The calibration is that of {options.calibration.name}, and the body {whose}, whatever the bag says."
         return rig, str(options.calibration), (said, *notes[1:])
     eyes = []
@@ -308,7 +295,7 @@ def _imu(
     T_body_imu: Array | None = np.eye(4)
     if options.calibration is None:
         frame = _frame(found.first[chosen.imu])
-        T_body_imu = found.tree.between(body or _frame(found.first[chosen.left]), frame)
+        T_body_imu = between(found.tree, body or _frame(found.first[chosen.left]), frame)
     if T_body_imu is None:
         return None, None, (f"{chosen.imu} was dropped: nothing says where it sits.",)
     return found.imu, read_imu(noise, T_body_imu), (f"The IMU's noise is that of {noise.name}.",)
@@ -372,7 +359,7 @@ def _copy(reader: AnyReader, writer: Writer, *, true_mounts_differ: bool) -> Non
 
 
 def _name(connection: Connection, reader: AnyReader, *, true_mounts_differ: bool) -> str | None:
-    """A topic's name in the bag; None for a message that is there already. The sensors' file comes first."""
+    """A topic's name in the bag; None for a message that is there already, for the sensors' file comes first."""
     if connection.topic != ros.TF_STATIC.name or connection.owner is reader.connections[0].owner:
         return connection.topic
     return TRUE_TF_STATIC if true_mounts_differ else None

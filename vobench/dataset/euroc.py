@@ -88,10 +88,7 @@ def _has_dso(folder: Path) -> bool:
 
 
 def read_euroc(folder: Path, options: ReadOptions, *, form: str = "euroc") -> Recording:
-    """A folder with mav0/, or that folder itself; the body is the IMU.
-
-    Raises InputError, one sentence, naming the file that is missing or wrong.
-    """
+    """A folder with mav0/, or that folder itself; the body is the IMU. Raises InputError naming the file."""
     root = folder / "mav0" if (folder / "mav0").is_dir() else folder
     eyes, pairing = _pictures(root, options)
     stream = picture_files(eyes[0].t_ns, *(eye.paths for eye in eyes))
@@ -115,10 +112,7 @@ def _pictures(root: Path, options: ReadOptions) -> tuple[list[PictureList], Note
 
 
 def _rig(root: Path, folder: Path, count: int, options: ReadOptions) -> tuple[Rig, Path, Notes]:
-    """The cameras on the IMU, by Kalibr's chain where one is given, by their sensor.yaml, or by a chain that is there.
-
-    The path is that of the calibration.
-    """
+    """The cameras on the IMU, by the chain given, their sensor.yaml or a chain that is there; and the file's path."""
     sensors = [root / name / SENSOR for name in CAMERAS[:count]]
     chain = options.calibration or (
         None if all(path.is_file() for path in sensors) else kalibr.find_chain(folder, options)

@@ -30,10 +30,7 @@ TIMES_SUFFIX = ".times.txt"
 
 
 def export_trajectory(trajectory: Trajectory, path: Path, form: str) -> tuple[Path, ...]:
-    """Write a trajectory and say which files it became; KITTI's has no stamps, so its times go beside it.
-
-    Stamps come back exactly and poses to 1e-15. Raises InputError for another form, or a file that is there already.
-    """
+    """Write a trajectory, exactly, as one file, or two in KITTI's form. Raises InputError, also for a file there."""
     if form not in TRAJECTORY_TEXTS:
         raise InputError(f"no form of trajectory '{form}'. Known: {', '.join(TRAJECTORY_FORMS)}")
     texts = {path: TRAJECTORY_TEXTS[form](trajectory)}
@@ -67,11 +64,7 @@ class Exported:
 
 
 def export(sequence: Path, out: Path, form: str) -> Exported:
-    """Write a sequence's folder in another form into a new folder, and read it back: points and poses must agree.
-
-    Raises InputError for an unknown form or a folder in use, SequenceError for what the form cannot hold or a
-    sequence that is not whole.
-    """
+    """Write a sequence in another form into a new folder and test it, read back. Raises InputError, SequenceError."""
     layout = writable().get(form)
     if layout is None:
         raise InputError(unknown("form to export to", form, list(writable())))
@@ -92,10 +85,7 @@ def export(sequence: Path, out: Path, form: str) -> Exported:
 
 @contextmanager
 def _building(out: Path) -> Iterator[Path]:
-    """A folder to fill, which gets its name when the context ends without an error, and is gone after one.
-
-    Raises SequenceError where the disk does not take it.
-    """
+    """A folder to fill, which gets its name when the context ends without an error, and is gone after one."""
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         part = Path(mkdtemp(dir=out.parent, prefix=f".{out.name}.", suffix=".part"))
@@ -161,7 +151,6 @@ def _test(views: Views, expected: Trajectory | None, form: str, folder: Path) ->
 
 
 def _chain_rig(path: Path, imu: ImuCalibration | None) -> Rig:
-    """The rig of a camchain.yaml; where there is an IMU the chain's body is that."""
     rig = kalibr.read_camchain(path)
     return replace(rig, imu=replace(imu, T_body_imu=np.eye(4))) if imu else rig
 

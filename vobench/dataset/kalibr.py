@@ -80,10 +80,7 @@ class Values:
         return int(found[0]), int(found[1])
 
     def transform(self, *keys: str) -> Array:
-        """A rigid transform (4, 4), as rows or as EuRoC's rows, cols and data; its rotation is made exact.
-
-        Raises InputError.
-        """
+        """A rigid transform (4, 4), as rows or as EuRoC's data; its rotation is made exact. Raises InputError."""
         found = self.at(*keys)
         flat = found.get("data") if isinstance(found, dict) else found
         rows = flat if isinstance(flat, list) else []
@@ -158,10 +155,7 @@ NONE = ("none", "")
 def focal_camera(
     size_px: tuple[int, int], focal_px: list[float], model: str, coefficients: list[float], *, place: str
 ) -> Camera:
-    """The camera of fx, fy, cx, cy, a distortion model by any of its names and its coefficients.
-
-    Raises InputError where that is no lens known here; `place` is the file or topic that says so.
-    """
+    """The camera of fx, fy, cx, cy and a distortion model by any of its names. Raises InputError naming `place`."""
     if len(focal_px) != 4 or not all(value > 0 for value in focal_px[:2]):
         raise InputError(f"{place}: a camera should have fx, fy, cx, cy with fx and fy above 0, but has {focal_px}")
     name = model.strip().lower()
@@ -210,10 +204,7 @@ def numbers(values: ArrayLike) -> str:
 
 
 def intrinsics(camera: Camera) -> tuple[str, Array, str, Array]:
-    """Kalibr's camera_model, intrinsics, distortion_model and distortion_coeffs, k3 last where it is not 0.
-
-    Raises SequenceError for a camera that sees all around.
-    """
+    """Kalibr's camera_model, intrinsics, distortion_model and _coeffs, k3 last if not 0. Raises SequenceError."""
     match camera:
         case Equirectangular():
             raise SequenceError(ALL_AROUND)
@@ -261,10 +252,7 @@ def _matrix(name: str, T: Array) -> list[str]:
 
 
 def imu_yaml(imu: ImuCalibration, *, topic: str) -> str:
-    """The imu.yaml of an IMU, without its place, which Kalibr finds out.
-
-    Raises InputError where one of the numbers is not positive, which Kalibr refuses.
-    """
+    """The imu.yaml of an IMU, without its place. Raises InputError for a number that Kalibr refuses, 0 or less."""
     found = {"update_rate": imu.rate_hz, **{name: getattr(imu, field) for field, name in DENSITIES.items()}}
     for name, value in found.items():
         if not 0 < value < np.inf:
@@ -273,10 +261,7 @@ def imu_yaml(imu: ImuCalibration, *, topic: str) -> str:
 
 
 def read_camchain(path: Path) -> Rig:
-    """The rig of a camchain.yaml, cam0 on the left; the body is the IMU, or cam0 where the chain says nothing of one.
-
-    Raises InputError.
-    """
+    """The rig of a camchain.yaml; the body is the IMU, or cam0 where the chain knows none. Raises InputError."""
     chain = read_yaml(path)
     left, placed = _camera(chain, "cam0"), chain.has("cam0", "T_cam_imu")
     T_body_left = se3.inverse(chain.transform("cam0", "T_cam_imu")) if placed else np.eye(4)
@@ -334,10 +319,7 @@ def find_imu(folder: Path, options: ReadOptions) -> Path | None:
 
 
 def chain_rig(path: Path, cameras: int, body: Literal["imu", "left"]) -> tuple[Rig, tuple[str, ...]]:
-    """The first one or two cameras of Kalibr's chain on a body that is the IMU or the left camera, and what to note.
-
-    Raises InputError where the chain has fewer cameras, or does not say where the IMU is.
-    """
+    """The first one or two cameras of Kalibr's chain on that body, and what to note. Raises InputError."""
     values = read_yaml(path)
     if cameras > 1 and not values.has("cam1"):
         raise InputError(f"a recording with two cameras needs cam1, which is missing in {path}")

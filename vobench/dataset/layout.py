@@ -45,10 +45,7 @@ class Writing:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A form of recordings: its name, what it is known by in words, and what tells, reads and writes it.
-
-    `heeds` names the fields of ReadOptions that make a difference.
-    """
+    """A form of recordings, how it is told, read and written; `heeds` names the ReadOptions that make a difference."""
 
     name: str
     known_by: str
@@ -116,7 +113,6 @@ def head(path: Path) -> bytes:
 
 
 def _sentence(path: Path) -> str:
-    """Why a path is none of the forms, and what might have been meant."""
     if not path.is_dir():
         if packed := _packed(head(path)):
             return f"a {packed} archive; unpack it and name the folder: {path}"
@@ -158,10 +154,7 @@ def _levels_below(folder: Path) -> Iterator[Path]:
 
 
 def read(path: Path, *, form: str | None = None, options: ReadOptions | None = None) -> Recording:
-    """The recording at a path, its pictures not yet read; `form` overrides what `sniff` would say.
-
-    Raises VobenchError, one sentence naming the file, where it is no recording, or one that is wrong.
-    """
+    """The recording at a path, its pictures not yet read, as `form` or by content. Raises VobenchError."""
     options = options or ReadOptions()
     try:
         if form is not None and form not in layouts():

@@ -198,10 +198,7 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
 def truth_file(
     options: ReadOptions, beside: Iterable[Path], frames_ns: Stamps, whose: str, turn: Array | None = None
 ) -> tuple[Trajectory | None, Notes]:
-    """The truth that the options name, or the first one there beside the pictures; None where there is none.
-
-    `turn` (4, 4) turns the file's axes, those of the world and of what moves, into ours.
-    """
+    """The truth that the options name, or the first one beside the pictures; `turn` (4, 4) turns its axes into ours."""
     path = options.truth or next((path for path in beside if path.exists()), None)
     if path is None:
         return None, ()
@@ -261,10 +258,7 @@ def assemble(
     notes: Iterable[str] = (),
     calibration: str,
 ) -> Recording:
-    """A recording with pictures at t_ns (N,); `calibration` is the file that says what the rig is.
-
-    Raises InputError where pictures are not of the rig's size, or stamps are before 0 or beyond ROS's seconds.
-    """
+    """A recording at stamps t_ns (N,) by the rig of the file `calibration`. Raises InputError where they do not fit."""
     stream.require(rig, calibration)
     said = [*notes, *_pair_notes(rig, calibration), *stream.notes()]
     if truth is None:
@@ -343,10 +337,7 @@ class PictureList:
 
 
 def read_list(path: Path, folder: Path, *, separator: str | None, unit: Unit) -> PictureList:
-    """A list of stamps and names of pictures below `folder`.
-
-    Raises InputError naming file and line for what is no stamp, does not rise, or names a file outside the folder.
-    """
+    """A list of stamps and names of pictures below `folder`. Raises InputError naming file and line."""
     rows = content(read_text(path))
     if not rows:
         raise InputError(f"the list has no picture: {path}")
@@ -380,7 +371,6 @@ def listed_pictures(
 
 
 def _present(*eyes: PictureList) -> tuple[list[PictureList], Notes]:
-    """The pictures whose files are there for every eye, and what is to be said of the others."""
     # pathlib's own is_file raises for a name that is too long.
     is_there = np.array([all(map(isfile, paths)) for paths in zip(*(eye.paths for eye in eyes), strict=True)])
     if is_there.all():
@@ -438,10 +428,7 @@ def _numbered(folder: Path) -> dict[int, Path]:
 
 
 def partners(left_ns: Stamps, right_ns: Stamps, within_ns: int, name: str) -> tuple[Stamps, Stamps, Notes]:
-    """Indices (K,) of the left and right stamps that make pairs, and what is to be said of the others.
-
-    Raises InputError where there is no pair.
-    """
+    """Indices (K,) of the left and right stamps that make pairs, and notes. Raises InputError where none do."""
     pairs = associate(left_ns, right_ns, max_diff_ns=within_ns)
     if not len(pairs):
         raise InputError(f"no left and right picture have stamps within {within_ns} ns of each other in {name}")

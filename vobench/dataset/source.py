@@ -72,10 +72,7 @@ class Views:
 
 
 def rectified(rig: Rig) -> Views:
-    """The pinholes side by side that stand for a rig; as recorded where it is such a pair to 1e-6 px.
-
-    Raises SequenceError where nothing rectifies the pair.
-    """
+    """The pinholes side by side that stand for a rig, or the rig where it is that. Raises SequenceError for no pair."""
     flat, turns = _flat(rig)
     if pixel_difference(rig, flat) < PIXEL_TOLERANCE:
         return Views(flat)
@@ -203,10 +200,7 @@ def known_points(camera: Camera) -> Array:
 
 
 def pixel_difference(expected: Rig, found: Rig) -> float:
-    """The largest distance in pixels between what two rigs make of the same points; infinite for other pictures.
-
-    Points are given to both in the axes of their left camera.
-    """
+    """The largest distance in px between two rigs' views of the same points; infinite for other pictures."""
     if expected.sides != found.sides:
         return np.inf
     points, largest = known_points(expected.left), 0.0
@@ -226,7 +220,6 @@ def _seen_from_left(rig: Rig, points_left: Array, *, right: bool) -> Array:
 
 
 def _largest(expected: Array, found: Array) -> float:
-    """The largest distance over all that the first one sees; infinite where the other one does not."""
     blind = np.isnan(expected[:, 0])
     if not (~blind).any():
         return np.inf

@@ -58,7 +58,6 @@ def read_tartanair(folder: Path, options: ReadOptions) -> Recording:
 
 
 def _rig(folder: Path, size_px: tuple[int, int], count: int, options: ReadOptions) -> tuple[Rig, str, Notes]:
-    """The simulator's camera, or that of Kalibr's chain, on a body with x ahead, y left, z up."""
     T_body_left = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))
     if options.calibration is not None:
         rig, notes = chain_rig(options.calibration, count, "left")

@@ -55,7 +55,6 @@ def read_tum(folder: Path, options: ReadOptions) -> Recording:
 
 
 def _rig(folder: Path, options: ReadOptions) -> tuple[Rig, str, Notes]:
-    """The camera by Kalibr's chain, or that of the robot that the folder's name or its list speaks of."""
     chain = find_chain(folder, options)
     if chain is not None:
         rig, notes = chain_rig(chain, 1, "left")

@@ -77,7 +77,6 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 @cache
 def _described(type_name: str) -> tuple[bytes, str]:
-    """The definition of a message type with all that it is made of, and ROS's hash of it."""
     return TYPES.generate_msgdef(type_name, ros_version=2)[0].encode(), TYPES.hash_rihs01(type_name)
 
 
@@ -119,10 +118,7 @@ class BagWriter:
         self._mcap.add_metadata(name, {**entries, CHECKSUM: _checksum(entries)})
 
     def write(self, topic: Topic, t_ns: int, data: bytes) -> None:
-        """Add a serialised message.
-
-        Raises SequenceError unless stamps rise per topic and never fall per file, and the topic was declared.
-        """
+        """Add a message. Raises SequenceError unless its topic is declared; stamps rise per topic and never fall."""
         channel = self._channels.get(topic, NO_CHANNEL)
         if channel == NO_CHANNEL:
             raise SequenceError(f"the rig of this recording has nothing that sends {topic.name}: {self.path}")
@@ -172,10 +168,7 @@ class BoundedFile(BufferedReader):
 
 @contextmanager
 def parsing(path: Path) -> Iterator[None]:
-    """Say of any failure inside, in one line, what is wrong with the file at `path`.
-
-    A torn or foreign file makes parsers raise errors of a dozen unrelated kinds.
-    """
+    """Say of any failure inside, of a dozen unrelated kinds in the parsers, in one line what is wrong with the file."""
     try:
         yield
     except SequenceError:
@@ -195,7 +188,6 @@ def part_of(path: Path) -> Path:
 
 
 def _ailment(path: Path, error: Exception) -> str:
-    """What is wrong with a file that could not be read, by its first and its last bytes."""
     try:
         with path.open("rb") as stream:
             start = stream.read(len(LFS_START))
@@ -214,10 +206,7 @@ def _ailment(path: Path, error: Exception) -> str:
 
 
 def unpack(packing: str, packed: bytes, size: int) -> bytes:
-    """The bytes of a chunk, never more than `size` and MAX_BYTES.
-
-    Raises ValueError, or an error of the packing's own, where it is none.
-    """
+    """The bytes of a chunk, never more than `size` and MAX_BYTES. Raises ValueError, or the packing's own error."""
     if size > MAX_BYTES:
         raise ValueError(f"a chunk states {size} bytes unpacked where at most {MAX_BYTES} are read")
     if not packing:
@@ -362,10 +351,7 @@ class Bag:
                 yield topic, TYPES.deserialize_cdr(data, topic.type_name)
 
     def nth(self, topic: Topic, number: int) -> memoryview:
-        """The bytes of a topic's message of that number, of which only its chunk is read.
-
-        Raises SequenceError where there is none.
-        """
+        """A topic's message of that number, of which only its chunk is read. Raises SequenceError for none."""
         channel, skipped = self._channel(topic), number
         with parsing(self.path), BoundedFile(self.path) as stream:
             for chunk, counts in zip(self.summary.chunk_indexes, self.counts, strict=True):

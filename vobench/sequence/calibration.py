@@ -26,10 +26,7 @@ def write_mounts(bag: BagWriter, rig: Rig, t_ns: int) -> None:
 
 
 def read_rig(bag: Bag, info_topics: Sequence[ros.Topic]) -> Rig:
-    """The rig of a bag, its cameras by their topics: the left one, and the right one where there is one.
-
-    Raises SequenceError where the calibration is missing or makes no sense.
-    """
+    """The rig of a bag, its left and right camera by their topics. Raises SequenceError where that is wrong."""
     bag.require((ros.TF_STATIC, *info_topics[:1]))
     cameras = [ros.camera(_first(bag, topic)) for topic in info_topics if bag.has(topic)]
     T_body = _read_mounts(bag)

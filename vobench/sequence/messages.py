@@ -218,10 +218,7 @@ def wheel_ticks(t_ns: int, left: int, right: int) -> Any:
 
 
 def imu(t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike, variances: tuple[float, float]) -> Any:
-    """One reading as a sensor_msgs/Imu that knows no orientation.
-
-    `variances` are those of one axis, of the gyro and of the accelerometer; 0 where they are not known.
-    """
+    """One reading as a sensor_msgs/Imu; `variances` are those of one axis of gyro and accelerometer, 0 if not known."""
     upright, unknown = _make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0), np.zeros(9)
     unknown[0] = UNKNOWN
     gyro, accel = (np.eye(3).ravel() * variance for variance in variances)

@@ -211,19 +211,13 @@ def read_imu_bias(folder: Path) -> ImuBias:
 
 
 def read_disturbances(folder: Path) -> tuple[Stamps, Array]:
-    """Stamps (N,) and what disturbed the robot (N, 5); empty where nothing was noted.
-
-    Slip ratios of the left and right wheel, side slip in rad, pushes in m/s² and rad/s².
-    """
+    """Stamps (N,) and left and right slip ratio, side slip in rad, pushes in m/s² and rad/s² (N, 5), if noted."""
     names = ("left_slip", "right_slip", "side_slip_rad", "push_mps2", "turn_push_radps2")
     return _table(_truth_bag(folder), ros.DISTURBANCE, lambda m: [getattr(m, name) for name in names], 5)
 
 
 def read_true_rig(folder: Path) -> Rig:
-    """The rig that the pictures were made with, where the one of `Sequence` is what estimators are told.
-
-    Raises SequenceError where the file is not whole, or is of the time before it held the true rig.
-    """
+    """The rig that the pictures were made with; `Sequence.rig` is what estimators are told. Raises SequenceError."""
     return read_rig(_truth_bag(folder), ros.TRUE_INFO_TOPICS)
 
 
@@ -287,10 +281,7 @@ def read_truth_names(folder: Path) -> TruthNames:
 
 
 def read_truth_frames(folder: Path, channels: Iterable[str] | None = None) -> Iterator[StereoTruth]:
-    """Some channels (None: all there are) of each instant's pictures; only the current ones are held in memory.
-
-    Raises SequenceError where one was not recorded, or a picture lacks one.
-    """
+    """Channels (None: all) of each instant's pictures, one instant in memory. Raises SequenceError if one lacks."""
     bag, there = _truth_bag(folder), truth_channels(folder)
     wanted = there if channels is None else check_channels(channels)
     for name in wanted:
