@@ -47,11 +47,6 @@ def sensor_camera(values: kalibr.Values) -> tuple[Camera, Array]:
     return camera, values.transform("T_BS")
 
 
-def sensor_imu(values: kalibr.Values) -> ImuCalibration:
-    """An IMU by its sensor.yaml. Raises InputError."""
-    return kalibr.imu_numbers(values, values.transform("T_BS"), ("rate_hz",), ())
-
-
 def read_imu_csv(path: Path) -> ImuReadings:
     """An IMU's `t, wx, wy, wz, ax, ay, az` in ns, rad/s and m/s². Raises TrajectoryError naming file and line."""
     rows = content(read_text(path))
@@ -137,7 +132,8 @@ def _imu(root: Path, folder: Path, options: ReadOptions) -> tuple[ImuReadings | 
         return read_imu_csv(data), kalibr.read_imu(noise, np.eye(4)), (f"The IMU's noise is that of {noise.name}.",)
     if not sensor.is_file():
         return None, None, (f"The IMU was dropped: nothing says how noisy it is ({sensor} or Kalibr's imu.yaml).",)
-    return read_imu_csv(data), sensor_imu(kalibr.read_yaml(sensor)), ()
+    values = kalibr.read_yaml(sensor)
+    return read_imu_csv(data), kalibr.imu_numbers(values, values.transform("T_BS"), ("rate_hz",), ()), ()
 
 
 def _truth(root: Path, frames_ns: Stamps, options: ReadOptions) -> tuple[Trajectory | None, Notes]:
@@ -251,9 +247,8 @@ def _write_truth(source: ExportSource, T_base_body: Array, mav: Path) -> list[st
     if source.twist is None:
         notes.append("No velocities were recorded, so the truth's rows end after the pose.")
     else:
-        columns.append(point_velocity(source.truth, source.twist, T_base_body[:3, 3]))
         bias, said = _biases(source)
-        columns += bias
+        columns = [point_velocity(source.truth, source.twist, T_base_body[:3, 3]), *bias]
         notes.append(said)
     truth = source.truth.of_mounted(T_base_body)
     state = mav / "state_groundtruth_estimate0"

@@ -151,8 +151,7 @@ def _test(views: Views, expected: Trajectory | None, form: str, folder: Path) ->
 
 
 def _chain_rig(path: Path, imu: ImuCalibration | None) -> Rig:
-    rig = kalibr.read_camchain(path)
-    return replace(rig, imu=replace(imu, T_body_imu=np.eye(4))) if imu else rig
+    return replace(kalibr.read_camchain(path), imu=imu and replace(imu, T_body_imu=np.eye(4)))
 
 
 def _expected_path(source: ExportSource, rig: Rig, stamps: Stamps, layout: Writing) -> Trajectory | None:

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -46,17 +47,11 @@ class Values:
 
     def text(self, *keys: str) -> str:
         """A text. Raises InputError."""
-        found = self.at(*keys)
-        if not isinstance(found, str):
-            raise self._wrong(keys, "text", found)
-        return found
+        return str(self._checked(keys, "text", lambda found: isinstance(found, str)))
 
     def number(self, *keys: str) -> float:
         """A finite number. Raises InputError."""
-        found = self.at(*keys)
-        if not _is_number(found):
-            raise self._wrong(keys, "a finite number", found)
-        return float(found)
+        return float(self._checked(keys, "a finite number", _is_number))
 
     def positive(self, *keys: str, or_zero: bool = False) -> float:
         """A finite number above 0, or from 0 on. Raises InputError."""
@@ -67,9 +62,8 @@ class Values:
 
     def numbers(self, *keys: str) -> list[float]:
         """A list of finite numbers. Raises InputError."""
-        found = self.at(*keys)
-        if not isinstance(found, list) or not all(map(_is_number, found)):
-            raise self._wrong(keys, "a list of finite numbers", found)
+        wanted = "a list of finite numbers"
+        found = self._checked(keys, wanted, lambda found: isinstance(found, list) and all(map(_is_number, found)))
         return [float(value) for value in found]
 
     def size(self, *keys: str) -> tuple[int, int]:
@@ -91,6 +85,12 @@ class Values:
         if not se3.is_rotation(T[:3, :3], tolerance=SKEW_TOLERANCE) or T[3].tolist() != [0, 0, 0, 1]:
             raise self._wrong(keys, "a rigid transform with the last row 0 0 0 1", T.tolist())
         return se3.transform(se3.nearest_rotation(T[:3, :3]), T[:3, 3])
+
+    def _checked(self, keys: tuple[str, ...], wanted: str, is_right: Callable[[Any], bool]) -> Any:
+        found = self.at(*keys)
+        if not is_right(found):
+            raise self._wrong(keys, wanted, found)
+        return found
 
     def _find(self, keys: tuple[str, ...]) -> Any:
         tree = self.tree

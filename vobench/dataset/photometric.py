@@ -88,18 +88,14 @@ def write_photometric(source: ExportSource, views: Views, stamps: Stamps, folder
         cam.mkdir(parents=True)
         texts = {"times.txt": times, "camera.txt": lenses[index]}
         if photometry:
-            texts["pcalib.txt"] = inverse_response(photometry.response)
+            signals_dn = linear_of_grey(photometry.response) * FULL_SCALE_DN  # of all grey values, from 0 to 255
+            texts["pcalib.txt"] = " ".join(map(repr, signals_dn.tolist())) + "\n"
             shade = passed(views.rays_of(side, source.true_rig.camera(side)), photometry)
             write_png(cam / "vignette.png", np.rint(shade / shade.max() * WHITE_16).astype(np.uint16))
         for name, text in texts.items():
             if text:
                 (cam / name).write_text(text, encoding="utf-8")
     return notes
-
-
-def inverse_response(response: Response) -> str:
-    """pcalib.txt: the signals of all grey values in one row, from 0 to 255."""
-    return " ".join(map(repr, (linear_of_grey(response) * FULL_SCALE_DN).tolist())) + "\n"
 
 
 def passed(rays: Array, photometry: Photometry) -> Array:

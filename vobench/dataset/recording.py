@@ -103,10 +103,6 @@ class PictureStream:
                     f"but the calibration is for {camera.width_px} x {camera.height_px}: {calibration}"
                 )
 
-    def notes(self) -> Notes:
-        """What is done to make the pictures 8-bit grey."""
-        return tuple(dict.fromkeys(sentence for kind in self.kinds for sentence in conversions(kind)))
-
     def frames(self) -> Iterator[StereoFrame]:
         """The pictures, 8-bit grey. Raises InputError, naming the file, for one that is not as the first."""
         for index, shot in enumerate(self.shots()):
@@ -260,7 +256,8 @@ def assemble(
 ) -> Recording:
     """A recording at stamps t_ns (N,) by the rig of the file `calibration`. Raises InputError where they do not fit."""
     stream.require(rig, calibration)
-    said = [*notes, *_pair_notes(rig, calibration), *stream.notes()]
+    converted = [sentence for kind in stream.kinds for sentence in conversions(kind)]
+    said = [*notes, *_pair_notes(rig, calibration), *converted]
     if truth is None:
         said.append(NO_TRUTH)
     else:
@@ -273,14 +270,13 @@ def assemble(
         rig = replace(rig, imu=None)
     streams = [(t_ns, "picture"), *([(truth.t_ns, "true pose")] if truth else [])]
     streams += [(imu.t_ns, "IMU reading")] if imu and len(imu.t_ns) else []
-    starts = [_span(*stream) for stream in streams]
     return Recording(
         form=form,
         rig=rig,
         frames=stream.frames,
         encoded_frames=stream.encoded_frames,
         t_ns=t_ns,
-        start_ns=min(starts),
+        start_ns=min(_span(*stamps) for stamps in streams),
         truth=truth,
         imu=imu,
         notes=tuple(dict.fromkeys(said)),

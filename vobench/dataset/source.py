@@ -236,16 +236,12 @@ def check_rig(what: str, expected: Rig, found: Rig, *, tolerance_px: float = PIX
             f"and {tolerance_px:g} px would be right"
         )
     if expected.imu and found.imu:
-        off = _pose_difference(_T_left_imu(expected), _T_left_imu(found))
+        mounts = ((expected, expected.imu), (found, found.imu))
+        off = _pose_difference(*(se3.inverse(rig.T_body_left) @ imu.T_body_imu for rig, imu in mounts))
         if not off < POSE_TOLERANCE:
             raise SequenceError(
                 f"{what} puts the IMU {off:.3g} beside its place, and {POSE_TOLERANCE:g} would be right"
             )
-
-
-def _T_left_imu(rig: Rig) -> Array:
-    T_body_imu = rig.imu.T_body_imu if rig.imu else np.eye(4)
-    return se3.inverse(rig.T_body_left) @ T_body_imu
 
 
 def check_path(what: str, expected: Trajectory, found: Trajectory) -> None:

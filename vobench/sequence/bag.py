@@ -330,7 +330,8 @@ class Bag:
 
     def count(self, topic: Topic) -> int:
         """How many messages a topic has; none where there is no such topic."""
-        return self._total(self._channel(topic))
+        channel = self._channel(topic)
+        return sum(counts.get(channel, 0) for counts in self.counts)
 
     def raw(self, topics: Iterable[Topic]) -> Iterator[tuple[Topic, memoryview]]:
         """The serialised messages of those topics that there are, in order of time, one chunk in memory at a time."""
@@ -421,6 +422,3 @@ class Bag:
             kinds = " and ".join(sorted(types)) or "of no type" if len(found) == 1 else f"{len(found)} channels"
             raise SequenceError(f"{topic.name} should be {topic.type_name} but is {kinds} in {self.path}")
         return found[0].id if found else NO_CHANNEL
-
-    def _total(self, channel: int) -> int:
-        return sum(counts.get(channel, 0) for counts in self.counts)

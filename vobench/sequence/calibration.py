@@ -22,33 +22,27 @@ def write_mounts(bag: BagWriter, rig: Rig, t_ns: int) -> None:
         bag.note(WHEELS_NOTE, {**lengths, "ticks_per_revolution": str(wheels.ticks_per_revolution)})
     if rig.imu:
         bag.note(IMU_NOTE, {name: repr(float(getattr(rig.imu, name))) for name in IMU_NUMBERS})
-    bag.write(ros.TF_STATIC, t_ns, serialise(ros.transforms(t_ns, ros.BODY, _mounts(rig))))
+    T_body = dict(zip((ros.LEFT, ros.RIGHT), (rig.T_body_camera(side) for side in rig.sides), strict=False))
+    if rig.imu:
+        T_body[ros.IMU_FRAME] = rig.imu.T_body_imu
+    bag.write(ros.TF_STATIC, t_ns, serialise(ros.transforms(t_ns, ros.BODY, T_body)))
 
 
 def read_rig(bag: Bag, info_topics: Sequence[ros.Topic]) -> Rig:
     """The rig of a bag, its left and right camera by their topics. Raises SequenceError where that is wrong."""
     bag.require((ros.TF_STATIC, *info_topics[:1]))
     cameras = [ros.camera(_first(bag, topic)) for topic in info_topics if bag.has(topic)]
-    T_body = _read_mounts(bag)
+    stamped = _first(bag, ros.TF_STATIC).transforms
+    T_body = {t.child_frame_id: ros.poses(ros.pose_fields(t.transform)) for t in stamped}
     left, right = cameras[0], cameras[1] if len(cameras) > 1 else None
     T_body_right = _mount(bag, T_body, ros.RIGHT) if right else None
     return Rig(left, right, _mount(bag, T_body, ros.LEFT), T_body_right, _read_wheels(bag), _read_imu(bag, T_body))
-
-
-def _mounts(rig: Rig) -> dict[str, Array]:
-    T_body = dict(zip((ros.LEFT, ros.RIGHT), (rig.T_body_camera(side) for side in rig.sides), strict=False))
-    return {**T_body, ros.IMU_FRAME: rig.imu.T_body_imu} if rig.imu else T_body
 
 
 def _first(bag: Bag, topic: ros.Topic) -> Any:
     for _, message in bag.messages((topic,)):
         return message
     raise SequenceError(f"{topic.name} has no message in {bag.path}")
-
-
-def _read_mounts(bag: Bag) -> dict[str, Array]:
-    stamped = _first(bag, ros.TF_STATIC).transforms
-    return {t.child_frame_id: ros.poses(ros.pose_fields(t.transform)) for t in stamped}
 
 
 def _mount(bag: Bag, T_body: dict[str, Array], frame: str) -> Array:

@@ -29,7 +29,6 @@ POSES = {
 }
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 NORM_TOLERANCE = 1e-3
-PACKINGS = ("zstd", "lz4")
 
 
 def is_recording(path: Path) -> bool:
@@ -74,7 +73,7 @@ def _suffix(path: Path) -> str | None:
 def opened(path: Path) -> Iterator[AnyReader]:
     """A reader of any recording; rosbags goes by endings, so the file gets one. Its errors become SequenceError."""
     # rosbags looks at the size of a chunk after it has unpacked it: a few kB can make many GB.
-    DECOMPRESSORS.update({packing: partial(unpack, packing) for packing in PACKINGS})
+    DECOMPRESSORS.update({packing: partial(unpack, packing) for packing in ("zstd", "lz4")})
     folder = Path(mkdtemp(prefix="vobench-bag-"))
     with stop.undone(lambda: stop.remove(folder)):
         link = path
