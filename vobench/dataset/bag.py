@@ -29,17 +29,8 @@ from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import messages as ros
 from vobench.sequence.bag import MAGIC, Bag
-from vobench.sequence.calibration import IMU_NOTE, WHEELS_NOTE
 from vobench.sequence.messages import TYPES
 from vobench.sequence.recording import MAGICS, METADATA, opened, read_first_poses
-from vobench.sequence.writer import (
-    CASE_ATTACHMENT,
-    IMPORT_NOTE,
-    NAMES_ATTACHMENT,
-    PROVENANCE_NOTE,
-    SENSORS_FILE,
-    TRUTH_FILE,
-)
 from vobench.trajectory.trajectory import Stamps
 
 # Channels and bytes of each; where the colours come the wrong way round; what makes mosaics grey.
@@ -67,13 +58,6 @@ def picture(message: Any, name: str) -> Picture:
         return Picture(name, np.asarray(cv2.cvtColor(_pixels(message, name, 1, 1)[..., 0], MOSAICS[encoding])))
     known = ", ".join((*GREY, *COLOURS, *MOSAICS))
     raise InputError(f"the encoding {message.encoding!r} is not read. Known: {known}: {name}")
-
-
-def encoding_note(message: Any) -> tuple[str, ...]:
-    """What `picture` makes of a message, beyond what its kind says."""
-    if getattr(message, "encoding", "").lower() in MOSAICS:
-        return (f"The colour mosaic ({message.encoding}) was turned grey by OpenCV's bilinear interpolation.",)
-    return ()
 
 
 def _pixels(message: Any, name: str, channels: int, size: int) -> NDArray[Any]:
@@ -127,7 +111,9 @@ def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
     imu, imu_calibration, imu_notes = _imu(path, chosen, found, body, options)
     unread = sorted(types.keys() - {*_topics(chosen), ros.TF_STATIC.name, (chosen.truth or "").partition(":")[0]})
     notes = [*chosen.notes, "Stamps are those in the messages' headers.", *pairing, *rig_notes, *imu_notes]
-    notes += encoding_note(found.first[chosen.left])
+    encoding = getattr(found.first[chosen.left], "encoding", "")
+    if encoding.lower() in MOSAICS:
+        notes.append(f"The colour mosaic ({encoding}) was turned grey by OpenCV's bilinear interpolation.")
     if repeats:
         notes.append(f"{repeats} poses of {chosen.truth} repeat a stamp; the first pose of each stamp was kept.")
     if unread:
@@ -308,7 +294,7 @@ VERSION: Final = 8  # of rosbag2's metadata; ROS 2 Iron and later read it
 def write_ros2(source: ExportSource, views: Views, folder: Path) -> list[str]:
     """Write every message of both files, bit for bit, and say what became of the rest."""
     del views  # a bag holds the pictures as they were recorded
-    paths = [path for path in (source.folder / SENSORS_FILE, source.folder / TRUTH_FILE) if path.is_file()]
+    paths = [path for path in (source.folder / ros.SENSORS_FILE, source.folder / ros.TRUTH_FILE) if path.is_file()]
     mounts = [tuple(bytes(data) for _, data in Bag.open(path).raw((ros.TF_STATIC,))) for path in paths]
     folder.rmdir()  # rosbags makes its own
     writer = Writer(folder, version=VERSION, storage_plugin=StoragePlugin.MCAP)
@@ -330,10 +316,10 @@ def _records(paths: list[Path]) -> dict[str, str]:
     records = {}
     for path in paths:
         bag = Bag.open(path)
-        for name in (WHEELS_NOTE, IMU_NOTE, PROVENANCE_NOTE, IMPORT_NOTE):
+        for name in (ros.WHEELS_NOTE, ros.IMU_NOTE, ros.PROVENANCE_NOTE, ros.IMPORT_NOTE):
             if entries := bag.note(name):
                 records[name] = json.dumps(entries, sort_keys=True)
-        for name in (CASE_ATTACHMENT, NAMES_ATTACHMENT):
+        for name in (ros.CASE_ATTACHMENT, ros.NAMES_ATTACHMENT):
             if bag.has_attachment(name):
                 records[name] = bag.attachment(name).decode()
     return records
@@ -368,7 +354,7 @@ def _name(connection: Connection, reader: AnyReader, *, true_mounts_differ: bool
 def _begins(path: Path, suffix: str) -> bool:
     """Whether a file begins as those of an ending do; a sensors.mcap is a sequence of our own."""
     magic = next(magic for magic, known in MAGICS.items() if known == suffix)
-    return path.name != SENSORS_FILE and head(path).startswith(magic)
+    return path.name != ros.SENSORS_FILE and head(path).startswith(magic)
 
 
 HEEDS = frozenset({"calibration", "imu", "within_ns", "topics"})

@@ -16,7 +16,7 @@ from vobench.dataset.picture import require_free
 from vobench.dataset.recording import cut_to
 from vobench.dataset.source import PNG, ExportSource, Views, check_path, check_rig, open_source
 from vobench.errors import InputError, SequenceError, unknown
-from vobench.geometry.rig import ImuCalibration, Rig
+from vobench.geometry.rig import Rig
 from vobench.trajectory.formats import format_euroc, format_kitti, format_times, format_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
@@ -142,16 +142,13 @@ def _test(views: Views, expected: Trajectory | None, form: str, folder: Path) ->
     found = read(folder, form=form)
     check_rig(f"the {form} folder, read back,", views.rig, found.rig)
     if (folder / CHAIN).is_file():
-        check_rig(f"{CHAIN}, read back,", views.rig, _chain_rig(folder / CHAIN, views.rig.imu))
+        imu = views.rig.imu and replace(views.rig.imu, T_body_imu=np.eye(4))  # where there is one, the chain's body
+        check_rig(f"{CHAIN}, read back,", views.rig, replace(kalibr.read_camchain(folder / CHAIN), imu=imu))
     path = found.truth
     if expected is not None and path is not None:
         check_path(f"the {form} folder, read back,", expected, path.of_mounted(found.rig.T_body_left))
     elif expected is not None or path is not None:
         raise SequenceError(f"the {form} folder, read back, {'has no truth any more' if expected else 'has a truth'}")
-
-
-def _chain_rig(path: Path, imu: ImuCalibration | None) -> Rig:
-    return replace(kalibr.read_camchain(path), imu=imu and replace(imu, T_body_imu=np.eye(4)))
 
 
 def _expected_path(source: ExportSource, rig: Rig, stamps: Stamps, layout: Writing) -> Trajectory | None:

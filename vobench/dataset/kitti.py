@@ -139,12 +139,8 @@ def kitti_path(truth: Trajectory, rig: Rig, stamps: Stamps) -> Trajectory | None
 def _calibration(rig: Rig) -> str:
     """P0 and P1, each (3, 4) in a row: what sends points in the left camera's axes to pixels."""
     shifts_m = [0.0, rig.baseline_m] if rig.right else [0.0]
-    matrices = [projection(rig.left.K, shift_m) for shift_m in shifts_m]
-    return "".join(f"P{index}: {_row(P)}\n" for index, P in enumerate(matrices))
-
-
-def _row(values: Array) -> str:
-    return " ".join(repr(value + 0.0) for value in values.ravel().tolist())  # no -0.0
+    rows = [(projection(rig.left.K, shift_m) + 0.0).ravel().tolist() for shift_m in shifts_m]  # no -0.0
+    return "".join(f"P{index}: {' '.join(map(repr, row))}\n" for index, row in enumerate(rows))
 
 
 def _picture_notes(source: ExportSource, views: Views) -> list[str]:

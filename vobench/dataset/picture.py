@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.errors import InputError
-from vobench.sequence.picture import header
+from vobench.sequence.picture import Image, header
 from vobench.trajectory.formats import LFS_POINTER
 
 MOST_NAME = 1024  # characters of a file's name in a list, folders and all
@@ -88,7 +88,6 @@ def unread(folder: Path, *used: str) -> tuple[str, ...]:
     return (f"Not read: {some}.",) if others else ()
 
 
-Image = NDArray[np.uint8]
 Form = Literal["png", "jpeg", "pixels"]
 PNG, JPEG, JPEG_END = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\xff\xd9"
 MOST_PIXELS = 1 << 26  # 67 megapixels; a header that asks for more is a mistake or a trap

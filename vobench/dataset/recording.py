@@ -181,8 +181,8 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
             f"{len(parsed.T)} poses without stamps for {len(frames_ns)} pictures: give one pose a picture, or each "
             f"row its picture's number, from 0, as a first of 13 columns: {path}"
         )
-    T, off = parsed.T, _skew(parsed.T)
-    notes = list(parsed.notes)
+    T, notes = parsed.T, list(parsed.notes)
+    off = np.abs(np.swapaxes(T[:, :3, :3], -1, -2) @ T[:, :3, :3] - np.eye(3)).max(initial=0.0)
     if parsed.frames is not None:
         notes.append(f"{path.name} has poses of {len(T)} of {len(frames_ns)} pictures, by their numbers.")
     if off > EXACT:
@@ -232,11 +232,6 @@ def apart(what: str, t_ns: Stamps, frames_ns: Stamps) -> str:
     """The sentence on truth or readings whose time is not the pictures'."""
     when = f" ({t_ns[0]} to {t_ns[-1]} ns)" if len(t_ns) else ""
     return f"The {what}{when} was dropped: it shares no time with the pictures ({frames_ns[0]} to {frames_ns[-1]} ns)."
-
-
-def _skew(T: np.ndarray) -> float:
-    R = T[:, :3, :3]
-    return float(np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0))
 
 
 LEAST_BASELINE_M = 1e-6

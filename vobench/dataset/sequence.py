@@ -12,7 +12,7 @@ from vobench.errors import InputError
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import Sequence, SequenceWriter, has_truth, read_truth
 from vobench.sequence.bag import part_of
-from vobench.sequence.writer import SENSORS_FILE
+from vobench.sequence.messages import SENSORS_FILE
 
 
 def is_sequence(path: Path) -> bool:

@@ -11,7 +11,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.errors import SequenceError
 from vobench.geometry import se3
@@ -30,10 +29,9 @@ from vobench.sequence import (
     read_twist,
     truth_channels,
 )
-from vobench.sequence.picture import decode, encode
+from vobench.sequence.picture import Image, decode, encode
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
-Grey = NDArray[np.uint8]
 FAR_PX = 30_000.0  # outside of any picture that OpenCV resamples, which takes NaN for any place
 PIXEL_TOLERANCE = 1e-6
 POSE_TOLERANCE = 1e-9  # metres, and entries of rotations
@@ -53,7 +51,7 @@ class Views:
         pixels = self.source_px[side] if self.source_px else camera.pixel_grid()
         return camera.rays(pixels)
 
-    def show(self, side: Side, picture: Grey) -> Grey:
+    def show(self, side: Side, picture: Image) -> Image:
         """A recorded picture in this view: linear between its pixels, black where it shows nothing."""
         if self.source_px is None:
             return picture

@@ -1,6 +1,5 @@
 """Recordings in TartanAir's two layouts: simulated pinholes without stamps, axes north-east-down."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,38 +21,30 @@ FLIP = se3.transform(np.diag([1.0, -1.0, -1.0]), np.zeros(3))  # ahead-right-dow
 TRUTH = "of the left camera; world and body were turned from x ahead, y right, z down (NED) to x ahead, y left, z up."
 
 
-@dataclass(frozen=True, slots=True)
-class Names:
-    """What the layout calls its parts."""
-
-    left: str
-    right: str
-    poses: str
-
-
-VERSIONS = (
-    Names("image_left", "image_right", "pose_left.txt"),
-    Names("image_lcam_front", "image_rcam_front", "pose_lcam_front.txt"),
+VERSIONS = (  # what they call the left pictures, the right ones and the poses
+    ("image_left", "image_right", "pose_left.txt"),
+    ("image_lcam_front", "image_rcam_front", "pose_lcam_front.txt"),
 )
 
 
 def read_tartanair(folder: Path, options: ReadOptions) -> Recording:
     """A folder such as P000; the body is the left camera, its axes ahead, left, up. Raises InputError."""
-    names = next((names for names in VERSIONS if (folder / names.left).is_dir()), None)
+    names = next((names for names in VERSIONS if (folder / names[0]).is_dir()), None)
     if names is None:
-        raise InputError(f"no folder {' or '.join(names.left for names in VERSIONS)} with pictures in {folder}")
-    eyes = numbered(*(folder / name for name in (names.left, names.right) if (folder / name).is_dir()))
+        raise InputError(f"no folder {' or '.join(left for left, _, _ in VERSIONS)} with pictures in {folder}")
+    *sides, poses = names
+    eyes = numbered(*(folder / name for name in sides if (folder / name).is_dir()))
     rate_hz = RATE_HZ if options.rate_hz is None else options.rate_hz
     if not 0 < rate_hz <= MOST_HZ:
         raise InputError(f"rate_hz should be above 0 and at most {MOST_HZ:g}, got {rate_hz:g}")
     t_ns = np.array([round(index * 1e9 / rate_hz) for index in range(len(eyes[0]))], np.int64)
     stream = picture_files(t_ns, *eyes)
     rig, calibration, lens_notes = _rig(folder, stream.size_px, len(eyes), options)
-    truth, truth_notes = truth_file(options, [folder / names.poses], t_ns, TRUTH, FLIP)
+    truth, truth_notes = truth_file(options, [folder / poses], t_ns, TRUTH, FLIP)
     notes = [f"There are no stamps: pictures were taken to come at {rate_hz:g} Hz from 0.", *lens_notes, *truth_notes]
-    notes += unread(folder, names.left, names.right, names.poses)
+    notes += unread(folder, *names)
     if len(eyes) == 1:
-        notes.append(f"There is one camera: no folder {names.right}.")
+        notes.append(f"There is one camera: no folder {sides[1]}.")
     return assemble("tartanair", rig, stream, t_ns, truth=truth, notes=notes, calibration=calibration)
 
 
@@ -79,7 +70,7 @@ LAYOUTS = (
     Layout(
         "tartanair",
         "TartanAir: image_left/ or image_lcam_front/",
-        lambda path: any((path / names.left).is_dir() for names in VERSIONS),
+        lambda path: any((path / left).is_dir() for left, _, _ in VERSIONS),
         read_tartanair,
         frozenset({"calibration", "truth", "rate_hz"}),
     ),

@@ -11,7 +11,6 @@ from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag, BagWriter
 from vobench.sequence.messages import serialise
 
-WHEELS_NOTE, IMU_NOTE = "vobench.wheels", "vobench.imu"
 IMU_NUMBERS = tuple(field.name for field in fields(ImuCalibration) if field.name != "T_body_imu")
 
 
@@ -19,9 +18,9 @@ def write_mounts(bag: BagWriter, rig: Rig, t_ns: int) -> None:
     """Note the wheels and the IMU, and write where everything sits on the body."""
     if wheels := rig.wheels:
         lengths = {"radius_m": repr(float(wheels.radius_m)), "track_m": repr(float(wheels.track_m))}
-        bag.note(WHEELS_NOTE, {**lengths, "ticks_per_revolution": str(wheels.ticks_per_revolution)})
+        bag.note(ros.WHEELS_NOTE, {**lengths, "ticks_per_revolution": str(wheels.ticks_per_revolution)})
     if rig.imu:
-        bag.note(IMU_NOTE, {name: repr(float(getattr(rig.imu, name))) for name in IMU_NUMBERS})
+        bag.note(ros.IMU_NOTE, {name: repr(float(getattr(rig.imu, name))) for name in IMU_NUMBERS})
     T_body = dict(zip((ros.LEFT, ros.RIGHT), (rig.T_body_camera(side) for side in rig.sides), strict=False))
     if rig.imu:
         T_body[ros.IMU_FRAME] = rig.imu.T_body_imu
@@ -52,7 +51,7 @@ def _mount(bag: Bag, T_body: dict[str, Array], frame: str) -> Array:
 
 
 def _read_wheels(bag: Bag) -> WheelGeometry | None:
-    entries = bag.note(WHEELS_NOTE)
+    entries = bag.note(ros.WHEELS_NOTE)
     if not entries:
         return None
     try:
@@ -65,7 +64,7 @@ def _read_wheels(bag: Bag) -> WheelGeometry | None:
 
 
 def _read_imu(bag: Bag, T_body: dict[str, Array]) -> ImuCalibration | None:
-    entries = bag.note(IMU_NOTE)
+    entries = bag.note(ros.IMU_NOTE)
     if not entries:
         return None
     try:

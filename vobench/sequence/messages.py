@@ -1,4 +1,4 @@
-"""ROS 2 messages and topics of a sequence, and their CDR form."""
+"""Files, notes, topics and ROS 2 messages of a sequence, and their CDR form."""
 
 import struct
 from dataclasses import dataclass
@@ -24,6 +24,10 @@ from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 
 WORLD, BODY, LEFT, RIGHT, IMU_FRAME = "map", "base_link", "cam_left", "cam_right", "imu"
+SENSORS_FILE, TRUTH_FILE = "sensors.mcap", "truth.mcap"
+CASE_ATTACHMENT, NAMES_ATTACHMENT = "case.json", "truth_names.json"
+PROVENANCE_NOTE, IMPORT_NOTE = "vobench.provenance", "vobench.import"
+WHEELS_NOTE, IMU_NOTE = "vobench.wheels", "vobench.imu"
 NS_PER_S = 1_000_000_000
 END_OF_STAMPS_NS = 2**31 * NS_PER_S  # ROS counts seconds in 31 bits
 UNKNOWN = -1.0  # in the first element of a covariance: "there is no estimate of this", says sensor_msgs/Imu

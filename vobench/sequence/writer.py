@@ -23,9 +23,6 @@ from vobench.sequence.messages import pictured, serialise, stamped
 from vobench.sequence.picture import Image, encode, require_grey
 from vobench.sequence.pixel_truth import check_truth, names_to_json, truth_image, truth_topic, truth_topics
 
-SENSORS_FILE, TRUTH_FILE = "sensors.mcap", "truth.mcap"
-CASE_ATTACHMENT, NAMES_ATTACHMENT = "case.json", "truth_names.json"
-PROVENANCE_NOTE, IMPORT_NOTE = "vobench.provenance", "vobench.import"
 NAMES = (ros.LEFT, ros.RIGHT)
 
 T = TypeVar("T")
@@ -60,17 +57,18 @@ class SequenceWriter:
         self._info = [serialise(info) for info in ros.camera_infos(0, rig)]
         self._form, self._blank = "", [b""]
         folder.mkdir(parents=True, exist_ok=True)
+        sensed = ros.sensor_topics(rig)
         topics = (*ros.truth_topics(self._true_rig), *truth_topics(self._channels, self._true_rig.sides))
         with ExitStack() as stack:
             # What is entered first ends last: where there are sensors, the truth is whole.
-            self._sensors = stack.enter_context(BagWriter(folder / SENSORS_FILE, ros.sensor_topics(rig), encoded=True))
-            self._truth = stack.enter_context(BagWriter(folder / TRUTH_FILE, topics, encoded=False))
+            self._sensors = stack.enter_context(BagWriter(folder / ros.SENSORS_FILE, sensed, encoded=True))
+            self._truth = stack.enter_context(BagWriter(folder / ros.TRUTH_FILE, topics, encoded=False))
             if case_json is not None:
-                self._truth.attach(CASE_ATTACHMENT, "application/json", case_json)
+                self._truth.attach(ros.CASE_ATTACHMENT, "application/json", case_json)
             if self._channels:
                 names = names_to_json(truth_names or TruthNames())
-                self._truth.attach(NAMES_ATTACHMENT, "application/json", names)
-            for name, entries in ((PROVENANCE_NOTE, provenance), (IMPORT_NOTE, notes)):
+                self._truth.attach(ros.NAMES_ATTACHMENT, "application/json", names)
+            for name, entries in ((ros.PROVENANCE_NOTE, provenance), (ros.IMPORT_NOTE, notes)):
                 if entries:
                     self._truth.note(name, entries)
             self._write_rigs(start_ns)
