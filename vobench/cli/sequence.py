@@ -1,6 +1,6 @@
 """vobench import, export and info."""
 
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,7 +11,6 @@ from vobench.cli import terminal
 from vobench.dataset.picture import require_free
 from vobench.dataset.recording import ReadOptions, Topics
 from vobench.errors import InputError, UnknownNameError, unknown
-from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.run.store import unfinished
 from vobench.sequence.recording import is_recording, topic_facts
@@ -72,18 +71,13 @@ def _files(path: Path, form: str) -> dict[str, list[dict[str, Any]]]:
 
 
 def _calibration(rig: Rig) -> dict[str, Any]:
-    cameras: dict[str, Any] = {side: _camera(rig.camera(side)) for side in rig.sides}
+    cameras: dict[str, Any] = {side: rig.camera(side) for side in rig.sides}
     return {
-        **cameras,
+        **{side: {"model": type(camera).__name__, **asdict(camera)} for side, camera in cameras.items()},
         "baseline_m": rig.baseline_m if rig.right else None,
         "imu_rate_hz": rig.imu.rate_hz if rig.imu else None,
         "wheels": asdict(rig.wheels) if rig.wheels else None,
     }
-
-
-def _camera(camera: Camera) -> dict[str, Any]:
-    numbers = {field.name: getattr(camera, field.name) for field in fields(camera)}  # type: ignore[arg-type]
-    return {"model": type(camera).__name__, **numbers}
 
 
 def _truth(truth: Trajectory | None) -> dict[str, Any] | None:

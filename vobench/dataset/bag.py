@@ -17,7 +17,7 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, ReaderError, StoragePlugin, Writer
 
-from vobench.dataset.bag_rig import Chosen, Info, Tree, between, choose, info_rig, is_rectified, plain, tree_of
+from vobench.dataset.bag_rig import Chosen, Info, Tree, between, choose, info_rig, plain, tree_of
 from vobench.dataset.kalibr import chain_rig, find_imu, read_imu, read_yaml
 from vobench.dataset.layout import Layout, Writing, head
 from vobench.dataset.picture import Picture, require_themselves
@@ -261,7 +261,9 @@ def _rig(path: Path, chosen: Chosen, found: Contents, body: str | None, options:
                 raise InputError(
                     f"no camera_info for {topic}: name its topic or a camchain.yaml of Kalibr's for {path}"
                 )
-            eyes.append((Info(info, found.first[info], is_rectified(topic)), _frame(found.first[topic])))
+            eyes.append(
+                (Info(info, found.first[info], "rect" in topic.replace("unrect", "")), _frame(found.first[topic]))
+            )
     rig, notes = info_rig(eyes, found.tree, body)
     if any(info.rectified for info, _ in eyes):
         notes = (*notes, "The topics say that the pictures are rectified: the calibration is their matrix P.")

@@ -166,11 +166,6 @@ def plain(frame: str) -> str:
     return frame.lstrip("/")
 
 
-def is_rectified(topic: str) -> bool:
-    """Whether a topic's name says that its pictures are rectified."""
-    return "rect" in topic.replace("unrect", "")
-
-
 @dataclass(frozen=True, slots=True)
 class Info:
     """What a CameraInfo says, by the names that ROS 1 and ROS 2 share when small."""

@@ -3,7 +3,7 @@
 A layout is one module of this room with LAYOUTS, or an entry point of the group `vobench.datasets` that is a Layout.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import import_module
@@ -139,18 +139,14 @@ def _packed(start: bytes) -> str | None:
 
 def _below(folder: Path) -> list[str]:
     """Recordings one or two levels down, a few of them, as `name (form)`."""
+    first = [folder / name for name in listed(folder)[:MOST_LOOKED_AT]]
+    second = [inner / name for inner in first if inner.is_dir() for name in listed(inner)[:MOST_LOOKED_AT]]
     found: dict[Path, str] = {}
-    for path in _levels_below(folder):
+    for path in [path for path in (*first, *second) if path.exists()][:MOST_LOOKED_AT]:
         if not found.keys() & {path.parent} and (names := _told(path)):
             found[path] = f"{path.relative_to(folder)} ({names[0]})"
     some = list(found.values())
     return some[:5] + ([f"{len(some) - 5} more"] if len(some) > 5 else [])
-
-
-def _levels_below(folder: Path) -> Iterator[Path]:
-    first = [folder / name for name in listed(folder)[:MOST_LOOKED_AT]]
-    second = [inner / name for inner in first if inner.is_dir() for name in listed(inner)[:MOST_LOOKED_AT]]
-    yield from [path for path in (*first, *second) if path.exists()][:MOST_LOOKED_AT]
 
 
 def read(path: Path, *, form: str | None = None, options: ReadOptions | None = None) -> Recording:

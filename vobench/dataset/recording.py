@@ -132,14 +132,11 @@ NO_TRUTH = "There is no ground truth."
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A recording of any form, its pictures not yet read: `frames` reads and checks them one at a time.
+    """A recording of any form, all pictures unread: `frames` reads and checks them, `encoded_frames` keeps grey files.
 
-    `encoded_frames` are the same as files, untouched where they were 8-bit grey PNG or JPEG.
-
-    `t_ns` (N,) are the pictures' stamps. `truth` is the path of the body in its world, at stamps of its own;
-    exposures are their stamps (N,) and times in s and gains in dB (N, 2), encoders their stamps (M,) and counts
-    (M, 2). None stands for what there is not.
-    `notes` are sentences: everything assumed, converted or dropped.
+    `t_ns` (N,) are the pictures' stamps; `truth` is the path of the body in its world. Exposures are their stamps (N,)
+    and times in s and gains in dB (N, 2), encoders their stamps (M,) and counts (M, 2); None stands for what there is
+    not. `notes` are sentences: everything assumed, converted or dropped.
     """
 
     form: str

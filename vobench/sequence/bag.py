@@ -249,6 +249,10 @@ def messages_in(chunk: Chunk, channels: Container[int]) -> Iterator[tuple[int, i
     raise ValueError(f"{MAX_RECORDS} records and more lie in one chunk")
 
 
+def _messages(stream: BinaryIO, chunk: ChunkIndex, channels: Container[int]) -> Iterator[tuple[int, int, memoryview]]:
+    return messages_in(read_record(stream, chunk.chunk_start_offset, Chunk), channels)
+
+
 def read_record(stream: BinaryIO, offset: int, kind: type[Record]) -> Record:
     """The record of a kind that begins at a place. Raises ValueError where there is none."""
     stream.seek(offset)
@@ -339,7 +343,7 @@ class Bag:
         last_ns = 0
         with parsing(self.path), BoundedFile(self.path) as stream:
             for chunk, counts in zip(self.summary.chunk_indexes, self.counts, strict=True):
-                for channel, log_ns, data in self._messages(stream, chunk, there) if there.keys() & counts else ():
+                for channel, log_ns, data in _messages(stream, chunk, there) if there.keys() & counts else ():
                     if log_ns < last_ns:
                         raise ValueError(f"after {last_ns} ns comes {log_ns} ns")
                     last_ns = log_ns
@@ -357,7 +361,7 @@ class Bag:
         with parsing(self.path), BoundedFile(self.path) as stream:
             for chunk, counts in zip(self.summary.chunk_indexes, self.counts, strict=True):
                 if 0 <= skipped < counts.get(channel, 0):
-                    for _, _, data in islice(self._messages(stream, chunk, {channel}), skipped, None):
+                    for _, _, data in islice(_messages(stream, chunk, {channel}), skipped, None):
                         return data
                     raise ValueError(f"a chunk has {skipped} messages of {topic.name} where the index has more")
                 skipped -= counts.get(channel, 0)
@@ -409,11 +413,6 @@ class Bag:
             if stated and stated != tested:
                 raise ValueError(f"the checksum of the attachment {name!r} differs from its content")
             return data
-
-    def _messages(
-        self, stream: BinaryIO, chunk: ChunkIndex, channels: Container[int]
-    ) -> Iterator[tuple[int, int, memoryview]]:
-        return messages_in(read_record(stream, chunk.chunk_start_offset, Chunk), channels)
 
     def _channel(self, topic: Topic) -> int:
         found = [channel for channel in self.summary.channels.values() if channel.topic == topic.name]
