@@ -256,14 +256,12 @@ def _rig(path: Path, chosen: Chosen, found: Contents, body: str | None, options:
         return rig, str(options.calibration), (said, *notes[1:])
     eyes = []
     for topic, info in ((chosen.left, chosen.left_info), (chosen.right, chosen.right_info)):
-        if topic is not None:
-            if info is None or info not in found.first:
-                raise InputError(
-                    f"no camera_info for {topic}: name its topic or a camchain.yaml of Kalibr's for {path}"
-                )
-            eyes.append(
-                (Info(info, found.first[info], "rect" in topic.replace("unrect", "")), _frame(found.first[topic]))
-            )
+        if topic is None:
+            continue
+        if info is None or info not in found.first:
+            raise InputError(f"no camera_info for {topic}: name its topic or a camchain.yaml of Kalibr's for {path}")
+        is_rectified = "rect" in topic.replace("unrect", "")
+        eyes.append((Info(info, found.first[info], is_rectified), _frame(found.first[topic])))
     rig, notes = info_rig(eyes, found.tree, body)
     if any(info.rectified for info, _ in eyes):
         notes = (*notes, "The topics say that the pictures are rectified: the calibration is their matrix P.")
