@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vobench.dataset.euroc import read_imu_csv, sensor_camera, sensor_imu
-from vobench.dataset.kalibr import read_camchain, read_imu, read_yaml
+from vobench.dataset.euroc import read_imu_csv, sensor_camera
+from vobench.dataset.kalibr import imu_numbers, read_camchain, read_imu, read_yaml
 from vobench.dataset.kitti import read_calibration
 from vobench.dataset.picture import read_text
 from vobench.dataset.recording import read_list, read_truth_file
@@ -196,7 +196,7 @@ def test_calibrations(tmp_path, data):
     path = tmp_path / "any.yaml"
     for read in (
         lambda p: sensor_camera(read_yaml(p)),
-        lambda p: sensor_imu(read_yaml(p)),
+        lambda p: (values := read_yaml(p)) and imu_numbers(values, values.transform("T_BS"), ("rate_hz",), ()),
         read_camchain,
         lambda p: read_imu(p, np.eye(4)),
     ):

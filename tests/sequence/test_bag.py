@@ -188,7 +188,9 @@ def write_foreign(path, count=30, **options):
         schema = writer.register_schema(ros.ENCODERS.type_name, "ros2msg", b"")
         channels = [writer.register_channel(name, "cdr", schema) for name in (ros.ENCODERS.name, "/other")]
         for t_ns in range(count):
-            writer.add_message(channels[t_ns % 2], t_ns, serialise(ros.wheel_ticks(t_ns, t_ns, -t_ns)), t_ns)
+            writer.add_message(
+                channels[t_ns % 2], t_ns, serialise(ros.message(ros.ENCODERS, t_ns, ros.BODY, t_ns, -t_ns)), t_ns
+            )
         writer.finish()
     return path
 
@@ -197,7 +199,7 @@ def write_foreign(path, count=30, **options):
 def test_every_packing_is_read(tmp_path, packing):
     bag = Bag.open(write_foreign(tmp_path / "a", compression=packing))
     assert [m.left for _, m in bag.messages([ros.ENCODERS])] == list(range(0, 30, 2))
-    messages = [serialise(ros.wheel_ticks(2 * n, 2 * n, -2 * n)) for n in range(15)]
+    messages = [serialise(ros.message(ros.ENCODERS, 2 * n, ros.BODY, 2 * n, -2 * n)) for n in range(15)]
     assert [bytes(bag.nth(ros.ENCODERS, n)) for n in (0, 7, 14)] == [messages[n] for n in (0, 7, 14)]
 
 
@@ -218,7 +220,7 @@ def test_messages_that_fall_back_in_time_are_refused_when_they_come(tmp_path):
             ros.ENCODERS.name, "cdr", writer.register_schema(ros.ENCODERS.type_name, "ros2msg", b"")
         )
         for t_ns in (5, 4):
-            writer.add_message(channel, t_ns, serialise(ros.wheel_ticks(t_ns, 0, 0)), t_ns)
+            writer.add_message(channel, t_ns, serialise(ros.message(ros.ENCODERS, t_ns, ros.BODY, 0, 0)), t_ns)
         writer.finish()
     messages = Bag.open(tmp_path / "a").raw([ros.ENCODERS])
     next(messages)

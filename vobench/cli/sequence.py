@@ -1,7 +1,6 @@
 """vobench import, export and info."""
 
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,25 +11,12 @@ from vobench.cli import terminal
 from vobench.dataset.picture import require_free
 from vobench.dataset.recording import ReadOptions, Topics
 from vobench.errors import InputError, UnknownNameError, unknown
-from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.run.store import unfinished
-from vobench.sequence.recording import TopicFacts, is_recording, topic_facts
+from vobench.sequence.recording import is_recording, topic_facts
 from vobench.trajectory.trajectory import Trajectory
 
 SENSORS_FILE = "sensors.mcap"
-
-
-def show_export(source: Path, out: Path, *, form: str, as_json: bool) -> None:
-    """Write a sequence in another layout, or a trajectory in another form, and print what was converted or lost."""
-    path = source.parent if source.name == SENSORS_FILE else source
-    notes, files = _trajectory(path, out, form) if path.is_file() else _sequence(path, out, form)
-    if as_json:
-        terminal.print_json({"form": form, "path": str(out), "files": files, "notes": notes})
-        return
-    for note in notes:
-        print(f"- {note}")
-    print(f"{files} {'file' if files == 1 else 'files'} in the form '{form}': {out}")
 
 
 def _sequence(folder: Path, out: Path, form: str) -> tuple[tuple[str, ...], int]:
@@ -67,47 +53,9 @@ def _read(path: Path) -> Trajectory:
 TOPICS = tuple(Topics.__dataclass_fields__)
 
 
-@dataclass(frozen=True, slots=True)
-class Given:
-    """What was said on the command line of a recording."""
-
-    form: str | None = None
-    calibration: Path | None = None
-    imu: Path | None = None
-    truth: Path | None = None
-    rate_hz: float | None = None
-    topics: tuple[str, ...] = ()
-
-    def options(self) -> ReadOptions:
-        """The same as a reader takes it. Raises UnknownNameError for a topic that no reader looks for."""
-        return ReadOptions(self.calibration, self.imu, self.truth, self.rate_hz, topics=_topics(self.topics))
-
-
-def show_import(path: Path, out: Path, given: Given, *, as_json: bool) -> None:
-    """Convert a recording into a sequence, and print what was found, assumed and dropped."""
-    from vobench.dataset.layout import read
-    from vobench.run.import_recording import import_recording
-    from vobench.sequence import Sequence
-
-    require_free(out)
-    recording = read(path, form=given.form, options=given.options())
-    with unfinished(out.resolve().parent) as folder:
-        import_recording(recording, folder)
-        if out.is_dir():
-            out.rmdir()
-        folder.rename(out)
-    frames = len(Sequence.open(out))
-    if as_json:
-        terminal.print_json({"form": recording.form, "path": str(out), "frames": frames, "notes": recording.notes})
-        return
-    for note in recording.notes:
-        print(f"- {note}")
-    print(f"{frames} frames of a recording in the form '{recording.form}': {out}")
-
-
-def _topics(given: tuple[str, ...]) -> Topics:
+def _topics(given: list[str] | None) -> Topics:
     chosen = {}
-    for entry in given:
+    for entry in given or ():
         role, _, name = entry.partition("=")
         if role not in TOPICS or not name:
             raise UnknownNameError(f"--topic {entry}: {unknown('topic', role, list(TOPICS))}; as in --topic left=/cam0")
@@ -115,56 +63,21 @@ def _topics(given: tuple[str, ...]) -> Topics:
     return Topics(**chosen)
 
 
-def show_info(path: Path, given: Given, *, as_json: bool) -> None:
-    """Print what is in a recording of any form; its pictures are read only for the hash of a sequence of ours."""
-    from vobench.dataset.layout import read
-
-    recording = read(path, form=given.form, options=given.options())
-    folder = path.parent if path.is_file() else path
-    facts = {
-        "path": str(path),
-        "form": recording.form,
-        "frames": recording.frame_count,
-        "duration_s": float(recording.t_ns[-1] - recording.t_ns[0]) / 1e9,
-        "calibration": _calibration(recording.rig),
-        "ground_truth": _truth(recording.truth),
-        "imu_readings": len(recording.imu.t_ns) if recording.imu else 0,
-        "encoder_readings": len(recording.encoders[0]) if recording.encoders else 0,
-        "files": {name: [_topic(facts) for facts in found] for name, found in _files(path, recording.form)},
-        **(_identity(folder) if recording.form == "vobench" else {"notes": list(recording.notes)}),
-    }
-    if as_json:
-        terminal.print_json(facts)
-    else:
-        _print_info(facts)
-
-
-def _files(path: Path, form: str) -> Iterator[tuple[str, tuple[TopicFacts, ...]]]:
-    """What is in each file of a sequence of ours, or in somebody's bag."""
-    if form == "vobench":
-        files = [path] if path.is_file() else sorted(path.glob("*.mcap"))
-        yield from ((file.name, topic_facts(file)) for file in files)
-    elif is_recording(path):
-        yield path.name, topic_facts(path)
-
-
-def _topic(facts: TopicFacts) -> dict[str, Any]:
-    return {**asdict(facts), "rate_hz": facts.rate_hz}
+def _files(path: Path, form: str) -> dict[str, list[dict[str, Any]]]:
+    """The topics in each file of a sequence of ours, or in somebody's bag."""
+    files = [path] if form != "vobench" or path.is_file() else sorted(path.glob("*.mcap"))
+    read = [file for file in files if form == "vobench" or is_recording(file)]
+    return {file.name: [{**asdict(topic), "rate_hz": topic.rate_hz} for topic in topic_facts(file)] for file in read}
 
 
 def _calibration(rig: Rig) -> dict[str, Any]:
-    cameras: dict[str, Any] = {side: _camera(rig.camera(side)) for side in rig.sides}
+    cameras: dict[str, Any] = {side: rig.camera(side) for side in rig.sides}
     return {
-        **cameras,
+        **{side: {"model": type(camera).__name__, **asdict(camera)} for side, camera in cameras.items()},
         "baseline_m": rig.baseline_m if rig.right else None,
         "imu_rate_hz": rig.imu.rate_hz if rig.imu else None,
         "wheels": asdict(rig.wheels) if rig.wheels else None,
     }
-
-
-def _camera(camera: Camera) -> dict[str, Any]:
-    numbers = {field.name: getattr(camera, field.name) for field in fields(camera)}  # type: ignore[arg-type]
-    return {"model": type(camera).__name__, **numbers}
 
 
 def _truth(truth: Trajectory | None) -> dict[str, Any] | None:
@@ -191,14 +104,16 @@ def _print_info(facts: dict[str, Any]) -> None:
     out = terminal.console()
     out.print(f"{facts['path']}: form '{facts['form']}', {facts['frames']} frames in {facts['duration_s']:.3f} s")
     for name, topics in facts["files"].items():
-        rows = [[t["name"], t["type_name"], str(t["count"]), _rate(t), _span(t)] for t in topics]
+        rows = [_row(topic) for topic in topics]
         out.print(terminal.table(name, ["name", "kind", "messages", "Hz", "seconds"], rows))
     for side in ("left", "right"):
         if camera := facts["calibration"].get(side):
             out.print(f"{side} camera: " + ", ".join(_entry(*item) for item in camera.items()))
     rest = {key: facts["calibration"][key] for key in ("baseline_m", "imu_rate_hz", "wheels")}
     out.print("; ".join(_entry(key, value) for key, value in rest.items()))
-    out.print(_truth_line(facts["ground_truth"]))
+    truth = facts["ground_truth"]
+    said = f"{truth['poses']} poses, {truth['path_m']:.3f} m, {truth['duration_s']:.3f} s" if truth else "none"
+    out.print(f"ground truth: {said}")
     for note in facts["notes"]:
         out.print(f"- {note}")
     if "payload_sha256" in facts:
@@ -206,24 +121,16 @@ def _print_info(facts: dict[str, Any]) -> None:
         out.print(", ".join(f"{name} {version}" for name, version in facts["provenance"].items()) or "no provenance")
 
 
+def _row(topic: dict[str, Any]) -> list[str]:
+    rate_hz, start_ns = topic["rate_hz"], topic["start_ns"]
+    span_s = "" if start_ns is None else f"{(topic['end_ns'] - start_ns) / 1e9:.3f}"
+    return [topic["name"], topic["type_name"], str(topic["count"]), f"{rate_hz:.2f}" if rate_hz else "", span_s]
+
+
 def _entry(key: str, value: Any) -> str:
     if isinstance(value, dict):
         return f"{key}: " + ", ".join(_entry(*item) for item in value.items())
     return f"{key} {'none' if value is None else f'{value:.6g}' if isinstance(value, float) else value}"
-
-
-def _rate(topic: dict[str, Any]) -> str:
-    return f"{topic['rate_hz']:.2f}" if topic["rate_hz"] else ""
-
-
-def _span(topic: dict[str, Any]) -> str:
-    return "" if topic["start_ns"] is None else f"{(topic['end_ns'] - topic['start_ns']) / 1e9:.3f}"
-
-
-def _truth_line(truth: dict[str, Any] | None) -> str:
-    if truth is None:
-        return "ground truth: none"
-    return f"ground truth: {truth['poses']} poses, {truth['path_m']:.3f} m, {truth['duration_s']:.3f} s"
 
 
 Recorded = Annotated[
@@ -253,8 +160,25 @@ def import_command(
     json: terminal.Json = False,
 ) -> None:
     """Make a sequence from a dataset's folder or a bag, and say all that was assumed or dropped."""
-    given = Given(form, calibration, imu, truth, rate, tuple(topic or ()))
-    show_import(path, out, given, as_json=json)
+    from vobench.dataset.layout import read
+    from vobench.run.import_recording import import_recording
+    from vobench.sequence import Sequence
+
+    require_free(out)
+    options = ReadOptions(calibration, imu, truth, rate, topics=_topics(topic))
+    recording = read(path, form=form, options=options)
+    with unfinished(out.resolve().parent) as folder:
+        import_recording(recording, folder)
+        if out.is_dir():
+            out.rmdir()
+        folder.rename(out)
+    frames = len(Sequence.open(out))
+    if json:
+        terminal.print_json({"form": recording.form, "path": str(out), "frames": frames, "notes": recording.notes})
+        return
+    for note in recording.notes:
+        print(f"- {note}")
+    print(f"{frames} frames of a recording in the form '{recording.form}': {out}")
 
 
 def export_command(
@@ -267,7 +191,14 @@ def export_command(
     json: terminal.Json = False,
 ) -> None:
     """Write a sequence in another layout, or a trajectory as another text; say all that is lost."""
-    show_export(source, out, form=form, as_json=json)
+    path = source.parent if source.name == SENSORS_FILE else source
+    notes, files = _trajectory(path, out, form) if path.is_file() else _sequence(path, out, form)
+    if json:
+        terminal.print_json({"form": form, "path": str(out), "files": files, "notes": notes})
+        return
+    for note in notes:
+        print(f"- {note}")
+    print(f"{files} {'file' if files == 1 else 'files'} in the form '{form}': {out}")
 
 
 def info_command(
@@ -282,8 +213,26 @@ def info_command(
     json: terminal.Json = False,
 ) -> None:
     """Say what is in a recording: topics, rates, duration, calibration, ground truth, hash."""
-    given = Given(form, calibration, imu, truth, rate, tuple(topic or ()))
-    show_info(path, given, as_json=json)
+    from vobench.dataset.layout import read
+
+    recording = read(path, form=form, options=ReadOptions(calibration, imu, truth, rate, topics=_topics(topic)))
+    folder = path.parent if path.is_file() else path
+    facts = {
+        "path": str(path),
+        "form": recording.form,
+        "frames": recording.frame_count,
+        "duration_s": float(recording.t_ns[-1] - recording.t_ns[0]) / 1e9,
+        "calibration": _calibration(recording.rig),
+        "ground_truth": _truth(recording.truth),
+        "imu_readings": len(recording.imu.t_ns) if recording.imu else 0,
+        "encoder_readings": len(recording.encoders[0]) if recording.encoders else 0,
+        "files": _files(path, recording.form),
+        **(_identity(folder) if recording.form == "vobench" else {"notes": list(recording.notes)}),
+    }
+    if json:
+        terminal.print_json(facts)
+    else:
+        _print_info(facts)
 
 
 class FormCommand(TyperCommand):

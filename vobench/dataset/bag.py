@@ -17,7 +17,7 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, ReaderError, StoragePlugin, Writer
 
-from vobench.dataset.bag_rig import Chosen, Info, Tree, choose, info_rig, is_rectified, plain, tree_of
+from vobench.dataset.bag_rig import Chosen, Info, Tree, between, choose, info_rig, plain, tree_of
 from vobench.dataset.kalibr import chain_rig, find_imu, read_imu, read_yaml
 from vobench.dataset.layout import Layout, Writing, head
 from vobench.dataset.picture import Picture, require_themselves
@@ -29,17 +29,8 @@ from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import messages as ros
 from vobench.sequence.bag import MAGIC, Bag
-from vobench.sequence.calibration import IMU_NOTE, WHEELS_NOTE
 from vobench.sequence.messages import TYPES
 from vobench.sequence.recording import MAGICS, METADATA, opened, read_first_poses
-from vobench.sequence.writer import (
-    CASE_ATTACHMENT,
-    IMPORT_NOTE,
-    NAMES_ATTACHMENT,
-    PROVENANCE_NOTE,
-    SENSORS_FILE,
-    TRUTH_FILE,
-)
 from vobench.trajectory.trajectory import Stamps
 
 # Channels and bytes of each; where the colours come the wrong way round; what makes mosaics grey.
@@ -67,13 +58,6 @@ def picture(message: Any, name: str) -> Picture:
         return Picture(name, np.asarray(cv2.cvtColor(_pixels(message, name, 1, 1)[..., 0], MOSAICS[encoding])))
     known = ", ".join((*GREY, *COLOURS, *MOSAICS))
     raise InputError(f"the encoding {message.encoding!r} is not read. Known: {known}: {name}")
-
-
-def encoding_note(message: Any) -> tuple[str, ...]:
-    """What `picture` makes of a message, beyond what its kind says."""
-    if getattr(message, "encoding", "").lower() in MOSAICS:
-        return (f"The colour mosaic ({message.encoding}) was turned grey by OpenCV's bilinear interpolation.",)
-    return ()
 
 
 def _pixels(message: Any, name: str, channels: int, size: int) -> NDArray[Any]:
@@ -127,7 +111,9 @@ def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
     imu, imu_calibration, imu_notes = _imu(path, chosen, found, body, options)
     unread = sorted(types.keys() - {*_topics(chosen), ros.TF_STATIC.name, (chosen.truth or "").partition(":")[0]})
     notes = [*chosen.notes, "Stamps are those in the messages' headers.", *pairing, *rig_notes, *imu_notes]
-    notes += encoding_note(found.first[chosen.left])
+    encoding = getattr(found.first[chosen.left], "encoding", "")
+    if encoding.lower() in MOSAICS:
+        notes.append(f"The colour mosaic ({encoding}) was turned grey by OpenCV's bilinear interpolation.")
     if repeats:
         notes.append(f"{repeats} poses of {chosen.truth} repeat a stamp; the first pose of each stamp was kept.")
     if unread:
@@ -183,7 +169,8 @@ def _walk(reader: Any, chosen: Chosen, path: Path) -> Contents:
     if unheard:
         raise InputError(f"{unheard} is said to have messages, but has none that can be read in {path}")
     known = {topic: _rising(np.array(found, np.int64), topic, path) for topic, found in stamps.items()}
-    return Contents(known, first, _readings(chosen, known, readings, path), tree_of(static, str(path)))
+    imu = _readings(chosen.imu, known[chosen.imu], readings, path) if chosen.imu and readings else None
+    return Contents(known, first, imu, tree_of(static, str(path)))
 
 
 def _without_pixels(message: Any) -> Any:
@@ -193,18 +180,12 @@ def _without_pixels(message: Any) -> Any:
     return SimpleNamespace(header=message.header, encoding=getattr(message, "encoding", ""))
 
 
-def _readings(
-    chosen: Chosen, stamps: dict[str, Stamps], rows: list[tuple[float, ...]], path: Path
-) -> ImuReadings | None:
-    if not rows or chosen.imu is None:
-        return None
+def _readings(topic: str, t_ns: Stamps, rows: list[tuple[float, ...]], path: Path) -> ImuReadings:
     values = np.array(rows, float)
     bad = np.flatnonzero(~np.isfinite(values).all(1))
     if bad.size:
-        raise InputError(
-            f"reading {bad[0]} of {chosen.imu} should be finite, but is {values[bad[0]].tolist()} in {path}"
-        )
-    return ImuReadings(stamps[chosen.imu], values[:, :3].copy(), values[:, 3:].copy())
+        raise InputError(f"reading {bad[0]} of {topic} should be finite, but is {values[bad[0]].tolist()} in {path}")
+    return ImuReadings(t_ns, values[:, :3].copy(), values[:, 3:].copy())
 
 
 def _rising(t_ns: Stamps, topic: str, path: Path) -> Stamps:
@@ -218,19 +199,13 @@ def _rising(t_ns: Stamps, topic: str, path: Path) -> Stamps:
 
 
 def _shots(path: Path, chosen: Chosen, found: Contents, options: ReadOptions) -> tuple[Any, Stamps, Notes]:
-    """The pictures in pairs, their stamps (N,), and what pairing them took."""
-    left_ns = found.stamps[chosen.left]
-    places = {chosen.left: {int(t): index for index, t in enumerate(left_ns)}}
-    notes: Notes = ()
+    stamps, notes = {chosen.left: found.stamps[chosen.left]}, Notes()
     if chosen.right is not None:
-        right_ns = found.stamps[chosen.right]
+        left_ns, right_ns = found.stamps[chosen.left], found.stamps[chosen.right]
         at_left, at_right, notes = partners(left_ns, right_ns, options.within_ns, str(path))
-        places = {
-            topic: {int(t): index for index, t in enumerate(stamps)}
-            for topic, stamps in ((chosen.left, left_ns[at_left]), (chosen.right, right_ns[at_right]))
-        }
-        left_ns = left_ns[at_left]
-    return partial(_pictures, path, places, left_ns), left_ns, notes
+        stamps = {chosen.left: left_ns[at_left], chosen.right: right_ns[at_right]}
+    places = {topic: {int(t): index for index, t in enumerate(t_ns)} for topic, t_ns in stamps.items()}
+    return partial(_pictures, path, places, stamps[chosen.left]), stamps[chosen.left], notes
 
 
 def _pictures(path: Path, places: dict[str, dict[int, int]], t_ns: Stamps) -> Iterator[RecordedFrame]:
@@ -263,10 +238,9 @@ def _body(chosen: Chosen, found: Contents) -> tuple[str | None, Notes]:
     truth, _, pair = (chosen.truth or "").partition(":")
     stated = pair.rpartition(".")[2] or plain(getattr(found.first.get(truth), "child_frame_id", ""))
     for frame in (stated, BASE):
-        if frame and found.tree.between(frame, left) is not None:
-            whose = (
-                "" if frame == stated or not truth else f", and {truth}, which names no frame, was taken to be of it"
-            )
+        if frame and between(found.tree, frame, left) is not None:
+            taken = truth and frame != stated
+            whose = f", and {truth}, which names no frame, was taken to be of it" if taken else ""
             return frame, (f"The body is {frame}{whose}.",)
     if stated:
         return None, (f"The body is the left camera; where {stated} is, of which the truth is, is not said.",)
@@ -274,21 +248,20 @@ def _body(chosen: Chosen, found: Contents) -> tuple[str | None, Notes]:
 
 
 def _rig(path: Path, chosen: Chosen, found: Contents, body: str | None, options: ReadOptions) -> tuple[Rig, str, Notes]:
-    """The cameras by Kalibr's chain where one is given, or by the bag; and what says so."""
     if options.calibration is not None:
-        about = "imu" if read_yaml(options.calibration).has("cam0", "T_cam_imu") else "left"
-        rig, notes = chain_rig(options.calibration, 2 if chosen.right else 1, "imu" if about == "imu" else "left")
-        whose = "the IMU" if about == "imu" else "the left camera"
+        has_imu = read_yaml(options.calibration).has("cam0", "T_cam_imu")
+        rig, notes = chain_rig(options.calibration, 2 if chosen.right else 1, "imu" if has_imu else "left")
+        whose = "the IMU" if has_imu else "the left camera"
         said = f"The calibration is that of {options.calibration.name}, and the body {whose}, whatever the bag says."
         return rig, str(options.calibration), (said, *notes[1:])
     eyes = []
     for topic, info in ((chosen.left, chosen.left_info), (chosen.right, chosen.right_info)):
-        if topic is not None:
-            if info is None or info not in found.first:
-                raise InputError(
-                    f"no camera_info for {topic}: name its topic or a camchain.yaml of Kalibr's for {path}"
-                )
-            eyes.append((Info(info, found.first[info], is_rectified(topic)), _frame(found.first[topic])))
+        if topic is None:
+            continue
+        if info is None or info not in found.first:
+            raise InputError(f"no camera_info for {topic}: name its topic or a camchain.yaml of Kalibr's for {path}")
+        is_rectified = "rect" in topic.replace("unrect", "")
+        eyes.append((Info(info, found.first[info], is_rectified), _frame(found.first[topic])))
     rig, notes = info_rig(eyes, found.tree, body)
     if any(info.rectified for info, _ in eyes):
         notes = (*notes, "The topics say that the pictures are rectified: the calibration is their matrix P.")
@@ -308,7 +281,7 @@ def _imu(
     T_body_imu: Array | None = np.eye(4)
     if options.calibration is None:
         frame = _frame(found.first[chosen.imu])
-        T_body_imu = found.tree.between(body or _frame(found.first[chosen.left]), frame)
+        T_body_imu = between(found.tree, body or _frame(found.first[chosen.left]), frame)
     if T_body_imu is None:
         return None, None, (f"{chosen.imu} was dropped: nothing says where it sits.",)
     return found.imu, read_imu(noise, T_body_imu), (f"The IMU's noise is that of {noise.name}.",)
@@ -321,7 +294,7 @@ VERSION: Final = 8  # of rosbag2's metadata; ROS 2 Iron and later read it
 def write_ros2(source: ExportSource, views: Views, folder: Path) -> list[str]:
     """Write every message of both files, bit for bit, and say what became of the rest."""
     del views  # a bag holds the pictures as they were recorded
-    paths = [path for path in (source.folder / SENSORS_FILE, source.folder / TRUTH_FILE) if path.is_file()]
+    paths = [path for path in (source.folder / ros.SENSORS_FILE, source.folder / ros.TRUTH_FILE) if path.is_file()]
     mounts = [tuple(bytes(data) for _, data in Bag.open(path).raw((ros.TF_STATIC,))) for path in paths]
     folder.rmdir()  # rosbags makes its own
     writer = Writer(folder, version=VERSION, storage_plugin=StoragePlugin.MCAP)
@@ -343,10 +316,10 @@ def _records(paths: list[Path]) -> dict[str, str]:
     records = {}
     for path in paths:
         bag = Bag.open(path)
-        for name in (WHEELS_NOTE, IMU_NOTE, PROVENANCE_NOTE, IMPORT_NOTE):
+        for name in (ros.WHEELS_NOTE, ros.IMU_NOTE, ros.PROVENANCE_NOTE, ros.IMPORT_NOTE):
             if entries := bag.note(name):
                 records[name] = json.dumps(entries, sort_keys=True)
-        for name in (CASE_ATTACHMENT, NAMES_ATTACHMENT):
+        for name in (ros.CASE_ATTACHMENT, ros.NAMES_ATTACHMENT):
             if bag.has_attachment(name):
                 records[name] = bag.attachment(name).decode()
     return records
@@ -372,7 +345,7 @@ def _copy(reader: AnyReader, writer: Writer, *, true_mounts_differ: bool) -> Non
 
 
 def _name(connection: Connection, reader: AnyReader, *, true_mounts_differ: bool) -> str | None:
-    """A topic's name in the bag; None for a message that is there already. The sensors' file comes first."""
+    """A topic's name in the bag; None for a message that is there already, for the sensors' file comes first."""
     if connection.topic != ros.TF_STATIC.name or connection.owner is reader.connections[0].owner:
         return connection.topic
     return TRUE_TF_STATIC if true_mounts_differ else None
@@ -381,7 +354,7 @@ def _name(connection: Connection, reader: AnyReader, *, true_mounts_differ: bool
 def _begins(path: Path, suffix: str) -> bool:
     """Whether a file begins as those of an ending do; a sensors.mcap is a sequence of our own."""
     magic = next(magic for magic, known in MAGICS.items() if known == suffix)
-    return path.name != SENSORS_FILE and head(path).startswith(magic)
+    return path.name != ros.SENSORS_FILE and head(path).startswith(magic)
 
 
 HEEDS = frozenset({"calibration", "imu", "within_ns", "topics"})

@@ -45,10 +45,7 @@ class Chosen:
 
 
 def choose(types: Types, topics: Topics, path: str) -> Chosen:
-    """The topics that are named, and for the others those that can be no others.
-
-    Raises InputError, with the topics there are, where that leaves the pictures open.
-    """
+    """The topics that are named, and for the others those that can be no others. Raises InputError if open."""
     left, right = _eyes(types, topics, path)
     for named, allowed in ((topics.left_info, INFO), (topics.right_info, INFO), (topics.imu, IMU)):
         if named is not None:
@@ -89,7 +86,6 @@ def _eyes(types: Types, topics: Topics, path: str) -> tuple[str, str | None]:
 
 
 def _pairs(pictures: list[str]) -> list[tuple[str, str]]:
-    """Topics that differ by what tells left from right alone."""
     found = [
         (topic, topic.replace(left, right))
         for topic in pictures
@@ -107,7 +103,6 @@ def _info_of(types: Types, picture: str) -> str | None:
 
 
 def _truth(types: Types, topics: Topics) -> tuple[str | None, tuple[str, ...]]:
-    """The topic of poses that is named, that calls itself true, or that is the only one."""
     if topics.truth is not None:
         return topics.truth, (f"The truth is {topics.truth}.",)
     poses = [topic for topic, kind in types.items() if kind in POSES]
@@ -135,24 +130,21 @@ def _listed(types: Types) -> str:
 OUR_OWN = (DOUBLE_SPHERE, ALL_AROUND)  # lenses that ROS has no name for
 
 
-@dataclass(frozen=True, slots=True)
-class Tree:
-    """Frames that never move against each other: T_parent_child by the names of both."""
+Tree = Mapping[tuple[str, str], Array]  # frames that never move: T_parent_child by the names of both
 
-    links: Mapping[tuple[str, str], Array]
 
-    def between(self, a: str, b: str) -> Array | None:
-        """T_a_b; None where nothing says so."""
-        reached = {a: np.eye(4)}
-        edge = [a]
-        while edge and b not in reached:
-            at = edge.pop(0)
-            for (parent, child), T in self.links.items():
-                other, T_at_other = (child, T) if parent == at else (parent, se3.inverse(T))
-                if at in (parent, child) and other not in reached:
-                    reached[other] = reached[at] @ T_at_other
-                    edge.append(other)
-        return reached.get(b)
+def between(tree: Tree, a: str, b: str) -> Array | None:
+    """T_a_b; None where nothing says so."""
+    reached = {a: np.eye(4)}
+    edge = [a]
+    while edge and b not in reached:
+        at = edge.pop(0)
+        for (parent, child), T in tree.items():
+            other, T_at_other = (child, T) if parent == at else (parent, se3.inverse(T))
+            if at in (parent, child) and other not in reached:
+                reached[other] = reached[at] @ T_at_other
+                edge.append(other)
+    return reached.get(b)
 
 
 def tree_of(messages: list[Any], path: str) -> Tree:
@@ -166,17 +158,12 @@ def tree_of(messages: list[Any], path: str) -> Tree:
             raise InputError(f"/tf_static: {parent} to {child} should be finite with a unit quaternion in {path}")
         fields[3:] /= norm
         links[parent, child] = ros.poses(fields)
-    return Tree(links)
+    return links
 
 
 def plain(frame: str) -> str:
     """A frame's name without the slash that ROS 1 once began it with."""
     return frame.lstrip("/")
-
-
-def is_rectified(topic: str) -> bool:
-    """Whether a topic's name says that its pictures are rectified."""
-    return "rect" in topic.replace("unrect", "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,19 +221,16 @@ def by_projection(left: Info, right: Info) -> Array:
 
 
 def info_rig(eyes: list[tuple[Info, str]], tree: Tree, body: str | None) -> tuple[Rig, tuple[str, ...]]:
-    """The rig of one or two cameras, each with its frame's name, on `body`, or on the left camera where that is None.
-
-    Raises InputError where a camera is none, or nothing says where the right one is.
-    """
+    """The rig of cameras, each with its frame's name, on `body`, None for the left camera. Raises InputError."""
     (left, left_frame), *others = eyes
-    mount = tree.between(body, left_frame) if body else None
+    mount = between(tree, body, left_frame) if body else None
     T_body_left = np.eye(4) if mount is None else mount
     if mount is not None and left.rectified:  # the tree knows the camera, and not its rectified picture
         T_body_left = mount @ se3.transform(left.turn.T, np.zeros(3))
     if not others:
         return Rig(left.camera, None, T_body_left, None), ()
     right, right_frame = others[0]
-    T_left_right = None if left.rectified or right.rectified else tree.between(left_frame, right_frame)
+    T_left_right = None if left.rectified or right.rectified else between(tree, left_frame, right_frame)
     notes: tuple[str, ...] = ()
     if T_left_right is None or left_frame == right_frame:
         T_left_right = by_projection(left, right)

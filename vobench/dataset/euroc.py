@@ -12,15 +12,13 @@ from vobench.dataset.picture import read_text, unread
 from vobench.dataset.recording import (
     Notes,
     PictureList,
-    PictureStream,
     ReadOptions,
     Recording,
     assemble,
-    paired,
-    present,
-    read_list,
+    listed_pictures,
+    picture_files,
     read_truth_file,
-    recorded_frames,
+    truth_file,
 )
 from vobench.dataset.source import ExportSource, Views, png_frames, rate_hz
 from vobench.errors import InputError
@@ -47,11 +45,6 @@ def sensor_camera(values: kalibr.Values) -> tuple[Camera, Array]:
         )
     camera = kalibr.focal_camera(size, numbers, values.text("distortion_model"), bends, place=str(values.path))
     return camera, values.transform("T_BS")
-
-
-def sensor_imu(values: kalibr.Values) -> ImuCalibration:
-    """An IMU by its sensor.yaml. Raises InputError."""
-    return kalibr.imu_numbers(values, values.transform("T_BS"), ("rate_hz",), ())
 
 
 def read_imu_csv(path: Path) -> ImuReadings:
@@ -90,13 +83,10 @@ def _has_dso(folder: Path) -> bool:
 
 
 def read_euroc(folder: Path, options: ReadOptions, *, form: str = "euroc") -> Recording:
-    """A folder with mav0/, or that folder itself; the body is the IMU.
-
-    Raises InputError, one sentence, naming the file that is missing or wrong.
-    """
+    """A folder with mav0/, or that folder itself; the body is the IMU. Raises InputError naming the file."""
     root = folder / "mav0" if (folder / "mav0").is_dir() else folder
     eyes, pairing = _pictures(root, options)
-    stream = PictureStream.open(recorded_frames(eyes[0].t_ns, *(eye.paths for eye in eyes)))
+    stream = picture_files(eyes[0].t_ns, *(eye.paths for eye in eyes))
     rig, calibration, lens_notes = _rig(root, folder, len(eyes), options)
     imu, imu_calibration, imu_notes = _imu(root, folder, options)
     truth, truth_notes = _truth(root, eyes[0].t_ns, options)
@@ -111,20 +101,13 @@ def _pictures(root: Path, options: ReadOptions) -> tuple[list[PictureList], Note
     if not (root / CAMERAS[0]).is_dir():
         raise InputError(f"no folder {CAMERAS[0]} with pictures in {root}")
     folders = [root / name for name in CAMERAS if (root / name).is_dir()]
-    eyes = [read_list(folder / DATA, folder / "data", separator=",", unit="ns") for folder in folders]
-    if len(eyes) == 1:
-        notes: Notes = (f"There is one camera: no folder {CAMERAS[1]}.",)
-    else:
-        *eyes, notes = paired(eyes[0], eyes[1], options.within_ns)
-    found, missing = present(*eyes)
-    return found, (*notes, *missing)
+    lists = [(folder / DATA, folder / "data") for folder in folders]
+    eyes, notes = listed_pictures(*lists, separator=",", unit="ns", within_ns=options.within_ns)
+    return eyes, notes if len(eyes) > 1 else (f"There is one camera: no folder {CAMERAS[1]}.", *notes)
 
 
 def _rig(root: Path, folder: Path, count: int, options: ReadOptions) -> tuple[Rig, Path, Notes]:
-    """The cameras on the IMU, by Kalibr's chain where one is given, by their sensor.yaml, or by a chain that is there.
-
-    The path is that of the calibration.
-    """
+    """The cameras on the IMU, by the chain given, their sensor.yaml or a chain that is there; and the file's path."""
     sensors = [root / name / SENSOR for name in CAMERAS[:count]]
     chain = options.calibration or (
         None if all(path.is_file() for path in sensors) else kalibr.find_chain(folder, options)
@@ -135,10 +118,9 @@ def _rig(root: Path, folder: Path, count: int, options: ReadOptions) -> tuple[Ri
     missing = next((path for path in sensors if not path.is_file()), None)
     if missing is not None:
         raise kalibr.no_calibration(missing)
-    cameras = [sensor_camera(kalibr.read_yaml(path)) for path in sensors]
-    (left, T_body_left), (right, T_body_right) = cameras[0], cameras[1] if count > 1 else (None, None)
+    rig = kalibr.rig_of(*(sensor_camera(kalibr.read_yaml(path)) for path in sensors))
     note = "Pictures stay as they are, not rectified; the lens is in the calibration (sensor.yaml)."
-    return Rig(left, right, T_body_left, T_body_right), sensors[0], (note,)
+    return rig, sensors[0], (note,)
 
 
 def _imu(root: Path, folder: Path, options: ReadOptions) -> tuple[ImuReadings | None, ImuCalibration | None, Notes]:
@@ -150,13 +132,13 @@ def _imu(root: Path, folder: Path, options: ReadOptions) -> tuple[ImuReadings | 
         return read_imu_csv(data), kalibr.read_imu(noise, np.eye(4)), (f"The IMU's noise is that of {noise.name}.",)
     if not sensor.is_file():
         return None, None, (f"The IMU was dropped: nothing says how noisy it is ({sensor} or Kalibr's imu.yaml).",)
-    return read_imu_csv(data), sensor_imu(kalibr.read_yaml(sensor)), ()
+    values = kalibr.read_yaml(sensor)
+    return read_imu_csv(data), kalibr.imu_numbers(values, values.transform("T_BS"), ("rate_hz",), ()), ()
 
 
 def _truth(root: Path, frames_ns: Stamps, options: ReadOptions) -> tuple[Trajectory | None, Notes]:
     if options.truth is not None:
-        truth, notes = read_truth_file(options.truth, frames_ns)
-        return truth, (f"The truth is {options.truth.name}, taken to be of the body.", *notes)
+        return truth_file(options, (), frames_ns, "taken to be of the body.")
     for name in TRUTHS:
         if (root / name / DATA).is_file():
             return _tracked(root / name, frames_ns)
@@ -183,15 +165,8 @@ def _on_body(rig: Rig, truth: Trajectory | None, T_imu_base: Array | None) -> tu
     """Rig and truth on the body that a recording of our own had before it was exported, or on the IMU."""
     if T_imu_base is None:
         return rig, truth, "The body is the IMU."
-    T_base_imu = se3.inverse(T_imu_base)
-    moved = Rig(
-        rig.left,
-        rig.right,
-        T_base_imu @ rig.T_body_left,
-        None if rig.T_body_right is None else T_base_imu @ rig.T_body_right,
-        imu=replace(rig.imu, T_body_imu=T_base_imu @ rig.imu.T_body_imu) if rig.imu else None,
-    )
-    return moved, truth.of_mounted(T_imu_base) if truth else None, f"The body is {BASE}, as its sensor.yaml places it."
+    said = f"The body is {BASE}, as its sensor.yaml places it."
+    return kalibr.on_body(rig, se3.inverse(T_imu_base)), truth.of_mounted(T_imu_base) if truth else None, said
 
 
 # EuRoC's words for Kalibr's.
@@ -272,9 +247,8 @@ def _write_truth(source: ExportSource, T_base_body: Array, mav: Path) -> list[st
     if source.twist is None:
         notes.append("No velocities were recorded, so the truth's rows end after the pose.")
     else:
-        columns.append(point_velocity(source.truth, source.twist, T_base_body[:3, 3]))
         bias, said = _biases(source)
-        columns += bias
+        columns = [point_velocity(source.truth, source.twist, T_base_body[:3, 3]), *bias]
         notes.append(said)
     truth = source.truth.of_mounted(T_base_body)
     state = mav / "state_groundtruth_estimate0"

@@ -16,7 +16,7 @@ from vobench.dataset.picture import require_free
 from vobench.dataset.recording import cut_to
 from vobench.dataset.source import PNG, ExportSource, Views, check_path, check_rig, open_source
 from vobench.errors import InputError, SequenceError, unknown
-from vobench.geometry.rig import ImuCalibration, Rig
+from vobench.geometry.rig import Rig
 from vobench.trajectory.formats import format_euroc, format_kitti, format_times, format_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
@@ -30,10 +30,7 @@ TIMES_SUFFIX = ".times.txt"
 
 
 def export_trajectory(trajectory: Trajectory, path: Path, form: str) -> tuple[Path, ...]:
-    """Write a trajectory and say which files it became; KITTI's has no stamps, so its times go beside it.
-
-    Stamps come back exactly and poses to 1e-15. Raises InputError for another form, or a file that is there already.
-    """
+    """Write a trajectory, exactly, as one file, or two in KITTI's form. Raises InputError, also for a file there."""
     if form not in TRAJECTORY_TEXTS:
         raise InputError(f"no form of trajectory '{form}'. Known: {', '.join(TRAJECTORY_FORMS)}")
     texts = {path: TRAJECTORY_TEXTS[form](trajectory)}
@@ -67,11 +64,7 @@ class Exported:
 
 
 def export(sequence: Path, out: Path, form: str) -> Exported:
-    """Write a sequence's folder in another form into a new folder, and read it back: points and poses must agree.
-
-    Raises InputError for an unknown form or a folder in use, SequenceError for what the form cannot hold or a
-    sequence that is not whole.
-    """
+    """Write a sequence in another form into a new folder and test it, read back. Raises InputError, SequenceError."""
     layout = writable().get(form)
     if layout is None:
         raise InputError(unknown("form to export to", form, list(writable())))
@@ -92,10 +85,7 @@ def export(sequence: Path, out: Path, form: str) -> Exported:
 
 @contextmanager
 def _building(out: Path) -> Iterator[Path]:
-    """A folder to fill, which gets its name when the context ends without an error, and is gone after one.
-
-    Raises SequenceError where the disk does not take it.
-    """
+    """A folder to fill, which gets its name when the context ends without an error, and is gone after one."""
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         part = Path(mkdtemp(dir=out.parent, prefix=f".{out.name}.", suffix=".part"))
@@ -152,18 +142,13 @@ def _test(views: Views, expected: Trajectory | None, form: str, folder: Path) ->
     found = read(folder, form=form)
     check_rig(f"the {form} folder, read back,", views.rig, found.rig)
     if (folder / CHAIN).is_file():
-        check_rig(f"{CHAIN}, read back,", views.rig, _chain_rig(folder / CHAIN, views.rig.imu))
+        imu = views.rig.imu and replace(views.rig.imu, T_body_imu=np.eye(4))  # where there is one, the chain's body
+        check_rig(f"{CHAIN}, read back,", views.rig, replace(kalibr.read_camchain(folder / CHAIN), imu=imu))
     path = found.truth
     if expected is not None and path is not None:
         check_path(f"the {form} folder, read back,", expected, path.of_mounted(found.rig.T_body_left))
     elif expected is not None or path is not None:
         raise SequenceError(f"the {form} folder, read back, {'has no truth any more' if expected else 'has a truth'}")
-
-
-def _chain_rig(path: Path, imu: ImuCalibration | None) -> Rig:
-    """The rig of a camchain.yaml; where there is an IMU the chain's body is that."""
-    rig = kalibr.read_camchain(path)
-    return replace(rig, imu=replace(imu, T_body_imu=np.eye(4))) if imu else rig
 
 
 def _expected_path(source: ExportSource, rig: Rig, stamps: Stamps, layout: Writing) -> Trajectory | None:

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -46,17 +47,11 @@ class Values:
 
     def text(self, *keys: str) -> str:
         """A text. Raises InputError."""
-        found = self.at(*keys)
-        if not isinstance(found, str):
-            raise self._wrong(keys, "text", found)
-        return found
+        return str(self._checked(keys, "text", lambda found: isinstance(found, str)))
 
     def number(self, *keys: str) -> float:
         """A finite number. Raises InputError."""
-        found = self.at(*keys)
-        if not _is_number(found):
-            raise self._wrong(keys, "a finite number", found)
-        return float(found)
+        return float(self._checked(keys, "a finite number", _is_number))
 
     def positive(self, *keys: str, or_zero: bool = False) -> float:
         """A finite number above 0, or from 0 on. Raises InputError."""
@@ -67,9 +62,8 @@ class Values:
 
     def numbers(self, *keys: str) -> list[float]:
         """A list of finite numbers. Raises InputError."""
-        found = self.at(*keys)
-        if not isinstance(found, list) or not all(map(_is_number, found)):
-            raise self._wrong(keys, "a list of finite numbers", found)
+        wanted = "a list of finite numbers"
+        found = self._checked(keys, wanted, lambda found: isinstance(found, list) and all(map(_is_number, found)))
         return [float(value) for value in found]
 
     def size(self, *keys: str) -> tuple[int, int]:
@@ -80,10 +74,7 @@ class Values:
         return int(found[0]), int(found[1])
 
     def transform(self, *keys: str) -> Array:
-        """A rigid transform (4, 4), as rows or as EuRoC's rows, cols and data; its rotation is made exact.
-
-        Raises InputError.
-        """
+        """A rigid transform (4, 4), as rows or as EuRoC's data; its rotation is made exact. Raises InputError."""
         found = self.at(*keys)
         flat = found.get("data") if isinstance(found, dict) else found
         rows = flat if isinstance(flat, list) else []
@@ -94,6 +85,12 @@ class Values:
         if not se3.is_rotation(T[:3, :3], tolerance=SKEW_TOLERANCE) or T[3].tolist() != [0, 0, 0, 1]:
             raise self._wrong(keys, "a rigid transform with the last row 0 0 0 1", T.tolist())
         return se3.transform(se3.nearest_rotation(T[:3, :3]), T[:3, 3])
+
+    def _checked(self, keys: tuple[str, ...], wanted: str, is_right: Callable[[Any], bool]) -> Any:
+        found = self.at(*keys)
+        if not is_right(found):
+            raise self._wrong(keys, wanted, found)
+        return found
 
     def _find(self, keys: tuple[str, ...]) -> Any:
         tree = self.tree
@@ -158,10 +155,7 @@ NONE = ("none", "")
 def focal_camera(
     size_px: tuple[int, int], focal_px: list[float], model: str, coefficients: list[float], *, place: str
 ) -> Camera:
-    """The camera of fx, fy, cx, cy, a distortion model by any of its names and its coefficients.
-
-    Raises InputError where that is no lens known here; `place` is the file or topic that says so.
-    """
+    """The camera of fx, fy, cx, cy and a distortion model by any of its names. Raises InputError naming `place`."""
     if len(focal_px) != 4 or not all(value > 0 for value in focal_px[:2]):
         raise InputError(f"{place}: a camera should have fx, fy, cx, cy with fx and fy above 0, but has {focal_px}")
     name = model.strip().lower()
@@ -210,10 +204,7 @@ def numbers(values: ArrayLike) -> str:
 
 
 def intrinsics(camera: Camera) -> tuple[str, Array, str, Array]:
-    """Kalibr's camera_model, intrinsics, distortion_model and distortion_coeffs, k3 last where it is not 0.
-
-    Raises SequenceError for a camera that sees all around.
-    """
+    """Kalibr's camera_model, intrinsics, distortion_model and _coeffs, k3 last if not 0. Raises SequenceError."""
     match camera:
         case Equirectangular():
             raise SequenceError(ALL_AROUND)
@@ -261,10 +252,7 @@ def _matrix(name: str, T: Array) -> list[str]:
 
 
 def imu_yaml(imu: ImuCalibration, *, topic: str) -> str:
-    """The imu.yaml of an IMU, without its place, which Kalibr finds out.
-
-    Raises InputError where one of the numbers is not positive, which Kalibr refuses.
-    """
+    """The imu.yaml of an IMU, without its place. Raises InputError for a number that Kalibr refuses, 0 or less."""
     found = {"update_rate": imu.rate_hz, **{name: getattr(imu, field) for field, name in DENSITIES.items()}}
     for name, value in found.items():
         if not 0 < value < np.inf:
@@ -273,10 +261,7 @@ def imu_yaml(imu: ImuCalibration, *, topic: str) -> str:
 
 
 def read_camchain(path: Path) -> Rig:
-    """The rig of a camchain.yaml, cam0 on the left; the body is the IMU, or cam0 where the chain says nothing of one.
-
-    Raises InputError.
-    """
+    """The rig of a camchain.yaml; the body is the IMU, or cam0 where the chain knows none. Raises InputError."""
     chain = read_yaml(path)
     left, placed = _camera(chain, "cam0"), chain.has("cam0", "T_cam_imu")
     T_body_left = se3.inverse(chain.transform("cam0", "T_cam_imu")) if placed else np.eye(4)
@@ -334,10 +319,7 @@ def find_imu(folder: Path, options: ReadOptions) -> Path | None:
 
 
 def chain_rig(path: Path, cameras: int, body: Literal["imu", "left"]) -> tuple[Rig, tuple[str, ...]]:
-    """The first one or two cameras of Kalibr's chain on a body that is the IMU or the left camera, and what to note.
-
-    Raises InputError where the chain has fewer cameras, or does not say where the IMU is.
-    """
+    """The first one or two cameras of Kalibr's chain on that body, and what to note. Raises InputError."""
     values = read_yaml(path)
     if cameras > 1 and not values.has("cam1"):
         raise InputError(f"a recording with two cameras needs cam1, which is missing in {path}")
@@ -355,6 +337,18 @@ def chain_rig(path: Path, cameras: int, body: Literal["imu", "left"]) -> tuple[R
     off = "By the calibration the clock of {} is {:g} s off the IMU's; stamps were left as they are."
     told = f"The calibration is that of {path.name}."
     return rig, (told, *(off.format(*shift) for shift in shifts_s if shift[1]))
+
+
+def rig_of(left: tuple[Camera, Array], right: tuple[Camera, Array] | None = None) -> Rig:
+    """The rig of one or two cameras, each with its T_body_camera."""
+    return Rig(left[0], right and right[0], left[1], None if right is None else right[1])
+
+
+def on_body(rig: Rig, T_body_old: Array) -> Rig:
+    """A rig without wheels on another body, on which the old one sits so."""
+    imu = rig.imu and replace(rig.imu, T_body_imu=T_body_old @ rig.imu.T_body_imu)
+    T_body_right = None if rig.T_body_right is None else T_body_old @ rig.T_body_right
+    return Rig(rig.left, rig.right, T_body_old @ rig.T_body_left, T_body_right, imu=imu)
 
 
 def no_calibration(looked_for: Path) -> InputError:

@@ -5,20 +5,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.dataset.kalibr import chain_rig, no_calibration
+from vobench.dataset.kalibr import chain_rig, no_calibration, on_body, rig_of
 from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
-from vobench.dataset.recording import (
-    Notes,
-    PictureStream,
-    ReadOptions,
-    Recording,
-    assemble,
-    in_step,
-    numbered,
-    read_truth_file,
-    recorded_frames,
-)
+from vobench.dataset.recording import Notes, ReadOptions, Recording, assemble, numbered, picture_files, truth_file
 from vobench.dataset.source import ExportSource, Views, png_frames, rectified
 from vobench.errors import InputError
 from vobench.geometry import se3
@@ -32,20 +22,27 @@ from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 PAIRS = (("image_0", "image_1"), ("image_2", "image_3"))  # grey, colour
 CALIBRATION, TIMES, POSES = "calib.txt", "times.txt", "poses.txt"
 T_BODY_GREY = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))
+TRUTH = (
+    "of the left grey camera; its world is that camera at the start, turned from "
+    "x right, y down, z ahead to x ahead, y left, z up."
+)
 SKEW_TOLERANCE = 1e-6  # of KITTI's seven digits: K's lower triangle is zero
 
 
 def read_kitti(folder: Path, options: ReadOptions) -> Recording:
     """A folder such as sequences/00; the body is the camera of image_0, its axes ahead, left, up. Raises InputError."""
     names, pair_notes = _pair(folder)
-    eyes = [numbered(folder / name) for name in names]
-    in_step(eyes[0], eyes[1] if len(eyes) > 1 else None)
-    t_ns = _times(folder / TIMES, len(eyes[0]), folder / names[0])
-    stream = PictureStream.open(recorded_frames(t_ns, *eyes))
+    eyes, times = numbered(*(folder / name for name in names)), folder / TIMES
+    t_ns = parse_times(read_text(times), name=str(times))
+    if len(t_ns) != len(eyes[0]):
+        raise InputError(f"{len(t_ns)} times for {len(eyes[0])} pictures in {folder / names[0]}: {times}")
+    stream = picture_files(t_ns, *eyes)
     rig, calibration, lens_notes = _rig(folder, names, stream.size_px, options)
-    truth, truth_notes = _truth(folder, t_ns, options)
+    named, root = f"{folder.absolute().name}.txt", folder.absolute()
+    beside = (root / POSES, root / named, *(up / "poses" / named for up in root.parents[:2]))
+    truth, truth_notes = truth_file(options, beside, t_ns, TRUTH, T_BODY_GREY)
     notes = ("The body is the left grey camera, x ahead, y left, z up.", *pair_notes, *lens_notes, *truth_notes)
-    notes += unread(folder, *PAIRS[0], *PAIRS[1], CALIBRATION, TIMES, POSES, f"{folder.absolute().name}.txt")
+    notes += unread(folder, *PAIRS[0], *PAIRS[1], CALIBRATION, TIMES, POSES, named)
     return assemble("kitti", rig, stream, t_ns, truth=truth, notes=notes, calibration=str(calibration))
 
 
@@ -63,20 +60,13 @@ def _pair(folder: Path) -> tuple[tuple[str, ...], Notes]:
     return single, (f"There is one camera: {single[0]} has no partner.",)
 
 
-def _times(path: Path, count: int, pictures: Path) -> Stamps:
-    t_ns = parse_times(read_text(path), name=str(path))
-    if len(t_ns) != count:
-        raise InputError(f"{len(t_ns)} times for {count} pictures in {pictures}: {path}")
-    return t_ns
-
-
 def _rig(
     folder: Path, names: tuple[str, ...], size_px: tuple[int, int], options: ReadOptions
 ) -> tuple[Rig, Path, Notes]:
     """The cameras by calib.txt, which knows no picture's size, or by Kalibr's chain; and which file that was."""
     if options.calibration is not None:
         rig, notes = chain_rig(options.calibration, len(names), "left")
-        return _level(rig), options.calibration, notes
+        return on_body(rig, T_BODY_GREY), options.calibration, notes
     path = folder / CALIBRATION
     if not path.exists():
         raise no_calibration(path)
@@ -85,15 +75,9 @@ def _rig(
     missing = [name for name in needed if name not in matrices]
     if missing:
         raise InputError(f"{path}: no matrix {missing[0]}, which is that of {names[needed.index(missing[0])]}")
-    eyes = [_camera(matrices[name], size_px, f"{path}: {name}") for name in needed]
-    (left, T_grey_left), (right, T_grey_right) = eyes[0], eyes[1] if len(eyes) > 1 else (None, None)
-    return _level(Rig(left, right, T_grey_left, T_grey_right)), path, _other_matrices(matrices, needed)
-
-
-def _level(rig: Rig) -> Rig:
-    T_grey_right = rig.T_body_right
-    T_body_right = None if T_grey_right is None else T_BODY_GREY @ T_grey_right
-    return Rig(rig.left, rig.right, T_BODY_GREY @ rig.T_body_left, T_body_right)
+    rig = rig_of(*(_camera(matrices[name], size_px, f"{path}: {name}") for name in needed))
+    others = ", ".join(name for name in matrices if name not in needed)
+    return on_body(rig, T_BODY_GREY), path, (f"{others} of {CALIBRATION} were not used.",) if others else ()
 
 
 def read_calibration(path: Path) -> dict[str, Array]:
@@ -116,28 +100,6 @@ def _camera(P: Array, size_px: tuple[int, int], place: str) -> tuple[Pinhole, Ar
         raise InputError(f"{place} should be a rectified camera, fx 0 cx / 0 fy cy / 0 0 1, but is {K.tolist()}")
     camera = Pinhole(*size_px, float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
     return camera, se3.transform(np.eye(3), -np.linalg.solve(K, P[:, 3]))
-
-
-def _other_matrices(matrices: dict[str, Array], used: list[str]) -> Notes:
-    others = [name for name in matrices if name not in used]
-    return (f"{', '.join(others)} of {CALIBRATION} were not used.",) if others else ()
-
-
-def _truth(folder: Path, t_ns: Stamps, options: ReadOptions) -> tuple[Trajectory | None, Notes]:
-    """The poses beside the pictures or where KITTI has them, one a picture."""
-    folder = folder.absolute()
-    named = f"{folder.name}.txt"
-    beside = (folder / POSES, folder / named, *(up / "poses" / named for up in folder.parents[:2]))
-    path = options.truth or next((path for path in beside if path.is_file()), None)
-    if path is None:
-        return None, ()
-    truth, notes = read_truth_file(path, t_ns)
-    turned = Trajectory(truth.t_ns, T_BODY_GREY @ truth.T_world_frame @ T_BODY_GREY.T)
-    return turned, (
-        f"The truth is {path.name}, of the left grey camera; its world is that camera at the start, turned from "
-        "x right, y down, z ahead to x ahead, y left, z up.",
-        *notes,
-    )
 
 
 def write_kitti(source: ExportSource, views: Views, folder: Path) -> list[str]:
@@ -177,12 +139,8 @@ def kitti_path(truth: Trajectory, rig: Rig, stamps: Stamps) -> Trajectory | None
 def _calibration(rig: Rig) -> str:
     """P0 and P1, each (3, 4) in a row: what sends points in the left camera's axes to pixels."""
     shifts_m = [0.0, rig.baseline_m] if rig.right else [0.0]
-    matrices = [projection(rig.left.K, shift_m) for shift_m in shifts_m]
-    return "".join(f"P{index}: {_row(P)}\n" for index, P in enumerate(matrices))
-
-
-def _row(values: Array) -> str:
-    return " ".join(repr(value + 0.0) for value in values.ravel().tolist())  # no -0.0
+    rows = [(projection(rig.left.K, shift_m) + 0.0).ravel().tolist() for shift_m in shifts_m]  # no -0.0
+    return "".join(f"P{index}: {' '.join(map(repr, row))}\n" for index, row in enumerate(rows))
 
 
 def _picture_notes(source: ExportSource, views: Views) -> list[str]:

@@ -3,7 +3,7 @@
 A layout is one module of this room with LAYOUTS, or an entry point of the group `vobench.datasets` that is a Layout.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import import_module
@@ -45,10 +45,7 @@ class Writing:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A form of recordings: its name, what it is known by in words, and what tells, reads and writes it.
-
-    `heeds` names the fields of ReadOptions that make a difference.
-    """
+    """A form of recordings, how it is told, read and written; `heeds` names the ReadOptions that make a difference."""
 
     name: str
     known_by: str
@@ -116,7 +113,6 @@ def head(path: Path) -> bytes:
 
 
 def _sentence(path: Path) -> str:
-    """Why a path is none of the forms, and what might have been meant."""
     if not path.is_dir():
         if packed := _packed(head(path)):
             return f"a {packed} archive; unpack it and name the folder: {path}"
@@ -143,25 +139,18 @@ def _packed(start: bytes) -> str | None:
 
 def _below(folder: Path) -> list[str]:
     """Recordings one or two levels down, a few of them, as `name (form)`."""
+    first = [folder / name for name in listed(folder)[:MOST_LOOKED_AT]]
+    second = [inner / name for inner in first if inner.is_dir() for name in listed(inner)[:MOST_LOOKED_AT]]
     found: dict[Path, str] = {}
-    for path in _levels_below(folder):
+    for path in [path for path in (*first, *second) if path.exists()][:MOST_LOOKED_AT]:
         if not found.keys() & {path.parent} and (names := _told(path)):
             found[path] = f"{path.relative_to(folder)} ({names[0]})"
     some = list(found.values())
     return some[:5] + ([f"{len(some) - 5} more"] if len(some) > 5 else [])
 
 
-def _levels_below(folder: Path) -> Iterator[Path]:
-    first = [folder / name for name in listed(folder)[:MOST_LOOKED_AT]]
-    second = [inner / name for inner in first if inner.is_dir() for name in listed(inner)[:MOST_LOOKED_AT]]
-    yield from [path for path in (*first, *second) if path.exists()][:MOST_LOOKED_AT]
-
-
 def read(path: Path, *, form: str | None = None, options: ReadOptions | None = None) -> Recording:
-    """The recording at a path, its pictures not yet read; `form` overrides what `sniff` would say.
-
-    Raises VobenchError, one sentence naming the file, where it is no recording, or one that is wrong.
-    """
+    """The recording at a path, its pictures not yet read, as `form` or by content. Raises VobenchError."""
     options = options or ReadOptions()
     try:
         if form is not None and form not in layouts():

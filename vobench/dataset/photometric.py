@@ -88,18 +88,14 @@ def write_photometric(source: ExportSource, views: Views, stamps: Stamps, folder
         cam.mkdir(parents=True)
         texts = {"times.txt": times, "camera.txt": lenses[index]}
         if photometry:
-            texts["pcalib.txt"] = inverse_response(photometry.response)
+            signals_dn = linear_of_grey(photometry.response) * FULL_SCALE_DN  # of all grey values, from 0 to 255
+            texts["pcalib.txt"] = " ".join(map(repr, signals_dn.tolist())) + "\n"
             shade = passed(views.rays_of(side, source.true_rig.camera(side)), photometry)
             write_png(cam / "vignette.png", np.rint(shade / shade.max() * WHITE_16).astype(np.uint16))
         for name, text in texts.items():
             if text:
                 (cam / name).write_text(text, encoding="utf-8")
     return notes
-
-
-def inverse_response(response: Response) -> str:
-    """pcalib.txt: the signals of all grey values in one row, from 0 to 255."""
-    return " ".join(map(repr, (linear_of_grey(response) * FULL_SCALE_DN).tolist())) + "\n"
 
 
 def passed(rays: Array, photometry: Photometry) -> Array:
@@ -110,10 +106,7 @@ def passed(rays: Array, photometry: Photometry) -> Array:
 
 
 def camera_text(camera: Camera) -> str | None:
-    """DSO's camera.txt, focal length and centre relative to the picture; None for a lens that DSO has no model for.
-
-    There the centre of the first pixel is at 0.5, here at 0.
-    """
+    """DSO's camera.txt, where the first pixel's centre is at 0.5, here at 0; None for a lens unknown to it."""
     width, height = camera.width_px, camera.height_px
     (fx, _, cx), (_, fy, cy), _ = camera.K.tolist()
     relative = [fx / width, fy / height, (cx + 0.5) / width, (cy + 0.5) / height]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.errors import InputError
+from vobench.sequence.picture import Image, header
 from vobench.trajectory.formats import LFS_POINTER
 
 MOST_NAME = 1024  # characters of a file's name in a list, folders and all
@@ -59,10 +60,7 @@ def require_themselves(folder: Path) -> None:
 
 
 def inside(folder: Path, name: str, place: str) -> Path:
-    """The file that a list names, below `folder`; links on the disk are the owner's and are followed.
-
-    Raises InputError for a name that is absolute or climbs out; `place` is where the list has it.
-    """
+    """The file that a list names, below `folder`. Raises InputError for a name that is absolute or climbs out."""
     parts = PurePosixPath(name.replace("\\", "/"))
     if not 0 < len(name) <= MOST_NAME or parts.is_absolute() or PureWindowsPath(name).drive or ".." in parts.parts:
         raise InputError(f"{place}: a file's name should stay inside {folder}, but is {name[:200]!r}")
@@ -90,20 +88,15 @@ def unread(folder: Path, *used: str) -> tuple[str, ...]:
     return (f"Not read: {some}.",) if others else ()
 
 
-Image = NDArray[np.uint8]
 Form = Literal["png", "jpeg", "pixels"]
 PNG, JPEG, JPEG_END = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\xff\xd9"
-PNG_CHANNELS = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}  # by colour type; a palette's colours count
 MOST_PIXELS = 1 << 26  # 67 megapixels; a header that asks for more is a mistake or a trap
 GREY_SHARES = "0.299 red + 0.587 green + 0.114 blue"
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture as it was found: a PNG's or JPEG's bytes, or pixels (H, W) or (H, W, 3) blue, green, red, 8 or 16 bits.
-
-    `name` is for messages.
-    """
+    """A PNG's or JPEG's bytes, or pixels (H, W) or (H, W, 3) blue, green, red, 8 or 16 bits; a name for messages."""
 
     name: str
     content: bytes | NDArray[Any]
@@ -136,13 +129,10 @@ def kind_of(picture: Picture) -> Kind:
         channels = 1 if picture.content.ndim == 2 else picture.content.shape[2]
         return Kind(width, height, channels, picture.content.itemsize * 8, "pixels")
     require_itself(picture.content, picture.name)
-    if picture.content.startswith(PNG):
-        kind = _png_kind(picture.content, picture.name)
-    elif picture.content.startswith(JPEG):
-        kind = _jpeg_kind(picture.content, picture.name)
-    else:
+    if not picture.content.startswith((PNG, JPEG)):
         begins = "it is empty" if not picture.content else f"it begins with {picture.content[:8]!r}"
         raise InputError(f"a picture should be a PNG or JPEG file, but {begins}: {picture.name}")
+    kind = _file_kind(picture.content, picture.name)
     if not 0 < kind.width_px * kind.height_px <= MOST_PIXELS:
         raise InputError(f"{kind.width_px} x {kind.height_px} pixels are no picture: {picture.name}")
     return kind
@@ -193,9 +183,25 @@ def _decoded(picture: Picture, kind: Kind) -> NDArray[Any]:
     return pixels
 
 
-def _png_kind(data: bytes, name: str) -> Kind:
-    """Size and depth by the first chunk; every chunk's checksum is right, and the last is the end."""
-    place, first, transparent = len(PNG), b"", 0
+def _file_kind(data: bytes, name: str) -> Kind:
+    form: Form = "png" if data.startswith(PNG) else "jpeg"
+    if form == "jpeg" and not data.rstrip(b"\0").endswith(JPEG_END):
+        raise InputError(f"the JPEG is cut off after {len(data)} bytes: {name}")
+    alpha = form == "png" and b"tRNS" in _png_chunks(data, name)
+    try:
+        _, height, width, bits, channels = header(memoryview(data))
+    except struct.error:
+        channels = 0
+    if not channels:
+        raise InputError(f"the {form.upper()} has no header that makes sense: {name}")
+    if form == "jpeg" and (bits != 8 or channels not in (1, 3)):
+        raise InputError(f"a JPEG should have 8 bits and 1 or 3 channels, not {bits} and {channels}: {name}")
+    return Kind(width, height, channels + alpha, bits, form)
+
+
+def _png_chunks(data: bytes, name: str) -> set[bytes]:
+    """The kinds of its chunks; every one's checksum is right, and the last is the end."""
+    place, kinds = len(PNG), set()
     while place + 12 <= len(data):
         length, kind = struct.unpack_from(">I4s", data, place)
         end = place + 12 + length
@@ -203,33 +209,8 @@ def _png_kind(data: bytes, name: str) -> Kind:
             break
         if zlib.crc32(memoryview(data)[place + 4 : end - 4]) != struct.unpack_from(">I", data, end - 4)[0]:
             raise InputError(f"the PNG is damaged (checksum of its chunk at byte {place}): {name}")
-        first = first or data[place + 8 : end - 4]
-        transparent |= kind == b"tRNS"
+        kinds.add(kind)
         place = end
         if kind == b"IEND":
-            return _png_header(first, name, alpha=bool(transparent))
+            return kinds
     raise InputError(f"the PNG is cut off after {len(data)} bytes: {name}")
-
-
-def _png_header(header: bytes, name: str, *, alpha: bool) -> Kind:
-    if len(header) != 13 or header[9] not in PNG_CHANNELS:
-        raise InputError(f"the PNG has no header that makes sense: {name}")
-    width, height, bits, colour = struct.unpack_from(">IIBB", header)
-    channels = PNG_CHANNELS[colour] + (alpha and colour != 3)
-    return Kind(width, height, channels + (alpha and colour == 3), 8 if colour == 3 else bits, "png")
-
-
-def _jpeg_kind(data: bytes, name: str) -> Kind:
-    """Size by the frame's header, the first of the segments named so. Raises InputError."""
-    if not data.rstrip(b"\0").endswith(JPEG_END):
-        raise InputError(f"the JPEG is cut off after {len(data)} bytes: {name}")
-    place = 2
-    while place + 9 < len(data) and data[place] == 0xFF:
-        marker = data[place + 1]
-        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
-            bits, height, width, channels = struct.unpack_from(">BHHB", data, place + 4)
-            if bits != 8 or channels not in (1, 3):
-                raise InputError(f"a JPEG should have 8 bits and 1 or 3 channels, not {bits} and {channels}: {name}")
-            return Kind(width, height, channels, bits, "jpeg")
-        place += 2 + struct.unpack_from(">H", data, place + 2)[0]
-    raise InputError(f"the JPEG has no header that makes sense: {name}")

@@ -103,10 +103,6 @@ class PictureStream:
                     f"but the calibration is for {camera.width_px} x {camera.height_px}: {calibration}"
                 )
 
-    def notes(self) -> Notes:
-        """What is done to make the pictures 8-bit grey."""
-        return tuple(dict.fromkeys(sentence for kind in self.kinds for sentence in conversions(kind)))
-
     def frames(self) -> Iterator[StereoFrame]:
         """The pictures, 8-bit grey. Raises InputError, naming the file, for one that is not as the first."""
         for index, shot in enumerate(self.shots()):
@@ -136,14 +132,11 @@ NO_TRUTH = "There is no ground truth."
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A recording of any form, its pictures not yet read: `frames` reads and checks them one at a time.
+    """A recording of any form, all pictures unread: `frames` reads and checks them, `encoded_frames` keeps grey files.
 
-    `encoded_frames` are the same as files, untouched where they were 8-bit grey PNG or JPEG.
-
-    `t_ns` (N,) are the pictures' stamps. `truth` is the path of the body in its world, at stamps of its own;
-    exposures are their stamps (N,) and times in s and gains in dB (N, 2), encoders their stamps (M,) and counts
-    (M, 2). None stands for what there is not.
-    `notes` are sentences: everything assumed, converted or dropped.
+    `t_ns` (N,) are the pictures' stamps; `truth` is the path of the body in its world. Exposures are their stamps (N,)
+    and times in s and gains in dB (N, 2), encoders their stamps (M,) and counts (M, 2); None stands for what there is
+    not. `notes` are sentences: everything assumed, converted or dropped.
     """
 
     form: str
@@ -185,14 +178,27 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
             f"{len(parsed.T)} poses without stamps for {len(frames_ns)} pictures: give one pose a picture, or each "
             f"row its picture's number, from 0, as a first of 13 columns: {path}"
         )
-    T, off = parsed.T, _skew(parsed.T)
-    notes = list(parsed.notes)
+    T, notes = parsed.T, list(parsed.notes)
+    off = np.abs(np.swapaxes(T[:, :3, :3], -1, -2) @ T[:, :3, :3] - np.eye(3)).max(initial=0.0)
     if parsed.frames is not None:
         notes.append(f"{path.name} has poses of {len(T)} of {len(frames_ns)} pictures, by their numbers.")
     if off > EXACT:
         T = se3.transform(se3.nearest_rotation(T[:, :3, :3]), T[:, :3, 3])
         notes.append(f"Rotations of {path.name} were made exact; they were up to {off:.1g} off.")
     return Trajectory(t_ns, T), tuple(notes)
+
+
+def truth_file(
+    options: ReadOptions, beside: Iterable[Path], frames_ns: Stamps, whose: str, turn: Array | None = None
+) -> tuple[Trajectory | None, Notes]:
+    """The truth that the options name, or the first one beside the pictures; `turn` (4, 4) turns its axes into ours."""
+    path = options.truth or next((path for path in beside if path.exists()), None)
+    if path is None:
+        return None, ()
+    truth, notes = read_truth_file(path, frames_ns)
+    if turn is not None:
+        truth = Trajectory(truth.t_ns, turn @ truth.T_world_frame @ turn.T)
+    return truth, (f"The truth is {path.name}, {whose}", *notes)
 
 
 def cut_to(truth: Trajectory, frames_ns: Stamps) -> tuple[Trajectory | None, Notes]:
@@ -225,11 +231,6 @@ def apart(what: str, t_ns: Stamps, frames_ns: Stamps) -> str:
     return f"The {what}{when} was dropped: it shares no time with the pictures ({frames_ns[0]} to {frames_ns[-1]} ns)."
 
 
-def _skew(T: np.ndarray) -> float:
-    R = T[:, :3, :3]
-    return float(np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0))
-
-
 LEAST_BASELINE_M = 1e-6
 UNRECTIFIABLE = "The right camera is not to the right of the left one and looking the same way: nothing rectifies them."
 
@@ -245,12 +246,10 @@ def assemble(
     notes: Iterable[str] = (),
     calibration: str,
 ) -> Recording:
-    """A recording with pictures at t_ns (N,); `calibration` is the file that says what the rig is.
-
-    Raises InputError where pictures are not of the rig's size, or stamps are before 0 or beyond ROS's seconds.
-    """
+    """A recording at stamps t_ns (N,) by the rig of the file `calibration`. Raises InputError where they do not fit."""
     stream.require(rig, calibration)
-    said = [*notes, *_pair_notes(rig, calibration), *stream.notes()]
+    converted = [sentence for kind in stream.kinds for sentence in conversions(kind)]
+    said = [*notes, *_pair_notes(rig, calibration), *converted]
     if truth is None:
         said.append(NO_TRUTH)
     else:
@@ -263,14 +262,13 @@ def assemble(
         rig = replace(rig, imu=None)
     streams = [(t_ns, "picture"), *([(truth.t_ns, "true pose")] if truth else [])]
     streams += [(imu.t_ns, "IMU reading")] if imu and len(imu.t_ns) else []
-    starts = [_span(*stream) for stream in streams]
     return Recording(
         form=form,
         rig=rig,
         frames=stream.frames,
         encoded_frames=stream.encoded_frames,
         t_ns=t_ns,
-        start_ns=min(starts),
+        start_ns=min(_span(*stamps) for stamps in streams),
         truth=truth,
         imu=imu,
         notes=tuple(dict.fromkeys(said)),
@@ -327,10 +325,7 @@ class PictureList:
 
 
 def read_list(path: Path, folder: Path, *, separator: str | None, unit: Unit) -> PictureList:
-    """A list of stamps and names of pictures below `folder`.
-
-    Raises InputError naming file and line for what is no stamp, does not rise, or names a file outside the folder.
-    """
+    """A list of stamps and names of pictures below `folder`. Raises InputError naming file and line."""
     rows = content(read_text(path))
     if not rows:
         raise InputError(f"the list has no picture: {path}")
@@ -347,11 +342,23 @@ def read_list(path: Path, folder: Path, *, separator: str | None, unit: Unit) ->
     return PictureList(str(path), t_ns, paths)
 
 
-def present(*eyes: PictureList) -> tuple[list[PictureList], Notes]:
-    """The pictures of lists in step whose files are there for every eye, and what is to be said of the others.
+def listed_pictures(
+    *lists: tuple[Path, Path], separator: str | None, unit: Unit, within_ns: int = 0
+) -> tuple[list[PictureList], Notes]:
+    """The pictures of one or two eyes, each by its list and the folder that its names start from, and what to note.
 
-    Raises InputError where none is.
+    Pictures up to `within_ns` apart are a pair. Raises InputError as `read_list` does, and where no pair is there.
     """
+    eyes, notes = [read_list(path, folder, separator=separator, unit=unit) for path, folder in lists], Notes()
+    if len(eyes) > 1:
+        left, right = eyes
+        at_left, at_right, notes = partners(left.t_ns, right.t_ns, within_ns, f"{left.name} and {right.name}")
+        eyes = [left.at(at_left), right.at(at_right)]
+    found, missing = _present(*eyes)
+    return found, (*notes, *missing)
+
+
+def _present(*eyes: PictureList) -> tuple[list[PictureList], Notes]:
     # pathlib's own is_file raises for a name that is too long.
     is_there = np.array([all(map(isfile, paths)) for paths in zip(*(eye.paths for eye in eyes), strict=True)])
     if is_there.all():
@@ -381,8 +388,20 @@ def _dropped(is_there: NDArray[np.bool_], t_ns: Stamps, what: str) -> str:
     return f"{len(is_there) - len(found)} of {len(is_there)} {what} were dropped, for files are missing: {where}."
 
 
-def numbered(folder: Path) -> tuple[Path, ...]:
-    """The pictures of a folder that are numbered without a gap. Raises InputError naming the first that is missing."""
+def numbered(*folders: Path) -> list[tuple[Path, ...]]:
+    """The pictures of one or two eyes, of the same numbers without a gap. Raises InputError naming one that is not."""
+    eyes = [_numbered(folder) for folder in folders]
+    left, right = (tuple(eye.values()) for eye in (eyes[0], eyes[-1]))
+    if len(left) != len(right):
+        raise InputError(
+            f"{len(left)} left and {len(right)} right pictures; there should be as many: {folders[0]} and {folders[-1]}"
+        )
+    if min(eyes[0]) != min(eyes[-1]):
+        raise InputError(f"the first left and right pictures have other numbers: {left[0]} and {right[0]}")
+    return [left, right][: len(folders)]
+
+
+def _numbered(folder: Path) -> dict[int, Path]:
     found = sorted((int(match[1]), name) for name in listed(folder) if (match := NUMBERED.fullmatch(name)))
     if not found:
         raise InputError(f"no numbered PNG or JPEG picture in {folder}")
@@ -393,28 +412,11 @@ def numbered(folder: Path) -> tuple[Path, ...]:
         if number > expected:
             width = sum(character.isdigit() for character in pattern.partition(".")[0])
             raise InputError(f"a picture is missing: {folder / (f'{expected:0{width}d}' + pattern[width:])}")
-    return tuple(folder / name for _, name in found)
-
-
-def in_step(left: Sequence[Path], right: Sequence[Path] | None) -> None:
-    """Raise InputError unless two eyes have as many pictures, of the same numbers."""
-    if right is None:
-        return
-    if len(left) != len(right):
-        raise InputError(
-            f"{len(left)} left and {len(right)} right pictures; there should be as many: "
-            f"{left[0].parent} and {right[0].parent}"
-        )
-    first = [NUMBERED.fullmatch(paths[0].name) for paths in (left, right)]
-    if first[0] and first[1] and int(first[0][1]) != int(first[1][1]):
-        raise InputError(f"the first left and right pictures have other numbers: {left[0]} and {right[0]}")
+    return {number: folder / name for number, name in found}
 
 
 def partners(left_ns: Stamps, right_ns: Stamps, within_ns: int, name: str) -> tuple[Stamps, Stamps, Notes]:
-    """Indices (K,) of the left and right stamps that make pairs, and what is to be said of the others.
-
-    Raises InputError where there is no pair.
-    """
+    """Indices (K,) of the left and right stamps that make pairs, and notes. Raises InputError where none do."""
     pairs = associate(left_ns, right_ns, max_diff_ns=within_ns)
     if not len(pairs):
         raise InputError(f"no left and right picture have stamps within {within_ns} ns of each other in {name}")
@@ -428,17 +430,11 @@ def partners(left_ns: Stamps, right_ns: Stamps, within_ns: int, name: str) -> tu
     return pairs.gt, pairs.est, tuple(notes)
 
 
-def paired(left: PictureList, right: PictureList, within_ns: int) -> tuple[PictureList, PictureList, Notes]:
-    """Both lists with the same stamps, and sentences on what that took. Raises InputError where there is no pair."""
-    at_left, at_right, notes = partners(left.t_ns, right.t_ns, within_ns, f"{left.name} and {right.name}")
-    return left.at(at_left), replace(right.at(at_right), t_ns=left.t_ns[at_left]), notes
-
-
-def recorded_frames(t_ns: Stamps, *eyes: Sequence[Path]) -> Shots:
-    """The pictures of one or two eyes, read from their files as one goes."""
+def picture_files(t_ns: Stamps, *eyes: Sequence[Path]) -> PictureStream:
+    """The pictures of one or two eyes, read from their files as one goes. Raises InputError as `open` does."""
 
     def shots() -> Iterator[RecordedFrame]:
         for t, paths in zip(t_ns.tolist(), zip(*eyes, strict=True), strict=True):
             yield RecordedFrame(t, tuple(Picture(str(path), read_bytes(path)) for path in paths))
 
-    return shots
+    return PictureStream.open(shots)

@@ -12,7 +12,7 @@ from vobench.errors import InputError
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import Sequence, SequenceWriter, has_truth, read_truth
 from vobench.sequence.bag import part_of
-from vobench.sequence.writer import SENSORS_FILE
+from vobench.sequence.messages import SENSORS_FILE
 
 
 def is_sequence(path: Path) -> bool:
@@ -48,10 +48,7 @@ LAYOUTS = (Layout("vobench", f"a sequence of vobench: {SENSORS_FILE}", is_sequen
 
 
 def convert(recording: Recording, folder: Path, *, provenance: Mapping[str, str] | None = None) -> None:
-    """Write a recording as a sequence: stamps exactly, 8-bit grey pictures bit for bit, notes beside the truth.
-
-    Raises VobenchError, and leaves no file that reads as a whole one, where a picture is wrong.
-    """
+    """Write a recording as a sequence: stamps exactly, 8-bit grey pictures bit for bit. Raises VobenchError."""
     notes = {"form": recording.form, **{f"note_{index:02d}": note for index, note in enumerate(recording.notes, 1)}}
     with SequenceWriter(
         folder, recording.rig, case_json=None, start_ns=recording.start_ns, notes=notes, provenance=provenance

@@ -11,7 +11,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.errors import SequenceError
 from vobench.geometry import se3
@@ -30,10 +29,9 @@ from vobench.sequence import (
     read_twist,
     truth_channels,
 )
-from vobench.sequence.picture import decode, encode
+from vobench.sequence.picture import Image, decode, encode
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
-Grey = NDArray[np.uint8]
 FAR_PX = 30_000.0  # outside of any picture that OpenCV resamples, which takes NaN for any place
 PIXEL_TOLERANCE = 1e-6
 POSE_TOLERANCE = 1e-9  # metres, and entries of rotations
@@ -53,7 +51,7 @@ class Views:
         pixels = self.source_px[side] if self.source_px else camera.pixel_grid()
         return camera.rays(pixels)
 
-    def show(self, side: Side, picture: Grey) -> Grey:
+    def show(self, side: Side, picture: Image) -> Image:
         """A recorded picture in this view: linear between its pixels, black where it shows nothing."""
         if self.source_px is None:
             return picture
@@ -72,10 +70,7 @@ class Views:
 
 
 def rectified(rig: Rig) -> Views:
-    """The pinholes side by side that stand for a rig; as recorded where it is such a pair to 1e-6 px.
-
-    Raises SequenceError where nothing rectifies the pair.
-    """
+    """The pinholes side by side that stand for a rig, or the rig where it is that. Raises SequenceError for no pair."""
     flat, turns = _flat(rig)
     if pixel_difference(rig, flat) < PIXEL_TOLERANCE:
         return Views(flat)
@@ -203,10 +198,7 @@ def known_points(camera: Camera) -> Array:
 
 
 def pixel_difference(expected: Rig, found: Rig) -> float:
-    """The largest distance in pixels between what two rigs make of the same points; infinite for other pictures.
-
-    Points are given to both in the axes of their left camera.
-    """
+    """The largest distance in px between two rigs' views of the same points; infinite for other pictures."""
     if expected.sides != found.sides:
         return np.inf
     points, largest = known_points(expected.left), 0.0
@@ -226,7 +218,6 @@ def _seen_from_left(rig: Rig, points_left: Array, *, right: bool) -> Array:
 
 
 def _largest(expected: Array, found: Array) -> float:
-    """The largest distance over all that the first one sees; infinite where the other one does not."""
     blind = np.isnan(expected[:, 0])
     if not (~blind).any():
         return np.inf
@@ -243,16 +234,12 @@ def check_rig(what: str, expected: Rig, found: Rig, *, tolerance_px: float = PIX
             f"and {tolerance_px:g} px would be right"
         )
     if expected.imu and found.imu:
-        off = _pose_difference(_T_left_imu(expected), _T_left_imu(found))
+        mounts = ((expected, expected.imu), (found, found.imu))
+        off = _pose_difference(*(se3.inverse(rig.T_body_left) @ imu.T_body_imu for rig, imu in mounts))
         if not off < POSE_TOLERANCE:
             raise SequenceError(
                 f"{what} puts the IMU {off:.3g} beside its place, and {POSE_TOLERANCE:g} would be right"
             )
-
-
-def _T_left_imu(rig: Rig) -> Array:
-    T_body_imu = rig.imu.T_body_imu if rig.imu else np.eye(4)
-    return se3.inverse(rig.T_body_left) @ T_body_imu
 
 
 def check_path(what: str, expected: Trajectory, found: Trajectory) -> None:

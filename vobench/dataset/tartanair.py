@@ -1,80 +1,58 @@
 """Recordings in TartanAir's two layouts: simulated pinholes without stamps, axes north-east-down."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from vobench.dataset.kalibr import chain_rig
+from vobench.dataset.kalibr import chain_rig, on_body
 from vobench.dataset.layout import Layout
 from vobench.dataset.picture import unread
-from vobench.dataset.recording import (
-    Notes,
-    PictureStream,
-    ReadOptions,
-    Recording,
-    assemble,
-    in_step,
-    numbered,
-    read_truth_file,
-    recorded_frames,
-)
+from vobench.dataset.recording import Notes, ReadOptions, Recording, assemble, numbered, picture_files, truth_file
 from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import Rig, looking, side_by_side
-from vobench.trajectory.trajectory import Stamps, Trajectory
 
 RATE_HZ, MOST_HZ = 25.0, 1e6
 BASELINE_M = 0.25
 FOCAL_PX = 320.0  # 90° across 640 pixels; the centre is half the size, as its authors give it
 SIZES_PX = ((640, 480), (640, 640))
 FLIP = se3.transform(np.diag([1.0, -1.0, -1.0]), np.zeros(3))  # ahead-right-down to ahead-left-up, and back
+TRUTH = "of the left camera; world and body were turned from x ahead, y right, z down (NED) to x ahead, y left, z up."
 
 
-@dataclass(frozen=True, slots=True)
-class Names:
-    """What the layout calls its parts."""
-
-    left: str
-    right: str
-    poses: str
-
-
-VERSIONS = (
-    Names("image_left", "image_right", "pose_left.txt"),
-    Names("image_lcam_front", "image_rcam_front", "pose_lcam_front.txt"),
+VERSIONS = (  # what they call the left pictures, the right ones and the poses
+    ("image_left", "image_right", "pose_left.txt"),
+    ("image_lcam_front", "image_rcam_front", "pose_lcam_front.txt"),
 )
 
 
 def read_tartanair(folder: Path, options: ReadOptions) -> Recording:
     """A folder such as P000; the body is the left camera, its axes ahead, left, up. Raises InputError."""
-    names = next((names for names in VERSIONS if (folder / names.left).is_dir()), None)
+    names = next((names for names in VERSIONS if (folder / names[0]).is_dir()), None)
     if names is None:
-        raise InputError(f"no folder {' or '.join(names.left for names in VERSIONS)} with pictures in {folder}")
-    eyes = [numbered(folder / name) for name in (names.left, names.right) if (folder / name).is_dir()]
-    in_step(eyes[0], eyes[1] if len(eyes) > 1 else None)
+        raise InputError(f"no folder {' or '.join(left for left, _, _ in VERSIONS)} with pictures in {folder}")
+    *sides, poses = names
+    eyes = numbered(*(folder / name for name in sides if (folder / name).is_dir()))
     rate_hz = RATE_HZ if options.rate_hz is None else options.rate_hz
     if not 0 < rate_hz <= MOST_HZ:
         raise InputError(f"rate_hz should be above 0 and at most {MOST_HZ:g}, got {rate_hz:g}")
     t_ns = np.array([round(index * 1e9 / rate_hz) for index in range(len(eyes[0]))], np.int64)
-    stream = PictureStream.open(recorded_frames(t_ns, *eyes))
+    stream = picture_files(t_ns, *eyes)
     rig, calibration, lens_notes = _rig(folder, stream.size_px, len(eyes), options)
-    truth, truth_notes = _truth(folder / names.poses, t_ns, options)
+    truth, truth_notes = truth_file(options, [folder / poses], t_ns, TRUTH, FLIP)
     notes = [f"There are no stamps: pictures were taken to come at {rate_hz:g} Hz from 0.", *lens_notes, *truth_notes]
-    notes += unread(folder, names.left, names.right, names.poses)
+    notes += unread(folder, *names)
     if len(eyes) == 1:
-        notes.append(f"There is one camera: no folder {names.right}.")
+        notes.append(f"There is one camera: no folder {sides[1]}.")
     return assemble("tartanair", rig, stream, t_ns, truth=truth, notes=notes, calibration=calibration)
 
 
 def _rig(folder: Path, size_px: tuple[int, int], count: int, options: ReadOptions) -> tuple[Rig, str, Notes]:
-    """The simulator's camera, or that of Kalibr's chain, on a body with x ahead, y left, z up."""
     T_body_left = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))
     if options.calibration is not None:
         rig, notes = chain_rig(options.calibration, count, "left")
-        right = None if rig.T_body_right is None else T_body_left @ rig.T_body_right
-        return Rig(rig.left, rig.right, T_body_left, right), str(options.calibration), notes
+        return on_body(rig, T_body_left), str(options.calibration), notes
     if size_px not in SIZES_PX:
         raise InputError(
             f"TartanAir's pictures have {' or '.join(f'{w} x {h}' for w, h in SIZES_PX)} pixels, these have "
@@ -88,25 +66,11 @@ def _rig(folder: Path, size_px: tuple[int, int], count: int, options: ReadOption
     return rig, "TartanAir's own", (f"{known}, baseline {BASELINE_M:g} m.",)
 
 
-def _truth(beside: Path, t_ns: Stamps, options: ReadOptions) -> tuple[Trajectory | None, Notes]:
-    """The path of the left camera, its axes and the world's turned from north-east-down to z up."""
-    path = options.truth or beside
-    if options.truth is None and not path.exists():
-        return None, ()
-    truth, notes = read_truth_file(path, t_ns)
-    turned = Trajectory(truth.t_ns, FLIP @ truth.T_world_frame @ FLIP)
-    return turned, (
-        f"The truth is {path.name}, of the left camera; world and body were turned from x ahead, y right, z down "
-        "(NED) to x ahead, y left, z up.",
-        *notes,
-    )
-
-
 LAYOUTS = (
     Layout(
         "tartanair",
         "TartanAir: image_left/ or image_lcam_front/",
-        lambda path: any((path / names.left).is_dir() for names in VERSIONS),
+        lambda path: any((path / left).is_dir() for left, _, _ in VERSIONS),
         read_tartanair,
         frozenset({"calibration", "truth", "rate_hz"}),
     ),

@@ -1,6 +1,7 @@
 """The layout of the TUM RGB-D benchmark, read and written."""
 
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,25 +13,21 @@ from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
 from vobench.dataset.recording import (
     Notes,
-    PictureStream,
     ReadOptions,
     Recording,
     assemble,
-    present,
-    read_list,
-    read_truth_file,
-    recorded_frames,
+    listed_pictures,
+    picture_files,
+    truth_file,
 )
 from vobench.dataset.source import ExportSource, Views, png_frames
 from vobench.geometry.camera import BrownConrady, Camera, Pinhole
 from vobench.geometry.rig import Rig
-from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sensor.pixel_truth import Floats, Ids
 from vobench.sequence import read_truth_frames
 from vobench.sequence.picture import write_png
 from vobench.trajectory.formats import format_tum, seconds
-from vobench.trajectory.trajectory import Stamps, Trajectory
 
 LIST, TRUTH, DEPTH = "rgb.txt", "groundtruth.txt", "depth.txt"
 # The colour cameras of the three robots, 640 x 480. Source: the benchmark's page "File Formats".
@@ -44,10 +41,10 @@ WHICH = re.compile(r"(?:freiburg|fr)_?([123])(?![0-9])", re.IGNORECASE)
 
 def read_tum(folder: Path, options: ReadOptions) -> Recording:
     """A folder with rgb.txt; the body is its camera. Raises InputError, one sentence, naming the file."""
-    (pictures,), missing = present(read_list(folder / LIST, folder, separator=None, unit="s"))
-    stream = PictureStream.open(recorded_frames(pictures.t_ns, pictures.paths))
+    (pictures,), missing = listed_pictures((folder / LIST, folder), separator=None, unit="s")
+    stream = picture_files(pictures.t_ns, pictures.paths)
     rig, calibration, lens_notes = _rig(folder, options)
-    truth, truth_notes = _truth(folder, pictures.t_ns, options)
+    truth, truth_notes = truth_file(options, [folder / TRUTH], pictures.t_ns, "of the camera.")
     notes = ["There is one camera, and it is the body: x right, y down, z ahead."]
     notes += [*missing, *lens_notes, *truth_notes]
     if (folder / DEPTH).exists():
@@ -57,12 +54,12 @@ def read_tum(folder: Path, options: ReadOptions) -> Recording:
 
 
 def _rig(folder: Path, options: ReadOptions) -> tuple[Rig, str, Notes]:
-    """The camera by Kalibr's chain, or that of the robot that the folder's name or its list speaks of."""
     chain = find_chain(folder, options)
     if chain is not None:
         rig, notes = chain_rig(chain, 1, "left")
         return rig, str(chain), notes
-    found = WHICH.search(folder.resolve().name) or WHICH.search(_title(folder / LIST))
+    title = [line for line in read_text(folder / LIST).splitlines()[:3] if line.startswith("#")]  # names its bag
+    found = WHICH.search(folder.resolve().name) or WHICH.search(" ".join(title))
     if found is None:
         raise no_calibration(folder / "camchain.yaml")
     robot = f"freiburg{found[1]}"
@@ -70,27 +67,9 @@ def _rig(folder: Path, options: ReadOptions) -> tuple[Rig, str, Notes]:
     return rig, f"{robot}'s published one", (f"The calibration is the benchmark's own of {robot}'s colour camera.",)
 
 
-def _title(path: Path) -> str:
-    """The comments at a list's start, which name the bag that it came from."""
-    lines = read_text(path).splitlines()[:3]
-    return " ".join(line for line in lines if line.startswith("#"))
-
-
-def _truth(folder: Path, t_ns: Stamps, options: ReadOptions) -> tuple[Trajectory | None, Notes]:
-    path = options.truth or folder / TRUTH
-    if options.truth is None and not path.exists():
-        return None, ()
-    truth, notes = read_truth_file(path, t_ns)
-    return truth, (f"The truth is {path.name}, of the camera.", *notes)
-
-
 DEPTH_PER_M = 5000  # grey values of 16 bits; 0 is unknown
 FARTHEST_M = 65535 / DEPTH_PER_M
 DEPTH_TOPIC = "depth"
-
-
-def _left_alone(rig: Rig) -> Views:
-    return Views(replace(rig, right=None, T_body_right=None))
 
 
 def write_tum(source: ExportSource, views: Views, folder: Path) -> list[str]:
@@ -102,7 +81,8 @@ def write_tum(source: ExportSource, views: Views, folder: Path) -> list[str]:
     for frame in png_frames(source.sequence, views):
         (folder / "rgb" / f"{seconds(frame.t_ns)}.png").write_bytes(frame.pictures["left"])
         stamps.append(frame.t_ns)
-    _write_list(folder / "rgb.txt", "color images", stamps, "rgb")
+    paths = (f"rgb/{seconds(t)}.png" for t in stamps)
+    _write_table(folder / "rgb.txt", "color images", "filename", stamps, paths)
     notes.append("The pictures are grey. Stamps have 9 decimals, where TUM's own have 6, so that none is rounded.")
     notes += _write_depth(source, folder)
     if source.imu:
@@ -113,11 +93,6 @@ def write_tum(source: ExportSource, views: Views, folder: Path) -> list[str]:
     text = "# ground truth trajectory\n# timestamp tx ty tz qx qy qz qw\n" + format_tum(path)
     (folder / "groundtruth.txt").write_text(text, encoding="utf-8")
     return [*notes, "groundtruth.txt is the path of the left camera in the world, as TUM has it."]
-
-
-def _write_list(path: Path, what: str, stamps: list[int], subfolder: str) -> None:
-    rows = "".join(f"{seconds(t)} {subfolder}/{seconds(t)}.png\n" for t in stamps)
-    path.write_text(f"# {what}\n# file: vobench\n# timestamp filename\n{rows}", encoding="utf-8")
 
 
 def _write_depth(source: ExportSource, folder: Path) -> list[str]:
@@ -136,7 +111,8 @@ def _write_depth(source: ExportSource, folder: Path) -> list[str]:
         stamps.append(frame.t_ns)
         beyond += int(np.sum(depth_m > FARTHEST_M))
         known += int(np.isfinite(depth_m).sum())
-    _write_list(folder / "depth.txt", "depth maps", stamps, DEPTH_TOPIC)
+    paths = (f"{DEPTH_TOPIC}/{seconds(t)}.png" for t in stamps)
+    _write_table(folder / "depth.txt", "depth maps", "filename", stamps, paths)
     return [
         f"Depth is the true one in steps of {1e3 / DEPTH_PER_M:g} mm ({DEPTH_PER_M} values a metre) up to "
         f"{FARTHEST_M:.3f} m; {beyond / max(known, 1):.1%} of it lies farther away and is 0, unknown."
@@ -151,15 +127,16 @@ def depth_values(depth_m: Floats) -> Ids:
 
 
 def _write_imu(imu: ImuReadings, folder: Path) -> list[str]:
-    _write_rows(folder / "accelerometer.txt", "accelerometer data", "ax ay az", imu.t_ns, imu.accel_mps2)
-    both = np.hstack([imu.gyro_radps, imu.accel_mps2])
-    _write_rows(folder / "imu.txt", "IMU data", "wx wy wz ax ay az", imu.t_ns, both)
+    both = np.hstack([imu.gyro_radps, imu.accel_mps2]).tolist()
+    rows, t_ns = [[repr(value) for value in row] for row in both], imu.t_ns.tolist()
+    accel = (" ".join(row[3:]) for row in rows)
+    _write_table(folder / "accelerometer.txt", "accelerometer data", "ax ay az", t_ns, accel)
+    _write_table(folder / "imu.txt", "IMU data", "wx wy wz ax ay az", t_ns, map(" ".join, rows))
     return ["accelerometer.txt is in the IMU's axes. TUM has no file for a gyroscope: imu.txt, with both, is our own."]
 
 
-def _write_rows(path: Path, what: str, columns: str, t_ns: Stamps, values: Array) -> None:
-    rows = zip(t_ns.tolist(), values.tolist(), strict=True)
-    text = "".join(f"{seconds(t)} {' '.join(map(repr, row))}\n" for t, row in rows)
+def _write_table(path: Path, what: str, columns: str, t_ns: Iterable[int], rows: Iterable[str]) -> None:
+    text = "".join(f"{seconds(t)} {row}\n" for t, row in zip(t_ns, rows, strict=True))
     path.write_text(f"# {what}\n# file: vobench\n# timestamp {columns}\n{text}", encoding="utf-8")
 
 
@@ -170,6 +147,6 @@ LAYOUTS = (
         lambda path: (path / LIST).is_file(),
         read_tum,
         frozenset({"calibration", "truth"}),
-        Writing(write_tum, _left_alone, keeps=("imu", DEPTH_TOPIC)),
+        Writing(write_tum, lambda rig: Views(replace(rig, right=None, T_body_right=None)), keeps=("imu", DEPTH_TOPIC)),
     ),
 )

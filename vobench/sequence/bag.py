@@ -77,7 +77,6 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 @cache
 def _described(type_name: str) -> tuple[bytes, str]:
-    """The definition of a message type with all that it is made of, and ROS's hash of it."""
     return TYPES.generate_msgdef(type_name, ros_version=2)[0].encode(), TYPES.hash_rihs01(type_name)
 
 
@@ -119,10 +118,7 @@ class BagWriter:
         self._mcap.add_metadata(name, {**entries, CHECKSUM: _checksum(entries)})
 
     def write(self, topic: Topic, t_ns: int, data: bytes) -> None:
-        """Add a serialised message.
-
-        Raises SequenceError unless stamps rise per topic and never fall per file, and the topic was declared.
-        """
+        """Add a message. Raises SequenceError unless its topic is declared; stamps rise per topic and never fall."""
         channel = self._channels.get(topic, NO_CHANNEL)
         if channel == NO_CHANNEL:
             raise SequenceError(f"the rig of this recording has nothing that sends {topic.name}: {self.path}")
@@ -172,10 +168,7 @@ class BoundedFile(BufferedReader):
 
 @contextmanager
 def parsing(path: Path) -> Iterator[None]:
-    """Say of any failure inside, in one line, what is wrong with the file at `path`.
-
-    A torn or foreign file makes parsers raise errors of a dozen unrelated kinds.
-    """
+    """Say of any failure inside, of a dozen unrelated kinds in the parsers, in one line what is wrong with the file."""
     try:
         yield
     except SequenceError:
@@ -195,7 +188,6 @@ def part_of(path: Path) -> Path:
 
 
 def _ailment(path: Path, error: Exception) -> str:
-    """What is wrong with a file that could not be read, by its first and its last bytes."""
     try:
         with path.open("rb") as stream:
             start = stream.read(len(LFS_START))
@@ -214,10 +206,7 @@ def _ailment(path: Path, error: Exception) -> str:
 
 
 def unpack(packing: str, packed: bytes, size: int) -> bytes:
-    """The bytes of a chunk, never more than `size` and MAX_BYTES.
-
-    Raises ValueError, or an error of the packing's own, where it is none.
-    """
+    """The bytes of a chunk, never more than `size` and MAX_BYTES. Raises ValueError, or the packing's own error."""
     if size > MAX_BYTES:
         raise ValueError(f"a chunk states {size} bytes unpacked where at most {MAX_BYTES} are read")
     if not packing:
@@ -258,6 +247,10 @@ def messages_in(chunk: Chunk, channels: Container[int]) -> Iterator[tuple[int, i
             if channel in channels:
                 yield channel, log_ns, records[begin + MESSAGE.size : at]
     raise ValueError(f"{MAX_RECORDS} records and more lie in one chunk")
+
+
+def _messages(stream: BinaryIO, chunk: ChunkIndex, channels: Container[int]) -> Iterator[tuple[int, int, memoryview]]:
+    return messages_in(read_record(stream, chunk.chunk_start_offset, Chunk), channels)
 
 
 def read_record(stream: BinaryIO, offset: int, kind: type[Record]) -> Record:
@@ -341,7 +334,8 @@ class Bag:
 
     def count(self, topic: Topic) -> int:
         """How many messages a topic has; none where there is no such topic."""
-        return self._total(self._channel(topic))
+        channel = self._channel(topic)
+        return sum(counts.get(channel, 0) for counts in self.counts)
 
     def raw(self, topics: Iterable[Topic]) -> Iterator[tuple[Topic, memoryview]]:
         """The serialised messages of those topics that there are, in order of time, one chunk in memory at a time."""
@@ -349,7 +343,7 @@ class Bag:
         last_ns = 0
         with parsing(self.path), BoundedFile(self.path) as stream:
             for chunk, counts in zip(self.summary.chunk_indexes, self.counts, strict=True):
-                for channel, log_ns, data in self._messages(stream, chunk, there) if there.keys() & counts else ():
+                for channel, log_ns, data in _messages(stream, chunk, there) if there.keys() & counts else ():
                     if log_ns < last_ns:
                         raise ValueError(f"after {last_ns} ns comes {log_ns} ns")
                     last_ns = log_ns
@@ -362,15 +356,12 @@ class Bag:
                 yield topic, TYPES.deserialize_cdr(data, topic.type_name)
 
     def nth(self, topic: Topic, number: int) -> memoryview:
-        """The bytes of a topic's message of that number, of which only its chunk is read.
-
-        Raises SequenceError where there is none.
-        """
+        """A topic's message of that number, of which only its chunk is read. Raises SequenceError for none."""
         channel, skipped = self._channel(topic), number
         with parsing(self.path), BoundedFile(self.path) as stream:
             for chunk, counts in zip(self.summary.chunk_indexes, self.counts, strict=True):
                 if 0 <= skipped < counts.get(channel, 0):
-                    for _, _, data in islice(self._messages(stream, chunk, {channel}), skipped, None):
+                    for _, _, data in islice(_messages(stream, chunk, {channel}), skipped, None):
                         return data
                     raise ValueError(f"a chunk has {skipped} messages of {topic.name} where the index has more")
                 skipped -= counts.get(channel, 0)
@@ -423,11 +414,6 @@ class Bag:
                 raise ValueError(f"the checksum of the attachment {name!r} differs from its content")
             return data
 
-    def _messages(
-        self, stream: BinaryIO, chunk: ChunkIndex, channels: Container[int]
-    ) -> Iterator[tuple[int, int, memoryview]]:
-        return messages_in(read_record(stream, chunk.chunk_start_offset, Chunk), channels)
-
     def _channel(self, topic: Topic) -> int:
         found = [channel for channel in self.summary.channels.values() if channel.topic == topic.name]
         types = {self.summary.schemas[c.schema_id].name if c.schema_id else "" for c in found}
@@ -435,6 +421,3 @@ class Bag:
             kinds = " and ".join(sorted(types)) or "of no type" if len(found) == 1 else f"{len(found)} channels"
             raise SequenceError(f"{topic.name} should be {topic.type_name} but is {kinds} in {self.path}")
         return found[0].id if found else NO_CHANNEL
-
-    def _total(self, channel: int) -> int:
-        return sum(counts.get(channel, 0) for counts in self.counts)

@@ -11,7 +11,6 @@ from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag, BagWriter
 from vobench.sequence.messages import serialise
 
-WHEELS_NOTE, IMU_NOTE = "vobench.wheels", "vobench.imu"
 IMU_NUMBERS = tuple(field.name for field in fields(ImuCalibration) if field.name != "T_body_imu")
 
 
@@ -19,39 +18,30 @@ def write_mounts(bag: BagWriter, rig: Rig, t_ns: int) -> None:
     """Note the wheels and the IMU, and write where everything sits on the body."""
     if wheels := rig.wheels:
         lengths = {"radius_m": repr(float(wheels.radius_m)), "track_m": repr(float(wheels.track_m))}
-        bag.note(WHEELS_NOTE, {**lengths, "ticks_per_revolution": str(wheels.ticks_per_revolution)})
+        bag.note(ros.WHEELS_NOTE, {**lengths, "ticks_per_revolution": str(wheels.ticks_per_revolution)})
     if rig.imu:
-        bag.note(IMU_NOTE, {name: repr(float(getattr(rig.imu, name))) for name in IMU_NUMBERS})
-    bag.write(ros.TF_STATIC, t_ns, serialise(ros.transforms(t_ns, ros.BODY, _mounts(rig))))
+        bag.note(ros.IMU_NOTE, {name: repr(float(getattr(rig.imu, name))) for name in IMU_NUMBERS})
+    T_body = dict(zip((ros.LEFT, ros.RIGHT), (rig.T_body_camera(side) for side in rig.sides), strict=False))
+    if rig.imu:
+        T_body[ros.IMU_FRAME] = rig.imu.T_body_imu
+    bag.write(ros.TF_STATIC, t_ns, serialise(ros.transforms(t_ns, ros.BODY, T_body)))
 
 
 def read_rig(bag: Bag, info_topics: Sequence[ros.Topic]) -> Rig:
-    """The rig of a bag, its cameras by their topics: the left one, and the right one where there is one.
-
-    Raises SequenceError where the calibration is missing or makes no sense.
-    """
+    """The rig of a bag, its left and right camera by their topics. Raises SequenceError where that is wrong."""
     bag.require((ros.TF_STATIC, *info_topics[:1]))
     cameras = [ros.camera(_first(bag, topic)) for topic in info_topics if bag.has(topic)]
-    T_body = _read_mounts(bag)
+    stamped = _first(bag, ros.TF_STATIC).transforms
+    T_body = {t.child_frame_id: ros.poses(ros.pose_fields(t.transform)) for t in stamped}
     left, right = cameras[0], cameras[1] if len(cameras) > 1 else None
     T_body_right = _mount(bag, T_body, ros.RIGHT) if right else None
     return Rig(left, right, _mount(bag, T_body, ros.LEFT), T_body_right, _read_wheels(bag), _read_imu(bag, T_body))
-
-
-def _mounts(rig: Rig) -> dict[str, Array]:
-    T_body = dict(zip((ros.LEFT, ros.RIGHT), (rig.T_body_camera(side) for side in rig.sides), strict=False))
-    return {**T_body, ros.IMU_FRAME: rig.imu.T_body_imu} if rig.imu else T_body
 
 
 def _first(bag: Bag, topic: ros.Topic) -> Any:
     for _, message in bag.messages((topic,)):
         return message
     raise SequenceError(f"{topic.name} has no message in {bag.path}")
-
-
-def _read_mounts(bag: Bag) -> dict[str, Array]:
-    stamped = _first(bag, ros.TF_STATIC).transforms
-    return {t.child_frame_id: ros.poses(ros.pose_fields(t.transform)) for t in stamped}
 
 
 def _mount(bag: Bag, T_body: dict[str, Array], frame: str) -> Array:
@@ -61,7 +51,7 @@ def _mount(bag: Bag, T_body: dict[str, Array], frame: str) -> Array:
 
 
 def _read_wheels(bag: Bag) -> WheelGeometry | None:
-    entries = bag.note(WHEELS_NOTE)
+    entries = bag.note(ros.WHEELS_NOTE)
     if not entries:
         return None
     try:
@@ -74,7 +64,7 @@ def _read_wheels(bag: Bag) -> WheelGeometry | None:
 
 
 def _read_imu(bag: Bag, T_body: dict[str, Array]) -> ImuCalibration | None:
-    entries = bag.note(IMU_NOTE)
+    entries = bag.note(ros.IMU_NOTE)
     if not entries:
         return None
     try:

@@ -1,4 +1,4 @@
-"""ROS 2 messages and topics of a sequence, and their CDR form."""
+"""Files, notes, topics and ROS 2 messages of a sequence, and their CDR form."""
 
 import struct
 from dataclasses import dataclass
@@ -24,6 +24,10 @@ from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 
 WORLD, BODY, LEFT, RIGHT, IMU_FRAME = "map", "base_link", "cam_left", "cam_right", "imu"
+SENSORS_FILE, TRUTH_FILE = "sensors.mcap", "truth.mcap"
+CASE_ATTACHMENT, NAMES_ATTACHMENT = "case.json", "truth_names.json"
+PROVENANCE_NOTE, IMPORT_NOTE = "vobench.provenance", "vobench.import"
+WHEELS_NOTE, IMU_NOTE = "vobench.wheels", "vobench.imu"
 NS_PER_S = 1_000_000_000
 END_OF_STAMPS_NS = 2**31 * NS_PER_S  # ROS counts seconds in 31 bits
 UNKNOWN = -1.0  # in the first element of a covariance: "there is no estimate of this", says sensor_msgs/Imu
@@ -132,10 +136,6 @@ def _make(type_name: str, *fields: Any) -> Any:
     return TYPES.types[type_name](*fields)
 
 
-def _vector(xyz: ArrayLike) -> Any:
-    return _make("geometry_msgs/msg/Vector3", *np.asarray(xyz, float).tolist())
-
-
 def _quaternion(R: Array) -> Any:
     return _make("geometry_msgs/msg/Quaternion", *se3.to_quaternion(R).tolist())
 
@@ -159,7 +159,7 @@ def transforms(t_ns: int, parent: str, T_parent_child: dict[str, Array]) -> Any:
             "geometry_msgs/msg/TransformStamped",
             header(t_ns, parent),
             child,
-            _make("geometry_msgs/msg/Transform", _vector(T[:3, 3]), _quaternion(T[:3, :3])),
+            _make("geometry_msgs/msg/Transform", vector(T[:3, 3]), _quaternion(T[:3, :3])),
         )
         for child, T in T_parent_child.items()
     ]
@@ -204,40 +204,25 @@ def _own_matrix(camera: Camera) -> Array:
 
 def image(t_ns: int, frame_id: str, encoded: bytes, form: str) -> Any:
     """A sensor_msgs/CompressedImage; `form` is png or jpeg."""
-    return _make(LEFT_IMAGE.type_name, header(t_ns, frame_id), form, np.frombuffer(encoded, np.uint8))
+    return message(LEFT_IMAGE, t_ns, frame_id, form, np.frombuffer(encoded, np.uint8))
 
 
-def exposure(t_ns: int, time_s: float, gain_db: float) -> Any:
-    """How a stereo pair was exposed, as a vobench_msgs/Exposure."""
-    return _make(EXPOSURE.type_name, header(t_ns, LEFT), float(time_s), float(gain_db))
+def message(topic: Topic, t_ns: int, frame_id: str, *fields: Any) -> Any:
+    """A message that is a header and these fields, as those of vobench_msgs are."""
+    return _make(topic.type_name, header(t_ns, frame_id), *fields)
 
 
-def wheel_ticks(t_ns: int, left: int, right: int) -> Any:
-    """One encoder reading as a vobench_msgs/WheelTicks."""
-    return _make(ENCODERS.type_name, header(t_ns, BODY), int(left), int(right))
+def vector(xyz: ArrayLike) -> Any:
+    """A geometry_msgs/Vector3."""
+    return _make("geometry_msgs/msg/Vector3", *np.asarray(xyz, float).tolist())
 
 
 def imu(t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike, variances: tuple[float, float]) -> Any:
-    """One reading as a sensor_msgs/Imu that knows no orientation.
-
-    `variances` are those of one axis, of the gyro and of the accelerometer; 0 where they are not known.
-    """
+    """One reading as a sensor_msgs/Imu; `variances` are those of one axis of gyro and accelerometer, 0 if not known."""
     upright, unknown = _make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0), np.zeros(9)
     unknown[0] = UNKNOWN
     gyro, accel = (np.eye(3).ravel() * variance for variance in variances)
-    fields = (header(t_ns, IMU_FRAME), upright, unknown, _vector(gyro_radps), gyro, _vector(accel_mps2), accel)
-    return _make(IMU.type_name, *fields)
-
-
-def disturbance(t_ns: int, slip: ArrayLike, push: ArrayLike) -> Any:
-    """Slip of the left and right wheel and to the side (3,), and pushes (2,), as a vobench_msgs/Disturbance."""
-    values = *np.asarray(slip, float).tolist(), *np.asarray(push, float).tolist()
-    return _make(DISTURBANCE.type_name, header(t_ns, BODY), *values)
-
-
-def imu_bias(t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike) -> Any:
-    """An IMU's biases as a vobench_msgs/ImuBias."""
-    return _make(IMU_BIAS.type_name, header(t_ns, IMU_FRAME), _vector(gyro_radps), _vector(accel_mps2))
+    return message(IMU, t_ns, IMU_FRAME, upright, unknown, vector(gyro_radps), gyro, vector(accel_mps2), accel)
 
 
 def odometry(t_ns: int, T_world_body: Array, twist_body: ArrayLike | None) -> Any:
@@ -247,7 +232,7 @@ def odometry(t_ns: int, T_world_body: Array, twist_body: ArrayLike | None) -> An
     position = _make("geometry_msgs/msg/Point", *T_world_body[:3, 3].tolist())
     pose = _make("geometry_msgs/msg/Pose", position, _quaternion(T_world_body[:3, :3]))
     linear, angular = np.zeros((2, 3)) if twist_body is None else np.asarray(twist_body, float).reshape(2, 3)
-    twist = _make("geometry_msgs/msg/Twist", _vector(linear), _vector(angular))
+    twist = _make("geometry_msgs/msg/Twist", vector(linear), vector(angular))
     return _make(
         ODOMETRY.type_name,
         header(t_ns, WORLD),

@@ -15,7 +15,8 @@ Image = NDArray[np.uint8]
 Encoded = bytes | memoryview | Image
 
 PNG_START, JPEG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR", b"\xff\xd8\xff"
-PNG_HEADER = struct.Struct(">IIBB")  # width, height, bits, colour type; 0 is grey
+PNG_HEADER = struct.Struct(">IIBB")  # width, height, bits, colour type
+PNG_CHANNELS, PALETTE = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}, 3  # by colour type; of a palette the colours count
 JPEG_SEGMENT, JPEG_FRAME = struct.Struct(">BBH"), struct.Struct(">BHHB")  # bits, height, width, components
 # Those of the markers C0 to CF that begin no frame: Huffman tables, extensions, arithmetic coding.
 NO_FRAME = (0xC4, 0xC8, 0xCC)
@@ -43,10 +44,7 @@ def encode(image: Image, camera: Camera, name: str, *, jpeg_quality: int | None 
 
 
 def decode(encoded: Encoded, camera: Camera | None, name: str) -> Image:
-    """A grey picture (H, W) from its PNG or JPEG. Raises SequenceError where it is none, or not of the camera's size.
-
-    The header is looked at first, so that a false one costs no memory.
-    """
+    """A grey picture (H, W) of a PNG or JPEG, by its header first. Raises SequenceError, also for another size."""
     size = require_grey(encoded, camera, name)[1:]
     image = cv2.imdecode(np.frombuffer(encoded, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None or image.shape != size or image.dtype != np.uint8:
@@ -55,14 +53,10 @@ def decode(encoded: Encoded, camera: Camera | None, name: str) -> Image:
 
 
 def require_grey(encoded: Encoded, camera: Camera | None, name: str) -> tuple[str, int, int]:
-    """Form (png or jpeg), height and width by a picture's header.
-
-    Raises SequenceError where it is not 8-bit grey, or not of the camera's size.
-    """
+    """Form, height and width by a header. Raises SequenceError where it is not 8-bit grey, or not the camera's size."""
     try:
-        form, height, width, bits, components = _header(
-            encoded.data if isinstance(encoded, np.ndarray) else memoryview(encoded)
-        )
+        found = header(encoded.data if isinstance(encoded, np.ndarray) else memoryview(encoded))
+        form, height, width, bits, components = found
     except struct.error:
         raise SequenceError(f"the picture ends within its header: {name}") from None
     if bits != 8 or components != 1 or not 0 < height * width <= MAX_PX:
@@ -72,15 +66,17 @@ def require_grey(encoded: Encoded, camera: Camera | None, name: str) -> tuple[st
     return form, height, width
 
 
-def _header(encoded: memoryview) -> tuple[str, int, int, int, int]:
-    """Form, height, width, bits and components; no components where it is neither PNG nor JPEG."""
+def header(encoded: memoryview) -> tuple[str, int, int, int, int]:
+    """Form, height, width, bits and channels, no channel where it makes no sense. Raises struct.error where it ends."""
     if encoded[: len(PNG_START)] == PNG_START:
         width, height, bits, colour = PNG_HEADER.unpack_from(encoded, len(PNG_START))
-        return "png", height, width, bits, 1 if colour == 0 else 3
+        return "png", height, width, 8 if colour == PALETTE else bits, PNG_CHANNELS.get(colour, 0)
     if encoded[: len(JPEG_START)] == JPEG_START:
         at = 2
         while True:
-            _, marker, length = JPEG_SEGMENT.unpack_from(encoded, at)
+            start, marker, length = JPEG_SEGMENT.unpack_from(encoded, at)
+            if start != 0xFF:
+                break
             if 0xC0 <= marker <= 0xCF and marker not in NO_FRAME:
                 bits, height, width, components = JPEG_FRAME.unpack_from(encoded, at + JPEG_SEGMENT.size)
                 return "jpeg", height, width, bits, components

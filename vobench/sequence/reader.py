@@ -19,18 +19,10 @@ from vobench.sensor.imu import ImuBias, ImuReadings
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, check_channels
 from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag, parsing, part_of
-from vobench.sequence.calibration import IMU_NOTE, WHEELS_NOTE, read_rig
+from vobench.sequence.calibration import read_rig
 from vobench.sequence.messages import picture_in
 from vobench.sequence.picture import Image, decode
 from vobench.sequence.pixel_truth import names_from_json, truth_topic, truth_topics, truth_values
-from vobench.sequence.writer import (
-    CASE_ATTACHMENT,
-    IMPORT_NOTE,
-    NAMES_ATTACHMENT,
-    PROVENANCE_NOTE,
-    SENSORS_FILE,
-    TRUTH_FILE,
-)
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 LONGEST_PATH = 60  # characters of it in a repr
@@ -69,7 +61,7 @@ class Sequence:
     @classmethod
     def open(cls, folder: Path) -> "Sequence":
         """Check the sensors of a recording and read its calibration. Raises SequenceError."""
-        bag = Bag.open(Path(folder) / SENSORS_FILE)
+        bag = Bag.open(Path(folder) / ros.SENSORS_FILE)
         bag.require((ros.LEFT_INFO, ros.LEFT_IMAGE))
         rig = read_rig(bag, ros.INFO_TOPICS)
         counts = [bag.count(topic) for topic in ros.IMAGE_TOPICS[: len(rig.sides)]]
@@ -175,7 +167,7 @@ def _table(bag: Bag, topic: ros.Topic, row: Callable[[Any], Iterable[float]], wi
 
 
 def _truth_bag(folder: Path) -> Bag:
-    return Bag.open(Path(folder) / TRUTH_FILE)
+    return Bag.open(Path(folder) / ros.TRUTH_FILE)
 
 
 def read_truth(folder: Path) -> Trajectory:
@@ -188,7 +180,7 @@ def read_truth(folder: Path) -> Trajectory:
 
 def has_truth(folder: Path) -> bool:
     """Whether the true path is known: not of every imported recording. Raises SequenceError where its file is torn."""
-    path = Path(folder) / TRUTH_FILE
+    path = Path(folder) / ros.TRUTH_FILE
     return (path.exists() or part_of(path).exists()) and Bag.open(path).count(ros.ODOMETRY) > 0
 
 
@@ -211,49 +203,43 @@ def read_imu_bias(folder: Path) -> ImuBias:
 
 
 def read_disturbances(folder: Path) -> tuple[Stamps, Array]:
-    """Stamps (N,) and what disturbed the robot (N, 5); empty where nothing was noted.
-
-    Slip ratios of the left and right wheel, side slip in rad, pushes in m/s² and rad/s².
-    """
+    """Stamps (N,) and left and right slip ratio, side slip in rad, pushes in m/s² and rad/s² (N, 5), if noted."""
     names = ("left_slip", "right_slip", "side_slip_rad", "push_mps2", "turn_push_radps2")
     return _table(_truth_bag(folder), ros.DISTURBANCE, lambda m: [getattr(m, name) for name in names], 5)
 
 
 def read_true_rig(folder: Path) -> Rig:
-    """The rig that the pictures were made with, where the one of `Sequence` is what estimators are told.
-
-    Raises SequenceError where the file is not whole, or is of the time before it held the true rig.
-    """
+    """The rig that the pictures were made with; `Sequence.rig` is what estimators are told. Raises SequenceError."""
     return read_rig(_truth_bag(folder), ros.TRUE_INFO_TOPICS)
 
 
 def read_case(folder: Path) -> bytes:
     """The case that a recording was made from, as its writer gave it. Raises SequenceError where it was imported."""
-    return _truth_bag(folder).attachment(CASE_ATTACHMENT)
+    return _truth_bag(folder).attachment(ros.CASE_ATTACHMENT)
 
 
 def read_provenance(folder: Path) -> dict[str, str]:
     """The versions of what made a recording, by name; nothing in it for one of the time before they were noted."""
-    return _truth_bag(folder).note(PROVENANCE_NOTE)
+    return _truth_bag(folder).note(ros.PROVENANCE_NOTE)
 
 
 def read_import_notes(folder: Path) -> dict[str, str]:
     """What was noted when a recording was imported; nothing in it where it was not."""
-    return _truth_bag(folder).note(IMPORT_NOTE)
+    return _truth_bag(folder).note(ros.IMPORT_NOTE)
 
 
 def payload_hash(folder: Path) -> str:
     """SHA-256 over all that was recorded: pixels instead of encoded bytes, which change with libpng."""
     digest = hashlib.sha256()
     later = (*ros.TRUE_INFO_TOPICS, ros.IMU_BIAS, ros.DISTURBANCE, *truth_topics())
-    sensors, truth = (Bag.open(Path(folder) / name) for name in (SENSORS_FILE, TRUTH_FILE))
+    sensors, truth = (Bag.open(Path(folder) / name) for name in (ros.SENSORS_FILE, ros.TRUTH_FILE))
     for bag, topics in ((sensors, ros.SENSOR_TOPICS), (truth, (*ros.TRUTH_TOPICS, *later))):
         for topic, data in bag.raw(topics):
             payload = _pixels(data, bag.path) if topic in ros.IMAGE_TOPICS else data
             digest.update(f"{topic.name} {len(payload)}\n".encode())
             digest.update(payload)
-    digest.update(repr(sorted(sensors.note(WHEELS_NOTE).items())).encode())
-    if imu := sensors.note(IMU_NOTE):
+    digest.update(repr(sorted(sensors.note(ros.WHEELS_NOTE).items())).encode())
+    if imu := sensors.note(ros.IMU_NOTE):
         digest.update(repr(sorted(imu.items())).encode())
     return digest.hexdigest()
 
@@ -283,14 +269,11 @@ def truth_channels(folder: Path) -> tuple[str, ...]:
 
 def read_truth_names(folder: Path) -> TruthNames:
     """What the ids of `instance` and `material` mean. Raises SequenceError where no channels were recorded."""
-    return names_from_json(_truth_bag(folder).attachment(NAMES_ATTACHMENT))
+    return names_from_json(_truth_bag(folder).attachment(ros.NAMES_ATTACHMENT))
 
 
 def read_truth_frames(folder: Path, channels: Iterable[str] | None = None) -> Iterator[StereoTruth]:
-    """Some channels (None: all there are) of each instant's pictures; only the current ones are held in memory.
-
-    Raises SequenceError where one was not recorded, or a picture lacks one.
-    """
+    """Channels (None: all) of each instant's pictures, one instant in memory. Raises SequenceError if one lacks."""
     bag, there = _truth_bag(folder), truth_channels(folder)
     wanted = there if channels is None else check_channels(channels)
     for name in wanted:

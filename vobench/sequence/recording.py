@@ -29,7 +29,6 @@ POSES = {
 }
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 NORM_TOLERANCE = 1e-3
-PACKINGS = ("zstd", "lz4")
 
 
 def is_recording(path: Path) -> bool:
@@ -38,11 +37,7 @@ def is_recording(path: Path) -> bool:
 
 
 def read_poses(path: Path, topic: str | None) -> Trajectory:
-    """The poses of a topic: PoseStamped, Odometry, TransformStamped, or one transform, `/tf:parent.child`.
-
-    Without a topic, the only one with poses. Raises SequenceError naming the topics there are
-    where that is not one, where the recording is torn, or where a pose is none.
-    """
+    """The poses of a topic, or `/tf:parent.child`; None: of the only one with poses. Raises SequenceError."""
     return _trajectory(*_read(path, topic), path)
 
 
@@ -63,7 +58,6 @@ def _read(path: Path, topic: str | None) -> tuple[Stamps, Array]:
 
 
 def _trajectory(t_ns: Stamps, fields: Array, path: Path) -> Trajectory:
-    """Poses of these fields. Raises SequenceError where one is none, or stamps do not rise."""
     _require_valid(t_ns, fields, path)
     fields[:, 3:] /= np.linalg.norm(fields[:, 3:], axis=1, keepdims=True)
     return Trajectory(t_ns, ros.poses(fields))
@@ -77,12 +71,9 @@ def _suffix(path: Path) -> str | None:
 
 @contextmanager
 def opened(path: Path) -> Iterator[AnyReader]:
-    """A reader of the recording, whatever its file is called: rosbags goes by endings, so it gets one.
-
-    Raises SequenceError for whatever its reader raises inside.
-    """
+    """A reader of any recording; rosbags goes by endings, so the file gets one. Its errors become SequenceError."""
     # rosbags looks at the size of a chunk after it has unpacked it: a few kB can make many GB.
-    DECOMPRESSORS.update({packing: partial(unpack, packing) for packing in PACKINGS})
+    DECOMPRESSORS.update({packing: partial(unpack, packing) for packing in ("zstd", "lz4")})
     folder = Path(mkdtemp(prefix="vobench-bag-"))
     with stop.undone(lambda: stop.remove(folder)):
         link = path
@@ -102,7 +93,6 @@ def opened(path: Path) -> Iterator[AnyReader]:
 
 
 def _rows(reader: AnyReader, path: Path, topic: str | None) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """Stamp in ns and `pose_fields` of each pose."""
     name, _, frames = (topic or _only_topic(reader, path)).partition(":")
     chosen = [connection for connection in reader.connections if connection.topic == name]
     if not chosen:

@@ -23,9 +23,6 @@ from vobench.sequence.messages import pictured, serialise, stamped
 from vobench.sequence.picture import Image, encode, require_grey
 from vobench.sequence.pixel_truth import check_truth, names_to_json, truth_image, truth_topic, truth_topics
 
-SENSORS_FILE, TRUTH_FILE = "sensors.mcap", "truth.mcap"
-CASE_ATTACHMENT, NAMES_ATTACHMENT = "case.json", "truth_names.json"
-PROVENANCE_NOTE, IMPORT_NOTE = "vobench.provenance", "vobench.import"
 NAMES = (ros.LEFT, ros.RIGHT)
 
 T = TypeVar("T")
@@ -60,17 +57,18 @@ class SequenceWriter:
         self._info = [serialise(info) for info in ros.camera_infos(0, rig)]
         self._form, self._blank = "", [b""]
         folder.mkdir(parents=True, exist_ok=True)
+        sensed = ros.sensor_topics(rig)
         topics = (*ros.truth_topics(self._true_rig), *truth_topics(self._channels, self._true_rig.sides))
         with ExitStack() as stack:
             # What is entered first ends last: where there are sensors, the truth is whole.
-            self._sensors = stack.enter_context(BagWriter(folder / SENSORS_FILE, ros.sensor_topics(rig), encoded=True))
-            self._truth = stack.enter_context(BagWriter(folder / TRUTH_FILE, topics, encoded=False))
+            self._sensors = stack.enter_context(BagWriter(folder / ros.SENSORS_FILE, sensed, encoded=True))
+            self._truth = stack.enter_context(BagWriter(folder / ros.TRUTH_FILE, topics, encoded=False))
             if case_json is not None:
-                self._truth.attach(CASE_ATTACHMENT, "application/json", case_json)
+                self._truth.attach(ros.CASE_ATTACHMENT, "application/json", case_json)
             if self._channels:
                 names = names_to_json(truth_names or TruthNames())
-                self._truth.attach(NAMES_ATTACHMENT, "application/json", names)
-            for name, entries in ((PROVENANCE_NOTE, provenance), (IMPORT_NOTE, notes)):
+                self._truth.attach(ros.NAMES_ATTACHMENT, "application/json", names)
+            for name, entries in ((ros.PROVENANCE_NOTE, provenance), (ros.IMPORT_NOTE, notes)):
                 if entries:
                     self._truth.note(name, entries)
             self._write_rigs(start_ns)
@@ -122,13 +120,14 @@ class SequenceWriter:
 
     def write_exposure(self, t_ns: int, time_s: float, gain_db: float) -> None:
         """Add how the pictures of that stamp were exposed."""
-        self._sensors.write(ros.EXPOSURE, int(t_ns), serialise(ros.exposure(t_ns, time_s, gain_db)))
+        fields = float(time_s), float(gain_db)
+        self._sensors.write(ros.EXPOSURE, int(t_ns), serialise(ros.message(ros.EXPOSURE, t_ns, ros.LEFT, *fields)))
 
     def write_encoders(self, t_ns: ArrayLike, ticks: ArrayLike) -> None:
         """Add encoder readings: stamps (M,) and counts (M, 2) int64, left and right."""
         stamps, counts = np.asarray(t_ns, np.int64), np.asarray(ticks, np.int64)
-        for t, (left, right) in zip(stamps.tolist(), counts.reshape(-1, 2).tolist(), strict=True):
-            self._sensors.write(ros.ENCODERS, t, serialise(ros.wheel_ticks(t, left, right)))
+        for t, pair in zip(stamps.tolist(), counts.reshape(-1, 2).tolist(), strict=True):
+            self._sensors.write(ros.ENCODERS, t, serialise(ros.message(ros.ENCODERS, t, ros.BODY, *pair)))
 
     def write_imu(self, readings: ImuReadings) -> None:
         """Add readings of the IMU. Raises SequenceError where the rig has none."""
@@ -141,11 +140,13 @@ class SequenceWriter:
 
     def write_imu_bias(self, t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike) -> None:
         """Add what the IMU's readings are off by, (3,) each, slowly varying."""
-        self._truth.write(ros.IMU_BIAS, int(t_ns), serialise(ros.imu_bias(t_ns, gyro_radps, accel_mps2)))
+        bias = ros.vector(gyro_radps), ros.vector(accel_mps2)
+        self._truth.write(ros.IMU_BIAS, int(t_ns), serialise(ros.message(ros.IMU_BIAS, t_ns, ros.IMU_FRAME, *bias)))
 
     def write_disturbance(self, t_ns: int, slip: ArrayLike, push: ArrayLike) -> None:
         """Add what disturbs the robot: slip of the left and right wheel and side slip in rad (3,), pushes (2,)."""
-        self._truth.write(ros.DISTURBANCE, int(t_ns), serialise(ros.disturbance(t_ns, slip, push)))
+        fields = *np.asarray(slip, float).tolist(), *np.asarray(push, float).tolist()
+        self._truth.write(ros.DISTURBANCE, int(t_ns), serialise(ros.message(ros.DISTURBANCE, t_ns, ros.BODY, *fields)))
 
     def write_truth(self, t_ns: int, T_world_body: Array, twist_body: ArrayLike | None) -> None:
         """Add the body's true pose (4, 4) and its twist (6,), m/s then rad/s, in body axes; None where unknown."""
