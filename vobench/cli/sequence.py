@@ -163,7 +163,7 @@ def _calibration(rig: Rig) -> dict[str, Any]:
 
 
 def _camera(camera: Camera) -> dict[str, Any]:
-    numbers = {field.name: getattr(camera, field.name) for field in fields(camera)}  # type: ignore[arg-type]
+    numbers = {field.name: getattr(camera, field.name) for field in fields(camera)}
     return {"model": type(camera).__name__, **numbers}
 
 
