@@ -1,8 +1,9 @@
 """The paper's point controller (20)-(21), its limits, and the targets it is led to."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, cos, inf, isfinite, sin, tanh
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
@@ -89,16 +90,12 @@ def loop_growth(gain_per_s: float, theta: Theta | None, *, period_s: float, subs
     )
 
 
-def settling_gain(gain_per_s: float, theta: Theta | None, *, period_s: float, substeps: int, integrator: str) -> float:
-    """The gain below which the loop of `loop_growth` is stable, 1/s, where `gain_per_s` is one that is not."""
-
-    def is_stable(k: float) -> bool:
-        return loop_growth(k, theta, period_s=period_s, substeps=substeps, integrator=integrator) < 1
-
+def settling_gain(gain_per_s: float, growth: Callable[[float], float]) -> float:
+    """The gain below which the loop of this growth is stable, 1/s, where `gain_per_s` is one that is not."""
     low, high = 0.0, gain_per_s
     for _ in range(40):
         middle = (low + high) / 2
-        low, high = (middle, high) if is_stable(middle) else (low, middle)
+        low, high = (middle, high) if growth(middle) < 1 else (low, middle)
     return low
 
 
@@ -145,10 +142,10 @@ class Vehicle:
 
     def __post_init__(self) -> None:
         require(self)
-        k, period_s = self.controller.gain_per_s, 1 / self.rate_hz
-        growth = loop_growth(k, self.theta, period_s=period_s, substeps=self.substeps, integrator=self.integrator)
-        if growth > 1 - 1e-9:
-            limit = settling_gain(k, self.theta, period_s=period_s, substeps=self.substeps, integrator=self.integrator)
+        k = self.controller.gain_per_s
+        cut: Any = {"period_s": 1 / self.rate_hz, "substeps": self.substeps, "integrator": self.integrator}
+        if loop_growth(k, self.theta, **cut) > 1 - 1e-9:
+            limit = settling_gain(k, lambda gain_per_s: loop_growth(gain_per_s, self.theta, **cut))
             cure = (
                 f"take a gain below {limit:.3g} or a higher rate_hz"
                 if limit > 1e-6
