@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry import se3
-from vobench.geometry.camera import Pinhole
+from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
 from vobench.render.bake import BakedScene, BakeSettings, bake, load_baked, save_baked
@@ -128,7 +128,7 @@ def stand(x_m: float, y_m: float, heading_deg: float, pitch_deg: float) -> Array
 def kinds(scene: Scene, camera: Pinhole, T_world_camera: Array) -> dict[str, Mask]:
     """Which pixels' centres see a surface of each kind first, from its front."""
     things = inventory(scene)
-    directions = camera.rays(camera.pixel_grid()).reshape(-1, 3) @ T_world_camera[:3, :3].T
+    directions = camera.rays(pixel_grid(camera)).reshape(-1, 3) @ T_world_camera[:3, :3].T
     origins = np.broadcast_to(T_world_camera[:3, 3], directions.shape)
     met = RayCaster(things.surfaces, np.arange(len(things.surfaces))).hits(origins, directions).surface
     own = [scene.materials.get(surface.material) for surface in things.surfaces]

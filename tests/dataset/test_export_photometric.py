@@ -13,7 +13,7 @@ from vobench.dataset.export import export
 from vobench.dataset.photometric import camera_text
 from vobench.dataset.source import known_points, rectified
 from vobench.geometry import se3
-from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere
+from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, pixel_grid
 from vobench.geometry.rig import PRESETS, Rig
 from vobench.sensor.exposure import Exposure
 from vobench.sensor.image_sensor import CAMERAS, CameraSensor, CameraSettings, NoiseStreams, expose
@@ -102,7 +102,7 @@ def shade_in(folder: Path, cam: str) -> NDArray[np.float64]:
 def test_the_vignette_is_cos4_of_the_angle_to_the_axis(make_sequence: Make, tmp_path: Path) -> None:
     made = make_sequence(case_json=case_json(vignetting=1.0))
     export(made.folder, tmp_path / "out", "euroc")
-    rays = made.rig.left.rays(made.rig.left.pixel_grid())
+    rays = made.rig.left.rays(pixel_grid(made.rig.left))
     np.testing.assert_allclose(
         shade_in(tmp_path / "out", "cam0"), rays[..., 2] ** 4 / (rays[..., 2] ** 4).max(), atol=1e-5
     )

@@ -12,7 +12,7 @@ import pytest
 from vobench.estimator import Estimator, Frame, Result
 from vobench.estimator.worker import load
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera
+from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.suite.manifest import read_manifest
@@ -73,7 +73,7 @@ class Optics:
 
 @cache
 def optics_of(lens: Camera) -> Optics:
-    rays = lens.rays(lens.pixel_grid())
+    rays = lens.rays(pixel_grid(lens))
     seen = np.isfinite(rays).all(-1)
     rays = np.where(seen[..., None], rays, [0.0, 0.0, 1.0])
     pixel_rad = np.linalg.norm(np.diff(rays, axis=1, append=rays[:, -2:-1]), axis=-1)

@@ -10,7 +10,7 @@ from vobench.errors import MotionError, SettingError
 from vobench.geometry import se3
 from vobench.motion.replay import AXES, Replay
 from vobench.motion.spline import pose_spline
-from vobench.trajectory.formats import parse_kitti, parse_tum
+from vobench.trajectory.formats import parse_any, parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
 DATA = Path(__file__).parents[2] / ".." / "shared" / "data" / "trajectories"
@@ -212,7 +212,7 @@ def test_freiburg1_smoothed_is_as_a_hand_moves_and_interpolated_is_not():
 @WITH_DATA
 def test_kitti_00_smoothed_drives_ahead_on_wheels():
     stamps_s = np.array((DATA / "KITTI_00_gt_times.txt").read_text().split(), float)
-    T = parse_kitti((DATA / "KITTI_00_gt.txt").read_text(), name="kitti")
+    T = parse_any((DATA / "KITTI_00_gt.txt").read_text(), name="kitti").T
     body = Trajectory(np.rint(stamps_s * 1e9).astype(np.int64), AXES["kitti"].apply(T))
     replay = smoothed(body)
     off_m, off_rad = left_over(replay, body)

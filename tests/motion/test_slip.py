@@ -9,6 +9,7 @@ import pytest
 
 from vobench.errors import MotionError, SettingError
 from vobench.geometry import se3
+from vobench.geometry.se3 import Array
 from vobench.motion import slip as slips
 from vobench.motion.controller import CONTROLLERS
 from vobench.motion.drive import Drive, drive
@@ -22,14 +23,23 @@ from vobench.motion.slip import (
     SURFACES,
     DeltaSettings,
     FloorPatch,
+    Generators,
     Ground,
     SlipNow,
     SlipSettings,
-    delta_path,
+    drawn,
     ornstein_uhlenbeck,
-    slip_path,
     under,
 )
+
+
+def slip_path(count: int, slip: SlipSettings, *, step_s: float, rngs: Generators | None) -> Array:
+    return drawn(count, slip, DELTAS["none"], (), step_s=step_s, rngs=rngs).rows[:, :3]
+
+
+def delta_path(count: int, delta: DeltaSettings, *, step_s: float, rngs: Generators | None) -> Array:
+    return drawn(count, SLIPS["none"], delta, (), step_s=step_s, rngs=rngs).rows[:, 3:]
+
 
 BUMPY = DELTAS["bumpy"]
 Pair = tuple[float, float]

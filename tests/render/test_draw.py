@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
-from vobench.geometry.camera import Pinhole
+from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.render.draw import MIRRORS
@@ -56,7 +56,7 @@ def image_of(surface: Surface, plane: Plane) -> Surface:
 
 
 def pixel_rays(T_world_camera: Array) -> Array:
-    rays: Array = CAMERA.rays(CAMERA.pixel_grid()) @ T_world_camera[:3, :3].T
+    rays: Array = CAMERA.rays(pixel_grid(CAMERA)) @ T_world_camera[:3, :3].T
     return rays
 
 

@@ -12,7 +12,7 @@ import pytest
 
 import vobench.render
 from vobench.errors import MissingDependencyError
-from vobench.geometry.camera import Camera, Pinhole
+from vobench.geometry.camera import Camera, Pinhole, pixel_grid
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
 from vobench.render import raster
@@ -92,7 +92,7 @@ def test_luminance_of_a_plain_floor_is_reflectance_times_illuminance_over_pi(dra
     lamp = ceiling_light("lamp", np.array([0.3, -0.2, 2.0]), (0.04, 0.04), power_lm=1000)
     settings = BakeSettings(spacing_m=0.02, light_rays=16, indirect_spacing_m=1.0, indirect_rays=1, bounces=0)
     picture = snap(draw(bake(Scene("floor", (floor,), MATERIALS, (lamp,)), settings)), CAMERA, DOWN)
-    rays = CAMERA.rays(CAMERA.pixel_grid())
+    rays = CAMERA.rays(pixel_grid(CAMERA))
     x, y, _ = np.moveaxis(DOWN[:3, 3] + 0.4 * rays / rays[..., 2:] @ DOWN[:3, :3].T, -1, 0)
     squared = (x - 0.3) ** 2 + (y + 0.2) ** 2 + 4.0
     np.testing.assert_allclose(picture, 0.5 / np.pi * 1000 / np.pi * 4.0 / squared**2, rtol=0.01)
@@ -132,7 +132,7 @@ def test_a_lamp_in_view_shows_its_luminance_and_its_back_is_not_there(renderer: 
 
 def hit_distance(scene: Scene, T_world_camera: Array) -> Array:
     """Distance (H, W) in metres along the rays through the pixels' centres; NaN where nothing is."""
-    rays = CAMERA.rays(CAMERA.pixel_grid()).reshape(-1, 3) @ T_world_camera[:3, :3].T
+    rays = CAMERA.rays(pixel_grid(CAMERA)).reshape(-1, 3) @ T_world_camera[:3, :3].T
     caster = RayCaster(scene.surfaces, np.arange(len(scene.surfaces)))
     hits = caster.hits(np.broadcast_to(T_world_camera[:3, 3], rays.shape), rays)
     return hits.distance.reshape(CAMERA.height_px, CAMERA.width_px)

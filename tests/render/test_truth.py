@@ -7,7 +7,15 @@ import pytest
 
 from vobench.errors import UnknownNameError
 from vobench.geometry import se3
-from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Equirectangular, KannalaBrandt, Pinhole
+from vobench.geometry.camera import (
+    BrownConrady,
+    Camera,
+    DoubleSphere,
+    Equirectangular,
+    KannalaBrandt,
+    Pinhole,
+    pixel_grid,
+)
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
 from vobench.render.geometry import inventory
@@ -88,7 +96,7 @@ def truth(caster: TruthCaster, camera: Camera) -> TruthFrame:
 @pytest.fixture(scope="module")
 def expected(camera: Camera) -> tuple[Array, Array, Array]:
     """Surfaces (R,), distances (R,) and rays (R, 3), by planes."""
-    rays = camera.rays(camera.pixel_grid()).reshape(-1, 3)
+    rays = camera.rays(pixel_grid(camera)).reshape(-1, 3)
     return *nearest(HALL, HERE[:3, 3], rays @ HERE[:3, :3].T, t_ns=0), rays
 
 
@@ -116,7 +124,7 @@ def test_every_camera_has_depth_to_1e_6_where_planes_put_it(truth, expected, cam
 
 def test_pixels_that_no_direction_leads_to_have_no_truth(caster):
     camera = CAMERAS["kannala"]
-    truth, dark = caster.frame(camera, NOW, later=LATER), np.isnan(camera.rays(camera.pixel_grid())[..., 0])
+    truth, dark = caster.frame(camera, NOW, later=LATER), np.isnan(camera.rays(pixel_grid(camera))[..., 0])
     assert 0.01 < dark.mean() < 0.5
     for name, values in truth.channels().items():
         nothing = np.isnan(values[dark]) if values.dtype == np.float32 else values[dark] == 0
@@ -128,7 +136,7 @@ def test_depth_is_exact_to_20_m_at_grazing_angles():
     camera, pose = LENSES["paper_literal"], looking(pitch_deg=15, position_m=(0, 0, 0.4))
     depth = TruthCaster(Scene("plain", (floor,), MATERIALS, ())).frame(camera, Shot(pose, 0), ["depth"]).depth
     assert depth is not None
-    rays = camera.rays(camera.pixel_grid())
+    rays = camera.rays(pixel_grid(camera))
     exact = rays[..., 2] * -0.4 / (rays @ pose[:3, :3].T)[..., 2]
     near = (exact > 0) & (exact < 20)
     assert exact[near].max() > 19
@@ -186,7 +194,7 @@ def carried(expected: tuple[Array, Array, Array]) -> tuple[Array, Array]:
 def test_flow_is_reprojection_of_what_stands_and_of_what_moves(truth, expected, camera):
     seen = expected[0] >= 0
     uv_px = camera.project(carried(expected)[0])
-    flow = uv_px - camera.pixel_grid().reshape(-1, 2)
+    flow = uv_px - pixel_grid(camera).reshape(-1, 2)
     error = np.abs(flat(truth.flow) - flow).max(1)[seen]
     known = np.isfinite(uv_px).all(1)[seen]
     assert np.isnan(error[~known]).all()

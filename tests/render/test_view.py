@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
-from vobench.geometry.camera import KannalaBrandt, Pinhole
+from vobench.geometry.camera import KannalaBrandt, Pinhole, pixel_grid
 from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.render.raster import RasterRenderer
@@ -44,7 +44,7 @@ def upside_down(surface: Surface) -> Surface:
 
 
 def pixel_rays(T_world_camera: Array) -> Array:
-    rays: Array = CAMERA.rays(CAMERA.pixel_grid()) @ T_world_camera[:3, :3].T
+    rays: Array = CAMERA.rays(pixel_grid(CAMERA)) @ T_world_camera[:3, :3].T
     return rays
 
 
@@ -203,7 +203,7 @@ def test_mirrors_work_through_a_fisheye_too(draw: Any, even_light: Any) -> None:
     floor = rectangle(np.zeros(3), np.array([60.0, 0, 0]), np.array([0, 60.0, 0]), "steel")
     T = looking(pitch_deg=90, position_m=(0, 0, 0.4))
     picture = draw(even_light(Scene("sky", (floor,), MATERIALS, (sky,)))).radiance(camera, still(camera, T))
-    rays = camera.rays(camera.pixel_grid()) @ T[:3, :3].T
+    rays = camera.rays(pixel_grid(camera)) @ T[:3, :3].T
     inside = rays[..., 2] < -0.15
     expected = 0.8 * sky.luminance_cd_m2(rays * [1, 1, -1])
     np.testing.assert_allclose(picture[inside], expected[inside], rtol=6e-3)

@@ -26,9 +26,9 @@ def levels(loop: AutoExposure, chip: CameraSensor, scene: Radiance, first: Expos
     """Time × gain of each picture."""
     state, noise, taken = start(loop, first), NoiseStreams(*np.random.default_rng(1).spawn(2)), []
     for _ in range(pictures):
-        taken.append(state.now.time_s * state.now.amplification)
+        taken.append(state[0].time_s * state[0].amplification)
         state = step(
-            loop, state, expose(scene, CameraSettings(chip=chip), noise, exposure=state.now), chip.signal_of_grey
+            loop, state, expose(scene, CameraSettings(chip=chip), noise, exposure=state[0]), chip.signal_of_grey
         )
     return np.array(taken)
 
@@ -89,9 +89,9 @@ def test_time_comes_before_gain_and_both_keep_their_limits() -> None:
         state, scene = start(loop, Exposure(0.005)), np.full((8, 8), level, np.float32)
         for _ in range(30):
             state = step(
-                loop, state, expose(scene, CameraSettings(chip=chip), noise, exposure=state.now), chip.signal_of_grey
+                loop, state, expose(scene, CameraSettings(chip=chip), noise, exposure=state[0]), chip.signal_of_grey
             )
-        seen.append(state.now)
+        seen.append(state[0])
     # The dead band may end a little before the limits.
     assert seen[0].gain_db == pytest.approx(12.0, abs=0.2)
     assert seen[-1].time_s == pytest.approx(1e-3, rel=0.02)
@@ -103,8 +103,8 @@ def test_time_comes_before_gain_and_both_keep_their_limits() -> None:
 
 def test_a_start_beyond_the_limits_is_brought_within() -> None:
     loop = AutoExposure(t_max_ms=8.0, gain_max_db=6.0)
-    assert start(loop, Exposure(1.0)).now == Exposure(8e-3, 6.0)
-    assert start(loop, Exposure(1e-6)).now == Exposure(loop.t_min_ms / 1e3)
+    assert start(loop, Exposure(1.0))[0] == Exposure(8e-3, 6.0)
+    assert start(loop, Exposure(1e-6))[0] == Exposure(loop.t_min_ms / 1e3)
 
 
 def test_the_percentile_meters_the_share_of_pixels_it_says() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vobench.errors import SettingError
-from vobench.geometry.camera import Pinhole
+from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.se3 import Array
 from vobench.sensor.image_sensor import CameraSettings, Radiance
 from vobench.sensor.lens import (
@@ -29,7 +29,7 @@ CAMERA = Pinhole(160, 120, 100.0, 100.0, 79.5, 59.5)
 
 def rays() -> Array:
     """Unit rays (H, W, 3) of the camera."""
-    return CAMERA.rays(CAMERA.pixel_grid())
+    return CAMERA.rays(pixel_grid(CAMERA))
 
 
 def light(seed: int = 0) -> Radiance:

@@ -35,7 +35,7 @@ def test_a_long_way_reaches_its_speed_and_its_acceleration():
     law = rest_to_rest(10, speed=1, acceleration=0.5)
     _, rate, change = law.at(np.linspace(0, law.end_s, 10_001))
     np.testing.assert_allclose([rate.max(), np.abs(change).max()], [1, 0.5], rtol=1e-6)
-    assert len(law.breaks_s) == 2
+    assert len(law.progress.x[1:-1]) == 2
 
 
 def test_a_short_way_is_never_that_fast():

@@ -64,23 +64,6 @@ class Driven:
         return np.stack(wheel_voltages(v_u, v_omega), -1)
 
 
-def show(
-    suite: str, trajectory: str | None, *, out: Path | None, tum: Path | None, csv: Path | None, as_json: bool
-) -> None:
-    """Drive a suite's trajectories, or one of them, without rendering; print a summary, and write what is asked for."""
-    plan = read_plan(suite)
-    names = _chosen(plan, trajectory)
-    _check_files(out, [path for path in (tum, csv) if path], names)
-    driven = [drive_one(plan, name) for name in names]
-    if out:
-        save_plot(out, [log_of(one) for one in driven])
-    if tum:
-        tum.write_text(format_tum(Trajectory(driven[0].travel.t_ns, driven[0].body.T_world_body)), encoding="utf-8")
-    if csv:
-        csv.write_text(_csv(driven[0]), encoding="utf-8")
-    _print(driven, [path for path in (out, tum, csv) if path], as_json=as_json)
-
-
 def _chosen(plan: Plan, trajectory: str | None) -> list[str]:
     known = list(plan.suite.trajectories or {})
     if not known:
@@ -211,4 +194,14 @@ def drive_command(
     json: terminal.Json = False,
 ) -> None:
     """Drive a suite's trajectories without rendering: a summary, and plots."""
-    show(suite, trajectory, out=out, tum=tum, csv=csv, as_json=json)
+    plan = read_plan(suite)
+    names = _chosen(plan, trajectory)
+    _check_files(out, [path for path in (tum, csv) if path], names)
+    driven = [drive_one(plan, name) for name in names]
+    if out:
+        save_plot(out, [log_of(one) for one in driven])
+    if tum:
+        tum.write_text(format_tum(Trajectory(driven[0].travel.t_ns, driven[0].body.T_world_body)), encoding="utf-8")
+    if csv:
+        csv.write_text(_csv(driven[0]), encoding="utf-8")
+    _print(driven, [path for path in (out, tum, csv) if path], as_json=json)

@@ -43,24 +43,6 @@ class DriveLog:
         return identify_odometry(self.rim_t_ns / 1e9, odometry, self.t_ns / 1e9, self.references)
 
 
-def show(path: Path, *, radius_m: float | None, track_m: float | None, as_json: bool) -> None:
-    """Print theta of each recorded drive at a path, with its residuals, and beside it the theta that was driven."""
-    if path.is_file():
-        wheels = WheelGeometry(radius_m or PIONEER_WHEELS.radius_m, track_m or PIONEER_WHEELS.track_m, 1)
-        found, untold = [(log := _of_csv(path, wheels), log.identified())], dict[str, str]()
-    elif radius_m or track_m:
-        raise InputError(f"--radius-m and --track-m are for a CSV file; a sequence holds its wheels: {path}")
-    else:
-        found, untold = _of_sequences(path)
-    if as_json:
-        terminal.print_json({"drives": [_facts(log, fit) for log, fit in found], "untold": untold})
-        return
-    out = terminal.console()
-    out.print(terminal.table("", HEADINGS, [row for log, fit in found for row in _rows(log, fit)]))
-    for name, sentence in untold.items():
-        out.print(f"{name}: {sentence}")
-
-
 def _of_sequences(path: Path) -> tuple[list[tuple[DriveLog, Fit]], dict[str, str]]:
     """What each sequence tells, and why others tell nothing. Raises VobenchError where none does."""
     found, untold = list[tuple[DriveLog, Fit]](), dict[str, str]()
@@ -123,13 +105,9 @@ def _facts(log: DriveLog, fit: Fit) -> dict[str, Any]:
 
 def _rows(log: DriveLog, fit: Fit) -> Iterator[list[str]]:
     residuals = [f"{fit.u_ref_rms_mps:.4f}", f"{np.rad2deg(fit.omega_ref_rms_radps):.3f}", f"{fit.condition:.1f}"]
-    yield [log.name, *_numbers(fit.theta), *residuals]
+    yield [log.name, *(f"{value:.4f}" for value in astuple(fit.theta)), *residuals]
     if log.theta:
-        yield ["  driven with", *_numbers(log.theta), "", "", ""]
-
-
-def _numbers(theta: Theta) -> list[str]:
-    return [f"{value:.4f}" for value in astuple(theta)]
+        yield ["  driven with", *(f"{value:.4f}" for value in astuple(log.theta)), "", "", ""]
 
 
 def identify_command(
@@ -142,4 +120,17 @@ def identify_command(
     json: terminal.Json = False,
 ) -> None:
     """Find theta in recorded drives of the Pioneer, from its wheels and what it was asked for; say what is left."""
-    show(path, radius_m=radius_m, track_m=track_m, as_json=json)
+    if path.is_file():
+        wheels = WheelGeometry(radius_m or PIONEER_WHEELS.radius_m, track_m or PIONEER_WHEELS.track_m, 1)
+        found, untold = [(log := _of_csv(path, wheels), log.identified())], dict[str, str]()
+    elif radius_m or track_m:
+        raise InputError(f"--radius-m and --track-m are for a CSV file; a sequence holds its wheels: {path}")
+    else:
+        found, untold = _of_sequences(path)
+    if json:
+        terminal.print_json({"drives": [_facts(log, fit) for log, fit in found], "untold": untold})
+        return
+    out = terminal.console()
+    out.print(terminal.table("", HEADINGS, [row for log, fit in found for row in _rows(log, fit)]))
+    for name, sentence in untold.items():
+        out.print(f"{name}: {sentence}")

@@ -14,7 +14,7 @@ import numpy as np
 
 from vobench.errors import SequenceError
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera, Pinhole
+from vobench.geometry.camera import Camera, Pinhole, pixel_grid
 from vobench.geometry.rectify import rectification
 from vobench.geometry.rig import Rig, Side, side_by_side
 from vobench.geometry.se3 import Array
@@ -48,7 +48,7 @@ class Views:
 
     def rays_of(self, side: Side, camera: Camera) -> Array:
         """Directions (H, W, 3) that light came from, in the axes of the camera that recorded; NaN for none."""
-        pixels = self.source_px[side] if self.source_px else camera.pixel_grid()
+        pixels = self.source_px[side] if self.source_px else pixel_grid(camera)
         return camera.rays(pixels)
 
     def show(self, side: Side, picture: Image) -> Image:
@@ -97,7 +97,7 @@ def _flat(rig: Rig) -> tuple[Rig, dict[Side, Array]]:
 
 def _source_px(view: Camera, camera: Camera, R_view_camera: Array) -> Array:
     """Where a view's pixels (H, W, 2) lie in the camera's picture; NaN for what its lens does not see."""
-    return camera.project(view.rays(view.pixel_grid()) @ R_view_camera)
+    return camera.project(view.rays(pixel_grid(view)) @ R_view_camera)
 
 
 PNG = "png"

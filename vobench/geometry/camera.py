@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import ClassVar, Literal, Protocol
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,66 +74,8 @@ def _newton_step(state: Array) -> Array:
     return step
 
 
+# What depth means: z, negative behind the camera, or the distance along the ray where it sees all around.
 DepthAlong = Literal["axis", "ray"]
-
-
-class Camera(Protocol):
-    """Anything that sends directions to pixels and pixels to directions.
-
-    Neither method asks whether a pixel lies within the picture: that is the caller's question.
-    """
-
-    @property
-    def width_px(self) -> int:
-        """Columns of the picture."""
-
-    @property
-    def height_px(self) -> int:
-        """Rows of the picture."""
-
-    @property
-    def depth_along(self) -> DepthAlong:
-        """What depth means: z, negative behind the camera, or the distance along the ray where it sees all around."""
-
-    @property
-    def coefficients(self) -> tuple[str, ...]:
-        """Names of the fields that say how the lens bends, in the order of ROS."""
-
-    @property
-    def K(self) -> Array:
-        """Matrix (3, 3) of the pinhole that this camera is like about its axis."""
-
-    def project(self, points_camera: ArrayLike) -> Array:
-        """Pixels (..., 2) of points (..., 3); NaN for points that the lens cannot see."""
-
-    def rays(self, uv_px: ArrayLike) -> Array:
-        """Unit directions (..., 3) through pixels (..., 2); NaN for pixels that no direction leads to."""
-
-    def pixel_grid(self) -> Array:
-        """Centres (H, W, 2) of all pixels."""
-
-    def __hash__(self) -> int:
-        """Equal cameras are one key, so that rays may be kept."""
-
-
-class Intrinsics(Protocol):
-    """The linear last step of most cameras: from a plane to pixels."""
-
-    @property
-    def fx_px(self) -> float:
-        """Pixels per unit to the right."""
-
-    @property
-    def fy_px(self) -> float:
-        """Pixels per unit down."""
-
-    @property
-    def cx_px(self) -> float:
-        """Column of the plane's origin."""
-
-    @property
-    def cy_px(self) -> float:
-        """Row of the plane's origin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,19 +105,15 @@ class Pinhole:
         x, y = from_pixels(self, uv_px)
         return unit(np.stack([x, y, np.ones_like(x)], -1))
 
-    def pixel_grid(self) -> Array:
-        """Centres (H, W, 2) of all pixels."""
-        return pixel_centres(self.width_px, self.height_px)
-
 
 def camera_matrix(fx_px: float, fy_px: float, cx_px: float, cy_px: float) -> Array:
     """The (3, 3) matrix of a pinhole."""
     return np.array([[fx_px, 0, cx_px], [0, fy_px, cy_px], [0, 0, 1.0]])
 
 
-def pixel_centres(width_px: int, height_px: int) -> Array:
-    """Columns and rows (H, W, 2) of a picture's pixels."""
-    u, v = np.meshgrid(np.arange(width_px, dtype=float), np.arange(height_px, dtype=float))
+def pixel_grid(camera: "Camera") -> Array:
+    """Columns and rows (H, W, 2) of the centres of all pixels."""
+    u, v = np.meshgrid(np.arange(camera.width_px, dtype=float), np.arange(camera.height_px, dtype=float))
     return np.stack([u, v], -1)
 
 
@@ -187,12 +125,12 @@ def on_plane(points_camera: ArrayLike) -> tuple[Array, Array]:
         return x / z, y / z
 
 
-def to_pixels(camera: Intrinsics, x: Array, y: Array) -> Array:
+def to_pixels(camera: "Focal", x: Array, y: Array) -> Array:
     """Pixels (..., 2) of places on the lens's plane."""
     return np.stack([camera.fx_px * x + camera.cx_px, camera.fy_px * y + camera.cy_px], -1)
 
 
-def from_pixels(camera: Intrinsics, uv_px: ArrayLike) -> tuple[Array, Array]:
+def from_pixels(camera: "Focal", uv_px: ArrayLike) -> tuple[Array, Array]:
     """Places on the lens's plane of pixels (..., 2)."""
     u, v = np.moveaxis(np.asarray(uv_px, float), -1, 0)
     return (u - camera.cx_px) / camera.fx_px, (v - camera.cy_px) / camera.fy_px
@@ -233,7 +171,12 @@ class BrownConrady:
     @property
     def fold_radius(self) -> float:
         """Radius on the plane z = 1 up to which the lens is one-to-one; infinite for most."""
-        return _fold_radius(self.k1, self.k2, self.k3, float(np.hypot(self.p1, self.p2)))
+        # Along the radius the radial part has d(r R)/dr, across it R. At radius r the tangential part has
+        # eigenvalues within 6 p r. While both stay above that the symmetric Jacobian is positive on a disc,
+        # which is convex, so the lens is one-to-one there.
+        k1, k2, k3, p = self.k1, self.k2, self.k3, float(np.hypot(self.p1, self.p2))
+        along, across = (1, -6 * p, 3 * k1, 0, 5 * k2, 0, 7 * k3), (1, -6 * p, k1, 0, k2, 0, k3)
+        return min(_first_root(along), _first_root(across))
 
     def project(self, points_camera: ArrayLike) -> Array:
         """Pixels (..., 2) of points (..., 3); NaN behind the camera and beyond the fold."""
@@ -247,10 +190,6 @@ class BrownConrady:
         x, y = from_pixels(self, uv_px)
         x, y = self._straight(x.ravel(), y.ravel()).reshape(2, *x.shape)
         return unit(np.stack([x, y, np.ones_like(x)], -1))
-
-    def pixel_grid(self) -> Array:
-        """Centres (H, W, 2) of all pixels."""
-        return pixel_centres(self.width_px, self.height_px)
 
     def _bent(self, x: Array, y: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Where the lens sends x and y, and the entries xx, xy, yy of the Jacobian, which is symmetric."""
@@ -332,10 +271,6 @@ class KannalaBrandt:
         aside = np.sin(theta) / np.where(far > 0, far, 1.0)
         return np.stack([x * aside, y * aside, np.cos(theta)], -1)
 
-    def pixel_grid(self) -> Array:
-        """Centres (H, W, 2) of all pixels."""
-        return pixel_centres(self.width_px, self.height_px)
-
     def _bent(self, theta: Array) -> Array:
         t = theta * theta
         return theta * (1 + t * (self.k1 + t * (self.k2 + t * (self.k3 + t * self.k4))))
@@ -343,19 +278,6 @@ class KannalaBrandt:
     def _slope(self, theta: Array) -> Array:
         t = theta * theta
         return 1 + t * (3 * self.k1 + t * (5 * self.k2 + t * (7 * self.k3 + t * 9 * self.k4)))
-
-
-@cache
-def _fold_radius(k1: float, k2: float, k3: float, p: float) -> float:
-    """Where the smallest eigenvalue of the Jacobian may first reach zero.
-
-    Along the radius the radial part has d(r R)/dr, across it R. At radius r the tangential part has
-    eigenvalues within 6 p r. While both stay above that the symmetric Jacobian is positive on a disc,
-    which is convex, so the lens is one-to-one there.
-    """
-    along = _first_root((1, -6 * p, 3 * k1, 0, 5 * k2, 0, 7 * k3))
-    across = _first_root((1, -6 * p, k1, 0, k2, 0, k3))
-    return min(along, across)
 
 
 @cache
@@ -424,10 +346,6 @@ class DoubleSphere:
         scale = (z * self.xi + np.sqrt(z * z + (1 - self.xi**2) * s)) / (z * z + s)
         return unit(np.stack([scale * x, scale * y, scale * z - self.xi], -1))
 
-    def pixel_grid(self) -> Array:
-        """Centres (H, W, 2) of all pixels."""
-        return pixel_centres(self.width_px, self.height_px)
-
 
 @dataclass(frozen=True, slots=True)
 class Equirectangular:
@@ -464,6 +382,9 @@ class Equirectangular:
         across = np.cos(latitude)
         return np.stack([across * np.sin(longitude), np.sin(latitude), across * np.cos(longitude)], -1)
 
-    def pixel_grid(self) -> Array:
-        """Centres (H, W, 2) of all pixels."""
-        return pixel_centres(self.width_px, self.height_px)
+
+# Cameras whose linear last step goes from a plane to pixels.
+Focal = Pinhole | BrownConrady | KannalaBrandt | DoubleSphere
+# What sends directions to pixels and back. Equal ones are one key. `coefficients` names the fields that say how the
+# lens bends, in the order of ROS; K is of the pinhole that it is like about its axis.
+Camera = Focal | Equirectangular

@@ -1,14 +1,14 @@
 """Stereo rigs: cameras, mounts, wheels and IMU of a body; presets, and declared calibration error."""
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 
 from vobench.errors import InputError, VobenchError
 from vobench.geometry import se3
-from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, KannalaBrandt, Pinhole
+from vobench.geometry.camera import BrownConrady, Camera, Focal, KannalaBrandt, Pinhole
 from vobench.geometry.se3 import Array
 from vobench.setting import Positive, settings
 
@@ -137,18 +137,9 @@ def mounted(
     return Rig(left, right, T_body_left, T_body_left @ T_left_right, wheels)
 
 
-def stereo_rig(
-    lens: Camera,
-    *,
-    pitch_deg: float,
-    baseline_m: float = 0.12,
-    forward_m: float = 0.25,
-    height_m: float = 0.4,
-    wheels: WheelGeometry = PIONEER_WHEELS,
-) -> Rig:
-    """Two equal cameras side by side across the robot, `forward_m` ahead of its axle."""
-    place = side_by_side(baseline_m)
-    return mounted(lens, lens, place, pitch_deg=pitch_deg, forward_m=forward_m, height_m=height_m, wheels=wheels)
+def stereo_rig(lens: Camera, *, baseline_m: float = 0.12, **mount: Any) -> Rig:
+    """Two equal cameras side by side across the robot, as `mounted`."""
+    return mounted(lens, lens, side_by_side(baseline_m), **mount)
 
 
 def side_by_side(baseline_m: float) -> Array:
@@ -252,28 +243,12 @@ TARTANAIR = StereoPreset(
 
 FISHEYE = StereoPreset(
     left=KannalaBrandt(
-        512,
-        512,
-        190.97847715128717,
-        190.9733070521226,
-        254.93170605935475,
-        256.8974428996504,
-        0.0034823894022493434,
-        0.0007150348452162257,
-        -0.0020532361418706202,
-        0.00020293673591811182,
+        *(512, 512, 190.97847715128717, 190.9733070521226, 254.93170605935475, 256.8974428996504),
+        *(0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202, 0.00020293673591811182),
     ),
     right=KannalaBrandt(
-        512,
-        512,
-        190.44236969414825,
-        190.4344384721956,
-        252.59949716835982,
-        254.91723064636983,
-        0.0034003170790442797,
-        0.001766278153469831,
-        -0.00266312569781606,
-        0.0003299517423931039,
+        *(512, 512, 190.44236969414825, 190.4344384721956, 252.59949716835982, 254.91723064636983),
+        *(0.0034003170790442797, 0.001766278153469831, -0.00266312569781606, 0.0003299517423931039),
     ),
     T_left_right=_between(
         _from_quaternion(
@@ -335,7 +310,7 @@ def true_camera(nominal: Camera, error: CalibrationError) -> Camera:
     """The camera with its focal length, centre and distortion off. Raises VobenchError."""
     if error.distortion_ratio and not any(getattr(nominal, name) for name in nominal.coefficients):
         raise VobenchError(f"distortion_ratio {error.distortion_ratio:g} needs a lens with distortion, got {nominal}")
-    if not isinstance(nominal, Pinhole | BrownConrady | KannalaBrandt | DoubleSphere):
+    if not isinstance(nominal, Focal):
         if error.focal_ratio or any(error.center_px):
             raise VobenchError(f"focal_ratio and center_px need a camera with a focal length, got {nominal}")
         return nominal

@@ -61,14 +61,6 @@ class Reference(NamedTuple):
     advance: Array
 
 
-class Rates(NamedTuple):
-    """Derivatives of x, y, psi, delta; and the speed u and its derivative."""
-
-    state: tuple[Array, Array, Array, Array]
-    u: Array
-    u_rate: Array
-
-
 @dataclass(frozen=True, slots=True)
 class AckermannMotion:
     """A Motion: state (M + 1, 4) of x, y, psi, delta at nodes_s, integrated on from the last one at any instant.
@@ -81,21 +73,9 @@ class AckermannMotion:
     nodes_s: Array
     state: Array
     advance: Array
-
-    @property
-    def start_ns(self) -> int:
-        """The first instant."""
-        return self.target.start_ns
-
-    @property
-    def end_ns(self) -> int:
-        """The last instant."""
-        return self.target.end_ns
-
-    @property
-    def breaks_ns(self) -> Array:
-        """Those of the target, and where the steering begins to answer them."""
-        return _breaks_s(self.target, self.settings) * 1e9
+    start_ns: int
+    end_ns: int
+    breaks_ns: Array  # those of the target, and where the steering begins to answer them
 
     def at(self, t_ns: Stamps | Array) -> Kinematics:
         """One Runge-Kutta step from the last node."""
@@ -124,7 +104,8 @@ def ackermann(target: CurveMotion, settings: AckermannSettings = ACKERMANNS["sma
     Raises MotionError where the way turns on the spot, or sharper than the steering allows.
     """
     _check_way(target, settings)
-    nodes_s = _nodes(target, settings)
+    breaks_s = _breaks_s(target, settings)
+    nodes_s = _nodes(np.concatenate([[target.law.start_s], breaks_s, [target.law.end_s]]))
     step_s = np.diff(nodes_s)
     advance = _by_progress(target, nodes_s[:-1] + step_s / 2)[0]
     stages = [
@@ -139,11 +120,17 @@ def ackermann(target: CurveMotion, settings: AckermannSettings = ACKERMANNS["sma
     for at_stages, lasts_s in zip(zip(*stages, strict=True), step_s.tolist(), strict=True):
         state = _stepped(state, [Reference(*stage) for stage in at_stages], lasts_s, settings)
         states.append(state)
-    return AckermannMotion(target, settings, nodes_s, np.array(states, float), advance)
+    ends_ns = target.start_ns, target.end_ns
+    return AckermannMotion(target, settings, nodes_s, np.array(states, float), advance, *ends_ns, breaks_s * 1e9)
+
+
+Rates = tuple[tuple[Array, ...], Array, Array]
 
 
 def _rates(state: tuple[Array, ...], way: Reference, settings: AckermannSettings) -> Rates:
-    """The model and its driver, after Kanayama et al. (1990), with gains by distance: at rest nothing moves.
+    """Derivatives of x, y, psi, delta; the speed u and its derivative: the model and its driver.
+
+    After Kanayama et al. (1990), with gains by distance: at rest nothing moves.
 
     Off the way by (ahead, aside, turned), the driver goes faster by ahead / lookahead, and asks for a curvature
     more by aside / lookahead² + 2 turned / lookahead: critically damped on the way, whatever the speed.
@@ -164,7 +151,7 @@ def _rates(state: tuple[Array, ...], way: Reference, settings: AckermannSettings
     ahead_rate = w * aside - u + way.speed * straight
     eagerness_rate = hurry * ahead_rate - slant * (way.turn - w)
     u_rate = way.acceleration * (straight + hurry * ahead) + way.speed * eagerness_rate
-    return Rates((u * cosine, u * sine, w, delta_rate), u, u_rate)
+    return (u * cosine, u * sine, w, delta_rate), u, u_rate
 
 
 def _stepped(
@@ -176,10 +163,10 @@ def _stepped(
     def after(share: float, rate: tuple[Array, ...]) -> tuple[Array, ...]:
         return tuple(value + share * step_s * change for value, change in zip(state, rate, strict=True))
 
-    k1 = _rates(state, start, settings).state
-    k2 = _rates(after(0.5, k1), middle, settings).state
-    k3 = _rates(after(0.5, k2), middle, settings).state
-    k4 = _rates(after(1.0, k3), end, settings).state
+    k1 = _rates(state, start, settings)[0]
+    k2 = _rates(after(0.5, k1), middle, settings)[0]
+    k3 = _rates(after(0.5, k2), middle, settings)[0]
+    k4 = _rates(after(1.0, k3), end, settings)[0]
     mean = tuple((a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
     return after(1.0, mean)
 
@@ -215,9 +202,8 @@ def _breaks_s(target: CurveMotion, settings: AckermannSettings) -> Array:
     return both[(both > target.law.start_s) & (both < target.law.end_s)]
 
 
-def _nodes(target: CurveMotion, settings: AckermannSettings) -> Array:
-    """Times from start to end at most STEP_S apart, with every break among them."""
-    marks = np.concatenate([[target.law.start_s], _breaks_s(target, settings), [target.law.end_s]])
+def _nodes(marks: Array) -> Array:
+    """Times at most STEP_S apart, with every mark among them."""
     counts = np.ceil(np.diff(marks) / STEP_S).astype(int)
     spans = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(marks[:-1], marks[1:], counts, strict=True)]
     return np.concatenate([*spans, marks[-1:]])

@@ -1,15 +1,18 @@
-"""The paper's point controller (20)-(21), its limits, and the references it is led by."""
+"""The paper's point controller (20)-(21), its limits, and the targets it is led to."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, inf, isfinite, sin, tanh
-from typing import Protocol
+from math import ceil, cos, inf, isfinite, sin, tanh
+from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Ge, Gt, Le
 
 from vobench.errors import MotionError
 from vobench.geometry.rig import WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.motion.pioneer import (
+    INTEGRATORS,
     UNLIMITED,
     AccelerationLimits,
     Number,
@@ -20,6 +23,7 @@ from vobench.motion.pioneer import (
     wheel_speeds,
 )
 from vobench.motion.slip import SlipNow
+from vobench.setting import OneOf, Positive, require
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,16 +90,12 @@ def loop_growth(gain_per_s: float, theta: Theta | None, *, period_s: float, subs
     )
 
 
-def settling_gain(gain_per_s: float, theta: Theta | None, *, period_s: float, substeps: int, integrator: str) -> float:
-    """The gain below which the loop of `loop_growth` is stable, 1/s, where `gain_per_s` is one that is not."""
-
-    def is_stable(k: float) -> bool:
-        return loop_growth(k, theta, period_s=period_s, substeps=substeps, integrator=integrator) < 1
-
+def settling_gain(gain_per_s: float, growth: Callable[[float], float]) -> float:
+    """The gain below which the loop of this growth is stable, 1/s, where `gain_per_s` is one that is not."""
     low, high = 0.0, gain_per_s
     for _ in range(40):
         middle = (low + high) / 2
-        low, high = (middle, high) if is_stable(middle) else (low, middle)
+        low, high = (middle, high) if growth(middle) < 1 else (low, middle)
     return low
 
 
@@ -118,6 +118,9 @@ def _axis_growth(
 
 # Beyond this (m, m/s, rad) the equations have run away: no room is so large and no wheel so fast.
 BOUND = 1e6
+# What is slower or faster is a slip of the pen, and would fill the memory.
+LONGEST_LEG_S, FASTEST_HZ = 3600.0, 1e4
+LegTime = Annotated[float, Gt(0), Le(LONGEST_LEG_S)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,16 +135,17 @@ class Vehicle:
     theta: Theta | None
     controller: ControllerSettings
     wheels: WheelGeometry
-    rate_hz: float
-    substeps: int
-    integrator: str
+    rate_hz: Annotated[float, Gt(0), Le(FASTEST_HZ)]
+    substeps: Annotated[int, Ge(1)]
+    integrator: Annotated[str, OneOf("integrator", INTEGRATORS)]
     limits: AccelerationLimits = UNLIMITED
 
     def __post_init__(self) -> None:
-        k, period_s = self.controller.gain_per_s, 1 / self.rate_hz
-        growth = loop_growth(k, self.theta, period_s=period_s, substeps=self.substeps, integrator=self.integrator)
-        if growth > 1 - 1e-9:
-            limit = settling_gain(k, self.theta, period_s=period_s, substeps=self.substeps, integrator=self.integrator)
+        require(self)
+        k = self.controller.gain_per_s
+        cut: Any = {"period_s": 1 / self.rate_hz, "substeps": self.substeps, "integrator": self.integrator}
+        if loop_growth(k, self.theta, **cut) > 1 - 1e-9:
+            limit = settling_gain(k, lambda gain_per_s: loop_growth(gain_per_s, self.theta, **cut))
             cure = (
                 f"take a gain below {limit:.3g} or a higher rate_hz"
                 if limit > 1e-6
@@ -222,65 +226,64 @@ class Vehicle:
         return (x - half * s, y + half * c), (x + half * s, y - half * c), (x, y)
 
 
-class Guidance(Protocol):
-    """What the robot is to do; `ends` is always the frames at which legs have ended so far."""
-
-    @property
-    def longest(self) -> int:
-        """Frames in the longest drive possible."""
-
-    def ended(self, state: Array, frame: int, ends: list[int]) -> list[int]:
-        """This frame, once for each leg that ends in it."""
-
-    def asked(self, vehicle: Vehicle, state: Array, frame: int, ends: list[int]) -> tuple[float, float]:
-        """u_ref in m/s and omega_ref in rad/s, to be held until the next frame."""
-
-    def finished(self, frame: int, ends: list[int]) -> bool:
-        """Whether the drive is over with this frame."""
-
-    def check_patience(self, place_m: list[Array], ends: list[int]) -> None:
-        """Raise MotionError where the places (2,) of h so far, one a frame, show a leg that takes too long."""
-
-
 @dataclass(frozen=True, slots=True)
-class WaypointGuidance:
-    """Targets (K, 2) in order, each until h is within the tolerance on both axes; then `settle` frames more."""
+class Legs:
+    """Targets (K, 2) for h in order, each until it is near on both axes or for `leg_s`; then `settle_s` more.
+
+    `ends` is always the frames at which legs have ended so far. Raises MotionError for a leg below one frame.
+    """
 
     targets_m: Array
-    tolerance_m: float
-    patience: int
-    settle: int
+    rate_hz: float
+    tolerance_m: Positive
+    max_time_s: LegTime
+    leg_s: LegTime | None
+    settle_s: Annotated[float, Ge(0), Le(LONGEST_LEG_S)]
+
+    def __post_init__(self) -> None:
+        require(self)
+        if self.leg_s is not None and self.leg_s * self.rate_hz < 1:
+            raise MotionError(f"leg_s must last one frame or more, got {self.leg_s * self.rate_hz:.3g} frames")
+
+    @property
+    def patience(self) -> int:
+        """Frames that a leg may take."""
+        return ceil(self.max_time_s * self.rate_hz)
 
     @property
     def longest(self) -> int:
         """Frames in the longest drive possible."""
-        return len(self.targets_m) * self.patience + self.settle + 1
+        count = len(self.targets_m)
+        last = self._clock(count) if self.leg_s else count * self.patience
+        return last + ceil(self.settle_s * self.rate_hz) + 1
 
-    def ended(self, state: Array, frame: int, ends: list[int]) -> list[int]:
-        """This frame, once for each target in turn that h is inside of."""
-        inside = (np.abs(self.targets_m[len(ends) :] - state[:2]) < self.tolerance_m).all(1)
-        return [frame] * int(np.logical_and.accumulate(inside).sum())
+    def ended(self, place_m: list[Array], ends: list[int]) -> list[int]:
+        """This frame, once for each leg that ends in it, given the places (2,) of h so far, one a frame.
 
-    def asked(self, vehicle: Vehicle, state: Array, frame: int, ends: list[int]) -> tuple[float, float]:  # noqa: ARG002
-        """Towards the next target, the last one for ever."""
-        return vehicle.references(state, self.targets_m[min(len(ends), len(self.targets_m) - 1)])
+        Raises MotionError where this leg's target has not been entered in time.
+        """
+        frame, left_m = len(place_m) - 1, self.targets_m[len(ends) :]
+        if self.leg_s:
+            return [frame] if len(left_m) and frame == self._clock(len(ends) + 1) else []
+        inside = (np.abs(left_m - place_m[-1]) < self.tolerance_m).all(1)
+        entered = int(np.logical_and.accumulate(inside).sum())
+        leg_start = ends[-1] if ends else 0
+        if len(left_m) and not entered and frame - leg_start >= self.patience:
+            away_m = np.hypot(*(np.array(place_m[leg_start:]) - left_m[0]).T)
+            raise MotionError(
+                f"target {len(ends) + 1} at ({left_m[0, 0]:g}, {left_m[0, 1]:g}) m was not entered in max_time_s "
+                f"({self.patience} frames): {_end_of_leg(away_m)}; "
+                f"allow more time, a wider tolerance_m or another controller"
+            )
+        return [frame] * entered
 
-    def finished(self, frame: int, ends: list[int]) -> bool:
-        """Whether the last target was entered long enough ago."""
-        return len(ends) == len(self.targets_m) and frame >= ends[-1] + self.settle
+    def are_over(self, frame: int, ends: list[int]) -> bool:
+        """Whether the last leg ended long enough ago."""
+        return len(ends) == len(self.targets_m) and frame >= ends[-1] + ceil(self.settle_s * self.rate_hz)
 
-    def check_patience(self, place_m: list[Array], ends: list[int]) -> None:
-        """Raise MotionError where this leg's target has not been entered in time."""
-        frame, leg_start = len(place_m) - 1, ends[-1] if ends else 0
-        if len(ends) == len(self.targets_m) or frame - leg_start < self.patience:
-            return
-        target_m = self.targets_m[len(ends)]
-        away_m = np.abs(np.array(place_m[leg_start:]) - target_m)
-        raise MotionError(
-            f"target {len(ends) + 1} at ({target_m[0]:g}, {target_m[1]:g}) m was not entered in max_time_s "
-            f"({self.patience} frames): {_end_of_leg(np.hypot(*away_m.T))}; "
-            f"allow more time, a wider tolerance_m or another controller"
-        )
+    def _clock(self, legs: int) -> int:
+        """The frame in which so many legs have had their time, whole frames or not."""
+        return round(legs * ((self.leg_s or 0.0) * self.rate_hz))
 
 
 def _end_of_leg(away_m: Array) -> str:
@@ -290,96 +293,3 @@ def _end_of_leg(away_m: Array) -> str:
     if comes_and_goes and last.min() > 0.98 * third.min() and np.ptp(last) > 0.02 * last.max():
         return f"the robot keeps circling it, between {last.min():.3g} and {last.max():.3g} m away, and comes no nearer"
     return f"the robot is {away_m[-1]:.3g} m away"
-
-
-@dataclass(frozen=True, slots=True)
-class TimedWaypoints:
-    """Targets (K, 2) in order, each for its time whatever happens; `leg_ends` (K,) are the frames of the changes."""
-
-    targets_m: Array
-    leg_ends: tuple[int, ...]
-    settle: int
-
-    @classmethod
-    def every(cls, frames: float, targets_m: Array, settle: int) -> "TimedWaypoints":
-        """Each leg as long as the others, in frames, whole or not. Raises MotionError below one frame."""
-        if frames < 1:
-            raise MotionError(f"leg_s must last one frame or more, got {frames:.3g} frames")
-        return cls(targets_m, tuple(round((i + 1) * frames) for i in range(len(targets_m))), settle)
-
-    @property
-    def longest(self) -> int:
-        """Frames in the drive."""
-        return self.leg_ends[-1] + self.settle + 1
-
-    def ended(self, state: Array, frame: int, ends: list[int]) -> list[int]:  # noqa: ARG002
-        """This frame where a leg's time is over."""
-        return [frame] * self.leg_ends[len(ends) :].count(frame)
-
-    def asked(self, vehicle: Vehicle, state: Array, frame: int, ends: list[int]) -> tuple[float, float]:  # noqa: ARG002
-        """Towards the target of this leg, the last one for ever."""
-        return vehicle.references(state, self.targets_m[min(len(ends), len(self.targets_m) - 1)])
-
-    def finished(self, frame: int, ends: list[int]) -> bool:  # noqa: ARG002
-        """Whether the last leg's time was over long enough ago."""
-        return frame >= self.leg_ends[-1] + self.settle
-
-    def check_patience(self, place_m: list[Array], ends: list[int]) -> None:
-        """The clock is always on time."""
-
-
-@dataclass(frozen=True, slots=True)
-class PathFollowing:
-    """A target that moves: where it is (N, 2) and how fast it goes (N, 2), one row a frame."""
-
-    path_m: Array
-    path_mps: Array
-
-    @property
-    def longest(self) -> int:
-        """Frames in the drive."""
-        return len(self.path_m)
-
-    def ended(self, state: Array, frame: int, ends: list[int]) -> list[int]:  # noqa: ARG002
-        """A path has no legs."""
-        return []
-
-    def asked(self, vehicle: Vehicle, state: Array, frame: int, ends: list[int]) -> tuple[float, float]:  # noqa: ARG002
-        """After the target where it is now, and as it moves."""
-        v_x, v_y = self.path_mps[frame].tolist()
-        return vehicle.references(state, self.path_m[frame], (v_x, v_y))
-
-    def finished(self, frame: int, ends: list[int]) -> bool:  # noqa: ARG002
-        """Whether this is the path's last row."""
-        return frame == len(self.path_m) - 1
-
-    def check_patience(self, place_m: list[Array], ends: list[int]) -> None:
-        """A path takes its time."""
-
-
-@dataclass(frozen=True, slots=True)
-class GivenReferences:
-    """References (N, 2) that were set beforehand, one row a frame, whatever comes of them."""
-
-    references: Array
-
-    @property
-    def longest(self) -> int:
-        """Frames in the drive."""
-        return len(self.references)
-
-    def ended(self, state: Array, frame: int, ends: list[int]) -> list[int]:  # noqa: ARG002
-        """There are no legs."""
-        return []
-
-    def asked(self, vehicle: Vehicle, state: Array, frame: int, ends: list[int]) -> tuple[float, float]:  # noqa: ARG002
-        """This frame's row; where the robot is does not matter."""
-        u_ref, omega_ref = self.references[frame].tolist()
-        return u_ref, omega_ref
-
-    def finished(self, frame: int, ends: list[int]) -> bool:  # noqa: ARG002
-        """Whether this is the last row."""
-        return frame == len(self.references) - 1
-
-    def check_patience(self, place_m: list[Array], ends: list[int]) -> None:
-        """Nothing is waited for."""

@@ -1,6 +1,6 @@
 """Planar courses: circles, squares, figures of eight, arcs and clothoids, as ideal wheeled robots drive them."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil, gcd, pi, radians
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
@@ -165,11 +165,7 @@ class LissajousCurve:
     waves: Array
     phase_rad: Array
     arc: ArcLength
-
-    @property
-    def breaks(self) -> Array:
-        """None: it is smooth."""
-        return np.zeros(0)
+    breaks: Array  # none: it is smooth
 
     def at(self, s: Array) -> Kinematics:
         """Poses (K, 4, 4) at arc length s (K,), and their derivatives by s."""
@@ -195,16 +191,12 @@ def lissajous_curve(size_m: tuple[float, float], ratio: tuple[int, int], *, phas
         return length
 
     knots = np.linspace(0, 2 * np.pi, KNOTS_PER_WAVE * max(ratio) + 1)
-    _require_blunt(speed(knots), phase_rad)
-    return LissajousCurve(half_m, waves, phases, arc_length(speed, knots))
-
-
-def _require_blunt(speeds: Array, phase_rad: float) -> None:
-    if speeds.min() < BLUNT * speeds.max():
+    if speed(knots).min() < BLUNT * speed(knots).max():
         raise MotionError(
             f"with a phase of {phase_rad:g} rad the Lissajous curve comes to a point where it turns back; "
             "choose another phase: 0 where one number of the ratio is even, a quarter turn where both are odd"
         )
+    return LissajousCurve(half_m, waves, phases, arc_length(speed, knots), np.zeros(0))
 
 
 def _derivatives(half_m: Array, waves: Array, phases: Array, phi: Array) -> Array:
@@ -404,7 +396,8 @@ def _rounded(side_m: float, radius_m: float, *, side: float) -> tuple[float, lis
     half_m = pi / 2 * radius_m  # a clothoid to 1/radius turns by half of that curvature times its length
     bent = side / (radius_m * half_m)
     corner = [Piece(half_m, 0.0, bent), Piece(half_m, side / radius_m, -bent)]
-    reach_m = float(abs(_end(corner)[0]))  # by symmetry as far along the side it leaves as along the next
+    end_m = course(corner).at(np.array([2 * half_m])).T_world_body[0, :2, 3]
+    reach_m = float(abs(end_m[0]))  # by symmetry as far along the side it leaves as along the next
     straight_m = side_m - 2 * reach_m
     if straight_m <= 0:
         most_m = radius_m * side_m / (2 * reach_m)
@@ -413,12 +406,6 @@ def _rounded(side_m: float, radius_m: float, *, side: float) -> tuple[float, lis
             f"{reach_m:.3g} m before the corner; it should be below {most_m:.3g}"
         )
     return straight_m, corner
-
-
-def _end(pieces: Sequence[Piece]) -> Array:
-    """Where pieces from the origin end (2,)."""
-    end: Array = course(pieces).at(np.array([sum(piece.length for piece in pieces)])).T_world_body[0, :2, 3]
-    return end
 
 
 def _side(*, clockwise: bool) -> float:

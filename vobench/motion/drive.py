@@ -2,26 +2,17 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import ceil, inf
-from typing import Annotated, ClassVar, Literal, TypedDict, Unpack
+from math import ceil
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from annotated_types import Gt, Le, MinLen
+from annotated_types import MinLen
 from numpy.typing import ArrayLike, NDArray
 
 from vobench.errors import MotionError
 from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
 from vobench.geometry.se3 import Array
-from vobench.motion.controller import (
-    CONTROLLERS,
-    ControllerSettings,
-    GivenReferences,
-    Guidance,
-    PathFollowing,
-    TimedWaypoints,
-    Vehicle,
-    WaypointGuidance,
-)
+from vobench.motion.controller import CONTROLLERS, ControllerSettings, Legs, LegTime, Vehicle
 from vobench.motion.pioneer import THETAS, UNLIMITED, AccelerationLimits, Theta
 from vobench.motion.slip import (
     DELTAS,
@@ -160,9 +151,6 @@ def _kinematics(place: Array, speed: Array, rate: Array) -> Kinematics:
 
 # How long a drive is known after its end, where it goes on with its last references: for shutters open there.
 TAIL_S = 1.0
-# What is slower or faster is a slip of the pen, and would fill the memory.
-LONGEST_LEG_S, FASTEST_HZ = 3600.0, 1e4
-LegTime = Annotated[float, Gt(0), Le(LONGEST_LEG_S)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,31 +175,6 @@ class Drive:
     delta: Array
     theta: Theta | None
     motion: DriveMotion = field(repr=False)
-
-    @property
-    def steps_per_leg(self) -> tuple[int, ...]:
-        """Control periods spent on each target."""
-        return tuple(np.diff(self.reached, prepend=0).tolist())
-
-
-class DriveOptions(TypedDict, total=False):
-    """Which robot it is, and what is done to it: the options of all drives; `_ready` has what they are by default.
-
-    Without a theta (None) the robot is an ideal unicycle; `theta_std` perturbs it. rngs: disturbance.STREAMS.
-    """
-
-    theta: Theta | None
-    theta_std: float
-    controller: ControllerSettings
-    limits: AccelerationLimits
-    slip: SlipSettings
-    delta: DeltaSettings
-    floor: Sequence[FloorPatch]
-    wheels: WheelGeometry
-    rate_hz: float
-    substeps: int
-    integrator: str
-    rngs: Generators | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -241,8 +204,8 @@ class Waypoints(Wheeled):
         )
 
 
-def options(robot: Wheeled, rngs: Generators) -> DriveOptions:
-    """Which robot it is, and what is done to it."""
+def options(robot: Wheeled, rngs: Generators) -> dict[str, Any]:
+    """Which robot it is, and what is done to it: `_ready`'s."""
     is_ideal = robot.mover == "unicycle"
     return {
         "theta": None if is_ideal else robot.theta,
@@ -268,7 +231,7 @@ def drive(
     settle_s: float = 0.0,
     max_time_s: float = 60.0,
     leg_s: float | None = None,
-    **options: Unpack[DriveOptions],
+    **options: Any,
 ) -> Drive:
     """Drive h from rest at `start` (x, y, psi) through targets (K, 2) in order, its speed carried over between them.
 
@@ -277,20 +240,16 @@ def drive(
     Raises MotionError for values that are not finite, a loop that cannot settle, a target not reached in time.
     """
     targets = _checked_rows(targets_m, "target")
-    _check_durations(settle_s=settle_s, max_time_s=max_time_s, leg_s=leg_s)
-    if not 0 < tolerance_m < inf:
-        raise MotionError(f"tolerance_m must be above 0 and finite, got {tolerance_m}")
     vehicle, disturbed = _ready(**options)
-    settle = ceil(settle_s * vehicle.rate_hz)
-    errand: Guidance = WaypointGuidance(targets, tolerance_m, ceil(max_time_s * vehicle.rate_hz), settle)
-    if leg_s is not None:
-        errand = TimedWaypoints.every(leg_s * vehicle.rate_hz, targets, settle)
-    return _driven(errand, vehicle, disturbed(errand.longest), start)
+    legs = Legs(targets, vehicle.rate_hz, tolerance_m, max_time_s, leg_s, settle_s)
+
+    def asked(state: Array, _: int, leg: int) -> tuple[float, float]:
+        return vehicle.references(state, targets[min(leg, len(targets) - 1)])
+
+    return _driven(asked, vehicle, disturbed(legs.longest), start, legs)
 
 
-def follow(
-    path_m: ArrayLike, path_mps: ArrayLike, *, start: tuple[float, float, float], **options: Unpack[DriveOptions]
-) -> Drive:
+def follow(path_m: ArrayLike, path_mps: ArrayLike, *, start: tuple[float, float, float], **options: Any) -> Drive:
     """Drive h from rest at `start` (x, y, psi) after a target that moves: one row (N, 2) of place and velocity a frame.
 
     The path's velocity is fed forward and tanh pulls h back to it; a real robot lags where it speeds up, and
@@ -300,20 +259,28 @@ def follow(
     path, path_rate = _checked_rows(path_m, "path point"), _checked_rows(path_mps, "path velocity")
     vehicle, disturbed = _ready(**options)
     _check_path(path, path_rate, vehicle.controller, vehicle.rate_hz)
-    return _driven(PathFollowing(path, path_rate), vehicle, disturbed(len(path)), start)
+
+    def asked(state: Array, frame: int, _: int) -> tuple[float, float]:
+        return vehicle.references(state, path[frame], tuple(path_rate[frame].tolist()))
+
+    return _driven(asked, vehicle, disturbed(len(path)), start)
 
 
-def led_by(references: ArrayLike, *, start: tuple[float, float, float], **options: Unpack[DriveOptions]) -> Drive:
+def led_by(references: ArrayLike, *, start: tuple[float, float, float], **options: Any) -> Drive:
     """Drive from rest with references (N, 2) of u in m/s and omega in rad/s, one row a frame, nothing fed back.
 
     This is how a robot goes backwards or turns on the spot, where no point h ahead of the axle can lead it.
     Of the controller it takes the place of h and the largest references.
     Raises MotionError as `drive` does, and where a reference is larger than the controller gives.
     """
-    asked = _checked_rows(references, "reference")
+    rows = _checked_rows(references, "reference")
     vehicle, disturbed = _ready(**options)
-    _check_references(asked, vehicle.controller, vehicle.rate_hz)
-    return _driven(GivenReferences(asked), vehicle, disturbed(len(asked)), start)
+    _check_references(rows, vehicle.controller, vehicle.rate_hz)
+
+    def asked(_: Array, frame: int, __: int) -> tuple[float, float]:
+        return tuple(rows[frame].tolist())
+
+    return _driven(asked, vehicle, disturbed(len(rows)), start)
 
 
 def _ready(
@@ -331,30 +298,41 @@ def _ready(
     integrator: str = "rk4",
     rngs: Generators | None = None,
 ) -> tuple[Vehicle, Callable[[int], Disturbances]]:
-    """The robot, and what disturbs it in so many frames."""
-    _check_clock(rate_hz, substeps)
-    vehicle = Vehicle(_own_theta(theta, theta_std, rngs), controller, wheels, rate_hz, substeps, integrator, limits)
+    """The robot, and what disturbs it in so many frames: the options of all drives.
+
+    Without a theta (None) the robot is an ideal unicycle; `theta_std` perturbs it. rngs: DISTURBANCE_STREAMS.
+    """
+    if theta_std:
+        if theta is None:
+            raise MotionError("an ideal unicycle has no theta that theta_std could perturb")
+        theta = theta.perturbed(theta_std, generator_of(rngs, "theta"))
+    vehicle = Vehicle(theta, controller, wheels, rate_hz, substeps, integrator, limits)
     return vehicle, lambda frames: drawn(frames, slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
 
 
-def _driven(errand: Guidance, vehicle: Vehicle, disturbances: Disturbances, start: tuple[float, float, float]) -> Drive:
-    """The robot on its errand, frame by frame, and a little on."""
+def _driven(
+    asked: Callable[[Array, int, int], tuple[float, float]],
+    vehicle: Vehicle,
+    disturbances: Disturbances,
+    start: tuple[float, float, float],
+    legs: Legs | None = None,
+) -> Drive:
+    """The robot on its way, frame by frame, and a little on; `asked` takes its state, the frame and the leg."""
     if np.shape(start) != (3,) or not np.isfinite(start).all():
         raise MotionError(f"the start (x, y, psi) must be three finite values, got {start}")
     state = np.array([*start, 0.0, 0.0, 0.0, 0.0])
     slips = [disturbances.at(0, vehicle.contacts_ahead(state, SlipNow()))]
-    fine, asked, ends, places = [state[None]], [], list[int](), [state[:2]]
-    for frame in range(errand.longest):
-        ends += errand.ended(state, frame, ends)
-        asked.append(errand.asked(vehicle, state, frame, ends))
-        if errand.finished(frame, ends):
+    fine, references, ends, places = [state[None]], [], list[int](), [state[:2]]
+    for frame in range(len(disturbances.rows)):
+        ends += legs.ended(places, ends) if legs else []
+        references.append(asked(state, frame, len(ends)))
+        if frame + 1 == len(disturbances.rows) or (legs and legs.are_over(frame, ends)):
             break
-        errand.check_patience(places, ends)
         slips.append(disturbances.at(frame + 1, vehicle.contacts_ahead(state, slips[-1])))
-        fine.append(vehicle.advance(state, asked[-1], *slips[-2:]))
+        fine.append(vehicle.advance(state, references[-1], *slips[-2:]))
         state = fine[-1][-1]
         places.append(state[:2])
-    return _record(fine, np.array(asked), tuple(ends), slips, vehicle=vehicle)
+    return _record(fine, np.array(references), tuple(ends), slips, vehicle=vehicle)
 
 
 def _record(
@@ -401,15 +379,6 @@ def _stamps(count: int, rate_hz: float, substeps: int) -> Stamps:
     return np.rint(np.arange(count) * 1e9 / substeps / rate_hz).astype(np.int64)
 
 
-def _own_theta(theta: Theta | None, std: float, rngs: Generators | None) -> Theta | None:
-    """The parameters of this very robot."""
-    if std == 0:
-        return theta
-    if theta is None:
-        raise MotionError("an ideal unicycle has no theta that theta_std could perturb")
-    return theta.perturbed(std, generator_of(rngs, "theta"))
-
-
 def _checked_rows(rows: ArrayLike, what: str) -> Array:
     pairs = np.asarray(rows, float)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not len(pairs):
@@ -441,18 +410,3 @@ def _check_references(asked: Array, controller: ControllerSettings, rate_hz: flo
                 f"the robot would be asked for {sizes.max():.3g} {unit} after {sizes.argmax() / rate_hz:.1f} s, "
                 f"and {most:g} {unit} is the most"
             )
-
-
-def _check_clock(rate_hz: float, substeps: int) -> None:
-    if not 0 < rate_hz <= FASTEST_HZ:
-        raise MotionError(f"a drive needs a rate_hz above 0 and at most {FASTEST_HZ:g}, got {rate_hz}")
-    if not (isinstance(substeps, int | np.integer) and substeps >= 1):
-        raise MotionError(f"a drive needs a whole number of substeps, 1 or more, got {substeps}")
-
-
-def _check_durations(**durations: float | None) -> None:
-    for name, value in durations.items():
-        may_be_0 = name == "settle_s"
-        if value is not None and not (0 < value <= LONGEST_LEG_S or (value == 0 and may_be_0)):
-            least = "0 or more" if may_be_0 else "above 0"
-            raise MotionError(f"{name} must be {least} and at most {LONGEST_LEG_S:g}, got {value}")

@@ -9,7 +9,6 @@ import numpy as np
 
 from vobench.errors import MotionError
 from vobench.geometry.se3 import Array
-from vobench.trajectory.kinematics import level
 
 # Formulas that hold for one instant and for arrays of them.
 Number = TypeVar("Number", float, Array)
@@ -95,11 +94,6 @@ def wheel_speeds(u: Number, omega: Number, *, track_m: float) -> tuple[Number, N
     return u - half, u + half
 
 
-def axle_poses(x_h_m: Array, y_h_m: Array, psi_rad: Array, *, a_m: float) -> Array:
-    """T_world_body (N, 4, 4) of the axle midpoint B, from the point h that is `a_m` ahead of it."""
-    return level(x_h_m - a_m * np.cos(psi_rad), y_h_m - a_m * np.sin(psi_rad), psi_rad)
-
-
 @dataclass(frozen=True, slots=True)
 class AccelerationLimits:
     """Largest |u'| in m/s^2 and |omega'| in rad/s^2 that (18) may give, before delta pushes.
@@ -124,8 +118,6 @@ class AccelerationLimits:
 
 
 UNLIMITED = AccelerationLimits()
-# Source: block defaults of Martins' Simulink toolbox. From .75 m/s they need .94 m to stop.
-TOOLBOX = AccelerationLimits(0.3, 1.745)
 
 
 def _cut(rate: Number, limit: float) -> Number:
@@ -154,20 +146,13 @@ def rk4(rates: Rates, state: Array, step_s: float) -> Array:
 INTEGRATORS = {"rk4": rk4, "euler": euler}
 
 
-def integrator_named(name: str) -> Callable[[Rates, Array, float], Array]:
-    """The step function of that name. Raises MotionError where there is none."""
-    if name not in INTEGRATORS:
-        raise MotionError(f"no integrator named {name!r}. Known: {', '.join(INTEGRATORS)}")
-    return INTEGRATORS[name]
-
-
 def over_period(rates: Rates, state: Array, *, period_s: float, substeps: int, integrator: str = "rk4") -> Array:
     """States (substeps, n) at the end of every sub-step of one period; the last is the period's end.
 
     `rates` must be smooth over the period: change the inputs between periods, never inside one,
     and the method keeps its order.
     """
-    step = integrator_named(integrator)
+    step = INTEGRATORS[integrator]
     states = np.empty((substeps, len(state)))
     for i in range(substeps):
         states[i] = state = step(rates, state, period_s / substeps)

@@ -80,17 +80,14 @@ class Quadrotor:
         if len(t_s) != len(points):
             raise MotionError(f"there are {len(t_s)} times for {len(points)} points; each point needs one")
         position = minimum_snap(t_s, points)
-        curve = QuadrotorCurve(position, self._yaw(position, t_s, points), t_s[1:-1])
-        _check_lift(curve, t_s)
-        return CurveMotion(curve, evenly(t_s[0], t_s[-1], begin=t_s[0]))
-
-    def _yaw(self, position: "BSpline", t_s: Array, points: Array) -> "BSpline":
-        """Yaw by time, at rest at both ends."""
         yaw = _headings(position, t_s, points)
         if self.yaw_deg is not None:
             yaw = np.full(len(t_s), radians(self.yaw_deg))
         rest = [(1, 0.0), (2, 0.0)]
-        return scipy.interpolate.make_interp_spline(t_s, yaw, k=5, bc_type=(rest, rest))
+        yaw_rad = scipy.interpolate.make_interp_spline(t_s, yaw, k=5, bc_type=(rest, rest))
+        curve = QuadrotorCurve(position, yaw_rad, t_s[1:-1])
+        _check_lift(curve, t_s)
+        return CurveMotion(curve, evenly(t_s[0], t_s[-1], begin=t_s[0]))
 
 
 def minimum_snap(t_s: Array, points_m: Array) -> "BSpline":

@@ -30,18 +30,15 @@ class RailCurve:
 
     position: "BSpline"
     arc: ArcLength
-
-    @property
-    def breaks(self) -> Array:
-        """None: positions are four times smooth at the points."""
-        return np.zeros(0)
+    breaks: Array  # none: positions are four times smooth at the points
 
     def at(self, s: Array) -> Kinematics:
         """Poses (K, 4, 4) at arc length s (K,), and their derivatives by s."""
         u = self.arc.parameter(s)
         d1, d2, d3 = (self.position(u, order) for order in (1, 2, 3))
         x = attitude.unit(Jet(d1, d2, d3))
-        y = attitude.unit(attitude.cross(_constant(UP, len(u)), x))
+        still = np.zeros_like(d1)
+        y = attitude.unit(attitude.cross(Jet(np.broadcast_to(UP, d1.shape), still, still), x))
         by_u = attitude.of_axes(x, y, attitude.cross(x, y))
         speed = np.linalg.norm(d1, axis=-1, keepdims=True)
         speed_rate = np.sum(x.value * d2, axis=-1, keepdims=True)
@@ -77,7 +74,7 @@ class Rail:
         _check_way(position(knots, 1), position(knots))
         arc = arc_length(lambda at: np.linalg.norm(position(at, 1), axis=-1), knots)
         law = rest_to_rest(arc.length, speed=self.speed_mps, acceleration=self.accel_mps2)
-        return CurveMotion(RailCurve(position, arc), law)
+        return CurveMotion(RailCurve(position, arc, np.zeros(0)), law)
 
 
 def check_apart(points: Array, *, of: str) -> None:
@@ -98,8 +95,3 @@ def _check_way(tangents: Array, at_m: Array) -> None:
         if wrong.any():
             x, y, z = at_m[int(np.flatnonzero(wrong)[0])].round(2) + 0.0  # which makes -0 a 0
             raise MotionError(f"near ({x:.2f}, {y:.2f}, {z:.2f}) m the rail {what}")
-
-
-def _constant(vector: Array, count: int) -> Jet:
-    still = np.zeros((count, 3))
-    return Jet(np.broadcast_to(vector, (count, 3)), still, still)

@@ -10,7 +10,7 @@ from annotated_types import Ge, Gt, Le
 from vobench.errors import InputError, MotionError, SettingError, unknown
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.motion.spline import FEWEST, PoseCurve, by_quaternion, through
+from vobench.motion.spline import FEWEST, Attitude, Jet, PoseCurve, of_quaternion, through
 from vobench.motion.wheeled import Rate
 from vobench.setting import Positive, Triple, settings
 from vobench.trajectory.kinematics import CurveMotion, evenly
@@ -92,12 +92,19 @@ def _smoothed(t_s: Array, T: Array, *, knot_hz: float) -> PoseCurve:
 
     Knots are left out until two poses lie between each two, so that a gap is one stretch of the spline.
     """
-    columns = np.column_stack([T[:, :3, 3], _unbroken(se3.to_quaternion(T[:, :3, :3]))])
+    q_xyzw = se3.to_quaternion(T[:, :3, :3])
+    flips = np.where(np.sum(q_xyzw[1:] * q_xyzw[:-1], axis=1) < 0, -1.0, 1.0)
+    signs = np.concatenate([[1.0], np.cumprod(flips)])  # each that is nearer to the one before
+    columns = np.column_stack([T[:, :3, 3], q_xyzw * signs[:, None]])
     spline = _least_squares(t_s, columns, knot_hz=knot_hz)
     position, quaternion = (
         scipy.interpolate.BSpline(spline.t, spline.c[:, part], DEGREE) for part in (slice(3), slice(3, 7))
     )
-    return PoseCurve(position, by_quaternion(quaternion), breaks=np.zeros(0))
+
+    def attitude(s: Array) -> Attitude:
+        return of_quaternion(Jet(*(quaternion(s, order) for order in range(3))))
+
+    return PoseCurve(position, attitude, breaks=np.zeros(0))
 
 
 def _recorded(trajectory: Trajectory, *, fewest: int, max_gap_s: float) -> tuple[Array, Array]:
@@ -113,14 +120,6 @@ def _recorded(trajectory: Trajectory, *, fewest: int, max_gap_s: float) -> tuple
             f"a gap may last max_gap_s {max_gap_s:g}: replay one side of it, or allow more"
         )
     return t_s, se3.transform(se3.nearest_rotation(T[:, :3, :3]), T[:, :3, 3])
-
-
-def _unbroken(q_xyzw: Array) -> Array:
-    """Quaternions (N, 4), each with the sign that is nearer to the one before."""
-    flips = np.where(np.sum(q_xyzw[1:] * q_xyzw[:-1], axis=1) < 0, -1.0, 1.0)
-    signs = np.concatenate([[1.0], np.cumprod(flips)])
-    unbroken: Array = q_xyzw * signs[:, None]
-    return unbroken
 
 
 def _least_squares(t_s: Array, columns: Array, *, knot_hz: float) -> "BSpline":

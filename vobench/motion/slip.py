@@ -68,14 +68,10 @@ class SlipNow(NamedTuple):
         """Angular rates of the left and right rim in rad/s that carry the wheels at these speeds and accelerations."""
         left, right = self.left, self.right
         if self.traction_s2pm:
-            left += self.traction_s2pm * _driven_on(left_mps, driven_mps2[0])
-            right += self.traction_s2pm * _driven_on(right_mps, driven_mps2[1])
+            # Acceleration along the way that a wheel goes: negative where it brakes.
+            left += self.traction_s2pm * (driven_mps2[0] if left_mps > 0 else -driven_mps2[0])
+            right += self.traction_s2pm * (driven_mps2[1] if right_mps > 0 else -driven_mps2[1])
         return left_mps / (radius_m * (1 - left)), right_mps / (radius_m * (1 - right))
-
-
-def _driven_on(speed_mps: float, rate_mps2: float) -> float:
-    """Acceleration along the way that a wheel goes: negative where it brakes."""
-    return rate_mps2 if speed_mps > 0 else -rate_mps2
 
 
 def ornstein_uhlenbeck(
@@ -98,18 +94,18 @@ def generator_of(rngs: Generators | None, stream: str) -> np.random.Generator:
     return rngs[stream]
 
 
-def slip_path(count: int, settings: SlipSettings, *, step_s: float, rngs: Generators | None) -> Array:
-    """Slip ratios of the left and right wheel and beta in rad, (count, 3), each from its own generator in `rngs`.
+def disturbance_paths(
+    count: int, stds: Mapping[str, float], *, step_s: float, correlation_s: float, rngs: Generators | None
+) -> Array:
+    """Ornstein-Uhlenbeck paths (count, n) of these standard deviations, each from the generator of its stream.
 
-    Raises MotionError where the settings ask for chance and a generator is missing.
+    Raises MotionError where one is left to chance and its generator is missing.
     """
-    stds = (settings.ratio_std, settings.ratio_std, settings.angle_std_rad)
-    path = np.zeros((count, 3))
-    for column, (stream, std) in enumerate(zip(SLIP_STREAMS, stds, strict=True)):
+    path = np.zeros((count, len(stds)))
+    for column, (stream, std) in enumerate(stds.items()):
         if std > 0:
-            path[:, column] = ornstein_uhlenbeck(
-                count, std=std, step_s=step_s, correlation_s=settings.correlation_s, rng=generator_of(rngs, stream)
-            )
+            rng = generator_of(rngs, stream)
+            path[:, column] = ornstein_uhlenbeck(count, std=std, step_s=step_s, correlation_s=correlation_s, rng=rng)
     return path
 
 
@@ -178,8 +174,6 @@ DISTURBANCE_STREAMS = (*SLIP_STREAMS, *DELTA_STREAMS, "theta")
 # Beyond this a slip ratio or an angle (rad) is cut: nearer 1 and pi/2 the formulas lose their meaning.
 MOST_SLIP = 0.5
 
-Contacts = Sequence[tuple[float, float]]
-
 
 @settings(kw_only=False)
 class DeltaSettings:
@@ -197,18 +191,6 @@ class DeltaSettings:
 DELTAS = {"none": DeltaSettings(), "nominal": DeltaSettings(0.05, 0.1), "bumpy": DeltaSettings(0.2, 0.5, 0.15)}
 
 
-def delta_path(count: int, settings: DeltaSettings, *, step_s: float, rngs: Generators | None) -> Array:
-    """delta_u in m/s^2 and delta_omega in rad/s^2 at every frame, (count, 2). Raises as `generator_of`."""
-    path = np.zeros((count, 2))
-    for column, std in enumerate((settings.speed_std_mps2, settings.turn_std_radps2)):
-        if std > 0:
-            rng = generator_of(rngs, DELTA_STREAMS[column])
-            path[:, column] = ornstein_uhlenbeck(
-                count, std=std, step_s=step_s, correlation_s=settings.correlation_s, rng=rng
-            )
-    return path
-
-
 @dataclass(frozen=True, slots=True)
 class Disturbances:
     """What disturbs a drive at its frames: rows (N, 5) of both sigmas, beta (rad) and both deltas as drawn.
@@ -222,7 +204,7 @@ class Disturbances:
     traction_s2pm: float
     floor: tuple[FloorPatch, ...]
 
-    def at(self, frame: int, contacts_m: Contacts) -> SlipNow:
+    def at(self, frame: int, contacts_m: Sequence[tuple[float, float]]) -> SlipNow:
         """What disturbs at a frame with the left wheel, the right wheel and the axle's middle at these places."""
         left, right, beta, delta_u, delta_omega = self.rows[frame].tolist()
         if self.floor:
@@ -242,9 +224,13 @@ def drawn(
     rngs: Generators | None,
 ) -> Disturbances:
     """The disturbances of `count` frames. Raises MotionError where they ask for chance and a stream is missing."""
-    slip_rows = slip_path(count, slip, step_s=step_s, rngs=rngs)
-    delta_rows = delta_path(count, delta, step_s=step_s, rngs=rngs)
-    return Disturbances(np.column_stack([slip_rows, delta_rows]), slip.skid_s, slip.traction_s2pm, tuple(floor))
+    slips = dict(zip(SLIP_STREAMS, (slip.ratio_std, slip.ratio_std, slip.angle_std_rad), strict=True))
+    deltas = dict(zip(DELTA_STREAMS, (delta.speed_std_mps2, delta.turn_std_radps2), strict=True))
+    rows = [
+        disturbance_paths(count, stds, step_s=step_s, correlation_s=correlation_s, rngs=rngs)
+        for stds, correlation_s in ((slips, slip.correlation_s), (deltas, delta.correlation_s))
+    ]
+    return Disturbances(np.hstack(rows), slip.skid_s, slip.traction_s2pm, tuple(floor))
 
 
 def _cut(value: float) -> float:

@@ -191,11 +191,6 @@ def through(t_s: Array, T: Array) -> PoseCurve:
     return PoseCurve(quintic(t_s, T[:, :3, 3]), turned, t_s[1:-1])
 
 
-def by_quaternion(spline: "BSpline") -> Callable[[Array], Attitude]:
-    """Attitudes of a spline of quaternions (4 columns, scalar last), brought to length 1."""
-    return lambda s: of_quaternion(Jet(spline(s), spline(s, 1), spline(s, 2)))
-
-
 def quintic(t: Array, values: Array) -> "BSpline":
     """The natural quintic through values (N, n) at t (N,), N >= 3: of all curves through them the one of least jerk."""
     natural = [(3, np.zeros(values.shape[1:])), (4, np.zeros(values.shape[1:]))]

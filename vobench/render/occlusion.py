@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera
+from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
 from vobench.render.geometry import RAY_OFFSET_M, Floats, Indices, Mask, RayCaster, corners, inventory
 from vobench.scene.scene import Scene
@@ -261,7 +261,7 @@ class Tiles:
 @lru_cache(maxsize=4)
 def tiles(camera: Camera) -> Tiles:
     """The tiles of a camera; kept, as cameras are few and pictures many."""
-    uv_px = camera.pixel_grid()
+    uv_px = pixel_grid(camera)
     rays = camera.rays(uv_px)
     sums = _over_tiles(np.add, rays)
     with np.errstate(invalid="ignore"):

@@ -15,7 +15,7 @@ from vobench.render.renderer import Radiance, Renderer, View
 from vobench.run.motion import generator
 from vobench.scene.light import Steady
 from vobench.scene.scene import Scene
-from vobench.sensor.exposure import Exposure, ExposureState, start, step, strips
+from vobench.sensor.exposure import Exposure, start, step, strips
 from vobench.sensor.image_sensor import NoiseStreams, expose, fixed_pattern
 from vobench.sensor.lens import lens_maps, through_lens
 from vobench.sensor.response import Grey
@@ -123,11 +123,11 @@ class StereoCamera:
         self._left, self._right = (SimulatedCamera(case, side, world, displacement) for side in SIDES)
         self._settings, first = case.camera, case.camera.exposure
         loop = case.camera.auto_exposure
-        self._state = start(loop, first) if loop else ExposureState((first,))
+        self._state = start(loop, first) if loop else (first,)
 
     def shoot(self, t_ns: int) -> StereoPair:
         """The pictures stamped t_ns, the middle of their exposure; call in order of time."""
-        exposure = self._state.now
+        exposure = self._state[0]
         pair = StereoPair(self._left.picture(t_ns, exposure), self._right.picture(t_ns, exposure), exposure)
         if loop := self._settings.auto_exposure:
             self._state = step(loop, self._state, pair.left, self._settings.chip.signal_of_grey)

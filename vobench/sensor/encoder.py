@@ -1,13 +1,17 @@
 """Wheel encoders: rim angles to counts, with the calibration errors a real odometer does not know of."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Ge, Le
 from numpy.typing import NDArray
 
-from vobench.errors import InputError
 from vobench.geometry.rig import WheelGeometry
 from vobench.geometry.se3 import Array
+from vobench.setting import require
+
+Fraction = Annotated[float, Ge(-0.2), Le(0.2)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,18 +23,12 @@ class EncoderErrors:
     Source: Borenstein and Feng (1996), who name these as the two dominant systematic errors.
     """
 
-    radius_left: float = 0.0
-    radius_right: float = 0.0
-    track: float = 0.0
+    radius_left: Fraction = 0.0
+    radius_right: Fraction = 0.0
+    track: Fraction = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in (
-            ("radius_left", self.radius_left),
-            ("radius_right", self.radius_right),
-            ("track", self.track),
-        ):
-            if not abs(value) <= 0.2:
-                raise InputError(f"encoder error {name} is a fraction of the nominal value within 0.2, got {value}")
+        require(self)
 
 
 ENCODERS = {

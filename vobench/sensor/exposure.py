@@ -112,36 +112,29 @@ class AutoExposure:
             )
 
 
-@dataclass(frozen=True, slots=True)
-class ExposureState:
-    """The exposures of the next `lag_frames` pictures, which are settled already."""
-
-    coming: tuple[Exposure, ...]
-
-    @property
-    def now(self) -> Exposure:
-        """The exposure of the next picture."""
-        return self.coming[0]
+# The exposures of the next `lag_frames` pictures, which are settled already.
+Coming = tuple[Exposure, ...]
 
 
-def start(loop: AutoExposure, exposure: Exposure) -> ExposureState:
+def start(loop: AutoExposure, exposure: Exposure) -> Coming:
     """The loop at rest on an exposure, brought within its limits."""
-    return ExposureState((_within(loop, _level(exposure)),) * loop.lag_frames)
+    return (_within(loop, _level(exposure)),) * loop.lag_frames
 
 
-def step(loop: AutoExposure, state: ExposureState, grey: Grey, linear_of_grey: Array) -> ExposureState:
-    """The state after a picture (H, W) that was taken with `state.now`.
+def step(loop: AutoExposure, coming: Coming, grey: Grey, linear_of_grey: Array) -> Coming:
+    """The exposures to come after a picture (H, W) that was taken with the first of those that were.
 
     `linear_of_grey` (256,) is the signal of each grey value in shares of full scale, black level taken off. What is
     wanted is counted from the exposure that the picture had, not from the newest: so no lag makes the loop oscillate.
     """
-    metered = max(_meter(loop, grey, linear_of_grey), _darkest(linear_of_grey))
-    wanted = _within(loop, _level(state.now) * loop.target_share / metered)
-    newest = state.coming[-1]
+    darkest = float(linear_of_grey[linear_of_grey > 0][0]) / 2  # black may be up to half a grey value bright
+    metered = max(_meter(loop, grey, linear_of_grey), darkest)
+    wanted = _within(loop, _level(coming[0]) * loop.target_share / metered)
+    newest = coming[-1]
     error = math.log(_level(wanted) / _level(newest))
     if abs(error) > _dead_band(loop, linear_of_grey):
         newest = _within(loop, _level(newest) * math.exp((1 - loop.damping) * error))
-    return ExposureState((*state.coming[1:], newest))
+    return (*coming[1:], newest)
 
 
 def _level(exposure: Exposure) -> float:
@@ -164,11 +157,6 @@ def _meter(loop: AutoExposure, grey: Grey, linear_of_grey: Array) -> float:
     # A grey value stands for signals half a step around it.
     level = np.interp(loop.percentile / 100, np.concatenate([[0.0], below]), np.arange(FULL_SCALE_DN + 2) - 0.5)
     return float(np.interp(level, np.arange(FULL_SCALE_DN + 1), linear_of_grey))
-
-
-def _darkest(linear_of_grey: Array) -> float:
-    """The least that a picture can prove: black may be up to half a grey value bright."""
-    return float(linear_of_grey[linear_of_grey > 0][0]) / 2
 
 
 def _dead_band(loop: AutoExposure, linear_of_grey: Array) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from vobench.geometry.camera import Camera
+from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
 from vobench.sensor.image_sensor import CameraSettings, Radiance
 
@@ -35,7 +35,7 @@ def lens_maps(effects: CameraSettings, camera: Camera, rng: np.random.Generator)
     shape = (camera.height_px, camera.width_px)
     shade = veil = transfer = None
     if effects.vignetting > 0 or effects.vignetting_cutoff_deg is not None:
-        rays = camera.rays(camera.pixel_grid())
+        rays = camera.rays(pixel_grid(camera))
         shade = vignetting(rays, strength=effects.vignetting, cutoff_deg=effects.vignetting_cutoff_deg)
     if effects.dirt > 0:
         taken, passed = dirt(shape, effects.dirt, rng), np.ones(shape) if shade is None else shade

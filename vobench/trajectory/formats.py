@@ -78,16 +78,11 @@ def stamps_ns(table: Table, unit: Unit) -> Stamps:
     return t_ns
 
 
-def first_stamps_ns(table: Table, unit: Unit) -> tuple[Stamps, Rows, tuple[str, ...]]:
-    """The stamps, the rows (K,) that they are of, and a note where rows with the stamp of the one before are left out.
-
-    Raises TrajectoryError where stamps go back or leave int64.
-    """
-    return first_of_equal(table, _all_ns(table, unit), "stamp")
-
-
 def first_of_equal(table: Table, numbers: Stamps, what: str) -> tuple[Stamps, Rows, tuple[str, ...]]:
-    """Of the rows' numbers (N,), such as stamps, the first of those that repeat; rows and note as `first_stamps_ns`."""
+    """Of the rows' numbers (N,), such as stamps, the first of those that repeat, their rows (K,), and a note of others.
+
+    Raises TrajectoryError where numbers go back.
+    """
     _require_rising(table, numbers, f"{what}s must increase", least=0)
     rows = np.flatnonzero(np.diff(numbers, prepend=numbers[:1] - 1))
     again = np.flatnonzero(np.diff(numbers) == 0) + 1
@@ -148,12 +143,8 @@ def _read_checked(
                 f"{name}:{number}: {what} has {len(columns)} columns ({' '.join(columns)}), "
                 f"this line has {len(fields)}{end}"
             )
-        values[row] = _numbers(fields, f"{name}:{number}", columns)
+        values[row] = [_number(*pair, f"{name}:{number}") for pair in zip(fields, columns, strict=False)]
     return values
-
-
-def _numbers(fields: list[str], place: str, columns: Sequence[str]) -> list[float]:
-    return [_number(field, column, place) for field, column in zip(fields, columns, strict=False)]
 
 
 def _number(field: str, column: str, place: str) -> float:
@@ -181,7 +172,7 @@ COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 NS_PER_S = 10**9
 
 
-def parse_tum(text: str, *, name: str, unit: Unit = "s", order: Order = "xyzw") -> Trajectory:
+def parse_tum(text: str, *, name: str) -> Trajectory:
     """The trajectory in a TUM file's text; `name` is the file, for messages.
 
     Comments (#), blank lines, tabs and CRLF pass. Digits beyond the nanosecond are rounded, ties to even.
@@ -189,8 +180,8 @@ def parse_tum(text: str, *, name: str, unit: Unit = "s", order: Order = "xyzw") 
     quaternions whose norm is not 1, and for stamps that don't increase.
     """
     table = read_table(content(text), name=name, columns=COLUMNS)
-    R = rotations(table, table.values[:, 4:], order)
-    return Trajectory(stamps_ns(table, unit), se3.transform(R, table.values[:, 1:4]))
+    R = rotations(table, table.values[:, 4:], "xyzw")
+    return Trajectory(stamps_ns(table, "s"), se3.transform(R, table.values[:, 1:4]))
 
 
 def format_tum(trajectory: Trajectory) -> str:
@@ -219,17 +210,11 @@ IN_SECONDS = re.compile(r"\[\s*s(?:ec(?:onds?)?)?\s*\]")
 WORD = re.compile(r"[a-df-z]", re.IGNORECASE)  # an e may be an exponent's
 
 
-@dataclass(frozen=True, slots=True)
-class CsvLayout:
-    """What a csv says of itself: the rows below its header, the stamps' unit, the quaternions' order."""
+def csv_layout(text: str) -> tuple[list[tuple[int, str]], Unit, Order]:
+    """The rows below a csv's header, the unit of its stamps and the order of its quaternions.
 
-    rows: tuple[tuple[int, str], ...]
-    unit: Unit
-    order: Order
-
-
-def csv_layout(text: str) -> CsvLayout:
-    """A header that names w last, or seconds, is believed; stamps with a decimal point are seconds."""
+    A header that names w last, or seconds, is believed; stamps with a decimal point are seconds.
+    """
     first = text.removeprefix("\ufeff").lstrip().partition("\n")[0]
     rows, header = content(text), [""]
     if WORD.search(first.lstrip("#")):
@@ -237,7 +222,7 @@ def csv_layout(text: str) -> CsvLayout:
         rows = rows if first.startswith("#") else rows[1:]
     names = [cell.partition("[")[0].strip() for cell in header[4:8]]
     order: Order = "xyzw" if [name[-1:] for name in names] == ["x", "y", "z", "w"] else "wxyz"
-    return CsvLayout(tuple(rows), _unit(header[0], rows), order)
+    return rows, _unit(header[0], rows), order
 
 
 def format_euroc(trajectory: Trajectory, more: Array | None = None) -> str:
@@ -273,36 +258,6 @@ SKEW_TOLERANCE = 1e-3
 MAX_FRAME = 10**9
 
 
-def parse_kitti(text: str, *, name: str) -> Array:
-    """Poses (N, 4, 4) of a KITTI file, the first three rows of each matrix; kept as given, not orthonormalised.
-
-    Raises TrajectoryError naming file and line for what is not 12 finite numbers or no rotation.
-    """
-    table = read_table(content(text), name=name, columns=KITTI_COLUMNS)
-    matrices = table.values.reshape(-1, 3, 4)
-    _require_rotations(table, matrices[:, :, :3])
-    return se3.transform(matrices[:, :, :3], matrices[:, :, 3])
-
-
-def parse_numbered_kitti(text: str, *, name: str) -> tuple[Stamps, Array, tuple[str, ...]]:
-    """Frame numbers (N,), their poses (N, 4, 4) as `parse_kitti` reads them, and a note where frames repeat.
-
-    Raises TrajectoryError as it does, and where a frame is no whole number from 0 on or comes after a later one.
-    """
-    table = read_table(content(text), name=name, columns=NUMBERED_COLUMNS)
-    stated = table.values[:, 0]
-    bad = np.flatnonzero((stated != np.floor(stated)) | (stated < 0) | (stated > MAX_FRAME))
-    if bad.size:
-        raise TrajectoryError(
-            f"{table.place(bad[0])}: the first of 13 columns should be the number of a frame, whole and from 0 on, "
-            f"but is {table.first[bad[0]]}"
-        )
-    frames, rows, notes = first_of_equal(table, stated.astype(np.int64), "frame number")
-    matrices = table.values[:, 1:].reshape(-1, 3, 4)
-    _require_rotations(table, matrices[:, :, :3])
-    return frames, se3.transform(matrices[rows, :, :3], matrices[rows, :, 3]), notes
-
-
 def format_kitti(T: Array) -> str:
     """KITTI text of poses (N, 4, 4), every digit of them."""
     rows = T[:, :3].reshape(-1, len(KITTI_COLUMNS)).tolist()
@@ -312,12 +267,6 @@ def format_kitti(T: Array) -> str:
 def format_times(t_ns: Stamps) -> str:
     """KITTI's file of times (N,): seconds with 9 decimals, exact."""
     return "".join(f"{seconds(t)}\n" for t in t_ns.tolist())
-
-
-def parse_tartanair(text: str, *, name: str, order: Order = "xyzw") -> Array:
-    """Poses (N, 4, 4) of a file with x y z qx qy qz qw, which is TartanAir's. Raises TrajectoryError."""
-    table = read_table(content(text), name=name, columns=TARTANAIR_COLUMNS)
-    return se3.transform(rotations(table, table.values[:, 3:], order), table.values[:, :3])
 
 
 def parse_times(text: str, *, name: str) -> Stamps:
@@ -345,6 +294,7 @@ def _require_rotations(table: Table, R: Array) -> None:
 LFS_POINTER = "version https://git-lfs.github.com/spec/"
 TUM, KITTI, TARTANAIR = len(COLUMNS), len(KITTI_COLUMNS), len(TARTANAIR_COLUMNS)
 NUMBERED = len(NUMBERED_COLUMNS)
+FORMS_BY_COLUMNS = {len(form): form for form in (COLUMNS, KITTI_COLUMNS, NUMBERED_COLUMNS, TARTANAIR_COLUMNS)}
 FORMS = (
     f"TUM has {TUM} ({' '.join(COLUMNS)}), KITTI {KITTI}, or {NUMBERED} with a frame number first, "
     f"TartanAir {TARTANAIR}, EuRoC {TUM} and commas"
@@ -398,24 +348,38 @@ def parse_any(written: str, *, name: str, unit: Unit | None = None, order: Order
     """
     first = _first_row(written, name)
     if "," in first:
-        found = csv_layout(written)
-        table = read_table(found.rows, name=name, columns=EUROC_COLUMNS, separator=",")
-        return _stamped(table, unit or found.unit, found.unit, order or found.order)
-    columns = len(first.split())
-    if columns == KITTI:
-        return Parsed(None, parse_kitti(written, name=name))
-    if columns == NUMBERED:
-        frames, T, notes = parse_numbered_kitti(written, name=name)
-        return Parsed(None, T, frames=frames, notes=notes)
-    if columns == TARTANAIR:
-        return Parsed(None, parse_tartanair(written, name=name, order=order or "xyzw"), order=order or "xyzw")
-    table = read_table(content(written), name=name, columns=COLUMNS)
-    return _stamped(table, unit or "s", "s", order or "xyzw")
+        rows, found_unit, found_order = csv_layout(written)
+        table = read_table(rows, name=name, columns=EUROC_COLUMNS, separator=",")
+        return _stamped(table, unit or found_unit, found_unit, order or found_order)
+    columns = FORMS_BY_COLUMNS[len(first.split())]
+    table, order = read_table(content(written), name=name, columns=columns), order or "xyzw"
+    if columns is TARTANAIR_COLUMNS:
+        T = se3.transform(rotations(table, table.values[:, 3:], order), table.values[:, :3])
+        return Parsed(None, T, order=order)
+    return _stamped(table, unit or "s", "s", order) if columns is COLUMNS else _matrices(table)
+
+
+def _matrices(table: Table) -> Parsed:
+    """KITTI's poses, the first three rows of each matrix, kept as given; the frame's number may come first."""
+    frames, rows, notes = None, np.arange(len(table.values)), tuple[str, ...]()
+    if table.values.shape[1] == NUMBERED:
+        stated = table.values[:, 0]
+        bad = np.flatnonzero((stated != np.floor(stated)) | (stated < 0) | (stated > MAX_FRAME))
+        if bad.size:
+            raise TrajectoryError(
+                f"{table.place(bad[0])}: the first of 13 columns should be the number of a frame, whole and from 0 on, "
+                f"but is {table.first[bad[0]]}"
+            )
+        frames, rows, notes = first_of_equal(table, stated.astype(np.int64), "frame number")
+    matrices = table.values[:, -KITTI:].reshape(-1, 3, 4)
+    _require_rotations(table, matrices[:, :, :3])
+    T = se3.transform(matrices[rows, :, :3], matrices[rows, :, 3])
+    return Parsed(None, T, frames=frames, notes=notes)
 
 
 def _stamped(table: Table, unit: Unit, form_unit: Unit, order: Order) -> Parsed:
     """The poses of rows with a stamp, a position and a quaternion."""
-    t_ns, rows, notes = first_stamps_ns(table, unit)
+    t_ns, rows, notes = first_of_equal(table, _all_ns(table, unit), "stamp")
     T = se3.transform(rotations(table, table.values[:, 4:8], order), table.values[:, 1:4])
     return Parsed(t_ns, T[rows], unit, form_unit, order, notes=notes)
 
@@ -429,6 +393,6 @@ def _first_row(written: str, name: str) -> str:
     if not first:
         raise TrajectoryError(f"no pose, {'for all lines are comments' if start else 'for the file is empty'}: {name}")
     columns = len(first.split())
-    if "," not in first and columns not in (TUM, KITTI, NUMBERED, TARTANAIR):
+    if "," not in first and columns not in FORMS_BY_COLUMNS:
         raise TrajectoryError(f"{name}:{number}: no form of trajectory has {columns} columns: {FORMS}")
     return first

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -115,12 +114,6 @@ class TimeLaw:
         return float(self.progress.x[-1])
 
     @property
-    def breaks_s(self) -> Array:
-        """Times at which its third derivative may jump."""
-        inner: Array = self.progress.x[1:-1]
-        return inner
-
-    @property
     def length(self) -> float:
         """Progress at its end."""
         return float(self.progress(self.end_s))
@@ -174,14 +167,12 @@ def in_stages(laws: Sequence[TimeLaw], *, pause_s: float = 0.0) -> TimeLaw:
     """One law after another, each from where the last ended, with rests between. Raises MotionError for its pause."""
     if not (np.isfinite(pause_s) and pause_s >= 0):
         raise MotionError(f"pause_s is {pause_s:g}; it should be a finite number of seconds, 0 or more")
-    rest = [(pause_s, np.zeros(7))] if pause_s else []
-    return _in_turn([stage for k, law in enumerate(laws) for stage in [*(rest if k else []), *_stages(law)]])
-
-
-def _stages(law: TimeLaw) -> list[tuple[float, Array]]:
-    """Durations and coefficients of a law's polynomials."""
-    durations_s = [after - before for before, after in pairwise(law.progress.x)]
-    return list(zip(durations_s, law.progress.c.T, strict=True))
+    stages = list[tuple[float, Array]]()
+    for law in laws:
+        if stages and pause_s:
+            stages.append((pause_s, np.zeros(7)))
+        stages += zip(np.diff(law.progress.x), law.progress.c.T, strict=True)
+    return _in_turn(stages)
 
 
 def _in_turn(stages: Sequence[tuple[float, Array]]) -> TimeLaw:
@@ -232,7 +223,7 @@ class CurveMotion:
         passed_s = self.law.when(self.curve.breaks)
         rate = self.law.at(passed_s)[1]
         passed_s = passed_s[(rate > AT_REST) & (passed_s > self.law.start_s) & (passed_s < self.law.end_s)]
-        return np.unique(np.concatenate([self.law.breaks_s, passed_s])) * 1e9
+        return np.unique(np.concatenate([self.law.progress.x[1:-1], passed_s])) * 1e9
 
     def at(self, t_ns: Stamps | Array) -> Kinematics:
         """The curve where the law says, by the chain rule."""
