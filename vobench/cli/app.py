@@ -106,15 +106,10 @@ def run() -> None:
         stop.check()  # then it may come of that
         _fail(_sentence(error), error)
     finally:
-        _flush()
-
-
-def _flush() -> None:
-    """Hand over what is printed now, not at exit, where a reader that has seen enough would make a traceback."""
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        _hang_up()
+        try:  # now, not at exit, where a reader that has seen enough would make a traceback
+            sys.stdout.flush()
+        except BrokenPipeError:
+            _hang_up()
 
 
 def _hang_up() -> None:

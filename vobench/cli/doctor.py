@@ -23,10 +23,7 @@ PROBE = "from vobench.render import raster; raster.context()"
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing looked at: what was found, and the command that mends it where it is not well.
-
-    What is optional may be missing without harm.
-    """
+    """One thing looked at: what was found, and the command that mends it; what is optional may be missing."""
 
     check: str
     well: bool
@@ -34,32 +31,25 @@ class Check:
     remedy: str = ""
     optional: bool = False
 
-    @property
-    def mark(self) -> str:
-        """What stands before it in the table."""
-        missing = "optional" if self.optional else "MISSING"
-        return "ok" if self.well else missing
 
-
-def show(*, fix: bool, as_json: bool) -> None:
-    """Print every check; raise MissingDependencyError, with the commands that mend it, where one is not well."""
-    checks = [_python(), _libraries(), _drawing(), _cache(), _path_tracing()]
+def doctor_command(
+    *,
+    fix: Annotated[bool, typer.Option("--fix", help="Install what is missing, where we may.")] = False,
+    json: terminal.Json = False,
+) -> None:
+    """Say what this machine lacks, and the command that mends it."""
+    python = Check("Python", True, sys.version.split()[0])
+    checks = [python, _libraries(), _drawing(), _cache(), _path_tracing()]
     if fix and not checks[2].well:
         checks[2] = _installed_drawing()
     ill = [c for c in checks if not (c.well or c.optional)]
-    if as_json:
+    if json:
         terminal.print_json({"well": not ill, "checks": [asdict(c) for c in checks]})
-    else:
-        rows = [[c.mark, c.check, c.result] for c in checks]
-        terminal.console().print(terminal.table("", ["", "check", "result"], rows))
-    if ill and as_json:
-        raise SystemExit(1)  # the one object has said it all
+        raise SystemExit(1 if ill else 0)  # the one object has said it all
+    rows = [["ok" if c.well else "optional" if c.optional else "MISSING", c.check, c.result] for c in checks]
+    terminal.console().print(terminal.table("", ["", "check", "result"], rows))
     if ill:
         raise MissingDependencyError("; ".join(f"{c.check}: {c.remedy}" for c in ill))
-
-
-def _python() -> Check:
-    return Check("Python", True, sys.version.split()[0])
 
 
 def _libraries() -> Check:
@@ -96,16 +86,12 @@ def _installed_drawing() -> Check:
     if os.geteuid() != 0 or shutil.which("apt-get") is None:
         return _drawing()
     with terminal.Bars().step(f"apt-get install {' '.join(EGL_PACKAGES)}"):
-        _apt_get("update")
-        _apt_get("install", "-y", "--no-install-recommends", *EGL_PACKAGES)
+        # Without a word or a question; whether it helped, the next check tells.
+        environment, nowhere = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}, subprocess.DEVNULL
+        for words in (["update"], ["install", "-y", "--no-install-recommends", *EGL_PACKAGES]):
+            command = ["apt-get", "-qq", *words]
+            subprocess.run(command, env=environment, check=False, stdin=nowhere, stdout=nowhere)
     return _drawing()
-
-
-def _apt_get(*words: str) -> None:
-    """Run apt-get without a word or a question; whether it helped, the next check tells."""
-    environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
-    command = ["apt-get", "-qq", *words]
-    subprocess.run(command, env=environment, check=False, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
 
 
 def _cache() -> Check:
@@ -123,12 +109,3 @@ def _path_tracing() -> Check:
         result, _, remedy = str(error).partition("; run: ")
         return Check("path tracing (Mitsuba)", False, f"{result}; run: {_as_we_are(remedy)}", _as_we_are(remedy), True)
     return Check("path tracing (Mitsuba)", True, f"works with {library}", optional=True)
-
-
-def doctor_command(
-    *,
-    fix: Annotated[bool, typer.Option("--fix", help="Install what is missing, where we may.")] = False,
-    json: terminal.Json = False,
-) -> None:
-    """Say what this machine lacks, and the command that mends it."""
-    show(fix=fix, as_json=json)

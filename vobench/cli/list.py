@@ -8,7 +8,7 @@ import typer
 from vobench.cli import terminal
 from vobench.errors import UnknownNameError, VobenchError, unknown
 from vobench.suite import catalog
-from vobench.suite.catalog import KINDS, Entry, Kind
+from vobench.suite.catalog import KINDS, Entry
 
 # The values of a top-level key `summary` that say the same without a YAML parser: on one line, in quotes without
 # escapes, or two words or more of plain text without a colon or a comment.
@@ -18,40 +18,29 @@ SUMMARY = re.compile(rf"^summary: +(?:{QUOTED}|{PLAIN})", re.MULTILINE)
 SUMMARY_KEY = re.compile(r"^[\"']?summary\b", re.MULTILINE)
 
 
-def show(kind: str | None, *, as_json: bool) -> None:
-    """Print all entries of one kind or of all; where a name is there twice, the second is hidden by the first."""
-    facts = [_facts(entry) for wanted in _kinds(kind) for entry in catalog.entries(wanted)]
-    seen: set[tuple[str, str]] = set()
-    for fact in facts:
-        fact["hidden"] = (fact["kind"], fact["name"]) in seen
-        seen.add((fact["kind"], fact["name"]))
-    if as_json:
+def list_command(
+    kind: Annotated[
+        str | None, typer.Argument(metavar="[suites|scenes|estimators]", help="All where left out.")
+    ] = None,
+    *,
+    json: terminal.Json = False,
+) -> None:
+    """List the suites, scenes and estimators that can be found, and where."""
+    kinds = [known for known in KINDS if kind in (None, known, f"{known}s")]
+    if not kinds:
+        raise UnknownNameError(unknown("kind", str(kind), [f"{known}s" for known in KINDS]))
+    facts, seen = list[dict[str, Any]](), set[tuple[str, str]]()
+    for entry in (entry for wanted in kinds for entry in catalog.entries(wanted)):
+        fact = {"kind": entry.kind, "name": entry.name, "summary": _summary(entry), "origin": entry.origin}
+        # Where a name is there twice, the second is hidden by the first.
+        facts.append({**fact, "path": str(entry.path), "hidden": (entry.kind, entry.name) in seen})
+        seen.add((entry.kind, entry.name))
+    if json:
         terminal.print_json({"entries": facts})
         return
     columns = ["kind", "name", "summary", "origin", "path"]
-    rows = [
-        [f[column] + (" (hidden)" if column == "name" and f["hidden"] else "") for column in columns] for f in facts
-    ]
+    rows = [[f[name] + (" (hidden)" if name == "name" and f["hidden"] else "") for name in columns] for f in facts]
     terminal.console().print(terminal.table("", columns, rows))
-
-
-def _kinds(kind: str | None) -> tuple[Kind, ...]:
-    if kind is None:
-        return KINDS
-    for known in KINDS:
-        if kind in (known, f"{known}s"):
-            return (known,)
-    raise UnknownNameError(unknown("kind", kind, [f"{known}s" for known in KINDS]))
-
-
-def _facts(entry: Entry) -> dict[str, Any]:
-    return {
-        "kind": entry.kind,
-        "name": entry.name,
-        "summary": _summary(entry),
-        "origin": entry.origin,
-        "path": str(entry.path),
-    }
 
 
 def _summary(entry: Entry) -> str:
@@ -83,14 +72,3 @@ def _checked_summary(entry: Entry) -> str:
     if entry.kind == "scene":
         return read_scene(entry.path).summary
     return yaml_file.read(entry.path, Suite).summary
-
-
-def list_command(
-    kind: Annotated[
-        str | None, typer.Argument(metavar="[suites|scenes|estimators]", help="All where left out.")
-    ] = None,
-    *,
-    json: terminal.Json = False,
-) -> None:
-    """List the suites, scenes and estimators that can be found, and where."""
-    show(kind, as_json=json)

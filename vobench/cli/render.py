@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -27,118 +26,14 @@ from vobench.sensor.image_sensor import CAMERAS, CameraSettings, NoiseStreams, e
 from vobench.sensor.pixel_truth import CHANNELS, picture
 from vobench.sensor.response import Grey
 from vobench.sequence.picture import write_png
+from vobench.setting import Triple
 from vobench.suite import catalog
 from vobench.suite.scene_file import build, read_scene
 from vobench.suite.suite import Rendering
 
-Place = tuple[float, float, float]
 LATEST_S = 1e9  # stamps are 64 bits of nanoseconds
 # Without a next picture nothing flows.
 STILL_CHANNELS = tuple(name for name in CHANNELS if name not in {"flow", "occlusion"})
-
-
-@dataclass(frozen=True, slots=True)
-class Viewpoint:
-    """A camera's place, direction and time."""
-
-    at_m: Place
-    yaw_deg: float
-    pitch_deg: float
-    t_s: float
-
-    def check(self) -> None:
-        """Raise InputError where an angle or the time is no number, or a stamp cannot hold the time."""
-        for option, value in (("--yaw", self.yaw_deg), ("--pitch", self.pitch_deg), ("--time", self.t_s)):
-            if not np.isfinite(value):
-                raise InputError(f"{option} should be a finite number, got {value}")
-        if abs(self.t_s) > LATEST_S:
-            raise InputError(f"--time should be within {LATEST_S:.0e} s of the start, got {self.t_s:g}")
-
-    @property
-    def T_world_camera(self) -> Array:
-        """The camera's pose (4, 4)."""
-        turned = se3.transform(se3.rotation_z(np.deg2rad(self.yaw_deg)), self.at_m)
-        return turned @ looking(pitch_deg=self.pitch_deg, position_m=(0.0, 0.0, 0.0))
-
-    @property
-    def t_ns(self) -> int:
-        """The instant."""
-        return round(self.t_s * NS_PER_S)
-
-
-@dataclass(frozen=True, slots=True)
-class PictureSettings:
-    """What draws and takes the picture: the lens of a preset, a chip, an exposure, an engine."""
-
-    camera: str
-    sensor: str
-    exposure_gain: float
-    engine: str
-    samples: int | None
-
-    def rendering(self) -> Rendering:
-        """The engine. Raises InputError for one that is not known, and for samples that it does not take."""
-        try:
-            return Rendering(engine=self.engine, samples=self.samples)
-        except SettingError as error:
-            raise InputError(": ".join([*(f"--{key}" for key in error.keys), error.sentence])) from None
-
-    def lens(self) -> Camera:
-        """The lens. Raises UnknownNameError."""
-        _require_known("camera", self.camera, PRESETS)
-        return PRESETS[self.camera].left
-
-    def chip(self) -> CameraSettings:
-        """The chip at its exposure. Raises UnknownNameError."""
-        _require_known("camera sensor", self.sensor, CAMERAS)
-        return CameraSettings(chip=CAMERAS[self.sensor], exposure_gain=self.exposure_gain)
-
-
-def show(
-    scene_name: str, viewpoint: Viewpoint, settings: PictureSettings, *, out: Path, truth: bool, as_json: bool
-) -> None:
-    """Draw one picture of a scene, and with `truth` its ground truth beside it."""
-    rendering, lens, chip = settings.rendering(), settings.lens(), settings.chip()
-    viewpoint.check()
-    if out.suffix != ".png" or out.is_dir() or not out.parent.is_dir():
-        raise InputError(f"--out should be a .png in a folder that exists, got {out}")
-    spec = read_scene(catalog.find("scene", scene_name).path)
-    if not spec.room.holds(viewpoint.at_m):
-        raise InputError(f"--at should be inside the room ({spec.room.extent}), got {viewpoint.at_m}")
-    scene, is_traced = build(spec, {}), rendering.engine == "path"
-    light = None if is_traced else perform(bake_task(spec), default_store().root, progress=terminal.Bars())
-    with closing(open_renderer(scene, rendering, light)) as renderer:
-        luminance_cd_m2 = renderer.radiance(lens, still(lens, viewpoint.T_world_camera, t_ns=viewpoint.t_ns))
-    write_png(out, _exposed(luminance_cd_m2 / np.float32(spec.white_cd_m2), chip))
-    written = [out, *(_write_truth(out, scene, lens, viewpoint) if truth else [])]
-    if as_json:
-        terminal.print_json({"files": [str(path) for path in written]})
-    else:
-        print("\n".join(map(str, written)))
-
-
-def _require_known(kind: str, name: str, known: Iterable[str]) -> None:
-    if name not in known:
-        raise UnknownNameError(unknown(kind, name, list(known)))
-
-
-def _exposed(radiance: Radiance, camera: CameraSettings) -> Grey:
-    pattern, shot, read = np.random.default_rng(0).spawn(3)
-    shape = (radiance.shape[0], radiance.shape[1])
-    return expose(radiance, camera, NoiseStreams(shot, read), pattern=fixed_pattern(shape, camera.chip, pattern))
-
-
-def _write_truth(out: Path, scene: Scene, camera: Camera, viewpoint: Viewpoint) -> Iterator[Path]:
-    """Every channel as a picture for people beside `out`, and all values in one .npz."""
-    shot = Shot(viewpoint.T_world_camera, viewpoint.t_ns)
-    channels = TruthCaster(scene).frame(camera, shot, STILL_CHANNELS).channels()
-    for name, values in channels.items():
-        path = out.with_suffix(f".{name}.png")
-        write_png(path, picture(name, values))
-        yield path
-    arrays = out.with_suffix(".truth.npz")
-    np.savez_compressed(arrays, allow_pickle=False, **channels)
-    yield arrays
 
 
 def render_command(
@@ -146,7 +41,7 @@ def render_command(
     *,
     out: Annotated[Path, typer.Option(help="The picture to write.")] = Path("frame.png"),
     camera: Annotated[str, typer.Option(help="The left lens of this rig preset.")] = "paper_blender",
-    at: Annotated[tuple[float, float, float], typer.Option(metavar="X Y Z", help="Where it stands, in metres.")] = (
+    at: Annotated[Triple, typer.Option(metavar="X Y Z", help="Where it stands, in metres.")] = (
         0.0,
         0.0,
         1.2,
@@ -162,6 +57,67 @@ def render_command(
     json: terminal.Json = False,
 ) -> None:
     """Draw one picture of a scene, to look at and to debug scenes with."""
-    viewpoint = Viewpoint(at, yaw, pitch, time)
-    settings = PictureSettings(camera, sensor, gain, engine, samples)
-    show(scene, viewpoint, settings, out=out, truth=truth, as_json=json)
+    rendering, lens = _rendering(engine, samples), PRESETS[_known("camera", camera, PRESETS)].left
+    chip = CameraSettings(chip=CAMERAS[_known("camera sensor", sensor, CAMERAS)], exposure_gain=gain)
+    T_world_camera, t_ns = _pose(at, yaw, pitch, time)
+    if out.suffix != ".png" or out.is_dir() or not out.parent.is_dir():
+        raise InputError(f"--out should be a .png in a folder that exists, got {out}")
+    spec = read_scene(catalog.find("scene", scene).path)
+    if not spec.room.holds(at):
+        raise InputError(f"--at should be inside the room ({spec.room.extent}), got {at}")
+    built, is_traced = build(spec, {}), rendering.engine == "path"
+    light = None if is_traced else perform(bake_task(spec), default_store().root, progress=terminal.Bars())
+    with closing(open_renderer(built, rendering, light)) as renderer:
+        luminance_cd_m2 = renderer.radiance(lens, still(lens, T_world_camera, t_ns=t_ns))
+    write_png(out, _exposed(luminance_cd_m2 / np.float32(spec.white_cd_m2), chip))
+    written = [
+        str(path) for path in (out, *(_write_truth(out, built, lens, Shot(T_world_camera, t_ns)) if truth else []))
+    ]
+    if json:
+        terminal.print_json({"files": written})
+    else:
+        print("\n".join(written))
+
+
+def _rendering(engine: str, samples: int | None) -> Rendering:
+    """The engine. Raises InputError for one that is not known, and for samples that it does not take."""
+    try:
+        return Rendering(engine=engine, samples=samples)
+    except SettingError as error:
+        raise InputError(": ".join([*(f"--{key}" for key in error.keys), error.sentence])) from None
+
+
+def _pose(at_m: Triple, yaw_deg: float, pitch_deg: float, t_s: float) -> tuple[Array, int]:
+    """The camera's pose and instant. Raises InputError where one is no number, or a stamp cannot hold the time."""
+    for option, value in (("--yaw", yaw_deg), ("--pitch", pitch_deg), ("--time", t_s)):
+        if not np.isfinite(value):
+            raise InputError(f"{option} should be a finite number, got {value}")
+    if abs(t_s) > LATEST_S:
+        raise InputError(f"--time should be within {LATEST_S:.0e} s of the start, got {t_s:g}")
+    turned = se3.transform(se3.rotation_z(np.deg2rad(yaw_deg)), at_m)
+    return turned @ looking(pitch_deg=pitch_deg, position_m=(0.0, 0.0, 0.0)), round(t_s * NS_PER_S)
+
+
+def _known(kind: str, name: str, known: Iterable[str]) -> str:
+    """The name, where it is known. Raises UnknownNameError where it is not."""
+    if name not in known:
+        raise UnknownNameError(unknown(kind, name, list(known)))
+    return name
+
+
+def _exposed(radiance: Radiance, camera: CameraSettings) -> Grey:
+    pattern, shot, read = np.random.default_rng(0).spawn(3)
+    shape = (radiance.shape[0], radiance.shape[1])
+    return expose(radiance, camera, NoiseStreams(shot, read), pattern=fixed_pattern(shape, camera.chip, pattern))
+
+
+def _write_truth(out: Path, scene: Scene, camera: Camera, shot: Shot) -> Iterator[Path]:
+    """Every channel as a picture for people beside `out`, and all values in one .npz."""
+    channels = TruthCaster(scene).frame(camera, shot, STILL_CHANNELS).channels()
+    for name, values in channels.items():
+        path = out.with_suffix(f".{name}.png")
+        write_png(path, picture(name, values))
+        yield path
+    arrays = out.with_suffix(".truth.npz")
+    np.savez_compressed(arrays, allow_pickle=False, **channels)
+    yield arrays

@@ -11,7 +11,7 @@ import typer
 from vobench.cli import terminal
 from vobench.errors import InputError
 from vobench.run.motion import BodyMotion, body_motions
-from vobench.run.store import default_store
+from vobench.run.store import default_store, why_unwritable
 from vobench.run.task import is_done, sequence_tasks
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite import Case, Plan, read_plan
@@ -20,39 +20,46 @@ if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
 
 
-def run(suite: str, estimators: tuple[str, ...], *, out: Path, as_json: bool) -> None:
-    """Run a suite and print its leaderboard and where everything lies."""
+def run_command(
+    suite: terminal.SuiteName,
+    *,
+    estimator: Annotated[
+        list[str] | None, typer.Option("--estimator", "-e", help="Run only this one; may be given several times.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Where the folders of runs go.")] = Path("runs"),
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
+    json: terminal.Json = False,
+) -> None:
+    """Run a suite: simulate, estimate, score, and print the leaderboard."""
+    names = tuple(estimator or ())
+    if dry_run:
+        _check(suite, names, as_json=json)
+        return
     from vobench.cli.boards import print_boards
     from vobench.report import page
     from vobench.report.leaderboard import as_json as boards_as_json
     from vobench.run.run import run_suite
 
-    planned = read_plan(suite, only_estimators=estimators)
+    planned = read_plan(suite, only_estimators=names)
     _, recordings = _preflight(planned)
     store = default_store().root
-    _require_writable("--out", out)
-    _require_writable("VOBENCH_CACHE", store)
+    for what, place in (("--out", out), ("VOBENCH_CACHE", store)):
+        if cause := why_unwritable(place):
+            raise InputError(f"{what} should be a folder that can be written ({cause}): {place}")
     finish, progress = page.write_reports, terminal.Bars()
     folder = run_suite(planned, recordings, root=out, store=store, progress=progress, finish=finish)
     boards = page.boards_of(folder, folder.scores())
-    if as_json:
+    if json:
         print(boards_as_json(boards), end="")
         return
     print_boards(boards)
-    terminal.console().print(f"Everything is in {folder.path}\nLook into it: {_command()} view {folder.path}")
+    vobench = "vobench" if shutil.which("vobench") else sys.argv[0]  # where the environment is not activated
+    terminal.console().print(f"Everything is in {folder.path}\nLook into it: {vobench} view {folder.path}")
 
 
-def _command() -> str:
-    """What to type for vobench: our own path where the environment is not activated."""
-    return "vobench" if shutil.which("vobench") else sys.argv[0]
-
-
-def _require_writable(what: str, folder: Path) -> None:
-    """Said before hours of work. Raises InputError."""
-    from vobench.run.store import why_unwritable
-
-    if cause := why_unwritable(folder):
-        raise InputError(f"{what} should be a folder that can be written ({cause}): {folder}")
+def check_command(suite: terminal.SuiteName, *, json: terminal.Json = False) -> None:
+    """Validate a suite and print its plan; nothing is rendered."""
+    _check(suite, (), as_json=json)
 
 
 def _preflight(planned: Plan) -> "tuple[dict[str, BodyMotion], dict[str, Recording]]":
@@ -62,17 +69,19 @@ def _preflight(planned: Plan) -> "tuple[dict[str, BodyMotion], dict[str, Recordi
     with wrong.at():
         travels = body_motions(planned)
     with wrong.at():
-        recordings = _read_recordings(planned)
+        if planned.recorded:
+            from vobench.run.import_recording import read_all
+
+            recordings = read_all(planned)
     wrong.require_none()
     return travels, recordings
 
 
-def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
+def _check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     """Validate a suite and print what it comes to."""
     planned = read_plan(suite, only_estimators=estimators)
     travels, recordings = _preflight(planned)
-    cases = [_case_facts(case, travels) for case in planned.simulated]
-    cases += [_recorded_facts(case, recordings[case.name]) for case in planned.recorded]
+    cases = [_facts(case, travels, recordings) for case in planned.cases]
     entrants = [
         {"estimator": e.label, "version": e.manifest.version, "needs": list(e.manifest.needs), "path": str(e.folder)}
         for e in planned.entrants
@@ -95,63 +104,22 @@ def check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     out.print(f"{len(cases)} cases, {len(entrants)} estimators, {trials} trials: the suite is valid")
 
 
-def _read_recordings(planned: Plan) -> "dict[str, Recording]":
-    """The plan's recordings by their cases' names; what reads them is imported where there are any."""
-    if not planned.recorded:
-        return {}
-    from vobench.run.import_recording import read_all
-
-    return read_all(planned)
-
-
-def _case_facts(case: Case, travels: Mapping[str, BodyMotion]) -> dict[str, Any]:
-    """What is known of a case before it is made."""
-    t_ns, is_there = travels[case.variant["trajectory"]].t_ns, _is_made(case, {})
+def _facts(
+    case: Case | RecordedCase, travels: Mapping[str, BodyMotion], recordings: "Mapping[str, Recording]"
+) -> dict[str, Any]:
+    """What is known of a case before it is made; a recording's pictures are not read yet."""
+    is_there = is_done(sequence_tasks(case, recordings)[-1], default_store().root)
+    notes = dict[str, list[str]]()
+    if isinstance(case, RecordedCase):
+        recording, to_make = recordings[case.name], f"to import from {case.source.path}"
+        t_ns, notes = recording.t_ns, {"notes": list(recording.notes)}
+    else:
+        t_ns, to_make = travels[case.variant["trajectory"]].t_ns, "to simulate"
     return {
         "case": case.name,
         "frames": len(t_ns),
         "duration_s": float(t_ns[-1] - t_ns[0]) / 1e9,
-        "simulated": is_there,
-        "sequence": "in the cache" if is_there else "to simulate",
+        "simulated": is_there and not isinstance(case, RecordedCase),
+        "sequence": "in the cache" if is_there else to_make,
+        **notes,
     }
-
-
-def _recorded_facts(case: RecordedCase, recording: "Recording") -> dict[str, Any]:
-    """The same of a recording; its pictures are not read yet."""
-    is_there = _is_made(case, {case.name: recording})
-    return {
-        "case": case.name,
-        "frames": recording.frame_count,
-        "duration_s": float(recording.t_ns[-1] - recording.t_ns[0]) / 1e9,
-        "simulated": False,
-        "sequence": "in the cache" if is_there else f"to import from {case.source.path}",
-        "notes": list(recording.notes),
-    }
-
-
-def _is_made(case: Case | RecordedCase, recordings: "Mapping[str, Recording]") -> bool:
-    """Whether the store holds the case's sequence."""
-    return is_done(sequence_tasks(case, recordings)[-1], default_store().root)
-
-
-def run_command(
-    suite: terminal.SuiteName,
-    *,
-    estimator: Annotated[
-        list[str] | None, typer.Option("--estimator", "-e", help="Run only this one; may be given several times.")
-    ] = None,
-    out: Annotated[Path, typer.Option(help="Where the folders of runs go.")] = Path("runs"),
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
-    json: terminal.Json = False,
-) -> None:
-    """Run a suite: simulate, estimate, score, and print the leaderboard."""
-    names = tuple(estimator or ())
-    if dry_run:
-        check(suite, names, as_json=json)
-    else:
-        run(suite, names, out=out, as_json=json)
-
-
-def check_command(suite: terminal.SuiteName, *, json: terminal.Json = False) -> None:
-    """Validate a suite and print its plan; nothing is rendered."""
-    check(suite, (), as_json=json)

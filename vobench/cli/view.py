@@ -1,6 +1,8 @@
 """vobench view."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -13,30 +15,8 @@ from vobench.report.rerun import pick, trial_view
 from vobench.run.folder import open_run
 
 
-def show_view(run: Path, *, case: str | None, estimator: str | None, save: Path | None, as_json: bool) -> None:
-    """Save a run as .rrd, or open it in Rerun's viewer."""
-    folder = open_run(run)
-    chosen = pick(folder.scores(), case=case, estimator=estimator)
-    path = save or folder.estimate(chosen.case, chosen.estimator, chosen.repeat) / "run.rrd"
-    if path.is_dir() or not os.access(path.parent, os.W_OK):
-        wrong = "is a folder" if path.is_dir() else "is in a folder that cannot be written"
-        raise InputError(f"--save should be a file to write, but this {wrong}: {path}")
-    save_trial(path, trial_view(folder, chosen))
-    if as_json:
-        terminal.print_json(
-            {"case": chosen.case, "estimator": chosen.estimator, "repeat": chosen.repeat, "path": str(path)}
-        )
-    else:
-        print(f"{chosen.estimator} on {chosen.case} ({chosen.status}): {path}")
-    if save is None and not as_json:
-        _open(path)
-
-
 def _open(path: Path) -> None:
     """Hand the file to Rerun's viewer, which needs a display."""
-    import subprocess
-    import sys
-
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise MissingDependencyError(f"no display to open the viewer on; on a machine that has one, run: rerun {path}")
     # Without -P, a rerun.py in the working folder would be run in its place.
@@ -56,4 +36,17 @@ def view_command(
     json: terminal.Json = False,
 ) -> None:
     """Open one run in Rerun, failures first."""
-    show_view(run, case=case, estimator=estimator, save=save, as_json=json)
+    folder = open_run(run)
+    chosen = pick(folder.scores(), case=case, estimator=estimator)
+    path = save or folder.estimate(chosen.case, chosen.estimator, chosen.repeat) / "run.rrd"
+    if path.is_dir() or not os.access(path.parent, os.W_OK):
+        wrong = "is a folder" if path.is_dir() else "is in a folder that cannot be written"
+        raise InputError(f"--save should be a file to write, but this {wrong}: {path}")
+    save_trial(path, trial_view(folder, chosen))
+    if json:
+        named = {"case": chosen.case, "estimator": chosen.estimator, "repeat": chosen.repeat}
+        terminal.print_json({**named, "path": str(path)})
+        return
+    print(f"{chosen.estimator} on {chosen.case} ({chosen.status}): {path}")
+    if save is None:
+        _open(path)
