@@ -9,7 +9,7 @@ from vobench.run.motion import body_motions
 from vobench.suite import catalog, scene_file
 from vobench.suite import suite as expand
 from vobench.suite.catalog import builtin_root
-from vobench.suite.suite import AXES, plan, read_plan
+from vobench.suite.suite import AXES, read_plan
 from vobench.suite.yaml_file import checked, plain
 
 MORE = (
@@ -140,9 +140,9 @@ def test_a_plan_goes_through_json_unchanged(bent):
 @pytest.mark.parametrize("name", sorted(path.stem for path in (builtin_root() / "suites").glob("*.yaml")))
 def test_every_suite_of_the_house_is_valid_and_called_as_its_file(name, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    suite = read_plan(name).suite
-    assert suite.name == name
-    assert plan(suite).cases
+    plan = read_plan(name)
+    assert plan.suite.name == name
+    assert plan.cases
     assert catalog.find("suite", name).origin == "built in"
 
 

@@ -1,4 +1,4 @@
-"""Settings in YAML: every mistake is a sentence with its line, whether settings are dataclasses or models."""
+"""Settings in YAML: every mistake is a sentence with its line."""
 
 from typing import Annotated, Literal
 
@@ -7,7 +7,7 @@ from annotated_types import Ge, Gt, Le
 
 from vobench.errors import SettingError, SuiteError
 from vobench.setting import ByKind, Like, Name, OneOf, Share, settings
-from vobench.suite.yaml_file import Strict, read, read_all
+from vobench.suite.yaml_file import read, read_all
 
 
 @settings()
@@ -66,18 +66,6 @@ class File:
     times_s: tuple[float, ...] = ()
 
 
-class Model(Strict):
-    """The same as a model."""
-
-    name: Name
-    seed: Annotated[int, Ge(0), Le(9)] = 0
-    lens: Annotated[str, OneOf("lens", ("wide", "tele"))] = "wide"
-    chips: dict[Name, Annotated[Chip, Like("chip", CHIPS)]] | None = None
-    courses: dict[Name, Course] | None = None
-    limits: Limits | None = None
-    times_s: tuple[float, ...] = ()
-
-
 COURSES = "Known: circle, square"
 WRONG = [
     ("name: 12", "name: should be text (a number or a date needs quotes) (got 12)"),
@@ -105,20 +93,18 @@ WRONG = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", [File, Model])
 @pytest.mark.parametrize(("line", "sentence"), WRONG, ids=[line for line, _ in WRONG])
-def test_a_mistake_is_one_sentence_with_line_key_value_and_remedy(tmp_path, kind, line, sentence):
+def test_a_mistake_is_one_sentence_with_line_key_value_and_remedy(tmp_path, line, sentence):
     path = tmp_path / "file.yaml"
     path.write_text("# settings\n" + line + ("" if line.startswith("name") else "\nname: a") + "\n")
     with pytest.raises(SuiteError) as refused:
-        read(path, kind)
+        read(path, File)
     assert str(refused.value) == f"{path}:2: {sentence}"
 
 
-@pytest.mark.parametrize("kind", [File, Model])
-def test_what_is_right_in_a_wrong_file_is_read(tmp_path, kind):
+def test_what_is_right_in_a_wrong_file_is_read(tmp_path):
     (tmp_path / "file.yaml").write_text("chips: {a: clean, b: {prnu: 3}}\ntimes_s: [1, x, 3]\nlens: x\n")
-    reading = read_all(tmp_path / "file.yaml", kind)
+    reading = read_all(tmp_path / "file.yaml", File)
     assert sorted(m.places[0].key for m in reading.mistakes) == ["chips.b.prnu", "lens", "name", "times_s.1"]
     assert (reading.model.chips, reading.model.times_s, reading.model.seed) == ({"a": Chip()}, (1.0, 3.0), 0)
     assert reading.source.written(("times_s", 1)) == ("times_s", 2)
@@ -129,4 +115,3 @@ def test_the_same_file_is_the_same_settings(tmp_path):
     (tmp_path / "file.yaml").write_text("{name: a, chips: {a: noisy}, courses: {b: {radius_m: 1}}, times_s: [1]}")
     course, chips = Circle(radius_m=1.0), {"a": CHIPS["noisy"]}
     assert read(tmp_path / "file.yaml", File) == File(name="a", chips=chips, courses={"b": course}, times_s=(1.0,))
-    assert read(tmp_path / "file.yaml", Model) == Model(name="a", chips=chips, courses={"b": course}, times_s=(1.0,))

@@ -1,7 +1,7 @@
 """What a suite's YAML may say, and the plan that follows: cases, entrants, trials."""
 
 from collections.abc import Collection, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from itertools import product
@@ -202,8 +202,8 @@ class Plan:
     simulated: tuple[Case, ...]
     recorded: tuple[RecordedCase, ...]
     entrants: tuple[Entrant, ...]
-    found: tuple[Entry, ...] = ()
-    source: YamlFile | None = None
+    found: tuple[Entry, ...]
+    source: YamlFile
 
     @property
     def cases(self) -> tuple[Case | RecordedCase, ...]:
@@ -214,9 +214,13 @@ class Plan:
         """Every trial on one case."""
         return [Trial(case, entrant, n) for entrant in self.entrants for n in range(self.suite.repeats)]
 
-    def at(self, *keys: int | str) -> AbstractContextManager[None]:
+    @contextmanager
+    def at(self, *keys: int | str) -> Iterator[None]:
         """Errors of the block name this place in the suite's file."""
-        return self.source.at(*keys) if self.source else nullcontext()
+        wrong = self.mistakes()
+        with wrong.at(*keys):
+            yield
+        wrong.require_none()
 
     def mistakes(self) -> Mistakes:
         """To gather what is wrong with the suite."""
@@ -224,7 +228,10 @@ class Plan:
 
 
 def read_plan(name: str, *, only_estimators: tuple[str, ...] = ()) -> Plan:
-    """The plan of the suite of that name, or in that file. Raises SuiteError or UnknownNameError."""
+    """The plan of the suite of that name, or in that file; nothing is simulated, no estimator's code is imported.
+
+    Raises SuiteError or UnknownNameError.
+    """
     reading = yaml_file.read_all(catalog.find("suite", name).path, Suite)
     wrong = Mistakes(reading.source, list(reading.mistakes))
     meant = {key for said in reading.source.marked for key in get_close_matches(str(said), hints(Suite), n=1)}
@@ -232,11 +239,6 @@ def read_plan(name: str, *, only_estimators: tuple[str, ...] = ()) -> Plan:
         if wrong.found and (missing := missing_axis(meant)):
             raise SuiteError(missing)
     return _Planner(reading.model, wrong).plan(only_estimators)
-
-
-def plan(suite: Suite) -> Plan:
-    """Resolve all names in a suite; nothing is simulated and no estimator's code is imported."""
-    return _Planner(suite, Mistakes(None)).plan()
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,15 +260,12 @@ class _Planner:
         simulated = tuple(self._case(name, variant, scenes, replayed) for name, variant in _combinations(axes))
         return Plan(self.suite, simulated, recorded, entrants, tuple(self.found), self.wrong.source)
 
-    def _file(self) -> Path | None:
-        return self.wrong.source.path.resolve() if self.wrong.source else None
-
     def _folder(self) -> Path:
         """Where relative paths in a suite start: at its file."""
-        return self.wrong.source.path.parent if self.wrong.source else Path.cwd()
+        return self.wrong.source.path.parent
 
     def _find(self, kind: Kind, name: str) -> Entry:
-        entry = catalog.find(kind, name, suite=self._file())
+        entry = catalog.find(kind, name, suite=self.wrong.source.path.resolve())
         self.found.append(entry)
         return entry
 
@@ -326,7 +325,7 @@ class _Planner:
         for lighting, overrides in self.suite.lightings.items():
             for name, override in overrides.items():
                 with self.wrong.at("lightings", lighting, name):
-                    if wrong.found and wrong.source:
+                    if wrong.found:
                         scene_file.require_possible(name, wrong.source)
                     else:
                         scene_file.lit(lights, {name: override})

@@ -10,12 +10,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.constructor import RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from vobench.errors import Mistake, Place, SettingError, SuiteError, VobenchError, unknown
+from vobench.errors import Mistake, Place, SettingError, SuiteError, VobenchError
 from vobench.setting import COMPLAINTS, complaint, hints, unit_of
 
 Model = TypeVar("Model")
@@ -32,14 +32,6 @@ class YamlFile:
     path: Path
     marked: Any
     kept: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-
-    @contextmanager
-    def at(self, *keys: int | str) -> Iterator[None]:
-        """Errors of the block come as SuiteError with the file, line and key in front."""
-        try:
-            yield
-        except VobenchError as error:
-            raise SuiteError(*self.placed(error, *keys)) from error
 
     def placed(self, error: VobenchError, *keys: int | str) -> tuple[Mistake, ...]:
         """The mistakes of an error, this place in front of their own; without keys, where they have none."""
@@ -76,7 +68,7 @@ class YamlFile:
 class Mistakes:
     """Gathers what is wrong with a file, so that all of it is said at once."""
 
-    source: YamlFile | None
+    source: YamlFile
     found: list[Mistake] = field(default_factory=list)
 
     @contextmanager
@@ -85,7 +77,7 @@ class Mistakes:
         try:
             yield
         except VobenchError as error:
-            self.found.extend(self.source.placed(error, *keys) if self.source else error.mistakes)
+            self.found.extend(self.source.placed(error, *keys))
 
     def require_none(self) -> None:
         """Raise SuiteError with all that was gathered, each once, in the order of the file."""
@@ -237,7 +229,7 @@ def _plain(tree: Any) -> Any:
 
 def _intact(model: type, data: dict[str, Any], wrong: list[Keys]) -> tuple[dict[str, Any], dict[str, Any]]:
     """The sections of a file without the entries in which something is wrong, and which are left of each list."""
-    parts, kept, known = dict[str, Any](), dict[str, tuple[int, ...]](), _annotations(model)
+    parts, kept, known = dict[str, Any](), dict[str, tuple[int, ...]](), hints(model)
     for key in data.keys() & known.keys():
         value, bad = data[key], [keys[1:2] for keys in wrong if keys[0:1] == (key,)]
         if isinstance(value, dict):
@@ -250,16 +242,8 @@ def _intact(model: type, data: dict[str, Any], wrong: list[Keys]) -> tuple[dict[
     return parts, kept
 
 
-def _annotations(model: type) -> dict[str, Any]:
-    if issubclass(model, BaseModel):
-        return {key: each.rebuild_annotation() for key, each in model.model_fields.items()}
-    return hints(model)
-
-
 def _partial(model: type[Model], parts: dict[str, Any]) -> Model:
     """An object with these fields and the defaults of others, unchecked; what else it needs, it lacks."""
-    if issubclass(model, BaseModel):
-        return model.model_construct(None, **parts)
     lacking = object.__new__(model)
     for each in fields(model):  # type: ignore[arg-type]
         default = each.default if each.default_factory is MISSING else each.default_factory()
@@ -272,16 +256,16 @@ def _kind(tree: Any) -> str:
     return "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
 
 
-UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
+UNKNOWN_KEY = "unexpected_keyword_argument"
 
 
 def _complaints(
     source: YamlFile, error: ValidationError, schema: dict[str, Any], unread: Collection[Keys]
 ) -> Iterator[Mistake]:
     """What is wrong, unknown keys first, but for `unread` ones and for what is wrong only because others are."""
-    found = sorted(error.errors(), key=lambda each: each["type"] not in UNKNOWN_KEY)
+    found = sorted(error.errors(), key=lambda each: each["type"] != UNKNOWN_KEY)
     places = [*unread, *map(_loc, found)]
-    meant = {(*each["loc"][:-1], _nearest(each, schema)) for each in found if each["type"] in UNKNOWN_KEY}
+    meant = {(*each["loc"][:-1], _nearest(each, schema)) for each in found if each["type"] == UNKNOWN_KEY}
     for each in found:
         loc, keys = _loc(each), _walk(schema, _loc(each))[0]
         is_misspelt = each["type"] == "missing" and loc in meant
@@ -307,18 +291,15 @@ def _known(error: Any, schema: dict[str, Any]) -> list[str]:
 
 
 def _complaint(error: Any, schema: dict[str, Any], source: YamlFile) -> str:
-    if error["type"] in UNKNOWN_KEY:
+    if error["type"] == UNKNOWN_KEY:
         if elsewhere := _of_other_kinds(error["loc"], schema, source):
             return elsewhere
         near = _nearest(error, schema)
         guess = f" Did you mean {near!r}?" if near else ""
         return f"unknown key.{guess} Known: {', '.join(_known(error, schema))}"
     context, template = error.get("ctx", {}), COMPLAINTS.get(error["type"])
-    if isinstance(context.get("error"), SettingError):
+    if isinstance(context.get("error"), SettingError):  # names the value itself
         return str(context["error"].sentence)
-    # Our own checks name the value themselves.
-    if error["type"] == "value_error":
-        return str(error["msg"].removeprefix("Value error, "))
     return complaint(template or error["msg"], error["input"], context if template else {})
 
 
@@ -364,20 +345,3 @@ def _chosen(schema: dict[str, Any], part: dict[str, Any]) -> dict[str, Any]:
 def _referred(schema: dict[str, Any], part: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = schema["$defs"][part["$ref"].rpartition("/")[2]] if "$ref" in part else part
     return found
-
-
-class Strict(BaseModel):
-    """A frozen model in which an unknown key is an error, as are NaN, infinity and a number in quotes."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-
-def one_of(kind: str, known: Collection[str]) -> AfterValidator:
-    """A check that text is among the known names; a near one is suggested."""
-
-    def check(name: str) -> str:
-        if name not in known:
-            raise ValueError(unknown(kind, name, list(known)))
-        return name
-
-    return AfterValidator(check)
