@@ -107,7 +107,7 @@ def test_the_pictures_may_be_missing_for_a_reason_that_doctor_knows(vobench, her
     said = vobench("run", "tiny")
     assert (said.code, said.out) == (1, "")
     assert said.err.splitlines()[-1].startswith("vobench: cannot draw without a display (")
-    assert not list((here / "runs" / "tiny").iterdir())
+    assert not list((here / "runs").rglob("*"))
 
 
 @pytest.mark.parametrize(
@@ -134,7 +134,8 @@ def test_no_label_reaches_anything_but_its_own_folder(vobench, here, label):
     case = here / "runs" / "tiny" / "latest" / "cases" / "short"
     assert {path.name for path in case.iterdir()} == {"case.json", "ground_truth.tum", "sequence", "estimates"}
     assert {path.name for path in (case / "estimates").iterdir()} == {label, "stand_still"}
-    assert {path.name for path in (case / "sequence").iterdir()} == {"inputs.json", "sensors.mcap", "truth.mcap"}
+    made = {"inputs.json", "sensors.mcap", "truth.mcap", "ground_truth.tum", "exposures.csv"}
+    assert {path.name for path in (case / "sequence").iterdir()} == made
     assert vobench("verify", "runs/tiny").code == 0
     assert vobench("view", "runs/tiny", "--estimator", label, "--save", "a.rrd").code == 0
 

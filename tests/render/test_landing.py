@@ -15,7 +15,7 @@ from vobench.render.renderer import still
 from vobench.scene.material import Matt
 from vobench.scene.scene import Scene
 from vobench.scene.surface import box, room
-from vobench.sensor.image_sensor import CAMERAS, NoiseStreams, expose
+from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose
 from vobench.sequence import Sequence, SequenceWriter, read_truth
 
 POSES = ((0.0, 0.0, 17.0), (0.31, -0.47, 71.0), (-1.1, 0.83, 200.0), (0.5, 0.5, -40.0))  # x, y in m, heading in deg
@@ -97,7 +97,7 @@ def test_corners_read_back_from_a_recording_are_where_its_truth_says(
     with SequenceWriter(tmp_path, rig, case_json=b"{}") as writer:
         for index, T_world_body in enumerate(body_poses()):
             views = [hall.picture(*eye) for eye in eyes(rig, T_world_body)]
-            left, right = (expose(view / np.float32(35.0), CAMERAS["clean"], noise) for view in views)
+            left, right = (expose(view / np.float32(35.0), CameraSettings(), noise) for view in views)
             writer.write_frame(index * 100_000_000, left, right)
             writer.write_truth(index * 100_000_000, T_world_body, np.zeros(6))
     sequence, truth = Sequence.open(tmp_path), read_truth(tmp_path)

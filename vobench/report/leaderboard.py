@@ -190,14 +190,13 @@ def notes(row: Row) -> list[str]:
 
 def markdown(boards: list[Board]) -> str:
     """All boards as Markdown tables, with what went wrong below each."""
-    return "\n".join(_markdown_board(board) for board in boards) + f"\n{LEGEND}\n"
-
-
-def _markdown_board(board: Board) -> str:
-    headings, *rows = ["| " + " | ".join(cells) + " |" for cells in lines_of(board)]
-    lines = [f"## {board.title}", "", headings, "|" + "---|" * (headings.count("|") - 1), *rows]
-    below = [f"- {note}" for row in board.rows for note in notes(row)]
-    return "\n".join([*lines, "", *below, *([""] if below else [])])
+    lines = list[str]()
+    for board in boards:
+        headings, *rows = ["| " + " | ".join(cells) + " |" for cells in lines_of(board)]
+        below = [f"- {note}" for row in board.rows for note in notes(row)]
+        lines += [f"## {board.title}", "", headings, "|" + "---|" * (headings.count("|") - 1), *rows, "", *below]
+        lines += [""] if below else []
+    return "\n".join([*lines, LEGEND, ""])
 
 
 def as_json(boards: list[Board]) -> str:

@@ -23,7 +23,7 @@ from vobench.run.estimate import ESTIMATE, read_tracks
 from vobench.run.folder import SEQUENCE, STATUSES, SURVIVED, RunFolder, TrialScore, read_tum
 from vobench.run.frames import read_frames
 from vobench.run.ground_truth import GROUND_TRUTH
-from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, picture
+from vobench.sensor.pixel_truth import CHANNELS, TruthNames, picture
 from vobench.sequence import EncodedFrame, Sequence, StereoTruth, read_truth_frames, read_truth_names, truth_channels
 from vobench.trajectory.align import Alignment
 from vobench.trajectory.trajectory import Stamps, Trajectory
@@ -56,12 +56,8 @@ def log_truth(stream: rr.RecordingStream, view: TruthView) -> None:
     for frame in view.frames():
         times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
         for side, truth in (("left", frame.left), ("right", frame.right)):
-            _log_side(stream, times, side, truth)
-
-
-def _log_side(stream: rr.RecordingStream, times: list[rr.TimeColumn], side: str, truth: TruthFrame | None) -> None:
-    for channel, values in truth.channels().items() if truth else ():
-        stream.send_columns(truth_entity(side, channel), times, _columns(channel, values))
+            for channel, values in truth.channels().items() if truth else ():
+                stream.send_columns(truth_entity(side, channel), times, _columns(channel, values))
 
 
 def _columns(channel: str, values: NDArray[np.generic]) -> Any:
@@ -182,16 +178,11 @@ def save_trial(path: Path, trial: TrialView) -> None:
         _log_tracks(log, trial.tracks)
         _log_statuses(log, trial.statuses)
         log.static(bp.SUMMARY, rr.TextDocument(trial.summary_md, media_type=rr.MediaType.MARKDOWN))
-        channels: tuple[str, ...] = ()
         if trial.truth is not None:
             log_truth(stream, trial.truth)
-            channels = trial.truth.channels
-        focus, truth_m, estimate_m = (
-            first_failure(trial.statuses),
-            trial.ground_truth.positions_m,
-            trial.estimate.positions_m,
-        )
-        stream.send_blueprint(bp.layout(truth_m, estimate_m, focus=focus, channels=channels))
+        channels, focus = trial.truth.channels if trial.truth else (), first_failure(trial.statuses)
+        paths_m = (trial.ground_truth.positions_m, trial.estimate.positions_m)
+        stream.send_blueprint(bp.layout(*paths_m, focus=focus, channels=channels))
         stream.disconnect()
         part.replace(path)
 
@@ -274,10 +265,6 @@ def _log_error(log: _Log, trial: TrialView) -> None:
     error_mm = 1e3 * trial.error_m
     log.static(bp.ERROR_PLOT, rr.SeriesLines(colors=RED, widths=1.5, names="position error (mm)"))
     log.columns(bp.ERROR_PLOT, np.arange(len(error_mm)), rr.Scalars.columns(scalars=error_mm))
-    _log_error_lines(log, trial)
-
-
-def _log_error_lines(log: _Log, trial: TrialView) -> None:
     truth, estimate = (
         dict(zip(*log.frames_of(path.t_ns), strict=True)) for path in (trial.ground_truth, trial.estimate)
     )
@@ -324,15 +311,13 @@ def pick(scores: Rows[TrialScore], *, case: str | None, estimator: str | None) -
         ("estimator", estimator, {s.estimator for s in scores}),
     ):
         if name is not None and name not in known:
-            raise UnknownNameError(f"no {kind} '{name}' in this trial. Known: {', '.join(sorted(known))}")
+            raise UnknownNameError(f"no {kind} '{name}' in this run. Known: {', '.join(sorted(known))}")
     wanted = [s for s in scores if case in (None, s.case) and estimator in (None, s.estimator)]
     failed = [s for s in wanted if s.status not in SURVIVED]
     if failed:
         return max(failed, key=lambda s: STATUSES.index(s.status))
-    best = min(
-        {s.estimator for s in wanted}, key=lambda name: (_mean_error([s for s in wanted if s.estimator == name]), name)
-    )
-    return max((s for s in wanted if s.estimator == best), key=_error)
+    of = {name: [s for s in wanted if s.estimator == name] for name in sorted({s.estimator for s in wanted})}
+    return max(min(of.values(), key=lambda trials: fmean(map(_error, trials))), key=_error)
 
 
 def trial_view(folder: RunFolder, trial: TrialScore) -> TrialView:
@@ -340,7 +325,7 @@ def trial_view(folder: RunFolder, trial: TrialScore) -> TrialView:
     link = folder.case(trial.case) / SEQUENCE
     if not link.exists():
         raise InputError(f"the sequence is gone from the cache; run the suite again to make it anew: {link}")
-    sequence = Sequence.open(link)
+    sequence, channels = Sequence.open(link), truth_channels(link)
     place = folder.estimate(trial.case, trial.estimator, trial.repeat)
     est, frames = read_tum(place / ESTIMATE), read_frames(place)
     if trial.score:
@@ -356,16 +341,8 @@ def trial_view(folder: RunFolder, trial: TrialScore) -> TrialView:
         statuses=[row.status or NO_OUTPUT for row in frames],
         tracks={i: (table[:, 2:4].astype(float), table[:, 4] > 0) for i, table in read_tracks(place)},
         summary_md=_summary(trial),
-        truth=_truth(link),
+        truth=TruthView(channels, read_truth_names(link), lambda: read_truth_frames(link)) if channels else None,
     )
-
-
-def _truth(sequence: Path) -> TruthView | None:
-    """What was recorded of the pixels, None for most sequences."""
-    channels = truth_channels(sequence)
-    if not channels:
-        return None
-    return TruthView(channels, read_truth_names(sequence), lambda: read_truth_frames(sequence))
 
 
 def _error(trial: TrialScore) -> float:
@@ -373,18 +350,10 @@ def _error(trial: TrialScore) -> float:
     return float("inf") if value is None else value
 
 
-def _mean_error(trials: Rows[TrialScore]) -> float:
-    return fmean(_error(trial) for trial in trials)
-
-
 def _summary(trial: TrialScore) -> str:
     """The trial's score in Markdown."""
-    lines = [
-        f"# {trial.estimator} on {trial.case}",
-        "",
-        f"**{trial.status}**{f' — {trial.reason}' if trial.reason else ''}",
-        "",
-    ]
+    status = f"**{trial.status}**{f' — {trial.reason}' if trial.reason else ''}"
+    lines = [f"# {trial.estimator} on {trial.case}", "", status, ""]
     lines += [f"{trial.frames} frames, {trial.path_m:.2f} m, coverage {trial.coverage:.1%}", ""]
     if trial.score:
         lines += ["| metric | rmse | mean | max |", "|---|---|---|---|"]

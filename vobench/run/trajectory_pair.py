@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
-from typing import BinaryIO, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -200,8 +200,7 @@ def _words(words: Iterable[str]) -> tuple[Unit | None, Order | None, tuple[Move,
 def _is_recording(path: Path) -> bool:
     if path.is_dir():
         return True
-    with _opened(path) as file:
-        head = file.read(HEAD_BYTES)
+    head = _bytes(path, HEAD_BYTES)
     try:
         head.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -209,16 +208,16 @@ def _is_recording(path: Path) -> bool:
     return b"\0" in head
 
 
-def _opened(path: Path) -> BinaryIO:
+def _bytes(path: Path, most: int = -1) -> bytes:
     try:
-        return path.open("rb")
+        with path.open("rb") as file:
+            return file.read(most)
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from None
 
 
 def _text(path: Path) -> str:
-    with _opened(path) as file:
-        content = file.read()
+    content = _bytes(path)
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
