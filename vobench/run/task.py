@@ -54,7 +54,7 @@ NO_LIMIT = 0
 
 @dataclass(frozen=True, slots=True)
 class Resources:
-    """What a task can make use of: cores, of which one is enough for any, and memory, as measured on `quickstart`."""
+    """What a task can make use of: cores, of which one is enough for any, and memory."""
 
     cores: int = 1
     memory_bytes: int = GIB
