@@ -15,14 +15,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from vobench.asset.texture import Procedural
 from vobench.render.bake import BakedScene, BakeSettings, bake
 from vobench.render.illumination import Illumination
 from vobench.scene.light import Flicker, Sun
-from vobench.scene.material import Matt
+from vobench.scene.material import Material
 from vobench.scene.scene import Mover, Path, Scene
 from vobench.scene.surface import box
 from vobench.suite import catalog, yaml_file
-from vobench.suite.scene_file import SceneFile, build
+from vobench.suite.scene_build import build
+from vobench.suite.scene_spec import SceneFile
 
 NS_PER_PICTURE = 100_000_000
 
@@ -45,7 +47,7 @@ def _baked(scene: Scene) -> BakedScene:
     started, cpu_started = time.perf_counter(), time.process_time()
     baked = bake(scene, BakeSettings())
     wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
-    texels = sum(chart.rows * chart.columns for chart in baked.atlas.charts)
+    texels = int((baked.surfel_of >= 0).sum())
     gigabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     lights = f"{len(scene.lights)} lights, {texels} samples"
     print(f"{scene.name}: {lights}, bake {wall_s:.1f} s wall, {cpu_s:.1f} s CPU, peak {gigabytes:.2f} GB")
@@ -84,7 +86,7 @@ def _changes(baked: BakedScene) -> Iterator[tuple[str, Illumination]]:
         yield f"{count} movers as tall as people", Illumination(replace(bake(walkers, quick), settings=BakeSettings()))
 
 
-WALKER = Matt("plain", 0.4, 0.0, 1.0, 8, 0)
+WALKER = Material(texture=Procedural("plain", 0.4, 0.0, 1.0, 8, 0))
 
 
 def _walker(index: int) -> Mover:

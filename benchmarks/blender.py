@@ -23,15 +23,15 @@ from light import PLACES, decibels, lens, lit, stand
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
 from vobench.render.geometry import corners
-from vobench.render.mitsuba import on_texture_m, tile_m
 from vobench.render.path import PathRenderer
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
-from vobench.scene.material import reflectance, texture_of
+from vobench.scene.material import reflectance
 from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface
 from vobench.suite import catalog
-from vobench.suite.scene_file import build, read_scene
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import read_scene
 
 # Paths a pixel, and whether Cycles' own Open Image Denoise follows.
 WAYS = [(4, True), (16, True), (64, True), (64, False), (256, False)]
@@ -44,12 +44,12 @@ def job(scene: Scene, camera: Pinhole, poses: Sequence[Array]) -> dict[str, Any]
     content["lens"] = [camera.width_px, camera.height_px, camera.fx_px]
     used = list(dict.fromkeys(surface.material for surface in scene.surfaces))
     for name in used:
-        texture = texture_of(scene.materials[name])
-        if texture is None:
+        material = scene.materials[name]
+        if material.kind != "body":
             raise SystemExit(f"material {name!r} has no texture; this benchmark draws matt scenes only")
-        content[f"tile.{name}"] = reflectance(texture)
+        content[f"tile.{name}"] = reflectance(material)
         own = [surface for surface in scene.surfaces if surface.material == name]
-        content |= _quads(name, own, tile_m(scene, name))
+        content |= _quads(name, own, material.tile_m)
     for panel in scene.panels:
         content[f"luminance.{panel.name}"] = panel.luminance_cd_m2
         content |= _quads(panel.name, [panel.surface], 1.0)
@@ -57,7 +57,8 @@ def job(scene: Scene, camera: Pinhole, poses: Sequence[Array]) -> dict[str, Any]
 
 
 def _quads(name: str, surfaces: Sequence[Surface], tile: float) -> dict[str, Any]:
-    uv = np.stack([on_texture_m(surface) for surface in surfaces]) / tile
+    u, v = np.array([[0.0, 1, 1, 0], [0, 0, 1, 1]])
+    uv = np.stack([surface.on_texture_m(u, v) for surface in surfaces]) / tile
     return {f"corners.{name}": np.stack([corners(surface) for surface in surfaces]), f"uv.{name}": uv}
 
 

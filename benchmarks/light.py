@@ -25,14 +25,15 @@ from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
 from vobench.render.bake import BakedScene, BakeSettings, bake, load_baked, save_baked
-from vobench.render.geometry import RayCaster, inventory
+from vobench.render.geometry import RayCaster
 from vobench.render.path import PathRenderer
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
-from vobench.scene.material import Glass, Matt, Mirror, Polished
-from vobench.scene.scene import Scene
+from vobench.scene.material import Material
+from vobench.scene.scene import Scene, triangles
 from vobench.suite import catalog
-from vobench.suite.scene_file import build, read_scene
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import read_scene
 
 # x, y in metres, heading and downward pitch in degrees: where a robot could stand, and its camera 0.4 m above.
 PLACES = {
@@ -53,7 +54,7 @@ PLACES = {
         (0.5, 0.0, 180.0, 15.0),
     ],
 }
-KINDS = {"matt": Matt, "polished": Polished, "mirror": Mirror, "glass": Glass}
+KINDS = ("matt", "polished", "mirror", "glass")
 FAINTEST_MSE = 1e-7  # where noise hides the difference
 FEWEST_PIXELS = 100  # of a kind, for a line of its own
 DIFFERENCE_GAIN, DIFFERENCE_BLUR_PX = 4.0, 2.0
@@ -127,17 +128,22 @@ def stand(x_m: float, y_m: float, heading_deg: float, pitch_deg: float) -> Array
 
 def kinds(scene: Scene, camera: Pinhole, T_world_camera: Array) -> dict[str, Mask]:
     """Which pixels' centres see a surface of each kind first, from its front."""
-    things = inventory(scene)
+    faces = triangles(scene, t_ns=0)
     directions = camera.rays(pixel_grid(camera)).reshape(-1, 3) @ T_world_camera[:3, :3].T
     origins = np.broadcast_to(T_world_camera[:3, 3], directions.shape)
-    met = RayCaster(things.surfaces, np.arange(len(things.surfaces))).hits(origins, directions).surface
-    own = [scene.materials.get(surface.material) for surface in things.surfaces]
+    met = np.append(faces.thing, -1)[RayCaster(faces).nearest(origins, directions)]
+    own = [scene.materials.get(thing.material) for thing in faces.things]
     shape = camera.height_px, camera.width_px
     masks = {}
-    for name, kind in KINDS.items():
-        of_kind = np.array([isinstance(material, kind) for material in own] + [False])
+    for name in KINDS:
+        of_kind = np.array([material is not None and _kind(material) == name for material in own] + [False])
         masks[name] = of_kind[met].reshape(shape)
     return masks
+
+
+def _kind(material: Material) -> str:
+    bodies = "polished" if material.is_coated else "matt"
+    return {"body": bodies, "mirror": "mirror", "pane": "glass"}[material.kind]
 
 
 def lit(scene: Scene, folder: Path | None) -> BakedScene:

@@ -22,7 +22,8 @@ from vobench.render.path import PathRenderer
 from vobench.render.renderer import still
 from vobench.scene.scene import Scene
 from vobench.suite import catalog
-from vobench.suite.scene_file import build, read_scene
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import read_scene
 
 LENS = LENSES["paper_blender"]  # square pixels: Mitsuba's camera has no others
 MAX_DEPTH = 8

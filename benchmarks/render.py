@@ -27,17 +27,19 @@ from vobench.render.bake import BakeSettings, bake
 from vobench.render.geometry import corners
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import View, still
-from vobench.render.view import FAR_M, NEAR_M, T_CV_GL
+from vobench.render.view import NEAR_M, T_CV_GL
 from vobench.scene.light import AreaLight
-from vobench.scene.material import Map, Material, Matt, Polished, reflectance, texture_of
+from vobench.scene.material import Map, Material, reflectance
 from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import CAMERAS, NoiseStreams, expose
 from vobench.sequence import SequenceWriter
 from vobench.suite import catalog
-from vobench.suite.scene_file import build, read_scene
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import read_scene
 
 VIEWS = {"down": 90.0, "ahead": 15.0}
 NS_PER_FRAME = 100_000_000
+FAR_M = 60.0  # of stock pyrender's camera
 # What is drawn does not depend on how finely light was sampled.
 QUICK = BakeSettings(spacing_m=0.05, light_rays=4, indirect_spacing_m=0.2, indirect_rays=16)
 FISHEYE = KannalaBrandt(720, 480, 290.0, 290.0, 359.5, 239.5, 0.0, 0.0, 0.0, 0.0)
@@ -134,9 +136,9 @@ def ours(scene: Scene, settings: BakeSettings, white_cd_m2: float, poses: list[A
 def mirrored(settings: BakeSettings, poses: list[Array]) -> Iterator[Row]:
     """Costs of the office: matt, with its polished floor, with all its mirrors and panes, and through a fisheye."""
     office = build(read_scene(catalog.find("scene", "office").path), {})
-    bodies = {name: texture_of(m) for name, m in office.materials.items()}
-    matt = {name: office.materials[name] if body is None else Matt(body) for name, body in bodies.items()}
-    plain = tuple(s for s in office.surfaces if bodies[s.material] is not None)
+    bodies = {name: m.kind == "body" for name, m in office.materials.items()}
+    matt = {name: replace(m, eta=1.0) if bodies[name] else m for name, m in office.materials.items()}
+    plain = tuple(s for s in office.surfaces if bodies[s.material])
     variants: tuple[tuple[str, Scene, tuple[tuple[str, Shoot], ...]], ...] = (
         ("office, all matt", replace(office, surfaces=plain, materials=matt), (("", pair),)),
         ("office, mirror floor", replace(office, surfaces=plain), (("", pair),)),
@@ -154,7 +156,7 @@ def mirrored(settings: BakeSettings, poses: list[Array]) -> Iterator[Row]:
 
 def _waxed(office: Scene) -> dict[str, Material]:
     """Its materials, with what is polished rough by a slope of 0.05."""
-    return {n: replace(m, roughness=0.05) if isinstance(m, Polished) else m for n, m in office.materials.items()}
+    return {n: replace(m, roughness=0.05) if m.is_coated else m for n, m in office.materials.items()}
 
 
 def stock(room: Scene, white_cd_m2: float, poses: list[Array]) -> Iterator[Row]:
@@ -187,10 +189,10 @@ def _stock_scene(room: Scene, white_cd_m2: float) -> tuple[Any, Any]:
     import pyrender
 
     scene = pyrender.Scene(ambient_light=[0.1, 0.1, 0.1])
-    textures = {name: texture for name, m in room.materials.items() if (texture := texture_of(m)) is not None}
-    materials = {name: _stock_material(reflectance(texture)) for name, texture in textures.items()}
+    bodies = {name: material for name, material in room.materials.items() if material.kind == "body"}
+    materials = {name: _stock_material(reflectance(material)) for name, material in bodies.items()}
     for surface in room.surfaces:
-        (width, height), tile_m = surface.size_m, textures[surface.material].tile_m
+        (width, height), tile_m = surface.size_m, bodies[surface.material].tile_m
         primitive = pyrender.Primitive(
             positions=corners(surface),
             normals=np.tile(surface.normal, (4, 1)),

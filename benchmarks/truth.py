@@ -20,10 +20,12 @@ from vobench.geometry import se3
 from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.render.truth import Shot, TruthCaster
+from vobench.scene.scene import triangles
 from vobench.sensor.pixel_truth import CHANNELS
 from vobench.sequence import SequenceWriter
 from vobench.suite import catalog
-from vobench.suite.scene_file import build, read_scene
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import read_scene
 
 LENS, PITCH_DEG = LENSES["paper_literal"], 15.0
 STEP_NS, STEP_RAD, RING_M = 100_000_000, 0.05, 1.5
@@ -92,7 +94,7 @@ def main() -> None:
     for name in arguments.scenes:
         scene = build(read_scene(catalog.find("scene", name).path), {})
         caster = TruthCaster(scene)
-        print(f"{name}: {len(scene.surfaces)} rectangles, {len(scene.lights)} lights")
+        print(f"{name}: {len(triangles(scene))} faces, {len(scene.lights)} lights")
         print(f"  {'channel':12}{'wall ms':>9}{'CPU ms':>9}")
         cast(caster, pairs)
         print(f"  {'recorded':12}{'CPU ms':>9}{'kB':>9}")

@@ -9,11 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from vobench.cli.schema import FILES
+from vobench.cli.run import FILES
 from vobench.setting import unit_of
 from vobench.suite.yaml_file import json_schema
 
 TABLE = re.compile(r"<!-- keys of (\w+) -->\n\n((?:\|.*\n)+)")
+ZEROS = re.compile(r"\.0(?![0-9])")
 HEAD = "| key | unit | takes | default | says |\n|---|---|---|---|---|\n"
 BOUNDS = {"exclusiveMinimum": "more than", "minimum": "from", "exclusiveMaximum": "less than", "maximum": "up to"}
 
@@ -90,7 +91,7 @@ def _value(default: Any) -> str:
     if isinstance(default, dict):
         return "`{}`"
     if isinstance(default, list):
-        return f"`{str(default).replace('.0', '')}`"
+        return f"`{ZEROS.sub('', str(default))}`"
     text = f"{default:g}" if isinstance(default, float) else str(default)
     return text if isinstance(default, int | float) and not isinstance(default, bool) else f"`{text.lower()}`"
 

@@ -4,6 +4,7 @@ VobenchError               the user's mistake or machine: one line, exit code 1
 ├── InputError             a file does not say what it should
 │   ├── SettingError       a setting is not what its field takes, or does not fit the others
 │   ├── SuiteError         a suite, scene or manifest: names file, line, key and value of every mistake
+│   ├── ModelError         a model of triangles: a glTF, OBJ, STL or PLY file
 │   └── TrajectoryError    a trajectory file or array
 ├── UnknownNameError       no scene, suite or estimator of that name
 ├── MissingDependencyError this machine lacks something; the message says how to get it
@@ -82,6 +83,10 @@ class SuiteError(InputError):
     def mistakes(self) -> tuple[Mistake, ...]:
         """Every one, also those that the message only counts."""
         return self._mistakes
+
+
+class ModelError(InputError):
+    """A model of triangles, or a picture on it, is wrong; the message names file, node and what would help."""
 
 
 class TrajectoryError(InputError):

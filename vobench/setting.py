@@ -33,8 +33,7 @@ COMPLAINTS = {
     "finite_number": "should be a finite number",
     "tuple_type": "should be a list, as in [a, b]",
     **dict.fromkeys(
-        ("dict_type", "model_type", "model_attributes_type", "dataclass_type", "dataclass_exact_type"),
-        "should be keys with values",
+        ("dict_type", "model_attributes_type", "dataclass_type", "dataclass_exact_type"), "should be keys with values"
     ),
     "too_short": "should have {min_length} or more entries, but has {actual_length}",
     "too_long": "should have {max_length} or fewer entries, but has {actual_length}",
@@ -313,21 +312,20 @@ TYPES: dict[Any, tuple[str, Any]] = {
 
 
 def _held_plain(value: Any, kind: Any) -> Any:
-    name, wanted = TYPES.get(kind, ("dataclass_type", kind))
-    if not isinstance(value, wanted) or (isinstance(value, bool) and kind is not bool):
-        raise _wrong(name, value)
+    if not _is_type(value, kind):
+        raise _wrong(TYPES.get(kind, ("dataclass_type", kind))[0], value)
     if kind is float and not isfinite(value):
         raise _wrong("finite_number", value)
     return kind(value) if kind in (float, int) else value
 
 
 def _is_type(value: Any, hint: Any) -> bool:
-    while get_origin(hint) is Annotated:
-        hint = get_args(hint)[0]
     kind = get_origin(hint) or hint
+    if kind is Annotated:
+        return _is_type(value, get_args(hint)[0])
     if kind is Literal:
         return value in get_args(hint)
-    wanted = TYPES[kind][1] if kind in TYPES else kind
+    _, wanted = TYPES.get(kind, ("", kind))
     return isinstance(value, wanted) and (kind is bool or not isinstance(value, bool))
 
 

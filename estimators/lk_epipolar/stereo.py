@@ -14,8 +14,7 @@ from vobench.errors import VobenchError
 from vobench.estimator.protocol import Image
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
-from vobench.geometry.rectify import rectification
-from vobench.geometry.rig import SIDES, Rig
+from vobench.geometry.rig import SIDES, Rig, rectification
 from vobench.geometry.se3 import Array
 
 from .tracking import Mask, Points, coarse_disparity, comparable, follow, inside, small_size

@@ -55,8 +55,9 @@ class FlatRenderer:
     def __init__(self, baked: object) -> None:
         pass
 
-    def radiance(self, camera: Any, T_world_camera: object) -> np.ndarray:
-        return np.full((camera.height_px, camera.width_px), 20.0, np.float32)
+    def radiance(self, camera: Any, T_world_camera: object, *, weights: Any = (1, 0, 0)) -> np.ndarray:
+        shape = (camera.height_px, camera.width_px)
+        return np.full(shape if weights else (*shape, 3), 20.0, np.float32)
 
     def close(self) -> None:
         pass

@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from vobench.cli import boards, terminal
+from vobench.cli import report, terminal
 from vobench.report.leaderboard import HEADINGS, Board, Row
 
 ROW = Row(
@@ -33,7 +33,7 @@ def drawn(width, monkeypatch):
     file = io.StringIO()
     out = Console(file=file, width=width, markup=False, highlight=False)
     monkeypatch.setattr(terminal, "console", lambda: out)
-    boards.print_boards([Board("short", (ROW,))])
+    report.print_boards([Board("short", (ROW,))])
     return file.getvalue()
 
 
@@ -51,7 +51,7 @@ def test_a_wide_terminal_shows_every_column(monkeypatch):
 
 
 def test_the_columns_that_may_go_exist():
-    assert set(boards.LEAST_FIRST) < set(HEADINGS)
+    assert set(report.LEAST_FIRST) < set(HEADINGS)
 
 
 def test_work_that_tells_its_share_shows_it_in_percent(monkeypatch):

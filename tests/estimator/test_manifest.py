@@ -79,7 +79,7 @@ def test_reading_a_manifest_imports_neither_opencv_nor_the_code():
         ({"name": "My-Own"}, r"estimator\.yaml:1: name: .*\(got 'My-Own'\)"),
         ({"version": "1.0"}, r":2: version: should be text .*\(got 1\.0\)"),
         ({"class_": "Mine", "class": None}, r"class: .*\(got 'Mine'\)"),
-        ({"needs": "[lidar]"}, r":4: needs\.0: .*'stereo', 'mono', 'encoders' or 'imu' \(got 'lidar'\)"),
+        ({"needs": "[lidar]"}, r":4: needs\.0: .*'stereo', 'mono', 'colour', 'encoders' or 'imu' \(got 'lidar'\)"),
         ({"pose_of": "head"}, r":5: pose_of: .*'left_camera' or 'body' \(got 'head'\)"),
         ({"summary": None}, r"summary: .*missing"),
         ({"parms": "{}"}, r":7: parms: unknown key\. Did you mean 'params'\?"),

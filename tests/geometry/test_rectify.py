@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
-from vobench.geometry.rectify import rectification
-from vobench.geometry.rig import LENSES, PRESETS, Rig, mounted, stereo_rig
+from vobench.geometry.rig import LENSES, PRESETS, Rig, mounted, rectification, stereo_rig
 
 RIGS = {name: mounted(p.left, p.right, p.T_left_right, pitch_deg=20) for name, p in PRESETS.items()}
 PLAIN = stereo_rig(LENSES["paper_literal"], pitch_deg=20)

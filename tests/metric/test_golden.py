@@ -8,7 +8,6 @@ KITTI's and rpg's are of independent programs in scalar loops, word for word aft
 
 # ruff: noqa: E501 - a command and its figures stand in one line
 
-import shlex
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +18,6 @@ from vobench.metric.score import ScoreSettings, score
 from vobench.metric.settings import LIKE
 from vobench.trajectory.trajectory import Trajectory
 
-PARTS = {"trans_part": "trans", "angle_deg": "rot", "rot_part": "rot_chordal", "full": "full"}
 STATISTICS = ("rmse", "mean", "median", "std", "min", "max", "sse")
 # fmt: off
 EVO = [
@@ -63,27 +61,11 @@ def drive_pair(*, whole=False):
     return Trajectory(t_ns, T_gt), Trajectory(t_ns[kept] + (0 if whole else 3_000_000), T_est[kept])
 
 
-def as_settings(words):
-    after = dict(zip(words, [*words[1:], None], strict=False))
-    aligned = {("-a",): "se3", ("-a", "-s"): "sim3", ("--align_origin",): "origin", (): "none"}
-    changes = {
-        "alignment": aligned[tuple(w for w in words if w in ("-a", "-s", "--align_origin"))],
-        "rpe_delta": float(after.get("-d", 1)),
-        "rpe_unit": after.get("-u", "f"),
-        "rpe_all_pairs": "--all_pairs" in words,
-        "rpe_pairs_from": "gt" if "--pairs_from_reference" in words else "est",
-        "project": after.get("--project_to_plane"),
-    }
-    return replace(LIKE["evo"], full=True, **changes), after.get("-r", "trans_part")
-
-
 @pytest.mark.parametrize(("command", "n", "figures"), EVO, ids=[row[0] for row in EVO])
-def test_evo_finds_the_same_statistics(command, n, figures):
-    tool, form, *words = shlex.split(command)
-    settings, part = as_settings(words)
-    metric = score(*drive_pair(whole=form == "kitti"), settings=settings).metric(
-        f"{'ate' if tool == 'ape' else 'rpe'}_{PARTS[part]}"
-    )
+def test_evo_finds_the_same_statistics(asked_of_evo, command, n, figures):
+    tool, form, *flags = command.split(maxsplit=2)
+    settings, name = asked_of_evo(tool, "".join(flags))
+    metric = score(*drive_pair(whole=form == "kitti"), settings=settings).metric(name)
     assert metric.statistics.n == n
     for name, expected in zip(STATISTICS, figures, strict=True):
         found = getattr(metric.statistics, name)

@@ -1,8 +1,6 @@
 """Scores that other tools publish for real trajectories, found again."""
 
 import json
-import shlex
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -18,8 +16,6 @@ from vobench.trajectory.trajectory import Trajectory
 
 DATA = Path(__file__).parents[2] / ".." / "shared" / "data"
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="no folder ../shared/data with the published trajectories")
-
-PARTS = {"trans_part": "trans", "angle_deg": "rot", "rot_part": "rot_chordal", "full": "full"}
 
 
 @cache
@@ -47,30 +43,12 @@ def evo_cases():
     return [pytest.param(case, id=case["id"]) for case in cases]
 
 
-def as_settings(flags):
-    """evo's options as changes to the settings that are like evo, and the part of the error that it asks for."""
-    words = shlex.split(flags)
-    after = dict(zip(words, [*words[1:], None], strict=True))
-    aligned = {("-a",): "se3", ("-a", "-s"): "sim3", ("--align_origin",): "origin", (): "none"}
-    changes = {
-        "alignment": aligned[tuple(w for w in words if w in ("-a", "-s", "--align_origin"))],
-        "max_diff_ns": round(float(after.get("--t_max_diff", 0.01)) * 1e9),
-        "rpe_delta": float(after.get("-d", 1)),
-        "rpe_unit": after.get("-u", "f"),
-        "rpe_all_pairs": "--all_pairs" in words,
-        "rpe_pairs_from": "gt" if "--pairs_from_reference" in words else "est",
-        "project": after.get("--project_to_plane"),
-    }
-    return replace(LIKE["evo"], full=True, **changes), after.get("-r", "trans_part")
-
-
 @pytest.mark.parametrize("case", evo_cases())
-def test_evo_finds_the_same_statistics(case):
-    settings, part = as_settings(case["flags"])
+def test_evo_finds_the_same_statistics(asked_of_evo, case):
+    settings, metric = asked_of_evo(case["tool"], case["flags"])
     read = read_tum if case["fmt"] == "tum" else read_kitti
     gt, est = read(case["ref"]), read(case["est"])
-    tool = {"ape": "ate", "rpe": "rpe"}[case["tool"]]
-    ours = score(gt, est, settings=settings).metric(f"{tool}_{PARTS[part]}").statistics
+    ours = score(gt, est, settings=settings).metric(metric).statistics
     assert ours.n == case["n"]
     for name, expected in case["stats"].items():
         # A minimum near zero holds the rounding of positions and matrices of size one.

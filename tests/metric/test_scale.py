@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from vobench.geometry import se3
 from vobench.metric.comparison import ate_scale, motion_scale
-from vobench.metric.scale import scale_errors
 from vobench.metric.score import ScoreSettings, score
+from vobench.metric.segment import scale_errors
 from vobench.trajectory.align import align
 from vobench.trajectory.trajectory import Trajectory
 

@@ -8,18 +8,20 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import scipy
 
+from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
-from vobench.render.bake import BakedScene
-from vobench.render.geometry import inventory
-from vobench.render.lightmap import pack_atlas
+from vobench.render.bake import BakedScene, Patches
+from vobench.render.geometry import areas_m2
+from vobench.render.lightmap import Atlas
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
 from vobench.scene.light import STEADY, Level, PointLight
-from vobench.scene.material import Map, Matt, Polished, reflectance, texture_of, under_coat
-from vobench.scene.scene import Scene
+from vobench.scene.material import Material, reflectance
+from vobench.scene.scene import Scene, triangles
 from vobench.scene.surface import Surface, room
 
 EvenLight = Callable[..., BakedScene]
@@ -30,20 +32,19 @@ def light_evenly(scene: Scene, *, illuminance_lx: float = 100.0, level: Level = 
     """A scene under the same illuminance everywhere, without a bake, from a lamp that is too weak to count."""
     lamp = PointLight("even", np.zeros(3), 1e-12, level)
     lit = replace(scene, lights=(lamp, *scene.lights))
-    surfaces = inventory(lit).surfaces
-    atlas = pack_atlas(surfaces, spacing_m=1.0)
-    light = np.zeros((len(lit.lights), atlas.height, atlas.width), np.float32)
-    light[0] = illuminance_lx
-    return BakedScene(lit, atlas, light, {name: tile for name in scene.materials for tile in _tiles(scene, name)})
-
-
-def _tiles(scene: Scene, name: str) -> list[Map]:
-    material = scene.materials[name]
-    texture = texture_of(material)
-    if texture is None:
-        return []
-    tile = reflectance(texture)
-    return [under_coat(tile, material.eta).astype(np.float32) if isinstance(material, Polished) else tile]
+    faces, count = triangles(lit), len(lit.lights)
+    atlas = Atlas(np.full((len(faces), 3, 2), 1.5, np.float32), np.full(len(faces), -1, np.int32), 3, 3)
+    direct = np.zeros((count, 3, 3), np.float32)
+    direct[0] = illuminance_lx
+    middle, dark = np.where(np.arange(9) == 4, 0, -1).astype(np.int32), np.zeros((count, 1, 3), np.float32)
+    areas, albedo = areas_m2(faces.corners_m), np.zeros((len(faces), 3))
+    for thing, material in enumerate(lit.materials.get(thing.material) for thing in faces.things):
+        if material is not None and material.kind == "body":
+            albedo[faces.thing == thing] = reflectance(material).mean()
+    own = albedo.any(1)
+    mean = np.average(albedo[own], 0, areas[own]) if own.any() else np.zeros(3)
+    patches = Patches(middle, mean[None].astype(np.float32), np.array([max(areas[own].sum(), 1e-9)], np.float32), dark)
+    return BakedScene(lit, faces, atlas, direct, dark, scipy.sparse.csr_matrix((9, 1), dtype=np.float32), patches)
 
 
 @pytest.fixture(scope="session")
@@ -119,7 +120,12 @@ def _lattice(surface: Surface, square_m: float) -> Lattice:
 def hall(draw: Draw) -> Hall:
     fine, coarse = ("checker", 0.5, 0.8, 0.8, 512, 0), ("checker", 0.5, 0.8, 3.2, 1024, 0)
     surfaces = tuple(room((8, 8, 3), floor="fine", wall="coarse", ceiling="coarse"))
-    scene = Scene("hall", surfaces, {"fine": Matt(*fine), "coarse": Matt(*coarse)}, ())
+    scene = Scene(
+        "hall",
+        surfaces,
+        {"fine": Material(texture=Procedural(*fine)), "coarse": Material(texture=Procedural(*coarse))},
+        (),
+    )
     lattices = tuple(_lattice(s, 0.1 if s.material == "fine" else 0.4) for s in surfaces)
     return Hall(draw(light_evenly(scene)), lattices)
 

@@ -5,16 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array
-from vobench.render.bake import BakeSettings, bake
+from vobench.render.bake import BakedScene, BakeSettings, bake
 from vobench.scene.light import SUN_RADIUS_RAD, Light, Sky, Sun
-from vobench.scene.material import Glass, Material, Matt, pane_reflectance
+from vobench.scene.material import Material, pane_reflectance
+from vobench.scene.mesh import Thing, quad
 from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface, rectangle
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=4, bounces=0)
-GREY = {"grey": Matt("plain", 0.5, 0.0, 1.0, 8, 0)}
-PANES: dict[str, Material] = {**GREY, "pane": Glass(), "hole": Glass(eta=1.0), "dark": Glass(eta=1.0, tint=0.4)}
+FINER = replace(DIRECT, spacing_m=0.05)  # the sky's light lies between every other sample
+GREY = {"grey": Material(texture=Procedural("plain", 0.5, 0.0, 1.0, 8, 0))}
+PANES: dict[str, Material] = {
+    **GREY,
+    "pane": Material("pane", eta=1.5),
+    "hole": Material("pane", eta=1.0),
+    "dark": Material("pane", eta=1.0, tint=0.4),
+}
 FLOOR = rectangle(np.zeros(3), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]), "grey")
 SUN = Sun("sun", 80_000.0, (0.0,), (30.0,), (50.0,))
 UNIFORM = Sky("sky", 10_000.0, "uniform")
@@ -22,11 +30,17 @@ X, Y, Z = np.eye(3)
 
 
 def floor_light(light: Light, *others: Surface, settings: BakeSettings = DIRECT) -> tuple[Array, Array, Array]:
-    """Places x, y and illuminance (rows, columns) on the floor."""
+    """Places x, y and illuminance (rows, columns) of the floor's samples."""
     baked = bake(Scene("day", (FLOOR, *others), PANES, (light,)), settings)
-    chart = baked.atlas.charts[0]
-    points = FLOOR.at(*chart.fractions())
-    return points[..., 0], points[..., 1], baked.light[0][chart.window].astype(float)
+    s, t = np.meshgrid(*[np.linspace(0, 1, round(4 / settings.spacing_m * finer(baked)) + 1)] * 2)
+    upper = (t > s).ravel()
+    u, v = np.where(t > s, s, s - t).ravel(), np.where(t > s, t - s, t).ravel()
+    return 4 * s - 2, 4 * t - 2, baked.atlas.read(baked.direct[0], upper.astype(np.int32), u, v).reshape(s.shape)
+
+
+def finer(baked: BakedScene) -> int:
+    """How many times as fine as asked the floor's samples are."""
+    return round(np.ptp(baked.atlas.light_px[0, :, 0]) * baked.settings.spacing_m / 4)
 
 
 def roof_with_opening(half_m: float, height_m: float, glazing: str | None) -> list[Surface]:
@@ -94,11 +108,22 @@ def test_a_suns_shadow_has_an_edge_as_wide_as_the_disc_looks_from_there() -> Non
 
 @pytest.mark.parametrize(("glazing", "passes"), [("hole", 1.0), ("dark", 0.4)])
 def test_through_an_opening_a_uniform_sky_gives_its_configuration_factor(glazing: str, passes: float) -> None:
-    x, y, light = floor_light(UNIFORM, *roof_with_opening(0.75, 2.0, glazing))
+    x, y, light = floor_light(UNIFORM, *roof_with_opening(0.75, 2.0, glazing), settings=FINER)
     expected = 10_000 * passes * opening_factor(x, y, 0.75, 2.0)
     # Daylight is smoothed, which shows where samples as coarse as these end.
     np.testing.assert_allclose(light[3:-3, 3:-3], expected[3:-3, 3:-3], rtol=0.02)
     assert light.mean() == pytest.approx(expected.mean(), rel=0.002)
+
+
+def test_a_pane_and_its_back_let_in_what_one_pane_does() -> None:
+    roof, level = roof_with_opening(0.75, 2.0, None), quad([-0.75, -0.75, 2.0], 1.5 * Y, 1.5 * X)
+    lit = []
+    for mesh in (level, level.two_sided()):
+        pane = Thing("pane", mesh, "pane")
+        baked = bake(Scene("day", (FLOOR, *roof), PANES, (UNIFORM,), (), (pane,)), DIRECT)
+        lit.append(baked.direct[0].mean())
+    assert lit[1] == pytest.approx(lit[0], rel=1e-3)
+    assert lit[0] > 0
 
 
 def test_an_opening_without_a_pane_lets_in_the_same_light() -> None:
@@ -110,7 +135,7 @@ def test_an_opening_without_a_pane_lets_in_the_same_light() -> None:
 def test_panes_behind_one_another_multiply_and_count_no_light_twice() -> None:
     roof = roof_with_opening(0.75, 2.0, "dark")
     second = rectangle(np.array([0, 0, 1.8]), 8 * Y, 8 * X, "dark")
-    x, y, light = floor_light(UNIFORM, *roof, second)
+    x, y, light = floor_light(UNIFORM, *roof, second, settings=FINER)
     expected = 10_000 * 0.4**2 * opening_factor(x, y, 0.75, 2.0)
     assert light.mean() == pytest.approx(expected.mean(), rel=0.01)
     np.testing.assert_allclose(light, expected, rtol=0.15)

@@ -6,37 +6,29 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.render.draw import MIRRORS
-from vobench.render.illumination import AmbientLight
+from vobench.render.illumination import AmbientLight, Illumination
 from vobench.render.renderer import View, still
 from vobench.render.view import Plane
 from vobench.scene.light import Sky
-from vobench.scene.material import (
-    Glass,
-    Material,
-    Matt,
-    Mirror,
-    Polished,
-    fresnel,
-    pane_reflectance,
-    under_coat,
-)
+from vobench.scene.material import Material, fresnel, pane_reflectance, under_coat
 from vobench.scene.scene import Scene
 from vobench.scene.surface import Surface, box, rectangle, room
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 MATERIALS: dict[str, Material] = {
-    "grey": Matt("plain", 0.5, 0, 1, 8, 0),
-    "bright": Matt("plain", 0.9, 0, 1, 8, 0),
-    "coarse": Matt("checker", 0.5, 0.8, 3.2, 1024, 0),
-    "steel": Mirror(0.8),
-    "brushed": Mirror(0.8, roughness=0.05),
-    "wax": Polished("plain", 0.3, 0, 1, 8, 0, eta=1.7, tint=0.9),
-    "glass": Glass(eta=1.5, tint=0.7),
+    "grey": Material(texture=Procedural("plain", 0.5, 0, 1, 8, 0)),
+    "bright": Material(texture=Procedural("plain", 0.9, 0, 1, 8, 0)),
+    "coarse": Material(texture=Procedural("checker", 0.5, 0.8, 3.2, 1024, 0)),
+    "steel": Material("mirror", tint=0.8),
+    "brushed": Material("mirror", tint=0.8, roughness=0.05),
+    "wax": Material(texture=Procedural("plain", 0.3, 0, 1, 8, 0), eta=1.7, tint=0.9),
+    "glass": Material("pane", eta=1.5, tint=0.7),
 }
 LUMINANCE, TINT = 0.5 * 100 / np.pi, 0.8  # of grey under 100 lx, of steel
 FLOOR, EAST = Plane(np.array([0, 0, 1.0]), 0.0), Plane(np.array([-1.0, 0, 0]), 4.0)
@@ -170,6 +162,6 @@ def test_the_mean_of_a_scene_counts_its_bodies_by_area_and_follows_the_light(eve
     baked = even_light(Scene("hall", tuple(surfaces), MATERIALS, ()))
     grey_m2, bright_m2 = 2 * 64 + 24, 24
     expected = (0.5 * grey_m2 + 0.9 * bright_m2) / (grey_m2 + bright_m2) * 100 / np.pi
-    ambience, light = AmbientLight(baked), baked.light.sum(0)
+    ambience, light = AmbientLight(baked), Illumination(baked).at(0, 0)
     assert ambience.cd_m2(light) == pytest.approx(expected, rel=1e-3)
     assert ambience.cd_m2(2 * light) == pytest.approx(2 * expected, rel=1e-3)

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Equirectangular, KannalaBrandt, Pinhole
 from vobench.geometry.rig import LENSES, Rig, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.render.renderer import still
-from vobench.scene.material import Matt
+from vobench.scene.material import Material
 from vobench.scene.scene import Scene
 from vobench.scene.surface import box, room
 from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose
@@ -138,7 +139,9 @@ def edge_errors(picture: Array, edge: Array, *, inside: int, reach: int = 6) -> 
 def test_the_outline_of_a_box_lies_where_its_edges_project(
     even_light: Any, draw: Any, measure: Any, lens: Pinhole, heading_deg: float
 ) -> None:
-    materials = {name: Matt("plain", a, 0, 1, 8, 0) for name, a in (("bright", BRIGHT), ("dark", DARK))}
+    materials = {
+        name: Material(texture=Procedural("plain", a, 0, 1, 8, 0)) for name, a in (("bright", BRIGHT), ("dark", DARK))
+    }
     furniture = box(BOX_CENTER_M, BOX_SIZE_M, yaw_deg=BOX_YAW_DEG, material="bright")
     surfaces = (*room((8, 8, 3), floor="dark", wall="dark", ceiling="dark"), *furniture)
     renderer = draw(even_light(Scene("box", surfaces, materials, ()), illuminance_lx=np.pi))

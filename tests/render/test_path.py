@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from vobench.asset.texture import Procedural
 from vobench.errors import MissingDependencyError, RenderError
 from vobench.geometry import se3
 from vobench.geometry.camera import KannalaBrandt, Pinhole, pixel_grid
@@ -15,7 +16,8 @@ from vobench.render import mitsuba
 from vobench.render.path import PathRenderer
 from vobench.render.renderer import View, still
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Sky, SpotLight, Sun, Switched
-from vobench.scene.material import Glass, Matt, Mirror, Polished, fresnel, pane_reflectance, under_coat
+from vobench.scene.material import LUMINANCE, Material, Picture, fresnel, linear, pane_reflectance, under_coat
+from vobench.scene.mesh import Thing, quad, unit
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 from vobench.scene.surface import rectangle, room
 
@@ -35,9 +37,9 @@ def trace() -> Trace:
     except MissingDependencyError as error:
         pytest.skip(str(error))
 
-    def picture(scene, T_world_camera=DOWN, camera=SMALL, *, views=None, **settings):
+    def picture(scene, T_world_camera=DOWN, camera=SMALL, *, views=None, weights=LUMINANCE, **settings):
         renderer = PathRenderer(scene, **{"samples": 64, **settings})
-        light = renderer.radiance(camera, views or still(camera, T_world_camera))
+        light = renderer.radiance(camera, views or still(camera, T_world_camera), weights=weights)
         renderer.close()
         return light
 
@@ -54,7 +56,7 @@ def plate(material, z_m=0.0, *, side_m=8.0, up=True):
 
 
 def floor_under(*lights, material=None, over=(), materials=None) -> Scene:
-    floor = material or Matt(*tone(0.5))
+    floor = material or Material(texture=Procedural(*tone(0.5)))
     return Scene("floor", (plate("floor"), *over), {"floor": floor, **(materials or {})}, tuple(lights))
 
 
@@ -92,7 +94,7 @@ def test_a_spot_fades_as_its_intensity_says(trace):
 def test_the_sun_s_disc_softens_the_edge_of_a_shadow_by_its_width(trace):
     sun = Sun("sun", 1000.0, (0.0,), (0.0,), (90.0,))
     blade = rectangle(4 * X + 3 * Z, 8 * X, 8 * Y, "blade", "blade")  # its edge is at x = 0, 3 m above the floor
-    scene = floor_under(sun, over=(blade,), materials={"blade": Matt(*tone(0.5))})
+    scene = floor_under(sun, over=(blade,), materials={"blade": Material(texture=Procedural(*tone(0.5)))})
     line = Pinhole(60, 1, 2000.0, 2000.0, 29.5, 0.0)  # 1 px is 0.5 mm of the floor
     T_world_camera = se3.transform(np.stack([X, -Y, -Z], -1), [0, 0, 1.0])
     shown = trace(scene, T_world_camera, line, samples=400)[0] / (0.5 * 1000 / np.pi)
@@ -108,7 +110,7 @@ def test_the_sun_s_disc_softens_the_edge_of_a_shadow_by_its_width(trace):
 def test_in_a_closed_box_light_adds_up_to_a_geometric_series(trace, albedo, max_depth):
     """A lamp amid a cube lights all sides alike, and each bounce keeps the share `albedo` of its flux."""
     sides = tuple(room((2, 2, 2), floor="skin", wall="skin", ceiling="skin"))
-    scene = Scene("box", sides, {"skin": Matt(*tone(albedo))}, (PointLight("bulb", Z, 600.0),))
+    scene = Scene("box", sides, {"skin": Material(texture=Procedural(*tone(albedo)))}, (PointLight("bulb", Z, 600.0),))
     # From above, through the ceiling's back: the picture is just the floor, each pixel of the same area.
     camera = Pinhole(16, 16, 32.0, 32.0, 7.5, 7.5)
     shown = trace(scene, looking(pitch_deg=90, position_m=(0, 0, 4.0)), camera, samples=400, max_depth=max_depth)
@@ -118,7 +120,7 @@ def test_in_a_closed_box_light_adds_up_to_a_geometric_series(trace, albedo, max_
 
 def test_a_coat_takes_its_share_of_the_light_on_the_way_in_and_out(trace):
     bulb = PointLight("bulb", np.array([1.5, 0.0, 1.5]), 800.0)
-    shown = trace(floor_under(bulb, material=Polished(*tone(0.6)))).mean()
+    shown = trace(floor_under(bulb, material=Material(texture=Procedural(*tone(0.6)), eta=1.5))).mean()
     cosine = np.array([np.cos(np.pi / 4), 1.0])
     entering = 800 / (4 * np.pi) / 4.5 * cosine[0] * (1 - fresnel(cosine, 1.5)[0])
     expected = under_coat(np.array(0.6), 1.5) * entering * (1 - fresnel(cosine, 1.5)[1]) / np.pi
@@ -129,7 +131,9 @@ def test_a_coat_takes_its_share_of_the_light_on_the_way_in_and_out(trace):
 def test_a_polished_floor_under_an_even_sky_shows_its_body_and_the_sky_by_fresnel_s_law(trace, pitch_deg):
     sky = Sky("sky", 1000.0, "uniform")
     eye = looking(pitch_deg=pitch_deg, position_m=(0, 0, 0.5))
-    shown = trace(floor_under(sky, material=Polished(*tone(0.6), tint=0.7)), eye, samples=1000)
+    shown = trace(
+        floor_under(sky, material=Material(texture=Procedural(*tone(0.6)), eta=1.5, tint=0.7)), eye, samples=1000
+    )
     F = fresnel(np.array(np.sin(np.deg2rad(pitch_deg))), 1.5)
     everywhere = fresnel(np.sqrt((np.arange(4096) + 0.5) / 4096), 1.5).mean()
     body = under_coat(np.array(0.6), 1.5) * (1 - everywhere) * (1 - F)
@@ -138,14 +142,17 @@ def test_a_polished_floor_under_an_even_sky_shows_its_body_and_the_sky_by_fresne
 
 @pytest.mark.parametrize(("roughness", "least"), [(0.0, 0.999), (0.1, 0.98)])
 def test_a_mirror_keeps_the_share_tint(trace, roughness, least):
-    floor = Mirror(tint=0.7, roughness=roughness)
+    floor = Material("mirror", tint=0.7, roughness=roughness)
     shown = trace(floor_under(Sky("sky", 1000.0, "uniform"), material=floor)).mean() * np.pi / 1000 / 0.7
     assert least <= shown <= 1.001
 
 
 def test_a_mirror_shows_what_the_mirrored_camera_sees(trace):
     poster = rectangle(np.array([2.0, 0.0, 1.0]), 2 * Z, 2 * Y, "poster")
-    materials = {"poster": Matt("checker", 0.5, 0.8, 1.6, 64, 0), "mirror": Mirror(tint=0.8)}
+    materials = {
+        "poster": Material(texture=Procedural("checker", 0.5, 0.8, 1.6, 64, 0)),
+        "mirror": Material("mirror", tint=0.8),
+    }
     bulb = (PointLight("bulb", np.array([0.0, 1.0, 3.0]), 800.0),)
     camera = Pinhole(32, 24, 30.0, 30.0, 15.5, 11.5)
     eye = looking(pitch_deg=50, position_m=(0.0, 0.0, 0.8))
@@ -161,8 +168,15 @@ def test_a_mirror_shows_what_the_mirrored_camera_sees(trace):
 
 def test_a_pane_lets_sunlight_through_and_is_looked_through(trace):
     sun = Sun("sun", 30_000.0, (0.0,), (0.0,), (30.0,))
-    pane = Glass(eta=1.5, tint=0.9)
-    shown = trace(floor_under(sun, material=Matt(*tone(0.02)), over=(plate("pane", 0.5),), materials={"pane": pane}))
+    pane = Material("pane", eta=1.5, tint=0.9)
+    shown = trace(
+        floor_under(
+            sun,
+            material=Material(texture=Procedural(*tone(0.02))),
+            over=(plate("pane", 0.5),),
+            materials={"pane": pane},
+        )
+    )
     passes = 0.9 * (1 - pane_reflectance(np.array([0.5, 1.0]), 1.5))
     assert shown.mean() == pytest.approx(0.02 / np.pi * 15_000 * passes.prod(), rel=0.01)
 
@@ -171,7 +185,7 @@ def test_a_pane_lets_sunlight_through_and_is_looked_through(trace):
 def test_a_pane_mirrors_by_fresnel_s_law_on_both_of_its_sides(trace, pitch_deg):
     lamp = AreaLight("lamp", plate("lamp", 4.0, side_m=40.0, up=False), 1e5)
     for up in (True, False):
-        scene = Scene("pane", (plate("pane", up=up),), {"pane": Glass(eta=1.5)}, (lamp,))
+        scene = Scene("pane", (plate("pane", up=up),), {"pane": Material("pane", eta=1.5)}, (lamp,))
         shown = trace(scene, looking(pitch_deg=pitch_deg, position_m=(0, 0, 1.0)), samples=400).mean()
         mirrored = pane_reflectance(np.array(np.sin(np.deg2rad(pitch_deg))), 1.5)
         assert shown == pytest.approx(mirrored * lamp.luminance_cd_m2, rel=0.04)
@@ -211,7 +225,7 @@ def test_a_picture_in_two_views_of_rows_is_the_picture_in_one(trace):
 
 
 def test_more_paths_than_are_traced_at_once_give_one_picture(trace, monkeypatch):
-    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Matt(*tone(0.5)))
+    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Material(texture=Procedural(*tone(0.5))))
     at_once = trace(scene, samples=7)
     monkeypatch.setattr("vobench.render.path.MAX_LANES", 200)
     piece_by_piece = trace(scene, samples=7)
@@ -220,7 +234,7 @@ def test_more_paths_than_are_traced_at_once_give_one_picture(trace, monkeypatch)
 
 
 def test_each_row_is_seen_from_its_own_pose(trace):
-    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Matt(*CHECKER))
+    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Material(texture=Procedural(*CHECKER)))
     poses = [looking(pitch_deg=90, position_m=(0.02 * r, 0, 1.5)) for r in range(8)]
     rolling = trace(scene, views=[instant(slice(r, r + 1), pose) for r, pose in enumerate(poses)], samples=400)
     for row, pose in enumerate(poses):
@@ -228,7 +242,7 @@ def test_each_row_is_seen_from_its_own_pose(trace):
 
 
 def test_sub_frames_are_averaged_in_linear_light(trace):
-    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Matt(*CHECKER))
+    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Material(texture=Procedural(*CHECKER)))
     poses = np.array([looking(pitch_deg=90, position_m=(0.02 * m, 0, 1.5)) for m in range(3)])
     blurred = trace(scene, views=[instant(slice(0, 8), poses)], samples=600)
     expected = np.mean([trace(scene, pose, samples=400) for pose in poses], 0)
@@ -264,7 +278,13 @@ def test_one_renderer_shows_lights_suns_and_movers_as_they_are_at_each_time(trac
     way = Path(np.array([0.0, 1.0]), np.array([[0.0, 0, 0], [4.0, 0, 0]]), np.array([0.0, 90.0]))
     box = Mover("lid", (rectangle(0.5 * Z, X, Y, "lid"),), way)
     sun = Sun("sun", 1000.0, (0.0, 1.0), (0.0, 0.0), (90.0, 30.0))
-    scene = Scene("moving", (plate("floor"),), {"floor": Matt(*tone(0.5)), "lid": Matt(*tone(0.2))}, (sun,), (box,))
+    scene = Scene(
+        "moving",
+        (plate("floor"),),
+        {"floor": Material(texture=Procedural(*tone(0.5))), "lid": Material(texture=Procedural(*tone(0.2)))},
+        (sun,),
+        (box,),
+    )
     renderer = PathRenderer(scene, samples=64, max_depth=2)
     for t_s, albedo, elevation_deg in ((0.0, 0.2, 90.0), (1.0, 0.5, 30.0), (0.0, 0.2, 90.0)):
         shown = renderer.radiance(SMALL, still(SMALL, DOWN, t_ns=int(t_s * 1e9)))
@@ -282,7 +302,7 @@ def test_one_renderer_shows_lights_suns_and_movers_as_they_are_at_each_time(trac
     ids=["pinhole", "fisheye"],
 )
 def test_the_corners_of_a_checker_land_where_projection_says(trace, camera):
-    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Matt(*CHECKER))
+    scene = floor_under(Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)), material=Material(texture=Procedural(*CHECKER)))
     eye = looking(pitch_deg=80, position_m=(0.03, 0.02, 0.8))
     picture = trace(scene, eye, camera, samples=256, max_depth=2)
     lattice = np.stack(np.meshgrid(np.arange(-4, 4, 0.1), np.arange(-4, 4, 0.1), [0.0]), -1).reshape(-1, 3)
@@ -302,14 +322,18 @@ def test_a_floor_of_two_halves_is_the_floor_in_one(trace):
     whole = plate("floor")
     left = replace(whole, edge_u_m=4.05 * X)
     right = replace(whole, corner_m=whole.corner_m + 4.05 * X, edge_u_m=3.95 * X, texture_corner_m=(4.05, 0.0))
-    pictures = [trace(Scene("f", s, {"floor": Matt(*CHECKER)}, sun)) for s in ((whole,), (left, right))]
+    pictures = [
+        trace(Scene("f", s, {"floor": Material(texture=Procedural(*CHECKER))}, sun)) for s in ((whole,), (left, right))
+    ]
     np.testing.assert_allclose(pictures[1], pictures[0], rtol=1e-3)
     assert pictures[0].std() > 0.2 * pictures[0].mean()
 
 
 def test_where_the_lens_sees_nothing_the_picture_is_black(trace):
     camera = KannalaBrandt(40, 40, 10.0, 10.0, 19.5, 19.5, -0.15, 0.0, 0.0, 0.0)
-    picture = trace(floor_under(Sky("sky", 1000.0, "uniform"), material=Matt(*tone(0.9))), camera=camera)
+    picture = trace(
+        floor_under(Sky("sky", 1000.0, "uniform"), material=Material(texture=Procedural(*tone(0.9)))), camera=camera
+    )
     u, v = np.moveaxis(pixel_grid(camera) - 19.5, -1, 0)
     assert np.isnan(camera.rays(pixel_grid(camera))[np.hypot(u, v) > 11]).all()
     assert (picture[np.hypot(u, v) > 11] == 0).all()
@@ -322,3 +346,85 @@ def test_where_the_lens_sees_nothing_the_picture_is_black(trace):
 def test_impossible_settings_are_a_sentence(settings, says):
     with pytest.raises(RenderError, match=says):
         PathRenderer(floor_under(LAMP), **settings)
+
+
+def test_each_channel_is_the_light_s_colour_times_the_floor_s(trace):
+    colour, tint = (0.6, 0.3, 0.1), np.array([1.2, 1.0, 0.4])
+    lamp = replace(LAMP, colour=tuple(tint))
+    bulb = PointLight("bulb", 2 * Z, 800.0, colour=tuple(tint))
+    sun = Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,), colour=tuple(tint))
+    sky = Sky("sky", 1000.0, colour=tuple(tint))
+    for light in (lamp, bulb, sun, sky):
+        grey = trace(floor_under(replace(light, colour=(1.0, 1.0, 1.0)), material=Material(colour=(0.5,) * 3)), seed=3)
+        rgb = trace(floor_under(light, material=Material(colour=colour)), seed=3, weights=None)
+        assert rgb.shape == (*grey.shape, 3)
+        # Beside the floor there is nothing, so that its light is met once.
+        np.testing.assert_allclose(rgb, grey[..., None] * tint * colour / 0.5, rtol=1e-4)
+
+
+def test_a_mono_picture_is_the_weighted_sum_of_its_channels(trace):
+    scene = floor_under(LAMP, material=Material(colour=(0.6, 0.3, 0.1)))
+    rgb, weights = trace(scene, weights=None), (0.1, 0.7, 0.2)
+    np.testing.assert_allclose(trace(scene, weights=weights), rgb @ np.array(weights), rtol=1e-5)
+    np.testing.assert_allclose(trace(scene), rgb @ LUMINANCE, rtol=1e-5)
+
+
+def test_a_picture_in_srgb_shows_its_linear_reflectance(trace):
+    pixels = np.zeros((2, 2, 3), np.uint8) + np.array([200, 120, 30], np.uint8)
+    paper = Material(texture=Picture(pixels), colour=(1.0, 0.5, 1.0))
+    plain = Material(colour=tuple(linear(pixels[0, 0]) * np.array([1.0, 0.5, 1.0])))
+    shown, expected = (trace(floor_under(LAMP, material=m), weights=None) for m in (paper, plain))
+    np.testing.assert_allclose(shown, expected, rtol=1e-4)
+
+
+def test_metal_mirrors_in_its_colour_and_scatters_nothing(trace):
+    sky, colour = Sky("sky", 1000.0, "uniform"), np.array([0.9, 0.6, 0.2])
+    metal, half = (Material(colour=tuple(colour), metal=m) for m in (1.0, 0.5))
+    for material in (metal, half):
+        shown = trace(floor_under(sky, material=material), samples=1000, weights=None).mean((0, 1))
+        np.testing.assert_allclose(shown, colour * 1000 / np.pi, rtol=0.02)
+    bulb = PointLight("bulb", np.array([1.0, 0, 1.0]), 800.0)
+    matt = trace(floor_under(bulb, material=Material(colour=tuple(colour))), samples=1000)
+    assert not trace(floor_under(bulb, material=metal)).any()
+    assert trace(floor_under(bulb, material=half), samples=1000).mean() == pytest.approx(0.5 * matt.mean(), rel=0.02)
+
+
+def test_what_glows_is_seen_as_its_emission_and_lights_what_is_before_it(trace):
+    emission = np.array([300.0, 100.0, 20.0])
+    halves = np.zeros((1, 64, 3), np.uint8)
+    halves[:, :32] = 255
+    screen = Material(colour=(0.0,) * 3, emission_cd_m2=tuple(emission))
+    striped = replace(screen, emission_texture=Picture(halves, 0.01))
+    lamp = AreaLight("lamp", plate("lamp", 3.0, side_m=1.0, up=False), 900.0)
+    panel = Thing("screen", quad([-0.5, -0.5, 3.0], Y, X), "screen")
+    for material, share in ((screen, 1.0), (striped, 0.5)):
+        scene = replace(floor_under(materials={"screen": material}), things=(panel,))
+        up = se3.transform(np.diag([1, -1, -1.0]) @ DOWN[:3, :3], [0, 0, 0.5])
+        np.testing.assert_allclose(trace(scene, up, weights=None).mean((0, 1)), share * emission, rtol=0.02)
+        shown = trace(scene, samples=1000, weights=None).mean((0, 1))
+        as_lamp = trace(floor_under(lamp), samples=1000).mean() / lamp.luminance_cd_m2
+        np.testing.assert_allclose(shown, as_lamp * share * emission, rtol=0.02)
+
+
+def test_holes_are_seen_through_and_let_light_through(trace):
+    pixels = np.full((4, 4, 4), 255, np.uint8)
+    pixels[:, 2:, 3] = 0
+    lace = Material(colour=(0.0,) * 3, texture=Picture(pixels, 0.004), cutout=0.5)
+    sun = Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,))
+    sheet = Thing("lace", quad([-4, -4, 0.5], 8 * X, 8 * Y).two_sided(), "lace")
+    plain = floor_under(sun)
+    covered = replace(plain, things=(sheet,), materials={**plain.materials, "lace": lace})
+    shown = trace(covered, samples=2000).mean()
+    # Half of the light comes in, half of that out again: the pattern is too fine to know its own shadow.
+    assert shown == pytest.approx(0.25 * trace(plain).mean(), rel=0.05)
+    solid = replace(covered, materials={**plain.materials, "lace": replace(lace, cutout=0.0)})
+    assert not trace(solid).any()
+
+
+def test_smooth_normals_shade_and_flat_faces_hide(trace):
+    tilted = unit(np.array([0.5, 0.0, 1.0]))
+    sun = Sun("sun", 1000.0, (0.0,), (0.0,), (90.0,))
+    mesh = quad([-4, -4, 0], 8 * X, 8 * Y)
+    floor = Thing("floor", replace(mesh, normals=np.tile(tilted, (4, 1))), "floor")
+    scene = Scene("f", (), {"floor": Material(colour=(0.5,) * 3)}, (sun,), (), (floor,))
+    assert trace(scene).mean() == pytest.approx(0.5 * 1000 / np.pi * tilted[2], rel=0.01)

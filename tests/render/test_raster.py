@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import vobench.render
+from vobench.asset.texture import Procedural
 from vobench.errors import MissingDependencyError
 from vobench.geometry.camera import Camera, Pinhole, pixel_grid
 from vobench.geometry.rig import LENSES, looking
@@ -20,16 +21,16 @@ from vobench.render.bake import BakedScene, BakeSettings, bake
 from vobench.render.geometry import RayCaster
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
-from vobench.scene.material import Matt
-from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.material import Material
+from vobench.scene.scene import Scene, ceiling_light, triangles
 from vobench.scene.surface import box, rectangle, room
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 DOWN, AHEAD = looking(pitch_deg=90, position_m=(0.2, 0.1, 0.4)), looking(pitch_deg=20, position_m=(0.2, 0.1, 0.4))
 LAMP = ceiling_light("lamp", np.array([0.5, 0.2, 2.4]), (0.5, 0.3), power_lm=2000)
 MATERIALS = {
-    "plain": Matt("plain", 0.5, 0.0, 1.0, 8, 0),
-    "busy": Matt("terrazzo", 0.5, 0.6, 1.0, 512, 1),
+    "plain": Material(texture=Procedural("plain", 0.5, 0.0, 1.0, 8, 0)),
+    "busy": Material(texture=Procedural("terrazzo", 0.5, 0.6, 1.0, 512, 1)),
 }
 
 
@@ -133,7 +134,7 @@ def test_a_lamp_in_view_shows_its_luminance_and_its_back_is_not_there(renderer: 
 def hit_distance(scene: Scene, T_world_camera: Array) -> Array:
     """Distance (H, W) in metres along the rays through the pixels' centres; NaN where nothing is."""
     rays = CAMERA.rays(pixel_grid(CAMERA)).reshape(-1, 3) @ T_world_camera[:3, :3].T
-    caster = RayCaster(scene.surfaces, np.arange(len(scene.surfaces)))
+    caster = RayCaster(triangles(scene))
     hits = caster.hits(np.broadcast_to(T_world_camera[:3, 3], rays.shape), rays)
     return hits.distance.reshape(CAMERA.height_px, CAMERA.width_px)
 
@@ -147,7 +148,10 @@ def test_where_nothing_is_the_picture_is_black(draw: Any, even_light: Any) -> No
 
 
 def test_rays_and_picture_agree_on_where_the_crate_is(draw: Any, even_light: Any) -> None:
-    materials = {"dark": Matt("plain", 0.1, 0, 1, 8, 0), "bright": Matt("plain", 0.9, 0, 1, 8, 0)}
+    materials = {
+        "dark": Material(texture=Procedural("plain", 0.1, 0, 1, 8, 0)),
+        "bright": Material(texture=Procedural("plain", 0.9, 0, 1, 8, 0)),
+    }
     crate = box(np.array([1.5, 0.1, 0.4]), (0.5, 0.5, 0.5), yaw_deg=30, material="bright")
     surfaces = (*room((20, 20, 20), floor="dark", wall="dark", ceiling="dark"), *crate)
     scene = Scene("crate", surfaces, materials, ())

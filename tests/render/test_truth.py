@@ -1,10 +1,11 @@
-"""Ground truth agrees with geometry worked out apart from it: no Embree, no tiles, float64, one plane at a time."""
+"""Ground truth agrees with geometry worked out apart from it: no Embree, float64, one triangle at a time."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from vobench.asset.texture import Procedural
 from vobench.errors import UnknownNameError
 from vobench.geometry import se3
 from vobench.geometry.camera import (
@@ -18,36 +19,63 @@ from vobench.geometry.camera import (
 )
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import inventory
-from vobench.render.truth import Shot, TruthCaster
+from vobench.render.truth import Shot, TruthCaster, lamp_of
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
-from vobench.scene.material import Glass, Matt, Mirror, Polished
-from vobench.scene.scene import Mover, Path, Scene, ceiling_light
-from vobench.scene.surface import Surface, box, rectangle, room
+from vobench.scene.material import Material, Picture
+from vobench.scene.mesh import Mesh, Thing, Triangles, flat, joined, quad, unit
+from vobench.scene.scene import Mover, Path, Scene, ceiling_light, triangles
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame
 
 PLAIN = ("plain", 0.5, 0.0, 1.0, 8, 0)
 MATERIALS = {
-    "matt": Matt(*PLAIN),
-    "wax": Polished(*PLAIN),
-    "steel": Mirror(),
-    "glass": Glass(),
+    "matt": Material(texture=Procedural(*PLAIN)),
+    "wax": Material(texture=Procedural(*PLAIN), eta=1.5),
+    "steel": Material("mirror", tint=0.9),
+    "glass": Material("pane", eta=1.5),
 }
 SECOND_NS = 1_000_000_000
+
+
+def sheet(name: str, center_m, edge_u_m, edge_v_m, material: str = "matt") -> Thing:
+    """A rectangle around a middle."""
+    u, v = np.asarray(edge_u_m, float), np.asarray(edge_v_m, float)
+    return Thing(name, quad(np.asarray(center_m) - (u + v) / 2, u, v), material)
+
+
+def sides(center_m, size_m, *, yaw_deg: float = 0.0) -> list[Mesh]:
+    """The sides of a block, seen from outside: east, west, north, south, top, bottom."""
+    x, y, z = np.diag(np.asarray(size_m, float)) @ se3.rotation_z(np.deg2rad(yaw_deg)).T
+    ways = ((x, y, z), (-x, z, y), (y, z, x), (-y, x, z), (z, x, y), (-z, y, x))
+    return [quad(np.asarray(center_m) + (out - u - v) / 2, u, v) for out, u, v in ways]
+
+
+def block(name: str, center_m, size_m, *, yaw_deg: float = 0.0) -> Thing:
+    return Thing(name, joined(sides(center_m, size_m, yaw_deg=yaw_deg)), "matt")
+
+
+def shell(size_m, *, floor: str = "matt") -> list[Thing]:
+    """The inner sides of a block that stands on the floor."""
+    names = ("wall_east", "wall_west", "wall_north", "wall_south", "ceiling", "floor")
+    meshes = [side.flipped() for side in sides([0, 0, size_m[2] / 2], size_m)]
+    return [Thing(n, mesh, floor if n == "floor" else "matt") for n, mesh in zip(names, meshes, strict=True)]
+
+
 RIDE = Path(np.array([0.0, 2.0]), np.array([[1.5, -1.2, 0.3], [1.9, 1.0, 0.3]]), np.array([0.0, 50.0]))
-CART = Mover("cart", tuple(box(np.zeros(3), (0.5, 0.4, 0.6), yaw_deg=0, material="matt", instance="x")), RIDE)
+CART = Mover("cart", (), RIDE, (block("x", np.zeros(3), (0.5, 0.4, 0.6)),))
+PANE = sheet("pane", [1.0, 0.4, 0.8], [0, 0.6, 0], [0, 0, 0.5], "glass")
 HALL = Scene(
     "hall",
-    (
-        *room((8, 6, 3), floor="wax", wall="matt", ceiling="matt"),
-        *box(np.array([2.0, 0.9, 0.4]), (0.8, 0.6, 0.8), yaw_deg=30, material="matt", instance="crate"),
-        *box(np.array([-2.0, -1.5, 0.7]), (0.3, 1.6, 1.4), yaw_deg=-12, material="matt", instance="shelf"),
-        rectangle(np.array([3.99, -1.0, 1.2]), np.array([0, 0, 1.0]), np.array([0, 1.5, 0]), "steel", "mirror"),
-        rectangle(np.array([1.0, 0.4, 0.8]), np.array([0, 0.6, 0]), np.array([0, 0, 0.5]), "glass", "pane"),
-    ),
+    (),
     MATERIALS,
     (ceiling_light("lamp", np.array([0.5, 0.5, 2.9]), (0.6, 0.6), power_lm=1000),),
     (CART,),
+    (
+        *shell((8, 6, 3), floor="wax"),
+        block("crate", [2.0, 0.9, 0.4], (0.8, 0.6, 0.8), yaw_deg=30),
+        block("shelf", [-2.0, -1.5, 0.7], (0.3, 1.6, 1.4), yaw_deg=-12),
+        sheet("mirror", [3.99, -1.0, 1.2], [0, 0, 1.0], [0, 1.5, 0], "steel"),
+        PANE,
+    ),
 )
 CAMERAS = {
     "pinhole": Pinhole(177, 119, 120.0, 100.0, 90.0, 55.0),
@@ -62,20 +90,30 @@ STEP_NS = SECOND_NS // 10
 NOW, LATER = Shot(HERE, 0), Shot(NEXT, STEP_NS)
 
 
+def met(faces: Triangles, origin_m: Array, directions: Array) -> Array:
+    """How far along directions (R, 3) the fronts of faces are (R, F), infinite for none. Source: Cramer's rule."""
+    a, b, c = np.moveaxis(faces.corners_m, 1, 0)
+    normal, way = np.cross(b - a, c - a), origin_m - a
+    across = np.cross(way, directions[:, None])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = -1 / (directions @ normal.T)
+        t = np.einsum("fi,fi->f", way, normal) * scale
+        u, v = np.einsum("fi,rfi->rf", c - a, across) * scale, -np.einsum("fi,rfi->rf", b - a, across) * scale
+        return np.where((scale > 0) & (t > 0) & (u >= 0) & (v >= 0) & (u + v <= 1), t, np.inf)
+
+
 def nearest(scene: Scene, origin_m: Array, directions: Array, *, t_ns: float) -> tuple[Array, Array]:
-    """The first opaque front along each direction (R, 3): surface, -1 for none, and lengths, infinite for none."""
-    listed, best = inventory(scene, t_ns=t_ns), np.full(len(directions), np.inf)
-    which = np.full(len(directions), -1)
-    for index, surface in enumerate(listed.surfaces):
-        along = directions @ surface.normal
-        with np.errstate(divide="ignore", invalid="ignore"):
-            distance = (surface.corner_m - origin_m) @ surface.normal / along
-            local = origin_m + distance[:, None] * directions - surface.corner_m
-        u, v = (local @ edge / (edge @ edge) for edge in (surface.edge_u_m, surface.edge_v_m))
-        hit = (along < 0) & (distance > 0) & (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1) & (distance < best)
-        if not listed.pane[index]:
-            best[hit], which[hit] = distance[hit], index
-    return which, best
+    """The first opaque front along each direction (R, 3): face, -1 for none, and lengths, infinite for none."""
+    faces = triangles(scene, t_ns=t_ns)
+    glass = {name for name, material in scene.materials.items() if material.kind == "pane"}
+    pane = np.array([thing.material in glass for thing in faces.things])[faces.thing]
+    which, best = [], []
+    for some in np.array_split(directions, max(1, len(directions) * len(faces) // 1_000_000)):
+        distance = np.where(pane, np.inf, met(faces, origin_m, some))
+        which.append(distance.argmin(1))
+        best.append(distance.min(1))
+    length = np.concatenate(best)
+    return np.where(np.isfinite(length), np.concatenate(which), -1), length
 
 
 @pytest.fixture(scope="module")
@@ -95,12 +133,12 @@ def truth(caster: TruthCaster, camera: Camera) -> TruthFrame:
 
 @pytest.fixture(scope="module")
 def expected(camera: Camera) -> tuple[Array, Array, Array]:
-    """Surfaces (R,), distances (R,) and rays (R, 3), by planes."""
+    """Faces (R,), distances (R,) and rays (R, 3)."""
     rays = camera.rays(pixel_grid(camera)).reshape(-1, 3)
     return *nearest(HALL, HERE[:3, 3], rays @ HERE[:3, :3].T, t_ns=0), rays
 
 
-def flat(channel: np.ndarray | None) -> np.ndarray:
+def flattened(channel: np.ndarray | None) -> np.ndarray:
     assert channel is not None
     return channel.reshape(-1, *channel.shape[2:])
 
@@ -113,7 +151,7 @@ def off_edges(same: np.ndarray) -> np.ndarray:
 
 def test_every_camera_has_depth_to_1e_6_where_planes_put_it(truth, expected, camera):
     surface, distance_m, rays = expected
-    depth = flat(truth.depth)
+    depth = flattened(truth.depth)
     exact = distance_m * (rays[:, 2] if camera.depth_along == "axis" else 1.0)
     unseen = surface < 0
     assert np.isnan(depth[unseen]).all()
@@ -132,9 +170,9 @@ def test_pixels_that_no_direction_leads_to_have_no_truth(caster):
 
 
 def test_depth_is_exact_to_20_m_at_grazing_angles():
-    floor = rectangle(np.zeros(3), np.array([60.0, 0, 0]), np.array([0, 60.0, 0]), "matt", "floor")
+    floor = sheet("floor", np.zeros(3), [60.0, 0, 0], [0, 60.0, 0])
     camera, pose = LENSES["paper_literal"], looking(pitch_deg=15, position_m=(0, 0, 0.4))
-    depth = TruthCaster(Scene("plain", (floor,), MATERIALS, ())).frame(camera, Shot(pose, 0), ["depth"]).depth
+    depth = TruthCaster(Scene("plain", (), MATERIALS, (), (), (floor,))).frame(camera, Shot(pose, 0), ["depth"]).depth
     assert depth is not None
     rays = camera.rays(pixel_grid(camera))
     exact = rays[..., 2] * -0.4 / (rays @ pose[:3, :3].T)[..., 2]
@@ -146,37 +184,33 @@ def test_depth_is_exact_to_20_m_at_grazing_angles():
 
 def test_normals_are_those_of_the_surfaces_in_the_cameras_frame(truth, expected):
     surface = expected[0]
-    normals = np.array([s.normal for s in inventory(HALL, t_ns=0).surfaces]) @ HERE[:3, :3]
+    normals = triangles(HALL, t_ns=0).plane @ HERE[:3, :3]
     seen = surface >= 0
-    error = np.abs(flat(truth.normals)[seen] - normals[surface[seen]]).max(1)
+    error = np.abs(flattened(truth.normals)[seen] - normals[surface[seen]]).max(1)
     off_edges(error < 1e-6)
 
 
 def test_ids_name_what_is_seen_and_movers_by_their_own_name(truth, expected, caster):
-    surface, listed = expected[0], inventory(HALL, t_ns=0)
-    things = ["cart" if listed.mover[i] >= 0 else s.instance for i, s in enumerate(listed.surfaces)]
-    instance = np.array(caster.names.instance)[flat(truth.instance)]
-    material = np.array(caster.names.material)[flat(truth.material)]
+    surface, faces = expected[0], triangles(HALL, t_ns=0)
+    things = ["cart" if mover >= 0 else faces.things[n].name for n, mover in zip(faces.thing, faces.mover, strict=True)]
+    instance = np.array(caster.names.instance)[flattened(truth.instance)]
+    material = np.array(caster.names.material)[flattened(truth.material)]
     off_edges(instance == np.array([*things, ""])[surface])
-    off_edges(material == np.array([*(s.material for s in listed.surfaces), ""])[surface])
-    off_edges(flat(truth.moving) == (np.append(listed.mover, -1)[surface] >= 0))
+    off_edges(material == np.array([*(faces.things[n].material for n in faces.thing), ""])[surface])
+    off_edges(flattened(truth.moving) == (np.append(faces.mover, -1)[surface] >= 0))
     assert {"cart", "crate", "floor", "wall_east"} <= set(instance)
     assert caster.names.instance[0] == caster.names.material[0] == ""
 
 
 def test_mirrors_coats_and_what_stands_behind_panes_are_in_the_mask(truth, expected):
     surface, distance_m, rays = expected
-    listed = inventory(HALL, t_ns=0)
-    shiny = np.array([*(s.material in {"wax", "steel"} for s in listed.surfaces), False])[surface]
-    pane = HALL.surfaces[-1]
-    directions = rays @ HERE[:3, :3].T
-    with np.errstate(invalid="ignore"):
-        reach = (pane.corner_m - HERE[:3, 3]) @ pane.normal / (directions @ pane.normal)
-        local = HERE[:3, 3] + reach[:, None] * directions - pane.corner_m
-        u, v = (local @ edge / (edge @ edge) for edge in (pane.edge_u_m, pane.edge_v_m))
-        behind = (reach > 0) & (reach < distance_m) & (u > 0) & (u < 1) & (v > 0) & (v < 1)
+    faces = triangles(HALL, t_ns=0)
+    shiny = np.array([*(faces.things[n].material in {"wax", "steel"} for n in faces.thing), False])[surface]
+    both = replace(PANE, mesh=PANE.mesh.two_sided())
+    pane = triangles(Scene("pane", (), MATERIALS, (), (), (both,)))
+    behind = met(pane, HERE[:3, 3], rays @ HERE[:3, :3].T).min(1) < distance_m
     assert behind.any()
-    off_edges(flat(truth.mirror) == (shiny | behind))
+    off_edges(flattened(truth.mirror) == (shiny | behind))
 
 
 def carried(expected: tuple[Array, Array, Array]) -> tuple[Array, Array]:
@@ -184,7 +218,7 @@ def carried(expected: tuple[Array, Array, Array]) -> tuple[Array, Array]:
     surface, distance_m, rays = expected
     points_m = HERE[:3, 3] + distance_m[:, None] * (rays @ HERE[:3, :3].T)
     onward = RIDE.pose(STEP_NS) @ se3.inverse(RIDE.pose(0))
-    moving = np.append(inventory(HALL).mover, -1)[surface] >= 0
+    moving = np.append(triangles(HALL).mover, -1)[surface] >= 0
     with np.errstate(invalid="ignore"):
         world_m = np.where(moving[:, None], se3.apply(onward, points_m), points_m)
         return se3.apply(se3.inverse(NEXT), world_m), world_m
@@ -195,11 +229,11 @@ def test_flow_is_reprojection_of_what_stands_and_of_what_moves(truth, expected, 
     seen = expected[0] >= 0
     uv_px = camera.project(carried(expected)[0])
     flow = uv_px - pixel_grid(camera).reshape(-1, 2)
-    error = np.abs(flat(truth.flow) - flow).max(1)[seen]
+    error = np.abs(flattened(truth.flow) - flow).max(1)[seen]
     known = np.isfinite(uv_px).all(1)[seen]
     assert np.isnan(error[~known]).all()
     off_edges(error[known] < 1e-3)
-    assert np.isnan(flat(truth.flow)[~seen]).all()
+    assert np.isnan(flattened(truth.flow)[~seen]).all()
 
 
 @pytest.mark.filterwarnings("ignore:invalid value encountered")
@@ -213,7 +247,7 @@ def test_occlusion_is_what_the_next_camera_does_not_see(truth, expected, camera)
     found, distance_m = nearest(HALL, NEXT[:3, 3], way / reach_m[:, None], t_ns=STEP_NS)
     hidden = (found != surface) & (distance_m < reach_m * (1 - 1e-4))
     assert (hidden & ~outside & seen).any()
-    off_edges(flat(truth.occlusion) == (seen & (outside | hidden)))
+    off_edges(flattened(truth.occlusion) == (seen & (outside | hidden)))
 
 
 def test_flow_there_and_back_returns_to_the_pixel(caster):
@@ -303,8 +337,8 @@ def test_flow_of_a_rolling_shutter_leads_to_where_the_row_that_sees_the_point_st
 
 def stage(*lights, things=(), movers=()):
     """A floor seen from above, one camera pixel to a centimetre, lights over it."""
-    floor = rectangle(np.zeros(3), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]), "matt", "floor")
-    return TruthCaster(Scene("stage", (floor, *things), MATERIALS, lights, movers))
+    floor = sheet("floor", np.zeros(3), [4.0, 0, 0], [0, 4.0, 0])
+    return TruthCaster(Scene("stage", (), MATERIALS, lights, movers, (floor, *things)))
 
 
 ABOVE = se3.transform(np.diag([1.0, -1.0, -1.0]), [0, 0, 2.0])
@@ -317,9 +351,9 @@ def shadow(caster: TruthCaster, *, t_ns: int = 0) -> np.ndarray:
     return found
 
 
-def plate(*, material: str = "matt", x_m: float = 0.0) -> Surface:
+def plate(*, material: str = "matt", x_m: float = 0.0) -> Thing:
     """0.2 m square, half a metre above the floor, seen from below and so not from the camera above."""
-    return rectangle(np.array([x_m, 0, 0.5]), np.array([0, 0.2, 0]), np.array([0.2, 0, 0]), material, "plate")
+    return sheet("plate", [x_m, 0, 0.5], [0, 0.2, 0], [0.2, 0, 0], material)
 
 
 def square(half_m: float, *, x_m: float = 0.0) -> np.ndarray:
@@ -372,38 +406,227 @@ def test_glass_casts_no_shadow_and_a_spot_none_outside_its_cone():
 def test_shadow_follows_a_mover():
     path = Path(np.array([0.0, 1.0]), np.array([[0.0, 0, 0], [0.4, 0, 0]]), np.zeros(2))
     bulb = PointLight("bulb", np.array([0.0, 0, 1.0]), 100.0)
-    caster = stage(bulb, movers=(Mover("kite", (plate(),), path),))
+    caster = stage(bulb, movers=(Mover("kite", (), path, (plate(),)),))
     for t_ns, x_m in ((0, 0.0), (SECOND_NS, 0.8)):
         found, beside = shadow(caster, t_ns=t_ns), square(0.2, x_m=x_m)
         assert (found[beside < -0.003] == 1).all()
         assert (found[beside > 0.003] == 0).all()
 
 
-def test_shadows_in_a_room_are_those_of_rays_without_tiles(caster, monkeypatch):
-    camera, shot = LENSES["paper_literal"], Shot(HERE, 0)
-    by_tiles = caster.frame(camera, shot, later=LATER)
-    monkeypatch.setattr(
-        "vobench.render.occlusion.PointView.fills", lambda self, axis, sine: np.full(len(axis), -1, np.int32)
-    )
-    by_rays = TruthCaster(HALL).frame(camera, shot, later=LATER)
-    for name, values in by_rays.channels().items():
-        if values.dtype == np.float32:
-            np.testing.assert_allclose(values, by_tiles.channels()[name], rtol=1e-5, atol=1e-5, err_msg=name)
-        else:
-            assert (values != by_tiles.channels()[name]).mean() < 1e-5, name
-
-
-def test_threads_do_not_change_a_bit(caster):
+def test_one_thread_and_two_give_the_same_bytes(caster, monkeypatch):
     camera = LENSES["paper_literal"]
-    first, second = (caster.frame(camera, NOW, later=LATER).channels() for _ in range(2))
-    for name in first:
-        assert first[name].tobytes() == second[name].tobytes()
+    by_two = caster.frame(camera, NOW, later=LATER).channels()
+    monkeypatch.setattr("vobench.render.truth.THREADS", 1)
+    by_one = TruthCaster(HALL).frame(camera, NOW, later=LATER).channels()
+    for name in by_two:
+        assert by_two[name].tobytes() == by_one[name].tobytes()
 
 
 def test_backs_are_not_seen_but_hide_lights():
-    ceiling = rectangle(np.array([0, 0, 1.5]), np.array([0, 1.0, 0]), np.array([1.0, 0, 0]), "matt", "ceiling")
+    ceiling = sheet("ceiling", [0, 0, 1.5], [0, 1.0, 0], [1.0, 0, 0])
     caster = stage(PointLight("bulb", np.array([0, 0, 3.0]), 100.0), things=(ceiling,))
     truth = caster.frame(TOP, Shot(ABOVE, 0), ["depth", "shadow"])
-    assert ceiling.normal[2] < 0
+    assert (ceiling.mesh.normals[:, 2] < 0).all()
     np.testing.assert_allclose(truth.depth, 2.0, rtol=1e-6)
     assert truth.shadow[100, 100] == 1
+
+
+def icosphere(center_m, radius_m: float, *, splits: int) -> Mesh:
+    """A ball of 20 * 4^splits faces whose corners are on it."""
+    gold = (1 + 5**0.5) / 2
+    pairs = np.array([[-1, gold], [1, gold], [-1, -gold], [1, -gold]])
+    corners = np.concatenate([np.roll(np.insert(pairs, 2, 0, axis=1), n, axis=1) for n in range(3)])
+    faces = corners[[f for f in np.ndindex(12, 12, 12) if _is_face(corners, f)]]
+    for _ in range(splits):
+        a, b, c = np.moveaxis(faces, 1, 0)
+        ab, bc, ca = a + b, b + c, c + a
+        four = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        faces = unit(np.concatenate([np.stack(three, 1) for three in four])) if len(faces) else faces
+    vertices = np.asarray(center_m) + radius_m * unit(faces.reshape(-1, 3))
+    return flat(vertices, np.arange(len(vertices)).reshape(-1, 3), np.zeros((len(vertices), 2)))
+
+
+def _is_face(corners: Array, which: tuple[int, ...]) -> bool:
+    a, b, c = corners[list(which)]
+    near = np.allclose([np.linalg.norm(a - b), np.linalg.norm(b - c), np.linalg.norm(c - a)], 2)
+    return bool(near and which[0] == min(which) and np.cross(b - a, c - a) @ a > 0)
+
+
+def ball_scene(*, splits: int) -> tuple[TruthCaster, Array, float]:
+    center_m, radius_m = np.array([2.0, 0.1, 0.4]), 0.5
+    ball = Thing("ball", icosphere(center_m, radius_m, splits=splits), "matt")
+    return TruthCaster(Scene("ball", (), MATERIALS, (), (), (ball,))), center_m, radius_m
+
+
+@pytest.mark.parametrize("splits", [2, 4])
+def test_a_ball_of_faces_is_as_deep_as_the_ball_within_its_faceting(splits):
+    caster, center_m, radius_m = ball_scene(splits=splits)
+    camera, pose = CAMERAS["pinhole"], looking(pitch_deg=10, position_m=(0, 0, 0.5))
+    depth = caster.frame(camera, Shot(pose, 0), ["depth"]).depth
+    rays = camera.rays(pixel_grid(camera))
+    away = center_m - pose[:3, 3]
+    along = rays @ pose[:3, :3].T @ away
+    square = along**2 - away @ away + radius_m**2
+    # Well inside the outline, where rays are at most 45° off the normal.
+    inside = square > 0.5 * radius_m**2
+    exact = (along - np.sqrt(np.where(inside, square, 0))) * rays[..., 2]
+    widest = 1.11 / 2**splits  # the longest edge, as an angle: that of an icosahedron, halved each time
+    sag_m = radius_m * (1 - np.cos(0.66 * widest)) * np.sqrt(2)
+    deeper = (depth - exact)[inside]
+    assert inside.sum() > 200
+    assert deeper.min() > -1e-6
+    assert 0.1 * sag_m < deeper.max() < sag_m
+    assert np.isnan(depth[square < 0]).all()
+
+
+def test_flow_on_a_ball_is_its_points_projected_again():
+    caster, _, _ = ball_scene(splits=3)
+    camera, pose = CAMERAS["pinhole"], looking(pitch_deg=10, position_m=(0, 0, 0.5))
+    onward = se3.transform(se3.rotation_z(0.02), (0.05, -0.03, 0.01)) @ pose
+    truth = caster.frame(camera, Shot(pose, 0), later=Shot(onward, STEP_NS))
+    seen = np.isfinite(truth.depth)
+    rays = camera.rays(pixel_grid(camera))[seen]
+    points_m = nearest(caster._scene, pose[:3, 3], rays @ pose[:3, :3].T, t_ns=0)[1][:, None] * rays
+    expected = camera.project(se3.apply(se3.inverse(onward) @ pose, points_m)) - pixel_grid(camera)[seen]
+    assert seen.sum() > 1000
+    assert np.abs(truth.flow[seen] - expected).max() < 1e-4
+
+
+def shards(count: int, seed: int) -> Scene:
+    """Triangles anywhere and any way, each a thing of its own, that cut through one another; some in a mover."""
+    rng = np.random.default_rng(seed)
+    middle = rng.uniform([1, -1.5, -1], [4, 1.5, 1], (count, 3))
+    corners = middle[:, None] + rng.uniform(-0.4, 0.4, (count, 3, 3)) * rng.choice([0.1, 1.0], (count, 1, 1))
+    things = [
+        Thing(
+            f"shard {n}",
+            flat(c, [[0, 1, 2]], np.zeros((3, 2))).two_sided() if n % 3 else flat(c, [[0, 1, 2]], np.zeros((3, 2))),
+            "matt",
+        )
+        for n, c in enumerate(corners)
+    ]
+    path = Path(np.array([0.0, 1.0]), np.array([[0.1, 0.2, 0.0], [0.3, 0.1, 0.1]]), np.array([5.0, 20.0]))
+    return Scene("shards", (), MATERIALS, (), (Mover("swarm", (), path, tuple(things[::4])),), tuple(things))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_ids_and_depth_of_many_meshes_are_those_of_every_triangle_tried_in_float64(seed):
+    scene = shards(300, seed)
+    caster, faces = TruthCaster(scene), triangles(scene, t_ns=STEP_NS)
+    camera, pose = CAMERAS["pinhole"], looking(pitch_deg=3, position_m=(0, 0.1, 0.05))
+    truth = caster.frame(camera, Shot(pose, STEP_NS), ["depth", "instance", "normals"])
+    rays = camera.rays(pixel_grid(camera)).reshape(-1, 3)
+    face, distance_m = nearest(scene, pose[:3, 3], rays @ pose[:3, :3].T, t_ns=STEP_NS)
+    names = ["swarm" if mover >= 0 else faces.things[n].name for n, mover in zip(faces.thing, faces.mover, strict=True)]
+    assert (np.array(caster.names.instance)[flattened(truth.instance)] == np.array([*names, ""])[face]).all()
+    seen = face >= 0
+    assert 0.3 < seen.mean() < 0.99
+    np.testing.assert_allclose(flattened(truth.depth)[seen], (distance_m * rays[:, 2])[seen], rtol=2e-7)
+    normals = faces.plane[face[seen]] @ pose[:3, :3]
+    np.testing.assert_allclose(flattened(truth.normals)[seen], normals, atol=1e-6)
+
+
+def tessellated(corner_m, edge_u_m, edge_v_m, count: int) -> Mesh:
+    """A rectangle of count * count squares, each of two faces with corners of its own."""
+    u, v = np.asarray(edge_u_m, float) / count, np.asarray(edge_v_m, float) / count
+    places = np.ndindex(count, count)
+    return joined([quad(np.asarray(corner_m) + i * u + j * v, u, v) for i, j in places])
+
+
+def test_rays_through_corners_and_edges_of_faces_meet_one_of_them():
+    # Every pixel's ray goes through a corner of the wall's squares, 5 m away: 1/20 m a pixel.
+    wall = tessellated([5.0, -1.5, -1.0], [0, 3.0, 0], [0, 0, 2.0], 20).flipped()
+    camera, pose = Pinhole(21, 21, 100.0 / 3, 50.0, 10.0, 10.0), looking(pitch_deg=0, position_m=(0, 0, 0))
+    caster = TruthCaster(Scene("wall", (), MATERIALS, (), (), (Thing("wall", wall, "matt"),)))
+    truth = caster.frame(camera, Shot(pose, 0), ["depth", "instance"])
+    inner = slice(1, -1), slice(1, -1)
+    np.testing.assert_allclose(truth.depth[inner], 5.0, rtol=1e-7)
+    assert (truth.instance[inner] == 1).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_ray_inside_a_closed_room_ends(seed):
+    rng = np.random.default_rng(seed)
+    turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    T = se3.transform(turned * np.linalg.det(turned), rng.uniform(-40, 40, 3))
+    inside = joined([side.flipped() for side in sides([0, 0, 1.5], rng.uniform(3, 12, 3))]).moved(T)
+    caster = TruthCaster(Scene("room", (), MATERIALS, (), (), (Thing("room", inside, "matt"),)))
+    shot = Shot(T @ se3.transform(np.eye(3), [0.1, -0.3, 1.6]), 0)
+    truth = caster.frame(Equirectangular(720, 360), shot, ["depth", "normals", "instance"])
+    assert np.isfinite(truth.depth).all()
+    assert np.isfinite(truth.normals).all()
+    assert (truth.instance == 1).all()
+
+
+def test_the_back_of_a_sheet_of_two_sides_is_seen_as_its_front_is():
+    both = Thing("card", quad([2.0, -0.5, -0.5], [0, 1.0, 0], [0, 0, 1.0]).two_sided(), "matt")
+    caster = TruthCaster(Scene("card", (), MATERIALS, (), (), (both,)))
+    camera = CAMERAS["pinhole"]
+    ahead = looking(pitch_deg=0, position_m=(0, 0, 0))
+    behind = se3.transform(se3.rotation_z(np.pi), [4.0, 0, 0]) @ ahead
+    for pose in (ahead, behind):
+        truth = caster.frame(camera, Shot(pose, 0), ["depth", "normals"])
+        seen = np.isfinite(truth.depth)
+        assert 0.13 < seen.mean() < 0.16
+        np.testing.assert_allclose(truth.depth[seen], 2.0, rtol=1e-6)
+        np.testing.assert_allclose(truth.normals[seen], [[0, 0, -1.0]] * seen.sum(), atol=1e-6)
+
+
+def holed(opacity) -> dict[str, Material]:
+    """Paper whose picture of 4 × 4 pixels, 0.4 m wide, is solid where `opacity` is 255."""
+    pixels = np.full((4, 4, 4), 200, np.uint8)
+    pixels[..., 3] = opacity
+    return {**MATERIALS, "paper": Material(texture=Picture(pixels, 0.4), cutout=0.5)}
+
+
+def test_what_is_seen_through_holes_is_what_is_behind_and_light_falls_through():
+    # Left half solid: opacity rises from a hole to solid over a pixel, half way at its edge.
+    opacity = np.where(np.arange(4) < 2, 255, 0)[None]
+    sheet_m = quad([-0.4, -0.4, 0.5], [0.8, 0, 0], [0, 0.8, 0]).two_sided()
+    floor = sheet("floor", np.zeros(3), [4.0, 0, 0], [0, 4.0, 0])
+    bulb = PointLight("bulb", np.array([0.0, 0, 1.0]), 100.0)
+    still = Scene("holes", (), holed(opacity), (bulb,), (), (floor, Thing("paper", sheet_m, "paper")))
+    path = Path(np.array([0.0]), np.zeros((1, 3)), np.zeros(1))
+    moving = replace(still, things=(floor,), movers=(Mover("paper", (), path, still.things[1:]),))
+    place_m = (np.arange(201) - 100) / 100
+    x, y = np.meshgrid(place_m, -place_m)
+    stripe = (x * 0.75 + 0.4) % 0.4 / 0.4  # the paper is 1.5 m below the camera, the floor 2 m
+    on_paper = np.maximum(np.abs(x), np.abs(y)) * 0.75 < 0.4 - 1e-3
+    off_edge = np.abs((stripe * 2) % 1 - 0.5) < 0.49
+    for scene in (still, moving):
+        caster = TruthCaster(scene)
+        truth = caster.frame(TOP, Shot(ABOVE, 0), ["instance", "depth", "shadow"])
+        paper = caster.names.instance.index("paper")
+        assert ((truth.instance == paper) == (stripe < 0.5))[on_paper & off_edge].all()
+        through = on_paper & off_edge & (stripe > 0.5)
+        np.testing.assert_allclose(truth.depth[through], 2.0, rtol=1e-6)
+        # The bulb, half a metre above the paper, throws its stripes on the floor twice as wide.
+        dark = ((x / 2 + 0.4) % 0.4 / 0.4 < 0.5) & (np.abs(x / 2) < 0.4) & (np.abs(y / 2) < 0.4)
+        clear = (np.abs(((x / 2 + 0.4) % 0.4 / 0.2) % 1 - 0.5) < 0.45) & (np.abs(np.abs(x / 2) - 0.4) > 0.01)
+        assert (truth.shadow > 0)[through & clear & dark].all()
+        assert not truth.shadow[through & clear & ~dark].any()
+
+
+def test_a_lamp_with_faces_to_all_sides_shines_to_all_sides_and_is_not_in_its_own_way():
+    center_m, rng = np.array([1.0, 2.0, 3.0]), np.random.default_rng(0)
+    points_m = (center_m + 2 * unit(rng.normal(size=(50, 3)))).astype(np.float32)
+    ball, panel = (
+        lamp_of(mesh.corners_m) for mesh in (icosphere(center_m, 0.5, splits=1), sides(center_m, (1, 1, 0))[4])
+    )
+    for lamp, stops_m, half in ((ball, 1.5, False), (panel, 2.0, True)):
+        way = lamp.way(points_m)
+        np.testing.assert_allclose(lamp.center_m, center_m, atol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(way, axis=1), stops_m, rtol=1e-5)
+        assert (np.broadcast_to(lamp.shines(way), 50) == (points_m[:, 2] > 3 if half else True)).all()
+
+
+def test_things_far_from_the_origin_throw_no_shadow_on_themselves():
+    floor = sheet("floor", [300.0, -200.0, 0], [40.0, 0, 0], [0, 40.0, 0])
+    ball = Thing("ball", icosphere([300.0, -200.0, 1.0], 1.0, splits=3), "matt")
+    sun = Sun("sun", 1e5, (0.0,), (0.0,), (60.0,))
+    caster = TruthCaster(Scene("far", (), MATERIALS, (sun,), (), (floor, ball)))
+    above = se3.transform(np.diag([1.0, -1.0, -1.0]), [300.0, -200.0, 8.0])
+    truth = caster.frame(Pinhole(201, 201, 200.0, 200.0, 100.0, 100.0), Shot(above, 0), ["instance", "shadow"])
+    on_ball = truth.instance == caster.names.instance.index("ball")
+    assert 0.01 < (truth.shadow[~on_ball] > 0).mean() < 0.2
+    assert not truth.shadow[on_ball].any()

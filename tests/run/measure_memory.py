@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vobench.render import raster
-from vobench.run.task import estimate_task, perform, sequence_tasks
+from vobench.run.task import estimate_task, estimator_code, perform, sequence_tasks
 from vobench.sequence import Sequence
 from vobench.suite.suite import read_plan
 
@@ -21,7 +21,7 @@ class Plain:
     def __init__(self, baked: object) -> None:
         pass
 
-    def radiance(self, camera: Any, views: Any) -> Any:
+    def radiance(self, camera: Any, views: Any, **_: Any) -> Any:
         x_m = views[0].T_world_camera[0, 0, 3]
         slope = np.linspace(5, 45, camera.width_px, dtype=np.float32) + np.float32(20 * x_m)
         return np.repeat(slope[None], camera.height_px, 0)
@@ -50,5 +50,5 @@ for suite in sys.argv[2:]:
     simulating = peak_mb()
     forget_peak()
     for trial in plan.trials(case):
-        perform(estimate_task(trial, task.key), store)
+        perform(estimate_task(trial, task.key, estimator_code(trial.entrant)), store)
     print(len(Sequence.open(sequence)), simulating, peak_mb())

@@ -109,3 +109,28 @@ def test_the_code_of_a_module_is_read_once_in_a_process(monkeypatch):
     digest = code_digest(*ENTRIES["score"])
     monkeypatch.setattr(key, "closure", None)
     assert code_digest(*ENTRIES["score"]) == digest
+
+
+@pytest.mark.parametrize("broken", [None, b"", b"{", b'{"digest": 1, "imports": []}', b"\0" * 100])
+def test_what_is_kept_of_modules_spares_time_and_changes_nothing(tmp_path, monkeypatch, broken):
+    compiled, read = key._compiled, []
+    monkeypatch.setattr(key, "_compiled", lambda source: read.append(source) or compiled(source))
+
+    def anew(cache: Path) -> set[str]:
+        monkeypatch.setenv("VOBENCH_CACHE", str(cache))
+        for each in (key._module, code_digest):
+            each.cache_clear()
+        read.clear()
+        return {code_digest(*ENTRIES["score"])}
+
+    digest = anew(tmp_path / "cache")
+    assert read
+    assert anew(tmp_path / "cache") == digest
+    assert not read
+    kept = list((tmp_path / "cache" / "modules").iterdir())
+    for path in kept:
+        path.unlink() if broken is None else path.write_bytes(broken)
+    assert anew(tmp_path / "cache") == digest
+    assert len(read) == len(kept)
+    (tmp_path / "file").touch()
+    assert anew(tmp_path / "file") == digest

@@ -236,18 +236,16 @@ def test_a_camera_inside_the_furniture_is_refused_with_place_and_time(at_height,
     with pytest.raises(SuiteError) as refused:
         body_motions(at_height(0.4))
     said = str(refused.value)
-    assert said.startswith(
-        f"{tmp_path / 'boxed.yaml'}:5: trajectories.desk: a camera of rig 'down' is inside the box of"
-    )
-    assert "wood at (3.2, -1.5, 0.4) m of scene 'room' after" in said
+    place = f"{tmp_path / 'boxed.yaml'}:5: trajectories.desk"
+    assert said.startswith(f"{place}: a camera of rig 'down' runs into 'desk' of scene 'room' after")
 
 
 def test_a_camera_inside_a_mover_is_refused_with_place_and_time(at_height, tmp_path):
     plan = at_height(0.9)
     keys = tuple(PathKey(t_s=t, position_m=(4.0 - 2 * t, -1.5, 1.2)) for t in (0, 1))
-    cart = MoverSpec(name="cart", size_m=(0.4, 0.4, 0.8), material="wood", path=keys, repeats=True)
+    cart = MoverSpec(name="cart", size_m=(0.4, 0.4, 0.8), material="brick", path=keys, repeats=True)
     scene = replace(plan.simulated[0].scene, movers=(cart,))
-    with pytest.raises(SuiteError, match=r"a camera of rig 'down' is inside the mover 'cart' of scene 'room' after"):
+    with pytest.raises(SuiteError, match=r"a camera of rig 'down' runs into 'cart' of scene 'room' after"):
         body_motions(replace(plan, simulated=(replace(plan.simulated[0], scene=scene),)))
 
 

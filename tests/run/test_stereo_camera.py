@@ -11,6 +11,7 @@ from vobench.geometry.camera import Camera
 from vobench.render.renderer import Radiance, View
 from vobench.run.motion import body_motion
 from vobench.run.stereo_camera import Displacement, StereoCamera, World
+from vobench.scene.material import LUMINANCE, Rgb
 from vobench.suite.suite import Case, read_plan
 
 WHITE_CD_M2 = 50
@@ -36,8 +37,9 @@ class Recorder:
     def __init__(self, luminance_cd_m2: float = WHITE_CD_M2) -> None:
         self.luminance_cd_m2, self.asked = luminance_cd_m2, list[Sequence[View]]()
 
-    def radiance(self, camera: Camera, views: Sequence[View]) -> Radiance:
+    def radiance(self, camera: Camera, views: Sequence[View], *, weights: Rgb | None = None) -> Radiance:
         self.asked.append(views)
+        assert weights == LUMINANCE
         return np.full((camera.height_px, camera.width_px), self.luminance_cd_m2, np.float32)
 
     def close(self) -> None:

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vobench.run.key import canonical, digest, folder_digest
-from vobench.run.store import PREFIX, Store, default_store
+from vobench.run.key import cache_folder, canonical, digest, folder_digest
+from vobench.run.store import PREFIX, Store
 
 Json = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -130,4 +130,4 @@ def test_where_the_cache_lies(monkeypatch, variables, root):
         monkeypatch.delenv(name, raising=False)
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
-    assert os.fspath(default_store().root) == root
+    assert os.fspath(cache_folder()) == root

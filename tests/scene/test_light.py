@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from vobench.asset.shape import at, block, cushion
 from vobench.geometry.se3 import Array
 from vobench.scene.light import (
     NS_PER_S,
@@ -20,7 +21,8 @@ from vobench.scene.light import (
     Switched,
     scaled,
 )
-from vobench.scene.surface import rectangle
+from vobench.scene.mesh import Mesh, area_m2, face_normals, quad
+from vobench.scene.scene import ceiling_light
 
 LEVELS: dict[str, Level] = {
     "steady": Steady(0.7),
@@ -100,13 +102,35 @@ def test_a_spots_light_falls_in_a_straight_line_between_its_two_angles() -> None
     np.testing.assert_allclose(spot.intensity_cd(towards) / spot.peak_cd, [1, 0.75, 0.5, 0.25, 0], atol=1e-9)
 
 
-def test_a_panel_and_a_bulb_send_out_their_power() -> None:
-    panel = AreaLight("p", rectangle(np.zeros(3), np.array([2.0, 0, 0]), np.array([0, 0.5, 0]), "p"), 900.0)
-    directions = sphere(100_000)
-    cosine = np.maximum(directions @ panel.surface.normal, 0)
-    assert (panel.luminance_cd_m2 * cosine * 1.0).mean() * 4 * np.pi == pytest.approx(900, rel=1e-3)
+SHAPES = {
+    "panel": quad((0, 0, 0), (2.0, 0, 0), (0, 0.5, 0)),
+    "bevelled block": block((0.3, 0.2, 0.1), bevel_m=0.02).moved(at(1, 2, 3, yaw=20)),
+    "ball": cushion((0.3, 0.3, 0.3), power=2, cells=4),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES.values(), ids=list(SHAPES))
+def test_a_lamps_luminance_over_its_area_and_half_space_is_its_power(shape: Mesh) -> None:
+    lamp, directions = AreaLight("lamp", shape, 900.0), sphere(20_000)
+    a, b, c = np.moveaxis(shape.corners_m, 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    cosines = np.maximum(directions @ face_normals(shape.corners_m).T, 0)
+    assert lamp.luminance_cd_m2 * (cosines @ area).mean() * 4 * np.pi == pytest.approx(900, rel=1e-3)
+
+
+@pytest.mark.parametrize("size_m", [(0.6, 0.6), (1.2, 0.1)])
+def test_a_ceiling_light_shines_down_from_where_it_hangs(size_m: tuple[float, float]) -> None:
+    lamp = ceiling_light("lamp", np.array([0.3, -0.2, 2.9]), size_m, power_lm=4000)
+    np.testing.assert_allclose(lamp.mesh.vertices_m.mean(0), [0.3, -0.2, 2.9])
+    np.testing.assert_allclose(np.ptp(lamp.mesh.vertices_m, axis=0), [*size_m, 0])
+    np.testing.assert_allclose(face_normals(lamp.mesh.corners_m), [[0, 0, -1]] * 2)
+    assert lamp.luminance_cd_m2 == pytest.approx(4000 / (np.pi * np.prod(size_m)))
+    assert area_m2(lamp.mesh.corners_m) == pytest.approx(np.prod(size_m))
+
+
+def test_a_bulb_sends_out_its_power() -> None:
     bulb = PointLight("b", np.zeros(3), 900.0)
-    assert bulb.intensity_cd(directions).mean() * 4 * np.pi == pytest.approx(900)
+    assert bulb.intensity_cd(sphere(1000)).mean() * 4 * np.pi == pytest.approx(900)
 
 
 @pytest.mark.parametrize("kind", SKIES)

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, DoubleSphere, Equirectangular, KannalaBrandt, Pinhole
-from vobench.geometry.rectify import rectification
-from vobench.geometry.rig import PRESETS, mounted, stereo_rig
+from vobench.geometry.rig import PRESETS, mounted, rectification, stereo_rig
 from vobench.sequence import messages as ros
 from vobench.sequence.messages import picture_in, pictured, serialise, stamped
 
@@ -23,7 +22,8 @@ STAMPS = st.integers(0, 2**31 * 10**9 - 1)
 def test_a_picture_in_a_template_is_the_message_and_comes_out_as_it_went_in(t_ns, encoded, form, frame):
     made = pictured(serialise(ros.image(0, frame, b"", form)), t_ns, encoded)
     assert made == serialise(ros.image(t_ns, frame, encoded, form))
-    found_ns, found_form, found = picture_in(memoryview(made))
+    found_ns, found_form, colour, found = picture_in(memoryview(made))
+    assert colour == "mono8"
     assert (found_ns, found_form, bytes(found)) == (t_ns, form, encoded)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from vobench.errors import SequenceError
 from vobench.geometry.camera import Pinhole
-from vobench.sequence.picture import decode, encode, require_grey
+from vobench.sequence.picture import BAYER, MONO, RGB, decode, encode, grey, require_picture, rgb
 
 CAMERA = Pinhole(48, 32, 40.5, 41.25, 23.5, 15.5)
 HUFFMAN_TABLES, START_OF_SCAN = 0xC4, 0xDA
@@ -29,13 +29,13 @@ def coded(end, picture, *options):
     ],
 )
 def test_form_and_size_are_in_the_header(form, options):
-    assert require_grey(coded(f".{form}", GREY, *options), CAMERA, "a") == (form, 32, 48)
+    assert require_picture(coded(f".{form}", GREY, *options), CAMERA, "a") == (form, 32, 48)
 
 
 @pytest.mark.parametrize("form", [".png", ".jpeg"])
 def test_colour_is_refused(form):
     with pytest.raises(SequenceError, match=r"^not an 8-bit grey PNG or JPEG: a$"):
-        require_grey(coded(form, np.dstack([GREY] * 3)), CAMERA, "a")
+        require_picture(coded(form, np.dstack([GREY] * 3)), CAMERA, "a")
 
 
 def test_sixteen_bits_text_and_nothing_are_refused():
@@ -52,7 +52,7 @@ def test_another_size_is_refused_with_both():
 @pytest.mark.parametrize("form", [".png", ".jpeg"])
 def test_a_picture_cut_within_its_header_is_refused(form):
     with pytest.raises(SequenceError, match=r"the picture ends within its header: a"):
-        require_grey(coded(form, GREY)[:20], CAMERA, "a")
+        require_picture(coded(form, GREY)[:20], CAMERA, "a")
 
 
 def test_a_header_that_states_a_billion_pixels_costs_nothing():
@@ -78,5 +78,33 @@ def test_the_size_is_found_behind_the_tables_that_some_write_before_it():
     segments.sort(key=lambda segment: segment[1] != HUFFMAN_TABLES)
     assert segments[0][1] == HUFFMAN_TABLES
     moved = b"".join((whole[:2], *segments, whole[at:]))
-    assert require_grey(moved, CAMERA, "a") == ("jpeg", 32, 48)
+    assert require_picture(moved, CAMERA, "a") == ("jpeg", 32, 48)
     np.testing.assert_array_equal(decode(moved, CAMERA, "a"), decode(whole, CAMERA, "a"))
+
+
+def test_a_colour_picture_comes_back_as_it_went_in_and_its_file_begins_with_red() -> None:
+    image = np.zeros((CAMERA.height_px, CAMERA.width_px, 3), np.uint8)
+    image[..., 0], image[:, ::2, 2] = 200, 90
+    encoded = encode(image, CAMERA, "a", colour=RGB)
+    np.testing.assert_array_equal(decode(encoded, CAMERA, "a", colour=RGB), image)
+    np.testing.assert_array_equal(cv2.imdecode(np.frombuffer(encoded, np.uint8), cv2.IMREAD_COLOR)[..., 2], 200)
+    with pytest.raises(SequenceError, match="not an 8-bit grey PNG"):
+        decode(encoded, CAMERA, "a")
+    with pytest.raises(SequenceError, match="takes"):
+        encode(image, CAMERA, "a")
+
+
+@pytest.mark.parametrize("colour", [MONO, RGB, BAYER])
+def test_white_is_grey_and_rgb_alike_in_every_form(colour: str) -> None:
+    shape = (8, 8, 3) if colour == RGB else (8, 8)
+    image = np.full(shape, 120, np.uint8)
+    np.testing.assert_array_equal(grey(image, colour), np.full((8, 8), 120))
+    np.testing.assert_array_equal(rgb(image, colour), np.full((8, 8, 3), 120))
+
+
+def test_a_mosaic_begins_with_red() -> None:
+    raw = np.zeros((8, 8), np.uint8)
+    raw[::2, ::2] = 200
+    red, green, blue = rgb(raw, BAYER)[2:6, 2:6].reshape(-1, 3).mean(0).tolist()
+    assert red > 150
+    assert max(green, blue) == 0

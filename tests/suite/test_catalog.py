@@ -46,7 +46,7 @@ def test_the_first_stop_of_the_search_order_wins_and_the_rest_are_still_listed(h
     first, second = tmp_path / "first", tmp_path / "second"
     monkeypatch.setenv("VOBENCH_PATH", f"{first}:{second}")
     expected = [put(root, "scene", "room") for root in (here, first, second)]
-    expected += [installed, catalog.builtin_root() / "scenes" / "room.yaml"]
+    expected += [installed, catalog.builtin_root() / "scenes" / "room" / "scene.yaml"]
     found = [entry for entry in catalog.entries("scene") if entry.name == "room"]
     assert [entry.path for entry in found] == expected
     assert [entry.origin for entry in found] == [

@@ -7,9 +7,11 @@ import pytest
 
 from vobench.errors import SuiteError
 from vobench.scene.light import AreaLight, Flicker, PointLight, Sky, SpotLight, Steady, Sun
-from vobench.scene.material import Glass, Matt, Mirror, Polished
+from vobench.scene.material import LUMINANCE
+from vobench.scene.mesh import Mesh, joined
 from vobench.scene.scene import Scene
-from vobench.suite.scene_file import build, read_scene
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import read_scene
 from vobench.suite.scene_spec import LevelSpec, LightOverride
 
 # ruff: noqa: E501 - tables of sentences are easier to read a line each
@@ -54,22 +56,33 @@ def hall(tmp_path: Path):
     return bent
 
 
-def named(scene: Scene, name: str) -> list[np.ndarray]:
-    """Middles of the surfaces of one thing."""
-    return [s.at(np.array(0.5), np.array(0.5)) for s in scene.surfaces if s.instance == name]
+def of_material(scene: Scene, material: str) -> Mesh:
+    """All that has a material."""
+    return joined([thing.mesh for thing in scene.things if thing.material == material])
 
 
 def test_materials_are_of_the_kind_they_say(hall):
     materials = hall().materials
-    assert [type(materials[name]) for name in ("grain", "stone", "steel", "pane")] == [Matt, Polished, Mirror, Glass]
+    kinds = [materials[name].kind for name in ("grain", "stone", "steel", "pane")]
+    assert kinds == ["body", "body", "mirror", "pane"]
+    assert [materials[name].is_coated for name in ("grain", "stone")] == [False, True]
     assert (materials["stone"].eta, materials["stone"].roughness, materials["steel"].tint) == (1.4, 0.1, 0.6)
 
 
-def test_lights_are_of_the_kind_they_say_and_a_luminous_thing_is_a_light_on_each_side(hall):
+def test_lights_are_of_the_kind_they_say_and_a_luminous_thing_is_one(hall):
     lights = hall().lights
-    assert [type(light) for light in lights] == [AreaLight, PointLight, SpotLight, Sun, Sky, *[AreaLight] * 6]
-    assert [light.name for light in lights[5:]] == ["box_1", *(f"box_1.{n}" for n in range(1, 6))]
-    assert [light.luminance_cd_m2 for light in lights[5:]] == pytest.approx([100] * 6)
+    assert [type(light) for light in lights] == [AreaLight, PointLight, SpotLight, Sun, Sky, AreaLight]
+    assert lights[5].name == "box_1"
+    assert lights[5].luminance_cd_m2 == pytest.approx(100)
+    assert lights[5].power_lm == pytest.approx(100 * np.pi * 6 * 0.1**2)
+
+
+def test_coloured_light_has_the_power_it_is_said_to_have(hall):
+    scene = hall("power_lm: 500", "power_lm: 500, colour: [1, 0.5, 0.25]")
+    (bulb,) = (light for light in scene.lights if light.name == "bulb")
+    assert np.array(bulb.colour) @ LUMINANCE == pytest.approx(1)
+    assert bulb.colour[1] / bulb.colour[0] == pytest.approx(0.5)
+    assert bulb.power_lm == 500
 
 
 def test_a_spot_points_at_its_target_and_the_sun_where_its_angles_say(hall):
@@ -84,25 +97,24 @@ def test_a_spot_points_at_its_target_and_the_sun_where_its_angles_say(hall):
 )
 def test_a_window_is_in_its_wall_at_its_place_along_the_world_axis(hall, wall, middle):
     scene = hall("wall: north", f"wall: {wall}")
-    (pane,) = (s for s in scene.surfaces if s.material == "pane")
-    np.testing.assert_allclose(pane.at(np.array(0.5), np.array(0.5)), middle, atol=1e-12)
-    assert sorted(pane.size_m) == pytest.approx([0.8, 1.0])
-    upright = pane.edge_u_m if abs(pane.edge_u_m[2]) > 0 else pane.edge_v_m
-    assert np.linalg.norm(upright) == pytest.approx(0.8)
+    pane = of_material(scene, "pane").vertices_m
+    np.testing.assert_allclose(pane.mean(0), middle, atol=1e-9)
+    assert np.ptp(pane, axis=0)[2] == pytest.approx(0.8)
+    assert np.ptp(pane, axis=0)[:2].max() == pytest.approx(1.0)
 
 
 def test_boards_stand_upright_and_look_where_they_face(hall):
     for yaw_deg, normal in ((0, [1, 0, 0]), (90, [0, 1, 0]), (-90, [0, -1, 0])):
         scene = hall("size_m: [1, 2], material: steel", f"size_m: [1, 2], yaw_deg: {yaw_deg}, material: steel")
-        (board,) = (s for s in scene.surfaces if s.instance == "looking_glass")
-        np.testing.assert_allclose(board.normal, normal, atol=1e-12)
-        assert abs(board.edge_v_m[2]) == 2
+        (board,) = (thing.mesh for thing in scene.things if thing.name == "looking_glass")
+        np.testing.assert_allclose(board.normals, [normal] * len(board.normals), atol=1e-9)
+        np.testing.assert_allclose(sorted(np.ptp(board.vertices_m, axis=0)), [0, 1, 2], atol=1e-9)
 
 
 def test_movers_go_with_their_path(hall):
     (cart,) = hall().movers
     np.testing.assert_allclose(cart.path.pose(1e9)[:3, 3], [0.5, 0, 0.3])
-    assert len(cart.surfaces) == 6
+    assert sum(len(thing.mesh.faces) for thing in cart.things) == 12
 
 
 def test_a_lighting_changes_levels_and_leaves_the_light_itself_alone(hall):
@@ -150,7 +162,7 @@ WRONG = [
     ("target_m: [2, -1, 0], ", "target_m: [2, -1, 2], ", ":20: lamps.2.target_m: should differ from center_m (got [2.0, -1.0, 2.0] for both)"),
     ("kind: point", "kind: point, size_m: [1, 1]", ":19: lamps.1.size_m: belongs to panel; this is point"),
     ("center_m: [1, 1.5], size_m: [1, 0.8]", "center_m: [2.8, 1.5], size_m: [1, 0.8]", ":14: room.windows.0: the window reaches beyond its wall, which is 6 m long around 0 and 3 m high: center_m [2.8, 1.5], size_m [1.0, 0.8]"),
-    ("pane: pane, reveal", "pane: pain, reveal", ":14: room.windows.0.pane: no material named 'pain'. Did you mean 'pane'? Known: glow, grain, pane, steel, stone"),
+    ("pane: pane, reveal", "pane: pain, reveal", ":14: room.windows.0.pane: no material named 'pain'. Did you mean 'paint'? Known: brick, carpet, ceiling_tiles, concrete, glow, grain, mirror, oak_floor, paint, pane, paving, sage_plaster, steel, stone, terrazzo, white_plaster"),
     ("name: crate", "name: cart", ":24: movers.0: two things are called 'cart'; give one another name"),
     ("{name: bulb", "{name: sky", ":19: lamps.1: two things are called 'sky'; give one another name"),
     ("name: crate", "name: window_0", ":15: boxes.0: two things are called 'window_0'; give one another name"),
@@ -177,7 +189,7 @@ def test_a_wrong_scene_gets_one_line_with_file_line_key_and_remedy(hall, tmp_pat
 
 def test_windows_may_touch(hall):
     beside = "{wall: north, center_m: [2, 1.5], size_m: [1, 0.8], pane: pane, reveal: grain}]"
-    assert sum(s.material == "pane" for s in hall("reveal: grain}]", f"reveal: grain}}, {beside}").surfaces) == 2
+    assert len(of_material(hall("reveal: grain}]", f"reveal: grain}}, {beside}"), "pane").faces) == 4
 
 
 @pytest.mark.parametrize(("light", "zero"), [("", ""), ("sky: {illuminance_lx: 0}\n", "; all that it has are 0")])
@@ -190,6 +202,7 @@ def test_a_scene_without_any_light_is_refused(tmp_path, light, zero):
 
 @pytest.mark.parametrize("name", ["room", "office"])
 def test_our_own_scenes_are_valid(name):
-    path = Path(__file__).parents[2] / "scenes" / f"{name}.yaml"
+    path = Path(__file__).parents[2] / "scenes" / name / "scene.yaml"
     scene = build(read_scene(path), {})
-    assert {s.material for s in scene.surfaces} <= set(scene.materials)
+    assert {thing.material for thing in scene.things} <= set(scene.materials)
+    assert 20_000 < sum(len(thing.mesh.faces) for thing in scene.things) < 120_000

@@ -6,7 +6,7 @@ import pytest
 
 from vobench.errors import MOST_SAID, Place, SuiteError, UnknownNameError, VobenchError
 from vobench.run.motion import body_motions
-from vobench.suite import catalog, scene_file
+from vobench.suite import catalog, scene_build, scene_file
 from vobench.suite import suite as expand
 from vobench.suite.catalog import builtin_root
 from vobench.suite.suite import AXES, read_plan
@@ -111,8 +111,7 @@ def test_what_cases_share_is_made_once_however_many_there_are(bent, monkeypatch)
     calls = []
     for module, name in (
         (scene_file, "survey"),
-        (scene_file, "build"),
-        (scene_file, "lights"),
+        (scene_build, "build"),
         (expand, "read_manifest"),
     ):
         made = getattr(module, name)
@@ -123,7 +122,7 @@ def test_what_cases_share_is_made_once_however_many_there_are(bent, monkeypatch)
     calls.clear()
     many = bent(("short: {targets_m: [[0.5, 0]]}", ways), ("clean: {sensor: clean}", cameras)), sorted(calls)
     assert (len(few[0].cases), len(many[0].cases)) == (2, 90)
-    assert few[1] == many[1] == ["build", "lights", "read_manifest", "read_manifest", "survey"]
+    assert few[1] == many[1] == ["build", "read_manifest", "read_manifest", "survey"]
 
 
 def test_merge_keys_and_aliases_keep_a_suite_short(bent):
@@ -311,7 +310,7 @@ def test_every_mistake_has_its_file_line_key_and_value_apart(bent, tmp_path):
     asking, at_fault = wall.places
     assert (asking.line, asking.key, asking.value) == (3, "scenes.0", "closet")
     assert at_fault == Place(str(tmp_path / "scenes" / "closet.yaml"), 4, key="room.wall", value="grane")
-    assert wall.sentence == "no material named 'grane'. Did you mean 'grain'? Known: grain"
+    assert wall.sentence.startswith("no material named 'grane'. Did you mean 'grain'? Known: brick, carpet,")
 
 
 def test_entries_after_a_wrong_one_keep_their_number(bent, tmp_path):
@@ -357,7 +356,7 @@ def test_a_file_that_is_no_suite_at_all_is_refused_by_name(bent, tmp_path, conte
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("wall: grain", "wall: grane", ":4: room.wall: no material named 'grane'. Did you mean 'grain'? Known: grain"),
+        ("wall: grain", "wall: grane", ":4: room.wall: no material named 'grane'. Did you mean 'grain'? Known: brick, "),
         ("albedo: 0.5", "albedo: 1", ":3: materials.grain.albedo: should be less than 1 (got 1)"),
         ("terrazzo", "tiles", ":3: materials.grain.pattern: no pattern named 'tiles'"),
         ("power_lm: 600", "power_lm: -1", ":5: lamps.0.power_lm: should be 0 or more (got -1)"),

@@ -8,7 +8,6 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import FrameType
 
 from vobench import stop
 
@@ -43,25 +42,17 @@ def _stoppable() -> Iterator[None]:
     watch.start()
     before = signal.set_wakeup_fd(hears, warn_on_full_buffer=False)
     for number in SIGNALS:
-        signal.signal(number, _request)
+        signal.signal(number, lambda number, _: stop.request(number))
     try:
         yield
     finally:
         for number in SIGNALS:  # from here on there is nothing to tidy up
-            signal.signal(number, _leave)
+            signal.signal(number, lambda number, _: os._exit(128 + number))
         signal.set_wakeup_fd(before)
         os.close(hears)
         watch.join()
         os.close(heard)
         _end_softly()
-
-
-def _request(number: int, _: FrameType | None) -> None:
-    stop.request(number)
-
-
-def _leave(number: int, _: FrameType | None) -> None:
-    os._exit(128 + number)
 
 
 def _end_softly() -> None:

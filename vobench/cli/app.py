@@ -24,8 +24,9 @@ VERBS = {
     "drive": "vobench.cli.drive:drive_command",
     "identify": "vobench.cli.identify:identify_command",
     "render": "vobench.cli.render:render_command",
+    "scene": "vobench.cli.scene:scene_command",
     "list": "vobench.cli.list:list_command",
-    "schema": "vobench.cli.schema:schema_command",
+    "schema": "vobench.cli.run:schema_command",
     "score": "vobench.cli.score:score_command",
     "diagnose": "vobench.cli.score:diagnose_command",
     "metrics": "vobench.cli.score:metrics_command",
@@ -34,7 +35,7 @@ VERBS = {
     "info": "vobench.cli.sequence:info_command",
     "verify": "vobench.cli.report:verify_command",
     "report": "vobench.cli.report:report_command",
-    "view": "vobench.cli.view:view_command",
+    "view": "vobench.cli.report:view_command",
     "doctor": "vobench.cli.doctor:doctor_command",
 }
 GROUP = "vobench.commands"

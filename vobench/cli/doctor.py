@@ -16,7 +16,8 @@ from vobench.cli import terminal
 from vobench.errors import MissingDependencyError
 from vobench.render import mitsuba
 from vobench.render.raster import EGL_PACKAGES, EGL_REMEDY
-from vobench.run.store import default_store, why_unwritable
+from vobench.run.key import cache_folder
+from vobench.run.store import why_unwritable
 
 PROBE = "from vobench.render import raster; raster.context()"
 
@@ -95,7 +96,7 @@ def _installed_drawing() -> Check:
 
 
 def _cache() -> Check:
-    root = default_store().root
+    root = cache_folder()
     writable = not why_unwritable(root)
     remedy = "set VOBENCH_CACHE to a folder that can be written"
     return Check("cache", writable, str(root) if writable else f"cannot write {root}", remedy)

@@ -9,7 +9,7 @@ import typer
 
 from vobench.cli import terminal
 from vobench.cli.identify import REFERENCES, RIMS
-from vobench.errors import InputError, UnknownNameError, unknown
+from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.course import Unled
@@ -68,9 +68,7 @@ def _chosen(plan: Plan, trajectory: str | None) -> list[str]:
     known = list(plan.suite.trajectories or {})
     if not known:
         raise InputError(f"suite '{plan.suite.name}' has no trajectory to drive, only recordings")
-    if trajectory is not None and trajectory not in known:
-        raise UnknownNameError(unknown("trajectory", trajectory, known))
-    return known if trajectory is None else [trajectory]
+    return known if trajectory is None else [terminal.known("trajectory", trajectory, known)]
 
 
 def _check_files(out: Path | None, exports: list[Path], names: list[str]) -> None:
@@ -87,9 +85,10 @@ def _check_files(out: Path | None, exports: list[Path], names: list[str]) -> Non
 def drive_one(plan: Plan, name: str) -> Driven:
     """One trajectory of a plan, gone. Raises SuiteError where that cannot be."""
     cases = [case for case in plan.simulated if case.variant["trajectory"] == name]
-    with plan.at("trajectories", name):
-        travel = body_motion(cases[0])
     wrong = plan.mistakes()
+    with wrong.at("trajectories", name):
+        travel = body_motion(cases[0])
+    wrong.require_none()
     check_cases(cases, travel, wrong)
     return Driven(name, cases[0], travel, travel.at_frames(), tuple(dict.fromkeys(map(str, wrong.found))))
 

@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
+from vobench.asset import MODEL_SUFFIXES
 from vobench.cli import terminal
 from vobench.errors import UnknownNameError, VobenchError, unknown
 from vobench.suite import catalog
@@ -45,6 +46,8 @@ def list_command(
 
 def _summary(entry: Entry) -> str:
     """What the file says of itself; one that is read whole and cannot be says why."""
+    if entry.path.suffix in MODEL_SUFFIXES:
+        return "a model; vobench scene looks it over"
     try:
         path = entry.path / "estimator.yaml" if entry.kind == "estimator" else entry.path
         text = path.read_text(encoding="utf-8")

@@ -1,6 +1,6 @@
 """Draw one picture of a scene: vobench render."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from vobench.cli import terminal
-from vobench.errors import InputError, SettingError, UnknownNameError, unknown
+from vobench.errors import InputError, SettingError
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import PRESETS, looking
@@ -17,8 +17,8 @@ from vobench.geometry.se3 import Array
 from vobench.render.occlusion import Shot
 from vobench.render.renderer import Radiance, still
 from vobench.render.truth import TruthCaster
+from vobench.run.key import cache_folder
 from vobench.run.simulate import open_renderer
-from vobench.run.store import default_store
 from vobench.run.task import bake_task, perform
 from vobench.scene.light import NS_PER_S
 from vobench.scene.scene import Scene
@@ -28,7 +28,8 @@ from vobench.sensor.response import Grey
 from vobench.sequence.picture import write_png
 from vobench.setting import Triple
 from vobench.suite import catalog
-from vobench.suite.scene_file import build, read_scene
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import read_scene
 from vobench.suite.suite import Rendering
 
 LATEST_S = 1e9  # stamps are 64 bits of nanoseconds
@@ -41,11 +42,7 @@ def render_command(
     *,
     out: Annotated[Path, typer.Option(help="The picture to write.")] = Path("frame.png"),
     camera: Annotated[str, typer.Option(help="The left lens of this rig preset.")] = "paper_blender",
-    at: Annotated[Triple, typer.Option(metavar="X Y Z", help="Where it stands, in metres.")] = (
-        0.0,
-        0.0,
-        1.2,
-    ),
+    at: Annotated[Triple, typer.Option(metavar="X Y Z", help="Where it stands, in metres.")] = (0.0, 0.0, 1.2),
     yaw: Annotated[float, typer.Option(help="Where it looks, in degrees: 0 along x, 90 along y.")] = 0.0,
     pitch: Annotated[float, typer.Option(help="How far below the horizon it looks, in degrees.")] = 10.0,
     time: Annotated[float, typer.Option(help="When, in seconds; lights and things may move.")] = 0.0,
@@ -57,19 +54,19 @@ def render_command(
     json: terminal.Json = False,
 ) -> None:
     """Draw one picture of a scene, to look at and to debug scenes with."""
-    rendering, lens = _rendering(engine, samples), PRESETS[_known("camera", camera, PRESETS)].left
-    chip = CameraSettings(chip=CAMERAS[_known("camera sensor", sensor, CAMERAS)], exposure_gain=gain)
+    rendering, lens = _rendering(engine, samples), PRESETS[terminal.known("camera", camera, PRESETS)].left
+    chip = CameraSettings(chip=CAMERAS[terminal.known("camera sensor", sensor, CAMERAS)], exposure_gain=gain)
     T_world_camera, t_ns = _pose(at, yaw, pitch, time)
     if out.suffix != ".png" or out.is_dir() or not out.parent.is_dir():
         raise InputError(f"--out should be a .png in a folder that exists, got {out}")
     spec = read_scene(catalog.find("scene", scene).path)
-    if not spec.room.holds(at):
+    if spec.room and not spec.room.holds(at):
         raise InputError(f"--at should be inside the room ({spec.room.extent}), got {at}")
     built, is_traced = build(spec, {}), rendering.engine == "path"
-    light = None if is_traced else perform(bake_task(spec), default_store().root, progress=terminal.Bars())
+    light = None if is_traced else perform(bake_task(spec), cache_folder(), progress=terminal.Bars())
     with closing(open_renderer(built, rendering, light)) as renderer:
-        luminance_cd_m2 = renderer.radiance(lens, still(lens, T_world_camera, t_ns=t_ns))
-    write_png(out, _exposed(luminance_cd_m2 / np.float32(spec.white_cd_m2), chip))
+        radiance = renderer.radiance(lens, still(lens, T_world_camera, t_ns=t_ns), weights=None)
+    write_png(out, _exposed(radiance / np.float32(spec.white_cd_m2), chip))
     written = [
         str(path) for path in (out, *(_write_truth(out, built, lens, Shot(T_world_camera, t_ns)) if truth else []))
     ]
@@ -98,17 +95,13 @@ def _pose(at_m: Triple, yaw_deg: float, pitch_deg: float, t_s: float) -> tuple[A
     return turned @ looking(pitch_deg=pitch_deg, position_m=(0.0, 0.0, 0.0)), round(t_s * NS_PER_S)
 
 
-def _known(kind: str, name: str, known: Iterable[str]) -> str:
-    """The name, where it is known. Raises UnknownNameError where it is not."""
-    if name not in known:
-        raise UnknownNameError(unknown(kind, name, list(known)))
-    return name
-
-
 def _exposed(radiance: Radiance, camera: CameraSettings) -> Grey:
+    """Red, green and blue (H, W, 3), each on a chip of its own behind a prism."""
     pattern, shot, read = np.random.default_rng(0).spawn(3)
-    shape = (radiance.shape[0], radiance.shape[1])
-    return expose(radiance, camera, NoiseStreams(shot, read), pattern=fixed_pattern(shape, camera.chip, pattern))
+    noise, shape = NoiseStreams(shot, read), (radiance.shape[0], radiance.shape[1])
+    chips = [fixed_pattern(shape, camera.chip, own) for own in pattern.spawn(3)]
+    channels = zip(np.moveaxis(radiance, -1, 0), chips, strict=True)
+    return np.stack([expose(channel, camera, noise, pattern=chip) for channel, chip in channels], -1)
 
 
 def _write_truth(out: Path, scene: Scene, camera: Camera, shot: Shot) -> Iterator[Path]:

@@ -1,19 +1,28 @@
-"""vobench report and verify."""
+"""vobench report, verify and view, and leaderboards on a terminal, as many columns as fit."""
 
+import os
+import subprocess
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.measure import Measurement
+from rich.table import Table
 
 from vobench.cli import terminal
-from vobench.cli.boards import print_boards
-from vobench.errors import UnknownNameError, unknown
-from vobench.report import page
-from vobench.report.leaderboard import FORMATS
+from vobench.errors import InputError, MissingDependencyError, UnknownNameError
+from vobench.report import page, save_trial
+from vobench.report.leaderboard import FORMATS, LEGEND, Board, lines_of, notes
+from vobench.report.rerun import pick, trial_view
 from vobench.run.folder import open_run
 from vobench.run.verify import verify_run
 
+# A narrow terminal goes without these, in this order; every report has them all.
+LEAST_FIRST = ("RPE °/frame", "RPE mm/frame", "CPU ms/frame", "segments %", "survived", "coverage", "#")
+ENDLESS = 10_000
 TERMINAL = "terminal"
 FORMS = (*FORMATS, "html")
 ENDINGS = {".tex": "latex", ".htm": "html", **{f".{form}": form for form in FORMS}}
@@ -53,10 +62,7 @@ def _chosen(form: str | None, out: Path | None, *, as_json: bool) -> str:
         raise UnknownNameError(f"no format goes with '{out.name}'; name one with --format: {', '.join(FORMS)}")
     if form is None:
         form = ENDINGS[out.suffix.lower()] if out else TERMINAL
-    known = FORMS if out else (TERMINAL, *FORMS)
-    if form not in known:
-        raise UnknownNameError(unknown("format", form, list(known)))
-    return form
+    return terminal.known("format", form, FORMS if out else (TERMINAL, *FORMS))
 
 
 def verify_command(run: terminal.RunPath, *, json: terminal.Json = False) -> None:
@@ -75,3 +81,63 @@ def verify_command(run: terminal.RunPath, *, json: terminal.Json = False) -> Non
         out.print(f"{kind}: {sum(not f.wrong for f in of_kind)} of {len(of_kind)} as they were")
     if wrong:
         raise SystemExit(1)
+
+
+def print_boards(boards: list[Board]) -> None:
+    """The leaderboards, and what their numbers don't say."""
+    out = terminal.console()
+    for board in boards:
+        out.print(_fitting(board, out))
+        for row in board.rows:
+            for note in notes(row):
+                out.print(f"  {note}", style="red" if row.reason and note == notes(row)[0] else None)
+    out.print(LEGEND, style="dim")
+
+
+def _fitting(board: Board, out: Console) -> Table:
+    """A board without the columns that matter least, where the terminal is too narrow for all of them."""
+    endless, lines = out.options.update(max_width=ENDLESS), lines_of(board)
+    for left_out in range(len(LEAST_FIRST) + 1):
+        kept = [i for i, heading in enumerate(lines[0]) if heading not in LEAST_FIRST[:left_out]]
+        headings, *rows = [[cells[i] for i in kept] for cells in lines]
+        made = terminal.table(board.title, headings, rows)
+        if Measurement.get(out, endless, made).maximum <= out.width:
+            break
+    return made
+
+
+def _open(path: Path) -> None:
+    """Hand the file to Rerun's viewer, which needs a display."""
+    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise MissingDependencyError(f"no display to open the viewer on; on a machine that has one, run: rerun {path}")
+    # Without -P, a rerun.py in the working folder would be run in its place.
+    subprocess.Popen([sys.executable, "-P", "-m", "rerun", str(path)], start_new_session=True)
+
+
+def view_command(
+    run: terminal.RunPath,
+    *,
+    case: Annotated[
+        str | None, typer.Option(help="The case; the gravest failure or the worst error where left out.")
+    ] = None,
+    estimator: Annotated[
+        str | None, typer.Option(help="The estimator; a failed one where left out, else the best.")
+    ] = None,
+    save: Annotated[Path | None, typer.Option(help="Write this .rrd instead of opening the viewer.")] = None,
+    json: terminal.Json = False,
+) -> None:
+    """Open one run in Rerun, failures first."""
+    folder = open_run(run)
+    chosen = pick(folder.scores(), case=case, estimator=estimator)
+    path = save or folder.estimate(chosen.case, chosen.estimator, chosen.repeat) / "run.rrd"
+    if path.is_dir() or not os.access(path.parent, os.W_OK):
+        wrong = "is a folder" if path.is_dir() else "is in a folder that cannot be written"
+        raise InputError(f"--save should be a file to write, but this {wrong}: {path}")
+    save_trial(path, trial_view(folder, chosen))
+    if json:
+        named = {"case": chosen.case, "estimator": chosen.estimator, "repeat": chosen.repeat}
+        terminal.print_json({**named, "path": str(path)})
+        return
+    print(f"{chosen.estimator} on {chosen.case} ({chosen.status}): {path}")
+    if save is None:
+        _open(path)

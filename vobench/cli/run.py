@@ -1,4 +1,4 @@
-"""vobench run and check."""
+"""vobench run, check and schema."""
 
 import shutil
 import sys
@@ -10,11 +10,15 @@ import typer
 
 from vobench.cli import terminal
 from vobench.errors import InputError
+from vobench.run.key import cache_folder
 from vobench.run.motion import BodyMotion, body_motions
-from vobench.run.store import default_store, why_unwritable
+from vobench.run.store import why_unwritable
 from vobench.run.task import is_done, sequence_tasks
+from vobench.suite.manifest import Manifest
+from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import RecordedCase
-from vobench.suite.suite import Case, Plan, read_plan
+from vobench.suite.suite import Case, Plan, Suite, read_plan
+from vobench.suite.yaml_file import json_schema
 
 if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
@@ -35,14 +39,14 @@ def run_command(
     if dry_run:
         _check(suite, names, as_json=json)
         return
-    from vobench.cli.boards import print_boards
+    from vobench.cli.report import print_boards
     from vobench.report import page
     from vobench.report.leaderboard import as_json as boards_as_json
     from vobench.run.run import run_suite
 
     planned = read_plan(suite, only_estimators=names)
     _, recordings = _preflight(planned)
-    store = default_store().root
+    store = cache_folder()
     for what, place in (("--out", out), ("VOBENCH_CACHE", store)):
         if cause := why_unwritable(place):
             raise InputError(f"{what} should be a folder that can be written ({cause}): {place}")
@@ -108,7 +112,7 @@ def _facts(
     case: Case | RecordedCase, travels: Mapping[str, BodyMotion], recordings: "Mapping[str, Recording]"
 ) -> dict[str, Any]:
     """What is known of a case before it is made; a recording's pictures are not read yet."""
-    is_there = is_done(sequence_tasks(case, recordings)[-1], default_store().root)
+    is_there = is_done(sequence_tasks(case, recordings)[-1], cache_folder())
     notes = dict[str, list[str]]()
     if isinstance(case, RecordedCase):
         recording, to_make = recordings[case.name], f"to import from {case.source.path}"
@@ -123,3 +127,17 @@ def _facts(
         "sequence": "in the cache" if is_there else to_make,
         **notes,
     }
+
+
+FILES = {"suite": Suite, "scene": SceneFile, "estimator": Manifest}
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def schema_command(
+    kind: Annotated[str, typer.Argument(metavar="[suite|scene|estimator]", help="Of which kind of file.")] = "suite",
+    *,
+    json: Annotated[bool, typer.Option("--json", help="It is JSON in any case.")] = False,
+) -> None:
+    """Print the JSON Schema of a suite's, scene's or estimator's YAML, for editors and other programs."""
+    del json
+    terminal.print_json({"$schema": DIALECT, **json_schema(FILES[terminal.known("schema", kind, FILES)])})

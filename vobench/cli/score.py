@@ -28,8 +28,7 @@ GROUP = "vobench.metrics"  # of entry points, each a MetricDefinition
 
 Gt = Annotated[Path, typer.Argument(metavar="GT", help="Ground truth: a file of any form, or a sequence's folder.")]
 Est = Annotated[
-    Path,
-    typer.Argument(metavar="EST", help="Estimate: TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, by content."),
+    Path, typer.Argument(metavar="EST", help="Estimate: TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, by content.")
 ]
 Topic = Annotated[str | None, typer.Option(help="The topic with the poses, or /tf:parent.child.")]
 As = Annotated[
@@ -202,8 +201,7 @@ def score_command(
         Path | None, typer.Option("--list", help="A file with GT and EST on each line, besides those given here.")
     ] = None,
     like: Annotated[
-        str | None,
-        typer.Option(help="Set what evo, kitti, rpg, tum, openvins, tartanair or tartanair_mono would."),
+        str | None, typer.Option(help="Set what evo, kitti, rpg, tum, openvins, tartanair or tartanair_mono would.")
     ] = None,
     alignment: Annotated[
         str | None, typer.Option("--align", "-a", help="none, origin, se3 (our default), sim3, scale or yaw.")
@@ -281,8 +279,8 @@ def _settings(like: str | None, **asked: Any) -> ScoreSettings:
     Raises UnknownNameError or InputError for what can't be asked.
     """
     for name, what, known in [(like, "preset", tuple(LIKE)), *((asked[key], *named) for key, named in CHOSEN.items())]:
-        if name is not None and name not in known:
-            raise UnknownNameError(unknown(what, name, list(known)))
+        if name is not None:
+            terminal.known(what, name, known)
     base = LIKE[like] if like else ScoreSettings()
     if base.rpe_rule in PAIRS_OF_RULE and not _keeps_pairs(base, asked):
         asked["rpe_rule"] = ScoreSettings().rpe_rule  # other pairs than that tool has are ours

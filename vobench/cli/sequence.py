@@ -8,21 +8,23 @@ import typer
 from typer.core import TyperCommand, TyperOption
 
 from vobench.cli import terminal
-from vobench.dataset.picture import require_free
+from vobench.dataset.export import TRAJECTORY_FORMS, export, export_trajectory
+from vobench.dataset.layout import layouts, read, writable
+from vobench.dataset.picture import read_text, require_free
 from vobench.dataset.recording import ReadOptions, Topics
 from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.geometry.rig import Rig
+from vobench.run.import_recording import import_recording
 from vobench.run.store import unfinished
-from vobench.sequence.recording import is_recording, topic_facts
+from vobench.sequence import Sequence, has_truth, payload_hash, read_import_notes, read_provenance
+from vobench.sequence.recording import is_recording, read_poses, topic_facts
+from vobench.trajectory.formats import parse_any
 from vobench.trajectory.trajectory import Trajectory
 
 SENSORS_FILE = "sensors.mcap"
 
 
 def _sequence(folder: Path, out: Path, form: str) -> tuple[tuple[str, ...], int]:
-    from vobench.dataset.export import export
-    from vobench.dataset.layout import writable
-
     if form in writable() and folder.is_dir() and not (folder / SENSORS_FILE).is_file():
         raise InputError(f"no sequence of ours (it has no {SENSORS_FILE}); vobench import makes one: {folder}")
     exported = export(folder, out, form)
@@ -30,18 +32,12 @@ def _sequence(folder: Path, out: Path, form: str) -> tuple[tuple[str, ...], int]
 
 
 def _trajectory(path: Path, out: Path, form: str) -> tuple[tuple[str, ...], int]:
-    from vobench.dataset.export import export_trajectory
-
     files = export_trajectory(_read(path), out, form)
     return tuple(f"KITTI's poses have no stamps: those are in {file.name}." for file in files[1:]), len(files)
 
 
 def _read(path: Path) -> Trajectory:
     """The poses of a text in any form, or the only ones of a recording."""
-    from vobench.dataset.picture import read_text
-    from vobench.sequence.recording import read_poses
-    from vobench.trajectory.formats import parse_any
-
     if is_recording(path):
         return read_poses(path, None)
     parsed = parse_any(read_text(path), name=str(path))
@@ -89,8 +85,6 @@ def _truth(truth: Trajectory | None) -> dict[str, Any] | None:
 
 def _identity(folder: Path) -> dict[str, Any]:
     """Of a sequence of ours: what its import assumed, the hash of all that was recorded, and what made it."""
-    from vobench.sequence import has_truth, payload_hash, read_import_notes, read_provenance
-
     if not has_truth(folder):
         return {"notes": []}
     return {
@@ -160,10 +154,6 @@ def import_command(
     json: terminal.Json = False,
 ) -> None:
     """Make a sequence from a dataset's folder or a bag, and say all that was assumed or dropped."""
-    from vobench.dataset.layout import read
-    from vobench.run.import_recording import import_recording
-    from vobench.sequence import Sequence
-
     require_free(out)
     options = ReadOptions(calibration, imu, truth, rate, topics=_topics(topic))
     recording = read(path, form=form, options=options)
@@ -213,8 +203,6 @@ def info_command(
     json: terminal.Json = False,
 ) -> None:
     """Say what is in a recording: topics, rates, duration, calibration, ground truth, hash."""
-    from vobench.dataset.layout import read
-
     recording = read(path, form=form, options=ReadOptions(calibration, imu, truth, rate, topics=_topics(topic)))
     folder = path.parent if path.is_file() else path
     facts = {
@@ -240,9 +228,6 @@ class FormCommand(TyperCommand):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help, with the names of the layouts."""
-        from vobench.dataset.export import TRAJECTORY_FORMS
-        from vobench.dataset.layout import layouts, writable
-
         known = ", ".join(layouts())
         if self.name == "export":
             known = f"{', '.join(writable())}; of a trajectory, {', '.join(TRAJECTORY_FORMS)}"

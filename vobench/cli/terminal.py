@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from vobench.errors import UnknownNameError, unknown
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, ProgressColumn
@@ -23,6 +25,13 @@ LEFT_ALIGNED = {
     *("estimator", "status", "name", "case", "kind", "summary", "path", "origin", "check", "result"),
     *("sequence", "metric", "headline", "is", "with", "trajectory"),
 }
+
+
+def known(kind: str, name: str, names: Iterable[str]) -> str:
+    """The name, where it is known. Raises UnknownNameError where it is not."""
+    if name not in names:
+        raise UnknownNameError(unknown(kind, name, list(names)))
+    return name
 
 
 def print_json(content: Any) -> None:

@@ -250,7 +250,7 @@ def _body(chosen: Chosen, found: Contents) -> tuple[str | None, Notes]:
 def _rig(path: Path, chosen: Chosen, found: Contents, body: str | None, options: ReadOptions) -> tuple[Rig, str, Notes]:
     if options.calibration is not None:
         has_imu = read_yaml(options.calibration).has("cam0", "T_cam_imu")
-        rig, notes = chain_rig(options.calibration, 2 if chosen.right else 1, "imu" if has_imu else "left")
+        rig, notes = chain_rig(options.calibration, 2 if chosen.right else 1, None if has_imu else np.eye(4))
         whose = "the IMU" if has_imu else "the left camera"
         said = f"The calibration is that of {options.calibration.name}, and the body {whose}, whatever the bag says."
         return rig, str(options.calibration), (said, *notes[1:])

@@ -113,7 +113,7 @@ def _rig(root: Path, folder: Path, count: int, options: ReadOptions) -> tuple[Ri
         None if all(path.is_file() for path in sensors) else kalibr.find_chain(folder, options)
     )
     if chain is not None:
-        rig, notes = kalibr.chain_rig(chain, count, "imu")
+        rig, notes = kalibr.chain_rig(chain, count, None)
         return rig, chain, notes
     missing = next((path for path in sensors if not path.is_file()), None)
     if missing is not None:

@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -318,20 +318,19 @@ def find_imu(folder: Path, options: ReadOptions) -> Path | None:
     return next((folder / at / name for at in BESIDE for name in IMU_NAMES if (folder / at / name).is_file()), None)
 
 
-def chain_rig(path: Path, cameras: int, body: Literal["imu", "left"]) -> tuple[Rig, tuple[str, ...]]:
-    """The first one or two cameras of Kalibr's chain on that body, and what to note. Raises InputError."""
+def chain_rig(path: Path, cameras: int, T_body_left: Array | None) -> tuple[Rig, tuple[str, ...]]:
+    """The first cameras of Kalibr's chain, at T_body_left or on its IMU, and what to note. Raises InputError."""
     values = read_yaml(path)
     if cameras > 1 and not values.has("cam1"):
         raise InputError(f"a recording with two cameras needs cam1, which is missing in {path}")
-    if body == "imu" and not values.has("cam0", "T_cam_imu"):
+    if T_body_left is None and not values.has("cam0", "T_cam_imu"):
         raise InputError(f"the recording is about its IMU, so the chain should say cam0: T_cam_imu: {path}")
     rig = read_camchain(path)
     if cameras == 1:
         rig = replace(rig, right=None, T_body_right=None)
-    elif rig.right and body == "left":
-        rig = replace(rig, T_body_right=rig.T_left_right)
-    if body == "left":
-        rig = replace(rig, T_body_left=np.eye(4))
+    if T_body_left is not None:
+        T_body_right = T_body_left @ rig.T_left_right if rig.right else None
+        rig = replace(rig, T_body_left=T_body_left, T_body_right=T_body_right)
     names = [name for name in ("cam0", "cam1")[:cameras] if values.has(name, "timeshift_cam_imu")]
     shifts_s = [(name, values.number(name, "timeshift_cam_imu")) for name in names]
     off = "By the calibration the clock of {} is {:g} s off the IMU's; stamps were left as they are."

@@ -13,8 +13,7 @@ from vobench.dataset.source import ExportSource, Views, png_frames, rectified
 from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
-from vobench.geometry.rectify import projection
-from vobench.geometry.rig import Rig, looking
+from vobench.geometry.rig import Rig, looking, projection
 from vobench.geometry.se3 import Array
 from vobench.trajectory.formats import content, format_kitti, format_times, parse_times, read_table
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
@@ -65,8 +64,8 @@ def _rig(
 ) -> tuple[Rig, Path, Notes]:
     """The cameras by calib.txt, which knows no picture's size, or by Kalibr's chain; and which file that was."""
     if options.calibration is not None:
-        rig, notes = chain_rig(options.calibration, len(names), "left")
-        return on_body(rig, T_BODY_GREY), options.calibration, notes
+        rig, notes = chain_rig(options.calibration, len(names), T_BODY_GREY)
+        return rig, options.calibration, notes
     path = folder / CALIBRATION
     if not path.exists():
         raise no_calibration(path)

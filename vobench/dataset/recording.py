@@ -23,8 +23,7 @@ from vobench.dataset.picture import (
 )
 from vobench.errors import InputError
 from vobench.geometry import se3
-from vobench.geometry.rectify import rectification
-from vobench.geometry.rig import SIDES, Rig
+from vobench.geometry.rig import SIDES, Rig, rectification
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import EncodedFrame, StereoFrame

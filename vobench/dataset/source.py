@@ -15,8 +15,7 @@ import numpy as np
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole, pixel_grid
-from vobench.geometry.rectify import rectification
-from vobench.geometry.rig import Rig, Side, side_by_side
+from vobench.geometry.rig import Rig, Side, rectification, side_by_side
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuBias, ImuReadings
 from vobench.sequence import (
@@ -74,7 +73,8 @@ def rectified(rig: Rig) -> Views:
     flat, turns = _flat(rig)
     if pixel_difference(rig, flat) < PIXEL_TOLERANCE:
         return Views(flat)
-    return Views(flat, {side: _source_px(flat.left, rig.camera(side), turns[side]) for side in rig.sides})
+    rays = flat.left.rays(pixel_grid(flat.left))
+    return Views(flat, {side: rig.camera(side).project(rays @ turns[side]) for side in rig.sides})
 
 
 def _flat(rig: Rig) -> tuple[Rig, dict[Side, Array]]:
@@ -93,11 +93,6 @@ def _flat(rig: Rig) -> tuple[Rig, dict[Side, Array]]:
         return Rig(hole, None, T_body_left, None), {"left": R_view_left}
     T_body_right = T_body_left @ side_by_side(views.baseline_m)
     return Rig(hole, hole, T_body_left, T_body_right), {"left": R_view_left, "right": views.R_view_right}
-
-
-def _source_px(view: Camera, camera: Camera, R_view_camera: Array) -> Array:
-    """Where a view's pixels (H, W, 2) lie in the camera's picture; NaN for what its lens does not see."""
-    return camera.project(view.rays(pixel_grid(view)) @ R_view_camera)
 
 
 PNG = "png"
@@ -225,13 +220,13 @@ def _largest(expected: Array, found: Array) -> float:
     return float(off.max()) if np.isfinite(off).all() else np.inf
 
 
-def check_rig(what: str, expected: Rig, found: Rig, *, tolerance_px: float = PIXEL_TOLERANCE) -> None:
+def check_rig(what: str, expected: Rig, found: Rig) -> None:
     """Raises SequenceError unless a rig that was read back sends known points where the exported one does."""
     off = pixel_difference(expected, found)
-    if not off < tolerance_px:
+    if not off < PIXEL_TOLERANCE:
         raise SequenceError(
             f"{what} does not say what was exported: known points come to lie {off:.3g} px beside their place, "
-            f"and {tolerance_px:g} px would be right"
+            f"and {PIXEL_TOLERANCE:g} px would be right"
         )
     if expected.imu and found.imu:
         mounts = ((expected, expected.imu), (found, found.imu))

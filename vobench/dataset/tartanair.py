@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vobench.dataset.kalibr import chain_rig, on_body
+from vobench.dataset.kalibr import chain_rig
 from vobench.dataset.layout import Layout
 from vobench.dataset.picture import unread
 from vobench.dataset.recording import Notes, ReadOptions, Recording, assemble, numbered, picture_files, truth_file
@@ -51,8 +51,8 @@ def read_tartanair(folder: Path, options: ReadOptions) -> Recording:
 def _rig(folder: Path, size_px: tuple[int, int], count: int, options: ReadOptions) -> tuple[Rig, str, Notes]:
     T_body_left = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))
     if options.calibration is not None:
-        rig, notes = chain_rig(options.calibration, count, "left")
-        return on_body(rig, T_body_left), str(options.calibration), notes
+        rig, notes = chain_rig(options.calibration, count, T_body_left)
+        return rig, str(options.calibration), notes
     if size_px not in SIZES_PX:
         raise InputError(
             f"TartanAir's pictures have {' or '.join(f'{w} x {h}' for w, h in SIZES_PX)} pixels, these have "

@@ -56,7 +56,7 @@ def read_tum(folder: Path, options: ReadOptions) -> Recording:
 def _rig(folder: Path, options: ReadOptions) -> tuple[Rig, str, Notes]:
     chain = find_chain(folder, options)
     if chain is not None:
-        rig, notes = chain_rig(chain, 1, "left")
+        rig, notes = chain_rig(chain, 1, np.eye(4))
         return rig, str(chain), notes
     title = [line for line in read_text(folder / LIST).splitlines()[:3] if line.startswith("#")]  # names its bag
     found = WHICH.search(folder.resolve().name) or WHICH.search(" ".join(title))

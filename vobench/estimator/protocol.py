@@ -35,9 +35,10 @@ class EncoderReadings:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """All that an estimator sees of one instant: grey pictures, and the encoders' and the IMU's readings up to it.
+    """All that an estimator sees of one instant: pictures, and the encoders' and the IMU's readings up to it.
 
-    Pictures are (H, W) uint8: both for an estimator that needs stereo, the left one for mono. `encoders` and `imu`
+    Pictures are grey (H, W) uint8, or (H, W, 3) red, green, blue for one that needs colour: both for an estimator
+    that needs stereo, the left one for mono. `encoders` and `imu`
     hold the readings after the last frame up to and including this one's stamp. What was not asked for is None.
     """
 

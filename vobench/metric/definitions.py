@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from vobench.errors import InputError
-from vobench.metric import ate, coverage, nees, rpe, scale, segment
+from vobench.metric import ate, coverage, nees, rpe, segment
 from vobench.metric.comparison import DEFAULTS, MetricDefinition
 from vobench.metric.settings import ScoreSettings
 
-ROOM = (ate, rpe, segment, scale, nees, coverage)
+ROOM = (ate, rpe, segment, nees, coverage)
 DEFINITIONS: dict[str, MetricDefinition] = {metric.id: metric for family in ROOM for metric in family.METRICS}
 
 NS_PER_MS = 10**6

@@ -181,24 +181,17 @@ def tum_errors(
 
     Source: Sturm et al. (2012), section V-A, by their script with --fixed_delta.
     """
-    first, last, gt_first, gt_last = _tum_pairs(gt, est, delta_s, offset_ns)
-    T_est = motions(est.T_world_frame, last, first)
-    T_est[:, :3, 3] *= scale
-    return motion_errors(motions(gt.T_world_frame, gt_last, gt_first), T_est)
-
-
-def _tum_pairs(gt: Trajectory, est: Trajectory, delta_s: float, offset_ns: int) -> tuple[*IndexPairs, *IndexPairs]:
-    """Poses (first, last) of the estimate, and the truth's that are nearest in time to them."""
     t_ns = est.t_ns + np.int64(offset_ns)
-    first = np.arange(len(t_ns))
     last = nearest(t_ns + round(delta_s * 1e9), t_ns)
-    inside = last < len(t_ns) - 1  # the last pose may stand for any later instant, so it ends no pair
-    first, last = first[inside], last[inside]
+    first = np.flatnonzero(last < len(t_ns) - 1)  # the last pose may stand for any later instant, so it ends no pair
+    last = last[first]
     gt_first, gt_last = nearest(t_ns[first], gt.t_ns), nearest(t_ns[last], gt.t_ns)
     longest_ns = MAX_TRUTH_STEPS * np.median(np.diff(gt.t_ns)) if len(gt) > 1 else 0.0
     off_ns = np.maximum(np.abs(gt.t_ns[gt_first] - t_ns[first]), np.abs(gt.t_ns[gt_last] - t_ns[last]))
     near = off_ns <= longest_ns
-    return first[near], last[near], gt_first[near], gt_last[near]
+    T_est = motions(est.T_world_frame, last[near], first[near])
+    T_est[:, :3, 3] *= scale
+    return motion_errors(motions(gt.T_world_frame, gt_last[near], gt_first[near]), T_est)
 
 
 OPENVINS_LENGTHS_M = (8.0, 16.0, 24.0, 32.0, 40.0, 48.0)

@@ -1,4 +1,4 @@
-"""Drift per metre over segments of fixed path length, after the KITTI odometry benchmark."""
+"""Errors over segments of fixed path length: drift per metre, after the KITTI odometry benchmark, and scale."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from vobench.trajectory.associate import Index
 
 Float32 = NDArray[np.float32]
 Distances = Float32 | Array
+LEAST_SHARE = 0.1  # of the median true distance; a segment that ends nearer to its begin shows no scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,9 +131,43 @@ def _drift(of: Comparison, drift: Distances, *, in_degrees: bool = False) -> Ove
     return OverLengths(errors, of.once(segments).length_m, drift)
 
 
+@dataclass(frozen=True, slots=True)
+class ScaleErrors:
+    """Signed errors (N,) of the scale as ratio less one, and their trend per metre of path."""
+
+    error: Array
+    drift_per_m: float
+
+
+def scale_errors(T_gt: Array, T_est: Array, along_m: Array, first: Index, last: Index) -> ScaleErrors:
+    """Ratios of the distances between matched poses (K, 4, 4) `first` and `last` (N,), estimate over truth.
+
+    along_m (K,) is the true path to each pose. The drift is the slope of the logarithm of the ratio over
+    the path by least squares, 0 with fewer than two places. Source: Strasdat et al. (2010), section II.
+    """
+    gt_m, est_m = (np.linalg.norm(T[last, :3, 3] - T[first, :3, 3], axis=1) for T in (T_gt, T_est))
+    shown = (gt_m > LEAST_SHARE * np.median(gt_m)) & (gt_m > 0) if len(gt_m) else np.zeros(0, bool)
+    ratio, middle_m = est_m[shown] / gt_m[shown], 0.5 * (along_m[first] + along_m[last])[shown]
+    return ScaleErrors(ratio - 1.0, _slope(middle_m[ratio > 0], np.log(ratio[ratio > 0])))
+
+
+def _slope(x: Array, y: Array) -> float:
+    centred = x - x.mean() if len(x) else x
+    power = float(centred @ centred)
+    return float(centred @ (y - y.mean())) / power if power > 0 else 0.0
+
+
+def _scale(of: Comparison) -> ScaleErrors:
+    frames, found = of.matched.pairs.gt, of.once(segments)
+    first, last = (np.searchsorted(frames, ends) for ends in (found.first, found.last))
+    return scale_errors(of.matched.T_gt, of.T_moving, of.distances_m[frames], first, last)
+
+
 SEGMENTS = ("segment_lengths_m", "segment_step_frames", "segment_precision", "segment_mean", *POSES)
 GEIGER = "Geiger et al. (2012), section 3.2, and its development kit"
+STRASDAT = "Strasdat et al. (2010), section II, as a ratio of distances"
 _drift_metric = partial(MetricDefinition, source=GEIGER, settings=SEGMENTS, headline="mean", full=False)
+_scale_metric = partial(MetricDefinition, source=STRASDAT, settings=SEGMENTS, headline="mean")
 METRICS = (
     _drift_metric(
         "kitti_t_rel",
@@ -149,5 +184,21 @@ METRICS = (
         "angle of (T_est,ij)⁻¹ T_gt,ij / length, segments as of kitti_t_rel",
         blind="jitter, and errors that turn back within a segment",
         measure=lambda of: _drift(of, of.once(segments).rot_radpm, in_degrees=True),
+    ),
+    _scale_metric(
+        "scale_error",
+        "scale error of the segments",
+        "1",
+        "‖p_j − p_i‖ / ‖q_j − q_i‖ − 1 of the segments of kitti_t_rel, with its sign",
+        blind="scale where a segment ends near where it began; an alignment with scale has taken the mean out",
+        measure=lambda of: of.once(_scale).error,
+    ),
+    _scale_metric(
+        "scale_drift",
+        "drift of the scale per metre of path",
+        "1/m",
+        "slope by least squares of log(1 + scale_error) over the true path, one number",
+        blind="a scale that goes up and comes down again",
+        measure=lambda of: np.full(min(len(of.once(_scale).error), 1), of.once(_scale).drift_per_m),
     ),
 )

@@ -14,7 +14,7 @@ from annotated_types import Ge, Gt, Lt
 from vobench.errors import MotionError
 from vobench.geometry.se3 import Array
 from vobench.setting import Positive, settings
-from vobench.trajectory.kinematics import CurveMotion, Kinematics, level
+from vobench.trajectory.kinematics import CurveMotion, Kinematics, along, level
 from vobench.trajectory.trajectory import Stamps
 
 STEP_S = 0.01
@@ -88,14 +88,7 @@ class AckermannMotion:
         x, y, psi, delta = state = _stepped(tuple(self.state[k].T), stages, step_s, self.settings)
         (*_, w, delta_rate), u, u_rate = _rates(state, stages[-1], self.settings)
         w_rate = (u_rate * np.tan(delta) + u * delta_rate / np.cos(delta) ** 2) / self.settings.wheelbase_m
-        still = np.zeros_like(x)
-        return Kinematics(
-            T_world_body=level(x, y, psi),
-            velocity_mps=np.stack([u, still, still], -1),
-            turn_radps=np.stack([still, still, w], -1),
-            acceleration_mps2=np.stack([u_rate, u * w, still], -1),
-            turn_rate_radps2=np.stack([still, still, w_rate], -1),
-        )
+        return along(level(x, y, psi), speed=u, acceleration=u_rate, turn=w, turn_rate=w_rate)
 
 
 def ackermann(target: CurveMotion, settings: AckermannSettings = ACKERMANNS["small_robot"]) -> AckermannMotion:

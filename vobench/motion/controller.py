@@ -16,6 +16,7 @@ from vobench.motion.pioneer import (
     UNLIMITED,
     AccelerationLimits,
     Number,
+    Pair,
     Theta,
     accelerations,
     over_period,
@@ -55,13 +56,8 @@ CONTROLLERS = {
 
 
 def references(
-    error_x_m: float,
-    error_y_m: float,
-    psi: float,
-    settings: ControllerSettings,
-    *,
-    path_mps: tuple[float, float] = (0.0, 0.0),
-) -> tuple[float, float]:
+    error_x_m: float, error_y_m: float, psi: float, settings: ControllerSettings, *, path_mps: Pair[float] = (0.0, 0.0)
+) -> Pair[float]:
     """u_ref in m/s and omega_ref in rad/s of (20)-(21), for the error target minus current position of h.
 
     `path_mps` is the velocity of a target that moves, added to what (20) asks for on each axis. Both are
@@ -156,22 +152,15 @@ class Vehicle:
                 f"settles: errors do not shrink; {cure}"
             )
 
-    def references(
-        self, state: Array, target_m: Array, path_mps: tuple[float, float] = (0.0, 0.0)
-    ) -> tuple[float, float]:
+    def references(self, state: Array, target_m: Array, path_mps: Pair[float] = (0.0, 0.0)) -> Pair[float]:
         """u_ref in m/s and omega_ref in rad/s that the controller asks for on the way to a target (2,)."""
         x, y, psi = state[:3].tolist()
         target_x, target_y = target_m.tolist()
         return references(target_x - x, target_y - y, psi, self.controller, path_mps=path_mps)
 
     def speed_rates(
-        self,
-        u: Number,
-        omega: Number,
-        reference: tuple[Number, Number],
-        began: tuple[Number, Number],
-        delta: tuple[Number, Number],
-    ) -> tuple[Number, Number]:
+        self, u: Number, omega: Number, reference: Pair[Number], began: Pair[Number], delta: Pair[Number]
+    ) -> Pair[Number]:
         """Accelerations u' and omega' of (18), within the limits, and delta; `began`: speeds as the period began."""
         if self.theta is None:
             asked = (reference[0] - began[0]) * self.rate_hz, (reference[1] - began[1]) * self.rate_hz
@@ -180,9 +169,7 @@ class Vehicle:
         u_rate, omega_rate = self.limits.held(*asked)
         return u_rate + delta[0], omega_rate + delta[1]
 
-    def rates(
-        self, state: Array, reference: tuple[float, float], slip: SlipNow, began: tuple[float, float]
-    ) -> tuple[float, ...]:
+    def rates(self, state: Array, reference: Pair[float], slip: SlipNow, began: Pair[float]) -> tuple[float, ...]:
         """Time derivative (7) of the state: equations (18) and (19), and what the wheels do for it."""
         _, _, psi, u, omega, _, _ = state.tolist()
         pose_rates = velocities(psi, u, omega, a_m=self.controller.a_m, side_mps=slip.side_speed(u, omega))
@@ -192,9 +179,7 @@ class Vehicle:
         rims = slip.rim_rates(*ground_mps, radius_m=self.wheels.radius_m, driven_mps2=ground_mps2)
         return *pose_rates, *speed_rates, *rims
 
-    def advance(
-        self, state: Array, reference: tuple[float, float], slip: SlipNow, then: SlipNow | None = None
-    ) -> Array:
+    def advance(self, state: Array, reference: Pair[float], slip: SlipNow, then: SlipNow | None = None) -> Array:
         """States (substeps, 7) over one control period with references held; slip runs evenly to what it is `then`.
 
         Raises MotionError where they run away.

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil, gcd, pi, radians
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 import scipy
@@ -15,11 +15,8 @@ from vobench.geometry.rig import WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.motion.pioneer import wheel_speeds
 from vobench.motion.wheeled import MOVER_KEYS, UNLED_KEYS, Acceleration, Length, Mover, Pause, Speed, Wheeled
-from vobench.trajectory.kinematics import CurveMotion, Kinematics, Motion, in_stages, level, rest_to_rest
+from vobench.trajectory.kinematics import CurveMotion, Kinematics, Motion, along, in_stages, level, rest_to_rest
 from vobench.trajectory.trajectory import Stamps
-
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
 
 BLUNT = 0.05  # a curve whose derivative falls below this share of its largest all but comes to a point
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -29,7 +26,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 class ArcLength:
     """parameter(s) is the curve's parameter at arc length s, up to `length`."""
 
-    parameter: "BSpline"
+    parameter: "scipy.interpolate.BSpline"
     length: float
 
 
@@ -79,31 +76,22 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """Pieces in a row, from the origin along x: a Curve. Arrays (P,) are of the parts, at their beginnings."""
+    """Pieces in a row, from the origin along x: a Curve.
+
+    parts (P, 7): the progress at which each begins, its bend, bent and advance, and its first heading, x and y.
+    """
 
     breaks: Array
-    begin: Array
-    bend: Array
-    bent: Array
-    advance: Array
-    heading_rad: Array
-    x_m: Array
-    y_m: Array
+    parts: Array
 
     def at(self, s: Array) -> Kinematics:
         """Poses (K, 4, 4) at progress s (K,), and their derivatives by s."""
-        k = np.clip(np.searchsorted(self.begin, s, side="right") - 1, 0, len(self.begin) - 1)
-        into, bend, bent, advance = s - self.begin[k], self.bend[k], self.bent[k], self.advance[k]
-        x_m, y_m = _steps(into, bend, bent, heading_rad=self.heading_rad[k])
-        heading = self.heading_rad[k] + into * (bend + bent * into / 2)
-        return along(
-            self.x_m[k] + advance * x_m,
-            self.y_m[k] + advance * y_m,
-            heading,
-            advance=advance,
-            bend=bend + bent * into,
-            bent=bent,
-        )
+        k = np.clip(np.searchsorted(self.parts[:, 0], s, side="right") - 1, 0, len(self.parts) - 1)
+        begin, bend, bent, advance, heading, x_m, y_m = self.parts[k].T
+        into = s - begin
+        ahead_m, left_m = _steps(into, bend, bent, heading_rad=heading)
+        T = level(x_m + advance * ahead_m, y_m + advance * left_m, heading + into * (bend + bent * into / 2))
+        return along(T, speed=advance, acceleration=np.zeros_like(s), turn=bend + bent * into, turn_rate=bent)
 
 
 def course(pieces: Iterable[Piece]) -> Course:
@@ -113,28 +101,9 @@ def course(pieces: Iterable[Piece]) -> Course:
     length, bend, bent, advance = np.array([(p.length, p.bend, p.bent, p.advance) for p in parts]).T
     heading_rad = _sums([part.turned_rad for part in parts])
     x_m, y_m = _steps(length, bend, bent, heading_rad=heading_rad[:-1])
-    return Course(
-        breaks=_sums([piece.length for piece in pieces])[1:-1],
-        begin=_sums(length)[:-1],
-        bend=bend,
-        bent=bent,
-        advance=advance,
-        heading_rad=heading_rad[:-1],
-        x_m=_sums(advance * x_m)[:-1],
-        y_m=_sums(advance * y_m)[:-1],
-    )
-
-
-def along(x_m: Array, y_m: Array, heading_rad: Array, *, advance: Array, bend: Array, bent: Array) -> Kinematics:
-    """A level body (K,) that goes along its own x axis alone, as wheels do: its derivatives by progress."""
-    still = np.zeros_like(x_m)
-    return Kinematics(
-        T_world_body=level(x_m, y_m, heading_rad),
-        velocity_mps=np.stack([advance, still, still], -1),
-        turn_radps=np.stack([still, still, bend], -1),
-        acceleration_mps2=np.stack([still, advance * bend, still], -1),
-        turn_rate_radps2=np.stack([still, still, bent], -1),
-    )
+    begin, x_m, y_m = (_sums(steps)[:-1] for steps in (length, advance * x_m, advance * y_m))
+    columns = [begin, bend, bent, advance, heading_rad[:-1], x_m, y_m]
+    return Course(_sums([piece.length for piece in pieces])[1:-1], np.stack(columns, -1))
 
 
 def _steps(length: Array, bend: Array, bent: Array, *, heading_rad: Array) -> tuple[Array, Array]:
@@ -158,27 +127,25 @@ MOST_WAVES = 20
 class LissajousCurve:
     """x = A sin(a phi + phase), y = B sin(b phi): a closed Curve, from the origin along x at s = 0.
 
-    half_m (2,) is A, B; waves (2,) is a, b; phase_rad (2,) is phase, 0.
+    derivatives: place and its first three derivatives (4, 2, K) at phi (K,).
     """
 
-    half_m: Array
-    waves: Array
-    phase_rad: Array
+    derivatives: Callable[[Array], Array]
     arc: ArcLength
     breaks: Array  # none: it is smooth
 
     def at(self, s: Array) -> Kinematics:
         """Poses (K, 4, 4) at arc length s (K,), and their derivatives by s."""
         s = np.mod(s, self.arc.length)
-        (x0, y0), *first = _derivatives(self.half_m, self.waves, self.phase_rad, np.zeros(1))[..., 0]
+        (x0, y0), *first = self.derivatives(np.zeros(1))[..., 0]
         ahead = np.arctan2(first[0][1], first[0][0])
-        (x, y), d1, d2, d3 = _derivatives(self.half_m, self.waves, self.phase_rad, self.arc.parameter(s))
+        (x, y), d1, d2, d3 = self.derivatives(self.arc.parameter(s))
         speed = np.hypot(*d1)
         bend = _cross(d1, d2) / speed**3
         bent = (_cross(d1, d3) / speed**3 - 3 * bend * (d1 * d2).sum(0) / speed**2) / speed
         place = (x - x0 + 1j * (y - y0)) * np.exp(-1j * ahead)
-        heading = np.arctan2(d1[1], d1[0]) - ahead
-        return along(place.real, place.imag, heading, advance=np.ones_like(s), bend=bend, bent=bent)
+        T = level(place.real, place.imag, np.arctan2(d1[1], d1[0]) - ahead)
+        return along(T, speed=np.ones_like(s), acceleration=np.zeros_like(s), turn=bend, turn_rate=bent)
 
 
 def lissajous_curve(size_m: tuple[float, float], ratio: tuple[int, int], *, phase_rad: float) -> LissajousCurve:
@@ -186,8 +153,13 @@ def lissajous_curve(size_m: tuple[float, float], ratio: tuple[int, int], *, phas
     half_m, waves = np.array(size_m)[:, None] / 2, np.array(ratio, float)[:, None]
     phases = np.array([[phase_rad], [0.0]])
 
+    def derivatives(phi: Array) -> Array:
+        angle = waves * phi + phases
+        sine, cosine = half_m * np.sin(angle), half_m * np.cos(angle)
+        return np.stack([sine, waves * cosine, -(waves**2) * sine, -(waves**3) * cosine])
+
     def speed(phi: Array) -> Array:
-        length: Array = np.hypot(*_derivatives(half_m, waves, phases, phi)[1])
+        length: Array = np.hypot(*derivatives(phi)[1])
         return length
 
     knots = np.linspace(0, 2 * np.pi, KNOTS_PER_WAVE * max(ratio) + 1)
@@ -196,14 +168,7 @@ def lissajous_curve(size_m: tuple[float, float], ratio: tuple[int, int], *, phas
             f"with a phase of {phase_rad:g} rad the Lissajous curve comes to a point where it turns back; "
             "choose another phase: 0 where one number of the ratio is even, a quarter turn where both are odd"
         )
-    return LissajousCurve(half_m, waves, phases, arc_length(speed, knots), np.zeros(0))
-
-
-def _derivatives(half_m: Array, waves: Array, phases: Array, phi: Array) -> Array:
-    """Position and its first three derivatives by phi: (4, 2, K)."""
-    angle = waves * phi + phases
-    sine, cosine = half_m * np.sin(angle), half_m * np.cos(angle)
-    return np.stack([sine, waves * cosine, -(waves**2) * sine, -(waves**3) * cosine])
+    return LissajousCurve(derivatives, arc_length(speed, knots), np.zeros(0))
 
 
 def _cross(a: Array, b: Array) -> Array:
@@ -230,7 +195,7 @@ class Circle(Wheeled):
         """As an ideal robot drives it. Raises MotionError."""
         length_m = 2 * pi * self.radius_m * self.laps
         law = rest_to_rest(length_m, speed=self.speed_mps, acceleration=self.accel_mps2)
-        bend = _side(clockwise=self.clockwise) / self.radius_m
+        bend = (-1 if self.clockwise else 1) / self.radius_m
         return CurveMotion(course([Piece(length_m, bend)]), law, self.T_world_start)
 
 
@@ -253,7 +218,7 @@ class Square(Wheeled):
 
     def way(self) -> CurveMotion:
         """As an ideal robot drives it. Raises MotionError."""
-        side, count = _side(clockwise=self.clockwise), CORNERS * self.laps
+        side, count = -1.0 if self.clockwise else 1.0, CORNERS * self.laps
         if self.corner_radius_m:
             straight_m, corner = _rounded(self.side_m, self.corner_radius_m, side=side)
             pieces = [Piece(straight_m), *corner] * count
@@ -351,7 +316,7 @@ class PureRotation(Wheeled):
         """As an ideal robot drives it. Raises MotionError."""
         angle_rad = abs(radians(self.angle_deg))
         law = rest_to_rest(angle_rad, speed=self.turn_radps, acceleration=self.turn_accel_radps2)
-        turn = Piece(angle_rad, _side(clockwise=self.angle_deg < 0), advance=0.0)
+        turn = Piece(angle_rad, -1.0 if self.angle_deg < 0 else 1.0, advance=0.0)
         return CurveMotion(course([turn]), law, self.T_world_start)
 
 
@@ -406,10 +371,6 @@ def _rounded(side_m: float, radius_m: float, *, side: float) -> tuple[float, lis
             f"{reach_m:.3g} m before the corner; it should be below {most_m:.3g}"
         )
     return straight_m, corner
-
-
-def _side(*, clockwise: bool) -> float:
-    return -1.0 if clockwise else 1.0
 
 
 # Pieces no longer than this are integrated with four Gauss-Legendre nodes: exact for polynomials of degree 7.

@@ -7,7 +7,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import MinLen
-from numpy.typing import ArrayLike, NDArray
+from numpy.polynomial.polynomial import polyder, polyval
+from numpy.typing import ArrayLike
 
 from vobench.errors import MotionError
 from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
@@ -58,43 +59,16 @@ class DriveMotion:
 
         Raises MotionError for an instant more than a second after the end, or not finite.
         """
-        index, share = self._places(np.asarray(t_ns, float))
-        per_s = self.rate_hz * self.substeps
-        place, speed, rate = _derivatives(self.pieces[index], share[:, None])
-        before = np.asarray(t_ns) < 0
-        speed[before], rate[before] = 0.0, 0.0
-        return _kinematics(place, speed * per_s, rate * per_s**2)
-
-    def _places(self, t_ns: Array) -> tuple[NDArray[np.int64], Array]:
-        """The piece that each instant (K,) is in, and its share of it."""
-        step_ns = 1e9 / self.rate_hz / self.substeps
+        t_ns, step_ns = np.asarray(t_ns, float), 1e9 / self.rate_hz / self.substeps
         known_ns = len(self.pieces) * step_ns + 1
         if not (t_ns <= known_ns).all():
             wrong = t_ns[~(t_ns <= known_ns)][0]
             raise MotionError(f"the drive ends at {self.end_ns} ns, and is asked where it is at {wrong:.0f} ns")
         index = np.clip(np.floor(t_ns / step_ns), 0, len(self.pieces) - 1)
-        return index.astype(np.int64), np.maximum(t_ns / step_ns - index, 0.0)
-
-
-def motion_of(
-    fine: Array, asked: Array, disturbed: Array, *, frames: int, vehicle: Vehicle, skid_s: float
-) -> DriveMotion:
-    """The motion through states (P + 1, 7) of all sub-steps, with references (Q, 2) of their P / substeps periods.
-
-    disturbed (Q + 1, 3) is beta in rad, delta_u and delta_omega at the periods' ends; `frames` of them were driven.
-    """
-    period, step = np.divmod(np.arange(len(fine) - 1), vehicle.substeps)
-    began = fine[period * vehicle.substeps, 3:5]
-    change = disturbed[period + 1] - disturbed[period]
-
-    def seen(state: Array, share: Array) -> Array:
-        disturbance = disturbed[period] + share[:, None] * change
-        return _derived(state, asked[period], began, disturbance, change[:, 0], vehicle=vehicle, skid_s=skid_s)
-
-    ends = seen(fine[:-1], step / vehicle.substeps), seen(fine[1:], (step + 1) / vehicle.substeps)
-    end_ns = round((frames - 1) * 1e9 / vehicle.rate_hz)
-    pieces = _quintics(*ends, step_s=1 / vehicle.rate_hz / vehicle.substeps)
-    return DriveMotion(0, end_ns, vehicle.rate_hz, vehicle.substeps, pieces)
+        share, per_s = np.maximum(t_ns / step_ns - index, 0.0), self.rate_hz * self.substeps
+        place, speed, rate = _derivatives(self.pieces[index.astype(np.int64)], share[:, None])
+        speed[t_ns < 0], rate[t_ns < 0] = 0.0, 0.0
+        return _kinematics(place, speed * per_s, rate * per_s**2)
 
 
 def _derived(
@@ -126,13 +100,10 @@ def _quintics(begin: Array, end: Array, *, step_s: float) -> Array:
     return np.stack([p0, v0, a0 / 2, 10 * p - 4 * v + a, -15 * p + 7 * v - 2 * a, 6 * p - 3 * v + a], -1)
 
 
-def _derivatives(c: Array, s: Array) -> tuple[Array, Array, Array]:
-    """Value, first and second derivative (K, 3) by s (K, 1) of the quintics c (K, 3, 6)."""
-    c0, c1, c2, c3, c4, c5 = np.moveaxis(c, -1, 0)
-    value = c0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
-    first = c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * (5 * c5))))
-    second = 2 * c2 + s * (6 * c3 + s * (12 * c4 + s * (20 * c5)))
-    return value, first, second
+def _derivatives(c: Array, s: Array) -> Array:
+    """Value, first and second derivative (3, K, 3) by s (K, 1) of the quintics c (K, 3, 6)."""
+    c = np.moveaxis(c, -1, 0)
+    return np.array([polyval(s, polyder(c, order), tensor=False) for order in range(3)], float)
 
 
 def _kinematics(place: Array, speed: Array, rate: Array) -> Kinematics:
@@ -359,19 +330,24 @@ def _record(
 
 
 def _with_tail(fine: Array, asked: Array, slips: list[SlipNow], vehicle: Vehicle) -> DriveMotion:
-    """The motion of the drive, its last references and slip held for a while after it."""
+    """The motion of the drive through states (P + 1, 7), its last references and slip held for a while after it."""
     tail, last = [fine], slips[-1]
     more = ceil(TAIL_S * vehicle.rate_hz)
     for _ in range(more):
         tail.append(vehicle.advance(tail[-1][-1], tuple(asked[-1].tolist()), last))
-    return motion_of(
-        np.concatenate(tail),
-        np.concatenate([asked, np.repeat(asked[-1:], more - 1, 0)]),
-        np.array([*slips, *[last] * more])[:, [2, 5, 6]],
-        frames=len(asked),
-        vehicle=vehicle,
-        skid_s=last.skid_s,
-    )
+    states, held = np.concatenate(tail), np.concatenate([asked, np.repeat(asked[-1:], more - 1, 0)])
+    disturbed = np.array([*slips, *[last] * more])[:, [2, 5, 6]]  # beta, delta_u and delta_omega at periods' ends
+    period, step = np.divmod(np.arange(len(states) - 1), vehicle.substeps)
+    began = states[period * vehicle.substeps, 3:5]
+    change = disturbed[period + 1] - disturbed[period]
+
+    def seen(state: Array, share: Array) -> Array:
+        disturbance = disturbed[period] + share[:, None] * change
+        return _derived(state, held[period], began, disturbance, change[:, 0], vehicle=vehicle, skid_s=last.skid_s)
+
+    ends = seen(states[:-1], step / vehicle.substeps), seen(states[1:], (step + 1) / vehicle.substeps)
+    pieces = _quintics(*ends, step_s=1 / vehicle.rate_hz / vehicle.substeps)
+    return DriveMotion(0, round((len(asked) - 1) * 1e9 / vehicle.rate_hz), vehicle.rate_hz, vehicle.substeps, pieces)
 
 
 def _stamps(count: int, rate_hz: float, substeps: int) -> Stamps:

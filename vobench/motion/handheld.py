@@ -63,13 +63,14 @@ class Shake:
     def at(self, t_s: Array) -> Kinematics:
         """T_carrier_body (K, 4, 4): moved, then turned about z, y and x, each of these about the axis of the last."""
         value, rate, change = self._sums(t_s)
-        moved = _moved(value[:3].T, rate[:3].T, change[:3].T)
+        still = np.zeros((len(t_s), 3))
+        moved = Kinematics(se3.transform(np.eye(3), value[:3].T), rate[:3].T, still, change[:3].T, still)
         for axis in (2, 1, 0):
             moved = composed(moved, _turned(axis, value[3 + axis], rate[3 + axis], change[3 + axis]))
         return moved
 
-    def _sums(self, t_s: Array) -> tuple[Array, Array, Array]:
-        """The six sums (6, K) and their first two derivatives."""
+    def _sums(self, t_s: Array) -> Array:
+        """The six sums and their first two derivatives (3, 6, K)."""
         sums = np.zeros((3, 6, len(t_s)))
         for omega, amplitude, phase in zip(
             2 * np.pi * self.frequency_hz.T, self.amplitude.T, self.phase_rad.T, strict=True
@@ -77,7 +78,7 @@ class Shake:
             angle = omega[:, None] * t_s + phase[:, None]
             sine, cosine = amplitude[:, None] * np.sin(angle), amplitude[:, None] * np.cos(angle)
             sums += [sine, omega[:, None] * cosine, -(omega[:, None] ** 2) * sine]
-        return sums[0], sums[1], sums[2]
+        return sums
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,8 +133,8 @@ def draw_shake(settings: ShakeSettings, rng: np.random.Generator) -> Shake:
     amplitude = frequency_hz**-FALL
     amplitude *= (rms / np.sqrt(np.sum(amplitude**2, axis=1) / 2))[:, None]
     phase_rad = 2 * np.pi * rng.random((6, WAVES))
-    step_hz, step, step_phase = _steps(settings, 2 * np.pi * rng.random())
-    columns = zip((frequency_hz, amplitude, phase_rad), (step_hz, step, step_phase), strict=True)
+    steps = _steps(settings, 2 * np.pi * rng.random())
+    columns = zip((frequency_hz, amplitude, phase_rad), steps, strict=True)
     return Shake(*(np.column_stack(pair) for pair in columns))
 
 
@@ -168,23 +169,9 @@ def _steps(settings: ShakeSettings, phase_rad: float) -> tuple[Array, Array, Arr
     return frequency_hz, amplitude, phases_rad
 
 
-def _moved(value_m: Array, rate_mps: Array, change_mps2: Array) -> Kinematics:
-    """A translation (K, 3) alone."""
-    still = np.zeros_like(value_m)
-    return Kinematics(se3.transform(np.eye(3), value_m), rate_mps, still, change_mps2, still)
-
-
 def _turned(axis: int, angle_rad: Array, rate: Array, change: Array) -> Kinematics:
-    """A turn (K,) about one axis alone."""
-    along = np.eye(3)[axis]
+    """A turn (K,) about x, y or z alone: one about z with its axes renamed."""
+    along, order = np.eye(3)[axis], np.roll(range(3), axis + 1)
     still = np.zeros((len(angle_rad), 3))
-    R = _about(axis, angle_rad)
+    R = se3.rotation_z(angle_rad)[:, order][:, :, order]
     return Kinematics(se3.transform(R, still), still, rate[:, None] * along, still, change[:, None] * along)
-
-
-def _about(axis: int, angle_rad: Array) -> Array:
-    """Rotations (K, 3, 3) about x, y or z, by renaming the axes of a rotation about z."""
-    order = np.array([(axis + 1) % 3, (axis + 2) % 3, axis])
-    R = np.zeros((len(angle_rad), 3, 3))
-    R[:, order[:, None], order] = se3.rotation_z(angle_rad)
-    return R

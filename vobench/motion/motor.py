@@ -6,7 +6,7 @@ No slip, no inductance, no limit on voltage. The equations are the paper's as do
 
 from dataclasses import dataclass
 
-from vobench.motion.pioneer import Number, Theta
+from vobench.motion.pioneer import Number, Pair, Theta
 from vobench.setting import NonNegative, Positive, settings
 
 
@@ -73,9 +73,7 @@ def theta_of(motors: MotorConstants) -> Theta:
     )
 
 
-def accelerations_at(
-    u: Number, omega: Number, v_u: Number, v_omega: Number, *, motors: MotorConstants
-) -> tuple[Number, Number]:
+def accelerations_at(u: Number, omega: Number, v_u: Number, v_omega: Number, *, motors: MotorConstants) -> Pair[Number]:
     """Accelerations u' in m/s^2 and omega' in rad/s^2 at these voltages: rows 4 and 5 of (1)."""
     r, d, t = motors.r_m, motors.d_m, voltage_theta_of(motors)
     u_rate = (t.t3 * r**2 * omega**2 - 2 * t.t4 * u + 2 * r * v_u) / t.t1
@@ -84,12 +82,8 @@ def accelerations_at(
 
 
 def loop_voltages(
-    speeds: tuple[Number, Number],
-    references: tuple[Number, Number],
-    rates: tuple[Number, Number],
-    *,
-    motors: MotorConstants,
-) -> tuple[Number, Number]:
+    speeds: Pair[Number], references: Pair[Number], rates: Pair[Number], *, motors: MotorConstants
+) -> Pair[Number]:
     """v_u and v_omega of (6), in V: the loops differentiate the speeds and not the references."""
     (u, omega), (u_ref, omega_ref), (u_rate, omega_rate) = speeds, references, rates
     v_u = motors.kPT_Vspm * (u_ref - u) - motors.kDT_Vs2pm * u_rate
@@ -97,6 +91,6 @@ def loop_voltages(
     return v_u, v_omega
 
 
-def wheel_voltages(v_u: Number, v_omega: Number) -> tuple[Number, Number]:
+def wheel_voltages(v_u: Number, v_omega: Number) -> Pair[Number]:
     """Voltages of the left and the right motor: (7) and (8) solved for them."""
     return v_u - v_omega, v_u + v_omega

@@ -12,6 +12,8 @@ from vobench.geometry.se3 import Array
 
 # Formulas that hold for one instant and for arrays of them.
 Number = TypeVar("Number", float, Array)
+# Of u and omega, of the left and the right wheel, or of x and y.
+Pair = tuple[Number, Number]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,17 +63,15 @@ THETAS = {
 
 
 def accelerations(
-    u: Number, omega: Number, u_ref: Number, omega_ref: Number, *, theta: Theta, delta: tuple[float, float] = (0.0, 0.0)
-) -> tuple[Number, Number]:
+    u: Number, omega: Number, u_ref: Number, omega_ref: Number, *, theta: Theta, delta: Pair[float] = (0.0, 0.0)
+) -> Pair[Number]:
     """Accelerations u' in m/s^2 and omega' in rad/s^2 of (18); `delta` is the paper's (delta_u, delta_omega)."""
     u_rate = (theta.t3 * omega**2 - theta.t4 * u + u_ref) / theta.t1 + delta[0]
     omega_rate = (-theta.t5 * u * omega - theta.t6 * omega + omega_ref) / theta.t2 + delta[1]
     return u_rate, omega_rate
 
 
-def feed_forward(
-    u: Number, omega: Number, u_rate: Number, omega_rate: Number, *, theta: Theta
-) -> tuple[Number, Number]:
+def feed_forward(u: Number, omega: Number, u_rate: Number, omega_rate: Number, *, theta: Theta) -> Pair[Number]:
     """u_ref in m/s and omega_ref in rad/s that (18) turns into these accelerations: it, solved for them."""
     u_ref = theta.t1 * u_rate - theta.t3 * omega**2 + theta.t4 * u
     omega_ref = theta.t2 * omega_rate + theta.t5 * u * omega + theta.t6 * omega
@@ -88,7 +88,7 @@ def velocities(psi: float, u: float, omega: float, *, a_m: float, side_mps: floa
     return u * cos(psi) - left * sin(psi), u * sin(psi) + left * cos(psi), omega
 
 
-def wheel_speeds(u: Number, omega: Number, *, track_m: float) -> tuple[Number, Number]:
+def wheel_speeds(u: Number, omega: Number, *, track_m: float) -> Pair[Number]:
     """Ground speeds of the left and the right wheel in m/s: (9) and (10) solved for the wheels."""
     half = omega * track_m / 2
     return u - half, u + half
@@ -110,7 +110,7 @@ class AccelerationLimits:
             if not getattr(self, name) > 0:
                 raise MotionError(f"the acceleration limit {name} must be positive, got {getattr(self, name)}")
 
-    def held(self, u_rate: Number, omega_rate: Number) -> tuple[Number, Number]:
+    def held(self, u_rate: Number, omega_rate: Number) -> Pair[Number]:
         """Both rates, each cut at its limit."""
         if self.speed_mps2 == self.turn_radps2 == inf:
             return u_rate, omega_rate

@@ -6,7 +6,7 @@ Source: Mellinger and Kumar (2011), minimum snap and differential flatness.
 from dataclasses import dataclass
 from itertools import pairwise
 from math import radians
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import scipy
@@ -15,15 +15,11 @@ from annotated_types import Ge, Le, MinLen
 from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.motion import spline as attitude
 from vobench.motion.rail import check_apart
-from vobench.motion.spline import Jet, from_zero
+from vobench.motion.spline import Jet, cross, from_zero, of_axes, unit
 from vobench.motion.wheeled import Rate, Speed
 from vobench.setting import Triple, settings
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, CurveMotion, Kinematics, evenly
-
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
 
 HELD_MPS2 = np.array([0.0, 0.0, STANDARD_GRAVITY_MPS2])  # what the rotors give beyond the acceleration
 LEAST_LIFT = 0.1  # of the weight: below it the rotors all but stop, and which way is up is lost
@@ -36,16 +32,16 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact for the square of a
 class QuadrotorCurve:
     """A Curve by time in s: position (3 columns) of degree 7, yaw of degree 5."""
 
-    position: "BSpline"
-    yaw_rad: "BSpline"
+    position: "scipy.interpolate.BSpline"
+    yaw_rad: "scipy.interpolate.BSpline"
     breaks: Array
 
     def at(self, s: Array) -> Kinematics:
         """Poses (K, 4, 4) at s (K,) in s: z along the thrust, x as near to the yaw's direction as that allows."""
         p, v, a, jerk, snap = (self.position(s, order) for order in range(5))
-        z = attitude.unit(Jet(a + HELD_MPS2, jerk, snap))
-        y = attitude.unit(attitude.cross(z, self._ahead(s)))
-        held = attitude.of_axes(attitude.cross(y, z), y, z)
+        z = unit(Jet(a + HELD_MPS2, jerk, snap))
+        y = unit(cross(z, self._ahead(s)))
+        held = of_axes(cross(y, z), y, z)
         return Kinematics(se3.transform(held.R, p), held.in_body(v), held.turn, held.in_body(a), held.turn_rate)
 
     def _ahead(self, s: Array) -> Jet:
@@ -90,7 +86,7 @@ class Quadrotor:
         return CurveMotion(curve, evenly(t_s[0], t_s[-1], begin=t_s[0]))
 
 
-def minimum_snap(t_s: Array, points_m: Array) -> "BSpline":
+def minimum_snap(t_s: Array, points_m: Array) -> "scipy.interpolate.BSpline":
     """Of all ways through points (N, 3) at t_s (N,), from hover to hover, the one of the least integral of snap².
 
     That is the interpolating spline of degree 7 with velocity, acceleration and jerk 0 at both ends.
@@ -100,7 +96,7 @@ def minimum_snap(t_s: Array, points_m: Array) -> "BSpline":
     return scipy.interpolate.make_interp_spline(t_s, points_m, k=7, bc_type=(hover, hover))
 
 
-def snap_cost(position: "BSpline", t_s: Array) -> float:
+def snap_cost(position: "scipy.interpolate.BSpline", t_s: Array) -> float:
     """∫ |snap|² dt between the times t_s (N,) that are its knots."""
     half = np.diff(t_s) / 2
     at_s = (t_s[:-1] + half)[:, None] + half[:, None] * NODES
@@ -125,7 +121,7 @@ def _least_snap_times(points: Array, speed_mps: float) -> Array:
     return times(found.x) * lasts_s
 
 
-def _headings(position: "BSpline", t_s: Array, points: Array) -> Array:
+def _headings(position: "scipy.interpolate.BSpline", t_s: Array, points: Array) -> Array:
     """The direction of flight (N,) over ground at each point, turning the shorter way; where it has none, the last."""
     ways = position(t_s, 1)
     ways[0], ways[-1] = points[1] - points[0], points[-1] - points[-2]

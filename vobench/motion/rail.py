@@ -1,23 +1,20 @@
 """A carriage on a rail through points in space: it looks along the rail, level from side to side."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
+import scipy
 from annotated_types import MinLen
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.motion import spline as attitude
 from vobench.motion.course import BLUNT, ArcLength, arc_length
-from vobench.motion.spline import Jet, quintic
+from vobench.motion.spline import Jet, cross, of_axes, quintic, unit
 from vobench.motion.wheeled import Acceleration, Rate, Speed
 from vobench.setting import Triple, settings
 from vobench.trajectory.kinematics import CurveMotion, Kinematics, rest_to_rest
-
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
 
 KNOTS_PER_POINT = 256
 STEEPEST_RAD = np.deg2rad(85.0)
@@ -28,7 +25,7 @@ UP = np.array([0.0, 0.0, 1.0])
 class RailCurve:
     """A Curve by arc length in m: x along the rail, y level."""
 
-    position: "BSpline"
+    position: "scipy.interpolate.BSpline"
     arc: ArcLength
     breaks: Array  # none: positions are four times smooth at the points
 
@@ -36,10 +33,10 @@ class RailCurve:
         """Poses (K, 4, 4) at arc length s (K,), and their derivatives by s."""
         u = self.arc.parameter(s)
         d1, d2, d3 = (self.position(u, order) for order in (1, 2, 3))
-        x = attitude.unit(Jet(d1, d2, d3))
+        x = unit(Jet(d1, d2, d3))
         still = np.zeros_like(d1)
-        y = attitude.unit(attitude.cross(Jet(np.broadcast_to(UP, d1.shape), still, still), x))
-        by_u = attitude.of_axes(x, y, attitude.cross(x, y))
+        y = unit(cross(Jet(np.broadcast_to(UP, d1.shape), still, still), x))
+        by_u = of_axes(x, y, cross(x, y))
         speed = np.linalg.norm(d1, axis=-1, keepdims=True)
         speed_rate = np.sum(x.value * d2, axis=-1, keepdims=True)
         return Kinematics(

@@ -1,7 +1,7 @@
 """A recorded trajectory as a motion: through its very poses for cameras, or smoothed where accelerations count."""
 
 from math import radians
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import scipy
@@ -15,9 +15,6 @@ from vobench.motion.wheeled import Rate
 from vobench.setting import Positive, Triple, settings
 from vobench.trajectory.kinematics import CurveMotion, evenly
 from vobench.trajectory.trajectory import Move, Trajectory, parse_move
-
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
 
 DEGREE = 5
 FEWEST_SMOOTHED = 2 * (DEGREE + 1)
@@ -122,7 +119,7 @@ def _recorded(trajectory: Trajectory, *, fewest: int, max_gap_s: float) -> tuple
     return t_s, se3.transform(se3.nearest_rotation(T[:, :3, :3]), T[:, :3, 3])
 
 
-def _least_squares(t_s: Array, columns: Array, *, knot_hz: float) -> "BSpline":
+def _least_squares(t_s: Array, columns: Array, *, knot_hz: float) -> "scipy.interpolate.BSpline":
     """The spline (7 columns) nearest to rows (N, 7)."""
     wanted_s = np.arange(1, int(t_s[-1] * knot_hz) + 1) / knot_hz
     before = np.searchsorted(t_s, wanted_s)  # poses before each knot wanted

@@ -94,21 +94,6 @@ def generator_of(rngs: Generators | None, stream: str) -> np.random.Generator:
     return rngs[stream]
 
 
-def disturbance_paths(
-    count: int, stds: Mapping[str, float], *, step_s: float, correlation_s: float, rngs: Generators | None
-) -> Array:
-    """Ornstein-Uhlenbeck paths (count, n) of these standard deviations, each from the generator of its stream.
-
-    Raises MotionError where one is left to chance and its generator is missing.
-    """
-    path = np.zeros((count, len(stds)))
-    for column, (stream, std) in enumerate(stds.items()):
-        if std > 0:
-            rng = generator_of(rngs, stream)
-            path[:, column] = ornstein_uhlenbeck(count, std=std, step_s=step_s, correlation_s=correlation_s, rng=rng)
-    return path
-
-
 Bias = Annotated[float, Ge(-0.3), Le(0.3)]
 
 
@@ -224,13 +209,14 @@ def drawn(
     rngs: Generators | None,
 ) -> Disturbances:
     """The disturbances of `count` frames. Raises MotionError where they ask for chance and a stream is missing."""
-    slips = dict(zip(SLIP_STREAMS, (slip.ratio_std, slip.ratio_std, slip.angle_std_rad), strict=True))
-    deltas = dict(zip(DELTA_STREAMS, (delta.speed_std_mps2, delta.turn_std_radps2), strict=True))
-    rows = [
-        disturbance_paths(count, stds, step_s=step_s, correlation_s=correlation_s, rngs=rngs)
-        for stds, correlation_s in ((slips, slip.correlation_s), (deltas, delta.correlation_s))
-    ]
-    return Disturbances(np.hstack(rows), slip.skid_s, slip.traction_s2pm, tuple(floor))
+    stds = (slip.ratio_std, slip.ratio_std, slip.angle_std_rad, delta.speed_std_mps2, delta.turn_std_radps2)
+    rows = np.zeros((count, len(stds)))
+    for column, (stream, std) in enumerate(zip((*SLIP_STREAMS, *DELTA_STREAMS), stds, strict=True)):
+        if std > 0:
+            correlation_s = slip.correlation_s if stream in SLIP_STREAMS else delta.correlation_s
+            rng = generator_of(rngs, stream)
+            rows[:, column] = ornstein_uhlenbeck(count, std=std, step_s=step_s, correlation_s=correlation_s, rng=rng)
+    return Disturbances(rows, slip.skid_s, slip.traction_s2pm, tuple(floor))
 
 
 def _cut(value: float) -> float:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import scipy
@@ -85,9 +85,6 @@ def _dot(a: Array, b: Array) -> Array:
     return product
 
 
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
-
 FEWEST = 3
 WIDEST_TURN_RAD = np.deg2rad(175.0)  # beyond it rounding or noise decides which way round
 
@@ -99,7 +96,7 @@ class PoseCurve:
     breaks: where the spline of rotations changes its piece.
     """
 
-    position: "BSpline"
+    position: "scipy.interpolate.BSpline"
     attitude: Callable[[Array], Attitude]
     breaks: Array
 
@@ -191,7 +188,7 @@ def through(t_s: Array, T: Array) -> PoseCurve:
     return PoseCurve(quintic(t_s, T[:, :3, 3]), turned, t_s[1:-1])
 
 
-def quintic(t: Array, values: Array) -> "BSpline":
+def quintic(t: Array, values: Array) -> "scipy.interpolate.BSpline":
     """The natural quintic through values (N, n) at t (N,), N >= 3: of all curves through them the one of least jerk."""
     natural = [(3, np.zeros(values.shape[1:])), (4, np.zeros(values.shape[1:]))]
     return scipy.interpolate.make_interp_spline(t, values, k=5, bc_type=(natural, natural))

@@ -1,53 +1,64 @@
-"""Baked light: what each light alone gives every surface; on disk, and read back."""
+"""Baked light: what each light alone gives every face; on disk, and read back."""
 
 import json
 import zipfile
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import scipy
 from annotated_types import Ge
-from numpy.typing import NDArray
 
 from vobench import stop
 from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
-from vobench.render.direct_light import SKY_SMOOTHING, direct_light, in_front, mirror_images, sees_open_sky
-from vobench.render.emitter import Emitter, emitters
-from vobench.render.geometry import Floats, SurfaceList, Visibility, inventory
-from vobench.render.indirect_light import bounced, final_gather, surface_responses
-from vobench.render.lightmap import Atlas, Chart, Holes, Scales, Texels, holes, outside, pack_atlas, texels
+from vobench.render.direct_light import direct_light, mirror_images
+from vobench.render.emitter import emitters
+from vobench.render.geometry import FAR_M, Floats, Indices, Mask, RayCaster, Visibility, areas_m2, face_materials, off
+from vobench.render.indirect_light import FinalGather, Gatherer, albedo, blend, bounced, response, surfels
+from vobench.render.lightmap import Atlas, Layout, Texels, owners, texels, unwrap
 from vobench.scene.light import NS_PER_S, AreaLight, Light, Sky, Sun
-from vobench.scene.material import Map, Polished, reflectance, texture_of, under_coat
-from vobench.scene.scene import Scene
+from vobench.scene.mesh import Triangles
+from vobench.scene.scene import Scene, triangles
 from vobench.setting import Positive, settings
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 Report = Callable[[float], object]
 MOVER_COARSER = 2
 SUNLIT_FINER = 2  # the half shadow of the sun is 1 cm wide for each metre to what casts it
-TEXTURES_DONE, GATHER_DONE = 0.05, 0.5  # the shares of a bake that are done after each, about
+CELL_TEXELS = 2.5  # along a surfel's side at least, where samples are far apart
+PROBES_M = 0.25  # between places that ask whether the sun reaches a face
+PLACED_DONE, GATHER_DONE = 0.1, 0.4  # the shares of a bake that are done after each, about
+SMALL_M2 = 10.0  # of a thing that is sunlit as a whole
+SKY_RAYS = 64  # at least from a surfel to tell whether it sees the sky
+BLIND = 0.02  # of a surfel's rays: one that sees less is inside something
+UNSEEN = 1e-3  # hits, of a texel that no ray has found
 SUN_STEP_RAD = np.deg2rad(3)  # between the suns whose indirect light is baked
 
 
 @settings(kw_only=False)
 class BakeSettings:
-    """How finely light is sampled; rays per sample are squares so that they can be stratified."""
+    """How finely light is sampled; rays per sample are squares so that they can be stratified.
+
+    bounces: at most; they end where they add no more.
+    """
 
     spacing_m: Positive = 0.025
     light_rays: Annotated[int, Ge(1)] = 16
     indirect_spacing_m: Positive = 0.1
     indirect_rays: Annotated[int, Ge(0)] = 256
-    bounces: Annotated[int, Ge(0)] = 12
+    bounces: Annotated[int, Ge(0)] = 64
     seed: Annotated[int, Ge(0)] = 0
 
 
 @dataclass(frozen=True, slots=True)
 class SunTrack:
-    """Indirect light (K, h, w) of the moving sun among the lights, at times_ns (K,) increasing."""
+    """Indirect light (K, S, 3) of the moving sun among the lights, at times_ns (K,) increasing."""
 
     light: int
     times_ns: tuple[float, ...]
@@ -55,114 +66,201 @@ class SunTrack:
 
 
 @dataclass(frozen=True, slots=True)
-class BakedScene:
-    """A scene with its light: all that drawing a picture needs, laid out by `atlas` over its inventory.
+class Patches:
+    """What surfels send out: surfel_of (H·W,) is the one that each texel is in, -1 for none.
 
-    light (L, H, W): what each light alone gives at level 1, bounces included: illuminance in lux, under a coat
-    the share that enters it; a panel holds pi times its luminance. albedo: a tile per material with a body,
-    under a coat already `under_coat`. A moving sun's layer is that of its first instant; see `tracks` for more.
+    reflectance (S, 3), area_m2 (S,); radiosity (L, S, 3) under each light if it is white, in lm/m².
+    """
+
+    surfel_of: Indices
+    reflectance: Floats
+    area_m2: Floats
+    radiosity: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class BakedScene:
+    """A scene with its light: all that drawing a picture needs. Its faces' places on the map are in `atlas`.
+
+    direct (L, H, W): what each light alone gives straight at level 1 if it is white: illuminance in lux, under a coat
+    the share that enters it; on a lamp pi times its luminance. bounced (L, S, 3): what it gives surfels by bounces;
+    spread (H·W, S) lays that on the map. A moving sun's layers are those of its first instant; see `tracks` for more.
     """
 
     scene: Scene
+    faces: Triangles
     atlas: Atlas
-    light: Floats
-    albedo: dict[str, Map]
+    direct: Floats
+    bounced: Floats
+    spread: "csr_matrix"
+    patches: Patches
     settings: BakeSettings = field(default_factory=BakeSettings)
     tracks: tuple[SunTrack, ...] = ()
+
+    @property
+    def light_uv(self) -> Floats:
+        """Places (F, 3, 2) of faces' corners on the map in [0, 1]."""
+        return self.atlas.light_uv
 
 
 @dataclass(frozen=True, slots=True)
 class StaticScene:
-    """What does not move of a scene, as rays and as points."""
+    """What does not move of a scene, as rays and as points.
 
-    things: SurfaceList
+    cells (P,): the surfel of each point; open_sky (P,): whether it may see the sky by no pane.
+    """
+
+    faces: Triangles
     visibility: Visibility
     atlas: Atlas
     points: Texels
-    holes: Holes
+    layout: Layout
+    cells: Indices
+    open_sky: Mask
 
 
-def placed(scene: Scene, *, spacing_m: float, sunlit: NDArray[np.bool_] | None = None) -> Atlas:
-    """A map of a scene's inventory, finer where it is sunlit (S,).
-
-    Movers' samples are coarser, as their light is found anew for each picture.
-    """
-    things = inventory(scene)
-    share = np.where(things.mover < 0, 1.0, MOVER_COARSER)
-    if sunlit is not None:
-        share = np.where(sunlit, 1 / SUNLIT_FINER, share)
-    return pack_atlas(things.surfaces, spacing_m=share * spacing_m)
+def bodies(scene: Scene, faces: Triangles) -> Mask:
+    """The faces (F,) that light can show on."""
+    own = face_materials(faces, scene.materials)
+    return np.array([material is not None and material.kind == "body" for material in own], bool)[faces.thing]
 
 
-def static_scene(scene: Scene, atlas: Atlas, *, seed: int) -> StaticScene:
-    """A scene without its movers."""
-    things = inventory(scene)
-    static = tuple(np.flatnonzero(things.mover < 0).tolist())
-    visibility = Visibility(things.surfaces, scene.materials, static)
-    points = texels(things.surfaces, scene.materials, atlas, among=static, seed=seed)
-    points = outside(points, atlas, visibility, things.panel >= 0)
-    return StaticScene(things, visibility, atlas, points, holes(atlas, points.index))
+def spacings_m(scene: Scene, faces: Triangles, settings: BakeSettings) -> Array:
+    """Between samples on each face (F,): what its thing asks for, finer where it is sunlit, coarser on movers."""
+    asked = np.array([thing.spacing_m or settings.spacing_m for thing in faces.things])[faces.thing]
+    share = np.where(_sunlit(scene, faces), 1 / SUNLIT_FINER, 1.0)
+    return np.asarray(asked * np.where(faces.mover < 0, share, MOVER_COARSER))
+
+
+def _sunlit(scene: Scene, faces: Triangles) -> Mask:
+    """The faces (F,) of planes and small things that the sun reaches, at any of the instants it is baked for."""
+    lit, suns = np.zeros(len(faces), bool), [light for light in scene.lights if isinstance(light, Sun)]
+    static = np.flatnonzero(bodies(scene, faces) & (faces.mover < 0))
+    if not suns or not len(static):
+        return lit
+    area_m2 = areas_m2(faces.corners_m)
+    which = np.repeat(static, 1 + (area_m2[static] / PROBES_M**2).astype(int))
+    a, b = np.random.default_rng(0).random((2, len(which), 1))
+    first, second, third = faces.corners_m[which].swapaxes(0, 1)
+    points = off(first + np.sqrt(a) * (second - first + b * (third - second)), faces.plane[which])
+    caster = RayCaster(faces, np.flatnonzero((faces.mover < 0) & ~_panes(scene, faces)))
+    for way in [sun.direction(t_ns) for sun in suns for t_ns in key_times_ns(sun)]:
+        faced = np.flatnonzero(faces.plane[which] @ way > 0)
+        shaded = caster.stops(points[faced], np.broadcast_to(FAR_M * way, (len(faced), 3)))
+        lit[which[faced[~shaded]]] = True
+    # All of a plane and of a small thing, so that no map changes its spacing amid either.
+    small = np.bincount(faces.thing, area_m2)[faces.thing] < SMALL_M2
+    offset = np.rint(np.einsum("ij,ij->i", faces.plane, faces.corners_m[:, 0]) * 1e3)
+    keys = np.column_stack([faces.thing, *(np.where(small, 0, x) for x in (*np.rint(faces.plane * 1e3).T, offset))])
+    group = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    return np.asarray((np.bincount(group, lit) > 0)[group])
+
+
+def _panes(scene: Scene, faces: Triangles) -> Mask:
+    return np.array([m is not None and m.kind == "pane" for m in face_materials(faces, scene.materials)])[faces.thing]
+
+
+def static_points(scene: Scene, faces: Triangles, atlas: Atlas, seed: int) -> tuple[Visibility, Texels, Layout]:
+    """A scene without its movers, as rays and as points, and these on the map."""
+    static = faces.mover < 0
+    visibility, on_map = Visibility(faces, scene.materials, np.flatnonzero(static)), owners(atlas)
+    own = texels(faces, scene.materials, atlas, on_map, among=static, seed=seed, visibility=visibility)
+    return visibility, *own
+
+
+def static_scene(baked: BakedScene) -> StaticScene:
+    """What does not move of a baked scene, once more."""
+    visibility, points, layout = static_points(baked.scene, baked.faces, baked.atlas, baked.settings.seed)
+    cells = baked.patches.surfel_of[points.index]
+    every = np.ones(len(points), bool)
+    return StaticScene(baked.faces, visibility, baked.atlas, points, layout, cells, every)
 
 
 def bake(scene: Scene, settings: BakeSettings, report: Report = lambda _: None) -> BakedScene:
-    """Make the textures and compute the light of a scene; the same bytes for the same arguments.
+    """Compute the light of a scene; the same bytes for the same arguments.
 
     `report` is called now and then with the share of the work that is done, about.
     """
-    coarse = static_scene(scene, placed(scene, spacing_m=settings.indirect_spacing_m), seed=settings.seed)
-    atlas = placed(scene, spacing_m=settings.spacing_m, sunlit=_sunlit(scene, coarse, settings))
-    albedo = tiles(scene)
-    report(TEXTURES_DONE)
-    fine = static_scene(scene, atlas, seed=settings.seed)
-    scales = Scales(fine.atlas, coarse.atlas)
-    gathered = final_gather(
-        coarse.points,
-        coarse.atlas,
-        coarse.visibility,
-        surface_responses(coarse.things.surfaces, scene.materials, albedo, coarse.things.panel),
-        [light for light in scene.lights if isinstance(light, Sky)],
-        rays=settings.indirect_rays,
-        done=lambda share: report(TEXTURES_DONE + (GATHER_DONE - TEXTURES_DONE) * share),
+    faces = triangles(scene)
+    spacing_m = spacings_m(scene, faces, settings)
+    atlas = unwrap(faces, spacing_m, bodies(scene, faces))
+    visibility, points, layout = static_points(scene, faces, atlas, settings.seed)
+    thing = faces.thing[points.face]
+    step_m = np.maximum(settings.indirect_spacing_m, CELL_TEXELS * spacing_m[points.face]).astype(np.float32)
+    groups = surfels(points, thing, step_m, visibility)
+    surfel_of = np.append(groups.of, np.int32(-1))[layout.source]
+    report(PLACED_DONE)
+    skies = [light for light in scene.lights if isinstance(light, Sky)]
+    gatherer = Gatherer(
+        atlas,
+        visibility,
+        response(faces, scene.materials, visibility),
+        skies,
+        surfel_of,
+        len(groups),
+        len(scene.lights),
     )
+    rays = max(settings.indirect_rays, SKY_RAYS if skies else 0)
+    gathered = gatherer.gather(
+        points.take(groups.middle),
+        rays=rays,
+        done=lambda share: report(PLACED_DONE + (GATHER_DONE - PLACED_DONE) * share),
+    )
+    usable = np.asarray(gathered.table.sum(1)).ravel() + gathered.escaped > BLIND
+    spread = blend(points, groups, layout, visibility, usable)
+    open_sky = (spread @ gathered.escaped)[points.index] > 0
+    still = StaticScene(faces, visibility, atlas, points, layout, groups.of, open_sky)
+    # What rays have found of a surfel stands for it, not what hides under a rug.
+    weights = np.bincount(layout.source, gathered.hits, len(points) + 1)[: len(points)] + UNSEEN
+    scatters = albedo(faces, scene.materials, points)
     instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
-    light = np.zeros((len(scene.lights), fine.atlas.height, fine.atlas.width), np.float32)
-    straight = np.zeros((len(instants), coarse.atlas.height, coarse.atlas.width), np.float32)
+    direct = np.zeros((len(scene.lights), atlas.height, atlas.width), np.float32)
+    received = np.zeros((len(instants), len(groups), 3), np.float32)
     # Backwards, so that a moving sun's layer ends as that of its first instant.
     for row, (index, t_ns) in reversed(list(enumerate(instants))):
-        light[index] = direct_layer(scene, index, fine, settings, t_ns=t_ns)
-        straight[row] = scales.coarsened(light[index, None])[0]
+        light = direct_points(scene, index, still, settings, t_ns=t_ns)
+        received[row] = groups.mean(scatters * light[:, None], weights)
+        direct[index] = direct_layer(scene, index, still, light)
         report(1 - (1 - GATHER_DONE) * row / len(instants))
-    skies = [row for row, (index, _) in enumerate(instants) if isinstance(scene.lights[index], Sky)]
-    around = bounced(straight, gathered, skies, coarse.holes, bounces=settings.bounces)
+    reflectance = groups.mean(scatters, weights)
+    by_mirrors = _by_mirrors(scene, [index for index, _ in instants], gathered, len(groups))
+    around = bounced(received, reflectance, gathered, by_mirrors, bounces=settings.bounces)
     first = [instants.index((index, key_times_ns(one)[0])) for index, one in enumerate(scene.lights)]
-    light += scales.refined(around[first])
-    return BakedScene(scene, fine.atlas, light, albedo, settings, _tracks(scene, instants, around))
+    areas = _point_areas_m2(faces, thing)
+    patches = Patches(
+        surfel_of,
+        reflectance,
+        np.bincount(groups.of, areas, len(groups)),
+        received[first] + reflectance * around[first],
+    )
+    return BakedScene(
+        scene, faces, atlas, direct, around[first], spread, patches, settings, _tracks(instants, around, scene)
+    )
 
 
-def tiles(scene: Scene) -> dict[str, Map]:
-    """Every body's tile: reflectance, or what a coat makes of it."""
-    made: dict[str, Map] = {}
-    for name, material in sorted(scene.materials.items()):
-        stop.check()
-        texture = texture_of(material)
-        if texture is not None:
-            made[name] = reflectance(texture)
-        if isinstance(material, Polished):
-            made[name] = under_coat(made[name].astype(float), material.eta).astype(np.float32)
-    return made
+def _point_areas_m2(faces: Triangles, thing: Indices) -> Array:
+    """The area (P,) that each point stands for among all of its thing's, whose index (P,) is given."""
+    of_thing = np.bincount(faces.thing, areas_m2(faces.corners_m))
+    return np.asarray(of_thing[thing] / np.bincount(thing, minlength=len(of_thing))[thing])
 
 
-def _sunlit(scene: Scene, coarse: StaticScene, settings: BakeSettings) -> NDArray[np.bool_]:
-    """The surfaces (S,) on which the sun casts shadows, at any of the instants it is baked for."""
-    lit = np.zeros(len(coarse.things.surfaces), bool)
-    for index, light in enumerate(scene.lights):
-        for t_ns in key_times_ns(light) if isinstance(light, Sun) else ():
-            layer = direct_layer(scene, index, coarse, settings, t_ns=t_ns)
-            lit |= [bool(layer[chart.window].any()) for chart in coarse.atlas.charts]
-    return lit
+def _by_mirrors(scene: Scene, rows: list[int], gathered: FinalGather, surfels: int) -> Floats:
+    """Illuminance (K, S) of surfels by lamps and the sky that rays found by way of mirrors, of lights `rows` (K,)."""
+    result, skies = (
+        np.zeros((len(rows), surfels), np.float32),
+        [i for i, x in enumerate(scene.lights) if isinstance(x, Sky)],
+    )
+    for row, index in enumerate(rows):
+        light = scene.lights[index]
+        if isinstance(light, AreaLight):
+            shown = gathered.table[:, surfels + index].toarray().ravel()
+            result[row] = np.pi * light.luminance_cd_m2 * shown
+        elif isinstance(light, Sky):
+            result[row] = gathered.sky[skies.index(index)]
+    return result
 
 
-def _tracks(scene: Scene, instants: list[tuple[int, float]], around: Floats) -> tuple[SunTrack, ...]:
+def _tracks(instants: list[tuple[int, float]], around: Floats, scene: Scene) -> tuple[SunTrack, ...]:
     rows = {sun: [row for row, (index, _) in enumerate(instants) if index == sun] for sun in moving_suns(scene)}
     return tuple(SunTrack(sun, tuple(instants[row][1] for row in own), around[own]) for sun, own in rows.items())
 
@@ -189,59 +287,64 @@ def wandered_rad(sun: Sun) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.hypot(across, np.diff(np.deg2rad(sun.elevation_deg))))])
 
 
-def direct_layer(scene: Scene, index: int, fine: StaticScene, settings: BakeSettings, *, t_ns: float) -> Floats:
-    """What one light gives straight (H, W), its panel's glow included."""
-    light, total = scene.lights[index], np.zeros(len(fine.points), np.float32)
-    shown = mirror_images(light, fine.visibility, t_ns=t_ns)
-    for emitter in [*emitters(light, fine.visibility, t_ns=t_ns), *shown]:
+def direct_points(scene: Scene, index: int, still: StaticScene, settings: BakeSettings, *, t_ns: float) -> Floats:
+    """What one light gives the points straight (P,)."""
+    light, total = scene.lights[index], np.zeros(len(still.points), np.float32)
+    side = round(np.sqrt(settings.light_rays))
+    shown = mirror_images(light, still.visibility, t_ns=t_ns)
+    for emitter in [*emitters(light, still.visibility, t_ns=t_ns), *shown]:
         stop.check()
-        some = np.flatnonzero(reached(emitter, fine))
-        side = round(np.sqrt(settings.light_rays))
-        total[some] += direct_light(emitter, fine.points.take(some), fine.atlas, fine.visibility, side=side)
-    layer = fine.holes.filled(total).reshape(fine.atlas.height, fine.atlas.width)
-    for chart in fine.atlas.charts if isinstance(light, Sky) else ():
-        layer[chart.window] = scipy.ndimage.gaussian_filter(layer[chart.window], SKY_SMOOTHING, mode="nearest")
-    if isinstance(light, AreaLight):
-        panel = int(np.flatnonzero(fine.things.panel == scene.panels.index(light))[0])
-        layer[fine.atlas.charts[panel].window] = np.pi * light.luminance_cd_m2
+        among = still.open_sky if emitter.sky == "open" else np.ones(len(still.points), bool)
+        total += direct_light(
+            emitter, still.points, still.layout, still.cells, still.visibility, side=side, among=among
+        )
+    return total
+
+
+def direct_layer(scene: Scene, index: int, still: StaticScene, light: Floats) -> Floats:
+    """The map (H, W) of what one light gives the points straight (P,), its own glow included."""
+    layer, lamp = still.layout.filled(light), scene.lights[index]
+    if isinstance(lamp, AreaLight):
+        layer[still.atlas.block(int(np.flatnonzero(still.faces.lamp == index)[0]))] = np.pi * lamp.luminance_cd_m2
     return layer
 
 
-def reached(emitter: Emitter, fine: StaticScene) -> NDArray[np.bool_]:
-    """The points (P,) that an emitter may light."""
-    ahead = in_front(emitter.ball, fine.points.points_m, fine.points.normals)
-    return ahead & sees_open_sky(emitter, fine.points, fine.visibility) if emitter.sky == "open" else ahead
-
-
-LIGHT, CHARTS, SETTINGS_FILE = "light.npy", "charts.npy", "settings.json"
+LIGHT, PLACES, SETTINGS_FILE = "light.npy", "surfels.npz", "settings.json"
 
 
 def save_baked(folder: Path, baked: BakedScene) -> None:
-    """Write the maps of a baked scene into a folder."""
+    """Write the light of a baked scene into a folder."""
     (folder / SETTINGS_FILE).write_text(json.dumps(asdict(baked.settings)))
-    np.save(folder / LIGHT, baked.light)
-    charts = [(p.row, p.column, p.rows, p.columns) for p in baked.atlas.charts]
-    np.save(folder / CHARTS, np.array(charts, np.int32))
-    for name, tile in baked.albedo.items():
-        np.save(folder / f"albedo.{name}.npy", tile)
+    np.save(folder / LIGHT, baked.direct)
+    atlas, patches, spread = baked.atlas, baked.patches, baked.spread
+    np.savez(
+        folder / PLACES,
+        light_px=atlas.light_px,
+        chart=atlas.chart,
+        bounced=baked.bounced,
+        **{f"spread_{name}": getattr(spread, name) for name in ("data", "indices", "indptr")},
+        **{field.name: getattr(patches, field.name) for field in fields(Patches)},
+    )
     for track in baked.tracks:
         np.savez(folder / f"sun.{track.light}.npz", times_ns=track.times_ns, bounced=track.bounced)
 
 
 def load_baked(folder: Path, scene: Scene) -> BakedScene:
-    """The maps that `save_baked` wrote, for the same scene. Raises RenderError where they are damaged."""
+    """The light that `save_baked` wrote, for the same scene. Raises RenderError where it is damaged."""
     try:
         settings = BakeSettings(**json.loads((folder / SETTINGS_FILE).read_text()))
-        light = np.load(folder / LIGHT)
-        charts = tuple(Chart(*row) for row in np.load(folder / CHARTS).tolist())
-        bodies = [name for name, material in sorted(scene.materials.items()) if texture_of(material)]
-        albedo = {name: np.load(folder / f"albedo.{name}.npy") for name in bodies}
-        tracks = tuple(_track(folder / f"sun.{sun}.npz", sun) for sun in moving_suns(scene))
+        light, kept = np.load(folder / LIGHT), _load(folder / PLACES)
+        suns = {sun: _load(folder / f"sun.{sun}.npz") for sun in moving_suns(scene)}
+        tracks = tuple(SunTrack(sun, tuple(own["times_ns"].tolist()), own["bounced"]) for sun, own in suns.items())
+        atlas = Atlas(kept["light_px"], kept["chart"], *light.shape[1:])
+        patches = Patches(*(kept[field.name] for field in fields(Patches)))
+        shape = (light[0].size if len(light) else atlas.height * atlas.width, len(patches.area_m2))
+        spread = scipy.sparse.csr_matrix(tuple(kept[f"spread_{name}"] for name in ("data", "indices", "indptr")), shape)
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, SettingError) as error:
         raise RenderError(f"the scene's light cannot be read ({error}); delete this folder: {folder}") from error
-    return BakedScene(scene, Atlas(charts, *light.shape[1:]), light, albedo, settings, tracks)
+    return BakedScene(scene, triangles(scene), atlas, light, kept["bounced"], spread, patches, settings, tracks)
 
 
-def _track(path: Path, sun: int) -> SunTrack:
+def _load(path: Path) -> dict[str, Any]:
     with path.open("rb") as file, np.load(file) as stored:  # np.load leaves a torn file open
-        return SunTrack(sun, tuple(stored["times_ns"].tolist()), stored["bounced"])
+        return dict(stored)

@@ -1,67 +1,68 @@
 """Direct light at texels: stratified shadow rays, and lamps that flat mirrors show."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
-from vobench.render.emitter import Aim, Emitter, emitters
-from vobench.render.geometry import RAY_OFFSET_M, Ball, Floats, Visibility
-from vobench.render.lightmap import Atlas, Texels, in_chunks
+from vobench.render.emitter import Aim, Between, Emitter, emitters
+from vobench.render.geometry import RAY_OFFSET_M, Ball, Flat, Floats, Indices, Mask, RayCaster, Visibility, ball
+from vobench.render.lightmap import Layout, Places, Texels, in_chunks
 from vobench.scene.light import Light, Sky
-from vobench.scene.surface import Surface
 
 
 @dataclass(frozen=True, slots=True)
 class _MirrorImage:
-    """An emitter in a mirror: rays go straight to where its image is, through the mirror's rectangle."""
+    """An emitter in a mirror: rays go straight to where its image is, through the mirror's faces."""
 
     emitter: Emitter
-    mirror: Surface
+    mirror: Flat
     tint: float
+    caster: RayCaster
 
     def width_rad(self, points_m: Floats) -> Floats:
         return self.emitter.width_rad(self.behind(points_m))
 
     def towards(self, texels: Texels) -> Aim:
-        images = replace(texels, points_m=self.behind(texels.points_m), normals=self._turned(texels.normals))
-        aim_from_behind = self.emitter.towards(images)
+        return self._mirrored(texels, self.emitter.towards)
+
+    def evenly(self, texels: Texels) -> Aim:
+        return self._mirrored(texels, self.emitter.evenly or self.emitter.towards)
+
+    def _mirrored(self, texels: Texels, towards: Callable[[Texels], Aim]) -> Aim:
+        turned = {name: self._turned(getattr(texels, name)) for name in ("normals", "planes")}
+        aim_from_behind = towards(replace(texels, points_m=self.behind(texels.points_m), **turned))
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
             way, strength = aim_from_behind(a, b)
-            way = self._turned(way)
-            return way, np.where(self._meets(texels.points_m, way), self.tint * strength, 0)
+            return self._turned(way), np.float32(self.tint) * strength
 
         return aim
 
-    def passing(self, visibility: Visibility, origins_m: Floats, way: Floats) -> Floats:
-        reach = self._reach(origins_m, way)[:, None]
-        share = visibility.passing(origins_m, reach * way)
-        some = np.flatnonzero(share)
-        met = origins_m[some] + reach[some] * way[some] + (RAY_OFFSET_M * self.mirror.normal).astype(np.float32)
-        share[some] *= self.emitter.passing(visibility, met, self._turned((1 - reach[some]) * way[some]))
+    def passing(self, between: Between, origins_m: Floats, way: Floats) -> Floats:
+        share, some = np.zeros(len(origins_m), np.float32), self._meeting(origins_m, way)
+        reach = self._reach(origins_m[some], way[some])[:, None]
+        share[some] = between.passing(origins_m[some], reach * way[some])
+        met = origins_m[some] + reach * way[some] + (RAY_OFFSET_M * self.mirror.normal).astype(np.float32)
+        share[some] *= self.emitter.passing(between, met, self._turned((1 - reach) * way[some]))
         return share
 
     def behind(self, points_m: Floats) -> Floats:
-        normal = self.mirror.normal
-        height = (points_m - self.mirror.corner_m) @ normal
-        return (points_m - 2 * height[:, None] * normal).astype(points_m.dtype)
+        return (points_m - 2 * self.mirror.height_m(points_m)[:, None] * self.mirror.normal).astype(points_m.dtype)
 
     def _reach(self, points_m: Floats, way: Floats) -> Floats:
         """The share (P,) of each way at which it meets the mirror's plane."""
-        normal = self.mirror.normal
         with np.errstate(divide="ignore", invalid="ignore"):
-            reach: Floats = ((self.mirror.corner_m - points_m) @ normal) / (way @ normal)
+            reach: Floats = -self.mirror.height_m(points_m) / (way @ self.mirror.normal)
         return reach.astype(np.float32)
 
-    def _meets(self, points_m: Floats, way: Floats) -> Floats:
-        """Whether ways (P, 3) from points pass the mirror's rectangle from its front."""
+    def _meeting(self, points_m: Floats, way: Floats) -> Places:
+        """Which ways (P, 3) from points pass the mirror's faces from their front."""
         reach = self._reach(points_m, way)
-        ahead = (way @ self.mirror.normal < 0) & (reach > 0) & (reach < 1)
-        place = points_m + np.where(ahead, reach, 0)[:, None] * way - self.mirror.corner_m
-        u, v = (place @ edge / (edge @ edge) for edge in (self.mirror.edge_u_m, self.mirror.edge_v_m))
-        return np.asarray(ahead & (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1))
+        some = np.flatnonzero((way @ self.mirror.normal < 0) & (reach > 0) & (reach < 1))
+        return some[self.caster.stops(points_m[some], way[some])]
 
     def _turned(self, vectors: Floats) -> Floats:
         normal = self.mirror.normal
@@ -74,18 +75,39 @@ def mirror_images(light: Light, visibility: Visibility, *, t_ns: float) -> list[
         return []
     own = emitters(light, visibility, t_ns=t_ns)
     found = []
-    for image in [_MirrorImage(emitter, mirror, tint) for mirror, tint in visibility.mirrors for emitter in own]:
-        ball = Ball(image.behind(image.emitter.ball.centre_m[None])[0], image.emitter.ball.radius_m)
-        found.append(Emitter(ball, image.towards, image.width_rad, image.passing))
+    for image in [_MirrorImage(emitter, *mirror) for mirror in visibility.mirrors for emitter in own]:
+        around = Ball(image.behind(image.emitter.ball.centre_m[None])[0], image.emitter.ball.radius_m)
+        may_light = partial(_shown, image, around)
+        found.append(
+            Emitter(
+                around,
+                image.towards,
+                image.width_rad,
+                image.passing,
+                may_light=may_light,
+                evenly=image.evenly,
+                spots=image.emitter.spots,
+            )
+        )
     return found
+
+
+def _shown(image: _MirrorImage, what: Ball, points_m: Floats) -> Mask:
+    """Points (P, 3) before the mirror from which a ball behind it lies beyond its outline."""
+    frame = ball(image.mirror.corners_m)
+    way = what.centre_m - points_m.astype(float)
+    height, far = image.mirror.height_m(points_m), way @ image.mirror.normal
+    share = np.clip(height / np.maximum(-far, 1e-9), 0, 1)
+    apart = np.linalg.norm(points_m + share[:, None] * way - frame.centre_m, axis=1)
+    return np.asarray((height > 0) & (apart <= frame.radius_m + share * what.radius_m))
 
 
 # Steps of additive recurrences that fill the unit interval evenly: Roberts (2018), R2 and the golden ratio.
 JITTER = np.array([0.7548776662, 0.5698402910], np.float32)
 FOOTPRINT = np.array([0.6180339887, 0.3247179572], np.float32)
-NARROW_RAD, WIDE_RAD = 0.15, 0.6  # emitters that are seen narrower or wider get a quarter or four times the rays
-SKY_SMOOTHING = 1.0  # samples; its shadows are so soft that averaging neighbours takes noise away, and nothing else
-PROBE_STEP, PROBE_SIDE, OPEN_SHARE = 7, 4, 1e-3
+NARROW_RAD, WIDE_RAD = 0.15, 0.6  # emitters that are seen narrower or wider need fewer or more rays
+MOST = 0.7
+RIM = 2  # texels around a place of half shadow
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,96 +118,118 @@ class Rays:
     spread: bool = False
 
 
-def direct_light(emitter: Emitter, texels: Texels, atlas: Atlas, visibility: Visibility, *, side: int) -> Floats:
-    """Illuminance (P,) in lux that one emitter gives at level 1; under a coat the part that enters."""
-    light, clear = np.zeros(len(texels), np.float32), np.full(len(texels), np.nan, np.float32)
-    coarse = np.zeros(len(texels), bool)
-    for rays, some in first_rays(emitter, texels, side):
-        light[some], clear[some] = arriving(emitter, texels.take(some), visibility, rays)
-        coarse[some] = rays.side < 2 * side
+def direct_light(
+    emitter: Emitter, points: Texels, layout: Layout, cells: Indices, visibility: Visibility, *, side: int, among: Mask
+) -> Floats:
+    """Illuminance (P,) in lux that one emitter gives at level 1 to those among the points; of coats what enters.
+
+    Few rays tell whether the emitter is seen, of soft shadows at every other point along rows and columns. Where it
+    is neither seen nor hidden all around, within RIM texels or in the same of the cells (P,), many rays follow.
+    Elsewhere many spots on it are added up without rays, and the sky in a pane is smoothed instead.
+    """
+    light, share = np.zeros((2, len(points)), np.float32)
+    clear, some = np.full(len(points), np.nan, np.float32), np.flatnonzero(among)
+    some = some[in_front(emitter.ball, points.points_m[some], points.normals[some])]
+    some = some[emitter.may_light(points.points_m[some])]
+    kinds = first_rays(emitter, points.points_m[some], side)
+    is_soft = bool((kinds > 1).any())
+    for kind in np.unique(kinds):
+        own = some[(kinds == kind) & (layout.few[some] if is_soft else True)]
+        light[own], clear[own], unshaded = arriving(emitter, points.take(own), visibility, Rays(int(kind)))
+        share[own] = light[own] / np.maximum(unshaded, 1e-30)
     if emitter.sky == "pane":
-        return light  # so soft that the map is smoothed instead
-    grainy = np.flatnonzero(_half_shadow(clear, texels, atlas) & coarse)
-    light[grainy], _ = arriving(emitter, texels.take(grainy), visibility, Rays(2 * side, spread=True))
-    return light
+        return layout.blurred(layout.between(light))
+    half = _half_shadow(clear, layout, cells, some)
+    if not is_soft:
+        light[half] = arriving(emitter, points.take(half), visibility, Rays(3 * side // 2, spread=True))[0]
+        return light
+    share, is_half = layout.between(share), np.zeros(len(points), bool)
+    is_half[half] = True
+    for kind in np.unique(kinds):
+        own = some[(kinds == kind) & ~is_half[some] & (share[some] > 0)]
+        light[own] = share[own] * open_light(emitter, points.take(own), max(2 * int(kind) - 1, emitter.spots))
+    light[half], clear[half], _ = arriving(emitter, points.take(half), visibility, Rays(side, spread=True))
+    is_half[half] = (clear[half] > 0) & (clear[half] < 1)
+    return np.where(is_half | bool(emitter.sky or emitter.spots), layout.blurred(light), light)
 
 
-def in_front(what: Ball, points_m: Floats, normals: Floats) -> NDArray[np.bool_]:
+def in_front(what: Ball, points_m: Floats, normals: Floats) -> Mask:
     """Points (P, 3) with normals (P, 3) before which some of a ball lies."""
     ahead = np.einsum("ij,ij->i", what.centre_m - points_m, normals)
     return np.asarray(ahead > -what.radius_m)
 
 
-def first_rays(emitter: Emitter, texels: Texels, side: int) -> list[tuple[Rays, NDArray[np.int64]]]:
-    """How many rays which points need where nothing is in the way: more for what is seen wider."""
-    points = texels.points_m
-    width = np.concatenate(in_chunks(lambda part: emitter.width_rad(points[part]), len(points)) or [np.zeros(0)])
-    kinds = np.select([width == 0, width < NARROW_RAD, width < WIDE_RAD], [1, max(1, side // 2), side], 2 * side)
-    return [(Rays(int(kind)), np.flatnonzero(kinds == kind)) for kind in np.unique(kinds)]
+def first_rays(emitter: Emitter, points_m: Floats, side: int) -> NDArray[np.int64]:
+    """How many rays along a side points (P, 3) need to tell whether they see an emitter: one where shadows are hard."""
+    width = np.concatenate([*in_chunks(lambda part: emitter.width_rad(points_m[part]), len(points_m)), np.zeros(0)])
+    middle = 3 * side // 4 if emitter.sky == "pane" else side // 2
+    return np.select([width == 0, width < NARROW_RAD, width < WIDE_RAD], [1, max(side // 2, 1), max(middle, 1)], side)
 
 
-def arriving(emitter: Emitter, texels: Texels, visibility: Visibility, rays: Rays) -> tuple[Floats, Floats]:
-    """Illuminance (P,), and the share of rays that met nothing opaque (P,), NaN where the emitter lies behind."""
-    parts = in_chunks(lambda part: _arriving(emitter, texels.take(part), visibility, rays), len(texels))
-    light, clear = zip(*parts, strict=True) if parts else ([np.zeros(0, np.float32)], [np.zeros(0, np.float32)])
-    return np.concatenate(light), np.concatenate(clear)
+def arriving(emitter: Emitter, texels: Texels, between: Between, rays: Rays) -> tuple[Floats, Floats, Floats]:
+    """Illuminance (P,), the share of rays that met nothing opaque (P,), NaN where none was sent, and light unshaded."""
+    parts = in_chunks(lambda part: _arriving(emitter, texels.take(part), between, rays), len(texels))
+    light, clear, unshaded = np.concatenate([np.zeros((3, 0), np.float32), *map(np.array, parts)], 1)
+    return light, clear, unshaded
 
 
-def _arriving(emitter: Emitter, texels: Texels, visibility: Visibility, rays: Rays) -> tuple[Floats, Floats]:
-    total, open_light, passed, cast = (np.zeros(len(texels), np.float32) for _ in range(4))
+def _arriving(emitter: Emitter, texels: Texels, between: Between, rays: Rays) -> tuple[Floats, Floats, Floats]:
+    total, unshaded, passed, cast = (np.zeros(len(texels), np.float32) for _ in range(4))
     towards = emitter.towards(texels)
     for cell in range(rays.side**2):
-        way, strength = towards(*cell_spot(texels, cell, rays.side))
-        cosine = texels.cosine(way)
-        light = strength * np.maximum(cosine, 0)
-        open_light += light
-        faced = np.flatnonzero(light > 0)
-        light *= texels.entering(cosine)
-        start = texels.points_m[faced] + (footprint(texels, faced, cell) if rays.spread else 0)
-        ahead = texels.points_m[faced] + way[faced] - start
-        share = emitter.passing(visibility, start, ahead)
+        way, light = _sent(towards, texels, cell, rays.side)
+        unshaded += light
+        faced: Places | slice = np.flatnonzero(light > 0)
+        # All at once where most are: picking rows costs as much as rays.
+        faced = faced if np.count_nonzero(light > 0) < MOST * len(light) else slice(None)
+        start, ahead = texels.points_m[faced], way[faced]
+        if rays.spread:
+            aside = footprint(texels, faced, cell)
+            start, ahead = start + aside, ahead - aside
+        share = emitter.passing(between, start, ahead)
         total[faced] += light[faced] * share
-        passed[faced] += share > 0
-        cast[faced] += 1
-    exact = emitter.unshadowed(texels) if emitter.unshadowed else None
-    known = np.zeros(0, np.int64) if exact is None else np.flatnonzero((open_light > 0) & ~np.isnan(exact))
-    total /= rays.side**2
-    if exact is not None:
-        total[known] *= exact[known] / open_light[known] * rays.side**2
+        passed[faced] += (share > 0) & (light[faced] > 0)
+        cast += light > 0
     with np.errstate(invalid="ignore"):
-        return total, passed / cast
+        return total / rays.side**2, passed / cast, unshaded / rays.side**2
+
+
+def open_light(emitter: Emitter, texels: Texels, side: int) -> Floats:
+    """Illuminance (P,) if nothing were in the way."""
+
+    def of(part: slice) -> Floats:
+        own = texels.take(part)
+        towards = (emitter.evenly or emitter.towards)(own)
+        light = np.sum([_sent(towards, own, cell, side)[1] for cell in range(side**2)], axis=0)
+        return np.asarray(light / np.float32(side**2), np.float32)
+
+    return np.concatenate([*in_chunks(of, len(texels)), np.zeros(0, np.float32)])
+
+
+def _sent(towards: Aim, texels: Texels, cell: int, side: int) -> tuple[Floats, Floats]:
+    """Ways (P, 3) to an emitter, and the illuminance (P,) that enters from there if nothing is in the way."""
+    way, strength = towards(*cell_spot(texels, cell, side))
+    cosine = texels.cosine(way)
+    return way, strength * np.maximum(cosine, 0) * texels.entering(cosine)
 
 
 def cell_spot(texels: Texels, cell: int, side: int) -> tuple[Floats, Floats]:
     """Where in one of side x side cells of the unit square each point aims (P,): turned by its own dither."""
-    jitter = (texels.dither + cell * JITTER) % 1
+    jitter = texels.dither + cell * JITTER
+    jitter -= np.floor(jitter)
     return (cell % side + jitter[:, 0]) / side, (cell // side + jitter[:, 1]) / side
 
 
-def footprint(texels: Texels, some: NDArray[np.int64], cell: int) -> Floats:
+def footprint(texels: Texels, some: Places | slice, cell: int) -> Floats:
     """Steps (N, 3) from the middle of texels to somewhere on their area."""
-    a, b = ((texels.dither[some, ::-1] + cell * FOOTPRINT) % 1 - np.float32(0.5)).T
-    return np.asarray(a[:, None] * texels.step_u_m[some] + b[:, None] * texels.step_v_m[some])
+    spot = texels.dither[some] + cell * FOOTPRINT
+    spot -= np.floor(spot) + np.float32(0.5)
+    return np.asarray(spot[:, 1:] * texels.step_u_m[some] + spot[:, :1] * texels.step_v_m[some])
 
 
-def _half_shadow(clear: Floats, texels: Texels, atlas: Atlas) -> NDArray[np.bool_]:
-    """Points (P,) beside which, within three texels, the emitter is both seen and hidden.
-
-    Few rays can miss the rim of a lamp, hence the three.
-    """
-    near = [
-        scipy.ndimage.binary_dilation(texels.on_map(part.astype(np.float32), atlas) > 0, iterations=3).ravel()[
-            texels.index
-        ]
-        for part in (clear > 0, clear < 1)
-    ]
-    return np.asarray(near[0] & near[1] & ~np.isnan(clear))
-
-
-def sees_open_sky(emitter: Emitter, texels: Texels, visibility: Visibility) -> NDArray[np.bool_]:
-    """Points (P,) on surfaces of which one probe in a thousand or more leaves the scene without meeting a pane."""
-    probe = texels.take(slice(None, None, PROBE_STEP))
-    lit, _ = arriving(emitter, probe, visibility, Rays(PROBE_SIDE))
-    count = np.bincount(probe.surface, lit > 0, minlength=len(visibility.surfaces))
-    total = np.bincount(probe.surface, minlength=len(visibility.surfaces))
-    return (count > OPEN_SHARE * total)[texels.surface]
+def _half_shadow(clear: Floats, layout: Layout, cells: Indices, some: Places) -> Places:
+    """Those of some points (N,) beside which an emitter is both seen and hidden."""
+    seen, hidden = clear > 0, clear < 1
+    mixed = np.logical_and(*(np.bincount(cells, part, minlength=1) > 0 for part in (seen, hidden)))
+    near = layout.near(seen, steps=RIM) & layout.near(hidden, steps=RIM)
+    return some[(near | mixed[cells])[some]]

@@ -2,16 +2,56 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import FAR_M, RAY_OFFSET_M, Ball, Floats, Visibility, ball, corners
+from vobench.render.geometry import (
+    FAR_M,
+    RAY_OFFSET_M,
+    Ball,
+    Flat,
+    Floats,
+    Mask,
+    Visibility,
+    areas_m2,
+    ball,
+    lengths,
+    spots,
+)
 from vobench.render.lightmap import Texels, tangents
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
-from vobench.scene.surface import Surface
+from vobench.scene.mesh import face_normals, unit
 
-FLAT_M = 1e-6  # a point nearer than this to a rectangle's plane sees none of it
+FAR_OFF = 2.9  # radii of a rectangle, beyond which rays spread over its area tell as well what hides it
+MESH_SPOTS, CURVE_BITS = 8, 10
+LEVEL_M = 1e-6  # a point nearer than this to a rectangle's plane sees none of it
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """A corner, two edges at right angles and the normal edge_u × edge_v (3,) of a rectangle."""
+
+    corner_m: Array
+    edge_u_m: Array
+    edge_v_m: Array
+    normal: Array
+
+
+def rectangle(corners_m: Array) -> Rectangle | None:
+    """The rectangle that triangles (K, 3, 3) fill between them, if they do."""
+    normal = unit(np.cross(corners_m[0, 1] - corners_m[0, 0], corners_m[0, 2] - corners_m[0, 0]))
+    edges = np.roll(corners_m[0], -1, axis=0) - corners_m[0]
+    square = np.abs([edges[i] @ edges[i - 1] for i in range(3)]).argmin()  # the corner with the right angle
+    u = unit(edges[square])
+    v = np.cross(normal, u)
+    local = (corners_m - corners_m[0, 0]) @ np.stack([u, v, normal]).T
+    low, size = local.min((0, 1)), np.ptp(local, axis=(0, 1))
+    turned = np.cross(local[:, 1] - local[:, 0], local[:, 2] - local[:, 0])[:, 2].sum() / 2
+    if size[2] > 1e-4 * size.max() or abs(turned - size[0] * size[1]) > 1e-4 * size[0] * size[1]:
+        return None
+    return Rectangle(corners_m[0, 0] + low[0] * u + low[1] * v, size[0] * u, size[1] * v, normal)
 
 
 class SolidAngle:
@@ -20,20 +60,21 @@ class SolidAngle:
     Source: Ureña, Fajardo, King (2013), An area-preserving parametrization for spherical rectangles.
     """
 
-    def __init__(self, surface: Surface, points_m: Floats) -> None:
-        way = surface.corner_m - points_m.astype(float)
-        x_axis, y_axis = (edge / np.linalg.norm(edge) for edge in (surface.edge_u_m, surface.edge_v_m))
-        height = way @ surface.normal
+    def __init__(self, face: Rectangle, points_m: Floats) -> None:
+        way = face.corner_m - points_m.astype(float)
+        width, length = np.linalg.norm(face.edge_u_m), np.linalg.norm(face.edge_v_m)
+        x_axis, y_axis = face.edge_u_m / width, face.edge_v_m / length
+        height = way @ face.normal
         # The paper's axes: the rectangle lies at negative z.
-        self._axes = np.stack([x_axis, y_axis, surface.normal]), np.where(height > 0, -1.0, 1.0)
-        self._z0 = np.minimum(-np.abs(height), -FLAT_M)
+        self._axes = np.stack([x_axis, y_axis, face.normal]), np.where(height > 0, -1.0, 1.0)
+        self._z0 = np.minimum(-np.abs(height), -LEVEL_M)
         self._x0, self._y0 = way @ x_axis, way @ y_axis
-        self._x1, self._y1 = self._x0 + surface.size_m[0], self._y0 + surface.size_m[1]
+        self._x1, self._y1 = self._x0 + width, self._y0 + length
         n0, n2 = (-self._y0 / np.hypot(self._z0, self._y0), self._y1 / np.hypot(self._z0, self._y1))
         n1, n3 = (self._x1 / np.hypot(self._z0, self._x1), -self._x0 / np.hypot(self._z0, self._x0))
         g0, g1, g2, g3 = (np.arccos(np.clip(-a * b, -1, 1)) for a, b in ((n0, n1), (n1, n2), (n2, n3), (n3, n0)))
         self._b0, self._b1, self._k = n0, n2, 2 * np.pi - g2 - g3
-        self.steradian = np.where(np.abs(height) > FLAT_M, np.maximum(g0 + g1 - self._k, 0), 0)
+        self.steradian = np.where(np.abs(height) > LEVEL_M, np.maximum(g0 + g1 - self._k, 0), 0)
 
     def spot(self, a: Floats, b: Floats) -> Floats:
         """Ways (P, 3) to spots."""
@@ -50,20 +91,17 @@ class SolidAngle:
         return np.asarray((np.stack([xu, yv, self._z0 * flip], -1) @ axes).astype(np.float32))
 
 
-def polygon_illuminance(corners_m: Array, points_m: Floats, normals: Floats) -> Floats:
-    """Illuminance (P,) by a polygon of luminance 1 and corners (C, 3), NaN where the horizon cuts it.
+class Between(Protocol):
+    """What may stand between points and an emitter; rays run from origins to origins + way (R, 3)."""
 
-    Source: Lambert (1760); Arvo (1995), Analytic methods for simulated light transport, eq. 2.30.
-    """
-    ways = corners_m[:, None] - points_m.astype(float)
-    ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
-    total, normals = np.zeros(len(points_m)), normals.astype(float)
-    for first, second in zip(ways, np.roll(ways, -1, axis=0), strict=True):
-        angle = np.arccos(np.clip(np.einsum("ij,ij->i", first, second), -1, 1))
-        edge = np.cross(first, second)
-        total += angle * np.einsum("ij,ij->i", edge, normals) / np.maximum(np.linalg.norm(edge, axis=1), 1e-12)
-    whole = (np.einsum("kij,ij->ki", ways, normals) > 0).all(0)
-    return np.where(whole, np.abs(total) / 2, np.nan).astype(np.float32)
+    def clear(self, origins_m: Floats, way: Floats) -> Mask:
+        """Whether nothing opaque is there."""
+
+    def passing(self, origins_m: Floats, way: Floats) -> Floats:
+        """Share (R,) of light that passes what is there."""
+
+    def through_panes(self, origins_m: Floats, way: Floats) -> Floats:
+        """Share (R,) that all panes there let through."""
 
 
 Aim = Callable[[Floats, Floats], tuple[Floats, Floats]]
@@ -76,32 +114,84 @@ class Emitter:
 
     towards: for points and two random numbers each, vectors (P, 3) to it and illuminance (P,) square to them.
     width_rad: roughly how wide it is (P,) seen from points (P, 3), 0 for hard shadows.
-    passing: share (R,) of light that comes from origins + way (R, 3) to the origins, of what `towards` does not count.
-    unshadowed: exact illuminance (P,) if nothing were in the way, NaN where unknown: takes the grain out of open light.
+    passing: share (R,) of light that comes from origins + way (R, 3) to the origins (R, 3), of what `towards` does
+    not count. may_light: the points (P, 3) that any of it can reach, as far as that is known without rays.
+    evenly: as `towards`, with less grain and at more cost, for light without rays; spots: along a side for that, at
+    least, 0 where its light is even.
     """
 
     ball: Ball
     towards: Callable[[Texels], Aim]
     width_rad: Callable[[Floats], Floats]
-    passing: Callable[[Visibility, Floats, Floats], Floats] = Visibility.passing
-    unshadowed: Callable[[Texels], Floats] | None = None
+    passing: Callable[[Between, Floats, Floats], Floats] = lambda between, *ways: between.passing(*ways)
     sky: str = ""
+    may_light: Callable[[Floats], Mask] = lambda points_m: np.ones(len(points_m), bool)
+    evenly: Callable[[Texels], Aim] | None = None
+    spots: int = 0
 
 
 def panel_emitter(light: AreaLight) -> Emitter:
-    """A lamp's rectangle, which shines only to its front."""
-    surface = light.surface
+    """A lamp's faces, which shine only to their front: rectangles by solid angle, all else by area."""
+    corners = light.mesh.corners_m
+    face, around = rectangle(corners), ball(corners)
+    if face is None:
+        # In an order in which near triangles are near to one another (Morton).
+        shares = (corners.mean(1) - around.centre_m) / around.radius_m / 2 + 0.5
+        curve = corners[np.argsort(_interleaved(np.clip(shares, 0, 1 - 1e-6)), kind="stable")]
+        return Emitter(around, lambda texels: _by_area(light, curve, texels), _width_rad(around), spots=MESH_SPOTS)
 
     def towards(texels: Texels) -> Aim:
-        angle = SolidAngle(surface, texels.points_m)
-        in_front = (texels.points_m - surface.corner_m) @ surface.normal > FLAT_M
+        nearest = lengths(texels.points_m - around.centre_m).min(initial=np.inf)
+        is_far = nearest > FAR_OFF * around.radius_m
+        return _by_area(light, corners, texels, face) if is_far else evenly(texels)
+
+    def evenly(texels: Texels) -> Aim:
+        angle = SolidAngle(face, texels.points_m)
+        in_front = (texels.points_m - face.corner_m) @ face.normal > LEVEL_M
         strength = np.where(in_front, light.luminance_cd_m2 * angle.steradian, 0).astype(np.float32)
-        return lambda a, b: (angle.spot(a, b) + (RAY_OFFSET_M * surface.normal).astype(np.float32), strength)
+        return lambda a, b: (angle.spot(a, b) + (RAY_OFFSET_M * face.normal).astype(np.float32), strength)
 
-    def unshadowed(texels: Texels) -> Floats:
-        return light.luminance_cd_m2 * polygon_illuminance(corners(surface), texels.points_m, texels.normals)
+    return Emitter(around, towards, _width_rad(around), evenly=evenly)
 
-    return Emitter(ball([surface]), towards, _width_rad(surface), unshadowed=unshadowed)
+
+def _interleaved(shares: Floats) -> Floats:
+    """Numbers (N,) in [0, 1) whose bits are by turns those of shares (N, D) in [0, 1)."""
+    rest, place, total = shares.astype(float), 1.0, np.zeros(len(shares))
+    for _ in range(CURVE_BITS):
+        rest = 2 * rest
+        bits = np.floor(rest)
+        rest = rest - bits
+        for bit in bits.T:
+            place /= 2
+            total += place * bit
+    return total
+
+
+def _by_area(light: AreaLight, corners_m: Array, texels: Texels, face: Rectangle | None = None) -> Aim:
+    """Spots on triangles in proportion to their areas, or all over the rectangle that they fill."""
+    area, normals = areas_m2(corners_m), face_normals(corners_m).astype(np.float32)
+    ends, power = np.cumsum(area) / area.sum(), np.float32(light.luminance_cd_m2 * area.sum())
+
+    def spot(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+        if face is None:
+            a, b = (
+                _interleaved(np.stack([a, b], -1)),
+                b * 2**CURVE_BITS % 1,
+            )  # strata of the square are such of the mesh
+            normal = normals[np.minimum(np.searchsorted(ends, a, side="right"), len(ends) - 1)]
+            return (spots(corners_m, a, b) + RAY_OFFSET_M * normal).astype(np.float32), normal
+        corner = (face.corner_m + RAY_OFFSET_M * face.normal).astype(np.float32)
+        u, v = face.edge_u_m.astype(np.float32), face.edge_v_m.astype(np.float32)
+        return corner + a[:, None] * u + b[:, None] * v, normals[:1]
+
+    def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+        ends_m, normal = spot(a, b)
+        way = ends_m - texels.points_m
+        squared = np.maximum(np.einsum("ij,ij->i", way, way), np.float32(1e-9))
+        before = np.maximum(-np.einsum("ij,ij->i", way, np.broadcast_to(normal, way.shape)), 0)
+        return way, power * before / (squared * np.sqrt(squared))
+
+    return aim
 
 
 def bulb_emitter(light: PointLight | SpotLight) -> Emitter:
@@ -135,36 +225,49 @@ def sun_emitter(light: Sun, t_ns: float) -> Emitter:
     return Emitter(Ball(FARTHEST_M * centre, FARTHEST_M * SUN_RADIUS_RAD), towards, _hard)
 
 
-def _pane_emitter(light: Sky, pane: int, visibility: Visibility) -> Emitter:
+def _pane_emitter(light: Sky, pane: Flat, visibility: Visibility) -> Emitter:
     """The sky through one pane: only rays that cross no other pane behind it, so that none counts twice."""
-    surface, (followed_back, followed_front) = visibility.surfaces[pane], _followed(pane, visibility)
+    followed_back, followed_front = _followed(pane, visibility)
+    face, area = rectangle(pane.corners_m), areas_m2(pane.corners_m).sum()
+
+    def spot(texels: Texels) -> Aim:
+        """Ways to spots on the pane, and the solid angle that each stands for."""
+        if face is not None:
+            angle = SolidAngle(face, texels.points_m)
+            return lambda a, b: (angle.spot(a, b), angle.steradian)
+
+        def by_area(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+            way = spots(pane.corners_m, a, b) - texels.points_m
+            return way, area * np.abs(way @ pane.normal) / np.maximum(np.linalg.norm(way, axis=1), 1e-6) ** 3
+
+        return by_area
 
     def towards(texels: Texels) -> Aim:
-        angle = SolidAngle(surface, texels.points_m)
+        spot_of = spot(texels)
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-            spot = angle.spot(a, b)
-            direction = spot / np.linalg.norm(spot, axis=1, keepdims=True)
-            strength = angle.steradian * light.luminance_cd_m2(direction)
-            strength *= visibility.pane_passes(pane, direction)
-            outward = direction @ surface.normal > 0
+            way, steradian = spot_of(a, b)
+            direction = way / lengths(way)[:, None]
+            strength = steradian * light.luminance_cd_m2(direction) * visibility.pane_passes(pane, direction)
+            outward = direction @ pane.normal > 0
             doubtful = np.flatnonzero(np.where(outward, followed_front, followed_back))
-            beyond = (texels.points_m + spot + 2 * RAY_OFFSET_M * direction)[doubtful]
-            strength[doubtful] *= ~visibility.crosses_pane(beyond, FAR_M * direction[doubtful])
-            return FAR_M * direction, strength.astype(np.float32)
+            beyond = (texels.points_m + way + 2 * RAY_OFFSET_M * direction)[doubtful]
+            strength[doubtful] *= ~visibility.crosses_sky_pane(beyond, FAR_M * direction[doubtful])
+            return (FAR_M * direction).astype(np.float32), strength.astype(np.float32)
 
         return aim
 
-    def passing(visibility: Visibility, origins_m: Floats, way: Floats) -> Floats:
+    def passing(between: Between, origins_m: Floats, way: Floats) -> Floats:
         """Past walls, and through panes before this one."""
-        share = visibility.clear(origins_m, way).astype(np.float32)
+        share = between.clear(origins_m, way).astype(np.float32)
         some = np.flatnonzero(share)
         start, ahead = origins_m[some], way[some]
-        reach = ((surface.corner_m - start) @ surface.normal) / (ahead @ surface.normal)
-        share[some] *= visibility.through_panes(start, ahead * ((1 - 1e-4) * reach[:, None]).astype(np.float32))
+        reach = -pane.height_m(start) / (ahead @ pane.normal)
+        share[some] *= between.through_panes(start, ahead * ((1 - 1e-4) * reach[:, None]).astype(np.float32))
         return share
 
-    return Emitter(ball([surface]), towards, _width_rad(surface), passing, sky="pane")
+    around = ball(pane.corners_m)
+    return Emitter(around, towards, _width_rad(around), passing, sky="pane")
 
 
 def _open_sky_emitter(light: Sky, visibility: Visibility) -> Emitter:
@@ -176,7 +279,7 @@ def _open_sky_emitter(light: Sky, visibility: Visibility) -> Emitter:
             luminance = light.luminance_cd_m2(direction)
             # The rays are as dense as their cosine, hence over it.
             strength = np.pi * luminance / np.maximum(np.einsum("ij,ij->i", direction, texels.normals), 1e-6)
-            strength[visibility.crosses_pane(texels.points_m, FAR_M * direction)] = 0
+            strength[visibility.crosses_sky_pane(texels.points_m, FAR_M * direction)] = 0
             return FAR_M * direction, strength.astype(np.float32)
 
         return aim
@@ -187,8 +290,11 @@ def _open_sky_emitter(light: Sky, visibility: Visibility) -> Emitter:
     return Emitter(Ball(np.zeros(3), np.inf), towards, width_rad, sky="open")
 
 
-def _width_rad(surface: Surface) -> Callable[[Floats], Floats]:
-    return lambda points_m: np.sqrt(SolidAngle(surface, points_m).steradian).astype(np.float32)
+def _width_rad(around: Ball) -> Callable[[Floats], Floats]:
+    """As wide as the ball is seen, at most."""
+    return lambda points_m: (
+        np.sqrt(np.pi) * around.radius_m / np.maximum(np.linalg.norm(around.centre_m - points_m, axis=1), 1e-6)
+    ).astype(np.float32)
 
 
 def _hard(points_m: Floats) -> Floats:
@@ -218,12 +324,11 @@ def emitters(light: Light, visibility: Visibility, *, t_ns: float = 0) -> list[E
         case Sun():
             return [sun_emitter(light, t_ns)]
         case Sky():
-            panes = [_pane_emitter(light, pane, visibility) for pane in visibility.sky_panes()]
+            panes = [_pane_emitter(light, pane, visibility) for pane in visibility.sky_panes]
             return [*panes, _open_sky_emitter(light, visibility)]
 
 
-def _followed(pane: int, visibility: Visibility) -> tuple[bool, bool]:
-    """Whether any other pane reaches to the back of a pane, and to its front."""
-    surface, panes = visibility.surfaces[pane], [visibility.surfaces[i] for i in visibility.panes]
-    height = np.concatenate([(corners(other) - surface.corner_m) @ surface.normal for other in panes])
+def _followed(pane: Flat, visibility: Visibility) -> tuple[bool, bool]:
+    """Whether any other pane that shows the sky reaches to the back of a pane, and to its front."""
+    height = np.concatenate([pane.height_m(other.corners_m).ravel() for other in visibility.sky_panes])
     return bool((height < -RAY_OFFSET_M).any()), bool((height > RAY_OFFSET_M).any())

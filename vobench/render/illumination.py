@@ -1,4 +1,4 @@
-"""The light on every surface over an interval, the sky behind it, and the mean luminance of a scene."""
+"""The light on every face over an interval, the sky behind it, and the mean luminance of a scene."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
@@ -7,38 +7,31 @@ from typing import TypeVar
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.render.bake import BakedScene, SunTrack, direct_layer, placed, static_scene, wandered_rad
-from vobench.render.geometry import inventory
-from vobench.render.lightmap import Scales
+from vobench.render.bake import BakedScene, SunTrack, direct_layer, direct_points, static_scene, wandered_rad
+from vobench.render.geometry import Floats
 from vobench.render.mover_light import MoverLight, MoverLightAt
 from vobench.scene.light import NS_PER_S, SKIES, Light, Sky, Steady, Sun
-from vobench.scene.material import Map
 
 
 class AmbientLight:
-    """Mean over the area of a scene's textured surfaces, in whatever light.
+    """Mean over the area of a scene's bodies that stand still, in whatever light.
 
     Lamps and the sky do not count: few directions lead there, and in all others their share would be too bright.
     """
 
     def __init__(self, baked: BakedScene) -> None:
-        things, charts = inventory(baked.scene), baked.atlas.charts
-        albedo = {name: float(tile.mean()) for name, tile in baked.albedo.items()}
-        self._weights = np.zeros(baked.light.shape[1:], np.float32)
-        area_m2 = 0.0
-        for surface, panel, chart in zip(things.surfaces, things.panel, charts, strict=True):
-            if panel < 0 and surface.material in albedo:
-                own_m2 = float(np.prod(surface.size_m))
-                self._weights[chart.window] = albedo[surface.material] / np.pi * own_m2 / (chart.rows * chart.columns)
-                area_m2 += own_m2
-        self._weights /= max(area_m2, 1e-12)
-        self._light, self._mean_cd_m2 = self._weights, 0.0
+        patches, shape = baked.patches, (*baked.direct.shape[1:], 3)
+        texels = np.bincount(patches.surfel_of + 1, minlength=len(patches.area_m2) + 1)[1:]
+        each = (patches.area_m2 / np.maximum(texels, 1) / np.pi / max(patches.area_m2.sum(), 1e-12))[:, None]
+        weights = np.append(each * patches.reflectance, np.zeros((1, 3)), 0).astype(np.float32)
+        self._weights = weights[patches.surfel_of].reshape(shape)
+        self._light, self._mean_cd_m2 = self._weights, np.zeros(3)
 
-    def cd_m2(self, light: Map) -> float:
-        """The mean under a map of light (H, W); the very array of the last call costs nothing."""
+    def cd_m2(self, light: Floats) -> Array:
+        """The mean (3,) under a map of light (H, W, 3); the very array of the last call costs nothing."""
         if light is not self._light:
             # No dot product, whose order of adding up hangs on the number of threads.
-            self._light, self._mean_cd_m2 = light, float(np.sum(self._weights * light, dtype=np.float64))
+            self._light, self._mean_cd_m2 = light, np.sum(self._weights * light, axis=(0, 1), dtype=np.float64)
         return self._mean_cd_m2
 
 
@@ -97,26 +90,31 @@ class Illumination:
         fixed = [i for i in range(len(self._lights)) if i not in self._tracks]
         steady = [i for i in fixed if isinstance(self._lights[i].level, Steady)]
         self._varying = [i for i in fixed if i not in steady]
-        self._steady = np.zeros(baked.light.shape[1:], np.float32)
-        self._add(self._steady, {i: self._lights[i].level.mean(0, 0) for i in steady})
+        self._steady = self._sum({i: self._lights[i].level.mean(0, 0) for i in steady})
         if self._tracks or baked.scene.movers:
-            self._still = static_scene(baked.scene, baked.atlas, seed=baked.settings.seed)
+            self._still = static_scene(baked)
         self._movers = MoverLight(baked, self._still) if baked.scene.movers else None
-        self._maps: OrderedDict[Hashable, Map] = OrderedDict()
+        self._maps: OrderedDict[Hashable, Floats] = OrderedDict()
         self._moments: OrderedDict[Hashable, MoverLightAt] = OrderedDict()
-        self._suns: OrderedDict[Hashable, Map] = OrderedDict()
+        self._suns: OrderedDict[Hashable, Floats] = OrderedDict()
 
-    def at(self, start_ns: int, end_ns: int) -> Map:
-        """Map (H, W): the mean from start_ns to end_ns. The very array of an earlier call where nothing differs."""
+    def at(self, start_ns: int, end_ns: int) -> Floats:
+        """Map (H, W, 3) float32 of linear RGB: illuminance in lux, pi times their luminance on lamps.
+
+        The mean from start_ns to end_ns; the very array of an earlier call where nothing differs.
+        """
         levels = tuple(light.level.mean(start_ns, end_ns) for light in self._lights)
         amid_ns = (start_ns + end_ns) / 2
         suns = tuple(_stepped_ns(light, amid_ns) for light in self._lights)
         poses = tuple(mover.path.pose(amid_ns).tobytes() for mover in self._baked.scene.movers)
         return _recent(self._maps, (levels, suns, poses), lambda: self._map(levels, suns, poses, amid_ns))
 
-    def _map(self, levels: tuple[float, ...], suns: tuple[float, ...], poses: tuple[bytes, ...], amid_ns: float) -> Map:
+    def _map(
+        self, levels: tuple[float, ...], suns: tuple[float, ...], poses: tuple[bytes, ...], amid_ns: float
+    ) -> Floats:
         total = self._steady.copy()
-        self._add(total, {i: levels[i] for i in self._varying})
+        if self._varying:
+            total += self._sum({i: levels[i] for i in self._varying})
         for index in self._tracks:
             total += np.float32(levels[index]) * self._sun(index, suns[index])
         if self._movers:
@@ -126,18 +124,28 @@ class Illumination:
             movers.add(moment, total, levels)
         return total
 
-    def _add(self, total: Map, levels: dict[int, float]) -> None:
+    def _sum(self, levels: dict[int, float]) -> Floats:
+        """The map of some lights at levels."""
+        baked = self._baked
+        total = np.zeros((*baked.direct.shape[1:], 3), np.float32)
+        around = np.zeros(baked.bounced.shape[1:], np.float32)
         for index, level in levels.items():
-            total += np.float32(level) * self._baked.light[index]
+            colour = (level * np.array(self._lights[index].colour)).astype(np.float32)
+            around += colour * baked.bounced[index]
+            for channel in range(3):
+                total[..., channel] += colour[channel] * baked.direct[index]
+        total += (baked.spread @ around).reshape(total.shape)
+        return total
 
-    def _sun(self, index: int, t_ns: float) -> Map:
-        """A moving sun's layer at an instant: straight light by rays, the rest between the baked ones."""
+    def _sun(self, index: int, t_ns: float) -> Floats:
+        """A moving sun's map at an instant: straight light by rays, the rest between the baked ones."""
 
-        def make() -> Map:
-            scene, settings = self._baked.scene, self._baked.settings
-            coarse = placed(scene, spacing_m=settings.indirect_spacing_m)
-            around = Scales(self._still.atlas, coarse).refined(_between(self._tracks[index], t_ns)[None])[0]
-            return np.asarray(direct_layer(scene, index, self._still, settings, t_ns=t_ns) + around)
+        def make() -> Floats:
+            scene, baked = self._baked.scene, self._baked
+            light = direct_points(scene, index, self._still, baked.settings, t_ns=t_ns)
+            straight = direct_layer(scene, index, self._still, light)[..., None]
+            around = (baked.spread @ _between(self._tracks[index], t_ns)).reshape(*straight.shape[:2], 3)
+            return np.asarray((straight + around) * np.array(self._lights[index].colour, np.float32))
 
         return _recent(self._suns, (index, t_ns), make)
 
@@ -151,8 +159,8 @@ def _stepped_ns(light: Light, t_ns: float) -> float:
     return float(np.interp(stepped_rad, way_rad, times_ns))
 
 
-def _between(track: SunTrack, t_ns: float) -> Map:
-    """Indirect light (h, w) at an instant, straight lines between the baked ones."""
+def _between(track: SunTrack, t_ns: float) -> Floats:
+    """Indirect light of surfels (S, 3) at an instant, straight lines between the baked ones."""
     after = int(np.clip(np.searchsorted(track.times_ns, t_ns), 1, len(track.times_ns) - 1))
     start, end = track.times_ns[after - 1 : after + 1]
     share = np.float32((t_ns - start) / (end - start))

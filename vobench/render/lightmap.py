@@ -1,181 +1,290 @@
-"""Light maps: where each surface's light is kept, and the texels it is computed at."""
+"""The light map: where each face's light is kept, and the texels it is computed at."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any, TypeVar
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from vobench import stop
+from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import RAY_OFFSET_M, Floats, Indices, Visibility, take
-from vobench.scene.material import Material, Polished, fresnel, texture_of
-from vobench.scene.surface import Surface
+from vobench.render.geometry import Floats, Indices, Mask, Visibility, areas_m2, face_materials, lengths, off, take
+from vobench.scene.material import Material, fresnel
+from vobench.scene.mesh import Triangles, unit
 
-ATLAS_WIDTH = 2048
-
-
-@dataclass(frozen=True, slots=True)
-class Chart:
-    """A surface's place in the map: `columns` samples along u, `rows` along v, first one at (row, column).
-
-    The outer samples lie on the surface's edges, so that interpolation never reaches a neighbour.
-    """
-
-    row: int
-    column: int
-    rows: int
-    columns: int
-
-    @property
-    def window(self) -> tuple[slice, slice]:
-        """The chart as an index into the map."""
-        return slice(self.row, self.row + self.rows), slice(self.column, self.column + self.columns)
-
-    def fractions(self) -> tuple[Array, Array]:
-        """Fractions u and v (rows, columns) of the surface's edges at the samples."""
-        u, v = np.meshgrid(np.linspace(0, 1, self.columns), np.linspace(0, 1, self.rows))
-        return u, v
+Places = NDArray[np.int64]
+WELD_M = 1e-5  # corners nearer than this are one
+TEXELS = 16_000_000  # at most in one map: some 100 bytes each, and 4 more for each light
+FINENESS = 4096  # steps a texel: places that are meant to be amid texels are so to the last bit
+PADDING = 1  # texels around a chart, besides those that interpolation within it reads
 
 
 @dataclass(frozen=True, slots=True)
 class Atlas:
-    """All charts and the size of the map that holds them."""
+    """Places of faces' corners on the map in texels, light_px (F, 3, 2), row 0 first; chart (F,) that each is in.
 
-    charts: tuple[Chart, ...]
+    Faces that keep no light of their own have chart -1: those of one lamp share a block of 3 x 3 texels, and all
+    others one that stays dark. A chart's outermost texels have their middles on its outline's box.
+    """
+
+    light_px: Floats
+    chart: Indices
     height: int
     width: int
 
-    def texture_coordinates(self, index: int) -> Array:
-        """Coordinates (4, 2) in [0, 1] of a surface's corners: centres of its outer samples."""
-        p = self.charts[index]
-        u0, u1 = p.column + 0.5, p.column + p.columns - 0.5
-        v0, v1 = p.row + 0.5, p.row + p.rows - 0.5
-        return np.array([[u0, v0], [u1, v0], [u1, v1], [u0, v1]]) / (self.width, self.height)
+    @property
+    def light_uv(self) -> Floats:
+        """The places (F, 3, 2) float32 in [0, 1]."""
+        return (self.light_px / (self.width, self.height)).astype(np.float32)
+
+    def index(self, places_px: Floats) -> Places:
+        """The flat index (R,) of the texel at places (R, 2)."""
+        column, row = np.floor(places_px).astype(np.int64).T
+        return np.asarray(np.clip(row, 0, self.height - 1) * self.width + np.clip(column, 0, self.width - 1))
+
+    def read(self, light: Floats, face: Indices, u: Floats, v: Floats) -> Floats:
+        """What a picture shows (R, ...) of a map (H, W, ...) at places of faces: between the four nearest texels."""
+        a, b, c = self.light_px[face].astype(float).swapaxes(0, 1)
+        first, share = np.divmod(a + u[:, None] * (b - a) + v[:, None] * (c - a) - 0.5, 1)
+        flat = light.reshape(self.height * self.width, -1)
+        total = np.zeros((len(share), flat.shape[1]))
+        for right, below in ((0, 0), (1, 0), (0, 1), (1, 1)):
+            weight = np.abs(1 - right - share[:, 0]) * np.abs(1 - below - share[:, 1])
+            total += weight[:, None] * flat[self.index(first + np.array([right, below]))]
+        return total.reshape(len(share), *light.shape[2:])
+
+    def block(self, face: int) -> tuple[slice, slice]:
+        """The texels that a lamp's faces share."""
+        column, row = np.floor(self.light_px[face, 0]).astype(int)
+        return slice(row - 1, row + 2), slice(column - 1, column + 2)
 
 
-def pack_atlas(surfaces: Sequence[Surface], *, spacing_m: ArrayLike) -> Atlas:
-    """Samples every `spacing_m`, one for all or (S,), packed in shelves, tallest first."""
-    spacings = np.broadcast_to(np.asarray(spacing_m, float), len(surfaces))
-    sizes = [
-        tuple(max(2, int(np.ceil(edge / spacing)) + 1) for edge in reversed(surface.size_m))
-        for surface, spacing in zip(surfaces, spacings, strict=True)
-    ]
-    width = max(ATLAS_WIDTH, *(columns for _, columns in sizes))
-    places: dict[int, tuple[int, int]] = {}
-    row = column = shelf = 0
-    for index in sorted(range(len(sizes)), key=lambda i: (-sizes[i][0], i)):
-        rows, columns = sizes[index]
-        if column + columns > width:
-            row, column, shelf = row + shelf, 0, 0
-        places[index] = (row, column)
-        column, shelf = column + columns, max(shelf, rows)
-    return Atlas(tuple(Chart(*places[i], *sizes[i]) for i in range(len(sizes))), row + shelf, width)
+def unwrap(faces: Triangles, spacing_m: Array, lit: Mask) -> Atlas:
+    """Charts of the lit faces (F,) with samples every spacing_m (F,), and below them the shared blocks.
 
-
-@dataclass(frozen=True, slots=True)
-class Holes:
-    """How values of P points fill a map: index (P,) is where each belongs, nearest (H·W,) whose value each sample has.
-
-    Samples inside things have no value of their own and take that of the nearest of their chart, so that
-    their darkness does not reach out by interpolation. -1: nobody's.
+    Raises RenderError where the map would be too large.
     """
+    needed = float((areas_m2(faces.corners_m) / spacing_m**2)[lit].sum())
+    if needed > TEXELS:
+        raise RenderError(
+            f"the light map would need {needed / 1e6:.0f} million samples; {TEXELS / 1e6:.0f} million are the most: "
+            f"give its largest things {np.sqrt(needed / TEXELS):.1f} times the spacing_m"
+        )
+    px = (faces.corners_m - faces.corners_m.reshape(-1, 3).min(0)) / spacing_m[:, None, None]
+    places, chart, width, height = _by_xatlas(px, spacing_m, _parts(faces.thing, spacing_m, np.flatnonzero(lit)))
+    left = np.flatnonzero(lit & (chart < 0) & (areas_m2(px) > 1e-6))
+    if len(left):
+        more, own, wide, high = axis_charts(px[left], px[left] * spacing_m[left, None, None], faces.thing[left])
+        places[left], chart[left] = more + np.array([0, height]), own + chart.max() + 1
+        width, height = max(width, wide), height + high
+    _settle(faces, places, chart, np.flatnonzero(lit & (chart < 0)))
+    height += PADDING
+    width, block = max(width, 3), faces.lamp + 1
+    shared = np.stack([block % (width // 3) * 3 + 1.5, block // (width // 3) * 3 + 1.5 + height], -1)
+    places[chart < 0] = shared[chart < 0, None]
+    height += 3 * (int(block.max(initial=0)) // (width // 3) + 1)
+    return Atlas((np.rint(places * FINENESS) / FINENESS).astype(np.float32), chart, height, width)
 
-    index: NDArray[np.int64]
-    nearest: NDArray[np.int64]
 
-    def filled(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Values (P, ...) as a flat map (H·W, ...)."""
-        padded = np.concatenate([values, np.zeros((1, *values.shape[1:]), values.dtype)])
-        return padded[self.nearest]
+def _parts(thing: Indices, spacing_m: Array, some: Places) -> list[Places]:
+    """Some faces thing by thing, each with one spacing."""
+    order = some[np.lexsort((spacing_m[some], thing[some]))]
+    new = (np.diff(thing[order]) != 0) | (np.diff(spacing_m[order]) != 0)
+    return np.split(order, np.flatnonzero(new) + 1) if len(order) else []
 
 
-def holes(atlas: Atlas, index: NDArray[np.int64]) -> Holes:
-    """For points that belong at flat places `index` (P,)."""
-    owner = np.full(atlas.height * atlas.width, -1)
-    owner[index] = np.arange(len(index))
-    nearest = owner.reshape(atlas.height, atlas.width)
-    for chart in atlas.charts:
-        own = nearest[chart.window]
-        if (own < 0).any() and (own >= 0).any():
-            rows, columns = scipy.ndimage.distance_transform_edt(own < 0, return_distances=False, return_indices=True)
-            nearest[chart.window] = own[rows, columns]
-    return Holes(index, nearest.ravel())
+def _by_xatlas(px: Array, spacing_m: Array, parts: Sequence[Places]) -> tuple[Array, Indices, int, int]:
+    """Places (F, 3, 2) and charts (F,) of parts, -1 for none, the map's width and height; nothing without xatlas."""
+    places, chart = np.zeros((len(px), 3, 2)), np.full(len(px), -1, np.int32)
+    try:
+        import xatlas
+    except ImportError:  # Python 3.14 has none yet
+        return places, chart, 0, 0
+    atlas, packing, added, count = xatlas.Atlas(), xatlas.PackOptions(), [], 0
+    packing.texels_per_unit, packing.padding, packing.bilinear = 1.0, PADDING, True
+    for part in parts:
+        first, of = _welded(px[part] * spacing_m[part, None, None])
+        whole = (of != np.roll(of, 1, axis=1)).all(1)
+        if whole.any():
+            vertices = px[part].reshape(-1, 3)[first]
+            atlas.add_mesh((vertices - vertices.min(0)).astype(np.float32), of[whole].astype(np.uint32))
+            added.append(part[whole])
+    stop.check()
+    atlas.generate(xatlas.ChartOptions(), packing)
+    for nth, part in enumerate(added):
+        _, index, uv = atlas[nth]
+        places[part] = (uv * (atlas.width, atlas.height))[index]
+        has_place = np.abs(_turns_px2(places[part])) > 1e-9
+        own = _connected(index.astype(np.int64))
+        chart[part] = np.where(has_place, own + count, -1)
+        count += own.max() + 1
+    return places, chart, atlas.width, atlas.height
+
+
+def _welded(corners_m: Array, *also: NDArray[np.int64]) -> tuple[Places, Places]:
+    """Of corners (F, 3, 3) the first (V,) of those at one place, and which each is (F, 3); `also` (F,) keeps apart."""
+    keys = np.rint(corners_m / WELD_M).astype(np.int64).reshape(-1, 3)
+    keys = np.column_stack([keys, *(np.repeat(other, 3) for other in also)])
+    _, first, of = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    return first, of.reshape(-1, 3)
+
+
+def _connected(index: Places) -> Indices:
+    """Which of the groups that share vertices each face is in (F,), by its vertices (F, 3)."""
+    count = len(index) + int(index.max()) + 1
+    links = (np.repeat(np.arange(len(index)), 3), index.ravel() + len(index))
+    graph = scipy.sparse.coo_matrix((np.ones(index.size, np.int8), links), (count, count))
+    labels = scipy.sparse.csgraph.connected_components(graph, directed=False)[1][: len(index)]
+    return np.unique(labels, return_inverse=True)[1].astype(np.int32)
+
+
+def axis_charts(px: Array, corners_m: Array, thing: Indices) -> tuple[Array, Indices, int, int]:
+    """Charts of connected faces that look the same of six ways, seen from there: for what xatlas leaves.
+
+    px (F, 3, 3): corners in texels. Returns places (F, 3, 2), charts (F,), width and height.
+    """
+    side = side_of(np.cross(px[:, 1] - px[:, 0], px[:, 2] - px[:, 0]))
+    chart = _connected(_welded(corners_m, thing.astype(np.int64), side)[1])
+    axes = np.array([[1, 2], [0, 2], [0, 1]])[side // 2]
+    flat = np.take_along_axis(px, axes[:, None].repeat(3, 1), 2)
+    count = int(chart.max()) + 1
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    for nth in range(3):
+        np.minimum.at(low, chart, flat[:, nth])
+        np.maximum.at(high, chart, flat[:, nth])
+    size = np.maximum(np.ceil(high - low - 1e-6), 1)
+    flat = (flat - low[chart, None]) * (size / np.maximum(high - low, 1e-9))[chart, None]
+    corner, width, height = _shelves(size.astype(np.int64) + 1 + 2 * PADDING)
+    return flat + corner[chart, None] + PADDING + 0.5, chart, width, height
+
+
+def side_of(vectors: Array) -> Places:
+    """Which of six ways vectors (N, 3) point most: 0 and 1 along the first axis and against it, and so on."""
+    axis = np.abs(vectors).argmax(1)
+    return np.asarray(2 * axis + (np.take_along_axis(vectors, axis[:, None], 1)[:, 0] < 0))
+
+
+def _shelves(sizes: Places) -> tuple[Places, int, int]:
+    """Corners (N, 2) of boxes (N, 2) in shelves, tallest first, and the width and height of them all."""
+    width = int(max(np.sqrt(sizes.prod(1).sum()), sizes[:, 0].max()))
+    corners, column, row, shelf = np.zeros_like(sizes), 0, 0, 0
+    for index in np.lexsort((np.arange(len(sizes)), -sizes[:, 0], -sizes[:, 1])):
+        wide, high = sizes[index].tolist()
+        if column + wide > width:
+            column, row, shelf = 0, row + shelf, 0
+        corners[index] = column, row
+        column, shelf = column + wide, max(shelf, high)
+    return corners, width, row + shelf
+
+
+def _turns_px2(places: Array) -> Array:
+    """Twice the areas (F,) of triangles (F, 3, 2), negative where they run clockwise."""
+    (a, b), (c, d) = (places[:, i].T - places[:, 0].T for i in (1, 2))
+    return np.asarray(a * d - b * c)
+
+
+def _settle(faces: Triangles, places: Array, chart: Indices, lost: Places) -> None:
+    """Give faces too thin for a place that of a neighbour's corner."""
+    if not len(lost):
+        return
+    _, of = _welded(faces.corners_m, faces.thing.astype(np.int64))
+    found = np.full(of.max() + 1, -1)
+    good = np.flatnonzero(chart >= 0)
+    found[of[good]] = 3 * good[:, None] + np.arange(3)
+    source = found[of[lost]].max(1)
+    has = source >= 0
+    places[lost[has]] = places.reshape(-1, 2)[source[has], None]
+    chart[lost[has]] = chart[source[has] // 3]
+
+
+CLAIMED_PX = 0.7072  # half a texel's diagonal: every place of a face is nearest to a texel that counts as its own
+READ_PX = 1.4143  # from a face, texels that interpolation on it can read
+PAIRS = 1 << 20  # of faces and texels at once
 
 
 @dataclass(frozen=True, slots=True)
-class Scales:
-    """Light between a fine and a coarse map of the same surfaces."""
+class Owners:
+    """For each texel (H·W,) the nearest face on the map within READ_PX, -1 for none, u and v there, and how far."""
 
-    fine: Atlas
-    coarse: Atlas
-
-    def coarsened(self, light: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Of (L, H, W) the means (L, h, w) around each coarse sample; keeps a surface's total."""
-        result = np.zeros((len(light), self.coarse.height, self.coarse.width), np.float32)
-        for many, few in zip(self.fine.charts, self.coarse.charts, strict=True):
-            down_v, down_u = _means(many.rows, few.rows), _means(many.columns, few.columns)
-            result[:, *few.window] = down_v @ light[:, *many.window] @ down_u.T
-        return result
-
-    def refined(self, light: NDArray[np.float32], among: Sequence[int] | None = None) -> NDArray[np.float32]:
-        """Light (L, h, w) smoothed against ray noise, at the fine samples (L, H, W), of some surfaces or all."""
-        result = np.zeros((len(light), self.fine.height, self.fine.width), np.float32)
-        for index in range(len(self.fine.charts)) if among is None else among:
-            many, few = self.fine.charts[index], self.coarse.charts[index]
-            up_v, up_u = _between(few.rows, many.rows), _between(few.columns, many.columns)
-            result[:, *many.window] = up_v @ light[:, *few.window] @ up_u.T
-        return result
+    face: Indices
+    uv: Floats
+    apart_px: Floats
 
 
-SMOOTHING = 0.7  # coarse samples
+def owners(atlas: Atlas) -> Owners:
+    """Lay the faces that have charts over the texels."""
+    count = atlas.height * atlas.width
+    result = Owners(np.full(count, -1, np.int32), np.zeros((count, 2), np.float32), np.full(count, READ_PX, np.float32))
+    corners = atlas.light_px.astype(float)
+    low = np.maximum(np.ceil(corners.min(1) - READ_PX - 0.5), 0).astype(np.int64)
+    high = np.minimum(np.floor(corners.max(1) + READ_PX - 0.5) + 1, (atlas.width, atlas.height)).astype(np.int64)
+    size = np.where(((atlas.chart >= 0) & (_turns_px2(corners) != 0))[:, None], high - low, 0)
+    ends = np.cumsum(size.prod(1))
+    last = int(ends[-1]) if len(ends) else 0
+    cuts = np.unique(np.searchsorted(ends, np.arange(PAIRS, last + PAIRS, PAIRS)) + 1)
+    for some in np.split(np.arange(len(corners)), cuts):
+        stop.check()
+        counts = size[some].prod(1)
+        which = np.repeat(some, counts)
+        nth = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
+        row, column = low[which, 1] + nth // size[which, 0], low[which, 0] + nth % size[which, 0]
+        uv, apart = _nearest_on(corners[which], np.stack([column, row], -1) + 0.5)
+        texel = row * atlas.width + column
+        order = np.argsort(-apart, kind="stable")  # of several the last one counts
+        order = order[apart[order] < result.apart_px[texel[order]]]
+        texel = texel[order]
+        result.face[texel], result.uv[texel], result.apart_px[texel] = which[order], uv[order], apart[order]
+    return result
 
 
-@lru_cache(maxsize=1024)
-def _between(few: int, many: int) -> NDArray[np.float32]:
-    """(many, few): linear interpolation of smoothed values."""
-    smooth = scipy.ndimage.gaussian_filter1d(np.eye(few), SMOOTHING, axis=0, mode="nearest")
-    return np.asarray((_linear(few, many) @ smooth).astype(np.float32))
-
-
-@lru_cache(maxsize=1024)
-def _means(many: int, few: int) -> NDArray[np.float32]:
-    """(few, many): the mean weighted by the hat of linear interpolation; outer samples stand for half an interval."""
-    hats = _linear(few, many).T.copy()
-    hats[:, [0, -1]] /= 2
-    return np.asarray((hats / hats.sum(1, keepdims=True)).astype(np.float32))
-
-
-def _linear(few: int, many: int) -> Array:
-    """(many, few): what each of few evenly spaced values weighs at each of many places."""
-    places = np.linspace(0, few - 1, many)
-    return np.asarray(np.maximum(1 - np.abs(places[:, None] - np.arange(few)), 0))
+def _nearest_on(corners: Array, points: Array) -> tuple[Array, Array]:
+    """The nearest places of triangles (N, 3, 2) to points (N, 2): weights (N, 2) of corners two and three, distance."""
+    edges = np.roll(corners, -1, axis=1) - corners
+    ways = points[:, None] - corners
+    along = np.einsum("nij,nij->ni", ways, edges) / np.maximum(np.einsum("nij,nij->ni", edges, edges), 1e-12)
+    along = np.clip(along, 0, 1)
+    apart = np.linalg.norm(ways - along[..., None] * edges, axis=-1)
+    nearest, each = apart.argmin(1), np.arange(len(points))
+    weights = np.zeros((len(points), 3))
+    weights[each, nearest] = 1 - along[each, nearest]
+    weights[each, (nearest + 1) % 3] = along[each, nearest]
+    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    parts = (edges[..., 0] * ways[..., 1] - edges[..., 1] * ways[..., 0]) / np.where(area == 0, 1, area)[:, None]
+    inside = (parts >= 0).all(1) & (area != 0)
+    weights[inside] = np.roll(parts[inside], -1, axis=1)  # the first edge lies across from the third corner
+    return weights[:, 1:], np.where(inside, 0, apart[each, nearest])
 
 
 T = TypeVar("T")
 TILTS = ((0.0, 0.0), (1.0, 0.4), (-1.0, -0.3), (0.3, -1.0), (-0.4, 1.0))  # of rays that search a way out
 CHUNK = 1 << 14  # points at once: their arrays fit the processor's cache
+PULLED_M = 1e-3  # points at a chart's rim lie so far inwards, where they see past the neighbour
+FACING = 0.1  # cosine to its flat face from which a normal of the shape counts
+STRAIGHT = np.cos(np.deg2rad(1.5))  # between texels that lie in one plane
 
 
 @dataclass(frozen=True, slots=True)
 class Texels:
-    """P points: position and normal (P, 3), steps to the next sample along u and v (P, 3).
+    """P points: position, normal of the shape and of the flat face, steps to the next along u and v, all (P, 3).
 
-    index (P,) is flat in the map, surface (P,) in the inventory; eta (P,) of the coat, 0 for none;
-    dither (P, 2) in [0, 1) turns each point's pattern of rays.
+    A step is 0 where the texel lies at a rim. index (P,) is flat in the map, face (P,) in the table, uv (P, 2) its
+    place there; eta (P,) of the coat, 0 for none; dither (P, 2) in [0, 1) turns each point's pattern of rays.
     """
 
     points_m: Floats
     normals: Floats
+    planes: Floats
     step_u_m: Floats
     step_v_m: Floats
-    index: NDArray[np.int64]
-    surface: Indices
+    index: Places
+    face: Indices
+    uv: Floats
     eta: Floats
     dither: Floats
 
@@ -192,84 +301,203 @@ class Texels:
         return share
 
     def cosine(self, way: Floats) -> Floats:
-        """Cosine (P,) of the angle between each normal and a way (P, 3)."""
-        return np.asarray(np.einsum("ij,ij->i", way, self.normals) / np.linalg.norm(way, axis=1))
+        """Cosine (P,) of the angle between each normal and a way (P, 3), 0 from behind the face."""
+        before = np.einsum("ij,ij->i", way, self.planes) > 0
+        return np.asarray(before * np.einsum("ij,ij->i", way, self.normals) / lengths(way))
 
-    def on_map(self, values: Floats, atlas: Atlas) -> Floats:
-        """Values (P,) laid out as the map (H, W); 0 where no point is."""
-        flat = np.zeros(atlas.height * atlas.width, np.float32)
-        flat[self.index] = values
-        return flat.reshape(atlas.height, atlas.width)
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How P points lie on a map of a height and width.
+
+    source (H·W,) is the point that each texel takes its value from, P for none: texels beside a face are read by
+    interpolation, and those inside things have the light of the nearest of their chart, so that no darkness reaches
+    out. beside (4, P) are the points left, right, above and below in the same chart, the point itself for none.
+    few (P,): every other point along rows and columns, and those that have none of these beside them.
+    """
+
+    height: int
+    width: int
+    source: Indices
+    beside: Indices
+    few: Mask
+
+    def filled(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Values (P, ...) as a map (H, W, ...)."""
+        padded = np.concatenate([values, np.zeros((1, *values.shape[1:]), values.dtype)])
+        return padded[self.source].reshape(self.height, self.width, *values.shape[1:])
+
+    def near(self, marked: Mask, *, steps: int) -> Mask:
+        """Points (P,) that some texels' steps lead to from a marked one."""
+        for _ in range(steps):
+            marked = np.logical_or.reduce([marked, *(marked[other] for other in self.beside)])
+        return marked
+
+    def between(self, values: Floats) -> Floats:
+        """Values (P,) known at the few points, at all of them."""
+        values, known = values.copy(), self.few.copy()
+        for first, second in (self.beside[:2], self.beside[2:]):
+            weight = known[first].astype(np.float32) + known[second]
+            new = np.flatnonzero(~known & (weight > 0))
+            sums = values[first[new]] * known[first[new]] + values[second[new]] * known[second[new]]
+            values[new] = sums / weight[new]
+            known[new] = True
+        return values
+
+    def blurred(self, values: Floats) -> Floats:
+        """Values (P,) smoothed by about one texel, each chart by itself."""
+        left, right, above, below = self.beside
+        for _ in range(2):
+            values = (2 * values + values[left] + values[right]) / 4
+            values = (2 * values + values[above] + values[below]) / 4
+        return values
 
 
 def texels(
-    surfaces: Sequence[Surface], materials: Mapping[str, Material], atlas: Atlas, *, among: Sequence[int], seed: int
-) -> Texels:
-    """The points of those surfaces `among` (K,) names that light can show on."""
-    flat = np.arange(atlas.height * atlas.width).reshape(atlas.height, atlas.width)
-    parts = [_of_surface(i, surfaces[i], materials, atlas, flat) for i in among if _has_body(surfaces[i], materials)]
-    columns = [np.concatenate(column) for column in zip(*parts, strict=True)] if parts else _nothing()
-    columns.append(_dither(seed, flat.size)[columns[4]])
-    return Texels(*columns)
+    faces: Triangles,
+    materials: Mapping[str, Material],
+    atlas: Atlas,
+    own: Owners,
+    *,
+    among: Mask,
+    seed: int,
+    visibility: Visibility | None = None,
+) -> tuple[Texels, Layout]:
+    """The points of some faces (F,) that light can show on; with a visibility those that lie in no thing."""
+    index = np.flatnonzero((own.face >= 0) & (own.apart_px <= CLAIMED_PX) & among[own.face])
+    beside = _beside(index, atlas, own)
+    etas = np.array([m.eta if m and m.is_coated else 0.0 for m in face_materials(faces, materials)], np.float32)
+    dither = np.random.default_rng([seed, 1]).random((atlas.height * atlas.width, 2), dtype=np.float32)
+
+    def made(part: slice) -> Texels:
+        face, texel = own.face[index[part]], index[part]
+        rim = beside[:, part] == np.arange(len(index))[part]
+        weights = np.column_stack([1 - own.uv[texel].sum(1), own.uv[texel]])
+        planes = faces.plane[face]
+        steps = _steps(faces.corners_m[face], atlas.light_px[face].astype(float))
+        points = np.einsum("ni,nij->nj", weights, faces.corners_m[face]) + _inwards(steps, rim)
+        points = off(points, planes)
+        normals = unit(np.einsum("ni,nij->nj", weights, faces.normals[face]))
+        normals = np.where(np.einsum("ij,ij->i", normals, planes)[:, None] > FACING, normals, planes)
+        p, n, g, u, v, uv = (np.asarray(x, np.float32) for x in (points, normals, planes, *steps, weights[:, 1:]))
+        return Texels(p, n, g, u, v, texel, face, uv, etas[faces.thing[face]], dither[texel])
+
+    parts = in_chunks(made, len(index)) or [made(slice(0, 0))]
+    every = Texels(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Texels)))
+    inside = np.zeros(len(index), bool) if visibility is None else _buried(every, visibility)
+    return _kept(every, atlas, own, beside, kept=~inside, visibility=visibility)
 
 
-@lru_cache(maxsize=4)
-def _dither(seed: int, count: int) -> Floats:
-    """Numbers (count, 2) in [0, 1); kept, as movers ask for the same ones for each picture."""
-    return np.random.default_rng([seed, 1]).random((count, 2), dtype=np.float32)
+def _inwards(steps: tuple[Array, Array], missing: Mask) -> Array:
+    """How far points (P, 3) move from a chart's rim, where neighbours (4, P) on four sides are missing."""
+    ways = [(missing[2 * i] * 1.0 - missing[2 * i + 1])[:, None] * unit(step) for i, step in enumerate(steps)]
+    return np.asarray(PULLED_M * (ways[0] + ways[1]))
 
 
-def _has_body(surface: Surface, materials: Mapping[str, Material]) -> bool:
-    material = materials.get(surface.material)
-    return material is not None and texture_of(material) is not None
+def _beside(index: Places, atlas: Atlas, own: Owners) -> Indices:
+    """The points (4, P) left, right, above and below of those at flat places (P,) in the same chart, else itself."""
+    point = np.full(atlas.height * atlas.width, -1, np.int32)
+    point[index] = np.arange(len(index))
+    chart, column = atlas.chart[own.face[index]], index % atlas.width
+    found = np.empty((4, len(index)), np.int32)
+    for nth, step in enumerate((-1, 1, -atlas.width, atlas.width)):
+        other = point[np.clip(index + step, 0, len(point) - 1)]
+        adjoins = np.abs(column[other] - column) == 1 if nth < 2 else np.abs(index[other] - index) == atlas.width
+        found[nth] = np.where((other >= 0) & (chart[other] == chart) & adjoins, other, np.arange(len(index)))
+    return found
 
 
-def _nothing() -> list[NDArray[Any]]:
-    vectors = [np.zeros((0, 3), np.float32)] * 4
-    return [*vectors, np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros(0, np.float32)]
+def _steps(corners_m: Array, places: Array) -> tuple[Array, Array]:
+    """What one texel along u and v is (P, 3) on faces with corners (P, 3, 3) and places (P, 3, 2)."""
+    (a, b), (c, d) = (places[:, i].T - places[:, 0].T for i in (1, 2))
+    area = _turns_px2(places)
+    area = np.where(np.abs(area) < 1e-9, np.inf, area)[:, None]
+    first, second = (corners_m[:, i] - corners_m[:, 0] for i in (1, 2))
+    return (d[:, None] * first - b[:, None] * second) / area, (a[:, None] * second - c[:, None] * first) / area
 
 
-def _of_surface(
-    index: int, surface: Surface, materials: Mapping[str, Material], atlas: Atlas, flat: NDArray[np.int64]
-) -> list[NDArray[Any]]:
-    """All columns of Texels but the last for one surface."""
-    chart, material = atlas.charts[index], materials[surface.material]
-    # Samples on an edge touch the neighbour; a hair inwards they see past it.
-    u, v = (np.clip(fraction.ravel(), 1e-3, 1 - 1e-3) for fraction in chart.fractions())
-    vectors = [surface.at(u, v) + RAY_OFFSET_M * surface.normal, surface.normal]
-    # Half of an outer sample's area would lie beyond the edge.
-    inner_u, inner_v = ((fraction > 0) & (fraction < 1) for fraction in (f.ravel()[:, None] for f in chart.fractions()))
-    vectors += [inner_u * surface.edge_u_m / (chart.columns - 1), inner_v * surface.edge_v_m / (chart.rows - 1)]
-    eta = material.eta if isinstance(material, Polished) else 0.0
-    return [
-        *(np.broadcast_to(vector, (len(u), 3)).astype(np.float32) for vector in vectors),
-        flat[chart.window].ravel(),
-        np.full(len(u), index, np.int32),
-        np.full(len(u), eta, np.float32),
-    ]
+def _buried(points: Texels, visibility: Visibility) -> Mask:
+    """Which points (P,) see only backs of faces, as does the floor under a crate."""
+    return np.concatenate([*in_chunks(lambda part: _sees_backs(points.take(part), visibility), len(points)), _NONE])
 
 
-def outside(points: Texels, atlas: Atlas, visibility: Visibility, is_panel: NDArray[np.bool_]) -> Texels:
-    """Those that do not lie inside a thing, as does the floor under a crate; next to it they shrink to their middle."""
-    parts = in_chunks(lambda part: _buried(points.take(part), visibility, is_panel), len(points))
-    inside = np.concatenate([*parts, np.zeros(0, bool)])
-    beside = scipy.ndimage.binary_dilation(points.on_map(inside.astype(np.float32), atlas) > 0).ravel()[points.index]
-    kept, open_area = points.take(~inside), ~beside[~inside, None]
-    return replace(kept, step_u_m=kept.step_u_m * open_area, step_v_m=kept.step_v_m * open_area)
+_NONE = np.zeros(0, bool)
 
 
-def _buried(points: Texels, visibility: Visibility, is_panel: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which points (P,) see only backs of surfaces."""
+def _sees_backs(points: Texels, visibility: Visibility) -> Mask:
     inside = np.ones(len(points), bool)
     for a, b in TILTS:
         some = np.flatnonzero(inside)
         p = points.take(some)
-        u_axis, v_axis = tangents(p.normals)
-        along = a * u_axis + b * v_axis + p.normals
-        hits = visibility.opaque.hits(p.points_m, along)
-        behind = np.einsum("ij,ij->i", along, visibility.normals[hits.surface]) > 0
-        inside[some] = (hits.surface >= 0) & behind & ~is_panel[hits.surface]
+        u_axis, v_axis = tangents(p.planes)
+        along = a * u_axis + b * v_axis + p.planes
+        face = visibility.opaque.nearest(p.points_m, along)
+        behind = np.einsum("ij,ij->i", along, visibility.normals[face]) > 0
+        inside[some] = (face >= 0) & behind & (visibility.faces.lamp[face] < 0)
     return inside
+
+
+def _kept(
+    points: Texels, atlas: Atlas, own: Owners, beside: Indices, *, kept: Mask, visibility: Visibility | None
+) -> tuple[Texels, Layout]:
+    """Those of the points that are kept (P,), and how they fill the map."""
+    number = np.where(kept, np.cumsum(kept) - 1, -1)
+    takes = np.append(number[_takes(beside, kept)], -1)
+    place = np.full(atlas.height * atlas.width, len(points))
+    place[points.index] = np.arange(len(points))
+    # A texel beside a face reads the one that the nearest place of the face lies in.
+    read = np.flatnonzero((own.face >= 0) & (place == len(points)))
+    weights = np.column_stack([1 - own.uv[read].sum(1), own.uv[read]])
+    place[read] = place[atlas.index(np.einsum("ni,nij->nj", weights, atlas.light_px[own.face[read]]))]
+    source = takes[place]
+    few = points.take(kept)
+    near = number[beside[:, kept]]
+    near = np.where(near < 0, np.arange(len(few)), near).astype(np.int32)
+    straight = (near != np.arange(len(few))) & (np.einsum("nij,ij->ni", few.planes[near], few.planes) > STRAIGHT)
+    for first, second in ((0, 1), (2, 3)):
+        if visibility is None:
+            break
+        # A texel that reaches behind a thin wall has its light from its middle alone.
+        hidden = np.concatenate([*in_chunks(partial(_hidden, few.points_m, near[second], visibility), len(few)), _NONE])
+        straight[second] &= ~hidden
+        straight[first] &= ~hidden[near[first]]
+    few.step_u_m[~straight[:2].all(0)] = 0
+    few.step_v_m[~straight[2:].all(0)] = 0
+    layout = Layout(
+        atlas.height,
+        atlas.width,
+        np.where(source < 0, len(few), source).astype(np.int32),
+        near,
+        _few(few.index, near, atlas.width),
+    )
+    return few, layout
+
+
+def _hidden(points_m: Floats, others: Indices, visibility: Visibility, part: slice) -> Mask:
+    return visibility.opaque.occluded(points_m[part], points_m[others[part]])
+
+
+def _few(index: Places, beside: Indices, width: int) -> Mask:
+    few = (index // width % 2 == 0) & (index % width % 2 == 0)
+    known = few
+    for first, second in (beside[:2], beside[2:]):
+        known = known | known[first] | known[second]
+    return np.asarray(few | ~known)
+
+
+def _takes(beside: Indices, kept: Mask) -> Places:
+    """For each point (P,) itself where it is kept, else the nearest kept one by steps within its chart, or itself."""
+    takes, open_ = np.arange(len(kept)), np.flatnonzero(~kept)
+    known = kept.copy()
+    while len(open_):
+        found = [np.where(known[other], takes[other], -1) for other in beside[:, open_]]
+        best = np.max(found, axis=0)
+        done = best >= 0
+        if not done.any():
+            break
+        takes[open_[done]], known[open_[done]] = best[done], True
+        open_ = open_[~done]
+    return takes
 
 
 def tangents(normals: Floats) -> tuple[Floats, Floats]:

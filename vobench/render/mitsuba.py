@@ -18,14 +18,14 @@ import numpy as np
 from vobench import stop
 from vobench.errors import MissingDependencyError
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import SurfaceList, corners, inventory
+from vobench.render.occlusion import Pixels, opaque, twins
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
-from vobench.scene.material import Glass, Material, Matt, Mirror, Polished, Textured, reflectance, texture_of
-from vobench.scene.scene import Scene
-from vobench.scene.surface import Surface
+from vobench.scene.material import Map, Material, Rgb, Texture, linear
+from vobench.scene.mesh import Triangles
+from vobench.scene.scene import Scene, triangles
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
-VARIANT = "llvm_ad_mono"
+VARIANT = "llvm_ad_rgb"
 OLDEST_MAJOR = 15  # Dr.Jit refuses older ones; 15 and 16 cannot compile for some processors
 FOLDERS = ("usr/lib/*-linux-gnu", "usr/lib64", "usr/lib", "usr/lib/llvm*/lib", "usr/local/lib")
 LLVM_REMEDY = "apt-get update && apt-get install -y libllvm19"
@@ -124,7 +124,7 @@ def register() -> None:
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
-            self.irradiance = mi.Float(properties["irradiance"])
+            self.irradiance = mi.Color3f(properties["irradiance"])
             self.direction = mi.Vector3f(properties["direction"])
             self.m_flags = mi.EmitterFlags.Infinite | mi.EmitterFlags.DeltaDirection
             dr.make_opaque(self.irradiance, self.direction)
@@ -162,46 +162,67 @@ def register() -> None:
 
 
 SKY_PX = (512, 1024)  # rows and columns of the sky's picture: a third of a degree; even, so that none is the horizon
-BLACK = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.0}}
+CUTOUT_PX = 4  # a texel's edge, in pixels of the mask of its holes
 
 Plugin = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Surfaces that share a mesh: one material, and one mover (-1 for what is static)."""
+    """Faces (K,) that share a mesh: one material, one mover (-1 for what is static), seen from one side or both."""
 
     mover: int
     material: str
-    surfaces: tuple[int, ...]
+    two_sided: bool
+    faces: Pixels
 
     @property
     def key(self) -> str:
         """The mesh's name in Mitsuba's scene."""
-        return f"mesh_{self.mover + 1}_{self.surfaces[0]}"
+        return f"mesh_{self.mover + 1}_{self.faces[0]}"
 
 
-def groups(things: SurfaceList) -> list[Group]:
-    """All surfaces but the lights' panels by mover and material."""
-    members: dict[tuple[int, str], list[int]] = {}
-    for index, surface in enumerate(things.surfaces):
-        if things.panel[index] < 0:
-            members.setdefault((int(things.mover[index]), surface.material), []).append(index)
-    return [Group(mover, material, tuple(indices)) for (mover, material), indices in members.items()]
+def groups(scene: Scene, faces: Triangles) -> list[Group]:
+    """All faces but the lamps'; of two back to back one that has both sides, unless they glow."""
+    twin, members = twins(faces)[:-1], dict[tuple[int, str, bool], list[Pixels]]()
+    glowing = {name for name, material in scene.materials.items() if any(material.emission_cd_m2)}
+    both = (twin >= 0) & ~np.array([t.material in glowing for t in faces.things], bool)[faces.thing]
+    kept = (faces.lamp < 0) & (~both | (twin > np.arange(len(twin))))
+    starts = np.searchsorted(faces.thing, np.arange(len(faces.things) + 1))  # things are in order
+    for thing, first, end in zip(faces.things, starts, starts[1:], strict=False):
+        for two_sided in (False, True):
+            own = first + np.flatnonzero(kept[first:end] & (both[first:end] == two_sided))
+            if len(own):
+                members.setdefault((int(faces.mover[first]), thing.material, two_sided), []).append(own)
+    return [Group(*kind, np.concatenate(parts)) for kind, parts in members.items()]
 
 
 def load(mi: Any, scene: Scene) -> Any:
     """Mitsuba's scene at the first instant, every light at level 1."""
-    things = inventory(scene)
-    bsdfs = {name: mi.load_dict(_bsdf(mi, material)) for name, material in scene.materials.items()}
+    own = triangles(scene)
+    faces = own.moved([mover.path.pose(0) for mover in scene.movers])
     register()
     world: Plugin = {"type": "scene"}
-    for group in groups(things):
-        surfaces = [things.surfaces[i] for i in group.surfaces]
-        world[group.key] = _mesh(mi, group.key, surfaces, bsdfs[group.material], tile_m(scene, group.material))
+    bsdfs = cache(lambda name, two_sided: mi.load_dict(_bsdf(mi, scene.materials[name], two_sided=two_sided)))
+    for group in groups(scene, own):
+        material, bsdf = scene.materials[group.material], bsdfs(group.material, group.two_sided)
+        glow = _glow(mi, material) if any(material.emission_cd_m2) else None
+        world[group.key] = _mesh(mi, group.key, faces, group.faces, bsdf=bsdf, glow=glow, tile=material.tile_m)
+    black = mi.load_dict({"type": "diffuse", "reflectance": _rgb((0, 0, 0))})
     for index, light in enumerate(scene.lights):
-        world[light_key(index)] = _emitter(mi, light)
+        key, shining = light_key(index), np.flatnonzero(faces.lamp == index)
+        glow = mi.load_dict({"type": "area", "radiance": _rgb(nominal(light))}) if len(shining) else None
+        world[key] = _mesh(mi, key, faces, shining, bsdf=black, glow=glow) if len(shining) else _emitter(mi, light)
     return mi.load_dict(world, optimize=False)
+
+
+def one_sided(mi: Any, scene: Scene, world: Any) -> Any:
+    """Whether the shapes of Mitsuba's scene, by their number there, are not to be seen from behind."""
+    import drjit as dr
+
+    seen = {g.key for g in groups(scene, triangles(scene)) if g.two_sided or scene.materials[g.material].kind == "pane"}
+    numbers = {int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(s))[0]): s.id() not in seen for s in world.shapes()}
+    return mi.Bool([numbers.get(number, False) for number in range(max(numbers, default=0) + 1)])
 
 
 # Where each kind of light keeps how strong it is.
@@ -214,19 +235,20 @@ STRENGTH = {
 }
 
 
-def nominal(light: Light) -> float:
-    """Strength at level 1, in the unit of its kind: cd/m², cd, lux; the sky's picture counts once."""
+def nominal(light: Light) -> Array:
+    """Strength (3,) at level 1 of red, green and blue, in the unit of its kind: cd/m², cd, lux; 1 for the sky."""
     match light:
         case AreaLight():
-            return light.luminance_cd_m2
+            strength = light.luminance_cd_m2
         case PointLight():
-            return light.power_lm / (4 * np.pi)
+            strength = light.power_lm / (4 * np.pi)
         case SpotLight():
-            return light.peak_cd
+            strength = light.peak_cd
         case Sun():
-            return light.illuminance_lx
+            strength = light.illuminance_lx
         case Sky():
-            return 1.0
+            return np.ones(3)
+    return strength * np.array(light.colour)
 
 
 def light_key(index: int) -> str:
@@ -234,100 +256,107 @@ def light_key(index: int) -> str:
     return f"light_{index}"
 
 
-def tile_m(scene: Scene, material: str) -> float:
-    """Length of the side of a material's tile; 1 where it has none."""
-    texture = texture_of(scene.materials[material])
-    return texture.tile_m if texture else 1.0
-
-
-def positions(surfaces: list[Surface]) -> Array:
-    """Corners (4 S, 3) of a mesh's rectangles."""
-    return np.concatenate([corners(surface) for surface in surfaces])
-
-
-def on_texture_m(surface: Surface) -> Array:
-    """Where the four corners (4, 2) of a rectangle lie on its texture, in metres."""
-    return surface.on_texture_m(np.array([0.0, 1, 1, 0]), np.array([0.0, 0, 1, 1]))
-
-
-def _mesh(mi: Any, name: str, surfaces: list[Surface], bsdf: Any, tile: float) -> Any:
-    """Two triangles a rectangle, with metres along its edges over the tile's size as texture coordinates."""
+def _mesh(mi: Any, name: str, faces: Triangles, own: Pixels, *, bsdf: Any, glow: Any = None, tile: float = 1.0) -> Any:
+    """Some faces (K,) of a table, their corners not shared."""
     properties = mi.Properties()
     properties["mesh_bsdf"] = bsdf
-    mesh = mi.Mesh(name, 4 * len(surfaces), 2 * len(surfaces), props=properties, has_vertex_texcoords=True)
+    if glow:
+        properties["mesh_emitter"] = glow
+    counts = {"vertex_count": 3 * len(own), "face_count": len(own)}
+    mesh = mi.Mesh(name, **counts, props=properties, has_vertex_normals=True, has_vertex_texcoords=True)
     parameters = mi.traverse(mesh)
-    faces = 4 * np.arange(len(surfaces))[:, None] + [0, 1, 2, 0, 2, 3]
-    coordinates = np.concatenate([on_texture_m(surface) for surface in surfaces]) / tile
-    parameters["faces"] = faces.ravel().astype(np.uint32)
-    parameters["vertex_positions"] = positions(surfaces).ravel().astype(np.float32)
-    parameters["vertex_texcoords"] = coordinates.ravel().astype(np.float32)
+    parameters["faces"] = np.arange(3 * len(own), dtype=np.uint32)
+    parameters["vertex_positions"] = faces.corners_m[own].ravel().astype(np.float32)
+    parameters["vertex_normals"] = faces.normals[own].ravel().astype(np.float32)
+    parameters["vertex_texcoords"] = (faces.uv[own] / tile).ravel().astype(np.float32)
     parameters.update()
     return mesh
 
 
-def _bsdf(mi: Any, material: Material) -> Plugin:
+def _bsdf(mi: Any, material: Material, *, two_sided: bool) -> Plugin:
     """The material as one of Mitsuba's plugins."""
-    match material:
-        case Matt():
-            return {"type": "diffuse", "reflectance": _texture(mi, material)}
-        case Polished():
-            coat = {"int_ior": material.eta, "ext_ior": 1.0, "nonlinear": True}
-            colours = {"specular_reflectance": _uniform(material.tint), "diffuse_reflectance": _texture(mi, material)}
-            return {**_polish("plastic", material.roughness), **coat, **colours}
-        case Mirror():
-            kind = _polish("conductor", material.roughness)
-            return {**kind, "material": "none", "specular_reflectance": _uniform(material.tint)}
-        case Glass():
-            passing = {"specular_transmittance": _uniform(material.tint)}
-            return {"type": "thindielectric", "int_ior": material.eta, "ext_ior": 1.0, **passing}
+    if material.kind == "pane":
+        passing = {"specular_transmittance": _rgb((material.tint,) * 3)}
+        return {"type": "thindielectric", "int_ior": material.eta, "ext_ior": 1.0, **passing}
+    bsdf = {"type": "twosided", "bsdf": _opaque(mi, material)} if two_sided else _opaque(mi, material)
+    if material.cutout is None or material.texture is None:
+        return bsdf
+    height, width = material.texture.pixels().shape[:2]
+    v, u = ((np.arange(CUTOUT_PX * n) + 0.5) / (CUTOUT_PX * n) for n in (height, width))
+    solid = opaque(material, np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)).reshape(len(v), len(u))
+    return {"type": "mask", "opacity": _bitmap(mi, solid.astype(np.float32), filter_type="nearest"), "bsdf": bsdf}
 
 
-def _polish(kind: str, roughness: float) -> Plugin:
-    return {"type": f"rough{kind}", "distribution": "ggx", "alpha": roughness} if roughness else {"type": kind}
+def _opaque(mi: Any, material: Material) -> Plugin:
+    """A mirror, or a body, which may be partly metal and partly matt or under a coat."""
+    polish = {"distribution": "ggx", "alpha": material.roughness} if material.roughness else {}
+    rough = "rough" if material.roughness else ""
+    mirror: Plugin = {"type": f"{rough}conductor", "material": "none", **polish}
+    if material.kind == "mirror":
+        return {**mirror, "specular_reflectance": _rgb((material.tint,) * 3)}
+    colour = _texture(mi, material.texture, material.colour)
+    body: Plugin = {"type": "diffuse", "reflectance": colour}
+    if material.is_coated:
+        coat = {"int_ior": material.eta, "ext_ior": 1.0, "nonlinear": True}
+        tint = _rgb((material.tint,) * 3)
+        body = {
+            "type": f"{rough}plastic",
+            **polish,
+            **coat,
+            "specular_reflectance": tint,
+            "diffuse_reflectance": colour,
+        }
+    if not material.metal:
+        return body
+    return {"type": "blendbsdf", "weight": material.metal, "0": body, "1": {**mirror, "specular_reflectance": colour}}
 
 
-def _uniform(value: float) -> Plugin:
-    return {"type": "uniform", "value": value}
+def _rgb(values: Array | Rgb) -> Plugin:
+    return {"type": "rgb", "value": [float(value) for value in values]}
 
 
-def _texture(mi: Any, texture: Textured) -> Plugin:
-    """The tile as it is: linear reflectance, repeated, linear between texels, row 0 at v = 0."""
-    tile = mi.Bitmap(np.ascontiguousarray(reflectance(texture)[..., None]))
-    return {"type": "bitmap", "bitmap": tile, "raw": True, "wrap_mode": "repeat", "filter_type": "bilinear"}
+def _texture(mi: Any, texture: Texture | None, colour: Rgb) -> Plugin:
+    """A colour times a texture, linear, repeated, linear between texels, row 0 at v = 0."""
+    if texture is None:
+        return _rgb(colour)
+    pixels = texture.pixels()
+    grey = pixels[..., None] if pixels.ndim == 2 else linear(pixels[..., :3])
+    return _bitmap(mi, grey * np.array(colour, np.float32))
+
+
+def _bitmap(mi: Any, tile: Map, *, filter_type: str = "bilinear") -> Plugin:
+    tile = np.ascontiguousarray(tile if tile.ndim == 3 else tile[..., None])
+    return {"type": "bitmap", "bitmap": mi.Bitmap(tile), "raw": True, "wrap_mode": "repeat", "filter_type": filter_type}
+
+
+def _glow(mi: Any, material: Material) -> Any:
+    """What a material emits, as an area light."""
+    return mi.load_dict({"type": "area", "radiance": _texture(mi, material.emission_texture, material.emission_cd_m2)})
 
 
 def _emitter(mi: Any, light: Light) -> Plugin:
-    """The light at level 1, in cd/m², cd or lux."""
+    """A light without faces at level 1, in cd or lux."""
     match light:
-        case AreaLight():
-            panel = {"to_world": mi.ScalarTransform4f(_unit_square(light.surface)), "bsdf": BLACK}
-            glow = {"type": "area", "radiance": _uniform(light.luminance_cd_m2)}
-            return {"type": "rectangle", **panel, "emitter": glow}
         case PointLight():
-            return {"type": "point", "position": list(light.position_m), "intensity": _uniform(nominal(light))}
+            return {"type": "point", "position": list(light.position_m), "intensity": _rgb(nominal(light))}
         case SpotLight():
             aim = {"origin": list(light.position_m), "target": list(light.position_m + light.direction)}
             up = np.eye(3)[np.argmin(np.abs(light.direction))]
             beam = {"cutoff_angle": light.outer_deg, "beam_width": min(light.inner_deg, light.outer_deg - 1e-3)}
             pose = mi.ScalarTransform4f().look_at(**aim, up=list(up))
-            return {"type": "spot", "to_world": pose, **beam, "intensity": _uniform(nominal(light))}
+            return {"type": "spot", "to_world": pose, **beam, "intensity": _rgb(nominal(light))}
         case Sun():
-            return {"type": PLUGIN, "irradiance": nominal(light), "direction": list(light.direction(0))}
+            strength = mi.ScalarColor3f(nominal(light).tolist())
+            return {"type": PLUGIN, "irradiance": strength, "direction": list(light.direction(0))}
         case Sky():
             upright = mi.ScalarTransform4f().rotate([1, 0, 0], 90)
             return {"type": "envmap", "bitmap": mi.Bitmap(_sky_picture(light)), "to_world": upright}
+        case AreaLight():
+            raise ValueError(f"the lamp '{light.name}' has no faces")
 
 
-def _unit_square(surface: Surface) -> Array:
-    """What takes Mitsuba's rectangle, two wide around the origin and facing z, to a surface (4, 4)."""
-    M = np.eye(4)
-    M[:3, 0], M[:3, 1] = surface.edge_u_m / 2, surface.edge_v_m / 2
-    M[:3, 2], M[:3, 3] = surface.normal, surface.at(np.array(0.5), np.array(0.5))
-    return M
-
-
-def _sky_picture(sky: Sky) -> Array:
-    """Luminance (rows, columns, 1) float32 as Mitsuba's environment map wants it: y up, from zenith to nadir."""
+def _sky_picture(sky: Sky) -> Map:
+    """Luminance (rows, columns, 3) float32 as Mitsuba's environment map wants it: y up, from zenith to nadir."""
     rows, columns = SKY_PX
     theta = np.pi * np.arange(rows)[:, None] / (rows - 1)
     phi = 2 * np.pi * (np.arange(columns) + 0.5) / columns
@@ -335,4 +364,4 @@ def _sky_picture(sky: Sky) -> Array:
     directions = np.stack(
         np.broadcast_arrays(np.sin(theta) * np.sin(phi), np.sin(theta) * np.cos(phi), np.cos(theta)), -1
     )
-    return sky.luminance_cd_m2(directions)[..., None].astype(np.float32)
+    return np.asarray(sky.luminance_cd_m2(directions)[..., None] * np.array(sky.colour), np.float32)

@@ -1,51 +1,32 @@
 """Light on movers, and what they keep from the rest."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
-from vobench.render.bake import BakedScene, StaticScene, reached
-from vobench.render.direct_light import Rays, arriving, cell_spot, first_rays, footprint, in_front, mirror_images
+from vobench.geometry import se3
+from vobench.geometry.se3 import Array
+from vobench.render.bake import BakedScene, StaticScene, bodies
+from vobench.render.direct_light import Rays, arriving, cell_spot, footprint, in_front, mirror_images
 from vobench.render.emitter import Emitter, emitters
-from vobench.render.geometry import (
-    Ball,
-    Floats,
-    Mask,
-    RayCaster,
-    SurfaceList,
-    Visibility,
-    ball,
-    corners,
-    inventory,
-    take,
-)
-from vobench.render.indirect_light import FinalGather, final_gather, surface_responses
-from vobench.render.lightmap import Atlas, Chart, Scales, Texels, in_chunks, pack_atlas, texels
-from vobench.scene.light import Sky, Sun
-from vobench.scene.material import Map
-from vobench.scene.surface import Surface
+from vobench.render.geometry import Ball, Floats, Indices, Mask, RayCaster, Visibility, face_materials
+from vobench.render.indirect_light import FinalGather, Gatherer, blend, response, surfels
+from vobench.render.lightmap import Places, Texels, in_chunks, owners, texels
+from vobench.scene.light import AreaLight, Light, Sky, Sun
+from vobench.scene.mesh import Triangles
 
-BLOCK = 4  # samples along a side
-PROBES, RAYS = Rays(2), Rays(3, spread=True)  # per point, emitter and picture
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+SIDE, SHADE_SIDE, SKY_SIDE = 3, 2, 5  # rays along a side to an emitter: on movers, in their shade, to the sky
 SKY_REACH = 10  # radii beyond which a mover hides less than a hundredth of an open sky
-CHUNK = 1 << 12
-MOST_SLICES = 8  # of a mover
-SPREAD = 1.5  # samples, from every other one
-MARGIN = 6  # samples around a shadow that its smoothing reaches
-
-
-def blocks(points: Texels, atlas: Atlas) -> tuple[NDArray[np.int64], Ball]:
-    """Which square (P,) of BLOCK x BLOCK samples of one surface each point is in, and balls (B,) around these."""
-    row, column = points.index // atlas.width // BLOCK, points.index % atlas.width // BLOCK
-    key = (points.surface.astype(np.int64) * (atlas.height // BLOCK + 1) + row) * (atlas.width // BLOCK + 1) + column
-    _, of, count = np.unique(key, return_inverse=True, return_counts=True)
-    centre = np.stack([np.bincount(of, axis) for axis in points.points_m.T], -1) / count[:, None]
-    radius = np.zeros(len(count))
-    np.maximum.at(radius, of, np.linalg.norm(points.points_m - centre[of], axis=1))
-    return of, Ball(centre, radius)
+GATHER_RAYS = 64
+GATHER_M = 0.2  # between places that gather indirect light
+UNNOTICED = 1 / 300  # share of a place's light, less than a step of 8 bits
 
 
 def may_shade(mover: Ball, emitter: Ball, points: Ball) -> Mask:
@@ -65,258 +46,187 @@ def may_shade(mover: Ball, emitter: Ball, points: Ball) -> Mask:
     return np.asarray(inside | ((np.arccos(np.clip(cosine, -1, 1)) <= sum(angles)) & (far_mover <= reach)))
 
 
-Shaded = tuple[NDArray[np.int64], Floats]  # some points (N,), and the illuminance (N,) that movers take from them
+class MovingCaster:
+    """Rays against bodies where they are: each caster is in its body's frame, and T_body_world (4, 4) leads there."""
 
+    def __init__(self, bodies: Sequence[tuple[RayCaster, Array]], still: RayCaster | None = None) -> None:
+        self._bodies, self._still = bodies, still
 
-@dataclass(frozen=True, slots=True)
-class StaticShading:
-    """What does not move, ready to be shaded; block_of and balls are its `blocks`."""
-
-    points: Texels
-    atlas: Atlas
-    block_of: NDArray[np.int64]
-    balls: Ball
-    visibility: Visibility
-
-    def by(self, movers: Sequence[Sequence[Surface]], target: "Target", least_lx: Floats) -> Shaded:
-        """Light of an emitter that movers, each a list of surfaces, keep from the points.
-
-        least_lx (P,): blocks of points that lose less than this are left alone.
-        """
-        emitter = target.emitter
-        some = np.flatnonzero(self._near(movers, emitter.ball)[self.block_of])
-        some = some[in_front(emitter.ball, self.points.points_m[some], self.points.normals[some])]
-        surfaces = [surface for mover in movers for surface in mover]
-        caster = RayCaster(surfaces, range(len(surfaces)))
-        probes = some[self._every_other(some)] if emitter.sky == "pane" else some
-        sent = target.sent(self.points, probes, PROBES)
-        bright = np.flatnonzero(sent.light.mean(1) > least_lx[probes])
-        found = probes[bright][self._lost(sent.take(bright), target, caster) > least_lx[probes[bright]]]
-        # Probes miss the rims of half shadows, but not whole blocks.
-        shaded = np.zeros(len(self.balls.radius_m), bool)
-        shaded[self.block_of[found]] = True
-        return self._shaded(some[shaded[self.block_of[some]]], target, caster)
-
-    def _near(self, movers: Sequence[Sequence[Surface]], emitter: Ball) -> Mask:
-        """Blocks (B,) that movers may shade: by a ball around each, and of those by smaller ones that fit better."""
-        near = np.zeros(len(self.balls.radius_m), bool)
-        for mover in movers:
-            some = np.flatnonzero(~near)
-            for enclosing in ([ball(mover)], slices(mover)):
-                few = self.balls.take(some)
-                some = some[np.logical_or.reduce([may_shade(one, emitter, few) for one in enclosing])]
-            near[some] = True
-        return near
-
-    def _shaded(self, some: NDArray[np.int64], target: "Target", caster: RayCaster) -> Shaded:
-        if target.emitter.sky != "pane":
-            return some, self._lost(target.sent(self.points, some, RAYS), target, caster)
-        few = some[self._every_other(some)]
-        return some, self._filled(some, few, self._lost(target.sent(self.points, few, RAYS), target, caster))
-
-    def _every_other(self, some: NDArray[np.int64]) -> Mask:
-        row, column = np.divmod(self.points.index[some], self.atlas.width)
-        return np.asarray((row % 2 == 0) & (column % 2 == 0))
-
-    def _filled(self, some: NDArray[np.int64], few: NDArray[np.int64], lost: Floats) -> Floats:
-        """The loss of few points, smoothed as the sky's own light is, at all of some."""
-        weighted = np.zeros((2, self.atlas.height, self.atlas.width), np.float32)
-        weighted.reshape(2, -1)[:, self.points.index[few]] = lost, np.ones_like(lost)
-        place, surface = self.points.index[some], self.points.surface[some]
-        for index in np.unique(surface):
-            window = _around(place[surface == index], self.atlas, self.atlas.charts[index])
-            for layer in weighted:
-                layer[window] = ndimage.gaussian_filter(layer[window], SPREAD, mode="nearest")
-        light, weight = weighted.reshape(2, -1)[:, place]
-        return np.asarray(light / np.maximum(weight, 1e-6))
-
-    def _lost(self, sent: "ShadowRays", target: "Target", caster: RayCaster) -> Floats:
-        """Illuminance (N,) that what a caster holds takes from the points of some rays."""
-        count = len(sent.some)
-        parts = in_chunks(lambda part: self._lost_of(sent.take(part), target.emitter, caster), count, chunk=CHUNK)
-        return np.concatenate([*parts, np.zeros(0, np.float32)])
-
-    def _lost_of(self, sent: "ShadowRays", emitter: Emitter, caster: RayCaster) -> Floats:
-        start = np.broadcast_to(sent.start_m, sent.ahead_m.shape).reshape(-1, 3)
-        light, ahead = sent.light.ravel(), sent.ahead_m.reshape(-1, 3)
-        hidden = np.flatnonzero(caster.stops(start, ahead) & (light > 0))
-        lost = np.zeros(len(light), np.float32)
-        lost[hidden] = light[hidden] * emitter.passing(self.visibility, start[hidden], ahead[hidden])
-        return np.asarray(lost.reshape(sent.light.shape).mean(1))
-
-
-@dataclass(frozen=True, slots=True)
-class ShadowRays:
-    """R rays from each of some points (N,), increasing, to an emitter: where from, (N, R, 3) or (N, 1, 3), and whereto.
-
-    light (N, R): the illuminance that each of the rays would bring if nothing stood in its way.
-    """
-
-    some: NDArray[np.int64]
-    start_m: Floats
-    ahead_m: Floats
-    light: Floats
-
-    take = take
-
-    def merged(self, other: "ShadowRays", own: Mask) -> "ShadowRays":
-        """Those of both, one after another; `own` (N,) says whose turn it is."""
-        merged = []
-        for mine, others in ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self)):
-            both = np.empty((len(own), *mine.shape[1:]), mine.dtype)
-            both[own], both[~own] = mine, others
-            merged.append(both)
-        return ShadowRays(*merged)
-
-
-def _nobody(rays: Rays) -> ShadowRays:
-    vectors = np.zeros((0, rays.side**2, 3), np.float32)
-    return ShadowRays(np.zeros(0, np.int64), vectors if rays.spread else vectors[:, :1], vectors, vectors[..., 0])
-
-
-class Target:
-    """An emitter, and the rays that points sent to it for the last picture: movers go slowly, so most serve again."""
-
-    def __init__(self, emitter: Emitter) -> None:
-        self.emitter = emitter
-        self._kept: dict[Rays, ShadowRays] = {}
-
-    def sent(self, points: Texels, some: NDArray[np.int64], rays: Rays) -> ShadowRays:
-        """Rays from some points (N,), increasing."""
-        kept = self._kept.get(rays, _nobody(rays))
-        place = np.searchsorted(kept.some, some)
-        known = np.append(kept.some, -1)[place] == some
-        new = some[~known]
-        parts = in_chunks(lambda part: self._send(points, new[part], rays), len(new), chunk=CHUNK)
-        fresh = ShadowRays(
-            *(np.concatenate([getattr(p, f.name) for p in [_nobody(rays), *parts]]) for f in fields(ShadowRays))
-        )
-        self._kept[rays] = kept.take(place[known]).merged(fresh, known)
-        return self._kept[rays]
-
-    def _send(self, points: Texels, some: NDArray[np.int64], rays: Rays) -> ShadowRays:
-        part, shape = points.take(some), (len(some), rays.side**2)
-        towards, every = self.emitter.towards(part), np.arange(len(some))
-        light, ahead_m = np.empty(shape, np.float32), np.empty((*shape, 3), np.float32)
-        start_m = part.points_m[:, None].repeat(shape[1] if rays.spread else 1, axis=1)
-        for cell in range(rays.side**2):
-            way, strength = towards(*cell_spot(part, cell, rays.side))
-            cosine = part.cosine(way)
-            light[:, cell] = strength * np.maximum(cosine, 0) * part.entering(cosine)
-            ahead_m[:, cell] = way
-            if rays.spread:
-                aside_m = footprint(part, every, cell)
-                start_m[:, cell] += aside_m
-                ahead_m[:, cell] -= aside_m
-        return ShadowRays(some, start_m, ahead_m, light)
-
-
-def slices(surfaces: Sequence[Surface]) -> list[Ball]:
-    """Balls that enclose surfaces together: slices of their upright box across its longest side."""
-    points = np.concatenate([corners(s) for s in surfaces])
-    low, size = points.min(0), np.ptp(points, axis=0)
-    longest = int(size.argmax())
-    count = int(np.clip(np.ceil(size[longest] / max(np.sort(size)[1], 1e-3)), 1, MOST_SLICES))
-    part = np.where(np.arange(3) == longest, size / count, size)
-    step = np.eye(3)[longest] * part
-    return [Ball(low + part / 2 + i * step, float(np.linalg.norm(part) / 2)) for i in range(count)]
-
-
-def _around(place: NDArray[np.int64], atlas: Atlas, chart: Chart) -> tuple[slice, slice]:
-    """The part of a chart, with a margin, that flat places lie in."""
-    row, column = np.divmod(place, atlas.width)
-    return (
-        slice(max(int(row.min()) - MARGIN, chart.row), min(int(row.max()) + MARGIN, chart.row + chart.rows)),
-        slice(
-            max(int(column.min()) - MARGIN, chart.column), min(int(column.max()) + MARGIN, chart.column + chart.columns)
-        ),
-    )
-
-
-GATHER_RAYS = 64
-GATHER_SPACING_M = 0.2
-SKY_SHARE = 0.05  # of all points
-UNNOTICED = 1 / 300  # share of a place's light, less than a step of 8 bits
+    def stops(self, origins_m: Floats, way: Floats) -> Mask:
+        """Whether anything is between origins and origins + way (R, 3)."""
+        hidden = self._still.stops(origins_m, way) if self._still else np.zeros(len(origins_m), bool)
+        for caster, T in self._bodies:
+            some = np.flatnonzero(~hidden)
+            hidden[some] = caster.stops(se3.apply(T, origins_m[some]), way[some] @ T[:3, :3].T)
+        return hidden
 
 
 @dataclass(frozen=True, slots=True)
 class MoverLightAt:
-    """Movers at one instant: each light's direct light (L, P) on their points, and what they shade of it.
+    """Movers at one instant: each light's direct light (L, M) on their points, and what they keep from others (L, P).
 
-    gathered: what reaches their coarse points, at `coarse` (C,) in the coarse map.
+    gathered: what reaches their groups of points from the surfels and lamps of what stands still.
     """
 
-    index: NDArray[np.int64]
     direct: Floats
-    shaded: tuple[tuple[Shaded, ...], ...]
+    lost: Floats
     gathered: FinalGather
-    coarse: NDArray[np.int64]
 
 
 class MoverLight:
     """The light of a baked scene's movers."""
 
     def __init__(self, baked: BakedScene, still: StaticScene) -> None:
-        self._scene, self._settings, self._still = baked.scene, baked.settings, still
-        self._shade = StaticShading(still.points, still.atlas, *blocks(still.points, still.atlas), still.visibility)
-        self._movers = tuple(np.flatnonzero(still.things.mover >= 0).tolist())
-        self._scales = Scales(still.atlas, pack_atlas(still.things.surfaces, spacing_m=GATHER_SPACING_M))
-        self._response = surface_responses(
-            still.things.surfaces, self._scene.materials, baked.albedo, still.things.panel
+        self._baked, self._still, self._lights = baked, still, baked.scene.lights
+        faces, materials = baked.faces, baked.scene.materials
+        looks = [m is not None and m.kind == "pane" for m in face_materials(faces, materials)]
+        solid = ~np.array(looks, bool)[faces.thing]
+        own = [np.flatnonzero((faces.mover == nth) & solid) for nth in range(len(baked.scene.movers))]
+        self._solid = [nth for nth, some in enumerate(own) if len(some)]
+        self._casters = [RayCaster(faces, own[nth]) for nth in self._solid]
+        self._parts = [parts(faces.corners_m[own[nth]]) for nth in self._solid]
+        moves = (faces.mover >= 0) & bodies(baked.scene, faces)
+        self._points, self._layout = texels(
+            faces, materials, baked.atlas, owners(baked.atlas), among=moves, seed=baked.settings.seed
         )
-        self._skies = [light for light in self._scene.lights if isinstance(light, Sky)]
-        self._targets = [self._seen(emitters(light, still.visibility)) for light in self._scene.lights]
-        self._layers = baked.light.reshape(len(baked.light), -1)
+        self._mover = faces.mover[self._points.face]
+        self._cells = _cells(still.points, still.cells)
+        self._groups, self._blend = self._grouped(faces)
+        self._gatherer = Gatherer(
+            baked.atlas,
+            still.visibility,
+            response(faces, materials, still.visibility),
+            [light for light in self._lights if isinstance(light, Sky)],
+            baked.patches.surfel_of,
+            len(baked.patches.area_m2),
+            len(self._lights),
+        )
+        self._straight = [layer.ravel()[still.points.index] for layer in baked.direct]
+
+    def _grouped(self, faces: Triangles) -> "tuple[Places, csr_matrix]":
+        """The points that gather light for their neighbours, and how these take it (H·W, S)."""
+        points, moving = self._points, np.flatnonzero(faces.mover >= 0)
+        alone = Visibility(faces, self._baked.scene.materials, moving)
+        steps = np.full(len(points), GATHER_M, np.float32)
+        groups = surfels(points, faces.thing[points.face], steps, alone)
+        return groups.middle, blend(points, groups, self._layout, alone, np.ones(len(groups), bool))
 
     def at(self, t_ns: float, suns_ns: Sequence[float], is_on: Sequence[bool]) -> MoverLightAt:
         """All that the movers' places decide.
 
         suns_ns (L,): the instant of each sun that moves; is_on (L,): which lights are on at all.
         """
-        things, side = inventory(self._scene, t_ns=t_ns), round(np.sqrt(self._settings.light_rays))
-        lit = self._points(things, self._still.atlas)
-        visibility = Visibility(things.surfaces, self._scene.materials, range(len(things.surfaces)))
-        shining = [self._shining(index, suns_ns[index]) if on else [] for index, on in enumerate(is_on)]
-        opaque = [np.flatnonzero((things.mover == index) & ~things.pane) for index in range(len(self._scene.movers))]
-        movers = [[things.surfaces[i] for i in sides] for sides in opaque if len(sides)]
-        direct = np.zeros((len(shining), len(lit)), np.float32)
-        for row, light, targets, sun_ns in zip(direct, self._scene.lights, shining, suns_ns, strict=True):
-            shown = mirror_images(light, visibility, t_ns=sun_ns) if targets else []
-            for emitter in [*(target.emitter for target in targets), *shown]:
-                for rays, some in first_rays(emitter, lit, side):
-                    row[some] += arriving(emitter, lit.take(some), visibility, rays)[0]
-        least_lx = (UNNOTICED * np.asarray(is_on, np.float32) @ self._layers)[self._still.points.index]
-        shaded = tuple(tuple(self._shade.by(movers, target, least_lx) for target in targets) for targets in shining)
-        coarse = self._points(things, self._scales.coarse)
-        gather_rays, still = GATHER_RAYS if self._settings.bounces else 0, self._still
-        gathered = final_gather(coarse, still.atlas, still.visibility, self._response, self._skies, rays=gather_rays)
-        return MoverLightAt(lit.index, direct, shaded, gathered, coarse.index)
+        poses = [mover.path.pose(t_ns) for mover in self._baked.scene.movers]
+        solid = [(caster, se3.inverse(poses[n])) for caster, n in zip(self._casters, self._solid, strict=True)]
+        parts_at = [_moved_ball(own, poses[n]) for own, n in zip(self._parts, self._solid, strict=True)]
+        points, together = self._placed(poses), copy(self._still.visibility)
+        together.opaque = MovingCaster(solid, together.opaque)  # type: ignore[assignment]
+        direct = np.zeros((len(self._lights), len(points)), np.float32)
+        lost = np.zeros((len(self._lights), len(self._still.points)), np.float32)
+        for index, light in enumerate(self._lights):
+            for emitter in self._shining(light, suns_ns[index]) if is_on[index] else ():
+                some = np.flatnonzero(in_front(emitter.ball, points.points_m, points.normals))
+                rays = Rays(SKY_SIDE if emitter.sky else SIDE)
+                direct[index, some] += arriving(emitter, points.take(some), together, rays)[0]
+                lost[index] += self._lost(emitter, self._shaded(emitter, parts_at, index), MovingCaster(solid))
+            # Rounding apart, nothing is taken that had not come.
+            np.minimum(lost[index], self._straight[index], out=lost[index])
+        count = GATHER_RAYS if self._baked.settings.bounces else 0
+        return MoverLightAt(direct, lost, self._gatherer.gather(points.take(self._groups), rays=count))
 
-    def add(self, moment: MoverLightAt, total: Map, levels: Sequence[float]) -> None:
-        """Put the movers' light and shade into the sum of all layers (H, W) of what is static."""
-        flat = total.reshape(-1)
-        for level, parts in zip(levels, moment.shaded, strict=True):
-            for some, lost in parts:
-                place = self._still.points.index[some]
-                flat[place] = np.maximum(flat[place] - np.float32(level) * lost, 0)
-        of_sky = [level for level, light in zip(levels, self._scene.lights, strict=True) if isinstance(light, Sky)]
-        around = np.zeros((1, self._scales.coarse.height * self._scales.coarse.width), np.float32)
-        around[0, moment.coarse] = moment.gathered.table @ flat + np.asarray(of_sky, np.float32) @ moment.gathered.sky
-        on_map = around.reshape(1, self._scales.coarse.height, -1)
-        indirect = self._scales.refined(on_map, self._movers).reshape(-1)
-        flat[moment.index] = np.asarray(levels, np.float32) @ moment.direct + indirect[moment.index]
+    def add(self, moment: MoverLightAt, total: Floats, levels: Sequence[float]) -> None:
+        """Put the movers' light and shade into the sum (H, W, 3) of all that stands still."""
+        flat, strength = total.reshape(-1, 3), np.asarray(levels, np.float32)
+        colours = strength[:, None] * np.array([light.colour for light in self._lights], np.float32)
+        shade = np.append(moment.lost.T @ colours, np.zeros((1, 3), np.float32), 0)
+        is_shaded: Mask = np.any(shade != 0, axis=1)
+        shaded = np.flatnonzero(is_shaded[self._still.layout.source])
+        flat[shaded] = np.maximum(flat[shaded] - shade[self._still.layout.source[shaded]], 0)
+        own = np.flatnonzero(self._layout.source < len(self._points))
+        lit = (moment.direct.T @ colours)[self._layout.source[own]]
+        flat[own] = lit + (self._blend @ self._around(moment.gathered, colours))[own]
 
-    def _points(self, things: SurfaceList, atlas: Atlas) -> Texels:
-        materials, seed = self._scene.materials, self._settings.seed
-        return texels(things.surfaces, materials, atlas, among=self._movers, seed=seed)
+    def _around(self, gathered: FinalGather, colours: Floats) -> Floats:
+        """Illuminance (S, 3) of the movers' groups by bounces, lamps in mirrors included."""
+        radiosity = np.einsum("lsc,lc->sc", self._baked.patches.radiosity, colours)
+        glow = [np.pi * x.luminance_cd_m2 if isinstance(x, AreaLight) else 0 for x in self._lights]
+        sent = np.concatenate([radiosity, np.array(glow, np.float32)[:, None] * colours])
+        skies = [colour for colour, x in zip(colours, self._lights, strict=True) if isinstance(x, Sky)]
+        by_mirrors = gathered.sky.T @ np.array(skies, np.float32).reshape(-1, 3)
+        return np.asarray(gathered.table @ sent + by_mirrors, np.float32)
 
-    def _shining(self, index: int, t_ns: float) -> list[Target]:
-        light = self._scene.lights[index]
-        if isinstance(light, Sun) and light.moves:
-            return [Target(emitter) for emitter in emitters(light, self._still.visibility, t_ns=t_ns)]
-        return self._targets[index]
+    def _placed(self, poses: Sequence[Array]) -> Texels:
+        """The movers' points where they are."""
+        p, T = self._points, np.array(poses)[self._mover]
 
-    def _seen(self, parts: list[Emitter]) -> list[Target]:
-        """All but an open sky that few points see, such as undersides of things on the floor."""
-        some = [reached(emitter, self._still).mean() if emitter.sky == "open" else 1 for emitter in parts]
-        return [Target(emitter) for emitter, share in zip(parts, some, strict=True) if share > SKY_SHARE]
+        def turned(vectors: Floats) -> Floats:
+            return np.asarray(np.einsum("nij,nj->ni", T[:, :3, :3], vectors), np.float32)
+
+        names = ("normals", "planes", "step_u_m", "step_v_m")
+        vectors: dict[str, Any] = {name: turned(getattr(p, name)) for name in names}
+        return replace(p, points_m=(turned(p.points_m) + T[:, :3, 3]).astype(np.float32), **vectors)
+
+    def _shining(self, light: Light, sun_ns: float) -> list[Emitter]:
+        """What a light shines from, its images in mirrors included."""
+        t_ns = sun_ns if isinstance(light, Sun) and light.moves else 0.0
+        own = emitters(light, self._still.visibility, t_ns=t_ns)
+        return [*own, *mirror_images(light, self._still.visibility, t_ns=t_ns)]
+
+    def _shaded(self, emitter: Emitter, movers: Sequence[Ball], light: int) -> Places:
+        """Points (N,) that stand still, have light of a lamp, and may lose some of it to a mover."""
+        near = np.zeros(len(self._cells.radius_m), bool)
+        for own in movers:
+            for part in range(len(own.radius_m)):
+                near |= may_shade(own.take(slice(part, part + 1)), emitter.ball, self._cells)
+        points, straight = self._still.points, self._straight[light]
+        some = np.flatnonzero(near[self._still.cells] & (straight > UNNOTICED * straight.max(initial=0)))
+        return some[in_front(emitter.ball, points.points_m[some], points.normals[some])]
+
+    def _lost(self, emitter: Emitter, some: Places, movers: MovingCaster) -> Floats:
+        """Illuminance (P,) that movers take from some points; the sky's in a pane is smoothed."""
+        layout, is_soft = self._still.layout, emitter.sky == "pane"
+        some, side = (some[layout.few[some]], SKY_SIDE) if is_soft else (some, SHADE_SIDE)
+        lost = np.zeros(len(self._still.points), np.float32)
+        found = in_chunks(lambda part: self._lost_at(emitter, some[part], movers, side), len(some))
+        lost[some] = np.concatenate([*found, np.zeros(0, np.float32)])
+        return layout.blurred(layout.between(lost)) if is_soft else lost
+
+    def _lost_at(self, emitter: Emitter, some: Places, movers: MovingCaster, side: int) -> Floats:
+        own = self._still.points.take(some)
+        towards, lost = emitter.towards(own), np.zeros(len(own), np.float32)
+        for cell in range(side**2):
+            way, strength = towards(*cell_spot(own, cell, side))
+            cosine = own.cosine(way)
+            light = strength * np.maximum(cosine, 0) * own.entering(cosine)
+            aside = footprint(own, slice(None), cell)
+            start, ahead = own.points_m + aside, way - aside
+            hit = np.flatnonzero(movers.stops(start, ahead) & (light > 0))
+            lost[hit] += light[hit] * emitter.passing(self._still.visibility, start[hit], ahead[hit])
+        return lost / np.float32(side**2)
+
+
+def _cells(points: Texels, of: Indices) -> Ball:
+    """Balls around the points of each cell, whose number is given (P,)."""
+    count = np.maximum(np.bincount(of), 1)
+    centre = np.stack([np.bincount(of, axis) for axis in points.points_m.T], -1) / count[:, None]
+    radius = np.zeros(len(count))
+    np.maximum.at(radius, of, np.linalg.norm(points.points_m - centre[of], axis=1))
+    return Ball(centre, radius)
+
+
+MOST_PARTS = 8
+
+
+def parts(corners_m: Array) -> Ball:
+    """Balls (K,) that enclose faces (F, 3, 3) together: of those in slices across the longest side of their box."""
+    points = corners_m.reshape(-1, 3)
+    low, size = points.min(0), np.ptp(points, axis=0)
+    longest = int(size.argmax())
+    count = int(np.clip(np.ceil(size[longest] / max(np.sort(size)[1], 1e-3)), 1, MOST_PARTS))
+    part = np.where(np.arange(3) == longest, size / count, size)
+    centres = low + part / 2 + np.arange(count)[:, None] * np.eye(3)[longest] * part
+    return Ball(centres, np.full(count, float(np.linalg.norm(part) / 2)))
+
+
+def _moved_ball(own: Ball, T_world_body: NDArray[np.float64]) -> Ball:
+    return Ball(se3.apply(T_world_body, own.centre_m), own.radius_m)

@@ -1,64 +1,157 @@
-"""What cameras see of bodies that move: rays against them, and occlusion of whole tiles of a picture."""
+"""Rays against faces: what a camera sees of bodies that move, and what is between two points."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import RAY_OFFSET_M, Floats, Indices, Mask, RayCaster, corners, inventory
-from vobench.scene.scene import Scene
-from vobench.scene.surface import Surface
+from vobench.scene.material import Material
+from vobench.scene.mesh import Triangles, unit
+from vobench.scene.scene import Scene, triangles
 
-# A ray passes this many back sides before it counts as lost between surfaces that touch.
-MOST_BACK_SIDES = 64
+Floats = NDArray[np.float32]
+Indices = NDArray[np.int32]
+Mask = NDArray[np.bool_]
+Pixels = NDArray[np.intp]
+
+RAY_OFFSET_M = 1e-4  # rays start this far off a face
+REACH_M = 1e8  # beyond every scene
+MOST_PASSED = 64  # backs and holes that a ray passes before it counts as lost between faces that touch
+GRAZING = 1e-3  # the least cosine by which a ray is taken to leave a face's plane
+# Embree works in float32, which resolves a place to this share of the scene's largest coordinate.
+RESOLUTION = 1e-6
+WATERTIGHT = 1e-3 * RESOLUTION  # a ray that passes a face's edge this close has met it
 
 
 @dataclass(frozen=True, slots=True)
-class VisibleSurfaces:
-    """Where rays end: surface (R,) by its place in the inventory, -1 for none; distance_m (R,), NaN for none."""
+class Hits:
+    """Where rays end: face (R,) by its place in the table, -1 for none; distance_m (R,), as Embree says or exact.
 
-    surface: Indices
-    distance_m: Array
+    u, v (R,) are the weights of the face's second and third corner.
+    """
+
+    face: Indices
+    u: Floats
+    v: Floats
+    distance_m: NDArray[Any]
+
+
+class FaceCaster:
+    """Embree over some faces (K,) of a table of corners (F, 3, 3); hits name faces by their place in the table."""
+
+    def __init__(self, corners_m: Array, among: Pixels) -> None:
+        from embreex import mesh_construction, rtcore_scene
+
+        self._among = np.append(among, -1).astype(np.int32)
+        # A scene without triangles would make Embree fail; one beyond everything is never hit.
+        own = corners_m[among] if len(among) else np.full((1, 3, 3), 10 * REACH_M)
+        self._scene = rtcore_scene.EmbreeScene()
+        self._mesh = mesh_construction.TriangleMesh(self._scene, np.ascontiguousarray(own, np.float32))
+
+    def first(self, origins_m: Array | Floats, way: Array | Floats, reach: float = REACH_M) -> Hits:
+        """The first face along rays (R, 3); reach and distances are in lengths of `way`."""
+        hit = self._scene.run(*_rays(origins_m, way, np.full(len(way), reach)), query="INTERSECT", output=1)
+        return Hits(self._among[hit["primID"]], hit["u"], hit["v"], hit["tfar"])
+
+    def stops(self, origins_m: Array | Floats, way: Array | Floats, reach: Array | Floats) -> Mask:
+        """Whether a face is between origins and origins + reach * way (R, 3); none where reach (R,) is negative."""
+        rays = _rays(origins_m, way, reach)
+        return np.asarray((self._scene.run(*rays, query="OCCLUDED") >= 0) & (rays[2] > 0))
+
+
+def _rays(*parts: Array | Floats) -> list[Floats]:
+    return [np.ascontiguousarray(part, np.float32) for part in parts]
+
+
+class CutOuts:
+    """Faces whose texture leaves holes, by the opacity of their materials."""
+
+    def __init__(self, faces: Triangles, materials: dict[str, Material]) -> None:
+        self._holed = {name: m for name, m in materials.items() if m.cutout is not None and m.texture}
+        place = {name: nth for nth, name in enumerate(self._holed)}
+        own = np.array([place.get(thing.material, -1) for thing in faces.things], np.int32)
+        self.map, self._uv = np.append(own[faces.thing], -1), faces.uv  # (F + 1,), -1 for none
+
+    def holes(self, hits: Hits) -> Mask:
+        """Which of the places (R,) are holes."""
+        found = np.zeros(len(hits.face), bool)
+        which = self.map[hits.face] if self._holed else np.zeros(0)
+        for nth, material in enumerate(self._holed.values()):
+            at = np.flatnonzero(which == nth)
+            u, v, (a, b, c) = hits.u[at, None], hits.v[at, None], np.moveaxis(self._uv[hits.face[at]], 1, 0)
+            found[at] = ~opaque(material, ((1 - u - v) * a + u * b + v * c) / material.tile_m)
+        return found
+
+
+def opaque(material: Material, places: Array) -> Mask:
+    """Whether a material is solid at places (R, 2), in tiles: where its opacity is no less than its cut-out."""
+    opacity = _opacity(material)
+    return np.asarray(_sampled(opacity, places) >= (material.cutout or 0.0))
+
+
+@lru_cache(maxsize=64)
+def _opacity(material: Material) -> Floats:
+    pixels = material.texture.pixels() if material.texture else np.ones((1, 1))
+    has_opacity = pixels.ndim == 3 and pixels.shape[-1] == 4
+    return np.asarray(pixels[..., 3] / 255 if has_opacity else np.ones((1, 1)), np.float32)
+
+
+def _sampled(tile: Floats, places: Array) -> Array:
+    """A repeating picture (H, W) at places (R, 2), linear between the middles of its pixels."""
+    height, width = tile.shape
+    x, y = places[:, 0] * width - 0.5, places[:, 1] * height - 0.5
+    x0, y0 = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    fx, fy = x - x0, y - y0
+    left, right, top, bottom = x0 % width, (x0 + 1) % width, y0 % height, (y0 + 1) % height
+    upper, lower = (tile[row, left] * (1 - fx) + tile[row, right] * fx for row in (top, bottom))
+    return np.asarray(upper * (1 - fy) + lower * fy)
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A body's opaque surfaces, its panes (None without any), and a sphere around both."""
+    """A body's faces: all that can be seen, those that stop light, those with holes, panes; and a sphere around."""
 
-    solid: RayCaster
-    panes: RayCaster | None
+    seen: FaceCaster
+    opaque: FaceCaster
+    holed: FaceCaster | None
+    panes: FaceCaster | None
     center_m: Array
     radius_m: float
 
     def near(self, origins_m: Array, directions: Array, reach_m: Array | float = np.inf) -> Mask:
         """Which rays (R, 3) of unit length pass the sphere within `reach_m` of their origins (R, 3)."""
         away = self.center_m - origins_m
-        beside = _dot(away, directions)
+        beside = dot(away, directions)
         along = np.clip(beside, 0, reach_m)
-        return np.asarray(_dot(away, away) - along * (2 * beside - along) <= self.radius_m**2)
+        return np.asarray(dot(away, away) - along * (2 * beside - along) <= self.radius_m**2)
 
 
 class Bodies:
-    """The surfaces of a scene in the inventory's order, each in its body's frame, and rays against them."""
+    """The faces of a scene, each in its body's frame, and rays against them; body 0 is all that stands.
+
+    normals (F + 1, 3) and offsets_m (F + 1,) are the planes of faces, body (F + 1,) whose they are; the last entry,
+    that of the face -1, is nothing.
+    """
 
     def __init__(self, scene: Scene) -> None:
-        things = inventory(scene)
-        moving = [surface for mover in scene.movers for surface in mover.surfaces]
-        self.surfaces = (*scene.surfaces, *(panel.surface for panel in scene.panels), *moving)
-        self.of_surface = things.mover + 1
-        # The last entry is that of the surface -1: nothing.
-        self.normals = np.array([*(s.normal for s in self.surfaces), np.full(3, np.nan)])
-        self.corners_m = np.array([corners(s) for s in self.surfaces]).reshape(-1, 4, 3)
-        self.opaque = ~things.pane
-        self._offsets_m = np.array([*(s.normal @ s.corner_m for s in self.surfaces), np.nan])
-        members = [self.of_surface == index for index in range(len(scene.movers) + 1)]
-        self._bodies = [_body(self.surfaces, member, things.pane) for member in members]
+        self.faces = triangles(scene)
+        corners = self.faces.corners_m
+        self.normals = np.append(self.faces.plane, np.full((1, 3), np.nan), axis=0)
+        self.offsets_m = np.append(dot(self.faces.plane, corners.mean(1)), np.nan)
+        self.body = np.append(self.faces.mover + 1, 0)
+        self._height_m = np.append(_least_height_m(corners), np.nan).astype(np.float32)
+        self._edge_m = RESOLUTION * max(1.0, float(np.abs(corners).max(initial=0.0)))
+        self.ray_offset_m = max(RAY_OFFSET_M, self._edge_m)
+        self._twin = twins(self.faces)
+        self._cut = CutOuts(self.faces, scene.materials)
+        glass = [(m := scene.materials.get(t.material)) is not None and m.kind == "pane" for t in self.faces.things]
+        pane = np.array(glass, bool)[self.faces.thing]
+        self._bodies = [self._body(index, pane) for index in range(len(scene.movers) + 1)]
         self._paths = [mover.path for mover in scene.movers]
 
     def T_world_bodies(self, t_ns: NDArray[np.int64]) -> list[Array]:
@@ -66,76 +159,181 @@ class Bodies:
         poses = [np.array([path.pose(t) for t in np.ravel(t_ns).tolist()]) for path in self._paths]
         return [np.eye(4), *(T if np.ndim(t_ns) else T[0] for T in poses)]
 
-    def visible_surfaces(self, directions: Array, T_bodies_camera: Sequence[Array]) -> VisibleSurfaces:
-        """What a camera sees along unit directions (R, 3) in its own frame; nothing along NaN."""
+    def visible(self, directions: Array, T_bodies_camera: Sequence[Array]) -> Hits:
+        """What a camera sees along unit directions (R, 3) in its own frame, NaN m away where that is nothing."""
         world, *movers = self._bodies
-        seen = self._meet(world, *into(T_bodies_camera[0], directions))
+        origins, turned = into(T_bodies_camera[0], directions)
+        seen = self._meet(world, origins, turned)
+        self._seal(world, origins, turned, seen)
         for body, T_body_camera in zip(movers, T_bodies_camera[1:], strict=True):
             origins, turned = into(T_body_camera, directions)
             near = np.flatnonzero(body.near(origins, turned))
             met = self._meet(body, origins[near], turned[near])
             nearer = met.distance_m < np.nan_to_num(seen.distance_m[near], nan=np.inf)
-            seen.surface[near[nearer]], seen.distance_m[near[nearer]] = met.surface[nearer], met.distance_m[nearer]
+            seen.face[near[nearer]], seen.distance_m[near[nearer]] = met.face[nearer], met.distance_m[nearer]
         return seen
 
     def behind_panes(self, directions: Array, T_bodies_camera: Sequence[Array], distance_m: Array) -> Mask:
         """Whether glass is before what is seen at some distance (R,), or before nothing where that is NaN."""
         behind = np.zeros(len(directions), bool)
-        limit_m = np.nan_to_num(distance_m, nan=np.inf)
+        limit_m = np.nan_to_num(distance_m, nan=REACH_M)
         for body, T_body_camera in zip(self._bodies, T_bodies_camera, strict=True):
             if body.panes is not None:
                 origins, turned = into(T_body_camera, directions)
-                pane = body.panes.nearest(origins, turned)
-                behind |= (pane >= 0) & (self._distance_m(pane, origins, turned)[0] < limit_m)
+                behind |= body.panes.stops(origins, turned, limit_m)
         return behind
 
-    def blocked(self, starts_m: Array, targets_m: Array, T_bodies_world: Sequence[Array]) -> Mask:
-        """Whether anything but glass is between starts (R, 3) and targets (R, 3), both in the world."""
+    def blocked(self, starts_m: Floats, way: Floats, T_bodies_world: Sequence[Array], reach: Floats) -> Mask:
+        """Whether anything but glass is between starts and starts + reach * way (R, 3), both in the world."""
         world, *movers = self._bodies
-        hidden = world.solid.occluded(starts_m, targets_m)
+        hidden = self._stopped(world, starts_m, way, reach)
         for body, T_body_world in zip(movers, T_bodies_world[1:], strict=True):
-            start, target = moved(T_body_world, starts_m), moved(T_body_world, targets_m)
-            way = target - start
-            reach_m = np.linalg.norm(way, axis=1)
-            near = np.flatnonzero(body.near(start, way / reach_m[:, None], reach_m))
-            hidden[near] |= body.solid.occluded(start[near], target[near])
+            start, turned = moved(T_body_world, starts_m.astype(float)), turn(T_body_world, way.astype(float))
+            length_m = np.linalg.norm(turned, axis=1)
+            near = np.flatnonzero(body.near(start, turned / length_m[:, None], length_m) & ~hidden & (reach > 0))
+            hidden[near] = self._stopped(body, start[near], turned[near], reach[near])
         return hidden
 
-    def _meet(self, body: Body, origins_m: Array, directions: Array) -> VisibleSurfaces:
-        """The first front side of a body along rays (R, 3) in its frame."""
-        surface = body.solid.nearest(origins_m, directions)
-        distance_m, cosine = self._distance_m(surface, origins_m, directions)
-        for _ in range(MOST_BACK_SIDES):
-            backs = np.flatnonzero((surface >= 0) & (cosine >= 0))
-            if not len(backs):
+    def _body(self, index: int, pane: Mask) -> Body:
+        member = (self.body[:-1] == index) & (self._height_m[:-1] > 0)
+        points = self.faces.corners_m[member].reshape(-1, 3)
+        center_m = (points.min(0) + points.max(0)) / 2 if len(points) else np.zeros(3)
+        radius_m = float(np.linalg.norm(points - center_m, axis=1).max(initial=0.0)) + RAY_OFFSET_M
+
+        def caster(which: Mask) -> FaceCaster:
+            return FaceCaster(self.faces.corners_m, np.flatnonzero(member & which))
+
+        # Of two faces back to back only one is there for rays: they could meet either.
+        one = (self._twin[:-1] < 0) | (self._twin[:-1] > np.arange(len(pane)))
+        seen, holed, glass = caster(one & ~pane), member & one & ~pane & (self._cut.map[:-1] >= 0), member & pane
+        opaque = caster(one & ~pane & ~holed) if holed.any() else seen
+        holed_caster, glass_caster = (caster(part) if part.any() else None for part in (holed, glass))
+        return Body(seen, opaque, holed_caster, glass_caster, center_m, radius_m)
+
+    def _stopped(self, body: Body, starts_m: Array | Floats, way: Array | Floats, reach: Floats) -> Mask:
+        """Whether a body stops light on its way, from either side of its faces but not through their holes."""
+        stopped = body.opaque.stops(starts_m, way, reach)
+        rays = np.flatnonzero(~stopped & (reach > 0)) if body.holed else np.zeros(0, np.intp)
+        start, ahead = starts_m[rays], way[rays] * reach[rays, None]
+        for _ in range(MOST_PASSED):
+            if not len(rays) or not body.holed:
                 break
-            passed_m, onward = distance_m[backs] + RAY_OFFSET_M, directions[backs]
-            start = origins_m[backs] + passed_m[:, None] * onward
-            surface[backs] = body.solid.nearest(start, onward)
-            farther_m, cosine[backs] = self._distance_m(surface[backs], start, onward)
-            distance_m[backs] = passed_m + farther_m
-        return VisibleSurfaces(surface, distance_m)
+            hits = body.holed.first(start, ahead, 1.0)
+            hole = self._cut.holes(hits)
+            stopped[rays[(hits.face >= 0) & ~hole]] = True
+            on = (hits.distance_m + RAY_OFFSET_M / np.linalg.norm(ahead, axis=1))[:, None]
+            further = hole & (on[:, 0] < 1)
+            rays, start, ahead = rays[further], (start + on * ahead)[further], (ahead * (1 - on))[further]
+        return stopped
 
-    def _distance_m(self, surface: Indices, origins_m: Array, directions: Array) -> tuple[Array, Array]:
-        """How far the surfaces' planes are along rays (R, 3), and the cosines to their normals; NaN for none.
+    def _meet(self, body: Body, origins_m: Array, directions: Array) -> Hits:
+        """The first face of a body that rays (R, 3) in its frame meet from its front.
 
-        Embree works in float32: it says which surface a ray meets, the plane's equation where.
+        Embree, in float32, says which; where, the plane's equation does. Where a ray passes so close to an edge that
+        float32 may take the wrong face, float64 decides.
         """
-        normals = self.normals[surface]
-        cosine = _dot(normals, directions)
-        return (self._offsets_m[surface] - _dot(normals, origins_m)) / cosine, cosine
+        hits, cosine = self._first_front(body, origins_m, directions)
+        distance_m = (self.offsets_m[hits.face] - dot(self.normals[hits.face], origins_m)) / cosine
+        within = np.minimum(np.minimum(hits.u, hits.v), 1 - hits.u - hits.v) * self._height_m[hits.face]
+        doubtful = np.flatnonzero(-cosine * within < self._edge_m)
+        distance_m[doubtful] = hits.distance_m[doubtful]
+        seen = replace(hits, distance_m=distance_m)
+        self._settle(body, origins_m, directions, seen, doubtful)
+        return seen
+
+    def _first_front(
+        self, body: Body, origins_m: Array, directions: Array, most: int = MOST_PASSED
+    ) -> tuple[Hits, Array]:
+        """What rays meet as Embree says, backs and holes passed, and the cosines (R,) to the faces' normals."""
+        hits = body.seen.first(origins_m, directions)
+        holes = self._cut.holes(hits)
+        cosine = self._fronts(hits.face, directions)
+        passed = np.flatnonzero((cosine >= 0) | holes)
+        if len(passed) and most:
+            aside = np.maximum(np.abs(cosine[passed]), GRAZING)
+            on_m = hits.distance_m[passed] + 3 * self._edge_m / aside
+            start = origins_m[passed] + on_m[:, None] * directions[passed]
+            onward, cosine[passed] = self._first_front(body, start, directions[passed], most - 1)
+            hits.face[passed], hits.u[passed], hits.v[passed] = onward.face, onward.u, onward.v
+            hits.distance_m[passed] = on_m + onward.distance_m
+        return hits, cosine
+
+    def _fronts(self, face: Indices, directions: Array) -> Array:
+        """Cosines (R,) to the normals of faces; where one's back is met and it has a twin, it becomes that."""
+        cosine = dot(self.normals[face], directions)
+        backs = np.flatnonzero(cosine >= 0)
+        backs = backs[self._twin[face[backs]] >= 0]
+        face[backs], cosine[backs] = self._twin[face[backs]], -cosine[backs]
+        return cosine
+
+    def _seal(self, body: Body, origins_m: Array, directions: Array, seen: Hits) -> None:
+        """Close the gaps that float32 leaves between faces: what meets nothing is asked again a hair aside."""
+        missed = np.flatnonzero(seen.face < 0)
+        aside = directions[missed] + (self._edge_m * AXES.sum(0))
+        gaps = missed[body.seen.first(origins_m[missed], aside).face >= 0]
+        self._settle(body, origins_m, directions, seen, gaps)
+
+    def _settle(self, body: Body, origins_m: Array, directions: Array, seen: Hits, doubtful: Pixels) -> None:
+        """The faces that rays meet in float64, among those that Embree finds there and a little to four sides."""
+        if not len(doubtful):
+            return
+        origins, ahead, reach_m = origins_m[doubtful], directions[doubtful], seen.distance_m[doubtful]
+        right = unit(np.cross(ahead, AXES[np.argmin(np.abs(ahead), axis=1)]))
+        down, step_m = np.cross(ahead, right), 3 * self._edge_m / np.where(reach_m > 0, reach_m, 1)[:, None]
+        origins = np.concatenate([origins] * 5)
+        aside = np.concatenate([ahead + step_m * way for way in (0 * right, right, down, -right, -down)])
+        face = self._first_front(body, origins, aside)[0].face.reshape(5, -1)
+        face[0] = seen.face[doubtful]
+        distance_m = self._exact_m(face.ravel(), origins, np.concatenate([ahead] * 5)).reshape(5, -1)
+        best = distance_m.argmin(0), np.arange(len(doubtful))
+        met = np.isfinite(distance_m[best])
+        seen.face[doubtful[met]], seen.distance_m[doubtful[met]] = face[best][met], distance_m[best][met]
+        # Past an outline; where all are faces, the ray is in a joint between them, and Embree's word stands.
+        past = doubtful[~met & (face < 0).any(0)]
+        seen.face[past], seen.distance_m[past] = -1, np.nan
+
+    def _exact_m(self, face: Indices, origins_m: Array, directions: Array) -> Array:
+        """How far along rays (R, 3) their faces' fronts are, infinite where they pass them by."""
+        normals, corners = self.normals[face], self.faces.corners_m[face]
+        cosine = dot(normals, directions)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance_m = (self.offsets_m[face] - dot(normals, origins_m)) / cosine
+            points = origins_m + distance_m[:, None] * directions
+            edges = np.roll(corners, -1, axis=1) - corners
+            inward = np.cross(normals[:, None], unit(edges))
+            inside_m = np.einsum("rei,rei->re", inward, points[:, None] - corners).min(1)
+            met = (cosine < 0) & (distance_m > 0) & (inside_m >= -WATERTIGHT / RESOLUTION * self._edge_m)
+        return np.where(met, distance_m, np.inf)
 
 
-def _body(surfaces: Sequence[Surface], member: Mask, pane: Mask) -> Body:
-    points = np.array([corners(surfaces[i]) for i in np.flatnonzero(member).tolist()]).reshape(-1, 3)
-    center_m = (points.min(0) + points.max(0)) / 2 if len(points) else np.zeros(3)
-    panes = np.flatnonzero(member & pane)
-    return Body(
-        RayCaster(surfaces, np.flatnonzero(member & ~pane)),
-        RayCaster(surfaces, panes) if len(panes) else None,
-        center_m,
-        float(np.linalg.norm(points - center_m, axis=1).max(initial=0.0)) + RAY_OFFSET_M,
-    )
+AXES = np.eye(3)
+
+
+def _least_height_m(corners_m: Array) -> Array:
+    """The least of the three heights (F,) of triangles (F, 3, 3)."""
+    edges = corners_m - np.roll(corners_m, 1, axis=1)
+    longest = np.maximum(np.linalg.norm(edges, axis=2).max(1), 1e-30)
+    return np.asarray(np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) / longest)
+
+
+def twins(faces: Triangles) -> Indices:
+    """The face (F + 1,) of the same thing with the same corners that looks the other way, -1 for none."""
+    corners = _numbered(faces.corners_m.reshape(-1, 3)).reshape(-1, 3)
+    key = _numbered(np.column_stack([np.sort(corners, axis=1), faces.thing]))
+    order = np.argsort(key, kind="stable")
+    first, second = order[:-1], order[1:]
+    pair = (key[first] == key[second]) & (dot(faces.plane[first], faces.plane[second]) < 0)
+    pair[1:] &= ~pair[:-1]
+    twin = np.full(len(faces) + 1, -1, np.int32)
+    twin[first[pair]], twin[second[pair]] = second[pair], first[pair]
+    return twin
+
+
+def _numbered(rows: NDArray[Any]) -> NDArray[np.int64]:
+    """Numbers (N,) that are equal where rows (N, K) are."""
+    order, numbers = np.lexsort(rows.T), np.zeros(len(rows), np.int64)
+    numbers[order[1:]] = np.cumsum((np.diff(rows[order], axis=0) != 0).any(1))
+    return numbers
 
 
 def into(T_body_camera: Array, directions: Array) -> tuple[Array, Array]:
@@ -156,7 +354,8 @@ def moved(T_a_b: Array, points: Array) -> Array:
     return turn(T_a_b, points) + T_a_b[..., :3, 3]
 
 
-def _dot(a: Array, b: Array) -> Array:
+def dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """Products (R,) of vectors (R, 3)."""
     return np.asarray(np.einsum("ri,ri->r", a, b))
 
 
@@ -169,29 +368,18 @@ class Shot:
 
 
 @dataclass(frozen=True, slots=True)
-class ShotSurfaces:
-    """All surfaces from a camera at one instant: corners (S, 4, 3) in its frame, planes (S + 1, 3), what it faces (S,).
-
-    A plane's product with a unit ray is one over the distance along that ray.
-    """
-
-    corners_m: Array
-    planes: Array
-    facing: Mask
-
-
-@dataclass(frozen=True, slots=True)
 class ShotTransforms:
-    """A shot as transforms, there and back: each body's (4, 4), or (H, 4, 4) by row.
-
-    `snapshot` is None where the camera or a body moves meanwhile.
-    """
+    """A shot as transforms, there and back: each body's (4, 4), or (H, 4, 4) by row."""
 
     T_world_bodies: list[Array]
     T_bodies_world: list[Array]
     T_bodies_camera: list[Array]
     T_camera_bodies: list[Array]
-    snapshot: ShotSurfaces | None
+
+    @property
+    def by_row(self) -> bool:
+        """Whether the camera or a body moves while the rows are exposed."""
+        return any(T.ndim == 3 for T in self.T_bodies_camera)
 
 
 def shot_transforms(bodies: Bodies, shot: Shot) -> ShotTransforms:
@@ -199,20 +387,7 @@ def shot_transforms(bodies: Bodies, shot: Shot) -> ShotTransforms:
     T_world_bodies = bodies.T_world_bodies(np.asarray(shot.t_ns, np.int64))
     T_bodies_world = [se3.inverse(T) for T in T_world_bodies]
     T_bodies_camera = [T @ shot.T_world_camera for T in T_bodies_world]
-    T_camera_bodies = [se3.inverse(T) for T in T_bodies_camera]
-    rolling = any(T.ndim == 3 for T in T_bodies_camera)
-    snapshot = None if rolling else _snapshot(bodies, np.stack(T_camera_bodies))
-    return ShotTransforms(T_world_bodies, T_bodies_world, T_bodies_camera, T_camera_bodies, snapshot)
-
-
-def _snapshot(bodies: Bodies, T_camera_bodies: Array) -> ShotSurfaces:
-    T_camera_surfaces = T_camera_bodies[bodies.of_surface]
-    corners_m = se3.apply(T_camera_surfaces, bodies.corners_m)
-    normals = np.einsum("sij,sj->si", T_camera_surfaces[:, :3, :3], bodies.normals[:-1])
-    away_m = np.einsum("si,si->s", normals, corners_m[:, 0])
-    with np.errstate(divide="ignore", invalid="ignore"):  # a plane through the camera is seen edge-on: never
-        planes = normals / away_m[:, None]
-    return ShotSurfaces(corners_m, np.append(planes, np.full((1, 3), np.nan), axis=0), away_m < 0)
+    return ShotTransforms(T_world_bodies, T_bodies_world, T_bodies_camera, [se3.inverse(T) for T in T_bodies_camera])
 
 
 def at_rows(tables: Sequence[Array], rows: Array) -> list[Array]:
@@ -233,137 +408,6 @@ def _between(table: Array, rows: Array) -> Array:
     return np.asarray((1 - share) * table[first] + share * table[np.minimum(first + 1, len(table) - 1)])
 
 
-def of(T: Array, rays: NDArray[np.intp]) -> Array:
+def of(T: Array, rays: Pixels) -> Array:
     """Some rays' transforms: the only one, or their own of (R, 4, 4)."""
     return T if T.ndim == 2 else T[rays]
-
-
-Scalar = TypeVar("Scalar", bound=np.generic)
-
-TILE_PX = 16
-MARGIN = 2e-6  # on sines and cosines, for float32
-EDGE_ON_M = 1e-6
-
-
-@dataclass(frozen=True, slots=True)
-class Tiles:
-    """A camera's pixels (H, W, 2), their unit rays (H, W, 3), and for each tile the cone around its pixels' rays.
-
-    axis (V, U, 3) unit; sine (V, U) of the angle to the farthest ray, infinite where a pixel has none.
-    """
-
-    uv_px: Array
-    rays: Array
-    axis: Floats
-    sine: Floats
-
-
-@lru_cache(maxsize=4)
-def tiles(camera: Camera) -> Tiles:
-    """The tiles of a camera; kept, as cameras are few and pictures many."""
-    uv_px = pixel_grid(camera)
-    rays = camera.rays(uv_px)
-    sums = _over_tiles(np.add, rays)
-    with np.errstate(invalid="ignore"):
-        axis = sums / np.linalg.norm(sums, axis=-1, keepdims=True)
-        cosine = _over_tiles(np.minimum, (rays * spread(axis, rays.shape)).sum(-1))
-    # Beyond some 60° bounds are of no use; NaN compares false.
-    sine = np.where(cosine > 0.5, np.sqrt(np.clip(1 - cosine**2, 0, 1)) + MARGIN, np.inf)
-    return Tiles(uv_px, rays, np.nan_to_num(axis).astype(np.float32), sine.astype(np.float32))
-
-
-def spread(values: NDArray[Scalar], shape: tuple[int, ...]) -> NDArray[Scalar]:
-    """Values of tiles (V, U, ...) at each of their pixels, for a picture of some shape (H, W, ...)."""
-    return values.repeat(TILE_PX, 0)[: shape[0]].repeat(TILE_PX, 1)[:, : shape[1]]
-
-
-def balls(planes: Array, axis: Floats, sine: Floats) -> tuple[Array, Array]:
-    """Centres (T, 3) and radii (T,) of balls around what cones cut out of planes, as in `geometry.ShotSurfaces`.
-
-    NaN or infinite where a cone does not end on its plane.
-    """
-    half_sine = np.minimum(sine, 1).astype(float)
-    half_cosine = np.sqrt(1 - half_sine**2)
-    along = np.einsum("tc,tc->t", planes, axis)
-    across = np.sqrt(np.maximum((planes**2).sum(1) - along**2, 0)) * half_sine
-    with np.errstate(divide="ignore", invalid="ignore"):
-        middle_m, nearest_m = 1 / along, 1 / (along * half_cosine + across)
-        farthest_m = np.where(along * half_cosine > across, 1 / (along * half_cosine - across), np.inf)
-        aside = np.maximum(farthest_m - middle_m, middle_m - nearest_m)
-        return axis * middle_m[:, None], (aside + middle_m * np.sqrt(2 - 2 * half_cosine)) * (1 + MARGIN)
-
-
-def _over_tiles(reduce: np.ufunc, values: Array) -> Array:
-    """A reduction over the pixels of each tile: (H, W, ...) to (V, U, ...)."""
-    height, width = values.shape[:2]
-    by_row = reduce.reduceat(values, np.arange(0, height, TILE_PX), axis=0)
-    return np.asarray(reduce.reduceat(by_row, np.arange(0, width, TILE_PX), axis=1))
-
-
-class PointView:
-    """Rectangles as one point sees them: corners (S, 4, 3) relative to it, `counts` (S,) says which count."""
-
-    def __init__(self, corners_m: Array, counts: Mask) -> None:
-        normal = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 3] - corners_m[:, 0])
-        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-        away_m = np.einsum("sc,sc->s", normal, corners_m[:, 0])
-        # A rectangle seen edge-on hides nothing.
-        self._which = np.flatnonzero(counts & (np.abs(away_m) > EDGE_ON_M))
-        corner, normal, away_m = corners_m[self._which], normal[self._which], away_m[self._which]
-        edges = np.cross(corner, np.roll(corner, -1, axis=1))
-        inward = np.sign(np.einsum("sec,sc->se", edges, corner.mean(1)))[..., None]
-        length = np.linalg.norm(edges, axis=-1, keepdims=True)
-        # Where the point lies in line with an edge the normal is 0: neither inside nor outside.
-        self._edges = (inward * edges / np.where(length > 0, length, 1.0)).astype(np.float32)
-        self._normal = (np.where(away_m < 0, -1, 1)[:, None] * normal).astype(np.float32)
-        self._away_m = np.abs(away_m).astype(np.float32)
-
-    def fills(self, axis: Floats, sine: Floats) -> Indices:
-        """The surface that is all there is to see in cones (T, 3), (T,), -1 where that is not sure."""
-        inside = self._inside(axis)
-        nearest_m, farthest_m = self._range_m(axis, sine)
-        covering = np.where((inside > sine[:, None]), farthest_m, np.inf)
-        if not len(self._which):
-            return np.full(len(axis), -1, np.int32)
-        best = covering.argmin(1)
-        limit_m = np.take_along_axis(covering, best[:, None], 1)
-        other = (inside >= -sine[:, None]) & (nearest_m < limit_m)
-        np.put_along_axis(other, best[:, None], values=False, axis=1)
-        sure = np.isfinite(limit_m[:, 0]) & ~other.any(1)
-        return np.where(sure, self._which[best], -1).astype(np.int32)
-
-    def shading(self, centers_m: Array, radii_m: Array, own: Indices) -> tuple[Mask, Mask]:
-        """Balls (T, 3), (T,) of points of surfaces `own` (T,) that are surely all visible, and surely all hidden."""
-        reach_m = np.linalg.norm(centers_m, axis=-1)
-        outside = reach_m > 2 * radii_m
-        reach_m, centers_m = np.where(outside, reach_m, 1), np.where(outside[:, None], centers_m, 1)
-        axis = (centers_m / reach_m[:, None]).astype(np.float32)
-        sine = (np.where(outside, radii_m / reach_m, 1) + MARGIN).astype(np.float32)
-        inside, (nearest_m, farthest_m) = self._inside(axis), self._range_m(axis, sine)
-        others = self._which != own[:, None]
-        before = others & (inside >= -sine[:, None]) & (nearest_m < (reach_m + radii_m)[:, None])
-        across = others & (inside > sine[:, None]) & (farthest_m < (reach_m - radii_m)[:, None])
-        return np.asarray(outside & ~before.any(1)), np.asarray(outside & across.any(1))
-
-    def touches(self, axis: Floats, sine: Floats) -> Mask:
-        """Whether anything may be in cones (T, 3), (T,)."""
-        return np.asarray(~(self._inside(axis) < -sine[:, None]).all(1))
-
-    def _inside(self, axis: Floats) -> Floats:
-        """The least sine (T, S) of the angle between axes and the planes through the point and an edge."""
-        first, second, third, fourth = (np.einsum("tc,sc->ts", axis, self._edges[:, edge]) for edge in range(4))
-        return np.asarray(np.minimum(np.minimum(first, second), np.minimum(third, fourth)))
-
-    def _range_m(self, axis: Floats, sine: Floats) -> tuple[Floats, Floats]:
-        """How near and how far (T, S) the surfaces' planes may be along rays of cones."""
-        half_sine = np.minimum(sine, 1)[:, None]
-        half_cosine = np.sqrt(1 - half_sine**2)
-        cosine = np.clip(np.einsum("tc,sc->ts", axis, self._normal), -1, 1)
-        along, across = cosine * half_cosine, np.sqrt(1 - cosine**2) * half_sine
-        # Within the cone's half angle of the normal, the normal itself is among the rays.
-        most = np.where(cosine >= half_cosine, 1, along + across) + np.float32(MARGIN)
-        least = along - across - np.float32(MARGIN)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            nearest = np.where(most > 0, self._away_m / most, np.inf)
-            farthest = np.where(least > 0, self._away_m / least, np.inf)
-        return nearest, farthest

@@ -1,9 +1,12 @@
 """What OpenGL holds: shader programs, textures, framebuffers; pyrender's private parts are used here and in raster."""
 
+import ctypes
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from OpenGL import GL
@@ -13,40 +16,119 @@ from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
 from vobench.render.renderer import Radiance
 from vobench.render.view import Box
+from vobench.scene.material import linear
 
 Floats = NDArray[np.float32]
 
 
-class FloatTexture:
-    """A (H, W) float32 map without mipmaps, row 0 at v = 0."""
+class LightTexture:
+    """A map (H, W, 3) float32 of linear colours, or (H, W) of grey, without mipmaps, row 0 at v = 0.
+
+    It takes one channel where all are equal.
+    """
 
     def __init__(self, values: Floats) -> None:
-        self._values, self.id = values, _texture(GL.GL_R32F, values, GL.GL_FLOAT)
-        _texture_parameters(GL.GL_LINEAR, GL.GL_LINEAR, GL.GL_CLAMP_TO_EDGE)
+        self._values: Floats | None = None
+        self.id = GL.glGenTextures(1)
+        self.update(values)
 
     def update(self, values: Floats) -> None:
-        """Replace the map by another (H, W); the very array that is there already costs nothing."""
+        """Replace the map by another; the very array that is there already costs nothing."""
         if values is self._values:
             return
         self._values = values
-        rows, columns = values.shape
         GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
-        GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
-        data = np.ascontiguousarray(values, np.float32)
-        GL.glTexSubImage2D(GL.GL_TEXTURE_2D, 0, 0, 0, columns, rows, GL.GL_RED, GL.GL_FLOAT, data)
+        is_grey = values.ndim == 2 or bool((values[..., :1] == values[..., 1:]).all())
+        if is_grey:
+            _upload(GL.GL_R32F, GL.GL_RED, values if values.ndim == 2 else values[..., 0], GL.GL_FLOAT)
+        else:
+            _upload(GL.GL_RGBA32F, GL.GL_RGB, values, GL.GL_FLOAT)
+        _swizzle(is_grey)
+        _texture_parameters(GL.GL_LINEAR, GL.GL_LINEAR, GL.GL_CLAMP_TO_EDGE)
 
 
-class ReflectanceTexture:
-    """A (N, N) float32 tile that repeats, with mipmaps; 16 bits of `scale`, linear, row 0 at v = 0."""
+# Linear values of sRGB in 16 bits: eight make steps of 2 % where a surface reflects 20 %, and drivers make sRGB
+# linear with errors of up to 1 %.
+COUNTS = np.rint(65535 * linear(np.arange(256, dtype=np.uint8))).astype(np.uint16)
 
-    def __init__(self, values: Floats) -> None:
-        # Under a coat a bright texture may give back more than 1.
-        self.scale = max(1.0, float(values.max()))
-        # Eight bits would make steps of 2 % where a surface reflects 20 %.
-        counts = np.rint(values * (65535 / self.scale)).astype(np.uint16)
-        self.id = _texture(GL.GL_R16, counts, GL.GL_UNSIGNED_SHORT)
+
+class SurfaceTexture:
+    """A tile that repeats, with mipmaps, row 0 at v = 0: linear, 16 bits of `scale`.
+
+    It is made of (H, W) float32, or of (H, W, 3 or 4) uint8 in sRGB; with `shrink` of half as many pixels each way,
+    or a quarter, and so on.
+    """
+
+    def __init__(self, values: NDArray[Any], *, shrink: int = 0) -> None:
+        self.scale, self.is_grey, self.id = 1.0, values.ndim == 2, GL.glGenTextures(1)
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
+        if values.ndim == 3:
+            counts = COUNTS[values]
+            counts[..., 3:] = np.uint16(257) * values[..., 3:]
+        else:
+            self.scale = max(1.0, float(values.max()))
+            counts = np.rint(values * (65535 / self.scale)).astype(np.uint16)
+        internal, form = COLOURS[values.shape[2] if values.ndim == 3 else 1]
+        _upload(internal, form, _halved(counts, shrink), GL.GL_UNSIGNED_SHORT)
+        _swizzle(self.is_grey)
         GL.glGenerateMipmap(GL.GL_TEXTURE_2D)
         _texture_parameters(GL.GL_LINEAR_MIPMAP_NEAREST, GL.GL_LINEAR, GL.GL_REPEAT)
+
+
+COLOURS = {1: (GL.GL_R16, GL.GL_RED), 3: (GL.GL_RGBA16, GL.GL_RGB), 4: (GL.GL_RGBA16, GL.GL_RGBA)}
+
+
+def _halved(values: NDArray[np.uint16], times: int) -> NDArray[np.uint16]:
+    """A picture (H, W, ...) of half as many pixels each way, some times over."""
+    size = [max(1, edge >> times) for edge in values.shape[1::-1]]
+    return np.asarray(cv2.resize(values, size, interpolation=cv2.INTER_AREA)) if times else values
+
+
+class Elements:
+    """Vertices (V, 10) and indices (N,) as culling.Geometry has them, on the graphics side."""
+
+    def __init__(self, vertices: Floats, indices: NDArray[np.uint32]) -> None:
+        self._array = GL.glGenVertexArrays(1)
+        GL.glBindVertexArray(self._array)
+        for kind, values in ((GL.GL_ARRAY_BUFFER, vertices), (GL.GL_ELEMENT_ARRAY_BUFFER, indices)):
+            GL.glBindBuffer(kind, GL.glGenBuffers(1))
+            GL.glBufferData(kind, values.nbytes, values, GL.GL_STATIC_DRAW)
+        for place, (count, first) in enumerate(((3, 0), (3, 3), (2, 6), (2, 8))):
+            GL.glEnableVertexAttribArray(place)
+            GL.glVertexAttribPointer(
+                place, count, GL.GL_FLOAT, GL.GL_FALSE, vertices.strides[0], ctypes.c_void_p(4 * first)
+            )
+
+    def draw(self, runs: Sequence[tuple[int, int]], copies: int) -> None:
+        """Draw runs (first, count) of indices, once for each sample, in the program in use."""
+        GL.glBindVertexArray(self._array)
+        for first, count in runs:
+            start = ctypes.c_void_p(4 * first)
+            GL.glDrawElementsInstanced(GL.GL_TRIANGLES, count, GL.GL_UNSIGNED_INT, start, copies)
+
+
+class Blocks:
+    """Numbers (B, N) float32 that shaders read as uniform blocks, one row at a time."""
+
+    def __init__(self, binding: int, values: Floats) -> None:
+        self._binding, self._size = binding, 4 * values.shape[1]
+        step = int(GL.glGetIntegerv(GL.GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT))
+        self._stride = -(-self._size // step) * step
+        self._buffer = GL.glGenBuffers(1)
+        GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._buffer)
+        GL.glBufferData(GL.GL_UNIFORM_BUFFER, self._stride * len(values), None, GL.GL_DYNAMIC_DRAW)
+        for row, numbers in enumerate(values):
+            self.update(row, numbers)
+
+    def update(self, row: int, numbers: Floats) -> None:
+        """Replace a row."""
+        GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._buffer)
+        GL.glBufferSubData(GL.GL_UNIFORM_BUFFER, row * self._stride, numbers.nbytes, numbers)
+
+    def use(self, row: int) -> None:
+        """Let shaders read a row."""
+        offset = row * self._stride
+        GL.glBindBufferRange(GL.GL_UNIFORM_BUFFER, self._binding, self._buffer, offset, self._size)
 
 
 def bind(unit: int, texture: Any, kind: int = GL.GL_TEXTURE_2D) -> None:
@@ -55,13 +137,18 @@ def bind(unit: int, texture: Any, kind: int = GL.GL_TEXTURE_2D) -> None:
     GL.glBindTexture(kind, texture)
 
 
-def _texture(internal: int, values: NDArray[Any], kind: int) -> Any:
-    texture = GL.glGenTextures(1)
-    GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
+def _upload(internal: int, form: int, values: NDArray[Any], kind: int) -> None:
+    """Fill the texture that is bound."""
     GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
-    rows, columns = values.shape
-    GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, columns, rows, 0, GL.GL_RED, kind, np.ascontiguousarray(values))
-    return texture
+    rows, columns = values.shape[:2]
+    GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, columns, rows, 0, form, kind, np.ascontiguousarray(values))
+
+
+def _swizzle(is_grey: bool) -> None:
+    """Whether shaders read the one channel of the texture that is bound as all three colours."""
+    colours = [GL.GL_RED] * 3 if is_grey else [GL.GL_RED, GL.GL_GREEN, GL.GL_BLUE]
+    last = GL.GL_ONE if is_grey else GL.GL_ALPHA
+    GL.glTexParameteriv(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_SWIZZLE_RGBA, np.array([*colours, last], np.int32))
 
 
 def _texture_parameters(minify: int, magnify: int, wrap: int) -> None:
@@ -75,7 +162,6 @@ def _texture_parameters(minify: int, magnify: int, wrap: int) -> None:
 
 
 SHADERS = Path(__file__).parent / "shaders"
-PASS_BINDING = 0  # as the shaders say
 
 
 class Program:
@@ -92,7 +178,7 @@ class Program:
         except Exception as error:  # PyOpenGL's, whichever stage fails
             reason = " ".join(str(error).split())[:200]
             raise RenderError(
-                f"this OpenGL driver cannot run {fragment}.frag, which needs OpenGL 4.2 ({reason})"
+                f"this OpenGL driver cannot run {fragment}.frag, which needs OpenGL 4.5 ({reason})"
             ) from error
         self._id = shader._program_id
         self._locations: dict[str, Any] = {}
@@ -123,6 +209,49 @@ class Program:
             upload(location, 1, GL.GL_TRUE, value)
 
 
+class CubeTexture:
+    """What is around a place: six pictures (N, N, 3) whose right, down and ahead axes are rows (6, 3, 3).
+
+    Each level is blurred by another roughness (L,), the first by none.
+    """
+
+    def __init__(self, pictures: Sequence[Radiance], axes: Array, roughness: Sequence[float]) -> None:
+        around, self.id = _cube(pictures), _cube(pictures)
+        program, framebuffer = Program("fullscreen", "probe"), GL.glGenFramebuffers(1)
+        GL.glBindVertexArray(GL.glGenVertexArrays(1))
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
+        for ability in (GL.GL_SCISSOR_TEST, GL.GL_DEPTH_TEST, GL.GL_CULL_FACE):
+            GL.glDisable(ability)
+        bind(GL.GL_TEXTURE0, around, GL.GL_TEXTURE_CUBE_MAP)
+        side = len(pictures[0])
+        for level, alpha in list(enumerate(roughness))[1:]:
+            size = side >> level
+            GL.glViewport(0, 0, size, size)
+            for nth, face in enumerate(axes):
+                at = GL.GL_TEXTURE_CUBE_MAP_POSITIVE_X + nth
+                GL.glFramebufferTexture2D(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, at, self.id, level)
+                program.use(axes=face.T, roughness=alpha, size_px=float(size), around_px=float(side))
+                GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
+        for ability in (GL.GL_SCISSOR_TEST, GL.GL_DEPTH_TEST, GL.GL_CULL_FACE):
+            GL.glEnable(ability)
+        GL.glDeleteFramebuffers(1, [framebuffer])
+        GL.glDeleteTextures([around])
+
+
+def _cube(pictures: Sequence[Radiance]) -> Any:
+    """A cube map with mipmaps."""
+    texture = GL.glGenTextures(1)
+    GL.glBindTexture(GL.GL_TEXTURE_CUBE_MAP, texture)
+    for nth, picture in enumerate(pictures):
+        at, size = GL.GL_TEXTURE_CUBE_MAP_POSITIVE_X + nth, len(picture)
+        data = np.ascontiguousarray(picture)
+        GL.glTexImage2D(at, 0, GL.GL_RGBA32F, size, size, 0, GL.GL_RGB, GL.GL_FLOAT, data)
+    GL.glGenerateMipmap(GL.GL_TEXTURE_CUBE_MAP)
+    GL.glTexParameteri(GL.GL_TEXTURE_CUBE_MAP, GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR_MIPMAP_LINEAR)
+    GL.glEnable(GL.GL_TEXTURE_CUBE_MAP_SEAMLESS)
+    return texture
+
+
 @dataclass(frozen=True, slots=True)
 class Grid:
     """Where in a pixel samples lie, one a layer, and how many mipmap levels finer than OpenGL's each takes."""
@@ -144,14 +273,20 @@ CENTRE = Grid(((0.5, 0.5),), (-1.5,))
 
 @dataclass(frozen=True, slots=True)
 class Canvas:
-    """A framebuffer with one layer a sample: one float channel and depth, as textures."""
+    """A framebuffer with one layer a sample: one float channel or four, and depth, as textures."""
 
     width_px: int
     height_px: int
+    channels: int
     grid: Grid
     framebuffer: Any
     colour: Any
     depth: Any
+
+    @property
+    def abilities(self) -> tuple[str, ...]:
+        """What shaders need to know of it."""
+        return ("IS_MONO",) if self.channels == 1 else ()
 
     @property
     def layers(self) -> int:
@@ -170,14 +305,24 @@ class Canvas:
         self.begin(box)
         GL.glClear(GL.GL_COLOR_BUFFER_BIT | GL.GL_DEPTH_BUFFER_BIT)
 
+    def nearness(self) -> Radiance:
+        """Nearness (rows, columns) of the first sample of each pixel, top row first."""
+        GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, self.depth)
+        buffer = GL.glGetTexImage(GL.GL_TEXTURE_2D_ARRAY, 0, GL.GL_DEPTH_COMPONENT, GL.GL_FLOAT)
+        return np.frombuffer(buffer, np.float32).reshape(self.layers, self.height_px, self.width_px)[0, ::-1]
 
-def canvas(width_px: int, height_px: int, grid: Grid) -> Canvas:
+
+# By how many channels a picture has; drivers need not draw into three.
+FORMATS = {1: (GL.GL_R32F, GL.GL_RED), 3: (GL.GL_RGBA32F, GL.GL_RGBA)}
+
+
+def canvas(width_px: int, height_px: int, grid: Grid, channels: int) -> Canvas:
     """A canvas of some size. Raises RenderError where the driver has no room or form for it."""
     framebuffer = GL.glGenFramebuffers(1)
     GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
     names = []
     for attachment, internal, form in (
-        (GL.GL_COLOR_ATTACHMENT0, GL.GL_R32F, GL.GL_RED),
+        (GL.GL_COLOR_ATTACHMENT0, *FORMATS[channels]),
         (GL.GL_DEPTH_ATTACHMENT, GL.GL_DEPTH_COMPONENT32F, GL.GL_DEPTH_COMPONENT),
     ):
         names.append(GL.glGenTextures(1))
@@ -188,17 +333,17 @@ def canvas(width_px: int, height_px: int, grid: Grid) -> Canvas:
             GL.glTexParameteri(GL.GL_TEXTURE_2D_ARRAY, filtering, GL.GL_NEAREST)
         GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, attachment, names[-1], 0)
     _require_complete(width_px, height_px)
-    return Canvas(width_px, height_px, grid, framebuffer, *names)
+    return Canvas(width_px, height_px, channels, grid, framebuffer, *names)
 
 
 @dataclass(frozen=True, slots=True)
 class FlatTarget:
-    """A framebuffer of one float sample a pixel, without depth: its texture can be sampled."""
+    """A framebuffer of one sample a pixel without depth: one float channel, or colours."""
 
     width_px: int
     height_px: int
+    channels: int
     framebuffer: Any
-    texture: Any
 
     @property
     def whole(self) -> Box:
@@ -211,33 +356,34 @@ class FlatTarget:
         GL.glViewport(0, 0, self.width_px, self.height_px)
         _scissor(box, self.height_px)
 
-    def clear(self, box: Box, value: float = 0.0) -> None:
-        """One value all over a box, in which to draw from now on."""
+    def clear(self, box: Box) -> None:
+        """Black all over a box, in which to draw from now on."""
         self.begin(box)
-        GL.glClearBufferfv(GL.GL_COLOR, 0, [value, 0.0, 0.0, 0.0])
+        GL.glClear(GL.GL_COLOR_BUFFER_BIT)
 
     def read(self, box: Box) -> Radiance:
-        """A box of the picture (rows, columns) float32, top row first; an array of its own."""
+        """A box of the picture (rows, columns) or (rows, columns, 3) float32, top row first; an array of its own."""
         u0, u1, v0, v1 = box
+        _, form = FORMATS[self.channels]
         GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self.framebuffer)
         GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 1)
-        buffer = GL.glReadPixels(u0, self.height_px - v1, u1 - u0, v1 - v0, GL.GL_RED, GL.GL_FLOAT)
-        # OpenGL's first row is the lowest; a copy, as OpenCV takes no array that runs backwards.
-        return np.ascontiguousarray(np.frombuffer(buffer, np.float32).reshape(v1 - v0, u1 - u0)[::-1])
+        buffer = GL.glReadPixels(u0, self.height_px - v1, u1 - u0, v1 - v0, form, GL.GL_FLOAT)
+        pixels = np.frombuffer(buffer, np.float32).reshape(v1 - v0, u1 - u0, -1)
+        colours = cv2.cvtColor(pixels, cv2.COLOR_RGBA2RGB) if self.channels == 3 else pixels
+        # OpenGL's first row is the lowest.
+        return np.asarray(cv2.flip(colours, 0), np.float32)
 
 
-def flat_target(width_px: int, height_px: int, *, mipmaps: bool = False) -> FlatTarget:
-    """A target of one channel, or of four with mipmaps. Raises RenderError where the driver has no such size."""
-    internal, form = (GL.GL_RGBA32F, GL.GL_RGBA) if mipmaps else (GL.GL_R32F, GL.GL_RED)
+def flat_target(width_px: int, height_px: int, channels: int) -> FlatTarget:
+    """A target of some size. Raises RenderError where the driver has none such."""
+    internal, form = FORMATS[channels]
     framebuffer, texture = GL.glGenFramebuffers(1), GL.glGenTextures(1)
     GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
     GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
     GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, width_px, height_px, 0, form, GL.GL_FLOAT, None)
-    filters = (GL.GL_LINEAR_MIPMAP_LINEAR, GL.GL_LINEAR) if mipmaps else (GL.GL_NEAREST, GL.GL_NEAREST)
-    _texture_parameters(*filters, GL.GL_CLAMP_TO_EDGE)
     GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, texture, 0)
     _require_complete(width_px, height_px)
-    return FlatTarget(width_px, height_px, framebuffer, texture)
+    return FlatTarget(width_px, height_px, channels, framebuffer)
 
 
 def _scissor(box: Box, height_px: int) -> None:

@@ -7,19 +7,18 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vobench import stop
 from vobench.errors import RenderError
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
 from vobench.render import mitsuba
-from vobench.render.geometry import inventory
-from vobench.render.mitsuba import STRENGTH, groups, light_key, load, nominal, positions
+from vobench.render.mitsuba import STRENGTH, groups, light_key, load, nominal, one_sided
 from vobench.render.renderer import Radiance, View
-from vobench.scene.light import Light, Sun
-from vobench.scene.material import Glass
-from vobench.scene.scene import Scene
+from vobench.scene.light import Light, Sky, Sun
+from vobench.scene.material import LUMINANCE
+from vobench.scene.scene import Scene, triangles
 
 Floats = NDArray[np.float32]
 Indices = NDArray[np.int64]
@@ -47,12 +46,13 @@ class MitsubaScene:
         import mitsuba as mi
 
         self._scene, self._state = scene, SceneState((1.0,) * len(scene.lights), 0.0)
-        self._groups = groups(inventory(scene))
+        self._faces = triangles(scene)
         self._world = load(mi, scene)
         self._parameters = mi.traverse(self._world)
-        # `path` is faster, but sees through panes only by chance; `volpath` samples lights through them.
-        self._has_panes = any(isinstance(material, Glass) for material in scene.materials.values())
-        kind = "volpath" if self._has_panes else "path"
+        # `path` is faster, but sees through panes and holes only by chance; `volpath` samples lights through them.
+        self._one_sided = one_sided(mi, scene, self._world)
+        passes = any(m.kind == "pane" or m.cutout is not None for m in scene.materials.values())
+        kind = "volpath" if passes else "path"
         self._integrator = mi.load_dict({"type": kind, "max_depth": -1 if max_depth is None else max_depth})
 
     def become(self, wanted: SceneState) -> None:
@@ -70,20 +70,22 @@ class MitsubaScene:
         import drjit as dr
         import mitsuba as mi
 
-        key = f"{light_key(index)}.{STRENGTH[type(light)]}"
-        self._parameters[key] = dr.opaque(mi.Float, wanted.levels[index] * nominal(light))
+        # Opaque, for a constant would be compiled into the kernel.
+        strength = [dr.opaque(mi.Float, wanted.levels[index] * part) for part in nominal(light).tolist()]
+        value = strength[0] if isinstance(light, Sky) else mi.Color3f(*strength)
+        self._parameters[f"{light_key(index)}.{STRENGTH[type(light)]}"] = value
         if isinstance(light, Sun) and light.moves:
             self._parameters[f"{light_key(index)}.direction"] = mi.Vector3f(*light.direction(wanted.t_ns).tolist())
 
     def _move(self, t_ns: float) -> None:
-        surfaces = inventory(self._scene, t_ns=t_ns).surfaces
-        for group in self._groups:
+        faces = self._faces.moved([mover.path.pose(t_ns) for mover in self._scene.movers])
+        for group in groups(self._scene, self._faces):
             if group.mover >= 0:
-                vertices = positions([surfaces[i] for i in group.surfaces]).ravel().astype(np.float32)
-                self._parameters[f"{group.key}.vertex_positions"] = vertices
+                for name, values in (("positions", faces.corners_m), ("normals", faces.normals)):
+                    self._parameters[f"{group.key}.vertex_{name}"] = values[group.faces].ravel().astype(np.float32)
 
     def trace(self, rays: Floats, rows: Indices, T_world_camera: Array, samples: int, seed: int) -> Floats:
-        """Radiance (R, W), the sum over `samples` paths a pixel, of rows (R,) seen from T_world_camera (R, 4, 4).
+        """Radiance (R, W, 3), the sum over `samples` paths a pixel, of rows (R,) seen from T_world_camera (R, 4, 4).
 
         rays (H + 1, W + 1, 3) are directions in the camera's frame through the corners of its pixels.
         """
@@ -97,8 +99,8 @@ class MitsubaScene:
         seen = dr.isfinite(ray.d.x)
         ray.o = self._past_backs(ray, seen)
         radiance, _, _ = self._integrator.sample(self._world, sampler, ray, None, seen)
-        light = dr.select(seen, radiance[0], 0.0).numpy().reshape(len(rows), columns, samples)
-        return np.asarray(light.sum(-1))
+        light = dr.select(seen, radiance, 0.0).numpy().reshape(3, len(rows), columns, samples)
+        return np.moveaxis(light.sum(-1), 0, -1)
 
     def _past_backs(self, ray: Any, seen: Any) -> Any:
         """Origins of rays moved on past surfaces that they see from behind, which no picture shows."""
@@ -108,8 +110,7 @@ class MitsubaScene:
         def step(origin: Any, looking: Any) -> tuple[Any, Any]:
             si = self._world.ray_intersect(mi.Ray3f(origin, ray.d), mi.RayFlags.Minimal, True, looking)
             behind = looking & si.is_valid() & (dr.dot(si.n, ray.d) > 0)
-            if self._has_panes:
-                behind &= ~mi.has_flag(si.bsdf().flags(), mi.BSDFFlags.Null)
+            behind &= dr.gather(mi.Bool, self._one_sided, dr.reinterpret_array(mi.UInt32, si.shape), behind)
             return dr.select(behind, si.spawn_ray(ray.d).o, origin), behind
 
         return dr.while_loop((mi.Point3f(ray.o), mi.Bool(seen)), lambda _, looking: looking, step)[0]
@@ -169,28 +170,29 @@ class PathRenderer:
         self._scene, self._samples, self._seed = scene, samples, seed
         self._mitsuba = MitsubaScene(scene, max_depth=max_depth)
 
-    def radiance(self, camera: Camera, views: Sequence[View]) -> Radiance:
-        """Luminance (H, W) in cd/m², linear and unclipped, averaged over each pixel's area; views tile the rows.
+    def radiance(self, camera: Camera, views: Sequence[View], *, weights: ArrayLike | None = LUMINANCE) -> Radiance:
+        """Radiance (H, W) in cd/m², linear and unclipped, averaged over each pixel's area; views tile the rows.
 
-        A pixel one of whose corners the lens does not see is black.
+        It is the sum of red, green and blue times weights, or (H, W, 3) where these are None. A pixel one of whose
+        corners the lens does not see is black.
         """
-        picture = np.zeros((camera.height_px, camera.width_px), np.float32)
+        picture = np.zeros((camera.height_px, camera.width_px, 3), np.float32)
         for (moment, samples), batch in _batches(self._scene, views, self._samples):
             self._mitsuba.become(moment)
             light = self._trace(camera, batch, samples)
-            np.add.at(picture, batch.rows, light * batch.weight[:, None].astype(np.float32))
-        return picture
+            np.add.at(picture, batch.rows, light * batch.weight[:, None, None].astype(np.float32))
+        return picture if weights is None else np.asarray(picture @ np.asarray(weights, np.float32))
 
     def close(self) -> None:
         """Give back Mitsuba's copy of the scene."""
         del self._mitsuba
 
     def _trace(self, camera: Camera, batch: RowBatch, samples: int) -> Radiance:
-        """Mean radiance (R, W) of the rows of a batch over `samples` paths a pixel, some at a time."""
+        """Mean radiance (R, W, 3) of the rows of a batch over `samples` paths a pixel, some at a time."""
         at_once = max(1, min(samples, MAX_LANES // (len(batch.rows) * camera.width_px)))
         counts = [at_once] * (samples // at_once) + [samples % at_once] * (samples % at_once > 0)
         rays = _corner_rays(camera)
-        total = np.zeros((len(batch.rows), camera.width_px), np.float32)
+        total = np.zeros((len(batch.rows), camera.width_px, 3), np.float32)
         for seed, count in zip(_seeds(self._seed, batch, len(counts)), counts, strict=True):
             stop.check()
             total += self._mitsuba.trace(rays, batch.rows, batch.T_world_camera, count, seed)

@@ -15,6 +15,7 @@ from vobench.errors import MissingDependencyError
 from vobench.geometry.camera import Camera
 from vobench.render.bake import BakedScene
 from vobench.render.renderer import Radiance, View
+from vobench.scene.material import LUMINANCE, Rgb
 
 EGL_PACKAGES = ("libegl1", "libgl1", "libopengl0", "libgl1-mesa-dri")
 EGL_REMEDY = f"apt-get update && apt-get install -y {' '.join(EGL_PACKAGES)}"
@@ -91,10 +92,10 @@ class RasterRenderer:
 
         self._frames = FrameRenderer(baked)
 
-    def radiance(self, camera: Camera, views: Sequence[View]) -> Radiance:
-        """Luminance (H, W) in cd/m², linear and unclipped, averaged over each pixel's area; views tile the rows."""
+    def radiance(self, camera: Camera, views: Sequence[View], *, weights: Rgb | None = LUMINANCE) -> Radiance:
+        """Luminance (H, W) in cd/m² of weighted channels, or (H, W, 3) without weights; see `Renderer`."""
         self._platform.make_current()
-        return self._frames.picture(camera, views)
+        return self._frames.picture(camera, views, weights)
 
     def close(self) -> None:
         """Free the OpenGL context and all in it."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
+from vobench.scene.material import LUMINANCE, Rgb
 
 Radiance = NDArray[np.float32]
 
@@ -36,8 +37,12 @@ def still(camera: Camera, T_world_camera: Array, *, t_ns: int = 0) -> tuple[View
 class Renderer(Protocol):
     """Pictures of one scene."""
 
-    def radiance(self, camera: Camera, views: Sequence[View]) -> Radiance:
-        """Luminance (H, W) in cd/m², linear and unclipped, averaged over each pixel's area; views tile the rows."""
+    def radiance(self, camera: Camera, views: Sequence[View], *, weights: Rgb | None = LUMINANCE) -> Radiance:
+        """Linear, unclipped and averaged over each pixel's area; views tile the rows.
+
+        (H, W): the sum of red, green and blue times the weights, with those of luminance in cd/m². (H, W, 3) without
+        weights: the three themselves, each as bright as a white of that luminance.
+        """
 
     def close(self) -> None:
         """Give back what the renderer holds."""

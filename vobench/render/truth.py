@@ -4,199 +4,121 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.geometry import se3
-from vobench.geometry.camera import Camera
+from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
-from vobench.render.emitter import FARTHEST_M
-from vobench.render.geometry import RAY_OFFSET_M, Indices, Mask
 from vobench.render.occlusion import (
-    TILE_PX,
+    RAY_OFFSET_M,
     Bodies,
-    PointView,
-    Scalar,
+    Floats,
+    Indices,
+    Mask,
+    Pixels,
     Shot,
-    ShotSurfaces,
     ShotTransforms,
-    Tiles,
     at_rows,
-    balls,
+    dot,
+    into,
     moved,
     of,
     shot_transforms,
-    spread,
-    tiles,
     turn,
 )
-from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
-from vobench.scene.material import Matt, Mirror, Polished
+from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun
+from vobench.scene.mesh import unit
 from vobench.scene.scene import Scene
-from vobench.scene.surface import Surface
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, check_channels
 
-# From there the sun's rays would fall this far beside where they do, within 30 m around the origin.
-NEAR_POINT_M, NEAR_POINT_SLACK_M = 3e4, 0.03
+SUN_WAY_M = 1e4  # beyond every scene
 
 
 @dataclass(frozen=True, slots=True)
 class Lamp:
-    """A light that is on, and its middle (3,)."""
+    """A light that is on, seen from its middle: what it reaches and does not.
 
-    light: Light
-    center_m: Array
+    center_m (3,), None for the sun; axis (3,): along which it shines, or to the sun; beyond cosine `least` of the
+    angle to the axis it does not shine. own_m: as near to the middle its own faces are not in the light's way.
+    """
 
-    @property
-    def near_point(self) -> tuple[Array, float]:
-        """A point (3,) not too far for float32, and how much farther than from it light may strike, in metres."""
-        if isinstance(self.light, Sun):
-            return self.center_m * (NEAR_POINT_M / FARTHEST_M), NEAR_POINT_SLACK_M
-        return self.center_m, 0.0
+    center_m: Array | None
+    axis: Array
+    least: float = -2.0
+    own_m: float = 0.0
 
-    @property
-    def panel(self) -> Surface | None:
-        """The rectangle that shines, which does not shade itself."""
-        return self.light.surface if isinstance(self.light, AreaLight) else None
+    def way(self, starts_m: Floats) -> Floats:
+        """From points (R, 3) to the middle, or as far as matters towards the sun."""
+        if self.center_m is None:
+            return np.broadcast_to((SUN_WAY_M * self.axis).astype(np.float32), starts_m.shape)
+        way = self.center_m.astype(np.float32) - starts_m
+        return way if self.own_m == 0 else way * np.maximum(1 - self.own_m / np.linalg.norm(way, axis=1), 0)[:, None]
 
-    def reaches(self, centers_m: Array, radii_m: Array, normals: Array) -> tuple[Mask, Mask]:
-        """Flat things in balls (R, 3), (R,) that it surely does not shine on, and that it surely shines on all of."""
-        way = centers_m - self.center_m
-        facing = np.asarray(np.einsum("ri,ri->r", way, normals) < 0)
-        if isinstance(self.light, AreaLight):
-            before_m = way @ self.light.surface.normal
-            return ~facing | (before_m <= -radii_m), facing & (before_m > radii_m)
-        if isinstance(self.light, SpotLight):
-            reach_m = np.maximum(np.linalg.norm(way, axis=1), 1e-9)
-            aside_rad = np.arccos(np.clip(way @ self.light.direction / reach_m, -1, 1))
-            half_rad = np.arcsin(np.clip(radii_m / reach_m, 0, 1))
-            outer_rad = np.deg2rad(self.light.outer_deg)
-            return ~facing | (aside_rad - half_rad >= outer_rad), facing & (aside_rad + half_rad < outer_rad)
-        return ~facing, facing
+    def faced(self, normals: Array, away_m: Array) -> Mask:
+        """Which planes (F, 3), away_m (F,) from the origin, have it before them."""
+        if self.center_m is None:
+            return normals @ self.axis > 0
+        return normals @ self.center_m > away_m + RAY_OFFSET_M
 
-    def hidden(self, bodies: Bodies, points_m: Array, normals: Array, T_bodies_world: Sequence[Array]) -> Mask:
-        """Whether something is between the light and places (R, 3) that it would shine on."""
-        _, hidden = self.reaches(points_m, np.zeros(len(points_m)), normals)
-        lit = np.flatnonzero(hidden)
-        starts = points_m[lit] + RAY_OFFSET_M * normals[lit]
-        to_bodies = [T if T.ndim == 2 else T[lit] for T in T_bodies_world]
-        hidden[lit] = bodies.blocked(starts, np.broadcast_to(self.center_m, starts.shape), to_bodies)
-        return hidden
+    def shines(self, way: Floats) -> Mask | bool:
+        """Whether it shines to where ways (R, 3) lead to its middle."""
+        if self.least < -1:
+            return True
+        return _along(way, -self.axis) > (self.least * np.sqrt(dot(way, way)) if self.least else 0)
 
 
-def lamps(scene: Scene, t_ns: int) -> Iterator[Lamp]:
-    """The lights that are on at an instant, but for the sky, which has no middle."""
-    for light in scene.lights:
+def _along(vectors: Floats, axis: Array) -> Floats:
+    return np.asarray(np.einsum("ri,i->r", vectors, axis.astype(np.float32)))
+
+
+def lamps(scene: Scene, bodies: Bodies, t_ns: int) -> Iterator[tuple[Lamp, Mask]]:
+    """The lights that are on at an instant, but for the sky, which has no middle; and the faces turned to each."""
+    for index, light in enumerate(scene.lights):
         if not isinstance(light, Sky) and light.level.mean(t_ns, t_ns) > 0:
-            yield Lamp(light, _center(light, t_ns))
+            lamp = _lamp(light, bodies.faces.corners_m[bodies.faces.lamp == index], t_ns)
+            yield lamp, lamp.faced(bodies.normals, bodies.offsets_m)
 
 
-def _center(light: AreaLight | PointLight | SpotLight | Sun, t_ns: int) -> Array:
-    if isinstance(light, Sun):
-        return FARTHEST_M * light.direction(t_ns)
-    if isinstance(light, AreaLight):
-        return light.surface.at(np.array(0.5), np.array(0.5))
-    return light.position_m
+def _lamp(light: AreaLight | PointLight | SpotLight | Sun, corners_m: Array, t_ns: int) -> Lamp:
+    match light:
+        case Sun():
+            return Lamp(None, light.direction(t_ns))
+        case PointLight():
+            return Lamp(light.position_m, np.zeros(3))
+        case SpotLight():
+            return Lamp(light.position_m, light.direction, float(np.cos(np.deg2rad(light.outer_deg))))
+        case AreaLight():
+            return lamp_of(corners_m)
+
+
+def lamp_of(corners_m: Array) -> Lamp:
+    """The lamp whose faces (F, 3, 3) shine; where they are flat, only before them."""
+    doubled = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
+    area = np.linalg.norm(doubled, axis=1)
+    center_m, axis = np.average(corners_m.mean(1), axis=0, weights=area), unit(doubled.sum(0))
+    way_m = corners_m.reshape(-1, 3) - center_m
+    if np.abs(way_m @ axis).max() < RAY_OFFSET_M:
+        return Lamp(center_m, axis, 0.0)
+    return Lamp(center_m, axis, own_m=float(np.linalg.norm(way_m, axis=1).max()))
 
 
 @dataclass(frozen=True, slots=True)
-class TilePlan:
-    """A picture to tell the truth of, and what is known of its tiles (V, U) beforehand.
-
-    sure: the one surface of a tile, -1 where rays must tell; glazed: panes may be before it; visible: the next
-    camera surely sees all of it, as far as its picture reaches; hidden: how many lights surely are from all of it;
-    each lamp has the tiles where it is in doubt. All are while camera or movers move.
-    """
+class Picture:
+    """A picture to tell the truth of, the next one, and its lamps, each with the faces (F + 1,) turned to it."""
 
     bodies: Bodies
     camera: Camera
-    tiles: Tiles
     here: ShotTransforms
     there: ShotTransforms | None
-    sure: Indices
-    glazed: Mask
-    visible: Mask
-    hidden: NDArray[np.uint16]
     lamps: tuple[tuple[Lamp, Mask], ...]
 
 
-def tile_plan(
-    bodies: Bodies, camera: Camera, here: ShotTransforms, there: ShotTransforms | None, lamps: Iterable[Lamp]
-) -> TilePlan:
-    """What whole tiles show."""
-    cones, snapshot = tiles(camera), here.snapshot
-    parts, shape = (bodies, camera, cones, here, there), cones.sine.shape
-    if snapshot is None:
-        none, nothing, glass = np.full(shape, -1, np.int32), np.zeros(shape, bool), not bodies.opaque.all()
-        doubts = tuple((lamp, ~nothing) for lamp in lamps)
-        return TilePlan(*parts, none, np.full(shape, glass), nothing, np.zeros(shape, np.uint16), doubts)
-    axis, sine = cones.axis.reshape(-1, 3), cones.sine.ravel()
-    sure = PointView(snapshot.corners_m, snapshot.facing & bodies.opaque).fills(axis, sine)
-    glazed = PointView(snapshot.corners_m, ~bodies.opaque).touches(axis, sine)
-    patches = _Patches(sure, *balls(snapshot.planes[sure], axis, sine))
-    visible = _visible(bodies, here, there, patches)
-    hidden, doubted = np.zeros(len(sure), np.uint16), []
-    for lamp in lamps:
-        dark, doubt = _cast(bodies, here, snapshot, lamp, patches)
-        hidden += dark
-        doubted.append((lamp, doubt.reshape(shape)))
-    known = sure.reshape(shape), glazed.reshape(shape), visible.reshape(shape), hidden.reshape(shape)
-    return TilePlan(*parts, *known, tuple(doubted))
-
-
 @dataclass(frozen=True, slots=True)
-class _Patches:
-    """What tiles show of their sure surfaces (T,), within balls: centres (T, 3) in the camera's frame, radii (T,)."""
-
-    sure: Indices
-    centers_m: Array
-    radii_m: Array
-
-
-def _visible(bodies: Bodies, here: ShotTransforms, there: ShotTransforms | None, patches: _Patches) -> Mask:
-    if there is None or there.snapshot is None:
-        return np.zeros(len(patches.sure), bool)
-    T_there_here = np.stack(there.T_camera_bodies) @ np.stack(here.T_bodies_camera)
-    body = np.append(bodies.of_surface, 0)[patches.sure]
-    centers_m = moved(T_there_here[body], patches.centers_m)
-    point_view = PointView(there.snapshot.corners_m, there.snapshot.facing & bodies.opaque)
-    facing = np.append(there.snapshot.facing, False)[patches.sure]
-    return np.asarray(facing & point_view.shading(centers_m, patches.radii_m, patches.sure)[0])
-
-
-def _cast(
-    bodies: Bodies, here: ShotTransforms, snapshot: ShotSurfaces, lamp: Lamp, patches: _Patches
-) -> tuple[Mask, Mask]:
-    """Tiles (T,) that a lamp would light but for what is before them, and those where that is not sure.
-
-    Glass does not count, and a panel does not shade itself.
-    """
-    T_world_camera = here.T_bodies_camera[0]
-    near_point_m, slack_m = lamp.near_point
-    T_lamp_camera = se3.transform(np.eye(3), -near_point_m) @ T_world_camera
-    others = np.array([surface is not lamp.panel for surface in bodies.surfaces])
-    point_view = PointView(se3.apply(T_lamp_camera, snapshot.corners_m), others & bodies.opaque)
-    radii_m = patches.radii_m + slack_m
-    clear, dark = point_view.shading(moved(T_lamp_camera, patches.centers_m), radii_m, patches.sure)
-    normals = turn(T_world_camera, snapshot.planes)[patches.sure]  # longer than 1, which matters to no sign
-    unlit, lit = lamp.reaches(moved(T_world_camera, patches.centers_m), radii_m, -normals)
-    return dark & lit, (patches.sure < 0) | ~(clear | unlit | (dark & lit))
-
-
-Values = dict[str, NDArray[np.generic]]
-Pixels = NDArray[np.intp]
-
-# With a rolling shutter the row that sees a point next is found by iteration, to this or in so many rounds.
-CONVERGED_PX, MOST_ROUNDS = 1e-5, 20
-# A point is seen where the ray ends no more than this share of the way before it.
-DEPTH_TOLERANCE = 1e-4
-
-
-@dataclass(frozen=True, slots=True)
-class SurfaceIds:
-    """Of each surface, the last one none (S + 1,): ids, whether it mirrors, whether it shows what light falls on it."""
+class FaceIds:
+    """Of each face, the last one none (F + 1,): ids, whether it mirrors, whether it shows what light falls on it."""
 
     instance: NDArray[np.uint16]
     material: NDArray[np.uint16]
@@ -204,151 +126,147 @@ class SurfaceIds:
     matt: Mask
 
 
-class Band:
-    """Rows of a picture that begin with a tile's first: R pixels in T tiles."""
+@lru_cache(maxsize=4)
+def pixel_rays(camera: Camera) -> tuple[Array, Array]:
+    """A camera's pixels (H, W, 2) and their unit rays (H, W, 3); kept, as cameras are few and pictures many."""
+    uv_px = pixel_grid(camera)
+    return uv_px, camera.rays(uv_px)
 
-    def __init__(self, plan: TilePlan, ids: SurfaceIds, rows: slice) -> None:
-        self._plan, self._bodies, self._ids_of = plan, plan.bodies, ids
-        self._shape = (rows.stop - rows.start, plan.camera.width_px)
-        self._rays = plan.tiles.rays[rows].reshape(-1, 3)
-        self._uv_px = plan.tiles.uv_px[rows].reshape(-1, 2)
-        self._tiles = slice(rows.start // TILE_PX, -(-rows.stop // TILE_PX))
-        self._T_bodies_camera = at_rows(plan.here.T_bodies_camera, self._uv_px[:, 1])
-        self._surface, self._distance_m = self._visible_surfaces()
-        self._points_m = self._distance_m[:, None] * self._rays
-        movers = np.append(self._bodies.of_surface, 0)[self._surface] if len(self._T_bodies_camera) > 1 else None
-        self._body = movers if movers is not None and movers.any() else None
+
+Values = dict[str, NDArray[np.generic]]
+
+# With a rolling shutter the row that sees a point next is found by iteration, to this or in so many rounds.
+CONVERGED_PX, MOST_ROUNDS = 1e-5, 20
+# A point is seen where the ray ends no more than this share of the way before it.
+DEPTH_TOLERANCE = 1e-4
+LAMP_TOLERANCE = 1e-3  # as near to a lamp's middle nothing is in its way
+
+
+class Band:
+    """Rows of a picture: R pixels."""
+
+    def __init__(self, picture: Picture, ids: FaceIds, rows: slice) -> None:
+        self._picture, self._bodies, self._ids_of = picture, picture.bodies, ids
+        self._uv_px, rays = (part[rows].reshape(-1, part.shape[2]) for part in pixel_rays(picture.camera))
+        self._rays = rays
+        self._T_bodies_camera = at_rows(picture.here.T_bodies_camera, self._uv_px[:, 1])
+        seen = self._bodies.visible(rays, self._T_bodies_camera)
+        self._face, self._distance_m = seen.face, seen.distance_m
+        self._points_m = self._distance_m[:, None] * rays
+        self._world_m = moved(self._T_bodies_camera[0], self._points_m)
+        self._movers = self._seen_movers(self._face)
 
     def values(self, names: Sequence[str]) -> Values:
         """The channels asked for, (R,) or (R, n)."""
         found: Values = {}
         if "flow" in names or "occlusion" in names:
-            found["flow"], found["occlusion"] = self._flow()
-        along_axis, T_camera_bodies = self._plan.camera.depth_along == "axis", self._plan.here.T_camera_bodies
-        rows, pixels = self._uv_px[:, 1], np.arange(len(self._rays))
+            found["flow"], found["occlusion"] = self._flow(hides="occlusion" in names)
+        here, rows = self._picture.here, self._uv_px[:, 1]
         makers: dict[str, Callable[[], NDArray[np.generic]]] = {
-            "depth": lambda: self._points_m[:, 2] if along_axis else self._distance_m,
-            "normals": lambda: self._turned_normals(at_rows(T_camera_bodies, rows), pixels),
-            "instance": lambda: self._ids_of.instance[self._surface],
-            "material": lambda: self._ids_of.material[self._surface],
+            "depth": lambda: self._points_m[:, 2] if self._picture.camera.depth_along == "axis" else self._distance_m,
+            "normals": lambda: self._normals(at_rows(here.T_camera_bodies, rows)),
+            "instance": lambda: self._ids_of.instance[self._face],
+            "material": lambda: self._ids_of.material[self._face],
             "mirror": self._mirror,
             "shadow": self._shadow,
-            "moving": lambda: np.zeros(len(self._rays), bool) if self._body is None else self._body > 0,
+            "moving": lambda: self._bodies.body[self._face] > 0,
         }
         return {name: found[name] if name in found else makers[name]() for name in names}
 
-    def _visible_surfaces(self) -> tuple[Indices, Array]:
-        """Surfaces and distances (R,): by planes where tiles are sure, by rays elsewhere."""
-        surface, snapshot = spread(self._plan.sure[self._tiles], self._shape).ravel(), self._plan.here.snapshot
-        distance_m = np.full(len(surface), np.nan)
-        if snapshot is not None:
-            distance_m = 1 / np.einsum("ri,ri->r", snapshot.planes[surface], self._rays)
-        unsure = np.flatnonzero(surface < 0)
-        seen = self._bodies.visible_surfaces(self._rays[unsure], [of(T, unsure) for T in self._T_bodies_camera])
-        surface[unsure], distance_m[unsure] = seen.surface, seen.distance_m
-        return surface, distance_m
+    def _seen_movers(self, face: Indices) -> list[tuple[int, Pixels]]:
+        """The movers among faces (P,), and which of these are of each."""
+        if len(self._T_bodies_camera) == 1:
+            return []
+        body = self._bodies.body[face]
+        return [(int(b), np.flatnonzero(body == b)) for b in np.unique(body) if b]
 
-    def _turned_normals(self, T_frame_bodies: Sequence[Array], pixels: Pixels) -> Array:
-        """Normals (P, 3) of some pixels in a frame that the transforms, (4, 4) or (P, 4, 4) each, lead to."""
-        surface, normals, T_frame_world = self._surface[pixels], self._bodies.normals, T_frame_bodies[0]
-        if T_frame_world.ndim == 2:
-            turned = turn(T_frame_world, normals)[surface]
-        else:
-            turned = turn(T_frame_world, normals[surface])
-        for body, these in self._movers(pixels):
-            turned[these] = turn(of(T_frame_bodies[body], these), normals[surface[these]])
+    def _normals(self, T_frame_bodies: Sequence[Array]) -> Array:
+        """Normals (R, 3) in a frame that the transforms, (4, 4) or (R, 4, 4) each, lead to."""
+        normals = self._bodies.normals[self._face]
+        turned = turn(T_frame_bodies[0], normals)
+        for body, these in self._movers:
+            turned[these] = turn(of(T_frame_bodies[body], these), normals[these])
         return turned
 
     def _mirror(self) -> Mask:
-        mirror = self._ids_of.mirrors[self._surface]
-        pixels = np.flatnonzero(self._spread(self._plan.glazed) & ~mirror)
-        T_bodies_camera = [of(T, pixels) for T in self._T_bodies_camera]
-        mirror[pixels] = self._bodies.behind_panes(self._rays[pixels], T_bodies_camera, self._distance_m[pixels])
-        return mirror
+        return self._ids_of.mirrors[self._face] | self._bodies.behind_panes(
+            self._rays, self._T_bodies_camera, self._distance_m
+        )
 
     def _shadow(self) -> NDArray[np.uint16]:
-        lamps, matt = self._plan.lamps, self._ids_of.matt[self._surface]
-        count = self._spread(self._plan.hidden) * matt
-        doubts = [self._spread(doubt) for _, doubt in lamps]
-        pixels = np.flatnonzero(matt & np.logical_or.reduce(doubts, axis=0))
-        rows, here = self._uv_px[pixels, 1], self._plan.here
-        T_world_bodies, T_bodies_world = at_rows(here.T_world_bodies, rows), at_rows(here.T_bodies_world, rows)
-        points_m = moved(of(self._T_bodies_camera[0], pixels), self._points_m[pixels])
-        normals = self._turned_normals(T_world_bodies, pixels)
-        for (lamp, _), doubt in zip(lamps, doubts, strict=True):
-            these = np.flatnonzero(doubt[pixels])
-            to_bodies = [of(T, these) for T in T_bodies_world]
-            count[pixels[these]] += lamp.hidden(self._bodies, points_m[these], normals[these], to_bodies)
+        count, here, rows = np.zeros(len(self._face), np.uint16), self._picture.here, self._uv_px[:, 1]
+        matt, T_bodies_world = self._ids_of.matt[self._face], at_rows(here.T_bodies_world, rows)
+        normals = self._normals(at_rows(here.T_world_bodies, rows))
+        starts_m = (self._world_m + self._bodies.ray_offset_m * normals).astype(np.float32)
+        away_m = dot(self._world_m, normals) if self._movers else np.empty(0)
+        for lamp, faces in self._picture.lamps:
+            faced, way = faces[self._face], lamp.way(starts_m)
+            for _, these in self._movers:
+                faced[these] = lamp.faced(normals[these], away_m[these])
+            lit = matt & faced & lamp.shines(way)
+            reach = np.where(lit, np.float32(1 - LAMP_TOLERANCE), np.float32(-1))
+            count += self._bodies.blocked(starts_m, way, T_bodies_world, reach)
         return count
 
-    def _spread(self, tiles: NDArray[Scalar]) -> NDArray[Scalar]:
-        return spread(tiles[self._tiles], self._shape).ravel()
-
-    def _flow(self) -> tuple[Array, Mask]:
+    def _flow(self, *, hides: bool) -> tuple[Array, Mask]:
         """Pixels (R, 2) to the place in the next picture, and whether the point is hidden or outside there (R,)."""
-        there, seen = self._plan.there, self._surface >= 0
+        there, seen = self._picture.there, self._face >= 0
         if there is None:
             return np.full((len(self._rays), 2), np.nan), seen
-        rows, points_m = self._uv_px[:, 1], self._own_points_m()
+        rows, own_m = self._uv_px[:, 1], self._own_m()
         for _ in range(MOST_ROUNDS):
-            next_m = self._carried(points_m, there, rows)
-            uv_px = self._plan.camera.project(next_m)
-            change_px = np.nanmax(np.abs(uv_px[:, 1] - rows), initial=0.0) if there.snapshot is None else 0.0
+            next_m = self._carried(own_m, there, rows)
+            uv_px = self._picture.camera.project(next_m)
+            change_px = np.nanmax(np.abs(uv_px[:, 1] - rows), initial=0.0) if there.by_row else 0.0
             if change_px < CONVERGED_PX:
                 break
             rows = uv_px[:, 1]
-        return uv_px - self._uv_px, seen & self._gone(there, next_m, uv_px)
+        return uv_px - self._uv_px, seen & self._gone(there, next_m, uv_px) if hides else seen
 
-    def _own_points_m(self) -> Array:
+    def _own_m(self) -> Array:
         """The seen points (R, 3), each in the frame of the body that it is on."""
-        points_m = moved(self._T_bodies_camera[0], self._points_m)
-        for body, these in self._movers():
-            points_m[these] = moved(of(self._T_bodies_camera[body], these), self._points_m[these])
-        return points_m
+        own_m = self._world_m.copy() if self._movers else self._world_m
+        for body, these in self._movers:
+            own_m[these] = moved(of(self._T_bodies_camera[body], these), self._points_m[these])
+        return own_m
 
-    def _carried(self, own_points_m: Array, there: ShotTransforms, rows: Array) -> Array:
+    def _carried(self, own_m: Array, there: ShotTransforms, rows: Array) -> Array:
         """The points (R, 3) in the next camera's frame, where it is on the rows (R,) that see them."""
-        carried = moved(at_rows(there.T_camera_bodies[:1], rows)[0], own_points_m)
-        for body, these in self._movers():
+        carried = moved(at_rows(there.T_camera_bodies[:1], rows)[0], own_m)
+        for body, these in self._movers:
             (T_there_body,) = at_rows(there.T_camera_bodies[body : body + 1], rows[these])
-            carried[these] = moved(T_there_body, own_points_m[these])
+            carried[these] = moved(T_there_body, own_m[these])
         return carried
 
-    def _gone(self, there: ShotTransforms, points_m: Array, uv_px: Array) -> Mask:
+    def _gone(self, there: ShotTransforms, next_m: Array, uv_px: Array) -> Mask:
         """Whether points (R, 3) in the next camera's frame are outside its picture (R, 2), or hidden from it."""
-        camera = self._plan.camera
-        u, v = uv_px[:, 0], uv_px[:, 1]
+        camera, (u, v) = self._picture.camera, uv_px.T
         gone: Mask = ~((u >= -0.5) & (u < camera.width_px - 0.5) & (v >= -0.5) & (v < camera.height_px - 0.5))
-        doubtful = np.flatnonzero(~gone & ~self._spread(self._plan.visible))
-        T_bodies_there = at_rows(there.T_bodies_camera, v[doubtful])
-        gone[doubtful] = self._hidden(points_m[doubtful], self._surface[doubtful], T_bodies_there)
+        inside = np.flatnonzero(~gone)
+        gone[inside] = self._hidden(there, inside, next_m[inside], v[inside])
         return gone
 
-    def _hidden(self, points_m: Array, surface: Indices, T_bodies_camera: Sequence[Array]) -> Mask:
-        """Whether a camera that has surfaces' points (P, 3) before it sees something nearer, or the surface's back."""
-        reach_m = np.linalg.norm(points_m, axis=1)
-        rays = points_m / reach_m[:, None]
-        met = self._bodies.visible_surfaces(rays, T_bodies_camera)
-        hidden: Mask = (met.surface != surface) & (met.distance_m < reach_m * (1 - DEPTH_TOLERANCE))
-        other = np.flatnonzero((met.surface != surface) & ~hidden)
-        body = self._bodies.of_surface[surface[other]]
-        for index in np.unique(body):
-            these = other[body == index]
-            turned = turn(of(T_bodies_camera[index], these), rays[these])
-            hidden[these] = np.einsum("ri,ri->r", turned, self._bodies.normals[surface[these]]) >= 0
+    def _hidden(self, there: ShotTransforms, pixels: Pixels, next_m: Array, rows: Array) -> Mask:
+        """Whether the next camera, with the points (P, 3) of pixels before it, sees backs or something nearer."""
+        T_bodies_there, face = at_rows(there.T_bodies_camera, rows), self._face[pixels]
+        origins, way = into(T_bodies_there[0], next_m)
+        eye_m = origins.copy()
+        for body, these in self._seen_movers(face):
+            eye_m[these] = of(T_bodies_there[body], these)[..., :3, 3]
+        hidden: Mask = dot(self._bodies.normals[face], eye_m) <= self._bodies.offsets_m[face]
+        T_bodies_world = at_rows(there.T_bodies_world, rows)
+        reach = np.where(hidden, np.float32(-1), np.float32(1 - DEPTH_TOLERANCE))
+        met = self._bodies.blocked(origins.astype(np.float32), way.astype(np.float32), T_bodies_world, reach)
+        doubtful = np.flatnonzero(met)  # backs and places within float32's reach are no hindrance
+        reach_m = np.linalg.norm(next_m[doubtful], axis=1)
+        seen = self._bodies.visible(next_m[doubtful] / reach_m[:, None], [of(T, doubtful) for T in T_bodies_there])
+        hidden[doubtful] = seen.distance_m < reach_m * (1 - DEPTH_TOLERANCE)
         return hidden
-
-    def _movers(self, pixels: Pixels | None = None) -> list[tuple[int, Pixels]]:
-        """The movers that some pixels (None: all) see, and which of these see each."""
-        if self._body is None:
-            return []
-        body = self._body if pixels is None else self._body[pixels]
-        return [(int(b), np.flatnonzero(body == b)) for b in np.unique(body) if b]
 
 
 __all__ = ["Shot", "TruthCaster"]
 
-BAND_ROWS = 3 * TILE_PX  # worked on at a time: their arrays stay in the processor's cache
+BAND_ROWS = 60  # worked on at a time: their arrays stay in the processor's cache
 THREADS = max(1, min(2, os.cpu_count() or 1))
 
 
@@ -357,17 +275,23 @@ class TruthCaster:
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._bodies = scene, Bodies(scene)
-        surfaces = self._bodies.surfaces
-        things = ["", *(mover.name for mover in scene.movers)]
-        instances = [things[b] or s.instance for b, s in zip(self._bodies.of_surface, surfaces, strict=True)]
-        materials = [s.material for s in surfaces]
+        faces = self._bodies.faces
+        movers = dict(zip(faces.thing.tolist(), faces.mover.tolist(), strict=True))
+        instances = [
+            thing.name if movers.get(nth, -1) < 0 else scene.movers[movers[nth]].name
+            for nth, thing in enumerate(faces.things)
+        ]
+        materials = [thing.material for thing in faces.things]
         self.names = TruthNames(_table(instances), _table(materials))
-        kinds = [*(scene.materials.get(name) for name in materials), None]
-        self._ids_of = SurfaceIds(
-            _ids(instances, self.names.instance),
-            _ids(materials, self.names.material),
-            np.array([isinstance(kind, Mirror | Polished) for kind in kinds]),
-            np.array([isinstance(kind, Matt | Polished) for kind in kinds]),
+        kinds = [scene.materials.get(name) for name in materials]
+        mirrors = [m is not None and (m.kind == "mirror" or m.is_coated or m.metal > 0) for m in kinds]
+        matt = [m is not None and m.kind == "body" and m.metal < 1 for m in kinds]
+        thing = np.append(faces.thing, len(faces.things))  # the last one is nothing, for the face -1
+        self._ids_of = FaceIds(
+            _ids(instances, self.names.instance)[thing],
+            _ids(materials, self.names.material)[thing],
+            np.array([*mirrors, False])[thing],
+            np.array([*matt, False])[thing] & (np.append(faces.lamp, -1) < 0),
         )
         self._pool = ThreadPoolExecutor(THREADS)
 
@@ -381,9 +305,9 @@ class TruthCaster:
         height, width = camera.height_px, camera.width_px
         wanted = {name: CHANNELS[name] for name in check_channels(channels)}
         values: dict[str, Any] = {name: np.empty(c.shape(height, width), c.dtype) for name, c in wanted.items()}
-        lit = lamps(self._scene, int(np.mean(now.t_ns))) if "shadow" in wanted else ()
+        lit = lamps(self._scene, self._bodies, int(np.mean(now.t_ns))) if "shadow" in wanted else ()
         there = shot_transforms(self._bodies, later) if later else None
-        whole = tile_plan(self._bodies, camera, shot_transforms(self._bodies, now), there, lit)
+        whole = Picture(self._bodies, camera, shot_transforms(self._bodies, now), there, tuple(lit))
 
         def fill(rows: slice) -> None:
             for name, found in Band(whole, self._ids_of, rows).values(tuple(wanted)).items():
@@ -399,5 +323,6 @@ def _table(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def _ids(names: Sequence[str], table: Sequence[str]) -> NDArray[np.uint16]:
-    """The names' places in a table (S + 1,); the last one is nothing, for the surface -1."""
-    return np.array([*(table.index(name) for name in names), 0], np.uint16)
+    """The names' places in a table (S + 1,); the last one is nothing."""
+    place = {name: nth for nth, name in enumerate(table)}
+    return np.array([*(place[name] for name in names), 0], np.uint16)

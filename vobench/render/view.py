@@ -1,7 +1,7 @@
 """Views of a camera as matrices, and of its images behind planar mirrors."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -46,31 +46,39 @@ class Plane:
         return tuple(float(x) + 0.0 for x in np.round([*self.normal, self.offset_m], 5))
 
 
-def visible_box(camera: Pinhole, quads_camera_m: Array, within: Box, *, near_m: float) -> Box | None:
-    """Columns and rows (first, end, first, end) that quads (K, 4, 3) can touch, None for none.
+NEAR_M = 0.05
+
+
+def visible_boxes(camera: Pinhole, outlines_camera_m: Array) -> Array:
+    """First and end column, first and end row (M, 4) that convex outlines (M, K, 3) can touch, none where first >= end.
 
     Edges are cut at the near plane, behind which a projection has no meaning.
     """
-    here, there = quads_camera_m.reshape(-1, 3), np.roll(quads_camera_m, -1, axis=1).reshape(-1, 3)
-    z0, z1 = here[:, 2] - near_m, there[:, 2] - near_m
+    here, there = outlines_camera_m, np.roll(outlines_camera_m, -1, axis=1)
+    z0, z1 = here[..., 2] - NEAR_M, there[..., 2] - NEAR_M
     crossing = (z0 < 0) != (z1 < 0)
-    share = (z0[crossing] / (z0[crossing] - z1[crossing]))[:, None]
-    cut = here[crossing] + share * (there[crossing] - here[crossing])
-    points = np.concatenate([here[z0 >= 0], cut])
-    if len(points) == 0:
-        return None
-    u = points[:, 0] / points[:, 2] * camera.fx_px + camera.cx_px
-    v = points[:, 1] / points[:, 2] * camera.fy_px + camera.cy_px
-    limits = np.array([u.min() - 1, u.max() + 2, v.min() - 1, v.max() + 2])
-    box = np.floor(np.clip(limits, -1e6, 1e6)).astype(int).tolist()
-    u0, v0 = np.maximum(box[::2], within[::2]).tolist()
-    u1, v1 = np.minimum(box[1::2], within[1::2]).tolist()
-    return (u0, u1, v0, v1) if u0 < u1 and v0 < v1 else None
+    share = np.where(crossing, z0 / np.where(crossing, z0 - z1, 1), 0)[..., None]
+    points = np.concatenate([here, here + share * (there - here)], 1)
+    ahead = np.concatenate([z0 >= 0, crossing], 1)
+    z = np.where(ahead, points[..., 2], 1)
+    u, v = (
+        np.clip(points[..., axis] / z * focal + centre, -1e6, 1e6)
+        for axis, focal, centre in ((0, camera.fx_px, camera.cx_px), (1, camera.fy_px, camera.cy_px))
+    )
+    low = [np.where(ahead, x, np.inf).min(1) - 1 for x in (u, v)]
+    high = [np.where(ahead, x, -np.inf).max(1) + 2 for x in (u, v)]
+    return np.asarray(np.floor(np.stack([low[0], high[0], low[1], high[1]], -1)))
 
 
-NEAR_M, FAR_M = 0.05, 60.0
+def within(box: Sequence[float], other: Sequence[float]) -> Box | None:
+    """What two boxes share, None for nothing."""
+    u0, v0, u1, v1 = max(box[0], other[0]), max(box[2], other[2]), min(box[1], other[1]), min(box[3], other[3])
+    return (int(u0), int(u1), int(v0), int(v1)) if u0 < u1 and v0 < v1 else None
+
+
 STATIC = -1
 IDENTITY = np.eye(4)
+NO_GLINTS = np.zeros((0, 3, 4))
 # OpenCV's camera faces +z with y down, OpenGL's -z with y up.
 T_CV_GL = np.diag([1.0, -1.0, -1.0, 1.0])
 
@@ -79,21 +87,23 @@ T_CV_GL = np.diag([1.0, -1.0, -1.0, 1.0])
 class PinholeView:
     """A pinhole at a place and time, perhaps by way of mirrors: then the picture is what the last one shows.
 
-    Movers' poses T_world_mover, the skies' coefficients, ambient_cd_m2 for mirrors that are not followed further.
-    view_projection (4, 4): from the world to OpenGL's screen, and `direct` (4, 4) as if there were no mirrors.
+    Movers' poses T_world_mover, the skies' coefficients (S, 4, 4), ambient_cd_m2 (3,) for mirrors that are not
+    followed further. view_projection (4, 4): from the world to OpenGL's screen, nearness from 1 at NEAR_M to 0;
+    `direct` (4, 4) as if there were no mirrors.
     eye_m (3,) is behind the last mirror, if any.
-    images (4, 4) takes what the last mirror shows to where the camera sees it.
+    images (4, 4) takes what the last mirror shows to where the camera sees it. glints (G, 3, 4) as in `probe`.
     """
 
     camera: Pinhole
     T_world_camera: Array
     T_world_movers: Sequence[Array]
     skies: Array
-    ambient_cd_m2: float
+    ambient_cd_m2: Array
     eye_m: Array
     direct: Array
     view_projection: Array
     images: Array
+    glints: Array = field(default_factory=lambda: NO_GLINTS)
     mirrors: tuple[Plane, ...] = ()
 
     def through(self, mirror: Plane) -> "PinholeView":
@@ -141,19 +151,30 @@ class PinholeView:
 
 
 def pinhole_view(
-    camera: Pinhole, T_world_camera: Array, T_world_movers: Sequence[Array], skies: Array, ambient_cd_m2: float
+    camera: Pinhole,
+    T_world_camera: Array,
+    T_world_movers: Sequence[Array],
+    skies: Array,
+    *,
+    ambient_cd_m2: Array,
+    glints: Array = NO_GLINTS,
 ) -> PinholeView:
     """The view without a mirror."""
     direct = _projection(camera) @ T_CV_GL @ se3.inverse(T_world_camera)
     eye_m = T_world_camera[:3, 3]
-    return PinholeView(camera, T_world_camera, T_world_movers, skies, ambient_cd_m2, eye_m, direct, direct, IDENTITY)
+    return PinholeView(
+        camera, T_world_camera, T_world_movers, skies, ambient_cd_m2, eye_m, direct, direct, IDENTITY, glints
+    )
 
 
 def _projection(camera: Pinhole) -> Array:
-    """From OpenGL's camera to its screen (4, 4), which counts from the corner of the top-left pixel."""
+    """From OpenGL's camera to its screen (4, 4), which counts from the corner of the top-left pixel.
+
+    Depth is NEAR_M over the distance ahead: floats are then as fine far away as near by (Reed, 2015).
+    """
     P = np.zeros((4, 4))
     P[0, 0], P[0, 2] = 2 * camera.fx_px / camera.width_px, 1 - 2 * (camera.cx_px + 0.5) / camera.width_px
     P[1, 1], P[1, 2] = 2 * camera.fy_px / camera.height_px, 2 * (camera.cy_px + 0.5) / camera.height_px - 1
-    P[2, 2:] = (FAR_M + NEAR_M) / (NEAR_M - FAR_M), 2 * FAR_M * NEAR_M / (NEAR_M - FAR_M)
+    P[2, 3] = NEAR_M
     P[3, 2] = -1
     return P

@@ -64,10 +64,11 @@ class Warp:
     at_column: Radiance
     at_row: Radiance
 
-    def blank(self) -> Radiance:
-        """An empty atlas."""
+    def blank(self, channels: int) -> Radiance:
+        """An empty atlas (rows, columns), of three channels (rows, columns, 3)."""
         cameras = [face.camera for face in self.faces]
-        return np.zeros((sum(c.height_px for c in cameras), max(c.width_px for c in cameras)), np.float32)
+        size = sum(c.height_px for c in cameras), max(c.width_px for c in cameras)
+        return np.zeros(size if channels == 1 else (*size, channels), np.float32)
 
     def put(self, atlas: Radiance, face: Face, box: Box, picture: Radiance) -> None:
         """Lay a box of a face's picture into the atlas."""
@@ -75,7 +76,7 @@ class Warp:
         atlas[face.row + top : face.row + bottom, first:end] = picture
 
     def picture(self, atlas: Radiance, rows: slice) -> Radiance:
-        """Rows of the lens's picture (rows, W); black where it has no rays."""
+        """Rows of the lens's picture (rows, W) or (rows, W, 3); black where it has no rays."""
         points = slice(rows.start * POINTS, rows.stop * POINTS)
         mapped = cv2.remap(
             atlas, self.at_column[points], self.at_row[points], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT

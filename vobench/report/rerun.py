@@ -25,6 +25,7 @@ from vobench.run.frames import read_frames
 from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.sensor.pixel_truth import CHANNELS, TruthNames, picture
 from vobench.sequence import EncodedFrame, Sequence, StereoTruth, read_truth_frames, read_truth_names, truth_channels
+from vobench.sequence.picture import BAYER, RGB, decode, encode, rgb
 from vobench.trajectory.align import Alignment
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
@@ -208,10 +209,18 @@ def _log_pictures(stream: rr.RecordingStream, frames: Iterable[EncodedFrame]) ->
         times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
         pictures = ((bp.TRUTH_LEFT, frame.left), (bp.TRUTH_RIGHT, frame.right))
         for entity, encoded in ((entity, encoded) for entity, encoded in pictures if encoded is not None):
-            columns = rr.EncodedImage.columns(blob=[encoded], media_type=[f"image/{frame.form}"])
+            columns = rr.EncodedImage.columns(blob=[_shown(encoded, frame)], media_type=[f"image/{frame.form}"])
             stream.send_columns(f"{entity}/image", times, columns)
         stamps.append(frame.t_ns)
     return np.array(stamps, np.int64)
+
+
+def _shown(encoded: bytes, frame: EncodedFrame) -> bytes:
+    """The picture as people look at it: a mosaic interpolated."""
+    if frame.colour != BAYER:
+        return encoded
+    picture = rgb(decode(encoded, None, f"frame {frame.index}"), BAYER)
+    return encode(picture, None, f"frame {frame.index}", jpeg_quality=None if frame.form == "png" else 95, colour=RGB)
 
 
 def _log_paths(log: _Log, trial: TrialView) -> None:

@@ -1,11 +1,12 @@
 """Sequence to estimate: an estimator is fed frame by frame; poses, frames and tracks are kept as files."""
 
+import csv
 import io
 import json
 import zipfile
 from collections.abc import Iterator
-from contextlib import ExitStack
-from dataclasses import fields
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -21,6 +22,7 @@ from vobench.geometry.se3 import Array
 from vobench.run.frames import ANSWER_COLUMNS, ANSWERS, TIME_COLUMNS, TIMES, new_table
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import Sequence, StereoFrame
+from vobench.sequence.picture import grey, rgb
 from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
 
@@ -64,10 +66,10 @@ def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress"
     """Feed a sequence to a trial's estimator; whatever happens, the folder is complete afterwards."""
     sequence, outcome = Sequence.open(recording), Outcome(kind=FINISHED, reason="")
     (folder / LOG).touch()
-    with _Keeper(folder, sequence.rig, trial.entrant.manifest.pose_of) as keeper:
+    with _keeper(folder, sequence.rig, trial.entrant.manifest.pose_of) as keeper:
         try:
             _check_needs(trial.entrant.manifest.needs, sequence)
-            _feed(trial, sequence, keeper, progress)
+            _feed(trial, sequence, keeper, progress, folder / LOG)
         except EstimatorFailure as failure:
             outcome = Outcome(kind=failure.kind, reason=failure.reason)
     (folder / OUTCOME).write_text(outcome.model_dump_json(), encoding="utf-8")
@@ -86,9 +88,9 @@ def _check_needs(needs: tuple[str, ...], sequence: Sequence) -> None:
             raise EstimatorFailure("refused", f"it needs {need!r}, but this recording has {short}")
 
 
-def _feed(trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Progress") -> None:
+def _feed(trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Progress", log: Path) -> None:
     """Start the estimator, hand it frame after frame, and keep what it says. Raises EstimatorFailure."""
-    entrant, manifest, log = trial.entrant, trial.entrant.manifest, keeper.folder / LOG
+    entrant, manifest = trial.entrant, trial.entrant.manifest
     with EstimatorProcess(entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=LIMITS) as process:
         process.start(sequence.rig, entrant.params, trial.repeat)
         for frame in progress.track(_frames(sequence, manifest.needs), trial.name, total=len(sequence)):
@@ -101,9 +103,10 @@ def _frames(sequence: Sequence, needs: tuple[str, ...]) -> Iterator[Frame]:
     imu = sequence.imu() if "imu" in needs else None
     last_ns = np.iinfo(np.int64).min
     # Pictures that nobody asked for are not decoded.
-    looks, stereo = "stereo" in needs or "mono" in needs, "stereo" in needs
+    looks, stereo, shown = "stereo" in needs or "mono" in needs, "stereo" in needs, rgb if "colour" in needs else grey
     for f in sequence.frames(right=stereo) if looks else sequence.encoded_frames():
-        left, right = (f.left, f.right) if isinstance(f, StereoFrame) else (None, None)
+        seen = (f.left, f.right) if isinstance(f, StereoFrame) else (None, None)
+        left, right = (image if image is None else shown(image, f.colour) for image in seen)
         yield Frame(f.index, f.t_ns, left, right, _between(encoders, last_ns, f.t_ns), _between(imu, last_ns, f.t_ns))
         last_ns = f.t_ns
 
@@ -116,49 +119,48 @@ def _between(readings: Readings | None, last_ns: int, now_ns: int) -> Readings |
     return type(readings)(*(getattr(readings, field.name)[first:end] for field in fields(readings)))
 
 
+@dataclass(frozen=True, slots=True)
 class _Keeper:
     """Writes what an estimator says as it says it: memory does not grow with the sequence's length."""
 
-    def __init__(self, folder: Path, rig: Rig, pose_of: str) -> None:
-        self.folder = folder
-        # An estimate file holds poses of the left camera, in the left camera's frame at the start.
-        self._T_frame_left = np.eye(4) if pose_of == "left_camera" else rig.T_body_left
-        self._poses: list[tuple[int, Array]] = []
+    T_frame_left: Array
+    answers: "csv.DictWriter[str]"
+    times: "csv.DictWriter[str]"
+    tracks: zipfile.ZipFile
+    poses: list[tuple[int, Array]] = field(default_factory=list)
 
     def keep(self, frame: Frame, answer: Answer) -> None:
         """Add one frame."""
         r = answer.result
         if r.T_odom_frame is not None and r.status is not Status.LOST:
-            T = se3.inverse(self._T_frame_left) @ r.T_odom_frame @ self._T_frame_left
-            self._poses.append((frame.t_ns, T))
+            T = se3.inverse(self.T_frame_left) @ r.T_odom_frame @ self.T_frame_left
+            self.poses.append((frame.t_ns, T))
         stats = json.dumps({key: float(f"{value:.6g}") for key, value in sorted(r.stats.items())})
         answered = {"frame": frame.index, "status": str(r.status), "reason": r.reason, "stats": stats}
-        self._times.writerow(
-            {"frame": frame.index, "wall_ms": f"{answer.wall_ms:.3f}", "cpu_ms": f"{answer.cpu_ms:.3f}"}
-        )
+        cost = {"wall_ms": f"{answer.wall_ms:.3f}", "cpu_ms": f"{answer.cpu_ms:.3f}"}
+        self.times.writerow({"frame": frame.index, **cost})
         if r.tracks is None:
-            self._answers.writerow(answered)
+            self.answers.writerow(answered)
         else:
             inlier = r.tracks.inlier
-            self._answers.writerow({**answered, "tracks": len(inlier), "inliers": int(inlier.sum())})
-            self._tracks.writestr(_member(frame.index), _table(r.tracks))
+            self.answers.writerow({**answered, "tracks": len(inlier), "inliers": int(inlier.sum())})
+            self.tracks.writestr(_member(frame.index), _table(r.tracks))
 
-    def __enter__(self) -> "_Keeper":
-        with ExitStack() as opened:
-            self._answers = opened.enter_context(new_table(self.folder / ANSWERS, ANSWER_COLUMNS))
-            self._times = opened.enter_context(new_table(self.folder / TIMES, TIME_COLUMNS))
-            archive = zipfile.ZipFile(self.folder / TRACKS, "w", zipfile.ZIP_DEFLATED)
-            self._tracks = opened.enter_context(archive)
-            self._opened = opened.pop_all()
-        return self
 
-    def __exit__(self, *_: object) -> None:
-        self._opened.close()
-        text = ""
-        if self._poses:
-            stamps = np.array([t for t, _ in self._poses], np.int64)
-            text = format_tum(Trajectory(stamps, np.stack([T for _, T in self._poses])))
-        (self.folder / ESTIMATE).write_text(text, encoding="utf-8")
+@contextmanager
+def _keeper(folder: Path, rig: Rig, pose_of: str) -> Iterator[_Keeper]:
+    """A keeper while an estimator runs; then the file of poses: the left camera's, in its frame at the start."""
+    with (
+        new_table(folder / ANSWERS, ANSWER_COLUMNS) as answers,
+        new_table(folder / TIMES, TIME_COLUMNS) as times,
+        zipfile.ZipFile(folder / TRACKS, "w", zipfile.ZIP_DEFLATED) as tracks,
+    ):
+        T_frame_left = np.eye(4) if pose_of == "left_camera" else rig.T_body_left
+        keeper = _Keeper(T_frame_left, answers, times, tracks)
+        yield keeper
+    stamps = np.array([t for t, _ in keeper.poses], np.int64)
+    text = format_tum(Trajectory(stamps, np.stack([T for _, T in keeper.poses]))) if keeper.poses else ""
+    (folder / ESTIMATE).write_text(text, encoding="utf-8")
 
 
 def _member(index: int) -> zipfile.ZipInfo:

@@ -123,7 +123,9 @@ def make_run(root: Path, suite: str, key: str, fill: Callable[[RunFolder], None]
     with unfinished(parent) as folder:
         fill(RunFolder(folder))
         final = _published(folder, parent / f"{datetime.now(UTC):%Y%m%dT%H%M%S}_{key[:8]}")
-        _point(parent / "latest", final.name)
+        fresh = parent / f".latest-{os.getpid()}"
+        fresh.symlink_to(final.name)
+        fresh.replace(parent / "latest")  # in one step
     return RunFolder(final)
 
 
@@ -137,13 +139,6 @@ def _published(folder: Path, name: Path) -> Path:
             if not final.is_dir():
                 raise
     raise AssertionError
-
-
-def _point(link: Path, target: str) -> None:
-    """Make a link point elsewhere in one step."""
-    fresh = link.with_name(f".{link.name}-{os.getpid()}")
-    fresh.symlink_to(target)
-    fresh.replace(link)
 
 
 def read_tum(path: Path) -> Trajectory:

@@ -5,7 +5,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from pydantic import TypeAdapter
 
 from vobench.errors import InputError
 
@@ -70,18 +72,11 @@ def read_frames(folder: Path) -> list[FrameRow]:
     if not (folder / TIMES).is_file():
         raise InputError(f"a run of an older vobench, without a table of times; run the suite again: {folder}")
     times = {row["frame"]: row for row in read_table(folder / TIMES)}
-    nothing = dict.fromkeys(TIME_COLUMNS, "")
-    return [_row({**nothing, **times.get(row["frame"], {}), **row}) for row in read_table(folder / FRAMES)]
-
-
-def _row(cells: Mapping[str, str]) -> FrameRow:
-    kinds: dict[str, Any] = {field.name: field.type for field in fields(FrameRow)}
-    values: dict[str, Any] = {name: cells[name] for name in kinds}
-    for name, kind in kinds.items():
-        if kind is not str:
-            number = int if kind in (int, int | None) else float
-            values[name] = number(cells[name]) if cells[name] else None
-    return FrameRow(**values)
+    nothing = {field.name: "" if field.type is str else None for field in fields(FrameRow)}
+    untimed = dict.fromkeys(TIME_COLUMNS, "")
+    rows = [{**untimed, **times.get(row["frame"], {}), **row} for row in read_table(folder / FRAMES)]
+    known = [{name: row[name] or empty for name, empty in nothing.items()} for row in rows]
+    return TypeAdapter(list[FrameRow]).validate_python(known)
 
 
 @contextmanager

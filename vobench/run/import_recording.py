@@ -9,7 +9,7 @@ from vobench.dataset.recording import NO_TRUTH, ReadOptions, Recording, Topics
 from vobench.errors import SuiteError
 from vobench.run.ground_truth import is_known
 from vobench.run.key import versions
-from vobench.suite.source import RecordedCase
+from vobench.suite.source import FILE_KEYS, RecordedCase
 from vobench.suite.suite import Plan
 from vobench.suite.yaml_file import plain
 
@@ -46,18 +46,9 @@ def read_case(case: RecordedCase) -> Recording:
     from vobench.dataset.layout import read
 
     source = case.source
-    options = ReadOptions(
-        calibration=_path(source.calibration),
-        imu=_path(source.imu),
-        truth=_path(source.truth),
-        rate_hz=source.rate_hz,
-        topics=Topics(**source.topics),
-    )
+    files: dict[str, Any] = {key: Path(file) for key in FILE_KEYS if (file := getattr(source, key))}
+    options = ReadOptions(**files, rate_hz=source.rate_hz, topics=Topics(**source.topics))
     return read(Path(source.path), form=source.form, options=options)
-
-
-def _path(file: str | None) -> Path | None:
-    return None if file is None else Path(file)
 
 
 def import_recording(recording: Recording, folder: Path) -> None:

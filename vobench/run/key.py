@@ -6,6 +6,7 @@ import marshal
 import os
 import platform
 import re
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,11 +16,21 @@ from pathlib import Path
 from types import CodeType
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from vobench import __version__
 
 PACKAGE = Path(__file__).resolve().parents[1]
+# What reads modules: this Python and this file.
+READER = hashlib.sha256(sys.version.encode() + Path(__file__).read_bytes()).digest()
 # Imports that only a type checker sees: no result depends on them.
 TYPES_ONLY = re.compile(rb"^if TYPE_CHECKING:\n(?:(?: .*)?\n)+", re.MULTILINE)
+
+
+def cache_folder() -> Path:
+    """$VOBENCH_CACHE, or vobench/ in the user's cache folder."""
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return Path(os.environ.get("VOBENCH_CACHE") or home / "vobench")
 
 
 def canonical(inputs: Mapping[str, Any]) -> str:
@@ -100,6 +111,9 @@ class Module:
     imports: frozenset[str]
 
 
+MODULE = TypeAdapter(Module)
+
+
 def closure(entries: Iterable[str], *, package: Path = PACKAGE) -> dict[str, Module]:
     """All modules that these import, themselves included, by name.
 
@@ -124,6 +138,20 @@ def _modules(package: Path) -> dict[str, Path]:
 
 @cache
 def _module(source: bytes) -> Module:
+    """What a source says, compiled once for all processes: the cache folder may be without it, or broken."""
+    known = cache_folder() / "modules" / hashlib.sha256(READER + source).hexdigest()
+    with suppress(OSError, ValueError):
+        return MODULE.validate_json(known.read_bytes(), strict=True)
+    module = _compiled(source)
+    with suppress(OSError):
+        known.parent.mkdir(parents=True, exist_ok=True)
+        part = known.with_suffix(f".{os.getpid()}")
+        part.write_bytes(MODULE.dump_json(module))
+        part.replace(known)
+    return module
+
+
+def _compiled(source: bytes) -> Module:
     # optimize=2 leaves docstrings out; asserts go too, which change no result.
     bare = _bare(compile(TYPES_ONLY.sub(b"", source), "", "exec", optimize=2, dont_inherit=True))
     # The second form of marshal has no references, which depend on what else the process holds.

@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,8 @@ from vobench.motion.pioneer import Theta, feed_forward
 from vobench.motion.replay import Replay
 from vobench.motion.slip import DISTURBANCE_STREAMS, Generators
 from vobench.motion.wheeled import Wheeled
-from vobench.suite.scene_file import movers
+from vobench.render.geometry import RayCaster
+from vobench.scene.mesh import Thing, Triangles, table
 from vobench.suite.suite import Case, Plan
 from vobench.suite.trajectory import TrajectorySpec
 from vobench.suite.yaml_file import Mistakes, checked
@@ -42,6 +44,7 @@ NS_PER_S = 1e9
 ENCODERS_PER_FRAME = 4
 # Nearly two hours at 30 Hz.
 MOST_FRAMES = 200_000
+UP_M = 1e3
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,10 +183,14 @@ def check_cases(cases: Sequence[Case], travel: BodyMotion, wrong: Mistakes) -> N
     """Gather why these cases of one trajectory cannot be: `travel` is the trajectory's."""
     trajectory = cases[0].variant["trajectory"]
     with wrong.at("trajectories", trajectory):
-        _check_lasts(cases[0], travel)
+        if len(travel.t_ns) < 2:
+            raise MotionError(
+                f"the way ends within its first frame at {cases[0].trajectory.rate_hz:g} Hz: one picture shows no "
+                "motion; go further, more slowly or with a higher rate_hz"
+            )
     for case, *_ in _by(cases, "scene", "rig").values():
         with wrong.at("trajectories", trajectory):
-            _check_in_room(case, travel)
+            _check_clear(case, travel)
             _check_smooth(case)
     for camera, (case, *_) in _by(cases, "camera").items():
         with wrong.at("cameras", camera):
@@ -196,15 +203,6 @@ def _by(cases: Sequence[Case], *axes: str) -> dict[str, list[Case]]:
     for case in cases:
         of.setdefault(" ".join(case.variant[axis] for axis in axes), []).append(case)
     return of
-
-
-def _check_lasts(case: Case, travel: BodyMotion) -> None:
-    """Raise MotionError where there would be a single picture."""
-    if len(travel.t_ns) < 2:
-        raise MotionError(
-            f"the way ends within its first frame at {case.trajectory.rate_hz:g} Hz: one picture shows no motion; "
-            "go further, more slowly or with a higher rate_hz"
-        )
 
 
 def _check_smooth(case: Case) -> None:
@@ -229,28 +227,51 @@ def _check_fits_frame(case: Case) -> None:
             )
 
 
-def _check_in_room(case: Case, travel: BodyMotion) -> None:
-    rig, room, T_world_body = case.build_rig(), case.scene.room, travel.at_frames().T_world_body
+def _check_clear(case: Case, travel: BodyMotion) -> None:
+    """Raise MotionError where a camera leaves the room, starts inside a thing or goes through one."""
+    rig, room, scene = case.build_rig(), case.scene.room, case.build_scene()
+    T_world_body = travel.at_frames().T_world_body
     for T_body_camera in map(rig.T_body_camera, rig.sides):
         at_m = (T_world_body @ T_body_camera)[:, :3, 3]
-        outside = ~room.holds(at_m)
-        is_under = at_m[np.argmax(outside), 2] <= 0
-        _refuse(case, travel, at_m, outside, "is under the floor" if is_under else f"leaves the room ({room.extent})")
-        for b in case.scene.boxes:
-            T_world_box = se3.transform(se3.rotation_z(np.deg2rad(b.yaw_deg)), b.center_m)
-            inside = _within(at_m, T_world_box, b.size_m)
-            _refuse(case, travel, at_m, inside, f"is inside the box of {b.material} at {b.center_m} m")
-        for spec, mover in zip(case.scene.movers, movers(case.scene), strict=True):
-            T_world_mover = np.stack([mover.path.pose(t_ns) for t_ns in travel.t_ns])
-            inside = _within(at_m, T_world_mover, spec.size_m)
-            _refuse(case, travel, at_m, inside, f"is inside the mover '{spec.name}'")
+        if room:
+            outside = ~room.holds(at_m)
+            is_under = at_m[np.argmax(outside), 2] <= 0
+            what = "is under the floor" if is_under else f"leaves the room ({room.extent})"
+            _refuse(case, travel, at_m, outside, what)
+        _refuse_met(case, travel, at_m, scene.things, at_m)
+        for mover in scene.movers:
+            poses = np.stack([mover.path.pose(t_ns) for t_ns in travel.t_ns])
+            _refuse_met(case, travel, at_m, mover.things, se3.apply(se3.inverse(poses), at_m[:, None])[:, 0])
 
 
-def _within(at_m: Array, T_world_box: Array, size_m: tuple[float, float, float]) -> NDArray[np.bool_]:
-    """Which points (N, 3) are within a box around the origin of its frame, (4, 4) or (N, 4, 4)."""
-    in_box_m = se3.apply(se3.inverse(T_world_box), at_m[:, None])[:, 0]
-    within: NDArray[np.bool_] = np.all(np.abs(in_box_m) <= np.array(size_m) / 2, axis=-1)
-    return within
+def _refuse_met(case: Case, travel: BodyMotion, at_m: Array, things: tuple[Thing, ...], own_m: Array) -> None:
+    """Raise MotionError where a way, own_m (N, 3) in the things' frame, goes through one of them."""
+    if things:
+        faces, _ = _solid(things)
+        met = _met(things, own_m)
+        name = faces.things[faces.thing[met[np.argmax(met >= 0)]]].name
+        _refuse(case, travel, at_m, met >= 0, f"runs into '{name}'")
+
+
+def _met(things: tuple[Thing, ...], at_m: Array) -> NDArray[np.int32]:
+    """The face (N,) that each way from a place (N, 3) to the next goes through, -1 for none.
+
+    The last entry is of the first place: the back that it sees straight above, from inside a thing.
+    """
+    faces, caster = _solid(things)
+    ways = np.append(np.diff(at_m, axis=0), [[0.0, 0.0, UP_M]], axis=0)
+    hits = caster.hits(np.append(at_m[:-1], at_m[:1], axis=0), ways)
+    met = np.where(hits.distance <= 1, hits.face, -1)
+    if met[-1] >= 0 and faces.plane[met[-1], 2] <= 0:
+        met[-1] = -1
+    return np.asarray(np.roll(met, 1), np.int32)
+
+
+@lru_cache(maxsize=8)
+def _solid(things: tuple[Thing, ...]) -> tuple[Triangles, RayCaster]:
+    """The faces of things in one frame, and rays against them; kept, as many cases share a scene."""
+    faces = table(things, [-1] * len(things), [-1] * len(things))
+    return faces, RayCaster(faces, np.arange(len(faces)))
 
 
 def _refuse(case: Case, travel: BodyMotion, at_m: Array, wrong: NDArray[np.bool_], what: str) -> None:

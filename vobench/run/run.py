@@ -81,14 +81,11 @@ def _gather(task: Task, cases: Mapping[str, Case | RecordedCase], store: Path, f
 
 def _gather_case(case: Case | RecordedCase, sequence: Path, target: Path) -> None:
     target.mkdir(parents=True)
-    write_json(target / CASE, {**plain(case), **_assumed(case, sequence)})
+    # Of a recording: all that its import assumed, converted or dropped.
+    assumed = {"import": read_import_notes(sequence)} if isinstance(case, RecordedCase) else {}
+    write_json(target / CASE, {**plain(case), **assumed})
     copyfile(sequence / GROUND_TRUTH, target / GROUND_TRUTH)
     (target / SEQUENCE).symlink_to(sequence.resolve())
-
-
-def _assumed(case: Case | RecordedCase, sequence: Path) -> dict[str, dict[str, str]]:
-    """Of a recording: all that its import assumed, converted or dropped."""
-    return {"import": read_import_notes(sequence)} if isinstance(case, RecordedCase) else {}
 
 
 def _entrant_facts(entrant: Entrant) -> dict[str, Any]:

@@ -40,7 +40,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
         frames=len(gt),
         path_m=float(gt.distances_m()[-1]),
         score=scored.as_dict() if scored else None,
-        drift_m=_drift_m(estimate) if scored and stands_still(gt) else None,
+        drift_m=_extent_m(read_tum(estimate / ESTIMATE)) if scored and stands_still(gt) else None,
     )
     write_json(folder / SCORE, score.model_dump(mode="json"))
     write_frames(sequence, estimate, scored, folder)
@@ -50,10 +50,6 @@ def stands_still(gt: Trajectory) -> bool:
     """Whether the truth stays within 2 mm and 0.2° of its first pose: an error of its path would mean nothing."""
     turned_rad = se3.rotation_angle(se3.inverse(gt.T_world_frame[:1])[:, :3, :3] @ gt.T_world_frame[:, :3, :3])
     return bool(_extent_m(gt) <= STILL_M and np.max(turned_rad) <= STILL_RAD)
-
-
-def _drift_m(estimate: Path) -> float:
-    return _extent_m(read_tum(estimate / ESTIMATE))
 
 
 def _extent_m(trajectory: Trajectory) -> float:

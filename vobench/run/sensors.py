@@ -3,12 +3,11 @@
 import numpy as np
 
 from vobench.geometry.rig import Side
-from vobench.motion.wheeled import Wheeled
+from vobench.motion.wheeled import ENCODERS, Wheeled, ticks
 from vobench.render.occlusion import Shot
 from vobench.render.truth import TruthCaster
 from vobench.run.motion import BodyMotion, generator
 from vobench.scene.scene import Scene
-from vobench.sensor.encoder import ENCODERS, ticks
 from vobench.sensor.exposure import row_stamps
 from vobench.sensor.imu import STREAMS, ImuBias, ImuReadings, measure
 from vobench.sensor.pixel_truth import TruthFrame, TruthNames
@@ -38,7 +37,11 @@ class SensorFeed:
 
     def _write_imu(self, t_ns: int, writer: SequenceWriter) -> None:
         if self._imu:
-            _write_imu(*self._imu, _between(self._imu[0].t_ns, self._last_ns, t_ns), writer)
+            readings, bias = self._imu
+            new = _between(readings.t_ns, self._last_ns, t_ns)
+            writer.write_imu(ImuReadings(readings.t_ns[new], readings.gyro_radps[new], readings.accel_mps2[new]))
+            for row in zip(bias.t_ns[new].tolist(), bias.gyro_radps[new], bias.accel_mps2[new], strict=True):
+                writer.write_imu_bias(*row)
         self._last_ns = t_ns
 
 
@@ -51,17 +54,8 @@ def _counted(case: Case, travel: BodyMotion) -> tuple[Stamps, Stamps]:
 
 
 def _felt(case: Case, travel: BodyMotion) -> tuple[ImuReadings, ImuBias] | None:
-    if case.rig.imu is None:
-        return None
     rngs = {stream: generator(case.seed, f"imu.{stream}") for stream in STREAMS}
-    return measure(travel.motion, case.rig.imu, rngs=rngs)
-
-
-def _write_imu(readings: ImuReadings, bias: ImuBias, new: slice, writer: SequenceWriter) -> None:
-    writer.write_imu(ImuReadings(readings.t_ns[new], readings.gyro_radps[new], readings.accel_mps2[new]))
-    rows = zip(bias.t_ns[new].tolist(), bias.gyro_radps[new], bias.accel_mps2[new], strict=True)
-    for t_ns, gyro_radps, accel_mps2 in rows:
-        writer.write_imu_bias(t_ns, gyro_radps, accel_mps2)
+    return measure(travel.motion, case.rig.imu, rngs=rngs) if case.rig.imu else None
 
 
 def _between(t_ns: Stamps, last_ns: int, now_ns: int) -> slice:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from vobench.geometry.rig import SIDES
 from vobench.run.key import canonical, versions
 from vobench.run.motion import BodyMotion, body_motion
-from vobench.suite import scene_file
+from vobench.suite.scene_file import content as scene_content
 from vobench.suite.yaml_file import plain
 
 if TYPE_CHECKING:
@@ -32,8 +32,8 @@ LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "pyrender", "embreex", 
 
 def content(case: "Case") -> dict[str, Any]:
     """What is simulated, without what the suite calls it: the same for equal cases of two suites."""
-    content: dict[str, Any] = plain(case, exclude=UNSIMULATED)
-    return content
+    said: dict[str, Any] = plain(case, exclude=UNSIMULATED)
+    return said | {"scene": scene_content(case.scene, exclude=UNSIMULATED["scene"])}
 
 
 # What draws and writes is imported where it is used: whoever asks whether a sequence is there needs none of it.
@@ -46,9 +46,10 @@ def bake_scene(spec: "SceneFile", folder: Path, progress: "Progress") -> None:
     """
     from vobench.render.bake import BakeSettings, bake, save_baked
     from vobench.render.raster import require_drawing
+    from vobench.suite.scene_build import build
 
     require_drawing()
-    scene = scene_file.build(spec, {})
+    scene = build(spec, {})
     with progress.step(f"light of {scene.name}") as tell:
         save_baked(folder, bake(scene, BakeSettings(), tell))
 
@@ -89,6 +90,7 @@ def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progr
 
 def _writer(case: "Case", folder: Path, truth: "PixelTruth | None") -> "SequenceWriter":
     from vobench.sequence import SequenceWriter
+    from vobench.sequence.picture import BAYER, MONO, RGB
 
     return SequenceWriter(
         folder,
@@ -96,6 +98,7 @@ def _writer(case: "Case", folder: Path, truth: "PixelTruth | None") -> "Sequence
         case_json=canonical(content(case)).encode(),
         true_rig=case.build_true_rig(),
         jpeg_quality=case.camera.jpeg_quality,
+        colour={"mono": MONO, "rgb": RGB, "bayer": BAYER}[case.camera.colour],
         truth_channels=case.truth,
         truth_names=truth.names if truth else None,
         provenance=versions(*LIBRARIES),
@@ -120,9 +123,5 @@ def _write(
         if travel.drive:
             writer.write_disturbance(t_ns, travel.drive.slip[index], travel.drive.delta[index])
         if truth:
-            _write_pixel_truth(writer, truth, t_ns, stamps[index + 1])
-
-
-def _write_pixel_truth(writer: "SequenceWriter", truth: "PixelTruth", t_ns: int, next_t_ns: int | None) -> None:
-    for side in SIDES:
-        writer.write_truth_frame(t_ns, side, truth.frame(side, t_ns, next_t_ns))
+            for side in SIDES:
+                writer.write_truth_frame(t_ns, side, truth.frame(side, t_ns, stamps[index + 1]))

@@ -10,11 +10,11 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import SIDES, Side
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import RayCaster, inventory
+from vobench.render.geometry import RayCaster
 from vobench.render.renderer import Radiance, Renderer, View
 from vobench.run.motion import generator
 from vobench.scene.light import Steady
-from vobench.scene.scene import Scene
+from vobench.scene.scene import Scene, triangles
 from vobench.sensor.exposure import Exposure, start, step, strips
 from vobench.sensor.image_sensor import NoiseStreams, expose, fixed_pattern
 from vobench.sensor.lens import lens_maps, through_lens
@@ -32,54 +32,32 @@ class Displacement:
     """Measures one scene's displacements, at a grid of pixels."""
 
     def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self._at_rest = _Seen(scene, 0)
+        self._scene, self._at_rest = scene, _solid(scene, 0)
 
     def largest_px(
         self, camera: Camera, T_world_first: Array, T_world_last: Array, *, start_ns: int, end_ns: int
     ) -> float:
         """How far what the first pose sees at start_ns has moved for the last one at end_ns, in pixels, at most."""
         rays = _grid_rays(camera) @ T_world_first[:3, :3].T
-        seen = _Seen(self._scene, start_ns) if self._scene.movers else self._at_rest
-        before = seen.points(T_world_first[:3, 3], rays)
-        after = seen.later(before, end_ns)
-        first, last = (
-            camera.project(se3.apply(se3.inverse(T), points.at_m))
-            for T, points in ((T_world_first, before), (T_world_last, after))
-        )
+        caster, mover_of = _solid(self._scene, start_ns) if self._scene.movers else self._at_rest
+        hits = caster.hits(np.broadcast_to(T_world_first[:3, 3], rays.shape), rays)
+        before_m = T_world_first[:3, 3] + np.nan_to_num(hits.distance, nan=FAR_M)[:, None] * rays
+        after_m, mover_at = before_m.copy(), np.where(hits.face < 0, -1, mover_of[hits.face])
+        for index, mover in enumerate(self._scene.movers):
+            T_later_now = mover.path.pose(end_ns) @ se3.inverse(mover.path.pose(start_ns))
+            after_m[mover_at == index] = se3.apply(T_later_now, before_m[mover_at == index])
+        first = camera.project(se3.apply(se3.inverse(T_world_first), before_m))
+        last = camera.project(se3.apply(se3.inverse(T_world_last), after_m))
         moved = np.linalg.norm(last - first, axis=-1)
         return float(np.nanmax(moved)) if np.isfinite(moved).any() else 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Points:
-    """Points at_m (K, 3), and the mover each is on, -1 for none."""
-
-    at_m: Array
-    mover: NDArray[np.int32]
-
-
-class _Seen:
-    """What rays meet in a scene at an instant; panes are seen through."""
-
-    def __init__(self, scene: Scene, t_ns: int) -> None:
-        held = inventory(scene, t_ns=t_ns)
-        self._scene, self._t_ns, self._mover = scene, t_ns, held.mover
-        self._caster = RayCaster(held.surfaces, np.flatnonzero(~held.pane))
-
-    def points(self, origin_m: Array, rays: Array) -> _Points:
-        """The ends of unit rays (K, 3) from one origin."""
-        hits = self._caster.hits(np.broadcast_to(origin_m, rays.shape), rays)
-        distance = np.nan_to_num(hits.distance, nan=FAR_M)[:, None]
-        return _Points(origin_m + distance * rays, np.where(hits.surface < 0, -1, self._mover[hits.surface]))
-
-    def later(self, points: _Points, t_ns: int) -> _Points:
-        """The same points of the same things at another instant."""
-        at_m = points.at_m.copy()
-        for index, mover in enumerate(self._scene.movers):
-            T_later_now = mover.path.pose(t_ns) @ se3.inverse(mover.path.pose(self._t_ns))
-            at_m[points.mover == index] = se3.apply(T_later_now, at_m[points.mover == index])
-        return _Points(at_m, points.mover)
+def _solid(scene: Scene, t_ns: int) -> tuple[RayCaster, NDArray[np.int32]]:
+    """What rays meet in a scene at an instant, seen through panes; and the mover of each surface, -1 for none."""
+    faces = triangles(scene, t_ns=t_ns)
+    looks = [scene.materials.get(thing.material) for thing in faces.things]
+    is_pane = np.array([look is not None and look.kind == "pane" for look in looks], bool)
+    return RayCaster(faces, np.flatnonzero(~is_pane[faces.thing])), faces.mover
 
 
 @lru_cache(maxsize=8)
@@ -99,7 +77,7 @@ ROWS_UNDER_CHANGING_LIGHT = 4
 
 @dataclass(frozen=True, slots=True)
 class StereoPair:
-    """A stereo pair (H, W) uint8 each, and the exposure that both had."""
+    """A stereo pair, (H, W) or (H, W, 3) uint8 each, and the exposure that both had."""
 
     left: Grey
     right: Grey
@@ -152,9 +130,10 @@ class SimulatedCamera:
         self._pattern = fixed_pattern(shape, case.camera.chip, stream("pattern"))
 
     def picture(self, t_ns: int, exposure: Exposure) -> Grey:
-        """The grey values (H, W) of a picture stamped t_ns."""
-        luminance_cd_m2 = self._world.renderer.radiance(self._camera, self.views(t_ns, exposure))
-        at_chip: Radiance = through_lens(luminance_cd_m2 / self._white_cd_m2, self._lens)
+        """The values (H, W), or (H, W, 3) in colour, of a picture stamped t_ns."""
+        views, weights = self.views(t_ns, exposure), self._settings.weights
+        light = self._world.renderer.radiance(self._camera, views, weights=weights) / self._white_cd_m2
+        at_chip: Radiance = through_lens(light, self._lens)
         return expose(at_chip, self._settings, self._noise, pattern=self._pattern, exposure=exposure)
 
     def views(self, t_ns: int, exposure: Exposure) -> list[View]:

@@ -84,7 +84,11 @@ class Store:
         with unfinished(final.parent) as folder:
             build(folder)
             (folder / "inputs.json").write_text(canonical(inputs), encoding="utf-8")
-            _publish(folder, final)
+            try:
+                folder.rename(final)
+            except OSError:  # where another process was faster, both hold the same
+                if not final.is_dir():
+                    raise
         return final
 
     def forget(self, kind: str, inputs: Mapping[str, Any]) -> None:
@@ -95,24 +99,9 @@ class Store:
                 final.rename(folder / "forgotten")
 
 
-def _publish(folder: Path, final: Path) -> None:
-    """Give a folder its final name; where another process was faster, both hold the same."""
-    try:
-        folder.rename(final)
-    except OSError:
-        if not final.is_dir():
-            raise
-
-
 def write_json(path: Path, content: Any) -> None:
     """JSON that people can read."""
     path.write_text(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
-
-
-def default_store() -> Store:
-    """$VOBENCH_CACHE, or vobench/ in the user's cache folder."""
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return Store(Path(os.environ.get("VOBENCH_CACHE") or home / "vobench"))
 
 
 Item = TypeVar("Item")

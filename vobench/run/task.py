@@ -11,10 +11,10 @@ from vobench import stop
 from vobench.run.key import code_digest, digest, folder_digest, imported_by, library_versions
 from vobench.run.simulate import LIBRARIES, content
 from vobench.run.store import Progress, SilentProgress, Store
+from vobench.suite.scene_file import content as scene_content
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import RecordedCase
-from vobench.suite.suite import Case, Plan, Trial
-from vobench.suite.yaml_file import plain
+from vobench.suite.suite import Case, Entrant, Plan, Trial
 
 if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
@@ -30,7 +30,7 @@ KINDS: dict[Stage, str] = {
 }
 # The modules that a stage enters, of which its key hashes all that they import; a room stands for all of its modules.
 ENTRIES: dict[Stage, tuple[str, ...]] = {
-    "bake": ("vobench.render.bake", "vobench.suite.scene_file"),
+    "bake": ("vobench.render.bake", "vobench.suite.scene_build"),
     "sequence": ("vobench.run.simulate", "vobench.run.ground_truth"),
     "import": ("vobench.run.import_recording", "vobench.run.ground_truth", "vobench.dataset"),
     "estimate": ("vobench.run.estimate", "vobench.estimator.worker"),
@@ -88,13 +88,16 @@ def plan(suite: Plan, recordings: "Mapping[str, Recording]") -> list[Task]:
     tasks = dict[str, Task]()
 
     def add(*made: Task) -> str:
-        tasks.update((task.key, task) for task in made if task.key not in tasks)
-        return made[-1].key
+        keys = [task.key for task in made]
+        for key, task in zip(keys, made, strict=True):
+            tasks.setdefault(key, task)
+        return keys[-1]
 
+    code = {entrant.label: estimator_code(entrant) for entrant in suite.entrants}
     for case in suite.cases:
         sequence = add(*sequence_tasks(case, recordings))
         for trial in suite.trials(case):
-            add(score_task(trial, sequence, add(estimate_task(trial, sequence))))
+            add(score_task(trial, sequence, add(estimate_task(trial, sequence, code[trial.entrant.label]))))
     return list(tasks.values())
 
 
@@ -113,8 +116,8 @@ def sequence_tasks(case: Case | RecordedCase, recordings: "Mapping[str, Recordin
 
 def bake_task(spec: SceneFile) -> Task:
     """What computes a scene's light, under whatever levels."""
-    scene = plain(spec, exclude=UNLIT)
-    libraries = library_versions("numpy", "scipy", "embreex")
+    scene = scene_content(spec, exclude=UNLIT)
+    libraries = library_versions("numpy", "scipy", "embreex", "xatlas", "pillow", "trimesh", "opencv-python-headless")
     inputs = {"scene": scene, **_made_by("bake"), "libraries": libraries}
     return Task("bake", spec, inputs, (), Resources(MANY_CORES))
 
@@ -127,17 +130,23 @@ def _import_task(case: RecordedCase, recording: "Recording") -> Task:
     return Task("import", case, inputs, (), Resources())
 
 
-def estimate_task(trial: Trial, sequence: str) -> Task:
-    """What lets an estimator run on the sequence of that key."""
+def estimator_code(entrant: Entrant) -> dict[str, str]:
+    """Hashes of an estimator's folder, and of all code of vobench that runs it or that it imports."""
+    code = code_digest(*ENTRIES["estimate"], *imported_by(entrant.folder))
+    return {"estimator": folder_digest(entrant.folder), "code": code}
+
+
+def estimate_task(trial: Trial, sequence: str, code: Mapping[str, str]) -> Task:
+    """What lets an estimator run on the sequence of that key; `code` is its `estimator_code`."""
     from vobench.run.estimate import LIMITS
 
-    entrant, needs = trial.entrant, (sequence,)
+    needs = (sequence,)
     inputs = {
-        "params": entrant.params,
+        "params": trial.entrant.params,
         "repeat": trial.repeat,
         "limits": repr(LIMITS),
-        "estimator": folder_digest(entrant.folder),
-        **_made_by("estimate", needs, *imported_by(entrant.folder)),
+        "needs": needs,
+        **code,
         "libraries": library_versions("numpy", "scipy", "opencv-python-headless"),
     }
     return Task("estimate", trial, inputs, needs, Resources(memory_bytes=GIB + LIMITS.memory_bytes))
@@ -156,8 +165,8 @@ def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
     return Task("score", trial, inputs, (sequence, estimate), Resources())
 
 
-def _made_by(stage: Stage, needs: tuple[str, ...] = (), *modules: str) -> dict[str, Any]:
-    return {"needs": needs, "code": code_digest(*ENTRIES[stage], *modules)}
+def _made_by(stage: Stage, needs: tuple[str, ...] = ()) -> dict[str, Any]:
+    return {"needs": needs, "code": code_digest(*ENTRIES[stage])}
 
 
 def missing(tasks: Iterable[Task], root: Path) -> list[Task]:

@@ -11,7 +11,8 @@ from annotated_types import MinLen
 
 from vobench.errors import SettingError
 from vobench.geometry.se3 import Array
-from vobench.scene.surface import Surface
+from vobench.scene.material import WHITE, Rgb
+from vobench.scene.mesh import Mesh, area_m2
 from vobench.setting import Positive, Share, settings
 
 NS_PER_S = 1e9
@@ -119,18 +120,22 @@ def scaled(level: Level, factor: float) -> Level:
 
 @dataclass(frozen=True, slots=True)
 class AreaLight:
-    """A rectangle that emits `power_lm` evenly and to all sides of its front (Lambert)."""
+    """Faces that emit `power_lm` evenly and to all sides of their front (Lambert).
+
+    `material` names what they look like, where that has an emission texture.
+    """
 
     name: str
-    surface: Surface
+    mesh: Mesh
     power_lm: float
     level: Level = STEADY
+    colour: Rgb = WHITE
+    material: str = ""
 
     @property
     def luminance_cd_m2(self) -> float:
-        """Luminance of the panel: power / (π area)."""
-        width, height = self.surface.size_m
-        return self.power_lm / (np.pi * width * height)
+        """Luminance of the faces: power / (π area)."""
+        return self.power_lm / (np.pi * area_m2(self.mesh.corners_m))
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +146,7 @@ class PointLight:
     position_m: Array
     power_lm: float
     level: Level = STEADY
+    colour: Rgb = WHITE
 
     def intensity_cd(self, directions: Array) -> Array:
         """Luminous intensity (...) towards unit directions (..., 3)."""
@@ -161,6 +167,7 @@ class SpotLight:
     inner_deg: float
     outer_deg: float
     level: Level = STEADY
+    colour: Rgb = WHITE
 
     @property
     def peak_cd(self) -> float:
@@ -191,6 +198,7 @@ class Sun:
     azimuth_deg: tuple[float, ...]
     elevation_deg: tuple[float, ...]
     level: Level = STEADY
+    colour: Rgb = WHITE
 
     @property
     def moves(self) -> bool:
@@ -226,6 +234,7 @@ class Sky:
     sun_direction: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     ground_albedo: float = 0.2
     level: Level = STEADY
+    colour: Rgb = WHITE
 
     def luminance_cd_m2(self, directions: Array) -> Array:
         """Luminance (...) seen along unit directions (..., 3). Source: ISO 15469:2004, eqs 1 to 7."""

@@ -1,175 +1,99 @@
-"""Materials: matt, polished, mirror, glass; and their procedural textures."""
+"""Materials: how surfaces scatter, mirror and shine; Fresnel's law."""
 
-from collections.abc import Callable
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
 
 import numpy as np
-import scipy
-from annotated_types import Ge, Gt, Le, Lt
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vobench.geometry.se3 import Array
-from vobench.setting import OneOf, Positive, Share, settings
 
 Map = NDArray[np.float32]
+Rgb = tuple[float, float, float]
+WHITE: Rgb = (1.0, 1.0, 1.0)
+# What red, green and blue of ITU-R BT.709 add to luminance.
+LUMINANCE: Rgb = (0.2126, 0.7152, 0.0722)
 
 
-def reflectance(texture: "Textured") -> Map:
-    """The tile as (resolution_px, resolution_px) float32 in [0.02, 0.98], row 0 at v = 0."""
-    rng = np.random.default_rng([texture.seed, texture.resolution_px])
-    pattern = PATTERNS[texture.pattern](texture, rng)
-    low, high = np.percentile(pattern[::4, ::4] if len(pattern) > 64 else pattern, [1, 99])
-    unit = (pattern - pattern.mean()) / ((high - low) / 2 if high > low else 1.0)
-    return np.asarray(np.clip(texture.albedo * (1 + texture.contrast * unit), 0.02, 0.98).astype(np.float32))
+class Texture(Protocol):
+    """A picture that repeats every tile_m, u along its rows, v down from the first of them."""
+
+    @property
+    def tile_m(self) -> float:
+        """What one repeat covers of a mesh's texture coordinates, which are metres for most."""
+
+    def pixels(self) -> NDArray[Any]:
+        """Linear reflectance (H, W) float32, or (H, W, 3 or 4) uint8 in sRGB, the fourth the opacity."""
 
 
-def _noise(texture: "Textured", rng: np.random.Generator, *, coarse_m: float, fine_m: float, slope: float) -> Map:
-    """Periodic noise of unit variance whose features are between `fine_m` and `coarse_m` wide; 0 where none fits.
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A texture of these pixels."""
 
-    White noise shaped in the frequency domain by f^-slope: isotropic, and a tile without seams.
-    """
-    n = texture.resolution_px
-    per_m = n / texture.tile_m
-    f_u = scipy.fft.rfftfreq(n) * per_m
-    # Columns above the band are zero, and the inverse transform adds them back as such.
-    f_u = f_u[f_u < 0.5 / fine_m]
-    spectrum = scipy.fft.rfft2(rng.standard_normal((n, n), dtype=np.float32), workers=-1)[:, : len(f_u)]
-    f = np.hypot(scipy.fft.fftfreq(n)[:, None] * per_m, f_u).astype(np.float32)
-    band = (f > 0.5 / coarse_m) & (f < 0.5 / fine_m)
-    spectrum = spectrum * np.where(band, np.maximum(f, 1e-6) ** -slope, 0).astype(np.float32)
-    noise = scipy.fft.irfft2(spectrum, s=(n, n), workers=-1)
-    return np.asarray(noise / (noise.std() or 1))
+    values: NDArray[Any]
+    tile_m: float = 1.0
+
+    def pixels(self) -> NDArray[Any]:
+        """The pixels."""
+        return self.values
 
 
-def plain(texture: "Textured", rng: np.random.Generator) -> Map:
-    """One tone, without any detail."""
-    del rng
-    return np.zeros((texture.resolution_px, texture.resolution_px), np.float32)
+@dataclass(frozen=True, slots=True)
+class Material:
+    """How a surface looks. A body scatters light evenly (Lambert) under a coat; a mirror and a pane have no body.
 
-
-def terrazzo(texture: "Textured", rng: np.random.Generator) -> Map:
-    """Chips of several tones and sizes with sharp edges in a ground with fine grain."""
-    chips = _noise(texture, rng, coarse_m=0.06, fine_m=0.012, slope=0.5)
-    small = _noise(texture, rng, coarse_m=0.015, fine_m=0.004, slope=0.5)
-    grain = _noise(texture, rng, coarse_m=0.5, fine_m=0.002, slope=1.2)
-    step = 0.08
-    return np.asarray(0.9 * np.tanh((chips - 0.6) / step) - 0.6 * np.tanh((small - 0.8) / step) + 0.5 * grain)
-
-
-def plaster(texture: "Textured", rng: np.random.Generator) -> Map:
-    """A trowelled wall: soft patches with pits."""
-    patches = _noise(texture, rng, coarse_m=0.8, fine_m=0.006, slope=1.1)
-    pits = _noise(texture, rng, coarse_m=0.04, fine_m=0.008, slope=0.3)
-    return np.asarray(patches - 0.8 * np.tanh((pits - 1.4) / 0.1))
-
-
-def wood(texture: "Textured", rng: np.random.Generator) -> Map:
-    """Grain that runs along u, in bent rings."""
-    bend = _noise(texture, rng, coarse_m=0.6, fine_m=0.08, slope=1.5)
-    fibre = _noise(texture, rng, coarse_m=0.05, fine_m=0.004, slope=0.6)
-    n = texture.resolution_px
-    rings = np.arange(n, dtype=np.float32)[:, None] / n * 2 * np.pi * round(texture.tile_m / 0.05)
-    return np.asarray(np.sin(rings + 2.5 * bend) + 0.7 * fibre)
-
-
-def poster(texture: "Textured", rng: np.random.Generator) -> Map:
-    """Large flat patches with sharp borders, as on printed boards and book spines."""
-    n = texture.resolution_px
-    pattern = np.zeros((n, n), np.float32)
-    for _ in range(160):
-        row, column = rng.integers(0, n, 2)
-        height, width = (rng.uniform(0.02, 0.22, 2) * n).astype(int)
-        rows, columns = np.arange(row, row + height) % n, np.arange(column, column + width) % n
-        pattern[np.ix_(rows, columns)] = rng.uniform(-1, 1)
-    return pattern + 0.15 * _noise(texture, rng, coarse_m=0.1, fine_m=0.004, slope=0.5)
-
-
-def checker(texture: "Textured", rng: np.random.Generator) -> Map:
-    """Eight by eight squares: the one with corners whose place is known."""
-    del rng
-    square = np.arange(texture.resolution_px) * 8 // texture.resolution_px
-    return np.where((square[:, None] + square[None, :]) % 2, 1.0, -1.0).astype(np.float32)
-
-
-PATTERNS: dict[str, Callable[["Textured", np.random.Generator], Map]] = {
-    "plain": plain,
-    "terrazzo": terrazzo,
-    "plaster": plaster,
-    "wood": wood,
-    "poster": poster,
-    "checker": checker,
-}
-
-
-Pattern = Annotated[str, OneOf("pattern", PATTERNS)]
-Albedo = Annotated[float, Gt(0), Lt(1)]
-Resolution = Annotated[int, Ge(8), Le(8192)]
-Seed = Annotated[int, Ge(0)]
-Eta = Annotated[float, Ge(1), Le(4)]  # 1 is an open pane, or no coat
-Roughness = Annotated[float, Ge(0), Le(0.5)]
-
-
-@settings(kw_only=False)
-class Matt:
-    """Reflects its texture's share of the light alike in all directions (Lambert).
-
-    The texture is a square tile that repeats every `tile_m`. `albedo` is its mean, and `contrast` its spread over
-    its mean: half the step from the darkest 1 % to the brightest 1 %.
+    colour (3,) linear RGB reflectance, times the texture. eta: of the coat or the pane's glass, 1 for none;
+    tint: scales what a coat or mirror mirrors, or what a pane lets pass. roughness: GGX alpha of coat or mirror.
+    metal: the share of the body that is bare metal, which mirrors in its colour and scatters nothing.
+    emission_cd_m2 (3,): luminance of each channel as white of that strength, times emission_texture.
+    cutout: the opacity of the texture below which there is a hole, None where it is solid.
     """
 
-    pattern: Pattern
-    albedo: Albedo
-    contrast: Share = 0.0
-    tile_m: Positive = 1.0
-    resolution_px: Resolution = 1024
-    seed: Seed = 0
-    kind: Literal["matt"] = "matt"
+    kind: Literal["body", "mirror", "pane"] = "body"
+    colour: Rgb = WHITE
+    texture: Texture | None = None
+    eta: float = 1.0
+    tint: float = 1.0
+    roughness: float = 0.0
+    metal: float = 0.0
+    emission_cd_m2: Rgb = (0.0, 0.0, 0.0)
+    emission_texture: Texture | None = None
+    cutout: float | None = None
+
+    @property
+    def is_coated(self) -> bool:
+        """Whether it is a body under a coat."""
+        return self.kind == "body" and self.eta > 1
+
+    @property
+    def tile_m(self) -> float:
+        """What one repeat of the texture covers; 1 where there is none."""
+        return self.texture.tile_m if self.texture else 1.0
 
 
-@settings(kw_only=False)
-class Polished:
-    """A texture as in Matt under a clear coat, such as waxed stone: matt below, and a mirror that grows to grazing.
-
-    `tint` scales what the coat mirrors; `roughness` is the RMS slope of its facets (GGX alpha), 0 for none.
-    """
-
-    pattern: Pattern
-    albedo: Albedo
-    contrast: Share = 0.0
-    tile_m: Positive = 1.0
-    resolution_px: Resolution = 1024
-    seed: Seed = 0
-    eta: Eta = 1.5
-    tint: Share = 1.0
-    roughness: Roughness = 0.0
-    kind: Literal["polished"] = "polished"
+def linear(srgb: ArrayLike) -> Map:
+    """Linear values of sRGB ones, both in [0, 1], or of uint8. Source: IEC 61966-2-1."""
+    values = np.asarray(srgb)
+    c = values.astype(np.float32) / (255 if values.dtype == np.uint8 else 1)
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
-@settings(kw_only=False)
-class Mirror:
-    """A metal that reflects the share `tint` at every angle; `roughness` as in Polished."""
-
-    tint: Share = 0.9
-    roughness: Roughness = 0.0
-    kind: Literal["mirror"] = "mirror"
+def srgb(values: ArrayLike) -> NDArray[np.uint8]:
+    """Linear values in [0, 1] as sRGB in uint8; what is beyond is cut off. Source: IEC 61966-2-1."""
+    c = np.clip(values, 0, 1)
+    encoded = np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)
+    return np.asarray(np.rint(255 * encoded), np.uint8)
 
 
-@settings(kw_only=False)
-class Glass:
-    """A thin pane: mirrors a little, lets the rest pass straight; `tint` scales what passes. It dims light, no more."""
-
-    eta: Eta = 1.5
-    tint: Share = 1.0
-    kind: Literal["glass"] = "glass"
-
-
-Textured = Matt | Polished
-Material = Matt | Polished | Mirror | Glass
-
-
-def texture_of(material: Material) -> Textured | None:
-    """The material where it shows a texture, None for one without a body."""
-    return material if isinstance(material, Matt | Polished) else None
+def reflectance(material: Material) -> Map:
+    """Luminous reflectance (H, W) float32 of a body's tile, row 0 at v = 0; one pixel where it has no texture."""
+    colour = np.array(material.colour, np.float32)
+    if material.texture is None:
+        return np.full((1, 1), colour @ np.array(LUMINANCE), np.float32)
+    pixels = material.texture.pixels()
+    if pixels.ndim == 2:
+        return np.asarray(pixels * np.float32(colour @ np.array(LUMINANCE)), np.float32)
+    return np.asarray(linear(pixels[..., :3]) @ (colour * np.array(LUMINANCE)).astype(np.float32))
 
 
 def fresnel(cosine: Array, eta: float | Array) -> Array:

@@ -8,7 +8,8 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.scene.light import AreaLight, Light
 from vobench.scene.material import Material
-from vobench.scene.surface import Surface, rectangle
+from vobench.scene.mesh import Thing, Triangles, quad, table
+from vobench.scene.surface import Surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,22 +36,24 @@ class Path:
 
 @dataclass(frozen=True, slots=True)
 class Mover:
-    """A rigid thing on a path; its surfaces are in its own frame."""
+    """A rigid thing on a path; its surfaces and things are in its own frame."""
 
     name: str
     surfaces: tuple[Surface, ...]
     path: Path
+    things: tuple[Thing, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Static surfaces, their materials by name, the lights that shine on them, and movers."""
+    """Static surfaces and things, their materials by name, the lights that shine on them, and movers."""
 
     name: str
     surfaces: tuple[Surface, ...]
     materials: dict[str, Material]
     lights: tuple[Light, ...]
     movers: tuple[Mover, ...] = ()
+    things: tuple[Thing, ...] = ()
 
     @property
     def panels(self) -> tuple[AreaLight, ...]:
@@ -58,7 +61,25 @@ class Scene:
         return tuple(light for light in self.lights if isinstance(light, AreaLight))
 
 
+def triangles(scene: Scene, *, t_ns: float | None = None) -> Triangles:
+    """Every face of a scene: surfaces, things, panels, movers; these in their own frames where t_ns is None."""
+    static = [*map(_thing, scene.surfaces), *scene.things]
+    lamps = {nth: light for nth, light in enumerate(scene.lights) if isinstance(light, AreaLight)}
+    panels = {nth: Thing(light.name, light.mesh, light.material or light.name) for nth, light in lamps.items()}
+    moving = [(nth, thing) for nth, m in enumerate(scene.movers) for thing in (*map(_thing, m.surfaces), *m.things)]
+    things = [*static, *panels.values(), *(thing for _, thing in moving)]
+    mover = [-1] * (len(static) + len(panels)) + [nth for nth, _ in moving]
+    lamp = [-1] * len(static) + list(panels) + [-1] * len(moving)
+    faces = table(things, mover, lamp)
+    return faces if t_ns is None else faces.moved([m.path.pose(t_ns) for m in scene.movers])
+
+
+def _thing(surface: Surface) -> Thing:
+    mesh = quad(surface.corner_m, surface.edge_u_m, surface.edge_v_m, uv_m=surface.texture_corner_m)
+    return Thing(surface.instance, mesh, surface.material)
+
+
 def ceiling_light(name: str, center_m: Array, size_m: tuple[float, float], *, power_lm: float) -> AreaLight:
     """A panel that hangs level and shines down."""
     x, y = np.array([size_m[0], 0, 0]), np.array([0, size_m[1], 0])
-    return AreaLight(name, rectangle(np.asarray(center_m, float), y, x, name, name), power_lm)
+    return AreaLight(name, quad(np.asarray(center_m, float) - (x + y) / 2, y, x), power_lm)

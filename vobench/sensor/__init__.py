@@ -1,1 +1,1 @@
-"""What the sensors make of the world: light to grey values, wheel angles to encoder counts. Pure."""
+"""What the sensors make of the world: light to grey values, motion to readings of an IMU. Pure."""

@@ -1,4 +1,4 @@
-"""A camera's image sensor after EMVA 1288: photons to electrons to 8-bit grey values. Pure."""
+"""A camera's image sensor after EMVA 1288: photons to electrons to 8-bit values, grey or in colour. Pure."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -158,9 +158,17 @@ CAMERAS = {
 SENSOR_PRESETS = Like("camera sensor", CAMERAS, key="sensor", section="chip")
 
 
+Colour = Literal["mono", "rgb", "bayer"]
+# What linear red, green and blue (ITU-R BT.709) add to luminance.
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+
+
 @settings()
 class CameraSettings:
     """The chip behind the lens, how it is exposed, and what the lens does to the light.
+
+    `colour` mono weighs red, green and blue by `spectrum`; bayer records the mosaic of a chip behind RGGB filters as
+    it is, rgb interpolates it. White light gives each of them the same grey value.
 
     The aperture is set for `exposure_ms`: then, and without gain, radiance 1 comes to 200 grey values;
     `exposure_gain` multiplies that light. `readout_ms` of a rolling shutter is height × line delay.
@@ -170,6 +178,8 @@ class CameraSettings:
     """
 
     chip: CameraSensor = CAMERAS["clean"]
+    colour: Colour = "mono"
+    spectrum: tuple[NonNegative, NonNegative, NonNegative] = LUMINANCE
     exposure_gain: Positive = 1.0
     exposure_ms: Annotated[float, Ge(0.001), Le(1000)] = 5.0
     gain_db: Annotated[float, Ge(0), Le(48)] = 0.0
@@ -191,6 +201,11 @@ class CameraSettings:
             )
         if self.shutter == "global" and self.readout_ms is not None:
             raise SettingError("readout_ms belongs to a rolling shutter; add shutter: rolling")
+
+    @property
+    def weights(self) -> tuple[float, float, float] | None:
+        """What the chip makes of red, green and blue in one number; None where it tells them apart."""
+        return None if self.colour != "mono" else self.spectrum
 
     @property
     def exposure(self) -> Exposure:
@@ -251,33 +266,82 @@ def expose(
     pattern: FixedPattern | None = None,
     exposure: Exposure | None = None,
 ) -> Grey:
-    """One picture (H, W) of linear radiance (H, W), where 1 is matt white in the scene's own light.
+    """One picture of linear radiance, where 1 is matt white in the scene's own light: (H, W) of (H, W).
 
+    Of radiance (H, W, 3) in red, green and blue: the mosaic (H, W), or (H, W, 3) where the camera's colour is rgb.
     Without an exposure it is the one that the aperture is set for.
     Longer exposure is more electrons, gain only a larger K. Radiance is the mean over the exposure.
     Raises RenderError for radiance that is negative or not a number. Source: EMVA 1288, release 3.1, section 2.
     """
     if not radiance.min() >= 0:
-        v, u = np.argwhere(~(radiance >= 0))[0]
+        v, u = np.argwhere(~(radiance >= 0))[0][:2]
         raise RenderError(f"radiance must be 0 or more, got {radiance[v, u]} at pixel ({u}, {v})")
+    exposure = exposure or Exposure(camera.exposure_ms / 1e3)
+    if radiance.ndim == 3:
+        radiance = mosaic(radiance)
+        if camera.colour == "rgb":
+            signal = _digital(
+                _signal(_electrons(radiance, camera, noise, pattern, exposure), camera.chip, exposure), camera.chip
+            )
+            return np.stack([quantise(plane, camera.chip.curve) for plane in demosaiced(signal)], -1)
     grey, step = np.empty(radiance.shape, np.uint8), max(1, PIXELS_AT_A_TIME // radiance.shape[1])
     for first in range(0, len(radiance), step):
         rows = slice(first, first + step)
         local = pattern.of(rows) if pattern else None
-        grey[rows] = _expose_rows(radiance[rows], camera, noise, local, exposure or Exposure(camera.exposure_ms / 1e3))
+        electrons = _electrons(radiance[rows], camera, noise, local, exposure)
+        grey[rows] = _convert(_signal(electrons, camera.chip, exposure), camera.chip)
     return grey
 
 
-def _expose_rows(
+# The channel behind each of two by two pixels (Bayer, 1976): red, green; green, blue.
+RGGB = np.array([[0, 1], [1, 2]])
+
+
+def mosaic(radiance: Radiance) -> Radiance:
+    """What the filters before a chip's pixels let pass (H, W) of light (H, W, 3) in red, green and blue."""
+    passed = np.empty(radiance.shape[:2], radiance.dtype)
+    for v, u in np.ndindex(RGGB.shape):
+        passed[v::2, u::2] = radiance[v::2, u::2, RGGB[v, u]]
+    return passed
+
+
+# Source: Malvar, He, Cutler (2004), High-quality linear interpolation for demosaicing, figure 2.
+GREEN_AT_OTHER = (
+    np.array([[0, 0, -1, 0, 0], [0, 0, 2, 0, 0], [-1, 2, 4, 2, -1], [0, 0, 2, 0, 0], [0, 0, -1, 0, 0]]) / 8.0
+)
+ALONG_ROW = (
+    np.array([[0, 0, 0.5, 0, 0], [0, -1, 0, -1, 0], [-1, 4, 5, 4, -1], [0, -1, 0, -1, 0], [0, 0, 0.5, 0, 0]]) / 8.0
+)
+ACROSS = (
+    np.array([[0, 0, -1.5, 0, 0], [0, 2, 0, 2, 0], [-1.5, 0, 6, 0, -1.5], [0, 2, 0, 2, 0], [0, 0, -1.5, 0, 0]]) / 8.0
+)
+
+
+def demosaiced(signal: Array) -> Array:
+    """Red, green and blue (3, H, W) in 0..1 of a mosaic of signals (H, W)."""
+    green, row, column, diagonal = (
+        scipy.ndimage.correlate(signal, kernel, mode="mirror")
+        for kernel in (GREEN_AT_OTHER, ALONG_ROW, ALONG_ROW.T, ACROSS)
+    )
+    rgb = np.stack([row, green, column])
+    red, first, second, blue = ((slice(v, None, 2), slice(u, None, 2)) for v, u in np.ndindex(2, 2))
+    rgb[0][red], rgb[0][second], rgb[0][blue] = signal[red], column[second], diagonal[blue]
+    rgb[1][first], rgb[1][second] = signal[first], signal[second]
+    rgb[2][red], rgb[2][second], rgb[2][blue] = diagonal[red], row[second], signal[blue]
+    return np.asarray(np.clip(rgb, 0.0, 1.0))
+
+
+def _electrons(
     radiance: Radiance, camera: CameraSettings, noise: NoiseStreams, pattern: FixedPattern | None, exposure: Exposure
-) -> Grey:
+) -> Array:
+    """What the wells hold (H, W), read out."""
     sensor = camera.chip
     electrons = _collect(_mean_electrons(radiance, camera, pattern, exposure), sensor, noise.shot)
     if pattern is not None:
         electrons += pattern.offset_e
     if sensor.read_noise_e > 0:
         electrons += sensor.read_noise_e * noise.read.standard_normal(electrons.shape)
-    return _convert(electrons, sensor, exposure)
+    return electrons
 
 
 def _mean_electrons(
@@ -301,15 +365,33 @@ def _collect(mean_e: Array, sensor: CameraSensor, rng: np.random.Generator) -> A
     return np.minimum(mean_e, sensor.full_well_e, out=mean_e)
 
 
-def _convert(electrons: Array, sensor: CameraSensor, exposure: Exposure) -> Grey:
-    """Grey values (H, W) of what the wells hold."""
+def _signal(electrons: Array, sensor: CameraSensor, exposure: Exposure) -> Array:
+    """What the wells hold (H, W) as shares of full scale, amplified; in place."""
     electrons *= sensor.dn_per_electron * exposure.amplification
     electrons += sensor.black_dn
     electrons /= FULL_SCALE_DN
-    linear = np.clip(electrons, 0.0, 1.0, out=electrons)
+    return np.clip(electrons, 0.0, 1.0, out=electrons)
+
+
+def _convert(signal: Array, sensor: CameraSensor) -> Grey:
+    """Grey values (H, W) of signals."""
     if sensor.adc_bits is None:
-        return quantise(linear, sensor.curve)
-    largest = (1 << sensor.adc_bits) - 1
-    linear *= largest
-    linear += 0.5
-    return quantise(np.arange(largest + 1) / largest, sensor.curve).take(linear.astype(np.intp))
+        return quantise(signal, sensor.curve)
+    counts, largest = _counts(signal, sensor.adc_bits)
+    return quantise(np.arange(largest + 1) / largest, sensor.curve).take(counts)
+
+
+def _digital(signal: Array, sensor: CameraSensor) -> Array:
+    """Signals (H, W) as the converter counts them."""
+    if sensor.adc_bits is None:
+        return signal
+    counts, largest = _counts(signal, sensor.adc_bits)
+    return counts / largest
+
+
+def _counts(signal: Array, bits: int) -> tuple[NDArray[np.intp], int]:
+    """What a converter counts (H, W), and its largest count; the signal is used up."""
+    largest = (1 << bits) - 1
+    signal *= largest
+    signal += 0.5
+    return signal.astype(np.intp), largest

@@ -46,10 +46,12 @@ def lens_maps(effects: CameraSettings, camera: Camera, rng: np.random.Generator)
 
 
 def through_lens(radiance: Radiance, maps: LensMaps) -> Radiance:
-    """Radiance (H, W) as it reaches the chip: dirt on the front lens, then falloff, then blur.
+    """Radiance (H, W), or (H, W, 3) in colour, as it reaches the chip: dirt on the front lens, falloff, then blur.
 
     Source of the dirt's two terms: Gu, Ramamoorthi, Belhumeur and Nayar (2009), equation 3.
     """
+    if radiance.ndim == 3:
+        return np.stack([through_lens(channel, maps) for channel in np.moveaxis(radiance, -1, 0)], -1)
     passed = radiance if maps.shade is None else radiance * maps.shade
     if maps.veil is not None:
         passed = passed + maps.veil * np.float32(radiance.mean(dtype=np.float64))

@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from io import BufferedReader, FileIO
-from itertools import islice, pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self, TypeVar
@@ -262,8 +262,11 @@ def read_record(stream: BinaryIO, offset: int, kind: type[Record]) -> Record:
     return found
 
 
-def read_summary(stream: BinaryIO) -> Summary:
-    """The records behind the data, their checksum tested. Raises ValueError where a file has none."""
+def read_summary(stream: BinaryIO) -> tuple[Summary, tuple[dict[int, int], ...]]:
+    """The records behind the data, their checksum tested, and how many messages of each channel each chunk has.
+
+    Raises ValueError where a file has none, or they contradict each other.
+    """
     footer_at = stream.seek(-FOOTER_BYTES - len(MAGIC), os.SEEK_END)
     footer = read_record(stream, footer_at, Footer)
     if not 0 < footer.summary_start <= footer_at:
@@ -279,13 +282,13 @@ def read_summary(stream: BinaryIO) -> Summary:
     chunks = summary.chunk_indexes
     if any(b.chunk_start_offset < a.chunk_start_offset + a.chunk_length for a, b in pairwise(chunks)):
         raise ValueError("the chunks of its summary overlap")  # few bytes could state endless chunks
-    stated = Counter(summary.statistics.channel_message_counts)
-    if stated != sum((Counter(_counts(chunk)) for chunk in chunks), Counter()):
+    counts, stated = tuple(map(_counts, chunks)), Counter(summary.statistics.channel_message_counts)
+    if stated != sum(map(Counter, counts), Counter()):
         raise ValueError("its summary counts other messages than its message indexes do")
     unknown = {channel.schema_id for channel in summary.channels.values()} - {0, *summary.schemas}
     if unknown or stated.keys() - summary.channels.keys():
         raise ValueError("its summary names a channel or a message type that it does not describe")
-    return summary
+    return summary, counts
 
 
 def _counts(chunk: ChunkIndex) -> dict[int, int]:
@@ -319,8 +322,7 @@ class Bag:
     def open(cls, path: Path) -> "Bag":
         """Read the summary. Raises SequenceError where the file is none, torn or damaged."""
         with parsing(path), BoundedFile(path) as stream:
-            summary = read_summary(stream)
-            return cls(path, summary, tuple(map(_counts, summary.chunk_indexes)))
+            return cls(path, *read_summary(stream))
 
     def has(self, topic: Topic) -> bool:
         """Whether there is such a topic, empty or not. Raises SequenceError where it is of another type."""
@@ -341,13 +343,14 @@ class Bag:
         """The serialised messages of those topics that there are, in order of time, one chunk in memory at a time."""
         there = {self._channel(topic): topic for topic in topics if self.has(topic)}
         last_ns = 0
+        indexed = zip(self.summary.chunk_indexes, self.counts, strict=True)
         with parsing(self.path), BoundedFile(self.path) as stream:
-            for chunk, counts in zip(self.summary.chunk_indexes, self.counts, strict=True):
-                for channel, log_ns, data in _messages(stream, chunk, there) if there.keys() & counts else ():
-                    if log_ns < last_ns:
-                        raise ValueError(f"after {last_ns} ns comes {log_ns} ns")
-                    last_ns = log_ns
-                    yield there[channel], data
+            chunks = (_messages(stream, chunk, there) for chunk, counts in indexed if there.keys() & counts)
+            for channel, log_ns, data in chain.from_iterable(chunks):
+                if log_ns < last_ns:
+                    raise ValueError(f"after {last_ns} ns comes {log_ns} ns")
+                last_ns = log_ns
+                yield there[channel], data
 
     def messages(self, topics: Iterable[Topic]) -> Iterator[tuple[Topic, Any]]:
         """The messages of `raw`."""
@@ -355,17 +358,39 @@ class Bag:
             for topic, data in self.raw(topics):
                 yield topic, TYPES.deserialize_cdr(data, topic.type_name)
 
-    def nth(self, topic: Topic, number: int) -> memoryview:
-        """A topic's message of that number, of which only its chunk is read. Raises SequenceError for none."""
-        channel, skipped = self._channel(topic), number
+    def nth(self, topics: Sequence[Topic], number: int) -> list[tuple[Topic, memoryview]]:
+        """Each topic's message of that number, of which only their chunks are read. Raises SequenceError for none."""
+        places = {topic: self._place(topic, number) for topic in topics}
+        found = dict[Topic, memoryview]()
         with parsing(self.path), BoundedFile(self.path) as stream:
-            for chunk, counts in zip(self.summary.chunk_indexes, self.counts, strict=True):
-                if 0 <= skipped < counts.get(channel, 0):
-                    for _, _, data in islice(_messages(stream, chunk, {channel}), skipped, None):
-                        return data
-                    raise ValueError(f"a chunk has {skipped} messages of {topic.name} where the index has more")
-                skipped -= counts.get(channel, 0)
+            for place in sorted({at for at, _ in places.values()}):
+                numbers = {topic: within for topic, (at, within) in places.items() if at == place}
+                found.update(self._picked(stream, self.summary.chunk_indexes[place], numbers))
+        return [(topic, found[topic]) for topic in topics]
+
+    def _place(self, topic: Topic, number: int) -> tuple[int, int]:
+        """Which chunk has a topic's message of that number, and its number there."""
+        channel, within = self._channel(topic), number
+        for at, counts in enumerate(self.counts):
+            if 0 <= within < counts.get(channel, 0):
+                return at, within
+            within -= counts.get(channel, 0)
         raise SequenceError(f"{topic.name} has {self.count(topic)} messages and none numbered {number} in {self.path}")
+
+    def _picked(
+        self, stream: BinaryIO, chunk: ChunkIndex, numbers: Mapping[Topic, int]
+    ) -> Iterator[tuple[Topic, memoryview]]:
+        """Of each topic the message of its number in a chunk."""
+        wanted, passed = {self._channel(topic): topic for topic in numbers}, Counter[Topic]()
+        for channel, _, data in _messages(stream, chunk, wanted):
+            topic = wanted[channel]
+            if passed[topic] == numbers[topic]:
+                yield topic, data
+            passed[topic] += 1
+            if all(passed[topic] > number for topic, number in numbers.items()):
+                return
+        short = next(topic for topic, number in numbers.items() if passed[topic] <= number)
+        raise ValueError(f"a chunk has {passed[short]} messages of {short.name} where the index has more")
 
     def stamps(self, topic: Topic) -> Numbers:
         """Log times in ns (N,) of a topic's messages by their indexes, which have no checksum; no chunk is read."""

@@ -19,9 +19,9 @@ from vobench.geometry.camera import (
     Pinhole,
     camera_matrix,
 )
-from vobench.geometry.rectify import projection, rectification
-from vobench.geometry.rig import Rig
+from vobench.geometry.rig import Rig, projection, rectification
 from vobench.geometry.se3 import Array
+from vobench.sequence.picture import CHANNELS, MONO, RGB
 
 WORLD, BODY, LEFT, RIGHT, IMU_FRAME = "map", "base_link", "cam_left", "cam_right", "imu"
 SENSORS_FILE, TRUTH_FILE = "sensors.mcap", "truth.mcap"
@@ -202,9 +202,13 @@ def _own_matrix(camera: Camera) -> Array:
     return camera.K
 
 
-def image(t_ns: int, frame_id: str, encoded: bytes, form: str) -> Any:
-    """A sensor_msgs/CompressedImage; `form` is png or jpeg."""
-    return message(LEFT_IMAGE, t_ns, frame_id, form, np.frombuffer(encoded, np.uint8))
+def image(t_ns: int, frame_id: str, encoded: bytes, form: str, colour: str = MONO) -> Any:
+    """A sensor_msgs/CompressedImage; `form` is png or jpeg, which says all of a grey picture.
+
+    Others are named as ROS's compressed_image_transport names them: "rgb8; png compressed bgr8".
+    """
+    named = form if colour == MONO else f"{colour}; {form} compressed {'bgr8' if colour == RGB else MONO}"
+    return message(LEFT_IMAGE, t_ns, frame_id, named, np.frombuffer(encoded, np.uint8))
 
 
 def message(topic: Topic, t_ns: int, frame_id: str, *fields: Any) -> Any:
@@ -302,15 +306,18 @@ def pictured(template: bytes, t_ns: int, encoded: bytes) -> bytes:
     return b"".join((*head, LENGTH.pack(len(encoded)), encoded))
 
 
-def picture_in(data: memoryview) -> tuple[int, str, memoryview]:
-    """Stamp in ns, form and picture of a serialised CompressedImage. Raises ValueError where it is none."""
+def picture_in(data: memoryview) -> tuple[int, str, str, memoryview]:
+    """Stamp in ns, form, colour and picture of a serialised CompressedImage. Raises ValueError where it is none."""
     if data[: len(LITTLE_ENDIAN)] != LITTLE_ENDIAN:
         raise ValueError("a picture's message is not in little-endian CDR")
     sec, nanosec = STAMP.unpack_from(data, STAMP_AT)
     _, at = _string(data, STAMP_AT + STAMP.size)  # the frame
-    form, at = _string(data, at)
+    named, at = _string(data, at)
+    colour, _, form = named.rpartition("; ")
+    if (colour or MONO) not in CHANNELS:
+        raise ValueError(f"a picture has the unknown format {named!r}")
     begin, end = _counted(data, at)
-    return sec * NS_PER_S + nanosec, form, data[begin:end]
+    return sec * NS_PER_S + nanosec, form.partition(" ")[0], colour or MONO, data[begin:end]
 
 
 def _string(data: memoryview, at: int) -> tuple[str, int]:

@@ -29,41 +29,66 @@ def write_png(path: Path, picture: NDArray[np.unsignedinteger[Any]]) -> None:
     path.write_bytes(cv2.imencode(".png", np.ascontiguousarray(in_cv_order))[1].tobytes())
 
 
-def encode(image: Image, camera: Camera, name: str, *, jpeg_quality: int | None = None) -> bytes:
-    """A grey picture as PNG, or as JPEG of a quality. Raises SequenceError where it is not what the camera takes.
+# What pictures can be, by the names that ROS has for them, and their channels.
+MONO, RGB, BAYER = "mono8", "rgb8", "bayer_rggb8"
+CHANNELS = {MONO: 1, RGB: 3, BAYER: 1}
+RGB_SHAPE: tuple[tuple[int, ...], ...] = ((), (3,))
+
+
+def grey(image: Image, colour: str) -> Image:
+    """The picture (H, W) as grey as a television makes it: 0.299 red + 0.587 green + 0.114 blue (ITU-R BT.601)."""
+    if colour == MONO:
+        return image
+    return cv2.cvtColor(image, cv2.COLOR_RGB2GRAY if colour == RGB else cv2.COLOR_BayerRGGB2GRAY).astype(np.uint8)
+
+
+def rgb(image: Image, colour: str) -> Image:
+    """The picture as red, green and blue (H, W, 3); a mosaic is interpolated."""
+    ways = {MONO: cv2.COLOR_GRAY2RGB, BAYER: cv2.COLOR_BayerRGGB2RGB}
+    return image if colour == RGB else cv2.cvtColor(image, ways[colour]).astype(np.uint8)
+
+
+def encode(
+    image: Image, camera: Camera | None, name: str, *, jpeg_quality: int | None = None, colour: str = MONO
+) -> bytes:
+    """A grey or RGB picture as PNG or as JPEG of a quality. Raises SequenceError where it is not the camera's.
 
     PNG gets no compression level: OpenCV's default strategy is both faster and smaller than any level.
     """
-    if image.shape != (camera.height_px, camera.width_px) or image.dtype != np.uint8:
-        raise SequenceError(
-            f"{name} takes ({camera.height_px}, {camera.width_px}) uint8 pictures, got {image.shape} {image.dtype}"
-        )
+    takes = ((camera.height_px, camera.width_px) if camera else image.shape[:2]) + RGB_SHAPE[colour == RGB]
+    if image.shape != takes or image.dtype != np.uint8:
+        raise SequenceError(f"{name} takes {takes} uint8 pictures, got {image.shape} {image.dtype}")
+    image = np.ascontiguousarray(image[..., ::-1]) if image.ndim == 3 else image  # OpenCV begins with blue
     if jpeg_quality is None:
         return cv2.imencode(".png", image)[1].tobytes()
     return cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality])[1].tobytes()
 
 
-def decode(encoded: Encoded, camera: Camera | None, name: str) -> Image:
-    """A grey picture (H, W) of a PNG or JPEG, by its header first. Raises SequenceError, also for another size."""
-    size = require_grey(encoded, camera, name)[1:]
+def decode(encoded: Encoded, camera: Camera | None, name: str, *, colour: str = MONO) -> Image:
+    """A picture (H, W), or (H, W, 3) of rgb8, by its header first. Raises SequenceError, also for another size."""
+    size = require_picture(encoded, camera, name, colour=colour)[1:]
     image = cv2.imdecode(np.frombuffer(encoded, np.uint8), cv2.IMREAD_UNCHANGED)
-    if image is None or image.shape != size or image.dtype != np.uint8:
-        raise SequenceError(f"not a whole 8-bit grey PNG or JPEG: {name}")
-    return image.astype(np.uint8, copy=False)
+    if image is None or image.shape != size + RGB_SHAPE[colour == RGB] or image.dtype != np.uint8:
+        raise SequenceError(f"not a whole 8-bit {_looks(colour)} PNG or JPEG: {name}")
+    return (np.ascontiguousarray(image[..., ::-1]) if colour == RGB else image).astype(np.uint8, copy=False)
 
 
-def require_grey(encoded: Encoded, camera: Camera | None, name: str) -> tuple[str, int, int]:
-    """Form, height and width by a header. Raises SequenceError where it is not 8-bit grey, or not the camera's size."""
+def require_picture(encoded: Encoded, camera: Camera | None, name: str, *, colour: str = MONO) -> tuple[str, int, int]:
+    """Form, height and width by a header. Raises SequenceError where it is not 8-bit, the colour's or the camera's."""
     try:
         found = header(encoded.data if isinstance(encoded, np.ndarray) else memoryview(encoded))
         form, height, width, bits, components = found
     except struct.error:
         raise SequenceError(f"the picture ends within its header: {name}") from None
-    if bits != 8 or components != 1 or not 0 < height * width <= MAX_PX:
-        raise SequenceError(f"not an 8-bit grey PNG or JPEG: {name}")
+    if bits != 8 or components != CHANNELS[colour] or not 0 < height * width <= MAX_PX:
+        raise SequenceError(f"not an 8-bit {_looks(colour)} PNG or JPEG: {name}")
     if camera and (height, width) != (camera.height_px, camera.width_px):
         raise SequenceError(f"{(height, width)} pixels, but the camera has {camera.height_px, camera.width_px}: {name}")
     return form, height, width
+
+
+def _looks(colour: str) -> str:
+    return "RGB" if colour == RGB else "grey"
 
 
 def header(encoded: memoryview) -> tuple[str, int, int, int, int]:

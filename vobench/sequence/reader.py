@@ -21,7 +21,7 @@ from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag, parsing, part_of
 from vobench.sequence.calibration import read_rig
 from vobench.sequence.messages import picture_in
-from vobench.sequence.picture import Image, decode
+from vobench.sequence.picture import MONO, Image, decode
 from vobench.sequence.pixel_truth import names_from_json, truth_topic, truth_topics, truth_values
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
@@ -30,12 +30,13 @@ LONGEST_PATH = 60  # characters of it in a repr
 
 @dataclass(frozen=True, slots=True)
 class StereoFrame:
-    """Grey pictures (H, W) uint8 of one instant; no `right` one where the rig has one camera."""
+    """Pictures (H, W) uint8 of one instant, (H, W, 3) where `colour` is rgb8; no `right` where there is one camera."""
 
     index: int
     t_ns: int
     left: Image
     right: Image | None
+    colour: str = MONO
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,7 @@ class EncodedFrame:
     form: str
     left: bytes
     right: bytes | None
+    colour: str = MONO
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +100,11 @@ class Sequence:
         """One message of each camera. Raises SequenceError where they are not of one instant."""
         topics, messages = zip(*pictures, strict=True)
         with parsing(self.path):
-            stamps, forms, encoded = zip(*map(picture_in, messages), strict=True)
+            stamps, forms, colours, encoded = zip(*map(picture_in, messages), strict=True)
         if topics != self._image_topics or len(set(stamps)) > 1:
             raise SequenceError(f"frame {index} is no left and right picture of one stamp in {self.path}")
         left, *others = map(bytes, encoded)
-        return EncodedFrame(index, stamps[0], forms[0], left, others[0] if others else None)
+        return EncodedFrame(index, stamps[0], forms[0], left, others[0] if others else None, colours[0])
 
     def frames(self, *, right: bool = True) -> Iterator[StereoFrame]:
         """The frames in order, the right picture only where it is wanted; one frame at a time is held in memory."""
@@ -111,14 +113,14 @@ class Sequence:
 
     def _decoded(self, frame: EncodedFrame) -> StereoFrame:
         name = f"picture {frame.index} of {self.path}"
-        left, right = decode(frame.left, self.rig.left, f"left {name}"), None
+        left, right = decode(frame.left, self.rig.left, f"left {name}", colour=frame.colour), None
         if frame.right is not None:
-            right = decode(frame.right, self.rig.camera("right"), f"right {name}")
-        return StereoFrame(frame.index, frame.t_ns, left, right)
+            right = decode(frame.right, self.rig.camera("right"), f"right {name}", colour=frame.colour)
+        return StereoFrame(frame.index, frame.t_ns, left, right, frame.colour)
 
     def frame(self, index: int) -> StereoFrame:
         """One frame, of which only its part of the file is read. Raises SequenceError where there is none."""
-        return self._decoded(self._encoded(index, [(t, self.bag.nth(t, index)) for t in self._image_topics]))
+        return self._decoded(self._encoded(index, self.bag.nth(self._image_topics, index)))
 
     def frame_at(self, t_ns: int) -> StereoFrame:
         """The last frame at or before an instant. Raises SequenceError where there is none yet."""
@@ -246,8 +248,8 @@ def payload_hash(folder: Path) -> str:
 
 def _pixels(data: memoryview, path: Path) -> bytes:
     with parsing(path):
-        t_ns, _, encoded = picture_in(data)
-    image = decode(encoded, None, f"a picture of {path}")
+        t_ns, _, colour, encoded = picture_in(data)
+    image = decode(encoded, None, f"a picture of {path}", colour=colour)
     return f"{t_ns} {image.shape}\n".encode() + image.tobytes()
 
 

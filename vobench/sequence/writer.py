@@ -20,7 +20,7 @@ from vobench.sequence import messages as ros
 from vobench.sequence.bag import BagWriter
 from vobench.sequence.calibration import write_mounts
 from vobench.sequence.messages import pictured, serialise, stamped
-from vobench.sequence.picture import Image, encode, require_grey
+from vobench.sequence.picture import MONO, Image, encode, require_picture
 from vobench.sequence.pixel_truth import check_truth, names_to_json, truth_image, truth_topic, truth_topics
 
 NAMES = (ros.LEFT, ros.RIGHT)
@@ -34,7 +34,8 @@ class SequenceWriter:
     Stamps are `t_ns`, int64, from `start_ns`, which what never changes is stamped with. Calls come in order of
     time: readings up to a frame's stamp before that frame. The case goes with the truth, for it holds seeds and
     path, and so do `notes` on an import, the versions of `provenance`, what is true of pixels and `true_rig`,
-    where it is not the `rig` that estimators are told. Pictures are PNG, or JPEG of a quality from 1 to 100.
+    where it is not the `rig` that estimators are told. Pictures are PNG, or JPEG of a quality from 1 to 100, and of
+    one `colour`: mono8, rgb8 or bayer_rggb8.
     Raises SequenceError where stamps fall, or what is written is not what the rig says.
     """
 
@@ -46,6 +47,7 @@ class SequenceWriter:
         case_json: bytes | None,
         true_rig: Rig | None = None,
         jpeg_quality: int | None = None,
+        colour: str = MONO,
         truth_channels: Sequence[str] = (),
         truth_names: TruthNames | None = None,
         start_ns: int = 0,
@@ -53,7 +55,7 @@ class SequenceWriter:
         provenance: Mapping[str, str] | None = None,
     ) -> None:
         self._rig, self._true_rig, self._channels = rig, true_rig or rig, check_channels(truth_channels)
-        self._jpeg_quality = jpeg_quality
+        self._jpeg_quality, self._colour = jpeg_quality, colour
         self._info = [serialise(info) for info in ros.camera_infos(0, rig)]
         self._form, self._blank = "", [b""]
         folder.mkdir(parents=True, exist_ok=True)
@@ -83,20 +85,20 @@ class SequenceWriter:
             bag.flush()
 
     def write_frame(self, t_ns: int, left: Image, right: Image | None) -> None:
-        """Add the picture of each camera, (H, W) uint8, with its calibration."""
+        """Add the picture of each camera, (H, W) or (H, W, 3) uint8, with its calibration."""
         form = "png" if self._jpeg_quality is None else "jpeg"
         cameras = [self._rig.camera(side) for side in self._rig.sides]
         encoded = [
-            encode(picture, camera, name, jpeg_quality=self._jpeg_quality)
+            encode(picture, camera, name, jpeg_quality=self._jpeg_quality, colour=self._colour)
             for picture, camera, name in zip(self._present(left, right), cameras, NAMES, strict=False)
         ]
         self._write_pictures(t_ns, encoded, form)
 
     def write_encoded_frame(self, t_ns: int, left: bytes, right: bytes | None, form: str) -> None:
-        """Add pictures that are 8-bit grey PNG or JPEG already, bit for bit; `form` is png or jpeg."""
+        """Add pictures that are 8-bit PNG or JPEG already, bit for bit; `form` is png or jpeg."""
         encoded = self._present(left, right)
         for side, name, picture in zip(self._rig.sides, NAMES, encoded, strict=False):
-            found = require_grey(picture, self._rig.camera(side), name)[0]
+            found = require_picture(picture, self._rig.camera(side), name, colour=self._colour)[0]
             if found != form:
                 raise SequenceError(f"{name} should be {form} but is {found}")
         self._write_pictures(t_ns, encoded, form)
@@ -112,7 +114,8 @@ class SequenceWriter:
         stop.check()
         t_ns = int(t_ns)
         if form != self._form:
-            self._form, self._blank = form, [serialise(ros.image(0, name, b"", form)) for name in NAMES]
+            self._form = form
+            self._blank = [serialise(ros.image(0, name, b"", form, self._colour)) for name in NAMES]
         for topic, info in zip(ros.INFO_TOPICS, self._info, strict=False):
             self._sensors.write(topic, t_ns, stamped(info, t_ns))
         for topic, blank, picture in zip(ros.IMAGE_TOPICS, self._blank, encoded, strict=False):

@@ -2,7 +2,8 @@
 
 Beside the suite that asks, in <kind>s/ and then in its own folder; ./<kind>s/; <folder>/<kind>s/ for each folder of
 $VOBENCH_PATH; installed entry points (groups vobench.scenes, vobench.suites, vobench.estimators); what vobench
-brings along. A scene or suite is <name>.yaml, an estimator a folder <name>/ with an estimator.yaml.
+brings along. A suite is <name>.yaml, an estimator a folder <name>/ with an estimator.yaml; a scene is <name>.yaml, a
+folder <name>/ with a scene.yaml, or a model <name>.glb.
 """
 
 import os
@@ -15,10 +16,16 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
+from vobench.asset import MODEL_SUFFIXES
 from vobench.errors import UnknownNameError, unknown
 
 Kind = Literal["scene", "suite", "estimator"]
 KINDS: tuple[Kind, ...] = ("suite", "scene", "estimator")
+FORMS: dict[Kind, tuple[str, ...]] = {
+    "suite": ("{}.yaml",),
+    "scene": ("{}.yaml", "{}/scene.yaml", "{}.glb"),
+    "estimator": ("{}/estimator.yaml",),
+}
 SUITE_KEY = re.compile(rb"^estimators\s*:", re.MULTILINE)
 
 
@@ -26,7 +33,7 @@ SUITE_KEY = re.compile(rb"^estimators\s*:", re.MULTILINE)
 class Entry:
     """Something with a name, where it lies, and which stop of the search order it came from.
 
-    `path` is the YAML file of a scene or suite, the folder of an estimator.
+    `path` is the file of a scene or suite, the folder of an estimator.
     """
 
     kind: Kind
@@ -57,7 +64,7 @@ def find(kind: Kind, name: str, *, suite: Path | None = None) -> Entry:
     all known ones.
     """
     path = Path(name)
-    if path.suffix in {".yaml", ".yml"} or "/" in name or os.sep in name:
+    if path.suffix in {".yaml", ".yml", *MODEL_SUFFIXES} or "/" in name or os.sep in name:
         return _at(kind, path, suite)
     for entry in _all(kind, suite, name=name):
         return entry
@@ -67,11 +74,13 @@ def find(kind: Kind, name: str, *, suite: Path | None = None) -> Entry:
 def _at(kind: Kind, path: Path, suite: Path | None) -> Entry:
     if kind == "estimator" and path.name == "estimator.yaml":
         path = path.parent
+    if kind == "scene" and path.is_dir():
+        path /= "scene.yaml"
     wanted = path / "estimator.yaml" if kind == "estimator" else path
     if not wanted.is_file():
         known = ", ".join(_names(kind, suite)) or "none"
         raise UnknownNameError(f"no {kind} file at {wanted}. Known by name: {known}")
-    return Entry(kind, path.resolve().name if kind == "estimator" else path.stem, path.resolve(), "path")
+    return Entry(kind, _name(kind, path.resolve()), path.resolve(), "path")
 
 
 def _names(kind: Kind, suite: Path | None) -> list[str]:
@@ -94,7 +103,8 @@ def _installed(kind: Kind) -> Iterator[Entry]:
     for point in entry_points(group=f"vobench.{kind}s"):
         spec = find_spec(point.value)
         for folder in spec.submodule_search_locations or [] if spec else []:
-            path = Path(folder) if kind == "estimator" else Path(folder) / f"{point.name}.yaml"
+            found = [Path(folder, form.format(point.name)) for form in (*FORMS[kind], "scene.yaml")]
+            path = Path(folder) if kind == "estimator" else next((p for p in found if p.is_file()), found[0])
             yield Entry(kind, point.name, path, f"installed: {point.dist.name if point.dist else point.value}")
 
 
@@ -102,12 +112,16 @@ def _in_folder(kind: Kind, folder: Path, origin: str, name: str | None) -> Itera
     if name in ("", ".", ".."):
         return
     named = "*" if name is None else escape(name)
+    for form in FORMS[kind]:
+        for path in sorted(folder.glob(form.format(named))):
+            own = path.parent if kind == "estimator" else path
+            yield Entry(kind, _name(kind, own), own.resolve(), origin)
+
+
+def _name(kind: Kind, path: Path) -> str:
     if kind == "estimator":
-        paths = (manifest.parent for manifest in folder.glob(f"{named}/estimator.yaml"))
-    else:
-        paths = iter(folder.glob(f"{named}.yaml"))
-    for path in sorted(paths):
-        yield Entry(kind, path.name if kind == "estimator" else path.stem, path.resolve(), origin)
+        return path.name
+    return path.parent.name if kind == "scene" and path.name == "scene.yaml" else path.stem
 
 
 def _is_suite(path: Path) -> bool:

@@ -29,7 +29,7 @@ class Manifest:
     name: Annotated[str, Matching(r"[a-z][a-z0-9_]*", "lower-case letters, digits and _, a letter first")]
     version: Text
     class_path: Annotated[str, Matching(CLASS_PATH, "file:Class, as in 'estimator:Mine'")]
-    needs: tuple[Literal["stereo", "mono", "encoders", "imu"], ...] = ()
+    needs: tuple[Literal["stereo", "mono", "colour", "encoders", "imu"], ...] = ()
     pose_of: Literal["left_camera", "body"]
     summary: Text
     paper: str = ""

@@ -1,12 +1,14 @@
 """What a scene's YAML may say, beside the materials and levels of the room `scene`."""
 
-from dataclasses import replace
-from typing import Annotated, Literal
+from dataclasses import field, replace
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt, MinLen
 from numpy.typing import ArrayLike, NDArray
 
+from vobench.asset import FURNITURE, ROLES
+from vobench.asset.texture import Procedural
 from vobench.errors import SettingError
 from vobench.geometry.se3 import Array
 from vobench.scene.light import (
@@ -21,9 +23,9 @@ from vobench.scene.light import (
     Switched,
     require_increasing,
 )
-from vobench.scene.material import Glass, Matt, Mirror, Polished
+from vobench.scene.material import LUMINANCE, WHITE, Material, Rgb
 from vobench.scene.scene import ceiling_light
-from vobench.setting import ByKind, Name, NonNegative, OneOf, Positive, Triple, settings
+from vobench.setting import ByKind, Check, Name, NonNegative, OneOf, Positive, Share, Triple, settings
 
 
 @settings()
@@ -59,20 +61,102 @@ class LightOverride:
     level: LevelSpec | None = None
 
 
-# The light of anything larger would take more memory than machines have, and the renderer sees 60 m far.
-Side = Annotated[float, Gt(0), Le(30)]
+Colour = tuple[Share, Share, Share]  # linear red, green and blue
+
+
+def hue(colour: Colour) -> Rgb:
+    """The colour at luminance 1. Raises SettingError for black, which is no colour of light."""
+    luminance = float(np.array(colour) @ np.array(LUMINANCE))
+    if not luminance:
+        raise SettingError("light should not be black (got [0, 0, 0])")
+    red, green, blue = (channel / luminance for channel in colour)
+    return red, green, blue
+
+
+Hue = Annotated[Colour, Check(hue)]  # of light, whose power it leaves as it is
+
+
+# The light of anything larger would take more memory than machines have.
+Side = Annotated[float, Gt(0), Le(300)]
 Size = tuple[Side, Side, Side]
 Elevation = Annotated[float, Gt(0), Le(90)]
 
 
 @settings()
 class Luminous:
-    """A material of lamps: what has it shines evenly to all sides of its front."""
+    """A material of lamps: what has it shines evenly to all sides of its front, in the hue of a linear RGB `colour`."""
 
     kind: Literal["luminous"] = "luminous"
     luminance_cd_m2: Positive
+    colour: Hue = WHITE
+
+    def build(self) -> Material:
+        """The material."""
+        red, green, blue = (self.luminance_cd_m2 * channel for channel in hue(self.colour))
+        return Material(emission_cd_m2=(red, green, blue))
 
 
+Eta = Annotated[float, Ge(1), Le(4)]  # 1 is an open pane, or no coat
+Roughness = Annotated[float, Ge(0), Le(0.5)]
+
+
+@settings(kw_only=False)
+class Matt(Procedural):
+    """Reflects its texture's share of the light alike in all directions (Lambert), times its linear RGB `colour`."""
+
+    colour: Colour = WHITE
+    kind: Literal["matt"] = "matt"
+
+    def build(self) -> Material:
+        """The material."""
+        return Material(colour=self.colour, texture=self)
+
+
+@settings(kw_only=False)
+class Polished(Procedural):
+    """A texture as in Matt under a clear coat, such as waxed stone: matt below, and a mirror that grows to grazing.
+
+    `tint` scales what the coat mirrors; `roughness` is the RMS slope of its facets (GGX alpha), 0 for none.
+    """
+
+    eta: Eta = 1.5
+    tint: Share = 1.0
+    roughness: Roughness = 0.0
+    colour: Colour = WHITE
+    kind: Literal["polished"] = "polished"
+
+    def build(self) -> Material:
+        """The material."""
+        return Material(colour=self.colour, texture=self, eta=self.eta, tint=self.tint, roughness=self.roughness)
+
+
+@settings(kw_only=False)
+class Mirror:
+    """A metal that reflects the share `tint` at every angle; `roughness` as in Polished."""
+
+    tint: Share = 0.9
+    roughness: Roughness = 0.0
+    kind: Literal["mirror"] = "mirror"
+
+    def build(self) -> Material:
+        """The material."""
+        return Material("mirror", tint=self.tint, roughness=self.roughness)
+
+
+@settings(kw_only=False)
+class Glass:
+    """A thin pane: mirrors a little, lets the rest pass straight; `tint` scales what passes. It dims light, no more."""
+
+    eta: Eta = 1.5
+    tint: Share = 1.0
+    kind: Literal["glass"] = "glass"
+
+    def build(self) -> Material:
+        """The material."""
+        return Material("pane", eta=self.eta, tint=self.tint)
+
+
+Wall = Literal["north", "east", "south", "west"]
 MaterialSpec = Annotated[Matt | Polished | Mirror | Glass | Luminous, ByKind("material", default="matt")]
 
 
@@ -80,7 +164,7 @@ MaterialSpec = Annotated[Matt | Polished | Mirror | Glass | Luminous, ByKind("ma
 class WindowSpec:
     """A hole in a wall with a pane depth_m behind it; center_m is the place along the wall (world x or y) and z."""
 
-    wall: Literal["north", "east", "south", "west"]
+    wall: Wall
     center_m: tuple[float, float]
     size_m: tuple[Side, Side]
     depth_m: Annotated[float, Gt(0), Le(2)] = 0.15
@@ -90,12 +174,13 @@ class WindowSpec:
 
 @settings()
 class RoomSpec:
-    """Four walls, a floor at z = 0 and a ceiling, around the origin."""
+    """Four walls, a floor at z = 0 and a ceiling, around the origin; `walls` are those of another material."""
 
     size_m: Size
     floor: str
     wall: str
     ceiling: str
+    walls: dict[Wall, str] = field(default_factory=dict)
     windows: tuple[WindowSpec, ...] = ()
 
     @property
@@ -133,6 +218,34 @@ class BoardSpec:
 
 
 @settings()
+class FurnitureSpec:
+    """A piece of furniture that stands at at_m with its front towards yaw_deg; its chances hang on seed and name."""
+
+    kind: Annotated[str, OneOf("piece of furniture", FURNITURE)]
+    name: Name
+    at_m: Triple
+    yaw_deg: float = 0.0
+    pitch_deg: float = 0.0
+    size: dict[str, Any] = field(default_factory=dict)
+
+
+@settings()
+class ModelSpec:
+    """A model from a glTF, OBJ, STL or PLY file, with its origin at at_m; roles of its nodes by globs of their names.
+
+    `scale`: metres of the file's unit. `up`: its upward axis, where it is not what the format says.
+    """
+
+    file: Annotated[str, MinLen(1)]
+    name: Name | None = None
+    at_m: Triple = (0.0, 0.0, 0.0)
+    yaw_deg: float = 0.0
+    scale: Positive = 1.0
+    up: Literal["y", "z"] | None = None
+    roles: dict[str, Annotated[str, OneOf("role", ROLES)]] = field(default_factory=dict)
+
+
+@settings()
 class PanelLamp:
     """A level panel that shines down from a rectangle of size_m."""
 
@@ -141,12 +254,13 @@ class PanelLamp:
     center_m: Triple
     size_m: tuple[Side, Side]
     power_lm: NonNegative
+    colour: Hue = WHITE
     level: LevelSpec = STEADY
 
     def build(self) -> AreaLight:
         """The light."""
         panel = ceiling_light(self.name, np.asarray(self.center_m), self.size_m, power_lm=self.power_lm)
-        return replace(panel, level=self.level.build())
+        return replace(panel, level=self.level.build(), colour=hue(self.colour))
 
 
 @settings()
@@ -157,11 +271,12 @@ class PointLamp:
     kind: Literal["point"] = "point"
     center_m: Triple
     power_lm: NonNegative
+    colour: Hue = WHITE
     level: LevelSpec = STEADY
 
     def build(self) -> PointLight:
         """The light."""
-        return PointLight(self.name, np.asarray(self.center_m), self.power_lm, self.level.build())
+        return PointLight(self.name, np.asarray(self.center_m), self.power_lm, self.level.build(), hue(self.colour))
 
 
 @settings()
@@ -175,6 +290,7 @@ class SpotLamp:
     inner_deg: Annotated[float, Ge(0), Lt(90)] = 20.0
     outer_deg: Annotated[float, Gt(0), Lt(90)] = 30.0
     power_lm: NonNegative
+    colour: Hue = WHITE
     level: LevelSpec = STEADY
 
     def __post_init__(self) -> None:
@@ -188,7 +304,9 @@ class SpotLamp:
         center, level = np.asarray(self.center_m), self.level.build()
         way = np.asarray(self.target_m) - center
         direction: Array = way / np.linalg.norm(way)
-        return SpotLight(self.name, center, direction, self.power_lm, self.inner_deg, self.outer_deg, level)
+        return SpotLight(
+            self.name, center, direction, self.power_lm, self.inner_deg, self.outer_deg, level, hue(self.colour)
+        )
 
 
 LampSpec = Annotated[PanelLamp | PointLamp | SpotLamp, ByKind("lamp", default="panel")]
@@ -211,6 +329,7 @@ class SunSpec:
     azimuth_deg: float | None = None
     elevation_deg: Elevation | None = None
     path: tuple[SunKey, ...] = ()
+    colour: Hue = WHITE
     level: LevelSpec = STEADY
 
     def __post_init__(self) -> None:
@@ -226,6 +345,7 @@ class SkySpec:
 
     illuminance_lx: NonNegative
     kind: Annotated[str, OneOf("sky", SKIES)] = "overcast"
+    colour: Hue = WHITE
     level: LevelSpec = STEADY
 
 
@@ -240,30 +360,53 @@ class PathKey:
 
 @settings()
 class MoverSpec:
-    """A box that goes straight from key to key, its middle at position_m; again and again where it repeats."""
+    """What goes straight from key to key; again and again where it repeats.
+
+    It is a box around position_m of size_m and material, or a piece of furniture or a model that stands there.
+    """
 
     name: Name
-    size_m: Size
-    material: str
+    size_m: Size | None = None
+    material: str | None = None
+    kind: Annotated[str, OneOf("piece of furniture", FURNITURE)] | None = None
+    file: str | None = None
     path: Annotated[tuple[PathKey, ...], MinLen(2)]
     repeats: bool = False
 
     def __post_init__(self) -> None:
         require_increasing([key.t_s for key in self.path])
+        if (self.size_m is None) != (self.material is None):
+            raise SettingError("a box that moves should have both size_m and material")
+        if sum(shape is not None for shape in (self.size_m, self.kind, self.file)) != 1:
+            raise SettingError(
+                "should be a box with size_m and material, or a kind of furniture, or the file of a model"
+            )
 
 
 @settings()
 class SceneFile:
-    """A scene, and the luminance of matt white that cameras are exposed for."""
+    """A scene, and the luminance of matt white that cameras are exposed for.
+
+    What stands in it: a room, boxes, boards, furniture, models, and what `maker`, a Python file, makes. Files are named
+    from where the scene's own lies. `seed` decides what furniture and makers leave to chance.
+    """
 
     name: Name
     summary: str = ""
     white_cd_m2: Positive
-    materials: dict[Name, MaterialSpec]
-    room: RoomSpec
+    materials: dict[Name, MaterialSpec] = field(default_factory=dict)
+    room: RoomSpec | None = None
     boxes: tuple[BoxSpec, ...] = ()
     boards: tuple[BoardSpec, ...] = ()
+    furniture: tuple[FurnitureSpec, ...] = ()
+    meshes: tuple[ModelSpec, ...] = ()
+    maker: str | None = None
+    seed: Annotated[int, Ge(0)] = 0
     lamps: tuple[LampSpec, ...] = ()
     sun: SunSpec | None = None
     sky: SkySpec | None = None
     movers: tuple[MoverSpec, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not (self.room or self.maker or any((self.boxes, self.boards, self.furniture, self.meshes))):
+            raise SettingError("a scene needs something to see: room, boxes, boards, furniture, meshes or a maker")

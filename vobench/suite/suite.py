@@ -1,7 +1,6 @@
 """What a suite's YAML may say, and the plan that follows: cases, entrants, trials."""
 
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from itertools import product
@@ -13,6 +12,7 @@ from annotated_types import Ge, Le, MinLen
 from vobench.errors import SettingError, SuiteError, unknown
 from vobench.geometry.rig import PRESETS, CalibrationError, Rig, mounted, true_rig
 from vobench.motion.replay import Replay
+from vobench.motion.wheeled import Wheeled
 from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import SENSOR_PRESETS, CameraSettings
 from vobench.sensor.imu import IMUS, ImuSettings
@@ -23,7 +23,7 @@ from vobench.suite.catalog import Entry, Kind
 from vobench.suite.manifest import Manifest, read_manifest
 from vobench.suite.scene_spec import LightOverride, SceneFile
 from vobench.suite.source import SOURCES, RecordedCase, Source, recorded_cases
-from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times, wheels_of
+from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times
 from vobench.suite.yaml_file import Mistakes, YamlFile
 
 NEEDED = ("scenes", "rigs", "trajectories")
@@ -156,11 +156,14 @@ class Case:
 
     def build_scene(self) -> Scene:
         """The scene under this case's lighting."""
-        return scene_file.build(self.scene, self.lighting)
+        from vobench.suite.scene_build import build
+
+        return build(self.scene, self.lighting)
 
     def build_rig(self) -> Rig:
         """The sensors on the body as their calibration has them: what estimators are told."""
-        return replace(self.rig.build(), wheels=wheels_of(self.trajectory))
+        spec = self.trajectory
+        return replace(self.rig.build(), wheels=spec.wheels if isinstance(spec, Wheeled) else None)
 
     def build_true_rig(self) -> Rig:
         """The stereo pair as it is: what pictures are made with. Raises VobenchError, as `true_rig` does."""
@@ -213,14 +216,6 @@ class Plan:
     def trials(self, case: Case | RecordedCase) -> list[Trial]:
         """Every trial on one case."""
         return [Trial(case, entrant, n) for entrant in self.entrants for n in range(self.suite.repeats)]
-
-    @contextmanager
-    def at(self, *keys: int | str) -> Iterator[None]:
-        """Errors of the block name this place in the suite's file."""
-        wrong = self.mistakes()
-        with wrong.at(*keys):
-            yield
-        wrong.require_none()
 
     def mistakes(self) -> Mistakes:
         """To gather what is wrong with the suite."""
@@ -276,9 +271,7 @@ class _Planner:
         entrants = list[Entrant]()
         for index, spec in listed.items():
             with self.wrong.at("estimators", index):
-                entrant = self._entrant(spec, index)
-                _require_new_label(entrant, entrants)
-                entrants.append(entrant)
+                entrants.append(self._entrant(spec, index, entrants))
         return tuple(entrants)
 
     def _asked_for(self, only: tuple[str, ...], listed: dict[int, EstimatorSettings]) -> tuple[Entrant, ...]:
@@ -288,20 +281,21 @@ class _Planner:
         """
         entrants = list[Entrant]()
         for name in only:
-            indexes = [index for index, spec in listed.items() if name == (spec.label or spec.name)]
-            index = indexes[0] if indexes else None
-            entrant = self._entrant(EstimatorSettings(name=name) if index is None else listed[index], index)
-            _require_new_label(entrant, entrants)
-            entrants.append(entrant)
+            index = next((index for index, spec in listed.items() if name == (spec.label or spec.name)), None)
+            spec = EstimatorSettings(name=name) if index is None else listed[index]
+            entrants.append(self._entrant(spec, index, entrants))
         return tuple(entrants)
 
-    def _entrant(self, spec: EstimatorSettings, index: int | None = None) -> Entrant:
+    def _entrant(self, spec: EstimatorSettings, index: int | None, earlier: list[Entrant]) -> Entrant:
         folder = self._find("estimator", spec.name).path
         manifest = read_manifest(folder)
         for key, value in spec.params.items():
             with self.wrong.at("estimators", index or 0, "params", key):
                 _check_param(key, value, manifest.params)
-        return Entrant(spec.label or manifest.name, folder, manifest, {**manifest.params, **spec.params})
+        label = spec.label or manifest.name
+        if label in [other.label for other in earlier]:
+            raise SuiteError(f"two estimators are called '{label}'; give one a label of its own")
+        return Entrant(label, folder, manifest, {**manifest.params, **spec.params})
 
     def _scenes(self) -> dict[str, SceneFile]:
         """The scenes by their files' names, which name a case's place on this axis; lightings are checked on each."""
@@ -316,12 +310,13 @@ class _Planner:
                 scenes[entry.name], wrong = scene_file.survey(entry.path)
                 self._check_lightings(scenes[entry.name], wrong)
                 wrong.require_none()
-                scene_file.build(scenes[entry.name], {})
         return scenes
 
     def _check_lightings(self, scene: SceneFile, wrong: Mistakes) -> None:
         """A lighting that names no lamp is an error now, not after an hour."""
-        lights = () if wrong.found else scene_file.lights(scene)
+        from vobench.suite.scene_build import build
+
+        lights = () if wrong.found else build(scene, {}).lights
         for lighting, overrides in self.suite.lightings.items():
             for name, override in overrides.items():
                 with self.wrong.at("lightings", lighting, name):
@@ -369,10 +364,12 @@ class _Planner:
         recorded = list[RecordedCase]()
         for index, spec in enumerate(self.suite.source):
             with self.wrong.at("source", index):
-                cases = list(recorded_cases(spec, self._folder(), entry=index))
-                recorded += cases
-                _require_new(cases, taken)
-            taken = taken | {case.name for case in recorded}
+                recorded += recorded_cases(spec, self._folder(), entry=index)
+        for case in recorded:
+            with self.wrong.at("source", case.entry):
+                if case.name in taken:
+                    raise SuiteError(f"two cases are called '{case.name}'; name one another: {case.source.path}")
+            taken = taken | {case.name}
         return tuple(recorded)
 
 
@@ -384,11 +381,6 @@ def _combinations(axes: tuple[dict[str, Any], ...]) -> Iterator[tuple[str, dict[
         yield "-".join(differing) or variant["trajectory"], variant
 
 
-def _require_new_label(entrant: Entrant, earlier: list[Entrant]) -> None:
-    if entrant.label in [other.label for other in earlier]:
-        raise SuiteError(f"two estimators are called '{entrant.label}'; give one a label of its own")
-
-
 def _check_param(key: str, value: Any, defaults: dict[str, Any]) -> None:
     """A parameter of the manifest's, and of the kind of its value there; whole numbers may become fractions."""
     if key not in defaults:
@@ -396,14 +388,3 @@ def _check_param(key: str, value: Any, defaults: dict[str, Any]) -> None:
     kinds = [int if isinstance(v, float) else type(v) for v in (defaults[key], value)]
     if defaults[key] is not None and kinds[0] is not kinds[1]:
         raise SuiteError(f"parameter '{key}' should be of the kind of its default {defaults[key]!r}, got {value!r}")
-
-
-def _require_new(cases: list[RecordedCase], taken: set[str]) -> None:
-    """Raise SuiteError with all that are called as another case is."""
-    wrong = list[str]()
-    for case in cases:
-        if case.name in taken:
-            wrong.append(f"two cases are called '{case.name}'; name one another: {case.source.path}")
-        taken = taken | {case.name}
-    if wrong:
-        raise SuiteError(*wrong)

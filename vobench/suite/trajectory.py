@@ -8,7 +8,6 @@ from pydantic import ValidatorFunctionWrapHandler, WrapSerializer, WrapValidator
 
 from vobench.errors import SettingError, SuiteError, TrajectoryError
 from vobench.geometry import se3
-from vobench.geometry.rig import WheelGeometry
 from vobench.motion.course import Planar
 from vobench.motion.drive import Waypoints
 from vobench.motion.handheld import Handheld
@@ -56,16 +55,8 @@ def _of_mover(spec: Any, handler: Any) -> Any:
 
 
 TrajectorySpec = Annotated[
-    AnyTrajectory,
-    ByKind("trajectory", default="waypoints"),
-    WrapValidator(_fitting),
-    WrapSerializer(_of_mover),
+    AnyTrajectory, ByKind("trajectory", default="waypoints"), WrapValidator(_fitting), WrapSerializer(_of_mover)
 ]
-
-
-def wheels_of(spec: AnyTrajectory) -> WheelGeometry | None:
-    """The wheels of the body that goes there, None for one that leaves the floor."""
-    return spec.wheels if isinstance(spec, Wheeled) else None
 
 
 def read_times(spec: Replay, folder: Path) -> Stamps | None:

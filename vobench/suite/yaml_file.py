@@ -115,7 +115,9 @@ def read_all(path: Path, model: type[Model]) -> Reading[Model]:
     """The file as far as it can be read, and where its keys stand. Raises SuiteError where it is no such file."""
     source, twice = _parse(path)
     if not isinstance(source.marked, dict):
-        raise SuiteError(Mistake(f"should be keys with values, but is {_kind(source.marked)}", (source.place(()),)))
+        tree = source.marked
+        kind = "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
+        raise SuiteError(Mistake(f"should be keys with values, but is {kind}", (source.place(()),)))
     unread = dict(_unreadable(source.marked, ()))
     mistakes = [*twice, *(Mistake(sentence, (source.place(keys),)) for keys, sentence in unread.items())]
     data, wrong = _plain(source.marked), [*unread]
@@ -250,10 +252,6 @@ def _partial(model: type[Model], parts: dict[str, Any]) -> Model:
         if each.name in parts or default is not MISSING:
             object.__setattr__(lacking, each.name, parts.get(each.name, default))
     return lacking
-
-
-def _kind(tree: Any) -> str:
-    return "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
 
 
 UNKNOWN_KEY = "unexpected_keyword_argument"

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 import scipy
@@ -82,8 +82,17 @@ def level(x_m: Array, y_m: Array, heading_rad: Array) -> Array:
     return se3.transform(se3.rotation_z(heading_rad), np.stack([x_m, y_m, np.zeros_like(x_m)], -1))
 
 
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
+def along(T_world_body: Array, *, speed: Array, acceleration: Array, turn: Array, turn_rate: Array) -> Kinematics:
+    """A level body (K,) that goes along its own x axis alone, as wheels do."""
+    still = np.zeros_like(speed)
+    return Kinematics(
+        T_world_body,
+        velocity_mps=np.stack([speed, still, still], -1),
+        turn_radps=np.stack([still, still, turn], -1),
+        acceleration_mps2=np.stack([acceleration, speed * turn, still], -1),
+        turn_rate_radps2=np.stack([still, still, turn_rate], -1),
+    )
+
 
 LONGEST_S = 86_400.0
 SHORTEST_S = 1e-9  # of speeding up: an instant is a whole nanosecond
@@ -97,7 +106,7 @@ class TimeLaw:
     Raises MotionError where it lasts longer than a day.
     """
 
-    progress: "PPoly"
+    progress: "scipy.interpolate.PPoly"
 
     def __post_init__(self) -> None:
         if not self.end_s - self.start_s <= LONGEST_S:

@@ -38,14 +38,15 @@ def estimate_offset(gt: Trajectory, est: Trajectory) -> Offset:
     Every offset that leaves half of the shorter recording in common is tried. Source: Furgale et al. (2013).
     Raises AlignmentError for recordings too short, or that never turn nor move.
     """
-    step_ns = int(max(_median_step(gt), _median_step(est)))
+    step_ns = int(_step_ns(gt, est))
     _require_samples(gt, est, step_ns)
-    found = []
-    for a, b in _signals(gt, est, step_ns):
-        offsets_ns = gt.t_ns[0] - est.t_ns[0] + np.arange(-len(b) + 1, len(a)) * step_ns
+    window_ns, found = WINDOW_STEPS * step_ns, []
+    grids = [np.arange(t.t_ns[0], t.t_ns[-1] - window_ns, step_ns, dtype=np.int64) for t in (gt, est)]
+    for a, b in zip(speeds(gt, grids[0], window_ns), speeds(est, grids[1], window_ns), strict=True):
         correlation = _correlations(a, b)
         best = int(np.argmax(correlation))
-        found.append(Offset(int(offsets_ns[best]), float(correlation[best])))
+        offset_ns = int(gt.t_ns[0] - est.t_ns[0]) + (best - len(b) + 1) * step_ns
+        found.append(Offset(offset_ns, float(correlation[best])))
     coarse = max(found, key=lambda offset: offset.correlation)
     if coarse.correlation <= 0:
         raise AlignmentError("an offset in time needs motion, but the trajectories never turn nor move alike")
@@ -58,7 +59,7 @@ def estimate_offset(gt: Trajectory, est: Trajectory) -> Offset:
 
 def likeness(gt: Trajectory, est: Trajectory, offset_ns: int) -> float | None:
     """How alike (-1..1) both turn and move with the estimate's stamps moved by offset_ns; None where nothing tells."""
-    step_ns = int(max(_median_step(gt), _median_step(est)))
+    step_ns = int(_step_ns(gt, est))
     found = _likeness(gt, est, np.array([offset_ns]), WINDOW_STEPS * step_ns)
     return found[0] if found else None
 
@@ -68,16 +69,18 @@ def offsets_in_stretches(gt: Trajectory, est: Trajectory, *, within_ns: int) -> 
 
     A stretch too short to tell shows 0.
     """
-    step_ns = max(_median_step(gt), _median_step(est))
+    step_ns = _step_ns(gt, est)
     parts = np.array_split(np.arange(len(est)), STRETCHES)
     stretches = [Trajectory(est.t_ns[part], est.T_world_frame[part]) for part in parts if len(part) > 1]
     return np.array([_refined(gt, part, 0, step_ns, reach_ns=max(step_ns, within_ns)) for part in stretches], float)
 
 
-def _median_step(trajectory: Trajectory) -> float:
-    if len(trajectory) < 2:
-        raise AlignmentError(f"an offset in time needs two poses or more, got {len(trajectory)}")
-    return float(np.median(np.diff(trajectory.t_ns)))
+def _step_ns(gt: Trajectory, est: Trajectory) -> float:
+    """The longer of the median times between poses."""
+    for trajectory in (gt, est):
+        if len(trajectory) < 2:
+            raise AlignmentError(f"an offset in time needs two poses or more, got {len(trajectory)}")
+    return max(float(np.median(np.diff(trajectory.t_ns))) for trajectory in (gt, est))
 
 
 def _require_samples(gt: Trajectory, est: Trajectory, step_ns: int) -> None:
@@ -94,15 +97,6 @@ def speeds(trajectory: Trajectory, t_ns: Stamps, window_ns: int) -> tuple[Array,
     T_begin, T_end = poses_at(trajectory, t_ns), poses_at(trajectory, t_ns + window_ns)
     turned = se3.rotation_angle(np.swapaxes(T_begin[:, :3, :3], -1, -2) @ T_end[:, :3, :3])
     return turned, np.linalg.norm(T_end[:, :3, 3] - T_begin[:, :3, 3], axis=1)
-
-
-def _signals(gt: Trajectory, est: Trajectory, step_ns: int) -> list[tuple[Array, Array]]:
-    window_ns = WINDOW_STEPS * step_ns
-    grids = [np.arange(t.t_ns[0], t.t_ns[-1] - window_ns, step_ns, dtype=np.int64) for t in (gt, est)]
-    (gt_turn, gt_move), (est_turn, est_move) = (
-        speeds(t, grid, window_ns) for t, grid in zip((gt, est), grids, strict=True)
-    )
-    return [(gt_turn, est_turn), (gt_move, est_move)]
 
 
 def _correlations(a: Array, b: Array) -> Array:

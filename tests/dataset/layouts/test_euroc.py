@@ -14,8 +14,7 @@ from vobench.dataset.recording import ReadOptions
 from vobench.errors import VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady
-from vobench.geometry.rectify import rectification
-from vobench.geometry.rig import EUROC
+from vobench.geometry.rig import EUROC, rectification
 from vobench.sequence import Sequence, read_truth
 
 

@@ -1,44 +1,109 @@
 #version 410 core
 #extension GL_ARB_shading_language_420pack : require
-// Luminance of a surface, linear and unclipped: what its body scatters and what it mirrors.
+// Luminance of a surface's three channels, linear and unclipped: what its body scatters, what it mirrors, its glow.
 layout(std140, binding = 0) uniform Pass {
-    mat4 view_projection;
+    mat4 direct;
     vec4 eye;
     vec4 clip_plane;
     vec4 lod_bias;
-    mat4 direct;
     vec4 mirrors[3];
-};
+    vec4 ambient;  // what is mirrored where no mirror is followed
+    vec4 weights;  // of the channels in a picture that has one, and 1 / their sum
+    vec4 probe_centre;
+    vec4 probe_low;
+    vec4 probe_high;
+    vec4 probe_light;  // luminance around: all over, and how it rises towards a direction
+    vec4 probe_scale;  // the light now over that of the probe, and the number of glints
+    vec4 glints[12];   // place, intensity and axis of each
+} view;
+layout(std140, binding = 1) uniform Batch {
+    mat4 model;
+    vec4 colour;    // and the tint of what a coat mirrors
+    vec4 emission;  // and repeats of its texture in one of the body's
+    vec4 plane;     // of a mirror, where it is
+    vec4 coat;      // eta, what it sends back down, 1 / eta^2, illuminance over what enters
+    vec4 finish;    // metal, share of Fresnel's rise that roughness leaves, cut-out, roughness
+    vec4 blur;      // level of the probe, how much of it is shown; Fresnel's share square on
+} batch;
 layout(binding = 0) uniform sampler2D body_texture;
 layout(binding = 1) uniform sampler2D light_texture;
-uniform float body_scale;  // of the body's texture, over pi
-uniform float eta;
-uniform float tint;
-uniform float eye_height;  // distance of the eye from the mirroring plane
-#ifdef HAS_REFLECTION
 layout(binding = 2) uniform sampler2DArray reflection;
-#endif
-#ifdef HAS_ROUGHNESS
-layout(binding = 3) uniform sampler2D rough_reflection;
-#endif
+layout(binding = 3) uniform sampler2D emission_texture;
+layout(binding = 4) uniform samplerCube probe;
 
-in vec2 uv_albedo;
-in vec2 uv_light;
+in vec2 at_texture;
+in vec2 at_light;
 in vec3 to_eye;
+in vec3 facing;
 flat in int layer;
-#ifdef IS_MIRRORED
 in float before_mirror;
+layout(location = 0, index = 0) out vec4 frag_color;
+#ifdef IS_PANE
+#ifndef IS_GREY
+layout(location = 0, index = 1) out vec4 passes;
 #endif
-out vec4 frag_color;
+#endif
 
-// Share of unpolarised light that a boundary from air to eta reflects (Born and Wolf, section 1.5).
-float fresnel(float c)
+// What a grey surface does to light is one number; in a picture with one channel so is its light.
+#ifdef IS_GREY
+#define Shade float
+#define SHADE(c) (c).r
+#ifdef IS_MONO
+#define Light float
+#define LIGHT(c) dot(view.weights.rgb, c)
+#else
+#define Light vec3
+#define LIGHT(c) (c)
+#endif
+#else
+#define Shade vec3
+#define SHADE(c) (c).rgb
+#define Light vec3
+#define LIGHT(c) (c)
+#endif
+
+const float PI = 3.14159265358979;
+
+// Share of unpolarised light that a boundary from air to eta reflects (Born and Wolf, section 1.5), by one division.
+float fresnel(float c, float eta, float inverse_square)
 {
-    float inside = sqrt(1.0 - (1.0 - c * c) / (eta * eta));
-    float across = (c - eta * inside) / (c + eta * inside);
-    float along = (inside - eta * c) / (inside + eta * c);
-    return 0.5 * (across * across + along * along);
+    float inside = sqrt(1.0 - (1.0 - c * c) * inverse_square);
+    float across = c + eta * inside, along = inside + eta * c;
+    float a = (c - eta * inside) * along, b = (inside - eta * c) * across;
+    return 0.5 * (a * a + b * b) / (across * across * along * along);
 }
+
+const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
+
+#ifdef HAS_PROBE
+// What a probe shows along a ray, put right for where the ray starts in the room (Lagarde and Zanuttini, 2012).
+vec3 probed(vec3 from, vec3 ray)
+{
+    from = clamp(from, view.probe_low.xyz, view.probe_high.xyz);
+    vec3 reach = max((view.probe_low.xyz - from) / ray, (view.probe_high.xyz - from) / ray);
+    vec3 met = from + min(reach.x, min(reach.y, reach.z)) * ray;
+    return view.probe_scale.rgb * textureLod(probe, met - view.probe_centre.xyz, batch.blur.x).rgb;
+}
+
+// The lamps that no picture shows, as rough facets mirror them (GGX; Heitz 2014), where what arrives is not less
+// than one of them gives.
+vec3 glint(vec3 from, vec3 N, vec3 V, float arrives)
+{
+    vec3 light = vec3(0.0);
+    float alpha = batch.finish.w + 0.0025, squared = alpha * alpha, cv = max(abs(dot(N, V)), 0.01);
+    for (int i = 0; i < int(view.probe_scale.a); i++) {
+        vec4 place = view.glints[3 * i], power = view.glints[3 * i + 1], axis = view.glints[3 * i + 2];
+        vec3 way = place.xyz - place.w * from, L = normalize(way);
+        float cl = dot(N, L), edge = clamp((power.w - acos(clamp(-dot(L, axis.xyz), -1.0, 1.0))) * axis.w, 0.0, 1.0);
+        if (cl <= 0.0 || edge == 0.0) continue;
+        float h = dot(N, normalize(L + V)), peak = h * h * (squared - 1.0) + 1.0;
+        vec3 square_on = edge * power.rgb / (place.w > 0.0 ? dot(way, way) : 1.0);
+        float shows = smoothstep(0.5, 0.9, PI * arrives / max(cl * dot(LUMINANCE, square_on), 1e-9));
+        light += shows * square_on * cl * squared / (PI * peak * peak) * 0.5 / mix(2.0 * cl * cv, cl + cv, alpha);
+    }
+    return light;
+}
+#endif
 
 void main()
 {
@@ -46,37 +111,99 @@ void main()
     // Not clipped by OpenGL, which would move the ends of edges that must stay the same from mirror to mirror.
     if (before_mirror < 0.0) discard;
 #endif
-    float luminance = 0.0, passes = 1.0, mirrored = 0.0;
-#ifdef HAS_FRESNEL
-    float F = fresnel(clamp(eye_height / length(to_eye), 0.0, 1.0));
-#else
-    float F = 1.0;
+    Shade colour = SHADE(batch.colour);
+#ifdef HAS_TEXTURE
+    vec4 texel = texture(body_texture, at_texture, view.lod_bias[layer]);
+    colour *= SHADE(texel);
+#ifdef HAS_CUTOUT
+    if (texel.a < batch.finish.z) discard;
 #endif
+#endif
+#ifdef HAS_LIGHT
+    vec3 around = textureLod(light_texture, at_light, 0.0).rgb / PI;
+    Light light = LIGHT(around);
+#endif
+#ifdef HAS_GLOSS
+#ifdef IS_PLANAR
+    float above = dot(batch.plane, vec4(view.eye.xyz, 1.0)), c = clamp(abs(above) / length(to_eye), 0.0, 1.0);
+    vec3 N = sign(above) * batch.plane.xyz;
+#else
+    float above = dot(facing, to_eye), c = clamp(abs(above) / (length(facing) * length(to_eye)), 0.0, 1.0);
+    vec3 N = sign(above) * normalize(facing);
+#endif
+    float F = batch.blur.z + batch.finish.y * (fresnel(c, batch.coat.x, batch.coat.z) - batch.blur.z);
 #ifdef HAS_REFLECTION
-    mirrored = F * texelFetch(reflection, ivec3(ivec2(gl_FragCoord.xy), layer), 0).r;
+    vec3 seen = texelFetch(reflection, ivec3(ivec2(gl_FragCoord.xy), layer), 0).rgb;
+#ifdef IS_MONO
+    seen = vec3(view.weights.a * seen.r);  // which has been weighted
+#endif
 #else
-    mirrored = F * eye.w;
+    vec3 seen = view.ambient.rgb;
+    float arrives = 1e9;
+#ifndef IS_LAST
+#ifdef HAS_LIGHT
+    seen = batch.coat.w * around;  // as bright as what lights the place
+    arrives = dot(LUMINANCE, seen);
 #endif
-#ifdef HAS_ROUGHNESS
-    // Pixels whose middle is beside the mirror have none.
-    float spread = texelFetch(rough_reflection, ivec2(gl_FragCoord.xy), 0).r;
-    mirrored = spread < 0.0 ? mirrored : spread;
 #endif
-#ifdef HAS_BODY
-    float albedo = body_scale * texture(body_texture, uv_albedo, lod_bias[layer]).r;
-    luminance = albedo * textureLod(light_texture, uv_light, 0.0).r;
-#ifdef HAS_FRESNEL
-    luminance *= 1.0 - F;
+#ifdef HAS_PROBE
+    vec3 from = view.eye.xyz - to_eye, V = normalize(to_eye);
+    // Where less light arrives than at the probe, something hides what the probe sees.
+    float most = max(view.probe_light.a + dot(view.probe_light.xyz, N), 0.05 * view.probe_light.a);
+    float open = min(1.0, arrives / (most * dot(LUMINANCE, view.probe_scale.rgb)));
+    seen = mix(seen, open * probed(from, reflect(-V, N)) + glint(from, N, V, arrives), batch.blur.y);
 #endif
-    luminance += tint * mirrored;
-#else
+#endif
+    Light mirrored = LIGHT(seen);
+#endif
 #ifdef IS_PANE
     // All reflections between the pane's two faces added.
-    luminance = 2.0 / (1.0 + F) * mirrored;
-    passes = (1.0 - 2.0 * F / (1.0 + F)) * tint;
+    F = 2.0 * F / (1.0 + F);
+    Light radiance = F * mirrored;
+    Shade through = (1.0 - F) * colour;
 #else
-    luminance = tint * mirrored;
+#ifdef IS_MIRROR
+    Light radiance = colour * mirrored;
+#else
+#ifdef HAS_GLOSS
+    Shade body = colour, mirrors = Shade(batch.colour.a * F);
+#ifdef HAS_METAL
+    float metal = batch.finish.x, away = 1.0 - c, grazing = batch.finish.y * away * away * away * away * away;
+    body *= 1.0 - metal;
+    mirrors = (1.0 - metal) * mirrors + metal * (colour + (1.0 - colour) * grazing);
+#endif
+    body *= batch.coat.z * (1.0 - F) / (1.0 - body * batch.coat.y);
+    Light radiance = body * light + mirrors * mirrored;
+#else
+    Light radiance = colour * light;
 #endif
 #endif
-    frag_color = vec4(luminance, 0.0, 0.0, passes);
+#endif
+#ifdef HAS_EMISSION
+    vec3 glow = batch.emission.rgb;
+#ifdef HAS_EMISSION_TEXTURE
+    glow *= texture(emission_texture, batch.emission.a * at_texture, view.lod_bias[layer]).rgb;
+#endif
+#ifdef IS_LAMP
+    radiance = LIGHT(glow * around);
+#else
+    radiance += LIGHT(glow);
+#endif
+#endif
+#ifdef IS_MONO
+#ifdef IS_GREY
+    frag_color = vec4(radiance, 0.0, 0.0, 1.0);
+#else
+    frag_color = vec4(dot(view.weights.rgb, radiance), 0.0, 0.0, 1.0);
+#endif
+#else
+    frag_color = vec4(radiance, 1.0);
+#endif
+#ifdef IS_PANE
+#ifdef IS_GREY
+    frag_color.a = through;
+#else
+    passes = vec4(through, 1.0);
+#endif
+#endif
 }

@@ -3,24 +3,27 @@
 #extension GL_ARB_shader_viewport_layer_array : require
 // Where a surface's corners fall in each sample's layer; texture and light coordinates pass through.
 layout(location = 0) in vec3 position;
-layout(location = 1) in vec2 texcoord_0;
-layout(location = 2) in vec2 texcoord_1;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec2 uv_texture;
+layout(location = 3) in vec2 uv_light;
 
-layout(std140, binding = 0) uniform Pass {
-    mat4 view_projection;
-    vec4 eye;         // where the picture is seen from, and what mirrors show that are followed no further
+layout(std140, binding = 0) uniform Camera {
+    mat4 direct;      // from the world to the screen as if there were no mirrors
+    vec4 eye;         // where the picture is seen from
     vec4 clip_plane;  // what lies behind it is not drawn
     vec4 lod_bias;    // of each layer
-    mat4 direct;      // view_projection as if there were no mirrors
     vec4 mirrors[3];  // planes, the one seen first to begin with; 0 for none
-};
-uniform mat4 model;
+} view;
+layout(std140, binding = 1) uniform Pose {
+    mat4 model;
+} body;
 
 // Surfaces that meet are drawn by several programs; each puts a corner in the same place, so that no gap opens.
 invariant gl_Position;
-out vec2 uv_albedo;
-out vec2 uv_light;
+out vec2 at_texture;
+out vec2 at_light;
 out vec3 to_eye;
+out vec3 facing;
 flat out int layer;
 out float before_mirror;
 
@@ -35,16 +38,17 @@ float height(vec4 plane, vec3 point)
 
 void main()
 {
-    vec4 world = model * vec4(position, 1.0);
+    vec4 world = body.model * vec4(position, 1.0);
     // Mirror by mirror, so that what touches a mirror lands on its own image to the last bit, and leaves no gap.
     vec3 image = world.xyz;
-    for (int i = 2; i >= 0; i--) image -= 2.0 * height(mirrors[i], image) * mirrors[i].xyz;
-    gl_Position = direct * vec4(image, 1.0);
-    before_mirror = dot(clip_plane, world);
+    for (int i = 2; i >= 0; i--) image -= 2.0 * height(view.mirrors[i], image) * view.mirrors[i].xyz;
+    gl_Position = view.direct * vec4(image, 1.0);
+    before_mirror = dot(view.clip_plane, world);
     gl_Layer = gl_InstanceID;
     gl_ViewportIndex = gl_InstanceID;
     layer = gl_InstanceID;
-    uv_albedo = texcoord_0;
-    uv_light = texcoord_1;
-    to_eye = eye.xyz - world.xyz;
+    at_texture = uv_texture;
+    at_light = uv_light;
+    to_eye = view.eye.xyz - world.xyz;
+    facing = mat3(body.model) * normal;
 }

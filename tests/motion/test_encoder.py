@@ -12,7 +12,7 @@ from vobench.geometry.se3 import Array
 from vobench.motion.controller import CONTROLLERS
 from vobench.motion.drive import Drive, drive
 from vobench.motion.slip import SLIP_STREAMS, SLIPS
-from vobench.sensor.encoder import ENCODERS, EncoderErrors, ticks, true_rims
+from vobench.motion.wheeled import ENCODERS, EncoderErrors, ticks, true_rims
 
 FIGURE_12 = ((0, 1), (1, 1), (2, 2))
 ROUND = ((0, 2), (2, 0), (-1, 1), (1, -1), (0, 0), (0, 1), (1, 1), (2, 2), (0, 2), (2, 0), (-1, 1), (1, -1))

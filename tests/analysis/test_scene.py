@@ -1,0 +1,71 @@
+"""What a scene holds, and where a body can drive in it."""
+
+import numpy as np
+import pytest
+
+from vobench.analysis.scene import survey
+from vobench.asset.shape import at, block
+from vobench.scene.light import PointLight
+from vobench.scene.material import Material
+from vobench.scene.mesh import Thing, joined, quad
+from vobench.scene.scene import Scene
+
+GREY = {"grey": Material(colour=(0.5, 0.5, 0.5))}
+FLOOR = Thing("floor", quad((-4, -3, 0), (8, 0, 0), (0, 6, 0)), "grey")
+LIGHT = PointLight("bulb", np.array([0.0, 0.0, 2.5]), 500.0)
+
+
+def scene(*things: Thing) -> Scene:
+    return Scene("s", (), GREY, (LIGHT,), (), things)
+
+
+def crate(x_m: float, y_m: float, *, size_m: float = 1.0) -> Thing:
+    mesh = block((size_m, size_m, size_m), bevel_m=0).moved(at(x_m, y_m, size_m / 2))
+    return Thing(f"crate_{x_m:g}", mesh, "grey")
+
+
+def test_the_largest_free_circle_touches_the_floors_edge_or_a_thing() -> None:
+    free = survey(scene(FLOOR)).free
+    assert free is not None
+    assert (free.floor_m, free.radius_m) == (0, pytest.approx(3.0, abs=0.1))
+    beside = survey(scene(FLOOR, crate(1.0, 0.0))).free
+    assert beside is not None
+    # Between the left edge and the crate's side, and away from its corners.
+    assert np.hypot(beside.x_m - 0.5, beside.y_m) >= beside.radius_m - 0.1
+    assert beside.x_m - beside.radius_m >= -4.1
+    assert beside.radius_m < free.radius_m
+
+
+def test_what_hangs_higher_than_a_body_leaves_the_floor_free() -> None:
+    shelf = Thing("shelf", block((8, 6, 0.05), bevel_m=0).moved(at(z_m=1.2)), "grey")
+    free = survey(scene(FLOOR, shelf)).free
+    assert free is not None
+    assert free.floor_m == 0 or free.floor_m == pytest.approx(1.22, abs=0.03)
+
+
+def test_faces_sizes_and_lights_are_counted() -> None:
+    found = survey(scene(FLOOR, crate(1.0, 0.0)))
+    assert (found.things, found.faces, found.materials, found.lights) == (2, 14, 1, ("bulb",))
+    assert (found.low_m, found.high_m) == ((-4, -3, 0), (4, 3, 1))
+
+
+def test_open_edges_and_faces_on_a_face_are_found() -> None:
+    solid = crate(1.0, 0.0)
+    assert survey(scene(FLOOR, solid)).open_edges == 0
+    faces = solid.mesh.faces
+    torn = Thing("torn", type(solid.mesh)(solid.mesh.vertices_m, faces[1:], solid.mesh.uv, solid.mesh.normals), "grey")
+    assert survey(scene(FLOOR, torn)).open_edges == 3
+    assert survey(scene(FLOOR, Thing("twice", joined([solid.mesh, solid.mesh]), "grey"))).twins == 12
+
+
+def test_backs_are_seen_from_inside_a_thing_that_looks_outwards() -> None:
+    hall = block((7.9, 5.9, 3), bevel_m=0).moved(at(z_m=1.4))
+    inwards = survey(scene(FLOOR, Thing("hall", hall.flipped(), "grey")))
+    outwards = survey(scene(FLOOR, Thing("hall", hall, "grey")))
+    assert inwards.backs == 0
+    assert outwards.backs > 0.5
+
+
+def test_a_scene_without_a_floor_has_no_free_circle() -> None:
+    wall = Thing("wall", quad((0, 0, 0), (1, 0, 0), (0, 0, 1)), "grey")
+    assert survey(scene(wall)).free is None

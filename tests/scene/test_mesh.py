@@ -1,0 +1,109 @@
+"""Meshes keep their shape and winding as they are moved, mirrored and joined; a scene's table has every face once."""
+
+import numpy as np
+import pytest
+
+from vobench.asset.shape import block
+from vobench.geometry import se3
+from vobench.scene.light import PointLight
+from vobench.scene.mesh import Mesh, Thing, face_normals, flat, joined, quad, table, unit
+from vobench.scene.scene import Mover, Path, Scene, ceiling_light, triangles
+
+CORNER_M, U_M, V_M = np.array([1.0, 2.0, 0.5]), np.array([2.0, 0, 0]), np.array([0, 0, 3.0])
+T = se3.transform(se3.rotation_z(0.4), [0.3, -2.0, 1.0])
+
+
+def tetrahedron() -> Mesh:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+    return flat(vertices, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], vertices[:, :2])
+
+
+def volume(mesh: Mesh) -> float:
+    """What a mesh encloses, positive where its faces look outwards (Gauss's theorem)."""
+    a, b, c = np.moveaxis(mesh.corners_m, 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def test_a_quad_faces_where_its_edges_turn_and_its_texture_lies_on_it_in_metres() -> None:
+    mesh = quad(CORNER_M, U_M, V_M, uv_m=(0.25, 0.5))
+    np.testing.assert_allclose(face_normals(mesh.corners_m), [unit(np.cross(U_M, V_M))] * 2)
+    np.testing.assert_allclose(mesh.normals, [unit(np.cross(U_M, V_M))] * 4)
+    along, up = (mesh.vertices_m - CORNER_M) @ unit(U_M), (mesh.vertices_m - CORNER_M) @ unit(V_M)
+    np.testing.assert_allclose(mesh.uv, np.stack([along + 0.25, up + 0.5], -1))
+    assert {tuple(p) for p in mesh.vertices_m[mesh.faces].reshape(-1, 3)} == {tuple(p) for p in mesh.vertices_m}
+
+
+def test_a_flat_mesh_has_the_normals_of_its_faces_and_encloses_what_it_should() -> None:
+    mesh = tetrahedron()
+    assert volume(mesh) == pytest.approx(1 / 6)
+    np.testing.assert_allclose(mesh.normals[mesh.faces], face_normals(mesh.corners_m)[:, None].repeat(3, 1))
+
+
+def test_a_moved_mesh_is_its_points_moved() -> None:
+    mesh, moved = tetrahedron(), tetrahedron().moved(T)
+    np.testing.assert_allclose(moved.vertices_m, se3.apply(T, mesh.vertices_m))
+    np.testing.assert_allclose(moved.normals, mesh.normals @ T[:3, :3].T, atol=1e-12)
+
+
+@pytest.mark.parametrize("scale", [(2.0, 1.0, 0.5), (-1.0, 1.0, 1.0), (-1.0, -2.0, -3.0)])
+def test_what_is_scaled_or_mirrored_still_looks_outwards(scale: tuple[float, float, float]) -> None:
+    moved = tetrahedron().moved(T @ np.diag([*scale, 1.0]))
+    assert volume(moved) == pytest.approx(abs(np.prod(scale)) / 6)
+    np.testing.assert_allclose(moved.normals[moved.faces], face_normals(moved.corners_m)[:, None].repeat(3, 1))
+
+
+def test_a_flipped_mesh_looks_inwards_and_two_sides_enclose_nothing() -> None:
+    assert volume(tetrahedron().flipped()) == pytest.approx(-1 / 6)
+    assert volume(tetrahedron().two_sided()) == pytest.approx(0)
+    assert len(tetrahedron().two_sided().faces) == 8
+
+
+def test_joined_meshes_have_all_faces_of_all_and_nothing_else() -> None:
+    parts = [tetrahedron(), quad(CORNER_M, U_M, V_M), tetrahedron().moved(T)]
+    np.testing.assert_array_equal(joined(parts).corners_m, np.concatenate([part.corners_m for part in parts]))
+    assert len(joined([]).faces) == 0
+
+
+def hall() -> Scene:
+    crate = Thing("crate", block((1, 1, 1), bevel_m=0), "wood")
+    lid = Thing("lid", quad([0, 0, 0.6], [1, 0, 0], [0, 1, 0]), "wood")
+    path = Path(np.array([0.0, 1.0]), np.array([[0.0, 0, 0.5], [1.0, 0, 0.5]]), np.array([0.0, 90.0]))
+    floor = Thing("floor", quad([-2, -3, 0], [4, 0, 0], [0, 6, 0]), "f")
+    bulb = PointLight("bulb", np.zeros(3), 1.0)
+    lamp = ceiling_light("lamp", np.array([0.0, 0.0, 2.9]), (0.5, 0.5), power_lm=1.0)
+    mover = Mover("crate", (), path, (crate, lid))
+    return Scene("hall", (), {}, (bulb, lamp), (mover,), (floor, Thing("pyramid", tetrahedron(), "stone")))
+
+
+def test_a_scenes_table_has_what_stands_then_lamps_then_movers() -> None:
+    faces = triangles(hall())
+    assert [thing.name for thing in faces.things] == ["floor", "pyramid", "lamp", "crate", "lid"]
+    assert np.bincount(faces.thing).tolist() == [2, 4, 2, 12, 2]
+    assert (np.diff(faces.thing) >= 0).all()
+    assert np.unique(faces.lamp[faces.thing == 2]).tolist() == [1]  # the second of its lights
+    assert (faces.lamp[faces.thing != 2] == -1).all()
+    assert (faces.mover[-14:] == 0).all()
+    assert (faces.mover[:-14] == -1).all()
+
+
+def test_what_a_face_has_is_that_of_its_things_mesh() -> None:
+    faces = triangles(hall())
+    for nth, thing in enumerate(faces.things):
+        own, mesh = faces.thing == nth, thing.mesh
+        np.testing.assert_array_equal(faces.corners_m[own], mesh.corners_m)
+        np.testing.assert_array_equal(faces.normals[own], mesh.normals[mesh.faces])
+        np.testing.assert_array_equal(faces.uv[own], mesh.uv[mesh.faces])
+        np.testing.assert_allclose(faces.plane[own], face_normals(mesh.corners_m), atol=1e-12)
+
+
+def test_movers_faces_are_where_their_path_says_and_others_stay() -> None:
+    still, later = triangles(hall()), triangles(hall(), t_ns=1_000_000_000)
+    own = still.mover == 0
+    pose = hall().movers[0].path.pose(1_000_000_000)
+    np.testing.assert_allclose(later.corners_m[own], se3.apply(pose, still.corners_m[own]))
+    np.testing.assert_allclose(later.plane[own], face_normals(later.corners_m[own]), atol=1e-12)
+    np.testing.assert_array_equal(later.corners_m[~own], still.corners_m[~own])
+
+
+def test_a_table_of_nothing_is_empty() -> None:
+    assert len(table((), (), ())) == 0

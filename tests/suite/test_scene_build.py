@@ -1,0 +1,176 @@
+"""What a scene's YAML names is built where it says: furniture, models, what makers make, and what of these moves."""
+
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vobench.asset import FINISHES, FURNITURE
+from vobench.asset import room as kinds
+from vobench.errors import ModelError, SuiteError
+from vobench.scene.light import AreaLight, PointLight
+from vobench.scene.scene import Scene
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import content, read_scene
+
+YAML = """name: yard
+white_cd_m2: 50
+seed: 3
+materials: {stone: {pattern: terrazzo, albedo: 0.5, resolution_px: 8, colour: [1, 0.5, 0.25]}}
+boxes: [{name: plinth, center_m: [0, 0, -0.1], size_m: [8, 8, 0.2], material: stone}]
+sky: {illuminance_lx: 8000}
+"""
+MAKER = """import numpy as np
+from vobench.asset.shape import at, lathe
+from vobench.scene.material import Material
+from vobench.scene.mesh import Thing
+
+def make(seed):
+    column = lathe([[0, 0], [0.3, 0], [0.3, 2.0], [0, 2.0]])
+    return (Thing("column", column.moved(at(seed, 0, 0)), "chalk"),), {"chalk": Material(colour=(0.8, 0.8, 0.7))}
+"""
+
+
+def glb(path: Path, *, emission: float = 0.0) -> None:
+    """One triangle of a node called Sail, upright in glTF's axes, at (1, 2, 3) there."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32).tobytes()
+    material = {"name": "cloth", "emissiveFactor": [1, 1, 1], "extensions": {"KHR_materials_emissive_strength": {}}}
+    material["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": emission}}
+    document = {
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["KHR_materials_emissive_strength"],
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"name": "Sail", "mesh": 0, "translation": [1, 2, 3]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+        "materials": [material if emission else {"name": "cloth"}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": len(points)}],
+        "buffers": [{"byteLength": len(points)}],
+    }
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(points), 0x004E4942) + points
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+
+
+@pytest.fixture
+def yard(tmp_path: Path):
+    """Builds the yard with some lines added."""
+
+    def of(more: str = "") -> Scene:
+        (tmp_path / "yard.yaml").write_text(YAML + more)
+        return build(read_scene(tmp_path / "yard.yaml"), {})
+
+    return of
+
+
+def vertices(scene: Scene, name: str) -> np.ndarray:
+    return np.concatenate([thing.mesh.vertices_m for thing in scene.things if thing.name == name])
+
+
+def test_the_names_that_a_yaml_may_say_are_those_that_there_are() -> None:
+    assert sorted(FURNITURE) == sorted(kinds.KINDS)
+    assert sorted(FINISHES) == sorted(kinds.FINISHES)
+
+
+def test_furniture_stands_where_it_says_with_its_front_as_it_says(yard) -> None:
+    scene = yard("furniture: [{kind: desk, name: d, at_m: [2, 1, 0], yaw_deg: 90, size: {width_m: 2.0}}]\n")
+    low, high = vertices(scene, "d").min(0), vertices(scene, "d").max(0)
+    np.testing.assert_allclose((low + high)[:2] / 2, [2, 1], atol=0.1)
+    assert high[0] - low[0] == pytest.approx(2.0, abs=0.02)  # turned: its width lies along x
+    assert low[2] == pytest.approx(0, abs=1e-6)
+
+
+def test_another_piece_changes_no_other(yard) -> None:
+    one = "{kind: shelf, name: s, at_m: [0, 2, 0]}"
+    alone, both = yard(f"furniture: [{one}]\n"), yard(f"furniture: [{{kind: mug, name: m, at_m: [1, 1, 0]}}, {one}]\n")
+    np.testing.assert_array_equal(vertices(alone, "s"), vertices(both, "s"))
+
+
+def test_what_a_maker_of_furniture_does_not_know_is_named(yard) -> None:
+    with pytest.raises(SuiteError, match=r"furniture 'd': TypeError: .*'colour_of_legs'"):
+        yard("furniture: [{kind: desk, name: d, at_m: [0, 0, 0], size: {colour_of_legs: red}}]\n")
+    with pytest.raises(SuiteError, match=r"no piece of furniture named 'desc'\. Did you mean 'desk'"):
+        yard("furniture: [{kind: desc, name: d, at_m: [0, 0, 0]}]\n")
+
+
+def test_a_model_is_placed_and_its_names_begin_with_its_own(yard, tmp_path: Path) -> None:
+    glb(tmp_path / "sail.glb")
+    scene = yard("meshes: [{file: sail.glb, name: boat, at_m: [0, 0, 1], yaw_deg: 90, scale: 2}]\n")
+    # glTF's (x, y, z) are (x, -z, y); then twice as large, turned to the left and lifted.
+    expected = [[6, 2, 5], [6, 4, 5], [6, 2, 7]]
+    np.testing.assert_allclose(sorted(vertices(scene, "boat.Sail").tolist()), sorted(map(list, expected)), atol=1e-6)
+    assert {thing.material for thing in scene.things if thing.name == "boat.Sail"} == {"boat.cloth"}
+
+
+def test_a_model_alone_is_a_scene_where_it_has_light(tmp_path: Path) -> None:
+    glb(tmp_path / "lit.glb", emission=500.0)
+    spec = read_scene(tmp_path / "lit.glb")
+    (light,) = build(spec, {}).lights
+    assert isinstance(light, AreaLight)
+    assert light.luminance_cd_m2 == pytest.approx(500)
+    assert light.power_lm == pytest.approx(500 * np.pi * 0.5)
+    assert spec.white_cd_m2 == pytest.approx(2 * 500)  # 2 P / A over pi
+    glb(tmp_path / "dark.glb")
+    with pytest.raises(SuiteError, match=r"dark\.glb has no lights, so nothing could be seen; write a scene\.yaml"):
+        read_scene(tmp_path / "dark.glb")
+
+
+def test_a_file_that_is_not_there_or_no_model_is_one_sentence(yard, tmp_path: Path) -> None:
+    with pytest.raises(SuiteError, match=r"yard.yaml:7: meshes.0.file: there is no such file beside the scene"):
+        yard("meshes: [{file: no.glb}]\n")
+    (tmp_path / "bad.glb").write_bytes(b"nothing")
+    with pytest.raises(ModelError, match=r"bad.glb: "):
+        yard("meshes: [{file: bad.glb}]\n")
+
+
+def test_a_maker_gets_the_scenes_seed_and_what_it_raises_is_named(yard, tmp_path: Path) -> None:
+    (tmp_path / "maker.py").write_text(MAKER)
+    np.testing.assert_allclose(vertices(yard("maker: maker.py\n"), "column").mean(0)[:2], [3, 0], atol=0.05)
+    (tmp_path / "maker.py").write_text(MAKER.replace("seed, 0, 0", "1 / 0, 0, 0"))
+    with pytest.raises(SuiteError, match=r"maker.py: ZeroDivisionError: division by zero"):
+        yard("maker: maker.py\n")
+    (tmp_path / "maker.py").write_text(MAKER.replace('{"chalk"', '{"cheese"'))
+    with pytest.raises(SuiteError, match=r"make\(\) returns things without materials: chalk"):
+        yard("maker: maker.py\n")
+
+
+def test_files_count_by_what_is_in_them_wherever_they_lie(yard, tmp_path: Path) -> None:
+    said = []
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "yard.yaml").write_text(f"{YAML}maker: maker.py\n")
+        (tmp_path / folder / "maker.py").write_text(MAKER)
+        said.append(content(read_scene(tmp_path / folder / "yard.yaml")))
+    assert said[0] == said[1]
+    (tmp_path / "b" / "maker.py").write_text(MAKER + "# another\n")
+    assert content(read_scene(tmp_path / "b" / "yard.yaml")) != said[0]
+
+
+def test_furniture_and_models_can_move(yard, tmp_path: Path) -> None:
+    glb(tmp_path / "sail.glb")
+    path = "path: [{t_s: 0, position_m: [0, 0, 0]}, {t_s: 1, position_m: [1, 0, 0]}]"
+    scene = yard(f"movers: [{{name: c, kind: chair, {path}}}, {{name: s, file: sail.glb, {path}}}]\n")
+    assert [mover.name for mover in scene.movers] == ["c", "s"]
+    assert {thing.name for mover in scene.movers for thing in mover.things} == {"c", "s"}
+    assert {thing.material for mover in scene.movers for thing in mover.things} <= set(scene.materials)
+    with pytest.raises(SuiteError, match="should be a box with size_m and material, or a kind of furniture"):
+        yard(f"movers: [{{name: c, kind: chair, file: sail.glb, {path}}}]\n")
+
+
+def test_a_material_takes_a_colour_and_a_lamp_a_hue(yard) -> None:
+    scene = yard("lamps: [{name: l, kind: point, center_m: [0, 0, 2], power_lm: 100, colour: [0, 1, 0]}]\n")
+    assert scene.materials["stone"].colour == (1, 0.5, 0.25)
+    (lamp,) = (light for light in scene.lights if isinstance(light, PointLight))
+    assert lamp.colour == pytest.approx((0, 1 / 0.7152, 0))
+    with pytest.raises(SuiteError, match="light should not be black"):
+        yard("lamps: [{name: l, kind: point, center_m: [0, 0, 2], power_lm: 100, colour: [0, 0, 0]}]\n")
+
+
+def test_a_scene_of_nothing_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "void.yaml").write_text("name: void\nwhite_cd_m2: 1\nsky: {illuminance_lx: 1}\n")
+    with pytest.raises(SuiteError, match="a scene needs something to see: room, boxes, boards, furniture"):
+        read_scene(tmp_path / "void.yaml")

@@ -1,0 +1,18 @@
+"""What scenes are made of: textures, shapes, furniture, rooms, and models from files."""
+
+# Names that a scene's YAML may say, for those who need no more than the names: kinds of furniture, finishes of rooms
+# (both of `asset.room`), roles of a model's nodes, endings of models' files.
+# fmt: off
+FURNITURE = (
+    "bench", "blind", "book_stack", "cabinet", "cables", "carton", "chair", "crate", "curtain", "desk", "desk_lamp",
+    "door", "framed", "glass_wall", "keyboard", "lamp_housing", "monitor", "mouse", "mug", "noticeboard", "papers",
+    "pens", "pillar", "pipe", "plant", "radiator", "shelf", "skirting", "socket", "sofa", "spot_housing", "waste_bin",
+    "window_frame",
+)
+FINISHES = (
+    "brick", "carpet", "ceiling_tiles", "concrete", "mirror", "oak_floor", "paint", "pane", "paving", "sage_plaster",
+    "terrazzo", "white_plaster",
+)
+# fmt: on
+ROLES = ("mirror", "pane", "lamp", "mover", "ignored")
+MODEL_SUFFIXES = (".glb", ".gltf", ".obj", ".stl", ".ply")

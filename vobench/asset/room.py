@@ -1,0 +1,124 @@
+"""Interiors: a shell of walls with windows, its finishes, and pieces of furniture that stand in it."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+from zlib import crc32
+
+import numpy as np
+
+from vobench.asset import fitting, furniture, picture
+from vobench.asset.furniture import Part, matt
+from vobench.asset.shape import Hole, at, pierced, reveal
+from vobench.geometry.se3 import Array
+from vobench.scene.material import Material
+from vobench.scene.mesh import Mesh, Thing, joined, quad
+
+Instance = tuple[str, Sequence[Part]]
+Wall = Literal["east", "north", "west", "south"]
+OUTWARD: dict[Wall, tuple[float, float]] = {"east": (1, 0), "north": (0, 1), "west": (-1, 0), "south": (0, -1)}
+
+KINDS: dict[str, Callable[..., list[Part]]] = {
+    name: getattr(room, name)
+    for room, names in (
+        (furniture, "desk chair shelf book_stack papers monitor keyboard mouse mug pens desk_lamp cables plant carton"),
+        (furniture, "crate sofa waste_bin cabinet bench pillar"),
+        (fitting, "door window_frame blind curtain radiator socket skirting framed noticeboard glass_wall pipe"),
+        (fitting, "lamp_housing spot_housing"),
+    )
+    for name in names.split()
+}
+# Materials that scenes may name.
+FINISHES: dict[str, Callable[[], Material]] = {
+    "terrazzo": lambda: Material(texture=picture.terrazzo(), eta=1.5),
+    "oak_floor": lambda: matt(texture=picture.boards("oak", 1, 2048, 2.0, rows=14, joint_m=0.002)),
+    "carpet": lambda: matt(texture=picture.ground("carpet")),
+    "white_plaster": lambda: matt("#f0ece3", picture.ground("plaster", 0, 1280, 1.6)),
+    "sage_plaster": lambda: matt("#b9c4bb", picture.ground("plaster", 0, 1280, 1.6)),
+    "concrete": lambda: matt(texture=picture.ground("concrete")),
+    "brick": lambda: matt(texture=picture.masonry("brick")),
+    "paving": lambda: matt(texture=picture.masonry("paving", rows=4, columns=4)),
+    "ceiling_tiles": lambda: matt(texture=picture.masonry("tile", tile_m=1.2, rows=2, columns=2, bond=0.0)),
+    "paint": lambda: furniture.WHITE,
+    "pane": lambda: fitting.PANE,
+    "mirror": lambda: fitting.MIRROR,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """One of KINDS at a place; what is left to chance hangs on the scene's seed and this name alone."""
+
+    kind: str
+    name: str
+    at_m: tuple[float, float, float]
+    yaw_deg: float = 0.0
+    pitch_deg: float = 0.0
+    size: Mapping[str, Any] = field(default_factory=dict)
+
+    def build(self, seed: int = 0) -> Instance:
+        """Its name and its parts in the scene's frame."""
+        rng = np.random.default_rng(np.random.SeedSequence([seed, crc32(self.name.encode())]))
+        T_world_piece = at(*self.at_m, yaw=self.yaw_deg, pitch=self.pitch_deg)
+        return self.name, [part.moved(T_world_piece) for part in KINDS[self.kind](rng, **self.size)]
+
+
+def things(
+    instances: Iterable[Instance], known: Mapping[str, Material] = {}
+) -> tuple[tuple[Thing, ...], dict[str, Material]]:
+    """The parts of instances as things, one of each material an instance, and the materials by name.
+
+    A material that is not known by a name already is named after the instance that has it first.
+    """
+    names = {material: name for name, material in known.items()}
+    result = []
+    for name, parts in instances:
+        meshes: dict[Material, list[Mesh]] = {}
+        for part in parts:
+            meshes.setdefault(part.material, []).append(part.mesh)
+        for k, (material, of_it) in enumerate(meshes.items()):
+            result.append(Thing(name, joined(of_it), names.setdefault(material, f"{name}.{k}")))
+    return tuple(result), {name: material for material, name in names.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """A window: its middle along the wall (world x or y) and above the floor, and how far behind it the pane is."""
+
+    wall: Wall
+    center_m: tuple[float, float]
+    size_m: tuple[float, float]
+    depth_m: float = 0.15
+
+
+def shell(
+    size_m: tuple[float, float, float],
+    openings: Sequence[Opening] = (),
+    *,
+    floor: Material,
+    ceiling: Material,
+    walls: Mapping[Wall, Material],
+    frame: Material = furniture.WHITE,
+    pane: Material = fitting.PANE,
+) -> Iterator[Instance]:
+    """`floor`, `ceiling`, `wall_east` ... around the origin, and `window_0` ..., each of its reveals and its pane."""
+    x, y, z = size_m
+    yield "floor", [Part(pierced((-x / 2, -y / 2, 0), (x, 0, 0), (0, y, 0)), floor)]
+    yield "ceiling", [Part(pierced((-x / 2, -y / 2, z), (0, y, 0), (x, 0, 0)), ceiling)]
+    for name, outward in OUTWARD.items():
+        right = np.array([outward[1], -outward[0], 0.0])
+        corner = (np.array([*outward, 0.0]) - right) * [x / 2, y / 2, 0]
+        sheet = corner, right * [x, y, 0], (0.0, 0.0, z)
+        holes = {k: _hole(opening, sheet[1]) for k, opening in enumerate(openings) if opening.wall == name}
+        yield f"wall_{name}", [Part(pierced(*sheet, list(holes.values())), walls[name])]
+        for k, (u0, u1, v0, v1) in holes.items():
+            depth = openings[k].depth_m
+            near = corner + right * u0 + [0, 0, v0] + np.array([*outward, 0.0]) * depth
+            glass = quad(near, right * (u1 - u0), (0, 0, v1 - v0))
+            yield f"window_{k}", [Part(reveal(*sheet, (u0, u1, v0, v1), depth), frame), Part(glass, pane)]
+
+
+def _hole(opening: Opening, edge_m: Array) -> Hole:
+    (along, up), (width, height) = opening.center_m, opening.size_m
+    u = float(np.abs(edge_m).sum() / 2 + along * np.sign(edge_m.sum()))
+    return u - width / 2, u + width / 2, up - height / 2, up + height / 2

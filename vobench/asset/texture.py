@@ -1,0 +1,118 @@
+"""Procedural textures: square tiles that repeat without a seam."""
+
+from collections.abc import Callable
+from typing import Annotated
+
+import numpy as np
+import scipy
+from annotated_types import Ge, Gt, Le, Lt
+
+from vobench.scene.material import Map
+from vobench.setting import OneOf, Positive, Share, settings
+
+
+def _noise(texture: "Procedural", rng: np.random.Generator, *, coarse_m: float, fine_m: float, slope: float) -> Map:
+    """Periodic noise of unit variance whose features are between `fine_m` and `coarse_m` wide; 0 where none fits.
+
+    White noise shaped in the frequency domain by f^-slope: isotropic, and a tile without seams.
+    """
+    n = texture.resolution_px
+    per_m = n / texture.tile_m
+    f_u = scipy.fft.rfftfreq(n) * per_m
+    # Columns above the band are zero, and the inverse transform adds them back as such.
+    f_u = f_u[f_u < 0.5 / fine_m]
+    spectrum = scipy.fft.rfft2(rng.standard_normal((n, n), dtype=np.float32), workers=-1)[:, : len(f_u)]
+    f = np.hypot(scipy.fft.fftfreq(n)[:, None] * per_m, f_u).astype(np.float32)
+    band = (f > 0.5 / coarse_m) & (f < 0.5 / fine_m)
+    spectrum = spectrum * np.where(band, np.maximum(f, 1e-6) ** -slope, 0).astype(np.float32)
+    noise = scipy.fft.irfft2(spectrum, s=(n, n), workers=-1)
+    return np.asarray(noise / (noise.std() or 1))
+
+
+def plain(texture: "Procedural", rng: np.random.Generator) -> Map:
+    """One tone, without any detail."""
+    del rng
+    return np.zeros((texture.resolution_px, texture.resolution_px), np.float32)
+
+
+def terrazzo(texture: "Procedural", rng: np.random.Generator) -> Map:
+    """Chips of several tones and sizes with sharp edges in a ground with fine grain."""
+    chips = _noise(texture, rng, coarse_m=0.06, fine_m=0.012, slope=0.5)
+    small = _noise(texture, rng, coarse_m=0.015, fine_m=0.004, slope=0.5)
+    grain = _noise(texture, rng, coarse_m=0.5, fine_m=0.002, slope=1.2)
+    step = 0.08
+    return np.asarray(0.9 * np.tanh((chips - 0.6) / step) - 0.6 * np.tanh((small - 0.8) / step) + 0.5 * grain)
+
+
+def plaster(texture: "Procedural", rng: np.random.Generator) -> Map:
+    """A trowelled wall: soft patches with pits."""
+    patches = _noise(texture, rng, coarse_m=0.8, fine_m=0.006, slope=1.1)
+    pits = _noise(texture, rng, coarse_m=0.04, fine_m=0.008, slope=0.3)
+    return np.asarray(patches - 0.8 * np.tanh((pits - 1.4) / 0.1))
+
+
+def wood(texture: "Procedural", rng: np.random.Generator) -> Map:
+    """Grain that runs along u, in bent rings."""
+    bend = _noise(texture, rng, coarse_m=0.6, fine_m=0.08, slope=1.5)
+    fibre = _noise(texture, rng, coarse_m=0.05, fine_m=0.004, slope=0.6)
+    n = texture.resolution_px
+    rings = np.arange(n, dtype=np.float32)[:, None] / n * 2 * np.pi * round(texture.tile_m / 0.05)
+    return np.asarray(np.sin(rings + 2.5 * bend) + 0.7 * fibre)
+
+
+def poster(texture: "Procedural", rng: np.random.Generator) -> Map:
+    """Large flat patches with sharp borders, as on printed boards and book spines."""
+    n = texture.resolution_px
+    pattern = np.zeros((n, n), np.float32)
+    for _ in range(160):
+        row, column = rng.integers(0, n, 2)
+        height, width = (rng.uniform(0.02, 0.22, 2) * n).astype(int)
+        rows, columns = np.arange(row, row + height) % n, np.arange(column, column + width) % n
+        pattern[np.ix_(rows, columns)] = rng.uniform(-1, 1)
+    return pattern + 0.15 * _noise(texture, rng, coarse_m=0.1, fine_m=0.004, slope=0.5)
+
+
+def checker(texture: "Procedural", rng: np.random.Generator) -> Map:
+    """Eight by eight squares: the one with corners whose place is known."""
+    del rng
+    square = np.arange(texture.resolution_px) * 8 // texture.resolution_px
+    return np.where((square[:, None] + square[None, :]) % 2, 1.0, -1.0).astype(np.float32)
+
+
+PATTERNS: dict[str, Callable[["Procedural", np.random.Generator], Map]] = {
+    "plain": plain,
+    "terrazzo": terrazzo,
+    "plaster": plaster,
+    "wood": wood,
+    "poster": poster,
+    "checker": checker,
+}
+
+
+Pattern = Annotated[str, OneOf("pattern", PATTERNS)]
+Albedo = Annotated[float, Gt(0), Lt(1)]
+Resolution = Annotated[int, Ge(8), Le(8192)]
+Seed = Annotated[int, Ge(0)]
+
+
+@settings(kw_only=False)
+class Procedural:
+    """A square tile that repeats every `tile_m`.
+
+    `albedo` is its mean, and `contrast` its spread over its mean: half the step from the darkest 1 % to the
+    brightest 1 %.
+    """
+
+    pattern: Pattern
+    albedo: Albedo
+    contrast: Share = 0.0
+    tile_m: Positive = 1.0
+    resolution_px: Resolution = 1024
+    seed: Seed = 0
+
+    def pixels(self) -> Map:
+        """Reflectance (resolution_px, resolution_px) float32 in [0.02, 0.98], row 0 at v = 0."""
+        pattern = PATTERNS[self.pattern](self, np.random.default_rng([self.seed, self.resolution_px]))
+        low, high = np.percentile(pattern[::4, ::4] if len(pattern) > 64 else pattern, [1, 99])
+        unit = (pattern - pattern.mean()) / ((high - low) / 2 if high > low else 1.0)
+        return np.asarray(np.clip(self.albedo * (1 + self.contrast * unit), 0.02, 0.98).astype(np.float32))

@@ -1,0 +1,215 @@
+"""Builds the scene that a scene's YAML describes: shapes, furniture, models, what its maker makes, and lights."""
+
+import json
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
+from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.util import module_from_spec
+
+import numpy as np
+
+from vobench.asset.furniture import Part
+from vobench.asset.room import FINISHES, OUTWARD, Instance, Opening, Piece, shell, things
+from vobench.asset.shape import at, block, card
+from vobench.errors import SuiteError, VobenchError
+from vobench.geometry import se3
+from vobench.geometry.se3 import Array
+from vobench.scene import scene as scripted
+from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
+from vobench.scene.material import LUMINANCE, Material
+from vobench.scene.mesh import Thing, area_m2
+from vobench.scene.scene import Scene
+from vobench.suite.scene_file import SKY, SUN, Lighting, content, lit, materials_used
+from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile, SunSpec, hue
+
+
+def build(spec: SceneFile, lighting: Lighting) -> Scene:
+    """The scene under a lighting. Raises SuiteError where the lighting names a light that is not there."""
+    made = _made(spec)
+    return replace(made, lights=lit(made.lights, lighting))
+
+
+KEPT = 4
+_kept: OrderedDict[str, Scene] = OrderedDict()
+
+
+def _made(spec: SceneFile) -> Scene:
+    """The scene in its own light; the last few are kept, as some take seconds to make."""
+    key = json.dumps(content(spec))
+    if key not in _kept:
+        _kept[key] = _make(spec)
+    _kept.move_to_end(key)
+    while len(_kept) > KEPT:
+        _kept.popitem(last=False)
+    return _kept[key]
+
+
+@dataclass(frozen=True, slots=True)
+class Contents:
+    """Some of what a scene holds: things, their materials by name, lights and movers."""
+
+    things: tuple[Thing, ...] = ()
+    materials: Mapping[str, Material] = field(default_factory=dict)
+    lights: tuple[Light, ...] = ()
+    movers: tuple[scripted.Mover, ...] = ()
+
+
+def _make(spec: SceneFile) -> Scene:
+    parts = [_built(spec), *_from_maker(spec), *map(_model, spec.meshes), Contents(lights=tuple(_lights(spec)))]
+    parts += [_mover(mover, spec) for mover in spec.movers]
+    materials = {name: material for part in parts for name, material in part.materials.items()}
+    found = [thing for part in parts for thing in part.things]
+    glowing = {name for name, material in materials.items() if max(material.emission_cd_m2) > 0}
+    own = [light for part in parts for light in part.lights]
+    return Scene(
+        spec.name,
+        (),
+        materials,
+        (*own, *_glow([thing for thing in found if thing.material in glowing], materials)),
+        tuple(mover for part in parts for mover in part.movers),
+        tuple(thing for thing in found if thing.material not in glowing),
+    )
+
+
+def _material(name: str, spec: SceneFile) -> Material:
+    """What the scene calls so, or a finish that every scene has."""
+    return spec.materials[name].build() if name in spec.materials else FINISHES[name]()
+
+
+def _built(spec: SceneFile) -> Contents:
+    """The room, boxes, boards and furniture."""
+    of = cache(partial(_material, spec=spec))
+    instances = [*_room(spec, of), *_boxes(spec, of)]
+    for piece in spec.furniture:
+        with _sentence(f"furniture '{piece.name}'"):
+            made = Piece(piece.kind, piece.name, piece.at_m, piece.yaw_deg, piece.pitch_deg, piece.size)
+            instances.append(made.build(spec.seed))
+    used = {*spec.materials, *(name for _, name in materials_used(spec))}
+    return Contents(*things(instances, {name: of(name) for name in sorted(used)}))
+
+
+def _room(spec: SceneFile, of: Callable[[str], Material]) -> Iterator[Instance]:
+    room = spec.room
+    if room is None:
+        return
+    openings = [Opening(w.wall, w.center_m, w.size_m, w.depth_m) for w in room.windows]
+    walls = {side: of(room.walls.get(side, room.wall)) for side in OUTWARD}
+    for name, parts in shell(room.size_m, openings, floor=of(room.floor), ceiling=of(room.ceiling), walls=walls):
+        if name.startswith("window_"):
+            window = room.windows[int(name.removeprefix("window_"))]
+            looks = of(window.reveal), of(window.pane)
+            yield name, [replace(part, material=look) for part, look in zip(parts, looks, strict=True)]
+        else:
+            yield name, parts
+
+
+def _boxes(spec: SceneFile, of: Callable[[str], Material]) -> Iterator[Instance]:
+    for index, box in enumerate(spec.boxes):
+        mesh = block(box.size_m, bevel_m=0).moved(at(*box.center_m, yaw=box.yaw_deg))
+        yield box.name or f"box_{index}", [Part(mesh, of(box.material))]
+    for index, board in enumerate(spec.boards):
+        mesh = card(board.size_m).moved(at(*board.center_m, yaw=board.yaw_deg))
+        yield board.name or f"board_{index}", [Part(mesh, of(board.material))]
+
+
+def _from_maker(spec: SceneFile) -> Iterator[Contents]:
+    """What `make(seed)` of the scene's Python file returns: things, and their materials by name."""
+    if spec.maker is None:
+        return
+    with _sentence(spec.maker):
+        loader = SourceFileLoader("vobench_scene_maker", spec.maker)
+        module = module_from_spec(ModuleSpec(loader.name, loader, origin=spec.maker))
+        loader.exec_module(module)
+        found, materials = module.make(spec.seed)
+        missing = {thing.material for thing in found} - materials.keys()
+        if missing:
+            raise SuiteError(f"make() returns things without materials: {', '.join(sorted(missing))}")
+    yield Contents(tuple(found), materials)
+
+
+@contextmanager
+def _sentence(where: str) -> Iterator[None]:
+    """Whatever a maker raises as a SuiteError that names it."""
+    try:
+        yield
+    except VobenchError:
+        raise
+    except Exception as error:  # the user's code may raise anything
+        raise SuiteError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}") from error
+
+
+def _model(spec: ModelSpec) -> Contents:
+    """A model where it stands; with a name of its own, the names in it begin with that."""
+    from vobench.asset.model import read_model
+
+    model, T = read_model(spec.file, scale=spec.scale, up=spec.up, roles=spec.roles), at(*spec.at_m, yaw=spec.yaw_deg)
+    before = f"{spec.name}." if spec.name else ""
+    placed = tuple(
+        replace(thing, name=before + thing.name, mesh=thing.mesh.moved(T), material=before + thing.material)
+        for thing in model.everything
+    )
+    lights = tuple(_moved(replace(light, name=before + light.name), T) for light in model.lights)
+    return Contents(placed, {before + name: material for name, material in model.materials.items()}, lights)
+
+
+def _moved(light: Light, T_world_model: Array) -> Light:
+    if isinstance(light, Sun):
+        turn = float(np.rad2deg(np.arctan2(T_world_model[1, 0], T_world_model[0, 0])))
+        return replace(light, azimuth_deg=tuple(azimuth + turn for azimuth in light.azimuth_deg))
+    if not isinstance(light, PointLight | SpotLight):
+        return light
+    placed = replace(light, position_m=se3.apply(T_world_model, light.position_m[None])[0])
+    if isinstance(placed, SpotLight):
+        placed = replace(placed, direction=T_world_model[:3, :3] @ placed.direction)
+    return placed
+
+
+def _lights(spec: SceneFile) -> Iterator[Light]:
+    yield from (lamp.build() for lamp in spec.lamps)
+    if spec.sun:
+        yield _sun(spec.sun)
+    if spec.sky:
+        # A clear sky is brightest around where the sun stands at first, or overhead without a sun.
+        toward = _sun(spec.sun).direction(0) if spec.sun else np.array([0.0, 0.0, 1.0])
+        colour, level = hue(spec.sky.colour), spec.sky.level.build()
+        yield Sky(SKY, spec.sky.illuminance_lx, spec.sky.kind, toward, level=level, colour=colour)
+
+
+def _sun(sun: SunSpec) -> Sun:
+    path = [(key.t_s, key.azimuth_deg, key.elevation_deg) for key in sun.path]
+    if sun.azimuth_deg is not None and sun.elevation_deg is not None:
+        path = [(0.0, sun.azimuth_deg, sun.elevation_deg)]
+    times_s, azimuth_deg, elevation_deg = zip(*path, strict=True)
+    return Sun(SUN, sun.illuminance_lx, times_s, azimuth_deg, elevation_deg, sun.level.build(), hue(sun.colour))
+
+
+def _glow(things: Sequence[Thing], materials: Mapping[str, Material]) -> Iterator[AreaLight]:
+    """Every thing that shines as a light; those of one name are numbered."""
+    count = Counter[str]()
+    for thing in things:
+        emission = np.array(materials[thing.material].emission_cd_m2)
+        luminance = float(emission @ np.array(LUMINANCE))
+        nth, count[thing.name] = count[thing.name], count[thing.name] + 1
+        red, green, blue = (emission / luminance).tolist()
+        name = f"{thing.name}.{nth}" if nth else thing.name
+        power_lm, colour = luminance * np.pi * area_m2(thing.mesh.corners_m), (red, green, blue)
+        yield AreaLight(name, thing.mesh, power_lm, colour=colour, material=thing.material)
+
+
+def _mover(mover: MoverSpec, spec: SceneFile) -> Contents:
+    if mover.file:
+        own = _model(ModelSpec(file=mover.file, name=mover.name))
+    elif mover.kind:
+        with _sentence(f"mover '{mover.name}'"):
+            own = Contents(*things([Piece(mover.kind, mover.name, (0.0, 0.0, 0.0)).build(spec.seed)]))
+    else:
+        mesh, look = block(mover.size_m or (), bevel_m=0), mover.material or ""
+        own = Contents((Thing(mover.name, mesh, look),), {look: _material(look, spec)})
+    columns = zip(*((key.t_s, key.position_m, key.yaw_deg) for key in mover.path), strict=True)
+    times_s, positions_m, yaw_deg = (np.array(column, float) for column in columns)
+    path = scripted.Path(times_s, positions_m, yaw_deg, mover.repeats)
+    moving = tuple(replace(thing, name=mover.name) for thing in own.things)
+    return Contents(materials=own.materials, movers=(scripted.Mover(mover.name, (), path, moving),))
