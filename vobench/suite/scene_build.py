@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from importlib.machinery import ModuleSpec, SourceFileLoader
-from importlib.util import module_from_spec
+from runpy import run_path
 
 import numpy as np
 
@@ -120,10 +119,11 @@ def _from_maker(spec: SceneFile) -> Iterator[Contents]:
     if spec.maker is None:
         return
     with _sentence(spec.maker):
-        loader = SourceFileLoader("vobench_scene_maker", spec.maker)
-        module = module_from_spec(ModuleSpec(loader.name, loader, origin=spec.maker))
-        loader.exec_module(module)
-        found, materials = module.make(spec.seed)
+        # Never from bytecode: that of a file edited twice within a second would be the first one's.
+        make = run_path(spec.maker).get("make")
+        if make is None:
+            raise SuiteError(f"{spec.maker} has no function make(seed)")
+        found, materials = make(spec.seed)
         missing = {thing.material for thing in found} - materials.keys()
         if missing:
             raise SuiteError(f"make() returns things without materials: {', '.join(sorted(missing))}")
