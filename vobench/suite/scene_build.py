@@ -65,11 +65,10 @@ def _make(spec: SceneFile) -> Scene:
     own = [light for part in parts for light in part.lights]
     return Scene(
         spec.name,
-        (),
+        tuple(thing for thing in found if thing.material not in glowing),
         materials,
         (*own, *_glow([thing for thing in found if thing.material in glowing], materials)),
         tuple(mover for part in parts for mover in part.movers),
-        tuple(thing for thing in found if thing.material not in glowing),
     )
 
 
@@ -212,4 +211,4 @@ def _mover(mover: MoverSpec, spec: SceneFile) -> Contents:
     times_s, positions_m, yaw_deg = (np.array(column, float) for column in columns)
     path = scripted.Path(times_s, positions_m, yaw_deg, mover.repeats)
     moving = tuple(replace(thing, name=mover.name) for thing in own.things)
-    return Contents(materials=own.materials, movers=(scripted.Mover(mover.name, (), path, moving),))
+    return Contents(materials=own.materials, movers=(scripted.Mover(mover.name, moving, path),))
