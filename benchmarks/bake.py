@@ -48,7 +48,7 @@ def _baked(scene: Scene) -> BakedScene:
     started, cpu_started = time.perf_counter(), time.process_time()
     baked = bake(scene, BakeSettings())
     wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
-    texels = int((baked.surfel_of >= 0).sum())
+    texels = int((baked.patches.surfel_of >= 0).sum())
     gigabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     lights = f"{len(scene.lights)} lights, {texels} samples"
     print(f"{scene.name}: {lights}, bake {wall_s:.1f} s wall, {cpu_s:.1f} s CPU, peak {gigabytes:.2f} GB")

@@ -3,8 +3,8 @@
     python benchmarks/blender.py --python PYTHON_WITH_BPY [--samples 1024] [--width 720] [--bakes FOLDER]
 
 The room, all matt, the same poses for all. Error: PSNR against white (a luminance of 1) in linear light over
-pixels that are not clipped, the reference's own noise taken out by its two halves as in light.py. The raster engine's time
-is that of a picture, its bake (once per scene) apart. bpy comes as a wheel ("pip install bpy" in an environment
+pixels that are not clipped, the reference's own noise taken out by its two halves as in light.py. The raster
+engine's time is that of a picture, its bake (once per scene) apart. bpy is a wheel ("pip install bpy" in an environment
 of its own, with the Python that it is made for), is GPL, and is only ever run as a separate process.
 """
 

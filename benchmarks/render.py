@@ -31,7 +31,7 @@ from vobench.scene.light import AreaLight
 from vobench.scene.material import Map, reflectance
 from vobench.scene.mesh import joined
 from vobench.scene.scene import Scene
-from vobench.sensor.image_sensor import CAMERAS, NoiseStreams, expose
+from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose
 from vobench.sequence import SequenceWriter
 from vobench.suite import catalog
 from vobench.suite.scene_build import build
@@ -86,7 +86,7 @@ class Recorder:
         """Add one pair and its truth."""
         rig, t_ns = self._rig, self._frames * NS_PER_FRAME
         light = (picture / self._white_cd_m2 for picture in pair(self._renderer, rig, T_world_body))
-        left, right = (expose(picture, CAMERAS["clean"], self._noise) for picture in light)
+        left, right = (expose(picture, CameraSettings(), self._noise) for picture in light)
         self._writer.write_frame(t_ns, left, right)
         self._writer.write_truth(t_ns, T_world_body, np.zeros(6))
         self._frames += 1
