@@ -18,7 +18,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.scene import scene as scripted
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
-from vobench.scene.material import LUMINANCE, Material
+from vobench.scene.material import LUMINANCE, Material, emitted_cd_m2
 from vobench.scene.mesh import Thing, area_m2
 from vobench.scene.scene import Scene
 from vobench.suite.scene_file import SKY, SUN, Lighting, content, lit, materials_used
@@ -61,7 +61,7 @@ def _make(spec: SceneFile) -> Scene:
     parts += [_mover(mover, spec) for mover in spec.movers]
     materials = {name: material for part in parts for name, material in part.materials.items()}
     found = [thing for part in parts for thing in part.things]
-    glowing = {name for name, material in materials.items() if max(material.emission_cd_m2) > 0}
+    glowing = {name for name, material in materials.items() if emitted_cd_m2(material).max() > 0}
     own = [light for part in parts for light in part.lights]
     return Scene(
         spec.name,
@@ -189,7 +189,7 @@ def _glow(things: Sequence[Thing], materials: Mapping[str, Material]) -> Iterato
     """Every thing that shines as a light; those of one name are numbered."""
     count = Counter[str]()
     for thing in things:
-        emission = np.array(materials[thing.material].emission_cd_m2)
+        emission = emitted_cd_m2(materials[thing.material])
         luminance = float(emission @ np.array(LUMINANCE))
         nth, count[thing.name] = count[thing.name], count[thing.name] + 1
         red, green, blue = (emission / luminance).tolist()
