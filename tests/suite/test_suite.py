@@ -170,9 +170,7 @@ def test_a_calibration_error_makes_the_true_rig_another_and_the_told_one_not(ben
 # ruff: noqa: E501 - a sentence stands in one line
 
 
-SUITE_KEYS = (
-    "cameras, estimators, lightings, name, rendering, repeats, rigs, scenes, seed, source, summary, trajectories, truth"
-)
+SUITE_KEYS = "cameras, estimators, lightings, modes, name, rendering, repeats, rigs, scenes, seed, source, summary, trajectories, truth"
 RIG_KEYS = "baseline_m, calibration_error, forward_m, height_m, imu, lens, pitch_deg"
 LENSES = "d435i, euroc, fisheye, paper_blender, paper_literal, tartanair, zed2i"
 ESTIMATORS = "constant_velocity, imu_dead_reckoning, lk_epipolar, stand_still, wheel_odometry"
@@ -184,7 +182,7 @@ WRONG = [
     ("seed: 1", "xyz: 1", f":2: xyz: unknown key. Known: {SUITE_KEYS}"),
     ("pitch_deg", "pich_deg", f":5: rigs.down.pich_deg: unknown key. Did you mean 'pitch_deg'? Known: {RIG_KEYS}"),
     ("{power_lm: 150}", "{power: 1, power_lm: 1}", ":4: lightings.dim.lamp.power: unknown key. Did you mean 'power_lm'? Known: illuminance_lx, level, power_lm"),
-    ("params:", "parms:", ":8: estimators.1.parms: unknown key. Did you mean 'params'? Known: label, name, params"),
+    ("params:", "parms:", ":8: estimators.1.parms: unknown key. Did you mean 'params'? Known: label, limits, name, params"),
     ("pitch_deg: 90", "", ":5: rigs.down.pitch_deg: this key is missing"),
     ("seed: 1", "seed: one", ":2: seed: should be a whole number (got 'one')"),
     ("seed: 1", "seed: '1'", ":2: seed: should be a whole number (got '1')"),

@@ -17,8 +17,8 @@ from vobench.errors import InputError, MissingDependencyError, UnknownNameError
 from vobench.report import page, save_trial
 from vobench.report.leaderboard import FORMATS, LEGEND, Board, lines_of, notes
 from vobench.report.rerun import pick, trial_view
+from vobench.report.verify import verify_run
 from vobench.run.folder import open_run
-from vobench.run.verify import verify_run
 
 # A narrow terminal goes without these, in this order; every report has them all.
 LEAST_FIRST = ("RPE °/frame", "RPE mm/frame", "CPU ms/frame", "segments %", "survived", "coverage", "#")

@@ -16,8 +16,8 @@ from types import ModuleType
 from typing import cast
 
 from vobench.errors import VobenchError
-from vobench.estimator.process import InvalidOutputError, checked
-from vobench.estimator.protocol import Estimator
+from vobench.estimator.process import InvalidOutputError, checked, checked_revision
+from vobench.estimator.protocol import Estimator, Frame
 
 NAMESPACE = "vobench_estimators"
 
@@ -97,15 +97,25 @@ def main(fd: int, folder: Path, class_path: str, name: str, memory_bytes: int) -
 
 
 def _serve(connection: Connection, estimator: Estimator) -> None:
-    _, rig, params, seed = connection.recv()
-    estimator.start(rig, params, seed)
-    connection.send(("ready",))
     while True:
-        frame = connection.recv()
-        wall, cpu = time.perf_counter(), time.process_time()
-        answer = estimator.process(frame)
-        spent = (time.perf_counter() - wall) * 1e3, (time.process_time() - cpu) * 1e3
-        connection.send(("result", checked(answer, frame.index), *spent))
+        message = connection.recv()
+        if isinstance(message, Frame):
+            wall, cpu = time.perf_counter(), _cpu_s()
+            answer = estimator.process(message)
+            spent = (time.perf_counter() - wall) * 1e3, (_cpu_s() - cpu) * 1e3
+            connection.send(("result", checked(answer, message.index), *spent))
+        elif message[0] == "start":
+            estimator.start(*message[1:])
+            connection.send(("ready",))
+        else:
+            finish = getattr(estimator, "finish", dict)
+            connection.send(("revised", checked_revision(finish() or {})))
+
+
+def _cpu_s() -> float:
+    """CPU time of this process and of those that it has started and that have ended."""
+    spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in spent)
 
 
 def _die_with_parent() -> None:

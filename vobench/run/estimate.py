@@ -4,22 +4,27 @@ import csv
 import io
 import json
 import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from vobench.estimator.process import Answer, EstimatorFailure, EstimatorProcess, Limits
+from vobench.estimator.oracle import NoisyTruth
+from vobench.estimator.process import Answer, EstimatorProcess
+from vobench.estimator.program import EstimatorFailure
 from vobench.estimator.protocol import EncoderReadings, Frame, Status, Tracks
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
+from vobench.run.consistency import COVARIANCE, format_covariances
+from vobench.run.folder import read_tum
 from vobench.run.frames import ANSWER_COLUMNS, ANSWERS, TIME_COLUMNS, TIMES, new_table
+from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import Sequence, StereoFrame
 from vobench.sequence.picture import grey, rgb
@@ -30,11 +35,12 @@ if TYPE_CHECKING:
     from vobench.run.store import Progress
     from vobench.suite.suite import Trial
 
-ESTIMATE = "estimate.tum"
+ESTIMATE, REVISED = "estimate.tum", "revised.tum"
 TRACKS = "tracks.zip"
 OUTCOME = "outcome.json"
 LOG = "log.txt"
 FINISHED = "finished"
+DROPPED = "dropped"  # a frame that came while the estimator was busy with another
 
 
 class Outcome(BaseModel):
@@ -58,21 +64,49 @@ def read_tracks(folder: Path) -> Iterator[tuple[int, NDArray[np.float32]]]:
             yield int(name.removesuffix(".npy")), np.load(io.BytesIO(archive.read(name)))
 
 
-LIMITS = Limits()
 Readings = TypeVar("Readings", EncoderReadings, ImuReadings)
+
+
+class Running(Protocol):
+    """An estimator that runs, by whichever door it came: its verbs raise EstimatorFailure."""
+
+    def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
+        """Take the calibration, the parameters and a seed."""
+
+    def process(self, frame: Frame) -> Answer:
+        """Take the next frame; what the estimator says of it, checked."""
+
+    def finish(self) -> dict[int, Array]:
+        """Hear that there are no more frames; the revised poses by their frame's index."""
 
 
 def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress") -> None:
     """Feed a sequence to a trial's estimator; whatever happens, the folder is complete afterwards."""
     sequence, outcome = Sequence.open(recording), Outcome(kind=FINISHED, reason="")
     (folder / LOG).touch()
-    with _keeper(folder, sequence.rig, trial.entrant.manifest.pose_of) as keeper:
+    with _keeper(folder, _T_frame_left(sequence.rig, trial.entrant.manifest.pose_of)) as keeper:
         try:
             _check_needs(trial.entrant.manifest.needs, sequence)
-            _feed(trial, sequence, keeper, progress, folder / LOG)
+            _feed(trial, sequence, keeper, progress, _running(trial, recording, folder / LOG))
         except EstimatorFailure as failure:
             outcome = Outcome(kind=failure.kind, reason=failure.reason)
     (folder / OUTCOME).write_text(outcome.model_dump_json(), encoding="utf-8")
+
+
+def _running(trial: "Trial", recording: Path, log: Path) -> AbstractContextManager[Running]:
+    """The trial's estimator as its manifest says that it is run."""
+    entrant, manifest = trial.entrant, trial.entrant.manifest
+    if manifest.oracle:
+        return NoisyTruth(read_tum(recording / GROUND_TRUTH))
+    assert manifest.class_path
+    return EstimatorProcess(entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits)
+
+
+def _T_frame_left(rig: Rig, pose_of: str) -> Array:
+    """The left camera in the frame whose poses the estimator gives."""
+    T_body_imu = rig.imu.T_body_imu if rig.imu else np.eye(4)
+    T_body_frame = {"body": np.eye(4), "imu": T_body_imu}.get(pose_of)
+    return np.eye(4) if T_body_frame is None else se3.inverse(T_body_frame) @ rig.T_body_left
 
 
 def _check_needs(needs: tuple[str, ...], sequence: Sequence) -> None:
@@ -88,23 +122,51 @@ def _check_needs(needs: tuple[str, ...], sequence: Sequence) -> None:
             raise EstimatorFailure("refused", f"it needs {need!r}, but this recording has {short}")
 
 
-def _feed(trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Progress", log: Path) -> None:
+def _feed(
+    trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Progress", door: AbstractContextManager[Running]
+) -> None:
     """Start the estimator, hand it frame after frame, and keep what it says. Raises EstimatorFailure."""
-    entrant, manifest = trial.entrant, trial.entrant.manifest
-    with EstimatorProcess(entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=LIMITS) as process:
-        process.start(sequence.rig, entrant.params, trial.repeat)
-        for frame in progress.track(_frames(sequence, manifest.needs), trial.name, total=len(sequence)):
-            keeper.keep(frame, process.process(frame))
+    entrant = trial.entrant
+    with door as running:
+        running.start(sequence.rig, entrant.params, trial.repeat)
+        pace = _Pace(keeper, is_real_time=entrant.mode == "real_time")
+        frames = _frames(sequence, entrant.manifest.needs, pace)
+        for frame in progress.track(frames, trial.name, total=len(sequence)):
+            answer = running.process(frame)
+            keeper.keep(frame, answer)
+            pace.free_ns = frame.t_ns + int(answer.wall_ms * 1e6)
+        keeper.revised.update(running.finish())
 
 
-def _frames(sequence: Sequence, needs: tuple[str, ...]) -> Iterator[Frame]:
-    """What the estimator asked for, one instant at a time."""
+@dataclass(slots=True)
+class _Pace:
+    """The camera's pace, by the clock of its stamps and of what answers took: nobody sleeps.
+
+    An estimator is free again at `free_ns`. In real time, a frame that comes earlier is dropped.
+    """
+
+    keeper: "_Keeper"
+    is_real_time: bool
+    free_ns: int = np.iinfo(np.int64).min
+
+    def drops(self, index: int, t_ns: int) -> bool:
+        """Whether this frame is lost to the estimator, which the table of frames then says."""
+        is_lost = self.is_real_time and t_ns < self.free_ns
+        if is_lost:
+            self.keeper.answers.writerow({"frame": index, "status": DROPPED})
+        return is_lost
+
+
+def _frames(sequence: Sequence, needs: tuple[str, ...], pace: _Pace) -> Iterator[Frame]:
+    """What the estimator asked for, one instant at a time, but for the frames that it is too late for."""
     encoders = EncoderReadings(*sequence.encoders()) if "encoders" in needs else None
     imu = sequence.imu() if "imu" in needs else None
     last_ns = np.iinfo(np.int64).min
     # Pictures that nobody asked for are not decoded.
     looks, stereo, shown = "stereo" in needs or "mono" in needs, "stereo" in needs, rgb if "colour" in needs else grey
     for f in sequence.frames(right=stereo) if looks else sequence.encoded_frames():
+        if pace.drops(f.index, f.t_ns):
+            continue
         seen = (f.left, f.right) if isinstance(f, StereoFrame) else (None, None)
         left, right = (image if image is None else shown(image, f.colour) for image in seen)
         yield Frame(f.index, f.t_ns, left, right, _between(encoders, last_ns, f.t_ns), _between(imu, last_ns, f.t_ns))
@@ -127,14 +189,19 @@ class _Keeper:
     answers: "csv.DictWriter[str]"
     times: "csv.DictWriter[str]"
     tracks: zipfile.ZipFile
-    poses: list[tuple[int, Array]] = field(default_factory=list)
+    stamps: dict[int, int] = field(default_factory=dict)
+    poses: dict[int, Array] = field(default_factory=dict)
+    covariances: dict[int, Array] = field(default_factory=dict)
+    revised: dict[int, Array] = field(default_factory=dict)
 
     def keep(self, frame: Frame, answer: Answer) -> None:
         """Add one frame."""
         r = answer.result
+        self.stamps[frame.index] = frame.t_ns
         if r.T_odom_frame is not None and r.status is not Status.LOST:
-            T = se3.inverse(self.T_frame_left) @ r.T_odom_frame @ self.T_frame_left
-            self.poses.append((frame.t_ns, T))
+            self.poses[frame.index] = r.T_odom_frame
+            if r.covariance is not None:
+                self.covariances[frame.index] = self._of_left(r.T_odom_frame[:3, :3], r.covariance)
         stats = json.dumps({key: float(f"{value:.6g}") for key, value in sorted(r.stats.items())})
         answered = {"frame": frame.index, "status": str(r.status), "reason": r.reason, "stats": stats}
         cost = {"wall_ms": f"{answer.wall_ms:.3f}", "cpu_ms": f"{answer.cpu_ms:.3f}"}
@@ -146,21 +213,46 @@ class _Keeper:
             self.answers.writerow({**answered, "tracks": len(inlier), "inliers": int(inlier.sum())})
             self.tracks.writestr(_member(frame.index), _table(r.tracks))
 
+    def _of_left(self, R_odom_frame: Array, P: Array) -> Array:
+        """The covariance (6, 6) of the left camera's pose, where P is that of the frame that it is mounted on.
+
+        A rotation of the frame by δ about odom's axes moves the camera by δ × r, with r its place in the frame.
+        """
+        x, y, z = R_odom_frame @ self.T_frame_left[:3, 3]
+        J = np.eye(6)
+        J[:3, 3:] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
+        J = np.kron(np.eye(2), self.T_frame_left[:3, :3].T) @ J
+        return np.asarray(J @ P @ J.T)
+
+    def write(self, folder: Path) -> None:
+        """The files of poses: the left camera's, in its frame at the start."""
+        (folder / ESTIMATE).write_text(self._tum(self.poses), encoding="utf-8")
+        if self.covariances:
+            rows = ((self.stamps[index], P) for index, P in self.covariances.items())
+            (folder / COVARIANCE).write_text(format_covariances(rows), encoding="utf-8")
+        if self.revised:
+            (folder / REVISED).write_text(self._tum(self.revised), encoding="utf-8")
+
+    def _tum(self, poses: Mapping[int, Array]) -> str:
+        at = sorted(poses.keys() & self.stamps.keys())
+        if not at:
+            return ""
+        T_odom_frame = np.stack([poses[index] for index in at])
+        T = se3.inverse(self.T_frame_left) @ T_odom_frame @ self.T_frame_left
+        return format_tum(Trajectory(np.array([self.stamps[index] for index in at], np.int64), T))
+
 
 @contextmanager
-def _keeper(folder: Path, rig: Rig, pose_of: str) -> Iterator[_Keeper]:
-    """A keeper while an estimator runs; then the file of poses: the left camera's, in its frame at the start."""
+def _keeper(folder: Path, T_frame_left: Array) -> Iterator[_Keeper]:
+    """A keeper while an estimator runs; then its files of poses."""
     with (
         new_table(folder / ANSWERS, ANSWER_COLUMNS) as answers,
         new_table(folder / TIMES, TIME_COLUMNS) as times,
         zipfile.ZipFile(folder / TRACKS, "w", zipfile.ZIP_DEFLATED) as tracks,
     ):
-        T_frame_left = np.eye(4) if pose_of == "left_camera" else rig.T_body_left
         keeper = _Keeper(T_frame_left, answers, times, tracks)
         yield keeper
-    stamps = np.array([t for t, _ in keeper.poses], np.int64)
-    text = format_tum(Trajectory(stamps, np.stack([T for _, T in keeper.poses]))) if keeper.poses else ""
-    (folder / ESTIMATE).write_text(text, encoding="utf-8")
+    keeper.write(folder)
 
 
 def _member(index: int) -> zipfile.ZipInfo:

@@ -1,0 +1,93 @@
+"""What an estimator's `estimator.yaml` may say: how it is run, what it needs, what it claims, what it may take."""
+
+import re
+from dataclasses import field
+from typing import Annotated, Any, ClassVar, Literal
+
+from annotated_types import Ge, Le, MinLen
+
+from vobench.errors import SettingError, unknown
+from vobench.setting import Check, Matching, Positive, settings
+
+MANIFEST_FILE = "estimator.yaml"
+CLASS_PATH = r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*"
+PLACEHOLDER = re.compile(r"\{(\w*)\}")
+PLACEHOLDERS = ("dataset", "calib", "out", "seed", "rate_hz")
+IN_STREAM = ("seed", "rate_hz")
+
+Text = Annotated[str, MinLen(1)]
+Need = Literal["stereo", "mono", "colour", "encoders", "imu"]
+
+
+def _check_placeholders(word: str) -> None:
+    for name in PLACEHOLDER.findall(word):
+        if name not in PLACEHOLDERS:
+            raise SettingError(unknown("placeholder", name, list(PLACEHOLDERS)))
+
+
+Argv = tuple[Annotated[str, MinLen(1), Check(_check_placeholders)], ...]
+
+
+@settings()
+class Limits:
+    """What an estimator may take, its processes together; the clock of `trial_s` runs from its start."""
+
+    start_s: Positive = 60.0
+    frame_s: Positive = 20.0
+    trial_s: Positive = 7200.0
+    memory_mib: Annotated[int, Ge(64)] = 4096
+    threads: Annotated[int, Ge(1), Le(256)] = 1
+
+
+USUAL = Limits()
+
+
+def _key_of(name: str) -> str:
+    return "class" if name == "class_path" else name
+
+
+@settings()
+class Manifest:
+    """One estimator: its name, one way to run it, which sensors it needs, whose pose it gives, what it claims."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = {"alias_generator": _key_of}
+
+    name: Annotated[str, Matching(r"[a-z][a-z0-9_]*", "lower-case letters, digits and _, a letter first")]
+    version: Text
+    class_path: Annotated[str, Matching(CLASS_PATH, "file:Class, as in 'estimator:Mine'")] | None = None
+    command: Argv = ()
+    stream: Argv = ()
+    oracle: bool = False
+    dataset: Literal["kitti", "euroc", "tum"] = "kitti"
+    needs: tuple[Need, ...] = ()
+    pose_of: Literal["left_camera", "body", "imu"]
+    metric: bool = True
+    causal: bool = True
+    deterministic: bool = True
+    limits: Limits = USUAL
+    summary: Text
+    paper: str = ""
+    params: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        ways = {"class": self.class_path, "command": self.command, "stream": self.stream, "oracle": self.oracle}
+        given = [way for way, said in ways.items() if said]
+        if len(given) != 1:
+            raise SettingError(f"an estimator has one of {', '.join(ways)} (got {' and '.join(given) or 'none'})")
+        if self.command and not any("{out}" in word for word in self.command):
+            raise SettingError("should have {out}, the file where the program writes its poses", "command")
+        for word in self.stream:
+            if wrong := [name for name in PLACEHOLDER.findall(word) if name not in IN_STREAM]:
+                raise SettingError(f"has no {{{wrong[0]}}}: frames come on standard input", "stream")
+
+    @property
+    def claims(self) -> tuple[str, ...]:
+        """What a board says beside the name, as it is not what all others claim."""
+        said = {
+            "Sim(3)": not self.metric,
+            "whole recording": bool(self.command),
+            "not causal": not self.causal and not self.command,
+            "not deterministic": not self.deterministic,
+            "oracle": self.oracle,
+        }
+        return tuple(claim for claim, holds in said.items() if holds)
