@@ -101,8 +101,11 @@ def test_reading_a_manifest_imports_neither_opencv_nor_the_code():
         ({"class": None}, r"an estimator has one of class, command, stream, oracle \(got none\)"),
         ({"stream": "[./run]"}, r"an estimator has one of .* \(got class and stream\)"),
         ({"class": None, "command": "[./run, '{dataset}']"}, r"command: should have \{out\}"),
-        ({"class": None, "command": "[./run, '{data}', '{out}']"}, r"command\.1: no placeholder named 'data'\. Did"),
-        ({"class": None, "stream": "[./run, '{out}']"}, r"stream: has no \{out\}"),
+        (
+            {"class": None, "command": "[./run, '{data}', '{out}']"},
+            r"command: no placeholder or parameter named 'data'\. Did",
+        ),
+        ({"class": None, "stream": "[./run, '{out}']"}, r"stream: no placeholder or parameter named 'out'"),
         ({"class": None, "oracle": "true"}, r"oracle: only vobench's own estimators may be drawn from the truth"),
         ({"limits": "{frame_s: 0}"}, r":7: limits\.frame_s: should be greater than 0 \(got 0\)"),
     ],

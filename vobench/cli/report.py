@@ -21,7 +21,7 @@ from vobench.report.verify import verify_run
 from vobench.run.folder import open_run
 
 # A narrow terminal goes without these, in this order; every report has them all.
-LEAST_FIRST = ("RPE °/frame", "RPE mm/frame", "CPU ms/frame", "segments %", "survived", "coverage", "#")
+LEAST_FIRST = ("MiB", "RPE °/frame", "RPE mm/frame", "CPU ms/frame", "segments %", "survived", "coverage", "#")
 ENDLESS = 10_000
 TERMINAL = "terminal"
 FORMS = (*FORMATS, "html")

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from annotated_types import Ge, Le, MinLen
 
 from vobench.errors import SettingError, unknown
-from vobench.setting import Check, Matching, Positive, settings
+from vobench.setting import Matching, Positive, settings
 
 MANIFEST_FILE = "estimator.yaml"
 CLASS_PATH = r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*"
@@ -19,13 +19,7 @@ Text = Annotated[str, MinLen(1)]
 Need = Literal["stereo", "mono", "colour", "encoders", "imu"]
 
 
-def _check_placeholders(word: str) -> None:
-    for name in PLACEHOLDER.findall(word):
-        if name not in PLACEHOLDERS:
-            raise SettingError(unknown("placeholder", name, list(PLACEHOLDERS)))
-
-
-Argv = tuple[Annotated[str, MinLen(1), Check(_check_placeholders)], ...]
+Argv = tuple[Annotated[str, MinLen(1)], ...]
 
 
 @settings()
@@ -76,9 +70,10 @@ class Manifest:
             raise SettingError(f"an estimator has one of {', '.join(ways)} (got {' and '.join(given) or 'none'})")
         if self.command and not any("{out}" in word for word in self.command):
             raise SettingError("should have {out}, the file where the program writes its poses", "command")
-        for word in self.stream:
-            if wrong := [name for name in PLACEHOLDER.findall(word) if name not in IN_STREAM]:
-                raise SettingError(f"has no {{{wrong[0]}}}: frames come on standard input", "stream")
+        for key, argv, known in (("command", self.command, PLACEHOLDERS), ("stream", self.stream, IN_STREAM)):
+            for name in PLACEHOLDER.findall(" ".join(argv)):
+                if name not in (*known, *self.params):
+                    raise SettingError(unknown("placeholder or parameter", name, [*known, *self.params]), key)
 
     @property
     def claims(self) -> tuple[str, ...]:

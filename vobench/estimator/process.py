@@ -130,11 +130,12 @@ ANSWER_BYTES = 64 << 20  # a pose, some numbers and tracks; more is no answer bu
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A checked result and what it cost."""
+    """A checked result and what it cost; memory is the most that it held so far."""
 
     result: Result
     wall_ms: float
     cpu_ms: float
+    memory_mib: float = 0.0
 
 
 class EstimatorProcess:
@@ -154,8 +155,8 @@ class EstimatorProcess:
 
     def process(self, frame: Frame) -> Answer:
         """Hand over the next frame; what the estimator says of it, checked."""
-        _, result, wall_ms, cpu_ms = self._ask(frame, self._limits.frame_s)
-        return Answer(result, wall_ms, cpu_ms)
+        _, result, *cost = self._ask(frame, self._limits.frame_s)
+        return Answer(result, *cost)
 
     def finish(self) -> dict[int, Array]:
         """Say that there are no more frames; the poses that the estimator revises, by their frame's index."""

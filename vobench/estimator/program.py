@@ -7,7 +7,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
@@ -43,8 +42,8 @@ class Program:
     def __init__(self, argv: list[str], *, log: Path, limits: Limits, home: Path | None = None, **streams: Any) -> None:
         self.limits, self._log_path, self._log = limits, log, log.open("wb")
         self.home = home or new_home()
-        self._began = self._looked = time.monotonic()
-        self.cpu_s, self.peak_bytes = 0.0, 0
+        self._began, self._looked, self._pids = time.monotonic(), 0.0, list[str]()
+        self._before_s, self.cpu_s, self.peak_mib = _buried_s(), 0.0, 0.0
         kept = {name: value for name, value in os.environ.items() if name in KEPT_ENVIRONMENT}
         one = {**dict.fromkeys(THREADS, str(limits.threads)), "PYTHONHASHSEED": "0"}
         given = {"stdin": subprocess.DEVNULL, "stdout": self._log, "stderr": self._log, **streams}
@@ -67,15 +66,19 @@ class Program:
         stop.check()
         if self.left_s() < 0:
             raise EstimatorFailure("timeout", f"the whole trial took more than {self.limits.trial_s:g} s")
-        if not at_once and time.monotonic() < self._looked + LOOK_S:
+        is_time = time.monotonic() > self._looked + LOOK_S
+        if is_time:
+            self._looked, self._pids = time.monotonic(), session(self.process.pid)
+        if not (is_time or at_once):
             return
-        self._looked = time.monotonic()
-        cpu_s, memory_bytes = used(self.process.pid)
-        self.cpu_s, self.peak_bytes = max(self.cpu_s, cpu_s), max(self.peak_bytes, memory_bytes)
-        if memory_bytes > self.limits.memory_mib << 20:
-            raise EstimatorFailure(
-                "out_of_memory", f"{memory_bytes >> 20} MiB, where the limit is {self.limits.memory_mib} MiB"
-            )
+        stats = [stat for pid in self._pids if (stat := _stat(pid))]
+        # Of each its own time, and that of those that it has buried.
+        self.cpu_s = max(self.cpu_s, sum(int(ticks) for stat in stats for ticks in stat[11:15]) / TICKS_PER_S)
+        memory_mib = sum(int(stat[21]) for stat in stats) * resource.getpagesize() / (1 << 20)
+        self.peak_mib = max(self.peak_mib, memory_mib)
+        if memory_mib > self.limits.memory_mib:
+            limit = f"where the limit is {self.limits.memory_mib} MiB"
+            raise EstimatorFailure("out_of_memory", f"its processes hold {memory_mib:.0f} MiB, {limit}")
 
     def wait(self) -> None:
         """Wait for its end. Raises EstimatorFailure where that is none that it wanted."""
@@ -83,6 +86,7 @@ class Program:
             self.look()
             time.sleep(LOOK_S / 5)
         stop.check()
+        self.cpu_s = max(self.cpu_s, _buried_s() - self._before_s)
         if self.process.returncode:
             raise EstimatorFailure(*self.death())
 
@@ -128,22 +132,23 @@ def new_home() -> Path:
     return Path(tempfile.mkdtemp(prefix="vobench-estimator-"))
 
 
-def used(session: int) -> tuple[float, int]:
-    """CPU seconds and resident bytes of all processes of a session, with the CPU of those that it has buried."""
-    if sys.platform != "linux":  # where there is no /proc
-        spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-        return spent.ru_utime + spent.ru_stime, 0
-    stats = [stat for stat in _stats() if int(stat[3]) == session]
-    ticks = sum(int(value) for stat in stats for value in stat[11:15])
-    return ticks / TICKS_PER_S, sum(int(stat[21]) for stat in stats) * resource.getpagesize()
+def session(leader: int) -> list[str]:
+    """The ids of all processes of a session; none where there is no /proc."""
+    pids = os.listdir("/proc") if sys.platform == "linux" else []
+    return [pid for pid in pids if pid.isdigit() and (stat := _stat(pid)) and int(stat[3]) == leader]
 
 
-def _stats() -> Iterable[list[str]]:
-    """What /proc/<pid>/stat says of each process behind its name: state, parent, group, session, ... (proc(5))."""
-    for entry in os.listdir("/proc"):
-        if entry.isdigit():
-            with suppress(OSError):
-                yield Path("/proc", entry, "stat").read_text(errors="replace").rpartition(")")[2].split()
+def _stat(pid: str) -> list[str]:
+    """What /proc/<pid>/stat says behind the name: state, parent, group, session, ... (proc(5)); nothing once gone."""
+    with suppress(OSError):
+        return Path("/proc", pid, "stat").read_text(errors="replace").rpartition(")")[2].split()
+    return []
+
+
+def _buried_s() -> float:
+    """CPU seconds of all processes that we have started and that have ended, and of theirs."""
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
 
 
 def _cut(log: Path) -> None:

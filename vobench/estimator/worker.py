@@ -102,7 +102,8 @@ def _serve(connection: Connection, estimator: Estimator) -> None:
         if isinstance(message, Frame):
             wall, cpu = time.perf_counter(), _cpu_s()
             answer = estimator.process(message)
-            spent = (time.perf_counter() - wall) * 1e3, (_cpu_s() - cpu) * 1e3
+            peak = sum(each.ru_maxrss for each in _spent()) / 1024
+            spent = (time.perf_counter() - wall) * 1e3, (_cpu_s() - cpu) * 1e3, peak
             connection.send(("result", checked(answer, message.index), *spent))
         elif message[0] == "start":
             estimator.start(*message[1:])
@@ -114,8 +115,11 @@ def _serve(connection: Connection, estimator: Estimator) -> None:
 
 def _cpu_s() -> float:
     """CPU time of this process and of those that it has started and that have ended."""
-    spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(each.ru_utime + each.ru_stime for each in spent)
+    return sum(each.ru_utime + each.ru_stime for each in _spent())
+
+
+def _spent() -> list[resource.struct_rusage]:
+    return [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
 
 
 def _die_with_parent() -> None:

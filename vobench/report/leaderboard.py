@@ -55,6 +55,7 @@ class Row:
     revised_ate_mm: float | None = None
     revised_segment_percent: float | None = None
     scale_drift_percent_per_m: float | None = None
+    memory_mib: float | None = None
     frames: int = 0
     frames_dropped: int = 0
     deadlines_missed: int = 0
@@ -72,6 +73,7 @@ class Board:
 class EstimatorStatistics:
     """What an estimator answered on a case: mean CPU time of a frame, and its commonest reason for single frames.
 
+    Its processes held `memory_mib` at most.
     Of all frames so many were `dropped`, as `late` answers came after the next frame.
     """
 
@@ -79,6 +81,7 @@ class EstimatorStatistics:
     reason: str = ""
     count: int = 0
     first: int | None = None
+    memory_mib: float | None = None
     frames: int = 0
     dropped: int = 0
     late: int = 0
@@ -97,7 +100,13 @@ def answers(trials: Sequence[list[FrameRow]]) -> EstimatorStatistics:
     cost_ms = fmean(costs_ms) if costs_ms else None
     statuses = [[row.status for row in trial] for trial in trials]
     late = sum(now == DROPPED != before for each in statuses for before, now in pairwise(each))
-    pace: dict[str, Any] = {"frames": len(rows), "dropped": sum(row.status == DROPPED for row in rows), "late": late}
+    memory_mib = max((row.memory_mib for row in rows if row.memory_mib), default=None)
+    pace: dict[str, Any] = {
+        "memory_mib": memory_mib,
+        "frames": len(rows),
+        "dropped": sum(row.status == DROPPED for row in rows),
+        "late": late,
+    }
     if not given:
         return EstimatorStatistics(cost_ms, **pace)
     kinds = Counter(NUMBER.sub("0", row.reason) for row in given)
@@ -160,6 +169,7 @@ def _row(trials: list[TrialScore], answered: Answered) -> Row:
         frame_reason_count=said.count,
         frame_reason_first=said.first,
         claims=trials[0].claims,
+        memory_mib=max((each.memory_mib for each in by_case if each.memory_mib), default=None),
         frames=sum(each.frames for each in by_case),
         frames_dropped=sum(each.dropped for each in by_case),
         deadlines_missed=sum(each.late for each in by_case),
@@ -190,7 +200,7 @@ def _number(value: float | None, digits: int) -> str:
     return "–" if value is None else f"{value:.{digits}f}"
 
 
-COST = "CPU ms/frame"
+COST, MEMORY = "CPU ms/frame", "MiB"
 # Heading and cell of each column, as people read them.
 COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("#", lambda row: str(row.rank)),
@@ -203,6 +213,7 @@ COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("RPE °/frame", lambda row: _number(row.rpe_deg, 4)),
     ("coverage", lambda row: _number(row.coverage, 3)),
     (COST, lambda row: _number(row.ms_per_frame, 1)),
+    (MEMORY, lambda row: _number(row.memory_mib, 0)),
 )
 HEADINGS = tuple(heading for heading, _ in COLUMNS)
 LEGEND = (
@@ -213,9 +224,9 @@ LEGEND = (
 
 
 def lines_of(board: Board) -> list[list[str]]:
-    """The headings, then the cells of each row; the column of costs is left out where no row has one."""
+    """The headings, then the cells of each row; the columns of costs are left out where no row has one."""
     is_timed = any(row.ms_per_frame is not None for row in board.rows)
-    shown = [(heading, cell) for heading, cell in COLUMNS if is_timed or heading != COST]
+    shown = [(heading, cell) for heading, cell in COLUMNS if is_timed or heading not in (COST, MEMORY)]
     return [[heading for heading, _ in shown], *([cell(row) for _, cell in shown] for row in board.rows)]
 
 

@@ -6,7 +6,8 @@ import json
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -14,10 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from vobench.errors import SequenceError
+from vobench.estimator.command import CommandProgram, rate_hz
+from vobench.estimator.manifest import Manifest
 from vobench.estimator.oracle import NoisyTruth
 from vobench.estimator.process import Answer, EstimatorProcess
 from vobench.estimator.program import EstimatorFailure
 from vobench.estimator.protocol import EncoderReadings, Frame, Status, Tracks
+from vobench.estimator.stream import StreamProgram
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
@@ -32,6 +37,7 @@ from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from vobench.dataset.source import Views
     from vobench.run.store import Progress
     from vobench.suite.suite import Trial
 
@@ -84,12 +90,15 @@ def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress"
     """Feed a sequence to a trial's estimator; whatever happens, the folder is complete afterwards."""
     sequence, outcome = Sequence.open(recording), Outcome(kind=FINISHED, reason="")
     (folder / LOG).touch()
-    with _keeper(folder, _T_frame_left(sequence.rig, trial.entrant.manifest.pose_of)) as keeper:
+    with _keeper(folder) as keeper:
         try:
+            keeper.T_frame_left = _T_frame_left(sequence.rig, trial.entrant.manifest)
             _check_needs(trial.entrant.manifest.needs, sequence)
             _feed(trial, sequence, keeper, progress, _running(trial, recording, folder / LOG))
         except EstimatorFailure as failure:
             outcome = Outcome(kind=failure.kind, reason=failure.reason)
+        except SequenceError as error:  # a layout that cannot have this recording
+            outcome = Outcome(kind="refused", reason=str(error))
     (folder / OUTCOME).write_text(outcome.model_dump_json(), encoding="utf-8")
 
 
@@ -98,15 +107,45 @@ def _running(trial: "Trial", recording: Path, log: Path) -> AbstractContextManag
     entrant, manifest = trial.entrant, trial.entrant.manifest
     if manifest.oracle:
         return NoisyTruth(read_tum(recording / GROUND_TRUTH))
-    assert manifest.class_path
-    return EstimatorProcess(entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits)
+    if manifest.class_path:
+        return EstimatorProcess(entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits)
+    t_ns, limits = Sequence.open(recording).frame_stamps(), entrant.limits
+    if manifest.stream:
+        return StreamProgram(manifest.stream, entrant.folder, log=log, limits=limits, rate_hz=rate_hz(t_ns))
+    if entrant.mode == "real_time":
+        raise EstimatorFailure("refused", "it takes the whole recording at once, so it cannot go at the camera's pace")
+    write = partial(_write_blind, recording, manifest)
+    return CommandProgram(manifest.command, entrant.folder, log=log, limits=limits, t_ns=t_ns, write_dataset=write)
 
 
-def _T_frame_left(rig: Rig, pose_of: str) -> Array:
-    """The left camera in the frame whose poses the estimator gives."""
-    T_body_imu = rig.imu.T_body_imu if rig.imu else np.eye(4)
-    T_body_frame = {"body": np.eye(4), "imu": T_body_imu}.get(pose_of)
-    return np.eye(4) if T_body_frame is None else se3.inverse(T_body_frame) @ rig.T_body_left
+def _write_blind(recording: Path, manifest: Manifest, folder: Path) -> None:
+    """Write a recording in the manifest's layout: what it needs and Kalibr's calibration, and nothing of the truth."""
+    from vobench.dataset.export import write_calibration
+    from vobench.dataset.layout import writable
+    from vobench.dataset.source import ExportSource
+
+    sequence, layout = Sequence.open(recording), writable()[manifest.dataset]
+    source = ExportSource(recording, sequence, sequence.rig, imu=sequence.imu() if "imu" in manifest.needs else None)
+    views = _views(manifest, source.rig)
+    layout.write(source, views, folder)
+    write_calibration(views.rig, layout, folder)
+
+
+def _views(manifest: Manifest, rig: Rig) -> "Views":
+    """The pictures of a recording as a program finds them in its files."""
+    from vobench.dataset.layout import writable
+
+    one = replace(rig, right=None, T_body_right=None)
+    return writable()[manifest.dataset].views(rig if "stereo" in manifest.needs else one)
+
+
+def _T_frame_left(rig: Rig, manifest: Manifest) -> Array:
+    """The left camera in the frame whose poses the estimator gives; a program's pictures may be rectified ones."""
+    if manifest.pose_of == "left_camera":
+        return se3.inverse(_views(manifest, rig).rig.T_body_left) @ rig.T_body_left if manifest.command else np.eye(4)
+    return (
+        se3.inverse(rig.imu.T_body_imu) @ rig.T_body_left if manifest.pose_of == "imu" and rig.imu else rig.T_body_left
+    )
 
 
 def _check_needs(needs: tuple[str, ...], sequence: Sequence) -> None:
@@ -181,14 +220,14 @@ def _between(readings: Readings | None, last_ns: int, now_ns: int) -> Readings |
     return type(readings)(*(getattr(readings, field.name)[first:end] for field in fields(readings)))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Keeper:
     """Writes what an estimator says as it says it: memory does not grow with the sequence's length."""
 
-    T_frame_left: Array
     answers: "csv.DictWriter[str]"
     times: "csv.DictWriter[str]"
     tracks: zipfile.ZipFile
+    T_frame_left: Array = field(default_factory=lambda: np.eye(4))
     stamps: dict[int, int] = field(default_factory=dict)
     poses: dict[int, Array] = field(default_factory=dict)
     covariances: dict[int, Array] = field(default_factory=dict)
@@ -204,8 +243,9 @@ class _Keeper:
                 self.covariances[frame.index] = self._of_left(r.T_odom_frame[:3, :3], r.covariance)
         stats = json.dumps({key: float(f"{value:.6g}") for key, value in sorted(r.stats.items())})
         answered = {"frame": frame.index, "status": str(r.status), "reason": r.reason, "stats": stats}
-        cost = {"wall_ms": f"{answer.wall_ms:.3f}", "cpu_ms": f"{answer.cpu_ms:.3f}"}
-        self.times.writerow({"frame": frame.index, **cost})
+        self.times.writerow(
+            {"frame": frame.index, **{name: f"{getattr(answer, name):.3f}" for name in TIME_COLUMNS[1:]}}
+        )
         if r.tracks is None:
             self.answers.writerow(answered)
         else:
@@ -243,14 +283,14 @@ class _Keeper:
 
 
 @contextmanager
-def _keeper(folder: Path, T_frame_left: Array) -> Iterator[_Keeper]:
+def _keeper(folder: Path) -> Iterator[_Keeper]:
     """A keeper while an estimator runs; then its files of poses."""
     with (
         new_table(folder / ANSWERS, ANSWER_COLUMNS) as answers,
         new_table(folder / TIMES, TIME_COLUMNS) as times,
         zipfile.ZipFile(folder / TRACKS, "w", zipfile.ZIP_DEFLATED) as tracks,
     ):
-        keeper = _Keeper(T_frame_left, answers, times, tracks)
+        keeper = _Keeper(answers, times, tracks)
         yield keeper
     keeper.write(folder)
 
