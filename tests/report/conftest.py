@@ -10,7 +10,7 @@ import pytest
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
-from vobench.report import TrialView, save_trial
+from vobench.report.rerun import TrialView, save_trial
 from vobench.run import estimate as estimate_file
 from vobench.run.folder import SCORE, RunFolder, TrialScore
 from vobench.run.frames import COLUMNS, FRAMES, TIME_COLUMNS, TIMES, new_table

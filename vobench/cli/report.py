@@ -14,9 +14,9 @@ from rich.table import Table
 
 from vobench.cli import terminal
 from vobench.errors import InputError, MissingDependencyError, UnknownNameError
-from vobench.report import page, save_trial
+from vobench.report import page
 from vobench.report.leaderboard import FORMATS, LEGEND, Board, lines_of, notes
-from vobench.report.rerun import pick, trial_view
+from vobench.report.rerun import pick, save_trial, trial_view
 from vobench.report.verify import verify_run
 from vobench.run.folder import open_run
 

@@ -149,9 +149,9 @@ class EstimatorProcess:
         self._program = Program(argv, log=log, limits=limits, pass_fds=[child.fileno()])
         child.close()
 
-    def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Hand over the calibration and the parameters."""
-        self._ask(("start", rig, dict(params), seed), self._limits.start_s)
+    def start(self, rig: Rig, params: Mapping[str, Any], seed: int, *, is_watched: bool = False) -> None:
+        """Hand over the calibration and the parameters; who `is_watched` fails where it changes a frame."""
+        self._ask(("start", rig, dict(params), seed, is_watched), self._limits.start_s)
 
     def process(self, frame: Frame) -> Answer:
         """Hand over the next frame; what the estimator says of it, checked."""

@@ -4,6 +4,7 @@ import ctypes
 import importlib
 import importlib.machinery
 import importlib.util
+import pickle
 import resource
 import signal
 import sys
@@ -97,16 +98,21 @@ def main(fd: int, folder: Path, class_path: str, name: str, memory_bytes: int) -
 
 
 def _serve(connection: Connection, estimator: Estimator) -> None:
+    is_watched = False
     while True:
         message = connection.recv()
         if isinstance(message, Frame):
+            before = pickle.dumps(message) if is_watched else b""
             wall, cpu = time.perf_counter(), _cpu_s()
             answer = estimator.process(message)
             peak = sum(each.ru_maxrss for each in _spent()) / 1024
             spent = (time.perf_counter() - wall) * 1e3, (_cpu_s() - cpu) * 1e3, peak
+            if is_watched and pickle.dumps(message) != before:
+                raise InvalidOutputError(f"frame {message.index}: process() changed the frame it was given")
             connection.send(("result", checked(answer, message.index), *spent))
         elif message[0] == "start":
-            estimator.start(*message[1:])
+            *told, is_watched = message[1:]
+            estimator.start(*told)
             connection.send(("ready",))
         else:
             finish = getattr(estimator, "finish", dict)

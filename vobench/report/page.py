@@ -118,7 +118,7 @@ def _frames(folder: RunFolder, scores: list[TrialScore]) -> dict[tuple[str, str]
 
 
 def _write_costs(folder: RunFolder, frames: dict[tuple[str, str], list[list[FrameRow]]]) -> None:
-    """The mean cost of a frame and the most memory, a row for each case and estimator; empty cells where it answered none."""
+    """The mean cost of a frame and the most memory, a row for each case and estimator; empty where it answered none."""
     with new_table(folder.path / TIMES, COST_COLUMNS) as costs:
         for (case, estimator), trials in frames.items():
             named = {"case": case, "estimator": estimator}

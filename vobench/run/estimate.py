@@ -169,7 +169,7 @@ def _feed(
     with door as running:
         running.start(sequence.rig, entrant.params, trial.repeat)
         pace = _Pace(keeper, is_real_time=entrant.mode == "real_time")
-        frames = _frames(sequence, entrant.manifest.needs, pace)
+        frames = frames_of(sequence, entrant.manifest.needs, pace)
         for frame in progress.track(frames, trial.name, total=len(sequence)):
             answer = running.process(frame)
             keeper.keep(frame, answer)
@@ -196,7 +196,7 @@ class _Pace:
         return is_lost
 
 
-def _frames(sequence: Sequence, needs: tuple[str, ...], pace: _Pace) -> Iterator[Frame]:
+def frames_of(sequence: Sequence, needs: tuple[str, ...], pace: _Pace | None = None) -> Iterator[Frame]:
     """What the estimator asked for, one instant at a time, but for the frames that it is too late for."""
     encoders = EncoderReadings(*sequence.encoders()) if "encoders" in needs else None
     imu = sequence.imu() if "imu" in needs else None
@@ -204,7 +204,7 @@ def _frames(sequence: Sequence, needs: tuple[str, ...], pace: _Pace) -> Iterator
     # Pictures that nobody asked for are not decoded.
     looks, stereo, shown = "stereo" in needs or "mono" in needs, "stereo" in needs, rgb if "colour" in needs else grey
     for f in sequence.frames(right=stereo) if looks else sequence.encoded_frames():
-        if pace.drops(f.index, f.t_ns):
+        if pace and pace.drops(f.index, f.t_ns):
             continue
         seen = (f.left, f.right) if isinstance(f, StereoFrame) else (None, None)
         left, right = (image if image is None else shown(image, f.colour) for image in seen)
