@@ -76,9 +76,11 @@ def write_times(dataset):
     (dataset / "times.txt").write_text("".join(f"{t / 1e9}\n" for t in T_NS))
 
 
-def run(folder, tmp_path, *how, limits=USUAL, argv=None, write=write_times, params=None):
+def run(folder, tmp_path, *how, limits=USUAL, argv=None, write=write_times, params=None, **more):
     argv = argv or ["./run", "{dataset}", "{out}", *how]
-    program = CommandProgram(argv, folder, log=tmp_path / "log.txt", limits=limits, t_ns=T_NS, write_dataset=write)
+    program = CommandProgram(
+        argv, folder, log=tmp_path / "log.txt", limits=limits, t_ns=T_NS, write_dataset=write, **more
+    )
     with program:
         program.start(RIG, params or {}, 7)
         return [program.process(Frame(n, t)) for n, t in enumerate(T_NS.tolist())]
@@ -90,6 +92,11 @@ def test_each_frame_is_answered_with_what_the_program_wrote_of_it(tmp_path, fold
     assert [answer.result.T_odom_frame[0, 3] for answer in answers] == [0, 1, 2, 3]
     assert answers[0].wall_ms > 0
     assert (tmp_path / "log.txt").read_text() == f"about to {how}\n"
+
+
+def test_a_program_may_write_to_a_file_of_its_own_choice_in_its_folder(tmp_path, folder):
+    answers = run(folder, tmp_path, argv=["./run", "{dataset}", "CameraTrajectory.txt"], out="CameraTrajectory.txt")
+    assert [answer.result.T_odom_frame[0, 3] for answer in answers] == [0, 1, 2, 3]
 
 
 def test_a_frame_without_a_pose_is_lost(tmp_path, folder):

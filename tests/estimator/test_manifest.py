@@ -105,6 +105,7 @@ def test_reading_a_manifest_imports_neither_opencv_nor_the_code():
             {"class": None, "command": "[./run, '{data}', '{out}']"},
             r"command: no placeholder or parameter named 'data'\. Did",
         ),
+        ({"class": None, "command": "[./run]", "out": "../poses.txt"}, r"out: should be a file below the work folder"),
         ({"class": None, "stream": "[./run, '{out}']"}, r"stream: no placeholder or parameter named 'out'"),
         ({"class": None, "oracle": "true"}, r"oracle: only vobench's own estimators may be drawn from the truth"),
         ({"limits": "{frame_s: 0}"}, r":7: limits\.frame_s: should be greater than 0 \(got 0\)"),
@@ -174,3 +175,29 @@ def test_the_example_of_the_docs_works(tmp_path):
     estimator = loaded(tmp_path)
     estimator.start(None, read_manifest(tmp_path).params, 0)
     assert estimator.process(Frame(2, 0)).T_odom_frame[:3, 3].tolist() == [0.02, 0.002, 0.0]
+
+
+def blocks(language):
+    page = (ESTIMATORS.parent / "docs" / "estimators.md").read_text(encoding="utf-8")
+    return [block.split("```")[0] for block in page.split(f"```{language}\n")[1:]]
+
+
+WORKED = {block.split()[1]: block for block in blocks("text") if block.startswith("name: ")}
+
+
+@pytest.mark.parametrize("name", WORKED)
+def test_the_manifests_of_known_systems_in_the_docs_are_valid(tmp_path, name):
+    (tmp_path / "estimator.yaml").write_text(WORKED[name])
+    manifest = read_manifest(tmp_path)
+    assert manifest.name == name
+    assert manifest.command or manifest.stream
+
+
+def test_there_are_those_that_people_ask_for():
+    assert set(WORKED) == {"orb_slam3", "openvins", "basalt", "stella_vslam", "libviso2", "dpvo", "cuvslam"}
+
+
+def test_the_example_with_both_pictures_is_the_scaffolds():
+    scaffold = ESTIMATORS.parent / "vobench" / "cli" / "scaffold" / "class" / "estimator.txt"
+    shown = next(block for block in blocks("text") if "frame.right" in block)
+    assert shown.rstrip() in scaffold.read_text(encoding="utf-8")

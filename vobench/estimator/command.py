@@ -10,7 +10,7 @@ import numpy as np
 
 from vobench import stop
 from vobench.errors import TrajectoryError, VobenchError
-from vobench.estimator.manifest import PLACEHOLDER, Limits
+from vobench.estimator.manifest import OUT, PLACEHOLDER, Limits
 from vobench.estimator.process import FARTHEST_M, Answer
 from vobench.estimator.program import EstimatorFailure, Program, new_home
 from vobench.estimator.protocol import Frame, Result, Status
@@ -20,7 +20,7 @@ from vobench.trajectory.formats import Parsed, Unit, content, parse_any
 from vobench.trajectory.trajectory import Stamps
 
 UNITS: tuple[Unit | None, ...] = (None, "ns", "us", "ms")
-CALIBRATION, OUT = "camchain.yaml", "poses.txt"
+CALIBRATION = "camchain.yaml"
 OUT_BYTES = 1 << 30
 
 
@@ -46,11 +46,12 @@ class CommandProgram:
         *,
         log: Path,
         limits: Limits,
+        out: str = OUT,
         t_ns: Stamps,
         write_dataset: Callable[[Path], object],
     ) -> None:
         self._argv, self._folder, self._log, self._limits = argv, folder, log, limits
-        self._t_ns, self._write_dataset = t_ns, write_dataset
+        self._out, self._t_ns, self._write_dataset = out, t_ns, write_dataset
         self._cost, self._poses = (0.0, 0.0, 0.0), dict[int, Array]()
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
@@ -63,12 +64,12 @@ class CommandProgram:
                 self._write_dataset(dataset)
             except VobenchError as error:
                 raise EstimatorFailure("refused", str(error)) from None
-            values = {"dataset": dataset, "calib": dataset / CALIBRATION, "out": home / OUT, "seed": seed}
+            values = {"dataset": dataset, "calib": dataset / CALIBRATION, "out": home / self._out, "seed": seed}
             argv = filled(self._argv, self._folder, {**params, **values, "rate_hz": rate_hz(self._t_ns)})
             began = time.monotonic()
             with Program(argv, log=self._log, limits=self._limits, home=home) as program:
                 program.wait()
-                self._poses = poses_in(home / OUT, self._t_ns)
+                self._poses = poses_in(home / self._out, self._t_ns)
         wall_s, frames_per_ms = time.monotonic() - began, len(self._t_ns) / 1e3
         self._cost = wall_s / frames_per_ms, program.cpu_s / frames_per_ms, program.peak_mib
 

@@ -11,6 +11,7 @@ from vobench.setting import Matching, Positive, settings
 
 MANIFEST_FILE = "estimator.yaml"
 CLASS_PATH = r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*"
+OUT = "poses.txt"
 PLACEHOLDER = re.compile(r"\{(\w*)\}")
 PLACEHOLDERS = ("dataset", "calib", "out", "seed", "rate_hz")
 IN_STREAM = ("seed", "rate_hz")
@@ -53,6 +54,7 @@ class Manifest:
     stream: Argv = ()
     oracle: bool = False
     dataset: Literal["kitti", "euroc", "tum"] = "kitti"
+    out: Annotated[str, Matching(r"(?!.*\.\.)\w[\w.-]*(/\w[\w.-]*)*", "a file below the work folder")] = OUT
     needs: tuple[Need, ...] = ()
     pose_of: Literal["left_camera", "body", "imu"]
     metric: bool = True
@@ -68,8 +70,10 @@ class Manifest:
         given = [way for way, said in ways.items() if said]
         if len(given) != 1:
             raise SettingError(f"an estimator has one of {', '.join(ways)} (got {' and '.join(given) or 'none'})")
-        if self.command and not any("{out}" in word for word in self.command):
-            raise SettingError("should have {out}, the file where the program writes its poses", "command")
+        if self.command and self.out == OUT and not any("{out}" in word for word in self.command):
+            raise SettingError(
+                "should have {out}, where the program is to write its poses, or `out` say where", "command"
+            )
         for key, argv, known in (("command", self.command, PLACEHOLDERS), ("stream", self.stream, IN_STREAM)):
             for name in PLACEHOLDER.findall(" ".join(argv)):
                 if name not in (*known, *self.params):

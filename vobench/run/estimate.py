@@ -115,7 +115,9 @@ def _running(trial: "Trial", recording: Path, log: Path) -> AbstractContextManag
     if entrant.mode == "real_time":
         raise EstimatorFailure("refused", "it takes the whole recording at once, so it cannot go at the camera's pace")
     write = partial(_write_blind, recording, manifest)
-    return CommandProgram(manifest.command, entrant.folder, log=log, limits=limits, t_ns=t_ns, write_dataset=write)
+    return CommandProgram(
+        manifest.command, entrant.folder, log=log, limits=limits, out=manifest.out, t_ns=t_ns, write_dataset=write
+    )
 
 
 def _write_blind(recording: Path, manifest: Manifest, folder: Path) -> None:
