@@ -61,6 +61,38 @@ def test_one_estimator_takes_part_twice_under_two_labels(bent):
     assert [(e.label, e.params["measure_s"]) for e in planned.entrants] == [("slow", 1), ("constant_velocity", 0.1)]
 
 
+def test_a_suites_limits_go_over_the_manifests(bent):
+    planned = bent(("stand_still,", "{name: stand_still, limits: {frame_s: 1, memory_mib: 512}},"))
+    limits, usual = (entrant.limits for entrant in planned.entrants)
+    assert (limits.frame_s, limits.memory_mib, limits.start_s) == (1.0, 512, usual.start_s)
+    assert usual == planned.entrants[1].manifest.limits
+
+
+def test_each_mode_has_an_entrant_of_its_own(bent):
+    planned = bent(("estimators:", "modes: [step, real_time]\nestimators:"))
+    assert [(e.label, e.mode, e.claims) for e in planned.entrants[:2]] == [
+        ("stand_still", "step", ()),
+        ("stand_still.real_time", "real_time", ("real time",)),
+    ]
+    alone = bent(("estimators:", "modes: [real_time]\nestimators:"))
+    assert next((e.label, e.mode) for e in alone.entrants) == ("stand_still", "real_time")
+
+
+@pytest.mark.parametrize(
+    ("limits", "sentence"),
+    [
+        ("{frame_s: 0}", "limits: frame_s: should be greater than 0 (got 0"),
+        ("{memory_mib: 1}", "limits: memory_mib: should be 64 or more (got 1)"),
+        ("{frames: 1}", "no limit named 'frames'. Did you mean 'frame_s'?"),
+    ],
+)
+def test_a_limit_that_is_none_is_refused_with_its_place(bent, limits, sentence):
+    with pytest.raises(SuiteError) as refused:
+        bent(("stand_still,", f"{{name: stand_still, limits: {limits}}},"))
+    assert sentence in str(refused.value)
+    assert "estimators.0" in str(refused.value)
+
+
 def test_parameters_reach_an_estimator_as_plain_python(bent):
     (value,) = bent().entrants[1].params.values()
     assert type(value) is float

@@ -85,10 +85,13 @@ class Consistency(BaseModel):
         )
 
 
-def trial_consistency(estimate: Path, gt: Trajectory, est: Trajectory, alignment: Alignment) -> Consistency | None:
+def trial_consistency(
+    estimate: Path, gt: Trajectory, est: Trajectory, *, start_ns: int, scale: float
+) -> Consistency | None:
     """What a trial's covariances are worth; None where it stated none.
 
-    They are of poses in odom, the left camera at its first true pose, so nothing is fitted but the scale.
+    They are of poses in odom, the left camera at the first frame's stamp, so nothing is fitted but the scale. Where
+    the truth of that is not known, the first frame that has truth and pose stands for it.
     """
     if not (estimate / COVARIANCE).is_file():
         return None
@@ -97,6 +100,11 @@ def trial_consistency(estimate: Path, gt: Trajectory, est: Trajectory, alignment
     if not len(true):
         return None
     which = np.flatnonzero(np.isfinite(P).all((1, 2)))[stated]
-    T_odom_true = (se3.inverse(gt.T_world_frame[:1]) @ gt.T_world_frame)[true]
-    scaled = Alignment("scale", np.eye(3), np.zeros(3), alignment.scale, ())
+    T_world_odom = gt.T_world_frame[0]
+    if gt.t_ns[0] != start_ns:
+        T_odom_left = est.T_world_frame[which[0]]
+        T_odom_left = se3.transform(T_odom_left[:3, :3], scale * T_odom_left[:3, 3])
+        T_world_odom = gt.T_world_frame[true[0]] @ se3.inverse(T_odom_left)
+    T_odom_true = (se3.inverse(T_world_odom) @ gt.T_world_frame)[true]
+    scaled = Alignment("scale", np.eye(3), np.zeros(3), scale, ())
     return Consistency.of(consistency(T_odom_true, est.T_world_frame[which], P[which], scaled).pose)

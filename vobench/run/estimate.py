@@ -5,11 +5,11 @@ import io
 import json
 import zipfile
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,17 +73,8 @@ def read_tracks(folder: Path) -> Iterator[tuple[int, NDArray[np.float32]]]:
 Readings = TypeVar("Readings", EncoderReadings, ImuReadings)
 
 
-class Running(Protocol):
-    """An estimator that runs, by whichever door it came: its verbs raise EstimatorFailure."""
-
-    def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Take the calibration, the parameters and a seed."""
-
-    def process(self, frame: Frame) -> Answer:
-        """Take the next frame; what the estimator says of it, checked."""
-
-    def finish(self) -> dict[int, Array]:
-        """Hear that there are no more frames; the revised poses by their frame's index."""
+# An estimator that runs, by whichever door it came: start, process, finish, each of which raises EstimatorFailure.
+Running = EstimatorProcess | StreamProgram | CommandProgram | NoisyTruth
 
 
 def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress") -> None:
@@ -102,7 +93,7 @@ def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress"
     (folder / OUTCOME).write_text(outcome.model_dump_json(), encoding="utf-8")
 
 
-def _running(trial: "Trial", recording: Path, log: Path) -> AbstractContextManager[Running]:
+def _running(trial: "Trial", recording: Path, log: Path) -> Running:
     """The trial's estimator as its manifest says that it is run."""
     entrant, manifest = trial.entrant, trial.entrant.manifest
     if manifest.oracle:
@@ -163,9 +154,7 @@ def _check_needs(needs: tuple[str, ...], sequence: Sequence) -> None:
             raise EstimatorFailure("refused", f"it needs {need!r}, but this recording has {short}")
 
 
-def _feed(
-    trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Progress", door: AbstractContextManager[Running]
-) -> None:
+def _feed(trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Progress", door: Running) -> None:
     """Start the estimator, hand it frame after frame, and keep what it says. Raises EstimatorFailure."""
     entrant = trial.entrant
     with door as running:

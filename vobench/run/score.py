@@ -35,18 +35,14 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
     gt = read_tum(sequence / GROUND_TRUTH)  # what is scored is what anybody can score again
     claims = trial.entrant.claims
     est, revised = read_tum(estimate / ESTIMATE), estimate / REVISED
-    scored, later = score_estimate(est, gt, claims), None
-    if revised.is_file():
-        later = score_estimate(read_tum(revised), gt, claims)
-    dropped = [row["frame"] for row in read_table(estimate / ANSWERS) if row["status"] == DROPPED]
-    status, reason = _status(read_outcome(estimate), scored, gt)
-    if dropped and read_outcome(estimate).kind == FINISHED:
-        at = {row["frame"]: int(row["t_ns"]) for row in read_table(sequence / EXPOSURES)}
-        seen = ~np.isin(gt.t_ns, [at[frame] for frame in dropped])
-        handed = Trajectory(gt.t_ns[seen], gt.T_world_frame[seen])
-        status, reason = _status(read_outcome(estimate), score_estimate(est, handed, claims), handed)
-        if status in SURVIVED:
-            status, reason = "partial", f"it was too late for {len(dropped)} of {len(at)} frames; {reason}".rstrip("; ")
+    scored = score_estimate(est, gt, claims)
+    later = score_estimate(read_tum(revised), gt, claims) if revised.is_file() else None
+    stamps = {row["frame"]: int(row["t_ns"]) for row in read_table(sequence / EXPOSURES)}
+    dropped = [stamps[row["frame"]] for row in read_table(estimate / ANSWERS) if row["status"] == DROPPED]
+    outcome, scale = read_outcome(estimate), scored.alignment.scale if scored else 1.0
+    status, reason = _status(outcome, scored, gt)
+    if dropped and outcome.kind == FINISHED:
+        status, reason = _status_of_handed(est, gt, claims, dropped)
     score = TrialScore(
         case=trial.case.name,
         variant=trial.case.variant,
@@ -60,7 +56,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
         score=scored.as_dict() if scored else None,
         drift_m=_extent_m(est) if scored and stands_still(gt) else None,
         claims=claims,
-        consistency=trial_consistency(estimate, gt, est, scored.alignment) if scored else None,
+        consistency=trial_consistency(estimate, gt, est, start_ns=min(stamps.values()), scale=scale),
         revised=later.as_dict() if later else None,
     )
     write_json(folder / SCORE, score.model_dump(mode="json"))
@@ -105,3 +101,16 @@ def _status(outcome: Outcome, scored: Score | None, gt: Trajectory) -> tuple[Tri
         without = scored.association.gt_poses - scored.association.pairs
         return "partial", f"no pose for {without} of {len(gt)} frames; the first is {scored.coverage.first_lost_frame}"
     return "ok", ""
+
+
+def _status_of_handed(
+    est: Trajectory, gt: Trajectory, claims: Sequence[str], dropped: Sequence[int]
+) -> tuple[TrialStatus, str]:
+    """How a trial in real time ended, by the frames that came in time; those of these stamps did not."""
+    in_time = ~np.isin(gt.t_ns, dropped)
+    handed = Trajectory(gt.t_ns[in_time], gt.T_world_frame[in_time])
+    status, reason = _status(Outcome(kind=FINISHED, reason=""), score_estimate(est, handed, claims), handed)
+    if status not in SURVIVED:
+        return status, reason
+    late = f"it was too late for {len(dropped)} of {len(gt)} frames"
+    return "partial", f"{late}; {reason}" if reason else late
