@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from vobench.report import TruthView, save_trial
-from vobench.report.rerun import application_id, first_failure, rerun_matrix
+from vobench.report.rerun import TruthView, application_id, first_failure, rerun_matrix, save_trial
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames
 from vobench.sequence import StereoTruth
 from vobench.trajectory.trajectory import Trajectory
