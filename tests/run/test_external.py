@@ -3,13 +3,28 @@
 import re
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from vobench.dataset.source import rectified
+from vobench.geometry import se3
+from vobench.geometry.rig import LENSES, PRESETS, ImuCalibration, stereo_rig
 from vobench.report import page
-from vobench.run.estimate import DROPPED, LOG
+from vobench.run.estimate import DROPPED, ESTIMATE, LOG, estimate, read_outcome
+from vobench.run.folder import read_tum
 from vobench.run.frames import read_frames
+from vobench.run.store import SilentProgress
+from vobench.sensor.imu import ImuReadings
+from vobench.sequence import SequenceWriter
+from vobench.suite.manifest import read_manifest
+from vobench.suite.source import RecordedCase, Source
+from vobench.suite.suite import Entrant, Trial
+from vobench.trajectory.formats import format_tum
+from vobench.trajectory.trajectory import Trajectory
 
 ESTIMATORS = "[wheel_odometry, stand_still]"
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -113,3 +128,41 @@ def test_what_a_stream_says_wrong_is_a_row(bench, first, tmp_path):
     (folder / "wrong.py").write_text(code.replace('pack("<qII", index', 'pack("<qII", index + (index > 2)'))
     score = bench.run((ESTIMATORS, f"[{folder}]")).scores()[0]
     assert (score.status, score.reason) == ("invalid_output", "frame 3: the answer is to frame 4")
+
+
+T_BODY_IMU = se3.transform(Rotation.from_euler("xyz", [0.3, -0.2, 0.5]).as_matrix(), [0.1, -0.05, 0.2])
+RIG = replace(
+    stereo_rig(LENSES["paper_blender"], pitch_deg=20), imu=ImuCalibration(T_BODY_IMU, 100.0, 1e-4, 1e-3, 1e-5, 1e-4)
+)
+EUROC = PRESETS["euroc"]
+BENT = replace(RIG, left=EUROC.left, right=EUROC.right, T_body_right=RIG.T_body_left @ EUROC.T_left_right)
+
+
+@pytest.mark.parametrize(
+    ("rig", "form", "pose_of"),
+    [(RIG, "kitti", "left_camera"), (BENT, "kitti", "left_camera"), (BENT, "euroc", "imu"), (BENT, "tum", "body")],
+    ids=["kitti", "kitti rectified", "imu", "body"],
+)
+def test_a_perfect_program_is_perfect_whatever_frame_it_gives_the_poses_of(tmp_path, rig, form, pose_of):
+    rng, t_ns = np.random.default_rng(1), np.arange(5) * 10**8
+    R = Rotation.from_rotvec(0.2 * rng.normal(size=(5, 3))).as_matrix()
+    T_world_body = se3.transform(R, rng.normal(size=(5, 3)))
+    with SequenceWriter(tmp_path / "sequence", rig, case_json=b"{}") as writer:
+        picture = np.zeros((rig.left.height_px, rig.left.width_px), np.uint8)
+        for t, T in zip(t_ns.tolist(), T_world_body, strict=True):
+            writer.write_imu(ImuReadings(np.array([t]), np.zeros((1, 3)), np.zeros((1, 3))))
+            writer.write_frame(t, picture, picture)
+            writer.write_truth(t, T, np.zeros(6))
+    shown = rectified(rig).rig if form == "kitti" else rig
+    T_body_frame = {"left_camera": shown.T_body_left, "imu": T_BODY_IMU, "body": np.eye(4)}[pose_of]
+    command = "[cp, ./poses.tum, '{out}']"
+    folder = manifest(tmp_path / "perfect", command=command, dataset=form, pose_of=pose_of, needs="[stereo, imu]")
+    (folder / "poses.tum").write_text(format_tum(Trajectory(t_ns, T_world_body @ T_body_frame)))
+    case = RecordedCase(name="case", variant={}, source=Source(path="."))
+    (tmp_path / "estimate").mkdir()
+    entrant = Entrant("perfect", folder, read_manifest(folder), {})
+    estimate(Trial(case, entrant, 0), tmp_path / "sequence", tmp_path / "estimate", SilentProgress())
+    assert read_outcome(tmp_path / "estimate").reason == ""
+    est, gt = read_tum(tmp_path / "estimate" / ESTIMATE), T_world_body @ rig.T_body_left
+    T_first = gt[0] @ se3.inverse(est.T_world_frame[0])
+    np.testing.assert_allclose(T_first @ est.T_world_frame, gt, atol=1e-9)

@@ -155,8 +155,8 @@ class EstimatorProcess:
 
     def process(self, frame: Frame) -> Answer:
         """Hand over the next frame; what the estimator says of it, checked."""
-        _, result, *cost = self._ask(frame, self._limits.frame_s)
-        return Answer(result, *cost)
+        _, result, wall_ms, cpu_ms = self._ask(frame, self._limits.frame_s)
+        return Answer(result, wall_ms, cpu_ms, self._program.peak_mib)
 
     def finish(self) -> dict[int, Array]:
         """Say that there are no more frames; the poses that the estimator revises, by their frame's index."""

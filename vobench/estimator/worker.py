@@ -105,8 +105,7 @@ def _serve(connection: Connection, estimator: Estimator) -> None:
             before = pickle.dumps(message) if is_watched else b""
             wall, cpu = time.perf_counter(), _cpu_s()
             answer = estimator.process(message)
-            peak = sum(each.ru_maxrss for each in _spent()) / 1024
-            spent = (time.perf_counter() - wall) * 1e3, (_cpu_s() - cpu) * 1e3, peak
+            spent = (time.perf_counter() - wall) * 1e3, (_cpu_s() - cpu) * 1e3
             if is_watched and pickle.dumps(message) != before:
                 raise InvalidOutputError(f"frame {message.index}: process() changed the frame it was given")
             connection.send(("result", checked(answer, message.index), *spent))
@@ -121,11 +120,8 @@ def _serve(connection: Connection, estimator: Estimator) -> None:
 
 def _cpu_s() -> float:
     """CPU time of this process and of those that it has started and that have ended."""
-    return sum(each.ru_utime + each.ru_stime for each in _spent())
-
-
-def _spent() -> list[resource.struct_rusage]:
-    return [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    spent = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(each.ru_utime + each.ru_stime for each in spent)
 
 
 def _die_with_parent() -> None:

@@ -21,7 +21,7 @@ from vobench.estimator.manifest import Manifest
 from vobench.estimator.oracle import NoisyTruth
 from vobench.estimator.process import Answer, EstimatorProcess
 from vobench.estimator.program import EstimatorFailure
-from vobench.estimator.protocol import EncoderReadings, Frame, Status, Tracks
+from vobench.estimator.protocol import EncoderReadings, Frame, Status
 from vobench.estimator.stream import StreamProgram
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from vobench.suite.suite import Trial
 
 ESTIMATE, REVISED = "estimate.tum", "revised.tum"
-TRACKS = "tracks.zip"
+TRACKS, POINTS = "tracks.zip", "points/"
 OUTCOME = "outcome.json"
 LOG = "log.txt"
 FINISHED = "finished"
@@ -63,11 +63,12 @@ def read_outcome(folder: Path) -> Outcome:
     return Outcome(**json.loads((folder / OUTCOME).read_text(encoding="utf-8")))
 
 
-def read_tracks(folder: Path) -> Iterator[tuple[int, NDArray[np.float32]]]:
-    """Frame index and its table (N, 5): u, v before, u, v now, inlier."""
+def read_tracks(folder: Path, *, of: str = "") -> Iterator[tuple[int, NDArray[np.float32]]]:
+    """Frame index and its table (N, 5): u, v before, u, v now, inlier; or `of` POINTS (N, 3), in odom, in m."""
     with zipfile.ZipFile(folder / TRACKS) as archive:
         for name in archive.namelist():
-            yield int(name.removesuffix(".npy")), np.load(io.BytesIO(archive.read(name)))
+            if name.startswith(of) and ("/" in name) == bool(of):
+                yield int(Path(name).stem), np.load(io.BytesIO(archive.read(name)))
 
 
 Readings = TypeVar("Readings", EncoderReadings, ImuReadings)
@@ -232,6 +233,9 @@ class _Keeper:
             self.poses[frame.index] = r.T_odom_frame
             if r.covariance is not None:
                 self.covariances[frame.index] = self._of_left(r.T_odom_frame[:3, :3], r.covariance)
+        if r.points is not None:
+            points = se3.apply(se3.inverse(self.T_frame_left), r.points)
+            self.tracks.writestr(_member(frame.index, POINTS), _npy(points))
         stats = json.dumps({key: float(f"{value:.6g}") for key, value in sorted(r.stats.items())})
         answered = {"frame": frame.index, "status": str(r.status), "reason": r.reason, "stats": stats}
         self.times.writerow(
@@ -240,9 +244,9 @@ class _Keeper:
         if r.tracks is None:
             self.answers.writerow(answered)
         else:
-            inlier = r.tracks.inlier
+            inlier, table = r.tracks.inlier, np.column_stack([r.tracks.uv_last_px, r.tracks.uv_px, r.tracks.inlier])
             self.answers.writerow({**answered, "tracks": len(inlier), "inliers": int(inlier.sum())})
-            self.tracks.writestr(_member(frame.index), _table(r.tracks))
+            self.tracks.writestr(_member(frame.index), _npy(table))
 
     def _of_left(self, R_odom_frame: Array, P: Array) -> Array:
         """The covariance (6, 6) of the left camera's pose, where P is that of the frame that it is mounted on.
@@ -286,15 +290,15 @@ def _keeper(folder: Path) -> Iterator[_Keeper]:
     keeper.write(folder)
 
 
-def _member(index: int) -> zipfile.ZipInfo:
+def _member(index: int, of: str = "") -> zipfile.ZipInfo:
     """A fixed date, so that equal tracks are equal bytes."""
-    info = zipfile.ZipInfo(f"{index:08d}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+    info = zipfile.ZipInfo(f"{of}{index:08d}.npy", date_time=(1980, 1, 1, 0, 0, 0))
     info.compress_type = zipfile.ZIP_DEFLATED
     return info
 
 
-def _table(tracks: Tracks) -> bytes:
-    """Columns u, v before, u, v now, inlier as .npy (N, 5) float32."""
+def _npy(table: Array) -> bytes:
+    """Numbers as .npy in float32."""
     buffer = io.BytesIO()
-    np.save(buffer, np.column_stack([tracks.uv_last_px, tracks.uv_px, tracks.inlier]).astype(np.float32))
+    np.save(buffer, table.astype(np.float32))
     return buffer.getvalue()
