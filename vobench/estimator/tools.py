@@ -430,6 +430,8 @@ def twist(step: Array) -> Array:
 OFFSET_PRIOR_PX = 0.3
 OFFSET_SIGMAS, OFFSET_LEAST_PX = 3.0, 0.15
 OFFSET_STEPS = 5
+STEREO_NOISE, STEREO_NOISE_PX = 2.0, 0.1  # of a disparity, over that of a track, and at least
+MOST_BIAS_PX = 0.05
 CORRELATED = 8.0  # tracks near each other err alike: so many count as one
 
 
@@ -479,26 +481,31 @@ def _fitted_offset(
 ) -> tuple[float, float]:
     """An offset of disparity and its information in 1/px², everything that the motion could explain taken out.
 
-    A point of ray x0 comes to R x0 + t (d - o) / (f b): least squares in R, t and o with Cauchy's weights.
+    A point of ray x0 comes to R x0 + t (d - o) / (f b): least squares in t, R and o with Cauchy's weights. Where
+    depths differ by little more than their noise, the fit would mistake the noise for depth: no information.
     """
-    focal = np.array([pair.K[0, 0], pair.K[1, 1]])
-    information, noise_px, unit = np.eye(7), 1.0, 1 / pair.focal_baseline
+    focal, unit = np.array([pair.K[0, 0], pair.K[1, 1]]), 1 / pair.focal_baseline
     for _ in range(OFFSET_STEPS):
-        rho = (disparity_px - offset_px) * unit
-        turned = rays0 @ T[:3, :3].T
+        rho, turned = (disparity_px - offset_px) * unit, rays0 @ T[:3, :3].T
         moved = turned + rho[:, None] * T[:3, 3]
-        z = moved[:, 2:]
-        residual = (rays1[:, :2] - moved[:, :2] / z) * focal
+        slope = moved[:, :2] / moved[:, 2:]
+        residual = (rays1[:, :2] - slope) * focal
         noise_px = max(1.4826 * float(np.median(np.abs(residual))), NOISE_FLOOR_PX)
         weight = 1 / (1 + (residual / (2.4 * noise_px)) ** 2)
-        by_ray = np.concatenate([np.broadcast_to(np.eye(2), (len(z), 2, 2)), -(moved[:, :2] / z)[:, :, None]], -1)
-        by_ray = by_ray / z[:, :, None] * focal[:, None]
-        by_offset = -unit * by_ray @ T[:3, 3]
-        jacobian = np.concatenate([rho[:, None, None] * by_ray, -by_ray @ cross_matrix(turned), by_offset[..., None]], -1)
+        by_point = np.concatenate([np.broadcast_to(np.eye(2), (len(rho), 2, 2)), -slope[..., None]], -1)
+        by_point = by_point * focal[:, None] / moved[:, 2, None, None]
+        by_turn, by_offset = -by_point @ cross_matrix(turned), -unit * by_point @ T[:3, 3]
+        jacobian = np.concatenate([rho[:, None, None] * by_point, by_turn, by_offset[..., None]], -1)
         information = np.einsum("nij,ni,nik->jk", jacobian, weight, jacobian) + 1e-9 * np.eye(7)
         step = np.linalg.solve(information, np.einsum("nij,ni->j", jacobian, weight * residual))
-        turn = cv2.Rodrigues(step[3:6])[0].astype(float)
-        T, offset_px = se3.transform(turn @ T[:3, :3], T[:3, 3] + step[:3]), offset_px + float(step[6])
+        T = se3.transform(twist(step[:6])[:3, :3] @ T[:3, :3], T[:3, 3] + step[:3])
+        offset_px += float(step[6])
+    # Noise in depth pulls the length of t down, and the offset with it (errors in variables): by so much.
+    noise_rho = max(STEREO_NOISE * noise_px, STEREO_NOISE_PX) * unit
+    pull = noise_rho**2 * np.einsum("nij,ni,nik->jk", by_point, weight, by_point) @ T[:3, 3]
+    bias_px = -float(np.linalg.solve(information, np.r_[pull, np.zeros(4)])[6])
+    if not abs(bias_px) < MOST_BIAS_PX:
+        return offset_px, 0.0
     of_motion = np.linalg.solve(information[:6, :6], information[:6, 6])
     alone = float(information[6, 6] - information[6, :6] @ of_motion)
-    return offset_px, alone / (CORRELATED * noise_px**2)
+    return offset_px - bias_px, alone / (CORRELATED * noise_px**2)
