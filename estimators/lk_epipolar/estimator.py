@@ -36,6 +36,7 @@ class Settings:
     corners_per_cell: int
     corner_distance_px: float
     margin_px: int
+    window_px: int
     min_tracks: int
     min_flow_px: float
     keep_below_px: float
@@ -126,7 +127,7 @@ class LkEpipolar:
         T_now_last = se3.inverse(carried_on(self._T_odom_before, self._T_odom_now)) @ self._T_odom_last
         guess = predicted(pair.left, last.corners, rho, T_now_last)
         earlier, now = comparable(last.left, view.left)
-        there, found = follow_predicted(earlier, now, last.corners, guess)
+        there, found = follow_predicted(earlier, now, last.corners, guess, window_px=self._settings.window_px)
         good = found & inside(there, view.left, self._settings.margin_px) & pair.seen(there)
         uv0, uv1 = last.corners[good].astype(float), there[good].astype(float)
         return Matches(pair.left.rays(uv0), pair.left.rays(uv1), uv0, uv1, rho[good], pair.K)
@@ -152,7 +153,7 @@ class LkEpipolar:
     def _remember(self, view: View) -> None:
         """Follow the next frame from this view, at the pose of now, with disparities from left to right."""
         self._last, self._T_odom_last = view, self._T_odom_now
-        _, self._disparity = self._pair.match(view.left, view.right, view.corners, margin_px=self._settings.margin_px)
+        _, self._disparity = self._pair.match(view.left, view.right, view.corners, margin_px=self._settings.margin_px, window_px=self._settings.window_px)
 
     def _lost(self, view: View, reason: str, matches: Matches) -> Result:
         """No pose for this frame; the next one carries on from here with the last pose there was."""

@@ -36,6 +36,7 @@ class Settings:
     corners_per_cell: int
     corner_distance_px: float
     margin_px: int
+    window_px: int
     min_points: int
     min_flow_px: float
     keep_below_px: float
@@ -115,7 +116,7 @@ class StereoPnp:
         rho = (last.disparity_px - self._offset.px) / pair.focal_baseline
         T_now_last = se3.inverse(carried_on(self._T_odom_before, self._T_odom_now)) @ self._T_odom_last
         guess = predicted(pair.left, last.in_left, rho, T_now_last)
-        there, found = follow_predicted(*comparable(last.left, left), last.in_left, guess)
+        there, found = follow_predicted(*comparable(last.left, left), last.in_left, guess, window_px=s.window_px)
         index = np.flatnonzero(found & inside(there, left, s.margin_px) & pair.seen(there))
         if not len(index):
             return Followed(last.in_left[index], there[index], index, np.zeros(0))
@@ -124,7 +125,8 @@ class StereoPnp:
         disparity_px = pair.focal_baseline / se3.apply(T_now_last, points_m)[:, 2]
         beside = pair.right.from_view(pair.left.in_view(there[index]) - np.c_[disparity_px, 0 * disparity_px])
         guess = np.where(np.isfinite(beside), beside, last.in_right[index]).astype(np.float32)
-        in_right, found = lucas_kanade(*comparable(last.right, right), last.in_right[index], guess)
+        pictures, start = comparable(last.right, right), last.in_right[index]
+        in_right, found = lucas_kanade(*pictures, start, guess, window_px=s.window_px)
         good = found & inside(in_right, right, s.margin_px)
         disparity_px = np.where(good, pair.disparity(there[index], in_right), np.nan)
         return Followed(last.in_left[index], there[index], index, disparity_px)
@@ -154,7 +156,7 @@ class StereoPnp:
         corners = corners[pair.seen(corners)]
         if len(corners) < s.min_points:
             return False
-        in_right, disparity_px = pair.match(left, right, corners, margin_px=s.margin_px)
+        in_right, disparity_px = pair.match(left, right, corners, margin_px=s.margin_px, window_px=s.window_px)
         known = np.isfinite(disparity_px)
         self._last = View(left, right, corners[known], in_right[known], disparity_px[known])
         self._T_odom_last = self._T_odom_now

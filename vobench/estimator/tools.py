@@ -28,7 +28,7 @@ Kind = TypeVar("Kind")
 
 GRID = (6, 4)  # cells across and down: corners everywhere, not only where the texture is best
 CORNER_QUALITY = 0.01  # of the best corner in the cell
-WINDOW_PX, PYRAMID_LEVELS = 21, 3
+WINDOW_PX, LEVELS = 21, 3
 LK_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.01)
 ROUND_TRIP_PX = 0.5  # forward and backward tracking must meet
 MISLED_PX, MISLED_SHARE = 5.0, 0.4  # a guess so far away that finds fewer than this share is doubted
@@ -74,41 +74,48 @@ def corners_per_cell(image: Image, per_cell: int, *, distance_px: float, margin_
     return np.concatenate(corners)
 
 
-def follow(image: Image, later: Image, points: Points, guess: Points | None = None) -> tuple[Points, Mask]:
+def follow(
+    image: Image, later: Image, points: Points, guess: Points | None = None, *, window_px: int = WINDOW_PX
+) -> tuple[Points, Mask]:
     """Where points (N, 2) went, and which of them come back when followed backwards.
 
-    `guess` (N, 2) is where to look first. Source: Lucas and Kanade (1981), pyramids after Bouguet (2000).
+    `guess` (N, 2) is where to look first. A small window is true to edges and slanted surfaces, a large one to
+    noisy pictures. Source: Lucas and Kanade (1981), pyramids after Bouguet (2000).
     """
     if not len(points):
         return points, np.zeros(0, bool)
-    there, found = lucas_kanade(image, later, points, points if guess is None else guess)
-    back, returned = lucas_kanade(later, image, there, points)
+    there, found = lucas_kanade(image, later, points, points if guess is None else guess, window_px=window_px)
+    back, returned = lucas_kanade(later, image, there, points, window_px=window_px)
     home = np.linalg.norm(back - points, axis=1) < ROUND_TRIP_PX
     return there, found & returned & home
 
 
-def lucas_kanade(image: Image, later: Image, points: Points, guess: Points) -> tuple[Points, Mask]:
+def lucas_kanade(
+    image: Image, later: Image, points: Points, guess: Points, *, window_px: int = WINDOW_PX
+) -> tuple[Points, Mask]:
     """Where points (N, 2) went, looked for around the guess (N, 2), and which were found."""
     there, status, _ = cv2.calcOpticalFlowPyrLK(
         image,
         later,
         points,
         guess.astype(np.float32),
-        winSize=(WINDOW_PX, WINDOW_PX),
-        maxLevel=PYRAMID_LEVELS,
+        winSize=(window_px, window_px),
+        maxLevel=LEVELS,
         criteria=LK_STOP,
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )
     return np.asarray(there, np.float32), status.ravel() == 1
 
 
-def follow_predicted(image: Image, later: Image, points: Points, guess: Points) -> tuple[Points, Mask]:
+def follow_predicted(
+    image: Image, later: Image, points: Points, guess: Points, *, window_px: int = WINDOW_PX
+) -> tuple[Points, Mask]:
     """As `follow`, and once more without the guess where it misled: a motion that was predicted may have stopped."""
-    there, found = follow(image, later, points, guess)
+    there, found = follow(image, later, points, guess, window_px=window_px)
     far = len(points) > 0 and float(np.median(np.linalg.norm(guess - points, axis=1))) > MISLED_PX
     if not far or found.mean() >= MISLED_SHARE:
         return there, found
-    again, found_again = follow(image, later, points)
+    again, found_again = follow(image, later, points, window_px=window_px)
     return (again, found_again) if found_again.sum() > found.sum() else (there, found)
 
 
@@ -217,10 +224,12 @@ class StereoPair:
         """Which points (N, 2) of the left picture have a place in the view."""
         return np.asarray(np.isfinite(self.left.in_view(points)).all(1))
 
-    def match(self, left: Image, right: Image, points: Points, *, margin_px: int) -> tuple[Points, Array]:
+    def match(
+        self, left: Image, right: Image, points: Points, *, margin_px: int, window_px: int = WINDOW_PX
+    ) -> tuple[Points, Array]:
         """Places (N, 2) in the right picture of points (N, 2) in the left one, and disparities (N,), NaN for none."""
         left, right = comparable(left, right)
-        matched, found = follow(left, right, points, self._coarse(left, right, points))
+        matched, found = follow(left, right, points, self._coarse(left, right, points), window_px=window_px)
         disparity_px = self.disparity(points, matched)
         return matched, np.where(found & inside(matched, right, margin_px), disparity_px, np.nan)
 
