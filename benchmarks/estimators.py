@@ -116,6 +116,8 @@ def main() -> None:
 def sequence_folder(case: Case, runs: Path) -> Path:
     """Where the sequence lies; rendered if it is not there."""
     folder = runs / case.suite / "latest" / "cases" / case.case / "sequence"
+    if not folder.exists() and case.is_of_rectangles:
+        raise SystemExit(f"run the suite {case.suite} by the commit ce32e00 into {runs} first: there is no {folder}")
     if not folder.exists():
         suite = case.suite if case.suite == "quickstart" else str(SUITES / f"{case.suite}.yaml")
         command = [sys.executable, "-c", "from vobench.cli import main; main()", "run", suite, "-e", "stand_still"]

@@ -105,7 +105,7 @@ class LkEpipolar:
 
         # Off a plane the tracks alone know the direction better than either matrix does.
         if views.h_ratio < self._settings.refine_below_h_ratio:
-            motion = scaled(refined(motion.shape, matches, views.inlier), matches) or motion
+            motion = refined(motion, matches, views.inlier)
         if motion.transfer_px > self._settings.lost_above_px:
             return self._lost(view, "transfer_error", matches)
         return self._step(view, matches, views, motion)

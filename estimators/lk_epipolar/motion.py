@@ -174,20 +174,35 @@ def robust_scale(a: Array, b: Array) -> float:
     return s
 
 
-def refined(shape: Shape, matches: Matches, inlier: Mask) -> Shape:
-    """The shape near the given one with the least Sampson distance over the inliers: five unknowns, no stereo."""
-    x0, x1 = matches.x0[inlier], matches.x1[inlier]
-    tangent = np.linalg.svd(shape.direction[None])[2][1:]
+def refined(motion: Motion, matches: Matches, inlier: Mask) -> Motion:
+    """The motion near the given one that fits best: all tracks by their epipolar lines, those with depth by their place.
 
-    def moved(delta: Array) -> Shape:
-        direction = shape.direction + delta[3:] @ tangent
-        return Shape(Rotation.from_rotvec(delta[:3]).as_matrix() @ shape.R, direction / np.linalg.norm(direction))
+    The distance to the line is Sampson's; the place is that of the transferred point, in px.
+    """
+    x0, x1, rho = matches.x0[inlier], matches.x1[inlier], matches.rho[inlier, None]
+    known = np.isfinite(rho[:, 0])
+    focal_px, size_m = matches.focal_px, max(float(np.linalg.norm(motion.T_now_last[:3, 3])), NO_TRANSLATION)
+
+    def moved(delta: Array) -> Array:
+        R = Rotation.from_rotvec(delta[:3]).as_matrix() @ motion.T_now_last[:3, :3]
+        return se3.transform(R, motion.T_now_last[:3, 3] + size_m * delta[3:])
 
     def cost(delta: Array) -> Array:
-        return sampson(moved(delta), x0, x1) * matches.focal_px
+        T = moved(delta)
+        landed = x0[known] @ T[:3, :3].T + rho[known] * T[:3, 3]
+        off = landed[:, :2] / landed[:, 2:] - x1[known, :2]
+        return focal_px * np.r_[sampson(shape_of(T), x0, x1), off.ravel()]
 
-    fit = least_squares(cost, np.zeros(5), loss="huber", f_scale=HUBER_PX, max_nfev=MAX_EVALUATIONS)
-    return moved(fit.x)
+    fit = least_squares(cost, np.zeros(6), loss="huber", f_scale=HUBER_PX, max_nfev=MAX_EVALUATIONS)
+    T = moved(fit.x)
+    error = np.linalg.norm(cost(fit.x)[len(x0) :].reshape(-1, 2), axis=1)
+    return Motion(shape_of(T), T, float(np.median(error)))
+
+
+def shape_of(T_now_last: Array) -> Shape:
+    """A motion without its length."""
+    t = T_now_last[:3, 3]
+    return Shape(T_now_last[:3, :3], t / max(float(np.linalg.norm(t)), NO_TRANSLATION))
 
 
 def sampson(shape: Shape, x0: Array, x1: Array) -> Array:

@@ -352,19 +352,27 @@ class PoseFit:
 
 
 def pose_from_points(
-    points_m: Array, uv_px: Array, disparity_px: Array, pair: StereoPair, *, ransac_px: float = 1.0
+    points_m: Array,
+    uv_px: Array,
+    K: Array,
+    *,
+    disparity_px: Array | None = None,
+    baseline_m: float = 0.0,
+    ransac_px: float = 1.0,
 ) -> PoseFit | None:
-    """The motion that brings points (N, 3) to view pixels (N, 2) with disparities (N,), NaN where not seen right.
+    """The motion that brings points (N, 3) to pixels (N, 2) of a pinhole K; None where there is none.
 
-    AP3P in RANSAC, then least squares with Cauchy's weights on left column, row and right column. None where
-    there is none. Source: Ke and Roumeliotis (2017); Fischler and Bolles (1981).
+    With a right eye, `disparity_px` (N,) are the points' disparities now, NaN where not seen there. AP3P in RANSAC,
+    then least squares with Cauchy's weights on left column, row and right column.
+    Source: Ke and Roumeliotis (2017); Fischler and Bolles (1981).
     """
     if len(points_m) < MIN_POINTS:
         return None
+    disparity_px = np.full(len(points_m), np.nan) if disparity_px is None else disparity_px
     ok, rotvec, t, inliers = cv2.solvePnPRansac(
         points_m,
         np.ascontiguousarray(uv_px),
-        pair.K,
+        K,
         None,
         flags=cv2.SOLVEPNP_AP3P,
         iterationsCount=PNP_ROUNDS,
@@ -377,24 +385,26 @@ def pose_from_points(
     inlier[inliers.ravel()] = True
     R = cv2.Rodrigues(rotvec)[0].astype(float)
     measured = np.c_[uv_px, uv_px[:, 0] - disparity_px]
-    T, covariance = _least_squares_pose(se3.transform(R, t.ravel()), points_m[inlier], measured[inlier], pair)
-    error = np.linalg.norm(_stereo_pixels(se3.apply(T, points_m), pair)[:, :2] - uv_px, axis=1)
+    T, covariance = _least_squares_pose(se3.transform(R, t.ravel()), points_m[inlier], measured[inlier], K, baseline_m)
+    error = np.linalg.norm(_stereo_pixels(se3.apply(T, points_m), K, baseline_m)[:, :2] - uv_px, axis=1)
     inlier = error < ransac_px
     if inlier.sum() < MIN_POINTS or not np.isfinite(T).all():
         return None
     return PoseFit(T, inlier, float(np.median(error[inlier])), covariance)
 
 
-def _least_squares_pose(T: Array, points_m: Array, measured_px: Array, pair: StereoPair) -> tuple[Array, Array]:
+def _least_squares_pose(
+    T: Array, points_m: Array, measured_px: Array, K: Array, baseline_m: float
+) -> tuple[Array, Array]:
     """Gauss-Newton from T; the last step's inverse information, scaled by the noise seen, is the covariance."""
     known = np.isfinite(measured_px)
     information, noise_px = np.eye(6), NOISE_FLOOR_PX
     for _ in range(POSE_STEPS):
         moved = se3.apply(T, points_m)
-        residual = np.where(known, measured_px - _stereo_pixels(moved, pair), 0.0)
+        residual = np.where(known, measured_px - _stereo_pixels(moved, K, baseline_m), 0.0)
         noise_px = max(1.4826 * float(np.median(np.abs(residual[known]))), NOISE_FLOOR_PX)
         weight = known / (1 + (residual / (2.4 * noise_px)) ** 2)
-        jacobian = _stereo_jacobian(moved, pair)
+        jacobian = _stereo_jacobian(moved, K, baseline_m)
         information = np.einsum("nij,ni,nik->jk", jacobian, weight, jacobian) + 1e-9 * np.eye(6)
         step = np.linalg.solve(information, np.einsum("nij,ni->j", jacobian, weight * residual))
         T = twist(step) @ T
@@ -403,22 +413,22 @@ def _least_squares_pose(T: Array, points_m: Array, measured_px: Array, pair: Ste
     return T, noise_px**2 * np.linalg.inv(information)
 
 
-def _stereo_pixels(points_m: Array, pair: StereoPair) -> Array:
+def _stereo_pixels(points_m: Array, K: Array, baseline_m: float) -> Array:
     """Left column, row and right column (N, 3) of points in the view's axes; far off the picture behind it."""
     z = np.where(points_m[:, 2] > 0, points_m[:, 2], np.finfo(float).eps)
-    uv = (points_m / z[:, None]) @ pair.K.T
-    return np.c_[uv[:, :2], uv[:, 0] - pair.focal_baseline / z]
+    uv = (points_m / z[:, None]) @ K.T
+    return np.c_[uv[:, :2], uv[:, 0] - K[0, 0] * baseline_m / z]
 
 
-def _stereo_jacobian(points_m: Array, pair: StereoPair) -> Array:
+def _stereo_jacobian(points_m: Array, K: Array, baseline_m: float) -> Array:
     """How these pixels (N, 3) change with a small translation and rotation (6,) of the points: (N, 3, 6)."""
-    fx, skew, fy = pair.K[0, 0], pair.K[0, 1], pair.K[1, 1]
+    fx, skew, fy = K[0, 0], K[0, 1], K[1, 1]
     x, y, z = points_m.T
     z = np.where(z > 0, z, np.finfo(float).eps)
     zero, one = np.zeros_like(z), np.ones_like(z)
     column = np.stack([fx * one, skew * one, -(fx * x + skew * y) / z], -1)
     row = np.stack([zero, fy * one, -fy * y / z], -1)
-    right = column + np.stack([zero, zero, pair.focal_baseline / z], -1)
+    right = column + np.stack([zero, zero, K[0, 0] * baseline_m / z], -1)
     by_point = np.stack([column, row, right], 1) / z[:, None, None]
     by_turn = -by_point @ cross_matrix(points_m)
     return np.concatenate([by_point, by_turn], -1)
