@@ -251,8 +251,13 @@ class StereoPair:
 
     def T_left(self, T_view: Array) -> Array:
         """A motion in the view's axes as the same motion in the left camera's."""
-        turn = se3.transform(self.left.R_view_camera, np.zeros(3))
+        turn = self.T_view_left
         return se3.inverse(turn) @ T_view @ turn
+
+    @property
+    def T_view_left(self) -> Array:
+        """The left camera's pose in the view's axes: a turn."""
+        return se3.transform(self.left.R_view_camera, np.zeros(3))
 
     def _coarse(self, left: Image, right: Image, points: Points) -> Points:
         """About where the points are in the right picture; their own place where nothing is known."""
@@ -439,6 +444,12 @@ def cross_matrix(vectors: Array) -> Array:
     x, y, z = vectors.T
     zero = np.zeros_like(x)
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(-1, 3, 3)
+
+
+def adjoint(T_a_b: Array) -> Array:
+    """The matrix (6, 6) that takes a small translation and rotation in b to the same motion in a."""
+    R = T_a_b[:3, :3]
+    return np.block([[R, cross_matrix(T_a_b[None, :3, 3])[0] @ R], [np.zeros((3, 3)), R]])
 
 
 def twist(step: Array) -> Array:
