@@ -101,6 +101,9 @@ CASES = [
     Case("gain down", "quickstart", "down", altered=right_dimmer),
     Case("gain ahead", "quickstart", "ahead", altered=right_dimmer),
     Case("gain drive", "office", "clean", altered=right_dimmer),
+    Case("old gain down", "quickstart", "down", is_of_rectangles=True, altered=right_dimmer),
+    Case("old gain ahead", "quickstart", "ahead", is_of_rectangles=True, altered=right_dimmer),
+    Case("old gain drive", "office", "clean", is_of_rectangles=True, altered=right_dimmer),
     Case("still down", "quickstart", "down", altered=standing),
     Case("still ahead", "quickstart", "ahead", altered=standing),
     Case("still drive", "office", "clean", altered=standing),
@@ -148,10 +151,8 @@ def compare_fusions(runs: Path) -> None:
             half = stats.t.ppf(0.975, len(ratio) - 1) * ratio.std(ddof=1) / np.sqrt(len(ratio))
             said = ", ".join(f"{name} {mean:.3g}" for name, mean in zip(names, errors.mean(0), strict=True))
             middle, low, high = np.exp([ratio.mean(), ratio.mean() - half, ratio.mean() + half])
-            print(
-                f"{suite + ' ' + case:24s}{said:>64s}{middle:10.2f} [{low:.2f}, {high:.2f}]{(ratio < 0).sum():>4d}/{len(ratio)}",
-                flush=True,
-            )
+            won = f"{(ratio < 0).sum():>4d}/{len(ratio)}"
+            print(f"{suite + ' ' + case:24s}{said:>64s}{middle:10.2f} [{low:.2f}, {high:.2f}]{won}", flush=True)
 
 
 def sequence_folder(case: Case, runs: Path) -> Path:
@@ -173,7 +174,7 @@ def sequence_folder(case: Case, runs: Path) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What came out: segments in %, scale, °/m, RMSE of position and the farthest from the start in mm, and the cost."""
+    """Segments in %, scale, °/m, RMSE of position and the farthest from the start in mm, frames with a pose, cost."""
 
     segments: float
     scale: float

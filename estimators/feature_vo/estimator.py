@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from vobench.errors import VobenchError
 from vobench.estimator import Frame, Result, Status, Tracks
+from vobench.estimator.pose import PoseFit, pose_from_points
 from vobench.estimator.protocol import Image
-from vobench.estimator.tools import PoseFit, parameters, pose_from_points, stereo_pair
+from vobench.estimator.tools import parameters, stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array

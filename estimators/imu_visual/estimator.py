@@ -9,8 +9,9 @@ import numpy as np
 
 from vobench.errors import VobenchError
 from vobench.estimator import Frame, ImuReadings, Result, Status
+from vobench.estimator.pose import PoseFit, adjoint
 from vobench.estimator.stereo_tracker import StereoTracker, TrackerSettings
-from vobench.estimator.tools import PoseFit, adjoint, parameters, stereo_pair
+from vobench.estimator.tools import parameters, stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.camera import unit
 from vobench.geometry.rig import Rig
@@ -58,7 +59,8 @@ class ImuVisual:
         if not self._tracker.has_view:
             self._state = state
             return self._anchor(frame, Status.INIT, "")
-        T_now_view = se3.inverse(self._T_imu_view) @ se3.inverse(state.T_odom_imu) @ self._T_odom_anchor @ self._T_imu_view
+        T_now_anchor = se3.inverse(state.T_odom_imu) @ self._T_odom_anchor
+        T_now_view = se3.inverse(self._T_imu_view) @ T_now_anchor @ self._T_imu_view
         followed = self._tracker.follow(frame.left, frame.right, T_now_view)
         fit = self._tracker.fit(followed)
         after = None if fit is None else self._corrected(state, fit)
@@ -98,9 +100,7 @@ class ImuVisual:
     def _anchor(self, frame: Frame, status: Status, reason: str) -> Result:
         """Take a new view here; where there is nothing to see, keep the old one."""
         assert self._state is not None
-        assert frame.left is not None
-        assert frame.right is not None
-        if self._tracker.look(frame.left, frame.right):
+        if frame.left is not None and frame.right is not None and self._tracker.look(frame.left, frame.right):
             self._state = anchored(self._state)
             self._T_odom_anchor = self._state.T_odom_imu
         return self._said(status, reason)

@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from vobench.estimator.tools import cross_matrix
+from vobench.estimator.pose import cross_matrix
 from vobench.geometry import se3
 from vobench.geometry.rig import ImuCalibration
-from vobench.geometry.se3 import Array
 from vobench.geometry.se3 import Array
 
 P, THETA, V, BIAS, GRAVITY = (slice(k, k + 3) for k in range(0, 15, 3))
@@ -24,7 +23,7 @@ LEAST_GYRO, LEAST_ACCEL = 1e-5, 1e-4  # densities below which no real IMU is: an
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Where the IMU is at an instant, how fast, what it errs by; and the covariance (15, 15) of the error of all that."""
+    """Where the IMU is at an instant, how fast, and what it errs by; the covariance (15, 15) is of the error."""
 
     t_ns: float
     T_odom_imu: Array

@@ -8,12 +8,11 @@ import cv2
 import numpy as np
 
 from vobench.estimator import Frame, Result, Status, Tracks
+from vobench.estimator.pose import DisparityOffset, carried_on
 from vobench.estimator.protocol import Image
 from vobench.estimator.tools import (
-    DisparityOffset,
     Mask,
     Points,
-    carried_on,
     comparable,
     corners_per_cell,
     follow_predicted,
@@ -26,7 +25,7 @@ from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 
-from .motion import Matches, Motion, TwoViews, best_motion, refined, scaled, two_views
+from .motion import Matches, Motion, TwoViews, best_motion, refined, two_views
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +152,10 @@ class LkEpipolar:
     def _remember(self, view: View) -> None:
         """Follow the next frame from this view, at the pose of now, with disparities from left to right."""
         self._last, self._T_odom_last = view, self._T_odom_now
-        _, self._disparity = self._pair.match(view.left, view.right, view.corners, margin_px=self._settings.margin_px, window_px=self._settings.window_px)
+        s = self._settings
+        _, self._disparity = self._pair.match(
+            view.left, view.right, view.corners, margin_px=s.margin_px, window_px=s.window_px
+        )
 
     def _lost(self, view: View, reason: str, matches: Matches) -> Result:
         """No pose for this frame; the next one carries on from here with the last pose there was."""

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from vobench.estimator.tools import Mask, cross_matrix
+from vobench.estimator.pose import cross_matrix
+from vobench.estimator.tools import Mask
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
@@ -175,7 +176,7 @@ def robust_scale(a: Array, b: Array) -> float:
 
 
 def refined(motion: Motion, matches: Matches, inlier: Mask) -> Motion:
-    """The motion near the given one that fits best: all tracks by their epipolar lines, those with depth by their place.
+    """The motion near the given one that fits best: all tracks by epipolar lines, those with depth by their place.
 
     The distance to the line is Sampson's; the place is that of the transferred point, in px.
     """
@@ -191,7 +192,8 @@ def refined(motion: Motion, matches: Matches, inlier: Mask) -> Motion:
         T = moved(delta)
         landed = x0[known] @ T[:3, :3].T + rho[known] * T[:3, 3]
         off = landed[:, :2] / landed[:, 2:] - x1[known, :2]
-        return focal_px * np.r_[sampson(shape_of(T), x0, x1), off.ravel()]
+        residual: Array = focal_px * np.r_[sampson(shape_of(T), x0, x1), off.ravel()]
+        return residual
 
     fit = least_squares(cost, np.zeros(6), loss="huber", f_scale=HUBER_PX, max_nfev=MAX_EVALUATIONS)
     T = moved(fit.x)

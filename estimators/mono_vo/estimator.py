@@ -8,18 +8,17 @@ import cv2
 import numpy as np
 
 from vobench.estimator import Frame, Result, Status, Tracks
+from vobench.estimator.pose import carried_on, pose_from_points
 from vobench.estimator.protocol import Image
 from vobench.estimator.tools import (
     Eye,
     Mask,
     Points,
-    carried_on,
     comparable,
     corners_per_cell,
     follow_predicted,
     inside,
     parameters,
-    pose_from_points,
     predicted,
 )
 from vobench.geometry import se3
@@ -79,26 +78,32 @@ class MonoVo:
         if frame.left is None:
             return Result(None, Status.LOST, "no_picture")
         if self._view is None:
-            self._view = self._added(frame.left, np.zeros((0, 2), np.float32), np.zeros(0), np.zeros(0))
-            return Result(self._T_odom_now, Status.INIT)
+            return self._begin(frame.left)
         view = self._view
         there, good = self._follow(view, frame.left)
         if good.sum() < self._settings.min_tracks:
-            return self._lost(frame.left, "few_tracks")
-        flow_px = float(np.median(np.linalg.norm(there[good] - view.corners[good], axis=1)))
+            self._begin(frame.left)
+            return Result(None, Status.LOST, "few_tracks")
+        flow_px = median_flow_px(view.corners[good], there[good])
         if not view.known.any() and flow_px < self._settings.begin_px:
             return Result(self._T_odom_now, Status.INIT, "no_depth")
         if flow_px < self._settings.min_flow_px:
             self._T_odom_before = self._T_odom_now = self._T_odom_view
             return Result(self._T_odom_now, Status.STATIONARY, "no_flow")
+        return self._step(frame.left, view, there, good)
+
+    def _step(self, image: Image, view: View, there: Points, good: Mask) -> Result:
+        """Chain the motion since the view on its pose, and take a new view when the old one is far away."""
+        flow_px = median_flow_px(view.corners[good], there[good])
         motion = self._motion(view, there, good)
         if motion is None:
-            return self._lost(frame.left, "no_model")
+            self._begin(image)
+            return Result(None, Status.LOST, "no_model")
         T_now_view, inlier = motion
         self._T_odom_before, T_odom_now = self._T_odom_now, self._T_odom_view @ se3.inverse(T_now_view)
         self._T_odom_now = se3.transform(se3.nearest_rotation(T_odom_now[:3, :3]), T_odom_now[:3, 3])
         if flow_px >= self._settings.keep_below_px:
-            self._renew(view, frame.left, there, good, T_now_view)
+            self._renew(view, image, there, good, T_now_view)
         tracks = Tracks(view.corners[good].astype(float), there[good].astype(float), inlier[good])
         stats = {"tracks": int(good.sum()), "inliers": int(inlier.sum()), "parallax_px": flow_px}
         return Result(self._T_odom_now, Status.OK, "", tracks, stats | {"depths": int((view.known & good).sum())})
@@ -117,7 +122,7 @@ class MonoVo:
         inlier = np.zeros(len(good), bool)
         if not view.known.any():
             found = np.flatnonzero(good)
-            begun = first_motion(*(self._eye.rays(uv[found]) for uv in (view.corners, there)), self._eye.K)
+            begun = first_motion(self._eye.rays(view.corners[found]), self._eye.rays(there[found]), self._eye.K)
             if begun is None:
                 return None
             inlier[found] = begun[1]
@@ -132,7 +137,7 @@ class MonoVo:
         return fit.T_now_last, inlier
 
     def _renew(self, view: View, image: Image, there: Points, good: Mask, T_now_view: Array) -> None:
-        """The picture of now as the view: depths by this parallax joined with those known, carried over, new corners."""
+        """Take this picture as the view: depths, bettered by the parallax, are carried over, new corners added."""
         rays0, rays1 = self._eye.rays(view.corners[good]), self._eye.rays(there[good])
         rho, certainty = triangulated(rays0, rays1, T_now_view, float(self._eye.K[0, 0]))
         joined = certainty + view.certainty[good]
@@ -157,18 +162,25 @@ class MonoVo:
         unknown = np.zeros(len(new))
         return View(image, np.concatenate([corners, new]), np.r_[rho, unknown], np.r_[certainty, unknown])
 
-    def _lost(self, image: Image, reason: str) -> Result:
-        """No pose for this frame; the next one begins anew from here, with another unit of length."""
+    def _begin(self, image: Image) -> Result:
+        """Begin anew at the pose of now, with another unit of length; where there is nothing to see, wait."""
         fresh = self._added(image, np.zeros((0, 2), np.float32), np.zeros(0), np.zeros(0))
-        if len(fresh.corners) >= self._settings.min_tracks:
-            self._view, self._T_odom_view, self._T_odom_before = fresh, self._T_odom_now, self._T_odom_now
-        return Result(None, Status.LOST, reason)
+        if len(fresh.corners) < self._settings.min_tracks:
+            return Result(None, Status.LOST, "few_corners")
+        self._view, self._T_odom_view, self._T_odom_before = fresh, self._T_odom_now, self._T_odom_now
+        return Result(self._T_odom_now, Status.INIT)
+
+
+def median_flow_px(before: Points, now: Points) -> float:
+    """Median length of tracks (N, 2)."""
+    return float(np.median(np.linalg.norm(now - before, axis=1)))
 
 
 def first_motion(rays0: Array, rays1: Array, K: Array) -> tuple[Array, Mask] | None:
-    """The motion of length 1 between two views that puts most points before both, and who agrees. Source: Nistér (2004).
+    """The motion of length 1 between two views that puts most points before both, and who agrees.
 
     Candidates are those of the essential matrix and of the homography, for points may lie on a plane.
+    Source: Nistér (2004); Malis and Vargas (2007).
     """
     uv0, uv1 = ((rays @ K.T)[:, :2] for rays in (rays0, rays1))
     motions = list(_candidates(uv0, uv1, K))
@@ -198,7 +210,8 @@ def _agrees(T: Array, rays0: Array, rays1: Array, focal_px: float) -> Mask:
     rho, _ = triangulated(rays0, rays1, T, focal_px)
     moved = rays0 @ T[:3, :3].T + rho[:, None] * T[:3, 3]
     off_px = np.linalg.norm(moved[:, :2] / moved[:, 2:] - rays1[:, :2], axis=1) * focal_px
-    return (rho > 0) & (moved[:, 2] > 0) & (off_px < 1.0)
+    agrees: Mask = (rho > 0) & (moved[:, 2] > 0) & (off_px < 1.0)
+    return agrees
 
 
 def triangulated(rays0: Array, rays1: Array, T_now_view: Array, focal_px: float) -> tuple[Array, Array]:

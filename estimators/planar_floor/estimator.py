@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -70,8 +69,8 @@ class PlanarFloor:
         view, s = self._view, self._settings
         step = relative(self._view_pose, compose(self._now, relative(self._before, self._now)))
         guess = self._project(view.ground_m, step)
-        guess = np.where(np.isfinite(guess), guess, view.corners).astype(np.float32)
-        there, found = follow_predicted(*comparable(view.image, frame.left), view.corners, guess, window_px=s.window_px)
+        start = np.where(np.isfinite(guess), guess, view.corners).astype(np.float32)
+        there, found = follow_predicted(*comparable(view.image, frame.left), view.corners, start, window_px=s.window_px)
         good = found & inside(there, frame.left, s.margin_px)
         if good.sum() < s.min_points:
             return self._look(frame.left, Status.LOST, "few_tracks")
@@ -130,14 +129,16 @@ class PlanarFloor:
 
         def cost(step: Array) -> Array:
             off_px = self._project(ground_m[inlier], step) - uv_px[inlier]
-            return np.nan_to_num(off_px, nan=1e3).ravel()
+            residual: Array = np.nan_to_num(off_px, nan=1e3).ravel()
+            return residual
 
         fit = least_squares(cost, steps[best], loss="cauchy", f_scale=ROBUST_PX, x_scale=(0.01, 0.01, 0.01))
         return fit.x, self._error(fit.x, ground_m, uv_px) < self._settings.ransac_px
 
     def _error(self, step: Array, ground_m: Array, uv_px: Array) -> Array:
         """By how many px (N,) a step misses."""
-        return np.nan_to_num(np.linalg.norm(self._project(ground_m, step) - uv_px, axis=1), nan=np.inf)
+        off_px: Array = np.linalg.norm(self._project(ground_m, step) - uv_px, axis=1)
+        return np.where(np.isfinite(off_px), off_px, np.inf)
 
 
 def steps_of_pairs(a0: Array, b0: Array, a1: Array, b1: Array) -> Array:
@@ -146,13 +147,15 @@ def steps_of_pairs(a0: Array, b0: Array, a1: Array, b1: Array) -> Array:
     turn = np.arctan2(was[:, 1], was[:, 0]) - np.arctan2(now[:, 1], now[:, 0])
     c, s = np.cos(turn), np.sin(turn)
     turned = np.stack([c * a1[:, 0] - s * a1[:, 1], s * a1[:, 0] + c * a1[:, 1]], -1)
-    return np.c_[a0 - turned, np.arctan2(s, c)]
+    steps: Array = np.c_[a0 - turned, np.arctan2(s, c)]
+    return steps
 
 
 def compose(pose: Array, step: Array) -> Array:
     """x, y, psi after a step (3,) in the pose's own axes."""
     c, s = np.cos(pose[2]), np.sin(pose[2])
-    return pose + np.array([c * step[0] - s * step[1], s * step[0] + c * step[1], step[2]])
+    moved: Array = pose + np.array([c * step[0] - s * step[1], s * step[0] + c * step[1], step[2]])
+    return moved
 
 
 def relative(pose: Array, other: Array) -> Array:

@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 
 from vobench.estimator import Frame, Result, Status, Tracks
+from vobench.estimator.pose import PoseFit, carried_on
 from vobench.estimator.protocol import Image
 from vobench.estimator.stereo_tracker import Followed, StereoTracker, TrackerSettings
-from vobench.estimator.tools import PoseFit, carried_on, parameters, stereo_pair
+from vobench.estimator.tools import parameters, stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 

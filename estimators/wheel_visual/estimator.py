@@ -1,7 +1,7 @@
 """Wheels and stereo on a level floor: the wheels say where to look, both say how far, and the surer one counts more."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from vobench.errors import VobenchError
 from vobench.estimator import EncoderReadings, Frame, Result, Status
-from vobench.estimator.protocol import Image
+from vobench.estimator.pose import PoseFit, adjoint
 from vobench.estimator.stereo_tracker import StereoTracker, TrackerSettings
-from vobench.estimator.tools import PoseFit, adjoint, parameters, stereo_pair
+from vobench.estimator.tools import parameters, stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
@@ -85,17 +85,17 @@ class WheelVisual:
             return Result(None, Status.LOST, "no_reading")
         self._roll(frame.encoders)
         if not self._tracker.has_view:
-            return self._look(frame.left, frame.right, self._rolled.pose, Status.INIT, "")
+            return self._look(frame, self._rolled.pose, Status.INIT, "")
         T_now_view = se3.inverse(self._in_cameras(self._rolled.pose))
         followed = self._tracker.follow(frame.left, frame.right, T_now_view)
         fit = self._tracker.fit(followed)
         if fit is None:
-            return self._look(frame.left, frame.right, self._rolled.pose, Status.DEGRADED, "wheels")
+            return self._look(frame, self._rolled.pose, Status.DEGRADED, "wheels")
         pose, slips = self._joined(fit)
         stats = {"tracks": len(followed.uv_px), "slip": float(slips), "length_gain": self._length.value}
         if followed.flow_px >= self._settings.keep_below_px:
             self._tracker.learn(followed, fit.T_now_last)
-            return self._look(frame.left, frame.right, pose, Status.OK, "", stats)
+            return replace(self._look(frame, pose, Status.OK, ""), stats=stats)
         return Result(placed(compose(self._view_pose, pose)), stats=stats)
 
     def _roll(self, readings: EncoderReadings) -> None:
@@ -135,20 +135,19 @@ class WheelVisual:
         self._turn = self._turn.after(rolled.pose[2], self._turn.value * seen[2], turn_rad)
         return rolled.pose + of_wheels @ np.linalg.solve(both, difference), False
 
-    def _look(
-        self, left: Image, right: Image, pose: Array, status: Status, reason: str, stats: Mapping[str, float] | None = None
-    ) -> Result:
+    def _look(self, frame: Frame, pose: Array, status: Status, reason: str) -> Result:
         """Take a new view at this step from the old one; where there is nothing to see, keep the old one."""
         now = compose(self._view_pose, pose)
-        if self._tracker.look(left, right):
+        if frame.left is not None and frame.right is not None and self._tracker.look(frame.left, frame.right):
             self._view_pose, self._rolled = now, Rolled(np.zeros(3))
-        return Result(placed(now), status, reason, stats=stats or {})
+        return Result(placed(now), status, reason)
 
 
 def compose(pose: Array, step: Array) -> Array:
     """x, y, psi after a step (3,) in the pose's own axes."""
     c, s = np.cos(pose[2]), np.sin(pose[2])
-    return pose + np.array([c * step[0] - s * step[1], s * step[0] + c * step[1], step[2]])
+    moved: Array = pose + np.array([c * step[0] - s * step[1], s * step[0] + c * step[1], step[2]])
+    return moved
 
 
 def placed(pose: Array) -> Array:

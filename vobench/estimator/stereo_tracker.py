@@ -4,19 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vobench.estimator.pose import DisparityOffset, PoseFit, pose_from_points
 from vobench.estimator.protocol import Image
 from vobench.estimator.tools import (
-    DisparityOffset,
     Mask,
     Points,
-    PoseFit,
     StereoPair,
     comparable,
     corners_per_cell,
     follow_predicted,
     inside,
     lucas_kanade,
-    pose_from_points,
     predicted,
 )
 from vobench.geometry import se3
@@ -133,5 +131,5 @@ class StereoTracker:
 
     def learn(self, followed: Followed, T_now_last: Array) -> None:
         """Learn the pair's offset of disparity from points followed over a motion that is known by now."""
-        rays = (self._pair.left.rays(uv_px) for uv_px in (followed.uv_last_px, followed.uv_px))
-        self.offset = self.offset.after(*rays, followed.disparity_last_px, T_now_last, self._pair)
+        rays0, rays1 = self._pair.left.rays(followed.uv_last_px), self._pair.left.rays(followed.uv_px)
+        self.offset = self.offset.after(rays0, rays1, followed.disparity_last_px, T_now_last, self._pair)
