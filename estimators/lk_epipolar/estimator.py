@@ -1,23 +1,31 @@
 """Stereo visual odometry with Lucas-Kanade tracks and epipolar geometry."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
 
-from vobench.errors import VobenchError
 from vobench.estimator import Frame, Result, Status, Tracks
+from vobench.estimator.pose import DisparityOffset, carried_on
 from vobench.estimator.protocol import Image
+from vobench.estimator.tools import (
+    Mask,
+    Points,
+    comparable,
+    corners_per_cell,
+    follow_predicted,
+    inside,
+    parameters,
+    predicted,
+    stereo_pair,
+)
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 
-from .motion import Matches, Motion, TwoViews, best_motion, scaled, two_views
-from .refinement import refined
-from .stereo import flat_rays, stereo_pair
-from .tracking import Mask, Points, comparable, detect, follow, inside
+from .motion import Matches, Motion, TwoViews, best_motion, refined, two_views
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +35,7 @@ class Settings:
     corners_per_cell: int
     corner_distance_px: float
     margin_px: int
+    window_px: int
     min_tracks: int
     min_flow_px: float
     keep_below_px: float
@@ -34,6 +43,7 @@ class Settings:
     refine_below_h_ratio: float
     degraded_above_px: float
     lost_above_px: float
+    estimate_offset: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +61,13 @@ class LkEpipolar:
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
         """Take the calibration. Raises VobenchError for a rig that is no stereo pair."""
         cv2.setRNGSeed(seed)
-        self._settings = settings_from(params)
-        self._pair = stereo_pair(rig)
+        self._settings = parameters(Settings, params, "lk_epipolar")
+        self._pair = stereo_pair(rig, "lk_epipolar")
+        self._offset = DisparityOffset()
         self._last: View | None = None  # the view that corners are followed from, ...
-        self._rho_last: Array = np.zeros(0)  # ... their inverse depths (N,) in 1/m, NaN for unknown, ...
-        self._T_odom_last: Array = np.eye(4)  # ... and its pose
-        self._T_odom_left: Array = np.eye(4)
+        self._disparity: Array = np.zeros(0)  # ... their disparities (N,) in px, NaN for unknown, ...
+        self._T_odom_last: Array = np.eye(4)  # ... and its pose, in the view's axes
+        self._T_odom_before = self._T_odom_now = np.eye(4)  # the last two poses
 
     def process(self, frame: Frame) -> Result:
         """Look, follow the corners of the last view, find the motion between the two, step on."""
@@ -65,7 +76,7 @@ class LkEpipolar:
             return Result(None, Status.LOST, "few_corners")  # a black picture is not worth remembering
         if self._last is None:
             self._remember(view)
-            return Result(self._T_odom_left, Status.INIT)
+            return Result(self._pose, Status.INIT)
 
         # Lucas-Kanade from the last picture to this one.
         matches = self._follow(self._last, view)
@@ -74,10 +85,14 @@ class LkEpipolar:
 
         # No flow, no motion; since the last view is kept, creeping adds up until it shows.
         if matches.flow_px < self._settings.min_flow_px:
-            self._T_odom_left = self._T_odom_last
-            return Result(self._T_odom_left, Status.STATIONARY, "no_flow", *told(matches))
+            self._T_odom_before = self._T_odom_now = self._T_odom_last
+            return Result(self._pose, Status.STATIONARY, "no_flow", *told(matches))
 
         return self._move(view, matches)
+
+    @property
+    def _pose(self) -> Array:
+        return self._pair.T_left(self._T_odom_now)
 
     def _move(self, view: View, matches: Matches) -> Result:
         """Take the two views apart; let stereo choose and measure; refine; step on."""
@@ -89,7 +104,7 @@ class LkEpipolar:
 
         # Off a plane the tracks alone know the direction better than either matrix does.
         if views.h_ratio < self._settings.refine_below_h_ratio:
-            motion = scaled(refined(motion.shape, matches, views.inlier), matches) or motion
+            motion = refined(motion, matches, views.inlier)
         if motion.transfer_px > self._settings.lost_above_px:
             return self._lost(view, "transfer_error", matches)
         return self._step(view, matches, views, motion)
@@ -99,35 +114,48 @@ class LkEpipolar:
         if frame.left is None or frame.right is None:
             return None
         s = self._settings
-        corners = detect(frame.left, s.corners_per_cell, distance_px=s.corner_distance_px, margin_px=s.margin_px)
+        corners = corners_per_cell(
+            frame.left, s.corners_per_cell, distance_px=s.corner_distance_px, margin_px=s.margin_px
+        )
         corners = corners[self._pair.seen(corners)]
         return View(frame.left, frame.right, corners) if len(corners) >= s.min_tracks else None
 
     def _follow(self, last: View, view: View) -> Matches:
-        """Tracks from the last view's corners to this picture."""
-        there, found = follow(*comparable(last.left, view.left), last.corners)
-        lens = self._pair.left.camera
-        good = found & inside(there, view.left, self._settings.margin_px) & self._pair.seen(there)
+        """Tracks from the last view's corners to this picture, looked for where the motion so far would bring them."""
+        pair, rho = self._pair, (self._disparity - self._offset.px) / self._pair.focal_baseline
+        T_now_last = se3.inverse(carried_on(self._T_odom_before, self._T_odom_now)) @ self._T_odom_last
+        guess = predicted(pair.left, last.corners, rho, T_now_last)
+        earlier, now = comparable(last.left, view.left)
+        there, found = follow_predicted(earlier, now, last.corners, guess, window_px=self._settings.window_px)
+        good = found & inside(there, view.left, self._settings.margin_px) & pair.seen(there)
         uv0, uv1 = last.corners[good].astype(float), there[good].astype(float)
-        return Matches(flat_rays(lens, uv0), flat_rays(lens, uv1), uv0, uv1, self._rho_last[good], lens.K)
+        return Matches(pair.left.rays(uv0), pair.left.rays(uv1), uv0, uv1, rho[good], pair.K)
 
     def _step(self, view: View, matches: Matches, views: TwoViews, motion: Motion) -> Result:
         """Chain the motion on the pose of the last view."""
-        T_odom_left = self._T_odom_last @ se3.inverse(motion.T_now_last)
+        self._T_odom_before = self._T_odom_now
+        T_odom_now = self._T_odom_last @ se3.inverse(motion.T_now_last)
         # Thousands of products drift off SO(3) by rounding.
-        self._T_odom_left = se3.transform(se3.nearest_rotation(T_odom_left[:3, :3]), T_odom_left[:3, 3])
+        self._T_odom_now = se3.transform(se3.nearest_rotation(T_odom_now[:3, :3]), T_odom_now[:3, 3])
         if matches.flow_px >= self._settings.keep_below_px:
+            if self._settings.estimate_offset:
+                raw = matches.rho * self._pair.focal_baseline + self._offset.px
+                self._offset = self._offset.after(matches.x0, matches.x1, raw, motion.T_now_last, self._pair)
             self._remember(view)
         tracks, stats = told(matches, views.inlier)
         stats |= {"h_ratio": views.h_ratio, "transfer_px": motion.transfer_px}
+        stats |= {"offset_px": self._offset.px, "offset_guess_px": self._offset.estimate_px}
         if motion.transfer_px > self._settings.degraded_above_px:
-            return Result(self._T_odom_left, Status.DEGRADED, "transfer_error", tracks, stats)
-        return Result(self._T_odom_left, Status.OK, "", tracks, stats)
+            return Result(self._pose, Status.DEGRADED, "transfer_error", tracks, stats)
+        return Result(self._pose, Status.OK, "", tracks, stats)
 
     def _remember(self, view: View) -> None:
-        """Follow the next frame from this view, at the pose of now, with depths from stereo."""
-        self._last, self._T_odom_last = view, self._T_odom_left
-        self._rho_last = self._pair.inverse_depth(view.left, view.right, view.corners, self._settings.margin_px)
+        """Follow the next frame from this view, at the pose of now, with disparities from left to right."""
+        self._last, self._T_odom_last = view, self._T_odom_now
+        s = self._settings
+        _, self._disparity = self._pair.match(
+            view.left, view.right, view.corners, margin_px=s.margin_px, window_px=s.window_px
+        )
 
     def _lost(self, view: View, reason: str, matches: Matches) -> Result:
         """No pose for this frame; the next one carries on from here with the last pose there was."""
@@ -145,14 +173,3 @@ def told(matches: Matches, inlier: Mask | None = None) -> tuple[Tracks, dict[str
         "parallax_px": matches.flow_px,
     }
     return Tracks(matches.uv0_px, matches.uv1_px, inlier), numbers
-
-
-def settings_from(params: Mapping[str, Any]) -> Settings:
-    """Raises VobenchError for a name that is no parameter, or a value that is no number."""
-    known = [field.name for field in fields(Settings)]
-    if set(params) != set(known):
-        raise VobenchError(f"lk_epipolar takes the parameters {', '.join(known)}, got {', '.join(params)}")
-    for name, value in params.items():
-        if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
-            raise VobenchError(f"lk_epipolar: {name} is {value!r}, expected a number that is not negative")
-    return Settings(**params)

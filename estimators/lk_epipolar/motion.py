@@ -1,6 +1,6 @@
 """How the camera moved between two views: direction from epipolar geometry, length from stereo.
 
-x0, x1     rays (N, 3) with z = 1 through the tracks in the last view and in this one
+x0, x1     rays (N, 3) with z = 1 through the tracks in the last view and in this one, in the rectified view's axes
 rho        inverse depth (N,) in 1/m of the tracks in the last view, NaN where stereo has none
 R, t       T_now_last: a point X of the last view is at R X + t in this one; t = s d, |d| = 1
 """
@@ -10,23 +10,27 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
+from vobench.estimator.pose import cross_matrix
+from vobench.estimator.tools import Mask
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-
-from .tracking import Mask
 
 MIN_STEREO = 12  # points with depth that a length needs
 MAX_BEHIND = 0.1  # share of points that may land behind the camera
 SCALE_ITERATIONS = 5
 NO_TRANSLATION = 1e-9
+HUBER_PX = 0.1  # about the noise of a good track
+MAX_EVALUATIONS = 20
 
 
 @dataclass(frozen=True, slots=True)
 class Matches:
     """Tracks from the last view to this one, as rays, pixels of the picture and inverse depths.
 
-    K is the pinhole that the lens is like about its axis: it gives the rays pixels without distortion.
+    K is the view's matrix: it gives the rays pixels without distortion. uv0_px and uv1_px are the picture's own.
     """
 
     x0: Array
@@ -169,3 +173,44 @@ def robust_scale(a: Array, b: Array) -> float:
         weight = 1 / (1 + squared / max(2 * float(np.median(squared)), 1e-16))
         s = -float(weight @ ab) / max(float(weight @ aa), np.finfo(float).tiny)
     return s
+
+
+def refined(motion: Motion, matches: Matches, inlier: Mask) -> Motion:
+    """The motion near the given one that fits best: all tracks by epipolar lines, those with depth by their place.
+
+    The distance to the line is Sampson's; the place is that of the transferred point, in px.
+    """
+    x0, x1, rho = matches.x0[inlier], matches.x1[inlier], matches.rho[inlier, None]
+    known = np.isfinite(rho[:, 0])
+    focal_px, size_m = matches.focal_px, max(float(np.linalg.norm(motion.T_now_last[:3, 3])), NO_TRANSLATION)
+
+    def moved(delta: Array) -> Array:
+        R = Rotation.from_rotvec(delta[:3]).as_matrix() @ motion.T_now_last[:3, :3]
+        return se3.transform(R, motion.T_now_last[:3, 3] + size_m * delta[3:])
+
+    def cost(delta: Array) -> Array:
+        T = moved(delta)
+        landed = x0[known] @ T[:3, :3].T + rho[known] * T[:3, 3]
+        off = landed[:, :2] / landed[:, 2:] - x1[known, :2]
+        residual: Array = focal_px * np.r_[sampson(shape_of(T), x0, x1), off.ravel()]
+        return residual
+
+    fit = least_squares(cost, np.zeros(6), loss="huber", f_scale=HUBER_PX, max_nfev=MAX_EVALUATIONS)
+    T = moved(fit.x)
+    error = np.linalg.norm(cost(fit.x)[len(x0) :].reshape(-1, 2), axis=1)
+    return Motion(shape_of(T), T, float(np.median(error)))
+
+
+def shape_of(T_now_last: Array) -> Shape:
+    """A motion without its length."""
+    t = T_now_last[:3, 3]
+    return Shape(T_now_last[:3, :3], t / max(float(np.linalg.norm(t)), NO_TRANSLATION))
+
+
+def sampson(shape: Shape, x0: Array, x1: Array) -> Array:
+    """First-order distance (N,) of rays (N, 3) to the epipolar geometry. Source: Sampson (1982)."""
+    E = cross_matrix(shape.direction[None])[0] @ shape.R
+    line1, line0 = x0 @ E.T, x1 @ E
+    gradient = line1[:, 0] ** 2 + line1[:, 1] ** 2 + line0[:, 0] ** 2 + line0[:, 1] ** 2
+    distance: Array = (x1 * line1).sum(1) / np.sqrt(gradient + np.finfo(float).tiny)
+    return distance

@@ -14,10 +14,10 @@ LENS = paper_lens(square_pixels=False)
 
 
 @pytest.fixture(scope="module")
-def parts(bed):
-    """The modules `motion` and `refinement` of the loaded estimator."""
+def motion(bed):
+    """The module `motion` of the loaded estimator."""
     bed.started("lk_epipolar", stereo_rig(LENS, pitch_deg=90))
-    return [sys.modules[f"vobench_estimators.lk_epipolar.{name}"] for name in ("motion", "refinement")]
+    return sys.modules["vobench_estimators.lk_epipolar.motion"]
 
 
 def seen(motion, points, T_now_last, *, noise_px=0.0):
@@ -51,24 +51,21 @@ STEP = moved([0.004, -0.01, 0.03], [0.012, -0.009, 0.003])
 
 
 @pytest.mark.parametrize("points", [floor(), cloud()], ids=["floor", "cloud"])
-def test_an_exact_motion_is_found_again(parts, points):
-    motion, _ = parts
+def test_an_exact_motion_is_found_again(motion, points):
     matches = seen(motion, points, STEP)
     found = motion.best_motion(motion.two_views(matches, 0.5).shapes, matches)
     np.testing.assert_allclose(found.T_now_last, STEP, atol=3e-5)  # cv2 fits in float32
 
 
-def test_the_length_of_the_step_scales_with_the_scene(parts):
-    motion, _ = parts
+def test_the_length_of_the_step_scales_with_the_scene(motion):
     big = moved([0.004, -0.01, 0.03], 3 * STEP[:3, 3])
     shape = motion.Shape(STEP[:3, :3], -STEP[:3, 3] / np.linalg.norm(STEP[:3, 3]))  # wrong sign on purpose
     found = motion.scaled(shape, seen(motion, 3 * cloud(), big))
     np.testing.assert_allclose(found.T_now_last, big, atol=1e-9)
 
 
-def test_points_hundreds_of_baselines_away_still_give_a_motion(parts):
+def test_points_hundreds_of_baselines_away_still_give_a_motion(motion):
     """Trap 1: cv2.recoverPose gives no vote to points farther than 50 baselines."""
-    motion, _ = parts
     points, T = cloud() * 2, moved([0, 0.002, 0], [0.004, 0, 0.012])
     matches = seen(motion, points, T)
     E, _ = motion.essential(matches, 0.5)
@@ -78,9 +75,8 @@ def test_points_hundreds_of_baselines_away_still_give_a_motion(parts):
     np.testing.assert_allclose(found.T_now_last, T, atol=1e-5)
 
 
-def test_both_explanations_of_a_plane_are_among_the_candidates_and_stereo_picks_the_true_one(parts):
+def test_both_explanations_of_a_plane_are_among_the_candidates_and_stereo_picks_the_true_one(motion):
     """Trap 2: two different motions send a plane's points to the very same pixels."""
-    motion, _ = parts
     T = moved([0, 0, 0.02], [0.012, 0, 0.008])
     matches = seen(motion, floor(), T)
     H, _ = motion.homography(matches, 0.5)
@@ -92,9 +88,8 @@ def test_both_explanations_of_a_plane_are_among_the_candidates_and_stereo_picks_
     assert min(m.transfer_px for m in others) > 0.1 > 10 * true.transfer_px
 
 
-def test_a_homography_of_almost_no_translation_still_gives_rotations(parts):
+def test_a_homography_of_almost_no_translation_still_gives_rotations(motion):
     """Trap 3: OpenCV hands back a matrix that is no rotation."""
-    motion, _ = parts
     matches = seen(motion, cloud(), moved([0, 0.05, 0], [1e-4, 0, 0]))
     H, _ = motion.homography(matches, 0.5)
     shapes = list(motion.from_homography(H * 1.01, LENS.K))
@@ -102,30 +97,27 @@ def test_a_homography_of_almost_no_translation_still_gives_rotations(parts):
     assert all(se3.is_rotation(shape.R, tolerance=1e-12) for shape in shapes)
 
 
-def test_refining_brings_a_shape_that_is_off_back_to_the_truth(parts):
+def test_refining_brings_a_shape_that_is_off_back_to_the_truth(motion):
     """Trap 4, the good side: in a scene with depth the Sampson distance knows the shape."""
-    motion, refinement = parts
     matches = seen(motion, cloud(), STEP)
     direction = STEP[:3, 3] / np.linalg.norm(STEP[:3, 3])
     tilted = direction + np.array([0.1, 0.0, -0.1])
     off = motion.Shape(moved([1e-3, 0, 0], [0, 0, 0])[:3, :3] @ STEP[:3, :3], tilted / np.linalg.norm(tilted))
-    found = refinement.refined(off, matches, np.ones(400, bool))
+    found = motion.refined(off, matches, np.ones(400, bool))
     assert np.abs(found.R - STEP[:3, :3]).max() < 1e-5
     assert abs(found.direction @ direction) > 1 - 1e-6
 
 
-def test_the_sampson_distance_of_a_true_match_is_zero_and_has_the_size_of_the_error(parts):
-    motion, refinement = parts
+def test_the_sampson_distance_of_a_true_match_is_zero_and_has_the_size_of_the_error(motion):
     matches = seen(motion, cloud(), STEP)
     shape = motion.Shape(STEP[:3, :3], STEP[:3, 3] / np.linalg.norm(STEP[:3, 3]))
-    exact = refinement.sampson(shape, matches.x0, matches.x1)
-    off = refinement.sampson(shape, matches.x0, matches.x1 + np.array([0, 1e-3, 0]))
+    exact = motion.sampson(shape, matches.x0, matches.x1)
+    off = motion.sampson(shape, matches.x0, matches.x1 + np.array([0, 1e-3, 0]))
     assert np.abs(exact).max() < 1e-12
     assert 1e-5 < np.median(np.abs(off)) <= 1e-3
 
 
-def test_a_third_of_wrong_depths_does_not_move_the_length(parts):
-    motion, _ = parts
+def test_a_third_of_wrong_depths_does_not_move_the_length(motion):
     matches = seen(motion, cloud(), STEP, noise_px=0.02)
     rho = matches.rho.copy()
     rho[::3] *= 3
@@ -135,8 +127,7 @@ def test_a_third_of_wrong_depths_does_not_move_the_length(parts):
     assert np.linalg.norm(found.T_now_last[:3, 3]) == pytest.approx(np.linalg.norm(STEP[:3, 3]), rel=0.01)
 
 
-def test_without_depth_there_is_no_motion(parts):
-    motion, _ = parts
+def test_without_depth_there_is_no_motion(motion):
     matches = seen(motion, cloud(), STEP)
     blind = motion.Matches(
         matches.x0, matches.x1, matches.uv0_px, matches.uv1_px, np.full(len(matches.rho), np.nan), matches.K

@@ -1,0 +1,141 @@
+"""Motion and the offset of disparity from points: exact without noise, honest with it."""
+
+import numpy as np
+import pytest
+
+from vobench.estimator.pose import DisparityOffset, adjoint, carried_on, pose_from_points, twist
+from vobench.estimator.tools import stereo_pair
+from vobench.geometry import se3
+from vobench.geometry.rig import paper_lens, stereo_rig
+
+PAIR = stereo_pair(stereo_rig(paper_lens(square_pixels=True), pitch_deg=10), "test")
+STEP = twist(np.array([0.03, -0.01, 0.14, 0.004, -0.01, 0.03]))
+
+
+def cloud(rng, n=400, near_m=1.0, far_m=12.0):
+    """Points all over the view, evenly spread in disparity."""
+    uv = rng.uniform([60, 60], [660, 420], (n, 2))
+    disparity_px = PAIR.focal_baseline / rng.uniform(near_m, far_m, n)
+    return uv, disparity_px, PAIR.points(uv, disparity_px)
+
+
+def pixels(points):
+    uv = PAIR.left.project(points)
+    return uv, PAIR.focal_baseline / points[:, 2]
+
+
+def test_an_exact_motion_is_found_again_with_one_eye_and_with_two():
+    *_, points = cloud(np.random.default_rng(0))
+    uv, disparity_px = pixels(se3.apply(STEP, points))
+    for stereo in ({}, {"disparity_px": disparity_px, "baseline_m": PAIR.baseline_m}):
+        fit = pose_from_points(points, uv, PAIR.K, **stereo)
+        np.testing.assert_allclose(fit.T_now_last, STEP, atol=1e-9)
+        assert fit.inlier.all()
+
+
+def test_forty_percent_of_wrong_points_do_not_move_it():
+    rng = np.random.default_rng(1)
+    *_, points = cloud(rng)
+    uv, disparity_px = pixels(se3.apply(STEP, points))
+    wrong = rng.random(400) < 0.4
+    uv = uv + wrong[:, None] * rng.uniform(-40, 40, (400, 2))
+    fit = pose_from_points(points, uv, PAIR.K, disparity_px=disparity_px, baseline_m=PAIR.baseline_m)
+    np.testing.assert_allclose(fit.T_now_last, STEP, atol=1e-4)
+    assert fit.inlier[~wrong].all()
+    assert fit.inlier[wrong].mean() < 0.05
+
+
+def test_its_covariance_is_that_of_its_errors():
+    """NEES of a 6-dof error has mean 6: over 60 trials within 6 ± 3 sqrt(12 / 60), and a tenth for what is robust."""
+    rng, nees = np.random.default_rng(2), []
+    for _ in range(60):
+        *_, points = cloud(rng, 200)
+        uv, disparity_px = pixels(se3.apply(STEP, points))
+        left = uv + rng.normal(0, 0.2, uv.shape)
+        right = uv[:, 0] - disparity_px + rng.normal(0, 0.2, 200)
+        fit = pose_from_points(points, left, PAIR.K, disparity_px=left[:, 0] - right, baseline_m=PAIR.baseline_m)
+        error = STEP @ se3.inverse(fit.T_now_last)
+        turn = [error[2, 1] - error[1, 2], error[0, 2] - error[2, 0], error[1, 0] - error[0, 1]]
+        small = np.r_[error[:3, 3], np.array(turn) / 2]
+        nees.append(small @ np.linalg.solve(fit.covariance, small))
+    assert 4.0 < np.mean(nees) < 8.5
+
+
+def test_points_that_the_right_eye_lost_count_in_the_left():
+    *_, points = cloud(np.random.default_rng(3))
+    uv, disparity_px = pixels(se3.apply(STEP, points))
+    disparity_px[::2] = np.nan
+    fit = pose_from_points(points, uv, PAIR.K, disparity_px=disparity_px, baseline_m=PAIR.baseline_m)
+    np.testing.assert_allclose(fit.T_now_last, STEP, atol=1e-9)
+
+
+@pytest.mark.parametrize("n", [0, 3, 5])
+def test_too_few_points_give_no_motion(n):
+    *_, points = cloud(np.random.default_rng(4), n)
+    assert pose_from_points(points, pixels(points)[0], PAIR.K) is None
+
+
+def test_points_at_random_give_no_motion():
+    rng = np.random.default_rng(5)
+    *_, points = cloud(rng, 40)
+    assert pose_from_points(points, rng.uniform(0, 700, (40, 2)), PAIR.K, ransac_px=0.2) is None
+
+
+def test_the_adjoint_carries_a_small_motion_from_one_frame_to_another():
+    T, small = twist(np.array([0.3, -0.2, 0.5, 0.4, 0.1, -0.3])), 1e-6 * np.array([1.0, 2, 3, -2, 1, 4])
+    np.testing.assert_allclose(T @ twist(small) @ se3.inverse(T), twist(adjoint(T) @ small), atol=1e-11)
+
+
+def test_who_moves_as_before_is_where_that_leads():
+    before = twist(np.array([1.0, 2, 3, 0.1, 0.2, 0.3]))
+    np.testing.assert_allclose(carried_on(before, before @ STEP), before @ STEP @ STEP, atol=1e-12)
+    np.testing.assert_allclose(carried_on(before, before), before, atol=1e-12)
+    np.testing.assert_allclose(carried_on(before, before @ STEP, share=0.0), before @ STEP, atol=1e-12)
+
+
+def learnt(true_px, frames, *, flat=False, noise_px=0.1, start_scale=1.0):
+    """What is known of an offset after so many steps; the motion that is handed in is off by start_scale."""
+    rng, offset = np.random.default_rng(6), DisparityOffset()
+    for _ in range(frames):
+        uv, disparity_px, points = cloud(rng, 300, 4.0, 30.0)
+        if flat:
+            disparity_px = np.full(300, 200.0)
+            points = PAIR.points(uv, disparity_px)
+        now = PAIR.left.project(se3.apply(STEP, points)) + rng.normal(0, noise_px, uv.shape)
+        measured_px = disparity_px + true_px + rng.normal(0, noise_px, 300)
+        told = se3.transform(STEP[:3, :3], start_scale * STEP[:3, 3])
+        offset = offset.after(PAIR.left.rays(uv), PAIR.left.rays(now), measured_px, told, PAIR)
+    return offset
+
+
+@pytest.mark.parametrize("true_px", [0.5, -0.5, 0.3])
+def test_an_offset_is_learnt_though_it_spoils_the_motion_handed_in(true_px):
+    offset = learnt(true_px, 30, start_scale=1.05)
+    assert offset.px == pytest.approx(true_px, abs=max(3 * offset.information**-0.5, 0.05))
+    assert offset.px != 0
+
+
+def test_a_perfect_pair_is_left_as_it_is():
+    offset = learnt(0.0, 60)
+    assert offset.px == 0.0
+    assert abs(offset.estimate_px) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("guess_px", "sigma_px", "is_taken"), [(0.4, 0.1, True), (0.4, 0.2, False), (0.14, 0.01, False), (-0.2, 0.05, True)]
+)
+def test_a_guess_is_taken_off_once_it_is_large_and_certain(guess_px, sigma_px, is_taken):
+    offset = DisparityOffset(sigma_px**-2, guess_px * sigma_px**-2)
+    assert offset.px == pytest.approx(guess_px if is_taken else 0.0)
+
+
+def test_points_at_one_distance_tell_nothing():
+    """Their disparities differ by noise alone, which must not be taken for depth."""
+    offset = learnt(0.5, 30, flat=True)
+    assert offset.information == DisparityOffset().information
+    assert offset.px == 0.0
+
+
+def test_without_depths_nothing_is_learnt():
+    rays = PAIR.left.rays(np.random.default_rng(7).uniform(100, 400, (50, 2)))
+    assert DisparityOffset().after(rays, rays, np.full(50, np.nan), STEP, PAIR) == DisparityOffset()

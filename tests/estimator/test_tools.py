@@ -1,0 +1,233 @@
+"""The tools that estimators share: tracks, contrast, pairs of any two lenses, each by its law."""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+import pytest
+
+from vobench.errors import VobenchError
+from vobench.estimator.tools import (
+    GRID,
+    Eye,
+    coarse_disparity,
+    comparable,
+    corners_per_cell,
+    follow,
+    follow_predicted,
+    inside,
+    local_contrast,
+    parameters,
+    predicted,
+    small_size,
+    stereo_pair,
+)
+from vobench.geometry import se3
+from vobench.geometry.camera import DoubleSphere
+from vobench.geometry.rig import PRESETS, mounted, paper_lens, stereo_rig
+
+LENS = paper_lens(square_pixels=True)
+STRAIGHT = stereo_rig(LENS, pitch_deg=10)
+
+
+def wild(name):
+    preset = PRESETS[name]
+    return mounted(preset.left, preset.right, preset.T_left_right, pitch_deg=15)
+
+
+def bulging():
+    return stereo_rig(DoubleSphere(512, 512, 158.0, 157.0, 254.9, 256.9, -0.18, 0.59), pitch_deg=15)
+
+
+def texture(seed=0, size=(480, 720)):
+    """Grain of every size from 4 px on."""
+    rng = np.random.default_rng(seed)
+    grains = [rng.uniform(-1, 1, (size[0] // k, size[1] // k)).astype(np.float32) for k in (4, 8, 16, 32)]
+    summed = sum(cv2.resize(grain, size[::-1], interpolation=cv2.INTER_CUBIC) for grain in grains)
+    return np.clip(128 + 45 * summed, 0, 255).astype(np.uint8)
+
+
+def shifted(image, dx, dy):
+    moving = np.float32([[1, 0, dx], [0, 1, dy]])
+    return cv2.warpAffine(image, moving, image.shape[::-1], flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
+
+
+def grid(n=9):
+    return np.stack(np.meshgrid(np.linspace(60, 660, n), np.linspace(60, 420, n)), -1).reshape(-1, 2).astype(np.float32)
+
+
+def test_every_cell_has_its_corners_and_none_is_near_the_border():
+    corners = corners_per_cell(texture(), 5, distance_px=8, margin_px=12)
+    assert len(corners) == 5 * GRID[0] * GRID[1]
+    assert inside(corners, texture(), 12).all()
+    columns = np.linspace(12, 708, GRID[0] + 1)
+    assert set(np.histogram(corners[:, 0], columns)[0]) == {5 * GRID[1]}
+
+
+def test_corners_are_found_though_only_one_cell_has_any():
+    image = np.full((480, 720), 90, np.uint8)
+    image[200:260, 300:360] = texture()[200:260, 300:360]
+    corners = corners_per_cell(image, 5, distance_px=8, margin_px=12)
+    assert len(corners) > 0
+    assert np.all((corners > [290, 190]) & (corners < [370, 270]))
+
+
+@pytest.mark.parametrize("window_px", [9, 21])
+def test_a_picture_that_moves_by_a_fraction_is_followed_by_it(window_px):
+    moved, found = follow(texture(), shifted(texture(), 3.3, -1.6), grid(), window_px=window_px)
+    assert found.mean() > 0.95
+    np.testing.assert_allclose((moved - grid())[found], np.broadcast_to([3.3, -1.6], (found.sum(), 2)), atol=0.1)
+
+
+def test_what_is_too_far_to_be_found_is_found_from_a_guess():
+    later = shifted(texture(), 120, 40)
+    points = grid()[(grid() < [560, 400]).all(1)]
+    _, alone = follow(texture(), later, points)
+    there, found = follow_predicted(texture(), later, points, points + np.float32([118, 43]))
+    assert alone.mean() < 0.2
+    assert found.mean() > 0.95
+    np.testing.assert_allclose(there[found] - points[found], np.broadcast_to([120, 40], (found.sum(), 2)), atol=0.1)
+
+
+def test_a_guess_that_misleads_costs_nothing_but_time():
+    later = shifted(texture(), 2, 1)
+    plain, misled = follow(texture(), later, grid()), follow_predicted(texture(), later, grid(), grid() + 150)
+    np.testing.assert_array_equal(misled[1], plain[1])
+    np.testing.assert_array_equal(misled[0], plain[0])
+
+
+def test_no_points_are_followed_nowhere():
+    none = np.zeros((0, 2), np.float32)
+    there, found = follow_predicted(texture(), texture(), none, none)
+    assert there.shape == (0, 2)
+    assert found.shape == (0,)
+
+
+def test_pictures_of_like_light_are_compared_as_they_are():
+    other = np.clip(texture() * 1.05, 0, 255).astype(np.uint8)
+    assert comparable(texture(), other)[1] is other
+
+
+@pytest.mark.parametrize(("gain", "bias"), [(0.84, 0.0), (0.75, 20.0), (1.0, 40.0)])
+def test_local_contrast_does_not_see_gain_nor_bias(gain, bias):
+    dim = (texture() * 0.6).astype(np.uint8)
+    changed = np.round(dim * gain + bias).astype(np.uint8)
+    one, other = comparable(dim, changed)
+    assert one is not dim
+    assert np.abs(one.astype(float) - other).mean() < 2
+    assert np.abs(local_contrast(dim).astype(float) - one).max() == 0
+
+
+def test_tracks_in_an_eye_of_another_gain_are_as_many_and_as_good():
+    points, later = grid(15), shifted(texture(), 1.4, 0.3)
+    equal, found = follow(*comparable(texture(), later), points)
+    dim = np.round(later * 0.84).astype(np.uint8)
+    unlike, found_unlike = follow(*comparable(texture(), dim), points)
+    assert found_unlike.sum() > 0.9 * found.sum()
+    both = found & found_unlike
+    assert np.abs(unlike - equal)[both].max() < 0.1
+
+
+@pytest.mark.parametrize("rig", [STRAIGHT, wild("euroc"), wild("fisheye"), wild("zed2i"), bulging()], ids=str)
+def test_a_point_seen_by_any_two_lenses_is_found_again_from_its_disparity(rig):
+    pair = stereo_pair(rig, "test")
+    rng = np.random.default_rng(1)
+    points = rng.uniform([-0.5, -0.4, 1.0], [0.6, 0.4, 4.0], (200, 3))  # in the left camera's axes
+    left_px, right_px = rig.left.project(points), rig.right.project(se3.apply(se3.inverse(rig.T_left_right), points))
+    found = pair.points(left_px, pair.disparity(left_px, right_px))
+    np.testing.assert_allclose(found, se3.apply(pair.T_view_left, points), atol=1e-6)
+
+
+@pytest.mark.parametrize("rig", [STRAIGHT, wild("euroc"), wild("fisheye")], ids=["straight", "euroc", "fisheye"])
+def test_a_prediction_with_the_true_motion_and_depth_is_where_the_point_is(rig):
+    pair = stereo_pair(rig, "test")
+    rng = np.random.default_rng(2)
+    points = rng.uniform([-0.5, -0.4, 1.0], [0.5, 0.4, 4.0], (50, 3))
+    T = se3.transform(se3.rotation_z(0.05), [0.02, -0.03, 0.1])
+    uv = pair.left.project(points)
+    np.testing.assert_allclose(
+        predicted(pair.left, uv, 1 / points[:, 2], T), pair.left.project(se3.apply(T, points)), atol=1e-3
+    )
+    np.testing.assert_allclose(predicted(pair.left, uv, np.full(50, np.nan), np.eye(4)), uv, atol=1e-3)
+
+
+def test_a_motion_of_the_view_is_the_same_motion_of_the_left_camera():
+    pair = stereo_pair(wild("euroc"), "test")
+    T_left = se3.transform(se3.rotation_z(0.3), [0.1, 0.2, 0.3])
+    T_view = pair.T_view_left @ T_left @ se3.inverse(pair.T_view_left)
+    np.testing.assert_allclose(pair.T_left(T_view), T_left, atol=1e-12)
+
+
+def test_a_pair_matches_across_its_eyes_also_where_one_is_dimmer(bed_pair):
+    for gain in (1.0, 0.84):
+        right = np.round(bed_pair.right * gain).astype(np.uint8)
+        _, disparity_px = bed_pair.pair.match(bed_pair.left, right, bed_pair.points, margin_px=12, window_px=11)
+        known = np.isfinite(disparity_px)
+        assert known.sum() > 0.9 * bed_pair.seen.sum()
+        np.testing.assert_allclose(np.median(disparity_px[known]), bed_pair.disparity_px, atol=0.05)
+
+
+@dataclass(frozen=True)
+class WallPair:
+    """Two pictures of a wall across the view, and what is true of them."""
+
+    pair: object
+    left: np.ndarray
+    right: np.ndarray
+    points: np.ndarray
+    seen: np.ndarray
+    disparity_px: float
+
+
+@pytest.fixture
+def bed_pair():
+    """A wall so near that a plain search would not find it in the other eye: 150.5 px."""
+    left, disparity_px = texture(3), 150.5
+    points = corners_per_cell(left, 10, distance_px=8, margin_px=12)
+    return WallPair(
+        stereo_pair(STRAIGHT, "test"),
+        left,
+        shifted(left, -disparity_px, 0),
+        points,
+        points[:, 0] > disparity_px + 12,
+        disparity_px,
+    )
+
+
+def test_coarse_disparity_finds_what_is_far_apart():
+    image = texture(4)
+    small = [
+        cv2.resize(picture, small_size(720, 480), interpolation=cv2.INTER_AREA)
+        for picture in (image, shifted(image, -200, 0))
+    ]
+    right_half = grid()[grid()[:, 0] > 300]
+    found = coarse_disparity(small[0], small[1], right_half, 720)
+    assert np.median(np.abs(found - 200)) < 4
+
+
+def test_an_eye_that_is_its_own_view_needs_no_map():
+    assert Eye(LENS, np.eye(3), LENS.K).small_map() is None
+    assert stereo_pair(wild("euroc"), "test").left.small_map() is not None
+
+
+def test_a_rig_that_is_no_pair_is_refused_by_the_estimators_name():
+    above = replace(STRAIGHT, T_body_right=STRAIGHT.T_body_left @ se3.transform(np.eye(3), [0, 0.12, 0]))
+    with pytest.raises(VobenchError, match="mine needs the right camera to the right"):
+        stereo_pair(above, "mine")
+
+
+@dataclass(frozen=True, slots=True)
+class Two:
+    a: int
+    b: float
+
+
+def test_parameters_are_all_given_and_numbers():
+    assert parameters(Two, {"a": 1, "b": 0.5}, "mine") == Two(1, 0.5)
+    for wrong, said in (
+        ({"a": 1}, "takes the parameters a, b"),
+        ({"a": 1, "b": "x"}, "b is 'x'"),
+        ({"a": True, "b": 1}, "a is"),
+    ):
+        with pytest.raises(VobenchError, match=said):
+            parameters(Two, wrong, "mine")
