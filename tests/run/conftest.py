@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from vobench.report import page
+from vobench.run.executor import Serial
 from vobench.run.folder import RunFolder
 from vobench.run.import_recording import read_all
 from vobench.run.run import run_suite
-from vobench.run.store import SilentProgress
 from vobench.suite.suite import Plan, read_plan
 
 CLOSET = """
@@ -58,8 +58,8 @@ class Bench:
 
     def run_plan(self, plan: Plan, *, root: Path, cache: str) -> RunFolder:
         """Run a plan, in silence."""
-        recordings, store, progress = read_all(plan), self.folder / cache, SilentProgress()
-        return run_suite(plan, recordings, root=root, store=store, progress=progress, finish=page.write_reports)
+        recordings, store = read_all(plan), self.folder / cache
+        return run_suite(plan, recordings, root=root, store=store, executor=Serial(), finish=page.write_reports)
 
 
 @pytest.fixture(scope="session")

@@ -57,7 +57,11 @@ def html(folder: RunFolder, scores: list[TrialScore], boards: list[Board]) -> st
         lines_of=table.lines_of,
         notes=table.notes,
         legend=table.LEGEND,
-        plots=[_plot(folder, case, [s for s in scores if s.case == case and s.repeat == 0], colours) for case in cases],
+        plots=[
+            _plot(folder, case, [s for s in scores if s.case == case and s.repeat == 0], colours)
+            for case in cases
+            if (folder.case(case) / GROUND_TRUTH).is_file()
+        ],
         size=PLOT_PX,
     )
 

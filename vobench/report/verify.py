@@ -50,6 +50,8 @@ def _changed(path: Path, held: str) -> str:
 def _truth_differs(case: Path) -> str:
     """The path that was scored against, compared with that in the recording."""
     link = case / SEQUENCE
+    if not link.is_symlink() and not (case / GROUND_TRUTH).is_file():
+        return ""  # there never was one
     if not link.exists():
         return "its sequence is gone from the cache; run the suite again to make it anew"
     try:
@@ -63,6 +65,8 @@ def _rescored(file: Path) -> str:
     """A trial's score, computed anew and compared digit by digit."""
     try:
         held = read_score(file)
+        if held.score is None and not held.frames:
+            return ""  # it came to nothing that could be scored
         gt = read_tum(file.parents[3] / GROUND_TRUTH)
         tracks = {name: file.parent / name for name in (ESTIMATE, REVISED) if (file.parent / name).is_file()}
         scored = {name: score_estimate(read_tum(path), gt, held.claims) for name, path in tracks.items()}

@@ -1,4 +1,4 @@
-"""A run of a suite: its tasks are performed one after another, and what a person reads is gathered in one folder."""
+"""A run of a suite: its tasks are performed, and what a person reads is gathered in one folder."""
 
 import platform
 import sys
@@ -7,10 +7,12 @@ from dataclasses import asdict
 from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
+from zipfile import ZipFile
 
 from vobench import __version__, stop
 from vobench.run.consistency import COVARIANCE
 from vobench.run.estimate import ESTIMATE, LOG, REVISED, TRACKS
+from vobench.run.executor import Done, Event, Executor, perform_all
 from vobench.run.folder import (
     CASE,
     ENVIRONMENT,
@@ -24,12 +26,12 @@ from vobench.run.folder import (
     read_score,
     write_hashes,
 )
-from vobench.run.frames import FRAMES, TIMES
+from vobench.run.frames import COLUMNS, FRAMES, TIME_COLUMNS, TIMES, new_table
 from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.run.key import digest, folder_digest, library_versions
 from vobench.run.simulate import LIBRARIES
-from vobench.run.store import Progress, write_json
-from vobench.run.task import Task, missing, perform, plan
+from vobench.run.store import write_json
+from vobench.run.task import Task, missing, plan
 from vobench.sequence import read_import_notes
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite import Case, Entrant, Plan
@@ -44,15 +46,23 @@ OPTIONAL = (COVARIANCE, REVISED)
 
 
 def run_suite(
-    suite: Plan, recordings: "Mapping[str, Recording]", *, root: Path, store: Path, progress: Progress, finish: Finish
+    suite: Plan,
+    recordings: "Mapping[str, Recording]",
+    *,
+    root: Path,
+    store: Path,
+    finish: Finish,
+    executor: Executor,
+    shares_time: bool = False,
+    heard: Callable[[Event], object] = lambda _: None,
 ) -> RunFolder:
     """Run every case, estimator and repeat; what the store holds already is not made again.
 
-    `finish` adds reports to the folder before it gets its final name under `root`.
+    `finish` adds reports to the folder before it gets its final name under `root`. A cell whose task fails has a row
+    that says why. `executor`, `shares_time` and `heard` are those of `perform_all`.
     """
     tasks = plan(suite, recordings)
-    for task in missing(tasks, store):
-        perform(task, store, progress=progress)
+    failures = perform_all(missing(tasks, store), store, executor, shares_time=shares_time, heard=heard)
     cases = {case.name: case for case in suite.cases}
     stated = plain(suite.suite)
     entrants = [_entrant_facts(entrant) for entrant in suite.entrants]
@@ -61,20 +71,26 @@ def run_suite(
         write_json(folder.path / SUITE, stated)
         write_json(folder.path / ESTIMATORS, entrants)
         write_json(folder.path / ENVIRONMENT, _environment())
-        finish(folder, [_gather(task, cases, store, folder) for task in tasks if task.stage == "score"])
+        scores = [task for task in tasks if task.stage == "score"]
+        finish(folder, [_gather(task, cases, store, folder, failures.get(task.key)) for task in scores])
         write_hashes(folder)
 
     return make_run(root, suite.suite.name, digest({"suite": stated, "estimators": entrants}), fill)
 
 
-def _gather(task: Task, cases: Mapping[str, Case | RecordedCase], store: Path, folder: RunFolder) -> TrialScore:
+def _gather(
+    task: Task, cases: Mapping[str, Case | RecordedCase], store: Path, folder: RunFolder, failure: Done | None
+) -> TrialScore:
     """Copy a trial's files out of the store, and its case's before the first of them."""
     stop.check()
     sequence, estimate = (store / key for key in task.needs)
+    case = task.inputs["case"]
+    if not folder.case(case).is_dir():
+        _gather_case(cases[case], sequence, folder.case(case))
+    if failure:
+        return _write_failed(task, failure, folder)
     score = read_score(store / task.key / SCORE)
     target = folder.estimate(score.case, score.estimator, score.repeat)
-    if not folder.case(score.case).is_dir():
-        _gather_case(cases[score.case], sequence, folder.case(score.case))
     target.mkdir(parents=True)
     for place, names in ((estimate, OF_ESTIMATE), (store / task.key, OF_SCORE)):
         for name in names:
@@ -83,11 +99,38 @@ def _gather(task: Task, cases: Mapping[str, Case | RecordedCase], store: Path, f
     return score
 
 
+def _write_failed(task: Task, failure: Done, folder: RunFolder) -> TrialScore:
+    """The row of a cell that came to no score."""
+    score = TrialScore(
+        case=task.inputs["case"],
+        variant=task.inputs["variant"],
+        estimator=task.inputs["estimator"],
+        repeat=task.inputs["repeat"],
+        status=failure.failure or "crashed",
+        reason=failure.reason,
+        coverage=0.0,
+        frames=0,
+        path_m=0.0,
+        score=None,
+        claims=task.inputs["claims"],
+    )
+    target = folder.estimate(score.case, score.estimator, score.repeat)
+    target.mkdir(parents=True)
+    write_json(target / SCORE, score.model_dump(mode="json"))
+    (target / ESTIMATE).touch()
+    (target / LOG).write_text(f"{failure.reason}\n", encoding="utf-8")
+    with new_table(target / FRAMES, COLUMNS), new_table(target / TIMES, TIME_COLUMNS), ZipFile(target / TRACKS, "w"):
+        return score
+
+
 def _gather_case(case: Case | RecordedCase, sequence: Path, target: Path) -> None:
     target.mkdir(parents=True)
     # Of a recording: all that its import assumed, converted or dropped.
-    assumed = {"import": read_import_notes(sequence)} if isinstance(case, RecordedCase) else {}
+    is_made = sequence.is_dir()
+    assumed = {"import": read_import_notes(sequence)} if is_made and isinstance(case, RecordedCase) else {}
     write_json(target / CASE, {**plain(case), **assumed})
+    if not is_made:
+        return
     copyfile(sequence / GROUND_TRUTH, target / GROUND_TRUTH)
     (target / SEQUENCE).symlink_to(sequence.resolve())
 

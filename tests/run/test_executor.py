@@ -1,0 +1,166 @@
+"""Executors: the same bytes whoever performs a task, and a failure of one cell is a row of it and nobody else's."""
+
+import os
+import signal
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import pytest
+
+from vobench.report import page
+from vobench.report.verify import verify_run
+from vobench.run.executor import Done, Event, Executor, LocalProcesses, Serial, perform_all
+from vobench.run.folder import RunFolder
+from vobench.run.run import run_suite
+from vobench.run.task import Resources, Task, plan
+
+
+def task(name: str, stage: str = "sequence", needs: tuple[str, ...] = ()) -> Task:
+    return Task(stage, None, {"name": name}, needs, Resources())
+
+
+@dataclass
+class Recorder:
+    """An executor that keeps what runs beside what; a task ends at the next turn, by the failures that are given."""
+
+    slots: int
+    failures: dict[str, Done] = field(default_factory=dict)
+    beside: list[tuple[str, int]] = field(default_factory=list)
+    running: list = field(default_factory=list)
+
+    def submit(self, one, store, slot, threads):
+        from concurrent.futures import Future
+        from threading import Timer
+
+        future = Future()
+        self.running.append(future)
+        self.beside.append((one.inputs["name"], sum(not other.done() for other in self.running) - 1))
+        Timer(0.02, lambda: future.set_result(self.failures.get(one.key, Done()))).start()
+        return future
+
+    def close(self):
+        pass
+
+
+LIGHT = task("light", "bake")
+PICTURES = [task(f"pictures {n}", needs=(LIGHT.key,)) for n in range(4)]
+ESTIMATES = [task(f"estimate {n}", "estimate", (one.key,)) for n, one in enumerate(PICTURES)]
+SCORES = [task(f"score {n}", "score", (a.key, b.key)) for n, (a, b) in enumerate(zip(PICTURES, ESTIMATES, strict=True))]
+ALL = [LIGHT, *PICTURES, *ESTIMATES, *SCORES]
+
+
+def test_tasks_come_after_what_they_need_and_two_at_a_time(tmp_path):
+    executor, heard = Recorder(2), list[Event]()
+    assert perform_all(ALL, tmp_path, executor, heard=heard.append) == {}
+    ended = list[str]()
+    for event in heard:
+        if event.what == "started":
+            assert set(event.task.needs) <= set(ended)
+        else:
+            ended.append(event.task.key)
+    assert sorted(ended) == sorted(one.key for one in ALL)
+    assert max(count for _, count in executor.beside) == 1
+
+
+def test_an_estimator_is_timed_with_nothing_beside_it_unless_that_is_asked_for(tmp_path):
+    alone, shared = Recorder(3), Recorder(3)
+    perform_all(ALL, tmp_path, alone)
+    perform_all(ALL, tmp_path, shared, shares_time=True)
+    assert {count for name, count in alone.beside if name.startswith("estimate")} == {0}
+    assert max(count for name, count in shared.beside if name.startswith("estimate")) > 0
+
+
+def test_a_failure_takes_what_needs_it_along_and_nothing_else(tmp_path):
+    failures = {PICTURES[1].key: Done("crashed", "lens fell off")}
+    found = perform_all(ALL, tmp_path, Recorder(2, failures))
+    assert set(found) == {PICTURES[1].key, ESTIMATES[1].key, SCORES[1].key}
+    assert found[SCORES[1].key] == Done("crashed", "its sequence could not be made: lens fell off")
+
+
+def test_ten_thousand_tasks_are_handed_out_in_little_time(tmp_path):
+    class Instant(Recorder):
+        def submit(self, one, store, slot, threads):
+            from concurrent.futures import Future
+
+            future = Future()
+            future.set_result(Done())
+            return future
+
+    tasks = [task(f"s{n}") for n in range(2000)]
+    tasks += [task(f"e{n} {k}", "estimate", (one.key,)) for n, one in enumerate(tasks) for k in range(4)]
+    began = os.times().user
+    assert perform_all(tasks, tmp_path, Instant(2)) == {}
+    assert os.times().user - began < 20
+
+
+def run(bench, tmp_path: Path, executor: Executor, *changes: tuple[str, str]) -> RunFolder:
+    try:
+        return run_suite(
+            bench.plan(*changes), {}, root=tmp_path / "runs", store=tmp_path / "store", executor=executor,
+            finish=page.write_reports,
+        )  # fmt: skip
+    finally:
+        executor.close()
+
+
+def files(folder: RunFolder) -> dict[str, bytes]:
+    chosen = [path for path in folder.path.rglob("*") if path.is_file() and path.name not in ("environment.json",)]
+    kept = [path for path in chosen if "times" not in path.name]
+    return {str(path.relative_to(folder.path)): path.read_bytes() for path in kept}
+
+
+def test_two_processes_write_the_bytes_that_one_does(bench, first, tmp_path):
+    two = run(bench, tmp_path, LocalProcesses(2))
+    assert files(two) == files(first)
+
+
+def test_a_process_that_dies_is_a_row_of_its_cell(bench, tmp_path, monkeypatch):
+    executor = LocalProcesses(2)
+    submit = executor.submit
+
+    def deadly(one: Task, store: Path, slot: int, threads: int):
+        if one.stage == "sequence" and "dim" in one.subject.name:
+            one = replace(one, subject=None)  # whatever it then trips over
+        future = submit(one, store, slot, threads)
+        if one.stage == "sequence" and one.subject is None:
+            for process in list(executor._running):
+                os.kill(process.pid, signal.SIGSEGV)
+        return future
+
+    monkeypatch.setattr(executor, "submit", deadly)
+    folder = run(bench, tmp_path, executor)
+    rows = {(score.case, score.estimator): (score.status, score.reason) for score in folder.scores()}
+    dim = [said for (case, _), said in rows.items() if "dim" in case]
+    assert len(dim) == 2
+    assert all(status == "crashed" and "its sequence could not be made" in reason for status, reason in dim)
+    assert all(not finding.wrong for finding in verify_run(folder))
+    assert "crashed" in (folder.path / "leaderboard.html").read_text()
+
+
+def test_what_a_task_raises_in_this_process_is_a_row_too(bench, tmp_path, monkeypatch):
+    from vobench.run import task as stages
+
+    def raising(*_):
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setitem(stages.PERFORMERS, "score", raising)
+    folder = run(bench, tmp_path, Serial())
+    assert {(s.status, s.reason) for s in folder.scores()} == {("crashed", "ZeroDivisionError: division by zero")}
+
+
+def test_a_full_disk_ends_the_run_with_what_to_do(bench, tmp_path, monkeypatch):
+    import errno
+
+    from vobench.errors import InputError
+    from vobench.run import task as stages
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "store"))
+
+    monkeypatch.setitem(stages.PERFORMERS, "bake", full)
+    with pytest.raises(InputError, match=r"no space is left on the device; free some, or let VOBENCH_CACHE name"):
+        run(bench, tmp_path, Serial())
+
+
+def test_the_plan_of_a_real_suite_is_performed_whole(bench, first):
+    assert perform_all(plan(bench.plan(), {}), bench.folder / "cache", Serial()) == {}
