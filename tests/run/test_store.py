@@ -1,5 +1,7 @@
 """The cache: what is there is whole, what is equal is one, and what is dead is swept."""
 
+import errno
+import fcntl
 import os
 import subprocess
 import sys
@@ -10,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vobench.run.key import cache_folder, canonical, digest, folder_digest
-from vobench.run.store import PREFIX, Store
+from vobench.run.store import PREFIX, Store, sweep
 
 Json = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -63,7 +65,13 @@ def test_nothing_is_seen_under_its_name_before_it_is_whole(store):
     store.get("kind", {}, build)
 
 
-def test_where_another_process_was_faster_its_result_is_taken(store):
+def no_locks(*_):
+    raise OSError(errno.ENOLCK, "No locks available")
+
+
+def test_where_another_process_was_faster_its_result_is_taken(store, monkeypatch):
+    monkeypatch.setattr(fcntl, "flock", no_locks)  # else it would have waited
+
     def build(folder):
         write("slow")(folder)
         store.get("kind", {}, write("fast"))
@@ -72,12 +80,19 @@ def test_where_another_process_was_faster_its_result_is_taken(store):
     assert [path.name for path in (store.root / "kind").iterdir()] == [digest({})]
 
 
-def test_a_forgotten_result_is_made_anew_and_leaves_nothing_behind(store):
+def test_a_result_that_is_not_kept_is_made_anew_and_leaves_nothing_behind(store):
     store.get("kind", {}, write("old"))
-    store.forget("kind", {})
-    store.forget("kind", {})
-    assert list((store.root / "kind").iterdir()) == []
-    assert (store.get("kind", {}, write("new")) / "result").read_text() == "new"
+    made = store.get("kind", {}, write("new"), keeps=lambda folder: (folder / "result").read_text() == "new")
+    assert (made / "result").read_text() == "new"
+    assert list((store.root / "kind").iterdir()) == [made]
+
+
+def test_a_result_that_is_made_anew_stays_until_it_is(store):
+    old = store.get("kind", {}, write("old"))
+    with pytest.raises(ZeroDivisionError):
+        store.get("kind", {}, lambda _: 1 / 0, keeps=lambda _: False)
+    assert (old / "result").read_text() == "old"
+    assert store.has(f"kind/{old.name}")
 
 
 def test_what_a_killed_process_left_is_swept_and_what_a_living_one_fills_is_not(store):
@@ -89,11 +104,11 @@ def test_what_a_killed_process_left_is_swept_and_what_a_living_one_fills_is_not(
     command = [sys.executable, "-c", script, str(store.root)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         folder = Path(process.stdout.readline().strip())
-        store.get("kind", {"from": "here"}, write(""))
+        sweep(folder.parent)
         assert folder.is_dir()
         assert folder.name.startswith(PREFIX)
         process.kill()
-    store.get("kind", {"from": "here again"}, write(""))
+    sweep(folder.parent)
     assert not folder.exists()
 
 

@@ -42,16 +42,16 @@ def run_command(
     from vobench.cli.report import print_boards
     from vobench.report import page
     from vobench.report.leaderboard import as_json as boards_as_json
+    from vobench.run.executor import Serial
     from vobench.run.run import run_suite
 
     planned = read_plan(suite, only_estimators=names)
     _, recordings = _preflight(planned)
-    store = cache_folder()
-    for what, place in (("--out", out), ("VOBENCH_CACHE", store)):
-        if cause := why_unwritable(place):
-            raise InputError(f"{what} should be a folder that can be written ({cause}): {place}")
-    finish, progress = page.write_reports, terminal.Bars()
-    folder = run_suite(planned, recordings, root=out, store=store, progress=progress, finish=finish)
+    if cause := why_unwritable(out):
+        raise InputError(f"--out should be a folder that can be written ({cause}): {out}")
+    finish, store, progress = page.write_reports, cache_folder(), terminal.Bars()
+    executor = Serial(progress)
+    folder = run_suite(planned, recordings, root=out, store=store, finish=finish, executor=executor, tell=progress.say)
     boards = page.boards_of(folder, folder.scores())
     if json:
         print(boards_as_json(boards), end="")

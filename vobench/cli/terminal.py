@@ -85,6 +85,10 @@ class Bars:
             task = progress.add_task(what, total=None)
             yield lambda share: progress.update(task, total=1.0, completed=share)
 
+    def say(self, sentence: str) -> None:
+        """A line of its own."""
+        print(f"vobench: {sentence}", file=sys.stderr, flush=True)
+
     def _progress(self, line: str, *columns: "ProgressColumn") -> "Progress":
         from rich.progress import Progress
 

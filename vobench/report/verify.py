@@ -8,8 +8,9 @@ from typing import Any
 
 from vobench import stop
 from vobench.errors import VobenchError
+from vobench.run.entry import file_hash
 from vobench.run.estimate import ESTIMATE, REVISED
-from vobench.run.folder import SEQUENCE, RunFolder, file_hash, read_hashes, read_score, read_tum
+from vobench.run.folder import SEQUENCE, RunFolder, read_hashes, read_score, read_tum
 from vobench.run.ground_truth import GROUND_TRUTH, left_truth
 from vobench.run.score import score_estimate
 from vobench.trajectory.formats import format_tum
