@@ -3,16 +3,22 @@
 import errno
 import fcntl
 import os
+import socket
 import subprocess
 import sys
+import threading
+import time
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vobench import stop
+from vobench.errors import InputError
 from vobench.run.key import cache_folder, canonical, digest, folder_digest
-from vobench.run.store import PREFIX, Store, sweep
+from vobench.run.store import BAD, PREFIX, Store, sweep
 
 Json = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -146,3 +152,152 @@ def test_where_the_cache_lies(monkeypatch, variables, root):
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
     assert os.fspath(cache_folder()) == root
+
+
+RACER = """
+import os, sys
+from pathlib import Path
+from vobench.run import store
+from vobench.run.store import Store
+store.seal.__globals__["_sync"] = lambda _: None  # the disk's pace is not what is tried
+root, turns = Path(sys.argv[1]), int(sys.argv[2])
+made = os.open(root / "made", os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+def build(folder):
+    os.write(made, b"x")
+    (folder / "result").write_text("whole")
+print("ready", flush=True)
+sys.stdin.readline()
+for turn in range(turns):
+    found = Store(root).get("kind", {"turn": turn}, build)
+    assert (found / "result").read_text() == "whole"
+"""
+
+
+@pytest.mark.parametrize("turns", [int(os.environ.get("VOBENCH_TEST_TURNS", "300"))])
+def test_two_processes_that_want_the_same_never_make_it_twice(tmp_path, turns):
+    command = [sys.executable, "-c", RACER, str(tmp_path), str(turns)]
+    racers = [subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    for racer in racers:
+        racer.stdout.readline()
+    for racer in racers:
+        racer.stdin.write("go\n")
+        racer.stdin.flush()
+    for racer in racers:
+        racer.communicate()
+        assert racer.returncode == 0
+    assert (tmp_path / "made").stat().st_size == turns
+    assert len(list((tmp_path / "kind").iterdir())) == turns
+    assert list((tmp_path / "state" / "locks").iterdir()) == []
+
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from vobench.run.store import Store
+def build(folder):
+    print("making", flush=True)
+    time.sleep(600)
+Store(Path(sys.argv[1])).get("kind", {}, build)
+"""
+
+
+@pytest.fixture
+def held(store):
+    """Another process makes the result of no inputs, and does not come to an end."""
+    command = [sys.executable, "-c", HOLDER, str(store.root)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        process.stdout.readline()
+        yield process
+        process.kill()
+
+
+def test_whoever_waits_says_for_whom_and_goes_on_when_that_one_is_killed(store, held):
+    said = list[str]()
+
+    def tell(sentence):
+        said.append(sentence)
+        held.kill()
+
+    assert (store.get("kind", {}, write("mine"), tell=tell) / "result").read_text() == "mine"
+    assert said == [f"waiting for process {held.pid} on {socket.gethostname()}, which makes kind-{digest({})}"]
+
+
+def test_whoever_waits_answers_a_stop_within_a_second(store, held):
+    began = time.monotonic()
+    timer = threading.Timer(0.5, stop.request, [2])
+    timer.start()
+    try:
+        with pytest.raises(stop.Stopped):
+            store.get("kind", {}, write(""))
+    finally:
+        stop.forget()
+    assert time.monotonic() - began < 1.5
+
+
+def test_where_another_process_has_made_a_failure_anew_that_is_taken(store):
+    store.get("kind", {}, write("failed"))
+    waits, made = threading.Event(), list[Path]()
+
+    def again():
+        made.append(store.get("kind", {}, write("twice"), keeps=lambda _: False, tell=lambda _: waits.set()))
+
+    waiting = threading.Thread(target=again)
+
+    def build(folder):
+        waiting.start()
+        assert waits.wait(10)
+        write("failed again")(folder)
+
+    store.get("kind", {}, build, keeps=lambda _: False)
+    waiting.join()
+    assert (made[0] / "result").read_text() == "failed again"
+
+
+def test_a_damaged_result_is_made_anew_with_a_sentence_and_set_aside(store):
+    made, said = store.get("kind", {}, write("right")), list[str]()
+    (made / "result").write_text("wrong size")
+    store.get("kind", {}, write("right"), tell=said.append)
+    assert (made / "result").read_text() == "right"
+    assert said == [f"a damaged result is made anew, for result has 10 bytes, should have 5: {made}"]
+    assert (made.with_name(f"{BAD}{made.name}") / "result").read_text() == "wrong size"
+
+
+def test_what_a_result_is_made_of_must_be_there_and_sound(store):
+    made = store.get("kind", {}, write("right"))
+    assert store.need(f"kind/{made.name}") == made
+    (made / "result").write_text("wrong")
+    os.utime(made / "result", ns=(0, 0))
+    with pytest.raises(InputError, match=r"a result is damaged \(result holds other bytes than were written\)"):
+        store.need(f"kind/{made.name}")
+    with pytest.raises(InputError, match="a result is gone that this is made of; the same command makes it anew: "):
+        store.need("kind/other")
+
+
+def read_as_nobody(root, waits):
+    os.setgid(65534)
+    os.setuid(65534)
+    store = Store(root)
+    try:
+        store.get("kind", {"other": 1}, write(""))
+    except InputError as error:
+        waits.put(str(error))
+    waits.put((store.get("kind", {}, write("")) / "result").read_text())
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="whoever is not root need not become nobody")
+def test_a_complete_cache_may_be_read_only_and_an_incomplete_one_says_so(store, tmp_path):
+    """In a process of nobody's, for root may write anywhere."""
+    store.get("kind", {}, write("there"))
+    for place in [tmp_path, *tmp_path.parents][:-2]:
+        place.chmod(place.stat().st_mode | 0o055)
+    before = {path: path.stat() for path in sorted(store.root.rglob("*"))}
+    context = get_context("fork")
+    waits = context.SimpleQueue()
+    child = context.Process(target=read_as_nobody, args=(store.root, waits))
+    child.start()
+    child.join()
+    assert waits.get() == f"VOBENCH_CACHE should be a folder that can be written (Permission denied): {store.root}"
+    assert waits.get() == "there"
+    assert {path: path.stat().st_mtime_ns for path in sorted(store.root.rglob("*"))} == {
+        path: stat.st_mtime_ns for path, stat in before.items()
+    }
