@@ -301,3 +301,77 @@ def test_a_complete_cache_may_be_read_only_and_an_incomplete_one_says_so(store, 
     assert {path: path.stat().st_mtime_ns for path in sorted(store.root.rglob("*"))} == {
         path: stat.st_mtime_ns for path, stat in before.items()
     }
+
+
+def filled(store, count):
+    """Results of 1000 bytes and a little, used one day after the other, the first longest ago."""
+    made = [store.get("kind", {"n": n}, write("x" * 1000)) for n in range(count)]
+    for n, folder in enumerate(made):
+        used_s = time.time() - (count - n) * 86400
+        os.utime(folder, (used_s, used_s))
+    return made
+
+
+def test_the_least_recently_used_go_first_until_so_much_is_left(store):
+    made = filled(store, 4)
+    assert store.has(f"kind/{made[0].name}")  # which is a use
+    size = next(store.entries()).bytes
+    removed = store.collect(keep_bytes=2.5 * size)
+    assert [entry.path for entry in removed] == made[1:3]
+    assert sorted(entry.path for entry in store.entries()) == sorted([made[0], made[3]])
+    assert [*store.root.glob("state/checked/kind/*")] != []
+    assert len([*store.root.glob("state/checked/kind/*")]) == 2
+
+
+def test_what_was_not_used_for_days_goes(store):
+    made = filled(store, 4)
+    assert [entry.path for entry in store.collect(older_s=2.5 * 86400)] == made[:2]
+    assert store.collect(older_s=2.5 * 86400) == []
+
+
+def test_what_is_damaged_or_unfinished_goes_in_any_case_and_all_else_stays(store):
+    made = filled(store, 3)
+    (made[1] / "result").write_text("")
+    store.set_aside_damaged([f"kind/{made[1].name}"], str)
+    (store.root / "kind" / f"{PREFIX}x").mkdir()
+    (store.root / "state" / "locks" / "of a killed process").write_text("")
+    assert [entry.is_damaged for entry in store.collect()] == [True]
+    assert {path.name for path in (store.root / "kind").iterdir()} == {made[0].name, made[2].name}
+    assert list((store.root / "state" / "locks").iterdir()) == []
+
+
+def test_what_another_process_makes_anew_is_not_removed(store, held):
+    (folder := store.path("kind", {})).mkdir()
+    os.utime(folder, (0, 0))
+    assert store.collect(older_s=1) == []
+    held.kill()
+    held.wait()
+    assert [entry.path for entry in store.collect(older_s=1)] == [folder]
+
+
+def test_what_a_run_has_used_since_it_began_is_not_removed(store):
+    made = filled(store, 2)
+    with store.in_use(str):
+        time.sleep(0.02)
+        assert store.has(f"kind/{made[0].name}")
+        assert [entry.path for entry in store.collect(keep_bytes=0)] == [made[1]]
+    assert [entry.path for entry in store.collect(keep_bytes=0)] == [made[0]]
+
+
+def test_a_store_that_is_larger_than_wanted_is_told_after_a_run(store, monkeypatch):
+    said = list[str]()
+    filled(store, 2)
+    for limit in ("1", "1e-6"):
+        monkeypatch.setenv("VOBENCH_CACHE_GB", limit)
+        with store.in_use(said.append):
+            pass
+    (sentence,) = said
+    assert sentence.startswith("the cache holds 2.")
+    assert sentence.endswith(" GB, more than VOBENCH_CACHE_GB says; run: vobench cache gc --keep-gb 1e-06")
+
+
+@pytest.mark.parametrize("limit", ["much", "-1", "nan", "0"])
+def test_a_limit_that_is_no_number_is_said_before_a_run(store, monkeypatch, limit):
+    monkeypatch.setenv("VOBENCH_CACHE_GB", limit)
+    with pytest.raises(InputError, match="VOBENCH_CACHE_GB should be a number of gigabytes above 0"):
+        store.in_use(str).__enter__()

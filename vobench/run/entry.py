@@ -88,11 +88,10 @@ def _files_of(folder: Path) -> dict[str, File]:
     return files
 
 
-def fault(folder: Path, checked: Path, *, anew: bool = False) -> str:
+def fault(folder: Path, checked: Path | None = None) -> str:
     """What is wrong with an entry, empty where its files are what its manifest says.
 
-    Sizes are compared always. Hashes are, too, unless the file `checked` says that they were of files of these very
-    states; `anew` believes nothing of the kind.
+    Sizes are compared always, and hashes unless the file `checked` says that they were of files of these states.
     """
     try:
         files = _files_of(folder)
@@ -100,17 +99,18 @@ def fault(folder: Path, checked: Path, *, anew: bool = False) -> str:
         resized = (name for name, file in files.items() if states[name][0] != file.bytes)
         if name := next(resized, ""):
             return f"{name} has {states[name][0]} bytes, should have {files[name].bytes}"
-        if not anew and states == _remembered(checked):
+        if checked and states == _remembered(checked):
             return ""
         for name, file in files.items():
-            held = file_hash(folder / name) if anew else _hash_of(folder / name, states[name])
+            held = _hash_of(folder / name, states[name]) if checked else file_hash(folder / name)
             if held != file.sha256:
                 return f"{name} holds other bytes than were written"
     except ValueError:
         return f"{MANIFEST} is not as it was written"
     except OSError as error:
         return f"{Path(error.filename or folder).name} cannot be read ({error.strerror})"
-    remember(checked, states)
+    if checked:
+        remember(checked, states)
     return ""
 
 

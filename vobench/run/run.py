@@ -64,24 +64,26 @@ def run_suite(
     store, say of a result that was damaged.
     """
     tasks = plan(suite, recordings)
-    to_make = missing(tasks, store)
-    if to_make:
-        Store(store).require_writable()
-        Store(store).set_aside_damaged((task.key for task in to_make), tell)
-    failures = perform_all(to_make, store, executor, shares_time=shares_time, heard=heard)
-    cases = {case.name: case for case in suite.cases}
-    stated = plain(suite.suite)
-    entrants = [_entrant_facts(entrant) for entrant in suite.entrants]
+    kept = Store(store)
+    with kept.in_use(tell):
+        to_make = missing(tasks, store)
+        if to_make:
+            kept.require_writable()
+            kept.set_aside_damaged((task.key for task in to_make), tell)
+        failures = perform_all(to_make, store, executor, shares_time=shares_time, heard=heard)
+        cases = {case.name: case for case in suite.cases}
+        stated = plain(suite.suite)
+        entrants = [_entrant_facts(entrant) for entrant in suite.entrants]
 
-    def fill(folder: RunFolder) -> None:
-        write_json(folder.path / SUITE, stated)
-        write_json(folder.path / ESTIMATORS, entrants)
-        write_json(folder.path / ENVIRONMENT, _environment())
-        scores = [task for task in tasks if task.stage == "score"]
-        finish(folder, [_gather(task, cases, store, folder, failures.get(task.key)) for task in scores])
-        write_hashes(folder)
+        def fill(folder: RunFolder) -> None:
+            write_json(folder.path / SUITE, stated)
+            write_json(folder.path / ESTIMATORS, entrants)
+            write_json(folder.path / ENVIRONMENT, _environment())
+            scores = [task for task in tasks if task.stage == "score"]
+            finish(folder, [_gather(task, cases, store, folder, failures.get(task.key)) for task in scores])
+            write_hashes(folder)
 
-    return make_run(root, suite.suite.name, digest({"suite": stated, "estimators": entrants}), fill)
+        return make_run(root, suite.suite.name, digest({"suite": stated, "estimators": entrants}), fill)
 
 
 def _gather(

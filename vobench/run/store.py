@@ -5,6 +5,7 @@
 
 import fcntl
 import json
+import math
 import os
 import shutil
 import socket
@@ -12,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -122,10 +124,63 @@ def _taken(path: Path) -> int | None:
     return None
 
 
+def _unlink_if_free(path: Path) -> None:
+    """Remove the file of a lock that nobody holds."""
+    with suppress(OSError):
+        lock = os.open(path, os.O_RDONLY)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.path.samestat(os.fstat(lock), path.stat()):
+                path.unlink()
+        finally:
+            os.close(lock)
+
+
 def _holder(path: Path) -> str:
     with suppress(OSError):
         return path.read_text(encoding="utf-8", errors="replace")
     return ""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """Something in the store: when it was made and last used, in seconds since 1970; `is_damaged` was set aside."""
+
+    kind: str
+    path: Path
+    bytes: int
+    made_s: float
+    used_s: float
+
+    @property
+    def key(self) -> str:
+        """What tasks name it by."""
+        return f"{self.kind}/{self.path.name}"
+
+    @property
+    def is_damaged(self) -> bool:
+        """Whether it was set aside."""
+        return self.path.name.startswith(BAD)
+
+
+def _entry(path: Path) -> Entry:
+    files = [path] if path.is_file() else [file for file in path.rglob("*") if file.is_file()]
+    stats = [file.stat() for file in files]
+    made_s = max((stat.st_mtime for stat in stats), default=path.stat().st_mtime)
+    return Entry(path.parent.name, path, sum(stat.st_size for stat in stats), made_s, path.stat().st_mtime)
+
+
+LIMIT = "VOBENCH_CACHE_GB"
+GB = 1e9
+
+
+def limit_bytes() -> float:
+    """How large the user wants the store to be, by $VOBENCH_CACHE_GB; infinite where nothing is said."""
+    said = os.environ.get(LIMIT) or "inf"
+    with suppress(ValueError):
+        if (limit := float(said)) > 0:
+            return limit * GB
+    raise InputError(f"{LIMIT} should be a number of gigabytes above 0 (got {said!r})")
 
 
 class Store:
@@ -140,7 +195,7 @@ class Store:
 
     def fault(self, key: str, *, anew: bool = False) -> str:
         """What is wrong with a result, `<kind>/<hash>`, empty where nothing is; `anew` hashes all of it."""
-        return fault(self.root / key, self._checked(key), anew=anew)
+        return fault(self.root / key, None if anew else self._checked(key))
 
     def has(self, key: str) -> bool:
         """Whether a result is there and sound; it counts as used."""
@@ -221,6 +276,79 @@ class Store:
         """Raise InputError where nothing can be made here."""
         if cause := why_unwritable(self.root):
             raise InputError(f"VOBENCH_CACHE should be a folder that can be written ({cause}): {self.root}")
+
+    @contextmanager
+    def in_use(self, tell: Tell) -> Iterator[None]:
+        """A block, such as a run, from whose beginning on nothing that is used may be removed.
+
+        In the end the user is told where the store is larger than he wants it to be. Raises InputError where he does
+        not say so as a number.
+        """
+        limit, runs = limit_bytes(), self.root / STATE / "runs"
+        if why_unwritable(self.root):
+            yield
+            return
+        self.sweep()
+        with locked(runs / f"{socket.gethostname()}-{os.getpid()}-{time.monotonic_ns()}"):
+            yield
+        if limit < math.inf and (held := sum(entry.bytes for entry in self.entries())) > limit:
+            tell(
+                f"the cache holds {held / GB:.3g} GB, more than {LIMIT} says; "
+                f"run: vobench cache gc --keep-gb {limit / GB:g}"
+            )
+
+    def sweep(self) -> None:
+        """Remove what killed processes left behind: unfinished folders and locks."""
+        for kind in self._kinds():
+            sweep(kind)
+        for path in self.root.glob(f"{STATE}/*/*"):
+            if path.is_file():
+                _unlink_if_free(path)
+
+    def entries(self) -> Iterator[Entry]:
+        """All that lies in the store, what was set aside as damaged included."""
+        for kind in self._kinds():
+            for path in sorted(kind.iterdir()):
+                with suppress(OSError):  # another process may remove it meanwhile
+                    if not path.name.startswith(PREFIX):
+                        yield _entry(path)
+
+    def _kinds(self) -> list[Path]:
+        return sorted(path for path in self.root.glob("*") if path.is_dir() and path.name != STATE)
+
+    def collect(self, *, keep_bytes: float = math.inf, older_s: float = math.inf) -> list[Entry]:
+        """Remove what is unfinished or damaged, what was last used so long ago, and then the least recently used.
+
+        What a process makes, or a run uses, stays. Returns what is removed.
+        """
+        self.require_writable()
+        self.sweep()
+        now_s = time.time()
+        since_s = min((path.stat().st_mtime for path in self.root.glob(f"{STATE}/runs/*")), default=math.inf)
+        found = sorted(self.entries(), key=lambda entry: (not entry.is_damaged, entry.used_s))
+        held, removed = sum(entry.bytes for entry in found), list[Entry]()
+        for entry in found:
+            stop.check()
+            is_old = now_s - entry.used_s > older_s
+            is_too_much = (is_old or held > keep_bytes) and entry.used_s < since_s
+            if (entry.is_damaged or is_too_much) and self._removed(entry):
+                held -= entry.bytes
+                removed.append(entry)
+        return removed
+
+    def _removed(self, entry: Entry) -> bool:
+        """Whether an entry could be removed: nobody holds its lock."""
+        self._lock(entry.key).parent.mkdir(parents=True, exist_ok=True)
+        lock = _taken(self._lock(entry.key))
+        if lock is None:
+            return False
+        try:
+            discard(entry.path)
+            self._checked(entry.key).unlink(missing_ok=True)
+            self._lock(entry.key).unlink(missing_ok=True)
+        finally:
+            os.close(lock)
+        return True
 
     def _checked(self, key: str) -> Path:
         return self.root / STATE / "checked" / f"{key}.json"
