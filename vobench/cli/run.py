@@ -45,7 +45,14 @@ def run_command(
     ] = None,
     out: Annotated[Path, typer.Option(help="Where the folders of runs go.")] = Path("runs"),
     jobs: Annotated[
-        int | None, typer.Option("--jobs", "-j", min=1, help="Tasks at once; 1 draws bars. Else one a core, 8 at most.")
+        int | None,
+        typer.Option(
+            "--jobs",
+            "-j",
+            min=1,
+            envvar="VOBENCH_JOBS",
+            help="Tasks at once; 1 draws bars. Else one a core, 8 at most.",
+        ),
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Let the workers of a Dask scheduler do it, as in tcp://host:8786.")

@@ -328,7 +328,7 @@ class _Planner:
         entrants = list[Entrant]()
         labels = {index: spec.label or spec.name for index, spec in listed.items()}
         named = [label for name in only for label in (fnmatch.filter(labels.values(), name) or [name])]
-        for name in dict.fromkeys(named):
+        for name in named:
             index = next((index for index, spec in listed.items() if name == (spec.label or spec.name)), None)
             spec = EstimatorSettings(name=name) if index is None else listed[index]
             entrants += self._of_modes(self._entrant(spec, index), entrants)
