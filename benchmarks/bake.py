@@ -15,16 +15,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from vobench.asset.shape import at, block
 from vobench.asset.texture import Procedural
 from vobench.render.bake import BakedScene, BakeSettings, bake
 from vobench.render.illumination import Illumination
 from vobench.scene.light import Flicker, Sun
 from vobench.scene.material import Material
+from vobench.scene.mesh import Thing
 from vobench.scene.scene import Mover, Path, Scene
-from vobench.scene.surface import box
-from vobench.suite import catalog, yaml_file
+from vobench.suite import catalog
 from vobench.suite.scene_build import build
-from vobench.suite.scene_spec import SceneFile
+from vobench.suite.scene_file import read_scene
 
 NS_PER_PICTURE = 100_000_000
 
@@ -37,7 +38,7 @@ def main() -> None:
     arguments = parser.parse_args()
     print(f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     for name in arguments.scenes:
-        scene = build(yaml_file.read(catalog.find("scene", name).path, SceneFile), {})
+        scene = build(read_scene(catalog.find("scene", name).path), {})
         baked = _baked(scene)
         for change, light in _changes(baked):
             print(f"{name}: {change}: {_milliseconds(light, arguments.pictures)}")
@@ -47,7 +48,7 @@ def _baked(scene: Scene) -> BakedScene:
     started, cpu_started = time.perf_counter(), time.process_time()
     baked = bake(scene, BakeSettings())
     wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
-    texels = int((baked.surfel_of >= 0).sum())
+    texels = int((baked.patches.surfel_of >= 0).sum())
     gigabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     lights = f"{len(scene.lights)} lights, {texels} samples"
     print(f"{scene.name}: {lights}, bake {wall_s:.1f} s wall, {cpu_s:.1f} s CPU, peak {gigabytes:.2f} GB")
@@ -90,9 +91,9 @@ WALKER = Material(texture=Procedural("plain", 0.4, 0.0, 1.0, 8, 0))
 
 
 def _walker(index: int) -> Mover:
-    body = box(np.array([0, 0, 0.9]), (0.5, 0.3, 1.8), yaw_deg=0, material="walker")
+    body = Thing(f"walker_{index}", block((0.5, 0.3, 1.8), bevel_m=0).moved(at(0, 0, 0.9)), "walker")
     positions = np.array([[-1.5 + index, -1.0, 0.0], [-1.5 + index, 4.0, 0.0]])
-    return Mover(f"walker_{index}", tuple(body), Path(np.array([0.0, 5.0]), positions, np.array([0.0, 90.0])))
+    return Mover(f"walker_{index}", (body,), Path(np.array([0.0, 5.0]), positions, np.array([0.0, 90.0])))
 
 
 def _milliseconds(light: Illumination, pictures: int) -> str:

@@ -2,9 +2,9 @@
 
     python benchmarks/blender.py --python PYTHON_WITH_BPY [--samples 1024] [--width 720] [--bakes FOLDER]
 
-The room, the same poses for all. Error: PSNR against white (a luminance of 1) in linear light over pixels that
-are not clipped, the reference's own noise taken out by its two halves as in light.py. The raster engine's time
-is that of a picture, its bake (once per scene) apart. bpy comes as a wheel ("pip install bpy" in an environment
+The room, all matt, the same poses for all. Error: PSNR against white (a luminance of 1) in linear light over
+pixels that are not clipped, the reference's own noise taken out by its two halves as in light.py. The raster
+engine's time is that of a picture, its bake (once per scene) apart. bpy is a wheel ("pip install bpy" in an environment
 of its own, with the Python that it is made for), is GPL, and is only ever run as a separate process.
 """
 
@@ -14,6 +14,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +23,12 @@ from light import PLACES, decibels, lens, lit, stand
 
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import corners
 from vobench.render.path import PathRenderer
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
 from vobench.scene.material import reflectance
+from vobench.scene.mesh import Mesh, joined
 from vobench.scene.scene import Scene
-from vobench.scene.surface import Surface
 from vobench.suite import catalog
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
@@ -39,27 +39,29 @@ POSES = 2
 
 
 def job(scene: Scene, camera: Pinhole, poses: Sequence[Array]) -> dict[str, Any]:
-    """The scene as quads, tiles and panels, under names that blender_draw.py knows."""
+    """The scene as triangles, tiles and panels, under names that blender_draw.py knows."""
     content: dict[str, Any] = {"poses": np.array(poses), "ways": np.array(WAYS)}
     content["lens"] = [camera.width_px, camera.height_px, camera.fx_px]
-    used = list(dict.fromkeys(surface.material for surface in scene.surfaces))
+    used = list(dict.fromkeys(thing.material for thing in scene.things))
     for name in used:
         material = scene.materials[name]
-        if material.kind != "body":
-            raise SystemExit(f"material {name!r} has no texture; this benchmark draws matt scenes only")
         content[f"tile.{name}"] = reflectance(material)
-        own = [surface for surface in scene.surfaces if surface.material == name]
-        content |= _quads(name, own, material.tile_m)
+        content |= _triangles(name, [t.mesh for t in scene.things if t.material == name], material.tile_m)
     for panel in scene.panels:
         content[f"luminance.{panel.name}"] = panel.luminance_cd_m2
-        content |= _quads(panel.name, [panel.surface], 1.0)
+        content |= _triangles(panel.name, [panel.mesh], 1.0)
     return content | {"materials": [*used, *(panel.name for panel in scene.panels)]}
 
 
-def _quads(name: str, surfaces: Sequence[Surface], tile: float) -> dict[str, Any]:
-    u, v = np.array([[0.0, 1, 1, 0], [0, 0, 1, 1]])
-    uv = np.stack([surface.on_texture_m(u, v) for surface in surfaces]) / tile
-    return {f"corners.{name}": np.stack([corners(surface) for surface in surfaces]), f"uv.{name}": uv}
+def _triangles(name: str, meshes: Sequence[Mesh], tile: float) -> dict[str, Any]:
+    whole = joined(meshes)
+    return {f"corners.{name}": whole.corners_m, f"uv.{name}": whole.uv[whole.faces] / tile}
+
+
+def matt(scene: Scene) -> Scene:
+    """The scene without mirrors, panes and gloss."""
+    bodies = {name: replace(m, eta=1.0) for name, m in scene.materials.items() if m.kind == "body"}
+    return replace(scene, materials=bodies, things=tuple(t for t in scene.things if t.material in bodies))
 
 
 def in_blender(python: str, content: dict[str, Any]) -> tuple[Any, Any]:
@@ -102,7 +104,7 @@ def main() -> None:
     parser.add_argument("--bakes", type=Path)
     arguments = parser.parse_args()
     spec = read_scene(catalog.find("scene", "room").path)
-    scene, camera = build(spec, {}), lens(arguments.width)
+    scene, camera = matt(build(spec, {})), lens(arguments.width)
     poses = [stand(*place) for place in PLACES["room"][:POSES]]
     raster = RasterRenderer(lit(scene, arguments.bakes))
     drawn, raster_s = timed(raster, camera, poses)

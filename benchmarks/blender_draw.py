@@ -33,8 +33,8 @@ def matt(material: Any, tile: Any) -> None:
     """Diffuse reflectance from a tile of linear values, repeated."""
     nodes, links = material.node_tree.nodes, material.node_tree.links
     image = bpy.data.images.new(material.name, tile.shape[1], tile.shape[0], float_buffer=True, is_data=True)
-    rgba = np.ones((*tile.shape, 4), np.float32)
-    rgba[..., :3] = tile[..., None]
+    rgba = np.ones((*tile.shape[:2], 4), np.float32)
+    rgba[..., :3] = tile.reshape(*tile.shape[:2], -1)
     image.pixels.foreach_set(rgba.ravel())
     image.update()
     texture, diffuse = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeBsdfDiffuse")
@@ -44,16 +44,16 @@ def matt(material: Any, tile: Any) -> None:
 
 
 def mesh(name: str, corners: Any, uv: Any, material: Any) -> None:
-    """Quads (Q, 4, 3) with texture coordinates (Q, 4, 2)."""
+    """Triangles (F, 3, 3) with texture coordinates (F, 3, 2)."""
     made = bpy.data.meshes.new(name)
-    made.from_pydata(corners.reshape(-1, 3).tolist(), [], np.arange(4 * len(corners)).reshape(-1, 4).tolist())
+    made.from_pydata(corners.reshape(-1, 3).tolist(), [], np.arange(3 * len(corners)).reshape(-1, 3).tolist())
     made.uv_layers.new().data.foreach_set("uv", uv.astype(np.float32).ravel())
     made.materials.append(material)
     bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, made))
 
 
 def build(job: Any) -> None:
-    """The job's quads, tiles, panels and camera in an empty scene."""
+    """The job's triangles, tiles, panels and camera in an empty scene."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     for name in job["materials"]:
         material = bpy.data.materials.new(str(name))
@@ -105,7 +105,7 @@ def draw(T_world_camera: Any, samples: int, seed: int, denoised: bool) -> tuple[
         height, width = image.size[1], image.size[0]
         bpy.data.images.remove(image)
     # Blender counts rows from the bottom.
-    return pixels.reshape(height, width, -1)[::-1, :, 0].copy(), spent_s
+    return pixels.reshape(height, width, -1)[::-1, :, :3] @ [0.2126, 0.7152, 0.0722], spent_s
 
 
 def main() -> None:

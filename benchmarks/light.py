@@ -142,7 +142,7 @@ def kinds(scene: Scene, camera: Pinhole, T_world_camera: Array) -> dict[str, Mas
 
 
 def _kind(material: Material) -> str:
-    bodies = "polished" if material.is_coated else "matt"
+    bodies = "polished" if material.is_coated or material.metal else "matt"
     return {"body": bodies, "mirror": "mirror", "pane": "glass"}[material.kind]
 
 

@@ -1,4 +1,4 @@
-"""What pictures cost: vobench and stock pyrender on the same room, then mirrors, lenses, strips and blur, in one run.
+"""What pictures cost: vobench and stock pyrender on the same scenes, with mirrors, lenses, strips and blur, in one run.
 
     python benchmarks/render.py [--views 12] [--fine]
 
@@ -24,14 +24,14 @@ from vobench.geometry.camera import KannalaBrandt
 from vobench.geometry.rig import LENSES, Rig, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.render.bake import BakeSettings, bake
-from vobench.render.geometry import corners
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import View, still
 from vobench.render.view import NEAR_M, T_CV_GL
 from vobench.scene.light import AreaLight
-from vobench.scene.material import Map, Material, reflectance
+from vobench.scene.material import Map, reflectance
+from vobench.scene.mesh import joined
 from vobench.scene.scene import Scene
-from vobench.sensor.image_sensor import CAMERAS, NoiseStreams, expose
+from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose
 from vobench.sequence import SequenceWriter
 from vobench.suite import catalog
 from vobench.suite.scene_build import build
@@ -86,7 +86,7 @@ class Recorder:
         """Add one pair and its truth."""
         rig, t_ns = self._rig, self._frames * NS_PER_FRAME
         light = (picture / self._white_cd_m2 for picture in pair(self._renderer, rig, T_world_body))
-        left, right = (expose(picture, CAMERAS["clean"], self._noise) for picture in light)
+        left, right = (expose(picture, CameraSettings(), self._noise) for picture in light)
         self._writer.write_frame(t_ns, left, right)
         self._writer.write_truth(t_ns, T_world_body, np.zeros(6))
         self._frames += 1
@@ -115,97 +115,98 @@ def rolled(renderer: RasterRenderer, rig: Rig, T_world_body: Array) -> None:
         renderer.radiance(rig.left, [View(slice(a, b), T, now, now) for a, b in pairwise(edges)])
 
 
-def ours(scene: Scene, settings: BakeSettings, white_cd_m2: float, poses: list[Array]) -> Iterator[Row]:
-    """Costs of drawing a room, and of drawing and recording it."""
+def room_rows(scene: Scene, settings: BakeSettings, white_cd_m2: float, poses: list[Array]) -> Iterator[Row]:
+    """Costs of drawing a room in every way."""
     renderer = RasterRenderer(bake(scene, settings))
+    for view, rig in _rigs():
+        for name, shoot in (("", pair), (", 60 strips", rolled), (", 8 sub-frames", blurred)):
+            yield "room" + name, view, measure(partial(shoot, renderer, rig), poses)
+        fisheye = stereo_rig(FISHEYE, pitch_deg=VIEWS[view])
+        yield "room, fisheye", view, measure(partial(pair, renderer, fisheye), poses)
+    yield from _recorded("room", renderer, white_cd_m2, poses)
+    renderer.close()
+
+
+def office_rows(office: Scene, settings: BakeSettings, white_cd_m2: float, poses: list[Array]) -> Iterator[Row]:
+    """Costs of the office: matt, with its polished floor, and with all its mirrors and panes."""
+    bodies = {name: m.kind == "body" for name, m in office.materials.items()}
+    matt = {name: replace(m, eta=1.0) if bodies[name] else m for name, m in office.materials.items()}
+    plain = tuple(thing for thing in office.things if bodies[thing.material])
+    variants: tuple[tuple[str, Scene, tuple[tuple[str, Shoot], ...]], ...] = (
+        ("office, all matt", replace(office, things=plain, materials=matt), (("", pair),)),
+        ("office, gloss and polished floor", replace(office, things=plain), (("", pair),)),
+        ("office", office, (("", pair), (", 60 strips", rolled), (", 8 sub-frames", blurred))),
+    )
+    for name, scene, shots in variants:
+        renderer = RasterRenderer(bake(scene, settings))
+        for view, rig in _rigs():
+            for suffix, shoot in shots:
+                yield name + suffix, view, measure(partial(shoot, renderer, rig), poses)
+        yield from _recorded(name, renderer, white_cd_m2, poses)
+        renderer.close()
+
+
+def _rigs() -> Iterator[tuple[str, Rig]]:
     for view, pitch_deg in VIEWS.items():
-        rig = stereo_rig(LENSES["paper_literal"], pitch_deg=pitch_deg)
-        for name, shoot in (("vobench", pair), ("vobench, 60 strips", rolled), ("vobench, 8 sub-frames", blurred)):
-            yield name, view, measure(partial(shoot, renderer, rig), poses)
-        fisheye = stereo_rig(FISHEYE, pitch_deg=pitch_deg)
-        yield "vobench, fisheye", view, measure(partial(pair, renderer, fisheye), poses)
+        yield view, stereo_rig(LENSES["paper_literal"], pitch_deg=pitch_deg)
+
+
+def _recorded(name: str, renderer: RasterRenderer, white_cd_m2: float, poses: list[Array]) -> Iterator[Row]:
+    for view, rig in _rigs():
         with (
             tempfile.TemporaryDirectory() as folder,
             SequenceWriter(Path(folder), rig, case_json=b"{}") as writer,
         ):
             recorder = Recorder(renderer, rig, writer, white_cd_m2)
-            yield "vobench + chip + PNG + MCAP", view, measure(recorder.record, poses)
-    renderer.close()
+            yield f"{name} + chip + PNG + MCAP", view, measure(recorder.record, poses)
 
 
-def mirrored(settings: BakeSettings, poses: list[Array]) -> Iterator[Row]:
-    """Costs of the office: matt, with its polished floor, with all its mirrors and panes, and through a fisheye."""
-    office = build(read_scene(catalog.find("scene", "office").path), {})
-    bodies = {name: m.kind == "body" for name, m in office.materials.items()}
-    matt = {name: replace(m, eta=1.0) if bodies[name] else m for name, m in office.materials.items()}
-    plain = tuple(s for s in office.surfaces if bodies[s.material])
-    variants: tuple[tuple[str, Scene, tuple[tuple[str, Shoot], ...]], ...] = (
-        ("office, all matt", replace(office, surfaces=plain, materials=matt), (("", pair),)),
-        ("office, mirror floor", replace(office, surfaces=plain), (("", pair),)),
-        ("office", office, (("", pair), (", 60 strips", rolled), (", 8 sub-frames", blurred))),
-        ("office, waxed floor", replace(office, materials=_waxed(office)), (("", pair),)),
-    )
-    for name, scene, shots in variants:
-        renderer = RasterRenderer(bake(scene, settings))
-        for view, pitch_deg in VIEWS.items():
-            rig = stereo_rig(LENSES["paper_literal"], pitch_deg=pitch_deg)
-            for suffix, shoot in shots:
-                yield name + suffix, view, measure(partial(shoot, renderer, rig), poses)
-        renderer.close()
-
-
-def _waxed(office: Scene) -> dict[str, Material]:
-    """Its materials, with what is polished rough by a slope of 0.05."""
-    return {n: replace(m, roughness=0.05) if m.is_coated else m for n, m in office.materials.items()}
-
-
-def stock(room: Scene, white_cd_m2: float, poses: list[Array]) -> Iterator[Row]:
-    """Costs of pyrender as it comes: 8 bits, four samples a pixel, a shadow-mapped spot for each lamp, and none."""
+def stock(name: str, shown: Scene, white_cd_m2: float, poses: list[Array]) -> Iterator[Row]:
+    """Costs of pyrender as it comes: 8 bits, four samples a pixel, two shadow-mapped spots, and none."""
     # pyrender 0.1.45 still says infty, which NumPy 2 has no more.
     setattr(np, "infty", np.inf)  # noqa: B010
     import pyrender
 
-    scene, camera = _stock_scene(room, white_cd_m2)
+    scene, camera = _stock_scene(shown, white_cd_m2)
     lens = LENSES["paper_literal"]
     renderer = pyrender.OffscreenRenderer(lens.width_px, lens.height_px)
-    for name, flags in (
-        ("stock pyrender, shadows", pyrender.RenderFlags.SHADOWS_SPOT),
-        ("stock pyrender, no shadows", pyrender.RenderFlags.NONE),
+    for suffix, flags in (
+        ("two shadows", pyrender.RenderFlags.SHADOWS_SPOT),
+        ("no shadows", pyrender.RenderFlags.NONE),
     ):
-        for view, pitch_deg in VIEWS.items():
-            rig = stereo_rig(lens, pitch_deg=pitch_deg)
+        for view, rig in _rigs():
 
             def draw(T_world_body: Array, rig: Rig = rig, flags: int = flags) -> None:
                 for T_body_camera in (rig.T_body_left, rig.T_body_right):
                     scene.set_pose(camera, T_world_body @ T_body_camera @ T_CV_GL)
                     renderer.render(scene, flags)
 
-            yield name, view, measure(draw, poses)
+            yield f"{name}: stock pyrender, {suffix}", view, measure(draw, poses)
     renderer.delete()
 
 
-def _stock_scene(room: Scene, white_cd_m2: float) -> tuple[Any, Any]:
-    """The same rectangles and tiles in pyrender's own materials, and its camera's node."""
+def _stock_scene(shown: Scene, white_cd_m2: float) -> tuple[Any, Any]:
+    """The same faces and textures in pyrender's own materials under the two strongest lamps, and its camera's node."""
     import pyrender
 
     scene = pyrender.Scene(ambient_light=[0.1, 0.1, 0.1])
-    bodies = {name: material for name, material in room.materials.items() if material.kind == "body"}
+    bodies = {name: material for name, material in shown.materials.items() if material.kind == "body"}
     materials = {name: _stock_material(reflectance(material)) for name, material in bodies.items()}
-    for surface in room.surfaces:
-        (width, height), tile_m = surface.size_m, bodies[surface.material].tile_m
+    for material, look in materials.items():
+        mesh = joined([thing.mesh for thing in shown.things if thing.material == material])
+        if not len(mesh.faces):
+            continue
         primitive = pyrender.Primitive(
-            positions=corners(surface),
-            normals=np.tile(surface.normal, (4, 1)),
-            texcoord_0=np.array([[0, 0], [width, 0], [width, height], [0, height]]) / tile_m,
-            indices=np.array([[0, 1, 2], [0, 2, 3]]),
-            material=materials[surface.material],
+            positions=mesh.vertices_m,
+            normals=mesh.normals,
+            texcoord_0=mesh.uv / bodies[material].tile_m,
+            indices=mesh.faces,
+            material=look,
             mode=4,
         )
         scene.add(pyrender.Mesh([primitive]))
-    for lamp in room.panels:
-        scene.add(
-            _stock_lamp(lamp, white_cd_m2), pose=se3.transform(np.eye(3), lamp.surface.at(np.array(0.5), np.array(0.5)))
-        )
+    for lamp in sorted(shown.panels, key=lambda lamp: -lamp.power_lm)[:2]:
+        scene.add(_stock_lamp(lamp, white_cd_m2), pose=se3.transform(np.eye(3), lamp.mesh.vertices_m.mean(0)))
     lens = LENSES["paper_literal"]
     camera = pyrender.IntrinsicsCamera(lens.fx_px, lens.fy_px, lens.cx_px + 0.5, lens.cy_px + 0.5, NEAR_M, FAR_M)
     return scene, scene.add(camera)
@@ -214,7 +215,7 @@ def _stock_scene(room: Scene, white_cd_m2: float) -> tuple[Any, Any]:
 def _stock_material(tile: Map) -> Any:
     import pyrender
 
-    source = np.repeat(np.rint(255 * tile).astype(np.uint8)[..., None], 3, 2)
+    source = np.rint(255 * np.broadcast_to(tile.reshape(*tile.shape[:2], -1), (*tile.shape[:2], 3))).astype(np.uint8)
     texture = pyrender.Texture(source=source, source_channels="RGB")
     # Floats: pyrender reads the integer 1 as 1/255.
     return pyrender.MetallicRoughnessMaterial(
@@ -235,12 +236,13 @@ def _stock_lamp(lamp: AreaLight, white_cd_m2: float) -> Any:
 
 
 def table(rows: list[Row]) -> str:
-    """All costs, and how many times stock pyrender with shadows each is faster, by CPU time."""
-    reference = {view: cost.cpu_ms for name, view, cost in rows if name == "stock pyrender, shadows"}
-    lines = [f"{'per stereo pair':32}{'view':8}{'wall ms':>10}{'CPU ms':>10}{'CPU ratio':>11}"]
+    """All costs, and how many times stock pyrender with two shadows in the same place is as dear, by CPU time."""
+    reference = {(name, view): cost.cpu_ms for name, view, cost in rows if name.endswith("two shadows")}
+    lines = [f"{'per stereo pair':48}{'view':8}{'wall ms':>10}{'CPU ms':>10}{'CPU ratio':>11}"]
     for name, view, cost in rows:
-        ratio = reference[view] / cost.cpu_ms
-        lines.append(f"{name:32}{view:8}{cost.wall_ms:10.1f}{cost.cpu_ms:10.1f}{ratio:10.1f}x")
+        place = name.split(",")[0].split(":")[0].split(" ")[0]
+        ratio = reference[f"{place}: stock pyrender, two shadows", view] / cost.cpu_ms
+        lines.append(f"{name:48}{view:8}{cost.wall_ms:10.1f}{cost.cpu_ms:10.1f}{ratio:10.1f}x")
     return "\n".join(lines)
 
 
@@ -251,12 +253,23 @@ def main() -> None:
     parser.add_argument("--fine", action="store_true", help="bake as a simulation does, which takes minutes")
     arguments = parser.parse_args()
     poses, settings = stand_points(arguments.views), BakeSettings() if arguments.fine else QUICK
-    spec = read_scene(catalog.find("scene", "room").path)
-    room = build(spec, {})
+    specs = {name: read_scene(catalog.find("scene", name).path) for name in ("room", "office")}
+    scenes = {name: build(spec, {}) for name, spec in specs.items()}
     print(f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
-    rows = [*ours(room, settings, spec.white_cd_m2, poses), *mirrored(settings, poses)]
+    rows = [
+        row
+        for name, draw in (("room", room_rows), ("office", office_rows))
+        for row in draw(scenes[name], settings, specs[name].white_cd_m2, poses)
+    ]
     # Stock pyrender comes last: when it ends, it takes the process's EGL display with it.
-    print(table([*rows, *stock(room, spec.white_cd_m2, poses)]))
+    print(
+        table(
+            [
+                *rows,
+                *(row for name, scene in scenes.items() for row in stock(name, scene, specs[name].white_cd_m2, poses)),
+            ]
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -48,6 +48,7 @@ COMPLAINTS = {
 UNITS = {
     **{unit: unit for unit in ("m", "s", "ms", "ns", "rad", "deg", "px", "kg", "V", "lm", "lx")},
     "hz": "Hz",
+    "mib": "MiB",
     "db": "dB",
     "e": "electrons",
     "dn": "grey values",

@@ -16,7 +16,7 @@ LIGHT = PointLight("bulb", np.array([0.0, 0.0, 2.5]), 500.0)
 
 
 def scene(*things: Thing) -> Scene:
-    return Scene("s", (), GREY, (LIGHT,), (), things)
+    return Scene("s", things, GREY, (LIGHT,))
 
 
 def crate(x_m: float, y_m: float, *, size_m: float = 1.0) -> Thing:

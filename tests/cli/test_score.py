@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
+from vobench.run.consistency import format_covariances
 from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory, parse_move
 
@@ -430,6 +431,30 @@ def test_each_length_of_path_has_its_row_where_asked_and_always_in_json(vobench,
     for form in ((), ("--md",)):
         assert f"{of_yaw[2]['rmse']:.6g}" in vobench(*words, "--per-length", *form).out
         assert "length" not in vobench(*words, *form).out.partition("[")[0]
+
+
+def test_stated_covariances_are_held_against_the_errors(vobench, files_scoring):
+    """Errors are those of the pose's own noise; a covariance of a tenth of it claims too much."""
+    rng, gt = np.random.default_rng(3), drive()
+    e = 0.01 * rng.normal(size=(len(gt), 3))
+    R = gt.T_world_frame[:, :3, :3] @ se3.rotation_z(0.001 * rng.normal(size=len(gt)))
+    est = Trajectory(gt.t_ns, se3.transform(R, gt.positions_m + e))
+    Path("gt.tum").write_text(format_tum(gt))
+    Path("est.tum").write_text(format_tum(est))
+    honest = np.diag([1e-4] * 3 + [1e-6 / 3] * 3)
+    for name, factor in (("honest", 1.0), ("bold", 0.01)):
+        Path(f"{name}.txt").write_text(format_covariances((t, factor * honest) for t in gt.t_ns.tolist()))
+    found = {
+        name: vobench("score", "gt.tum", "est.tum", "--cov", f"{name}.txt", "--json").json
+        for name in ("honest", "bold")
+    }
+    assert found["honest"]["consistency"]["scale_gap"] == pytest.approx(1, rel=0.15)
+    assert found["bold"]["consistency"]["scale_gap"] == pytest.approx(10, rel=0.15)
+    assert found["bold"]["consistency"]["covered_90"] < 0.05
+    assert {"nees_pose", "nees_trans", "nees_rot"} <= {metric["name"] for metric in found["honest"]["metrics"]}
+    assert "claims too much: errors are " in vobench("score", "gt.tum", "est.tum", "--cov", "bold.txt").out
+    refused = vobench("score", "gt.tum", "est.tum", "gt.tum", "est.tum", "--cov", "bold.txt")
+    assert "--cov comes once for each pair of files, 2 times (got 1)" in refused.err
 
 
 def test_several_sequences_have_a_row_each_and_one_for_all_of_their_errors(vobench, files_scoring):

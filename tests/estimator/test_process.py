@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from vobench.estimator import Frame, Status
-from vobench.estimator.process import LOG_BYTES, EstimatorFailure, EstimatorProcess, Limits
+from vobench.estimator.manifest import Limits
+from vobench.estimator.process import EstimatorProcess
+from vobench.estimator.program import LOG_BYTES, EstimatorFailure
 from vobench.geometry.rig import LENSES, stereo_rig
 
 # ruff: noqa: E501 - one way to fail is one line

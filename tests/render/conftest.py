@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scipy
 
+from tests.render.rectangles import Rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
@@ -22,7 +23,6 @@ from vobench.render.renderer import Radiance, still
 from vobench.scene.light import STEADY, Level, PointLight
 from vobench.scene.material import Material, reflectance
 from vobench.scene.scene import Scene, triangles
-from vobench.scene.surface import Surface, room
 
 EvenLight = Callable[..., BakedScene]
 Draw = Callable[[BakedScene], RasterRenderer]
@@ -70,7 +70,7 @@ def draw() -> Iterator[Draw]:
 class Lattice:
     """Corners (N, 3) of one surface's squares, and the steps (3,) from each to the next."""
 
-    surface: Surface
+    surface: Rectangle
     square_m: float
     corners_m: Array
 
@@ -109,7 +109,7 @@ def _in_sight(camera: Camera, T_camera_world: Array, lattice: Lattice, apart_px:
     return uv[inside & (nearest > apart_px) & (skew > 0.5)]
 
 
-def _lattice(surface: Surface, square_m: float) -> Lattice:
+def _lattice(surface: Rectangle, square_m: float) -> Lattice:
     width, height = surface.size_m
     # Only corners with a whole square on every side.
     u, v = (np.arange(1, int(edge / square_m + 1e-9)) * square_m / edge for edge in (width, height))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from tests.render.rectangles import Rectangle, box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.errors import RenderError
 from vobench.geometry import se3
@@ -20,7 +21,6 @@ from vobench.scene.light import AreaLight, Flicker, Light, PointLight, SpotLight
 from vobench.scene.material import Material, fresnel
 from vobench.scene.mesh import Mesh, Thing, flat
 from vobench.scene.scene import Scene, ceiling_light
-from vobench.scene.surface import Surface, box, rectangle, room
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=1, bounces=0)
 BODY = ("plain", 0.5, 0.0, 1.0, 8, 0)
@@ -29,8 +29,8 @@ FLOOR = rectangle(np.zeros(3), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]), "gr
 LAMP = ceiling_light("lamp", np.array([0.3, -0.2, 2.0]), (0.04, 0.06), power_lm=1000)
 
 
-def scene(*lamps: Light, surfaces: tuple[Surface, ...] = (FLOOR,)) -> Scene:
-    return Scene("test", surfaces, GREY, lamps)
+def scene(*lamps: Light, things: tuple[Rectangle, ...] = (FLOOR,)) -> Scene:
+    return Scene("test", things, GREY, lamps)
 
 
 def on_quad(baked: BakedScene, light: Array, thing: int, s: Array, t: Array) -> Array:
@@ -80,7 +80,7 @@ def test_twice_the_power_is_exactly_twice_the_light() -> None:
     settings = replace(DIRECT, indirect_spacing_m=0.3, indirect_rays=16, bounces=2)
     closed = tuple(room((3, 3, 2.5), floor="grey", wall="grey", ceiling="grey"))
     once, twice = (
-        whole(bake(scene(replace(LAMP, power_lm=power), surfaces=closed), settings)) for power in (700.0, 1400.0)
+        whole(bake(scene(replace(LAMP, power_lm=power), things=closed), settings)) for power in (700.0, 1400.0)
     )
     np.testing.assert_array_equal(twice, 2 * once)
 
@@ -95,7 +95,7 @@ def test_the_light_of_two_lamps_is_the_sum_of_each() -> None:
 def test_behind_a_box_there_is_no_direct_light_and_beside_it_all_of_it() -> None:
     lamp = ceiling_light("lamp", np.array([0, 0, 2.0]), (0.2, 0.2), power_lm=1000)
     blocker = box(np.array([0, 0, 1.0]), (0.8, 0.8, 0.1), yaw_deg=0, material="grey")
-    x, y, shaded = floor_light(bake(scene(lamp, surfaces=(FLOOR, *blocker)), DIRECT))
+    x, y, shaded = floor_light(bake(scene(lamp, things=(FLOOR, *blocker)), DIRECT))
     open_light = floor_light(bake(scene(lamp), DIRECT))[2]
     far = np.maximum(np.abs(x), np.abs(y))
     # From the lamp's rims past the box's: the box's top is 0.95 m below the lamp, its underside 1.05 m.
@@ -111,7 +111,7 @@ def test_half_shadows_are_smooth() -> None:
     lamp = ceiling_light("lamp", np.array([0, 0, 2.0]), (0.2, 0.2), power_lm=1000)
     blocker = box(np.array([0, 0, 1.0]), (0.8, 0.8, 0.1), yaw_deg=0, material="grey")
     shaded, fine = (
-        floor_light(bake(scene(lamp, surfaces=(FLOOR, *blocker)), replace(DIRECT, spacing_m=0.03, light_rays=rays)))[2]
+        floor_light(bake(scene(lamp, things=(FLOOR, *blocker)), replace(DIRECT, spacing_m=0.03, light_rays=rays)))[2]
         for rays in (16, 400)
     )
     open_light = floor_light(bake(scene(lamp), replace(DIRECT, spacing_m=0.03)))[2]
@@ -123,7 +123,7 @@ def test_half_shadows_are_smooth() -> None:
 def test_nothing_shines_through_the_corners_of_a_closed_box() -> None:
     lamp = ceiling_light("lamp", np.array([0.5, 0.4, 2.0]), (0.2, 0.2), power_lm=1000)
     crate = box(np.array([0, 0, 0.501]), (1.0, 1.0, 1.0), yaw_deg=0, material="grey")
-    x, y, light = floor_light(bake(scene(lamp, surfaces=(FLOOR, *crate)), DIRECT))
+    x, y, light = floor_light(bake(scene(lamp, things=(FLOOR, *crate)), DIRECT))
     np.testing.assert_allclose(light[np.maximum(np.abs(x), np.abs(y)) < 0.49], 0, atol=1e-9)
 
 
@@ -153,7 +153,7 @@ def test_a_closed_room_keeps_its_light_and_each_bounce_returns_the_albedos_share
     # The panel itself swallows what falls on it, so it is small.
     lamp = ceiling_light("lamp", np.array([0.3, -0.2, 1.5]), (0.1, 0.1), power_lm=1000)
     closed = tuple(room((3, 2.5, 2.5), floor="grey", wall="grey", ceiling="grey"))
-    baked = bake(scene(lamp, surfaces=closed), settings)
+    baked = bake(scene(lamp, things=closed), settings)
     arriving = flux_lm(baked, whole(baked))
     # Ulbricht's integrating sphere: every surface returns its albedo of what it gets, whatever the shape.
     expected = 1000 * sum(0.5**n for n in range(bounces + 1))
@@ -163,7 +163,7 @@ def test_a_closed_room_keeps_its_light_and_each_bounce_returns_the_albedos_share
 def test_a_bake_is_the_same_bytes_twice_and_another_seed_changes_only_noise() -> None:
     settings = replace(DIRECT, light_rays=4, indirect_spacing_m=0.3, indirect_rays=16, bounces=2)
     closed = tuple(room((3, 3, 2.5), floor="grey", wall="grey", ceiling="grey"))
-    first, again, other = (bake(scene(LAMP, surfaces=closed), replace(settings, seed=seed)) for seed in (0, 0, 1))
+    first, again, other = (bake(scene(LAMP, things=closed), replace(settings, seed=seed)) for seed in (0, 0, 1))
     assert maps(first) == maps(again)
     assert not np.array_equal(first.direct, other.direct)
     assert whole(other).mean() == pytest.approx(whole(first).mean(), rel=0.01)
@@ -181,7 +181,7 @@ def test_a_bulb_obeys_the_inverse_square_and_casts_a_hard_shadow() -> None:
     x, y, light = floor_light(bake(scene(bulb), DIRECT))
     squared = (x - 0.3) ** 2 + (y + 0.2) ** 2 + 4
     np.testing.assert_allclose(light, 1000 / (4 * np.pi) * 2 / squared**1.5, rtol=5e-3)
-    shaded = floor_light(bake(scene(bulb, surfaces=(FLOOR, blocker)), DIRECT))[2]
+    shaded = floor_light(bake(scene(bulb, things=(FLOOR, blocker)), DIRECT))[2]
     far = np.maximum(np.abs(x - 0.3), np.abs(y + 0.2))
     np.testing.assert_allclose(shaded[far < 0.5 - 0.08], 0, atol=1e-9)
     np.testing.assert_allclose(shaded[far > 0.5 + 0.08], light[far > 0.5 + 0.08], rtol=1e-6)
@@ -191,7 +191,7 @@ def test_the_edge_of_a_hard_shadow_is_as_light_as_the_share_of_each_sample_it_le
     bulb = PointLight("bulb", np.array([0.0, 0.0, 2.0]), 1000.0)
     # Its shadow ends 0.52 m from the middle, between samples 0.1 m apart at 0.5 and 0.6.
     blocker = rectangle(np.array([0, 0, 1.0]), np.array([0, 0.52, 0]), np.array([0.52, 0, 0]), "grey")
-    x, y, light = floor_light(bake(scene(bulb, surfaces=(FLOOR, blocker)), DIRECT))
+    x, y, light = floor_light(bake(scene(bulb, things=(FLOOR, blocker)), DIRECT))
     open_light = floor_light(bake(scene(bulb), DIRECT))[2]
     edge = (np.abs(x - 0.5) < 1e-6) & (np.abs(y) < 0.35)
     np.testing.assert_allclose((light / open_light)[edge], 0.3, atol=0.1)
@@ -225,12 +225,12 @@ def test_in_a_closed_grey_box_indirect_light_is_that_of_the_integrating_sphere()
 def test_each_light_has_a_layer_of_its_own_and_dimming_one_leaves_the_others_byte_equal() -> None:
     settings = replace(DIRECT, indirect_spacing_m=0.3, indirect_rays=16, bounces=2)
     bulb = PointLight("bulb", np.array([0.5, 0, 1.0]), 300.0)
-    both = bake(scene(LAMP, bulb, surfaces=GLOBE), settings)
-    dimmed = bake(scene(replace(LAMP, power_lm=10, level=Flicker(depth=0.5)), bulb, surfaces=GLOBE), settings)
+    both = bake(scene(LAMP, bulb, things=GLOBE), settings)
+    dimmed = bake(scene(replace(LAMP, power_lm=10, level=Flicker(depth=0.5)), bulb, things=GLOBE), settings)
     for layers, others in ((both.direct, dimmed.direct), (both.bounced, dimmed.bounced)):
         assert layers[1].tobytes() == others[1].tobytes()
         assert not np.array_equal(layers[0], others[0])
-    alone = bake(scene(bulb, surfaces=GLOBE), settings)
+    alone = bake(scene(bulb, things=GLOBE), settings)
     assert flux_lm(alone, alone.direct[0]) == pytest.approx(flux_lm(both, both.direct[1]), rel=0.01)
     assert alone.bounced[0].mean() == pytest.approx(both.bounced[1].mean(), rel=0.03)
 
@@ -299,7 +299,7 @@ def test_what_stands_between_a_lamp_and_the_mirror_shades_the_lamps_image() -> N
     blocker = rectangle(np.array([1.5, 0, 1.0]), np.array([0, 6.0, 0]), np.array([0, 0, 4.0]), "grey")
     materials = {**GREY, "mirror": Material("mirror", tint=0.8)}
     light = floor_light(bake(Scene("m", (FLOOR, MIRROR, blocker), materials, (bulb,)), DIRECT))
-    straight = floor_light(bake(scene(bulb, surfaces=(FLOOR, blocker)), DIRECT))
+    straight = floor_light(bake(scene(bulb, things=(FLOOR, blocker)), DIRECT))
     before = light[0] < 1.4
     np.testing.assert_array_equal(light[2][before], straight[2][before])
 
@@ -307,7 +307,7 @@ def test_what_stands_between_a_lamp_and_the_mirror_shades_the_lamps_image() -> N
 def test_the_floor_under_a_box_has_the_light_beside_it_so_that_no_darkness_leaks_out() -> None:
     lamp = ceiling_light("lamp", np.array([0, 0, 2.0]), (0.2, 0.2), power_lm=1000)
     crate = box(np.array([0.6, 0, 0.1]), (0.55, 0.55, 0.2), yaw_deg=0, material="grey")
-    x, y, light = floor_light(bake(scene(lamp, surfaces=(FLOOR, *crate)), DIRECT))
+    x, y, light = floor_light(bake(scene(lamp, things=(FLOOR, *crate)), DIRECT))
     open_light = floor_light(bake(scene(lamp), DIRECT))[2]
     row = np.abs(y).argmin(0)[0]
     lit_foot = np.flatnonzero((x[row] > 0.325) & (x[row] < 0.45))[0]
@@ -336,7 +336,7 @@ def test_in_a_sphere_of_triangles_light_is_that_of_the_integrating_sphere_all_ov
     ball = solid("ball", trimesh.creation.icosphere(subdivisions=4), smooth=smooth, inside=True)
     bulb = PointLight("bulb", np.array([0.3, 0.1, 0.2]), 1000.0)
     settings = BakeSettings(spacing_m=0.05, indirect_rays=256)
-    baked = bake(Scene("globe", (), {"grey": Material(colour=(0.8, 0.5, 0.2))}, (bulb,), (), (ball,)), settings)
+    baked = bake(Scene("globe", (ball,), {"grey": Material(colour=(0.8, 0.5, 0.2))}, (bulb,)), settings)
     light, area_m2 = Illumination(baked).at(0, 0), areas_m2(baked.faces.corners_m).sum()
     for channel, albedo in enumerate((0.8, 0.5, 0.2)):
         around = light[..., channel] - baked.direct[0]
@@ -363,7 +363,7 @@ def test_no_light_passes_a_thin_wall() -> None:
     between = trimesh.creation.box((0.02, 2.01, 2.01))
     things = (solid("room", walls, inside=True), solid("wall", between))
     bulb = PointLight("bulb", np.array([-1.0, 0.1, 0.2]), 1000.0)
-    baked = bake(Scene("rooms", (), GREY, (bulb,), (), things), BakeSettings(indirect_rays=64))
+    baked = bake(Scene("rooms", things, GREY, (bulb,)), BakeSettings(indirect_rays=64))
     own = owners(baked.atlas)
     in_room = (own.face >= 0) & (baked.faces.thing[own.face] == 0)
     (u, v), face = own.uv[in_room].T.astype(float), own.face[in_room]
@@ -445,7 +445,7 @@ def test_indirect_light_is_that_of_paths_traced_one_by_one() -> None:
         "red": Material(colour=(0.7, 0.3, 0.1)),
     }
     bulb = PointLight("bulb", np.array([-0.7, -0.5, 0.8]), 1000.0)
-    made = Scene("room", (), materials, (bulb,), (), tuple(things))
+    made = Scene("room", tuple(things), materials, (bulb,))
     baked = bake(made, BakeSettings())
     place, expected = traced(baked, bulb, count=400, paths=400)
     around = Illumination(baked).at(0, 0) - baked.direct[0][..., None]

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.render.rectangles import Rectangle, rectangle
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array
 from vobench.render.bake import BakedScene, BakeSettings, bake
@@ -12,7 +13,6 @@ from vobench.scene.light import SUN_RADIUS_RAD, Light, Sky, Sun
 from vobench.scene.material import Material, pane_reflectance
 from vobench.scene.mesh import Thing, quad
 from vobench.scene.scene import Scene
-from vobench.scene.surface import Surface, rectangle
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=4, bounces=0)
 FINER = replace(DIRECT, spacing_m=0.05)  # the sky's light lies between every other sample
@@ -29,7 +29,7 @@ UNIFORM = Sky("sky", 10_000.0, "uniform")
 X, Y, Z = np.eye(3)
 
 
-def floor_light(light: Light, *others: Surface, settings: BakeSettings = DIRECT) -> tuple[Array, Array, Array]:
+def floor_light(light: Light, *others: Rectangle, settings: BakeSettings = DIRECT) -> tuple[Array, Array, Array]:
     """Places x, y and illuminance (rows, columns) of the floor's samples."""
     baked = bake(Scene("day", (FLOOR, *others), PANES, (light,)), settings)
     s, t = np.meshgrid(*[np.linspace(0, 1, round(4 / settings.spacing_m * finer(baked)) + 1)] * 2)
@@ -43,7 +43,7 @@ def finer(baked: BakedScene) -> int:
     return round(np.ptp(baked.atlas.light_px[0, :, 0]) * baked.settings.spacing_m / 4)
 
 
-def roof_with_opening(half_m: float, height_m: float, glazing: str | None) -> list[Surface]:
+def roof_with_opening(half_m: float, height_m: float, glazing: str | None) -> list[Rectangle]:
     """A wide roof whose middle is open or glazed, seen from below, and walls that let nothing in below it."""
     side, centre = 4.0 - half_m, (4.0 + half_m) / 2
     strips = [rectangle(np.array([0, sign * centre, height_m]), side * Y, 8 * X, "grey") for sign in (-1, 1)] + [
@@ -120,7 +120,7 @@ def test_a_pane_and_its_back_let_in_what_one_pane_does() -> None:
     lit = []
     for mesh in (level, level.two_sided()):
         pane = Thing("pane", mesh, "pane")
-        baked = bake(Scene("day", (FLOOR, *roof), PANES, (UNIFORM,), (), (pane,)), DIRECT)
+        baked = bake(Scene("day", (FLOOR, *roof, pane), PANES, (UNIFORM,)), DIRECT)
         lit.append(baked.direct[0].mean())
     assert lit[1] == pytest.approx(lit[0], rel=1e-3)
     assert lit[0] > 0

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.render.rectangles import Rectangle, box, rectangle, room, sheet
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole, pixel_grid
@@ -18,7 +19,6 @@ from vobench.render.view import Plane
 from vobench.scene.light import Sky
 from vobench.scene.material import Material, fresnel, pane_reflectance, under_coat
 from vobench.scene.scene import Scene
-from vobench.scene.surface import Surface, box, rectangle, room
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 MATERIALS: dict[str, Material] = {
@@ -35,16 +35,15 @@ FLOOR, EAST = Plane(np.array([0, 0, 1.0]), 0.0), Plane(np.array([-1.0, 0, 0]), 4
 HALF_M, HEIGHT_M = 4.0, 3.0
 
 
-def hall_of(changes: dict[str, str], *, floor: str = "grey", wall: str = "grey") -> list[Surface]:
+def hall_of(changes: dict[str, str], *, floor: str = "grey", wall: str = "grey") -> list[Rectangle]:
     """A room, 8 × 8 × 3 m, with other materials on some sides."""
     sides = room((2 * HALF_M, 2 * HALF_M, HEIGHT_M), floor=floor, wall=wall, ceiling=wall)
-    return [replace(side, material=changes.get(side.instance, side.material)) for side in sides]
+    return [replace(side, material=changes.get(side.name, side.material)) for side in sides]
 
 
-def image_of(surface: Surface, plane: Plane) -> Surface:
-    corner, along, up = (surface.corner_m, surface.edge_u_m, surface.edge_v_m)
-    R = plane.reflection[:3, :3]
-    return replace(surface, corner_m=se3.apply(plane.reflection, corner[None])[0], edge_u_m=R @ along, edge_v_m=R @ up)
+def image_of(surface: Rectangle, plane: Plane) -> Rectangle:
+    corner, R = se3.apply(plane.reflection, surface.corner_m[None])[0], plane.reflection[:3, :3]
+    return sheet(corner, R @ surface.edge_u_m, R @ surface.edge_v_m, surface.material, surface.name)
 
 
 def pixel_rays(T_world_camera: Array) -> Array:
@@ -72,7 +71,7 @@ def test_the_image_of_an_image_lies_where_two_reflections_put_it(
             corners_m=se3.apply(twice, lattice.corners_m),
         )
         for lattice in hall.lattices[1:]
-        if lattice.surface.instance != "wall_east"
+        if lattice.surface.name != "wall_east"
     )
     lens, errors, half = LENSES["paper_literal"], [], 15
     for heading, x_m, pitch_deg in ((0.0, 3.2, 45), (0.5, 2.5, 30), (-0.4, 2.8, 38), (0.1, 1.5, 25)):

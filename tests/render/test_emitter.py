@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
+from tests.render import rectangles
 from vobench.geometry.se3 import Array
 from vobench.render.emitter import SolidAngle, rectangle
-from vobench.scene import surface
-from vobench.scene.mesh import quad
 
-PANEL = surface.rectangle(np.array([0.2, 0.1, 2.0]), np.array([0, 1.2, 0]), np.array([0.8, 0, 0]), "a")
-FACE = rectangle(quad(PANEL.corner_m, PANEL.edge_u_m, PANEL.edge_v_m).corners_m)
+PANEL = rectangles.rectangle(np.array([0.2, 0.1, 2.0]), np.array([0, 1.2, 0]), np.array([0.8, 0, 0]), "a")
+FACE = rectangle(PANEL.mesh.corners_m)
 assert FACE is not None
 POINTS = np.array([[0.0, 0, 0], [1.5, -0.3, 0.4], [0.2, 0.1, 1.9], [-2, 3, 1.0], [0.2, 0.1, 2.5]])
 

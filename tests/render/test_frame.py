@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.render.rectangles import room
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import KannalaBrandt, Pinhole
@@ -16,7 +17,6 @@ from vobench.scene.light import AreaLight, Sky
 from vobench.scene.material import LUMINANCE, Material, Picture, linear
 from vobench.scene.mesh import Mesh, Thing, flat, quad
 from vobench.scene.scene import Scene, ceiling_light
-from vobench.scene.surface import room
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 FISHEYE = KannalaBrandt(120, 90, 60.0, 60.0, 59.5, 44.5, 0.0, 0.0, 0.0, 0.0)
@@ -57,7 +57,7 @@ def scene(*things: tuple[Mesh, str], lights: Any = (), sides: str | None = "grey
     around = room((8, 8, 3), floor=sides or "grey", wall=sides or "grey", ceiling=sides or "grey")
     around = around if sides else [side.moved(se3.transform(np.eye(3), [-20.0, 0, -10])) for side in around[:1]]
     made = tuple(Thing(str(nth), mesh, material) for nth, (mesh, material) in enumerate(things))
-    return Scene("meshes", tuple(around), MATERIALS, lights, things=made)
+    return Scene("meshes", (*around, *made), MATERIALS, lights)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def test_a_colour_picture_times_the_weights_is_the_picture_of_one_channel(
         lights=(SKY,),
         sides="print",
     )
-    shown = replace(shown, surfaces=tuple(s for s in shown.surfaces if s.instance != "ceiling"))
+    shown = replace(shown, things=tuple(s for s in shown.things if s.name != "ceiling"))
     renderer = draw(even_light(shown))
     colours, mono = (renderer.radiance(camera, still(camera, AHEAD), weights=w) for w in (None, WEIGHTS))
     assert colours.shape == (*mono.shape, 3)
@@ -144,7 +144,7 @@ def test_what_is_under_the_cut_out_is_not_there(draw: Any, even_light: Any) -> N
     mesh = replace(board(2.0, 1.0, 1.0), uv=np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]))
     shown = replace(scene((mesh, "leaf")), materials=materials)
     picture = draw(even_light(shown)).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
-    without = draw(even_light(replace(shown, things=()))).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
+    without = draw(even_light(scene())).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
     right, left = slice(95, 125), slice(55, 85)
     np.testing.assert_array_equal(picture[40:80, right], without[40:80, right])
     np.testing.assert_allclose(picture[40:80, left], LIGHT, rtol=1e-5)

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from tests.render.rectangles import box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array
 from vobench.render.geometry import Hits, RayCaster, Visibility, areas_m2, ball, flats, spots
 from vobench.scene.material import Material, pane_reflectance
 from vobench.scene.mesh import Thing, quad, table
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light, triangles
-from vobench.scene.surface import box, rectangle, room
 
 MATERIALS: dict[str, Material] = {
     "a": Material(texture=Procedural("plain", 0.5, 0.0, 1.0, 8, 0)),

@@ -39,7 +39,7 @@ PLACES = np.random.default_rng(0).dirichlet((1, 1, 1), 1500)  # on a triangle
 
 
 def scene(*lights: Light, things: tuple[Thing, ...] = ROOM, movers: tuple[Mover, ...] = ()) -> Scene:
-    return Scene("test", (), MATERIALS, lights, movers, things)
+    return Scene("test", things, MATERIALS, lights, movers)
 
 
 def on(baked: BakedScene, light: np.ndarray, name: str) -> np.ndarray:
@@ -160,7 +160,7 @@ def test_a_sun_that_ends_where_it_began_moves_meanwhile():
 
 def walk(*positions_m: tuple[float, float, float]) -> Mover:
     times = np.arange(len(positions_m), dtype=float)
-    return Mover("crate", (), Path(times, np.array(positions_m), np.zeros(len(positions_m))), (CRATE,))
+    return Mover("crate", (CRATE,), Path(times, np.array(positions_m), np.zeros(len(positions_m))))
 
 
 DAY = Sky("sky", 5_000.0, "uniform")

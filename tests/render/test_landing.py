@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.render.rectangles import box, room
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Equirectangular, KannalaBrandt, Pinhole
@@ -15,7 +16,6 @@ from vobench.geometry.se3 import Array
 from vobench.render.renderer import still
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene
-from vobench.scene.surface import box, room
 from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose
 from vobench.sequence import Sequence, SequenceWriter, read_truth
 

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.render.rectangles import rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.errors import MissingDependencyError, RenderError
 from vobench.geometry import se3
@@ -19,7 +20,6 @@ from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Sky, Spo
 from vobench.scene.material import LUMINANCE, Material, Picture, fresnel, linear, pane_reflectance, under_coat
 from vobench.scene.mesh import Thing, quad, unit
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light
-from vobench.scene.surface import rectangle, room
 
 X, Y, Z = np.eye(3)
 SMALL = Pinhole(12, 8, 200.0, 200.0, 5.5, 3.5)
@@ -320,8 +320,11 @@ def test_the_corners_of_a_checker_land_where_projection_says(trace, camera):
 def test_a_floor_of_two_halves_is_the_floor_in_one(trace):
     sun = (Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,)),)
     whole = plate("floor")
-    left = replace(whole, edge_u_m=4.05 * X)
-    right = replace(whole, corner_m=whole.corner_m + 4.05 * X, edge_u_m=3.95 * X, texture_corner_m=(4.05, 0.0))
+    halves = (0.0, 4.05), (4.05, 3.95)
+    left, right = (
+        replace(whole, mesh=quad(whole.corner_m + start * X, length * X, whole.edge_v_m, uv_m=(start, 0.0)))
+        for start, length in halves
+    )
     pictures = [
         trace(Scene("f", s, {"floor": Material(texture=Procedural(*CHECKER))}, sun)) for s in ((whole,), (left, right))
     ]
@@ -426,5 +429,5 @@ def test_smooth_normals_shade_and_flat_faces_hide(trace):
     sun = Sun("sun", 1000.0, (0.0,), (0.0,), (90.0,))
     mesh = quad([-4, -4, 0], 8 * X, 8 * Y)
     floor = Thing("floor", replace(mesh, normals=np.tile(tilted, (4, 1))), "floor")
-    scene = Scene("f", (), {"floor": Material(colour=(0.5,) * 3)}, (sun,), (), (floor,))
+    scene = Scene("f", (floor,), {"floor": Material(colour=(0.5,) * 3)}, (sun,))
     assert trace(scene).mean() == pytest.approx(0.5 * 1000 / np.pi * tilted[2], rel=0.01)

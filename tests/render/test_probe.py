@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.render.rectangles import room
 from vobench.asset.texture import Procedural
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
@@ -16,7 +17,6 @@ from vobench.scene.light import Flicker, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Material, inner_reflectance
 from vobench.scene.mesh import Mesh, Thing, quad
 from vobench.scene.scene import Scene
-from vobench.scene.surface import room
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 AHEAD = looking(pitch_deg=0, position_m=(-2.0, 0, 1.5))
@@ -39,13 +39,10 @@ def shown(material: Material, *, sides: dict[str, Material] | None = None, light
     """A ball in a room of some materials, or under the sky with one small board far below."""
     materials = {"ball": material, "grey": Material() if sides is None else GREY} | (sides or {})
     around = room((8, 8, 3), floor="grey", wall="grey", ceiling="grey")
-    around = [replace(side, material=side.instance if side.instance in materials else "grey") for side in around]
+    around = [replace(side, material=side.name if side.name in materials else "grey") for side in around]
     if sides is None:
-        small = quad((-3.0, -3, -3), (0.1, 0, 0), (0, 0.1, 0))
-        around = [
-            replace(around[0], corner_m=small.vertices_m[0], edge_u_m=np.eye(3)[0] / 10, edge_v_m=np.eye(3)[1] / 10)
-        ]
-    return Scene("ball", tuple(around), materials, lights, things=(Thing("ball", ball(), "ball"),))
+        around = [replace(around[0], mesh=quad((-3.0, -3, -3), (0.1, 0, 0), (0, 0.1, 0)))]
+    return Scene("ball", (*around, Thing("ball", ball(), "ball")), materials, lights)
 
 
 def on_ball(T: Array = AHEAD, *, within: float = 0.97) -> Any:

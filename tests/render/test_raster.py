@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import vobench.render
+from tests.render.rectangles import box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.errors import MissingDependencyError
 from vobench.geometry.camera import Camera, Pinhole, pixel_grid
@@ -23,7 +24,6 @@ from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene, ceiling_light, triangles
-from vobench.scene.surface import box, rectangle, room
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 DOWN, AHEAD = looking(pitch_deg=90, position_m=(0.2, 0.1, 0.4)), looking(pitch_deg=20, position_m=(0.2, 0.1, 0.4))

@@ -60,7 +60,7 @@ def mean_lx(scene: Scene) -> float:
 def test_a_room_of_two_sided_walls_is_as_bright_as_one_that_is_seen_from_inside_alone(back_first: bool) -> None:
     lamp = PointLight("bulb", np.array([0.2, 0.1, 0.4]), 1000.0)
     walls = joined([ROOM.flipped(), ROOM][:: 1 if back_first else -1])
-    alone, doubled = (Scene("s", (), GREY, (lamp,), (), (Thing("room", mesh, "grey"),)) for mesh in (ROOM, walls))
+    alone, doubled = (Scene("s", (Thing("room", mesh, "grey"),), GREY, (lamp,)) for mesh in (ROOM, walls))
     assert mean_lx(doubled) == pytest.approx(mean_lx(alone), rel=0.01)
 
 
@@ -72,5 +72,5 @@ def test_a_two_sided_sheet_returns_light_from_both_sides(back_first: bool) -> No
     for apart_m in (0.001, 0.0):
         pair = [SHEET.moved(at(apart_m / 2)), SHEET.flipped().moved(at(-apart_m / 2))][:: -1 if back_first else 1]
         things = (Thing("room", ROOM, "grey"), Thing("sheet", joined(pair), "grey"))
-        seen.append(mean_lx(Scene("s", (), GREY, lamps, (), things)))
+        seen.append(mean_lx(Scene("s", things, GREY, lamps)))
     assert seen[1] == pytest.approx(seen[0], rel=0.01)

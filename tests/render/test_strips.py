@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.render.rectangles import box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, DoubleSphere, KannalaBrandt, Pinhole
@@ -17,7 +18,6 @@ from vobench.render.renderer import View, still
 from vobench.scene.light import Dimmer, Flicker, Sky
 from vobench.scene.material import Material
 from vobench.scene.scene import Mover, Path, Scene
-from vobench.scene.surface import box, rectangle, room
 
 PINHOLE = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 CAMERAS = {
@@ -38,7 +38,7 @@ SECOND_NS = 1_000_000_000
 PATH = Path(np.array([0.0, 2.0]), np.array([[1.0, -0.8, 0.3], [1.0, 0.8, 0.3]]), np.array([0.0, 60.0]))
 CART = Mover("cart", tuple(box(np.zeros(3), (0.5, 0.5, 0.5), yaw_deg=0, material="board")), PATH)
 SURFACES = (
-    *(s for s in room((6, 5, 3), floor="wax", wall="wall", ceiling="wall") if s.instance != "wall_east"),
+    *(s for s in room((6, 5, 3), floor="wax", wall="wall", ceiling="wall") if s.name != "wall_east"),
     rectangle(np.array([3.0, 0, 1.5]), np.array([0, 0, 3.0]), np.array([0, 5.0, 0]), "glass"),
     rectangle(np.array([1.0, 2.4, 1.0]), np.array([2.0, 0, 0]), np.array([0, 0, 1.6]), "steel"),
 )
@@ -124,7 +124,7 @@ def test_a_mover_is_where_its_path_says_amid_the_interval(draw: Any, even_light:
     start, end, rows = instants(SECOND_NS // 2), instants(SECOND_NS), slice(0, PINHOLE.height_px)
     T = PATH.pose(0.75 * SECOND_NS)
     matt = replace(DARK, materials=MATERIALS | {"wax": MATERIALS["wall"], "steel": MATERIALS["wall"]})
-    parked = replace(matt, movers=(), surfaces=(*SURFACES, *(s.moved(T) for s in CART.surfaces)))
+    parked = replace(matt, movers=(), things=(*SURFACES, *(s.moved(T) for s in CART.things)))
     empty = replace(matt, movers=())
     moving, standing, without = (
         draw(even_light(scene)).radiance(PINHOLE, [View(rows, AHEAD[None], start, end)])
@@ -137,11 +137,11 @@ def test_a_mover_is_where_its_path_says_amid_the_interval(draw: Any, even_light:
 
 def test_a_mirror_that_moves_mirrors_from_where_it_is(draw: Any, even_light: Any) -> None:
     materials = MATERIALS | {"steel": MATERIALS["wall"], "wax": MATERIALS["wall"]}
-    cart = replace(CART, surfaces=(replace(CART.surfaces[3], material="chrome"),))
+    cart = replace(CART, things=(replace(CART.things[3], material="chrome"),))
     plain = replace(DARK, materials=materials)
     moving = draw(even_light(replace(plain, movers=(cart,)))).radiance(PINHOLE, still(PINHOLE, AHEAD, t_ns=SECOND_NS))
     T = PATH.pose(SECOND_NS)
-    parked = replace(plain, movers=(), surfaces=(*SURFACES, *(s.moved(T) for s in cart.surfaces)))
+    parked = replace(plain, movers=(), things=(*SURFACES, *(s.moved(T) for s in cart.things)))
     matt = replace(parked, materials=materials | {"chrome": MATERIALS["board"]})
     standing, without = (draw(even_light(one)).radiance(PINHOLE, still(PINHOLE, AHEAD)) for one in (parked, matt))
     assert (np.abs(moving - standing) > 0.01 * standing).mean() < 0.002

@@ -61,14 +61,10 @@ def shell(size_m, *, floor: str = "matt") -> list[Thing]:
 
 
 RIDE = Path(np.array([0.0, 2.0]), np.array([[1.5, -1.2, 0.3], [1.9, 1.0, 0.3]]), np.array([0.0, 50.0]))
-CART = Mover("cart", (), RIDE, (block("x", np.zeros(3), (0.5, 0.4, 0.6)),))
+CART = Mover("cart", (block("x", np.zeros(3), (0.5, 0.4, 0.6)),), RIDE)
 PANE = sheet("pane", [1.0, 0.4, 0.8], [0, 0.6, 0], [0, 0, 0.5], "glass")
 HALL = Scene(
     "hall",
-    (),
-    MATERIALS,
-    (ceiling_light("lamp", np.array([0.5, 0.5, 2.9]), (0.6, 0.6), power_lm=1000),),
-    (CART,),
     (
         *shell((8, 6, 3), floor="wax"),
         block("crate", [2.0, 0.9, 0.4], (0.8, 0.6, 0.8), yaw_deg=30),
@@ -76,6 +72,9 @@ HALL = Scene(
         sheet("mirror", [3.99, -1.0, 1.2], [0, 0, 1.0], [0, 1.5, 0], "steel"),
         PANE,
     ),
+    MATERIALS,
+    (ceiling_light("lamp", np.array([0.5, 0.5, 2.9]), (0.6, 0.6), power_lm=1000),),
+    (CART,),
 )
 CAMERAS = {
     "pinhole": Pinhole(177, 119, 120.0, 100.0, 90.0, 55.0),
@@ -172,7 +171,7 @@ def test_pixels_that_no_direction_leads_to_have_no_truth(caster):
 def test_depth_is_exact_to_20_m_at_grazing_angles():
     floor = sheet("floor", np.zeros(3), [60.0, 0, 0], [0, 60.0, 0])
     camera, pose = LENSES["paper_literal"], looking(pitch_deg=15, position_m=(0, 0, 0.4))
-    depth = TruthCaster(Scene("plain", (), MATERIALS, (), (), (floor,))).frame(camera, Shot(pose, 0), ["depth"]).depth
+    depth = TruthCaster(Scene("plain", (floor,), MATERIALS, ())).frame(camera, Shot(pose, 0), ["depth"]).depth
     assert depth is not None
     rays = camera.rays(pixel_grid(camera))
     exact = rays[..., 2] * -0.4 / (rays @ pose[:3, :3].T)[..., 2]
@@ -207,7 +206,7 @@ def test_mirrors_coats_and_what_stands_behind_panes_are_in_the_mask(truth, expec
     faces = triangles(HALL, t_ns=0)
     shiny = np.array([*(faces.things[n].material in {"wax", "steel"} for n in faces.thing), False])[surface]
     both = replace(PANE, mesh=PANE.mesh.two_sided())
-    pane = triangles(Scene("pane", (), MATERIALS, (), (), (both,)))
+    pane = triangles(Scene("pane", (both,), MATERIALS, ()))
     behind = met(pane, HERE[:3, 3], rays @ HERE[:3, :3].T).min(1) < distance_m
     assert behind.any()
     off_edges(flattened(truth.mirror) == (shiny | behind))
@@ -338,7 +337,7 @@ def test_flow_of_a_rolling_shutter_leads_to_where_the_row_that_sees_the_point_st
 def stage(*lights, things=(), movers=()):
     """A floor seen from above, one camera pixel to a centimetre, lights over it."""
     floor = sheet("floor", np.zeros(3), [4.0, 0, 0], [0, 4.0, 0])
-    return TruthCaster(Scene("stage", (), MATERIALS, lights, movers, (floor, *things)))
+    return TruthCaster(Scene("stage", (floor, *things), MATERIALS, lights, movers))
 
 
 ABOVE = se3.transform(np.diag([1.0, -1.0, -1.0]), [0, 0, 2.0])
@@ -406,7 +405,7 @@ def test_glass_casts_no_shadow_and_a_spot_none_outside_its_cone():
 def test_shadow_follows_a_mover():
     path = Path(np.array([0.0, 1.0]), np.array([[0.0, 0, 0], [0.4, 0, 0]]), np.zeros(2))
     bulb = PointLight("bulb", np.array([0.0, 0, 1.0]), 100.0)
-    caster = stage(bulb, movers=(Mover("kite", (), path, (plate(),)),))
+    caster = stage(bulb, movers=(Mover("kite", (plate(),), path),))
     for t_ns, x_m in ((0, 0.0), (SECOND_NS, 0.8)):
         found, beside = shadow(caster, t_ns=t_ns), square(0.2, x_m=x_m)
         assert (found[beside < -0.003] == 1).all()
@@ -455,7 +454,7 @@ def _is_face(corners: Array, which: tuple[int, ...]) -> bool:
 def ball_scene(*, splits: int) -> tuple[TruthCaster, Array, float]:
     center_m, radius_m = np.array([2.0, 0.1, 0.4]), 0.5
     ball = Thing("ball", icosphere(center_m, radius_m, splits=splits), "matt")
-    return TruthCaster(Scene("ball", (), MATERIALS, (), (), (ball,))), center_m, radius_m
+    return TruthCaster(Scene("ball", (ball,), MATERIALS, ())), center_m, radius_m
 
 
 @pytest.mark.parametrize("splits", [2, 4])
@@ -506,7 +505,7 @@ def shards(count: int, seed: int) -> Scene:
         for n, c in enumerate(corners)
     ]
     path = Path(np.array([0.0, 1.0]), np.array([[0.1, 0.2, 0.0], [0.3, 0.1, 0.1]]), np.array([5.0, 20.0]))
-    return Scene("shards", (), MATERIALS, (), (Mover("swarm", (), path, tuple(things[::4])),), tuple(things))
+    return Scene("shards", tuple(things), MATERIALS, (), (Mover("swarm", tuple(things[::4]), path),))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -537,7 +536,7 @@ def test_rays_through_corners_and_edges_of_faces_meet_one_of_them():
     # Every pixel's ray goes through a corner of the wall's squares, 5 m away: 1/20 m a pixel.
     wall = tessellated([5.0, -1.5, -1.0], [0, 3.0, 0], [0, 0, 2.0], 20).flipped()
     camera, pose = Pinhole(21, 21, 100.0 / 3, 50.0, 10.0, 10.0), looking(pitch_deg=0, position_m=(0, 0, 0))
-    caster = TruthCaster(Scene("wall", (), MATERIALS, (), (), (Thing("wall", wall, "matt"),)))
+    caster = TruthCaster(Scene("wall", (Thing("wall", wall, "matt"),), MATERIALS, ()))
     truth = caster.frame(camera, Shot(pose, 0), ["depth", "instance"])
     inner = slice(1, -1), slice(1, -1)
     np.testing.assert_allclose(truth.depth[inner], 5.0, rtol=1e-7)
@@ -550,7 +549,7 @@ def test_every_ray_inside_a_closed_room_ends(seed):
     turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     T = se3.transform(turned * np.linalg.det(turned), rng.uniform(-40, 40, 3))
     inside = joined([side.flipped() for side in sides([0, 0, 1.5], rng.uniform(3, 12, 3))]).moved(T)
-    caster = TruthCaster(Scene("room", (), MATERIALS, (), (), (Thing("room", inside, "matt"),)))
+    caster = TruthCaster(Scene("room", (Thing("room", inside, "matt"),), MATERIALS, ()))
     shot = Shot(T @ se3.transform(np.eye(3), [0.1, -0.3, 1.6]), 0)
     truth = caster.frame(Equirectangular(720, 360), shot, ["depth", "normals", "instance"])
     assert np.isfinite(truth.depth).all()
@@ -560,7 +559,7 @@ def test_every_ray_inside_a_closed_room_ends(seed):
 
 def test_the_back_of_a_sheet_of_two_sides_is_seen_as_its_front_is():
     both = Thing("card", quad([2.0, -0.5, -0.5], [0, 1.0, 0], [0, 0, 1.0]).two_sided(), "matt")
-    caster = TruthCaster(Scene("card", (), MATERIALS, (), (), (both,)))
+    caster = TruthCaster(Scene("card", (both,), MATERIALS, ()))
     camera = CAMERAS["pinhole"]
     ahead = looking(pitch_deg=0, position_m=(0, 0, 0))
     behind = se3.transform(se3.rotation_z(np.pi), [4.0, 0, 0]) @ ahead
@@ -585,9 +584,9 @@ def test_what_is_seen_through_holes_is_what_is_behind_and_light_falls_through():
     sheet_m = quad([-0.4, -0.4, 0.5], [0.8, 0, 0], [0, 0.8, 0]).two_sided()
     floor = sheet("floor", np.zeros(3), [4.0, 0, 0], [0, 4.0, 0])
     bulb = PointLight("bulb", np.array([0.0, 0, 1.0]), 100.0)
-    still = Scene("holes", (), holed(opacity), (bulb,), (), (floor, Thing("paper", sheet_m, "paper")))
+    still = Scene("holes", (floor, Thing("paper", sheet_m, "paper")), holed(opacity), (bulb,))
     path = Path(np.array([0.0]), np.zeros((1, 3)), np.zeros(1))
-    moving = replace(still, things=(floor,), movers=(Mover("paper", (), path, still.things[1:]),))
+    moving = replace(still, things=(floor,), movers=(Mover("paper", still.things[1:], path),))
     place_m = (np.arange(201) - 100) / 100
     x, y = np.meshgrid(place_m, -place_m)
     stripe = (x * 0.75 + 0.4) % 0.4 / 0.4  # the paper is 1.5 m below the camera, the floor 2 m
@@ -624,7 +623,7 @@ def test_things_far_from_the_origin_throw_no_shadow_on_themselves():
     floor = sheet("floor", [300.0, -200.0, 0], [40.0, 0, 0], [0, 40.0, 0])
     ball = Thing("ball", icosphere([300.0, -200.0, 1.0], 1.0, splits=3), "matt")
     sun = Sun("sun", 1e5, (0.0,), (0.0,), (60.0,))
-    caster = TruthCaster(Scene("far", (), MATERIALS, (sun,), (), (floor, ball)))
+    caster = TruthCaster(Scene("far", (floor, ball), MATERIALS, (sun,)))
     above = se3.transform(np.diag([1.0, -1.0, -1.0]), [300.0, -200.0, 8.0])
     truth = caster.frame(Pinhole(201, 201, 200.0, 200.0, 100.0, 100.0), Shot(above, 0), ["instance", "shadow"])
     on_ball = truth.instance == caster.names.instance.index("ball")

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.render.rectangles import Rectangle, box, rectangle, room, sheet
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import KannalaBrandt, Pinhole, pixel_grid
@@ -17,7 +18,6 @@ from vobench.render.view import Plane, visible_boxes, within
 from vobench.scene.light import Sky
 from vobench.scene.material import Material, fresnel, pane_reflectance, under_coat
 from vobench.scene.scene import Scene
-from vobench.scene.surface import Surface, box, rectangle, room
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 AHEAD = looking(pitch_deg=20, position_m=(0.2, 0.1, 0.4))
@@ -36,12 +36,11 @@ def snap(renderer: RasterRenderer, T_world_camera: Array, camera: Pinhole = CAME
     return renderer.radiance(camera, still(camera, T_world_camera))
 
 
-def upside_down(surface: Surface) -> Surface:
+def upside_down(surface: Rectangle) -> Rectangle:
     """A surface's image in the plane z = 0."""
     flip = np.array([1.0, 1.0, -1.0])
-    return replace(
-        surface, corner_m=flip * surface.corner_m, edge_u_m=flip * surface.edge_u_m, edge_v_m=flip * surface.edge_v_m
-    )
+    edges = flip * surface.edge_u_m, flip * surface.edge_v_m
+    return sheet(flip * surface.corner_m, *edges, surface.material, surface.name)
 
 
 def pixel_rays(T_world_camera: Array) -> Array:
@@ -145,7 +144,7 @@ SKY = Sky("sky", np.pi * 50, "uniform", ground_albedo=1.0)  # 50 cd/m² all arou
 def test_a_pane_lets_pass_and_mirrors_the_right_shares_from_both_sides(
     draw: Any, even_light: Any, outside: bool
 ) -> None:
-    walls = [s for s in room((4, 4, 3), floor="grey", wall="grey", ceiling="grey") if s.instance != "wall_east"]
+    walls = [s for s in room((4, 4, 3), floor="grey", wall="grey", ceiling="grey") if s.name != "wall_east"]
     pane = rectangle(np.array([2.0, 0, 1.5]), np.array([0, 0, 3.0]), np.array([0, 4.0, 0]), "glass")
     renderer = draw(even_light(Scene("room", (*walls, pane), MATERIALS, (SKY,))))
     turn = se3.transform(se3.rotation_z(np.pi * outside), (4.0 * outside, 0, 0))

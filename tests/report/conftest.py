@@ -10,7 +10,7 @@ import pytest
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
-from vobench.report import TrialView, save_trial
+from vobench.report.rerun import TrialView, save_trial
 from vobench.run import estimate as estimate_file
 from vobench.run.folder import SCORE, RunFolder, TrialScore
 from vobench.run.frames import COLUMNS, FRAMES, TIME_COLUMNS, TIMES, new_table
@@ -53,7 +53,7 @@ def make_run(path: Path, scores: list[TrialScore]) -> RunFolder:
         with new_table(place / FRAMES, COLUMNS) as frames, new_table(place / TIMES, TIME_COLUMNS) as times:
             frames.writerow({"frame": 0, "t_ns": 0, **({"status": "ok", "stats": "{}"} if score.score else {})})
             if score.score:
-                times.writerow({"frame": 0, "wall_ms": 1.0, "cpu_ms": 2.0})
+                times.writerow({"frame": 0, "wall_ms": 1.0, "cpu_ms": 2.0, "memory_mib": 3.0})
         write_json(place / SCORE, score.model_dump(mode="json"))
     return folder
 

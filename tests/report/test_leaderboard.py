@@ -161,13 +161,13 @@ def frames(*reasons):
 def test_the_commonest_reason_of_frames_is_counted_whatever_its_numbers(scored):
     rows = frames("", "blurred", "too few tracks (7)", "", "too few tracks (-1.5e3)", "too few tracks")
     found = answers([rows])
-    assert found == EstimatorStatistics(2.0, "too few tracks (7)", 2, 12)
+    assert found == EstimatorStatistics(2.0, "too few tracks (7)", 2, 12, frames=6)
     (row,) = board("down", [scored("a")], {("down", "a"): found}).rows
     assert (row.frame_reason, row.frame_reason_count, row.frame_reason_first) == ("too few tracks (7)", 2, 12)
 
 
 def test_frames_without_a_reason_have_none_and_no_frame_no_answer():
-    assert answers([frames("", ""), []]) == EstimatorStatistics(2.0)
+    assert answers([frames("", ""), []]) == EstimatorStatistics(2.0, frames=2)
     assert answers([[], []]) == EstimatorStatistics()
 
 
@@ -223,7 +223,7 @@ def test_no_time_stands_in_a_report_but_in_a_file_of_its_own(run, mixed):
     assert not any("CPU" in text for text in said.values())
     assert {row["ms_per_frame"] for b in json.loads(said[".json"])["boards"] for row in b["rows"]} == {None}
     costs = pd.read_csv(run.path / TIMES).set_index(["case", "estimator"])
-    assert costs.loc["down", "mad"].to_list() == [1.0, 2.0]
+    assert costs.loc["down", "mad"].to_list() == [1.0, 2.0, 3.0]
     assert costs.loc["down", "dead"].isna().all()
 
 

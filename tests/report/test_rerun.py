@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from vobench.report import TruthView, save_trial
-from vobench.report.rerun import application_id, first_failure, rerun_matrix
+from vobench.report.rerun import TruthView, application_id, first_failure, rerun_matrix, save_trial
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames
 from vobench.sequence import StereoTruth
 from vobench.trajectory.trajectory import Trajectory
@@ -52,6 +51,15 @@ def test_tracks_move_by_half_a_pixel_because_rerun_counts_from_the_corner(rrd):
     assert points[1] == [[0.5, 0.5], [3.5, 2.5], [47.5, 31.5]]
     colors = values(rrd, f"{LEFT}/tracks", "Points2D:colors")[1]
     assert colors[0] == colors[1] != colors[2]
+
+
+def test_what_an_estimator_says_in_numbers_and_points_is_there(run_viewer, tmp_path):
+    cloud, numbers = np.arange(6.0).reshape(2, 3), np.where(np.arange(12) == 4, np.nan, np.arange(12.0))
+    save_trial(tmp_path / "more.rrd", replace(run_viewer, points={2: cloud, 7: cloud[:1]}, stats={"depth_m": numbers}))
+    points = values(tmp_path / "more.rrd", "/world/estimate/points", "Points3D:positions")
+    assert points == {2: cloud.tolist(), 7: cloud[:1].tolist()}
+    depths = values(tmp_path / "more.rrd", "/stats/depth_m", "Scalars:scalars")
+    assert depths == {index: [float(index)] for index in range(12) if index != 4}
 
 
 def test_frame_without_tracks_clears_those_before_it(rrd):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from vobench.errors import TrajectoryError
+from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import ImuCalibration, Rig, stereo_rig
 from vobench.run import estimate as estimate_file
@@ -146,3 +147,15 @@ def test_a_trajectory_with_bytes_of_no_text_is_one_sentence_with_its_place(tmp_p
     (tmp_path / "a.tum").write_bytes(b"0 0\xff")
     with pytest.raises(TrajectoryError, match=r"^not a text file in UTF-8 \(byte 3\): .*a\.tum$"):
         read_tum(tmp_path / "a.tum")
+
+
+def test_points_of_the_body_come_back_in_the_left_cameras_axes_beside_the_tracks(tmp_path, plugin):
+    mine = plugin("return Result(np.eye(4), points=[[frame.index, 0, 0], [0, 0, 1]])")
+    (mine / "estimator.yaml").write_text((mine / "estimator.yaml").read_text().replace("left_camera", "body"))
+    folder = estimated(tmp_path, recorded(tmp_path / "sequence", STEREO), mine)
+    read = dict(estimate_file.read_tracks(folder, of=estimate_file.POINTS))
+    for index, points in read.items():
+        expected = se3.apply(se3.inverse(STEREO.T_body_left), [[index, 0, 0], [0, 0, 1]])
+        np.testing.assert_allclose(points, expected, atol=1e-6)
+    assert sorted(read) == [0, 1, 2]
+    assert list(estimate_file.read_tracks(folder)) == []

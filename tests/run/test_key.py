@@ -58,7 +58,7 @@ def test_an_operator_in_a_module_that_all_reach_changes_every_key(digest_after, 
 @pytest.mark.parametrize(
     ("stage", "file", "is_of_it"),
     [
-        ("sequence", "run/verify.py", False),
+        ("sequence", "report/verify.py", False),
         ("sequence", "run/score.py", False),
         ("sequence", "metric/ate.py", False),
         ("sequence", "render/raster.py", True),  # which is imported when the first picture is drawn

@@ -215,7 +215,7 @@ def test_a_failure_is_a_row_and_is_tried_again_when_its_cause_may_be_gone(bench,
     (tmp_path / "lib.py").write_text(
         "import numpy\nfrom vobench.estimator import Result\ndef answer(): return Result(numpy.eye(4))\n"
     )
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
     assert {s.status for s in bench.run(change).scores()} == {"ok"}
 
 

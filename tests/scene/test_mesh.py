@@ -71,8 +71,8 @@ def hall() -> Scene:
     floor = Thing("floor", quad([-2, -3, 0], [4, 0, 0], [0, 6, 0]), "f")
     bulb = PointLight("bulb", np.zeros(3), 1.0)
     lamp = ceiling_light("lamp", np.array([0.0, 0.0, 2.9]), (0.5, 0.5), power_lm=1.0)
-    mover = Mover("crate", (), path, (crate, lid))
-    return Scene("hall", (), {}, (bulb, lamp), (mover,), (floor, Thing("pyramid", tetrahedron(), "stone")))
+    mover = Mover("crate", (crate, lid), path)
+    return Scene("hall", (floor, Thing("pyramid", tetrahedron(), "stone")), {}, (bulb, lamp), (mover,))
 
 
 def test_a_scenes_table_has_what_stands_then_lamps_then_movers() -> None:

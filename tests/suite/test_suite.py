@@ -61,6 +61,38 @@ def test_one_estimator_takes_part_twice_under_two_labels(bent):
     assert [(e.label, e.params["measure_s"]) for e in planned.entrants] == [("slow", 1), ("constant_velocity", 0.1)]
 
 
+def test_a_suites_limits_go_over_the_manifests(bent):
+    planned = bent(("stand_still,", "{name: stand_still, limits: {frame_s: 1, memory_mib: 512}},"))
+    limits, usual = (entrant.limits for entrant in planned.entrants)
+    assert (limits.frame_s, limits.memory_mib, limits.start_s) == (1.0, 512, usual.start_s)
+    assert usual == planned.entrants[1].manifest.limits
+
+
+def test_each_mode_has_an_entrant_of_its_own(bent):
+    planned = bent(("estimators:", "modes: [step, real_time]\nestimators:"))
+    assert [(e.label, e.mode, e.claims) for e in planned.entrants[:2]] == [
+        ("stand_still", "step", ()),
+        ("stand_still.real_time", "real_time", ("real time",)),
+    ]
+    alone = bent(("estimators:", "modes: [real_time]\nestimators:"))
+    assert next((e.label, e.mode) for e in alone.entrants) == ("stand_still", "real_time")
+
+
+@pytest.mark.parametrize(
+    ("limits", "sentence"),
+    [
+        ("{frame_s: 0}", "limits: frame_s: should be greater than 0 (got 0"),
+        ("{memory_mib: 1}", "limits: memory_mib: should be 64 or more (got 1)"),
+        ("{frames: 1}", "no limit named 'frames'. Did you mean 'frame_s'?"),
+    ],
+)
+def test_a_limit_that_is_none_is_refused_with_its_place(bent, limits, sentence):
+    with pytest.raises(SuiteError) as refused:
+        bent(("stand_still,", f"{{name: stand_still, limits: {limits}}},"))
+    assert sentence in str(refused.value)
+    assert "estimators.0" in str(refused.value)
+
+
 def test_parameters_reach_an_estimator_as_plain_python(bent):
     (value,) = bent().entrants[1].params.values()
     assert type(value) is float
@@ -170,12 +202,10 @@ def test_a_calibration_error_makes_the_true_rig_another_and_the_told_one_not(ben
 # ruff: noqa: E501 - a sentence stands in one line
 
 
-SUITE_KEYS = (
-    "cameras, estimators, lightings, name, rendering, repeats, rigs, scenes, seed, source, summary, trajectories, truth"
-)
+SUITE_KEYS = "cameras, estimators, lightings, modes, name, rendering, repeats, rigs, scenes, seed, source, summary, trajectories, truth"
 RIG_KEYS = "baseline_m, calibration_error, forward_m, height_m, imu, lens, pitch_deg"
 LENSES = "d435i, euroc, fisheye, paper_blender, paper_literal, tartanair, zed2i"
-ESTIMATORS = "constant_velocity, imu_dead_reckoning, lk_epipolar, stand_still, wheel_odometry"
+ESTIMATORS = "constant_velocity, imu_dead_reckoning, lk_epipolar, noisy_truth, stand_still, wheel_odometry"
 A_NAME = "should be lower-case letters, digits, _ and ., a letter or digit first"
 
 # What is replaced, what with, and what comes after the file's path.
@@ -184,7 +214,7 @@ WRONG = [
     ("seed: 1", "xyz: 1", f":2: xyz: unknown key. Known: {SUITE_KEYS}"),
     ("pitch_deg", "pich_deg", f":5: rigs.down.pich_deg: unknown key. Did you mean 'pitch_deg'? Known: {RIG_KEYS}"),
     ("{power_lm: 150}", "{power: 1, power_lm: 1}", ":4: lightings.dim.lamp.power: unknown key. Did you mean 'power_lm'? Known: illuminance_lx, level, power_lm"),
-    ("params:", "parms:", ":8: estimators.1.parms: unknown key. Did you mean 'params'? Known: label, name, params"),
+    ("params:", "parms:", ":8: estimators.1.parms: unknown key. Did you mean 'params'? Known: label, limits, name, params"),
     ("pitch_deg: 90", "", ":5: rigs.down.pitch_deg: this key is missing"),
     ("seed: 1", "seed: one", ":2: seed: should be a whole number (got 'one')"),
     ("seed: 1", "seed: '1'", ":2: seed: should be a whole number (got '1')"),

@@ -29,6 +29,8 @@ VERBS = {
     "schema": "vobench.cli.run:schema_command",
     "score": "vobench.cli.score:score_command",
     "diagnose": "vobench.cli.score:diagnose_command",
+    "new": "vobench.cli.estimator:new_command",
+    "try": "vobench.cli.estimator:try_command",
     "metrics": "vobench.cli.score:metrics_command",
     "import": "vobench.cli.sequence:import_command",
     "export": "vobench.cli.sequence:export_command",

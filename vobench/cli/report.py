@@ -14,14 +14,14 @@ from rich.table import Table
 
 from vobench.cli import terminal
 from vobench.errors import InputError, MissingDependencyError, UnknownNameError
-from vobench.report import page, save_trial
+from vobench.report import page
 from vobench.report.leaderboard import FORMATS, LEGEND, Board, lines_of, notes
-from vobench.report.rerun import pick, trial_view
+from vobench.report.rerun import pick, save_trial, trial_view
+from vobench.report.verify import verify_run
 from vobench.run.folder import open_run
-from vobench.run.verify import verify_run
 
 # A narrow terminal goes without these, in this order; every report has them all.
-LEAST_FIRST = ("RPE °/frame", "RPE mm/frame", "CPU ms/frame", "segments %", "survived", "coverage", "#")
+LEAST_FIRST = ("MiB", "RPE °/frame", "RPE mm/frame", "CPU ms/frame", "segments %", "survived", "coverage", "#")
 ENDLESS = 10_000
 TERMINAL = "terminal"
 FORMS = (*FORMATS, "html")

@@ -10,11 +10,11 @@ import typer
 
 from vobench.cli import terminal
 from vobench.errors import InputError
+from vobench.estimator.manifest import Manifest
 from vobench.run.key import cache_folder
 from vobench.run.motion import BodyMotion, body_motions
 from vobench.run.store import why_unwritable
 from vobench.run.task import is_done, sequence_tasks
-from vobench.suite.manifest import Manifest
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite import Case, Plan, Suite, read_plan

@@ -1,6 +1,5 @@
 """vobench score, diagnose and metrics."""
 
-import csv as csv_module
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
@@ -19,6 +18,8 @@ from vobench.metric.comparison import MetricDefinition
 from vobench.metric.definitions import DEFINITIONS
 from vobench.metric.score import Score, pooled, score
 from vobench.metric.settings import LIKE, PAIRS_OF_RULE, Plane, ScoreSettings, Side, Unit
+from vobench.report import score_table
+from vobench.report.score_table import COLUMNS, Content
 from vobench.run.trajectory_pair import TrajectorySource, read_pair
 from vobench.setting import hints
 from vobench.trajectory.align import Kind
@@ -179,12 +180,6 @@ CHOSEN = {
     "project": ("plane", get_args(Plane)),
 }
 OPTIONS = {"alignment": "--align", "align_n": "--align-n", "rpe_delta": "--delta"}
-COLUMNS = ("n", "rmse", "mean", "median", "std", "min", "max", "sse", "p95", "p99")
-SHOWN = ("n", "rmse", "mean", "median", "std", "min", "max", "p95", "p99")
-WORDS = ("metric", "unit", "sequence")  # headings of columns that hold words
-ABREAST = 6  # metrics in one table of sequences
-Content = dict[str, Any]
-Rows = list[list[str]]
 
 
 def score_command(
@@ -231,6 +226,10 @@ def score_command(
     per_length: Annotated[
         bool, typer.Option("--per-length", help="Segments and parts over each length too; --json always has them.")
     ] = False,
+    covariances: Annotated[
+        list[Path] | None,
+        typer.Option("--cov", help="The covariances that EST states (docs/score.md), one file a pair; repeatable."),
+    ] = None,
     gt_topic: Topic = None,
     est_topic: Topic = None,
     gt_as: As = None,
@@ -263,7 +262,10 @@ def score_command(
     )
     truths, estimates = [_source(gt, gt_topic, gt_as) for gt in paths[::2]], paths[1::2]
     pairs = [(gt, _source(est, est_topic, est_as)) for gt, est in zip(truths, estimates, strict=True)]
-    _show_score(pairs, settings, times=times or (), form=form, per_length=per_length)
+    stated: list[Path | None] = [*covariances] if covariances else [None] * len(pairs)
+    if len(stated) != len(pairs):
+        raise typer.BadParameter(f"--cov comes once for each pair of files, {len(pairs)} times (got {len(stated)})")
+    _show_score(pairs, stated, settings, times=times or (), form=form, per_length=per_length)
 
 
 def _form(**asked: bool) -> str:
@@ -300,6 +302,7 @@ def _keeps_pairs(base: ScoreSettings, asked: Mapping[str, Any]) -> bool:
 
 def _show_score(
     pairs: Sequence[tuple[TrajectorySource, TrajectorySource]],
+    covariances: Sequence[Path | None],
     settings: ScoreSettings,
     *,
     times: Sequence[Path],
@@ -308,7 +311,8 @@ def _show_score(
 ) -> None:
     """Score one pair of trajectories, or several and all of them together, and print every metric with its identity."""
     metrics = tuple(_definitions() if settings.full else DEFINITIONS.values())
-    scored = [_scored(gt, est, settings, times, metrics) for gt, est in pairs]
+    both = zip(pairs, covariances, strict=True)
+    scored = [_scored(gt, est, settings, times, metrics, covariance=covariance) for (gt, est), covariance in both]
     content = scored[0][1] if len(scored) == 1 else _together(pairs, scored)
     parts = [*content["sequences"], content["pooled"]] if "sequences" in content else [content]
     for metric in (metric for part in parts for metric in part["metrics"]):
@@ -319,7 +323,13 @@ def _show_score(
     for part in content.get("sequences", [content]):
         for note in part["notes"]:
             print(f"note: {note}", file=sys.stderr)
-    FORMS[form](content, [result for result, _ in scored], per_length)
+    results = [result for result, _ in scored]
+    if form == "csv":
+        print(score_table.as_csv(content, per_length=per_length), end="")
+    elif form == "md":
+        print(score_table.as_markdown(content, results, per_length=per_length), end="")
+    else:
+        _print_table(content, results, per_length=per_length)
 
 
 def _read_list(path: Path) -> list[Path]:
@@ -345,12 +355,22 @@ def _scored(
     settings: ScoreSettings,
     times: Sequence[Path],
     metrics: Sequence[MetricDefinition],
+    *,
+    covariance: Path | None,
 ) -> tuple[Score, Content]:
     pair = read_pair(gt, est, times=times)
     if pair.by_frame and settings.rpe_unit == "s":
         raise InputError("a delta in seconds needs stamps, and neither file has any; name one with --times")
-    scored = score(pair.gt.trajectory, pair.est.trajectory, settings=settings, metrics=metrics)
+    P = None
+    if covariance:
+        from vobench.run.consistency import Consistency, read_covariances
+
+        P = read_covariances(covariance, pair.est.trajectory.t_ns)
+    scored = score(pair.gt.trajectory, pair.est.trajectory, settings=settings, metrics=metrics, covariance=P)
     content = scored.as_dict()
+    if covariance:
+        found = Consistency.of(next(each.errors for each in scored.samples if each.of.id == "nees_pose"))
+        content["consistency"] = {**found.model_dump(), "sentence": found.sentence}
     content["warnings"] = [*([pair.by_frame] if pair.by_frame else []), *content["warnings"]]
     content["notes"] = list(pair.notes)
     content["per_length"] = [row.as_dict() for row in scored.per_length]
@@ -390,106 +410,13 @@ def _require_finite(metric: dict[str, Any]) -> None:
             raise AlignmentError(f"the {name} of {metric['name']} is {metric[name]}: positions are too far apart")
 
 
-def _print_csv(content: Content, scored: Sequence[Score], per_length: bool) -> None:
-    del scored
-    named = [(part["est"], part) for part in content.get("sequences", [])]
-    named += [("pooled", content["pooled"])] if named else [("", content)]
-    columns = [*(["sequence"] if len(named) > 1 else []), "name", "unit", *(["length_m"] if per_length else [])]
-    writer = csv_module.DictWriter(sys.stdout, [*columns, *COLUMNS, "id"], extrasaction="ignore", lineterminator="\n")
-    writer.writeheader()
-    for name, part in named:
-        rows = [*part["metrics"], *(part["per_length"] if per_length else [])]
-        writer.writerows({"sequence": name, **row} for row in rows)
-
-
-def _print_md(content: Content, scored: Sequence[Score], per_length: bool) -> None:
-    for headings, rows in _tables(content, per_length):
-        words = sum(heading in WORDS for heading in headings)
-        print(f"| {' | '.join(headings)} |\n|{'---|' * words}{'---:|' * (len(headings) - words)}")
-        for row in rows:
-            print(f"| {' | '.join(row)} |")
-        print()
-    for sentence in (*_ids(content), *_summaries(content, scored), *(f"warning: {w}" for w in _warnings(content))):
-        print(f"- {sentence}")
-
-
-def _print_table(content: Content, scored: Sequence[Score], per_length: bool) -> None:
+def _print_table(content: Content, scored: Sequence[Score], *, per_length: bool) -> None:
     out = terminal.console()
-    for headings, rows in _tables(content, per_length):
+    for headings, rows in score_table.tables(content, per_length=per_length):
         out.print(terminal.table("", headings, rows))
-    for identity in _ids(content):
+    for identity in score_table.ids(content):
         out.print(identity, style="dim", soft_wrap=True)
-    for summary in _summaries(content, scored):
+    for summary in score_table.summaries(content, scored):
         out.print(summary, soft_wrap=True)
-    for warning in _warnings(content):
+    for warning in score_table.warnings(content):
         out.print(f"warning: {warning}", style="yellow", soft_wrap=True)
-
-
-def _tables(content: Content, per_length: bool) -> list[tuple[list[str], Rows]]:
-    """Headings and rows of each table: the metrics, or the sequences with all of them pooled, then the lengths."""
-    whole = content.get("pooled", content)
-    if "sequences" in content:
-        tables = _sequence_tables(content)
-    else:
-        rows = [[metric["name"], metric["unit"], *_cells(metric)] for metric in content["metrics"]]
-        tables = [(["metric", "unit", *SHOWN], rows)]
-    if per_length:
-        cut = [[row["name"], row["unit"], f"{row['length_m']:g}", *_cells(row)] for row in whole["per_length"]]
-        tables.append((["metric", "unit", "length m", *SHOWN], cut))
-    return tables
-
-
-def _sequence_tables(content: Content) -> list[tuple[list[str], Rows]]:
-    """A row for each sequence and one for all of them, with the statistic to quote of each metric."""
-    parts = [*content["sequences"], {"est": "pooled", **content["pooled"]}]
-    units = {metric["name"]: metric["unit"] for part in parts for metric in part["metrics"]}
-    quoted = {metric["name"]: _quoted(metric) for part in parts for metric in part["metrics"]}
-    names = list(units)
-    tables: list[tuple[list[str], Rows]] = []
-    for begin in range(0, len(names), ABREAST):
-        chosen = names[begin : begin + ABREAST]
-        rows = []
-        for part in parts:
-            values = {metric["name"]: f"{metric[_quoted(metric)]:.6g}" for metric in part["metrics"]}
-            coverage = f"{part['coverage']:.3f}" if "coverage" in part else ""
-            rows.append([part["est"], coverage, *(values.get(name, "") for name in chosen)])
-        headings = [f"{name} {quoted[name]}{'' if units[name] == '1' else ' ' + units[name]}" for name in chosen]
-        tables.append((["sequence", "coverage", *headings], rows))
-    return tables
-
-
-def _quoted(metric: dict[str, Any]) -> str:
-    """The statistic of a metric that is quoted, which its id says."""
-    return str(metric["id"].partition("[")[0].rpartition(".")[2])
-
-
-def _cells(metric: dict[str, Any]) -> list[str]:
-    return [str(metric["n"]), *(f"{metric[name]:.6g}" for name in SHOWN[1:])]
-
-
-def _ids(content: Content) -> list[str]:
-    return [metric["id"] for metric in content.get("pooled", content)["metrics"]]
-
-
-def _warnings(content: Content) -> list[str]:
-    if "sequences" not in content:
-        return list(content["warnings"])
-    said = [f"{part['est']}: {warning}" for part in content["sequences"] for warning in part["warnings"]]
-    return [*said, *content["pooled"]["warnings"]]
-
-
-def _summaries(content: Content, scored: Sequence[Score]) -> list[str]:
-    names = [f"{part['est']}: " for part in content.get("sequences", [])] or [""]
-    return [f"{name}{_summary(result)}" for name, result in zip(names, scored, strict=True)]
-
-
-def _summary(scored: Score) -> str:
-    met, ratio, failed = scored.association, scored.coverage.ratio, scored.failure
-    lost_aware = "" if failed.lost_aware is None else f", lost-aware score {failed.lost_aware:.3f}"
-    return (
-        f"{met.pairs} pairs of {met.gt_poses} true and {met.est_poses} estimated poses, coverage {ratio:.3f}"
-        f"{lost_aware} ({'survived' if failed.survived else 'not survived'})"
-    )
-
-
-FORMS = {"table": _print_table, "csv": _print_csv, "md": _print_md}

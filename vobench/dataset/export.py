@@ -74,7 +74,7 @@ def export(sequence: Path, out: Path, form: str) -> Exported:
     views, stamps = layout.views(source.rig), layout.stamps(source)
     with _building(out) as folder:
         notes = layout.write(source, views, folder)
-        notes += _write_calibration(views.rig, layout, folder)
+        notes += write_calibration(views.rig, layout, folder)
         notes += write_photometric(source, views, stamps, folder / PHOTOMETRIC)
         notes += _left_out(source, layout)
         (folder / NOTES).write_text("".join(f"{note}\n" for note in notes), encoding="utf-8")
@@ -100,7 +100,8 @@ def _building(out: Path) -> Iterator[Path]:
         raise SequenceError(f"cannot write the export ({error.strerror or error}): {out}") from error
 
 
-def _write_calibration(rig: Rig, layout: Writing, folder: Path) -> list[str]:
+def write_calibration(rig: Rig, layout: Writing, folder: Path) -> list[str]:
+    """Kalibr's files of a rig, and what they cannot say."""
     *image_topics, imu_topic = layout.topics
     notes = kalibr.remarks(rig)
     try:

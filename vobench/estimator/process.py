@@ -1,13 +1,8 @@
-"""An estimator in a process of its own, under limits; its answers checked, its failures as data."""
+"""An estimator in Python in a process of its own; its answers checked, its failures as data."""
 
-import os
 import pickle
-import signal
-import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping
-from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from math import isfinite
 from multiprocessing import Pipe
@@ -19,6 +14,8 @@ import numpy as np
 
 from vobench import stop
 from vobench.errors import VobenchError
+from vobench.estimator.manifest import Limits
+from vobench.estimator.program import EstimatorFailure, Program
 from vobench.estimator.protocol import Frame, Result, Status, Tracks
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
@@ -47,6 +44,8 @@ def checked(answer: Any, frame: int) -> Result:
             reason=" ".join(str(answer.reason).split()),
             tracks=None if answer.tracks is None else _tracks(answer.tracks),
             stats=_stats(answer.stats),
+            covariance=None if answer.covariance is None else _covariance(answer.covariance),
+            points=None if answer.points is None else _points(answer.points),
         )
     except InvalidOutputError as error:
         raise InvalidOutputError(f"frame {frame}: {error}") from None
@@ -69,6 +68,32 @@ def _pose(T_odom_frame: Any) -> Array:
     if not se3.is_rotation(T[:3, :3]) or not np.array_equal(T[3], [0, 0, 0, 1]):
         raise InvalidOutputError("the pose is no rigid transform (R'R differs from I, or the last row from 0 0 0 1)")
     return T
+
+
+def _covariance(covariance: Any) -> Array:
+    P = _array(covariance, "the covariance")
+    if P.shape != (6, 6) or not np.isfinite(P).all():
+        raise InvalidOutputError(f"the covariance is no finite (6, 6) array (shape {P.shape})")
+    if not np.allclose(P, P.T, rtol=1e-6, atol=1e-9 * np.abs(P).max()) or np.linalg.eigvalsh(P)[0] <= 0:
+        raise InvalidOutputError("the covariance is not symmetric and positive definite")
+    return P
+
+
+def _points(points: Any) -> Array:
+    X = _array(points, "points")
+    if X.ndim != 2 or X.shape[1] != 3:
+        raise InvalidOutputError(f"points should be (N, 3), got {X.shape}")
+    return X
+
+
+def checked_revision(revised: Any) -> dict[int, Array]:
+    """Poses by their frame's index, as `finish` gives them. Raises InvalidOutputError."""
+    if not isinstance(revised, Mapping):
+        raise InvalidOutputError(f"finish() must return poses by their frame's index, got {type(revised).__name__}")
+    try:
+        return {int(frame): _pose(T) for frame, T in revised.items()}
+    except (InvalidOutputError, TypeError, ValueError) as error:
+        raise InvalidOutputError(f"finish(): {error}") from None
 
 
 def _status(status: Any) -> Status:
@@ -100,44 +125,17 @@ def _stats(stats: Any) -> dict[str, float]:
     return {name: number for name, number in numbers.items() if isfinite(number)}
 
 
-# One thread each: runs compare, and do not fight for cores.
-ONE_THREAD = {
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    "OPENCV_FOR_THREADS_NUM": "1",
-    "PYTHONHASHSEED": "0",
-}
-LOG_BYTES = 1 << 20
 ANSWER_BYTES = 64 << 20  # a pose, some numbers and tracks; more is no answer but noise on the connection
-KEPT_ENVIRONMENT = ("PATH", "HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV")
-
-
-class EstimatorFailure(Exception):  # noqa: N818 - a result, not a mistake of ours
-    """The estimator gave up: `kind` is a run's status, `reason` one line."""
-
-    def __init__(self, kind: str, reason: str) -> None:
-        super().__init__(f"{kind}: {reason}")
-        self.kind = kind
-        self.reason = reason
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What an estimator may take: seconds to start and for each frame, bytes of its own data."""
-
-    start_s: float = 60.0
-    frame_s: float = 20.0
-    memory_bytes: int = 4 << 30
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A checked result and what it cost."""
+    """A checked result and what it cost; memory is the most that it held so far."""
 
     result: Result
     wall_ms: float
     cpu_ms: float
+    memory_mib: float = 0.0
 
 
 class EstimatorProcess:
@@ -146,33 +144,24 @@ class EstimatorProcess:
     def __init__(self, folder: Path, class_path: str, *, name: str, log: Path, limits: Limits) -> None:
         self._limits = limits
         self._connection, child = Pipe()
-        self._home = Path(tempfile.mkdtemp(prefix="vobench-estimator-"))
-        fd, memory = str(child.fileno()), str(limits.memory_bytes)
-        self._log_path, self._log = log, log.open("wb")
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "vobench.estimator.worker", fd, str(folder), class_path, name, memory],
-            pass_fds=[child.fileno()],
-            cwd=self._home,
-            env={k: v for k, v in os.environ.items() if k in KEPT_ENVIRONMENT} | ONE_THREAD,
-            stdin=subprocess.DEVNULL,
-            stdout=self._log,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
+        fd, memory = str(child.fileno()), str(limits.memory_mib << 20)
+        argv = [sys.executable, "-P", "-m", "vobench.estimator.worker", fd, str(folder), class_path, name, memory]
+        self._program = Program(argv, log=log, limits=limits, pass_fds=[child.fileno()])
         child.close()
-        with ExitStack() as undone:
-            undone.enter_context(stop.undone(lambda: stop.remove(self._home)))
-            undone.enter_context(stop.undone(lambda: stop.kill_session(self._process), is_awaited=True))
-            self._undone = undone.pop_all()
 
-    def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Hand over the calibration and the parameters."""
-        self._ask(("start", rig, dict(params), seed), self._limits.start_s)
+    def start(self, rig: Rig, params: Mapping[str, Any], seed: int, *, is_watched: bool = False) -> None:
+        """Hand over the calibration and the parameters; who `is_watched` fails where it changes a frame."""
+        self._ask(("start", rig, dict(params), seed, is_watched), self._limits.start_s)
 
     def process(self, frame: Frame) -> Answer:
         """Hand over the next frame; what the estimator says of it, checked."""
         _, result, wall_ms, cpu_ms = self._ask(frame, self._limits.frame_s)
-        return Answer(result, wall_ms, cpu_ms)
+        return Answer(result, wall_ms, cpu_ms, self._program.peak_mib)
+
+    def finish(self) -> dict[int, Array]:
+        """Say that there are no more frames; the poses that the estimator revises, by their frame's index."""
+        _, revised = self._ask(("finish",), self._limits.trial_s)
+        return dict(revised)
 
     def _ask(self, message: Any, timeout_s: float) -> tuple[Any, ...]:
         stop.check()
@@ -185,27 +174,18 @@ class EstimatorProcess:
     def _answer(self, message: Any, timeout_s: float) -> tuple[Any, ...]:
         try:
             self._connection.send(message)
-            answered = self._connection.poll(timeout_s)
+            answered = self._connection.poll(max(min(timeout_s, self._program.left_s()), 0))
             reply: tuple[Any, ...] = pickle.loads(self._connection.recv_bytes(ANSWER_BYTES)) if answered else ()
         except (EOFError, ConnectionError):
-            raise EstimatorFailure(*self._death()) from None
+            raise EstimatorFailure(*self._program.death()) from None
         except Exception as error:  # bytes of somebody else's on our connection can be unpickled into anything
             raise EstimatorFailure("crashed", f"its answer cannot be read ({error})") from None
+        self._program.look()
         if not answered:
             raise EstimatorFailure("timeout", f"no answer within {timeout_s:g} s")
         if reply[0] == "failed":
             raise EstimatorFailure(reply[1], reply[2])
         return reply
-
-    def _death(self) -> tuple[str, str]:
-        try:
-            code = self._process.wait(timeout=5)
-        except subprocess.TimeoutExpired:
-            return "crashed", "it closed its connection and lives on"
-        if code == -signal.SIGKILL:
-            return "out_of_memory", "killed by the system, most likely for memory"
-        by = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-        return "crashed", f"the process ended with {by}"
 
     def __enter__(self) -> Self:
         return self
@@ -214,20 +194,4 @@ class EstimatorProcess:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._connection.close()
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(timeout=0.5 if kind is None else 0)
-        # The whole session goes: an estimator may have started processes of its own.
-        stop.kill_session(self._process)
-        self._process.wait()
-        self._log.close()
-        _cut(self._log_path)
-        self._undone.close()
-
-
-def _cut(log: Path) -> None:
-    """Keep the beginning of a log that an estimator has filled without end."""
-    size = log.stat().st_size
-    if size > LOG_BYTES:
-        os.truncate(log, LOG_BYTES)
-        with log.open("a", encoding="utf-8") as file:
-            file.write(f"\n[vobench: cut here; the estimator printed {size} bytes]\n")
+        self._program.__exit__(kind, error, trace)

@@ -68,6 +68,8 @@ class Result:
 
     `frame` is the left camera or the body, as the manifest's `pose_of` says; odom is that frame at
     the start. `reason` is one word for a status that is not ok; `stats` are numbers worth plotting.
+    `covariance` (6, 6) is of the pose: position in m, then rotation vector in rad, about the fixed axes of odom.
+    `points` (N, 3) are what it takes the scene to be, in odom, in m.
     """
 
     T_odom_frame: Array | None
@@ -75,10 +77,16 @@ class Result:
     reason: str = ""
     tracks: Tracks | None = None
     stats: Mapping[str, float] = field(default_factory=dict)
+    covariance: Array | None = None
+    points: Array | None = None
 
 
 class Estimator(Protocol):
-    """A visual-odometry estimator that is fed one frame at a time, in order."""
+    """A visual-odometry estimator that is fed one frame at a time, in order.
+
+    It may have a method `finish()`, called after the last frame, which returns revised poses T_odom_frame (4, 4) by
+    their frame's index, all or some: they are scored as a second track.
+    """
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
         """Take the calibration and the manifest's parameters, as the suite may have changed them."""

@@ -4,6 +4,7 @@ import ctypes
 import importlib
 import importlib.machinery
 import importlib.util
+import pickle
 import resource
 import signal
 import sys
@@ -16,8 +17,8 @@ from types import ModuleType
 from typing import cast
 
 from vobench.errors import VobenchError
-from vobench.estimator.process import InvalidOutputError, checked
-from vobench.estimator.protocol import Estimator
+from vobench.estimator.process import InvalidOutputError, checked, checked_revision
+from vobench.estimator.protocol import Estimator, Frame
 
 NAMESPACE = "vobench_estimators"
 
@@ -97,15 +98,30 @@ def main(fd: int, folder: Path, class_path: str, name: str, memory_bytes: int) -
 
 
 def _serve(connection: Connection, estimator: Estimator) -> None:
-    _, rig, params, seed = connection.recv()
-    estimator.start(rig, params, seed)
-    connection.send(("ready",))
+    is_watched = False
     while True:
-        frame = connection.recv()
-        wall, cpu = time.perf_counter(), time.process_time()
-        answer = estimator.process(frame)
-        spent = (time.perf_counter() - wall) * 1e3, (time.process_time() - cpu) * 1e3
-        connection.send(("result", checked(answer, frame.index), *spent))
+        message = connection.recv()
+        if isinstance(message, Frame):
+            before = pickle.dumps(message) if is_watched else b""
+            wall, cpu = time.perf_counter(), _cpu_s()
+            answer = estimator.process(message)
+            spent = (time.perf_counter() - wall) * 1e3, (_cpu_s() - cpu) * 1e3
+            if is_watched and pickle.dumps(message) != before:
+                raise InvalidOutputError(f"frame {message.index}: process() changed the frame it was given")
+            connection.send(("result", checked(answer, message.index), *spent))
+        elif message[0] == "start":
+            *told, is_watched = message[1:]
+            estimator.start(*told)
+            connection.send(("ready",))
+        else:
+            finish = getattr(estimator, "finish", dict)
+            connection.send(("revised", checked_revision(finish() or {})))
+
+
+def _cpu_s() -> float:
+    """CPU time of this process and of those that it has started and that have ended."""
+    spent = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(each.ru_utime + each.ru_stime for each in spent)
 
 
 def _die_with_parent() -> None:

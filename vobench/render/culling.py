@@ -325,6 +325,7 @@ def _sealed_by_mover(faces: Triangles) -> Sealed:
 
 PLANE_TILT, PLANE_OFF_M = np.deg2rad(0.1), 1e-3  # between faces that mirror as one plane
 LEAST_M2, MOST_MIRRORS = 0.05, 64
+LEAST_FILL = 0.02  # of the rectangle around them: a rim is no mirror
 
 
 def _mirrors(
@@ -348,10 +349,11 @@ def _mirrors(
         plane = Plane(normal[seed], float(offset[seed]))
         near = free & (mover == mover[seed]) & (pane == pane[seed]) & (normal @ plane.normal > np.cos(PLANE_TILT))
         near[near] = np.abs(corners_m[near] @ plane.normal + plane.offset_m).max(1) < PLANE_OFF_M
-        if areas[near].sum() < LEAST_M2:
+        outline = _outline(corners_m[near].reshape(-1, 3), plane)
+        least = max(LEAST_M2, LEAST_FILL * float(np.prod(np.linalg.norm(np.diff(outline[:3], axis=0), axis=1))))
+        if areas[near].sum() < least:
             continue
         index[near], free = len(found), free & ~near
-        outline = _outline(corners_m[near].reshape(-1, 3), plane)
         most = float(strength[near].max())
         found.append(Mirror(len(found), int(mover[seed]), plane, outline, bool(pane[seed]), most))
     return index, found

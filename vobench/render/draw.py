@@ -25,7 +25,7 @@ from vobench.render.opengl import (
 )
 from vobench.render.probe import Probe, level_of
 from vobench.render.view import Box, PinholeView, Plane, visible_boxes, within
-from vobench.scene.material import LUMINANCE, Rgb, inner_reflectance
+from vobench.scene.material import LUMINANCE, Rgb, emitted_cd_m2, inner_reflectance
 
 # As the shaders say.
 BODY_UNIT, LIGHT_UNIT, LAYERS_UNIT, EMISSION_UNIT, PROBE_UNIT = (GL.GL_TEXTURE0 + unit for unit in range(5))
@@ -233,7 +233,11 @@ def _numbers(batch: Batch, texture: SurfaceTexture | None) -> Array:
     material = batch.material
     is_body, eta = material.kind == "body", material.eta
     inner = inner_reflectance(eta)
-    glow = (1.0, 1.0, 1.0) if batch.is_lamp else material.emission_cd_m2
+    # A lamp's light is on the map: its texture only says how that is spread.
+    spread = np.divide(
+        material.emission_cd_m2, emitted_cd_m2(material), out=np.ones(3), where=emitted_cd_m2(material) > 0
+    )
+    glow = spread if batch.is_lamp else material.emission_cd_m2
     repeats = material.tile_m / material.emission_texture.tile_m if material.emission_texture else 1.0
     scale = (texture.scale if texture else 1.0) if is_body else material.tint
     plane = [*batch.mirror.plane.normal, batch.mirror.plane.offset_m] if batch.mirror else np.zeros(4)

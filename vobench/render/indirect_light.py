@@ -340,7 +340,8 @@ def _facets(normals: Floats, roughness: Floats, dither: Floats, turn: NDArray[np
     return facets
 
 
-EVEN, REST = 2e-3, 0.03  # bounces of a ratio this even, whose rest is this small a share of the light, are summed up
+# Bounces of a ratio this even, whose rest is this small a share of the light, or a rest too faint, are summed up.
+EVEN, REST, FAINT_REST = 2e-3, 0.03, 1e-4
 
 
 def bounced(straight: Floats, reflectance: Floats, gathered: FinalGather, first: Floats, *, bounces: int) -> Floats:
@@ -351,16 +352,19 @@ def bounced(straight: Floats, reflectance: Floats, gathered: FinalGather, first:
     """
     count, size, channels = straight.shape
     table, columns = gathered.table[:, :size], (size, count * channels)
-    sent = straight.transpose(1, 0, 2).reshape(columns)
+    if not bounces:
+        return np.zeros(straight.shape, np.float32)
     by_mirrors = np.repeat(first.T[..., None], channels, 2).reshape(columns).astype(np.float32)
-    again = np.tile(reflectance, (1, count))
-    total, step, ratio = np.zeros(columns, np.float32), np.zeros(columns, np.float32), np.zeros(columns[1])
-    for left in reversed(range(bounces)):
-        before, total = total, table @ (sent + again * total) + by_mirrors
-        last, step = step.sum(0, dtype=float), total - before
+    step = table @ straight.transpose(1, 0, 2).reshape(columns) + by_mirrors
+    total, again, ratio = step.copy(), np.tile(reflectance, (1, count)), np.zeros(columns[1])
+    for left in reversed(range(bounces - 1)):
+        last = step.sum(0, dtype=float)
+        step = table @ (again * step)
+        total += step
         earlier, ratio = ratio, np.clip(step.sum(0, dtype=float) / np.maximum(last, 1e-30), 0, 0.999)
         rest = ratio * (1 - ratio**left) / (1 - ratio)
-        if (np.abs(ratio - earlier) <= EVEN).all() and (rest * np.abs(step).sum(0) <= REST * total.sum(0)).all():
+        share = rest * step.sum(0) / np.maximum(total.sum(0), 1e-30)
+        if ((share <= FAINT_REST) | (np.abs(ratio - earlier) <= EVEN) & (share <= REST)).all():
             total += step * rest.astype(np.float32)
             break
     return np.ascontiguousarray(total.reshape(size, count, channels).transpose(1, 0, 2))

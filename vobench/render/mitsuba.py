@@ -211,8 +211,13 @@ def load(mi: Any, scene: Scene) -> Any:
     black = mi.load_dict({"type": "diffuse", "reflectance": _rgb((0, 0, 0))})
     for index, light in enumerate(scene.lights):
         key, shining = light_key(index), np.flatnonzero(faces.lamp == index)
-        glow = mi.load_dict({"type": "area", "radiance": _rgb(nominal(light))}) if len(shining) else None
-        world[key] = _mesh(mi, key, faces, shining, bsdf=black, glow=glow) if len(shining) else _emitter(mi, light)
+        if not len(shining):
+            world[key] = _emitter(mi, light)
+            continue
+        look = lamp_look(scene, light)
+        glow = _glow(mi, look) if look else mi.load_dict({"type": "area", "radiance": _rgb(nominal(light))})
+        tile = look.emission_texture.tile_m if look and look.emission_texture else 1.0
+        world[key] = _mesh(mi, key, faces, shining, bsdf=black, glow=glow, tile=tile)
     return mi.load_dict(world, optimize=False)
 
 
@@ -249,6 +254,12 @@ def nominal(light: Light) -> Array:
         case Sky():
             return np.ones(3)
     return strength * np.array(light.colour)
+
+
+def lamp_look(scene: Scene, light: Light) -> Material | None:
+    """The material of a lamp that shows a picture."""
+    look = scene.materials.get(light.material) if isinstance(light, AreaLight) else None
+    return look if look and look.emission_texture else None
 
 
 def light_key(index: int) -> str:

@@ -14,7 +14,7 @@ from vobench.errors import RenderError
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
 from vobench.render import mitsuba
-from vobench.render.mitsuba import STRENGTH, groups, light_key, load, nominal, one_sided
+from vobench.render.mitsuba import STRENGTH, groups, lamp_look, light_key, load, nominal, one_sided
 from vobench.render.renderer import Radiance, View
 from vobench.scene.light import Light, Sky, Sun
 from vobench.scene.material import LUMINANCE
@@ -46,7 +46,7 @@ class MitsubaScene:
         import mitsuba as mi
 
         self._scene, self._state = scene, SceneState((1.0,) * len(scene.lights), 0.0)
-        self._faces = triangles(scene)
+        self._faces, self._pictures = triangles(scene), dict[int, Any]()
         self._world = load(mi, scene)
         self._parameters = mi.traverse(self._world)
         # `path` is faster, but sees through panes and holes only by chance; `volpath` samples lights through them.
@@ -70,6 +70,13 @@ class MitsubaScene:
         import drjit as dr
         import mitsuba as mi
 
+        if lamp_look(self._scene, light):
+            key = f"{light_key(index)}.emitter.radiance.data"
+            self._pictures.setdefault(index, self._parameters[key].array)
+            self._parameters[key] = mi.TensorXf(
+                self._pictures[index] * wanted.levels[index], shape=self._parameters[key].shape
+            )
+            return
         # Opaque, for a constant would be compiled into the kernel.
         strength = [dr.opaque(mi.Float, wanted.levels[index] * part) for part in nominal(light).tolist()]
         value = strength[0] if isinstance(light, Sky) else mi.Color3f(*strength)

@@ -1,5 +1,1 @@
-"""Leaderboards, pages, plots, and the Rerun recording of a trial."""
-
-from vobench.report.rerun import TrialView, TruthView, save_trial
-
-__all__ = ["TrialView", "TruthView", "save_trial"]
+"""Leaderboards, pages, plots, tables of scores, the Rerun recording of a trial, and what is checked afterwards."""

@@ -17,7 +17,8 @@ TRUTH_LEFT, TRUTH_RIGHT = f"{WORLD}/ground_truth/left", f"{WORLD}/ground_truth/r
 ESTIMATE_LEFT = f"{WORLD}/estimate/left"
 ERROR_LINE = f"{WORLD}/error"
 LEFT_TRACKS = f"{TRUTH_LEFT}/tracks"
-ERROR_PLOT, STATUS, SUMMARY = "error_mm", "status", "summary"
+ESTIMATE_POINTS = f"{WORLD}/estimate/points"
+ERROR_PLOT, STATUS, SUMMARY, STATS = "error_mm", "status", "summary", "stats"
 
 EYE_PITCH_DEG = 38.0
 EYE_DISTANCE_PER_RADIUS = 1.6  # fills the view with Rerun's default field of view, with a margin for frusta
@@ -31,11 +32,16 @@ def truth_entity(side: str, channel: str) -> str:
 
 
 def layout(
-    truth_m: Array, estimate_m: Array, *, focus: tuple[int, int] | None, channels: Sequence[str] = ()
+    truth_m: Array,
+    estimate_m: Array,
+    *,
+    focus: tuple[int, int] | None,
+    channels: Sequence[str] = (),
+    has_stats: bool = False,
 ) -> rrb.Blueprint:
     """The default blueprint for paths (N, 3) and (M, 3); `focus` is a range of frames to start at.
 
-    Truth channels, where there are any, have tabs of their own.
+    Truth channels, where there are any, have tabs of their own, and what the estimator counted a plot.
     """
     seen_m = _near(truth_m, estimate_m)
     paths = rrb.Vertical(
@@ -47,7 +53,8 @@ def layout(
             plot_legend=rrb.PlotLegend(visible=False),
         ),
         rrb.StateTimelineView(origin=STATUS, name="Status of each frame"),
-        row_shares=[6, 2.2, 1.2],
+        *([rrb.TimeSeriesView(origin=STATS, name="What the estimator says")] if has_stats else []),
+        row_shares=[6, 2.2, 1.2, *([2.2] if has_stats else [])],
     )
     pictures = rrb.Vertical(
         rrb.Spatial2DView(origin=TRUTH_LEFT, name="Left: inliers green, outliers red"),

@@ -88,7 +88,7 @@ def _aligned(folder: RunFolder, score: TrialScore, stated: dict[str, Any]) -> Ar
 
 
 STEM = "leaderboard"
-COST_COLUMNS = ("case", "estimator", "wall_ms", "cpu_ms")
+COST_COLUMNS = ("case", "estimator", "wall_ms", "cpu_ms", "memory_mib")
 
 
 def boards_of(folder: RunFolder, scores: list[TrialScore]) -> list[Board]:
@@ -99,7 +99,7 @@ def boards_of(folder: RunFolder, scores: list[TrialScore]) -> list[Board]:
 def write_reports(folder: RunFolder, scores: list[TrialScore]) -> None:
     """Put leaderboard.md, .json, .csv and .html into a run's folder, without costs: these go to times.csv."""
     frames = _frames(folder, scores)
-    said = {key: replace(answers(trials), ms_per_frame=None) for key, trials in frames.items()}
+    said = {key: replace(answers(trials), ms_per_frame=None, memory_mib=None) for key, trials in frames.items()}
     made = boards(scores, said)
     for suffix in ("md", "json", "csv"):
         stop.check()
@@ -118,12 +118,13 @@ def _frames(folder: RunFolder, scores: list[TrialScore]) -> dict[tuple[str, str]
 
 
 def _write_costs(folder: RunFolder, frames: dict[tuple[str, str], list[list[FrameRow]]]) -> None:
-    """The mean cost of a frame, a row for each case and estimator; empty cells where it answered none."""
+    """The mean cost of a frame and the most memory, a row for each case and estimator; empty where it answered none."""
     with new_table(folder.path / TIMES, COST_COLUMNS) as costs:
         for (case, estimator), trials in frames.items():
             named = {"case": case, "estimator": estimator}
             rows = [row for trial in trials for row in trial]
             for column in COST_COLUMNS[2:]:
                 values = [value for row in rows if (value := getattr(row, column)) is not None]
-                named[column] = f"{fmean(values):.3f}" if values else ""
+                of_all = max if column == "memory_mib" else fmean
+                named[column] = f"{of_all(values):.3f}" if values else ""
             costs.writerow(named)

@@ -1,9 +1,10 @@
 """A trial as a Rerun recording: pictures, tracks, both paths and the error on one time line."""
 
+import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from collections.abc import Sequence as Rows
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -14,14 +15,15 @@ from numpy.typing import NDArray
 
 from vobench import stop
 from vobench.errors import InputError, UnknownNameError
+from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.report import blueprint as bp
 from vobench.report.blueprint import FRAME_TIMELINE, truth_entity
-from vobench.run.estimate import ESTIMATE, read_tracks
+from vobench.run.estimate import ESTIMATE, POINTS, read_tracks
 from vobench.run.folder import SEQUENCE, STATUSES, SURVIVED, RunFolder, TrialScore, read_tum
-from vobench.run.frames import read_frames
+from vobench.run.frames import FrameRow, read_frames
 from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.sensor.pixel_truth import CHANNELS, TruthNames, picture
 from vobench.sequence import EncodedFrame, Sequence, StereoTruth, read_truth_frames, read_truth_names, truth_channels
@@ -121,7 +123,8 @@ class TrialView:
 
     `frames` starts a fresh pass over the N pictures. `error_m` (N,) is NaN for frames without a pose, and
     `statuses` has one word for each. `tracks` maps a frame's index to points (K, 2) in the left picture and
-    which are inliers (K,). `truth` is None where nothing was recorded of the pixels.
+    which are inliers (K,), `points` to what it took the scene to be (K, 3), in the world; `stats` has (N,) numbers by
+    name, NaN for none. `truth` is None where nothing was recorded of the pixels.
     """
 
     title: str
@@ -134,6 +137,8 @@ class TrialView:
     tracks: Mapping[int, Tracks]
     summary_md: str
     truth: TruthView | None = None
+    points: Mapping[int, Array] = field(default_factory=dict)
+    stats: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,13 +182,17 @@ def save_trial(path: Path, trial: TrialView) -> None:
         _log_cameras(log, trial)
         _log_error(log, trial)
         _log_tracks(log, trial.tracks)
+        _log_points(log, trial.points)
+        for name, numbers in trial.stats.items():
+            known = np.flatnonzero(np.isfinite(numbers))
+            log.columns(f"{bp.STATS}/{name}", known, rr.Scalars.columns(scalars=numbers[known]))
         _log_statuses(log, trial.statuses)
         log.static(bp.SUMMARY, rr.TextDocument(trial.summary_md, media_type=rr.MediaType.MARKDOWN))
         if trial.truth is not None:
             log_truth(stream, trial.truth)
         channels, focus = trial.truth.channels if trial.truth else (), first_failure(trial.statuses)
         paths_m = (trial.ground_truth.positions_m, trial.estimate.positions_m)
-        stream.send_blueprint(bp.layout(*paths_m, focus=focus, channels=channels))
+        stream.send_blueprint(bp.layout(*paths_m, focus=focus, channels=channels, has_stats=bool(trial.stats)))
         stream.disconnect()
         part.replace(path)
 
@@ -329,6 +338,15 @@ def pick(scores: Rows[TrialScore], *, case: str | None, estimator: str | None) -
     return max(min(of.values(), key=lambda trials: fmean(map(_error, trials))), key=_error)
 
 
+def _log_points(log: _Log, points: Mapping[int, Array]) -> None:
+    """The scene as the estimator takes it to be: the points of a frame stay until those of another."""
+    frames = np.array(sorted(points), np.int64)
+    if len(frames):
+        columns = rr.Points3D.columns(positions=np.concatenate([points[index] for index in frames.tolist()]))
+        log.static(bp.ESTIMATE_POINTS, rr.Points3D.from_fields(colors=ORANGE, radii=rr.Radius.ui_points(1.5)))
+        log.columns(bp.ESTIMATE_POINTS, frames, columns.partition([len(points[index]) for index in frames.tolist()]))
+
+
 def trial_view(folder: RunFolder, trial: TrialScore) -> TrialView:
     """All that is shown of one trial. Raises InputError where its sequence is no longer in the cache."""
     link = folder.case(trial.case) / SEQUENCE
@@ -337,8 +355,11 @@ def trial_view(folder: RunFolder, trial: TrialScore) -> TrialView:
     sequence, channels = Sequence.open(link), truth_channels(link)
     place = folder.estimate(trial.case, trial.estimator, trial.repeat)
     est, frames = read_tum(place / ESTIMATE), read_frames(place)
+    points = {index: X.astype(float) for index, X in read_tracks(place, of=POINTS)}
     if trial.score:
         alignment = Alignment.from_dict(trial.score["alignment"])
+        placed = {index: alignment.apply(se3.transform(np.eye(3), X)) for index, X in points.items()}
+        points = {index: T[:, :3, 3] for index, T in placed.items()}
         est = Trajectory(est.t_ns, alignment.apply(est.T_world_frame))
     return TrialView(
         title=f"{trial.estimator} on {trial.case}",
@@ -349,9 +370,18 @@ def trial_view(folder: RunFolder, trial: TrialScore) -> TrialView:
         error_m=np.array([row.position_error_m for row in frames], float),
         statuses=[row.status or NO_OUTPUT for row in frames],
         tracks={i: (table[:, 2:4].astype(float), table[:, 4] > 0) for i, table in read_tracks(place)},
+        points=points,
+        stats=_stats(frames),
         summary_md=_summary(trial),
         truth=TruthView(channels, read_truth_names(link), lambda: read_truth_frames(link)) if channels else None,
     )
+
+
+def _stats(frames: Rows[FrameRow]) -> dict[str, Array]:
+    """What the estimator said in numbers, (N,) by name, NaN where it did not."""
+    rows = [json.loads(row.stats or "{}") for row in frames]
+    names = sorted({name for row in rows for name in row})
+    return {name: np.array([row.get(name, np.nan) for row in rows], float) for name in names}
 
 
 def _error(trial: TrialScore) -> float:

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import count
@@ -13,6 +13,7 @@ from typing import Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from vobench.errors import InputError, TrajectoryError
+from vobench.run.consistency import Consistency
 from vobench.run.frames import TIMES
 from vobench.run.store import unfinished, write_json
 from vobench.trajectory.formats import parse_tum
@@ -34,6 +35,8 @@ class TrialScore(BaseModel):
     """One estimator on one case: its status and, where there is any estimate, its score.
 
     `drift_m` is the largest distance of the estimate from its start, in a case that stands still; else None.
+    `claims` are the manifest's, such as Sim(3); `consistency` is of the covariances that were stated, and `revised`
+    the score of the poses that came after the last frame, where there were some.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -50,13 +53,19 @@ class TrialScore(BaseModel):
     path_m: float
     score: dict[str, Any] | None
     drift_m: float | None = None
+    claims: tuple[str, ...] = ()
+    consistency: Consistency | None = None
+    revised: dict[str, Any] | None = None
 
     def value(self, metric: str, statistic: str) -> float | None:
         """One statistic of one metric, None where the trial has no such score."""
-        for entry in (self.score or {"metrics": []})["metrics"]:
-            if entry["name"] == metric:
-                return float(entry[statistic])
-        return None
+        return value_of(self.score, metric, statistic)
+
+
+def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> float | None:
+    """One statistic of one metric of a score as JSON has it, None where it has no such."""
+    entries = (score or {"metrics": []})["metrics"]
+    return next((float(entry[statistic]) for entry in entries if entry["name"] == metric), None)
 
 
 @dataclass(frozen=True, slots=True)

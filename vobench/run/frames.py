@@ -19,7 +19,7 @@ FRAMES, TIMES = "frames.csv", "times.csv"
 EXPOSURES, ANSWERS = "exposures.csv", "answers.csv"
 EXPOSURE_COLUMNS = ("frame", "t_ns", "exposure_s", "gain_db")
 ANSWER_COLUMNS = ("frame", "status", "reason", "tracks", "inliers", "stats")
-TIME_COLUMNS = ("frame", "wall_ms", "cpu_ms")
+TIME_COLUMNS = ("frame", "wall_ms", "cpu_ms", "memory_mib")
 ERROR_COLUMNS = ("position_error_m", "rotation_error_deg")
 
 
@@ -29,7 +29,8 @@ class FrameRow:
 
     `status` is empty where the estimator never answered. The errors are against the truth after the score's
     alignment; `tracks` and `inliers` count the points that were followed; `stats` is a JSON object of what else the
-    estimator said. `wall_ms` and `cpu_ms` are what the answer cost.
+    estimator said. `wall_ms` and `cpu_ms` are what the answer cost, `memory_mib` the most
+    that the estimator's processes held so far.
     """
 
     frame: int
@@ -45,6 +46,7 @@ class FrameRow:
     stats: str
     wall_ms: float | None
     cpu_ms: float | None
+    memory_mib: float | None = None
 
 
 COLUMNS = tuple(field.name for field in fields(FrameRow) if field.name not in TIME_COLUMNS[1:])

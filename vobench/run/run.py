@@ -3,12 +3,14 @@
 import platform
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
 
 from vobench import __version__, stop
-from vobench.run.estimate import ESTIMATE, LOG, TRACKS
+from vobench.run.consistency import COVARIANCE
+from vobench.run.estimate import ESTIMATE, LOG, REVISED, TRACKS
 from vobench.run.folder import (
     CASE,
     ENVIRONMENT,
@@ -37,7 +39,8 @@ if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
 
 Finish = Callable[[RunFolder, list[TrialScore]], None]
-OF_ESTIMATE, OF_SCORE = (ESTIMATE, TRACKS, LOG, TIMES), (SCORE, FRAMES)
+OF_ESTIMATE, OF_SCORE = (ESTIMATE, TRACKS, LOG, TIMES, COVARIANCE, REVISED), (SCORE, FRAMES)
+OPTIONAL = (COVARIANCE, REVISED)
 
 
 def run_suite(
@@ -75,7 +78,8 @@ def _gather(task: Task, cases: Mapping[str, Case | RecordedCase], store: Path, f
     target.mkdir(parents=True)
     for place, names in ((estimate, OF_ESTIMATE), (store / task.key, OF_SCORE)):
         for name in names:
-            copyfile(place / name, target / name)
+            if name not in OPTIONAL or (place / name).is_file():
+                copyfile(place / name, target / name)
     return score
 
 
@@ -95,6 +99,8 @@ def _entrant_facts(entrant: Entrant) -> dict[str, Any]:
         "name": manifest.name,
         "version": manifest.version,
         "params": entrant.params,
+        "limits": asdict(entrant.limits),
+        "mode": entrant.mode,
         "code": folder_digest(entrant.folder),
     }
 

@@ -1,16 +1,20 @@
 """Estimate to score: one trial's numbers and its status."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vobench.geometry import se3
+from vobench.metric.definitions import DEFINITIONS
 from vobench.metric.score import Score, score
 from vobench.metric.settings import ScoreSettings
-from vobench.run.estimate import ESTIMATE, FINISHED, Outcome, read_outcome
-from vobench.run.folder import SCORE, TrialScore, TrialStatus, read_tum
-from vobench.run.frames import write_frames
+from vobench.run.consistency import trial_consistency
+from vobench.run.estimate import DROPPED, ESTIMATE, FINISHED, REVISED, Outcome, read_outcome
+from vobench.run.folder import SCORE, SURVIVED, TrialScore, TrialStatus, read_tum
+from vobench.run.frames import ANSWERS, EXPOSURES, read_table, write_frames
 from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.run.store import write_json
 from vobench.trajectory.trajectory import Trajectory
@@ -20,6 +24,8 @@ if TYPE_CHECKING:
 
 # The truth that a trial is scored against has one pose for each frame.
 SETTINGS = ScoreSettings(coverage_of="frames")
+NO_SCALE = "Sim(3)"
+OF_NO_SCALE = tuple(metric for metric in DEFINITIONS.values() if not metric.full or metric.id == "scale_drift")
 # What trackers of resting things jitter by. Extents, not path lengths: jitter adds up along a path.
 STILL_M, STILL_RAD = 2e-3, np.deg2rad(0.2)
 
@@ -27,8 +33,16 @@ STILL_M, STILL_RAD = 2e-3, np.deg2rad(0.2)
 def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) -> None:
     """Score a trial's estimate against its sequence's true path: the score and the table of frames, in a folder."""
     gt = read_tum(sequence / GROUND_TRUTH)  # what is scored is what anybody can score again
-    scored = score_estimate(estimate, gt)
-    status, reason = _status(read_outcome(estimate), scored, gt)
+    claims = trial.entrant.claims
+    est, revised = read_tum(estimate / ESTIMATE), estimate / REVISED
+    scored = score_estimate(est, gt, claims)
+    later = score_estimate(read_tum(revised), gt, claims) if revised.is_file() else None
+    stamps = {row["frame"]: int(row["t_ns"]) for row in read_table(sequence / EXPOSURES)}
+    dropped = [stamps[row["frame"]] for row in read_table(estimate / ANSWERS) if row["status"] == DROPPED]
+    outcome, scale = read_outcome(estimate), scored.alignment.scale if scored else 1.0
+    status, reason = _status(outcome, scored, gt)
+    if dropped and outcome.kind == FINISHED:
+        status, reason = _status_of_handed(est, gt, claims, dropped)
     score = TrialScore(
         case=trial.case.name,
         variant=trial.case.variant,
@@ -40,7 +54,10 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
         frames=len(gt),
         path_m=float(gt.distances_m()[-1]),
         score=scored.as_dict() if scored else None,
-        drift_m=_extent_m(read_tum(estimate / ESTIMATE)) if scored and stands_still(gt) else None,
+        drift_m=_extent_m(est) if scored and stands_still(gt) else None,
+        claims=claims,
+        consistency=trial_consistency(estimate, gt, est, start_ns=min(stamps.values()), scale=scale),
+        revised=later.as_dict() if later else None,
     )
     write_json(folder / SCORE, score.model_dump(mode="json"))
     write_frames(sequence, estimate, scored, folder)
@@ -57,10 +74,16 @@ def _extent_m(trajectory: Trajectory) -> float:
     return float(np.linalg.norm(trajectory.positions_m - trajectory.positions_m[:1], axis=1).max())
 
 
-def score_estimate(estimate: Path, gt: Trajectory) -> Score | None:
-    """The score of an estimate's folder, None where it holds no pose of a frame whose truth is known."""
-    est = read_tum(estimate / ESTIMATE)
-    return score(gt, est, settings=SETTINGS) if np.isin(est.t_ns, gt.t_ns).any() else None
+def score_estimate(est: Trajectory, gt: Trajectory, claims: Sequence[str]) -> Score | None:
+    """The score of an estimate, None where it holds no pose of a frame whose truth is known.
+
+    One that claims no more than Sim(3) is aligned with a scale, and how that drifts is told.
+    """
+    if not np.isin(est.t_ns, gt.t_ns).any():
+        return None
+    if NO_SCALE not in claims:
+        return score(gt, est, settings=SETTINGS)
+    return score(gt, est, settings=replace(SETTINGS, alignment="sim3", full=True), metrics=OF_NO_SCALE)
 
 
 def _status(outcome: Outcome, scored: Score | None, gt: Trajectory) -> tuple[TrialStatus, str]:
@@ -78,3 +101,16 @@ def _status(outcome: Outcome, scored: Score | None, gt: Trajectory) -> tuple[Tri
         without = scored.association.gt_poses - scored.association.pairs
         return "partial", f"no pose for {without} of {len(gt)} frames; the first is {scored.coverage.first_lost_frame}"
     return "ok", ""
+
+
+def _status_of_handed(
+    est: Trajectory, gt: Trajectory, claims: Sequence[str], dropped: Sequence[int]
+) -> tuple[TrialStatus, str]:
+    """How a trial in real time ended, by the frames that came in time; those of these stamps did not."""
+    in_time = ~np.isin(gt.t_ns, dropped)
+    handed = Trajectory(gt.t_ns[in_time], gt.T_world_frame[in_time])
+    status, reason = _status(Outcome(kind=FINISHED, reason=""), score_estimate(est, handed, claims), handed)
+    if status not in SURVIVED:
+        return status, reason
+    late = f"it was too late for {len(dropped)} of {len(gt)} frames"
+    return "partial", f"{late}; {reason}" if reason else late

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any, Literal
@@ -138,18 +138,18 @@ def estimator_code(entrant: Entrant) -> dict[str, str]:
 
 def estimate_task(trial: Trial, sequence: str, code: Mapping[str, str]) -> Task:
     """What lets an estimator run on the sequence of that key; `code` is its `estimator_code`."""
-    from vobench.run.estimate import LIMITS
-
-    needs = (sequence,)
+    entrant, needs = trial.entrant, (sequence,)
     inputs = {
-        "params": trial.entrant.params,
+        "params": entrant.params,
         "repeat": trial.repeat,
-        "limits": repr(LIMITS),
+        "limits": asdict(entrant.limits),
+        "mode": entrant.mode,
         "needs": needs,
         **code,
         "libraries": library_versions("numpy", "scipy", "opencv-python-headless"),
     }
-    return Task("estimate", trial, inputs, needs, Resources(memory_bytes=GIB + LIMITS.memory_bytes))
+    takes = Resources(entrant.limits.threads, GIB + (entrant.limits.memory_mib << 20))
+    return Task("estimate", trial, inputs, needs, takes)
 
 
 def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
@@ -158,6 +158,7 @@ def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
         "case": trial.case.name,
         "variant": trial.case.variant,
         "estimator": trial.entrant.label,
+        "claims": trial.entrant.claims,
         "repeat": trial.repeat,
         **_made_by("score", (sequence, estimate)),
         "libraries": library_versions("numpy", "scipy"),

@@ -1,1 +1,1 @@
-"""What a scene is: flat surfaces, materials with procedural textures, and lights. Pure."""
+"""What a scene is: meshes, materials with procedural textures, and lights. Pure."""

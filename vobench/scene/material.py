@@ -85,6 +85,15 @@ def srgb(values: ArrayLike) -> NDArray[np.uint8]:
     return np.asarray(np.rint(255 * encoded), np.uint8)
 
 
+def emitted_cd_m2(material: Material) -> Array:
+    """Luminance (3,) of each channel of what a material emits, the mean over its texture."""
+    if material.emission_texture is None:
+        return np.array(material.emission_cd_m2)
+    pixels = material.emission_texture.pixels()
+    grey = pixels[..., None] if pixels.ndim == 2 else linear(pixels[..., :3])
+    return np.asarray(material.emission_cd_m2 * grey.mean((0, 1), dtype=float))
+
+
 def reflectance(material: Material) -> Map:
     """Luminous reflectance (H, W) float32 of a body's tile, row 0 at v = 0; one pixel where it has no texture."""
     colour = np.array(material.colour, np.float32)

@@ -1,4 +1,4 @@
-"""A scene: surfaces with materials, lights, and movers; metres, world frame, z up."""
+"""A scene: things with materials, lights, and movers; metres, world frame, z up."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,6 @@ from vobench.geometry.se3 import Array
 from vobench.scene.light import AreaLight, Light
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, Triangles, quad, table
-from vobench.scene.surface import Surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,24 +35,22 @@ class Path:
 
 @dataclass(frozen=True, slots=True)
 class Mover:
-    """A rigid thing on a path; its surfaces and things are in its own frame."""
+    """A rigid thing on a path; its things are in its own frame."""
 
     name: str
-    surfaces: tuple[Surface, ...]
+    things: tuple[Thing, ...]
     path: Path
-    things: tuple[Thing, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Static surfaces and things, their materials by name, the lights that shine on them, and movers."""
+    """Things that stand still, their materials by name, the lights that shine on them, and movers."""
 
     name: str
-    surfaces: tuple[Surface, ...]
+    things: tuple[Thing, ...]
     materials: dict[str, Material]
     lights: tuple[Light, ...]
     movers: tuple[Mover, ...] = ()
-    things: tuple[Thing, ...] = ()
 
     @property
     def panels(self) -> tuple[AreaLight, ...]:
@@ -62,21 +59,15 @@ class Scene:
 
 
 def triangles(scene: Scene, *, t_ns: float | None = None) -> Triangles:
-    """Every face of a scene: surfaces, things, panels, movers; these in their own frames where t_ns is None."""
-    static = [*map(_thing, scene.surfaces), *scene.things]
+    """Every face of a scene: things, panels, movers; these in their own frames where t_ns is None."""
     lamps = {nth: light for nth, light in enumerate(scene.lights) if isinstance(light, AreaLight)}
     panels = {nth: Thing(light.name, light.mesh, light.material or light.name) for nth, light in lamps.items()}
-    moving = [(nth, thing) for nth, m in enumerate(scene.movers) for thing in (*map(_thing, m.surfaces), *m.things)]
-    things = [*static, *panels.values(), *(thing for _, thing in moving)]
-    mover = [-1] * (len(static) + len(panels)) + [nth for nth, _ in moving]
-    lamp = [-1] * len(static) + list(panels) + [-1] * len(moving)
+    moving = [(nth, thing) for nth, m in enumerate(scene.movers) for thing in m.things]
+    things = [*scene.things, *panels.values(), *(thing for _, thing in moving)]
+    mover = [-1] * (len(scene.things) + len(panels)) + [nth for nth, _ in moving]
+    lamp = [-1] * len(scene.things) + list(panels) + [-1] * len(moving)
     faces = table(things, mover, lamp)
     return faces if t_ns is None else faces.moved([m.path.pose(t_ns) for m in scene.movers])
-
-
-def _thing(surface: Surface) -> Thing:
-    mesh = quad(surface.corner_m, surface.edge_u_m, surface.edge_v_m, uv_m=surface.texture_corner_m)
-    return Thing(surface.instance, mesh, surface.material)
 
 
 def ceiling_light(name: str, center_m: Array, size_m: tuple[float, float], *, power_lm: float) -> AreaLight:

@@ -18,7 +18,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.scene import scene as scripted
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
-from vobench.scene.material import LUMINANCE, Material
+from vobench.scene.material import LUMINANCE, Material, emitted_cd_m2
 from vobench.scene.mesh import Thing, area_m2
 from vobench.scene.scene import Scene
 from vobench.suite.scene_file import SKY, SUN, Lighting, content, lit, materials_used
@@ -61,15 +61,14 @@ def _make(spec: SceneFile) -> Scene:
     parts += [_mover(mover, spec) for mover in spec.movers]
     materials = {name: material for part in parts for name, material in part.materials.items()}
     found = [thing for part in parts for thing in part.things]
-    glowing = {name for name, material in materials.items() if max(material.emission_cd_m2) > 0}
+    glowing = {name for name, material in materials.items() if emitted_cd_m2(material).max() > 0}
     own = [light for part in parts for light in part.lights]
     return Scene(
         spec.name,
-        (),
+        tuple(thing for thing in found if thing.material not in glowing),
         materials,
         (*own, *_glow([thing for thing in found if thing.material in glowing], materials)),
         tuple(mover for part in parts for mover in part.movers),
-        tuple(thing for thing in found if thing.material not in glowing),
     )
 
 
@@ -190,7 +189,7 @@ def _glow(things: Sequence[Thing], materials: Mapping[str, Material]) -> Iterato
     """Every thing that shines as a light; those of one name are numbered."""
     count = Counter[str]()
     for thing in things:
-        emission = np.array(materials[thing.material].emission_cd_m2)
+        emission = emitted_cd_m2(materials[thing.material])
         luminance = float(emission @ np.array(LUMINANCE))
         nth, count[thing.name] = count[thing.name], count[thing.name] + 1
         red, green, blue = (emission / luminance).tolist()
@@ -212,4 +211,4 @@ def _mover(mover: MoverSpec, spec: SceneFile) -> Contents:
     times_s, positions_m, yaw_deg = (np.array(column, float) for column in columns)
     path = scripted.Path(times_s, positions_m, yaw_deg, mover.repeats)
     moving = tuple(replace(thing, name=mover.name) for thing in own.things)
-    return Contents(materials=own.materials, movers=(scripted.Mover(mover.name, (), path, moving),))
+    return Contents(materials=own.materials, movers=(scripted.Mover(mover.name, moving, path),))

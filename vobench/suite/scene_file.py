@@ -12,7 +12,7 @@ import numpy as np
 from vobench.asset import FINISHES, MODEL_SUFFIXES
 from vobench.errors import SuiteError, unknown
 from vobench.scene.light import Light, Sky, Sun, scaled
-from vobench.scene.material import LUMINANCE
+from vobench.scene.material import LUMINANCE, emitted_cd_m2
 from vobench.scene.mesh import area_m2
 from vobench.setting import Triple
 from vobench.suite import yaml_file
@@ -83,7 +83,7 @@ def _bare(path: Path) -> SceneFile:
     from vobench.asset.model import read_model
 
     model = read_model(path)
-    emission = {name: float(np.array(m.emission_cd_m2) @ LUMINANCE) for name, m in model.materials.items()}
+    emission = {name: float(emitted_cd_m2(m) @ LUMINANCE) for name, m in model.materials.items()}
     areas_m2 = [(float(area_m2(thing.mesh.corners_m)), thing.material) for thing in model.everything]
     lamps_lm = sum(light.power_lm for light in model.lights if not isinstance(light, Sun | Sky))
     glow_lm = sum(np.pi * area * emission[material] for area, material in areas_m2)

@@ -5,11 +5,12 @@ from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Le, MinLen
 
 from vobench.errors import SettingError, SuiteError, unknown
+from vobench.estimator.manifest import Limits, Manifest
 from vobench.geometry.rig import PRESETS, CalibrationError, Rig, mounted, true_rig
 from vobench.motion.replay import Replay
 from vobench.motion.wheeled import Wheeled
@@ -20,7 +21,7 @@ from vobench.sensor.pixel_truth import CHANNELS
 from vobench.setting import Like, Name, OneOf, Positive, Short, hints, settings
 from vobench.suite import catalog, scene_file, yaml_file
 from vobench.suite.catalog import Entry, Kind
-from vobench.suite.manifest import Manifest, read_manifest
+from vobench.suite.manifest import read_manifest
 from vobench.suite.scene_spec import LightOverride, SceneFile
 from vobench.suite.source import SOURCES, RecordedCase, Source, recorded_cases
 from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times
@@ -29,7 +30,7 @@ from vobench.suite.yaml_file import Mistakes, YamlFile
 NEEDED = ("scenes", "rigs", "trajectories")
 ENGINES = ("raster", "path")
 MOST_SAMPLES = 65536
-HONEST = CalibrationError()
+HONEST, USUAL = CalibrationError(), Limits()
 
 
 @settings()
@@ -78,11 +79,12 @@ class Rendering:
 
 @settings()
 class EstimatorSettings:
-    """An estimator with parameters other than its manifest's."""
+    """An estimator with parameters and limits other than its manifest's."""
 
     name: str
     label: Name | None = None
     params: dict[str, Any] = field(default_factory=dict)
+    limits: dict[Annotated[str, OneOf("limit", hints(Limits))], float] = field(default_factory=dict)
 
 
 def _named(value: Any) -> Any:
@@ -93,6 +95,7 @@ ChannelName = Annotated[str, OneOf("ground-truth channel", CHANNELS)]
 Camera = Annotated[CameraSettings, SENSOR_PRESETS]
 NamedEstimator = Annotated[EstimatorSettings, Short(_named, {"type": "string"})]
 Lighting = dict[str, LightOverride]
+Mode = Literal["step", "real_time"]
 
 
 @settings()
@@ -114,6 +117,7 @@ class Suite:
     cameras: Annotated[dict[Name, Camera], MinLen(1)] = field(default_factory=lambda: {"clean": CameraSettings()})
     rendering: Rendering = Rendering()
     truth: tuple[ChannelName, ...] = ()
+    modes: Annotated[tuple[Mode, ...], MinLen(1)] = ("step",)
     estimators: Annotated[tuple[NamedEstimator, ...], MinLen(1)]
 
     def __post_init__(self) -> None:
@@ -172,12 +176,22 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """An estimator as it takes part in a suite: its folder, its manifest and its parameters."""
+    """An estimator as it takes part in a suite: its folder, its manifest, its parameters and limits.
+
+    In mode `step` it gets the next frame when it is through with the last, in `real_time` when the camera has it.
+    """
 
     label: str
     folder: Path
     manifest: Manifest
     params: dict[str, Any]
+    limits: Limits = USUAL
+    mode: Mode = "step"
+
+    @property
+    def claims(self) -> tuple[str, ...]:
+        """What a board says beside the label."""
+        return (*self.manifest.claims, *(["real time"] if self.mode == "real_time" else []))
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,8 +285,17 @@ class _Planner:
         entrants = list[Entrant]()
         for index, spec in listed.items():
             with self.wrong.at("estimators", index):
-                entrants.append(self._entrant(spec, index, entrants))
+                entrants += self._of_modes(self._entrant(spec, index), entrants)
         return tuple(entrants)
+
+    def _of_modes(self, entrant: Entrant, earlier: list[Entrant]) -> list[Entrant]:
+        """The entrant in each mode of the suite; where there are two, real time has a label of its own."""
+        modes = tuple(dict.fromkeys(getattr(self.suite, "modes", ("step",))))
+        labels = {mode: f"{entrant.label}.{mode}" if mode != modes[0] else entrant.label for mode in modes}
+        for label in labels.values():
+            if label in [other.label for other in earlier]:
+                raise SuiteError(f"two estimators are called '{label}'; give one a label of its own")
+        return [replace(entrant, label=label, mode=mode) for mode, label in labels.items()]
 
     def _asked_for(self, only: tuple[str, ...], listed: dict[int, EstimatorSettings]) -> tuple[Entrant, ...]:
         """The suite's own entries of these labels, else estimators of these names with their defaults.
@@ -283,19 +306,21 @@ class _Planner:
         for name in only:
             index = next((index for index, spec in listed.items() if name == (spec.label or spec.name)), None)
             spec = EstimatorSettings(name=name) if index is None else listed[index]
-            entrants.append(self._entrant(spec, index, entrants))
+            entrants += self._of_modes(self._entrant(spec, index), entrants)
         return tuple(entrants)
 
-    def _entrant(self, spec: EstimatorSettings, index: int | None, earlier: list[Entrant]) -> Entrant:
+    def _entrant(self, spec: EstimatorSettings, index: int | None) -> Entrant:
         folder = self._find("estimator", spec.name).path
         manifest = read_manifest(folder)
         for key, value in spec.params.items():
             with self.wrong.at("estimators", index or 0, "params", key):
                 _check_param(key, value, manifest.params)
-        label = spec.label or manifest.name
-        if label in [other.label for other in earlier]:
-            raise SuiteError(f"two estimators are called '{label}'; give one a label of its own")
-        return Entrant(label, folder, manifest, {**manifest.params, **spec.params})
+        limits = manifest.limits
+        for key, value in spec.limits.items():
+            with self.wrong.at("estimators", index or 0, "limits"):
+                changed: Any = int(value) if isinstance(getattr(limits, key), int) else value
+                limits = replace(limits, **{key: changed})
+        return Entrant(spec.label or manifest.name, folder, manifest, {**manifest.params, **spec.params}, limits)
 
     def _scenes(self) -> dict[str, SceneFile]:
         """The scenes by their files' names, which name a case's place on this axis; lightings are checked on each."""

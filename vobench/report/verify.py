@@ -8,6 +8,7 @@ from typing import Any
 
 from vobench import stop
 from vobench.errors import VobenchError
+from vobench.run.estimate import ESTIMATE, REVISED
 from vobench.run.folder import SEQUENCE, RunFolder, file_hash, read_hashes, read_score, read_tum
 from vobench.run.ground_truth import GROUND_TRUTH, left_truth
 from vobench.run.score import score_estimate
@@ -63,13 +64,15 @@ def _rescored(file: Path) -> str:
     try:
         held = read_score(file)
         gt = read_tum(file.parents[3] / GROUND_TRUTH)
-        scored = score_estimate(file.parent, gt)
+        tracks = {name: file.parent / name for name in (ESTIMATE, REVISED) if (file.parent / name).is_file()}
+        scored = {name: score_estimate(read_tum(path), gt, held.claims) for name, path in tracks.items()}
     except (VobenchError, OSError) as error:
         return str(error)
-    anew = json.loads(json.dumps(scored.as_dict())) if scored else None
-    if anew == held.score:
-        return ""
-    return f"the score differs: {_difference(held.score, anew)}"
+    anew = {name: json.loads(json.dumps(each.as_dict())) for name, each in scored.items() if each}
+    for name, before in ((ESTIMATE, held.score), (REVISED, held.revised)):
+        if anew.get(name) != before:
+            return f"the score differs: {_difference(before, anew.get(name))}"
+    return ""
 
 
 def _difference(held: Any, anew: Any, place: str = "") -> str:

@@ -1,0 +1,135 @@
+"""A program of any language that reads a whole recording from files, and writes all its poses to one."""
+
+import shutil
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from vobench import stop
+from vobench.errors import TrajectoryError, VobenchError
+from vobench.estimator.manifest import OUT, PLACEHOLDER, Limits
+from vobench.estimator.process import FARTHEST_M, Answer
+from vobench.estimator.program import EstimatorFailure, Program, new_home
+from vobench.estimator.protocol import Frame, Result, Status
+from vobench.geometry.rig import Rig
+from vobench.geometry.se3 import Array
+from vobench.trajectory.formats import Parsed, Unit, content, parse_any
+from vobench.trajectory.trajectory import Stamps
+
+UNITS: tuple[Unit | None, ...] = (None, "ns", "us", "ms")
+CALIBRATION = "camchain.yaml"
+OUT_BYTES = 1 << 30
+
+
+def filled(argv: Sequence[str], folder: Path, values: Mapping[str, Any]) -> list[str]:
+    """A manifest's words for the system: {name} is filled in, and what begins with ./ lies in the manifest's folder."""
+    words = [PLACEHOLDER.sub(lambda name: str(values[name[1]]), word) for word in argv]
+    placed = [str(folder.resolve() / word[2:]) if word.startswith("./") else word for word in words]
+    if not Path(placed[0]).is_absolute() and shutil.which(placed[0]) is None:
+        raise EstimatorFailure("refused", f"no executable {placed[0]!r} on PATH; install it, or name it by its path")
+    return placed
+
+
+class CommandProgram:
+    """A program that is run once at the start; each frame is then answered with what it wrote of it.
+
+    `write_dataset` fills the folder of {dataset}; a frame's cost is the program's, divided among all frames (N,).
+    """
+
+    def __init__(
+        self,
+        argv: Sequence[str],
+        folder: Path,
+        *,
+        log: Path,
+        limits: Limits,
+        out: str = OUT,
+        t_ns: Stamps,
+        write_dataset: Callable[[Path], object],
+    ) -> None:
+        self._argv, self._folder, self._log, self._limits = argv, folder, log, limits
+        self._out, self._t_ns, self._write_dataset = out, t_ns, write_dataset
+        self._cost, self._poses = (0.0, 0.0, 0.0), dict[int, Array]()
+
+    def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
+        """Write the recording, run the program on it and read its poses. Raises EstimatorFailure."""
+        del rig  # which is in the files
+        home = new_home()
+        with stop.undone(lambda: stop.remove(home)):
+            (dataset := home / "dataset").mkdir()
+            try:
+                self._write_dataset(dataset)
+            except VobenchError as error:
+                raise EstimatorFailure("refused", str(error)) from None
+            values = {"dataset": dataset, "calib": dataset / CALIBRATION, "out": home / self._out, "seed": seed}
+            argv = filled(self._argv, self._folder, {**params, **values, "rate_hz": rate_hz(self._t_ns)})
+            began = time.monotonic()
+            with Program(argv, log=self._log, limits=self._limits, home=home) as program:
+                program.wait()
+                self._poses = poses_in(home / self._out, self._t_ns)
+        wall_s, frames_per_ms = time.monotonic() - began, len(self._t_ns) / 1e3
+        self._cost = wall_s / frames_per_ms, program.cpu_s / frames_per_ms, program.peak_mib
+
+    def process(self, frame: Frame) -> Answer:
+        """What it wrote of a frame."""
+        T = self._poses.get(frame.t_ns)
+        return Answer(Result(T) if T is not None else Result(None, Status.LOST, "no_pose"), *self._cost)
+
+    def finish(self) -> dict[int, Array]:
+        """All that it revised is in its poses already."""
+        return {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """The program has ended at the start."""
+
+
+def rate_hz(t_ns: Stamps) -> float:
+    """Frames a second, by the median of the steps of stamps (N,)."""
+    return round(1e9 / float(np.median(np.diff(t_ns))), 6) if len(t_ns) > 1 else 1.0
+
+
+def poses_in(path: Path, t_ns: Stamps) -> dict[int, Array]:
+    """The poses that a program wrote, by the stamps of the frames, each within half a step of its own.
+
+    Any form that `vobench score` reads; one without stamps has a pose for each frame. Raises EstimatorFailure.
+    """
+    if not path.is_file():
+        raise EstimatorFailure("invalid_output", "it ended well, but wrote no file {out}")
+    if path.stat().st_size > OUT_BYTES:
+        raise EstimatorFailure("invalid_output", f"it wrote {path.stat().st_size} bytes of poses")
+    text = path.read_text(encoding="utf-8", errors="replace")
+    if not content(text):
+        raise EstimatorFailure("lost", "it ended well, but {out} is empty")
+    errors = list[str]()
+    for unit in UNITS:
+        try:
+            parsed = parse_any(text, name="{out}", unit=unit)
+            if not (unit and parsed.notes):  # too fine a unit makes one stamp of several
+                return _matched(parsed, t_ns)
+        except TrajectoryError as error:
+            errors.append(" ".join(str(error).split()))
+    raise EstimatorFailure("invalid_output", errors[0])
+
+
+def _matched(parsed: Parsed, t_ns: Stamps) -> dict[int, Array]:
+    """Each pose at the frame whose stamp is nearest. Raises TrajectoryError where that is none of the poses' own."""
+    stamps = parsed.t_ns if parsed.t_ns is not None else parsed.stamped_by(t_ns)
+    if stamps is None:
+        raise TrajectoryError(f"{{out}} has {len(parsed.T)} poses without stamps, for {len(t_ns)} frames")
+    if np.abs(parsed.T[:, :3, 3]).max() > FARTHEST_M:
+        raise TrajectoryError(f"{{out}} has a pose farther than {FARTHEST_M:g} m away")
+    after = np.clip(np.searchsorted(t_ns, stamps), 1, max(len(t_ns) - 1, 1))
+    near = np.where(stamps - t_ns[after - 1] < t_ns[after] - stamps, after - 1, after) if len(t_ns) > 1 else after - 1
+    half_ns = np.diff(t_ns).min() / 2 if len(t_ns) > 1 else np.inf
+    off, again = np.abs(t_ns[near] - stamps) > half_ns, np.diff(near, prepend=-1) < 1
+    for wrong, said in ((off, "no frame"), (again, "the same frame as the one before")):
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise TrajectoryError(f"{{out}}: pose {row}, stamped {stamps[row] / 1e9:.9f} s, is of {said}")
+    return dict(zip(t_ns[near].tolist(), parsed.T, strict=True))

@@ -1,0 +1,200 @@
+"""Whether an estimator keeps the contract: it is run on recordings of a second, each with something of its own."""
+
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import fmean
+
+import numpy as np
+
+from vobench.estimator.process import EstimatorProcess
+from vobench.estimator.program import EstimatorFailure
+from vobench.estimator.protocol import Image
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import ImuCalibration, Rig, stereo_rig
+from vobench.geometry.se3 import transform
+from vobench.run import estimate as running
+from vobench.run.estimate import estimate, frames_of, read_outcome
+from vobench.run.folder import read_tum
+from vobench.run.frames import ANSWERS, TIMES, read_table
+from vobench.run.ground_truth import write_ground_truth
+from vobench.run.store import SilentProgress
+from vobench.sensor.imu import ImuReadings
+from vobench.sequence import Sequence, SequenceWriter
+from vobench.suite.manifest import read_manifest
+from vobench.suite.source import RecordedCase, Source
+from vobench.suite.suite import Entrant, Trial
+
+LENS = Pinhole(320, 240, 240.0, 240.0, 159.5, 119.5)
+HEIGHT_M, BASELINE_M, STEP_M, STEP_NS = 0.4, 0.05, 0.005, 50_000_000
+FRAMES, FIRST_ODD, LAST_ODD = 20, 10, 13
+IMU = ImuCalibration(np.eye(4), 200.0, 1e-4, 1e-3, 1e-5, 1e-4)
+RIG = stereo_rig(LENS, pitch_deg=90, baseline_m=BASELINE_M, height_m=HEIGHT_M)
+STILL_M = 0.01  # farther than this no tracker of a resting picture should come in a second
+
+
+@dataclass(frozen=True, slots=True)
+class Clause:
+    """One thing that was looked at: whether it `holds` (None: it could not be told), and what was seen."""
+
+    name: str
+    holds: bool | None
+    seen: str
+
+
+@dataclass(frozen=True, slots=True)
+class Practice:
+    """What is recorded: a drive over a textured floor, seen from above, with something odd from FIRST_ODD on."""
+
+    is_still: bool = False
+    odd: Callable[[int, Image], Image | None] = field(default=lambda _, picture: picture)
+
+    def write(self, folder: Path) -> Path:
+        """Record it. A picture that the odd part makes None is missing."""
+        floor = np.random.default_rng(7).integers(30, 220, (60, 42)).repeat(12, 0).repeat(12, 1)
+        rig = Rig(RIG.left, RIG.right, RIG.T_body_left, RIG.T_body_right, RIG.wheels, IMU)
+        disparity_px, step_px = round(240 * BASELINE_M / HEIGHT_M), round(240 * STEP_M / HEIGHT_M)
+        with SequenceWriter(folder, rig, case_json=b"{}") as writer:
+            for index in range(FRAMES):
+                moved = 0 if self.is_still else index
+                top = 300 - step_px * moved
+                noise = np.random.default_rng(index).integers(-2, 3, (2, 240, 320))
+                eyes = [floor[top : top + 240, left : left + 320] for left in (60, 60 + disparity_px)]
+                pair = [self.odd(index, (eye + n).astype(np.uint8)) for eye, n in zip(eyes, noise, strict=True)]
+                self._write_readings(writer, index, moved)
+                if pair[0] is not None:
+                    writer.write_frame(index * STEP_NS, pair[0], pair[1])
+                    pose = transform(np.eye(3), [STEP_M * moved, 0.0, 0.0])
+                    writer.write_truth(index * STEP_NS, pose, np.zeros(6))
+        write_ground_truth(folder)
+        return folder
+
+    def _write_readings(self, writer: SequenceWriter, index: int, moved: int) -> None:
+        t_ns = index * STEP_NS + np.arange(-9 if index else 0, 1) * 5_000_000
+        level = np.tile([0.0, 0.0, 9.81], (len(t_ns), 1))
+        writer.write_imu(ImuReadings(t_ns, np.zeros_like(level), level))
+        wheels = RIG.wheels
+        assert wheels
+        ticks = round(STEP_M * moved / (2 * np.pi * wheels.radius_m) * wheels.ticks_per_revolution)
+        writer.write_encoders([index * STEP_NS], [[ticks, ticks]])
+
+
+def _at_odd(change: Callable[[Image], Image | None], last: int = LAST_ODD) -> Callable[[int, Image], Image | None]:
+    return lambda index, picture: change(picture) if FIRST_ODD <= index < last else picture
+
+
+PRACTICES = {
+    "drive": Practice(),
+    "other end": Practice(odd=_at_odd(lambda picture: picture[::-1], FRAMES)),
+    "black": Practice(odd=_at_odd(np.zeros_like)),
+    "missing": Practice(odd=_at_odd(lambda _: None)),
+    "standstill": Practice(is_still=True),
+}
+
+
+def contract(folder: Path) -> Iterator[Clause]:
+    """Try an estimator, clause by clause. Raises SuiteError where its manifest is wrong."""
+    manifest = read_manifest(folder)
+    entrant = Entrant(manifest.name, folder, manifest, manifest.params, manifest.limits)
+    with tempfile.TemporaryDirectory(prefix="vobench-try-") as place:
+        at = {name: practice.write(Path(place, name)) for name, practice in PRACTICES.items()}
+
+        def run(name: str, again: str = "") -> Path:
+            made = Path(place, f"{name} estimated{again}")
+            made.mkdir()
+            case = RecordedCase(name=name, variant={}, source=Source(path=str(at[name])))
+            estimate(Trial(case, entrant, 0), at[name], made, SilentProgress())
+            return made
+
+        drive = run("drive")
+        yield _ended("rigid poses in time", drive)
+        if read_outcome(drive).kind != running.FINISHED:
+            return
+        yield _repeats(drive, run("drive", " again"), is_declared=manifest.deterministic)
+        yield _causes(entrant, drive, lambda: run("other end"))
+        yield from _in_one_process(entrant, at["drive"], drive)
+        for name in ("black", "missing"):
+            yield _ended(f"{name} frames", run(name))
+        yield _rests(run("standstill"))
+        yield _spends(drive, entrant)
+
+
+def _ended(name: str, made: Path) -> Clause:
+    outcome = read_outcome(made)
+    poses = len(read_tum(made / running.ESTIMATE))
+    frames = len(read_table(made / ANSWERS))
+    if outcome.kind != running.FINISHED:
+        return Clause(name, False, f"{outcome.kind} after {frames} frames: {outcome.reason}")
+    return Clause(name, True, f"{poses} poses of {frames} frames")
+
+
+def _repeats(first: Path, second: Path, *, is_declared: bool) -> Clause:
+    is_same = all((first / name).read_bytes() == (second / name).read_bytes() for name in (running.ESTIMATE, ANSWERS))
+    seen = (
+        f"two runs are {'the same' if is_same else 'not the same'}, declared deterministic: {str(is_declared).lower()}"
+    )
+    return Clause("determinism", is_same or not is_declared, seen)
+
+
+def _causes(entrant: Entrant, drive: Path, run: Callable[[], Path]) -> Clause:
+    """Other pictures from FIRST_ODD on must leave the poses before them as they were."""
+    manifest = entrant.manifest
+    if manifest.command or not (manifest.causal and manifest.deterministic):
+        why = "it reads all at once" if manifest.command else "it is not declared causal and deterministic"
+        return Clause("causality", None, f"{why}: nothing to compare")
+    before = [read_tum(made / running.ESTIMATE) for made in (drive, run())]
+    known = [each.T_world_frame[each.t_ns < FIRST_ODD * STEP_NS] for each in before]
+    is_same = np.array_equal(known[0], known[1])
+    return Clause("causality", is_same, f"poses {'do not hang' if is_same else 'hang'} on later frames")
+
+
+def _in_one_process(entrant: Entrant, recording: Path, drive: Path) -> Iterator[Clause]:
+    """What only a class can be asked: that it leaves its frames alone, and starts again from nothing."""
+    manifest, sequence = entrant.manifest, Sequence.open(recording)
+    if not manifest.class_path:
+        return
+    frames, log = list(frames_of(sequence, manifest.needs)), drive / "watched.txt"
+    try:
+        with EstimatorProcess(
+            entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits
+        ) as process:
+            tracks = []
+            for _ in range(2):
+                process.start(sequence.rig, entrant.params, 0, is_watched=True)
+                answers = [process.process(frame).result for frame in frames]
+                tracks.append(
+                    [None if answer.T_odom_frame is None else answer.T_odom_frame.tolist() for answer in answers]
+                )
+    except EstimatorFailure as failure:
+        yield Clause("frames unchanged, restart", False, f"{failure.kind}: {failure.reason}")
+        return
+    yield Clause("frames unchanged", True, "no picture and no reading was written to")
+    is_same = tracks[0] == tracks[1]
+    seen = f"start() once more gives {'the same' if is_same else 'other'} poses"
+    yield Clause("restart", is_same or not manifest.deterministic, seen)
+
+
+def _rests(made: Path) -> Clause:
+    if read_outcome(made).kind != running.FINISHED:
+        return _ended("standstill", made)
+    path_m = read_tum(made / running.ESTIMATE).positions_m
+    if not len(path_m):
+        return Clause("standstill", False, "no pose")
+    away_m = float(np.linalg.norm(path_m - path_m[:1], axis=1).max())
+    return Clause("standstill", away_m <= STILL_M, f"{1e3 * away_m:.2f} mm away at most, in a second")
+
+
+def _spends(made: Path, entrant: Entrant) -> Clause:
+    rows = read_table(made / TIMES)
+    wall_ms, cpu_ms = ([float(row[name]) for row in rows] for name in ("wall_ms", "cpu_ms"))
+    limit_ms = 1e3 * entrant.limits.frame_s
+    cost = f"{fmean(wall_ms):.1f} ms a frame, {max(wall_ms):.1f} ms at most, {fmean(cpu_ms):.1f} ms of CPU"
+    return Clause("time", max(wall_ms) <= limit_ms, f"{cost}; 320 x 240 pixels")
+
+
+def assert_contract(folder: Path | str) -> None:
+    """For a plugin's own tests: raises AssertionError with every clause that an estimator's folder does not keep."""
+    broken = [f"{clause.name}: {clause.seen}" for clause in contract(Path(folder)) if clause.holds is False]
+    if broken:
+        raise AssertionError(f"{folder} does not keep the contract: {'; '.join(broken)}")
