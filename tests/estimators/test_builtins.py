@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 from vobench.errors import VobenchError
-from vobench.estimator import EncoderReadings, ImuReadings, Status
+from vobench.estimator import EncoderReadings, Frame, ImuReadings, Status
 from vobench.geometry import se3
+from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import (
     PIONEER_WHEELS,
+    PRESETS,
     CalibrationError,
     looking,
+    mounted,
     paper_lens,
     stereo_rig,
     true_rig,
@@ -113,6 +116,39 @@ def test_who_stands_still_under_noise_stays_within_a_millimetre(bed, filmed, est
     noisy = [replace(first, left=grainy(first.left, rng), right=grainy(first.right, rng)) for _ in range(12)]
     results = bed.estimated(estimator, AHEAD, noisy)
     assert np.abs(positions(results)).max() < 0.001
+
+
+@pytest.mark.parametrize("estimator", [*STEREO, "mono_vo", "planar_floor", "wheel_visual", "imu_visual"])
+@pytest.mark.parametrize("size", [(20, 16), (64, 48), (1226, 370)])
+def test_pictures_of_nothing_are_no_crash_and_no_nan(bed, estimator, size):
+    """Noise, white, and noise again, of any size: a pose is a pose or there is none."""
+    lens, rng = Pinhole(*size, size[0], size[0], (size[0] - 1) / 2, (size[1] - 1) / 2), np.random.default_rng(7)
+    imu = replace(IMUS["adis16448"]).calibration
+    running = bed.started(estimator, replace(stereo_rig(lens, pitch_deg=30), imu=imu))
+    level = ImuReadings(np.zeros(1, np.int64), np.zeros((1, 3)), np.array([[0, 0, 9.8]]))
+    for k in range(4):
+        left, right = (
+            rng.integers(0, 256, (2, *size[::-1])).astype(np.uint8)
+            if k != 2
+            else np.full((2, *size[::-1]), 255, np.uint8)
+        )
+        stamp = np.array([k * 10**8], np.int64)
+        readings = {"encoders": EncoderReadings(stamp, np.full((1, 2), 50 * k)), "imu": replace(level, t_ns=stamp)}
+        result = running.process(Frame(k, k * 10**8, left, right, **readings))
+        assert result.T_odom_frame is None or se3.is_rotation(result.T_odom_frame[:3, :3], tolerance=1e-9)
+        assert result.T_odom_frame is None or np.isfinite(result.T_odom_frame).all()
+        assert np.isfinite(list(result.stats.values())).all()
+
+
+@pytest.mark.parametrize("name", ["euroc", "fisheye"])
+def test_points_are_followed_through_lenses_that_bend_lines(bed, name):
+    preset, legs = PRESETS[name], ((3, 0.5, 0.0), (3, 0.4, 1.0))
+    rig = mounted(preset.left, preset.right, preset.T_left_right, pitch_deg=15)
+    T_world_body = bed.drive(*legs)
+    results = bed.estimated("stereo_pnp", rig, bed.film(rig, T_world_body))
+    accuracy = bed.accuracy(results, T_world_body @ rig.T_body_left)
+    assert accuracy.end_fraction < 0.01
+    assert accuracy.end_rad < np.deg2rad(0.1)
 
 
 def grainy(image, rng, sigma=2.0):
