@@ -27,6 +27,7 @@ from vobench.run.task import ENTRIES, NO_LIMIT, Task, perform
 FailureKind = Literal["crashed", "out_of_memory", "refused"]
 LOOK_S = 0.2
 GRACE_S = 1.0  # for a process that is asked to stop
+CONNECT_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +197,7 @@ class Dask:
         except ImportError:
             raise InputError("--scheduler needs Dask; run: pip install 'vobench[dask]'") from None
         try:
-            self._client = Client(address, timeout="10s", set_as_default=False)
+            self._client = Client(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(f"no Dask scheduler answers ({_line(error)}): {address}") from None
         own, theirs = versions(), self._client.run(versions)
