@@ -82,7 +82,7 @@ def run_command(
     from vobench.cli.report import print_boards
     from vobench.report import page
     from vobench.report.leaderboard import as_json as boards_as_json
-    from vobench.run.run import run_suite
+    from vobench.run.run import BESIDE, run_suite
 
     _, recordings = _preflight(planned)
     store = cache_folder()
@@ -104,6 +104,8 @@ def run_command(
         print(boards_as_json(boards), end="")
     else:
         print_boards(boards)
+        if share_time:
+            terminal.console().print(f"CPU times of this run were taken {BESIDE}.")
         vobench = "vobench" if shutil.which("vobench") else sys.argv[0]  # where the environment is not activated
         terminal.console().print(f"Everything is in {folder.path}\nLook into it: {vobench} view {folder.path}")
     for line in broken:
