@@ -30,17 +30,17 @@ from scipy import stats
 
 from vobench import ScoreSettings, Sequence, Trajectory, read_sequence, read_trajectory, score
 from vobench.estimator import EncoderReadings, Frame, ImuReadings, Result
+from vobench.estimator.manifest import Manifest
 from vobench.estimator.worker import load
 from vobench.geometry import se3
 from vobench.sequence.picture import grey
-from vobench.suite.manifest import Manifest, read_manifest
+from vobench.suite.manifest import read_manifest
 
 HERE = Path(__file__).parent
 BUILT_IN = HERE.parent / "estimators"
 SUITES = HERE / "estimators"
 Frames = list[Frame]
 Readings = TypeVar("Readings", EncoderReadings, ImuReadings)
-WITHOUT_SCALE = {"mono_vo"}  # their paths are scaled to the truth's before they are scored
 
 
 def as_filmed(frames: Frames) -> Frames:
@@ -206,7 +206,7 @@ def measured(altered: Callable[[Frames], Frames], folder: Path, name: str) -> Ro
         return Row(nan, nan, nan, nan, farthest_mm, len(known) / len(frames), cpu_ms)
     truth, stamps = read_trajectory(folder), np.array([frames[k].t_ns for k in known], np.int64)
     scale = score(truth, Trajectory(stamps, poses), settings=ScoreSettings(alignment="sim3")).alignment.scale
-    if manifest.name in WITHOUT_SCALE:
+    if not manifest.metric:
         poses[:, :3, 3] *= scale
     scored = score(truth, Trajectory(stamps, poses))
     t_rel, r_rel = (scored.metric(name) for name in ("kitti_t_rel", "kitti_r_rel"))

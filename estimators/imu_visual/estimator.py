@@ -20,8 +20,8 @@ from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2
 
 from .filter import State, anchored, carried, corrected, started
 
-CORRELATED = 10.0  # tracks near each other err alike: so many count as one
-STEREO_M, STEREO_RAD = 1e-4, 1e-4  # what stereo errs by beyond the noise of its tracks
+CORRELATED = 4.0  # tracks near each other err alike: so many count as one
+STEREO_M, STEREO_RAD = 2e-5, 2e-5  # what stereo errs by beyond the noise of its tracks
 MOST_DOUBTS = 5  # frames after which stereo is right and the filter wrong
 
 

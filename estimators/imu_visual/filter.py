@@ -1,7 +1,7 @@
-"""An error-state Kalman filter: pose, velocity, the gyroscopes' bias and gravity. Source: Sola (2017).
+"""An error-state Kalman filter: pose, velocity, both biases and gravity. Source: Sola (2017).
 
-The error (15,) is of position and velocity in odom, of attitude in the IMU's own axes, of bias and of gravity:
-p, theta, v, b, g. Gravity is three unknowns, so that a tilted start and the accelerometers' bias are in it.
+The error (18,) is of position p, attitude theta in the IMU's own axes, velocity v, the gyroscopes' bias b, the
+accelerometers' bias a, and gravity g in odom, which is the IMU at the start however that is tilted.
 """
 
 from dataclasses import dataclass, replace
@@ -14,28 +14,28 @@ from vobench.geometry import se3
 from vobench.geometry.rig import ImuCalibration
 from vobench.geometry.se3 import Array
 
-P, THETA, V, BIAS, GRAVITY = (slice(k, k + 3) for k in range(0, 15, 3))
+P, THETA, V, TURN, FORCE, GRAVITY = (slice(k, k + 3) for k in range(0, 18, 3))
 POSE = slice(0, 6)
-START_SIGMAS = np.repeat([1e-9, 1e-9, 1.0, 0.01, 2.0], 3)  # m, rad, m/s, rad/s, m/s²
-GRAVITY_WALK = 0.02  # m/s² per √s: the accelerometers' bias turns with the body
-LEAST_GYRO, LEAST_ACCEL = 1e-5, 1e-4  # densities below which no real IMU is: an ideal one has zero
+START_SIGMAS = np.repeat([1e-9, 1e-9, 1.0, 0.01, 0.2, 2.0], 3)  # m, rad, m/s, rad/s, m/s², m/s²
+LEAST_GYRO, LEAST_ACCEL = 1e-5, 1e-3  # densities, and walks, below which no real IMU is: an ideal one has zero
 
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Where the IMU is at an instant, how fast, and what it errs by; the covariance (15, 15) is of the error."""
+    """Where the IMU is at an instant, how fast, and what it errs by; the covariance (18, 18) is of the error."""
 
     t_ns: float
     T_odom_imu: Array
     v_mps: Array
     bias_radps: Array
+    bias_mps2: Array
     gravity_mps2: Array
     covariance: Array
 
 
 def started(t_ns: float, gravity_mps2: Array) -> State:
     """At rest or not, upright or not: known is the pose alone, which is the origin."""
-    return State(t_ns, np.eye(4), np.zeros(3), np.zeros(3), gravity_mps2, np.diag(START_SIGMAS**2))
+    return State(t_ns, np.eye(4), np.zeros(3), np.zeros(3), np.zeros(3), gravity_mps2, np.diag(START_SIGMAS**2))
 
 
 def carried(state: State, turn_radps: Array, force_mps2: Array, until_ns: float, imu: ImuCalibration) -> State:
@@ -44,16 +44,16 @@ def carried(state: State, turn_radps: Array, force_mps2: Array, until_ns: float,
     if dt <= 0:
         return state
     R = state.T_odom_imu[:3, :3]
-    rate = turn_radps - state.bias_radps
+    rate, force = turn_radps - state.bias_radps, force_mps2 - state.bias_mps2
     half, whole = (cv2.Rodrigues(rate * share * dt)[0].astype(float) for share in (0.5, 1.0))
-    acceleration = R @ half @ force_mps2 + state.gravity_mps2
+    acceleration = R @ half @ force + state.gravity_mps2
     p_m = state.T_odom_imu[:3, 3] + state.v_mps * dt + acceleration * dt**2 / 2
-    F = np.eye(15)
+    F = np.eye(18)
     F[P, V] = F[V, GRAVITY] = np.eye(3) * dt
-    F[THETA, THETA], F[THETA, BIAS] = whole.T, -np.eye(3) * dt
-    F[V, THETA] = -R @ half @ cross_matrix(force_mps2[None])[0] * dt
+    F[THETA, THETA], F[THETA, TURN] = whole.T, -np.eye(3) * dt
+    F[V, THETA], F[V, FORCE] = -R @ half @ cross_matrix(force[None])[0] * dt, -R @ half * dt
     gyro, accel = max(imu.gyro_noise, LEAST_GYRO), max(imu.accel_noise, LEAST_ACCEL)
-    densities = np.repeat([0.0, gyro, accel, max(imu.gyro_walk, LEAST_GYRO), GRAVITY_WALK], 3)
+    densities = np.repeat([0.0, gyro, accel, max(imu.gyro_walk, LEAST_GYRO), max(imu.accel_walk, LEAST_ACCEL), 0.0], 3)
     covariance = F @ state.covariance @ F.T + np.diag(densities**2 * dt)
     pose = se3.transform(R @ whole, p_m)
     return replace(state, t_ns=until_ns, T_odom_imu=pose, v_mps=state.v_mps + acceleration * dt, covariance=covariance)
@@ -76,7 +76,8 @@ def corrected(state: State, T_odom_imu: Array, noise: Array, *, gate: float) -> 
         state.t_ns,
         se3.transform(se3.nearest_rotation(pose[:3, :3]), pose[:3, 3]),
         state.v_mps + step[V],
-        state.bias_radps + step[BIAS],
+        state.bias_radps + step[TURN],
+        state.bias_mps2 + step[FORCE],
         state.gravity_mps2 + step[GRAVITY],
         (covariance + covariance.T) / 2,
     )

@@ -41,6 +41,7 @@ class Settings:
     keep_below_px: float
     ransac_px: float
     refine_below_h_ratio: float
+    refine_below_px: float
     degraded_above_px: float
     lost_above_px: float
     estimate_offset: int
@@ -102,10 +103,11 @@ class LkEpipolar:
         if motion is None:
             return self._lost(view, "no_scale" if views.shapes else "no_model", matches)
 
-        # Off a plane the tracks alone know the direction better than either matrix does.
-        if views.h_ratio < self._settings.refine_below_h_ratio:
+        # Off a plane, and where hardly anything moves, tracks and depths together know more than either matrix does.
+        s = self._settings
+        if views.h_ratio < s.refine_below_h_ratio or matches.flow_px < s.refine_below_px:
             motion = refined(motion, matches, views.inlier)
-        if motion.transfer_px > self._settings.lost_above_px:
+        if motion.transfer_px > s.lost_above_px:
             return self._lost(view, "transfer_error", matches)
         return self._step(view, matches, views, motion)
 

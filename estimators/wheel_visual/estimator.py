@@ -17,7 +17,7 @@ from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 
-CORRELATED = 10.0  # tracks near each other err alike: so many count as one
+CORRELATED = 4.0  # tracks near each other err alike: so many count as one
 PLANE = (0, 1, 5)  # of a small translation and rotation: along x and y, about z
 STEREO_RATIO, STEREO_M, STEREO_RAD = 0.002, 5e-5, 1e-4  # what stereo errs by beyond the noise of its tracks
 WHEEL_M, WHEEL_RAD = 2e-4, 2e-4  # about a count

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 HERE, FRAME = Path(__file__).resolve().parent, struct.Struct("<qqIIIIII")
-OK, LOST, INIT = 1, 4, 0
+OK, LOST = 1, 4
+JUMP_M, JUMP_DEG = 0.15, 8.0  # off a steady motion from frame to frame: no hand does that
 # What the library prints must not fall among the answers.
 ANSWERS = os.fdopen(os.dup(1), "wb")
 os.dup2(2, 1)
@@ -72,7 +73,7 @@ class Tracker:
     """One system; poses are of the left camera in its first place, kept continuous where the map is aligned anew."""
 
     def __init__(self, mode: str, calibration: dict) -> None:
-        self._mode, self._t0_ns, self._was_inertial = mode, None, False
+        self._mode, self._t0_ns = mode, None
         file = Path(tempfile.mkdtemp()) / "settings.yaml"
         file.write_text(settings(calibration, calibration["rate_hz"]))
         sensor = {"stereo": "STEREO", "mono": "MONOCULAR", "inertial": "IMU_STEREO"}[mode]
@@ -102,15 +103,20 @@ class Tracker:
         return self._continued(np.asarray(result.pose_wc, float))
 
     def _continued(self, T_map_left: np.ndarray) -> np.ndarray:
-        now = bool(self._slam.imu_initialized()) if self._mode == "inertial" else False
-        if self._T_odom_map is None or now != self._was_inertial:
-            self._T_odom_map = self._last @ self._step @ np.linalg.inv(T_map_left)
-        self._was_inertial = now
+        """The pose in odom, which stays where the map is turned upright, at some time after the IMU is initialised."""
+        expected = self._last @ self._step
+        if self._T_odom_map is None or (self._mode == "inertial" and self._jumps(expected, T_map_left)):
+            self._T_odom_map = expected @ np.linalg.inv(T_map_left)
         T = self._T_odom_map @ T_map_left
         u, _, v = np.linalg.svd(T[:3, :3])
         T[:3, :3] = u @ v
         self._step, self._last = np.linalg.inv(self._last) @ T, T
         return T
+
+    def _jumps(self, expected: np.ndarray, T_map_left: np.ndarray) -> bool:
+        off = np.linalg.inv(expected) @ self._T_odom_map @ T_map_left
+        turned = np.degrees(np.arccos(np.clip((np.trace(off[:3, :3]) - 1) / 2, -1, 1)))
+        return bool(np.linalg.norm(off[:3, 3]) > JUMP_M or turned > JUMP_DEG)
 
 
 def main() -> None:

@@ -41,7 +41,10 @@ def test_check_counts_what_run_would_do_and_does_none_of_it(vobench, here):
     assert planned["trials"] == 2
     assert not (here / "runs").exists()
     assert not (here / "cache").exists()
-    assert vobench("run", "tiny", "--dry-run", "--json").json == planned
+    dry = vobench("run", "tiny", "--dry-run", "--json").json
+    to_do = {row["stage"]: (row["tasks"], row["in the cache"], row["to do"]) for row in dry.pop("tasks")}
+    assert dry == planned
+    assert to_do == {"bake": (1, 0, 1), "sequence": (1, 0, 1), "estimate": (2, 0, 2), "score": (2, 0, 2)}
     vobench("run", "tiny")
     assert vobench("check", "tiny", "--json").json["cases"][0]["simulated"]
 
@@ -174,3 +177,41 @@ def test_view_of_a_run_without_a_single_pose_works_too(vobench, here):
     said = vobench("view", "runs/tiny", "--save", "a.rrd", "--json")
     assert said.json["estimator"] == "blind"
     assert (here / "a.rrd").stat().st_size > 0
+
+
+def test_only_what_matches_is_run_and_values_take_the_place_of_the_suites(vobench, here):
+    said = vobench("run", "tiny", "-e", "stand*", "-c", "sh*", "-n", "2", "--set", "seed=5", "--json")
+    (row,) = said.json["boards"][0]["rows"]
+    assert (row["estimator"], row["runs"]) == ("stand_still", 2)
+    assert '"seed": 5' in (here / "runs/tiny/latest/suite.json").read_text()
+    for words, sentence in (
+        (("-c", "long"), "no case named 'long'. Known: short"),
+        (("--set", "seed"), "--set should be key=value, as in rigs.ahead.pitch_deg=20, got 'seed'"),
+        (("--set", "name.x=1"), "--set name.x=1: there are no keys below 'name'"),
+        (("--fail-if", "ate > x"), "no metric named 'ate'. Did you mean"),
+        (
+            ("--fail-if", "much"),
+            "should be a metric, a comparison and a number, as in 'ate_trans.rmse > 0.2', got 'much'",
+        ),
+    ):
+        wrong = vobench("run", "tiny", *words)
+        assert wrong.code == 1
+        assert sentence in wrong.err
+
+
+def test_a_threshold_that_is_broken_is_said_and_is_a_code_of_its_own(vobench, here):
+    kept = vobench("run", "tiny", "-e", "stand_still", "--fail-if", "coverage < 0.5")
+    assert (kept.code, kept.err.count("which is")) == (0, 0)
+    broken = vobench("run", "tiny", "-e", "stand_still", "--fail-if", "ate_trans.max >= 0")
+    assert broken.code == 3
+    assert "stand_still on short: ate_trans.max is" in broken.err
+
+
+def test_the_log_of_events_has_a_start_and_an_end_of_each_task(vobench, here):
+    import json
+
+    vobench("run", "tiny", "--events", "events.jsonl")
+    events = [json.loads(line) for line in (here / "events.jsonl").read_text().splitlines()]
+    started = [event["key"] for event in events if event["event"] == "started"]
+    assert sorted(started) == sorted(event["key"] for event in events if event["event"] == "done")
+    assert next(event["stage"] for event in events if event["event"] == "done") == "bake"

@@ -97,15 +97,31 @@ def test_a_homography_of_almost_no_translation_still_gives_rotations(motion):
     assert all(se3.is_rotation(shape.R, tolerance=1e-12) for shape in shapes)
 
 
-def test_refining_brings_a_shape_that_is_off_back_to_the_truth(motion):
-    """Trap 4, the good side: in a scene with depth the Sampson distance knows the shape."""
+def test_refining_brings_a_motion_that_is_off_back_to_the_truth(motion):
+    """Trap 4: rotation, direction and length come back together, from epipolar lines and depths."""
     matches = seen(motion, cloud(), STEP)
-    direction = STEP[:3, 3] / np.linalg.norm(STEP[:3, 3])
-    tilted = direction + np.array([0.1, 0.0, -0.1])
-    off = motion.Shape(moved([1e-3, 0, 0], [0, 0, 0])[:3, :3] @ STEP[:3, :3], tilted / np.linalg.norm(tilted))
-    found = motion.refined(off, matches, np.ones(400, bool))
-    assert np.abs(found.R - STEP[:3, :3]).max() < 1e-5
-    assert abs(found.direction @ direction) > 1 - 1e-6
+    off = moved([1e-3, 0, 0], [0.001, 0.0, -0.001]) @ STEP
+    off[:3, 3] *= 1.05
+    begun = motion.Motion(motion.shape_of(off), off, np.inf)
+    found = motion.refined(begun, matches, np.ones(400, bool))
+    np.testing.assert_allclose(found.T_now_last, STEP, atol=1e-7)
+    assert found.transfer_px < 1e-4
+
+
+def test_refining_on_a_plane_does_not_slide_along_its_ambiguity(motion):
+    matches = seen(motion, floor(), STEP, noise_px=0.05)
+    begun = motion.Motion(motion.shape_of(STEP), STEP, np.inf)
+    found = motion.refined(begun, matches, np.ones(400, bool))
+    assert np.linalg.norm(found.T_now_last[:3, 3] - STEP[:3, 3]) < 0.02 * np.linalg.norm(STEP[:3, 3])
+
+
+def test_tracks_without_depth_still_count_by_their_epipolar_lines(motion):
+    matches = seen(motion, cloud(), STEP)
+    rho = np.where(np.arange(400) < 12, matches.rho, np.nan)
+    few = motion.Matches(matches.x0, matches.x1, matches.uv0_px, matches.uv1_px, rho, matches.K)
+    off = moved([2e-4, 0, 0], [0.0003, 0.0, -0.0003]) @ STEP
+    found = motion.refined(motion.Motion(motion.shape_of(off), off, np.inf), few, np.ones(400, bool))
+    np.testing.assert_allclose(found.T_now_last, STEP, atol=1e-6)
 
 
 def test_the_sampson_distance_of_a_true_match_is_zero_and_has_the_size_of_the_error(motion):

@@ -183,7 +183,7 @@ def test_a_pane_lets_sunlight_through_and_is_looked_through(trace):
 
 @pytest.mark.parametrize("pitch_deg", [90, 30])
 def test_a_pane_mirrors_by_fresnel_s_law_on_both_of_its_sides(trace, pitch_deg):
-    lamp = AreaLight("lamp", plate("lamp", 4.0, side_m=40.0, up=False), 1e5)
+    lamp = AreaLight("lamp", plate("lamp", 4.0, side_m=40.0, up=False).mesh, 1e5)
     for up in (True, False):
         scene = Scene("pane", (plate("pane", up=up),), {"pane": Material("pane", eta=1.5)}, (lamp,))
         shown = trace(scene, looking(pitch_deg=pitch_deg, position_m=(0, 0, 1.0)), samples=400).mean()
@@ -192,7 +192,7 @@ def test_a_pane_mirrors_by_fresnel_s_law_on_both_of_its_sides(trace, pitch_deg):
 
 
 def test_a_panel_is_seen_as_its_luminance_from_the_front_and_not_from_behind(trace):
-    lamp = AreaLight("lamp", plate("lamp", 1.0, up=False), 1000.0)
+    lamp = AreaLight("lamp", plate("lamp", 1.0, up=False).mesh, 1000.0)
     scene = floor_under(lamp)
     up = se3.transform(np.diag([1, -1, -1.0]) @ DOWN[:3, :3], [0, 0, 0.5])
     np.testing.assert_allclose(trace(scene, up), lamp.luminance_cd_m2, rtol=1e-5)
@@ -261,7 +261,7 @@ LEVELS = {
 def test_a_light_counts_with_its_mean_level_over_the_exposure(trace, kind, level):
     def scene(level):
         lights = {
-            "panel": AreaLight("panel", LAMP.surface, 900.0, level),
+            "panel": AreaLight("panel", LAMP.mesh, 900.0, level),
             "bulb": PointLight("bulb", 2 * Z, 800.0, level),
             "spot": SpotLight("spot", 2 * Z, -Z, 800.0, 20.0, 40.0, level),
             "sun": Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,), level),
@@ -398,10 +398,10 @@ def test_what_glows_is_seen_as_its_emission_and_lights_what_is_before_it(trace):
     halves[:, :32] = 255
     screen = Material(colour=(0.0,) * 3, emission_cd_m2=tuple(emission))
     striped = replace(screen, emission_texture=Picture(halves, 0.01))
-    lamp = AreaLight("lamp", plate("lamp", 3.0, side_m=1.0, up=False), 900.0)
+    lamp = AreaLight("lamp", plate("lamp", 3.0, side_m=1.0, up=False).mesh, 900.0)
     panel = Thing("screen", quad([-0.5, -0.5, 3.0], Y, X), "screen")
     for material, share in ((screen, 1.0), (striped, 0.5)):
-        scene = replace(floor_under(materials={"screen": material}), things=(panel,))
+        scene = floor_under(materials={"screen": material}, over=(panel,))
         up = se3.transform(np.diag([1, -1, -1.0]) @ DOWN[:3, :3], [0, 0, 0.5])
         np.testing.assert_allclose(trace(scene, up, weights=None).mean((0, 1)), share * emission, rtol=0.02)
         shown = trace(scene, samples=1000, weights=None).mean((0, 1))
@@ -416,7 +416,7 @@ def test_holes_are_seen_through_and_let_light_through(trace):
     sun = Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,))
     sheet = Thing("lace", quad([-4, -4, 0.5], 8 * X, 8 * Y).two_sided(), "lace")
     plain = floor_under(sun)
-    covered = replace(plain, things=(sheet,), materials={**plain.materials, "lace": lace})
+    covered = replace(plain, things=(*plain.things, sheet), materials={**plain.materials, "lace": lace})
     shown = trace(covered, samples=2000).mean()
     # Half of the light comes in, half of that out again: the pattern is too fine to know its own shadow.
     assert shown == pytest.approx(0.25 * trace(plain).mean(), rel=0.05)

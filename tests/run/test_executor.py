@@ -9,7 +9,8 @@ import pytest
 
 from vobench.report import page
 from vobench.report.verify import verify_run
-from vobench.run.executor import Done, Event, Executor, LocalProcesses, Serial, perform_all
+from vobench.run import executor
+from vobench.run.executor import Dask, Done, Event, Executor, LocalProcesses, Serial, perform_all
 from vobench.run.folder import RunFolder
 from vobench.run.run import run_suite
 from vobench.run.task import Resources, Task, plan
@@ -164,3 +165,27 @@ def test_a_full_disk_ends_the_run_with_what_to_do(bench, tmp_path, monkeypatch):
 
 def test_the_plan_of_a_real_suite_is_performed_whole(bench, first):
     assert perform_all(plan(bench.plan(), {}), bench.folder / "cache", Serial()) == {}
+
+
+@pytest.fixture
+def dask():
+    """A scheduler with two workers on this machine."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, worker_dashboard_address=None
+    ) as cluster:
+        yield cluster
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_the_workers_of_a_dask_scheduler_write_the_same_bytes(bench, first, tmp_path, dask):
+    assert files(run(bench, tmp_path, Dask(dask.scheduler_address))) == files(first)
+
+
+def test_a_scheduler_that_is_not_there_is_a_sentence(monkeypatch):
+    from vobench.errors import InputError
+
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(executor, "CONNECT_S", 0.5)
+    with pytest.raises(InputError, match=r"no Dask scheduler answers .*: tcp://127.0.0.1:1"):
+        Dask("tcp://127.0.0.1:1")

@@ -11,6 +11,7 @@ from vobench.asset import FINISHES, FURNITURE
 from vobench.asset import room as kinds
 from vobench.errors import ModelError, SuiteError
 from vobench.scene.light import AreaLight, PointLight
+from vobench.scene.material import LUMINANCE, linear
 from vobench.scene.scene import Scene
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import content, read_scene
@@ -174,3 +175,14 @@ def test_a_scene_of_nothing_is_refused(tmp_path: Path) -> None:
     (tmp_path / "void.yaml").write_text("name: void\nwhite_cd_m2: 1\nsky: {illuminance_lx: 1}\n")
     with pytest.raises(SuiteError, match="a scene needs something to see: room, boxes, boards, furniture"):
         read_scene(tmp_path / "void.yaml")
+
+
+def test_a_screen_gives_the_light_of_its_picture(yard) -> None:
+    scene = yard("furniture: [{kind: monitor, name: m, at_m: [0, 0, 1]}]\n")
+    (lamp,) = (light for light in scene.lights if isinstance(light, AreaLight))
+    look = scene.materials[lamp.material]
+    assert look.emission_texture is not None
+    shown = np.array(look.emission_cd_m2) * linear(look.emission_texture.pixels()[..., :3]).mean((0, 1), dtype=float)
+    assert lamp.luminance_cd_m2 == pytest.approx(shown @ LUMINANCE, rel=1e-6)
+    np.testing.assert_allclose(lamp.luminance_cd_m2 * np.array(lamp.colour), shown, rtol=1e-6)
+    assert shown.max() < 0.9 * max(look.emission_cd_m2)

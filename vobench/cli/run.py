@@ -1,20 +1,24 @@
 """vobench run, check and schema."""
 
+import os
 import shutil
 import sys
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from vobench import stop
 from vobench.cli import terminal
 from vobench.errors import InputError
 from vobench.estimator.manifest import Manifest
+from vobench.run.executor import Dask, Executor, LocalProcesses, Serial
 from vobench.run.key import cache_folder
 from vobench.run.motion import BodyMotion, body_motions
 from vobench.run.store import why_unwritable
-from vobench.run.task import is_done, sequence_tasks
+from vobench.run.task import is_done, missing, plan, sequence_tasks
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite import Case, Plan, Suite, read_plan
@@ -28,42 +32,106 @@ def run_command(
     suite: terminal.SuiteName,
     *,
     estimator: Annotated[
-        list[str] | None, typer.Option("--estimator", "-e", help="Run only this one; may be given several times.")
+        list[str] | None,
+        typer.Option("--estimator", "-e", help="Run only this one, or those that match; may be given several times."),
+    ] = None,
+    case: Annotated[
+        list[str] | None, typer.Option("--case", "-c", help="Only cases that match, as in 'dark*'.")
+    ] = None,
+    scene: Annotated[list[str] | None, typer.Option("--scene", "-s", help="Only scenes that match.")] = None,
+    repeats: Annotated[int | None, typer.Option("--repeats", "-n", help="Run each trial so often.")] = None,
+    changes: Annotated[
+        list[str] | None, typer.Option("--set", help="Put a value in place of the suite's, as in seed=3.")
     ] = None,
     out: Annotated[Path, typer.Option(help="Where the folders of runs go.")] = Path("runs"),
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "--jobs",
+            "-j",
+            min=1,
+            envvar="VOBENCH_JOBS",
+            help="Tasks at once; 1 draws bars. Else one a core, 8 at most.",
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Let the workers of a Dask scheduler do it, as in tcp://host:8786.")
+    ] = None,
+    share_time: Annotated[
+        bool, typer.Option("--share-time", help="Let estimators run beside other tasks; the board says so.")
+    ] = False,
+    events: Annotated[
+        Path | None, typer.Option(help="Write what happens to each task here, a JSON object a line.")
+    ] = None,
+    fail_if: Annotated[
+        list[str] | None, typer.Option("--fail-if", help="End with code 3 if so, as in 'ate_trans.rmse > 0.2'.")
+    ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
     json: terminal.Json = False,
 ) -> None:
     """Run a suite: simulate, estimate, score, and print the leaderboard."""
-    names = tuple(estimator or ())
+    from vobench.report.threshold import parse_threshold
+
+    given = [*(changes or ()), *([f"repeats={repeats}"] if repeats else [])]
+    limits = [parse_threshold(said) for said in fail_if or ()]
+    planned = read_plan(suite, only_estimators=tuple(estimator or ()), changes=_assigned(given))
+    planned = planned.only(case or (), scene or ())
     if dry_run:
-        _check(suite, names, as_json=json)
+        _check(planned, as_json=json, is_dry_run=True)
         return
     from vobench.cli.report import print_boards
     from vobench.report import page
     from vobench.report.leaderboard import as_json as boards_as_json
-    from vobench.run.executor import Serial
-    from vobench.run.run import run_suite
+    from vobench.run.run import BESIDE, run_suite
 
-    planned = read_plan(suite, only_estimators=names)
     _, recordings = _preflight(planned)
+    store = cache_folder()
     if cause := why_unwritable(out):
         raise InputError(f"--out should be a folder that can be written ({cause}): {out}")
-    finish, store, progress = page.write_reports, cache_folder(), terminal.Bars()
-    executor = Serial(progress)
-    folder = run_suite(planned, recordings, root=out, store=store, finish=finish, executor=executor, tell=progress.say)
-    boards = page.boards_of(folder, folder.scores())
+    work = terminal.Work(events, is_serial=(count := _jobs(jobs)) == 1 and not scheduler)
+    executor: Executor = Serial(terminal.Bars()) if count == 1 else LocalProcesses(count)
+    executor = Dask(scheduler) if scheduler else executor
+    with stop.undone(executor.close), work:
+        folder = run_suite(
+            planned, recordings, root=out, store=store.resolve(), finish=page.write_reports,
+            executor=executor, shares_time=share_time, heard=work.hear, tell=work.say,
+        )  # fmt: skip
+    scores = folder.scores()
+    boards = page.boards_of(folder, scores)
+    broken = [line for limit in limits for line in limit.broken_by(scores)]
     if json:
         print(boards_as_json(boards), end="")
-        return
-    print_boards(boards)
-    vobench = "vobench" if shutil.which("vobench") else sys.argv[0]  # where the environment is not activated
-    terminal.console().print(f"Everything is in {folder.path}\nLook into it: {vobench} view {folder.path}")
+    else:
+        print_boards(boards)
+        if share_time:
+            terminal.console().print(f"CPU times of this run were taken {BESIDE}.")
+        vobench = "vobench" if shutil.which("vobench") else sys.argv[0]  # where the environment is not activated
+        terminal.console().print(f"Everything is in {folder.path}\nLook into it: {vobench} view {folder.path}")
+    for line in broken:
+        print(f"vobench: {line}", file=sys.stderr)
+    if broken:
+        raise typer.Exit(FAILED_LIMIT)
+
+
+FAILED_LIMIT = 3
+MOST_JOBS = 8
+
+
+def _jobs(asked: int | None) -> int:
+    return asked or min(len(os.sched_getaffinity(0)), MOST_JOBS)
+
+
+def _assigned(changes: Sequence[str]) -> dict[str, str]:
+    """key=value by key. Raises InputError."""
+    for change in changes:
+        if "=" not in change:
+            raise InputError(f"--set should be key=value, as in rigs.ahead.pitch_deg=20, got {change!r}")
+    return dict(change.split("=", 1) for change in changes)
 
 
 def check_command(suite: terminal.SuiteName, *, json: terminal.Json = False) -> None:
     """Validate a suite and print its plan; nothing is rendered."""
-    _check(suite, (), as_json=json)
+    _check(read_plan(suite), as_json=json)
 
 
 def _preflight(planned: Plan) -> "tuple[dict[str, BodyMotion], dict[str, Recording]]":
@@ -81,9 +149,8 @@ def _preflight(planned: Plan) -> "tuple[dict[str, BodyMotion], dict[str, Recordi
     return travels, recordings
 
 
-def _check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
-    """Validate a suite and print what it comes to."""
-    planned = read_plan(suite, only_estimators=estimators)
+def _check(planned: Plan, *, as_json: bool, is_dry_run: bool = False) -> None:
+    """Validate a suite and print what it comes to; of a dry run also what is to be done for it."""
     travels, recordings = _preflight(planned)
     cases = [_facts(case, travels, recordings) for case in planned.cases]
     entrants = [
@@ -92,9 +159,10 @@ def _check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     ]
     found = [{"kind": e.kind, "name": e.name, "origin": e.origin, "path": str(e.path)} for e in planned.found]
     trials = sum(len(planned.trials(case)) for case in planned.cases)
+    to_do = _to_do(planned, recordings) if is_dry_run else []
     if as_json:
         said = {"suite": planned.suite.name, "cases": cases, "estimators": entrants, "trials": trials, "found": found}
-        terminal.print_json(said)
+        terminal.print_json({**said, **({"tasks": to_do} if is_dry_run else {})})
         return
     rows = [[f["case"], str(f["frames"]), f"{f['duration_s']:.1f}", f["sequence"]] for f in cases]
     out = terminal.console()
@@ -105,7 +173,20 @@ def _check(suite: str, estimators: tuple[str, ...], *, as_json: bool) -> None:
     for case in cases:
         for note in case.get("notes", []):
             out.print(f"{case['case']}: {note}")
+    if is_dry_run:
+        rows = [[row["stage"], str(row["tasks"]), str(row["in the cache"]), str(row["to do"])] for row in to_do]
+        out.print(terminal.table("tasks", ["stage", "tasks", "in the cache", "to do"], rows))
     out.print(f"{len(cases)} cases, {len(entrants)} estimators, {trials} trials: the suite is valid")
+
+
+def _to_do(planned: Plan, recordings: "Mapping[str, Recording]") -> list[dict[str, Any]]:
+    """By stage, how many tasks there are, and how many of them are done."""
+    tasks = plan(planned, recordings)
+    wanted = Counter(task.stage for task in missing(tasks, cache_folder()))
+    return [
+        {"stage": stage, "tasks": count, "in the cache": count - wanted[stage], "to do": wanted[stage]}
+        for stage, count in Counter(task.stage for task in tasks).items()
+    ]
 
 
 def _facts(

@@ -2,10 +2,11 @@
 
 import json as json_module
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar
 
 import typer
 
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, ProgressColumn
     from rich.table import Table
+
+    from vobench.run.executor import Event
 
 Item = TypeVar("Item")
 # Options and arguments that many verbs have.
@@ -95,3 +98,57 @@ class Bars:
         if not self._console.is_terminal:
             print(line, file=sys.stderr, flush=True)
         return Progress(*columns, console=self._console, transient=True, disable=not self._console.is_terminal)
+
+
+class Work:
+    """What a run's tasks do: on a terminal a line for each slot, else a line for each task; and a log of events."""
+
+    def __init__(self, events: Path | None, *, is_serial: bool) -> None:
+        from rich.console import Console
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        console = Console(stderr=True, markup=False)
+        self._draws, self._is_serial, self._events = console.is_terminal and not is_serial, is_serial, events
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+        self._bars = Progress(*columns, console=console, transient=True, disable=not self._draws)
+        self._lines, self._log = dict[str, Any](), None if events is None else events.open("w", encoding="utf-8")
+
+    def hear(self, event: "Event") -> None:
+        """Draw and log one event."""
+        name = f"{event.task.stage} {event.task.name}"
+        if self._log:
+            said = {
+                "t_s": round(time.time(), 3),
+                "event": event.what,
+                "stage": event.task.stage,
+                "task": event.task.name,
+            }
+            said |= {
+                "key": event.task.key,
+                "slot": event.slot,
+                "wall_s": round(event.wall_s, 3),
+                "reason": event.reason,
+            }
+            print(json_module.dumps(said, ensure_ascii=False), file=self._log, flush=True)
+        if event.what == "started":
+            if self._draws:
+                self._lines[event.task.key] = self._bars.add_task(name)
+            return
+        if self._draws:
+            self._bars.remove_task(self._lines.pop(event.task.key))
+        if event.what == "failed" or not (self._draws or self._is_serial):
+            ended = f"failed: {event.reason}" if event.what == "failed" else f"{event.wall_s:.1f} s"
+            self._bars.console.print(f"{name}: {ended}", highlight=False, soft_wrap=True)
+
+    def say(self, sentence: str) -> None:
+        """A line of its own, above all others."""
+        self._bars.console.print(f"vobench: {sentence}", highlight=False, soft_wrap=True)
+
+    def __enter__(self) -> Self:
+        self._bars.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bars.stop()
+        if self._log:
+            self._log.close()

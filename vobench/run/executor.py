@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from vobench import __version__, stop
-from vobench.errors import InputError, VobenchError
+from vobench.errors import InputError, MissingDependencyError, VobenchError
 from vobench.run.key import code_digest
 from vobench.run.store import Progress, SilentProgress
 from vobench.run.task import ENTRIES, NO_LIMIT, Task, perform
@@ -27,15 +27,17 @@ from vobench.run.task import ENTRIES, NO_LIMIT, Task, perform
 FailureKind = Literal["crashed", "out_of_memory", "refused"]
 LOOK_S = 0.2
 GRACE_S = 1.0  # for a process that is asked to stop
+CONNECT_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """How a task ended: no failure, or which and why."""
+    """How a task ended: no failure, or which and why; `ends_all` where no other task can end better."""
 
     failure: FailureKind | None = None
     reason: str = ""
     wall_s: float = 0.0
+    ends_all: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,17 +83,19 @@ class Serial:
 
 
 def performed(task: Task, store: Path, threads: int, progress: Progress = SilentProgress()) -> Done:  # noqa: B008
-    """Perform a task; what it raises is told, but for a full disk and a request to stop."""
+    """Perform a task; what it raises is told, but for a request to stop."""
     began = time.monotonic()
     try:
         perform(task, store, threads, progress=progress)
+    except MissingDependencyError as error:
+        return Done("refused", _line(error), time.monotonic() - began, ends_all=True)
     except VobenchError as error:
         return Done("refused", _line(error), time.monotonic() - began)
     except MemoryError:
         return Done("out_of_memory", "there was not enough memory", time.monotonic() - began)
     except Exception as error:  # of one cell; the others go on
         if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-            return Done("refused", f"{FULL}: {error.filename or store}", time.monotonic() - began)
+            return Done("refused", f"{FULL}: {error.filename or store}", time.monotonic() - began, ends_all=True)
         return Done("crashed", f"{type(error).__name__}: {_line(error)}", time.monotonic() - began)
     return Done(wall_s=time.monotonic() - began)
 
@@ -193,7 +197,7 @@ class Dask:
         except ImportError:
             raise InputError("--scheduler needs Dask; run: pip install 'vobench[dask]'") from None
         try:
-            self._client = Client(address, timeout="10s", set_as_default=False)
+            self._client = Client(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(f"no Dask scheduler answers ({_line(error)}): {address}") from None
         own, theirs = versions(), self._client.run(versions)
@@ -309,7 +313,7 @@ def perform_all(
     """Perform tasks, each after those that it needs; the failures by key, those of what they took with them included.
 
     An estimator is timed: unless `shares_time`, nothing else runs beside it. `heard` is called with what happens.
-    Raises InputError where the disk is full, and Stopped.
+    Raises InputError where the disk is full or a library is missing, and Stopped.
     """
     queue, failures, running = _Queue.of(tasks), dict[str, Done](), dict["Future[Done]", tuple[Task, int]]()
     last = [""] * executor.slots
@@ -320,7 +324,7 @@ def perform_all(
             for future in wait(running, timeout=LOOK_S, return_when=FIRST_COMPLETED).done:
                 task, slot = running.pop(future)
                 done = future.result()
-                if FULL in done.reason:
+                if done.ends_all:
                     raise InputError(done.reason)
                 heard(Event("failed" if done.failure else "done", task, slot, done.wall_s, done.reason))
                 if not done.failure:

@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 Finish = Callable[[RunFolder, list[TrialScore]], None]
 OF_ESTIMATE, OF_SCORE = (ESTIMATE, TRACKS, LOG, TIMES, COVARIANCE, REVISED), (SCORE, FRAMES)
 OPTIONAL = (COVARIANCE, REVISED)
+# How the cost of estimators was taken that were run this time.
+ALONE, BESIDE = "with nothing beside it", "beside other tasks"
 
 
 def run_suite(
@@ -78,7 +80,7 @@ def run_suite(
         def fill(folder: RunFolder) -> None:
             write_json(folder.path / SUITE, stated)
             write_json(folder.path / ESTIMATORS, entrants)
-            write_json(folder.path / ENVIRONMENT, _environment())
+            write_json(folder.path / ENVIRONMENT, {**_environment(), "timed": BESIDE if shares_time else ALONE})
             scores = [task for task in tasks if task.stage == "score"]
             finish(folder, [_gather(task, cases, store, folder, failures.get(task.key)) for task in scores])
             write_hashes(folder)

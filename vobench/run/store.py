@@ -127,7 +127,7 @@ def _taken(path: Path) -> int | None:
 def _unlink_if_free(path: Path) -> None:
     """Remove the file of a lock that nobody holds."""
     with suppress(OSError):
-        lock = os.open(path, os.O_RDONLY)
+        lock = os.open(path, os.O_RDWR)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if os.path.samestat(os.fstat(lock), path.stat()):

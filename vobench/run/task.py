@@ -75,6 +75,11 @@ class Task:
     resources: Resources
 
     @property
+    def name(self) -> str:
+        """What people call it."""
+        return self.subject.name
+
+    @property
     def key(self) -> str:
         """Where its result lies in the store, by which others name it."""
         return f"{KINDS[self.stage]}/{digest(self.inputs)}"

@@ -1,15 +1,17 @@
 """What a suite's YAML may say, and the plan that follows: cases, entrants, trials."""
 
-from collections.abc import Collection, Iterator
+import fnmatch
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from itertools import product
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Le, MinLen
 
-from vobench.errors import SettingError, SuiteError, unknown
+from vobench.errors import SettingError, SuiteError, UnknownNameError, unknown
 from vobench.estimator.manifest import Limits, Manifest
 from vobench.geometry.rig import PRESETS, CalibrationError, Rig, mounted, true_rig
 from vobench.motion.replay import Replay
@@ -231,17 +233,38 @@ class Plan:
         """Every trial on one case."""
         return [Trial(case, entrant, n) for entrant in self.entrants for n in range(self.suite.repeats)]
 
+    def only(self, cases: Collection[str], scenes: Collection[str]) -> "Plan":
+        """The plan of those cases and scenes alone whose names match; none given means all.
+
+        Raises UnknownNameError for what matches none.
+        """
+        names, places = [case.name for case in self.cases], [case.variant.get("scene", "") for case in self.cases]
+        for kind, patterns, known in (("case", cases, names), ("scene", scenes, places)):
+            for pattern in patterns:
+                if not fnmatch.filter(known, pattern):
+                    raise UnknownNameError(unknown(kind, pattern, sorted(set(known))))
+
+        def kept(case: Case | RecordedCase) -> bool:
+            pairs = ((case.name, cases), (case.variant.get("scene", ""), scenes))
+            return all(not some or any(fnmatch.fnmatch(name, pattern) for pattern in some) for name, some in pairs)
+
+        return replace(self, simulated=tuple(filter(kept, self.simulated)), recorded=tuple(filter(kept, self.recorded)))
+
     def mistakes(self) -> Mistakes:
         """To gather what is wrong with the suite."""
         return Mistakes(self.source)
 
 
-def read_plan(name: str, *, only_estimators: tuple[str, ...] = ()) -> Plan:
+def read_plan(
+    name: str, *, only_estimators: tuple[str, ...] = (), changes: Mapping[str, str] = MappingProxyType({})
+) -> Plan:
     """The plan of the suite of that name, or in that file; nothing is simulated, no estimator's code is imported.
+
+    `only_estimators` are labels, globs of labels, or names of others; `changes` those of `yaml_file.read_all`.
 
     Raises SuiteError or UnknownNameError.
     """
-    reading = yaml_file.read_all(catalog.find("suite", name).path, Suite)
+    reading = yaml_file.read_all(catalog.find("suite", name).path, Suite, changes)
     wrong = Mistakes(reading.source, list(reading.mistakes))
     meant = {key for said in reading.source.marked for key in get_close_matches(str(said), hints(Suite), n=1)}
     with wrong.at():
@@ -303,7 +326,9 @@ class _Planner:
         Raises UnknownNameError and SuiteError, for it is not the suite that is wrong.
         """
         entrants = list[Entrant]()
-        for name in only:
+        labels = {index: spec.label or spec.name for index, spec in listed.items()}
+        named = [label for name in only for label in (fnmatch.filter(labels.values(), name) or [name])]
+        for name in named:
             index = next((index for index, spec in listed.items() if name == (spec.label or spec.name)), None)
             spec = EstimatorSettings(name=name) if index is None else listed[index]
             entrants += self._of_modes(self._entrant(spec, index), entrants)

@@ -8,10 +8,12 @@ from dataclasses import MISSING, dataclass, field, fields, replace
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.constructor import RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
@@ -49,7 +51,7 @@ class YamlFile:
                 continue  # one value stands for a list of one
             named.append(key)
             if isinstance(tree, dict) and key in tree:
-                tree, line = tree[key], tree.lc.key(key)[0] + 1
+                tree, line = tree[key], tree.lc.key(key)[0] + 1 if key in (tree.lc.data or ()) else line
             elif isinstance(tree, list) and isinstance(key, int) and key < len(tree):
                 tree, line = tree[key], tree.lc.item(key)[0] + 1
             else:
@@ -111,13 +113,18 @@ def read(path: Path, model: type[Model]) -> Model:
     return reading.model
 
 
-def read_all(path: Path, model: type[Model]) -> Reading[Model]:
-    """The file as far as it can be read, and where its keys stand. Raises SuiteError where it is no such file."""
+def read_all(path: Path, model: type[Model], changes: Mapping[str, str] = MappingProxyType({})) -> Reading[Model]:
+    """The file as far as it can be read, and where its keys stand. Raises SuiteError where it is no such file.
+
+    `changes` are values in YAML by keys with dots between, which are put in place of the file's.
+    """
     source, twice = _parse(path)
     if not isinstance(source.marked, dict):
         tree = source.marked
         kind = "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
         raise SuiteError(Mistake(f"should be keys with values, but is {kind}", (source.place(()),)))
+    for keys, value in changes.items():
+        _change(source.marked, keys, value)
     unread = dict(_unreadable(source.marked, ()))
     mistakes = [*twice, *(Mistake(sentence, (source.place(keys),)) for keys, sentence in unread.items())]
     data, wrong = _plain(source.marked), [*unread]
@@ -130,6 +137,23 @@ def read_all(path: Path, model: type[Model]) -> Reading[Model]:
         mistakes += _complaints(source, error, json_schema(model), unread)
     parts, kept = _intact(model, data, wrong)
     return Reading(_partial(model, parts), replace(source, kept=kept), tuple(sorted(mistakes, key=_line)))
+
+
+def _change(tree: Any, keys: str, value: str) -> None:
+    *way, last = (int(key) if key.isdigit() else key for key in keys.split("."))
+    for key in way:
+        held = tree.setdefault(key, CommentedMap()) if isinstance(tree, dict) and isinstance(key, str) else None
+        if held is None and isinstance(tree, list) and isinstance(key, int) and key < len(tree):
+            held = tree[key]
+        if not isinstance(held, dict | list):
+            raise SuiteError(f"--set {keys}={value}: there are no keys below {key!r}")
+        tree = held
+    if isinstance(tree, list) and (not isinstance(last, int) or last >= len(tree)):
+        raise SuiteError(f"--set {keys}={value}: a list of {len(tree)} has no entry {last!r}")
+    try:
+        tree[last] = YAML(typ="safe").load(value)
+    except YAMLError:
+        raise SuiteError(f"--set {keys}={value}: should be a value as YAML has it, such as 3, true or [1, 2]") from None
 
 
 _adapter: Callable[[Any], TypeAdapter[Any]] = cache(TypeAdapter)
