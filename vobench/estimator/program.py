@@ -8,12 +8,15 @@ import sys
 import tempfile
 import time
 from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from vobench import stop
+from vobench.estimator.check import in_one_line
 from vobench.estimator.manifest import Limits
+from vobench.estimator.protocol import Result
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 KEPT_ENVIRONMENT = ("PATH", "HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV")
@@ -27,9 +30,18 @@ class EstimatorFailure(Exception):  # noqa: N818 - a result, not a mistake of ou
     """The estimator gave up: `kind` is a run's status, `reason` one line."""
 
     def __init__(self, kind: str, reason: str) -> None:
-        super().__init__(f"{kind}: {reason}")
-        self.kind = kind
-        self.reason = reason
+        self.kind, self.reason = kind, in_one_line(reason)
+        super().__init__(f"{kind}: {self.reason}")
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A checked result and what it cost, by our own clocks; memory is the most that it held so far."""
+
+    result: Result
+    wall_ms: float
+    cpu_ms: float
+    memory_mib: float = 0.0
 
 
 class Program:
@@ -95,7 +107,9 @@ class Program:
         try:
             code = self.process.wait(timeout=5)
         except subprocess.TimeoutExpired:
-            return "crashed", "it closed its connection and lives on"
+            return "invalid_output", "it closed its output and lives on"
+        if not code:
+            return "invalid_output", "it ended, with exit code 0"
         if code == -signal.SIGKILL:
             return "out_of_memory", "killed by the system, most likely for memory"
         by = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
@@ -103,9 +117,10 @@ class Program:
         return "crashed", f"the process ended with {by}{f': {said}' if said else ''}"
 
     def _last_line(self) -> str:
-        lines = self._log_path.read_bytes()[-4096:].decode("utf-8", "replace").split("\n")
-        printable = ("".join(c for c in line if c.isprintable()).strip() for line in reversed(lines))
-        return next(filter(None, printable), "")[:MOST_OF_A_LINE]
+        with self._log_path.open("rb") as log:
+            log.seek(max(os.path.getsize(self._log_path) - 4096, 0))
+            lines = log.read(4096).decode("utf-8", "replace").split("\n")
+        return next(filter(None, (in_one_line(line, MOST_OF_A_LINE) for line in reversed(lines))), "")
 
     def __enter__(self) -> Self:
         return self
