@@ -206,3 +206,34 @@ with t.running(Path(sys.argv[1]), "print(os.getpid(), flush=True)\\nwhile True: 
         assert is_alive(estimator)
         process.kill()
     await_death(estimator)
+
+
+ORPHAN = """
+import os
+if os.fork() == 0:
+    os.setsid()
+    if os.fork() == 0:
+        open({file!r} + ".part", "w").write(str(os.getpid()))
+        os.rename({file!r} + ".part", {file!r})
+        import time; time.sleep(60)
+    os._exit(0)
+os.wait()
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="orphans are taken in on Linux alone")
+@pytest.mark.parametrize("how", ["killed", "done"])
+def test_no_orphan_in_a_session_of_its_own_is_left_even_where_vobench_is_killed(tmp_path, how):
+    file = tmp_path / "orphan"
+    script = f"""
+import os, sys, signal
+from pathlib import Path
+import test_process as t
+with t.running(Path(sys.argv[1]), {("exec(" + repr(ORPHAN.format(file=str(file))) + "); return Result(I)")!r}) as process:
+    process.process(t.frame())
+    if {how == "killed"}:
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+    search = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+    subprocess.run([sys.executable, "-c", script, str(tmp_path)], env=os.environ | {"PYTHONPATH": search}, check=False)
+    await_death(int(file.read_text()))
