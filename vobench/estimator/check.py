@@ -50,7 +50,10 @@ def checked(answer: Any, frame: int) -> Result:
 
 def _array(value: Any, what: str) -> Array:
     """A float64 array. Raises InvalidOutputError where the value is none of real numbers."""
-    array = np.asarray(value)
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError) as error:
+        raise InvalidOutputError(f"{what} should be an array ({error})") from None
     if array.dtype.kind not in "fiub":
         raise InvalidOutputError(f"{what} should be an array of real numbers, got {array.dtype}")
     return array.astype(np.float64)
