@@ -137,7 +137,7 @@ def test_no_label_reaches_anything_but_its_own_folder(vobench, here, label):
     case = here / "runs" / "tiny" / "latest" / "cases" / "short"
     assert {path.name for path in case.iterdir()} == {"case.json", "ground_truth.tum", "sequence", "estimates"}
     assert {path.name for path in (case / "estimates").iterdir()} == {label, "stand_still"}
-    made = {"inputs.json", "sensors.mcap", "truth.mcap", "ground_truth.tum", "exposures.csv"}
+    made = {"inputs.json", "manifest.json", "sensors.mcap", "truth.mcap", "ground_truth.tum", "exposures.csv"}
     assert {path.name for path in (case / "sequence").iterdir()} == made
     assert vobench("verify", "runs/tiny").code == 0
     assert vobench("view", "runs/tiny", "--estimator", label, "--save", "a.rrd").code == 0

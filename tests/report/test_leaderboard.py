@@ -4,6 +4,7 @@ import html
 import io
 import json
 import re
+import time
 from itertools import pairwise
 
 import pandas as pd
@@ -249,3 +250,25 @@ def test_every_form_shows_drift_and_the_commonest_reason_of_frames(tmp_path, sco
     else:
         (row,) = next(b["rows"] for b in json.loads(text)["boards"] if b["title"] == "down")
         assert (row["drift_mm"], row["ate_mm"], row["frame_reason_first"]) == (2.34, None, 1)
+
+
+@pytest.mark.parametrize(("cases", "estimators"), [(2500, 4), (5, 2000)])
+def test_the_boards_of_ten_thousand_trials_take_a_second_of_work(cases, estimators):
+    """Were it quadratic in either, it would take several."""
+    one = scores_of({"e": [("ok", 0.1)] * len(CASES)})[0]
+    trials = [
+        one.model_copy(
+            update={
+                "case": f"c{k}",
+                "estimator": f"e{n}",
+                "score": {"metrics": [{"name": "ate_trans", "rmse": 0.1 + n}]},
+            }
+        )
+        for k in range(cases)
+        for n in range(estimators)
+    ]
+    began = time.process_time()
+    made = boards(trials, {})
+    assert time.process_time() - began < 2
+    assert [len(board.rows) for board in made] == [estimators] * (cases + 1)
+    assert [row.rank for row in made[1].rows] == list(range(1, estimators + 1))

@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from vobench.errors import InputError
+from vobench.run.entry import file_hash
 from vobench.run.folder import (
     HASHES,
     SCORE,
@@ -15,7 +16,6 @@ from vobench.run.folder import (
     SURVIVED,
     RunFolder,
     TrialScore,
-    file_hash,
     make_run,
     open_run,
     read_hashes,

@@ -148,7 +148,7 @@ def test_a_run_verifies_as_it_was_left(first, recorded):
     for run in (first, recorded):
         findings = list(verify_run(run))
         assert not [finding for finding in findings if finding.wrong]
-        assert {finding.kind for finding in findings} == {"hash", "ground truth", "score"}
+        assert {finding.kind for finding in findings} == {"hash", "ground truth", "cache", "score"}
 
 
 @pytest.fixture
@@ -202,6 +202,17 @@ def test_a_changed_truth_is_found_even_where_its_hash_is_changed_too(changed):
 
     write_hashes(run)
     assert ("ground truth", "dim") in wrong(run)
+
+
+def test_a_file_of_a_sequence_that_is_not_what_the_caches_manifest_says_is_found(changed, tmp_path):
+    run = changed(HASHES, "{", "{")
+    link = run.case("full") / SEQUENCE
+    shutil.copytree(link.resolve(), tmp_path / "damaged")
+    link.unlink()
+    link.symlink_to(tmp_path / "damaged")
+    exposures = tmp_path / "damaged" / "exposures.csv"  # of which the run keeps no hash
+    exposures.write_bytes(bytes(exposures.stat().st_size))
+    assert wrong(run) == [("cache", "full")]
 
 
 def test_a_sequence_that_is_gone_and_a_missing_file_are_said(changed, tmp_path):

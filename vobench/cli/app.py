@@ -38,6 +38,7 @@ VERBS = {
     "verify": "vobench.cli.report:verify_command",
     "report": "vobench.cli.report:report_command",
     "view": "vobench.cli.report:view_command",
+    "cache": "vobench.cli.cache:cache_command",
     "doctor": "vobench.cli.doctor:doctor_command",
 }
 GROUP = "vobench.commands"

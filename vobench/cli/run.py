@@ -85,17 +85,15 @@ def run_command(
     from vobench.run.run import BESIDE, run_suite
 
     _, recordings = _preflight(planned)
-    store = cache_folder()
-    for what, place in (("--out", out), ("VOBENCH_CACHE", store)):
-        if cause := why_unwritable(place):
-            raise InputError(f"{what} should be a folder that can be written ({cause}): {place}")
+    if cause := why_unwritable(out):
+        raise InputError(f"--out should be a folder that can be written ({cause}): {out}")
     work = terminal.Work(events, is_serial=(count := _jobs(jobs)) == 1 and not scheduler)
     executor: Executor = Serial(terminal.Bars()) if count == 1 else LocalProcesses(count)
     executor = Dask(scheduler) if scheduler else executor
     with stop.undone(executor.close), work:
         folder = run_suite(
-            planned, recordings, root=out, store=store.resolve(), finish=page.write_reports,
-            executor=executor, shares_time=share_time, heard=work.hear,
+            planned, recordings, root=out, store=cache_folder().resolve(), finish=page.write_reports,
+            executor=executor, shares_time=share_time, heard=work.hear, tell=work.say,
         )  # fmt: skip
     scores = folder.scores()
     boards = page.boards_of(folder, scores)

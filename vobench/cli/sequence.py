@@ -15,7 +15,7 @@ from vobench.dataset.recording import ReadOptions, Topics
 from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.geometry.rig import Rig
 from vobench.run.import_recording import import_recording
-from vobench.run.store import unfinished
+from vobench.run.store import sweep, unfinished
 from vobench.sequence import Sequence, has_truth, payload_hash, read_import_notes, read_provenance
 from vobench.sequence.recording import is_recording, read_poses, topic_facts
 from vobench.trajectory.formats import parse_any
@@ -157,6 +157,7 @@ def import_command(
     require_free(out)
     options = ReadOptions(calibration, imu, truth, rate, topics=_topics(topic))
     recording = read(path, form=form, options=options)
+    sweep(out.resolve().parent)
     with unfinished(out.resolve().parent) as folder:
         import_recording(recording, folder)
         if out.is_dir():

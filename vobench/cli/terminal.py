@@ -88,6 +88,10 @@ class Bars:
             task = progress.add_task(what, total=None)
             yield lambda share: progress.update(task, total=1.0, completed=share)
 
+    def say(self, sentence: str) -> None:
+        """A line of its own."""
+        print(f"vobench: {sentence}", file=sys.stderr, flush=True)
+
     def _progress(self, line: str, *columns: "ProgressColumn") -> "Progress":
         from rich.progress import Progress
 
@@ -135,6 +139,10 @@ class Work:
         if event.what == "failed" or not (self._draws or self._is_serial):
             ended = f"failed: {event.reason}" if event.what == "failed" else f"{event.wall_s:.1f} s"
             self._bars.console.print(f"{name}: {ended}", highlight=False, soft_wrap=True)
+
+    def say(self, sentence: str) -> None:
+        """One sentence that stays."""
+        self._bars.console.print(sentence, highlight=False, soft_wrap=True)
 
     def __enter__(self) -> Self:
         self._bars.start()

@@ -117,10 +117,11 @@ def answers(trials: Sequence[list[FrameRow]]) -> EstimatorStatistics:
 
 def boards(scores: Iterable[TrialScore], answered: Answered) -> list[Board]:
     """The board over all cases, then one per case; `answered` is per (case, estimator) and may lack some."""
-    every = list(scores)
-    cases = sorted({score.case for score in every})
-    per_case = [board(case, [s for s in every if s.case == case], answered) for case in cases]
-    return [board(f"all {len(cases)} cases", every, answered), *per_case] if len(cases) > 1 else per_case
+    every, by_case = list(scores), dict[str, list[TrialScore]]()
+    for score in every:
+        by_case.setdefault(score.case, []).append(score)
+    per_case = [board(case, of_case, answered) for case, of_case in sorted(by_case.items())]
+    return [board(f"all {len(by_case)} cases", every, answered), *per_case] if len(by_case) > 1 else per_case
 
 
 def board(title: str, scores: list[TrialScore], answered: Answered) -> Board:
@@ -131,8 +132,10 @@ def board(title: str, scores: list[TrialScore], answered: Answered) -> Board:
 
     grouped = [list(group) for _, group in groupby(sorted(scores, key=name), key=name)]
     ranked = sorted((_row(trials, answered) for trials in grouped), key=_place)
-    rows = [replace(row, rank=1 + sum(_place(other)[:3] < _place(row)[:3] for other in ranked)) for row in ranked]
-    return Board(title, tuple(rows))
+    first: dict[tuple[int, int, float], int] = {}
+    for number, row in enumerate(ranked, 1):
+        first.setdefault(_place(row)[:3], number)
+    return Board(title, tuple(replace(row, rank=first[_place(row)[:3]]) for row in ranked))
 
 
 def _place(row: Row) -> tuple[int, int, float, str]:

@@ -50,7 +50,10 @@ def html(folder: RunFolder, scores: list[TrialScore], boards: list[Board]) -> st
     environment = Environment(loader=FileSystemLoader(TEMPLATES), autoescape=True, trim_blocks=True, lstrip_blocks=True)
     names = sorted({score.estimator for score in scores})
     colours = {name: COLOURS[i % len(COLOURS)] for i, name in enumerate(names)}
-    cases = sorted({score.case for score in scores})
+    shown: dict[str, list[TrialScore]] = {score.case: [] for score in sorted(scores, key=lambda score: score.case)}
+    for score in scores:
+        if score.repeat == 0:
+            shown[score.case].append(score)
     return environment.get_template("leaderboard.html").render(
         title=folder.path.resolve().parent.name,
         boards=boards,
@@ -58,8 +61,8 @@ def html(folder: RunFolder, scores: list[TrialScore], boards: list[Board]) -> st
         notes=table.notes,
         legend=table.LEGEND,
         plots=[
-            _plot(folder, case, [s for s in scores if s.case == case and s.repeat == 0], colours)
-            for case in cases
+            _plot(folder, case, of_case, colours)
+            for case, of_case in shown.items()
             if (folder.case(case) / GROUND_TRUTH).is_file()
         ],
         size=PLOT_PX,

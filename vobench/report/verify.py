@@ -8,8 +8,9 @@ from typing import Any
 
 from vobench import stop
 from vobench.errors import VobenchError
+from vobench.run.entry import fault, file_hash
 from vobench.run.estimate import ESTIMATE, REVISED
-from vobench.run.folder import SEQUENCE, RunFolder, file_hash, read_hashes, read_score, read_tum
+from vobench.run.folder import SEQUENCE, RunFolder, read_hashes, read_score, read_tum
 from vobench.run.ground_truth import GROUND_TRUTH, left_truth
 from vobench.run.score import score_estimate
 from vobench.trajectory.formats import format_tum
@@ -25,13 +26,18 @@ class Finding:
 
 
 def verify_run(folder: RunFolder) -> Iterator[Finding]:
-    """Recompute all hashes and scores of a run from its files. Raises InputError where the folder is no run."""
+    """Recompute all hashes and scores of a run, and compare its sequences with the cache's manifests.
+
+    Raises InputError where the folder is no run.
+    """
     files, hashes = folder.score_files(), read_hashes(folder)
     for name, held in hashes.items():
         stop.check()
         yield Finding("hash", name, _changed(folder.path / name, held))
     for case in sorted({file.parents[3].name for file in files}):
         yield Finding("ground truth", case, _truth_differs(folder.case(case)))
+        if (link := folder.case(case) / SEQUENCE).exists():
+            yield Finding("cache", case, fault(link.resolve()))
     for file in files:
         stop.check()
         place = file.relative_to(folder.path)

@@ -1,6 +1,5 @@
 """The folder of a run, as a person reads it, and the hashes of its files."""
 
-import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping
@@ -14,8 +13,9 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from vobench.errors import InputError, TrajectoryError
 from vobench.run.consistency import Consistency
+from vobench.run.entry import file_hash
 from vobench.run.frames import TIMES
-from vobench.run.store import unfinished, write_json
+from vobench.run.store import sweep, unfinished, write_json
 from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
@@ -129,6 +129,7 @@ def open_run(path: Path) -> RunFolder:
 def make_run(root: Path, suite: str, key: str, fill: Callable[[RunFolder], None]) -> RunFolder:
     """A new run's folder, which gets its name when `fill` is through with it without an error."""
     parent = root / suite
+    sweep(parent)
     with unfinished(parent) as folder:
         fill(RunFolder(folder))
         final = _published(folder, parent / f"{datetime.now(UTC):%Y%m%dT%H%M%S}_{key[:8]}")
@@ -164,7 +165,6 @@ def read_tum(path: Path) -> Trajectory:
 
 # Of runs of equal inputs the first are equal; the second are of the files of times, the only ones that differ.
 HASHES, TIMES_HASHES = "hashes.json", "times_hashes.json"
-CHUNK = 1 << 20
 
 
 def write_hashes(folder: RunFolder) -> None:
@@ -193,15 +193,6 @@ def _hashes_in(path: Path) -> dict[str, str]:
     if escaped:
         raise InputError(f"names a file outside the run's folder ({escaped[0]!r}): {path}")
     return held
-
-
-def file_hash(path: Path) -> str:
-    """SHA-256 of a file's bytes."""
-    state = hashlib.sha256()
-    with path.open("rb") as file:
-        while chunk := file.read(CHUNK):
-            state.update(chunk)
-    return state.hexdigest()
 
 
 def _names(root: Path) -> Iterator[str]:

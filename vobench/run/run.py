@@ -5,12 +5,12 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from shutil import copyfile
 from typing import TYPE_CHECKING, Any
 from zipfile import ZipFile
 
 from vobench import __version__, stop
 from vobench.run.consistency import COVARIANCE
+from vobench.run.entry import copy_files
 from vobench.run.estimate import ESTIMATE, LOG, REVISED, TRACKS
 from vobench.run.executor import Done, Event, Executor, perform_all
 from vobench.run.folder import (
@@ -30,7 +30,7 @@ from vobench.run.frames import COLUMNS, FRAMES, TIME_COLUMNS, TIMES, new_table
 from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.run.key import digest, folder_digest, library_versions
 from vobench.run.simulate import LIBRARIES
-from vobench.run.store import write_json
+from vobench.run.store import Store, Tell, write_json
 from vobench.run.task import Task, missing, plan
 from vobench.sequence import read_import_notes
 from vobench.suite.source import RecordedCase
@@ -57,27 +57,35 @@ def run_suite(
     executor: Executor,
     shares_time: bool = False,
     heard: Callable[[Event], object] = lambda _: None,
+    tell: Tell = lambda _: None,
 ) -> RunFolder:
     """Run every case, estimator and repeat; what the store holds already is not made again.
 
     `finish` adds reports to the folder before it gets its final name under `root`. A cell whose task fails has a row
-    that says why. `executor`, `shares_time` and `heard` are those of `perform_all`.
+    that says why. `executor`, `shares_time` and `heard` are those of `perform_all`; `tell` is given sentences on the
+    store, say of a result that was damaged.
     """
     tasks = plan(suite, recordings)
-    failures = perform_all(missing(tasks, store), store, executor, shares_time=shares_time, heard=heard)
-    cases = {case.name: case for case in suite.cases}
-    stated = plain(suite.suite)
-    entrants = [_entrant_facts(entrant) for entrant in suite.entrants]
+    kept = Store(store)
+    with kept.in_use(tell):
+        to_make = missing(tasks, store)
+        if to_make:
+            kept.require_writable()
+            kept.set_aside_damaged((task.key for task in to_make), tell)
+        failures = perform_all(to_make, store, executor, shares_time=shares_time, heard=heard)
+        cases = {case.name: case for case in suite.cases}
+        stated = plain(suite.suite)
+        entrants = [_entrant_facts(entrant) for entrant in suite.entrants]
 
-    def fill(folder: RunFolder) -> None:
-        write_json(folder.path / SUITE, stated)
-        write_json(folder.path / ESTIMATORS, entrants)
-        write_json(folder.path / ENVIRONMENT, {**_environment(), "timed": BESIDE if shares_time else ALONE})
-        scores = [task for task in tasks if task.stage == "score"]
-        finish(folder, [_gather(task, cases, store, folder, failures.get(task.key)) for task in scores])
-        write_hashes(folder)
+        def fill(folder: RunFolder) -> None:
+            write_json(folder.path / SUITE, stated)
+            write_json(folder.path / ESTIMATORS, entrants)
+            write_json(folder.path / ENVIRONMENT, {**_environment(), "timed": BESIDE if shares_time else ALONE})
+            scores = [task for task in tasks if task.stage == "score"]
+            finish(folder, [_gather(task, cases, store, folder, failures.get(task.key)) for task in scores])
+            write_hashes(folder)
 
-    return make_run(root, suite.suite.name, digest({"suite": stated, "estimators": entrants}), fill)
+        return make_run(root, suite.suite.name, digest({"suite": stated, "estimators": entrants}), fill)
 
 
 def _gather(
@@ -95,9 +103,7 @@ def _gather(
     target = folder.estimate(score.case, score.estimator, score.repeat)
     target.mkdir(parents=True)
     for place, names in ((estimate, OF_ESTIMATE), (store / task.key, OF_SCORE)):
-        for name in names:
-            if name not in OPTIONAL or (place / name).is_file():
-                copyfile(place / name, target / name)
+        copy_files(place, [name for name in names if name not in OPTIONAL or (place / name).is_file()], target)
     return score
 
 
@@ -133,7 +139,7 @@ def _gather_case(case: Case | RecordedCase, sequence: Path, target: Path) -> Non
     write_json(target / CASE, {**plain(case), **assumed})
     if not is_made:
         return
-    copyfile(sequence / GROUND_TRUTH, target / GROUND_TRUTH)
+    copy_files(sequence, [GROUND_TRUTH], target)
     (target / SEQUENCE).symlink_to(sequence.resolve())
 
 

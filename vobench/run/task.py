@@ -187,14 +187,13 @@ def missing(tasks: Iterable[Task], root: Path) -> list[Task]:
 
 def is_done(task: Task, root: Path) -> bool:
     """Whether the store holds the task's result; that of a failure is made anew, for its cause may be gone."""
-    folder = root / task.key
-    return folder.is_dir() and (task.stage not in ("estimate", "score") or not _has_failed(folder))
+    return Store(root).has(task.key) and not _has_failed(task, root / task.key)
 
 
-def _has_failed(folder: Path) -> bool:
+def _has_failed(task: Task, folder: Path) -> bool:
     from vobench.run.estimate import FINISHED, read_outcome
 
-    return read_outcome(folder).kind != FINISHED
+    return task.stage in ("estimate", "score") and read_outcome(folder).kind != FINISHED
 
 
 def perform(
@@ -212,11 +211,15 @@ def perform(
     stop.check()
     if threads != NO_LIMIT:
         _limit(threads)
-    store, kind = Store(root), KINDS[task.stage]
-    if not is_done(task, root):
-        store.forget(kind, task.inputs)
-    needs = [root / key for key in task.needs]
-    return store.get(kind, task.inputs, lambda folder: PERFORMERS[task.stage](task.subject, needs, folder, progress))
+    store = Store(root)
+
+    def build(folder: Path) -> None:
+        PERFORMERS[task.stage](task.subject, [store.need(key) for key in task.needs], folder, progress)
+
+    def keeps(folder: Path) -> bool:
+        return not _has_failed(task, folder)
+
+    return store.get(KINDS[task.stage], task.inputs, build, keeps=keeps, tell=progress.say)
 
 
 def _limit(threads: int) -> None:

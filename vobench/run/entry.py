@@ -1,0 +1,141 @@
+"""An entry of the store: a folder of files, and the manifest of their sizes and hashes when they were written."""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from shutil import copyfile
+
+from pydantic import TypeAdapter
+
+from vobench import stop
+from vobench.errors import InputError
+
+MANIFEST = "manifest.json"
+CHUNK = 1 << 20
+# Hashes that a process keeps: where nothing can be written, a file is hashed once in a run and not at every look.
+KEPT_HASHES = 1 << 14
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """What a file was when it was written."""
+
+    bytes: int
+    sha256: str
+
+
+# By a file's path in its entry: size, time of its last change in ns, and inode. Of an equal state are equal bytes.
+States = Mapping[str, tuple[int, int, int]]
+FILES, STATES = TypeAdapter(dict[str, File]), TypeAdapter(dict[str, tuple[int, int, int]])
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file's bytes."""
+    state = hashlib.sha256()
+    with path.open("rb") as file:
+        while chunk := file.read(CHUNK):
+            stop.check()
+            state.update(chunk)
+    return state.hexdigest()
+
+
+@lru_cache(KEPT_HASHES)
+def _hash_of(path: Path, _: tuple[int, int, int]) -> str:
+    return file_hash(path)
+
+
+def seal(folder: Path) -> States:
+    """Bring all files of a finished folder to the disk and write its manifest; the states of what was hashed."""
+    names = sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+    for name in names:
+        _sync(folder / name)
+    states = _states(folder, names)
+    files = {name: File(states[name][0], file_hash(folder / name)) for name in names}
+    (folder / MANIFEST).write_bytes(_text(files))
+    _sync(folder / MANIFEST)
+    _sync(folder)
+    return {**states, **_states(folder, [MANIFEST])}
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _text(files: Mapping[str, File]) -> bytes:
+    return FILES.dump_json(dict(sorted(files.items())), indent=1) + b"\n"
+
+
+def _states(folder: Path, names: Iterable[str]) -> States:
+    found = {name: (folder / name).stat() for name in names}
+    return {name: (stat.st_size, stat.st_mtime_ns, stat.st_ino) for name, stat in found.items()}
+
+
+def _files_of(folder: Path) -> dict[str, File]:
+    """The files of an entry, by its manifest. Raises OSError or ValueError where that is not as it was written."""
+    text = (folder / MANIFEST).read_bytes()
+    files = FILES.validate_json(text, strict=True)
+    if _text(files) != text:
+        raise ValueError
+    return files
+
+
+def fault(folder: Path, checked: Path | None = None) -> str:
+    """What is wrong with an entry, empty where its files are what its manifest says.
+
+    Sizes are compared always, and hashes unless the file `checked` says that they were of files of these states.
+    """
+    try:
+        files = _files_of(folder)
+        states = _states(folder, [*files, MANIFEST])
+        resized = (name for name, file in files.items() if states[name][0] != file.bytes)
+        if name := next(resized, ""):
+            return f"{name} has {states[name][0]} bytes, should have {files[name].bytes}"
+        if checked and states == _remembered(checked):
+            return ""
+        for name, file in files.items():
+            held = _hash_of(folder / name, states[name]) if checked else file_hash(folder / name)
+            if held != file.sha256:
+                return f"{name} holds other bytes than were written"
+    except ValueError:
+        return f"{MANIFEST} is not as it was written"
+    except OSError as error:
+        return f"{Path(error.filename or folder).name} cannot be read ({error.strerror})"
+    if checked:
+        remember(checked, states)
+    return ""
+
+
+def _remembered(checked: Path) -> States | None:
+    with suppress(OSError, ValueError):
+        return STATES.validate_json(checked.read_bytes(), strict=False)
+    return None
+
+
+def remember(checked: Path, states: States) -> None:
+    """Keep in the file `checked` that files of these states were hashed and are sound; where it can be written."""
+    with suppress(OSError):
+        checked.parent.mkdir(parents=True, exist_ok=True)
+        part = checked.with_suffix(f".{os.getpid()}")
+        part.write_text(json.dumps(states), encoding="utf-8")
+        part.replace(checked)
+
+
+def copy_files(folder: Path, names: Iterable[str], target: Path) -> None:
+    """Copy some files of an entry. Raises InputError where a copy is not what the manifest says."""
+    files = dict[str, File]()
+    with suppress(OSError, ValueError):
+        files = _files_of(folder)
+    for name in names:
+        if name in files:
+            copyfile(folder / name, target / name)
+        if name not in files or file_hash(target / name) != files[name].sha256:
+            raise InputError(f"not what was written; run the suite again to make it anew: {folder / name}")
