@@ -4,8 +4,8 @@
     python benchmarks/estimators.py --fusions [--runs FOLDER]
 
 --fusions compares wheel_visual and imu_visual with what they are made of, over five seeds of each case (slip, noise of
-every sensor, the hand's shake): mean error, and the 95 % interval of the ratio to the better parent (Student's t of
-the logarithms).
+every sensor, the hand's shake): mean error, the 95 % interval of the ratio to each seed's better parent (Student's t of
+the logarithms), in how many seeds it won, and how likely so many wins are by chance (Wilcoxon, one-sided).
 
 Sequences come from the suites in benchmarks/estimators and the built-in quickstart; what is missing in --runs is
 rendered first (some minutes). --rectangles is the folder of runs of the same suites `office` and `hand` by the
@@ -29,6 +29,7 @@ import numpy as np
 from scipy import stats
 
 from vobench import ScoreSettings, Sequence, Trajectory, read_sequence, read_trajectory, score
+from vobench.errors import VobenchError
 from vobench.estimator import EncoderReadings, Frame, ImuReadings, Result
 from vobench.estimator.manifest import Manifest
 from vobench.estimator.worker import load
@@ -151,7 +152,8 @@ def compare_fusions(runs: Path) -> None:
             half = stats.t.ppf(0.975, len(ratio) - 1) * ratio.std(ddof=1) / np.sqrt(len(ratio))
             said = ", ".join(f"{name} {mean:.3g}" for name, mean in zip(names, errors.mean(0), strict=True))
             middle, low, high = np.exp([ratio.mean(), ratio.mean() - half, ratio.mean() + half])
-            won = f"{(ratio < 0).sum():>4d}/{len(ratio)}"
+            by_chance = stats.wilcoxon(ratio, alternative="less").pvalue
+            won = f"{(ratio < 0).sum():>4d}/{len(ratio)}  p {by_chance:.2f}"
             print(f"{suite + ' ' + case:24s}{said:>64s}{middle:10.2f} [{low:.2f}, {high:.2f}]{won}", flush=True)
 
 
@@ -197,7 +199,10 @@ def measured(altered: Callable[[Frames], Frames], folder: Path, name: str) -> Ro
     short = {"stereo": sequence.rig.right, "encoders": sequence.rig.wheels, "imu": sequence.rig.imu}
     if any(need in short and not short[need] for need in manifest.needs):
         return None
-    results, cpu_ms = run(home, manifest, sequence, frames)
+    try:
+        results, cpu_ms = run(home, manifest, sequence, frames)
+    except VobenchError:  # a rig that it cannot be used with
+        return None
     known = [k for k, result in enumerate(results) if result.T_odom_frame is not None and result.status != "lost"]
     T_frame_left = np.eye(4) if manifest.pose_of == "left_camera" else sequence.rig.T_body_left
     poses = np.stack([se3.inverse(T_frame_left) @ results[k].T_odom_frame @ T_frame_left for k in known])

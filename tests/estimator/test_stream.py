@@ -10,8 +10,8 @@ import pytest
 
 from vobench.estimator import EncoderReadings, Frame, ImuReadings, Status
 from vobench.estimator.manifest import Limits
+from vobench.estimator.process import EstimatorProcess
 from vobench.estimator.program import EstimatorFailure
-from vobench.estimator.stream import StreamProgram
 from vobench.geometry.rig import LENSES, stereo_rig
 
 # ruff: noqa: E501 - one way to fail is one line
@@ -39,7 +39,7 @@ LIMITS = Limits(start_s=20, frame_s=10)
 def running(tmp_path, body, *, limits=LIMITS, argv=None):
     (tmp_path / "client.py").write_text(HEAD + body)
     argv = argv or [sys.executable, "./client.py"]
-    with StreamProgram(argv, tmp_path, log=tmp_path / "log.txt", limits=limits, rate_hz=10.0) as program:
+    with EstimatorProcess.of_stream(argv, tmp_path, log=tmp_path / "log.txt", limits=limits, rate_hz=10.0) as program:
         program.start(RIG, {"speed": 2.0}, 7)
         yield program
 
@@ -58,7 +58,7 @@ FAILURES = {
     "breaks off and dies": ("send(b'POSE', b'1', 112); sys.exit(4)", "crashed", "the process ended with exit code 4: its answer breaks off"),
     "prints": ("print('hello, world'); sys.stdout.flush()", "invalid_output", "frame 0: it should answer POSE, but says b'hell' and"),
     "answers another frame": ("answer(index + 1)", "invalid_output", "frame 0: the answer is to frame 1"),
-    "says too little": ("answer(index, rest=POSE[:40])", "invalid_output", "a message of 56 bytes should have 112 or more"),
+    "says too little": ("answer(index, rest=POSE[:40])", "invalid_output", "frame 0: a message of 56 bytes should have 112 or more"),
     "promises 4 GB": ("send(b'POSE', b'', 2**32 - 1)", "invalid_output", "frame 0: it should answer POSE, but says b'POSE' and 4294967295"),
     "NaN": ("answer(index, rest=struct.pack('<12d', *[float('nan')] * 12))", "invalid_output", "frame 0: the pose is no finite"),
     "a mirror": ("answer(index, rest=struct.pack('<12d', -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0))", "invalid_output", "frame 0: the pose is no rigid transform"),
@@ -194,7 +194,7 @@ def test_the_memory_of_its_children_counts(tmp_path):
 
 def answers_of(tmp_path, argv, folder):
     limits = Limits(start_s=20)
-    with StreamProgram(argv, folder, log=tmp_path / "log.txt", limits=limits, rate_hz=10.0) as program:
+    with EstimatorProcess.of_stream(argv, folder, log=tmp_path / "log.txt", limits=limits, rate_hz=10.0) as program:
         program.start(RIG, {}, 0)
         answers = [program.process(frame(index)) for index in range(3)]
         assert program.finish() == {}

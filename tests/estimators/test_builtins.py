@@ -77,9 +77,9 @@ def test_sift_is_nearer_to_the_truth_than_orb(bed, filmed):
 
 
 @pytest.mark.parametrize(("way", "most"), [("down", 0.02), ("ahead", 0.04)])
-def test_one_camera_knows_the_path_but_for_its_length(bed, way, most):
-    T_world_left = bed.drive((14, 0.5, 0.0), (14, 0.4, 1.0)) @ RIGS[way].T_body_left
-    frames = [replace(f, right=None) for f in bed.film(RIGS[way], bed.drive((14, 0.5, 0.0), (14, 0.4, 1.0)))]
+def test_one_camera_knows_the_path_but_for_its_length(bed, filmed, way, most):
+    T_world_left = bed.drive(*LEGS[way]) @ RIGS[way].T_body_left
+    frames = [replace(f, right=None) for f in filmed(way)]
     results = bed.estimated("mono_vo", RIGS[way], frames)
     begun = next(k for k, result in enumerate(results) if result.status is Status.OK)
     truth = (se3.inverse(T_world_left[0]) @ T_world_left)[begun:, :3, 3]

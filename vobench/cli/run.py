@@ -85,7 +85,6 @@ def run_command(
     from vobench.run.run import BESIDE, run_suite
 
     _, recordings = _preflight(planned)
-    store = cache_folder()
     if cause := why_unwritable(out):
         raise InputError(f"--out should be a folder that can be written ({cause}): {out}")
     work = terminal.Work(events, is_serial=(count := _jobs(jobs)) == 1 and not scheduler)
@@ -93,7 +92,7 @@ def run_command(
     executor = Dask(scheduler) if scheduler else executor
     with stop.undone(executor.close), work:
         folder = run_suite(
-            planned, recordings, root=out, store=store.resolve(), finish=page.write_reports,
+            planned, recordings, root=out, store=cache_folder().resolve(), finish=page.write_reports,
             executor=executor, shares_time=share_time, heard=work.hear, tell=work.say,
         )  # fmt: skip
     scores = folder.scores()

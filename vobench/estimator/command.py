@@ -10,9 +10,9 @@ import numpy as np
 
 from vobench import stop
 from vobench.errors import TrajectoryError, VobenchError
+from vobench.estimator.check import FARTHEST_M
 from vobench.estimator.manifest import OUT, PLACEHOLDER, Limits
-from vobench.estimator.process import FARTHEST_M, Answer
-from vobench.estimator.program import EstimatorFailure, Program, new_home
+from vobench.estimator.program import Answer, EstimatorFailure, Program, new_home
 from vobench.estimator.protocol import Frame, Result, Status
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array

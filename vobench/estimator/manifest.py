@@ -31,6 +31,7 @@ class Limits:
     frame_s: Positive = 20.0
     trial_s: Positive = 7200.0
     memory_mib: Annotated[int, Ge(64)] = 4096
+    disk_mib: Annotated[int, Ge(1)] = 4096
     threads: Annotated[int, Ge(1), Le(256)] = 1
 
 

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from vobench.estimator.process import Answer
-from vobench.estimator.program import EstimatorFailure
+from vobench.estimator.program import Answer, EstimatorFailure
 from vobench.estimator.protocol import Frame, Result, Status
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig

@@ -1,197 +1,198 @@
-"""An estimator in Python in a process of its own; its answers checked, its failures as data."""
+"""A running estimator that is sent one frame at a time: a program of any language, or our worker with a class in it.
 
+What it says is data: read as far as it is long, within one deadline for sending and receiving, and checked here.
+"""
+
+import fcntl
+import json
+import os
 import pickle
+import select
+import subprocess
 import sys
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
-from math import isfinite
-from multiprocessing import Pipe
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
-
-from vobench import stop
-from vobench.errors import VobenchError
+from vobench.estimator.check import InvalidOutputError
+from vobench.estimator.command import filled
 from vobench.estimator.manifest import Limits
-from vobench.estimator.program import EstimatorFailure, Program
-from vobench.estimator.protocol import Frame, Result, Status, Tracks
-from vobench.geometry import se3
+from vobench.estimator.message import (
+    ANSWER_BYTES,
+    FAILURES,
+    HEADER,
+    REASON_BYTES,
+    VERSION,
+    calibration,
+    framed,
+    read_answer,
+    read_revision,
+)
+from vobench.estimator.program import LOOK_S, Answer, EstimatorFailure, Program
+from vobench.estimator.protocol import Frame
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 
-# Beyond any path, and small enough for sums of squares to stay finite.
-FARTHEST_M = 1e12
-
-
-class InvalidOutputError(VobenchError):
-    """An estimator's answer is not what the contract says."""
-
-
-def checked(answer: Any, frame: int) -> Result:
-    """The answer as a Result of plain types. Raises InvalidOutputError, naming the frame."""
-    if not isinstance(answer, Result):
-        raise InvalidOutputError(
-            f"frame {frame}: process() must return a vobench.estimator.Result, got {type(answer).__name__}"
-        )
-    if answer.T_odom_frame is None and answer.status not in (Status.LOST, Status.INIT):
-        raise InvalidOutputError(f"frame {frame}: status '{answer.status}' needs a pose; without one say lost or init")
-    try:
-        return Result(
-            T_odom_frame=None if answer.T_odom_frame is None else _pose(answer.T_odom_frame),
-            status=_status(answer.status),
-            reason=" ".join(str(answer.reason).split()),
-            tracks=None if answer.tracks is None else _tracks(answer.tracks),
-            stats=_stats(answer.stats),
-            covariance=None if answer.covariance is None else _covariance(answer.covariance),
-            points=None if answer.points is None else _points(answer.points),
-        )
-    except InvalidOutputError as error:
-        raise InvalidOutputError(f"frame {frame}: {error}") from None
-
-
-def _array(value: Any, what: str) -> Array:
-    """A float64 array. Raises InvalidOutputError where the value is none of real numbers."""
-    array = np.asarray(value)
-    if array.dtype.kind not in "fiub":
-        raise InvalidOutputError(f"{what} should be an array of real numbers, got {array.dtype}")
-    return array.astype(np.float64)
-
-
-def _pose(T_odom_frame: Any) -> Array:
-    T = _array(T_odom_frame, "the pose")
-    if T.shape != (4, 4) or not np.isfinite(T).all():
-        raise InvalidOutputError(f"the pose is no finite (4, 4) array (shape {T.shape})")
-    if np.abs(T[:3, 3]).max() > FARTHEST_M:
-        raise InvalidOutputError(f"the pose is farther than {FARTHEST_M:g} m away")
-    if not se3.is_rotation(T[:3, :3]) or not np.array_equal(T[3], [0, 0, 0, 1]):
-        raise InvalidOutputError("the pose is no rigid transform (R'R differs from I, or the last row from 0 0 0 1)")
-    return T
-
-
-def _covariance(covariance: Any) -> Array:
-    P = _array(covariance, "the covariance")
-    if P.shape != (6, 6) or not np.isfinite(P).all():
-        raise InvalidOutputError(f"the covariance is no finite (6, 6) array (shape {P.shape})")
-    if not np.allclose(P, P.T, rtol=1e-6, atol=1e-9 * np.abs(P).max()) or np.linalg.eigvalsh(P)[0] <= 0:
-        raise InvalidOutputError("the covariance is not symmetric and positive definite")
-    return P
-
-
-def _points(points: Any) -> Array:
-    X = _array(points, "points")
-    if X.ndim != 2 or X.shape[1] != 3:
-        raise InvalidOutputError(f"points should be (N, 3), got {X.shape}")
-    return X
-
-
-def checked_revision(revised: Any) -> dict[int, Array]:
-    """Poses by their frame's index, as `finish` gives them. Raises InvalidOutputError."""
-    if not isinstance(revised, Mapping):
-        raise InvalidOutputError(f"finish() must return poses by their frame's index, got {type(revised).__name__}")
-    try:
-        return {int(frame): _pose(T) for frame, T in revised.items()}
-    except (InvalidOutputError, TypeError, ValueError) as error:
-        raise InvalidOutputError(f"finish(): {error}") from None
-
-
-def _status(status: Any) -> Status:
-    try:
-        return Status(status)
-    except ValueError:
-        raise InvalidOutputError(f"no status {status!r}. Known: {', '.join(Status)}") from None
-
-
-def _tracks(tracks: Any) -> Tracks:
-    if not isinstance(tracks, Tracks):
-        raise InvalidOutputError(f"tracks must be a vobench.estimator.Tracks, got {type(tracks).__name__}")
-    last, now = _array(tracks.uv_last_px, "uv_last_px"), _array(tracks.uv_px, "uv_px")
-    inlier = _array(tracks.inlier, "inlier").astype(bool)
-    if not (last.shape == now.shape == (len(inlier), 2) and inlier.ndim == 1):
-        shapes = f"{last.shape}, {now.shape} and {inlier.shape}"
-        raise InvalidOutputError(f"tracks should be (N, 2), (N, 2) and (N,), got {shapes}")
-    return Tracks(last, now, inlier)
-
-
-def _stats(stats: Any) -> dict[str, float]:
-    """Numbers by name; one that is not finite says nothing and is left out."""
-    if not isinstance(stats, Mapping):
-        raise InvalidOutputError(f"stats should be numbers by name, got {type(stats).__name__}")
-    try:
-        numbers = {str(name): float(value) for name, value in stats.items()}
-    except (TypeError, ValueError) as error:
-        raise InvalidOutputError(f"stats should be numbers by name ({error})") from None
-    return {name: number for name, number in numbers.items() if isfinite(number)}
-
-
-ANSWER_BYTES = 64 << 20  # a pose, some numbers and tracks; more is no answer but noise on the connection
+PIPE_BYTES = 1 << 20  # what anybody may ask for
+WORKER = (sys.executable, "-P", "-m", "vobench.estimator.worker")
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
-    """A checked result and what it cost; memory is the most that it held so far."""
+class Door:
+    """How an estimator is called: its argv and the payload of CALB for a trial, and the parts of a FRAM."""
 
-    result: Result
-    wall_ms: float
-    cpu_ms: float
-    memory_mib: float = 0.0
+    opened: Callable[[Rig, Mapping[str, Any], int], tuple[Sequence[str], bytes]]
+    framed: Callable[[Frame], list[bytes]]
 
 
 class EstimatorProcess:
     """A running estimator; what it prints goes to `log`. Its verbs raise EstimatorFailure."""
 
-    def __init__(self, folder: Path, class_path: str, *, name: str, log: Path, limits: Limits) -> None:
-        self._limits = limits
-        self._connection, child = Pipe()
-        fd, memory = str(child.fileno()), str(limits.memory_mib << 20)
-        argv = [sys.executable, "-P", "-m", "vobench.estimator.worker", fd, str(folder), class_path, name, memory]
-        self._program = Program(argv, log=log, limits=limits, pass_fds=[child.fileno()])
-        child.close()
+    def __init__(self, door: Door, *, log: Path, limits: Limits) -> None:
+        self._door, self._log, self._limits = door, log, limits
+        self._running: AbstractContextManager[Program] | None = None
 
-    def start(self, rig: Rig, params: Mapping[str, Any], seed: int, *, is_watched: bool = False) -> None:
-        """Hand over the calibration and the parameters; who `is_watched` fails where it changes a frame."""
-        self._ask(("start", rig, dict(params), seed, is_watched), self._limits.start_s)
+    @classmethod
+    def of_class(
+        cls, folder: Path, class_path: str, *, name: str, log: Path, limits: Limits, is_watched: bool = False
+    ) -> Self:
+        """A class in Python, in a process of its own; who `is_watched` fails where it changes a frame."""
+        argv = [*WORKER, str(folder), class_path, name, str(limits.memory_mib << 20)]
+
+        def opened(rig: Rig, params: Mapping[str, Any], seed: int) -> tuple[Sequence[str], bytes]:
+            return argv, pickle.dumps((rig, dict(params), seed, is_watched))
+
+        return cls(Door(opened, lambda frame: [pickle.dumps(frame)]), log=log, limits=limits)
+
+    @classmethod
+    def of_stream(cls, argv: Sequence[str], folder: Path, *, log: Path, limits: Limits, rate_hz: float) -> Self:
+        """A program that takes frames on standard input and gives poses on standard output."""
+
+        def opened(rig: Rig, params: Mapping[str, Any], seed: int) -> tuple[Sequence[str], bytes]:
+            said = {"version": VERSION, "seed": seed, "rate_hz": rate_hz, "params": dict(params), **calibration(rig)}
+            return filled(argv, folder, {**params, "seed": seed, "rate_hz": rate_hz}), json.dumps(said).encode()
+
+        return cls(Door(opened, framed), log=log, limits=limits)
+
+    def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
+        """Start it, hand over the calibration, and wait until it is ready; a second time, to start again."""
+        argv, said = self._door.opened(rig, params, seed)
+        if self._running is None:
+            self._open(list(argv))
+        self._frames, until = 0, self._until(self._limits.start_s)
+        self._send(b"CALB", [said], until)
+        self._receive("its start", {b"REDY"}, until)
+        self._program.look(at_once=True)
+
+    def _open(self, argv: list[str]) -> None:
+        pipe = subprocess.PIPE
+        self._program = self._running = Program(
+            argv, log=self._log, limits=self._limits, stdin=pipe, stdout=pipe, bufsize=0
+        )
+        process = self._program.process
+        assert process.stdin
+        assert process.stdout
+        self._input, self._output = process.stdin.fileno(), process.stdout.fileno()
+        os.set_blocking(self._input, False)
+        with suppress(OSError, AttributeError):  # Linux's: a picture goes in one piece
+            fcntl.fcntl(self._input, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
 
     def process(self, frame: Frame) -> Answer:
         """Hand over the next frame; what the estimator says of it, checked."""
-        _, result, wall_ms, cpu_ms = self._ask(frame, self._limits.frame_s)
-        return Answer(result, wall_ms, cpu_ms, self._program.peak_mib)
+        cpu_s, parts = self._program.cpu_s, self._door.framed(frame)
+        began, until = time.monotonic(), self._until(self._limits.frame_s)
+        self._send(b"FRAM", parts, until)
+        _, payload = self._receive(f"frame {frame.index}", {b"POSE"}, until)
+        wall_s, self._frames = time.monotonic() - began, self._frames + 1
+        self._program.look(at_once=True)
+        try:
+            result = read_answer(payload, frame.index)
+        except InvalidOutputError as error:
+            raise EstimatorFailure("invalid_output", str(error)) from None
+        return Answer(result, 1e3 * wall_s, 1e3 * (self._program.cpu_s - cpu_s), self._program.peak_mib)
 
     def finish(self) -> dict[int, Array]:
-        """Say that there are no more frames; the poses that the estimator revises, by their frame's index."""
-        _, revised = self._ask(("finish",), self._limits.trial_s)
-        return dict(revised)
+        """Say that there are no more frames; the poses that it revises, until it says so too or ends well."""
+        revised, until = dict[int, Array](), self._until(self._program.left_s())
+        self._send(b"DONE", [], until)
+        for _ in range(self._frames + 1):
+            tag, payload = self._receive("the end", {b"REVI", b"DONE", b""}, until)
+            if tag != b"REVI":
+                return revised
+            try:
+                revised.update(read_revision(payload))
+            except InvalidOutputError as error:
+                raise EstimatorFailure("invalid_output", str(error)) from None
+        raise EstimatorFailure("invalid_output", f"the end: more poses revised than the {self._frames} frames it had")
 
-    def _ask(self, message: Any, timeout_s: float) -> tuple[Any, ...]:
-        stop.check()
-        try:
-            return self._answer(message, timeout_s)
-        except EstimatorFailure:
-            stop.check()  # which kills the process that we are waiting for
-            raise
+    def _until(self, limit_s: float) -> float:
+        self._limit_s = limit_s
+        return time.monotonic() + limit_s
 
-    def _answer(self, message: Any, timeout_s: float) -> tuple[Any, ...]:
-        try:
-            self._connection.send(message)
-            answered = self._connection.poll(max(min(timeout_s, self._program.left_s()), 0))
-            reply: tuple[Any, ...] = pickle.loads(self._connection.recv_bytes(ANSWER_BYTES)) if answered else ()
-        except (EOFError, ConnectionError):
-            raise EstimatorFailure(*self._program.death()) from None
-        except Exception as error:  # bytes of somebody else's on our connection can be unpickled into anything
-            raise EstimatorFailure("crashed", f"its answer cannot be read ({error})") from None
-        self._program.look()
-        if not answered:
-            raise EstimatorFailure("timeout", f"no answer within {timeout_s:g} s")
-        if reply[0] == "failed":
-            raise EstimatorFailure(reply[1], reply[2])
-        return reply
+    def _send(self, tag: bytes, parts: Sequence[bytes], until: float) -> None:
+        for part in (HEADER.pack(tag, sum(map(len, parts))), *parts):
+            left = memoryview(part)
+            while left:
+                self._await([], [self._input], until)
+                try:
+                    left = left[os.write(self._input, left) :]
+                except BlockingIOError:
+                    continue
+                except BrokenPipeError:
+                    if tag != b"DONE":
+                        self._receive("its input", set(), until)  # why it went, if it says so
+                    return
+
+    def _receive(self, what: str, tags: set[bytes], until: float) -> tuple[bytes, bytes]:
+        """The next message; an empty tag where the program has ended well and may."""
+        head = self._read(HEADER.size, what, until, may_end=b"" in tags)
+        if not head:
+            return b"", b""
+        tag, length = HEADER.unpack(head)
+        if tag in FAILURES:
+            reason = self._read(min(length, REASON_BYTES), what, until).decode("utf-8", "replace")
+            raise EstimatorFailure(FAILURES[tag], reason)
+        if tag not in tags or length > ANSWER_BYTES:
+            wanted = " or ".join(sorted(tag.decode() for tag in tags if tag)) or "nothing"
+            said = f"{tag!r} and {length} bytes"
+            raise EstimatorFailure("invalid_output", f"{what}: it should answer {wanted}, but says {said}")
+        return tag, self._read(length, what, until)
+
+    def _read(self, length: int, what: str, until: float, *, may_end: bool = False) -> bytes:
+        read = bytearray()
+        while len(read) < length:
+            self._await([self._output], [], until)
+            more = os.read(self._output, min(length - len(read), 1 << 20))
+            if not more:
+                kind, reason = self._end(what)
+                if may_end and not read and kind == "invalid_output":
+                    return b""
+                torn = f": its answer breaks off after {len(read)} of {length} bytes" if read else ""
+                raise EstimatorFailure(kind, reason + torn)
+            read += more
+        return bytes(read)
+
+    def _end(self, what: str) -> tuple[str, str]:
+        """Status and reason of an end before its time."""
+        kind, reason = self._program.death()
+        return kind, f"{what}: {reason}" if kind == "invalid_output" else reason
+
+    def _await(self, reads: list[int], writes: list[int], until: float) -> None:
+        while True:
+            ready = select.select(reads, writes, [], max(min(LOOK_S, until - time.monotonic()), 0))
+            self._program.look()
+            if any(ready):
+                return
+            if time.monotonic() > until:
+                raise EstimatorFailure("timeout", f"no answer within {self._limit_s:g} s")
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._connection.close()
-        self._program.__exit__(kind, error, trace)
+    def __exit__(self, *end: Any) -> None:
+        """End it, and whatever it has started."""
+        if self._running:
+            self._running.__exit__(*end)

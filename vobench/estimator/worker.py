@@ -1,23 +1,21 @@
 """The process an estimator runs in: its folder imported, frames handed to it."""
 
-import ctypes
 import importlib
 import importlib.machinery
 import importlib.util
+import os
 import pickle
 import resource
-import signal
 import sys
-import time
 import traceback
-from contextlib import suppress
-from multiprocessing.connection import Connection
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
-from typing import cast
+from typing import BinaryIO, cast
 
 from vobench.errors import VobenchError
-from vobench.estimator.process import InvalidOutputError, checked, checked_revision
+from vobench.estimator.check import InvalidOutputError, checked, checked_revision, in_one_line
+from vobench.estimator.message import HEADER, answered, revision
 from vobench.estimator.protocol import Estimator, Frame
 
 NAMESPACE = "vobench_estimators"
@@ -80,69 +78,71 @@ def _cause(error: Exception, folder: Path) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split())}: {place}"
 
 
-PR_SET_PDEATHSIG = 1  # from linux/prctl.h
+Says = tuple[bytes, bytes]  # a message: tag and content
 
 
-def main(fd: int, folder: Path, class_path: str, name: str, memory_bytes: int) -> None:
+def main(folder: Path, class_path: str, name: str, memory_bytes: int) -> None:
     """Serve frames until the other side hangs up."""
-    _die_with_parent()
     resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))
-    connection = Connection(fd)
+    asked, told = _taken_over()
     try:
-        _serve(connection, load(folder, class_path, name=name))
+        estimator = load(folder, class_path, name=name)
+        for tag, content in _answers(asked, estimator):
+            told.write(HEADER.pack(tag, len(content)) + content)
     except (EOFError, BrokenPipeError):
         return
     except Exception as error:
         traceback.print_exc()
-        connection.send(("failed", _kind(error), _in_one_line(error)))
+        content = _in_one_line(error).encode("utf-8", "replace")
+        told.write(HEADER.pack(_tag(error), len(content)) + content)
 
 
-def _serve(connection: Connection, estimator: Estimator) -> None:
+def _taken_over() -> tuple[BinaryIO, BinaryIO]:
+    """Standard input and output, which are the estimator's own from here on: nothing, and what is kept as log."""
+    asked, told = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb", buffering=0)
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.dup2(2, 1)
+    os.close(nothing)
+    return asked, told
+
+
+def _answers(asked: BinaryIO, estimator: Estimator) -> Iterator[Says]:
+    """What is to be said to one message after another. Our own side alone is unpickled."""
     is_watched = False
-    while True:
-        message = connection.recv()
-        if isinstance(message, Frame):
-            before = pickle.dumps(message) if is_watched else b""
-            wall, cpu = time.perf_counter(), _cpu_s()
-            answer = estimator.process(message)
-            spent = (time.perf_counter() - wall) * 1e3, (_cpu_s() - cpu) * 1e3
-            if is_watched and pickle.dumps(message) != before:
-                raise InvalidOutputError(f"frame {message.index}: process() changed the frame it was given")
-            connection.send(("result", checked(answer, message.index), *spent))
-        elif message[0] == "start":
-            *told, is_watched = message[1:]
+    while head := asked.read(HEADER.size):
+        tag, length = HEADER.unpack(head)
+        said = asked.read(length)
+        if tag == b"FRAM":
+            frame: Frame = pickle.loads(said)
+            before = pickle.dumps(frame) if is_watched else b""
+            result = checked(estimator.process(frame), frame.index)
+            if is_watched and pickle.dumps(frame) != before:
+                raise InvalidOutputError(f"frame {frame.index}: process() changed the frame it was given")
+            yield b"POSE", answered(result, frame.index)
+        elif tag == b"CALB":
+            *told, is_watched = pickle.loads(said)
             estimator.start(*told)
-            connection.send(("ready",))
+            yield b"REDY", b""
         else:
-            finish = getattr(estimator, "finish", dict)
-            connection.send(("revised", checked_revision(finish() or {})))
+            revised = checked_revision(getattr(estimator, "finish", dict)() or {})
+            yield from ((b"REVI", revision(index, T)) for index, T in revised.items())
+            yield b"DONE", b""
 
 
-def _cpu_s() -> float:
-    """CPU time of this process and of those that it has started and that have ended."""
-    spent = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return sum(each.ru_utime + each.ru_stime for each in spent)
-
-
-def _die_with_parent() -> None:
-    """Where Linux offers it: an estimator in an endless loop must not outlive a vobench that was killed."""
-    with suppress(OSError, AttributeError):
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-
-
-def _kind(error: Exception) -> str:
+def _tag(error: Exception) -> bytes:
     # OpenCV reports a failed allocation as its own error -4.
     if isinstance(error, MemoryError) or "Insufficient memory" in str(error):
-        return "out_of_memory"
+        return b"NMEM"
     if isinstance(error, InvalidOutputError):
-        return "invalid_output"
-    return "refused" if isinstance(error, VobenchError) else "crashed"
+        return b"WRNG"
+    return b"FAIL" if isinstance(error, VobenchError) else b"CRSH"
 
 
 def _in_one_line(error: Exception) -> str:
-    text = " ".join(str(error).split())
+    text = in_one_line(error)
     return text if isinstance(error, VobenchError) else f"{type(error).__name__}: {text}"
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), Path(sys.argv[2]), sys.argv[3], sys.argv[4], int(sys.argv[5]))
+    main(Path(sys.argv[1]), sys.argv[2], sys.argv[3], int(sys.argv[4]))

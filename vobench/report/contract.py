@@ -156,12 +156,12 @@ def _in_one_process(entrant: Entrant, recording: Path, drive: Path) -> Iterator[
         return
     frames, log = list(frames_of(sequence, manifest.needs)), drive / "watched.txt"
     try:
-        with EstimatorProcess(
-            entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits
+        with EstimatorProcess.of_class(
+            entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits, is_watched=True
         ) as process:
             tracks = []
             for _ in range(2):
-                process.start(sequence.rig, entrant.params, 0, is_watched=True)
+                process.start(sequence.rig, entrant.params, 0)
                 answers = [process.process(frame).result for frame in frames]
                 tracks.append(
                     [None if answer.T_odom_frame is None else answer.T_odom_frame.tolist() for answer in answers]

@@ -19,10 +19,9 @@ from vobench.errors import SequenceError
 from vobench.estimator.command import CommandProgram, rate_hz
 from vobench.estimator.manifest import Manifest
 from vobench.estimator.oracle import NoisyTruth
-from vobench.estimator.process import Answer, EstimatorProcess
-from vobench.estimator.program import EstimatorFailure
+from vobench.estimator.process import EstimatorProcess
+from vobench.estimator.program import Answer, EstimatorFailure
 from vobench.estimator.protocol import EncoderReadings, Frame, Status
-from vobench.estimator.stream import StreamProgram
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
@@ -75,7 +74,7 @@ Readings = TypeVar("Readings", EncoderReadings, ImuReadings)
 
 
 # An estimator that runs, by whichever door it came: start, process, finish, each of which raises EstimatorFailure.
-Running = EstimatorProcess | StreamProgram | CommandProgram | NoisyTruth
+Running = EstimatorProcess | CommandProgram | NoisyTruth
 
 
 def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress") -> None:
@@ -100,10 +99,13 @@ def _running(trial: "Trial", recording: Path, log: Path) -> Running:
     if manifest.oracle:
         return NoisyTruth(read_tum(recording / GROUND_TRUTH))
     if manifest.class_path:
-        return EstimatorProcess(entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits)
+        return EstimatorProcess.of_class(
+            entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits
+        )
     t_ns, limits = Sequence.open(recording).frame_stamps(), entrant.limits
     if manifest.stream:
-        return StreamProgram(manifest.stream, entrant.folder, log=log, limits=limits, rate_hz=rate_hz(t_ns))
+        rate = rate_hz(t_ns)
+        return EstimatorProcess.of_stream(manifest.stream, entrant.folder, log=log, limits=limits, rate_hz=rate)
     if entrant.mode == "real_time":
         raise EstimatorFailure("refused", "it takes the whole recording at once, so it cannot go at the camera's pace")
     write = partial(_write_blind, recording, manifest)

@@ -1,0 +1,85 @@
+"""What it costs to hand an estimator a stereo pair in a process of its own, against calling the class directly.
+
+    python benchmarks/pipe.py [--frames 500] [--repeats 3]
+
+The estimator answers with a pose, 300 tracks and two numbers. Medians of the best repeat.
+"""
+
+import argparse
+import platform
+import resource
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from vobench.estimator import Frame
+from vobench.estimator.manifest import Limits
+from vobench.estimator.process import EstimatorProcess
+from vobench.estimator.worker import load
+from vobench.geometry.rig import LENSES, stereo_rig
+
+SIZES = {"720 x 480": (480, 720), "1920 x 1080": (1080, 1920), "1920 x 1080 colour": (1080, 1920, 3)}
+CODE = """
+import numpy as np
+from vobench.estimator import Result, Tracks
+class Idle:
+    def start(self, rig, params, seed):
+        self.tracks = Tracks(np.ones((300, 2)), np.ones((300, 2)), np.ones(300, bool))
+    def process(self, frame):
+        return Result(np.eye(4), tracks=self.tracks, stats={"flow_px": 1.0, "inliers": 300.0})
+"""
+
+
+def started(folder: Path) -> EstimatorProcess:
+    """The class in a process of its own."""
+    return EstimatorProcess.of_class(folder, "idle:Idle", name="idle", log=folder / "log", limits=Limits())
+
+
+def median_ms(process, picture: np.ndarray, frames: int) -> float:
+    """The median time of a call of `process`."""
+    spent = []
+    for index in range(frames):
+        frame = Frame(index, index * 10**8, picture, picture)
+        began = time.perf_counter()
+        process(frame)
+        spent.append(time.perf_counter() - began)
+    return 1e3 * float(np.median(spent))
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--frames", type=int, default=500)
+    parser.add_argument("--repeats", type=int, default=3)
+    args = parser.parse_args()
+    rig, rng = stereo_rig(LENSES["paper_blender"], pitch_deg=90), np.random.default_rng(0)
+    print(f"{platform.machine()}, Python {platform.python_version()}; ms a pair")
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        (folder / "idle.py").write_text(CODE)
+        direct = load(folder, "idle:Idle", name="idle")
+        direct.start(rig, {}, 0)
+        for size, shape in SIZES.items():
+            picture, best = rng.integers(0, 255, shape).astype(np.uint8), []
+            frames = max(args.frames * 480 * 720 // picture.size, 20)
+            for _ in range(args.repeats):
+                with started(folder) as process:
+                    process.start(rig, {}, 0)
+                    best.append(median_ms(process.process, picture, frames))
+            alone = median_ms(direct.process, picture, frames)
+            print(f"{size:>20}: {min(best):7.3f} piped, {alone:7.3f} direct")
+        spent = []
+        for _ in range(args.repeats):
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            with started(folder) as process:
+                process.start(rig, {}, 0)
+                process.finish()
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            spent.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+        print(f"a start and an end without frames: {min(spent):.3f} s of CPU, the guard with it")
+
+
+if __name__ == "__main__":
+    main()

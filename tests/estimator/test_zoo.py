@@ -1,0 +1,313 @@
+"""Bad plugins: whatever one does, its trial has a status and a reason, nothing is left of it, and the next goes on.
+
+Each is run as a trial of a recording of three frames; what it does happens in `process`, if nothing else is said.
+"""
+
+import json
+import os
+import sys
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vobench.estimator.manifest import Limits
+from vobench.estimator.process import EstimatorProcess
+from vobench.estimator.program import EstimatorFailure
+from vobench.estimator.protocol import Frame
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import stereo_rig
+from vobench.run.estimate import LOG, estimate, read_outcome
+from vobench.run.frames import ANSWERS, TIMES, read_table
+from vobench.run.store import SilentProgress
+from vobench.sequence import SequenceWriter
+from vobench.suite.manifest import read_manifest
+from vobench.suite.source import RecordedCase, Source
+from vobench.suite.suite import Entrant, Trial
+
+# ruff: noqa: E501 - one animal is one line
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the tree of processes is Linux's /proc")
+
+HEAD = """
+import ctypes, json, os, pickle, resource, signal, struct, subprocess, sys, threading, time
+import numpy as np
+from vobench.errors import VobenchError
+from vobench.estimator import Result, Status, Tracks
+I = np.eye(4)
+OUT = 4  # where answers go
+def send(tag, payload=b"", length=None):
+    os.write(OUT, struct.pack("<4sI", tag, len(payload) if length is None else length) + payload)
+def pose(index, what=1, rest=b""):
+    send(b"POSE", struct.pack("<qII", index, 1, what) + np.eye(4)[:3].tobytes() + rest)
+class Bomb:
+    def __reduce__(self): return os.system, (f"touch {os.environ['PYTHONPATH'].split(':')[0]}/executed",)
+class Vile(Exception):
+    def __str__(self): raise RuntimeError("not even that")
+def away(and_then):
+    if os.fork() == 0:
+        os.setsid()
+        if os.fork() == 0:
+            and_then()
+            time.sleep(600)
+        os._exit(0)
+    os.wait()
+"""
+OK = "return Result(I)"
+FINISHED, CRASHED, INVALID, LATE, MEMORY, REFUSED = (
+    "finished",
+    "crashed",
+    "invalid_output",
+    "timeout",
+    "out_of_memory",
+    "refused",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Animal:
+    kind: str
+    body: str
+    reason: str = ""
+    head: str = ""
+    start: str = "pass"
+    finish: str = "return {}"
+    frame_s: float = 10.0
+    start_s: float = 20.0
+    trial_s: float = 60.0
+    memory_mib: int = 4096
+    disk_mib: int = 4096
+
+
+def late(body, **more):
+    return Animal(LATE, body, "no answer within 0.4 s", frame_s=0.4, **more)
+
+
+def writes(code, reason, kind=INVALID, **more):
+    """Speaks for itself, past our worker, which it keeps from answering."""
+    return Animal(kind, f"{code}\ntime.sleep(600)", reason, **more)
+
+
+ZOO = {
+    # It raises.
+    "raises": Animal(CRASHED, "raise RuntimeError('a\\nb')", "RuntimeError: a b"),
+    "raises at import": Animal(REFUSED, OK, "estimator 'bad' cannot be imported: RuntimeError: no", head="raise RuntimeError('no')"),
+    "raises in __init__": Animal(REFUSED, OK, "Bad() RuntimeError: no", head="def init(self): raise RuntimeError('no')"),
+    "raises in start": Animal(CRASHED, OK, "ZeroDivisionError: division by zero", start="1 / 0"),
+    "raises in finish": Animal(CRASHED, OK, "ZeroDivisionError: division by zero", finish="1 / 0"),
+    "raises what is no Exception": Animal(CRASHED, "raise BaseException('x')", "the process ended with exit code 1: BaseException: x"),
+    "raises what cannot be said": Animal(CRASHED, "raise Vile", "the process ended with exit code 1: RuntimeError: not even that"),
+    "recurses": Animal(CRASHED, "f = lambda: f()\nf()", "RecursionError: maximum recursion depth exceeded"),
+    "raises 20 MB of ESC and surrogates": Animal(CRASHED, "raise ValueError('\\x1b[2J\\0\\ud800' * 4_000_000)", "ValueError: [2J [2J"),
+    # It ends.
+    "exits": Animal(CRASHED, "sys.exit(3)", "the process ended with exit code 3"),
+    "exits in silence": Animal(INVALID, "os._exit(0)", "frame 0: it ended, with exit code 0"),
+    "exits in start": Animal(CRASHED, OK, "the process ended with exit code 9", start="os._exit(9)"),
+    "exits in finish": Animal(CRASHED, OK, "the process ended with exit code 9", finish="os._exit(9)"),
+    "aborts": Animal(CRASHED, "os.abort()", "the process ended with signal SIGABRT"),
+    "segfaults": Animal(CRASHED, "ctypes.string_at(0)", "the process ended with signal SIGSEGV"),
+    "is killed": Animal(MEMORY, "os.kill(os.getpid(), 9)", "killed by the system"),
+    "terminates its group": Animal(CRASHED, "os.killpg(0, signal.SIGTERM)\ntime.sleep(9)", "the process ended with signal SIGTERM"),
+    "closes its files": Animal(CRASHED, f"os.closerange(3, 64)\n{OK}", "the process ended with exit code 1"),
+    # It hangs.
+    "hangs in Python": late("while True: pass"),
+    "sleeps": late("time.sleep(600)"),
+    "hangs in C with the GIL held": late("ctypes.PyDLL(None).pause()"),
+    "hangs deaf to signals": late("for n in set(signal.Signals) - {9, 19}: signal.signal(n, signal.SIG_IGN)\ntime.sleep(600)"),
+    "hangs at import": Animal(LATE, OK, "no answer within 2 s", head="time.sleep(600)", start_s=2),
+    "hangs in start": Animal(LATE, OK, "no answer within 2 s", start="time.sleep(600)", start_s=2),
+    "hangs in finish": Animal(LATE, OK, "", finish="time.sleep(600)", trial_s=2),
+    "stops": late("os.kill(os.getpid(), signal.SIGSTOP)"),
+    "stops after an answer": late(f"threading.Timer(0.02, os.kill, (os.getpid(), signal.SIGSTOP)).start()\ntime.sleep(0.1 * frame.index)\n{OK}"),
+    "takes too long in all": Animal(LATE, "time.sleep(1.5)\n" + OK, "the whole trial took more than 2.5 s", trial_s=2.5),
+    # It answers what is none.
+    "None": Animal(INVALID, "return None", "frame 0: process() must return a vobench.estimator.Result, got NoneType"),
+    "a tuple": Animal(INVALID, "return I, 'ok'", "frame 0: process() must return"),
+    "a class": Animal(INVALID, "return Result", "frame 0: process() must return"),
+    "NaN": Animal(INVALID, "return Result(I * np.nan)", "frame 0: the pose is no finite"),
+    "infinite": Animal(INVALID, "return Result(I + np.diag([0, 0, np.inf], 1))", "frame 0: the pose is no finite"),
+    "a reflection": Animal(INVALID, "return Result(np.diag([-1, 1, 1, 1]))", "frame 0: the pose is no rigid transform"),
+    "scaled": Animal(INVALID, "return Result(2 * I)", "frame 0: the pose is no rigid transform"),
+    "enormous": Animal(INVALID, "return Result(1e300 * I)", "frame 0: the pose is no rigid transform"),
+    "projective": Animal(INVALID, "return Result(I + np.eye(4)[[3]].T * 0.1)", "frame 0: the pose is no rigid transform"),
+    "far away": Animal(INVALID, "T = I.copy(); T[0, 3] = 1e300\nreturn Result(T)", "frame 0: the pose is farther than"),
+    "3 x 3": Animal(INVALID, "return Result(np.eye(3))", "frame 0: the pose is no finite (4, 4) array"),
+    "ragged": Animal(INVALID, "return Result([[1, 0], [0]])", "frame 0: the pose should be an array"),
+    "complex": Animal(INVALID, "return Result(I * 1j)", "frame 0: the pose should be an array of real numbers"),
+    "text": Animal(INVALID, "return Result('here')", "frame 0: the pose should be an array of real numbers"),
+    "objects": Animal(INVALID, "return Result(np.array([[Bomb()] * 4] * 4))", "frame 0: the pose should be an array of real numbers"),
+    "an unknown status": Animal(INVALID, "return Result(I, '\\x1b[2Jfine' * 10**6)", "frame 0: no status '\\x1b[2Jfine"),
+    "ok without a pose": Animal(INVALID, "return Result(None)", "frame 0: status 'ok' needs a pose"),
+    "stats that are none": Animal(INVALID, "return Result(I, stats=[1])", "frame 0: stats should be numbers by name"),
+    "stats beyond a float": Animal(INVALID, "return Result(I, stats={'n': 10**400})", "frame 0: stats should be numbers by name"),
+    "ten thousand stats": Animal(INVALID, "return Result(I, stats={str(n): 0 for n in range(10**4)})", "frame 0: 128890 bytes of stats"),
+    "ragged tracks": Animal(INVALID, "return Result(I, tracks=Tracks(np.zeros((3, 2)), np.zeros((2, 2)), np.zeros(3, bool)))", "frame 0: tracks should be"),
+    "80 MB of tracks": Animal(INVALID, "z = np.zeros((2 * 10**6, 2), np.float16)\nreturn Result(I, tracks=Tracks(z, z, z[:, 0] > 0))", "frame 0: an answer of 80"),
+    "points of a plane": Animal(INVALID, "return Result(I, points=np.zeros((9, 2)))", "frame 0: points should be (N, 3)"),
+    "a covariance that is none": Animal(INVALID, "return Result(I, covariance=-np.eye(6))", "frame 0: the covariance is not symmetric and positive"),
+    "an infinite covariance": Animal(INVALID, "return Result(I, covariance=np.eye(6) * np.inf)", "frame 0: the covariance is no finite"),
+    "revises what is none": Animal(INVALID, OK, "finish() must return poses", finish="return [np.eye(4)]"),
+    "revises with NaN": Animal(INVALID, OK, "finish(): the pose is no finite", finish="return {0: np.eye(4) * np.nan}"),
+    "revises for ever": Animal(INVALID, OK, "the end: more poses revised than the 3 frames it had", finish="while True: send(b'REVI', struct.pack('<q', 0) + np.eye(4)[:3].tobytes())"),
+    # It speaks past our worker.
+    "half a header": writes("os.write(OUT, b'POS')", "no answer within 0.4 s", LATE, frame_s=0.4),
+    "half a message": writes("send(b'POSE', b'1234', 112)", "no answer within 0.4 s", LATE, frame_s=0.4),
+    "half a message and ends": Animal(CRASHED, "send(b'POSE', b'1234', 112)\nos._exit(5)", "the process ended with exit code 5: its answer breaks off after 4 of 112 bytes"),
+    "a byte now and then": writes("send(b'POSE', b'', 10**6)\nwhile True: os.write(OUT, b'x'); time.sleep(0.01)", "no answer within 0.4 s", LATE, frame_s=0.4),
+    "4 GB": writes("send(b'POSE', b'', 2**32 - 1)", "frame 0: it should answer POSE, but says b'POSE' and 4294967295 bytes"),
+    "noise": writes("os.write(OUT, b'\\x1b\\x00\\xff' * 2000)", "frame 0: it should answer POSE, but says b'\\x1b"),
+    "another message": writes("send(b'REDY')", "frame 0: it should answer POSE, but says b'REDY'"),
+    "the wrong frame": writes("pose(frame.index + 1)", "frame 0: the answer is to frame 1"),
+    "the last frame again": Animal(INVALID, f"if frame.index: pose(frame.index - 1)\n{OK}", "frame 1: the answer is to frame 0"),
+    "two answers": Animal(INVALID, f"pose(frame.index)\n{OK}", "frame 1: the answer is to frame 0"),
+    "what is not asked for": writes("pose(frame.index, what=1 << 9)", "frame 0: no status 1 with contents 512"),
+    "a billion tracks": writes("pose(0, 9, struct.pack('<I', 10**9))", "frame 0: a message of 116 bytes should have 40000000116 or more"),
+    "deep JSON": writes("said = b'[' * 60000\npose(0, 5, struct.pack('<I', len(said)) + said)", "frame 0: "),
+    "odd JSON": writes("said = b'{\"a\": {}}'\npose(0, 5, struct.pack('<I', len(said)) + said)", "frame 0: stats should be numbers by name"),
+    "a pickle": writes("send(b'POSE', pickle.dumps(Bomb()))", "frame 0: "),
+    "a pickle of stats": writes("said = pickle.dumps(Bomb())\npose(0, 5, struct.pack('<I', len(said)) + said)", "frame 0: "),
+    "a pickle without a header": writes("os.write(OUT, pickle.dumps(Bomb()))", "frame 0: it should answer POSE"),
+    "20 MB of failure": writes("send(b'FAIL', b'\\x1b\\xff' * 3000, 20_000_000)", "", REFUSED),
+    # It does well, and more.
+    "20 MB of a reason": Animal(FINISHED, "return Result(I, reason='x' * 20_000_000)"),
+    "a reason of surrogates, ESC and NUL": Animal(FINISHED, "return Result(I, Status.DEGRADED, '\\ud800\\x1b[2J\\0dark\\u202e', stats={'\\x1b\\ud800n': 1})"),
+    "stats that are no numbers": Animal(FINISHED, "return Result(I, stats={'a': float('nan'), 'b': float('inf')})"),
+    "prints 30 MB": Animal(FINISHED, f"print('\\x1b[2J' + 'y' * 10_000_000)\n{OK}"),
+    "prints secrets": Animal(FINISHED, f"print(sorted(os.environ.items()))\n{OK}"),
+    "closes what it prints to": Animal(FINISHED, f"if not frame.index: os.close(1); os.close(2)\n{OK}", start="os.close(0)"),
+    "patched checks": Animal(INVALID, "worker = sys.modules['__main__']\nworker.checked = lambda answer, frame: answer\nreturn Result(I * np.nan)", "frame 0: the pose is no finite"),
+    "patched clock": Animal(FINISHED, f"time.perf_counter = time.monotonic = time.process_time = lambda: 0.0\nresource.getrusage = None\nuntil = os.times().user + 0.05\nwhile os.times().user < until: pass\n{OK}"),
+    "reads /proc of its parents": Animal(FINISHED, f"for pid in os.listdir('/proc'):\n    try: open(f'/proc/{{pid}}/cmdline').read()\n    except OSError: pass\n{OK}"),
+    "looks for the truth beside it": Animal(CRASHED, "open('truth.mcap')", "FileNotFoundError"),
+    "deletes its folder": Animal(FINISHED, f"if not frame.index: os.rmdir(os.getcwd())\n{OK}"),
+    # It takes, and leaves behind.
+    "allocates 10 GB": Animal(MEMORY, "np.ones(10 * 2**27)", "MemoryError: Unable to allocate 10.0 GiB"),
+    "children that hold memory": Animal(MEMORY, "pid = os.fork()\nheld = bytearray(b'1') * (200 << 20)\ntime.sleep(9)", "its processes hold", memory_mib=300),
+    "an orphan that holds memory": Animal(MEMORY, "for _ in range(3): away(lambda: globals().update(held=bytearray(b'1') * (150 << 20)))\ntime.sleep(9)", "its processes hold", memory_mib=450),
+    "shared memory": Animal(CRASHED, "os.ftruncate(os.memfd_create('x'), 5 << 30)", "OSError: [Errno 27] File too large"),
+    "shared memory in pieces": Animal(MEMORY, "fds = [os.memfd_create(str(n)) for n in range(20)]\nfor fd in fds: os.write(fd, bytes(8 << 20))\ntime.sleep(9)", "its files hold more than the limit of 64 MiB", disk_mib=64),
+    "one file fills the disk": Animal(CRASHED, "with open('x', 'wb') as file:\n    while True: file.write(bytes(1 << 20))", "OSError: [Errno 27] File too large", disk_mib=64),
+    "many files fill the disk": Animal(MEMORY, "for n in range(100): open(str(n), 'wb').write(bytes(1 << 20))\ntime.sleep(9)", "its files hold more than the limit of 64 MiB", disk_mib=64),
+    "a deleted file fills the disk": Animal(MEMORY, "files = [open(str(n), 'wb') for n in range(10)]\nfor n, file in enumerate(files): file.write(bytes(8 << 20)); os.remove(str(n))\ntime.sleep(9)", "its files hold", disk_mib=64),
+    "forks": Animal(FINISHED, f"if os.fork() == 0: time.sleep(600)\n{OK}"),
+    "forks, and both answer": Animal(INVALID, f"os.fork()\n{OK}", "frame 1: the answer is to frame 0"),
+    "an orphan in a session of its own": Animal(FINISHED, f"away(lambda: None)\n{OK}"),
+    "an orphan without a variable": Animal(FINISHED, f"away(lambda: os.execve('/bin/sleep', ['sleep', '600', os.environ['PYTHONPATH']], {{}}))\n{OK}"),
+    "an orphan that holds the pipe, and an end": Animal(CRASHED, "away(lambda: None)\nos._exit(4)", "the process ended with exit code 4"),
+    "stops its guard": Animal(FINISHED, f"os.kill(os.getppid(), signal.SIGSTOP)\n{OK}"),
+    "kills its guard": Animal(MEMORY, "os.kill(os.getppid(), signal.SIGKILL)\ntime.sleep(600)", "killed by the system"),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    folder, lens = tmp_path_factory.mktemp("recording") / "sequence", Pinhole(64, 48, 60.0, 60.0, 31.5, 23.5)
+    picture = np.random.default_rng(1).integers(0, 255, (48, 64)).astype(np.uint8)
+    with SequenceWriter(folder, stereo_rig(lens, pitch_deg=90), case_json=b"{}") as writer:
+        for index in range(3):
+            writer.write_frame(index * 10**8, picture, picture)
+            writer.write_truth(index * 10**8, np.eye(4), np.zeros(6))
+    return folder
+
+
+def trial_of(animal, place):
+    """A folder of its own with the plugin, and the trial of it."""
+    folder = place / "bad"
+    folder.mkdir()
+    (folder / "estimator.yaml").write_text(
+        "name: bad\nversion: '1'\nclass: estimator:Bad\nneeds: [stereo]\npose_of: left_camera\nsummary: Bad\n"
+    )
+    body, start, finish = (text.replace("\n", "\n        ") for text in (animal.body, animal.start, animal.finish))
+    init = "    __init__ = init\n" if "def init" in animal.head else ""
+    (folder / "estimator.py").write_text(
+        f"{HEAD}{animal.head}\nclass Bad:\n{init}    def start(self, rig, params, seed):\n        {start}\n"
+        f"    def process(self, frame):\n        {body}\n    def finish(self):\n        {finish}\n"
+    )
+    names = ("start_s", "frame_s", "trial_s", "memory_mib", "disk_mib")
+    limits = Limits(**{name: getattr(animal, name) for name in names})
+    manifest = read_manifest(folder)
+    case = RecordedCase(name="case", variant={}, source=Source(path="."))
+    return Trial(case, Entrant("bad", folder, manifest, {}, limits), 0)
+
+
+def left_over(mark):
+    """Processes whose environment or words have a mark in them."""
+    found = []
+    for pid in filter(str.isdigit, os.listdir("/proc")):
+        with suppress(OSError):
+            said = b"".join(Path("/proc", pid, name).read_bytes() for name in ("environ", "cmdline"))
+            if mark.encode() in said:
+                found.append((int(pid), said[-200:]))
+    return found
+
+
+@pytest.fixture
+def run(tmp_path, recording, monkeypatch):
+    """Runs a trial; gives its folder."""
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+    monkeypatch.setenv("SECRET_TOKEN", "hush")
+
+    def run(animal):
+        folder = tmp_path / "estimate"
+        folder.mkdir()
+        estimate(trial_of(animal, tmp_path), recording, folder, SilentProgress())
+        return folder
+
+    return run
+
+
+@pytest.mark.parametrize("animal", ZOO.values(), ids=ZOO)
+def test_a_bad_plugin_is_a_row_with_a_reason_and_nothing_is_left_of_it(run, tmp_path, capfd, animal):
+    outcome = read_outcome(run(animal))
+    assert (outcome.kind, outcome.reason[: len(animal.reason)]) == (animal.kind, animal.reason)
+    assert len(outcome.reason) <= 500
+    assert outcome.reason.isprintable()
+    assert capfd.readouterr() == ("", "")  # in the harness
+    assert left_over(str(tmp_path)) == []
+    assert not (tmp_path / "executed").exists()
+    said = (tmp_path / "estimate" / ANSWERS).read_text()
+    assert not {"\x1b", "\0", "\ud800", "\u202e"} & set(said)
+    if outcome.kind == FINISHED:
+        assert [len(row["reason"]) <= 500 for row in read_table(tmp_path / "estimate" / ANSWERS)] == [True] * 3
+
+
+def test_the_zoo_is_large():
+    assert len(ZOO) >= 60
+
+
+def test_after_a_bad_one_the_next_goes_on(run, tmp_path):
+    assert read_outcome(run(ZOO["kills its guard"])).kind == MEMORY
+    for name in ("estimate", "bad"):
+        (tmp_path / name).rename(tmp_path / f"first {name}")
+    assert read_outcome(run(Animal(FINISHED, OK))).kind == FINISHED
+
+
+def test_who_patches_its_clock_is_timed_by_ours(run):
+    rows = read_table(run(ZOO["patched clock"]) / TIMES)
+    assert all(float(row["wall_ms"]) >= 40 and float(row["cpu_ms"]) >= 40 for row in rows)
+
+
+def test_what_it_prints_has_none_of_our_variables_and_is_cut(run, tmp_path):
+    assert "hush" not in (run(ZOO["prints secrets"]) / LOG).read_text()
+    for name in ("estimate", "bad"):
+        (tmp_path / name).rename(tmp_path / f"first {name}")
+    assert (run(ZOO["prints 30 MB"]) / LOG).stat().st_size < 2 << 20
+
+
+def test_who_reads_nothing_is_late(tmp_path):
+    code = "import os, time; os.write(1, b'REDY' + bytes(4)); time.sleep(600)"
+    picture, began = np.zeros((2000, 2000), np.uint8), time.monotonic()
+    rig = stereo_rig(Pinhole(64, 48, 60.0, 60.0, 31.5, 23.5), pitch_deg=90)
+    argv, limits = [sys.executable, "-S", "-c", code], Limits(frame_s=0.3)
+    with EstimatorProcess.of_stream(argv, tmp_path, log=tmp_path / "log", limits=limits, rate_hz=1.0) as process:
+        process.start(rig, {}, 0)
+        with pytest.raises(EstimatorFailure, match=r"timeout: no answer within 0.3 s"):
+            process.process(Frame(0, 0, picture, picture))
+    assert time.monotonic() - began < 5
+
+
+def test_an_outcome_is_json(run):
+    json.loads((run(ZOO["raises 20 MB of ESC and surrogates"]) / "outcome.json").read_bytes())
