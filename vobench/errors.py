@@ -117,6 +117,11 @@ class SequenceError(VobenchError):
     """A recording is incomplete, torn or of another form."""
 
 
+def printable(text: str) -> str:
+    """A text of somebody else's as a terminal may have it: without ESC, NUL and their like, or lone surrogates."""
+    return "".join(letter if letter.isprintable() or letter == "\n" else " " for letter in text)
+
+
 def unknown(kind: str, name: str, known: list[str]) -> str:
     """One line for a name that nothing has, with the nearest one and all there are."""
     near = get_close_matches(name, known, n=1)

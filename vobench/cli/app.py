@@ -14,7 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from vobench import stop
-from vobench.errors import SuiteError, VobenchError
+from vobench.errors import SuiteError, VobenchError, printable
 
 # Where each verb is: module and function; its first sentence is the verb's summary. Others are installed as entry
 # points of the group below.
@@ -136,7 +136,7 @@ def _fail(sentence: str, error: BaseException) -> None:
     if "--json" in sys.argv:
         print(json_module.dumps({"error": sentence, **_mistakes(error)}, ensure_ascii=False))
     for line in str(error).splitlines() if isinstance(error, SuiteError) else [sentence]:
-        print(f"vobench: {line}", file=sys.stderr)
+        print(f"vobench: {printable(line)}", file=sys.stderr)
     raise SystemExit(1) from None
 
 

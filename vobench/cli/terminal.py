@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar
 
 import typer
 
-from vobench.errors import UnknownNameError, unknown
+from vobench.errors import UnknownNameError, printable, unknown
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from vobench.run.executor import Event
+    from vobench.suite.catalog import Entry
 
 Item = TypeVar("Item")
 # Options and arguments that many verbs have.
@@ -42,6 +43,16 @@ def print_json(content: Any) -> None:
     print(json_module.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
 
 
+def say_hidden(found: "Iterable[Entry]") -> None:
+    """A line on standard error for each estimator that hides one of the same name that vobench brings along."""
+    from vobench.suite.catalog import builtin_root
+
+    for entry in found:
+        ours = builtin_root() / "estimators" / entry.name
+        if entry.kind == "estimator" and entry.origin != "path" and ours.is_dir() and entry.path != ours:
+            print(printable(f"vobench: {entry.name} is {entry.path}, not vobench's own"), file=sys.stderr)
+
+
 def console() -> "Console":
     """Standard output; lines are as long as they are where nobody watches."""
     from rich.console import Console
@@ -59,7 +70,7 @@ def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) ->
     for heading in headings:
         made.add_column(heading, justify="left" if heading in LEFT_ALIGNED else "right", overflow="fold")
     for row in rows:
-        made.add_row(*row)
+        made.add_row(*map(printable, row))
     return made
 
 

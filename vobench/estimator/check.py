@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from vobench.errors import VobenchError
+from vobench.errors import VobenchError, printable
 from vobench.estimator.protocol import Result, Status, Tracks
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
@@ -22,8 +22,7 @@ class InvalidOutputError(VobenchError):
 
 def in_one_line(said: object, most: int = REASON_LETTERS) -> str:
     """A text of somebody else's as it may be printed: without control characters or lone surrogates, cut at `most`."""
-    text = str(said)[: 4 * most]
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split())[:most]
+    return " ".join(printable(str(said)[: 4 * most]).split())[:most]
 
 
 def checked(answer: Any, frame: int) -> Result:

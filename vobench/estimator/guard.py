@@ -24,8 +24,9 @@ def guard(line: socket.socket, file_bytes: int, argv: list[str]) -> NoReturn:
     """Start a program, say on the line how that went, and end as it ends, or when the line is cut."""
     line.set_inheritable(False)
     parent = os.getppid()
-    resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    for limit, value in ((resource.RLIMIT_FSIZE, file_bytes), (resource.RLIMIT_CORE, 0)):
+        with suppress(ValueError):  # where we are given less ourselves
+            resource.setrlimit(limit, (value, value))
     _prctl(PR_SET_CHILD_SUBREAPER, 1)  # the orphans of all below us become our own
     heard, hears = os.pipe()
     os.set_blocking(heard, False)

@@ -73,7 +73,9 @@ class EstimatorProcess:
 
         def opened(rig: Rig, params: Mapping[str, Any], seed: int) -> tuple[Sequence[str], bytes]:
             said = {"version": VERSION, "seed": seed, "rate_hz": rate_hz, "params": dict(params), **calibration(rig)}
-            return filled(argv, folder, {**params, "seed": seed, "rate_hz": rate_hz}), json.dumps(said).encode()
+            return filled(argv, folder, {**params, "seed": seed, "rate_hz": rate_hz}), json.dumps(
+                said, default=str
+            ).encode()
 
         return cls(Door(opened, framed), log=log, limits=limits)
 

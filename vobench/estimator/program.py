@@ -75,15 +75,21 @@ class Program:
             self._line = undone.enter_context(line)
             given = {"stdin": subprocess.DEVNULL, "stdout": self._log, "stderr": self._log, **streams}
             guarded = [*GUARD, str(theirs.fileno()), str(limits.disk_mib << 20), *argv]
-            with theirs:
-                self.process = subprocess.Popen(
-                    guarded, cwd=self.home, env=kept | one, start_new_session=True, pass_fds=[theirs.fileno()], **given
-                )
+            given |= {"cwd": self.home, "env": kept | one, "pass_fds": [theirs.fileno()]}
+            try:
+                with theirs:
+                    self.process = subprocess.Popen(guarded, start_new_session=True, **given)
+            except (OSError, ValueError) as error:  # no memory for it, or a NUL in its words
+                raise EstimatorFailure("refused", f"{argv[0]} cannot be started ({error})") from None
             for pipe in filter(None, (self.process.stdin, self.process.stdout)):
                 undone.callback(pipe.close)
             undone.enter_context(stop.undone(self._kill, is_awaited=True))
             line.settimeout(limits.start_s)
-            if errno := int(line.recv(16) or b"0"):
+            try:
+                errno = int(line.recv(16) or b"0")
+            except TimeoutError:
+                raise EstimatorFailure("timeout", f"it did not run within {limits.start_s:g} s") from None
+            if errno:
                 raise EstimatorFailure("refused", f"{argv[0]} cannot be started ({os.strerror(errno)})")
             self._undone = undone.pop_all()
 
@@ -94,6 +100,8 @@ class Program:
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(timeout=GUARD_S)
         stop.kill_session(self.process)
+        with suppress(subprocess.TimeoutExpired):
+            self.process.wait(timeout=GUARD_S)
         for pid in _strays(self.home):
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
@@ -115,7 +123,8 @@ class Program:
             return
         stats = {pid: fields for pid in self._pids if (fields := stat(pid))}
         self.cpu_s = max(self.cpu_s, sum(_cpu_s(pid, fields) for pid, fields in stats.items()))
-        memory_mib = sum(int(fields[21]) for fields in stats.values()) * resource.getpagesize() / (1 << 20)
+        pages = sum(int(fields[21]) for pid, fields in stats.items() if pid != self.process.pid)  # but the guard's
+        memory_mib = pages * resource.getpagesize() / (1 << 20)
         self.peak_mib = max(self.peak_mib, memory_mib)
         if memory_mib > self.limits.memory_mib:
             limit = f"where the limit is {self.limits.memory_mib} MiB"
@@ -179,7 +188,6 @@ class Program:
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(timeout=0.5 if kind is None else 0)
         self._undone.close()
-        self.process.wait(timeout=GUARD_S)
         self._cut_log()
         if self._printed:
             with self._log_path.open("a", encoding="utf-8") as log:
