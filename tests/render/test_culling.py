@@ -206,7 +206,8 @@ def plainly(material: Material, *, closed: bool, mirrors: bool) -> Material:
     if material.kind == "pane":
         return Material(texture=Procedural(*PLAIN)) if closed else material
     eta = material.eta if mirrors and material.roughness == 0 else 1.0
-    return replace(material, texture=Procedural(*PLAIN), eta=eta, metal=0.0) if material.kind == "body" else material
+    plain = replace(material, texture=Procedural(*PLAIN), emission_texture=None, eta=eta, metal=0.0)
+    return plain if material.kind == "body" else material
 
 
 def scene_in(path: Path, *, closed: bool, mirrors: bool = True) -> Scene:
