@@ -45,6 +45,11 @@ def pose(index, what=1, rest=b""):
     send(b"POSE", struct.pack("<qII", index, 1, what) + np.eye(4)[:3].tobytes() + rest)
 class Bomb:
     def __reduce__(self): return os.system, (f"touch {os.environ['PYTHONPATH'].split(':')[0]}/executed",)
+def shared(number, size):
+    mark = os.environ["PYTHONPATH"].split(":")[0].replace("/", "_")
+    fd = os.open(f"/dev/shm/{mark}{number}", os.O_CREAT | os.O_RDWR)
+    for _ in range(size >> 20): os.write(fd, bytes(1 << 20))
+    return fd
 class Vile(Exception):
     def __str__(self): raise RuntimeError("not even that")
 def away(and_then):
@@ -189,6 +194,8 @@ ZOO = {
     "an orphan that holds memory": Animal(MEMORY, "for _ in range(3): away(lambda: globals().update(held=bytearray(b'1') * (150 << 20)))\ntime.sleep(9)", "its processes hold", memory_mib=450),
     "shared memory": Animal(CRASHED, "os.ftruncate(os.memfd_create('x'), 5 << 30)", "OSError: [Errno 27] File too large"),
     "shared memory in pieces": Animal(MEMORY, "fds = [os.memfd_create(str(n)) for n in range(20)]\nfor fd in fds: os.write(fd, bytes(8 << 20))\ntime.sleep(9)", "its files hold more than the limit of 64 MiB", disk_mib=64),
+    "shared memory with a name": Animal(FINISHED, f"if not frame.index: self.held = shared(0, 32 << 20)\n{OK}"),
+    "too much shared memory with a name": Animal(MEMORY, "self.held = [shared(n, 40 << 20) for n in range(2)]\ntime.sleep(9)", "its files hold more", disk_mib=64),
     "one file fills the disk": Animal(CRASHED, "with open('x', 'wb') as file:\n    while True: file.write(bytes(1 << 20))", "OSError: [Errno 27] File too large", disk_mib=64),
     "many files fill the disk": Animal(MEMORY, "for n in range(100): open(str(n), 'wb').write(bytes(1 << 20))\ntime.sleep(9)", "its files hold more than the limit of 64 MiB", disk_mib=64),
     "a deleted file fills the disk": Animal(MEMORY, "files = [open(str(n), 'wb') for n in range(10)]\nfor n, file in enumerate(files): file.write(bytes(8 << 20)); os.remove(str(n))\ntime.sleep(9)", "its files hold", disk_mib=64),
@@ -268,6 +275,7 @@ def test_a_bad_plugin_is_a_row_with_a_reason_and_nothing_is_left_of_it(run, tmp_
     assert capfd.readouterr() == ("", "")  # in the harness
     assert left_over(str(tmp_path)) == []
     assert not (tmp_path / "executed").exists()
+    assert not list(Path("/dev/shm").glob(f"{str(tmp_path).replace(os.sep, '_')}*"))
     said = (tmp_path / "estimate" / ANSWERS).read_text()
     assert not {"\x1b", "\0", "\ud800", "\u202e"} & set(said)
     if outcome.kind == FINISHED:

@@ -76,6 +76,7 @@ def run_command(
     limits = [parse_threshold(said) for said in fail_if or ()]
     planned = read_plan(suite, only_estimators=tuple(estimator or ()), changes=_assigned(given))
     planned = planned.only(case or (), scene or ())
+    terminal.say_hidden(planned.found)
     if dry_run:
         _check(planned, as_json=json, is_dry_run=True)
         return

@@ -49,7 +49,12 @@ def say_hidden(found: "Iterable[Entry]") -> None:
 
     for entry in found:
         ours = builtin_root() / "estimators" / entry.name
-        if entry.kind == "estimator" and entry.origin != "path" and ours.is_dir() and entry.path != ours:
+        if (
+            entry.kind == "estimator"
+            and entry.origin != "path"
+            and ours.is_dir()
+            and entry.path.resolve() != ours.resolve()
+        ):
             print(printable(f"vobench: {entry.name} is {entry.path}, not vobench's own"), file=sys.stderr)
 
 

@@ -5,6 +5,7 @@ docs/estimators.md has the specification. Every message is a tag of four letters
 """
 
 import json
+import pickle
 import struct
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -44,13 +45,13 @@ def _camera(camera: Camera, T_body_camera: Array) -> dict[str, Any]:
     return {"model": type(camera).__name__, **asdict(camera), "T_body_camera": T_body_camera.tolist()}
 
 
-def framed(frame: Frame) -> list[bytes]:
+def framed(frame: Frame) -> list[bytes | memoryview]:
     """A frame's parts: FRAME, the pictures row by row, IMU readings and encoder counts, each after its stamp."""
     pictures = [picture for picture in (frame.left, frame.right) if picture is not None]
     height, width, channels = (*pictures[0].shape, 1)[:3] if pictures else (0, 0, 0)
     imu, encoders = frame.imu, frame.encoders
     counts = (len(pictures), 0 if imu is None else len(imu.t_ns), 0 if encoders is None else len(encoders.t_ns))
-    parts = [FRAME.pack(frame.index, frame.t_ns, width, height, channels, *counts)]
+    parts: list[bytes | memoryview] = [FRAME.pack(frame.index, frame.t_ns, width, height, channels, *counts)]
     parts += [np.ascontiguousarray(picture).tobytes() for picture in pictures]
     if imu is not None:
         values = np.hstack([imu.gyro_radps, imu.accel_mps2]).astype("<f8")
@@ -58,6 +59,25 @@ def framed(frame: Frame) -> list[bytes]:
     if encoders is not None:
         parts.append(np.column_stack([encoders.t_ns, encoders.ticks]).astype("<i8").tobytes())
     return parts
+
+
+def pickled(frame: Frame) -> list[bytes | memoryview]:
+    """A frame's parts for our own worker: its pickle and its arrays as they lie in memory, each after its length."""
+    arrays = list[pickle.PickleBuffer]()
+    said = pickle.dumps(frame, 5, buffer_callback=arrays.append)
+    parts: list[bytes | memoryview] = [said, *(array.raw() for array in arrays)]
+    return [each for part in parts for each in (COUNT.pack(len(part)), part)]
+
+
+def unpickled(payload: bytearray) -> Frame:
+    """The frame of these parts; its arrays are the payload's memory."""
+    view, parts = memoryview(payload), list[memoryview]()
+    while view:
+        end = COUNT.size + COUNT.unpack_from(view)[0]
+        parts.append(view[COUNT.size : end])
+        view = view[end:]
+    frame: Frame = pickle.loads(parts[0], buffers=parts[1:])
+    return frame
 
 
 def answered(result: Result, index: int) -> bytes:

@@ -28,6 +28,7 @@ from vobench.estimator.message import (
     VERSION,
     calibration,
     framed,
+    pickled,
     read_answer,
     read_revision,
 )
@@ -45,7 +46,7 @@ class Door:
     """How an estimator is called: its argv and the payload of CALB for a trial, and the parts of a FRAM."""
 
     opened: Callable[[Rig, Mapping[str, Any], int], tuple[Sequence[str], bytes]]
-    framed: Callable[[Frame], list[bytes]]
+    framed: Callable[[Frame], list[bytes | memoryview]]
 
 
 class EstimatorProcess:
@@ -65,7 +66,7 @@ class EstimatorProcess:
         def opened(rig: Rig, params: Mapping[str, Any], seed: int) -> tuple[Sequence[str], bytes]:
             return argv, pickle.dumps((rig, dict(params), seed, is_watched))
 
-        return cls(Door(opened, lambda frame: [pickle.dumps(frame)]), log=log, limits=limits)
+        return cls(Door(opened, pickled), log=log, limits=limits)
 
     @classmethod
     def of_stream(cls, argv: Sequence[str], folder: Path, *, log: Path, limits: Limits, rate_hz: float) -> Self:
@@ -134,7 +135,7 @@ class EstimatorProcess:
         self._limit_s = limit_s
         return time.monotonic() + limit_s
 
-    def _send(self, tag: bytes, parts: Sequence[bytes], until: float) -> None:
+    def _send(self, tag: bytes, parts: Sequence[bytes | memoryview], until: float) -> None:
         for part in (HEADER.pack(tag, sum(map(len, parts))), *parts):
             left = memoryview(part)
             while left:

@@ -27,6 +27,7 @@ KEPT_ENVIRONMENT = ("PATH", "HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PYTHON
 LOG_BYTES = 1 << 20
 LOOK_S = 0.1  # how often memory and time of a running program are looked at
 WEIGH_S = 1.0  # how often its files are
+SHARED = "/dev/shm/"  # Linux's shared memory, where it has a name
 GUARD_S = 2.0  # the guard's time to end what it guards
 GUARD = (sys.executable, "-I", "-S", str(Path(__file__).with_name("guard.py")))
 CPUCLOCK_SCHED = 2  # of another process's clock: linux/posix-timers.h
@@ -65,12 +66,14 @@ class Program:
         self._began, self._looked, self._weighed = time.monotonic(), 0.0, time.monotonic()
         self._pids, self._files_before = list[int](), _held_bytes(self.home, most=sys.maxsize)
         self._before_s, self.cpu_s, self.peak_mib = _buried_s(), 0.0, 0.0
+        self._shared, self._shared_before = set[str](), {str(path) for path in Path(SHARED).glob("*")}
         kept = {name: value for name, value in os.environ.items() if name in KEPT_ENVIRONMENT}
         one = {**dict.fromkeys(THREADS, str(limits.threads)), "PYTHONHASHSEED": "0", "TMPDIR": str(self.home)}
         with ExitStack() as undone:
             undone.enter_context(stop.undone(lambda: stop.remove(self.home)))
             self._log = undone.enter_context(log.open("ab"))  # to its end, also once we have cut it
             os.truncate(log, 0)
+            undone.callback(self._free_shared)
             line, theirs = socket.socketpair()
             self._line = undone.enter_context(line)
             given = {"stdin": subprocess.DEVNULL, "stdout": self._log, "stderr": self._log, **streams}
@@ -106,6 +109,11 @@ class Program:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
 
+    def _free_shared(self) -> None:
+        for path in self._shared:
+            with suppress(OSError):
+                os.unlink(path)
+
     def left_s(self) -> float:
         """Seconds that are left of the whole trial's."""
         return self._began + self.limits.trial_s - time.monotonic()
@@ -136,7 +144,9 @@ class Program:
         """Raises EstimatorFailure where its folder and the nameless files that it holds open are beyond the limit."""
         self._weighed, most = time.monotonic(), self.limits.disk_mib << 20
         held = _held_bytes(self.home, most=most + self._files_before) - self._files_before
-        if held + sum(_nameless(self._pids).values()) > most:
+        nameless = _nameless(self._pids)
+        self._shared |= {target for _, target in nameless.values()} - self._shared_before
+        if held + sum(size for size, _ in nameless.values()) > most:
             reason = f"its files hold more than the limit of {self.limits.disk_mib} MiB"
             raise EstimatorFailure("out_of_memory", reason)
 
@@ -183,6 +193,8 @@ class Program:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        with suppress(EstimatorFailure):
+            self._weigh_files()  # what it would leave in shared memory
         if self.process.stdin:
             self.process.stdin.close()  # there is no more to come
         with suppress(subprocess.TimeoutExpired):
@@ -230,16 +242,16 @@ def _held_bytes(folder: Path, *, most: int) -> int:
     return held
 
 
-def _nameless(pids: Iterable[int]) -> dict[tuple[int, int], int]:
-    """Bytes of the files that processes hold open and that no folder shows, shared memory with them, by their ids."""
-    held = dict[tuple[int, int], int]()
+def _nameless(pids: Iterable[int]) -> dict[tuple[int, int], tuple[int, str]]:
+    """Bytes and names of files held open that no folder of theirs shows, shared memory with them, by device and id."""
+    held = dict[tuple[int, int], tuple[int, str]]()
     for pid in pids:
         with suppress(OSError):
             for name in os.listdir(f"/proc/{pid}/fd"):
                 with suppress(OSError):
                     target, facts = os.readlink(f"/proc/{pid}/fd/{name}"), os.stat(f"/proc/{pid}/fd/{name}")
-                    if S_ISREG(facts.st_mode) and (not facts.st_nlink or target.startswith("/dev/shm/")):
-                        held[facts.st_dev, facts.st_ino] = facts.st_blocks * 512
+                    if S_ISREG(facts.st_mode) and (not facts.st_nlink or target.startswith(SHARED)):
+                        held[facts.st_dev, facts.st_ino] = facts.st_blocks * 512, target
     return held
 
 

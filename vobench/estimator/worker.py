@@ -15,8 +15,8 @@ from typing import BinaryIO, cast
 
 from vobench.errors import VobenchError
 from vobench.estimator.check import InvalidOutputError, checked, checked_revision, in_one_line
-from vobench.estimator.message import HEADER, answered, revision
-from vobench.estimator.protocol import Estimator, Frame
+from vobench.estimator.message import HEADER, answered, revision, unpickled
+from vobench.estimator.protocol import Estimator
 
 NAMESPACE = "vobench_estimators"
 
@@ -112,9 +112,10 @@ def _answers(asked: BinaryIO, estimator: Estimator) -> Iterator[Says]:
     is_watched = False
     while head := asked.read(HEADER.size):
         tag, length = HEADER.unpack(head)
-        said = asked.read(length)
+        said = bytearray(length)
+        asked.readinto(said)  # type: ignore[attr-defined]
         if tag == b"FRAM":
-            frame: Frame = pickle.loads(said)
+            frame = unpickled(said)
             before = pickle.dumps(frame) if is_watched else b""
             result = checked(estimator.process(frame), frame.index)
             if is_watched and pickle.dumps(frame) != before:
