@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import scipy
@@ -17,6 +17,9 @@ from vobench.geometry.se3 import Array
 from vobench.render.geometry import Floats, Indices, Mask, Visibility, areas_m2, face_materials, lengths, off, take
 from vobench.scene.material import Material, fresnel
 from vobench.scene.mesh import Triangles, unit
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Places = NDArray[np.int64]
 WELD_M = 1e-5  # corners nearer than this are one
@@ -344,6 +347,20 @@ class Layout:
             known[new] = True
         return values
 
+    def interpolation(self) -> "csr_array":
+        """Weights (P, P) with which `between` makes all points' values of the few's."""
+        known, result = self.few, scipy.sparse.diags_array(self.few.astype(np.float32), format="csr")
+        for sides in (self.beside[:2], self.beside[2:]):
+            weight = known[sides[0]].astype(np.float32) + known[sides[1]]
+            new = np.flatnonzero(~known & (weight > 0))
+            pairs = [(new[known[side[new]]], side) for side in sides]
+            rows = np.concatenate([np.flatnonzero(known), *(own for own, _ in pairs)])
+            columns = np.concatenate([np.flatnonzero(known), *(side[own] for own, side in pairs)])
+            shares = np.where(known[rows], np.float32(1), 1 / np.maximum(weight[rows], 1))
+            step = scipy.sparse.csr_array((shares.astype(np.float32), (rows, columns)), (len(known), len(known)))
+            result, known = step @ result, known | (weight > 0)
+        return result
+
     def blurred(self, values: Floats) -> Floats:
         """Values (P,) smoothed by about one texel, each chart by itself."""
         left, right, above, below = self.beside
@@ -518,6 +535,8 @@ def in_chunks(
         stop.check()
         return work(part)
 
+    if len(slices) == 1:
+        return [checked(slices[0])]
     results = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for result in pool.map(checked, slices):
