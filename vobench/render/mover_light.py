@@ -102,7 +102,7 @@ class _Lit:
             cells = self.cells.take(some)
             for part in range(len(parts_at.radius_m)):
                 near[some] |= may_shade(parts_at.take(slice(part, part + 1)), self.emitter.ball, cells)
-        return self.points[np.repeat(near, np.diff(self.starts))]
+        return np.asarray(self.points[np.repeat(near, np.diff(self.starts))])
 
 
 class MoverLight:
