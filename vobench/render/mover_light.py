@@ -123,7 +123,6 @@ class MoverLight:
         )
         self._mover = faces.mover[self._points.face]
         self._by_cell = np.argsort(still.cells, kind="stable")
-        self._between = still.layout.interpolation() if self._solid else None
         self._lit: dict[tuple[int, float], list[_Lit]] = {}
         self._groups, self._blend = self._grouped(faces)
         self._gatherer = Gatherer(
@@ -237,19 +236,16 @@ class MoverLight:
 
     def _lost(self, lit: _Lit, some: Places, index: int, movers: MovingCaster) -> Floats:
         """Illuminance (N,) that movers take from some points; soft shadows between points that ask, as light does."""
-        if not lit.is_soft or self._between is None:
+        if not lit.is_soft:
             return self._traced(lit.emitter, some, movers, SHADE_SIDE)
         side = SKY_SHADE_SIDE if lit.emitter.sky == "pane" else SHADE_SIDE
         straight, is_few = self._straight[index], self._still.layout.few[some]
         few, rest = some[is_few], some[~is_few]
-        share, known = np.zeros((2, len(straight)), np.float32)
-        known[lit.points] = self._still.layout.few[lit.points]
+        share, known = np.zeros(len(straight), np.float32), np.zeros(len(straight), bool)
+        known[lit.points] = True
         share[few] = self._traced(lit.emitter, few, movers, side) / straight[few]
-        rows = self._between[rest]
-        sure = rows @ known
-        with np.errstate(invalid="ignore", divide="ignore"):
-            mean, square = rows @ share / sure, rows @ share**2 / sure
-            unsure = ~(square - mean**2 <= UNSURE**2)
+        mean, spread = self._still.layout.around(rest, share, known)
+        unsure = ~(spread <= UNSURE)
         share[rest] = np.where(unsure, 0, mean)
         asked = rest[unsure]
         share[asked] = self._traced(lit.emitter, asked, movers, side) / straight[asked]
