@@ -1,5 +1,6 @@
 """vobench run, check, report and view on a suite whose pictures are grey."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -215,3 +216,12 @@ def test_the_log_of_events_has_a_start_and_an_end_of_each_task(vobench, here):
     started = [event["key"] for event in events if event["event"] == "started"]
     assert sorted(started) == sorted(event["key"] for event in events if event["event"] == "done")
     assert next(event["stage"] for event in events if event["event"] == "done") == "bake"
+
+
+def test_a_limit_of_time_holds_for_every_trial_and_fresh_makes_all_anew(ran: Path, vobench):
+    store = Path(os.environ["VOBENCH_CACHE"])
+    made = {path: path.stat().st_mtime_ns for path in store.glob("*/*/manifest.json")}
+    assert vobench("run", "tiny", "--timeout", 0.001, "--json").json["boards"][0]["rows"][0]["status"] == "timeout"
+    assert {path: path.stat().st_mtime_ns for path in made} == made
+    vobench("run", "tiny", "--fresh", "--json")
+    assert all(path.stat().st_mtime_ns > before for path, before in made.items())

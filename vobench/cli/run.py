@@ -3,7 +3,6 @@
 import os
 import shutil
 import sys
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,7 +17,7 @@ from vobench.run.executor import Dask, Executor, LocalProcesses, Serial
 from vobench.run.key import cache_folder
 from vobench.run.motion import BodyMotion, body_motions
 from vobench.run.store import why_unwritable
-from vobench.run.task import is_done, missing, plan, sequence_tasks
+from vobench.run.task import is_done, plan, sequence_tasks
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite import Case, Plan, Suite, read_plan
@@ -66,6 +65,9 @@ def run_command(
     fail_if: Annotated[
         list[str] | None, typer.Option("--fail-if", help="End with code 3 if so, as in 'ate_trans.rmse > 0.2'.")
     ] = None,
+    timeout: Annotated[float | None, typer.Option(min=0.001, help="Seconds that a whole trial may take.")] = None,
+    memory: Annotated[int | None, typer.Option(min=1, help="MiB that an estimator's processes may hold.")] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Make everything anew, whatever the cache holds.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
     json: terminal.Json = False,
 ) -> None:
@@ -76,6 +78,8 @@ def run_command(
     limits = [parse_threshold(said) for said in fail_if or ()]
     planned = read_plan(suite, only_estimators=tuple(estimator or ()), changes=_assigned(given))
     planned = planned.only(case or (), scene or ())
+    said = {"trial_s": timeout, "memory_mib": memory}
+    planned = planned.limited(**{name: value for name, value in said.items() if value is not None})
     terminal.say_hidden(planned.found)
     if dry_run:
         _check(planned, as_json=json, is_dry_run=True)
@@ -94,7 +98,7 @@ def run_command(
     with stop.undone(executor.close), work:
         folder = run_suite(
             planned, recordings, root=out, store=cache_folder().resolve(), finish=page.write_reports,
-            executor=executor, shares_time=share_time, heard=work.hear, tell=work.say,
+            executor=executor, shares_time=share_time, is_fresh=fresh, heard=work.hear, tell=work.say,
         )  # fmt: skip
     scores = folder.scores()
     boards = page.boards_of(folder, scores)
@@ -174,19 +178,35 @@ def _check(planned: Plan, *, as_json: bool, is_dry_run: bool = False) -> None:
         for note in case.get("notes", []):
             out.print(f"{case['case']}: {note}")
     if is_dry_run:
-        rows = [[row["stage"], str(row["tasks"]), str(row["in the cache"]), str(row["to do"])] for row in to_do]
-        out.print(terminal.table("tasks", ["stage", "tasks", "in the cache", "to do"], rows))
+        rows = [[row["stage"], *(str(row[name]) for name in ("tasks", "in the cache", "to do")), _spell(row["seconds"])]
+                for row in to_do]  # fmt: skip
+        out.print(terminal.table("tasks", ["stage", "tasks", "in the cache", "to do", "about"], rows))
+        for row in to_do:
+            for reason, count in row["reasons"].items():
+                out.print(f"{row['stage']}: {count} to do: {reason}", highlight=False)
     out.print(f"{len(cases)} cases, {len(entrants)} estimators, {trials} trials: the suite is valid")
 
 
 def _to_do(planned: Plan, recordings: "Mapping[str, Recording]") -> list[dict[str, Any]]:
-    """By stage, how many tasks there are, and how many of them are done."""
-    tasks = plan(planned, recordings)
-    wanted = Counter(task.stage for task in missing(tasks, cache_folder()))
+    """By stage, how many tasks there are, how many of them are done, why the rest is not, and how long it takes."""
+    from vobench.run.dry_run import to_do
+
     return [
-        {"stage": stage, "tasks": count, "in the cache": count - wanted[stage], "to do": wanted[stage]}
-        for stage, count in Counter(task.stage for task in tasks).items()
+        {
+            "stage": each.stage,
+            "tasks": each.tasks,
+            "in the cache": each.tasks - each.to_do,
+            "to do": each.to_do,
+            "reasons": each.reasons,
+            "seconds": each.seconds,
+        }
+        for each in to_do(plan(planned, recordings), cache_folder())
     ]
+
+
+def _spell(seconds: float | None) -> str:
+    """So many seconds of one core's work; empty where nothing is known."""
+    return "" if seconds is None else f"{seconds:.0f} s" if seconds < 600 else f"{seconds / 60:.0f} min"
 
 
 def _facts(

@@ -146,6 +146,8 @@ class Work:
                 "reason": event.reason,
             }
             print(json_module.dumps(said, ensure_ascii=False), file=self._log, flush=True)
+        for sentence in event.told:
+            self.say(sentence)
         if event.what == "started":
             if self._draws:
                 self._lines[event.task.key] = self._bars.add_task(name)

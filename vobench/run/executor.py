@@ -32,12 +32,16 @@ CONNECT_S = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """How a task ended: no failure, or which and why; `ends_all` where no other task can end better."""
+    """How a task ended: no failure, or which and why; `ends_all` where no other task can end better.
+
+    `told` are the sentences on the store that the user should read.
+    """
 
     failure: FailureKind | None = None
     reason: str = ""
     wall_s: float = 0.0
     ends_all: bool = False
+    told: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +53,7 @@ class Event:
     slot: int
     wall_s: float = 0.0
     reason: str = ""
+    told: tuple[str, ...] = ()
 
 
 class Executor(Protocol):
@@ -84,7 +89,9 @@ class Serial:
 
 def performed(task: Task, store: Path, threads: int, progress: Progress = SilentProgress()) -> Done:  # noqa: B008
     """Perform a task; what it raises is told, but for a request to stop."""
-    began = time.monotonic()
+    began, told = time.monotonic(), list[str]()
+    if isinstance(progress, SilentProgress):  # nobody hears of it here
+        progress = SilentProgress(told.append)
     try:
         perform(task, store, threads, progress=progress)
     except MissingDependencyError as error:
@@ -97,7 +104,7 @@ def performed(task: Task, store: Path, threads: int, progress: Progress = Silent
         if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
             return Done("refused", f"{FULL}: {error.filename or store}", time.monotonic() - began, ends_all=True)
         return Done("crashed", f"{type(error).__name__}: {_line(error)}", time.monotonic() - began)
-    return Done(wall_s=time.monotonic() - began)
+    return Done(wall_s=time.monotonic() - began, told=tuple(told))
 
 
 FULL = "no space is left on the device; free some, or let VOBENCH_CACHE name a folder elsewhere"
@@ -326,7 +333,7 @@ def perform_all(
                 done = future.result()
                 if done.ends_all:
                     raise InputError(done.reason)
-                heard(Event("failed" if done.failure else "done", task, slot, done.wall_s, done.reason))
+                heard(Event("failed" if done.failure else "done", task, slot, done.wall_s, done.reason, done.told))
                 if not done.failure:
                     queue.release(task.key)
                     continue

@@ -56,18 +56,22 @@ def run_suite(
     finish: Finish,
     executor: Executor,
     shares_time: bool = False,
+    is_fresh: bool = False,
     heard: Callable[[Event], object] = lambda _: None,
     tell: Tell = lambda _: None,
 ) -> RunFolder:
     """Run every case, estimator and repeat; what the store holds already is not made again.
 
     `finish` adds reports to the folder before it gets its final name under `root`. A cell whose task fails has a row
-    that says why. `executor`, `shares_time` and `heard` are those of `perform_all`; `tell` is given sentences on the
-    store, say of a result that was damaged.
+    that says why. `is_fresh` makes all of it anew. `executor`, `shares_time` and `heard` are those of `perform_all`;
+    `tell` is given sentences on the store, say of a result that was damaged.
     """
     tasks = plan(suite, recordings)
     kept = Store(store)
     with kept.in_use(tell):
+        if is_fresh:
+            kept.require_writable()
+            kept.forget(task.key for task in tasks)
         to_make = missing(tasks, store)
         if to_make:
             kept.require_writable()

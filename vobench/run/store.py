@@ -23,7 +23,8 @@ from vobench.run.entry import MANIFEST, States, fault, remember, seal
 from vobench.run.key import canonical, digest
 
 PREFIX, BAD = ".unfinished-", ".bad-"
-STATE = "state"
+STATE, INPUTS = "state", "inputs.json"
+TIMED = 50  # results of a stage whose seconds are kept, about
 # How often a lock is asked for that another holds: soon at first, and then so that Ctrl-C is answered in time.
 FIRST_LOOK_S, LOOK_S = 1e-3, 0.2
 PATIENCE_S = 1.0  # before the user is told who is waited for
@@ -241,7 +242,7 @@ class Store:
             old = _made(final)
             with unfinished(final.parent) as folder:
                 build(folder)
-                (folder / "inputs.json").write_text(canonical(inputs), encoding="utf-8")
+                (folder / INPUTS).write_text(canonical(inputs), encoding="utf-8")
                 states = seal(folder)
                 if old and old == _made(final):
                     discard(final)
@@ -256,6 +257,27 @@ class Store:
                 raise
             return
         remember(self._checked(f"{final.parent.name}/{final.name}"), states)
+
+    def note_seconds(self, stage: str, seconds: float) -> None:
+        """Keep how long a result took."""
+        path = self.root / STATE / "seconds" / stage
+        with suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open("a", encoding="ascii") as file:
+                file.write(f"{seconds:.3f}\n")
+
+    def seconds(self, stage: str) -> list[float]:
+        """How long the last results of a stage took; empty where none was made."""
+        with suppress(OSError, ValueError):
+            lines = (self.root / STATE / "seconds" / stage).read_text(encoding="ascii").split()
+            return [float(line) for line in lines[-TIMED:]]
+        return []
+
+    def forget(self, keys: Iterable[str]) -> None:
+        """Remove results, so that they are made anew; what another process makes meanwhile stays."""
+        for key in keys:
+            if (self.root / key).is_dir():
+                self._removed(_entry(self.root / key))
 
     def set_aside_damaged(self, keys: Iterable[str], tell: Tell) -> None:
         """Give results that are not as they were written another name, and say why."""
@@ -301,8 +323,8 @@ class Store:
         """Remove what killed processes left behind: unfinished folders and locks."""
         for kind in self._kinds():
             sweep(kind)
-        for path in self.root.glob(f"{STATE}/*/*"):
-            if path.is_file():
+        for name in ("runs", "locks"):
+            for path in self.root.glob(f"{STATE}/{name}/*"):
                 _unlink_if_free(path)
 
     def entries(self) -> Iterator[Entry]:
@@ -398,7 +420,10 @@ class Progress(Protocol):
 
 
 class SilentProgress:
-    """Progress that nobody hears of."""
+    """Progress that nobody hears of but for sentences that stay, if somebody is to be told."""
+
+    def __init__(self, tell: Tell = lambda _: None) -> None:
+        self._tell = tell
 
     def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
         """The same items."""
@@ -411,4 +436,5 @@ class SilentProgress:
         return nullcontext(lambda _: None)
 
     def say(self, sentence: str) -> None:
-        """Nothing is said."""
+        """Told to whoever asked for it."""
+        self._tell(sentence)

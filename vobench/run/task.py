@@ -1,6 +1,7 @@
 """The stages from suite to scores as tasks: what each makes, of what, after which others, and how it is performed."""
 
 import os
+import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -187,10 +188,11 @@ def missing(tasks: Iterable[Task], root: Path) -> list[Task]:
 
 def is_done(task: Task, root: Path) -> bool:
     """Whether the store holds the task's result; that of a failure is made anew, for its cause may be gone."""
-    return Store(root).has(task.key) and not _has_failed(task, root / task.key)
+    return Store(root).has(task.key) and not has_failed(task, root / task.key)
 
 
-def _has_failed(task: Task, folder: Path) -> bool:
+def has_failed(task: Task, folder: Path) -> bool:
+    """Whether what lies there is the result of a trial that came to no end."""
     from vobench.run.estimate import FINISHED, read_outcome
 
     return task.stage in ("estimate", "score") and read_outcome(folder).kind != FINISHED
@@ -214,10 +216,12 @@ def perform(
     store = Store(root)
 
     def build(folder: Path) -> None:
+        began = time.monotonic()
         PERFORMERS[task.stage](task.subject, [store.need(key) for key in task.needs], folder, progress)
+        store.note_seconds(task.stage, time.monotonic() - began)
 
     def keeps(folder: Path) -> bool:
-        return not _has_failed(task, folder)
+        return not has_failed(task, folder)
 
     return store.get(KINDS[task.stage], task.inputs, build, keeps=keeps, tell=progress.say)
 

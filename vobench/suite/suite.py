@@ -250,6 +250,11 @@ class Plan:
 
         return replace(self, simulated=tuple(filter(kept, self.simulated)), recorded=tuple(filter(kept, self.recorded)))
 
+    def limited(self, **limits: Any) -> "Plan":
+        """The plan with these of Limits in place of every entrant's."""
+        entrants = (replace(each, limits=replace(each.limits, **limits)) for each in self.entrants)
+        return replace(self, entrants=tuple(entrants))
+
     def mistakes(self) -> Mistakes:
         """To gather what is wrong with the suite."""
         return Mistakes(self.source)
