@@ -14,6 +14,7 @@ import typer
 from vobench import stop
 from vobench.cli import terminal
 from vobench.errors import MissingDependencyError
+from vobench.estimator.program import sandbox_works
 from vobench.render import mitsuba
 from vobench.render.raster import EGL_PACKAGES, EGL_REMEDY
 from vobench.run.key import cache_folder
@@ -40,7 +41,7 @@ def doctor_command(
 ) -> None:
     """Say what this machine lacks, and the command that mends it."""
     python = Check("Python", True, sys.version.split()[0])
-    checks = [python, _libraries(), _drawing(), _cache(), _path_tracing()]
+    checks = [python, _libraries(), _drawing(), _cache(), _sandbox(), _path_tracing()]
     if fix and not checks[2].well:
         checks[2] = _installed_drawing()
     ill = [c for c in checks if not (c.well or c.optional)]
@@ -100,6 +101,14 @@ def _cache() -> Check:
     writable = not why_unwritable(root)
     remedy = "set VOBENCH_CACHE to a folder that can be written"
     return Check("cache", writable, str(root) if writable else f"cannot write {root}", remedy)
+
+
+def _sandbox() -> Check:
+    """Whether estimators can be kept from seeing the truth; they run all the same."""
+    if sandbox_works():
+        return Check("sandbox for estimators", True, "truth, cache and other processes are hidden", optional=True)
+    remedy = "allow user namespaces: sysctl user.max_user_namespaces, kernel.apparmor_restrict_unprivileged_userns"
+    return Check("sandbox for estimators", False, "the kernel gives no namespaces; boards say so", remedy, True)
 
 
 def _path_tracing() -> Check:

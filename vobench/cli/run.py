@@ -13,6 +13,7 @@ from vobench import stop
 from vobench.cli import terminal
 from vobench.errors import InputError
 from vobench.estimator.manifest import Manifest
+from vobench.estimator.program import sandbox_works
 from vobench.run.executor import Dask, Executor, LocalProcesses, Serial
 from vobench.run.key import cache_folder
 from vobench.run.motion import BodyMotion, body_motions
@@ -107,6 +108,8 @@ def run_command(
         print(boards_as_json(boards), end="")
     else:
         print_boards(boards)
+        if not sandbox_works():
+            terminal.console().print("Estimators were not sandboxed: the kernel gives no namespaces (vobench doctor).")
         if share_time:
             terminal.console().print(f"CPU times of this run were taken {BESIDE}.")
         vobench = "vobench" if shutil.which("vobench") else sys.argv[0]  # where the environment is not activated

@@ -49,7 +49,9 @@ class CommandProgram:
         out: str = OUT,
         t_ns: Stamps,
         write_dataset: Callable[[Path], object],
+        hidden: Sequence[Path] = (),
     ) -> None:
+        self._hidden = hidden
         self._argv, self._folder, self._log, self._limits = argv, folder, log, limits
         self._out, self._t_ns, self._write_dataset = out, t_ns, write_dataset
         self._cost, self._poses = (0.0, 0.0, 0.0), dict[int, Array]()
@@ -67,7 +69,7 @@ class CommandProgram:
             values = {"dataset": dataset, "calib": dataset / CALIBRATION, "out": home / self._out, "seed": seed}
             argv = filled(self._argv, self._folder, {**params, **values, "rate_hz": rate_hz(self._t_ns)})
             began = time.monotonic()
-            with Program(argv, log=self._log, limits=self._limits, home=home) as program:
+            with Program(argv, log=self._log, limits=self._limits, home=home, hidden=self._hidden) as program:
                 program.wait()
                 self._poses = poses_in(home / self._out, self._t_ns)
         wall_s, frames_per_ms = time.monotonic() - began, len(self._t_ns) / 1e3

@@ -1,9 +1,13 @@
 """The parent of an estimator's processes: none of them outlives the trial or vobench, whatever session it is in.
 
+Where the kernel allows it they live in namespaces of their own (namespaces(7)): they see no other processes, and
+folders that are hidden from them are empty.
+
 Run as a script by a bare interpreter, for it should cost next to nothing: nothing of vobench is imported.
 """
 
 import ctypes
+import json
 import os
 import resource
 import select
@@ -18,9 +22,12 @@ PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
 LOOK_S = 0.5  # how often we look whether vobench lives, should its end of the line be held open by another
 KILL_S = 0.002
 CANNOT_START = 127
+# linux/sched.h and linux/mount.h
+CLONE_NEWNS, CLONE_NEWUSER, CLONE_NEWPID = 0x00020000, 0x10000000, 0x20000000
+MS_RDONLY, MS_BIND, MS_REC, MS_PRIVATE = 1, 4096, 16384, 1 << 18
 
 
-def guard(line: socket.socket, file_bytes: int, argv: list[str]) -> NoReturn:
+def guard(line: socket.socket, file_bytes: int, hidden: list[str], argv: list[str]) -> NoReturn:
     """Start a program, say on the line how that went, and end as it ends, or when the line is cut."""
     line.set_inheritable(False)
     parent = os.getppid()
@@ -33,7 +40,9 @@ def guard(line: socket.socket, file_bytes: int, argv: list[str]) -> NoReturn:
     os.set_blocking(hears, False)
     signal.signal(signal.SIGCHLD, lambda *_: None)
     signal.set_wakeup_fd(hears)
-    main, status = _started(argv, line), None
+    ends, writes = os.pipe()
+    main, status = _started(argv, line, hidden, writes), None
+    os.close(writes)
     for fd in (0, 1):  # the program's alone, whose end is then seen at the other side
         os.close(fd)
     while status is None:
@@ -44,27 +53,84 @@ def guard(line: socket.socket, file_bytes: int, argv: list[str]) -> NoReturn:
             break
         status = _buried(main)
     _end_all()
-    _end_as(status or 0)
+    _end_as(int(os.read(ends, 16) or status or 0))
 
 
-def _started(argv: list[str], line: socket.socket) -> int:
-    """The id of the program's process, when it runs; errno goes down the line, 0 where all is well."""
-    reads, writes = os.pipe()
+def _started(argv: list[str], line: socket.socket, hidden: list[str], ended: int) -> int:
+    """The id of the program's process, or of the first in its namespaces, which writes on `ended` how the program did.
+
+    Down the line goes "1" where the hidden folders are hidden, else "0", and errno, 0 where the program runs.
+    """
+    is_apart, (reads, writes) = bool(hidden) and _unshared(), os.pipe()
     pid = os.fork()
     if pid == 0:
         signal.set_wakeup_fd(-1)
         for number in (signal.SIGCHLD, signal.SIGPIPE, signal.SIGXFSZ):  # which our interpreter has changed
             signal.signal(number, signal.SIG_DFL)
         _prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        os.write(writes, b"1 " if is_apart and _hide(hidden) else b"0 ")
+        if is_apart:
+            _be_first(writes, ended)
         try:
             os.execvp(argv[0], argv)
         except OSError as error:
             os.write(writes, str(error.errno).encode())
         os._exit(CANNOT_START)
     os.close(writes)
-    line.send(os.read(reads, 16) or b"0")
+    said = b""
+    while more := os.read(reads, 16):
+        said += more
+    line.send(said + b"0" if said.endswith(b" ") else said)
     os.close(reads)
     return pid
+
+
+def _unshared() -> bool:
+    """Whether our children are in a namespace of processes of their own, as the system's root or as one of our own."""
+    user, group = os.getuid(), os.getgid()
+    try:
+        libc = ctypes.CDLL(None, use_errno=True)
+        if libc.unshare(CLONE_NEWPID) == 0:
+            return True
+        if libc.unshare(CLONE_NEWUSER | CLONE_NEWPID):
+            return False
+        for name, text in (("setgroups", "deny"), ("uid_map", f"{user} {user} 1"), ("gid_map", f"{group} {group} 1")):
+            with open(f"/proc/self/{name}", "w") as file:
+                file.write(text)
+    except (OSError, AttributeError):
+        return False
+    return True
+
+
+def _hide(paths: list[str]) -> bool:
+    """Whether folders are now empty and files without content for this process and those that come of it."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.unshare(CLONE_NEWNS) or libc.mount(None, b"/", None, MS_REC | MS_PRIVATE, None):
+        return False
+    libc.mount(b"proc", b"/proc", b"proc", 0, None)  # where the system's own is masked this may not be
+    done = True
+    for path in paths:
+        at = os.fsencode(path)
+        if os.path.isdir(at):
+            done &= libc.mount(b"tmpfs", at, b"tmpfs", MS_RDONLY, b"size=4k") == 0
+        elif os.path.exists(at):
+            done &= libc.mount(b"/dev/null", at, None, MS_BIND, None) == 0
+    return bool(done)
+
+
+def _be_first(writes: int, ended: int) -> None:
+    """Become the first process of our namespace, with which all others go; come back as the program's alone."""
+    pid = os.fork()
+    if pid == 0:
+        _prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        return
+    for fd in (0, 1, writes):
+        os.close(fd)
+    while True:
+        who, status = os.wait()
+        if who == pid:
+            os.write(ended, str(status).encode())
+            os._exit(0)
 
 
 def _buried(main: int) -> int | None:
@@ -124,4 +190,4 @@ def stat(pid: int) -> list[str]:
 
 
 if __name__ == "__main__":
-    guard(socket.socket(fileno=int(sys.argv[1])), int(sys.argv[2]), sys.argv[3:])
+    guard(socket.socket(fileno=int(sys.argv[1])), int(sys.argv[2]), json.loads(sys.argv[3]), sys.argv[4:])

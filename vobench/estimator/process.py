@@ -52,13 +52,21 @@ class Door:
 class EstimatorProcess:
     """A running estimator; what it prints goes to `log`. Its verbs raise EstimatorFailure."""
 
-    def __init__(self, door: Door, *, log: Path, limits: Limits) -> None:
-        self._door, self._log, self._limits = door, log, limits
+    def __init__(self, door: Door, *, log: Path, limits: Limits, hidden: Sequence[Path] = ()) -> None:
+        self._door, self._log, self._limits, self._hidden = door, log, limits, hidden
         self._running: AbstractContextManager[Program] | None = None
 
     @classmethod
     def of_class(
-        cls, folder: Path, class_path: str, *, name: str, log: Path, limits: Limits, is_watched: bool = False
+        cls,
+        folder: Path,
+        class_path: str,
+        *,
+        name: str,
+        log: Path,
+        limits: Limits,
+        is_watched: bool = False,
+        hidden: Sequence[Path] = (),
     ) -> Self:
         """A class in Python, in a process of its own; who `is_watched` fails where it changes a frame."""
         argv = [*WORKER, str(folder), class_path, name, str(limits.memory_mib << 20)]
@@ -66,10 +74,19 @@ class EstimatorProcess:
         def opened(rig: Rig, params: Mapping[str, Any], seed: int) -> tuple[Sequence[str], bytes]:
             return argv, pickle.dumps((rig, dict(params), seed, is_watched))
 
-        return cls(Door(opened, pickled), log=log, limits=limits)
+        return cls(Door(opened, pickled), log=log, limits=limits, hidden=hidden)
 
     @classmethod
-    def of_stream(cls, argv: Sequence[str], folder: Path, *, log: Path, limits: Limits, rate_hz: float) -> Self:
+    def of_stream(
+        cls,
+        argv: Sequence[str],
+        folder: Path,
+        *,
+        log: Path,
+        limits: Limits,
+        rate_hz: float,
+        hidden: Sequence[Path] = (),
+    ) -> Self:
         """A program that takes frames on standard input and gives poses on standard output."""
 
         def opened(rig: Rig, params: Mapping[str, Any], seed: int) -> tuple[Sequence[str], bytes]:
@@ -78,7 +95,7 @@ class EstimatorProcess:
                 said, default=str
             ).encode()
 
-        return cls(Door(opened, framed), log=log, limits=limits)
+        return cls(Door(opened, framed), log=log, limits=limits, hidden=hidden)
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
         """Start it, hand over the calibration, and wait until it is ready; a second time, to start again."""
@@ -93,7 +110,7 @@ class EstimatorProcess:
     def _open(self, argv: list[str]) -> None:
         pipe = subprocess.PIPE
         self._program = self._running = Program(
-            argv, log=self._log, limits=self._limits, stdin=pipe, stdout=pipe, bufsize=0
+            argv, log=self._log, limits=self._limits, hidden=self._hidden, stdin=pipe, stdout=pipe, bufsize=0
         )
         process = self._program.process
         assert process.stdin

@@ -1,5 +1,6 @@
 """A program in a session and a folder of its own, under limits: what all its processes use, and how it ended."""
 
+import json
 import os
 import resource
 import signal
@@ -8,9 +9,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from stat import S_ISREG
 from types import TracebackType
@@ -57,10 +59,20 @@ class Program:
     """A running program; what it prints goes to `log`. Its verbs raise EstimatorFailure.
 
     It has a folder of its own to work in, no shell, and of our environment KEPT_ENVIRONMENT alone. All that it
-    starts, in whatever session, has a guard for an ancestor, and is killed with it.
+    starts, in whatever session, has a guard for an ancestor, and is killed with it. Where `is_apart` it sees neither
+    the folders that are `hidden` from it, but for those in which something lies that it needs, nor other processes.
     """
 
-    def __init__(self, argv: list[str], *, log: Path, limits: Limits, home: Path | None = None, **streams: Any) -> None:
+    def __init__(
+        self,
+        argv: list[str],
+        *,
+        log: Path,
+        limits: Limits,
+        home: Path | None = None,
+        hidden: Sequence[Path] = (),
+        **streams: Any,
+    ) -> None:
         self.limits, self._log_path, self._printed = limits, log, 0
         self.home = home or new_home()
         self._began, self._looked, self._weighed = time.monotonic(), 0.0, time.monotonic()
@@ -77,7 +89,8 @@ class Program:
             line, theirs = socket.socketpair()
             self._line = undone.enter_context(line)
             given = {"stdin": subprocess.DEVNULL, "stdout": self._log, "stderr": self._log, **streams}
-            guarded = [*GUARD, str(theirs.fileno()), str(limits.disk_mib << 20), *argv]
+            unseen = json.dumps([str(path) for path in hidden if not _holds(path, [self.home, *_needed(argv)])])
+            guarded = [*GUARD, str(theirs.fileno()), str(limits.disk_mib << 20), unseen, *argv]
             given |= {"cwd": self.home, "env": kept | one, "pass_fds": [theirs.fileno()]}
             try:
                 with theirs:
@@ -89,7 +102,7 @@ class Program:
             undone.enter_context(stop.undone(self._kill, is_awaited=True))
             line.settimeout(limits.start_s)
             try:
-                errno = int(line.recv(16) or b"0")
+                self.is_apart, errno = map(int, (line.recv(16) or b"0 0").split())
             except TimeoutError:
                 raise EstimatorFailure("timeout", f"it did not run within {limits.start_s:g} s") from None
             if errno:
@@ -131,7 +144,8 @@ class Program:
             return
         stats = {pid: fields for pid in self._pids if (fields := stat(pid))}
         self.cpu_s = max(self.cpu_s, sum(_cpu_s(pid, fields) for pid, fields in stats.items()))
-        pages = sum(int(fields[21]) for pid, fields in stats.items() if pid != self.process.pid)  # but the guard's
+        ours = self._pids[: 1 + bool(self.is_apart)]  # the guard, and the first of its namespace
+        pages = sum(int(fields[21]) for pid, fields in stats.items() if pid not in ours)
         memory_mib = pages * resource.getpagesize() / (1 << 20)
         self.peak_mib = max(self.peak_mib, memory_mib)
         if memory_mib > self.limits.memory_mib:
@@ -204,6 +218,32 @@ class Program:
         if self._printed:
             with self._log_path.open("a", encoding="utf-8") as log:
                 log.write(f"\n[vobench: cut here; the estimator printed {LOG_BYTES + self._printed} bytes]\n")
+
+
+@cache
+def sandbox_works() -> bool:
+    """Whether this machine lets us hide folders and processes from a program; it is tried once."""
+    with tempfile.TemporaryDirectory() as folder:
+        unseen, log = Path(folder, "unseen"), Path(folder, "log.txt")
+        unseen.mkdir()
+        try:
+            with Program(["true"], log=log, limits=Limits(), hidden=[unseen]) as program:
+                return bool(program.is_apart)
+        except EstimatorFailure:
+            return False
+
+
+def _needed(argv: Sequence[str]) -> list[Path]:
+    """What a program reads: our interpreter and packages, and what its words and our environment name."""
+    named = [*argv, *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
+    own = [Path(sys.prefix), Path(sys.base_prefix), Path(__file__)]
+    return [*own, *(Path(word).absolute() for word in named if os.sep in word)]
+
+
+def _holds(folder: Path, paths: Iterable[Path]) -> bool:
+    """Whether one of the paths lies in a folder, or is it."""
+    real = folder.resolve()
+    return any(path == folder or path.resolve().is_relative_to(real) for path in paths)
 
 
 def new_home() -> Path:

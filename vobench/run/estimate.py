@@ -95,23 +95,32 @@ def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress"
 
 def _running(trial: "Trial", recording: Path, log: Path) -> Running:
     """The trial's estimator as its manifest says that it is run."""
-    entrant, manifest = trial.entrant, trial.entrant.manifest
+    entrant, manifest, hidden = trial.entrant, trial.entrant.manifest, _hidden(trial, recording)
     if manifest.oracle:
         return NoisyTruth(read_tum(recording / GROUND_TRUTH))
     if manifest.class_path:
         return EstimatorProcess.of_class(
-            entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits
+            entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits, hidden=hidden
         )
     t_ns, limits = Sequence.open(recording).frame_stamps(), entrant.limits
     if manifest.stream:
         rate = rate_hz(t_ns)
-        return EstimatorProcess.of_stream(manifest.stream, entrant.folder, log=log, limits=limits, rate_hz=rate)
+        return EstimatorProcess.of_stream(
+            manifest.stream, entrant.folder, log=log, limits=limits, rate_hz=rate, hidden=hidden
+        )
     if entrant.mode == "real_time":
         raise EstimatorFailure("refused", "it takes the whole recording at once, so it cannot go at the camera's pace")
     write = partial(_write_blind, recording, manifest)
     return CommandProgram(
-        manifest.command, entrant.folder, log=log, limits=limits, out=manifest.out, t_ns=t_ns, write_dataset=write
-    )
+        manifest.command, entrant.folder, log=log, limits=limits, out=manifest.out, t_ns=t_ns, write_dataset=write,
+        hidden=hidden,
+    )  # fmt: skip
+
+
+def _hidden(trial: "Trial", recording: Path) -> list[Path]:
+    """Where truth lies: the store that the sequence is in, and the recording that it was read from."""
+    source = getattr(trial.case, "source", None)
+    return [recording.resolve().parents[1], *([Path(source.path).resolve()] if source else [])]
 
 
 def _write_blind(recording: Path, manifest: Manifest, folder: Path) -> None:

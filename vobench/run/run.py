@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from zipfile import ZipFile
 
 from vobench import __version__, stop
+from vobench.estimator.program import sandbox_works
 from vobench.run.consistency import COVARIANCE
 from vobench.run.entry import copy_files
 from vobench.run.estimate import ESTIMATE, LOG, REVISED, TRACKS
@@ -84,7 +85,8 @@ def run_suite(
         def fill(folder: RunFolder) -> None:
             write_json(folder.path / SUITE, stated)
             write_json(folder.path / ESTIMATORS, entrants)
-            write_json(folder.path / ENVIRONMENT, {**_environment(), "timed": BESIDE if shares_time else ALONE})
+            write_json(folder.path / ENVIRONMENT, {**_environment(), "timed": BESIDE if shares_time else ALONE,
+                       "sandboxed": sandbox_works()})  # fmt: skip
             scores = [task for task in tasks if task.stage == "score"]
             finish(folder, [_gather(task, cases, store, folder, failures.get(task.key)) for task in scores])
             write_hashes(folder)
