@@ -156,3 +156,18 @@ def test_recordings_on_fresh_caches_in_this_process_and_in_another_are_the_same_
     assert len({payload_hash(sequence) for sequence in (base, again, beside)}) == 1
     for name in ("sensors.mcap", "truth.mcap"):
         assert len({(sequence / name).read_bytes() for sequence in (base, again, beside)}) == 1
+
+
+def test_a_window_of_frames_holds_what_the_whole_recording_has_there(base, cache, tmp_path):
+    window = recorded(tmp_path / "it", cache=cache, TRUTH="[]\nframes: [1, 4]")
+    whole, part = list(Sequence.open(base).frames())[1:4], list(Sequence.open(window).frames())
+    assert [frame.t_ns for frame in part] == [frame.t_ns for frame in whole]
+    for one, other in zip(part, whole, strict=True):
+        np.testing.assert_array_equal(one.left, other.left)
+        np.testing.assert_array_equal(one.right, other.right)
+    np.testing.assert_array_equal(read_truth(window).T_world_frame, read_truth(base).T_world_frame[1:4])
+    np.testing.assert_array_equal(read_disturbances(window)[1], read_disturbances(base)[1][1:4])
+    (t_ns, counts), (all_ns, all_counts) = Sequence.open(window).encoders(), Sequence.open(base).encoders()
+    kept = (all_ns >= part[0].t_ns) & (all_ns <= part[-1].t_ns)
+    np.testing.assert_array_equal(t_ns, all_ns[kept])
+    np.testing.assert_array_equal(counts, (all_counts - all_counts[kept][0])[kept])

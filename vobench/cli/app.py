@@ -38,6 +38,9 @@ VERBS = {
     "verify": "vobench.cli.report:verify_command",
     "report": "vobench.cli.report:report_command",
     "view": "vobench.cli.report:view_command",
+    "causes": "vobench.cli.failure:causes_command",
+    "explain": "vobench.cli.failure:explain_command",
+    "shrink": "vobench.cli.failure:shrink_command",
     "cache": "vobench.cli.cache:cache_command",
     "doctor": "vobench.cli.doctor:doctor_command",
 }

@@ -27,7 +27,8 @@ SuiteName = Annotated[str, typer.Argument(metavar="SUITE", help="A suite's name,
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or runs/<suite> for its latest.")]
 LEFT_ALIGNED = {
     *("estimator", "status", "name", "case", "kind", "summary", "path", "origin", "check", "result"),
-    *("sequence", "metric", "headline", "is", "with", "trajectory"),
+    *("sequence", "metric", "headline", "is", "with", "trajectory", "condition", "without", "instead", "tried"),
+    *("is worse than others by",),
 }
 
 
@@ -41,6 +42,11 @@ def known(kind: str, name: str, names: Iterable[str]) -> str:
 def print_json(content: Any) -> None:
     """One JSON object on standard output."""
     print(json_module.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
+
+
+def warn(sentence: str) -> None:
+    """A line on standard error."""
+    print(printable(f"vobench: {sentence}"), file=sys.stderr)
 
 
 def say_hidden(found: "Iterable[Entry]") -> None:

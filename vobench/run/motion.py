@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -59,13 +59,15 @@ class Rims:
 class BodyMotion:
     """A body's way: its motion, the stamps t_ns (N,) of its pictures; `rims` where it rolls, `drive` where it is led.
 
-    All that is true of it comes from `motion`: poses, twists, accelerations, at these stamps or any other.
+    All that is true of it comes from `motion`: poses, twists, accelerations, at these stamps or any other. `first` is
+    which of the way's pictures is the first that is taken.
     """
 
     motion: Motion
     t_ns: Stamps
     rims: Rims | None = None
     drive: Drive | None = None
+    first: int = 0
 
     def at_frames(self) -> Kinematics:
         """Where the body is and how it moves at its pictures' stamps."""
@@ -74,6 +76,19 @@ class BodyMotion:
 
 def body_motion(case: Case) -> BodyMotion:
     """The case's body on its way; the same for every scene, rig and camera. Raises MotionError."""
+    whole = _whole_motion(case)
+    if case.frames is None:
+        return whole
+    first, end = case.frames
+    if not first + 2 <= end <= len(whole.t_ns):
+        raise MotionError(
+            f"frames should be 2 or more of the {len(whole.t_ns)} there are, the first and the one after the last "
+            f"(got [{first}, {end}])"
+        )
+    return replace(whole, t_ns=whole.t_ns[first:end], first=first)
+
+
+def _whole_motion(case: Case) -> BodyMotion:
     spec = case.trajectory
     if isinstance(spec, Wheeled):
         if not isinstance(spec, Waypoints) and spec.mover != "pioneer":

@@ -25,7 +25,7 @@ class SensorFeed:
     def __init__(self, case: Case, travel: BodyMotion) -> None:
         self._encoder_t_ns, self._ticks = _counted(case, travel)
         self._imu = _felt(case, travel)
-        self._last_ns = np.iinfo(np.int64).min
+        self._last_ns = int(travel.t_ns[0]) - 1 if travel.first else np.iinfo(np.int64).min
 
     def write_until(self, t_ns: int, writer: SequenceWriter) -> None:
         """Write what was read since the last call, up to and at a stamp."""
@@ -46,11 +46,14 @@ class SensorFeed:
 
 
 def _counted(case: Case, travel: BodyMotion) -> tuple[Stamps, Stamps]:
-    """Stamps (M,) and counts (M, 2) of both encoders; none where nothing rolls."""
+    """Stamps (M,) and counts (M, 2) of both encoders, 0 at the first picture; none where nothing rolls."""
     spec = case.trajectory
     if travel.rims is None or not isinstance(spec, Wheeled):
         return EMPTY, EMPTY.reshape(0, 2)
-    return travel.rims.t_ns, ticks(travel.rims.rim_rad, spec.wheels, ENCODERS[spec.encoders])
+    t_ns, counts = travel.rims.t_ns, ticks(travel.rims.rim_rad, spec.wheels, ENCODERS[spec.encoders])
+    if travel.first:
+        counts = counts - counts[np.searchsorted(t_ns, travel.t_ns[0])]
+    return t_ns, counts
 
 
 def _felt(case: Case, travel: BodyMotion) -> tuple[ImuReadings, ImuBias] | None:

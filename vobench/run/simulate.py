@@ -80,6 +80,7 @@ def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progr
     renderer = open_renderer(scene, case.rendering, light)
     try:
         camera = StereoCamera(case, World(scene, renderer, travel.motion))
+        camera.skip(travel.first)
         pairs = (camera.shoot(t_ns) for t_ns in travel.t_ns.tolist())
         watched = progress.track(pairs, f"simulate {case.name}", total=len(travel.t_ns))
         with _writer(case, folder, truth) as writer:
@@ -121,7 +122,8 @@ def _write(
         writer.write_exposure(t_ns, pair.exposure.time_s, pair.exposure.gain_db)
         writer.write_truth(t_ns, body.T_world_body[index], body.twist[index])
         if travel.drive:
-            writer.write_disturbance(t_ns, travel.drive.slip[index], travel.drive.delta[index])
+            nth = travel.first + index
+            writer.write_disturbance(t_ns, travel.drive.slip[nth], travel.drive.delta[nth])
         if truth:
             for side in SIDES:
                 writer.write_truth_frame(t_ns, side, truth.frame(side, t_ns, stamps[index + 1]))

@@ -103,6 +103,11 @@ class StereoCamera:
         loop = case.camera.auto_exposure
         self._state = start(loop, first) if loop else (first,)
 
+    def skip(self, pictures: int) -> None:
+        """Leave out the first pictures: the noise of others is as it would be, auto-exposure starts anew."""
+        for camera in (self._left, self._right):
+            camera.skip(pictures)
+
     def shoot(self, t_ns: int) -> StereoPair:
         """The pictures stamped t_ns, the middle of their exposure; call in order of time."""
         exposure = self._state[0]
@@ -128,6 +133,15 @@ class SimulatedCamera:
         self._noise = NoiseStreams(stream("shot"), stream("read"))
         shape = (self._camera.height_px, self._camera.width_px)
         self._pattern = fixed_pattern(shape, case.camera.chip, stream("pattern"))
+
+    def skip(self, pictures: int) -> None:
+        """Take the draws of so many pictures' noise."""
+        chip, shape = self._settings.chip, (self._camera.height_px, self._camera.width_px)
+        for _ in range(pictures):
+            if chip.shot_noise:
+                self._noise.shot.standard_normal(shape)
+            if chip.read_noise_e > 0:
+                self._noise.read.standard_normal(shape)
 
     def picture(self, t_ns: int, exposure: Exposure) -> Grey:
         """The values (H, W), or (H, W, 3) in colour, of a picture stamped t_ns."""

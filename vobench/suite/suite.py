@@ -97,6 +97,7 @@ ChannelName = Annotated[str, OneOf("ground-truth channel", CHANNELS)]
 Camera = Annotated[CameraSettings, SENSOR_PRESETS]
 NamedEstimator = Annotated[EstimatorSettings, Short(_named, {"type": "string"})]
 Lighting = dict[str, LightOverride]
+Window = tuple[Annotated[int, Ge(0)], Annotated[int, Ge(2)]]
 Mode = Literal["step", "real_time"]
 
 
@@ -105,6 +106,7 @@ class Suite:
     """The cases are every combination of scene, lighting, rig, trajectory and camera, and every recording of `source`.
 
     Each axis names its variants; change one axis to change one factor. A suite of recordings alone has no axes.
+    With `frames` only the pictures from one number to before another are taken of every way.
     """
 
     name: Name
@@ -119,6 +121,7 @@ class Suite:
     cameras: Annotated[dict[Name, Camera], MinLen(1)] = field(default_factory=lambda: {"clean": CameraSettings()})
     rendering: Rendering = Rendering()
     truth: tuple[ChannelName, ...] = ()
+    frames: Window | None = None
     modes: Annotated[tuple[Mode, ...], MinLen(1)] = ("step",)
     estimators: Annotated[tuple[NamedEstimator, ...], MinLen(1)]
 
@@ -158,6 +161,7 @@ class Case:
     camera: CameraSettings
     rendering: Rendering
     truth: tuple[str, ...]
+    frames: Window | None = None
     seed: int
 
     def build_scene(self) -> Scene:
@@ -411,6 +415,7 @@ class _Planner:
             replayed=replayed.get(variant["trajectory"]),
             rendering=suite.rendering,
             truth=suite.truth,
+            frames=suite.frames,
             seed=suite.seed,
         )
 

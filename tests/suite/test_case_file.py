@@ -1,0 +1,52 @@
+"""A case, written as a suite of its own, is the same case."""
+
+from pathlib import Path
+
+import pytest
+
+from vobench.run.simulate import content
+from vobench.suite.case_file import write_case
+from vobench.suite.suite import read_plan
+
+SCENE = """
+name: hall
+white_cd_m2: 50
+materials: {grain: {kind: polished, pattern: terrazzo, albedo: 0.5, resolution_px: 64}}
+room: {size_m: [2, 2, 1.5], floor: grain, wall: brick, ceiling: paint}
+lamps: [{name: lamp, kind: point, center_m: [0, 0, 1.4], power_lm: 600, level: {dimmer: [[0, 1], [2, 0.5]]}}]
+sky: {illuminance_lx: 100}
+"""
+SUITE = """
+name: one
+seed: 7
+scenes: [hall]
+lightings: {dark: {lamp: {power_lm: 10}}}
+rigs: {down: {pitch_deg: 90, imu: mpu6000}}
+trajectories: {WAY}
+cameras: {noisy: {sensor: mt9v034, auto_exposure: {}, shutter: rolling, readout_ms: 10}}
+truth: [depth]
+frames: [1, 3]
+estimators: [{name: feature_vo, label: sift, params: {detector: sift}, limits: {frame_s: 3}}]
+"""
+POSES = "".join(f"{n / 10} {n / 50} 0 0 0 0 0 1\n" for n in range(12))
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        "short: {targets_m: [[0.3, 0]], rate_hz: 5}",
+        "round: {kind: circle, radius_m: 0.3, speed_mps: 0.2, mover: unicycle}",
+        "again: {kind: replay, file: was.tum, axes: body, start_m: [0.1, 0, 0], rate_hz: 5}",
+    ],
+)
+def test_what_is_written_reads_as_the_same_case_wherever_it_lies(tmp_path: Path, way: str) -> None:
+    (tmp_path / "hall.yaml").write_text(SCENE)
+    (tmp_path / "was.tum").write_text(POSES)
+    (tmp_path / "suite.yaml").write_text(SUITE.replace("WAY", way))
+    plan = read_plan(str(tmp_path / "suite.yaml"))
+    (case,) = plan.simulated
+    written = write_case(case, plan.entrants, tmp_path / "away", name="again")
+    (tmp_path / "away").rename(tmp_path / "moved")
+    again = read_plan(str(tmp_path / "moved" / written.name))
+    assert content(again.simulated[0]) == content(case)
+    assert again.entrants == plan.entrants
