@@ -223,5 +223,8 @@ def test_a_limit_of_time_holds_for_every_trial_and_fresh_makes_all_anew(ran: Pat
     made = {path: path.stat().st_mtime_ns for path in store.glob("*/*/manifest.json")}
     assert vobench("run", "tiny", "--timeout", 0.001, "--json").json["boards"][0]["rows"][0]["status"] == "timeout"
     assert {path: path.stat().st_mtime_ns for path in made} == made
+    assert vobench("run", "tiny", "--limit", 3, "--json").json["boards"][0]["rows"][0]["frames"] == 3
+    whole = vobench("run", "tiny", "--limit", 999, "--dry-run", "--json").json["tasks"]
+    assert [row["to do"] for row in whole if row["stage"] in ("bake", "sequence")] == [0, 0]
     vobench("run", "tiny", "--fresh", "--json")
     assert all(path.stat().st_mtime_ns > before for path, before in made.items())

@@ -16,7 +16,7 @@ from vobench.estimator.manifest import Manifest
 from vobench.estimator.program import sandbox_works
 from vobench.run.executor import Dask, Executor, LocalProcesses, Serial
 from vobench.run.key import cache_folder
-from vobench.run.motion import BodyMotion, body_motions
+from vobench.run.motion import BodyMotion, body_motions, cut
 from vobench.run.store import why_unwritable
 from vobench.run.task import is_done, plan, sequence_tasks
 from vobench.suite.scene_spec import SceneFile
@@ -66,6 +66,7 @@ def run_command(
     fail_if: Annotated[
         list[str] | None, typer.Option("--fail-if", help="End with code 3 if so, as in 'ate_trans.rmse > 0.2'.")
     ] = None,
+    limit: Annotated[int | None, typer.Option(min=2, help="Frames of each simulated case, from its first on.")] = None,
     timeout: Annotated[float | None, typer.Option(min=0.001, help="Seconds that a whole trial may take.")] = None,
     memory: Annotated[int | None, typer.Option(min=1, help="MiB that an estimator's processes may hold.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Make everything anew, whatever the cache holds.")] = False,
@@ -82,6 +83,7 @@ def run_command(
     said = {"trial_s": timeout, "memory_mib": memory}
     planned = planned.limited(**{name: value for name, value in said.items() if value is not None})
     terminal.say_hidden(planned.found)
+    planned = cut(planned, limit) if limit else planned
     if dry_run:
         _check(planned, as_json=json, is_dry_run=True)
         return

@@ -178,6 +178,20 @@ def _rolling(spec: Planar) -> BodyMotion:
     return BodyMotion(motion, fine[::ENCODERS_PER_FRAME], Rims(fine, rolled(motion, fine, spec.wheels)))
 
 
+def cut(planned: Plan, frames: int) -> Plan:
+    """The plan with so many frames of each simulated case, or all where there are no more; recordings stay whole.
+
+    Raises SuiteError where a body cannot go its way.
+    """
+    travels = body_motions(planned)
+
+    def shorter(case: Case) -> Case:
+        travel = travels[case.variant["trajectory"]]
+        return replace(case, frames=(travel.first, travel.first + frames)) if frames < len(travel.t_ns) else case
+
+    return replace(planned, simulated=tuple(shorter(case) for case in planned.simulated))
+
+
 def body_motions(plan: Plan) -> dict[str, BodyMotion]:
     """The travel of each trajectory of a plan, by its name: said before hours of rendering.
 
