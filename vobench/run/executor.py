@@ -207,7 +207,11 @@ class Dask:
             self._client = Client(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(f"no Dask scheduler answers ({_line(error)}): {address}") from None
-        own, theirs = versions(), self._client.run(versions)
+        try:
+            own, theirs = versions(), self._client.run(versions)
+        except OSError as error:
+            self.close()
+            raise InputError(f"a Dask worker went while we asked it, try again ({_line(error)}): {address}") from None
         for worker, found in theirs.items():
             other = [f"{name} {said}, not {own[name]}" for name, said in found.items() if said != own[name]]
             if other:
