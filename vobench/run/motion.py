@@ -216,7 +216,11 @@ def _check_smooth(case: Case) -> None:
 def _check_fits_frame(case: Case) -> None:
     """Raise MotionError where a picture would still be exposed or read out when the next one begins."""
     camera, frame_ms = case.camera, 1e3 / case.trajectory.rate_hz
-    durations = {"exposure_ms": camera.exposure_ms, "readout_ms": camera.readout_ms or 0.0}
+    durations = {
+        "exposure_ms": camera.exposure_ms,
+        "readout_ms": camera.readout_ms or 0.0,
+        "timing: three times jitter_ms and right_delay_ms": camera.timing.latest_ms,
+    }
     if camera.auto_exposure:
         durations["auto_exposure.t_max_ms"] = camera.auto_exposure.t_max_ms
     for key, lasts_ms in durations.items():

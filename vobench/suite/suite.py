@@ -9,11 +9,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-from annotated_types import Ge, Le, MinLen
+import numpy as np
+from annotated_types import Ge, Gt, Le, MinLen
 
 from vobench.errors import SettingError, SuiteError, UnknownNameError, unknown
 from vobench.estimator.manifest import Limits, Manifest
-from vobench.geometry.rig import PRESETS, CalibrationError, Rig, mounted, true_rig
+from vobench.geometry.rig import PRESETS, RESIDUALS, CalibrationError, Rig, drawn, mounted, resized, true_rig
 from vobench.motion.replay import Replay
 from vobench.motion.wheeled import Wheeled
 from vobench.scene.scene import Scene
@@ -32,30 +33,39 @@ from vobench.suite.yaml_file import Mistakes, YamlFile
 NEEDED = ("scenes", "rigs", "trajectories")
 ENGINES = ("raster", "path")
 MOST_SAMPLES = 65536
+CALIBRATION_STREAM = 7_301  # sets what is drawn of a calibration apart from other streams of a seed
 HONEST, USUAL = CalibrationError(), Limits()
+
+
+def _levelled(value: Any) -> Any:
+    return {"level": value} if isinstance(value, str) else value
+
+
+Calibration = Annotated[CalibrationError, Short(_levelled, {"type": "string", "enum": ["none", *RESIDUALS]})]
 
 
 @settings()
 class RigSettings:
     """A stereo pair on the body: a preset with both lenses, placed, how far its calibration is off, and an IMU.
 
-    Without `baseline_m` the cameras stand to each other as the preset has them.
+    Without `baseline_m` the cameras stand to each other as the preset has them; `picture_scale` .5 has half the pixels.
     """
 
     lens: Annotated[str, OneOf("lens", PRESETS)] = "paper_blender"
+    picture_scale: Annotated[float, Gt(0), Le(4)] = 1.0
     pitch_deg: Annotated[float, Ge(-90), Le(90)]
     baseline_m: Positive | None = None
     forward_m: float = 0.25
     height_m: float = 0.4
-    calibration_error: CalibrationError = HONEST
+    calibration_error: Calibration = HONEST
     imu: Annotated[ImuSettings, Like("IMU", IMUS)] | None = None
 
     def build(self) -> Rig:
         """The sensors on the body as their calibration has them."""
         preset = PRESETS[self.lens]
         cameras = mounted(
-            preset.left,
-            preset.right,
+            resized(preset.left, self.picture_scale),
+            resized(preset.right, self.picture_scale),
             preset.T_left_right if self.baseline_m is None else preset.at_baseline(self.baseline_m),
             pitch_deg=self.pitch_deg,
             forward_m=self.forward_m,
@@ -173,7 +183,8 @@ class Case:
 
     def build_true_rig(self) -> Rig:
         """The stereo pair as it is: what pictures are made with. Raises VobenchError, as `true_rig` does."""
-        return true_rig(self.build_rig(), self.rig.calibration_error)
+        rig, rng = self.build_rig(), np.random.default_rng([self.seed, CALIBRATION_STREAM])
+        return true_rig(rig, drawn(self.rig.calibration_error, rig, rng))
 
 
 @dataclass(frozen=True, slots=True)
