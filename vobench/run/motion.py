@@ -172,7 +172,7 @@ def body_motions(plan: Plan) -> dict[str, BodyMotion]:
     travels, wrong = dict[str, BodyMotion](), plan.mistakes()
     for name, cases in _by(plan.simulated, "trajectory").items():
         stop.check()
-        with wrong.at("trajectories", name):
+        with wrong.at(*_said_at(cases[0], "trajectory")):
             travels[name] = body_motion(cases[0])
             check_cases(cases, travels[name], wrong)
     wrong.require_none()
@@ -181,20 +181,27 @@ def body_motions(plan: Plan) -> dict[str, BodyMotion]:
 
 def check_cases(cases: Sequence[Case], travel: BodyMotion, wrong: Mistakes) -> None:
     """Gather why these cases of one trajectory cannot be: `travel` is the trajectory's."""
-    trajectory = cases[0].variant["trajectory"]
-    with wrong.at("trajectories", trajectory):
+    with wrong.at(*_said_at(cases[0], "trajectory")):
         if len(travel.t_ns) < 2:
             raise MotionError(
                 f"the way ends within its first frame at {cases[0].trajectory.rate_hz:g} Hz: one picture shows no "
                 "motion; go further, more slowly or with a higher rate_hz"
             )
     for case, *_ in _by(cases, "scene", "rig").values():
-        with wrong.at("trajectories", trajectory):
+        with wrong.at(*_said_at(case, "trajectory")):
             _check_clear(case, travel)
             _check_smooth(case)
-    for camera, (case, *_) in _by(cases, "camera").items():
-        with wrong.at("cameras", camera):
+    for case, *_ in _by(cases, "camera").values():
+        with wrong.at(*_said_at(case, "camera")):
             _check_fits_frame(case)
+
+
+AXIS_KEYS = {"trajectory": "trajectories", "camera": "cameras"}
+
+
+def _said_at(case: Case, axis: str) -> tuple[str, str]:
+    """Where a suite says what a case has on this axis."""
+    return ("scenarios", case.scenario) if case.scenario else (AXIS_KEYS[axis], case.variant[axis])
 
 
 def _by(cases: Sequence[Case], *axes: str) -> dict[str, list[Case]]:

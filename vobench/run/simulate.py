@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 UNSIMULATED: dict[str, Any] = {
     "name": True,
     "variant": True,
+    "scenario": True,
+    "severity": True,
     "scene": {"summary"},
     "trajectory": {"file", "times", "recorded_hz", "axes"},
 }
