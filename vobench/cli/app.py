@@ -37,6 +37,8 @@ VERBS = {
     "info": "vobench.cli.sequence:info_command",
     "verify": "vobench.cli.report:verify_command",
     "report": "vobench.cli.report:report_command",
+    "compare": "vobench.cli.report:compare_command",
+    "bundle": "vobench.cli.report:bundle_command",
     "view": "vobench.cli.report:view_command",
     "cache": "vobench.cli.cache:cache_command",
     "doctor": "vobench.cli.doctor:doctor_command",
