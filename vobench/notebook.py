@@ -63,15 +63,15 @@ def read_sequence(folder: Path | str) -> "Sequence":
 
 
 def read_board(run: Path | str) -> "pd.DataFrame":
-    """The leaderboards of a run's folder, or of the latest of runs/<suite>: one row per board and estimator.
+    """The leaderboard of a run's folder, or of the latest of runs/<suite>: a row per cell, then one per total.
 
     Raises InputError where the folder is none of a run.
     """
-    from vobench.report import leaderboard, page
+    from vobench.report import board_table, page
     from vobench.run.folder import open_run
 
     folder = open_run(Path(run))
-    return leaderboard.data_frame(page.boards_of(folder, folder.scores()))
+    return board_table.data_frame(page.board_of(folder, folder.scores()))
 
 
 def _pair(gt: Given, est: Given, times: Path | str | None, *, any_unit: bool = False) -> TrajectoryPair:

@@ -80,7 +80,7 @@ def test_every_command_has_json_and_help(vobench, command):
 
 
 JSON = [
-    (("run", "tiny"), "boards"),
+    (("run", "tiny"), "totals"),
     (("run", "tiny", "--dry-run"), "cases"),
     (("check", "tiny"), "cases"),
     (("render", "closet", "--at", "0", "0", "1", "--out", "look.png"), "files"),
@@ -91,8 +91,11 @@ JSON = [
     (("metrics",), "metrics"),
     (("metrics", "ate_trans"), "formula"),
     (("metrics", "ate"), "error"),
-    (("report", "runs/tiny"), "boards"),
+    (("report", "runs/tiny"), "cells"),
     (("report", "runs/tiny", "--out", "board.html"), "path"),
+    (("report", "runs/tiny", "runs/tiny"), "totals"),
+    (("compare", "runs/tiny", "runs/tiny"), "changes"),
+    (("bundle", "runs/tiny", "tiny.zip"), "bytes"),
     (("view", "runs/tiny"), "path"),
     (("view", "runs/tiny", "--save", "look.rrd"), "path"),
     (("doctor",), "checks"),
@@ -187,7 +190,7 @@ def test_a_terminal_that_knows_no_degree_sign_gets_a_table_all_the_same(ran, her
     environment = os.environ | {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, env=environment, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
-    assert b"RPE ?/frame" in done.stdout
+    assert b"? first" in done.stdout
 
 
 @pytest.mark.parametrize("words", [("list", "--json"), ("metrics",), ("report", "runs/tiny")], ids=" ".join)

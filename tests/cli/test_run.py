@@ -33,7 +33,7 @@ def test_where_nobody_watches_each_stage_is_one_line_and_one_in_the_cache_is_non
 
 def test_run_takes_the_estimators_that_are_asked_for(vobench, here):
     said = vobench("run", "tiny", "-e", "stand_still", "-e", "constant_velocity", "--json")
-    assert {row["estimator"] for row in said.json["boards"][0]["rows"]} == {"stand_still", "constant_velocity"}
+    assert {row["estimator"] for row in said.json["totals"]} == {"stand_still", "constant_velocity"}
 
 
 def test_check_counts_what_run_would_do_and_does_none_of_it(vobench, here):
@@ -117,11 +117,11 @@ def test_the_pictures_may_be_missing_for_a_reason_that_doctor_knows(vobench, her
 @pytest.mark.parametrize(
     ("name", "begin"),
     [
-        ("b.md", "## short"),
+        ("b.md", "## ATE % of path"),
         ("b.html", "<!doctype html>"),
-        ("b.csv", "board,"),
+        ("b.csv", "case,"),
         ("b.json", "{"),
-        ("b.tex", "\\begin{tabular}"),
+        ("b.tex", "% Needs \\usepackage{booktabs}.\n\\begin{table}"),
     ],
 )
 def test_a_files_ending_says_its_form(vobench, ran, here, name, begin):
@@ -182,8 +182,8 @@ def test_view_of_a_run_without_a_single_pose_works_too(vobench, here):
 
 def test_only_what_matches_is_run_and_values_take_the_place_of_the_suites(vobench, here):
     said = vobench("run", "tiny", "-e", "stand*", "-c", "sh*", "-n", "2", "--set", "seed=5", "--json")
-    (row,) = said.json["boards"][0]["rows"]
-    assert (row["estimator"], row["runs"]) == ("stand_still", 2)
+    (row,) = said.json["totals"]
+    assert (row["estimator"], row["trials"]) == ("stand_still", 2)
     assert '"seed": 5' in (here / "runs/tiny/latest/suite.json").read_text()
     for words, sentence in (
         (("-c", "long"), "no case named 'long'. Known: short"),

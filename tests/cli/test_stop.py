@@ -82,7 +82,7 @@ PLACES = {
     "run.score": "score_trial",
     "report.page": "html",
     "run.folder.RunFolder": "estimate",
-    "cli.report": "print_boards",
+    "cli.report": "print_board",
 }
 
 

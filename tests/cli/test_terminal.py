@@ -6,49 +6,45 @@ import pytest
 from rich.console import Console
 
 from vobench.cli import report, terminal
-from vobench.report.leaderboard import HEADINGS, Board, Row
+from vobench.report.board_table import COST, HEADINGS, MEMORY
+from vobench.report.leaderboard import board
+from vobench.run.folder import TrialScore
 from vobench.suite.catalog import Entry, find
 
-ROW = Row(
-    rank=1,
-    estimator="wheel_odometry",
-    status="invalid_output",
-    survived=11,
-    partial=0,
-    runs=12,
-    ate_mm=1234.567,
-    segment_percent=12.345,
-    rpe_mm=1.234,
-    rpe_deg=0.1234,
-    coverage=0.999,
-    ms_per_frame=123.4,
-    reason="",
-    drift_mm=None,
-    frame_reason="",
-    frame_reason_count=0,
-    frame_reason_first=None,
-)
+NAMES = ("wheel_odometry", "an_estimator_of_a_long_name", "lk_epipolar", "stereo_pnp")
 
 
 def drawn(width, monkeypatch):
     file = io.StringIO()
     out = Console(file=file, width=width, markup=False, highlight=False)
     monkeypatch.setattr(terminal, "console", lambda: out)
-    report.print_boards([Board("short", (ROW,))])
+    report.print_board(board([trial(name, k) for name in NAMES for k in range(3)], {}))
     return file.getvalue()
 
 
+def trial(name, repeat):
+    score = {"metrics": [{"name": "ate_trans", "rmse": 1.2345 + repeat}]}
+    facts = {"variant": {}, "reason": "", "coverage": 1.0, "frames": 9, "path_m": 100.0, "score": score}
+    return TrialScore(case="down-short", estimator=name, repeat=repeat, status="ok", **facts)
+
+
 @pytest.mark.parametrize("width", [60, 80, 100, 140])
-def test_a_board_fits_with_every_cell_in_one_piece(width, monkeypatch):
+def test_a_board_fits_with_every_cell_in_one_piece_and_what_has_no_room_is_said(width, monkeypatch):
     lines = drawn(width, monkeypatch).splitlines()
     assert max(map(len, lines)) <= width
-    (row,) = (line for line in lines if "wheel_odometry" in line)
-    assert "invalid_output" in row
-    assert "1234.57" in row
+    assert any("2.23" in line for line in lines)
+    assert any("1.23–3.23" in line for line in lines)
+    folded = ("wheel_", "an_estimator_", "lk_epipolar", "stereo_pnp")
+    gone = " ".join(lines).split("no room for ", 1)[1].split(":")[0] if width < 80 else ""
+    assert all(
+        any(part in line for line in lines[:6]) or name in gone for name, part in zip(NAMES, folded, strict=True)
+    )
 
 
-def test_a_wide_terminal_shows_every_column(monkeypatch):
-    assert all(heading in drawn(140, monkeypatch) for heading in HEADINGS)
+def test_a_wide_terminal_shows_every_column_that_has_anything(monkeypatch):
+    text = drawn(160, monkeypatch)
+    assert all(heading in text for heading in HEADINGS if heading not in (COST, MEMORY))
+    assert "no room" not in text
 
 
 def test_the_columns_that_may_go_exist():

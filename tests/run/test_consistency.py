@@ -32,7 +32,7 @@ def mean_nees(found):
 
 
 def board_of(run):
-    return page.boards_of(run, run.scores())[0]
+    return page.board_of(run, run.scores())
 
 
 def test_the_quantiles_are_those_of_the_law():
@@ -49,18 +49,18 @@ def test_an_honest_covariance_is_within_its_band_over_20_repeats_and_a_tenth_of_
     mean = {name: mean_nees(each) for name, each in found.items()}
     assert low < mean["honest"] < high
     assert [mean["bold"], mean["shy"]] == pytest.approx([10 * mean["honest"], mean["honest"] / 10], rel=1e-9)
-    said = {row.estimator: row.consistency for row in board_of(run).rows}
+    said = {cell.estimator: cell.consistency for cell in board_of(run).cells}
     assert said["honest"].startswith("claims what it holds: errors are ")
     assert said["bold"].startswith("claims too much: errors are ")
     assert said["shy"].startswith("claims too little: errors are ")
     assert "bold: claims too much" in (run.path / "leaderboard.md").read_text()
-    gaps = {row.estimator: row.scale_gap for row in board_of(run).rows}
+    gaps = {cell.estimator: cell.scale_gap for cell in board_of(run).cells}
     assert gaps["bold"] == pytest.approx(10**0.5, rel=0.2)
 
 
 def test_a_board_orders_the_levels_of_noise_and_marks_the_oracle(bench, first):
     run = bench.run((ESTIMATORS, noisy(*LEVELS[::-1])))
-    assert [row.estimator for row in board_of(run).rows] == ["fine", "middling", "coarse"]
+    assert [total.estimator for total in board_of(run).totals] == ["fine", "middling", "coarse"]
     assert "| fine [oracle] |" in (run.path / "leaderboard.md").read_text()
     assert [finding for finding in verify_run(run) if finding.wrong] == []
 
@@ -114,9 +114,9 @@ def test_one_that_knows_no_scale_is_aligned_with_one_and_marked(bench, first, pl
     manifest = (folder / "estimator.yaml").read_text().replace("left_camera", "body")
     (folder / "estimator.yaml").write_text(f"{manifest}metric: false\n")
     run = bench.run((ESTIMATORS, f"[{folder}, wheel_odometry]"))
-    rows = {row.estimator: row for row in board_of(run).rows}
-    assert rows["mine"].claims == ("Sim(3)",)
-    assert rows["mine"].ate_mm < 0.2 * 0.15e3
+    cells = {cell.estimator: cell for cell in board_of(run).cells}
+    assert cells["mine"].claims == ("Sim(3)",)
+    assert cells["mine"].spread("ate_mm")[0] < 0.2 * 0.15e3
     assert {s.score["alignment"]["kind"] for s in run.scores() if s.estimator == "mine"} == {"sim3"}
     assert "| mine [Sim(3)] |" in (run.path / "leaderboard.md").read_text()
 

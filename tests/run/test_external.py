@@ -103,9 +103,9 @@ def test_a_program_by_stream_stands_where_the_null_hypothesis_stands(bench, firs
     folder = manifest(tmp_path / "streamed", stream=f"[{sys.executable}, ./stream_client.py]")
     shutil.copy(EXAMPLES / "stream_client.py", folder)
     run = bench.run((ESTIMATORS, f"[{folder}, stand_still]"))
-    rows = {row.estimator: row for row in page.boards_of(run, run.scores())[0].rows}
-    assert rows["streamed"].status == rows["stand_still"].status
-    assert rows["streamed"].ate_mm == rows["stand_still"].ate_mm
+    cells = {cell.estimator: cell for cell in page.board_of(run, run.scores()).cells}
+    assert cells["streamed"].status == cells["stand_still"].status
+    assert cells["streamed"].values["ate_mm"] == cells["stand_still"].values["ate_mm"]
     frames = read_frames(run.estimate("full", "streamed", 0))
     assert all(frame.status == "ok" and frame.wall_ms > 0 and frame.memory_mib > 1 for frame in frames)
 

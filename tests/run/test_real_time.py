@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from vobench.estimator.process import EstimatorProcess
-from vobench.report import page
 from vobench.run import estimate as estimate_file
 from vobench.run.estimate import DROPPED
 from vobench.run.frames import read_frames
@@ -28,10 +27,6 @@ class Slow(EstimatorProcess):
 @pytest.fixture
 def slow(monkeypatch):
     monkeypatch.setattr(estimate_file, "EstimatorProcess", Slow)
-
-
-def row_of(run, estimator):
-    return next(row for row in page.boards_of(run, run.scores())[0].rows if row.estimator == estimator)
 
 
 def test_60_ms_at_30_hz_loses_every_other_frame_and_the_board_says_so(bench, slow):

@@ -37,6 +37,8 @@ VERBS = {
     "info": "vobench.cli.sequence:info_command",
     "verify": "vobench.cli.report:verify_command",
     "report": "vobench.cli.report:report_command",
+    "compare": "vobench.cli.report:compare_command",
+    "bundle": "vobench.cli.report:bundle_command",
     "view": "vobench.cli.report:view_command",
     "causes": "vobench.cli.failure:causes_command",
     "explain": "vobench.cli.failure:explain_command",

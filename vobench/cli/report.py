@@ -1,8 +1,9 @@
-"""vobench report, verify and view, and leaderboards on a terminal, as many columns as fit."""
+"""vobench report, compare, bundle, verify and view, and leaderboards on a terminal, as many columns as fit."""
 
 import os
 import subprocess
 import sys
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -13,39 +14,51 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from vobench.cli import terminal
-from vobench.errors import InputError, MissingDependencyError, UnknownNameError
-from vobench.report import page
-from vobench.report.leaderboard import FORMATS, LEGEND, Board, lines_of, notes
+from vobench.errors import InputError, MissingDependencyError, UnknownNameError, printable
+from vobench.report import compare, page
+from vobench.report.board_table import DEFAULT_METRIC, FORMATS, LEGEND, cell_notes, matrix, remarks, totals
+from vobench.report.leaderboard import METRICS, Board
 from vobench.report.rerun import pick, save_trial, trial_view
 from vobench.report.verify import verify_run
-from vobench.run.folder import open_run
+from vobench.run.bundle import bundle, merged, opened, scored_again
+from vobench.run.folder import TrialScore, open_run
 
 # A narrow terminal goes without these, in this order; every report has them all.
-LEAST_FIRST = ("MiB", "RPE °/frame", "RPE mm/frame", "CPU ms/frame", "segments %", "survived", "coverage", "#")
-ENDLESS = 10_000
+LEAST_FIRST = ("MiB", "mean place", "CPU ms/frame", "ATE %", "failed", "decided", "× first")
+ENDLESS, FOLDED = 10_000, 12  # widths: of a table as it would like to be, and of an estimator's name above a column
+MOST_CASES = 60  # that a terminal shows
 TERMINAL = "terminal"
 FORMS = (*FORMATS, "html")
 ENDINGS = {".tex": "latex", ".htm": "html", **{f".{form}": form for form in FORMS}}
+REGRESSED = 3  # the exit code where something got worse
+MetricName = Annotated[str, typer.Option(help=f"What the matrix shows: {', '.join(METRICS)}.")]
 
 
 def report_command(
-    run: terminal.RunPath,
+    runs: Annotated[
+        list[Path], typer.Argument(metavar="RUN...", help="Runs or bundles; several are merged into one board.")
+    ],
     *,
     form: Annotated[
         str | None, typer.Option("--format", help="terminal, md, csv, json, latex or html; --out's ending says it too.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Write to this file instead of the terminal.")] = None,
+    metric: MetricName = DEFAULT_METRIC,
     json: terminal.Json = False,
 ) -> None:
     """Print a run's leaderboard, in any form."""
     chosen = _chosen(form, out, as_json=json)
-    folder = open_run(run)
-    scores = folder.scores()
-    boards = page.boards_of(folder, scores)
-    if out is None and chosen == TERMINAL:
-        print_boards(boards)
-        return
-    text = page.html(folder, scores, boards) if chosen == "html" else FORMATS[chosen](boards)
+    terminal.known("metric", metric, METRICS)
+    with ExitStack() as stack:
+        folders = [stack.enter_context(opened(run)) for run in runs]
+        folder = stack.enter_context(merged(folders, [run.stem for run in runs]))
+        scores = folder.scores()
+        board = page.board_of(folder, scores)
+        if out is None and chosen == TERMINAL:
+            print_board(board, metric)
+            return
+        beside = out.resolve().parent if out else folder.path
+        text = page.html(folder, scores, board, beside) if chosen == "html" else FORMATS[chosen](board, metric)
     if out is None:
         print(text, end="")
         return
@@ -63,6 +76,92 @@ def _chosen(form: str | None, out: Path | None, *, as_json: bool) -> str:
     if form is None:
         form = ENDINGS[out.suffix.lower()] if out else TERMINAL
     return terminal.known("format", form, FORMS if out else (TERMINAL, *FORMS))
+
+
+def compare_command(
+    old: Annotated[Path, typer.Argument(metavar="OLD", help="A run or a bundle.")],
+    new: Annotated[Path, typer.Argument(metavar="NEW", help="Another of the same suite.")],
+    *,
+    at_most: Annotated[
+        float | None, typer.Option(help="Errors this many times the old ones are worse, decided or not.")
+    ] = None,
+    json: terminal.Json = False,
+) -> None:
+    """Say what became better or worse between two runs; exit code 3 where something got worse or fails now."""
+    with opened(old) as before, opened(new) as after, merged([before, after], ["old", "new"]):
+        boards = [page.board_of(folder, folder.scores()) for folder in (before, after)]
+    changes = compare.compare(*boards, at_most=at_most)
+    worse = [change for change in changes if change.verdict in compare.REGRESSIONS]
+    if json:
+        terminal.print_json({"worse": len(worse), "changes": [asdict(change) for change in changes]})
+    else:
+        _print_changes(changes)
+    if worse:
+        raise SystemExit(REGRESSED)
+
+
+def _print_changes(changes: list[compare.Change]) -> None:
+    """The totals, then the cells that are not as they were."""
+    out, headings = terminal.console(), ["estimator", "verdict", "old", "new", "ratio", "p"]
+    for title, chosen in (
+        ("lost-aware score over all cases", [change for change in changes if not change.case]),
+        ("ATE % of path", [change for change in changes if change.case and change.verdict != compare.SAME]),
+    ):
+        if not chosen:
+            continue
+        rows = [
+            [c.case, c.estimator, c.verdict, c.old, c.new, _ratio(c), "" if c.p is None else f"{c.p:.2g}"]
+            for c in chosen
+        ]
+        kept = slice(0 if chosen[0].case else 1, None)
+        out.print(terminal.table(title, ["case", *headings][kept], [row[kept] for row in rows]))
+    cells = [change for change in changes if change.case]
+    same = sum(change.verdict == compare.SAME for change in cells)
+    out.print(
+        f"{same} of {len(cells)} cells are the same to the last digit; ratio: new loss to old, 1 - lost-aware score"
+    )
+
+
+def _ratio(change: compare.Change) -> str:
+    within = f" [{change.interval[0]:.3g}, {change.interval[1]:.3g}]" if change.interval else ""
+    return "" if change.ratio is None else f"{change.ratio:.3g}{within}"
+
+
+def bundle_command(
+    run: terminal.RunPath,
+    out: Annotated[Path, typer.Argument(metavar="OUT.zip", help="The file to write.")],
+    *,
+    json: terminal.Json = False,
+) -> None:
+    """Pack a run's suite, versions, truth, estimates, scores and hashes, for others to score again and to merge."""
+    if out.suffix.lower() != ".zip":
+        raise InputError(f"a bundle's name should end in .zip, got {out.name!r}")
+    files, size = bundle(open_run(run), out), out.stat().st_size
+    if json:
+        terminal.print_json({"path": str(out), "files": files, "bytes": size})
+    else:
+        print(f"{files} files, {size / 1e6:.1f} MB: {out}\nscore it again: vobench score {out}")
+
+
+def score_bundle(path: Path, *, as_json: bool) -> None:
+    """Score a bundle again and print its board of the new scores; exit code 1 where they are not those it states."""
+    with opened(path) as folder:
+        again = list(scored_again(folder))
+        scores, wrong = [score for score, _ in again], [score for score, same in again if not same]
+        board = page.board_of(folder, scores)
+    if as_json:
+        terminal.print_json({"trials": len(again), "differ": [_named(score) for score in wrong]})
+    else:
+        print_board(board)
+        terminal.console().print(f"{len(again) - len(wrong)} of {len(again)} scores are those that the bundle states")
+    for score in wrong[:MOST_CASES]:
+        print(f"vobench: another score than the bundle states: {_named(score)}", file=sys.stderr)
+    if wrong:
+        raise SystemExit(1)
+
+
+def _named(score: TrialScore) -> str:
+    return f"{score.estimator} on {score.case}, {score.repeat}"
 
 
 def verify_command(run: terminal.RunPath, *, json: terminal.Json = False) -> None:
@@ -83,27 +182,55 @@ def verify_command(run: terminal.RunPath, *, json: terminal.Json = False) -> Non
         raise SystemExit(1)
 
 
-def print_boards(boards: list[Board]) -> None:
-    """The leaderboards, and what their numbers don't say."""
+def print_board(board: Board, metric: str = DEFAULT_METRIC) -> None:
+    """The matrix and the totals, and what their numbers don't say."""
     out = terminal.console()
-    for board in boards:
-        out.print(_fitting(board, out))
-        for row in board.rows:
-            for note in notes(row):
-                out.print(f"  {note}", style="red" if row.reason and note == notes(row)[0] else None)
+    rows = matrix(board, metric)
+    cells = [[case, *(f"{c.text}{c.mark}{chr(10) + c.range if c.range else ''}" for c in of)] for case, of in rows]
+    names = board.estimators
+    for shown in range(len(names), 0, -1):
+        headings = ["case", *(_folded(name) for name in names[:shown])]
+        table = terminal.table(METRICS[metric].heading, headings, [row[: shown + 1] for row in cells[:MOST_CASES]])
+        if _fits(table, out):
+            break
+    out.print(table)
+    if left := names[shown:]:
+        out.print(f"no room for {', '.join(left)}: use a wider terminal, or --format csv", style="yellow")
+    if len(cells) > MOST_CASES:
+        out.print(f"{len(cells) - MOST_CASES} more cases: see --format csv", style="yellow")
+    for over, (headings, *lines) in totals(board):
+        _print_totals(f"totals over {over}", headings, lines, out)
+    for remark in remarks(board):
+        out.print(f"  {printable(remark)}")
+    for note in cell_notes(board):
+        out.print(f"  {printable(note)}")
     out.print(LEGEND, style="dim")
 
 
-def _fitting(board: Board, out: Console) -> Table:
-    """A board without the columns that matter least, where the terminal is too narrow for all of them."""
-    endless, lines = out.options.update(max_width=ENDLESS), lines_of(board)
+def _print_totals(title: str, headings: list[str], lines: list[list[str]], out: Console) -> None:
+    """The totals without the columns that matter least, where the terminal is too narrow for all of them."""
     for left_out in range(len(LEAST_FIRST) + 1):
-        kept = [i for i, heading in enumerate(lines[0]) if heading not in LEAST_FIRST[:left_out]]
-        headings, *rows = [[cells[i] for i in kept] for cells in lines]
-        made = terminal.table(board.title, headings, rows)
-        if Measurement.get(out, endless, made).maximum <= out.width:
+        kept = [i for i, heading in enumerate(headings) if heading not in LEAST_FIRST[:left_out]]
+        table = terminal.table(title, [headings[i] for i in kept], [[line[i] for i in kept] for line in lines])
+        if _fits(table, out):
             break
-    return made
+    out.print(table)
+    if gone := [heading for heading in headings if heading in LEAST_FIRST[:left_out]]:
+        out.print(f"no room for {', '.join(gone)}: use a wider terminal, or --format csv", style="yellow")
+
+
+def _fits(table: Table, out: Console) -> bool:
+    return bool(Measurement.get(out, out.options.update(max_width=ENDLESS), table).maximum <= out.width)
+
+
+def _folded(name: str) -> str:
+    """A name on as many lines as keep it narrow, broken behind underscores."""
+    lines = [""]
+    for part in name.replace("_", "_\n").split("\n"):
+        if len(lines[-1] + part) > FOLDED and lines[-1]:
+            lines.append("")
+        lines[-1] += part
+    return "\n".join(lines)
 
 
 def _open(path: Path) -> None:

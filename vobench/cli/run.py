@@ -88,9 +88,9 @@ def run_command(
     if dry_run:
         _check(planned, as_json=json, is_dry_run=True)
         return
-    from vobench.cli.report import print_boards
+    from vobench.cli.report import print_board
     from vobench.report import page
-    from vobench.report.leaderboard import as_json as boards_as_json
+    from vobench.report.board_table import as_json as board_as_json
     from vobench.run.run import BESIDE, run_suite
 
     _, recordings = _preflight(planned)
@@ -105,12 +105,12 @@ def run_command(
             executor=executor, shares_time=share_time, is_fresh=fresh, heard=work.hear, tell=work.say,
         )  # fmt: skip
     scores = folder.scores()
-    boards = page.boards_of(folder, scores)
+    board = page.board_of(folder, scores)
     broken = [line for limit in limits for line in limit.broken_by(scores)]
     if json:
-        print(boards_as_json(boards), end="")
+        print(board_as_json(board), end="")
     else:
-        print_boards(boards)
+        print_board(board)
         if not sandbox_works():
             terminal.console().print("Estimators were not sandboxed: the kernel gives no namespaces (vobench doctor).")
         if share_time:

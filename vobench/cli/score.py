@@ -188,7 +188,7 @@ def score_command(
         typer.Argument(
             metavar="GT EST",
             help="Ground truth and estimate: TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, by content, or the truth "
-            "of a sequence's folder. Several pairs are scored one by one and all together.",
+            "of a sequence's folder. Several pairs are scored one by one and all together. Or a bundle of a run.",
         ),
     ] = None,
     *,
@@ -242,6 +242,11 @@ def score_command(
     """Score estimates against ground truth: ATE, RPE, segments, coverage."""
     form = _form(json=json, csv=csv, md=md)
     paths = [*(files or ()), *(_read_list(listed) if listed else ())]
+    if len(paths) == 1 and paths[0].suffix.lower() == ".zip":
+        from vobench.cli.report import score_bundle
+
+        score_bundle(paths[0], as_json=json)
+        return
     if not paths or len(paths) % 2:
         raise typer.BadParameter(
             f"files come in pairs, GT EST, but there {'is' if len(paths) == 1 else 'are'} {len(paths)}"

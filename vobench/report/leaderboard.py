@@ -1,72 +1,85 @@
-"""Scores to ranked boards, and boards as text for a terminal, Markdown, CSV, LaTeX or JSON."""
+"""Scores as one table of cells, case × estimator, and what comes of it: ranks, marks and where estimators break."""
 
-import json
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from itertools import groupby, pairwise
-from statistics import fmean
-from typing import TYPE_CHECKING, Any
+from math import inf, isnan, nan
+from statistics import fmean, median
+from typing import Any
 
+import numpy as np
+
+from vobench.metric import ranking
+from vobench.metric.coverage import lost_aware_score
 from vobench.run.consistency import Consistency
 from vobench.run.estimate import DROPPED
 from vobench.run.folder import STATUSES, SURVIVED, TrialScore, value_of
 from vobench.run.frames import FrameRow
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+FAIL_RATIO = 0.1  # of the path, of scores without a lost-aware one
+BROKEN = 0.75  # the lost-aware score of a survivor that is off by half of what counts as failed
+ALL = "all"
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """One line of a board, over one or more trials (`runs` of them): errors are means over those that survived.
+class Metric:
+    """One number of a trial that a board shows: its heading, and how it is read off a score."""
 
-    `coverage` and `ms_per_frame`, which is CPU time, are means over all trials; `status` is the worst of them.
-    A case that stands still has no errors but `drift_mm`, the largest of its trials; `frame_reason` is the
-    commonest that an estimator gave for single frames of a case, as it first stood, at `frame_reason_first`.
-    `claims` are the manifest's; `consistency` says what stated covariances are worth, and `revised_…` are errors of
-    the poses that came after the last frame; these and `scale_drift_…` are means over survivors that have them.
-    """
+    heading: str
+    of: Callable[[TrialScore], float | None]
+    higher_is_better: bool = False
+    of_failures: bool = False  # told of failed trials too
 
-    rank: int
-    estimator: str
-    status: str
-    survived: int
-    partial: int
-    runs: int
-    ate_mm: float | None
-    segment_percent: float | None
-    rpe_mm: float | None
-    rpe_deg: float | None
-    coverage: float
-    ms_per_frame: float | None
-    reason: str
-    drift_mm: float | None
-    frame_reason: str
-    frame_reason_count: int
-    frame_reason_first: int | None
-    claims: tuple[str, ...] = ()
-    scale_gap: float | None = None
-    covered_90: float | None = None
-    consistency: str = ""
-    revised_ate_mm: float | None = None
-    revised_segment_percent: float | None = None
-    scale_drift_percent_per_m: float | None = None
-    memory_mib: float | None = None
-    frames: int = 0
-    frames_dropped: int = 0
-    deadlines_missed: int = 0
+
+def _read(metric: str, statistic: str, scale: float) -> Callable[[TrialScore], float | None]:
+    def read(trial: TrialScore) -> float | None:
+        value = None if trial.drift_m is not None else trial.value(metric, statistic)
+        return None if value is None else scale * value
+
+    return read
+
+
+def _ate_percent(trial: TrialScore) -> float | None:
+    ate_m = _read("ate_trans", "rmse", 1.0)(trial)
+    return 100 * ate_m / trial.path_m if ate_m is not None and trial.path_m > 0 else None
+
+
+def lost_aware(trial: TrialScore) -> float | None:
+    """A trial's lost-aware score, below 1/2 of any that failed; None where the truth stands still."""
+    survived = trial.status in SURVIVED
+    if trial.drift_m is not None:
+        return None
+    score = ((trial.score or {}).get("failure") or {}).get("lost_aware")
+    if score is None and (ate_m := trial.value("ate_trans", "rmse")) is not None:
+        limit_m = FAIL_RATIO * max(trial.path_m, 1e-9)
+        score = lost_aware_score(np.array([ate_m]), trial.coverage, survived=survived, fail_m=limit_m)
+    return 1.0 - ranking.trial_loss(score, survived=survived)
+
+
+METRICS: dict[str, Metric] = {
+    "ate": Metric("ATE % of path", _ate_percent),
+    "ate_mm": Metric("ATE mm", _read("ate_trans", "rmse", 1e3)),
+    "segments": Metric("segments %", _read("kitti_t_rel", "mean", 100)),
+    "rpe_mm": Metric("RPE mm/frame", _read("rpe_trans", "rmse", 1e3)),
+    "rpe_deg": Metric("RPE °/frame", _read("rpe_rot", "rmse", 1)),
+    "score": Metric("lost-aware score", lost_aware, higher_is_better=True, of_failures=True),
+    "coverage": Metric("coverage", lambda trial: trial.coverage, higher_is_better=True, of_failures=True),
+    "cpu_ms": Metric("CPU ms/frame", lambda _: None, of_failures=True),
+    "memory_mib": Metric("MiB", lambda _: None, of_failures=True),
+}
+COSTS = ("cpu_ms", "memory_mib")
 
 
 @dataclass(frozen=True, slots=True)
-class Board:
-    """A ranked table; `title` is a case's name, or says that it is over all of them."""
+class CaseFacts:
+    """What a case says of itself: the `group` of its calibration, and how severe its scenario is."""
 
-    title: str
-    rows: tuple[Row, ...]
+    group: str = ""
+    scenario: str = ""
+    severity: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +101,122 @@ class EstimatorStatistics:
 
 
 Answered = Mapping[tuple[str, str], EstimatorStatistics]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """All trials of one estimator on one case.
+
+    `values` has each metric's of every trial, infinitely bad where it failed, None where it has none; `status` and
+    `reason` are the gravest. `consistency`, `revised_…` and `scale_drift_…` are of the survivors.
+    """
+
+    case: str
+    estimator: str
+    facts: CaseFacts
+    failures: tuple[bool, ...]
+    status: str
+    reason: str
+    values: Mapping[str, tuple[float | None, ...]]
+    losses: tuple[float, ...]
+    answered: EstimatorStatistics
+    claims: tuple[str, ...] = ()
+    drift_mm: float | None = None
+    scale_gap: float | None = None
+    consistency: str = ""
+    revised_ate_mm: float | None = None
+    revised_segment_percent: float | None = None
+    scale_drift_percent_per_m: float | None = None
+
+    @property
+    def trials(self) -> int:
+        """How many trials there are."""
+        return len(self.failures)
+
+    @property
+    def failed(self) -> int:
+        """How many of them failed."""
+        return sum(self.failures)
+
+    def spread(self, metric: str) -> tuple[float, float, float] | None:
+        """Median, least and largest of a metric over the trials that have it, None where none has."""
+        has = [value for value in self.values[metric] if value is not None and abs(value) < inf]
+        return (median(has), min(has), max(has)) if has else None
+
+
+@dataclass(frozen=True, slots=True)
+class Total:
+    """One estimator over all cases of a group that everybody has: its standing, and what it cost.
+
+    `score` is the lost-aware one, 1 minus the geometric mean of what trials lack of 1; `ate_percent` a median over
+    cases, `mean_place` a mean over them; `is_efficient`: nobody ranked above took less CPU time.
+    """
+
+    group: str
+    estimator: str
+    claims: tuple[str, ...]
+    place: int
+    places: tuple[int, int]
+    score: float
+    loss_ratio: float
+    ratio_interval: tuple[float, float] | None
+    p_above: float | None
+    decided_above: bool
+    repeats: int | None
+    trials: int
+    failed: int
+    cases: int
+    ate_percent: float | None
+    mean_place: float | None
+    cpu_ms: float | None
+    memory_mib: float | None
+    is_efficient: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """An estimator's median lost-aware score over the severities of a scenario, and the first at which it is broken."""
+
+    group: str
+    scenario: str
+    estimator: str
+    severities: tuple[int, ...]
+    scores: tuple[float, ...]
+    breaks_at: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """The table of cells, and what was made of it; `remarks` say what its numbers don't."""
+
+    title: str
+    cells: tuple[Cell, ...]
+    totals: tuple[Total, ...]
+    curves: tuple[Curve, ...]
+    remarks: tuple[str, ...]
+    _at: dict[tuple[str, str], Cell] = field(default_factory=dict, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        self._at.update({(cell.case, cell.estimator): cell for cell in self.cells})
+
+    def cell(self, case: str, estimator: str) -> Cell | None:
+        """The cell of a case and an estimator, if there is such a trial."""
+        return self._at.get((case, estimator))
+
+    @property
+    def cases(self) -> list[str]:
+        """Names of all cases."""
+        return list(dict.fromkeys(cell.case for cell in self.cells))
+
+    @property
+    def estimators(self) -> list[str]:
+        """All estimators, the best first."""
+        return list(dict.fromkeys([*(t.estimator for t in self.totals), *(c.estimator for c in self.cells)]))
+
+    @property
+    def metrics(self) -> list[str]:
+        """The metrics that any cell has."""
+        return [name for name in METRICS if any(cell.spread(name) for cell in self.cells)]
 
 
 def answers(trials: Sequence[list[FrameRow]]) -> EstimatorStatistics:
@@ -115,67 +244,56 @@ def answers(trials: Sequence[list[FrameRow]]) -> EstimatorStatistics:
     return EstimatorStatistics(cost_ms, first.reason, count, first.frame, **pace)
 
 
-def boards(scores: Iterable[TrialScore], answered: Answered) -> list[Board]:
-    """The board over all cases, then one per case; `answered` is per (case, estimator) and may lack some."""
-    every, by_case = list(scores), dict[str, list[TrialScore]]()
-    for score in every:
-        by_case.setdefault(score.case, []).append(score)
-    per_case = [board(case, of_case, answered) for case, of_case in sorted(by_case.items())]
-    return [board(f"all {len(by_case)} cases", every, answered), *per_case] if len(by_case) > 1 else per_case
+def board(
+    scores: Iterable[TrialScore], answered: Answered, facts: Mapping[str, CaseFacts] | None = None, *, title: str = ""
+) -> Board:
+    """The board of these trials; `answered` is per (case, estimator), `facts` per case, and both may lack some."""
+
+    def place(score: TrialScore) -> tuple[str, str]:
+        return score.case, score.estimator
+
+    facts = facts or {}
+    grouped = groupby(sorted(scores, key=lambda score: (*place(score), score.repeat)), key=place)
+    cells = [
+        _cell(list(trials), answered.get(key, EstimatorStatistics()), facts.get(key[0], CaseFacts()))
+        for key, trials in grouped
+    ]
+    groups = sorted({cell.facts.group for cell in cells})
+    totals, remarks = list[Total](), list[str]()
+    for group in groups:
+        found, said = _totals(group, [cell for cell in cells if cell.facts.group == group])
+        totals += found
+        remarks += said
+    if len(groups) > 1:
+        remarks.append(f"each calibration has totals of its own: {', '.join(group or 'unnamed' for group in groups)}")
+    return Board(title, tuple(cells), tuple(totals), tuple(_curves(cells)), tuple(remarks))
 
 
-def board(title: str, scores: list[TrialScore], answered: Answered) -> Board:
-    """One ranked table of these trials, one row for each estimator."""
-
-    def name(score: TrialScore) -> str:
-        return score.estimator
-
-    grouped = [list(group) for _, group in groupby(sorted(scores, key=name), key=name)]
-    ranked = sorted((_row(trials, answered) for trials in grouped), key=_place)
-    first: dict[tuple[int, int, float], int] = {}
-    for number, row in enumerate(ranked, 1):
-        first.setdefault(_place(row)[:3], number)
-    return Board(title, tuple(replace(row, rank=first[_place(row)[:3]]) for row in ranked))
-
-
-def _place(row: Row) -> tuple[int, int, float, str]:
-    """What a row is sorted by: failures, partial trials, error, and the name so that ties are stable."""
-    return row.runs - row.survived, row.partial, float("inf") if row.ate_mm is None else row.ate_mm, row.estimator
-
-
-def _row(trials: list[TrialScore], answered: Answered) -> Row:
+def _cell(trials: list[TrialScore], found: EstimatorStatistics, facts: CaseFacts) -> Cell:
     survivors = [trial for trial in trials if trial.status in SURVIVED]
     moving = [trial for trial in survivors if trial.drift_m is None]
     worst = max(trials, key=lambda trial: STATUSES.index(trial.status))
-    found = [answered.get((trial.case, trial.estimator), EstimatorStatistics()) for trial in trials]
-    by_case = {trial.case: each for trial, each in zip(trials, found, strict=True)}.values()
-    costs_ms = [each.ms_per_frame for each in found if each.ms_per_frame is not None]
-    is_one_case = len({trial.case for trial in trials}) == 1
-    drifts = [1e3 * trial.drift_m for trial in trials if trial.drift_m is not None and is_one_case]
-    said = found[0] if is_one_case else EstimatorStatistics()
-    return Row(
-        rank=0,
-        estimator=trials[0].estimator,
+    drifts = [1e3 * trial.drift_m for trial in trials if trial.drift_m is not None]
+    scored = [lost_aware(trial) for trial in trials]
+    costs: dict[str, tuple[float | None, ...]] = {
+        "cpu_ms": (found.ms_per_frame or None,),
+        "memory_mib": (found.memory_mib,),
+    }
+    return Cell(
+        case=worst.case,
+        estimator=worst.estimator,
+        facts=facts,
+        failures=tuple(trial.status not in SURVIVED for trial in trials),
         status=worst.status,
-        survived=len(survivors),
-        partial=sum(trial.status == "partial" for trial in trials),
-        runs=len(trials),
-        ate_mm=_mean(moving, "ate_trans", "rmse", 1e3),
-        segment_percent=_mean(moving, "kitti_t_rel", "mean", 100),
-        rpe_mm=_mean(moving, "rpe_trans", "rmse", 1e3),
-        rpe_deg=_mean(moving, "rpe_rot", "rmse", 1),
-        coverage=fmean(trial.coverage for trial in trials),
-        ms_per_frame=fmean(costs_ms) if costs_ms else None,
-        reason=worst.reason if is_one_case or not worst.reason else f"{worst.case}: {worst.reason}",
+        reason=worst.reason,
+        values={
+            **{name: tuple(_value(metric, trial) for trial in trials) for name, metric in METRICS.items()},
+            **costs,
+        },
+        losses=tuple(nan if score is None else max(1.0 - score, ranking.MIN_LOSS) for score in scored),
+        answered=found,
+        claims=worst.claims,
         drift_mm=max(drifts, default=None),
-        frame_reason=said.reason,
-        frame_reason_count=said.count,
-        frame_reason_first=said.first,
-        claims=trials[0].claims,
-        memory_mib=max((each.memory_mib for each in by_case if each.memory_mib), default=None),
-        frames=sum(each.frames for each in by_case),
-        frames_dropped=sum(each.dropped for each in by_case),
-        deadlines_missed=sum(each.late for each in by_case),
         scale_drift_percent_per_m=_mean(moving, "scale_drift", "mean", 100),
         revised_ate_mm=_mean(moving, "ate_trans", "rmse", 1e3, revised=True),
         revised_segment_percent=_mean(moving, "kitti_t_rel", "mean", 100, revised=True),
@@ -183,12 +301,18 @@ def _row(trials: list[TrialScore], answered: Answered) -> Row:
     )
 
 
+def _value(metric: Metric, trial: TrialScore) -> float | None:
+    if trial.status in SURVIVED or metric.of_failures:
+        return metric.of(trial)
+    return None if trial.drift_m is not None else inf
+
+
 def _consistency(found: list[Consistency]) -> dict[str, Any]:
     """What the covariances of these trials are worth together: the median trial's, for errors of one path go along."""
     if not found:
         return {}
     middle = sorted(found, key=lambda each: each.scale_gap)[len(found) // 2]
-    return {"scale_gap": middle.scale_gap, "covered_90": middle.covered_90, "consistency": middle.sentence}
+    return {"scale_gap": middle.scale_gap, "consistency": middle.sentence}
 
 
 def _mean(
@@ -199,101 +323,136 @@ def _mean(
     return scale * fmean(values) if values else None
 
 
-def _number(value: float | None, digits: int) -> str:
-    return "–" if value is None else f"{value:.{digits}f}"
+def _totals(group: str, cells: Sequence[Cell]) -> tuple[list[Total], list[str]]:
+    """The estimators ranked over the cases that all of them have, and what to know of that."""
+    names = sorted({cell.estimator for cell in cells})
+    of_case: dict[str, list[Cell]] = {}
+    for cell in cells:
+        of_case.setdefault(cell.case, []).append(cell)
+    common = [case for case, of in of_case.items() if len(of) == len(names)]
+    remarks = list[str]()
+    if len(common) < len(of_case):
+        lacks = Counter(cell.estimator for cell in cells)
+        least = min(lacks, key=lambda name: (lacks[name], name))
+        over = f"totals are over the {len(common)} of {len(of_case)} cases that every estimator has"
+        over = over if common else "nobody is ranked, for no case has every estimator"
+        remarks.append(f"{over} ({least} has {lacks[least]})")
+    if not common:
+        return [], remarks
+    shown = [cell for case in common for cell in of_case[case]]
+    rows, columns = ({name: k for k, name in enumerate(each)} for each in (names, common))
+    loss = np.full((len(names), len(common), max(cell.trials for cell in shown)), np.nan)
+    failed = loss.copy()
+    by_name: dict[str, list[Cell]] = {name: [] for name in names}
+    for cell in shown:
+        place = rows[cell.estimator], columns[cell.case]
+        loss[place][: cell.trials], failed[place][: cell.trials] = cell.losses, cell.failures
+        by_name[cell.estimator].append(cell)
+    places = ranking.mean_places(loss, failed)
+    standings = ranking.rank(loss, failed)
+    found = [_total(group, by_name[names[each.index]], each, float(places[each.index])) for each in standings]
+    pairs = len(common) * loss.shape[2]
+    if len(names) > 1 and pairs < ranking.MIN_UNITS:
+        remarks.append(f"too few trials to decide anything: {pairs} a pair of estimators, {ranking.MIN_UNITS} at least")
+    elif len(names) > 1 and len(common) < ranking.MIN_UNITS:
+        remarks.append(f"fewer than {ranking.MIN_UNITS} cases: ranks say what repeats of these show, not other cases")
+    return _efficient(found), remarks
 
 
-COST, MEMORY = "CPU ms/frame", "MiB"
-# Heading and cell of each column, as people read them.
-COLUMNS: tuple[tuple[str, Callable[[Row], str]], ...] = (
-    ("#", lambda row: str(row.rank)),
-    ("estimator", lambda row: f"{row.estimator} [{', '.join(row.claims)}]" if row.claims else row.estimator),
-    ("status", lambda row: row.status),
-    ("survived", lambda row: f"{row.survived}/{row.runs}"),
-    ("ATE mm", lambda row: _number(row.ate_mm, 2)),
-    ("segments %", lambda row: _number(row.segment_percent, 3)),
-    ("RPE mm/frame", lambda row: _number(row.rpe_mm, 3)),
-    ("RPE °/frame", lambda row: _number(row.rpe_deg, 4)),
-    ("coverage", lambda row: _number(row.coverage, 3)),
-    (COST, lambda row: _number(row.ms_per_frame, 1)),
-    (MEMORY, lambda row: _number(row.memory_mib, 0)),
-)
-HEADINGS = tuple(heading for heading, _ in COLUMNS)
-LEGEND = (
-    "ATE: RMSE of position after SE(3) alignment, Sim(3) for those marked so; segments: mean drift over 0.5 to 2 m "
-    "(5 to 40 m on paths from 40 m on, 100 to 800 m from 300 m on); "
-    "RPE: RMSE from frame to frame. Errors are means over the trials that survived, of cases that move."
-)
+def _total(group: str, cells: Sequence[Cell], standing: ranking.Standing, mean_place: float) -> Total:
+    ates = [each[0] for cell in cells if (each := cell.spread("ate"))]
+    costs = [each[0] for cell in cells if (each := cell.spread("cpu_ms"))]
+    memory = [each[0] for cell in cells if (each := cell.spread("memory_mib"))]
+    stated = asdict(standing)
+    return Total(
+        group=group,
+        estimator=cells[0].estimator,
+        claims=cells[0].claims,
+        score=1.0 - standing.loss,
+        trials=sum(cell.trials for cell in cells),
+        cases=len(cells),
+        ate_percent=median(ates) if ates else None,
+        mean_place=mean_place,
+        cpu_ms=fmean(costs) if costs else None,
+        memory_mib=max(memory, default=None),
+        **{name: stated[name] for name in ("place", "places", "loss_ratio", "ratio_interval", "p_above")},
+        decided_above=standing.decided_above,
+        repeats=standing.repeats,
+        failed=sum(cell.failed for cell in cells),
+    )
 
 
-def lines_of(board: Board) -> list[list[str]]:
-    """The headings, then the cells of each row; the columns of costs are left out where no row has one."""
-    is_timed = any(row.ms_per_frame is not None for row in board.rows)
-    shown = [(heading, cell) for heading, cell in COLUMNS if is_timed or heading not in (COST, MEMORY)]
-    return [[heading for heading, _ in shown], *([cell(row) for _, cell in shown] for row in board.rows)]
+def _efficient(ranked: Sequence[Total]) -> list[Total]:
+    """The same, those marked whose CPU time nobody ranked above has undercut."""
+    found, least = list[Total](), inf
+    for total in ranked:
+        cost = inf if total.cpu_ms is None else total.cpu_ms
+        found.append(replace(total, is_efficient=cost < least))
+        least = min(least, cost)
+    return found
 
 
-def notes(row: Row) -> list[str]:
-    """What a line's numbers don't say: how it failed, how far it drifted standing still, what its frames lacked."""
-    said = [f"{row.status}: {row.reason}"] if row.reason else []
-    if row.drift_mm is not None:
-        said.append(f"stood still: drift {row.drift_mm:.1f} mm")
-    if row.frames_dropped:
-        missed = f"{row.deadlines_missed} deadline{'' if row.deadlines_missed == 1 else 's'} missed"
-        said.append(f"real time: {missed}, {row.frames_dropped} of {row.frames} frames dropped")
-    if row.revised_ate_mm is not None:
-        drift = _number(row.revised_segment_percent, 3)
-        said.append(f"after the fact: ATE {row.revised_ate_mm:.2f} mm, segments {drift} %")
-    if row.scale_drift_percent_per_m is not None:
-        said.append(f"aligned with a scale, which drifts by {row.scale_drift_percent_per_m:+.2g} % a metre")
-    if row.consistency:
-        said.append(row.consistency)
-    if row.frame_reason:
-        frames = "1 frame" if row.frame_reason_count == 1 else f"{row.frame_reason_count} frames"
-        over = f" of {row.runs} trials" if row.runs > 1 else ""
-        said.append(f'{frames}{over} "{row.frame_reason}", first at frame {row.frame_reason_first}')
-    return [f"{row.estimator}: {sentence}" for sentence in said]
+def _curves(cells: Iterable[Cell]) -> list[Curve]:
+    """How each estimator fares as each scenario grows more severe."""
+    found: dict[tuple[str, str, str], dict[int, list[float]]] = {}
+    for cell in cells:
+        if cell.facts.scenario and cell.facts.severity is not None:
+            key = cell.facts.group, cell.facts.scenario, cell.estimator
+            known = [1.0 - loss for loss in cell.losses if not isnan(loss)]
+            found.setdefault(key, {}).setdefault(cell.facts.severity, []).extend(known)
+    curves = list[Curve]()
+    for key, by_severity in sorted(found.items()):
+        levels = sorted(severity for severity, known in by_severity.items() if known)
+        scores = tuple(median(by_severity[level]) for level in levels)
+        broken = next((level for level, score in zip(levels, scores, strict=True) if score < BROKEN), None)
+        if len(levels) > 1:
+            curves.append(Curve(*key, tuple(levels), scores, broken))
+    return curves
 
 
-def markdown(boards: list[Board]) -> str:
-    """All boards as Markdown tables, with what went wrong below each."""
-    lines = list[str]()
-    for board in boards:
-        headings, *rows = ["| " + " | ".join(cells) + " |" for cells in lines_of(board)]
-        below = [f"- {note}" for row in board.rows for note in notes(row)]
-        lines += [f"## {board.title}", "", headings, "|" + "---|" * (headings.count("|") - 1), *rows, "", *below]
-        lines += [""] if below else []
-    return "\n".join([*lines, LEGEND, ""])
+def marks(made: Board, metric: str) -> dict[tuple[str, str], str]:
+    """Of each case the best estimator's mark `*`, and `~` of those, it too, that are not decided against the best.
+
+    A cell with a failed trial counts it as worst of all; costs are not marked.
+    """
+    found = dict[tuple[str, str], str]()
+    sign = -1.0 if METRICS[metric].higher_is_better else 1.0
+    for case, group in groupby(made.cells if metric not in COSTS else (), key=lambda cell: cell.case):
+        values = {
+            cell.estimator: np.array([sign * v for v in cell.values[metric] if v is not None])
+            for cell in group
+            if cell.drift_mm is None
+        }
+        middle = {name: float(np.median(v)) for name, v in values.items() if len(v) and np.median(v) < inf}
+        if len(middle) < 2:
+            continue
+        best = min(middle, key=lambda name: (middle[name], name))
+        others = [name for name in values if name != best and len(values[name])]
+        tied = [name for name in others if ranking.difference_p(values[best], values[name]) >= ranking.ALPHA]
+        few = len(values[best]) < ranking.MIN_TRIALS
+        found[case, best] = "*~" if tied else "*"
+        found |= {(case, name): "*" if middle.get(name) == middle[best] else "~" for name in tied if not few}
+    return found
 
 
-def as_json(boards: list[Board]) -> str:
-    """All boards as one JSON object, numbers in full."""
-    content = {"boards": [{"title": b.title, "rows": [asdict(row) for row in b.rows]} for b in boards]}
-    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def csv(boards: list[Board]) -> str:
-    """All boards as one CSV table, with the board's title in front."""
-    text: str = data_frame(boards).to_csv(index=False)
-    return text
-
-
-def latex(boards: list[Board]) -> str:
-    """The first board as a LaTeX table with booktabs rules."""
-    import pandas as pd
-
-    headings, *rows = lines_of(boards[0])
-    table = pd.DataFrame(rows, columns=[heading.replace("%", "\\%") for heading in headings])
-    escaped = table.replace({"_": r"\_"}, regex=True).rename(columns={"#": r"\#", "RPE °/frame": r"RPE $^\circ$/frame"})
-    text: str = escaped.style.hide(axis="index").to_latex(hrules=True)
-    return text
-
-
-def data_frame(boards: list[Board]) -> "pd.DataFrame":
-    """All boards as a pandas table, numbers in full, one row per board and estimator."""
-    import pandas as pd
-
-    return pd.DataFrame([{"board": board.title, **asdict(row)} for board in boards for row in board.rows])
-
-
-FORMATS: dict[str, Callable[[list[Board]], str]] = {"md": markdown, "json": as_json, "csv": csv, "latex": latex}
+def notes(cell: Cell) -> list[str]:
+    """What a cell's numbers don't say: how it failed, how far it drifted standing still, what its frames lacked."""
+    said = [f"{cell.status}: {cell.reason}"] if cell.reason else []
+    frames = cell.answered
+    if cell.drift_mm is not None:
+        said.append(f"stood still: drift {cell.drift_mm:.1f} mm")
+    if frames.dropped:
+        missed = f"{frames.late} deadline{'' if frames.late == 1 else 's'} missed"
+        said.append(f"real time: {missed}, {frames.dropped} of {frames.frames} frames dropped")
+    if cell.revised_ate_mm is not None:
+        drift = "–" if cell.revised_segment_percent is None else f"{cell.revised_segment_percent:.3f}"
+        said.append(f"after the fact: ATE {cell.revised_ate_mm:.2f} mm, segments {drift} %")
+    if cell.scale_drift_percent_per_m is not None:
+        said.append(f"aligned with a scale, which drifts by {cell.scale_drift_percent_per_m:+.2g} % a metre")
+    if cell.consistency:
+        said.append(cell.consistency)
+    if frames.reason:
+        count = "1 frame" if frames.count == 1 else f"{frames.count} frames"
+        over = f" of {cell.trials} trials" if cell.trials > 1 else ""
+        said.append(f'{count}{over} "{frames.reason}", first at frame {frames.first}')
+    return [f"{cell.estimator}: {sentence}" for sentence in said]

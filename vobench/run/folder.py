@@ -20,7 +20,7 @@ from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
 CASE, SCORE, SEQUENCE = "case.json", "score.json", "sequence"
-ESTIMATES = "estimates"
+ESTIMATES, PAGE = "estimates", "leaderboard.html"
 ENVIRONMENT, SUITE, ESTIMATORS = "environment.json", "suite.json", "estimators.json"
 
 # Best first; the last seven are failures, and no failure ranks before a survivor.
@@ -163,7 +163,7 @@ def read_tum(path: Path) -> Trajectory:
     return parse_tum(text, name=str(path))
 
 
-# Of runs of equal inputs the first are equal; the second are of the files of times, the only ones that differ.
+# Of runs of equal inputs the first are equal; the second are of the files of times, and of the page that shows them.
 HASHES, TIMES_HASHES = "hashes.json", "times_hashes.json"
 
 
@@ -171,7 +171,7 @@ def write_hashes(folder: RunFolder) -> None:
     """Hash all that lies in a run's folder, and the sequences that it links to; files of times apart."""
     hashes = {name: file_hash(folder.path / name) for name in _names(folder.path)}
     for file, are_times in ((HASHES, False), (TIMES_HASHES, True)):
-        chosen = {name: held for name, held in hashes.items() if (Path(name).name == TIMES) == are_times}
+        chosen = {name: held for name, held in hashes.items() if (Path(name).name in (TIMES, PAGE)) == are_times}
         write_json(folder.path / file, chosen)
 
 

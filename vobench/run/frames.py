@@ -4,6 +4,7 @@ import csv
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -78,7 +79,12 @@ def read_frames(folder: Path) -> list[FrameRow]:
     untimed = dict.fromkeys(TIME_COLUMNS, "")
     rows = [{**untimed, **times.get(row["frame"], {}), **row} for row in read_table(folder / FRAMES)]
     known = [{name: row[name] or empty for name, empty in nothing.items()} for row in rows]
-    return TypeAdapter(list[FrameRow]).validate_python(known)
+    return _adapter().validate_python(known)
+
+
+@cache
+def _adapter() -> TypeAdapter[list[FrameRow]]:
+    return TypeAdapter(list[FrameRow])
 
 
 @contextmanager

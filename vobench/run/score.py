@@ -40,7 +40,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
     stamps = {row["frame"]: int(row["t_ns"]) for row in read_table(sequence / EXPOSURES)}
     dropped = [stamps[row["frame"]] for row in read_table(estimate / ANSWERS) if row["status"] == DROPPED]
     outcome, scale = read_outcome(estimate), scored.alignment.scale if scored else 1.0
-    status, reason = _status(outcome, scored, gt)
+    status, reason = status_of(outcome, scored, gt)
     if dropped and outcome.kind == FINISHED:
         status, reason = _status_of_handed(est, gt, claims, dropped)
     score = TrialScore(
@@ -86,7 +86,7 @@ def score_estimate(est: Trajectory, gt: Trajectory, claims: Sequence[str]) -> Sc
     return score(gt, est, settings=replace(SETTINGS, alignment="sim3", full=True), metrics=OF_NO_SCALE)
 
 
-def _status(outcome: Outcome, scored: Score | None, gt: Trajectory) -> tuple[TrialStatus, str]:
+def status_of(outcome: Outcome, scored: Score | None, gt: Trajectory) -> tuple[TrialStatus, str]:
     """How the trial ended, the gravest first; an estimator that died is not saved by what it answered before."""
     if outcome.kind != FINISHED:
         return outcome.kind, outcome.reason  # type: ignore[return-value]  # EstimatorFailure's kinds are statuses
@@ -109,7 +109,7 @@ def _status_of_handed(
     """How a trial in real time ended, by the frames that came in time; those of these stamps did not."""
     in_time = ~np.isin(gt.t_ns, dropped)
     handed = Trajectory(gt.t_ns[in_time], gt.T_world_frame[in_time])
-    status, reason = _status(Outcome(kind=FINISHED, reason=""), score_estimate(est, handed, claims), handed)
+    status, reason = status_of(Outcome(kind=FINISHED, reason=""), score_estimate(est, handed, claims), handed)
     if status not in SURVIVED:
         return status, reason
     late = f"it was too late for {len(dropped)} of {len(gt)} frames"
