@@ -35,6 +35,7 @@ VERBS = {
     "import": "vobench.cli.sequence:import_command",
     "export": "vobench.cli.sequence:export_command",
     "info": "vobench.cli.sequence:info_command",
+    "realism": "vobench.cli.realism:realism_command",
     "verify": "vobench.cli.report:verify_command",
     "report": "vobench.cli.report:report_command",
     "view": "vobench.cli.report:view_command",

@@ -27,7 +27,7 @@ SuiteName = Annotated[str, typer.Argument(metavar="SUITE", help="A suite's name,
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or runs/<suite> for its latest.")]
 LEFT_ALIGNED = {
     *("estimator", "status", "name", "case", "kind", "summary", "path", "origin", "check", "result"),
-    *("sequence", "metric", "headline", "is", "with", "trajectory"),
+    *("sequence", "metric", "headline", "is", "with", "trajectory", "statistic", "unit", "moved by"),
 }
 
 
