@@ -203,7 +203,7 @@ def test_a_calibration_error_makes_the_true_rig_another_and_the_told_one_not(ben
 
 
 SUITE_KEYS = "cameras, estimators, lightings, modes, name, rendering, repeats, rigs, scenes, seed, source, summary, trajectories, truth"
-RIG_KEYS = "baseline_m, calibration_error, forward_m, height_m, imu, lens, pitch_deg"
+RIG_KEYS = "baseline_m, calibration_error, forward_m, height_m, imu, lens, own, pitch_deg"
 LENSES = "d435i, euroc, fisheye, paper_blender, paper_literal, tartanair, zed2i"
 ESTIMATORS = (
     "constant_velocity, feature_vo, imu_dead_reckoning, imu_visual, lk_epipolar, mono_vo, noisy_truth, planar_floor, "

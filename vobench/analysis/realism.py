@@ -23,7 +23,7 @@ from vobench.sequence import EncodedFrame
 from vobench.sequence.picture import Image, decode, grey
 from vobench.trajectory.trajectory import poses_at
 
-WINDOW, WINDOWS = 14, 3  # successive pictures, and how often over a recording
+WINDOW, WINDOWS = 14, 6  # successive pictures, and how often over a recording
 MOST_CORNERS, CORNER_QUALITY, CORNER_DISTANCE_PX = 2000, 0.01, 8
 CELLS = (8, 6)
 TILE_PX, CYCLES = 256, (4, 100)

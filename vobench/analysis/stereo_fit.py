@@ -18,15 +18,17 @@ from vobench.sequence.picture import Image
 
 MAD = 1.4826  # to a normal distribution's standard deviation
 ROWS_APART_PX = 8.0  # beyond it a match is wrong
+WINDOW_PX, USUAL_WINDOW_PX = 9, 21  # small is true to edges and slanted surfaces; the bands are of the usual one
 CORNERS_PER_CELL, CORNER_DISTANCE_PX, MARGIN_PX = 30, 8.0, 12
 FEWEST = 50  # matches, for a fit of five numbers
 FIT_STEPS = 20
-CORRELATED = 16.0  # matches near each other err alike: so many count as one
-APART = 3  # pictures between the two views of a motion
+CORRELATED = 8.0  # matches near each other err alike: so many count as one
+APART = 5  # pictures between the two views of a motion
 TRUTH_M, TRUTH_SHARE, TRUTH_RAD = 3e-4, 5e-4, 3e-5  # how well a true motion is taken to be known
 MOST_YAW_DEG = 0.3  # rows that say more are of a lens
 FEWEST_FOLLOWED, LEAST_FLOW_PX = 40, 2.0
-OFFSET_STEPS = 6
+OFFSET_STEPS, DEPTH_STEPS = 6, 2
+MEDIAN_OF_TWO = 1.1774  # of the length of two normal numbers
 DISPARITY_QUANTILES = (0.1, 0.5, 0.9)
 
 
@@ -103,6 +105,9 @@ def fit_pair(windows: Sequence[Sequence[PairShot]], pair: StereoPair) -> StereoF
     if len(matches.row_px) < FEWEST:
         return None
     rows, sigma, noise_px = _robust_fit(_row_terms(matches.place), matches.row_px)
+    usual = [
+        _match(shot.left, shot.right, pair, USUAL_WINDOW_PX)[0].row_px for window in windows for shot in window[::3]
+    ]
     fx, fy = float(pair.K[0, 0]), float(pair.K[1, 1])
     of_motion = _offset(windows, pair, np.array([-rows[1], rows[0]]) / fy)
     xy_px = Uncertain(float(rows[3]), float(sigma[3]))
@@ -111,7 +116,7 @@ def fit_pair(windows: Sequence[Sequence[PairShot]], pair: StereoPair) -> StereoF
         focal_px=fx,
         baseline_m=pair.baseline_m,
         matches=matches,
-        row_mad_px=_mad(matches.row_px),
+        row_mad_px=_mad(np.concatenate(usual)),
         row_noise_px=noise_px,
         coefficients=rows,
         roll_deg=_degrees(-rows[1], sigma[1], fy),
@@ -140,10 +145,12 @@ def _yaw(of_rows: Uncertain, of_motion: Uncertain | None) -> tuple[Uncertain | N
     return Uncertain(mean, sum(weights) ** -0.5), "rows and motion"
 
 
-def _match(left: Image, right: Image, pair: StereoPair) -> tuple[Matches, float]:
+def _match(left: Image, right: Image, pair: StereoPair, window_px: int = WINDOW_PX) -> tuple[Matches, float]:
     """The matches of one pair of pictures, and how much brighter the right one is around them."""
     corners = _corners(left, pair)
-    matched, disparity_px = pair.match(left, right, corners, margin_px=MARGIN_PX, row_px=ROWS_APART_PX)
+    matched, disparity_px = pair.match(
+        left, right, corners, margin_px=MARGIN_PX, window_px=window_px, row_px=ROWS_APART_PX
+    )
     good = np.isfinite(disparity_px)
     in_left, in_right = pair.left.in_view(corners[good]), pair.right.in_view(matched[good])
     place = pair.right.rays(matched[good])[:, :2]
@@ -219,7 +226,7 @@ class Followed:
 
 # What all motions share: offset of disparity (px), scale of disparities, centre (2, px) and focal length (ratio) of
 # both eyes; and how far each may be off, which holds those that a motion tells nothing of.
-SHARED = np.array([1.0, 0.02, 3.0, 3.0, 0.01])
+SHARED = np.array([1.0, 0.006, 3.0, 3.0, 0.005])
 MOTION_STEPS = np.array([1e-5, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6])
 SHARED_STEPS = np.array([1e-3, 1e-5, 1e-3, 1e-3, 1e-6])
 
@@ -259,21 +266,34 @@ def _offset(windows: Sequence[Sequence[PairShot]], pair: StereoPair, turns_rad: 
 def _normal_equations(
     followed: Followed, T: Array, *, moved: Array, shared: Array, pair: StereoPair, turns_rad: Array
 ) -> tuple[Array, Array]:
-    """Matrix (11, 11) and right side (11,) of a motion and of what is shared, by Cauchy's weights."""
-    expected = _later_px(followed, T, shared, pair, turns_rad)
-    residual = followed.after_px - expected
-    noise_px = max(MAD * float(np.median(np.abs(residual))), 0.03)
-    weight = (1 / (1 + (residual / (2.4 * noise_px)) ** 2)) / (CORRELATED * noise_px**2)
+    """Matrix (11, 11) and right side (11,) of a motion and of what is shared, by Cauchy's weights.
+
+    Every point's inverse depth is free: what its disparity and its flow say of it is taken out of them first.
+    """
+
+    def seen(T: Array, shared: Array, rho: Array) -> Array:
+        return _seen(followed, T, shared, rho, pair=pair, turns_rad=turns_rad)
+
+    measured = np.c_[followed.disparity_px, followed.after_px]
+    rho, step = followed.disparity_px / pair.focal_baseline, 1e-3 / pair.focal_baseline
+    for _ in range(DEPTH_STEPS):
+        expected = seen(T, shared, rho)
+        by_rho = (seen(T, shared, rho + step) - expected) / step
+        along = by_rho / np.linalg.norm(by_rho, axis=1, keepdims=True)
+        residual = measured - expected
+        rho = rho + np.einsum("ni,ni->n", by_rho, residual) / np.einsum("ni,ni->n", by_rho, by_rho)
+    residual -= along * np.einsum("ni,ni->n", along, residual)[:, None]
+    off_px = np.linalg.norm(residual, axis=1)
+    noise_px = max(float(np.median(off_px)) / MEDIAN_OF_TWO, 0.03)
+    weight = 1 / (1 + (off_px / (2.4 * noise_px)) ** 2) / (CORRELATED * noise_px**2)
     columns = [
-        (_later_px(followed, _moved(T, small), shared, pair, turns_rad) - expected) / small.sum()
-        for small in np.diag(MOTION_STEPS)
-    ] + [
-        (_later_px(followed, T, shared + small, pair, turns_rad) - expected) / small.sum()
-        for small in np.diag(SHARED_STEPS)
+        (seen(_moved(T, each), shared, rho) - seen(T, shared, rho)) / each.sum() for each in np.diag(MOTION_STEPS)
     ]
+    columns += [(seen(T, shared + each, rho) - seen(T, shared, rho)) / each.sum() for each in np.diag(SHARED_STEPS)]
     jacobian = np.stack(columns, -1)
-    A = np.einsum("nij,ni,nik->jk", jacobian, weight, jacobian)
-    b = np.einsum("nij,ni->j", jacobian, weight * residual)
+    jacobian -= along[..., None] * np.einsum("ni,nij->nj", along, jacobian)[:, None]
+    A = np.einsum("nij,n,nik->jk", jacobian, weight, jacobian)
+    b = np.einsum("nij,n,ni->j", jacobian, weight, residual)
     A[:6, :6] += followed.information
     b[:6] -= followed.information @ moved
     return A + 1e-9 * np.eye(len(A)), b
@@ -283,30 +303,31 @@ def _moved(T: Array, step: Array) -> Array:
     return se3.transform(twist(step)[:3, :3] @ T[:3, :3], T[:3, 3] + step[:3])
 
 
-def _later_px(followed: Followed, T: Array, shared: Array, pair: StereoPair, turns_rad: Array) -> Array:
-    """Where (N, 2) the view's points come to lie."""
+def _seen(followed: Followed, T: Array, shared: Array, rho: Array, *, pair: StereoPair, turns_rad: Array) -> Array:
+    """Disparities before and the view's pixels later (N, 3) of points with inverse depths rho (N,) in 1/m."""
     offset_px, scale, *centre_px, focal = shared
     K = pair.K.copy()
     K[:2, :2] *= 1 + focal
     K[:2, 2] += centre_px
-    rays = np.c_[followed.before_px, np.ones(len(followed.before_px))] @ np.linalg.inv(K).T
+    rays = np.c_[followed.before_px, np.ones(len(rho))] @ np.linalg.inv(K).T
     x, y = rays[:, 0] - followed.disparity_px / K[0, 0], rays[:, 1]
     roll, pitch = turns_rad
     excess_px = offset_px * (1 + x * x) - K[0, 0] * (roll * y + pitch * x * y)
-    rho = (followed.disparity_px - excess_px) * (1 + scale) / pair.focal_baseline
     there = rays @ T[:3, :3].T + rho[:, None] * T[:3, 3]
-    pixels: Array = ((there / there[:, 2:]) @ K.T)[:, :2]
-    return pixels
+    seen: Array = np.c_[rho * pair.focal_baseline * (1 + scale) + excess_px, ((there / there[:, 2:]) @ K.T)[:, :2]]
+    return seen
 
 
 def _follow(shots: Sequence[PairShot], pair: StereoPair) -> Followed | None:
     """The points of the first of successive shots in the last that keeps enough of them; None where none does."""
     first, start = shots[0], _corners(shots[0].left, pair)
-    _, disparity_px = pair.match(first.left, first.right, start, margin_px=MARGIN_PX, row_px=ROWS_APART_PX)
+    _, disparity_px = pair.match(
+        first.left, first.right, start, margin_px=MARGIN_PX, window_px=WINDOW_PX, row_px=ROWS_APART_PX
+    )
     start, disparity_px = start[np.isfinite(disparity_px)], disparity_px[np.isfinite(disparity_px)]
     there, last = start, first
     for now in shots[1:]:
-        moved, found = follow(*comparable(last.left, now.left), there)
+        moved, found = follow(*comparable(last.left, now.left), there, window_px=WINDOW_PX)
         found &= inside(moved, now.left, MARGIN_PX) & pair.seen(moved)
         if found.sum() < FEWEST_FOLLOWED:
             break

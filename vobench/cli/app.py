@@ -36,6 +36,7 @@ VERBS = {
     "export": "vobench.cli.sequence:export_command",
     "info": "vobench.cli.sequence:info_command",
     "realism": "vobench.cli.realism:realism_command",
+    "twin": "vobench.cli.twin:twin_command",
     "verify": "vobench.cli.report:verify_command",
     "report": "vobench.cli.report:report_command",
     "view": "vobench.cli.report:view_command",

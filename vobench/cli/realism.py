@@ -36,8 +36,8 @@ def realism_command(
     json: terminal.Json = False,
 ) -> None:
     """Say how real pictures are, how far the pair is off from its calibration, and which knob moves what."""
-    recording = _recording(path, form, ReadOptions(calibration, None, truth, rate, topics=topics_of(topic)))
-    other = against and _recording(against, None, ReadOptions())
+    recording = recording_at(path, form, ReadOptions(calibration, None, truth, rate, topics=topics_of(topic)))
+    other = against and recording_at(against, None, ReadOptions())
     found = measure(shots_of(recording), recording.rig)
     beside = measure(shots_of(other), other.rig) if other else None
     if plot:
@@ -45,12 +45,12 @@ def realism_command(
 
         save_plot(plot, {path.name: found} | ({against.name: beside} if against and beside else {}))
     if json:
-        terminal.print_json(_facts(found, beside))
+        terminal.print_json(facts_of(found, beside))
     else:
         _print(path, found, beside)
 
 
-def _recording(path: Path, form: str | None, options: ReadOptions) -> Recording:
+def recording_at(path: Path, form: str | None, options: ReadOptions) -> Recording:
     """What is at a path; of a run's case its sequence."""
     linked = path / SEQUENCE
     if not linked.is_dir() and linked.is_symlink():
@@ -58,7 +58,8 @@ def _recording(path: Path, form: str | None, options: ReadOptions) -> Recording:
     return read(linked if linked.is_dir() else path, form=form, options=options)
 
 
-def _rows(found: Realism, beside: Realism | None) -> list[dict[str, Any]]:
+def rows_of(found: Realism, beside: Realism | None) -> list[dict[str, Any]]:
+    """Each statistic with its band, or another recording in its place, and what would move it."""
     return [_row(statistic, found, beside) for statistic in STATISTICS if statistic.name in found.values]
 
 
@@ -73,7 +74,8 @@ def _row(statistic: Statistic, found: Realism, beside: Realism | None) -> dict[s
     return {**row, "is": statistic.verdict(value), "knob": statistic.knob(value)}
 
 
-def _facts(found: Realism, beside: Realism | None) -> dict[str, Any]:
+def facts_of(found: Realism, beside: Realism | None) -> dict[str, Any]:
+    """All that is known of a recording, and of each statistic beside another one or the bands."""
     pair = found.pair
     fit: dict[str, Any] | None = None
     if pair:
@@ -89,7 +91,7 @@ def _facts(found: Realism, beside: Realism | None) -> dict[str, Any]:
     return {
         "pictures": found.pictures,
         "inside": found.inside,
-        "statistics": _rows(found, beside),
+        "statistics": rows_of(found, beside),
         "also": dict(found.also),
         "pair": fit,
         "says": says(found),
@@ -98,7 +100,7 @@ def _facts(found: Realism, beside: Realism | None) -> dict[str, Any]:
 
 def _print(path: Path, found: Realism, beside: Realism | None) -> None:
     out, rows = terminal.console(), []
-    for row in _rows(found, beside):
+    for row in rows_of(found, beside):
         band = f"{row['against']:.2f}" if beside and row["against"] is not None else ""
         band = band if beside else f"{row['low']:g} … {row['high']:g}"
         rows.append([row["statistic"], f"{row['value']:.2f}", row["unit"], band, row["is"], row["knob"]])

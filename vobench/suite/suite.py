@@ -13,7 +13,7 @@ from annotated_types import Ge, Le, MinLen
 
 from vobench.errors import SettingError, SuiteError, UnknownNameError, unknown
 from vobench.estimator.manifest import Limits, Manifest
-from vobench.geometry.rig import PRESETS, CalibrationError, Rig, mounted, true_rig
+from vobench.geometry.rig import PRESETS, CalibrationError, OwnPair, Rig, mounted, true_rig
 from vobench.motion.replay import Replay
 from vobench.motion.wheeled import Wheeled
 from vobench.scene.scene import Scene
@@ -29,7 +29,7 @@ from vobench.suite.source import SOURCES, RecordedCase, Source, recorded_cases
 from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times
 from vobench.suite.yaml_file import Mistakes, YamlFile
 
-NEEDED = ("scenes", "rigs", "trajectories")
+USUAL_RIG = "ahead"  # where a suite has none
 ENGINES = ("raster", "path")
 MOST_SAMPLES = 65536
 HONEST, USUAL = CalibrationError(), Limits()
@@ -39,10 +39,12 @@ HONEST, USUAL = CalibrationError(), Limits()
 class RigSettings:
     """A stereo pair on the body: a preset with both lenses, placed, how far its calibration is off, and an IMU.
 
+    `own` are lenses of one's own in the preset's place.
     Without `baseline_m` the cameras stand to each other as the preset has them.
     """
 
     lens: Annotated[str, OneOf("lens", PRESETS)] = "paper_blender"
+    own: OwnPair | None = None
     pitch_deg: Annotated[float, Ge(-90), Le(90)]
     baseline_m: Positive | None = None
     forward_m: float = 0.25
@@ -52,7 +54,7 @@ class RigSettings:
 
     def build(self) -> Rig:
         """The sensors on the body as their calibration has them."""
-        preset = PRESETS[self.lens]
+        preset = self.own.preset() if self.own else PRESETS[self.lens]
         cameras = mounted(
             preset.left,
             preset.right,
@@ -105,6 +107,7 @@ class Suite:
     """The cases are every combination of scene, lighting, rig, trajectory and camera, and every recording of `source`.
 
     Each axis names its variants; change one axis to change one factor. A suite of recordings alone has no axes.
+    Without rigs a pair looks ahead; without trajectories the body goes round where each scene is free.
     """
 
     name: Name
@@ -128,15 +131,14 @@ class Suite:
 
 
 def missing_axis(given: Collection[str]) -> str | None:
-    """What a suite with these keys lacks: it has scenes, rigs and trajectories, or none of them and a source."""
-    missing = [name for name in NEEDED if name not in given]
-    if missing and not ("source" in given and len(missing) == len(NEEDED)):
-        said = "this key is missing" if len(missing) == 1 else "these keys are missing"
-        return f"{', '.join(missing)}: {said}; a suite has {', '.join(NEEDED)}, or a source alone"
-    return None
+    """What a suite with these keys lacks: it has scenes, or a source; rigs and trajectories need scenes."""
+    if "scenes" in given or ("source" in given and not {"rigs", "trajectories"} & set(given)):
+        return None
+    return "scenes: this key is missing; a suite has scenes, or a source alone"
 
 
 AXES = ("scene", "lighting", "rig", "trajectory", "camera")
+Axes = tuple[dict[str, Any], ...]  # the variants of each, by name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -287,9 +289,12 @@ class _Planner:
         scenes, replayed = self._scenes(), self._replayed()
         self._check_rigs()
         axes = self._axes(scenes)
-        recorded = self._recorded({name for name, _ in _combinations(axes)})
+        variants = [*_combinations(axes)]
+        if not self.suite.trajectories:
+            variants = [(name, v) for name, v in variants if v["trajectory"] == _found_name(v["scene"], scenes)]
+        recorded = self._recorded({name for name, _ in variants})
         self.wrong.require_none()
-        simulated = tuple(self._case(name, variant, scenes, replayed) for name, variant in _combinations(axes))
+        simulated = tuple(self._case(name, variant, axes, replayed) for name, variant in variants)
         return Plan(self.suite, simulated, recorded, entrants, tuple(self.found), self.wrong.source)
 
     def _folder(self) -> Path:
@@ -392,13 +397,28 @@ class _Planner:
                         texts[name] = read_replayed(spec, self._folder(), times)
         return texts
 
-    def _axes(self, scenes: dict[str, SceneFile]) -> tuple[dict[str, Any], ...]:
+    def _axes(self, scenes: dict[str, SceneFile]) -> Axes:
         suite = self.suite
-        return scenes, suite.lightings, suite.rigs or {}, suite.trajectories or {}, suite.cameras
+        if not scenes:
+            return scenes, suite.lightings, suite.rigs or {}, suite.trajectories or {}, suite.cameras
+        rigs = suite.rigs or {USUAL_RIG: RigSettings(pitch_deg=10)}
+        return scenes, suite.lightings, rigs, suite.trajectories or self._found_ways(scenes), suite.cameras
 
-    def _case(self, name: str, variant: dict[str, str], scenes: dict[str, SceneFile], replayed: dict[str, str]) -> Case:
+    def _found_ways(self, scenes: dict[str, SceneFile]) -> dict[str, Any]:
+        """A way round in each scene, where the suite says none."""
+        from vobench.suite.free_way import free_way
+        from vobench.suite.scene_build import build
+
+        ways = dict[str, Any]()
+        for index, (name, scene) in enumerate(scenes.items()):
+            with self.wrong.at("scenes", index):
+                if not self.wrong.found:
+                    ways[_found_name(name, scenes)] = free_way(build(scene, {}))
+        return ways
+
+    def _case(self, name: str, variant: dict[str, str], axes: Axes, replayed: dict[str, str]) -> Case:
         suite = self.suite
-        chosen = [axis[variant[kind]] for kind, axis in zip(AXES, self._axes(scenes), strict=True)]
+        chosen = [axis[variant[kind]] for kind, axis in zip(AXES, axes, strict=True)]
         return Case(
             name=name,
             variant=variant,
@@ -423,7 +443,11 @@ class _Planner:
         return tuple(recorded)
 
 
-def _combinations(axes: tuple[dict[str, Any], ...]) -> Iterator[tuple[str, dict[str, str]]]:
+def _found_name(scene: str, scenes: Collection[str]) -> str:
+    return "found" if len(scenes) == 1 else f"found_{scene}"
+
+
+def _combinations(axes: Axes) -> Iterator[tuple[str, dict[str, str]]]:
     """The name of each case, of those variants that there is a choice of, and its place on each axis."""
     for names in product(*axes):
         differing = [name for name, axis in zip(names, axes, strict=True) if len(axis) > 1]
