@@ -14,6 +14,7 @@ from vobench.errors import SuiteError, unknown
 from vobench.scene.light import Light, Sky, Sun, scaled
 from vobench.scene.material import LUMINANCE, emitted_cd_m2
 from vobench.scene.mesh import area_m2
+from vobench.scene.scene import Scene
 from vobench.setting import Triple
 from vobench.suite import yaml_file
 from vobench.suite.scene_spec import (
@@ -106,7 +107,7 @@ def _bare(path: Path) -> SceneFile:
     spec = SceneFile(
         name=name, white_cd_m2=max(float(lux / np.pi), 1.0), meshes=(ModelSpec(file=str(path.resolve()), scale=scale),)
     )
-    return spec if lux else _lit_from_outside(spec, sum(area for area, _ in areas_m2))
+    return spec if lux else _lit_from_outside(spec, Scene(name, tuple(model.everything), {}, ()))
 
 
 DAYLIGHT = SunSpec(illuminance_lx=30_000, azimuth_deg=30, elevation_deg=50), SkySpec(illuminance_lx=8_000, kind="clear")
@@ -114,17 +115,19 @@ ROOM_LX, LEAST_OPEN = 400.0, 0.1
 LARGEST_M, CENTIMETRE = 300.0, 0.01  # a larger model was written in centimetres
 
 
-def _lit_from_outside(spec: SceneFile, area_m2: float) -> SceneFile:
+def _lit_from_outside(spec: SceneFile, shape: Scene) -> SceneFile:
     """A model without a light, by day where its floor sees the sky, else with a lamp under its ceiling."""
     from vobench.suite.free_way import ceiling_above
-    from vobench.suite.scene_build import build
 
-    sun, sky = DAYLIGHT
-    lit = replace(spec, sun=sun, sky=sky, white_cd_m2=float((sun.illuminance_lx * 0.77 + sky.illuminance_lx) / np.pi))
-    open_share, lamp_m = ceiling_above(build(lit, {}))
+    open_share, lamp_m = ceiling_above(shape)
     if open_share >= LEAST_OPEN:
-        return lit
-    lamp = PointLamp(name="lamp", center_m=lamp_m, power_lm=ROOM_LX * area_m2 / 2)
+        sun, sky = DAYLIGHT
+        up = np.sin(np.deg2rad(sun.elevation_deg or 90))
+        return replace(
+            spec, sun=sun, sky=sky, white_cd_m2=float((sun.illuminance_lx * up + sky.illuminance_lx) / np.pi)
+        )
+    area = sum(float(area_m2(thing.mesh.corners_m)) for thing in shape.things)
+    lamp = PointLamp(name="lamp", center_m=lamp_m, power_lm=ROOM_LX * area / 2)
     return replace(spec, lamps=(lamp,), white_cd_m2=float(ROOM_LX / np.pi))
 
 
