@@ -1,5 +1,6 @@
 """Recordings in a suite: paths, patterns, names, and what is said where there is none."""
 
+import numpy as np
 import pytest
 
 from vobench.errors import SuiteError
@@ -75,8 +76,17 @@ def test_what_is_wrong_names_the_place_in_the_suite(suite, source, sentence):
 
 
 def test_a_suite_has_all_axes_or_a_source_alone(suite):
-    with pytest.raises(SuiteError, match="trajectories: this key is missing"):
-        suite("data/V1", "scenes: [room]\nrigs: {down: {pitch_deg: 90}}\n")
+    with pytest.raises(SuiteError, match="scenes: this key is missing; a suite has scenes, or scenarios or a source alone"):
+        suite("data/V1", "rigs: {down: {pitch_deg: 90}}\n")
+
+
+def test_a_scene_without_rigs_and_trajectories_gets_a_rig_and_a_way_round(suite):
+    plan = suite("data/V1", "scenes: [room]\n")
+    assert [case.name for case in plan.cases] == ["found", "v1"]
+    case = plan.simulated[0]
+    assert case.rig.pitch_deg == 10
+    positions_m = case.trajectory.motion().at(np.array([0])).T_world_body[:, :3, 3]
+    assert positions_m[0, 2] == 0
 
 
 def test_recordings_stand_beside_simulated_cases(suite):

@@ -5,34 +5,22 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
-from vobench.geometry.se3 import Array
-from vobench.render.geometry import RayCaster, areas_m2
+from vobench.render.geometry import RayCaster
 from vobench.render.renderer import Renderer, still
 from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Texture, reflectance, srgb
 from vobench.scene.mesh import Triangles, unit
 from vobench.scene.scene import Scene, triangles
+from vobench.suite.free_way import Free, down, free_circle
 
-LEVEL, FLOOR_STEP_M = 0.99, 0.02  # cosine of what counts as level, and how even a floor is
-CELL_M, BODY_M, EYE_M = 0.1, 0.6, 1.2  # of the map of free places, the height of a body, and of an eye
+EYE_M = 1.2
 LOOKS = 4096
 WELD_M = 1e-5
-
-
-@dataclass(frozen=True, slots=True)
-class Free:
-    """The largest free circle on the floor: its middle (x, y), the floor's height and the radius, in metres."""
-
-    x_m: float
-    y_m: float
-    floor_m: float
-    radius_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,38 +92,6 @@ def _backs(faces: Triangles, caster: RayCaster, eye_m: ArrayLike) -> float:
     return float(((hits.face >= 0) & (facing > 0)).mean())
 
 
-def free_circle(faces: Triangles, caster: RayCaster) -> Free | None:
-    """The largest circle on the floor over which nothing stands lower than a body is high.
-
-    The floor is the height at which most level area lies.
-    """
-    level = (faces.plane[:, 2] > LEVEL) & (faces.mover < 0)
-    if not level.any():
-        return None
-    heights = np.rint(faces.corners_m[level].mean(1)[:, 2] / FLOOR_STEP_M).astype(int)
-    areas = np.bincount(heights - heights.min(), areas_m2(faces.corners_m[level]))
-    floor_m = float((areas.argmax() + heights.min()) * FLOOR_STEP_M)
-    on_floor = faces.corners_m[level][np.abs(heights * FLOOR_STEP_M - floor_m) < FLOOR_STEP_M].reshape(-1, 3)
-    low, high = on_floor.min(0)[:2], on_floor.max(0)[:2]
-    x, y = (np.arange(a + CELL_M / 2, b, CELL_M) for a, b in zip(low, high, strict=True))
-    if not x.size or not y.size:
-        return None
-    starts = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
-    hits = caster.hits(np.column_stack([starts, np.full(len(starts), floor_m + BODY_M)]), _down(len(starts)))
-    is_floor = (np.abs(hits.distance - BODY_M) < FLOOR_STEP_M) & (faces.plane[hits.face, 2] > 0)
-    # Whoever sees a back above is inside a thing.
-    above = caster.nearest(np.column_stack([starts, np.full(len(starts), floor_m + BODY_M)]), -_down(len(starts)))
-    free = (is_floor & ~((above >= 0) & (faces.plane[above, 2] > 0))).reshape(len(y), len(x))
-    distance = scipy.ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]
-    row, column = np.unravel_index(distance.argmax(), distance.shape)
-    radius_m = float((distance[row, column] - 0.5) * CELL_M)
-    return Free(float(x[column]), float(y[row]), floor_m, radius_m) if radius_m > 0 else None
-
-
-def _down(count: int) -> Array:
-    return np.tile([0.0, 0.0, -1.0], (count, 1))
-
-
 Rgb8 = NDArray[np.uint8]
 CELL_PX = (480, 320)
 LENS = Pinhole(*CELL_PX, 240.0, 240.0, 239.5, 159.5)
@@ -164,7 +120,7 @@ def _plan(scene: Scene, found: SceneSurvey) -> Rgb8:
     px = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1).reshape(-1, 2) + 0.5
     places = (px - [width / 2, height / 2]) / scale * [1, -1] + middle
     floor_m = found.free.floor_m if found.free else found.low_m[2]
-    hits = RayCaster(faces).hits(np.column_stack([places, np.full(len(places), floor_m + 2.0)]), _down(len(places)))
+    hits = RayCaster(faces).hits(np.column_stack([places, np.full(len(places), floor_m + 2.0)]), down(len(places)))
     tones = {name: reflectance(material).mean() for name, material in scene.materials.items()}
     own = np.array([*(tones.get(thing.material, 0.9) for thing in faces.things), 1.0])
     thing = np.where(hits.face < 0, len(own) - 1, faces.thing[hits.face])

@@ -35,6 +35,8 @@ VERBS = {
     "import": "vobench.cli.sequence:import_command",
     "export": "vobench.cli.sequence:export_command",
     "info": "vobench.cli.sequence:info_command",
+    "realism": "vobench.cli.realism:realism_command",
+    "twin": "vobench.cli.twin:twin_command",
     "verify": "vobench.cli.report:verify_command",
     "report": "vobench.cli.report:report_command",
     "compare": "vobench.cli.report:compare_command",

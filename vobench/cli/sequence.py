@@ -49,7 +49,8 @@ def _read(path: Path) -> Trajectory:
 TOPICS = tuple(Topics.__dataclass_fields__)
 
 
-def _topics(given: list[str] | None) -> Topics:
+def topics_of(given: list[str] | None) -> Topics:
+    """The topics of `--topic`. Raises UnknownNameError."""
     chosen = {}
     for entry in given or ():
         role, _, name = entry.partition("=")
@@ -155,7 +156,7 @@ def import_command(
 ) -> None:
     """Make a sequence from a dataset's folder or a bag, and say all that was assumed or dropped."""
     require_free(out)
-    options = ReadOptions(calibration, imu, truth, rate, topics=_topics(topic))
+    options = ReadOptions(calibration, imu, truth, rate, topics=topics_of(topic))
     recording = read(path, form=form, options=options)
     sweep(out.resolve().parent)
     with unfinished(out.resolve().parent) as folder:
@@ -204,7 +205,7 @@ def info_command(
     json: terminal.Json = False,
 ) -> None:
     """Say what is in a recording: topics, rates, duration, calibration, ground truth, hash."""
-    recording = read(path, form=form, options=ReadOptions(calibration, imu, truth, rate, topics=_topics(topic)))
+    recording = read(path, form=form, options=ReadOptions(calibration, imu, truth, rate, topics=topics_of(topic)))
     folder = path.parent if path.is_file() else path
     facts = {
         "path": str(path),

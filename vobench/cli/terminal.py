@@ -28,7 +28,7 @@ RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or
 LEFT_ALIGNED = {
     *("estimator", "status", "name", "case", "kind", "summary", "path", "origin", "check", "result"),
     *("sequence", "metric", "headline", "is", "with", "trajectory", "condition", "without", "instead", "tried"),
-    *("is worse than others by",),
+    *("is worse than others by", "statistic", "unit", "moved by"),
 }
 
 

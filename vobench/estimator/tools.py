@@ -225,19 +225,29 @@ class StereoPair:
         return np.asarray(np.isfinite(self.left.in_view(points)).all(1))
 
     def match(
-        self, left: Image, right: Image, points: Points, *, margin_px: int, window_px: int = WINDOW_PX
+        self,
+        left: Image,
+        right: Image,
+        points: Points,
+        *,
+        margin_px: int,
+        window_px: int = WINDOW_PX,
+        row_px: float = ROW_PX,
     ) -> tuple[Points, Array]:
-        """Places (N, 2) in the right picture of points (N, 2) in the left one, and disparities (N,), NaN for none."""
+        """Places (N, 2) in the right picture of points (N, 2) in the left one, and disparities (N,), NaN for none.
+
+        Rows of the view may differ by `row_px`.
+        """
         left, right = comparable(left, right)
         matched, found = follow(left, right, points, self._coarse(left, right, points), window_px=window_px)
-        disparity_px = self.disparity(points, matched)
+        disparity_px = self.disparity(points, matched, row_px=row_px)
         return matched, np.where(found & inside(matched, right, margin_px), disparity_px, np.nan)
 
-    def disparity(self, points: Points, matched: Points) -> Array:
+    def disparity(self, points: Points, matched: Points, *, row_px: float = ROW_PX) -> Array:
         """Disparity (N,) in px of left and right pixels (N, 2); NaN where rows differ or it is too small."""
         shift = self.left.in_view(points) - self.right.in_view(matched)
         with np.errstate(invalid="ignore"):
-            good = (np.abs(shift[:, 1]) < ROW_PX) & (shift[:, 0] > MIN_DISPARITY_PX)
+            good = (np.abs(shift[:, 1]) < row_px) & (shift[:, 0] > MIN_DISPARITY_PX)
         return np.where(good, shift[:, 0], np.nan)
 
     def points(self, uv_px: ArrayLike, disparity_px: Array) -> Array:

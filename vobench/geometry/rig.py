@@ -6,11 +6,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 
-from vobench.errors import InputError, VobenchError
+from vobench.errors import InputError, SettingError, VobenchError
 from vobench.geometry import se3
-from vobench.geometry.camera import BrownConrady, Camera, Focal, KannalaBrandt, Pinhole, unit
+from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Focal, KannalaBrandt, Pinhole, unit
 from vobench.geometry.se3 import Array
-from vobench.setting import Positive, settings
+from vobench.setting import OneOf, Positive, Triple, settings
 
 # Focal length, sensor and resolution as the paper gives them (section II-B).
 PAPER_FOCAL_MM, PAPER_SENSOR_MM, PAPER_SIZE_PX = 32.0, (35.0, 28.18), (720, 480)
@@ -272,6 +272,83 @@ PRESETS = {
     "tartanair": TARTANAIR,
     "fisheye": FISHEYE,
 }
+
+
+LENS_MODELS: dict[str, Any] = {
+    "pinhole": Pinhole,
+    "brown_conrady": BrownConrady,
+    "kannala_brandt": KannalaBrandt,
+    "double_sphere": DoubleSphere,
+}
+
+
+@settings()
+class Lens:
+    """One lens: its model, and that model's numbers; `distortion` in the model's own order."""
+
+    model: Annotated[str, OneOf("model of a lens", LENS_MODELS)] = "pinhole"
+    size_px: tuple[Annotated[int, Gt(0)], Annotated[int, Gt(0)]]
+    focal_px: tuple[Positive, Positive]
+    center_px: tuple[float, float]
+    distortion: tuple[float, ...] = ()
+
+    def build(self) -> Camera:
+        """The camera. Raises SettingError where the model takes another number of coefficients."""
+        model = LENS_MODELS[self.model]
+        takes = model.coefficients
+        if len(self.distortion) > len(takes) or (len(self.distortion) < min(len(takes), 2)):
+            wanted = ", ".join(takes) or "nothing"
+            raise SettingError(f"should be {wanted} for {self.model}, but are {list(self.distortion)}", "distortion")
+        camera: Camera = model(*self.size_px, *self.focal_px, *self.center_px, *self.distortion)
+        return camera
+
+
+def lens_of(camera: Camera) -> Lens:
+    """The lens that says what a camera is. Raises InputError for a camera without a focal length."""
+    model = next((name for name, each in LENS_MODELS.items() if isinstance(camera, each)), None)
+    if model is None or not isinstance(camera, Focal):
+        raise InputError(f"a rig of a suite has lenses with a focal length, and {camera} is none")
+    return Lens(
+        model=model,
+        size_px=(camera.width_px, camera.height_px),
+        focal_px=(camera.fx_px, camera.fy_px),
+        center_px=(camera.cx_px, camera.cy_px),
+        distortion=tuple(getattr(camera, name) for name in camera.coefficients),
+    )
+
+
+@settings()
+class OwnPair:
+    """Two lenses of one's own: where the right one is in the left one's axes, and how it is turned (rotation vector).
+
+    Without `right` it is as the left one.
+    """
+
+    left: Lens
+    right: Lens | None = None
+    right_at_m: Triple
+    right_turned_deg: Triple = (0.0, 0.0, 0.0)
+
+    def preset(self) -> StereoPreset:
+        """The pair before it is put on a body."""
+        from scipy.spatial.transform import Rotation
+
+        R = Rotation.from_rotvec(np.array(self.right_turned_deg), degrees=True).as_matrix()
+        left = self.left.build()
+        right = self.right.build() if self.right else left
+        return StereoPreset(left, right, se3.transform(R, self.right_at_m), "the suite")
+
+
+def own_pair(rig: Rig) -> OwnPair:
+    """The pair of a rig, as a suite says it. Raises InputError where it has one camera."""
+    from scipy.spatial.transform import Rotation
+
+    T = rig.T_left_right
+    right_at_m: Any = tuple(T[:3, 3].tolist())
+    turned: Any = tuple(Rotation.from_matrix(T[:3, :3]).as_rotvec(degrees=True).tolist())
+    return OwnPair(
+        left=lens_of(rig.left), right=lens_of(rig.camera("right")), right_at_m=right_at_m, right_turned_deg=turned
+    )
 
 
 Ratio = Annotated[float, Gt(-1), Lt(1)]

@@ -70,7 +70,7 @@ class DriveLog:
 
 def save_plot(path: Path, logs: Sequence[DriveLog]) -> None:
     """Draw one row for each log, as SVG, PNG or PDF by the path's ending. Raises InputError for another ending."""
-    _check_ending(path)
+    check_ending(path)
     import matplotlib as mpl
 
     with mpl.rc_context(SETTINGS):
@@ -79,12 +79,12 @@ def save_plot(path: Path, logs: Sequence[DriveLog]) -> None:
         rows = figure.subfigures(len(logs), 1, squeeze=False)[:, 0]
         for row, log in zip(rows, logs, strict=True):
             _draw(row, log)
-        figure.savefig(path, dpi=110, metadata=_undated(path.suffix))
+        figure.savefig(path, dpi=110, metadata=undated(path.suffix))
 
 
 def save_sheet(path: Path, logs: Sequence[DriveLog], *, columns: int = 5) -> None:
     """Draw the paths alone, in a grid, to the same forms. Raises InputError as `save_plot`."""
-    _check_ending(path)
+    check_ending(path)
     import matplotlib as mpl
 
     with mpl.rc_context(SETTINGS):
@@ -94,10 +94,11 @@ def save_sheet(path: Path, logs: Sequence[DriveLog], *, columns: int = 5) -> Non
             axes = figure.add_subplot(rows, columns, place)
             _path(axes, log, legend=False)
             axes.set_title(log.title, fontsize=8, fontweight="bold")
-        figure.savefig(path, dpi=110, metadata=_undated(path.suffix))
+        figure.savefig(path, dpi=110, metadata=undated(path.suffix))
 
 
-def _check_ending(path: Path) -> None:
+def check_ending(path: Path) -> None:
+    """Raise InputError for a plot that is no SVG, PNG or PDF."""
     if path.suffix not in ENDINGS:
         raise InputError(f"a plot's name should end in {', '.join(ENDINGS)}, got {path}")
 
@@ -110,7 +111,8 @@ def _figure(width: float, height: float) -> "Figure":
     return Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=0.05, w_pad=0.05, hspace=0, wspace=0))
 
 
-def _undated(suffix: str) -> dict[str, None]:
+def undated(suffix: str) -> dict[str, None]:
+    """What keeps dates out of a plot of that suffix."""
     return {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix, {})
 
 

@@ -63,8 +63,9 @@ def case_facts(folder: RunFolder, case: str) -> CaseFacts:
     """What a case says of itself; nothing where its file is missing or says nothing."""
     stated = _json(folder.case(case) / CASE)
     severity = stated.get("severity")
+    error = (stated.get("rig") or {}).get("calibration_error") or {}
     return CaseFacts(
-        group=str(stated.get("calibration_group") or ""),
+        group=str(error.get("level") or ""),
         scenario=str(stated.get("scenario") or ""),
         severity=severity if isinstance(severity, int) else None,
     )

@@ -274,7 +274,7 @@ def _check_clear(case: Case, travel: BodyMotion) -> None:
     for T_body_camera in map(rig.T_body_camera, rig.sides):
         at_m = (T_world_body @ T_body_camera)[:, :3, 3]
         if room:
-            outside = ~room.holds(at_m)
+            outside = ~room.holds(at_m / case.scene.scale)
             is_under = at_m[np.argmax(outside), 2] <= 0
             what = "is under the floor" if is_under else f"leaves the room ({room.extent})"
             _refuse(case, travel, at_m, outside, what)

@@ -1,6 +1,7 @@
 """The stereo pair at work: light through the lens onto the chip, exposed by a shutter while the body moves."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,7 +17,7 @@ from vobench.run.motion import generator
 from vobench.scene.light import Steady
 from vobench.scene.scene import Scene, triangles
 from vobench.sensor.exposure import Exposure, start, step, strips
-from vobench.sensor.image_sensor import NoiseStreams, expose, fixed_pattern
+from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose, fixed_pattern
 from vobench.sensor.lens import lens_maps, through_lens
 from vobench.sensor.response import Grey
 from vobench.suite.suite import Case
@@ -145,8 +146,16 @@ class SimulatedCamera:
 
     def picture(self, t_ns: int, exposure: Exposure) -> Grey:
         """The values (H, W), or (H, W, 3) in colour, of a picture stamped t_ns."""
+        return self.exposed(self.light(t_ns, exposure), exposure)
+
+    def light(self, t_ns: int, exposure: Exposure) -> Radiance:
+        """What comes to the lens (H, W), or (H, W, 3) in colour, in shares of matt white."""
         views, weights = self.views(t_ns, exposure), self._settings.weights
-        light = self._world.renderer.radiance(self._camera, views, weights=weights) / self._white_cd_m2
+        light: Radiance = self._world.renderer.radiance(self._camera, views, weights=weights) / self._white_cd_m2
+        return light
+
+    def exposed(self, light: Radiance, exposure: Exposure) -> Grey:
+        """The values of a picture of that light."""
         at_chip: Radiance = through_lens(light, self._lens)
         return expose(at_chip, self._settings, self._noise, pattern=self._pattern, exposure=exposure)
 
@@ -187,3 +196,16 @@ class SimulatedCamera:
         """T_world_camera (K, 4, 4) at instants (K,)."""
         T_world_camera: Array = self._world.motion.at(t_ns).T_world_body @ self._T_body_camera
         return T_world_camera
+
+
+def exposed_by(case: Case, world: World, stamps: Sequence[int]) -> Callable[[CameraSettings], list[Grey]]:
+    """What takes a case's left pictures at instants with any camera; the light is drawn once."""
+    displacement, plain = Displacement(world.scene), CameraSettings()
+    first = SimulatedCamera(replace(case, camera=plain), "left", world, displacement)
+    lights = [first.light(t_ns, plain.exposure) for t_ns in stamps]
+
+    def take(settings: CameraSettings) -> list[Grey]:
+        camera = SimulatedCamera(replace(case, camera=settings), "left", world, displacement)
+        return [camera.exposed(light, settings.exposure) for light in lights]
+
+    return take

@@ -1,12 +1,12 @@
 """A scene: things with materials, lights, and movers; metres, world frame, z up."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.scene.light import AreaLight, Light
+from vobench.scene.light import AreaLight, Light, PointLight, SpotLight
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, Triangles, quad, table
 
@@ -74,3 +74,28 @@ def ceiling_light(name: str, center_m: Array, size_m: tuple[float, float], *, po
     """A panel that hangs level and shines down."""
     x, y = np.array([size_m[0], 0, 0]), np.array([0, size_m[1], 0])
     return AreaLight(name, quad(np.asarray(center_m, float) - (x + y) / 2, y, x), power_lm)
+
+
+def sized(scene: Scene, by: float) -> Scene:
+    """The scene with all lengths times `by`, textures too; lamps are so much stronger that it is lit as before."""
+    T = np.diag([by, by, by, 1.0])
+
+    def grown(things: tuple[Thing, ...]) -> tuple[Thing, ...]:
+        return tuple(
+            replace(thing, mesh=thing.mesh.moved(T), spacing_m=thing.spacing_m and thing.spacing_m * by)
+            for thing in things
+        )
+
+    def brighter(light: Light) -> Light:
+        if isinstance(light, AreaLight):
+            return replace(light, mesh=light.mesh.moved(T), power_lm=light.power_lm * by**2)
+        if isinstance(light, PointLight | SpotLight):
+            return replace(light, position_m=light.position_m * by, power_lm=light.power_lm * by**2)
+        return light
+
+    movers = [
+        replace(m, things=grown(m.things), path=replace(m.path, positions_m=m.path.positions_m * by))
+        for m in scene.movers
+    ]
+    lights = tuple(map(brighter, scene.lights))
+    return replace(scene, things=grown(scene.things), lights=lights, movers=tuple(movers))

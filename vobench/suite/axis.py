@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from annotated_types import Ge, Gt, Le
 
-from vobench.geometry.rig import PRESETS, RESIDUALS, CalibrationError, Rig, mounted, resized
+from vobench.geometry.rig import PRESETS, RESIDUALS, CalibrationError, OwnPair, Rig, mounted, resized
 from vobench.sensor.image_sensor import SENSOR_PRESETS, CameraSettings
 from vobench.sensor.imu import IMUS, ImuSettings
 from vobench.setting import Like, OneOf, Positive, Short, settings
@@ -27,10 +27,12 @@ Calibration = Annotated[CalibrationError, Short(_levelled, {"type": "string", "e
 class RigSettings:
     """A stereo pair on the body: a preset with both lenses, placed, how far its calibration is off, and an IMU.
 
+    `own` are lenses of one's own in the preset's place.
     Without `baseline_m` the cameras stand to each other as the preset has them; `picture_scale` .5 has half the pixels.
     """
 
     lens: Annotated[str, OneOf("lens", PRESETS)] = "paper_blender"
+    own: OwnPair | None = None
     picture_scale: Annotated[float, Gt(0), Le(4)] = 1.0
     pitch_deg: Annotated[float, Ge(-90), Le(90)]
     baseline_m: Positive | None = None
@@ -41,7 +43,7 @@ class RigSettings:
 
     def build(self) -> Rig:
         """The sensors on the body as their calibration has them."""
-        preset = PRESETS[self.lens]
+        preset = self.own.preset() if self.own else PRESETS[self.lens]
         cameras = mounted(
             resized(preset.left, self.picture_scale),
             resized(preset.right, self.picture_scale),

@@ -63,13 +63,14 @@ def _make(spec: SceneFile) -> Scene:
     found = [thing for part in parts for thing in part.things]
     glowing = {name for name, material in materials.items() if emitted_cd_m2(material).max() > 0}
     own = [light for part in parts for light in part.lights]
-    return Scene(
+    made = Scene(
         spec.name,
         tuple(thing for thing in found if thing.material not in glowing),
         materials,
         (*own, *_glow([thing for thing in found if thing.material in glowing], materials)),
         tuple(mover for part in parts for mover in part.movers),
     )
+    return made if spec.scale == 1 else scripted.sized(made, spec.scale)
 
 
 def _material(name: str, spec: SceneFile) -> Material:

@@ -16,9 +16,19 @@ from vobench.errors import SuiteError, unknown
 from vobench.scene.light import Light, Sky, Sun, scaled
 from vobench.scene.material import LUMINANCE, emitted_cd_m2
 from vobench.scene.mesh import area_m2
+from vobench.scene.scene import Scene
 from vobench.setting import Triple
 from vobench.suite import yaml_file
-from vobench.suite.scene_spec import LightOverride, Luminous, ModelSpec, RoomSpec, SceneFile
+from vobench.suite.scene_spec import (
+    LightOverride,
+    Luminous,
+    ModelSpec,
+    PointLamp,
+    RoomSpec,
+    SceneFile,
+    SkySpec,
+    SunSpec,
+)
 from vobench.suite.yaml_file import Keys, Mistakes, YamlFile
 
 Lighting = dict[str, LightOverride]
@@ -83,26 +93,49 @@ def _located(spec: SceneFile, folder: Path, wrong: Mistakes) -> SceneFile:
 
 
 def _bare(path: Path) -> SceneFile:
-    """A model as a scene: its own lights, and an exposure for a white wall in their mean light.
+    """A model as a scene: its own lights, or such as it needs; and an exposure for a white wall in their mean light.
 
     In a closed room of area A and reflectance 0.5 lamps of a power P come to 2 P / A everywhere, bounces included.
     """
     from vobench.asset.model import read_model
 
     model = read_model(path)
+    corners_m = np.concatenate([thing.mesh.vertices_m for thing in model.everything])
+    scale = CENTIMETRE if float(np.ptp(corners_m, axis=0).max()) > LARGEST_M else 1.0
+    if scale != 1:
+        model = read_model(path, scale=scale)
     emission = {name: float(emitted_cd_m2(m) @ LUMINANCE) for name, m in model.materials.items()}
     areas_m2 = [(float(area_m2(thing.mesh.corners_m)), thing.material) for thing in model.everything]
     lamps_lm = sum(light.power_lm for light in model.lights if not isinstance(light, Sun | Sky))
     glow_lm = sum(np.pi * area * emission[material] for area, material in areas_m2)
     sun_lx = sum(light.illuminance_lx for light in model.lights if isinstance(light, Sun | Sky))
     lux = sun_lx + 2 * (lamps_lm + glow_lm) / sum(area for area, _ in areas_m2)
-    if not lux:
-        raise SuiteError(
-            f"{path} has no lights, so nothing could be seen; write a scene.yaml with meshes: [{{file: {path.name}}}] "
-            "and lamps, a sun or a sky"
-        )
     name = re.sub(r"[^a-z0-9_]+", "_", path.stem.lower()).strip("_") or "model"
-    return SceneFile(name=name, white_cd_m2=float(lux / np.pi), meshes=(ModelSpec(file=str(path.resolve())),))
+    spec = SceneFile(
+        name=name, white_cd_m2=max(float(lux / np.pi), 1.0), meshes=(ModelSpec(file=str(path.resolve()), scale=scale),)
+    )
+    return spec if lux else _lit_from_outside(spec, Scene(name, tuple(model.everything), {}, ()))
+
+
+DAYLIGHT = SunSpec(illuminance_lx=30_000, azimuth_deg=30, elevation_deg=50), SkySpec(illuminance_lx=8_000, kind="clear")
+ROOM_LX, LEAST_OPEN = 400.0, 0.1
+LARGEST_M, CENTIMETRE = 300.0, 0.01  # a larger model was written in centimetres
+
+
+def _lit_from_outside(spec: SceneFile, shape: Scene) -> SceneFile:
+    """A model without a light, by day where its floor sees the sky, else with a lamp under its ceiling."""
+    from vobench.suite.free_way import ceiling_above
+
+    open_share, lamp_m = ceiling_above(shape)
+    if open_share >= LEAST_OPEN:
+        sun, sky = DAYLIGHT
+        up = np.sin(np.deg2rad(sun.elevation_deg or 90))
+        return replace(
+            spec, sun=sun, sky=sky, white_cd_m2=float((sun.illuminance_lx * up + sky.illuminance_lx) / np.pi)
+        )
+    area = sum(float(area_m2(thing.mesh.corners_m)) for thing in shape.things)
+    lamp = PointLamp(name="lamp", center_m=lamp_m, power_lm=ROOM_LX * area / 2)
+    return replace(spec, lamps=(lamp,), white_cd_m2=float(ROOM_LX / np.pi))
 
 
 def content(spec: SceneFile, *, exclude: Any = None) -> dict[str, Any]:

@@ -388,7 +388,8 @@ class SceneFile:
     """A scene, and the luminance of matt white that cameras are exposed for.
 
     What stands in it: a room, boxes, boards, furniture, models, and what `maker`, a Python file, makes. Files are named
-    from where the scene's own lies. `seed` decides what furniture and makers leave to chance.
+    from where the scene's own lies. `seed` decides what furniture and makers leave to chance. `scale` makes all lengths
+    so many times as large.
     """
 
     name: Name
@@ -402,6 +403,7 @@ class SceneFile:
     meshes: tuple[ModelSpec, ...] = ()
     maker: str | None = None
     seed: Annotated[int, Ge(0)] = 0
+    scale: Annotated[float, Ge(0.05), Le(20)] = 1.0
     lamps: tuple[LampSpec, ...] = ()
     sun: SunSpec | None = None
     sky: SkySpec | None = None

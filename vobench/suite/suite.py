@@ -32,7 +32,7 @@ from vobench.suite.source import SOURCES, RecordedCase, Source, recorded_cases
 from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times
 from vobench.suite.yaml_file import Mistakes, YamlFile
 
-NEEDED = ("scenes", "rigs", "trajectories")
+USUAL_RIG = "ahead"  # where a suite has none
 ALONE = {"scenarios", "source"}
 ENGINES = ("raster", "path")
 MOST_SAMPLES = 65536
@@ -87,9 +87,10 @@ Mode = Literal["step", "real_time"]
 class Suite:
     """The cases are every combination of scene, lighting, rig, trajectory and camera, and every recording of `source`.
 
-    Each axis names its variants; change one axis to change one factor. A suite of recordings alone has no axes, nor has
-    one of `scenarios`, each at some severities and with the rig's calibration off by each of `calibrations`. With
-    `frames` only the pictures from one number to before another are taken of every way.
+    Each axis names its variants; change one axis to change one factor. Without rigs a pair looks ahead; without
+    trajectories the body goes round where each scene is free. A suite of recordings alone has no axes, nor has one of
+    `scenarios`, each at some severities and with the rig's calibration off by each of `calibrations`. With `frames`
+    only the pictures from one number to before another are taken of every way.
     """
 
     name: Name
@@ -120,15 +121,14 @@ class Suite:
 
 
 def missing_axis(given: Collection[str]) -> str | None:
-    """What a suite with these keys lacks: scenes, rigs and trajectories, or none of them and scenarios or a source."""
-    missing = [name for name in NEEDED if name not in given]
-    if missing and not (ALONE & set(given) and len(missing) == len(NEEDED)):
-        said = "this key is missing" if len(missing) == 1 else "these keys are missing"
-        return f"{', '.join(missing)}: {said}; a suite has {', '.join(NEEDED)}, or scenarios or a source alone"
-    return None
+    """What a suite with these keys lacks: scenes, scenarios or a source; rigs and trajectories need scenes."""
+    if "scenes" in given or (ALONE & set(given) and not {"rigs", "trajectories"} & set(given)):
+        return None
+    return "scenes: this key is missing; a suite has scenes, or scenarios or a source alone"
 
 
 AXES = ("scene", "lighting", "rig", "trajectory", "camera")
+Axes = tuple[dict[str, Any], ...]  # the variants of each, by name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -288,14 +288,17 @@ class _Planner:
         scenes, replayed = self._scenes(), self._replayed()
         self._check_rigs()
         axes = self._axes(scenes)
+        variants = [*_combinations(axes)]
+        if not self.suite.trajectories:
+            variants = [(name, v) for name, v in variants if v["trajectory"] == _found_name(v["scene"], scenes)]
         of_scenarios = self._of_scenarios()
-        taken = [name for name, _ in _combinations(axes)] + [case.name for case in of_scenarios]
+        taken = [name for name, _ in variants] + [case.name for case in of_scenarios]
         with self.wrong.at("scenarios"):
             if twice := [name for name in taken if taken.count(name) > 1]:
                 raise SuiteError(f"two cases are called '{twice[0]}'; name a variant of an axis otherwise")
         recorded = self._recorded(set(taken))
         self.wrong.require_none()
-        simulated = tuple(self._case(name, variant, scenes, replayed) for name, variant in _combinations(axes))
+        simulated = tuple(self._case(name, variant, axes, replayed) for name, variant in variants)
         return Plan(self.suite, (*simulated, *of_scenarios), recorded, entrants, tuple(self.found), self.wrong.source)
 
     def _folder(self) -> Path:
@@ -442,13 +445,28 @@ class _Planner:
                         texts[name] = read_replayed(spec, self._folder(), times)
         return texts
 
-    def _axes(self, scenes: dict[str, SceneFile]) -> tuple[dict[str, Any], ...]:
+    def _axes(self, scenes: dict[str, SceneFile]) -> Axes:
         suite = self.suite
-        return scenes, suite.lightings, suite.rigs or {}, suite.trajectories or {}, suite.cameras
+        if not scenes:
+            return scenes, suite.lightings, suite.rigs or {}, suite.trajectories or {}, suite.cameras
+        rigs = suite.rigs or {USUAL_RIG: RigSettings(pitch_deg=10)}
+        return scenes, suite.lightings, rigs, suite.trajectories or self._found_ways(scenes), suite.cameras
 
-    def _case(self, name: str, variant: dict[str, str], scenes: dict[str, SceneFile], replayed: dict[str, str]) -> Case:
+    def _found_ways(self, scenes: dict[str, SceneFile]) -> dict[str, Any]:
+        """A way round in each scene, where the suite says none."""
+        from vobench.suite.free_way import free_way
+        from vobench.suite.scene_build import build
+
+        ways = dict[str, Any]()
+        for index, (name, scene) in enumerate(scenes.items()):
+            with self.wrong.at("scenes", index):
+                if not self.wrong.found:
+                    ways[_found_name(name, scenes)] = free_way(build(scene, {}))
+        return ways
+
+    def _case(self, name: str, variant: dict[str, str], axes: Axes, replayed: dict[str, str]) -> Case:
         suite = self.suite
-        chosen = [axis[variant[kind]] for kind, axis in zip(AXES, self._axes(scenes), strict=True)]
+        chosen = [axis[variant[kind]] for kind, axis in zip(AXES, axes, strict=True)]
         return Case(
             name=name,
             variant=variant,
@@ -474,13 +492,17 @@ class _Planner:
         return tuple(recorded)
 
 
+def _found_name(scene: str, scenes: Collection[str]) -> str:
+    return "found" if len(scenes) == 1 else f"found_{scene}"
+
+
 def _lights(scene: SceneFile) -> tuple[Light, ...]:
     from vobench.suite.scene_build import build
 
     return build(scene, {}).lights
 
 
-def _combinations(axes: tuple[dict[str, Any], ...]) -> Iterator[tuple[str, dict[str, str]]]:
+def _combinations(axes: Axes) -> Iterator[tuple[str, dict[str, str]]]:
     """The name of each case, of those variants that there is a choice of, and its place on each axis."""
     for names in product(*axes):
         differing = [name for name, axis in zip(names, axes, strict=True) if len(axis) > 1]

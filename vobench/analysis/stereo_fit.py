@@ -1,0 +1,347 @@
+"""How far a stereo pair is off from its calibration: what its rows and its disparities say of the right eye.
+
+x, y      a match's place in the right view over the focal length; fx, fy are those of both views
+turned    by roll r to the right, pitch p upwards and yaw w to the right (the signs of `CalibrationError`), the right
+          eye sees a point lower by fy (p (1 + y²) - r x - w x y) and further left by fx (w (1 + x²) - r y - p x y)
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vobench.estimator.pose import pose_from_points, twist
+from vobench.estimator.tools import Points, StereoPair, comparable, corners_per_cell, follow, inside
+from vobench.geometry import se3
+from vobench.geometry.se3 import Array
+from vobench.sequence.picture import Image
+
+MAD = 1.4826  # to a normal distribution's standard deviation
+ROWS_APART_PX = 8.0  # beyond it a match is wrong
+WINDOW_PX, USUAL_WINDOW_PX = 9, 21  # small is true to edges and slanted surfaces; the bands are of the usual one
+CORNERS_PER_CELL, CORNER_DISTANCE_PX, MARGIN_PX = 30, 8.0, 12
+FEWEST = 50  # matches, for a fit of five numbers
+FIT_STEPS = 20
+CORRELATED = 8.0  # matches near each other err alike: so many count as one
+APART = 5  # pictures between the two views of a motion
+TRUTH_M, TRUTH_SHARE, TRUTH_RAD = 3e-4, 5e-4, 3e-5  # how well a true motion is taken to be known
+MOST_YAW_DEG = 0.3  # rows that say more are of a lens
+FEWEST_FOLLOWED, LEAST_FLOW_PX = 40, 2.0
+OFFSET_STEPS, DEPTH_STEPS = 6, 2
+MEDIAN_OF_TWO = 1.1774  # of the length of two normal numbers
+DISPARITY_QUANTILES = (0.1, 0.5, 0.9)
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertain:
+    """A value and its standard deviation."""
+
+    value: float
+    sigma: float
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is 3 standard deviations from nothing."""
+        return abs(self.value) > 3 * self.sigma
+
+
+@dataclass(frozen=True, slots=True)
+class Matches:
+    """Stereo matches: places (N, 2) in the right view over the focal length, row errors and disparities (N,) in px."""
+
+    place: Array
+    row_px: Array
+    disparity_px: Array
+
+
+@dataclass(frozen=True, slots=True)
+class StereoFit:
+    """A pair beside its told calibration: the right eye's turns, and what is left of the rows when they are undone.
+
+    `row_mad_px` is of the rows as they are, `row_noise_px` of those without the fit a + b x + c y + d xy + e y²;
+    `roll_deg` is of b, `pitch_deg` of a, `xy_px` is d; `yaw_deg` is of rows and motion where they agree, else of
+    `yaw_from` alone, None where nothing tells; `gain` is right over left.
+    """
+
+    focal_px: float
+    baseline_m: float
+    matches: Matches
+    row_mad_px: float
+    row_noise_px: float
+    coefficients: Array
+    roll_deg: Uncertain
+    pitch_deg: Uncertain
+    xy_px: Uncertain
+    gain: float
+    disparity_px: tuple[float, ...]
+    yaw_deg: Uncertain | None
+    yaw_from: str
+
+    @property
+    def offset_px(self) -> Uncertain | None:
+        """What all disparities in the middle of the picture are too large by, for that yaw."""
+        if self.yaw_deg is None:
+            return None
+        return Uncertain(*(self.focal_px * np.deg2rad([self.yaw_deg.value, self.yaw_deg.sigma])).tolist())
+
+
+@dataclass(frozen=True, slots=True)
+class PairShot:
+    """A left and a right picture, and where the left camera truly was: T_world_left, None where that is not known."""
+
+    left: Image
+    right: Image
+    T_world_left: Array | None = None
+
+
+def fit_pair(windows: Sequence[Sequence[PairShot]], pair: StereoPair) -> StereoFit | None:
+    """What runs of successive shots say of a pair; None where too little matches."""
+    found, gains = [], []
+    for shot in (shot for window in windows for shot in window):
+        matches, gain = _match(shot.left, shot.right, pair)
+        found.append(matches)
+        gains.append(gain)
+    matches = Matches(*(np.concatenate([getattr(each, name) for each in found]) for name in Matches.__slots__))
+    if len(matches.row_px) < FEWEST:
+        return None
+    rows, sigma, noise_px = _robust_fit(_row_terms(matches.place), matches.row_px)
+    usual = [
+        _match(shot.left, shot.right, pair, USUAL_WINDOW_PX)[0].row_px for window in windows for shot in window[::3]
+    ]
+    fx, fy = float(pair.K[0, 0]), float(pair.K[1, 1])
+    of_motion = _offset(windows, pair, np.array([-rows[1], rows[0]]) / fy)
+    xy_px = Uncertain(float(rows[3]), float(sigma[3]))
+    yaw_deg, yaw_from = _yaw(_degrees(-xy_px.value, xy_px.sigma, fy), of_motion and _degrees(*of_motion, fx))
+    return StereoFit(
+        focal_px=fx,
+        baseline_m=pair.baseline_m,
+        matches=matches,
+        row_mad_px=_mad(np.concatenate(usual)),
+        row_noise_px=noise_px,
+        coefficients=rows,
+        roll_deg=_degrees(-rows[1], sigma[1], fy),
+        pitch_deg=_degrees(rows[0], sigma[0], fy),
+        xy_px=xy_px,
+        gain=float(np.nanmedian(gains)),
+        disparity_px=tuple(np.quantile(matches.disparity_px, DISPARITY_QUANTILES).tolist()),
+        yaw_deg=yaw_deg,
+        yaw_from=yaw_from,
+    )
+
+
+def _degrees(value_px: float, sigma_px: float, focal_px: float) -> Uncertain:
+    return Uncertain(float(np.rad2deg(value_px / focal_px)), float(np.rad2deg(sigma_px / focal_px)))
+
+
+def _yaw(of_rows: Uncertain, of_motion: Uncertain | None) -> tuple[Uncertain | None, str]:
+    """The right eye's yaw in degrees, and what says so: a lens that is off moves rows as a yaw does, but not alone."""
+    if of_motion is None:
+        return (of_rows, "rows") if abs(of_rows.value) < MOST_YAW_DEG else (None, "")
+    apart = abs(of_rows.value - of_motion.value)
+    if apart > 3 * np.hypot(of_rows.sigma, of_motion.sigma):
+        return of_motion, "motion"
+    weights = of_rows.sigma**-2, of_motion.sigma**-2
+    mean = (weights[0] * of_rows.value + weights[1] * of_motion.value) / sum(weights)
+    return Uncertain(mean, sum(weights) ** -0.5), "rows and motion"
+
+
+def _match(left: Image, right: Image, pair: StereoPair, window_px: int = WINDOW_PX) -> tuple[Matches, float]:
+    """The matches of one pair of pictures, and how much brighter the right one is around them."""
+    corners = _corners(left, pair)
+    matched, disparity_px = pair.match(
+        left, right, corners, margin_px=MARGIN_PX, window_px=window_px, row_px=ROWS_APART_PX
+    )
+    good = np.isfinite(disparity_px)
+    in_left, in_right = pair.left.in_view(corners[good]), pair.right.in_view(matched[good])
+    place = pair.right.rays(matched[good])[:, :2]
+    return Matches(place, in_right[:, 1] - in_left[:, 1], disparity_px[good]), _gain(
+        left, right, corners[good], matched[good]
+    )
+
+
+def _corners(left: Image, pair: StereoPair) -> Points:
+    corners = corners_per_cell(left, CORNERS_PER_CELL, distance_px=CORNER_DISTANCE_PX, margin_px=MARGIN_PX)
+    return corners[pair.seen(corners)]
+
+
+def _gain(left: Image, right: Image, in_left: Points, in_right: Points) -> float:
+    """Median ratio of local means, right over left, around matches (N, 2) that are not burnt; NaN where none is."""
+    import cv2
+
+    means = []
+    for picture, places in ((left, in_left), (right, in_right)):
+        local = cv2.blur(picture.astype(np.float32), (2 * MARGIN_PX - 1, 2 * MARGIN_PX - 1))
+        column, row = np.rint(places).astype(int).T
+        means.append(local[row, column])
+    even = (means[0] > 5) & (np.maximum(*means) < 240) if len(in_left) else np.zeros(0, bool)
+    return float(np.median(means[1][even] / means[0][even])) if even.any() else float("nan")
+
+
+def _row_terms(place: Array) -> Array:
+    """1, x, y, xy, y² (N, 5)."""
+    x, y = place.T
+    return np.stack([np.ones_like(x), x, y, x * y, y * y], -1)
+
+
+def row_error(coefficients: Array, place: Array) -> Array:
+    """The fitted row error (N,) in px at places (N, 2)."""
+    error: Array = _row_terms(place) @ coefficients
+    return error
+
+
+def _robust_fit(terms: Array, values: Array) -> tuple[Array, Array, float]:
+    """Coefficients (K,) of terms (N, K) by Cauchy's weights, their standard deviations, and the noise that is left."""
+    solution = np.zeros(terms.shape[1])
+    solution[0] = np.median(values)
+    for _ in range(FIT_STEPS):
+        rest = values - terms @ solution
+        noise = max(_mad(rest), 1e-3)
+        weight = 1 / (1 + (rest / (2.4 * noise)) ** 2)
+        information = terms.T @ (weight[:, None] * terms) + 1e-9 * np.eye(terms.shape[1])
+        step = np.linalg.solve(information, terms.T @ (weight * rest))
+        solution = solution + step
+        if np.abs(step).max() < 1e-6:
+            break
+    sigma = noise * np.sqrt(CORRELATED * np.diag(np.linalg.inv(information)))
+    return solution, sigma, noise
+
+
+def _mad(values: Array) -> float:
+    return MAD * float(np.median(np.abs(values - np.median(values))))
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """Points seen at two times: the view's pixels (N, 2) then and later, disparities (N,) then, and the motion between.
+
+    `information` (6, 6) is what is known of the motion's translation and turn beforehand.
+    """
+
+    before_px: Array
+    after_px: Array
+    disparity_px: Array
+    T_after_before: Array
+    information: Array
+
+
+# What all motions share: offset of disparity (px), scale of disparities, centre (2, px) and focal length (ratio) of
+# both eyes; and how far each may be off, which holds those that a motion tells nothing of.
+SHARED = np.array([1.0, 0.006, 3.0, 3.0, 0.005])
+MOTION_STEPS = np.array([1e-5, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6])
+SHARED_STEPS = np.array([1e-3, 1e-5, 1e-3, 1e-3, 1e-6])
+
+
+def _offset(windows: Sequence[Sequence[PairShot]], pair: StereoPair, turns_rad: Array) -> tuple[float, float] | None:
+    """How much too large disparities in the middle of the picture are, by the right eye's yaw, and how surely.
+
+    Where a point goes says how far it is in units of the motion: all motions, and what both eyes and the pair are off
+    by, are fitted together. `turns_rad` are the right eye's roll and pitch, as the rows have them.
+    """
+    runs = [window[first : first + APART + 1] for window in windows for first in range(len(window) - APART)]
+    followed = [found for run in runs if (found := _follow(run, pair))]
+    if not followed:
+        return None
+    shared, motions = np.zeros(len(SHARED)), [each.T_after_before for each in followed]
+    changed, held = [np.zeros(6) for _ in followed], np.diag(SHARED**-2)
+    information = held
+    for _ in range(OFFSET_STEPS):
+        parts = [
+            _normal_equations(each, T, moved=moved, shared=shared, pair=pair, turns_rad=turns_rad)
+            for each, T, moved in zip(followed, motions, changed, strict=True)
+        ]
+        information, rest = held.copy(), -held @ shared
+        for A, b in parts:
+            by_motion = np.linalg.solve(A[:6, :6], np.c_[A[:6, 6:], b[:6]])
+            information += A[6:, 6:] - A[6:, :6] @ by_motion[:, :-1]
+            rest += b[6:] - A[6:, :6] @ by_motion[:, -1]
+        step = np.linalg.solve(information, rest)
+        shared = shared + step
+        steps = [np.asarray(np.linalg.solve(A[:6, :6], b[:6] - A[:6, 6:] @ step), float) for A, b in parts]
+        motions = [_moved(T, each) for T, each in zip(motions, steps, strict=True)]
+        changed = [before + each for before, each in zip(changed, steps, strict=True)]
+    sigma_px = float(np.linalg.inv(information)[0, 0]) ** 0.5
+    return (float(shared[0]), sigma_px) if sigma_px < SHARED[0] / 2 else None
+
+
+def _normal_equations(
+    followed: Followed, T: Array, *, moved: Array, shared: Array, pair: StereoPair, turns_rad: Array
+) -> tuple[Array, Array]:
+    """Matrix (11, 11) and right side (11,) of a motion and of what is shared, by Cauchy's weights.
+
+    Every point's inverse depth is free: what its disparity and its flow say of it is taken out of them first.
+    """
+
+    def seen(T: Array, shared: Array, rho: Array) -> Array:
+        return _seen(followed, T, shared, rho, pair=pair, turns_rad=turns_rad)
+
+    measured = np.c_[followed.disparity_px, followed.after_px]
+    rho, step = followed.disparity_px / pair.focal_baseline, 1e-3 / pair.focal_baseline
+    for _ in range(DEPTH_STEPS):
+        expected = seen(T, shared, rho)
+        by_rho = (seen(T, shared, rho + step) - expected) / step
+        along = by_rho / np.linalg.norm(by_rho, axis=1, keepdims=True)
+        residual = measured - expected
+        rho = rho + np.einsum("ni,ni->n", by_rho, residual) / np.einsum("ni,ni->n", by_rho, by_rho)
+    residual -= along * np.einsum("ni,ni->n", along, residual)[:, None]
+    off_px = np.linalg.norm(residual, axis=1)
+    noise_px = max(float(np.median(off_px)) / MEDIAN_OF_TWO, 0.03)
+    weight = 1 / (1 + (off_px / (2.4 * noise_px)) ** 2) / (CORRELATED * noise_px**2)
+    columns = [
+        (seen(_moved(T, each), shared, rho) - seen(T, shared, rho)) / each.sum() for each in np.diag(MOTION_STEPS)
+    ]
+    columns += [(seen(T, shared + each, rho) - seen(T, shared, rho)) / each.sum() for each in np.diag(SHARED_STEPS)]
+    jacobian = np.stack(columns, -1)
+    jacobian -= along[..., None] * np.einsum("ni,nij->nj", along, jacobian)[:, None]
+    A = np.einsum("nij,n,nik->jk", jacobian, weight, jacobian)
+    b = np.einsum("nij,n,ni->j", jacobian, weight, residual)
+    A[:6, :6] += followed.information
+    b[:6] -= followed.information @ moved
+    return A + 1e-9 * np.eye(len(A)), b
+
+
+def _moved(T: Array, step: Array) -> Array:
+    return se3.transform(twist(step)[:3, :3] @ T[:3, :3], T[:3, 3] + step[:3])
+
+
+def _seen(followed: Followed, T: Array, shared: Array, rho: Array, *, pair: StereoPair, turns_rad: Array) -> Array:
+    """Disparities before and the view's pixels later (N, 3) of points with inverse depths rho (N,) in 1/m."""
+    offset_px, scale, *centre_px, focal = shared
+    K = pair.K.copy()
+    K[:2, :2] *= 1 + focal
+    K[:2, 2] += centre_px
+    rays = np.c_[followed.before_px, np.ones(len(rho))] @ np.linalg.inv(K).T
+    x, y = rays[:, 0] - followed.disparity_px / K[0, 0], rays[:, 1]
+    roll, pitch = turns_rad
+    excess_px = offset_px * (1 + x * x) - K[0, 0] * (roll * y + pitch * x * y)
+    there = rays @ T[:3, :3].T + rho[:, None] * T[:3, 3]
+    seen: Array = np.c_[rho * pair.focal_baseline * (1 + scale) + excess_px, ((there / there[:, 2:]) @ K.T)[:, :2]]
+    return seen
+
+
+def _follow(shots: Sequence[PairShot], pair: StereoPair) -> Followed | None:
+    """The points of the first of successive shots in the last that keeps enough of them; None where none does."""
+    first, start = shots[0], _corners(shots[0].left, pair)
+    _, disparity_px = pair.match(
+        first.left, first.right, start, margin_px=MARGIN_PX, window_px=WINDOW_PX, row_px=ROWS_APART_PX
+    )
+    start, disparity_px = start[np.isfinite(disparity_px)], disparity_px[np.isfinite(disparity_px)]
+    there, last = start, first
+    for now in shots[1:]:
+        moved, found = follow(*comparable(last.left, now.left), there, window_px=WINDOW_PX)
+        found &= inside(moved, now.left, MARGIN_PX) & pair.seen(moved)
+        if found.sum() < FEWEST_FOLLOWED:
+            break
+        start, there, disparity_px, last = start[found], moved[found], disparity_px[found], now
+    if last is first:
+        return None
+    before_px, after_px = pair.left.in_view(start), pair.left.in_view(there)
+    fit = pose_from_points(pair.points(start, disparity_px), after_px, pair.K, ransac_px=3.0)
+    if fit is None or float(np.median(np.linalg.norm(after_px - before_px, axis=1))) < LEAST_FLOW_PX:
+        return None
+    kept, T, information = fit.inlier, fit.T_now_last, np.zeros((6, 6))
+    if first.T_world_left is not None and last.T_world_left is not None:
+        turn = pair.T_view_left
+        T = turn @ se3.inverse(last.T_world_left) @ first.T_world_left @ se3.inverse(turn)
+        sigma_m = TRUTH_M + TRUTH_SHARE * float(np.linalg.norm(T[:3, 3]))
+        information = np.diag(np.repeat([sigma_m**-2, TRUTH_RAD**-2], 3))
+    return Followed(before_px[kept], after_px[kept], disparity_px[kept], T, information)

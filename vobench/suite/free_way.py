@@ -1,0 +1,106 @@
+"""Where a body can drive in a scene, found by rays: its largest free circle, and a way round in it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from vobench.errors import SuiteError
+from vobench.geometry.se3 import Array
+from vobench.motion.spline import Pose, PoseSpline
+from vobench.render.geometry import RayCaster, areas_m2
+from vobench.scene.mesh import Triangles
+from vobench.scene.scene import Scene, triangles
+
+LEVEL, FLOOR_STEP_M = 0.99, 0.02  # cosine of what counts as level, and how even a floor is
+CELL_M, MOST_CELLS, BODY_M = 0.1, 600, 0.6  # of the map of free places, and the height of a body
+LEAST_RADIUS_M, MOST_RADIUS_M, OF_CIRCLE = 0.2, 4.0, 0.6
+SPEED_MPS, RATE_HZ, EASE_S = 0.5, 10.0, 1.0
+CORNERS, MOST_LENGTH_M = 16, 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Free:
+    """The largest free circle on the floor: its middle (x, y), the floor's height and the radius, in metres."""
+
+    x_m: float
+    y_m: float
+    floor_m: float
+    radius_m: float
+
+
+def free_circle(faces: Triangles, caster: RayCaster) -> Free | None:
+    """The largest circle on the floor over which nothing stands lower than a body is high.
+
+    The floor is the height at which most level area lies.
+    """
+    level = (faces.plane[:, 2] > LEVEL) & (faces.mover < 0)
+    if not level.any():
+        return None
+    heights = np.rint(faces.corners_m[level].mean(1)[:, 2] / FLOOR_STEP_M).astype(int)
+    areas = np.bincount(heights - heights.min(), areas_m2(faces.corners_m[level]))
+    floor_m = float((areas.argmax() + heights.min()) * FLOOR_STEP_M)
+    on_floor = faces.corners_m[level][np.abs(heights * FLOOR_STEP_M - floor_m) < FLOOR_STEP_M].reshape(-1, 3)
+    low, high = on_floor.min(0)[:2], on_floor.max(0)[:2]
+    cell_m = max(CELL_M, float((high - low).max()) / MOST_CELLS)
+    x, y = (np.arange(a + cell_m / 2, b, cell_m) for a, b in zip(low, high, strict=True))
+    if not x.size or not y.size:
+        return None
+    starts = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
+    hits = caster.hits(np.column_stack([starts, np.full(len(starts), floor_m + BODY_M)]), down(len(starts)))
+    is_floor = (np.abs(hits.distance - BODY_M) < FLOOR_STEP_M) & (faces.plane[hits.face, 2] > 0)
+    # Whoever sees a back above is inside a thing.
+    above = caster.nearest(np.column_stack([starts, np.full(len(starts), floor_m + BODY_M)]), -down(len(starts)))
+    free = (is_floor & ~((above >= 0) & (faces.plane[above, 2] > 0))).reshape(len(y), len(x))
+    distance = scipy.ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]
+    row, column = np.unravel_index(distance.argmax(), distance.shape)
+    radius_m = float((distance[row, column] - 0.5) * cell_m)
+    return Free(float(x[column]), float(y[row]), floor_m, radius_m) if radius_m > 0 else None
+
+
+def down(count: int) -> Array:
+    """Rays (N, 3) straight down."""
+    return np.tile([0.0, 0.0, -1.0], (count, 1))
+
+
+def free_way(scene: Scene) -> PoseSpline:
+    """A way round in the scene's largest free circle, for a body that looks ahead. Raises SuiteError for none."""
+    faces = triangles(scene, t_ns=0)
+    free = free_circle(faces, RayCaster(faces))
+    if free is None or free.radius_m < LEAST_RADIUS_M:
+        found = f"the largest free circle on its floor has {free.radius_m:.2f} m" if free else "it has no level floor"
+        raise SuiteError(f"no way for a body was found in '{scene.name}' ({found}); give trajectories")
+    radius_m = min(OF_CIRCLE * free.radius_m, MOST_RADIUS_M)
+    whole = 2 * np.pi * min(1.0, MOST_LENGTH_M / (2 * np.pi * radius_m))
+    turned = np.linspace(0, whole, CORNERS)
+    poses = [
+        Pose(
+            t_s=float(angle * radius_m / SPEED_MPS),
+            position_m=(
+                free.x_m + radius_m * float(np.cos(angle)), free.y_m + radius_m * float(np.sin(angle)), free.floor_m
+            ),
+            yaw_deg=float(np.rad2deg(angle)) + 90,
+        )
+        for angle in turned
+    ]  # fmt: skip
+    return PoseSpline(poses=tuple(poses), ease_s=EASE_S, rate_hz=RATE_HZ)
+
+
+LOOKS, LAMP_BELOW = 512, 0.15  # ways up that are looked, and how far below the ceiling a lamp hangs
+
+
+def ceiling_above(scene: Scene) -> tuple[float, tuple[float, float, float]]:
+    """The share of the sky that a body sees where it is free, all without a floor; and where a lamp would hang."""
+    faces = triangles(scene, t_ns=0)
+    caster = RayCaster(faces)
+    free = free_circle(faces, caster)
+    if free is None:
+        return 1.0, (0.0, 0.0, 0.0)
+    at = np.array([free.x_m, free.y_m, free.floor_m + BODY_M])
+    ways = np.abs(np.random.default_rng(0).standard_normal((LOOKS, 3)))
+    ways[:, :2] *= np.sign(np.random.default_rng(1).standard_normal((LOOKS, 2)))
+    seen = caster.nearest(np.tile(at, (LOOKS, 1)), ways)
+    above = caster.hits(at[None], np.array([[0.0, 0.0, 1.0]]))
+    height_m = float(above.distance[0]) if above.face[0] >= 0 else BODY_M
+    x, y, z = at.tolist()
+    return float((seen < 0).mean()), (x, y, z + (1 - LAMP_BELOW) * height_m)
