@@ -62,9 +62,9 @@ def _board(folder: RunFolder, scores: list[TrialScore], answered: Answered) -> B
 def case_facts(folder: RunFolder, case: str) -> CaseFacts:
     """What a case says of itself; nothing where its file is missing or says nothing."""
     stated = _json(folder.case(case) / CASE)
-    severity = stated.get("severity")
+    group, severity = stated.get("calibration"), stated.get("severity")
     return CaseFacts(
-        group=str(stated.get("calibration_group") or ""),
+        group=group if isinstance(group, str) else "",
         scenario=str(stated.get("scenario") or ""),
         severity=severity if isinstance(severity, int) else None,
     )
