@@ -13,7 +13,7 @@ import pytest
 from vobench.render import raster
 from vobench.run import estimate
 from vobench.run import estimate as estimate_file
-from vobench.run.folder import SCORE, SEQUENCE, TIMES_HASHES
+from vobench.run.folder import PAGE, SCORE, SEQUENCE, TIMES_HASHES
 from vobench.run.frames import TIMES
 from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.run.task import sequence_tasks
@@ -65,7 +65,7 @@ def test_two_fresh_caches_give_equal_pictures_and_all_files_but_those_of_times_e
         sequences = [(run.case(case) / SEQUENCE).resolve() for run in (first, other)]
         assert sequences[0] != sequences[1]
         assert payload_hash(sequences[0]) == payload_hash(sequences[1])
-    differing = {TIMES, TIMES_HASHES}
+    differing = {TIMES, TIMES_HASHES, PAGE}
     files = [
         {str(p.relative_to(run.path)): p.read_bytes() for p in run.path.rglob("*") if p.is_file()}
         for run in (first, other)

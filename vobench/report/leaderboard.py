@@ -149,7 +149,7 @@ class Total:
     """One estimator over all cases of a group that everybody has: its standing, and what it cost.
 
     `score` is the lost-aware one, 1 minus the geometric mean of what trials lack of 1; `ate_percent` a median over
-    cases, `mean_place` a mean over them; `is_efficient`: nobody ranked above took less CPU time.
+    cases, `mean_place` a mean over them; `is_efficient`: nobody with a better score took less CPU time.
     """
 
     group: str
@@ -383,13 +383,14 @@ def _total(group: str, cells: Sequence[Cell], standing: ranking.Standing, mean_p
 
 
 def _efficient(ranked: Sequence[Total]) -> list[Total]:
-    """The same, those marked whose CPU time nobody ranked above has undercut."""
-    found, least = list[Total](), inf
-    for total in ranked:
-        cost = inf if total.cpu_ms is None else total.cpu_ms
-        found.append(replace(total, is_efficient=cost < least))
-        least = min(least, cost)
-    return found
+    """The same, those marked than whom nobody with a better score took less CPU time."""
+    costs = {total.estimator: inf if total.cpu_ms is None else total.cpu_ms for total in ranked}
+    least, marked = inf, set[str]()
+    for total in sorted(ranked, key=lambda total: (-total.score, costs[total.estimator])):
+        if costs[total.estimator] < least:
+            least = costs[total.estimator]
+            marked.add(total.estimator)
+    return [replace(total, is_efficient=total.estimator in marked) for total in ranked]
 
 
 def _curves(cells: Iterable[Cell]) -> list[Curve]:
