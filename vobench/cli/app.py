@@ -37,7 +37,7 @@ VERBS = {
     "info": "vobench.cli.sequence:info_command",
     "verify": "vobench.cli.report:verify_command",
     "report": "vobench.cli.report:report_command",
-    "view": "vobench.cli.report:view_command",
+    "view": "vobench.cli.view:view_command",
     "causes": "vobench.cli.failure:causes_command",
     "explain": "vobench.cli.failure:explain_command",
     "shrink": "vobench.cli.failure:shrink_command",
