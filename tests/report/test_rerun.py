@@ -112,7 +112,7 @@ def test_two_estimators_are_in_one_recording_each_with_entities_and_a_left_pictu
 
 def test_tails_follow_tracks_back_and_epipolar_lines_pass_through_points_that_stand_still(run_viewer, tmp_path):
     camera, gt = run_viewer.rig.left, run_viewer.ground_truth
-    ahead = gt.T_world_frame[0] @ [0.2, 0.1, 3.0, 1.0]
+    ahead = gt.T_world_frame[0] @ [0.2, 0.1, 30.0, 1.0]
     seen = [camera.project((np.linalg.inv(T) @ ahead)[None, :3])[0] for T in gt.T_world_frame]
     tracks = {i: (seen[i][None], np.ones(1, bool)) for i in range(1, 12)}
     steps = {i: seen[i - 1][None] for i in range(1, 12)}

@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from collections.abc import Sequence as Rows
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -126,12 +127,12 @@ FAILED = ("lost", NO_OUTPUT)
 PIXEL_CENTRE = 0.5  # Rerun puts the corner of the top-left pixel at (0, 0), we its centre
 FRUSTUM_LINE = -1.5  # negative: in screen points, whatever the zoom
 TRACK_RADIUS, PATH_RADIUS = rr.Radius.ui_points(3.5), rr.Radius.ui_points(1.8)
-TAIL_FRAMES = 5
+TAIL_FRAMES, MOST_TAILS = 5, 200
 MOST_LINES = 40  # of epipolar lines in a picture
 AWAY_M = np.geomspace(0.3, 100.0, 12)  # points of such a line, by their distance from the last place
 
 PictureForm = Literal["jpeg", "png"]
-FRAME_BYTES = 60_000
+FRAME_BYTES = 45_000  # of 60,000 with tracks
 BEST_QUALITY, WORST_QUALITY = 85, 10
 
 
@@ -289,19 +290,19 @@ def first_failure(statuses: Rows[str]) -> tuple[int, int] | None:
 def _log_pictures(stream: rr.RecordingStream, frames: Iterable[EncodedFrame], form: PictureForm) -> Stamps:
     """Log both pictures, one frame in memory at a time; return the stamps."""
     stamps, quality = [], BEST_QUALITY
-    for frame in frames:
-        times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
-        pictures = [(bp.TRUTH_LEFT, frame.left), *([(bp.TRUTH_RIGHT, frame.right)] if frame.right else [])]
-        shown, kind = [_shown(encoded, frame, form, quality) for _, encoded in pictures], frame.form
-        if form == "jpeg":
-            kind = form
-            while sum(map(len, shown)) > FRAME_BYTES and quality > WORST_QUALITY:
+    with ThreadPoolExecutor(2) as eyes:
+        for frame in frames:
+            times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
+            pictures = {bp.TRUTH_LEFT: frame.left} | ({bp.TRUTH_RIGHT: frame.right} if frame.right else {})
+            shown = list(eyes.map(lambda each, of=frame, q=quality: _shown(each, of, form, q), pictures.values()))
+            while form == "jpeg" and sum(map(len, shown)) > FRAME_BYTES and quality > WORST_QUALITY:
                 quality -= 5
-                shown = [_shown(encoded, frame, form, quality) for _, encoded in pictures]
-        for (entity, _), blob in zip(pictures, shown, strict=True):
-            columns = rr.EncodedImage.columns(blob=[blob], media_type=[f"image/{kind}"])
-            stream.send_columns(f"{entity}/image", times, columns)
-        stamps.append(frame.t_ns)
+                shown = [_shown(each, frame, form, quality) for each in pictures.values()]
+            kind = form if form == "jpeg" else frame.form
+            for entity, blob in zip(pictures, shown, strict=True):
+                columns = rr.EncodedImage.columns(blob=[blob], media_type=[f"image/{kind}"])
+                stream.send_columns(f"{entity}/image", times, columns)
+            stamps.append(frame.t_ns)
     return np.array(stamps, np.int64)
 
 
@@ -413,29 +414,43 @@ def _log_tracks(log: _Log, trial: TrialView, of: bp.Entities) -> None:
     log.columns(of.tracks, np.arange(count), columns)
     if not trial.steps:
         return
-    tails = [tail + PIXEL_CENTRE for row in _tails(trial.tracks, trial.steps, count) for tail in row]
+    shown = list(_tails(trial.tracks, trial.steps, count))
+    tails = [tail + PIXEL_CENTRE for row, _ in shown for tail in row]
+    of_tails = np.concatenate([rows[index][1][chosen] for index, (_, chosen) in enumerate(shown)])
+    strips = rr.LineStrips2D.columns(strips=tails, colors=np.where(of_tails[:, None], GREEN, RED).astype(np.uint8))
     log.static(of.tails, rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(1.0)))
-    log.columns(of.tails, np.arange(count), rr.LineStrips2D.columns(strips=tails, colors=colors).partition(lengths))
+    log.columns(of.tails, np.arange(count), strips.partition([len(row) for row, _ in shown]))
     lines = [[line + PIXEL_CENTRE for line in _epipolar_lines(trial, index)] for index in range(count)]
     strips = rr.LineStrips2D.columns(strips=[line for of_frame in lines for line in of_frame])
     log.static(of.epipolar, rr.LineStrips2D.from_fields(colors=EPIPOLAR, radii=rr.Radius.ui_points(0.7)))
     log.columns(of.epipolar, np.arange(count), strips.partition([len(of_frame) for of_frame in lines]))
 
 
-def _tails(tracks: Mapping[int, Tracks], steps: Mapping[int, Array], count: int) -> Iterable[list[Array]]:
-    """Where each track of a frame was, its last TAIL_FRAMES places (T, 2), oldest first.
+def _tails(
+    tracks: Mapping[int, Tracks], steps: Mapping[int, Array], count: int
+) -> Iterable[tuple[list[Array], NDArray[np.intp]]]:
+    """Where some tracks of each frame were, their last places (T, 2) with the oldest first; and which tracks.
 
     A track goes on from the one that ended where it was: estimators number no tracks.
     """
-    before = dict[bytes, Array]()
+    places = np.zeros((0, TAIL_FRAMES + 1, 2))
     for index in range(count):
-        row = []
-        if index in tracks:
-            for last, now in zip(steps[index], tracks[index][0], strict=True):
-                earlier = before.get(last.astype(np.float32).tobytes(), last[None])
-                row.append(np.vstack([earlier[-TAIL_FRAMES:], now]))
-        before = {tail[-1].astype(np.float32).tobytes(): tail for tail in row}
-        yield row
+        now, last = tracks[index][0] if index in tracks else np.zeros((0, 2)), steps.get(index, np.zeros((0, 2)))
+        began = np.full((len(now), TAIL_FRAMES, 2), np.nan)
+        began[:, -1] = last
+        ended, starts = _keys(places[:, -1]), _keys(last)
+        order = np.argsort(ended)
+        found = np.searchsorted(ended, starts, sorter=order).clip(max=max(len(ended) - 1, 0))
+        goes_on = np.flatnonzero(ended[order[found]] == starts) if len(ended) else np.zeros(0, np.intp)
+        began[goes_on] = places[order[found[goes_on]], 1:] if len(goes_on) else 0
+        places = np.concatenate([began, now[:, None]], 1)
+        chosen = np.arange(0, len(now), max(1, -(-len(now) // MOST_TAILS)))
+        yield [tail[np.isfinite(tail[:, 0])] for tail in places[chosen]], chosen
+
+
+def _keys(places: Array) -> NDArray[np.int64]:
+    """Places (K, 2) as single precision knows them, one number each."""
+    return np.ascontiguousarray(places, np.float32).view(np.int64).reshape(-1)
 
 
 def _epipolar_lines(trial: TrialView, index: int) -> list[Array]:
