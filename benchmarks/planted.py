@@ -231,25 +231,25 @@ def shrink_all(out: Path, chosen: list[str]) -> int:
     return right
 
 
-def rank_causes(out: Path, estimator: str) -> int:
-    """Print which conditions `causes` ranks first in each planted case of one run; how often it is in the first two."""
-    folders = [
-        run(write(out, f"all_{name or 'usual'}", (name,) if name else (), (estimator,)), out) for name in ("", *PLANTED)
-    ]
-    courses = []
-    for folder, name in zip(folders, ("usual", *PLANTED), strict=True):
-        (score,) = folder.scores()
-        seen = conditions_of(folder, read_simulated(folder, score.case))
-        courses.append(replace(course(folder, score, seen), case=name))
-    found = attribute(courses)
-    assert found is not None
-    right = 0
-    for name, (nuisance, *_) in PLANTED.items():
-        ranked = found.cases[name]
-        firsts = {condition for cause, _ in ranked[:2] for condition in cause.conditions}
-        right += (is_right := bool(firsts & SHOWN[nuisance]))
-        told = ", ".join(f"{'+'.join(c.conditions)} ×{factor:.2g}" for c, factor in ranked[:3])
-        print(f"{name:12} {'right' if is_right else 'WRONG'}: {told}", flush=True)
+def rank_causes(out: Path) -> int:
+    """Print which conditions `causes` ranks first for each planted thing, of its estimator on all cases."""
+    names, right = ("usual", *PLANTED), 0
+    estimators = tuple(dict.fromkeys(estimator for _, estimator, _ in PLANTED.values()))
+    folders = {
+        name: run(write(out, f"all_{name}", (name,) if name in PLANTED else (), estimators), out) for name in names
+    }
+    seen = {name: conditions_of(folder, read_simulated(folder, "way")) for name, folder in folders.items()}
+    for estimator in estimators:
+        scores = {name: next(s for s in f.scores() if s.estimator == estimator) for name, f in folders.items()}
+        found = attribute([replace(course(folders[name], scores[name], seen[name]), case=name) for name in names])
+        assert found is not None
+        for name, (nuisance, its, _) in PLANTED.items():
+            if its == estimator:
+                ranked = found.cases[name]
+                firsts = {condition for cause, _ in ranked[:2] for condition in cause.conditions}
+                right += (is_right := bool(firsts & SHOWN[nuisance]))
+                told = ", ".join(f"{'+'.join(c.conditions)} ×{factor:.2g}" for c, factor in ranked[:3])
+                print(f"{name:12} {estimator:12} {'right' if is_right else 'WRONG'}: {told}", flush=True)
     return right
 
 
@@ -276,13 +276,13 @@ def main() -> None:
     asked.add_argument("--out", type=Path, default=Path("runs/planted"))
     asked.add_argument("--repeats", type=int, default=2)
     asked.add_argument("--only", nargs="*", help="planted things, and pairs as a+b")
-    asked.add_argument("--causes", metavar="ESTIMATOR", help="rank conditions of one run of all instead")
+    asked.add_argument("--causes", action="store_true", help="rank conditions over all instead")
     asked.add_argument("--shrink", action="store_true", help="shrink longer failures instead")
     args = asked.parse_args()
     small_lens()
     coarse_light()
     if args.causes:
-        print(f"{rank_causes(args.out, args.causes)} of {len(PLANTED)} in the first two")
+        print(f"{rank_causes(args.out)} of {len(PLANTED)} in the first two")
         return
     if args.shrink:
         names = args.only or list(FAILURES)
