@@ -17,7 +17,7 @@ from typing import Any
 import yaml
 
 from vobench.analysis.causes import attribute
-from vobench.cli.failure import conditions_of, course, explained, read_simulated, read_trial
+from vobench.cli.failure import conditions_of, course, explained, read_simulated, read_trial, shrunk
 from vobench.geometry import rig
 from vobench.geometry.camera import Pinhole
 from vobench.render import bake
@@ -191,25 +191,65 @@ def explain_all(out: Path, chosen: list[tuple[str, ...]], repeats: int) -> int:
     return right
 
 
-def rank_causes(out: Path, estimator: str) -> int:
-    """Print which conditions `causes` ranks first in each planted case of one run; how often it is in the first two."""
-    folders = [
-        run(write(out, f"all_{name or 'usual'}", (name,) if name else (), (estimator,)), out) for name in ("", *PLANTED)
-    ]
-    courses = []
-    for folder, name in zip(folders, ("usual", *PLANTED), strict=True):
-        (score,) = folder.scores()
-        seen = conditions_of(folder, read_simulated(folder, score.case))
-        courses.append(replace(course(folder, score, seen), case=name))
-    found = attribute(courses)
-    assert found is not None
+# Failures of a longer drive: an estimator, and what is changed.
+LONG = {
+    "trajectories": {
+        "way": {"targets_m": [[1.0, 0.4], [0.3, -0.5], [1.1, -0.2]], "controller": "smooth", "rate_hz": 30}
+    }
+}
+OFF = {"switched": {"times_s": [6.0]}}
+GAP = {"switched": {"times_s": [5.0, 5.6]}}
+FAILURES: dict[str, tuple[str, dict[str, Any]]] = {
+    "lights go out": ("lk_epipolar", {"scene": {"lamps.0.level": OFF, "lamps.1.level": OFF}}),
+    "lights fail for a while": ("lk_epipolar", {"scene": {"lamps.0.level": GAP, "lamps.1.level": GAP}}),
+    "noise": ("lk_epipolar", PLANTED["noise"][2]),
+    "texture": ("lk_epipolar", PLANTED["texture"][2]),
+    "blur": ("feature_vo", PLANTED["blur"][2]),
+}
+
+
+def shrink_all(out: Path, chosen: list[str]) -> int:
+    """Print to how much each failure shrinks; how many to a fifth within twelve trials."""
     right = 0
-    for name, (nuisance, *_) in PLANTED.items():
-        ranked = found.cases[name]
-        firsts = {condition for cause, _ in ranked[:2] for condition in cause.conditions}
-        right += (is_right := bool(firsts & SHOWN[nuisance]))
-        told = ", ".join(f"{'+'.join(c.conditions)} ×{factor:.2g}" for c, factor in ranked[:3])
-        print(f"{name:12} {'right' if is_right else 'WRONG'}: {told}", flush=True)
+    for name in chosen:
+        estimator, change = FAILURES[name]
+        place = name.replace(" ", "_")
+        PLANTED[place] = ("", estimator, {**change, "suite": LONG})
+        folder = run(write(out, f"long_{place}", (place,), (estimator,)), out)
+        (score,) = folder.scores()
+        began = time.process_time()
+        found = shrunk(read_trial(folder.path / score.case / score.estimator), trials=12, out=out, jobs=1)
+        first, end = found.case.frames or (0, score.frames)
+        share = (end - first) / score.frames
+        right += (is_right := share <= 0.2 and len(found.tried) <= 12)
+        print(
+            f"{name:24} {'right' if is_right else 'WRONG'}: {score.status} ({score.reason}), {score.frames} frames to "
+            f"{end - first} ({share:.0%}), {len(found.tried)} trials, without {', '.join(found.removed) or 'nothing'}; "
+            f"{time.process_time() - began:.0f} s",
+            flush=True,
+        )
+    return right
+
+
+def rank_causes(out: Path) -> int:
+    """Print which conditions `causes` ranks first for each planted thing, of its estimator on all cases."""
+    names, right = ("usual", *PLANTED), 0
+    estimators = tuple(dict.fromkeys(estimator for _, estimator, _ in PLANTED.values()))
+    folders = {
+        name: run(write(out, f"all_{name}", (name,) if name in PLANTED else (), estimators), out) for name in names
+    }
+    seen = {name: conditions_of(folder, read_simulated(folder, "way")) for name, folder in folders.items()}
+    for estimator in estimators:
+        scores = {name: next(s for s in f.scores() if s.estimator == estimator) for name, f in folders.items()}
+        found = attribute([replace(course(folders[name], scores[name], seen[name]), case=name) for name in names])
+        assert found is not None
+        for name, (nuisance, its, _) in PLANTED.items():
+            if its == estimator:
+                ranked = found.cases[name]
+                firsts = {condition for cause, _ in ranked[:2] for condition in cause.conditions}
+                right += (is_right := bool(firsts & SHOWN[nuisance]))
+                told = ", ".join(f"{'+'.join(c.conditions)} ×{factor:.2g}" for c, factor in ranked[:3])
+                print(f"{name:12} {estimator:12} {'right' if is_right else 'WRONG'}: {told}", flush=True)
     return right
 
 
@@ -236,12 +276,17 @@ def main() -> None:
     asked.add_argument("--out", type=Path, default=Path("runs/planted"))
     asked.add_argument("--repeats", type=int, default=2)
     asked.add_argument("--only", nargs="*", help="planted things, and pairs as a+b")
-    asked.add_argument("--causes", metavar="ESTIMATOR", help="rank conditions of one run of all instead")
+    asked.add_argument("--causes", action="store_true", help="rank conditions over all instead")
+    asked.add_argument("--shrink", action="store_true", help="shrink longer failures instead")
     args = asked.parse_args()
     small_lens()
     coarse_light()
     if args.causes:
-        print(f"{rank_causes(args.out, args.causes)} of {len(PLANTED)} in the first two")
+        print(f"{rank_causes(args.out)} of {len(PLANTED)} in the first two")
+        return
+    if args.shrink:
+        names = args.only or list(FAILURES)
+        print(f"{shrink_all(args.out, names)} of {len(names)} shrunk to a fifth")
         return
     chosen = [tuple(name.split("+")) for name in args.only or [*PLANTED, *("+".join(pair) for pair in PAIRS)]]
     print(f"{explain_all(args.out, chosen, args.repeats)} of {len(chosen)} right")

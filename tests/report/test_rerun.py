@@ -9,10 +9,11 @@ from rerun.chunk import RrdReader
 
 from vobench.report.rerun import TruthView, application_id, first_failure, rerun_matrix, save_trial
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames
-from vobench.sequence import StereoTruth
+from vobench.sequence import EncodedFrame, StereoTruth
+from vobench.sequence.picture import encode
 from vobench.trajectory.trajectory import Trajectory
 
-LEFT = "/world/ground_truth/left"
+LEFT, RIGHT = "/world/ground_truth/left", "/world/ground_truth/right"
 
 
 def rows(path, entity, *, static=False):
@@ -30,11 +31,11 @@ def test_every_entity_has_its_rows(rrd):
     found = Counter()
     for chunk in RrdReader(rrd).stream():
         found[chunk.entity_path, chunk.is_static] += chunk.num_rows
-    for entity in ("left/image", "left/tracks", "right/image"):
+    for entity in ("left/image", "left/tracks/estimate", "right/image"):
         assert found[f"/world/ground_truth/{entity}", False] == 12
-    assert found["/error_mm", False] == found["/world/error", False] == 12
-    assert found["/status", False] == 3
-    for entity in ("/world/ground_truth/path", "/world/estimate/path", "/summary", "/status"):
+    assert found["/position_error/estimate", False] == found["/world/error/estimate", False] == 12
+    assert found["/status/estimate", False] == 3
+    for entity in ("/world/ground_truth/path", "/world/estimate/path", "/summary/estimate", "/status/estimate"):
         assert found[entity, True] == 1
 
 
@@ -47,9 +48,9 @@ def test_recording_opens_with_a_layout_of_its_own(rrd):
 
 
 def test_tracks_move_by_half_a_pixel_because_rerun_counts_from_the_corner(rrd):
-    points = values(rrd, f"{LEFT}/tracks", "Points2D:positions")
+    points = values(rrd, f"{LEFT}/tracks/estimate", "Points2D:positions")
     assert points[1] == [[0.5, 0.5], [3.5, 2.5], [47.5, 31.5]]
-    colors = values(rrd, f"{LEFT}/tracks", "Points2D:colors")[1]
+    colors = values(rrd, f"{LEFT}/tracks/estimate", "Points2D:colors")[1]
     assert colors[0] == colors[1] != colors[2]
 
 
@@ -58,12 +59,12 @@ def test_what_an_estimator_says_in_numbers_and_points_is_there(run_viewer, tmp_p
     save_trial(tmp_path / "more.rrd", replace(run_viewer, points={2: cloud, 7: cloud[:1]}, stats={"depth_m": numbers}))
     points = values(tmp_path / "more.rrd", "/world/estimate/points", "Points3D:positions")
     assert points == {2: cloud.tolist(), 7: cloud[:1].tolist()}
-    depths = values(tmp_path / "more.rrd", "/stats/depth_m", "Scalars:scalars")
+    depths = values(tmp_path / "more.rrd", "/stats/estimate/depth_m", "Scalars:scalars")
     assert depths == {index: [float(index)] for index in range(12) if index != 4}
 
 
 def test_frame_without_tracks_clears_those_before_it(rrd):
-    points = values(rrd, f"{LEFT}/tracks", "Points2D:positions")
+    points = values(rrd, f"{LEFT}/tracks/estimate", "Points2D:positions")
     assert {frame: len(p) for frame, p in points.items()} == {i: 3 if i in {1, 3} else 0 for i in range(12)}
 
 
@@ -73,9 +74,83 @@ def test_camera_matrix_projects_to_rerun_pixels(run_viewer):
     np.testing.assert_allclose(projected[:2] / projected[2], camera.project(point) + 0.5)
 
 
-def test_pictures_are_the_png_bytes_of_the_sequence(run_viewer, rrd):
+def test_pictures_are_small_or_the_png_bytes_of_the_sequence(run_viewer, rrd, tmp_path):
     (blob,) = values(rrd, f"{LEFT}/image", "EncodedImage:blob")[4]
+    assert bytes(blob).startswith(b"\xff\xd8")
+    save_trial(tmp_path / "png.rrd", run_viewer, form="png")
+    (blob,) = values(tmp_path / "png.rrd", f"{LEFT}/image", "EncodedImage:blob")[4]
     assert bytes(blob) == next(iter(run_viewer.frames())).left
+
+
+def test_a_noisy_pair_of_pictures_takes_sixty_kilobytes_at_most(run_viewer, tmp_path):
+    rng = np.random.default_rng(0)
+    noisy = [encode(rng.integers(0, 256, (240, 376), dtype=np.uint8), None, "noise") for _ in range(4)]
+    frames = [EncodedFrame(i, i * 10**8, "png", noisy[i % 2], noisy[2]) for i in range(12)]
+    save_trial(tmp_path / "noisy.rrd", replace(run_viewer, frames=lambda: frames))
+    for index in range(2):
+        sizes = [
+            len(values(tmp_path / "noisy.rrd", f"{s}/image", "EncodedImage:blob")[index][0]) for s in (LEFT, RIGHT)
+        ]
+        assert sum(sizes) <= 60_000
+
+
+def test_two_estimators_are_in_one_recording_each_with_entities_and_a_left_picture_of_its_own(run_viewer, tmp_path):
+    other = replace(run_viewer, label="other", title="other on room", rotation_deg=np.full(12, 2.0))
+    save_trial(tmp_path / "two.rrd", run_viewer, other)
+    for label in ("estimate", "other"):
+        assert len(values(tmp_path / "two.rrd", f"/position_error/{label}", "Scalars:scalars")) == 12
+        assert rows(tmp_path / "two.rrd", f"/world/{label}/path", static=True)
+    turned = values(tmp_path / "two.rrd", "/rotation_error/other", "Scalars:scalars")
+    assert [turned[index][0] for index in range(12)] == [2.0] * 12
+    (layout,) = RrdReader(tmp_path / "two.rrd").blueprints()
+    found = [
+        row for c in RrdReader(tmp_path / "two.rrd").stream(store=layout) for row in c.to_record_batch().to_pylist()
+    ]
+    origins = [origin for row in found for origin in row.get("ViewBlueprint:space_origin") or []]
+    assert origins.count(LEFT[1:]) == 2
+
+
+def test_tails_follow_tracks_back_and_epipolar_lines_pass_through_points_that_stand_still(run_viewer, tmp_path):
+    camera, gt = run_viewer.rig.left, run_viewer.ground_truth
+    ahead = gt.T_world_frame[0] @ [0.2, 0.1, 30.0, 1.0]
+    seen = [camera.project((np.linalg.inv(T) @ ahead)[None, :3])[0] for T in gt.T_world_frame]
+    tracks = {i: (seen[i][None], np.ones(1, bool)) for i in range(1, 12)}
+    steps = {i: seen[i - 1][None] for i in range(1, 12)}
+    save_trial(tmp_path / "t.rrd", replace(run_viewer, tracks=tracks, steps=steps))
+    tails = values(tmp_path / "t.rrd", f"{LEFT}/tracks/estimate/tails", "LineStrips2D:strips")
+    assert [len(tails[i][0]) for i in range(1, 12)] == [2, 3, 4, 5, *[6] * 7]
+    np.testing.assert_allclose(tails[7][0], np.array(seen[2:8]) + 0.5, atol=1e-4)
+    lines = values(tmp_path / "t.rrd", f"{LEFT}/tracks/estimate/epipolar_lines", "LineStrips2D:strips")
+    inside = {
+        i
+        for i in lines
+        if lines[i] and (seen[i] > 1).all() and (seen[i] < [camera.width_px - 2, camera.height_px - 2]).all()
+    }
+    assert inside
+    for index in inside:
+        line, point = np.array(lines[index][0]), seen[index] + 0.5
+        along = np.diff(line, axis=0)
+        share = np.clip(((point - line[:-1]) * along).sum(1) / np.maximum((along**2).sum(1), 1e-12), 0, 1)
+        assert np.linalg.norm(line[:-1] + share[:, None] * along - point, axis=1).min() < 0.05
+
+
+def test_a_window_keeps_its_frames_numbers(run_viewer, tmp_path):
+    frames = list(run_viewer.frames())[5:9]
+    t_ns, T = run_viewer.ground_truth.t_ns[5:9], run_viewer.ground_truth.T_world_frame[5:9]
+    part = Trajectory(t_ns, T)
+    shown = replace(
+        run_viewer,
+        frames=lambda: frames,
+        ground_truth=part,
+        estimate=part,
+        error_m=np.zeros(4),
+        statuses=["ok"] * 4,
+        tracks={},
+        first=5,
+    )
+    save_trial(tmp_path / "w.rrd", shown)
+    assert sorted(values(tmp_path / "w.rrd", LEFT, "Transform3D:translation")) == [5, 6, 7, 8]
+    assert sorted(values(tmp_path / "w.rrd", "/position_error/estimate", "Scalars:scalars")) == [5, 6, 7, 8]
 
 
 def test_estimated_camera_vanishes_while_lost(rrd):
@@ -87,15 +162,15 @@ def test_estimated_camera_vanishes_while_lost(rrd):
 def test_estimated_path_and_error_have_a_gap_where_lost(rrd):
     (path,) = rows(rrd, "/world/estimate/path", static=True)
     assert [len(strip) for strip in path["LineStrips3D:strips"]] == [5, 5]
-    error = values(rrd, "/error_mm", "Scalars:scalars")
+    error = values(rrd, "/position_error/estimate", "Scalars:scalars")
     assert [frame for frame, (value,) in error.items() if np.isnan(value)] == [5, 6]
-    lines = values(rrd, "/world/error", "LineStrips3D:strips")
+    lines = values(rrd, "/world/error/estimate", "LineStrips3D:strips")
     assert [frame for frame, strips in lines.items() if not strips] == [5, 6]
     np.testing.assert_allclose(np.diff(lines[0][0], axis=0), [[0.1, 0, 0]], atol=1e-6)
 
 
 def test_status_has_a_row_where_it_changes(rrd):
-    assert values(rrd, "/status", "StateChange:state") == {0: ["ok"], 5: ["lost"], 7: ["ok"]}
+    assert values(rrd, "/status/estimate", "StateChange:state") == {0: ["ok"], 5: ["lost"], 7: ["ok"]}
 
 
 def test_stamps_off_by_rounding_still_find_their_frame(run_viewer, tmp_path):
@@ -112,14 +187,14 @@ def test_trial_that_failed_at_once_can_still_be_looked_at(run_viewer, tmp_path, 
     error_m[:kept] = 0.0
     failed = replace(run_viewer, estimate=estimate, error_m=error_m, statuses=statuses, tracks={})
     save_trial(path, failed)
-    assert values(path, "/status", "StateChange:state") == {0: ["init"], 1: ["no output"]}
+    assert values(path, "/status/estimate", "StateChange:state") == {0: ["init"], 1: ["no output"]}
     assert len(values(path, f"{LEFT}/image", "EncodedImage:blob")) == 12
     assert list(tmp_path.iterdir()) == [path]
 
 
 def test_saving_twice_holds_the_same(run_viewer, rrd, tmp_path):
     save_trial(tmp_path / "again.rrd", run_viewer)
-    for entity in (f"{LEFT}/tracks", LEFT, "/error_mm"):
+    for entity in (f"{LEFT}/tracks/estimate", LEFT, "/position_error/estimate"):
         again, before = rows(tmp_path / "again.rrd", entity), rows(rrd, entity)
         for row in (*again, *before):
             row.pop("rerun.controls.RowId")

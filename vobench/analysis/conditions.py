@@ -11,6 +11,7 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
 from vobench.render.truth import Shot, TruthCaster
+from vobench.scene.material import Material, linear
 from vobench.sensor.pixel_truth import TruthFrame
 from vobench.sensor.response import FULL_SCALE_DN
 from vobench.sequence.reader import StereoFrame
@@ -25,7 +26,7 @@ CONDITIONS: dict[str, tuple[str, str]] = {
     "moving": ("%", "pixels on things that move"),
     "burnt": ("%", "pixels at 254 or more"),
     "black": ("%", "pixels at 2 or less"),
-    "faintness": ("1/DN", "one over the mean step between neighbouring pixels"),
+    "faintness": ("", "one over the contrast of the textures in view, whatever the camera makes of them"),
     "depth": ("m", "the middle distance"),
     "disparity": ("px", "the middle one between the eyes"),
     "flow": ("px", "how far the middle pixel goes to the next frame"),
@@ -41,7 +42,7 @@ CONDITIONS: dict[str, tuple[str, str]] = {
 }
 SAMPLES_ACROSS = 60  # pixels that rays are cast through, in a row of the picture
 BURNT_DN, BLACK_DN = 254, 2
-SHARES = {name for name, (unit, _) in CONDITIONS.items() if unit == "%"}
+LEAST_CONTRAST = 0.02
 BLUR_PER_DEFOCUS = 0.25  # standard deviation of a disc over its diameter
 SIGMA_PER_SMEAR = 12**-0.5  # of an even smear over its length
 
@@ -112,6 +113,7 @@ class _Watched:
         self._camera = Sampled(self._true.left, max(1, self._true.left.width_px // SAMPLES_ACROSS))
         self._caster = TruthCaster(scene)
         looks = [scene.materials.get(name) for name in self._caster.names.material]
+        self._contrast = np.array([np.nan if look is None else _contrast(look) for look in looks])
         self._is_coated = np.array([look is not None and look.is_coated for look in looks])
         self._rays = self._camera.rays(pixel_grid(cast("Camera", self._camera)))
 
@@ -140,8 +142,16 @@ class _Watched:
             "mirror": float((mirror & ~coated).mean()),
             "gloss": float((mirror & coated).mean()),
             "shadow_edge": float(edge.mean()),
+            "faintness": 1 / (LEAST_CONTRAST + self._seen_contrast(material)),
             "moving": float(cast("Any", truth.moving).mean()),
         }
+
+    def _seen_contrast(self, material: NDArray[np.uint16]) -> float:
+        """The mean over pixels of things with a texture; of all things, where none is in view."""
+        for values in (self._contrast[material], self._contrast):
+            if (known := values[np.isfinite(values)]).size:
+                return float(known.mean())
+        return 0.0
 
     def _disparity_px(self, points_m: Array) -> Array:
         right, T = self._true.camera("right"), se3.inverse(self._true.T_left_right)
@@ -158,6 +168,17 @@ class _Watched:
         return np.asarray((np.linalg.norm(left, axis=-1) + np.linalg.norm(right[0] - right[1], axis=-1)) / 2)
 
 
+def _contrast(look: Material) -> float:
+    """The spread of a material's texture over its mean; NaN for a mirror or a pane, which shows other things."""
+    if look.kind != "body":
+        return float("nan")
+    if look.texture is None:
+        return 0.0
+    pixels = np.asarray(look.texture.pixels()[::2, ::2])
+    grey = pixels.astype(np.float32) if pixels.ndim == 2 else linear(pixels[..., :3]).mean(-1)
+    return float(grey.std() / max(float(grey.mean()), 1e-3))
+
+
 def _middle(values: NDArray[np.floating[Any]]) -> float:
     known = values[np.isfinite(values)]
     return float(np.median(known)) if known.size else 0.0
@@ -167,12 +188,10 @@ def _pictured(frame: StereoFrame) -> dict[str, float]:
     """What pictures show; `level` is the left one's mean in stops of the linear signal, roughly."""
     left = frame.left.astype(np.float32)
     left = left.mean(-1) if left.ndim == 3 else left
-    step = (np.abs(np.diff(left, axis=1)).mean() + np.abs(np.diff(left, axis=0)).mean()) / 2
     level = _level(frame.left)
     return {
         "burnt": float((left >= BURNT_DN).mean()),
         "black": float((left <= BLACK_DN).mean()),
-        "faintness": 1 / max(float(step), 0.1),
         "unlike_eyes": 0.0 if frame.right is None else abs(level - _level(frame.right)),
         "level": level,
         "mean": float(left.mean()),

@@ -41,7 +41,7 @@ VERBS = {
     "report": "vobench.cli.report:report_command",
     "compare": "vobench.cli.report:compare_command",
     "bundle": "vobench.cli.report:bundle_command",
-    "view": "vobench.cli.report:view_command",
+    "view": "vobench.cli.view:view_command",
     "causes": "vobench.cli.failure:causes_command",
     "explain": "vobench.cli.failure:explain_command",
     "shrink": "vobench.cli.failure:shrink_command",

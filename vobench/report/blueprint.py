@@ -12,18 +12,27 @@ FRAME_TIMELINE = "frame"
 
 # Entities: what a recording holds and the views below show.
 WORLD = "world"
-TRUTH_PATH, ESTIMATE_PATH = f"{WORLD}/ground_truth/path", f"{WORLD}/estimate/path"
+TRUTH_PATH, SCENE = f"{WORLD}/ground_truth/path", f"{WORLD}/scene"
 TRUTH_LEFT, TRUTH_RIGHT = f"{WORLD}/ground_truth/left", f"{WORLD}/ground_truth/right"
-ESTIMATE_LEFT = f"{WORLD}/estimate/left"
-ERROR_LINE = f"{WORLD}/error"
-LEFT_TRACKS = f"{TRUTH_LEFT}/tracks"
-ESTIMATE_POINTS = f"{WORLD}/estimate/points"
-ERROR_PLOT, STATUS, SUMMARY, STATS = "error_mm", "status", "summary", "stats"
+ERROR, TRACKS = f"{WORLD}/error", f"{TRUTH_LEFT}/tracks"
+POSITION_ERROR, ROTATION_ERROR, STATUS, SUMMARY = "position_error", "rotation_error", "status", "summary"
+STATS, COSTS = "stats", "costs"
 
 EYE_PITCH_DEG = 38.0
 EYE_DISTANCE_PER_RADIUS = 1.6  # fills the view with Rerun's default field of view, with a margin for frusta
 FRAMES_AROUND_FOCUS = 15
 REPLAY_FPS = 5.0  # slow enough to see single frames
+
+
+class Entities:
+    """Where a recording holds what is one estimator's."""
+
+    def __init__(self, label: str) -> None:
+        self.path, self.left, self.points = (f"{WORLD}/{label}/{part}" for part in ("path", "left", "points"))
+        self.error_line, self.tracks = f"{ERROR}/{label}", f"{TRACKS}/{label}"
+        self.tails, self.epipolar = f"{self.tracks}/tails", f"{self.tracks}/epipolar_lines"
+        self.position_error, self.rotation_error = f"{POSITION_ERROR}/{label}", f"{ROTATION_ERROR}/{label}"
+        self.status, self.summary = f"{STATUS}/{label}", f"{SUMMARY}/{label}"
 
 
 def truth_entity(side: str, channel: str) -> str:
@@ -36,37 +45,52 @@ def layout(
     estimate_m: Array,
     *,
     focus: tuple[int, int] | None,
+    labels: Sequence[str] = ("estimate",),
     channels: Sequence[str] = (),
     has_stats: bool = False,
+    has_costs: bool = False,
 ) -> rrb.Blueprint:
     """The default blueprint for paths (N, 3) and (M, 3); `focus` is a range of frames to start at.
 
-    Truth channels, where there are any, have tabs of their own, and what the estimator counted a plot.
+    Several estimators have a left picture each, side by side. Truth channels, where there are any, have tabs of their
+    own, and what an estimator counted and a frame cost a plot.
     """
-    seen_m = _near(truth_m, estimate_m)
+    seen_m, is_one = _near(truth_m, estimate_m), len(labels) == 1
+    said = [rrb.TimeSeriesView(origin=STATS, name="What the estimator says")] if has_stats else []
+    said += [rrb.TimeSeriesView(origin=COSTS, name="Latency (ms), exposure (ms), gain (dB)")] if has_costs else []
     paths = rrb.Vertical(
-        _space(truth_m, seen_m),
-        rrb.TimeSeriesView(
-            origin=ERROR_PLOT,
-            name="Position error (mm)",
-            axis_y=rrb.ScalarAxis(zoom_lock=True),
-            plot_legend=rrb.PlotLegend(visible=False),
-        ),
+        _space(truth_m, seen_m, labels),
+        rrb.Horizontal(_plot(POSITION_ERROR, "Position error"), _plot(ROTATION_ERROR, "Rotation error")),
         rrb.StateTimelineView(origin=STATUS, name="Status of each frame"),
-        *([rrb.TimeSeriesView(origin=STATS, name="What the estimator says")] if has_stats else []),
-        row_shares=[6, 2.2, 1.2, *([2.2] if has_stats else [])],
+        *([rrb.Tabs(*said, active_tab=0)] if said else []),
+        row_shares=[6, 2.2, 1.2 + 0.4 * (len(labels) - 1), *([2.0] if said else [])],
     )
+    summaries = [rrb.TextDocumentView(origin=Entities(label).summary, name=f"Score of {label}") for label in labels]
+    right = [rrb.Spatial2DView(origin=TRUTH_RIGHT, name="Right")] if is_one else []
     pictures = rrb.Vertical(
-        rrb.Spatial2DView(origin=TRUTH_LEFT, name="Left: inliers green, outliers red"),
-        rrb.Spatial2DView(origin=TRUTH_RIGHT, name="Right"),
-        rrb.TextDocumentView(origin=SUMMARY, name="Score"),
-        row_shares=[3, 3, 3],
+        *(_left(label, labels) for label in labels),
+        *right,
+        rrb.Tabs(*summaries, active_tab=0),
+        row_shares=[3] * (len(labels) + len(right)) + [2.6],
     )
     columns = rrb.Horizontal(paths, pictures, column_shares=[3, 2])
     run = rrb.Tabs(rrb.Horizontal(columns, name="Run"), *_truth(channels), active_tab=0) if channels else columns
     return rrb.Blueprint(
         run, _time_panel(focus), rrb.SelectionPanel(state="hidden"), rrb.BlueprintPanel(state="hidden")
     )
+
+
+def _plot(origin: str, name: str) -> rrb.TimeSeriesView:
+    legend = rrb.PlotLegend(corner=rrb.Corner2D.RightTop)
+    return rrb.TimeSeriesView(origin=origin, name=name, axis_y=rrb.ScalarAxis(zoom_lock=True), plot_legend=legend)
+
+
+def _left(label: str, labels: Sequence[str]) -> rrb.Spatial2DView:
+    """The left picture with the tracks of one estimator."""
+    hidden = [f"- {Entities(other).tracks}/**" for other in labels if other != label]
+    of = f" of {label}" if len(labels) > 1 else ""
+    name = f"Left, tracks{of}: inliers green, outliers red, true epipolar lines white"
+    return rrb.Spatial2DView(origin=TRUTH_LEFT, name=name, contents=["$origin/**", *hidden])
 
 
 def _truth(channels: Sequence[str]) -> list[rrb.Grid]:
@@ -77,12 +101,17 @@ def _truth(channels: Sequence[str]) -> list[rrb.Grid]:
     ]
 
 
-def _space(truth_m: Array, seen_m: Array) -> rrb.Spatial3DView:
+NAMES = ("orange", "blue", "violet", "yellow", "cyan")  # of report.rerun.COLORS
+
+
+def _space(truth_m: Array, seen_m: Array, labels: Sequence[str]) -> rrb.Spatial3DView:
     eye, target = eye_and_target(seen_m)
     return rrb.Spatial3DView(
         origin=WORLD,
-        name="Truth green, estimate orange, error red",
-        contents=["$origin/**", f"- {TRUTH_RIGHT}/**", f"- {LEFT_TRACKS}"],
+        name=", ".join(
+            ["Truth green", *(f"{label} {color}" for label, color in zip(labels, NAMES, strict=False)), "error red"]
+        ),
+        contents=["$origin/**", f"- {TRUTH_RIGHT}/**", f"- {TRACKS}/**"],
         eye_controls=rrb.EyeControls3D(position=eye, look_target=target, eye_up=(0, 0, 1)),
         line_grid=rrb.LineGrid3D(
             visible=True,
