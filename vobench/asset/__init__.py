@@ -4,10 +4,10 @@
 # (both of `asset.room`), roles of a model's nodes, endings of models' files.
 # fmt: off
 FURNITURE = (
-    "bench", "blind", "book_stack", "cabinet", "cables", "carton", "chair", "crate", "curtain", "desk", "desk_lamp",
-    "door", "framed", "glass_wall", "keyboard", "lamp_housing", "monitor", "mouse", "mug", "noticeboard", "papers",
-    "pens", "pillar", "pipe", "plant", "radiator", "shelf", "skirting", "socket", "sofa", "spot_housing", "waste_bin",
-    "window_frame",
+    "bench", "blind", "bollard", "book_stack", "cabinet", "cables", "car", "carton", "chair", "crate", "curtain",
+    "desk", "desk_lamp", "door", "framed", "glass_wall", "keyboard", "lamp_housing", "monitor", "mouse", "mug",
+    "noticeboard", "papers", "pens", "person", "pillar", "pipe", "plant", "radiator", "shelf", "skirting", "socket",
+    "sofa", "spot_housing", "street_lamp", "tree", "waste_bin", "window_frame",
 )
 FINISHES = (
     "brick", "carpet", "ceiling_tiles", "concrete", "mirror", "oak_floor", "paint", "pane", "paving", "sage_plaster",

@@ -1,0 +1,23 @@
+"""Every place that is made by code is the same for one seed and stands above its ground."""
+
+from pathlib import Path
+from runpy import run_path
+
+import numpy as np
+import pytest
+
+SCENES = Path(__file__).parents[2] / "scenes"
+MADE = sorted(path.parent.name for path in SCENES.glob("*/maker.py"))
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_place_is_the_same_for_one_seed_and_stands_above_its_ground(name: str) -> None:
+    make = run_path(str(SCENES / name / "maker.py"))["make"]
+    (things, materials), (again, _) = make(3), make(3)
+    assert {thing.material for thing in things} <= materials.keys()
+    for thing, other in zip(things, again, strict=True):
+        assert thing.name == other.name
+        np.testing.assert_array_equal(thing.mesh.vertices_m, other.mesh.vertices_m)
+        assert np.isfinite(thing.mesh.vertices_m).all()
+    lowest = min(float(thing.mesh.vertices_m[:, 2].min()) for thing in things)
+    assert -1.5 < lowest <= 0.1
