@@ -78,8 +78,6 @@ def test_what_is_wrong_names_the_place_in_the_suite(suite, source, sentence):
 def test_a_suite_has_all_axes_or_a_source_alone(suite):
     said = "scenes: this key is missing; a suite has scenes, or scenarios or a source alone"
     with pytest.raises(SuiteError, match=said):
-        SuiteError, match="scenes: this key is missing; a suite has scenes, or scenarios or a source alone"
-    ):
         suite("data/V1", "rigs: {down: {pitch_deg: 90}}\n")
 
 
