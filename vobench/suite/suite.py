@@ -281,6 +281,7 @@ class _Planner:
     suite: Suite
     wrong: Mistakes
     found: list[Entry] = field(default_factory=list)
+    changed: dict[str, SceneFile] = field(default_factory=dict)
 
     def plan(self, only_estimators: tuple[str, ...] = ()) -> Plan:
         """The plan. Raises SuiteError with all that is wrong."""
@@ -388,9 +389,9 @@ class _Planner:
         entry = catalog.find("scene", setup.scene, suite=scenario.path)
         if entry not in self.found:
             self.found.append(entry)
-        scene, wrong = scene_file.survey(entry.path, setup.scene_changes)
-        wrong.require_none()
-        scene_file.lit(_lights(scene), setup.lighting)
+        scene = self._changed(entry.path, setup.scene_changes)
+        if setup.lighting:
+            scene_file.lit(_lights(scene), setup.lighting)
         text = None
         if isinstance(setup.trajectory, Replay):
             folder = scenario.path.parent
@@ -416,6 +417,14 @@ class _Planner:
                 scenario=scenario.name,
                 severity=severity,
             )
+
+    def _changed(self, path: Path, changes: dict[str, Any]) -> SceneFile:
+        """A scene with these changes, read once for all scenarios that share it."""
+        key = f"{path} {changes}"
+        if key not in self.changed:
+            self.changed[key], wrong = scene_file.survey(path, changes)
+            wrong.require_none()
+        return self.changed[key]
 
     def _check_lightings(self, scene: SceneFile, wrong: Mistakes) -> None:
         """A lighting that names no lamp is an error now, not after an hour."""
