@@ -44,6 +44,7 @@ MOST_DETAILS = 200  # cells, the worst of them, that a page can open
 MOST_POINTS = 160  # of a curve or a path in it
 THUMB_PX, RIG_PX, JPEG_QUALITY = 176, 256, 55
 MOST_PICTURE_BYTES = 2_200_000  # of all pictures in it, before they are written as text
+UNCALIBRATED = "none"  # the group of cases without a calibration error, as recordings are
 APART = 5  # frames between two of the worst moments
 MOST_RIGS = 4
 FILES = (SCORE, FRAMES, ESTIMATE, LOG, "run.rrd")
@@ -64,7 +65,7 @@ def case_facts(folder: RunFolder, case: str) -> CaseFacts:
     stated = _json(folder.case(case) / CASE)
     group, severity = stated.get("calibration"), stated.get("severity")
     return CaseFacts(
-        group=group if isinstance(group, str) else "",
+        group=group if isinstance(group, str) and group != UNCALIBRATED else "",
         scenario=str(stated.get("scenario") or ""),
         severity=severity if isinstance(severity, int) else None,
     )
