@@ -11,7 +11,7 @@ from vobench.report import page
 from vobench.report.verify import verify_run
 from vobench.run import executor
 from vobench.run.executor import Dask, Done, Event, Executor, LocalProcesses, Serial, perform_all
-from vobench.run.folder import RunFolder
+from vobench.run.folder import PAGE, RunFolder
 from vobench.run.run import run_suite
 from vobench.run.task import Resources, Task, plan
 
@@ -106,7 +106,7 @@ def run(bench, tmp_path: Path, executor: Executor, *changes: tuple[str, str]) ->
 
 def files(folder: RunFolder) -> dict[str, bytes]:
     chosen = [path for path in folder.path.rglob("*") if path.is_file() and path.name not in ("environment.json",)]
-    kept = [path for path in chosen if "times" not in path.name]
+    kept = [path for path in chosen if "times" not in path.name and path.name != PAGE]
     return {str(path.relative_to(folder.path)): path.read_bytes() for path in kept}
 
 

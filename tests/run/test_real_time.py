@@ -44,8 +44,8 @@ def test_60_ms_at_30_hz_loses_every_other_frame_and_the_board_says_so(bench, slo
     assert late.coverage == pytest.approx(1 - dropped / len(statuses))
     board = (run.path / "leaderboard.md").read_text()
     assert "| wheel_odometry.real_time [real time] |" in board
-    said = f"real time: {2 * dropped} deadlines missed, {2 * dropped} of {2 * len(statuses)} frames dropped"
-    assert f"wheel_odometry.real_time: {said}" in board.split("## dim")[0]
+    said = f"real time: {dropped} deadlines missed, {dropped} of {len(statuses)} frames dropped"
+    assert f"wheel_odometry.real_time: {said}" in board
     # Nothing that was measured on the way is lost with a frame: the wheels' path ends where it did.
     assert late.value("ate_trans", "rmse") == pytest.approx(fast.value("ate_trans", "rmse"), abs=1e-3)
 

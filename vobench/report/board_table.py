@@ -109,11 +109,12 @@ def totals(made: Board) -> list[tuple[str, list[list[str]]]]:
     """Of each group its name, and the headings and cells of its totals; columns of costs only where there are some."""
     timed = any(total.cpu_ms is not None for total in made.totals)
     columns = [column for column in COLUMNS if timed or column[0] not in (COST, MEMORY)]
-    found = []
-    for group in dict.fromkeys(total.group for total in made.totals):
+    found, groups = [], dict.fromkeys(total.group for total in made.totals)
+    for group in groups:
         rows = [[cell(total) for _, cell in columns] for total in made.totals if total.group == group]
         cases = next(total.cases for total in made.totals if total.group == group)
-        over = f"{group + ', ' if group else ''}{cases} case{'s' if cases > 1 else ''}"
+        named_group = [group or "none"] if len(groups) > 1 else []
+        over = ", ".join([*named_group, f"{cases} case{'s' if cases > 1 else ''}"])
         found.append((over, [[heading for heading, _ in columns], *rows]))
     return found
 

@@ -265,7 +265,7 @@ def board(
         totals += found
         remarks += said
     if len(groups) > 1:
-        remarks.append(f"each calibration has totals of its own: {', '.join(group or 'unnamed' for group in groups)}")
+        remarks.append(f"each calibration has totals of its own: {', '.join(group or 'none' for group in groups)}")
     return Board(title, tuple(cells), tuple(totals), tuple(_curves(cells)), tuple(remarks))
 
 

@@ -44,6 +44,7 @@ MOST_DETAILS = 200  # cells, the worst of them, that a page can open
 MOST_POINTS = 160  # of a curve or a path in it
 THUMB_PX, RIG_PX, JPEG_QUALITY = 176, 256, 55
 MOST_PICTURE_BYTES = 2_200_000  # of all pictures in it, before they are written as text
+UNCALIBRATED = "none"  # the group of cases without a calibration error, as recordings are
 APART = 5  # frames between two of the worst moments
 MOST_RIGS = 4
 FILES = (SCORE, FRAMES, ESTIMATE, LOG, "run.rrd")
@@ -63,9 +64,9 @@ def case_facts(folder: RunFolder, case: str) -> CaseFacts:
     """What a case says of itself; nothing where its file is missing or says nothing."""
     stated = _json(folder.case(case) / CASE)
     severity = stated.get("severity")
-    error = (stated.get("rig") or {}).get("calibration_error") or {}
+    level = ((stated.get("rig") or {}).get("calibration_error") or {}).get("level")
     return CaseFacts(
-        group=str(error.get("level") or ""),
+        group=level if isinstance(level, str) and level != UNCALIBRATED else "",
         scenario=str(stated.get("scenario") or ""),
         severity=severity if isinstance(severity, int) else None,
     )
