@@ -6,18 +6,27 @@ from runpy import run_path
 import numpy as np
 import pytest
 
+from vobench.asset import picture
+from vobench.scene.material import Picture
+
 SCENES = Path(__file__).parents[2] / "scenes"
 MADE = sorted(path.parent.name for path in SCENES.glob("*/maker.py"))
+# Triangles do not hang on what is painted on them, which takes most of the time.
+PAINTED = ("boards", "carton", "fabric", "ground", "masonry", "pages", "poster", "terrazzo")
 
 
 @pytest.mark.parametrize("name", MADE)
-def test_a_place_is_the_same_for_one_seed_and_stands_above_its_ground(name: str) -> None:
+def test_a_place_is_the_same_for_one_seed_and_stands_above_its_ground(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for texture in PAINTED:
+        monkeypatch.setattr(picture, texture, lambda *_, **__: Picture(np.zeros((8, 8, 3), np.uint8)))
+    monkeypatch.setattr(picture, "noise", lambda rng, px, *_, **__: np.zeros((px, px), np.float32))
     make = run_path(str(SCENES / name / "maker.py"))["make"]
-    (things, materials), (again, _) = make(3), make(3)
+    (things, materials, *_), (again, *_) = make(3), make(3)
     assert {thing.material for thing in things} <= materials.keys()
     for thing, other in zip(things, again, strict=True):
         assert thing.name == other.name
         np.testing.assert_array_equal(thing.mesh.vertices_m, other.mesh.vertices_m)
         assert np.isfinite(thing.mesh.vertices_m).all()
-    lowest = min(float(thing.mesh.vertices_m[:, 2].min()) for thing in things)
-    assert -1.5 < lowest <= 0.1
+    assert -0.2 < min(float(thing.mesh.vertices_m[:, 2].min()) for thing in things) <= 0.0

@@ -27,7 +27,7 @@ def car(rng: Rng, colour: str = "") -> list[Part]:
     """A hatchback 4.2 m long with wheels, lamps, plates and mirrors, its windows dark."""
     paint = coated(colour or some(rng, *PAINTS), roughness=0.12)
     parts = [Part(_body(), paint), *_cabin(paint)]
-    arch, lamp = lathe(mm("0 0, 350 0, 350 6, 0 6"), sections=28), cushion((0.2, 0.36, 0.14), power=3, cells=5)
+    arch, lamp = lathe(mm("0 0, 350 0, 350 6, 0 6"), sections=18), cushion((0.2, 0.36, 0.14), power=3, cells=5)
     for s in (-1, 1):
         for x in (-1.27, 1.32):
             parts.append(put(arch, BLACK, x, s * 0.876, 0.36, roll=-90 * s))
@@ -46,8 +46,8 @@ def car(rng: Rng, colour: str = "") -> list[Part]:
 
 def _body() -> Mesh:
     """The body of a car, rounded at waist and sill."""
-    x, low, high, half = spline(mm(BODY), 40).T
-    turn = np.linspace(0, 2 * np.pi, 41)
+    x, low, high, half = spline(mm(BODY), 30).T
+    turn = np.linspace(0, 2 * np.pi, 29)
     y, z = (np.sign(f(turn)) * np.abs(f(turn)) ** p for f, p in ((np.cos, 0.35), (np.sin, 0.5)))
     height = (low + high)[:, None] / 2 + (high - low)[:, None] / 2 * z
     grid = np.stack([np.broadcast_to(x[:, None], height.shape), half[:, None] * y, height], axis=-1)
@@ -87,8 +87,8 @@ def _cabin(paint: Material) -> list[Part]:
 @cache
 def _wheel() -> tuple[Part, ...]:
     """A wheel around z, its outer side up."""
-    tyre = lathe(mm("0 -90, 200 -90, 290 -80, 310 -60, 310 60, 290 85, 205 90, 200 70, 0 70"), sections=28)
-    rim = lathe(mm("0 0, 195 0, 195 14, 160 6, 50 10, 40 22, 0 22"), sections=28)
+    tyre = lathe(mm("0 -90, 200 -90, 290 -80, 310 -60, 310 60, 290 85, 205 90, 200 70, 0 70"), sections=18)
+    rim = lathe(mm("0 0, 195 0, 195 14, 160 6, 50 10, 40 22, 0 22"), sections=18)
     turns = np.deg2rad(72 * np.arange(5))
     spoke = block((0.13, 0.045, 0.02), bevel_m=0.006)
     spokes = [spoke.moved(at(0.11 * np.cos(a), 0.11 * np.sin(a), 0.085, yaw=np.rad2deg(a))) for a in turns]
@@ -154,7 +154,7 @@ def _limb(start: Array, end: Array, first_m: float, last_m: float, material: Mat
 def foliage(seed: int = 0, px: int = 512) -> Picture:
     """Twigs with leaves before nothing, from dark ones behind to light ones in front."""
     rng = np.random.default_rng(seed)
-    image = Image.new("RGBA", (px, px), (58, 82, 36, 0))
+    image = Image.new("RGBA", (px, px), (96, 124, 58, 0))
     draw = ImageDraw.Draw(image)
     for k in range(260):
         x, y = px / 2 + px * 0.42 * np.sqrt(rng.random()) * np.array([np.cos(a := rng.uniform(0, 7)), np.sin(a)])
@@ -162,7 +162,7 @@ def foliage(seed: int = 0, px: int = 512) -> Picture:
         ahead, side = np.array([np.cos(a), np.sin(a)]), np.array([-np.sin(a), np.cos(a)])
         t = np.linspace(0, 2 * np.pi, 14)[:, None]
         shape = np.array([x, y]) + long * np.cos(t) * ahead + 0.45 * long * np.sin(t) * (1 - 0.3 * np.cos(t)) * side
-        ink = tuple(int(np.clip(c * tone, 0, 255)) for c in (86 + rng.normal(0, 12), 122, 52))
+        ink = tuple(int(np.clip(c * tone, 0, 255)) for c in (128 + rng.normal(0, 14), 160, 78))
         draw.polygon([tuple(p) for p in shape.tolist()], fill=(*ink, 255))
         draw.line([*(x, y), *(x + long * ahead[0], y + long * ahead[1])], fill=(*(int(c * 1.15) for c in ink), 255))
     return Picture(np.asarray(image))

@@ -115,7 +115,7 @@ def _boxes(spec: SceneFile, of: Callable[[str], Material]) -> Iterator[Instance]
 
 
 def _from_maker(spec: SceneFile) -> Iterator[Contents]:
-    """What `make(seed)` of the scene's Python file returns: things, and their materials by name."""
+    """What `make(seed)` of the scene's Python file returns: things, their materials by name, and lights if it likes."""
     if spec.maker is None:
         return
     with _sentence(spec.maker):
@@ -123,11 +123,11 @@ def _from_maker(spec: SceneFile) -> Iterator[Contents]:
         make = run_path(spec.maker).get("make")
         if make is None:
             raise SuiteError(f"{spec.maker} has no function make(seed)")
-        found, materials = make(spec.seed)
+        found, materials, *lights = make(spec.seed)
         missing = {thing.material for thing in found} - materials.keys()
         if missing:
             raise SuiteError(f"make() returns things without materials: {', '.join(sorted(missing))}")
-    yield Contents(tuple(found), materials)
+    yield Contents(tuple(found), materials, *map(tuple, lights))
 
 
 @contextmanager
