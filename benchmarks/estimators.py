@@ -111,11 +111,14 @@ CASES = [
 ]
 
 SEEDS = range(1, 6)
-FUSIONS = {
-    "wheels": ("wheel_visual", "stereo_pnp", "wheel_odometry"),
-    "inertial": ("imu_visual", "stereo_pnp", "imu_dead_reckoning"),
-}
-FUSED_CASES = ("lit-clean", "lit-dark", "blinking-clean", "blinking-dark")
+WHEELS = ("wheel_visual", "stereo_pnp", "wheel_odometry")
+INERTIAL = ("imu_visual", "stereo_pnp", "imu_dead_reckoning")
+IN_LIGHT, BLINKING = ("lit-clean", "lit-dark"), ("blinking-clean", "blinking-dark")
+FUSIONS = (
+    ("wheels", WHEELS, (*IN_LIGHT, *BLINKING)),
+    ("sparse", WHEELS, ("clean", "dark")),
+    ("inertial", INERTIAL, (*IN_LIGHT, *BLINKING)),
+)
 
 
 def main() -> None:
@@ -144,8 +147,8 @@ def main() -> None:
 def compare_fusions(runs: Path) -> None:
     """One row for each case: mean errors of a fusion and its parents, and the ratio to the better parent."""
     print(f"{'case':28s}{'fusion, parents: segm. %':>50s}{'ratio to the better one, 95 %':>36s}{'won':>6s}")
-    for suite, names in FUSIONS.items():
-        for case in FUSED_CASES:
+    for suite, names, cases in FUSIONS:
+        for case in cases:
             folders = [sequence_folder(Case(case, suite, case, seed=seed), runs) for seed in SEEDS]
             errors = np.array([[measured(as_filmed, folder, name).segments for name in names] for folder in folders])
             ratio = np.log(errors[:, 0] / errors[:, 1:].min(1))

@@ -14,12 +14,17 @@ from vobench.geometry.rig import (
     LENSES,
     PIONEER_WHEELS,
     PRESETS,
+    RESIDUALS,
+    SPREAD,
     CalibrationError,
+    EyeError,
     Rig,
     StereoPreset,
+    drawn,
     looking,
     mounted,
     paper_lens,
+    resized,
     stereo_rig,
     true_rig,
 )
@@ -103,6 +108,42 @@ def test_all_turns_together_stay_a_rotation() -> None:
     true = true_rig(EUROC, CalibrationError(right_roll_deg=2, right_pitch_deg=-3, right_yaw_deg=4, baseline_ratio=0.1))
     assert se3.is_rotation(true.T_body_right[:3, :3], tolerance=1e-12)
     assert 4 < np.linalg.norm(turned_deg(true, EUROC)) < 9
+
+
+def test_an_eyes_own_error_is_added_to_that_of_both_and_is_of_no_other_eye() -> None:
+    both = true_rig(EUROC, CalibrationError(focal_ratio=0.01, right_yaw_deg=0.2))
+    own = EyeError(focal_ratio=0.01, center_px=(1.0, 2.0), yaw_deg=-0.2)
+    right = true_rig(EUROC, CalibrationError(focal_ratio=0.01, right_yaw_deg=0.2, right=own))
+    assert right.left == both.left
+    assert right.right.fx_px == pytest.approx(EUROC.right.fx_px * 1.02)
+    np.testing.assert_allclose(turned_deg(right, EUROC), 0, atol=1e-12)
+    left = true_rig(EUROC, CalibrationError(left=EyeError(roll_deg=0.3)))
+    turn = Rotation.from_matrix(EUROC.T_body_left[:3, :3].T @ left.T_body_left[:3, :3])
+    np.testing.assert_allclose(turn.as_rotvec(degrees=True), [0, 0, 0.3], atol=1e-12)
+    np.testing.assert_array_equal(left.T_body_right, EUROC.T_body_right)
+
+
+@pytest.mark.parametrize("level", RESIDUALS)
+@every_rig
+def test_a_drawn_calibration_is_off_by_its_levels_pixels_whatever_the_focal_length(rig: Rig, level: str) -> None:
+    usual = RESIDUALS[level]
+    yaws_px = []
+    for seed in range(20):
+        error = drawn(CalibrationError(level=level), rig, np.random.default_rng(seed))
+        assert drawn(error, rig, np.random.default_rng(seed)) is error
+        true_rig(rig, error)
+        yaws_px.append(np.tan(np.deg2rad(error.right_yaw_deg)) * rig.left.K[0, 0])
+    assert min(yaws_px) < 0 < max(yaws_px)
+    np.testing.assert_array_less(np.abs(np.abs(yaws_px) / usual.yaw_px - 1), SPREAD + 1e-9)
+
+
+@every_rig
+def test_a_resized_picture_shows_the_same_in_other_pixels(rig: Rig) -> None:
+    half = resized(rig.left, 0.5)
+    points = np.random.default_rng(1).uniform([-0.3, -0.3, 1], [0.3, 0.3, 3], (50, 3))
+    np.testing.assert_allclose(half.project(points), (rig.left.project(points) + 0.5) / 2 - 0.5)
+    with pytest.raises(VobenchError, match=r"picture_scale 0\.3333 should leave whole pixels"):
+        resized(rig.left, 0.3333)
 
 
 def test_an_error_that_has_nothing_to_act_on_is_refused() -> None:

@@ -21,7 +21,8 @@ def here(tmp_path, monkeypatch):
 
 
 def put(root, kind, name):
-    path = root / f"{kind}s" / (f"{name}/estimator.yaml" if kind == "estimator" else f"{name}.yaml")
+    among = "suites/scenarios" if kind == "scenario" else f"{kind}s"
+    path = root / among / (f"{name}/estimator.yaml" if kind == "estimator" else f"{name}.yaml")
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(f"name: {name}\n")
     return path.parent if kind == "estimator" else path

@@ -202,8 +202,8 @@ def test_a_calibration_error_makes_the_true_rig_another_and_the_told_one_not(ben
 # ruff: noqa: E501 - a sentence stands in one line
 
 
-SUITE_KEYS = "cameras, estimators, lightings, modes, name, rendering, repeats, rigs, scenes, seed, source, summary, trajectories, truth"
-RIG_KEYS = "baseline_m, calibration_error, forward_m, height_m, imu, lens, pitch_deg"
+SUITE_KEYS = "calibrations, cameras, estimators, lightings, modes, name, rendering, repeats, rigs, scenarios, scenes, seed, source, summary, trajectories, truth"
+RIG_KEYS = "baseline_m, calibration_error, forward_m, height_m, imu, lens, picture_scale, pitch_deg"
 LENSES = "d435i, euroc, fisheye, paper_blender, paper_literal, tartanair, zed2i"
 ESTIMATORS = (
     "constant_velocity, feature_vo, imu_dead_reckoning, imu_visual, lk_epipolar, mono_vo, noisy_truth, planar_floor, "
@@ -250,7 +250,7 @@ WRONG = [
     ("{lamp:", "{lmp:", ":4: lightings.dim.lmp: lighting: no light named 'lmp'. Did you mean 'lamp'? Known: lamp"),
     ("pitch_deg: 90", "pitch_deg: 90, lens: x", f":5: rigs.down.lens: no lens named 'x'. Known: {LENSES}"),
     ("pitch_deg: 90", "pitch_deg: 90, lens: eurok", f":5: rigs.down.lens: no lens named 'eurok'. Did you mean 'euroc'? Known: {LENSES}"),
-    ("pitch_deg: 90", "pitch_deg: 90, calibration_error: {right_yaw: 1}", ":5: rigs.down.calibration_error.right_yaw: unknown key. Did you mean 'right_yaw_deg'? Known: baseline_ratio, center_px, distortion_ratio, focal_ratio, right_pitch_deg, right_roll_deg, right_yaw_deg"),
+    ("pitch_deg: 90", "pitch_deg: 90, calibration_error: {right_yaw: 1}", ":5: rigs.down.calibration_error.right_yaw: unknown key. Did you mean 'right_yaw_deg'? Known: baseline_ratio, center_px, distortion_ratio, focal_ratio, left, level, right, right_pitch_deg, right_roll_deg, right_yaw_deg"),
     ("pitch_deg: 90", "pitch_deg: 90, calibration_error: {right_yaw_deg: 11}", ":5: rigs.down.calibration_error.right_yaw_deg: should be 10 or less (got 11)"),
     ("pitch_deg: 90", "pitch_deg: 90, calibration_error: {focal_ratio: -1}", ":5: rigs.down.calibration_error.focal_ratio: should be greater than -1 (got -1)"),
     ("pitch_deg: 90", "pitch_deg: 90, lens: d435i, calibration_error: {distortion_ratio: 0.1}", ":5: rigs.down: distortion_ratio 0.1 needs a lens with distortion, got Pinhole(width_px=848, height_px=480, fx_px=427.259765625, fy_px=427.259765625, cx_px=422.357269287109, cy_px=233.807525634766)"),

@@ -67,6 +67,7 @@ def _checked_summary(entry: Entry) -> str:
     """The same by the checked models. Raises VobenchError."""
     from vobench.suite import yaml_file
     from vobench.suite.manifest import read_manifest
+    from vobench.suite.scenario import ScenarioFile
     from vobench.suite.scene_file import read_scene
     from vobench.suite.suite import Suite
 
@@ -74,4 +75,6 @@ def _checked_summary(entry: Entry) -> str:
         return read_manifest(entry.path).summary
     if entry.kind == "scene":
         return read_scene(entry.path).summary
+    if entry.kind == "scenario":
+        return yaml_file.read(entry.path, ScenarioFile).summary
     return yaml_file.read(entry.path, Suite).summary

@@ -19,6 +19,7 @@ from vobench.run.key import cache_folder
 from vobench.run.motion import BodyMotion, body_motions
 from vobench.run.store import why_unwritable
 from vobench.run.task import is_done, missing, plan, sequence_tasks
+from vobench.suite.scenario import ScenarioFile
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite import Case, Plan, Suite, read_plan
@@ -210,15 +211,15 @@ def _facts(
     }
 
 
-FILES = {"suite": Suite, "scene": SceneFile, "estimator": Manifest}
+FILES = {"suite": Suite, "scenario": ScenarioFile, "scene": SceneFile, "estimator": Manifest}
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def schema_command(
-    kind: Annotated[str, typer.Argument(metavar="[suite|scene|estimator]", help="Of which kind of file.")] = "suite",
+    kind: Annotated[str, typer.Argument(metavar="[suite|scenario|scene|estimator]", help="Kind of file.")] = "suite",
     *,
     json: Annotated[bool, typer.Option("--json", help="It is JSON in any case.")] = False,
 ) -> None:
-    """Print the JSON Schema of a suite's, scene's or estimator's YAML, for editors and other programs."""
+    """Print the JSON Schema of a suite's, scenario's, scene's or estimator's YAML, for editors and other programs."""
     del json
     terminal.print_json({"$schema": DIALECT, **json_schema(FILES[terminal.known("schema", kind, FILES)])})

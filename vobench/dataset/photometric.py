@@ -41,6 +41,7 @@ class Photometry:
     cutoff_deg: float | None
     dirt: float
     readout_ms: float
+    unlike: bool
 
     def remarks(self) -> list[str]:
         """Sentences on what the files have no place for."""
@@ -48,6 +49,7 @@ class Photometry:
             (self.black_dn, f"pcalib.txt leaves in the black level: {self.black_dn:g} grey values of linear signal."),
             (self.dirt, "What dirt on the lens takes and scatters is not in vignette.png."),
             (self.readout_ms, f"The shutter rolls, {self.readout_ms:g} ms a picture; stamps are the middle row's."),
+            (self.unlike, "What sets one eye apart (unlike) is in neither pcalib.txt nor vignette.png."),
         ]
         return [sentence for amount, sentence in found if amount]
 
@@ -64,6 +66,7 @@ def photometry_of(case: Mapping[str, Any] | None) -> Photometry | None:
             cutoff_deg=camera.get("vignetting_cutoff_deg"),
             dirt=float(camera.get("dirt", 0.0)),
             readout_ms=float(camera.get("readout_ms", 0.0)),
+            unlike=any(value not in (None, 1) for eye in camera.get("unlike", {}).values() for value in eye.values()),
         )
     except (InputError, KeyError, TypeError, ValueError, AttributeError):
         return None

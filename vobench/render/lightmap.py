@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import scipy
@@ -17,6 +17,9 @@ from vobench.geometry.se3 import Array
 from vobench.render.geometry import Floats, Indices, Mask, Visibility, areas_m2, face_materials, lengths, off, take
 from vobench.scene.material import Material, fresnel
 from vobench.scene.mesh import Triangles, unit
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Places = NDArray[np.int64]
 WELD_M = 1e-5  # corners nearer than this are one
@@ -313,7 +316,8 @@ class Layout:
     source (H·W,) is the point that each texel takes its value from, P for none: texels beside a face are read by
     interpolation, and those inside things have the light of the nearest of their chart, so that no darkness reaches
     out. beside (4, P) are the points left, right, above and below in the same chart, the point itself for none.
-    few (P,): every other point along rows and columns, and those that have none of these beside them.
+    few (P,): every other point along rows and columns, and those that have none of these beside them; weights (P, P)
+    make all points' values of theirs.
     """
 
     height: int
@@ -321,6 +325,7 @@ class Layout:
     source: Indices
     beside: Indices
     few: Mask
+    weights: "csr_array"
 
     def filled(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values (P, ...) as a map (H, W, ...)."""
@@ -335,14 +340,16 @@ class Layout:
 
     def between(self, values: Floats) -> Floats:
         """Values (P,) known at the few points, at all of them."""
-        values, known = values.copy(), self.few.copy()
-        for first, second in (self.beside[:2], self.beside[2:]):
-            weight = known[first].astype(np.float32) + known[second]
-            new = np.flatnonzero(~known & (weight > 0))
-            sums = values[first[new]] * known[first[new]] + values[second[new]] * known[second[new]]
-            values[new] = sums / weight[new]
-            known[new] = True
-        return values
+        return np.asarray(self.weights @ values)
+
+    def around(self, some: Places, values: Floats, known: Mask) -> tuple[Floats, Floats]:
+        """Mean and spread (N,) of the values (P,) of those few around some points that are known (P,), else NaN."""
+        rows = self.weights[some]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            count = rows @ known.astype(np.float32)
+            mean = rows @ np.where(known, values, 0) / count
+            square = rows @ np.where(known, values, 0) ** 2 / count
+            return mean, np.sqrt(np.maximum(square - mean**2, 0))
 
     def blurred(self, values: Floats) -> Floats:
         """Values (P,) smoothed by about one texel, each chart by itself."""
@@ -463,14 +470,25 @@ def _kept(
         straight[first] &= ~hidden[near[first]]
     few.step_u_m[~straight[:2].all(0)] = 0
     few.step_v_m[~straight[2:].all(0)] = 0
-    layout = Layout(
-        atlas.height,
-        atlas.width,
-        np.where(source < 0, len(few), source).astype(np.int32),
-        near,
-        _few(few.index, near, atlas.width),
-    )
+    every_other = _few(few.index, near, atlas.width)
+    source = np.where(source < 0, len(few), source).astype(np.int32)
+    layout = Layout(atlas.height, atlas.width, source, near, every_other, _weights(every_other, near))
     return few, layout
+
+
+def _weights(few: Mask, beside: Indices) -> "csr_array":
+    """Weights (P, P) that make all points' values of the few's: along rows first, then along columns."""
+    known, result = few, scipy.sparse.diags_array(few.astype(np.float32), format="csr")
+    for sides in (beside[:2], beside[2:]):
+        weight = known[sides[0]].astype(np.float32) + known[sides[1]]
+        new = np.flatnonzero(~known & (weight > 0))
+        pairs = [(new[known[side[new]]], side) for side in sides]
+        rows = np.concatenate([np.flatnonzero(known), *(own for own, _ in pairs)])
+        columns = np.concatenate([np.flatnonzero(known), *(side[own] for own, side in pairs)])
+        shares = np.where(known[rows], np.float32(1), 1 / np.maximum(weight[rows], 1))
+        step = scipy.sparse.csr_array((shares.astype(np.float32), (rows, columns)), (len(known), len(known)))
+        result, known = step @ result, known | (weight > 0)
+    return result
 
 
 def _hidden(points_m: Floats, others: Indices, visibility: Visibility, part: slice) -> Mask:
@@ -518,6 +536,8 @@ def in_chunks(
         stop.check()
         return work(part)
 
+    if len(slices) == 1:
+        return [checked(slices[0])]
     results = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for result in pool.map(checked, slices):

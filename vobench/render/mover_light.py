@@ -13,7 +13,7 @@ from vobench.geometry.se3 import Array
 from vobench.render.bake import BakedScene, StaticScene, bodies
 from vobench.render.direct_light import Rays, arriving, cell_spot, footprint, in_front, mirror_images
 from vobench.render.emitter import Emitter, emitters
-from vobench.render.geometry import Ball, Floats, Indices, Mask, RayCaster, Visibility, face_materials
+from vobench.render.geometry import Ball, Floats, Mask, RayCaster, Visibility, face_materials
 from vobench.render.indirect_light import FinalGather, Gatherer, blend, response, surfels
 from vobench.render.lightmap import Places, Texels, in_chunks, owners, texels
 from vobench.scene.light import AreaLight, Light, Sky, Sun
@@ -22,28 +22,34 @@ from vobench.scene.mesh import Triangles
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-SIDE, SHADE_SIDE, SKY_SIDE = 3, 2, 5  # rays along a side to an emitter: on movers, in their shade, to the sky
+SIDE, SKY_SIDE = 3, 5  # rays along a side from points on movers, to an emitter and to the sky
+SHADE_SIDE, SKY_SHADE_SIDE = 2, 3  # the same from points in their shade
 SKY_REACH = 10  # radii beyond which a mover hides less than a hundredth of an open sky
 GATHER_RAYS = 64
 GATHER_M = 0.2  # between places that gather indirect light
 UNNOTICED = 1 / 300  # share of a place's light, less than a step of 8 bits
+STEEPEST = 0.999  # sine of the angle of a frustum that is as good as open to all sides
+SMOOTHINGS = 2  # of the sky's shade
+UNSURE = 0.2  # spread of what the points around keep from each other, as a share: there a point asks for itself
 
 
 def may_shade(mover: Ball, emitter: Ball, points: Ball) -> Mask:
-    """Whether a way from within each of `points` (N,) to within the emitter's ball can pass the mover's."""
+    """Whether a way from within each of `points` (N,) to within the emitter's ball can pass the mover's.
+
+    All ways lie in a cone frustum about the line between the two balls, here one a little wider.
+    """
+    to_mover = mover.centre_m - points.centre_m
+    far2, near = np.einsum("ij,ij->i", to_mover, to_mover), mover.radius_m + points.radius_m
     if np.isinf(emitter.radius_m):
-        distance = np.linalg.norm(mover.centre_m - points.centre_m, axis=-1)
-        return np.asarray(distance <= SKY_REACH * mover.radius_m + points.radius_m)
-    to_mover, to_source = mover.centre_m - points.centre_m, emitter.centre_m - points.centre_m
-    far_mover, far_source = (np.linalg.norm(way, axis=-1) for way in (to_mover, to_source))
-    cosine = np.einsum("ij,ij->i", to_mover, to_source) / np.maximum(far_mover * far_source, 1e-9)
-    angles = (
-        np.arcsin(np.clip((one.radius_m + points.radius_m) / np.maximum(far, 1e-9), 0, 1))
-        for one, far in ((mover, far_mover), (emitter, far_source))
-    )
-    reach = far_source + emitter.radius_m + mover.radius_m + points.radius_m
-    inside = far_mover <= mover.radius_m + points.radius_m
-    return np.asarray(inside | ((np.arccos(np.clip(cosine, -1, 1)) <= sum(angles)) & (far_mover <= reach)))
+        return np.asarray(far2 <= (SKY_REACH * mover.radius_m + points.radius_m) ** 2)
+    to_emitter = emitter.centre_m - points.centre_m
+    far_emitter = np.maximum(np.sqrt(np.einsum("ij,ij->i", to_emitter, to_emitter)), 1e-9)
+    along = np.einsum("ij,ij->i", to_mover, to_emitter) / far_emitter
+    slope = np.minimum((emitter.radius_m + points.radius_m) / far_emitter, STEEPEST)
+    aside = np.sqrt(np.maximum(far2 - along**2, 0))
+    within = aside * np.sqrt(1 - slope**2) <= near + slope * np.maximum(along, 0)
+    ahead = along <= far_emitter + emitter.radius_m + near
+    return np.asarray((far2 <= near**2) | (within & ahead & (along >= -near)))
 
 
 class MovingCaster:
@@ -63,14 +69,40 @@ class MovingCaster:
 
 @dataclass(frozen=True, slots=True)
 class MoverLightAt:
-    """Movers at one instant: each light's direct light (L, M) on their points, and what they keep from others (L, P).
+    """Movers at one instant: each light's direct light (L, M) on their points.
 
-    gathered: what reaches their groups of points from the surfels and lamps of what stands still.
+    lost: of each light the points (N,) from which they keep some of it, and how much (N,). gathered: what reaches
+    their groups of points from the surfels and lamps of what stands still.
     """
 
     direct: Floats
-    lost: Floats
+    lost: list[tuple[Places, Floats]]
     gathered: FinalGather
+
+
+@dataclass(frozen=True, slots=True)
+class _Lit:
+    """Points (N,) that stand still and have an emitter's light, surfel by surfel.
+
+    cells: balls (C,) around those of each surfel, whose points begin at starts (C + 1,).
+    """
+
+    emitter: Emitter
+    is_soft: bool
+    points: Places
+    cells: Ball
+    starts: NDArray[np.int64]
+
+    def near(self, movers: Sequence[Ball]) -> Places:
+        """Those that may lose some of their light to one of the movers, each of them given as balls."""
+        near = np.zeros(len(self.cells.radius_m), bool)
+        for parts_at in movers:
+            whole = _around(parts_at)
+            some = np.flatnonzero(~near & may_shade(whole, self.emitter.ball, self.cells))
+            cells = self.cells.take(some)
+            for part in range(len(parts_at.radius_m)):
+                near[some] |= may_shade(parts_at.take(slice(part, part + 1)), self.emitter.ball, cells)
+        return np.asarray(self.points[np.repeat(near, np.diff(self.starts))])
 
 
 class MoverLight:
@@ -90,7 +122,8 @@ class MoverLight:
             faces, materials, baked.atlas, owners(baked.atlas), among=moves, seed=baked.settings.seed
         )
         self._mover = faces.mover[self._points.face]
-        self._cells = _cells(still.points, still.cells)
+        self._by_cell = np.argsort(still.cells, kind="stable")
+        self._lit: dict[tuple[int, float], list[_Lit]] = {}
         self._groups, self._blend = self._grouped(faces)
         self._gatherer = Gatherer(
             baked.atlas,
@@ -122,15 +155,19 @@ class MoverLight:
         points, together = self._placed(poses), copy(self._still.visibility)
         together.opaque = MovingCaster(solid, together.opaque)  # type: ignore[assignment]
         direct = np.zeros((len(self._lights), len(points)), np.float32)
-        lost = np.zeros((len(self._lights), len(self._still.points)), np.float32)
-        for index, light in enumerate(self._lights):
-            for emitter in self._shining(light, suns_ns[index]) if is_on[index] else ():
+        lost = []
+        for index in range(len(self._lights)):
+            taken = np.zeros(len(self._still.points), np.float32)
+            for lit in self._lit_by(index, suns_ns[index]) if is_on[index] else ():
+                emitter = lit.emitter
                 some = np.flatnonzero(in_front(emitter.ball, points.points_m, points.normals))
                 rays = Rays(SKY_SIDE if emitter.sky else SIDE)
                 direct[index, some] += arriving(emitter, points.take(some), together, rays)[0]
-                lost[index] += self._lost(emitter, self._shaded(emitter, parts_at, index), MovingCaster(solid))
+                near = lit.near(parts_at)
+                taken[near] += self._lost(lit, near, index, MovingCaster(solid))
+            some = np.flatnonzero(taken)
             # Rounding apart, nothing is taken that had not come.
-            np.minimum(lost[index], self._straight[index], out=lost[index])
+            lost.append((some, np.minimum(taken[some], self._straight[index][some])))
         count = GATHER_RAYS if self._baked.settings.bounces else 0
         return MoverLightAt(direct, lost, self._gatherer.gather(points.take(self._groups), rays=count))
 
@@ -138,10 +175,17 @@ class MoverLight:
         """Put the movers' light and shade into the sum (H, W, 3) of all that stands still."""
         flat, strength = total.reshape(-1, 3), np.asarray(levels, np.float32)
         colours = strength[:, None] * np.array([light.colour for light in self._lights], np.float32)
-        shade = np.append(moment.lost.T @ colours, np.zeros((1, 3), np.float32), 0)
-        is_shaded: Mask = np.any(shade != 0, axis=1)
-        shaded = np.flatnonzero(is_shaded[self._still.layout.source])
-        flat[shaded] = np.maximum(flat[shaded] - shade[self._still.layout.source[shaded]], 0)
+        row = np.zeros(len(self._still.points) + 1, np.int32)
+        for some, _ in moment.lost:
+            row[some] = 1
+        points = np.flatnonzero(row)
+        row[points] = np.arange(1, len(points) + 1)
+        shade = np.zeros((len(points) + 1, 3), np.float32)
+        for (some, taken), colour in zip(moment.lost, colours, strict=True):
+            shade[row[some]] += taken[:, None] * colour
+        rows = row[self._still.layout.source]
+        shaded = np.flatnonzero(rows)
+        flat[shaded] = np.maximum(flat[shaded] - shade[rows[shaded]], 0)
         own = np.flatnonzero(self._layout.source < len(self._points))
         lit = (moment.direct.T @ colours)[self._layout.source[own]]
         flat[own] = lit + (self._blend @ self._around(moment.gathered, colours))[own]
@@ -172,24 +216,47 @@ class MoverLight:
         own = emitters(light, self._still.visibility, t_ns=t_ns)
         return [*own, *mirror_images(light, self._still.visibility, t_ns=t_ns)]
 
-    def _shaded(self, emitter: Emitter, movers: Sequence[Ball], light: int) -> Places:
-        """Points (N,) that stand still, have light of a lamp, and may lose some of it to a mover."""
-        near = np.zeros(len(self._cells.radius_m), bool)
-        for own in movers:
-            for part in range(len(own.radius_m)):
-                near |= may_shade(own.take(slice(part, part + 1)), emitter.ball, self._cells)
-        points, straight = self._still.points, self._straight[light]
-        some = np.flatnonzero(near[self._still.cells] & (straight > UNNOTICED * straight.max(initial=0)))
-        return some[in_front(emitter.ball, points.points_m[some], points.normals[some])]
+    def _lit_by(self, index: int, sun_ns: float) -> list[_Lit]:
+        """All that a light shines from, each with the points that it may light, a moving sun at an instant of its."""
+        key = index, sun_ns
+        if key not in self._lit:
+            self._lit = {other: lit for other, lit in self._lit.items() if other[0] != index}
+            self._lit[key] = [self._lit_from(x, index) for x in self._shining(self._lights[index], sun_ns)]
+        return self._lit[key]
 
-    def _lost(self, emitter: Emitter, some: Places, movers: MovingCaster) -> Floats:
-        """Illuminance (P,) that movers take from some points; the sky's in a pane is smoothed."""
-        layout, is_soft = self._still.layout, emitter.sky == "pane"
-        some, side = (some[layout.few[some]], SKY_SIDE) if is_soft else (some, SHADE_SIDE)
-        lost = np.zeros(len(self._still.points), np.float32)
+    def _lit_from(self, emitter: Emitter, index: int) -> _Lit:
+        points, straight = self._still.points, self._straight[index]
+        some = self._by_cell[straight[self._by_cell] > UNNOTICED * straight.max(initial=0)]
+        some = some[in_front(emitter.ball, points.points_m[some], points.normals[some])]
+        some = some[emitter.may_light(points.points_m[some])]
+        cells = self._still.cells[some]
+        starts = np.flatnonzero(np.diff(cells, prepend=-1, append=-1) if len(cells) else np.zeros(1, bool))
+        is_soft = bool((emitter.width_rad(points.points_m[some]) > 0).any())
+        return _Lit(emitter, is_soft, some, _balls(points.points_m[some], starts), starts)
+
+    def _lost(self, lit: _Lit, some: Places, index: int, movers: MovingCaster) -> Floats:
+        """Illuminance (N,) that movers take from some points; soft shadows between points that ask, as light does."""
+        if not lit.is_soft:
+            return self._traced(lit.emitter, some, movers, SHADE_SIDE)
+        side = SKY_SHADE_SIDE if lit.emitter.sky == "pane" else SHADE_SIDE
+        straight, is_few = self._straight[index], self._still.layout.few[some]
+        few, rest = some[is_few], some[~is_few]
+        share, known = np.zeros(len(straight), np.float32), np.zeros(len(straight), bool)
+        known[lit.points] = True
+        share[few] = self._traced(lit.emitter, few, movers, side) / straight[few]
+        mean, spread = self._still.layout.around(rest, share, known)
+        unsure = ~(spread <= UNSURE)
+        share[rest] = np.where(unsure, 0, mean)
+        asked = rest[unsure]
+        share[asked] = self._traced(lit.emitter, asked, movers, side) / straight[asked]
+        if lit.emitter.sky == "pane":
+            for _ in range(SMOOTHINGS):
+                share[some] = (4 * share[some] + share[self._still.layout.beside[:, some]].sum(0)) / 8
+        return np.asarray(share[some] * straight[some])
+
+    def _traced(self, emitter: Emitter, some: Places, movers: MovingCaster, side: int) -> Floats:
         found = in_chunks(lambda part: self._lost_at(emitter, some[part], movers, side), len(some))
-        lost[some] = np.concatenate([*found, np.zeros(0, np.float32)])
-        return layout.blurred(layout.between(lost)) if is_soft else lost
+        return np.concatenate([*found, np.zeros(0, np.float32)])
 
     def _lost_at(self, emitter: Emitter, some: Places, movers: MovingCaster, side: int) -> Floats:
         own = self._still.points.take(some)
@@ -205,13 +272,21 @@ class MoverLight:
         return lost / np.float32(side**2)
 
 
-def _cells(points: Texels, of: Indices) -> Ball:
-    """Balls around the points of each cell, whose number is given (P,)."""
-    count = np.maximum(np.bincount(of), 1)
-    centre = np.stack([np.bincount(of, axis) for axis in points.points_m.T], -1) / count[:, None]
-    radius = np.zeros(len(count))
-    np.maximum.at(radius, of, np.linalg.norm(points.points_m - centre[of], axis=1))
-    return Ball(centre, radius)
+def _balls(points_m: Floats, starts: NDArray[np.int64]) -> Ball:
+    """Balls (C,) around points (N, 3) from each start (C + 1,) to the next."""
+    if not len(points_m):
+        return Ball(np.zeros((0, 3)), np.zeros(0))
+    count = np.diff(starts)
+    centre = np.add.reduceat(points_m.astype(float), starts[:-1]) / count[:, None]
+    apart = np.linalg.norm(points_m - np.repeat(centre, count, axis=0), axis=1)
+    return Ball(centre, np.maximum.reduceat(apart, starts[:-1]))
+
+
+def _around(balls: Ball) -> Ball:
+    """One ball (1,) around several."""
+    centre = balls.centre_m.mean(0)
+    reach = np.linalg.norm(balls.centre_m - centre, axis=1) + balls.radius_m
+    return Ball(centre[None], reach.max(keepdims=True))
 
 
 MOST_PARTS = 8

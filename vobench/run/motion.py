@@ -187,7 +187,7 @@ def body_motions(plan: Plan) -> dict[str, BodyMotion]:
     travels, wrong = dict[str, BodyMotion](), plan.mistakes()
     for name, cases in _by(plan.simulated, "trajectory").items():
         stop.check()
-        with wrong.at("trajectories", name):
+        with wrong.at(*_said_at(cases[0], "trajectory")):
             travels[name] = body_motion(cases[0])
             check_cases(cases, travels[name], wrong)
     wrong.require_none()
@@ -196,20 +196,27 @@ def body_motions(plan: Plan) -> dict[str, BodyMotion]:
 
 def check_cases(cases: Sequence[Case], travel: BodyMotion, wrong: Mistakes) -> None:
     """Gather why these cases of one trajectory cannot be: `travel` is the trajectory's."""
-    trajectory = cases[0].variant["trajectory"]
-    with wrong.at("trajectories", trajectory):
+    with wrong.at(*_said_at(cases[0], "trajectory")):
         if len(travel.t_ns) < 2:
             raise MotionError(
                 f"the way ends within its first frame at {cases[0].trajectory.rate_hz:g} Hz: one picture shows no "
                 "motion; go further, more slowly or with a higher rate_hz"
             )
     for case, *_ in _by(cases, "scene", "rig").values():
-        with wrong.at("trajectories", trajectory):
+        with wrong.at(*_said_at(case, "trajectory")):
             _check_clear(case, travel)
             _check_smooth(case)
-    for camera, (case, *_) in _by(cases, "camera").items():
-        with wrong.at("cameras", camera):
+    for case, *_ in _by(cases, "camera").values():
+        with wrong.at(*_said_at(case, "camera")):
             _check_fits_frame(case)
+
+
+AXIS_KEYS = {"trajectory": "trajectories", "camera": "cameras"}
+
+
+def _said_at(case: Case, axis: str) -> tuple[str, str]:
+    """Where a suite says what a case has on this axis."""
+    return ("scenarios", case.scenario) if case.scenario else (AXIS_KEYS[axis], case.variant[axis])
 
 
 def _by(cases: Sequence[Case], *axes: str) -> dict[str, list[Case]]:
@@ -231,7 +238,11 @@ def _check_smooth(case: Case) -> None:
 def _check_fits_frame(case: Case) -> None:
     """Raise MotionError where a picture would still be exposed or read out when the next one begins."""
     camera, frame_ms = case.camera, 1e3 / case.trajectory.rate_hz
-    durations = {"exposure_ms": camera.exposure_ms, "readout_ms": camera.readout_ms or 0.0}
+    durations = {
+        "exposure_ms": camera.exposure_ms,
+        "readout_ms": camera.readout_ms or 0.0,
+        "timing: three times jitter_ms and right_delay_ms": camera.timing.latest_ms,
+    }
     if camera.auto_exposure:
         durations["auto_exposure.t_max_ms"] = camera.auto_exposure.t_max_ms
     for key, lasts_ms in durations.items():

@@ -6,16 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 from vobench.geometry.rig import SIDES
 from vobench.run.key import canonical, versions
-from vobench.run.motion import BodyMotion, body_motion
+from vobench.run.motion import BodyMotion, body_motion, generator
 from vobench.suite.scene_file import content as scene_content
 from vobench.suite.yaml_file import plain
 
 if TYPE_CHECKING:
     from vobench.render.renderer import Renderer
     from vobench.run.sensors import PixelTruth, SensorFeed
-    from vobench.run.stereo_camera import StereoPair
+    from vobench.run.stereo_camera import StereoCamera, StereoPair
     from vobench.run.store import Progress
     from vobench.scene.scene import Scene
+    from vobench.sensor.timing import Schedule
     from vobench.sequence import SequenceWriter
     from vobench.suite.scene_spec import SceneFile
     from vobench.suite.suite import Case, Rendering
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 UNSIMULATED: dict[str, Any] = {
     "name": True,
     "variant": True,
+    "scenario": True,
+    "severity": True,
     "scene": {"summary"},
     "trajectory": {"file", "times", "recorded_hz", "axes"},
 }
@@ -81,12 +84,28 @@ def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progr
     try:
         camera = StereoCamera(case, World(scene, renderer, travel.motion))
         camera.skip(travel.first)
-        pairs = (camera.shoot(t_ns) for t_ns in travel.t_ns.tolist())
-        watched = progress.track(pairs, f"simulate {case.name}", total=len(travel.t_ns))
+        frames = frames_of(case, travel)
+        watched = progress.track(_pairs(camera, frames), f"simulate {case.name}", total=len(frames.t_ns))
         with _writer(case, folder, truth) as writer:
-            _write(writer, travel, SensorFeed(case, travel), watched, truth)
+            _write(writer, (travel, frames), SensorFeed(case, travel), watched, truth)
     finally:
         renderer.close()
+
+
+def frames_of(case: "Case", travel: BodyMotion) -> "Schedule":
+    """The frames that come of a case's way, and when their pictures are taken."""
+    from vobench.sensor.timing import STREAMS, schedule
+
+    rngs = {stream: generator(case.seed, f"camera.{stream}") for stream in STREAMS}
+    return schedule(case.camera.timing, travel.t_ns, rngs)
+
+
+def _pairs(camera: "StereoCamera", frames: "Schedule") -> "Iterator[StereoPair]":
+    """The pictures of each frame; one that repeats has those before."""
+    pair = None
+    for left_ns, right_ns, repeats in zip(frames.left_ns, frames.right_ns, frames.repeats, strict=True):
+        pair = pair if repeats and pair else camera.shoot(int(left_ns), int(right_ns))
+        yield pair
 
 
 def _writer(case: "Case", folder: Path, truth: "PixelTruth | None") -> "SequenceWriter":
@@ -108,22 +127,22 @@ def _writer(case: "Case", folder: Path, truth: "PixelTruth | None") -> "Sequence
 
 def _write(
     writer: "SequenceWriter",
-    travel: BodyMotion,
+    way: "tuple[BodyMotion, Schedule]",
     feed: "SensorFeed",
     pairs: "Iterator[StereoPair]",
     truth: "PixelTruth | None",
 ) -> None:
+    travel, frames = way
     body = travel.at_frames()
-    stamps = [*travel.t_ns.tolist(), None]
-    for index, pair in enumerate(pairs):
-        t_ns = stamps[index]
+    taken = {"left": [*frames.left_ns.tolist(), None], "right": [*frames.right_ns.tolist(), None]}
+    for nth, (pair, index, t_ns) in enumerate(zip(pairs, frames.index, frames.t_ns.tolist(), strict=True)):
         feed.write_until(t_ns, writer)
         writer.write_frame(t_ns, pair.left, pair.right)
         writer.write_exposure(t_ns, pair.exposure.time_s, pair.exposure.gain_db)
         writer.write_truth(t_ns, body.T_world_body[index], body.twist[index])
         if travel.drive:
-            nth = travel.first + index
-            writer.write_disturbance(t_ns, travel.drive.slip[nth], travel.drive.delta[nth])
+            whole = travel.first + index
+            writer.write_disturbance(t_ns, travel.drive.slip[whole], travel.drive.delta[whole])
         if truth:
             for side in SIDES:
-                writer.write_truth_frame(t_ns, side, truth.frame(side, t_ns, stamps[index + 1]))
+                writer.write_truth_frame(t_ns, side, truth.frame(side, *taken[side][nth : nth + 2]))

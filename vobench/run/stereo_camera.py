@@ -108,10 +108,10 @@ class StereoCamera:
         for camera in (self._left, self._right):
             camera.skip(pictures)
 
-    def shoot(self, t_ns: int) -> StereoPair:
-        """The pictures stamped t_ns, the middle of their exposure; call in order of time."""
-        exposure = self._state[0]
-        pair = StereoPair(self._left.picture(t_ns, exposure), self._right.picture(t_ns, exposure), exposure)
+    def shoot(self, t_ns: int, right_ns: int | None = None) -> StereoPair:
+        """The pictures amid whose exposure is t_ns, the right one's where it has its own; call in order of time."""
+        exposure, right_ns = self._state[0], t_ns if right_ns is None else right_ns
+        pair = StereoPair(self._left.picture(t_ns, exposure), self._right.picture(right_ns, exposure), exposure)
         if loop := self._settings.auto_exposure:
             self._state = step(loop, self._state, pair.left, self._settings.chip.signal_of_grey)
         return pair
@@ -128,8 +128,8 @@ class SimulatedCamera:
         self._camera, self._T_body_camera = rig.camera(side), rig.T_body_camera(side)
         self._world, self._displacement = world, displacement
         self._light_changes = not all(isinstance(light.level, Steady) for light in world.scene.lights)
-        self._settings, self._white_cd_m2 = case.camera, np.float32(case.scene.white_cd_m2)
-        self._lens = lens_maps(case.camera, self._camera, stream("dirt"))
+        self._settings, self._white_cd_m2 = case.camera.eye(side), np.float32(case.scene.white_cd_m2)
+        self._lens = lens_maps(self._settings, self._camera, stream("dirt"))
         self._noise = NoiseStreams(stream("shot"), stream("read"))
         shape = (self._camera.height_px, self._camera.width_px)
         self._pattern = fixed_pattern(shape, case.camera.chip, stream("pattern"))

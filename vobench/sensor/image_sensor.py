@@ -1,6 +1,6 @@
 """A camera's image sensor after EMVA 1288: photons to electrons to 8-bit values, grey or in colour. Pure."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.sensor.exposure import AutoExposure, Exposure
 from vobench.sensor.response import FULL_SCALE_DN, Grey, Response, linear_of_grey, quantise, response_of
+from vobench.sensor.timing import Timing
 from vobench.setting import Check, Like, NonNegative, Positive, Share, settings
 
 # From this mean on the expansion below is off by less than 6e-4 in total variation, 1e-4 in variance and 1e-5 in mean.
@@ -163,6 +164,30 @@ Colour = Literal["mono", "rgb", "bayer"]
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
+Falloff = Annotated[float, Ge(0), Le(4)]
+Spread = Annotated[float, Ge(0), Le(100)]
+Dirt = Annotated[float, Ge(0), Le(0.5)]
+
+
+@settings()
+class Eye:
+    """What sets one eye apart: `gain` multiplies the light that its chip gets, the rest stands in place of both's."""
+
+    gain: Positive = 1.0
+    blur_sigma_px: Spread | None = None
+    defocus_px: Spread | None = None
+    vignetting: Falloff | None = None
+    dirt: Dirt | None = None
+
+
+@settings()
+class Eyes:
+    """How the two cameras of a pair differ."""
+
+    left: Eye = Eye()
+    right: Eye = Eye()
+
+
 @settings()
 class CameraSettings:
     """The chip behind the lens, how it is exposed, and what the lens does to the light.
@@ -174,7 +199,7 @@ class CameraSettings:
     `exposure_gain` multiplies that light. `readout_ms` of a rolling shutter is height × line delay.
     `vignetting` 1 is cos⁴θ (the exponent is 4 · vignetting), cut off by the lens's rims at `vignetting_cutoff_deg`;
     `blur_sigma_px` is a Gaussian's, `defocus_px` the diameter of the disc that a point out of focus makes,
-    `dirt` the mean share of light that dirt on the front lens keeps from its way.
+    `dirt` the mean share of light that dirt on the front lens keeps from its way. `unlike` says how the eyes differ.
     """
 
     chip: CameraSensor = CAMERAS["clean"]
@@ -187,12 +212,14 @@ class CameraSettings:
     shutter: Literal["global", "rolling"] = "global"
     readout_ms: Annotated[float, Ge(0), Le(1000)] | None = None
     motion_blur: bool = False
-    vignetting: Annotated[float, Ge(0), Le(4)] = 0.0
+    vignetting: Falloff = 0.0
     vignetting_cutoff_deg: Annotated[float, Gt(0), Lt(90)] | None = None
-    blur_sigma_px: Annotated[float, Ge(0), Le(100)] = 0.0
-    defocus_px: Annotated[float, Ge(0), Le(100)] = 0.0
-    dirt: Annotated[float, Ge(0), Le(0.5)] = 0.0
+    blur_sigma_px: Spread = 0.0
+    defocus_px: Spread = 0.0
+    dirt: Dirt = 0.0
     jpeg_quality: Annotated[int, Ge(1), Le(100)] | None = None
+    unlike: Eyes = Eyes()
+    timing: Timing = Timing()
 
     def __post_init__(self) -> None:
         if self.shutter == "rolling" and self.readout_ms is None:
@@ -201,6 +228,12 @@ class CameraSettings:
             )
         if self.shutter == "global" and self.readout_ms is not None:
             raise SettingError("readout_ms belongs to a rolling shutter; add shutter: rolling")
+
+    def eye(self, side: Literal["left", "right"]) -> "CameraSettings":
+        """The settings of one of the two cameras."""
+        own: Eye = getattr(self.unlike, side)
+        given = {key: value for key, value in asdict(own).items() if key != "gain" and value is not None}
+        return replace(self, exposure_gain=self.exposure_gain * own.gain, **given)
 
     @property
     def weights(self) -> tuple[float, float, float] | None:

@@ -1,9 +1,9 @@
-"""One search order for scenes, suites and estimators; the first of a name wins.
+"""One search order for scenes, suites, scenarios and estimators; the first of a name wins.
 
 Beside the suite that asks, in <kind>s/ and then in its own folder; ./<kind>s/; <folder>/<kind>s/ for each folder of
 $VOBENCH_PATH; installed entry points (groups vobench.scenes, vobench.suites, vobench.estimators); what vobench
 brings along. A suite is <name>.yaml, an estimator a folder <name>/ with an estimator.yaml; a scene is <name>.yaml, a
-folder <name>/ with a scene.yaml, or a model <name>.glb.
+folder <name>/ with a scene.yaml, or a model <name>.glb. A scenario is <name>.yaml in scenarios/ beside suites.
 """
 
 import os
@@ -19,10 +19,11 @@ from typing import Literal
 from vobench.asset import MODEL_SUFFIXES
 from vobench.errors import UnknownNameError, unknown
 
-Kind = Literal["scene", "suite", "estimator"]
-KINDS: tuple[Kind, ...] = ("suite", "scene", "estimator")
+Kind = Literal["scene", "suite", "scenario", "estimator"]
+KINDS: tuple[Kind, ...] = ("suite", "scenario", "scene", "estimator")
 FORMS: dict[Kind, tuple[str, ...]] = {
     "suite": ("{}.yaml",),
+    "scenario": ("{}.yaml",),
     "scene": ("{}.yaml", "{}/scene.yaml", "{}.glb"),
     "estimator": ("{}/estimator.yaml",),
 }
@@ -33,7 +34,7 @@ SUITE_KEY = re.compile(rb"^estimators\s*:", re.MULTILINE)
 class Entry:
     """Something with a name, where it lies, and which stop of the search order it came from.
 
-    `path` is the file of a scene or suite, the folder of an estimator.
+    `path` is the file of a scene, suite or scenario, the folder of an estimator.
     """
 
     kind: Kind
@@ -89,14 +90,16 @@ def _names(kind: Kind, suite: Path | None) -> list[str]:
 
 def _all(kind: Kind, suite: Path | None = None, *, name: str | None = None) -> Iterator[Entry]:
     """Every entry of a kind, or those of a name, in the order of search."""
+    among = "suites/scenarios" if kind == "scenario" else f"{kind}s"
     if suite:
         yield from _in_folder(kind, suite.parent / f"{kind}s", "beside the suite", name)
-        yield from (e for e in _in_folder(kind, suite.parent, "beside the suite", name) if not _is_suite(e.path))
-    yield from _in_folder(kind, Path(f"{kind}s"), f"./{kind}s", name)
+        if kind != "scenario":
+            yield from (e for e in _in_folder(kind, suite.parent, "beside the suite", name) if not _is_suite(e.path))
+    yield from _in_folder(kind, Path(among), f"./{among}", name)
     for folder in filter(None, os.environ.get("VOBENCH_PATH", "").split(os.pathsep)):
-        yield from _in_folder(kind, Path(folder) / f"{kind}s", "$VOBENCH_PATH", name)
+        yield from _in_folder(kind, Path(folder) / among, "$VOBENCH_PATH", name)
     yield from (entry for entry in _installed(kind) if name in (None, entry.name))
-    yield from _in_folder(kind, builtin_root() / f"{kind}s", "built in", name)
+    yield from _in_folder(kind, builtin_root() / among, "built in", name)
 
 
 def _installed(kind: Kind) -> Iterator[Entry]:

@@ -1,10 +1,12 @@
 """Reads a scene's YAML, and checks the names and places in it."""
 
 import hashlib
+import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -35,11 +37,16 @@ def read_scene(path: Path) -> SceneFile:
     return spec
 
 
-def survey(path: Path) -> tuple[SceneFile, Mistakes]:
-    """The scene in a file and all that is wrong with it; where anything is, the scene lacks sections and entries."""
+def survey(path: Path, changes: Mapping[str, Any] = MappingProxyType({})) -> tuple[SceneFile, Mistakes]:
+    """The scene in a file and all that is wrong with it; where anything is, the scene lacks sections and entries.
+
+    `changes` are values in place of the file's, by keys with dots between.
+    """
+    if changes and path.suffix.lower() in MODEL_SUFFIXES:
+        raise SuiteError(f"scene_changes are of a scene in YAML, and this is a model: {path}")
     if path.suffix.lower() in MODEL_SUFFIXES:
         return _bare(path), Mistakes(YamlFile(path, {}))
-    reading = yaml_file.read_all(path, SceneFile)
+    reading = yaml_file.read_all(path, SceneFile, {key: json.dumps(value) for key, value in changes.items()})
     spec, source = reading.model, reading.source
     wrong = Mistakes(source, list(reading.mistakes))
     materials = source.marked.get("materials", {})

@@ -9,59 +9,35 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from annotated_types import Ge, Le, MinLen
 
 from vobench.errors import SettingError, SuiteError, UnknownNameError, unknown
 from vobench.estimator.manifest import Limits, Manifest
-from vobench.geometry.rig import PRESETS, CalibrationError, Rig, mounted, true_rig
+from vobench.geometry.rig import Level, Rig, drawn, true_rig
 from vobench.motion.replay import Replay
 from vobench.motion.wheeled import Wheeled
+from vobench.scene.light import Light
 from vobench.scene.scene import Scene
-from vobench.sensor.image_sensor import SENSOR_PRESETS, CameraSettings
-from vobench.sensor.imu import IMUS, ImuSettings
+from vobench.sensor.image_sensor import CameraSettings
 from vobench.sensor.pixel_truth import CHANNELS
-from vobench.setting import Like, Name, OneOf, Positive, Short, hints, settings
+from vobench.setting import Name, OneOf, Short, hints, settings
 from vobench.suite import catalog, scene_file, yaml_file
+from vobench.suite.axis import Camera, Lighting, RigSettings
 from vobench.suite.catalog import Entry, Kind
 from vobench.suite.manifest import read_manifest
-from vobench.suite.scene_spec import LightOverride, SceneFile
+from vobench.suite.scenario import MOST_SEVERE, Scenario, read_scenario
+from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import SOURCES, RecordedCase, Source, recorded_cases
 from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times
 from vobench.suite.yaml_file import Mistakes, YamlFile
 
 NEEDED = ("scenes", "rigs", "trajectories")
+ALONE = {"scenarios", "source"}
 ENGINES = ("raster", "path")
 MOST_SAMPLES = 65536
-HONEST, USUAL = CalibrationError(), Limits()
-
-
-@settings()
-class RigSettings:
-    """A stereo pair on the body: a preset with both lenses, placed, how far its calibration is off, and an IMU.
-
-    Without `baseline_m` the cameras stand to each other as the preset has them.
-    """
-
-    lens: Annotated[str, OneOf("lens", PRESETS)] = "paper_blender"
-    pitch_deg: Annotated[float, Ge(-90), Le(90)]
-    baseline_m: Positive | None = None
-    forward_m: float = 0.25
-    height_m: float = 0.4
-    calibration_error: CalibrationError = HONEST
-    imu: Annotated[ImuSettings, Like("IMU", IMUS)] | None = None
-
-    def build(self) -> Rig:
-        """The sensors on the body as their calibration has them."""
-        preset = PRESETS[self.lens]
-        cameras = mounted(
-            preset.left,
-            preset.right,
-            preset.T_left_right if self.baseline_m is None else preset.at_baseline(self.baseline_m),
-            pitch_deg=self.pitch_deg,
-            forward_m=self.forward_m,
-            height_m=self.height_m,
-        )
-        return replace(cameras, imu=self.imu.calibration if self.imu else None)
+CALIBRATION_STREAM = 7_301  # sets what is drawn of a calibration apart from other streams of a seed
+USUAL = Limits()
 
 
 @settings()
@@ -89,14 +65,20 @@ class EstimatorSettings:
     limits: dict[Annotated[str, OneOf("limit", hints(Limits))], float] = field(default_factory=dict)
 
 
+def _listed(value: Any) -> Any:
+    return (value,) if isinstance(value, int) else value
+
+
+Severity = Annotated[int, Ge(0), Le(MOST_SEVERE)]
+Severities = Annotated[tuple[Severity, ...], MinLen(1), Short(_listed, {"type": "integer"})]
+
+
 def _named(value: Any) -> Any:
     return {"name": value} if isinstance(value, str) else value
 
 
 ChannelName = Annotated[str, OneOf("ground-truth channel", CHANNELS)]
-Camera = Annotated[CameraSettings, SENSOR_PRESETS]
 NamedEstimator = Annotated[EstimatorSettings, Short(_named, {"type": "string"})]
-Lighting = dict[str, LightOverride]
 Window = tuple[Annotated[int, Ge(0)], Annotated[int, Ge(2)]]
 Mode = Literal["step", "real_time"]
 
@@ -105,7 +87,8 @@ Mode = Literal["step", "real_time"]
 class Suite:
     """The cases are every combination of scene, lighting, rig, trajectory and camera, and every recording of `source`.
 
-    Each axis names its variants; change one axis to change one factor. A suite of recordings alone has no axes.
+    Each axis names its variants; change one axis to change one factor. A suite of recordings alone has no axes, nor has
+    one of `scenarios`, each at some severities and with the rig's calibration off by each of `calibrations`.
     With `frames` only the pictures from one number to before another are taken of every way.
     """
 
@@ -114,6 +97,8 @@ class Suite:
     seed: Annotated[int, Ge(0)] = 0
     repeats: Annotated[int, Ge(1), Le(100)] = 1
     source: Annotated[tuple[Source, ...], SOURCES] = ()
+    scenarios: Annotated[dict[str, Severities], MinLen(1)] | None = None
+    calibrations: Annotated[tuple[Level, ...], MinLen(1)] | None = None
     scenes: Annotated[tuple[str, ...], MinLen(1)] | None = None
     lightings: Annotated[dict[Name, Lighting], MinLen(1)] = field(default_factory=lambda: {"as_built": {}})
     rigs: Annotated[dict[Name, RigSettings], MinLen(1)] | None = None
@@ -128,14 +113,18 @@ class Suite:
     def __post_init__(self) -> None:
         if missing := missing_axis({each.name for each in fields(self) if getattr(self, each.name)}):
             raise SettingError(missing)
+        if self.calibrations and not self.scenarios:
+            raise SettingError(
+                "belongs to scenarios, and there are none; give a rig its calibration_error", "calibrations"
+            )
 
 
 def missing_axis(given: Collection[str]) -> str | None:
-    """What a suite with these keys lacks: it has scenes, rigs and trajectories, or none of them and a source."""
+    """What a suite with these keys lacks: scenes, rigs and trajectories, or none of them and scenarios or a source."""
     missing = [name for name in NEEDED if name not in given]
-    if missing and not ("source" in given and len(missing) == len(NEEDED)):
+    if missing and not (ALONE & set(given) and len(missing) == len(NEEDED)):
         said = "this key is missing" if len(missing) == 1 else "these keys are missing"
-        return f"{', '.join(missing)}: {said}; a suite has {', '.join(NEEDED)}, or a source alone"
+        return f"{', '.join(missing)}: {said}; a suite has {', '.join(NEEDED)}, or scenarios or a source alone"
     return None
 
 
@@ -148,7 +137,7 @@ class Case:
 
     `variant` names the case's place on each of AXES; `name` keeps those that differ within the suite,
     and so is unique there and fit for a folder. `seed` is the suite's; `replayed` is what the trajectory's
-    file holds, as TUM text, where it has one.
+    file holds, as TUM text, where it has one. A case of a scenario says of which, and how severe it is.
     """
 
     name: str
@@ -163,6 +152,8 @@ class Case:
     truth: tuple[str, ...]
     frames: Window | None = None
     seed: int
+    scenario: str | None = None
+    severity: int | None = None
 
     def build_scene(self) -> Scene:
         """The scene under this case's lighting."""
@@ -177,7 +168,8 @@ class Case:
 
     def build_true_rig(self) -> Rig:
         """The stereo pair as it is: what pictures are made with. Raises VobenchError, as `true_rig` does."""
-        return true_rig(self.build_rig(), self.rig.calibration_error)
+        rig, rng = self.build_rig(), np.random.default_rng([self.seed, CALIBRATION_STREAM])
+        return true_rig(rig, drawn(self.rig.calibration_error, rig, rng))
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,10 +283,15 @@ class _Planner:
         scenes, replayed = self._scenes(), self._replayed()
         self._check_rigs()
         axes = self._axes(scenes)
-        recorded = self._recorded({name for name, _ in _combinations(axes)})
+        of_scenarios = self._of_scenarios()
+        taken = [name for name, _ in _combinations(axes)] + [case.name for case in of_scenarios]
+        with self.wrong.at("scenarios"):
+            if twice := [name for name in taken if taken.count(name) > 1]:
+                raise SuiteError(f"two cases are called '{twice[0]}'; name a variant of an axis otherwise")
+        recorded = self._recorded(set(taken))
         self.wrong.require_none()
         simulated = tuple(self._case(name, variant, scenes, replayed) for name, variant in _combinations(axes))
-        return Plan(self.suite, simulated, recorded, entrants, tuple(self.found), self.wrong.source)
+        return Plan(self.suite, (*simulated, *of_scenarios), recorded, entrants, tuple(self.found), self.wrong.source)
 
     def _folder(self) -> Path:
         """Where relative paths in a suite start: at its file."""
@@ -366,11 +363,56 @@ class _Planner:
                 wrong.require_none()
         return scenes
 
+    def _of_scenarios(self) -> list[Case]:
+        """The cases of the scenarios: each at each severity, by each calibration."""
+        cases = list[Case]()
+        for name, severities in (self.suite.scenarios or {}).items():
+            with self.wrong.at("scenarios", name):
+                scenario = read_scenario(self._find("scenario", name).path)
+                if scenario.name in (self.suite.trajectories or {}):
+                    raise SuiteError("a trajectory of the suite is called so, too; give it another name")
+                for severity in dict.fromkeys(severities):
+                    cases += self._of_scenario(scenario, severity)
+        return cases
+
+    def _of_scenario(self, scenario: Scenario, severity: int) -> Iterator[Case]:
+        setup, levels = scenario.setup(severity), self.suite.calibrations or (None,)
+        entry = catalog.find("scene", setup.scene, suite=scenario.path)
+        if entry not in self.found:
+            self.found.append(entry)
+        scene, wrong = scene_file.survey(entry.path, setup.scene_changes)
+        wrong.require_none()
+        scene_file.lit(_lights(scene), setup.lighting)
+        text = None
+        if isinstance(setup.trajectory, Replay):
+            folder = scenario.path.parent
+            text = read_replayed(setup.trajectory, folder, read_times(setup.trajectory, folder))
+        variant = scenario.variant(severity, entry.name)
+        for level in levels:
+            rig, end = setup.rig, f"-{level}" if len(levels) > 1 else ""
+            if level:
+                rig = replace(rig, calibration_error=replace(rig.calibration_error, level=level))
+            true_rig(rig.build(), rig.calibration_error)
+            yield Case(
+                name=f"{scenario.name}-{severity}{end}",
+                variant={**variant, "rig": f"{variant['rig']}{end}"},
+                scene=scene,
+                lighting=setup.lighting,
+                rig=rig,
+                trajectory=setup.trajectory,
+                replayed=text,
+                camera=setup.camera,
+                rendering=self.suite.rendering,
+                truth=self.suite.truth,
+                frames=self.suite.frames,
+                seed=self.suite.seed,
+                scenario=scenario.name,
+                severity=severity,
+            )
+
     def _check_lightings(self, scene: SceneFile, wrong: Mistakes) -> None:
         """A lighting that names no lamp is an error now, not after an hour."""
-        from vobench.suite.scene_build import build
-
-        lights = () if wrong.found else build(scene, {}).lights
+        lights = () if wrong.found else _lights(scene)
         for lighting, overrides in self.suite.lightings.items():
             for name, override in overrides.items():
                 with self.wrong.at("lightings", lighting, name):
@@ -426,6 +468,12 @@ class _Planner:
                     raise SuiteError(f"two cases are called '{case.name}'; name one another: {case.source.path}")
             taken = taken | {case.name}
         return tuple(recorded)
+
+
+def _lights(scene: SceneFile) -> tuple[Light, ...]:
+    from vobench.suite.scene_build import build
+
+    return build(scene, {}).lights
 
 
 def _combinations(axes: tuple[dict[str, Any], ...]) -> Iterator[tuple[str, dict[str, str]]]:

@@ -35,6 +35,11 @@ class YamlFile:
     marked: Any
     kept: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
+    @property
+    def plain(self) -> Any:
+        """What it holds, in Python's own types."""
+        return _plain(self.marked)
+
     def placed(self, error: VobenchError, *keys: int | str) -> tuple[Mistake, ...]:
         """The mistakes of an error, this place in front of their own; without keys, where they have none."""
         place = self.place(self.written(keys))
@@ -47,13 +52,14 @@ class YamlFile:
         """The place of the deepest of these keys that the file has."""
         tree, line, named = self.marked, None, list[int | str]()
         for key in keys:
-            if isinstance(key, int) and isinstance(tree, str | dict) and key not in list(tree):
+            if isinstance(key, int) and (isinstance(tree, str | int) or (isinstance(tree, dict) and key not in tree)):
                 continue  # one value stands for a list of one
             named.append(key)
+            lines = getattr(tree, "lc", None)  # what was put in place of the file's has none
             if isinstance(tree, dict) and key in tree:
-                tree, line = tree[key], tree.lc.key(key)[0] + 1 if key in (tree.lc.data or ()) else line
+                tree, line = tree[key], lines.key(key)[0] + 1 if lines and key in (lines.data or ()) else line
             elif isinstance(tree, list) and isinstance(key, int) and key < len(tree):
-                tree, line = tree[key], tree.lc.item(key)[0] + 1
+                tree, line = tree[key], lines.item(key)[0] + 1 if lines else line
             else:
                 tree = None
         value = tree if isinstance(tree, str | bool | int | float) else None
@@ -166,6 +172,16 @@ def checked(kind: type[Model], data: Any) -> Model:
     """
     read: Model = _adapter(kind).validate_json(json.dumps(data), strict=True)
     return read
+
+
+def checked_section(kind: type[Model], data: Any, at: Place) -> Model:
+    """As `checked`, of what a place in a file makes of the file. Raises SuiteError."""
+    try:
+        return checked(kind, data)
+    except ValidationError as error:
+        found = list(_complaints(YamlFile(Path(at.file), data), error, json_schema(kind), ()))
+    places = [replace(at, key=f"{at.key}.{mistake.places[0].key}", value=mistake.places[0].value) for mistake in found]
+    raise SuiteError(*(replace(mistake, places=(place,)) for mistake, place in zip(found, places, strict=True)))
 
 
 def plain(settings: Any, *, exclude: Any = None) -> Any:

@@ -1,0 +1,142 @@
+"""Scenarios: one factor at six severities, all else the same."""
+
+from pathlib import Path
+
+import pytest
+
+from vobench.errors import SuiteError
+from vobench.suite import catalog
+from vobench.suite.catalog import builtin_root
+from vobench.suite.scenario import AXES, read_scenario
+from vobench.suite.suite import Plan, read_plan
+
+CLOSET = """name: closet
+white_cd_m2: 50
+materials: {grain: {pattern: terrazzo, albedo: 0.5, resolution_px: 8}}
+room: {size_m: [3, 3, 1.5], floor: grain, wall: grain, ceiling: grain}
+lamps: [{name: lamp, center_m: [0, 0, 1.4], size_m: [0.4, 0.4], power_lm: 600}]
+"""
+DUSK = """name: dusk
+base:
+  scene: closet
+  rig: {pitch_deg: 90}
+  trajectory: {targets_m: [[0.5, 0]]}
+  camera: {sensor: mt9v034, chip: {read_noise_e: 5}}
+severity:
+  - {}
+  - {camera: {gain_db: 6}}
+  - {camera: {gain_db: 12, chip: {prnu: 0.1}}}
+  - {lighting: {lamp: {power_lm: 100}}}
+  - {scene_changes: {materials.grain.albedo: 0.1}}
+  - {trajectory: {rate_hz: 5}}
+"""
+SUITE = "name: tiny\nscenarios: {dusk: [0, 2, 3, 4, 5]}\nestimators: [stand_still]\n"
+
+
+@pytest.fixture
+def plan(tmp_path, monkeypatch):
+    """Reads the plan of a suite with one scenario, texts of both replaced."""
+    monkeypatch.chdir(tmp_path)
+    for folder in ("scenes", "suites/scenarios"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "scenes" / "closet.yaml").write_text(CLOSET)
+
+    def read(old: str = "", new: str = "", *, suite: str = SUITE) -> Plan:
+        assert old in DUSK
+        (tmp_path / "suites" / "scenarios" / "dusk.yaml").write_text(DUSK.replace(old, new, 1))
+        (tmp_path / "suites" / "tiny.yaml").write_text(suite)
+        return read_plan("./suites/tiny.yaml")
+
+    return read
+
+
+def test_a_case_says_its_scenario_and_severity_and_others_say_none(plan):
+    axes = "scenes: [closet]\nrigs: {down: {pitch_deg: 90}}\ntrajectories: {short: {targets_m: [[0.5, 0]]}}\n"
+    plain, *severe = plan(suite=SUITE + axes).cases
+    assert (plain.scenario, plain.severity) == (None, None)
+    assert [(case.name, case.scenario, case.severity) for case in severe] == [
+        (f"dusk-{n}", "dusk", n) for n in (0, 2, 3, 4, 5)
+    ]
+
+
+def test_a_severity_changes_the_keys_it_names_and_no_others(plan):
+    first, second, third, fourth, fifth = plan().cases
+    assert (second.camera.gain_db, second.camera.chip.prnu, second.camera.chip.read_noise_e) == (12, 0.1, 5)
+    assert (third.camera, fourth.camera, fifth.camera) == (first.camera,) * 3
+    assert third.lighting["lamp"].power_lm == 100
+    assert (first.scene.materials["grain"].albedo, fourth.scene.materials["grain"].albedo) == (0.5, 0.1)
+    assert fifth.trajectory.rate_hz == 5
+    changed = [
+        [axis for axis in ("scene", *AXES) if getattr(case, axis) != getattr(first, axis)]
+        for case in (second, third, fourth, fifth)
+    ]
+    assert changed == [["camera"], ["lighting"], ["scene"], ["trajectory"]]
+
+
+def test_variants_of_an_axis_are_called_alike_just_where_they_are(plan):
+    cases = plan().cases
+    for axis in ("scene", *AXES):
+        names = [case.variant[axis] for case in cases]
+        values = [getattr(case, axis) for case in cases]
+        assert [[a == b for a in names] for b in names] == [[a == b for a in values] for b in values]
+
+
+def test_calibrations_stand_side_by_side_and_are_told_alike(plan):
+    cases = plan(suite=SUITE.replace("[0, 2, 3, 4, 5]", "2") + "calibrations: [none, worn]\n").cases
+    assert [case.name for case in cases] == ["dusk-2-none", "dusk-2-worn"]
+    none, worn = cases
+    assert none.build_rig().T_body_right.tobytes() == worn.build_rig().T_body_right.tobytes()
+    assert none.build_true_rig().T_body_right.tobytes() != worn.build_true_rig().T_body_right.tobytes()
+    assert worn.build_true_rig().T_body_right.tobytes() == worn.build_true_rig().T_body_right.tobytes()
+
+
+MISTAKES = [
+    ("gain_db: 6", "gain_dbb: 6", "severity.1.camera.gain_dbb: unknown key. Did you mean 'gain_db'?"),
+    ("gain_db: 6", "gain_db: 90", "dusk.yaml:9: severity.1.camera.gain_db: should be 48 or less (got 90)"),
+    ("  - {}\n", "", "severity: should have 6 or more entries, but has 5"),
+    ("grain.albedo", "grian.albedo", "materials.grian"),
+    ("{lamp: {p", "{lmap: {p", "scenarios.dusk: lighting: no light named 'lmap'. Did you mean 'lamp'?"),
+    ("scene: closet", "scene: close", "scenarios.dusk: no scene named 'close'. Did you mean 'closet'?"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "said"), MISTAKES, ids=[new for _, new, _ in MISTAKES])
+def test_what_is_wrong_with_a_scenario_is_said_with_its_place(plan, old, new, said):
+    with pytest.raises(SuiteError) as refused:
+        plan(old, new)
+    assert said in "\n".join(map(str, refused.value.mistakes))
+
+
+@pytest.mark.parametrize(
+    ("suite", "said"),
+    [
+        (SUITE.replace("dusk:", "dsuk:"), "scenarios.dsuk: no scenario named 'dsuk'. Did you mean 'dusk'?"),
+        (SUITE.replace("[0, 2, 3, 4, 5]", "6"), "scenarios.dusk: should be 5 or less (got 6)"),
+        ("name: tiny\nestimators: [stand_still]\n", "or scenarios or a source alone"),
+        ("name: t\nsource: x\ncalibrations: [worn]\nestimators: [stand_still]\n", "calibrations: belongs to scenarios"),
+    ],
+    ids=["name", "severity", "nothing", "calibrations"],
+)
+def test_what_is_wrong_with_a_suite_of_scenarios_is_said(plan, suite, said):
+    with pytest.raises(SuiteError) as refused:
+        plan(suite=suite)
+    assert said in "\n".join(map(str, refused.value.mistakes))
+
+
+STOCK = [entry for entry in catalog.entries("scenario") if builtin_root() in entry.path.parents]
+
+
+@pytest.mark.parametrize("entry", STOCK, ids=lambda entry: entry.name)
+def test_a_stock_scenario_changes_something_at_every_severity_and_nothing_at_severity_0(entry):
+    scenario = read_scenario(Path(entry.path))
+    assert scenario.name == entry.name
+    assert len({repr(setup) for setup in scenario.setups}) == len(scenario.setups)
+    changed = {
+        tuple(
+            axis
+            for axis in ("scene", "scene_changes", *AXES)
+            if getattr(setup, axis) != getattr(scenario.setup(0), axis)
+        )
+        for setup in scenario.setups[1:]
+    }
+    assert len(changed) == 1, "one factor, on one axis"
