@@ -124,12 +124,14 @@ def explain(case: Case, nuisances: Sequence[Nuisance], measure: Measure, *, repe
 
     def tried(sets: Sequence[tuple[str, ...]]) -> dict[tuple[str, ...], list[Outcome]]:
         cases = {
-            f"{folder_name(removed)}.{nth}": replace(without(case, removed), seed=case.seed + nth)
+            f"{folder_name(removed, names)}.{nth}": replace(without(case, removed), seed=case.seed + nth)
             for removed in sets
             for nth in range(repeats)
         }
         found = measure(cases)
-        return {removed: [found[f"{folder_name(removed)}.{nth}"][0] for nth in range(repeats)] for removed in sets}
+        return {
+            removed: [found[f"{folder_name(removed, names)}.{nth}"][0] for nth in range(repeats)] for removed in sets
+        }
 
     whole = tuple(names)
     first = tried([(), *((name,) for name in names), *([whole] if len(names) > 1 else [])])
@@ -147,9 +149,16 @@ def explain(case: Case, nuisances: Sequence[Nuisance], measure: Measure, *, repe
     return Explanation(_mean(base), _status(base), differ, everything, singles, alone, pairs)
 
 
-def folder_name(removed: Sequence[str]) -> str:
-    """A variant as cases are called."""
-    return "without_" + "_and_".join(name.lower().replace(" ", "_") for name in removed) if removed else "as_it_is"
+def folder_name(removed: Sequence[str], names: Sequence[str]) -> str:
+    """A variant as cases are called, by what is removed or, where that is most, by what is left."""
+    left = [name for name in names if name not in removed]
+    if removed and len(left) < 2 < len(names):
+        return f"with_{_word(left[0])}_alone" if left else "without_all"
+    return "without_" + "_and_".join(map(_word, removed)) if removed else "as_it_is"
+
+
+def _word(name: str) -> str:
+    return name.lower().replace(" ", "_").replace("-", "_")
 
 
 def mends(change: Change, everything: Change) -> bool:
