@@ -8,7 +8,8 @@ from vobench.analysis.nuisance import Nuisance, without
 from vobench.suite.suite import Case, Window
 
 FIRST_SHARE = 0.1  # of all frames: what is tried first, around where the trial went wrong
-LEAD = 0.25  # of a window: what comes before that place
+# Of a window: what comes before that place, where most of the frames may fail and where most must not.
+LEAD, LEAD_OF_PARTIAL = 0.25, 0.75
 FEWEST_FRAMES = 4
 
 
@@ -39,7 +40,14 @@ class _Spent(Exception):  # noqa: N818 - no error: the trials are used up
 
 
 def shrink(
-    case: Case, count: int, wrong_at: int, nuisances: Sequence[Nuisance], fails: Callable[[Case], bool], *, trials: int
+    case: Case,
+    count: int,
+    wrong_at: int,
+    nuisances: Sequence[Nuisance],
+    fails: Callable[[Case], bool],
+    *,
+    trials: int,
+    lead: float = LEAD,
 ) -> Shrunk:
     """Cut a case of `count` frames that goes wrong at one of them, then remove nuisances, in so many trials at most.
 
@@ -48,7 +56,7 @@ def shrink(
     """
     search = _Search(case, case.frames or (0, count), fails, trials)
     try:
-        search.find(wrong_at)
+        search.find(wrong_at, lead)
         search.cut()
         search.remove(nuisances)
     except _Spent:
@@ -69,12 +77,12 @@ class _Search:
         """The smallest that is known to fail."""
         return self._made(self.window, self.removed)
 
-    def find(self, wrong_at: int) -> None:
+    def find(self, wrong_at: int, lead: float) -> None:
         """A window around the place, twice as long each time, the whole where no shorter one fails."""
         first, end = self._whole
         length = max(FEWEST_FRAMES, round(FIRST_SHARE * (end - first)))
         while length < end - first:
-            begin = min(max(first, first + wrong_at - max(1, round(LEAD * length))), end - length)
+            begin = min(max(first, first + wrong_at - max(1, round(lead * length))), end - length)
             if self._try((begin, begin + length)):
                 return
             length *= 2

@@ -14,7 +14,7 @@ from vobench.analysis.causes import Attribution, Course, attribute
 from vobench.analysis.conditions import CONDITIONS, conditions
 from vobench.analysis.explain import Change, Explanation, Outcome, explain, loss_between, mends, segment_loss
 from vobench.analysis.nuisance import NUISANCES, nuisances_of
-from vobench.analysis.shrink import Failure, Shrunk, shrink
+from vobench.analysis.shrink import LEAD, LEAD_OF_PARTIAL, Failure, Shrunk, shrink
 from vobench.cli import terminal
 from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.run.estimate import ESTIMATE
@@ -400,7 +400,8 @@ def shrunk(tried: Tried, *, trials: int, out: Path, jobs: int) -> Shrunk:
         score, *_ = folder.scores()
         return Failure.of(score.status, score.reason) == wanted
 
-    return shrink(tried.case, tried.score.frames, _wrong_at(tried), nuisances_of(tried.case), fails, trials=trials)
+    nuisances, lead = nuisances_of(tried.case), LEAD_OF_PARTIAL if tried.score.status == "partial" else LEAD
+    return shrink(tried.case, tried.score.frames, _wrong_at(tried), nuisances, fails, trials=trials, lead=lead)
 
 
 def _wrong_at(tried: Tried) -> int:
