@@ -114,6 +114,10 @@ PLANTED: dict[str, tuple[str, str, dict[str, Any]]] = {
         {"scene": {"materials.floor.contrast": 0.01, "materials.wall.contrast": 0.01, "materials.box.contrast": 0.01}},
     ),
 }
+PLANTED |= {
+    "eyes": ("unlike eyes", "stereo_pnp", {"camera": {"unlike": {"right": {"gain": 0.15, "blur_sigma_px": 4.0}}}}),
+    "drops": ("dropped frames", "lk_epipolar", {"camera": {"timing": {"drop_share": 0.7, "drop_burst": 4}}}),
+}
 PAIRS = (
     ("blur", "crowd"),
     ("noise", "rolling"),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vobench.geometry.rig import CalibrationError
-from vobench.sensor.image_sensor import CameraSensor
+from vobench.sensor.image_sensor import CameraSensor, Eyes
 from vobench.sensor.response import FULL_SCALE_DN, linear_of_grey
 from vobench.suite.scene_file import materials_used
 from vobench.suite.scene_spec import (
@@ -59,6 +59,10 @@ def without(case: Case, removed: Iterable[str]) -> Case:
 
 def _camera(**changes: Any) -> Callable[[Case], Case]:
     return lambda case: replace(case, camera=replace(case.camera, **changes))
+
+
+def _timed(**changes: Any) -> Callable[[Case], Case]:
+    return lambda case: _camera(timing=replace(case.camera.timing, **changes))(case)
 
 
 def _of_scene(change: Callable[[SceneFile], SceneFile]) -> Callable[[Case], Case]:
@@ -208,6 +212,9 @@ NUISANCES = (
     Nuisance("burnt pixels", "eight times the range", _unburnt, shown_by="burnt"),
     Nuisance("blur", "a short exposure and a sharp lens", _lens_blur),
     Nuisance("noise", "a chip without noise", _noiseless),
+    Nuisance("unlike eyes", "two equal eyes", _camera(unlike=Eyes())),
+    Nuisance("dropped frames", "every frame, once", _timed(drop_share=0.0, repeat_share=0.0)),
+    Nuisance("late pictures", "both taken at their stamp", _timed(jitter_ms=0.0, right_delay_ms=0.0)),
     Nuisance("rolling shutter", "a global shutter", _camera(shutter="global", readout_ms=None)),
     Nuisance("auto-exposure", "the first exposure throughout", _camera(auto_exposure=None)),
     Nuisance("vignetting and dirt", "an even, clean lens", _camera(vignetting=0, vignetting_cutoff_deg=None, dirt=0)),

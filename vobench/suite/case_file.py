@@ -9,7 +9,7 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from vobench.motion.replay import Replay
-from vobench.suite.suite import Case, Entrant
+from vobench.suite.suite import AXES, Case, Entrant
 from vobench.suite.yaml_file import plain
 
 SUITE_FILE, POSES_FILE = "suite.yaml", "poses.tum"
@@ -21,17 +21,18 @@ def write_case(case: Case, entrants: Sequence[Entrant], folder: Path, *, name: s
     Estimators keep their names, for a folder of that name may be put beside it; those found by a path, their path.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    scene = case.variant["scene"]
+    of = {axis: case.variant.get(axis, "it") for axis in AXES}
+    scene = case.variant.get("scene", case.scene.name)
     _write(folder / f"{scene}.yaml", _scene(case, folder))
     suite = {
         "name": name,
         "summary": summary,
         "seed": case.seed,
         "scenes": [scene],
-        "lightings": {case.variant["lighting"]: _said(plain(case)["lighting"])},
-        "rigs": {case.variant["rig"]: _said(plain(case.rig))},
-        "trajectories": {case.variant["trajectory"]: _trajectory(case, folder)},
-        "cameras": {case.variant["camera"]: _said(plain(case.camera))},
+        "lightings": {of["lighting"]: _said(plain(case)["lighting"])},
+        "rigs": {of["rig"]: _said(plain(case.rig))},
+        "trajectories": {of["trajectory"]: _trajectory(case, folder)},
+        "cameras": {of["camera"]: _said(plain(case.camera))},
         "rendering": _said(plain(case.rendering)),
         "truth": list(case.truth),
         **({"frames": list(case.frames)} if case.frames else {}),

@@ -413,6 +413,7 @@ class _Planner:
                 camera=setup.camera,
                 rendering=self.suite.rendering,
                 truth=self.suite.truth,
+                frames=self.suite.frames,
                 seed=self.suite.seed,
                 scenario=scenario.name,
                 severity=severity,
