@@ -59,7 +59,7 @@ def entries(kind: Kind) -> list[Entry]:
 
 
 def find(kind: Kind, name: str, *, suite: Path | None = None) -> Entry:
-    """The entry of that name that wins; a path, which has a / or ends in .yaml, is taken as it is.
+    """The entry of that name that wins; a path, with a / or a suffix, is taken from here or from beside the suite.
 
     `suite` is the file that asks, beside which is looked first. Raises UnknownNameError with the nearest name and
     all known ones.
@@ -73,6 +73,8 @@ def find(kind: Kind, name: str, *, suite: Path | None = None) -> Entry:
 
 
 def _at(kind: Kind, path: Path, suite: Path | None) -> Entry:
+    if suite and not path.exists() and (suite.parent / path).exists():
+        path = suite.parent / path
     if kind == "estimator" and path.name == "estimator.yaml":
         path = path.parent
     if kind == "scene" and path.is_dir():
