@@ -137,6 +137,8 @@ def test_a_missing_pose_is_a_lost_segment():
     errors = segment_errors(walk(), half)
     assert np.nanmax(errors) == LOST
     assert np.isfinite(errors).sum() == np.isfinite(segment_errors(walk(), walk())).sum()
+    nothing = segment_errors(walk(), Trajectory(half.t_ns[:0], half.T_world_frame[:0]))
+    assert np.nanmin(nothing) == LOST
 
 
 def test_equal_orders_have_tau_1_and_reversed_ones_minus_1():

@@ -288,10 +288,9 @@ def segment_errors(gt: Trajectory, est: Trajectory, *, scaled: bool = False) -> 
     NaN stands for no segment, LOST for one that the estimate has no pose of.
     `scaled`: the estimate has no unit of length, and gets the truth's.
     """
-    rows = np.searchsorted(est.t_ns, gt.t_ns)
-    there = (rows < len(est)) & (est.t_ns[np.minimum(rows, len(est) - 1)] == gt.t_ns)
+    there = np.isin(gt.t_ns, est.t_ns)
     T_est = np.full((len(gt), 4, 4), np.nan)
-    T_est[there] = est.T_world_frame[rows[there]]
+    T_est[there] = est.T_world_frame[np.searchsorted(est.t_ns, gt.t_ns[there])]
     if scaled and there.sum() > 2:
         fit = align(T_est[there], gt.T_world_frame[there], kind="sim3")
         T_est[:, :3, 3] *= fit.scale

@@ -54,7 +54,7 @@ ESTIMATORS: tuple[Any, ...] = (
     "stereo_pnp",
     "feature_vo",
     "mono_vo",
-    "constant_velocity",
+    {"name": "stereo_pnp", "label": "stereo_pnp_wide", "params": {"window_px": 21}},
     "stand_still",
 )
 TO_FIT = 4  # pictures that the camera is fitted to
