@@ -150,7 +150,10 @@ def _ground():
         for s in (-1, 1)
     ]
     yield "lids", [Part(joined(lids + gullies), matt("#4a4b4b"))]
-    yield "back", [Part(quad((-60, -40, -0.02), (120, 0, 0), (0, 80, 0)), asphalt)]
+    beyond = [
+        quad((x, y, -0.02), (CROSS_M + PAVED_M, 0, 0), (0, 18, 0)) for x in (-far - PAVED_M, half) for y in (-40, 22)
+    ]
+    yield "back", [Part(joined(beyond), asphalt)]
 
 
 def _lid():
