@@ -79,7 +79,7 @@ def _lit_windows(things):
 def _spacing_m(name):
     """Fine on the ground near by, coarse on what is high, thin or far."""
     kind = name.split("_")[0]
-    return {"road": 0.2, "pavement": 0.2, "house": 0.4, "car": 0.16, "tree": 0.5}.get(kind, 0.12)
+    return {"road": 0.25, "pavement": 0.25, "house": 0.6, "car": 0.22, "tree": 0.6}.get(kind, 0.18)
 
 
 def _moved(name, parts, place):
