@@ -48,6 +48,10 @@ def make(seed):
             place = at(end * (LONG / 2 + CROSS_M + PAVED_M), y, 0, yaw=90 + 90 * end)
             far += _moved(f"house_{k}", _house(rng, k, 13.0), place)
             k += 1
+    for end, side in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+        place = at(end * (LONG / 2 + (CROSS_M + PAVED_M) / 2), side * 22.0, 0, yaw=-90 * side)
+        far += _moved(f"house_{k}", _house(rng, k, CROSS_M + PAVED_M), place)
+        k += 1
     near += [piece.build(seed) for piece in _pieces(rng)]
     near += _signs()
     made, known = things(far, {GLASS_NAME: GLASS})
@@ -75,7 +79,7 @@ def _lit_windows(things):
 def _spacing_m(name):
     """Fine on the ground near by, coarse on what is high, thin or far."""
     kind = name.split("_")[0]
-    return {"road": 0.2, "pavement": 0.2, "house": 0.4, "car": 0.16, "tree": 0.5}.get(kind, 0.12)
+    return {"road": 0.25, "pavement": 0.25, "house": 0.6, "car": 0.22, "tree": 0.6}.get(kind, 0.18)
 
 
 def _moved(name, parts, place):
@@ -150,7 +154,6 @@ def _ground():
         for s in (-1, 1)
     ]
     yield "lids", [Part(joined(lids + gullies), matt("#4a4b4b"))]
-    yield "back", [Part(quad((-60, -40, -0.02), (120, 0, 0), (0, 80, 0)), asphalt)]
 
 
 def _lid():
@@ -264,11 +267,10 @@ def _house(rng, number, wide):
     if number % 3 == 0:
         parts += _awning(ink, middle, u1 - u0)
     parts.append(put(tube([[0.08, wide / 2 - 0.15, KERB_M], [0.08, wide / 2 - 0.15, high - 0.3]], 0.045), DARK))
-    roof = [block((9.0, wide, 0.1), bevel_m=0).moved(at(-4.5, 0, high - 0.06))]
-    sides = [
-        block((9.0, 0.1, high - SHOP_M), bevel_m=0).moved(at(-4.52, s * (wide / 2 - 0.05), (high + SHOP_M) / 2 - 0.1))
-        for s in (-1, 1)
-    ]
+    deep = 15.5
+    roof = [block((deep, wide, 0.1), bevel_m=0).moved(at(-deep / 2, 0, high - 0.06))]
+    side = block((deep, 0.1, high - 0.1), bevel_m=0)
+    sides = [side.moved(at(-0.02 - deep / 2, s * (wide / 2 - 0.05), high / 2 - 0.06)) for s in (-1, 1)]
     return [*parts, Part(joined(roof), DARK), Part(joined(sides), look)]
 
 

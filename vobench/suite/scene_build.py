@@ -31,7 +31,7 @@ def build(spec: SceneFile, lighting: Lighting) -> Scene:
     return replace(made, lights=lit(made.lights, lighting))
 
 
-KEPT = 4
+KEPT = 16
 _kept: OrderedDict[str, Scene] = OrderedDict()
 
 
