@@ -54,7 +54,7 @@ def test_noise_is_named_as_the_cause_and_the_failure_shrinks_to_a_suite_of_its_o
     small = vobench("shrink", failed, "--trials", 2, "--save", "small", "--json").json
     first, end = small["frames"]
     assert end - first <= small["of"] / 2
-    assert vobench("run", "small/suite.yaml", "--json").json["boards"][0]["rows"][0]["status"] == "lost"
+    assert vobench("run", "small/suite.yaml", "--json").json["cells"][0]["status"] == "lost"
 
     assert "too few frames" in vobench("causes", "runs/tiny").out
     (trial,) = vobench("causes", "runs/tiny", "--json").json["estimators"][0]["trials"]

@@ -221,9 +221,9 @@ def test_the_log_of_events_has_a_start_and_an_end_of_each_task(vobench, here):
 def test_a_limit_of_time_holds_for_every_trial_and_fresh_makes_all_anew(ran: Path, vobench):
     store = Path(os.environ["VOBENCH_CACHE"])
     made = {path: path.stat().st_mtime_ns for path in store.glob("*/*/manifest.json")}
-    assert vobench("run", "tiny", "--timeout", 0.001, "--json").json["boards"][0]["rows"][0]["status"] == "timeout"
+    assert vobench("run", "tiny", "--timeout", 0.001, "--json").json["cells"][0]["status"] == "timeout"
     assert {path: path.stat().st_mtime_ns for path in made} == made
-    assert vobench("run", "tiny", "--limit", 3, "--json").json["boards"][0]["rows"][0]["frames"] == 3
+    assert vobench("run", "tiny", "--limit", 3, "--json").json["cells"][0]["frames"] == 3
     whole = vobench("run", "tiny", "--limit", 999, "--dry-run", "--json").json["tasks"]
     assert [row["to do"] for row in whole if row["stage"] in ("bake", "sequence")] == [0, 0]
     vobench("run", "tiny", "--fresh", "--json")

@@ -99,7 +99,10 @@ def test_a_suite_may_be_called_as_its_scene_is(here, suite):
 
 def test_what_lies_beside_a_suite_is_among_the_known(here, suite):
     put(suite.parent, "scene", "hall")
-    with pytest.raises(UnknownNameError, match=r"Did you mean 'hall'\? Known: hall, office, room"):
+    with pytest.raises(
+        UnknownNameError,
+        match=r"Did you mean 'hall'\? Known: car_park, corridor, hall, office, room, street, warehouse",
+    ):
         catalog.find("scene", "halle", suite=suite)
 
 
@@ -151,7 +154,9 @@ def test_an_unknown_name_gets_the_nearest_and_all_there_are(here):
 
 
 def test_a_name_far_from_all_gets_no_guess(here):
-    with pytest.raises(UnknownNameError, match=r"^no scene named 'zzzz'\. Known: office, room$"):
+    with pytest.raises(
+        UnknownNameError, match=r"^no scene named 'zzzz'\. Known: car_park, corridor, office, room, street, warehouse$"
+    ):
         catalog.find("scene", "zzzz")
 
 
