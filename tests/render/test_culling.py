@@ -108,7 +108,7 @@ def sphere(count: int) -> Mesh:
     return Mesh(points, faces, np.stack([u, v], -1).reshape(-1, 2), points)
 
 
-SCENES = [Path(__file__).parents[2] / "scenes" / name / "scene.yaml" for name in ("corridor", "office", "room")]
+SCENES = [Path(__file__).parents[2] / "scenes" / name / "scene.yaml" for name in ("office", "room")]
 CAMERA_mesh = Pinhole(320, 240, 144.0, 144.0, 159.5, 119.5)
 PLAIN = ("plain", 0.5, 0, 1, 8, 0)
 SKY_CD_M2 = 1e9  # so bright that one sample of it shows, by way of a mirror too

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from vobench.errors import SuiteError
-from vobench.suite import catalog
+from vobench.suite import catalog, yaml_file
 from vobench.suite.catalog import builtin_root
 from vobench.suite.scenario import AXES, read_scenario
-from vobench.suite.suite import Plan, read_plan
+from vobench.suite.suite import Plan, Suite, read_plan
 
 CLOSET = """name: closet
 white_cd_m2: 50
@@ -140,3 +140,10 @@ def test_a_stock_scenario_changes_something_at_every_severity_and_nothing_at_sev
         for setup in scenario.setups[1:]
     }
     assert len(changed) == 1, "one factor, on one axis"
+
+
+@pytest.mark.parametrize("name", ["daily", "full"])
+def test_the_long_suites_have_every_stock_scenario(name):
+    suite = yaml_file.read(catalog.find("suite", name).path, Suite)
+    stock = {path.stem for path in (builtin_root() / "suites" / "scenarios").glob("*.yaml")}
+    assert suite.scenarios.keys() == stock
