@@ -30,6 +30,7 @@ LOG_BYTES = 1 << 20
 LOOK_S = 0.1  # how often memory and time of a running program are looked at
 WEIGH_S = 1.0  # how often its files are
 SHARED = "/dev/shm/"  # Linux's shared memory, where it has a name
+DIE_S = 0.005  # for a process that is killed to be gone
 GUARD_S = 2.0  # the guard's time to end what it guards
 GUARD = (sys.executable, "-I", "-S", str(Path(__file__).with_name("guard.py")))
 CPUCLOCK_SCHED = 2  # of another process's clock: linux/posix-timers.h
@@ -118,9 +119,12 @@ class Program:
         stop.kill_session(self.process)
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(timeout=GUARD_S)
-        for pid in _strays(self.home):
-            with suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGKILL)
+        until = time.monotonic() + GUARD_S
+        while (strays := _strays(self.home)) and time.monotonic() < until:
+            for pid in strays:
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+            time.sleep(DIE_S)
 
     def _free_shared(self) -> None:
         for path in self._shared:
