@@ -30,7 +30,6 @@ TILE_PX, CYCLES = 256, (4, 100)
 BURNT_DN, DARK_DN = 254, 2
 PATCH_PX, PATCH_STEP_PX, FEWEST_PATCHES, NOISE_ROUNDS = 7, 3, 300, 8
 EDGE_SHARE, EDGE_PX = 0.01, 9  # the strongest gradients, and the window that has the whole of an edge
-DOCUMENT = "docs/realism.md"
 
 
 @dataclass(frozen=True, slots=True)

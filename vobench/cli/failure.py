@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from pydantic import ValidationError
 
-from vobench import stop
 from vobench.analysis.causes import Attribution, Course, attribute
 from vobench.analysis.conditions import CONDITIONS, conditions
 from vobench.analysis.explain import Change, Explanation, Outcome, explain, loss_between, mends, segment_loss
 from vobench.analysis.nuisance import NUISANCES, nuisances_of
 from vobench.analysis.shrink import LEAD, LEAD_OF_PARTIAL, Failure, Shrunk, shrink
 from vobench.cli import terminal
+from vobench.cli.run import run_plan
 from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.run.estimate import ESTIMATE
-from vobench.run.executor import Executor, LocalProcesses, Serial
 from vobench.run.folder import (
     CASE,
     ESTIMATORS,
@@ -34,9 +33,8 @@ from vobench.run.folder import (
 )
 from vobench.run.frames import read_frames
 from vobench.run.ground_truth import GROUND_TRUTH
-from vobench.run.key import cache_folder, folder_digest
+from vobench.run.key import folder_digest
 from vobench.run.motion import body_motions
-from vobench.run.run import run_suite
 from vobench.suite import catalog
 from vobench.suite.case_file import write_case
 from vobench.suite.manifest import read_manifest
@@ -143,13 +141,7 @@ def run_cases(tried: Tried, cases: Mapping[str, Case], *, name: str, out: Path, 
     with wrong.at():
         body_motions(plan)
     wrong.require_none()
-    executor: Executor = Serial(terminal.Bars()) if jobs == 1 else LocalProcesses(jobs)
-    work = terminal.Work(None, is_serial=jobs == 1)
-    store = cache_folder().resolve()
-    with stop.undone(executor.close), work:
-        return run_suite(
-            plan, {}, root=out, store=store, finish=lambda *_: None, executor=executor, heard=work.hear, tell=work.say
-        )
+    return run_plan(plan, {}, out=out, jobs=jobs, finish=lambda *_: None)
 
 
 def outcome(folder: RunFolder, score: TrialScore) -> Outcome:

@@ -4,6 +4,7 @@ import os
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,6 +28,8 @@ from vobench.suite.yaml_file import json_schema
 
 if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
+    from vobench.run.folder import RunFolder
+    from vobench.run.run import Finish
 
 
 def run_command(
@@ -91,19 +94,15 @@ def run_command(
     from vobench.cli.report import print_board
     from vobench.report import page
     from vobench.report.board_table import as_json as board_as_json
-    from vobench.run.run import BESIDE, run_suite
+    from vobench.run.run import BESIDE
 
     _, recordings = _preflight(planned)
     if cause := why_unwritable(out):
         raise InputError(f"--out should be a folder that can be written ({cause}): {out}")
-    work = terminal.Work(events, is_serial=(count := _jobs(jobs)) == 1 and not scheduler)
-    executor: Executor = Serial(terminal.Bars()) if count == 1 else LocalProcesses(count)
-    executor = Dask(scheduler) if scheduler else executor
-    with stop.undone(executor.close), work:
-        folder = run_suite(
-            planned, recordings, root=out, store=cache_folder().resolve(), finish=page.write_reports,
-            executor=executor, shares_time=share_time, is_fresh=fresh, heard=work.hear, tell=work.say,
-        )  # fmt: skip
+    folder = run_plan(
+        planned, recordings, out=out, jobs=_jobs(jobs), finish=page.write_reports, scheduler=scheduler, events=events,
+        shares_time=share_time, is_fresh=fresh,
+    )  # fmt: skip
     scores = folder.scores()
     board = page.board_of(folder, scores)
     broken = [line for limit in limits for line in limit.broken_by(scores)]
@@ -121,6 +120,30 @@ def run_command(
         print(f"vobench: {line}", file=sys.stderr)
     if broken:
         raise typer.Exit(FAILED_LIMIT)
+
+
+def run_plan(
+    planned: Plan,
+    recordings: "Mapping[str, Recording]",
+    *,
+    out: Path,
+    jobs: int,
+    finish: "Finish",
+    scheduler: str | None = None,
+    events: Path | None = None,
+    **options: bool,
+) -> "RunFolder":
+    """`run_suite` with what happens shown on this terminal; `options` are its own."""
+    from vobench.run.run import run_suite
+
+    work = terminal.Work(events, is_serial=jobs == 1 and not scheduler)
+    executor: Executor = Serial(terminal.Bars()) if jobs == 1 else LocalProcesses(jobs)
+    executor = Dask(scheduler) if scheduler else executor
+    with stop.undone(executor.close), work:
+        return run_suite(
+            planned, recordings, root=out, store=cache_folder().resolve(), finish=finish, executor=executor,
+            heard=work.hear, tell=work.say, **options,
+        )  # fmt: skip
 
 
 FAILED_LIMIT = 3
@@ -197,17 +220,9 @@ def _to_do(planned: Plan, recordings: "Mapping[str, Recording]") -> list[dict[st
     """By stage, how many tasks there are, how many of them are done, why the rest is not, and how long it takes."""
     from vobench.run.dry_run import to_do
 
-    return [
-        {
-            "stage": each.stage,
-            "tasks": each.tasks,
-            "in the cache": each.tasks - each.to_do,
-            "to do": each.to_do,
-            "reasons": each.reasons,
-            "seconds": each.seconds,
-        }
-        for each in to_do(plan(planned, recordings), cache_folder())
-    ]
+    found = to_do(plan(planned, recordings), cache_folder())
+    counts = [{"in the cache": each.tasks - each.to_do, "to do": each.to_do} for each in found]
+    return [asdict(each) | count for each, count in zip(found, counts, strict=True)]
 
 
 def _spell(seconds: float | None) -> str:

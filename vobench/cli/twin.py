@@ -23,6 +23,7 @@ from vobench.analysis.twin import (
 )
 from vobench.cli import terminal
 from vobench.cli.realism import facts_of, recording_at, rows_of
+from vobench.cli.run import run_plan
 from vobench.cli.sequence import Calibration, Form, FormCommand, Rate, TopicOf, Truth, topics_of
 from vobench.dataset.layout import read
 from vobench.dataset.picture import require_free
@@ -31,7 +32,6 @@ from vobench.errors import InputError
 from vobench.estimator.tools import stereo_pair
 from vobench.geometry.rig import own_pair
 from vobench.geometry.se3 import Array, inverse
-from vobench.run.executor import LocalProcesses, Serial
 from vobench.run.folder import SEQUENCE, RunFolder, TrialScore, read_tum
 from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.run.key import cache_folder
@@ -196,19 +196,11 @@ def _look_of(recording: Recording) -> Look:
 
 
 def _run(file: Path, out: Path, jobs: int) -> RunFolder:
-    from vobench import stop
     from vobench.report import page
     from vobench.run.import_recording import read_all
-    from vobench.run.run import run_suite
 
     planned = read_plan(str(file))
-    work = terminal.Work(None, is_serial=jobs == 1)
-    executor = Serial(terminal.Bars()) if jobs == 1 else LocalProcesses(jobs)
-    with stop.undone(executor.close), work:
-        return run_suite(
-            planned, read_all(planned), root=out / "runs", store=cache_folder().resolve(),
-            finish=page.write_reports, executor=executor, heard=work.hear, tell=work.say,
-        )  # fmt: skip
+    return run_plan(planned, read_all(planned), out=out / "runs", jobs=jobs, finish=page.write_reports)
 
 
 def _errors(folder: RunFolder, case: str) -> dict[str, Array]:

@@ -344,11 +344,10 @@ class Layout:
 
     def around(self, some: Places, values: Floats, known: Mask) -> tuple[Floats, Floats]:
         """Mean and spread (N,) of the values (P,) of those few around some points that are known (P,), else NaN."""
-        rows = self.weights[some]
+        rows, kept = self.weights[some], np.where(known, values, 0)
         with np.errstate(invalid="ignore", divide="ignore"):
             count = rows @ known.astype(np.float32)
-            mean = rows @ np.where(known, values, 0) / count
-            square = rows @ np.where(known, values, 0) ** 2 / count
+            mean, square = rows @ kept / count, rows @ kept**2 / count
             return mean, np.sqrt(np.maximum(square - mean**2, 0))
 
     def blurred(self, values: Floats) -> Floats:

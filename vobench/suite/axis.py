@@ -9,10 +9,8 @@ from vobench.geometry.rig import PRESETS, RESIDUALS, CalibrationError, OwnPair, 
 from vobench.sensor.image_sensor import SENSOR_PRESETS, CameraSettings
 from vobench.sensor.imu import IMUS, ImuSettings
 from vobench.setting import Like, OneOf, Positive, Short, settings
-from vobench.suite.scene_spec import LightOverride
 
 HONEST = CalibrationError()
-Lighting = dict[str, LightOverride]
 Camera = Annotated[CameraSettings, SENSOR_PRESETS]
 
 

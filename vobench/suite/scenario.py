@@ -10,7 +10,8 @@ from vobench.errors import Mistake, SuiteError
 from vobench.sensor.image_sensor import CameraSettings
 from vobench.setting import Name, settings
 from vobench.suite import yaml_file
-from vobench.suite.axis import Camera, Lighting, RigSettings
+from vobench.suite.axis import Camera, RigSettings
+from vobench.suite.scene_file import Lighting
 from vobench.suite.trajectory import TrajectorySpec
 
 MOST_SEVERE = 5

@@ -13,7 +13,7 @@ import numpy as np
 from annotated_types import Ge, Le, MinLen
 
 from vobench.errors import SettingError, SuiteError, UnknownNameError, unknown
-from vobench.estimator.manifest import Limits, Manifest
+from vobench.estimator.manifest import USUAL, Limits, Manifest
 from vobench.geometry.rig import Level, Rig, drawn, true_rig
 from vobench.motion.replay import Replay
 from vobench.motion.wheeled import Wheeled
@@ -23,10 +23,11 @@ from vobench.sensor.image_sensor import CameraSettings
 from vobench.sensor.pixel_truth import CHANNELS
 from vobench.setting import Name, OneOf, Short, hints, settings
 from vobench.suite import catalog, scene_file, yaml_file
-from vobench.suite.axis import Camera, Lighting, RigSettings
+from vobench.suite.axis import Camera, RigSettings
 from vobench.suite.catalog import Entry, Kind
 from vobench.suite.manifest import read_manifest
 from vobench.suite.scenario import MOST_SEVERE, Scenario, read_scenario
+from vobench.suite.scene_file import Lighting
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import SOURCES, RecordedCase, Source, recorded_cases
 from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times
@@ -37,7 +38,6 @@ ALONE = {"scenarios", "source"}
 ENGINES = ("raster", "path")
 MOST_SAMPLES = 65536
 CALIBRATION_STREAM = 7_301  # sets what is drawn of a calibration apart from other streams of a seed
-USUAL = Limits()
 
 
 @settings()
