@@ -112,7 +112,7 @@ def run_command(
         print_board(board)
         if not sandbox_works():
             terminal.console().print("Estimators were not sandboxed: the kernel gives no namespaces (vobench doctor).")
-        if share_time:
+        if share_time or planned.suite.share_time:
             terminal.console().print(f"CPU times of this run were taken {BESIDE}.")
         vobench = "vobench" if shutil.which("vobench") else sys.argv[0]  # where the environment is not activated
         terminal.console().print(f"Everything is in {folder.path}\nLook into it: {vobench} view {folder.path}")

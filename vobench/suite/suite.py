@@ -109,6 +109,7 @@ class Suite:
     truth: tuple[ChannelName, ...] = ()
     frames: Window | None = None
     modes: Annotated[tuple[Mode, ...], MinLen(1)] = ("step",)
+    share_time: bool = False
     estimators: Annotated[tuple[NamedEstimator, ...], MinLen(1)]
 
     def __post_init__(self) -> None:
