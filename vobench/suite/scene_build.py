@@ -64,7 +64,7 @@ class Contents:
 
 
 def _make(spec: SceneFile) -> Scene:
-    parts = [_built(spec), *_from_maker(spec), *map(_model, spec.meshes), Contents(lights=tuple(_lights(spec)))]
+    parts = [_built(spec), *_from_maker(spec), *map(_model, spec.meshes), Contents(lights=tuple(listed_lights(spec)))]
     parts += [_mover(mover, spec) for mover in spec.movers]
     materials = {name: material for part in parts for name, material in part.materials.items()}
     found = [thing for part in parts for thing in part.things]
@@ -180,7 +180,8 @@ def _moved(light: Light, T_world_model: Array) -> Light:
     return placed
 
 
-def _lights(spec: SceneFile) -> Iterator[Light]:
+def listed_lights(spec: SceneFile) -> Iterator[Light]:
+    """The lights that a scene's file lists as such: lamps, sun and sky."""
     yield from (lamp.build() for lamp in spec.lamps)
     if spec.sun:
         yield _sun(spec.sun)
