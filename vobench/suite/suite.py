@@ -109,6 +109,7 @@ class Suite:
     truth: tuple[ChannelName, ...] = ()
     frames: Window | None = None
     modes: Annotated[tuple[Mode, ...], MinLen(1)] = ("step",)
+    share_time: bool = False
     estimators: Annotated[tuple[NamedEstimator, ...], MinLen(1)]
 
     def __post_init__(self) -> None:
@@ -391,7 +392,7 @@ class _Planner:
             self.found.append(entry)
         scene = self._changed(entry.path, setup.scene_changes)
         if setup.lighting:
-            scene_file.lit(_lights(scene), setup.lighting)
+            scene_file.lit(_lights(scene, setup.lighting), setup.lighting)
         text = None
         if isinstance(setup.trajectory, Replay):
             folder = scenario.path.parent
@@ -506,10 +507,13 @@ def _found_name(scene: str, scenes: Collection[str]) -> str:
     return "found" if len(scenes) == 1 else f"found_{scene}"
 
 
-def _lights(scene: SceneFile) -> tuple[Light, ...]:
-    from vobench.suite.scene_build import build
+def _lights(scene: SceneFile, named: Collection[str] | None = None) -> tuple[Light, ...]:
+    """The lights of a scene; where its file lists all of those `named`, these alone, for which nothing is built."""
+    from vobench.suite.scene_build import build, listed_lights
 
-    return build(scene, {}).lights
+    listed = tuple(listed_lights(scene))
+    is_enough = named is not None and {light.name for light in listed}.issuperset(named)
+    return listed if is_enough else build(scene, {}).lights
 
 
 def _combinations(axes: Axes) -> Iterator[tuple[str, dict[str, str]]]:

@@ -4,9 +4,10 @@ import json
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from copy import deepcopy
 from dataclasses import MISSING, dataclass, field, fields, replace
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
@@ -22,6 +23,7 @@ from vobench.setting import COMPLAINTS, complaint, hints, unit_of
 
 Model = TypeVar("Model")
 Keys = tuple[int | str, ...]
+KEPT = 64  # files, parsed: scenarios change one scene again and again
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +126,8 @@ def read_all(path: Path, model: type[Model], changes: Mapping[str, str] = Mappin
 
     `changes` are values in YAML by keys with dots between, which are put in place of the file's.
     """
-    source, twice = _parse(path)
+    source, twice = _parse(path, _text(path))
+    source = replace(source, marked=deepcopy(source.marked)) if changes else source
     if not isinstance(source.marked, dict):
         tree = source.marked
         kind = "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
@@ -216,17 +219,23 @@ class _Constructor(RoundTripConstructor):
         return True
 
 
-def _parse(path: Path) -> tuple[YamlFile, list[Mistake]]:
-    """The file as YAML, and the keys that are in it twice. Raises SuiteError where it is none."""
-    # YAML 1.2: 1e-3 is a number, 'no' a word.
-    yaml = YAML(typ="rt", pure=True)
-    yaml.Constructor = _Constructor
+def _text(path: Path) -> str:
     try:
-        tree = yaml.load(path.read_text(encoding="utf-8"))
+        return path.read_text(encoding="utf-8")
     except OSError as error:
         raise SuiteError(f"cannot read {path}: {error.strerror}") from None
     except UnicodeDecodeError:
         raise SuiteError(Mistake("not a text file in UTF-8", (Place(str(path)),))) from None
+
+
+@lru_cache(KEPT)
+def _parse(path: Path, text: str) -> tuple[YamlFile, list[Mistake]]:
+    """The text of a file as YAML, and the keys that are in it twice. Raises SuiteError where it is none."""
+    # YAML 1.2: 1e-3 is a number, 'no' a word.
+    yaml = YAML(typ="rt", pure=True)
+    yaml.Constructor = _Constructor
+    try:
+        tree = yaml.load(text)
     except MarkedYAMLError as error:
         raise SuiteError(_at_mark(path, error.problem_mark, " ".join(str(error.problem).split()))) from None
     except YAMLError as error:
