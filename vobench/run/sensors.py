@@ -72,8 +72,9 @@ def wheel_error_m(case: Case, travel: BodyMotion) -> float | None:
     spec = case.trajectory
     if not isinstance(spec, Wheeled):
         return None
-    _, counts = _counted(case, travel)
-    left, right = np.diff(counts, axis=0).T * 2 * np.pi * spec.wheels.radius_m / spec.wheels.ticks_per_revolution
+    t_ns, counts = _counted(case, travel)
+    gone = counts[(t_ns >= travel.t_ns[0]) & (t_ns <= travel.t_ns[-1])]
+    left, right = np.diff(gone, axis=0).T * 2 * np.pi * spec.wheels.radius_m / spec.wheels.ticks_per_revolution
     turned = (right - left) / spec.wheels.track_m
     first, last = travel.motion.at(travel.t_ns[[0, -1]]).T_world_body
     heading = np.arctan2(first[1, 0], first[0, 0]) + np.cumsum(turned) - turned / 2
