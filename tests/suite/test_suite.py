@@ -207,7 +207,8 @@ def test_a_calibration_error_makes_the_true_rig_another_and_the_told_one_not(ben
 
 
 SUITE_KEYS = "calibrations, cameras, estimators, frames, lightings, modes, name, rendering, repeats, rigs, scenarios, scenes, seed, source, summary, trajectories, truth"
-RIG_KEYS = "baseline_m, calibration_error, forward_m, height_m, imu, lens, own, picture_scale, pitch_deg"
+RIG_KEYS = """baseline_m, calib, calibration_error, camchain, forward_m, height_m, imu, lens, own, picture_scale,\
+ pitch_deg, size_px"""
 LENSES = "d435i, euroc, fisheye, paper_blender, paper_literal, tartanair, zed2i"
 ESTIMATORS = (
     "constant_velocity, feature_vo, imu_dead_reckoning, imu_visual, lk_epipolar, mono_vo, noisy_truth, planar_floor, "

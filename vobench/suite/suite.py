@@ -287,8 +287,7 @@ class _Planner:
         """The plan. Raises SuiteError with all that is wrong."""
         entrants = self._entrants(only_estimators)
         scenes, replayed = self._scenes(), self._replayed()
-        self._check_rigs()
-        axes = self._axes(scenes)
+        axes = self._axes(scenes, self._rigs())
         variants = [*_combinations(axes)]
         if not self.suite.trajectories:
             variants = [(name, v) for name, v in variants if v["trajectory"] == _found_name(v["scene"], scenes)]
@@ -386,6 +385,7 @@ class _Planner:
 
     def _of_scenario(self, scenario: Scenario, severity: int) -> Iterator[Case]:
         setup, levels = scenario.setup(severity), self.suite.calibrations or (None,)
+        own = setup.rig.read(scenario.path.parent)
         entry = catalog.find("scene", setup.scene, suite=scenario.path)
         if entry not in self.found:
             self.found.append(entry)
@@ -398,16 +398,15 @@ class _Planner:
             text = read_replayed(setup.trajectory, folder, read_times(setup.trajectory, folder))
         variant = scenario.variant(severity, entry.name)
         for level in levels:
-            rig, end = setup.rig, f"-{level}" if len(levels) > 1 else ""
+            rig, end = own, f"-{level}" if len(levels) > 1 else ""
             if level:
                 rig = replace(rig, calibration_error=replace(rig.calibration_error, level=level))
-            true_rig(rig.build(), rig.calibration_error)
             yield Case(
                 name=f"{scenario.name}-{severity}{end}",
                 variant={**variant, "rig": f"{variant['rig']}{end}"},
                 scene=scene,
                 lighting=setup.lighting,
-                rig=rig,
+                rig=_possible(rig),
                 trajectory=setup.trajectory,
                 replayed=text,
                 camera=setup.camera,
@@ -438,11 +437,13 @@ class _Planner:
                     else:
                         scene_file.lit(lights, {name: override})
 
-    def _check_rigs(self) -> None:
-        """So is a rig whose distortion is off, on a lens without any."""
-        for name, rig in (self.suite.rigs or {}).items():
+    def _rigs(self) -> dict[str, RigSettings]:
+        """The rigs, their files read; one whose distortion is off, on a lens without any, is an error now."""
+        rigs = dict(self.suite.rigs or {})
+        for name, rig in rigs.items():
             with self.wrong.at("rigs", name):
-                true_rig(rig.build(), rig.calibration_error)
+                rigs[name] = _possible(rig.read(self._folder()))
+        return rigs
 
     def _replayed(self) -> dict[str, str]:
         """What the files of replayed trajectories hold, by the trajectories' names."""
@@ -455,11 +456,11 @@ class _Planner:
                         texts[name] = read_replayed(spec, self._folder(), times)
         return texts
 
-    def _axes(self, scenes: dict[str, SceneFile]) -> Axes:
+    def _axes(self, scenes: dict[str, SceneFile], rigs: dict[str, RigSettings]) -> Axes:
         suite = self.suite
         if not scenes:
-            return scenes, suite.lightings, suite.rigs or {}, suite.trajectories or {}, suite.cameras
-        rigs = suite.rigs or {USUAL_RIG: RigSettings(pitch_deg=10)}
+            return scenes, suite.lightings, rigs, suite.trajectories or {}, suite.cameras
+        rigs = rigs or {USUAL_RIG: RigSettings(pitch_deg=10)}
         return scenes, suite.lightings, rigs, suite.trajectories or self._found_ways(scenes), suite.cameras
 
     def _found_ways(self, scenes: dict[str, SceneFile]) -> dict[str, Any]:
@@ -504,6 +505,12 @@ class _Planner:
 
 def _found_name(scene: str, scenes: Collection[str]) -> str:
     return "found" if len(scenes) == 1 else f"found_{scene}"
+
+
+def _possible(rig: RigSettings) -> RigSettings:
+    """A rig that can be built, its calibration's error too. Raises VobenchError."""
+    true_rig(rig.build(), rig.calibration_error)
+    return rig
 
 
 def _lights(scene: SceneFile) -> tuple[Light, ...]:
