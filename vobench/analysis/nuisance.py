@@ -218,6 +218,7 @@ NUISANCES = (
     Nuisance("rolling shutter", "a global shutter", _camera(shutter="global", readout_ms=None)),
     Nuisance("auto-exposure", "the first exposure throughout", _camera(auto_exposure=None)),
     Nuisance("vignetting and dirt", "an even, clean lens", _camera(vignetting=0, vignetting_cutoff_deg=None, dirt=0)),
+    Nuisance("flare", "a lens that scatters nothing", _camera(flare=0, ghost=0)),
     Nuisance("JPEG", "pictures without loss", _camera(jpeg_quality=None)),
     Nuisance(
         "calibration",
