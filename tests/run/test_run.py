@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from vobench.render import raster
+from vobench.report.verify import verify_run
 from vobench.run import estimate
 from vobench.run import estimate as estimate_file
-from vobench.run.folder import PAGE, SCORE, SEQUENCE, TIMES_HASHES
+from vobench.run.estimate import ESTIMATE
+from vobench.run.folder import PAGE, SCORE, SEQUENCE, TIMES_HASHES, read_tum
 from vobench.run.frames import TIMES
 from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.run.task import sequence_tasks
@@ -47,6 +49,21 @@ def test_a_run_holds_all_that_its_folder_promises(first):
     assert [(s.case, s.status, s.coverage) for s in first.scores()] == [
         (case, "ok", 1.0) for case in ("dim", "dim", "full", "full")
     ]
+
+
+def test_a_noisy_truth_changes_scores_and_no_sequence_and_no_estimate(bench, first):
+    noisy = bench.run(("seed: 1", "seed: 1\ntruth_noise: {position_m: 0.005, rotation_deg: 0.2}"))
+    for case in ("dim", "full"):
+        assert (noisy.case(case) / "sequence").resolve() == (first.case(case) / "sequence").resolve()
+    assert contents(noisy, ESTIMATE) == contents(first, ESTIMATE)
+    told, exact = (read_tum(run.case("full") / GROUND_TRUTH) for run in (noisy, first))
+    assert np.std(told.positions_m - exact.positions_m) == pytest.approx(0.005, rel=0.5)  # of a dozen poses
+    by_wheels = [[s for s in run.scores() if s.estimator == "wheel_odometry"] for run in (noisy, first)]
+    ate_m, exact_ate_m = ([score.value("ate_trans", "rmse") for score in scores] for scores in by_wheels)
+    assert ate_m[0] == ate_m[1] > exact_ate_m[0] + 0.002
+    (said,) = contents(noisy, "leaderboard.md").values()
+    assert "the truth that is scored is off by 5 mm on each axis and 0.2 ° about each" in said.decode()
+    assert not [finding for finding in verify_run(noisy) if finding.wrong]
 
 
 def test_the_second_run_renders_nothing_estimates_nothing_and_says_the_same(bench, first, monkeypatch):

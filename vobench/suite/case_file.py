@@ -35,6 +35,7 @@ def write_case(case: Case, entrants: Sequence[Entrant], folder: Path, *, name: s
         "cameras": {of["camera"]: _said(plain(case.camera))},
         "rendering": _said(plain(case.rendering)),
         "truth": list(case.truth),
+        "truth_noise": plain(case.truth_noise),
         **({"frames": list(case.frames)} if case.frames else {}),
         "estimators": [_estimator(entrant) for entrant in entrants],
     }

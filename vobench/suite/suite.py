@@ -56,6 +56,20 @@ class Rendering:
 
 
 @settings()
+class TruthNoise:
+    """How far each pose of the truth that is scored is off, as a reference of a real recording is.
+
+    Standard deviations of its place along each axis, and of its turn about each.
+    """
+
+    position_m: Annotated[float, Ge(0), Le(1)] = 0.0
+    rotation_deg: Annotated[float, Ge(0), Le(10)] = 0.0
+
+
+EXACT = TruthNoise()
+
+
+@settings()
 class EstimatorSettings:
     """An estimator with parameters and limits other than its manifest's."""
 
@@ -107,6 +121,7 @@ class Suite:
     cameras: Annotated[dict[Name, Camera], MinLen(1)] = field(default_factory=lambda: {"clean": CameraSettings()})
     rendering: Rendering = Rendering()
     truth: tuple[ChannelName, ...] = ()
+    truth_noise: TruthNoise = EXACT
     frames: Window | None = None
     modes: Annotated[tuple[Mode, ...], MinLen(1)] = ("step",)
     estimators: Annotated[tuple[NamedEstimator, ...], MinLen(1)]
@@ -150,6 +165,7 @@ class Case:
     camera: CameraSettings
     rendering: Rendering
     truth: tuple[str, ...]
+    truth_noise: TruthNoise = EXACT
     frames: Window | None = None
     seed: int
     scenario: str | None = None
@@ -412,6 +428,7 @@ class _Planner:
                 camera=setup.camera,
                 rendering=self.suite.rendering,
                 truth=self.suite.truth,
+                truth_noise=self.suite.truth_noise,
                 frames=self.suite.frames,
                 seed=self.suite.seed,
                 scenario=scenario.name,
@@ -485,6 +502,7 @@ class _Planner:
             replayed=replayed.get(variant["trajectory"]),
             rendering=suite.rendering,
             truth=suite.truth,
+            truth_noise=suite.truth_noise,
             frames=suite.frames,
             seed=suite.seed,
         )
