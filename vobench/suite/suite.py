@@ -104,9 +104,11 @@ class Suite:
     Each axis names its variants; change one axis to change one factor. Without rigs a pair looks ahead; without
     trajectories the body goes round where each scene is free. A suite of recordings alone has no axes, nor has one of
     `scenarios`, each at some severities and with the rig's calibration off by each of `calibrations`. With `frames`
-    only the pictures from one number to before another are taken of every way.
+    only the pictures from one number to before another are taken of every way. What it does not say itself is as the
+    suite has it that it includes.
     """
 
+    include: str | None = None
     name: Name
     summary: str = ""
     seed: Annotated[int, Ge(0)] = 0
@@ -283,7 +285,7 @@ def read_plan(
     """
     reading = yaml_file.read_all(catalog.find("suite", name).path, Suite, changes)
     wrong = Mistakes(reading.source, list(reading.mistakes))
-    meant = {key for said in reading.source.marked for key in get_close_matches(str(said), hints(Suite), n=1)}
+    meant = {key for said in reading.source.plain for key in get_close_matches(str(said), hints(Suite), n=1)}
     with wrong.at():
         if wrong.found and (missing := missing_axis(meant)):
             raise SuiteError(missing)
