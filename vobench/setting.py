@@ -182,7 +182,7 @@ class Like:
             place = [] if value == name else [self.key]
             raise SettingError(unknown(self.what, str(name), list(self.presets)), *place)
         preset = asdict(self.presets[name])
-        return _over({self.section: preset} if self.section else preset, given)
+        return over({self.section: preset} if self.section else preset, given)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> Any:
         return _before(self.merged, handler(source))
@@ -228,10 +228,10 @@ def _before(change: Callable[[Any], Any], schema: Any) -> Any:
     return core_schema.no_info_before_validator_function(change, schema)
 
 
-def _over(preset: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
-    """What is given, and the preset's values elsewhere, section by section."""
+def over(preset: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    """What is given, and the preset's values elsewhere: sections key by key, all else as a whole."""
     both = [key for key in given if isinstance(given[key], dict) and isinstance(preset.get(key), dict)]
-    return {**preset, **given, **{key: _over(preset[key], given[key]) for key in both}}
+    return {**preset, **given, **{key: over(preset[key], given[key]) for key in both}}
 
 
 Positive = Annotated[float, Gt(0)]

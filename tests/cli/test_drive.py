@@ -49,6 +49,20 @@ def test_json_has_the_facts_in_full(vobench, ways):
     assert (lift["reached_s"], lift["wheel_error_m"]) == (None, None)
 
 
+def test_some_frames_of_a_way_are_as_they_are_in_the_whole(vobench, ways):
+    def legs():
+        said = vobench("drive", "ways", "-t", "legs", "--csv", "it.csv", "--out", "it.svg", "--json").json
+        with (ways / "it.csv").open() as file:
+            return said["trajectories"][0], list(csv.DictReader(file))
+
+    whole, rows = legs()
+    (ways / "suites" / "ways.yaml").write_text(f"{WAYS}frames: [40, 70]\n")
+    part, some = legs()
+    assert some == rows[40:70]
+    assert part["reached_s"] == whole["reached_s"]
+    assert 0 < part["wheel_error_m"] < whole["wheel_error_m"]
+
+
 def test_one_trajectory_may_be_chosen_and_exported(vobench, ways):
     said = vobench("drive", "ways", "-t", "lift", "--tum", "it.tum", "--csv", "it.csv", "--json").json
     assert [one["trajectory"] for one in said["trajectories"]] == ["lift"]

@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 from vobench.render import raster
+from vobench.report.verify import verify_run
 from vobench.run import estimate
 from vobench.run import estimate as estimate_file
-from vobench.run.folder import ENVIRONMENT, PAGE, SCORE, SEQUENCE, TIMES_HASHES
+from vobench.run.estimate import ESTIMATE
+from vobench.run.folder import ENVIRONMENT, PAGE, SCORE, SEQUENCE, TIMES_HASHES, read_tum
 from vobench.run.frames import TIMES
 from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.run.task import sequence_tasks
@@ -59,6 +61,21 @@ def test_a_suite_may_let_estimators_run_beside_other_tasks_and_its_run_says_so(b
     said = [json.loads((run.path / ENVIRONMENT).read_text())["timed"] for run in (first, shared)]
     assert said == [runs.ALONE, runs.BESIDE]
     assert heard == [True]
+
+
+def test_a_noisy_truth_changes_scores_and_no_sequence_and_no_estimate(bench, first):
+    noisy = bench.run(("seed: 1", "seed: 1\ntruth_noise: {position_m: 0.005, rotation_deg: 0.2}"))
+    for case in ("dim", "full"):
+        assert (noisy.case(case) / "sequence").resolve() == (first.case(case) / "sequence").resolve()
+    assert contents(noisy, ESTIMATE) == contents(first, ESTIMATE)
+    told, exact = (read_tum(run.case("full") / GROUND_TRUTH) for run in (noisy, first))
+    assert np.std(told.positions_m - exact.positions_m) == pytest.approx(0.005, rel=0.5)  # of a dozen poses
+    by_wheels = [[s for s in run.scores() if s.estimator == "wheel_odometry"] for run in (noisy, first)]
+    ate_m, exact_ate_m = ([score.value("ate_trans", "rmse") for score in scores] for scores in by_wheels)
+    assert ate_m[0] == ate_m[1] > exact_ate_m[0] + 0.002
+    (said,) = contents(noisy, "leaderboard.md").values()
+    assert "the truth that is scored is off by 5 mm on each axis and 0.2 ° about each" in said.decode()
+    assert not [finding for finding in verify_run(noisy) if finding.wrong]
 
 
 def test_the_second_run_renders_nothing_estimates_nothing_and_says_the_same(bench, first, monkeypatch):

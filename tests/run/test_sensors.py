@@ -1,10 +1,13 @@
 """Wheels and IMU say what the motion does to them, each reading once, in order of time, before its picture."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vobench.run.motion import body_motion
 from vobench.run.sensors import SensorFeed, _felt, wheel_error_m
+from vobench.sensor.timing import Timing
 from vobench.suite.suite import read_plan
 
 SUITE = """name: it
@@ -68,6 +71,18 @@ def test_every_reading_up_to_the_last_picture_comes_once_and_in_order_of_time(ca
     lasts_s = travel.t_ns[-1] / 1e9
     assert len(readings) == pytest.approx(lasts_s * rate_hz, abs=2)
     assert [t for t, _ in writer.truth] == readings
+
+
+@pytest.mark.parametrize("delay_ms", [12.5, -7.5])
+def test_a_late_imu_has_the_same_readings_that_much_later(case, delay_ms):
+    it = case()
+    late = replace(it, camera=replace(it.camera, timing=Timing(imu_delay_ms=delay_ms)))
+    (told, bias), (was, _) = (_felt(each, body_motion(each)) for each in (late, it))
+    np.testing.assert_array_equal(told.t_ns - was.t_ns, round(delay_ms * 1e6))
+    np.testing.assert_array_equal(bias.t_ns, told.t_ns)
+    np.testing.assert_array_equal(told.gyro_radps, was.gyro_radps)
+    travel, writer = fed(late)
+    assert writer.of("imu") == [t for t in told.t_ns.tolist() if 0 <= t <= travel.t_ns[-1]]
 
 
 def test_the_noise_of_an_imu_is_the_same_whatever_it_rides_on(case):

@@ -46,6 +46,29 @@ def test_a_lens_without_effects_hands_light_through_untouched() -> None:
     assert through_lens(radiance, maps(CLEAN)) is radiance
 
 
+def test_flare_moves_light_in_proportion_and_keeps_its_sum() -> None:
+    flares = maps(replace(CLEAN, flare=0.2, ghost=0.05, blur_sigma_px=0.7))
+    one, other = light(1), 40 * light(2) ** 20
+    for radiance in (one, other):
+        assert through_lens(radiance, flares).sum() == pytest.approx(radiance.sum(), rel=1e-6)
+    both = through_lens(one, flares) + through_lens(other, flares)
+    np.testing.assert_allclose(through_lens(one + other, flares), both, rtol=1e-5)
+
+
+def test_a_lamp_has_its_veil_about_it_and_its_ghost_across_the_middle() -> None:
+    lamp = np.zeros(SHAPE, np.float32)
+    lamp[30, 100] = 1000.0
+    seen = through_lens(lamp, maps(replace(CLEAN, flare=0.1, ghost=0.04)))
+    assert seen[30, 100] == pytest.approx(860, rel=0.01)  # and what the veil is there
+    ghost = seen[89 - 10 : 89 + 11, 59 - 10 : 59 + 11]  # three sigma of it to all sides
+    assert ghost.argmax() == 10 * 21 + 10
+    alone = through_lens(lamp, maps(replace(CLEAN, flare=0.1)))
+    assert (ghost - alone[79:100, 49:70]).sum() == pytest.approx(40, rel=0.01)
+    h_px, r_px = 0.1 * SHAPE[1], 12
+    middle = through_lens(np.roll(lamp, (30, -20), (0, 1)), maps(replace(CLEAN, flare=0.1)))
+    assert middle[60, 80 + r_px] == pytest.approx(100 * h_px / (2 * np.pi * (h_px**2 + r_px**2) ** 1.5), rel=0.05)
+
+
 def test_falloff_is_the_fourth_power_of_the_cosine() -> None:
     seen = through_lens(np.full(SHAPE, 0.7, np.float32), maps(replace(CLEAN, vignetting=1.0)))
     cosine = rays()[..., 2]

@@ -25,6 +25,7 @@ rigs: {down: {pitch_deg: 90, imu: mpu6000}}
 trajectories: {WAY}
 cameras: {noisy: {sensor: mt9v034, auto_exposure: {}, shutter: rolling, readout_ms: 10}}
 truth: [depth]
+truth_noise: {position_m: 0.005}
 frames: [1, 3]
 estimators: [{name: feature_vo, label: sift, params: {detector: sift}, limits: {frame_s: 3}}]
 """
@@ -49,4 +50,5 @@ def test_what_is_written_reads_as_the_same_case_wherever_it_lies(tmp_path: Path,
     (tmp_path / "away").rename(tmp_path / "moved")
     again = read_plan(str(tmp_path / "moved" / written.name))
     assert content(again.simulated[0]) == content(case)
+    assert again.simulated[0].truth_noise == case.truth_noise
     assert again.entrants == plan.entrants

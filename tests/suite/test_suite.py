@@ -68,6 +68,44 @@ def test_a_suites_limits_go_over_the_manifests(bent):
     assert usual == planned.entrants[1].manifest.limits
 
 
+@pytest.fixture
+def building(bent, tmp_path):
+    """Reads the plan of a suite with this text that includes one that includes the suite, which has some text replaced."""
+
+    def read(text, *changes, **more):
+        bent()
+        for old, new in changes:
+            (tmp_path / "tiny.yaml").write_text((tmp_path / "tiny.yaml").read_text().replace(old, new))
+        (tmp_path / "middle.yaml").write_text("include: tiny.yaml\nseed: 2\nlightings: {dim: {lamp: {power_lm: 99}}}\n")
+        (tmp_path / "over.yaml").write_text(f"include: middle.yaml\n{text}")
+        return read_plan("./over.yaml", **more)
+
+    return read
+
+
+def test_a_suite_goes_over_what_it_includes_key_by_key(building):
+    text = "rigs: {down: {height_m: 0.3}, ahead: {pitch_deg: 10}}\nlightings: {full: null}\nestimators: [stand_still]\n"
+    planned = building(text, changes={"trajectories.short.rate_hz": "5"})
+    assert [case.name for case in planned.cases] == ["down", "ahead"]
+    down, ahead = planned.simulated
+    assert (down.rig.pitch_deg, down.rig.height_m, down.seed, down.trajectory.rate_hz) == (90, 0.3, 2, 5)
+    assert ahead.lighting["lamp"].power_lm == 99
+    assert [entrant.label for entrant in planned.entrants] == ["stand_still"]
+
+
+def test_a_mistake_is_said_with_the_file_that_it_is_in(building):
+    with pytest.raises(SuiteError) as error:
+        building("rigs: {down: {height_m: high}}\nscene: 3\n", ("pitch_deg: 90", "pitch_deg: 91"))
+    misspelt = f"over.yaml:3: scene: unknown key. Did you mean 'scenes'? Known: {SUITE_KEYS}"
+    said = ("over.yaml:2: rigs.down.height_m: should be a number (got 'high')", misspelt)
+    assert all(sentence in str(error.value) for sentence in said)
+    assert "tiny.yaml:5: rigs.down.pitch_deg: should be 90 or less (got 91)" in str(error.value)
+    with pytest.raises(
+        SuiteError, match=r"over.yaml:1: include: .*middle.yaml:1: include: .*cannot include itself: .*over"
+    ):
+        building("", ("name: tiny", "name: tiny\ninclude: over.yaml"))
+
+
 def test_each_mode_has_an_entrant_of_its_own(bent):
     planned = bent(("estimators:", "modes: [step, real_time]\nestimators:"))
     assert [(e.label, e.mode, e.claims) for e in planned.entrants[:2]] == [
@@ -206,8 +244,9 @@ def test_a_calibration_error_makes_the_true_rig_another_and_the_told_one_not(ben
 # ruff: noqa: E501 - a sentence stands in one line
 
 
-SUITE_KEYS = "calibrations, cameras, estimators, frames, lightings, modes, name, rendering, repeats, rigs, scenarios, scenes, seed, share_time, source, summary, trajectories, truth"
-RIG_KEYS = "baseline_m, calibration_error, forward_m, height_m, imu, lens, own, picture_scale, pitch_deg"
+SUITE_KEYS = "calibrations, cameras, estimators, frames, include, lightings, modes, name, rendering, repeats, rigs, scenarios, scenes, seed, share_time, source, summary, trajectories, truth, truth_noise"
+RIG_KEYS = """baseline_m, calib, calibration_error, camchain, forward_m, height_m, imu, lens, own, picture_scale,\
+ pitch_deg, size_px"""
 LENSES = "d435i, euroc, fisheye, paper_blender, paper_literal, tartanair, zed2i"
 ESTIMATORS = (
     "constant_velocity, feature_vo, imu_dead_reckoning, imu_visual, lk_epipolar, mono_vo, noisy_truth, planar_floor, "

@@ -215,9 +215,11 @@ NUISANCES = (
     Nuisance("unlike eyes", "two equal eyes", _camera(unlike=Eyes())),
     Nuisance("dropped frames", "every frame, once", _timed(drop_share=0.0, repeat_share=0.0)),
     Nuisance("late pictures", "both taken at their stamp", _timed(jitter_ms=0.0, right_delay_ms=0.0)),
+    Nuisance("late IMU", "readings stamped when they are taken", _timed(imu_delay_ms=0.0)),
     Nuisance("rolling shutter", "a global shutter", _camera(shutter="global", readout_ms=None)),
     Nuisance("auto-exposure", "the first exposure throughout", _camera(auto_exposure=None)),
     Nuisance("vignetting and dirt", "an even, clean lens", _camera(vignetting=0, vignetting_cutoff_deg=None, dirt=0)),
+    Nuisance("flare", "a lens that scatters nothing", _camera(flare=0, ghost=0)),
     Nuisance("JPEG", "pictures without loss", _camera(jpeg_quality=None)),
     Nuisance(
         "calibration",

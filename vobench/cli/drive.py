@@ -51,7 +51,12 @@ class Driven:
         """When the leg to each target ended, where there are targets."""
         if self.travel.drive is None or not isinstance(self.case.trajectory, Waypoints):
             return None
-        return self.travel.t_ns[list(self.travel.drive.reached)] / 1e9
+        return self.travel.drive.t_ns[list(self.travel.drive.reached)] / 1e9
+
+    @property
+    def rows(self) -> slice:
+        """Which frames of the whole drive its pictures are of."""
+        return slice(self.travel.first, self.travel.first + len(self.travel.t_ns))
 
     @property
     def volts(self) -> Array | None:
@@ -61,7 +66,7 @@ class Driven:
             return None
         u, omega = drive.state[:, 3:].T
         v_u, v_omega = loop_voltages((u, omega), tuple(drive.references.T), tuple(drive.rates.T), motors=spec.motors)
-        return np.stack(wheel_voltages(v_u, v_omega), -1)
+        return np.stack(wheel_voltages(v_u, v_omega), -1)[self.rows]
 
 
 def _chosen(plan: Plan, trajectory: str | None) -> list[str]:
@@ -101,8 +106,8 @@ def log_of(driven: Driven) -> DriveLog:
         t_s=driven.travel.t_ns / 1e9,
         T_world_body=driven.body.T_world_body,
         twist=driven.body.twist,
-        point_m=drive.state[:, :2] if drive and not isinstance(spec, Unled) else None,
-        references=drive.references if drive else None,
+        point_m=drive.state[driven.rows, :2] if drive and not isinstance(spec, Unled) else None,
+        references=drive.references[driven.rows] if drive else None,
         targets_m=np.array(spec.targets_m) if isinstance(spec, Waypoints) else None,
         reached_s=driven.reached_s,
         patches=tuple((patch.surface, patch.corners_m) for patch in spec.floor) if isinstance(spec, Wheeled) else (),
@@ -172,7 +177,7 @@ def _csv(driven: Driven) -> str:
         ("vx_mps,vy_mps,vz_mps,wx_radps,wy_radps,wz_radps", body.twist),
         ("ax_mps2,ay_mps2,az_mps2", body.acceleration_mps2),
         (",".join(RIMS), travel.rims.rim_rad[np.searchsorted(travel.rims.t_ns, travel.t_ns)] if travel.rims else None),
-        (",".join(REFERENCES), travel.drive.references if travel.drive else None),
+        (",".join(REFERENCES), travel.drive.references[driven.rows] if travel.drive else None),
         ("left_V,right_V", driven.volts),
     ]
     known = [(names, values) for names, values in columns if values is not None]

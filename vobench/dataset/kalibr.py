@@ -284,6 +284,11 @@ def imu_numbers(entries: Values, T_body_imu: Array, rate: tuple[str, ...], withi
     return ImuCalibration(T_body_imu, entries.positive(*rate), **densities)
 
 
+def read_pair(path: Path) -> Rig:
+    """The pair of a camchain.yaml alone; the body is the left camera. Raises InputError."""
+    return chain_rig(path, 2, np.eye(4))[0]
+
+
 def _camera(chain: Values, name: str) -> Camera:
     model, linear = chain.text(name, "camera_model"), chain.numbers(name, "intrinsics")
     size = chain.size(name, "resolution")
@@ -322,7 +327,7 @@ def chain_rig(path: Path, cameras: int, T_body_left: Array | None) -> tuple[Rig,
     """The first cameras of Kalibr's chain, at T_body_left or on its IMU, and what to note. Raises InputError."""
     values = read_yaml(path)
     if cameras > 1 and not values.has("cam1"):
-        raise InputError(f"a recording with two cameras needs cam1, which is missing in {path}")
+        raise InputError(f"a pair of cameras needs cam1, which is missing in {path}")
     if T_body_left is None and not values.has("cam0", "T_cam_imu"):
         raise InputError(f"the recording is about its IMU, so the chain should say cam0: T_cam_imu: {path}")
     rig = read_camchain(path)

@@ -25,6 +25,7 @@ TRUTH = (
     "of the left grey camera; its world is that camera at the start, turned from "
     "x right, y down, z ahead to x ahead, y left, z up."
 )
+USUAL_PX, MOST_OFF_CENTER = (1241, 376), 0.1  # sequences 00 to 02; a share of the size
 SKEW_TOLERANCE = 1e-6  # of KITTI's seven digits: K's lower triangle is zero
 
 
@@ -74,9 +75,32 @@ def _rig(
     missing = [name for name in needed if name not in matrices]
     if missing:
         raise InputError(f"{path}: no matrix {missing[0]}, which is that of {names[needed.index(missing[0])]}")
-    rig = rig_of(*(_camera(matrices[name], size_px, f"{path}: {name}") for name in needed))
+    rig = _of_matrices(path, matrices, needed, size_px)
     others = ", ".join(name for name in matrices if name not in needed)
     return on_body(rig, T_BODY_GREY), path, (f"{others} of {CALIBRATION} were not used.",) if others else ()
+
+
+def read_pair(path: Path, size_px: tuple[int, int] | None = None) -> Rig:
+    """The pair of calib.txt alone: P0 and P1 where they are there, else P2 and P3; the body is the first camera of all.
+
+    Without a size the pictures are as KITTI's first ones. Raises InputError, also where they cannot be.
+    """
+    matrices, pairs = read_calibration(path), [[f"P{name[-1]}" for name in pair] for pair in PAIRS]
+    needed = next((names for names in pairs if matrices.keys() >= set(names)), None)
+    if needed is None:
+        raise InputError(f"{path}: a pair is P0 and P1, or P2 and P3, and there is {', '.join(matrices) or 'none'}")
+    rig = _of_matrices(path, matrices, needed, size_px or USUAL_PX)
+    center_px = rig.left.K[:2, 2]
+    if size_px is None and np.abs(center_px / USUAL_PX - 0.5).max() > MOST_OFF_CENTER:
+        raise InputError(
+            f"{path}: {needed[0]} has its centre at {center_px.tolist()}, so pictures are not {USUAL_PX[0]} x "
+            f"{USUAL_PX[1]} as KITTI's are; give size_px"
+        )
+    return rig
+
+
+def _of_matrices(path: Path, matrices: dict[str, Array], needed: list[str], size_px: tuple[int, int]) -> Rig:
+    return rig_of(*(_camera(matrices[name], size_px, f"{path}: {name}") for name in needed))
 
 
 def read_calibration(path: Path) -> dict[str, Array]:

@@ -39,7 +39,7 @@ class Photometry:
     black_dn: float
     vignetting: float
     cutoff_deg: float | None
-    dirt: float
+    scattered: float
     readout_ms: float
     unlike: bool
 
@@ -47,7 +47,7 @@ class Photometry:
         """Sentences on what the files have no place for."""
         found = [
             (self.black_dn, f"pcalib.txt leaves in the black level: {self.black_dn:g} grey values of linear signal."),
-            (self.dirt, "What dirt on the lens takes and scatters is not in vignette.png."),
+            (self.scattered, "What dirt and flare take and scatter is not in vignette.png."),
             (self.readout_ms, f"The shutter rolls, {self.readout_ms:g} ms a picture; stamps are the middle row's."),
             (self.unlike, "What sets one eye apart (unlike) is in neither pcalib.txt nor vignette.png."),
         ]
@@ -64,7 +64,7 @@ def photometry_of(case: Mapping[str, Any] | None) -> Photometry | None:
             black_dn=float(chip["black_dn"]),
             vignetting=float(camera.get("vignetting", 0.0)),
             cutoff_deg=camera.get("vignetting_cutoff_deg"),
-            dirt=float(camera.get("dirt", 0.0)),
+            scattered=sum(float(camera.get(key, 0.0)) for key in ("dirt", "flare", "ghost")),
             readout_ms=float(camera.get("readout_ms", 0.0)),
             unlike=any(value not in (None, 1) for eye in camera.get("unlike", {}).values() for value in eye.values()),
         )

@@ -75,11 +75,12 @@ COSTS = ("cpu_ms", "memory_mib")
 
 @dataclass(frozen=True, slots=True)
 class CaseFacts:
-    """What a case says of itself: the `group` of its calibration, and how severe its scenario is."""
+    """What a case says of itself: the `group` of its calibration, how severe its scenario is, its truth's noise."""
 
     group: str = ""
     scenario: str = ""
     severity: int | None = None
+    truth_noise: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,6 +267,9 @@ def board(
         remarks += said
     if len(groups) > 1:
         remarks.append(f"each calibration has totals of its own: {', '.join(group or 'none' for group in groups)}")
+    remarks += sorted(
+        {f"the truth that is scored is off by {each}" for cell in cells if (each := cell.facts.truth_noise)}
+    )
     return Board(title, tuple(cells), tuple(totals), tuple(_curves(cells)), tuple(remarks))
 
 

@@ -3,7 +3,7 @@
 import base64
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from itertools import groupby
@@ -69,7 +69,14 @@ def case_facts(folder: RunFolder, case: str) -> CaseFacts:
         group=level if isinstance(level, str) and level != UNCALIBRATED else "",
         scenario=str(stated.get("scenario") or ""),
         severity=severity if isinstance(severity, int) else None,
+        truth_noise=_noise(stated.get("truth_noise") or {}),
     )
+
+
+def _noise(stated: Mapping[str, float]) -> str:
+    """How far each pose of a truth is off, in words; nothing where it is exact."""
+    sizes = [(1e3 * stated.get("position_m", 0), "mm on each axis"), (stated.get("rotation_deg", 0), "° about each")]
+    return " and ".join(f"{size:g} {unit}" for size, unit in sizes if size)
 
 
 def _json(path: Path) -> dict[str, Any]:

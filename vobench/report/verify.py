@@ -10,9 +10,10 @@ from vobench import stop
 from vobench.errors import VobenchError
 from vobench.run.entry import fault, file_hash
 from vobench.run.estimate import ESTIMATE, REVISED
-from vobench.run.folder import SEQUENCE, RunFolder, read_hashes, read_score, read_tum
-from vobench.run.ground_truth import GROUND_TRUTH, left_truth
+from vobench.run.folder import CASE, SEQUENCE, RunFolder, read_hashes, read_score, read_tum
+from vobench.run.ground_truth import GROUND_TRUTH, left_truth, noisy
 from vobench.run.score import score_estimate
+from vobench.suite.suite import TruthNoise
 from vobench.trajectory.formats import format_tum
 
 
@@ -61,8 +62,11 @@ def _truth_differs(case: Path) -> str:
     if not link.exists():
         return "its sequence is gone from the cache; run the suite again to make it anew"
     try:
-        same = format_tum(left_truth(link)).encode() == (case / GROUND_TRUTH).read_bytes()
-    except (VobenchError, OSError) as error:
+        stated, truth = json.loads((case / CASE).read_bytes()), format_tum(left_truth(link))
+        if noise := stated.get("truth_noise"):
+            truth = noisy(truth, TruthNoise(**noise), seed=stated["seed"], frames=stated["frames"])
+        same = truth.encode() == (case / GROUND_TRUTH).read_bytes()
+    except (VobenchError, OSError, ValueError, LookupError) as error:
         return str(error)
     return "" if same else f"{GROUND_TRUTH} is not the path in its sequence"
 

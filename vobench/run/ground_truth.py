@@ -4,14 +4,19 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from vobench.errors import SequenceError
+from vobench.geometry import se3
 from vobench.run.frames import EXPOSURE_COLUMNS, EXPOSURES, new_table
 from vobench.sequence import Sequence, read_truth
-from vobench.trajectory.formats import format_tum
+from vobench.suite.source import RecordedCase
+from vobench.suite.suite import EXACT, Case, TruthNoise, Window
+from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
 GROUND_TRUTH = "ground_truth.tum"
+NOISE_STREAM = 9_173  # sets the noise of the truth apart from other streams of a seed
 # Between two true poses further apart than this nobody knows where the camera was.
 LONGEST_GAP_NS = 200_000_000
 
@@ -32,6 +37,24 @@ def left_truth(folder: Path) -> Trajectory:
             raise SequenceError(f"the ground truth covers none of the pictures in time: {folder}")
         truth = Trajectory(stamps, poses_at(truth, stamps))
     return truth.of_mounted(sequence.rig.T_body_left)
+
+
+def scored_truth(exact: str, case: Case | RecordedCase) -> str:
+    """The truth, as TUM text, that estimates on a case are scored against; that of its sequence without its noise."""
+    if isinstance(case, RecordedCase):
+        return exact
+    return noisy(exact, case.truth_noise, seed=case.seed, frames=case.frames)
+
+
+def noisy(exact: str, noise: TruthNoise, *, seed: int, frames: Window | None) -> str:
+    """A truth, as TUM text, with noise on each pose; of `frames` the noise is what it is in the whole way."""
+    if noise == EXACT:
+        return exact
+    truth, before = parse_tum(exact, name=GROUND_TRUTH), frames[0] if frames else 0
+    draws = np.random.default_rng([seed, NOISE_STREAM]).standard_normal((before + len(truth), 2, 3))
+    moved, turned = draws[before:].swapaxes(0, 1)
+    R = Rotation.from_rotvec(noise.rotation_deg * turned, degrees=True).as_matrix()
+    return format_tum(Trajectory(truth.t_ns, truth.T_world_frame @ se3.transform(R, noise.position_m * moved)))
 
 
 def is_known(truth_ns: Stamps, stamps: Stamps) -> NDArray[np.bool_]:

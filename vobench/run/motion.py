@@ -220,9 +220,10 @@ def check_cases(cases: Sequence[Case], travel: BodyMotion, wrong: Mistakes) -> N
         with wrong.at(*_said_at(case, "trajectory")):
             _check_clear(case, travel)
             _check_smooth(case)
-    for case, *_ in _by(cases, "camera").values():
+    for case, *_ in _by(cases, "rig", "camera").values():
         with wrong.at(*_said_at(case, "camera")):
             _check_fits_frame(case)
+            _check_heeded(case)
 
 
 AXIS_KEYS = {"trajectory": "trajectories", "camera": "cameras"}
@@ -247,6 +248,11 @@ def _check_smooth(case: Case) -> None:
             f"the IMU of rig '{case.variant['rig']}' would feel the noise of an exact replay; "
             "leave exact out, or the IMU"
         )
+
+
+def _check_heeded(case: Case) -> None:
+    if case.camera.timing.imu_delay_ms and not case.rig.imu:
+        raise MotionError(f"timing.imu_delay_ms delays the IMU, and rig '{case.variant['rig']}' has none")
 
 
 def _check_fits_frame(case: Case) -> None:

@@ -28,7 +28,7 @@ from vobench.run.folder import (
     write_hashes,
 )
 from vobench.run.frames import COLUMNS, FRAMES, TIME_COLUMNS, TIMES, new_table
-from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.ground_truth import GROUND_TRUTH, scored_truth
 from vobench.run.key import digest, folder_digest, library_versions
 from vobench.run.simulate import LIBRARIES
 from vobench.run.store import Store, Tell, write_json
@@ -147,6 +147,8 @@ def _gather_case(case: Case | RecordedCase, sequence: Path, target: Path) -> Non
     if not is_made:
         return
     copy_files(sequence, [GROUND_TRUTH], target)
+    exact = (target / GROUND_TRUTH).read_text(encoding="utf-8")
+    (target / GROUND_TRUTH).write_text(scored_truth(exact, case), encoding="utf-8")
     (target / SEQUENCE).symlink_to(sequence.resolve())
 
 

@@ -15,8 +15,9 @@ from vobench.run.consistency import trial_consistency
 from vobench.run.estimate import DROPPED, ESTIMATE, FINISHED, REVISED, Outcome, read_outcome
 from vobench.run.folder import SCORE, SURVIVED, TrialScore, TrialStatus, read_tum
 from vobench.run.frames import ANSWERS, EXPOSURES, read_table, write_frames
-from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.ground_truth import GROUND_TRUTH, scored_truth
 from vobench.run.store import write_json
+from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -32,7 +33,8 @@ STILL_M, STILL_RAD = 2e-3, np.deg2rad(0.2)
 
 def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) -> None:
     """Score a trial's estimate against its sequence's true path: the score and the table of frames, in a folder."""
-    gt = read_tum(sequence / GROUND_TRUTH)  # what is scored is what anybody can score again
+    exact = (sequence / GROUND_TRUTH).read_text(encoding="utf-8")
+    gt = parse_tum(scored_truth(exact, trial.case), name=GROUND_TRUTH)  # as a file has it that anybody can score again
     claims = trial.entrant.claims
     est, revised = read_tum(estimate / ESTIMATE), estimate / REVISED
     scored = score_estimate(est, gt, claims)

@@ -1,5 +1,7 @@
 """Readings of a body's wheels and IMU on its way, and the ground truth of its cameras' pixels."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from vobench.geometry.rig import Side
@@ -11,6 +13,7 @@ from vobench.scene.scene import Scene
 from vobench.sensor.exposure import row_stamps
 from vobench.sensor.imu import STREAMS, ImuBias, ImuReadings, measure
 from vobench.sensor.pixel_truth import TruthFrame, TruthNames
+from vobench.sensor.timing import NS_PER_MS
 from vobench.sequence import SequenceWriter
 from vobench.suite.suite import Case
 from vobench.trajectory.kinematics import Motion
@@ -25,7 +28,7 @@ class SensorFeed:
     def __init__(self, case: Case, travel: BodyMotion) -> None:
         self._encoder_t_ns, self._ticks = _counted(case, travel)
         self._imu = _felt(case, travel)
-        self._last_ns = int(travel.t_ns[0]) - 1 if travel.first else np.iinfo(np.int64).min
+        self._last_ns = int(travel.t_ns[0]) - 1
 
     def write_until(self, t_ns: int, writer: SequenceWriter) -> None:
         """Write what was read since the last call, up to and at a stamp."""
@@ -57,8 +60,12 @@ def _counted(case: Case, travel: BodyMotion) -> tuple[Stamps, Stamps]:
 
 
 def _felt(case: Case, travel: BodyMotion) -> tuple[ImuReadings, ImuBias] | None:
+    if not case.rig.imu:
+        return None
     rngs = {stream: generator(case.seed, f"imu.{stream}") for stream in STREAMS}
-    return measure(travel.motion, case.rig.imu, rngs=rngs) if case.rig.imu else None
+    readings, bias = measure(travel.motion, case.rig.imu, rngs=rngs)
+    t_ns = readings.t_ns + round(case.camera.timing.imu_delay_ms * NS_PER_MS)
+    return replace(readings, t_ns=t_ns), replace(bias, t_ns=t_ns)
 
 
 def _between(t_ns: Stamps, last_ns: int, now_ns: int) -> slice:
@@ -72,8 +79,9 @@ def wheel_error_m(case: Case, travel: BodyMotion) -> float | None:
     spec = case.trajectory
     if not isinstance(spec, Wheeled):
         return None
-    _, counts = _counted(case, travel)
-    left, right = np.diff(counts, axis=0).T * 2 * np.pi * spec.wheels.radius_m / spec.wheels.ticks_per_revolution
+    t_ns, counts = _counted(case, travel)
+    gone = counts[(t_ns >= travel.t_ns[0]) & (t_ns <= travel.t_ns[-1])]
+    left, right = np.diff(gone, axis=0).T * 2 * np.pi * spec.wheels.radius_m / spec.wheels.ticks_per_revolution
     turned = (right - left) / spec.wheels.track_m
     first, last = travel.motion.at(travel.t_ns[[0, -1]]).T_world_body
     heading = np.arctan2(first[1, 0], first[0, 0]) + np.cumsum(turned) - turned / 2

@@ -27,6 +27,7 @@ UNSIMULATED: dict[str, Any] = {
     "variant": True,
     "scenario": True,
     "severity": True,
+    "truth_noise": True,
     "scene": {"summary"},
     "trajectory": {"file", "times", "recorded_hz", "axes"},
 }

@@ -15,7 +15,7 @@ from vobench.run.store import Progress, SilentProgress, Store
 from vobench.suite.scene_file import content as scene_content
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import RecordedCase
-from vobench.suite.suite import Case, Entrant, Plan, Trial
+from vobench.suite.suite import EXACT, Case, Entrant, Plan, Trial
 
 if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
@@ -165,11 +165,19 @@ def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
         "variant": trial.case.variant,
         "estimator": trial.entrant.label,
         "claims": trial.entrant.claims,
+        **_noise(trial.case),
         "repeat": trial.repeat,
         **_made_by("score", (sequence, estimate)),
         "libraries": library_versions("numpy", "scipy"),
     }
     return Task("score", trial, inputs, (sequence, estimate), Resources())
+
+
+def _noise(case: Case | RecordedCase) -> dict[str, Any]:
+    """What the truth of a case that is scored depends on, beside the exact one."""
+    if isinstance(case, RecordedCase) or case.truth_noise == EXACT:
+        return {}
+    return {"truth_noise": asdict(case.truth_noise), "seed": case.seed, "first": case.frames and case.frames[0]}
 
 
 def _made_by(stage: Stage, needs: tuple[str, ...] = ()) -> dict[str, Any]:

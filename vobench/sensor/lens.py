@@ -1,4 +1,4 @@
-"""What the lens does to light on its way: falloff to the corners, blur and dirt, on linear radiance. Pure."""
+"""What the lens does to light on its way: falloff to the corners, blur, flare and dirt, on linear radiance. Pure."""
 
 from dataclasses import dataclass
 
@@ -13,6 +13,8 @@ SMUDGES, SPECKS = 5, 60
 SMUDGE_SHARE, SPECK_SHARE = (0.05, 0.2), (0.004, 0.015)  # radii over the picture's width
 # Of the light that dirt takes, the share that it scatters onto the chip; the rest is absorbed. An assumption.
 SCATTERED = 0.5
+# Over the picture's width: the distance scale of the veil of flare, and the spread of a ghost. Assumptions.
+VEIL_SHARE, GHOST_SHARE = 0.1, 0.02
 # Points across a pixel for the share of it that a disc covers.
 FINE = 32
 
@@ -22,7 +24,7 @@ class LensMaps:
     """One lens, made once per camera; None is no effect.
 
     `shade` (H, W) is the share of light that passes; `veil` (H, W) the share of the picture's mean that dirt adds;
-    `transfer` (H, W) the blur over the frequencies of a cosine transform.
+    `transfer` (H, W) the blur and flare over the frequencies of a cosine transform.
     """
 
     shade: Radiance | None = None
@@ -42,11 +44,13 @@ def lens_maps(effects: CameraSettings, camera: Camera, rng: np.random.Generator)
         shade, veil = passed * (1 - taken), SCATTERED * passed * taken
     if effects.blur_sigma_px > 0 or effects.defocus_px > 0:
         transfer = gaussian_transfer(shape, effects.blur_sigma_px) * disc_transfer(shape, effects.defocus_px)
+    if effects.flare > 0 or effects.ghost > 0:
+        transfer = flare_transfer(1.0 if transfer is None else transfer, shape, effects.flare, effects.ghost)
     return LensMaps(_single(shade), _single(veil), transfer)
 
 
 def through_lens(radiance: Radiance, maps: LensMaps) -> Radiance:
-    """Radiance (H, W), or (H, W, 3) in colour, as it reaches the chip: dirt on the front lens, falloff, then blur.
+    """Radiance (H, W), or (H, W, 3) in colour, as it reaches the chip: past dirt, falloff, blur and flare.
 
     Source of the dirt's two terms: Gu, Ramamoorthi, Belhumeur and Nayar (2009), equation 3.
     """
@@ -74,7 +78,7 @@ def vignetting(rays: Array, *, strength: float = 1.0, cutoff_deg: float | None =
 
 
 def blur(radiance: Radiance, transfer: Array) -> Radiance:
-    """Radiance (H, W) convolved with the symmetric spread of that transfer; the picture is mirrored at its borders.
+    """Radiance (H, W) spread by that transfer; the picture is mirrored at its borders.
 
     What leaves a pixel arrives in others: the sum stays.
     """
@@ -96,6 +100,20 @@ def disc_transfer(shape: tuple[int, int], diameter_px: float) -> Array:
     shares = _disc(diameter_px)
     down, across = (_cosines(size, len(shares)) for size in shape)
     transfer: Array = down @ shares @ across.T
+    return transfer
+
+
+def flare_transfer(straight: Array | float, shape: tuple[int, int], flare: float, ghost: float) -> Array:
+    """Transfer (H, W) of a lens that is `straight` but for the shares of light that it scatters and that it mirrors.
+
+    The scattered share falls at distance r as (h² + r²)^-1.5, half of it within √3 h; the mirrored share comes, out of
+    focus, to where a half turn about the picture's middle takes it.
+    """
+    height, width = shape
+    down, across = (np.arange(size) for size in shape)
+    veil = np.exp(-VEIL_SHARE * width * np.pi * np.hypot(down[:, None] / height, across / width))
+    turned = np.where(np.add.outer(down, across) % 2, -1.0, 1.0) * gaussian_transfer(shape, GHOST_SHARE * width)
+    transfer: Array = (1 - flare - ghost) * straight + flare * veil + ghost * turned
     return transfer
 
 

@@ -1,4 +1,4 @@
-"""When pictures are really taken: frames that are lost or come twice, stamps that jitter, an eye that is late. Pure."""
+"""When sensors really look: frames that are lost or come twice, stamps that jitter, a late eye or IMU. Pure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,10 +18,11 @@ WIDEST_JITTER = 3.0  # standard deviations; a stamp is no further off
 
 @settings()
 class Timing:
-    """What happens to pictures between the shutter and their stamps.
+    """What happens to pictures and readings between sensors and their stamps.
 
     Of all frames `drop_share` are lost, `drop_burst` in a row; `repeat_share` of them show the picture before again.
     A picture is taken `jitter_ms` (standard deviation) beside its stamp, the right one `right_delay_ms` later still.
+    A reading of the IMU is stamped `imu_delay_ms` after it was taken, by the clock of the pictures.
     """
 
     drop_share: Annotated[Share, Le(0.9)] = 0.0
@@ -29,6 +30,7 @@ class Timing:
     repeat_share: Annotated[Share, Le(0.9)] = 0.0
     jitter_ms: Annotated[float, Ge(0), Le(100)] = 0.0
     right_delay_ms: Annotated[float, Ge(-100), Le(100)] = 0.0
+    imu_delay_ms: Annotated[float, Ge(-1000), Le(1000)] = 0.0
 
     @property
     def latest_ms(self) -> float:

@@ -10,7 +10,7 @@ from ruamel.yaml import YAML
 
 from vobench.motion.replay import Replay
 from vobench.suite.suite import AXES, Case, Entrant
-from vobench.suite.yaml_file import plain
+from vobench.suite.yaml_file import plain, without_nothing
 
 SUITE_FILE, POSES_FILE = "suite.yaml", "poses.tum"
 
@@ -29,12 +29,13 @@ def write_case(case: Case, entrants: Sequence[Entrant], folder: Path, *, name: s
         "summary": summary,
         "seed": case.seed,
         "scenes": [scene],
-        "lightings": {of["lighting"]: _said(plain(case)["lighting"])},
-        "rigs": {of["rig"]: _said(plain(case.rig))},
+        "lightings": {of["lighting"]: without_nothing(plain(case)["lighting"])},
+        "rigs": {of["rig"]: without_nothing(plain(case.rig))},
         "trajectories": {of["trajectory"]: _trajectory(case, folder)},
-        "cameras": {of["camera"]: _said(plain(case.camera))},
-        "rendering": _said(plain(case.rendering)),
+        "cameras": {of["camera"]: without_nothing(plain(case.camera))},
+        "rendering": without_nothing(plain(case.rendering)),
         "truth": list(case.truth),
+        "truth_noise": plain(case.truth_noise),
         **({"frames": list(case.frames)} if case.frames else {}),
         "estimators": [_estimator(entrant) for entrant in entrants],
     }
@@ -43,7 +44,7 @@ def write_case(case: Case, entrants: Sequence[Entrant], folder: Path, *, name: s
 
 
 def _scene(case: Case, folder: Path) -> Any:
-    said = _said(plain(case.scene))
+    said = without_nothing(plain(case.scene))
     for part in (*said.get("meshes", ()), *said.get("movers", ()), said):
         for key in ("file", "maker"):
             if part.get(key):
@@ -59,7 +60,9 @@ def _trajectory(case: Case, folder: Path) -> Any:
     if isinstance(spec, Replay) and case.replayed is not None:
         (folder / POSES_FILE).write_text(case.replayed, encoding="utf-8")
         spec = replace(spec, file=POSES_FILE, times=None, recorded_hz=None, axes="body")
-    return _said({key: value for key, value in plain(case)["trajectory"].items() if hasattr(spec, key)} | _moved(spec))
+    return without_nothing(
+        {key: value for key, value in plain(case)["trajectory"].items() if hasattr(spec, key)} | _moved(spec)
+    )
 
 
 def _moved(spec: Any) -> dict[str, Any]:
@@ -70,15 +73,9 @@ def _estimator(entrant: Entrant) -> Any:
     limits = {
         key: value for key, value in plain(entrant.limits).items() if value != getattr(entrant.manifest.limits, key)
     }
-    return _said({"name": entrant.manifest.name, "label": entrant.label, "params": entrant.params, "limits": limits})
-
-
-def _said(tree: Any) -> Any:
-    """Without what is left out in YAML: keys without a value, and sections without keys."""
-    if isinstance(tree, dict):
-        kept = {key: _said(value) for key, value in tree.items()}
-        return {key: value for key, value in kept.items() if value is not None}
-    return [_said(value) for value in tree] if isinstance(tree, list | tuple) else tree
+    return without_nothing(
+        {"name": entrant.manifest.name, "label": entrant.label, "params": entrant.params, "limits": limits}
+    )
 
 
 def _write(path: Path, tree: Any) -> None:

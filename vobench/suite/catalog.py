@@ -27,7 +27,7 @@ FORMS: dict[Kind, tuple[str, ...]] = {
     "scene": ("{}.yaml", "{}/scene.yaml", "{}.glb"),
     "estimator": ("{}/estimator.yaml",),
 }
-SUITE_KEY = re.compile(rb"^estimators\s*:", re.MULTILINE)
+NO_SCENE = re.compile(rb"^(estimators|severity|include)\s*:", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +96,7 @@ def _all(kind: Kind, suite: Path | None = None, *, name: str | None = None) -> I
     if suite:
         yield from _in_folder(kind, suite.parent / f"{kind}s", "beside the suite", name)
         if kind != "scenario":
-            yield from (e for e in _in_folder(kind, suite.parent, "beside the suite", name) if not _is_suite(e.path))
+            yield from (e for e in _in_folder(kind, suite.parent, "beside the suite", name) if not _is_other(e.path))
     yield from _in_folder(kind, Path(among), f"./{among}", name)
     for folder in filter(None, os.environ.get("VOBENCH_PATH", "").split(os.pathsep)):
         yield from _in_folder(kind, Path(folder) / among, "$VOBENCH_PATH", name)
@@ -129,6 +129,6 @@ def _name(kind: Kind, path: Path) -> str:
     return path.parent.name if kind == "scene" and path.name == "scene.yaml" else path.stem
 
 
-def _is_suite(path: Path) -> bool:
-    """Whether this file is a suite, which may be called as its scene is: only suites have estimators."""
-    return path.is_file() and SUITE_KEY.search(path.read_bytes()) is not None
+def _is_other(path: Path) -> bool:
+    """Whether this file is a suite or a scenario, which may be called as its scene is."""
+    return path.is_file() and NO_SCENE.search(path.read_bytes()) is not None

@@ -8,7 +8,7 @@ from annotated_types import MaxLen, MinLen
 
 from vobench.errors import Mistake, SuiteError
 from vobench.sensor.image_sensor import CameraSettings
-from vobench.setting import Name, settings
+from vobench.setting import Name, over, settings
 from vobench.suite import yaml_file
 from vobench.suite.axis import Camera, RigSettings
 from vobench.suite.scene_file import Lighting
@@ -77,15 +77,9 @@ def read_scenario(path: Path) -> Scenario:
     for severity, changes in enumerate(read.model.severity):
         try:
             place = read.source.place(("severity", severity))
-            setups.append(yaml_file.checked_section(Setup, merged(base, changes), place))
+            setups.append(yaml_file.checked_section(Setup, over(base, changes), place))
         except SuiteError as error:
             wrong += error.mistakes
     if wrong:
         raise SuiteError(*wrong)
     return Scenario(read.model.name, path, tuple(setups))
-
-
-def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Keys with values, some of them changed: sections key by key, all else as a whole."""
-    both = [key for key, value in changes.items() if isinstance(value, dict) and isinstance(base.get(key), dict)]
-    return {**base, **changes, **{key: merged(base[key], changes[key]) for key in both}}

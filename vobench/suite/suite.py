@@ -56,6 +56,20 @@ class Rendering:
 
 
 @settings()
+class TruthNoise:
+    """How far each pose of the truth that is scored is off, as a reference of a real recording is.
+
+    Standard deviations of its place along each axis, and of its turn about each.
+    """
+
+    position_m: Annotated[float, Ge(0), Le(1)] = 0.0
+    rotation_deg: Annotated[float, Ge(0), Le(10)] = 0.0
+
+
+EXACT = TruthNoise()
+
+
+@settings()
 class EstimatorSettings:
     """An estimator with parameters and limits other than its manifest's."""
 
@@ -90,9 +104,11 @@ class Suite:
     Each axis names its variants; change one axis to change one factor. Without rigs a pair looks ahead; without
     trajectories the body goes round where each scene is free. A suite of recordings alone has no axes, nor has one of
     `scenarios`, each at some severities and with the rig's calibration off by each of `calibrations`. With `frames`
-    only the pictures from one number to before another are taken of every way.
+    only the pictures from one number to before another are taken of every way. What it does not say itself is as the
+    suite has it that it includes.
     """
 
+    include: str | None = None
     name: Name
     summary: str = ""
     seed: Annotated[int, Ge(0)] = 0
@@ -107,6 +123,7 @@ class Suite:
     cameras: Annotated[dict[Name, Camera], MinLen(1)] = field(default_factory=lambda: {"clean": CameraSettings()})
     rendering: Rendering = Rendering()
     truth: tuple[ChannelName, ...] = ()
+    truth_noise: TruthNoise = EXACT
     frames: Window | None = None
     modes: Annotated[tuple[Mode, ...], MinLen(1)] = ("step",)
     share_time: bool = False
@@ -151,6 +168,7 @@ class Case:
     camera: CameraSettings
     rendering: Rendering
     truth: tuple[str, ...]
+    truth_noise: TruthNoise = EXACT
     frames: Window | None = None
     seed: int
     scenario: str | None = None
@@ -268,7 +286,7 @@ def read_plan(
     """
     reading = yaml_file.read_all(catalog.find("suite", name).path, Suite, changes)
     wrong = Mistakes(reading.source, list(reading.mistakes))
-    meant = {key for said in reading.source.marked for key in get_close_matches(str(said), hints(Suite), n=1)}
+    meant = {key for said in reading.source.plain for key in get_close_matches(str(said), hints(Suite), n=1)}
     with wrong.at():
         if wrong.found and (missing := missing_axis(meant)):
             raise SuiteError(missing)
@@ -288,8 +306,7 @@ class _Planner:
         """The plan. Raises SuiteError with all that is wrong."""
         entrants = self._entrants(only_estimators)
         scenes, replayed = self._scenes(), self._replayed()
-        self._check_rigs()
-        axes = self._axes(scenes)
+        axes = self._axes(scenes, self._rigs())
         variants = [*_combinations(axes)]
         if not self.suite.trajectories:
             variants = [(name, v) for name, v in variants if v["trajectory"] == _found_name(v["scene"], scenes)]
@@ -387,6 +404,7 @@ class _Planner:
 
     def _of_scenario(self, scenario: Scenario, severity: int) -> Iterator[Case]:
         setup, levels = scenario.setup(severity), self.suite.calibrations or (None,)
+        own = setup.rig.read(scenario.path.parent)
         entry = catalog.find("scene", setup.scene, suite=scenario.path)
         if entry not in self.found:
             self.found.append(entry)
@@ -399,21 +417,21 @@ class _Planner:
             text = read_replayed(setup.trajectory, folder, read_times(setup.trajectory, folder))
         variant = scenario.variant(severity, entry.name)
         for level in levels:
-            rig, end = setup.rig, f"-{level}" if len(levels) > 1 else ""
+            rig, end = own, f"-{level}" if len(levels) > 1 else ""
             if level:
                 rig = replace(rig, calibration_error=replace(rig.calibration_error, level=level))
-            true_rig(rig.build(), rig.calibration_error)
             yield Case(
                 name=f"{scenario.name}-{severity}{end}",
                 variant={**variant, "rig": f"{variant['rig']}{end}"},
                 scene=scene,
                 lighting=setup.lighting,
-                rig=rig,
+                rig=_possible(rig),
                 trajectory=setup.trajectory,
                 replayed=text,
                 camera=setup.camera,
                 rendering=self.suite.rendering,
                 truth=self.suite.truth,
+                truth_noise=self.suite.truth_noise,
                 frames=self.suite.frames,
                 seed=self.suite.seed,
                 scenario=scenario.name,
@@ -439,11 +457,13 @@ class _Planner:
                     else:
                         scene_file.lit(lights, {name: override})
 
-    def _check_rigs(self) -> None:
-        """So is a rig whose distortion is off, on a lens without any."""
-        for name, rig in (self.suite.rigs or {}).items():
+    def _rigs(self) -> dict[str, RigSettings]:
+        """The rigs, their files read; one whose distortion is off, on a lens without any, is an error now."""
+        rigs = dict(self.suite.rigs or {})
+        for name, rig in rigs.items():
             with self.wrong.at("rigs", name):
-                true_rig(rig.build(), rig.calibration_error)
+                rigs[name] = _possible(rig.read(self._folder()))
+        return rigs
 
     def _replayed(self) -> dict[str, str]:
         """What the files of replayed trajectories hold, by the trajectories' names."""
@@ -456,11 +476,11 @@ class _Planner:
                         texts[name] = read_replayed(spec, self._folder(), times)
         return texts
 
-    def _axes(self, scenes: dict[str, SceneFile]) -> Axes:
+    def _axes(self, scenes: dict[str, SceneFile], rigs: dict[str, RigSettings]) -> Axes:
         suite = self.suite
         if not scenes:
-            return scenes, suite.lightings, suite.rigs or {}, suite.trajectories or {}, suite.cameras
-        rigs = suite.rigs or {USUAL_RIG: RigSettings(pitch_deg=10)}
+            return scenes, suite.lightings, rigs, suite.trajectories or {}, suite.cameras
+        rigs = rigs or {USUAL_RIG: RigSettings(pitch_deg=10)}
         return scenes, suite.lightings, rigs, suite.trajectories or self._found_ways(scenes), suite.cameras
 
     def _found_ways(self, scenes: dict[str, SceneFile]) -> dict[str, Any]:
@@ -485,6 +505,7 @@ class _Planner:
             replayed=replayed.get(variant["trajectory"]),
             rendering=suite.rendering,
             truth=suite.truth,
+            truth_noise=suite.truth_noise,
             frames=suite.frames,
             seed=suite.seed,
         )
@@ -505,6 +526,12 @@ class _Planner:
 
 def _found_name(scene: str, scenes: Collection[str]) -> str:
     return "found" if len(scenes) == 1 else f"found_{scene}"
+
+
+def _possible(rig: RigSettings) -> RigSettings:
+    """A rig that can be built, its calibration's error too. Raises VobenchError."""
+    true_rig(rig.build(), rig.calibration_error)
+    return rig
 
 
 def _lights(scene: SceneFile, named: Collection[str] | None = None) -> tuple[Light, ...]:

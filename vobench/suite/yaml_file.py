@@ -19,28 +19,33 @@ from ruamel.yaml.constructor import RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from vobench.errors import Mistake, Place, SettingError, SuiteError, VobenchError
-from vobench.setting import COMPLAINTS, complaint, hints, unit_of
+from vobench.setting import COMPLAINTS, complaint, hints, over, unit_of
+from vobench.suite import catalog
 
 Model = TypeVar("Model")
 Keys = tuple[int | str, ...]
 KEPT = 64  # files, parsed: scenarios change one scene again and again
+INCLUDE = "include"  # the key of a file that others of its kind build on
 
 
 @dataclass(frozen=True, slots=True)
 class YamlFile:
     """A YAML file as it was read: what it holds, and on which line each key stands.
 
-    `kept` says which entries of its lists are left, by their numbers in the file, where some are left out.
+    `kept` says which entries of its lists are left, by their numbers in the file, where some are left out; `included`
+    is the file whose keys are its own where it has none.
     """
 
     path: Path
     marked: Any
     kept: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    included: "YamlFile | None" = None
 
     @property
     def plain(self) -> Any:
-        """What it holds, in Python's own types."""
-        return _plain(self.marked)
+        """What it holds over what it includes, in Python's own types; a key without a value takes one of that away."""
+        own = _plain(self.marked)
+        return without_nothing(over(self.included.plain, own)) if self.included else own
 
     def placed(self, error: VobenchError, *keys: int | str) -> tuple[Mistake, ...]:
         """The mistakes of an error, this place in front of their own; without keys, where they have none."""
@@ -51,8 +56,17 @@ class YamlFile:
         )
 
     def place(self, keys: Keys) -> Place:
-        """The place of the deepest of these keys that the file has."""
-        tree, line, named = self.marked, None, list[int | str]()
+        """The place of the deepest of these keys that the file has, or that is in what it includes."""
+        return max((file._place(keys) for file in self.files), key=lambda each: each[0])[1]
+
+    @property
+    def files(self) -> "tuple[YamlFile, ...]":
+        """The file, what it includes, what that includes."""
+        return self, *(self.included.files if self.included else ())
+
+    def _place(self, keys: Keys) -> tuple[int, Place]:
+        """How many of the keys the file has, and the place of the last of them."""
+        tree, line, named, depth = self.marked, None, list[int | str](), 0
         for key in keys:
             if isinstance(key, int) and (isinstance(tree, str | int) or (isinstance(tree, dict) and key not in tree)):
                 continue  # one value stands for a list of one
@@ -60,12 +74,14 @@ class YamlFile:
             lines = getattr(tree, "lc", None)  # what was put in place of the file's has none
             if isinstance(tree, dict) and key in tree:
                 tree, line = tree[key], lines.key(key)[0] + 1 if lines and key in (lines.data or ()) else line
+                depth = len(named)
             elif isinstance(tree, list) and isinstance(key, int) and key < len(tree):
                 tree, line = tree[key], lines.item(key)[0] + 1 if lines else line
+                depth = len(named)
             else:
                 tree = None
         value = tree if isinstance(tree, str | bool | int | float) else None
-        return Place(str(self.path), line, key=".".join(map(str, named)), value=value)
+        return depth, Place(str(self.path), line, key=".".join(map(str, named)), value=value)
 
     def written(self, keys: Keys) -> Keys:
         """The keys with an entry's number as it is in the file."""
@@ -126,17 +142,13 @@ def read_all(path: Path, model: type[Model], changes: Mapping[str, str] = Mappin
 
     `changes` are values in YAML by keys with dots between, which are put in place of the file's.
     """
-    source, twice = _parse(path, _text(path))
+    source, mistakes = _with_included(path, ()) if INCLUDE in hints(model) else _parse(path)
     source = replace(source, marked=deepcopy(source.marked)) if changes else source
-    if not isinstance(source.marked, dict):
-        tree = source.marked
-        kind = "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
-        raise SuiteError(Mistake(f"should be keys with values, but is {kind}", (source.place(()),)))
     for keys, value in changes.items():
         _change(source.marked, keys, value)
-    unread = dict(_unreadable(source.marked, ()))
-    mistakes = [*twice, *(Mistake(sentence, (source.place(keys),)) for keys, sentence in unread.items())]
-    data, wrong = _plain(source.marked), [*unread]
+    unread = {keys: sentence for file in source.files for keys, sentence in _unreadable(file.marked, ())}
+    mistakes += [Mistake(sentence, (source.place(keys),)) for keys, sentence in unread.items()]
+    data, wrong = source.plain, [*unread]
     try:
         whole = checked(model, data)
         if not mistakes:
@@ -146,6 +158,22 @@ def read_all(path: Path, model: type[Model], changes: Mapping[str, str] = Mappin
         mistakes += _complaints(source, error, json_schema(model), unread)
     parts, kept = _intact(model, data, wrong)
     return Reading(_partial(model, parts), replace(source, kept=kept), tuple(sorted(mistakes, key=_line)))
+
+
+def _with_included(path: Path, including: tuple[Path, ...]) -> tuple[YamlFile, list[Mistake]]:
+    """The file with the suite that it includes, by name or path, and the keys that are twice in one of them."""
+    source, twice = _parse(path)
+    name = source.marked.get(INCLUDE)
+    if not isinstance(name, str):
+        return source, twice
+    try:
+        found = catalog.find("suite", name, suite=path.resolve()).path
+        if found in (path.resolve(), *including):
+            raise SuiteError(f"a suite cannot include itself: {found}")
+        included, more = _with_included(found, (path.resolve(), *including))
+    except VobenchError as error:
+        raise SuiteError(*source.placed(error, INCLUDE)) from None
+    return replace(source, included=included), [*twice, *more]
 
 
 def _change(tree: Any, keys: str, value: str) -> None:
@@ -219,18 +247,23 @@ class _Constructor(RoundTripConstructor):
         return True
 
 
-def _text(path: Path) -> str:
+def _parse(path: Path) -> tuple[YamlFile, list[Mistake]]:
+    """The file as YAML, and the keys that are in it twice. Raises SuiteError where it has no keys with values."""
     try:
-        return path.read_text(encoding="utf-8")
+        source, twice = _of_text(path, path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SuiteError(f"cannot read {path}: {error.strerror}") from None
     except UnicodeDecodeError:
         raise SuiteError(Mistake("not a text file in UTF-8", (Place(str(path)),))) from None
+    if not isinstance(source.marked, dict):
+        tree = source.marked
+        kind = "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
+        raise SuiteError(Mistake(f"should be keys with values, but is {kind}", (source.place(()),)))
+    return source, [*twice]
 
 
 @lru_cache(KEPT)
-def _parse(path: Path, text: str) -> tuple[YamlFile, list[Mistake]]:
-    """The text of a file as YAML, and the keys that are in it twice. Raises SuiteError where it is none."""
+def _of_text(path: Path, text: str) -> tuple[YamlFile, tuple[Mistake, ...]]:
     # YAML 1.2: 1e-3 is a number, 'no' a word.
     yaml = YAML(typ="rt", pure=True)
     yaml.Constructor = _Constructor
@@ -242,7 +275,7 @@ def _parse(path: Path, text: str) -> tuple[YamlFile, list[Mistake]]:
         raise SuiteError(Mistake(" ".join(str(error).split()), (Place(str(path)),))) from None
     except RecursionError:
         raise SuiteError(Mistake("brackets or indents are nested too deep", (Place(str(path)),))) from None
-    return YamlFile(path, tree), [_at_mark(path, mark, sentence) for mark, sentence in yaml.constructor.twice]
+    return YamlFile(path, tree), tuple(_at_mark(path, mark, sentence) for mark, sentence in yaml.constructor.twice)
 
 
 def _at_mark(path: Path, mark: Any, sentence: str) -> Mistake:
@@ -276,6 +309,14 @@ def _plain(tree: Any) -> Any:
         if isinstance(tree, made):
             return made(tree)
     return None
+
+
+def without_nothing(tree: Any) -> Any:
+    """Without what is left out in YAML: keys without a value."""
+    if isinstance(tree, dict):
+        kept = {key: without_nothing(value) for key, value in tree.items()}
+        return {key: value for key, value in kept.items() if value is not None}
+    return [without_nothing(value) for value in tree] if isinstance(tree, list | tuple) else tree
 
 
 def _intact(model: type, data: dict[str, Any], wrong: list[Keys]) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -252,9 +252,7 @@ def test_two_cameras_in_one_place(euroc, kitti):
 def test_a_chain_with_one_camera_for_two(euroc, tmp_path, camchain):
     chain = tmp_path / "chain.yaml"
     chain.write_text(camchain(cameras=1))
-    assert (
-        complaint(euroc, calibration=chain) == f"a recording with two cameras needs cam1, which is missing in {chain}"
-    )
+    assert complaint(euroc, calibration=chain) == f"a pair of cameras needs cam1, which is missing in {chain}"
 
 
 def test_a_chain_that_does_not_say_where_the_imu_is(euroc, tmp_path, camchain):
