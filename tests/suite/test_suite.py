@@ -192,7 +192,7 @@ def test_what_cases_share_is_made_once_however_many_there_are(bent, monkeypatch)
     calls.clear()
     many = bent(("short: {targets_m: [[0.5, 0]]}", ways), ("clean: {sensor: clean}", cameras)), sorted(calls)
     assert (len(few[0].cases), len(many[0].cases)) == (2, 90)
-    assert few[1] == many[1] == ["build", "read_manifest", "read_manifest", "survey"]
+    assert few[1] == many[1] == ["read_manifest", "read_manifest", "survey"]
 
 
 def test_merge_keys_and_aliases_keep_a_suite_short(bent):

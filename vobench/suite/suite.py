@@ -448,7 +448,8 @@ class _Planner:
 
     def _check_lightings(self, scene: SceneFile, wrong: Mistakes) -> None:
         """A lighting that names no lamp is an error now, not after an hour."""
-        lights = () if wrong.found else _lights(scene)
+        named = {name for overrides in self.suite.lightings.values() for name in overrides}
+        lights = () if wrong.found else _lights(scene, named)
         for lighting, overrides in self.suite.lightings.items():
             for name, override in overrides.items():
                 with self.wrong.at("lightings", lighting, name):
@@ -534,13 +535,12 @@ def _possible(rig: RigSettings) -> RigSettings:
     return rig
 
 
-def _lights(scene: SceneFile, named: Collection[str] | None = None) -> tuple[Light, ...]:
+def _lights(scene: SceneFile, named: Collection[str]) -> tuple[Light, ...]:
     """The lights of a scene; where its file lists all of those `named`, these alone, for which nothing is built."""
     from vobench.suite.scene_build import build, listed_lights
 
     listed = tuple(listed_lights(scene))
-    is_enough = named is not None and {light.name for light in listed}.issuperset(named)
-    return listed if is_enough else build(scene, {}).lights
+    return listed if {light.name for light in listed}.issuperset(named) else build(scene, {}).lights
 
 
 def _combinations(axes: Axes) -> Iterator[tuple[str, dict[str, str]]]:
