@@ -1,5 +1,6 @@
 """A suite from end to end: what is cached, what is repeatable, and what survives being killed."""
 
+import json
 import os
 import signal
 import subprocess
@@ -15,7 +16,7 @@ from vobench.report.verify import verify_run
 from vobench.run import estimate
 from vobench.run import estimate as estimate_file
 from vobench.run.estimate import ESTIMATE
-from vobench.run.folder import PAGE, SCORE, SEQUENCE, TIMES_HASHES, read_tum
+from vobench.run.folder import ENVIRONMENT, PAGE, SCORE, SEQUENCE, TIMES_HASHES, read_tum
 from vobench.run.frames import TIMES
 from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.run.task import sequence_tasks
@@ -49,6 +50,17 @@ def test_a_run_holds_all_that_its_folder_promises(first):
     assert [(s.case, s.status, s.coverage) for s in first.scores()] == [
         (case, "ok", 1.0) for case in ("dim", "dim", "full", "full")
     ]
+
+
+def test_a_suite_may_let_estimators_run_beside_other_tasks_and_its_run_says_so(bench, first, monkeypatch):
+    from vobench.run import run as runs
+
+    heard = list[bool]()
+    monkeypatch.setattr(runs, "perform_all", lambda *_, shares_time, **__: heard.append(shares_time) or {})
+    shared = bench.run(("name: tiny", "name: tiny\nshare_time: true"))
+    said = [json.loads((run.path / ENVIRONMENT).read_text())["timed"] for run in (first, shared)]
+    assert said == [runs.ALONE, runs.BESIDE]
+    assert heard == [True]
 
 
 def test_a_noisy_truth_changes_scores_and_no_sequence_and_no_estimate(bench, first):

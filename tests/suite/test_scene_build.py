@@ -62,7 +62,9 @@ def yard(tmp_path: Path):
     """Builds the yard with some lines added."""
 
     def of(more: str = "") -> Scene:
-        (tmp_path / "yard.yaml").write_text(YAML + more)
+        replaced = {line.split(":")[0] for line in more.splitlines()}
+        kept = (line for line in YAML.splitlines() if line.split(":")[0] not in replaced)
+        (tmp_path / "yard.yaml").write_text("\n".join([*kept, more]))
         return build(read_scene(tmp_path / "yard.yaml"), {})
 
     return of
@@ -89,6 +91,18 @@ def test_another_piece_changes_no_other(yard) -> None:
     one = "{kind: shelf, name: s, at_m: [0, 2, 0]}"
     alone, both = yard(f"furniture: [{one}]\n"), yard(f"furniture: [{{kind: mug, name: m, at_m: [1, 1, 0]}}, {one}]\n")
     np.testing.assert_array_equal(vertices(alone, "s"), vertices(both, "s"))
+
+
+def test_a_piece_is_built_anew_for_another_place_or_seed_alone(yard, monkeypatch) -> None:
+    built, build_piece = list[int](), kinds.Piece.build
+    monkeypatch.setattr(kinds.Piece, "build", lambda piece, seed: built.append(seed) or build_piece(piece, seed))
+    pots = [f"furniture: [{{kind: plant, name: pot, at_m: [{x}, 2, 0]}}]\n" for x in (0.125, 0.375)]
+    lit = yard(pots[0]), yard(pots[0] + "white_cd_m2: 60\n"), yard(pots[1]), yard(pots[0] + "seed: 4\n")
+    assert built == [3, 3, 4]
+    first, dimmer, moved, other = (vertices(scene, "pot") for scene in lit)
+    np.testing.assert_array_equal(first, dimmer)
+    np.testing.assert_allclose(moved - first, np.broadcast_to([0.25, 0, 0], first.shape), atol=1e-6)
+    assert other.shape != first.shape or np.abs(other - first).max() > 0.01
 
 
 def test_what_a_maker_of_furniture_does_not_know_is_named(yard) -> None:

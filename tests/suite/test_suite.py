@@ -244,7 +244,7 @@ def test_a_calibration_error_makes_the_true_rig_another_and_the_told_one_not(ben
 # ruff: noqa: E501 - a sentence stands in one line
 
 
-SUITE_KEYS = "calibrations, cameras, estimators, frames, include, lightings, modes, name, rendering, repeats, rigs, scenarios, scenes, seed, source, summary, trajectories, truth, truth_noise"
+SUITE_KEYS = "calibrations, cameras, estimators, frames, include, lightings, modes, name, rendering, repeats, rigs, scenarios, scenes, seed, share_time, source, summary, trajectories, truth, truth_noise"
 RIG_KEYS = """baseline_m, calib, calibration_error, camchain, forward_m, height_m, imu, lens, own, picture_scale,\
  pitch_deg, size_px"""
 LENSES = "d435i, euroc, fisheye, paper_blender, paper_literal, tartanair, zed2i"

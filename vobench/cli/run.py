@@ -4,7 +4,7 @@ import os
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -96,7 +96,7 @@ def run_command(
     from vobench.report.board_table import as_json as board_as_json
     from vobench.run.run import BESIDE
 
-    _, recordings = _preflight(planned)
+    _, recordings = _preflight(planned, of_all=fresh)
     if cause := why_unwritable(out):
         raise InputError(f"--out should be a folder that can be written ({cause}): {out}")
     folder = run_plan(
@@ -112,7 +112,7 @@ def run_command(
         print_board(board)
         if not sandbox_works():
             terminal.console().print("Estimators were not sandboxed: the kernel gives no namespaces (vobench doctor).")
-        if share_time:
+        if share_time or planned.suite.share_time:
             terminal.console().print(f"CPU times of this run were taken {BESIDE}.")
         vobench = "vobench" if shutil.which("vobench") else sys.argv[0]  # where the environment is not activated
         terminal.console().print(f"Everything is in {folder.path}\nLook into it: {vobench} view {folder.path}")
@@ -167,12 +167,16 @@ def check_command(suite: terminal.SuiteName, *, json: terminal.Json = False) -> 
     _check(read_plan(suite), as_json=json)
 
 
-def _preflight(planned: Plan) -> "tuple[dict[str, BodyMotion], dict[str, Recording]]":
-    """Where bodies go and what recordings hold. Raises SuiteError with all that cannot be."""
+def _preflight(planned: Plan, *, of_all: bool = True) -> "tuple[dict[str, BodyMotion], dict[str, Recording]]":
+    """Where bodies go, of all cases or those to simulate, and what recordings hold.
+
+    Raises SuiteError with all that cannot be.
+    """
     travels, wrong = dict[str, BodyMotion](), planned.mistakes()
     recordings: dict[str, Recording] = {}
     with wrong.at():
-        travels = body_motions(planned)
+        simulated = (case for case in planned.simulated if of_all or not _is_there(case, {}))
+        travels = body_motions(replace(planned, simulated=tuple(simulated)))
     with wrong.at():
         if planned.recorded:
             from vobench.run.import_recording import read_all
@@ -230,11 +234,15 @@ def _spell(seconds: float | None) -> str:
     return "" if seconds is None else f"{seconds:.0f} s" if seconds < 600 else f"{seconds / 60:.0f} min"
 
 
+def _is_there(case: Case | RecordedCase, recordings: "Mapping[str, Recording]") -> bool:
+    return is_done(sequence_tasks(case, recordings)[-1], cache_folder())
+
+
 def _facts(
     case: Case | RecordedCase, travels: Mapping[str, BodyMotion], recordings: "Mapping[str, Recording]"
 ) -> dict[str, Any]:
     """What is known of a case before it is made; a recording's pictures are not read yet."""
-    is_there = is_done(sequence_tasks(case, recordings)[-1], cache_folder())
+    is_there = _is_there(case, recordings)
     notes = dict[str, list[str]]()
     if isinstance(case, RecordedCase):
         recording, to_make = recordings[case.name], f"to import from {case.source.path}"

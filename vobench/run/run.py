@@ -64,8 +64,8 @@ def run_suite(
     """Run every case, estimator and repeat; what the store holds already is not made again.
 
     `finish` adds reports to the folder before it gets its final name under `root`. A cell whose task fails has a row
-    that says why. `is_fresh` makes all of it anew. `executor`, `shares_time` and `heard` are those of `perform_all`;
-    `tell` is given sentences on the store, say of a result that was damaged.
+    that says why. `is_fresh` makes all of it anew. `executor`, `shares_time` (which the suite may ask for itself)
+    and `heard` are those of `perform_all`; `tell` is given sentences on the store, say of a result that was damaged.
     """
     tasks = plan(suite, recordings)
     kept = Store(store)
@@ -77,6 +77,7 @@ def run_suite(
         if to_make:
             kept.require_writable()
             kept.set_aside_damaged((task.key for task in to_make), tell)
+        shares_time = shares_time or suite.suite.share_time
         failures = perform_all(to_make, store, executor, shares_time=shares_time, heard=heard)
         cases = {case.name: case for case in suite.cases}
         stated = plain(suite.suite)

@@ -4,9 +4,10 @@ import json
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
 from runpy import run_path
+from typing import TypeVar
 
 import numpy as np
 
@@ -31,19 +32,25 @@ def build(spec: SceneFile, lighting: Lighting) -> Scene:
     return replace(made, lights=lit(made.lights, lighting))
 
 
-KEPT = 16
-_kept: OrderedDict[str, Scene] = OrderedDict()
+KEPT_SCENES, KEPT_PIECES = 16, 512
+_scenes: OrderedDict[str, Scene] = OrderedDict()
+_pieces: OrderedDict[str, Instance] = OrderedDict()
+Made = TypeVar("Made")
+
+
+def _kept(last: OrderedDict[str, Made], most: int, key: str, make: Callable[[], Made]) -> Made:
+    """What was made of that key, or is now; the `most` that were asked for last are kept."""
+    if key not in last:
+        last[key] = make()
+    last.move_to_end(key)
+    while len(last) > most:
+        last.popitem(last=False)
+    return last[key]
 
 
 def _made(spec: SceneFile) -> Scene:
-    """The scene in its own light; the last few are kept, as some take seconds to make."""
-    key = json.dumps(content(spec))
-    if key not in _kept:
-        _kept[key] = _make(spec)
-    _kept.move_to_end(key)
-    while len(_kept) > KEPT:
-        _kept.popitem(last=False)
-    return _kept[key]
+    """The scene in its own light; some take seconds to make."""
+    return _kept(_scenes, KEPT_SCENES, json.dumps(content(spec)), lambda: _make(spec))
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +64,7 @@ class Contents:
 
 
 def _make(spec: SceneFile) -> Scene:
-    parts = [_built(spec), *_from_maker(spec), *map(_model, spec.meshes), Contents(lights=tuple(_lights(spec)))]
+    parts = [_built(spec), *_from_maker(spec), *map(_model, spec.meshes), Contents(lights=tuple(listed_lights(spec)))]
     parts += [_mover(mover, spec) for mover in spec.movers]
     materials = {name: material for part in parts for name, material in part.materials.items()}
     found = [thing for part in parts for thing in part.things]
@@ -75,7 +82,12 @@ def _make(spec: SceneFile) -> Scene:
 
 def _material(name: str, spec: SceneFile) -> Material:
     """What the scene calls so, or a finish that every scene has."""
-    return spec.materials[name].build() if name in spec.materials else FINISHES[name]()
+    return spec.materials[name].build() if name in spec.materials else _finish(name)
+
+
+@cache
+def _finish(name: str) -> Material:
+    return FINISHES[name]()
 
 
 def _built(spec: SceneFile) -> Contents:
@@ -85,7 +97,8 @@ def _built(spec: SceneFile) -> Contents:
     for piece in spec.furniture:
         with _sentence(f"furniture '{piece.name}'"):
             made = Piece(piece.kind, piece.name, piece.at_m, piece.yaw_deg, piece.pitch_deg, piece.size)
-            instances.append(made.build(spec.seed))
+            key = json.dumps([asdict(made), spec.seed])  # scenes with other walls share it
+            instances.append(_kept(_pieces, KEPT_PIECES, key, partial(made.build, spec.seed)))
     used = {*spec.materials, *(name for _, name in materials_used(spec))}
     return Contents(*things(instances, {name: of(name) for name in sorted(used)}))
 
@@ -167,7 +180,8 @@ def _moved(light: Light, T_world_model: Array) -> Light:
     return placed
 
 
-def _lights(spec: SceneFile) -> Iterator[Light]:
+def listed_lights(spec: SceneFile) -> Iterator[Light]:
+    """The lights that a scene's file lists as such: lamps, sun and sky."""
     yield from (lamp.build() for lamp in spec.lamps)
     if spec.sun:
         yield _sun(spec.sun)

@@ -126,6 +126,7 @@ class Suite:
     truth_noise: TruthNoise = EXACT
     frames: Window | None = None
     modes: Annotated[tuple[Mode, ...], MinLen(1)] = ("step",)
+    share_time: bool = False
     estimators: Annotated[tuple[NamedEstimator, ...], MinLen(1)]
 
     def __post_init__(self) -> None:
@@ -409,7 +410,7 @@ class _Planner:
             self.found.append(entry)
         scene = self._changed(entry.path, setup.scene_changes)
         if setup.lighting:
-            scene_file.lit(_lights(scene), setup.lighting)
+            scene_file.lit(_lights(scene, setup.lighting), setup.lighting)
         text = None
         if isinstance(setup.trajectory, Replay):
             folder = scenario.path.parent
@@ -528,10 +529,13 @@ def _possible(rig: RigSettings) -> RigSettings:
     return rig
 
 
-def _lights(scene: SceneFile) -> tuple[Light, ...]:
-    from vobench.suite.scene_build import build
+def _lights(scene: SceneFile, named: Collection[str] | None = None) -> tuple[Light, ...]:
+    """The lights of a scene; where its file lists all of those `named`, these alone, for which nothing is built."""
+    from vobench.suite.scene_build import build, listed_lights
 
-    return build(scene, {}).lights
+    listed = tuple(listed_lights(scene))
+    is_enough = named is not None and {light.name for light in listed}.issuperset(named)
+    return listed if is_enough else build(scene, {}).lights
 
 
 def _combinations(axes: Axes) -> Iterator[tuple[str, dict[str, str]]]:

@@ -4,9 +4,10 @@ import json
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from copy import deepcopy
 from dataclasses import MISSING, dataclass, field, fields, replace
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
@@ -23,6 +24,7 @@ from vobench.suite import catalog
 
 Model = TypeVar("Model")
 Keys = tuple[int | str, ...]
+KEPT = 64  # files, parsed: scenarios change one scene again and again
 INCLUDE = "include"  # the key of a file that others of its kind build on
 
 
@@ -141,6 +143,7 @@ def read_all(path: Path, model: type[Model], changes: Mapping[str, str] = Mappin
     `changes` are values in YAML by keys with dots between, which are put in place of the file's.
     """
     source, mistakes = _with_included(path, ()) if INCLUDE in hints(model) else _parse(path)
+    source = replace(source, marked=deepcopy(source.marked)) if changes else source
     for keys, value in changes.items():
         _change(source.marked, keys, value)
     unread = {keys: sentence for file in source.files for keys, sentence in _unreadable(file.marked, ())}
@@ -246,26 +249,33 @@ class _Constructor(RoundTripConstructor):
 
 def _parse(path: Path) -> tuple[YamlFile, list[Mistake]]:
     """The file as YAML, and the keys that are in it twice. Raises SuiteError where it has no keys with values."""
-    # YAML 1.2: 1e-3 is a number, 'no' a word.
-    yaml = YAML(typ="rt", pure=True)
-    yaml.Constructor = _Constructor
     try:
-        tree = yaml.load(path.read_text(encoding="utf-8"))
+        source, twice = _of_text(path, path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SuiteError(f"cannot read {path}: {error.strerror}") from None
     except UnicodeDecodeError:
         raise SuiteError(Mistake("not a text file in UTF-8", (Place(str(path)),))) from None
+    if not isinstance(source.marked, dict):
+        tree = source.marked
+        kind = "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
+        raise SuiteError(Mistake(f"should be keys with values, but is {kind}", (source.place(()),)))
+    return source, [*twice]
+
+
+@lru_cache(KEPT)
+def _of_text(path: Path, text: str) -> tuple[YamlFile, tuple[Mistake, ...]]:
+    # YAML 1.2: 1e-3 is a number, 'no' a word.
+    yaml = YAML(typ="rt", pure=True)
+    yaml.Constructor = _Constructor
+    try:
+        tree = yaml.load(text)
     except MarkedYAMLError as error:
         raise SuiteError(_at_mark(path, error.problem_mark, " ".join(str(error.problem).split()))) from None
     except YAMLError as error:
         raise SuiteError(Mistake(" ".join(str(error).split()), (Place(str(path)),))) from None
     except RecursionError:
         raise SuiteError(Mistake("brackets or indents are nested too deep", (Place(str(path)),))) from None
-    source = YamlFile(path, tree)
-    if not isinstance(tree, dict):
-        kind = "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
-        raise SuiteError(Mistake(f"should be keys with values, but is {kind}", (source.place(()),)))
-    return source, [_at_mark(path, mark, sentence) for mark, sentence in yaml.constructor.twice]
+    return YamlFile(path, tree), tuple(_at_mark(path, mark, sentence) for mark, sentence in yaml.constructor.twice)
 
 
 def _at_mark(path: Path, mark: Any, sentence: str) -> Mistake:
