@@ -19,14 +19,15 @@ estimators: [stand_still]
 def driven(here):
     """Writes the suite, with keys for its trajectory."""
 
-    def write(keys):
-        (here / "suites" / "driven.yaml").write_text(SUITE.replace("KEYS", keys))
+    def write(keys, more=""):
+        (here / "suites" / "driven.yaml").write_text(SUITE.replace("KEYS", keys) + more)
 
     return write
 
 
 def test_the_theta_of_the_motors_comes_back_from_a_run_and_from_its_sequence(vobench, driven, here):
-    driven("rate_hz: 8, motors: {m_kg: 20, kPT_Vspm: 30}")
+    some = "frames: [2, 90]\ncameras: {it: {timing: {drop_share: 0.1}}}\n"
+    driven("rate_hz: 8, motors: {m_kg: 20, kPT_Vspm: 30}", some)
     assert vobench("run", "driven").code == 0
     theta = theta_of(MotorConstants(m_kg=20, kPT_Vspm=30))
     for path in ("runs/driven", next((here / "cache" / "sequences").iterdir())):

@@ -72,7 +72,7 @@ class Driven:
 def _chosen(plan: Plan, trajectory: str | None) -> list[str]:
     known = list(plan.suite.trajectories or {})
     if not known:
-        raise InputError(f"suite '{plan.suite.name}' has no trajectory to drive, only recordings")
+        raise InputError(f"suite '{plan.suite.name}' has no trajectory to drive, only recordings or scenarios")
     return known if trajectory is None else [terminal.known("trajectory", trajectory, known)]
 
 

@@ -73,8 +73,8 @@ def _of_sequence(name: str, folder: Path) -> DriveLog:
     """
     drive = recorded_drive(folder)
     sequence, truth = Sequence.open(folder), read_truth(folder)
-    again = drive.motion.at(drive.t_ns).T_world_body[: len(truth)]
-    if not np.array_equal(drive.t_ns, truth.t_ns) or not np.allclose(again, truth.T_world_frame, atol=1e-6):
+    again = drive.motion.at(truth.t_ns).T_world_body  # of some frames where others were left out or lost
+    if not np.isin(truth.t_ns, drive.t_ns).all() or not np.allclose(again, truth.T_world_frame, atol=1e-6):
         raise InputError(f"this version of vobench drives the case otherwise than it was recorded: {folder}")
     wheels, (t_ns, ticks) = sequence.rig.wheels, sequence.encoders()
     assert wheels is not None  # a controller drove them

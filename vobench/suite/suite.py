@@ -429,11 +429,7 @@ class _Planner:
                 trajectory=setup.trajectory,
                 replayed=text,
                 camera=setup.camera,
-                rendering=self.suite.rendering,
-                truth=self.suite.truth,
-                truth_noise=self.suite.truth_noise,
-                frames=self.suite.frames,
-                seed=self.suite.seed,
+                **self._of_all(),
                 scenario=scenario.name,
                 severity=severity,
             )
@@ -497,19 +493,18 @@ class _Planner:
         return ways
 
     def _case(self, name: str, variant: dict[str, str], axes: Axes, replayed: dict[str, str]) -> Case:
-        suite = self.suite
         chosen = [axis[variant[kind]] for kind, axis in zip(AXES, axes, strict=True)]
         return Case(
             name=name,
             variant=variant,
             **dict(zip(AXES, chosen, strict=True)),
             replayed=replayed.get(variant["trajectory"]),
-            rendering=suite.rendering,
-            truth=suite.truth,
-            truth_noise=suite.truth_noise,
-            frames=suite.frames,
-            seed=suite.seed,
+            **self._of_all(),
         )
+
+    def _of_all(self) -> dict[str, Any]:
+        """What all cases of the suite have alike."""
+        return {key: getattr(self.suite, key) for key in ("rendering", "truth", "truth_noise", "frames", "seed")}
 
     def _recorded(self, taken: set[str]) -> tuple[RecordedCase, ...]:
         """The recordings, none of them called as another case is."""
