@@ -28,6 +28,9 @@ FailureKind = Literal["crashed", "out_of_memory", "refused"]
 LOOK_S = 0.2
 GRACE_S = 1.0  # for a process that is asked to stop
 CONNECT_S = 10.0
+# What processes of tasks import, once for all of them.
+PRELOADED = [f"vobench.{name}" for name in ("run.executor", "run.simulate", "run.estimate", "run.score", "run.sensors",
+             "run.stereo_camera", "render.raster", "suite.scene_build")]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +127,7 @@ class LocalProcesses:
     def __init__(self, slots: int) -> None:
         self.slots, self._cores = slots, sorted(os.sched_getaffinity(0))
         self._context = get_context("forkserver")
-        self._context.set_forkserver_preload(["vobench.run.executor", "vobench.run.simulate", "vobench.run.estimate"])
+        self._context.set_forkserver_preload(PRELOADED)
         self._running: set[Any] = set()
 
     def submit(self, task: Task, store: Path, slot: int, threads: int) -> "Future[Done]":
