@@ -379,7 +379,7 @@ def _row_sentences(pair: StereoFit) -> Iterator[str]:
             f"Rows differ by {pair.row_mad_px:.2f} px, most likely the right eye's {' and '.join(plain)}; "
             f"{pair.row_noise_px:.2f} px are left without them."
         )
-    if pair.xy_px.is_plain and pair.yaw_from != "rows and motion":
+    if pair.xy_px.is_plain and "rows" not in pair.yaw_from:
         yield (
             f"Rows differ by {pair.xy_px.value:+.2f} px × xy, which no turn of an eye explains: "
             "a lens or the rectification is off."

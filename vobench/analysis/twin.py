@@ -210,7 +210,8 @@ def look_of(pictures: Sequence[Image]) -> Look:
     """The look of some grey pictures."""
     noises = [noise_dn(picture) for picture in pictures]
     rows = [(p.mean(), p.std(), n[0], edge_px(p, gradients(p))) for p, n in zip(pictures, noises, strict=True)]
-    return Look(*np.mean(rows, axis=0).tolist(), flat_dn=np.concatenate([flat_dn for _, flat_dn in noises]))
+    mean_dn, sd_dn, sigma_dn, width_px = np.mean(rows, axis=0).tolist()
+    return Look(mean_dn, sd_dn, sigma_dn, width_px, np.concatenate([flat_dn for _, flat_dn in noises]))
 
 
 Develop = Callable[[CameraSettings], list[Image]]  # the pictures that a camera takes of what is there
