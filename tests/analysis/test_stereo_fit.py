@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vobench.analysis.stereo_fit import PairShot, fit_pair
+from vobench.analysis.stereo_fit import SLANT, PairShot, fit_pair, refined
 from vobench.estimator.tools import stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
@@ -69,11 +69,23 @@ def test_a_perfect_pair_has_rows_that_agree_and_no_offset(fits):
 
 def test_the_right_eyes_turns_are_found(fits):
     fit = fits[0.15, -0.1, 0.12]
-    assert fit.roll_deg.value == pytest.approx(0.15, rel=0.1)
-    assert fit.pitch_deg.value == pytest.approx(-0.1, rel=0.1)
-    assert fit.yaw_deg.value == pytest.approx(0.12, rel=0.2)
-    assert fit.offset_px.value == pytest.approx(300 * np.deg2rad(0.12), rel=0.2)
+    assert fit.roll_deg.value == pytest.approx(0.15, rel=0.03)
+    assert fit.pitch_deg.value == pytest.approx(-0.1, rel=0.03)
+    assert fit.yaw_deg.value == pytest.approx(0.12, rel=0.1)
+    assert fit.offset_px.value == pytest.approx(300 * np.deg2rad(0.12), rel=0.1)
     assert fit.row_noise_px < fit.row_mad_px / 3
+
+
+def test_places_on_slanted_walls_are_found_between_pixels():
+    shot = shots(CalibrationError())[0]
+    points = np.float32([[x, y] for x in range(80, 290, 15) for y in range(40, 210, 15)]) + 0.3
+    rays = LENS.rays(points)
+    z_m = np.min([np.where(rays @ n > 0, m / (rays @ n), np.inf) for n, m in WALLS], axis=0) * rays[:, 2]
+    there = points - np.c_[300 * 0.2 / z_m, np.zeros(len(z_m))]
+    found, settled = refined(shot.left, shot.right, points, np.float32(there + 0.5), shape=SLANT)
+    assert settled.mean() > 0.8
+    assert np.median(np.abs(found - there)[settled], axis=0) == pytest.approx([0, 0], abs=0.04)
+    assert not refined(shot.left, shot.right, points, np.float32(there + 9), shape=SLANT)[1].all()
 
 
 def test_pictures_without_texture_have_no_fit():

@@ -6,6 +6,7 @@ import pytest
 from vobench.analysis import twin
 from vobench.analysis.twin import (
     LOST,
+    WELL_E,
     agreement,
     camera_of,
     fit_camera,
@@ -117,6 +118,7 @@ def test_a_cameras_exposure_contrast_blur_and_noise_are_found():
     assert look.mean_dn == pytest.approx(wanted.mean_dn, rel=0.05)
     assert look.sd_dn == pytest.approx(wanted.sd_dn, rel=0.1)
     assert look.noise_dn == pytest.approx(wanted.noise_dn, rel=0.15)
+    assert settings.chip.full_well_e == pytest.approx(WELL_E / 1.8**2, rel=0.3)
     assert settings.blur_sigma_px == pytest.approx(0.9, abs=0.25)
 
 

@@ -12,6 +12,7 @@ from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
 from vobench.render.truth import Shot, TruthCaster
 from vobench.scene.material import Material, linear
+from vobench.sensor.image_sensor import CameraSensor
 from vobench.sensor.pixel_truth import TruthFrame
 from vobench.sensor.response import FULL_SCALE_DN
 from vobench.sequence.reader import StereoFrame
@@ -210,13 +211,13 @@ def _set(case: Case, row: dict[str, float], *, exposure_s: float, gain_db: float
     return {
         "blur": float(blur),
         "rolling": speed_pxps * camera.readout_s,
-        "noise": _noise_dn(case, row["mean"], gain_db),
+        "noise": chip_noise_dn(camera.chip, row["mean"], gain_db=gain_db),
     }
 
 
-def _noise_dn(case: Case, grey_dn: float, gain_db: float) -> float:
-    """The temporal noise at a grey value. Source: EMVA 1288, release 3.1, eq. 10."""
-    chip, amplification = case.camera.chip, 10 ** (gain_db / 20)
+def chip_noise_dn(chip: CameraSensor, grey_dn: float, *, gain_db: float = 0.0) -> float:
+    """The temporal noise of a chip at a grey value. Source: EMVA 1288, release 3.1, eq. 10."""
+    amplification = 10 ** (gain_db / 20)
     around = np.clip(np.array([grey_dn - 1, grey_dn + 1]), 0, FULL_SCALE_DN) / FULL_SCALE_DN
     low, high = chip.curve.decode(around)
     electrons = (low + high) / 2 * chip.full_well_e / amplification

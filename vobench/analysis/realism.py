@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import islice, pairwise
+from typing import Any
 
 import cv2
 import numpy as np
@@ -29,6 +30,7 @@ CELLS = (8, 6)
 TILE_PX, CYCLES = 256, (4, 100)
 BURNT_DN, DARK_DN = 254, 2
 PATCH_PX, PATCH_STEP_PX, FEWEST_PATCHES, NOISE_ROUNDS = 7, 3, 300, 8
+FLAT_SHARES = np.arange(0.05, 1.0, 0.1)
 EDGE_SHARE, EDGE_PX = 0.01, 9  # the strongest gradients, and the window that has the whole of an edge
 
 
@@ -170,7 +172,7 @@ def picture_statistics(picture: Image) -> dict[str, float]:
         "grey_sd": float(picture.std()),
         "burnt": 100 * float((picture >= BURNT_DN).mean()),
         "grey_mean": float(picture.mean()),
-        "noise_dn": noise_dn(picture),
+        "noise_dn": noise_dn(picture)[0],
         "edge_px": edge_px(picture, gradient),
         "corners": float(len(points)),
     }
@@ -188,25 +190,44 @@ def corners(picture: Image) -> Points:
     return np.zeros((0, 2), np.float32) if found is None else found.reshape(-1, 2).astype(np.float32)
 
 
-def noise_dn(picture: Image) -> float:
-    """Standard deviation of the noise in grey values, where the picture is flat, neither black nor burnt.
+def noise_dn(picture: Image) -> tuple[float, Array]:
+    """Standard deviation of the noise in grey values where the picture is flat, and ten of the grey values there.
+
+    Neither black nor burnt ones are looked at.
 
     The smallest principal variance of patches is the noise's, if some have no texture: those are kept whose gradients
     noise explains, again and again. Source: Liu, Tanaka and Okutomi (2013).
     """
-    views = np.lib.stride_tricks.sliding_window_view(picture, (PATCH_PX, PATCH_PX))[::PATCH_STEP_PX, ::PATCH_STEP_PX]
-    patches = views.reshape(-1, PATCH_PX**2)
-    kept = patches[(patches.min(1) > DARK_DN) & (patches.max(1) < BURNT_DN - DARK_DN)].astype(np.float32)
+    patches = _patches(picture)
+    kept = patches[(patches.min(1) > DARK_DN) & (patches.max(1) < BURNT_DN - DARK_DN)]
     steps = _patch_differences()
     strength = ((kept @ steps.T) ** 2).sum(1)
-    sigma, most = 0.0, np.inf
+    sigma, most, flat_dn = 0.0, np.inf, np.zeros(0)
     for _ in range(NOISE_ROUNDS):
         kept, strength = kept[strength <= most], strength[strength <= most]
         if len(kept) < FEWEST_PATCHES:
             break
-        sigma = float(np.sqrt(max(np.linalg.eigvalsh(np.cov(kept, rowvar=False))[:PATCH_PX].mean(), 0.0)))
-        most = sigma**2 * _noise_strength()
-    return sigma
+        variance = _smallest_variance(kept) / _smallest_of_noise(int(np.log2(len(kept))))
+        sigma, most, flat_dn = variance**0.5, variance * _noise_strength(), np.quantile(kept.mean(1), FLAT_SHARES)
+    return sigma, flat_dn
+
+
+def _patches(picture: NDArray[Any]) -> NDArray[np.float32]:
+    """Square patches (N, PATCH_PX²) that overlap."""
+    views = np.lib.stride_tricks.sliding_window_view(picture, (PATCH_PX, PATCH_PX))[::PATCH_STEP_PX, ::PATCH_STEP_PX]
+    return views.reshape(-1, PATCH_PX**2).astype(np.float32)
+
+
+def _smallest_variance(patches: NDArray[np.float32]) -> float:
+    """The mean of the smallest principal variances of patches."""
+    return float(max(np.linalg.eigvalsh(np.cov(patches, rowvar=False))[:PATCH_PX].mean(), 0.0))
+
+
+@cache
+def _smallest_of_noise(magnitude: int) -> float:
+    """What 2 ** magnitude patches of noise of variance 1 come to: the fewer, the less."""
+    side = round(PATCH_STEP_PX * 2 ** (magnitude / 2 + 0.25)) + PATCH_PX
+    return _smallest_variance(_patches(np.random.default_rng(0).standard_normal((side, side))))
 
 
 @cache
@@ -358,7 +379,7 @@ def _row_sentences(pair: StereoFit) -> Iterator[str]:
             f"Rows differ by {pair.row_mad_px:.2f} px, most likely the right eye's {' and '.join(plain)}; "
             f"{pair.row_noise_px:.2f} px are left without them."
         )
-    if pair.xy_px.is_plain and pair.yaw_from != "rows and motion":
+    if pair.xy_px.is_plain and "rows" not in pair.yaw_from:
         yield (
             f"Rows differ by {pair.xy_px.value:+.2f} px × xy, which no turn of an eye explains: "
             "a lens or the rectification is off."

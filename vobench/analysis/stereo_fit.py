@@ -7,24 +7,29 @@ turned    by roll r to the right, pitch p upwards and yaw w to the right (the si
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vobench.estimator.pose import pose_from_points, twist
-from vobench.estimator.tools import Points, StereoPair, comparable, corners_per_cell, follow, inside
+from vobench.estimator.tools import Mask, Points, StereoPair, comparable, corners_per_cell, follow, inside
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.sequence.picture import Image
 
 MAD = 1.4826  # to a normal distribution's standard deviation
 ROWS_APART_PX = 8.0  # beyond it a match is wrong
-WINDOW_PX, USUAL_WINDOW_PX = 9, 21  # small is true to edges and slanted surfaces; the bands are of the usual one
+WINDOW_PX = 9  # small finds more; what it finds is refined with a larger one
+REFINED_PX, REFINE_STEPS, SETTLED_PX, STRAYED_PX = 21, 5, 0.05, 1.5
+SLANT, AFFINE = 2, 4  # terms of how a patch's neighbourhood moves: disparity along x and y, or all
+DITHER = np.array([0.7548777, 0.5698403])  # of Roberts' R2 sequence: points evenly all over a pixel
 CORNERS_PER_CELL, CORNER_DISTANCE_PX, MARGIN_PX = 30, 8.0, 12
 FEWEST = 50  # matches, for a fit of five numbers
 FIT_STEPS = 20
 CORRELATED = 8.0  # matches near each other err alike: so many count as one
 APART = 5  # pictures between the two views of a motion
-TRUTH_M, TRUTH_SHARE, TRUTH_RAD = 3e-4, 5e-4, 3e-5  # how well a true motion is taken to be known
+TRUTH_M, TRUTH_SHARE, TRUTH_RAD = 3e-4, 2e-3, 5e-4  # how well a true motion is known, of laser trackers and of cars
 MOST_YAW_DEG = 0.3  # rows that say more are of a lens
 FEWEST_FOLLOWED, LEAST_FLOW_PX = 40, 2.0
 OFFSET_STEPS, DEPTH_STEPS = 6, 2
@@ -96,20 +101,14 @@ class PairShot:
 
 def fit_pair(windows: Sequence[Sequence[PairShot]], pair: StereoPair) -> StereoFit | None:
     """What runs of successive shots say of a pair; None where too little matches."""
-    found, gains = [], []
-    for shot in (shot for window in windows for shot in window):
-        matches, gain = _match(shot.left, shot.right, pair)
-        found.append(matches)
-        gains.append(gain)
-    matches = Matches(*(np.concatenate([getattr(each, name) for each in found]) for name in Matches.__slots__))
+    matched = [[_matched(shot, pair) for shot in window] for window in windows]
+    matches = _all_matches([shot for window in matched for shot in window], pair)
     if len(matches.row_px) < FEWEST:
         return None
     rows, sigma, noise_px = _robust_fit(_row_terms(matches.place), matches.row_px)
-    usual = [
-        _match(shot.left, shot.right, pair, USUAL_WINDOW_PX)[0].row_px for window in windows for shot in window[::3]
-    ]
+    usual = [_usual_rows(shot.left, shot.right, pair) for window in windows for shot in window[::3]]
     fx, fy = float(pair.K[0, 0]), float(pair.K[1, 1])
-    of_motion = _offset(windows, pair, np.array([-rows[1], rows[0]]) / fy)
+    of_motion = _offset(matched, pair, np.array([-rows[1], rows[0]]) / fy)
     xy_px = Uncertain(float(rows[3]), float(sigma[3]))
     yaw_deg, yaw_from = _yaw(_degrees(-xy_px.value, xy_px.sigma, fy), of_motion and _degrees(*of_motion, fx))
     return StereoFit(
@@ -122,7 +121,7 @@ def fit_pair(windows: Sequence[Sequence[PairShot]], pair: StereoPair) -> StereoF
         roll_deg=_degrees(-rows[1], sigma[1], fy),
         pitch_deg=_degrees(rows[0], sigma[0], fy),
         xy_px=xy_px,
-        gain=float(np.nanmedian(gains)),
+        gain=float(np.nanmedian([_gain(shot) for window in matched for shot in window])),
         disparity_px=tuple(np.quantile(matches.disparity_px, DISPARITY_QUANTILES).tolist()),
         yaw_deg=yaw_deg,
         yaw_from=yaw_from,
@@ -145,18 +144,12 @@ def _yaw(of_rows: Uncertain, of_motion: Uncertain | None) -> tuple[Uncertain | N
     return Uncertain(mean, sum(weights) ** -0.5), "rows and motion"
 
 
-def _match(left: Image, right: Image, pair: StereoPair, window_px: int = WINDOW_PX) -> tuple[Matches, float]:
-    """The matches of one pair of pictures, and how much brighter the right one is around them."""
+def _usual_rows(left: Image, right: Image, pair: StereoPair) -> Array:
+    """Row errors (N,) in px as the bands were measured."""
     corners = _corners(left, pair)
-    matched, disparity_px = pair.match(
-        left, right, corners, margin_px=MARGIN_PX, window_px=window_px, row_px=ROWS_APART_PX
-    )
-    good = np.isfinite(disparity_px)
-    in_left, in_right = pair.left.in_view(corners[good]), pair.right.in_view(matched[good])
-    place = pair.right.rays(matched[good])[:, :2]
-    return Matches(place, in_right[:, 1] - in_left[:, 1], disparity_px[good]), _gain(
-        left, right, corners[good], matched[good]
-    )
+    matched, disparity_px = pair.match(left, right, corners, margin_px=MARGIN_PX, row_px=ROWS_APART_PX)
+    row_px: Array = (pair.right.in_view(matched) - pair.left.in_view(corners))[:, 1]
+    return row_px[np.isfinite(disparity_px)]
 
 
 def _corners(left: Image, pair: StereoPair) -> Points:
@@ -164,16 +157,89 @@ def _corners(left: Image, pair: StereoPair) -> Points:
     return corners[pair.seen(corners)]
 
 
-def _gain(left: Image, right: Image, in_left: Points, in_right: Points) -> float:
-    """Median ratio of local means, right over left, around matches (N, 2) that are not burnt; NaN where none is."""
+@dataclass(frozen=True, slots=True)
+class Matched:
+    """A pair of pictures, left and right pixels (N, 2) of its matches, and their disparities (N,) in px."""
+
+    shot: PairShot
+    left_px: Points
+    right_px: Points
+    disparity_px: Array
+
+
+def _matched(shot: PairShot, pair: StereoPair) -> Matched:
+    """The matches of a pair of pictures, of places between the pixels' middles."""
+    corners = _corners(shot.left, pair)
+    there, disparity_px = pair.match(
+        shot.left, shot.right, corners, margin_px=MARGIN_PX, window_px=WINDOW_PX, row_px=ROWS_APART_PX
+    )
+    found = np.isfinite(disparity_px)
+    shift = np.modf(np.arange(1, found.sum() + 1)[:, None] * DITHER)[0] - 0.5
+    corners, there = (np.asarray(px[found] + shift, np.float32) for px in (corners, there))
+    there, settled = refined(shot.left, shot.right, corners, there, shape=SLANT)
+    disparity_px = pair.disparity(corners, there, row_px=ROWS_APART_PX)
+    good = settled & np.isfinite(disparity_px)
+    return Matched(shot, corners[good], there[good], disparity_px[good])
+
+
+def _all_matches(matched: Sequence[Matched], pair: StereoPair) -> Matches:
+    left_px, right_px = (np.concatenate([getattr(each, px) for each in matched]) for px in ("left_px", "right_px"))
+    row_px = (pair.right.in_view(right_px) - pair.left.in_view(left_px))[:, 1]
+    return Matches(pair.right.rays(right_px)[:, :2], row_px, np.concatenate([each.disparity_px for each in matched]))
+
+
+def refined(image: Image, later: Image, points: Points, guess: Points, *, shape: int) -> tuple[Points, Mask]:
+    """Where points (N, 2) went, by patches that also grow and shear, and whether that settled near the guess (N, 2).
+
+    `shape` is SLANT or AFFINE. A window that only shifts leans to where slanted surfaces have their edges. Points on
+    whole pixels would be sharper than what is found between them, which pulls shifts by a few percent: dither them.
+    Source: Shi and Tomasi (1994); Baker and Matthews (2004), inverse compositional.
+    """
+    if not len(points):
+        return points, np.zeros(0, bool)
+    half = REFINED_PX // 2
+    grid = np.stack(np.meshgrid(*[np.arange(-half, half + 1.0)] * 2), -1).reshape(-1, 2).astype(np.float32)
+    weight = np.exp(-((grid / half) ** 2).sum(1))
+    then, now = image.astype(np.float32), later.astype(np.float32)
+    patch = _sampled(then, points[:, None] + grid)
+    slopes = [_sampled(each, points[:, None] + grid) for each in np.gradient(then)[::-1]]
+    terms = [*slopes, *(slope * along for slope in slopes for along in (grid / half).T)][: 2 + shape]
+    jacobian = np.stack([*terms, patch - patch.mean(1, keepdims=True), np.ones_like(patch)], -1)
+    weighted = np.swapaxes(jacobian * weight[:, None], 1, 2)
+    hessian = weighted @ jacobian
+    hessian += 1e-6 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.eye(hessian.shape[1])
+    solve = np.linalg.solve(hessian, weighted).astype(np.float32)
+    there, turn, step = guess.astype(float), np.tile(np.eye(2), (len(points), 1, 1)), np.zeros((len(points), 2))
+    for _ in range(REFINE_STEPS):
+        seen = _sampled(now, there[:, None] + grid @ np.swapaxes(turn, 1, 2))
+        change = (solve @ (seen - patch)[..., None])[..., 0]
+        by_grid = np.zeros((len(points), 4))
+        by_grid[:, :shape] = change[:, 2 : 2 + shape] / half
+        undone = np.linalg.inv(np.eye(2) + by_grid.reshape(-1, 2, 2))
+        step = (turn @ undone @ change[:, :2, None])[..., 0]
+        there, turn = there - step, turn @ undone
+    settled = (np.linalg.norm(step, axis=1) < SETTLED_PX) & (np.linalg.norm(there - guess, axis=1) < STRAYED_PX)
+    return there.astype(np.float32), settled
+
+
+def _sampled(picture: NDArray[np.float32], at_px: NDArray[Any]) -> Array:
+    """A picture's values (N, K) at pixels (N, K, 2)."""
+    import cv2
+
+    column, row = np.moveaxis(np.asarray(at_px, np.float32), -1, 0)
+    return np.asarray(cv2.remap(picture, column, row, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE))
+
+
+def _gain(matched: Matched) -> float:
+    """Median ratio of local means, right over left, around matches that are not burnt; NaN where none is."""
     import cv2
 
     means = []
-    for picture, places in ((left, in_left), (right, in_right)):
+    for picture, places in ((matched.shot.left, matched.left_px), (matched.shot.right, matched.right_px)):
         local = cv2.blur(picture.astype(np.float32), (2 * MARGIN_PX - 1, 2 * MARGIN_PX - 1))
         column, row = np.rint(places).astype(int).T
         means.append(local[row, column])
-    even = (means[0] > 5) & (np.maximum(*means) < 240) if len(in_left) else np.zeros(0, bool)
+    even = (means[0] > 5) & (np.maximum(*means) < 240) if len(matched.left_px) else np.zeros(0, bool)
     return float(np.median(means[1][even] / means[0][even])) if even.any() else float("nan")
 
 
@@ -231,7 +297,7 @@ MOTION_STEPS = np.array([1e-5, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6])
 SHARED_STEPS = np.array([1e-3, 1e-5, 1e-3, 1e-3, 1e-6])
 
 
-def _offset(windows: Sequence[Sequence[PairShot]], pair: StereoPair, turns_rad: Array) -> tuple[float, float] | None:
+def _offset(windows: Sequence[Sequence[Matched]], pair: StereoPair, turns_rad: Array) -> tuple[float, float] | None:
     """How much too large disparities in the middle of the picture are, by the right eye's yaw, and how surely.
 
     Where a point goes says how far it is in units of the motion: all motions, and what both eyes and the pair are off
@@ -318,21 +384,22 @@ def _seen(followed: Followed, T: Array, shared: Array, rho: Array, *, pair: Ster
     return seen
 
 
-def _follow(shots: Sequence[PairShot], pair: StereoPair) -> Followed | None:
+def _follow(shots: Sequence[Matched], pair: StereoPair) -> Followed | None:
     """The points of the first of successive shots in the last that keeps enough of them; None where none does."""
-    first, start = shots[0], _corners(shots[0].left, pair)
-    _, disparity_px = pair.match(
-        first.left, first.right, start, margin_px=MARGIN_PX, window_px=WINDOW_PX, row_px=ROWS_APART_PX
-    )
-    start, disparity_px = start[np.isfinite(disparity_px)], disparity_px[np.isfinite(disparity_px)]
-    there, last = start, first
-    for now in shots[1:]:
+    first = last = shots[0].shot
+    start, disparity_px = shots[0].left_px, shots[0].disparity_px
+    there = start
+    for now in (later.shot for later in shots[1:]):
         moved, found = follow(*comparable(last.left, now.left), there, window_px=WINDOW_PX)
         found &= inside(moved, now.left, MARGIN_PX) & pair.seen(moved)
         if found.sum() < FEWEST_FOLLOWED:
             break
         start, there, disparity_px, last = start[found], moved[found], disparity_px[found], now
     if last is first:
+        return None
+    there, settled = refined(first.left, last.left, start, there, shape=AFFINE)
+    start, there, disparity_px = start[settled], there[settled], disparity_px[settled]
+    if settled.sum() < FEWEST_FOLLOWED:
         return None
     before_px, after_px = pair.left.in_view(start), pair.left.in_view(there)
     fit = pose_from_points(pair.points(start, disparity_px), after_px, pair.K, ransac_px=3.0)

@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from vobench.analysis.conditions import chip_noise_dn
 from vobench.analysis.realism import edge_px, gradients, noise_dn
 from vobench.analysis.stereo_fit import Matches, StereoFit
 from vobench.errors import InputError
@@ -193,23 +194,30 @@ def _misfit(caster: RayCaster, way: Array, pair: StereoPair, wanted_px: Array, s
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What a camera's settings are fitted to: mean and standard deviation of grey, noise, and the width of edges."""
+    """What a camera is fitted to: mean and standard deviation of grey, noise where flat, and the width of edges.
+
+    `flat_dn` (N,) are the grey values of what is flat.
+    """
 
     mean_dn: float
     sd_dn: float
     noise_dn: float
     edge_px: float
+    flat_dn: Array
 
 
 def look_of(pictures: Sequence[Image]) -> Look:
     """The look of some grey pictures."""
-    rows = [(p.mean(), p.std(), noise_dn(p), edge_px(p, gradients(p))) for p in pictures]
-    return Look(*np.mean(rows, axis=0).tolist())
+    noises = [noise_dn(picture) for picture in pictures]
+    rows = [(p.mean(), p.std(), n[0], edge_px(p, gradients(p))) for p, n in zip(pictures, noises, strict=True)]
+    mean_dn, sd_dn, sigma_dn, width_px = np.mean(rows, axis=0).tolist()
+    return Look(mean_dn, sd_dn, sigma_dn, width_px, np.concatenate([flat_dn for _, flat_dn in noises]))
 
 
 Develop = Callable[[CameraSettings], list[Image]]  # the pictures that a camera takes of what is there
 WELL_E, READ_E = 20_000.0, 25.0
 GAINS, GAMMAS, BLURS_PX, NOISES = (0.02, 60.0), (0.2, 1.2), (0.0, 3.0), (0.03, 30.0)
+ROUNDING = 1 / 12  # variance of a grey value that is rounded
 ROUNDS, HALVINGS = 3, 7
 
 
@@ -231,7 +239,7 @@ def fit_camera(wanted: Look, develop: Develop) -> tuple[CameraSettings, Look]:
         gamma = _contrast(blur_px, noise, wanted, develop)
         gain = _exposed(gamma, blur_px, noise, wanted, develop)[0]
         blur_px = _sharpness(gain, gamma, noise, wanted, develop)
-        noise = _noisiness(gain, gamma, blur_px, wanted, develop)
+        noise = _noisiness(gamma, wanted)
     settings = camera_of(gain, gamma, blur_px, noise)
     return settings, look_of(develop(settings))
 
@@ -246,9 +254,14 @@ def _sharpness(gain: float, gamma: float, noise: float, wanted: Look, develop: D
     return _solve(lambda blur: _look(gain, gamma, blur, noise, develop).edge_px, wanted.edge_px, BLURS_PX)
 
 
-def _noisiness(gain: float, gamma: float, blur_px: float, wanted: Look, develop: Develop) -> float:
-    """How many times as noisy the chip is as one of 20,000 electrons."""
-    return _solve(lambda n: _look(gain, gamma, blur_px, n, develop).noise_dn, wanted.noise_dn, NOISES, log=True)
+def _noisiness(gamma: float, wanted: Look) -> float:
+    """How many times as noisy the chip is as one of 20,000 electrons, at the grey values of what is flat."""
+    if not len(wanted.flat_dn):
+        return NOISES[0]
+    usual = camera_of(1.0, gamma, 0.0, 1.0).chip
+    usual_dn = np.array([chip_noise_dn(usual, grey_dn) for grey_dn in wanted.flat_dn])
+    times = max(wanted.noise_dn**2 - ROUNDING, 0.0) ** 0.5 / np.mean(usual_dn**2) ** 0.5
+    return float(np.clip(times, *NOISES))
 
 
 def _look(gain: float, gamma: float, blur_px: float, noise: float, develop: Develop) -> Look:

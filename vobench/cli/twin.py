@@ -57,6 +57,7 @@ ESTIMATORS: tuple[Any, ...] = (
     {"name": "stereo_pnp", "label": "stereo_pnp_wide", "params": {"window_px": 21}},
     "stand_still",
 )
+FEWEST_RANKED, FEWEST_PICTURES, LEAST_EXTENT_M = 3, 10, 0.05
 TO_FIT = 4  # pictures that the camera is fitted to
 KNOTS = 0.5  # of the smoothed path, a picture
 
@@ -81,6 +82,9 @@ def twin_command(
 ) -> None:
     """Repeat a recording in simulation, run the same estimators on both, and say how far they agree."""
     require_free(out)
+    if estimator and len(estimator) < FEWEST_RANKED:
+        raise InputError(f"an order needs {FEWEST_RANKED} estimators or more, and -e names {len(estimator)}")
+    read_scene(catalog.find("scene", place).path)
     recording = recording_at(path, form, ReadOptions(calibration, None, truth, rate, topics=topics_of(topic)))
     found = measure(shots_of(recording), recording.rig)
     made = _made(recording, found, place, out)
@@ -90,7 +94,7 @@ def twin_command(
     suite = {**made.suite, "source": [{key: value for key, value in source.items() if value}]}
     suite["estimators"] = list(estimator or ESTIMATORS)
     file = _write(out.resolve() / "twin.yaml", suite)
-    _fit(file, suite, recording)
+    _fit(file, suite, recording, gain=found.pair.gain if found.pair else 1.0)
     if dry_run:
         print(f"The suite is {file}")
         return
@@ -137,7 +141,15 @@ def _made(recording: Recording, found: Realism, place: str, out: Path) -> Made:
     if recording.truth is None:
         raise InputError("a twin repeats a path, and this recording has none; give one with --truth, say an estimate")
     t_ns = recording.t_ns[(recording.t_ns >= recording.truth.t_ns[0]) & (recording.t_ns <= recording.truth.t_ns[-1])]
+    if len(t_ns) < FEWEST_PICTURES:
+        raise InputError(
+            f"a twin takes {FEWEST_PICTURES} pictures or more with a truth, and this recording has {len(t_ns)}"
+        )
     T_world_left = poses_at(recording.truth, t_ns) @ recording.rig.T_body_left
+    if np.linalg.norm(np.ptp(T_world_left[:, :3, 3], axis=0)) < LEAST_EXTENT_M:
+        raise InputError(
+            "a twin ranks estimators by errors per length of path, and this recording stands still; take one that moves"
+        )
     if recording.form == "kitti":
         T_world_left = levelled(T_world_left)
     pair = stereo_pair(recording.rig, "the twin")
@@ -160,8 +172,11 @@ def _made(recording: Recording, found: Realism, place: str, out: Path) -> Made:
     return Made(suite, placement)
 
 
-def _fit(file: Path, suite: dict[str, Any], recording: Recording) -> None:
-    """Fit exposure, contrast, blur and noise to the recording's pictures, and write them into the suite."""
+def _fit(file: Path, suite: dict[str, Any], recording: Recording, *, gain: float) -> None:
+    """Fit exposure, contrast, blur and noise to the recording's pictures, and write them into the suite.
+
+    `gain` is of the right eye's grey values over the left one's.
+    """
     from vobench.run.simulate import open_renderer
     from vobench.run.stereo_camera import World, exposed_by
 
@@ -184,6 +199,7 @@ def _fit(file: Path, suite: dict[str, Any], recording: Recording) -> None:
             },
             "exposure_gain": settings.exposure_gain,
             "blur_sigma_px": settings.blur_sigma_px,
+            "unlike": {"right": {"gain": round(gain ** float(str(chip.response)), 4)}},
         }
     }
     _write(file, suite)
