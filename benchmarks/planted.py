@@ -140,12 +140,12 @@ def shrink_all(world: World, out: Path, chosen: Sequence[str]) -> int:
         (score,) = folder.scores()
         began = time.process_time()
         found = shrunk(read_trial(folder.path / score.case / score.estimator), trials=12, out=out, jobs=1)
-        first, end = found.case.frames or (0, score.frames)
-        share = (end - first) / score.frames
-        right += (is_right := score.frames >= 300 and share <= 0.2 and len(found.tried) <= 12)
+        (first, end), (_, of) = found.window, found.whole
+        share = (end - first) / of
+        right += (is_right := of >= 300 and share <= 0.2 and len(found.tried) <= 12)
         print(
             f"{name:24} {estimator:12} {'right' if is_right else 'WRONG'}: {score.status} ({score.reason}), "
-            f"{score.frames} frames to {end - first} ({share:.0%}), {len(found.tried)} trials, without "
+            f"{of} frames to {end - first} ({share:.0%}), {len(found.tried)} trials, without "
             f"{', '.join(found.removed) or 'nothing'}; {time.process_time() - began:.0f} s",
             flush=True,
         )
