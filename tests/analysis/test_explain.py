@@ -5,7 +5,15 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import pytest
 
-from vobench.analysis.explain import Explanation, Outcome, explain, loss_between, segment_loss
+from vobench.analysis.explain import (
+    FEWEST_BLOCKS,
+    MORE_SEEDS,
+    Explanation,
+    Outcome,
+    explain,
+    loss_between,
+    segment_loss,
+)
 from vobench.analysis.nuisance import nuisances_of
 from vobench.geometry import se3
 from vobench.suite.suite import Case
@@ -14,19 +22,21 @@ from vobench.trajectory.trajectory import Trajectory
 Error = Callable[[set[str]], float]
 
 
-def explained(hard: Case, error: Error, *, repeats: int = 3, spread: float = 0.2) -> Explanation:
+def explained(
+    hard: Case, error: Error, *, repeats: int = 3, spread: float = 0.2, parts: int = 24, unlucky: int = -1
+) -> Explanation:
     """The explanation where a case with these nuisances left has that mean error."""
     nuisances = nuisances_of(hard)
     rng = np.random.default_rng(1)
-    shape = {nth: rng.lognormal(0, 0.5, 24) for nth in range(repeats)}
+    shape = {nth: rng.lognormal(0, 0.5, parts) for nth in range(MORE_SEEDS * max(repeats, FEWEST_BLOCKS))}
 
     def measure(cases: Mapping[str, Case]) -> Mapping[str, Sequence[Outcome]]:
         return {name: [outcome(case)] for name, case in cases.items()}
 
     def outcome(case: Case) -> Outcome:
         left = {nuisance.name for nuisance in nuisances if nuisance.remove(case) != case}
-        mean = error(left)
-        loss = mean * shape[case.seed - hard.seed] * rng.lognormal(0, spread, 24)
+        mean = error(left if case.seed - hard.seed != unlucky else {nuisance.name for nuisance in nuisances})
+        loss = mean * shape[case.seed - hard.seed] * rng.lognormal(0, spread, parts)
         return Outcome("lost" if mean > 0.5 else "ok", mean <= 0.5, np.minimum(loss, 1.0))
 
     return explain(hard, nuisances, measure, repeats=repeats)
@@ -37,6 +47,18 @@ def test_the_one_cause_is_named_and_no_pair_is_tried(hard: Case) -> None:
     assert found.named == ("blur",)
     assert found.singles[0].low > 0.8
     assert not found.pairs
+
+
+def test_a_short_case_is_given_more_seeds(hard: Case) -> None:
+    found = explained(hard, lambda left: 0.3 if "blur" in left else 0.1, repeats=2, parts=3)
+    assert found.named == ("blur",)
+    assert {change.repeats for change in (found.everything, *found.singles)} == {8}
+
+
+def test_where_seeds_leave_it_open_the_best_is_given_more_of_them(hard: Case) -> None:
+    found = explained(hard, lambda left: 0.3 if "blur" in left else 0.02, repeats=2, unlucky=1)
+    assert found.named == ("blur",)
+    assert [change.repeats for change in (found.everything, *found.singles[:2])] == [6, 6, 2]
 
 
 def test_two_causes_of_which_each_alone_is_enough_are_named_together(hard: Case) -> None:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from vobench.analysis.nuisance import NUISANCES, nuisances_of, without
 from vobench.sensor.image_sensor import NoiseStreams, expose
@@ -45,10 +46,14 @@ def test_shadowless_light_is_as_strong_and_dims_as_the_strongest_lamp_did(hard: 
 
 
 def test_a_wider_range_keeps_what_was_in_range_and_holds_eight_times_the_light(hard: Case) -> None:
-    camera = replace(without(hard, ["noise", "auto-exposure"]).camera, motion_blur=False)
+    camera = replace(
+        without(hard, ["noise", "auto-exposure"]).camera, motion_blur=False, exposure_gain=1.0, gain_db=0.0
+    )
     wide = without(replace(hard, camera=camera), [BURNT]).camera
     assert wide.white_e == camera.white_e
-    light = np.linspace(0.01, 3, 64, dtype=np.float32)[None]
+    glaring = replace(camera, exposure_gain=20.0, gain_db=6.0)
+    assert without(replace(hard, camera=glaring), [BURNT]).camera.white_e * 10**0.3 == pytest.approx(camera.white_e)
+    light = np.linspace(0.02, 6, 64, dtype=np.float32)[None]
     streams = NoiseStreams(np.random.default_rng(0), np.random.default_rng(0))
     before, after = (expose(light, each, streams).astype(float) for each in (camera, wide))
     in_range = before < 250

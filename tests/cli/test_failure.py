@@ -35,7 +35,7 @@ def failed(vobench: Callable[..., Said], here: Path) -> str:
     (folder / "estimator.py").write_text(BLIND)
     suite = here / "suites" / "tiny.yaml"
     text = suite.read_text().replace("[wheel_odometry, stand_still]", "[blind]")
-    suite.write_text(text + "cameras: {noisy: {sensor: mt9v034, vignetting: 0.1}}\n")
+    suite.write_text(text + "cameras: {noisy: {sensor: mt9v034, vignetting: 0.1, timing: {drop_share: 0.2}}}\n")
     assert vobench("run", "tiny").code == 0
     return "runs/tiny/latest/short/blind"
 
@@ -54,6 +54,8 @@ def test_noise_is_named_as_the_cause_and_the_failure_shrinks_to_a_suite_of_its_o
     small = vobench("shrink", failed, "--trials", 2, "--save", "small", "--json").json
     first, end = small["frames"]
     assert end - first <= small["of"] / 2
+    came = (here / "runs/tiny/latest/cases/short/estimates/blind/0/frames.csv").read_text().splitlines()[1:]
+    assert small["of"] > len(came)  # the way has more frames than came
     assert vobench("run", "small/suite.yaml", "--json").json["cells"][0]["status"] == "lost"
 
     assert "too few frames" in vobench("causes", "runs/tiny").out

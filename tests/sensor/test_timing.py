@@ -8,8 +8,9 @@ from vobench.sensor.timing import STREAMS, Schedule, Timing, schedule
 T_NS = np.arange(200, dtype=np.int64) * 50_000_000
 
 
-def made(**settings: float) -> Schedule:
-    return schedule(Timing(**settings), T_NS, {name: np.random.default_rng([7, n]) for n, name in enumerate(STREAMS)})
+def made(*, before: int = 0, **settings: float) -> Schedule:
+    rngs = {name: np.random.default_rng([7, n]) for n, name in enumerate(STREAMS)}
+    return schedule(Timing(**settings), T_NS[before:], rngs, before=before)
 
 
 def test_by_itself_every_picture_is_taken_at_its_stamp():
@@ -26,6 +27,13 @@ def test_more_drops_lose_the_frames_of_fewer_and_others_and_neither_end(burst):
     assert {0, 199} <= set(many.index)
     assert len(many.index) == pytest.approx(200 * (0.6 if burst == 1 else 0.9**4), abs=20)
     np.testing.assert_array_equal(many.t_ns, T_NS[many.index])
+
+
+def test_a_part_of_a_way_loses_what_the_whole_loses_but_its_first_frame():
+    whole = made(drop_share=0.4, drop_burst=9)
+    amid = next(n for n in range(50, 200) if not {n - 1, n, n + 1} & {*whole.index})  # of a burst
+    part = made(drop_share=0.4, drop_burst=9, before=amid)
+    assert part.t_ns.tolist() == [T_NS[amid], *whole.t_ns[whole.t_ns > T_NS[amid]]]
 
 
 def test_a_repeated_frame_shows_what_was_taken_before():

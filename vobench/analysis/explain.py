@@ -18,6 +18,10 @@ LEAST_M = 1e-3  # of way, for what stands still
 # A nuisance mends a case alone where as much of what all of them cost together goes with it.
 MENDS = 2 / 3
 TRIED_IN_PAIRS = 3
+# Fewer blocks of segments than these, in all repeats, draw no interval that could be believed.
+FEWEST_BLOCKS = 8
+# Where chance leaves open whether so much of the error goes, the best one is tried under so many times the seeds.
+WORTH_SEEDS, MORE_SEEDS = 0.2, 3
 DRAWS, BLOCK, LOW_HIGH = 2000, 3, (2.5, 97.5)
 
 
@@ -118,11 +122,12 @@ Measure = Callable[[Mapping[str, Case]], Mapping[str, Sequence[Outcome]]]
 def explain(case: Case, nuisances: Sequence[Nuisance], measure: Measure, *, repeats: int = 3) -> Explanation:
     """Try a case without each nuisance and without all; where none mends it alone, with each alone and in pairs.
 
-    A repeat is the case under another seed, the same for all variants.
+    A repeat is the case under another seed, the same for all variants. A short case is given more of them, and the
+    best single one where they leave it open.
     """
     names = [nuisance.name for nuisance in nuisances]
 
-    def tried(sets: Sequence[tuple[str, ...]]) -> dict[tuple[str, ...], list[Outcome]]:
+    def tried(sets: Sequence[tuple[str, ...]], repeats: int) -> dict[tuple[str, ...], list[Outcome]]:
         cases = {
             f"{folder_name(removed, names)}.{nth}": replace(without(case, removed), seed=case.seed + nth)
             for removed in sets
@@ -133,17 +138,26 @@ def explain(case: Case, nuisances: Sequence[Nuisance], measure: Measure, *, repe
             removed: [found[f"{folder_name(removed, names)}.{nth}"][0] for nth in range(repeats)] for removed in sets
         }
 
-    whole = tuple(names)
-    first = tried([(), *((name,) for name in names), *([whole] if len(names) > 1 else [])])
+    whole, (once,) = tuple(names), tried([()], 1)[()]
+    repeats = max(repeats, -(-FEWEST_BLOCKS // _blocks(once)))
+    first = tried([(), *((name,) for name in names), *([whole] if len(names) > 1 else [])], repeats)
     base = first[()]
     everything = _change(whole, base, first[whole])
     singles = _ranked(_change((name,), base, first[name,]) for name in names)
+    if _is_open(singles[0], everything):
+        best = singles[0].removed
+        again = tried([(), best, whole], repeats * MORE_SEEDS)
+        everything = _change(whole, again[()], again[whole])
+        singles = _ranked([_change(best, again[()], again[best]), *singles[1:]])
     alone, pairs = dict[str, float](), tuple[Change, ...]()
     if len(names) > 2 and everything.is_sure and not mends(singles[0], everything):
         rests = {name: tuple(other for other in names if other != name) for name in names}
-        alone = {name: _mean(outcomes) for name, outcomes in zip(names, tried([*rests.values()]).values(), strict=True)}
+        alone = {
+            name: _mean(outcomes)
+            for name, outcomes in zip(names, tried([*rests.values()], repeats).values(), strict=True)
+        }
         chosen = _suspects(singles, alone, everything)
-        found = tried([pair for pair in combinations(names, 2) if set(pair) <= chosen])
+        found = tried([pair for pair in combinations(names, 2) if set(pair) <= chosen], repeats)
         pairs = _ranked(_change(pair, base, outcomes) for pair, outcomes in found.items())
     differ = any(not np.array_equal(base[0].loss, other.loss) for other in base[1:])
     return Explanation(_mean(base), _status(base), differ, everything, singles, alone, pairs)
@@ -164,6 +178,12 @@ def _word(name: str) -> str:
 def mends(change: Change, everything: Change) -> bool:
     """Whether a change does most of what removing everything does."""
     return change.is_sure and change.mended >= MENDS * everything.mended
+
+
+def _is_open(best: Change, everything: Change) -> bool:
+    """Whether a single one may well mend the case, but not surely."""
+    is_sure = best.is_sure and everything.is_sure
+    return not is_sure and best.mended >= WORTH_SEEDS and best.high >= MENDS * everything.mended
 
 
 def _suspects(singles: Sequence[Change], alone: Mapping[str, float], everything: Change) -> set[str]:
@@ -190,6 +210,10 @@ def _status(outcomes: Sequence[Outcome]) -> str:
     return max(statuses, key=statuses.count)
 
 
+def _blocks(outcome: Outcome) -> int:
+    return -(-len(outcome.loss) // BLOCK)
+
+
 def _change(removed: tuple[str, ...], base: Sequence[Outcome], changed: Sequence[Outcome]) -> Change:
     """How much of the error went: repeats and blocks of segments are drawn again, in pairs of before and after."""
     before, after = (_means(outcomes, np.random.default_rng(0)) for outcomes in (base, changed))
@@ -208,8 +232,7 @@ def _means(outcomes: Sequence[Outcome], rng: np.random.Generator) -> Array:
         for draw_of, outcome in enumerate(outcomes):
             these = np.flatnonzero(chosen[:, nth] == draw_of)
             count = len(outcome.loss)
-            blocks = -(-count // BLOCK)
-            starts = (places[these, nth, :blocks] * count).astype(int)
+            starts = (places[these, nth, : _blocks(outcome)] * count).astype(int)
             index = (starts[..., None] + np.arange(BLOCK)).reshape(len(these), -1)[:, :count] % count
             sums[these] += outcome.loss[index].mean(1)
     return np.maximum(sums / len(outcomes), 1e-12)

@@ -173,7 +173,10 @@ KNEE = 0.9  # of the grey values, for what fitted before; the rest is for what b
 
 
 def _unburnt(case: Case) -> Case:
-    """A chip with eight times the full well: what was in its range looks nearly as before, the rest fits above."""
+    """A chip with eight times the full well: what was in its range looks nearly as before, the rest fits above.
+
+    A fixed exposure that makes white more than white comes down to it first.
+    """
     camera, chip = case.camera, case.camera.chip
     stored = np.linspace(0, 1, FULL_SCALE_DN + 1)
     signal = np.interp(stored / KNEE, stored, linear_of_grey(chip.curve))
@@ -189,7 +192,9 @@ def _unburnt(case: Case) -> Case:
     loop = camera.auto_exposure
     loop = replace(loop, target_share=loop.target_share / HEADROOM) if loop else None
     probe = replace(camera, chip=wide, exposure_gain=1.0, auto_exposure=loop)
-    return replace(case, camera=replace(probe, exposure_gain=camera.white_e / probe.white_e))
+    most = camera.exposure_gain if loop else min(camera.exposure_gain, 10 ** (-camera.gain_db / 20))
+    exposed = replace(camera, exposure_gain=most)
+    return replace(case, camera=replace(probe, exposure_gain=exposed.white_e / probe.white_e))
 
 
 def _noiseless(case: Case) -> Case:
@@ -209,7 +214,7 @@ NUISANCES = (
     Nuisance("changing light", "lamps and a sun that stay as they are", _still_lights),
     Nuisance("moving things", "a world at rest", _of_scene(lambda scene: replace(scene, movers=())), "moving"),
     Nuisance("low texture", "strong patterns on faint surfaces", _of_materials(_textured)),
-    Nuisance("burnt pixels", "eight times the range", _unburnt, shown_by="burnt"),
+    Nuisance("burnt pixels", "no more light than white needs, and eight times the range", _unburnt, shown_by="burnt"),
     Nuisance("blur", "a short exposure and a sharp lens", _lens_blur),
     Nuisance("noise", "a chip without noise", _noiseless),
     Nuisance("unlike eyes", "two equal eyes", _camera(unlike=Eyes())),

@@ -3,13 +3,13 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 from vobench.analysis.nuisance import Nuisance, without
 from vobench.suite.suite import Case, Window
 
-FIRST_SHARE = 0.1  # of all frames: what is tried first, around where the trial went wrong
-# Of a window: what comes before that place, where most of the frames may fail and where most must not.
-LEAD, LEAD_OF_PARTIAL = 0.25, 0.75
+FIRST_SHARE = 0.1  # of all frames: what is tried first
+STRIDES = 4  # to a window: how closely places are looked at
 FEWEST_FRAMES = 4
 
 
@@ -28,9 +28,14 @@ class Failure:
 
 @dataclass(frozen=True, slots=True)
 class Shrunk:
-    """The smallest case that was found to fail in the same way, and what was tried: which case, and whether it did."""
+    """The smallest case that was found to fail in the same way, and what was tried: which case, and whether it did.
+
+    `window` are its frames of the `whole` way's.
+    """
 
     case: Case
+    window: Window
+    whole: Window
     removed: tuple[str, ...]
     tried: tuple[tuple[str, bool], ...]
 
@@ -41,27 +46,27 @@ class _Spent(Exception):  # noqa: N818 - no error: the trials are used up
 
 def shrink(
     case: Case,
-    count: int,
-    wrong_at: int,
+    whole: Window,
+    likely: Callable[[Window], bool],
     nuisances: Sequence[Nuisance],
     fails: Callable[[Case], bool],
     *,
     trials: int,
-    lead: float = LEAD,
 ) -> Shrunk:
-    """Cut a case of `count` frames that goes wrong at one of them, then remove nuisances, in so many trials at most.
+    """Cut a case of the frames `whole`, then remove nuisances, in so many trials at most.
 
-    First a window around that place, doubled until it fails; then its end and its start are moved inwards by halves;
-    then all nuisances at once, or one after the other. `fails` runs a case and says whether it fails the same way.
+    First a window where the whole trial's own estimate fails alike, which is what `likely` says, doubled until it
+    does so by itself; then its end and its start are moved inwards by halves; then all nuisances at once, or one after
+    the other. `fails` runs a case and says whether it fails the same way.
     """
-    search = _Search(case, case.frames or (0, count), fails, trials)
+    search = _Search(case, whole, fails, trials)
     try:
-        search.find(wrong_at, lead)
+        search.find(likely)
         search.cut()
         search.remove(nuisances)
     except _Spent:
         pass
-    return Shrunk(search.case, tuple(search.removed), tuple(search.tried))
+    return Shrunk(search.case, search.window, whole, tuple(search.removed), tuple(search.tried))
 
 
 class _Search:
@@ -77,13 +82,14 @@ class _Search:
         """The smallest that is known to fail."""
         return self._made(self.window, self.removed)
 
-    def find(self, wrong_at: int, lead: float) -> None:
-        """A window around the place, twice as long each time, the whole where no shorter one fails."""
+    def find(self, likely: Callable[[Window], bool]) -> None:
+        """A window that is likely to fail, twice as long each time, the whole where no shorter one does."""
         first, end = self._whole
         length = max(FEWEST_FRAMES, round(FIRST_SHARE * (end - first)))
         while length < end - first:
-            begin = min(max(first, first + wrong_at - max(1, round(lead * length))), end - length)
-            if self._try((begin, begin + length)):
+            begins = [*range(first, end - length, max(1, length // STRIDES)), end - length]
+            middle = _middle_of_first_run([likely((begin, begin + length)) for begin in begins])
+            if middle is not None and self._try((begins[middle], begins[middle] + length)):
                 return
             length *= 2
 
@@ -119,3 +125,11 @@ class _Search:
 
     def _made(self, window: Window, removed: Sequence[str]) -> Case:
         return replace(without(self._original, removed), frames=window)
+
+
+def _middle_of_first_run(holds: Sequence[bool]) -> int | None:
+    """The place in the middle of the first that hold in a row; None where none does."""
+    if True not in holds:
+        return None
+    first = holds.index(True)
+    return first + sum(1 for _ in takewhile(bool, holds[first:])) // 2

@@ -1,7 +1,7 @@
 """vobench causes, explain and shrink: why an estimator fails."""
 
 import json as json_module
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,11 +13,12 @@ from vobench.analysis.causes import Attribution, Course, attribute
 from vobench.analysis.conditions import CONDITIONS, conditions
 from vobench.analysis.explain import Change, Explanation, Outcome, explain, loss_between, mends, segment_loss
 from vobench.analysis.nuisance import NUISANCES, nuisances_of
-from vobench.analysis.shrink import LEAD, LEAD_OF_PARTIAL, Failure, Shrunk, shrink
+from vobench.analysis.shrink import FEWEST_FRAMES, Failure, Shrunk, shrink
 from vobench.cli import terminal
 from vobench.cli.run import run_plan
 from vobench.errors import InputError, UnknownNameError, unknown
-from vobench.run.estimate import ESTIMATE
+from vobench.run.estimate import ESTIMATE, FINISHED
+from vobench.run.estimate import Outcome as Ended
 from vobench.run.folder import (
     CASE,
     ESTIMATORS,
@@ -34,11 +35,12 @@ from vobench.run.folder import (
 from vobench.run.frames import read_frames
 from vobench.run.ground_truth import GROUND_TRUTH
 from vobench.run.key import folder_digest
-from vobench.run.motion import body_motions
+from vobench.run.motion import body_motion, body_motions
+from vobench.run.score import score_estimate, status_of
 from vobench.suite import catalog
 from vobench.suite.case_file import write_case
 from vobench.suite.manifest import read_manifest
-from vobench.suite.suite import Case, Entrant, Plan, Suite
+from vobench.suite.suite import Case, Entrant, Plan, Suite, Window
 from vobench.suite.yaml_file import Mistakes, YamlFile, checked
 
 if TYPE_CHECKING:
@@ -354,8 +356,8 @@ def shrink_command(
         raise InputError(f"{tried.score.estimator} on {tried.score.case} is {tried.score.status}: nothing fails")
     found = shrunk(tried, trials=trials, out=out, jobs=jobs)
     target = save or Path("shrunk") / f"{tried.score.case}_{tried.score.estimator}"
-    first, end = found.case.frames or (0, tried.score.frames)
-    kept = (end - first) / max(tried.score.frames, 1)
+    first, end = found.window
+    of = found.whole[1] - found.whole[0]
     summary = f"{tried.score.estimator}: {tried.score.status}, {tried.score.reason}"
     suite = write_case(
         found.case, [tried.entrant], target, name=f"{tried.score.case}_shrunk".replace("-", "_"), summary=summary
@@ -365,7 +367,7 @@ def shrink_command(
             {
                 "suite": str(suite),
                 "frames": [first, end],
-                "of": tried.score.frames,
+                "of": of,
                 "removed": found.removed,
                 "tried": found.tried,
             }
@@ -378,7 +380,7 @@ def shrink_command(
     ]
     console.print(terminal.table(f"{summary}", ["#", "tried", "result"], rows))
     also = f" and without {', '.join(found.removed)}" if found.removed else ""
-    console.print(f"It still fails with frames {first} to {end - 1} of {tried.score.frames} ({kept:.0%}){also}.")
+    console.print(f"It still fails with frames {first} to {end - 1} of {of} ({(end - first) / of:.0%}){also}.")
     console.print(f"The smaller case: {suite}\nRun it: vobench run {suite}")
 
 
@@ -392,17 +394,32 @@ def shrunk(tried: Tried, *, trials: int, out: Path, jobs: int) -> Shrunk:
         score, *_ = folder.scores()
         return Failure.of(score.status, score.reason) == wanted
 
-    nuisances, lead = nuisances_of(tried.case), LEAD_OF_PARTIAL if tried.score.status == "partial" else LEAD
-    return shrink(tried.case, tried.score.frames, _wrong_at(tried), nuisances, fails, trials=trials, lead=lead)
+    t_ns = body_motion(tried.case).t_ns
+    first, _ = tried.case.frames or (0, 0)
+    likely = _likely(tried, {first + nth: stamp for nth, stamp in enumerate(t_ns.tolist())}, wanted)
+    whole = (first, first + len(t_ns))
+    return shrink(tried.case, whole, likely, nuisances_of(tried.case), fails, trials=trials)
 
 
-def _wrong_at(tried: Tried) -> int:
-    """The frame at which the trial fails: the first without a pose, else that of the largest error."""
-    import numpy as np
+def _likely(tried: Tried, stamps_ns: Mapping[int, int], wanted: Failure) -> Callable[[Window], bool]:
+    """Whether the trial's own estimate of a part fails alike; where that is not told by poses, whether it began there.
 
-    frames = read_frames(tried.place)
-    lost = [nth for nth, row in enumerate(frames) if row.status in ("", "lost")]
-    if lost or not frames:
-        return lost[0] if lost else 0
-    gt, est, scale = _paths(tried.folder, tried.score)
-    return int(np.argmax(loss_between(gt, est, np.arange(len(gt)), scale=scale)))
+    `stamps_ns` are those of the frames of the way, also of those that did not come.
+    """
+    gt, est, _ = _paths(tried.folder, tried.score)
+    wrong_ns = next((row.t_ns for row in read_frames(tried.place) if row.status in ("", "lost")), int(gt.t_ns[0]))
+
+    def part(path: "Trajectory", window: Window) -> "Trajectory":
+        is_in = (path.t_ns >= stamps_ns[window[0]]) & (path.t_ns <= stamps_ns[window[1] - 1])
+        return replace(path, t_ns=path.t_ns[is_in], T_world_frame=path.T_world_frame[is_in])
+
+    def alike(window: Window) -> bool:
+        true, found = part(gt, window), part(est, window)
+        if len(true) < FEWEST_FRAMES:
+            return False
+        scored = score_estimate(found, true, tried.score.claims)
+        return Failure.of(*status_of(Ended(kind=FINISHED, reason=""), scored, true)) == wanted
+
+    if alike((min(stamps_ns), max(stamps_ns) + 1)):
+        return alike
+    return lambda window: stamps_ns[window[0]] <= wrong_ns <= stamps_ns[window[1] - 1]

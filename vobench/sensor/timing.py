@@ -59,15 +59,15 @@ def schedule(timing: Timing, t_ns: Stamps, rngs: Mapping[str, np.random.Generato
     frame and the last always come, and the first shows its own picture. So many of the way's frames come `before`.
     """
     count = len(t_ns)
-    chances = {name: rngs[name].random(before + count)[before:] for name in ("drop", "repeat")}
+    chances = {name: rngs[name].random(before + count) for name in ("drop", "repeat")}
     jitter = np.clip(rngs["jitter"].standard_normal(before + count)[before:], -WIDEST_JITTER, WIDEST_JITTER)
     begins = chances["drop"] < timing.drop_share / timing.drop_burst
-    lost = np.convolve(begins, np.ones(timing.drop_burst, int))[:count] > 0
+    lost = np.convolve(begins, np.ones(timing.drop_burst, int))[before : before + count] > 0
     lost[[0, -1]] = False
     index = np.flatnonzero(~lost)
     left_ns = t_ns + np.rint(jitter * timing.jitter_ms * NS_PER_MS).astype(np.int64)
     right_ns = left_ns + round(timing.right_delay_ms * NS_PER_MS)
-    repeats = chances["repeat"][index] < timing.repeat_share
+    repeats = chances["repeat"][before + index] < timing.repeat_share
     repeats[0] = False
     shown = index[np.maximum.accumulate(np.where(repeats, 0, np.arange(len(index))))]
     return Schedule(index, t_ns[index], left_ns[shown], right_ns[shown], repeats)
