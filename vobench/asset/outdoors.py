@@ -12,7 +12,7 @@ from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PLUM, SAGE, SAND, TEA
 from vobench.asset.shape import at, block, card, cushion, lathe, sheet, spline, tube
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Mesh, joined, unit
+from vobench.scene.mesh import Mesh, flat, joined, unit
 
 PAINTS = ("#8d1f1c", "#20334e", "#d9dad7", "#5d6468", "#2f3a34", "#b7bcc0", "#17191b", "#3f6c87")
 GLASS = coated("#12161a", roughness=0.12)
@@ -204,3 +204,60 @@ def bollard(_: Rng, height_m: float = 0.95) -> list[Part]:
     """An iron post with a ring."""
     profile = mm("0 0, 80 0, 80 40, 62 60, 55 800, 66 810, 66 850, 50 860, 40 930, 0 950") * [1, height_m / 0.95]
     return [put(lathe(profile, sections=20), coated("#23282a", roughness=0.35))]
+
+
+def bush(rng: Rng, height_m: float = 1.1, width_m: float = 1.6) -> list[Part]:
+    """A round bush of leaves down to the ground."""
+    size, cards = np.array([width_m, width_m, height_m]) / 2, []
+    for _ in range(48):
+        way = unit(rng.normal([0, 0, 0.15], 1))
+        place, side = [0, 0, 0.42 * height_m] + size * way * rng.uniform(0.55, 0.95), rng.uniform(0.36, 0.55) * height_m
+        yaw = np.rad2deg(np.arctan2(way[1], way[0])) + rng.normal(0, 25)
+        turned = at(*place, yaw=yaw, pitch=rng.normal(-30, 25), roll=rng.uniform(0, 360))
+        cards.append(card((side, side)).moved(turned).two_sided())
+    leaf = replace(matt(some(rng, "#e2f0d0", "#d0e0c8", "#f4f0d0"), foliage(1)), cutout=0.5)
+    return [Part(joined(cards), leaf), put(cushion(1.1 * size, power=2.2, cells=6), matt("#2f4020"), z=0.26 * height_m)]
+
+
+def rock(rng: Rng, size_m: float = 0.6) -> list[Part]:
+    """A boulder, broken and worn, a third of it in the ground."""
+    mesh = cushion(size_m * rng.uniform([0.8, 0.6, 0.5], [1.2, 1.0, 0.8]), power=2.4, cells=9)
+    p = mesh.vertices_m
+    for _ in range(9):  # flat breaks
+        way = unit(rng.standard_normal(3))
+        p = p - np.maximum(p @ way - rng.uniform(0.3, 0.42) * size_m, 0)[:, None] * way
+    waves, phase = rng.normal(0, 9 / size_m, (6, 3)), rng.uniform(0, 7, 6)
+    p = p * (1 + 0.02 * np.sin(p @ waves.T + phase).sum(axis=1))[:, None]
+    stone = matt(some(rng, "#c9c4ba", "#a8a59e", "#b9ad9a"), picture.ground("concrete", 3, 1024, 1.4))
+    return [put(flat(p, mesh.faces, mesh.uv), stone, z=0.12 * size_m, yaw=rng.uniform(0, 360))]
+
+
+def park_bench(rng: Rng, width_m: float = 1.8) -> list[Part]:
+    """Slats of wood on two feet of cast iron; who sits on it looks along x."""
+    iron, slats = coated("#23282a", roughness=0.35), []
+    foot = tube(spline(mm("240 0 0, 200 0 250, 230 0 420, 0 0 410, -200 0 430, -280 0 860"), 24), 0.022)
+    leg = tube(spline(mm("-200 0 430, -230 0 200, -290 0 0"), 8), 0.022)
+    for x, z, pitch in ((0.19, 0.45, 0), (0.08, 0.445, 0), (-0.03, 0.44, 0), (-0.14, 0.445, 0), (-0.225, 0.56, 102),
+                        (-0.25, 0.68, 102), (-0.275, 0.8, 102)):  # fmt: skip
+        slat = block((0.09, width_m, 0.028), bevel_m=0.006, uv_m=(rng.uniform(0, 2), rng.uniform(0, 2)))
+        slats.append(slat.moved(at(x, 0, z, pitch=pitch)))
+    feet = [mesh.moved(at(0, s * (width_m / 2 - 0.2))) for s in (-1, 1) for mesh in (foot, leg)]
+    return [Part(joined(feet), iron), Part(joined(slats), matt("#d8c0a0", picture.boards("oak", 4, 1024)))]
+
+
+def park_lamp(_: Rng, height_m: float = 3.4) -> list[Part]:
+    """A post with a lantern under a hat; its globe would be at height_m, 0.3 m wide."""
+    iron, h = coated("#27302d", roughness=0.35), height_m
+    post = [
+        [0, 0],
+        [0.13, 0],
+        [0.13, 0.05],
+        [0.08, 0.12],
+        [0.07, 0.7],
+        [0.045, 0.78],
+        [0.035, h - 0.2],
+        [0.1, h - 0.16],
+    ]
+    hat = mm("0 170, 160 170, 240 150, 236 165, 90 240, 20 290, 0 292")
+    rods = [tube(mm("130 0 -170, 180 0 160"), 0.008).moved(at(z_m=h, yaw=90 * k)) for k in range(4)]
+    return [put(joined([lathe([*post, [0, h - 0.16]]), *rods]), iron), put(lathe(hat), iron, z=h)]

@@ -7,7 +7,7 @@ from zlib import crc32
 
 import numpy as np
 
-from vobench.asset import fitting, furniture, outdoors, picture
+from vobench.asset import fitting, furniture, household, outdoors, picture
 from vobench.asset.furniture import Part, matt
 from vobench.asset.shape import Hole, at, pierced, reveal
 from vobench.geometry.se3 import Array
@@ -25,7 +25,8 @@ KINDS: dict[str, Callable[..., list[Part]]] = {
         (furniture, "crate sofa waste_bin cabinet bench pillar"),
         (fitting, "door window_frame blind curtain radiator socket skirting framed noticeboard glass_wall pipe"),
         (fitting, "lamp_housing spot_housing"),
-        (outdoors, "bollard car person street_lamp tree"),
+        (household, "dining_chair floor_lamp fruit_bowl low_board pendant rug table television"),
+        (outdoors, "bollard bush car park_bench park_lamp person rock street_lamp tree"),
     )
     for name in names.split()
 }
