@@ -9,6 +9,8 @@ import pytest
 from vobench.errors import UnknownNameError
 from vobench.suite import catalog
 
+OURS = "car_park, corridor, flat, hall, office, park, ramp, room, street, warehouse"
+
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):
@@ -101,7 +103,7 @@ def test_what_lies_beside_a_suite_is_among_the_known(here, suite):
     put(suite.parent, "scene", "barn")
     with pytest.raises(
         UnknownNameError,
-        match=r"Did you mean 'barn'\? Known: barn, car_park, corridor, flat, hall, office, park, ramp, room, ",
+        match=rf"Did you mean 'barn'\? Known: barn, {OURS}",
     ):
         catalog.find("scene", "barne", suite=suite)
 
@@ -156,7 +158,7 @@ def test_an_unknown_name_gets_the_nearest_and_all_there_are(here):
 def test_a_name_far_from_all_gets_no_guess(here):
     with pytest.raises(
         UnknownNameError,
-        match=r"^no scene named 'zzzz'\. Known: car_park, corridor, flat, hall, office, park, ramp, room, str\w+, ware\w+$",
+        match=rf"^no scene named 'zzzz'\. Known: {OURS}$",
     ):
         catalog.find("scene", "zzzz")
 
