@@ -58,11 +58,14 @@ class Piece:
     pitch_deg: float = 0.0
     size: Mapping[str, Any] = field(default_factory=dict)
 
+    def rng(self, seed: int = 0) -> np.random.Generator:
+        """Its chances."""
+        return np.random.default_rng(np.random.SeedSequence([seed, crc32(self.name.encode())]))
+
     def build(self, seed: int = 0) -> Instance:
         """Its name and its parts in the scene's frame."""
-        rng = np.random.default_rng(np.random.SeedSequence([seed, crc32(self.name.encode())]))
         T_world_piece = at(*self.at_m, yaw=self.yaw_deg, pitch=self.pitch_deg)
-        return self.name, [part.moved(T_world_piece) for part in KINDS[self.kind](rng, **self.size)]
+        return self.name, [part.moved(T_world_piece) for part in KINDS[self.kind](self.rng(seed), **self.size)]
 
 
 def things(
