@@ -200,12 +200,12 @@ def test_a_scene_without_any_light_is_refused(tmp_path, light, zero):
         read_scene(tmp_path / "cave.yaml")
 
 
-@pytest.mark.parametrize("name", ["room", "office"])
+@pytest.mark.parametrize("name", ["room", "office", "flat", "hall", "ramp", "park"])
 def test_our_own_scenes_are_valid(name):
     path = Path(__file__).parents[2] / "scenes" / name / "scene.yaml"
     scene = build(read_scene(path), {})
     assert {thing.material for thing in scene.things} <= set(scene.materials)
-    assert 20_000 < sum(len(thing.mesh.faces) for thing in scene.things) < 120_000
+    assert 20_000 < sum(len(thing.mesh.faces) for thing in scene.things) < 300_000
 
 
 def test_who_walks_is_a_mover_for_each_limb_and_may_stand_on_the_floor(tmp_path):

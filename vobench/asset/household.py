@@ -89,7 +89,7 @@ def bulb(x_m: float, y_m: float, z_m: float, width_m: float = 0.07) -> Mesh:
 def floor_lamp(_: Rng, height_m: float = 1.6, colour: str = SAND, wide_m: float = 0.42) -> list[Part]:
     """A lamp on a foot with a shade of cloth; its bulb would be at height_m less 0.15."""
     foot = lathe(mm("0 0, 130 0, 130 12, 40 22, 12 30, 0 30") * [1, 1] * (0.6 + 0.25 * height_m))
-    stem = tube([[0, 0, 0.01], [0, 0, height_m - 0.2]], 0.011)
+    stem = tube(np.array([[0, 0, 0.01], [0, 0, height_m - 0.2]]), 0.011)
     shade = [part.moved(at(z_m=height_m - 0.28)) for part in _shade(colour, wide_m, 0.28)]
     return [put(foot, BLACK), put(stem, STEEL), *shade]
 
@@ -99,7 +99,7 @@ def pendant(rng: Rng, drop_m: float = 1.0, colour: str = "", wide_m: float = 0.4
     shade = lathe(mm("200 0, 196 60, 160 130, 70 190, 30 230, 0 232") * [wide_m / 0.4, wide_m / 0.4], sections=36)
     inner = shade.flipped().moved(np.diag([0.985, 0.985, 0.985, 1]))
     paint = coated(colour or some(rng, NAVY, INK, "#5c6b5a"), roughness=0.3)
-    cord = tube([[0, 0, 0.2 - drop_m], [0, 0, 0]], 0.004, sections=6)
+    cord = tube(np.array([[0, 0, 0.2 - drop_m], [0, 0, 0]]), 0.004, sections=6)
     rose = lathe(mm("0 -30, 50 -25, 50 0, 0 0"))
     return [put(shade, paint, z=-drop_m), put(inner, WHITE, z=-drop_m), put(cord, DARK), put(rose, WHITE)]
 

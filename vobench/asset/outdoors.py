@@ -293,16 +293,8 @@ def park_bench(rng: Rng, width_m: float = 1.8) -> list[Part]:
 def park_lamp(_: Rng, height_m: float = 3.4) -> list[Part]:
     """A post with a lantern under a hat; its globe would be at height_m, 0.3 m wide."""
     iron, h = coated("#27302d", roughness=0.35), height_m
-    post = [
-        [0, 0],
-        [0.13, 0],
-        [0.13, 0.05],
-        [0.08, 0.12],
-        [0.07, 0.7],
-        [0.045, 0.78],
-        [0.035, h - 0.2],
-        [0.1, h - 0.16],
-    ]
+    post = mm("0 0, 130 0, 130 50, 80 120, 70 700, 45 780, 35 1000, 100 1000, 0 1000")
+    post[6:, 1] = h - np.array([0.2, 0.16, 0.16])
     hat = mm("0 170, 160 170, 240 150, 236 165, 90 240, 20 290, 0 292")
     rods = [tube(mm("130 0 -170, 180 0 160"), 0.008).moved(at(z_m=h, yaw=90 * k)) for k in range(4)]
-    return [put(joined([lathe([*post, [0, h - 0.16]]), *rods]), iron), put(lathe(hat), iron, z=h)]
+    return [put(joined([lathe(post), *rods]), iron), put(lathe(hat), iron, z=h)]

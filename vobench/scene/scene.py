@@ -89,8 +89,7 @@ class Gait:
 
     def sized(self, by: float) -> "Gait":
         """The same with all lengths times `by`."""
-        lengths = {"cycle_m": self.cycle_m * by, "joints_m": self.joints_m * by, "rise_m": self.rise_m * by}
-        return replace(self, path=self.path.sized(by), **lengths)
+        return Gait(self.path.sized(by), self.cycle_m * by, self.joints_m * by, self.pitch_rad, self.rise_m * by)
 
 
 @dataclass(frozen=True, slots=True)
