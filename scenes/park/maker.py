@@ -19,7 +19,7 @@ from vobench.scene.mesh import Mesh, joined, quad
 
 LONG, WIDE, CELL_M = 72.0, 52.0, 0.5
 LOOP = ((-25, -9), (-14, -14), (1, -9.5), (14, -13), (25, -6), (21, 8), (9, 14.5), (-4, 10), (-15, 14), (-26, 4))
-ACROSS = ((-14, -14), (-9, -4), (-8.5, 4), (-4, 10))
+ACROSS = ((-13.2, -12.7), (-9, -4), (-8.5, 4), (-4.9, 8.9))
 POND, POND_M, LEVEL_M = np.array([10.0, 2.0]), np.array([6.5, 4.5]), -0.62
 PATH_M, LAMP_M = 2.2, 3.3
 
@@ -264,7 +264,7 @@ def _map():
 
 
 def _people(seed):
-    for k, (x, y, yaw) in enumerate(((-3.5, -11.6, 10), (-2.9, -12.3, 14), (22.6, 3.2, 110), (-9.2, 1.0, -88))):
+    for k, (x, y, yaw) in enumerate(((-4.3, -10.6, 22), (-3.6, -11.2, 26), (22.6, 3.2, 110), (-9.2, 1.0, -88))):
         yield Piece(
             "person", f"person_{k}", (x, y, float(height(x, y)) + 0.01), yaw, size={"height_m": 1.64 + 0.05 * k}
         ).build(seed)

@@ -256,12 +256,13 @@ def bush(rng: Rng, height_m: float = 1.1, width_m: float = 1.6) -> list[Part]:
     size, cards = np.array([width_m, width_m, height_m]) / 2, []
     for _ in range(48):
         way = unit(rng.normal([0, 0, 0.15], 1))
-        place, side = [0, 0, 0.42 * height_m] + size * way * rng.uniform(0.55, 0.95), rng.uniform(0.36, 0.55) * height_m
+        place = [0, 0, 0.42 * height_m] + size * way * rng.uniform(0.55, 0.95)
+        side = rng.uniform(0.18, 0.3) * (height_m + width_m)
         yaw = np.rad2deg(np.arctan2(way[1], way[0])) + rng.normal(0, 25)
         turned = at(*place, yaw=yaw, pitch=rng.normal(-30, 25), roll=rng.uniform(0, 360))
         cards.append(card((side, side)).moved(turned).two_sided())
     leaf = replace(matt(some(rng, "#e2f0d0", "#d0e0c8", "#f4f0d0"), foliage(1)), cutout=0.5)
-    return [Part(joined(cards), leaf), put(cushion(1.1 * size, power=2.2, cells=6), matt("#2f4020"), z=0.26 * height_m)]
+    return [Part(joined(cards), leaf), put(cushion(0.9 * size, power=2.2, cells=6), matt("#2f4020"), z=0.22 * height_m)]
 
 
 def rock(rng: Rng, size_m: float = 0.6) -> list[Part]:
