@@ -9,6 +9,8 @@ import pytest
 from vobench.errors import UnknownNameError
 from vobench.suite import catalog
 
+OURS = "car_park, corridor, flat, hall, office, park, ramp, room, street, warehouse"
+
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):
@@ -98,12 +100,12 @@ def test_a_suite_may_be_called_as_its_scene_is(here, suite):
 
 
 def test_what_lies_beside_a_suite_is_among_the_known(here, suite):
-    put(suite.parent, "scene", "hall")
+    put(suite.parent, "scene", "barn")
     with pytest.raises(
         UnknownNameError,
-        match=r"Did you mean 'hall'\? Known: car_park, corridor, hall, office, room, street, warehouse",
+        match=rf"Did you mean 'barn'\? Known: barn, {OURS}",
     ):
-        catalog.find("scene", "halle", suite=suite)
+        catalog.find("scene", "barne", suite=suite)
 
 
 @pytest.mark.parametrize("kind", catalog.KINDS)
@@ -116,9 +118,9 @@ def test_a_name_is_no_pattern_and_no_other_folder(here, kind, name):
 
 
 def test_a_folder_that_two_stops_share_is_listed_once(here, monkeypatch):
-    put(here, "scene", "hall")
+    put(here, "scene", "barn")
     monkeypatch.setenv("VOBENCH_PATH", str(here))
-    assert [entry.origin for entry in catalog.entries("scene") if entry.name == "hall"] == ["./scenes"]
+    assert [entry.origin for entry in catalog.entries("scene") if entry.name == "barn"] == ["./scenes"]
 
 
 @pytest.mark.parametrize("kind", catalog.KINDS)
@@ -155,7 +157,8 @@ def test_an_unknown_name_gets_the_nearest_and_all_there_are(here):
 
 def test_a_name_far_from_all_gets_no_guess(here):
     with pytest.raises(
-        UnknownNameError, match=r"^no scene named 'zzzz'\. Known: car_park, corridor, office, room, street, warehouse$"
+        UnknownNameError,
+        match=rf"^no scene named 'zzzz'\. Known: {OURS}$",
     ):
         catalog.find("scene", "zzzz")
 

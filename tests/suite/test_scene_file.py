@@ -200,9 +200,20 @@ def test_a_scene_without_any_light_is_refused(tmp_path, light, zero):
         read_scene(tmp_path / "cave.yaml")
 
 
-@pytest.mark.parametrize("name", ["room", "office"])
+@pytest.mark.parametrize("name", ["room", "office", "flat", "hall", "ramp", "park"])
 def test_our_own_scenes_are_valid(name):
     path = Path(__file__).parents[2] / "scenes" / name / "scene.yaml"
     scene = build(read_scene(path), {})
     assert {thing.material for thing in scene.things} <= set(scene.materials)
-    assert 20_000 < sum(len(thing.mesh.faces) for thing in scene.things) < 120_000
+    assert 20_000 < sum(len(thing.mesh.faces) for thing in scene.things) < 300_000
+
+
+def test_who_walks_is_a_mover_for_each_limb_and_may_stand_on_the_floor(tmp_path):
+    way = "path: [{t_s: 0, position_m: [-1, 0, 0]}, {t_s: 2, position_m: [1, 0, 0]}]"
+    text = "name: stage\nwhite_cd_m2: 9\nroom: {size_m: [4, 4, 3], floor: oak_floor, wall: paint, ceiling: paint}\n"
+    text += f"sky: {{illuminance_lx: 9}}\nmovers: [{{name: ada, kind: person, {way}}}]\n"
+    (tmp_path / "stage.yaml").write_text(text)
+    scene = build(read_scene(tmp_path / "stage.yaml"), {})
+    assert {mover.name for mover in scene.movers} == {"ada"} == {t.name for m in scene.movers for t in m.things}
+    assert len(scene.movers) == 7
+    assert {thing.material for mover in scene.movers for thing in mover.things} <= set(scene.materials)

@@ -4,10 +4,12 @@
 # (both of `asset.room`), roles of a model's nodes, endings of models' files.
 # fmt: off
 FURNITURE = (
-    "bench", "blind", "bollard", "book_stack", "cabinet", "cables", "car", "carton", "chair", "crate", "curtain",
-    "desk", "desk_lamp", "door", "framed", "glass_wall", "keyboard", "lamp_housing", "monitor", "mouse", "mug",
-    "noticeboard", "papers", "pens", "person", "pillar", "pipe", "plant", "radiator", "shelf", "skirting", "socket",
-    "sofa", "spot_housing", "street_lamp", "tree", "waste_bin", "window_frame",
+    "bench", "blind", "bollard", "book_stack", "bush", "cabinet", "cables", "car", "carton", "chair", "crate",
+    "curtain", "desk", "desk_lamp", "dining_chair", "door", "floor_lamp", "framed", "fruit_bowl", "glass_wall",
+    "keyboard", "lamp_housing", "low_board", "monitor", "mouse", "mug", "noticeboard", "papers", "park_bench",
+    "park_lamp", "pendant", "pens", "person", "pillar", "pipe", "plant", "radiator", "rock", "rug", "shelf",
+    "skirting", "socket", "sofa", "spot_housing", "street_lamp", "table", "television", "tree", "waste_bin",
+    "window_frame",
 )
 FINISHES = (
     "brick", "carpet", "ceiling_tiles", "concrete", "mirror", "oak_floor", "paint", "pane", "paving", "sage_plaster",

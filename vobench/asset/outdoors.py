@@ -1,6 +1,6 @@
 """What stands and moves outdoors: cars, people, trees, street lamps; parts on z = 0, their front towards x."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -12,7 +12,8 @@ from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PLUM, SAGE, SAND, TEA
 from vobench.asset.shape import at, block, card, cushion, lathe, sheet, spline, tube
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Mesh, joined, unit
+from vobench.scene.mesh import Mesh, flat, joined, unit
+from vobench.scene.scene import jointed
 
 PAINTS = ("#8d1f1c", "#20334e", "#d9dad7", "#5d6468", "#2f3a34", "#b7bcc0", "#17191b", "#3f6c87")
 GLASS = coated("#12161a", roughness=0.12)
@@ -100,41 +101,85 @@ SKINS, HAIR = ("#8d5a3f", "#b98263", "#d0a285", "#5c3a28"), ("#1d1613", "#3b2a1e
 TRUNK = "830 105 165, 930 118 172, 1050 105 150, 1200 118 172, 1340 118 198, 1420 88 165, 1470 60 80, 1500 50 52"
 
 
-def person(rng: Rng, height_m: float = 1.74, stride_deg: float = 24.0) -> list[Part]:
-    """Somebody amid a step along x, in trousers and a coat or a jumper."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Limb:
+    """Parts that move together, as they are when somebody stands upright, and how they turn while they walk.
+
+    joints_m (J, 3) from the body on and pitch_rad (K, J) are those of a `Gait`.
+    """
+
+    parts: list[Part]
+    joints_m: Array
+    pitch_rad: Array
+
+    def posed(self, step: int) -> list[Part]:
+        """The parts at one of the K steps of a cycle."""
+        T = jointed(self.joints_m, self.pitch_rad[step])
+        return [part.moved(T) for part in self.parts]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Walker:
+    """The limbs of somebody, the length of two of their steps, and how high their body is (K,) within these."""
+
+    limbs: list[Limb]
+    cycle_m: float
+    rise_m: Array
+
+
+STEPS = 24  # of a cycle
+LEG_M = 0.9  # from the hip to the sole
+
+
+def walker(rng: Rng, height_m: float = 1.74, stride_deg: float = 22.0) -> Walker:
+    """Somebody who walks along x, in trousers and a coat or a jumper; their feet stay where they stand."""
     top, legs = some(rng, NAVY, TEAL, BRICK, PLUM, OCHRE, SAGE, INK, SAND), some(rng, "#2b3442", "#3c3a38", "#5a5142")
-    skin, side, shoe = matt(some(rng, *SKINS)), float(rng.choice([-1, 1])), matt("#241f1c")
-    upper, lower, parts = cloth(top), cloth(legs), []
+    skin, shoe, upper, lower = matt(some(rng, *SKINS)), matt("#241f1c"), cloth(top), cloth(legs)
+    limbs = [Limb(_trunk(upper, skin, matt(some(rng, *HAIR))), np.zeros((0, 3)), np.zeros((STEPS, 0)))]
+    half, reach = STEPS // 2, np.sin(np.deg2rad(stride_deg))
+    stance, u = np.linspace(1, -1, half, endpoint=False), np.arange(half) / half
+    swing = np.arcsin(reach * np.concatenate([stance, -np.cos(np.pi * u)]))
+    bend = np.concatenate([np.full(half, 0.07), 0.07 + 2.6 * reach * np.sin(np.pi * u) * (1 - 0.3 * u)])
+    for s in (-1, 1):
+        late = 0 if s > 0 else half
+        hip, turn = np.array([0, s * 0.095, 0.88]), np.roll(swing, late)
+        knee, ankle = hip - [0, 0, 0.43], hip - [0, 0, 0.84]
+        shin = [_limb(knee, ankle, 0.06, 0.047, lower)]
+        shin.append(put(cushion((0.27, 0.095, 0.085), power=3, cells=5), shoe, 0.06, s * 0.095, 0.01))
+        limbs.append(Limb([_limb(hip, knee, 0.088, 0.062, lower)], hip[None], -turn[:, None]))
+        limbs.append(Limb(shin, np.stack([hip, knee]), np.stack([-turn, np.roll(bend, late)], axis=1)))
+        shoulder = np.array([0, s * 0.178, 1.375])
+        elbow = shoulder + 0.3 * np.array([0, s * 0.12, -1])
+        wrist = elbow + 0.26 * np.array([np.sin(0.35), 0.0, -np.cos(0.35)])
+        hand = put(cushion((0.09, 0.04, 0.16), power=2.5, cells=4), skin, *(wrist - [-0.01, 0, 0.06]), pitch=-20)
+        arm = [_limb(shoulder, elbow, 0.052, 0.044, upper), _limb(elbow, wrist, 0.046, 0.036, upper), hand]
+        limbs.append(Limb(arm, shoulder[None], 0.8 * turn[:, None]))
+    scale = height_m / 1.74
+    lowest = [min(p.mesh.vertices_m[:, 2].min() for x in limbs for p in x.posed(k)) for k in range(STEPS)]
+    T = np.diag([scale, scale, scale, 1.0])
+    grown = [Limb([p.moved(T) for p in x.parts], scale * x.joints_m, x.pitch_rad) for x in limbs]
+    return Walker(grown, 4 * scale * LEG_M * reach, -scale * np.array(lowest))
+
+
+def _trunk(upper: Material, skin: Material, hair: Material) -> list[Part]:
+    """A body from the hips up with its head."""
     z, depth, width = spline(mm(TRUNK), 20).T
     turn = np.linspace(0, 2 * np.pi, 25)
     rings = np.stack([depth[:, None] * np.cos(turn), width[:, None] * np.sin(turn), z[:, None] + 0 * turn], axis=-1)
     trunk = sheet(rings)
-    parts.append(Part(trunk if trunk.normals[30] @ [*trunk.vertices_m[30][:2], 0] > 0 else trunk.flipped(), upper))
-    for s in (-1, 1):
-        swing = s * side * np.deg2rad(stride_deg)
-        hip, knee_bend = np.array([0, s * 0.095, 0.88]), np.deg2rad(8 if swing > 0 else 30)
-        knee = hip + 0.43 * np.array([np.sin(swing), 0, -np.cos(swing)])
-        ankle = knee + 0.41 * np.array([np.sin(swing - knee_bend), 0, -np.cos(swing - knee_bend)])
-        parts += [_limb(hip, knee, 0.088, 0.06, lower), _limb(knee, ankle, 0.06, 0.047, lower)]
-        pitch = 12.0 if swing < 0 else -10.0
-        foot = ankle + np.array([0.06, 0, -0.03])
-        parts.append(put(cushion((0.27, 0.095, 0.085), power=3, cells=5), shoe, *foot, pitch=pitch))
-        shoulder = np.array([0, s * 0.178, 1.375])
-        elbow = shoulder + 0.3 * np.array([-np.sin(0.9 * swing), s * 0.2, -np.cos(0.9 * swing)])
-        wrist = elbow + 0.26 * np.array([np.sin(0.35 - 0.9 * swing), 0.0, -np.cos(0.35 - 0.9 * swing)])
-        parts += [_limb(shoulder, elbow, 0.052, 0.044, upper), _limb(elbow, wrist, 0.046, 0.036, upper)]
-        parts.append(put(cushion((0.09, 0.04, 0.16), power=2.5, cells=4), skin, *(wrist + np.array([0.01, 0, -0.06]))))
-    head = cushion((0.2, 0.155, 0.235), power=2.2, cells=7)
-    hair = cushion((0.205, 0.17, 0.17), power=2.2, cells=7)
-    parts += [put(head, skin, 0.02, 0, 1.62), put(hair, matt(some(rng, *HAIR)), -0.012, 0, 1.668)]
+    parts = [Part(trunk if trunk.normals[30] @ [*trunk.vertices_m[30][:2], 0] > 0 else trunk.flipped(), upper)]
+    head, mop = cushion((0.2, 0.155, 0.235), power=2.2, cells=7), cushion((0.205, 0.17, 0.17), power=2.2, cells=7)
+    parts += [put(head, skin, 0.02, 0, 1.62), put(mop, hair, -0.012, 0, 1.668)]
     parts += [put(lathe(mm("0 0, 52 0, 52 90, 0 90")), skin, 0, 0, 1.46)]
     parts += [put(cushion((0.035, 0.03, 0.05), power=2, cells=3), skin, 0.12, 0, 1.605)]
-    parts += [put(cushion((0.02, 0.03, 0.014), power=2, cells=3), BLACK, 0.107, s * 0.035, 1.64) for s in (-1, 1)]
-    lowest = min(float(part.mesh.vertices_m[:, 2].min()) for part in parts)
-    scale = height_m / 1.74
-    T = np.diag([scale, scale, scale, 1.0])
-    T[2, 3] = -scale * lowest
-    return [part.moved(T) for part in parts]
+    eye = cushion((0.02, 0.03, 0.014), power=2, cells=3)
+    return [*parts, *(put(eye, BLACK, 0.107, s * 0.035, 1.64) for s in (-1, 1))]
+
+
+def person(rng: Rng, height_m: float = 1.74, stride_deg: float = 22.0) -> list[Part]:
+    """Somebody amid a step along x."""
+    who, step = walker(rng, height_m, stride_deg), int(rng.choice([0, STEPS // 2]))
+    return [part.moved(at(z_m=who.rise_m[step])) for limb in who.limbs for part in limb.posed(step)]
 
 
 def _limb(start: Array, end: Array, first_m: float, last_m: float, material: Material) -> Part:
@@ -204,3 +249,53 @@ def bollard(_: Rng, height_m: float = 0.95) -> list[Part]:
     """An iron post with a ring."""
     profile = mm("0 0, 80 0, 80 40, 62 60, 55 800, 66 810, 66 850, 50 860, 40 930, 0 950") * [1, height_m / 0.95]
     return [put(lathe(profile, sections=20), coated("#23282a", roughness=0.35))]
+
+
+def bush(rng: Rng, height_m: float = 1.1, width_m: float = 1.6) -> list[Part]:
+    """A round bush of leaves down to the ground."""
+    size, cards = np.array([width_m, width_m, height_m]) / 2, []
+    for _ in range(48):
+        way = unit(rng.normal([0, 0, 0.15], 1))
+        place = [0, 0, 0.42 * height_m] + size * way * rng.uniform(0.55, 0.95)
+        side = rng.uniform(0.18, 0.3) * (height_m + width_m)
+        yaw = np.rad2deg(np.arctan2(way[1], way[0])) + rng.normal(0, 25)
+        turned = at(*place, yaw=yaw, pitch=rng.normal(-30, 25), roll=rng.uniform(0, 360))
+        cards.append(card((side, side)).moved(turned).two_sided())
+    leaf = replace(matt(some(rng, "#e2f0d0", "#d0e0c8", "#f4f0d0"), foliage(1)), cutout=0.5)
+    return [Part(joined(cards), leaf), put(cushion(0.9 * size, power=2.2, cells=6), matt("#2f4020"), z=0.22 * height_m)]
+
+
+def rock(rng: Rng, size_m: float = 0.6) -> list[Part]:
+    """A boulder, broken and worn, a third of it in the ground."""
+    mesh = cushion(size_m * rng.uniform([0.8, 0.6, 0.5], [1.2, 1.0, 0.8]), power=2.4, cells=9)
+    p = mesh.vertices_m
+    for _ in range(9):  # flat breaks
+        way = unit(rng.standard_normal(3))
+        p = p - np.maximum(p @ way - rng.uniform(0.3, 0.42) * size_m, 0)[:, None] * way
+    waves, phase = rng.normal(0, 9 / size_m, (6, 3)), rng.uniform(0, 7, 6)
+    p = p * (1 + 0.02 * np.sin(p @ waves.T + phase).sum(axis=1))[:, None]
+    stone = matt(some(rng, "#c9c4ba", "#a8a59e", "#b9ad9a"), picture.ground("concrete", 3, 1024, 1.4))
+    return [put(flat(p, mesh.faces, mesh.uv), stone, z=0.12 * size_m, yaw=rng.uniform(0, 360))]
+
+
+def park_bench(rng: Rng, width_m: float = 1.8) -> list[Part]:
+    """Slats of wood on two feet of cast iron; who sits on it looks along x."""
+    iron, slats = coated("#23282a", roughness=0.35), []
+    foot = tube(spline(mm("240 0 0, 200 0 250, 230 0 420, 0 0 410, -200 0 430, -280 0 860"), 24), 0.022)
+    leg = tube(spline(mm("-200 0 430, -230 0 200, -290 0 0"), 8), 0.022)
+    for x, z, pitch in ((0.19, 0.45, 0), (0.08, 0.445, 0), (-0.03, 0.44, 0), (-0.14, 0.445, 0), (-0.225, 0.56, 102),
+                        (-0.25, 0.68, 102), (-0.275, 0.8, 102)):  # fmt: skip
+        slat = block((0.09, width_m, 0.028), bevel_m=0.006, uv_m=(rng.uniform(0, 2), rng.uniform(0, 2)))
+        slats.append(slat.moved(at(x, 0, z, pitch=pitch)))
+    feet = [mesh.moved(at(0, s * (width_m / 2 - 0.2))) for s in (-1, 1) for mesh in (foot, leg)]
+    return [Part(joined(feet), iron), Part(joined(slats), matt("#d8c0a0", picture.boards("oak", 4, 1024)))]
+
+
+def park_lamp(_: Rng, height_m: float = 3.4) -> list[Part]:
+    """A post with a lantern under a hat; its globe would be at height_m, 0.3 m wide."""
+    iron, h = coated("#27302d", roughness=0.35), height_m
+    post = mm("0 0, 130 0, 130 50, 80 120, 70 700, 45 780, 35 1000, 100 1000, 0 1000")
+    post[6:, 1] = h - np.array([0.2, 0.16, 0.16])
+    hat = mm("0 170, 160 170, 240 150, 236 165, 90 240, 20 290, 0 292")
+    rods = [tube(mm("130 0 -170, 180 0 160"), 0.008).moved(at(z_m=h, yaw=90 * k)) for k in range(4)]
+    return [put(joined([lathe(post), *rods]), iron), put(lathe(hat), iron, z=h)]

@@ -7,7 +7,7 @@ from zlib import crc32
 
 import numpy as np
 
-from vobench.asset import fitting, furniture, outdoors, picture
+from vobench.asset import fitting, furniture, household, outdoors, picture
 from vobench.asset.furniture import Part, matt
 from vobench.asset.shape import Hole, at, pierced, reveal
 from vobench.geometry.se3 import Array
@@ -25,7 +25,8 @@ KINDS: dict[str, Callable[..., list[Part]]] = {
         (furniture, "crate sofa waste_bin cabinet bench pillar"),
         (fitting, "door window_frame blind curtain radiator socket skirting framed noticeboard glass_wall pipe"),
         (fitting, "lamp_housing spot_housing"),
-        (outdoors, "bollard car person street_lamp tree"),
+        (household, "dining_chair floor_lamp fruit_bowl low_board pendant rug table television"),
+        (outdoors, "bollard bush car park_bench park_lamp person rock street_lamp tree"),
     )
     for name in names.split()
 }
@@ -57,11 +58,14 @@ class Piece:
     pitch_deg: float = 0.0
     size: Mapping[str, Any] = field(default_factory=dict)
 
+    def rng(self, seed: int = 0) -> np.random.Generator:
+        """Its chances."""
+        return np.random.default_rng(np.random.SeedSequence([seed, crc32(self.name.encode())]))
+
     def build(self, seed: int = 0) -> Instance:
         """Its name and its parts in the scene's frame."""
-        rng = np.random.default_rng(np.random.SeedSequence([seed, crc32(self.name.encode())]))
         T_world_piece = at(*self.at_m, yaw=self.yaw_deg, pitch=self.pitch_deg)
-        return self.name, [part.moved(T_world_piece) for part in KINDS[self.kind](rng, **self.size)]
+        return self.name, [part.moved(T_world_piece) for part in KINDS[self.kind](self.rng(seed), **self.size)]
 
 
 def things(

@@ -121,8 +121,10 @@ def _revolved(pairs: Array, turn: Array) -> Array:
 
 def spline(points_m: ArrayLike, count: int = 16) -> Array:
     """Points (count, 3) of a smooth curve through some."""
-    p = np.asarray(points_m, float)
-    return np.asarray(scipy.interpolate.CubicSpline(np.linspace(0, 1, len(p)), p)(np.linspace(0, 1, count)))
+    p, t = np.asarray(points_m, float), np.linspace(0, 1, count)
+    if len(p) == 3:  # a parabola, for which the spline would call a solver of dense systems
+        return np.asarray(np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=1) @ p)
+    return np.asarray(scipy.interpolate.CubicSpline(np.linspace(0, 1, len(p)), p)(t))
 
 
 def tube(path_m: ArrayLike, radius_m: float, *, sections: int = 8) -> Mesh:

@@ -12,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from vobench.asset.furniture import Part
+from vobench.asset.outdoors import walker
 from vobench.asset.room import FINISHES, OUTWARD, Instance, Opening, Piece, shell, things
 from vobench.asset.shape import at, block, card
 from vobench.errors import SuiteError, VobenchError
@@ -214,6 +215,11 @@ def _glow(things: Sequence[Thing], materials: Mapping[str, Material]) -> Iterato
 
 
 def _mover(mover: MoverSpec, spec: SceneFile) -> Contents:
+    columns = zip(*((key.t_s, key.position_m, key.yaw_deg) for key in mover.path), strict=True)
+    times_s, positions_m, yaw_deg = (np.array(column, float) for column in columns)
+    path = scripted.Path(times_s, positions_m, yaw_deg, mover.repeats)
+    if mover.kind == "person":
+        return _walker(mover.name, path, spec.seed)
     if mover.file:
         own = _model(ModelSpec(file=mover.file, name=mover.name))
     elif mover.kind:
@@ -222,8 +228,17 @@ def _mover(mover: MoverSpec, spec: SceneFile) -> Contents:
     else:
         mesh, look = block(mover.size_m or (), bevel_m=0), mover.material or ""
         own = Contents((Thing(mover.name, mesh, look),), {look: _material(look, spec)})
-    columns = zip(*((key.t_s, key.position_m, key.yaw_deg) for key in mover.path), strict=True)
-    times_s, positions_m, yaw_deg = (np.array(column, float) for column in columns)
-    path = scripted.Path(times_s, positions_m, yaw_deg, mover.repeats)
     moving = tuple(replace(thing, name=mover.name) for thing in own.things)
     return Contents(materials=own.materials, movers=(scripted.Mover(mover.name, moving, path),))
+
+
+def _walker(name: str, path: scripted.Path, seed: int) -> Contents:
+    """Somebody who walks a path: a mover for each of their limbs, all of one name."""
+    who = walker(Piece("person", name, (0.0, 0.0, 0.0)).rng(seed))
+    made, materials = things([(f"{name}.{nth}", limb.parts) for nth, limb in enumerate(who.limbs)])
+    movers = []
+    for nth, limb in enumerate(who.limbs):
+        own = tuple(replace(thing, name=name) for thing in made if thing.name == f"{name}.{nth}")
+        gait = scripted.Gait(path, who.cycle_m, limb.joints_m, limb.pitch_rad, who.rise_m)
+        movers.append(scripted.Mover(name, own, gait))
+    return Contents(materials=materials, movers=tuple(movers))

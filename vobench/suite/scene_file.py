@@ -213,7 +213,10 @@ def _places(spec: SceneFile) -> Iterator[tuple[Keys, Triple]]:
     for kind in ("lamps", "boxes", "boards"):
         yield from (((kind, index, "center_m"), thing.center_m) for index, thing in enumerate(getattr(spec, kind)))
     for index, mover in enumerate(spec.movers):
-        yield from ((("movers", index, "path", nth), key.position_m) for nth, key in enumerate(mover.path))
+        for nth, key in enumerate(mover.path):
+            x, y, z = key.position_m
+            # Furniture and models may stand on the floor; of a box it is the middle.
+            yield ("movers", index, "path", nth), (x, y, z if mover.size_m else z or TOUCHING_M)
 
 
 def _check_names(spec: SceneFile, source: YamlFile, wrong: Mistakes) -> None:
