@@ -47,7 +47,7 @@ def test_noise_is_named_as_the_cause_and_the_failure_shrinks_to_a_suite_of_its_o
     assert said.code == 0, said.err
     assert said.json["named"] == ["noise"]
     assert said.json["singles"][0]["removed"] == ["noise"]
-    assert said.json["singles"][0]["survived"] == 1
+    assert said.json["singles"][0]["survived"] == 4  # of so few frames one repeat is too little to tell by
     shown = vobench("explain", failed, "--repeats", 1)
     assert "It fails for noise." in shown.out
 

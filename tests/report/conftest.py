@@ -13,8 +13,7 @@ from vobench.geometry.rig import stereo_rig
 from vobench.report.rerun import TrialView, save_trial
 from vobench.run import estimate as estimate_file
 from vobench.run.folder import SCORE, RunFolder, TrialScore
-from vobench.run.frames import COLUMNS, FRAMES, TIME_COLUMNS, TIMES, new_table
-from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.run.store import write_json
 from vobench.sequence import EncodedFrame
 from vobench.trajectory.align import Alignment

@@ -9,8 +9,7 @@ import pytest
 from vobench.errors import InputError
 from vobench.run.bundle import bundle, merged, opened, scored_again
 from vobench.run.folder import CASE, ESTIMATORS, SCORE, SUITE, RunFolder, TrialScore, write_hashes
-from vobench.run.frames import COLUMNS, FRAMES, TIME_COLUMNS, TIMES, new_table
-from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.run.score import score_estimate
 from vobench.run.store import write_json
 from vobench.trajectory.formats import format_tum

@@ -17,8 +17,7 @@ from vobench.run import estimate
 from vobench.run import estimate as estimate_file
 from vobench.run.estimate import ESTIMATE
 from vobench.run.folder import ENVIRONMENT, PAGE, SCORE, SEQUENCE, TIMES_HASHES, read_tum
-from vobench.run.frames import TIMES
-from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.frames import GROUND_TRUTH, TIMES
 from vobench.run.task import sequence_tasks
 from vobench.sequence import Sequence, payload_hash, read_truth
 

@@ -32,8 +32,7 @@ from vobench.run.folder import (
     read_score,
     read_tum,
 )
-from vobench.run.frames import read_frames
-from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.frames import GROUND_TRUTH, read_frames
 from vobench.run.key import folder_digest
 from vobench.run.motion import body_motion, body_motions
 from vobench.run.score import score_estimate, status_of
@@ -49,7 +48,7 @@ if TYPE_CHECKING:
 TrialPath = Annotated[
     Path, typer.Argument(metavar="RUN/CASE/ESTIMATOR", help="A trial, as runs/quickstart/latest/down/lk_epipolar.")
 ]
-Seeds = Annotated[int, typer.Option("--repeats", "-n", min=1, max=20, help="Try each under so many seeds.")]
+Seeds = Annotated[int, typer.Option("--repeats", "-n", min=1, max=20, help="Seeds for each; few frames take more.")]
 Out = Annotated[Path, typer.Option(help="Where the folders of runs go.")]
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, envvar="VOBENCH_JOBS", help="Tasks at once.")]
 EstimatorPath = Annotated[

@@ -33,7 +33,7 @@ from vobench.estimator.tools import stereo_pair
 from vobench.geometry.rig import own_pair
 from vobench.geometry.se3 import Array, inverse
 from vobench.run.folder import SEQUENCE, RunFolder, TrialScore, read_tum
-from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.frames import GROUND_TRUTH
 from vobench.run.key import cache_folder
 from vobench.run.motion import body_motion
 from vobench.run.task import bake_task, perform

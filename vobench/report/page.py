@@ -33,8 +33,7 @@ from vobench.run.folder import (
     TrialScore,
     read_tum,
 )
-from vobench.run.frames import FRAMES, TIMES, FrameRow, new_table, read_frames
-from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.frames import FRAMES, GROUND_TRUTH, TIMES, FrameRow, new_table, read_frames
 from vobench.trajectory.align import Alignment
 
 TEMPLATES = Path(__file__).parent / "templates"

@@ -28,8 +28,7 @@ from vobench.report import blueprint as bp
 from vobench.report.blueprint import FRAME_TIMELINE, truth_entity
 from vobench.run.estimate import ESTIMATE, POINTS, read_tracks
 from vobench.run.folder import CASE, SEQUENCE, STATUSES, SURVIVED, RunFolder, TrialScore, read_tum
-from vobench.run.frames import FrameRow, read_frames
-from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.frames import GROUND_TRUTH, FrameRow, read_frames
 from vobench.scene.material import Material, linear, srgb
 from vobench.sensor.pixel_truth import CHANNELS, TruthNames, picture
 from vobench.sequence import EncodedFrame, Sequence, StereoTruth, read_truth_frames, read_truth_names, truth_channels

@@ -11,7 +11,8 @@ from vobench.errors import VobenchError
 from vobench.run.entry import fault, file_hash
 from vobench.run.estimate import ESTIMATE, REVISED
 from vobench.run.folder import CASE, SEQUENCE, RunFolder, read_hashes, read_score, read_tum
-from vobench.run.ground_truth import GROUND_TRUTH, left_truth, noisy
+from vobench.run.frames import GROUND_TRUTH
+from vobench.run.ground_truth import left_truth, noisy
 from vobench.run.score import score_estimate
 from vobench.suite.suite import TruthNoise
 from vobench.trajectory.formats import format_tum

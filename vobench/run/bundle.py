@@ -30,8 +30,7 @@ from vobench.run.folder import (
     read_hashes,
     read_tum,
 )
-from vobench.run.frames import FRAMES, TIMES
-from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.frames import FRAMES, GROUND_TRUTH, TIMES
 from vobench.run.score import score_estimate, status_of
 from vobench.run.store import write_json
 

@@ -27,8 +27,7 @@ from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.run.consistency import COVARIANCE, format_covariances
 from vobench.run.folder import read_tum
-from vobench.run.frames import ANSWER_COLUMNS, ANSWERS, TIME_COLUMNS, TIMES, new_table
-from vobench.run.ground_truth import GROUND_TRUTH
+from vobench.run.frames import ANSWER_COLUMNS, ANSWERS, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import Sequence, StereoFrame
 from vobench.sequence.picture import grey, rgb

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 FRAMES, TIMES = "frames.csv", "times.csv"
 # What these are made of: tables in the store, one of a sequence and one of an estimate.
 EXPOSURES, ANSWERS = "exposures.csv", "answers.csv"
+GROUND_TRUTH = "ground_truth.tum"
 EXPOSURE_COLUMNS = ("frame", "t_ns", "exposure_s", "gain_db")
 ANSWER_COLUMNS = ("frame", "status", "reason", "tracks", "inliers", "stats")
 TIME_COLUMNS = ("frame", "wall_ms", "cpu_ms", "memory_mib")

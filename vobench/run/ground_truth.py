@@ -8,14 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from vobench.errors import SequenceError
 from vobench.geometry import se3
-from vobench.run.frames import EXPOSURE_COLUMNS, EXPOSURES, new_table
+from vobench.run.frames import EXPOSURE_COLUMNS, EXPOSURES, GROUND_TRUTH, new_table
 from vobench.sequence import Sequence, read_truth
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite import EXACT, Case, TruthNoise, Window
 from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
-GROUND_TRUTH = "ground_truth.tum"
 NOISE_STREAM = 9_173  # sets the noise of the truth apart from other streams of a seed
 # Between two true poses further apart than this nobody knows where the camera was.
 LONGEST_GAP_NS = 200_000_000

@@ -27,8 +27,8 @@ from vobench.run.folder import (
     read_score,
     write_hashes,
 )
-from vobench.run.frames import COLUMNS, FRAMES, TIME_COLUMNS, TIMES, new_table
-from vobench.run.ground_truth import GROUND_TRUTH, scored_truth
+from vobench.run.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
+from vobench.run.ground_truth import scored_truth
 from vobench.run.key import digest, folder_digest, library_versions
 from vobench.run.simulate import LIBRARIES
 from vobench.run.store import Store, Tell, write_json

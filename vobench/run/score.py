@@ -14,8 +14,8 @@ from vobench.metric.settings import ScoreSettings
 from vobench.run.consistency import trial_consistency
 from vobench.run.estimate import DROPPED, ESTIMATE, FINISHED, REVISED, Outcome, read_outcome
 from vobench.run.folder import SCORE, SURVIVED, TrialScore, TrialStatus, read_tum
-from vobench.run.frames import ANSWERS, EXPOSURES, read_table, write_frames
-from vobench.run.ground_truth import GROUND_TRUTH, scored_truth
+from vobench.run.frames import ANSWERS, EXPOSURES, GROUND_TRUTH, read_table, write_frames
+from vobench.run.ground_truth import scored_truth
 from vobench.run.store import write_json
 from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.trajectory import Trajectory
