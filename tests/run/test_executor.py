@@ -115,6 +115,21 @@ def test_two_processes_write_the_bytes_that_one_does(bench, first, tmp_path):
     assert files(two) == files(first)
 
 
+def test_sequences_of_one_light_share_a_process_and_nothing_else_does(tmp_path, monkeypatch):
+    executor, started = LocalProcesses(1), []
+    make = executor._context.Process
+    monkeypatch.setattr(executor._context, "Process", lambda **said: started.append(said) or make(**said))
+    lit, dark = PICTURES[:3], task("pictures of another light", needs=("another",))
+    counts = []
+    for one in (LIGHT, *lit, dark, lit[0]):
+        done = executor.submit(one, tmp_path, 0, 1).result(timeout=30)
+        assert done.failure  # there is no such key, and the process lives on
+        counts.append(len(started))
+    executor.close()
+    assert counts == [1, 2, 2, 2, 3, 4]
+    assert not executor._running and not executor._idle
+
+
 def test_a_process_that_dies_is_a_row_of_its_cell(bench, tmp_path, monkeypatch):
     executor = LocalProcesses(2)
     submit = executor.submit

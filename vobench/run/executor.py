@@ -118,8 +118,9 @@ def _line(error: Exception) -> str:
 
 
 class LocalProcesses:
-    """A process for each task, forked from a server that has imported what tasks import and nothing else.
+    """Processes forked from a server that has imported what tasks import and nothing else, one for each task.
 
+    Only sequences of one light, one after the other in a slot, share a process, which then has their scene at hand.
     Each slot has cores of its own, as many as a task is given threads: what draws, traces, filters and multiplies
     looks at which cores it may use.
     """
@@ -129,34 +130,49 @@ class LocalProcesses:
         self._context = get_context("forkserver")
         self._context.set_forkserver_preload(PRELOADED)
         self._running: set[Any] = set()
+        self._idle: dict[int, _Worker] = {}
 
     def submit(self, task: Task, store: Path, slot: int, threads: int) -> "Future[Done]":
-        """Start the task's process; a thread waits for what it says, or for its end."""
+        """Give the task to a process; a thread waits for what it says, or for its end."""
         future: Future[Done] = Future()
-        ours, theirs = self._context.Pipe(duplex=False)
         cores = self._cores if threads == NO_LIMIT else _share(self._cores, slot, threads)
-        process = self._context.Process(target=_work, args=(theirs, task, store, cores), daemon=False)
-        process.start()
-        theirs.close()
-        self._running.add(process)
+        worker = self._worker(slot, task, cores)
+        self._running.add(worker.process)
 
         def await_end() -> None:
             began = time.monotonic()
             try:
-                done = ours.recv()
+                worker.connection.send((task, store))
+                done = worker.connection.recv()
             except (EOFError, OSError):
-                process.join()
-                done = _death(process.exitcode, time.monotonic() - began)
-            process.join()
-            self._running.discard(process)
-            ours.close()
+                worker.process.join()
+                done = _death(worker.process.exitcode, time.monotonic() - began)
+            if task.stage == "sequence" and worker.process.is_alive():
+                self._idle[slot] = worker
+            else:
+                worker.leave()
+            self._running.discard(worker.process)
             future.set_result(done)
 
         threading.Thread(target=await_end, name=f"task {task.key}", daemon=True).start()
         return future
 
+    def _worker(self, slot: int, task: Task, cores: list[int]) -> "_Worker":
+        kept = self._idle.pop(slot, None)
+        if kept and (kept.at_hand, kept.cores) == (_takes_up(task), cores) and kept.process.is_alive():
+            return kept
+        if kept:
+            kept.leave()
+        ours, theirs = self._context.Pipe()
+        process = self._context.Process(target=_work, args=(theirs, cores), daemon=False)
+        process.start()
+        theirs.close()
+        return _Worker(process, ours, cores, _takes_up(task))
+
     def close(self) -> None:
-        """Ask what runs to stop, then kill it."""
+        """Let go what waits; ask what runs to stop, then kill it."""
+        while self._idle:
+            self._idle.popitem()[1].leave()
         for end in (signal.SIGTERM, signal.SIGKILL):
             for process in list(self._running):
                 if process.pid and process.is_alive():
@@ -164,6 +180,20 @@ class LocalProcesses:
             until = time.monotonic() + GRACE_S
             while self._running and time.monotonic() < until:
                 time.sleep(0.01)
+
+
+@dataclass(frozen=True, slots=True)
+class _Worker:
+    """A process that performs tasks, on these cores, until nobody can send it another."""
+
+    process: Any
+    connection: Any
+    cores: list[int]
+    at_hand: str
+
+    def leave(self) -> None:
+        self.connection.close()
+        self.process.join()
 
 
 def _share(cores: Sequence[int], slot: int, threads: int) -> list[int]:
@@ -178,15 +208,19 @@ def _death(exitcode: int | None, wall_s: float) -> Done:
     return Done("crashed", f"its process ended with {by}", wall_s)
 
 
-def _work(connection: Connection, task: Task, store: Path, cores: Sequence[int]) -> None:
-    """A task in a process of its own, which goes when whoever started it does."""
+def _work(connection: Connection, cores: Sequence[int]) -> None:
+    """Tasks in a process of its own, which goes when whoever started it does."""
     os.setsid()  # the terminal's Ctrl-C is the parent's
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: stop.request(number))
     os.sched_setaffinity(0, cores)
     threading.Thread(target=_leave_with, args=(os.getppid(),), daemon=True).start()
     try:
-        connection.send(performed(task, store, len(cores)))
+        while True:
+            task, store = connection.recv()
+            connection.send(performed(task, store, len(cores)))
+    except EOFError:
+        return
     except stop.Stopped:
         os._exit(128 + stop.requested())
 
@@ -348,8 +382,7 @@ def perform_all(
                 for other in queue.fell(task.key):
                     failures[other.key] = Done(done.failure, f"its {task.stage} could not be made: {done.reason}")
     finally:
-        if running:
-            executor.close()
+        executor.close()
     return failures
 
 
