@@ -127,7 +127,8 @@ def test_sequences_of_one_light_share_a_process_and_nothing_else_does(tmp_path, 
         counts.append(len(started))
     executor.close()
     assert counts == [1, 2, 2, 2, 3, 4]
-    assert not executor._running and not executor._idle
+    assert not executor._running
+    assert not executor._idle
 
 
 def test_a_process_that_dies_is_a_row_of_its_cell(bench, tmp_path, monkeypatch):
