@@ -90,6 +90,14 @@ def test_calibrations_stand_side_by_side_and_are_told_alike(plan):
     assert worn.build_true_rig().T_body_right.tobytes() == worn.build_true_rig().T_body_right.tobytes()
 
 
+def test_a_calibration_may_be_run_at_some_severities_alone(plan):
+    suite = SUITE.replace("[0, 2, 3, 4, 5]", "[2, 3]")
+    cases = plan(suite=suite + "calibrations: {none: [2, 3], worn: 2}\n").cases
+    assert [case.name for case in cases] == ["dusk-2-none", "dusk-2-worn", "dusk-3-none"]
+    with pytest.raises(SuiteError, match=r"scenarios\.dusk: none of the calibrations is run at severity 3"):
+        plan(suite=suite + "calibrations: {worn: 2}\n")
+
+
 MISTAKES = [
     ("gain_db: 6", "gain_dbb: 6", "severity.1.camera.gain_dbb: unknown key. Did you mean 'gain_db'?"),
     ("gain_db: 6", "gain_db: 90", "dusk.yaml:9: severity.1.camera.gain_db: should be 48 or less (got 90)"),

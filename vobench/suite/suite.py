@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from annotated_types import Ge, Le, MinLen
@@ -87,6 +87,18 @@ Severity = Annotated[int, Ge(0), Le(MOST_SEVERE)]
 Severities = Annotated[tuple[Severity, ...], MinLen(1), Short(_listed, {"type": "integer"})]
 
 
+def _at_all(value: Any) -> Any:
+    is_list = isinstance(value, (list, tuple)) and all(isinstance(level, str) for level in value)
+    return {level: list(range(MOST_SEVERE + 1)) for level in value} if is_list else value
+
+
+Calibrations = Annotated[
+    dict[Level, Severities],
+    MinLen(1),
+    Short(_at_all, {"type": "array", "items": {"enum": get_args(Level)}, "minItems": 1}),
+]
+
+
 def _named(value: Any) -> Any:
     return {"name": value} if isinstance(value, str) else value
 
@@ -103,7 +115,8 @@ class Suite:
 
     Each axis names its variants; change one axis to change one factor. Without rigs a pair looks ahead; without
     trajectories the body goes round where each scene is free. A suite of recordings alone has no axes, nor has one of
-    `scenarios`, each at some severities and with the rig's calibration off by each of `calibrations`. With `frames`
+    `scenarios`, each at some severities and with the rig's calibration off by each of `calibrations`, or by those that
+    have its severity. With `frames`
     only the pictures from one number to before another are taken of every way. What it does not say itself is as the
     suite has it that it includes.
     """
@@ -115,7 +128,7 @@ class Suite:
     repeats: Annotated[int, Ge(1), Le(100)] = 1
     source: Annotated[tuple[Source, ...], SOURCES] = ()
     scenarios: Annotated[dict[str, Severities], MinLen(1)] | None = None
-    calibrations: Annotated[tuple[Level, ...], MinLen(1)] | None = None
+    calibrations: Calibrations | None = None
     scenes: Annotated[tuple[str, ...], MinLen(1)] | None = None
     lightings: Annotated[dict[Name, Lighting], MinLen(1)] = field(default_factory=lambda: {"as_built": {}})
     rigs: Annotated[dict[Name, RigSettings], MinLen(1)] | None = None
@@ -403,7 +416,10 @@ class _Planner:
         return cases
 
     def _of_scenario(self, scenario: Scenario, severity: int) -> Iterator[Case]:
-        setup, levels = scenario.setup(severity), self.suite.calibrations or (None,)
+        setup, asked = scenario.setup(severity), self.suite.calibrations or {}
+        levels = [level for level in asked if severity in asked[level]] if asked else [None]
+        if not levels:
+            raise SuiteError(f"none of the calibrations is run at severity {severity}")
         own = setup.rig.read(scenario.path.parent)
         entry = catalog.find("scene", setup.scene, suite=scenario.path)
         if entry not in self.found:
@@ -417,7 +433,7 @@ class _Planner:
             text = read_replayed(setup.trajectory, folder, read_times(setup.trajectory, folder))
         variant = scenario.variant(severity, entry.name)
         for level in levels:
-            rig, end = own, f"-{level}" if len(levels) > 1 else ""
+            rig, end = own, f"-{level}" if len(asked) > 1 else ""
             if level:
                 rig = replace(rig, calibration_error=replace(rig.calibration_error, level=level))
             yield Case(
