@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 
 from vobench.report import board_table, page
 from vobench.report.leaderboard import CaseFacts, EstimatorStatistics, answers, board, lost_aware, marks
-from vobench.run.folder import STATUSES, SURVIVED, TrialScore
+from vobench.run.folder import NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore
 from vobench.run.frames import COLUMNS, FRAMES, TIMES, FrameRow, new_table
 
 CASES = ("a", "b")
+BEGUN = [status for status in STATUSES if status != NOT_APPLICABLE]
 ates = st.none() | st.floats(0, 1e6)
 runs = st.fixed_dictionaries(
-    {name: st.tuples(*[st.tuples(st.sampled_from(STATUSES), ates)] * len(CASES)) for name in ("p", "q", "r", "s")}
+    {name: st.tuples(*[st.tuples(st.sampled_from(BEGUN), ates)] * len(CASES)) for name in ("p", "q", "r", "s")}
 )
 
 
@@ -123,6 +124,20 @@ def test_the_best_of_a_case_is_marked_and_whoever_is_not_decided_against_it(scor
     assert marks(board([s for s in near if s.estimator == "b"] + trials("c", [0.2, 0.3, 0.4, 0.5]), {}), "ate") == {
         ("down", "b"): "*"
     }
+
+
+def test_who_lacks_a_sensor_in_some_cases_is_ranked_on_the_others_and_in_all_of_them_behind(scored):
+    trials = [scored("blind", ate_m=0.9), scored("blind", case="flat", ate_m=0.9), scored("wheels", ate_m=0.01)]
+    unfit = scored("wheels", "not_applicable", case="flat", ate_m=None, coverage=0.0)
+    made = board([*trials, unfit], {})
+    assert [(total.estimator, total.failed, total.cases) for total in made.totals] == [
+        ("wheels", 0, 1),
+        ("blind", 0, 1),
+    ]
+    assert "over the 1 of 2 cases that every estimator has (wheels has 1)" in made.remarks[0]
+    everywhere = [scored("wheels", "not_applicable", case=case, ate_m=None, coverage=0.0) for case in ("down", "flat")]
+    last = board([*trials[:2], *everywhere], {}).totals[-1]
+    assert (last.estimator, last.failed) == ("wheels", 2)
 
 
 def test_totals_are_over_the_cases_that_all_have_and_say_so(scored):

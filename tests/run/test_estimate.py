@@ -118,7 +118,7 @@ def test_what_the_recording_cannot_serve_is_refused_before_it_starts(tmp_path, p
     mine = plugin("import os; os._exit(3)", head="raise RuntimeError('started')", needs=f"[{need}]")
     folder = estimated(tmp_path, recorded(tmp_path / "sequence", MONO), mine)
     outcome = estimate_file.read_outcome(folder)
-    assert outcome.kind == "refused"
+    assert outcome.kind == "not_applicable"
     assert outcome.reason == f"it needs {need!r}, but this recording has {lacks}"
     assert (folder / estimate_file.LOG).read_text() == ""
     assert (folder / estimate_file.ESTIMATE).read_text() == ""

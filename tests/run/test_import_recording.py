@@ -116,8 +116,8 @@ def test_a_recording_that_stands_still_has_a_drift_and_no_error_among_others(ben
     assert drift_m > 0.1  # it sees the pictures of a drive
     assert scores["rest", "lk_epipolar"].status == "ok"
     assert scores["kitti", "lk_epipolar"].drift_m is None
-    refused = scores["rest", "constant_velocity"]
-    assert (refused.status, refused.reason) == ("refused", "it needs 'encoders', but this recording has no wheels")
+    unfit = scores["rest", "constant_velocity"]
+    assert (unfit.status, unfit.reason) == ("not_applicable", "it needs 'encoders', but this recording has no wheels")
     board = (run.path / "leaderboard.md").read_text()
     assert f"lk_epipolar: stood still: drift {1e3 * drift_m:.1f} mm" in board
     made = page.board_of(run, run.scores())

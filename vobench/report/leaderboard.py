@@ -15,7 +15,7 @@ from vobench.metric import ranking
 from vobench.metric.coverage import lost_aware_score
 from vobench.run.consistency import Consistency
 from vobench.run.estimate import DROPPED
-from vobench.run.folder import STATUSES, SURVIVED, TrialScore, value_of
+from vobench.run.folder import NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore, value_of
 from vobench.run.frames import FrameRow
 
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
@@ -328,8 +328,13 @@ def _mean(
 
 
 def _totals(group: str, cells: Sequence[Cell]) -> tuple[list[Total], list[str]]:
-    """The estimators ranked over the cases that all of them have, and what to know of that."""
+    """The estimators ranked over the cases that all of them have, and what to know of that.
+
+    Whose sensors some of the cases lack has not got these; whose sensors all of them lack fails them.
+    """
     names = sorted({cell.estimator for cell in cells})
+    able = {cell.estimator for cell in cells if cell.status != NOT_APPLICABLE}
+    cells = [cell for cell in cells if cell.estimator not in able or cell.status != NOT_APPLICABLE]
     of_case: dict[str, list[Cell]] = {}
     for cell in cells:
         of_case.setdefault(cell.case, []).append(cell)

@@ -26,7 +26,7 @@ from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.run.consistency import COVARIANCE, format_covariances
-from vobench.run.folder import read_tum
+from vobench.run.folder import NOT_APPLICABLE, read_tum
 from vobench.run.frames import ANSWER_COLUMNS, ANSWERS, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import Sequence, StereoFrame
@@ -162,7 +162,7 @@ def _check_needs(needs: tuple[str, ...], sequence: Sequence) -> None:
     }
     for need in needs:
         if short := has.get(need):
-            raise EstimatorFailure("refused", f"it needs {need!r}, but this recording has {short}")
+            raise EstimatorFailure(NOT_APPLICABLE, f"it needs {need!r}, but this recording has {short}")
 
 
 def _feed(trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Progress", door: Running) -> None:

@@ -25,10 +25,20 @@ ENVIRONMENT, SUITE, ESTIMATORS = "environment.json", "suite.json", "estimators.j
 
 # Best first; the last seven are failures, and no failure ranks before a survivor.
 TrialStatus = Literal[
-    "ok", "partial", "lost", "diverged", "invalid_output", "timeout", "out_of_memory", "crashed", "refused"
+    "ok",
+    "partial",
+    "lost",
+    "diverged",
+    "invalid_output",
+    "timeout",
+    "out_of_memory",
+    "crashed",
+    "refused",
+    "not_applicable",
 ]
 STATUSES: tuple[TrialStatus, ...] = get_args(TrialStatus)
 SURVIVED = ("ok", "partial")
+NOT_APPLICABLE = "not_applicable"  # the recording lacks a sensor that the estimator needs
 
 
 class TrialScore(BaseModel):
