@@ -219,8 +219,8 @@ def _work(connection: Connection, cores: Sequence[int]) -> None:
         while True:
             task, store = connection.recv()
             connection.send(performed(task, store, len(cores)))
-    except EOFError:
-        return
+    except (EOFError, OSError):
+        return  # nobody asks or hears any more
     except stop.Stopped:
         os._exit(128 + stop.requested())
 
