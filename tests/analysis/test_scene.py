@@ -40,7 +40,25 @@ def test_what_hangs_higher_than_a_body_leaves_the_floor_free() -> None:
     shelf = Thing("shelf", block((8, 6, 0.05), bevel_m=0).moved(at(z_m=1.2)), "grey")
     free = survey(scene(FLOOR, shelf)).free
     assert free is not None
-    assert free.floor_m == 0 or free.floor_m == pytest.approx(1.22, abs=0.03)
+    assert (free.floor_m, free.radius_m) == (0, pytest.approx(3.0, abs=0.1))
+
+
+def test_a_wall_that_stands_on_the_floor_and_ends_at_the_ceiling_is_no_way() -> None:
+    ceiling = Thing("ceiling", quad((-4, 3, 2.5), (8, 0, 0), (0, -6, 0)), "grey")
+    for wall in (
+        block((0.14, 6, 2.5), bevel_m=0).moved(at(0.04, 0, 1.25)),  # its ends lie in floor and ceiling
+        quad((0.04, -3, 0), (0, 6, 0), (0, 0, 2.5)),  # a sheet, between two looks down
+    ):
+        free = survey(scene(FLOOR, ceiling, Thing("wall", wall, "grey"))).free
+        assert free is not None
+        assert abs(free.x_m - 0.04) > free.radius_m - 0.05
+
+
+def test_the_floor_is_below_a_roof_that_is_larger() -> None:
+    roof = Thing("roof", quad((-6, -4, 3), (12, 0, 0), (0, 8, 0)), "grey")
+    free = survey(scene(FLOOR, roof)).free
+    assert free is not None
+    assert free.floor_m == 0
 
 
 def test_faces_sizes_and_lights_are_counted() -> None:

@@ -13,7 +13,9 @@ from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
 
 LEVEL, FLOOR_STEP_M = 0.99, 0.02  # cosine of what counts as level, and how even a floor is
+FLOOR_SHARE = 0.4  # of the largest level area, which a floor has at least
 CELL_M, MOST_CELLS, BODY_M = 0.1, 600, 0.6  # of the map of free places, and the height of a body
+HEIGHTS_M, SIDES = (0.1, 0.35, 0.6), np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])  # looked for walls
 LEAST_RADIUS_M, MOST_RADIUS_M, OF_CIRCLE = 0.2, 4.0, 0.6
 SPEED_MPS, RATE_HZ, EASE_S = 0.5, 10.0, 1.0
 CORNERS, MOST_LENGTH_M = 16, 10.0
@@ -32,14 +34,14 @@ class Free:
 def free_circle(faces: Triangles, caster: RayCaster) -> Free | None:
     """The largest circle on the floor over which nothing stands lower than a body is high.
 
-    The floor is the height at which most level area lies.
+    The floor is the lowest height at which much level area lies: roofs and storeys above may have more.
     """
     level = (faces.plane[:, 2] > LEVEL) & (faces.mover < 0)
     if not level.any():
         return None
     heights = np.rint(faces.corners_m[level].mean(1)[:, 2] / FLOOR_STEP_M).astype(int)
     areas = np.bincount(heights - heights.min(), areas_m2(faces.corners_m[level]))
-    floor_m = float((areas.argmax() + heights.min()) * FLOOR_STEP_M)
+    floor_m = float((np.flatnonzero(areas > FLOOR_SHARE * areas.max())[0] + heights.min()) * FLOOR_STEP_M)
     on_floor = faces.corners_m[level][np.abs(heights * FLOOR_STEP_M - floor_m) < FLOOR_STEP_M].reshape(-1, 3)
     low, high = on_floor.min(0)[:2], on_floor.max(0)[:2]
     cell_m = max(CELL_M, float((high - low).max()) / MOST_CELLS)
@@ -49,13 +51,25 @@ def free_circle(faces: Triangles, caster: RayCaster) -> Free | None:
     starts = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
     hits = caster.hits(np.column_stack([starts, np.full(len(starts), floor_m + BODY_M)]), down(len(starts)))
     is_floor = (np.abs(hits.distance - BODY_M) < FLOOR_STEP_M) & (faces.plane[hits.face, 2] > 0)
-    # Whoever sees a back above is inside a thing.
-    above = caster.nearest(np.column_stack([starts, np.full(len(starts), floor_m + BODY_M)]), -down(len(starts)))
-    free = (is_floor & ~((above >= 0) & (faces.plane[above, 2] > 0))).reshape(len(y), len(x))
+    is_floor[is_floor] = _clear(starts[is_floor], floor_m, cell_m, faces, caster)
+    free = is_floor.reshape(len(y), len(x))
     distance = scipy.ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]
     row, column = np.unravel_index(distance.argmax(), distance.shape)
     radius_m = float((distance[row, column] - 0.5) * cell_m)
     return Free(float(x[column]), float(y[row]), floor_m, radius_m) if radius_m > 0 else None
+
+
+def _clear(at_m: Array, floor_m: float, cell_m: float, faces: Triangles, caster: RayCaster) -> Array:
+    """Whether no wall stands in a cell (N, 2), nor around it: whoever sees backs on all sides is inside a thing."""
+    clear = np.ones(len(at_m), bool)
+    for height_m in HEIGHTS_M:
+        starts, backs = np.column_stack([at_m, np.full(len(at_m), floor_m + height_m)]), np.ones(len(at_m), bool)
+        for way in SIDES:
+            hits = caster.hits(starts, np.tile(way, (len(starts), 1)))
+            clear &= (hits.face < 0) | (hits.distance > cell_m)
+            backs &= (hits.face >= 0) & (faces.plane[hits.face, :3] @ way > 0)
+        clear &= ~backs
+    return clear
 
 
 def down(count: int) -> Array:
