@@ -7,9 +7,9 @@
 every sensor, the hand's shake): mean error, the 95 % interval of the ratio to each seed's better parent (Student's t of
 the logarithms), in how many seeds it won, and how likely so many wins are by chance (Wilcoxon, one-sided).
 
-Sequences come from the suites in benchmarks/estimators and the built-in quickstart; what is missing in --runs is
-rendered first (some minutes). --rectangles is the folder of runs of the same suites `office` and `hand` by the
-commit ce32e00, whose office has no furniture but rectangles; without it these cases are left out. An estimator is a
+Sequences come from the suites in benchmarks/estimators; what is missing in --runs is rendered first (some minutes).
+--rectangles is the folder of runs of the same suites `office` and `hand`, and of `quickstart`, by the commit ce32e00,
+whose office has no furniture but rectangles; without it these cases are left out. An estimator is a
 built-in's name, or a folder with an estimator.yaml, say another version's. Estimators run in this process, with one
 thread; a frame costs its process's CPU time, pictures decoded before.
 """
@@ -86,8 +86,8 @@ class Case:
 
 
 CASES = [
-    Case("quick down", "quickstart", "down"),
-    Case("quick ahead", "quickstart", "ahead"),
+    Case("quick down", "quick", "down"),
+    Case("quick ahead", "quick", "ahead"),
     Case("old quick down", "quickstart", "down", is_of_rectangles=True),
     Case("old quick ahead", "quickstart", "ahead", is_of_rectangles=True),
     Case("old drive", "office", "clean", is_of_rectangles=True),
@@ -99,14 +99,14 @@ CASES = [
     Case("far", "far", "perfect"),
     Case("far inward", "far", "inward"),
     Case("far outward", "far", "outward"),
-    Case("gain down", "quickstart", "down", altered=right_dimmer),
-    Case("gain ahead", "quickstart", "ahead", altered=right_dimmer),
+    Case("gain down", "quick", "down", altered=right_dimmer),
+    Case("gain ahead", "quick", "ahead", altered=right_dimmer),
     Case("gain drive", "office", "clean", altered=right_dimmer),
     Case("old gain down", "quickstart", "down", is_of_rectangles=True, altered=right_dimmer),
     Case("old gain ahead", "quickstart", "ahead", is_of_rectangles=True, altered=right_dimmer),
     Case("old gain drive", "office", "clean", is_of_rectangles=True, altered=right_dimmer),
-    Case("still down", "quickstart", "down", altered=standing),
-    Case("still ahead", "quickstart", "ahead", altered=standing),
+    Case("still down", "quick", "down", altered=standing),
+    Case("still ahead", "quick", "ahead", altered=standing),
     Case("still drive", "office", "clean", altered=standing),
 ]
 
@@ -167,7 +167,7 @@ def sequence_folder(case: Case, runs: Path) -> Path:
         return folder
     if case.is_of_rectangles:
         raise SystemExit(f"run the suite {case.suite} by the commit ce32e00 into {runs} first: there is no {folder}")
-    suite = case.suite if case.suite == "quickstart" else str(SUITES / f"{case.suite}.yaml")
+    suite = str(SUITES / f"{case.suite}.yaml")
     if case.seed:
         text = Path(suite).read_text(encoding="utf-8").replace("seed: 1\n", f"seed: {case.seed}\n", 1)
         suite = str((runs / f"{case.run_name}.yaml").resolve())

@@ -3,7 +3,7 @@
     pip install evo; python benchmarks/startup.py [--repeats 5] [--poses 1000] [--evo PATH/TO/evo_ape]
 
 Each command is run once unmeasured, so that Python's compiled files are there; the least of the repeats counts.
-`check` is of `quickstart`, which has two cases. Compare within a run only: a busy machine doubles all of it.
+`check` is of `quickstart`, which has four cases. Compare within a run only: a busy machine doubles all of it.
 """
 
 import argparse

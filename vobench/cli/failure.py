@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from vobench.trajectory.trajectory import Trajectory
 
 TrialPath = Annotated[
-    Path, typer.Argument(metavar="RUN/CASE/ESTIMATOR", help="A trial, as runs/quickstart/latest/down/lk_epipolar.")
+    Path, typer.Argument(metavar="RUN/CASE/ESTIMATOR", help="A trial, as runs/quickstart/latest/room-down/lk_epipolar.")
 ]
 Seeds = Annotated[int, typer.Option("--repeats", "-n", min=1, max=20, help="Seeds for each; few frames take more.")]
 Out = Annotated[Path, typer.Option(help="Where the folders of runs go.")]
