@@ -19,9 +19,9 @@ SHEETS, COLUMNS, QUALITY = 2, 2, 80
 
 
 def picture(case: Path, scenario: str) -> Image.Image:
-    """A small picture of a case."""
+    """A small picture of a case, from a third of its way."""
     frames = list(Sequence.open(case / "sequence").frames())
-    now, then = (frames[min(int(0.4 * len(frames)) + n, len(frames) - 1)] for n in (0, 1))
+    now, then = (frames[min(int(0.3 * len(frames)) + n, len(frames) - 1)] for n in (0, 1))
     other = now.right if scenario in EYES else then.left if scenario in TIME else now.left
     return Image.fromarray(np.dstack([now.left, other, other])).resize((WIDE, HIGH), Image.Resampling.LANCZOS)
 
