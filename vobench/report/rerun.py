@@ -30,6 +30,7 @@ from vobench.run.estimate import ESTIMATE, POINTS, read_tracks
 from vobench.run.folder import CASE, SEQUENCE, STATUSES, SURVIVED, RunFolder, TrialScore, read_tum
 from vobench.run.frames import GROUND_TRUTH, FrameRow, read_frames
 from vobench.scene.material import Material, linear, srgb
+from vobench.scene.scene import Way
 from vobench.sensor.pixel_truth import CHANNELS, TruthNames, picture
 from vobench.sequence import EncodedFrame, Sequence, StereoTruth, read_truth_frames, read_truth_names, truth_channels
 from vobench.sequence.picture import BAYER, RGB, decode, encode, rgb
@@ -137,12 +138,28 @@ BEST_QUALITY, WORST_QUALITY = 85, 10
 
 @dataclass(frozen=True, slots=True)
 class SceneMesh:
-    """A scene's faces: corners (F, 3, 3), their places on the map of light (H, W, 3) uint8, colours (F, 3) uint8."""
+    """A scene's faces: corners (F, 3, 3), their places on the map of light (H, W, 3) uint8, colours (F, 3) uint8.
+
+    mover (F,) is -1 for what stands still; the others are in the frame of that mover, which goes one of the ways.
+    """
 
     corners_m: Array
     light_uv: Array
     light: NDArray[np.uint8]
     colors: NDArray[np.uint8]
+    mover: NDArray[np.int32]
+    ways: tuple[Way, ...] = ()
+
+    def shown(self, some: NDArray[np.bool_]) -> rr.Mesh3D:
+        """Some of the faces (F,)."""
+        return rr.Mesh3D(
+            vertex_positions=self.corners_m[some].reshape(-1, 3),
+            triangle_indices=np.arange(3 * np.count_nonzero(some), dtype=np.uint32).reshape(-1, 3),
+            vertex_texcoords=self.light_uv[some].reshape(-1, 2),
+            vertex_colors=np.repeat(self.colors[some], 3, axis=0),
+            albedo_texture=self.light,
+            face_rendering=rr.components.MeshFaceRendering.Front,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,19 +334,15 @@ def _shown(encoded: bytes, frame: EncodedFrame, form: PictureForm, quality: int)
 
 
 def _log_scene(log: _Log, scene: SceneMesh | None) -> None:
-    """The scene in its own light, seen through walls from outside."""
+    """The scene in its own light, seen through walls from outside; what moves goes its way."""
     if scene is None:
         return
-    count = scene.corners_m.size // 3
-    mesh = rr.Mesh3D(
-        vertex_positions=scene.corners_m.reshape(-1, 3),
-        triangle_indices=np.arange(count, dtype=np.uint32).reshape(-1, 3),
-        vertex_texcoords=scene.light_uv.reshape(-1, 2),
-        vertex_colors=np.repeat(scene.colors, 3, axis=0),
-        albedo_texture=scene.light,
-        face_rendering=rr.components.MeshFaceRendering.Front,
-    )
-    log.static(bp.SCENE, mesh)
+    log.static(bp.SCENE, scene.shown(scene.mover < 0))
+    for nth, way in enumerate(scene.ways):
+        entity, poses = f"{bp.SCENE}/mover_{nth}", np.stack([way.pose(t_ns) for t_ns in log.t_ns.tolist()])
+        log.static(entity, scene.shown(scene.mover == nth))
+        columns = rr.Transform3D.columns(translation=poses[:, :3, 3], mat3x3=poses[:, :3, :3])
+        log.columns(entity, np.arange(len(poses)), columns)
 
 
 def _log_truth_path(log: _Log, trial: TrialView) -> None:
@@ -613,7 +626,8 @@ def scene_mesh(folder: RunFolder, case: str) -> SceneMesh | None:
     shown = srgb(picture / max(float(np.percentile(lit, BRIGHT)) if lit.size else 1.0, 1e-9))
     looks = [light.scene.materials.get(thing.material) for thing in light.faces.things]
     tones = np.array([srgb(_tone(look)) if look else (128, 128, 128) for look in looks], np.uint8)
-    return SceneMesh(light.faces.corners_m, light.light_uv, shown, tones[light.faces.thing])
+    ways, faces = tuple(mover.path for mover in light.scene.movers), light.faces
+    return SceneMesh(faces.corners_m, light.light_uv, shown, tones[faces.thing], faces.mover, ways)
 
 
 def _tone(look: Material) -> Array:
