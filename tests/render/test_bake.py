@@ -389,7 +389,7 @@ def traced(baked: BakedScene, bulb: PointLight, *, count: int, paths: int) -> tu
     )
     carried, total = np.ones((len(points), 3)), np.zeros((count * paths, 3))
     for _ in range(12):
-        ways = cosine_weighted(normals, *numbers.random((2, len(points)), dtype=np.float32))
+        ways = cosine_weighted(normals)(*numbers.random((2, len(points)), dtype=np.float32))
         hits = visibility.opaque.hits(points, ways)
         front = (hits.face >= 0) & (np.einsum("ij,ij->i", ways, visibility.normals[hits.face]) < 0)
         hits, ends, path, carried = (

@@ -51,7 +51,7 @@ class BakeSettings:
     spacing_m: Positive = 0.025
     light_rays: Annotated[int, Ge(1)] = 16
     indirect_spacing_m: Positive = 0.1
-    indirect_rays: Annotated[int, Ge(0)] = 256
+    indirect_rays: Annotated[int, Ge(0)] = 100
     bounces: Annotated[int, Ge(0)] = 64
     seed: Annotated[int, Ge(0)] = 0
 

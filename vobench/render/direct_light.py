@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vobench.render.emitter import Aim, Between, Emitter, emitters
 from vobench.render.geometry import RAY_OFFSET_M, Ball, Flat, Floats, Indices, Mask, RayCaster, Visibility, ball
@@ -213,11 +213,12 @@ def _sent(towards: Aim, texels: Texels, cell: int, side: int) -> tuple[Floats, F
     return way, strength * np.maximum(cosine, 0) * texels.entering(cosine)
 
 
-def cell_spot(texels: Texels, cell: int, side: int) -> tuple[Floats, Floats]:
-    """Where in one of side x side cells of the unit square each point aims (P,): turned by its own dither."""
-    jitter = texels.dither + cell * JITTER
+def cell_spot(texels: Texels, cell: ArrayLike, side: int) -> tuple[Floats, Floats]:
+    """Where in a cell of side x side of the unit square each point aims (P,), of cells (K, 1) (K, P): by its dither."""
+    cells = np.asarray(cell, np.float32)
+    jitter = texels.dither + cells[..., None] * JITTER
     jitter -= np.floor(jitter)
-    return (cell % side + jitter[:, 0]) / side, (cell // side + jitter[:, 1]) / side
+    return (cells % side + jitter[..., 0]) / np.float32(side), (cells // side + jitter[..., 1]) / np.float32(side)
 
 
 def footprint(texels: Texels, some: Places | slice, cell: int) -> Floats:

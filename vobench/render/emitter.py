@@ -274,8 +274,10 @@ def _open_sky_emitter(light: Sky, visibility: Visibility) -> Emitter:
     """The sky that no pane covers: rays all over the half sphere above each point."""
 
     def towards(texels: Texels) -> Aim:
+        around = cosine_weighted(texels.normals)
+
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-            direction = cosine_weighted(texels.normals, a, b)
+            direction = around(a, b)
             luminance = light.luminance_cd_m2(direction)
             # The rays are as dense as their cosine, hence over it.
             strength = np.pi * luminance / np.maximum(np.einsum("ij,ij->i", direction, texels.normals), 1e-6)
@@ -307,11 +309,15 @@ def disc(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     return radius * np.cos(angle), radius * np.sin(angle)
 
 
-def cosine_weighted(normals: Floats, a: Floats, b: Floats) -> Floats:
-    """Unit directions (P, 3) around normals, as dense as their cosine."""
-    (x, y), (u_axis, v_axis) = disc(a, b), tangents(normals)
-    up = np.sqrt(np.maximum(1 - a, 1e-7))
-    return np.asarray(x[:, None] * u_axis + y[:, None] * v_axis + up[:, None] * normals)
+def cosine_weighted(normals: Floats) -> Callable[[Floats, Floats], Floats]:
+    """For two random numbers (..., P) unit directions (..., P, 3) around normals (P, 3), as dense as their cosine."""
+    u_axis, v_axis = tangents(normals)
+
+    def direction(a: Floats, b: Floats) -> Floats:
+        (x, y), up = disc(a, b), np.sqrt(np.maximum(1 - a, 1e-7))
+        return np.asarray(x[..., None] * u_axis + y[..., None] * v_axis + up[..., None] * normals)
+
+    return direction
 
 
 def emitters(light: Light, visibility: Visibility, *, t_ns: float = 0) -> list[Emitter]:

@@ -177,8 +177,8 @@ def _rays(origins_m: ArrayLike, directions: ArrayLike, *, reach: float) -> tuple
 
 
 def lengths(vectors: Floats) -> Floats:
-    """Lengths (R,) of vectors (R, 3)."""
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)))
+    """Lengths (...) of vectors (..., 3)."""
+    return np.asarray(np.sqrt(np.einsum("...j,...j->...", vectors, vectors)))
 
 
 def off(points_m: Floats, normals: Floats) -> Floats:

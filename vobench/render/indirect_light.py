@@ -319,12 +319,11 @@ class Gatherer:
 
 def _start(points: Texels, side: int) -> _RayBatch:
     """Side x side cosine-weighted rays from each point; their weights average to what enters its coat."""
-    rays, count = side * side, len(points)
-    directions = [cosine_weighted(points.normals, *cell_spot(points, cell, side)) for cell in range(rays)]
-    cosines = [points.cosine(each) for each in directions]
-    weight = np.concatenate([points.entering(cosine) * (cosine > 0) for cosine in cosines])
-    origins, of = np.tile(points.points_m, (rays, 1)), np.tile(np.arange(count), rays)
-    return _RayBatch(of, origins, np.concatenate(directions), weight, np.ones(len(of), bool))
+    directions = cosine_weighted(points.normals)(*cell_spot(points, np.arange(side**2)[:, None], side))
+    cosines = points.cosine(directions)
+    weight = (points.entering(cosines) * (cosines > 0)).ravel()
+    origins, of = np.tile(points.points_m, (side**2, 1)), np.tile(np.arange(len(points)), side**2)
+    return _RayBatch(of, origins, directions.reshape(-1, 3), weight, np.ones(len(of), bool))
 
 
 def _facets(normals: Floats, roughness: Floats, dither: Floats, turn: NDArray[np.int64]) -> Floats:

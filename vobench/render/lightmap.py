@@ -208,7 +208,7 @@ def _settle(faces: Triangles, places: Array, chart: Indices, lost: Places) -> No
 
 CLAIMED_PX = 0.7072  # half a texel's diagonal: every place of a face is nearest to a texel that counts as its own
 READ_PX = 1.4143  # from a face, texels that interpolation on it can read
-PAIRS = 1 << 20  # of faces and texels at once
+PAIRS = 1 << 14  # of faces and texels at once: their arrays fit the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,29 +239,42 @@ def owners(atlas: Atlas) -> Owners:
         row, column = low[which, 1] + nth // size[which, 0], low[which, 0] + nth % size[which, 0]
         uv, apart = _nearest_on(corners[which], np.stack([column, row], -1) + 0.5)
         texel = row * atlas.width + column
-        order = np.argsort(-apart, kind="stable")  # of several the last one counts
-        order = order[apart[order] < result.apart_px[texel[order]]]
+        order = np.flatnonzero(apart < result.apart_px[texel])
+        order = order[np.argsort(-apart[order], kind="stable")]  # of several the last one counts
         texel = texel[order]
         result.face[texel], result.uv[texel], result.apart_px[texel] = which[order], uv[order], apart[order]
     return result
 
 
 def _nearest_on(corners: Array, points: Array) -> tuple[Array, Array]:
-    """The nearest places of triangles (N, 3, 2) to points (N, 2): weights (N, 2) of corners two and three, distance."""
-    edges = np.roll(corners, -1, axis=1) - corners
-    ways = points[:, None] - corners
-    along = np.einsum("nij,nij->ni", ways, edges) / np.maximum(np.einsum("nij,nij->ni", edges, edges), 1e-12)
-    along = np.clip(along, 0, 1)
+    """The nearest places of triangles (N, 3, 2) to points (N, 2): weights (N, 2) of corners two and three, distance.
+
+    What is farther than READ_PX from the line of an edge is infinitely far.
+    """
+    edges, ways = np.roll(corners, -1, axis=1) - corners, points[:, None] - corners
+    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    across = edges[..., 0] * ways[..., 1] - edges[..., 1] * ways[..., 0]
+    inwards = across * np.sign(area)[:, None]
+    squared = np.einsum("nij,nij->ni", edges, edges)
+    inside = (inwards >= 0).all(1) & (area != 0)
+    is_near = ((inwards > 0) | (inwards**2 <= READ_PX**2 * squared)).all(1)
+    # The first edge lies across from the third corner.
+    weights = np.roll(across, -1, axis=1) / np.where(area == 0, 1, area)[:, None]
+    apart = np.where(inside, 0, np.inf)
+    some = np.flatnonzero(is_near & ~inside)
+    weights[some], apart[some] = _nearest_on_edges(edges[some], ways[some], squared[some])
+    return weights[:, 1:], apart
+
+
+def _nearest_on_edges(edges: Array, ways: Array, squared: Array) -> tuple[Array, Array]:
+    """Weights (N, 3) of corners, and distance, of the nearest places on edges (N, 3, 2) to points."""
+    along = np.clip(np.einsum("nij,nij->ni", ways, edges) / np.maximum(squared, 1e-12), 0, 1)
     apart = np.linalg.norm(ways - along[..., None] * edges, axis=-1)
-    nearest, each = apart.argmin(1), np.arange(len(points))
-    weights = np.zeros((len(points), 3))
+    nearest, each = apart.argmin(1), np.arange(len(edges))
+    weights = np.zeros((len(edges), 3))
     weights[each, nearest] = 1 - along[each, nearest]
     weights[each, (nearest + 1) % 3] = along[each, nearest]
-    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    parts = (edges[..., 0] * ways[..., 1] - edges[..., 1] * ways[..., 0]) / np.where(area == 0, 1, area)[:, None]
-    inside = (parts >= 0).all(1) & (area != 0)
-    weights[inside] = np.roll(parts[inside], -1, axis=1)  # the first edge lies across from the third corner
-    return weights[:, 1:], np.where(inside, 0, apart[each, nearest])
+    return weights, apart[each, nearest]
 
 
 T = TypeVar("T")
@@ -297,16 +310,16 @@ class Texels:
     take = take
 
     def entering(self, cosine: Floats) -> Floats:
-        """Share (P,) of light that arrives at a cosine (P,) and passes the coat, 1 where there is none."""
-        share = np.ones(len(self), np.float32)
+        """Share (..., P) of light that arrives at a cosine (..., P) and passes the coat, 1 where there is none."""
+        share = np.ones(cosine.shape, np.float32)
         coated = np.flatnonzero(self.eta)
-        share[coated] -= fresnel(cosine[coated], self.eta[coated]).astype(np.float32)
+        share[..., coated] -= fresnel(cosine[..., coated], self.eta[coated]).astype(np.float32)
         return share
 
     def cosine(self, way: Floats) -> Floats:
-        """Cosine (P,) of the angle between each normal and a way (P, 3), 0 from behind the face."""
-        before = np.einsum("ij,ij->i", way, self.planes) > 0
-        return np.asarray(before * np.einsum("ij,ij->i", way, self.normals) / lengths(way))
+        """Cosine (..., P) of the angle between each normal and a way (..., P, 3), 0 from behind the face."""
+        before = np.einsum("...ij,ij->...i", way, self.planes) > 0
+        return np.asarray(before * np.einsum("...ij,ij->...i", way, self.normals) / lengths(way))
 
 
 @dataclass(frozen=True, slots=True)
