@@ -73,6 +73,22 @@ def test_a_severity_changes_the_keys_it_names_and_no_others(plan):
     assert changed == [["camera"], ["lighting"], ["scene"], ["trajectory"]]
 
 
+def test_a_scenario_has_the_base_of_what_it_includes_with_its_own_keys_over_it(plan, tmp_path):
+    whole = plan().cases
+    base, severity = DUSK.index("base:"), DUSK.index("severity:")
+    setups = tmp_path / "suites" / "scenarios" / "setups"
+    setups.mkdir()
+    (setups / "down.yaml").write_text(DUSK[base:severity].replace("pitch_deg: 90", "pitch_deg: 80"))
+    own = "include: setups/down.yaml\nname: dusk\nbase: {rig: {pitch_deg: 90}}\n"
+    parted = plan(DUSK[:severity], own).cases
+    assert parted == whole
+    (setups / "down.yaml").write_text(DUSK[base:severity].replace("mt9v034", "mt9v035"))
+    with pytest.raises(SuiteError, match=r"down\.yaml:5: .*mt9v035"):
+        plan(DUSK[:severity], own)
+    with pytest.raises(SuiteError, match="a scenario cannot include itself"):
+        plan("name: dusk\n", "include: dusk\nname: dusk\n")
+
+
 def test_variants_of_an_axis_are_called_alike_just_where_they_are(plan):
     cases = plan().cases
     for axis in ("scene", *AXES):

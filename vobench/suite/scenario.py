@@ -36,8 +36,12 @@ class Setup:
 
 @settings()
 class ScenarioFile:
-    """A scenario's YAML: a setup, and for each severity what is changed in it, key by key."""
+    """A scenario's YAML: a setup, and for each severity what is changed in it, key by key.
 
+    What it does not say itself is as the file has it that it includes: another scenario, or one with a `base` alone.
+    """
+
+    include: str | None = None
     name: Name
     summary: str = ""
     base: Setup
@@ -70,7 +74,7 @@ class Scenario:
 
 def read_scenario(path: Path) -> Scenario:
     """The scenario in a file. Raises SuiteError with all that is wrong with it."""
-    read = yaml_file.read_all(path, ScenarioFile)
+    read = yaml_file.read_all(path, ScenarioFile, kind="scenario")
     if read.mistakes:
         raise SuiteError(*read.mistakes)
     base, wrong, setups = read.source.plain["base"], list[Mistake](), list[Setup]()

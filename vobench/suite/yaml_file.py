@@ -137,12 +137,15 @@ def read(path: Path, model: type[Model]) -> Model:
     return reading.model
 
 
-def read_all(path: Path, model: type[Model], changes: Mapping[str, str] = MappingProxyType({})) -> Reading[Model]:
+def read_all(
+    path: Path, model: type[Model], changes: Mapping[str, str] = MappingProxyType({}), kind: catalog.Kind = "suite"
+) -> Reading[Model]:
     """The file as far as it can be read, and where its keys stand. Raises SuiteError where it is no such file.
 
-    `changes` are values in YAML by keys with dots between, which are put in place of the file's.
+    `changes` are values in YAML by keys with dots between, which are put in place of the file's. A model with `include`
+    is that of a kind, of which it may be.
     """
-    source, mistakes = _with_included(path, ()) if INCLUDE in hints(model) else _parse(path)
+    source, mistakes = _with_included(path, kind, ()) if INCLUDE in hints(model) else _parse(path)
     source = replace(source, marked=deepcopy(source.marked)) if changes else source
     for keys, value in changes.items():
         _change(source.marked, keys, value)
@@ -160,17 +163,17 @@ def read_all(path: Path, model: type[Model], changes: Mapping[str, str] = Mappin
     return Reading(_partial(model, parts), replace(source, kept=kept), tuple(sorted(mistakes, key=_line)))
 
 
-def _with_included(path: Path, including: tuple[Path, ...]) -> tuple[YamlFile, list[Mistake]]:
-    """The file with the suite that it includes, by name or path, and the keys that are twice in one of them."""
+def _with_included(path: Path, kind: catalog.Kind, including: tuple[Path, ...]) -> tuple[YamlFile, list[Mistake]]:
+    """The file with the one of its kind that it includes, by name or path, and the keys that are twice in one."""
     source, twice = _parse(path)
     name = source.marked.get(INCLUDE)
     if not isinstance(name, str):
         return source, twice
     try:
-        found = catalog.find("suite", name, suite=path.resolve()).path
+        found = catalog.find(kind, name, suite=path.resolve()).path
         if found in (path.resolve(), *including):
-            raise SuiteError(f"a suite cannot include itself: {found}")
-        included, more = _with_included(found, (path.resolve(), *including))
+            raise SuiteError(f"a {kind} cannot include itself: {found}")
+        included, more = _with_included(found, kind, (path.resolve(), *including))
     except VobenchError as error:
         raise SuiteError(*source.placed(error, INCLUDE)) from None
     return replace(source, included=included), [*twice, *more]
