@@ -13,11 +13,11 @@ from vobench.run import executor
 from vobench.run.executor import Dask, Done, Event, Executor, LocalProcesses, Serial, perform_all
 from vobench.run.folder import PAGE, RunFolder
 from vobench.run.run import run_suite
-from vobench.run.task import Resources, Task, plan
+from vobench.run.task import Task, plan
 
 
 def task(name: str, stage: str = "sequence", needs: tuple[str, ...] = ()) -> Task:
-    return Task(stage, None, {"name": name}, needs, Resources())
+    return Task(stage, None, {"name": name}, needs)
 
 
 @dataclass

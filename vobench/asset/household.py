@@ -1,7 +1,5 @@
 """What stands and hangs in homes and halls; parts on z = 0 around the origin, their front towards x."""
 
-from functools import cache
-
 import numpy as np
 from PIL import Image, ImageDraw
 
@@ -38,7 +36,7 @@ def dining_chair(_: Rng, colour: str = SAND, tones: str = "oak") -> list[Part]:
     ]
 
 
-@cache
+@picture.painted
 def _weave(seed: int, px: int = 1024) -> Picture:
     """Bands of lozenges in few colours within a border, woven."""
     rng = np.random.default_rng(seed)

@@ -195,7 +195,7 @@ def _limb(start: Array, end: Array, first_m: float, last_m: float, material: Mat
     return Part(lathe(profile, sections=14).moved(T), material)
 
 
-@cache
+@picture.painted
 def foliage(seed: int = 0, px: int = 512) -> Picture:
     """Twigs with leaves before nothing, from dark ones behind to light ones in front."""
     rng = np.random.default_rng(seed)

@@ -2,8 +2,9 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
+from functools import cache, wraps
+from inspect import signature
+from typing import Any, ParamSpec
 
 import numpy as np
 import scipy
@@ -12,7 +13,7 @@ from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
 from vobench.asset.shape import Hole
 from vobench.geometry.se3 import Array
-from vobench.scene.material import Map, Picture
+from vobench.scene.material import Map, Picture, Texture
 
 Rng = np.random.Generator
 Bytes = NDArray[np.uint8]
@@ -58,6 +59,33 @@ WORDS = (
     "signal practice annual report drive state method urban design order error studies depth volume energy craft map "
     "modern filter winter letters pixel control introduction systems guide image data the of and for"
 )
+
+
+P = ParamSpec("P")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Unpainted:
+    """A texture whose pixels are painted where they are first asked for."""
+
+    pixels: Callable[[], NDArray[Any]]
+    tile_m: float
+
+
+def painted(paint: Callable[P, Picture]) -> Callable[P, Texture]:
+    """What paints pictures that cover `tile_m`, 1 without, made one for each of its arguments, and late.
+
+    Most that a scene is built for, such as ways through it, looks at none.
+    """
+    form = signature(paint)
+
+    @cache
+    def texture(*args: P.args, **kwargs: P.kwargs) -> Texture:
+        said = form.bind(*args, **kwargs)
+        said.apply_defaults()
+        return Unpainted(cache(lambda: paint(*args, **kwargs).values), said.arguments.get("tile_m", 1.0))
+
+    return wraps(paint)(texture)  # type: ignore[return-value]
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
@@ -119,7 +147,7 @@ def _cells(px: int, cuts: Array) -> tuple[NDArray[np.int64], Map]:
     return place[row], np.minimum(apart[row], np.minimum(x % high, high - x % high)[:, None]).astype(np.float32)
 
 
-@cache
+@painted
 def boards(
     tones: str, seed: int = 0, px: int = 1024, tile_m: float = 1.2, *, rows: int = 8, joint_m: float = 0
 ) -> Picture:
@@ -142,7 +170,7 @@ def boards(
     return Picture(_scaled(_ramp(tone, tones), hue[cell] * (wear * joint)[..., None]), tile_m)
 
 
-@cache
+@painted
 def masonry(
     tones: str,
     seed: int = 0,
@@ -165,7 +193,7 @@ def masonry(
     return Picture(_scaled(np.where(is_joint, rgb(MORTAR), _ramp(tone, tones)), light[..., None]), tile_m)
 
 
-@cache
+@painted
 def ground(kind: str, seed: int = 0, px: int = 1024, tile_m: float = 2.0) -> Picture:
     """An even surface of GROUNDS: blotches, grain, pits and scratches."""
     rng = np.random.default_rng(seed)
@@ -175,7 +203,7 @@ def ground(kind: str, seed: int = 0, px: int = 1024, tile_m: float = 2.0) -> Pic
     return Picture(_ramp(tone - 0.2 * _scratches(rng, px, px // 20), kind), tile_m)
 
 
-@cache
+@painted
 def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
     """A plain weave of threads in slightly different greys, to be coloured by its material."""
     rng, thread = np.random.default_rng(seed), np.arange(px) // 4
@@ -188,7 +216,7 @@ def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
     )
 
 
-@cache
+@painted
 def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
     """Broken stones of all sizes ground flush with their cement, between strips of brass, with stains and scratches."""
     rng, count = np.random.default_rng(seed), round(11700 * tile_m**2)
@@ -264,7 +292,7 @@ def _column(draw: Draw, rng: Rng, box: Box, size: float) -> None:
         y += (2.4 if is_last else 1.35) * size
 
 
-@cache
+@painted
 def pages(seed: int = 0) -> Picture:
     """Six sheets of A4 (480 × 680 px each), in three columns and two rows, with titles, text and charts."""
     rng = np.random.default_rng(seed)
@@ -337,7 +365,7 @@ def _series(rng: Rng) -> list[Image.Image]:
     return result
 
 
-@cache
+@painted
 def screen(seed: int = 0) -> Picture:
     """A display (1280 × 720) with files, an editor, a chart, a log and a bar of icons."""
     rng = np.random.default_rng(seed)
@@ -360,7 +388,7 @@ def screen(seed: int = 0) -> Picture:
     return Picture(np.asarray(image))
 
 
-@cache
+@painted
 def poster(style: str, seed: int = 0, width: int = 700, height: int = 1000) -> Picture:
     """A print in one of POSTERS' styles."""
     rng = np.random.default_rng(seed)
@@ -411,7 +439,7 @@ def _talk(draw: Draw, rng: Rng, w: int, h: int) -> None:
 POSTERS: dict[str, Callable[[Draw, Rng, int, int], None]] = {"hills": _hills, "circles": _circles, "talk": _talk}
 
 
-@cache
+@painted
 def whiteboard(seed: int = 0) -> Picture:
     """A board (1440 × 900) with diagrams in four inks, and what is left of wiped ones."""
     rng = np.random.default_rng(seed)
@@ -428,7 +456,7 @@ def whiteboard(seed: int = 0) -> Picture:
     return Picture(_scaled(image.filter(ImageFilter.GaussianBlur(0.8)), wiped[..., None]))
 
 
-@cache
+@painted
 def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
     """Brown board (768 × 768 px) with tape, a label with bars and text, and printed marks."""
     rng = np.random.default_rng(seed)
@@ -450,7 +478,7 @@ def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
     return Picture(np.asarray(image), tile_m)
 
 
-@cache
+@painted
 def sign(text: str, colour: str = PAPER) -> Picture:
     """A plate (480 × 240) with a word in a border."""
     image, draw = _canvas(480, 240, colour)

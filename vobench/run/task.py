@@ -47,18 +47,7 @@ UNLIT: dict[str, Any] = {
 }
 
 
-# Mesa draws, and Embree and Mitsuba trace, on as many cores as there are; beyond these little is gained.
-MANY_CORES = 8
-GIB = 1 << 30
 NO_LIMIT = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Resources:
-    """What a task can make use of: cores, of which one is enough for any, and memory."""
-
-    cores: int = 1
-    memory_bytes: int = GIB
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +62,6 @@ class Task:
     subject: "SceneFile | Case | RecordedCase | Trial"
     inputs: Mapping[str, Any]
     needs: tuple[str, ...]
-    resources: Resources
 
     @property
     def name(self) -> str:
@@ -111,13 +99,12 @@ def sequence_tasks(case: Case | RecordedCase, recordings: "Mapping[str, Recordin
     """What makes a case's sequence, the sequence last: its scene's light is computed before, where it is drawn with."""
     if isinstance(case, RecordedCase):
         return [_import_task(case, recordings[case.name])]
-    many = Resources(MANY_CORES)
     is_traced = case.rendering.engine == "path"
     before = [] if is_traced else [bake_task(case.scene)]
     needs = tuple(task.key for task in before)
     libraries = library_versions(*LIBRARIES, *(["mitsuba"] if is_traced else []))
     inputs = {"case": content(case), **_made_by("sequence", needs), "libraries": libraries}
-    return [*before, Task("sequence", case, inputs, needs, many)]
+    return [*before, Task("sequence", case, inputs, needs)]
 
 
 def bake_task(spec: SceneFile) -> Task:
@@ -125,7 +112,7 @@ def bake_task(spec: SceneFile) -> Task:
     scene = scene_content(spec, exclude=UNLIT)
     libraries = library_versions("numpy", "scipy", "embreex", "xatlas", "pillow", "trimesh", "opencv-python-headless")
     inputs = {"scene": scene, **_made_by("bake"), "libraries": libraries}
-    return Task("bake", spec, inputs, (), Resources(MANY_CORES))
+    return Task("bake", spec, inputs, ())
 
 
 def _import_task(case: RecordedCase, recording: "Recording") -> Task:
@@ -133,7 +120,7 @@ def _import_task(case: RecordedCase, recording: "Recording") -> Task:
 
     libraries = library_versions(*import_recording.LIBRARIES)
     inputs = {**import_recording.content(case, recording), **_made_by("import"), "libraries": libraries}
-    return Task("import", case, inputs, (), Resources())
+    return Task("import", case, inputs, ())
 
 
 def estimator_code(entrant: Entrant) -> dict[str, str]:
@@ -154,8 +141,7 @@ def estimate_task(trial: Trial, sequence: str, code: Mapping[str, str]) -> Task:
         **code,
         "libraries": library_versions("numpy", "scipy", "opencv-python-headless"),
     }
-    takes = Resources(entrant.limits.threads, GIB + (entrant.limits.memory_mib << 20))
-    return Task("estimate", trial, inputs, needs, takes)
+    return Task("estimate", trial, inputs, needs)
 
 
 def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
@@ -170,7 +156,7 @@ def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
         **_made_by("score", (sequence, estimate)),
         "libraries": library_versions("numpy", "scipy"),
     }
-    return Task("score", trial, inputs, (sequence, estimate), Resources())
+    return Task("score", trial, inputs, (sequence, estimate))
 
 
 def _noise(case: Case | RecordedCase) -> dict[str, Any]:
