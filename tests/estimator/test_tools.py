@@ -169,6 +169,30 @@ def test_a_pair_matches_across_its_eyes_also_where_one_is_dimmer(bed_pair):
         np.testing.assert_allclose(np.median(disparity_px[known]), bed_pair.disparity_px, atol=0.05)
 
 
+def test_without_points_on_edges_of_depth_disparities_beside_them_are_truer():
+    back, front = texture(5), texture(6)
+    is_front = np.zeros(back.shape, bool)
+    is_front[:, 100:700:120] = is_front[:, 101:700:120] = True
+    is_front = cv2.dilate(is_front.astype(np.uint8), np.ones((1, 39), np.uint8)).astype(bool)
+    near_px, far_px = 40.0, 34.0
+    left = np.where(is_front, front, back)
+    moved = shifted(is_front.astype(np.uint8) * 255, -near_px, 0) > 127
+    right = np.where(moved, shifted(front, -near_px, 0), shifted(back, -far_px, 0))
+    points = corners_per_cell(left, 80, distance_px=3, margin_px=60)
+    column, row = np.rint(points).astype(int).T
+    true_px = np.where(is_front[row, column], near_px, far_px)
+
+    def errors_px(*, with_edges):
+        pair = stereo_pair(STRAIGHT, "test")
+        _, found_px = pair.match(left, right, points, margin_px=12, window_px=9, with_edges=with_edges)
+        return np.abs(found_px - true_px)[np.isfinite(found_px)]
+
+    every, some = errors_px(with_edges=True), errors_px(with_edges=False)
+    assert len(some) > 0.9 * len(every)
+    assert np.mean(some > 0.25) < 0.6 * np.mean(every > 0.25)
+    assert np.mean(some > 0.1) < 0.6 * np.mean(every > 0.1)
+
+
 @dataclass(frozen=True)
 class WallPair:
     """Two pictures of a wall across the view, and what is true of them."""

@@ -25,7 +25,7 @@ from vobench.metric.rpe import (
     tum_errors,
 )
 from vobench.metric.score import score
-from vobench.metric.settings import LIKE
+from vobench.metric.settings import LIKE, ScoreSettings
 from vobench.trajectory.trajectory import Trajectory
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -377,6 +377,27 @@ def test_a_drift_of_one_percent_is_one_percent_of_each_step(all_pairs):
         point_m, percent = distance_errors(T_gt, T_est, pairs)
         np.testing.assert_allclose(point_m, 0.001 * delta, atol=1e-12)
         np.testing.assert_allclose(percent, 1.0, rtol=1e-9)
+
+
+def test_each_relative_metric_is_the_error_that_it_is_called_by():
+    T_gt, T_est = straight(20), straight(20, step_m=0.101)
+    T_est[:, :3, :3] = se3.rotation_z(0.3 * np.arange(20))
+    t_ns = np.arange(20) * 10**8
+    settings = ScoreSettings(full=True, alignment="none", rpe_delta=1.0, rpe_unit="f")
+    scored = score(Trajectory(t_ns, T_gt), Trajectory(t_ns, T_est), settings=settings)
+    pairs = frames_apart(T_gt, 1)
+    errors, (point_m, percent) = errors_between(T_gt, T_est, *pairs), distance_errors(T_gt, T_est, pairs)
+    chordal, full = relative_matrix_errors(T_gt, T_est, pairs)
+    wanted = {
+        "rpe_trans": errors.trans_m,
+        "rpe_rot": np.rad2deg(errors.rot_rad),
+        "rpe_rot_chordal": chordal,
+        "rpe_full": full,
+        "rpe_point": point_m,
+        "rpe_point_percent": percent,
+    }
+    for name, values in wanted.items():
+        assert scored.metric(name).statistics.rmse == pytest.approx(np.sqrt(np.mean(values**2)), rel=1e-9), name
 
 
 def test_a_turn_is_the_same_by_its_angle_and_by_its_matrix():

@@ -124,6 +124,13 @@ def test_it_begins_at_the_origin_along_x_and_every_lap_again():
     np.testing.assert_allclose(k.T_world_body[2:], k.T_world_body[[1, 1]], atol=1e-11)
 
 
+@pytest.mark.parametrize("size_m", [0.01, 1.0, 100.0])
+def test_how_blunt_a_bend_may_be_hangs_on_its_shape_and_not_on_its_size(size_m):
+    assert lissajous_curve((size_m, size_m), (1, 1), phase_rad=0.15).arc.length > size_m
+    with pytest.raises(MotionError, match="comes to a point"):
+        lissajous_curve((size_m, size_m), (1, 1), phase_rad=0.05)
+
+
 @pytest.mark.parametrize("ratio", [(1, 1), (1, 2), (2, 1), (1, 3), (3, 2), (3, 5), (5, 4), (7, 9)])
 def test_the_phase_that_the_sentence_names_can_be_driven(ratio):
     with pytest.raises(MotionError, match="0 where one number of the ratio is even, a quarter turn where both are odd"):

@@ -350,6 +350,14 @@ def test_a_robot_that_starts_on_its_target_has_a_motion_that_stands_still() -> N
     assert not still.acceleration_mps2.any()
 
 
+def test_the_last_instant_that_the_drive_knows_is_the_limit_of_those_before() -> None:
+    motion = driven_driven("clean").motion
+    last_ns = float(motion.breaks_ns[-1])
+    before, last = motion.at(np.array([last_ns - 1.0])), motion.at(np.array([last_ns]))
+    np.testing.assert_allclose(last.T_world_body, before.T_world_body, atol=1e-8)
+    np.testing.assert_allclose(last.twist, before.twist, atol=1e-8)
+
+
 @pytest.mark.parametrize("late_ns", [float("nan"), 1e12])
 def test_an_instant_that_the_drive_does_not_know_is_refused(late_ns: float) -> None:
     with pytest.raises(MotionError, match=r"ends at \d+ ns, and is asked"):

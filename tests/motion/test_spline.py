@@ -167,7 +167,7 @@ def turned_half_round():
         ((np.arange(1.0), np.eye(4)[None]), "needs 3 poses or more, but there is 1"),
         ((np.arange(4.0), np.stack([np.eye(4)] * 3)), "4 times need as many poses"),
         ((np.arange(3.0), np.stack([np.eye(4), 2 * np.eye(4), np.eye(4)])), "the rotation of pose 1 at 1 s is none"),
-        (turned_half_round(), "turned by 180 deg against the one before"),
+        (turned_half_round(), "pose 1 is turned by 180 deg against the one before"),
     ],
 )
 def test_poses_that_make_no_spline_are_named(given, sentence):

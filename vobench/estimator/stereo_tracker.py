@@ -81,7 +81,9 @@ class StereoTracker:
         s, pair = self._settings, self._pair
         corners = corners_per_cell(left, s.corners_per_cell, distance_px=s.corner_distance_px, margin_px=s.margin_px)
         corners = corners[pair.seen(corners)]
-        in_right, disparity_px = pair.match(left, right, corners, margin_px=s.margin_px, window_px=s.window_px)
+        in_right, disparity_px = pair.match(
+            left, right, corners, margin_px=s.margin_px, window_px=s.window_px, with_edges=False
+        )
         known = np.isfinite(disparity_px)
         if known.sum() < s.min_points:
             return False

@@ -40,6 +40,9 @@ WIDEST_COSINE = 0.5
 ROW_PX = 1.0  # rectified: a point keeps its row from left to right
 MIN_DISPARITY_PX = 0.5
 NOWHERE_PX = -1e4
+# A point on an edge of depth has the disparity of what is in front (foreground fattening: Scharstein, Szeliski 2002),
+# the less the smaller the window: one that so small a window moves by more, and more than most, is left out.
+SMALL_WINDOW_PX, FATTENED_PX, FATTENED_RATIO = 5, 0.2, 2.0
 
 
 def parameters(kind: type[Kind], params: Mapping[str, Any], name: str) -> Kind:
@@ -91,7 +94,7 @@ def follow(
 
 
 def lucas_kanade(
-    image: Image, later: Image, points: Points, guess: Points, *, window_px: int = WINDOW_PX
+    image: Image, later: Image, points: Points, guess: Points, *, window_px: int = WINDOW_PX, levels: int = LEVELS
 ) -> tuple[Points, Mask]:
     """Where points (N, 2) went, looked for around the guess (N, 2), and which were found."""
     there, status, _ = cv2.calcOpticalFlowPyrLK(
@@ -100,7 +103,7 @@ def lucas_kanade(
         points,
         guess.astype(np.float32),
         winSize=(window_px, window_px),
-        maxLevel=LEVELS,
+        maxLevel=levels,
         criteria=LK_STOP,
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )
@@ -233,15 +236,21 @@ class StereoPair:
         margin_px: int,
         window_px: int = WINDOW_PX,
         row_px: float = ROW_PX,
+        with_edges: bool = True,
     ) -> tuple[Points, Array]:
         """Places (N, 2) in the right picture of points (N, 2) in the left one, and disparities (N,), NaN for none.
 
-        Rows of the view may differ by `row_px`.
+        Rows of the view may differ by `row_px`. Points on edges of depth may be left out.
         """
         left, right = comparable(left, right)
         matched, found = follow(left, right, points, self._coarse(left, right, points), window_px=window_px)
         disparity_px = self.disparity(points, matched, row_px=row_px)
-        return matched, np.where(found & inside(matched, right, margin_px), disparity_px, np.nan)
+        good = found & inside(matched, right, margin_px) & np.isfinite(disparity_px)
+        if not with_edges and good.any():
+            closer, again = lucas_kanade(left, right, points, matched, window_px=SMALL_WINDOW_PX, levels=0)
+            moved_px = np.abs(closer - matched)[:, 0]  # along rows, or nearly so
+            good &= again & (moved_px < max(FATTENED_PX, FATTENED_RATIO * float(np.median(moved_px[good]))))
+        return matched, np.where(good, disparity_px, np.nan)
 
     def disparity(self, points: Points, matched: Points, *, row_px: float = ROW_PX) -> Array:
         """Disparity (N,) in px of left and right pixels (N, 2); NaN where rows differ or it is too small."""

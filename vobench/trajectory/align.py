@@ -154,7 +154,6 @@ def turn(from_direction: ArrayLike, to_direction: ArrayLike) -> Array:
     axis = np.cross(a, b)
     if np.linalg.norm(axis) < UNCORRELATED:
         axis = IDENTITY[np.argmin(np.abs(a))]
-    axis = axis / np.linalg.norm(axis)
     axis = axis - (axis @ a) * a
     K = np.cross(IDENTITY, axis / np.linalg.norm(axis))
     angle = np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)
