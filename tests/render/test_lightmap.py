@@ -8,7 +8,7 @@ import trimesh
 
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import areas_m2
+from vobench.render.geometry import Visibility, areas_m2
 from vobench.render.lightmap import Atlas, Layout, Texels, owners, texels, unwrap
 from vobench.scene.material import Material
 from vobench.scene.mesh import Mesh, Thing, Triangles, flat, joined, quad, table
@@ -133,3 +133,34 @@ def test_lamps_share_a_block_each_and_what_has_no_light_another() -> None:
 def test_a_map_too_large_for_memory_is_refused_with_what_would_do() -> None:
     with pytest.raises(RenderError, match="million samples"):
         unwrap(FACES, np.full(len(FACES), 2e-4), LIT)
+
+
+def test_where_things_touch_neither_side_has_light_of_its_own():
+    """The bottom of a box on a floor is beyond it, in the open sky for all that rays tell."""
+    floor = quad([-1, -1, 0], [2, 0, 0], [0, 2, 0])
+    meshes = {
+        "floor": floor,
+        "standing": shape(
+            trimesh.creation.box((0.2, 0.2, 0.2), trimesh.transformations.translation_matrix([0, 0, 0.1])), smooth=False
+        ),
+        "raised": shape(
+            trimesh.creation.box((0.2, 0.2, 0.2), trimesh.transformations.translation_matrix([0.5, 0, 0.12])),
+            smooth=False,
+        ),
+        "sheet": quad([-0.6, 0, 0.3], [0.2, 0, 0], [0, 0.2, 0]).two_sided(),
+    }
+    things = [Thing(name, mesh, "grey") for name, mesh in meshes.items()]
+    faces = table(things, [-1] * len(things), [-1] * len(things))
+    lit = np.ones(len(faces), bool)
+    atlas = unwrap(faces, np.full(len(faces), 0.025), lit)
+    visibility = Visibility(faces, MATERIALS, np.arange(len(faces)))
+    points, _ = texels(faces, MATERIALS, atlas, owners(atlas), among=lit, seed=0, visibility=visibility)
+    name = np.array(list(meshes))[faces.thing[points.face]]
+    down, up = points.planes[:, 2] < -0.9, points.planes[:, 2] > 0.9
+    assert not (down & (name == "standing")).any()
+    assert (up & (name == "standing")).sum() == pytest.approx(64, rel=0.4)
+    assert (down & (name == "raised")).sum() == pytest.approx(64, rel=0.4)
+    assert (down & (name == "sheet")).sum() == (up & (name == "sheet")).sum() > 30
+    x, y, _ = points.points_m[name == "floor"].T
+    assert not ((np.abs(x) < 0.09) & (np.abs(y) < 0.09)).any()
+    assert ((np.abs(x - 0.5) < 0.09) & (np.abs(y) < 0.09)).sum() > 30

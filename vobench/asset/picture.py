@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, wraps
 from inspect import signature
-from typing import Any, ParamSpec
+from typing import Any
 
 import numpy as np
 import scipy
@@ -61,9 +61,6 @@ WORDS = (
 )
 
 
-P = ParamSpec("P")
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Unpainted:
     """A texture whose pixels are painted where they are first asked for."""
@@ -72,7 +69,7 @@ class Unpainted:
     tile_m: float
 
 
-def painted(paint: Callable[P, Picture]) -> Callable[P, Texture]:
+def painted(paint: Callable[..., Picture]) -> Callable[..., Texture]:
     """What paints pictures that cover `tile_m`, 1 without, made one for each of its arguments, and late.
 
     Most that a scene is built for, such as ways through it, looks at none.
@@ -80,12 +77,11 @@ def painted(paint: Callable[P, Picture]) -> Callable[P, Texture]:
     form = signature(paint)
 
     @cache
-    def texture(*args: P.args, **kwargs: P.kwargs) -> Texture:
-        said = form.bind(*args, **kwargs)
-        said.apply_defaults()
+    def texture(*args: Any, **kwargs: Any) -> Texture:
+        (said := form.bind(*args, **kwargs)).apply_defaults()
         return Unpainted(cache(lambda: paint(*args, **kwargs).values), said.arguments.get("tile_m", 1.0))
 
-    return wraps(paint)(texture)  # type: ignore[return-value]
+    return wraps(paint)(texture)
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -132,6 +132,7 @@ class RayCaster:
         self._mesh = mesh_construction.TriangleMesh(self._scene, np.ascontiguousarray(triangles))
         self._twin, self._planes = twins(faces.corners_m[self._among]), faces.plane[self._among]
         self._has_sheets = bool((self._twin >= 0).any())
+        self.solid = self._among[self._twin < 0]
 
     def occluded(self, origins_m: ArrayLike, targets_m: ArrayLike) -> Mask:
         """Whether anything is between each of (R, 3) origins and its target (R, 3)."""

@@ -14,7 +14,18 @@ from numpy.typing import NDArray
 from vobench import stop
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import Floats, Indices, Mask, Visibility, areas_m2, face_materials, lengths, off, take
+from vobench.render.geometry import (
+    Floats,
+    Indices,
+    Mask,
+    RayCaster,
+    Visibility,
+    areas_m2,
+    face_materials,
+    lengths,
+    off,
+    take,
+)
 from vobench.scene.material import Material, fresnel
 from vobench.scene.mesh import Triangles, unit
 
@@ -282,6 +293,10 @@ TILTS = ((0.0, 0.0), (1.0, 0.4), (-1.0, -0.3), (0.3, -1.0), (-0.4, 1.0))  # of r
 CHUNK = 1 << 14  # points at once: their arrays fit the processor's cache
 PULLED_M = 1e-3  # points at a chart's rim lie so far inwards, where they see past the neighbour
 FACING = 0.1  # cosine to its flat face from which a normal of the shape counts
+ALIGNED, CONTACT_M = (
+    0.999,
+    4e-4,
+)  # of faces that touch: cosine to an axis, and how deep in the thing they are looked for
 STRAIGHT = np.cos(np.deg2rad(1.5))  # between texels that lie in one plane
 
 
@@ -403,7 +418,9 @@ def texels(
 
     parts = in_chunks(made, len(index)) or [made(slice(0, 0))]
     every = Texels(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Texels)))
-    inside = np.zeros(len(index), bool) if visibility is None else _buried(every, visibility)
+    inside = np.zeros(len(index), bool)
+    if visibility is not None:
+        inside = _buried(every, visibility) | _covered(every, visibility)
     return _kept(every, atlas, own, beside, kept=~inside, visibility=visibility)
 
 
@@ -441,6 +458,23 @@ def _buried(points: Texels, visibility: Visibility) -> Mask:
 
 
 _NONE = np.zeros(0, bool)
+
+
+def _covered(points: Texels, visibility: Visibility) -> Mask:
+    """Which points (P,) lie on a face that looks the other way, as does the bottom of a crate on the floor.
+
+    Only where both look along an axis. Raised off their face they are beyond the other, outside in the sky for all
+    that rays tell.
+    """
+    covered, solid = np.zeros(len(points), bool), visibility.opaque.solid
+    for axis, sign in np.ndindex(3, 2):
+        along = 2 * sign - 1
+        some = np.flatnonzero(along * points.planes[:, axis] > ALIGNED)
+        others = solid[along * visibility.faces.plane[solid, axis] < -ALIGNED]
+        if len(some) and len(others):
+            caster, p, way = RayCaster(visibility.faces, others), points.points_m[some], points.planes[some] * CONTACT_M
+            covered[some] = caster.stops(p - way, way)
+    return covered
 
 
 def _sees_backs(points: Texels, visibility: Visibility) -> Mask:
