@@ -1,6 +1,6 @@
 """Draws the pictures of scenarios.md: `python docs/sheet.py RUN...`, of runs with severities 0, 3 and 5.
 
-Each picture is the left one, 40 % of the way along. Where eyes differ, left is red and right cyan; where time does, a
+Each picture is the left one, a third of the way along. Where eyes differ, left is red and right cyan; where time does, a
 picture is red and the one that comes next cyan.
 """
 
