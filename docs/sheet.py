@@ -1,7 +1,7 @@
 """Draws the pictures of scenarios.md: `python docs/sheet.py RUN...`, of runs with severities 0, 3 and 5.
 
-Each picture is the left one, a third of the way along. Where eyes differ, left is red and right cyan; where time does, a
-picture is red and the one that comes next cyan.
+Each picture is the left one, a third of the way along. Where eyes differ, left is red and right cyan; where time does,
+a picture is red and the one that comes next cyan.
 """
 
 import json
