@@ -104,6 +104,18 @@ def test_the_outer_samples_of_a_rectangle_lie_on_its_edges() -> None:
     assert sorted(np.ptp(corners, axis=0).tolist()) == [15, 20]
 
 
+@pytest.mark.parametrize(("wide", "high"), [(5, 5), (6, 5), (5, 6), (6, 6), (2, 4), (2, 3)])
+def test_light_known_at_every_other_sample_is_whole_up_to_the_edges(wide: int, high: int) -> None:
+    """What rises evenly is told exactly by some of the samples, none of them beyond the outermost known ones."""
+    things = [Thing("board", quad([0, 0, 0], [0.1 * (wide - 1), 0, 0], [0, 0.1 * (high - 1), 0]), "grey")]
+    faces, lit = table(things, [-1], [-1]), np.ones(2, bool)
+    atlas = unwrap(faces, np.full(2, 0.1), lit)
+    points, layout = texels(faces, MATERIALS, atlas, owners(atlas), among=lit, seed=0)
+    ramp = points.points_m @ [1.0, 2.0, 0.0]
+    assert layout.few.sum() < 0.75 * len(points) or min(wide, high) < 3
+    np.testing.assert_allclose(layout.between(np.where(layout.few, ramp, 1e9)), ramp, atol=2e-3)
+
+
 def test_a_front_and_its_back_have_places_of_their_own() -> None:
     atlas, points, _ = laid_out(0.05)
     front, back = np.flatnonzero(FACES.thing == 5).reshape(2, 2)

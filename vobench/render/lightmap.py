@@ -542,7 +542,10 @@ def _hidden(points_m: Floats, others: Indices, visibility: Visibility, part: sli
 
 
 def _few(index: Places, beside: Indices, width: int) -> Mask:
-    few = (index // width % 2 == 0) & (index % width % 2 == 0)
+    """Every other point along rows and columns, and at rims those that would have one neighbour's value alone."""
+    at_rim = beside == np.arange(len(index))
+    along_row = (index % width % 2 == 0) | at_rim[:2].any(0)
+    few = along_row & ((index // width % 2 == 0) | at_rim[2:].any(0))
     known = few
     for first, second in (beside[:2], beside[2:]):
         known = known | known[first] | known[second]
