@@ -293,10 +293,7 @@ TILTS = ((0.0, 0.0), (1.0, 0.4), (-1.0, -0.3), (0.3, -1.0), (-0.4, 1.0))  # of r
 CHUNK = 1 << 14  # points at once: their arrays fit the processor's cache
 PULLED_M = 1e-3  # points at a chart's rim lie so far inwards, where they see past the neighbour
 FACING = 0.1  # cosine to its flat face from which a normal of the shape counts
-ALIGNED, CONTACT_M = (
-    0.999,
-    4e-4,
-)  # of faces that touch: cosine to an axis, and how deep in the thing they are looked for
+ALIGNED, CONTACT_M = 0.999, 4e-4  # of faces that touch: cosine to an axis, how deep in the thing they are looked for
 STRAIGHT = np.cos(np.deg2rad(1.5))  # between texels that lie in one plane
 
 
