@@ -209,15 +209,17 @@ with t.running(Path(sys.argv[1]), "print(os.getpid(), flush=True)\\nwhile True: 
 
 
 ORPHAN = """
-import os
+import os, time
 if os.fork() == 0:
     os.setsid()
     if os.fork() == 0:
         open({file!r} + ".part", "w").write(str(os.getpid()))
         os.rename({file!r} + ".part", {file!r})
-        import time; time.sleep(60)
+        time.sleep(60)
     os._exit(0)
 os.wait()
+while not os.path.exists({file!r}):  # else vobench may be killed, and this with it, before it has said its number
+    time.sleep(0.01)
 """
 
 
