@@ -17,8 +17,13 @@ import numpy as np
 
 from vobench.asset.shape import at, block
 from vobench.asset.texture import Procedural
+from vobench.geometry import se3
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import looking
 from vobench.render.bake import BakedScene, BakeSettings, bake
 from vobench.render.illumination import Illumination
+from vobench.render.mover_light import Views
+from vobench.render.view import Box, PinholeView, pinhole_view
 from vobench.scene.light import Flicker, Sun
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing
@@ -40,8 +45,8 @@ def main() -> None:
     for name in arguments.scenes:
         scene = build(read_scene(catalog.find("scene", name).path), {})
         baked = _baked(scene)
-        for change, light in _changes(baked):
-            print(f"{name}: {change}: {_milliseconds(light, arguments.pictures)}")
+        for change, light, views in _changes(baked):
+            print(f"{name}: {change}: {_milliseconds(light, views, arguments.pictures)}")
 
 
 def _baked(scene: Scene) -> BakedScene:
@@ -55,14 +60,14 @@ def _baked(scene: Scene) -> BakedScene:
     return baked
 
 
-def _changes(baked: BakedScene) -> Iterator[tuple[str, Illumination]]:
+def _changes(baked: BakedScene) -> Iterator[tuple[str, Illumination, Views | None]]:
     """The scene with more and more that changes. The bake stays as it is: what is timed does not depend on it."""
     scene = baked.scene
     flicker = tuple(replace(light, level=Flicker(depth=0.2)) for light in scene.lights)
-    yield "steady", Illumination(baked)
+    yield "steady", Illumination(baked), None
     one = (flicker[0], *scene.lights[1:])
-    yield "one light flickers", Illumination(replace(baked, scene=replace(scene, lights=one)))
-    yield "all lights flicker", Illumination(replace(baked, scene=replace(scene, lights=flicker)))
+    yield "one light flickers", Illumination(replace(baked, scene=replace(scene, lights=one))), None
+    yield "all lights flicker", Illumination(replace(baked, scene=replace(scene, lights=flicker))), None
     suns = [light for light in scene.lights if isinstance(light, Sun)]
     for sun in suns:
         moving = replace(
@@ -79,15 +84,27 @@ def _changes(baked: BakedScene) -> Iterator[tuple[str, Illumination]]:
                     replace(BakeSettings(), light_rays=1, bounces=1, indirect_rays=4),
                 )
             ),
+            None,
         )
     for count in (1, 3):
         walkers = replace(scene, movers=tuple(_walker(i) for i in range(count)))
         walkers = replace(walkers, materials={**scene.materials, "walker": WALKER})
         quick = replace(BakeSettings(), light_rays=1, bounces=0, indirect_rays=1)
-        yield f"{count} movers as tall as people", Illumination(replace(bake(walkers, quick), settings=BakeSettings()))
+        moving = replace(bake(walkers, quick), settings=BakeSettings())
+        yield f"{count} movers as tall as people, the whole scene", Illumination(moving), None
+        yield f"{count} movers as tall as people, what a camera sees", Illumination(moving), [_view(count)]
 
 
 WALKER = Material(texture=Procedural("plain", 0.4, 0.0, 1.0, 8, 0))
+
+
+def _view(movers: int) -> tuple[PinholeView, Box]:
+    """A camera on the way of the movers, which looks at where they go."""
+    camera = Pinhole(720, 480, 500.0, 500.0, 359.5, 239.5)
+    T = se3.transform(se3.rotation_z(np.pi / 2), (-0.5, -2.5, 0)) @ looking(pitch_deg=5, position_m=(0, 0, 1.0))
+    away = [np.eye(4)] * movers
+    view = pinhole_view(camera, T, away, np.zeros((0, 4, 4)), ambient_cd_m2=np.ones(3))
+    return view, (0, 720, 0, 480)
 
 
 def _walker(index: int) -> Mover:
@@ -96,12 +113,12 @@ def _walker(index: int) -> Mover:
     return Mover(f"walker_{index}", (body,), Path(np.array([0.0, 5.0]), positions, np.array([0.0, 90.0])))
 
 
-def _milliseconds(light: Illumination, pictures: int) -> str:
+def _milliseconds(light: Illumination, views: Views | None, pictures: int) -> str:
     """Median per picture after the first."""
     spent = []
     for index in range(pictures + 1):
         wall, cpu = time.perf_counter(), time.process_time()
-        light.at(index * NS_PER_PICTURE, index * NS_PER_PICTURE + 10_000_000 + index)
+        light.at(index * NS_PER_PICTURE, index * NS_PER_PICTURE + 10_000_000 + index, views)
         spent.append((time.perf_counter() - wall, time.process_time() - cpu))
     wall_s, cpu_s = np.median(spent[1:], axis=0)
     return f"{1e3 * wall_s:.1f} ms wall, {1e3 * cpu_s:.1f} ms CPU"

@@ -79,8 +79,8 @@ DepthAlong = Literal["axis", "ray"]
 
 
 @dataclass(frozen=True, slots=True)
-class Pinhole:
-    """A pinhole camera with pixels that need not be square."""
+class Focal:
+    """A camera whose linear last step goes from a plane to pixels, which need not be square."""
 
     depth_along: ClassVar[DepthAlong] = "axis"
     coefficients: ClassVar[tuple[str, ...]] = ()
@@ -93,16 +93,30 @@ class Pinhole:
 
     @property
     def K(self) -> Array:
-        """The (3, 3) camera matrix."""
+        """The (3, 3) matrix of the pinhole that the lens is like about its axis."""
         return camera_matrix(self.fx_px, self.fy_px, self.cx_px, self.cy_px)
+
+    def to_pixels(self, x: Array, y: Array) -> Array:
+        """Pixels (..., 2) of places on the lens's plane."""
+        return np.stack([self.fx_px * x + self.cx_px, self.fy_px * y + self.cy_px], -1)
+
+    def from_pixels(self, uv_px: ArrayLike) -> tuple[Array, Array]:
+        """Places on the lens's plane of pixels (..., 2)."""
+        u, v = np.moveaxis(np.asarray(uv_px, float), -1, 0)
+        return (u - self.cx_px) / self.fx_px, (v - self.cy_px) / self.fy_px
+
+
+@dataclass(frozen=True, slots=True)
+class Pinhole(Focal):
+    """A pinhole camera."""
 
     def project(self, points_camera: ArrayLike) -> Array:
         """Pixels (..., 2) of points (..., 3); NaN for points not in front of the camera."""
-        return to_pixels(self, *on_plane(points_camera))
+        return self.to_pixels(*on_plane(points_camera))
 
     def rays(self, uv_px: ArrayLike) -> Array:
         """Unit directions (..., 3) through pixels (..., 2)."""
-        x, y = from_pixels(self, uv_px)
+        x, y = self.from_pixels(uv_px)
         return unit(np.stack([x, y, np.ones_like(x)], -1))
 
 
@@ -125,17 +139,6 @@ def on_plane(points_camera: ArrayLike) -> tuple[Array, Array]:
         return x / z, y / z
 
 
-def to_pixels(camera: "Focal", x: Array, y: Array) -> Array:
-    """Pixels (..., 2) of places on the lens's plane."""
-    return np.stack([camera.fx_px * x + camera.cx_px, camera.fy_px * y + camera.cy_px], -1)
-
-
-def from_pixels(camera: "Focal", uv_px: ArrayLike) -> tuple[Array, Array]:
-    """Places on the lens's plane of pixels (..., 2)."""
-    u, v = np.moveaxis(np.asarray(uv_px, float), -1, 0)
-    return (u - camera.cx_px) / camera.fx_px, (v - camera.cy_px) / camera.fy_px
-
-
 def unit(vectors: Array) -> Array:
     """Vectors (..., n) with their length taken out."""
     directions: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
@@ -143,30 +146,18 @@ def unit(vectors: Array) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class BrownConrady:
+class BrownConrady(Focal):
     """Radial and tangential distortion (ROS: plumb_bob, Kalibr: radtan). Source: Brown (1966), OpenCV.
 
     Beyond `fold_radius` the polynomials turn back and far directions would land on near ones: no pixel.
     """
 
-    depth_along: ClassVar[DepthAlong] = "axis"
     coefficients: ClassVar[tuple[str, ...]] = ("k1", "k2", "p1", "p2", "k3")
-    width_px: int
-    height_px: int
-    fx_px: float
-    fy_px: float
-    cx_px: float
-    cy_px: float
     k1: float
     k2: float
     p1: float = 0.0
     p2: float = 0.0
     k3: float = 0.0
-
-    @property
-    def K(self) -> Array:
-        """The (3, 3) camera matrix."""
-        return camera_matrix(self.fx_px, self.fy_px, self.cx_px, self.cy_px)
 
     @property
     def fold_radius(self) -> float:
@@ -183,11 +174,11 @@ class BrownConrady:
         x, y = on_plane(points_camera)
         seen = x * x + y * y < self.fold_radius**2
         x, y = np.where(seen, x, np.nan), np.where(seen, y, np.nan)
-        return to_pixels(self, *self._bent(x, y)[:2])
+        return self.to_pixels(*self._bent(x, y)[:2])
 
     def rays(self, uv_px: ArrayLike) -> Array:
         """Unit directions (..., 3) through pixels (..., 2); NaN for pixels beyond the fold."""
-        x, y = from_pixels(self, uv_px)
+        x, y = self.from_pixels(uv_px)
         x, y = self._straight(x.ravel(), y.ravel()).reshape(2, *x.shape)
         return unit(np.stack([x, y, np.ones_like(x)], -1))
 
@@ -225,29 +216,17 @@ class BrownConrady:
 
 
 @dataclass(frozen=True, slots=True)
-class KannalaBrandt:
+class KannalaBrandt(Focal):
     """A fisheye by a polynomial in the angle (ROS: equidistant, Kalibr: equi). Source: Kannala and Brandt (2006).
 
     Works on directions, so it sees past 180°, up to `fold_rad` from the axis.
     """
 
-    depth_along: ClassVar[DepthAlong] = "axis"
     coefficients: ClassVar[tuple[str, ...]] = ("k1", "k2", "k3", "k4")
-    width_px: int
-    height_px: int
-    fx_px: float
-    fy_px: float
-    cx_px: float
-    cy_px: float
     k1: float
     k2: float
     k3: float
     k4: float
-
-    @property
-    def K(self) -> Array:
-        """The (3, 3) matrix of the pinhole that the lens is like about its axis."""
-        return camera_matrix(self.fx_px, self.fy_px, self.cx_px, self.cy_px)
 
     @property
     def fold_rad(self) -> float:
@@ -261,11 +240,11 @@ class KannalaBrandt:
         theta = np.arctan2(aside, z)
         seen = (theta < self.fold_rad) & ((aside > 0) | (z > 0))
         scale = np.where(seen, self._bent(theta), np.nan) / np.where(aside > 0, aside, 1.0)
-        return to_pixels(self, x * scale, y * scale)
+        return self.to_pixels(x * scale, y * scale)
 
     def rays(self, uv_px: ArrayLike) -> Array:
         """Unit directions (..., 3) through pixels (..., 2); NaN for pixels beyond the fold."""
-        x, y = from_pixels(self, uv_px)
+        x, y = self.from_pixels(uv_px)
         far = np.hypot(x, y)
         theta = rising_root(self._bent, self._slope, far.ravel(), self.fold_rad).reshape(far.shape)
         aside = np.sin(theta) / np.where(far > 0, far, 1.0)
@@ -297,20 +276,13 @@ def _reach(g: Callable[[Array], Array], farthest: float, limit: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class DoubleSphere:
+class DoubleSphere(Focal):
     """A fisheye with an inverse in closed form. Source: Usenko, Demmel and Cremers (2018), equations 40 to 46.
 
     |xi| < 1 shifts the second sphere, 0 <= alpha < 1 the pinhole behind it.
     """
 
-    depth_along: ClassVar[DepthAlong] = "axis"
     coefficients: ClassVar[tuple[str, ...]] = ("xi", "alpha")
-    width_px: int
-    height_px: int
-    fx_px: float
-    fy_px: float
-    cx_px: float
-    cy_px: float
     xi: float
     alpha: float
 
@@ -334,11 +306,11 @@ class DoubleSphere:
         d = np.sqrt(x * x + y * y + z * z)
         seen = z > self.least_cosine * d
         scale = np.where(seen, self.alpha * d + (1 - self.alpha) * z, np.nan)
-        return to_pixels(self, x / scale, y / scale)
+        return self.to_pixels(x / scale, y / scale)
 
     def rays(self, uv_px: ArrayLike) -> Array:
         """Unit directions (..., 3) through pixels (..., 2); NaN for pixels beyond the fold."""
-        x, y = from_pixels(self, uv_px)
+        x, y = self.from_pixels(uv_px)
         s = x * x + y * y
         under_root = 1 - (2 * self.alpha - 1) * s
         root = np.sqrt(np.where(under_root > 0, under_root, np.nan))
@@ -383,8 +355,6 @@ class Equirectangular:
         return np.stack([across * np.sin(longitude), np.sin(latitude), across * np.cos(longitude)], -1)
 
 
-# Cameras whose linear last step goes from a plane to pixels.
-Focal = Pinhole | BrownConrady | KannalaBrandt | DoubleSphere
 # What sends directions to pixels and back. Equal ones are one key. `coefficients` names the fields that say how the
 # lens bends, in the order of ROS; K is of the pinhole that it is like about its axis.
-Camera = Focal | Equirectangular
+Camera = Pinhole | BrownConrady | KannalaBrandt | DoubleSphere | Equirectangular

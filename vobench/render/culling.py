@@ -214,10 +214,10 @@ class CullingSet:
     def visible(self, view: PinholeView, box: Box) -> Runs:
         """By batch the runs (first, count) of indices that can touch a box of a picture; of the others none does."""
         seen = np.zeros(len(self._all.batch), bool)
-        bounds = _bounds(view, box)
+        edges = bounds(view, box)
         for mover, own in self._bodies:
             T_world_mover = view.pose(mover)
-            planes = bounds @ T_world_mover
+            planes = edges @ T_world_mover
             normal = planes[:, :3]
             reach = np.maximum(normal, 0) @ self._all.high_m[own].T + np.minimum(normal, 0) @ self._all.low_m[own].T
             seen[own] = (reach + planes[:, 3:] > 0).all(0)
@@ -247,7 +247,7 @@ class CullingSet:
 MARGIN_PX = 1  # samples lie up to half a pixel from the middle
 
 
-def _bounds(view: PinholeView, box: Box) -> Array:
+def bounds(view: PinholeView, box: Box) -> Array:
     """Planes (P, 4) of the world around all that a box shows, positive inside: four sides, near, and the mirror."""
     u0, u1, v0, v1 = box
     x, y, depth, w = view.view_projection

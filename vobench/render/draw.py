@@ -284,6 +284,16 @@ class BatchDraw:
         """Show a probe from now on where no mirror is followed."""
         self._probe = probe
 
+    def views(self, view: PinholeView, box: Box) -> list[tuple[PinholeView, Box]]:
+        """All views that a picture is drawn from, those into mirrors among them, each with its box."""
+        visible = self._culling.visible(view, box)
+        boxes, found = self._boxes(view, visible), [(view, box)]
+        for mirror in [self._mirrors[n] for n in self._followed(view, boxes) if self._shown(self._mirrors[n], visible)]:
+            seen, plane = within(boxes[mirror.index], box), _plane_towards(mirror, view)
+            if seen and plane:
+                found += self.views(view.through(plane), seen)
+        return found
+
     def draw(self, view: PinholeView, target: RenderTarget, box: Box) -> None:
         """Fill a box of the target's canvas for as many mirrors as the view goes by, which must be clear there."""
         visible = self._culling.visible(view, box)

@@ -31,7 +31,7 @@ class FrameRenderer:
     def __init__(self, baked: BakedScene) -> None:
         self._illumination, self._background = Illumination(baked), Background(baked.scene.lights)
         self._ambient, self._movers = AmbientLight(baked), baked.scene.movers
-        self._light = LightTexture(self._illumination.at(0, 0))
+        self._light = LightTexture(self._illumination.without_movers(0, 0))
         drawn = geometry(baked.faces, baked.light_uv, baked.scene.materials)
         self._draw, self._lights = BatchDraw(drawn, self._light), baked.scene.lights
         self._target, self._warp = cache(partial(render_target, in_colour=self._draw.mirrors_in_colour)), cache(warp)
@@ -55,9 +55,9 @@ class FrameRenderer:
     def _room_probe(self, baked: BakedScene, faces: Triangles) -> Probe:
         """The probe of what stands still, with every lamp that varies at level 1."""
         lights = tuple(one if isinstance(one.level, Steady) else replace(one, level=STEADY) for one in self._lights)
-        light, skies = self._illumination.at(0, 0), _skies(Background(lights), 0, 0)
+        light, skies = self._illumination.without_movers(0, 0), _skies(Background(lights), 0, 0)
         if not all(isinstance(one.level, Steady) for one in self._lights):
-            light = Illumination(replace(baked, scene=replace(baked.scene, lights=lights))).at(0, 0)
+            light = Illumination(replace(baked, scene=replace(baked.scene, lights=lights, movers=()))).at(0, 0)
         self._light.update(light)
         ambient_cd_m2 = np.broadcast_to(self._ambient.cd_m2(light), 3)
         away = [se3.transform(np.eye(3), [0, 0, -AWAY_M])] * len(self._movers)
@@ -98,19 +98,23 @@ class FrameRenderer:
             target = targets[index % len(targets)]
             target.canvas.clear(around)
             for view, box in zip(views, boxes, strict=True):
-                self._draw.draw(self._view(camera, view, index), target, box)
+                self._draw.draw(self._view(camera, view, index, box), target, box)
             self._draw.add(target, total, around, 1 / count)
 
-    def _view(self, camera: Pinhole, view: View, index: int) -> PinholeView:
+    def _view(self, camera: Pinhole, view: View, index: int, box: Box) -> PinholeView:
+        """A sub-frame of a view, its light on the graphics side."""
         start_ns, end_ns = int(view.start_ns[index]), int(view.end_ns[index])
-        light = self._illumination.at(start_ns, end_ns)
-        self._light.update(light)
         poses = [mover.path.pose((start_ns + end_ns) / 2) for mover in self._movers]
+        light = self._illumination.without_movers(start_ns, end_ns)
         ambient_cd_m2 = np.broadcast_to(self._ambient.cd_m2(light), 3)
         skies = _skies(self._background, start_ns, end_ns)
         T_world_camera = view.T_world_camera[index]
         shining = glints(self._lights, T_world_camera[:3, 3], start_ns, end_ns) if self._draw.needs_probe else NO_GLINTS
-        return pinhole_view(camera, T_world_camera, poses, skies, ambient_cd_m2=ambient_cd_m2, glints=shining)
+        drawn = pinhole_view(camera, T_world_camera, poses, skies, ambient_cd_m2=ambient_cd_m2, glints=shining)
+        if self._movers:
+            light = self._illumination.at(start_ns, end_ns, self._draw.views(drawn, box))
+        self._light.update(light)
+        return drawn
 
 
 def _skies(background: Background, start_ns: int, end_ns: int) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from vobench.geometry.se3 import Array
 from vobench.render.bake import BakedScene, SunTrack, direct_layer, direct_points, static_scene, wandered_rad
 from vobench.render.geometry import Floats
-from vobench.render.mover_light import MoverLight, MoverLightAt
+from vobench.render.mover_light import MoverLight, MoverLightAt, Views
 from vobench.scene.light import NS_PER_S, SKIES, Light, Sky, Steady, Sun
 
 
@@ -98,30 +98,40 @@ class Illumination:
         self._moments: OrderedDict[Hashable, MoverLightAt] = OrderedDict()
         self._suns: OrderedDict[Hashable, Floats] = OrderedDict()
 
-    def at(self, start_ns: int, end_ns: int) -> Floats:
+    def at(self, start_ns: int, end_ns: int, views: Views | None = None) -> Floats:
         """Map (H, W, 3) float32 of linear RGB: illuminance in lux, pi times their luminance on lamps.
 
-        The mean from start_ns to end_ns; the very array of an earlier call where nothing differs.
+        The mean from start_ns to end_ns; the very array of an earlier call where nothing differs. Movers may have
+        their shade where the views lead alone, everywhere without.
         """
-        levels = tuple(light.level.mean(start_ns, end_ns) for light in self._lights)
-        amid_ns = (start_ns + end_ns) / 2
-        suns = tuple(_stepped_ns(light, amid_ns) for light in self._lights)
+        total = self.without_movers(start_ns, end_ns)
+        if not self._movers:
+            return total
+        movers, (levels, suns) = self._movers, self._now(start_ns, end_ns)
+        amid_ns, is_on = (start_ns + end_ns) / 2, tuple(level > 0 for level in levels)
         poses = tuple(mover.path.pose(amid_ns).tobytes() for mover in self._baked.scene.movers)
-        return _recent(self._maps, (levels, suns, poses), lambda: self._map(levels, suns, poses, amid_ns))
+        moment = _recent(self._moments, (suns, poses, is_on), lambda: movers.at(amid_ns, suns, is_on))
+        movers.shade(moment, views)
+        return _recent(self._maps, (levels, suns, poses, len(moment.lost)), lambda: movers.add(moment, total, levels))
 
-    def _map(
-        self, levels: tuple[float, ...], suns: tuple[float, ...], poses: tuple[bytes, ...], amid_ns: float
-    ) -> Floats:
+    def without_movers(self, start_ns: int, end_ns: int) -> Floats:
+        """The same map as if there were no movers."""
+        levels, suns = self._now(start_ns, end_ns)
+        if not self._varying and not self._tracks:
+            return self._steady
+        return _recent(self._maps, (levels, suns), lambda: self._map(levels, suns))
+
+    def _now(self, start_ns: int, end_ns: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The level of each light, and the instant of each sun that moves."""
+        levels = tuple(light.level.mean(start_ns, end_ns) for light in self._lights)
+        return levels, tuple(_stepped_ns(light, (start_ns + end_ns) / 2) for light in self._lights)
+
+    def _map(self, levels: tuple[float, ...], suns: tuple[float, ...]) -> Floats:
         total = self._steady.copy()
         if self._varying:
             total += self._sum({i: levels[i] for i in self._varying})
         for index in self._tracks:
             total += np.float32(levels[index]) * self._sun(index, suns[index])
-        if self._movers:
-            movers = self._movers
-            is_on = tuple(level > 0 for level in levels)
-            moment = _recent(self._moments, (suns, poses, is_on), lambda: movers.at(amid_ns, suns, is_on))
-            movers.add(moment, total, levels)
         return total
 
     def _sum(self, levels: dict[int, float]) -> Floats:

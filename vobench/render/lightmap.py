@@ -134,7 +134,7 @@ def _by_xatlas(px: Array, spacing_m: Array, parts: Sequence[Places]) -> tuple[Ar
     for nth, part in enumerate(added):
         _, index, uv = atlas[nth]
         places[part] = (uv * (atlas.width, atlas.height))[index]
-        has_place = np.abs(_turns_px2(places[part])) > 1e-9
+        has_place = np.abs(turns_px2(places[part])) > 1e-9
         own = _connected(index.astype(np.int64))
         chart[part] = np.where(has_place, own + count, -1)
         count += own.max() + 1
@@ -197,7 +197,7 @@ def _shelves(sizes: Places) -> tuple[Places, int, int]:
     return corners, width, row + shelf
 
 
-def _turns_px2(places: Array) -> Array:
+def turns_px2(places: Array) -> Array:
     """Twice the areas (F,) of triangles (F, 3, 2), negative where they run clockwise."""
     (a, b), (c, d) = (places[:, i].T - places[:, 0].T for i in (1, 2))
     return np.asarray(a * d - b * c)
@@ -238,7 +238,7 @@ def owners(atlas: Atlas) -> Owners:
     corners = atlas.light_px.astype(float)
     low = np.maximum(np.ceil(corners.min(1) - READ_PX - 0.5), 0).astype(np.int64)
     high = np.minimum(np.floor(corners.max(1) + READ_PX - 0.5) + 1, (atlas.width, atlas.height)).astype(np.int64)
-    size = np.where(((atlas.chart >= 0) & (_turns_px2(corners) != 0))[:, None], high - low, 0)
+    size = np.where(((atlas.chart >= 0) & (turns_px2(corners) != 0))[:, None], high - low, 0)
     ends = np.cumsum(size.prod(1))
     last = int(ends[-1]) if len(ends) else 0
     cuts = np.unique(np.searchsorted(ends, np.arange(PAIRS, last + PAIRS, PAIRS)) + 1)
@@ -367,14 +367,6 @@ class Layout:
         """Values (P,) known at the few points, at all of them."""
         return np.asarray(self.weights @ values)
 
-    def around(self, some: Places, values: Floats, known: Mask) -> tuple[Floats, Floats]:
-        """Mean and spread (N,) of the values (P,) of those few around some points that are known (P,), else NaN."""
-        rows, kept = self.weights[some], np.where(known, values, 0)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            count = rows @ known.astype(np.float32)
-            mean, square = rows @ kept / count, rows @ kept**2 / count
-            return mean, np.sqrt(np.maximum(square - mean**2, 0))
-
     def blurred(self, values: Floats) -> Floats:
         """Values (P,) smoothed by about one texel, each chart by itself."""
         left, right, above, below = self.beside
@@ -443,7 +435,7 @@ def _beside(index: Places, atlas: Atlas, own: Owners) -> Indices:
 def _steps(corners_m: Array, places: Array) -> tuple[Array, Array]:
     """What one texel along u and v is (P, 3) on faces with corners (P, 3, 3) and places (P, 3, 2)."""
     (a, b), (c, d) = (places[:, i].T - places[:, 0].T for i in (1, 2))
-    area = _turns_px2(places)
+    area = turns_px2(places)
     area = np.where(np.abs(area) < 1e-9, np.inf, area)[:, None]
     first, second = (corners_m[:, i] - corners_m[:, 0] for i in (1, 2))
     return (d[:, None] * first - b[:, None] * second) / area, (a[:, None] * second - c[:, None] * first) / area

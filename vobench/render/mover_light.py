@@ -11,17 +11,20 @@ from numpy.typing import NDArray
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.render.bake import BakedScene, StaticScene, bodies
+from vobench.render.culling import bounds
 from vobench.render.direct_light import Rays, arriving, cell_spot, footprint, in_front, mirror_images
 from vobench.render.emitter import Emitter, emitters
-from vobench.render.geometry import Ball, Floats, Mask, RayCaster, Visibility, face_materials
+from vobench.render.geometry import Ball, Floats, Indices, Mask, RayCaster, Visibility, areas_m2, face_materials
 from vobench.render.indirect_light import FinalGather, Gatherer, blend, response, surfels
-from vobench.render.lightmap import Places, Texels, in_chunks, owners, texels
+from vobench.render.lightmap import Places, Texels, in_chunks, owners, texels, turns_px2
+from vobench.render.view import Box, PinholeView
 from vobench.scene.light import AreaLight, Light, Sky, Sun
 from vobench.scene.mesh import Triangles
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
+Views = Sequence[tuple[PinholeView, Box]]
 SIDE, SKY_SIDE = 3, 5  # rays along a side from points on movers, to an emitter and to the sky
 SHADE_SIDE, SKY_SHADE_SIDE = 2, 3  # the same from points in their shade
 SKY_REACH = 10  # radii beyond which a mover hides less than a hundredth of an open sky
@@ -30,6 +33,8 @@ GATHER_M = 0.2  # between places that gather indirect light
 UNNOTICED = 1 / 300  # share of a place's light, less than a step of 8 bits
 STEEPEST = 0.999  # sine of the angle of a frustum that is as good as open to all sides
 SMOOTHINGS = 2  # of the sky's shade
+READ_TEXELS = 2  # from what is seen, as far as pictures read light
+AHEAD_M = 0.3  # beyond what a view needs: the other eye is about there
 UNSURE = 0.2  # spread of what the points around keep from each other, as a share: there a point asks for itself
 
 
@@ -52,57 +57,70 @@ def may_shade(mover: Ball, emitter: Ball, points: Ball) -> Mask:
     return np.asarray((far2 <= near**2) | (within & ahead & (along >= -near)))
 
 
-class MovingCaster:
-    """Rays against bodies where they are: each caster is in its body's frame, and T_body_world (4, 4) leads there."""
+class Casters:
+    """Several ray casters as one."""
 
-    def __init__(self, bodies: Sequence[tuple[RayCaster, Array]], still: RayCaster | None = None) -> None:
-        self._bodies, self._still = bodies, still
+    def __init__(self, *casters: RayCaster) -> None:
+        self._casters = casters
 
     def stops(self, origins_m: Floats, way: Floats) -> Mask:
         """Whether anything is between origins and origins + way (R, 3)."""
-        hidden = self._still.stops(origins_m, way) if self._still else np.zeros(len(origins_m), bool)
-        for caster, T in self._bodies:
+        hidden = np.zeros(len(origins_m), bool)
+        for caster in self._casters:
             some = np.flatnonzero(~hidden)
-            hidden[some] = caster.stops(se3.apply(T, origins_m[some]), way[some] @ T[:3, :3].T)
+            hidden[some] = caster.stops(origins_m[some], way[some])
         return hidden
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class MoverLightAt:
     """Movers at one instant: each light's direct light (L, M) on their points.
 
-    lost: of each light the points (N,) from which they keep some of it, and how much (N,). gathered: what reaches
-    their groups of points from the surfels and lamps of what stands still.
+    gathered: what reaches their groups of points from the surfels and lamps of what stands still. movers, balls: they
+    as faces that rays meet, and around their parts. known (C,): the cells whose shade has been looked for; lost: of a
+    light the points (N,) there from which they keep some of it, and how much (N,).
     """
 
     direct: Floats
-    lost: list[tuple[Places, Floats]]
     gathered: FinalGather
+    movers: RayCaster
+    balls: list[Ball]
+    shining: "list[list[_Lit]]"
+    known: Mask
+    lost: list[tuple[int, Places, Floats]]
 
 
 @dataclass(frozen=True, slots=True)
 class _Lit:
-    """Points (N,) that stand still and have an emitter's light, surfel by surfel.
+    """Points that stand still and have an emitter's light, surfel by surfel: has (P,) says which.
 
-    cells: balls (C,) around those of each surfel, whose points begin at starts (C + 1,).
+    points (N,): in the order of their cells (C,), cell by cell from starts (C + 1,) on; balls around each of these.
     """
 
     emitter: Emitter
     is_soft: bool
+    has: Mask
     points: Places
-    cells: Ball
-    starts: NDArray[np.int64]
+    cells: Indices
+    balls: Ball
+    starts: Places
 
-    def near(self, movers: Sequence[Ball]) -> Places:
-        """Those that may lose some of their light to one of the movers, each of them given as balls."""
-        near = np.zeros(len(self.cells.radius_m), bool)
+    def near(self, movers: Sequence[Ball], among: Mask) -> Mask:
+        """Of which of the cells among all (A,) some point may lose light to one of the movers, given as balls."""
+        asked = np.flatnonzero(among[self.cells])
+        balls, near = self.balls.take(asked), np.zeros(len(asked), bool)
         for parts_at in movers:
-            whole = _around(parts_at)
-            some = np.flatnonzero(~near & may_shade(whole, self.emitter.ball, self.cells))
-            cells = self.cells.take(some)
+            some = np.flatnonzero(~near & may_shade(_around(parts_at), self.emitter.ball, balls))
+            cells = balls.take(some)
             for part in range(len(parts_at.radius_m)):
                 near[some] |= may_shade(parts_at.take(slice(part, part + 1)), self.emitter.ball, cells)
-        return np.asarray(self.points[np.repeat(near, np.diff(self.starts))])
+        found = np.zeros(len(among), bool)
+        found[self.cells[asked[near]]] = True
+        return found
+
+    def within(self, among: Mask) -> Places:
+        """Its points in the cells among all (A,)."""
+        return self.points[spans(self.starts, np.flatnonzero(among[self.cells]))]
 
 
 class MoverLight:
@@ -115,7 +133,7 @@ class MoverLight:
         solid = ~np.array(looks, bool)[faces.thing]
         own = [np.flatnonzero((faces.mover == nth) & solid) for nth in range(len(baked.scene.movers))]
         self._solid = [nth for nth, some in enumerate(own) if len(some)]
-        self._casters = [RayCaster(faces, own[nth]) for nth in self._solid]
+        self._bodies = faces.some(np.concatenate([NONE, *own]))
         self._parts = [parts(faces.corners_m[own[nth]]) for nth in self._solid]
         moves = (faces.mover >= 0) & bodies(baked.scene, faces)
         self._points, self._layout = texels(
@@ -123,8 +141,13 @@ class MoverLight:
         )
         self._mover = faces.mover[self._points.face]
         self._by_cell = np.argsort(still.cells, kind="stable")
+        self._cells = _cells(baked, still, self._by_cell)
+        self._texels = np.argsort(still.layout.source, kind="stable").astype(np.int32)
+        self._begins = np.searchsorted(still.layout.source[self._texels], np.arange(len(still.points) + 1))
         self._lit: dict[tuple[int, float], list[_Lit]] = {}
         self._groups, self._blend = self._grouped(faces)
+        self._own = np.flatnonzero(self._layout.source < len(self._points))
+        self._blend = self._blend[self._own]
         self._gatherer = Gatherer(
             baked.atlas,
             still.visibility,
@@ -145,50 +168,62 @@ class MoverLight:
         return groups.middle, blend(points, groups, self._layout, alone, np.ones(len(groups), bool))
 
     def at(self, t_ns: float, suns_ns: Sequence[float], is_on: Sequence[bool]) -> MoverLightAt:
-        """All that the movers' places decide.
+        """What the movers' places decide, but for their shade.
 
         suns_ns (L,): the instant of each sun that moves; is_on (L,): which lights are on at all.
         """
         poses = [mover.path.pose(t_ns) for mover in self._baked.scene.movers]
-        solid = [(caster, se3.inverse(poses[n])) for caster, n in zip(self._casters, self._solid, strict=True)]
-        parts_at = [_moved_ball(own, poses[n]) for own, n in zip(self._parts, self._solid, strict=True)]
+        movers = RayCaster(self._bodies.moved(poses))
+        balls = [_moved_ball(own, poses[n]) for own, n in zip(self._parts, self._solid, strict=True)]
         points, together = self._placed(poses), copy(self._still.visibility)
-        together.opaque = MovingCaster(solid, together.opaque)  # type: ignore[assignment]
+        together.opaque = Casters(together.opaque, movers)  # type: ignore[assignment]
         direct = np.zeros((len(self._lights), len(points)), np.float32)
-        lost = []
-        for index in range(len(self._lights)):
-            taken = np.zeros(len(self._still.points), np.float32)
-            for lit in self._lit_by(index, suns_ns[index]) if is_on[index] else ():
-                emitter = lit.emitter
+        shining = [self._lit_by(i, suns_ns[i]) if is_on[i] else [] for i in range(len(self._lights))]
+        for index, lit in enumerate(shining):
+            for emitter in [one.emitter for one in lit]:
                 some = np.flatnonzero(in_front(emitter.ball, points.points_m, points.normals))
+                some = some[emitter.may_light(points.points_m[some])]
                 rays = Rays(SKY_SIDE if emitter.sky else SIDE)
                 direct[index, some] += arriving(emitter, points.take(some), together, rays)[0]
-                near = lit.near(parts_at)
-                taken[near] += self._lost(lit, near, index, MovingCaster(solid))
-            some = np.flatnonzero(taken)
-            # Rounding apart, nothing is taken that had not come.
-            lost.append((some, np.minimum(taken[some], self._straight[index][some])))
         count = GATHER_RAYS if self._baked.settings.bounces else 0
-        return MoverLightAt(direct, lost, self._gatherer.gather(points.take(self._groups), rays=count))
+        gathered = self._gatherer.gather(points.take(self._groups), rays=count)
+        known = np.zeros(int(self._still.cells.max(initial=-1)) + 1, bool)
+        return MoverLightAt(direct, gathered, movers, balls, shining, known, [])
 
-    def add(self, moment: MoverLightAt, total: Floats, levels: Sequence[float]) -> None:
-        """Put the movers' light and shade into the sum (H, W, 3) of all that stands still."""
-        flat, strength = total.reshape(-1, 3), np.asarray(levels, np.float32)
+    def shade(self, moment: MoverLightAt, views: Views | None) -> None:
+        """Find what the movers keep from all that views show, or from everything."""
+        if views is None:
+            new = ~moment.known
+        elif (_shown(self._cells, views, 0.0) > moment.known).any():
+            new = _shown(self._cells, views, AHEAD_M) > moment.known
+        else:
+            return
+        moment.known = moment.known | new
+        for index, shining in enumerate(moment.shining):
+            taken = np.zeros(len(self._still.points), np.float32)
+            found = [self._lost(lit, index, moment, new) for lit in shining]
+            for some, lost in found:
+                taken[some] += lost
+            some = _distinct(np.concatenate([NONE, *(points[lost > 0] for points, lost in found)]))
+            # Rounding apart, nothing is taken that had not come.
+            moment.lost.append((index, some, np.minimum(taken[some], self._straight[index][some])))
+
+    def add(self, moment: MoverLightAt, still: Floats, levels: Sequence[float]) -> Floats:
+        """The map (H, W, 3) of all that stands still with the movers' light and shade."""
+        total, strength = still.copy(), np.asarray(levels, np.float32)
         colours = strength[:, None] * np.array([light.colour for light in self._lights], np.float32)
-        row = np.zeros(len(self._still.points) + 1, np.int32)
-        for some, _ in moment.lost:
-            row[some] = 1
-        points = np.flatnonzero(row)
-        row[points] = np.arange(1, len(points) + 1)
-        shade = np.zeros((len(points) + 1, 3), np.float32)
-        for (some, taken), colour in zip(moment.lost, colours, strict=True):
-            shade[row[some]] += taken[:, None] * colour
-        rows = row[self._still.layout.source]
-        shaded = np.flatnonzero(rows)
-        flat[shaded] = np.maximum(flat[shaded] - shade[rows[shaded]], 0)
-        own = np.flatnonzero(self._layout.source < len(self._points))
-        lit = (moment.direct.T @ colours)[self._layout.source[own]]
-        flat[own] = lit + (self._blend @ self._around(moment.gathered, colours))[own]
+        flat = total.reshape(-1, 3)
+        row = np.zeros(len(self._still.points), np.int32)
+        points = _distinct(np.concatenate([NONE, *(some for _, some, _ in moment.lost)]))
+        row[points] = np.arange(len(points))
+        shade = np.zeros((len(points), 3), np.float32)
+        for index, some, taken in moment.lost:
+            shade[row[some]] += taken[:, None] * colours[index]
+        shaded = self._texels[spans(self._begins, points)]
+        flat[shaded] = np.maximum(flat[shaded] - np.repeat(shade, np.diff(self._begins)[points], axis=0), 0)
+        lit = (moment.direct.T @ colours)[self._layout.source[self._own]]
+        flat[self._own] = lit + self._blend @ self._around(moment.gathered, colours)
+        return total
 
     def _around(self, gathered: FinalGather, colours: Floats) -> Floats:
         """Illuminance (S, 3) of the movers' groups by bounces, lamps in mirrors included."""
@@ -229,36 +264,61 @@ class MoverLight:
         some = self._by_cell[straight[self._by_cell] > UNNOTICED * straight.max(initial=0)]
         some = some[in_front(emitter.ball, points.points_m[some], points.normals[some])]
         some = some[emitter.may_light(points.points_m[some])]
-        cells = self._still.cells[some]
+        has, cells = np.zeros(len(points), bool), self._still.cells[some]
+        has[some] = True
         starts = np.flatnonzero(np.diff(cells, prepend=-1, append=-1) if len(cells) else np.zeros(1, bool))
         is_soft = bool((emitter.width_rad(points.points_m[some]) > 0).any())
-        return _Lit(emitter, is_soft, some, _balls(points.points_m[some], starts), starts)
+        return _Lit(emitter, is_soft, has, some, cells[starts[:-1]], _balls(points.points_m[some], starts), starts)
 
-    def _lost(self, lit: _Lit, some: Places, index: int, movers: MovingCaster) -> Floats:
-        """Illuminance (N,) that movers take from some points; soft shadows between points that ask, as light does."""
+    def _lost(self, lit: _Lit, index: int, moment: MoverLightAt, new: Mask) -> tuple[Places, Floats]:
+        """Points (N,) in new cells and the illuminance (N,) that movers take from them.
+
+        Soft shadows are asked at few points, and at others where those around differ, as light is. What is found at
+        a point does not hang on which others are asked for.
+        """
+        straight, layout = self._straight[index], self._still.layout
+        near = lit.near(moment.balls, new)
+        wanted = some = lit.within(near)
         if not lit.is_soft:
-            return self._traced(lit.emitter, some, movers, SHADE_SIDE)
-        side = SKY_SHADE_SIDE if lit.emitter.sky == "pane" else SHADE_SIDE
-        straight, is_few = self._straight[index], self._still.layout.few[some]
-        few, rest = some[is_few], some[~is_few]
-        share, known = np.zeros(len(straight), np.float32), np.zeros(len(straight), bool)
-        known[lit.points] = True
-        share[few] = self._traced(lit.emitter, few, movers, side) / straight[few]
-        mean, spread = self._still.layout.around(rest, share, known)
-        unsure = ~(spread <= UNSURE)
+            return some, self._traced(lit.emitter, some, moment.movers, SHADE_SIDE)
+        is_pane = lit.emitter.sky == "pane"
+        for _ in range(SMOOTHINGS if is_pane else 0):
+            some = self._may_lose(lit, moment, near, np.append(some, layout.beside[:, some]))
+        is_few = layout.few[some]
+        rest = some[~is_few]
+        weights = layout.weights[rest]
+        few = self._may_lose(lit, moment, near, np.append(some[is_few], weights.indices))
+        side = SKY_SHADE_SIDE if is_pane else SHADE_SIDE
+        share = np.zeros(len(straight), np.float32)
+        share[few] = self._traced(lit.emitter, few, moment.movers, side) / straight[few]
+        each, known = share[weights.indices], weights.data * lit.has[weights.indices]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            count = np.add.reduceat(known, weights.indptr[:-1])
+            mean, square = (np.add.reduceat(known * each**power, weights.indptr[:-1]) / count for power in (1, 2))
+            unsure = ~(np.sqrt(np.maximum(square - mean**2, 0)) <= UNSURE)
         share[rest] = np.where(unsure, 0, mean)
         asked = rest[unsure]
-        share[asked] = self._traced(lit.emitter, asked, movers, side) / straight[asked]
-        if lit.emitter.sky == "pane":
-            for _ in range(SMOOTHINGS):
-                share[some] = (4 * share[some] + share[self._still.layout.beside[:, some]].sum(0)) / 8
-        return np.asarray(share[some] * straight[some])
+        share[asked] = self._traced(lit.emitter, asked, moment.movers, side) / straight[asked]
+        for _ in range(SMOOTHINGS if is_pane else 0):
+            share[some] = (4 * share[some] + share[layout.beside[:, some]].sum(0)) / 8
+        return wanted, share[wanted] * straight[wanted]
 
-    def _traced(self, emitter: Emitter, some: Places, movers: MovingCaster, side: int) -> Floats:
+    def _may_lose(self, lit: _Lit, moment: MoverLightAt, near: Mask, points: Places) -> Places:
+        """Those of some points, each once, that have an emitter's light and may lose some of it.
+
+        near (C,): the cells of which that is known; it is asked for others.
+        """
+        points = _distinct(points[lit.has[points]])
+        cells = self._still.cells[points]
+        others = np.zeros(len(near), bool)
+        others[cells[~near[cells]]] = True
+        return points[(near | lit.near(moment.balls, others))[cells]]
+
+    def _traced(self, emitter: Emitter, some: Places, movers: RayCaster, side: int) -> Floats:
         found = in_chunks(lambda part: self._lost_at(emitter, some[part], movers, side), len(some))
         return np.concatenate([*found, np.zeros(0, np.float32)])
 
-    def _lost_at(self, emitter: Emitter, some: Places, movers: MovingCaster, side: int) -> Floats:
+    def _lost_at(self, emitter: Emitter, some: Places, movers: RayCaster, side: int) -> Floats:
         own = self._still.points.take(some)
         towards, lost = emitter.towards(own), np.zeros(len(own), np.float32)
         for cell in range(side**2):
@@ -270,6 +330,44 @@ class MoverLight:
             hit = np.flatnonzero(movers.stops(start, ahead) & (light > 0))
             lost[hit] += light[hit] * emitter.passing(self._still.visibility, start[hit], ahead[hit])
         return lost / np.float32(side**2)
+
+
+NONE = np.zeros(0, np.int64)
+
+
+def _distinct(points: Places) -> Places:
+    """Each of some points (N,) once, in order."""
+    points = np.sort(points)
+    return np.asarray(points[np.diff(points, prepend=-1) > 0])
+
+
+def spans(begins: Places, some: Places) -> Places:
+    """All numbers from begins[i] to begins[i + 1] for some i (N,), one after the other."""
+    count = begins[some + 1] - begins[some]
+    ends = np.cumsum(count)
+    return np.asarray(np.arange(ends[-1] if len(ends) else 0) + np.repeat(begins[some] - ends + count, count))
+
+
+def _cells(baked: BakedScene, still: StaticScene, by_cell: Places) -> Ball:
+    """Balls (C,) around all places that read light of the cells of what stands still."""
+    faces, some = still.faces, still.points.face[by_cell]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        texel_m = np.sqrt(2 * areas_m2(faces.corners_m) / np.abs(turns_px2(baked.atlas.light_px)))
+    starts = np.flatnonzero(np.diff(still.cells[by_cell], prepend=-1, append=-1))
+    around = _balls(still.points.points_m[by_cell], starts)
+    farthest = np.maximum.reduceat(np.where(np.isfinite(texel_m), texel_m, 0)[some], starts[:-1])
+    return Ball(around.centre_m, around.radius_m + READ_TEXELS * farthest)
+
+
+def _shown(cells: Ball, views: Views, beyond_m: float) -> Mask:
+    """Which cells (C,) some view shows, or what is so far beyond its edges."""
+    shown = np.zeros(len(cells.radius_m), bool)
+    for view, box in views:
+        planes = bounds(view, box)
+        inside = np.einsum("ij,kj->ik", planes[:, :3], cells.centre_m) + planes[:, 3:]
+        reach = np.linalg.norm(planes[:, :3], axis=1)[:, None] * (cells.radius_m + beyond_m)
+        shown |= (inside > -reach).all(0)
+    return shown
 
 
 def _balls(points_m: Floats, starts: NDArray[np.int64]) -> Ball:

@@ -132,6 +132,11 @@ class Triangles:
     def __len__(self) -> int:
         return len(self.corners_m)
 
+    def some(self, which: Faces) -> "Triangles":
+        """The table of some faces (K,) alone."""
+        names = ("corners_m", "normals", "uv", "plane", "thing", "mover", "lamp")
+        return replace(self, **{name: getattr(self, name)[which] for name in names})
+
     def moved(self, T_world_movers: Sequence[Array]) -> "Triangles":
         """The table of things in their movers' frames with the movers at these poses (4, 4)."""
         corners, normals, plane = self.corners_m.copy(), self.normals.copy(), self.plane.copy()
