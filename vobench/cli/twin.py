@@ -58,7 +58,7 @@ ESTIMATORS: tuple[Any, ...] = (
     "stand_still",
 )
 FEWEST_RANKED, FEWEST_PICTURES, LEAST_EXTENT_M = 3, 10, 0.05
-TO_FIT = 4  # pictures that the camera is fitted to
+TO_FIT = 12  # pictures that the camera is fitted to
 KNOTS = 0.5  # of the smoothed path, a picture
 
 
