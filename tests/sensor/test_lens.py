@@ -178,6 +178,14 @@ def test_dirt_takes_the_share_of_light_it_says(amount: float) -> None:
     assert taken.max() < 1
 
 
+def test_dirt_lies_in_blobs_with_clean_glass_between() -> None:
+    for seed in range(5):
+        taken = dirt(SHAPE, 0.1, np.random.default_rng(seed))
+        cleanest, thickest = np.quantile(taken, [0.05, 0.95])
+        assert cleanest < 0.03
+        assert thickest > 0.2
+
+
 def test_dirt_is_one_per_camera_and_only_thickens() -> None:
     thin, thick, other = (
         dirt(SHAPE, amount, np.random.default_rng(seed)) for amount, seed in ((0.05, 1), (0.2, 1), (0.05, 2))

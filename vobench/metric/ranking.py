@@ -131,8 +131,8 @@ def rank(loss: Array, failed: Array, *, seed: int = 1) -> list[Standing]:
     drawn, drawn_losses = trials.resampled(trials.shares, seed), trials.resampled([trials.losses], seed)
     pairs, rng = list(pairwise(order.tolist())), np.random.default_rng(seed)
     p = holm([permutation_p(trials.differences(a, b), rng) for a, b in pairs])
-    low, high = _interval(np.diff(drawn[:, order], axis=1))
-    decided = [bool(chance < DECIDED and (lo > 0 or hi < 0)) for chance, lo, hi in zip(p, low, high, strict=True)]
+    least = _interval(np.diff(drawn[:, order], axis=1))[0]
+    decided = [bool(chance < DECIDED and low > 0) for chance, low in zip(p, least, strict=True)]
     places = _places(drawn[:, order], decided, enough=trials.enough(*order))
     ratios = np.exp(_interval(drawn_losses - drawn_losses[:, order[:1]]))
     shares = np.einsum("ecr,ecr->e", np.nan_to_num(failed), trials.fails[1])
