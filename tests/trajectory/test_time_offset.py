@@ -64,3 +64,12 @@ def test_a_hole_after_the_first_pose_moves_no_clock():
     truth, est = wander(np.r_[stamps[:1], stamps[300:]]), wander(stamps[400:2900:3])
     found = estimate_offset(truth, Trajectory(est.t_ns - 2 * 10**9, est.T_world_frame))
     assert found.offset_ns == pytest.approx(2 * 10**9, abs=1_000_000)
+
+
+def test_that_both_stand_still_is_no_likeness():
+    """One moves, then stands; the other stands, then moves: where both stand, correlation has no meaning."""
+    stamps = np.arange(3000) * 10_000_000
+    first, second = wander(stamps, seed=1).T_world_frame, wander(stamps, seed=2).T_world_frame
+    stops, starts = first[np.minimum(np.arange(3000), 900)], second[np.maximum(np.arange(3000), 2100)]
+    with pytest.raises(AlignmentError, match="never turn nor move alike"):
+        estimate_offset(Trajectory(stamps, stops), Trajectory(stamps, starts))
