@@ -45,6 +45,13 @@ def test_a_repeated_frame_shows_what_was_taken_before():
     np.testing.assert_array_equal(plan.left_ns[fresh], plan.t_ns[fresh])
 
 
+def test_the_first_frame_never_shows_another_and_any_later_one_may():
+    plans = [made(repeat_share=0.8, before=before) for before in range(40)]
+    repeats = np.array([plan.repeats[:4] for plan in plans])
+    assert not repeats[:, 0].any()
+    assert repeats[:, 1:].any(axis=0).all()
+
+
 def test_jitter_has_its_size_and_the_right_eye_its_delay():
     plan = made(jitter_ms=2, right_delay_ms=-3)
     off_ms = (plan.left_ns - T_NS) / 1e6
