@@ -23,6 +23,7 @@ from vobench.geometry.rig import (
     drawn,
     looking,
     mounted,
+    own_pair,
     paper_lens,
     resized,
     stereo_rig,
@@ -121,6 +122,13 @@ def test_an_eyes_own_error_is_added_to_that_of_both_and_is_of_no_other_eye() -> 
     turn = Rotation.from_matrix(EUROC.T_body_left[:3, :3].T @ left.T_body_left[:3, :3])
     np.testing.assert_allclose(turn.as_rotvec(degrees=True), [0, 0, 0.3], atol=1e-12)
     np.testing.assert_array_equal(left.T_body_right, EUROC.T_body_right)
+
+
+@every_rig
+def test_a_pair_that_is_written_into_a_suite_comes_back(rig: Rig) -> None:
+    preset = own_pair(rig).preset()
+    assert (preset.left, preset.right) == (rig.left, rig.camera("right"))
+    np.testing.assert_allclose(preset.T_left_right, rig.T_left_right, atol=1e-12)
 
 
 def test_what_is_given_besides_a_level_is_added_to_what_the_level_stands_for() -> None:

@@ -47,7 +47,7 @@ def test_clocks_of_different_epochs_are_brought_together():
     ("n", "step_m", "message"),
     [
         (1, 0.0, "two poses or more"),
-        (10, 0.1, "20 to"),
+        (10, 0.1, "25 to"),
         (100, 0.0, "never turn nor move"),
         (100, 0.1, "never turn nor move"),
     ],
@@ -57,6 +57,13 @@ def test_too_short_or_without_a_change_of_speed_there_is_no_offset(n, step_m, me
     path = Trajectory(np.arange(n) * 10**8, T)
     with pytest.raises(AlignmentError, match=message):
         estimate_offset(path, path)
+
+
+def test_25_steps_are_enough_and_24_are_not():
+    stamps = np.arange(26) * 10**8
+    assert estimate_offset(wander(stamps), wander(stamps)).offset_ns == pytest.approx(0, abs=1_000_000)
+    with pytest.raises(AlignmentError, match="hold 24 and 24"):
+        estimate_offset(wander(stamps[:-1]), wander(stamps[:-1]))
 
 
 def test_a_hole_after_the_first_pose_moves_no_clock():

@@ -85,9 +85,9 @@ def _step_ns(gt: Trajectory, est: Trajectory) -> float:
 
 def _require_samples(gt: Trajectory, est: Trajectory, step_ns: int) -> None:
     spans = [int(t.t_ns[-1] - t.t_ns[0]) // step_ns for t in (gt, est)]
-    if min(spans) < MIN_SAMPLES or max(spans) > MAX_SAMPLES:
+    if min(spans) < (fewest := MIN_SAMPLES + WINDOW_STEPS) or max(spans) > MAX_SAMPLES:
         raise AlignmentError(
-            f"an offset in time needs {MIN_SAMPLES} to {MAX_SAMPLES} steps of {step_ns / 1e9:g} s on either side, "
+            f"an offset in time needs {fewest} to {MAX_SAMPLES} steps of {step_ns / 1e9:g} s on either side, "
             f"but the recordings hold {spans[0]} and {spans[1]}"
         )
 
