@@ -90,12 +90,18 @@ def _amid(corners_m: Array) -> Array:
     offsets = np.stack(np.meshgrid(steps, steps, steps / 2, indexing="ij"), -1).reshape(-1, 3)
     near, far = corners_m.min(1), corners_m.max(1)
 
-    def value(offset: Array) -> float:
+    aside, best, found = np.linalg.norm(offsets, axis=1).round(9), -np.inf, offsets[0]
+    # From the middle outwards, until what is farther out cannot be better.
+    for nth in np.argsort(aside, kind="stable"):
+        offset, most = offsets[nth], CLEAR_M - 0.1 * aside[nth]
+        if best >= most:
+            break
         place = (low + high) / 2 + offset * (high - low)
         clear = np.linalg.norm(np.maximum(np.maximum(near - place, place - far), 0), axis=1).min()
-        return float(min(clear, CLEAR_M) - 0.1 * np.linalg.norm(offset))
-
-    return np.asarray((low + high) / 2 + max(offsets, key=value) * (high - low))
+        value = min(clear - CLEAR_M, 0) + most
+        if value > best:
+            best, found = value, offset
+    return np.asarray((low + high) / 2 + found * (high - low))
 
 
 def _irradiance(pictures: Array) -> Array:

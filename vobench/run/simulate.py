@@ -68,9 +68,8 @@ def open_renderer(scene: "Scene", rendering: "Rendering", light: Path | None) ->
 
         return PathRenderer(scene, samples=rendering.samples or SAMPLES)
     from vobench.render.bake import load_baked
-    from vobench.render.raster import RasterRenderer, require_drawing
+    from vobench.render.raster import RasterRenderer
 
-    require_drawing()
     return RasterRenderer(load_baked(light, scene))
 
 
