@@ -102,8 +102,7 @@ def _view(movers: int) -> tuple[PinholeView, Box]:
     """A camera on the way of the movers, which looks at where they go."""
     camera = Pinhole(720, 480, 500.0, 500.0, 359.5, 239.5)
     T = se3.transform(se3.rotation_z(np.pi / 2), (-0.5, -2.5, 0)) @ looking(pitch_deg=5, position_m=(0, 0, 1.0))
-    away = [np.eye(4)] * movers
-    view = pinhole_view(camera, T, away, np.zeros((0, 4, 4)), ambient_cd_m2=np.ones(3))
+    view = pinhole_view(camera, T, [np.eye(4)] * movers, np.zeros((0, 4, 4)), ambient_cd_m2=np.ones(3))
     return view, (0, 720, 0, 480)
 
 

@@ -123,6 +123,7 @@ def test_shade_found_bit_by_bit_is_that_found_at_once(cell: BakedScene) -> None:
         assert light.at(0, 0, views(cell, yaw_deg)) is maps[-1]
     assert len({one.tobytes() for one in maps}) == len(maps)
     assert light.at(0, 0).tobytes() == Illumination(cell).at(0, 0).tobytes()
+    assert light.at(0, 0) is light.at(0, 0)
 
 
 def test_several_casters_stop_what_any_of_them_stops() -> None:

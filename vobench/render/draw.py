@@ -287,10 +287,10 @@ class BatchDraw:
     def views(self, view: PinholeView, box: Box) -> list[tuple[PinholeView, Box]]:
         """All views that a picture is drawn from, those into mirrors among them, each with its box."""
         visible = self._culling.visible(view, box)
-        boxes, found = self._boxes(view, visible), [(view, box)]
-        for mirror in [self._mirrors[n] for n in self._followed(view, boxes) if self._shown(self._mirrors[n], visible)]:
-            seen, plane = within(boxes[mirror.index], box), _plane_towards(mirror, view)
-            if seen and plane:
+        found = [(view, box)]
+        for index, seen in self._followed(view, self._boxes(view, visible), box).items():
+            plane = _plane_towards(self._mirrors[index], view)
+            if plane and self._shown(self._mirrors[index], visible):
                 found += self.views(view.through(plane), seen)
         return found
 
@@ -302,7 +302,7 @@ class BatchDraw:
             if batch.index in visible:
                 self._calls.surface(batch, visible, view, canvas, *self._unfollowed(batch))
         boxes = self._boxes(view, visible)
-        seen = {n: within(boxes[n], box) for n in self._followed(view, boxes)}
+        seen = self._followed(view, boxes, box)
         shown = [self._mirrors[n] for n in boxes if self._shown(self._mirrors[n], visible)]
         for mirror in shown:
             if not mirror.is_pane:
@@ -350,13 +350,14 @@ class BatchDraw:
     def _shown(self, mirror: Mirror, visible: Runs) -> bool:
         return any(batch.index in visible for batch in self._in[mirror.index])
 
-    def _followed(self, view: PinholeView, boxes: dict[int, Box]) -> set[int]:
-        """Which of the mirrors in a picture are drawn again from behind: those that show most."""
+    def _followed(self, view: PinholeView, boxes: dict[int, Box], box: Box) -> dict[int, Box]:
+        """Mirrors in a picture that are drawn again from behind, those that show most, and where in a box of it."""
         if view.depth == MIRRORS or (self.needs_probe and not self._probe):
-            return set()
+            return {}
         least = LEAST_SHARE * view.camera.width_px * view.camera.height_px
         shown = [((u1 - u0) * (v1 - v0) * self._mirrors[n].strength, n) for n, (u0, u1, v0, v1) in boxes.items()]
-        return {n for size, n in sorted(shown, reverse=True)[: FOLLOWED[view.depth]] if size > least}
+        most = [n for size, n in sorted(shown, reverse=True)[: FOLLOWED[view.depth]] if size > least]
+        return {n: part for n in most if (part := within(boxes[n], box))}
 
     def _draw_mirror(
         self, mirror: Mirror, view: PinholeView, target: RenderTarget, *, box: Box, visible: Runs, seen: Box | None

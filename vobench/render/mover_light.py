@@ -192,12 +192,10 @@ class MoverLight:
 
     def shade(self, moment: MoverLightAt, views: Views | None) -> None:
         """Find what the movers keep from all that views show, or from everything."""
-        if views is None:
-            new = ~moment.known
-        elif (_shown(self._cells, views, 0.0) > moment.known).any():
-            new = _shown(self._cells, views, AHEAD_M) > moment.known
-        else:
+        inside_m = np.full(len(moment.known), np.inf) if views is None else _inside_m(self._cells, views)
+        if not ((inside_m > 0) & ~moment.known).any():
             return
+        new = (inside_m > -AHEAD_M) & ~moment.known
         moment.known = moment.known | new
         for index, shining in enumerate(moment.shining):
             taken = np.zeros(len(self._still.points), np.float32)
@@ -266,7 +264,7 @@ class MoverLight:
         some = some[emitter.may_light(points.points_m[some])]
         has, cells = np.zeros(len(points), bool), self._still.cells[some]
         has[some] = True
-        starts = np.flatnonzero(np.diff(cells, prepend=-1, append=-1) if len(cells) else np.zeros(1, bool))
+        starts = np.flatnonzero(np.diff(cells, prepend=-1, append=-1))
         is_soft = bool((emitter.width_rad(points.points_m[some]) > 0).any())
         return _Lit(emitter, is_soft, has, some, cells[starts[:-1]], _balls(points.points_m[some], starts), starts)
 
@@ -359,15 +357,15 @@ def _cells(baked: BakedScene, still: StaticScene, by_cell: Places) -> Ball:
     return Ball(around.centre_m, around.radius_m + READ_TEXELS * farthest)
 
 
-def _shown(cells: Ball, views: Views, beyond_m: float) -> Mask:
-    """Which cells (C,) some view shows, or what is so far beyond its edges."""
-    shown = np.zeros(len(cells.radius_m), bool)
+def _inside_m(cells: Ball, views: Views) -> Floats:
+    """How far cells (C,) reach into what one of the views shows, at least; negative for how far they are from all."""
+    farthest = np.full(len(cells.radius_m), -np.inf)
     for view, box in views:
         planes = bounds(view, box)
-        inside = np.einsum("ij,kj->ik", planes[:, :3], cells.centre_m) + planes[:, 3:]
-        reach = np.linalg.norm(planes[:, :3], axis=1)[:, None] * (cells.radius_m + beyond_m)
-        shown |= (inside > -reach).all(0)
-    return shown
+        planes /= np.linalg.norm(planes[:, :3], axis=1)[:, None]
+        middle_m = np.einsum("ij,kj->ik", planes[:, :3], cells.centre_m) + planes[:, 3:]
+        farthest = np.maximum(farthest, middle_m.min(0) + cells.radius_m)
+    return farthest
 
 
 def _balls(points_m: Floats, starts: NDArray[np.int64]) -> Ball:
