@@ -16,12 +16,12 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
 from vobench.render.bake import BakedScene, Patches
-from vobench.render.geometry import areas_m2
 from vobench.render.lightmap import Atlas
 from vobench.render.raster import RasterRenderer
 from vobench.render.renderer import Radiance, still
 from vobench.scene.light import STEADY, Level, PointLight
 from vobench.scene.material import Material, reflectance
+from vobench.scene.mesh import areas_m2
 from vobench.scene.scene import Scene, triangles
 
 EvenLight = Callable[..., BakedScene]

@@ -14,12 +14,12 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.render.bake import LIGHT, PLACES, BakedScene, BakeSettings, bake, load_baked, save_baked
 from vobench.render.emitter import cosine_weighted
-from vobench.render.geometry import Hits, Visibility, areas_m2, off
+from vobench.render.geometry import Hits, Visibility, off
 from vobench.render.illumination import AmbientLight, Illumination
 from vobench.render.lightmap import owners
 from vobench.scene.light import AreaLight, Flicker, Light, PointLight, SpotLight, Sun
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import Mesh, Thing, flat
+from vobench.scene.mesh import Mesh, Thing, areas_m2, flat
 from vobench.scene.scene import Scene, ceiling_light
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=1, bounces=0)

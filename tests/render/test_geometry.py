@@ -7,9 +7,9 @@ import numpy as np
 from tests.render.rectangles import box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import Hits, RayCaster, Visibility, areas_m2, ball, flats, spots
+from vobench.render.geometry import Hits, RayCaster, Visibility, ball, flats, spots
 from vobench.scene.material import Material, pane_reflectance
-from vobench.scene.mesh import Thing, quad, table
+from vobench.scene.mesh import Thing, areas_m2, quad, table
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light, triangles
 
 MATERIALS: dict[str, Material] = {

@@ -8,10 +8,10 @@ import trimesh
 
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import Visibility, areas_m2
+from vobench.render.geometry import Visibility
 from vobench.render.lightmap import Atlas, Layout, Texels, owners, texels, unwrap
 from vobench.scene.material import Material
-from vobench.scene.mesh import Mesh, Thing, Triangles, flat, joined, quad, table
+from vobench.scene.mesh import Mesh, Thing, Triangles, areas_m2, flat, joined, quad, table
 
 MATERIALS = {"grey": Material()}
 

@@ -21,7 +21,7 @@ from vobench.scene.light import (
     Switched,
     scaled,
 )
-from vobench.scene.mesh import Mesh, area_m2, face_normals, quad
+from vobench.scene.mesh import Mesh, areas_m2, face_normals, quad
 from vobench.scene.scene import ceiling_light
 
 LEVELS: dict[str, Level] = {
@@ -125,7 +125,7 @@ def test_a_ceiling_light_shines_down_from_where_it_hangs(size_m: tuple[float, fl
     np.testing.assert_allclose(np.ptp(lamp.mesh.vertices_m, axis=0), [*size_m, 0])
     np.testing.assert_allclose(face_normals(lamp.mesh.corners_m), [[0, 0, -1]] * 2)
     assert lamp.luminance_cd_m2 == pytest.approx(4000 / (np.pi * np.prod(size_m)))
-    assert area_m2(lamp.mesh.corners_m) == pytest.approx(np.prod(size_m))
+    assert areas_m2(lamp.mesh.corners_m).sum() == pytest.approx(np.prod(size_m))
 
 
 def test_a_bulb_sends_out_its_power() -> None:

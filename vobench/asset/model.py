@@ -15,7 +15,7 @@ from vobench.asset.gltf import MOST_BYTES, MOST_FACES, Look, ModelLight, Part, P
 from vobench.errors import ModelError, unknown
 from vobench.geometry.se3 import Array
 from vobench.scene.material import LUMINANCE, Map, Material, Picture, srgb
-from vobench.scene.mesh import Mesh, Thing, face_normals
+from vobench.scene.mesh import Mesh, Thing, areas_m2, face_normals
 
 Roles = Mapping[str, str]
 Key = TypeVar("Key")
@@ -189,9 +189,7 @@ def _sound(part: Part) -> Part:
     mesh = replace(mesh, uv=np.nan_to_num(mesh.uv, posinf=0, neginf=0)).moved(T)
     if np.abs(mesh.vertices_m).max(initial=0) > FARTHEST_M:
         raise ModelError(f"reaches {np.abs(mesh.vertices_m).max():.3g} m; is it damaged, or of another unit?")
-    corners = mesh.corners_m
-    areas_m2 = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    faces = mesh.faces[areas_m2 > LEAST_M2]
+    faces = mesh.faces[areas_m2(mesh.corners_m) > LEAST_M2]
     normals, planes = np.nan_to_num(mesh.normals)[faces], face_normals(mesh.vertices_m[faces])[:, None]
     normals = np.where(np.linalg.norm(normals, axis=2, keepdims=True) > 0.5, normals, planes).reshape(-1, 3)
     own = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import Faces, Mesh, face_normals, joined, quad, unit
+from vobench.scene.mesh import Faces, Mesh, cross, face_normals, joined, quad, unit
 
 # A lap lies this far behind a wall's joint and reaches this far to both of its sides.
 LAP_BEHIND_M, LAP_M = 0.002, 0.01
@@ -68,9 +68,7 @@ def _sharp() -> tuple[Array, Faces]:
 def _outward(points: Array, faces: Faces) -> Faces:
     """The faces of a convex body around the origin, counter-clockwise from outside."""
     corners = points[faces]
-    inward = np.einsum(
-        "fk,fk->f", np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), corners[:, 0]
-    )
+    inward = np.einsum("fk,fk->f", cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), corners[:, 0])
     return np.where((inward < 0)[:, None], faces[:, ::-1], faces).astype(np.int32)
 
 
@@ -82,7 +80,7 @@ def _patches(points_m: Array, normals: Array, uv: Array) -> Mesh:
     faces = np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3)
     vertices = points_m.reshape(-1, 3)
     p, q, r = (vertices[faces[:, k]] for k in range(3))
-    has_area = np.linalg.norm(np.cross(q - p, r - p), axis=1) > 1e-12
+    has_area = np.linalg.norm(cross(q - p, r - p), axis=1) > 1e-12
     return Mesh(vertices, faces[has_area], uv.reshape(-1, 2), normals.reshape(-1, 3))
 
 
@@ -133,10 +131,10 @@ def tube(path_m: ArrayLike, radius_m: float, *, sections: int = 8) -> Mesh:
     step = np.diff(path, axis=0)
     ahead = unit(step)
     tangent = unit(np.concatenate([ahead[:1], ahead[:-1] + ahead[1:], ahead[-1:]]))
-    side = [unit(np.cross(tangent[0], np.eye(3)[np.abs(tangent[0]).argmin()]))]
+    side = [unit(cross(tangent[0], np.eye(3)[np.abs(tangent[0]).argmin()]))]
     for t in tangent[1:]:
         side.append(unit(side[-1] - t * (side[-1] @ t)))
-    across = np.stack([np.array(side), np.cross(tangent, side)], axis=1)  # (N, 2, 3)
+    across = np.stack([np.array(side), cross(tangent, np.array(side))], axis=1)  # (N, 2, 3)
     angle, turn = _circle(sections)
     normals = np.einsum("cj,njk->nck", turn, across)
     ring = path[:, None] + radius_m * normals
@@ -152,7 +150,7 @@ def tube(path_m: ArrayLike, radius_m: float, *, sections: int = 8) -> Mesh:
 def _end(middle_m: Array, ring_m: Array, normal: Array, uv: Array) -> Mesh:
     rows = np.stack([np.broadcast_to(middle_m, ring_m.shape), ring_m])
     places = np.stack([0 * uv, uv])
-    if np.cross(ring_m[1] - ring_m[0], ring_m[0] - middle_m) @ normal < 0:
+    if cross(ring_m[1] - ring_m[0], ring_m[0] - middle_m) @ normal < 0:
         rows, places = rows[::-1], places[::-1]
     return _patches(rows[None], np.broadcast_to(normal, (1, *rows.shape)), places[None])
 
@@ -176,7 +174,7 @@ def sheet(points_m: ArrayLike) -> Mesh:
     p = np.asarray(points_m, float)
     rows, columns = np.gradient(p, axis=0), np.gradient(p, axis=1)
     u, v = (np.cumsum(np.linalg.norm(np.diff(p, axis=k, prepend=np.take(p, [0], k)), axis=2), axis=k) for k in (1, 0))
-    return _patches(p[None], unit(np.cross(columns, rows))[None], np.stack([u, v], axis=-1)[None])
+    return _patches(p[None], unit(cross(columns, rows))[None], np.stack([u, v], axis=-1)[None])
 
 
 def card(size_m: tuple[float, float], *, cell: Hole = (0.0, 1.0, 0.0, 1.0)) -> Mesh:
@@ -257,7 +255,7 @@ def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes
     near, far = -LAP_M, LAP_M
     laps = [(near, width - near, e + near, e + far) for e in (0, height)]
     laps += [(e + near, e + far, near, height - near) for e in (0, width)]
-    behind = -LAP_BEHIND_M * unit(np.cross(u, v))
+    behind = -LAP_BEHIND_M * unit(cross(u, v))
     return joined([_part(corner, u, v, cell) for cell in cells] + [_part(corner + behind, u, v, lap) for lap in laps])
 
 
@@ -276,6 +274,6 @@ def reveal(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, hole: 
     u, v = unit(edge_u_m), unit(edge_v_m)
     u0, u1, v0, v1 = hole
     near = np.asarray(corner_m, float) + u0 * u + v0 * v
-    across, along, deep = (u1 - u0) * u, (v1 - v0) * v, -depth_m * np.cross(u, v)
+    across, along, deep = (u1 - u0) * u, (v1 - v0) * v, -depth_m * cross(u, v)
     sides = [(near, deep, along), (near + across, along, deep), (near, across, deep), (near + along, deep, across)]
     return joined([quad(*side) for side in sides])

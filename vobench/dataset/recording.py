@@ -278,7 +278,7 @@ def _pair_notes(rig: Rig, calibration: str) -> Notes:
     if rig.right is None:
         return ()
     if not rig.baseline_m > LEAST_BASELINE_M:
-        raise InputError(f"left and right camera are in the same place, {rig.baseline_m:g} m apart: {calibration}")
+        raise InputError(f"left and right camera are in one place, {LEAST_BASELINE_M:g} m or less apart: {calibration}")
     return () if rectification(rig) else (UNRECTIFIABLE,)
 
 

@@ -15,14 +15,13 @@ from vobench.render.geometry import (
     Floats,
     Mask,
     Visibility,
-    areas_m2,
     ball,
     lengths,
     spots,
 )
 from vobench.render.lightmap import Texels, tangents
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
-from vobench.scene.mesh import face_normals, unit
+from vobench.scene.mesh import areas_m2, face_normals, unit
 
 FAR_OFF = 2.9  # radii of a rectangle, beyond which rays spread over its area tell as well what hides it
 MESH_SPOTS, CURVE_BITS = 8, 10

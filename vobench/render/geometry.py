@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material, pane_reflectance
-from vobench.scene.mesh import Triangles, unit
+from vobench.scene.mesh import Triangles, areas_m2, unit
 
 Floats = NDArray[Any]  # float32 where there are many, float64 inside formulas
 Indices = NDArray[np.int32]
@@ -44,12 +44,6 @@ def ball(points_m: Array) -> Ball:
     points = points_m.reshape(-1, 3)
     centre = (points.min(0) + points.max(0)) / 2
     return Ball(centre, float(np.linalg.norm(points - centre, axis=1).max()))
-
-
-def areas_m2(corners_m: Array) -> Array:
-    """Areas (F,) of triangles (F, 3, 3)."""
-    a, b, c = corners_m.swapaxes(0, 1)
-    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
 
 @dataclass(frozen=True, slots=True)

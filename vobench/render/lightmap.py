@@ -20,14 +20,13 @@ from vobench.render.geometry import (
     Mask,
     RayCaster,
     Visibility,
-    areas_m2,
     face_materials,
     lengths,
     off,
     take,
 )
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import Triangles, unit
+from vobench.scene.mesh import Triangles, areas_m2, unit
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -14,12 +14,12 @@ from vobench.render.bake import BakedScene, StaticScene, bodies
 from vobench.render.culling import bounds
 from vobench.render.direct_light import Rays, arriving, cell_spot, footprint, in_front, mirror_images
 from vobench.render.emitter import Emitter, emitters
-from vobench.render.geometry import Ball, Floats, Indices, Mask, RayCaster, Visibility, areas_m2, face_materials
+from vobench.render.geometry import Ball, Floats, Indices, Mask, RayCaster, Visibility, face_materials
 from vobench.render.indirect_light import FinalGather, Gatherer, blend, response, surfels
 from vobench.render.lightmap import Places, Texels, in_chunks, owners, texels, turns_px2
 from vobench.render.view import Box, PinholeView
 from vobench.scene.light import AreaLight, Light, Sky, Sun
-from vobench.scene.mesh import Triangles
+from vobench.scene.mesh import Triangles, areas_m2
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix

@@ -21,7 +21,6 @@ from vobench.run.frames import FrameRow
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 FAIL_RATIO = 0.1  # of the path, of scores without a lost-aware one
 BROKEN = 0.75  # the lost-aware score of a survivor that is off by half of what counts as failed
-ALL = "all"
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from annotated_types import MinLen
 from vobench.errors import SettingError
 from vobench.geometry.se3 import Array
 from vobench.scene.material import WHITE, Rgb
-from vobench.scene.mesh import Mesh, area_m2
+from vobench.scene.mesh import Mesh, areas_m2
 from vobench.setting import Positive, Share, settings
 
 NS_PER_S = 1e9
@@ -135,7 +135,7 @@ class AreaLight:
     @property
     def luminance_cd_m2(self) -> float:
         """Luminance of the faces: power / (π area)."""
-        return self.power_lm / (np.pi * area_m2(self.mesh.corners_m))
+        return self.power_lm / (np.pi * float(areas_m2(self.mesh.corners_m).sum()))
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ import scipy
 from vobench.errors import SuiteError
 from vobench.geometry.se3 import Array
 from vobench.motion.spline import Pose, PoseSpline
-from vobench.render.geometry import RayCaster, areas_m2
-from vobench.scene.mesh import Triangles
+from vobench.render.geometry import RayCaster
+from vobench.scene.mesh import Triangles, areas_m2
 from vobench.scene.scene import Scene, triangles
 
 LEVEL, FLOOR_STEP_M = 0.99, 0.02  # cosine of what counts as level, and how even a floor is

@@ -21,7 +21,7 @@ from vobench.geometry.se3 import Array
 from vobench.scene import scene as scripted
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Material, emitted_cd_m2
-from vobench.scene.mesh import Thing, area_m2
+from vobench.scene.mesh import Thing, areas_m2
 from vobench.scene.scene import Scene
 from vobench.suite.scene_file import SKY, SUN, Lighting, content, lit, materials_used
 from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile, SunSpec, hue
@@ -210,7 +210,7 @@ def _glow(things: Sequence[Thing], materials: Mapping[str, Material]) -> Iterato
         nth, count[thing.name] = count[thing.name], count[thing.name] + 1
         red, green, blue = (emission / luminance).tolist()
         name = f"{thing.name}.{nth}" if nth else thing.name
-        power_lm, colour = luminance * np.pi * area_m2(thing.mesh.corners_m), (red, green, blue)
+        power_lm, colour = luminance * np.pi * areas_m2(thing.mesh.corners_m).sum(), (red, green, blue)
         yield AreaLight(name, thing.mesh, power_lm, colour=colour, material=thing.material)
 
 

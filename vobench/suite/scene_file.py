@@ -15,7 +15,7 @@ from vobench.asset import FINISHES, MODEL_SUFFIXES
 from vobench.errors import SuiteError, unknown
 from vobench.scene.light import Light, Sky, Sun, scaled
 from vobench.scene.material import LUMINANCE, emitted_cd_m2
-from vobench.scene.mesh import area_m2
+from vobench.scene.mesh import areas_m2
 from vobench.scene.scene import Scene
 from vobench.setting import Triple
 from vobench.suite import yaml_file
@@ -105,11 +105,11 @@ def _bare(path: Path) -> SceneFile:
     if scale != 1:
         model = read_model(path, scale=scale)
     emission = {name: float(emitted_cd_m2(m) @ LUMINANCE) for name, m in model.materials.items()}
-    areas_m2 = [(float(area_m2(thing.mesh.corners_m)), thing.material) for thing in model.everything]
+    areas = [(float(areas_m2(thing.mesh.corners_m).sum()), thing.material) for thing in model.everything]
     lamps_lm = sum(light.power_lm for light in model.lights if not isinstance(light, Sun | Sky))
-    glow_lm = sum(np.pi * area * emission[material] for area, material in areas_m2)
+    glow_lm = sum(np.pi * area * emission[material] for area, material in areas)
     sun_lx = sum(light.illuminance_lx for light in model.lights if isinstance(light, Sun | Sky))
-    lux = sun_lx + 2 * (lamps_lm + glow_lm) / sum(area for area, _ in areas_m2)
+    lux = sun_lx + 2 * (lamps_lm + glow_lm) / sum(area for area, _ in areas)
     name = re.sub(r"[^a-z0-9_]+", "_", path.stem.lower()).strip("_") or "model"
     spec = SceneFile(
         name=name, white_cd_m2=max(float(lux / np.pi), 1.0), meshes=(ModelSpec(file=str(path.resolve()), scale=scale),)
@@ -133,7 +133,7 @@ def _lit_from_outside(spec: SceneFile, shape: Scene) -> SceneFile:
         return replace(
             spec, sun=sun, sky=sky, white_cd_m2=float((sun.illuminance_lx * up + sky.illuminance_lx) / np.pi)
         )
-    area = sum(float(area_m2(thing.mesh.corners_m)) for thing in shape.things)
+    area = sum(float(areas_m2(thing.mesh.corners_m).sum()) for thing in shape.things)
     lamp = PointLamp(name="lamp", center_m=lamp_m, power_lm=ROOM_LX * area / 2)
     return replace(spec, lamps=(lamp,), white_cd_m2=float(ROOM_LX / np.pi))
 
