@@ -14,7 +14,7 @@ from vobench.render.emitter import cosine_weighted
 from vobench.render.geometry import FAR_M, RAY_OFFSET_M, Floats, Hits, Indices, Mask, Visibility, face_materials, take
 from vobench.render.lightmap import Atlas, Layout, Places, Texels, in_chunks, side_of, tangents
 from vobench.scene.light import Sky
-from vobench.scene.material import LUMINANCE, Material, fresnel, linear, under_coat
+from vobench.scene.material import LUMINANCE, Material, fresnel, linear_texture, under_coat
 from vobench.scene.mesh import Triangles
 
 if TYPE_CHECKING:
@@ -135,9 +135,7 @@ def _tile(material: Material) -> Floats:
     """Linear reflectance (h, w, 3), or (h, w, 1) of a grey one, of a texture, coarse."""
     if material.texture is None:
         return np.ones((1, 1, 1), np.float32)
-    pixels = material.texture.pixels()
-    if pixels.ndim == 3:
-        pixels = linear(np.arange(256, dtype=np.uint8))[pixels[..., :3]]
+    pixels = linear_texture(material.texture)
     height, width = (min(side, MOST_PX) for side in pixels.shape[:2])
     small = cv2.resize(pixels, (width, height), interpolation=cv2.INTER_AREA)
     return np.asarray(small.reshape(height, width, -1), np.float32)

@@ -20,7 +20,7 @@ from vobench.errors import MissingDependencyError
 from vobench.geometry.se3 import Array
 from vobench.render.occlusion import Pixels, opaque, twins
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
-from vobench.scene.material import Map, Material, Rgb, Texture, linear
+from vobench.scene.material import Map, Material, Rgb, Texture, linear_texture
 from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
 
@@ -330,9 +330,7 @@ def _texture(mi: Any, texture: Texture | None, colour: Rgb) -> Plugin:
     """A colour times a texture, linear, repeated, linear between texels, row 0 at v = 0."""
     if texture is None:
         return _rgb(colour)
-    pixels = texture.pixels()
-    grey = pixels[..., None] if pixels.ndim == 2 else linear(pixels[..., :3])
-    return _bitmap(mi, grey * np.array(colour, np.float32))
+    return _bitmap(mi, linear_texture(texture) * np.array(colour, np.float32))
 
 
 def _bitmap(mi: Any, tile: Map, *, filter_type: str = "bilinear") -> Plugin:

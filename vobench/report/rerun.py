@@ -29,7 +29,7 @@ from vobench.report.blueprint import FRAME_TIMELINE, truth_entity
 from vobench.run.estimate import ESTIMATE, POINTS, read_tracks
 from vobench.run.folder import CASE, SEQUENCE, STATUSES, SURVIVED, RunFolder, TrialScore, read_tum
 from vobench.run.frames import GROUND_TRUTH, FrameRow, read_frames
-from vobench.scene.material import Material, linear, srgb
+from vobench.scene.material import Material, linear_texture, srgb
 from vobench.scene.scene import Way
 from vobench.sensor.pixel_truth import CHANNELS, TruthNames, picture
 from vobench.sequence import EncodedFrame, Sequence, StereoTruth, read_truth_frames, read_truth_names, truth_channels
@@ -632,11 +632,7 @@ def scene_mesh(folder: RunFolder, case: str) -> SceneMesh | None:
 
 def _tone(look: Material) -> Array:
     """A material's mean reflectance (3,)."""
-    color = np.array(look.colour)
-    if look.texture is None:
-        return color
-    pixels = look.texture.pixels()
-    return np.asarray(color * (linear(pixels[..., :3]).mean((0, 1)) if pixels.ndim == 3 else pixels.mean()))
+    return np.array(look.colour) * (linear_texture(look.texture).mean((0, 1)) if look.texture else 1)
 
 
 def _stats(frames: Rows[FrameRow]) -> dict[str, Array]:

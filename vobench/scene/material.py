@@ -74,7 +74,9 @@ class Material:
 def linear(srgb: ArrayLike) -> Map:
     """Linear values of sRGB ones, both in [0, 1], or of uint8. Source: IEC 61966-2-1."""
     values = np.asarray(srgb)
-    c = values.astype(np.float32) / (255 if values.dtype == np.uint8 else 1)
+    if values.dtype == np.uint8:
+        return np.asarray(linear(np.arange(256, dtype=np.float32) / 255)[values])
+    c = values.astype(np.float32)
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
@@ -85,13 +87,17 @@ def srgb(values: ArrayLike) -> NDArray[np.uint8]:
     return np.asarray(np.rint(255 * encoded), np.uint8)
 
 
+def linear_texture(texture: Texture) -> Map:
+    """Linear values (H, W, 3), or (H, W, 1) of a grey texture, row 0 at v = 0."""
+    pixels = texture.pixels()
+    return pixels[..., None] if pixels.ndim == 2 else linear(pixels[..., :3])
+
+
 def emitted_cd_m2(material: Material) -> Array:
     """Luminance (3,) of each channel of what a material emits, the mean over its texture."""
     if material.emission_texture is None:
         return np.array(material.emission_cd_m2)
-    pixels = material.emission_texture.pixels()
-    grey = pixels[..., None] if pixels.ndim == 2 else linear(pixels[..., :3])
-    return np.asarray(material.emission_cd_m2 * grey.mean((0, 1), dtype=float))
+    return np.asarray(material.emission_cd_m2 * linear_texture(material.emission_texture).mean((0, 1), dtype=float))
 
 
 def reflectance(material: Material) -> Map:
