@@ -360,8 +360,11 @@ def test_the_last_instant_that_the_drive_knows_is_the_limit_of_those_before() ->
 
 @pytest.mark.parametrize("late_ns", [float("nan"), 1e12])
 def test_an_instant_that_the_drive_does_not_know_is_refused(late_ns: float) -> None:
-    with pytest.raises(MotionError, match=r"ends at \d+ ns, and is asked"):
-        driven_driven("clean").motion.at(np.array([0.0, late_ns]))
+    motion = driven_driven("clean").motion
+    last_ns = motion.breaks_ns[-1] + 1
+    motion.at(np.array([last_ns]))
+    with pytest.raises(MotionError, match=rf"ends at \d+ ns, and is asked where it is at {late_ns:.0f} ns"):
+        motion.at(np.array([last_ns, late_ns]))
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)

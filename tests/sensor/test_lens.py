@@ -196,6 +196,11 @@ def test_dirt_is_one_per_camera_and_only_thickens() -> None:
     assert np.corrcoef(thin.ravel(), other.ravel())[0, 1] < 0.5
 
 
+def test_the_dirt_of_a_seed_stays_what_it_was_so_that_sequences_come_again() -> None:
+    taken = dirt(SHAPE, 0.1, np.random.default_rng(3))
+    np.testing.assert_allclose(taken[60, ::40], [0.05316098, 0.15589388, 0.24826597, 0.06259832], rtol=1e-6)
+
+
 def test_dirt_dims_what_is_bright_and_veils_what_is_dark() -> None:
     dirty, radiance = maps(CameraSettings(dirt=0.2)), np.zeros(SHAPE, np.float32)
     radiance[:60] = 2.0
