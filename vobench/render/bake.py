@@ -223,6 +223,7 @@ def bake(scene: Scene, settings: BakeSettings, report: Report = lambda _: None) 
         direct[index] = direct_layer(scene, index, still, light)
         report(1 - (1 - GATHER_DONE) * row / len(instants))
     reflectance = groups.mean(scatters, weights)
+    del still, points, layout  # bounces take memory of their own
     by_mirrors = _by_mirrors(scene, [index for index, _ in instants], gathered, len(groups))
     around = bounced(received, reflectance, gathered, by_mirrors, bounces=settings.bounces)
     first = [instants.index((index, key_times_ns(one)[0])) for index, one in enumerate(scene.lights)]

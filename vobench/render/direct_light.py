@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vobench.render.emitter import Aim, Between, Emitter, emitters
 from vobench.render.geometry import RAY_OFFSET_M, Ball, Flat, Floats, Indices, Mask, RayCaster, Visibility, ball
-from vobench.render.lightmap import Layout, Places, Texels, in_chunks
+from vobench.render.lightmap import Layout, Places, Texels, chunked
 from vobench.scene.light import Light, Sky
 
 
@@ -128,82 +128,84 @@ def direct_light(
     Elsewhere many spots on it are added up without rays, and the sky in a pane is smoothed instead.
     """
     light, share = np.zeros((2, len(points)), np.float32)
-    clear, some = np.full(len(points), np.nan, np.float32), np.flatnonzero(among)
-    some = some[in_front(emitter.ball, points.points_m[some], points.normals[some])]
-    some = some[emitter.may_light(points.points_m[some])]
+    clear, some = np.full(len(points), np.nan, np.float32), reached(emitter, points, np.flatnonzero(among))
     kinds = first_rays(emitter, points.points_m[some], side)
     is_soft = bool((kinds > 1).any())
     for kind in np.unique(kinds):
         own = some[(kinds == kind) & (layout.few[some] if is_soft else True)]
-        light[own], clear[own], unshaded = arriving(emitter, points.take(own), visibility, Rays(int(kind)))
+        light[own], clear[own], unshaded = arriving(emitter, points, own, visibility, Rays(int(kind)))
         share[own] = light[own] / np.maximum(unshaded, 1e-30)
     if emitter.sky == "pane":
         return layout.blurred(layout.between(light))
     half = _half_shadow(clear, layout, cells, some)
     if not is_soft:
-        light[half] = arriving(emitter, points.take(half), visibility, Rays(3 * side // 2, spread=True))[0]
+        light[half] = arriving(emitter, points, half, visibility, Rays(3 * side // 2, spread=True))[0]
         return light
     share, is_half = layout.between(share), np.zeros(len(points), bool)
     is_half[half] = True
     for kind in np.unique(kinds):
         own = some[(kinds == kind) & ~is_half[some] & (share[some] > 0)]
-        light[own] = share[own] * open_light(emitter, points.take(own), max(2 * int(kind) - 1, emitter.spots))
-    light[half], clear[half], _ = arriving(emitter, points.take(half), visibility, Rays(side, spread=True))
+        light[own] = share[own] * open_light(emitter, points, own, max(2 * int(kind) - 1, emitter.spots))
+    light[half], clear[half], _ = arriving(emitter, points, half, visibility, Rays(side, spread=True))
     is_half[half] = (clear[half] > 0) & (clear[half] < 1)
     return np.where(is_half | bool(emitter.sky or emitter.spots), layout.blurred(light), light)
 
 
-def in_front(what: Ball, points_m: Floats, normals: Floats) -> Mask:
-    """Points (P, 3) with normals (P, 3) before which some of a ball lies."""
-    ahead = np.einsum("ij,ij->i", what.centre_m - points_m, normals)
-    return np.asarray(ahead > -what.radius_m)
+def reached(emitter: Emitter, points: Texels, some: Places) -> Places:
+    """Those of some points (N,) that any light of an emitter can reach, as far as that is known without rays."""
+
+    def of(part: slice) -> Places:
+        own = some[part]
+        ahead = np.einsum("ij,ij->i", emitter.ball.centre_m - points.points_m[own], points.normals[own])
+        own = own[ahead > -emitter.ball.radius_m]
+        return np.asarray(own[emitter.may_light(points.points_m[own])])
+
+    return chunked(of, len(some))
 
 
 def first_rays(emitter: Emitter, points_m: Floats, side: int) -> NDArray[np.int64]:
     """How many rays along a side points (P, 3) need to tell whether they see an emitter: one where shadows are hard."""
-    width = np.concatenate([*in_chunks(lambda part: emitter.width_rad(points_m[part]), len(points_m)), np.zeros(0)])
+    width = chunked(lambda part: emitter.width_rad(points_m[part]), len(points_m))
     middle = 3 * side // 4 if emitter.sky == "pane" else side // 2
     return np.select([width == 0, width < NARROW_RAD, width < WIDE_RAD], [1, max(side // 2, 1), max(middle, 1)], side)
 
 
-def arriving(emitter: Emitter, texels: Texels, between: Between, rays: Rays) -> tuple[Floats, Floats, Floats]:
-    """Illuminance (P,), the share of rays that met nothing opaque (P,), NaN where none was sent, and light unshaded."""
-    parts = in_chunks(lambda part: _arriving(emitter, texels.take(part), between, rays), len(texels))
-    light, clear, unshaded = np.concatenate([np.zeros((3, 0), np.float32), *map(np.array, parts)], 1)
-    return light, clear, unshaded
+def arriving(emitter: Emitter, points: Texels, some: Places, between: Between, rays: Rays) -> Floats:
+    """(3, N) of some points: illuminance, share of rays that met nothing opaque (NaN: none sent), light unshaded."""
+    return chunked(lambda part: _arriving(emitter, points.take(some[part]), between, rays), len(some)).T
 
 
-def _arriving(emitter: Emitter, texels: Texels, between: Between, rays: Rays) -> tuple[Floats, Floats, Floats]:
+def _arriving(emitter: Emitter, texels: Texels, between: Between, rays: Rays) -> Floats:
     total, unshaded, passed, cast = (np.zeros(len(texels), np.float32) for _ in range(4))
     towards = emitter.towards(texels)
     for cell in range(rays.side**2):
         way, light = _sent(towards, texels, cell, rays.side)
         unshaded += light
-        faced: Places | slice = np.flatnonzero(light > 0)
+        is_lit = light > 0
         # All at once where most are: picking rows costs as much as rays.
-        faced = faced if np.count_nonzero(light > 0) < MOST * len(light) else slice(None)
+        faced = np.flatnonzero(is_lit) if np.count_nonzero(is_lit) < MOST * len(light) else slice(None)
         start, ahead = texels.points_m[faced], way[faced]
         if rays.spread:
             aside = footprint(texels, faced, cell)
             start, ahead = start + aside, ahead - aside
         share = emitter.passing(between, start, ahead)
         total[faced] += light[faced] * share
-        passed[faced] += (share > 0) & (light[faced] > 0)
-        cast += light > 0
+        passed[faced] += (share > 0) & is_lit[faced]
+        cast += is_lit
     with np.errstate(invalid="ignore"):
-        return total / rays.side**2, passed / cast, unshaded / rays.side**2
+        return np.stack([total / rays.side**2, passed / cast, unshaded / rays.side**2], -1)
 
 
-def open_light(emitter: Emitter, texels: Texels, side: int) -> Floats:
-    """Illuminance (P,) if nothing were in the way."""
+def open_light(emitter: Emitter, points: Texels, some: Places, side: int) -> Floats:
+    """Illuminance (N,) of some points if nothing were in the way."""
 
     def of(part: slice) -> Floats:
-        own = texels.take(part)
+        own = points.take(some[part])
         towards = (emitter.evenly or emitter.towards)(own)
         light = np.sum([_sent(towards, own, cell, side)[1] for cell in range(side**2)], axis=0)
         return np.asarray(light / np.float32(side**2), np.float32)
 
-    return np.concatenate([*in_chunks(of, len(texels)), np.zeros(0, np.float32)])
+    return chunked(of, len(some))
 
 
 def _sent(towards: Aim, texels: Texels, cell: int, side: int) -> tuple[Floats, Floats]:

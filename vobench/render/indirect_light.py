@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vobench.render.direct_light import JITTER, cell_spot
 from vobench.render.emitter import cosine_weighted
 from vobench.render.geometry import FAR_M, RAY_OFFSET_M, Floats, Hits, Indices, Mask, Visibility, face_materials, take
-from vobench.render.lightmap import Atlas, Layout, Places, Texels, in_chunks, side_of, tangents
+from vobench.render.lightmap import Atlas, Layout, Places, Texels, chunked, in_chunks, side_of, tangents
 from vobench.scene.light import Sky
 from vobench.scene.material import LUMINANCE, Material, fresnel, linear_texture, under_coat
 from vobench.scene.mesh import Triangles
@@ -58,8 +58,7 @@ def surfels(points: Texels, thing: Indices, step_m: Floats, visibility: Visibili
     of, middle = _grouped(key, points.points_m)
     # What a thin wall parts is not one.
     high = points.points_m + RAISED * step_m[:, None] * points.planes
-    parts = in_chunks(lambda part: visibility.opaque.occluded(high[part], high[middle[of[part]]]), len(points))
-    beyond = np.concatenate([*parts, np.zeros(0, bool)])
+    beyond = chunked(lambda part: visibility.opaque.occluded(high[part], high[middle[of[part]]]), len(points))
     of, middle = _grouped(2 * of + beyond, points.points_m)
     return Surfels(of.astype(np.int32), middle, step_m[middle].astype(np.float32))
 
@@ -85,8 +84,8 @@ def blend(points: Texels, groups: Surfels, layout: Layout, visibility: Visibilit
     near = known[near]
     high = p + RAISED * step * points.planes[groups.middle]
     own = np.repeat(np.arange(len(groups)), near.shape[1])
-    parts = in_chunks(lambda part: visibility.opaque.occluded(high[own[part]], p[near.ravel()[part]]), len(own))
-    hidden = np.concatenate(parts).reshape(near.shape) & (near != np.arange(len(groups))[:, None])
+    hidden = chunked(lambda part: visibility.opaque.occluded(high[own[part]], p[near.ravel()[part]]), len(own))
+    hidden = hidden.reshape(near.shape) & (near != np.arange(len(groups))[:, None])
     hidden &= ~hidden.all(1, keepdims=True)
     blends = in_chunks(
         lambda part: _weights(points.take(part), groups, groups.of[part], near, hidden=hidden, middles=(p, n)),
@@ -117,10 +116,11 @@ MOST_PX = 256  # along a texture's side, finer than texels are apart
 def albedo(faces: Triangles, materials: Mapping[str, Material], points: Texels) -> Floats:
     """Linear reflectance (P, 3) of the body there, of what its coat lets in."""
     result = np.zeros((len(points), 3), np.float32)
-    names = np.array([thing.material for thing in faces.things])[faces.thing[points.face]]
+    number = {name: nth for nth, name in enumerate(materials)}
+    of = np.array([number.get(thing.material, -1) for thing in faces.things], np.int32)[faces.thing[points.face]]
     weights = np.column_stack([1 - points.uv.sum(1), points.uv])
-    for name, material in sorted(materials.items()):
-        own = np.flatnonzero(names == name)
+    for name, material in materials.items():
+        own = np.flatnonzero(of == number[name])
         if len(own) and material.kind == "body":
             tile = _tile(material)
             rows, columns = tile.shape[:2]

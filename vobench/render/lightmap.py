@@ -3,9 +3,9 @@
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import scipy
@@ -390,22 +390,21 @@ def texels(
     beside = _beside(index, atlas, own)
     etas = np.array([m.eta if m and m.is_coated else 0.0 for m in face_materials(faces, materials)], np.float32)
     dither = np.random.default_rng([seed, 1]).random((atlas.height * atlas.width, 2), dtype=np.float32)
+    face, vectors = own.face[index], np.empty((5, len(index), 3), np.float32)
 
-    def made(part: slice) -> Texels:
-        face, texel = own.face[index[part]], index[part]
+    def place(part: slice) -> None:
+        on, uv = face[part], own.uv[index[part]]
         rim = beside[:, part] == np.arange(len(index))[part]
-        weights = np.column_stack([1 - own.uv[texel].sum(1), own.uv[texel]])
-        planes = faces.plane[face]
-        steps = _steps(faces.corners_m[face], atlas.light_px[face].astype(float))
-        points = np.einsum("ni,nij->nj", weights, faces.corners_m[face]) + _inwards(steps, rim)
-        points = off(points, planes)
-        normals = unit(np.einsum("ni,nij->nj", weights, faces.normals[face]))
+        weights, planes = np.column_stack([1 - uv.sum(1), uv]), faces.plane[on]
+        steps = _steps(faces.corners_m[on], atlas.light_px[on].astype(float))
+        points = off(np.einsum("ni,nij->nj", weights, faces.corners_m[on]) + _inwards(steps, rim), planes)
+        normals = unit(np.einsum("ni,nij->nj", weights, faces.normals[on]))
         normals = np.where(np.einsum("ij,ij->i", normals, planes)[:, None] > FACING, normals, planes)
-        p, n, g, u, v, uv = (np.asarray(x, np.float32) for x in (points, normals, planes, *steps, weights[:, 1:]))
-        return Texels(p, n, g, u, v, texel, face, uv, etas[faces.thing[face]], dither[texel])
+        vectors[:, part] = points, normals, planes, *steps
 
-    parts = in_chunks(made, len(index)) or [made(slice(0, 0))]
-    every = Texels(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Texels)))
+    in_chunks(place, len(index))
+    p, n, g, u, v = vectors
+    every = Texels(p, n, g, u, v, index, face, own.uv[index], etas[faces.thing[face]], dither[index])
     inside = np.zeros(len(index), bool)
     if visibility is not None:
         inside = _buried(every, visibility) | _covered(every, visibility)
@@ -442,10 +441,7 @@ def _steps(corners_m: Array, places: Array) -> tuple[Array, Array]:
 
 def _buried(points: Texels, visibility: Visibility) -> Mask:
     """Which points (P,) see only backs of faces, as does the floor under a crate."""
-    return np.concatenate([*in_chunks(lambda part: _sees_backs(points.take(part), visibility), len(points)), _NONE])
-
-
-_NONE = np.zeros(0, bool)
+    return chunked(lambda part: _sees_backs(points.take(part), visibility), len(points))
 
 
 def _covered(points: Texels, visibility: Visibility) -> Mask:
@@ -499,7 +495,7 @@ def _kept(
         if visibility is None:
             break
         # A texel that reaches behind a thin wall has its light from its middle alone.
-        hidden = np.concatenate([*in_chunks(partial(_hidden, few.points_m, near[second], visibility), len(few)), _NONE])
+        hidden = chunked(partial(_hidden, few.points_m, near[second], visibility), len(few))
         straight[second] &= ~hidden
         straight[first] &= ~hidden[near[first]]
     few.step_u_m[~straight[:2].all(0)] = 0
@@ -515,10 +511,10 @@ def _weights(few: Mask, beside: Indices) -> "csr_array":
     known, result = few, scipy.sparse.diags_array(few.astype(np.float32), format="csr")
     for sides in (beside[:2], beside[2:]):
         weight = known[sides[0]].astype(np.float32) + known[sides[1]]
-        new = np.flatnonzero(~known & (weight > 0))
+        own, new = (np.flatnonzero(some).astype(np.int32) for some in (known, ~known & (weight > 0)))
         pairs = [(new[known[side[new]]], side) for side in sides]
-        rows = np.concatenate([np.flatnonzero(known), *(own for own, _ in pairs)])
-        columns = np.concatenate([np.flatnonzero(known), *(side[own] for own, side in pairs)])
+        rows = np.concatenate([own, *(one for one, _ in pairs)])
+        columns = np.concatenate([own, *(side[one] for one, side in pairs)])
         shares = np.where(known[rows], np.float32(1), 1 / np.maximum(weight[rows], 1))
         step = scipy.sparse.csr_array((shares.astype(np.float32), (rows, columns)), (len(known), len(known)))
         result, known = step @ result, known | (weight > 0)
@@ -582,3 +578,8 @@ def in_chunks(
             if done:
                 done(len(results) / len(slices))
     return results
+
+
+def chunked(work: Callable[[slice], NDArray[Any]], count: int) -> NDArray[Any]:
+    """What `work` gives for slices of `count` things, one after the other (count, ...), on all cores."""
+    return np.concatenate(in_chunks(work, count) or [work(slice(0, 0))])

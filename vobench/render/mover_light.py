@@ -12,11 +12,11 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.render.bake import BakedScene, StaticScene, bodies
 from vobench.render.culling import bounds
-from vobench.render.direct_light import Rays, arriving, cell_spot, footprint, in_front, mirror_images
+from vobench.render.direct_light import Rays, arriving, cell_spot, footprint, mirror_images, reached
 from vobench.render.emitter import Emitter, emitters
 from vobench.render.geometry import Ball, Floats, Indices, Mask, RayCaster, Visibility, face_materials
 from vobench.render.indirect_light import FinalGather, Gatherer, blend, response, surfels
-from vobench.render.lightmap import Places, Texels, in_chunks, owners, texels, turns_px2
+from vobench.render.lightmap import Places, Texels, chunked, owners, texels, turns_px2
 from vobench.render.view import Box, PinholeView
 from vobench.scene.light import AreaLight, Light, Sky, Sun
 from vobench.scene.mesh import Triangles, areas_m2
@@ -181,10 +181,9 @@ class MoverLight:
         shining = [self._lit_by(i, suns_ns[i]) if is_on[i] else [] for i in range(len(self._lights))]
         for index, lit in enumerate(shining):
             for emitter in [one.emitter for one in lit]:
-                some = np.flatnonzero(in_front(emitter.ball, points.points_m, points.normals))
-                some = some[emitter.may_light(points.points_m[some])]
+                some = reached(emitter, points, np.arange(len(points)))
                 rays = Rays(SKY_SIDE if emitter.sky else SIDE)
-                direct[index, some] += arriving(emitter, points.take(some), together, rays)[0]
+                direct[index, some] += arriving(emitter, points, some, together, rays)[0]
         count = GATHER_RAYS if self._baked.settings.bounces else 0
         gathered = self._gatherer.gather(points.take(self._groups), rays=count)
         known = np.zeros(int(self._still.cells.max(initial=-1)) + 1, bool)
@@ -259,9 +258,7 @@ class MoverLight:
 
     def _lit_from(self, emitter: Emitter, index: int) -> _Lit:
         points, straight = self._still.points, self._straight[index]
-        some = self._by_cell[straight[self._by_cell] > UNNOTICED * straight.max(initial=0)]
-        some = some[in_front(emitter.ball, points.points_m[some], points.normals[some])]
-        some = some[emitter.may_light(points.points_m[some])]
+        some = reached(emitter, points, self._by_cell[straight[self._by_cell] > UNNOTICED * straight.max(initial=0)])
         has, cells = np.zeros(len(points), bool), self._still.cells[some]
         has[some] = True
         starts = np.flatnonzero(np.diff(cells, prepend=-1, append=-1))
@@ -313,8 +310,7 @@ class MoverLight:
         return points[(near | lit.near(moment.balls, others))[cells]]
 
     def _traced(self, emitter: Emitter, some: Places, movers: RayCaster, side: int) -> Floats:
-        found = in_chunks(lambda part: self._lost_at(emitter, some[part], movers, side), len(some))
-        return np.concatenate([*found, np.zeros(0, np.float32)])
+        return chunked(lambda part: self._lost_at(emitter, some[part], movers, side), len(some))
 
     def _lost_at(self, emitter: Emitter, some: Places, movers: RayCaster, side: int) -> Floats:
         own = self._still.points.take(some)
