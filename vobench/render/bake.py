@@ -17,7 +17,7 @@ from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.render.direct_light import direct_light, mirror_images
 from vobench.render.emitter import emitters
-from vobench.render.geometry import FAR_M, Floats, Indices, Mask, RayCaster, Visibility, face_materials, off
+from vobench.render.geometry import FAR_M, Floats, Indices, Mask, RayCaster, Visibility, distinct, face_materials, off
 from vobench.render.indirect_light import FinalGather, Gatherer, albedo, blend, bounced, response, surfels
 from vobench.render.lightmap import Atlas, Layout, Texels, owners, texels, unwrap
 from vobench.scene.light import NS_PER_S, AreaLight, Light, Sky, Sun
@@ -152,7 +152,7 @@ def _sunlit(scene: Scene, faces: Triangles) -> Mask:
     small = np.bincount(faces.thing, area_m2)[faces.thing] < SMALL_M2
     offset = np.rint(np.einsum("ij,ij->i", faces.plane, faces.corners_m[:, 0]) * 1e3)
     keys = np.column_stack([faces.thing, *(np.where(small, 0, x) for x in (*np.rint(faces.plane * 1e3).T, offset))])
-    group = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    group = distinct(keys)[1]
     return np.asarray((np.bincount(group, lit) > 0)[group])
 
 

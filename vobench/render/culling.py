@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.render.geometry import distinct
 from vobench.render.view import Box, PinholeView, Plane
 from vobench.scene.material import Material, fresnel
 from vobench.scene.mesh import Triangles, unit
@@ -76,9 +77,11 @@ def _welded(points_m: Array) -> tuple[Array, Indices]:
 
 def _open_edges(faces: Indices) -> Indices:
     """The edges (E, 2), lower end first, that a single one of the faces (F, 3) has; a face and its back are one."""
-    distinct = np.unique(np.sort(faces, 1), axis=0)
-    edges, count = np.unique(distinct[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=0, return_counts=True)
-    return np.asarray(edges[(count == 1) & (edges[:, 0] < edges[:, 1])])
+    faces = np.sort(faces, 1)
+    edges = faces[distinct(faces)[0]][:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
+    first, which = distinct(edges)
+    alone = edges[first[np.bincount(which) == 1]]
+    return np.asarray(alone[alone[:, 0] < alone[:, 1]])
 
 
 def _cuts(points: Array, edges: Indices) -> dict[int, list[tuple[float, int]]]:
@@ -289,8 +292,7 @@ def geometry(faces: Triangles, light_uv: Floats, materials: dict[str, Material])
     mirror, found = _mirrors(parts.corners_m, faces.plane[parent], areas, mover=mover, strength=strength, pane=pane)
     nth_look = {id(look): nth for nth, look in enumerate(looks)}
     keys = np.column_stack([mover, lamp, mirror, np.array([nth_look[id(look)] for look in looks])[thing]])
-    _, first, batch = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    batch = batch.ravel()
+    first, batch = distinct(keys)
     area = np.bincount(batch, areas)
     batches = tuple(
         Batch(
@@ -339,10 +341,10 @@ def _mirrors(
     free = (strength > 0) & normals.any(1)
     index, found = np.full(len(areas), -1), list[Mirror]()
     cells = np.round(np.column_stack([500 * normal, 500 * offset, mover, pane]))
-    _, cell = np.unique(cells, axis=0, return_inverse=True)
-    sizes = np.bincount(cell.ravel(), areas * free)
+    cell = distinct(cells)[1]
+    sizes = np.bincount(cell, areas * free)
     for nth in np.argsort(-sizes, kind="stable")[: 4 * MOST_MIRRORS].tolist():
-        own = np.flatnonzero(free & (cell.ravel() == nth))
+        own = np.flatnonzero(free & (cell == nth))
         if len(own) == 0 or len(found) == MOST_MIRRORS:
             continue
         seed = own[np.argmax(areas[own])]

@@ -1,6 +1,6 @@
 """Rays against the faces of a scene, and how much light passes between two points."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
@@ -27,6 +27,13 @@ WIDE_M2 = 0.05  # of mirrors that show lamps and of panes that show the sky
 def take(table: T, which: NDArray[np.int64] | Mask | slice) -> T:
     """Some rows of all the arrays that a dataclass has."""
     return type(table)(*(getattr(table, field.name)[which] for field in fields(table)))  # type: ignore[arg-type]
+
+
+def distinct(rows: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which rows (N, K) are the first of their kind (V,), kinds in their order, and the kind of each (N,)."""
+    order = np.lexsort(rows.T[::-1])  # in a fraction of the time of np.unique
+    new = np.append(True, (np.diff(rows[order], axis=0) != 0).any(1))[: len(rows)]
+    return order[new], (np.cumsum(new) - 1)[np.argsort(order)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +76,7 @@ def flats(faces: Triangles, among: ArrayLike, *, at_least_m2: float = 0.0) -> li
     own = np.asarray(among, np.int32)
     offset = np.einsum("ij,ij->i", faces.plane[own], faces.corners_m[own, 0])
     keys = np.rint(np.column_stack([faces.plane[own] / FLAT_RAD, offset / FLAT_M, faces.thing[own]])).astype(np.int64)
-    groups = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    groups = distinct(keys)[1]
     members = [own[groups == group] for group in range(groups.max(initial=-1) + 1)]
     found = [Flat(some, faces.corners_m[some], unit(faces.plane[some].mean(0))) for some in members]
     return [flat for flat in found if areas_m2(flat.corners_m).sum() >= at_least_m2]
@@ -209,7 +216,7 @@ class Visibility:
         for pane in flats(faces, own[is_pane], at_least_m2=WIDE_M2):
             if self._sees_sky(pane) and not any(pane.coincides(other) for other in self.sky_panes):
                 self.sky_panes.append(pane)
-        self._sky_panes = RayCaster(faces, _joined(self.sky_panes))
+        self._sky_panes = RayCaster(faces, [face for pane in self.sky_panes for face in pane.faces])
 
     def passing(self, origins_m: Floats, way: Floats) -> Floats:
         """Share (R,) of light that comes from origins + way (R, 3) to the origins (R, 3)."""
@@ -272,10 +279,6 @@ class Visibility:
         origins = np.tile(spots(pane.corners_m, a, b), (2, 1)) + RAY_OFFSET_M * directions
         blocked = self.opaque.stops(origins, FAR_M * directions) | self._glass.stops(origins, FAR_M * directions)
         return not blocked.all()
-
-
-def _joined(parts: Iterable[Flat]) -> Indices:
-    return np.concatenate([np.zeros(0, np.int32), *(part.faces for part in parts)])
 
 
 def spots(corners_m: Array, a: Floats, b: Floats) -> Array:

@@ -20,6 +20,7 @@ from vobench.render.geometry import (
     Mask,
     RayCaster,
     Visibility,
+    distinct,
     face_materials,
     lengths,
     off,
@@ -144,7 +145,7 @@ def _welded(corners_m: Array, *also: NDArray[np.int64]) -> tuple[Places, Places]
     """Of corners (F, 3, 3) the first (V,) of those at one place, and which each is (F, 3); `also` (F,) keeps apart."""
     keys = np.rint(corners_m / WELD_M).astype(np.int64).reshape(-1, 3)
     keys = np.column_stack([keys, *(np.repeat(other, 3) for other in also)])
-    _, first, of = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    first, of = distinct(keys)
     return first, of.reshape(-1, 3)
 
 
@@ -407,7 +408,7 @@ def texels(
     every = Texels(p, n, g, u, v, index, face, own.uv[index], etas[faces.thing[face]], dither[index])
     inside = np.zeros(len(index), bool)
     if visibility is not None:
-        inside = _buried(every, visibility) | _covered(every, visibility)
+        inside = chunked(lambda part: _buried(every.take(part), visibility), len(every)) | _covered(every, visibility)
     return _kept(every, atlas, own, beside, kept=~inside, visibility=visibility)
 
 
@@ -441,7 +442,16 @@ def _steps(corners_m: Array, places: Array) -> tuple[Array, Array]:
 
 def _buried(points: Texels, visibility: Visibility) -> Mask:
     """Which points (P,) see only backs of faces, as does the floor under a crate."""
-    return chunked(lambda part: _sees_backs(points.take(part), visibility), len(points))
+    inside = np.ones(len(points), bool)
+    for a, b in TILTS:
+        some = np.flatnonzero(inside)
+        p = points.take(some)
+        u_axis, v_axis = tangents(p.planes)
+        along = a * u_axis + b * v_axis + p.planes
+        face = visibility.opaque.nearest(p.points_m, along)
+        behind = np.einsum("ij,ij->i", along, visibility.normals[face]) > 0
+        inside[some] = (face >= 0) & behind & (visibility.faces.lamp[face] < 0)
+    return inside
 
 
 def _covered(points: Texels, visibility: Visibility) -> Mask:
@@ -459,19 +469,6 @@ def _covered(points: Texels, visibility: Visibility) -> Mask:
             caster, p, way = RayCaster(visibility.faces, others), points.points_m[some], points.planes[some] * CONTACT_M
             covered[some] = caster.stops(p - way, way)
     return covered
-
-
-def _sees_backs(points: Texels, visibility: Visibility) -> Mask:
-    inside = np.ones(len(points), bool)
-    for a, b in TILTS:
-        some = np.flatnonzero(inside)
-        p = points.take(some)
-        u_axis, v_axis = tangents(p.planes)
-        along = a * u_axis + b * v_axis + p.planes
-        face = visibility.opaque.nearest(p.points_m, along)
-        behind = np.einsum("ij,ij->i", along, visibility.normals[face]) > 0
-        inside[some] = (face >= 0) & behind & (visibility.faces.lamp[face] < 0)
-    return inside
 
 
 def _kept(

@@ -182,8 +182,8 @@ class MoverLight:
         for index, lit in enumerate(shining):
             for emitter in [one.emitter for one in lit]:
                 some = reached(emitter, points, np.arange(len(points)))
-                rays = Rays(SKY_SIDE if emitter.sky else SIDE)
-                direct[index, some] += arriving(emitter, points, some, together, rays)[0]
+                side = SKY_SIDE if emitter.sky else SIDE
+                direct[index, some] += arriving(emitter, points, some, together, Rays(side))[0]
         count = GATHER_RAYS if self._baked.settings.bounces else 0
         gathered = self._gatherer.gather(points.take(self._groups), rays=count)
         known = np.zeros(int(self._still.cells.max(initial=-1)) + 1, bool)
