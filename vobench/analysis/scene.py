@@ -14,7 +14,7 @@ from vobench.render.geometry import RayCaster
 from vobench.render.renderer import Renderer, still
 from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Texture, reflectance, srgb
-from vobench.scene.mesh import Triangles, unit
+from vobench.scene.mesh import Triangles, distinct, unit
 from vobench.scene.scene import Scene, triangles
 from vobench.suite.free_way import Free, down, free_circle
 
@@ -65,7 +65,7 @@ def survey(scene: Scene) -> SceneSurvey:
         (high[0], high[1], high[2]),
         tuple(light.name for light in scene.lights),
         _open_edges(faces, point),
-        len(point) - len(np.unique(np.sort(point, axis=1), axis=0)),
+        len(point) - len(distinct(np.sort(point, axis=1))[0]),
         _backs(faces, caster, eye_m),
         free,
     )
@@ -76,13 +76,13 @@ def _open_edges(faces: Triangles, point: NDArray[np.intp]) -> int:
     solid = np.isin(faces.thing, np.flatnonzero(np.bincount(faces.thing, minlength=len(faces.things)) > 2))
     ends = np.sort(np.stack([point[solid], np.roll(point[solid], -1, axis=1)], -1), axis=-1)
     edges = np.column_stack([np.repeat(faces.thing[solid], 3), ends.reshape(-1, 2)])
-    return int((np.unique(edges, axis=0, return_counts=True)[1] == 1).sum())
+    return int((np.bincount(distinct(edges)[1]) == 1).sum())
 
 
 def _points(faces: Triangles) -> NDArray[np.intp]:
     """Which point (F, 3) each corner is; nearer than WELD_M they are one."""
     cells = np.rint(faces.corners_m.reshape(-1, 3) / WELD_M).astype(np.int64)
-    return np.asarray(np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1, 3))
+    return distinct(cells)[1].reshape(-1, 3)
 
 
 def _backs(faces: Triangles, caster: RayCaster, eye_m: ArrayLike) -> float:

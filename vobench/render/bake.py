@@ -17,11 +17,11 @@ from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.render.direct_light import direct_light, mirror_images
 from vobench.render.emitter import emitters
-from vobench.render.geometry import FAR_M, Floats, Indices, Mask, RayCaster, Visibility, distinct, face_materials, off
+from vobench.render.geometry import FAR_M, Floats, Indices, Mask, RayCaster, Visibility, face_materials, off
 from vobench.render.indirect_light import FinalGather, Gatherer, albedo, blend, bounced, response, surfels
 from vobench.render.lightmap import Atlas, Layout, Texels, owners, texels, unwrap
 from vobench.scene.light import NS_PER_S, AreaLight, Light, Sky, Sun
-from vobench.scene.mesh import Triangles, areas_m2
+from vobench.scene.mesh import Triangles, areas_m2, distinct
 from vobench.scene.scene import Scene, triangles
 from vobench.setting import Positive, settings
 

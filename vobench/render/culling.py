@@ -12,10 +12,9 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import distinct
 from vobench.render.view import Box, PinholeView, Plane
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import Triangles, unit
+from vobench.scene.mesh import Triangles, distinct, unit
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]

@@ -77,9 +77,10 @@ def mirror_images(light: Light, visibility: Visibility, *, t_ns: float) -> list[
     found = []
     for image in [_MirrorImage(emitter, *mirror) for mirror in visibility.mirrors for emitter in own]:
         around = Ball(image.behind(image.emitter.ball.centre_m[None])[0], image.emitter.ball.radius_m)
-        may_light = partial(_shown, image, around)
-        emitter = Emitter(around, image.towards, image.width_rad, image.passing, may_light=may_light)
-        found.append(replace(emitter, evenly=image.evenly, spots=image.emitter.spots))
+        found.append(Emitter(
+            around, image.towards, image.width_rad, image.passing, may_light=partial(_shown, image, around),
+            evenly=image.evenly, spots=image.emitter.spots,
+        ))  # fmt: skip
     return found
 
 

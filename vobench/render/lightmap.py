@@ -20,14 +20,13 @@ from vobench.render.geometry import (
     Mask,
     RayCaster,
     Visibility,
-    distinct,
     face_materials,
     lengths,
     off,
     take,
 )
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import Triangles, areas_m2, unit
+from vobench.scene.mesh import Triangles, areas_m2, distinct, unit
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

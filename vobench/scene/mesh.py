@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,6 +62,13 @@ NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 def cross(a: Array, b: Array) -> Array:
     """Products (..., 3), to the last bit those of np.cross, whose checks take longer than small meshes do."""
     return np.asarray(a[..., NEXT] * b[..., LAST] - a[..., LAST] * b[..., NEXT])
+
+
+def distinct(rows: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which rows (N, K) are the first of their kind (V,), kinds in their order, and the kind of each (N,)."""
+    order = np.lexsort(rows.T[::-1])  # in a fraction of the time of np.unique
+    new = np.append(True, (np.diff(rows[order], axis=0) != 0).any(1))[: len(rows)]
+    return order[new], (np.cumsum(new) - 1)[np.argsort(order)]
 
 
 def face_normals(corners_m: Array) -> Array:
