@@ -14,15 +14,17 @@ from vobench.analysis.twin import (
     look_of,
     place_path,
     segment_errors,
+    stretch_disparities,
 )
 from vobench.errors import InputError
 from vobench.estimator.tools import stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking, stereo_rig
+from vobench.render.geometry import RayCaster
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, flat
-from vobench.scene.scene import Scene
+from vobench.scene.scene import Scene, triangles
 from vobench.sensor.image_sensor import NoiseStreams, expose
 from vobench.sensor.lens import lens_maps, through_lens
 from vobench.trajectory.trajectory import Trajectory
@@ -34,6 +36,7 @@ PAIR = stereo_pair(stereo_rig(LENS, pitch_deg=0, baseline_m=0.2), "test")
 @pytest.fixture(autouse=True)
 def few_draws(monkeypatch):
     monkeypatch.setattr(twin, "DRAWS", 600)
+    monkeypatch.setattr(twin, "NEAR_DRAWS", 200)
 
 
 def hall(*, pillar: bool = False) -> Scene:
@@ -76,7 +79,7 @@ def straight(length_m: float, count: int = 20) -> np.ndarray:
 
 
 def test_a_path_lies_free_and_its_disparities_agree():
-    wanted = np.full((3, 3), 150 * 0.2 / 2.5)
+    wanted = np.full((1, 3, 3), 150 * 0.2 / 2.5)
     found = place_path(hall(), straight(1.5), PAIR, wanted)
     places = (found.T_place_world @ straight(1.5))[:, :3, 3] / found.scale
     assert (np.abs(places) < [3.9, 2.9, 3.0]).all()
@@ -84,9 +87,20 @@ def test_a_path_lies_free_and_its_disparities_agree():
     assert place_path(hall(), straight(1.5), PAIR, wanted / 20).scale > 1.5  # a hall of 8 m has nothing so far away
 
 
+def test_where_a_path_was_is_found_by_its_disparities_along_the_way():
+    scene = hall()
+    there = se3.transform(se3.rotation_z(0.4), (-2.5, 0.6, 1.2)) @ straight(4.0)
+    wanted = stretch_disparities(RayCaster(triangles(scene, t_ns=0)), there, PAIR, 1.0, 4)
+    found = place_path(scene, straight(4.0), PAIR, wanted)
+    ends = (found.T_place_world @ straight(4.0))[[0, -1], :2, 3] / found.scale
+    assert found.misfit < 0.05
+    # The hall is its own image when it is turned by half.
+    assert min(np.abs(sign * ends - there[[0, -1], :2, 3]).max() for sign in (1, -1)) < 0.25
+
+
 def test_a_place_without_a_free_way_is_refused():
     with pytest.raises(InputError, match=r"no free way of 60.0 m was found in 'hall'; take fewer pictures"):
-        place_path(hall(pillar=True), straight(60.0), PAIR, np.full((3, 3), 10.0))
+        place_path(hall(pillar=True), straight(60.0), PAIR, np.full((1, 3, 3), 10.0))
 
 
 def test_a_tilted_world_is_levelled():

@@ -52,11 +52,15 @@ class Uncertain:
 
 @dataclass(frozen=True, slots=True)
 class Matches:
-    """Stereo matches: places (N, 2) in the right view over the focal length, row errors and disparities (N,) in px."""
+    """Stereo matches: places (N, 2) in the right view over the focal length, row errors and disparities (N,) in px.
+
+    window (N,) says in which run of pictures each was found.
+    """
 
     place: Array
     row_px: Array
     disparity_px: Array
+    window: NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +106,7 @@ class PairShot:
 def fit_pair(windows: Sequence[Sequence[PairShot]], pair: StereoPair) -> StereoFit | None:
     """What runs of successive shots say of a pair; None where too little matches."""
     matched = [[_matched(shot, pair) for shot in window] for window in windows]
-    matches = _all_matches([shot for window in matched for shot in window], pair)
+    matches = _all_matches(matched, pair)
     if len(matches.row_px) < FEWEST:
         return None
     rows, sigma, noise_px = _robust_fit(_row_terms(matches.place), matches.row_px)
@@ -182,10 +186,14 @@ def _matched(shot: PairShot, pair: StereoPair) -> Matched:
     return Matched(shot, corners[good], there[good], disparity_px[good])
 
 
-def _all_matches(matched: Sequence[Matched], pair: StereoPair) -> Matches:
-    left_px, right_px = (np.concatenate([getattr(each, px) for each in matched]) for px in ("left_px", "right_px"))
+def _all_matches(windows: Sequence[Sequence[Matched]], pair: StereoPair) -> Matches:
+    found = [(nth, shot) for nth, window in enumerate(windows) for shot in window]
+    left_px, right_px, disparity_px = (
+        np.concatenate([getattr(shot, px) for _, shot in found]) for px in ("left_px", "right_px", "disparity_px")
+    )
     row_px = (pair.right.in_view(right_px) - pair.left.in_view(left_px))[:, 1]
-    return Matches(pair.right.rays(right_px)[:, :2], row_px, np.concatenate([each.disparity_px for each in matched]))
+    window = np.repeat(*np.array([(nth, len(shot.disparity_px)) for nth, shot in found]).T)
+    return Matches(pair.right.rays(right_px)[:, :2], row_px, disparity_px, window)
 
 
 def refined(image: Image, later: Image, points: Points, guess: Points, *, shape: int) -> tuple[Points, Mask]:

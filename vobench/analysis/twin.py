@@ -1,10 +1,10 @@
 """A recording repeated in simulation: its path laid into a place, its camera fitted, and how far both agree.
 
-cell       one of 3 x 3 parts of the left view; a place is judged by the median disparity in each
+cell       one of 3 x 3 parts of the left view; a place is judged by the median disparity in each, stretch by stretch
 scale      how many times as large the place is made; distances in it are looked up with the path so many times smaller
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -32,16 +32,19 @@ LEAST_DISPARITY_PX = 0.3  # what is further away is at infinity
 
 
 def cell_disparities(fit: StereoFit, pair: StereoPair) -> Array:
-    """Median disparity (3, 3) in px of a recording's matches, by rows and columns of the left view; NaN for few."""
+    """Median disparity (V, 3, 3) in px of a recording's matches, by rows and columns of the left view; NaN for few.
+
+    V are the stretches along the path that were matched.
+    """
     matches: Matches = fit.matches
     offset_px = fit.offset_px.value if fit.offset_px and fit.offset_px.is_plain else 0.0
     uv = np.c_[matches.place, np.ones(len(matches.place))] @ pair.K.T
     column, row = _cell(uv[:, 0] + matches.disparity_px, pair, 0), _cell(uv[:, 1], pair, 1)
-    cells = np.full((CELLS, CELLS), np.nan)
-    for r, c in product(range(CELLS), repeat=2):
-        inside = (row == r) & (column == c)
+    cells = np.full((int(matches.window.max()) + 1, CELLS, CELLS), np.nan)
+    for window, r, c in np.ndindex(cells.shape):
+        inside = (matches.window == window) & (row == r) & (column == c)
         if inside.sum() >= FEWEST_IN_CELL:
-            cells[r, c] = np.median(matches.disparity_px[inside]) - offset_px
+            cells[window, r, c] = np.median(matches.disparity_px[inside]) - offset_px
     return np.asarray(np.maximum(cells, LEAST_DISPARITY_PX), float)
 
 
@@ -71,7 +74,7 @@ def levelled(T_world_left: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Where a path lies in a place: T_place_world, the place's scale, and how far disparities are off (log, median)."""
+    """Where a path lies in a place: T_place_world, the place's scale, and how far disparities are off (log, mean)."""
 
     T_place_world: Array
     scale: float
@@ -82,14 +85,16 @@ class Placement:
 SCALES = (1.0, 0.7, 1.4, 0.5, 2.0, 0.35, 2.8, 4.0, 5.6)
 HEIGHTS_M = (0.3, 0.5, 0.8, 1.2, 1.65, 2.2)
 CLEAR_M = 0.3
-WAYPOINTS, VIEWS, RAYS = 40, 5, 7
-DRAWS = 6000
+WAYPOINTS, RAYS = 40, 7
+DRAWS, NEAR_DRAWS = 6000, 1500  # anywhere, and then ever nearer to the best so far
+NEAR_M, NEAR_RAD, NEAREST = 1.0, 0.3, 0.05  # how near at first, and in the end the share of that
 UNSCALED = 0.05  # how much misfit a place of its own size is worth, per factor e
 
 
 def place_path(scene: Scene, T_world_left: Array, pair: StereoPair, wanted_px: Array, *, seed: int = 0) -> Placement:
     """Lay a path (N, 4, 4) of the left camera into a place so that its disparities agree and nothing is in the way.
 
+    wanted_px (V, 3, 3) are those of V stretches along the path.
     Raises InputError where no way was found that is free.
     """
     faces = triangles(scene, t_ns=0)
@@ -99,7 +104,9 @@ def place_path(scene: Scene, T_world_left: Array, pair: StereoPair, wanted_px: A
     path = _thinned(T_world_left, WAYPOINTS)
     start = path[0, :3, 3]
     rng, best, tried = np.random.default_rng(seed), None, 0
-    for scale, height_m, heading, xy in _candidates(low, high, rng):
+    for nth in range(DRAWS + NEAR_DRAWS):
+        drawn = _anywhere(low, high, rng) if nth < DRAWS or best is None else _near(best[1], nth - DRAWS, rng)
+        scale, height_m, heading, xy = drawn
         ground = _ground(caster, facing, xy, high[2])
         if ground is None or not _is_open(caster, xy, ground, height_m / scale):
             continue
@@ -110,24 +117,35 @@ def place_path(scene: Scene, T_world_left: Array, pair: StereoPair, wanted_px: A
         if not _is_free(caster, facing, way[:, :3, 3], CLEAR_M / scale):
             continue
         tried += 1
-        misfit = _misfit(caster, way, pair, wanted_px, scale)
+        apart = np.abs(np.log(stretch_disparities(caster, way, pair, scale, len(wanted_px)) / wanted_px))
+        misfit = float(np.nanmean(apart))
         cost = misfit + UNSCALED * abs(np.log(scale))
         if best is None or cost < best[0]:
             T[:3, 3] *= scale
-            best = cost, Placement(T, scale, misfit, 0)
+            best = cost, drawn, Placement(T, scale, misfit, 0)
     if best is None:
         length_m = float(np.linalg.norm(np.diff(T_world_left[:, :3, 3], axis=0), axis=1).sum())
         raise InputError(
             f"no free way of {length_m:.1f} m was found in '{scene.name}'; take fewer pictures or another place"
         )
-    return replace(best[1], tried=tried)
+    return replace(best[2], tried=tried)
 
 
-def _candidates(low: Array, high: Array, rng: np.random.Generator) -> Iterator[tuple[float, float, float, Array]]:
-    """Scales, heights, headings and places (2,), drawn at random: small changes of size more often."""
-    for _ in range(DRAWS):
-        scale = SCALES[min(int(rng.exponential(2.5)), len(SCALES) - 1)]
-        yield scale, float(rng.choice(HEIGHTS_M)), float(rng.uniform(0, 2 * np.pi)), rng.uniform(low[:2], high[:2])
+Start = tuple[float, float, float, Array]  # scale, height, heading, place (2,)
+
+
+def _anywhere(low: Array, high: Array, rng: np.random.Generator) -> Start:
+    """A start drawn at random: small changes of size more often."""
+    scale = SCALES[min(int(rng.exponential(2.5)), len(SCALES) - 1)]
+    return scale, float(rng.choice(HEIGHTS_M)), float(rng.uniform(0, 2 * np.pi)), rng.uniform(low[:2], high[:2])
+
+
+def _near(start: Start, nth: int, rng: np.random.Generator) -> Start:
+    """A start near another one, the nearer the later it is drawn."""
+    share = NEAREST ** (nth / NEAR_DRAWS)
+    scale, height_m, heading, xy = start
+    higher, turned, *aside = (share * rng.standard_normal(4)).tolist()
+    return scale, height_m * np.exp(NEAR_RAD * higher), heading + NEAR_RAD * turned, xy + NEAR_M * np.array(aside)
 
 
 def _ground(caster: RayCaster, facing: Array, xy: Array, top_m: float) -> float | None:
@@ -171,9 +189,9 @@ def _is_free(caster: RayCaster, facing: Array, way_m: Array, clear_m: float) -> 
     return not np.any(met & from_behind & (ways[:, 2] > 0.9))
 
 
-def _misfit(caster: RayCaster, way: Array, pair: StereoPair, wanted_px: Array, scale: float) -> float:
-    """Median over cells of |log| of the disparity there over the wanted one."""
-    views = _thinned(way, VIEWS)
+def stretch_disparities(caster: RayCaster, way: Array, pair: StereoPair, scale: float, stretches: int) -> Array:
+    """Median disparity (V, 3, 3) in px by rows and columns of the left view, amid each stretch of a way (N, 4, 4)."""
+    views = way[((np.arange(stretches) + 0.5) * len(way) / stretches).astype(int)]
     camera = pair.left.camera
     u, v = ((np.arange(CELLS * RAYS) + 0.5) * n / (CELLS * RAYS) for n in (camera.width_px, camera.height_px))
     pixels = np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)
@@ -184,9 +202,7 @@ def _misfit(caster: RayCaster, way: Array, pair: StereoPair, wanted_px: Array, s
     hits = caster.hits(origins, ways)
     depth_m = np.where(hits.face >= 0, hits.distance * scale, np.inf)
     seen = (pair.focal_baseline / depth_m).reshape(len(views), CELLS, RAYS, CELLS, RAYS)
-    cells = np.maximum(np.median(seen.transpose(1, 3, 0, 2, 4).reshape(CELLS, CELLS, -1), axis=-1), LEAST_DISPARITY_PX)
-    apart = np.abs(np.log(cells / wanted_px))
-    return float(np.nanmean(apart))
+    return np.asarray(np.maximum(np.median(seen, axis=(2, 4)), LEAST_DISPARITY_PX))
 
 
 # --- The camera ---
