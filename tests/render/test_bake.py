@@ -12,13 +12,13 @@ from vobench.asset.texture import Procedural
 from vobench.errors import RenderError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.render.bake import LIGHT, PLACES, BakedScene, BakeSettings, bake, load_baked, save_baked
+from vobench.render.bake import LIGHT, PLACES, TEXTURES, BakedScene, BakeSettings, bake, load_baked, save_baked
 from vobench.render.emitter import cosine_weighted
 from vobench.render.geometry import Hits, Visibility, off
 from vobench.render.illumination import AmbientLight, Illumination
 from vobench.render.lightmap import owners
 from vobench.scene.light import AreaLight, Flicker, Light, PointLight, SpotLight, Sun
-from vobench.scene.material import Material, fresnel
+from vobench.scene.material import Material, Picture, fresnel
 from vobench.scene.mesh import Mesh, Thing, areas_m2, flat
 from vobench.scene.scene import Scene, ceiling_light
 
@@ -482,7 +482,28 @@ def test_what_was_saved_is_what_is_loaded(baked: BakedScene, tmp_path: Path) -> 
     assert track.bounced.tobytes() == kept.bounced.tobytes()
 
 
-@pytest.mark.parametrize("name", [LIGHT, PLACES, "sun.1.npz"])
+def test_textures_that_were_painted_are_loaded_as_pictures_one_for_all_that_share_it(tmp_path: Path) -> None:
+    shared, glow = Procedural("terrazzo", 0.5, 0.5, 1.0, 64, 0), Procedural("poster", 0.4, 0.5, 2.0, 32, 1)
+    kept = Picture(np.full((2, 2), 0.5, np.float32))
+    made_of = {
+        "spare": Material(texture=shared),
+        "floor": Material(texture=shared, emission_cd_m2=(1.0, 1.0, 1.0), emission_texture=glow),
+        "wall": Material(texture=shared, eta=1.5),
+        "ceiling": Material(texture=kept),
+        "unused": Material(texture=Procedural("wood", 0.4, 0.5, 1.0, 32, 1)),
+    }
+    scene = Scene("cell", tuple(room((2, 2, 2), floor="floor", wall="wall", ceiling="ceiling")), made_of, ())
+    save_baked(tmp_path, bake(scene, BakeSettings(spacing_m=0.5, indirect_rays=0, bounces=0)))
+    loaded = load_baked(tmp_path, scene).scene.materials
+    for name, material in made_of.items():
+        assert isinstance(loaded[name].texture, Picture) == (name != "unused")
+        assert loaded[name].texture.pixels().tobytes() == material.texture.pixels().tobytes()
+    assert loaded["floor"].texture is loaded["wall"].texture
+    assert loaded["floor"].emission_texture.pixels().tobytes() == glow.pixels().tobytes()
+    assert (loaded["floor"].emission_texture.tile_m, loaded["ceiling"].texture) == (2.0, kept)
+
+
+@pytest.mark.parametrize("name", [LIGHT, PLACES, TEXTURES, "sun.1.npz"])
 @pytest.mark.parametrize("left", [0, 100])
 def test_an_empty_or_torn_file_is_an_error_that_names_the_folder(baked, tmp_path, name, left):
     save_baked(tmp_path, baked)

@@ -58,34 +58,20 @@ class Statistic:
 ERRORS = "calibration_error (right_roll_deg, right_pitch_deg)"
 STATISTICS = (
     Statistic("row_error_px", "row error of the pair", "px", 0.15, 0.5, f"more {ERRORS}", f"less {ERRORS}"),
-    Statistic(
-        "gradient_p99", "gradient, 99th percentile", "DN", 55, 75,
-        "contrast: sun, exposure_gain, less blur_sigma_px", "softer light, more blur_sigma_px",
-    ),
-    Statistic(
-        "gradient_kurtosis", "gradient, kurtosis", "", 15, 35,
-        "plain surfaces beside detailed ones", "texture on more surfaces, more gain_db",
-    ),
-    Statistic(
-        "spectrum_slope", "slope of the power spectrum", "", -3.2, -2.5,
-        "fine texture, less blur_sigma_px, more gain_db", "large shapes and shadows, more blur_sigma_px",
-    ),
-    Statistic(
-        "corner_unevenness", "unevenness of corners", "", 0.35, 0.7,
-        "plain walls or sky beside texture", "texture on plain surfaces",
-    ),
-    Statistic(
-        "tracks_home", "tracks that come home", "%", 50, 75,
-        "smaller steps: more rate_hz, less speed", "larger steps: less rate_hz, more speed",
-    ),
-    Statistic(
-        "track_life", "life of a track, of 13", "pictures", 3, 5,
-        "smaller steps: more rate_hz, less speed", "larger steps: less rate_hz, more speed, movers",
-    ),
-    Statistic(
-        "grey_sd", "standard deviation of grey", "DN", 50, 75,
-        "sun and shadow, darker and brighter materials", "softer light, less exposure_gain",
-    ),
+    Statistic("gradient_p99", "gradient, 99th percentile", "DN", 55, 75,
+              "contrast: sun, exposure_gain, less blur_sigma_px", "softer light, more blur_sigma_px"),
+    Statistic("gradient_kurtosis", "gradient, kurtosis", "", 15, 35,
+              "plain surfaces beside detailed ones", "texture on more surfaces, more gain_db"),
+    Statistic("spectrum_slope", "slope of the power spectrum", "", -3.2, -2.5,
+              "fine texture, less blur_sigma_px, more gain_db", "large shapes and shadows, more blur_sigma_px"),
+    Statistic("corner_unevenness", "unevenness of corners", "", 0.35, 0.7,
+              "plain walls or sky beside texture", "texture on plain surfaces"),
+    Statistic("tracks_home", "tracks that come home", "%", 50, 75,
+              "smaller steps: more rate_hz, less speed", "larger steps: less rate_hz, more speed"),
+    Statistic("track_life", "life of a track, of 13", "pictures", 3, 5,
+              "smaller steps: more rate_hz, less speed", "larger steps: less rate_hz, more speed, movers"),
+    Statistic("grey_sd", "standard deviation of grey", "DN", 50, 75,
+              "sun and shadow, darker and brighter materials", "softer light, less exposure_gain"),
     Statistic("burnt", "pixels at 254 or more", "%", 4, 10, "more exposure_gain, sky or windows", "less exposure_gain"),
 )  # fmt: skip
 OFFSET_BAND_PX = (0.0, 0.9)

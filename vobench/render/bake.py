@@ -2,8 +2,8 @@
 
 import json
 import zipfile
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,6 +21,7 @@ from vobench.render.geometry import FAR_M, Floats, Indices, Mask, RayCaster, Vis
 from vobench.render.indirect_light import FinalGather, Gatherer, albedo, blend, bounced, response, surfels
 from vobench.render.lightmap import Atlas, Layout, Texels, owners, texels, unwrap
 from vobench.scene.light import NS_PER_S, AreaLight, Light, Sky, Sun
+from vobench.scene.material import Material, Picture, Texture
 from vobench.scene.mesh import Triangles, areas_m2, distinct
 from vobench.scene.scene import Scene, triangles
 from vobench.setting import Positive, settings
@@ -37,6 +38,7 @@ PLACED_DONE, GATHER_DONE = 0.1, 0.4  # the shares of a bake that are done after 
 SMALL_M2 = 10.0  # of a thing that is sunlit as a whole
 SKY_RAYS = 64  # at least from a surfel to tell whether it sees the sky
 BLIND = 0.02  # of a surfel's rays: one that sees less is inside something
+TEXTURE_FIELDS = ("texture", "emission_texture")
 UNSEEN = 1e-3  # hits, of a texel that no ray has found
 SUN_STEP_RAD = np.deg2rad(3)  # between the suns whose indirect light is baked
 
@@ -310,11 +312,11 @@ def direct_layer(scene: Scene, index: int, still: StaticScene, light: Floats) ->
     return layer
 
 
-LIGHT, PLACES, SETTINGS_FILE = "light.npy", "surfels.npz", "settings.json"
+LIGHT, PLACES, TEXTURES, SETTINGS_FILE = "light.npy", "surfels.npz", "textures.npz", "settings.json"
 
 
 def save_baked(folder: Path, baked: BakedScene) -> None:
-    """Write the light of a baked scene into a folder."""
+    """Write the light of a baked scene into a folder, and its textures as they were painted for it."""
     (folder / SETTINGS_FILE).write_text(json.dumps(asdict(baked.settings)))
     np.save(folder / LIGHT, baked.direct)
     atlas, patches, spread = baked.atlas, baked.patches, baked.spread
@@ -328,12 +330,39 @@ def save_baked(folder: Path, baked: BakedScene) -> None:
     )
     for track in baked.tracks:
         np.savez(folder / f"sun.{track.light}.npz", times_ns=track.times_ns, bounced=track.bounced)
+    materials = baked.scene.materials
+    seen = {thing.material for thing in baked.faces.things} & materials.keys()
+    shown = {id(getattr(materials[name], part)) for name in seen for part in TEXTURE_FIELDS}
+    painted: dict[str, Any] = {name: t.pixels() for name, t in _textures(materials).items() if id(t) in shown}
+    np.savez(folder / TEXTURES, **painted)
+
+
+def _textures(materials: Mapping[str, Material]) -> dict[str, Texture]:
+    """The textures that are no pictures yet, each by the first material and the field that have it."""
+    found = {
+        id(texture): (f"{name}.{part}", texture)
+        for name, material in reversed(list(materials.items()))
+        for part in TEXTURE_FIELDS
+        if (texture := getattr(material, part)) is not None and not isinstance(texture, Picture)
+    }
+    return dict(found.values())
+
+
+def _with_pictures(scene: Scene, pictures: Mapping[str, Any]) -> Scene:
+    """The scene with pictures, by the names of `_textures`, in place of textures that would be painted once more."""
+    own = {id(t): Picture(pictures[n], t.tile_m) for n, t in _textures(scene.materials).items() if n in pictures}
+
+    def ready(material: Material) -> Material:
+        return replace(material, **{p: own.get(id(t := getattr(material, p)), t) for p in TEXTURE_FIELDS})
+
+    return replace(scene, materials={name: ready(material) for name, material in scene.materials.items()})
 
 
 def load_baked(folder: Path, scene: Scene) -> BakedScene:
     """The light that `save_baked` wrote, for the same scene. Raises RenderError where it is damaged."""
     try:
         settings = BakeSettings(**json.loads((folder / SETTINGS_FILE).read_text()))
+        shown = _with_pictures(scene, _load(folder / TEXTURES))
         light, kept = np.load(folder / LIGHT), _load(folder / PLACES)
         suns = {sun: _load(folder / f"sun.{sun}.npz") for sun in moving_suns(scene)}
         tracks = tuple(SunTrack(sun, tuple(own["times_ns"].tolist()), own["bounced"]) for sun, own in suns.items())
@@ -343,7 +372,7 @@ def load_baked(folder: Path, scene: Scene) -> BakedScene:
         spread = scipy.sparse.csr_matrix(tuple(kept[f"spread_{name}"] for name in ("data", "indices", "indptr")), shape)
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, SettingError) as error:
         raise RenderError(f"the scene's light cannot be read ({error}); delete this folder: {folder}") from error
-    return BakedScene(scene, triangles(scene), atlas, light, kept["bounced"], spread, patches, settings, tracks)
+    return BakedScene(shown, triangles(scene), atlas, light, kept["bounced"], spread, patches, settings, tracks)
 
 
 def _load(path: Path) -> dict[str, Any]:
