@@ -72,8 +72,8 @@ class Glb:
 def triangle(*, nodes: Sequence[Json] = ({},), material: Json | None = None, **more: Any) -> Glb:
     """One triangle at every node, of one material."""
     glb = Glb(**more)
-    glb.tree |= {} if material is None else {"materials": [material]}
-    glb.tree["meshes"] = [{"primitives": [glb.primitive(**({} if material is None else {"material": 0}))]}]
+    glb.tree["materials"] = [material or {"name": "default"}]
+    glb.tree["meshes"] = [{"primitives": [glb.primitive(material=0)]}]
     glb.tree["nodes"] = [{"name": "tile", "mesh": 0, **node} for node in nodes]
     return glb
 
@@ -207,7 +207,8 @@ def test_a_skin_is_taken_as_its_joints_stand(read: Reader) -> None:
         glb.numbers([[0, 1, 0, 0]] * 3, "uint8"),
         glb.numbers([[1, 0, 0, 0], [0, 1, 0, 0], [0.5, 0.5, 0, 0]]),
     )
-    glb.tree["meshes"] = [{"primitives": [glb.primitive(JOINTS_0=joints, WEIGHTS_0=weights)]}]
+    glb.tree["materials"] = [{}]
+    glb.tree["meshes"] = [{"primitives": [glb.primitive(JOINTS_0=joints, WEIGHTS_0=weights, material=0)]}]
     binds = np.stack([np.eye(4), np.eye(4)])
     binds[1, 3, :3] = [0, 0, -1]  # columns first: joint 1 was bound at z = 1
     glb.tree["skins"] = [{"joints": [1, 2], "inverseBindMatrices": glb.numbers(binds.reshape(2, 16))}]
@@ -240,6 +241,15 @@ def test_a_shiny_body_has_its_colour_coat_roughness_and_metal(read: Reader) -> N
 def test_what_is_too_rough_to_mirror_is_matt_in_its_colour(read: Reader) -> None:
     stuff = material_of(read, {"pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3, 1]}})  # metal, by default
     assert (stuff.colour, stuff.eta, stuff.metal, stuff.roughness) == ((0.1, 0.2, 0.3), 1.0, 0.0, 0.0)
+
+
+def test_what_has_neither_material_nor_colours_is_grey_and_said_so(read: Reader) -> None:
+    glb = Glb(nodes=[{"mesh": 0}])
+    glb.tree["meshes"] = [{"primitives": [glb.primitive()]}]
+    model = read(glb)
+    assert [look.colour for look in model.materials.values()] == [(0.5, 0.5, 0.5)]
+    assert model.notes == ("what has no material is read as grey and matt",)
+    assert material_of(read, {}).colour == (1, 1, 1)  # as glTF has it
 
 
 def test_emission_is_factor_times_strength_in_candela_per_square_metre(read: Reader) -> None:
@@ -537,7 +547,7 @@ FAULTS: dict[str, tuple[Callable[[], Glb | bytes], str]] = {
     "another format": (lambda: b"\x7fELF" + bytes(100), "begins like neither .glb nor .gltf"),
     "half a file": (
         lambda: triangle().bytes()[:-20],
-        "has 376 of 396 bytes, or they are damaged; copy or export it again",
+        "has 428 of 448 bytes, or they are damaged; copy or export it again",
     ),
     "broken JSON": (lambda: triangle().bytes().replace(b'"nodes":', b'"nodes" ;'), "is not as glTF 2.0 has it"),
     "glTF 1": (lambda: changed("asset", {"version": "1.0"}), "is glTF 1.0, not 2; gltf-pipeline"),

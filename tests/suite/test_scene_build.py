@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from vobench.asset import FINISHES, FURNITURE
 from vobench.asset import room as kinds
@@ -128,9 +129,27 @@ def test_a_model_alone_is_a_scene_where_it_has_light(tmp_path: Path) -> None:
     assert isinstance(light, AreaLight)
     assert light.luminance_cd_m2 == pytest.approx(500)
     assert light.power_lm == pytest.approx(500 * np.pi * 0.5)
-    assert spec.white_cd_m2 == pytest.approx(2 * 500)  # 2 P / A over pi
+    assert spec.white_cd_m2 == pytest.approx(500 / (1 - 0.9))  # P / (A (1 - r)) over pi, r at most 0.9
     glb(tmp_path / "dark.glb")
     assert {light.name for light in build(read_scene(tmp_path / "dark.glb"), {}).lights} == {"sun", "sky"}
+
+
+@pytest.mark.parametrize(("colour", "share"), [((0.3, 0.3, 0.3), 0.3), (None, 0.5), ((1.0, 1.0, 1.0), 0.9)])
+def test_a_dark_room_from_a_file_gets_a_lamp_for_what_its_walls_reflect(
+    tmp_path: Path, colour: tuple[float, ...] | None, share: float
+) -> None:
+    room = trimesh.creation.box((4, 4, 3))
+    room.invert()
+    if colour:
+        room.visual = trimesh.visual.TextureVisuals(material=trimesh.visual.material.PBRMaterial(
+            name="paint", baseColorFactor=[*colour, 1.0], roughnessFactor=1.0, metallicFactor=0.0
+        ))  # fmt: skip
+    room.export(tmp_path / "room.glb")
+    spec = read_scene(tmp_path / "room.glb")
+    assert spec.white_cd_m2 == pytest.approx(400 / np.pi)
+    (lamp,) = build(spec, {}).lights
+    assert isinstance(lamp, PointLight)
+    assert lamp.power_lm == pytest.approx(400 * room.area * (1 - share), rel=0.01)
 
 
 def test_a_file_that_is_not_there_or_no_model_is_one_sentence(yard, tmp_path: Path) -> None:

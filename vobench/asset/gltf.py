@@ -95,6 +95,10 @@ class Look:
     notes: tuple[str, ...] = ()
 
 
+# glTF's default is white; in a room of nothing else light would pile up, and every picture be burnt.
+BARE = Look("default", Material(colour=(0.5, 0.5, 0.5)), notes=("what has no material is read as grey and matt",))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
     """Faces of one look at a place, T_model_mesh (4, 4) from where they are; linear colours (V, 3) of their vertices.
@@ -279,7 +283,8 @@ class Gltf:
     def _part(self, place: Place, primitive: Json, poses: Mapping[int, Array]) -> Part:
         at, mode, T = primitive["attributes"], primitive.get("mode", TRIANGLES), place.poses[-1]
         vertices = self.accessor(at["POSITION"]).astype(float)
-        count, look = len(vertices), self.look(primitive.get("material"))
+        is_bare = primitive.get("material") is None and "COLOR_0" not in at
+        count, look = len(vertices), BARE if is_bare else self.look(primitive.get("material"))
         index = self.accessor(primitive["indices"])[:, 0] if "indices" in primitive else np.arange(count)
         faces = _faces(index.astype(np.int64), mode)
         if faces.size and not 0 <= faces.min() <= faces.max() < count:

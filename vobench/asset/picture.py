@@ -178,11 +178,10 @@ def masonry(
     bond: float = 0.5,
 ) -> Picture:
     """Bricks, slabs or tiles in courses, each shifted by `bond` of a length against the one before."""
-    rng = np.random.default_rng(seed)
+    rng, variety = np.random.default_rng(seed), 0.14 if columns > 3 else 0.05
     cell, apart = _cells(px, (np.arange(columns) + bond * (np.arange(rows) % 2)[:, None] + 1e-3) / columns)
     rough = noise(rng, px, 4, 60, slope=0.6) * 0.6 + noise(rng, px, 60, 400, slope=0.2)
     pits = noise(rng, px, 40, 200, slope=0.2) > 2.3
-    variety = 0.14 if columns > 3 else 0.05
     tone = 0.5 + rng.normal(0, variety, rows * columns)[cell] + variety * 0.5 * rough - 0.2 * pits
     is_joint = (apart + 0.6 * rough < 0.006 / tile_m * px)[..., None]
     light = 1 + 0.3 * variety * noise(rng, px, 1, 8) - 0.1 * np.exp(-apart / 3) + 0.04 * rough
@@ -207,9 +206,8 @@ def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
     warp, weft = (0.5 + 0.14 * rng.standard_normal(px // 4)[thread] + 0.3 * bulge for _ in range(2))
     is_over = (thread[:, None] + thread) % 2 == 0
     tone = np.where(is_over, warp * (0.7 + 0.3 * bulge[:, None]), weft[:, None] * (0.7 + 0.3 * bulge))
-    return Picture(
-        _ramp(tone + 0.06 * noise(rng, px, 1, 12) + 0.1 * noise(rng, px, 40, 250, slope=0.0), "cloth"), tile_m
-    )
+    tone = tone + 0.06 * noise(rng, px, 1, 12) + 0.1 * noise(rng, px, 40, 250, slope=0.0)
+    return Picture(_ramp(tone, "cloth"), tile_m)
 
 
 @painted
@@ -218,15 +216,12 @@ def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
     rng, count = np.random.default_rng(seed), round(11700 * tile_m**2)
     radius = np.sort(0.0016 * rng.uniform(0, 1, count) ** -0.55)[::-1].clip(max=0.014) / tile_m * px
     angle = np.sort(rng.uniform(0, 2 * np.pi, (count, 6)), axis=1)
-    shapes = np.stack([np.cos(angle), np.sin(angle)], axis=-1) * radius[:, None, None] + rng.uniform(
-        0, px, (count, 1, 2)
-    )
+    shapes = np.stack([np.cos(angle), np.sin(angle)], -1) * radius[:, None, None] + rng.uniform(0, px, (count, 1, 2))
     chips = _polygons(Image.new("L", (px, px)), shapes, rng.integers(1, 6 * len(STONES) + 1, count)).astype(np.uint8)
     tones = np.array([rgb(CEMENT), *(rgb(stone) for stone in STONES for _ in range(6))])
     table = (tones * rng.uniform(0.86, 1.12, (len(tones), 1))).clip(0, 255).astype(np.uint8)
-    grain = (
-        0.045 * noise(rng, px, 20, 1500, slope=0.6) + 0.02 * noise(rng, px, 3, 12) - 0.1 * _scratches(rng, px, px // 6)
-    )
+    grain = 0.045 * noise(rng, px, 20, 1500, slope=0.6) + 0.02 * noise(rng, px, 3, 12)
+    grain -= 0.1 * _scratches(rng, px, px // 6)
     picture, strip = _scaled(table[chips], (1 + grain)[..., None]), slice(round(0.004 / tile_m * px))
     picture[strip], picture[:, strip] = BRASS, BRASS
     return Picture(picture, tile_m)

@@ -14,7 +14,7 @@ import numpy as np
 from vobench.asset import FINISHES, MODEL_SUFFIXES
 from vobench.errors import SuiteError, unknown
 from vobench.scene.light import Light, Sky, Sun, scaled
-from vobench.scene.material import LUMINANCE, emitted_cd_m2
+from vobench.scene.material import LUMINANCE, emitted_cd_m2, reflectance
 from vobench.scene.mesh import areas_m2
 from vobench.scene.scene import Scene
 from vobench.setting import Triple
@@ -95,7 +95,7 @@ def _located(spec: SceneFile, folder: Path, wrong: Mistakes) -> SceneFile:
 def _bare(path: Path) -> SceneFile:
     """A model as a scene: its own lights, or such as it needs; and an exposure for a white wall in their mean light.
 
-    In a closed room of area A and reflectance 0.5 lamps of a power P come to 2 P / A everywhere, bounces included.
+    In a closed room of area A and mean reflectance r lamps of a power P come to P / (A (1 - r)), bounces included.
     """
     from vobench.asset.model import read_model
 
@@ -104,37 +104,37 @@ def _bare(path: Path) -> SceneFile:
     scale = CENTIMETRE if float(np.ptp(corners_m, axis=0).max()) > LARGEST_M else 1.0
     if scale != 1:
         model = read_model(path, scale=scale)
-    emission = {name: float(emitted_cd_m2(m) @ LUMINANCE) for name, m in model.materials.items()}
-    areas = [(float(areas_m2(thing.mesh.corners_m).sum()), thing.material) for thing in model.everything]
+    own = {
+        name: (emitted_cd_m2(m) @ LUMINANCE, min(reflectance(m).mean(), WHITEST) if m.kind == "body" else 0.5)
+        for name, m in model.materials.items()
+    }
+    area_m2 = np.array([areas_m2(thing.mesh.corners_m).sum() for thing in model.everything])
+    glow_cd_m2, kept = np.array([own[thing.material] for thing in model.everything]).T
+    swallows_m2 = float(area_m2 @ (1 - kept))
     lamps_lm = sum(light.power_lm for light in model.lights if not isinstance(light, Sun | Sky))
-    glow_lm = sum(np.pi * area * emission[material] for area, material in areas)
     sun_lx = sum(light.illuminance_lx for light in model.lights if isinstance(light, Sun | Sky))
-    lux = sun_lx + 2 * (lamps_lm + glow_lm) / sum(area for area, _ in areas)
+    lux = sun_lx + float(lamps_lm + np.pi * area_m2 @ glow_cd_m2) / swallows_m2
     name = re.sub(r"[^a-z0-9_]+", "_", path.stem.lower()).strip("_") or "model"
-    spec = SceneFile(
-        name=name, white_cd_m2=max(float(lux / np.pi), 1.0), meshes=(ModelSpec(file=str(path.resolve()), scale=scale),)
-    )
-    return spec if lux else _lit_from_outside(spec, Scene(name, tuple(model.everything), {}, ()))
+    whole = ModelSpec(file=str(path.resolve()), scale=scale)
+    spec = SceneFile(name=name, white_cd_m2=max(float(lux / np.pi), 1.0), meshes=(whole,))
+    return spec if lux else _lit_from_outside(spec, Scene(name, tuple(model.everything), {}, ()), swallows_m2)
 
 
 DAYLIGHT = SunSpec(illuminance_lx=30_000, azimuth_deg=30, elevation_deg=50), SkySpec(illuminance_lx=8_000, kind="clear")
-ROOM_LX, LEAST_OPEN = 400.0, 0.1
+ROOM_LX, LEAST_OPEN, WHITEST = 400.0, 0.1, 0.9
 LARGEST_M, CENTIMETRE = 300.0, 0.01  # a larger model was written in centimetres
 
 
-def _lit_from_outside(spec: SceneFile, shape: Scene) -> SceneFile:
+def _lit_from_outside(spec: SceneFile, shape: Scene, swallows_m2: float) -> SceneFile:
     """A model without a light, by day where its floor sees the sky, else with a lamp under its ceiling."""
     from vobench.suite.free_way import ceiling_above
 
     open_share, lamp_m = ceiling_above(shape)
     if open_share >= LEAST_OPEN:
         sun, sky = DAYLIGHT
-        up = np.sin(np.deg2rad(sun.elevation_deg or 90))
-        return replace(
-            spec, sun=sun, sky=sky, white_cd_m2=float((sun.illuminance_lx * up + sky.illuminance_lx) / np.pi)
-        )
-    area = sum(float(areas_m2(thing.mesh.corners_m).sum()) for thing in shape.things)
-    lamp = PointLamp(name="lamp", center_m=lamp_m, power_lm=ROOM_LX * area / 2)
+        lux = sun.illuminance_lx * np.sin(np.deg2rad(sun.elevation_deg or 90)) + sky.illuminance_lx
+        return replace(spec, sun=sun, sky=sky, white_cd_m2=float(lux / np.pi))
+    lamp = PointLamp(name="lamp", center_m=lamp_m, power_lm=ROOM_LX * swallows_m2)
     return replace(spec, lamps=(lamp,), white_cd_m2=float(ROOM_LX / np.pi))
 
 
