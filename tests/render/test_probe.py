@@ -93,6 +93,18 @@ def test_metal_mirrors_in_its_colour(snap: Any) -> None:
     assert (picture[inside][:, 2] / picture[inside][:, 0]).max() > 0.4
 
 
+def test_metal_whose_normals_lie_square_to_the_view_has_a_luminance(draw: Any, even_light: Any) -> None:
+    # A bevel seen along its face: at some dozens of these samples the cosine is 0 to the last bit.
+    askew = np.tile(np.array([0.0, 1, 1]) / np.sqrt(2), (4, 1))
+    points = np.array([[2.0, -1, -1], [2, 1, -1], [2, 1, 1], [2, -1, 1]])
+    bevel = Mesh(points, np.array([[0, 2, 1], [0, 3, 2]], np.int32), np.zeros((4, 2)), askew)
+    metal = {"metal": Material(colour=(0.5, 0.5, 0.5), metal=1.0, roughness=0.25)}
+    camera = Pinhole(320, 240, 160.0, 160.0, 159.25, 119.25)
+    renderer = draw(even_light(Scene("bevel", (Thing("bevel", bevel, "metal"),), metal, ())))
+    picture = renderer.radiance(camera, still(camera, looking(pitch_deg=0, position_m=(0, 0, 0))))
+    assert np.isfinite(picture).all()
+
+
 def test_a_smooth_ball_shows_the_walls_that_reflected_rays_meet(snap: Any) -> None:
     sides = {
         name: Material(colour=c)

@@ -70,7 +70,7 @@ float fresnel(float c, float eta, float inverse_square)
     float inside = sqrt(1.0 - (1.0 - c * c) * inverse_square);
     float across = c + eta * inside, along = inside + eta * c;
     float a = (c - eta * inside) * along, b = (inside - eta * c) * across;
-    return 0.5 * (a * a + b * b) / (across * across * along * along);
+    return 0.5 * (a * a + b * b) / max(across * across * along * along, 1e-36);  // 0 where eta is 1 and c is 0
 }
 
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
@@ -80,6 +80,7 @@ const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 vec3 probed(vec3 from, vec3 ray)
 {
     from = clamp(from, view.probe_low.xyz, view.probe_high.xyz);
+    ray = mix(ray, vec3(1e-9), equal(ray, vec3(0.0)));
     vec3 reach = max((view.probe_low.xyz - from) / ray, (view.probe_high.xyz - from) / ray);
     vec3 met = from + min(reach.x, min(reach.y, reach.z)) * ray;
     return view.probe_scale.rgb * textureLod(probe, met - view.probe_centre.xyz, batch.blur.x).rgb;
