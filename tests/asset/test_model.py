@@ -502,6 +502,12 @@ def test_a_model_of_an_unlikely_size_is_doubted_aloud(read: Reader, scale: float
     assert read(triangle()).notes == ()
 
 
+def test_a_place_that_lies_on_its_side_is_doubted_aloud(read: Reader) -> None:
+    floor = triangle(nodes=[{"scale": [20, 20, 20]}])  # its corners are of one height only where z is up
+    assert read(floor).notes == ("most of its faces look sideways: is another axis up? up: y, or z",)
+    assert read(floor, up="z").notes == ()
+
+
 # Faults
 
 

@@ -12,15 +12,26 @@ from vobench.asset.texture import Procedural
 from vobench.errors import RenderError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.render.bake import LIGHT, PLACES, TEXTURES, BakedScene, BakeSettings, bake, load_baked, save_baked
+from vobench.render.bake import (
+    LIGHT,
+    PLACES,
+    SAMPLES,
+    TEXTURES,
+    BakedScene,
+    BakeSettings,
+    bake,
+    load_baked,
+    save_baked,
+    spacings_m,
+)
 from vobench.render.emitter import cosine_weighted
 from vobench.render.geometry import Hits, Visibility, off
 from vobench.render.illumination import AmbientLight, Illumination
 from vobench.render.lightmap import owners
 from vobench.scene.light import AreaLight, Flicker, Light, PointLight, SpotLight, Sun
 from vobench.scene.material import Material, Picture, fresnel
-from vobench.scene.mesh import Mesh, Thing, areas_m2, flat
-from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.mesh import Mesh, Thing, areas_m2, flat, quad
+from vobench.scene.scene import Scene, ceiling_light, triangles
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=1, bounces=0)
 BODY = ("plain", 0.5, 0.0, 1.0, 8, 0)
@@ -54,6 +65,20 @@ def test_the_floor_is_read_where_its_samples_are() -> None:
     rectangle_px = baked.atlas.light_px[:2].reshape(-1, 2)
     np.testing.assert_allclose(np.ptp(rectangle_px, axis=0), 40, atol=1e-4)
     np.testing.assert_allclose(rectangle_px % 1, 0.5, atol=1e-4)
+
+
+def test_samples_lie_further_apart_in_a_large_place_where_nothing_is_asked_for() -> None:
+    sides = {"small": 20.0, "asks": 20.0, "large": 200.0}
+    things = [Thing(name, quad((0.0, 0, 0), (a, 0, 0), (0, a, 0)), "grey") for name, a in sides.items()]
+    things[1] = replace(things[1], spacing_m=0.5)
+    place = Scene("place", tuple(things), {"grey": Material()}, ())
+    faces = triangles(place)
+    spacing_m = spacings_m(place, faces, BakeSettings())
+    samples = (areas_m2(faces.corners_m) / spacing_m**2)[faces.thing != 1].sum()
+    assert samples == pytest.approx(SAMPLES)
+    assert np.unique(spacing_m[faces.thing == 1]) == [0.5]
+    alone = replace(place, things=place.things[:2])
+    assert np.unique(spacings_m(alone, triangles(alone), BakeSettings())[:2]) == [BakeSettings().spacing_m]
 
 
 @pytest.mark.parametrize("height_m", [1.0, 2.0, 4.0])

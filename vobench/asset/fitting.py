@@ -113,10 +113,7 @@ def framed(
     w, h = (round(900 / max(width_m, height_m) * side) for side in (width_m, height_m))
     print_ = picture.whiteboard(seed) if style == "whiteboard" else None
     face = MIRROR if style == "mirror" else matt(texture=print_ or picture.poster(style, seed, w, h))
-    return [
-        put(card((width_m, height_m)), face, 0.01),
-        put(bars(width_m, height_m, 0.025, 0.02), coated(frame), 0.011),
-    ]
+    return [put(card((width_m, height_m)), face, 0.01), put(bars(width_m, height_m, 0.025, 0.02), coated(frame), 0.011)]
 
 
 def noticeboard(rng: Rng, width_m: float = 1.2, height_m: float = 0.9) -> list[Part]:

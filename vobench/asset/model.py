@@ -25,7 +25,8 @@ LEAST_M2, WELD_M = 1e-12, 1e-5
 # No camera gets into a closed body this small: its backs are never seen.
 CLOSED_M = 1.0
 # Beyond these a model is likely in another unit, or damaged; most are about TYPICAL_M across.
-SMALLEST_M, TYPICAL_M, LARGEST_M, FARTHEST_M = 0.05, 5.0, 500.0, 1e7
+SMALLEST_M, PLACE_M, TYPICAL_M, LARGEST_M, FARTHEST_M = 0.05, 3.0, 5.0, 500.0, 1e7
+LYING = 2.0  # times as much area that looks along the other axis as up and down
 Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
@@ -169,13 +170,17 @@ def _in_role(look: Look, role: str) -> tuple[str, Material]:
 
 
 def _doubts(model: Model) -> list[str]:
-    """Whether a model is likely of another unit."""
+    """Whether a model is likely of another unit, or a place that lies on its side, with its floor as a wall."""
     span = float(np.ptp(np.concatenate([thing.mesh.vertices_m for thing in model.everything]), axis=0).max())
+    turned = [np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]) for c in (t.mesh.corners_m for t in model.everything)]
+    _, along, up_m2 = np.abs(np.concatenate(turned)).sum(0)
+    lies = span > PLACE_M and along > LYING * up_m2
+    doubts = ["most of its faces look sideways: is another axis up? up: y, or z"] if lies else []
     if SMALLEST_M <= span <= LARGEST_M:
-        return []
+        return doubts
     units = {0.001: "in millimetres?", 0.01: "in centimetres?", 100.0: "shrunk twice?", 1000.0: "shrunk twice?"}
     factor = min(units, key=lambda unit: abs(np.log(max(span, 1e-9) * unit / TYPICAL_M)))
-    return [f"spans {span:,.4g} m: {units[factor]} scale: {factor:g}"]
+    return [*doubts, f"spans {span:,.4g} m: {units[factor]} scale: {factor:g}"]
 
 
 def _sound(part: Part) -> Part:

@@ -363,13 +363,7 @@ def shrink_command(
     )
     if json:
         terminal.print_json(
-            {
-                "suite": str(suite),
-                "frames": [first, end],
-                "of": of,
-                "removed": found.removed,
-                "tried": found.tried,
-            }
+            {"suite": str(suite), "frames": [first, end], "of": of, "removed": found.removed, "tried": found.tried}
         )
         return
     console = terminal.console()

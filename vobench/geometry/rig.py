@@ -107,10 +107,7 @@ def paper_lens(*, square_pixels: bool) -> Pinhole:
     return Pinhole(width, height, fx, fy, (width - 1) / 2, (height - 1) / 2)
 
 
-LENSES = {
-    "paper_literal": paper_lens(square_pixels=False),
-    "paper_blender": paper_lens(square_pixels=True),
-}
+LENSES = {"paper_literal": paper_lens(square_pixels=False), "paper_blender": paper_lens(square_pixels=True)}
 
 
 def looking(*, pitch_deg: float, position_m: tuple[float, float, float]) -> Array:

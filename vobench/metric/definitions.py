@@ -60,9 +60,7 @@ def _stated(key: str, setting: str, write: Callable[[Any], str] = str, *, always
 
 PARTS = (
     Part(
-        "delta",
-        ("rpe_delta",),
-        lambda s: None if s.rpe_rule == "tartanair" else f"{_number(s.rpe_delta)}{s.rpe_unit}",
+        "delta", ("rpe_delta",), lambda s: None if s.rpe_rule == "tartanair" else f"{_number(s.rpe_delta)}{s.rpe_unit}"
     ),
     Part("pairs", ("rpe_all_pairs",), lambda s: f"{_PAIRS[s.rpe_all_pairs]}/{s.rpe_pairs_from}"),
     _stated("rule", "rpe_rule"),

@@ -119,12 +119,7 @@ LIKE: dict[str, ScoreSettings] = {
         rpe_rule="tum",
     ),
     "openvins": ScoreSettings(
-        alignment="yaw",
-        association="in_order",
-        max_diff_ns=20_000_000,
-        relative_rule="openvins",
-        std_ddof=1,
-        full=True,
+        alignment="yaw", association="in_order", max_diff_ns=20_000_000, relative_rule="openvins", std_ddof=1, full=True
     ),
     "tartanair": _TARTANAIR,
     "tartanair_mono": replace(_TARTANAIR, scale_rule="tartanair"),

@@ -119,10 +119,7 @@ class EncoderErrors:
     track: Fraction = 0.0
 
 
-ENCODERS = {
-    "exact": EncoderErrors(),
-    "nominal": EncoderErrors(radius_left=0.0015, radius_right=-0.0015, track=0.005),
-}
+ENCODERS = {"exact": EncoderErrors(), "nominal": EncoderErrors(radius_left=0.0015, radius_right=-0.0015, track=0.005)}
 
 
 def true_rims(rim_rad: Array, errors: EncoderErrors) -> Array:

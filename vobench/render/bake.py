@@ -39,6 +39,7 @@ SMALL_M2 = 10.0  # of a thing that is sunlit as a whole
 SKY_RAYS = 64  # at least from a surfel to tell whether it sees the sky
 BLIND = 0.02  # of a surfel's rays: one that sees less is inside something
 TEXTURE_FIELDS = ("texture", "emission_texture")
+SAMPLES = 4_000_000  # of light, by default: what a bake of minutes takes
 UNSEEN = 1e-3  # hits, of a texel that no ray has found
 SUN_STEP_RAD = np.deg2rad(3)  # between the suns whose indirect light is baked
 
@@ -128,10 +129,16 @@ def bodies(scene: Scene, faces: Triangles) -> Mask:
 
 
 def spacings_m(scene: Scene, faces: Triangles, settings: BakeSettings) -> Array:
-    """Between samples on each face (F,): what its thing asks for, finer where it is sunlit, coarser on movers."""
-    asked = np.array([thing.spacing_m or settings.spacing_m for thing in faces.things])[faces.thing]
+    """Between samples on each face (F,): what its thing asks for, finer where it is sunlit, coarser on movers.
+
+    On what asks for nothing it grows with the scene, so that SAMPLES do.
+    """
+    asked = np.array([thing.spacing_m or 0.0 for thing in faces.things])[faces.thing]
     share = np.where(_sunlit(scene, faces), 1 / SUNLIT_FINER, 1.0)
-    return np.asarray(asked * np.where(faces.mover < 0, share, MOVER_COARSER))
+    spacing_m = np.where(asked, asked, settings.spacing_m) * np.where(faces.mover < 0, share, MOVER_COARSER)
+    own = bodies(scene, faces) & (asked == 0)
+    samples = (areas_m2(faces.corners_m[own]) / spacing_m[own] ** 2).sum()
+    return np.asarray(spacing_m * np.where(own, max(1.0, float(np.sqrt(samples / SAMPLES))), 1.0))
 
 
 def _sunlit(scene: Scene, faces: Triangles) -> Mask:

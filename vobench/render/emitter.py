@@ -7,18 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import (
-    FAR_M,
-    RAY_OFFSET_M,
-    Ball,
-    Flat,
-    Floats,
-    Mask,
-    Visibility,
-    ball,
-    lengths,
-    spots,
-)
+from vobench.render.geometry import FAR_M, RAY_OFFSET_M, Ball, Flat, Floats, Mask, Visibility, ball, lengths, spots
 from vobench.render.lightmap import Texels, tangents
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.mesh import areas_m2, face_normals, unit

@@ -14,17 +14,7 @@ from numpy.typing import NDArray
 from vobench import stop
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import (
-    Floats,
-    Indices,
-    Mask,
-    RayCaster,
-    Visibility,
-    face_materials,
-    lengths,
-    off,
-    take,
-)
+from vobench.render.geometry import Floats, Indices, Mask, RayCaster, Visibility, face_materials, lengths, off, take
 from vobench.scene.material import Material, fresnel
 from vobench.scene.mesh import Triangles, areas_m2, distinct, unit
 

@@ -82,7 +82,8 @@ def free_way(scene: Scene) -> PoseSpline:
     faces = triangles(scene, t_ns=0)
     free = free_circle(faces, RayCaster(faces))
     if free is None or free.radius_m < LEAST_RADIUS_M:
-        found = f"the largest free circle on its floor has {free.radius_m:.2f} m" if free else "it has no level floor"
+        found = "it has no level floor; is another axis up?"
+        found = f"the largest free circle on its floor has {free.radius_m:.2f} m" if free else found
         raise SuiteError(f"no way for a body was found in '{scene.name}' ({found}); give trajectories")
     radius_m = min(OF_CIRCLE * free.radius_m, MOST_RADIUS_M)
     whole = 2 * np.pi * min(1.0, MOST_LENGTH_M / (2 * np.pi * radius_m))

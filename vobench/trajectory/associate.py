@@ -41,12 +41,7 @@ class Matched:
 
 
 def associate(
-    gt_t_ns: Stamps,
-    est_t_ns: Stamps,
-    *,
-    max_diff_ns: int = MAX_DIFF_NS,
-    offset_ns: int = 0,
-    method: Method = "nearest",
+    gt_t_ns: Stamps, est_t_ns: Stamps, *, max_diff_ns: int = MAX_DIFF_NS, offset_ns: int = 0, method: Method = "nearest"
 ) -> Pairs:
     """Pairs of poses whose stamps, the estimate's moved by offset_ns, are at most max_diff_ns apart; stamps sorted.
 
@@ -72,12 +67,7 @@ def associate(
 
 
 def match(
-    gt: Trajectory,
-    est: Trajectory,
-    *,
-    method: Method = "nearest",
-    max_diff_ns: int = MAX_DIFF_NS,
-    offset_ns: int = 0,
+    gt: Trajectory, est: Trajectory, *, method: Method = "nearest", max_diff_ns: int = MAX_DIFF_NS, offset_ns: int = 0
 ) -> Matched:
     """The poses that `associate` pairs; with "interpolate" the longer side is read at the shorter side's stamps."""
     pairs = associate(gt.t_ns, est.t_ns, max_diff_ns=max_diff_ns, offset_ns=offset_ns, method=method)
