@@ -152,6 +152,21 @@ def test_a_dark_room_from_a_file_gets_a_lamp_for_what_its_walls_reflect(
     assert lamp.power_lm == pytest.approx(400 * room.area * (1 - share), rel=0.01)
 
 
+def test_a_dark_hall_from_a_file_gets_lamps_all_over_its_floor_but_in_no_thing(tmp_path: Path) -> None:
+    hall, block = trimesh.creation.box((60, 8, 40)), trimesh.creation.box((9, 7.9, 9))  # glTF's y is up
+    hall.apply_translation((0, 4, 0))
+    hall.invert()
+    block.apply_translation((0, 3.95, 10))  # in the middle of one of six parts of the floor
+    trimesh.Scene([hall, block]).export(tmp_path / "hall.glb")
+    lights = build(read_scene(tmp_path / "hall.glb"), {}).lights
+    places = np.array([light.position_m for light in lights if isinstance(light, PointLight)])
+    assert len(places) == len(lights) == 6
+    parts = np.floor_divide(places[:, :2] + np.array([30, 20]), 20)
+    assert sorted(parts.tolist()) == [[i, j] for i in range(3) for j in range(2)]
+    assert (np.abs(places[:, :2] - [0, -10]).max(1) > 4.5).all()
+    assert ((places[:, 2] > 4) & (places[:, 2] < 7)).all()
+
+
 def test_a_file_that_is_not_there_or_no_model_is_one_sentence(yard, tmp_path: Path) -> None:
     with pytest.raises(SuiteError, match=r"yard.yaml:7: meshes.0.file: there is no such file beside the scene"):
         yard("meshes: [{file: no.glb}]\n")

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from vobench.errors import SuiteError
 from vobench.geometry.se3 import Array
@@ -31,11 +32,33 @@ class Free:
     radius_m: float
 
 
+@dataclass(frozen=True, slots=True)
+class _Floor:
+    """Cells of a floor: their middles x (W,), y (H,), whether nothing stands there (H, W), and the floor's height."""
+
+    x_m: Array
+    y_m: Array
+    free: NDArray[np.bool_]
+    floor_m: float
+    cell_m: float
+
+    def largest(self) -> Free | None:
+        distance = scipy.ndimage.distance_transform_edt(np.pad(self.free, 1))[1:-1, 1:-1]
+        row, column = np.unravel_index(distance.argmax(), distance.shape)
+        radius_m = float((distance[row, column] - 0.5) * self.cell_m)
+        return Free(float(self.x_m[column]), float(self.y_m[row]), self.floor_m, radius_m) if radius_m > 0 else None
+
+
 def free_circle(faces: Triangles, caster: RayCaster) -> Free | None:
     """The largest circle on the floor over which nothing stands lower than a body is high.
 
     The floor is the lowest height at which much level area lies: roofs and storeys above may have more.
     """
+    floor = _floor(faces, caster)
+    return floor.largest() if floor else None
+
+
+def _floor(faces: Triangles, caster: RayCaster) -> _Floor | None:
     level = (faces.plane[:, 2] > LEVEL) & (faces.mover < 0)
     if not level.any():
         return None
@@ -52,11 +75,7 @@ def free_circle(faces: Triangles, caster: RayCaster) -> Free | None:
     hits = caster.hits(np.column_stack([starts, np.full(len(starts), floor_m + BODY_M)]), down(len(starts)))
     is_floor = (np.abs(hits.distance - BODY_M) < FLOOR_STEP_M) & (faces.plane[hits.face, 2] > 0)
     is_floor[is_floor] = _clear(starts[is_floor], floor_m, cell_m, faces, caster)
-    free = is_floor.reshape(len(y), len(x))
-    distance = scipy.ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]
-    row, column = np.unravel_index(distance.argmax(), distance.shape)
-    radius_m = float((distance[row, column] - 0.5) * cell_m)
-    return Free(float(x[column]), float(y[row]), floor_m, radius_m) if radius_m > 0 else None
+    return _Floor(x, y, is_floor.reshape(len(y), len(x)), floor_m, cell_m)
 
 
 def _clear(at_m: Array, floor_m: float, cell_m: float, faces: Triangles, caster: RayCaster) -> Array:
@@ -101,21 +120,41 @@ def free_way(scene: Scene) -> PoseSpline:
     return PoseSpline(poses=tuple(poses), ease_s=EASE_S, rate_hz=RATE_HZ)
 
 
-LOOKS, LAMP_BELOW = 512, 0.15  # ways up that are looked, and how far below the ceiling a lamp hangs
+LOOKS, LAMP_BELOW = 512, 0.35  # ways up that are looked; how far down a lamp hangs, or its spot above drowns all
+LAMPS_APART, MOST_LAMPS = 2.5, 4  # in heights of the ceiling, and along a side
 
 
-def ceiling_above(scene: Scene) -> tuple[float, tuple[float, float, float]]:
-    """The share of the sky that a body sees where it is free, all without a floor; and where a lamp would hang."""
+def ceiling_above(scene: Scene) -> tuple[float, list[tuple[float, float, float]]]:
+    """The share of the sky that a body sees where it is free, all without a floor; and where lamps would hang.
+
+    That is above the free circle, or all over the floor of a hall that is much wider than high.
+    """
     faces = triangles(scene, t_ns=0)
     caster = RayCaster(faces)
-    free = free_circle(faces, caster)
-    if free is None:
-        return 1.0, (0.0, 0.0, 0.0)
+    floor = _floor(faces, caster)
+    free = floor.largest() if floor else None
+    if floor is None or free is None:
+        return 1.0, [(0.0, 0.0, 0.0)]
     at = np.array([free.x_m, free.y_m, free.floor_m + BODY_M])
     ways = np.abs(np.random.default_rng(0).standard_normal((LOOKS, 3)))
     ways[:, :2] *= np.sign(np.random.default_rng(1).standard_normal((LOOKS, 2)))
     seen = caster.nearest(np.tile(at, (LOOKS, 1)), ways)
     above = caster.hits(at[None], np.array([[0.0, 0.0, 1.0]]))
     height_m = float(above.distance[0]) if above.face[0] >= 0 else BODY_M
-    x, y, z = at.tolist()
-    return float((seen < 0).mean()), (x, y, z + (1 - LAMP_BELOW) * height_m)
+    places = _apart(floor, LAMPS_APART * (BODY_M + height_m))
+    starts = np.column_stack([places, np.full(len(places), at[2])]) if len(places) > 1 else at[None]
+    ceiling = caster.hits(starts, -down(len(starts)))
+    ends = starts - (1 - LAMP_BELOW) * np.where(ceiling.face < 0, height_m, ceiling.distance)[:, None] * down(1)
+    return float((seen < 0).mean()), [(x, y, z) for x, y, z in ends.tolist()]
+
+
+def _apart(floor: _Floor, step_m: float) -> Array:
+    """The free cells (N, 2) next to the middles of parts of a floor some step wide, one in each where there is any."""
+    cells = np.argwhere(floor.free)[:, ::-1]
+    size = np.array(floor.free.shape[::-1])
+    parts = np.clip(np.rint(size * floor.cell_m / step_m), 1, MOST_LAMPS)
+    part = np.floor(cells / size * parts)
+    apart = np.abs(cells / size * parts - part - 0.5).max(1)
+    order = np.lexsort((apart, part[:, 1], part[:, 0]))
+    first = order[np.unique(part[order], axis=0, return_index=True)[1]]
+    return np.column_stack([floor.x_m[cells[first, 0]], floor.y_m[cells[first, 1]]])

@@ -126,16 +126,17 @@ LARGEST_M, CENTIMETRE = 300.0, 0.01  # a larger model was written in centimetres
 
 
 def _lit_from_outside(spec: SceneFile, shape: Scene, swallows_m2: float) -> SceneFile:
-    """A model without a light, by day where its floor sees the sky, else with a lamp under its ceiling."""
+    """A model without a light, by day where its floor sees the sky, else with lamps under its ceiling."""
     from vobench.suite.free_way import ceiling_above
 
-    open_share, lamp_m = ceiling_above(shape)
+    open_share, places_m = ceiling_above(shape)
     if open_share >= LEAST_OPEN:
         sun, sky = DAYLIGHT
         lux = sun.illuminance_lx * np.sin(np.deg2rad(sun.elevation_deg or 90)) + sky.illuminance_lx
         return replace(spec, sun=sun, sky=sky, white_cd_m2=float(lux / np.pi))
-    lamp = PointLamp(name="lamp", center_m=lamp_m, power_lm=ROOM_LX * swallows_m2)
-    return replace(spec, lamps=(lamp,), white_cd_m2=float(ROOM_LX / np.pi))
+    power_lm = ROOM_LX * swallows_m2 / len(places_m)
+    lamps = [PointLamp(name=f"lamp_{n}", center_m=at_m, power_lm=power_lm) for n, at_m in enumerate(places_m, 1)]
+    return replace(spec, lamps=tuple(lamps), white_cd_m2=float(ROOM_LX / np.pi))
 
 
 def content(spec: SceneFile, *, exclude: Any = None) -> dict[str, Any]:
