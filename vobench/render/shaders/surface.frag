@@ -80,7 +80,7 @@ const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 vec3 probed(vec3 from, vec3 ray)
 {
     from = clamp(from, view.probe_low.xyz, view.probe_high.xyz);
-    ray = mix(ray, vec3(1e-9), equal(ray, vec3(0.0)));
+    ray = mix(ray, vec3(1e-9), equal(ray, vec3(0.0)));  // or 0 / 0, at the probe's bounds
     vec3 reach = max((view.probe_low.xyz - from) / ray, (view.probe_high.xyz - from) / ray);
     vec3 met = from + min(reach.x, min(reach.y, reach.z)) * ray;
     return view.probe_scale.rgb * textureLod(probe, met - view.probe_centre.xyz, batch.blur.x).rgb;
