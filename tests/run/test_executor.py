@@ -154,6 +154,27 @@ def test_a_process_that_dies_is_a_row_of_its_cell(bench, tmp_path, monkeypatch):
     assert "crashed" in (folder.path / "leaderboard.html").read_text()
 
 
+def test_what_a_fault_of_a_library_ended_is_made_once_more(bench, tmp_path, monkeypatch):
+    executor, hit, futures = LocalProcesses(2), [], []
+    submit = executor.submit
+
+    def once(one: Task, store: Path, slot: int, threads: int):
+        future = submit(one, store, slot, threads)
+        if one.stage == "sequence" and "dim" in one.name:
+            hit.append(one.key)
+            futures.append(future)
+            for process in list(executor._running):
+                os.kill(process.pid, signal.SIGABRT)
+        return future
+
+    monkeypatch.setattr(executor, "submit", once)
+    folder = run(bench, tmp_path, executor)
+    assert {score.status for score in folder.scores()} == {"ok"}
+    assert [future.result().told[0] for future in futures] == [
+        f"{key}: its process ended with signal SIGABRT, by a fault in a library; it is made once more" for key in hit
+    ]
+
+
 def test_what_a_task_raises_in_this_process_is_a_row_too(bench, tmp_path, monkeypatch):
     from vobench.run import task as stages
 

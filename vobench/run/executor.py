@@ -12,7 +12,7 @@ import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -28,6 +28,8 @@ FailureKind = Literal["crashed", "out_of_memory", "refused"]
 LOOK_S = 0.2
 GRACE_S = 1.0  # for a process that is asked to stop
 CONNECT_S = 10.0
+# What a library's fault ends, as once in hundreds of sequences; what is made so is the same however often it is made.
+FAULTS, MADE = (-signal.SIGABRT, -signal.SIGSEGV, -signal.SIGBUS), ("bake", "sequence")
 # What processes of tasks import, once for all of them.
 PRELOADED = [f"vobench.{name}" for name in ("run.executor", "run.simulate", "run.estimate", "run.score", "run.sensors",
              "run.stereo_camera", "render.raster", "suite.scene_build")]  # fmt: skip
@@ -136,17 +138,19 @@ class LocalProcesses:
         """Give the task to a process; a thread waits for what it says, or for its end."""
         future: Future[Done] = Future()
         cores = self._cores if threads == NO_LIMIT else _share(self._cores, slot, threads)
-        worker = self._worker(slot, task, cores)
-        self._running.add(worker.process)
+        first = self._worker(slot, task, cores)
+        self._running.add(first.process)
 
         def await_end() -> None:
-            began = time.monotonic()
-            try:
-                worker.connection.send((task, store))
-                done = worker.connection.recv()
-            except (EOFError, OSError):
-                worker.process.join()
-                done = _death(worker.process.exitcode, time.monotonic() - began)
+            worker, done = first, first.ask(task, store)
+            if task.stage in MADE and worker.process.exitcode in FAULTS:
+                told = f"{task.key}: {done.reason}, by a fault in a library; it is made once more"
+                worker.leave()
+                self._running.discard(worker.process)
+                worker = self._worker(slot, task, cores)
+                self._running.add(worker.process)
+                done = worker.ask(task, store)
+                done = replace(done, told=(told, *done.told))
             if task.stage == "sequence" and worker.process.is_alive():
                 self._idle[slot] = worker
             else:
@@ -190,6 +194,16 @@ class _Worker:
     connection: Any
     cores: list[int]
     at_hand: str
+
+    def ask(self, task: Task, store: Path) -> Done:
+        """What it says of a task, or how it died."""
+        began = time.monotonic()
+        try:
+            self.connection.send((task, store))
+            return self.connection.recv()  # type: ignore[no-any-return]
+        except (EOFError, OSError):
+            self.process.join()
+            return _death(self.process.exitcode, time.monotonic() - began)
 
     def leave(self) -> None:
         self.connection.close()
