@@ -171,10 +171,10 @@ def _in_role(look: Look, role: str) -> tuple[str, Material]:
 
 def _doubts(model: Model) -> list[str]:
     """Whether a model is likely of another unit, or a place that lies on its side, with its floor as a wall."""
-    span = float(np.ptp(np.concatenate([thing.mesh.vertices_m for thing in model.everything]), axis=0).max())
-    turned = [np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]) for c in (t.mesh.corners_m for t in model.everything)]
-    _, along, up_m2 = np.abs(np.concatenate(turned)).sum(0)
-    lies = span > PLACE_M and along > LYING * up_m2
+    corners_m = np.concatenate([thing.mesh.corners_m for thing in model.everything])
+    span = float(np.ptp(corners_m, axis=(0, 1)).max())
+    _, along_m2, up_m2 = areas_m2(corners_m) @ np.abs(face_normals(corners_m))
+    lies = span > PLACE_M and along_m2 > LYING * up_m2
     doubts = ["most of its faces look sideways: is another axis up? up: y, or z"] if lies else []
     if SMALLEST_M <= span <= LARGEST_M:
         return doubts

@@ -139,16 +139,14 @@ class LocalProcesses:
         future: Future[Done] = Future()
         cores = self._cores if threads == NO_LIMIT else _share(self._cores, slot, threads)
         first = self._worker(slot, task, cores)
-        self._running.add(first.process)
 
         def await_end() -> None:
             worker, done = first, first.ask(task, store)
             if task.stage in MADE and worker.process.exitcode in FAULTS:
                 told = f"{task.key}: {done.reason}, by a fault in a library; it is made once more"
-                worker.leave()
                 self._running.discard(worker.process)
+                worker.leave()
                 worker = self._worker(slot, task, cores)
-                self._running.add(worker.process)
                 done = worker.ask(task, store)
                 done = replace(done, told=(told, *done.told))
             if task.stage == "sequence" and worker.process.is_alive():
@@ -164,6 +162,7 @@ class LocalProcesses:
     def _worker(self, slot: int, task: Task, cores: list[int]) -> "_Worker":
         kept = self._idle.pop(slot, None)
         if kept and (kept.at_hand, kept.cores) == (_takes_up(task), cores) and kept.process.is_alive():
+            self._running.add(kept.process)
             return kept
         if kept:
             kept.leave()
@@ -171,6 +170,7 @@ class LocalProcesses:
         process = self._context.Process(target=_work, args=(theirs, cores), daemon=False)
         process.start()
         theirs.close()
+        self._running.add(process)
         return _Worker(process, ours, cores, _takes_up(task))
 
     def close(self) -> None:
