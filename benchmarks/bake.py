@@ -20,10 +20,10 @@ from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
-from vobench.render.bake import BakedScene, BakeSettings, bake
-from vobench.render.illumination import Illumination
-from vobench.render.mover_light import Views
-from vobench.render.view import Box, PinholeView, pinhole_view
+from vobench.rendering.bake import BakedScene, BakeSettings, bake
+from vobench.rendering.illumination import Illumination
+from vobench.rendering.mover_light import Views
+from vobench.rendering.view import Box, PinholeView, pinhole_view
 from vobench.scene.light import Flicker, Sun
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing

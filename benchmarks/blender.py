@@ -23,9 +23,9 @@ from light import PLACES, decibels, lens, lit, stand
 
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
-from vobench.render.path import PathRenderer
-from vobench.render.raster import RasterRenderer
-from vobench.render.renderer import Radiance, still
+from vobench.rendering.path import PathRenderer
+from vobench.rendering.raster import RasterRenderer
+from vobench.rendering.renderer import Radiance, still
 from vobench.scene.material import reflectance
 from vobench.scene.mesh import Mesh, joined
 from vobench.scene.scene import Scene

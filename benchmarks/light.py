@@ -24,11 +24,11 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
-from vobench.render.bake import BakedScene, BakeSettings, bake, load_baked, save_baked
-from vobench.render.geometry import RayCaster
-from vobench.render.path import PathRenderer
-from vobench.render.raster import RasterRenderer
-from vobench.render.renderer import Radiance, still
+from vobench.rendering.bake import BakedScene, BakeSettings, bake, load_baked, save_baked
+from vobench.rendering.geometry import RayCaster
+from vobench.rendering.path import PathRenderer
+from vobench.rendering.raster import RasterRenderer
+from vobench.rendering.renderer import Radiance, still
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene, triangles
 from vobench.suite import catalog

@@ -16,10 +16,10 @@ import numpy as np
 
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
-from vobench.render import mitsuba as llvm
-from vobench.render.mitsuba import load
-from vobench.render.path import PathRenderer
-from vobench.render.renderer import still
+from vobench.rendering import mitsuba as llvm
+from vobench.rendering.mitsuba import load
+from vobench.rendering.path import PathRenderer
+from vobench.rendering.renderer import still
 from vobench.scene.scene import Scene
 from vobench.suite import catalog
 from vobench.suite.scene_build import build

@@ -21,11 +21,11 @@ from vobench.analysis.causes import attribute
 from vobench.cli.failure import conditions_of, course, explained, outcome, read_simulated, read_trial, shrunk
 from vobench.geometry import rig
 from vobench.geometry.camera import Pinhole
-from vobench.render import bake
-from vobench.run.executor import Serial
-from vobench.run.folder import RunFolder
-from vobench.run.key import cache_folder
-from vobench.run.run import run_suite
+from vobench.rendering import bake
+from vobench.runner.executor import Serial
+from vobench.runner.folder import RunFolder
+from vobench.runner.key import cache_folder
+from vobench.runner.run import run_suite
 from vobench.suite.suite import read_plan
 
 LENS = Pinhole(240, 160, 200.0, 200.0, 119.5, 79.5)

@@ -23,10 +23,10 @@ from vobench.geometry import se3
 from vobench.geometry.camera import KannalaBrandt
 from vobench.geometry.rig import LENSES, Rig, stereo_rig
 from vobench.geometry.se3 import Array
-from vobench.render.bake import BakeSettings, bake
-from vobench.render.raster import RasterRenderer
-from vobench.render.renderer import View, still
-from vobench.render.view import NEAR_M, T_CV_GL
+from vobench.rendering.bake import BakeSettings, bake
+from vobench.rendering.raster import RasterRenderer
+from vobench.rendering.renderer import View, still
+from vobench.rendering.view import NEAR_M, T_CV_GL
 from vobench.scene.light import AreaLight
 from vobench.scene.material import Map, reflectance
 from vobench.scene.mesh import joined

@@ -19,7 +19,7 @@ import numpy as np
 from vobench.geometry import se3
 from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
-from vobench.render.truth import Shot, TruthCaster
+from vobench.rendering.truth import Shot, TruthCaster
 from vobench.scene.scene import triangles
 from vobench.sensor.pixel_truth import CHANNELS
 from vobench.sequence import SequenceWriter

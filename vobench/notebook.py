@@ -11,7 +11,7 @@ from vobench.metric import score as scoring
 from vobench.metric.comparison import DEFAULTS
 from vobench.metric.score import Score
 from vobench.metric.settings import ScoreSettings
-from vobench.run.trajectory_pair import TrajectoryPair, TrajectorySource, read_one, read_pair
+from vobench.runner.trajectory_pair import TrajectoryPair, TrajectorySource, read_one, read_pair
 from vobench.trajectory.formats import Reading
 from vobench.trajectory.trajectory import Trajectory
 
@@ -68,7 +68,7 @@ def read_board(run: Path | str) -> "pd.DataFrame":
     Raises InputError where the folder is none of a run.
     """
     from vobench.report import board_table, page
-    from vobench.run.folder import open_run
+    from vobench.runner.folder import open_run
 
     folder = open_run(Path(run))
     return board_table.data_frame(page.board_of(folder, folder.scores()))

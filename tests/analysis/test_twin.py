@@ -21,7 +21,7 @@ from vobench.estimator.tools import stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking, stereo_rig
-from vobench.render.geometry import RayCaster
+from vobench.rendering.geometry import RayCaster
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, flat
 from vobench.scene.scene import Scene, triangles

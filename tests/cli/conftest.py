@@ -16,8 +16,8 @@ import pytest
 
 from vobench import cli, stop
 from vobench.cli import main
-from vobench.render import bake, raster
-from vobench.render.bake import BakeSettings
+from vobench.rendering import bake, raster
+from vobench.rendering.bake import BakeSettings
 
 SUITE = """name: tiny
 scenes: [closet]

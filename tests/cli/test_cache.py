@@ -53,7 +53,7 @@ import os, sys
 import pytest
 from conftest import make_cheap
 from vobench import cli
-from vobench.run import task
+from vobench.runner import task
 def counted(stage, perform):
     def performed(*args):
         with open("made", "a") as file:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from vobench.errors import MissingDependencyError
-from vobench.render import raster
+from vobench.rendering import raster
 
 
 def test_run_ends_in_a_leaderboard_and_says_where_everything_is(vobench, here):

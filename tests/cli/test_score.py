@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
-from vobench.run.consistency import format_covariances
+from vobench.runner.consistency import format_covariances
 from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory, parse_move
 

@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from vobench.run.folder import SEQUENCE
+from vobench.runner.folder import SEQUENCE
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from vobench import stop
-from vobench.run import motion
+from vobench.runner import motion
 
 SENTENCE = "vobench: stopped; finished stages are kept, the same command goes on from there"
 HANGING = """
@@ -28,7 +28,7 @@ import sys, time
 import pytest
 from conftest import make_cheap
 from vobench import cli
-from vobench.run import simulate
+from vobench.runner import simulate
 def sleep(case, folder, **_):
     (folder / "begun").write_text("")
     print("asleep", file=sys.stderr, flush=True)

@@ -8,7 +8,7 @@ from rich.console import Console
 from vobench.cli import report, terminal
 from vobench.report.board_table import COST, HEADINGS, MEMORY
 from vobench.report.leaderboard import board
-from vobench.run.folder import TrialScore
+from vobench.runner.folder import TrialScore
 from vobench.suite.catalog import Entry, find
 
 NAMES = ("wheel_odometry", "an_estimator_of_a_long_name", "lk_epipolar", "stereo_pnp")

@@ -20,9 +20,9 @@ from vobench.estimator.program import EstimatorFailure, sandbox_works
 from vobench.estimator.protocol import Frame
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
-from vobench.run.estimate import LOG, estimate, read_outcome
-from vobench.run.frames import ANSWERS, TIMES, read_table
-from vobench.run.store import SilentProgress
+from vobench.runner.estimate import LOG, estimate, read_outcome
+from vobench.runner.frames import ANSWERS, TIMES, read_table
+from vobench.runner.store import SilentProgress
 from vobench.sequence import SequenceWriter
 from vobench.suite.manifest import read_manifest
 from vobench.suite.source import RecordedCase, Source
@@ -291,7 +291,7 @@ def test_the_truth_and_other_processes_are_out_of_sight(run, tmp_path, recording
 
 
 def test_a_folder_in_which_the_estimator_lies_is_not_hidden_from_it(run, tmp_path, recording, monkeypatch):
-    monkeypatch.setattr("vobench.run.estimate._hidden", lambda *_: [tmp_path])
+    monkeypatch.setattr("vobench.runner.estimate._hidden", lambda *_: [tmp_path])
     assert read_outcome(run(Animal(FINISHED, OK))).kind == FINISHED
 
 

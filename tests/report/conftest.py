@@ -11,10 +11,10 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
 from vobench.report.rerun import TrialView, save_trial
-from vobench.run import estimate as estimate_file
-from vobench.run.folder import SCORE, RunFolder, TrialScore
-from vobench.run.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
-from vobench.run.store import write_json
+from vobench.runner import estimate as estimate_file
+from vobench.runner.folder import SCORE, RunFolder, TrialScore
+from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
+from vobench.runner.store import write_json
 from vobench.sequence import EncodedFrame
 from vobench.trajectory.align import Alignment
 from vobench.trajectory.formats import format_tum

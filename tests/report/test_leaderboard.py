@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from vobench.report import board_table, page
 from vobench.report.leaderboard import CaseFacts, EstimatorStatistics, answers, board, lost_aware, marks
-from vobench.run.folder import NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore
-from vobench.run.frames import COLUMNS, FRAMES, TIMES, FrameRow, new_table
+from vobench.runner.folder import NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore
+from vobench.runner.frames import COLUMNS, FRAMES, TIMES, FrameRow, new_table
 
 CASES = ("a", "b")
 BEGUN = [status for status in STATUSES if status != NOT_APPLICABLE]

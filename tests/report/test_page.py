@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from vobench.report import page
-from vobench.run.folder import RunFolder
-from vobench.run.frames import FrameRow
+from vobench.runner.folder import RunFolder
+from vobench.runner.frames import FrameRow
 
 VOID = {"meta", "img", "input", "wbr"}
 

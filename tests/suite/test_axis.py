@@ -3,7 +3,7 @@
 import pytest
 
 from vobench.errors import SuiteError
-from vobench.run.simulate import content
+from vobench.runner.simulate import content
 
 # A pair as KITTI has it: P = K [I | -K (0.5, 0, 0)], and a colour pair that is looked at where there is no grey one.
 GREY = "P0: 700 0 600 0 0 710 180 0 0 0 1 0\nP1: 700 0 600 -350 0 710 180 0 0 0 1 0\n"

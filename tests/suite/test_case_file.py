@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vobench.run.simulate import content
+from vobench.runner.simulate import content
 from vobench.suite.case_file import write_case
 from vobench.suite.suite import read_plan
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from vobench.errors import MOST_SAID, Place, SuiteError, UnknownNameError, VobenchError
-from vobench.run.motion import body_motions
+from vobench.runner.motion import body_motions
 from vobench.suite import catalog, scene_build, scene_file
 from vobench.suite import suite as expand
 from vobench.suite.catalog import builtin_root

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
-from vobench.render.truth import Shot, TruthCaster
+from vobench.rendering.truth import Shot, TruthCaster
 from vobench.scene.material import Material, linear
 from vobench.sensor.image_sensor import CameraSensor
 from vobench.sensor.pixel_truth import TruthFrame

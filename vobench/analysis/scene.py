@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
-from vobench.render.geometry import RayCaster
-from vobench.render.renderer import Renderer, still
+from vobench.rendering.geometry import RayCaster
+from vobench.rendering.renderer import Renderer, still
 from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Texture, reflectance, srgb
 from vobench.scene.mesh import Triangles, distinct, unit

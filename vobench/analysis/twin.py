@@ -19,7 +19,7 @@ from vobench.errors import InputError
 from vobench.estimator.tools import StereoPair
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.render.geometry import RayCaster
+from vobench.rendering.geometry import RayCaster
 from vobench.scene.scene import Scene, triangles
 from vobench.sensor.image_sensor import CameraSensor, CameraSettings
 from vobench.sequence.picture import Image

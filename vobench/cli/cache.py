@@ -10,8 +10,8 @@ import typer
 from vobench import stop
 from vobench.cli import terminal
 from vobench.errors import InputError
-from vobench.run.key import cache_folder
-from vobench.run.store import GB, Entry, Store
+from vobench.runner.key import cache_folder
+from vobench.runner.store import GB, Entry, Store
 
 ACTIONS = ("ls", "gc", "verify")
 DAY_S = 86400.0

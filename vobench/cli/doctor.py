@@ -15,12 +15,12 @@ from vobench import stop
 from vobench.cli import terminal
 from vobench.errors import MissingDependencyError
 from vobench.estimator.program import sandbox_works
-from vobench.render import mitsuba
-from vobench.render.raster import EGL_PACKAGES, EGL_REMEDY
-from vobench.run.key import cache_folder
-from vobench.run.store import why_unwritable
+from vobench.rendering import mitsuba
+from vobench.rendering.raster import EGL_PACKAGES, EGL_REMEDY
+from vobench.runner.key import cache_folder
+from vobench.runner.store import why_unwritable
 
-PROBE = "from vobench.render import raster; raster.context()"
+PROBE = "from vobench.rendering import raster; raster.context()"
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,8 @@ from vobench.motion.drive import Waypoints
 from vobench.motion.motor import loop_voltages, wheel_voltages
 from vobench.motion.wheeled import Wheeled
 from vobench.report.drive_plot import ENDINGS, DriveLog, save_plot
-from vobench.run.motion import BodyMotion, body_motion, check_cases
-from vobench.run.sensors import wheel_error_m
+from vobench.runner.motion import BodyMotion, body_motion, check_cases
+from vobench.runner.sensors import wheel_error_m
 from vobench.suite.suite import Case, Plan, read_plan
 from vobench.trajectory.formats import format_tum
 from vobench.trajectory.kinematics import Kinematics

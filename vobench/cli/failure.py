@@ -17,9 +17,9 @@ from vobench.analysis.shrink import FEWEST_FRAMES, Failure, Shrunk, shrink
 from vobench.cli import terminal
 from vobench.cli.run import run_plan
 from vobench.errors import InputError, UnknownNameError, unknown
-from vobench.run.estimate import ESTIMATE, FINISHED
-from vobench.run.estimate import Outcome as Ended
-from vobench.run.folder import (
+from vobench.runner.estimate import ESTIMATE, FINISHED
+from vobench.runner.estimate import Outcome as Ended
+from vobench.runner.folder import (
     CASE,
     ESTIMATORS,
     SCORE,
@@ -32,10 +32,10 @@ from vobench.run.folder import (
     read_score,
     read_tum,
 )
-from vobench.run.frames import GROUND_TRUTH, read_frames
-from vobench.run.key import folder_digest
-from vobench.run.motion import body_motion, body_motions
-from vobench.run.score import score_estimate, status_of
+from vobench.runner.frames import GROUND_TRUTH, read_frames
+from vobench.runner.key import folder_digest
+from vobench.runner.motion import body_motion, body_motions
+from vobench.runner.score import score_estimate, status_of
 from vobench.suite import catalog
 from vobench.suite.case_file import write_case
 from vobench.suite.manifest import read_manifest

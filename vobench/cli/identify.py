@@ -15,8 +15,8 @@ from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.motion.identification import Fit, identify_odometry
 from vobench.motion.pioneer import Theta
-from vobench.run.folder import SEQUENCE, open_run
-from vobench.run.motion import recorded_drive
+from vobench.runner.folder import SEQUENCE, open_run
+from vobench.runner.motion import recorded_drive
 from vobench.sequence import Sequence, read_truth
 from vobench.trajectory.trajectory import Stamps
 

@@ -13,7 +13,7 @@ from vobench.cli.sequence import Calibration, Form, FormCommand, Rate, TopicOf, 
 from vobench.dataset.layout import read
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
-from vobench.run.folder import SEQUENCE
+from vobench.runner.folder import SEQUENCE
 
 COMMAND_CLASS = FormCommand
 ALIKE = 0.25  # values that differ by a smaller share are taken for equal

@@ -14,12 +14,12 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import PRESETS, looking
 from vobench.geometry.se3 import Array
-from vobench.render.occlusion import Shot
-from vobench.render.renderer import Radiance, still
-from vobench.render.truth import TruthCaster
-from vobench.run.key import cache_folder
-from vobench.run.simulate import open_renderer
-from vobench.run.task import bake_task, perform
+from vobench.rendering.occlusion import Shot
+from vobench.rendering.renderer import Radiance, still
+from vobench.rendering.truth import TruthCaster
+from vobench.runner.key import cache_folder
+from vobench.runner.simulate import open_renderer
+from vobench.runner.task import bake_task, perform
 from vobench.scene.light import NS_PER_S
 from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import CAMERAS, CameraSettings, NoiseStreams, expose, fixed_pattern

@@ -17,8 +17,8 @@ from vobench.report import compare, page
 from vobench.report.board_table import DEFAULT_METRIC, FORMATS, LEGEND, cell_notes, matrix, remarks, totals
 from vobench.report.leaderboard import METRICS, Board
 from vobench.report.verify import verify_run
-from vobench.run.bundle import bundle, merged, opened, scored_again
-from vobench.run.folder import TrialScore, open_run
+from vobench.runner.bundle import bundle, merged, opened, scored_again
+from vobench.runner.folder import TrialScore, open_run
 
 # A narrow terminal goes without these, in this order; every report has them all.
 LEAST_FIRST = ("MiB", "mean place", "CPU ms/frame", "ATE %", "failed", "decided", "× first")

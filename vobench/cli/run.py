@@ -15,11 +15,11 @@ from vobench.cli import terminal
 from vobench.errors import InputError
 from vobench.estimator.manifest import Manifest
 from vobench.estimator.program import sandbox_works
-from vobench.run.executor import Dask, Executor, LocalProcesses, Serial
-from vobench.run.key import cache_folder
-from vobench.run.motion import BodyMotion, body_motions, cut
-from vobench.run.store import why_unwritable
-from vobench.run.task import is_done, plan, sequence_tasks
+from vobench.runner.executor import Dask, Executor, LocalProcesses, Serial
+from vobench.runner.key import cache_folder
+from vobench.runner.motion import BodyMotion, body_motions, cut
+from vobench.runner.store import why_unwritable
+from vobench.runner.task import is_done, plan, sequence_tasks
 from vobench.suite.scenario import ScenarioFile
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import RecordedCase
@@ -28,8 +28,8 @@ from vobench.suite.yaml_file import json_schema
 
 if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
-    from vobench.run.folder import RunFolder
-    from vobench.run.run import Finish
+    from vobench.runner.folder import RunFolder
+    from vobench.runner.run import Finish
 
 
 def run_command(
@@ -94,7 +94,7 @@ def run_command(
     from vobench.cli.report import print_board
     from vobench.report import page
     from vobench.report.board_table import as_json as board_as_json
-    from vobench.run.run import BESIDE
+    from vobench.runner.run import BESIDE
 
     _, recordings = _preflight(planned, of_all=fresh)
     if cause := why_unwritable(out):
@@ -134,7 +134,7 @@ def run_plan(
     **options: bool,
 ) -> "RunFolder":
     """`run_suite` with what happens shown on this terminal; `options` are its own."""
-    from vobench.run.run import run_suite
+    from vobench.runner.run import run_suite
 
     work = terminal.Work(events, is_serial=jobs == 1 and not scheduler)
     executor: Executor = Serial(terminal.Bars()) if jobs == 1 else LocalProcesses(jobs)
@@ -179,7 +179,7 @@ def _preflight(planned: Plan, *, of_all: bool = True) -> "tuple[dict[str, BodyMo
         travels = body_motions(replace(planned, simulated=tuple(simulated)))
     with wrong.at():
         if planned.recorded:
-            from vobench.run.import_recording import read_all
+            from vobench.runner.import_recording import read_all
 
             recordings = read_all(planned)
     wrong.require_none()
@@ -222,7 +222,7 @@ def _check(planned: Plan, *, as_json: bool, is_dry_run: bool = False) -> None:
 
 def _to_do(planned: Plan, recordings: "Mapping[str, Recording]") -> list[dict[str, Any]]:
     """By stage, how many tasks there are, how many of them are done, why the rest is not, and how long it takes."""
-    from vobench.run.dry_run import to_do
+    from vobench.runner.dry_run import to_do
 
     found = to_do(plan(planned, recordings), cache_folder())
     counts = [{"in the cache": each.tasks - each.to_do, "to do": each.to_do} for each in found]

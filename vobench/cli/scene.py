@@ -11,9 +11,9 @@ from vobench.analysis.scene import SceneSurvey, sheet, strength, survey
 from vobench.asset import MODEL_SUFFIXES
 from vobench.cli import terminal
 from vobench.errors import InputError
-from vobench.run.key import cache_folder
-from vobench.run.simulate import open_renderer
-from vobench.run.task import bake_task, perform
+from vobench.runner.key import cache_folder
+from vobench.runner.simulate import open_renderer
+from vobench.runner.task import bake_task, perform
 from vobench.scene.scene import Scene
 from vobench.sequence.picture import write_png
 from vobench.suite import catalog

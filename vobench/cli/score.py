@@ -20,7 +20,7 @@ from vobench.metric.score import Score, pooled, score
 from vobench.metric.settings import LIKE, PAIRS_OF_RULE, Plane, ScoreSettings, Side, Unit
 from vobench.report import score_table
 from vobench.report.score_table import COLUMNS, Content
-from vobench.run.trajectory_pair import TrajectorySource, read_pair
+from vobench.runner.trajectory_pair import TrajectorySource, read_pair
 from vobench.setting import hints
 from vobench.trajectory.align import Kind
 from vobench.trajectory.associate import Method
@@ -368,7 +368,7 @@ def _scored(
         raise InputError("a delta in seconds needs stamps, and neither file has any; name one with --times")
     P = None
     if covariance:
-        from vobench.run.consistency import Consistency, read_covariances
+        from vobench.runner.consistency import Consistency, read_covariances
 
         P = read_covariances(covariance, pair.est.trajectory.t_ns)
     scored = score(pair.gt.trajectory, pair.est.trajectory, settings=settings, metrics=metrics, covariance=P)

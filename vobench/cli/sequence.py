@@ -14,8 +14,8 @@ from vobench.dataset.picture import read_text, require_free
 from vobench.dataset.recording import ReadOptions, Topics
 from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.geometry.rig import Rig
-from vobench.run.import_recording import import_recording
-from vobench.run.store import sweep, unfinished
+from vobench.runner.import_recording import import_recording
+from vobench.runner.store import sweep, unfinished
 from vobench.sequence import Sequence, has_truth, payload_hash, read_import_notes, read_provenance
 from vobench.sequence.recording import is_recording, read_poses, topic_facts
 from vobench.trajectory.formats import parse_any

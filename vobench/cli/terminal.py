@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
     from rich.table import Table
 
-    from vobench.run.executor import Event
+    from vobench.runner.executor import Event
     from vobench.suite.catalog import Entry
 
 Item = TypeVar("Item")

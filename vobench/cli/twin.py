@@ -32,11 +32,11 @@ from vobench.errors import InputError
 from vobench.estimator.tools import stereo_pair
 from vobench.geometry.rig import own_pair
 from vobench.geometry.se3 import Array, inverse
-from vobench.run.folder import SEQUENCE, RunFolder, TrialScore, read_tum
-from vobench.run.frames import GROUND_TRUTH
-from vobench.run.key import cache_folder
-from vobench.run.motion import body_motion
-from vobench.run.task import bake_task, perform
+from vobench.runner.folder import SEQUENCE, RunFolder, TrialScore, read_tum
+from vobench.runner.frames import GROUND_TRUTH
+from vobench.runner.key import cache_folder
+from vobench.runner.motion import body_motion
+from vobench.runner.task import bake_task, perform
 from vobench.suite import catalog
 from vobench.suite.axis import RigSettings
 from vobench.suite.scene_build import build
@@ -177,8 +177,8 @@ def _fit(file: Path, suite: dict[str, Any], recording: Recording, *, gain: float
 
     `gain` is of the right eye's grey values over the left one's.
     """
-    from vobench.run.simulate import open_renderer
-    from vobench.run.stereo_camera import World, exposed_by
+    from vobench.runner.simulate import open_renderer
+    from vobench.runner.stereo_camera import World, exposed_by
 
     case = read_plan(str(file)).simulated[0]
     travel, scene = body_motion(case), case.build_scene()
@@ -213,7 +213,7 @@ def _look_of(recording: Recording) -> Look:
 
 def _run(file: Path, out: Path, jobs: int) -> RunFolder:
     from vobench.report import page
-    from vobench.run.import_recording import read_all
+    from vobench.runner.import_recording import read_all
 
     planned = read_plan(str(file))
     return run_plan(planned, read_all(planned), out=out / "runs", jobs=jobs, finish=page.write_reports)

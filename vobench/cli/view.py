@@ -11,7 +11,7 @@ import typer
 from vobench.cli import terminal
 from vobench.errors import InputError, MissingDependencyError
 from vobench.report.rerun import PictureForm, pick, ranked, save_trial, trial_view
-from vobench.run.folder import RunFolder, TrialScore, open_run
+from vobench.runner.folder import RunFolder, TrialScore, open_run
 
 FORMS: tuple[PictureForm, ...] = ("jpeg", "png")
 RERUN = (sys.executable, "-P", "-m", "rerun")  # without -P, a rerun.py in the working folder would be run in its place

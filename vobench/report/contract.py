@@ -14,12 +14,12 @@ from vobench.estimator.protocol import Image
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import ImuCalibration, Rig, stereo_rig
 from vobench.geometry.se3 import transform
-from vobench.run import estimate as running
-from vobench.run.estimate import estimate, frames_of, read_outcome
-from vobench.run.folder import read_tum
-from vobench.run.frames import ANSWERS, TIMES, read_table
-from vobench.run.ground_truth import write_ground_truth
-from vobench.run.store import SilentProgress
+from vobench.runner import estimate as running
+from vobench.runner.estimate import estimate, frames_of, read_outcome
+from vobench.runner.folder import read_tum
+from vobench.runner.frames import ANSWERS, TIMES, read_table
+from vobench.runner.ground_truth import write_ground_truth
+from vobench.runner.store import SilentProgress
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import Sequence, SequenceWriter
 from vobench.suite.manifest import read_manifest

@@ -13,10 +13,10 @@ import numpy as np
 
 from vobench.metric import ranking
 from vobench.metric.coverage import lost_aware_score
-from vobench.run.consistency import Consistency
-from vobench.run.estimate import DROPPED
-from vobench.run.folder import NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore, value_of
-from vobench.run.frames import FrameRow
+from vobench.runner.consistency import Consistency
+from vobench.runner.estimate import DROPPED
+from vobench.runner.folder import NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore, value_of
+from vobench.runner.frames import FrameRow
 
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 FAIL_RATIO = 0.1  # of the path, of scores without a lost-aware one

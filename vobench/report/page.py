@@ -20,8 +20,8 @@ from vobench.errors import VobenchError
 from vobench.geometry.se3 import Array
 from vobench.report import board_table as table
 from vobench.report.leaderboard import COSTS, METRICS, Answered, Board, CaseFacts, Cell, answers, board, notes
-from vobench.run.estimate import ESTIMATE, LOG
-from vobench.run.folder import (
+from vobench.runner.estimate import ESTIMATE, LOG
+from vobench.runner.folder import (
     CASE,
     ENVIRONMENT,
     PAGE,
@@ -33,7 +33,7 @@ from vobench.run.folder import (
     TrialScore,
     read_tum,
 )
-from vobench.run.frames import FRAMES, GROUND_TRUTH, TIMES, FrameRow, new_table, read_frames
+from vobench.runner.frames import FRAMES, GROUND_TRUTH, TIMES, FrameRow, new_table, read_frames
 from vobench.trajectory.align import Alignment
 
 TEMPLATES = Path(__file__).parent / "templates"

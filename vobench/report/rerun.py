@@ -22,13 +22,13 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
-from vobench.render.bake import load_baked
-from vobench.render.illumination import Illumination
+from vobench.rendering.bake import load_baked
+from vobench.rendering.illumination import Illumination
 from vobench.report import blueprint as bp
 from vobench.report.blueprint import FRAME_TIMELINE, truth_entity
-from vobench.run.estimate import ESTIMATE, POINTS, read_tracks
-from vobench.run.folder import CASE, SEQUENCE, STATUSES, SURVIVED, RunFolder, TrialScore, read_tum
-from vobench.run.frames import GROUND_TRUTH, FrameRow, read_frames
+from vobench.runner.estimate import ESTIMATE, POINTS, read_tracks
+from vobench.runner.folder import CASE, SEQUENCE, STATUSES, SURVIVED, RunFolder, TrialScore, read_tum
+from vobench.runner.frames import GROUND_TRUTH, FrameRow, read_frames
 from vobench.scene.material import Material, linear_texture, srgb
 from vobench.scene.scene import Way
 from vobench.sensor.pixel_truth import CHANNELS, TruthNames, picture

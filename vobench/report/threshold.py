@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from vobench.errors import InputError, unknown
 from vobench.metric.definitions import DEFINITIONS
-from vobench.run.folder import SURVIVED, TrialScore
+from vobench.runner.folder import SURVIVED, TrialScore
 
 STATISTICS = ("rmse", "mean", "median", "std", "min", "max")
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {

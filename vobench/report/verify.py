@@ -8,12 +8,12 @@ from typing import Any
 
 from vobench import stop
 from vobench.errors import VobenchError
-from vobench.run.entry import fault, file_hash
-from vobench.run.estimate import ESTIMATE, REVISED
-from vobench.run.folder import CASE, SEQUENCE, RunFolder, read_hashes, read_score, read_tum
-from vobench.run.frames import GROUND_TRUTH
-from vobench.run.ground_truth import left_truth, noisy
-from vobench.run.score import score_estimate
+from vobench.runner.entry import fault, file_hash
+from vobench.runner.estimate import ESTIMATE, REVISED
+from vobench.runner.folder import CASE, SEQUENCE, RunFolder, read_hashes, read_score, read_tum
+from vobench.runner.frames import GROUND_TRUTH
+from vobench.runner.ground_truth import left_truth, noisy
+from vobench.runner.score import score_estimate
 from vobench.suite.suite import TruthNoise
 from vobench.trajectory.formats import format_tum
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from vobench.errors import SuiteError
 from vobench.geometry.se3 import Array
 from vobench.motion.spline import Pose, PoseSpline
-from vobench.render.geometry import RayCaster
+from vobench.rendering.geometry import RayCaster
 from vobench.scene.mesh import Triangles, areas_m2
 from vobench.scene.scene import Scene, triangles
 

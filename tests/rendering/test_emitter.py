@@ -1,0 +1,48 @@
+"""A rectangle's solid angle, spots on it, and its light agree with what is known without sampling."""
+
+import numpy as np
+import pytest
+from tests.render import rectangles
+
+from vobench.geometry.se3 import Array
+from vobench.rendering.emitter import SolidAngle, rectangle
+
+PANEL = rectangles.rectangle(np.array([0.2, 0.1, 2.0]), np.array([0, 1.2, 0]), np.array([0.8, 0, 0]), "a")
+FACE = rectangle(PANEL.mesh.corners_m)
+assert FACE is not None
+POINTS = np.array([[0.0, 0, 0], [1.5, -0.3, 0.4], [0.2, 0.1, 1.9], [-2, 3, 1.0], [0.2, 0.1, 2.5]])
+
+
+def unit(vectors: Array) -> Array:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def grid(count: int) -> tuple[Array, Array]:
+    middle = (np.arange(count) + 0.5) / count
+    a, b = np.meshgrid(middle, middle)
+    return a.ravel(), b.ravel()
+
+
+@pytest.mark.parametrize("point", POINTS)
+def test_the_solid_angle_is_the_integral_over_the_rectangle_from_either_side(point: Array) -> None:
+    way = PANEL.at(*grid(1000)) - point
+    squared = np.einsum("ij,ij->i", way, way)
+    integral = (np.abs(way @ PANEL.normal) / squared**1.5).mean() * np.prod(PANEL.size_m)
+    assert SolidAngle(FACE, point[None]).steradian[0] == pytest.approx(integral, rel=1e-3)
+
+
+@pytest.mark.parametrize("point", POINTS)
+def test_spots_lie_on_the_rectangle_and_are_spread_evenly_over_its_solid_angle(point: Array) -> None:
+    a, b = grid(200)
+    seen = SolidAngle(FACE, np.repeat(point[None], len(a), axis=0))
+    spots = seen.spot(a, b) + point
+    local = spots - PANEL.corner_m
+    assert np.abs(local @ PANEL.normal).max() < 1e-5
+    for edge in (PANEL.edge_u_m, PANEL.edge_v_m):
+        share = local @ edge / (edge @ edge)
+        assert -1e-5 < share.min() < share.max() < 1 + 1e-5
+    # The mean direction over the solid angle, by area elements instead.
+    way = PANEL.at(*grid(1000)) - point
+    weight = np.abs(way @ PANEL.normal) / np.linalg.norm(way, axis=1) ** 3
+    expected = (unit(way) * weight[:, None]).sum(0) / weight.sum()
+    np.testing.assert_allclose(unit(seen.spot(a, b)).mean(0), expected, atol=1e-3)

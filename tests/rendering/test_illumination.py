@@ -1,0 +1,216 @@
+"""Layers add up by their levels; a moving sun and movers give the light of the same things at rest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy
+
+from vobench.asset.shape import block
+from vobench.asset.texture import Procedural
+from vobench.geometry import se3
+from vobench.rendering.bake import SUN_STEP_RAD, BakedScene, BakeSettings, bake, key_times_ns
+from vobench.rendering.illumination import Illumination
+from vobench.scene.light import NS_PER_S, Dimmer, Flicker, Light, PointLight, Sky, Sun, Switched
+from vobench.scene.material import Material
+from vobench.scene.mesh import Thing, quad
+from vobench.scene.scene import Mover, Path, Scene, ceiling_light
+
+COARSE = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=0.3, indirect_rays=64, bounces=3)
+DIRECT = replace(COARSE, bounces=0)
+MATERIALS = {"grey": Material(texture=Procedural("plain", 0.5, 0.0, 1.0, 8, 0)), "pane": Material("pane", eta=1.5)}
+X, Y, Z = np.diag([4.0, 4.0, 2.5])
+ROOM = tuple(
+    Thing(name, quad(corner, u, v), "grey")
+    for name, corner, u, v in (
+        ("floor", -(X + Y) / 2, X, Y),
+        ("ceiling", Z - (X + Y) / 2, Y, X),
+        ("east", (X - Y) / 2, Z, Y),
+        ("west", -(X + Y) / 2, Y, Z),
+        ("north", (Y - X) / 2, X, Z),
+        ("south", -(X + Y) / 2, Z, X),
+    )
+)
+PANEL = ceiling_light("panel", np.array([0.5, 0.3, 2.4]), (0.4, 0.4), power_lm=1000)
+BULB = PointLight("bulb", np.array([-1.0, 0.5, 2.0]), 500.0)
+UP = se3.transform(np.eye(3), [0, 0, 0.5])
+CRATE = Thing("crate", block((0.4, 0.6, 1.0), bevel_m=0).moved(UP), "grey")
+PLACES = np.random.default_rng(0).dirichlet((1, 1, 1), 1500)  # on a triangle
+
+
+def scene(*lights: Light, things: tuple[Thing, ...] = ROOM, movers: tuple[Mover, ...] = ()) -> Scene:
+    return Scene("test", things, MATERIALS, lights, movers)
+
+
+def on(baked: BakedScene, light: np.ndarray, name: str) -> np.ndarray:
+    """Light (N,) at places all over the faces of one thing."""
+    faces, (height, width) = baked.faces, light.shape[:2]
+    own = [faces.things[thing].name == name for thing in faces.thing]
+    u, v = np.moveaxis(PLACES @ baked.light_uv[own].astype(float), -1, 0).reshape(2, -1)
+    return scipy.ndimage.map_coordinates(light[..., 1], [v * height - 0.5, u * width - 0.5], order=1, mode="nearest")
+
+
+def layer(baked: BakedScene, index: int) -> np.ndarray:
+    """The map (H, W, 3) of one light alone, which is white, at level 1."""
+    around = (baked.spread @ baked.bounced[index]).reshape(*baked.direct.shape[1:], 3)
+    return baked.direct[index][..., None] + around
+
+
+def ns(t_s: float) -> int:
+    return round(t_s * NS_PER_S)
+
+
+@pytest.fixture(scope="module")
+def lamps() -> BakedScene:
+    lights = (
+        PANEL,
+        replace(BULB, name="flickers", level=Flicker(depth=0.5)),
+        replace(BULB, name="switched", position_m=np.array([1.0, -1, 2]), level=Switched((1.0,))),
+    )
+    return bake(scene(*lights), COARSE)
+
+
+def test_the_light_is_the_sum_of_layers_by_their_levels(lamps: BakedScene) -> None:
+    light = Illumination(lamps)
+    for start, end in ((0, 0), (ns(0.1), ns(0.103)), (ns(0.9), ns(1.1)), (ns(2), ns(2.004))):
+        levels = [one.level.mean(start, end) for one in lamps.scene.lights]
+        np.testing.assert_allclose(
+            light.at(start, end), sum(level * layer(lamps, i) for i, level in enumerate(levels)), rtol=1e-4
+        )
+
+
+def test_a_light_switched_off_leaves_what_the_others_give(lamps: BakedScene) -> None:
+    after = Illumination(lamps).at(ns(2), ns(2))
+    flicker = np.float32(lamps.scene.lights[1].level.mean(ns(2), ns(2)))
+    np.testing.assert_allclose(after, layer(lamps, 0) + flicker * layer(lamps, 1), rtol=1e-4)
+
+
+def test_nothing_is_computed_anew_where_nothing_has_changed(lamps: BakedScene) -> None:
+    light = Illumination(lamps)
+    first = light.at(ns(0.1), ns(0.105))
+    assert light.at(ns(0.1), ns(0.105)) is first
+    # A whole period on it is the same again; a quarter on it is not.
+    assert light.at(ns(0.101), ns(0.106)) is not first
+    steady = Illumination(bake(scene(PANEL), DIRECT))
+    assert steady.at(0, 0) is steady.at(ns(5), ns(6))
+
+
+def test_a_dimmer_scales_its_own_layer_only() -> None:
+    dimmed = replace(BULB, level=Dimmer((0.0, 10.0), (1.0, 0.0)))
+    baked = bake(scene(PANEL, dimmed), DIRECT)
+    light = Illumination(baked)
+    np.testing.assert_allclose(light.at(ns(5), ns(5)) - light.at(ns(10), ns(10)), 0.5 * layer(baked, 1), atol=1e-3)
+
+
+def window_room() -> tuple[Thing, ...]:
+    """A room whose north wall is glass."""
+    return tuple(replace(thing, material="pane") if thing.name == "north" else thing for thing in ROOM)
+
+
+@pytest.mark.parametrize("t_s", [0.0, 4.3, 10.0])
+def test_a_moving_sun_lights_as_one_that_stands_where_it_is(t_s: float) -> None:
+    sun = Sun("sun", 1e4, (0.0, 10.0), (80.0, 100.0), (30.0, 40.0))
+    baked = bake(scene(sun, things=window_room()), COARSE)
+    moved = Illumination(baked).at(ns(t_s), ns(t_s))
+    still = Sun("sun", 1e4, (0.0,), (80 + 2 * t_s,), (30 + t_s,))
+    rest = bake(scene(still, things=window_room()), COARSE)
+    alone = on(rest, layer(rest, 0), "floor")
+    difference = np.abs(on(baked, moved, "floor") - alone)
+    # The sun's patch may differ by a step of the sun at its rim; indirect light is interpolated.
+    assert np.median(difference) < 0.01 * alone.mean()
+    assert difference.mean() < 0.01 * alone.mean()
+
+
+def test_a_slow_sun_is_traced_anew_only_when_it_has_turned_a_little() -> None:
+    sun = Sun("sun", 1e4, (0.0, 3600.0), (80.0, 95.0), (30.0, 30.0))
+    light = Illumination(bake(scene(sun, things=window_room()), DIRECT))
+    assert light.at(ns(10), ns(10)) is light.at(ns(10.1), ns(10.1))
+    assert light.at(ns(10), ns(10)) is not light.at(ns(60), ns(60))
+
+
+@pytest.mark.parametrize(
+    ("azimuths", "elevations"),
+    [((0, 0, 90), (30, 30, 30)), ((0, 0, 0), (30, 30, 30)), ((0, 360), (20, 20)), ((10, 30, 30), (10, 80, 80))],
+    ids=["rests first", "rests", "all around", "rests last"],
+)
+def test_a_suns_light_is_baked_all_along_its_way(azimuths, elevations):
+    times = tuple(np.linspace(5.0, 25.0, len(azimuths)).tolist())
+    sun = Sun("sun", 1e4, times, azimuths, elevations)
+    keys = key_times_ns(sun)
+    assert (keys[0], keys[-1]) == (5 * NS_PER_S, 25 * NS_PER_S)
+    assert (np.diff(keys) > 0).all()
+    ways = np.array([sun.direction(t) for t in keys])
+    assert np.arccos(np.clip((ways[1:] * ways[:-1]).sum(1), -1, 1)).max() <= SUN_STEP_RAD * (1 + 1e-9)
+
+
+def test_a_sun_that_rests_first_lights_as_one_that_stands_there():
+    coarse = BakeSettings(spacing_m=0.5, light_rays=4, indirect_spacing_m=1.0, indirect_rays=16, bounces=2)
+    sun = Sun("sun", 1e4, (0.0, 10.0, 20.0), (90.0, 90.0, 100.0), (30.0, 30.0, 30.0))
+    baked = bake(scene(sun, things=window_room()), coarse)
+    np.testing.assert_allclose(Illumination(baked).at(0, 0), layer(baked, 0), rtol=1e-4, atol=1e-2)
+
+
+def test_a_sun_that_ends_where_it_began_moves_meanwhile():
+    coarse = BakeSettings(spacing_m=0.5, light_rays=1, indirect_spacing_m=1.0, indirect_rays=4, bounces=1)
+    sun = Sun("sun", 1e4, (0.0, 10.0), (90.0, 450.0), (30.0, 30.0))
+    light = Illumination(bake(scene(sun, things=window_room()), coarse))
+    north, south = light.at(0, 0), light.at(ns(5), ns(5))
+    assert north.sum() > 2 * south.sum()
+
+
+def walk(*positions_m: tuple[float, float, float]) -> Mover:
+    times = np.arange(len(positions_m), dtype=float)
+    return Mover("crate", (CRATE,), Path(times, np.array(positions_m), np.zeros(len(positions_m))))
+
+
+DAY = Sky("sky", 5_000.0, "uniform")
+
+
+@pytest.mark.parametrize("light", [PANEL, BULB, DAY], ids=["panel", "bulb", "sky"])
+def test_a_mover_shades_and_is_lit_as_the_same_thing_at_rest(light: Light) -> None:
+    place = np.array([-0.5, -0.3, 0.2])
+    things = window_room() if light is DAY else ROOM
+    moving = bake(scene(light, things=things, movers=(walk(tuple(place)),)), DIRECT)
+    lit = Illumination(moving).at(0, 0)
+    crate = replace(CRATE, mesh=CRATE.mesh.moved(se3.transform(np.eye(3), place)))
+    rest = bake(scene(light, things=(*things, crate)), DIRECT)
+    straight = layer(rest, 0)
+    for name in ("floor", "west", "south"):
+        ours, theirs = on(moving, lit, name), on(rest, straight, name)
+        assert np.abs(ours - theirs).mean() < (0.03 if light is DAY else 0.02) * theirs.mean()
+    ours, theirs = on(moving, lit, "crate").reshape(6, -1).mean(1), on(rest, straight, "crate").reshape(6, -1).mean(1)
+    np.testing.assert_allclose(ours, theirs, rtol=0.12, atol=1.0)
+
+
+def test_a_mover_takes_indirect_light_from_the_room() -> None:
+    baked = bake(scene(PANEL, movers=(walk((0.5, 0.3, 0.0)),)), COARSE)
+    lit = Illumination(baked).at(0, 0)
+    room_around = np.mean([on(baked, lit, thing.name).mean() for thing in ROOM])
+    darkest = on(baked, lit, "crate").reshape(12, -1).mean(1)
+    assert 0.1 * room_around < np.sort(darkest)[2] < 2 * room_around  # the two faces below see the floor alone
+    direct = replace(baked, bounced=0 * baked.bounced, settings=DIRECT)
+    assert on(direct, Illumination(direct).at(0, 0), "crate").min() == 0
+
+
+def test_where_a_mover_was_before_leaves_nothing_behind() -> None:
+    """Rays are kept from picture to picture: an illumination that has none gives the same light."""
+    baked = bake(scene(PANEL, BULB, DAY, things=window_room(), movers=(walk((0, 0, 0), (1, 0.5, 0)),)), DIRECT)
+    light = Illumination(baked)
+    first, *_, last = (light.at(ns(t_s), ns(t_s)) for t_s in (0, 0.1, 0.3, 0.9))
+    assert not np.array_equal(first, last)
+    np.testing.assert_allclose(last, Illumination(baked).at(ns(0.9), ns(0.9)), rtol=1e-5, atol=1e-4)
+
+
+def test_a_mover_of_glass_takes_no_light() -> None:
+    pane = replace(walk((0.5, 0.3, 0)), things=(replace(CRATE, material="pane"),))
+    baked = bake(scene(PANEL, movers=(pane,)), DIRECT)
+    np.testing.assert_allclose(Illumination(baked).at(0, 0), layer(baked, 0), rtol=1e-6)
+
+
+def test_a_mover_only_takes_light() -> None:
+    baked = bake(scene(PANEL, BULB, movers=(walk((0, 0, 0)),)), COARSE)
+    lit, empty = Illumination(baked).at(0, 0), layer(baked, 0) + layer(baked, 1)
+    for thing in ROOM:
+        assert (on(baked, lit, thing.name) <= on(baked, empty, thing.name) * (1 + 1e-5)).all()
+        assert (on(baked, lit, thing.name) >= 0).all()
+    assert on(baked, lit, "floor").sum() < on(baked, empty, "floor").sum()

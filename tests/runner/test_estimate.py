@@ -1,0 +1,161 @@
+"""An estimator gets what it needs of a recording, in time and no sooner; one that cannot be served is refused."""
+
+import io
+import json
+import zipfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vobench.errors import TrajectoryError
+from vobench.geometry import se3
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import ImuCalibration, Rig, stereo_rig
+from vobench.runner import estimate as estimate_file
+from vobench.runner.estimate import estimate
+from vobench.runner.folder import read_tum
+from vobench.runner.frames import ANSWERS, read_table
+from vobench.runner.store import SilentProgress
+from vobench.sensor.imu import ImuReadings
+from vobench.sequence import SequenceWriter
+from vobench.suite.manifest import read_manifest
+from vobench.suite.suite import Entrant, Trial
+
+LENS = Pinhole(64, 48, 50.0, 50.0, 31.5, 23.5)
+STEREO = replace(stereo_rig(LENS, pitch_deg=15), imu=ImuCalibration(np.eye(4), 100.0, 1e-4, 1e-3, 1e-5, 1e-4))
+MONO = Rig(LENS, None, STEREO.T_body_left, None)
+# What the estimator saw, as numbers: pictures' grey, readings' count, first and last stamp in ms.
+SEES = """
+        stats = {}
+        for name in ("left", "right"):
+            if getattr(frame, name) is not None:
+                stats[name] = getattr(frame, name).mean()
+        for name in ("encoders", "imu"):
+            readings = getattr(frame, name)
+            if readings is not None:
+                stats[name] = len(readings.t_ns)
+                if len(readings.t_ns):
+                    stats[name + "_first_ms"], stats[name + "_last_ms"] = readings.t_ns[[0, -1]] / 1e6
+        if frame.imu is not None and len(frame.imu.t_ns):
+            stats["gyro"], stats["accel"] = frame.imu.gyro_radps[-1, 2], frame.imu.accel_mps2[-1, 0]
+        return Result(np.eye(4), stats=stats)
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """All that an estimate needs of a case."""
+
+    name: str = "case"
+
+
+def recorded(folder: Path, rig: Rig, *, frames: int = 3) -> Path:
+    """Frames 100 ms apart of a grey that grows; the IMU at 0, 10, .. ms reads its own index; two ticks a frame."""
+    index = np.arange(10 * (frames - 1) + 1, dtype=np.int64)
+    with SequenceWriter(folder, rig, case_json=b"{}") as writer:
+        for k in range(frames):
+            t_ns = k * 100_000_000
+            new = index[(index > 10 * (k - 1)) & (index <= 10 * k)]
+            if rig.imu:
+                turns = np.zeros((len(new), 3)) + new[:, None]
+                writer.write_imu(ImuReadings(new * 10_000_000, turns, -turns))
+            if rig.wheels:
+                writer.write_encoders(np.array([t_ns]), np.array([[k, k]]))
+            left = np.full((48, 64), 10 * k, np.uint8)
+            writer.write_frame(t_ns, left, left + 1 if rig.right else None)
+            writer.write_truth(t_ns, np.eye(4), np.zeros(6))
+    return folder
+
+
+def estimated(tmp_path: Path, sequence: Path, plugin: Path) -> Path:
+    entrant, folder = Entrant("mine", plugin, read_manifest(plugin), {}), tmp_path / "estimate"
+    folder.mkdir()
+    estimate(Trial(Named(), entrant, 0), sequence, folder, SilentProgress())
+    return folder
+
+
+def seen(folder: Path) -> list[dict[str, float]]:
+    return [json.loads(row["stats"]) for row in read_table(folder / ANSWERS)]
+
+
+def test_the_imu_comes_in_pieces_up_to_each_frames_stamp_and_not_twice(tmp_path, plugin):
+    sequence = recorded(tmp_path / "sequence", STEREO)
+    stats = seen(estimated(tmp_path, sequence, plugin(SEES, needs="[imu]")))
+    assert [s["imu"] for s in stats] == [1, 10, 10]
+    assert [(s["imu_first_ms"], s["imu_last_ms"]) for s in stats] == [(0, 0), (10, 100), (110, 200)]
+    assert [(s["gyro"], s["accel"]) for s in stats] == [(0, 0), (10, -10), (20, -20)]
+
+
+@pytest.mark.parametrize(
+    ("needs", "said"),
+    [
+        ("[]", set()),
+        ("[mono]", {"left"}),
+        ("[stereo]", {"left", "right"}),
+        ("[mono, encoders]", {"left", "encoders"}),
+        ("[imu, stereo, encoders]", {"left", "right", "imu", "encoders"}),
+    ],
+)
+def test_an_estimator_gets_what_it_needs_and_nothing_else(tmp_path, plugin, needs, said):
+    sequence = recorded(tmp_path / "sequence", STEREO)
+    last = seen(estimated(tmp_path, sequence, plugin(SEES, needs=needs)))[-1]
+    assert {"left", "right", "imu", "encoders"} & set(last) == said
+    assert last.get("left", 20) == 20
+    assert last.get("right", 21) == 21
+
+
+@pytest.mark.parametrize("needs", ["[]", "[mono]"])
+def test_one_camera_is_enough_for_those_who_need_no_more(tmp_path, plugin, needs):
+    folder = estimated(tmp_path, recorded(tmp_path / "sequence", MONO), plugin(SEES, needs=needs))
+    assert estimate_file.read_outcome(folder).kind == estimate_file.FINISHED
+    assert len(seen(folder)) == 3
+
+
+@pytest.mark.parametrize(("need", "lacks"), [("stereo", "one camera"), ("encoders", "no wheels"), ("imu", "no IMU")])
+def test_what_the_recording_cannot_serve_is_refused_before_it_starts(tmp_path, plugin, need, lacks):
+    mine = plugin("import os; os._exit(3)", head="raise RuntimeError('started')", needs=f"[{need}]")
+    folder = estimated(tmp_path, recorded(tmp_path / "sequence", MONO), mine)
+    outcome = estimate_file.read_outcome(folder)
+    assert outcome.kind == "not_applicable"
+    assert outcome.reason == f"it needs {need!r}, but this recording has {lacks}"
+    assert (folder / estimate_file.LOG).read_text() == ""
+    assert (folder / estimate_file.ESTIMATE).read_text() == ""
+    assert seen(folder) == []
+
+
+def test_tracks_come_back_in_the_order_of_frames(tmp_path):
+    tables = {index: np.full((index, 5), index, np.float32) for index in (2, 10, 100)}
+    with zipfile.ZipFile(tmp_path / estimate_file.TRACKS, "w") as archive:
+        for index, table in tables.items():
+            buffer = io.BytesIO()
+            np.save(buffer, table)
+            archive.writestr(f"{index:08d}.npy", buffer.getvalue())
+    read = list(estimate_file.read_tracks(tmp_path))
+    assert [index for index, _ in read] == [2, 10, 100]
+    assert all(np.array_equal(table, tables[index]) for index, table in read)
+
+
+def test_an_outcome_with_an_unknown_key_is_refused(tmp_path):
+    (tmp_path / estimate_file.OUTCOME).write_text('{"kind": "finished", "reason": "", "mood": "good"}')
+    with pytest.raises(ValueError, match="mood"):
+        estimate_file.read_outcome(tmp_path)
+
+
+def test_a_trajectory_with_bytes_of_no_text_is_one_sentence_with_its_place(tmp_path):
+    (tmp_path / "a.tum").write_bytes(b"0 0\xff")
+    with pytest.raises(TrajectoryError, match=r"^not a text file in UTF-8 \(byte 3\): .*a\.tum$"):
+        read_tum(tmp_path / "a.tum")
+
+
+def test_points_of_the_body_come_back_in_the_left_cameras_axes_beside_the_tracks(tmp_path, plugin):
+    mine = plugin("return Result(np.eye(4), points=[[frame.index, 0, 0], [0, 0, 1]])")
+    (mine / "estimator.yaml").write_text((mine / "estimator.yaml").read_text().replace("left_camera", "body"))
+    folder = estimated(tmp_path, recorded(tmp_path / "sequence", STEREO), mine)
+    read = dict(estimate_file.read_tracks(folder, of=estimate_file.POINTS))
+    for index, points in read.items():
+        expected = se3.apply(se3.inverse(STEREO.T_body_left), [[index, 0, 0], [0, 0, 1]])
+        np.testing.assert_allclose(points, expected, atol=1e-6)
+    assert sorted(read) == [0, 1, 2]
+    assert list(estimate_file.read_tracks(folder)) == []

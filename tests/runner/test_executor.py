@@ -1,0 +1,228 @@
+"""Executors: the same bytes whoever performs a task, and a failure of one cell is a row of it and nobody else's."""
+
+import os
+import signal
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import pytest
+
+from vobench.report import page
+from vobench.report.verify import verify_run
+from vobench.runner import executor
+from vobench.runner.executor import Dask, Done, Event, Executor, LocalProcesses, Serial, perform_all
+from vobench.runner.folder import PAGE, RunFolder
+from vobench.runner.run import run_suite
+from vobench.runner.task import Task, plan
+
+
+def task(name: str, stage: str = "sequence", needs: tuple[str, ...] = ()) -> Task:
+    return Task(stage, None, {"name": name}, needs)
+
+
+@dataclass
+class Recorder:
+    """An executor that keeps what runs beside what; a task ends at the next turn, by the failures that are given."""
+
+    slots: int
+    failures: dict[str, Done] = field(default_factory=dict)
+    beside: list[tuple[str, int]] = field(default_factory=list)
+    running: list = field(default_factory=list)
+
+    def submit(self, one, store, slot, threads):
+        from concurrent.futures import Future
+        from threading import Timer
+
+        future = Future()
+        self.running.append(future)
+        self.beside.append((one.inputs["name"], sum(not other.done() for other in self.running) - 1))
+        Timer(0.02, lambda: future.set_result(self.failures.get(one.key, Done()))).start()
+        return future
+
+    def close(self):
+        pass
+
+
+LIGHT = task("light", "bake")
+PICTURES = [task(f"pictures {n}", needs=(LIGHT.key,)) for n in range(4)]
+ESTIMATES = [task(f"estimate {n}", "estimate", (one.key,)) for n, one in enumerate(PICTURES)]
+SCORES = [task(f"score {n}", "score", (a.key, b.key)) for n, (a, b) in enumerate(zip(PICTURES, ESTIMATES, strict=True))]
+ALL = [LIGHT, *PICTURES, *ESTIMATES, *SCORES]
+
+
+def test_tasks_come_after_what_they_need_and_two_at_a_time(tmp_path):
+    executor, heard = Recorder(2), list[Event]()
+    assert perform_all(ALL, tmp_path, executor, heard=heard.append) == {}
+    ended = list[str]()
+    for event in heard:
+        if event.what == "started":
+            assert set(event.task.needs) <= set(ended)
+        else:
+            ended.append(event.task.key)
+    assert sorted(ended) == sorted(one.key for one in ALL)
+    assert max(count for _, count in executor.beside) == 1
+
+
+def test_an_estimator_is_timed_with_nothing_beside_it_unless_that_is_asked_for(tmp_path):
+    alone, shared = Recorder(3), Recorder(3)
+    perform_all(ALL, tmp_path, alone)
+    perform_all(ALL, tmp_path, shared, shares_time=True)
+    assert {count for name, count in alone.beside if name.startswith("estimate")} == {0}
+    assert max(count for name, count in shared.beside if name.startswith("estimate")) > 0
+
+
+def test_a_failure_takes_what_needs_it_along_and_nothing_else(tmp_path):
+    failures = {PICTURES[1].key: Done("crashed", "lens fell off")}
+    found = perform_all(ALL, tmp_path, Recorder(2, failures))
+    assert set(found) == {PICTURES[1].key, ESTIMATES[1].key, SCORES[1].key}
+    assert found[SCORES[1].key] == Done("crashed", "its sequence could not be made: lens fell off")
+
+
+def test_ten_thousand_tasks_are_handed_out_in_little_time(tmp_path):
+    class Instant(Recorder):
+        def submit(self, one, store, slot, threads):
+            from concurrent.futures import Future
+
+            future = Future()
+            future.set_result(Done())
+            return future
+
+    tasks = [task(f"s{n}") for n in range(2000)]
+    tasks += [task(f"e{n} {k}", "estimate", (one.key,)) for n, one in enumerate(tasks) for k in range(4)]
+    began = os.times().user
+    assert perform_all(tasks, tmp_path, Instant(2)) == {}
+    assert os.times().user - began < 20
+
+
+def run(bench, tmp_path: Path, executor: Executor, *changes: tuple[str, str]) -> RunFolder:
+    try:
+        return run_suite(
+            bench.plan(*changes), {}, root=tmp_path / "runs", store=tmp_path / "store", executor=executor,
+            finish=page.write_reports,
+        )  # fmt: skip
+    finally:
+        executor.close()
+
+
+def files(folder: RunFolder) -> dict[str, bytes]:
+    chosen = [path for path in folder.path.rglob("*") if path.is_file() and path.name not in ("environment.json",)]
+    kept = [path for path in chosen if "times" not in path.name and path.name != PAGE]
+    return {str(path.relative_to(folder.path)): path.read_bytes() for path in kept}
+
+
+def test_two_processes_write_the_bytes_that_one_does(bench, first, tmp_path):
+    two = run(bench, tmp_path, LocalProcesses(2))
+    assert files(two) == files(first)
+
+
+def test_sequences_of_one_light_share_a_process_and_nothing_else_does(tmp_path, monkeypatch):
+    executor, started = LocalProcesses(1), []
+    make = executor._context.Process
+    monkeypatch.setattr(executor._context, "Process", lambda **said: started.append(said) or make(**said))
+    lit, dark = PICTURES[:3], task("pictures of another light", needs=("another",))
+    counts = []
+    for one in (LIGHT, *lit, dark, lit[0]):
+        done = executor.submit(one, tmp_path, 0, 1).result(timeout=30)
+        assert done.failure  # there is no such key, and the process lives on
+        counts.append(len(started))
+    executor.close()
+    assert counts == [1, 2, 2, 2, 3, 4]
+    assert not executor._running
+    assert not executor._idle
+
+
+def test_a_process_that_dies_is_a_row_of_its_cell(bench, tmp_path, monkeypatch):
+    executor = LocalProcesses(2)
+    submit = executor.submit
+
+    def deadly(one: Task, store: Path, slot: int, threads: int):
+        if one.stage == "sequence" and "dim" in one.subject.name:
+            one = replace(one, subject=None)  # whatever it then trips over
+        future = submit(one, store, slot, threads)
+        if one.stage == "sequence" and one.subject is None:
+            for process in list(executor._running):
+                os.kill(process.pid, signal.SIGSEGV)
+        return future
+
+    monkeypatch.setattr(executor, "submit", deadly)
+    folder = run(bench, tmp_path, executor)
+    rows = {(score.case, score.estimator): (score.status, score.reason) for score in folder.scores()}
+    dim = [said for (case, _), said in rows.items() if "dim" in case]
+    assert len(dim) == 2
+    assert all(status == "crashed" and "its sequence could not be made" in reason for status, reason in dim)
+    assert all(not finding.wrong for finding in verify_run(folder))
+    assert "crashed" in (folder.path / "leaderboard.html").read_text()
+
+
+def test_what_a_fault_of_a_library_ended_is_made_once_more(bench, tmp_path, monkeypatch):
+    executor, hit, futures = LocalProcesses(2), [], []
+    submit = executor.submit
+
+    def once(one: Task, store: Path, slot: int, threads: int):
+        future = submit(one, store, slot, threads)
+        if one.stage == "sequence" and "dim" in one.name:
+            hit.append(one.key)
+            futures.append(future)
+            for process in list(executor._running):
+                os.kill(process.pid, signal.SIGABRT)
+        return future
+
+    monkeypatch.setattr(executor, "submit", once)
+    folder = run(bench, tmp_path, executor)
+    assert {score.status for score in folder.scores()} == {"ok"}
+    assert [future.result().told[0] for future in futures] == [
+        f"{key}: its process ended with signal SIGABRT, by a fault in a library; it is made once more" for key in hit
+    ]
+
+
+def test_what_a_task_raises_in_this_process_is_a_row_too(bench, tmp_path, monkeypatch):
+    from vobench.runner import task as stages
+
+    def raising(*_):
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setitem(stages.PERFORMERS, "score", raising)
+    folder = run(bench, tmp_path, Serial())
+    assert {(s.status, s.reason) for s in folder.scores()} == {("crashed", "ZeroDivisionError: division by zero")}
+
+
+def test_a_full_disk_ends_the_run_with_what_to_do(bench, tmp_path, monkeypatch):
+    import errno
+
+    from vobench.errors import InputError
+    from vobench.runner import task as stages
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "store"))
+
+    monkeypatch.setitem(stages.PERFORMERS, "bake", full)
+    with pytest.raises(InputError, match=r"no space is left on the device; free some, or let VOBENCH_CACHE name"):
+        run(bench, tmp_path, Serial())
+
+
+def test_the_plan_of_a_real_suite_is_performed_whole(bench, first):
+    assert perform_all(plan(bench.plan(), {}), bench.folder / "cache", Serial()) == {}
+
+
+@pytest.fixture
+def dask():
+    """A scheduler with two workers on this machine."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, worker_dashboard_address=None
+    ) as cluster:
+        yield cluster
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_the_workers_of_a_dask_scheduler_write_the_same_bytes(bench, first, tmp_path, dask):
+    assert files(run(bench, tmp_path, Dask(dask.scheduler_address))) == files(first)
+
+
+def test_a_scheduler_that_is_not_there_is_a_sentence(monkeypatch):
+    from vobench.errors import InputError
+
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(executor, "CONNECT_S", 0.5)
+    with pytest.raises(InputError, match=r"no Dask scheduler answers .*: tcp://127.0.0.1:1"):
+        Dask("tcp://127.0.0.1:1")

@@ -1,0 +1,397 @@
+"""What OpenGL holds: shader programs, textures, framebuffers; pyrender's private parts are used here and in raster."""
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from OpenGL import GL
+from pyrender.shader_program import ShaderProgram
+
+from vobench.errors import RenderError
+from vobench.geometry.se3 import Array
+from vobench.rendering.renderer import Radiance
+from vobench.rendering.view import Box
+from vobench.scene.material import linear
+
+Floats = NDArray[np.float32]
+
+
+class LightTexture:
+    """A map (H, W, 3) float32 of linear colours, or (H, W) of grey, without mipmaps, row 0 at v = 0.
+
+    It takes one channel where all are equal.
+    """
+
+    def __init__(self, values: Floats) -> None:
+        self._values: Floats | None = None
+        self.id = GL.glGenTextures(1)
+        self.update(values)
+
+    def update(self, values: Floats) -> None:
+        """Replace the map by another; the very array that is there already costs nothing."""
+        if values is self._values:
+            return
+        self._values = values
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
+        is_grey = values.ndim == 2 or bool((values[..., :1] == values[..., 1:]).all())
+        if is_grey:
+            _upload(GL.GL_R32F, GL.GL_RED, values if values.ndim == 2 else values[..., 0], GL.GL_FLOAT)
+        else:
+            _upload(GL.GL_RGBA32F, GL.GL_RGB, values, GL.GL_FLOAT)
+        _swizzle(is_grey)
+        _texture_parameters(GL.GL_LINEAR, GL.GL_LINEAR, GL.GL_CLAMP_TO_EDGE)
+
+
+# Linear values of sRGB in 16 bits: eight make steps of 2 % where a surface reflects 20 %, and drivers make sRGB
+# linear with errors of up to 1 %.
+COUNTS = np.rint(65535 * linear(np.arange(256, dtype=np.uint8))).astype(np.uint16)
+
+
+class SurfaceTexture:
+    """A tile that repeats, with mipmaps, row 0 at v = 0: linear, 16 bits of `scale`.
+
+    It is made of (H, W) float32, or of (H, W, 3 or 4) uint8 in sRGB; with `shrink` of half as many pixels each way,
+    or a quarter, and so on.
+    """
+
+    def __init__(self, values: NDArray[Any], *, shrink: int = 0) -> None:
+        self.scale, self.is_grey, self.id = 1.0, values.ndim == 2, GL.glGenTextures(1)
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
+        if values.ndim == 3:
+            counts = COUNTS[values]
+            counts[..., 3:] = np.uint16(257) * values[..., 3:]
+        else:
+            self.scale = max(1.0, float(values.max()))
+            counts = np.rint(values * (65535 / self.scale)).astype(np.uint16)
+        internal, form = COLOURS[values.shape[2] if values.ndim == 3 else 1]
+        _upload(internal, form, _halved(counts, shrink), GL.GL_UNSIGNED_SHORT)
+        _swizzle(self.is_grey)
+        GL.glGenerateMipmap(GL.GL_TEXTURE_2D)
+        _texture_parameters(GL.GL_LINEAR_MIPMAP_NEAREST, GL.GL_LINEAR, GL.GL_REPEAT)
+
+
+COLOURS = {1: (GL.GL_R16, GL.GL_RED), 3: (GL.GL_RGBA16, GL.GL_RGB), 4: (GL.GL_RGBA16, GL.GL_RGBA)}
+
+
+def _halved(values: NDArray[np.uint16], times: int) -> NDArray[np.uint16]:
+    """A picture (H, W, ...) of half as many pixels each way, some times over."""
+    size = [max(1, edge >> times) for edge in values.shape[1::-1]]
+    return np.asarray(cv2.resize(values, size, interpolation=cv2.INTER_AREA)) if times else values
+
+
+class Elements:
+    """Vertices (V, 10) and indices (N,) as culling.Geometry has them, on the graphics side."""
+
+    def __init__(self, vertices: Floats, indices: NDArray[np.uint32]) -> None:
+        self._array = GL.glGenVertexArrays(1)
+        GL.glBindVertexArray(self._array)
+        for kind, values in ((GL.GL_ARRAY_BUFFER, vertices), (GL.GL_ELEMENT_ARRAY_BUFFER, indices)):
+            GL.glBindBuffer(kind, GL.glGenBuffers(1))
+            GL.glBufferData(kind, values.nbytes, values, GL.GL_STATIC_DRAW)
+        for place, (count, first) in enumerate(((3, 0), (3, 3), (2, 6), (2, 8))):
+            GL.glEnableVertexAttribArray(place)
+            GL.glVertexAttribPointer(
+                place, count, GL.GL_FLOAT, GL.GL_FALSE, vertices.strides[0], ctypes.c_void_p(4 * first)
+            )
+
+    def draw(self, runs: Sequence[tuple[int, int]], copies: int) -> None:
+        """Draw runs (first, count) of indices, once for each sample, in the program in use."""
+        GL.glBindVertexArray(self._array)
+        for first, count in runs:
+            start = ctypes.c_void_p(4 * first)
+            GL.glDrawElementsInstanced(GL.GL_TRIANGLES, count, GL.GL_UNSIGNED_INT, start, copies)
+
+
+class Blocks:
+    """Numbers (B, N) float32 that shaders read as uniform blocks, one row at a time."""
+
+    def __init__(self, binding: int, values: Floats) -> None:
+        self._binding, self._size = binding, 4 * values.shape[1]
+        step = int(GL.glGetIntegerv(GL.GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT))
+        self._stride = -(-self._size // step) * step
+        self._buffer = GL.glGenBuffers(1)
+        GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._buffer)
+        GL.glBufferData(GL.GL_UNIFORM_BUFFER, self._stride * len(values), None, GL.GL_DYNAMIC_DRAW)
+        for row, numbers in enumerate(values):
+            self.update(row, numbers)
+
+    def update(self, row: int, numbers: Floats) -> None:
+        """Replace a row."""
+        GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._buffer)
+        GL.glBufferSubData(GL.GL_UNIFORM_BUFFER, row * self._stride, numbers.nbytes, numbers)
+
+    def use(self, row: int) -> None:
+        """Let shaders read a row."""
+        offset = row * self._stride
+        GL.glBindBufferRange(GL.GL_UNIFORM_BUFFER, self._binding, self._buffer, offset, self._size)
+
+
+def bind(unit: int, texture: Any, kind: int = GL.GL_TEXTURE_2D) -> None:
+    """Let shaders sample a texture by a unit."""
+    GL.glActiveTexture(unit)
+    GL.glBindTexture(kind, texture)
+
+
+def _upload(internal: int, form: int, values: NDArray[Any], kind: int) -> None:
+    """Fill the texture that is bound."""
+    GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
+    rows, columns = values.shape[:2]
+    GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, columns, rows, 0, form, kind, np.ascontiguousarray(values))
+
+
+def _swizzle(is_grey: bool) -> None:
+    """Whether shaders read the one channel of the texture that is bound as all three colours."""
+    colours = [GL.GL_RED] * 3 if is_grey else [GL.GL_RED, GL.GL_GREEN, GL.GL_BLUE]
+    last = GL.GL_ONE if is_grey else GL.GL_ALPHA
+    GL.glTexParameteriv(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_SWIZZLE_RGBA, np.array([*colours, last], np.int32))
+
+
+def _texture_parameters(minify: int, magnify: int, wrap: int) -> None:
+    for key, value in (
+        (GL.GL_TEXTURE_MIN_FILTER, minify),
+        (GL.GL_TEXTURE_MAG_FILTER, magnify),
+        (GL.GL_TEXTURE_WRAP_S, wrap),
+        (GL.GL_TEXTURE_WRAP_T, wrap),
+    ):
+        GL.glTexParameteri(GL.GL_TEXTURE_2D, key, value)
+
+
+SHADERS = Path(__file__).parent / "shaders"
+
+
+class Program:
+    """Two linked shaders with some of their abilities.
+
+    pyrender's own `set_uniform` asks for the location each time and hides every error.
+    """
+
+    def __init__(self, vertex: str, fragment: str, *defines: str) -> None:
+        files = {"vertex_shader": str(SHADERS / f"{vertex}.vert"), "fragment_shader": str(SHADERS / f"{fragment}.frag")}
+        shader = ShaderProgram(**files, defines=dict.fromkeys(sorted(defines), 1))
+        try:
+            shader._add_to_context()
+        except Exception as error:  # PyOpenGL's, whichever stage fails
+            reason = " ".join(str(error).split())[:200]
+            raise RenderError(
+                f"this OpenGL driver cannot run {fragment}.frag, which needs OpenGL 4.5 ({reason})"
+            ) from error
+        self._id = shader._program_id
+        self._locations: dict[str, Any] = {}
+        self._values: dict[str, float | bytes] = {}
+
+    def use(self, **uniforms: float | Array) -> None:
+        """Draw with this program from now on, with some of its uniforms: numbers, vectors (4,), matrices."""
+        GL.glUseProgram(self._id)
+        for name, value in uniforms.items():
+            data = value if isinstance(value, int | float) else np.ascontiguousarray(value, np.float32)
+            key = data.tobytes() if isinstance(data, np.ndarray) else data
+            if self._values.get(name) != key:
+                self._values[name] = key
+                self._upload(name, data)
+
+    def _upload(self, name: str, value: float | NDArray[np.float32]) -> None:
+        if name not in self._locations:
+            self._locations[name] = GL.glGetUniformLocation(self._id, name)
+        location = self._locations[name]
+        if isinstance(value, int):
+            GL.glUniform1i(location, value)
+        elif isinstance(value, float):
+            GL.glUniform1f(location, value)
+        elif value.ndim == 1:
+            GL.glUniform4fv(location, 1, value)
+        else:
+            upload = GL.glUniformMatrix4fv if len(value) == 4 else GL.glUniformMatrix3fv
+            upload(location, 1, GL.GL_TRUE, value)
+
+
+class CubeTexture:
+    """What is around a place: six pictures (N, N, 3) whose right, down and ahead axes are rows (6, 3, 3).
+
+    Each level is blurred by another roughness (L,), the first by none.
+    """
+
+    def __init__(self, pictures: Sequence[Radiance], axes: Array, roughness: Sequence[float]) -> None:
+        around, self.id = _cube(pictures), _cube(pictures)
+        program, framebuffer = Program("fullscreen", "probe"), GL.glGenFramebuffers(1)
+        GL.glBindVertexArray(GL.glGenVertexArrays(1))
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
+        for ability in (GL.GL_SCISSOR_TEST, GL.GL_DEPTH_TEST, GL.GL_CULL_FACE):
+            GL.glDisable(ability)
+        bind(GL.GL_TEXTURE0, around, GL.GL_TEXTURE_CUBE_MAP)
+        side = len(pictures[0])
+        for level, alpha in list(enumerate(roughness))[1:]:
+            size = side >> level
+            GL.glViewport(0, 0, size, size)
+            for nth, face in enumerate(axes):
+                at = GL.GL_TEXTURE_CUBE_MAP_POSITIVE_X + nth
+                GL.glFramebufferTexture2D(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, at, self.id, level)
+                program.use(axes=face.T, roughness=alpha, size_px=float(size), around_px=float(side))
+                GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
+        for ability in (GL.GL_SCISSOR_TEST, GL.GL_DEPTH_TEST, GL.GL_CULL_FACE):
+            GL.glEnable(ability)
+        GL.glDeleteFramebuffers(1, [framebuffer])
+        GL.glDeleteTextures([around])
+
+
+def _cube(pictures: Sequence[Radiance]) -> Any:
+    """A cube map with mipmaps."""
+    texture = GL.glGenTextures(1)
+    GL.glBindTexture(GL.GL_TEXTURE_CUBE_MAP, texture)
+    for nth, picture in enumerate(pictures):
+        at, size = GL.GL_TEXTURE_CUBE_MAP_POSITIVE_X + nth, len(picture)
+        data = np.ascontiguousarray(picture)
+        GL.glTexImage2D(at, 0, GL.GL_RGBA32F, size, size, 0, GL.GL_RGB, GL.GL_FLOAT, data)
+    GL.glGenerateMipmap(GL.GL_TEXTURE_CUBE_MAP)
+    GL.glTexParameteri(GL.GL_TEXTURE_CUBE_MAP, GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR_MIPMAP_LINEAR)
+    GL.glEnable(GL.GL_TEXTURE_CUBE_MAP_SEAMLESS)
+    return texture
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Where in a pixel samples lie, one a layer, and how many mipmap levels finer than OpenGL's each takes."""
+
+    points: tuple[tuple[float, float], ...]
+    lod_bias: tuple[float, ...]
+
+
+# Four rows and four columns: an edge along either is placed to an eighth of a pixel.
+# Each sample takes the one nearest mipmap level: by different choices, levels blend from one into the next.
+TURNED = Grid(((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)), (-2.875, -2.375, -2.625, -2.125))
+# The same in two halves, each even about the centre, for sub-frames by turns.
+HALVES = tuple(
+    Grid((TURNED.points[a], TURNED.points[b]), (TURNED.lod_bias[a], TURNED.lod_bias[b])) for a, b in ((0, 3), (1, 2))
+)
+# For pictures of twice as many pixels each way.
+CENTRE = Grid(((0.5, 0.5),), (-1.5,))
+
+
+@dataclass(frozen=True, slots=True)
+class Canvas:
+    """A framebuffer with one layer a sample: one float channel or four, and depth, as textures."""
+
+    width_px: int
+    height_px: int
+    channels: int
+    grid: Grid
+    framebuffer: Any
+    colour: Any
+    depth: Any
+
+    @property
+    def abilities(self) -> tuple[str, ...]:
+        """What shaders need to know of it."""
+        return ("IS_MONO",) if self.channels == 1 else ()
+
+    @property
+    def layers(self) -> int:
+        """How many samples a pixel has."""
+        return len(self.grid.points)
+
+    def begin(self, box: Box) -> None:
+        """Draw here from now on, within a box of the picture."""
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.framebuffer)
+        for index, (x, y) in enumerate(self.grid.points):
+            GL.glViewportIndexedf(index, 0.5 - x, 0.5 - y, self.width_px, self.height_px)
+        _scissor(box, self.height_px)
+
+    def clear(self, box: Box) -> None:
+        """Black and nothing near, within a box, in which to draw from now on."""
+        self.begin(box)
+        GL.glClear(GL.GL_COLOR_BUFFER_BIT | GL.GL_DEPTH_BUFFER_BIT)
+
+    def nearness(self) -> Radiance:
+        """Nearness (rows, columns) of the first sample of each pixel, top row first."""
+        GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, self.depth)
+        buffer = GL.glGetTexImage(GL.GL_TEXTURE_2D_ARRAY, 0, GL.GL_DEPTH_COMPONENT, GL.GL_FLOAT)
+        return np.frombuffer(buffer, np.float32).reshape(self.layers, self.height_px, self.width_px)[0, ::-1]
+
+
+# By how many channels a picture has; drivers need not draw into three.
+FORMATS = {1: (GL.GL_R32F, GL.GL_RED), 3: (GL.GL_RGBA32F, GL.GL_RGBA)}
+
+
+def canvas(width_px: int, height_px: int, grid: Grid, channels: int) -> Canvas:
+    """A canvas of some size. Raises RenderError where the driver has no room or form for it."""
+    framebuffer = GL.glGenFramebuffers(1)
+    GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
+    names = []
+    for attachment, internal, form in (
+        (GL.GL_COLOR_ATTACHMENT0, *FORMATS[channels]),
+        (GL.GL_DEPTH_ATTACHMENT, GL.GL_DEPTH_COMPONENT32F, GL.GL_DEPTH_COMPONENT),
+    ):
+        names.append(GL.glGenTextures(1))
+        GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, names[-1])
+        size = (width_px, height_px, len(grid.points))
+        GL.glTexImage3D(GL.GL_TEXTURE_2D_ARRAY, 0, internal, *size, 0, form, GL.GL_FLOAT, None)
+        for filtering in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):
+            GL.glTexParameteri(GL.GL_TEXTURE_2D_ARRAY, filtering, GL.GL_NEAREST)
+        GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, attachment, names[-1], 0)
+    _require_complete(width_px, height_px)
+    return Canvas(width_px, height_px, channels, grid, framebuffer, *names)
+
+
+@dataclass(frozen=True, slots=True)
+class FlatTarget:
+    """A framebuffer of one sample a pixel without depth: one float channel, or colours."""
+
+    width_px: int
+    height_px: int
+    channels: int
+    framebuffer: Any
+
+    @property
+    def whole(self) -> Box:
+        """The box of the whole picture."""
+        return 0, self.width_px, 0, self.height_px
+
+    def begin(self, box: Box) -> None:
+        """Draw here from now on, within a box of the picture."""
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.framebuffer)
+        GL.glViewport(0, 0, self.width_px, self.height_px)
+        _scissor(box, self.height_px)
+
+    def clear(self, box: Box) -> None:
+        """Black all over a box, in which to draw from now on."""
+        self.begin(box)
+        GL.glClear(GL.GL_COLOR_BUFFER_BIT)
+
+    def read(self, box: Box) -> Radiance:
+        """A box of the picture (rows, columns) or (rows, columns, 3) float32, top row first; an array of its own."""
+        u0, u1, v0, v1 = box
+        _, form = FORMATS[self.channels]
+        GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self.framebuffer)
+        GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 1)
+        buffer = GL.glReadPixels(u0, self.height_px - v1, u1 - u0, v1 - v0, form, GL.GL_FLOAT)
+        pixels = np.frombuffer(buffer, np.float32).reshape(v1 - v0, u1 - u0, -1)
+        colours = cv2.cvtColor(pixels, cv2.COLOR_RGBA2RGB) if self.channels == 3 else pixels
+        # OpenGL's first row is the lowest.
+        return np.asarray(cv2.flip(colours, 0), np.float32)
+
+
+def flat_target(width_px: int, height_px: int, channels: int) -> FlatTarget:
+    """A target of some size. Raises RenderError where the driver has none such."""
+    internal, form = FORMATS[channels]
+    framebuffer, texture = GL.glGenFramebuffers(1), GL.glGenTextures(1)
+    GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
+    GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
+    GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, width_px, height_px, 0, form, GL.GL_FLOAT, None)
+    GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, texture, 0)
+    _require_complete(width_px, height_px)
+    return FlatTarget(width_px, height_px, channels, framebuffer)
+
+
+def _scissor(box: Box, height_px: int) -> None:
+    u0, u1, v0, v1 = box
+    GL.glScissor(u0, height_px - v1, u1 - u0, v1 - v0)
+
+
+def _require_complete(width_px: int, height_px: int) -> None:
+    status = GL.glCheckFramebufferStatus(GL.GL_FRAMEBUFFER)
+    if status != GL.GL_FRAMEBUFFER_COMPLETE:
+        raise RenderError(f"OpenGL has no float framebuffer of {width_px} x {height_px} pixels (status {status:#x})")

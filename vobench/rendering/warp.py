@@ -1,0 +1,147 @@
+"""Lenses that are no pinhole: pinhole faces around the camera, and the map from their pixels to the lens's.
+
+Each pixel is the mean of 2 x 2 points, each interpolated between the pixels of one face, which are as fine as the
+points. Faces overlap by a margin, so that no interpolation crosses a seam; only what the lens sees is drawn.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench.geometry.camera import Camera, Pinhole
+from vobench.geometry.se3 import Array
+from vobench.rendering.renderer import Radiance
+from vobench.rendering.view import Box
+
+POINTS = 2  # each way in a pixel
+MARGIN_PX = 3
+# Beyond this angle from the axis a single face would spend most of its pixels on its rim.
+ONE_FACE_RAD = np.deg2rad(65)
+NOWHERE = -100.0
+# Columns: the x, y and z axes of each face in the camera's: ahead, right, left, below, above, behind.
+FACES = np.array(
+    [
+        [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
+        [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
+        [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+        [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+        [[-1, 0, 0], [0, 1, 0], [0, 0, -1]],
+    ],
+    float,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """A pinhole turned by R_camera_face (3, 3), whose picture lies in the atlas from `row` on.
+
+    spans (R, 4): first and end column, first and end row that each row of points needs; empty where first >= end.
+    """
+
+    camera: Pinhole
+    R_camera_face: Array
+    row: int
+    spans: NDArray[np.int32]
+
+    def needed_for(self, rows: slice) -> Box | None:
+        """The box of its picture that rows of the lens's picture need, None for nothing."""
+        spans = self.spans[rows.start * POINTS : rows.stop * POINTS]
+        spans = spans[spans[:, 0] < spans[:, 1]]
+        if len(spans) == 0:
+            return None
+        first, end = spans.min(0).tolist(), spans.max(0).tolist()
+        return first[0], end[1], first[2], end[3]
+
+
+@dataclass(frozen=True, slots=True)
+class Warp:
+    """Faces, and where in their atlas each point lies: at_column, at_row (2 H, 2 W)."""
+
+    faces: tuple[Face, ...]
+    at_column: Radiance
+    at_row: Radiance
+
+    def blank(self, channels: int) -> Radiance:
+        """An empty atlas (rows, columns), of three channels (rows, columns, 3)."""
+        cameras = [face.camera for face in self.faces]
+        size = sum(c.height_px for c in cameras), max(c.width_px for c in cameras)
+        return np.zeros(size if channels == 1 else (*size, channels), np.float32)
+
+    def put(self, atlas: Radiance, face: Face, box: Box, picture: Radiance) -> None:
+        """Lay a box of a face's picture into the atlas."""
+        first, end, top, bottom = box
+        atlas[face.row + top : face.row + bottom, first:end] = picture
+
+    def picture(self, atlas: Radiance, rows: slice) -> Radiance:
+        """Rows of the lens's picture (rows, W) or (rows, W, 3); black where it has no rays."""
+        points = slice(rows.start * POINTS, rows.stop * POINTS)
+        mapped = cv2.remap(
+            atlas, self.at_column[points], self.at_row[points], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
+        )
+        size = (mapped.shape[1] // POINTS, mapped.shape[0] // POINTS)
+        return np.asarray(cv2.resize(mapped, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def warp(camera: Camera) -> Warp:
+    """The faces a lens needs, and the map from them."""
+    face_of, plane = _faces(_rays(camera))
+    focal_px = _focal_px(plane, face_of, np.diag(camera.K)[:2])
+    pixels = np.moveaxis((plane * focal_px).astype(np.float32), -1, 0)
+    faces, row = [], 0
+    at = np.full_like(pixels, NOWHERE)
+    for index in np.unique(face_of[face_of >= 0]):
+        mine = face_of == index
+        face = _face(pixels, mine, FACES[index], row, focal_px=focal_px)
+        np.copyto(at[0], pixels[0] + face.camera.cx_px, where=mine, casting="same_kind")
+        np.copyto(at[1], pixels[1] + (face.camera.cy_px + row), where=mine, casting="same_kind")
+        faces.append(face)
+        row += face.camera.height_px
+    return Warp(tuple(faces), *at)
+
+
+def _rays(camera: Camera) -> Array:
+    """Unit directions (2 H, 2 W, 3) of all points."""
+    v, u = np.indices((camera.height_px * POINTS, camera.width_px * POINTS)) + 0.5
+    return np.asarray(camera.rays(np.stack([u, v], -1) / POINTS - 0.5))
+
+
+def _faces(rays: Array) -> tuple[NDArray[np.int8], Array]:
+    """Which face each ray (R, C, 3) belongs to, -1 for none, and where it meets that face's plane z = 1 (R, C, 2)."""
+    nowhere = np.isnan(rays[..., 2])
+    if np.all(nowhere | (rays[..., 2] > np.cos(ONE_FACE_RAD))):
+        return np.where(nowhere, -1, 0).astype(np.int8), np.nan_to_num(rays[..., :2] / rays[..., 2:])
+    face_of = np.full(nowhere.shape, -1, np.int8)
+    plane, best = np.zeros((*nowhere.shape, 2)), np.zeros(nowhere.shape)
+    for index, turn in enumerate(FACES):
+        along = rays @ turn[:, 2]
+        nearer = along > best  # false where there is no ray
+        face_of[nearer], best[nearer] = index, along[nearer]
+        plane[nearer] = (rays[nearer] @ turn[:, :2]) / along[nearer, None]
+    return face_of, plane
+
+
+def _focal_px(plane: Array, face_of: NDArray[np.int8], focal_lengths: Array) -> float:
+    """Focal length of faces as fine as the points are where they are finest, in the lens's finer direction."""
+    here, right, down = (
+        (slice(0, -1, 3), slice(0, -1, 3)),
+        (slice(0, -1, 3), slice(1, None, 3)),
+        (slice(1, None, 3), slice(0, -1, 3)),
+    )
+    within = (face_of[here] >= 0) & (face_of[here] == face_of[right]) & (face_of[here] == face_of[down])
+    steps = np.sort([np.hypot(*(plane[there] - plane[here])[within].T) for there in (right, down)], 0)
+    # Towards a fisheye's rim and a full sphere's poles, points lie close along one direction without showing more.
+    return float(focal_lengths.max() / focal_lengths.min() / steps[1].min())
+
+
+def _face(pixels: Radiance, mine: NDArray[np.bool_], turn: Array, row: int, *, focal_px: float) -> Face:
+    """The face that holds its own ones of all pixels (2, R, C), which count from its axis."""
+    low = np.floor(np.where(mine, pixels, np.inf).min(2))
+    high = np.ceil(np.where(mine, pixels, -np.inf).max(2))
+    cx, cy = (MARGIN_PX - low.min(1)).tolist()
+    width, height = (high.max(1) - low.min(1) + 2 * MARGIN_PX + 1).astype(int).tolist()
+    spans = np.stack([low[0] + cx - 1, high[0] + cx + 2, low[1] + cy - 1, high[1] + cy + 2], -1)
+    spans = np.where(np.any(mine, axis=1, keepdims=True), spans, [1, 0, 1, 0])
+    return Face(Pinhole(width, height, focal_px, focal_px, cx, cy), turn, row, spans.astype(np.int32))

@@ -1,0 +1,214 @@
+"""The folder of a run, as a person reads it, and the hashes of its files."""
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from itertools import count
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from vobench.errors import InputError, TrajectoryError
+from vobench.runner.consistency import Consistency
+from vobench.runner.entry import file_hash
+from vobench.runner.frames import TIMES
+from vobench.runner.store import sweep, unfinished, write_json
+from vobench.trajectory.formats import parse_tum
+from vobench.trajectory.trajectory import Trajectory
+
+CASE, SCORE, SEQUENCE = "case.json", "score.json", "sequence"
+ESTIMATES, PAGE = "estimates", "leaderboard.html"
+ENVIRONMENT, SUITE, ESTIMATORS = "environment.json", "suite.json", "estimators.json"
+
+# Best first; the last seven are failures, and no failure ranks before a survivor.
+TrialStatus = Literal[
+    "ok",
+    "partial",
+    "lost",
+    "diverged",
+    "invalid_output",
+    "timeout",
+    "out_of_memory",
+    "crashed",
+    "refused",
+    "not_applicable",
+]
+STATUSES: tuple[TrialStatus, ...] = get_args(TrialStatus)
+SURVIVED = ("ok", "partial")
+NOT_APPLICABLE = "not_applicable"  # the recording lacks a sensor that the estimator needs
+
+
+class TrialScore(BaseModel):
+    """One estimator on one case: its status and, where there is any estimate, its score.
+
+    `drift_m` is the largest distance of the estimate from its start, in a case that stands still; else None.
+    `claims` are the manifest's, such as Sim(3); `consistency` is of the covariances that were stated, and `revised`
+    the score of the poses that came after the last frame, where there were some.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    schema_version: int = 1
+    case: str
+    variant: dict[str, str]
+    estimator: str
+    repeat: int
+    status: TrialStatus
+    reason: str
+    coverage: float
+    frames: int
+    path_m: float
+    score: dict[str, Any] | None
+    drift_m: float | None = None
+    claims: tuple[str, ...] = ()
+    consistency: Consistency | None = None
+    revised: dict[str, Any] | None = None
+
+    def value(self, metric: str, statistic: str) -> float | None:
+        """One statistic of one metric, None where the trial has no such score."""
+        return value_of(self.score, metric, statistic)
+
+
+def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> float | None:
+    """One statistic of one metric of a score as JSON has it, None where it has no such."""
+    entries = (score or {"metrics": []})["metrics"]
+    return next((float(entry[statistic]) for entry in entries if entry["name"] == metric), None)
+
+
+@dataclass(frozen=True, slots=True)
+class RunFolder:
+    """A finished run of a suite."""
+
+    path: Path
+
+    def case(self, case: str) -> Path:
+        """The folder of a case."""
+        return self.path / "cases" / case
+
+    def estimate(self, case: str, estimator: str, repeat: int) -> Path:
+        """The folder of a trial."""
+        return self.case(case) / ESTIMATES / estimator / str(repeat)
+
+    def score_files(self) -> list[Path]:
+        """Where every trial's score lies, in order of folders. Raises InputError where the folder is none of ours."""
+        cases = self.path / "cases"
+        files = sorted(cases.glob(f"*/{ESTIMATES}/*/*/{SCORE}"))
+        if files:
+            return files
+        if not self.path.is_dir():
+            raise InputError(f"no such folder: {self.path}")
+        if any(cases.glob(f"*/*/*/{SCORE}")):
+            raise InputError(
+                f"a run of an older vobench, whose estimates do not lie in cases/*/{ESTIMATES}; "
+                f"run the suite again: {self.path}"
+            )
+        raise InputError(f"not the folder of a run (no cases/*/{ESTIMATES}/*/*/{SCORE} in it): {self.path}")
+
+    def scores(self) -> list[TrialScore]:
+        """Every trial's score, in order of folders. Raises InputError where the folder or a score is none of ours."""
+        scores = []
+        for file in self.score_files():
+            score = read_score(file)
+            if self.estimate(score.case, score.estimator, score.repeat) / SCORE != file:
+                told = f"{score.estimator!r} on {score.case!r}, {score.repeat}"
+                raise InputError(f"should be the score of the folder it lies in, but is of {told}: {file}")
+            scores.append(score)
+        return scores
+
+
+def read_score(path: Path) -> TrialScore:
+    """One trial's score. Raises InputError where the file is none."""
+    try:
+        return TrialScore.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise InputError(
+            f"not a score as vobench writes it ({f'{place}: ' if place else ''}{first['msg']}): {path}"
+        ) from None
+
+
+def open_run(path: Path) -> RunFolder:
+    """The run at a path; a suite's folder stands for its latest run."""
+    return RunFolder((path / "latest") if (path / "latest").exists() else path)
+
+
+def make_run(root: Path, suite: str, key: str, fill: Callable[[RunFolder], None]) -> RunFolder:
+    """A new run's folder, which gets its name when `fill` is through with it without an error."""
+    parent = root / suite
+    sweep(parent)
+    with unfinished(parent) as folder:
+        fill(RunFolder(folder))
+        final = _published(folder, parent / f"{datetime.now(UTC):%Y%m%dT%H%M%S}_{key[:8]}")
+        fresh = parent / f".latest-{os.getpid()}"
+        fresh.symlink_to(final.name)
+        fresh.replace(parent / "latest")  # in one step
+    return RunFolder(final)
+
+
+def _published(folder: Path, name: Path) -> Path:
+    """The folder under its final name, with a number behind it where two runs ended in one second."""
+    for number in count(1):
+        final = name if number == 1 else name.with_name(f"{name.name}.{number}")
+        try:
+            return folder.rename(final)
+        except OSError:
+            if not final.is_dir():
+                raise
+    raise AssertionError
+
+
+def read_tum(path: Path) -> Trajectory:
+    """The trajectory in a TUM file of a run; empty where an estimator gave no pose at all.
+
+    Raises TrajectoryError where the file is none.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise TrajectoryError(f"not a text file in UTF-8 (byte {error.start}): {path}") from None
+    return parse_tum(text, name=str(path))
+
+
+# Of runs of equal inputs the first are equal; the second are of the files of times, and of the page that shows them.
+HASHES, TIMES_HASHES = "hashes.json", "times_hashes.json"
+
+
+def write_hashes(folder: RunFolder) -> None:
+    """Hash all that lies in a run's folder, and the sequences that it links to; files of times apart."""
+    hashes = {name: file_hash(folder.path / name) for name in _names(folder.path)}
+    for file, are_times in ((HASHES, False), (TIMES_HASHES, True)):
+        chosen = {name: held for name, held in hashes.items() if (Path(name).name in (TIMES, PAGE)) == are_times}
+        write_json(folder.path / file, chosen)
+
+
+def read_hashes(folder: RunFolder) -> dict[str, str]:
+    """The hash of each file by its path in the folder. Raises InputError where none were kept."""
+    return {**_hashes_in(folder.path / HASHES), **_hashes_in(folder.path / TIMES_HASHES)}
+
+
+def _hashes_in(path: Path) -> dict[str, str]:
+    try:
+        held = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"this run kept no hashes (its vobench was older, or it is no run): {path}") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"not readable as JSON ({error}): {path}") from None
+    if not isinstance(held, dict) or not all(isinstance(value, str) for value in held.values()):
+        raise InputError(f"should hold one hash for each file: {path}")
+    escaped = [name for name in held if Path(name).is_absolute() or ".." in Path(name).parts]
+    if escaped:
+        raise InputError(f"names a file outside the run's folder ({escaped[0]!r}): {path}")
+    return held
+
+
+def _names(root: Path) -> Iterator[str]:
+    """Paths of all files below a run's folder; a sequence is a link to a folder in the cache."""
+    linked = (file for link in root.glob(f"cases/*/{SEQUENCE}") for file in link.glob("*.mcap"))
+    for path in sorted({*(p for p in root.rglob("*") if p.is_file()), *linked}):
+        name = str(path.relative_to(root))
+        if name not in (HASHES, TIMES_HASHES):
+            yield name

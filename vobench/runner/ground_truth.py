@@ -1,0 +1,77 @@
+"""The ground truth that trials are scored against, and the exposures of the frames: what a sequence tells of itself."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from vobench.errors import SequenceError
+from vobench.geometry import se3
+from vobench.runner.frames import EXPOSURE_COLUMNS, EXPOSURES, GROUND_TRUTH, new_table
+from vobench.sequence import Sequence, read_truth
+from vobench.suite.source import RecordedCase
+from vobench.suite.suite import EXACT, Case, TruthNoise, Window
+from vobench.trajectory.formats import format_tum, parse_tum
+from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
+
+NOISE_STREAM = 9_173  # sets the noise of the truth apart from other streams of a seed
+# Between two true poses further apart than this nobody knows where the camera was.
+LONGEST_GAP_NS = 200_000_000
+
+
+def left_truth(folder: Path) -> Trajectory:
+    """The left camera's true poses at all pictures that have one; the truth is interpolated where it is not theirs.
+
+    Pictures before, after or in a gap of the truth are left out, and so not scored.
+    Raises SequenceError where that leaves none.
+    """
+    sequence, truth = Sequence.open(folder), read_truth(folder)
+    if not len(truth):
+        raise SequenceError(f"no ground truth, so nothing can be scored: {folder}")
+    stamps = sequence.frame_stamps()
+    if not np.array_equal(stamps, truth.t_ns):
+        stamps = stamps[is_known(truth.t_ns, stamps)]
+        if not len(stamps):
+            raise SequenceError(f"the ground truth covers none of the pictures in time: {folder}")
+        truth = Trajectory(stamps, poses_at(truth, stamps))
+    return truth.of_mounted(sequence.rig.T_body_left)
+
+
+def scored_truth(exact: str, case: Case | RecordedCase) -> str:
+    """The truth, as TUM text, that estimates on a case are scored against; that of its sequence without its noise."""
+    if isinstance(case, RecordedCase):
+        return exact
+    return noisy(exact, case.truth_noise, seed=case.seed, frames=case.frames)
+
+
+def noisy(exact: str, noise: TruthNoise, *, seed: int, frames: Window | None) -> str:
+    """A truth, as TUM text, with noise on each pose; of `frames` the noise is what it is in the whole way."""
+    if noise == EXACT:
+        return exact
+    truth, before = parse_tum(exact, name=GROUND_TRUTH), frames[0] if frames else 0
+    draws = np.random.default_rng([seed, NOISE_STREAM]).standard_normal((before + len(truth), 2, 3))
+    moved, turned = draws[before:].swapaxes(0, 1)
+    R = Rotation.from_rotvec(noise.rotation_deg * turned, degrees=True).as_matrix()
+    return format_tum(Trajectory(truth.t_ns, truth.T_world_frame @ se3.transform(R, noise.position_m * moved)))
+
+
+def is_known(truth_ns: Stamps, stamps: Stamps) -> NDArray[np.bool_]:
+    """Which stamps lie on a true pose, or between two that are near to each other in time."""
+    after = np.searchsorted(truth_ns, stamps, side="left")
+    before = np.searchsorted(truth_ns, stamps, side="right") - 1
+    inside = (before >= 0) & (after < len(truth_ns))
+    last = len(truth_ns) - 1
+    gap_ns = truth_ns[np.minimum(after, last)] - truth_ns[np.maximum(before, 0)]
+    return np.asarray(inside & (gap_ns <= LONGEST_GAP_NS))
+
+
+def write_ground_truth(folder: Path) -> None:
+    """Put beside a sequence's recordings what each of its trials reads: the true path, and every frame's exposure."""
+    (folder / GROUND_TRUTH).write_text(format_tum(left_truth(folder)), encoding="utf-8")
+    sequence = Sequence.open(folder)
+    known = dict(zip(*(part.tolist() for part in sequence.exposures()), strict=True))
+    with new_table(folder / EXPOSURES, EXPOSURE_COLUMNS) as table:
+        for frame, t_ns in enumerate(sequence.frame_stamps().tolist()):
+            exposure_s, gain_db = known.get(t_ns, ("", ""))
+            table.writerow({"frame": frame, "t_ns": t_ns, "exposure_s": exposure_s, "gain_db": gain_db})

@@ -1,0 +1,148 @@
+"""Case to sequence: light is computed, the body moves, cameras and other sensors measure, the recording keeps."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vobench.geometry.rig import SIDES
+from vobench.runner.key import canonical, versions
+from vobench.runner.motion import BodyMotion, body_motion, generator
+from vobench.suite.scene_file import content as scene_content
+from vobench.suite.yaml_file import plain
+
+if TYPE_CHECKING:
+    from vobench.rendering.renderer import Renderer
+    from vobench.runner.sensors import PixelTruth, SensorFeed
+    from vobench.runner.stereo_camera import StereoCamera, StereoPair
+    from vobench.runner.store import Progress
+    from vobench.scene.scene import Scene
+    from vobench.sensor.timing import Schedule
+    from vobench.sequence import SequenceWriter
+    from vobench.suite.scene_spec import SceneFile
+    from vobench.suite.suite import Case, Rendering
+
+# What of a case is for people: names, and where the poses of a replay were found.
+UNSIMULATED: dict[str, Any] = {
+    "name": True,
+    "variant": True,
+    "scenario": True,
+    "severity": True,
+    "truth_noise": True,
+    "scene": {"summary"},
+    "trajectory": {"file", "times", "recorded_hz", "axes"},
+}
+LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "pyrender", "embreex", "mcap", "rosbags")
+
+
+def content(case: "Case") -> dict[str, Any]:
+    """What is simulated, without what the suite calls it: the same for equal cases of two suites."""
+    said: dict[str, Any] = plain(case, exclude=UNSIMULATED)
+    return said | {"scene": scene_content(case.scene, exclude=UNSIMULATED["scene"])}
+
+
+# What draws and writes is imported where it is used: whoever asks whether a sequence is there needs none of it.
+
+
+def bake_scene(spec: "SceneFile", folder: Path, progress: "Progress") -> None:
+    """Compute the light of a scene, under whatever levels, into a folder.
+
+    Raises MissingDependencyError where this machine cannot draw, before any light is computed.
+    """
+    from vobench.rendering.bake import BakeSettings, bake, save_baked
+    from vobench.rendering.raster import require_drawing
+    from vobench.suite.scene_build import build
+
+    require_drawing()
+    scene = build(spec, {})
+    with progress.step(f"light of {scene.name}") as tell:
+        save_baked(folder, bake(scene, BakeSettings(), tell))
+
+
+def open_renderer(scene: "Scene", rendering: "Rendering", light: Path | None) -> "Renderer":
+    """The renderer of a scene, which draws with the light in a folder where it traces no paths; the caller closes it.
+
+    Raises MissingDependencyError where this machine cannot draw.
+    """
+    if light is None:
+        from vobench.rendering.path import SAMPLES, PathRenderer
+
+        return PathRenderer(scene, samples=rendering.samples or SAMPLES)
+    from vobench.rendering.bake import load_baked
+    from vobench.rendering.raster import RasterRenderer
+
+    return RasterRenderer(load_baked(light, scene))
+
+
+def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progress") -> None:
+    """Record a case's sequence in a folder, drawn with the light of its scene or, without, by tracing paths."""
+    from vobench.runner.sensors import PixelTruth, SensorFeed
+    from vobench.runner.stereo_camera import StereoCamera, World
+
+    travel, scene = body_motion(case), case.build_scene()
+    truth = PixelTruth(case, scene, travel.motion) if case.truth else None
+    renderer = open_renderer(scene, case.rendering, light)
+    try:
+        camera = StereoCamera(case, World(scene, renderer, travel.motion))
+        camera.skip(travel.first)
+        frames = frames_of(case, travel)
+        watched = progress.track(_pairs(camera, frames), f"simulate {case.name}", total=len(frames.t_ns))
+        with _writer(case, folder, truth) as writer:
+            _write(writer, (travel, frames), SensorFeed(case, travel), watched, truth)
+    finally:
+        renderer.close()
+
+
+def frames_of(case: "Case", travel: BodyMotion) -> "Schedule":
+    """The frames that come of a case's way, and when their pictures are taken."""
+    from vobench.sensor.timing import STREAMS, schedule
+
+    rngs = {stream: generator(case.seed, f"camera.{stream}") for stream in STREAMS}
+    return schedule(case.camera.timing, travel.t_ns, rngs, before=travel.first)
+
+
+def _pairs(camera: "StereoCamera", frames: "Schedule") -> "Iterator[StereoPair]":
+    """The pictures of each frame; one that repeats has those before."""
+    pair = None
+    for left_ns, right_ns, repeats in zip(frames.left_ns, frames.right_ns, frames.repeats, strict=True):
+        pair = pair if repeats and pair else camera.shoot(int(left_ns), int(right_ns))
+        yield pair
+
+
+def _writer(case: "Case", folder: Path, truth: "PixelTruth | None") -> "SequenceWriter":
+    from vobench.sequence import SequenceWriter
+    from vobench.sequence.picture import BAYER, MONO, RGB
+
+    return SequenceWriter(
+        folder,
+        case.build_rig(),
+        case_json=canonical(content(case)).encode(),
+        true_rig=case.build_true_rig(),
+        jpeg_quality=case.camera.jpeg_quality,
+        colour={"mono": MONO, "rgb": RGB, "bayer": BAYER}[case.camera.colour],
+        truth_channels=case.truth,
+        truth_names=truth.names if truth else None,
+        provenance=versions(*LIBRARIES),
+    )
+
+
+def _write(
+    writer: "SequenceWriter",
+    way: "tuple[BodyMotion, Schedule]",
+    feed: "SensorFeed",
+    pairs: "Iterator[StereoPair]",
+    truth: "PixelTruth | None",
+) -> None:
+    travel, frames = way
+    body = travel.at_frames()
+    taken = {"left": [*frames.left_ns.tolist(), None], "right": [*frames.right_ns.tolist(), None]}
+    for nth, (pair, index, t_ns) in enumerate(zip(pairs, frames.index, frames.t_ns.tolist(), strict=True)):
+        feed.write_until(t_ns, writer)
+        writer.write_frame(t_ns, pair.left, pair.right)
+        writer.write_exposure(t_ns, pair.exposure.time_s, pair.exposure.gain_db)
+        writer.write_truth(t_ns, body.T_world_body[index], body.twist[index])
+        if travel.drive:
+            step = travel.first + index
+            writer.write_disturbance(t_ns, travel.drive.slip[step], travel.drive.delta[step])
+        if truth:
+            for side in SIDES:
+                writer.write_truth_frame(t_ns, side, truth.frame(side, *taken[side][nth : nth + 2]))

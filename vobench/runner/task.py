@@ -1,0 +1,277 @@
+"""The stages from suite to scores as tasks: what each makes, of what, after which others, and how it is performed."""
+
+import os
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from shutil import copyfile
+from typing import TYPE_CHECKING, Any, Literal
+
+from vobench import stop
+from vobench.runner.key import code_digest, digest, folder_digest, imported_by, library_versions
+from vobench.runner.simulate import LIBRARIES, content
+from vobench.runner.store import Progress, SilentProgress, Store
+from vobench.suite.scene_file import content as scene_content
+from vobench.suite.scene_spec import SceneFile
+from vobench.suite.source import RecordedCase
+from vobench.suite.suite import EXACT, Case, Entrant, Plan, Trial
+
+if TYPE_CHECKING:
+    from vobench.dataset.recording import Recording
+
+Stage = Literal["bake", "sequence", "import", "estimate", "score"]
+# Where the results of each stage lie in the store.
+KINDS: dict[Stage, str] = {
+    "bake": "bakes",
+    "sequence": "sequences",
+    "import": "sequences",
+    "estimate": "estimates",
+    "score": "scores",
+}
+# The modules that a stage enters, of which its key hashes all that they import; a room stands for all of its modules.
+ENTRIES: dict[Stage, tuple[str, ...]] = {
+    "bake": ("vobench.rendering.bake", "vobench.suite.scene_build"),
+    "sequence": ("vobench.runner.simulate", "vobench.runner.ground_truth"),
+    "import": ("vobench.runner.import_recording", "vobench.runner.ground_truth", "vobench.dataset"),
+    "estimate": ("vobench.runner.estimate", "vobench.estimator.worker"),
+    "score": ("vobench.runner.score",),
+}
+# What of a scene's file its light does not depend on; levels weigh the light of each lamp later.
+UNLIT: dict[str, Any] = {
+    "summary": True,
+    "white_cd_m2": True,
+    "lamps": {"__all__": {"level"}},
+    "sun": {"level"},
+    "sky": {"level"},
+}
+
+
+NO_LIMIT = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One unit of work, whose result is a folder in the store.
+
+    `inputs` is all that the result's bytes depend on, as JSON; `subject` is what it is made of, for whoever makes it;
+    `needs` are the keys of the tasks whose results it takes, in the order that its stage asks for.
+    """
+
+    stage: Stage
+    subject: "SceneFile | Case | RecordedCase | Trial"
+    inputs: Mapping[str, Any]
+    needs: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        return self.subject.name
+
+    @property
+    def key(self) -> str:
+        """Where its result lies in the store, by which others name it."""
+        return f"{KINDS[self.stage]}/{digest(self.inputs)}"
+
+
+def plan(suite: Plan, recordings: "Mapping[str, Recording]") -> list[Task]:
+    """All tasks of a suite, each once and after those that it needs; `recordings` are its recorded cases' by name.
+
+    Nothing is made and nothing of a case is read; of code, the hashes.
+    """
+    tasks = dict[str, Task]()
+
+    def add(*made: Task) -> str:
+        keys = [task.key for task in made]
+        for key, task in zip(keys, made, strict=True):
+            tasks.setdefault(key, task)
+        return keys[-1]
+
+    code = {entrant.label: estimator_code(entrant) for entrant in suite.entrants}
+    for case in suite.cases:
+        sequence = add(*sequence_tasks(case, recordings))
+        for trial in suite.trials(case):
+            add(score_task(trial, sequence, add(estimate_task(trial, sequence, code[trial.entrant.label]))))
+    return list(tasks.values())
+
+
+def sequence_tasks(case: Case | RecordedCase, recordings: "Mapping[str, Recording]") -> list[Task]:
+    """What makes a case's sequence, the sequence last: its scene's light is computed before, where it is drawn with."""
+    if isinstance(case, RecordedCase):
+        return [_import_task(case, recordings[case.name])]
+    is_traced = case.rendering.engine == "path"
+    before = [] if is_traced else [bake_task(case.scene)]
+    needs = tuple(task.key for task in before)
+    libraries = library_versions(*LIBRARIES, *(["mitsuba"] if is_traced else []))
+    inputs = {"case": content(case), **_made_by("sequence", needs), "libraries": libraries}
+    return [*before, Task("sequence", case, inputs, needs)]
+
+
+def bake_task(spec: SceneFile) -> Task:
+    """What computes a scene's light, under whatever levels."""
+    scene = scene_content(spec, exclude=UNLIT)
+    libraries = library_versions("numpy", "scipy", "embreex", "xatlas", "pillow", "trimesh", "opencv-python-headless")
+    inputs = {"scene": scene, **_made_by("bake"), "libraries": libraries}
+    return Task("bake", spec, inputs, ())
+
+
+def _import_task(case: RecordedCase, recording: "Recording") -> Task:
+    from vobench.runner import import_recording
+
+    libraries = library_versions(*import_recording.LIBRARIES)
+    inputs = {**import_recording.content(case, recording), **_made_by("import"), "libraries": libraries}
+    return Task("import", case, inputs, ())
+
+
+def estimator_code(entrant: Entrant) -> dict[str, str]:
+    """Hashes of an estimator's folder, and of all code of vobench that runs it or that it imports."""
+    code = code_digest(*ENTRIES["estimate"], *imported_by(entrant.folder))
+    return {"estimator": folder_digest(entrant.folder), "code": code}
+
+
+def estimate_task(trial: Trial, sequence: str, code: Mapping[str, str]) -> Task:
+    """What lets an estimator run on the sequence of that key; `code` is its `estimator_code`."""
+    entrant, needs = trial.entrant, (sequence,)
+    inputs = {
+        "params": entrant.params,
+        "repeat": trial.repeat,
+        "limits": asdict(entrant.limits),
+        "mode": entrant.mode,
+        "needs": needs,
+        **code,
+        "libraries": library_versions("numpy", "scipy", "opencv-python-headless"),
+    }
+    return Task("estimate", trial, inputs, needs)
+
+
+def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
+    """What scores the estimate of that key against the truth of its sequence."""
+    inputs = {
+        "case": trial.case.name,
+        "variant": trial.case.variant,
+        "estimator": trial.entrant.label,
+        "claims": trial.entrant.claims,
+        **_noise(trial.case),
+        "repeat": trial.repeat,
+        **_made_by("score", (sequence, estimate)),
+        "libraries": library_versions("numpy", "scipy"),
+    }
+    return Task("score", trial, inputs, (sequence, estimate))
+
+
+def _noise(case: Case | RecordedCase) -> dict[str, Any]:
+    """What the truth of a case that is scored depends on, beside the exact one."""
+    if isinstance(case, RecordedCase) or case.truth_noise == EXACT:
+        return {}
+    return {"truth_noise": asdict(case.truth_noise), "seed": case.seed, "first": case.frames and case.frames[0]}
+
+
+def _made_by(stage: Stage, needs: tuple[str, ...] = ()) -> dict[str, Any]:
+    return {"needs": needs, "code": code_digest(*ENTRIES[stage])}
+
+
+def missing(tasks: Iterable[Task], root: Path) -> list[Task]:
+    """The tasks to perform, in order: what is there is not made again, nor light that no picture is drawn with."""
+    wanted, found = set[str](), list[Task]()
+    for task in reversed(list(tasks)):
+        if (task.stage != "bake" or task.key in wanted) and not is_done(task, root):
+            wanted.update(task.needs)
+            found.append(task)
+    return found[::-1]
+
+
+def is_done(task: Task, root: Path) -> bool:
+    """Whether the store holds the task's result; that of a failure is made anew, for its cause may be gone."""
+    return Store(root).has(task.key) and not has_failed(task, root / task.key)
+
+
+def has_failed(task: Task, folder: Path) -> bool:
+    """Whether what lies there is the result of a trial that came to no end."""
+    from vobench.runner.estimate import FINISHED, read_outcome
+
+    return task.stage in ("estimate", "score") and read_outcome(folder).kind != FINISHED
+
+
+def perform(
+    task: Task,
+    root: Path,
+    threads: int = NO_LIMIT,
+    *,
+    progress: Progress = SilentProgress(),  # noqa: B008 - no state
+) -> Path:
+    """Make a task's result in the store at `root`, out of those that it needs, and say where it lies.
+
+    `threads` is how many may draw and filter pictures, NO_LIMIT for as many as there are. It may be called in a
+    process of its own.
+    """
+    stop.check()
+    if threads != NO_LIMIT:
+        _limit(threads)
+    store = Store(root)
+
+    def build(folder: Path) -> None:
+        began = time.monotonic()
+        PERFORMERS[task.stage](task.subject, [store.need(key) for key in task.needs], folder, progress)
+        store.note_seconds(task.stage, time.monotonic() - began)
+
+    def keeps(folder: Path) -> bool:
+        return not has_failed(task, folder)
+
+    return store.get(KINDS[task.stage], task.inputs, build, keeps=keeps, tell=progress.say)
+
+
+def _limit(threads: int) -> None:
+    import cv2
+
+    os.environ["LP_NUM_THREADS"] = str(threads)  # Mesa reads it when it first draws
+    cv2.setNumThreads(threads)
+
+
+# Each stage imports what it takes: a process that performs none of them loads none.
+
+
+def _bake(spec: SceneFile, _: list[Path], folder: Path, progress: Progress) -> None:
+    from vobench.runner.simulate import bake_scene
+
+    bake_scene(spec, folder, progress)
+
+
+def _sequence(case: Case, needs: list[Path], folder: Path, progress: Progress) -> None:
+    from vobench.runner.ground_truth import write_ground_truth
+    from vobench.runner.simulate import simulate
+
+    simulate(case, folder, light=needs[0] if needs else None, progress=progress)
+    write_ground_truth(folder)
+
+
+def _import(case: RecordedCase, _: list[Path], folder: Path, progress: Progress) -> None:
+    from vobench.runner.ground_truth import write_ground_truth
+    from vobench.runner.import_recording import import_recording, read_case
+
+    with progress.step(f"import {case.name}"):
+        import_recording(read_case(case), folder)
+    write_ground_truth(folder)
+
+
+def _estimate(trial: Trial, needs: list[Path], folder: Path, progress: Progress) -> None:
+    from vobench.runner.estimate import estimate
+
+    estimate(trial, needs[0], folder, progress)
+
+
+def _score(trial: Trial, needs: list[Path], folder: Path, _: Progress) -> None:
+    from vobench.runner.estimate import OUTCOME
+    from vobench.runner.score import score_trial
+
+    sequence, estimate = needs
+    score_trial(trial, sequence, estimate, folder)
+    copyfile(estimate / OUTCOME, folder / OUTCOME)
+
+
+PERFORMERS: dict[Stage, Callable[[Any, list[Path], Path, Progress], None]] = {
+    "bake": _bake,
+    "sequence": _sequence,
+    "import": _import,
+    "estimate": _estimate,
+    "score": _score,
+}
