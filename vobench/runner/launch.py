@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from vobench import stop
 from vobench.errors import InputError
-from vobench.runner.executor import Dask, Executor, LocalProcesses, Serial
+from vobench.runner.executor import Dask, Executor, LocalProcesses, Serial, perform_all
 from vobench.runner.key import cache_folder
 from vobench.runner.preflight import preflight
 from vobench.runner.progress import RunDisplay
 from vobench.runner.store import Progress, SilentProgress, Store, why_unwritable
-from vobench.runner.task import KINDS, Task
+from vobench.runner.task import KINDS, Task, missing
 from vobench.suite.suite import Plan
 
 if TYPE_CHECKING:
@@ -79,6 +79,26 @@ def run_plan(
             shares_time=shares_time,
             is_fresh=is_fresh,
         )
+
+
+def perform_tasks(tasks: "Sequence[Task]", *, display: RunDisplay, jobs: int | None = None) -> Path:
+    """Perform those of these tasks that the cache does not hold; the folder of the last one's result.
+
+    Raises InputError with the cause where one of them fails, and Stopped.
+    """
+    store = cache_folder().resolve()
+    kept = Store(store)
+    executor = make_executor(jobs, None, SilentProgress())
+    with stop.undone(executor.close), display, kept.in_use(display.say):
+        to_make = missing(tasks, store)
+        if to_make:
+            kept.require_writable()
+        display.begin(to_make, typical_seconds(store))
+        failures = perform_all(to_make, store, executor, heard=display.hear)
+    for task in tasks:
+        if task.key in failures:
+            raise InputError(f"{task.stage} {task.name} failed: {failures[task.key].reason}")
+    return store / tasks[-1].key
 
 
 def make_executor(jobs: int | None, scheduler: str | None, task_progress: Progress) -> Executor:
