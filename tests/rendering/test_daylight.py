@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.render.rectangles import Rectangle, rectangle
+from tests.rendering.rectangles import Rectangle, rectangle
 
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from tests.render.rectangles import box, rectangle, room
+from tests.rendering.rectangles import box, rectangle, room
 
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array

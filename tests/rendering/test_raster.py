@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.render.rectangles import box, rectangle, room
+from tests.rendering.rectangles import box, rectangle, room
 
 import vobench.rendering
 from vobench.asset.texture import Procedural

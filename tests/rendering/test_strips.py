@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.render.rectangles import box, rectangle, room
+from tests.rendering.rectangles import box, rectangle, room
 
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3

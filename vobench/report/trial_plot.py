@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from vobench.errors import InputError
 from vobench.report.drive_plot import SETTINGS
 from vobench.runner.estimate import ESTIMATE
@@ -22,6 +24,9 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F
 LINES = ("-", "--", "-.", ":")
 SIZE_INCHES = (9.0, 3.6)
 NS_PER_S = 1e9
+MARGIN = 1.5  # the side of the picture of paths, against the longer side of the ground truth
+LEAST_SPAN_M = 0.05  # from the centre of that picture to its edge
+LOGARITHMIC_FROM = 20.0  # the ratio of median errors from which on their axis is logarithmic
 
 
 def plot_case(folder: RunFolder, trials: Sequence[TrialScore]) -> "Figure":
@@ -47,7 +52,8 @@ def plot_case(folder: RunFolder, trials: Sequence[TrialScore]) -> "Figure":
             line = LINES[index // len(COLOURS) % len(LINES)]
             scored = _score(folder, trial, truth)
             _draw_trial(path_axes, error_axes, trial, scored, colour=colour, line=line)
-        _finish(path_axes, error_axes)
+        _finish_path(path_axes, truth)
+        _finish_errors(error_axes)
     return figure
 
 
@@ -81,10 +87,25 @@ def _draw_trial(
     error_axes.plot(time_s, 1e3 * scored.ate_trans_m, color=colour, ls=line, lw=1.2, label=name)
 
 
-def _finish(path_axes: "Axes", error_axes: "Axes") -> None:
-    path_axes.set(xlabel="x (m)", ylabel="y (m)")
-    path_axes.set_aspect("equal", adjustable="datalim")
-    path_axes.margins(0.1)
-    path_axes.legend(loc="best")
-    error_axes.set(xlabel="time (s)", ylabel="position error (mm)")
-    error_axes.set_ylim(bottom=0)
+def _finish_path(axes: "Axes", truth: "Trajectory") -> None:
+    """Show what is around the ground truth: an estimate that diverged leaves the picture instead of shrinking it."""
+    low_m = truth.positions_m[:, :2].min(axis=0)
+    high_m = truth.positions_m[:, :2].max(axis=0)
+    centre_m = (low_m + high_m) / 2
+    half_m = max(float((high_m - low_m).max()) * MARGIN / 2, LEAST_SPAN_M)
+    axes.set(xlabel="x (m)", ylabel="y (m)")
+    axes.set_xlim(centre_m[0] - half_m, centre_m[0] + half_m)
+    axes.set_ylim(centre_m[1] - half_m, centre_m[1] + half_m)
+    axes.set_aspect("equal", adjustable="box")
+    axes.legend(loc="best")
+
+
+def _finish_errors(axes: "Axes") -> None:
+    """A linear axis from zero, or a logarithmic one where errors differ too much to be seen on it."""
+    axes.set(xlabel="time (s)", ylabel="position error (mm)")
+    medians_mm = [float(np.median(np.asarray(line.get_ydata(), float))) for line in axes.get_lines()]
+    positive_mm = [median for median in medians_mm if median > 0]
+    if positive_mm and max(positive_mm) > LOGARITHMIC_FROM * min(positive_mm):
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(bottom=0)
