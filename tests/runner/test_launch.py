@@ -66,7 +66,16 @@ def test_one_job_runs_in_this_process_and_several_in_others():
     assert several.slots == 3
 
 
+def test_the_environment_says_how_many_jobs_there_are(monkeypatch):
+    monkeypatch.setenv("VOBENCH_JOBS", "3")
+    assert default_jobs() == 3
+    monkeypatch.setenv("VOBENCH_JOBS", "0")
+    with pytest.raises(InputError, match="VOBENCH_JOBS should be a number of tasks from 1 on, got '0'"):
+        default_jobs()
+
+
 def test_by_default_there_is_a_job_a_core_and_no_more_than_eight(monkeypatch):
+    monkeypatch.delenv("VOBENCH_JOBS", raising=False)
     for cores, jobs in ((1, 1), (5, 5), (64, 8)):
         monkeypatch.setattr(launch.os, "sched_getaffinity", lambda _, n=cores: set(range(n)))
         assert default_jobs() == jobs

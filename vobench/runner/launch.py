@@ -27,7 +27,12 @@ MOST_JOBS = 8
 
 
 def default_jobs() -> int:
-    """One task a core that this process may use, and no more than 8."""
+    """The number in $VOBENCH_JOBS, else one task a core that this process may use, and no more than 8."""
+    stated = os.environ.get("VOBENCH_JOBS", "")
+    if stated:
+        if not stated.isdecimal() or int(stated) < 1:
+            raise InputError(f"VOBENCH_JOBS should be a number of tasks from 1 on, got {stated!r}")
+        return int(stated)
     return min(len(os.sched_getaffinity(0)), MOST_JOBS)
 
 
