@@ -107,7 +107,7 @@ def test_the_table_has_the_values_of_the_dictionaries(read):
 
 
 def test_names_and_suites_without_trajectories_are_refused(read, tmp_path):
-    with pytest.raises(UnknownNameError, match="no trajectory named 'leg'. Did you mean 'legs'"):
+    with pytest.raises(UnknownNameError, match=r"no trajectory named 'leg'\. Did you mean 'legs'"):
         chosen_trajectories(read(), trajectory="leg")
     (tmp_path / "scenario.yaml").write_text("name: none\nscenarios: {spin_in_place: [1]}\nestimators: [stand_still]\n")
     with pytest.raises(InputError, match="has no trajectory to drive"):
