@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
@@ -11,11 +11,11 @@ from vobench.cli import terminal
 from vobench.errors import InputError, SettingError
 from vobench.metric.settings import ScoreSettings
 from vobench.report import score_table
-from vobench.runner.metric_catalog import all_metrics, find_metric
-from vobench.runner.score_files import FilePair, ScoredFiles, read_pair_list, score_files
-from vobench.runner.score_settings import settings_like
 from vobench.runner.trajectory_pair import TrajectorySource
 from vobench.setting import hints
+
+if TYPE_CHECKING:
+    from vobench.runner.score_files import ScoredFiles
 
 Gt = Annotated[Path, typer.Argument(metavar="GT", help="Ground truth: a file of any form, or a sequence's folder.")]
 Est = Annotated[
@@ -41,6 +41,8 @@ def metrics_command(
     json: terminal.Json = False,
 ) -> None:
     """Define a metric: formula, source, settings, and what it cannot see."""
+    from vobench.runner.metric_catalog import all_metrics, find_metric
+
     if metric is not None:
         _show_metric(find_metric(metric).as_dict(), as_json=json)
         return
@@ -175,6 +177,8 @@ def score_command(
     md: Annotated[bool, typer.Option("--md", help="Print Markdown.")] = False,
 ) -> None:
     """Score estimates against ground truth: ATE, RPE, segments, coverage."""
+    from vobench.runner.score_files import FilePair, read_pair_list, score_files
+
     form = _form(json=json, csv=csv, md=md)
     paths = list(files or ())
     for pair in read_pair_list(listed) if listed else ():
@@ -230,6 +234,8 @@ def _form(**asked: bool) -> str:
 
 def _settings(like: str | None, asked: dict[str, Any]) -> ScoreSettings:
     """The preset's settings, or our own, with what was asked for. Errors name the option that is wrong."""
+    from vobench.runner.score_settings import settings_like
+
     try:
         return settings_like(like, **asked)
     except SettingError as error:
@@ -246,7 +252,7 @@ def _ns(option: str, value_s: float | None, setting: str) -> int | None:
     return round(value_s * 1e9)
 
 
-def _show_score(found: ScoredFiles, *, form: str, per_length: bool) -> None:
+def _show_score(found: "ScoredFiles", *, form: str, per_length: bool) -> None:
     """Print every metric with its identity."""
     content = found.as_dict()
     if form == "json":
@@ -263,7 +269,7 @@ def _show_score(found: ScoredFiles, *, form: str, per_length: bool) -> None:
         _print_table(found, per_length=per_length)
 
 
-def _print_table(found: ScoredFiles, *, per_length: bool) -> None:
+def _print_table(found: "ScoredFiles", *, per_length: bool) -> None:
     content = found.as_dict()
     console = terminal.console()
     for headings, rows in score_table.tables(content, per_length=per_length):
