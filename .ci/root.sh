@@ -63,7 +63,8 @@ configure_root() {
 in_root() {
   local root=$1 folder=$2 command=$3 variables
   local network='^(PIP|UV)_[A-Z_]+=|^(https?|no|all)_proxy=|^SSL_CERT_|_CA_BUNDLE=|^GIT_SSL_CAINFO='
-  mapfile -t variables < <(env | grep -iE "$network" | grep -vE '^(PIP|UV)_CACHE_DIR=' || true)
+  local useless='^(PIP|UV)_(CACHE_DIR=|FIND_LINKS=(/|file:))'  # folders that no root has
+  mapfile -t variables < <(env | grep -iE "$network" | grep -vE "$useless" || true)
   unshare --mount --propagation private bash -euc '
     root=$1 downloads=$2
     shift 2

@@ -267,7 +267,18 @@ def _at(key: int | str, value: Any, hint: Any) -> Any:
         raise SettingError(error.sentence, key, *error.keys) from None
 
 
+def _unaliased(hint: Any) -> Any:
+    """The type that an alias made by a `type` statement stands for, such as NDArray from NumPy 2.5 on."""
+    alias = get_origin(hint) or hint
+    meant = getattr(alias, "__value__", None)
+    if meant is None:
+        return hint
+    args = get_args(hint)
+    return _unaliased(meant[args] if args else meant)
+
+
 def _held(value: Any, hint: Any) -> Any:
+    hint = _unaliased(hint)
     origin, args = get_origin(hint), get_args(hint)
     if origin is Annotated:
         for mark in args[1:]:
@@ -321,6 +332,7 @@ def _held_plain(value: Any, kind: Any) -> Any:
 
 
 def _is_type(value: Any, hint: Any) -> bool:
+    hint = _unaliased(hint)
     kind = get_origin(hint) or hint
     if kind is Annotated:
         return _is_type(value, get_args(hint)[0])

@@ -24,7 +24,8 @@ from vobench.sensor.pixel_truth import CHANNELS
 from vobench.setting import Name, OneOf, Short, hints, settings
 from vobench.suite import catalog, scene_file, yaml_file
 from vobench.suite.axis import Camera, RigSettings
-from vobench.suite.catalog import Entry, Kind
+from vobench.suite.catalog import Entry
+from vobench.suite.file_kind import Kind
 from vobench.suite.manifest import read_manifest
 from vobench.suite.scenario import MOST_SEVERE, Scenario, read_scenario
 from vobench.suite.scene_file import Lighting
@@ -297,7 +298,7 @@ def read_plan(
 
     Raises SuiteError or UnknownNameError.
     """
-    reading = yaml_file.read_all(catalog.find("suite", name).path, Suite, changes)
+    reading = yaml_file.read_all(catalog.find("suite", name).path, Suite, changes, kind="suite")
     wrong = Mistakes(reading.source, list(reading.mistakes))
     meant = {key for said in reading.source.plain for key in get_close_matches(str(said), hints(Suite), n=1)}
     with wrong.at():
