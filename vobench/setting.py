@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import cache
-from math import isfinite
+from math import isclose, isfinite
 from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, dataclass_transform, get_args, get_origin, get_type_hints
@@ -67,6 +67,15 @@ def unit_of(name: str) -> str:
     """The unit that a setting's name ends in; empty where it has none."""
     parts = name.split("_")
     return next((UNITS[end] for end in ("_".join(parts[n:]) for n in range(1, len(parts))) if end in UNITS), "")
+
+
+WHOLE_WITHIN = 1e-9  # relative: far more than rounding does, far less than anybody writes
+
+
+def nearest_whole(value: float) -> int | None:
+    """The whole number that a value is but for rounding, as 0.35 × 720 is 252; None where it is none."""
+    nearest = round(value)
+    return nearest if isclose(value, nearest, rel_tol=WHOLE_WITHIN) else None
 
 
 def tupled(value: Any) -> Any:

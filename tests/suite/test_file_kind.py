@@ -136,3 +136,15 @@ def test_a_folder_where_a_scene_belongs_says_what_is_in_it(here: Path) -> None:
 def test_a_name_comes_before_a_folder_that_is_called_so(here: Path) -> None:
     (here / "quickstart").mkdir()
     assert catalog.find("suite", "quickstart").origin == "built in"
+
+
+def test_a_folder_that_is_an_estimator_or_a_scene_is_one_by_its_path_alone(here: Path, monkeypatch) -> None:
+    monkeypatch.chdir(here / "my")
+    with pytest.raises(UnknownNameError, match=r"^no estimator named 'vo'; for the folder write \./vo$"):
+        catalog.find("estimator", "vo")
+    assert catalog.find("estimator", "./vo").path == here / "my/vo"
+    (here / "my/barn").mkdir()
+    (here / "my/barn/scene.yaml").write_text(SCENE)
+    with pytest.raises(UnknownNameError, match=r"^no scene named 'barn'; for the folder write \./barn$"):
+        catalog.find("scene", "barn")
+    assert catalog.find("scene", "./barn").path == here / "my/barn/scene.yaml"

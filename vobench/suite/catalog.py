@@ -32,6 +32,7 @@ WHAT_IT_IS: dict[Kind, str] = {
     "scene": "a scene is a YAML file, a folder with a scene.yaml, or a model",
     "estimator": "an estimator is a folder with an estimator.yaml",
 }
+NO_NAMES = ("", ".", "..")
 NO_SCENE = re.compile(rb"^(estimators|severity|include)\s*:", re.MULTILINE)
 
 
@@ -74,7 +75,7 @@ def find(kind: Kind, name: str, *, suite: Path | None = None) -> Entry:
         return _at(kind, path, suite)
     for entry in _all(kind, suite, name=name):
         return entry
-    if name and path.is_dir():
+    if name not in NO_NAMES and path.is_dir():
         raise UnknownNameError(_about_folder(kind, path))
     raise UnknownNameError(unknown(kind, name, _names(kind, suite)))
 
@@ -85,7 +86,11 @@ def examples() -> list[Entry]:
 
 
 def _about_folder(kind: Kind, folder: Path) -> str:
-    """What to say of a folder that is no such thing: what one is, and which are in it."""
+    """What to say of a folder where a name or a file is wanted: how to write its path, or what is in it."""
+    if kind == "estimator" and (folder / "estimator.yaml").is_file():
+        return f"no estimator named '{folder}'; for the folder write ./{folder}"
+    if kind == "scene" and (folder / "scene.yaml").is_file():
+        return f"no scene named '{folder}'; for the folder write ./{folder}"
     inside = [entry for entry in _in_folder(kind, folder, "", None) if _is_of_kind(kind, entry.path)]
     paths = ", ".join(shown(entry.path) for entry in inside)
     found = f"in it are {paths}" if inside else f"in it is no {kind}"
@@ -141,7 +146,7 @@ def _installed(kind: Kind) -> Iterator[Entry]:
 
 
 def _in_folder(kind: Kind, folder: Path, origin: str, name: str | None) -> Iterator[Entry]:
-    if name in ("", ".", ".."):
+    if name in NO_NAMES:
         return
     named = "*" if name is None else escape(name)
     for form in FORMS[kind]:

@@ -21,7 +21,7 @@ from vobench.scene.light import Light
 from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import CameraSettings
 from vobench.sensor.pixel_truth import CHANNELS
-from vobench.setting import Name, OneOf, Short, hints, settings
+from vobench.setting import Name, OneOf, Short, hints, nearest_whole, settings
 from vobench.suite import catalog, scene_file, yaml_file
 from vobench.suite.axis import Camera, RigSettings
 from vobench.suite.catalog import Entry
@@ -385,7 +385,7 @@ class _Planner:
         limits = manifest.limits
         for key, value in spec.limits.items():
             with self.wrong.at("estimators", index or 0, "limits"):
-                changed: Any = int(value) if isinstance(getattr(limits, key), int) else value
+                changed: Any = _whole(value) if isinstance(getattr(limits, key), int) else value
                 limits = replace(limits, **{key: changed})
         return Entrant(spec.label or manifest.name, folder, manifest, {**manifest.params, **spec.params}, limits)
 
@@ -561,6 +561,14 @@ def _combinations(axes: Axes) -> Iterator[tuple[str, dict[str, str]]]:
         differing = [name for name, axis in zip(names, axes, strict=True) if len(axis) > 1]
         variant = dict(zip(AXES, names, strict=True))
         yield "-".join(differing) or variant["trajectory"], variant
+
+
+def _whole(value: float) -> int:
+    """A limit that counts something. Raises SuiteError for a fraction."""
+    whole = nearest_whole(value)
+    if whole is None:
+        raise SuiteError(f"should be a whole number (got {value:g})")
+    return whole
 
 
 def _check_param(key: str, value: Any, defaults: dict[str, Any]) -> None:
