@@ -1,6 +1,7 @@
 """vobench: simulate, run and score visual odometry, and explain where it breaks.
 
-What a notebook needs is here and imported when it is first asked for; docs/python.md shows all of it.
+Everything that the command line does can be done from Python; docs/python.md shows it. Each name is imported when it
+is first used.
 """
 
 from importlib import import_module
@@ -8,38 +9,70 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from vobench.metric.settings import LIKE, ScoreSettings
-    from vobench.notebook import diagnose, read_board, read_sequence, read_trajectory, score
+    from vobench.notebook.class_source import write_estimator
+    from vobench.notebook.runs import Check, Run, bundle, check, compare, read_board, read_run, run
+    from vobench.notebook.simulation import Simulation, read_sequence, simulate
+    from vobench.notebook.trajectories import diagnose, read_trajectory, score
     from vobench.sequence import Sequence
     from vobench.trajectory.trajectory import Trajectory
 
 __version__ = "0.1.0"
+
+# Where each public name is defined.
+_HOMES = {
+    "LIKE": "vobench.metric.settings",
+    "ScoreSettings": "vobench.metric.settings",
+    "Sequence": "vobench.sequence",
+    "Trajectory": "vobench.trajectory.trajectory",
+    "Check": "vobench.notebook.runs",
+    "Run": "vobench.notebook.runs",
+    "bundle": "vobench.notebook.runs",
+    "check": "vobench.notebook.runs",
+    "compare": "vobench.notebook.runs",
+    "read_board": "vobench.notebook.runs",
+    "read_run": "vobench.notebook.runs",
+    "run": "vobench.notebook.runs",
+    "Simulation": "vobench.notebook.simulation",
+    "read_sequence": "vobench.notebook.simulation",
+    "simulate": "vobench.notebook.simulation",
+    "diagnose": "vobench.notebook.trajectories",
+    "read_trajectory": "vobench.notebook.trajectories",
+    "score": "vobench.notebook.trajectories",
+    "write_estimator": "vobench.notebook.class_source",
+}
 __all__ = [
     "LIKE",
+    "Check",
+    "Run",
     "ScoreSettings",
     "Sequence",
+    "Simulation",
     "Trajectory",
     "__version__",
+    "bundle",
+    "check",
+    "compare",
     "diagnose",
     "read_board",
+    "read_run",
     "read_sequence",
     "read_trajectory",
+    "run",
     "score",
+    "simulate",
+    "write_estimator",
 ]
 
-if not TYPE_CHECKING:  # else every misspelt name would pass for one of ours
-    _HOMES = {
-        "LIKE": "metric.settings",
-        "ScoreSettings": "metric.settings",
-        "Sequence": "sequence",
-        "Trajectory": "trajectory.trajectory",
-    }
+if not TYPE_CHECKING:  # otherwise a type checker would take every misspelt name for one of these
 
     def __getattr__(name):
-        """A name of `__all__`, imported now."""
-        if name not in __all__:
+        """Import a public name now."""
+        if name not in _HOMES:
             raise AttributeError(f"module 'vobench' has no attribute {name!r}")
-        return getattr(import_module(f"vobench.{_HOMES.get(name, 'notebook')}"), name)
+        value = getattr(import_module(_HOMES[name]), name)
+        globals()[name] = value
+        return value
 
     def __dir__():
-        """What there is to complete, imported or not."""
-        return sorted({*globals(), *__all__})
+        """The public names, imported or not."""
+        return sorted(__all__)

@@ -56,6 +56,10 @@ class VobenchError(Exception):
         """What is wrong, one by one."""
         return (Mistake(str(self)),)
 
+    def _render_traceback_(self) -> list[str]:
+        """What Jupyter shows in place of a traceback."""
+        return [f"{type(self).__name__}: {line}" for line in printable(str(self)).splitlines()]
+
 
 class InputError(VobenchError):
     """A file does not say what it should."""

@@ -133,7 +133,7 @@ WRONG = [
     (("check", "./no.yaml"), "no suite file at no.yaml. Known by name: daily, full, hand, paper, quickstart, regression, sensors, street, tiny"),
     (("run", "tiny", "-e", "stand_stil"), "no estimator named 'stand_stil'. Did you mean 'stand_still'? Known: constant_velocity, feature_vo, imu_dead_reckoning, "
      "imu_visual, lk_epipolar, mono_vo, noisy_truth, planar_floor, stand_still, stereo_pnp, wheel_odometry, wheel_visual"),
-    (("run", "tiny", "--out", "suites/tiny.yaml"), "--out should be a folder that can be written (File exists): suites/tiny.yaml"),
+    (("run", "tiny", "--out", "suites/tiny.yaml"), "out should be a folder that can be written (File exists): suites/tiny.yaml"),
     (("list", "scene_s"), "no kind named 'scene_s'. Did you mean 'scenes'? Known: estimators, scenarios, scenes, suites"),
     (("score", "no.tum", "no.tum"), "cannot read no.tum: No such file or directory"),
     (("score", "suites/tiny.yaml", "no.tum"), "suites/tiny.yaml:1: no form of trajectory has 2 columns: TUM has 8 (t x y z qx qy qz qw), KITTI 12, or 13 with a frame number first, TartanAir 7, EuRoC 8 and commas"),

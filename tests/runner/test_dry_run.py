@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import pytest
-from tests.run.conftest import Bench
 
+from tests.runner.conftest import Bench
 from vobench.runner import dry_run
 from vobench.runner.dry_run import ToDo, to_do
 from vobench.runner.folder import RunFolder

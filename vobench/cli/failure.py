@@ -15,7 +15,6 @@ from vobench.analysis.explain import Change, Explanation, Outcome, explain, loss
 from vobench.analysis.nuisance import NUISANCES, nuisances_of
 from vobench.analysis.shrink import FEWEST_FRAMES, Failure, Shrunk, shrink
 from vobench.cli import terminal
-from vobench.cli.run import run_plan
 from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.runner.estimate import ESTIMATE, FINISHED
 from vobench.runner.estimate import Outcome as Ended
@@ -34,6 +33,7 @@ from vobench.runner.folder import (
 )
 from vobench.runner.frames import GROUND_TRUTH, read_frames
 from vobench.runner.key import folder_digest
+from vobench.runner.launch import run_plan
 from vobench.runner.motion import body_motion, body_motions
 from vobench.runner.score import score_estimate, status_of
 from vobench.suite import catalog
@@ -142,7 +142,7 @@ def run_cases(tried: Tried, cases: Mapping[str, Case], *, name: str, out: Path, 
     with wrong.at():
         body_motions(plan)
     wrong.require_none()
-    return run_plan(plan, {}, out=out, jobs=jobs, finish=lambda *_: None)
+    return run_plan(plan, recordings={}, out=out, jobs=jobs, finish=lambda *_: None, display=terminal.TerminalDisplay())
 
 
 def outcome(folder: RunFolder, score: TrialScore) -> Outcome:

@@ -12,12 +12,12 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from vobench.cli import terminal
-from vobench.errors import InputError, UnknownNameError, printable
+from vobench.errors import UnknownNameError, printable
 from vobench.report import compare, page
 from vobench.report.board_table import DEFAULT_METRIC, FORMATS, LEGEND, cell_notes, matrix, remarks, totals
 from vobench.report.leaderboard import METRICS, Board
 from vobench.report.verify import verify_run
-from vobench.runner.bundle import bundle, merged, opened, scored_again
+from vobench.runner.bundle import bundle, merged, opened, require_zip, scored_again
 from vobench.runner.folder import TrialScore, open_run
 
 # A narrow terminal goes without these, in this order; every report has them all.
@@ -131,8 +131,7 @@ def bundle_command(
     json: terminal.Json = False,
 ) -> None:
     """Pack a run's suite, versions, truth, estimates, scores and hashes, for others to score again and to merge."""
-    if out.suffix.lower() != ".zip":
-        raise InputError(f"a bundle's name should end in .zip, got {out.name!r}")
+    require_zip(out)
     files, size = bundle(open_run(run), out), out.stat().st_size
     if json:
         terminal.print_json({"path": str(out), "files": files, "bytes": size})

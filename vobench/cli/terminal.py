@@ -3,7 +3,7 @@
 import json as json_module
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar
 import typer
 
 from vobench.errors import UnknownNameError, printable, unknown
+from vobench.runner.progress import RunProgress
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from vobench.runner.executor import Event
+    from vobench.runner.task import Task
     from vobench.suite.catalog import Entry
 
 Item = TypeVar("Item")
@@ -122,51 +124,74 @@ class Bars:
         return Progress(*columns, console=self._console, transient=True, disable=not self._console.is_terminal)
 
 
-class Work:
-    """What a run's tasks do: on a terminal a line for each slot, else a line for each task; and a log of events."""
+class TerminalDisplay:
+    """A run on standard error, and a log of its events.
 
-    def __init__(self, events: Path | None, *, is_serial: bool) -> None:
+    On a terminal: one bar with the share that is done and the time left, and a line for each running task. Elsewhere,
+    or with `is_verbose`, a line for each finished task. With `is_quiet`, failures alone.
+    """
+
+    def __init__(
+        self, events: Path | None = None, *, is_serial: bool = False, is_quiet: bool = False, is_verbose: bool = False
+    ) -> None:
         from rich.console import Console
-        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
         console = Console(stderr=True, markup=False)
-        self._draws, self._is_serial, self._events = console.is_terminal and not is_serial, is_serial, events
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+        # One job draws bars of its own, within each task.
+        self._draws = console.is_terminal and not is_serial and not is_quiet
+        self._says_finished = is_verbose or not (self._draws or is_serial or is_quiet)
+        self._is_quiet = is_quiet
+        self._log = None if events is None else events.open("w", encoding="utf-8")
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=BAR_WIDTH),
+            TextColumn("{task.fields[told]}"),
+            TimeElapsedColumn(),
+        )
         self._bars = Progress(*columns, console=console, transient=True, disable=not self._draws)
-        self._lines, self._log = dict[str, Any](), None if events is None else events.open("w", encoding="utf-8")
+        self._lines: dict[str, Any] = {}
+        self._overall: Any = None
+        self._progress = RunProgress()
+        self._began_s = time.monotonic()
+
+    def begin(self, tasks: "Sequence[Task]", seconds: "Mapping[str, float]") -> None:
+        """Take the tasks that are to be performed, and what a task of each stage takes."""
+        self._progress = RunProgress(tasks, seconds)
+        self._began_s = time.monotonic()
+        if tasks:
+            self._overall = self._bars.add_task("all", total=1.0, told=self._progress.describe(0.0))
 
     def hear(self, event: "Event") -> None:
         """Draw and log one event."""
-        name = f"{event.task.stage} {event.task.name}"
         if self._log:
-            said = {
-                "t_s": round(time.time(), 3),
-                "event": event.what,
-                "stage": event.task.stage,
-                "task": event.task.name,
-            }
-            said |= {
-                "key": event.task.key,
-                "slot": event.slot,
-                "wall_s": round(event.wall_s, 3),
-                "reason": event.reason,
-            }
-            print(json_module.dumps(said, ensure_ascii=False), file=self._log, flush=True)
+            print(json_module.dumps(_logged(event), ensure_ascii=False), file=self._log, flush=True)
+        self._progress.count(event)
+        if self._overall is not None:
+            told = self._progress.describe(time.monotonic() - self._began_s)
+            self._bars.update(self._overall, completed=self._progress.share, told=told)
         for sentence in event.told:
             self.say(sentence)
+
+        name = f"{event.task.stage} {event.task.name}"
         if event.what == "started":
             if self._draws:
-                self._lines[event.task.key] = self._bars.add_task(name)
+                self._lines[event.task.key] = self._bars.add_task(name, total=None, told="")
             return
-        if self._draws:
+        if event.what in ("done", "failed") and event.task.key in self._lines:
             self._bars.remove_task(self._lines.pop(event.task.key))
-        if event.what == "failed" or not (self._draws or self._is_serial):
-            ended = f"failed: {event.reason}" if event.what == "failed" else f"{event.wall_s:.1f} s"
-            self._bars.console.print(f"{name}: {ended}", highlight=False, soft_wrap=True)
+        if event.what == "failed":
+            self._print(f"{name}: failed: {event.reason}")
+        elif event.what == "done" and self._says_finished:
+            position = f"[{self._progress.finished}/{self._progress.planned}] " if self._progress.planned else ""
+            self._print(f"{position}{name}: {event.wall_s:.1f} s")
 
     def say(self, sentence: str) -> None:
         """A line of its own, above all others."""
-        self._bars.console.print(f"vobench: {sentence}", highlight=False, soft_wrap=True)
+        self._print(f"vobench: {sentence}")
+
+    def _print(self, line: str) -> None:
+        self._bars.console.print(printable(line), highlight=False, soft_wrap=True)
 
     def __enter__(self) -> Self:
         self._bars.start()
@@ -176,3 +201,20 @@ class Work:
         self._bars.stop()
         if self._log:
             self._log.close()
+
+
+BAR_WIDTH = 24
+
+
+def _logged(event: "Event") -> dict[str, Any]:
+    """An event as a line of the log has it."""
+    return {
+        "t_s": round(time.time(), 3),
+        "event": event.what,
+        "stage": event.task.stage,
+        "task": event.task.name,
+        "key": event.task.key,
+        "slot": event.slot,
+        "wall_s": round(event.wall_s, 3),
+        "reason": event.reason,
+    }

@@ -23,7 +23,6 @@ from vobench.analysis.twin import (
 )
 from vobench.cli import terminal
 from vobench.cli.realism import facts_of, recording_at, rows_of
-from vobench.cli.run import run_plan
 from vobench.cli.sequence import Calibration, Form, FormCommand, Rate, TopicOf, Truth, topics_of
 from vobench.dataset.layout import read
 from vobench.dataset.picture import require_free
@@ -35,6 +34,7 @@ from vobench.geometry.se3 import Array, inverse
 from vobench.runner.folder import SEQUENCE, RunFolder, TrialScore, read_tum
 from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.key import cache_folder
+from vobench.runner.launch import run_plan
 from vobench.runner.motion import body_motion
 from vobench.runner.task import bake_task, perform
 from vobench.suite import catalog
@@ -216,7 +216,14 @@ def _run(file: Path, out: Path, jobs: int) -> RunFolder:
     from vobench.runner.import_recording import read_all
 
     planned = read_plan(str(file))
-    return run_plan(planned, read_all(planned), out=out / "runs", jobs=jobs, finish=page.write_reports)
+    return run_plan(
+        planned,
+        recordings=read_all(planned),
+        out=out / "runs",
+        jobs=jobs,
+        finish=page.write_reports,
+        display=terminal.TerminalDisplay(),
+    )
 
 
 def _errors(folder: RunFolder, case: str) -> dict[str, Array]:

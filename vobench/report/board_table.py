@@ -213,9 +213,14 @@ def _row(cell: Cell) -> dict[str, Any]:
     }
 
 
+def cell_rows(made: Board) -> list[dict[str, Any]]:
+    """One flat row for each cell."""
+    return [_row(cell) for cell in made.cells]
+
+
 def rows(made: Board) -> list[dict[str, Any]]:
     """One flat row for each cell, then one for each total, whose case is `all`."""
-    found = [_row(cell) for cell in made.cells]
+    found = cell_rows(made)
     for total in made.totals:
         stated = {**asdict(total), "case": "all", "ate": total.ate_percent}
         for name, ends in (("places", total.places), ("ratio", total.ratio_interval or (None, None))):

@@ -61,6 +61,12 @@ def bundle(folder: RunFolder, out: Path) -> int:
     return len(files)
 
 
+def require_zip(out: Path) -> None:
+    """Raise InputError where a bundle's file has another ending."""
+    if out.suffix.lower() != ".zip":
+        raise InputError(f"a bundle's name should end in .zip, got {out.name!r}")
+
+
 @contextmanager
 def opened(path: Path) -> Iterator[RunFolder]:
     """The run of a folder or a bundle, which is unpacked for so long. Raises InputError where it is neither."""

@@ -7,11 +7,13 @@ what runs when. A task that fails takes those that need it with it, and nobody e
 import errno
 import os
 import signal
+import sys
 import threading
 import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -176,7 +178,8 @@ class LocalProcesses:
             kept.leave()
         ours, theirs = self._context.Pipe()
         process = self._context.Process(target=_work, args=(theirs, cores), daemon=False)
-        process.start()
+        with _main_module_hidden():
+            process.start()
         theirs.close()
         self._running.add(process)
         return _Worker(process, ours, cores, _takes_up(task))
@@ -192,6 +195,29 @@ class LocalProcesses:
             until = time.monotonic() + GRACE_S
             while self._running and time.monotonic() < until:
                 time.sleep(0.01)
+
+
+_HIDING = threading.Lock()
+
+
+@contextmanager
+def _main_module_hidden() -> Iterator[None]:
+    """Keep multiprocessing from importing the user's program in a worker that is started in this block.
+
+    Workers need nothing of it. A program that calls `vobench.run` without asking for its `__name__` would otherwise
+    run itself again in each of them.
+    """
+    main = sys.modules["__main__"]
+    with _HIDING:
+        file = main.__dict__.pop("__file__", None)
+        spec = main.__spec__
+        main.__spec__ = None
+        try:
+            yield
+        finally:
+            main.__spec__ = spec
+            if file is not None:
+                main.__file__ = file
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 import platform
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -58,14 +58,16 @@ def run_suite(
     executor: Executor,
     shares_time: bool = False,
     is_fresh: bool = False,
+    begin: Callable[[Sequence[Task]], object] = lambda _: None,
     heard: Callable[[Event], object] = lambda _: None,
     tell: Tell = lambda _: None,
 ) -> RunFolder:
     """Run every case, estimator and repeat; what the store holds already is not made again.
 
     `finish` adds reports to the folder before it gets its final name under `root`. A cell whose task fails has a row
-    that says why. `is_fresh` makes all of it anew. `executor`, `shares_time` (which the suite may ask for itself)
-    and `heard` are those of `perform_all`; `tell` is given sentences on the store, say of a result that was damaged.
+    that says why. `is_fresh` makes all of it anew. `begin` is given the tasks that are to be performed. `executor`,
+    `shares_time` (which the suite may ask for itself) and `heard` are those of `perform_all`; `tell` is given
+    sentences on the store, say of a result that was damaged.
     """
     tasks = plan(suite, recordings)
     kept = Store(store)
@@ -78,6 +80,7 @@ def run_suite(
             kept.require_writable()
             kept.set_aside_damaged((task.key for task in to_make), tell)
         shares_time = shares_time or suite.suite.share_time
+        begin(to_make)
         failures = perform_all(to_make, store, executor, shares_time=shares_time, heard=heard)
         cases = {case.name: case for case in suite.cases}
         stated = plain(suite.suite)

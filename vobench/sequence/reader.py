@@ -77,6 +77,16 @@ class Sequence:
     def __len__(self) -> int:
         return self.frame_count
 
+    def __getitem__(self, index: int) -> StereoFrame:
+        """One frame by its number, from the end where it is negative. Raises IndexError where there is none."""
+        if not -self.frame_count <= index < self.frame_count:
+            raise IndexError(f"frame {index} of a sequence with {self.frame_count} frames")
+        return self.frame(index % self.frame_count)
+
+    def __iter__(self) -> Iterator[StereoFrame]:
+        """The frames in order, one at a time in memory."""
+        return self.frames()
+
     def __repr__(self) -> str:
         path, cameras = str(self.path), " and ".join(self.rig.sides)
         shown = path if len(path) <= LONGEST_PATH else f"…{path[-LONGEST_PATH:]}"

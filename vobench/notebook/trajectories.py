@@ -1,9 +1,8 @@
-"""What a notebook calls: trajectories of any form, their scores and diagnoses, sequences, leaderboards."""
+"""Trajectories of any form, their scores, and what is wrong between two of them."""
 
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from vobench.analysis import diagnose as diagnosis
 from vobench.analysis.diagnose import Finding
@@ -14,11 +13,6 @@ from vobench.metric.settings import ScoreSettings
 from vobench.runner.trajectory_pair import TrajectoryPair, TrajectorySource, read_one, read_pair
 from vobench.trajectory.formats import Reading
 from vobench.trajectory.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from vobench.sequence import Sequence
 
 Given = Trajectory | Path | str
 
@@ -53,25 +47,6 @@ def diagnose(gt: Given, est: Given, *, times: Path | str | None = None) -> tuple
     """
     pair = _pair(gt, est, times, any_unit=True)
     return diagnosis.diagnose(pair.gt, pair.est)
-
-
-def read_sequence(folder: Path | str) -> "Sequence":
-    """The pictures and readings of a sequence, read when they are asked for. Raises SequenceError."""
-    from vobench.sequence import Sequence
-
-    return Sequence.open(Path(folder))
-
-
-def read_board(run: Path | str) -> "pd.DataFrame":
-    """The leaderboard of a run's folder, or of the latest of runs/<suite>: a row per cell, then one per total.
-
-    Raises InputError where the folder is none of a run.
-    """
-    from vobench.report import board_table, page
-    from vobench.runner.folder import open_run
-
-    folder = open_run(Path(run))
-    return board_table.data_frame(page.board_of(folder, folder.scores()))
 
 
 def _pair(gt: Given, est: Given, times: Path | str | None, *, any_unit: bool = False) -> TrajectoryPair:

@@ -1,0 +1,85 @@
+"""Sequences from Python: simulate a case, and open what was recorded."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vobench.errors import InputError, UnknownNameError, unknown
+from vobench.notebook.display import choose_display
+from vobench.notebook.runs import plan
+from vobench.notebook.trajectories import read_trajectory
+from vobench.runner.launch import perform_tasks
+from vobench.runner.task import sequence_tasks
+from vobench.suite.source import RecordedCase
+from vobench.suite.suite import Case
+
+if TYPE_CHECKING:
+    from vobench.dataset.recording import Recording
+    from vobench.sequence import Sequence
+    from vobench.trajectory.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class Simulation:
+    """A simulated or imported case: the folder with its two MCAP files, what an estimator may see, and the truth."""
+
+    case: Case | RecordedCase
+    path: Path
+
+    @property
+    def sequence(self) -> "Sequence":
+        """The pictures and readings that an estimator may see."""
+        return read_sequence(self.path)
+
+    @property
+    def ground_truth(self) -> "Trajectory":
+        """The true path of the left camera."""
+        return read_trajectory(self.path)
+
+    def __repr__(self) -> str:
+        return f"Simulation({self.case.name}, {self.path})"
+
+
+def simulate(
+    case: Case | RecordedCase | str,
+    *,
+    name: str | None = None,
+    changes: Mapping[str, Any] | None = None,
+    quiet: bool = False,
+) -> Simulation:
+    """Simulate one case, or import it where it is a recording; one that is in the cache is not made again.
+
+    `case` is a case of a plan, as `check(suite).plan.cases` has them, or the name or path of a suite, of which `name`
+    is the case: the first one without it. `changes` are those of `run`. Raises SuiteError and UnknownNameError.
+    """
+    if isinstance(case, str):
+        planned = plan(case, changes=changes)
+        chosen = _case_of(planned.cases, name)
+    elif name or changes:
+        raise InputError("name and changes belong to a suite; a case of a plan has both already")
+    else:
+        chosen = case
+    recordings: dict[str, Recording] = {}
+    if isinstance(chosen, RecordedCase):
+        from vobench.runner.import_recording import read_case
+
+        recordings = {chosen.name: read_case(chosen)}
+    tasks = sequence_tasks(chosen, recordings)
+    folder = perform_tasks(tasks, display=choose_display(is_quiet=quiet))
+    return Simulation(chosen, folder)
+
+
+def read_sequence(folder: Path | str) -> "Sequence":
+    """The pictures and readings of a sequence, read when they are asked for. Raises SequenceError."""
+    from vobench.sequence import Sequence
+
+    return Sequence.open(Path(folder))
+
+
+def _case_of(cases: Collection[Case | RecordedCase], name: str | None) -> Case | RecordedCase:
+    by_name = {case.name: case for case in cases}
+    chosen = next(iter(by_name)) if name is None else name
+    if chosen not in by_name:
+        raise UnknownNameError(unknown("case", chosen, list(by_name)))
+    return by_name[chosen]

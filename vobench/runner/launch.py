@@ -1,0 +1,127 @@
+"""Run a plan on this machine, or on the workers of a Dask scheduler, from a command line or from Python."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING
+
+from vobench import stop
+from vobench.errors import InputError
+from vobench.runner.executor import Dask, Executor, LocalProcesses, Serial, perform_all
+from vobench.runner.key import cache_folder
+from vobench.runner.preflight import preflight
+from vobench.runner.progress import RunDisplay
+from vobench.runner.store import Progress, SilentProgress, Store, why_unwritable
+from vobench.runner.task import KINDS, Task, missing
+from vobench.suite.suite import Plan
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from vobench.dataset.recording import Recording
+    from vobench.runner.folder import RunFolder
+    from vobench.runner.run import Finish
+
+MOST_JOBS = 8
+
+
+def default_jobs() -> int:
+    """The number in $VOBENCH_JOBS, else one task a core that this process may use, and no more than 8."""
+    stated = os.environ.get("VOBENCH_JOBS", "")
+    if stated:
+        if not stated.isdecimal() or int(stated) < 1:
+            raise InputError(f"VOBENCH_JOBS should be a number of tasks from 1 on, got {stated!r}")
+        return int(stated)
+    return min(len(os.sched_getaffinity(0)), MOST_JOBS)
+
+
+def run_plan(
+    planned: Plan,
+    *,
+    out: Path,
+    finish: "Finish",
+    display: RunDisplay,
+    recordings: "Mapping[str, Recording] | None" = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    task_progress: Progress = SilentProgress(),  # noqa: B008 - no state
+    shares_time: bool = False,
+    is_fresh: bool = False,
+) -> "RunFolder":
+    """Perform all tasks of a plan that the cache does not hold, and gather the run's folder below `out`.
+
+    `recordings` are those of its recorded cases, read here where they are not given; `finish` writes the reports;
+    `jobs` is the number of tasks at once, `default_jobs()` without it; `scheduler` is the address of a Dask scheduler
+    whose workers perform the tasks instead; `task_progress` shows the progress within a task where `jobs` is 1.
+
+    Raises SuiteError where the plan is not valid, InputError where `out` cannot be written, and Stopped.
+    """
+    from vobench.runner.run import run_suite
+
+    if recordings is None:
+        recordings = preflight(planned, only_missing=not is_fresh).recordings
+    if cause := why_unwritable(out):
+        raise InputError(f"out should be a folder that can be written ({cause}): {out}")
+
+    store = cache_folder().resolve()
+
+    def begin(tasks: "Sequence[Task]") -> None:
+        display.begin(tasks, typical_seconds(store))
+
+    executor = make_executor(jobs, scheduler, task_progress)
+    with stop.undone(executor.close), display:
+        return run_suite(
+            planned,
+            recordings,
+            root=out,
+            store=store,
+            finish=finish,
+            executor=executor,
+            begin=begin,
+            heard=display.hear,
+            tell=display.say,
+            shares_time=shares_time,
+            is_fresh=is_fresh,
+        )
+
+
+def perform_tasks(tasks: "Sequence[Task]", *, display: RunDisplay, jobs: int | None = None) -> Path:
+    """Perform those of these tasks that the cache does not hold; the folder of the last one's result.
+
+    Raises InputError with the cause where one of them fails, and Stopped.
+    """
+    store = cache_folder().resolve()
+    kept = Store(store)
+    executor = make_executor(jobs, None, SilentProgress())
+    with stop.undone(executor.close), display, kept.in_use(display.say):
+        to_make = missing(tasks, store)
+        if to_make:
+            kept.require_writable()
+        display.begin(to_make, typical_seconds(store))
+        failures = perform_all(to_make, store, executor, heard=display.hear)
+    for task in tasks:
+        if task.key in failures:
+            raise InputError(f"{task.stage} {task.name} failed: {failures[task.key].reason}")
+    return store / tasks[-1].key
+
+
+def make_executor(jobs: int | None, scheduler: str | None, task_progress: Progress) -> Executor:
+    """The executor that was asked for: Dask's workers, this process for one job, else processes of this machine."""
+    if scheduler:
+        return Dask(scheduler)
+    count = jobs or default_jobs()
+    if count == 1:
+        return Serial(task_progress)
+    return LocalProcesses(count)
+
+
+def typical_seconds(store: Path) -> dict[str, float]:
+    """The median of the seconds that recent tasks of each stage took, for the stages that have been performed."""
+    noted = Store(store)
+    typical: dict[str, float] = {}
+    for stage in KINDS:
+        seconds = noted.seconds(stage)
+        if seconds:
+            typical[stage] = median(seconds)
+    return typical

@@ -1,0 +1,162 @@
+"""What is known of a plan before anything is made: what is wrong with it, its cases, and the work that is left."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from vobench.runner.key import cache_folder
+from vobench.runner.motion import BodyMotion, body_motions
+from vobench.runner.task import is_done, plan, sequence_tasks
+from vobench.suite.source import RecordedCase
+from vobench.suite.suite import Case, Plan
+
+if TYPE_CHECKING:
+    from vobench.dataset.recording import Recording
+    from vobench.runner.dry_run import ToDo
+
+IN_CACHE = "in the cache"
+TO_SIMULATE = "to simulate"
+NS_PER_S = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Preflight:
+    """The motion of each trajectory and the recording of each recorded case, by name."""
+
+    motions: Mapping[str, BodyMotion]
+    recordings: "Mapping[str, Recording]"
+
+
+@dataclass(frozen=True, slots=True)
+class CaseSummary:
+    """A case before it is made. `notes` is None for a simulated case, and lists the assumptions of an import."""
+
+    case: str
+    frames: int
+    duration_s: float
+    simulated: bool
+    sequence: str
+    notes: tuple[str, ...] | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """The fields that apply, as JSON has them."""
+        content = asdict(self)
+        notes = content.pop("notes")
+        return content if notes is None else {**content, "notes": list(notes)}
+
+
+@dataclass(frozen=True, slots=True)
+class PlanSummary:
+    """A valid plan: its cases, and stage by stage the work that is left where that was asked for."""
+
+    plan: Plan
+    cases: tuple[CaseSummary, ...]
+    stages: "tuple[ToDo, ...] | None" = None
+
+    @property
+    def trials(self) -> int:
+        """The number of trials."""
+        return sum(len(self.plan.trials(case)) for case in self.plan.cases)
+
+    def estimators(self) -> list[dict[str, Any]]:
+        """Each estimator with its version, the sensors that it needs, and its folder."""
+        return [
+            {
+                "estimator": entrant.label,
+                "version": entrant.manifest.version,
+                "needs": list(entrant.manifest.needs),
+                "path": str(entrant.folder),
+            }
+            for entrant in self.plan.entrants
+        ]
+
+    def found(self) -> list[dict[str, str]]:
+        """The scenes and estimators that the suite's names stand for."""
+        return [
+            {"kind": entry.kind, "name": entry.name, "origin": entry.origin, "path": str(entry.path)}
+            for entry in self.plan.found
+        ]
+
+    def tasks(self) -> list[dict[str, Any]]:
+        """Stage by stage: how many tasks there are, how many are to do and why, and an estimate of the seconds."""
+        return [
+            {**asdict(stage), IN_CACHE: stage.tasks - stage.to_do, "to do": stage.to_do} for stage in self.stages or ()
+        ]
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it, as JSON has it."""
+        content = {
+            "suite": self.plan.suite.name,
+            "cases": [case.as_dict() for case in self.cases],
+            "estimators": self.estimators(),
+            "trials": self.trials,
+            "found": self.found(),
+        }
+        if self.stages is not None:
+            content["tasks"] = self.tasks()
+        return content
+
+
+def preflight(planned: Plan, *, only_missing: bool = False) -> Preflight:
+    """Compute the motion of every simulated case, and read what every recorded case needs.
+
+    With `only_missing`, cases whose sequence is in the cache are taken to be valid. Raises SuiteError, which lists
+    all that is wrong.
+    """
+    wrong = planned.mistakes()
+    motions: dict[str, BodyMotion] = {}
+    recordings: dict[str, Recording] = {}
+    with wrong.at():
+        simulated = planned.simulated
+        if only_missing:
+            simulated = tuple(case for case in simulated if not is_in_cache(case, {}))
+        motions = body_motions(replace(planned, simulated=simulated))
+    with wrong.at():
+        if planned.recorded:
+            from vobench.runner.import_recording import read_all
+
+            recordings = read_all(planned)
+    wrong.require_none()
+    return Preflight(motions, recordings)
+
+
+def summarize(planned: Plan, *, with_stages: bool = False) -> PlanSummary:
+    """Validate a plan and say what it comes to; with_stages also counts the work that is left.
+
+    Raises SuiteError, which lists all that is wrong.
+    """
+    checked = preflight(planned)
+    cases = tuple(_case_summary(case, checked) for case in planned.cases)
+    if not with_stages:
+        return PlanSummary(planned, cases)
+
+    from vobench.runner.dry_run import to_do
+
+    stages = to_do(plan(planned, checked.recordings), cache_folder())
+    return PlanSummary(planned, cases, tuple(stages))
+
+
+def is_in_cache(case: Case | RecordedCase, recordings: "Mapping[str, Recording]") -> bool:
+    """Whether the sequence of a case has been made."""
+    return is_done(sequence_tasks(case, recordings)[-1], cache_folder())
+
+
+def _case_summary(case: Case | RecordedCase, checked: Preflight) -> CaseSummary:
+    is_made = is_in_cache(case, checked.recordings)
+    notes: tuple[str, ...] | None = None
+    if isinstance(case, RecordedCase):
+        recording = checked.recordings[case.name]
+        t_ns = recording.t_ns
+        to_make = f"to import from {case.source.path}"
+        notes = tuple(recording.notes)
+    else:
+        t_ns = checked.motions[case.variant["trajectory"]].t_ns
+        to_make = TO_SIMULATE
+    return CaseSummary(
+        case=case.name,
+        frames=len(t_ns),
+        duration_s=float(t_ns[-1] - t_ns[0]) / NS_PER_S,
+        simulated=is_made and not isinstance(case, RecordedCase),
+        sequence=IN_CACHE if is_made else to_make,
+        notes=notes,
+    )
