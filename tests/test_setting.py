@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 from math import inf, nan, nextafter
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 import pytest
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
+from numpy.typing import NDArray
 from pydantic import ValidationError
+from typing_extensions import TypeAliasType
 
 from vobench.errors import InputError, SettingError
 from vobench.setting import ByKind, Like, Matching, Name, OneOf, hints, settings, unit_of
@@ -184,3 +186,25 @@ def test_a_section_without_a_kind_is_of_the_default_one():
 )  # fmt: skip
 def test_a_name_says_its_unit(name, unit):
     assert unit_of(name) == unit
+
+
+Entry = TypeVar("Entry")
+Row = TypeAliasType("Row", tuple[Entry, ...], type_params=(Entry,))
+Height = TypeAliasType("Height", Annotated[float, Gt(0)])
+
+
+@settings()
+class Table:
+    """Fields whose annotations are aliases, as NDArray is one from NumPy 2.5 on."""
+
+    row: Row[int] = (1, 2)
+    height_m: Height | None = 1.0
+    places_m: NDArray[np.float64] | None = None
+
+
+def test_an_alias_holds_values_to_what_it_stands_for():
+    places_m = np.zeros((2, 3))
+    assert Table(row=(3,), height_m=2, places_m=places_m).places_m is places_m
+    for wrong, key in (({"row": (1, "a")}, "row.1"), ({"height_m": 0}, "height_m"), ({"places_m": 1}, "places_m")):
+        with pytest.raises(SettingError, match=rf"^{key}: should be"):
+            Table(**wrong)

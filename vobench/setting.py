@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import cache
-from math import isfinite
+from math import isclose, isfinite
 from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, dataclass_transform, get_args, get_origin, get_type_hints
@@ -67,6 +67,15 @@ def unit_of(name: str) -> str:
     """The unit that a setting's name ends in; empty where it has none."""
     parts = name.split("_")
     return next((UNITS[end] for end in ("_".join(parts[n:]) for n in range(1, len(parts))) if end in UNITS), "")
+
+
+WHOLE_WITHIN = 1e-9  # relative: far more than rounding does, far less than anybody writes
+
+
+def nearest_whole(value: float) -> int | None:
+    """The whole number that a value is but for rounding, as 0.35 × 720 is 252; None where it is none."""
+    nearest = round(value)
+    return nearest if isclose(value, nearest, rel_tol=WHOLE_WITHIN) else None
 
 
 def tupled(value: Any) -> Any:
@@ -267,7 +276,18 @@ def _at(key: int | str, value: Any, hint: Any) -> Any:
         raise SettingError(error.sentence, key, *error.keys) from None
 
 
+def _unaliased(hint: Any) -> Any:
+    """The type that an alias made by a `type` statement stands for, such as NDArray from NumPy 2.5 on."""
+    alias = get_origin(hint) or hint
+    meant = getattr(alias, "__value__", None)
+    if meant is None:
+        return hint
+    args = get_args(hint)
+    return _unaliased(meant[args] if args else meant)
+
+
 def _held(value: Any, hint: Any) -> Any:
+    hint = _unaliased(hint)
     origin, args = get_origin(hint), get_args(hint)
     if origin is Annotated:
         for mark in args[1:]:
@@ -321,6 +341,7 @@ def _held_plain(value: Any, kind: Any) -> Any:
 
 
 def _is_type(value: Any, hint: Any) -> bool:
+    hint = _unaliased(hint)
     kind = get_origin(hint) or hint
     if kind is Annotated:
         return _is_type(value, get_args(hint)[0])

@@ -1,5 +1,6 @@
 """vobench new and try: a scaffold that keeps the contract and scores as it is."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -51,7 +52,15 @@ def test_a_broken_one_ends_with_1_and_says_where(vobench, here):
             ("new", "estimator", "My-Own"),
             "a name should be lower-case letters, digits and _, a letter first (got 'My-Own')",
         ),
-        (("new", "suite", "mine"), "no kind of thing to make named 'suite'"),
+        (("new", "suit", "mine"), "no kind of thing to make named 'suit'. Did you mean 'suite'?"),
+        (("new", "suite", "My-Own"), "a name should be lower-case letters, digits and _, a letter first"),
+        (("new", "suite", "mine", "--command"), "--command is for an estimator, not for a suite"),
+        (("new", "estimator", "mine", "--from", "lk_epipolar"), "--from is for a suite or a scene"),
+        (
+            ("new", "suite", "mine", "--from", "lightning"),
+            "no suite or example named 'lightning'. Did you mean 'lighting'?",
+        ),
+        (("new", "scene", "mine", "--from", "rom"), "no scene named 'rom'. Did you mean 'room'?"),
         (("try", "stand_stil"), "no estimator named 'stand_stil'. Did you mean 'stand_still'?"),
     ],
 )
@@ -66,3 +75,35 @@ def test_what_is_there_is_not_written_over(vobench, here):
     again = vobench("new", "estimator", "mine")
     assert again.code == 1
     assert "there is one already; choose another name or take it away: estimators/mine" in again.err
+
+
+def test_a_new_suite_and_scene_are_checked_and_run_by_the_commands_that_new_prints(vobench, here):
+    made = vobench("new", "suite", "mine")
+    assert made.out == "Made suites/mine.yaml. Check it: vobench check mine\nRun it: vobench run mine\n"
+    assert "4 cases, 3 estimators, 12 trials: the suite is valid" in vobench("check", "mine").out
+
+    made = vobench("new", "scene", "lab")
+    printed = re.findall(r"vobench (scene|render) (\w+)", made.out)
+    assert printed == [("scene", "lab"), ("render", "lab")]
+    assert "light: lamp, 6000 lm" in vobench("scene", "lab").out
+    assert vobench("render", "lab").code == 0
+    assert Path("frame.png").is_file()
+
+    suite = Path("suites/mine.yaml")
+    suite.write_text(suite.read_text().replace("scenes: [room]", "scenes: [lab]").replace("lamp_b", "lamp"))
+    ran = vobench("run", "mine", "--set", "estimators=[stand_still]", "--json").json
+    assert {cell["status"] for cell in ran["cells"]} == {"ok"}
+    assert len(ran["cells"]) == 4
+
+
+def test_an_example_is_run_by_its_name_once_it_is_copied(vobench, here):
+    assert vobench("run", "lighting").code == 1
+    made = vobench("new", "suite", "lighting", "--from", "lighting", "--json").json
+    assert made == {"path": "suites/lighting.yaml", "files": ["lighting.yaml"]}
+    assert "6 cases, 2 estimators, 12 trials: the suite is valid" in vobench("check", "lighting").out
+
+
+def test_what_is_made_elsewhere_is_named_by_its_path(vobench, here):
+    made = vobench("new", "suite", "mine", "--out", "elsewhere")
+    assert "vobench check elsewhere/mine.yaml" in made.out
+    assert vobench("check", "elsewhere/mine.yaml").code == 0

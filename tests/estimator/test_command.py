@@ -36,13 +36,13 @@ int main(int argc, char** argv) {
   if (how == "exit") return 3;
   if (how == "segfault") *static_cast<volatile int*>(nullptr) = 1;
   if (how == "write nothing") return 0;
-  if (how == "sleep") std::this_thread::sleep_for(std::chrono::seconds(60));
+  if (how == "sleep") std::this_thread::sleep_for(std::chrono::seconds(600));
   if (how == "grow") {
     volatile char* held = new char[500 << 20];
     for (int i = 0; i < (500 << 20); i += 4096) held[i] = 1;
     sleep(30);
   }
-  if (how == "leave a child") { if (!fork()) sleep(60); }
+  if (how == "leave a child") { if (!fork()) sleep(600); }
   if (how == "let a child work") {
     const pid_t child = fork();
     if (!child) { const auto until = clock() + CLOCKS_PER_SEC * 4 / 10; while (clock() < until) {} _exit(0); }
@@ -134,7 +134,7 @@ def test_one_that_is_late_is_stopped_at_its_limit(tmp_path, folder):
     began = time.monotonic()
     with pytest.raises(EstimatorFailure, match=r"^timeout: the whole trial took more than 0\.5 s$"):
         run(folder, tmp_path, "sleep", limits=Limits(trial_s=0.5))
-    assert time.monotonic() - began < 10
+    assert time.monotonic() - began < 60
 
 
 def test_one_that_grows_is_stopped_at_its_limit(tmp_path, folder):

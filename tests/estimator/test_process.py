@@ -104,14 +104,14 @@ def test_a_failure_before_the_first_frame_is_a_failure_too(tmp_path, start, head
 def test_one_that_sleeps_is_stopped_at_its_limit(tmp_path):
     began = time.monotonic()
     limits = Limits(start_s=20, frame_s=0.3)
-    with running(tmp_path, "time.sleep(60)", limits=limits) as process, pytest.raises(EstimatorFailure) as failed:
+    with running(tmp_path, "time.sleep(600)", limits=limits) as process, pytest.raises(EstimatorFailure) as failed:
         process.process(frame())
     assert (failed.value.kind, failed.value.reason) == ("timeout", "no answer within 0.3 s")
-    assert time.monotonic() - began < 10
+    assert time.monotonic() - began < 60
 
 
 def test_one_that_starts_processes_takes_them_along_when_it_goes(tmp_path):
-    body = "pid = os.fork()\nif pid == 0:\n    time.sleep(60)\nprint(pid, flush=True)\nreturn Result(I)"
+    body = "pid = os.fork()\nif pid == 0:\n    time.sleep(600)\nprint(pid, flush=True)\nreturn Result(I)"
     with running(tmp_path, body) as process:
         process.process(frame())
         child = int((tmp_path / "log.txt").read_text().split()[-1])
@@ -119,7 +119,7 @@ def test_one_that_starts_processes_takes_them_along_when_it_goes(tmp_path):
     await_death(child)
 
 
-def await_death(pid, patience_s=5.0):
+def await_death(pid, patience_s=60.0):
     until = time.monotonic() + patience_s
     while is_alive(pid):
         assert time.monotonic() < until
@@ -198,7 +198,7 @@ with t.running(Path(sys.argv[1]), "print(os.getpid(), flush=True)\\nwhile True: 
     environment = os.environ | {"PYTHONPATH": search}
     log = tmp_path / "log.txt"
     with subprocess.Popen([sys.executable, "-c", script, str(tmp_path)], env=environment) as process:
-        until = time.monotonic() + 20
+        until = time.monotonic() + 120
         while not (log.exists() and log.read_text().strip()):
             assert time.monotonic() < until
             time.sleep(0.02)
@@ -215,7 +215,7 @@ if os.fork() == 0:
     if os.fork() == 0:
         open({file!r} + ".part", "w").write(str(os.getpid()))
         os.rename({file!r} + ".part", {file!r})
-        time.sleep(60)
+        time.sleep(600)
     os._exit(0)
 os.wait()
 while not os.path.exists({file!r}):  # else vobench may be killed, and this with it, before it has said its number

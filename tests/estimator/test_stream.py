@@ -81,16 +81,16 @@ def test_a_late_answer_is_a_timeout_and_leaves_nothing_behind(tmp_path):
     began = time.monotonic()
     with (
         pytest.raises(EstimatorFailure, match=r"^timeout: no answer within 0\.3 s$"),
-        running(tmp_path, FIRST + "time.sleep(60)", limits=Limits(frame_s=0.3)) as program,
+        running(tmp_path, FIRST + "time.sleep(600)", limits=Limits(frame_s=0.3)) as program,
     ):
         program.process(frame())
-    assert time.monotonic() - began < 10
+    assert time.monotonic() - began < 60
 
 
 def test_one_that_is_not_ready_in_time_is_a_timeout(tmp_path):
     with (
         pytest.raises(EstimatorFailure, match=r"^timeout: no answer within 0\.5 s$"),
-        running(tmp_path, "time.sleep(60)", limits=Limits(start_s=0.5)),
+        running(tmp_path, "time.sleep(600)", limits=Limits(start_s=0.5)),
     ):
         pass
 
@@ -183,7 +183,7 @@ def test_the_cpu_time_of_its_children_counts(tmp_path):
 
 
 def test_the_memory_of_its_children_counts(tmp_path):
-    grow = "import time; held = bytearray(b'1') * (300 << 20); time.sleep(30)"
+    grow = "import time; held = bytearray(b'1') * (300 << 20); time.sleep(600)"
     body = FIRST + f"import subprocess; subprocess.run([sys.executable, '-c', {grow!r}]); answer(index)"
     with (
         pytest.raises(EstimatorFailure, match=r"out_of_memory: its processes hold \d+ MiB, where the limit is 200 MiB"),

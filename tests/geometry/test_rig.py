@@ -178,6 +178,19 @@ def test_a_resized_picture_shows_the_same_in_other_pixels(rig: Rig) -> None:
         resized(rig.left, 0.3333)
 
 
+@pytest.mark.parametrize("percent", range(5, 105, 5))
+def test_a_scale_that_leaves_whole_pixels_is_not_refused_for_rounding(percent: int) -> None:
+    camera = Pinhole(1280, 720, 640.0, 640.0, 639.5, 359.5)
+    smaller = resized(camera, percent / 100)
+    assert (smaller.width_px, smaller.height_px) == (1280 * percent // 100, 720 * percent // 100)
+
+
+@pytest.mark.parametrize("scale", [0.3501, 0.35 + 1e-6, 1 / 1280])
+def test_a_scale_that_leaves_part_of_a_pixel_or_hardly_one_is_refused(scale: float) -> None:
+    with pytest.raises(VobenchError, match=r"should leave whole pixels"):
+        resized(Pinhole(1280, 720, 640.0, 640.0, 639.5, 359.5), scale)
+
+
 def test_an_error_that_has_nothing_to_act_on_is_refused() -> None:
     with pytest.raises(VobenchError, match=r"^distortion_ratio 0\.1 needs a lens with distortion, got Pinhole"):
         true_rig(RIGS["d435i"], CalibrationError(distortion_ratio=0.1))

@@ -122,7 +122,7 @@ def test_sequences_of_one_light_share_a_process_and_nothing_else_does(tmp_path, 
     lit, dark = PICTURES[:3], task("pictures of another light", needs=("another",))
     counts = []
     for one in (LIGHT, *lit, dark, lit[0]):
-        done = executor.submit(one, tmp_path, 0, 1).result(timeout=30)
+        done = executor.submit(one, tmp_path, 0, 1).result(timeout=600)
         assert done.failure  # there is no such key, and the process lives on
         counts.append(len(started))
     executor.close()

@@ -222,7 +222,7 @@ def contents_of(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def await_file(folder: Path, pattern: str, patience_s: float = 120.0) -> None:
+def await_file(folder: Path, pattern: str, patience_s: float = 600.0) -> None:
     until = time.monotonic() + patience_s
     while not list(folder.glob(pattern)):
         assert time.monotonic() < until, f"nothing like {pattern} in {patience_s} s"

@@ -121,6 +121,7 @@ def test_each_mode_has_an_entrant_of_its_own(bent):
     [
         ("{frame_s: 0}", "limits: frame_s: should be greater than 0 (got 0"),
         ("{memory_mib: 1}", "limits: memory_mib: should be 64 or more (got 1)"),
+        ("{memory_mib: 512.5}", "limits: should be a whole number (got 512.5)"),
         ("{frames: 1}", "no limit named 'frames'. Did you mean 'frame_s'?"),
     ],
 )

@@ -27,6 +27,7 @@ CLOSED_M = 1.0
 # Beyond these a model is likely in another unit, or damaged; most are about TYPICAL_M across.
 SMALLEST_M, PLACE_M, TYPICAL_M, LARGEST_M, FARTHEST_M = 0.05, 3.0, 5.0, 500.0, 1e7
 LYING = 2.0  # times as much area that looks along the other axis as up and down
+FLAT = 0.5  # a place is likely less high than this share of its length and of its width
 Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
@@ -91,10 +92,15 @@ def read_model(path: Path | str, *, scale: float = 1.0, roles: Mapping[str, str]
                 parts += map(_sound, file.parts(place, poses))
                 lights += file.light(place)
         notes += [f"{len(file.reduced)} of its pictures are reduced to fit into memory"] if file.reduced else []
-        return _model(parts, lights, (*notes, *file.notes), roles)
+        model = _model(parts, lights, roles)
+        # Who gave the axis has been asked already.
+        on_its_side = [] if up else _doubt_of_axis(model, path, axis)
+        said = [note for part in parts for note in (*part.look.notes, *part.notes)]
+        all_notes = [*notes, *file.notes, *said, *on_its_side, *_doubt_of_unit(model)]
+        return replace(model, notes=tuple(dict.fromkeys(all_notes)))
 
 
-def _model(parts: Sequence[Part], lights: Sequence[ModelLight], notes: Sequence[str], roles: Roles) -> Model:
+def _model(parts: Sequence[Part], lights: Sequence[ModelLight], roles: Roles) -> Model:
     """Things, materials and lights with names of their own, in their roles, movers apart from what stands."""
     solid = [part for part in parts if len(part.mesh.faces)]
     if not solid:
@@ -110,7 +116,7 @@ def _model(parts: Sequence[Part], lights: Sequence[ModelLight], notes: Sequence[
     if lamps and not bright.keys() & lamps:
         raise ModelError(f"{lamps[0]}: is a lamp without light; set its emissiveFactor and emissiveStrength (cd/m²)")
     own = _apart({nth: light.name for nth, light in enumerate(lights)})
-    model = Model(
+    return Model(
         things=tuple(thing for place, thing in things if role[place][1] is None),
         materials={name: look for (_, look), name in material.items()},
         lights=tuple(replace(light, name=own[nth]) for nth, light in enumerate(lights)),
@@ -118,8 +124,6 @@ def _model(parts: Sequence[Part], lights: Sequence[ModelLight], notes: Sequence[
         lamps=tuple(bright[place] for place in lamps if place in bright),
         dropped=sum(part.dropped for part in parts),
     )
-    said = [note for part in parts for note in (*part.look.notes, *part.notes)]
-    return replace(model, notes=tuple(dict.fromkeys([*notes, *said, *_doubts(model)])))
 
 
 def _movers(moving: Sequence[tuple[Place, int, Thing]]) -> tuple[Moving, ...]:
@@ -169,18 +173,36 @@ def _in_role(look: Look, role: str) -> tuple[str, Material]:
     return look.name, material
 
 
-def _doubts(model: Model) -> list[str]:
-    """Whether a model is likely of another unit, or a place that lies on its side, with its floor as a wall."""
+def _doubt_of_axis(model: Model, path: Path, axis: str) -> list[str]:
+    """Whether a model is likely a place that lies on its side, with its floor as a wall, as it is read with `axis` up.
+
+    Either most of its faces look along the other axis, or it is flat along that axis, as rooms are in height.
+    """
+    corners_m = np.concatenate([thing.mesh.corners_m for thing in model.everything])
+    width_m, depth_m, height_m = np.ptp(corners_m, axis=(0, 1))
+    _, along_m2, up_m2 = areas_m2(corners_m) @ np.abs(face_normals(corners_m))
+
+    is_place = max(width_m, depth_m, height_m) > PLACE_M
+    looks_sideways = along_m2 > LYING * up_m2
+    is_flat = depth_m < FLAT * min(width_m, height_m) and height_m > PLACE_M and LYING * along_m2 > up_m2
+    if not (is_place and (looks_sideways or is_flat)):
+        return []
+    other = "z" if axis == "y" else "y"
+    return [
+        f"stands on its side? It is read with {axis} up; if {other} is up, say so in a scene's YAML: "
+        f"meshes: [{{file: {path.name}, up: {other}}}]"
+    ]
+
+
+def _doubt_of_unit(model: Model) -> list[str]:
+    """Whether a model is likely of another unit than metres."""
     corners_m = np.concatenate([thing.mesh.corners_m for thing in model.everything])
     span = float(np.ptp(corners_m, axis=(0, 1)).max())
-    _, along_m2, up_m2 = areas_m2(corners_m) @ np.abs(face_normals(corners_m))
-    lies = span > PLACE_M and along_m2 > LYING * up_m2
-    doubts = ["most of its faces look sideways: is another axis up? up: y, or z"] if lies else []
     if SMALLEST_M <= span <= LARGEST_M:
-        return doubts
+        return []
     units = {0.001: "in millimetres?", 0.01: "in centimetres?", 100.0: "shrunk twice?", 1000.0: "shrunk twice?"}
     factor = min(units, key=lambda unit: abs(np.log(max(span, 1e-9) * unit / TYPICAL_M)))
-    return [*doubts, f"spans {span:,.4g} m: {units[factor]} scale: {factor:g}"]
+    return [f"spans {span:,.4g} m: {units[factor]} scale: {factor:g}"]
 
 
 def _sound(part: Part) -> Part:

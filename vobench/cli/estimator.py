@@ -1,6 +1,6 @@
 """vobench new and try."""
 
-import re
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -9,35 +9,69 @@ import typer
 
 from vobench.cli import terminal
 from vobench.errors import InputError
+from vobench.suite.scaffold import new_scene, new_suite, require_free, require_name
 
 SCAFFOLD = Path(__file__).parent / "scaffold"
 SIGNS = {True: "kept", False: "BROKEN", None: "not told"}
 
 
 def new_command(
-    kind: Annotated[str, typer.Argument(metavar="estimator", help="What to make: an estimator.")],
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="What to make: an estimator, a suite or a scene.")],
     name: Annotated[str, typer.Argument(metavar="NAME", help="Lower-case letters, digits and _.")],
     *,
-    command: Annotated[bool, typer.Option("--command", help="A program that reads files, in any language.")] = False,
-    out: Annotated[Path, typer.Option(help="The folder in which NAME/ is made.")] = Path("estimators"),
+    source: Annotated[
+        str | None, typer.Option("--from", help="Copy this suite, example or scene: lighting, quickstart, room.")
+    ] = None,
+    command: Annotated[bool, typer.Option("--command", help="An estimator that reads files, in any language.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="The folder in which it is made; else estimators, suites or scenes.")
+    ] = None,
     json: terminal.Json = False,
 ) -> None:
-    """Make the folder of a new estimator, which runs as it is."""
-    terminal.known("kind of thing to make", kind, ("estimator",))
-    if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
-        raise InputError(f"a name should be lower-case letters, digits and _, a letter first (got {name!r})")
+    """Make a new estimator, suite or scene, which runs as it is."""
+    terminal.known("kind of thing to make", kind, tuple(MADE))
+    if command and kind != "estimator":
+        raise InputError(f"--command is for an estimator, not for a {kind}")
+    if source and kind == "estimator":
+        raise InputError("--from is for a suite or a scene, not for an estimator; copy the folder of one instead")
+    usual_folder = Path(f"{kind}s")
+    folder = out or usual_folder
+    made = MADE[kind](name, folder, source, command)
+    if json:
+        files = sorted(path.name for path in made.iterdir()) if made.is_dir() else [made.name]
+        terminal.print_json({"path": str(made), "files": files})
+        return
+    print(f"Made {made}. {NEXT[kind].format(name if folder == usual_folder else made)}")
+
+
+def _new_estimator(name: str, out: Path, _: str | None, is_command: bool) -> Path:
+    require_name(name)
     folder = out / name
-    if folder.exists():
-        raise InputError(f"there is one already; choose another name or take it away: {folder}")
+    require_free(folder)
     folder.mkdir(parents=True)
-    for source in sorted((SCAFFOLD / ("command" if command else "class")).iterdir()):
+    for source in sorted((SCAFFOLD / ("command" if is_command else "class")).iterdir()):
         text = source.read_text(encoding="utf-8").replace("NAME", name)
         (folder / source.name.replace(".txt", ".py")).write_text(text, encoding="utf-8")
-    if json:
-        terminal.print_json({"path": str(folder), "files": sorted(path.name for path in folder.iterdir())})
-        return
-    found = name if out == Path("estimators") else folder
-    print(f"Made {folder}. Try it: vobench try {found}\nRun it: vobench run quickstart -e {found} -e lk_epipolar")
+    return folder
+
+
+def _new_suite(name: str, out: Path, source: str | None, _: bool) -> Path:
+    return new_suite(name, out=out, source=source)
+
+
+def _new_scene(name: str, out: Path, source: str | None, _: bool) -> Path:
+    return new_scene(name, out=out, source=source)
+
+
+Maker = Callable[[str, Path, str | None, bool], Path]
+MADE: dict[str, Maker] = {"estimator": _new_estimator, "suite": _new_suite, "scene": _new_scene}
+# What to do with it next; {0} is its name, or its path where a name would not find it.
+NEXT = {
+    "estimator": "Try it: vobench try {0}\nRun it: vobench run quickstart -e {0} -e lk_epipolar",
+    "suite": "Check it: vobench check {0}\nRun it: vobench run {0}",
+    "scene": "Look it over: vobench scene {0}\nDraw it: vobench render {0}\nDrive in it: name it in a suite, "
+    "scenes: [{0}]",
+}
 
 
 def try_command(

@@ -1,5 +1,6 @@
 """Look a scene or a model over: vobench scene."""
 
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
@@ -19,6 +20,7 @@ from vobench.sequence.picture import write_png
 from vobench.suite import catalog
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
+from vobench.suite.scene_spec import ModelSpec
 from vobench.suite.suite import Rendering
 
 
@@ -34,7 +36,7 @@ def scene_command(
     path = catalog.find("scene", scene).path
     spec = read_scene(path)
     built = build(spec, {})
-    found, notes = survey(built), _notes([Path(model.file) for model in spec.meshes])
+    found, notes = survey(built), _notes(spec.meshes)
     if out:
         light = perform(bake_task(spec), cache_folder(), progress=terminal.Bars())
         with closing(open_renderer(built, Rendering(), light)) as renderer:
@@ -45,17 +47,19 @@ def scene_command(
     print("\n".join([*_lines(spec.name, built, found), *notes]))
 
 
-def _notes(models: list[Path]) -> list[str]:
+def _notes(models: Sequence[ModelSpec]) -> list[str]:
     """What reading the models changed or doubted."""
     from vobench.asset.model import read_model
 
-    found = []
-    for path in models:
+    notes = []
+    for spec in models:
+        path = Path(spec.file)
         if path.suffix.lower() in MODEL_SUFFIXES:
-            model = read_model(path)
-            found += [f"{path.name}: {note}" for note in model.notes]
-            found += [f"{path.name}: {model.dropped} faces without area were dropped"] if model.dropped else []
-    return found
+            model = read_model(path, scale=spec.scale, roles=spec.roles, up=spec.up)
+            notes += [f"{path.name}: {note}" for note in model.notes]
+            if model.dropped:
+                notes.append(f"{path.name}: {model.dropped} faces without area were dropped")
+    return notes
 
 
 def _lines(name: str, scene: Scene, found: SceneSurvey) -> list[str]:

@@ -10,7 +10,7 @@ from vobench.errors import InputError, SettingError, VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Focal, KannalaBrandt, Pinhole, unit
 from vobench.geometry.se3 import Array
-from vobench.setting import OneOf, Positive, Triple, settings
+from vobench.setting import OneOf, Positive, Triple, nearest_whole, settings
 
 # Focal length, sensor and resolution as the paper gives them (section II-B).
 PAPER_FOCAL_MM, PAPER_SENSOR_MM, PAPER_SIZE_PX = 32.0, (35.0, 28.18), (720, 480)
@@ -496,6 +496,9 @@ def _turned(T_body_camera: Array, error: EyeError) -> Array:
     return T_body_turned
 
 
+SMALLEST_SIDE_PX = 2
+
+
 def resized(camera: Camera, scale: float) -> Camera:
     """The camera with `scale` times as many pixels across, behind the same lens.
 
@@ -503,15 +506,16 @@ def resized(camera: Camera, scale: float) -> Camera:
     """
     if scale == 1:
         return camera
-    size_px = [side * scale for side in (camera.width_px, camera.height_px)]
-    if not isinstance(camera, Focal) or any(side != round(side) or side < 2 for side in size_px):
+    width_px = nearest_whole(camera.width_px * scale) or 0
+    height_px = nearest_whole(camera.height_px * scale) or 0
+    if not isinstance(camera, Focal) or min(width_px, height_px) < SMALLEST_SIDE_PX:
         raise VobenchError(
             f"picture_scale {scale:g} should leave whole pixels of a camera with a focal length, got {camera}"
         )
     return replace(
         camera,
-        width_px=round(size_px[0]),
-        height_px=round(size_px[1]),
+        width_px=width_px,
+        height_px=height_px,
         fx_px=camera.fx_px * scale,
         fy_px=camera.fy_px * scale,
         cx_px=(camera.cx_px + 0.5) * scale - 0.5,

@@ -31,7 +31,7 @@ UNSIMULATED: dict[str, Any] = {
     "scene": {"summary"},
     "trajectory": {"file", "times", "recorded_hz", "axes"},
 }
-LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "pyrender", "embreex", "mcap", "rosbags")
+LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "pyrender2", "embreex", "mcap", "rosbags")
 
 
 def content(case: "Case") -> dict[str, Any]:

@@ -14,12 +14,11 @@ from glob import escape
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Literal
 
 from vobench.asset import MODEL_SUFFIXES
 from vobench.errors import UnknownNameError, unknown
+from vobench.suite.file_kind import Kind, kind_in, shown
 
-Kind = Literal["scene", "suite", "scenario", "estimator"]
 KINDS: tuple[Kind, ...] = ("suite", "scenario", "scene", "estimator")
 FORMS: dict[Kind, tuple[str, ...]] = {
     "suite": ("{}.yaml",),
@@ -27,6 +26,13 @@ FORMS: dict[Kind, tuple[str, ...]] = {
     "scene": ("{}.yaml", "{}/scene.yaml", "{}.glb"),
     "estimator": ("{}/estimator.yaml",),
 }
+WHAT_IT_IS: dict[Kind, str] = {
+    "suite": "a suite is a YAML file with scenes and estimators",
+    "scenario": "a scenario is a YAML file with a base and severities",
+    "scene": "a scene is a YAML file, a folder with a scene.yaml, or a model",
+    "estimator": "an estimator is a folder with an estimator.yaml",
+}
+NO_NAMES = ("", ".", "..")
 NO_SCENE = re.compile(rb"^(estimators|severity|include)\s*:", re.MULTILINE)
 
 
@@ -69,7 +75,31 @@ def find(kind: Kind, name: str, *, suite: Path | None = None) -> Entry:
         return _at(kind, path, suite)
     for entry in _all(kind, suite, name=name):
         return entry
+    if name not in NO_NAMES and path.is_dir():
+        raise UnknownNameError(_about_folder(kind, path))
     raise UnknownNameError(unknown(kind, name, _names(kind, suite)))
+
+
+def examples() -> list[Entry]:
+    """The example suites that vobench brings along, which `vobench new suite` copies; no name finds them otherwise."""
+    return [*_in_folder("suite", builtin_root() / "examples", "example", None)]
+
+
+def _about_folder(kind: Kind, folder: Path) -> str:
+    """What to say of a folder where a name or a file is wanted: how to write its path, or what is in it."""
+    if kind == "estimator" and (folder / "estimator.yaml").is_file():
+        return f"no estimator named '{folder}'; for the folder write ./{folder}"
+    if kind == "scene" and (folder / "scene.yaml").is_file():
+        return f"no scene named '{folder}'; for the folder write ./{folder}"
+    inside = [entry for entry in _in_folder(kind, folder, "", None) if _is_of_kind(kind, entry.path)]
+    paths = ", ".join(shown(entry.path) for entry in inside)
+    found = f"in it are {paths}" if inside else f"in it is no {kind}"
+    return f"{shown(folder)} is a folder, and {WHAT_IT_IS[kind]}; {found}"
+
+
+def _is_of_kind(kind: Kind, path: Path) -> bool:
+    """Whether what lies there is of a kind, as far as its keys tell."""
+    return path.is_dir() or path.suffix.lower() in MODEL_SUFFIXES or kind_in(path) == kind
 
 
 def _at(kind: Kind, path: Path, suite: Path | None) -> Entry:
@@ -77,9 +107,11 @@ def _at(kind: Kind, path: Path, suite: Path | None) -> Entry:
         path = suite.parent / path
     if kind == "estimator" and path.name == "estimator.yaml":
         path = path.parent
-    if kind == "scene" and path.is_dir():
+    if kind == "scene" and (path / "scene.yaml").is_file():
         path /= "scene.yaml"
     wanted = path / "estimator.yaml" if kind == "estimator" else path
+    if path.is_dir() and kind != "estimator":
+        raise UnknownNameError(_about_folder(kind, path))
     if not wanted.is_file():
         known = ", ".join(_names(kind, suite)) or "none"
         raise UnknownNameError(f"no {kind} file at {wanted}. Known by name: {known}")
@@ -114,7 +146,7 @@ def _installed(kind: Kind) -> Iterator[Entry]:
 
 
 def _in_folder(kind: Kind, folder: Path, origin: str, name: str | None) -> Iterator[Entry]:
-    if name in ("", ".", ".."):
+    if name in NO_NAMES:
         return
     named = "*" if name is None else escape(name)
     for form in FORMS[kind]:

@@ -56,7 +56,8 @@ def survey(path: Path, changes: Mapping[str, Any] = MappingProxyType({})) -> tup
         raise SuiteError(f"scene_changes are of a scene in YAML, and this is a model: {path}")
     if path.suffix.lower() in MODEL_SUFFIXES:
         return _bare(path), Mistakes(YamlFile(path, {}))
-    reading = yaml_file.read_all(path, SceneFile, {key: json.dumps(value) for key, value in changes.items()})
+    changes_in_yaml = {key: json.dumps(value) for key, value in changes.items()}
+    reading = yaml_file.read_all(path, SceneFile, changes_in_yaml, kind="scene")
     spec, source = reading.model, reading.source
     wrong = Mistakes(source, list(reading.mistakes))
     materials = source.marked.get("materials", {})

@@ -21,10 +21,11 @@ from vobench.scene.light import Light
 from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import CameraSettings
 from vobench.sensor.pixel_truth import CHANNELS
-from vobench.setting import Name, OneOf, Short, hints, settings
+from vobench.setting import Name, OneOf, Short, hints, nearest_whole, settings
 from vobench.suite import catalog, scene_file, yaml_file
 from vobench.suite.axis import Camera, RigSettings
-from vobench.suite.catalog import Entry, Kind
+from vobench.suite.catalog import Entry
+from vobench.suite.file_kind import Kind
 from vobench.suite.manifest import read_manifest
 from vobench.suite.scenario import MOST_SEVERE, Scenario, read_scenario
 from vobench.suite.scene_file import Lighting
@@ -297,7 +298,7 @@ def read_plan(
 
     Raises SuiteError or UnknownNameError.
     """
-    reading = yaml_file.read_all(catalog.find("suite", name).path, Suite, changes)
+    reading = yaml_file.read_all(catalog.find("suite", name).path, Suite, changes, kind="suite")
     wrong = Mistakes(reading.source, list(reading.mistakes))
     meant = {key for said in reading.source.plain for key in get_close_matches(str(said), hints(Suite), n=1)}
     with wrong.at():
@@ -384,7 +385,7 @@ class _Planner:
         limits = manifest.limits
         for key, value in spec.limits.items():
             with self.wrong.at("estimators", index or 0, "limits"):
-                changed: Any = int(value) if isinstance(getattr(limits, key), int) else value
+                changed: Any = _whole(value) if isinstance(getattr(limits, key), int) else value
                 limits = replace(limits, **{key: changed})
         return Entrant(spec.label or manifest.name, folder, manifest, {**manifest.params, **spec.params}, limits)
 
@@ -560,6 +561,14 @@ def _combinations(axes: Axes) -> Iterator[tuple[str, dict[str, str]]]:
         differing = [name for name, axis in zip(names, axes, strict=True) if len(axis) > 1]
         variant = dict(zip(AXES, names, strict=True))
         yield "-".join(differing) or variant["trajectory"], variant
+
+
+def _whole(value: float) -> int:
+    """A limit that counts something. Raises SuiteError for a fraction."""
+    whole = nearest_whole(value)
+    if whole is None:
+        raise SuiteError(f"should be a whole number (got {value:g})")
+    return whole
 
 
 def _check_param(key: str, value: Any, defaults: dict[str, Any]) -> None:

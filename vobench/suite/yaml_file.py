@@ -20,7 +20,8 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from vobench.errors import Mistake, Place, SettingError, SuiteError, VobenchError
 from vobench.setting import COMPLAINTS, complaint, hints, over, unit_of
-from vobench.suite import catalog
+from vobench.suite import catalog, file_kind
+from vobench.suite.file_kind import Kind
 
 Model = TypeVar("Model")
 Keys = tuple[int | str, ...]
@@ -129,23 +130,32 @@ class Reading(Generic[Model]):
     mistakes: tuple[Mistake, ...] = ()
 
 
-def read(path: Path, model: type[Model]) -> Model:
-    """The file as `model`. Raises SuiteError with all that is wrong."""
-    reading = read_all(path, model)
+def read(path: Path, model: type[Model], kind: Kind | None = None) -> Model:
+    """The file as `model`. Raises SuiteError with all that is wrong, as `read_all` does."""
+    reading = read_all(path, model, kind=kind)
     if reading.mistakes:
         raise SuiteError(*reading.mistakes)
     return reading.model
 
 
 def read_all(
-    path: Path, model: type[Model], changes: Mapping[str, str] = MappingProxyType({}), kind: catalog.Kind = "suite"
+    path: Path,
+    model: type[Model],
+    changes: Mapping[str, str] = MappingProxyType({}),
+    kind: Kind | None = None,
 ) -> Reading[Model]:
     """The file as far as it can be read, and where its keys stand. Raises SuiteError where it is no such file.
 
-    `changes` are values in YAML by keys with dots between, which are put in place of the file's. A model with `include`
-    is that of a kind, of which it may be.
+    `changes` are values in YAML by keys with dots between, which are put in place of the file's. `kind` is that of the
+    file: one of another kind is refused with a sentence that says so, and a model with `include` includes files of
+    this kind, suites if none is given.
     """
-    source, mistakes = _with_included(path, kind, ()) if INCLUDE in hints(model) else _parse(path)
+    if kind:
+        _refuse(path, file_kind.model_mistaken_for(kind, path))
+    has_include = INCLUDE in hints(model)
+    source, mistakes = _with_included(path, kind or "suite", ()) if has_include else _parse(path)
+    if kind:
+        _refuse(path, file_kind.mistaken_for(kind, path, [*source.plain]))
     source = replace(source, marked=deepcopy(source.marked)) if changes else source
     for keys, value in changes.items():
         _change(source.marked, keys, value)
@@ -163,7 +173,12 @@ def read_all(
     return Reading(_partial(model, parts), replace(source, kept=kept), tuple(sorted(mistakes, key=_line)))
 
 
-def _with_included(path: Path, kind: catalog.Kind, including: tuple[Path, ...]) -> tuple[YamlFile, list[Mistake]]:
+def _refuse(path: Path, sentence: str | None) -> None:
+    if sentence:
+        raise SuiteError(Mistake(sentence, (Place(file_kind.shown(path)),)))
+
+
+def _with_included(path: Path, kind: Kind, including: tuple[Path, ...]) -> tuple[YamlFile, list[Mistake]]:
     """The file with the one of its kind that it includes, by name or path, and the keys that are twice in one."""
     source, twice = _parse(path)
     name = source.marked.get(INCLUDE)

@@ -1,0 +1,10 @@
+"""The `vobench` command as `python -m vobench`."""
+
+import sys
+
+from vobench.cli import main
+
+if __name__ == "__main__":
+    # Messages that name a command to run next start with this.
+    sys.argv[0] = f"{sys.executable} -m vobench"
+    main()
