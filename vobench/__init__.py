@@ -3,10 +3,13 @@
 What a notebook needs is here and imported when it is first asked for; docs/python.md shows all of it.
 """
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from importlib.machinery import ModuleSpec
+
     from vobench.metric.settings import LIKE, ScoreSettings
     from vobench.notebook import diagnose, read_board, read_sequence, read_trajectory, score
     from vobench.sequence import Sequence
@@ -43,3 +46,19 @@ if not TYPE_CHECKING:  # else every misspelt name would pass for one of ours
     def __dir__():
         """What there is to complete, imported or not."""
         return sorted({*globals(), *__all__})
+
+
+class _Retired:
+    """A finder of modules that earlier releases had, asked after all others: old plugins get a sentence."""
+
+    @staticmethod
+    def find_spec(name: str, _path: object = None, _target: object = None) -> "ModuleSpec | None":
+        """The spec of a retired module, as `vobench.retired` says; None for any other name."""
+        if not name.startswith("vobench."):
+            return None
+        from vobench import retired
+
+        return retired.find_spec(name)
+
+
+sys.meta_path.append(_Retired)
