@@ -437,6 +437,8 @@ if not TYPE_CHECKING:  # else every misspelt name would pass for one of ours
 
     def __getattr__(name):
         """A name of `__all__`, imported now; one that has left `__all__` as `vobench.retired` says."""
+        if name.startswith("__"):  # asked for by the import system, with every `from vobench.plugin import ...`
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         if name not in HOMES:
             from vobench import retired
 

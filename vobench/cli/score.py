@@ -66,8 +66,16 @@ def metrics_command(
 
 
 def _definitions() -> list[MetricDefinition]:
-    """Our own metrics, and those installed as entry points."""
-    installed = [point.load() for point in entry_points(group=GROUP)]
+    """Our own metrics, and those installed as entry points. Raises InputError for one that is no metric."""
+    installed = []
+    for point in entry_points(group=GROUP):
+        try:
+            metric = point.load()
+        except Exception as error:  # somebody else's code may raise anything
+            raise InputError(f"the metric {point.value} does not load ({type(error).__name__}: {error})") from error
+        if not isinstance(metric, MetricDefinition):
+            raise InputError(f"{point.value} should be a MetricDefinition, but is {type(metric).__name__}")
+        installed.append(metric)
     return [*DEFINITIONS.values(), *(metric for metric in installed if metric.id not in DEFINITIONS)]
 
 
