@@ -149,11 +149,12 @@ class Work:
                 "key": event.task.key,
                 "slot": event.slot,
                 "wall_s": round(event.wall_s, 3),
-                "reason": event.reason,
+                "reason": event.told or event.reason,
             }
             print(json_module.dumps(said, ensure_ascii=False), file=self._log, flush=True)
-        for sentence in event.told:
-            self.say(sentence)
+        if event.what == "told":
+            self.say(event.told)
+            return
         if event.what == "started":
             if self._draws:
                 self._lines[event.task.key] = self._bars.add_task(name)
