@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from vobench.metric.settings import LIKE, ScoreSettings
     from vobench.notebook.class_source import write_estimator
+    from vobench.notebook.questions import causes, drive, explain, realism, shrink, twin
     from vobench.notebook.runs import Check, Run, bundle, check, compare, read_board, read_run, run
     from vobench.notebook.simulation import Simulation, read_sequence, simulate
     from vobench.notebook.trajectories import diagnose, read_trajectory, score
@@ -27,6 +28,12 @@ _HOMES = {
     "ScoreSettings": "vobench.metric.settings",
     "Sequence": "vobench.sequence",
     "Trajectory": "vobench.trajectory.trajectory",
+    "causes": "vobench.notebook.questions",
+    "drive": "vobench.notebook.questions",
+    "explain": "vobench.notebook.questions",
+    "realism": "vobench.notebook.questions",
+    "shrink": "vobench.notebook.questions",
+    "twin": "vobench.notebook.questions",
     "Check": "vobench.notebook.runs",
     "Run": "vobench.notebook.runs",
     "bundle": "vobench.notebook.runs",
@@ -53,16 +60,22 @@ __all__ = [
     "Trajectory",
     "__version__",
     "bundle",
+    "causes",
     "check",
     "compare",
     "diagnose",
+    "drive",
+    "explain",
     "read_board",
     "read_run",
     "read_sequence",
     "read_trajectory",
+    "realism",
     "run",
     "score",
+    "shrink",
     "simulate",
+    "twin",
     "write_estimator",
 ]
 

@@ -2,10 +2,13 @@
 
 import os
 import pkgutil
+import random
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -171,6 +174,139 @@ def test_what_looks_at_no_flag_is_ended_after_a_grace_or_by_a_second_ctrl_c(star
     assert process.communicate() == ("", f"{SENTENCE}\n")
     assert process.returncode == 130
     assert left_behind(here) == []
+
+
+# Runs the command that it is given; whoever the command started and left behind becomes its child.
+KEEPER = """
+import ctypes, subprocess, sys, time
+ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)
+print(subprocess.Popen(sys.argv[1:]).pid, flush=True)
+time.sleep(3600)
+"""
+GONE_S = 2.0
+
+
+@dataclass
+class Kept:
+    """A vobench whose processes are all below one that we know, dead or alive."""
+
+    keeper: subprocess.Popen
+    pid: int
+
+    def alive(self) -> list[int]:
+        """The processes that vobench has started, and vobench itself."""
+        children = dict[int, list[int]]()
+        for path in Path("/proc").glob("[0-9]*/stat"):
+            fields = read(path).rpartition(")")[2].split()
+            if fields and fields[0] not in "ZX":
+                children.setdefault(int(fields[1]), []).append(int(path.parent.name))
+        found = list(children.get(self.keeper.pid, []))
+        for pid in found:  # which grows
+            found += children.get(pid, [])
+        return found
+
+    def ended_within(self, seconds: float) -> list[int]:
+        """Who is alive after so many seconds at most."""
+        until_s = time.monotonic() + seconds
+        while (alive := self.alive()) and time.monotonic() < until_s:
+            time.sleep(0.02)
+        return alive
+
+
+@pytest.fixture
+def kept(here, monkeypatch):
+    """Starts vobench with two jobs under a process that adopts its orphans, with a TMPDIR of its own."""
+    keepers = []
+    (here / "tmp").mkdir()
+    monkeypatch.setenv("TMPDIR", str(here / "tmp"))
+
+    def start(*words):
+        command = [sys.executable, "-c", "from vobench.cli import main; main()", "run", "tiny", "-j", "2", *words]
+        with (here / "log.txt").open("wb") as log:
+            keeper = subprocess.Popen(
+                [sys.executable, "-c", KEEPER, *command], stdout=subprocess.PIPE, stderr=log, text=True
+            )
+        keepers.append(keeper)
+        return Kept(keeper, int(keeper.stdout.readline()))
+
+    yield start
+    for keeper in keepers:
+        for pid in Kept(keeper, 0).alive():
+            os.kill(pid, signal.SIGKILL)
+        keeper.kill()
+        keeper.communicate()
+
+
+def hanging_in(here: Path) -> Path:
+    """The folder of an estimator that hangs, and starts a process that would go on for an hour."""
+    plug = here / "estimators" / "hanging"
+    plug.mkdir(parents=True)
+    (plug / "estimator.yaml").write_text(
+        "name: hanging\nversion: '1'\nclass: estimator:Hanging\npose_of: body\nsummary: Hangs\n"
+        "limits: {frame_s: 3600}\n"
+    )
+    (plug / "estimator.py").write_text(HANGING_FOR_EVER)
+    return plug
+
+
+HANGING_FOR_EVER = """
+import subprocess, sys, time
+class Hanging:
+    def start(self, rig, params, seed): ...
+    def process(self, frame):
+        subprocess.Popen(["sleep", "3600"], start_new_session=True)
+        print("hangs", file=sys.stderr, flush=True)
+        time.sleep(100_000)
+"""
+
+
+def await_hanging(here: Path) -> None:
+    until_s = time.monotonic() + 120
+    while not any("hangs" in read(log) for log in (here / "cache").glob("estimates/.unfinished-*/log.txt")):
+        assert time.monotonic() < until_s, read(here / "log.txt")
+        time.sleep(0.05)
+
+
+def test_nobody_outlives_a_killed_vobench_with_two_jobs(kept, here):
+    hanging_in(here)
+    run = kept("-e", "hanging")
+    await_hanging(here)
+    assert len(run.alive()) > 4  # vobench, the fork server, a worker, the guard, the estimator
+    os.kill(run.pid, signal.SIGKILL)
+    assert run.ended_within(GONE_S) == []
+
+
+def test_a_stop_with_two_jobs_takes_two_seconds_at_most_and_leaves_nothing(kept, here):
+    hanging_in(here)
+    run = kept("-e", "hanging")
+    await_hanging(here)
+    os.kill(run.pid, signal.SIGTERM)
+    assert run.ended_within(GONE_S) == []
+    assert SENTENCE in read(here / "log.txt")
+    assert list((here / "tmp").iterdir()) == []
+    assert left_behind(here) == []
+
+
+def test_killed_at_any_moment_with_two_jobs_nobody_lives_on_and_the_same_command_resumes(kept, here):
+    def hashes():
+        return (here / "runs" / "tiny" / "latest" / "hashes.json").read_bytes()
+
+    began = time.monotonic()
+    assert kept().ended_within(120) == []
+    whole_s = time.monotonic() - began
+    whole = hashes()
+    dice = random.Random(1)
+    for _ in range(3):
+        for name in ("cache", "runs"):
+            shutil.rmtree(here / name)
+        run = kept()
+        time.sleep(dice.uniform(0.2, whole_s))
+        os.kill(run.pid, signal.SIGKILL)
+        assert run.ended_within(GONE_S) == []
+        assert kept().ended_within(120) == []
+        assert hashes() == whole
+        assert left_behind(here) == []
+        assert list((here / "tmp").iterdir()) == []
 
 
 def test_what_is_left_of_a_folder_that_was_being_filled_is_never_published(tmp_path):

@@ -24,7 +24,8 @@ def test_a_line_for_each_task_that_ends_and_what_is_left(capsys):
 def test_a_quiet_display_names_only_what_failed(capsys):
     with QuietDisplay() as shown:
         shown.begin([TASK], {})
-        shown.hear(Event("failed", TASK, slot=0, reason="no light", told=("looked twice",)))
+        shown.hear(Event("told", TASK, slot=0, told="looked twice"))
+        shown.hear(Event("failed", TASK, slot=0, reason="no light"))
     assert capsys.readouterr().err == "vobench: looked twice\nvobench: bake room & hall failed: no light\n"
 
 

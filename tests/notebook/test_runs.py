@@ -23,7 +23,7 @@ class Still:
         self.pose = np.eye(4)
 
     def process(self, frame):
-        from vobench.estimator import Result
+        from vobench.plugin import Result
 
         return Result(self.pose)
 

@@ -2,8 +2,11 @@
 
 import os
 import signal
+import socket
+import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from queue import SimpleQueue
 
 import pytest
 
@@ -13,6 +16,7 @@ from vobench.runner import executor
 from vobench.runner.executor import Dask, Done, Event, Executor, LocalProcesses, Serial, perform_all
 from vobench.runner.folder import PAGE, RunFolder
 from vobench.runner.run import run_suite
+from vobench.runner.store import locked
 from vobench.runner.task import Task, plan
 
 
@@ -29,7 +33,7 @@ class Recorder:
     beside: list[tuple[str, int]] = field(default_factory=list)
     running: list = field(default_factory=list)
 
-    def submit(self, one, store, slot, threads):
+    def submit(self, one, store, slot, threads, tell):
         from concurrent.futures import Future
         from threading import Timer
 
@@ -80,7 +84,7 @@ def test_a_failure_takes_what_needs_it_along_and_nothing_else(tmp_path):
 
 def test_ten_thousand_tasks_are_handed_out_in_little_time(tmp_path):
     class Instant(Recorder):
-        def submit(self, one, store, slot, threads):
+        def submit(self, one, store, slot, threads, tell):
             from concurrent.futures import Future
 
             future = Future()
@@ -94,14 +98,21 @@ def test_ten_thousand_tasks_are_handed_out_in_little_time(tmp_path):
     assert os.times().user - began < 20
 
 
-def run(bench, tmp_path: Path, executor: Executor, *changes: tuple[str, str]) -> RunFolder:
+def run(bench, tmp_path: Path, executor: Executor, heard=lambda _: None) -> RunFolder:
     try:
         return run_suite(
-            bench.plan(*changes), {}, root=tmp_path / "runs", store=tmp_path / "store", executor=executor,
-            finish=page.write_reports,
+            bench.plan(), {}, root=tmp_path / "runs", store=tmp_path / "store", executor=executor,
+            finish=page.write_reports, heard=heard,
         )  # fmt: skip
     finally:
         executor.close()
+
+
+def kill_all(executor: LocalProcesses, number: int) -> None:
+    """Send a signal to all that runs, once it has started."""
+    for process in list(executor._running):
+        assert process.pid(timeout_s=30)
+        process.kill(number)
 
 
 def files(folder: RunFolder) -> dict[str, bytes]:
@@ -117,12 +128,12 @@ def test_two_processes_write_the_bytes_that_one_does(bench, first, tmp_path):
 
 def test_sequences_of_one_light_share_a_process_and_nothing_else_does(tmp_path, monkeypatch):
     executor, started = LocalProcesses(1), []
-    make = executor._context.Process
-    monkeypatch.setattr(executor._context, "Process", lambda **said: started.append(said) or make(**said))
+    start = executor._server.start_worker
+    monkeypatch.setattr(executor._server, "start_worker", lambda: started.append(start()) or started[-1])
     lit, dark = PICTURES[:3], task("pictures of another light", needs=("another",))
     counts = []
     for one in (LIGHT, *lit, dark, lit[0]):
-        done = executor.submit(one, tmp_path, 0, 1).result(timeout=600)
+        done = executor.submit(one, tmp_path, 0, 1, lambda _: None).result(timeout=600)
         assert done.failure  # there is no such key, and the process lives on
         counts.append(len(started))
     executor.close()
@@ -135,13 +146,12 @@ def test_a_process_that_dies_is_a_row_of_its_cell(bench, tmp_path, monkeypatch):
     executor = LocalProcesses(2)
     submit = executor.submit
 
-    def deadly(one: Task, store: Path, slot: int, threads: int):
+    def deadly(one: Task, store: Path, slot: int, threads: int, tell):
         if one.stage == "sequence" and "dim" in one.subject.name:
             one = replace(one, subject=None)  # whatever it then trips over
-        future = submit(one, store, slot, threads)
+        future = submit(one, store, slot, threads, tell)
         if one.stage == "sequence" and one.subject is None:
-            for process in list(executor._running):
-                os.kill(process.pid, signal.SIGSEGV)
+            kill_all(executor, signal.SIGSEGV)
         return future
 
     monkeypatch.setattr(executor, "submit", deadly)
@@ -155,24 +165,24 @@ def test_a_process_that_dies_is_a_row_of_its_cell(bench, tmp_path, monkeypatch):
 
 
 def test_what_a_fault_of_a_library_ended_is_made_once_more(bench, tmp_path, monkeypatch):
-    executor, hit, futures = LocalProcesses(2), [], []
+    executor, hit, heard = LocalProcesses(2), [], []
     submit = executor.submit
 
-    def once(one: Task, store: Path, slot: int, threads: int):
-        future = submit(one, store, slot, threads)
+    def once(one: Task, store: Path, slot: int, threads: int, tell):
+        future = submit(one, store, slot, threads, tell)
         if one.stage == "sequence" and "dim" in one.name:
             hit.append(one.key)
-            futures.append(future)
-            for process in list(executor._running):
-                os.kill(process.pid, signal.SIGABRT)
+            kill_all(executor, signal.SIGABRT)
         return future
 
     monkeypatch.setattr(executor, "submit", once)
-    folder = run(bench, tmp_path, executor)
+    folder = run(bench, tmp_path, executor, heard=heard.append)
     assert {score.status for score in folder.scores()} == {"ok"}
-    assert [future.result().told[0] for future in futures] == [
+    told = {event.told for event in heard if event.what == "told"}
+    assert hit
+    assert told >= {
         f"{key}: its process ended with signal SIGABRT, by a fault in a library; it is made once more" for key in hit
-    ]
+    }
 
 
 def test_what_a_task_raises_in_this_process_is_a_row_too(bench, tmp_path, monkeypatch):
@@ -204,6 +214,26 @@ def test_the_plan_of_a_real_suite_is_performed_whole(bench, first):
     assert perform_all(plan(bench.plan(), {}), bench.folder / "cache", Serial()) == {}
 
 
+def patience_s(executor: Executor, store: Path) -> float:
+    """The seconds until the user reads for whom a task waits that waits for ever."""
+    one, told = task("pictures"), SimpleQueue()
+    executor.submit(task("imports"), store, 0, 1, print).result(timeout=60)
+    with locked(store / "state" / "locks" / one.key.replace("/", "-")):
+        began = time.monotonic()
+        future = executor.submit(one, store, 0, 1, told.put)
+        sentence = told.get(timeout=60)
+        took_s = time.monotonic() - began
+        assert not future.done()
+    assert sentence.startswith(f"waiting for process {os.getpid()} on {socket.gethostname()}, which makes sequences-")
+    assert future.result(timeout=60).failure
+    executor.close()
+    return took_s
+
+
+def test_a_worker_says_at_once_for_whom_it_waits(tmp_path):
+    assert patience_s(LocalProcesses(1), tmp_path) < 5
+
+
 @pytest.fixture
 def dask():
     """A scheduler with two workers on this machine."""
@@ -217,6 +247,11 @@ def dask():
 @pytest.mark.filterwarnings("ignore")
 def test_the_workers_of_a_dask_scheduler_write_the_same_bytes(bench, first, tmp_path, dask):
     assert files(run(bench, tmp_path, Dask(dask.scheduler_address))) == files(first)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_worker_of_dask_says_at_once_for_whom_it_waits(tmp_path, dask):
+    assert patience_s(Dask(dask.scheduler_address), tmp_path) < 10
 
 
 def test_a_scheduler_that_is_not_there_is_a_sentence(monkeypatch):

@@ -62,6 +62,11 @@ def test_home_is_found(tmp_path, monkeypatch):
     ("source", "sentence"),
     [
         ("data/none", r":2: source: no folder or file at .*/data/none$"),
+        ("/proc/**/*", r":2: source: more than 10000 files and folders match '/proc/\*\*/\*'$"),
+        (
+            "'data/a**'",
+            r":2: source: 'data/a\*\*' cannot be searched for \(Invalid pattern.*\)$|no folder or file matches",
+        ),
         ("[data/V1, 'data/x*']", r":2: source\.1: no folder or file matches .*/data/x\*$"),
         ("{path: 'data/MH*', name: one}", "2 recordings match 'data/MH\\*', so one name 'one' is not enough"),
         ("[data/V1, data/V1/mav0]", "two cases are called 'v1'; name one another: .*/data/V1/mav0"),

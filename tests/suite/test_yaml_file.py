@@ -1,5 +1,7 @@
 """Settings in YAML: every mistake is a sentence with its line."""
 
+import time
+from pathlib import Path
 from typing import Annotated, Literal
 
 import pytest
@@ -115,3 +117,68 @@ def test_the_same_file_is_the_same_settings(tmp_path):
     (tmp_path / "file.yaml").write_text("{name: a, chips: {a: noisy}, courses: {b: {radius_m: 1}}, times_s: [1]}")
     course, chips = Circle(radius_m=1.0), {"a": CHIPS["noisy"]}
     assert read(tmp_path / "file.yaml", File) == File(name="a", chips=chips, courses={"b": course}, times_s=(1.0,))
+
+
+def bomb(levels: int) -> str:
+    """Each level repeats the one before nine times."""
+    lines = ["name: x", "l0: &l0 {a: 1}"]
+    lines += [f"l{n}: &l{n} [{', '.join([f'*l{n - 1}'] * 9)}]" for n in range(1, levels)]
+    return "\n".join(lines)
+
+
+HOSTILE = {
+    "self-merge": ("name: x\na: &a {<<: *a}\n", r":2:4: an alias stands inside of what it repeats"),
+    "list in itself": ("name: x\na: &a [*a]\n", r":2:4: an alias stands inside of what it repeats"),
+    "long integer": (f"name: x\na: {'9' * 4301}\n", r":2:4: a number has more than 400 characters"),
+    "long hexadecimal": (f"name: x\na: 0x{'f' * 5000}\n", r":2:4: a number has more than 400 characters"),
+    "bomb": (bomb(12), r"holds more than 100000 values, repetitions by aliases counted"),
+    "bomb of merges": (
+        "name: x\nl0: &l0 {a: 1, b: 2}\n"
+        + "".join(f"l{n}: &l{n} {{<<: [{', '.join([f'*l{n - 1}'] * 9)}]}}\n" for n in range(1, 12)),
+        r"holds more than 100000 values",
+    ),
+    "depth": (f"name: x\na: {'[' * 300}{']' * 300}\n", r"nested"),
+    "great depth": (f"name: x\na: {'[' * 100_000}{']' * 100_000}\n", r"nested too deep"),
+    "many keys": ("name: x\n" + "".join(f"k{n}: 1\n" for n in range(60_000)), r"holds more than 100000 values"),
+    "long text": (f"name: {'x' * (3 << 20)}\n", r"should be a text of 2 MiB at most"),
+    "no date": ("name: x\na: 2001-99-99\n", r":2:4: "),
+    "not base 64": ("name: x\na: !!binary '~'\n", r"file\.yaml"),
+    "merge of a number": ("name: x\na: {<<: 3}\n", r":2"),
+    "a key of a list": ("name: x\n? [a, b]\n: 1\n", r"file\.yaml"),
+    "a set": ("name: x\na: !!set {b, c}\n", r"file\.yaml"),
+    "an omap": ("name: x\na: !!omap {b: 1}\n", r"file\.yaml"),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_file_is_one_line_with_its_place_soon(tmp_path, name):
+    text, sentence = HOSTILE[name]
+    path = tmp_path / "file.yaml"
+    path.write_text(text)
+    began = time.process_time()
+    with pytest.raises(SuiteError, match=sentence) as raised:
+        read(path, File)
+    assert time.process_time() - began < 20
+    for line in str(raised.value).splitlines():
+        assert str(path) in line or line.startswith("and ")
+
+
+def test_a_file_without_an_end_is_one_line():
+    with pytest.raises(SuiteError, match=r"/dev/zero: should be a text of 2 MiB at most"):
+        read(Path("/dev/zero"), File)
+
+
+def test_a_value_to_set_obeys_the_limits_of_files(tmp_path):
+    path = tmp_path / "file.yaml"
+    path.write_text("name: x\n")
+    with pytest.raises(SuiteError, match="should be a value as YAML has it"):
+        read_all(path, File, {"name": "9" * 5000})
+
+
+def test_a_deep_file_of_every_days_size_is_read(tmp_path):
+    path = tmp_path / "file.yaml"
+    path.write_text("name: x\na: &a {b: [1, 2]}\nc: [*a, *a]\n")
+    with pytest.raises(SuiteError) as raised:
+        read(path, File)
+    assert all("unknown" in line or "a" in line for line in str(raised.value).splitlines())
+    assert "alias" not in str(raised.value)

@@ -2,7 +2,7 @@
 
 import sys
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +19,9 @@ from vobench.report.leaderboard import METRICS, Board
 from vobench.report.verify import verify_run
 from vobench.runner.bundle import bundle, merged, opened, require_zip, scored_again
 from vobench.runner.folder import TrialScore, open_run
+from vobench.runner.rescore import Rescored, check, wrong_truths
+from vobench.runner.signature import sign as make_signature
+from vobench.runner.signature import signed_by
 
 # A narrow terminal goes without these, in this order; every report has them all.
 LEAST_FIRST = ("MiB", "mean place", "CPU ms/frame", "ATE %", "failed", "decided", "× first")
@@ -28,6 +31,14 @@ TERMINAL = "terminal"
 FORMS = (*FORMATS, "html")
 ENDINGS = {".tex": "latex", ".htm": "html", **{f".{form}": form for form in FORMS}}
 REGRESSED = 3  # the exit code where something got worse
+AllowedSigners = Annotated[
+    Path | None,
+    typer.Option(
+        "--allowed-signers",
+        envvar="VOBENCH_ALLOWED_SIGNERS",
+        help="Who may sign bundles: a file as ssh-keygen(1) has it.",
+    ),
+]
 MetricName = Annotated[str, typer.Option(help=f"What the matrix shows: {', '.join(METRICS)}.")]
 
 
@@ -41,18 +52,28 @@ def report_command(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Write to this file instead of the terminal.")] = None,
     metric: MetricName = DEFAULT_METRIC,
+    allowed_signers: AllowedSigners = None,
     json: terminal.Json = False,
 ) -> None:
-    """Print a run's leaderboard, in any form."""
+    """Print a run's leaderboard, in any form; all trials are scored again from their estimates and truths."""
     chosen = _chosen(form, out, as_json=json)
     terminal.known("metric", metric, METRICS)
     with ExitStack() as stack:
-        folders = [stack.enter_context(opened(run)) for run in runs]
+        folders, wrong = [], dict[str, str]()
+        signatures = [told for run in runs if (told := _signature(run, allowed_signers))]
+        for run in runs:
+            folders.append(stack.enter_context(opened(run, terminal.warn)))
+            wrong |= wrong_truths(folders[-1]) if run.is_file() else {}
         folder = stack.enter_context(merged(folders, [run.stem for run in runs]))
-        scores = folder.scores()
+        checked = check(folder, wrong)
+        scores = checked.scores
         board = page.board_of(folder, scores)
+        board = replace(board, remarks=(*board.remarks, *checked.notes, *signatures))
+        for note in (*checked.notes, *signatures):
+            terminal.warn(note)
         if out is None and chosen == TERMINAL:
             print_board(board, metric)
+            _print_claimed(checked.claimed)
             return
         beside = out.resolve().parent if out else folder.path
         text = page.html(folder, scores, board, beside) if chosen == "html" else FORMATS[chosen](board, metric)
@@ -62,6 +83,23 @@ def report_command(
     out.write_text(text, encoding="utf-8")
     if json:
         terminal.print_json({"path": str(out), "format": chosen})
+
+
+def _signature(run: Path, allowed_signers: Path | None) -> str:
+    """What is known of a bundle's signature; empty if it has none, or the path is a folder."""
+    told = signed_by(run, allowed_signers) if run.is_file() else ""
+    return f"{run.name}: {told}" if told else ""
+
+
+def _print_claimed(claimed: list[Rescored]) -> None:
+    """The trials that only claim a score, apart from the board."""
+    rows = []
+    for trial in claimed:
+        score, ate_m = trial.score, trial.score.value("ate_trans", "rmse")
+        rows.append([score.case, score.estimator, score.status, "" if ate_m is None else f"{ate_m:.3g}", trial.claimed])
+    if rows:
+        headings = ["case", "estimator", "status", "ATE m", "why it cannot be scored again"]
+        terminal.console().print(terminal.table("claimed, not ranked", headings, rows))
 
 
 def _chosen(form: str | None, out: Path | None, *, as_json: bool) -> str:
@@ -85,8 +123,17 @@ def compare_command(
     json: terminal.Json = False,
 ) -> None:
     """Say what became better or worse between two runs; exit code 3 where something got worse or fails now."""
-    with opened(old) as before, opened(new) as after, merged([before, after], ["old", "new"]):
-        boards = [page.board_of(folder, folder.scores()) for folder in (before, after)]
+    boards = []
+    with (
+        opened(old, terminal.warn) as before,
+        opened(new, terminal.warn) as after,
+        merged([before, after], ["old", "new"]),
+    ):
+        for folder, path in ((before, old), (after, new)):
+            checked = check(folder, wrong_truths(folder) if path.is_file() else {})
+            for note in checked.notes:
+                terminal.warn(f"{path.name}: {note}")
+            boards.append(page.board_of(folder, checked.scores))
     changes = compare.compare(*boards, at_most=at_most)
     worse = [change for change in changes if change.verdict in compare.REGRESSIONS]
     if json:
@@ -128,21 +175,29 @@ def bundle_command(
     run: terminal.RunPath,
     out: Annotated[Path, typer.Argument(metavar="OUT.zip", help="The file to write.")],
     *,
+    sign: Annotated[
+        Path | None, typer.Option(metavar="KEY", help="Sign it with this SSH key, in a file beside it.")
+    ] = None,
     json: terminal.Json = False,
 ) -> None:
     """Pack a run's suite, versions, truth, estimates, scores and hashes, for others to score again and to merge."""
     require_zip(out)
     files, size = bundle(open_run(run), out), out.stat().st_size
+    signature = make_signature(out, sign) if sign else None
     if json:
-        terminal.print_json({"path": str(out), "files": files, "bytes": size})
-    else:
-        print(f"{files} files, {size / 1e6:.1f} MB: {out}\nscore it again: vobench score {out}")
+        signed = {"signature": str(signature)} if signature else {}
+        terminal.print_json({"path": str(out), "files": files, "bytes": size, **signed})
+        return
+    print(f"{files} files, {size / 1e6:.1f} MB: {out}")
+    if signature:
+        print(f"its signature: {signature}")
+    print(f"score it again: vobench score {out}")
 
 
 def score_bundle(path: Path, *, as_json: bool) -> None:
     """Score a bundle again and print its board of the new scores; exit code 1 where they are not those it states."""
-    with opened(path) as folder:
-        again = list(scored_again(folder))
+    with opened(path, terminal.warn) as folder:
+        again = list(scored_again(folder, wrong_truths(folder)))
         scores, wrong = [score for score, _ in again], [score for score, same in again if not same]
         board = page.board_of(folder, scores)
     if as_json:

@@ -166,12 +166,13 @@ class TerminalDisplay:
         """Draw and log one event."""
         if self._log:
             print(json_module.dumps(_logged(event), ensure_ascii=False), file=self._log, flush=True)
+        if event.what == "told":
+            self.say(event.told)
+            return
         self._progress.count(event)
         if self._overall is not None:
-            told = self._progress.describe(time.monotonic() - self._began_s)
-            self._bars.update(self._overall, completed=self._progress.share, told=told)
-        for sentence in event.told:
-            self.say(sentence)
+            left = self._progress.describe(time.monotonic() - self._began_s)
+            self._bars.update(self._overall, completed=self._progress.share, told=left)
 
         name = f"{event.task.stage} {event.task.name}"
         if event.what == "started":
@@ -216,5 +217,5 @@ def _logged(event: "Event") -> dict[str, Any]:
         "key": event.task.key,
         "slot": event.slot,
         "wall_s": round(event.wall_s, 3),
-        "reason": event.reason,
+        "reason": event.told or event.reason,
     }

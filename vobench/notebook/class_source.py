@@ -121,7 +121,7 @@ class _Collected:
         if isinstance(value, types.ModuleType):
             self.imports[name] = _import_module(value.__name__, name)
         elif _is_importable(value, self.module):
-            self.imports[name] = _import_name(value.__module__, value.__qualname__, name)
+            self.imports[name] = _import_name(_public_home(value), value.__qualname__, name)
         elif isinstance(value, (type, types.FunctionType)):
             self.add_source(name, value)
         elif _is_plain(value):
@@ -137,6 +137,15 @@ class _Collected:
         constants = list(self.constants.values())
         sections = [f'"""{docstring}"""', "\n".join(imports), "\n".join(constants), *self.definitions.values()]
         return "\n\n".join(section for section in sections if section) + "\n"
+
+
+def _public_home(value: Any) -> str:
+    """The module from which a plugin imports a value: `vobench.plugin` for what vobench offers."""
+    from vobench import plugin
+
+    if value.__module__.startswith("vobench.") and value.__qualname__ in plugin.__all__:
+        return plugin.__name__
+    return str(value.__module__)
 
 
 def _import_module(module: str, name: str) -> str:

@@ -48,9 +48,9 @@ class QuietDisplay:
     def hear(self, event: "Event") -> None:
         """Count a task, and name one that failed."""
         self._progress.count(event)
-        for sentence in event.told:
-            self.say(sentence)
-        if event.what == "failed":
+        if event.what == "told":
+            self.say(event.told)
+        elif event.what == "failed":
             self.say(f"{event.task.stage} {event.task.name} failed: {event.reason}")
 
     def say(self, sentence: str) -> None:
@@ -97,7 +97,7 @@ class NotebookDisplay(QuietDisplay):
         super().hear(event)
         if event.what == "started":
             self._running[event.task.key] = f"{event.task.stage} {event.task.name}"
-        else:
+        elif event.what in ("done", "failed"):
             self._running.pop(event.task.key, None)
         self._draw()
 

@@ -95,7 +95,7 @@ class Run:
         if in_notebook():
             import matplotlib.pyplot  # noqa: F401 - registers how Jupyter shows a figure
         chosen = self._require("case", case or self.cases[0], self.cases)
-        names = self.estimators if estimators is None else _listed(estimators)
+        names = self.estimators if estimators is None else listed(estimators)
         for name in names:
             self._require("estimator", name, self.estimators)
         trials = [score for score in self._scores if score.case == chosen and score.repeat == 0]
@@ -286,7 +286,7 @@ def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | No
 
     boards = []
     for given in (old, new):
-        with opened(_run_path(given)) as folder:
+        with opened(run_path(given)) as folder:
             boards.append(page.board_of(folder, folder.scores()))
     changes = comparison.compare(boards[0], boards[1], at_most=at_most)
     return pd.DataFrame([_change_row(change) for change in changes])
@@ -298,7 +298,7 @@ def bundle(run: Run | Path | str, out: Path | str) -> Path:
 
     path = Path(out)
     packing.require_zip(path)
-    packing.bundle(open_run(_run_path(run)), path)
+    packing.bundle(open_run(run_path(run)), path)
     return path
 
 
@@ -310,10 +310,10 @@ def plan(
     changes: Mapping[str, Any] | None = None,
 ) -> Plan:
     """The plan of a suite, as `run` takes it. Raises SuiteError and UnknownNameError."""
-    names = tuple(_estimator_name(each) for each in _listed(estimators))
+    names = tuple(_estimator_name(each) for each in listed(estimators))
     stated = {key: _as_yaml(value) for key, value in (changes or {}).items()}
     planned = read_plan(str(suite), only_estimators=names, changes=stated)
-    return _only(planned, _listed(only))
+    return _only(planned, listed(only))
 
 
 def _only(planned: Plan, patterns: Sequence[str]) -> Plan:
@@ -338,8 +338,8 @@ def _only(planned: Plan, patterns: Sequence[str]) -> Plan:
     return replace(planned.only(cases, scenes), entrants=entrants)
 
 
-def _listed(given: Any) -> list[Any]:
-    """One or several things, as a list."""
+def listed(given: Any) -> list[Any]:
+    """One or several things, as a list; nothing for None."""
     if given is None:
         return []
     if isinstance(given, (str, type, Path)):
@@ -366,7 +366,8 @@ def _as_yaml(value: Any) -> str:
         raise InputError(f"a change should be a number, a text, a list or a dict, got {value!r}") from None
 
 
-def _run_path(given: Run | Path | str) -> Path:
+def run_path(given: Run | Path | str) -> Path:
+    """The folder or the bundle of a run that is given in any form."""
     return given.path if isinstance(given, Run) else Path(given)
 
 

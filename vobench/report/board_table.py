@@ -236,8 +236,16 @@ def as_csv(made: Board) -> str:
     columns = list(dict.fromkeys(name for row in found for name in row))
     writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
-    writer.writerows({k: printable(v) if isinstance(v, str) else v for k, v in row.items()} for row in found)
+    writer.writerows({name: _csv_text(value) for name, value in row.items()} for row in found)
     return text.getvalue()
+
+
+def _csv_text(value: Any) -> Any:
+    """A value as a cell; a text that a spreadsheet would take for a formula has an apostrophe before it."""
+    if not isinstance(value, str):
+        return value
+    text = printable(value)
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "|")) else text
 
 
 def data_frame(made: Board) -> "pd.DataFrame":

@@ -1,18 +1,24 @@
 """A run as one zip file that others can score again, and several runs as one."""
 
+import errno
 import json
+import os
+import re
 import stat
-from collections.abc import Iterator, Sequence
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import Any
 from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile, ZipInfo
 
-from vobench.errors import InputError
+from vobench.errors import InputError, printable
 from vobench.runner.consistency import COVARIANCE
 from vobench.runner.entry import file_hash
-from vobench.runner.estimate import ESTIMATE, FINISHED, LOG, REVISED, Outcome
+from vobench.runner.estimate import ESTIMATE, LOG, REVISED
 from vobench.runner.folder import (
     CASE,
     ENVIRONMENT,
@@ -22,22 +28,26 @@ from vobench.runner.folder import (
     SCORE,
     SEQUENCE,
     SUITE,
-    SURVIVED,
     TIMES_HASHES,
     RunFolder,
     TrialScore,
     open_run,
     read_hashes,
-    read_tum,
 )
 from vobench.runner.frames import FRAMES, GROUND_TRUTH, TIMES
-from vobench.runner.score import score_estimate, status_of
-from vobench.runner.store import write_json
+from vobench.runner.rescore import rescored
+from vobench.runner.store import Tell, write_json
 
 OF_RUN, OF_CASE = (SUITE, ENVIRONMENT, ESTIMATORS), (CASE, GROUND_TRUTH)
 OF_TRIAL = (SCORE, ESTIMATE, REVISED, COVARIANCE, FRAMES, TIMES, LOG)
 SEQUENCES = "sequence_hashes.json"  # of the recordings, which are too large for a bundle
 MOST_BYTES = 8 << 30  # unpacked
+# What a suite's names look like; a label of several runs' has the name of its run behind it.
+LABEL = re.compile(r"[a-z0-9][a-z0-9_.]*( of [A-Za-z0-9_.-]+)?")
+CASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+REPEAT = re.compile(r"[0-9]{1,9}")
+NO_PLAIN = re.compile(r"[^A-Za-z0-9_.-]|^[^A-Za-z0-9]")
+MOST_OF_A_NAME = 60
 EPOCH = (1980, 1, 1, 0, 0, 0)  # no date, so that equal runs make equal bundles
 
 
@@ -50,14 +60,20 @@ def bundle(folder: RunFolder, out: Path) -> int:
     places[1:1] = sorted({place.parents[2] for place in places[1:]})
     names = [*(folder.path / name for name in OF_RUN)]
     names += [place / name for place in places[1:] for name in (*OF_CASE, *OF_TRIAL)]
-    files = {str(path.relative_to(folder.path)): path for path in names if path.is_file()}
+    root = folder.path.resolve()
     recorded = {name: held for name, held in read_hashes(folder).items() if SEQUENCE in PurePosixPath(name).parts}
-    hashes = {name: file_hash(path) for name, path in files.items()}
+    files = dict[str, bytes]()
+    for path in names:
+        name = str(path.relative_to(folder.path))
+        content = _content(root, name)
+        if content is not None:
+            files[name] = content
+    hashes = {name: sha256(content).hexdigest() for name, content in files.items()}
     with ZipFile(out, "w", ZIP_DEFLATED) as file:
         for name, stated in ((HASHES, hashes), (TIMES_HASHES, {}), (SEQUENCES, recorded)):
             file.writestr(ZipInfo(name, EPOCH), json.dumps(stated, indent=1), ZIP_DEFLATED)
-        for name, path in files.items():
-            file.writestr(ZipInfo(name, EPOCH), path.read_bytes(), ZIP_DEFLATED)
+        for name, content in files.items():
+            file.writestr(ZipInfo(name, EPOCH), content, ZIP_DEFLATED)
     return len(files)
 
 
@@ -67,24 +83,115 @@ def require_zip(out: Path) -> None:
         raise InputError(f"a bundle's name should end in .zip, got {out.name!r}")
 
 
+def _content(root: Path, name: str) -> bytes | None:
+    """The bytes of a file below a folder, None if there is no such file; no link on its path is followed.
+
+    Raises InputError if something on its path is a link, or the file is none.
+    """
+    *folders, last = PurePosixPath(name).parts
+    opened = [os.open(root, os.O_RDONLY | os.O_DIRECTORY)]
+    try:
+        for part in folders:
+            opened.append(os.open(part, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=opened[-1]))
+        opened.append(os.open(last, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=opened[-1]))
+        if not stat.S_ISREG(os.fstat(opened[-1]).st_mode):
+            raise InputError(f"only files can be bundled, which this is not: {root / name}")
+        with open(opened.pop(), "rb") as file:
+            return file.read()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.ENOTDIR):
+            raise InputError(f"a link is on its path, which a bundle does not follow: {root / name}") from None
+        raise
+    finally:
+        for fd in opened:
+            os.close(fd)
+
+
 @contextmanager
-def opened(path: Path) -> Iterator[RunFolder]:
-    """The run of a folder or a bundle, which is unpacked for so long. Raises InputError where it is neither."""
+def opened(path: Path, tell: Tell = lambda _: None) -> Iterator[RunFolder]:
+    """The run of a folder or a bundle, which is unpacked for so long.
+
+    `tell` is given a sentence if control characters had to be removed from what was unpacked. Raises InputError if the
+    path is neither, or its names are none that a suite could have.
+    """
     if not path.is_file():
-        yield open_run(path)
+        folder = open_run(path)
+        _require_names(folder)
+        yield folder
         return
     with TemporaryDirectory(prefix="vobench-bundle-") as temporary:
         try:
             with ZipFile(path) as file:
-                folder = RunFolder(Path(temporary) / _suite(file) / path.stem)
-                _unpack(file, folder.path, path)
-        except (BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
+                folder = RunFolder(Path(temporary) / _suite(file) / (_plain_name(path.stem) or "bundle"))
+                names = _unpack(file, folder.path, path)
+        except (BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
             raise InputError(f"neither a run's folder nor a bundle of one ({error}): {path}") from None
-        for name, held in read_hashes(folder).items():
+        hashes = read_hashes(folder)
+        for name, held in hashes.items():
             there = folder.path / name
             if not there.is_file() or file_hash(there) != held:
                 raise InputError(f"{name} is not the file that was bundled: {path}")
+        unnamed = sorted(set(names) - hashes.keys() - {HASHES, TIMES_HASHES, SEQUENCES})
+        if unnamed:
+            raise InputError(f"holds a file that its hashes do not name ({printable(unnamed[0])}): {path}")
+        _require_names(folder)
+        for name in hashes:
+            if _clean(folder.path / name):
+                tell(f"control characters were removed from {name}: {path}")
         yield folder
+
+
+def _require_names(folder: RunFolder) -> None:
+    """Raise InputError if a case or an estimator has a name that no suite could give it."""
+    for file in folder.score_files():
+        case, estimator, repeat = file.parents[3].name, file.parents[1].name, file.parent.name
+        for what, name, pattern in (
+            ("case", case, CASE_NAME),
+            ("estimator", estimator, LABEL),
+            ("repeat", repeat, REPEAT),
+        ):
+            if not pattern.fullmatch(name):
+                told = printable(name)[:MOST_OF_A_NAME]
+                raise InputError(f"the name of its {what} should match {pattern.pattern}, got {told!r}: {folder.path}")
+
+
+def _clean(path: Path) -> bool:
+    """Remove control characters, such as ESC and those that turn text around, from a table or an object in JSON."""
+    if path.suffix not in (".json", ".csv"):
+        return False
+    text = path.read_text(encoding="utf-8", errors="replace")
+    if path.suffix == ".csv":
+        cleaned = "".join(letter if letter.isprintable() or letter in "\r\n\t" else " " for letter in text)
+        is_other = cleaned != text
+    else:
+        try:
+            found = json.loads(text)
+            printable_only = _printable(found)
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"not readable as JSON ({error}): {path.name}") from None
+        is_other = printable_only != found
+        cleaned = json.dumps(printable_only, ensure_ascii=False) if is_other else text
+    if is_other:
+        path.write_text(cleaned, encoding="utf-8")
+    return is_other
+
+
+def _printable(value: Any) -> Any:
+    """The same JSON with printable texts."""
+    if isinstance(value, str):
+        return printable(value)
+    if isinstance(value, list):
+        return [_printable(each) for each in value]
+    if isinstance(value, dict):
+        return {printable(key): _printable(each) for key, each in value.items()}
+    return value
+
+
+def _plain_name(name: str) -> str:
+    """A name without what neither a table of numbers nor a terminal should be given."""
+    return NO_PLAIN.sub("_", name)
 
 
 def _suite(file: ZipFile) -> str:
@@ -93,47 +200,37 @@ def _suite(file: ZipFile) -> str:
         name = str(json.loads(file.read(SUITE))["name"])
     except (KeyError, ValueError, TypeError):
         return "bundle"
-    return name if name not in ("", ".", "..") and not set(name) & set("/\\\0") else "bundle"
+    return name if LABEL.fullmatch(name) else "bundle"
 
 
-def _unpack(file: ZipFile, to: Path, path: Path) -> None:
+def _unpack(file: ZipFile, to: Path, path: Path) -> list[str]:
+    """Unpack all files, and return their names. Raises InputError if one is twice, or would lie outside."""
     entries = file.infolist()
     if (total := sum(entry.file_size for entry in entries)) > MOST_BYTES:
         raise InputError(f"unpacks to {total / 1e9:.3g} GB, more than {MOST_BYTES / 1e9:.3g}: {path}")
+    seen = set[str]()
     for entry in entries:
         parts = PurePosixPath(entry.filename).parts
         if entry.filename.startswith("/") or ".." in parts or stat.S_ISLNK(entry.external_attr >> 16):
             raise InputError(f"holds a file that would lie outside of it ({entry.filename!r}): {path}")
+        name = str(PurePosixPath(entry.filename))
+        if name in seen:
+            raise InputError(f"holds a file twice ({entry.filename!r}): {path}")
+        seen.add(name)
     to.mkdir(parents=True)
     file.extractall(to)
+    return [str(PurePosixPath(entry.filename)) for entry in entries if not entry.is_dir()]
 
 
-def scored_again(folder: RunFolder) -> Iterator[tuple[TrialScore, bool]]:
-    """Each trial with its score computed anew from estimate and truth, and whether that is what it was.
+def scored_again(
+    folder: RunFolder, wrong_truths: Mapping[str, str] = MappingProxyType({})
+) -> Iterator[tuple[TrialScore, bool]]:
+    """Each trial with its score computed again from estimate and truth, and whether the run states the same.
 
-    A failure stays one, for why an estimator died is in no trajectory.
+    `wrong_truths` are those of `rescored`.
     """
-    for held in folder.scores():
-        place, truth = folder.estimate(held.case, held.estimator, held.repeat), folder.case(held.case) / GROUND_TRUTH
-        if not held.frames or not truth.is_file():
-            yield held, held.score is None
-            continue
-        gt, revised = read_tum(truth), place / REVISED
-        scored = score_estimate(read_tum(place / ESTIMATE), gt, held.claims)
-        later = score_estimate(read_tum(revised), gt, held.claims) if revised.is_file() else None
-        stated = {name: _plain(each) for name, each in (("score", scored), ("revised", later))}
-        anew: dict[str, Any] = {**stated, "coverage": scored.coverage.ratio if scored else 0.0}
-        if held.status in SURVIVED:
-            status, reason = status_of(Outcome(kind=FINISHED, reason=""), scored, gt)
-            if status not in SURVIVED and "too late" not in held.reason:
-                anew |= {"status": status, "reason": reason}
-        again = held.model_copy(update=anew)
-        yield again, again == held
-
-
-def _plain(scored: Any) -> dict[str, Any] | None:
-    found: dict[str, Any] | None = json.loads(json.dumps(scored.as_dict())) if scored else None
-    return found
+    for trial in rescored(folder, wrong_truths):
+        yield trial.score, not (trial.differs or trial.claimed)
 
 
 @contextmanager
@@ -149,7 +246,7 @@ def merged(folders: Sequence[RunFolder], names: Sequence[str]) -> Iterator[RunFo
     with TemporaryDirectory(prefix="vobench-merged-") as temporary:
         made = RunFolder(Path(temporary) / "merged" / "runs")
         known = dict[str, Any]()
-        for folder, name in zip(folders, names, strict=True):
+        for folder, name in zip(folders, map(_plain_name, names), strict=True):
             facts = {each["label"]: each for each in _stated(folder)}
             for score in folder.scores():
                 _link_case(folder, made, score.case, name)
@@ -171,7 +268,9 @@ def merged(folders: Sequence[RunFolder], names: Sequence[str]) -> Iterator[RunFo
 def _stated(folder: RunFolder) -> list[dict[str, Any]]:
     try:
         found = json.loads((folder.path / ESTIMATORS).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
+        return []
+    if not isinstance(found, list):
         return []
     return [each for each in found if isinstance(each, dict) and "label" in each]
 

@@ -7,32 +7,37 @@ what runs when. A task that fails takes those that need it with it, and nobody e
 import errno
 import os
 import signal
-import sys
 import threading
 import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from multiprocessing import get_context
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from queue import SimpleQueue
+from tempfile import TemporaryFile
+from typing import IO, Any, Literal, Protocol
+from uuid import uuid4
 
 from vobench import __version__, stop
 from vobench.errors import InputError, MissingDependencyError, VobenchError
+from vobench.runner.fork_server import ForkServer, WorkerProcess, shared_server, watch
 from vobench.runner.key import code_digest
-from vobench.runner.store import Progress, SilentProgress
+from vobench.runner.store import Progress, SilentProgress, Store, Tell
 from vobench.runner.task import ENTRIES, NO_LIMIT, Task, perform
 
 FailureKind = Literal["crashed", "out_of_memory", "refused"]
 LOOK_S = 0.2
-GRACE_S = 1.0  # for a process that is asked to stop
+GRACE_S = 0.7  # for a process that is asked to stop, before it is killed
+STOP_S = 0.4  # for its main thread, before another one tidies up and ends it
 CONNECT_S = 10.0
 # What a library's fault ends, as once in hundreds of sequences; what is made so is the same however often it is made.
 FAULTS, MADE = (-signal.SIGABRT, -signal.SIGSEGV, -signal.SIGBUS), ("bake", "sequence")
-# What processes of tasks import, once for all of them.
+# The function of worker processes, and what they import, once for all of them.
+ENTRY = "vobench.runner.executor:work"
 PRELOADED = [
     "vobench.runner.executor",
     "vobench.runner.simulate",
@@ -47,28 +52,27 @@ PRELOADED = [
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """How a task ended: no failure, or which and why; `ends_all` where no other task can end better.
-
-    `told` are the sentences on the store that the user should read.
-    """
+    """How a task ended: no failure, or which and why; `ends_all` where no other task can end better."""
 
     failure: FailureKind | None = None
     reason: str = ""
     wall_s: float = 0.0
     ends_all: bool = False
-    told: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """News of one task: `what` happens to it, on which slot of the executor, after how many seconds, and why."""
+    """News of one task: `what` happens to it, on which slot of the executor, after how many seconds, and why.
 
-    what: Literal["started", "done", "failed"]
+    A message that the user should read, such as for whom the task waits, is `told`, and comes at once.
+    """
+
+    what: Literal["started", "told", "done", "failed"]
     task: Task
     slot: int
     wall_s: float = 0.0
     reason: str = ""
-    told: tuple[str, ...] = ()
+    told: str = ""
 
 
 class Executor(Protocol):
@@ -76,8 +80,11 @@ class Executor(Protocol):
 
     slots: int
 
-    def submit(self, task: Task, store: Path, slot: int, threads: int) -> "Future[Done]":
-        """Begin a task; `threads` is how many it may use, NO_LIMIT for as many as there are."""
+    def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[Done]":
+        """Begin a task; `threads` is how many it may use, NO_LIMIT for as many as there are.
+
+        `tell` is called with messages for the user while the task is under way, from any thread.
+        """
 
     def close(self) -> None:
         """End whatever still runs."""
@@ -88,25 +95,23 @@ class Serial:
 
     slots = 1
 
-    def __init__(self, progress: Progress = SilentProgress()) -> None:  # noqa: B008 - no state
+    def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
 
-    def submit(self, task: Task, store: Path, slot: int, threads: int) -> "Future[Done]":
+    def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[Done]":
         """Perform it now."""
         del slot, threads
         future: Future[Done] = Future()
-        future.set_result(performed(task, store, NO_LIMIT, self._progress))
+        future.set_result(performed(task, store, NO_LIMIT, self._progress or SilentProgress(tell)))
         return future
 
     def close(self) -> None:
         """Nothing runs."""
 
 
-def performed(task: Task, store: Path, threads: int, progress: Progress = SilentProgress()) -> Done:  # noqa: B008
-    """Perform a task; what it raises is told, but for a request to stop."""
-    began, told = time.monotonic(), list[str]()
-    if isinstance(progress, SilentProgress):  # nobody hears of it here
-        progress = SilentProgress(told.append)
+def performed(task: Task, store: Path, threads: int, progress: Progress) -> Done:
+    """Perform a task; whatever it raises becomes its result, except a request to stop."""
+    began = time.monotonic()
     try:
         perform(task, store, threads, progress=progress)
     except MissingDependencyError as error:
@@ -119,7 +124,7 @@ def performed(task: Task, store: Path, threads: int, progress: Progress = Silent
         if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
             return Done("refused", f"{FULL}: {error.filename or store}", time.monotonic() - began, ends_all=True)
         return Done("crashed", f"{type(error).__name__}: {_line(error)}", time.monotonic() - began)
-    return Done(wall_s=time.monotonic() - began, told=tuple(told))
+    return Done(wall_s=time.monotonic() - began)
 
 
 FULL = "no space is left on the device; free some, or let VOBENCH_CACHE name a folder elsewhere"
@@ -133,33 +138,38 @@ class LocalProcesses:
     """Processes forked from a server that has imported what tasks import and nothing else, one for each task.
 
     Only sequences of one light, one after the other in a slot, share a process, which then has their scene at hand.
-    Each slot has cores of its own, as many as a task is given threads: what draws, traces, filters and multiplies
-    looks at which cores it may use.
+    Unless `pins_cores` is False, each slot has its own cores, as many as a task is given threads: libraries that draw,
+    trace, filter and multiply look at which cores they may use.
     """
 
-    def __init__(self, slots: int) -> None:
-        self.slots, self._cores = slots, sorted(os.sched_getaffinity(0))
-        self._context = get_context("forkserver")
-        self._context.set_forkserver_preload(PRELOADED)
-        self._running: set[Any] = set()
+    def __init__(self, slots: int, *, server: ForkServer | None = None, pins_cores: bool = True) -> None:
+        self.slots = slots
+        self._cores = sorted(os.sched_getaffinity(0))
+        self._pins_cores = pins_cores
+        self._server = server or shared_server(ENTRY, PRELOADED)
+        self._running: set[WorkerProcess] = set()
         self._idle: dict[int, _Worker] = {}
+        self._stores: set[Path] = set()
 
-    def submit(self, task: Task, store: Path, slot: int, threads: int) -> "Future[Done]":
-        """Give the task to a process; a thread waits for what it says, or for its end."""
+    def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[Done]":
+        """Give the task to a process; a thread waits for its messages and its end."""
         future: Future[Done] = Future()
-        cores = self._cores if threads == NO_LIMIT else _share(self._cores, slot, threads)
+        self._stores.add(store)
+        has_all = threads == NO_LIMIT or not self._pins_cores
+        cores = self._cores if has_all else _share(self._cores, slot, threads)
+        limit = len(cores) if self._pins_cores else threads
         first = self._worker(slot, task, cores)
 
         def await_end() -> None:
-            worker, done = first, first.ask(task, store)
-            if task.stage in MADE and worker.process.exitcode in FAULTS:
-                told = f"{task.key}: {done.reason}, by a fault in a library; it is made once more"
+            worker = first
+            done = worker.ask(task, store, limit, tell)
+            if task.stage in MADE and worker.process.exit_code in FAULTS:
+                tell(f"{task.key}: {done.reason}, by a fault in a library; it is made once more")
                 self._running.discard(worker.process)
                 worker.leave()
                 worker = self._worker(slot, task, cores)
-                done = worker.ask(task, store)
-                done = replace(done, told=(told, *done.told))
-            if task.stage == "sequence" and worker.process.is_alive():
+                done = worker.ask(task, store, limit, tell)
+            if task.stage == "sequence" and worker.process.is_alive:
                 self._idle[slot] = worker
             else:
                 worker.leave()
@@ -170,78 +180,67 @@ class LocalProcesses:
         return future
 
     def _worker(self, slot: int, task: Task, cores: list[int]) -> "_Worker":
-        kept = self._idle.pop(slot, None)
-        if kept and (kept.at_hand, kept.cores) == (_takes_up(task), cores) and kept.process.is_alive():
-            self._running.add(kept.process)
-            return kept
-        if kept:
-            kept.leave()
-        ours, theirs = self._context.Pipe()
-        process = self._context.Process(target=_work, args=(theirs, cores), daemon=False)
-        with _main_module_hidden():
-            process.start()
-        theirs.close()
+        idle = self._idle.pop(slot, None)
+        if idle and (idle.at_hand, idle.cores) == (_takes_up(task), cores) and idle.process.is_alive:
+            self._running.add(idle.process)
+            return idle
+        if idle:
+            idle.leave()
+        process = self._server.start_worker()
         self._running.add(process)
-        return _Worker(process, ours, cores, _takes_up(task))
+        worker = _Worker(process, cores, _takes_up(task), TemporaryFile())  # noqa: SIM115 - it lives as long as the worker
+        worker.begin()
+        return worker
 
     def close(self) -> None:
-        """Let go what waits; ask what runs to stop, then kill it."""
+        """End the idle processes; ask those that run to stop, kill them after a grace period, and tidy up."""
         while self._idle:
             self._idle.popitem()[1].leave()
-        for end in (signal.SIGTERM, signal.SIGKILL):
-            for process in list(self._running):
-                if process.pid and process.is_alive():
-                    os.kill(process.pid, end)
-            until = time.monotonic() + GRACE_S
-            while self._running and time.monotonic() < until:
+        was_killed = False
+        for number in (signal.SIGTERM, signal.SIGKILL):
+            running = [process for process in list(self._running) if process.is_alive]
+            for process in running:
+                process.kill(number)
+                was_killed = was_killed or number == signal.SIGKILL
+            ends_s = time.monotonic() + GRACE_S
+            while any(process.is_alive for process in running) and time.monotonic() < ends_s:
                 time.sleep(0.01)
-
-
-_HIDING = threading.Lock()
-
-
-@contextmanager
-def _main_module_hidden() -> Iterator[None]:
-    """Keep multiprocessing from importing the user's program in a worker that is started in this block.
-
-    Workers need nothing of it. A program that calls `vobench.run` without asking for its `__name__` would otherwise
-    run itself again in each of them.
-    """
-    main = sys.modules["__main__"]
-    with _HIDING:
-        file = main.__dict__.pop("__file__", None)
-        spec = main.__spec__
-        main.__spec__ = None
-        try:
-            yield
-        finally:
-            main.__spec__ = spec
-            if file is not None:
-                main.__file__ = file
+        for store in self._stores if was_killed else ():
+            Store(store).sweep()
 
 
 @dataclass(frozen=True, slots=True)
 class _Worker:
-    """A process that performs tasks, on these cores, until nobody can send it another."""
+    """A process that performs tasks, on these cores, until nobody can send it another.
 
-    process: Any
-    connection: Any
+    `trace` is the file to which it writes its stack when a fault ends it.
+    """
+
+    process: WorkerProcess
     cores: list[int]
     at_hand: str
+    trace: IO[bytes]
 
-    def ask(self, task: Task, store: Path) -> Done:
-        """What it says of a task, or how it died."""
+    def begin(self) -> None:
+        """Tell the process where it works; it may not have started yet."""
+        with suppress(OSError):  # it is dead: `ask` says so
+            self.process.connection.send((os.getcwd(), dict(os.environ), self.cores))
+
+    def ask(self, task: Task, store: Path, threads: int, tell: Tell) -> Done:
+        """How the process reports that a task ended, or how the process died; its messages go to `tell` at once."""
         began = time.monotonic()
         try:
-            self.connection.send((task, store))
-            return self.connection.recv()  # type: ignore[no-any-return]
+            self.process.connection.send((task, store, threads))
+            while not isinstance(answer := self.process.connection.recv(), Done):
+                tell(answer)
         except (EOFError, OSError):
-            self.process.join()
-            return _death(self.process.exitcode, time.monotonic() - began)
+            return _death(self.process.join(), time.monotonic() - began)
+        return answer
 
     def leave(self) -> None:
-        self.connection.close()
-        self.process.join()
+        """End the process."""
+        self.process.close()
+        self.trace.close()
 
 
 def _share(cores: Sequence[int], slot: int, threads: int) -> list[int]:
@@ -256,28 +255,39 @@ def _death(exitcode: int | None, wall_s: float) -> Done:
     return Done("crashed", f"its process ended with {by}", wall_s)
 
 
-def _work(connection: Connection, cores: Sequence[int]) -> None:
-    """Tasks in a process of its own, which goes when whoever started it does."""
-    os.setsid()  # the terminal's Ctrl-C is the parent's
+def work(connection: Connection, vobench_fd: int) -> None:
+    """Perform tasks in a forked process until vobench needs no more, or is gone.
+
+    `vobench_fd` becomes readable when vobench ends; -1 on systems without such descriptors.
+    """
+    os.setsid()  # the terminal's Ctrl-C is vobench's
+    signals_fd, wakes_fd = os.pipe()
+    os.set_blocking(wakes_fd, False)
+    signal.set_wakeup_fd(wakes_fd)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: stop.request(number))
-    os.sched_setaffinity(0, cores)
-    threading.Thread(target=_leave_with, args=(os.getppid(),), daemon=True).start()
+    watching = partial(watch, connection, vobench_fd, signals_fd, grace_s=STOP_S, leave=_leave)
+    threading.Thread(target=watching, name="watch vobench", daemon=True).start()
     try:
+        folder, environment, cores = connection.recv()
+        os.environ.clear()
+        os.environ.update(environment)
+        with suppress(OSError):
+            os.chdir(folder)
+        os.sched_setaffinity(0, cores)
         while True:
-            task, store = connection.recv()
-            connection.send(performed(task, store, len(cores)))
+            task, store, threads = connection.recv()
+            connection.send(performed(task, store, threads, SilentProgress(connection.send)))
     except (EOFError, OSError):
-        return  # nobody asks or hears any more
+        return  # nobody asks or listens any more
     except stop.Stopped:
         os._exit(128 + stop.requested())
 
 
-def _leave_with(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(LOOK_S)
+def _leave() -> None:
+    """Tidy up and end this process, whatever its main thread does."""
     stop.undo_all()
-    os._exit(1)
+    os._exit(128 + stop.requested() if stop.requested() else 1)
 
 
 class Dask:
@@ -307,14 +317,21 @@ class Dask:
             raise InputError(f"this Dask scheduler has no workers: {address}")
         self._workers = list(theirs)
         self.slots = len(self._workers)
+        # Every worker that performs tasks of ours holds the lease, which the scheduler takes back when we are gone.
+        self._lease = f"vobench-lease-{uuid4().hex}"
+        self._held = self._client.submit(str, self._lease, key=self._lease, pure=False)
+        self._tells: dict[str, Tell] = {}
+        self._client.subscribe_topic(self._lease, self._hear)
 
-    def submit(self, task: Task, store: Path, slot: int, threads: int) -> "Future[Done]":
+    def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[Done]":
         """Send the task to the worker of that slot, or to another where that one is gone."""
         future: Future[Done] = Future()
         worker = self._workers[slot]
+        self._tells[task.key] = tell
         sent = self._client.submit(
-            performed, task, store, threads, key=task.key, workers=[worker], allow_other_workers=True, pure=False
-        )
+            _performed_for, self._held, task, store, threads,
+            key=task.key, workers=[worker], allow_other_workers=True, pure=False,
+        )  # fmt: skip
 
         def ended(sent: Any) -> None:
             error = sent.exception()
@@ -323,9 +340,45 @@ class Dask:
         sent.add_done_callback(ended)
         return future
 
+    def _hear(self, event: tuple[float, tuple[str, str]]) -> None:
+        """Pass on a message of a task under way."""
+        _, (key, sentence) = event
+        self._tells[key](sentence)
+
     def close(self) -> None:
         """Leave the scheduler; what was sent to it is taken back."""
         self._client.close()
+
+
+_processes_for: dict[str, LocalProcesses] = {}
+_leases_lock = threading.Lock()
+
+
+def _performed_for(lease: str, task: Task, store: Path, threads: int) -> Done:
+    """Perform a task on a Dask worker, in a process that ends as soon as the client that holds the lease is gone."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    with _leases_lock:
+        if lease not in _processes_for:
+            server = ForkServer(ENTRY, PRELOADED)
+            _processes_for[lease] = LocalProcesses(1, server=server, pins_cores=False)
+            leaving = partial(_leave_with, lease, worker, server)
+            threading.Thread(target=leaving, name=f"watch {lease}", daemon=True).start()
+        processes = _processes_for[lease]
+
+    def tell(sentence: str) -> None:
+        worker.log_event(lease, (task.key, sentence))
+
+    return processes.submit(task, store, threading.get_ident(), threads, tell).result()
+
+
+def _leave_with(lease: str, worker: Any, server: ForkServer) -> None:
+    """End what runs for a client on this Dask worker once the client is gone."""
+    while lease in worker.data:
+        time.sleep(LOOK_S)
+    _processes_for.pop(lease).close()
+    server.close()
 
 
 def versions() -> dict[str, str]:
@@ -413,16 +466,20 @@ def perform_all(
     """
     queue, failures, running = _Queue.of(tasks), dict[str, Done](), dict["Future[Done]", tuple[Task, int]]()
     last = [""] * executor.slots
+    messages: SimpleQueue[Event] = SimpleQueue()
     try:
         while len(queue) or running:
             stop.check()
-            _fill(queue, running, last, executor, store, shares_time=shares_time, heard=heard)
-            for future in wait(running, timeout=LOOK_S, return_when=FIRST_COMPLETED).done:
+            _fill(queue, running, last, executor, store, messages=messages, shares_time=shares_time, heard=heard)
+            ended = wait(running, timeout=LOOK_S, return_when=FIRST_COMPLETED).done
+            while not messages.empty():
+                heard(messages.get())
+            for future in ended:
                 task, slot = running.pop(future)
                 done = future.result()
                 if done.ends_all:
                     raise InputError(done.reason)
-                heard(Event("failed" if done.failure else "done", task, slot, done.wall_s, done.reason, done.told))
+                heard(Event("failed" if done.failure else "done", task, slot, done.wall_s, done.reason))
                 if not done.failure:
                     queue.release(task.key)
                     continue
@@ -441,6 +498,7 @@ def _fill(
     executor: Executor,
     store: Path,
     *,
+    messages: "SimpleQueue[Event]",
     shares_time: bool,
     heard: Callable[[Event], object],
 ) -> None:
@@ -456,4 +514,8 @@ def _fill(
         is_alone = not running and ((_is_timed(task) and not shares_time) or not len(queue))
         heard(Event("started", task, slot))
         threads = NO_LIMIT if is_alone or executor.slots == 1 else max(cores // executor.slots, 1)
-        running[executor.submit(task, store, slot, threads)] = (task, slot)
+
+        def tell(sentence: str, task: Task = task, slot: int = slot) -> None:
+            messages.put(Event("told", task, slot, told=sentence))
+
+        running[executor.submit(task, store, slot, threads, tell)] = (task, slot)

@@ -9,7 +9,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
 
 from vobench.errors import InputError, TrajectoryError
 from vobench.runner.consistency import Consistency
@@ -41,6 +41,24 @@ SURVIVED = ("ok", "partial")
 NOT_APPLICABLE = "not_applicable"  # the recording lacks a sensor that the estimator needs
 
 
+class _Metric(BaseModel):
+    """One metric of a score, as far as everybody reads it."""
+
+    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
+
+    name: str
+
+
+class _ScoreShape(BaseModel):
+    """What every score in JSON has."""
+
+    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
+
+    metrics: list[_Metric]
+    alignment: dict[str, Any] = {}
+    failure: dict[str, Any] | None = None
+
+
 class TrialScore(BaseModel):
     """One estimator on one case: its status and, where there is any estimate, its score.
 
@@ -49,7 +67,7 @@ class TrialScore(BaseModel):
     the score of the poses that came after the last frame, where there were some.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     schema_version: int = 1
     case: str
@@ -66,6 +84,13 @@ class TrialScore(BaseModel):
     claims: tuple[str, ...] = ()
     consistency: Consistency | None = None
     revised: dict[str, Any] | None = None
+
+    @field_validator("score", "revised")
+    @classmethod
+    def _has_shape(cls, score: dict[str, Any] | None) -> dict[str, Any] | None:
+        if score is not None:
+            _ScoreShape.model_validate(score)
+        return score
 
     def value(self, metric: str, statistic: str) -> float | None:
         """One statistic of one metric, None where the trial has no such score."""

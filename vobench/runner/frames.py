@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from vobench.errors import InputError
 
@@ -75,12 +75,17 @@ def read_frames(folder: Path) -> list[FrameRow]:
     """
     if not (folder / TIMES).is_file():
         raise InputError(f"a run of an older vobench, without a table of times; run the suite again: {folder}")
-    times = {row["frame"]: row for row in read_table(folder / TIMES)}
+    times = {row.get("frame", ""): row for row in read_table(folder / TIMES)}
     nothing = {field.name: "" if field.type is str else None for field in fields(FrameRow)}
     untimed = dict.fromkeys(TIME_COLUMNS, "")
-    rows = [{**untimed, **times.get(row["frame"], {}), **row} for row in read_table(folder / FRAMES)]
-    known = [{name: row[name] or empty for name, empty in nothing.items()} for row in rows]
-    return _adapter().validate_python(known)
+    rows = [{**untimed, **times.get(row.get("frame", ""), {}), **row} for row in read_table(folder / FRAMES)]
+    known = [{name: row.get(name) or empty for name, empty in nothing.items()} for row in rows]
+    try:
+        return _adapter().validate_python(known)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise InputError(f"not a table of frames as vobench writes it ({place}: {first['msg']}): {folder}") from None
 
 
 @cache

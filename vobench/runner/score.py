@@ -44,7 +44,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
     outcome, scale = read_outcome(estimate), scored.alignment.scale if scored else 1.0
     status, reason = status_of(outcome, scored, gt)
     if dropped and outcome.kind == FINISHED:
-        status, reason = _status_of_handed(est, gt, claims, dropped)
+        status, reason = status_of_handed(est, gt, claims, dropped)
     score = TrialScore(
         case=trial.case.name,
         variant=trial.case.variant,
@@ -56,7 +56,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
         frames=len(gt),
         path_m=float(gt.distances_m()[-1]),
         score=scored.as_dict() if scored else None,
-        drift_m=_extent_m(est) if scored and stands_still(gt) else None,
+        drift_m=extent_m(est) if scored and stands_still(gt) else None,
         claims=claims,
         consistency=trial_consistency(estimate, gt, est, start_ns=min(stamps.values()), scale=scale),
         revised=later.as_dict() if later else None,
@@ -68,10 +68,10 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
 def stands_still(gt: Trajectory) -> bool:
     """Whether the truth stays within 2 mm and 0.2° of its first pose: an error of its path would mean nothing."""
     turned_rad = se3.rotation_angle(se3.inverse(gt.T_world_frame[:1])[:, :3, :3] @ gt.T_world_frame[:, :3, :3])
-    return bool(_extent_m(gt) <= STILL_M and np.max(turned_rad) <= STILL_RAD)
+    return bool(extent_m(gt) <= STILL_M and np.max(turned_rad) <= STILL_RAD)
 
 
-def _extent_m(trajectory: Trajectory) -> float:
+def extent_m(trajectory: Trajectory) -> float:
     """The largest distance from the first position."""
     return float(np.linalg.norm(trajectory.positions_m - trajectory.positions_m[:1], axis=1).max())
 
@@ -105,7 +105,7 @@ def status_of(outcome: Outcome, scored: Score | None, gt: Trajectory) -> tuple[T
     return "ok", ""
 
 
-def _status_of_handed(
+def status_of_handed(
     est: Trajectory, gt: Trajectory, claims: Sequence[str], dropped: Sequence[int]
 ) -> tuple[TrialStatus, str]:
     """How a trial in real time ended, by the frames that came in time; those of these stamps did not."""

@@ -27,7 +27,7 @@ STATE, INPUTS = "state", "inputs.json"
 TIMED = 50  # results of a stage whose seconds are kept, about
 # How often a lock is asked for that another holds: soon at first, and then so that Ctrl-C is answered in time.
 FIRST_LOOK_S, LOOK_S = 1e-3, 0.2
-PATIENCE_S = 1.0  # before the user is told who is waited for
+PATIENCE_S = 0.5  # before the user is told who is waited for
 
 Tell = Callable[[str], object]
 

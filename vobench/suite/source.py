@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from glob import glob
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,6 +11,7 @@ from vobench.setting import Name, OneOf, Positive, Short, settings
 
 FILE_KEYS = ("calibration", "imu", "truth")
 TOPICS = ("left", "right", "left_info", "right_info", "truth", "imu")
+MOST_MATCHES = 10_000
 GLOB = re.compile(r"[*?\[]")
 
 
@@ -86,10 +86,31 @@ def _found(written: str, folder: Path) -> list[Path]:
         if not placed.exists():
             raise SuiteError(f"no folder or file at {placed}")
         return [placed]
-    paths = sorted(map(Path, glob(str(placed), recursive=True)))
+    paths = _matches(written, folder)
     if not paths:
         raise SuiteError(f"no folder or file matches {placed}")
     return paths
+
+
+def _matches(written: str, folder: Path) -> list[Path]:
+    """What a pattern matches, sorted; `**` follows no link. Raises SuiteError where that is too much, or no pattern."""
+    parts = _placed(written, folder).parts
+    first = next(index for index, part in enumerate(parts) if GLOB.search(part))
+    base, pattern = Path(*parts[:first]), "/".join(parts[first:])
+    shows_hidden = any(part.startswith(".") for part in parts[first:])
+    found = list[Path]()
+    try:
+        for path in base.glob(pattern):
+            is_hidden = any(part.startswith(".") for part in path.relative_to(base).parts)
+            if is_hidden and not shows_hidden:
+                continue
+            found.append(path)
+            if len(found) > MOST_MATCHES:
+                raise SuiteError(f"more than {MOST_MATCHES} files and folders match '{written}'")
+    except (OSError, RecursionError, ValueError) as error:
+        cause = "folders are nested too deep" if isinstance(error, RecursionError) else error
+        raise SuiteError(f"'{written}' cannot be searched for ({cause})") from None
+    return sorted(path for path in found if path.is_dir() or not written.endswith("/"))
 
 
 def _placed(written: str, folder: Path) -> Path:

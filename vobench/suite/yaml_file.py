@@ -15,8 +15,9 @@ from typing import Any, Generic, TypeVar
 from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
-from ruamel.yaml.constructor import RoundTripConstructor
+from ruamel.yaml.constructor import ConstructorError, RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from vobench.errors import Mistake, Place, SettingError, SuiteError, VobenchError
 from vobench.setting import COMPLAINTS, complaint, hints, over, unit_of
@@ -25,6 +26,13 @@ from vobench.suite.file_kind import Kind
 
 Model = TypeVar("Model")
 Keys = tuple[int | str, ...]
+# Limits of a file, far beyond what a person writes; each is reported in one line.
+MOST_BYTES = 2 << 20
+MOST_NODES = 100_000
+MOST_DEPTH = 100
+MOST_DIGITS = 400  # of a number; no float has as many
+NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+TOO_DEEP = "brackets or indents are nested too deep"
 KEPT = 64  # files, parsed: scenarios change one scene again and again
 INCLUDE = "include"  # the key of a file that others of its kind build on
 
@@ -206,8 +214,8 @@ def _change(tree: Any, keys: str, value: str) -> None:
     if isinstance(tree, list) and (not isinstance(last, int) or last >= len(tree)):
         raise SuiteError(f"--set {keys}={value}: a list of {len(tree)} has no entry {last!r}")
     try:
-        tree[last] = YAML(typ="safe").load(value)
-    except YAMLError:
+        tree[last] = _plain(_of_text(Path("--set"), value)[0].marked)
+    except SuiteError:
         raise SuiteError(f"--set {keys}={value}: should be a value as YAML has it, such as 3, true or [1, 2]") from None
 
 
@@ -249,11 +257,25 @@ def json_schema(kind: Any) -> dict[str, Any]:
 
 
 class _Constructor(RoundTripConstructor):
-    """Builds what a file holds, of keys that are there twice the first, and remembers the second."""
+    """Builds what a file holds, of keys that are there twice the first, and remembers the second.
+
+    What would be too large once its aliases are written out is refused before anything of it is built.
+    """
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         self.twice: list[tuple[Any, str]] = []
+        self.mark: Any = None  # of what is being built
+
+    def construct_document(self, node: Any) -> Any:
+        """What the file holds. Raises ConstructorError where it is beyond a limit."""
+        _require_limits(node)
+        return super().construct_document(node)
+
+    def construct_object(self, node: Any, deep: bool = False) -> Any:
+        """What a node stands for; its mark is remembered for an error that has none."""
+        self.mark = node.start_mark
+        return super().construct_object(node, deep=deep)
 
     def check_mapping_key(self, node: Any, key_node: Any, mapping: Any, key: Any, value: Any) -> bool:
         """Whether a key is new."""
@@ -265,14 +287,64 @@ class _Constructor(RoundTripConstructor):
         return True
 
 
+def _require_limits(root: Node) -> None:
+    """Raise ConstructorError for a document that is too large or contains itself: aliases count as what they repeat."""
+    sizes = dict[int, int]()  # of nodes with all below them, by id
+    pending = [(root, False)]  # a node, and whether all below it is counted
+    above = set[int]()
+    while pending:
+        node, is_counted = pending.pop()
+        children = _children(node)
+        if is_counted:
+            above.discard(id(node))
+            sizes[id(node)] = 1 + sum(sizes[id(child)] for child in children)
+            if sizes[id(node)] > MOST_NODES:
+                raise _refused(f"holds more than {MOST_NODES} values, repetitions by aliases counted", node)
+            continue
+        if id(node) in above:
+            raise _refused("an alias stands inside of what it repeats", node)
+        if id(node) in sizes:
+            continue
+        if len(above) >= MOST_DEPTH:
+            raise _refused(f"is nested more than {MOST_DEPTH} deep", node)
+        if isinstance(node, ScalarNode) and node.tag in NUMBERS and len(node.value) > MOST_DIGITS:
+            raise _refused(f"a number has more than {MOST_DIGITS} characters", node)
+        above.add(id(node))
+        pending.append((node, True))
+        pending += [(child, False) for child in children]
+
+
+def _children(node: Node) -> list[Node]:
+    if isinstance(node, MappingNode):
+        return [each for pair in node.value for each in pair]
+    return list(node.value) if isinstance(node, SequenceNode) else []
+
+
+def _refused(sentence: str, node: Node) -> ConstructorError:
+    return ConstructorError(None, None, sentence, node.start_mark)
+
+
+def _read_text(path: Path) -> str:
+    """The text of a file, which may be of any kind. Raises SuiteError where it is too long or no text."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise SuiteError(f"cannot read {path}: {error.strerror}") from None
+    if len(content) > MOST_BYTES:
+        raise SuiteError(Mistake(f"should be a text of {MOST_BYTES >> 20} MiB at most", (Place(str(path)),)))
+    try:
+        return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError:
+        raise SuiteError(Mistake("not a text file in UTF-8", (Place(str(path)),))) from None
+
+
 def _parse(path: Path) -> tuple[YamlFile, list[Mistake]]:
     """The file as YAML, and the keys that are in it twice. Raises SuiteError where it has no keys with values."""
     try:
-        source, twice = _of_text(path, path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SuiteError(f"cannot read {path}: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise SuiteError(Mistake("not a text file in UTF-8", (Place(str(path)),))) from None
+        source, twice = _of_text(path, _read_text(path))
+    except RecursionError:
+        raise SuiteError(Mistake(TOO_DEEP, (Place(str(path)),))) from None
     if not isinstance(source.marked, dict):
         tree = source.marked
         kind = "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
@@ -292,7 +364,10 @@ def _of_text(path: Path, text: str) -> tuple[YamlFile, tuple[Mistake, ...]]:
     except YAMLError as error:
         raise SuiteError(Mistake(" ".join(str(error).split()), (Place(str(path)),))) from None
     except RecursionError:
-        raise SuiteError(Mistake("brackets or indents are nested too deep", (Place(str(path)),))) from None
+        raise SuiteError(Mistake(TOO_DEEP, (Place(str(path)),))) from None
+    except Exception as error:  # of the library, which meets what its authors did not think of
+        sentence = f"not readable as YAML ({type(error).__name__}: {' '.join(str(error).split())})"
+        raise SuiteError(_at_mark(path, yaml.constructor.mark, sentence)) from None
     return YamlFile(path, tree), tuple(_at_mark(path, mark, sentence) for mark, sentence in yaml.constructor.twice)
 
 
