@@ -18,15 +18,19 @@ from typing import Any
 import yaml
 
 from vobench.analysis.causes import attribute
-from vobench.cli.failure import conditions_of, course, explained, outcome, read_simulated, read_trial, shrunk
+from vobench.analysis.explain_trial import explain_trial
+from vobench.analysis.shrink_trial import shrink_trial
+from vobench.analysis.trial_data import read_conditions, read_course, read_outcome
 from vobench.geometry import rig
 from vobench.geometry.camera import Pinhole
 from vobench.rendering import bake
 from vobench.runner.executor import Serial
+from vobench.runner.finished_trial import read_simulated_case
 from vobench.runner.folder import RunFolder
 from vobench.runner.key import cache_folder
+from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.run import run_suite
-from vobench.suite.suite import read_plan
+from vobench.suite.suite import Plan, read_plan
 
 LENS = Pinhole(240, 160, 200.0, 200.0, 119.5, 79.5)
 
@@ -83,9 +87,16 @@ def changed(tree: Any, changes: Mapping[str, Any]) -> Any:
 
 def run(suite: Path, out: Path) -> RunFolder:
     """The suite, run in this process, which alone knows the small lens."""
-    return run_suite(
-        read_plan(str(suite)), {}, root=out, store=cache_folder(), finish=lambda *_: None, executor=Serial()
-    )
+    return plan_runner(out)(read_plan(str(suite)))
+
+
+def plan_runner(out: Path) -> PlanRunner:
+    """Runs a plan in this process."""
+
+    def run_here(plan: Plan, /) -> RunFolder:
+        return run_suite(plan, {}, root=out, store=cache_folder(), finish=lambda *_: None, executor=Serial())
+
+    return run_here
 
 
 def named(world: World, names: Sequence[str]) -> tuple[list[dict[str, Any]], str]:
@@ -102,7 +113,7 @@ def print_errors(world: World, out: Path, chosen: Sequence[Sequence[str]]) -> No
         for planted in ((), *([name] for name in names), *([names] if len(names) > 1 else [])):
             folder = run(world.write(out, "_".join([*planted, estimator]), named(world, planted)[0], [estimator]), out)
             (score,) = folder.scores()
-            loss = outcome(folder, score).loss.mean()
+            loss = read_outcome(folder, score).loss.mean()
             told.append(f"{'+'.join(planted) or 'nothing'} {loss:.1%} ({score.status}, {score.frames} frames)")
         print(f"{'+'.join(names):20} {estimator:12} {'; '.join(told)}", flush=True)
 
@@ -115,9 +126,9 @@ def explain_all(world: World, out: Path, chosen: Sequence[Sequence[str]], repeat
         wanted = {change["cause"] for change in changes}
         folder = run(world.write(out, "_".join([*planted, estimator]), changes, [estimator]), out)
         (score,) = folder.scores()
-        tried = read_trial(folder.path / score.case / score.estimator)
+        trial = folder.path / score.case / score.estimator
         began = time.process_time()
-        found = explained(tried, repeats=repeats, out=out, jobs=1)
+        found = explain_trial(trial, run_plan=plan_runner(out), repeats=repeats).explanation
         ranked = [*found.singles[:3], *found.pairs[:2]]
         told = ", ".join(f"{'+'.join(c.removed)} {c.mended:.0%} [{c.low:.0%}, {c.high:.0%}]" for c in ranked)
         right += (is_right := wanted == set(found.named))
@@ -139,7 +150,9 @@ def shrink_all(world: World, out: Path, chosen: Sequence[str]) -> int:
         folder = run(world.write(out, f"long_{name}", changes, [estimator]), out)
         (score,) = folder.scores()
         began = time.process_time()
-        found = shrunk(read_trial(folder.path / score.case / score.estimator), trials=12, out=out, jobs=1)
+        trial = folder.path / score.case / score.estimator
+        saved = out / f"small_{name}"
+        found = shrink_trial(trial, run_plan=plan_runner(out), trials=12, folder=saved).found
         (first, end), (_, of) = found.window, found.whole
         share = (end - first) / of
         right += (is_right := of >= 300 and share <= 0.2 and len(found.tried) <= 12)
@@ -159,10 +172,10 @@ def rank_causes(world: World, out: Path) -> int:
     folders = {
         name: run(world.write(out, f"all_{name}", [world.planted.get(name, {})], estimators), out) for name in names
     }
-    seen = {name: conditions_of(folder, read_simulated(folder, "way")) for name, folder in folders.items()}
+    seen = {name: read_conditions(folder, read_simulated_case(folder, "way")) for name, folder in folders.items()}
     for estimator in estimators:
         scores = {name: next(s for s in f.scores() if s.estimator == estimator) for name, f in folders.items()}
-        found = attribute([replace(course(folders[name], scores[name], seen[name]), case=name) for name in names])
+        found = attribute([replace(read_course(folders[name], scores[name], seen[name]), case=name) for name in names])
         assert found is not None
         for name, change in world.planted.items():
             if change["estimator"] == estimator:

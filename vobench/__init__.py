@@ -4,10 +4,13 @@ Everything that the command line does can be done from Python; docs/python.md sh
 is first used.
 """
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from importlib.machinery import ModuleSpec
+
     from vobench.metric.settings import LIKE, ScoreSettings
     from vobench.notebook.class_source import write_estimator
     from vobench.notebook.runs import Check, Run, bundle, check, compare, read_board, read_run, run
@@ -76,3 +79,19 @@ if not TYPE_CHECKING:  # otherwise a type checker would take every misspelt name
     def __dir__():
         """The public names, imported or not."""
         return sorted(__all__)
+
+
+class _Retired:
+    """A finder of modules that earlier releases had, asked after all others: old plugins get a sentence."""
+
+    @staticmethod
+    def find_spec(name: str, _path: object = None, _target: object = None) -> "ModuleSpec | None":
+        """The spec of a retired module, as `vobench.retired` says; None for any other name."""
+        if not name.startswith("vobench."):
+            return None
+        from vobench import retired
+
+        return retired.find_spec(name)
+
+
+sys.meta_path.append(_Retired)

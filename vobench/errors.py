@@ -14,6 +14,7 @@ VobenchError               the user's mistake or machine: one line, exit code 1
 └── SequenceError          a recording is incomplete, torn or of another form
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -131,3 +132,10 @@ def unknown(kind: str, name: str, known: list[str]) -> str:
     near = get_close_matches(name, known, n=1)
     guess = f" Did you mean '{near[0]}'?" if near else ""
     return f"no {kind} named '{name}'.{guess} Known: {', '.join(sorted(known)) or 'none'}"
+
+
+def require_known(kind: str, name: str, known: Iterable[str]) -> None:
+    """Raise UnknownNameError, with the nearest known name, unless `name` is one of `known`."""
+    names = list(known)
+    if name not in names:
+        raise UnknownNameError(unknown(kind, name, names))

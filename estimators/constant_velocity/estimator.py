@@ -5,10 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from vobench.errors import VobenchError
-from vobench.estimator import EncoderReadings, Frame, Result, Status
-from vobench.geometry import se3
-from vobench.geometry.rig import Rig
+from vobench.plugin import EncoderReadings, Frame, Result, Rig, Status, VobenchError, se3
 
 
 class ConstantVelocity:

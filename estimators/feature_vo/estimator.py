@@ -8,14 +8,21 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.errors import VobenchError
-from vobench.estimator import Frame, Result, Status, Tracks
-from vobench.estimator.pose import PoseFit, pose_from_points
-from vobench.estimator.protocol import Image
-from vobench.estimator.tools import parameters, stereo_pair
-from vobench.geometry import se3
-from vobench.geometry.rig import Rig
-from vobench.geometry.se3 import Array
+from vobench.plugin import (
+    Array,
+    Frame,
+    Image,
+    PoseFit,
+    Result,
+    Rig,
+    Status,
+    Tracks,
+    VobenchError,
+    parameters,
+    pose_from_points,
+    se3,
+    stereo_pair,
+)
 
 Descriptors = NDArray[Any]
 DETECTORS = ("orb", "sift")

@@ -5,11 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from vobench.errors import VobenchError
-from vobench.estimator import Frame, ImuReadings, Result, Status
-from vobench.geometry import se3
-from vobench.geometry.rig import Rig
-from vobench.geometry.se3 import Array
+from vobench.plugin import Array, Frame, ImuReadings, Result, Rig, Status, VobenchError, se3
 
 from .standstill import Rest, Standstill
 from .strapdown import State, carried

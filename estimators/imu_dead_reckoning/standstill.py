@@ -4,11 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vobench.estimator import ImuReadings
-from vobench.geometry.camera import unit
-from vobench.geometry.rig import ImuCalibration
-from vobench.geometry.se3 import Array
-from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2
+from vobench.plugin import STANDARD_GRAVITY_MPS2, Array, ImuCalibration, ImuReadings, unit
 
 # Readings at rest stay within so many sigma of their mean, and a little more for a chip's rounding.
 SIGMAS = 5.0

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from vobench.geometry import se3
-from vobench.geometry.se3 import Array
+from vobench.plugin import Array, se3
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,16 +7,24 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vobench.errors import VobenchError
-from vobench.estimator import Frame, ImuReadings, Result, Status
-from vobench.estimator.pose import PoseFit, adjoint
-from vobench.estimator.stereo_tracker import StereoTracker, TrackerSettings
-from vobench.estimator.tools import parameters, stereo_pair
-from vobench.geometry import se3
-from vobench.geometry.camera import unit
-from vobench.geometry.rig import Rig
-from vobench.geometry.se3 import Array
-from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2
+from vobench.plugin import (
+    STANDARD_GRAVITY_MPS2,
+    Array,
+    Frame,
+    ImuReadings,
+    PoseFit,
+    Result,
+    Rig,
+    Status,
+    StereoTracker,
+    TrackerSettings,
+    VobenchError,
+    adjoint,
+    parameters,
+    se3,
+    stereo_pair,
+    unit,
+)
 
 from .filter import State, anchored, carried, corrected, started
 

@@ -9,10 +9,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from vobench.estimator.pose import cross_matrix
-from vobench.geometry import se3
-from vobench.geometry.rig import ImuCalibration
-from vobench.geometry.se3 import Array
+from vobench.plugin import Array, ImuCalibration, cross_matrix, se3
 
 P, THETA, V, TURN, FORCE, GRAVITY = (slice(k, k + 3) for k in range(0, 18, 3))
 POSE = slice(0, 6)

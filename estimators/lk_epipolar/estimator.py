@@ -7,23 +7,27 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vobench.estimator import Frame, Result, Status, Tracks
-from vobench.estimator.pose import DisparityOffset, carried_on
-from vobench.estimator.protocol import Image
-from vobench.estimator.tools import (
+from vobench.plugin import (
+    Array,
+    DisparityOffset,
+    Frame,
+    Image,
     Mask,
     Points,
+    Result,
+    Rig,
+    Status,
+    Tracks,
+    carried_on,
     comparable,
     corners_per_cell,
     follow_predicted,
     inside,
     parameters,
     predicted,
+    se3,
     stereo_pair,
 )
-from vobench.geometry import se3
-from vobench.geometry.rig import Rig
-from vobench.geometry.se3 import Array
 
 from .motion import Matches, Motion, TwoViews, best_motion, refined, two_views
 

@@ -13,10 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from vobench.estimator.pose import cross_matrix
-from vobench.estimator.tools import Mask
-from vobench.geometry import se3
-from vobench.geometry.se3 import Array
+from vobench.plugin import Array, Mask, cross_matrix, se3
 
 MIN_STEREO = 12  # points with depth that a length needs
 MAX_BEHIND = 0.1  # share of points that may land behind the camera

@@ -7,23 +7,27 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vobench.estimator import Frame, Result, Status, Tracks
-from vobench.estimator.pose import carried_on, pose_from_points
-from vobench.estimator.protocol import Image
-from vobench.estimator.tools import (
+from vobench.plugin import (
+    Array,
     Eye,
+    Frame,
+    Image,
     Mask,
     Points,
+    Result,
+    Rig,
+    Status,
+    Tracks,
+    carried_on,
     comparable,
     corners_per_cell,
     follow_predicted,
     inside,
     parameters,
+    pose_from_points,
     predicted,
+    se3,
 )
-from vobench.geometry import se3
-from vobench.geometry.rig import Rig
-from vobench.geometry.se3 import Array
 
 CONFIDENCE = 0.9999
 NOISE_PX = 0.1  # of a track: with its parallax it says how well a depth is known

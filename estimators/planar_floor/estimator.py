@@ -7,13 +7,24 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from vobench.errors import VobenchError
-from vobench.estimator import Frame, Result, Status, Tracks
-from vobench.estimator.protocol import Image
-from vobench.estimator.tools import Mask, Points, comparable, corners_per_cell, follow_predicted, inside, parameters
-from vobench.geometry import se3
-from vobench.geometry.rig import Rig
-from vobench.geometry.se3 import Array
+from vobench.plugin import (
+    Array,
+    Frame,
+    Image,
+    Mask,
+    Points,
+    Result,
+    Rig,
+    Status,
+    Tracks,
+    VobenchError,
+    comparable,
+    corners_per_cell,
+    follow_predicted,
+    inside,
+    parameters,
+    se3,
+)
 
 HYPOTHESES = 128
 ROBUST_PX = 0.15  # about the noise of a good track

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from vobench.estimator import Frame, Result
-from vobench.geometry.rig import Rig
+from vobench.plugin import Frame, Result, Rig
 
 
 class StandStill:

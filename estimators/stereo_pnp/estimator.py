@@ -7,13 +7,22 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vobench.estimator import Frame, Result, Status, Tracks
-from vobench.estimator.pose import PoseFit, carried_on
-from vobench.estimator.protocol import Image
-from vobench.estimator.stereo_tracker import Followed, StereoTracker, TrackerSettings
-from vobench.estimator.tools import parameters, stereo_pair
-from vobench.geometry import se3
-from vobench.geometry.rig import Rig
+from vobench.plugin import (
+    Followed,
+    Frame,
+    Image,
+    PoseFit,
+    Result,
+    Rig,
+    Status,
+    StereoTracker,
+    TrackerSettings,
+    Tracks,
+    carried_on,
+    parameters,
+    se3,
+    stereo_pair,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,10 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.errors import VobenchError
-from vobench.estimator import Frame, Result, Status
-from vobench.geometry import se3
-from vobench.geometry.rig import Rig
+from vobench.plugin import Frame, Result, Rig, Status, VobenchError, se3
 
 
 class WheelOdometry:

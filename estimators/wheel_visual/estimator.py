@@ -8,14 +8,22 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.errors import VobenchError
-from vobench.estimator import EncoderReadings, Frame, Result, Status
-from vobench.estimator.pose import PoseFit, adjoint
-from vobench.estimator.stereo_tracker import StereoTracker, TrackerSettings
-from vobench.estimator.tools import parameters, stereo_pair
-from vobench.geometry import se3
-from vobench.geometry.rig import Rig
-from vobench.geometry.se3 import Array
+from vobench.plugin import (
+    Array,
+    EncoderReadings,
+    Frame,
+    PoseFit,
+    Result,
+    Rig,
+    Status,
+    StereoTracker,
+    TrackerSettings,
+    VobenchError,
+    adjoint,
+    parameters,
+    se3,
+    stereo_pair,
+)
 
 CORRELATED = 4.0  # tracks near each other err alike: so many count as one
 PLANE = (0, 1, 5)  # of a small translation and rotation: along x and y, about z

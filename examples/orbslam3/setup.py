@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vobench.asset import picture
+from vobench.plugin import picture
 
 FOLDER = Path(__file__).resolve().parent
 PICTURES = 24

@@ -4,14 +4,33 @@ from dataclasses import replace
 
 import numpy as np
 
-from vobench.asset import picture
-from vobench.asset.furniture import DARK, STEEL, WHITE, Part, coated, matt, put, stood
-from vobench.asset.picture import INK, NAVY, OCHRE
-from vobench.asset.room import OUTWARD, Opening, Piece, shell, things
-from vobench.asset.shape import at, block, card, tube
-from vobench.asset.texture import Procedural
-from vobench.scene.material import Material
-from vobench.scene.mesh import joined, quad
+from vobench.plugin import (
+    DARK,
+    INK,
+    NAVY,
+    OCHRE,
+    OUTWARD,
+    STEEL,
+    WHITE,
+    Material,
+    Opening,
+    Part,
+    Piece,
+    Procedural,
+    at,
+    block,
+    card,
+    coated,
+    joined,
+    matt,
+    picture,
+    put,
+    quad,
+    shell,
+    stood,
+    things,
+    tube,
+)
 
 LONG, WIDE, HIGH = 32.0, 17.0, 2.7
 BAY_M, DEEP_M = 2.6, 5.0

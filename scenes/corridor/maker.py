@@ -4,14 +4,37 @@ from dataclasses import replace
 
 import numpy as np
 
-from vobench.asset import picture
-from vobench.asset.furniture import CHROME, DARK, STEEL, WHITE, coated, matt, put, stood, wood
-from vobench.asset.picture import INKS, NAVY, PAPER, TEAL
-from vobench.asset.room import FINISHES, OUTWARD, Opening, Piece, shell, things
-from vobench.asset.shape import at, block, card, lathe, spline, tube
-from vobench.asset.texture import Procedural
-from vobench.scene.material import Material
-from vobench.scene.mesh import joined
+from vobench.plugin import (
+    CHROME,
+    DARK,
+    FINISHES,
+    INKS,
+    NAVY,
+    OUTWARD,
+    PAPER,
+    STEEL,
+    TEAL,
+    WHITE,
+    Material,
+    Opening,
+    Piece,
+    Procedural,
+    at,
+    block,
+    card,
+    coated,
+    joined,
+    lathe,
+    matt,
+    picture,
+    put,
+    shell,
+    spline,
+    stood,
+    things,
+    tube,
+    wood,
+)
 
 LONG, WIDE, HIGH = 24.0, 2.4, 2.75
 DADO_M, DOOR_M = 1.05, 0.92

@@ -4,27 +4,46 @@ from dataclasses import replace
 
 import numpy as np
 
-from vobench.asset import picture
-from vobench.asset.furniture import (
+from vobench.plugin import (
     BLACK,
+    BRICK,
     CHROME,
     DARK,
+    FINISHES,
+    NAVY,
+    OCHRE,
+    OUTWARD,
+    SAND,
     STEEL,
+    TEAL,
     WHITE,
+    AreaLight,
+    Opening,
     Part,
+    Piece,
+    Steady,
+    at,
+    block,
+    bulb,
+    card,
     coated,
+    cushion,
+    extrusion,
+    joined,
+    lathe,
     matt,
     mm,
+    picture,
+    pierced,
     put,
+    quad,
+    shell,
+    spline,
     stood,
+    things,
+    tube,
     wood,
-)  # fmt: skip
-from vobench.asset.household import bulb
-from vobench.asset.picture import BRICK, NAVY, OCHRE, SAND, TEAL
-from vobench.asset.room import FINISHES, OUTWARD, Opening, Piece, shell, things
-from vobench.asset.shape import at, block, card, cushion, extrusion, lathe, pierced, quad, spline, tube
-from vobench.scene.light import AreaLight, Steady
-from vobench.scene.mesh import joined
+)
 
 LONG, WIDE, HIGH = 9.6, 5.4, 2.55
 WALL_X, WALL_M = -1.2, 0.14  # the wall between kitchen and living room

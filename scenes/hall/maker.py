@@ -4,15 +4,40 @@ from dataclasses import replace
 
 import numpy as np
 
-from vobench.asset import picture
-from vobench.asset.fitting import bars
-from vobench.asset.furniture import CHROME, DARK, STEEL, WHITE, Part, coated, matt, put, stood, wood
-from vobench.asset.picture import INK, NAVY, PAPER, TEAL
-from vobench.asset.room import FINISHES, OUTWARD, Opening, Piece, shell, things
-from vobench.asset.shape import at, block, card, lathe, pierced, quad, tube
-from vobench.scene.light import AreaLight
-from vobench.scene.material import Material
-from vobench.scene.mesh import joined
+from vobench.plugin import (
+    CHROME,
+    DARK,
+    FINISHES,
+    INK,
+    NAVY,
+    OUTWARD,
+    PAPER,
+    STEEL,
+    TEAL,
+    WHITE,
+    AreaLight,
+    Material,
+    Opening,
+    Part,
+    Piece,
+    at,
+    bars,
+    block,
+    card,
+    coated,
+    joined,
+    lathe,
+    matt,
+    picture,
+    pierced,
+    put,
+    quad,
+    shell,
+    stood,
+    things,
+    tube,
+    wood,
+)
 
 LONG, WIDE, HIGH = 22.0, 12.0, 4.4
 BAYS_X = tuple(3.6 * (k - 2.5) for k in range(6))  # middles of the panes

@@ -7,15 +7,28 @@ from PIL import Image, ImageDraw
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
-from vobench.asset import picture
-from vobench.asset.furniture import Part, coated, matt, put, stood, wood
-from vobench.asset.household import bulb
-from vobench.asset.picture import NAVY
-from vobench.asset.room import Piece, things
-from vobench.asset.shape import at, card, sheet
-from vobench.scene.light import AreaLight, Steady
-from vobench.scene.material import Picture
-from vobench.scene.mesh import Mesh, joined, quad
+from vobench.plugin import (
+    NAVY,
+    AreaLight,
+    Mesh,
+    Part,
+    Picture,
+    Piece,
+    Steady,
+    at,
+    bulb,
+    card,
+    coated,
+    joined,
+    matt,
+    picture,
+    put,
+    quad,
+    sheet,
+    stood,
+    things,
+    wood,
+)
 
 LONG, WIDE, CELL_M = 72.0, 52.0, 0.5
 LOOP = ((-25, -9), (-14, -14), (1, -9.5), (14, -13), (25, -6), (21, 8), (9, 14.5), (-4, 10), (-15, 14), (-26, 4))

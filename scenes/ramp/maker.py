@@ -4,14 +4,39 @@ from dataclasses import replace
 
 import numpy as np
 
-from vobench.asset import picture
-from vobench.asset.furniture import DARK, STEEL, WHITE, Part, coated, matt, mm, put, stood, wood
-from vobench.asset.picture import BRICK, NAVY, OCHRE, TEAL
-from vobench.asset.room import OUTWARD, Opening, Piece, shell, things
-from vobench.asset.shape import at, block, card, cushion, extrusion, lathe, spline, tube
-from vobench.asset.texture import Procedural
-from vobench.scene.material import Material
-from vobench.scene.mesh import joined
+from vobench.plugin import (
+    BRICK,
+    DARK,
+    NAVY,
+    OCHRE,
+    OUTWARD,
+    STEEL,
+    TEAL,
+    WHITE,
+    Material,
+    Opening,
+    Part,
+    Piece,
+    Procedural,
+    at,
+    block,
+    card,
+    coated,
+    cushion,
+    extrusion,
+    joined,
+    lathe,
+    matt,
+    mm,
+    picture,
+    put,
+    shell,
+    spline,
+    stood,
+    things,
+    tube,
+    wood,
+)
 
 LONG, WIDE, HIGH = 24.0, 10.0, 6.0
 FOOT_X, HEAD_X, SLOPE = -7.0, 8.0, 0.08

@@ -5,14 +5,40 @@ from dataclasses import replace
 import numpy as np
 from PIL import Image, ImageDraw
 
-from vobench.asset import picture
-from vobench.asset.furniture import DARK, STEEL, WHITE, Part, coated, matt, put, stood, wood
-from vobench.asset.picture import BRICK, INK, INKS, NAVY, PAPER, PLUM, SAND, TEAL
-from vobench.asset.room import Piece, things
-from vobench.asset.shape import at, block, card, lathe, pierced, reveal, tube
-from vobench.scene.light import AreaLight, Steady
-from vobench.scene.material import Picture
-from vobench.scene.mesh import joined, quad
+from vobench.plugin import (
+    BRICK,
+    DARK,
+    INK,
+    INKS,
+    NAVY,
+    PAPER,
+    PLUM,
+    SAND,
+    STEEL,
+    TEAL,
+    WHITE,
+    AreaLight,
+    Part,
+    Picture,
+    Piece,
+    Steady,
+    at,
+    block,
+    card,
+    coated,
+    joined,
+    lathe,
+    matt,
+    picture,
+    pierced,
+    put,
+    quad,
+    reveal,
+    stood,
+    things,
+    tube,
+    wood,
+)
 
 LONG = 84.0  # of the street; houses close it at both ends, beyond a crossroad
 ROAD_M, PAVED_M, KERB_M, CROSS_M = 7.0, 3.2, 0.12, 8.0

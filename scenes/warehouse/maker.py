@@ -4,14 +4,36 @@ from dataclasses import replace
 
 import numpy as np
 
-from vobench.asset import picture
-from vobench.asset.furniture import BLACK, DARK, STEEL, WHITE, Part, coated, matt, mm, put, stood
-from vobench.asset.picture import OCHRE, PAPER
-from vobench.asset.room import FINISHES, OUTWARD, Opening, Piece, shell, things
-from vobench.asset.shape import at, block, card, extrusion, lathe, tube
-from vobench.asset.texture import Procedural
-from vobench.scene.material import Material
-from vobench.scene.mesh import joined
+from vobench.plugin import (
+    BLACK,
+    DARK,
+    FINISHES,
+    OCHRE,
+    OUTWARD,
+    PAPER,
+    STEEL,
+    WHITE,
+    Material,
+    Opening,
+    Part,
+    Piece,
+    Procedural,
+    at,
+    block,
+    card,
+    coated,
+    extrusion,
+    joined,
+    lathe,
+    matt,
+    mm,
+    picture,
+    put,
+    shell,
+    stood,
+    things,
+    tube,
+)
 
 LONG, WIDE, HIGH = 26.0, 16.0, 6.5
 BAY_M, DEEP_M, BAYS = 2.7, 1.1, 6

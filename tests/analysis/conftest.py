@@ -1,10 +1,15 @@
-"""A case that has some of everything."""
+"""A case that has some of everything, and a run in which an estimator fails for a known reason."""
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 
-from vobench.suite.suite import Case, read_plan
+from tests.cli.conftest import CLOSET, make_cheap
+from vobench.runner.executor import Serial
+from vobench.runner.folder import RunFolder, TrialScore
+from vobench.runner.run import run_suite
+from vobench.suite.suite import Case, Plan, read_plan
 
 SCENE = """
 name: hall
@@ -40,3 +45,78 @@ def hard(tmp_path: Path) -> Case:
     (tmp_path / "hall.yaml").write_text(SCENE)
     (tmp_path / "suite.yaml").write_text(SUITE)
     return read_plan(str(tmp_path / "suite.yaml")).simulated[0]
+
+
+BLIND = '''
+import numpy as np
+from vobench.estimator import Result, Status
+
+class Blind:
+    def start(self, rig, params, seed):
+        self._metres_per_tick = 2 * np.pi * rig.wheels.radius_m / rig.wheels.ticks_per_revolution
+
+    def process(self, frame):
+        """The path of the wheels straight ahead, unless neighbouring pixels differ."""
+        if np.abs(np.diff(frame.left.astype(float), axis=1)).mean() > 0.5:
+            return Result(None, Status.LOST, "noise")
+        T = np.eye(4)
+        T[0, 3] = frame.encoders.ticks[-1].mean() * self._metres_per_tick
+        return Result(T)
+'''
+MANIFEST = "name: blind\nversion: '1'\nclass: estimator:Blind\nneeds: [mono, encoders]\npose_of: body\nsummary: Blind\n"
+NOISY = """
+name: noisy
+scenes: [closet]
+rigs: {down: {pitch_deg: 90}}
+trajectories: {short: {targets_m: [[0.25, 0]], tolerance_m: 0.04, rate_hz: 5}}
+cameras: {noisy: {sensor: mt9v034, vignetting: 0.1, timing: {drop_share: 0.2}}}
+estimators: [./blind, wheel_odometry]
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class NoisyRun:
+    """A run in which the estimator `blind` is lost because the camera is noisy, on one case called `short`."""
+
+    root: Path
+    folder: RunFolder
+
+    @property
+    def estimator(self) -> Path:
+        """The folder of `blind`, which is not found by its name."""
+        return self.root / "blind"
+
+    def trial(self, estimator: str) -> Path:
+        """A trial as the command line names it."""
+        return self.folder.path / "short" / estimator
+
+    def score(self, estimator: str) -> TrialScore:
+        """The score of a trial."""
+        return next(score for score in self.folder.scores() if score.estimator == estimator)
+
+    def run_plan(self, plan: Plan, /) -> RunFolder:
+        """Run a plan in this process, in silence."""
+        return run_suite(
+            plan, {}, root=self.root / "runs", store=self.root / "cache", executor=Serial(), finish=lambda *_: None
+        )
+
+
+@pytest.fixture(scope="session")
+def noisy_run(tmp_path_factory: pytest.TempPathFactory) -> NoisyRun:
+    """The run, made once, with pictures that are grey but for the camera's noise."""
+    root = tmp_path_factory.mktemp("noisy")
+    (root / "closet.yaml").write_text(CLOSET)
+    (root / "noisy.yaml").write_text(NOISY)
+    (root / "blind").mkdir()
+    (root / "blind" / "estimator.yaml").write_text(MANIFEST)
+    (root / "blind" / "estimator.py").write_text(BLIND)
+    with pytest.MonkeyPatch.context() as patch:
+        make_cheap(patch)
+        run = NoisyRun(root, RunFolder(root))
+        return replace(run, folder=run.run_plan(read_plan(str(root / "noisy.yaml"))))
+
+
+@pytest.fixture
+def cheap_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures that are grey but for the camera's effects, for a test that runs variants of `noisy_run`."""
+    make_cheap(monkeypatch)

@@ -8,6 +8,7 @@ import pytest
 from vobench.runner import key
 from vobench.runner.key import PACKAGE, closure, code_digest, imported_by
 from vobench.runner.task import ENTRIES
+from vobench.suite.catalog import builtin_root
 
 
 @pytest.fixture(scope="module")
@@ -20,15 +21,16 @@ def tree(tmp_path_factory):
 
 @pytest.fixture
 def digest_after(tree):
-    """The digest of a stage's code after a text in a file of it is replaced by another."""
+    """Digests of the code of a stage, or of modules, before and after a text in a file is replaced by another."""
 
-    def change(stage: str, file: str, old: str, new: str) -> tuple[str, str]:
+    def change(stage: str | list[str], file: str, old: str, new: str) -> tuple[str, str]:
         path = tree / file
-        before, text = code_digest(*ENTRIES[stage], package=tree), path.read_text()
+        entries = ENTRIES[stage] if isinstance(stage, str) else stage
+        before, text = code_digest(*entries, package=tree), path.read_text()
         assert old in text
         path.write_text(text.replace(old, new, 1))
         code_digest.cache_clear()
-        after = code_digest(*ENTRIES[stage], package=tree)
+        after = code_digest(*entries, package=tree)
         path.write_text(text)
         code_digest.cache_clear()
         return before, after
@@ -134,3 +136,63 @@ def test_what_is_kept_of_modules_spares_time_and_changes_nothing(tmp_path, monke
     assert len(read) == len(kept)
     (tmp_path / "file").touch()
     assert anew(tmp_path / "file") == digest
+
+
+def modules_behind(tmp_path, source: str) -> set[str]:
+    """The modules that an estimator with this source depends on, itself and those that these import."""
+    (tmp_path / "estimator.py").write_text(source)
+    return set(closure(imported_by(tmp_path)))
+
+
+def test_a_name_of_the_plugin_module_stands_for_the_module_it_lives_in(tmp_path):
+    modules = modules_behind(tmp_path, "from vobench.plugin import Result, StereoTracker, se3\n")
+    assert {"vobench.estimator.stereo_tracker", "vobench.estimator.tools", "vobench.geometry.se3"} <= modules
+    assert not {"vobench.asset.shape", "vobench.metric.comparison", "vobench.dataset.layout"} & modules
+
+
+def test_an_estimator_that_takes_little_from_the_plugin_module_depends_on_little(tmp_path):
+    modules = modules_behind(tmp_path, "from vobench.plugin import Result\n")
+    assert "vobench.estimator.protocol" in modules
+    assert "vobench.estimator.tools" not in modules
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import vobench.plugin\n\ndef f(rig):\n    return vobench.plugin.stereo_pair(rig, 'mine')\n",
+        "import vobench.plugin as vp\n\nclass A:\n    def f(self, rig):\n        return vp.stereo_pair(rig, 'mine')\n",
+        "from vobench import plugin\n\ndef f(rig):\n    return plugin.stereo_pair(rig, 'mine')\n",
+        "from vobench.plugin import *\n\ndef f(rig):\n    return stereo_pair(rig, 'mine')\n",
+        "def f(rig):\n    from vobench.plugin import stereo_pair as pair\n    return pair(rig, 'mine')\n",
+    ],
+)
+def test_a_name_is_found_however_the_plugin_module_is_imported(tmp_path, source):
+    modules = modules_behind(tmp_path, source)
+    assert "vobench.estimator.tools" in modules
+    assert "vobench.asset.shape" not in modules
+
+
+def test_a_retired_name_stands_for_the_module_it_lives_in_now(tmp_path):
+    assert "vobench.geometry.rig" in modules_behind(tmp_path, "from vobench.geometry.rectify import rectification\n")
+
+
+def test_what_an_estimators_test_imports_does_not_count(tmp_path):
+    (tmp_path / "test_contract.py").write_text("from vobench.plugin import assert_contract\n")
+    assert modules_behind(tmp_path, "from vobench.plugin import Result\n").isdisjoint({"vobench.report.contract"})
+
+
+@pytest.mark.parametrize(
+    ("estimator", "file", "is_of_it"),
+    [
+        ("stereo_pnp", "estimator/stereo_tracker.py", True),
+        ("stereo_pnp", "asset/shape.py", False),
+        ("stand_still", "estimator/stereo_tracker.py", False),
+        ("stand_still", "plugin.py", False),
+    ],
+)
+def test_a_built_in_estimators_key_changes_with_the_code_behind_its_names(
+    tree, digest_after, estimator, file, is_of_it
+):
+    folder = builtin_root() / "estimators" / estimator
+    before, after = digest_after(imported_by(folder, package=tree), file, "\nfrom ", "\nADDED = 1\nfrom ")
+    assert (before != after) is is_of_it

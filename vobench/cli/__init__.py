@@ -6,6 +6,7 @@ import select
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -19,6 +20,8 @@ CLEAR_LINE, SHOW_CURSOR = "\r\033[K", "\033[?25h"  # what a progress bar leaves 
 
 def main() -> None:
     """The entry point of the `vobench` command."""
+    # Names that a plugin of an earlier release imports and that have moved (`vobench/retired.py`).
+    warnings.filterwarnings("default", message=r"vobench\.", category=DeprecationWarning)
     try:
         with _stoppable():
             from vobench.cli.app import run

@@ -1,49 +1,17 @@
 """vobench causes, explain and shrink: why an estimator fails."""
 
-import json as json_module
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
-from pydantic import ValidationError
 
-from vobench.analysis.causes import Attribution, Course, attribute
-from vobench.analysis.conditions import CONDITIONS, conditions
-from vobench.analysis.explain import Change, Explanation, Outcome, explain, loss_between, mends, segment_loss
-from vobench.analysis.nuisance import NUISANCES, nuisances_of
-from vobench.analysis.shrink import FEWEST_FRAMES, Failure, Shrunk, shrink
+from vobench.analysis.causes import Attribution, Cause
+from vobench.analysis.explain_trial import TrialExplanation, explain_trial
+from vobench.analysis.run_causes import WORST_SEGMENTS, EstimatorCauses, find_causes
+from vobench.analysis.shrink_trial import ShrunkTrial, shrink_trial
 from vobench.cli import terminal
-from vobench.errors import InputError, UnknownNameError, unknown
-from vobench.runner.estimate import ESTIMATE, FINISHED
-from vobench.runner.estimate import Outcome as Ended
-from vobench.runner.folder import (
-    CASE,
-    ESTIMATORS,
-    SCORE,
-    SEQUENCE,
-    SUITE,
-    SURVIVED,
-    RunFolder,
-    TrialScore,
-    open_run,
-    read_score,
-    read_tum,
-)
-from vobench.runner.frames import GROUND_TRUTH, read_frames
-from vobench.runner.key import folder_digest
-from vobench.runner.launch import run_plan
-from vobench.runner.motion import body_motion, body_motions
-from vobench.runner.score import score_estimate, status_of
-from vobench.suite import catalog
-from vobench.suite.case_file import write_case
-from vobench.suite.manifest import read_manifest
-from vobench.suite.suite import Case, Entrant, Plan, Suite, Window
-from vobench.suite.yaml_file import Mistakes, YamlFile, checked
-
-if TYPE_CHECKING:
-    from vobench.trajectory.trajectory import Trajectory
+from vobench.cli.plan_runner import plan_runner
 
 TrialPath = Annotated[
     Path, typer.Argument(metavar="RUN/CASE/ESTIMATOR", help="A trial, as runs/quickstart/latest/room-down/lk_epipolar.")
@@ -54,217 +22,81 @@ Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, envvar="VOBENCH_JOBS",
 EstimatorPath = Annotated[
     Path | None, typer.Option("--estimator", help="The estimator's folder, where it is not found by its name.")
 ]
-
-
-@dataclass(frozen=True, slots=True)
-class Tried:
-    """A trial of a run, and what makes it again: its case, its entrant, and the suite that it was part of."""
-
-    folder: RunFolder
-    score: TrialScore
-    case: Case
-    entrant: Entrant
-    suite: Suite
-
-    @property
-    def place(self) -> Path:
-        """Where its files are."""
-        return self.folder.estimate(self.score.case, self.score.estimator, self.score.repeat)
-
-
-def read_trial(path: Path, *, estimator: Path | None = None) -> Tried:
-    """The trial at RUN/CASE/ESTIMATOR, with /REPEAT where it is not the first, or at its own folder.
-
-    Raises InputError and UnknownNameError for what is not there, or was recorded and cannot be made in another way.
-    """
-    folder, score = _found(path)
-    case = read_simulated(folder, score.case)
-    return Tried(folder, score, case, _entrant(folder, score.estimator, estimator), _suite(folder))
-
-
-def _found(path: Path) -> tuple[RunFolder, TrialScore]:
-    if (path / SCORE).is_file() and len(path.parts) > 5:
-        return RunFolder(path.parents[4]), read_score(path / SCORE)
-    *before, case, name, repeat = ("", "", *path.parts) if path.name.isdigit() else ("", "", *path.parts, "0")
-    folder = open_run(Path(*before))
-    scores = folder.scores()
-    for kind, said, known in (
-        ("case", case, {score.case for score in scores}),
-        ("estimator", name, {score.estimator for score in scores}),
-    ):
-        if said not in known:
-            raise UnknownNameError(f"{unknown(kind, said, sorted(known))} in the run {folder.path}")
-    found = [s for s in scores if (s.case, s.estimator, s.repeat) == (case, name, int(repeat))]
-    if not found:
-        raise InputError(f"there is no repeat {repeat} of {name} on {case} in the run {folder.path}")
-    return folder, found[0]
-
-
-def read_simulated(folder: RunFolder, case: str) -> Case:
-    """A case of a run. Raises InputError where it was recorded elsewhere, or by another vobench."""
-    path = folder.case(case) / CASE
-    said = json_module.loads(path.read_bytes())
-    if "source" in said:
-        raise InputError(f"'{case}' is a recording: nothing in it can be changed and made again: {path}")
-    try:
-        return checked(Case, said)
-    except ValidationError as error:
-        place = ".".join(map(str, error.errors()[0]["loc"]))
-        raise InputError(f"of another vobench, whose cases this one cannot read ({place}): {path}") from None
-
-
-def _suite(folder: RunFolder) -> Suite:
-    try:
-        return checked(Suite, json_module.loads((folder.path / SUITE).read_bytes()))
-    except ValidationError:
-        raise InputError(f"of another vobench, whose suites this one cannot read: {folder.path / SUITE}") from None
-
-
-def _entrant(folder: RunFolder, label: str, path: Path | None) -> Entrant:
-    """The estimator as it took part. Raises UnknownNameError where its folder is not found by its name."""
-    listed = json_module.loads((folder.path / ESTIMATORS).read_bytes())
-    facts = next(entry for entry in listed if entry["label"] == label)
-    place = path or catalog.find("estimator", facts["name"]).path
-    manifest = read_manifest(place)
-    if folder_digest(place) != facts["code"]:
-        terminal.warn(f"{place} has changed since the run, whose {label} this is")
-    limits = replace(manifest.limits, **facts["limits"])
-    return Entrant(label, place, manifest, facts["params"], limits, facts["mode"])
-
-
-def run_cases(tried: Tried, cases: Mapping[str, Case], *, name: str, out: Path, jobs: int) -> RunFolder:
-    """Run the trial's estimator on these cases, as any suite is run. Raises SuiteError where one cannot be."""
-    named = tuple(replace(case, name=key) for key, case in cases.items())
-    source = YamlFile(tried.folder.path / SUITE, {})
-    suite = replace(tried.suite, name=name, repeats=1)
-    plan = Plan(suite, named, (), (tried.entrant,), (), source)
-    wrong = Mistakes(source)
-    with wrong.at():
-        body_motions(plan)
-    wrong.require_none()
-    return run_plan(plan, recordings={}, out=out, jobs=jobs, finish=lambda *_: None, display=terminal.TerminalDisplay())
-
-
-def outcome(folder: RunFolder, score: TrialScore) -> Outcome:
-    """How a trial of a run ended, and its error in each segment."""
-    gt, est, scale = _paths(folder, score)
-    return Outcome(score.status, score.status in SURVIVED, segment_loss(gt, est, scale=scale))
-
-
-def _paths(folder: RunFolder, score: TrialScore) -> "tuple[Trajectory, Trajectory, float]":
-    gt = read_tum(folder.case(score.case) / GROUND_TRUTH)
-    est = read_tum(folder.estimate(score.case, score.estimator, score.repeat) / ESTIMATE)
-    return gt, est, float(score.score["alignment"]["scale"]) if score.score else 1.0
-
-
-def course(folder: RunFolder, score: TrialScore, of_frames: Mapping[str, Any]) -> Course:
-    """A trial frame by frame, with its case's conditions."""
-    gt, est, scale = _paths(folder, score)
-    import numpy as np
-
-    loss = np.append(0.0, loss_between(gt, est, np.arange(len(gt)), scale=scale))
-    return Course(score.case, score.repeat, of_frames, loss)
-
-
-def conditions_of(folder: RunFolder, case: Case) -> dict[str, Any]:
-    """The conditions of a case's frames. Raises InputError where its sequence is no longer in the cache."""
-    from vobench.sequence import Sequence as Recorded
-
-    link = folder.case(case.name) / SEQUENCE
-    if not link.exists():
-        raise InputError(f"the sequence is gone from the cache; run the suite again to make it anew: {link}")
-    trial = next(folder.case(case.name).glob("estimates/*/*"))
-    exposures = {row.t_ns: (row.exposure_s or 0.0, row.gain_db or 0.0) for row in read_frames(trial)}
-    gt = read_tum(folder.case(case.name) / GROUND_TRUTH)
-    return conditions(case, gt, Recorded.open(link).frames(), exposures)
+# A condition is listed where it multiplies the error by more than this.
+LEAST_FACTOR = 1.1
+MOST_FACTORS = 3
 
 
 def causes_command(
     run: terminal.RunPath,
     *,
     estimator: Annotated[str | None, typer.Option(help="Only this one.")] = None,
-    worst: Annotated[int, typer.Option(min=1, help="How many segments to list.")] = 8,
+    worst: Annotated[int, typer.Option(min=1, help="How many segments to list.")] = WORST_SEGMENTS,
     json: terminal.Json = False,
 ) -> None:
     """Say what a run's errors hang on, where each trial went wrong first, and its worst segments."""
-    folder = open_run(run)
-    scores = folder.scores()
-    labels = sorted({score.estimator for score in scores})
-    chosen = [terminal.known("estimator", estimator, labels)] if estimator else labels
-    of_frames = {}
-    for name in terminal.Bars().track(cases := sorted({s.case for s in scores}), "look at", total=len(cases)):
-        of_frames[name] = conditions_of(folder, read_simulated(folder, name))
-    said = []
-    for label in chosen:
-        rows = [score for score in scores if score.estimator == label and score.frames]
-        courses = [course(folder, score, of_frames[score.case]) for score in rows]
-        found = attribute(courses)
-        said.append({"estimator": label, **_attributed(rows, courses, found, worst)})
-        if not json:
-            _print_causes(label, rows, courses, found, worst)
+    found = find_causes(run, estimator=estimator, progress=terminal.Bars())
     if json:
-        terminal.print_json({"run": str(folder.path), "conditions": CONDITIONS, "estimators": said})
-
-
-def _attributed(
-    rows: Sequence[TrialScore], courses: Sequence[Course], found: Attribution | None, worst: int
-) -> dict[str, Any]:
-    trials = [
-        {"case": c.case, "repeat": c.repeat, "status": row.status, "first_divergence_frame": c.first_divergence}
-        for row, c in zip(rows, courses, strict=True)
-    ]
-    if found is None:
-        return {"trials": trials}
-    return {
-        "trials": trials,
-        "explained": found.explained,
-        "causes": [asdict(cause) for cause in found.causes],
-        "constant": found.constant,
-        "cases": {case: [[c.conditions, factor] for c, factor in share] for case, share in found.cases.items()},
-        "worst": [asdict(segment) for segment in found.segments[:worst]],
-    }
-
-
-def _print_causes(
-    label: str, rows: Sequence[TrialScore], courses: Sequence[Course], found: Attribution | None, worst: int
-) -> None:
-    out = terminal.console()
-    if found is None:
-        out.print(f"{label}: too few frames, or frames too alike, to learn causes from")
+        terminal.print_json(found.as_dict(worst=worst))
         return
-    table = [
-        [" + ".join(c.conditions), f"{c.factor:.2f}", f"{c.low:.2f} to {c.high:.2f}", "" if c.is_sure else "not sure"]
-        for c in found.causes
-    ]
-    title = f"{label}: the error is multiplied by, from little to much of"
-    out.print(terminal.table(title, ["condition", "factor", "95 % interval", "is"], table))
-    out.print(f"together they explain {found.explained:.0%} of the error's variance (of its logarithm)")
-    if any(len(c.conditions) > 1 for c in found.causes):
-        out.print("conditions joined by + go together in this run: no regression can tell them apart")
+    for each in found.estimators:
+        _print_causes(each, worst=worst)
+
+
+def _print_causes(causes: EstimatorCauses, *, worst: int) -> None:
+    console = terminal.console()
+    found = causes.attribution
+    if found is None:
+        console.print(f"{causes.estimator}: too few frames, or frames too alike, to learn causes from")
+        return
+
+    title = f"{causes.estimator}: the error is multiplied by, from little to much of"
+    rows = [_cause_row(cause) for cause in found.causes]
+    console.print(terminal.table(title, ["condition", "factor", "95 % interval", "is"], rows))
+    console.print(f"together they explain {found.explained:.0%} of the error's variance (of its logarithm)")
+    if any(len(cause.conditions) > 1 for cause in found.causes):
+        console.print("conditions joined by + go together in this run: no regression can tell them apart")
     if found.constant:
-        out.print(f"the same in every segment, and so not known: {', '.join(found.constant)}")
-    lines = []
-    for row, each in zip(rows, courses, strict=True):
-        at = each.first_divergence
-        lines.append(
-            [each.case, str(each.repeat), row.status, "" if at is None else str(at), _top(found.cases[each.case])]
-        )
-    out.print(terminal.table("trials", ["case", "repeat", "status", "goes wrong at", "is worse than others by"], lines))
-    segments = [
-        [s.case, str(s.repeat), f"{s.first} to {s.end - 1}", f"{s.loss:.1%}", _top(s.factors)]
-        for s in found.segments[:worst]
-    ]
+        console.print(f"the same in every segment, and so not known: {', '.join(found.constant)}")
+
+    headings = ["case", "repeat", "status", "goes wrong at", "is worse than others by"]
+    console.print(terminal.table("trials", headings, _trial_rows(causes, found)))
     headings = ["case", "repeat", "frames", "error, of the way", "with"]
-    out.print(terminal.table("worst segments", headings, segments))
+    console.print(terminal.table("worst segments", headings, _segment_rows(found, worst)))
 
 
-def _top(shares: Sequence[tuple[Any, float]]) -> str:
-    """The conditions that add most, at most three of them."""
-    told = [f"{' + '.join(cause.conditions)} ×{factor:.2g}" for cause, factor in shares[:3] if factor > LEAST_TOLD]
-    return ", ".join(told)
+def _cause_row(cause: Cause) -> list[str]:
+    conditions = " + ".join(cause.conditions)
+    interval = f"{cause.low:.2f} to {cause.high:.2f}"
+    return [conditions, f"{cause.factor:.2f}", interval, "" if cause.is_sure else "not sure"]
 
 
-LEAST_TOLD = 1.1
+def _trial_rows(causes: EstimatorCauses, found: Attribution) -> list[list[str]]:
+    rows = []
+    for trial in causes.trials():
+        frame = trial["first_divergence_frame"]
+        wrong_at = "" if frame is None else str(frame)
+        factors = _largest_factors(found.cases[trial["case"]])
+        rows.append([trial["case"], str(trial["repeat"]), trial["status"], wrong_at, factors])
+    return rows
+
+
+def _segment_rows(found: Attribution, worst: int) -> list[list[str]]:
+    rows = []
+    for segment in found.segments[:worst]:
+        frames = f"{segment.first} to {segment.end - 1}"
+        factors = _largest_factors(segment.factors)
+        rows.append([segment.case, str(segment.repeat), frames, f"{segment.loss:.1%}", factors])
+    return rows
+
+
+def _largest_factors(factors: Sequence[tuple[Cause, float]]) -> str:
+    """The conditions that multiply the error most, with their factors."""
+    texts = []
+    for cause, factor in factors[:MOST_FACTORS]:
+        if factor > LEAST_FACTOR:
+            texts.append(f"{' + '.join(cause.conditions)} ×{factor:.2g}")
+    return ", ".join(texts)
 
 
 def explain_command(
@@ -277,64 +109,54 @@ def explain_command(
     json: terminal.Json = False,
 ) -> None:
     """Run a trial again without each thing that makes it hard, and say which of them it fails for."""
-    tried = read_trial(trial, estimator=estimator)
-    found = explained(tried, repeats=repeats, out=out, jobs=jobs)
+    found = explain_trial(
+        trial,
+        run_plan=plan_runner(out=out, jobs=jobs),
+        repeats=repeats,
+        estimator=estimator,
+        progress=terminal.Bars(),
+    )
     if json:
-        terminal.print_json({**asdict(found), "named": found.named})
-        return
-    _print_explanation(tried, found)
-
-
-def explained(tried: Tried, *, repeats: int, out: Path, jobs: int) -> Explanation:
-    """The explanation of a trial. Raises InputError where its case has nothing that can be removed."""
-    seen = conditions_of(tried.folder, tried.case)
-    nuisances = nuisances_of(tried.case, {name: float(values.max()) for name, values in seen.items()})
-    if not nuisances:
-        known = ", ".join(nuisance.name for nuisance in NUISANCES)
-        raise InputError(f"'{tried.case.name}' has nothing that can be removed. Known: {known}")
-    name = f"explain_{tried.score.case.replace('-', '_')}_{tried.score.estimator}"
-
-    def measure(cases: Mapping[str, Case]) -> dict[str, list[Outcome]]:
-        folder = run_cases(tried, cases, name=name, out=out, jobs=jobs)
-        return {score.case: [outcome(folder, score)] for score in folder.scores()}
-
-    return explain(tried.case, nuisances, measure, repeats=repeats)
-
-
-def _print_explanation(tried: Tried, found: Explanation) -> None:
-    out, score = terminal.console(), tried.score
-    what = {nuisance.name: nuisance.instead for nuisance in NUISANCES}
-    everything = found.everything
-
-    def row(change: Change, instead: str) -> list[str]:
-        ended = f"{change.survived} of {change.repeats}"
-        part = f"{change.mended:.0%}", f"{change.low:.0%} to {change.high:.0%}"
-        return [" and ".join(change.removed), instead, f"{change.loss:.1%}", *part, ended, _verdict(change, everything)]
-
-    headings = ["without", "instead", "error", "less", "95 % interval", "survived", "is"]
-    rows = [row(change, what[change.removed[0]]) for change in found.singles]
-    rows += [row(change, "") for change in found.pairs]
-    if len(everything.removed) > 1:
-        whole = row(everything, "")
-        rows.append(["all of these", *whole[1:]])
-    title = f"{score.estimator} on {score.case}: {found.status}, {found.loss:.1%} of the way wrong"
-    out.print(terminal.table(title, headings, rows))
-    if found.alone:
-        ordered = sorted(found.alone.items(), key=lambda item: -item[1])
-        told = ", ".join(f"{name} {loss:.1%}" for name, loss in ordered)
-        out.print(f"no single one mends it; with only one of them left the error is: {told}")
-    if not found.repeats_differ:
-        out.print("the repeats are alike, for nothing is random here: the intervals are over segments alone")
-    if found.named:
-        out.print(f"It fails for {' and '.join(found.named)}.")
+        terminal.print_json(found.as_dict())
     else:
-        out.print("None of these explains it: it is the estimator, its path or what it sees.")
+        _print_explanation(found)
 
 
-def _verdict(change: Change, everything: Change) -> str:
-    if mends(change, everything):
-        return "mends it"
-    return "helps" if change.is_sure else "harms" if change.high < 0 else "no difference"
+def _print_explanation(found: TrialExplanation) -> None:
+    console = terminal.console()
+    why = found.explanation
+    title = f"{found.estimator} on {found.case}: {why.status}, {why.loss:.1%} of the way wrong"
+    headings = ["without", "instead", "error", "less", "95 % interval", "survived", "is"]
+    console.print(terminal.table(title, headings, _change_rows(found)))
+    if why.alone:
+        by_loss = sorted(why.alone.items(), key=lambda item: -item[1])
+        losses = ", ".join(f"{name} {loss:.1%}" for name, loss in by_loss)
+        console.print(f"no single one mends it; with only one of them left the error is: {losses}")
+    if not why.repeats_differ:
+        console.print("the repeats are alike, for nothing is random here: the intervals are over segments alone")
+    if found.named:
+        console.print(f"It fails for {' and '.join(found.named)}.")
+    else:
+        console.print("None of these explains it: it is the estimator, its path or what it sees.")
+
+
+def _change_rows(found: TrialExplanation) -> list[list[str]]:
+    everything = found.explanation.everything.removed
+    rows = []
+    for row in found.rows():
+        is_everything = len(everything) > 1 and row["removed"] == everything
+        rows.append(
+            [
+                "all of these" if is_everything else " and ".join(row["removed"]),
+                row["instead"],
+                f"{row['loss']:.1%}",
+                f"{row['mended']:.0%}",
+                f"{row['low']:.0%} to {row['high']:.0%}",
+                f"{row['survived']} of {row['repeats']}",
+                row["verdict"],
+            ]
+        )
+    return rows
 
 
 def shrink_command(
@@ -350,69 +172,30 @@ def shrink_command(
     json: terminal.Json = False,
 ) -> None:
     """Find the shortest part of a trial that fails in the same way, and save it as a suite of its own."""
-    tried = read_trial(trial, estimator=estimator)
-    if tried.score.status in ("ok", *([] if tried.score.reason else ["partial"])):
-        raise InputError(f"{tried.score.estimator} on {tried.score.case} is {tried.score.status}: nothing fails")
-    found = shrunk(tried, trials=trials, out=out, jobs=jobs)
-    target = save or Path("shrunk") / f"{tried.score.case}_{tried.score.estimator}"
-    first, end = found.window
-    of = found.whole[1] - found.whole[0]
-    summary = f"{tried.score.estimator}: {tried.score.status}, {tried.score.reason}"
-    suite = write_case(
-        found.case, [tried.entrant], target, name=f"{tried.score.case}_shrunk".replace("-", "_"), summary=summary
+    found = shrink_trial(
+        trial,
+        run_plan=plan_runner(out=out, jobs=jobs),
+        trials=trials,
+        folder=save,
+        estimator=estimator,
+        progress=terminal.Bars(),
     )
     if json:
-        terminal.print_json(
-            {"suite": str(suite), "frames": [first, end], "of": of, "removed": found.removed, "tried": found.tried}
-        )
-        return
+        terminal.print_json(found.as_dict())
+    else:
+        _print_shrunk(found)
+
+
+def _print_shrunk(found: ShrunkTrial) -> None:
+    rows = []
+    for number, (tried, fails) in enumerate(found.found.tried, 1):
+        rows.append([str(number), tried, "fails the same way" if fails else "does not"])
     console = terminal.console()
-    rows = [
-        [str(n), said, "fails the same way" if failed else "does not"]
-        for n, (said, failed) in enumerate(found.tried, 1)
-    ]
-    console.print(terminal.table(f"{summary}", ["#", "tried", "result"], rows))
-    also = f" and without {', '.join(found.removed)}" if found.removed else ""
-    console.print(f"It still fails with frames {first} to {end - 1} of {of} ({(end - first) / of:.0%}){also}.")
-    console.print(f"The smaller case: {suite}\nRun it: vobench run {suite}")
+    console.print(terminal.table(found.summary, ["#", "tried", "result"], rows))
 
-
-def shrunk(tried: Tried, *, trials: int, out: Path, jobs: int) -> Shrunk:
-    """The smallest case that fails as the trial does."""
-    wanted = Failure.of(tried.score.status, tried.score.reason)
-    name = f"shrink_{tried.score.case.replace('-', '_')}_{tried.score.estimator}"
-
-    def fails(case: Case) -> bool:
-        folder = run_cases(tried, {tried.score.case: case}, name=name, out=out, jobs=jobs)
-        score, *_ = folder.scores()
-        return Failure.of(score.status, score.reason) == wanted
-
-    t_ns = body_motion(tried.case).t_ns
-    first, _ = tried.case.frames or (0, 0)
-    likely = _likely(tried, {first + nth: stamp for nth, stamp in enumerate(t_ns.tolist())}, wanted)
-    whole = (first, first + len(t_ns))
-    return shrink(tried.case, whole, likely, nuisances_of(tried.case), fails, trials=trials)
-
-
-def _likely(tried: Tried, stamps_ns: Mapping[int, int], wanted: Failure) -> Callable[[Window], bool]:
-    """Whether the trial's own estimate of a part fails alike; where that is not told by poses, whether it began there.
-
-    `stamps_ns` are those of the frames of the way, also of those that did not come.
-    """
-    gt, est, _ = _paths(tried.folder, tried.score)
-    wrong_ns = next((row.t_ns for row in read_frames(tried.place) if row.status in ("", "lost")), int(gt.t_ns[0]))
-
-    def part(path: "Trajectory", window: Window) -> "Trajectory":
-        is_in = (path.t_ns >= stamps_ns[window[0]]) & (path.t_ns <= stamps_ns[window[1] - 1])
-        return replace(path, t_ns=path.t_ns[is_in], T_world_frame=path.T_world_frame[is_in])
-
-    def alike(window: Window) -> bool:
-        true, found = part(gt, window), part(est, window)
-        if len(true) < FEWEST_FRAMES:
-            return False
-        scored = score_estimate(found, true, tried.score.claims)
-        return Failure.of(*status_of(Ended(kind=FINISHED, reason=""), scored, true)) == wanted
-
-    if alike((min(stamps_ns), max(stamps_ns) + 1)):
-        return alike
-    return lambda window: stamps_ns[window[0]] <= wrong_ns <= stamps_ns[window[1] - 1]
+    first, end = found.found.window
+    share = (end - first) / found.frame_count
+    removed = found.found.removed
+    without = f" and without {', '.join(removed)}" if removed else ""
+    console.print(f"It still fails with frames {first} to {end - 1} of {found.frame_count} ({share:.0%}){without}.")
+    console.print(f"The smaller case: {found.suite}\nRun it: vobench run {found.suite}")

@@ -1,22 +1,17 @@
-"""How real pictures are, and how far a simulation can be trusted for a recording: vobench realism and twin."""
+"""How real pictures are: vobench realism."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from vobench.analysis.realism import OFFSET_BAND_PX, STATISTICS, Realism, Statistic, measure, residual, says, shots_of
-from vobench.analysis.stereo_fit import Uncertain
+from vobench.analysis.realism import OFFSET_BAND_PX, Realism, residual
+from vobench.analysis.realism_report import RealismReport, measure_realism
 from vobench.cli import terminal
 from vobench.cli.sequence import Calibration, Form, FormCommand, Rate, TopicOf, Truth, topics_of
-from vobench.dataset.layout import read
-from vobench.dataset.recording import ReadOptions, Recording
-from vobench.errors import InputError
-from vobench.runner.folder import SEQUENCE
+from vobench.dataset.recording import ReadOptions
 
 COMMAND_CLASS = FormCommand
-ALIKE = 0.25  # values that differ by a smaller share are taken for equal
 
 
 def realism_command(
@@ -36,98 +31,68 @@ def realism_command(
     json: terminal.Json = False,
 ) -> None:
     """Say how real pictures are, how far the pair is off from its calibration, and which knob moves what."""
-    recording = recording_at(path, form, ReadOptions(calibration, None, truth, rate, topics=topics_of(topic)))
-    other = against and recording_at(against, None, ReadOptions())
-    found = measure(shots_of(recording), recording.rig)
-    beside = measure(shots_of(other), other.rig) if other else None
+    options = ReadOptions(calibration=calibration, truth=truth, rate_hz=rate, topics=topics_of(topic))
+    report = measure_realism(path, against=against, form=form, options=options)
     if plot:
-        from vobench.report.realism_plot import save_plot
-
-        save_plot(plot, {path.name: found} | ({against.name: beside} if against and beside else {}))
+        _save_plot(plot, report)
     if json:
-        terminal.print_json(facts_of(found, beside))
+        terminal.print_json(report.as_dict())
     else:
-        _print(path, found, beside)
+        _print(report)
 
 
-def recording_at(path: Path, form: str | None, options: ReadOptions) -> Recording:
-    """What is at a path; of a run's case its sequence."""
-    linked = path / SEQUENCE
-    if not linked.is_dir() and linked.is_symlink():
-        raise InputError(f"this case's sequence is not in the cache any more; run the suite again: {path}")
-    return read(linked if linked.is_dir() else path, form=form, options=options)
+def _save_plot(file: Path, report: RealismReport) -> None:
+    from vobench.report.realism_plot import save_plot
+
+    drawn = {report.path.name: report.found}
+    if report.against_path and report.against:
+        drawn[report.against_path.name] = report.against
+    save_plot(file, drawn)
 
 
-def rows_of(found: Realism, beside: Realism | None) -> list[dict[str, Any]]:
-    """Each statistic with its band, or another recording in its place, and what would move it."""
-    return [_row(statistic, found, beside) for statistic in STATISTICS if statistic.name in found.values]
+def _print(report: RealismReport) -> None:
+    found = report.found
+    console = terminal.console()
+    in_bands = f"{found.inside} of {len(found.values)} statistics in their bands"
+    title = f"{report.path}: {in_bands}, by {found.pictures} pictures"
+    headings = ["statistic", "value", "unit", "against" if report.against else "real ones", "is", "moved by"]
+    console.print(terminal.table(title, headings, [_row(row) for row in report.rows()]))
+    for line in _more(found):
+        console.print(line)
+    for sentence in report.sentences():
+        console.print(sentence)
+    error = residual(found.pair) if found.pair else {}
+    if error:
+        entries = ", ".join(f"{name}: {value:g}" for name, value in error.items())
+        console.print(f"A rig with this error: calibration_error: {{{entries}}}")
 
 
-def _row(statistic: Statistic, found: Realism, beside: Realism | None) -> dict[str, Any]:
-    value = found.values[statistic.name]
-    other = beside.values.get(statistic.name) if beside else None
-    if other is not None:
-        width = ALIKE * abs(other)
-        statistic = replace(statistic, low=other - width, high=other + width)
-    row = {"statistic": statistic.title, "name": statistic.name, "unit": statistic.unit, "value": value}
-    row |= {"against": other} if beside else {"low": statistic.low, "high": statistic.high}
-    return {**row, "is": statistic.verdict(value), "knob": statistic.knob(value)}
+def _row(row: dict[str, Any]) -> list[str]:
+    return [row["statistic"], f"{row['value']:.2f}", row["unit"], _band(row), row["is"], row["knob"]]
 
 
-def facts_of(found: Realism, beside: Realism | None) -> dict[str, Any]:
-    """All that is known of a recording, and of each statistic beside another one or the bands."""
+def _band(row: dict[str, Any]) -> str:
+    """The band of a statistic, or its value in the other recording."""
+    if "against" not in row:
+        return f"{row['low']:g} … {row['high']:g}"
+    return "" if row["against"] is None else f"{row['against']:.2f}"
+
+
+def _more(found: Realism) -> list[str]:
+    """What else is measured of the pictures and of the pair, a line each."""
+    lines = [
+        f"noise where flat: {found.also['noise_dn']:.2f} DN",
+        f"sharpest edges: {found.also['edge_px']:.1f} px",
+        f"flow: {found.also['flow_px']:.1f} px a picture",
+    ]
     pair = found.pair
-    fit: dict[str, Any] | None = None
-    if pair:
-        turns: dict[str, Uncertain | None] = {
-            "yaw_deg": pair.yaw_deg,
-            "roll_deg": pair.roll_deg,
-            "pitch_deg": pair.pitch_deg,
-        }
-        turns |= {"offset_px": pair.offset_px, "xy_px": pair.xy_px}
-        fit = {name: turn and {"value": turn.value, "sigma": turn.sigma} for name, turn in turns.items()}
-        fit |= {"row_noise_px": pair.row_noise_px, "gain": pair.gain, "disparity_px": pair.disparity_px}
-        fit |= {"yaw_from": pair.yaw_from, "calibration_error": residual(pair)}
-    return {
-        "pictures": found.pictures,
-        "inside": found.inside,
-        "statistics": rows_of(found, beside),
-        "also": dict(found.also),
-        "pair": fit,
-        "says": says(found),
-    }
-
-
-def _print(path: Path, found: Realism, beside: Realism | None) -> None:
-    out, rows = terminal.console(), []
-    for row in rows_of(found, beside):
-        band = f"{row['against']:.2f}" if beside and row["against"] is not None else ""
-        band = band if beside else f"{row['low']:g} … {row['high']:g}"
-        rows.append([row["statistic"], f"{row['value']:.2f}", row["unit"], band, row["is"], row["knob"]])
-    title = f"{path}: {found.inside} of {len(found.values)} statistics in their bands, by {found.pictures} pictures"
-    against = "against" if beside else "real ones"
-    out.print(terminal.table(title, ["statistic", "value", "unit", against, "is", "moved by"], rows))
-    for name, (value, unit, note) in _also(found).items():
-        out.print(f"{name}: {value} {unit}{f' ({note})' if note else ''}".rstrip())
-    for sentence in says(found):
-        out.print(sentence)
-    if found.pair and (error := residual(found.pair)):
-        said = ", ".join(f"{name}: {value:g}" for name, value in error.items())
-        out.print(f"A rig with this error: calibration_error: {{{said}}}")
-
-
-def _also(found: Realism) -> dict[str, tuple[str, str, str]]:
-    also = {
-        "noise where flat": (f"{found.also['noise_dn']:.2f}", "DN", ""),
-        "sharpest edges": (f"{found.also['edge_px']:.1f}", "px", ""),
-        "flow": (f"{found.also['flow_px']:.1f}", "px a picture", ""),
-    }
-    if pair := found.pair:
-        disparities = ", ".join(f"{each:.1f}" for each in pair.disparity_px)
-        also["disparity"] = (disparities, "px", "a tenth, half and nine tenths of the matches are below")
-        also["gain of the right eye"] = (f"{pair.gain:.3f}", "", "")
-        if pair.offset_px:
-            low, high = OFFSET_BAND_PX
-            value = f"{pair.offset_px.value:+.2f} ± {pair.offset_px.sigma:.2f}"
-            also["offset of disparity"] = (value, "px", f"real pairs: {low:g} … {high:g} either way")
-    return also
+    if pair is None:
+        return lines
+    disparities = ", ".join(f"{each:.1f}" for each in pair.disparity_px)
+    lines.append(f"disparity: {disparities} px (a tenth, half and nine tenths of the matches are below)")
+    lines.append(f"gain of the right eye: {pair.gain:.3f}")
+    if pair.offset_px:
+        low, high = OFFSET_BAND_PX
+        offset = f"{pair.offset_px.value:+.2f} ± {pair.offset_px.sigma:.2f} px"
+        lines.append(f"offset of disparity: {offset} (real pairs: {low:g} … {high:g} either way)")
+    return lines

@@ -8,12 +8,13 @@ disparity  column in the left view less column in the right one, px; inverse dep
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vobench import retired
 from vobench.errors import VobenchError
 from vobench.estimator.protocol import Image
 from vobench.geometry import se3
@@ -342,3 +343,10 @@ def predicted(eye: Eye, points: Points, rho: Array, T_now_last: Array) -> Points
     moved = eye.rays(points) @ T_now_last[:3, :3].T + rho[:, None] * T_now_last[:3, 3]
     there = eye.project(moved)
     return np.where(np.isfinite(there.sum(1, keepdims=True)), there, points).astype(np.float32)
+
+
+if not TYPE_CHECKING:  # else every misspelt name would pass for one of ours
+
+    def __getattr__(name):
+        """A name that moved to `estimator/pose.py`, for one release."""
+        return retired.lookup(__name__, name)

@@ -8,6 +8,7 @@ import pickle
 import resource
 import sys
 import traceback
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -83,6 +84,9 @@ Says = tuple[bytes, bytes]  # a message: tag and content
 
 def main(folder: Path, class_path: str, name: str, memory_bytes: int) -> None:
     """Serve frames until the other side hangs up."""
+    warnings.filterwarnings(
+        "default", message=r"vobench\.", category=DeprecationWarning
+    )  # of retired names: in the log
     resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))
     asked, told = _taken_over()
     try:

@@ -9,6 +9,11 @@ import numpy as np
 
 from vobench.errors import InputError
 from vobench.geometry.se3 import Array
+from vobench.motion.course import Unled
+from vobench.motion.drive import Waypoints
+from vobench.motion.wheeled import Wheeled
+from vobench.runner.drive import TrajectoryDrive
+from vobench.runner.motion import NS_PER_S
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,6 +71,29 @@ class DriveLog:
         """Whether it does anything that a robot on a level floor cannot: rise, roll or pitch."""
         tilt = np.abs(self.T_world_body[:, 2, :2]).max()
         return bool(np.ptp(self.T_world_body[:, 2, 3]) > 1e-6 or tilt > 1e-6)
+
+
+def log_of(drive: TrajectoryDrive) -> DriveLog:
+    """Return what there is to draw of a driven trajectory."""
+    spec = drive.case.trajectory
+    whole = drive.motion.drive
+    point_m = None
+    if whole is not None and not isinstance(spec, Unled):
+        point_m = whole.state[drive.frames, :2]
+    patches: tuple[tuple[str, Array], ...] = ()
+    if isinstance(spec, Wheeled):
+        patches = tuple((patch.surface, patch.corners_m) for patch in spec.floor)
+    return DriveLog(
+        title=drive.kind if drive.name == spec.kind else f"{drive.name}: {drive.kind}",
+        t_s=drive.motion.t_ns / NS_PER_S,
+        T_world_body=drive.body.T_world_body,
+        twist=drive.body.twist,
+        point_m=point_m,
+        references=drive.references,
+        targets_m=np.array(spec.targets_m) if isinstance(spec, Waypoints) else None,
+        reached_s=drive.reached_s,
+        patches=patches,
+    )
 
 
 def save_plot(path: Path, logs: Sequence[DriveLog]) -> None:

@@ -1,5 +1,6 @@
 """Keys: a hash of all that a result depends on, from its inputs to the code that makes it."""
 
+import ast
 import hashlib
 import json
 import marshal
@@ -21,6 +22,7 @@ from pydantic import TypeAdapter
 from vobench import __version__
 
 PACKAGE = Path(__file__).resolve().parents[1]
+PLUGIN = "vobench.plugin"
 # What reads modules: this Python and this file.
 READER = hashlib.sha256(sys.version.encode() + Path(__file__).read_bytes()).digest()
 # Imports that only a type checker sees: no result depends on them.
@@ -93,14 +95,45 @@ def code_digest(*entries: str, package: Path = PACKAGE) -> str:
     return state.hexdigest()[:32]
 
 
-def imported_by(folder: Path) -> list[str]:
-    """The modules of vobench that the Python files of a folder, such as an estimator's, import themselves."""
+def imported_by(folder: Path, *, package: Path = PACKAGE) -> list[str]:
+    """The modules of vobench that the Python files of a folder, such as an estimator's, import themselves.
+
+    A name imported from `vobench.plugin`, or from where an earlier release had it, stands for the module it lives in.
+    Tests (`test_*.py`) do not run with the rest, so what they import does not count.
+    """
     names = set[str]()
     for path in _files(folder):
-        if path.suffix == ".py":
+        if path.suffix == ".py" and not path.name.startswith("test_"):
             with suppress(SyntaxError, ValueError):  # whoever runs it says what is wrong with it
                 names.update(_module(path.read_bytes()).imports)
-    return sorted(names & _modules(PACKAGE).keys())
+    homes = _homes(package)
+    names.update([homes[name] for name in names if name in homes])
+    return sorted(names & _modules(package).keys())
+
+
+@cache
+def _homes(package: Path) -> dict[str, str]:
+    """The module of each name that `vobench.plugin` offers and of each retired name: `vobench.plugin.se3`, say."""
+    offered = _table(package / "plugin.py", "HOMES")
+    homes = {f"{PLUGIN}.{name}": home.partition(":")[0] for name, home in offered.items()}
+    for module, moved in _table(package / "retired.py", "MOVED").items():
+        for name, new_place in moved.items():
+            homes[f"{module}.{name}"] = homes.get(new_place) or new_place.rpartition(".")[0]
+    return homes
+
+
+def _table(path: Path, name: str) -> dict[str, Any]:
+    """The literal dictionary that a file assigns to a name; the file is not imported."""
+    if not path.is_file():
+        return {}
+    for statement in ast.parse(path.read_bytes()).body:
+        if not isinstance(statement, ast.Assign):
+            continue
+        assigned = [target.id for target in statement.targets if isinstance(target, ast.Name)]
+        if name in assigned:
+            table: dict[str, Any] = ast.literal_eval(statement.value)
+            return table
+    raise LookupError(f"{path} assigns no {name}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +150,7 @@ MODULE = TypeAdapter(Module)
 def closure(entries: Iterable[str], *, package: Path = PACKAGE) -> dict[str, Module]:
     """All modules that these import, themselves included, by name.
 
-    The package's own file is none of them: it looks its names up when a notebook asks for them.
+    The package's own file and `vobench.plugin` are none of them: they look names up when these are asked for.
     """
     known, found, waiting = _modules(package), dict[str, Module](), list(entries)
     while waiting:
@@ -133,7 +166,7 @@ def _modules(package: Path) -> dict[str, Path]:
     """Where each module of vobench lies."""
     paths = {path.relative_to(package).with_suffix(""): path for path in package.glob("**/*.py")}
     named = {".".join(("vobench", *place.parts)).removesuffix(".__init__"): path for place, path in paths.items()}
-    return {name: path for name, path in named.items() if name != "vobench"}
+    return {name: path for name, path in named.items() if name not in {"vobench", PLUGIN}}
 
 
 @cache
@@ -155,7 +188,8 @@ def _compiled(source: bytes) -> Module:
     # optimize=2 leaves docstrings out; asserts go too, which change no result.
     bare = _bare(compile(TYPES_ONLY.sub(b"", source), "", "exec", optimize=2, dont_inherit=True))
     # The second form of marshal has no references, which depend on what else the process holds.
-    return Module(hashlib.sha256(marshal.dumps(bare, 2)).hexdigest(), frozenset(_imports(bare)))
+    imports = {*_imports(bare), *_plugin_names(ast.parse(source))}
+    return Module(hashlib.sha256(marshal.dumps(bare, 2)).hexdigest(), frozenset(imports))
 
 
 def _bare(code: CodeType) -> CodeType:
@@ -167,9 +201,28 @@ def _bare(code: CodeType) -> CodeType:
 def _imports(code: CodeType) -> Iterator[str]:
     """Dotted names in code are of modules; `from` one of them may come another."""
     for name in code.co_names:
-        if name == "vobench" or name.startswith("vobench."):
+        if (name == "vobench" or name.startswith("vobench.")) and name != PLUGIN:
             yield name
             yield from (f"{name}.{part}" for part in code.co_names if "." not in part)
     for const in code.co_consts:
         if isinstance(const, CodeType):
             yield from _imports(const)
+
+
+def _plugin_names(tree: ast.Module) -> Iterator[str]:
+    """The names that a file takes from `vobench.plugin`, each as `vobench.plugin.name`.
+
+    Where the module itself is imported, or all of its names by a star, every name in the file may be one of them.
+    """
+    is_whole = False
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module == PLUGIN:
+            yield from (f"{PLUGIN}.{alias.name}" for alias in node.names)
+            is_whole = is_whole or any(alias.name == "*" for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module == "vobench":
+            is_whole = is_whole or any(alias.name == "plugin" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            is_whole = is_whole or any(alias.name == PLUGIN for alias in node.names)
+    if is_whole:
+        yield from (f"{PLUGIN}.{node.attr}" for node in ast.walk(tree) if isinstance(node, ast.Attribute))
+        yield from (f"{PLUGIN}.{node.id}" for node in ast.walk(tree) if isinstance(node, ast.Name))

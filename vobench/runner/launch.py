@@ -1,7 +1,7 @@
 """Run a plan on this machine, or on the workers of a Dask scheduler, from a command line or from Python."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
@@ -10,9 +10,10 @@ from vobench import stop
 from vobench.errors import InputError
 from vobench.runner.executor import Dask, Executor, LocalProcesses, Serial, perform_all
 from vobench.runner.key import cache_folder
+from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.preflight import preflight
 from vobench.runner.progress import RunDisplay
-from vobench.runner.store import Progress, SilentProgress, Store, why_unwritable
+from vobench.runner.store import SILENT, Progress, Store, why_unwritable
 from vobench.runner.task import KINDS, Task, missing
 from vobench.suite.suite import Plan
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from vobench.dataset.recording import Recording
-    from vobench.runner.folder import RunFolder
+    from vobench.runner.folder import RunFolder, TrialScore
     from vobench.runner.run import Finish
 
 MOST_JOBS = 8
@@ -45,7 +46,7 @@ def run_plan(
     recordings: "Mapping[str, Recording] | None" = None,
     jobs: int | None = None,
     scheduler: str | None = None,
-    task_progress: Progress = SilentProgress(),  # noqa: B008 - no state
+    task_progress: Progress = SILENT,
     shares_time: bool = False,
     is_fresh: bool = False,
 ) -> "RunFolder":
@@ -86,6 +87,36 @@ def run_plan(
         )
 
 
+def plan_runner(
+    *,
+    out: Path,
+    jobs: int | None,
+    make_display: Callable[[], RunDisplay],
+    finish: "Finish | None" = None,
+    task_progress: Progress = SILENT,
+) -> PlanRunner:
+    """What runs a plan in a new folder below `out` and shows it on a display of its own.
+
+    `finish` writes reports into the folder of each run; without it there are none.
+    """
+
+    def run(planned: Plan, /) -> "RunFolder":
+        return run_plan(
+            planned,
+            out=out,
+            finish=finish or _no_reports,
+            display=make_display(),
+            jobs=jobs,
+            task_progress=task_progress,
+        )
+
+    return run
+
+
+def _no_reports(folder: "RunFolder", scores: "list[TrialScore]") -> None:
+    del folder, scores
+
+
 def perform_tasks(tasks: "Sequence[Task]", *, display: RunDisplay, jobs: int | None = None) -> Path:
     """Perform those of these tasks that the cache does not hold; the folder of the last one's result.
 
@@ -93,7 +124,7 @@ def perform_tasks(tasks: "Sequence[Task]", *, display: RunDisplay, jobs: int | N
     """
     store = cache_folder().resolve()
     kept = Store(store)
-    executor = make_executor(jobs, None, SilentProgress())
+    executor = make_executor(jobs, None, SILENT)
     with stop.undone(executor.close), display, kept.in_use(display.say):
         to_make = missing(tasks, store)
         if to_make:

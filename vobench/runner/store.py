@@ -438,3 +438,6 @@ class SilentProgress:
     def say(self, sentence: str) -> None:
         """Told to whoever asked for it."""
         self._tell(sentence)
+
+
+SILENT: Progress = SilentProgress()

@@ -1,0 +1,65 @@
+"""What the errors of a run depend on, for each of its estimators."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.analysis.conftest import NoisyRun
+from vobench.analysis.causes import Course, attribute
+from vobench.analysis.run_causes import EstimatorCauses, RunCauses, find_causes
+from vobench.errors import UnknownNameError
+
+
+def planted() -> RunCauses:
+    """Causes of an estimator whose error grows with blur and with nothing else."""
+    rng = np.random.default_rng(0)
+    blur, depth = rng.uniform(0.1, 4, 200), rng.uniform(1, 2, 200)
+    loss = np.append(0.0, 0.01 * np.exp(np.sqrt(blur[1:])))
+    course = Course("walk", 0, {"blur": blur, "depth": depth}, loss)
+    found = EstimatorCauses("mine", ("ok",), (course,), attribute([course]))
+    return RunCauses(Path("runs"), (found,))
+
+
+def test_the_table_has_a_row_per_cause_with_the_strongest_first() -> None:
+    frame = planted().to_frame()
+    assert frame["conditions"].tolist() == ["blur", "depth"]
+    assert frame["low"].iloc[0] > 1.2
+    assert frame["low"].iloc[1] < 1 < frame["high"].iloc[1]
+
+
+def test_the_dictionary_lists_as_many_segments_as_are_asked_for_and_the_worst_first() -> None:
+    (facts,) = planted().as_dict(worst=3)["estimators"]
+    losses = [segment["loss"] for segment in facts["worst"]]
+    assert len(losses) == 3
+    assert losses == sorted(losses, reverse=True)
+    assert [trial["status"] for trial in facts["trials"]] == ["ok"]
+
+
+def test_of_too_few_frames_trials_are_listed_and_no_cause_is_named(noisy_run: NoisyRun) -> None:
+    found = find_causes(noisy_run.folder.path)
+    assert [each.estimator for each in found.estimators] == ["blind", "wheel_odometry"]
+    blind = found.estimators[0]
+    assert blind.attribution is None
+    assert blind.trials() == [{"case": "short", "repeat": 0, "status": "lost", "first_divergence_frame": 1}]
+    assert "causes" not in blind.as_dict()
+    assert found.to_frame().empty
+
+
+def test_one_estimator_may_be_chosen_and_another_name_is_refused(noisy_run: NoisyRun) -> None:
+    found = find_causes(noisy_run.folder.path, estimator="wheel_odometry")
+    assert [each.estimator for each in found.estimators] == ["wheel_odometry"]
+    with pytest.raises(UnknownNameError, match="Did you mean 'wheel_odometry'"):
+        find_causes(noisy_run.folder.path, estimator="wheel_odometer")
+
+
+def test_progress_hears_of_every_case(noisy_run: NoisyRun) -> None:
+    heard = []
+
+    class Counting:
+        def track(self, items, what, *, total):
+            heard.append((what, total))
+            return iter(items)
+
+    find_causes(noisy_run.folder.path, progress=Counting())
+    assert heard == [("look at", 1)]

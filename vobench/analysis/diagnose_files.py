@@ -1,0 +1,108 @@
+"""What is wrong between two trajectory files, and the command that scores them without it."""
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vobench.analysis.diagnose import Finding, diagnose
+from vobench.metric.settings import Side
+from vobench.runner.data_frame import data_frame
+from vobench.runner.trajectory_pair import TrajectorySource, read_pair
+
+if TYPE_CHECKING:
+    from vobench.runner.data_frame import DataFrame
+
+OTHER_SIDE: dict[Side, Side] = {"gt": "est", "est": "gt"}
+OFFSET_OPTION = "--t-offset="
+
+
+@dataclass(frozen=True, slots=True)
+class FileDiagnosis:
+    """The faults found between two files; none where they only differ by errors of the estimate.
+
+    `times` are the files of stamps that the two were read with. `by_frame` says how poses were paired where neither
+    file has stamps. `notes` say what was done to read the files.
+    """
+
+    gt: TrajectorySource
+    est: TrajectorySource
+    findings: tuple[Finding, ...]
+    times: tuple[Path, ...] = ()
+    by_frame: str | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def command(self) -> str | None:
+        """The `vobench score` command that corrects all findings; None without any, or for unrelated files."""
+        return self._command_for(self.findings)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON values, as `vobench diagnose --json` prints them."""
+        findings = [{**finding.as_dict(), "command": self._command_for([finding])} for finding in self.findings]
+        return {
+            "findings": findings,
+            "command": self.command,
+            "warnings": [self.by_frame] if self.by_frame else [],
+            "notes": list(self.notes),
+        }
+
+    def to_frame(self) -> "DataFrame":
+        """A pandas table with one row per finding: its fault, its sentence and the options that correct it."""
+        return data_frame(
+            {"fault": finding.fault, "sentence": finding.sentence, "options": " ".join(finding.options)}
+            for finding in self.findings
+        )
+
+    def _command_for(self, findings: Sequence[Finding]) -> str | None:
+        """The command that corrects some findings; of swapped files, each is named for what it is."""
+        faults_of_all = [finding.fault for finding in self.findings]
+        if not findings or "unrelated" in faults_of_all:
+            return None
+        files = [str(self.gt.path), str(self.est.path)]
+        options = [*_source_options("gt", self.gt), *_source_options("est", self.est)]
+        for finding in findings:
+            options += finding.options
+        if any(finding.fault == "swapped_inputs" for finding in findings):
+            files.reverse()
+            options = [_exchanged(option) for option in options]
+        for path in self.times:
+            options += ["--times", str(path)]
+        return shlex.join(["vobench", "score", *files, *options])
+
+
+def diagnose_files(gt: TrajectorySource, est: TrajectorySource, *, times: Sequence[Path] = ()) -> FileDiagnosis:
+    """Find what is wrong between two files: units, clocks, quaternions, frames, axes, scale, or swapped files.
+
+    `times` are files of stamps for files without (KITTI).
+
+    Raises:
+        InputError: a file cannot be read, or the two do not fit together.
+        AlignmentError: too few of their poses match for a diagnosis.
+    """
+    pair = read_pair(gt, est, times=times, any_unit=True)
+    findings = diagnose(pair.gt, pair.est)
+    return FileDiagnosis(gt, est, findings, tuple(times), pair.by_frame, pair.notes)
+
+
+def _source_options(side: Side, source: TrajectorySource) -> list[str]:
+    """The options of `vobench score` that say how a file was read."""
+    options = []
+    if source.topic:
+        options += [f"--{side}-topic", source.topic]
+    for word in source.words:
+        options += [f"--{side}-as", word]
+    return options
+
+
+def _exchanged(option: str) -> str:
+    """An option as it reads once ground truth and estimate have changed places."""
+    for side, other in OTHER_SIDE.items():
+        if option.startswith(f"--{side}-"):
+            return f"--{other}-{option.removeprefix(f'--{side}-')}"
+    if option.startswith(OFFSET_OPTION):
+        offset = option.removeprefix(OFFSET_OPTION)
+        negated = offset[1:] if offset.startswith("-") else f"-{offset}"
+        return f"{OFFSET_OPTION}{negated}"
+    return option

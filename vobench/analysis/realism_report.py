@@ -1,0 +1,120 @@
+"""How real the pictures of a recording are: its statistics beside the bands of real ones, or beside another's."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vobench.analysis.realism import STATISTICS, Realism, Statistic, measure, residual, says, shots_of
+from vobench.analysis.stereo_fit import StereoFit, Uncertain
+from vobench.dataset.recording import ReadOptions, Recording
+from vobench.runner.data_frame import data_frame
+from vobench.runner.recording import NOTHING_MORE, read_recording
+
+if TYPE_CHECKING:
+    from vobench.runner.data_frame import DataFrame
+
+# Values of two recordings that differ by a smaller share count as equal.
+ALIKE = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class RealismReport:
+    """The realism of one recording and, where it is compared with another recording, that of the other.
+
+    `path` and `against_path` are where the recordings are.
+    """
+
+    path: Path
+    found: Realism
+    against_path: Path | None = None
+    against: Realism | None = None
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row per statistic: its value, its band or the other recording's value, and what would move it.
+
+        `is` says "in", "low" or "high" of the band; the band of another recording is its value ± 25 %.
+        """
+        measured = [statistic for statistic in STATISTICS if statistic.name in self.found.values]
+        return [_row(statistic, self.found, self.against) for statistic in measured]
+
+    def sentences(self) -> list[str]:
+        """What is off in the stereo pair, and of what, in sentences."""
+        return says(self.found)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON values, as `vobench realism --json` prints them."""
+        pair = self.found.pair
+        return {
+            "pictures": self.found.pictures,
+            "inside": self.found.inside,
+            "statistics": self.rows(),
+            "also": dict(self.found.also),
+            "pair": None if pair is None else _pair_facts(pair),
+            "says": self.sentences(),
+        }
+
+    def to_frame(self) -> "DataFrame":
+        """A pandas table of `rows`."""
+        return data_frame(self.rows())
+
+
+def measure_realism(
+    path: Path, *, against: Path | None = None, form: str | None = None, options: ReadOptions = NOTHING_MORE
+) -> RealismReport:
+    """Measure how real the pictures of a recording are.
+
+    Args:
+        path: a sequence, the folder of a run's case, a dataset's folder, or a bag.
+        against: another recording that takes the place of the bands of real pictures.
+        form: the form of the recording at `path`, where its content does not tell.
+        options: what the recording at `path` does not state itself: calibration, ground truth, rate, topics.
+
+    Raises:
+        InputError: a recording cannot be read, or has fewer than two pictures.
+    """
+    recording = read_recording(path, form=form, options=options)
+    other = None if against is None else read_recording(against)
+    found = realism_of(recording)
+    beside = None if other is None else realism_of(other)
+    return RealismReport(path, found, against, beside)
+
+
+def realism_of(recording: Recording) -> Realism:
+    """Measure the statistics of a recording's pictures."""
+    return measure(shots_of(recording), recording.rig)
+
+
+def _row(statistic: Statistic, found: Realism, against: Realism | None) -> dict[str, Any]:
+    value = found.values[statistic.name]
+    row = {"statistic": statistic.title, "name": statistic.name, "unit": statistic.unit, "value": value}
+    if against is None:
+        row |= {"low": statistic.low, "high": statistic.high}
+    else:
+        other = against.values.get(statistic.name)
+        row |= {"against": other}
+        if other is not None:
+            half_width = ALIKE * abs(other)
+            statistic = replace(statistic, low=other - half_width, high=other + half_width)
+    return {**row, "is": statistic.verdict(value), "knob": statistic.knob(value)}
+
+
+def _pair_facts(pair: StereoFit) -> dict[str, Any]:
+    """The fit of a stereo pair as plain JSON values."""
+    estimates: dict[str, Uncertain | None] = {
+        "yaw_deg": pair.yaw_deg,
+        "roll_deg": pair.roll_deg,
+        "pitch_deg": pair.pitch_deg,
+        "offset_px": pair.offset_px,
+        "xy_px": pair.xy_px,
+    }
+    facts: dict[str, Any] = {}
+    for name, estimate in estimates.items():
+        facts[name] = None if estimate is None else {"value": estimate.value, "sigma": estimate.sigma}
+    return {
+        **facts,
+        "row_noise_px": pair.row_noise_px,
+        "gain": pair.gain,
+        "disparity_px": pair.disparity_px,
+        "yaw_from": pair.yaw_from,
+        "calibration_error": residual(pair),
+    }

@@ -1,0 +1,426 @@
+"""A recording repeated in simulation: the suite that repeats it, and how far estimators agree on both."""
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vobench.analysis.realism import Realism, residual, shots_of
+from vobench.analysis.realism_report import RealismReport, realism_of
+from vobench.analysis.stereo_fit import StereoFit
+from vobench.analysis.twin import (
+    Agreement,
+    Look,
+    Placement,
+    agreement,
+    cell_disparities,
+    fit_camera,
+    levelled,
+    look_of,
+    place_path,
+    segment_errors,
+)
+from vobench.dataset.picture import require_free
+from vobench.dataset.recording import ReadOptions, Recording
+from vobench.errors import InputError
+from vobench.estimator.tools import stereo_pair
+from vobench.geometry.rig import own_pair
+from vobench.geometry.se3 import Array, inverse
+from vobench.runner.data_frame import data_frame
+from vobench.runner.estimate import ESTIMATE
+from vobench.runner.folder import RunFolder, TrialScore, read_tum
+from vobench.runner.frames import GROUND_TRUTH
+from vobench.runner.key import cache_folder
+from vobench.runner.motion import NS_PER_S, body_motion
+from vobench.runner.plan_runner import PlanRunner
+from vobench.runner.recording import NOTHING_MORE, read_recording, sequence_path
+from vobench.runner.score import NO_SCALE
+from vobench.runner.store import SILENT, Progress
+from vobench.runner.task import bake_task, perform
+from vobench.sensor.image_sensor import CameraSettings
+from vobench.suite import catalog
+from vobench.suite.axis import RigSettings
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import read_scene
+from vobench.suite.suite import read_plan
+from vobench.suite.yaml_file import plain
+from vobench.trajectory.formats import format_tum
+from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
+
+if TYPE_CHECKING:
+    from vobench.runner.data_frame import DataFrame
+
+# The names of the two cases of a twin's suite; TWIN also names its rig, trajectory and camera.
+REAL = "real"
+TWIN = "twin"
+SUITE_FILE = "twin.yaml"
+PLACE_FILE = "place.yaml"
+PATH_FILE = "path.tum"
+REPORT_FILE = "twin.json"
+
+# What is run where no estimators are asked for: five that differ, and two of them with other parameters.
+ESTIMATORS: tuple[str | Mapping[str, Any], ...] = (
+    "lk_epipolar",
+    {"name": "lk_epipolar", "label": "lk_epipolar_plain", "params": {"estimate_offset": 0}},
+    "stereo_pnp",
+    "feature_vo",
+    "mono_vo",
+    {"name": "stereo_pnp", "label": "stereo_pnp_wide", "params": {"window_px": 21}},
+    "stand_still",
+)
+FEWEST_RANKED = 3
+FEWEST_PICTURES = 12  # a replayed path needs as many poses
+LEAST_EXTENT_M = 0.05
+FITTED_PICTURES = 12  # that the camera is fitted to
+KNOTS_PER_PICTURE = 0.5  # of the smoothed path
+QUANTILES = (0.1, 0.5, 0.9)
+
+
+@dataclass(frozen=True, slots=True)
+class TwinSuite:
+    """The suite of a recording and its twin, written to a folder.
+
+    `file` is the suite. `placement` is where the recorded path lies in the place, `realism` that of the recording.
+    """
+
+    file: Path
+    placement: Placement
+    realism: Realism
+
+
+@dataclass(frozen=True, slots=True)
+class TwinReport:
+    """How far a recording and its twin agree: on the order of estimators, their errors, and the pictures.
+
+    `errors` are by estimator, then by case ("real" or "twin"): errors (8, N) of segments in percent of their length,
+    NaN where there is no segment.
+    """
+
+    suite: TwinSuite
+    run: RunFolder
+    agreement: Agreement
+    errors: Mapping[str, Mapping[str, Array]]
+    twin: Realism
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row per estimator, by their error on the recording: mean and quantiles of errors on both cases."""
+        ordered = sorted(self.agreement.errors, key=lambda name: self.agreement.errors[name][0])
+        rows = []
+        for name in ordered:
+            sides = self.errors[name]
+            rows.append({"estimator": name, REAL: _spread(sides[REAL]), TWIN: _spread(sides[TWIN])})
+        return rows
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON values, as `vobench twin --json` prints them and twin.json holds them."""
+        real = self.suite.realism
+        here = self.suite.file.parent
+        against_real = RealismReport(here, self.twin, here, real).rows()
+        return {
+            "tau": self.agreement.tau,
+            "interval": [self.agreement.low, self.agreement.high],
+            "estimators": self.rows(),
+            "statistics": [row for row in against_real if row["against"] is not None],
+            "also": _compared(real, self.twin),
+            "place": {"scale": self.suite.placement.scale, "misfit": self.suite.placement.misfit},
+            "real": RealismReport(here, real).as_dict(),
+            "twin": RealismReport(here, self.twin).as_dict(),
+        }
+
+    def to_frame(self) -> "DataFrame":
+        """A pandas table of `rows`, with columns such as `real_mean` and `twin_p90`, in percent."""
+        flat = []
+        for row in self.rows():
+            cells = {"estimator": row["estimator"]}
+            for side in (REAL, TWIN):
+                for name, value in row[side].items():
+                    cells[f"{side}_{name}"] = value
+            flat.append(cells)
+        return data_frame(flat)
+
+
+def write_twin_suite(
+    recording: Path,
+    *,
+    out: Path = Path("twin"),
+    place: str = "office",
+    estimators: Sequence[str] = (),
+    form: str | None = None,
+    options: ReadOptions = NOTHING_MORE,
+    progress: Progress = SILENT,
+) -> TwinSuite:
+    """Write the suite of a recording and of its repetition in a simulated place.
+
+    The recorded path is laid into the place where disparities agree best and nothing is in the way. The rig gets the
+    errors of calibration that are found in the recording, and the camera its exposure, contrast, blur and noise.
+
+    Args:
+        recording: a recording with ground truth, or the folder of a run's case.
+        out: the new folder for the suite.
+        place: the name of the scene, or the path of its file or model.
+        estimators: names of three estimators or more, in place of the usual seven.
+        form: the form of the recording, where its content does not tell.
+        options: what the recording does not state itself: calibration, ground truth, rate, topics.
+        progress: is told of the light of the place, which is computed unless it is in the cache.
+
+    Raises:
+        InputError: the folder is in use; fewer than three estimators; or the recording has no stereo pair that can be
+            matched, no ground truth, too few pictures, or no motion; or no free path was found in the place.
+        UnknownNameError: there is no such place.
+    """
+    require_free(out)
+    if estimators and len(estimators) < FEWEST_RANKED:
+        raise InputError(f"an order needs {FEWEST_RANKED} estimators or more, and -e names {len(estimators)}")
+    scene = read_scene(catalog.find("scene", place).path)
+
+    recorded = read_recording(recording, form=form, options=options)
+    realism = realism_of(recorded)
+    path = _recorded_path(recorded, realism)
+    pair = stereo_pair(recorded.rig, "the twin")
+    placement = place_path(build(scene, {}), path.T_world_left, pair, cell_disparities(path.fit, pair))
+
+    _write_json(out / PLACE_FILE, {**plain(scene), "scale": scene.scale * placement.scale})
+    (out / PATH_FILE).write_text(format_tum(path.in_place(placement)), encoding="utf-8")
+    suite = {
+        "name": "twin",
+        "summary": f"A recording repeated in {place}",
+        "scenes": [str((out / PLACE_FILE).resolve())],
+        "rigs": {TWIN: path.rig_settings()},
+        "trajectories": {TWIN: path.trajectory_settings()},
+        "source": [_source(recording, form, options)],
+        "estimators": list(estimators or ESTIMATORS),
+    }
+    file = (out / SUITE_FILE).resolve()
+    _write_json(file, suite)
+    # The camera is fitted to pictures of this suite's twin, so the suite is read without a camera first.
+    suite["cameras"] = {TWIN: _fit_camera(file, recorded, gain=path.fit.gain, progress=progress)}
+    _write_json(file, suite)
+    return TwinSuite(file, placement, realism)
+
+
+def compare_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> TwinReport:
+    """Run the estimators of a twin's suite on both cases, compare them, and write twin.json beside the suite.
+
+    Raises InputError where fewer than three estimators ran on both.
+    """
+    folder = run_plan(read_plan(str(suite.file)))
+    twin = realism_of(read_recording(folder.case(TWIN)))
+    real_errors = _errors(folder, REAL)
+    twin_errors = _errors(folder, TWIN)
+    found = agreement(real_errors, twin_errors)
+    errors = {name: {REAL: real_errors[name], TWIN: twin_errors[name]} for name in found.errors}
+    report = TwinReport(suite, folder, found, errors, twin)
+    _write_json(suite.file.parent / REPORT_FILE, report.as_dict())
+    return report
+
+
+def make_twin(
+    recording: Path,
+    *,
+    run_plan: PlanRunner,
+    out: Path = Path("twin"),
+    place: str = "office",
+    estimators: Sequence[str] = (),
+    form: str | None = None,
+    options: ReadOptions = NOTHING_MORE,
+    progress: Progress = SILENT,
+) -> TwinReport:
+    """Repeat a recording in simulation, run the same estimators on both, and compare.
+
+    `write_twin_suite` and `compare_twin` in one; their arguments and errors are these two functions'.
+    """
+    suite = write_twin_suite(
+        recording, out=out, place=place, estimators=estimators, form=form, options=options, progress=progress
+    )
+    return compare_twin(suite, run_plan=run_plan)
+
+
+# --- The path, and where it lies ---
+
+
+@dataclass(frozen=True, slots=True)
+class _RecordedPath:
+    """What a twin repeats: the poses T_world_left (N, 4, 4) of the left camera at t_ns (N,), the rig and its fit."""
+
+    t_ns: Stamps
+    T_world_left: Array
+    rig: RigSettings
+    fit: StereoFit
+
+    def in_place(self, placement: Placement) -> Trajectory:
+        """The path of the body in the place, from time 0 on."""
+        T_body_left = self.rig.build().T_body_left
+        T_place_body = placement.T_place_world @ self.T_world_left @ inverse(T_body_left)
+        return Trajectory(self.t_ns - self.t_ns[0], T_place_body)
+
+    def rig_settings(self) -> dict[str, Any]:
+        """The rig as a suite states it, with the errors of calibration that were found."""
+        settings: Any = plain(self.rig)
+        stated = {key: settings[key] for key in ("own", "pitch_deg", "forward_m", "height_m")}
+        return {**stated, "calibration_error": residual(self.fit)}
+
+    def trajectory_settings(self) -> dict[str, Any]:
+        """The replay of this path as a suite states it."""
+        rate_hz = round(NS_PER_S / float(np.median(np.diff(self.t_ns))), 3)
+        return {"kind": "replay", "file": PATH_FILE, "rate_hz": rate_hz, "knot_hz": rate_hz * KNOTS_PER_PICTURE}
+
+
+def _recorded_path(recording: Recording, realism: Realism) -> _RecordedPath:
+    """The path of a recording's pictures that have a true pose. Raises InputError where it cannot be repeated."""
+    if realism.pair is None:
+        raise InputError("a twin repeats a pair of eyes, and this recording has none that can be rectified and matched")
+    truth = recording.truth
+    if truth is None:
+        raise InputError("a twin repeats a path, and this recording has none; give one with --truth, say an estimate")
+
+    has_pose = (recording.t_ns >= truth.t_ns[0]) & (recording.t_ns <= truth.t_ns[-1])
+    t_ns = recording.t_ns[has_pose]
+    if len(t_ns) < FEWEST_PICTURES:
+        raise InputError(
+            f"a twin takes {FEWEST_PICTURES} pictures or more with a truth, and this recording has {len(t_ns)}"
+        )
+
+    T_world_left = poses_at(truth, t_ns) @ recording.rig.T_body_left
+    extent_m = np.linalg.norm(np.ptp(T_world_left[:, :3, 3], axis=0))
+    if extent_m < LEAST_EXTENT_M:
+        raise InputError(
+            "a twin ranks estimators by errors per length of path, and this recording stands still; take one that moves"
+        )
+    if recording.form == "kitti":  # its world is the first camera, which need not be level
+        T_world_left = levelled(T_world_left)
+
+    rig = RigSettings(own=own_pair(recording.rig), pitch_deg=0, forward_m=0, height_m=0)
+    return _RecordedPath(t_ns, T_world_left, rig, realism.pair)
+
+
+def _source(recording: Path, form: str | None, options: ReadOptions) -> dict[str, Any]:
+    """The recording as the `source` of a suite; what is not given is left out."""
+    topics = {name: getattr(options.topics, name) for name in type(options.topics).__dataclass_fields__}
+    source = {
+        "path": str(sequence_path(recording).resolve()),
+        "name": REAL,
+        "form": form,
+        "rate_hz": options.rate_hz,
+        "calibration": None if options.calibration is None else str(options.calibration.resolve()),
+        "truth": None if options.truth is None else str(options.truth.resolve()),
+        "topics": {name: topic for name, topic in topics.items() if topic},
+    }
+    return {key: value for key, value in source.items() if value}
+
+
+def _write_json(path: Path, content: Any) -> None:
+    """Write JSON, which YAML readers take too."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+# --- The camera ---
+
+
+def _fit_camera(file: Path, recording: Recording, *, gain: float, progress: Progress) -> dict[str, Any]:
+    """The camera, as a suite states it, whose pictures of the twin look most like those of the recording.
+
+    `file` is the suite of the twin, still without a camera. `gain` is the ratio of the grey values of the right picture
+    to those of the left one.
+    """
+    from vobench.runner.simulate import open_renderer
+    from vobench.runner.stereo_camera import World, exposed_by
+
+    case = read_plan(str(file)).simulated[0]
+    motion = body_motion(case)
+    scene = case.build_scene()
+    light = perform(bake_task(case.scene), cache_folder(), progress=progress)
+    fitted_t_ns = _evenly(motion.t_ns.tolist())
+    with closing(open_renderer(scene, case.rendering, light)) as renderer:
+        develop = exposed_by(case, World(scene, renderer, motion.motion), fitted_t_ns)
+        settings, _ = fit_camera(_look(recording), develop)
+    return _camera_settings(settings, gain=gain)
+
+
+def _look(recording: Recording) -> Look:
+    """How the pictures of a recording look, by some that are spread over it."""
+    pictures = [shot.left for run in shots_of(recording) for shot in run]
+    return look_of(_evenly(pictures))
+
+
+def _evenly(items: list[Any]) -> list[Any]:
+    """As many items as the camera is fitted to, evenly spread over all."""
+    indices = np.linspace(0, len(items) - 1, FITTED_PICTURES).astype(int)
+    return [items[index] for index in indices]
+
+
+def _camera_settings(settings: CameraSettings, *, gain: float) -> dict[str, Any]:
+    """A fitted camera as a suite states it, with a gain of the right eye in the linear signal."""
+    chip = settings.chip
+    linear_gain = gain ** float(str(chip.response))
+    return {
+        "chip": {
+            "full_well_e": chip.full_well_e,
+            "read_noise_e": chip.read_noise_e,
+            "shot_noise": True,
+            "adc_bits": chip.adc_bits,
+            "response": chip.response,
+        },
+        "exposure_gain": settings.exposure_gain,
+        "blur_sigma_px": settings.blur_sigma_px,
+        "unlike": {"right": {"gain": round(linear_gain, 4)}},
+    }
+
+
+# --- The comparison ---
+
+
+def _errors(folder: RunFolder, case: str) -> dict[str, Array]:
+    """The errors (8, N) of segments of each estimator on a case."""
+    gt = read_tum(folder.case(case) / GROUND_TRUTH)
+    errors = {}
+    for score in folder.scores():
+        if score.case == case and score.repeat == 0:
+            errors[score.estimator] = _trial_errors(folder, gt, score)
+    return errors
+
+
+def _trial_errors(folder: RunFolder, gt: Trajectory, score: TrialScore) -> Array:
+    est = read_tum(folder.estimate(score.case, score.estimator, score.repeat) / ESTIMATE)
+    has_no_scale = any(NO_SCALE in claim for claim in score.claims)
+    return segment_errors(gt, est, scaled=has_no_scale)
+
+
+def _spread(errors: Array) -> dict[str, float]:
+    """Mean and quantiles of the errors that are known."""
+    known = errors[np.isfinite(errors)]
+    p10, p50, p90 = np.quantile(known, QUANTILES).tolist()
+    return {"mean": float(known.mean()), "p10": p10, "p50": p50, "p90": p90}
+
+
+def _compared(real: Realism, twin: Realism) -> dict[str, tuple[float, float]]:
+    """What has no band, in the recording and in its twin, by a name with its unit."""
+    compared = {}
+    for key, title in (
+        ("noise_dn", "noise where flat, DN"),
+        ("grey_mean", "mean of grey, DN"),
+        ("edge_px", "sharpest edges, px"),
+        ("flow_px", "flow, px a picture"),
+    ):
+        compared[title] = (real.also[key], twin.also[key])
+    if real.pair and twin.pair:
+        compared |= _compared_pairs(real.pair, twin.pair)
+    return compared
+
+
+def _compared_pairs(real: StereoFit, twin: StereoFit) -> dict[str, tuple[float, float]]:
+    """The right eye's turns where both are known, and the quantiles of disparity."""
+    compared = {}
+    for name, unit in (("yaw_deg", "°"), ("roll_deg", "°"), ("pitch_deg", "°"), ("offset_px", " px")):
+        of_real = getattr(real, name)
+        of_twin = getattr(twin, name)
+        if of_real and of_twin:
+            quantity, _, _ = name.partition("_")
+            compared[f"{quantity} of the right eye,{unit}"] = (of_real.value, of_twin.value)
+    for quantile, below_real, below_twin in zip(QUANTILES, real.disparity_px, twin.disparity_px, strict=True):
+        compared[f"disparity, {100 * quantile:.0f} % are below, px"] = (below_real, below_twin)
+    return compared

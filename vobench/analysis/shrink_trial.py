@@ -1,0 +1,178 @@
+"""The shortest part of a failed trial that still fails in the same way, saved as a suite of its own."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vobench.analysis.nuisance import nuisances_of
+from vobench.analysis.shrink import FEWEST_FRAMES, Failure, Shrunk, shrink
+from vobench.analysis.trial_data import TrialPaths, read_paths
+from vobench.errors import InputError
+from vobench.runner.data_frame import data_frame
+from vobench.runner.estimate import FINISHED, Outcome
+from vobench.runner.finished_trial import FinishedTrial, read_finished_trial, run_variants
+from vobench.runner.folder import TrialScore
+from vobench.runner.frames import read_frames
+from vobench.runner.motion import body_motion
+from vobench.runner.plan_runner import PlanRunner
+from vobench.runner.score import score_estimate, status_of
+from vobench.runner.store import SILENT, Progress
+from vobench.suite.case_file import write_case
+from vobench.suite.suite import Case, Window
+from vobench.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from vobench.runner.data_frame import DataFrame
+
+# Statuses of a row of the table of frames that has no pose.
+WITHOUT_POSE = ("", "lost")
+
+
+@dataclass(frozen=True, slots=True)
+class ShrunkTrial:
+    """A failed trial and the smallest case found on which its estimator fails in the same way.
+
+    `suite` is the file of the suite of that case.
+    """
+
+    score: TrialScore
+    found: Shrunk
+    suite: Path
+
+    @property
+    def frame_count(self) -> int:
+        """How many frames the whole case has."""
+        first, end = self.found.whole
+        return end - first
+
+    @property
+    def summary(self) -> str:
+        """How the trial failed, in one line."""
+        return _summary(self.score)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON values, as `vobench shrink --json` prints them."""
+        return {
+            "suite": str(self.suite),
+            "frames": list(self.found.window),
+            "of": self.frame_count,
+            "removed": self.found.removed,
+            "tried": self.found.tried,
+        }
+
+    def to_frame(self) -> "DataFrame":
+        """A pandas table with one row per trial that was run: what it was, and whether it failed in the same way."""
+        return data_frame({"tried": tried, "fails_alike": fails} for tried, fails in self.found.tried)
+
+
+def shrink_trial(
+    trial: Path,
+    *,
+    run_plan: PlanRunner,
+    trials: int = 12,
+    folder: Path | None = None,
+    estimator: Path | None = None,
+    progress: Progress = SILENT,
+) -> ShrunkTrial:
+    """Find the shortest part of a failed trial that still fails in the same way, and write it as a suite.
+
+    Args:
+        trial: the trial as RUN/CASE/ESTIMATOR, or its folder in the run.
+        run_plan: runs the candidates.
+        trials: how many candidates are run at most.
+        folder: the folder for the suite of the smaller case; by default shrunk/CASE_ESTIMATOR.
+        estimator: the folder of the estimator, where it is not found by its name.
+        progress: is told when the estimator has changed since the run.
+
+    Raises:
+        InputError: there is no such trial, it is of a recording, or it does not fail.
+        UnknownNameError: the run has no such case or estimator.
+    """
+    finished = read_finished_trial(trial, estimator=estimator, progress=progress)
+    score = finished.score
+    if not _fails(score):
+        raise InputError(f"{score.estimator} on {score.case} is {score.status}: nothing fails")
+
+    found = _search(finished, run_plan, trials)
+    suite = write_case(
+        found.case,
+        [finished.entrant],
+        folder or Path("shrunk") / f"{score.case}_{score.estimator}",
+        name=f"{score.case}_shrunk".replace("-", "_"),
+        summary=_summary(score),
+    )
+    return ShrunkTrial(score, found, suite)
+
+
+def _summary(score: TrialScore) -> str:
+    return f"{score.estimator}: {score.status}, {score.reason}"
+
+
+def _fails(score: TrialScore) -> bool:
+    """Whether there is a failure to reproduce: a partial trial fails where it has a reason."""
+    if score.status == "partial":
+        return bool(score.reason)
+    return score.status != "ok"
+
+
+def _search(trial: FinishedTrial, run_plan: PlanRunner, trials: int) -> Shrunk:
+    """The smallest case on which the estimator fails as it did in the trial."""
+    wanted = Failure.of(trial.score.status, trial.score.reason)
+    suite_name = f"shrink_{trial.score.case.replace('-', '_')}_{trial.score.estimator}"
+
+    def fails_alike(case: Case) -> bool:
+        folder = run_variants(trial, {trial.score.case: case}, name=suite_name, run_plan=run_plan)
+        score, *_ = folder.scores()
+        return Failure.of(score.status, score.reason) == wanted
+
+    first = trial.case.frames[0] if trial.case.frames else 0
+    stamps_ns = body_motion(trial.case).t_ns.tolist()
+    whole = (first, first + len(stamps_ns))
+    is_likely = _likely_windows(trial, dict(enumerate(stamps_ns, first)), wanted)
+    return shrink(trial.case, whole, is_likely, nuisances_of(trial.case), fails_alike, trials=trials)
+
+
+def _likely_windows(trial: FinishedTrial, stamps_ns: dict[int, int], wanted: Failure) -> Callable[[Window], bool]:
+    """Return a test of whether the estimator is likely to fail alike on a window of frames; nothing is run for it.
+
+    The poses that the trial has in the window are scored by themselves. If those of the whole trial do not show the
+    failure (after a crash, say), the window must contain the first frame without a pose instead. `stamps_ns` has the
+    stamp of every frame of the trajectory, also of frames that were dropped.
+    """
+    paths = read_paths(trial.folder, trial.score)
+
+    def fails_alike_in(window: Window) -> bool:
+        part = _part(paths, first_ns=stamps_ns[window[0]], last_ns=stamps_ns[window[1] - 1])
+        if len(part.gt) < FEWEST_FRAMES:
+            return False
+        scored = score_estimate(part.est, part.gt, trial.score.claims)
+        status, reason = status_of(Outcome(kind=FINISHED, reason=""), scored, part.gt)
+        return Failure.of(status, reason) == wanted
+
+    whole = (min(stamps_ns), max(stamps_ns) + 1)
+    if fails_alike_in(whole):
+        return fails_alike_in
+
+    failed_ns = _first_without_pose_ns(trial, paths)
+    return lambda window: stamps_ns[window[0]] <= failed_ns <= stamps_ns[window[1] - 1]
+
+
+def _first_without_pose_ns(trial: FinishedTrial, paths: TrialPaths) -> int:
+    """The stamp of the first frame without a pose, that of the first frame where all have one."""
+    for row in read_frames(trial.path):
+        if row.status in WITHOUT_POSE:
+            return row.t_ns
+    return int(paths.gt.t_ns[0])
+
+
+def _part(paths: TrialPaths, *, first_ns: int, last_ns: int) -> TrialPaths:
+    """The poses of both paths from one stamp to another, both included."""
+    gt = _between(paths.gt, first_ns, last_ns)
+    est = _between(paths.est, first_ns, last_ns)
+    return TrialPaths(gt, est, paths.scale)
+
+
+def _between(path: Trajectory, first_ns: int, last_ns: int) -> Trajectory:
+    is_inside = (path.t_ns >= first_ns) & (path.t_ns <= last_ns)
+    return replace(path, t_ns=path.t_ns[is_inside], T_world_frame=path.T_world_frame[is_inside])

@@ -1,0 +1,454 @@
+"""Everything that a plugin may import: `from vobench.plugin import Result, Status, stereo_pair`.
+
+Estimators   Estimator Frame Result Status Tracks Image EncoderReadings ImuReadings: the protocol
+             Rig ImuCalibration WheelGeometry Rectification rectification STANDARD_GRAVITY_MPS2: the calibration
+             corners_per_cell follow follow_predicted predicted inside comparable local_contrast lucas_kanade
+             Points Mask: corners and tracks
+             StereoPair Eye stereo_pair coarse_disparity DisparityOffset: a stereo pair of any two lenses
+             PoseFit pose_from_points carried_on: motion
+             StereoTracker TrackerSettings Followed: a view whose points are tracked in both cameras
+             parameters assert_contract: the manifest's parameters, and the contract in a plugin's own test
+Makers       Mesh Thing joined quad at block card cushion extrusion lathe pierced reveal sheet spline tube: shapes
+             Material Picture Procedural coated matt wood picture STEEL CHROME WHITE DARK BLACK: materials, textures
+             BRICK INK INKS NAVY OCHRE PAPER PLUM SAND TEAL: colours
+             Part Piece put stood things mm bars bulb: furniture
+             Opening shell FINISHES OUTWARD: rooms
+             AreaLight PointLight SpotLight Sun Sky Steady Flicker Dimmer Switched: lights
+Layouts      Layout Writing ReadOptions Topics: what a layout is, and what its reader is asked for
+             Recording RecordedFrame RecordedPicture PictureStream assemble picture_files numbered truth_file unread
+             chain_rig: reading
+             ExportSource Views rectified png_frames: writing
+Metrics      MetricDefinition Comparison OverLengths POSES ScoreSettings
+All          se3 Array adjoint cross_matrix twist unit: rigid motions
+             Camera Pinhole BrownConrady KannalaBrandt DoubleSphere Equirectangular looking side_by_side: cameras
+             Trajectory Stamps: stamped poses
+             VobenchError InputError SequenceError SettingError: errors that end as one sentence
+
+A name is imported from its home when it is first asked for, so an estimator does not load what scenes are made of.
+`tests/plugin_surface.txt` freezes names and signatures. A name that leaves works for one release with a
+DeprecationWarning (`vobench/retired.py`). Everything else in vobench may change at any time.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from vobench.asset import picture
+    from vobench.asset.fitting import bars
+    from vobench.asset.furniture import (
+        BLACK,
+        CHROME,
+        DARK,
+        STEEL,
+        WHITE,
+        Part,
+        coated,
+        matt,
+        mm,
+        put,
+        stood,
+        wood,
+    )
+    from vobench.asset.household import bulb
+    from vobench.asset.picture import BRICK, INK, INKS, NAVY, OCHRE, PAPER, PLUM, SAND, TEAL
+    from vobench.asset.room import FINISHES, OUTWARD, Opening, Piece, shell, things
+    from vobench.asset.shape import (
+        at,
+        block,
+        card,
+        cushion,
+        extrusion,
+        lathe,
+        pierced,
+        reveal,
+        sheet,
+        spline,
+        tube,
+    )
+    from vobench.asset.texture import Procedural
+    from vobench.dataset.kalibr import chain_rig
+    from vobench.dataset.layout import Layout, Writing
+    from vobench.dataset.picture import Picture as RecordedPicture
+    from vobench.dataset.picture import unread
+    from vobench.dataset.recording import (
+        PictureStream,
+        ReadOptions,
+        RecordedFrame,
+        Recording,
+        Topics,
+        assemble,
+        numbered,
+        picture_files,
+        truth_file,
+    )
+    from vobench.dataset.source import ExportSource, Views, png_frames, rectified
+    from vobench.errors import InputError, SequenceError, SettingError, VobenchError
+    from vobench.estimator.pose import (
+        DisparityOffset,
+        PoseFit,
+        adjoint,
+        carried_on,
+        cross_matrix,
+        pose_from_points,
+        twist,
+    )
+    from vobench.estimator.protocol import EncoderReadings, Estimator, Frame, Image, Result, Status, Tracks
+    from vobench.estimator.stereo_tracker import Followed, StereoTracker, TrackerSettings
+    from vobench.estimator.tools import (
+        Eye,
+        Mask,
+        Points,
+        StereoPair,
+        coarse_disparity,
+        comparable,
+        corners_per_cell,
+        follow,
+        follow_predicted,
+        inside,
+        local_contrast,
+        lucas_kanade,
+        parameters,
+        predicted,
+        stereo_pair,
+    )
+    from vobench.geometry import se3
+    from vobench.geometry.camera import (
+        BrownConrady,
+        Camera,
+        DoubleSphere,
+        Equirectangular,
+        KannalaBrandt,
+        Pinhole,
+        unit,
+    )
+    from vobench.geometry.rig import (
+        ImuCalibration,
+        Rectification,
+        Rig,
+        WheelGeometry,
+        looking,
+        rectification,
+        side_by_side,
+    )
+    from vobench.geometry.se3 import Array
+    from vobench.metric.comparison import POSES, Comparison, MetricDefinition, OverLengths
+    from vobench.metric.settings import ScoreSettings
+    from vobench.report.contract import assert_contract
+    from vobench.scene.light import (
+        AreaLight,
+        Dimmer,
+        Flicker,
+        PointLight,
+        Sky,
+        SpotLight,
+        Steady,
+        Sun,
+        Switched,
+    )
+    from vobench.scene.material import Material, Picture
+    from vobench.scene.mesh import Mesh, Thing, joined, quad
+    from vobench.sensor.imu import ImuReadings
+    from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2
+    from vobench.trajectory.trajectory import Stamps, Trajectory
+
+# The module of each name: `module:name` where it has another name there; `se3` and `picture` are modules themselves.
+# `runner/key.py` reads this table without importing it, so it must stay a literal.
+HOMES = {
+    "bars": "vobench.asset.fitting",
+    "BLACK": "vobench.asset.furniture",
+    "CHROME": "vobench.asset.furniture",
+    "DARK": "vobench.asset.furniture",
+    "Part": "vobench.asset.furniture",
+    "STEEL": "vobench.asset.furniture",
+    "WHITE": "vobench.asset.furniture",
+    "coated": "vobench.asset.furniture",
+    "matt": "vobench.asset.furniture",
+    "mm": "vobench.asset.furniture",
+    "put": "vobench.asset.furniture",
+    "stood": "vobench.asset.furniture",
+    "wood": "vobench.asset.furniture",
+    "bulb": "vobench.asset.household",
+    "BRICK": "vobench.asset.picture",
+    "INK": "vobench.asset.picture",
+    "INKS": "vobench.asset.picture",
+    "NAVY": "vobench.asset.picture",
+    "OCHRE": "vobench.asset.picture",
+    "PAPER": "vobench.asset.picture",
+    "PLUM": "vobench.asset.picture",
+    "SAND": "vobench.asset.picture",
+    "TEAL": "vobench.asset.picture",
+    "picture": "vobench.asset.picture",
+    "FINISHES": "vobench.asset.room",
+    "OUTWARD": "vobench.asset.room",
+    "Opening": "vobench.asset.room",
+    "Piece": "vobench.asset.room",
+    "shell": "vobench.asset.room",
+    "things": "vobench.asset.room",
+    "at": "vobench.asset.shape",
+    "block": "vobench.asset.shape",
+    "card": "vobench.asset.shape",
+    "cushion": "vobench.asset.shape",
+    "extrusion": "vobench.asset.shape",
+    "lathe": "vobench.asset.shape",
+    "pierced": "vobench.asset.shape",
+    "reveal": "vobench.asset.shape",
+    "sheet": "vobench.asset.shape",
+    "spline": "vobench.asset.shape",
+    "tube": "vobench.asset.shape",
+    "Procedural": "vobench.asset.texture",
+    "chain_rig": "vobench.dataset.kalibr",
+    "Layout": "vobench.dataset.layout",
+    "Writing": "vobench.dataset.layout",
+    "unread": "vobench.dataset.picture",
+    "RecordedPicture": "vobench.dataset.picture:Picture",
+    "PictureStream": "vobench.dataset.recording",
+    "ReadOptions": "vobench.dataset.recording",
+    "RecordedFrame": "vobench.dataset.recording",
+    "Recording": "vobench.dataset.recording",
+    "Topics": "vobench.dataset.recording",
+    "assemble": "vobench.dataset.recording",
+    "numbered": "vobench.dataset.recording",
+    "picture_files": "vobench.dataset.recording",
+    "truth_file": "vobench.dataset.recording",
+    "ExportSource": "vobench.dataset.source",
+    "Views": "vobench.dataset.source",
+    "png_frames": "vobench.dataset.source",
+    "rectified": "vobench.dataset.source",
+    "InputError": "vobench.errors",
+    "SequenceError": "vobench.errors",
+    "SettingError": "vobench.errors",
+    "VobenchError": "vobench.errors",
+    "DisparityOffset": "vobench.estimator.pose",
+    "PoseFit": "vobench.estimator.pose",
+    "adjoint": "vobench.estimator.pose",
+    "carried_on": "vobench.estimator.pose",
+    "cross_matrix": "vobench.estimator.pose",
+    "pose_from_points": "vobench.estimator.pose",
+    "twist": "vobench.estimator.pose",
+    "EncoderReadings": "vobench.estimator.protocol",
+    "Estimator": "vobench.estimator.protocol",
+    "Frame": "vobench.estimator.protocol",
+    "Image": "vobench.estimator.protocol",
+    "Result": "vobench.estimator.protocol",
+    "Status": "vobench.estimator.protocol",
+    "Tracks": "vobench.estimator.protocol",
+    "Followed": "vobench.estimator.stereo_tracker",
+    "StereoTracker": "vobench.estimator.stereo_tracker",
+    "TrackerSettings": "vobench.estimator.stereo_tracker",
+    "Eye": "vobench.estimator.tools",
+    "Mask": "vobench.estimator.tools",
+    "Points": "vobench.estimator.tools",
+    "StereoPair": "vobench.estimator.tools",
+    "coarse_disparity": "vobench.estimator.tools",
+    "comparable": "vobench.estimator.tools",
+    "corners_per_cell": "vobench.estimator.tools",
+    "follow": "vobench.estimator.tools",
+    "follow_predicted": "vobench.estimator.tools",
+    "inside": "vobench.estimator.tools",
+    "local_contrast": "vobench.estimator.tools",
+    "lucas_kanade": "vobench.estimator.tools",
+    "parameters": "vobench.estimator.tools",
+    "predicted": "vobench.estimator.tools",
+    "stereo_pair": "vobench.estimator.tools",
+    "BrownConrady": "vobench.geometry.camera",
+    "Camera": "vobench.geometry.camera",
+    "DoubleSphere": "vobench.geometry.camera",
+    "Equirectangular": "vobench.geometry.camera",
+    "KannalaBrandt": "vobench.geometry.camera",
+    "Pinhole": "vobench.geometry.camera",
+    "unit": "vobench.geometry.camera",
+    "ImuCalibration": "vobench.geometry.rig",
+    "Rectification": "vobench.geometry.rig",
+    "Rig": "vobench.geometry.rig",
+    "WheelGeometry": "vobench.geometry.rig",
+    "looking": "vobench.geometry.rig",
+    "rectification": "vobench.geometry.rig",
+    "side_by_side": "vobench.geometry.rig",
+    "Array": "vobench.geometry.se3",
+    "se3": "vobench.geometry.se3",
+    "Comparison": "vobench.metric.comparison",
+    "MetricDefinition": "vobench.metric.comparison",
+    "OverLengths": "vobench.metric.comparison",
+    "POSES": "vobench.metric.comparison",
+    "ScoreSettings": "vobench.metric.settings",
+    "assert_contract": "vobench.report.contract",
+    "AreaLight": "vobench.scene.light",
+    "Dimmer": "vobench.scene.light",
+    "Flicker": "vobench.scene.light",
+    "PointLight": "vobench.scene.light",
+    "Sky": "vobench.scene.light",
+    "SpotLight": "vobench.scene.light",
+    "Steady": "vobench.scene.light",
+    "Sun": "vobench.scene.light",
+    "Switched": "vobench.scene.light",
+    "Material": "vobench.scene.material",
+    "Picture": "vobench.scene.material",
+    "Mesh": "vobench.scene.mesh",
+    "Thing": "vobench.scene.mesh",
+    "joined": "vobench.scene.mesh",
+    "quad": "vobench.scene.mesh",
+    "ImuReadings": "vobench.sensor.imu",
+    "STANDARD_GRAVITY_MPS2": "vobench.trajectory.kinematics",
+    "Stamps": "vobench.trajectory.trajectory",
+    "Trajectory": "vobench.trajectory.trajectory",
+}
+
+__all__ = [
+    "BLACK",
+    "BRICK",
+    "CHROME",
+    "DARK",
+    "FINISHES",
+    "INK",
+    "INKS",
+    "NAVY",
+    "OCHRE",
+    "OUTWARD",
+    "PAPER",
+    "PLUM",
+    "POSES",
+    "SAND",
+    "STANDARD_GRAVITY_MPS2",
+    "STEEL",
+    "TEAL",
+    "WHITE",
+    "AreaLight",
+    "Array",
+    "BrownConrady",
+    "Camera",
+    "Comparison",
+    "Dimmer",
+    "DisparityOffset",
+    "DoubleSphere",
+    "EncoderReadings",
+    "Equirectangular",
+    "Estimator",
+    "ExportSource",
+    "Eye",
+    "Flicker",
+    "Followed",
+    "Frame",
+    "Image",
+    "ImuCalibration",
+    "ImuReadings",
+    "InputError",
+    "KannalaBrandt",
+    "Layout",
+    "Mask",
+    "Material",
+    "Mesh",
+    "MetricDefinition",
+    "Opening",
+    "OverLengths",
+    "Part",
+    "Picture",
+    "PictureStream",
+    "Piece",
+    "Pinhole",
+    "PointLight",
+    "Points",
+    "PoseFit",
+    "Procedural",
+    "ReadOptions",
+    "RecordedFrame",
+    "RecordedPicture",
+    "Recording",
+    "Rectification",
+    "Result",
+    "Rig",
+    "ScoreSettings",
+    "SequenceError",
+    "SettingError",
+    "Sky",
+    "SpotLight",
+    "Stamps",
+    "Status",
+    "Steady",
+    "StereoPair",
+    "StereoTracker",
+    "Sun",
+    "Switched",
+    "Thing",
+    "Topics",
+    "TrackerSettings",
+    "Tracks",
+    "Trajectory",
+    "Views",
+    "VobenchError",
+    "WheelGeometry",
+    "Writing",
+    "adjoint",
+    "assemble",
+    "assert_contract",
+    "at",
+    "bars",
+    "block",
+    "bulb",
+    "card",
+    "carried_on",
+    "chain_rig",
+    "coarse_disparity",
+    "coated",
+    "comparable",
+    "corners_per_cell",
+    "cross_matrix",
+    "cushion",
+    "extrusion",
+    "follow",
+    "follow_predicted",
+    "inside",
+    "joined",
+    "lathe",
+    "local_contrast",
+    "looking",
+    "lucas_kanade",
+    "matt",
+    "mm",
+    "numbered",
+    "parameters",
+    "picture",
+    "picture_files",
+    "pierced",
+    "png_frames",
+    "pose_from_points",
+    "predicted",
+    "put",
+    "quad",
+    "rectification",
+    "rectified",
+    "reveal",
+    "se3",
+    "sheet",
+    "shell",
+    "side_by_side",
+    "spline",
+    "stereo_pair",
+    "stood",
+    "things",
+    "truth_file",
+    "tube",
+    "twist",
+    "unit",
+    "unread",
+    "wood",
+]
+
+if not TYPE_CHECKING:  # else every misspelt name would pass for one of ours
+
+    def __getattr__(name):
+        """A name of `__all__`, imported now; one that has left `__all__` as `vobench.retired` says."""
+        if name.startswith("__"):  # asked for by the import system, with every `from vobench.plugin import ...`
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        if name not in HOMES:
+            from vobench import retired
+
+            return retired.lookup(__name__, name)
+        module, _, attribute = HOMES[name].partition(":")
+        is_module = module.rpartition(".")[2] == name
+        value = import_module(module) if is_module else getattr(import_module(module), attribute or name)
+        globals()[name] = value  # the next time it is found without this function
+        return value
+
+    def __dir__():
+        """What there is to complete, imported or not."""
+        return sorted({*globals(), *__all__})

@@ -1,0 +1,231 @@
+"""Drives of a suite's trajectories, without rendering: the motion of the body, its wheels and its motors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vobench.errors import InputError, require_known
+from vobench.geometry import se3
+from vobench.geometry.se3 import Array
+from vobench.motion.drive import Waypoints
+from vobench.motion.motor import loop_voltages, wheel_voltages
+from vobench.motion.wheeled import Wheeled
+from vobench.runner.data_frame import data_frame
+from vobench.runner.motion import NS_PER_S, BodyMotion, body_motion, check_cases
+from vobench.runner.sensors import wheel_error_m
+from vobench.suite.suite import Case, Plan
+from vobench.trajectory.formats import format_tum
+from vobench.trajectory.kinematics import Kinematics
+from vobench.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from vobench.runner.data_frame import DataFrame
+
+# Columns of a drive's CSV file that `identify_drives` reads again.
+RIM_COLUMNS = ("left_rim_rad", "right_rim_rad")
+REFERENCE_COLUMNS = ("u_ref_mps", "omega_ref_radps")
+
+POSE_COLUMNS = ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
+TWIST_COLUMNS = ("vx_mps", "vy_mps", "vz_mps", "wx_radps", "wy_radps", "wz_radps")
+ACCELERATION_COLUMNS = ("ax_mps2", "ay_mps2", "az_mps2")
+VOLTAGE_COLUMNS = ("left_V", "right_V")
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectoryDrive:
+    """One trajectory of a suite, driven.
+
+    `body` is the true motion at the stamps of the N frames. `refusals` are sentences on why `vobench run` would refuse
+    cases on this trajectory, for example because a camera leaves the room. `case` is the first of these cases.
+    """
+
+    name: str
+    case: Case
+    motion: BodyMotion
+    body: Kinematics
+    refusals: tuple[str, ...]
+
+    @property
+    def kind(self) -> str:
+        """The kind of trajectory and, of a wheeled body, its mover: for example "waypoints, pioneer"."""
+        spec = self.case.trajectory
+        return f"{spec.kind}, {spec.mover}" if isinstance(spec, Wheeled) else spec.kind
+
+    @property
+    def frames(self) -> slice:
+        """Which frames of the whole drive the case's frames are."""
+        first = self.motion.first
+        return slice(first, first + len(self.motion.t_ns))
+
+    @property
+    def reached_s(self) -> Array | None:
+        """Times (K,) in s at which the legs to the K targets ended; None without targets."""
+        drive = self.motion.drive
+        if drive is None or not isinstance(self.case.trajectory, Waypoints):
+            return None
+        return drive.t_ns[list(drive.reached)] / NS_PER_S
+
+    @property
+    def rim_rad(self) -> Array | None:
+        """Angles (N, 2) in rad of the left and right rim at the frames; None for a body without wheels."""
+        rims = self.motion.rims
+        if rims is None:
+            return None
+        at_frames = np.searchsorted(rims.t_ns, self.motion.t_ns)
+        return rims.rim_rad[at_frames]
+
+    @property
+    def references(self) -> Array | None:
+        """Reference speed in m/s and yaw rate in rad/s (N, 2) of the controller; None for a body without one."""
+        drive = self.motion.drive
+        return None if drive is None else drive.references[self.frames]
+
+    @property
+    def voltages_V(self) -> Array | None:
+        """Voltages (N, 2) of the left and right motor; None where the suite gives no motor constants."""
+        drive = self.motion.drive
+        spec = self.case.trajectory
+        if drive is None or not isinstance(spec, Wheeled) or spec.motors is None:
+            return None
+
+        u, omega = drive.state[:, 3:].T
+        u_ref, omega_ref = drive.references.T
+        u_rate, omega_rate = drive.rates.T
+        v_u, v_omega = loop_voltages((u, omega), (u_ref, omega_ref), (u_rate, omega_rate), motors=spec.motors)
+        left_and_right = np.stack(wheel_voltages(v_u, v_omega), -1)
+        return left_and_right[self.frames]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The summary of this drive as plain JSON values, as `vobench drive --json` prints it."""
+        t_ns = self.motion.t_ns
+        voltages_V = self.voltages_V
+        reached_s = self.reached_s
+        return {
+            "trajectory": self.name,
+            "kind": self.kind,
+            "frames": len(t_ns),
+            "duration_s": float(t_ns[-1] - t_ns[0]) / NS_PER_S,
+            "path_m": float(_step_lengths_m(self.body).sum()),
+            "max_speed_mps": float(np.linalg.norm(self.body.velocity_mps, axis=1).max()),
+            "max_turn_degps": float(np.rad2deg(np.linalg.norm(self.body.turn_radps, axis=1).max())),
+            "max_turn_per_frame_deg": float(np.rad2deg(_step_angles_rad(self.body).max())),
+            "wheel_error_m": wheel_error_m(self.case, self.motion),
+            "peak_V": None if voltages_V is None else float(np.abs(voltages_V).max()),
+            "reached_s": None if reached_s is None else reached_s.tolist(),
+            "refused": list(self.refusals),
+        }
+
+    def trajectory(self) -> Trajectory:
+        """The true path of the body, with one pose per frame."""
+        return Trajectory(self.motion.t_ns, self.body.T_world_body)
+
+    def tum(self) -> str:
+        """The true path of the body as the text of a TUM file."""
+        return format_tum(self.trajectory())
+
+    def csv(self) -> str:
+        """The true motion at the frames as the text of a CSV file, one row per frame.
+
+        Poses are in the world; velocities and accelerations are in the axes of the body. Angles of the rims, references
+        of the controller and voltages of the motors follow where the body has these.
+        """
+        positions_m = self.body.T_world_body[:, :3, 3]
+        quaternions_xyzw = se3.to_quaternion(self.body.T_world_body[:, :3, :3])
+        columns: list[tuple[Sequence[str], Array | None]] = [
+            (POSE_COLUMNS, np.concatenate([positions_m, quaternions_xyzw], -1)),
+            (TWIST_COLUMNS, self.body.twist),
+            (ACCELERATION_COLUMNS, self.body.acceleration_mps2),
+            (RIM_COLUMNS, self.rim_rad),
+            (REFERENCE_COLUMNS, self.references),
+            (VOLTAGE_COLUMNS, self.voltages_V),
+        ]
+
+        heading = ["t_ns"]
+        known = []
+        for names, values in columns:
+            if values is not None:
+                heading += names
+                known.append(values)
+
+        lines = [",".join(heading)]
+        rows = np.concatenate(known, -1).tolist()
+        for t_ns, row in zip(self.motion.t_ns.tolist(), rows, strict=True):
+            lines.append(",".join([str(t_ns), *map(repr, row)]))
+        return "\n".join(lines) + "\n"
+
+
+@dataclass(frozen=True, slots=True)
+class SuiteDrive:
+    """The driven trajectories of a suite, in the suite's order."""
+
+    drives: tuple[TrajectoryDrive, ...]
+
+    @property
+    def refusals(self) -> tuple[str, ...]:
+        """The refusals of all drives, each sentence once."""
+        sentences = [sentence for drive in self.drives for sentence in drive.refusals]
+        return tuple(dict.fromkeys(sentences))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON values: the summary of each drive."""
+        return {"trajectories": [drive.as_dict() for drive in self.drives]}
+
+    def to_frame(self) -> "DataFrame":
+        """A pandas table with one row per trajectory; its columns are the keys of `TrajectoryDrive.as_dict`."""
+        return data_frame(drive.as_dict() for drive in self.drives)
+
+
+def chosen_trajectories(plan: Plan, *, trajectory: str | None = None) -> tuple[str, ...]:
+    """The names of the plan's trajectories, or only the one asked for.
+
+    Raises InputError for a suite without trajectories, and UnknownNameError for a name that is not in the suite.
+    """
+    names = tuple(plan.suite.trajectories or ())
+    if not names:
+        raise InputError(f"suite '{plan.suite.name}' has no trajectory to drive, only recordings or scenarios")
+    if trajectory is None:
+        return names
+    require_known("trajectory", trajectory, names)
+    return (trajectory,)
+
+
+def drive_plan(plan: Plan, *, trajectory: str | None = None) -> SuiteDrive:
+    """Drive the trajectories of a plan, or one of them, without rendering.
+
+    Raises:
+        InputError: the suite has no trajectories.
+        UnknownNameError: it has no trajectory of this name.
+        SuiteError: a body cannot follow its trajectory, for example because a target is out of reach.
+    """
+    names = chosen_trajectories(plan, trajectory=trajectory)
+    return SuiteDrive(tuple(drive_trajectory(plan, name) for name in names))
+
+
+def drive_trajectory(plan: Plan, name: str) -> TrajectoryDrive:
+    """Drive one trajectory of a plan. Raises SuiteError where the body cannot follow it."""
+    cases = [case for case in plan.simulated if case.variant["trajectory"] == name]
+    mistakes = plan.mistakes()
+    with mistakes.at("trajectories", name):
+        motion = body_motion(cases[0])
+    mistakes.require_none()
+
+    check_cases(cases, motion, mistakes)
+    refusals = dict.fromkeys(str(mistake) for mistake in mistakes.found)
+    return TrajectoryDrive(name, cases[0], motion, motion.at_frames(), tuple(refusals))
+
+
+def _step_lengths_m(body: Kinematics) -> Array:
+    """Distances (N - 1,) between the positions of successive frames."""
+    steps_m = np.diff(body.T_world_body[:, :3, 3], axis=0)
+    return np.asarray(np.linalg.norm(steps_m, axis=1))
+
+
+def _step_angles_rad(body: Kinematics) -> Array:
+    """Angles (N - 1,) between the orientations of successive frames; (1,) zero for a single frame."""
+    R_world_body = body.T_world_body[:, :3, :3]
+    if len(R_world_body) == 1:
+        return np.zeros(1)
+    R_body_world = np.swapaxes(R_world_body[:-1], -1, -2)
+    return se3.rotation_angle(R_body_world @ R_world_body[1:])

@@ -1,0 +1,135 @@
+"""A trial of a finished run, read back so that variants of its case can be run with the same estimator."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from vobench.errors import InputError, UnknownNameError, require_known
+from vobench.runner.folder import CASE, ESTIMATORS, SCORE, SUITE, RunFolder, TrialScore, open_run, read_score
+from vobench.runner.key import folder_digest
+from vobench.runner.motion import body_motions
+from vobench.runner.plan_runner import PlanRunner
+from vobench.runner.store import SILENT, Progress
+from vobench.suite import catalog
+from vobench.suite.manifest import read_manifest
+from vobench.suite.suite import Case, Entrant, Plan, Suite
+from vobench.suite.yaml_file import Mistakes, YamlFile, checked
+
+# RUN/cases/CASE/estimates/ESTIMATOR/REPEAT: how far above the folder of a trial its run is.
+LEVELS_TO_RUN = 5
+
+
+@dataclass(frozen=True, slots=True)
+class FinishedTrial:
+    """A trial of a run with all that is needed to run it again: its case, its entrant and the suite of the run."""
+
+    folder: RunFolder
+    score: TrialScore
+    case: Case
+    entrant: Entrant
+    suite: Suite
+
+    @property
+    def path(self) -> Path:
+        """The folder with the files of this trial."""
+        return self.folder.estimate(self.score.case, self.score.estimator, self.score.repeat)
+
+
+def read_finished_trial(path: Path, *, estimator: Path | None = None, progress: Progress = SILENT) -> FinishedTrial:
+    """Read the trial at RUN/CASE/ESTIMATOR, at RUN/CASE/ESTIMATOR/REPEAT, or at its own folder in the run.
+
+    `estimator` is the folder of the estimator, for one that is not found by its name. `progress` is told when the
+    estimator has changed since the run.
+
+    Raises InputError and UnknownNameError where there is no such trial, where the case is a recording, which cannot be
+    simulated in variants, and where another version of vobench wrote the run.
+    """
+    folder, score = _find(path)
+    case = read_simulated_case(folder, score.case)
+    entrant = _read_entrant(folder, score.estimator, estimator, progress)
+    return FinishedTrial(folder, score, case, entrant, _read_suite(folder))
+
+
+def _find(path: Path) -> tuple[RunFolder, TrialScore]:
+    """The run and the score of the trial that a path names."""
+    if (path / SCORE).is_file() and len(path.parts) > LEVELS_TO_RUN:
+        return RunFolder(path.parents[LEVELS_TO_RUN - 1]), read_score(path / SCORE)
+
+    parts = path.parts
+    repeat = 0
+    if path.name.isdigit():
+        repeat = int(path.name)
+        parts = parts[:-1]
+    if len(parts) < 2:
+        raise InputError(f"a trial is named as RUN/CASE/ESTIMATOR, got {path}")
+    *run, case, estimator = parts
+
+    folder = open_run(Path(*run))
+    scores = folder.scores()
+    _require_in_run("case", case, {score.case for score in scores}, folder)
+    _require_in_run("estimator", estimator, {score.estimator for score in scores}, folder)
+    for score in scores:
+        if (score.case, score.estimator, score.repeat) == (case, estimator, repeat):
+            return folder, score
+    raise InputError(f"there is no repeat {repeat} of {estimator} on {case} in the run {folder.path}")
+
+
+def _require_in_run(kind: str, name: str, known: set[str], folder: RunFolder) -> None:
+    """Raise UnknownNameError, which names the run, unless it has a case or an estimator of this name."""
+    try:
+        require_known(kind, name, sorted(known))
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{error} in the run {folder.path}") from None
+
+
+def read_simulated_case(folder: RunFolder, name: str) -> Case:
+    """Read a simulated case of a run. Raises InputError for a recording, or where another version wrote the file."""
+    path = folder.case(name) / CASE
+    content = json.loads(path.read_bytes())
+    if "source" in content:
+        raise InputError(f"'{name}' is a recording: nothing in it can be changed and made again: {path}")
+    try:
+        return checked(Case, content)
+    except ValidationError as error:
+        key = ".".join(map(str, error.errors()[0]["loc"]))
+        raise InputError(f"of another vobench, whose cases this one cannot read ({key}): {path}") from None
+
+
+def _read_suite(folder: RunFolder) -> Suite:
+    path = folder.path / SUITE
+    try:
+        return checked(Suite, json.loads(path.read_bytes()))
+    except ValidationError:
+        raise InputError(f"of another vobench, whose suites this one cannot read: {path}") from None
+
+
+def _read_entrant(folder: RunFolder, label: str, path: Path | None, progress: Progress) -> Entrant:
+    """The estimator with the parameters, limits and mode of the run. Raises UnknownNameError where it is not found."""
+    listed = json.loads((folder.path / ESTIMATORS).read_bytes())
+    facts = next(entry for entry in listed if entry["label"] == label)
+    place = path or catalog.find("estimator", facts["name"]).path
+    manifest = read_manifest(place)
+    if folder_digest(place) != facts["code"]:
+        progress.say(f"{place} has changed since the run, whose {label} this is")
+    limits = replace(manifest.limits, **facts["limits"])
+    return Entrant(label, place, manifest, facts["params"], limits, facts["mode"])
+
+
+def run_variants(trial: FinishedTrial, cases: Mapping[str, Case], *, name: str, run_plan: PlanRunner) -> RunFolder:
+    """Run the estimator of a trial once on each of these cases, which get the names that they are mapped from.
+
+    `name` is the name of the suite of this run. Raises SuiteError where one of the cases cannot be simulated.
+    """
+    named = tuple(replace(case, name=key) for key, case in cases.items())
+    suite = replace(trial.suite, name=name, repeats=1)
+    source = YamlFile(trial.folder.path / SUITE, {})
+    plan = Plan(suite, named, (), (trial.entrant,), (), source)
+
+    mistakes = Mistakes(source)
+    with mistakes.at():
+        body_motions(plan)
+    mistakes.require_none()
+    return run_plan(plan)

@@ -1,0 +1,178 @@
+"""Theta of the Pioneer from recorded drives: of a run, a sequence, or a CSV file of `vobench drive`."""
+
+import csv
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vobench.errors import InputError, VobenchError
+from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
+from vobench.geometry.se3 import Array
+from vobench.motion.drive import Drive
+from vobench.motion.identification import Fit, identify_odometry
+from vobench.motion.pioneer import Theta
+from vobench.runner.data_frame import data_frame
+from vobench.runner.drive import REFERENCE_COLUMNS, RIM_COLUMNS
+from vobench.runner.folder import SEQUENCE, open_run
+from vobench.runner.motion import NS_PER_S, recorded_drive
+from vobench.sequence import Sequence, read_truth
+from vobench.trajectory.trajectory import Stamps
+
+if TYPE_CHECKING:
+    from vobench.runner.data_frame import DataFrame
+
+# A recorded pose and that of the same drive computed again differ by rounding only.
+SAME_POSE = 1e-6  # m, and of elements of the rotation
+
+
+@dataclass(frozen=True, slots=True)
+class WheelLog:
+    """What theta is identified from: what the wheels turned, and what the controller asked for.
+
+    Rim angles (M, 2) in rad at rim_t_ns (M,), left then right; references (N, 2) in m/s and rad/s, each of which holds
+    from its stamp in t_ns (N,) on. `theta` is what the drive was simulated with, where that is known.
+    """
+
+    name: str
+    wheels: WheelGeometry
+    rim_t_ns: Stamps
+    rim_rad: Array
+    t_ns: Stamps
+    references: Array
+    theta: Theta | None = None
+
+    def fit(self) -> Fit:
+        """Identify theta. Raises MotionError where the drive does not determine it."""
+        left_m = self.rim_rad[:, 0] * self.wheels.radius_m
+        right_m = self.rim_rad[:, 1] * self.wheels.radius_m
+        distance_m = (left_m + right_m) / 2
+        heading_rad = (right_m - left_m) / self.wheels.track_m
+        odometry = np.stack([distance_m, heading_rad], -1)
+        return identify_odometry(self.rim_t_ns / NS_PER_S, odometry, self.t_ns / NS_PER_S, self.references)
+
+
+@dataclass(frozen=True, slots=True)
+class IdentifiedDrive:
+    """The fitted theta of one drive, and the theta that it was simulated with, where that is known."""
+
+    name: str
+    fit: Fit
+    driven_theta: Theta | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON values."""
+        driven_theta = None if self.driven_theta is None else asdict(self.driven_theta)
+        return {"name": self.name, **asdict(self.fit), "driven_theta": driven_theta}
+
+
+@dataclass(frozen=True, slots=True)
+class Identification:
+    """The identified drives, and by name the reason why nothing could be identified from others."""
+
+    drives: tuple[IdentifiedDrive, ...]
+    failures: Mapping[str, str]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON values, as `vobench identify --json` prints them."""
+        return {"drives": [drive.as_dict() for drive in self.drives], "untold": dict(self.failures)}
+
+    def to_frame(self) -> "DataFrame":
+        """A pandas table with one row per drive: its name, the six parameters, the residuals and the condition."""
+        rows = []
+        for drive in self.drives:
+            facts = asdict(drive.fit)
+            theta = facts.pop("theta")
+            rows.append({"name": drive.name, **theta, **facts})
+        return data_frame(rows)
+
+
+def identify_drives(path: Path, *, radius_m: float | None = None, track_m: float | None = None) -> Identification:
+    """Identify theta from every drive of a run, from one sequence, or from a CSV file of `vobench drive`.
+
+    `radius_m` and `track_m` are those of the wheels behind a CSV file, by default the Pioneer's; a sequence states its
+    own. Raises InputError and MotionError where there is no drive from which theta can be identified.
+    """
+    if path.is_file():
+        wheels = WheelGeometry(radius_m or PIONEER_WHEELS.radius_m, track_m or PIONEER_WHEELS.track_m, 1)
+        log = read_csv_log(path, wheels)
+        return Identification((IdentifiedDrive(log.name, log.fit(), log.theta),), {})
+    if radius_m or track_m:
+        raise InputError(f"--radius-m and --track-m are for a CSV file; a sequence holds its wheels: {path}")
+    return _identify_sequences(_sequences(path))
+
+
+def _identify_sequences(sequences: Mapping[str, Path]) -> Identification:
+    """Identify theta from each sequence that allows it. Raises InputError where none does."""
+    drives = []
+    failures = {}
+    for name, folder in sequences.items():
+        try:
+            log = read_sequence_log(name, folder)
+            drives.append(IdentifiedDrive(name, log.fit(), log.theta))
+        except VobenchError as error:
+            failures[name] = str(error)
+    if not drives:
+        raise InputError("; ".join(f"{name}: {sentence}" for name, sentence in failures.items()))
+    return Identification(tuple(drives), failures)
+
+
+def _sequences(path: Path) -> dict[str, Path]:
+    """The folders of sequences by name: of every case of a run, or the one sequence at the path."""
+    if (path / "truth.mcap").exists():
+        return {path.name: path}
+    run = open_run(path)
+    cases = sorted({file.parents[3] for file in run.score_files()})
+    return {case.name: case / SEQUENCE for case in cases}
+
+
+def read_sequence_log(name: str, folder: Path) -> WheelLog:
+    """Read the encoders of a sequence; its references come from driving its case again.
+
+    Raises InputError where the body is not a Pioneer under control, or where this version of vobench drives the case
+    differently from how it was recorded.
+    """
+    drive = recorded_drive(folder)
+    _require_same_drive(drive, folder)
+    sequence = Sequence.open(folder)
+    wheels = sequence.rig.wheels
+    assert wheels is not None  # a controller drove them
+    t_ns, ticks = sequence.encoders()
+    rad_per_tick = 2 * np.pi / wheels.ticks_per_revolution
+    rim_rad = (ticks * rad_per_tick).astype(np.float64)
+    return WheelLog(name, wheels, t_ns, rim_rad, drive.t_ns, drive.references, drive.theta)
+
+
+def _require_same_drive(drive: Drive, folder: Path) -> None:
+    """Raise InputError unless the recorded poses are those of the drive; some of its frames may be missing."""
+    truth = read_truth(folder)
+    T_world_body = drive.motion.at(truth.t_ns).T_world_body
+    has_same_stamps = bool(np.isin(truth.t_ns, drive.t_ns).all())
+    if not has_same_stamps or not np.allclose(T_world_body, truth.T_world_frame, atol=SAME_POSE):
+        raise InputError(f"this version of vobench drives the case otherwise than it was recorded: {folder}")
+
+
+def read_csv_log(path: Path, wheels: WheelGeometry) -> WheelLog:
+    """Read the columns of a CSV file that `vobench drive --csv` writes. Raises InputError."""
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    names = ("t_ns", *RIM_COLUMNS, *REFERENCE_COLUMNS)
+    listed = ", ".join(names)
+
+    missing = [name for name in names if not rows or name not in rows[0]]
+    if missing:
+        raise InputError(f"a drive to identify has the columns {listed}; no {', '.join(missing)} in {path}")
+    try:
+        values = np.array([[float(row[name]) for name in names] for row in rows])  # (N, 5)
+    except (TypeError, ValueError):
+        raise InputError(f"the columns {listed} should hold a number in each row: {path}") from None
+    is_rising = bool((np.diff(values[:, 0]) > 0).all())
+    if not np.isfinite(values).all() or not is_rising:
+        raise InputError(f"numbers should be finite and t_ns should rise: {path}")
+
+    t_ns = values[:, 0].astype(np.int64)
+    rim_rad = values[:, 1:3]
+    references = values[:, 3:]
+    return WheelLog(path.name, wheels, t_ns, rim_rad, t_ns, references)

@@ -1,0 +1,52 @@
+"""The settings of a score: those of a tool, or our own, with some of them changed."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, get_args
+
+from vobench.errors import require_known
+from vobench.metric.settings import LIKE, PAIRS_OF_RULE, Plane, ScoreSettings, Side, Unit
+from vobench.trajectory.align import Kind
+from vobench.trajectory.associate import Method
+
+# Settings that are one of a few names: what these are names of, and the names.
+NAMED = {
+    "alignment": ("alignment", get_args(Kind)),
+    "association": ("association", get_args(Method)),
+    "rpe_unit": ("unit", get_args(Unit)),
+    "rpe_pairs_from": ("side", get_args(Side)),
+    "project": ("plane", get_args(Plane)),
+}
+
+
+def settings_like(preset: str | None = None, **changes: Any) -> ScoreSettings:
+    """Return the settings of a preset of `LIKE`, or our own without one, with changes; a change of None is none.
+
+    Some tools choose the pairs of RPE by a rule of theirs (`rpe_rule`). With changes that this rule does not know, the
+    pairs are chosen by our own rule instead.
+
+    Raises UnknownNameError for a name that a preset or setting does not have, and SettingError for values that measure
+    nothing.
+    """
+    if preset is not None:
+        require_known("preset", preset, LIKE)
+    for setting, (kind, names) in NAMED.items():
+        if changes.get(setting) is not None:
+            require_known(kind, changes[setting], names)
+
+    base = ScoreSettings() if preset is None else LIKE[preset]
+    changes = {name: value for name, value in changes.items() if value is not None}
+    if base.rpe_rule in PAIRS_OF_RULE and not _keeps_rule(base, changes):
+        changes["rpe_rule"] = ScoreSettings().rpe_rule
+    return replace(base, **changes)
+
+
+def _keeps_rule(base: ScoreSettings, changes: Mapping[str, Any]) -> bool:
+    """Whether the changes leave the pairs that the rule of a tool chooses as they are."""
+    unit, all_pairs, side = PAIRS_OF_RULE[base.rpe_rule]
+    known = {"rpe_unit": unit, "rpe_all_pairs": all_pairs, "rpe_pairs_from": side}
+    for name, value in known.items():
+        if changes.get(name, value) != value:
+            return False
+    excluded = "project" if base.rpe_rule == "tum" else "rpe_delta"
+    return excluded not in changes
