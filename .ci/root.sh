@@ -70,6 +70,7 @@ in_root() {
     shift 2
     mount -t proc proc "$root/proc"
     mount --rbind /dev "$root/dev"
+    mount -t tmpfs tmpfs "$root/dev/shm"
     mount --bind "$downloads" "$root/downloads"
     exec chroot "$root" "$@"' - "$root" "$DOWNLOADS" \
     /usr/bin/env -i "${variables[@]}" PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 HOME=/home/new \

@@ -218,3 +218,15 @@ def test_every_shell_is_told_how_to_complete_and_is_offered_the_commands(shell):
     offered = said("complete")
     assert "verify" in offered
     assert "report" not in offered
+
+
+def test_python_m_vobench_is_the_same_command(tmp_path):
+    def output_of(*words):
+        command = [sys.executable, "-m", "vobench", *words]
+        return subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+
+    assert output_of("--version").stdout.strip() == __version__
+    wrong = output_of("run", "no_such_suite")
+    assert wrong.returncode == 1
+    assert wrong.stderr.startswith("vobench: no suite named 'no_such_suite'")
+    assert "Usage: vobench run" in output_of("run", "--help").stdout
