@@ -16,7 +16,7 @@ Definition = ast.FunctionDef | ast.ClassDef
 
 
 def surface(module: ModuleType) -> str:
-    """The surface of `module.__all__`: a line for each name, and an indented one for each field or method of a class."""
+    """The surface of `module.__all__`: a line for each name, an indented one for each field or method of a class."""
     lines = [line for name in sorted(module.__all__) for line in described(name, getattr(module, name))]
     return "".join(f"{line}\n" for line in lines)
 

@@ -1,4 +1,4 @@
-"""Names of an earlier release work for one more, or say what replaces them: in every kind of plugin, in one sentence."""
+"""Names of an earlier release work for one more, or say what replaces them in one sentence, in every kind of plugin."""
 
 import importlib
 import subprocess
@@ -86,7 +86,7 @@ from vobench.metric.comparison import POSES, MetricDefinition
 from vobench.metric.pose_error import angle_rad
 IMPORT
 
-METRIC = MetricDefinition("ate_old", "old", "rad", "angle", "a test", POSES, "", measure=lambda of: angle_rad(of.T_aligned))
+METRIC = MetricDefinition("ate_old", "", "rad", "", "", POSES, "", measure=lambda of: angle_rad(of.T_aligned))
 """
 
 Said = subprocess.CompletedProcess[str]

@@ -143,11 +143,6 @@ def lookup(module: str, name: str) -> object:
     raise AttributeError(f"module {module!r} has no attribute {name!r}")
 
 
-def replacement(module: str, name: str) -> str | None:
-    """What replaces a retired name, None where the name is not retired."""
-    return MOVED.get(module, {}).get(name) or GONE.get(module, {}).get(name)
-
-
 class RetiredModule(ModuleType):
     """A module that is no file any more: its names are looked up in the tables above."""
 

@@ -12,7 +12,6 @@ from vobench.errors import InputError
 from vobench.suite.scaffold import new_scene, new_suite, require_free, require_name
 
 SCAFFOLD = Path(__file__).parent / "scaffold"
-SIGNS = {True: "kept", False: "BROKEN", None: "not told"}
 
 
 def new_command(
@@ -82,7 +81,7 @@ def try_command(
     json: terminal.Json = False,
 ) -> None:
     """See in seconds whether an estimator keeps the contract; exit code 1 where it does not."""
-    from vobench.report.contract import contract
+    from vobench.report.contract import Verdict, contract
     from vobench.suite import catalog
 
     folder = catalog.find("estimator", estimator).path
@@ -90,8 +89,9 @@ def try_command(
     for clause in contract(folder):
         clauses.append(clause)
         if not json:
-            print(f"{SIGNS[clause.holds]:9} {clause.name}: {clause.seen}", flush=True)
-    is_kept = all(clause.holds is not False for clause in clauses)
+            word = clause.verdict.upper() if clause.verdict is Verdict.BROKEN else clause.verdict
+            print(f"{word:9} {clause.name}: {clause.seen}", flush=True)
+    is_kept = all(clause.verdict is not Verdict.BROKEN for clause in clauses)
     if json:
         terminal.print_json({"path": str(folder), "kept": is_kept, "clauses": [asdict(clause) for clause in clauses]})
     raise SystemExit(0 if is_kept else 1)

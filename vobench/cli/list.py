@@ -72,7 +72,7 @@ def _checked_summary(entry: Entry) -> str:
     from vobench.suite.suite import Suite
 
     if entry.kind == "estimator":
-        return read_manifest(entry.path).summary
+        return read_manifest(entry.path).described
     if entry.kind == "scene":
         return read_scene(entry.path).summary
     if entry.kind == "scenario":

@@ -62,7 +62,7 @@ class Manifest:
     causal: bool = True
     deterministic: bool = True
     limits: Limits = USUAL
-    summary: Text
+    summary: str = ""
     paper: str = ""
     params: dict[str, Any] = field(default_factory=dict)
 
@@ -79,6 +79,14 @@ class Manifest:
             for name in PLACEHOLDER.findall(" ".join(argv)):
                 if name not in (*known, *self.params):
                     raise SettingError(unknown("placeholder or parameter", name, [*known, *self.params]), key)
+
+    @property
+    def described(self) -> str:
+        """The summary or, where the manifest has none, how the estimator is run and which sensors it needs."""
+        if self.summary:
+            return self.summary
+        how = self.class_path or " ".join(self.command or self.stream) or "oracle"
+        return f"{how}, needs {' and '.join(self.needs) or 'no sensor'}"
 
     @property
     def claims(self) -> tuple[str, ...]:

@@ -1,13 +1,19 @@
 """Whether an estimator keeps the contract: it is run on recordings of a second, each with something of its own."""
 
+import ast
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
+from enum import StrEnum
+from importlib import import_module
 from pathlib import Path
 from statistics import fmean
 
 import numpy as np
 
+import vobench
+from vobench import retired
 from vobench.estimator.process import EstimatorProcess
 from vobench.estimator.program import EstimatorFailure
 from vobench.estimator.protocol import Image
@@ -19,6 +25,7 @@ from vobench.runner.estimate import estimate, frames_of, read_outcome
 from vobench.runner.folder import read_tum
 from vobench.runner.frames import ANSWERS, TIMES, read_table
 from vobench.runner.ground_truth import write_ground_truth
+from vobench.runner.key import PLUGIN, offered_names
 from vobench.runner.store import SilentProgress
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import Sequence, SequenceWriter
@@ -34,13 +41,27 @@ RIG = stereo_rig(LENS, pitch_deg=90, baseline_m=BASELINE_M, height_m=HEIGHT_M)
 STILL_M = 0.01  # farther than this no tracker of a resting picture should come in a second
 
 
+class Verdict(StrEnum):
+    """What a clause comes to. Only a broken one is a breach of the contract."""
+
+    KEPT = "kept"
+    BROKEN = "broken"
+    NOT_TOLD = "not told"  # it could not be tested
+    POOR = "poor"  # within the contract, but a poor result
+    ADVICE = "advice"  # nothing wrong today
+
+
 @dataclass(frozen=True, slots=True)
 class Clause:
-    """One thing that was looked at: whether it `holds` (None: it could not be told), and what was seen."""
+    """One thing that was looked at, what it comes to, and what was seen."""
 
     name: str
-    holds: bool | None
+    verdict: Verdict
     seen: str
+
+
+def _kept_if(holds: bool) -> Verdict:
+    return Verdict.KEPT if holds else Verdict.BROKEN
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +117,7 @@ PRACTICES = {
 def contract(folder: Path) -> Iterator[Clause]:
     """Try an estimator, clause by clause. Raises SuiteError where its manifest is wrong."""
     manifest = read_manifest(folder)
+    yield from foreign_imports(folder)
     entrant = Entrant(manifest.name, folder, manifest, manifest.params, manifest.limits)
     with tempfile.TemporaryDirectory(prefix="vobench-try-") as place:
         at = {name: practice.write(Path(place, name)) for name, practice in PRACTICES.items()}
@@ -125,8 +147,8 @@ def _ended(name: str, made: Path) -> Clause:
     poses = len(read_tum(made / running.ESTIMATE))
     frames = len(read_table(made / ANSWERS))
     if outcome.kind != running.FINISHED:
-        return Clause(name, False, f"{outcome.kind} after {frames} frames: {outcome.reason}")
-    return Clause(name, True, f"{poses} poses of {frames} frames")
+        return Clause(name, Verdict.BROKEN, f"{outcome.kind} after {frames} frames: {outcome.reason}")
+    return Clause(name, Verdict.KEPT, f"{poses} poses of {frames} frames")
 
 
 def _repeats(first: Path, second: Path, *, is_declared: bool) -> Clause:
@@ -134,7 +156,7 @@ def _repeats(first: Path, second: Path, *, is_declared: bool) -> Clause:
     seen = (
         f"two runs are {'the same' if is_same else 'not the same'}, declared deterministic: {str(is_declared).lower()}"
     )
-    return Clause("determinism", is_same or not is_declared, seen)
+    return Clause("determinism", _kept_if(is_same or not is_declared), seen)
 
 
 def _causes(entrant: Entrant, drive: Path, run: Callable[[], Path]) -> Clause:
@@ -142,11 +164,11 @@ def _causes(entrant: Entrant, drive: Path, run: Callable[[], Path]) -> Clause:
     manifest = entrant.manifest
     if manifest.command or not (manifest.causal and manifest.deterministic):
         why = "it reads all at once" if manifest.command else "it is not declared causal and deterministic"
-        return Clause("causality", None, f"{why}: nothing to compare")
+        return Clause("causality", Verdict.NOT_TOLD, f"{why}: nothing to compare")
     before = [read_tum(made / running.ESTIMATE) for made in (drive, run())]
     known = [each.T_world_frame[each.t_ns < FIRST_ODD * STEP_NS] for each in before]
     is_same = np.array_equal(known[0], known[1])
-    return Clause("causality", is_same, f"poses {'do not hang' if is_same else 'hang'} on later frames")
+    return Clause("causality", _kept_if(is_same), f"poses {'do not hang' if is_same else 'hang'} on later frames")
 
 
 def _in_one_process(entrant: Entrant, recording: Path, drive: Path) -> Iterator[Clause]:
@@ -167,22 +189,25 @@ def _in_one_process(entrant: Entrant, recording: Path, drive: Path) -> Iterator[
                     [None if answer.T_odom_frame is None else answer.T_odom_frame.tolist() for answer in answers]
                 )
     except EstimatorFailure as failure:
-        yield Clause("frames unchanged, restart", False, f"{failure.kind}: {failure.reason}")
+        yield Clause("frames unchanged, restart", Verdict.BROKEN, f"{failure.kind}: {failure.reason}")
         return
-    yield Clause("frames unchanged", True, "no picture and no reading was written to")
+    yield Clause("frames unchanged", Verdict.KEPT, "no picture and no reading was written to")
     is_same = tracks[0] == tracks[1]
     seen = f"start() once more gives {'the same' if is_same else 'other'} poses"
-    yield Clause("restart", is_same or not manifest.deterministic, seen)
+    yield Clause("restart", _kept_if(is_same or not manifest.deterministic), seen)
 
 
 def _rests(made: Path) -> Clause:
+    """How far the estimate moves while the camera stands still. Poor accuracy is no breach of the contract."""
     if read_outcome(made).kind != running.FINISHED:
         return _ended("standstill", made)
     path_m = read_tum(made / running.ESTIMATE).positions_m
     if not len(path_m):
-        return Clause("standstill", False, "no pose")
+        return Clause("standstill", Verdict.POOR, "no pose")
     away_m = float(np.linalg.norm(path_m - path_m[:1], axis=1).max())
-    return Clause("standstill", away_m <= STILL_M, f"{1e3 * away_m:.2f} mm away at most, in a second")
+    verdict = Verdict.KEPT if away_m <= STILL_M else Verdict.POOR
+    seen = f"at most {1e3 * away_m:.2f} mm away within a second; at most {1e3 * STILL_M:g} mm is good"
+    return Clause("standstill", verdict, seen)
 
 
 def _spends(made: Path, entrant: Entrant) -> Clause:
@@ -190,11 +215,62 @@ def _spends(made: Path, entrant: Entrant) -> Clause:
     wall_ms, cpu_ms = ([float(row[name]) for row in rows] for name in ("wall_ms", "cpu_ms"))
     limit_ms = 1e3 * entrant.limits.frame_s
     cost = f"{fmean(wall_ms):.1f} ms a frame, {max(wall_ms):.1f} ms at most, {fmean(cpu_ms):.1f} ms of CPU"
-    return Clause("time", max(wall_ms) <= limit_ms, f"{cost}; 320 x 240 pixels")
+    return Clause("time", _kept_if(max(wall_ms) <= limit_ms), f"{cost}; 320 x 240 pixels")
+
+
+def foreign_imports(folder: Path) -> Iterator[Clause]:
+    """An advice for each import of vobench, in the Python files of a folder, from elsewhere than `vobench.plugin`."""
+    for path in sorted(folder.rglob("*.py")):
+        with suppress(SyntaxError, ValueError):  # who runs it says what is wrong with it
+            for line, module, name in _imports_of_vobench(ast.parse(path.read_bytes())):
+                imported = f"{module}.{name}" if name else module
+                place = f"{path.relative_to(folder)}:{line}"
+                yield Clause("imports", Verdict.ADVICE, f"{place}: {imported}: {_instead_of(module, name)}")
+
+
+def _imports_of_vobench(tree: ast.Module) -> Iterator[tuple[int, str, str]]:
+    """Line, module and name of each import from the inside of vobench; no name where a module is imported."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            public = {PLUGIN.rpartition(".")[2], *vobench.__all__} if node.module == "vobench" else set()
+            is_inside = node.module.split(".")[0] == "vobench" and node.module != PLUGIN
+            if is_inside:
+                yield from ((node.lineno, node.module, alias.name) for alias in node.names if alias.name not in public)
+        elif isinstance(node, ast.Import):
+            for alias in node.names:
+                if alias.name.startswith("vobench.") and alias.name != PLUGIN:
+                    yield node.lineno, alias.name, ""
+
+
+def _instead_of(module: str, name: str) -> str:
+    """What a plugin should import in place of a name of a module, or of the module where there is no name."""
+    gone = retired.GONE.get(module, {}).get(name)
+    if gone is not None:
+        return gone
+    moved = retired.MOVED.get(module, {}).get(name)
+    if moved is not None and not moved.startswith(f"{PLUGIN}."):
+        return f"it is {moved} now, which {PLUGIN} does not offer"
+    offered = moved.rpartition(".")[2] if moved is not None else _offered_as(module, name)
+    if offered is not None:
+        return f"from {PLUGIN} import {offered}"
+    return f"{PLUGIN} does not offer it, so it may change or leave without notice"
+
+
+def _offered_as(module: str, name: str) -> str | None:
+    """The name under which `vobench.plugin` offers a name of a module, or a module, None where it does not."""
+    imported = f"{module}.{name}" if name else module
+    for offered, home in offered_names().items():
+        if imported in (home.replace(":", "."), f"{home}.{offered}"):
+            return offered
+    home = offered_names().get(name, "").partition(":")[0]
+    with suppress(ImportError, AttributeError):  # a module that imports the name from its home
+        if home and getattr(import_module(module), name) is getattr(import_module(home), name):
+            return name
+    return None
 
 
 def assert_contract(folder: Path | str) -> None:
     """For a plugin's own tests: raises AssertionError with every clause that an estimator's folder does not keep."""
-    broken = [f"{clause.name}: {clause.seen}" for clause in contract(Path(folder)) if clause.holds is False]
+    broken = [f"{clause.name}: {clause.seen}" for clause in contract(Path(folder)) if clause.verdict is Verdict.BROKEN]
     if broken:
         raise AssertionError(f"{folder} does not keep the contract: {'; '.join(broken)}")

@@ -114,12 +114,17 @@ def imported_by(folder: Path, *, package: Path = PACKAGE) -> list[str]:
 @cache
 def _homes(package: Path) -> dict[str, str]:
     """The module of each name that `vobench.plugin` offers and of each retired name: `vobench.plugin.se3`, say."""
-    offered = _table(package / "plugin.py", "HOMES")
-    homes = {f"{PLUGIN}.{name}": home.partition(":")[0] for name, home in offered.items()}
+    homes = {f"{PLUGIN}.{name}": home.partition(":")[0] for name, home in offered_names(package).items()}
     for module, moved in _table(package / "retired.py", "MOVED").items():
         for name, new_place in moved.items():
             homes[f"{module}.{name}"] = homes.get(new_place) or new_place.rpartition(".")[0]
     return homes
+
+
+@cache
+def offered_names(package: Path = PACKAGE) -> dict[str, str]:
+    """`HOMES` of `vobench.plugin`, read without importing it: where each name that plugins may import lives."""
+    return _table(package / "plugin.py", "HOMES")
 
 
 def _table(path: Path, name: str) -> dict[str, Any]:
