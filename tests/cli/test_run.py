@@ -10,6 +10,7 @@ import pytest
 
 from vobench.errors import MissingDependencyError
 from vobench.rendering import raster
+from vobench.runner.task import PERFORMERS
 
 
 def test_run_ends_in_a_leaderboard_and_says_where_everything_is(vobench, here):
@@ -206,6 +207,43 @@ def test_a_threshold_that_is_broken_is_said_and_is_a_code_of_its_own(vobench, he
     broken = vobench("run", "tiny", "-e", "stand_still", "--fail-if", "ate_trans.max >= 0")
     assert broken.code == 3
     assert "stand_still on short: ate_trans.max is" in broken.err
+
+
+def test_a_run_without_a_sequence_is_one_sentence_and_no_board(vobench, here, monkeypatch):
+    def broken(*_):
+        raise AttributeError("module 'OpenGL.GL' has no attribute 'glClipControl'")
+
+    monkeypatch.setattr(raster, "RasterRenderer", broken)
+    said = vobench("run", "tiny")
+    assert (said.code, said.out) == (1, "")
+    sentence = said.err.splitlines()[-1]
+    assert sentence.startswith("vobench: no case could be simulated or imported, so nothing was scored: short: ")
+    assert "glClipControl" in sentence
+    assert not list((here / "runs").rglob("*.json"))
+
+
+def test_a_run_of_which_some_cases_cannot_be_simulated_has_a_board_and_ends_with_1(vobench, here, monkeypatch):
+    suite = here / "suites" / "tiny.yaml"
+    suite.write_text(suite.read_text().replace("rigs: {", "rigs: {ahead: {pitch_deg: 0}, "))
+    simulate = PERFORMERS["sequence"]
+
+    def some(case, *others):
+        if "ahead" in case.name:
+            raise RuntimeError("no lens for it")
+        simulate(case, *others)
+
+    monkeypatch.setitem(PERFORMERS, "sequence", some)
+    said = vobench("run", "tiny")
+    assert said.code == 1
+    assert "1 of 2 cases could not be simulated or imported and count for no estimator: ahead: " in said.out
+    assert "crashed" not in said.out
+    assert vobench("run", "tiny", "--json").json["unmade"][0]["cases"] == ["ahead"]
+    for command in ("report", "verify"):
+        assert vobench(command, "runs/tiny").code == 0
+    assert vobench("bundle", "runs/tiny", "partial.zip").code == 0
+    assert vobench("score", "partial.zip").code == 0
+    shown = vobench("view", "runs/tiny", "--case", "ahead", "--save", "a.rrd")
+    assert shown.err.startswith("vobench: 'ahead' has no sequence to show, as it could not be made: ")
 
 
 def test_the_log_of_events_has_a_start_and_an_end_of_each_task(vobench, here):

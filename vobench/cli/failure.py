@@ -22,6 +22,7 @@ from vobench.runner.estimate import Outcome as Ended
 from vobench.runner.folder import (
     CASE,
     ESTIMATORS,
+    NO_SEQUENCE,
     SCORE,
     SEQUENCE,
     SUITE,
@@ -31,6 +32,7 @@ from vobench.runner.folder import (
     open_run,
     read_score,
     read_tum,
+    with_sequence,
 )
 from vobench.runner.frames import GROUND_TRUTH, read_frames
 from vobench.runner.key import folder_digest
@@ -78,6 +80,8 @@ def read_trial(path: Path, *, estimator: Path | None = None) -> Tried:
     Raises InputError and UnknownNameError for what is not there, or was recorded and cannot be made in another way.
     """
     folder, score = _found(path)
+    if score.status == NO_SEQUENCE:
+        raise InputError(f"'{score.case}' has no sequence, as it could not be made: {score.reason}")
     case = read_simulated(folder, score.case)
     return Tried(folder, score, case, _entrant(folder, score.estimator, estimator), _suite(folder))
 
@@ -142,7 +146,7 @@ def run_cases(tried: Tried, cases: Mapping[str, Case], *, name: str, out: Path, 
     with wrong.at():
         body_motions(plan)
     wrong.require_none()
-    return run_plan(plan, {}, out=out, jobs=jobs, finish=lambda *_: None)
+    return run_plan(plan, {}, out=out, jobs=jobs, finish=lambda *_: None, require_all=True)
 
 
 def outcome(folder: RunFolder, score: TrialScore) -> Outcome:
@@ -188,7 +192,7 @@ def causes_command(
 ) -> None:
     """Say what a run's errors hang on, where each trial went wrong first, and its worst segments."""
     folder = open_run(run)
-    scores = folder.scores()
+    scores = with_sequence(folder.scores())
     labels = sorted({score.estimator for score in scores})
     chosen = [terminal.known("estimator", estimator, labels)] if estimator else labels
     of_frames = {}

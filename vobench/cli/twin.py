@@ -216,7 +216,9 @@ def _run(file: Path, out: Path, jobs: int) -> RunFolder:
     from vobench.runner.import_recording import read_all
 
     planned = read_plan(str(file))
-    return run_plan(planned, read_all(planned), out=out / "runs", jobs=jobs, finish=page.write_reports)
+    return run_plan(
+        planned, read_all(planned), out=out / "runs", jobs=jobs, finish=page.write_reports, require_all=True
+    )
 
 
 def _errors(folder: RunFolder, case: str) -> dict[str, Array]:

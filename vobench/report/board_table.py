@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from vobench.errors import printable
 from vobench.report.leaderboard import COSTS, METRICS, Board, Cell, Curve, Total, marks, notes
+from vobench.runner.folder import NO_SEQUENCE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -185,6 +186,7 @@ def as_json(made: Board) -> str:
         "totals": [asdict(total) for total in made.totals],
         "curves": [asdict(curve) for curve in made.curves],
         "remarks": remarks(made),
+        "unmade": [asdict(group) for group in made.unmade],
     }
     return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -214,7 +216,7 @@ def _row(cell: Cell) -> dict[str, Any]:
 
 
 def rows(made: Board) -> list[dict[str, Any]]:
-    """One flat row for each cell, then one for each total, whose case is `all`."""
+    """One flat row per cell, then one per total, whose case is `all`, then one per case without a sequence."""
     found = [_row(cell) for cell in made.cells]
     for total in made.totals:
         stated = {**asdict(total), "case": "all", "ate": total.ate_percent}
@@ -222,6 +224,8 @@ def rows(made: Board) -> list[dict[str, Any]]:
             stated |= {f"{name}_min": ends[0], f"{name}_max": ends[1]}
         gone = ("claims", "places", "ratio_interval", "ate_percent", "repeats", "cases")
         found.append({name: value for name, value in stated.items() if name not in gone})
+    for group in made.unmade:
+        found += [{"case": case, "status": NO_SEQUENCE, "reason": group.cause} for case in group.cases]
     return found
 
 

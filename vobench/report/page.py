@@ -32,6 +32,7 @@ from vobench.runner.folder import (
     RunFolder,
     TrialScore,
     read_tum,
+    with_sequence,
 )
 from vobench.runner.frames import FRAMES, GROUND_TRUTH, TIMES, FrameRow, new_table, read_frames
 from vobench.trajectory.align import Alignment
@@ -107,7 +108,7 @@ def _answers(folder: RunFolder, scores: list[TrialScore]) -> Iterator[tuple[tupl
     def key(score: TrialScore) -> tuple[str, str]:
         return score.case, score.estimator
 
-    for each, trials in groupby(sorted(scores, key=key), key=key):
+    for each, trials in groupby(sorted(with_sequence(scores), key=key), key=key):
         stop.check()
         frames = [read_frames(folder.estimate(trial.case, trial.estimator, trial.repeat)) for trial in trials]
         yield each, answers(frames), _costs([row for rows in frames for row in rows])
@@ -159,9 +160,10 @@ def _header(folder: RunFolder, scores: list[TrialScore]) -> dict[str, Any]:
     suite, environment = _json(folder.path / SUITE), _json(folder.path / ENVIRONMENT)
     stamp = folder.path / ENVIRONMENT
     when = datetime.fromtimestamp(stamp.stat().st_mtime, UTC) if stamp.is_file() else None
-    failed = sum(score.status not in SURVIVED for score in scores)
+    trials = with_sequence(scores)
+    failed = sum(score.status not in SURVIVED for score in trials)
     facts = {
-        "trials": f"{len(scores)}, {failed} failed",
+        "trials": f"{len(trials)}, {failed} failed",
         "seed": suite.get("seed"),
         "repeats": suite.get("repeats"),
         "date": f"{when:%Y-%m-%d %H:%M} UTC" if when else None,

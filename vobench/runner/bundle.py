@@ -172,12 +172,11 @@ def _stated(folder: RunFolder) -> list[dict[str, Any]]:
 
 def _link_case(folder: RunFolder, made: RunFolder, case: str, name: str) -> None:
     source, target = folder.case(case), made.case(case)
-    if target.is_dir():
-        truths = [(place / GROUND_TRUTH) for place in (source, target)]
-        if all(truth.is_file() for truth in truths) and len({truth.read_bytes() for truth in truths}) > 1:
-            raise InputError(f"case {case!r} is another one in {name}: its true path differs, so nothing compares")
-        return
-    target.mkdir(parents=True)
+    truths = [place / GROUND_TRUTH for place in (source, target)]
+    if all(truth.is_file() for truth in truths) and len({truth.read_bytes() for truth in truths}) > 1:
+        raise InputError(f"case {case!r} is another one in {name}: its true path differs, so nothing compares")
+    target.mkdir(parents=True, exist_ok=True)
+    # A run that could not make the case has no true path of it; then another run's is linked.
     for path in (source / each for each in (*OF_CASE, SEQUENCE)):
-        if path.exists():
+        if path.exists() and not (target / path.name).exists():
             (target / path.name).symlink_to(path.resolve())

@@ -2,12 +2,12 @@
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -23,7 +23,8 @@ CASE, SCORE, SEQUENCE = "case.json", "score.json", "sequence"
 ESTIMATES, PAGE = "estimates", "leaderboard.html"
 ENVIRONMENT, SUITE, ESTIMATORS = "environment.json", "suite.json", "estimators.json"
 
-# Best first; the last seven are failures, and no failure ranks before a survivor.
+# Best first. Those from `lost` to `not_applicable` are failures, and no failure ranks before a survivor. The last one
+# is no failure of an estimator: its case is excluded for all of them.
 TrialStatus = Literal[
     "ok",
     "partial",
@@ -35,10 +36,13 @@ TrialStatus = Literal[
     "crashed",
     "refused",
     "not_applicable",
+    "no_sequence",
 ]
 STATUSES: tuple[TrialStatus, ...] = get_args(TrialStatus)
 SURVIVED = ("ok", "partial")
 NOT_APPLICABLE = "not_applicable"  # the recording lacks a sensor that the estimator needs
+NO_SEQUENCE: Final = "no_sequence"  # the case could not be simulated or imported
+MOST_NAMED = 3  # cases that a sentence names; the others are counted
 
 
 class TrialScore(BaseModel):
@@ -72,6 +76,44 @@ class TrialScore(BaseModel):
         return value_of(self.score, metric, statistic)
 
 
+@dataclass(frozen=True, slots=True)
+class Unmade:
+    """Cases that could not be simulated or imported for one cause, which names the remedy where there is one."""
+
+    cause: str
+    cases: tuple[str, ...]
+
+    @property
+    def names(self) -> str:
+        """The first of the cases, and how many others there are."""
+        named = ", ".join(self.cases[:MOST_NAMED])
+        others = len(self.cases) - MOST_NAMED
+        return f"{named} and {others} more" if others > 0 else named
+
+
+def unmade_in(scores: Iterable[TrialScore]) -> tuple[Unmade, ...]:
+    """The cases without a sequence, grouped by cause, in order of their first case.
+
+    A case that another of several merged runs has made is none of them.
+    """
+    causes = dict[str, str]()
+    made = set[str]()
+    for score in scores:
+        if score.status == NO_SEQUENCE:
+            causes.setdefault(score.case, score.reason)
+        else:
+            made.add(score.case)
+    by_cause = dict[str, list[str]]()
+    for case in sorted(causes.keys() - made):
+        by_cause.setdefault(causes[case], []).append(case)
+    return tuple(Unmade(cause, tuple(cases)) for cause, cases in by_cause.items())
+
+
+def with_sequence(scores: Iterable[TrialScore]) -> list[TrialScore]:
+    """The trials whose case could be simulated or imported: those that say something about an estimator."""
+    return [score for score in scores if score.status != NO_SEQUENCE]
+
+
 def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> float | None:
     """One statistic of one metric of a score as JSON has it, None where it has no such."""
     entries = (score or {"metrics": []})["metrics"]
@@ -87,6 +129,13 @@ class RunFolder:
     def case(self, case: str) -> Path:
         """The folder of a case."""
         return self.path / "cases" / case
+
+    def unmade(self) -> tuple[Unmade, ...]:
+        """The cases that could not be simulated or imported, by cause; empty if the run is complete.
+
+        Raises InputError where the folder or a score is none of ours.
+        """
+        return unmade_in(self.scores())
 
     def estimate(self, case: str, estimator: str, repeat: int) -> Path:
         """The folder of a trial."""
