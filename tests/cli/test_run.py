@@ -1,5 +1,6 @@
 """vobench run, check, report and view on a suite whose pictures are grey."""
 
+import json
 import os
 import re
 import shutil
@@ -139,7 +140,15 @@ def test_no_label_reaches_anything_but_its_own_folder(vobench, here, label):
     case = here / "runs" / "tiny" / "latest" / "cases" / "short"
     assert {path.name for path in case.iterdir()} == {"case.json", "ground_truth.tum", "sequence", "estimates"}
     assert {path.name for path in (case / "estimates").iterdir()} == {label, "stand_still"}
-    made = {"inputs.json", "manifest.json", "sensors.mcap", "truth.mcap", "ground_truth.tum", "exposures.csv"}
+    made = {
+        "inputs.json",
+        "manifest.json",
+        "sensors.mcap",
+        "truth.mcap",
+        "ground_truth.tum",
+        "exposures.csv",
+        "made_on.json",
+    }
     assert {path.name for path in (case / "sequence").iterdir()} == made
     assert vobench("verify", "runs/tiny").code == 0
     assert vobench("view", "runs/tiny", "--estimator", label, "--save", "a.rrd").code == 0
@@ -246,9 +255,31 @@ def test_a_run_of_which_some_cases_cannot_be_simulated_has_a_board_and_ends_with
     assert shown.err.startswith("vobench: 'ahead' has no sequence to show, as it could not be made: ")
 
 
-def test_the_log_of_events_has_a_start_and_an_end_of_each_task(vobench, here):
-    import json
+def test_the_board_and_the_page_say_where_the_figures_come_from(vobench, ran, here):
+    from vobench.runner.environment import processor
 
+    assert f"Made on {processor()}, " in vobench("report", "runs/tiny").out
+    assert vobench("report", "runs/tiny", "--json").json["environment"]["processors"][0]["simd"] == processor().simd
+    assert vobench("bundle", "runs/tiny", "a.zip").code == 0
+    assert f"Made on {processor()}, " in vobench("report", "a.zip").out
+    assert f"Made on {processor()}, " in vobench("report", "a.zip", "runs/tiny").out
+    (page,) = ran.glob("*T*/leaderboard.html")
+    assert f"<dt>processor</dt><dd>{processor()}</dd>" in page.read_text()
+
+
+def test_compare_names_what_differs_between_two_machines(vobench, ran, here):
+    assert "differ in what can change scores" not in vobench("compare", "runs/tiny", "runs/tiny").out
+    elsewhere = here / "elsewhere"
+    shutil.copytree(ran / "latest", elsewhere, symlinks=True)
+    stated = json.loads((elsewhere / "environment.json").read_text())
+    stated["processors"] = [{"model": "another", "simd": "x86-64-v3"}]
+    (elsewhere / "environment.json").write_text(json.dumps(stated))
+    said = vobench("compare", "runs/tiny", "elsewhere").out
+    assert "The runs differ in what can change scores: processor " in said
+    assert "→ another (x86-64-v3)" in said
+
+
+def test_the_log_of_events_has_a_start_and_an_end_of_each_task(vobench, here):
     vobench("run", "tiny", "--events", "events.jsonl")
     events = [json.loads(line) for line in (here / "events.jsonl").read_text().splitlines()]
     started = [event["key"] for event in events if event["event"] == "started"]

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from vobench.report import board_table, page
 from vobench.report.leaderboard import CaseFacts, EstimatorStatistics, answers, board, lost_aware, marks
+from vobench.runner.environment import Environment, Processor
 from vobench.runner.folder import NO_SEQUENCE, NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore
 from vobench.runner.frames import COLUMNS, FRAMES, TIMES, FrameRow, new_table
 
@@ -175,6 +176,34 @@ def test_a_board_without_any_sequence_is_empty_and_says_why(incomplete):
     assert (made.cells, made.totals) == ((), ())
     for form, write in board_table.FORMATS.items():
         assert write(made, "ate"), form
+
+
+@pytest.fixture
+def placed(scored):
+    """A board of which is known where it was made."""
+    here = Environment(
+        vobench="1.0", processors=(Processor("Some_CPU 9", "x86-64-v3"),), drawn_by=("pipe & co",), date="2026-11-24"
+    )
+    return board([scored("a"), scored("b")], {}, environment=here)
+
+
+@pytest.mark.parametrize("form", board_table.FORMATS)
+def test_every_form_names_processor_driver_and_date(placed, form):
+    text = board_table.FORMATS[form](placed, "ate")
+    for part in ("CPU 9", "x86-64-v3", "pipe", "2026-11-24"):
+        assert part in text
+
+
+def test_in_csv_the_origin_is_columns_of_every_row(placed):
+    frame = pd.read_csv(io.StringIO(board_table.as_csv(placed)))
+    assert set(frame.processor) == {"Some_CPU 9"}
+    assert set(frame.simd) == {"x86-64-v3"}
+    assert len(frame) == 4
+
+
+def test_in_latex_the_origin_is_a_comment(placed):
+    (line,) = [line for line in board_table.latex(placed).splitlines() if "Some_CPU" in line]
+    assert line.startswith("% Made on Some_CPU 9 (x86-64-v3), ")
 
 
 def test_csv_has_a_row_for_each_case_without_a_sequence(incomplete):

@@ -158,6 +158,11 @@ def cell_notes(made: Board) -> list[str]:
     return [f"{cases[0]}{f' and {len(cases) - 1} more' * (len(cases) > 1)}: {note}" for note, cases in said.items()]
 
 
+def origin(made: Board) -> str:
+    """Processor, driver and versions that the figures come from, in one line; empty where they are not known."""
+    return f"Made on {made.environment.line()}" if made.environment and made.environment.line() else ""
+
+
 def markdown(made: Board, metric: str = DEFAULT_METRIC) -> str:
     """The matrix of a metric, the totals, and what to know of them."""
     rows = [[case, *map(str, cells)] for case, cells in matrix(made, metric)]
@@ -165,6 +170,8 @@ def markdown(made: Board, metric: str = DEFAULT_METRIC) -> str:
     for over, table in totals(made):
         lines += [f"## Totals: {_md(over)}", "", *_md_table(table, words=2)]
     lines += [*(f"- {_md(said)}" for said in (*remarks(made), *cell_notes(made))), "", LEGEND.replace("~", "\\~"), ""]
+    if line := origin(made):
+        lines += [_md(line), ""]
     return "\n".join(lines)
 
 
@@ -187,6 +194,7 @@ def as_json(made: Board) -> str:
         "curves": [asdict(curve) for curve in made.curves],
         "remarks": remarks(made),
         "unmade": [asdict(group) for group in made.unmade],
+        "environment": asdict(made.environment) if made.environment else None,
     }
     return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -226,7 +234,8 @@ def rows(made: Board) -> list[dict[str, Any]]:
         found.append({name: value for name, value in stated.items() if name not in gone})
     for group in made.unmade:
         found += [{"case": case, "status": NO_SEQUENCE, "reason": group.cause} for case in group.cases]
-    return found
+    facts = made.environment.facts() if made.environment else {}
+    return [{**row, **facts} for row in found]
 
 
 def as_csv(made: Board) -> str:
@@ -294,6 +303,8 @@ def latex(made: Board, metric: str = DEFAULT_METRIC) -> str:
         r"\end{tabular}",
         r"\end{table}",
     ]
+    if line := origin(made):
+        lines.append(f"% {printable(line)}")
     return "\n".join([*lines, ""])
 
 

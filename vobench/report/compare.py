@@ -10,6 +10,7 @@ from vobench.errors import InputError
 from vobench.metric import ranking
 from vobench.metric.ranking import ALPHA, difference_p, holm
 from vobench.report.leaderboard import Board, Cell
+from vobench.runner.environment import differences
 
 SAME, BETTER, WORSE, UNDECIDED = "same", "better", "worse", "not decided"
 FAILS, MENDED, NEW, GONE = "fails now", "mended", "new", "gone"
@@ -55,6 +56,16 @@ def compare(old: Board, new: Board, *, at_most: float | None = None) -> list[Cha
     ]
     names = sorted({estimator for _, estimator in common})
     return [_total(name, [pair for (_, e), pair in common.items() if e == name], at_most) for name in names] + cells
+
+
+def environment_differences(old: Board, new: Board) -> list[str]:
+    """What differs between where two boards come from and can change scores, both values named.
+
+    Empty where nothing does, or where one of the runs does not state it.
+    """
+    if old.environment is None or new.environment is None:
+        return []
+    return differences(old.environment, new.environment)
 
 
 def _ordered(cell: Cell) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

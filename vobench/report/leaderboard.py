@@ -14,6 +14,7 @@ import numpy as np
 from vobench.metric import ranking
 from vobench.metric.coverage import lost_aware_score
 from vobench.runner.consistency import Consistency
+from vobench.runner.environment import Environment
 from vobench.runner.estimate import DROPPED
 from vobench.runner.folder import (
     NOT_APPLICABLE,
@@ -199,6 +200,7 @@ class Board:
     """The table of cells and what is derived from it; `remarks` say what its numbers do not.
 
     `unmade` are the cases that could not be simulated or imported: they have no cells, and count for no estimator.
+    `environment` is where the figures come from, as far as it is known.
     """
 
     title: str
@@ -207,6 +209,7 @@ class Board:
     curves: tuple[Curve, ...]
     remarks: tuple[str, ...]
     unmade: tuple[Unmade, ...] = ()
+    environment: Environment | None = None
     _at: dict[tuple[str, str], Cell] = field(default_factory=dict, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -258,7 +261,12 @@ def answers(trials: Sequence[list[FrameRow]]) -> EstimatorStatistics:
 
 
 def board(
-    scores: Iterable[TrialScore], answered: Answered, facts: Mapping[str, CaseFacts] | None = None, *, title: str = ""
+    scores: Iterable[TrialScore],
+    answered: Answered,
+    facts: Mapping[str, CaseFacts] | None = None,
+    *,
+    title: str = "",
+    environment: Environment | None = None,
 ) -> Board:
     """The board of these trials; `answered` is per (case, estimator), `facts` per case, and both may lack some."""
 
@@ -285,7 +293,7 @@ def board(
     remarks += sorted(
         {f"the truth that is scored is off by {each}" for cell in cells if (each := cell.facts.truth_noise)}
     )
-    return Board(title, tuple(cells), tuple(totals), tuple(_curves(cells)), tuple(remarks), unmade)
+    return Board(title, tuple(cells), tuple(totals), tuple(_curves(cells)), tuple(remarks), unmade, environment)
 
 
 def _without_sequence(unmade: Sequence[Unmade], *, of: int) -> list[str]:

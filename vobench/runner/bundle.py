@@ -12,6 +12,7 @@ from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile, ZipInfo
 from vobench.errors import InputError
 from vobench.runner.consistency import COVARIANCE
 from vobench.runner.entry import file_hash
+from vobench.runner.environment import merged_environment, read_environment
 from vobench.runner.estimate import ESTIMATE, FINISHED, LOG, REVISED, Outcome
 from vobench.runner.folder import (
     CASE,
@@ -142,6 +143,9 @@ def merged(folders: Sequence[RunFolder], names: Sequence[str]) -> Iterator[RunFo
         return
     with TemporaryDirectory(prefix="vobench-merged-") as temporary:
         made = RunFolder(Path(temporary) / "merged" / "runs")
+        made.path.mkdir(parents=True)
+        environments = [stated for folder in folders if (stated := read_environment(folder))]
+        write_json(made.path / ENVIRONMENT, merged_environment(environments))
         known = dict[str, Any]()
         for folder, name in zip(folders, names, strict=True):
             facts = {each["label"]: each for each in _stated(folder)}

@@ -20,6 +20,7 @@ from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
 CASE, SCORE, SEQUENCE = "case.json", "score.json", "sequence"
+STAMP = "%Y%m%dT%H%M%S"  # of the name of a run's folder
 ESTIMATES, PAGE = "estimates", "leaderboard.html"
 ENVIRONMENT, SUITE, ESTIMATORS = "environment.json", "suite.json", "estimators.json"
 
@@ -191,7 +192,7 @@ def make_run(root: Path, suite: str, key: str, fill: Callable[[RunFolder], None]
     sweep(parent)
     with unfinished(parent) as folder:
         fill(RunFolder(folder))
-        final = _published(folder, parent / f"{datetime.now(UTC):%Y%m%dT%H%M%S}_{key[:8]}")
+        final = _published(folder, parent / f"{datetime.now(UTC):{STAMP}}_{key[:8]}")
         fresh = parent / f".latest-{os.getpid()}"
         fresh.symlink_to(final.name)
         fresh.replace(parent / "latest")  # in one step
@@ -208,6 +209,16 @@ def _published(folder: Path, name: Path) -> Path:
             if not final.is_dir():
                 raise
     raise AssertionError
+
+
+def run_date(folder: RunFolder) -> str:
+    """The day a run ended in UTC, as in 2026-11-24, read off its folder's name; empty for a folder of another name."""
+    stamp = folder.path.resolve().name.partition("_")[0]
+    try:
+        ended = datetime.strptime(stamp, STAMP).replace(tzinfo=UTC)
+    except ValueError:
+        return ""
+    return f"{ended:%Y-%m-%d}"
 
 
 def read_tum(path: Path) -> Trajectory:

@@ -1,18 +1,17 @@
 """A run of a suite: its tasks are performed, and what a person reads is gathered in one folder."""
 
-import platform
-import sys
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import ZipFile
 
-from vobench import __version__, stop
+from vobench import stop
 from vobench.errors import NoSequenceError
 from vobench.estimator.program import sandbox_works
 from vobench.runner.consistency import COVARIANCE
 from vobench.runner.entry import copy_files
+from vobench.runner.environment import environment, joined, read_origin
 from vobench.runner.estimate import ESTIMATE, LOG, REVISED, TRACKS
 from vobench.runner.executor import Done, Event, Executor, perform_all
 from vobench.runner.folder import (
@@ -33,8 +32,7 @@ from vobench.runner.folder import (
 )
 from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.runner.ground_truth import scored_truth
-from vobench.runner.key import digest, folder_digest, library_versions
-from vobench.runner.simulate import LIBRARIES
+from vobench.runner.key import digest, folder_digest
 from vobench.runner.store import Store, Tell, write_json
 from vobench.runner.task import Task, missing, plan
 from vobench.sequence import read_import_notes
@@ -104,8 +102,9 @@ def run_suite(
         def fill(folder: RunFolder) -> None:
             write_json(folder.path / SUITE, stated)
             write_json(folder.path / ESTIMATORS, entrants)
-            write_json(folder.path / ENVIRONMENT, {**_environment(), "timed": BESIDE if shares_time else ALONE,
-                       "sandboxed": sandbox_works()})  # fmt: skip
+            origin = joined(read_origin(store / task.key) for task in scores)
+            timed = BESIDE if shares_time else ALONE
+            write_json(folder.path / ENVIRONMENT, environment(origin, timed=timed, sandboxed=sandbox_works()))
             trials = []
             for task in scores:
                 failure = unmade.get(task.inputs["case"]) or _trial_failure(failures.get(task.key))
@@ -223,13 +222,4 @@ def _entrant_facts(entrant: Entrant) -> dict[str, Any]:
         "limits": asdict(entrant.limits),
         "mode": entrant.mode,
         "code": folder_digest(entrant.folder),
-    }
-
-
-def _environment() -> dict[str, object]:
-    return {
-        "vobench": __version__,
-        "python": sys.version.split()[0],
-        "platform": platform.platform(),
-        "libraries": library_versions(*LIBRARIES, "pandas", "rerun-sdk"),
     }

@@ -9,9 +9,10 @@ from shutil import copyfile
 from typing import TYPE_CHECKING, Any, Literal
 
 from vobench import stop
+from vobench.runner.environment import MADE_ON, origin_here
 from vobench.runner.key import code_digest, digest, folder_digest, imported_by, library_versions
 from vobench.runner.simulate import LIBRARIES, content
-from vobench.runner.store import Progress, SilentProgress, Store
+from vobench.runner.store import Progress, SilentProgress, Store, write_json
 from vobench.suite.scene_file import content as scene_content
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import RecordedCase
@@ -211,7 +212,10 @@ def perform(
 
     def build(folder: Path) -> None:
         began = time.monotonic()
-        PERFORMERS[task.stage](task.subject, [store.need(key) for key in task.needs], folder, progress)
+        needs = [store.need(key) for key in task.needs]
+        PERFORMERS[task.stage](task.subject, needs, folder, progress)
+        engine = task.subject.rendering.engine if isinstance(task.subject, Case) else ""
+        write_json(folder / MADE_ON, asdict(origin_here(needs, engine=engine)))
         store.note_seconds(task.stage, time.monotonic() - began)
 
     def keeps(folder: Path) -> bool:
