@@ -6,6 +6,10 @@ What a notebook needs is here and imported when it is first asked for; docs/pyth
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from vobench.portable import hold
+
+hold()  # before anything imports numpy
+
 if TYPE_CHECKING:
     from vobench.metric.settings import LIKE, ScoreSettings
     from vobench.notebook import diagnose, read_board, read_sequence, read_trajectory, score

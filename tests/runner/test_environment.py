@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from vobench.portable import PORTABLE
 from vobench.runner import environment as environments
 from vobench.runner.environment import (
     MADE_ON,
@@ -26,6 +27,7 @@ from vobench.runner.environment import (
 )
 from vobench.runner.folder import ENVIRONMENT, RunFolder
 from vobench.runner.store import write_json
+from vobench.runner.task import plan
 
 V3_FLAGS = "abm avx avx2 bmi1 bmi2 cx16 f16c fma lahf_lm movbe pni popcnt sse4_1 sse4_2 ssse3 xsave"
 V4_FLAGS = f"{V3_FLAGS} avx512bw avx512cd avx512dq avx512f avx512vl"
@@ -157,3 +159,13 @@ def test_a_clone_is_named_by_its_commit_and_by_whether_its_files_differ(tmp_path
     assert environments.commit.__wrapped__() == named
     (tmp_path / "vobench" / "a.py").write_text("a = 2\n")
     assert environments.commit.__wrapped__() == f"{named}+changes"
+
+
+def test_portable_results_have_keys_of_their_own(bench, monkeypatch):
+    def keys():
+        return {task.key for task in plan(bench.plan(), {})}
+
+    monkeypatch.delenv(PORTABLE, raising=False)
+    usual = keys()
+    monkeypatch.setenv(PORTABLE, "1")
+    assert not usual & keys()

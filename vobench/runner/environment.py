@@ -15,11 +15,11 @@ from pydantic import TypeAdapter, ValidationError
 
 from vobench import __version__
 from vobench.errors import MissingDependencyError
+from vobench.portable import is_portable
 from vobench.runner.folder import ENVIRONMENT, RunFolder, run_date
 from vobench.runner.key import PACKAGE, library_versions
 
 MADE_ON = "made_on.json"  # beside each result in the store, in a file of its own: no recording holds it
-PORTABLE = "VOBENCH_PORTABLE"
 UNKNOWN = "unknown"
 # Libraries whose release can change a score; others only draw or write reports.
 SCORING = ("numpy", "scipy", "opencv-python-headless", "pyrender", "embreex")
@@ -210,11 +210,6 @@ def _git(clone: Path, *words: str) -> str:
         )
         return done.stdout.strip()
     return ""
-
-
-def is_portable() -> bool:
-    """Whether libraries are held to instructions that every supported processor of this kind has."""
-    return os.environ.get(PORTABLE, "") not in ("", "0")
 
 
 def drawn_by(engine: str) -> str:

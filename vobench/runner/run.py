@@ -9,6 +9,7 @@ from zipfile import ZipFile
 from vobench import stop
 from vobench.errors import NoSequenceError
 from vobench.estimator.program import sandbox_works
+from vobench.portable import require_held
 from vobench.runner.consistency import COVARIANCE
 from vobench.runner.entry import copy_files
 from vobench.runner.environment import environment, joined, read_origin
@@ -80,6 +81,7 @@ def run_suite(
     Raises NoSequenceError, and makes no folder, if no case could be simulated or imported; with `require_all`, if any
     could not. Raises MissingDependencyError if a library is missing and InputError if the disk is full.
     """
+    require_held()
     tasks = plan(suite, recordings)
     kept = Store(store)
     with kept.in_use(tell):

@@ -9,6 +9,7 @@ from shutil import copyfile
 from typing import TYPE_CHECKING, Any, Literal
 
 from vobench import stop
+from vobench.portable import is_portable
 from vobench.runner.environment import MADE_ON, origin_here
 from vobench.runner.key import code_digest, digest, folder_digest, imported_by, library_versions
 from vobench.runner.simulate import LIBRARIES, content
@@ -140,6 +141,7 @@ def estimate_task(trial: Trial, sequence: str, code: Mapping[str, str]) -> Task:
         "mode": entrant.mode,
         "needs": needs,
         **code,
+        **_portable(),
         "libraries": library_versions("numpy", "scipy", "opencv-python-headless"),
     }
     return Task("estimate", trial, inputs, needs)
@@ -168,7 +170,12 @@ def _noise(case: Case | RecordedCase) -> dict[str, Any]:
 
 
 def _made_by(stage: Stage, needs: tuple[str, ...] = ()) -> dict[str, Any]:
-    return {"needs": needs, "code": code_digest(*ENTRIES[stage])}
+    return {"needs": needs, "code": code_digest(*ENTRIES[stage]), **_portable()}
+
+
+def _portable() -> dict[str, bool]:
+    """Portable results share no entry with others, whose keys stay as they are."""
+    return {"portable": True} if is_portable() else {}
 
 
 def missing(tasks: Iterable[Task], root: Path) -> list[Task]:
