@@ -8,6 +8,10 @@ import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from vobench.portable import hold
+
+hold()  # before anything imports numpy
+
 if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
 

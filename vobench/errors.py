@@ -10,6 +10,7 @@ VobenchError               the user's mistake or machine: one line, exit code 1
 ├── MissingDependencyError this machine lacks something; the message says how to get it
 ├── AlignmentError         two trajectories cannot be compared as asked
 ├── MotionError            the robot cannot drive as asked
+├── NoSequenceError        no case of a suite could be simulated or imported
 ├── RenderError            the renderer cannot make this picture
 └── SequenceError          a recording is incomplete, torn or of another form
 """
@@ -112,6 +113,10 @@ class AlignmentError(VobenchError):
 
 class MotionError(VobenchError):
     """The robot cannot drive as asked."""
+
+
+class NoSequenceError(VobenchError):
+    """Cases of a suite could not be simulated or imported; the message says which, why and what helps."""
 
 
 class RenderError(VobenchError):

@@ -1,5 +1,6 @@
 """vobench run, check, report and view on a suite whose pictures are grey."""
 
+import json
 import os
 import re
 import shutil
@@ -10,6 +11,7 @@ import pytest
 
 from vobench.errors import MissingDependencyError
 from vobench.rendering import raster
+from vobench.runner.task import PERFORMERS
 
 
 def test_run_ends_in_a_leaderboard_and_says_where_everything_is(vobench, here):
@@ -138,7 +140,15 @@ def test_no_label_reaches_anything_but_its_own_folder(vobench, here, label):
     case = here / "runs" / "tiny" / "latest" / "cases" / "short"
     assert {path.name for path in case.iterdir()} == {"case.json", "ground_truth.tum", "sequence", "estimates"}
     assert {path.name for path in (case / "estimates").iterdir()} == {label, "stand_still"}
-    made = {"inputs.json", "manifest.json", "sensors.mcap", "truth.mcap", "ground_truth.tum", "exposures.csv"}
+    made = {
+        "inputs.json",
+        "manifest.json",
+        "sensors.mcap",
+        "truth.mcap",
+        "ground_truth.tum",
+        "exposures.csv",
+        "made_on.json",
+    }
     assert {path.name for path in (case / "sequence").iterdir()} == made
     assert vobench("verify", "runs/tiny").code == 0
     assert vobench("view", "runs/tiny", "--estimator", label, "--save", "a.rrd").code == 0
@@ -208,9 +218,68 @@ def test_a_threshold_that_is_broken_is_said_and_is_a_code_of_its_own(vobench, he
     assert "stand_still on short: ate_trans.max is" in broken.err
 
 
-def test_the_log_of_events_has_a_start_and_an_end_of_each_task(vobench, here):
-    import json
+def test_a_run_without_a_sequence_is_one_sentence_and_no_board(vobench, here, monkeypatch):
+    def broken(*_):
+        raise AttributeError("module 'OpenGL.GL' has no attribute 'glClipControl'")
 
+    monkeypatch.setattr(raster, "RasterRenderer", broken)
+    said = vobench("run", "tiny")
+    assert (said.code, said.out) == (1, "")
+    sentence = said.err.splitlines()[-1]
+    assert sentence.startswith("vobench: no case could be simulated or imported, so nothing was scored: short: ")
+    assert "glClipControl" in sentence
+    assert not list((here / "runs").rglob("*.json"))
+
+
+def test_a_run_of_which_some_cases_cannot_be_simulated_has_a_board_and_ends_with_1(vobench, here, monkeypatch):
+    suite = here / "suites" / "tiny.yaml"
+    suite.write_text(suite.read_text().replace("rigs: {", "rigs: {ahead: {pitch_deg: 0}, "))
+    simulate = PERFORMERS["sequence"]
+
+    def some(case, *others):
+        if "ahead" in case.name:
+            raise RuntimeError("no lens for it")
+        simulate(case, *others)
+
+    monkeypatch.setitem(PERFORMERS, "sequence", some)
+    said = vobench("run", "tiny")
+    assert said.code == 1
+    assert "1 of 2 cases could not be simulated or imported and count for no estimator: ahead: " in said.out
+    assert "crashed" not in said.out
+    assert vobench("run", "tiny", "--json").json["unmade"][0]["cases"] == ["ahead"]
+    for command in ("report", "verify"):
+        assert vobench(command, "runs/tiny").code == 0
+    assert vobench("bundle", "runs/tiny", "partial.zip").code == 0
+    assert vobench("score", "partial.zip").code == 0
+    shown = vobench("view", "runs/tiny", "--case", "ahead", "--save", "a.rrd")
+    assert shown.err.startswith("vobench: 'ahead' has no sequence to show, as it could not be made: ")
+
+
+def test_the_board_and_the_page_say_where_the_figures_come_from(vobench, ran, here):
+    from vobench.runner.environment import processor
+
+    assert f"Made on {processor()}, " in vobench("report", "runs/tiny").out
+    assert vobench("report", "runs/tiny", "--json").json["environment"]["processors"][0]["simd"] == processor().simd
+    assert vobench("bundle", "runs/tiny", "a.zip").code == 0
+    assert f"Made on {processor()}, " in vobench("report", "a.zip").out
+    assert f"Made on {processor()}, " in vobench("report", "a.zip", "runs/tiny").out
+    (page,) = ran.glob("*T*/leaderboard.html")
+    assert f"<dt>processor</dt><dd>{processor()}</dd>" in page.read_text()
+
+
+def test_compare_names_what_differs_between_two_machines(vobench, ran, here):
+    assert "differ in what can change scores" not in vobench("compare", "runs/tiny", "runs/tiny").out
+    elsewhere = here / "elsewhere"
+    shutil.copytree(ran / "latest", elsewhere, symlinks=True)
+    stated = json.loads((elsewhere / "environment.json").read_text())
+    stated["processors"] = [{"model": "another", "simd": "x86-64-v3"}]
+    (elsewhere / "environment.json").write_text(json.dumps(stated))
+    said = vobench("compare", "runs/tiny", "elsewhere").out
+    assert "The runs differ in what can change scores: processor " in said
+    assert "→ another (x86-64-v3)" in said
+
+
+def test_the_log_of_events_has_a_start_and_an_end_of_each_task(vobench, here):
     vobench("run", "tiny", "--events", "events.jsonl")
     events = [json.loads(line) for line in (here / "events.jsonl").read_text().splitlines()]
     started = [event["key"] for event in events if event["event"] == "started"]

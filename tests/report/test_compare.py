@@ -4,8 +4,21 @@ import numpy as np
 import pytest
 
 from vobench.errors import InputError
-from vobench.report.compare import BETTER, FAILS, GONE, MENDED, NEW, SAME, UNDECIDED, WORSE, compare
+from vobench.report.compare import (
+    BETTER,
+    FAILS,
+    GONE,
+    MENDED,
+    NEW,
+    NOT_MADE,
+    SAME,
+    UNDECIDED,
+    WORSE,
+    compare,
+    environment_differences,
+)
 from vobench.report.leaderboard import board
+from vobench.runner.environment import Environment, Processor
 
 
 @pytest.fixture
@@ -70,6 +83,24 @@ def test_cells_of_one_run_alone_are_named(scored):
         ("down", "b"): GONE,
         ("ahead", "a"): NEW,
     }
+
+
+def test_a_case_that_one_run_could_not_make_is_neither_gone_nor_worse(scored):
+    whole = board([scored("a"), scored("a", case="flat")], {})
+    partial = board([scored("a"), scored("a", "no_sequence", case="flat", ate_m=None)], {})
+    for pair in ((whole, partial), (partial, whole)):
+        totals, cells = verdicts(*pair)
+        assert totals["a"].verdict == SAME
+        assert {change.case: change.verdict for change in cells} == {"down": SAME, "flat": NOT_MADE}
+
+
+def test_another_processor_is_named_and_runs_that_do_not_state_theirs_differ_in_nothing(scored):
+    boards = [
+        board([scored("a")], {}, environment=Environment(processors=(Processor("cpu", simd),))) for simd in ("v3", "v4")
+    ]
+    assert environment_differences(*boards) == ["processor cpu (v3) → cpu (v4)"]
+    assert environment_differences(boards[0], boards[0]) == []
+    assert environment_differences(board([scored("a")], {}), boards[1]) == []
 
 
 def test_runs_of_different_suites_are_a_sentence(scored):

@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 
 from vobench.report import board_table, page
 from vobench.report.leaderboard import CaseFacts, EstimatorStatistics, answers, board, lost_aware, marks
-from vobench.runner.folder import NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore
+from vobench.runner.environment import Environment, Processor
+from vobench.runner.folder import NO_SEQUENCE, NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore
 from vobench.runner.frames import COLUMNS, FRAMES, TIMES, FrameRow, new_table
 
 CASES = ("a", "b")
-BEGUN = [status for status in STATUSES if status != NOT_APPLICABLE]
+BEGUN = [status for status in STATUSES if status not in (NOT_APPLICABLE, NO_SEQUENCE)]
 ates = st.none() | st.floats(0, 1e6)
 runs = st.fixed_dictionaries(
     {name: st.tuples(*[st.tuples(st.sampled_from(BEGUN), ates)] * len(CASES)) for name in ("p", "q", "r", "s")}
@@ -138,6 +139,81 @@ def test_who_lacks_a_sensor_in_some_cases_is_ranked_on_the_others_and_in_all_of_
     everywhere = [scored("wheels", "not_applicable", case=case, ate_m=None, coverage=0.0) for case in ("down", "flat")]
     last = board([*trials[:2], *everywhere], {}).totals[-1]
     assert (last.estimator, last.failed) == ("wheels", 2)
+
+
+@pytest.fixture
+def incomplete(scored):
+    """Two estimators on a case that was simulated, and on three that were not, for two causes."""
+    causes = {"dark": "no light", "dim": "no light", "far": "too far"}
+    return [
+        scored(name, case=case, ate_m=ate_m)
+        if case == "down"
+        else scored(name, NO_SEQUENCE, case=case, ate_m=None, reason=causes[case])
+        for name, ate_m in (("a", 0.01), ("b", 0.02))
+        for case in ("down", *causes)
+    ]
+
+
+def test_cases_without_a_sequence_are_one_sentence_and_change_nothing_else(incomplete):
+    made = board(incomplete, {})
+    complete = board([score for score in incomplete if score.case == "down"], {})
+    assert (made.cells, made.totals) == (complete.cells, complete.totals)
+    assert made.remarks == (
+        "3 of 4 cases could not be simulated or imported and count for no estimator: dark, dim: no light; far: too far",
+        *complete.remarks,
+    )
+
+
+@pytest.mark.parametrize("form", board_table.FORMATS)
+def test_every_form_but_a_table_for_a_paper_says_which_cases_have_no_sequence(incomplete, form):
+    text = board_table.FORMATS[form](board(incomplete, {}), "ate")
+    assert ("no light" in text) == (form != "latex")
+    assert "a" in text
+
+
+def test_a_board_without_any_sequence_is_empty_and_says_why(incomplete):
+    made = board([score for score in incomplete if score.case != "down"], {})
+    assert (made.cells, made.totals) == ((), ())
+    for form, write in board_table.FORMATS.items():
+        assert write(made, "ate"), form
+
+
+@pytest.fixture
+def placed(scored):
+    """A board of which is known where it was made."""
+    here = Environment(
+        vobench="1.0", processors=(Processor("Some_CPU 9", "x86-64-v3"),), drawn_by=("pipe & co",), date="2026-11-24"
+    )
+    return board([scored("a"), scored("b")], {}, environment=here)
+
+
+@pytest.mark.parametrize("form", board_table.FORMATS)
+def test_every_form_names_processor_driver_and_date(placed, form):
+    text = board_table.FORMATS[form](placed, "ate")
+    for part in ("CPU 9", "x86-64-v3", "pipe", "2026-11-24"):
+        assert part in text
+
+
+def test_in_csv_the_origin_is_columns_of_every_row(placed):
+    frame = pd.read_csv(io.StringIO(board_table.as_csv(placed)))
+    assert set(frame.processor) == {"Some_CPU 9"}
+    assert set(frame.simd) == {"x86-64-v3"}
+    assert len(frame) == 4
+
+
+def test_in_latex_the_origin_is_a_comment(placed):
+    (line,) = [line for line in board_table.latex(placed).splitlines() if "Some_CPU" in line]
+    assert line.startswith("% Made on Some_CPU 9 (x86-64-v3), ")
+
+
+def test_csv_has_a_row_for_each_case_without_a_sequence(incomplete):
+    frame = pd.read_csv(io.StringIO(board_table.as_csv(board(incomplete, {}))))
+    unmade = frame[frame.status == NO_SEQUENCE]
+    assert dict(zip(unmade.case, unmade.reason, strict=True)) == {
+        "dark": "no light",
+        "dim": "no light",
+        "far": "too far",
+    }
 
 
 def test_totals_are_over_the_cases_that_all_have_and_say_so(scored):

@@ -8,7 +8,7 @@ import pytest
 
 from vobench.errors import InputError
 from vobench.runner.bundle import bundle, merged, opened, scored_again
-from vobench.runner.folder import CASE, ESTIMATORS, SCORE, SUITE, RunFolder, TrialScore, write_hashes
+from vobench.runner.folder import CASE, ESTIMATORS, NO_SEQUENCE, SCORE, SUITE, RunFolder, TrialScore, write_hashes
 from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.runner.score import score_estimate
 from vobench.runner.store import write_json
@@ -103,6 +103,20 @@ def test_the_same_estimators_trials_are_repeats_of_one_another_and_another_ones_
     with merged([make("a"), make("b"), make("c", code="2")], ["a", "b", "c"]) as together:
         found = sorted((s.estimator, s.repeat) for s in together.scores() if s.case == "down")
     assert found == [("mine", 0), ("mine", 1), ("mine of c", 0)]
+
+
+def test_a_case_that_one_of_two_merged_runs_could_not_make_is_the_others(make):
+    partial, whole = make("partial"), make("whole")
+    case, *_ = CASES
+    (partial.case(case) / GROUND_TRUTH).unlink()
+    score = partial.scores()[-1]
+    unmade = score.model_copy(update={"case": case, "status": NO_SEQUENCE, "score": None, "frames": 0})
+    write_json(partial.estimate(case, "mine", 0) / SCORE, unmade.model_dump(mode="json"))
+    assert [group.cases for group in partial.unmade()] == [(case,)]
+    for order in ([partial, whole], [whole, partial]):
+        with merged(order, ["a", "b"]) as both:
+            assert both.unmade() == ()
+            assert (both.case(case) / GROUND_TRUTH).read_bytes() == (whole.case(case) / GROUND_TRUTH).read_bytes()
 
 
 def test_another_case_of_the_same_name_cannot_be_merged(make):

@@ -98,11 +98,11 @@ def test_ten_thousand_tasks_are_handed_out_in_little_time(tmp_path):
     assert os.times().user - began < 20
 
 
-def run(bench, tmp_path: Path, executor: Executor, heard=lambda _: None) -> RunFolder:
+def run(bench, tmp_path: Path, executor: Executor, *changes, heard=lambda _: None, **options) -> RunFolder:
     try:
         return run_suite(
-            bench.plan(), {}, root=tmp_path / "runs", store=tmp_path / "store", executor=executor,
-            finish=page.write_reports, heard=heard,
+            bench.plan(*changes), {}, root=tmp_path / "runs", store=tmp_path / "store", executor=executor,
+            finish=page.write_reports, heard=heard, **options,
         )  # fmt: skip
     finally:
         executor.close()
@@ -142,7 +142,7 @@ def test_sequences_of_one_light_share_a_process_and_nothing_else_does(tmp_path, 
     assert not executor._idle
 
 
-def test_a_process_that_dies_is_a_row_of_its_cell(bench, tmp_path, monkeypatch):
+def test_a_sequence_whose_process_dies_counts_for_no_estimator(bench, tmp_path, monkeypatch):
     executor = LocalProcesses(2)
     submit = executor.submit
 
@@ -159,9 +159,11 @@ def test_a_process_that_dies_is_a_row_of_its_cell(bench, tmp_path, monkeypatch):
     rows = {(score.case, score.estimator): (score.status, score.reason) for score in folder.scores()}
     dim = [said for (case, _), said in rows.items() if "dim" in case]
     assert len(dim) == 2
-    assert all(status == "crashed" and "its sequence could not be made" in reason for status, reason in dim)
+    assert all(status == "no_sequence" and reason for status, reason in dim)
     assert all(not finding.wrong for finding in verify_run(folder))
-    assert "crashed" in (folder.path / "leaderboard.html").read_text()
+    assert "1 of 2 cases could not be simulated or imported" in (folder.path / "leaderboard.html").read_text()
+    (unmade,) = folder.unmade()
+    assert unmade.cases == ("dim",)
 
 
 def test_what_a_fault_of_a_library_ended_is_made_once_more(bench, tmp_path, monkeypatch):
@@ -177,7 +179,7 @@ def test_what_a_fault_of_a_library_ended_is_made_once_more(bench, tmp_path, monk
 
     monkeypatch.setattr(executor, "submit", once)
     folder = run(bench, tmp_path, executor, heard=heard.append)
-    assert {score.status for score in folder.scores()} == {"ok"}
+    assert [score.reason for score in folder.scores() if score.status != "ok"] == []
     told = {event.told for event in heard if event.what == "told"}
     assert hit
     assert told >= {
@@ -194,6 +196,64 @@ def test_what_a_task_raises_in_this_process_is_a_row_too(bench, tmp_path, monkey
     monkeypatch.setitem(stages.PERFORMERS, "score", raising)
     folder = run(bench, tmp_path, Serial())
     assert {(s.status, s.reason) for s in folder.scores()} == {("crashed", "ZeroDivisionError: division by zero")}
+
+
+def test_a_missing_library_ends_the_run_with_how_to_get_it(bench, tmp_path, monkeypatch):
+    from vobench.errors import MissingDependencyError
+    from vobench.runner import task as stages
+
+    def lacking(*_):
+        raise MissingDependencyError("cannot draw without a display; run: apt-get install -y libegl1")
+
+    monkeypatch.setitem(stages.PERFORMERS, "bake", lacking)
+    with pytest.raises(MissingDependencyError, match="run: apt-get install -y libegl1"):
+        run(bench, tmp_path, Serial())
+    assert not list((tmp_path / "runs").rglob("*.json"))
+
+
+@pytest.mark.parametrize("stage", ["bake", "sequence"])
+def test_a_run_without_a_single_sequence_makes_no_folder_and_names_cause_and_remedy(
+    bench, tmp_path, monkeypatch, stage
+):
+    from vobench.errors import NoSequenceError
+    from vobench.runner import task as stages
+
+    def broken(*_):
+        raise AttributeError("module 'OpenGL.GL' has no attribute 'glClipControl'")
+
+    monkeypatch.setitem(stages.PERFORMERS, stage, broken)
+    with pytest.raises(NoSequenceError) as raised:
+        run(bench, tmp_path, Serial())
+    sentence = str(raised.value)
+    assert sentence.startswith("no case could be simulated or imported, so nothing was scored: full, dim: ")
+    assert sentence.count("glClipControl") == 1
+    assert "vobench doctor" in sentence
+    assert not list((tmp_path / "runs").rglob("*.json"))
+
+
+def test_a_case_that_cannot_be_simulated_counts_for_no_estimator(bench, tmp_path, monkeypatch):
+    from vobench.errors import NoSequenceError
+    from vobench.runner import task as stages
+
+    simulate = stages.PERFORMERS["sequence"]
+
+    def some(case, *others):
+        if case.name == "dim":
+            raise RuntimeError("the lamp is out")
+        simulate(case, *others)
+
+    monkeypatch.setitem(stages.PERFORMERS, "sequence", some)
+    folder = run(bench, tmp_path, Serial())
+    board = page.board_of(folder, folder.scores())
+    assert board.cases == ["full"]
+    assert {total.failed for total in board.totals} == {0}
+    assert {s.status for s in folder.scores() if s.case == "dim"} == {"no_sequence"}
+    (remark,) = [said for said in board.remarks if "could not be simulated" in said]
+    assert remark.startswith("1 of 2 cases could not be simulated or imported and count for no estimator: dim: ")
+    assert "the lamp is out" in remark
+    assert not [finding for finding in verify_run(folder) if finding.wrong]
+    with pytest.raises(NoSequenceError, match="1 of 2 cases could not be simulated"):
+        run(bench, tmp_path, Serial(), require_all=True)
 
 
 def test_a_full_disk_ends_the_run_with_what_to_do(bench, tmp_path, monkeypatch):

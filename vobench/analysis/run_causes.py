@@ -12,7 +12,7 @@ from vobench.errors import require_known
 from vobench.geometry.se3 import Array
 from vobench.runner.data_frame import data_frame
 from vobench.runner.finished_trial import read_simulated_case
-from vobench.runner.folder import RunFolder, TrialScore, open_run
+from vobench.runner.folder import RunFolder, TrialScore, open_run, with_sequence
 from vobench.runner.store import SILENT, Progress
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def find_causes(run: Path, *, estimator: str | None = None, progress: Progress =
         UnknownNameError: the run has no estimator of this name.
     """
     folder = open_run(run)
-    scores = folder.scores()
+    scores = with_sequence(folder.scores())
     estimators = sorted({score.estimator for score in scores})
     if estimator is not None:
         require_known("estimator", estimator, estimators)

@@ -14,7 +14,7 @@ from rich.table import Table
 from vobench.cli import terminal
 from vobench.errors import UnknownNameError, printable
 from vobench.report import compare, page
-from vobench.report.board_table import DEFAULT_METRIC, FORMATS, LEGEND, cell_notes, matrix, remarks, totals
+from vobench.report.board_table import DEFAULT_METRIC, FORMATS, LEGEND, cell_notes, matrix, origin, remarks, totals
 from vobench.report.leaderboard import METRICS, Board
 from vobench.report.verify import verify_run
 from vobench.runner.bundle import bundle, merged, opened, require_zip, scored_again
@@ -136,10 +136,14 @@ def compare_command(
             boards.append(page.board_of(folder, checked.scores))
     changes = compare.compare(*boards, at_most=at_most)
     worse = [change for change in changes if change.verdict in compare.REGRESSIONS]
+    differing = compare.environment_differences(*boards)
     if json:
-        terminal.print_json({"worse": len(worse), "changes": [asdict(change) for change in changes]})
+        told = [asdict(change) for change in changes]
+        terminal.print_json({"worse": len(worse), "changes": told, "environment": differing})
     else:
         _print_changes(changes)
+        if differing:
+            terminal.console().print(f"The runs differ in what can change scores: {'; '.join(differing)}")
     if worse:
         raise SystemExit(REGRESSED)
 
@@ -256,6 +260,8 @@ def print_board(board: Board, metric: str = DEFAULT_METRIC) -> None:
     for note in cell_notes(board):
         out.print(f"  {printable(note)}")
     out.print(LEGEND, style="dim")
+    if line := origin(board):
+        out.print(printable(line), style="dim")
 
 
 def _print_totals(title: str, headings: list[str], lines: list[list[str]], out: Console) -> None:

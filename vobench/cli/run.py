@@ -122,6 +122,8 @@ def run_command(
         terminal.console().print(f"Everything is in {folder.path}\nLook into it: {vobench} view {folder.path}")
     for line in broken:
         print(f"vobench: {line}", file=sys.stderr)
+    if board.unmade:  # the run is incomplete, whatever the thresholds say
+        raise typer.Exit(1)
     if broken:
         raise typer.Exit(FAILED_LIMIT)
 

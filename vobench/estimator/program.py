@@ -23,9 +23,20 @@ from vobench.estimator.check import in_one_line
 from vobench.estimator.guard import descendants, stat
 from vobench.estimator.manifest import Limits
 from vobench.estimator.protocol import Result
+from vobench.portable import PORTABLE, VARIABLES
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
-KEPT_ENVIRONMENT = ("PATH", "HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV")
+KEPT_ENVIRONMENT = (
+    "PATH",
+    "HOME",
+    "LANG",
+    "LC_ALL",
+    "LD_LIBRARY_PATH",
+    "PYTHONPATH",
+    "VIRTUAL_ENV",
+    PORTABLE,
+    *VARIABLES,
+)
 LOG_BYTES = 1 << 20
 LOOK_S = 0.1  # how often memory and time of a running program are looked at
 WEIGH_S = 1.0  # how often its files are

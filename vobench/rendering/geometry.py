@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vobench.geometry.se3 import Array
+from vobench.rendering.embree import new_scene, with_portable_places
 from vobench.scene.material import Material, pane_reflectance
 from vobench.scene.mesh import Triangles, areas_m2, distinct, unit
 
@@ -119,10 +120,10 @@ class RayCaster:
         triangles = faces.corners_m[self._among].astype(np.float32)
         # A scene without triangles would make Embree fail; one beyond everything is never hit.
         triangles = triangles if len(triangles) else np.full((1, 3, 3), 1e7, np.float32)
-        from embreex import mesh_construction, rtcore_scene
+        from embreex import mesh_construction
 
-        # Robust: no ray slips between two triangles that share an edge.
-        self._scene = rtcore_scene.EmbreeScene(robust=True)
+        self._triangles = triangles
+        self._scene = new_scene(robust=True)
         self._mesh = mesh_construction.TriangleMesh(self._scene, np.ascontiguousarray(triangles))
         self._twin, self._planes = twins(faces.corners_m[self._among]), faces.plane[self._among]
         self._has_sheets = bool((self._twin >= 0).any())
@@ -155,7 +156,8 @@ class RayCaster:
     def hits(self, origins_m: ArrayLike, directions: ArrayLike) -> Hits:
         """The nearest face along each ray (R, 3)."""
         rays = _rays(origins_m, directions, reach=1e8)
-        hit: dict[str, Any] = self._scene.run(*rays, query="INTERSECT", output=1)
+        found: dict[str, Any] = self._scene.run(*rays, query="INTERSECT", output=1)
+        hit = with_portable_places(found, self._triangles, rays[0], rays[1])
         triangle = hit["primID"].astype(np.int32)
         behind = self._behind(triangle, directions)
         # The corners in reverse: the second keeps its place, the first is the third.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.rendering.embree import new_scene, with_portable_places
 from vobench.scene.material import Material
 from vobench.scene.mesh import Triangles, unit
 from vobench.scene.scene import Scene, triangles
@@ -45,17 +46,20 @@ class FaceCaster:
     """Embree over some faces (K,) of a table of corners (F, 3, 3); hits name faces by their place in the table."""
 
     def __init__(self, corners_m: Array, among: Pixels) -> None:
-        from embreex import mesh_construction, rtcore_scene
+        from embreex import mesh_construction
 
         self._among = np.append(among, -1).astype(np.int32)
         # A scene without triangles would make Embree fail; one beyond everything is never hit.
         own = corners_m[among] if len(among) else np.full((1, 3, 3), 10 * REACH_M)
-        self._scene = rtcore_scene.EmbreeScene()
-        self._mesh = mesh_construction.TriangleMesh(self._scene, np.ascontiguousarray(own, np.float32))
+        self._triangles = np.ascontiguousarray(own, np.float32)
+        self._scene = new_scene()
+        self._mesh = mesh_construction.TriangleMesh(self._scene, self._triangles)
 
     def first(self, origins_m: Array | Floats, way: Array | Floats, reach: float = REACH_M) -> Hits:
         """The first face along rays (R, 3); reach and distances are in lengths of `way`."""
-        hit = self._scene.run(*_rays(origins_m, way, np.full(len(way), reach)), query="INTERSECT", output=1)
+        rays = _rays(origins_m, way, np.full(len(way), reach))
+        found = self._scene.run(*rays, query="INTERSECT", output=1)
+        hit = with_portable_places(found, self._triangles, rays[0], rays[1])
         return Hits(self._among[hit["primID"]], hit["u"], hit["v"], hit["tfar"])
 
     def stops(self, origins_m: Array | Floats, way: Array | Floats, reach: Array | Floats) -> Mask:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from vobench.errors import printable
 from vobench.report.leaderboard import COSTS, METRICS, Board, Cell, Curve, Total, marks, notes
+from vobench.runner.folder import NO_SEQUENCE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -157,6 +158,11 @@ def cell_notes(made: Board) -> list[str]:
     return [f"{cases[0]}{f' and {len(cases) - 1} more' * (len(cases) > 1)}: {note}" for note, cases in said.items()]
 
 
+def origin(made: Board) -> str:
+    """Processor, driver and versions that the figures come from, in one line; empty where they are not known."""
+    return f"Made on {made.environment.line()}" if made.environment and made.environment.line() else ""
+
+
 def markdown(made: Board, metric: str = DEFAULT_METRIC) -> str:
     """The matrix of a metric, the totals, and what to know of them."""
     rows = [[case, *map(str, cells)] for case, cells in matrix(made, metric)]
@@ -164,6 +170,8 @@ def markdown(made: Board, metric: str = DEFAULT_METRIC) -> str:
     for over, table in totals(made):
         lines += [f"## Totals: {_md(over)}", "", *_md_table(table, words=2)]
     lines += [*(f"- {_md(said)}" for said in (*remarks(made), *cell_notes(made))), "", LEGEND.replace("~", "\\~"), ""]
+    if line := origin(made):
+        lines += [_md(line), ""]
     return "\n".join(lines)
 
 
@@ -185,6 +193,8 @@ def as_json(made: Board) -> str:
         "totals": [asdict(total) for total in made.totals],
         "curves": [asdict(curve) for curve in made.curves],
         "remarks": remarks(made),
+        "unmade": [asdict(group) for group in made.unmade],
+        "environment": asdict(made.environment) if made.environment else None,
     }
     return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -219,7 +229,7 @@ def cell_rows(made: Board) -> list[dict[str, Any]]:
 
 
 def rows(made: Board) -> list[dict[str, Any]]:
-    """One flat row for each cell, then one for each total, whose case is `all`."""
+    """One flat row per cell, then one per total, whose case is `all`, then one per case without a sequence."""
     found = cell_rows(made)
     for total in made.totals:
         stated = {**asdict(total), "case": "all", "ate": total.ate_percent}
@@ -227,7 +237,10 @@ def rows(made: Board) -> list[dict[str, Any]]:
             stated |= {f"{name}_min": ends[0], f"{name}_max": ends[1]}
         gone = ("claims", "places", "ratio_interval", "ate_percent", "repeats", "cases")
         found.append({name: value for name, value in stated.items() if name not in gone})
-    return found
+    for group in made.unmade:
+        found += [{"case": case, "status": NO_SEQUENCE, "reason": group.cause} for case in group.cases]
+    facts = made.environment.facts() if made.environment else {}
+    return [{**row, **facts} for row in found]
 
 
 def as_csv(made: Board) -> str:
@@ -303,6 +316,8 @@ def latex(made: Board, metric: str = DEFAULT_METRIC) -> str:
         r"\end{tabular}",
         r"\end{table}",
     ]
+    if line := origin(made):
+        lines.append(f"% {printable(line)}")
     return "\n".join([*lines, ""])
 
 

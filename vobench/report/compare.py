@@ -1,5 +1,6 @@
 """Two runs compared: whether each estimator, and each cell of it, got better or worse, and by how much."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from math import exp, isnan, log
 
@@ -9,9 +10,11 @@ from vobench.errors import InputError
 from vobench.metric import ranking
 from vobench.metric.ranking import ALPHA, difference_p, holm
 from vobench.report.leaderboard import Board, Cell
+from vobench.runner.environment import differences
 
 SAME, BETTER, WORSE, UNDECIDED = "same", "better", "worse", "not decided"
 FAILS, MENDED, NEW, GONE = "fails now", "mended", "new", "gone"
+NOT_MADE = "no sequence"  # the case could not be simulated or imported in one of the runs
 REGRESSIONS = (WORSE, FAILS)
 
 
@@ -44,14 +47,25 @@ def compare(old: Board, new: Board, *, at_most: float | None = None) -> list[Cha
     if not common:
         told = [f"{', '.join(made.estimators[:3])} on {', '.join(made.cases[:3])}" for made in (old, new)]
         raise InputError(f"no estimator has a case in both runs: {told[0]} in the old one, {told[1]} in the new one")
+    not_made = {case for made in (old, new) for group in made.unmade for case in group.cases}
     chances = {key: difference_p(*(_ordered(cell) for cell in cells)) for key, cells in common.items()}
     corrected = dict(zip(chances, holm(list(chances.values())), strict=True))
     cells = [
-        _cell_change(*common[key], corrected[key], at_most) if key in common else _alone(key, *both[key])
+        _cell_change(*common[key], corrected[key], at_most) if key in common else _alone(key, *both[key], not_made)
         for key in keys
     ]
     names = sorted({estimator for _, estimator in common})
     return [_total(name, [pair for (_, e), pair in common.items() if e == name], at_most) for name in names] + cells
+
+
+def environment_differences(old: Board, new: Board) -> list[str]:
+    """What differs between where two boards come from and can change scores, both values named.
+
+    Empty where nothing does, or where one of the runs does not state it.
+    """
+    if old.environment is None or new.environment is None:
+        return []
+    return differences(old.environment, new.environment)
 
 
 def _ordered(cell: Cell) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -67,8 +81,13 @@ def _said(cell: Cell | None) -> str:
     return ", ".join(filter(None, [f"{ate[0]:.3g} %" if ate else "", lost])) or cell.status
 
 
-def _alone(key: tuple[str, str], old: Cell | None, new: Cell | None) -> Change:
-    return Change(*key, NEW if new else GONE, _said(old), _said(new))
+def _alone(key: tuple[str, str], old: Cell | None, new: Cell | None, not_made: Collection[str]) -> Change:
+    """The change of a cell that one run lacks; `not_made` are cases that one of the runs could not make."""
+    case, _ = key
+    verdict = NEW if new else GONE
+    if case in not_made:
+        verdict = NOT_MADE
+    return Change(*key, verdict, _said(old), _said(new))
 
 
 def _cell_change(old: Cell, new: Cell, p: float, at_most: float | None) -> Change:

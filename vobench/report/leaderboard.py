@@ -14,8 +14,18 @@ import numpy as np
 from vobench.metric import ranking
 from vobench.metric.coverage import lost_aware_score
 from vobench.runner.consistency import Consistency
+from vobench.runner.environment import Environment
 from vobench.runner.estimate import DROPPED
-from vobench.runner.folder import NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore, value_of
+from vobench.runner.folder import (
+    NOT_APPLICABLE,
+    STATUSES,
+    SURVIVED,
+    TrialScore,
+    Unmade,
+    unmade_in,
+    value_of,
+    with_sequence,
+)
 from vobench.runner.frames import FrameRow
 
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
@@ -187,13 +197,19 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """The table of cells, and what was made of it; `remarks` say what its numbers don't."""
+    """The table of cells and what is derived from it; `remarks` say what its numbers do not.
+
+    `unmade` are the cases that could not be simulated or imported: they have no cells, and count for no estimator.
+    `environment` is where the figures come from, as far as it is known.
+    """
 
     title: str
     cells: tuple[Cell, ...]
     totals: tuple[Total, ...]
     curves: tuple[Curve, ...]
     remarks: tuple[str, ...]
+    unmade: tuple[Unmade, ...] = ()
+    environment: Environment | None = None
     _at: dict[tuple[str, str], Cell] = field(default_factory=dict, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -245,7 +261,12 @@ def answers(trials: Sequence[list[FrameRow]]) -> EstimatorStatistics:
 
 
 def board(
-    scores: Iterable[TrialScore], answered: Answered, facts: Mapping[str, CaseFacts] | None = None, *, title: str = ""
+    scores: Iterable[TrialScore],
+    answered: Answered,
+    facts: Mapping[str, CaseFacts] | None = None,
+    *,
+    title: str = "",
+    environment: Environment | None = None,
 ) -> Board:
     """The board of these trials; `answered` is per (case, estimator), `facts` per case, and both may lack some."""
 
@@ -253,13 +274,16 @@ def board(
         return score.case, score.estimator
 
     facts = facts or {}
-    grouped = groupby(sorted(scores, key=lambda score: (*place(score), score.repeat)), key=place)
+    scores = list(scores)
+    unmade = unmade_in(scores)
+    grouped = groupby(sorted(with_sequence(scores), key=lambda score: (*place(score), score.repeat)), key=place)
     cells = [
         _cell(list(trials), answered.get(key, EstimatorStatistics()), facts.get(key[0], CaseFacts()))
         for key, trials in grouped
     ]
     groups = sorted({cell.facts.group for cell in cells})
-    totals, remarks = list[Total](), list[str]()
+    totals = list[Total]()
+    remarks = _without_sequence(unmade, of=len({score.case for score in scores}))
     for group in groups:
         found, said = _totals(group, [cell for cell in cells if cell.facts.group == group])
         totals += found
@@ -269,7 +293,16 @@ def board(
     remarks += sorted(
         {f"the truth that is scored is off by {each}" for cell in cells if (each := cell.facts.truth_noise)}
     )
-    return Board(title, tuple(cells), tuple(totals), tuple(_curves(cells)), tuple(remarks))
+    return Board(title, tuple(cells), tuple(totals), tuple(_curves(cells)), tuple(remarks), unmade, environment)
+
+
+def _without_sequence(unmade: Sequence[Unmade], *, of: int) -> list[str]:
+    """One sentence on the cases that could not be made, each cause once; none if there are no such cases."""
+    if not unmade:
+        return []
+    count = sum(len(group.cases) for group in unmade)
+    causes = "; ".join(f"{group.names}: {group.cause}" for group in unmade)
+    return [f"{count} of {of} cases could not be simulated or imported and count for no estimator: {causes}"]
 
 
 def _cell(trials: list[TrialScore], found: EstimatorStatistics, facts: CaseFacts) -> Cell:

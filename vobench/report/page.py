@@ -5,7 +5,6 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from datetime import UTC, datetime
 from itertools import groupby
 from math import inf
 from pathlib import Path
@@ -20,10 +19,10 @@ from vobench.errors import VobenchError
 from vobench.geometry.se3 import Array
 from vobench.report import board_table as table
 from vobench.report.leaderboard import COSTS, METRICS, Answered, Board, CaseFacts, Cell, answers, board, notes
+from vobench.runner.environment import Environment, read_environment
 from vobench.runner.estimate import ESTIMATE, LOG
 from vobench.runner.folder import (
     CASE,
-    ENVIRONMENT,
     PAGE,
     SCORE,
     SEQUENCE,
@@ -32,6 +31,7 @@ from vobench.runner.folder import (
     RunFolder,
     TrialScore,
     read_tum,
+    with_sequence,
 )
 from vobench.runner.frames import FRAMES, GROUND_TRUTH, TIMES, FrameRow, new_table, read_frames
 from vobench.trajectory.align import Alignment
@@ -56,7 +56,8 @@ def board_of(folder: RunFolder, scores: list[TrialScore]) -> Board:
 
 def _board(folder: RunFolder, scores: list[TrialScore], answered: Answered) -> Board:
     facts = {case: case_facts(folder, case) for case in {score.case for score in scores}}
-    return board(scores, answered, facts, title=folder.path.resolve().parent.name)
+    title = folder.path.resolve().parent.name
+    return board(scores, answered, facts, title=title, environment=read_environment(folder))
 
 
 def case_facts(folder: RunFolder, case: str) -> CaseFacts:
@@ -89,7 +90,10 @@ def _json(path: Path) -> dict[str, Any]:
 def write_reports(folder: RunFolder, scores: list[TrialScore]) -> None:
     """Put leaderboard.md, .json and .csv into a run's folder, without costs: these go to times.csv and the page."""
     found = list(_answers(folder, scores))
-    made = _board(folder, scores, {key: replace(each, ms_per_frame=None, memory_mib=None) for key, each, _ in found})
+    without_costs = {key: replace(each, ms_per_frame=None, memory_mib=None) for key, each, _ in found}
+    made = _board(folder, scores, without_costs)
+    if made.environment:
+        made = replace(made, environment=replace(made.environment, date=""))
     for suffix in ("md", "json", "csv"):
         stop.check()
         text = table.FORMATS[suffix](made, table.DEFAULT_METRIC)
@@ -107,7 +111,7 @@ def _answers(folder: RunFolder, scores: list[TrialScore]) -> Iterator[tuple[tupl
     def key(score: TrialScore) -> tuple[str, str]:
         return score.case, score.estimator
 
-    for each, trials in groupby(sorted(scores, key=key), key=key):
+    for each, trials in groupby(sorted(with_sequence(scores), key=key), key=key):
         stop.check()
         frames = [read_frames(folder.estimate(trial.case, trial.estimator, trial.repeat)) for trial in trials]
         yield each, answers(frames), _costs([row for rows in frames for row in rows])
@@ -156,23 +160,28 @@ def _safe(data: Any) -> str:
 
 def _header(folder: RunFolder, scores: list[TrialScore]) -> dict[str, Any]:
     """What was run, when, with what and on what, as far as the run's files say it."""
-    suite, environment = _json(folder.path / SUITE), _json(folder.path / ENVIRONMENT)
-    stamp = folder.path / ENVIRONMENT
-    when = datetime.fromtimestamp(stamp.stat().st_mtime, UTC) if stamp.is_file() else None
-    failed = sum(score.status not in SURVIVED for score in scores)
+    suite = _json(folder.path / SUITE)
+    environment = read_environment(folder) or Environment()
+    trials = with_sequence(scores)
+    failed = sum(score.status not in SURVIVED for score in trials)
     facts = {
-        "trials": f"{len(scores)}, {failed} failed",
+        "trials": f"{len(trials)}, {failed} failed",
         "seed": suite.get("seed"),
         "repeats": suite.get("repeats"),
-        "date": f"{when:%Y-%m-%d %H:%M} UTC" if when else None,
-        "vobench": environment.get("vobench"),
-        "machine": environment.get("platform"),
-        "CPU time": f"taken {environment['timed']}" if environment.get("timed") else None,
+        "date": environment.date,
+        "vobench": environment.release if environment.vobench else None,
+        "processor": " and ".join(map(str, environment.processors)),
+        "cores": f"{environment.cores} of {environment.cores_total}" if environment.cores else None,
+        "drawn by": environment.driver,
+        "portable": "yes" if environment.portable else None,
+        "system": environment.platform,
+        "CPU time": f"taken {environment.timed}" if environment.timed else None,
     }
+    versions = {"Python": environment.python} if environment.python else {}
     return {
         "summary": suite.get("summary", ""),
         "facts": {name: value for name, value in facts.items() if value not in (None, "")},
-        "libraries": environment.get("libraries") or {},
+        "libraries": {**versions, **environment.libraries},
     }
 
 

@@ -27,7 +27,16 @@ from vobench.rendering.illumination import Illumination
 from vobench.report import blueprint as bp
 from vobench.report.blueprint import FRAME_TIMELINE, truth_entity
 from vobench.runner.estimate import ESTIMATE, POINTS, read_tracks
-from vobench.runner.folder import CASE, SEQUENCE, STATUSES, SURVIVED, RunFolder, TrialScore, read_tum
+from vobench.runner.folder import (
+    CASE,
+    SEQUENCE,
+    STATUSES,
+    SURVIVED,
+    RunFolder,
+    TrialScore,
+    read_tum,
+    with_sequence,
+)
 from vobench.runner.frames import GROUND_TRUTH, FrameRow, read_frames
 from vobench.scene.material import Material, linear_texture, srgb
 from vobench.scene.scene import Way
@@ -492,7 +501,7 @@ def _log_statuses(log: _Log, statuses: Rows[str], of: bp.Entities) -> None:
 def ranked(scores: Rows[TrialScore], *, case: str | None, estimator: str | None) -> list[TrialScore]:
     """The trials asked for, the gravest failure first, then by error.
 
-    Raises UnknownNameError where no trial is of that case or estimator.
+    Raises UnknownNameError where no trial is of that case or estimator, and InputError where its case has no sequence.
     """
     wanted = _wanted(scores, case, estimator)
     return sorted(wanted, key=lambda s: (s.status in SURVIVED, -STATUSES.index(s.status), -_error(s)))
@@ -501,7 +510,7 @@ def ranked(scores: Rows[TrialScore], *, case: str | None, estimator: str | None)
 def pick(scores: Rows[TrialScore], *, case: str | None, estimator: str | None) -> TrialScore:
     """The trial most worth a look among those asked for: the gravest failure, else the best estimator's worst case.
 
-    Raises UnknownNameError where no trial is of that case or estimator.
+    Raises UnknownNameError where no trial is of that case or estimator, and InputError where its case has no sequence.
     """
     wanted = _wanted(scores, case, estimator)
     failed = [s for s in wanted if s.status not in SURVIVED]
@@ -518,7 +527,12 @@ def _wanted(scores: Rows[TrialScore], case: str | None, estimator: str | None) -
     ):
         if name is not None and name not in known:
             raise UnknownNameError(f"no {kind} '{name}' in this run. Known: {', '.join(sorted(known))}")
-    return [s for s in scores if case in (None, s.case) and estimator in (None, s.estimator)]
+    asked_for = [s for s in scores if case in (None, s.case) and estimator in (None, s.estimator)]
+    shown = with_sequence(asked_for)
+    if asked_for and not shown:
+        unmade = asked_for[0]
+        raise InputError(f"'{unmade.case}' has no sequence to show, as it could not be made: {unmade.reason}")
+    return shown
 
 
 def _log_points(log: _Log, points: Mapping[int, Array], of: bp.Entities, color: Color) -> None:

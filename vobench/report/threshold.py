@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from vobench.errors import InputError, unknown
 from vobench.metric.definitions import DEFINITIONS
-from vobench.runner.folder import SURVIVED, TrialScore
+from vobench.runner.folder import SURVIVED, TrialScore, with_sequence
 
 STATISTICS = ("rmse", "mean", "median", "std", "min", "max")
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {
@@ -30,8 +30,11 @@ class Threshold:
     value: float
 
     def broken_by(self, scores: Sequence[TrialScore]) -> Iterator[str]:
-        """A sentence for each trial that is beyond it, or that came to no value at all."""
-        for score in scores:
+        """A sentence for each trial that is beyond it or has no value.
+
+        A trial without a sequence says nothing about its estimator, and breaks no threshold.
+        """
+        for score in with_sequence(scores):
             on = f"{score.estimator} on {score.case}"
             value = score.coverage if self.metric == COVERAGE else score.value(self.metric, self.statistic)
             if score.status not in SURVIVED or value is None:

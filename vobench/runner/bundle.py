@@ -18,6 +18,7 @@ from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile, ZipInfo
 from vobench.errors import InputError, printable
 from vobench.runner.consistency import COVARIANCE
 from vobench.runner.entry import file_hash
+from vobench.runner.environment import merged_environment, read_environment
 from vobench.runner.estimate import ESTIMATE, LOG, REVISED
 from vobench.runner.folder import (
     CASE,
@@ -245,6 +246,9 @@ def merged(folders: Sequence[RunFolder], names: Sequence[str]) -> Iterator[RunFo
         return
     with TemporaryDirectory(prefix="vobench-merged-") as temporary:
         made = RunFolder(Path(temporary) / "merged" / "runs")
+        made.path.mkdir(parents=True)
+        environments = [stated for folder in folders if (stated := read_environment(folder))]
+        write_json(made.path / ENVIRONMENT, merged_environment(environments))
         known = dict[str, Any]()
         for folder, name in zip(folders, map(_plain_name, names), strict=True):
             facts = {each["label"]: each for each in _stated(folder)}
@@ -277,12 +281,11 @@ def _stated(folder: RunFolder) -> list[dict[str, Any]]:
 
 def _link_case(folder: RunFolder, made: RunFolder, case: str, name: str) -> None:
     source, target = folder.case(case), made.case(case)
-    if target.is_dir():
-        truths = [(place / GROUND_TRUTH) for place in (source, target)]
-        if all(truth.is_file() for truth in truths) and len({truth.read_bytes() for truth in truths}) > 1:
-            raise InputError(f"case {case!r} is another one in {name}: its true path differs, so nothing compares")
-        return
-    target.mkdir(parents=True)
+    truths = [place / GROUND_TRUTH for place in (source, target)]
+    if all(truth.is_file() for truth in truths) and len({truth.read_bytes() for truth in truths}) > 1:
+        raise InputError(f"case {case!r} is another one in {name}: its true path differs, so nothing compares")
+    target.mkdir(parents=True, exist_ok=True)
+    # A run that could not make the case has no true path of it; then another run's is linked.
     for path in (source / each for each in (*OF_CASE, SEQUENCE)):
-        if path.exists():
+        if path.exists() and not (target / path.name).exists():
             (target / path.name).symlink_to(path.resolve())

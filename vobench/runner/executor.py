@@ -27,15 +27,25 @@ from vobench.errors import InputError, MissingDependencyError, VobenchError
 from vobench.runner.fork_server import ForkServer, WorkerProcess, shared_server, watch
 from vobench.runner.key import code_digest
 from vobench.runner.store import Progress, SilentProgress, Store, Tell
-from vobench.runner.task import ENTRIES, NO_LIMIT, Task, perform
+from vobench.runner.task import ENTRIES, NO_LIMIT, Stage, Task, perform
 
 FailureKind = Literal["crashed", "out_of_memory", "refused"]
+# What no other task can do without either.
+Shortage = Literal["disk", "library"]
 LOOK_S = 0.2
 GRACE_S = 0.7  # for a process that is asked to stop, before it is killed
 STOP_S = 0.4  # for its main thread, before another one tidies up and ends it
 CONNECT_S = 10.0
 # What a library's fault ends, as once in hundreds of sequences; what is made so is the same however often it is made.
 FAULTS, MADE = (-signal.SIGABRT, -signal.SIGSEGV, -signal.SIGBUS), ("bake", "sequence")
+# What a stage makes, in the words of a sentence about what needed it.
+PRODUCTS: dict[Stage, str] = {
+    "bake": "scene's light",
+    "sequence": "sequence",
+    "import": "sequence",
+    "estimate": "estimate",
+    "score": "score",
+}
 # The function of worker processes, and what they import, once for all of them.
 ENTRY = "vobench.runner.executor:work"
 PRELOADED = [
@@ -52,12 +62,15 @@ PRELOADED = [
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """How a task ended: no failure, or which and why; `ends_all` where no other task can end better."""
+    """How a task ended: no failure, or which and why.
+
+    `lacks` names what ends the whole run, as no other task can end better without it.
+    """
 
     failure: FailureKind | None = None
     reason: str = ""
     wall_s: float = 0.0
-    ends_all: bool = False
+    lacks: Shortage | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,14 +128,14 @@ def performed(task: Task, store: Path, threads: int, progress: Progress) -> Done
     try:
         perform(task, store, threads, progress=progress)
     except MissingDependencyError as error:
-        return Done("refused", _line(error), time.monotonic() - began, ends_all=True)
+        return Done("refused", _line(error), time.monotonic() - began, lacks="library")
     except VobenchError as error:
         return Done("refused", _line(error), time.monotonic() - began)
     except MemoryError:
         return Done("out_of_memory", "there was not enough memory", time.monotonic() - began)
     except Exception as error:  # of one cell; the others go on
         if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-            return Done("refused", f"{FULL}: {error.filename or store}", time.monotonic() - began, ends_all=True)
+            return Done("refused", f"{FULL}: {error.filename or store}", time.monotonic() - began, lacks="disk")
         return Done("crashed", f"{type(error).__name__}: {_line(error)}", time.monotonic() - began)
     return Done(wall_s=time.monotonic() - began)
 
@@ -462,7 +475,7 @@ def perform_all(
     """Perform tasks, each after those that it needs; the failures by key, those of what they took with them included.
 
     An estimator is timed: unless `shares_time`, nothing else runs beside it. `heard` is called with what happens.
-    Raises InputError where the disk is full or a library is missing, and Stopped.
+    Raises InputError if the disk is full, MissingDependencyError if a library is missing, and Stopped.
     """
     queue, failures, running = _Queue.of(tasks), dict[str, Done](), dict["Future[Done]", tuple[Task, int]]()
     last = [""] * executor.slots
@@ -477,15 +490,18 @@ def perform_all(
             for future in ended:
                 task, slot = running.pop(future)
                 done = future.result()
-                if done.ends_all:
+                if done.lacks == "library":
+                    raise MissingDependencyError(done.reason)
+                if done.lacks:
                     raise InputError(done.reason)
                 heard(Event("failed" if done.failure else "done", task, slot, done.wall_s, done.reason))
                 if not done.failure:
                     queue.release(task.key)
                     continue
                 failures[task.key] = done
+                lost = f"its {PRODUCTS[task.stage]} could not be made: {done.reason}"
                 for other in queue.fell(task.key):
-                    failures[other.key] = Done(done.failure, f"its {task.stage} could not be made: {done.reason}")
+                    failures[other.key] = Done(done.failure, lost)
     finally:
         executor.close()
     return failures

@@ -8,7 +8,17 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from vobench.errors import InputError, UnknownNameError, require_known
-from vobench.runner.folder import CASE, ESTIMATORS, SCORE, SUITE, RunFolder, TrialScore, open_run, read_score
+from vobench.runner.folder import (
+    CASE,
+    ESTIMATORS,
+    NO_SEQUENCE,
+    SCORE,
+    SUITE,
+    RunFolder,
+    TrialScore,
+    open_run,
+    read_score,
+)
 from vobench.runner.key import folder_digest
 from vobench.runner.motion import body_motions
 from vobench.runner.plan_runner import PlanRunner
@@ -48,6 +58,8 @@ def read_finished_trial(path: Path, *, estimator: Path | None = None, progress: 
     simulated in variants, and where another version of vobench wrote the run.
     """
     folder, score = _find(path)
+    if score.status == NO_SEQUENCE:
+        raise InputError(f"'{score.case}' has no sequence, as it could not be made: {score.reason}")
     case = read_simulated_case(folder, score.case)
     entrant = _read_entrant(folder, score.estimator, estimator, progress)
     return FinishedTrial(folder, score, case, entrant, _read_suite(folder))

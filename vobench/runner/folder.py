@@ -2,12 +2,12 @@
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
 
@@ -20,10 +20,12 @@ from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
 CASE, SCORE, SEQUENCE = "case.json", "score.json", "sequence"
+STAMP = "%Y%m%dT%H%M%S"  # of the name of a run's folder
 ESTIMATES, PAGE = "estimates", "leaderboard.html"
 ENVIRONMENT, SUITE, ESTIMATORS = "environment.json", "suite.json", "estimators.json"
 
-# Best first; the last seven are failures, and no failure ranks before a survivor.
+# Best first. Those from `lost` to `not_applicable` are failures, and no failure ranks before a survivor. The last one
+# is no failure of an estimator: its case is excluded for all of them.
 TrialStatus = Literal[
     "ok",
     "partial",
@@ -35,10 +37,13 @@ TrialStatus = Literal[
     "crashed",
     "refused",
     "not_applicable",
+    "no_sequence",
 ]
 STATUSES: tuple[TrialStatus, ...] = get_args(TrialStatus)
 SURVIVED = ("ok", "partial")
 NOT_APPLICABLE = "not_applicable"  # the recording lacks a sensor that the estimator needs
+NO_SEQUENCE: Final = "no_sequence"  # the case could not be simulated or imported
+MOST_NAMED = 3  # cases that a sentence names; the others are counted
 
 
 class _Metric(BaseModel):
@@ -97,6 +102,44 @@ class TrialScore(BaseModel):
         return value_of(self.score, metric, statistic)
 
 
+@dataclass(frozen=True, slots=True)
+class Unmade:
+    """Cases that could not be simulated or imported for one cause, which names the remedy where there is one."""
+
+    cause: str
+    cases: tuple[str, ...]
+
+    @property
+    def names(self) -> str:
+        """The first of the cases, and how many others there are."""
+        named = ", ".join(self.cases[:MOST_NAMED])
+        others = len(self.cases) - MOST_NAMED
+        return f"{named} and {others} more" if others > 0 else named
+
+
+def unmade_in(scores: Iterable[TrialScore]) -> tuple[Unmade, ...]:
+    """The cases without a sequence, grouped by cause, in order of their first case.
+
+    A case that another of several merged runs has made is none of them.
+    """
+    causes = dict[str, str]()
+    made = set[str]()
+    for score in scores:
+        if score.status == NO_SEQUENCE:
+            causes.setdefault(score.case, score.reason)
+        else:
+            made.add(score.case)
+    by_cause = dict[str, list[str]]()
+    for case in sorted(causes.keys() - made):
+        by_cause.setdefault(causes[case], []).append(case)
+    return tuple(Unmade(cause, tuple(cases)) for cause, cases in by_cause.items())
+
+
+def with_sequence(scores: Iterable[TrialScore]) -> list[TrialScore]:
+    """The trials whose case could be simulated or imported: those that say something about an estimator."""
+    return [score for score in scores if score.status != NO_SEQUENCE]
+
+
 def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> float | None:
     """One statistic of one metric of a score as JSON has it, None where it has no such."""
     entries = (score or {"metrics": []})["metrics"]
@@ -112,6 +155,13 @@ class RunFolder:
     def case(self, case: str) -> Path:
         """The folder of a case."""
         return self.path / "cases" / case
+
+    def unmade(self) -> tuple[Unmade, ...]:
+        """The cases that could not be simulated or imported, by cause; empty if the run is complete.
+
+        Raises InputError where the folder or a score is none of ours.
+        """
+        return unmade_in(self.scores())
 
     def estimate(self, case: str, estimator: str, repeat: int) -> Path:
         """The folder of a trial."""
@@ -167,7 +217,7 @@ def make_run(root: Path, suite: str, key: str, fill: Callable[[RunFolder], None]
     sweep(parent)
     with unfinished(parent) as folder:
         fill(RunFolder(folder))
-        final = _published(folder, parent / f"{datetime.now(UTC):%Y%m%dT%H%M%S}_{key[:8]}")
+        final = _published(folder, parent / f"{datetime.now(UTC):{STAMP}}_{key[:8]}")
         fresh = parent / f".latest-{os.getpid()}"
         fresh.symlink_to(final.name)
         fresh.replace(parent / "latest")  # in one step
@@ -184,6 +234,16 @@ def _published(folder: Path, name: Path) -> Path:
             if not final.is_dir():
                 raise
     raise AssertionError
+
+
+def run_date(folder: RunFolder) -> str:
+    """The day a run ended in UTC, as in 2026-11-24, read off its folder's name; empty for a folder of another name."""
+    stamp = folder.path.resolve().name.partition("_")[0]
+    try:
+        ended = datetime.strptime(stamp, STAMP).replace(tzinfo=UTC)
+    except ValueError:
+        return ""
+    return f"{ended:%Y-%m-%d}"
 
 
 def read_tum(path: Path) -> Trajectory:

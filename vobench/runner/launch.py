@@ -49,6 +49,7 @@ def run_plan(
     task_progress: Progress = SILENT,
     shares_time: bool = False,
     is_fresh: bool = False,
+    require_all: bool = False,
 ) -> "RunFolder":
     """Perform all tasks of a plan that the cache does not hold, and gather the run's folder below `out`.
 
@@ -56,7 +57,9 @@ def run_plan(
     `jobs` is the number of tasks at once, `default_jobs()` without it; `scheduler` is the address of a Dask scheduler
     whose workers perform the tasks instead; `task_progress` shows the progress within a task where `jobs` is 1.
 
-    Raises SuiteError where the plan is not valid, InputError where `out` cannot be written, and Stopped.
+    Raises SuiteError where the plan is not valid, InputError where `out` cannot be written, NoSequenceError where no
+    case could be simulated or imported, or with `require_all` where any could not, MissingDependencyError where this
+    machine lacks a library, and Stopped.
     """
     from vobench.runner.run import run_suite
 
@@ -84,6 +87,7 @@ def run_plan(
             tell=display.say,
             shares_time=shares_time,
             is_fresh=is_fresh,
+            require_all=require_all,
         )
 
 
@@ -108,6 +112,7 @@ def plan_runner(
             display=make_display(),
             jobs=jobs,
             task_progress=task_progress,
+            require_all=True,
         )
 
     return run

@@ -1,36 +1,39 @@
 """A run of a suite: its tasks are performed, and what a person reads is gathered in one folder."""
 
-import platform
-import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import ZipFile
 
-from vobench import __version__, stop
+from vobench import stop
+from vobench.errors import NoSequenceError
 from vobench.estimator.program import sandbox_works
+from vobench.portable import require_held
 from vobench.runner.consistency import COVARIANCE
 from vobench.runner.entry import copy_files
+from vobench.runner.environment import environment, joined, read_origin
 from vobench.runner.estimate import ESTIMATE, LOG, REVISED, TRACKS
 from vobench.runner.executor import Done, Event, Executor, perform_all
 from vobench.runner.folder import (
     CASE,
     ENVIRONMENT,
     ESTIMATORS,
+    NO_SEQUENCE,
     SCORE,
     SEQUENCE,
     SUITE,
     RunFolder,
     TrialScore,
+    TrialStatus,
+    Unmade,
     make_run,
     read_score,
     write_hashes,
 )
 from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.runner.ground_truth import scored_truth
-from vobench.runner.key import digest, folder_digest, library_versions
-from vobench.runner.simulate import LIBRARIES
+from vobench.runner.key import digest, folder_digest
 from vobench.runner.store import Store, Tell, write_json
 from vobench.runner.task import Task, missing, plan
 from vobench.sequence import read_import_notes
@@ -44,6 +47,11 @@ if TYPE_CHECKING:
 Finish = Callable[[RunFolder, list[TrialScore]], None]
 OF_ESTIMATE, OF_SCORE = (ESTIMATE, TRACKS, LOG, TIMES, COVARIANCE, REVISED), (SCORE, FRAMES)
 OPTIONAL = (COVARIANCE, REVISED)
+# What helps where a sequence could not be made; a refusal's sentence says it already.
+REMEDIES: dict[str, str] = {
+    "crashed": " (`vobench doctor` checks what this machine lacks)",
+    "out_of_memory": " (run fewer tasks at once, as with --jobs 1)",
+}
 # How the cost of estimators was taken that were run this time.
 ALONE, BESIDE = "with nothing beside it", "beside other tasks"
 
@@ -59,16 +67,22 @@ def run_suite(
     shares_time: bool = False,
     is_fresh: bool = False,
     begin: Callable[[Sequence[Task]], object] = lambda _: None,
+    require_all: bool = False,
     heard: Callable[[Event], object] = lambda _: None,
     tell: Tell = lambda _: None,
 ) -> RunFolder:
-    """Run every case, estimator and repeat; what the store holds already is not made again.
+    """Run every case, estimator and repeat; results that the store holds are reused.
 
-    `finish` adds reports to the folder before it gets its final name under `root`. A cell whose task fails has a row
-    that says why. `is_fresh` makes all of it anew. `begin` is given the tasks that are to be performed. `executor`,
-    `shares_time` (which the suite may ask for itself) and `heard` are those of `perform_all`; `tell` is given
-    sentences on the store, say of a result that was damaged.
+    `finish` adds reports to the folder before it gets its final name under `root`. A trial that fails has a row that
+    says why. A case that could not be simulated or imported is in the folder's `unmade()`; its trials have the status
+    `no_sequence` and count for no estimator. `is_fresh` ignores what the store holds. `begin` is given the
+    tasks that are to be performed. `executor`, `shares_time` (which the suite may ask for itself) and `heard` are
+    those of `perform_all`; `tell` is called with sentences about the store, such as that a result was damaged.
+
+    Raises NoSequenceError, and makes no folder, if no case could be simulated or imported; with `require_all`, if any
+    could not. Raises MissingDependencyError if a library is missing and InputError if the disk is full.
     """
+    require_held()
     tasks = plan(suite, recordings)
     kept = Store(store)
     with kept.in_use(tell):
@@ -82,6 +96,9 @@ def run_suite(
         shares_time = shares_time or suite.suite.share_time
         begin(to_make)
         failures = perform_all(to_make, store, executor, shares_time=shares_time, heard=heard)
+        scores = [task for task in tasks if task.stage == "score"]
+        unmade = _unmade(scores, failures)
+        _require_sequences(unmade, {task.inputs["case"] for task in scores}, require_all=require_all)
         cases = {case.name: case for case in suite.cases}
         stated = plain(suite.suite)
         entrants = [_entrant_facts(entrant) for entrant in suite.entrants]
@@ -89,17 +106,61 @@ def run_suite(
         def fill(folder: RunFolder) -> None:
             write_json(folder.path / SUITE, stated)
             write_json(folder.path / ESTIMATORS, entrants)
-            write_json(folder.path / ENVIRONMENT, {**_environment(), "timed": BESIDE if shares_time else ALONE,
-                       "sandboxed": sandbox_works()})  # fmt: skip
-            scores = [task for task in tasks if task.stage == "score"]
-            finish(folder, [_gather(task, cases, store, folder, failures.get(task.key)) for task in scores])
+            origin = joined(read_origin(store / task.key) for task in scores)
+            timed = BESIDE if shares_time else ALONE
+            write_json(folder.path / ENVIRONMENT, environment(origin, timed=timed, sandboxed=sandbox_works()))
+            trials = []
+            for task in scores:
+                failure = unmade.get(task.inputs["case"]) or _trial_failure(failures.get(task.key))
+                trials.append(_gather(task, cases, store, folder, failure))
+            finish(folder, trials)
             write_hashes(folder)
 
         return make_run(root, suite.suite.name, digest({"suite": stated, "estimators": entrants}), fill)
 
 
+@dataclass(frozen=True, slots=True)
+class _Failure:
+    """The status and the reason of a trial without a score."""
+
+    status: TrialStatus
+    reason: str
+
+
+def _unmade(scores: Iterable[Task], failures: Mapping[str, Done]) -> dict[str, _Failure]:
+    """The failure of each case whose sequence could not be made, by the case's name."""
+    unmade = dict[str, _Failure]()
+    for task in scores:
+        sequence, _ = task.needs
+        if sequence in failures:
+            done = failures[sequence]
+            remedy = REMEDIES.get(done.failure or "crashed", "")
+            unmade[task.inputs["case"]] = _Failure(NO_SEQUENCE, f"{done.reason}{remedy}")
+    return unmade
+
+
+def _require_sequences(unmade: Mapping[str, _Failure], cases: Collection[str], *, require_all: bool) -> None:
+    """Raise NoSequenceError if no case could be made; with `require_all`, if any could not."""
+    nothing_made = bool(unmade) and len(unmade) == len(cases)
+    if not (nothing_made or (require_all and unmade)):
+        return
+    by_cause = dict[str, list[str]]()
+    for case, failure in unmade.items():
+        by_cause.setdefault(failure.reason, []).append(case)
+    causes = [f"{Unmade(cause, tuple(names)).names}: {cause}" for cause, names in by_cause.items()]
+    count = "no case" if nothing_made else f"{len(unmade)} of {len(cases)} cases"
+    negation = "" if nothing_made else " not"
+    raise NoSequenceError(
+        f"{count} could{negation} be simulated or imported, so nothing was scored: {'; '.join(causes)}"
+    )
+
+
+def _trial_failure(done: Done | None) -> _Failure | None:
+    return _Failure(done.failure or "crashed", done.reason) if done else None
+
+
 def _gather(
-    task: Task, cases: Mapping[str, Case | RecordedCase], store: Path, folder: RunFolder, failure: Done | None
+    task: Task, cases: Mapping[str, Case | RecordedCase], store: Path, folder: RunFolder, failure: _Failure | None
 ) -> TrialScore:
     """Copy a trial's files out of the store, and its case's before the first of them."""
     stop.check()
@@ -117,14 +178,14 @@ def _gather(
     return score
 
 
-def _write_failed(task: Task, failure: Done, folder: RunFolder) -> TrialScore:
+def _write_failed(task: Task, failure: _Failure, folder: RunFolder) -> TrialScore:
     """The row of a cell that came to no score."""
     score = TrialScore(
         case=task.inputs["case"],
         variant=task.inputs["variant"],
         estimator=task.inputs["estimator"],
         repeat=task.inputs["repeat"],
-        status=failure.failure or "crashed",
+        status=failure.status,
         reason=failure.reason,
         coverage=0.0,
         frames=0,
@@ -165,13 +226,4 @@ def _entrant_facts(entrant: Entrant) -> dict[str, Any]:
         "limits": asdict(entrant.limits),
         "mode": entrant.mode,
         "code": folder_digest(entrant.folder),
-    }
-
-
-def _environment() -> dict[str, object]:
-    return {
-        "vobench": __version__,
-        "python": sys.version.split()[0],
-        "platform": platform.platform(),
-        "libraries": library_versions(*LIBRARIES, "pandas", "rerun-sdk"),
     }

@@ -9,9 +9,11 @@ from shutil import copyfile
 from typing import TYPE_CHECKING, Any, Literal
 
 from vobench import stop
+from vobench.portable import is_portable
+from vobench.runner.environment import MADE_ON, origin_here
 from vobench.runner.key import code_digest, digest, folder_digest, imported_by, library_versions
 from vobench.runner.simulate import LIBRARIES, content
-from vobench.runner.store import Progress, SilentProgress, Store
+from vobench.runner.store import Progress, SilentProgress, Store, write_json
 from vobench.suite.scene_file import content as scene_content
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import RecordedCase
@@ -139,6 +141,7 @@ def estimate_task(trial: Trial, sequence: str, code: Mapping[str, str]) -> Task:
         "mode": entrant.mode,
         "needs": needs,
         **code,
+        **_portable(),
         "libraries": library_versions("numpy", "scipy", "opencv-python-headless"),
     }
     return Task("estimate", trial, inputs, needs)
@@ -167,7 +170,12 @@ def _noise(case: Case | RecordedCase) -> dict[str, Any]:
 
 
 def _made_by(stage: Stage, needs: tuple[str, ...] = ()) -> dict[str, Any]:
-    return {"needs": needs, "code": code_digest(*ENTRIES[stage])}
+    return {"needs": needs, "code": code_digest(*ENTRIES[stage]), **_portable()}
+
+
+def _portable() -> dict[str, bool]:
+    """Portable results share no entry with others, whose keys stay as they are."""
+    return {"portable": True} if is_portable() else {}
 
 
 def missing(tasks: Iterable[Task], root: Path) -> list[Task]:
@@ -211,7 +219,10 @@ def perform(
 
     def build(folder: Path) -> None:
         began = time.monotonic()
-        PERFORMERS[task.stage](task.subject, [store.need(key) for key in task.needs], folder, progress)
+        needs = [store.need(key) for key in task.needs]
+        PERFORMERS[task.stage](task.subject, needs, folder, progress)
+        engine = task.subject.rendering.engine if isinstance(task.subject, Case) else ""
+        write_json(folder / MADE_ON, asdict(origin_here(needs, engine=engine)))
         store.note_seconds(task.stage, time.monotonic() - began)
 
     def keeps(folder: Path) -> bool:

@@ -1,0 +1,305 @@
+"""Where figures come from: processor, driver, versions and commit, of what made a result and of a whole run."""
+
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from vobench import __version__
+from vobench.errors import MissingDependencyError
+from vobench.portable import is_portable
+from vobench.runner.folder import ENVIRONMENT, RunFolder, run_date
+from vobench.runner.key import PACKAGE, library_versions
+
+MADE_ON = "made_on.json"  # beside each result in the store, in a file of its own: no recording holds it
+UNKNOWN = "unknown"
+# Libraries whose release can change a score; others only draw or write reports.
+SCORING = ("numpy", "scipy", "opencv-python-headless", "pyrender", "embreex")
+LIBRARIES = (*SCORING, "mcap", "rosbags", "pandas", "rerun-sdk")
+# What of vobench's clone a result depends on.
+SOURCES = ("vobench", "scenes", "estimators", "suites")
+GIT_S = 10.0
+
+# The levels of the x86-64 psABI, by flags as Linux names them, the highest first.
+V2 = {"cx16", "lahf_lm", "popcnt", "pni", "sse4_1", "sse4_2", "ssse3"}
+V3 = V2 | {"abm", "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe", "xsave"}
+V4 = V3 | {"avx512bw", "avx512cd", "avx512dq", "avx512f", "avx512vl"}
+X86_LEVELS = (("x86-64-v4", V4), ("x86-64-v3", V3), ("x86-64-v2", V2))
+ARM_LEVELS = (("SVE2", "sve2"), ("SVE", "sve"), ("NEON", "asimd"))
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Processor:
+    """A processor's model as the system names it, and the instruction set that libraries choose their code by."""
+
+    model: str = UNKNOWN
+    simd: str = UNKNOWN
+
+    def __str__(self) -> str:
+        return f"{self.model} ({self.simd})"
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """What made a result, and everything that it was made from; usually one processor and one driver."""
+
+    processors: tuple[Processor, ...] = ()
+    drawn_by: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Environment:
+    """Where the figures of a run come from; the fields of `environment.json`, empty where a run does not state them.
+
+    `processors` and `drawn_by` are of all results of the run, also those that the cache held. `cores` are those that
+    the run may use, of `cores_total`. `commit` is of vobench's clone, with `+changes` where files differ from it.
+    `date` stands in no file: it is read off the name of the run's folder.
+    """
+
+    vobench: str = ""
+    commit: str = ""
+    python: str = ""
+    platform: str = ""
+    processors: tuple[Processor, ...] = ()
+    cores: int = 0
+    cores_total: int = 0
+    drawn_by: tuple[str, ...] = ()
+    portable: bool = False
+    libraries: Mapping[str, str] = field(default_factory=dict)
+    timed: str = ""
+    sandboxed: bool | None = None
+    date: str = ""
+
+    @property
+    def processor(self) -> str:
+        """The models of all processors."""
+        return " and ".join(dict.fromkeys(each.model for each in self.processors))
+
+    @property
+    def simd(self) -> str:
+        """The instruction sets of all processors."""
+        return " and ".join(dict.fromkeys(each.simd for each in self.processors))
+
+    @property
+    def driver(self) -> str:
+        """All drivers that drew."""
+        return " and ".join(self.drawn_by)
+
+    @property
+    def release(self) -> str:
+        """The version of vobench, and the commit where it runs from a clone."""
+        return f"vobench {self.vobench}{f' ({self.commit})' if self.commit else ''}"
+
+    def line(self) -> str:
+        """All of it in one line, without the libraries that do not change scores."""
+        parts = list[str]()
+        if self.processors:
+            parts.append(" and ".join(map(str, self.processors)))
+        if self.cores:
+            parts.append(f"{self.cores} of {self.cores_total} cores")
+        if self.drawn_by:
+            parts.append(f"drawn by {self.driver}")
+        if self.portable:
+            parts.append("portable")
+        if self.vobench:
+            parts.append(self.release)
+        if self.python:
+            parts.append(f"Python {self.python}")
+        parts += [f"{name} {self.libraries[name]}" for name in SCORING if name in self.libraries]
+        if self.date:
+            parts.append(self.date)
+        return ", ".join(parts)
+
+    def facts(self) -> dict[str, str]:
+        """The same as columns of a table."""
+        libraries = ", ".join(f"{name} {self.libraries[name]}" for name in SCORING if name in self.libraries)
+        return {
+            "processor": self.processor,
+            "simd": self.simd,
+            "cores": f"{self.cores} of {self.cores_total}" if self.cores else "",
+            "drawn_by": self.driver,
+            "portable": "yes" if self.portable else "no",
+            "vobench": self.vobench,
+            "commit": self.commit,
+            "python": self.python,
+            "libraries": libraries,
+            "date": self.date,
+        }
+
+
+ENVIRONMENTS, ORIGINS = TypeAdapter(Environment), TypeAdapter(Origin)
+
+
+def differences(old: Environment, new: Environment) -> list[str]:
+    """What differs between two environments that can change scores, as `name: old value → new value`."""
+    pairs = [
+        ("processor", " and ".join(map(str, old.processors)), " and ".join(map(str, new.processors))),
+        ("drawn by", old.driver, new.driver),
+        ("portable", str(old.portable), str(new.portable)),
+        ("Python", old.python, new.python),
+    ]
+    pairs += [(name, old.libraries.get(name, ""), new.libraries.get(name, "")) for name in SCORING]
+    return [f"{name} {was} → {now}" for name, was, now in pairs if was and now and was != now]
+
+
+@cache
+def processor() -> Processor:
+    """This machine's processor, read off /proc/cpuinfo where there is one."""
+    text = ""
+    with suppress(OSError):
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+    return parse_cpuinfo(text, platform.machine(), fallback=platform.processor())
+
+
+def parse_cpuinfo(text: str, machine: str, *, fallback: str = "") -> Processor:
+    """The processor that a text of Linux's /proc/cpuinfo describes; `fallback` is its model if the text names none."""
+    stated = dict[str, str]()
+    for line in text.splitlines():
+        name, colon, value = line.partition(":")
+        if colon:
+            stated.setdefault(name.strip().lower(), value.strip())
+    flags = set(stated.get("flags", stated.get("features", "")).split())
+    return Processor(_model(stated) or fallback or UNKNOWN, _simd(flags, machine))
+
+
+def _model(stated: Mapping[str, str]) -> str:
+    """The model's name; numbers tell apart the models that clouds give one name, and those of Arm, which have none."""
+    numbers = [f"{name} {stated[key]}" for name, key in (("family", "cpu family"), ("model", "model")) if key in stated]
+    if "model name" in stated:
+        return ", ".join([stated["model name"], *numbers])
+    if "cpu implementer" in stated:
+        return f"Arm implementer {stated['cpu implementer']}, part {stated.get('cpu part', UNKNOWN)}"
+    return ""
+
+
+def _simd(flags: set[str], machine: str) -> str:
+    """The highest level of instructions that these flags name."""
+    if not flags:
+        return UNKNOWN
+    if machine in ("aarch64", "arm64"):
+        return next((name for name, flag in ARM_LEVELS if flag in flags), UNKNOWN)
+    if machine in ("x86_64", "AMD64"):
+        return next((name for name, needed in X86_LEVELS if needed <= flags), "x86-64-v1")
+    return UNKNOWN
+
+
+@cache
+def commit() -> str:
+    """The commit of the clone that vobench runs from, with `+changes` where its files differ; empty elsewhere."""
+    clone = PACKAGE.parent
+    if not (clone / ".git").exists():
+        return ""
+    named = _git(clone, "rev-parse", "--short=10", "HEAD")
+    changed = _git(clone, "status", "--porcelain", "--", *SOURCES)
+    return f"{named}{'+changes' if named and changed else ''}"
+
+
+def _git(clone: Path, *words: str) -> str:
+    """What git says of a clone; empty where there is no git, or it refuses."""
+    with suppress(OSError, subprocess.SubprocessError):
+        done = subprocess.run(
+            ["git", "-C", str(clone), *words], capture_output=True, text=True, timeout=GIT_S, check=True
+        )
+        return done.stdout.strip()
+    return ""
+
+
+def drawn_by(engine: str) -> str:
+    """What draws the pictures of an engine here: the OpenGL driver, or Mitsuba."""
+    if engine == "path":
+        return f"Mitsuba {library_versions('mitsuba')['mitsuba']}"
+    from vobench.rendering.driver import driver_name
+
+    try:
+        return driver_name()
+    except MissingDependencyError:
+        return UNKNOWN
+
+
+def origin_here(needs: Iterable[Path], *, engine: str = "") -> Origin:
+    """The origin of a result that is made here of other results; `engine` is named if it draws pictures."""
+    before = [read_origin(folder) for folder in needs]
+    own = Origin((processor(),), (drawn_by(engine),) if engine else ())
+    return joined([*before, own])
+
+
+def joined(origins: Iterable[Origin]) -> Origin:
+    """The origin of what several results are part of, each processor and driver once, in order of their names."""
+    processors = set[Processor]()
+    drivers = set[str]()
+    for origin in origins:
+        processors.update(origin.processors)
+        drivers.update(origin.drawn_by)
+    return Origin(tuple(sorted(processors)), tuple(sorted(drivers)))
+
+
+def read_origin(folder: Path) -> Origin:
+    """The origin of a result in the store; empty where an older vobench made it."""
+    with suppress(OSError, ValidationError):
+        return ORIGINS.validate_json((folder / MADE_ON).read_bytes())
+    return Origin()
+
+
+def environment(origin: Origin, *, timed: str, sandboxed: bool) -> dict[str, Any]:
+    """The content of a run's `environment.json`: equal on one machine for equal inputs, so without date and times."""
+    stated = asdict(
+        Environment(
+            vobench=__version__,
+            commit=commit(),
+            python=sys.version.split()[0],
+            platform=platform.platform(),
+            processors=origin.processors or (processor(),),
+            cores=len(os.sched_getaffinity(0)),
+            cores_total=os.cpu_count() or 0,
+            drawn_by=origin.drawn_by,
+            portable=is_portable(),
+            libraries=library_versions(*LIBRARIES),
+            timed=timed,
+            sandboxed=sandboxed,
+        )
+    )
+    del stated["date"]
+    return stated
+
+
+def read_environment(folder: RunFolder) -> Environment | None:
+    """The environment that a run states, with its date; None where it states none."""
+    try:
+        stated = ENVIRONMENTS.validate_json((folder.path / ENVIRONMENT).read_bytes())
+    except (OSError, ValidationError):
+        return None
+    date = run_date(folder)
+    return replace(stated, date=date) if date else stated
+
+
+def merged_environment(environments: Sequence[Environment]) -> dict[str, Any]:
+    """What several runs state together: all processors and drivers, and each version, joined where they differ."""
+    origin = joined(Origin(each.processors, each.drawn_by) for each in environments)
+    names = dict.fromkeys(name for each in environments for name in each.libraries)
+    libraries = {name: _each_once(each.libraries.get(name, "") for each in environments) for name in names}
+    return asdict(
+        Environment(
+            vobench=_each_once(each.vobench for each in environments),
+            commit=_each_once(each.commit for each in environments),
+            python=_each_once(each.python for each in environments),
+            platform=_each_once(each.platform for each in environments),
+            processors=origin.processors,
+            drawn_by=origin.drawn_by,
+            portable=bool(environments) and all(each.portable for each in environments),
+            libraries=libraries,
+            timed=_each_once(each.timed for each in environments),
+            date=_each_once(each.date for each in environments),
+        )
+    )
+
+
+def _each_once(values: Iterable[str]) -> str:
+    return " and ".join(dict.fromkeys(filter(None, values)))
