@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 import scipy
-from tests.render.rectangles import Rectangle, room
 
+from tests.rendering.rectangles import Rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera

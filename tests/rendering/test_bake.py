@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from tests.render.rectangles import Rectangle, box, rectangle, room
 
+from tests.rendering.rectangles import Rectangle, box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.errors import RenderError
 from vobench.geometry import se3

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.render.rectangles import Rectangle, rectangle
 
+from tests.rendering.rectangles import Rectangle, rectangle
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakedScene, BakeSettings, bake

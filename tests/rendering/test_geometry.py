@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from tests.render.rectangles import box, rectangle, room
 
+from tests.rendering.rectangles import box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array
 from vobench.rendering.geometry import Hits, RayCaster, Visibility, ball, flats, spots

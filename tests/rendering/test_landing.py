@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.render.rectangles import box, room
 
+from tests.rendering.rectangles import box, room
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Equirectangular, KannalaBrandt, Pinhole

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.render.rectangles import room
 
+from tests.rendering.rectangles import room
 from vobench.asset.shape import at, block
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3

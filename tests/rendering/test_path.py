@@ -6,8 +6,8 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from tests.render.rectangles import rectangle, room
 
+from tests.rendering.rectangles import rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.errors import MissingDependencyError, RenderError
 from vobench.geometry import se3

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.render.rectangles import room
 
+from tests.rendering.rectangles import room
 from vobench.asset.texture import Procedural
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.render.rectangles import box, rectangle, room
 
 import vobench.rendering
+from tests.rendering.rectangles import box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.errors import MissingDependencyError
 from vobench.geometry.camera import Camera, Pinhole, pixel_grid

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.render.rectangles import box, rectangle, room
 
+from tests.rendering.rectangles import box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, DoubleSphere, KannalaBrandt, Pinhole

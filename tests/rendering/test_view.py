@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.render.rectangles import Rectangle, box, rectangle, room, sheet
 
+from tests.rendering.rectangles import Rectangle, box, rectangle, room, sheet
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import KannalaBrandt, Pinhole, pixel_grid
