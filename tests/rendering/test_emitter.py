@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.render import rectangles
+from tests.rendering import rectangles
 
 from vobench.geometry.se3 import Array
 from vobench.rendering.emitter import SolidAngle, rectangle
