@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from tests.rendering import rectangles
 
+from tests.rendering import rectangles
 from vobench.geometry.se3 import Array
 from vobench.rendering.emitter import SolidAngle, rectangle
 
