@@ -185,7 +185,7 @@ def _fit(file: Path, suite: dict[str, Any], recording: Recording, *, gain: float
     light = perform(bake_task(case.scene), cache_folder(), progress=terminal.Bars())
     wanted = _look_of(recording)
     stamps = travel.t_ns[np.linspace(0, len(travel.t_ns) - 1, TO_FIT).astype(int)].tolist()
-    with closing(open_renderer(scene, case.rendering, light)) as renderer:
+    with closing(open_renderer(scene, case.rendering, light, white_cd_m2=case.scene.white_cd_m2)) as renderer:
         settings, _ = fit_camera(wanted, exposed_by(case, World(scene, renderer, travel.motion), stamps))
     chip = settings.chip
     suite["cameras"] = {

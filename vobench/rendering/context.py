@@ -284,7 +284,7 @@ def devices() -> list[Device]:
     return [_described(index, handle, query_string) for index, handle in enumerate(handles[: count.value])]
 
 
-def _described(index: int, handle: int, query_string: Any) -> Device:
+def _described(index: int, handle: int | None, query_string: Any) -> Device:
     from OpenGL import EGL
 
     words = (query_string(handle, EGL.EGL_EXTENSIONS) or b"").decode("ascii", "replace").split()
@@ -351,7 +351,8 @@ def _egl_function(name: str, result: Any, *arguments: Any) -> Any:
     address = EGL.eglGetProcAddress(name.encode())
     if not address:
         return None
-    return ctypes.CFUNCTYPE(result, *arguments)(ctypes.cast(address, ctypes.c_void_p).value)
+    pointer = ctypes.cast(address, ctypes.c_void_p).value
+    return ctypes.CFUNCTYPE(result, *arguments)(pointer or 0)
 
 
 @cache
