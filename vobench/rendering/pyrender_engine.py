@@ -5,7 +5,7 @@ linear only after pyrender's power of 1/2.2 is undone.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -17,13 +17,19 @@ from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
 from vobench.rendering.context import create_context
 from vobench.rendering.pyrender_ambient import MeanLight, mean_light
-from vobench.rendering.pyrender_material import lamp_material, pyrender_material, require_pyrender, texture_tile_m
+from vobench.rendering.pyrender_material import (
+    TILE_EDGES_M,
+    lamp_material,
+    pyrender_material,
+    require_pyrender,
+    texture_tile_m,
+)
 from vobench.rendering.renderer import Radiance, View
 from vobench.rendering.view import NEAR_M, T_CV_GL, Box
 from vobench.rendering.warp import warp
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Rgb
-from vobench.scene.mesh import Mesh, Thing, areas_m2, cross, face_normals, joined, unit
+from vobench.scene.mesh import Mesh, Thing, areas_m2, cross, distinct, face_normals, joined, unit
 from vobench.scene.scene import Scene
 
 GAMMA = 2.2  # pyrender stores linear ** (1 / 2.2)
@@ -33,9 +39,11 @@ MOST_SPOTS = 4
 MOST_POINTS = 4
 LEAST_FAR_M = 100.0
 FAR_SCALES = 3.0
-# A spot that stands for a panel: straight ahead and in all, as bright as Lambert's law within 4 %.
-PANEL_INNER_RAD = np.pi / 4
-PANEL_OUTER_RAD = np.pi / 2.2
+# A spot that stands for a panel, as bright straight ahead. Wider ones stripe walls with the texels of their shadow map.
+PANEL_INNER_RAD = np.deg2rad(50)
+PANEL_OUTER_RAD = np.deg2rad(68)
+# Welds corners where edges are compared, in digits after the point of a metre.
+WELD_DIGITS = 5
 # A lamp whose normals cancel out further than this shines to all sides.
 LEAST_AHEAD = 0.5
 
@@ -136,7 +144,10 @@ class PyrenderScene:
         self._moment: Moment | None = None
         self._materials = cache(lambda name: pyrender_material(scene.materials[name], white_cd_m2))
 
-        self._add_things(scene.things)
+        suns = [light.direction(0) for light in scene.lights if isinstance(light, Sun)]
+        self._add_things(scene.things, sun=suns[0] if suns else None)
+        if suns:
+            self._add_backs(scene.things)
         self._movers = [(mover, self._add_things(mover.things)) for mover in scene.movers]
         self._lamp_faces = {
             index: self._add_lamp_faces(light)
@@ -204,16 +215,30 @@ class PyrenderScene:
                 colour += level * light.illuminance_lx / np.pi / self._white_cd_m2 * np.array(light.colour)
         return np.append(np.clip(colour, 0, 1) ** (1 / GAMMA), 1.0)
 
-    def _add_things(self, things: Sequence[Thing]) -> list[Any]:
-        """One node for each material of some things, in their common frame."""
+    def _add_things(self, things: Sequence[Thing], *, sun: Array | None = None) -> list[Any]:
+        """One node for each material of some things, in their common frame; panes let the sun (3,) through."""
         by_material = dict[str, list[Mesh]]()
         for thing in things:
             by_material.setdefault(thing.material, []).append(thing.mesh)
         nodes = []
         for name, meshes in by_material.items():
             tile_m = texture_tile_m(self._scene.materials[name])
-            nodes += self._add_mesh(joined(meshes), self._materials(name), tile_m)
+            mesh = joined(meshes)
+            if sun is not None and self._scene.materials[name].kind == "pane":
+                mesh = _turned_away(mesh, sun)
+            nodes += self._add_mesh(mesh, self._materials(name), tile_m)
         return nodes
+
+    def _add_backs(self, things: Sequence[Thing]) -> None:
+        """The backs of walls and other sheets, for pyrender's shadow maps leave out faces seen from behind."""
+        import pyrender
+
+        solid = [thing for thing in things if self._scene.materials[thing.material].kind != "pane"]
+        sheets = [thing.mesh.flipped() for thing in solid if _is_open(thing.mesh)]
+        material = pyrender.MetallicRoughnessMaterial(
+            baseColorFactor=[0.2, 0.2, 0.2, 1.0], metallicFactor=0.0, roughnessFactor=1.0
+        )
+        self._add_mesh(joined(sheets), material, TILE_EDGES_M)
 
     def _add_mesh(self, mesh: Mesh, material: Any, tile_m: float) -> list[Any]:
         import pyrender
@@ -273,6 +298,24 @@ def _spot(colour: Array, intensity: float, *, inner_rad: float, outer_rad: float
     widest_rad = min(outer_rad, np.pi / 2)
     narrow_rad = min(inner_rad, widest_rad)
     return pyrender.SpotLight(color=colour, intensity=intensity, innerConeAngle=narrow_rad, outerConeAngle=widest_rad)
+
+
+def _turned_away(mesh: Mesh, sun: Array) -> Mesh:
+    """A mesh whose faces all show the sun (3,) their backs, which its shadow map leaves out; normals stay."""
+    faces = mesh.faces.copy()
+    towards = face_normals(mesh.corners_m) @ sun > 0
+    faces[towards] = faces[towards][:, ::-1]
+    return replace(mesh, faces=faces)
+
+
+def _is_open(mesh: Mesh) -> bool:
+    """Whether a mesh has an edge with a face on one side only, as a sheet has and a box has not."""
+    corners = np.round(mesh.corners_m, WELD_DIGITS).reshape(-1, 3)
+    _, kind = distinct(corners)
+    loops = kind.reshape(-1, 3)
+    edges = np.sort(np.stack([loops, np.roll(loops, -1, axis=1)], -1).reshape(-1, 2), axis=1)
+    _, edge = distinct(edges)
+    return bool((np.bincount(edge) == 1).any())
 
 
 def _chosen(lights: Sequence[Light]) -> list[int]:
