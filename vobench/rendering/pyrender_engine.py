@@ -42,6 +42,8 @@ FAR_SCALES = 3.0
 # A spot that stands for a panel, as bright straight ahead. Wider ones stripe walls with the texels of their shadow map.
 PANEL_INNER_RAD = np.deg2rad(50)
 PANEL_OUTER_RAD = np.deg2rad(68)
+# Before its panel: pyrender divides by the distance ahead of the spot, which is 0 on the panel itself.
+SPOT_AHEAD_M = 0.01
 # Welds corners where edges are compared, in digits after the point of a metre.
 WELD_DIGITS = 5
 # A lamp whose normals cancel out further than this shines to all sides.
@@ -280,7 +282,8 @@ class PyrenderScene:
                 pose = _shining_along(light.direction, light.position_m)
             case AreaLight() if _is_ahead(light):
                 made = _spot(colour, intensity, inner_rad=PANEL_INNER_RAD, outer_rad=PANEL_OUTER_RAD)
-                pose = _shining_along(_mean_normal(light), _middle_m(light))
+                ahead = _mean_normal(light)
+                pose = _shining_along(ahead, _middle_m(light) + SPOT_AHEAD_M * ahead)
             case AreaLight():
                 made = pyrender.PointLight(color=colour, intensity=intensity)
                 pose = se3.transform(np.eye(3), _middle_m(light))

@@ -170,5 +170,5 @@ def _environment() -> dict[str, object]:
         "vobench": __version__,
         "python": sys.version.split()[0],
         "platform": platform.platform(),
-        "libraries": library_versions(*LIBRARIES, "pandas", "rerun-sdk"),
+        "libraries": library_versions(*LIBRARIES, "PyOpenGL", "pyrender2", "pandas", "rerun-sdk"),
     }
