@@ -1,3 +1,6 @@
+import json
+from subprocess import CompletedProcess
+
 import pytest
 
 from vobench.cli import doctor
@@ -35,5 +38,57 @@ def test_where_paths_can_be_traced_doctor_names_the_library(vobench, monkeypatch
 
 def test_no_file_of_the_working_folder_is_imported_where_drawing_is_tried(vobench, without_mitsuba, here):
     (here / "ctypes.py").write_text("raise SystemExit('imported from the working folder')\n")
-    (drawing,) = (c for c in vobench("doctor", "--json").json["checks"] if c["check"].startswith("drawing"))
+    (drawing,) = rows(vobench("doctor", "--json"), "drawing without a display (EGL)")
+    assert drawing["well"]
     assert "working folder" not in drawing["result"]
+
+
+def rows(said, name: str) -> list[dict]:
+    return [check for check in said.json["checks"] if check["check"] == name]
+
+
+def drawing_says(monkeypatch, content=None, *, code: int = 0, err: str = "") -> None:
+    """Let the process that draws end with a code, having said something."""
+    out = json.dumps(content) if content else ""
+    monkeypatch.setattr(doctor.stop, "run", lambda command: CompletedProcess(command, code, out, err))
+
+
+DRIVER = {"renderer": "llvmpipe", "version": "4.5", "vendor": "Mesa", "device": "1: Mesa software driver (CPU)"}
+RIGHT = {"well": True, "largest_error": 2e-4, "stray_cd_m2": 0.0, "driver": DRIVER, "devices": ["0: a", "1: b"]}
+
+
+def test_doctor_draws_a_picture_and_says_which_driver_and_device_drew(vobench, without_mitsuba):
+    said = vobench("doctor", "--json")
+    (drawing,) = rows(said, "drawing without a display (EGL)")
+    assert (said.code, drawing["well"]) == (0, True)
+    assert "a test picture is right, by " in drawing["result"]
+    assert "OpenGL 4" in drawing["result"]
+    assert "device 0: " in drawing["result"]
+    (devices,) = rows(said, "drawing devices")
+    assert devices["result"].endswith("VOBENCH_EGL_DEVICE chooses")
+
+
+def test_a_wrong_picture_is_not_well_and_its_figures_are_said(vobench, without_mitsuba, monkeypatch):
+    drawing_says(monkeypatch, {**RIGHT, "well": False, "largest_error": 0.123})
+    said = vobench("doctor", "--json")
+    (drawing,) = rows(said, "drawing without a display (EGL)")
+    assert (said.code, drawing["well"]) == (1, False)
+    assert "wrong by up to 12.3 %" in drawing["result"]
+    assert "VOBENCH_EGL_DEVICE" in drawing["remedy"]
+
+
+def test_a_driver_that_lacks_something_is_named_with_the_remedy_and_ends_with_1(vobench, without_mitsuba, monkeypatch):
+    sentence = "cannot draw: PyOpenGL 3.1.0 has no glClipControl; run: python -m pip install 'PyOpenGL>=3.1.10'"
+    drawing_says(monkeypatch, {"error": sentence})
+    said = vobench("doctor")
+    assert said.code == 1
+    assert "cannot draw: PyOpenGL 3.1.0 has no glClipControl" in said.out
+    assert said.err.strip().endswith("run: python -m pip install 'PyOpenGL>=3.1.10'")
+    assert len(said.err.splitlines()) == 1
+
+
+def test_a_driver_that_kills_the_process_is_not_well(vobench, without_mitsuba, monkeypatch):
+    drawing_says(monkeypatch, code=-11)
+    said = vobench("doctor", "--json")
+    (drawing,) = rows(said, "drawing without a display (EGL)")
+    assert (said.code, drawing["result"]) == (1, "the process that drew died with -11")

@@ -1,5 +1,6 @@
 """What `vobench render` refuses, before anything is drawn."""
 
+import cv2
 import pytest
 
 WRONG = [
@@ -15,6 +16,11 @@ WRONG = [
     (("--sensor", "film"), "no camera sensor named 'film'. Known: clean"),
     (("--engine", "rater"), "--engine: no engine named 'rater'. Did you mean 'raster'?"),
     (("--samples", "4"), "samples belongs to engine path, but the engine is raster; leave samples out"),
+    (
+        ("--engine", "pyrender", "--samples", "4"),
+        "samples belongs to engine path, but the engine is pyrender; leave samples out",
+    ),
+    (("--engine", "pyrenderer"), "--engine: no engine named 'pyrenderer'. Did you mean 'pyrender'?"),
     (("--engine", "path", "--samples", "0"), "--samples: should be 1 or more (got 0)"),
     (("--engine", "path", "--samples", "65537"), "--samples: should be 65536 or less (got 65537)"),
 ]
@@ -36,3 +42,11 @@ def test_truth_lies_beside_the_picture(vobench, here):
     assert written[0] == "look.png"
     assert {"look.depth.png", "look.normals.png", "look.truth.npz"} < set(written)
     assert sorted(written) == sorted(path.name for path in here.glob("look.*"))
+
+
+def test_stock_pyrender_draws_without_light_computed_before(vobench, here):
+    said = vobench("render", "closet", "--at", "0", "0", "1", "--out", "look.png", "--engine", "pyrender")
+    assert (said.code, said.out) == (0, "look.png\n")
+    picture = cv2.imread("look.png")
+    assert picture.std() > 0
+    assert not (here / "cache" / "bakes").exists()

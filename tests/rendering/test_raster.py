@@ -1,6 +1,5 @@
-"""Pictures are reflectance times light over pi, linear, and the same bytes; a machine that cannot draw says so."""
+"""Pictures are reflectance times light over pi, linear, and the same bytes."""
 
-import ctypes.util
 import os
 import pkgutil
 import subprocess
@@ -13,11 +12,9 @@ import pytest
 import vobench.rendering
 from tests.rendering.rectangles import box, rectangle, room
 from vobench.asset.texture import Procedural
-from vobench.errors import MissingDependencyError
 from vobench.geometry.camera import Camera, Pinhole, pixel_grid
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
-from vobench.rendering import raster
 from vobench.rendering.bake import BakedScene, BakeSettings, bake
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer
@@ -202,42 +199,14 @@ def test_a_machine_without_x11_is_told_from_one_with_it() -> None:
     assert "X11" in finished.stderr
 
 
-def test_missing_libraries_are_named_with_the_line_that_installs_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ctypes.util, "find_library", lambda name: None)
-    monkeypatch.setitem(sys.modules, "pyrender.platforms.egl", None)
-    with pytest.raises(MissingDependencyError) as caught:
-        raster.context()
-    message = str(caught.value)
-    assert "missing libEGL, libGL, libOpenGL" in message
-    assert message.endswith(raster.EGL_REMEDY)
-    assert "\n" not in message
-
-
-def test_only_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ctypes.util, "find_library", lambda name: None if name == "EGL" else f"lib{name}.so.1")
-    assert raster.missing_libraries() == ["EGL"]
-
-
-def test_a_driver_that_fails_is_one_line_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    from pyrender.platforms.egl import EGLPlatform
-
-    def fail(self: object) -> None:
-        raise AssertionError("eglInitialize\n\treturned 0")
-
-    monkeypatch.setattr(EGLPlatform, "init_context", fail)
-    with pytest.raises(
-        MissingDependencyError, match=r"EGL says AssertionError: eglInitialize returned 0\); run: apt-get"
-    ):
-        raster.context()
-
-
-def test_a_machine_that_can_draw_lacks_nothing() -> None:
-    assert raster.missing_libraries() == []
-    raster.release(raster.context())
-
-
 # Recordings are read, scenes checked and truth computed where no picture can be drawn.
-UNDRAWN = ["vobench.rendering.raster", "vobench.rendering.truth", "vobench.runner.simulate", "vobench.cli.doctor"]
+UNDRAWN = [
+    "vobench.rendering.raster",
+    "vobench.rendering.context",
+    "vobench.rendering.truth",
+    "vobench.runner.simulate",
+    "vobench.cli.doctor",
+]
 
 
 def test_what_draws_nothing_loads_no_opengl() -> None:

@@ -281,3 +281,12 @@ def test_memory_does_not_grow_with_the_length_of_a_sequence(bench, plugin):
     assert many > few + 45
     # One grey picture kept of each frame would be 15 MB here.
     assert all(longer - shorter < 8 for shorter, longer in zip(short_mb, long_mb, strict=True)), said
+
+
+def test_a_suite_of_stock_pyrender_runs_to_a_board(bench):
+    run = bench.run(
+        ("seed: 1", "seed: 1\nrendering: {engine: pyrender}"), ("full: {}, dim: {lamp: {power_lm: 150}}", "full: {}")
+    )
+    board = (run.path / "leaderboard.csv").read_text()
+    assert "wheel_odometry" in board
+    assert "crashed" not in (run.path / "leaderboard.md").read_text()

@@ -72,3 +72,11 @@ def test_a_task_performed_in_another_process_makes_the_same_files(bench, first, 
         assert names == {path.name for path in (store / task.key).iterdir()}
         for name in names - {"times.csv", MANIFEST}:
             assert (folder / name).read_bytes() == (store / task.key / name).read_bytes()
+
+
+def test_a_case_of_stock_pyrender_needs_no_light_and_counts_its_release(bench):
+    stock = plan(bench.plan(("seed: 1", "seed: 1\nrendering: {engine: pyrender}")), {})
+    assert "bake" not in {task.stage for task in stock}
+    sequence = next(task for task in stock if task.stage == "sequence")
+    assert {"PyOpenGL", "pyrender2"} <= set(sequence.inputs["libraries"])
+    assert "mitsuba" not in sequence.inputs["libraries"]

@@ -270,6 +270,7 @@ WRONG = [
     ("seed: 1", "seed:", ":2: seed: should be a whole number (got nothing)"),
     ("seed: 1", "seed: -1", ":2: seed: should be 0 or more (got -1)"),
     ("seed: 1", "seed: 1\nrendering: {samples: 4}", ":3: rendering: samples belongs to engine path, but the engine is raster; leave samples out"),
+    ("seed: 1", "seed: 1\nrendering: {engine: pyrendr}", ":3: rendering.engine: no engine named 'pyrendr'. Did you mean 'pyrender'? Known: path, pyrender, raster"),
     ("seed: 1", "seed: 1\nrendering: {engine: path, samples: 65537}", ":3: rendering.samples: should be 65536 or less (got 65537)"),
     ("seed: 1", "seed: 1\nrepeats: 101", ":3: repeats: should be 100 or less (got 101)"),
     ("seed: 1", "seed: 1\nseed: 2", ':3:1: found duplicate key "seed" with value "2" (original value: "1")'),

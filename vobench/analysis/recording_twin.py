@@ -335,7 +335,7 @@ def _fit_camera(file: Path, recording: Recording, *, gain: float, progress: Prog
     scene = case.build_scene()
     light = perform(bake_task(case.scene), cache_folder(), progress=progress)
     fitted_t_ns = _evenly(motion.t_ns.tolist())
-    with closing(open_renderer(scene, case.rendering, light)) as renderer:
+    with closing(open_renderer(scene, case.rendering, light, white_cd_m2=case.scene.white_cd_m2)) as renderer:
         develop = exposed_by(case, World(scene, renderer, motion.motion), fitted_t_ns)
         settings, _ = fit_camera(_look(recording), develop)
     return _camera_settings(settings, gain=gain)

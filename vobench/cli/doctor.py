@@ -1,5 +1,6 @@
 """vobench doctor: what this machine lacks, and the command that mends it."""
 
+import json as json_module
 import os
 import re
 import shutil
@@ -7,7 +8,7 @@ import subprocess
 import sys
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -16,11 +17,11 @@ from vobench.cli import terminal
 from vobench.errors import MissingDependencyError
 from vobench.estimator.program import sandbox_works
 from vobench.rendering import mitsuba
-from vobench.rendering.raster import EGL_PACKAGES, EGL_REMEDY
+from vobench.rendering.context import DEVICE_VARIABLE, EGL_PACKAGES, EGL_REMEDY
 from vobench.runner.key import cache_folder
 from vobench.runner.store import why_unwritable
 
-PROBE = "from vobench.rendering import raster; raster.context()"
+DRAWING = "drawing without a display (EGL)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +42,10 @@ def doctor_command(
 ) -> None:
     """Say what this machine lacks, and the command that mends it."""
     python = Check("Python", True, sys.version.split()[0])
-    checks = [python, _libraries(), _drawing(), _cache(), _sandbox(), _path_tracing()]
-    if fix and not checks[2].well:
-        checks[2] = _installed_drawing()
+    drawing = _drawing()
+    if fix and not drawing[0].well:
+        drawing = _installed_drawing()
+    checks = [python, _libraries(), *drawing, _cache(), _sandbox(), _path_tracing()]
     ill = [c for c in checks if not (c.well or c.optional)]
     if json:
         terminal.print_json({"well": not ill, "checks": [asdict(c) for c in checks]})
@@ -69,21 +71,40 @@ def _libraries() -> Check:
     return Check("Python libraries", not missing, f"missing: {', '.join(missing)}" if missing else "all there", remedy)
 
 
-def _drawing() -> Check:
-    """Whether a picture can be drawn, tried in a process of its own: a broken driver may kill it."""
-    tried = stop.run([sys.executable, "-P", "-c", PROBE])
-    if tried.returncode == 0:
-        return Check("drawing without a display (EGL)", True, "works")
-    last = tried.stderr.strip().splitlines()[-1:] or [f"the probe died with {tried.returncode}"]
-    result, _, remedy = last[0].split("Error: ", 1)[-1].partition("; run: ")
-    return Check("drawing without a display (EGL)", False, result, f"run: {_as_we_are(remedy or EGL_REMEDY)}")
+def _drawing() -> list[Check]:
+    """Whether a picture comes out right, drawn in a process of its own: a broken driver may kill it."""
+    tried = stop.run([sys.executable, "-P", "-m", "vobench.rendering.self_test"])
+    if tried.returncode != 0:
+        last = tried.stderr.strip().splitlines()[-1:] or [f"the process that drew died with {tried.returncode}"]
+        return [Check(DRAWING, False, last[0], f"run: {_as_we_are(EGL_REMEDY)}")]
+    said = json_module.loads(tried.stdout)
+    if "error" in said:
+        result, _, remedy = said["error"].partition("; run: ")
+        return [Check(DRAWING, False, result, f"run: {_as_we_are(remedy or EGL_REMEDY)}")]
+
+    driver = "{renderer}, OpenGL {version}, device {device}".format(**said["driver"])
+    devices = Check("drawing devices", True, f"{', '.join(said['devices'])}; {DEVICE_VARIABLE} chooses", optional=True)
+    if not said["well"]:
+        return [_wrong_picture(driver, said), devices]
+    result = f"a test picture is right, by {driver}; light and truth are computed on the CPU"
+    return [Check(DRAWING, True, result), devices]
+
+
+def _wrong_picture(driver: str, said: dict[str, Any]) -> Check:
+    """A driver that draws, but not what geometry and photometry say."""
+    largest = 100 * said["largest_error"]
+    result = (
+        f"a test picture is wrong by up to {largest:.3g} %, stray light {said['stray_cd_m2']:.3g} cd/m², by {driver}"
+    )
+    remedy = f"update the driver, or set {DEVICE_VARIABLE} to another device ({', '.join(said['devices'])})"
+    return Check(DRAWING, False, result, remedy)
 
 
 def _as_we_are(command: str) -> str:
     return command if os.geteuid() == 0 else command.replace("apt-get", "sudo apt-get")
 
 
-def _installed_drawing() -> Check:
+def _installed_drawing() -> list[Check]:
     """Install Mesa's EGL with apt where we are root, and look again."""
     if os.geteuid() != 0 or shutil.which("apt-get") is None:
         return _drawing()

@@ -48,7 +48,9 @@ def render_command(
     time: Annotated[float, typer.Option(help="When, in seconds; lights and things may move.")] = 0.0,
     sensor: Annotated[str, typer.Option(help="The chip behind the lens.")] = "clean",
     gain: Annotated[float, typer.Option(min=1e-6, help="Multiplies the exposure.")] = 1.0,
-    engine: Annotated[str, typer.Option(help="raster, or path for Mitsuba's path tracer.")] = "raster",
+    engine: Annotated[
+        str, typer.Option(help="raster; path, Mitsuba's path tracer; or pyrender, as it comes.")
+    ] = "raster",
     samples: Annotated[int | None, typer.Option(help="Light paths a pixel, for --engine path alone.")] = None,
     truth: Annotated[bool, typer.Option("--truth", help="Write ground truth beside the picture.")] = False,
     json: terminal.Json = False,
@@ -62,9 +64,9 @@ def render_command(
     spec = read_scene(catalog.find("scene", scene).path)
     if spec.room and not spec.room.holds(at):
         raise InputError(f"--at should be inside the room ({spec.room.extent}), got {at}")
-    built, is_traced = build(spec, {}), rendering.engine == "path"
-    light = None if is_traced else perform(bake_task(spec), cache_folder(), progress=terminal.Bars())
-    with closing(open_renderer(built, rendering, light)) as renderer:
+    built = build(spec, {})
+    light = perform(bake_task(spec), cache_folder(), progress=terminal.Bars()) if rendering.needs_bake else None
+    with closing(open_renderer(built, rendering, light, white_cd_m2=spec.white_cd_m2)) as renderer:
         radiance = renderer.radiance(lens, still(lens, T_world_camera, t_ns=t_ns), weights=None)
     write_png(out, _exposed(radiance / np.float32(spec.white_cd_m2), chip))
     written = [

@@ -1,4 +1,4 @@
-"""What OpenGL holds: shader programs, textures, framebuffers; pyrender's private parts are used here and in raster."""
+"""What OpenGL holds: shader programs, textures, framebuffers."""
 
 import ctypes
 from collections.abc import Sequence
@@ -10,10 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from OpenGL import GL
-from pyrender.shader_program import ShaderProgram
+from OpenGL.GL import shaders
 
-from vobench.errors import RenderError
+from vobench.errors import MissingDependencyError, RenderError
 from vobench.geometry.se3 import Array
+from vobench.rendering.context import SOFTWARE_REMEDY
 from vobench.rendering.renderer import Radiance
 from vobench.rendering.view import Box
 from vobench.scene.material import linear
@@ -165,22 +166,20 @@ SHADERS = Path(__file__).parent / "shaders"
 
 
 class Program:
-    """Two linked shaders with some of their abilities.
-
-    pyrender's own `set_uniform` asks for the location each time and hides every error.
-    """
+    """A vertex and a fragment shader of this package, compiled with some preprocessor names defined, and linked."""
 
     def __init__(self, vertex: str, fragment: str, *defines: str) -> None:
-        files = {"vertex_shader": str(SHADERS / f"{vertex}.vert"), "fragment_shader": str(SHADERS / f"{fragment}.frag")}
-        shader = ShaderProgram(**files, defines=dict.fromkeys(sorted(defines), 1))
+        # Core contexts check a program against a vertex array, whichever it is.
+        GL.glBindVertexArray(GL.glGenVertexArrays(1))
+        stages = ((f"{vertex}.vert", GL.GL_VERTEX_SHADER), (f"{fragment}.frag", GL.GL_FRAGMENT_SHADER))
         try:
-            shader._add_to_context()
+            compiled = [shaders.compileShader(_source(name, defines), stage) for name, stage in stages]
+            self._id = shaders.compileProgram(*compiled)
         except Exception as error:  # PyOpenGL's, whichever stage fails
             reason = " ".join(str(error).split())[:200]
-            raise RenderError(
-                f"this OpenGL driver cannot run {fragment}.frag, which needs OpenGL 4.5 ({reason})"
+            raise MissingDependencyError(
+                f"cannot draw: this OpenGL driver cannot run {fragment}.frag ({reason}); run: {SOFTWARE_REMEDY}"
             ) from error
-        self._id = shader._program_id
         self._locations: dict[str, Any] = {}
         self._values: dict[str, float | bytes] = {}
 
@@ -207,6 +206,13 @@ class Program:
         else:
             upload = GL.glUniformMatrix4fv if len(value) == 4 else GL.glUniformMatrix3fv
             upload(location, 1, GL.GL_TRUE, value)
+
+
+def _source(name: str, defines: Sequence[str]) -> str:
+    """The text of a shader's file, with names defined after its first line, which says the version."""
+    version, rest = (SHADERS / name).read_text(encoding="utf-8").split("\n", 1)
+    lines = [f"#define {define} 1" for define in sorted(defines)]
+    return "\n".join([version, *lines, rest])
 
 
 class CubeTexture:

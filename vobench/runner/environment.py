@@ -22,8 +22,8 @@ from vobench.runner.key import PACKAGE, library_versions
 MADE_ON = "made_on.json"  # beside each result in the store, in a file of its own: no recording holds it
 UNKNOWN = "unknown"
 # Libraries whose release can change a score; others only draw or write reports.
-SCORING = ("numpy", "scipy", "opencv-python-headless", "pyrender", "embreex")
-LIBRARIES = (*SCORING, "mcap", "rosbags", "pandas", "rerun-sdk")
+SCORING = ("numpy", "scipy", "opencv-python-headless", "PyOpenGL", "embreex")
+LIBRARIES = (*SCORING, "pyrender2", "mcap", "rosbags", "pandas", "rerun-sdk")
 # What of vobench's clone a result depends on.
 SOURCES = ("vobench", "scenes", "estimators", "suites")
 GIT_S = 10.0
@@ -216,10 +216,10 @@ def drawn_by(engine: str) -> str:
     """What draws the pictures of an engine here: the OpenGL driver, or Mitsuba."""
     if engine == "path":
         return f"Mitsuba {library_versions('mitsuba')['mitsuba']}"
-    from vobench.rendering.driver import driver_name
+    from vobench.rendering.raster import driver_facts
 
     try:
-        return driver_name()
+        return driver_facts().name
     except MissingDependencyError:
         return UNKNOWN
 

@@ -31,7 +31,13 @@ UNSIMULATED: dict[str, Any] = {
     "scene": {"summary"},
     "trajectory": {"file", "times", "recorded_hz", "axes"},
 }
-LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "pyrender2", "embreex", "mcap", "rosbags")
+LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "embreex", "mcap", "rosbags")
+ENGINE_LIBRARIES = {"raster": ("PyOpenGL",), "path": ("mitsuba",), "pyrender": ("PyOpenGL", "pyrender2")}
+
+
+def libraries(rendering: "Rendering") -> tuple[str, ...]:
+    """The distributions whose release can change the bytes of a sequence drawn by an engine."""
+    return LIBRARIES + ENGINE_LIBRARIES[rendering.engine]
 
 
 def content(case: "Case") -> dict[str, Any]:
@@ -58,29 +64,42 @@ def bake_scene(spec: "SceneFile", folder: Path, progress: "Progress") -> None:
         save_baked(folder, bake(scene, BakeSettings(), tell))
 
 
-def open_renderer(scene: "Scene", rendering: "Rendering", light: Path | None) -> "Renderer":
-    """The renderer of a scene, which draws with the light in a folder where it traces no paths; the caller closes it.
+def open_renderer(
+    scene: "Scene", rendering: "Rendering", light: Path | None, *, white_cd_m2: float | None = None
+) -> "Renderer":
+    """The renderer of a scene, which the caller closes.
+
+    light: the folder with the scene's light, for the engine that draws with it; white_cd_m2: the luminance that is
+    white, for the one that draws 8 bits.
 
     Raises MissingDependencyError where this machine cannot draw.
     """
-    if light is None:
+    if rendering.engine == "path":
         from vobench.rendering.path import SAMPLES, PathRenderer
 
         return PathRenderer(scene, samples=rendering.samples or SAMPLES)
+    if rendering.engine == "pyrender":
+        from vobench.rendering.pyrender_engine import PyrenderRenderer
+
+        if white_cd_m2 is None:
+            raise ValueError("the engine pyrender needs white_cd_m2")
+        return PyrenderRenderer(scene, white_cd_m2=white_cd_m2)
     from vobench.rendering.bake import load_baked
     from vobench.rendering.raster import RasterRenderer
 
+    if light is None:
+        raise ValueError("the engine raster needs the light of the scene")
     return RasterRenderer(load_baked(light, scene))
 
 
 def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progress") -> None:
-    """Record a case's sequence in a folder, drawn with the light of its scene or, without, by tracing paths."""
+    """Record a case's sequence in a folder, drawn by its engine, with the light of its scene where that needs it."""
     from vobench.runner.sensors import PixelTruth, SensorFeed
     from vobench.runner.stereo_camera import StereoCamera, World
 
     travel, scene = body_motion(case), case.build_scene()
     truth = PixelTruth(case, scene, travel.motion) if case.truth else None
-    renderer = open_renderer(scene, case.rendering, light)
+    renderer = open_renderer(scene, case.rendering, light, white_cd_m2=case.scene.white_cd_m2)
     try:
         camera = StereoCamera(case, World(scene, renderer, travel.motion))
         camera.skip(travel.first)
@@ -121,7 +140,7 @@ def _writer(case: "Case", folder: Path, truth: "PixelTruth | None") -> "Sequence
         colour={"mono": MONO, "rgb": RGB, "bayer": BAYER}[case.camera.colour],
         truth_channels=case.truth,
         truth_names=truth.names if truth else None,
-        provenance=versions(*LIBRARIES),
+        provenance=versions(*libraries(case.rendering)),
     )
 
 

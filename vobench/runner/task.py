@@ -12,7 +12,7 @@ from vobench import stop
 from vobench.portable import is_portable
 from vobench.runner.environment import MADE_ON, origin_here
 from vobench.runner.key import code_digest, digest, folder_digest, imported_by, library_versions
-from vobench.runner.simulate import LIBRARIES, content
+from vobench.runner.simulate import content, libraries
 from vobench.runner.store import Progress, SilentProgress, Store, write_json
 from vobench.suite.scene_file import content as scene_content
 from vobench.suite.scene_spec import SceneFile
@@ -101,11 +101,10 @@ def sequence_tasks(case: Case | RecordedCase, recordings: "Mapping[str, Recordin
     """What makes a case's sequence, the sequence last: its scene's light is computed before, where it is drawn with."""
     if isinstance(case, RecordedCase):
         return [_import_task(case, recordings[case.name])]
-    is_traced = case.rendering.engine == "path"
-    before = [] if is_traced else [bake_task(case.scene)]
+    before = [bake_task(case.scene)] if case.rendering.needs_bake else []
     needs = tuple(task.key for task in before)
-    libraries = library_versions(*LIBRARIES, *(["mitsuba"] if is_traced else []))
-    inputs = {"case": content(case), **_made_by("sequence", needs), "libraries": libraries}
+    used = library_versions(*libraries(case.rendering))
+    inputs = {"case": content(case), **_made_by("sequence", needs), "libraries": used}
     return [*before, Task("sequence", case, inputs, needs)]
 
 

@@ -36,16 +36,17 @@ from vobench.suite.yaml_file import Mistakes, YamlFile
 
 USUAL_RIG = "ahead"  # where a suite has none
 ALONE = {"scenarios", "source"}
-ENGINES = ("raster", "path")
+ENGINES = ("raster", "path", "pyrender")
 MOST_SAMPLES = 65536
 CALIBRATION_STREAM = 7_301  # sets what is drawn of a calibration apart from other streams of a seed
 
 
 @settings()
 class Rendering:
-    """The engine: `raster` draws with light computed once, `path` traces `samples` light paths through each pixel.
+    """The engine that draws pictures.
 
-    None are as many as the path tracer takes by itself.
+    `raster` draws with light computed once, `path` traces `samples` light paths through each pixel (None: as many as
+    the path tracer takes by itself), `pyrender` is the stock renderer of that name.
     """
 
     engine: Annotated[str, OneOf("engine", ENGINES)] = "raster"
@@ -54,6 +55,11 @@ class Rendering:
     def __post_init__(self) -> None:
         if self.engine != "path" and self.samples is not None:
             raise SettingError(f"samples belongs to engine path, but the engine is {self.engine}; leave samples out")
+
+    @property
+    def needs_bake(self) -> bool:
+        """Whether the engine draws with the light of the scene, computed before."""
+        return self.engine == "raster"
 
 
 @settings()
