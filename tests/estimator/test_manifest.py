@@ -108,7 +108,6 @@ def test_reading_a_manifest_imports_neither_opencv_nor_the_code():
         ({"version": "1.0"}, r":2: version: should be text .*\(got 1\.0\)"),
         ({"class_": "Mine", "class": None}, r"class: .*\(got 'Mine'\)"),
         ({"needs": "[lidar]"}, r":4: needs\.0: .*'stereo', 'mono', 'colour', 'encoders' or 'imu' \(got 'lidar'\)"),
-        ({"version": None}, r"version: .*missing"),
         ({"pose_of": "head"}, r":5: pose_of: .*'left_camera', 'body' or 'imu' \(got 'head'\)"),
         ({"version": None}, r"version: .*missing"),
         ({"parms": "{}"}, r":7: parms: unknown key\. Did you mean 'params'\?"),
