@@ -146,7 +146,7 @@ def test_an_old_maker_ends_with_the_sentence_that_names_the_new_place(
     vobench: Callable[..., Said], tmp_path: Path
 ) -> None:
     (tmp_path / "maker.py").write_text(MAKER)
-    (tmp_path / "old.yaml").write_text("name: old\nmaker: maker.py\n")
+    (tmp_path / "old.yaml").write_text("name: old\nwhite_cd_m2: 50\nmaker: maker.py\n")
     done = vobench("scene", "./old.yaml")
     assert done.returncode == 1
     assert "ImportError: vobench.scene.surface.box has gone: vobench.plugin.block makes a box" in done.stderr

@@ -39,7 +39,7 @@ def test_help_imports_no_heavy_library():
 
 OUTSIDE = """
 import numpy as np
-from vobench.metric.comparison import POSES, MetricDefinition
+from vobench.plugin import POSES, MetricDefinition
 
 def greet(name: str = "you", *, json: bool = False) -> None:
     \"\"\"Say hello.\"\"\"

@@ -23,13 +23,19 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from vobench.dataset.layout import Layout, Writing
-from vobench.dataset.picture import Picture
-from vobench.dataset.recording import PictureStream, RecordedFrame, assemble
-from vobench.dataset.source import Views, png_frames
-from vobench.geometry.camera import Pinhole
-from vobench.geometry.rig import Rig
-from vobench.trajectory.trajectory import Trajectory
+from vobench.plugin import (
+    Layout,
+    PictureStream,
+    Pinhole,
+    RecordedFrame,
+    RecordedPicture,
+    Rig,
+    Trajectory,
+    Views,
+    Writing,
+    assemble,
+    png_frames,
+)
 
 
 def read(folder, options):
@@ -37,9 +43,12 @@ def read(folder, options):
     with np.load(path) as found:
         t_ns, pictures, lens, T = (found[name] for name in ("t_ns", "pictures", "lens", "T_world_left"))
     height, width = pictures.shape[1:]
-    stream = PictureStream.open(lambda: (
-        RecordedFrame(int(t), (Picture(f"{path}: {i}", picture),)) for i, (t, picture) in enumerate(zip(t_ns, pictures))
-    ))
+
+    def frames():
+        for index, stamp in enumerate(t_ns):
+            yield RecordedFrame(int(stamp), (RecordedPicture(f"{path}: {index}", pictures[index]),))
+
+    stream = PictureStream.open(frames)
     rig = Rig(Pinhole(width, height, *lens.tolist()), None, np.eye(4), None)
     return assemble("npz", rig, stream, t_ns, truth=Trajectory(t_ns, T), calibration=str(path))
 

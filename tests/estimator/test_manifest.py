@@ -37,6 +37,20 @@ def plugin(folder, code=CODE, **keys):
     return folder
 
 
+@pytest.mark.parametrize(
+    ("keys", "described"),
+    [
+        ({}, "Mine"),
+        ({"summary": None}, "estimator:Mine, needs stereo"),
+        ({"summary": None, "needs": "[mono, imu]"}, "estimator:Mine, needs mono and imu"),
+        ({"summary": None, "needs": None}, "estimator:Mine, needs no sensor"),
+        ({"summary": None, "class": None, "stream": "[./run, --fast]"}, "./run --fast, needs stereo"),
+    ],
+)
+def test_a_manifest_without_a_summary_is_described_by_how_it_is_run(tmp_path, keys, described):
+    assert read_manifest(plugin(tmp_path / "mine", **keys)).described == described
+
+
 def loaded(folder):
     manifest = read_manifest(folder)
     return load(folder, manifest.class_path, name=manifest.name)
@@ -95,7 +109,7 @@ def test_reading_a_manifest_imports_neither_opencv_nor_the_code():
         ({"class_": "Mine", "class": None}, r"class: .*\(got 'Mine'\)"),
         ({"needs": "[lidar]"}, r":4: needs\.0: .*'stereo', 'mono', 'colour', 'encoders' or 'imu' \(got 'lidar'\)"),
         ({"pose_of": "head"}, r":5: pose_of: .*'left_camera', 'body' or 'imu' \(got 'head'\)"),
-        ({"summary": None}, r"summary: .*missing"),
+        ({"version": None}, r"version: .*missing"),
         ({"parms": "{}"}, r":7: parms: unknown key\. Did you mean 'params'\?"),
         ({"params": "7"}, r":7: params: .*\(got 7\)"),
         ({"class": None}, r"an estimator has one of class, command, stream, oracle \(got none\)"),

@@ -260,7 +260,10 @@ def _offered_as(module: str, name: str) -> str | None:
     """The name under which `vobench.plugin` offers a name of a module, or a module, None where it does not."""
     imported = f"{module}.{name}" if name else module
     for offered, home in offered_names().items():
-        if imported in (home.replace(":", "."), f"{home}.{offered}"):
+        module_of_it, _, original = home.partition(":")
+        is_module = module_of_it.rpartition(".")[2] == offered
+        full_name = module_of_it if is_module else f"{module_of_it}.{original or offered}"
+        if imported == full_name:
             return offered
     home = offered_names().get(name, "").partition(":")[0]
     with suppress(ImportError, AttributeError):  # a module that imports the name from its home
