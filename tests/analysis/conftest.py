@@ -1,15 +1,22 @@
 """A case that has some of everything, and a run in which an estimator fails for a known reason."""
 
+import json
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.cli.conftest import CLOSET, make_cheap
+from tests.runner.conftest import CLOSET as TEXTURED_CLOSET
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import own_pair, stereo_rig
 from vobench.runner.executor import Serial
 from vobench.runner.folder import RunFolder, TrialScore
 from vobench.runner.run import run_suite
+from vobench.suite.axis import RigSettings
 from vobench.suite.suite import Case, Plan, read_plan
+from vobench.suite.yaml_file import plain
 
 SCENE = """
 name: hall
@@ -120,3 +127,32 @@ def noisy_run(tmp_path_factory: pytest.TempPathFactory) -> NoisyRun:
 def cheap_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures that are grey but for the camera's effects, for a test that runs variants of `noisy_run`."""
     make_cheap(monkeypatch)
+
+
+LENS = Pinhole(240, 160, 200.0, 200.0, 119.5, 79.5)
+
+
+@pytest.fixture(scope="session")
+def recorded_case(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a case of some twenty small pictures from a textured closet, with a right eye that is rolled."""
+    root = tmp_path_factory.mktemp("recorded")
+    (root / "closet.yaml").write_text(TEXTURED_CLOSET)
+    rig: Any = plain(RigSettings(own=own_pair(stereo_rig(LENS, pitch_deg=0)), pitch_deg=30, forward_m=0, height_m=0.3))
+    stated = {key: rig[key] for key in ("own", "pitch_deg", "forward_m", "height_m")}
+    suite = {
+        "name": "recorded",
+        "scenes": ["closet"],
+        "rigs": {"it": {**stated, "calibration_error": {"right_roll_deg": 0.5}}},
+        "trajectories": {"legs": {"targets_m": [[0.3, 0.2]], "tolerance_m": 0.02, "slip": "none", "rate_hz": 10}},
+        "estimators": ["stand_still"],
+    }
+    (root / "recorded.yaml").write_text(json.dumps(suite))
+    run = run_suite(
+        read_plan(str(root / "recorded.yaml")),
+        {},
+        root=root / "runs",
+        store=root / "cache",
+        executor=Serial(),
+        finish=lambda *_: None,
+    )
+    return run.case("legs")

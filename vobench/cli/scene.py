@@ -1,27 +1,13 @@
 """Look a scene or a model over: vobench scene."""
 
-from collections.abc import Sequence
-from contextlib import closing
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from vobench.analysis.scene import SceneSurvey, sheet, strength, survey
-from vobench.asset import MODEL_SUFFIXES
+from vobench.analysis.scene_report import survey_scene
 from vobench.cli import terminal
 from vobench.errors import InputError
-from vobench.runner.key import cache_folder
-from vobench.runner.simulate import open_renderer
-from vobench.runner.task import bake_task, perform
-from vobench.scene.scene import Scene
-from vobench.sequence.picture import write_png
-from vobench.suite import catalog
-from vobench.suite.scene_build import build
-from vobench.suite.scene_file import read_scene
-from vobench.suite.scene_spec import ModelSpec
-from vobench.suite.suite import Rendering
 
 
 def scene_command(
@@ -33,49 +19,10 @@ def scene_command(
     """Say what is in a scene, where a body can drive, and what is doubtful in its models."""
     if out and (out.suffix != ".png" or out.is_dir() or not out.parent.is_dir()):
         raise InputError(f"--out should be a .png in a folder that exists, got {out}")
-    path = catalog.find("scene", scene).path
-    spec = read_scene(path)
-    built = build(spec, {})
-    found, notes = survey(built), _notes(spec.meshes)
+    report = survey_scene(scene)
     if out:
-        light = perform(bake_task(spec), cache_folder(), progress=terminal.Bars())
-        with closing(open_renderer(built, Rendering(), light)) as renderer:
-            write_png(out, sheet(built, found, renderer, spec.white_cd_m2, _lines(spec.name, built, found)))
+        report.save_picture(out, progress=terminal.Bars())
     if json:
-        terminal.print_json({**asdict(found), "notes": notes, "white_cd_m2": spec.white_cd_m2})
-        return
-    print("\n".join([*_lines(spec.name, built, found), *notes]))
-
-
-def _notes(models: Sequence[ModelSpec]) -> list[str]:
-    """What reading the models changed or doubted."""
-    from vobench.asset.model import read_model
-
-    notes = []
-    for spec in models:
-        path = Path(spec.file)
-        if path.suffix.lower() in MODEL_SUFFIXES:
-            model = read_model(path, scale=spec.scale, roles=spec.roles, up=spec.up)
-            notes += [f"{path.name}: {note}" for note in model.notes]
-            if model.dropped:
-                notes.append(f"{path.name}: {model.dropped} faces without area were dropped")
-    return notes
-
-
-def _lines(name: str, scene: Scene, found: SceneSurvey) -> list[str]:
-    size = " x ".join(f"{high - low:.2f}" for low, high in zip(found.low_m, found.high_m, strict=True))
-    free = found.free
-    circle = (
-        f"{free.radius_m:.1f} m around ({free.x_m:.1f}, {free.y_m:.1f}), floor at {free.floor_m:.2f} m"
-        if free
-        else "none"
-    )
-    return [
-        f"{name}: {found.things} things, {found.faces:,} faces, {found.materials} materials",
-        f"size: {size} m",
-        f"textures: {found.textures_mb:.0f} MB",
-        f"open edges: {found.open_edges:,}; faces on a face: {found.twins:,}",
-        f"backs seen: {found.backs:.1%}",
-        f"free circle: {circle}",
-        *(f"light: {light}, {strength(scene, light)}" for light in found.lights),
-    ]
+        terminal.print_json(report.as_dict())
+    else:
+        print("\n".join([*report.lines(), *report.notes]))

@@ -1,0 +1,173 @@
+"""A twin repeats the path of a recording, and orders of estimators that are known are compared rightly."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vobench.analysis import recording_twin, twin
+from vobench.analysis.realism import Realism
+from vobench.analysis.realism_report import realism_of
+from vobench.analysis.recording_twin import REAL, TWIN, TwinSuite, compare_twin, write_twin_suite
+from vobench.analysis.twin import Placement
+from vobench.dataset.recording import Recording
+from vobench.errors import InputError, UnknownNameError
+from vobench.geometry import se3
+from vobench.runner.folder import RunFolder, read_tum
+from vobench.runner.frames import GROUND_TRUTH
+from vobench.runner.recording import read_recording
+from vobench.suite.suite import read_plan
+from vobench.trajectory.formats import format_tum, parse_tum
+from vobench.trajectory.trajectory import Trajectory
+
+
+@pytest.fixture(scope="module")
+def recording(recorded_case: Path) -> Recording:
+    return read_recording(recorded_case)
+
+
+@pytest.fixture(scope="module")
+def realism(recording: Recording) -> Realism:
+    return realism_of(recording)
+
+
+@pytest.fixture
+def suite(recorded_case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> TwinSuite:
+    """The suite of a twin in the closet that was recorded, placed and fitted in few steps."""
+    for name, value in (("DRAWS", 600), ("NEAR_DRAWS", 100), ("ROUNDS", 1), ("HALVINGS", 2)):
+        monkeypatch.setattr(twin, name, value)
+    monkeypatch.setattr(recording_twin, "FITTED_PICTURES", 2)
+    monkeypatch.setenv("VOBENCH_CACHE", str(tmp_path / "cache"))
+    closet = next(recorded_case.resolve().parents[4].glob("closet.yaml"))
+    return write_twin_suite(
+        recorded_case, out=tmp_path / "twin", place=str(closet), estimators=["stereo_pnp", "mono_vo", "stand_still"]
+    )
+
+
+def test_the_suite_has_the_recording_and_its_repetition(suite: TwinSuite, recording: Recording) -> None:
+    plan = read_plan(str(suite.file))
+    assert [case.name for case in plan.cases] == [TWIN, REAL]
+    assert [entrant.label for entrant in plan.entrants] == ["stereo_pnp", "mono_vo", "stand_still"]
+    (case,) = plan.simulated
+    left, recorded = case.build_rig().left, recording.rig.left
+    assert (left.width_px, left.height_px) == (recorded.width_px, recorded.height_px)
+    assert case.rig.calibration_error.right_roll_deg == pytest.approx(0.5, abs=0.1)
+    assert case.camera.exposure_gain > 0
+    assert case.trajectory.rate_hz == pytest.approx(10)
+
+
+def test_the_path_of_the_twin_is_that_of_the_recording_moved_as_a_whole(suite: TwinSuite, recording: Recording) -> None:
+    path = parse_tum((suite.file.parent / "path.tum").read_text(), name="path")
+    (case,) = read_plan(str(suite.file)).simulated
+    assert recording.truth is not None
+    T_place_left = path.T_world_frame @ case.build_rig().T_body_left
+    T_world_left = recording.truth.T_world_frame @ recording.rig.T_body_left
+    moved, true = (se3.inverse(T[:-1]) @ T[1:] for T in (T_place_left, T_world_left))
+    np.testing.assert_allclose(moved[:, :3, 3], true[:, :3, 3], atol=1e-6)
+    turns, true_turns = (se3.rotation_angle(T[:, :3, :3]) for T in (moved, true))
+    np.testing.assert_allclose(turns, true_turns, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"truth": None}, "repeats a path, and this recording has none"),
+        ({"still": True}, "this recording stands still"),
+        ({"short": True}, "takes 12 pictures or more with a truth, and this recording has 5"),
+    ],
+)
+def test_a_recording_that_cannot_be_repeated_is_a_sentence(recording, realism, change, sentence) -> None:
+    truth = recording.truth
+    if "truth" in change:
+        truth = None
+    if "still" in change:
+        truth = Trajectory(truth.t_ns, np.repeat(truth.T_world_frame[:1], len(truth), axis=0))
+    if "short" in change:
+        truth = Trajectory(truth.t_ns[:5], truth.T_world_frame[:5])
+    with pytest.raises(InputError, match=sentence):
+        recording_twin._recorded_path(replace(recording, truth=truth), realism)
+
+
+def test_a_recording_without_a_pair_is_a_sentence(recording: Recording, realism: Realism) -> None:
+    with pytest.raises(InputError, match="none that can be rectified and matched"):
+        recording_twin._recorded_path(recording, replace(realism, pair=None))
+
+
+def test_what_is_asked_is_checked_before_the_recording_is_read(tmp_path: Path) -> None:
+    nowhere = tmp_path / "nowhere"
+    with pytest.raises(InputError, match="3 estimators or more, and -e names 2"):
+        write_twin_suite(nowhere, out=tmp_path / "new", estimators=["a", "b"])
+    with pytest.raises(UnknownNameError, match="no scene named 'offise'"):
+        write_twin_suite(nowhere, out=tmp_path / "new", place="offise")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "file").touch()
+    with pytest.raises(InputError):
+        write_twin_suite(nowhere, out=tmp_path / "full")
+
+
+# Standard deviations in m a step of estimators' positions.
+NOISE_M = {"good": 0.001, "fair": 0.01, "bad": 0.05}
+
+
+def lay_out(root: Path, recorded_case: Path, noise_m: dict[str, dict[str, float]]) -> RunFolder:
+    """A run whose two cases are the same recording, with estimates of known noise."""
+    folder = RunFolder(root / "run")
+    template = json.loads(next(recorded_case.glob("estimates/*/0/score.json")).read_text())
+    truth = read_tum(recorded_case / GROUND_TRUTH)
+    for case, estimators in noise_m.items():
+        folder.case(case).mkdir(parents=True)
+        (folder.case(case) / "sequence").symlink_to((recorded_case / "sequence").resolve())
+        (folder.case(case) / GROUND_TRUTH).write_text(format_tum(truth))
+        for seed, (name, sigma_m) in enumerate(estimators.items()):
+            place = folder.estimate(case, name, 0)
+            place.mkdir(parents=True)
+            T = truth.T_world_frame.copy()
+            T[:, :3, 3] += np.random.default_rng(seed).normal(0, sigma_m, (len(T), 3))
+            (place / "estimate.tum").write_text(format_tum(Trajectory(truth.t_ns, T)))
+            (place / "score.json").write_text(json.dumps({**template, "case": case, "estimator": name}))
+    return folder
+
+
+@pytest.fixture
+def known(recorded_case: Path, realism: Realism, tmp_path: Path):
+    """Compares a recording with itself as its twin, with these noises of estimators on both."""
+
+    def compare(real, twin):
+        source = {"path": str((recorded_case / "sequence").resolve()), "name": REAL}
+        (tmp_path / "twin.yaml").write_text(
+            json.dumps({"name": "twin", "source": [source], "estimators": ["stand_still"]})
+        )
+        suite = TwinSuite(tmp_path / "twin.yaml", Placement(np.eye(4), 1.4, 0.1, 1), realism)
+        return compare_twin(suite, run_plan=lambda plan, /: lay_out(tmp_path, recorded_case, {REAL: real, TWIN: twin}))
+
+    return compare
+
+
+def test_a_recording_agrees_with_itself_in_order_errors_and_pictures(known, tmp_path: Path) -> None:
+    report = known(NOISE_M, NOISE_M)
+    facts = report.as_dict()
+    assert facts["tau"] == 1
+    assert [row["estimator"] for row in report.rows()] == ["good", "fair", "bad"]
+    assert all(row[REAL] == row[TWIN] for row in report.rows())
+    assert {row["is"] for row in facts["statistics"]} == {"in"}
+    assert all(real == twin for real, twin in facts["also"].values())
+    assert facts["place"] == {"scale": 1.4, "misfit": 0.1}
+    assert json.loads((tmp_path / "twin.json").read_text()) == json.loads(json.dumps(facts))
+
+
+def test_the_opposite_order_is_a_tau_of_minus_one_and_the_table_shows_both_sides(known) -> None:
+    opposite = dict(zip(NOISE_M, reversed(NOISE_M.values()), strict=True))
+    report = known(NOISE_M, opposite)
+    assert report.as_dict()["tau"] == -1
+    frame = report.to_frame().set_index("estimator")
+    assert frame["real_mean"].is_monotonic_increasing
+    assert frame["twin_mean"].is_monotonic_decreasing
+    assert (frame["real_p10"] < frame["real_p90"]).all()
+
+
+def test_two_estimators_are_no_order(known) -> None:
+    two = {name: NOISE_M[name] for name in ("good", "bad")}
+    with pytest.raises(InputError, match="an order needs 3 estimators"):
+        known(two, two)

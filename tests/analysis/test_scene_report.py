@@ -1,0 +1,46 @@
+"""A scene by its name or file, in lines, as a dictionary, and as a picture."""
+
+from pathlib import Path
+
+import cv2
+import pytest
+
+from tests.cli.conftest import CLOSET, make_cheap
+from vobench.analysis.scene_report import SceneReport, survey_scene
+from vobench.errors import UnknownNameError
+
+
+@pytest.fixture
+def closet(tmp_path: Path) -> SceneReport:
+    (tmp_path / "closet.yaml").write_text(CLOSET)
+    return survey_scene(str(tmp_path / "closet.yaml"))
+
+
+def test_the_lines_say_what_the_dictionary_says(closet: SceneReport) -> None:
+    facts, lines = closet.as_dict(), closet.lines()
+    assert lines[0] == f"closet: {facts['things']} things, {facts['faces']} faces, {facts['materials']} materials"
+    assert lines[1] == "size: 2.02 x 2.02 x 1.52 m"  # the walls are 1 cm thick
+    assert lines[-1] == "light: lamp, 600 lm"
+    assert facts["white_cd_m2"] == 50
+    assert facts["free"]["floor_m"] == 0
+    assert "floor at 0.00 m" in lines[5]
+
+
+def test_the_picture_is_a_plan_and_four_views(closet: SceneReport, tmp_path: Path, monkeypatch) -> None:
+    make_cheap(monkeypatch)
+    monkeypatch.setenv("VOBENCH_CACHE", str(tmp_path / "cache"))
+    closet.save_picture(tmp_path / "look.png")
+    assert cv2.imread(str(tmp_path / "look.png")).shape == (640, 1440, 3)
+
+
+def test_faces_without_area_in_a_model_are_told_of(tmp_path: Path) -> None:
+    vertices = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n"
+    (tmp_path / "table.obj").write_text(f"{vertices}f 1 2 3\nf 1 3 4\nf 1 2 5\nf 2 2 5\n")
+    report = survey_scene(str(tmp_path / "table.obj"))
+    assert "table.obj: 1 faces without area were dropped" in report.notes
+    assert report.as_dict()["faces"] == 3
+
+
+def test_a_misspelt_name_gets_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="Did you mean 'office'"):
+        survey_scene("offise")

@@ -1,0 +1,90 @@
+"""What a scene or a model holds, as sentences, as a table, and as a picture of a plan and four views."""
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from vobench.analysis.scene import SceneSurvey, sheet, strength, survey
+from vobench.asset import MODEL_SUFFIXES
+from vobench.runner.key import cache_folder
+from vobench.runner.simulate import open_renderer
+from vobench.runner.store import SILENT, Progress
+from vobench.runner.task import bake_task, perform
+from vobench.scene.scene import Scene
+from vobench.sequence.picture import write_png
+from vobench.suite import catalog
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import read_scene
+from vobench.suite.scene_spec import ModelSpec, SceneFile
+from vobench.suite.suite import Rendering
+
+
+@dataclass(frozen=True, slots=True)
+class SceneReport:
+    """A scene looked over: its file, the scene built from it, what was found, and what is doubtful in its models."""
+
+    spec: SceneFile
+    scene: Scene
+    found: SceneSurvey
+    notes: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """What is in the scene, a line each, without the notes."""
+        found = self.found
+        sides_m = [high - low for low, high in zip(found.low_m, found.high_m, strict=True)]
+        size = " x ".join(f"{side_m:.2f}" for side_m in sides_m)
+        lines = [
+            f"{self.spec.name}: {found.things} things, {found.faces:,} faces, {found.materials} materials",
+            f"size: {size} m",
+            f"textures: {found.textures_mb:.0f} MB",
+            f"open edges: {found.open_edges:,}; faces on a face: {found.twins:,}",
+            f"backs seen: {found.backs:.1%}",
+            f"free circle: {self._free_circle()}",
+        ]
+        lines += [f"light: {light}, {strength(self.scene, light)}" for light in found.lights]
+        return lines
+
+    def _free_circle(self) -> str:
+        free = self.found.free
+        if free is None:
+            return "none"
+        return f"{free.radius_m:.1f} m around ({free.x_m:.1f}, {free.y_m:.1f}), floor at {free.floor_m:.2f} m"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON values, as `vobench scene --json` prints them."""
+        return {**asdict(self.found), "notes": list(self.notes), "white_cd_m2": self.spec.white_cd_m2}
+
+    def save_picture(self, path: Path, *, progress: Progress = SILENT) -> None:
+        """Draw a plan, these lines and four views to a PNG; the light is computed unless it is in the cache."""
+        light = perform(bake_task(self.spec), cache_folder(), progress=progress)
+        with closing(open_renderer(self.scene, Rendering(), light)) as renderer:
+            picture = sheet(self.scene, self.found, renderer, self.spec.white_cd_m2, self.lines())
+        write_png(path, picture)
+
+
+def survey_scene(scene: str) -> SceneReport:
+    """Look a scene over, by its name or by the path of its file or model; no light is computed.
+
+    Raises UnknownNameError where there is no such scene, and SuiteError or ModelError where its files are wrong.
+    """
+    spec = read_scene(catalog.find("scene", scene).path)
+    built = build(spec, {})
+    return SceneReport(spec, built, survey(built), tuple(_notes(spec.meshes)))
+
+
+def _notes(models: Sequence[ModelSpec]) -> list[str]:
+    """What reading the models changed or doubted."""
+    from vobench.asset.model import read_model
+
+    notes = []
+    for spec in models:
+        path = Path(spec.file)
+        if path.suffix.lower() not in MODEL_SUFFIXES:
+            continue
+        model = read_model(path, scale=spec.scale, roles=spec.roles, up=spec.up)
+        notes += [f"{path.name}: {note}" for note in model.notes]
+        if model.dropped:
+            notes.append(f"{path.name}: {model.dropped} faces without area were dropped")
+    return notes
