@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 from math import inf, nan, nextafter
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 import pytest
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic import ValidationError
+from typing_extensions import TypeAliasType
 
 from vobench.errors import InputError, SettingError
 from vobench.setting import ByKind, Like, Matching, Name, OneOf, hints, settings, unit_of
@@ -184,3 +185,21 @@ def test_a_section_without_a_kind_is_of_the_default_one():
 )  # fmt: skip
 def test_a_name_says_its_unit(name, unit):
     assert unit_of(name) == unit
+
+
+Number = TypeVar("Number", bound=np.generic)
+Numbers = TypeAliasType("Numbers", np.ndarray[Any, np.dtype[Number]], type_params=(Number,))
+
+
+@settings()
+class Table:
+    """An array's hint is the alias of a type, as NDArray is from NumPy 2.5 on."""
+
+    values: Numbers[np.float64]
+
+
+def test_the_alias_of_a_type_is_the_type_that_it_stands_for():
+    values = np.arange(3.0)
+    assert Table(values=values).values is values
+    with pytest.raises(SettingError):
+        Table(values=[0.0, 1.0])

@@ -288,7 +288,7 @@ def _held(value: Any, hint: Any) -> Any:
         return {_held(key, args[0]): _at(key, entry, args[1]) for key, entry in value.items()}
     if origin is Literal and value not in args:
         raise _wrong("literal_error", value, expected=" or ".join([", ".join(map(repr, args[:-1])), repr(args[-1])]))
-    return value if origin is Literal or hint is Any else _held_plain(value, origin or hint)
+    return value if origin is Literal or hint is Any else _held_plain(value, _plain_type(hint))
 
 
 def _held_entries(entries: tuple[Any, ...], args: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -320,8 +320,14 @@ def _held_plain(value: Any, kind: Any) -> Any:
     return kind(value) if kind in (float, int) else value
 
 
-def _is_type(value: Any, hint: Any) -> bool:
+def _plain_type(hint: Any) -> Any:
+    """The type that a hint stands for; NDArray is one from NumPy 2.5 on only by its alias's value."""
     kind = get_origin(hint) or hint
+    return _plain_type(kind.__value__) if hasattr(kind, "__value__") else kind
+
+
+def _is_type(value: Any, hint: Any) -> bool:
+    kind = _plain_type(hint)
     if kind is Annotated:
         return _is_type(value, get_args(hint)[0])
     if kind is Literal:
