@@ -1,4 +1,4 @@
-"""What pictures cost: vobench and stock pyrender on the same scenes, with mirrors, lenses, strips and blur, in one run.
+"""What pictures cost: the engines raster and pyrender on the same scenes, with mirrors, lenses, strips and blur.
 
     python benchmarks/render.py [--views 12] [--fine]
 
@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -24,12 +23,10 @@ from vobench.geometry.camera import KannalaBrandt
 from vobench.geometry.rig import LENSES, Rig, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakeSettings, bake
+from vobench.rendering.pyrender_engine import PyrenderRenderer
 from vobench.rendering.raster import RasterRenderer
-from vobench.rendering.renderer import View, still
-from vobench.rendering.view import NEAR_M, T_CV_GL
-from vobench.scene.light import AreaLight
-from vobench.scene.material import Map, reflectance
-from vobench.scene.mesh import joined
+from vobench.rendering.renderer import Renderer, View, still
+from vobench.scene.material import Map
 from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose
 from vobench.sequence import SequenceWriter
@@ -39,11 +36,11 @@ from vobench.suite.scene_file import read_scene
 
 VIEWS = {"down": 90.0, "ahead": 15.0}
 NS_PER_FRAME = 100_000_000
-FAR_M = 60.0  # of stock pyrender's camera
 # What is drawn does not depend on how finely light was sampled.
 QUICK = BakeSettings(spacing_m=0.05, light_rays=4, indirect_spacing_m=0.2, indirect_rays=16)
 FISHEYE = KannalaBrandt(720, 480, 290.0, 290.0, 359.5, 239.5, 0.0, 0.0, 0.0, 0.0)
-Shoot = Callable[[RasterRenderer, Rig, Array], object]
+STOCK = ": engine pyrender"
+Shoot = Callable[[Renderer, Rig, Array], object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,13 +89,13 @@ class Recorder:
         self._frames += 1
 
 
-def pair(renderer: RasterRenderer, rig: Rig, T_world_body: Array) -> list[Map]:
+def pair(renderer: Renderer, rig: Rig, T_world_body: Array) -> list[Map]:
     """Both eyes' pictures, each at one instant."""
     eyes = ((rig.left, T_world_body @ rig.T_body_left), (rig.right, T_world_body @ rig.T_body_right))
     return [renderer.radiance(camera, still(camera, T)) for camera, T in eyes]
 
 
-def blurred(renderer: RasterRenderer, rig: Rig, T_world_body: Array) -> None:
+def blurred(renderer: Renderer, rig: Rig, T_world_body: Array) -> None:
     """Both eyes, eight sub-frames each."""
     way = T_world_body @ se3.transform(np.eye(3), np.linspace([0, 0, 0], [0.01, 0, 0], 8))
     now = np.zeros(8, np.int64)
@@ -106,7 +103,7 @@ def blurred(renderer: RasterRenderer, rig: Rig, T_world_body: Array) -> None:
         renderer.radiance(rig.left, [View(slice(0, rig.left.height_px), way @ T_body_camera, now, now)])
 
 
-def rolled(renderer: RasterRenderer, rig: Rig, T_world_body: Array) -> None:
+def rolled(renderer: Renderer, rig: Rig, T_world_body: Array) -> None:
     """Both eyes, sixty strips each."""
     edges = np.linspace(0, rig.left.height_px, 61).astype(int).tolist()
     now = np.zeros(1, np.int64)
@@ -161,87 +158,21 @@ def _recorded(name: str, renderer: RasterRenderer, white_cd_m2: float, poses: li
             yield f"{name} + chip + PNG + MCAP", view, measure(recorder.record, poses)
 
 
-def stock(name: str, shown: Scene, white_cd_m2: float, poses: list[Array]) -> Iterator[Row]:
-    """Costs of pyrender as it comes: 8 bits, four samples a pixel, two shadow-mapped spots, and none."""
-    # pyrender 0.1.45 still says infty, which NumPy 2 has no more.
-    setattr(np, "infty", np.inf)  # noqa: B010
-    import pyrender
-
-    scene, camera = _stock_scene(shown, white_cd_m2)
-    lens = LENSES["paper_literal"]
-    renderer = pyrender.OffscreenRenderer(lens.width_px, lens.height_px)
-    for suffix, flags in (
-        ("two shadows", pyrender.RenderFlags.SHADOWS_SPOT),
-        ("no shadows", pyrender.RenderFlags.NONE),
-    ):
-        for view, rig in _rigs():
-
-            def draw(T_world_body: Array, rig: Rig = rig, flags: int = flags) -> None:
-                for T_body_camera in (rig.T_body_left, rig.T_body_right):
-                    scene.set_pose(camera, T_world_body @ T_body_camera @ T_CV_GL)
-                    renderer.render(scene, flags)
-
-            yield f"{name}: stock pyrender, {suffix}", view, measure(draw, poses)
-    renderer.delete()
-
-
-def _stock_scene(shown: Scene, white_cd_m2: float) -> tuple[Any, Any]:
-    """The same faces and textures in pyrender's own materials under the two strongest lamps, and its camera's node."""
-    import pyrender
-
-    scene = pyrender.Scene(ambient_light=[0.1, 0.1, 0.1])
-    bodies = {name: material for name, material in shown.materials.items() if material.kind == "body"}
-    materials = {name: _stock_material(reflectance(material)) for name, material in bodies.items()}
-    for material, look in materials.items():
-        mesh = joined([thing.mesh for thing in shown.things if thing.material == material])
-        if not len(mesh.faces):
-            continue
-        primitive = pyrender.Primitive(
-            positions=mesh.vertices_m,
-            normals=mesh.normals,
-            texcoord_0=mesh.uv / bodies[material].tile_m,
-            indices=mesh.faces,
-            material=look,
-            mode=4,
-        )
-        scene.add(pyrender.Mesh([primitive]))
-    for lamp in sorted(shown.panels, key=lambda lamp: -lamp.power_lm)[:2]:
-        scene.add(_stock_lamp(lamp, white_cd_m2), pose=se3.transform(np.eye(3), lamp.mesh.vertices_m.mean(0)))
-    lens = LENSES["paper_literal"]
-    camera = pyrender.IntrinsicsCamera(lens.fx_px, lens.fy_px, lens.cx_px + 0.5, lens.cy_px + 0.5, NEAR_M, FAR_M)
-    return scene, scene.add(camera)
-
-
-def _stock_material(tile: Map) -> Any:
-    import pyrender
-
-    source = np.rint(255 * np.broadcast_to(tile.reshape(*tile.shape[:2], -1), (*tile.shape[:2], 3))).astype(np.uint8)
-    texture = pyrender.Texture(source=source, source_channels="RGB")
-    # Floats: pyrender reads the integer 1 as 1/255.
-    return pyrender.MetallicRoughnessMaterial(
-        baseColorTexture=texture, baseColorFactor=[1.0, 1.0, 1.0, 1.0], metallicFactor=0.0, roughnessFactor=1.0
-    )
-
-
-def _stock_lamp(lamp: AreaLight, white_cd_m2: float) -> Any:
-    """A spot as bright as the lamp, in a unit that puts white at 1, as pyrender clips there."""
-    import pyrender
-
-    return pyrender.SpotLight(
-        color=np.ones(3),
-        intensity=lamp.power_lm / np.pi / white_cd_m2,
-        innerConeAngle=np.pi / 4,
-        outerConeAngle=np.pi / 2.2,
-    )
+def stock_rows(name: str, scene: Scene, white_cd_m2: float, poses: list[Array]) -> Iterator[Row]:
+    """Costs of the engine pyrender: the stock renderer, 8 bits, four samples a pixel, shadow maps of four spots."""
+    renderer = PyrenderRenderer(scene, white_cd_m2=white_cd_m2)
+    for view, rig in _rigs():
+        yield f"{name}{STOCK}", view, measure(partial(pair, renderer, rig), poses)
+    renderer.close()
 
 
 def table(rows: list[Row]) -> str:
-    """All costs, and how many times stock pyrender with two shadows in the same place is as dear, by CPU time."""
-    reference = {(name, view): cost.cpu_ms for name, view, cost in rows if name.endswith("two shadows")}
+    """All costs, and the CPU time of the engine pyrender in the same place over each."""
+    reference = {(name, view): cost.cpu_ms for name, view, cost in rows if name.endswith(STOCK)}
     lines = [f"{'per stereo pair':48}{'view':8}{'wall ms':>10}{'CPU ms':>10}{'CPU ratio':>11}"]
     for name, view, cost in rows:
         place = name.split(",")[0].split(":")[0].split(" ")[0]
-        ratio = reference[f"{place}: stock pyrender, two shadows", view] / cost.cpu_ms
+        ratio = reference[f"{place}{STOCK}", view] / cost.cpu_ms
         lines.append(f"{name:48}{view:8}{cost.wall_ms:10.1f}{cost.cpu_ms:10.1f}{ratio:10.1f}x")
     return "\n".join(lines)
 
@@ -261,15 +192,9 @@ def main() -> None:
         for name, draw in (("room", room_rows), ("office", office_rows))
         for row in draw(scenes[name], settings, specs[name].white_cd_m2, poses)
     ]
-    # Stock pyrender comes last: when it ends, it takes the process's EGL display with it.
-    print(
-        table(
-            [
-                *rows,
-                *(row for name, scene in scenes.items() for row in stock(name, scene, specs[name].white_cd_m2, poses)),
-            ]
-        )
-    )
+    for name, scene in scenes.items():
+        rows += stock_rows(name, scene, specs[name].white_cd_m2, poses)
+    print(table(rows))
 
 
 if __name__ == "__main__":

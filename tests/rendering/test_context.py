@@ -105,7 +105,16 @@ def test_missing_libraries_are_named_with_the_line_that_installs_them(monkeypatc
 
 
 def test_only_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ctypes.util, "find_library", lambda name: None if name == "EGL" else f"lib{name}.so.1")
+    find = ctypes.util.find_library
+    monkeypatch.setattr(ctypes.util, "find_library", lambda name: None if name == "EGL" else find(name))
+    assert context.missing_libraries() == ["EGL"]
+
+
+def test_a_library_that_is_no_library_is_missing_too(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
+    torn = tmp_path / "libEGL.so.1"
+    torn.write_bytes(b"")
+    find = ctypes.util.find_library
+    monkeypatch.setattr(ctypes.util, "find_library", lambda name: str(torn) if name == "EGL" else find(name))
     assert context.missing_libraries() == ["EGL"]
 
 

@@ -176,7 +176,19 @@ def _reason(error: Exception) -> str:
 
 def missing_libraries() -> list[str]:
     """Names of the system libraries that drawing needs and this machine lacks."""
-    return [name for name in ("EGL", "GL", "OpenGL") if ctypes.util.find_library(name) is None]
+    return [name for name in ("EGL", "GL", "OpenGL") if not _loads(name)]
+
+
+def _loads(library: str) -> bool:
+    """Whether a system library is there, and one that this process can load."""
+    file = ctypes.util.find_library(library)
+    if file is None:
+        return False
+    try:
+        ctypes.CDLL(file)
+    except OSError:
+        return False
+    return True
 
 
 def _require_pyopengl() -> None:

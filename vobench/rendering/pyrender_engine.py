@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vobench.errors import MissingDependencyError
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
@@ -67,8 +68,13 @@ class PyrenderRenderer:
     """
 
     def __init__(self, scene: Scene, *, white_cd_m2: float) -> None:
-        require_pyrender()
+        # First, for a machine that cannot draw is no fault of pyrender's.
         self._context = create_context()
+        try:
+            require_pyrender()
+        except MissingDependencyError:
+            self._context.release()
+            raise
         import pyrender
 
         self._lights = scene.lights

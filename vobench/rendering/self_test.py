@@ -93,6 +93,8 @@ def main() -> None:
         found = asdict(check_drawing())
     except VobenchError as error:
         found = {"error": str(error)}
+    except Exception as error:  # a driver may fail with anything
+        found = {"error": f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"}
     json.dump(found, sys.stdout)
 
 
