@@ -75,9 +75,11 @@ def run_command(
     memory: Annotated[int | None, typer.Option(min=1, help="MiB that an estimator's processes may hold.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Make everything anew, whatever the cache holds.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
+    trust: terminal.Trust = False,
     json: terminal.Json = False,
 ) -> None:
     """Run a suite: simulate, estimate, score, and print the leaderboard."""
+    del trust  # done by its callback
     from vobench.report.threshold import parse_threshold
 
     given = [*(changes or ()), *([f"repeats={repeats}"] if repeats else [])]
@@ -162,8 +164,9 @@ def _assigned(changes: Sequence[str]) -> dict[str, str]:
     return dict(change.split("=", 1) for change in changes)
 
 
-def check_command(suite: terminal.SuiteName, *, json: terminal.Json = False) -> None:
+def check_command(suite: terminal.SuiteName, *, trust: terminal.Trust = False, json: terminal.Json = False) -> None:
     """Validate a suite and print its plan; nothing is rendered."""
+    del trust  # done by its callback
     _check(read_plan(suite), as_json=json)
 
 
