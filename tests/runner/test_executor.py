@@ -178,11 +178,28 @@ def test_what_a_fault_of_a_library_ended_is_made_once_more(bench, tmp_path, monk
     monkeypatch.setattr(executor, "submit", once)
     folder = run(bench, tmp_path, executor, heard=heard.append)
     assert {score.status for score in folder.scores()} == {"ok"}
-    told = {event.told for event in heard if event.what == "told"}
+    told = {event.task.key: event.told for event in heard if event.what == "told"}
     assert hit
-    assert told >= {
-        f"{key}: its process ended with signal SIGABRT, by a fault in a library; it is made once more" for key in hit
-    }
+    for key in hit:
+        assert told[key].startswith(f"{key}: its process ended with signal SIGABRT")
+        assert told[key].endswith(", by a fault in a library; it is made once more")
+
+
+@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGABRT])
+def test_the_stack_of_what_a_fault_ended_is_kept_with_the_task(bench, tmp_path, monkeypatch, number):
+    """In a worker that waits for a lock, so that its stack is known."""
+    executor, one = LocalProcesses(1), next(each for each in plan(bench.plan(), {}) if each.stage == "score")
+    told = SimpleQueue()
+    with locked(tmp_path / "state" / "locks" / one.key.replace("/", "-")):
+        future = executor.submit(one, tmp_path, 0, 1, told.put)
+        assert told.get(timeout=60).startswith("waiting for")
+        kill_all(executor, number)
+        done = future.result(timeout=60)
+    executor.close()
+    assert "in _awaited" in done.stack
+    kept = f"state/faults/{one.key.replace('/', '-')}.txt"
+    assert done.reason == f"its process ended with signal {number.name} (its stack: {kept} in the cache)"
+    assert done.stack in (tmp_path / kept).read_text()
 
 
 def test_what_a_task_raises_in_this_process_is_a_row_too(bench, tmp_path, monkeypatch):

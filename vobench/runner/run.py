@@ -133,7 +133,7 @@ def _write_failed(task: Task, failure: Done, folder: RunFolder) -> TrialScore:
     target.mkdir(parents=True)
     write_json(target / SCORE, score.model_dump(mode="json"))
     (target / ESTIMATE).touch()
-    (target / LOG).write_text(f"{failure.reason}\n", encoding="utf-8")
+    (target / LOG).write_text(f"{failure.reason}\n{failure.stack}", encoding="utf-8")
     with new_table(target / FRAMES, COLUMNS), new_table(target / TIMES, TIME_COLUMNS), ZipFile(target / TRACKS, "w"):
         return score
 
