@@ -62,8 +62,8 @@ def admit(maker: Path, source: bytes, scene: str) -> None:
     if not is_ours and not trusted.is_file():
         if not in_force.trusts_new:
             raise SuiteError(
-                "is a program that would run with all your rights, from outside the working folder; read it, then add "
-                f"--trust, once for each version of it: {maker}"
+                "is a program that would run with all your rights, from outside the working folder; read it, then run "
+                f"check, run, scene, render or drive with --trust, once for each version of it: {maker}"
             )
         with suppress(OSError):  # without a cache it is asked again
             trusted.parent.mkdir(parents=True, exist_ok=True)

@@ -4,6 +4,7 @@ import os
 import signal
 import socket
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from queue import SimpleQueue
@@ -269,6 +270,37 @@ def test_the_workers_of_a_dask_scheduler_write_the_same_bytes(bench, first, tmp_
 @pytest.mark.filterwarnings("ignore")
 def test_a_worker_of_dask_says_at_once_for_whom_it_waits(tmp_path, dask):
     assert patience_s(Dask(dask.scheduler_address), tmp_path) < 10
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_what_a_worker_of_dask_started_for_a_client_ends_when_the_client_is_gone(tmp_path, dask):
+    executor, one, told = Dask(dask.scheduler_address), task("pictures"), SimpleQueue()
+    with locked(tmp_path / "state" / "locks" / one.key.replace("/", "-")):
+        executor.submit(one, tmp_path, 0, 1, told.put)
+        told.get(timeout=60)
+        workers = [worker.pid for worker in dask.workers.values()]
+        assert started_by_vobench(workers)
+        executor.close()
+        until_s = time.monotonic() + 10
+        while started_by_vobench(workers) and time.monotonic() < until_s:
+            time.sleep(0.05)
+        assert started_by_vobench(workers) == []
+
+
+def started_by_vobench(ancestors: list[int]) -> list[str]:
+    """The command lines of living fork servers and workers below some processes."""
+    children = dict[int, list[int]]()
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, parent = path.read_text(errors="replace").rpartition(")")[2].split()[:2]
+            if state not in "ZX":
+                children.setdefault(int(parent), []).append(int(path.parent.name))
+    below, found = [pid for ancestor in ancestors for pid in children.get(ancestor, [])], []
+    for pid in below:  # which grows
+        below += children.get(pid, [])
+        with suppress(OSError):
+            found.append(Path(f"/proc/{pid}/cmdline").read_text(errors="replace"))
+    return [line for line in found if "fork_server" in line]
 
 
 def test_a_scheduler_that_is_not_there_is_a_sentence(monkeypatch):
