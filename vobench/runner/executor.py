@@ -210,7 +210,7 @@ class LocalProcesses:
             self._idle.popitem()[1].leave()
         was_killed = False
         for number in (signal.SIGTERM, signal.SIGKILL):
-            running = [process for process in list(self._running) if process.is_alive]
+            running = [process for process in list(self._running) if process.is_alive and not process.abandon()]
             for process in running:
                 process.kill(number)
                 was_killed = was_killed or number == signal.SIGKILL
