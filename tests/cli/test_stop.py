@@ -78,13 +78,13 @@ def left_behind(folder):
 
 
 PLACES = {
-    "run.motion": "body_motion",
-    "render.bake": "bake",
-    "render.raster.RasterRenderer": "radiance",
+    "runner.motion": "body_motion",
+    "rendering.bake": "bake",
+    "rendering.raster.RasterRenderer": "radiance",
     "estimator.process.EstimatorProcess": "process",
-    "run.score": "score_trial",
+    "runner.score": "score_trial",
     "report.page": "html",
-    "run.folder.RunFolder": "estimate",
+    "runner.folder.RunFolder": "estimate",
     "cli.report": "print_board",
 }
 
