@@ -5,6 +5,7 @@ Nothing is raised where a signal arrives: amid an import, a library would swallo
 
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -12,6 +13,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from subprocess import CompletedProcess, Popen
+
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 Undo = tuple[Callable[[], object], bool]  # what is called, and whether it ends something that we may be waiting for
 
@@ -92,17 +95,42 @@ def kill_session(process: "Popen[str] | Popen[bytes]") -> None:
         os.killpg(process.pid, signal.SIGKILL)
 
 
+def _dying_with_us() -> Callable[[], object]:
+    """What a new process calls, on Linux, to be killed when the thread that started it ends, and so when we do."""
+    if sys.platform != "linux":
+        return lambda: None
+    import ctypes
+
+    prctl, us = ctypes.CDLL(None).prctl, os.getpid()
+
+    def die_with_us() -> None:
+        prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        if os.getppid() != us:  # we were faster
+            os._exit(1)
+
+    return die_with_us
+
+
 def run(
     command: list[str], *, env: Mapping[str, str] | None = None, timeout_s: float | None = None
 ) -> "CompletedProcess[str]":
-    """Run a command, hidden from the terminal and its Ctrl-C, and take what it says.
+    """Run a command, hidden from the terminal and its Ctrl-C, and take what it says; on Linux it ends with us.
 
     Raises Stopped where we are, and TimeoutExpired.
     """
     from subprocess import DEVNULL, PIPE, CompletedProcess, Popen
 
     with (
-        Popen(command, env=env, text=True, stdin=DEVNULL, stdout=PIPE, stderr=PIPE, start_new_session=True) as process,
+        Popen(
+            command,
+            env=env,
+            text=True,
+            stdin=DEVNULL,
+            stdout=PIPE,
+            stderr=PIPE,
+            start_new_session=True,
+            preexec_fn=_dying_with_us(),  # noqa: PLW1509 - one system call, whose library is loaded before the fork
+        ) as process,
         undone(lambda: kill_session(process), is_awaited=True),
     ):
         out, err = process.communicate(timeout=timeout_s)

@@ -1,7 +1,10 @@
 """vobench scene says what is in a scene, and draws it."""
 
 import cv2
+import pytest
 import trimesh
+
+from vobench.suite import scene_build
 
 
 def test_it_says_what_is_there_and_what_is_free(vobench):
@@ -43,3 +46,34 @@ def test_a_hall_with_z_up_is_doubted_until_its_scene_says_so(vobench, here):
     assert "size: 8.00 x 7.66 x 2.50 m" in upright
     assert "floor at 0.00 m" in upright
     assert "side?" not in upright
+
+
+MAKER = """
+from pathlib import Path
+Path({ran!r}).touch()
+from vobench.asset.room import things
+def make(seed):
+    return (), {{}}
+"""
+
+
+@pytest.mark.parametrize("verb", ["check", "scene", "render", "drive", "run"])
+def test_a_strangers_maker_does_not_run_before_it_is_trusted(vobench, here, tmp_path_factory, verb):
+    strange = tmp_path_factory.mktemp("strange")
+    ran = strange / "ran"
+    (strange / "maker.py").write_text(MAKER.format(ran=str(ran)))
+    (strange / "theirs.yaml").write_text((here / "scenes" / "closet.yaml").read_text() + "maker: maker.py\n")
+    suite = (here / "suites" / "tiny.yaml").read_text().replace("[closet]", f"['{strange}/theirs.yaml']")
+    (here / "suites" / "theirs.yaml").write_text(suite)
+    asked = f"{strange}/theirs.yaml" if verb in ("scene", "render") else "theirs"
+    said = vobench(verb, asked)
+    assert said.code == (0 if verb == "drive" else 1)  # which goes on, and says what cameras cannot be checked
+    assert "--trust" in said.err + said.out
+    assert not ran.exists()
+    trusted = vobench(verb, asked, "--trust")
+    assert ran.exists()
+    assert trusted.err.count(f"runs the program {strange}/maker.py") == 1
+    ran.unlink()
+    scene_build._scenes.clear()  # what this process has built it does not build again
+    vobench(verb, asked)
+    assert ran.exists() or verb == "run"  # what is cached needs no maker

@@ -309,6 +309,21 @@ def test_killed_at_any_moment_with_two_jobs_nobody_lives_on_and_the_same_command
         assert list((here / "tmp").iterdir()) == []
 
 
+def test_a_command_that_vobench_runs_ends_with_it_when_it_is_killed(tmp_path):
+    pid_file = tmp_path / "pid"
+    code = f"from vobench import stop; stop.run(['sh', '-c', 'echo $$ > {pid_file}; exec sleep 3600'])"
+    process = subprocess.Popen([sys.executable, "-c", code])
+    while not read(pid_file).endswith("\n"):
+        assert process.poll() is None
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    stat, until_s = Path(f"/proc/{read(pid_file).strip()}/stat"), time.monotonic() + GONE_S
+    while read(stat).rpartition(")")[2].split()[:1] not in ([], ["Z"]):
+        assert time.monotonic() < until_s
+        time.sleep(0.01)
+
+
 def test_what_is_left_of_a_folder_that_was_being_filled_is_never_published(tmp_path):
     folder = tmp_path / "folder"
     folder.mkdir()

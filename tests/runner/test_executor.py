@@ -4,6 +4,7 @@ import os
 import signal
 import socket
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from queue import SimpleQueue
@@ -180,11 +181,28 @@ def test_what_a_fault_of_a_library_ended_is_made_once_more(bench, tmp_path, monk
     monkeypatch.setattr(executor, "submit", once)
     folder = run(bench, tmp_path, executor, heard=heard.append)
     assert [score.reason for score in folder.scores() if score.status != "ok"] == []
-    told = {event.told for event in heard if event.what == "told"}
+    told = {event.task.key: event.told for event in heard if event.what == "told"}
     assert hit
-    assert told >= {
-        f"{key}: its process ended with signal SIGABRT, by a fault in a library; it is made once more" for key in hit
-    }
+    for key in hit:
+        assert told[key].startswith(f"{key}: its process ended with signal SIGABRT")
+        assert told[key].endswith(", by a fault in a library; it is made once more")
+
+
+@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGABRT])
+def test_the_stack_of_what_a_fault_ended_is_kept_with_the_task(bench, tmp_path, monkeypatch, number):
+    """In a worker that waits for a lock, so that its stack is known."""
+    executor, one = LocalProcesses(1), next(each for each in plan(bench.plan(), {}) if each.stage == "score")
+    told = SimpleQueue()
+    with locked(tmp_path / "state" / "locks" / one.key.replace("/", "-")):
+        future = executor.submit(one, tmp_path, 0, 1, told.put)
+        assert told.get(timeout=60).startswith("waiting for")
+        kill_all(executor, number)
+        done = future.result(timeout=60)
+    executor.close()
+    assert "in _awaited" in done.stack
+    kept = f"state/faults/{one.key.replace('/', '-')}.txt"
+    assert done.reason == f"its process ended with signal {number.name} (its stack: {kept} in the cache)"
+    assert done.stack in (tmp_path / kept).read_text()
 
 
 def test_what_a_task_raises_in_this_process_is_a_row_too(bench, tmp_path, monkeypatch):
@@ -312,6 +330,37 @@ def test_the_workers_of_a_dask_scheduler_write_the_same_bytes(bench, first, tmp_
 @pytest.mark.filterwarnings("ignore")
 def test_a_worker_of_dask_says_at_once_for_whom_it_waits(tmp_path, dask):
     assert patience_s(Dask(dask.scheduler_address), tmp_path) < 10
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_what_a_worker_of_dask_started_for_a_client_ends_when_the_client_is_gone(tmp_path, dask):
+    executor, one, told = Dask(dask.scheduler_address), task("pictures"), SimpleQueue()
+    with locked(tmp_path / "state" / "locks" / one.key.replace("/", "-")):
+        executor.submit(one, tmp_path, 0, 1, told.put)
+        told.get(timeout=60)
+        workers = [worker.pid for worker in dask.workers.values()]
+        assert started_by_vobench(workers)
+        executor.close()
+        until_s = time.monotonic() + 10
+        while started_by_vobench(workers) and time.monotonic() < until_s:
+            time.sleep(0.05)
+        assert started_by_vobench(workers) == []
+
+
+def started_by_vobench(ancestors: list[int]) -> list[str]:
+    """The command lines of living fork servers and workers below some processes."""
+    children = dict[int, list[int]]()
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, parent = path.read_text(errors="replace").rpartition(")")[2].split()[:2]
+            if state not in "ZX":
+                children.setdefault(int(parent), []).append(int(path.parent.name))
+    below, found = [pid for ancestor in ancestors for pid in children.get(ancestor, [])], []
+    for pid in below:  # which grows
+        below += children.get(pid, [])
+        with suppress(OSError):
+            found.append(Path(f"/proc/{pid}/cmdline").read_text(errors="replace"))
+    return [line for line in found if "fork_server" in line]
 
 
 def test_a_scheduler_that_is_not_there_is_a_sentence(monkeypatch):

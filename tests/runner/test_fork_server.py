@@ -38,6 +38,7 @@ def hangs(connection, vobench_fd):
 def server(tmp_path, monkeypatch):
     """Makes a server whose workers are one of the functions above."""
     (tmp_path / "workers_of_tests.py").write_text(WORKERS)
+    (tmp_path / "slow_import_of_tests.py").write_text("import time\ntime.sleep(1)\n")
     monkeypatch.syspath_prepend(tmp_path)
     servers = []
 
@@ -127,6 +128,15 @@ def test_a_closed_server_ends_workers_that_do_not_listen(server):
     made.close()
     assert worker.join(END_S) is not None
     assert not is_alive(pid)
+    worker.close()
+
+
+def test_a_worker_that_has_yet_to_start_is_abandoned_and_ends_when_it_does(server):
+    worker = server("ends", "slow_import_of_tests").start_worker()
+    assert worker.abandon()
+    assert worker.is_alive
+    assert worker.join(END_S) == 1  # of an EOFError
+    assert not worker.abandon()
     worker.close()
 
 

@@ -14,7 +14,9 @@ import typer
 from typer.core import TyperGroup
 
 from vobench import stop
+from vobench.cli.terminal import warn
 from vobench.errors import SuiteError, VobenchError, printable
+from vobench.trust import gate
 
 # Where each verb is: module and function; its first sentence is the verb's summary. Others are installed as entry
 # points of the group below.
@@ -107,8 +109,9 @@ def run() -> None:
     for stream in filter(None, (sys.stdout, sys.stderr)):
         stream.reconfigure(errors="replace")  # a terminal without ° gets a ? for it
     try:
-        # Nobody remembers whether --debug goes before the command or after it.
-        app([word for word in sys.argv[1:] if word != DEBUG], prog_name=app.info.name)
+        with gate(warn, ours=_ours, folder=_trusted):
+            # Nobody remembers whether --debug goes before the command or after it.
+            app([word for word in sys.argv[1:] if word != DEBUG], prog_name=app.info.name)
     except SystemExit as end:
         if not isinstance(end.__context__, BrokenPipeError):
             raise
@@ -121,6 +124,20 @@ def run() -> None:
             sys.stdout.flush()
         except BrokenPipeError:
             _hang_up()
+
+
+def _ours() -> tuple[Path, ...]:
+    """Below which folders makers run unasked."""
+    from vobench.suite.catalog import builtin_root
+
+    return builtin_root(), Path.cwd()
+
+
+def _trusted() -> Path:
+    """Where the hashes of makers are kept that the user trusts."""
+    from vobench.runner.key import cache_folder
+
+    return cache_folder() / "state" / "trusted"
 
 
 def _hang_up() -> None:

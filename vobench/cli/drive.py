@@ -36,9 +36,11 @@ def drive_command(
     csv: Annotated[
         Path | None, typer.Option(help="The same with speeds, wheels, references and voltages, as CSV.")
     ] = None,
+    trust: terminal.Trust = False,
     json: terminal.Json = False,
 ) -> None:
     """Drive a suite's trajectories without rendering: a summary, and plots."""
+    del trust  # done by its callback
     plan = read_plan(suite)
     names = chosen_trajectories(plan, trajectory=trajectory)
     _check_files(out, [path for path in (tum, csv) if path], names)

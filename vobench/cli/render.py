@@ -53,9 +53,11 @@ def render_command(
     ] = "raster",
     samples: Annotated[int | None, typer.Option(help="Light paths a pixel, for --engine path alone.")] = None,
     truth: Annotated[bool, typer.Option("--truth", help="Write ground truth beside the picture.")] = False,
+    trust: terminal.Trust = False,
     json: terminal.Json = False,
 ) -> None:
     """Draw one picture of a scene, to look at and to debug scenes with."""
+    del trust  # done by its callback
     rendering, lens = _rendering(engine, samples), PRESETS[terminal.known("camera", camera, PRESETS)].left
     chip = CameraSettings(chip=CAMERAS[terminal.known("camera sensor", sensor, CAMERAS)], exposure_gain=gain)
     T_world_camera, t_ns = _pose(at, yaw, pitch, time)

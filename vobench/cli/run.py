@@ -72,9 +72,11 @@ def run_command(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress, only failures.")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print a line for each finished task.")] = False,
+    trust: terminal.Trust = False,
     json: terminal.Json = False,
 ) -> None:
     """Run a suite: simulate, estimate, score, and print the leaderboard."""
+    del trust  # done by its callback
     from vobench.report.threshold import parse_threshold
 
     assignments = [*(changes or ()), *([f"repeats={repeats}"] if repeats else [])]
@@ -136,8 +138,9 @@ def _assigned(changes: Sequence[str]) -> dict[str, str]:
     return dict(change.split("=", 1) for change in changes)
 
 
-def check_command(suite: terminal.SuiteName, *, json: terminal.Json = False) -> None:
+def check_command(suite: terminal.SuiteName, *, trust: terminal.Trust = False, json: terminal.Json = False) -> None:
     """Validate a suite and print its plan; nothing is rendered."""
+    del trust  # done by its callback
     _print_summary(summarize(read_plan(suite)), as_json=json)
 
 

@@ -14,9 +14,11 @@ def scene_command(
     scene: Annotated[str, typer.Argument(metavar="SCENE", help="A scene's name, a path to it, or a model's file.")],
     *,
     out: Annotated[Path | None, typer.Option(help="Draw a plan and four views to this PNG; light is computed.")] = None,
+    trust: terminal.Trust = False,
     json: terminal.Json = False,
 ) -> None:
     """Say what is in a scene, where a body can drive, and what is doubtful in its models."""
+    del trust  # done by its callback
     if out and (out.suffix != ".png" or out.is_dir() or not out.parent.is_dir()):
         raise InputError(f"--out should be a .png in a folder that exists, got {out}")
     report = survey_scene(scene)

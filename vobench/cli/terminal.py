@@ -27,6 +27,20 @@ Item = TypeVar("Item")
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 SuiteName = Annotated[str, typer.Argument(metavar="SUITE", help="A suite's name, or a path to its YAML.")]
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or runs/<suite> for its latest.")]
+
+
+def _trust(is_given: bool) -> bool:
+    if is_given:
+        from vobench.trust import trust_new
+
+        trust_new()
+    return is_given
+
+
+Trust = Annotated[
+    bool,
+    typer.Option("--trust", help="Run makers of scenes from elsewhere, now and as long as they stay.", callback=_trust),
+]
 LEFT_ALIGNED = {
     *("estimator", "status", "name", "case", "kind", "summary", "path", "origin", "check", "result"),
     *("sequence", "metric", "headline", "is", "with", "trajectory", "condition", "without", "instead", "tried"),

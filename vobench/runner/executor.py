@@ -5,6 +5,7 @@ what runs when. A task that fails takes those that need it with it, and nobody e
 """
 
 import errno
+import faulthandler
 import os
 import signal
 import threading
@@ -13,9 +14,10 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import recv_handle, send_handle
 from pathlib import Path
 from queue import SimpleQueue
 from tempfile import TemporaryFile
@@ -26,7 +28,7 @@ from vobench import __version__, stop
 from vobench.errors import InputError, MissingDependencyError, VobenchError
 from vobench.runner.fork_server import ForkServer, WorkerProcess, shared_server, watch
 from vobench.runner.key import code_digest
-from vobench.runner.store import Progress, SilentProgress, Store, Tell
+from vobench.runner.store import STATE, Progress, SilentProgress, Store, Tell
 from vobench.runner.task import ENTRIES, NO_LIMIT, Stage, Task, perform
 
 FailureKind = Literal["crashed", "out_of_memory", "refused"]
@@ -36,6 +38,7 @@ LOOK_S = 0.2
 GRACE_S = 0.7  # for a process that is asked to stop, before it is killed
 STOP_S = 0.4  # for its main thread, before another one tidies up and ends it
 CONNECT_S = 10.0
+MOST_OF_A_STACK = 1 << 20  # bytes
 # What a library's fault ends, as once in hundreds of sequences; what is made so is the same however often it is made.
 FAULTS, MADE = (-signal.SIGABRT, -signal.SIGSEGV, -signal.SIGBUS), ("bake", "sequence")
 # What a stage makes, in the words of a sentence about what needed it.
@@ -65,12 +68,14 @@ class Done:
     """How a task ended: no failure, or which and why.
 
     `lacks` names what ends the whole run, as no other task can end better without it.
+    `stack` is what a process wrote when a fault of a library ended it.
     """
 
     failure: FailureKind | None = None
     reason: str = ""
     wall_s: float = 0.0
     lacks: Shortage | None = None
+    stack: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,12 +181,17 @@ class LocalProcesses:
         def await_end() -> None:
             worker = first
             done = worker.ask(task, store, limit, tell)
-            if task.stage in MADE and worker.process.exit_code in FAULTS:
+            fault = worker.process.exit_code in FAULTS
+            if fault:
+                done = worker.traced(done, task, store)
+            if fault and task.stage in MADE:
                 tell(f"{task.key}: {done.reason}, by a fault in a library; it is made once more")
                 self._running.discard(worker.process)
                 worker.leave()
                 worker = self._worker(slot, task, cores)
                 done = worker.ask(task, store, limit, tell)
+                if worker.process.exit_code in FAULTS:
+                    done = worker.traced(done, task, store)
             if task.stage == "sequence" and worker.process.is_alive:
                 self._idle[slot] = worker
             else:
@@ -211,7 +221,7 @@ class LocalProcesses:
             self._idle.popitem()[1].leave()
         was_killed = False
         for number in (signal.SIGTERM, signal.SIGKILL):
-            running = [process for process in list(self._running) if process.is_alive]
+            running = [process for process in list(self._running) if process.is_alive and not process.abandon()]
             for process in running:
                 process.kill(number)
                 was_killed = was_killed or number == signal.SIGKILL
@@ -238,6 +248,7 @@ class _Worker:
         """Tell the process where it works; it may not have started yet."""
         with suppress(OSError):  # it is dead: `ask` says so
             self.process.connection.send((os.getcwd(), dict(os.environ), self.cores))
+            send_handle(self.process.connection, self.trace.fileno(), None)
 
     def ask(self, task: Task, store: Path, threads: int, tell: Tell) -> Done:
         """How the process reports that a task ended, or how the process died; its messages go to `tell` at once."""
@@ -249,6 +260,18 @@ class _Worker:
         except (EOFError, OSError):
             return _death(self.process.join(), time.monotonic() - began)
         return answer
+
+    def traced(self, done: Done, task: Task, store: Path) -> Done:
+        """The same failure with the stack that the process wrote when a fault ended it, which is kept in the store."""
+        self.trace.seek(0)
+        stack = self.trace.read(MOST_OF_A_STACK).decode("utf-8", "replace")
+        if not stack:
+            return done
+        name = f"{STATE}/faults/{task.key.replace('/', '-')}.txt"
+        with suppress(OSError):
+            (store / name).parent.mkdir(parents=True, exist_ok=True)
+            (store / name).write_text(f"{task.stage} {task.name}: {done.reason}\n\n{stack}", encoding="utf-8")
+        return replace(done, reason=f"{done.reason} (its stack: {name} in the cache)", stack=stack)
 
     def leave(self) -> None:
         """End the process."""
@@ -283,6 +306,8 @@ def work(connection: Connection, vobench_fd: int) -> None:
     threading.Thread(target=watching, name="watch vobench", daemon=True).start()
     try:
         folder, environment, cores = connection.recv()
+        # The stack of every thread, that of the libraries too since Python 3.14, where a fault ends this process.
+        faulthandler.enable(recv_handle(connection))
         os.environ.clear()
         os.environ.update(environment)
         with suppress(OSError):
@@ -501,7 +526,7 @@ def perform_all(
                 failures[task.key] = done
                 lost = f"its {PRODUCTS[task.stage]} could not be made: {done.reason}"
                 for other in queue.fell(task.key):
-                    failures[other.key] = Done(done.failure, lost)
+                    failures[other.key] = Done(done.failure, lost, stack=done.stack)
     finally:
         executor.close()
     return failures

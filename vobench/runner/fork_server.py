@@ -69,6 +69,14 @@ class WorkerProcess:
         self._read(until=lambda: self._exit_code is not None, timeout_s=timeout_s)
         return self._exit_code
 
+    def abandon(self) -> bool:
+        """Whether the worker has yet to start; if so it will end as soon as it does."""
+        if self.pid(timeout_s=0) is not None or not self.is_alive:
+            return False
+        with suppress(OSError), socket.socket(fileno=os.dup(self.connection.fileno())) as line:
+            line.shutdown(socket.SHUT_RDWR)
+        return True
+
     def kill(self, number: int) -> None:
         """Send a signal to the worker, unless it has ended or has yet to start."""
         pid = self.pid(timeout_s=0)

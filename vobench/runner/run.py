@@ -121,10 +121,11 @@ def run_suite(
 
 @dataclass(frozen=True, slots=True)
 class _Failure:
-    """The status and the reason of a trial without a score."""
+    """The status and the reason of a trial without a score, and the stack of a process that a fault ended."""
 
     status: TrialStatus
     reason: str
+    stack: str = ""
 
 
 def _unmade(scores: Iterable[Task], failures: Mapping[str, Done]) -> dict[str, _Failure]:
@@ -135,7 +136,7 @@ def _unmade(scores: Iterable[Task], failures: Mapping[str, Done]) -> dict[str, _
         if sequence in failures:
             done = failures[sequence]
             remedy = REMEDIES.get(done.failure or "crashed", "")
-            unmade[task.inputs["case"]] = _Failure(NO_SEQUENCE, f"{done.reason}{remedy}")
+            unmade[task.inputs["case"]] = _Failure(NO_SEQUENCE, f"{done.reason}{remedy}", done.stack)
     return unmade
 
 
@@ -156,7 +157,7 @@ def _require_sequences(unmade: Mapping[str, _Failure], cases: Collection[str], *
 
 
 def _trial_failure(done: Done | None) -> _Failure | None:
-    return _Failure(done.failure or "crashed", done.reason) if done else None
+    return _Failure(done.failure or "crashed", done.reason, done.stack) if done else None
 
 
 def _gather(
@@ -197,7 +198,7 @@ def _write_failed(task: Task, failure: _Failure, folder: RunFolder) -> TrialScor
     target.mkdir(parents=True)
     write_json(target / SCORE, score.model_dump(mode="json"))
     (target / ESTIMATE).touch()
-    (target / LOG).write_text(f"{failure.reason}\n", encoding="utf-8")
+    (target / LOG).write_text(f"{failure.reason}\n{failure.stack}", encoding="utf-8")
     with new_table(target / FRAMES, COLUMNS), new_table(target / TIMES, TIME_COLUMNS), ZipFile(target / TRACKS, "w"):
         return score
 

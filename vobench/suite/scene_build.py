@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
+from pathlib import Path
 from runpy import run_path
 from typing import TypeVar
 
@@ -25,6 +26,7 @@ from vobench.scene.mesh import Thing, areas_m2
 from vobench.scene.scene import Scene
 from vobench.suite.scene_file import SKY, SUN, Lighting, content, lit, materials_used
 from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile, SunSpec, hue
+from vobench.trust import admit
 
 
 def build(spec: SceneFile, lighting: Lighting) -> Scene:
@@ -133,6 +135,7 @@ def _from_maker(spec: SceneFile) -> Iterator[Contents]:
     if spec.maker is None:
         return
     with _sentence(spec.maker):
+        admit(Path(spec.maker), Path(spec.maker).read_bytes(), spec.name)
         # Never from bytecode: that of a file edited twice within a second would be the first one's.
         make = run_path(spec.maker).get("make")
         if make is None:
