@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from vobench.notebook.class_source import write_estimator
     from vobench.notebook.questions import causes, drive, explain, realism, shrink, twin
     from vobench.notebook.runs import Check, Run, bundle, check, compare, read_board, read_run, run
-    from vobench.notebook.simulation import Simulation, read_sequence, simulate
+    from vobench.notebook.simulation import Simulation, read_sequence, render, simulate
     from vobench.notebook.trajectories import diagnose, read_trajectory, score
     from vobench.sequence import Sequence
     from vobench.trajectory.trajectory import Trajectory
@@ -48,6 +48,7 @@ _HOMES = {
     "run": "vobench.notebook.runs",
     "Simulation": "vobench.notebook.simulation",
     "read_sequence": "vobench.notebook.simulation",
+    "render": "vobench.notebook.simulation",
     "simulate": "vobench.notebook.simulation",
     "diagnose": "vobench.notebook.trajectories",
     "read_trajectory": "vobench.notebook.trajectories",
@@ -75,6 +76,7 @@ __all__ = [
     "read_sequence",
     "read_trajectory",
     "realism",
+    "render",
     "run",
     "score",
     "shrink",

@@ -31,3 +31,11 @@ def test_a_case_that_is_not_there_is_named(here):
         vobench.simulate("tiny", name="shirt")
     with pytest.raises(InputError, match="name and changes belong to a suite"):
         vobench.simulate(vobench.check("tiny").plan.cases[0], name="short")
+
+
+def test_a_picture_of_a_scene_is_an_array(here):
+    picture = vobench.render("closet", at_m=(0, 0, 1), camera="paper_blender")
+    assert picture.shape[2] == 3
+    assert picture.dtype == np.uint8
+    with pytest.raises(InputError, match="should be inside the room"):
+        vobench.render("closet", at_m=(5, 0, 1))

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.notebook.display import choose_display
@@ -15,9 +15,26 @@ from vobench.suite.source import RecordedCase
 from vobench.suite.suite import Case
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from vobench.dataset.recording import Recording
     from vobench.sequence import Sequence
     from vobench.trajectory.trajectory import Trajectory
+
+
+class RenderOptions(TypedDict, total=False):
+    """Where the camera of `render` stands, where and when it looks, and what draws the picture."""
+
+    camera: str
+    at_m: tuple[float, float, float]
+    yaw_deg: float
+    pitch_deg: float
+    time_s: float
+    sensor: str
+    gain: float
+    engine: str
+    samples: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +85,17 @@ def simulate(
     tasks = sequence_tasks(chosen, recordings)
     folder = perform_tasks(tasks, display=choose_display(is_quiet=quiet))
     return Simulation(chosen, folder)
+
+
+def render(scene: str, **options: Unpack[RenderOptions]) -> "NDArray[np.uint8]":
+    """A picture (H, W, 3) uint8 of a scene in red, green and blue, as `vobench render` draws it.
+
+    `options` are the keywords of `RenderOptions`: camera, at_m, yaw_deg, pitch_deg, time_s, sensor, gain, engine,
+    samples. Raises UnknownNameError, InputError and MissingDependencyError.
+    """
+    from vobench.runner.scene_picture import render_scene
+
+    return render_scene(scene, **options).rgb
 
 
 def read_sequence(folder: Path | str) -> "Sequence":

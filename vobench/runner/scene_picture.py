@@ -1,0 +1,158 @@
+"""One picture of a scene from a camera anywhere in it, and the ground truth of its pixels."""
+
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench.errors import InputError, SettingError, require_known
+from vobench.geometry import se3
+from vobench.geometry.rig import PRESETS, looking
+from vobench.geometry.se3 import Array
+from vobench.rendering.occlusion import Shot
+from vobench.rendering.renderer import Radiance, still
+from vobench.runner.key import cache_folder
+from vobench.runner.simulate import open_renderer
+from vobench.runner.store import SILENT, Progress
+from vobench.runner.task import bake_task, perform
+from vobench.scene.light import NS_PER_S
+from vobench.sensor.image_sensor import CAMERAS, CameraSettings, NoiseStreams, expose, fixed_pattern
+from vobench.sensor.pixel_truth import CHANNELS, picture
+from vobench.sensor.response import Grey
+from vobench.sequence.picture import write_png
+from vobench.setting import Triple
+from vobench.suite import catalog
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import read_scene
+from vobench.suite.suite import Rendering
+
+LATEST_S = 1e9  # stamps are 64 bits of nanoseconds
+# Flow and occlusion are of one picture and the next.
+STILL_CHANNELS = tuple(name for name in CHANNELS if name not in {"flow", "occlusion"})
+
+
+@dataclass(frozen=True, slots=True)
+class ScenePicture:
+    """A picture (H, W, 3) uint8 of red, green and blue, and each channel of its ground truth by name."""
+
+    rgb: Grey
+    truth: Mapping[str, NDArray[Any]]
+
+    def save(self, path: Path) -> list[Path]:
+        """Write the picture as PNG, and beside it a picture of each channel and all their values in one .npz.
+
+        Returns the files that were written.
+        """
+        write_png(path, self.rgb)
+        written = [path]
+        for name, values in self.truth.items():
+            beside = path.with_suffix(f".{name}.png")
+            write_png(beside, picture(name, values))
+            written.append(beside)
+        if self.truth:
+            arrays = path.with_suffix(".truth.npz")
+            np.savez_compressed(arrays, allow_pickle=False, **dict(self.truth))
+            written.append(arrays)
+        return written
+
+
+def render_scene(
+    scene: str,
+    *,
+    camera: str = "paper_blender",
+    at_m: Triple = (0.0, 0.0, 1.2),
+    yaw_deg: float = 0.0,
+    pitch_deg: float = 10.0,
+    time_s: float = 0.0,
+    sensor: str = "clean",
+    gain: float = 1.0,
+    engine: str = "raster",
+    samples: int | None = None,
+    with_truth: bool = False,
+    progress: Progress = SILENT,
+) -> ScenePicture:
+    """Draw one picture of a scene; its light is computed unless it is in the cache.
+
+    Args:
+        scene: the scene's name, or the path of its file or model.
+        camera: the rig preset whose left lens is used.
+        at_m: where the camera stands, in the world.
+        yaw_deg: where it looks: 0 along x, 90 along y.
+        pitch_deg: how far below the horizon it looks.
+        time_s: when; lights and things may move.
+        sensor: the chip behind the lens.
+        gain: multiplies the exposure.
+        engine: raster, path (Mitsuba's path tracer) or pyrender (stock pyrender).
+        samples: light paths per pixel, for the engine path alone.
+        with_truth: whether depth, ids and the other channels of one picture are computed, too.
+        progress: shows how the light is computed.
+
+    Raises:
+        UnknownNameError: no scene, camera or sensor has that name.
+        InputError: a setting is wrong, or the camera stands outside the room.
+        MissingDependencyError: this machine cannot draw.
+    """
+    rendering = _rendering(engine, samples)
+    require_known("camera", camera, PRESETS)
+    require_known("camera sensor", sensor, CAMERAS)
+    lens = PRESETS[camera].left
+    chip = CAMERAS[sensor]
+    T_world_camera, t_ns = _pose(at_m, yaw_deg, pitch_deg, time_s)
+    spec = read_scene(catalog.find("scene", scene).path)
+    if spec.room and not spec.room.holds(at_m):
+        raise InputError(f"--at should be inside the room ({spec.room.extent}), got {at_m}")
+
+    built = build(spec, {})
+    light = None
+    if rendering.needs_bake:
+        light = perform(bake_task(spec), cache_folder(), progress=progress)
+    with closing(open_renderer(built, rendering, light, white_cd_m2=spec.white_cd_m2)) as renderer:
+        radiance = renderer.radiance(lens, still(lens, T_world_camera, t_ns=t_ns), weights=None)
+    rgb = _exposed(radiance / np.float32(spec.white_cd_m2), CameraSettings(chip=chip, exposure_gain=gain))
+
+    truth: dict[str, NDArray[Any]] = {}
+    if with_truth:
+        from vobench.rendering.truth import TruthCaster
+
+        truth = TruthCaster(built).frame(lens, Shot(T_world_camera, t_ns), STILL_CHANNELS).channels()
+    return ScenePicture(rgb, truth)
+
+
+def _rendering(engine: str, samples: int | None) -> Rendering:
+    """The engine. Raises InputError for one that is not known, and for samples that it does not take."""
+    try:
+        return Rendering(engine=engine, samples=samples)
+    except SettingError as error:
+        options = [f"--{key}" for key in error.keys]
+        raise InputError(": ".join([*options, error.sentence])) from None
+
+
+def _pose(at_m: Triple, yaw_deg: float, pitch_deg: float, time_s: float) -> tuple[Array, int]:
+    """The camera's pose T_world_camera (4, 4) and instant in ns.
+
+    Raises InputError where one is not finite, or where a stamp cannot hold the time.
+    """
+    for option, value in (("--yaw", yaw_deg), ("--pitch", pitch_deg), ("--time", time_s)):
+        if not np.isfinite(value):
+            raise InputError(f"{option} should be a finite number, got {value}")
+    if abs(time_s) > LATEST_S:
+        raise InputError(f"--time should be within {LATEST_S:.0e} s of the start, got {time_s:g}")
+    T_world_turned = se3.transform(se3.rotation_z(np.deg2rad(yaw_deg)), at_m)
+    T_turned_camera = looking(pitch_deg=pitch_deg, position_m=(0.0, 0.0, 0.0))
+    return T_world_turned @ T_turned_camera, round(time_s * NS_PER_S)
+
+
+def _exposed(radiance: Radiance, camera: CameraSettings) -> Grey:
+    """Red, green and blue (H, W, 3) uint8, each on a chip of its own behind a prism."""
+    pattern_rng, shot_rng, read_rng = np.random.default_rng(0).spawn(3)
+    noise = NoiseStreams(shot_rng, read_rng)
+    shape = (radiance.shape[0], radiance.shape[1])
+    chips = [fixed_pattern(shape, camera.chip, rng) for rng in pattern_rng.spawn(3)]
+    exposed = []
+    for channel, chip in zip(np.moveaxis(radiance, -1, 0), chips, strict=True):
+        exposed.append(expose(channel, camera, noise, pattern=chip))
+    return np.stack(exposed, -1)
