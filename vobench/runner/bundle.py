@@ -9,6 +9,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile, ZipInfo
 
+import numpy as np
+
 from vobench.errors import InputError
 from vobench.runner.consistency import COVARIANCE
 from vobench.runner.entry import file_hash
@@ -39,6 +41,7 @@ OF_RUN, OF_CASE = (SUITE, ENVIRONMENT, ESTIMATORS), (CASE, GROUND_TRUTH)
 OF_TRIAL = (SCORE, ESTIMATE, REVISED, COVARIANCE, FRAMES, TIMES, LOG)
 SEQUENCES = "sequence_hashes.json"  # of the recordings, which are too large for a bundle
 MOST_BYTES = 8 << 30  # unpacked
+SAME_POSE = 1e-9  # metres, and elements of a rotation: below it two poses are one
 EPOCH = (1980, 1, 1, 0, 0, 0)  # no date, so that equal runs make equal bundles
 
 
@@ -174,10 +177,21 @@ def _stated(folder: RunFolder) -> list[dict[str, Any]]:
     return [each for each in found if isinstance(each, dict) and "label" in each]
 
 
+def _is_same_path(one: Path, other: Path) -> bool:
+    """Whether two files hold one true path; processors of other makes round its last digits differently."""
+    if one.read_bytes() == other.read_bytes():
+        return True
+    first = read_tum(one)
+    second = read_tum(other)
+    if not np.array_equal(first.t_ns, second.t_ns):
+        return False
+    return bool(np.allclose(first.T_world_frame, second.T_world_frame, rtol=0, atol=SAME_POSE))
+
+
 def _link_case(folder: RunFolder, made: RunFolder, case: str, name: str) -> None:
     source, target = folder.case(case), made.case(case)
     truths = [place / GROUND_TRUTH for place in (source, target)]
-    if all(truth.is_file() for truth in truths) and len({truth.read_bytes() for truth in truths}) > 1:
+    if all(truth.is_file() for truth in truths) and not _is_same_path(*truths):
         raise InputError(f"case {case!r} is another one in {name}: its true path differs, so nothing compares")
     target.mkdir(parents=True, exist_ok=True)
     # A run that could not make the case has no true path of it; then another run's is linked.
