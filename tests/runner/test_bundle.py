@@ -8,7 +8,17 @@ import pytest
 
 from vobench.errors import InputError
 from vobench.runner.bundle import bundle, merged, opened, scored_again
-from vobench.runner.folder import CASE, ESTIMATORS, NO_SEQUENCE, SCORE, SUITE, RunFolder, TrialScore, write_hashes
+from vobench.runner.folder import (
+    CASE,
+    ESTIMATORS,
+    NO_SEQUENCE,
+    SCORE,
+    SUITE,
+    RunFolder,
+    TrialScore,
+    read_tum,
+    write_hashes,
+)
 from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.runner.score import score_estimate
 from vobench.runner.store import write_json
@@ -117,6 +127,18 @@ def test_a_case_that_one_of_two_merged_runs_could_not_make_is_the_others(make):
         with merged(order, ["a", "b"]) as both:
             assert both.unmade() == ()
             assert (both.case(case) / GROUND_TRUTH).read_bytes() == (whole.case(case) / GROUND_TRUTH).read_bytes()
+
+
+def test_a_true_path_of_other_last_digits_is_the_same_path(make):
+    one, other = make("a"), make("b")
+    truth = other.case(CASES[0]) / GROUND_TRUTH
+    gt = read_tum(truth)
+    T = gt.T_world_frame.copy()
+    T[:, 0, 3] += 1e-14
+    truth.write_text(format_tum(Trajectory(gt.t_ns, T)))
+    assert truth.read_bytes() != (one.case(CASES[0]) / GROUND_TRUTH).read_bytes()
+    with merged([one, other], ["a", "b"]) as both:
+        assert len(both.scores()) == 2 * len(CASES)
 
 
 def test_another_case_of_the_same_name_cannot_be_merged(make):
