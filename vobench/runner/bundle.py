@@ -36,6 +36,7 @@ from vobench.runner.folder import (
     TrialScore,
     open_run,
     read_hashes,
+    read_tum,
 )
 from vobench.runner.frames import FRAMES, GROUND_TRUTH, TIMES
 from vobench.runner.rescore import rescored
