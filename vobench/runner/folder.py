@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from vobench.errors import InputError, TrajectoryError
+from vobench.estimator.sandbox import Sandbox
 from vobench.runner.consistency import Consistency
 from vobench.runner.entry import file_hash
 from vobench.runner.frames import TIMES
@@ -46,7 +47,8 @@ class TrialScore(BaseModel):
 
     `drift_m` is the largest distance of the estimate from its start, in a case that stands still; else None.
     `claims` are the manifest's, such as Sim(3); `consistency` is of the covariances that were stated, and `revised`
-    the score of the poses that came after the last frame, where there were some.
+    the score of the poses that came after the last frame, where there were some. `sandbox` is what the estimator could
+    see; None where none was started, and in runs of an older vobench.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -66,6 +68,7 @@ class TrialScore(BaseModel):
     claims: tuple[str, ...] = ()
     consistency: Consistency | None = None
     revised: dict[str, Any] | None = None
+    sandbox: Sandbox | None = None
 
     def value(self, metric: str, statistic: str) -> float | None:
         """One statistic of one metric, None where the trial has no such score."""
