@@ -167,7 +167,7 @@ ZOO = {
     "another message": writes("send(b'REDY')", "frame 0: it should answer POSE, but says b'REDY'"),
     "the wrong frame": writes("pose(frame.index + 1)", "frame 0: the answer is to frame 1"),
     "the last frame again": Animal(INVALID, f"if frame.index: pose(frame.index - 1)\n{OK}", "frame 1: the answer is to frame 0"),
-    "two answers": Animal(INVALID, f"pose(frame.index)\n{OK}", "frame 1: the answer is to frame 0"),
+    "two answers": Animal(INVALID, f"pose(frame.index)\n{OK}", "frame 1"),  # whether it comes before the question is a matter of time
     "what is not asked for": writes("pose(frame.index, what=1 << 9)", "frame 0: no status 1 with contents 512"),
     "a billion tracks": writes("pose(0, 9, struct.pack('<I', 10**9))", "frame 0: a message of 116 bytes should have 40000000116 or more"),
     "deep JSON": writes("said = b'[' * 60000\npose(0, 5, struct.pack('<I', len(said)) + said)", "frame 0: "),
@@ -200,7 +200,7 @@ ZOO = {
     "many files fill the disk": Animal(MEMORY, "for n in range(100): open(str(n), 'wb').write(bytes(1 << 20))\ntime.sleep(9)", "its files hold more than the limit of 64 MiB", disk_mib=64),
     "a deleted file fills the disk": Animal(MEMORY, "files = [open(str(n), 'wb') for n in range(10)]\nfor n, file in enumerate(files): file.write(bytes(8 << 20)); os.remove(str(n))\ntime.sleep(9)", "its files hold", disk_mib=64),
     "forks": Animal(FINISHED, f"if os.fork() == 0: time.sleep(600)\n{OK}"),
-    "forks, and both answer": Animal(INVALID, f"if frame.index: time.sleep(600)\nos.fork()\n{OK}", "frame 1: the answer is to frame 0"),
+    "forks, and both answer": Animal(INVALID, f"if frame.index: time.sleep(600)\nos.fork()\n{OK}", "frame 1"),
     "an orphan in a session of its own": Animal(FINISHED, f"away(lambda: None)\n{OK}"),
     "an orphan without a variable": Animal(FINISHED, f"away(lambda: os.execve('/bin/sleep', ['sleep', '600', os.environ['PYTHONPATH']], {{}}))\n{OK}"),
     "an orphan that holds the pipe, and an end": Animal(CRASHED, "away(lambda: None)\nos._exit(4)", "the process ended with exit code 4"),

@@ -74,7 +74,7 @@ def guard(line: _socket.socket, plan: "dict[str, Any]") -> "NoReturn":
 
 
 def _started(plan: "dict[str, Any]", line: _socket.socket, ended: int) -> int:
-    """The id of the program's process, or of the first in its namespace, which writes on `ended` how the program did."""
+    """The id of the program's process, or of the first in its namespace, which writes the program's end on `ended`."""
     is_isolated = plan["is_isolated"]
     has_pid_namespace = is_isolated and isolation.new_pid_namespace()
     reads, writes = os.pipe()

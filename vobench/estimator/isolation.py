@@ -392,9 +392,9 @@ def _restrict_files(plan: dict[str, object]) -> bool:
     rules += [(str(plan["home"]), every_access), ("/dev/shm", every_access)]
     for path, access in rules:
         _allow(ruleset, path, access & every_access)
-    is_restricted = libc.syscall(ctypes.c_long(LANDLOCK_RESTRICT_SELF), ctypes.c_int(ruleset), 0) == 0
+    failed = libc.syscall(ctypes.c_long(LANDLOCK_RESTRICT_SELF), ctypes.c_int(ruleset), 0)
     os.close(ruleset)
-    return is_restricted
+    return bool(failed == 0)
 
 
 def _allow(ruleset: int, path: str, access: int) -> None:

@@ -4,10 +4,10 @@ import os
 import shutil
 import site
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from vobench.estimator import isolation
 from vobench.estimator.manifest import Limits
@@ -94,7 +94,7 @@ def user_packages() -> dict[str, str]:
 
 def plan(
     argv: Sequence[str], *, home: Path, homes: Path, folder: Path | None, hidden: Sequence[Path], limits: Limits
-) -> Mapping[str, object]:
+) -> dict[str, Any]:
     """What the guard is to start and what that may see, of types that marshal takes.
 
     `home` is an empty folder to work in, or one with what the program is given; `homes` holds it and those of others.
