@@ -11,6 +11,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import uuid
@@ -35,7 +36,7 @@ LIMITS = Limits(start_s=30, trial_s=60)
 PREPARE = {
     "python": "import ctypes, glob, os, socket, struct, sys, time\nfrom contextlib import suppress\nT = dict(word.split('=', 1) for word in sys.argv[1:])\nlibc = ctypes.CDLL(None, use_errno=True)\n",
     "sh": 'for word in "$@"; do eval "${word%%=*}=\\"\\${word#*=}\\""; done\n',
-    "perl": "my %T = map { split(/=/, $_, 2) } @ARGV;\n",
+    "perl": "my %T = map { split(/=/, $_, 2) } @ARGV;\nsub show { my $f; open($f, '<', $_[0]) and print <$f>; }\n",
     "c": """
 #define _GNU_SOURCE
 #include <errno.h>
@@ -81,19 +82,19 @@ class Attack:
 ATTACKS = {
     "opens the truth": Attack(FILES, "python", "print(open(T['truth']).read())"),
     "opens the truth with sh": Attack(FILES, "sh", 'cat "$truth"'),
-    "opens the truth with perl": Attack(FILES, "perl", "open(my $f, '<', $T{truth}) and print <$f>;"),
+    "opens the truth with perl": Attack(FILES, "perl", "show($T{truth});"),
     "opens the truth in C": Attack(FILES, "c", 'static void attack(void) { show(T("truth")); }'),
     "searches earlier runs": Attack(FILES, "python", "for path in glob.glob(T['runs'] + '/**/*.tum', recursive=True): print(open(path).read())"),
     "searches earlier runs with find": Attack(FILES, "sh", 'find "$runs" -name ground_truth.tum -exec cat {} +'),
-    "follows the link of an earlier run": Attack(FILES, "perl", "for (glob(\"$T{runs}/*/cases/*/sequence/*\")) { open(my $f, '<', $_) and print <$f>; }"),
+    "follows the link of an earlier run": Attack(FILES, "perl", "show($_) for glob(\"$T{runs}/*/*/cases/*/sequence/*\");"),
     "follows a link of its own folder": Attack(FILES, "python", "print(open(os.path.join(T['own'], 'link', 'truth.txt')).read())"),
     "reads what a neighbour works on": Attack(FILES, "python", "for path in glob.glob(T['neighbour_home'] + '/*'): print(open(path).read())"),
     "reads the user's keys": Attack(FILES, "sh", 'cat "$user/.ssh/id_ed25519"'),
     "goes through the root of other processes": Attack(FILES, "python", "for root in glob.glob('/proc/[0-9]*/root'):\n    with suppress(OSError): print(open(root + T['truth']).read())"),
     "goes through the working folder of a neighbour": Attack(PROCESSES, "python", "for cwd in glob.glob('/proc/[0-9]*/cwd'):\n    with suppress(OSError): print(open(cwd + '/truth.txt').read())"),
-    "goes through open files of other processes": Attack(PROCESSES, "python", "for path in glob.glob('/proc/[0-9]*/fd/*'):\n    with suppress(OSError):\n        if 'truth' in os.readlink(path): print(open(path).read())"),
+    "goes through open files of other processes": Attack(PROCESSES, "python", "for path in glob.glob('/proc/[0-9]*/fd/*'):\n    with suppress(OSError):\n        if os.readlink(path).endswith('truth.txt'): print(open(path).read())"),
     "reads the environment of other processes": Attack(PROCESSES, "sh", 'cat /proc/[0-9]*/environ 2>/dev/null | tr "\\0" "\\n"'),
-    "reads the words of other processes": Attack(PROCESSES, "perl", "for (glob('/proc/[0-9]*/cmdline')) { open(my $f, '<', $_) and print <$f>; }"),
+    "reads the words of other processes": Attack(PROCESSES, "perl", "show($_) for glob('/proc/[0-9]*/cmdline');"),
     "reads the memory of vobench by /proc": Attack(PROCESSES, "python", "file = open(f\"/proc/{T['vobench']}/mem\", 'rb', 0)\nfile.seek(int(T['address']))\nprint(file.read(64))"),
     "reads the memory of vobench by process_vm_readv": Attack(PROCESSES, "c", """static void attack(void) {
   char text[65] = {0}; struct iovec here = {text, 64}, there = {(void *)strtoull(T("address"), 0, 10), 64};
@@ -144,7 +145,7 @@ with suppress(OSError): print(open(T['truth']).read())
   int places[] = {2, open(".", O_RDONLY), open("/usr", O_RDONLY)};
   for (int i = 0; i < 3; ++i) { int root = syscall(SYS_open_by_handle_at, places[i], &handle, O_RDONLY); if (root < 0) continue;
     fchdir(root); show(T("truth") + 1); } }""", works_bare=False),
-    "makes a device of the disk": Attack(FILES, "perl", "for my $type ('b', 'c') { for my $minor (0 .. 3) { system('mknod', \"d$type$minor\", $type, 1, $minor); open(my $f, '<', \"d$type$minor\") or next; print 'opened'; print $T{half}.$T{other_half} if $type eq 'c' && $minor < 3; } }", works_bare=False),
+    "makes a device of the disk": Attack(FILES, "perl", "for my $type ('b', 'c') { for my $minor (0 .. 3) { system('mknod', \"d$type$minor\", $type, 1, $minor); my $f; open($f, '<', \"d$type$minor\") or next; print $T{half}.$T{other_half}; } }", works_bare=False),
     "opens devices of memory, disks and the log": Attack(FILES, "sh", 'for d in /dev/mem /dev/kmem /dev/port /dev/kmsg /dev/vda /dev/sda /dev/nvme0n1 /dev/loop0 /proc/kcore /proc/kmsg; do head -c 1 "$d" 2>/dev/null | grep -q . && echo "$half$other_half $d"; done', works_bare=False),
     "has descriptors that it should not": Attack(FILES, "c", """static void attack(void) {
   for (int fd = 3; fd < 4096; ++fd) if (fcntl(fd, F_GETFD) >= 0) printf("%d %s%s", fd, T("half"), T("other_half")); }""", works_bare=False),
@@ -168,7 +169,7 @@ if os.path.exists(T['runs']): print(T['half'] + T['other_half'])
     "asks a program with other rights": Attack(FILES, "sh", 'for tool in "su -c" "sudo -n sh -c" "pkexec sh -c" "unshare -Urm sh -c" "nsenter -t 1 -m sh -c"; do $tool "cat $truth" </dev/null 2>/dev/null; done', works_bare=False),
     "writes the pattern of core dumps": Attack(FILES, "sh", 'for f in core_pattern modprobe hotplug; do (cat /proc/sys/kernel/$f > kept && cat kept > /proc/sys/kernel/$f) 2>/dev/null && echo "$half$other_half $f"; done', works_bare=False),
     "loads a library into others": Attack(FILES, "sh", 'for f in /etc/ld.so.preload /etc/ld.so.cache /usr/lib/x.so /usr/local/lib/x.so; do (: >> "$f") 2>/dev/null && echo "$half$other_half $f"; done', works_bare=False),
-    "climbs from its own root": Attack(FILES, "perl", "for my $up ('/..', '/../../..', '/proc/self/root/..', '/proc/1/root', '/proc/1/cwd/../../..', '/proc/self/task/../../1/root') { open(my $f, '<', \"$up$T{truth}\") and print <$f>; }"),
+    "climbs from its own root": Attack(FILES, "perl", "show(\"$_$T{truth}\") for ('/..', '/../../..', '/proc/self/root/..', '/proc/1/root', '/proc/1/cwd/../../..', '/proc/self/task/../../1/root');"),
     "opens the truth by an io_uring": Attack(SYSTEM_CALLS, "c", """static void attack(void) {
   char parameters[120] = {0}; if (syscall(425, 4, parameters) >= 0) printf("%s%s", T("half"), T("other_half")); }""", works_bare=False),
 }  # fmt: skip
@@ -367,7 +368,7 @@ SABOTAGE = {
     "writes into its own folder": ("sh", 'echo evil > "$own/data.txt"; echo evil > "$own/new"; rm -f "$own/data.txt"; mv "$own" "$own.old"'),
     "writes into the interpreter's libraries": ("python", "import site\nfor place in {os.path.dirname(os.__file__), sys.prefix, *sys.path, T['package'] if 'package' in T else T['own']}:\n    with suppress(OSError): open(os.path.join(place, 'vobench_test_evil.pth'), 'w').write('evil')\nprint('done')"),
     "writes into caches of compiled modules": ("python", "for path in glob.glob(os.path.dirname(os.__file__) + '/__pycache__/*.pyc')[:20]:\n    with suppress(OSError): open(path, 'r+b').write(b'evil')"),
-    "writes into the store and into runs": ("perl", "for ($T{truth}, \"$T{runs}/suite/one/cases/case/ground_truth.tum\") { open(my $f, '>', $_) and print $f 'evil'; unlink $_; }"),
+    "writes into the store and into runs": ("perl", "for ($T{truth}, \"$T{runs}/suite/one/cases/case/ground_truth.tum\") { my $f; open($f, '>', $_) and print $f 'evil'; unlink $_; }"),
     "writes into what a neighbour answers": ("python", "for path in glob.glob(T['neighbour_home'] + '/*') + glob.glob(T['temporary'] + '/*/poses.txt'):\n    with suppress(OSError): open(path, 'w').write('evil')"),
     "kills everybody": ("c", 'static void attack(void) { kill(-1, SIGTERM); kill(-1, SIGSTOP); }'),
     "kills its neighbour and vobench by number": ("sh", 'kill -9 "$neighbour" 2>/dev/null; kill -STOP "$neighbour" 2>/dev/null; true'),
@@ -380,13 +381,23 @@ NEEDS = {
     "kills its neighbour and vobench by number": PROCESSES,
     "slows its neighbour down": PROCESSES,
     "leaves files in shared memory": SHARED_MEMORY,
-    "takes away the permissions of devices": FILES,
 }
+# Dangerous to try where it might succeed.
+IN_A_FULL_SANDBOX_ALONE = ("takes away the permissions of devices", "kills everybody")
+
+
+def test_no_signal_goes_to_everybody(run):
+    if PROCESSES not in sandbox_here().sees or SYSTEM_CALLS in sandbox_here().sees:
+        pytest.skip("here everybody is the estimator itself, or nothing can be done")
+    _, printed = run("c", 'static void attack(void) { printf("%d\\n", kill(-1, 0) < 0 && errno == EPERM); }')
+    assert printed == "1\n"
 
 
 @pytest.mark.parametrize("name", SABOTAGE)
 def test_what_it_destroys_is_its_own(run, world, name):
     missing = NEEDS.get(name, FILES)
+    if sandbox_here().level != "full" and name in IN_A_FULL_SANDBOX_ALONE:
+        pytest.skip("this machine has no sandbox to try it in")
     if sandbox_here().level != "full" and missing in sandbox_here().sees:
         pytest.skip(f"this machine cannot keep {missing} from an estimator, and says so")
     watched = [path for path in world.place.rglob("*") if path.is_file()]
@@ -480,7 +491,8 @@ def test_a_folder_can_be_opened_to_it_which_the_record_names(run, world, monkeyp
     assert saw.read == (str(world.place / "user"),)
     if FILES not in saw.sees:
         assert printed.count(world.secret) == 1
-    assert str(world.place / "user") in saw.sentence
+    if saw.level != "none":
+        assert str(world.place / "user") in saw.sentence
 
 
 def test_what_is_hidden_stays_hidden_in_a_folder_that_is_opened(run, world, monkeypatch):
@@ -539,7 +551,7 @@ import ctypes, errno, os, struct, sys
 sys.path.append(sys.argv.pop(1))
 import isolation
 column, architecture = isolation.MACHINES[os.uname().machine]
-refused = [isolation.REFUSED['unshare'][column], *map(int, sys.argv.pop(1).split(','))]
+refused = [isolation.REFUSED['unshare'][column], *map(int, filter(None, sys.argv.pop(1).split(',')))]
 program = [(0x20, 0, 0, 0)]
 for number in refused:
     program += [(0x15, 0, 1, number), (0x06, 0, 0, isolation.FAIL | errno.EPERM)]
@@ -553,48 +565,40 @@ os.execv(sys.argv[1], sys.argv[1:])
 LANDLOCK = str(isolation.LANDLOCK_CREATE_RULESET)
 
 
-def rerun(tmp_path, before, *, python=sys.executable, environment=None):
+def rerun(before, *, python=sys.executable, environment=None):
     """Run this file again, started in another way."""
-    temporary = tmp_path / "temporary"
-    temporary.mkdir()
-    for folder in (tmp_path, temporary):
-        folder.chmod(0o777)
-    options = ["-n", "0", "-q", "-x", "-p", "no:cacheprovider", "--basetemp", str(temporary / "tests")]
-    argv = [*before, python, "-m", "pytest", *options, __file__]
-    variables = {
-        **os.environ,
-        RERUN: "1",
-        "TMPDIR": str(temporary),
-        "HOME": str(temporary),
-        "PYTHONDONTWRITEBYTECODE": "1",
-    }
-    done = subprocess.run(
-        argv,
-        env={**variables, **(environment or {})},
-        cwd=Path(__file__).parents[2],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+    with tempfile.TemporaryDirectory(prefix="vobench-test-", dir="/tmp", ignore_cleanup_errors=True) as temporary:
+        Path(temporary).chmod(0o777)
+        options = ["-n", "0", "-q", "-x", "-p", "no:cacheprovider", "--basetemp", f"{temporary}/tests"]
+        argv = [*before, python, "-m", "pytest", *options, __file__]
+        variables = {
+            **os.environ,
+            RERUN: "1",
+            "TMPDIR": temporary,
+            "HOME": temporary,
+            "PYTHONDONTWRITEBYTECODE": "1",
+            **(environment or {}),
+        }
+        root = Path(__file__).parents[2]
+        done = subprocess.run(argv, env=variables, cwd=root, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
 
 
 again = pytest.mark.skipif(bool(os.environ.get(RERUN)), reason="this is the second time")
 
 
 @again
-def test_the_same_as_an_ordinary_user(tmp_path):
+def test_the_same_as_an_ordinary_user():
     if os.getuid() != 0 or shutil.which("setpriv") is None:
         pytest.skip("this is an ordinary user already")
-    drop = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"]
+    # env, because setpriv keeps root's rights until it has found a program.
+    drop = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups", "env"]
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     search = os.pathsep.join(
         dict.fromkeys(path for path in sys.path if path.endswith("packages") or path == str(Path(__file__).parents[2]))
     )
     pythons = [sys.executable, f"/usr/bin/python{version}", f"/usr/local/bin/python{version}"]
     script = "import numpy, pytest, vobench.estimator.program"
-    for parent in (tmp_path, *tmp_path.parents[:2]):
-        parent.chmod(0o755)
     for python in pythons:
         environment = {"PYTHONPATH": search, "HOME": "/", "PYTHONDONTWRITEBYTECODE": "1"}
         with suppress(OSError):
@@ -606,18 +610,16 @@ def test_the_same_as_an_ordinary_user(tmp_path):
                 check=False,
             )
             if tried.returncode == 0:
-                rerun(tmp_path, drop, python=python, environment={"PYTHONPATH": search, READ: search})
+                rerun(drop, python=python, environment={"PYTHONPATH": search, READ: search})
                 return
     pytest.skip("no interpreter that an ordinary user may execute")
 
 
 @again
 @pytest.mark.parametrize("refused", ["", LANDLOCK], ids=["no namespaces", "neither namespaces nor landlock"])
-def test_the_same_where_the_kernel_refuses(tmp_path, refused):
-    isolation_folder = str(Path(isolation.__file__).parent)
-    numbers = refused or "-1"
-    script = WITHOUT.replace("map(int, sys.argv.pop(1).split(','))", f"{int(numbers)} & 0xFFFFFFFF")
-    rerun(tmp_path, [sys.executable, "-I", "-S", "-c", script, isolation_folder])
+def test_the_same_where_the_kernel_refuses(refused):
+    folder = str(Path(isolation.__file__).parent)
+    rerun([sys.executable, "-I", "-S", "-c", WITHOUT, folder, refused])
 
 
 def test_without_namespaces_the_record_says_what_can_be_seen():

@@ -13,6 +13,7 @@ import struct
 
 # What an estimator can see beyond its own, where the kernel does not give a layer.
 FILES = "the user's files"
+NAMES = "names and permissions of the user's files"
 PROCESSES = "other processes"
 NETWORK = "the network"
 SHARED_MEMORY = "shared memory of other processes"
@@ -137,8 +138,7 @@ def enter(plan: dict[str, object], *, has_pid_namespace: bool) -> tuple[list[str
     os.umask(before)
     _prctl(PR_SET_NO_NEW_PRIVS, 1)
     if not descriptors:
-        if not _restrict_files(plan):
-            sees.append(FILES)
+        sees.append(NAMES if _restrict_files(plan) else FILES)
         sees.append(SHARED_MEMORY)
     if not has_own_proc:
         sees.append(PROCESSES)
