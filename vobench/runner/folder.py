@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import count
@@ -79,6 +79,33 @@ def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> fl
     """One statistic of one metric of a score as JSON has it, None where it has no such."""
     entries = (score or {"metrics": []})["metrics"]
     return next((float(entry[statistic]) for entry in entries if entry["name"] == metric), None)
+
+
+ONLY_THEIR_OWN = "Estimators saw only their own files."
+ORACLE = "oracle"  # the claim of the harness's own estimators, which are no programs
+
+
+def visible_to(trials: Iterable[TrialScore]) -> str:
+    """What the estimators of trials could see, in sentences for every form of a board.
+
+    Estimators that saw more than their own files are named, and those of older runs, of which nothing is recorded.
+    """
+    estimators = dict[str, set[str]]()
+    for trial in trials:
+        sentence = _seen_by(trial)
+        if sentence:
+            estimators.setdefault(sentence, set()).add(trial.estimator)
+    named = [f"{', '.join(sorted(labels))}: {sentence}." for sentence, labels in sorted(estimators.items())]
+    return " ".join(named) or ONLY_THEIR_OWN
+
+
+def _seen_by(trial: TrialScore) -> str:
+    """What a trial's estimator saw beyond its own files; empty where that is nothing."""
+    if trial.sandbox is not None:
+        is_strict = trial.sandbox.level == "full" and not trial.sandbox.read
+        return "" if is_strict else trial.sandbox.sentence
+    was_started = trial.status not in ("refused", NOT_APPLICABLE) and ORACLE not in trial.claims
+    return "what it could see is not recorded" if was_started else ""
 
 
 @dataclass(frozen=True, slots=True)
