@@ -56,7 +56,7 @@ HOW
 HOWS = {
     "symlink": "os.symlink(paths[0], out)",
     "hardlink": "os.link(paths[0], out)",
-    "folder_link": "os.symlink(os.path.dirname(paths[0]), os.path.dirname(out) + '/ground'); os.symlink('ground/ground_truth.tum', out)",
+    "folder_link": "os.symlink(os.path.dirname(paths[0]), 'ground'); os.symlink('ground/ground_truth.tum', out)",
     "descriptor": "os.symlink('/proc/self/fd/0', out)",
 }
 
@@ -156,7 +156,7 @@ def test_the_neighbour_of_a_saboteur_scores_as_it_does_alone(here, vobench, tmp_
     if sandbox_here().level != "full":
         pytest.skip("this machine cannot keep neighbours apart, and says so")
     (here / "runs" / "tiny" / "latest" / "cases" / "none").mkdir(parents=True)
-    door = 'command: [{}, ./estimator.py, "{{dataset}}", "{{out}}"]'.format(sys.executable)
+    door = f'command: [{sys.executable}, ./estimator.py, "{{dataset}}", "{{out}}"]'
     add(here, "honest", door, HONEST)
     (here / "runs" / "tiny" / "latest").rename(here / "not a run")
     assert vobench("run", "tiny", "-e", "honest").code == 0

@@ -255,7 +255,7 @@ def _names(folder: int) -> list[str]:
 
 def _lift(name: str, folder: int, lifted: int) -> int:
     """Empty a folder: its files are deleted, its folders moved up beside it. Returns how many were moved so far."""
-    os.chmod(name, 0o700, dir_fd=folder)
+    _unless_immutable(partial(os.chmod, name, 0o700, dir_fd=folder), name, folder)
     inner = os.open(name, os.O_RDONLY | os.O_DIRECTORY | FOLLOW_NOTHING, dir_fd=folder)
     try:
         _clear_flags(inner)
@@ -263,7 +263,7 @@ def _lift(name: str, folder: int, lifted: int) -> int:
             if not stat.S_ISDIR(os.lstat(entry, dir_fd=inner).st_mode):
                 _unlink(entry, inner)
                 continue
-            os.chmod(entry, 0o700, dir_fd=inner)
+            _unless_immutable(partial(os.chmod, entry, 0o700, dir_fd=inner), entry, inner)
             move = partial(os.rename, entry, f".lifted-{os.getpid()}-{lifted}", src_dir_fd=inner, dst_dir_fd=folder)
             _unless_immutable(move, entry, inner)
             lifted += 1

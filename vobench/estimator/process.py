@@ -202,7 +202,7 @@ class EstimatorProcess:
         tag, length = HEADER.unpack(head)
         if tag in FAILURES:
             reason = self._read(min(length, REASON_BYTES), what, until).decode("utf-8", "replace")
-            self._program.weigh_disk()  # of which the failure may be a consequence
+            self._program.look(at_once=True)  # a limit, of which the failure may be a consequence
             raise EstimatorFailure(FAILURES[tag], reason)
         if tag not in tags or length > ANSWER_BYTES:
             wanted = " or ".join(sorted(tag.decode() for tag in tags if tag)) or "nothing"

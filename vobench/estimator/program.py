@@ -230,7 +230,7 @@ class Program:
             limit = f"where the limit is {self.limits.memory_mib} MiB"
             raise EstimatorFailure("out_of_memory", f"its processes hold {memory_mib:.0f} MiB, {limit}")
         if self._disk >= 0:
-            self.weigh_disk()
+            self._weigh_disk()
         elif time.monotonic() > self._weighed + WEIGH_S:
             self._weigh_files()
 
@@ -252,7 +252,7 @@ class Program:
             memory = private + max(shared, in_files)  # of which files that are mapped are a part
         return memory / MEBIBYTE
 
-    def weigh_disk(self) -> None:
+    def _weigh_disk(self) -> None:
         """Raises EstimatorFailure where the file system of its folder holds more than the limit."""
         if self._is_disk_full():
             raise EstimatorFailure(*self._of_files())
