@@ -1,12 +1,12 @@
 """Make what ORB-SLAM3 needs to stand on a board: an environment of its own and a vocabulary.
 
     .venv/bin/python examples/orbslam3/setup.py
-    .venv/bin/vobench run examples/orbslam3/suite.yaml
+    VOBENCH_SANDBOX_READ=examples/orbslam3 .venv/bin/vobench run examples/orbslam3/suite.yaml
 
 pyorbslam3 is ORB-SLAM3 (Campos et al., TRO 2021) as a wheel, under GPL-3: it lives in `.venv` beside this file, runs in
-processes of its own, and nothing of vobench imports it. Its own vocabulary is not in the wheel; the one made here is of
-ORB features in vobench's textures. It needs the system libraries libgl1 libegl1 libopengl0 libsm6 libice6 libx11-6
-libxext6.
+processes of its own, and nothing of vobench imports it. The variable lets its estimators read this folder. Its own
+vocabulary is not in the wheel; the one made here is of ORB features in vobench's textures. It needs the system
+libraries libgl1 libegl1 libopengl0 libsm6 libice6 libx11-6 libxext6.
 """
 
 import subprocess

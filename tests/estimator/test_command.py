@@ -199,7 +199,14 @@ def test_it_works_in_a_folder_of_its_own_that_is_gone_afterwards_with_few_of_our
     home, names, variables = eval((tmp_path / "log.txt").read_text())
     assert sorted(names) == ["dataset", "left"]
     assert not Path(home).exists()
-    assert set(variables) - {"LC_CTYPE"} <= {*KEPT_ENVIRONMENT, *THREADS, "PYTHONHASHSEED", "TMPDIR"}
+    assert set(variables) - {"LC_CTYPE"} <= {
+        *KEPT_ENVIRONMENT,
+        *THREADS,
+        "HOME",
+        "PYTHONHASHSEED",
+        "PYTHONUSERBASE",
+        "TMPDIR",
+    }
     assert os.environ["SECRET_TOKEN"] == "x"
 
 

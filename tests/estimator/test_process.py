@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -111,27 +111,30 @@ def test_one_that_sleeps_is_stopped_at_its_limit(tmp_path):
 
 
 def test_one_that_starts_processes_takes_them_along_when_it_goes(tmp_path):
-    body = "pid = os.fork()\nif pid == 0:\n    time.sleep(600)\nprint(pid, flush=True)\nreturn Result(I)"
+    body = "pid = os.fork()\nif pid == 0:\n    time.sleep(600)\nreturn Result(I)"
     with running(tmp_path, body) as process:
         process.process(frame())
-        child = int((tmp_path / "log.txt").read_text().split()[-1])
-        assert is_alive(child)
-    await_death(child)
+        assert len(workers_of(tmp_path)) == 2
+    await_end(tmp_path)
 
 
-def await_death(pid, patience_s=60.0):
+def workers_of(folder):
+    """The ids of living processes of the estimator in a folder, which their words name."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            words = (place / "cmdline").read_bytes()
+            is_dead = (place / "stat").read_text().rpartition(")")[2].split()[0] == "Z"
+            if b"vobench.estimator.worker" in words and f"\0{folder}\0".encode() in words and not is_dead:
+                found.append(int(place.name))
+    return found
+
+
+def await_end(folder, patience_s=60.0):
     until = time.monotonic() + patience_s
-    while is_alive(pid):
+    while workers_of(folder):
         assert time.monotonic() < until
         time.sleep(0.02)
-
-
-def is_alive(pid):
-    """Whether a process runs; one that is dead and not yet buried does not."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 def test_what_it_prints_is_kept_up_to_a_limit_and_what_it_writes_is_gone(tmp_path):
@@ -191,7 +194,7 @@ def test_an_endless_estimator_does_not_outlive_a_vobench_that_was_killed(tmp_pat
 import sys
 from pathlib import Path
 import test_process as t
-with t.running(Path(sys.argv[1]), "print(os.getpid(), flush=True)\\nwhile True: pass") as process:
+with t.running(Path(sys.argv[1]), "print('here', flush=True)\\nwhile True: pass") as process:
     process.process(t.frame())
 """
     search = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
@@ -202,10 +205,9 @@ with t.running(Path(sys.argv[1]), "print(os.getpid(), flush=True)\\nwhile True: 
         while not (log.exists() and log.read_text().strip()):
             assert time.monotonic() < until
             time.sleep(0.02)
-        estimator = int(log.read_text())
-        assert is_alive(estimator)
+        assert workers_of(tmp_path)
         process.kill()
-    await_death(estimator)
+    await_end(tmp_path)
 
 
 ORPHAN = """
@@ -213,12 +215,11 @@ import os, time
 if os.fork() == 0:
     os.setsid()
     if os.fork() == 0:
-        open({file!r} + ".part", "w").write(str(os.getpid()))
-        os.rename({file!r} + ".part", {file!r})
+        open("orphan", "w").close()
         time.sleep(600)
     os._exit(0)
 os.wait()
-while not os.path.exists({file!r}):  # else vobench may be killed, and this with it, before it has said its number
+while not os.path.exists("orphan"):
     time.sleep(0.01)
 """
 
@@ -226,16 +227,22 @@ while not os.path.exists({file!r}):  # else vobench may be killed, and this with
 @pytest.mark.skipif(sys.platform != "linux", reason="orphans are taken in on Linux alone")
 @pytest.mark.parametrize("how", ["killed", "done"])
 def test_no_orphan_in_a_session_of_its_own_is_left_even_where_vobench_is_killed(tmp_path, how):
-    file = tmp_path / "orphan"
     script = f"""
 import os, sys, signal
 from pathlib import Path
 import test_process as t
-with t.running(Path(sys.argv[1]), {("exec(" + repr(ORPHAN.format(file=str(file))) + "); return Result(I)")!r}) as process:
+with t.running(Path(sys.argv[1]), {("exec(" + repr(ORPHAN) + "); return Result(I)")!r}) as process:
     process.process(t.frame())
+    print(len(t.workers_of(sys.argv[1])), flush=True)
     if {how == "killed"}:
         os.kill(os.getpid(), signal.SIGKILL)
 """
     search = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
-    subprocess.run([sys.executable, "-c", script, str(tmp_path)], env=os.environ | {"PYTHONPATH": search}, check=False)
-    await_death(int(file.read_text()))
+    said = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path)],
+        env=os.environ | {"PYTHONPATH": search},
+        stdout=subprocess.PIPE,
+        check=False,
+    )
+    assert said.stdout.split() == [b"2"]
+    await_end(tmp_path)

@@ -7,9 +7,11 @@ import pytest
 from pydantic import ValidationError
 
 from vobench.errors import InputError
+from vobench.estimator.sandbox import Sandbox
 from vobench.runner.entry import file_hash
 from vobench.runner.folder import (
     HASHES,
+    ONLY_THEIR_OWN,
     SCORE,
     SEQUENCE,
     STATUSES,
@@ -20,6 +22,7 @@ from vobench.runner.folder import (
     open_run,
     read_hashes,
     read_score,
+    visible_to,
     write_hashes,
 )
 from vobench.runner.store import write_json
@@ -183,3 +186,33 @@ def test_a_score_or_a_folder_that_is_none_is_one_sentence_with_its_place(tmp_pat
         file.write_bytes(content)
         with pytest.raises(InputError, match=rf"^not a score as vobench writes it \({said}.*score\.json$"):
             read_score(file)
+
+
+def test_a_board_says_what_estimators_could_see():
+    full = Sandbox("full")
+    none = Sandbox("none", ("the user's files", "the network"))
+    honest = [score(estimator=name, sandbox=full) for name in ("a", "b")]
+    assert visible_to(honest) == ONLY_THEIR_OWN
+    assert visible_to([*honest, score(estimator="c", sandbox=none), score(estimator="d", sandbox=none)]) == (
+        "c, d: not sandboxed: it could see the user's files and the network."
+    )
+    assert "/opt/ros" in visible_to([score(estimator="a", sandbox=Sandbox("full", read=("/opt/ros",)))])
+
+
+def test_a_board_says_of_which_trials_nothing_is_recorded():
+    assert visible_to([score(estimator="old")]) == "old: what it could see is not recorded."
+    assert visible_to([score(estimator="a", status="refused")]) == ONLY_THEIR_OWN
+    assert visible_to([score(estimator="a", claims=("oracle",))]) == ONLY_THEIR_OWN
+
+
+def test_a_score_of_before_sandboxes_were_recorded_can_be_read(tmp_path):
+    facts = score(estimator="old").model_dump(mode="json")
+    del facts["sandbox"]
+    (tmp_path / "score.json").write_text(json.dumps(facts))
+    assert read_score(tmp_path / "score.json").sandbox is None
+
+
+def test_a_score_keeps_what_its_estimator_could_see(tmp_path):
+    kept = score(sandbox=Sandbox("partial", ("the network",), ("/opt/ros",), "why"))
+    (tmp_path / "score.json").write_text(kept.model_dump_json())
+    assert read_score(tmp_path / "score.json") == kept

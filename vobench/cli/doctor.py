@@ -15,7 +15,7 @@ import typer
 from vobench import stop
 from vobench.cli import terminal
 from vobench.errors import MissingDependencyError
-from vobench.estimator.program import sandbox_works
+from vobench.estimator.program import sandbox_here
 from vobench.rendering import mitsuba
 from vobench.rendering.context import DEVICE_VARIABLE, EGL_PACKAGES, EGL_REMEDY
 from vobench.runner.key import cache_folder
@@ -126,10 +126,13 @@ def _cache() -> Check:
 
 def _sandbox() -> Check:
     """Whether estimators can be kept from seeing the truth; they run all the same."""
-    if sandbox_works():
-        return Check("sandbox for estimators", True, "truth, cache and other processes are hidden", optional=True)
+    saw = sandbox_here()
+    if saw.level == "full":
+        return Check("sandbox for estimators", True, "they see their own files and nothing else", optional=True)
     remedy = "allow user namespaces: sysctl user.max_user_namespaces, kernel.apparmor_restrict_unprivileged_userns"
-    return Check("sandbox for estimators", False, "the kernel gives no namespaces; boards say so", remedy, True)
+    why = f" ({saw.why})" if saw.why else ""
+    seen = f"estimators can see {', '.join(saw.sees)}{why}; every trial records it"
+    return Check("sandbox for estimators", False, seen, remedy, True)
 
 
 def _path_tracing() -> Check:

@@ -8,12 +8,13 @@ from typing import Any, Self
 
 import numpy as np
 
-from vobench import stop
 from vobench.errors import TrajectoryError, VobenchError
 from vobench.estimator.check import FARTHEST_M
+from vobench.estimator.home import Home
 from vobench.estimator.manifest import OUT, PLACEHOLDER, Limits
-from vobench.estimator.program import Answer, EstimatorFailure, Program, new_home
+from vobench.estimator.program import Answer, EstimatorFailure, Program
 from vobench.estimator.protocol import Frame, Result, Status
+from vobench.estimator.sandbox import Sandbox
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.trajectory.formats import Parsed, Unit, content, parse_any
@@ -21,7 +22,9 @@ from vobench.trajectory.trajectory import Stamps
 
 UNITS: tuple[Unit | None, ...] = (None, "ns", "us", "ms")
 CALIBRATION = "camchain.yaml"
-OUT_BYTES = 1 << 30
+# More than any form of poses takes; a frame's pose has a line.
+OUT_BYTES = 1 << 20
+OUT_BYTES_PER_FRAME = 4096
 
 
 def filled(argv: Sequence[str], folder: Path, values: Mapping[str, Any]) -> list[str]:
@@ -51,28 +54,41 @@ class CommandProgram:
         write_dataset: Callable[[Path], object],
         hidden: Sequence[Path] = (),
     ) -> None:
+        self._argv = argv
+        self._folder = folder
+        self._log = log
+        self._limits = limits
+        self._out = out
+        self._t_ns = t_ns
+        self._write_dataset = write_dataset
         self._hidden = hidden
-        self._argv, self._folder, self._log, self._limits = argv, folder, log, limits
-        self._out, self._t_ns, self._write_dataset = out, t_ns, write_dataset
-        self._cost, self._poses = (0.0, 0.0, 0.0), dict[int, Array]()
+        self._cost = (0.0, 0.0, 0.0)
+        self._poses = dict[int, Array]()
+        self.sandbox: Sandbox | None = None  # what the program could see; None where it has not been started
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
         """Write the recording, run the program on it and read its poses. Raises EstimatorFailure."""
         del rig  # which is in the files
-        home = new_home()
-        with stop.undone(lambda: stop.remove(home)):
-            (dataset := home / "dataset").mkdir()
+        with Home(self._log) as home:
+            dataset = home.path / "dataset"
+            dataset.mkdir()
             try:
                 self._write_dataset(dataset)
             except VobenchError as error:
                 raise EstimatorFailure("refused", str(error)) from None
-            values = {"dataset": dataset, "calib": dataset / CALIBRATION, "out": home / self._out, "seed": seed}
+            values = {"dataset": dataset, "calib": dataset / CALIBRATION, "out": home.path / self._out, "seed": seed}
             argv = filled(self._argv, self._folder, {**params, **values, "rate_hz": rate_hz(self._t_ns)})
             began = time.monotonic()
-            with Program(argv, log=self._log, limits=self._limits, home=home, hidden=self._hidden) as program:
+            with Program(
+                argv, log=self._log, limits=self._limits, home=home, hidden=self._hidden, folder=self._folder.resolve()
+            ) as program:
+                self.sandbox = program.sandbox
                 program.wait()
-                self._poses = poses_in(home / self._out, self._t_ns)
-        wall_s, frames_per_ms = time.monotonic() - began, len(self._t_ns) / 1e3
+                most_bytes = OUT_BYTES + OUT_BYTES_PER_FRAME * len(self._t_ns)
+                text = program.read(self._out, most_bytes=most_bytes).decode("utf-8", "replace")
+            self._poses = poses_in(text, self._t_ns)
+        wall_s = time.monotonic() - began
+        frames_per_ms = len(self._t_ns) / 1e3
         self._cost = wall_s / frames_per_ms, program.cpu_s / frames_per_ms, program.peak_mib
 
     def process(self, frame: Frame) -> Answer:
@@ -96,16 +112,11 @@ def rate_hz(t_ns: Stamps) -> float:
     return round(1e9 / float(np.median(np.diff(t_ns))), 6) if len(t_ns) > 1 else 1.0
 
 
-def poses_in(path: Path, t_ns: Stamps) -> dict[int, Array]:
+def poses_in(text: str, t_ns: Stamps) -> dict[int, Array]:
     """The poses that a program wrote, by the stamps of the frames, each within half a step of its own.
 
     Any form that `vobench score` reads; one without stamps has a pose for each frame. Raises EstimatorFailure.
     """
-    if not path.is_file():
-        raise EstimatorFailure("invalid_output", "it ended well, but wrote no file {out}")
-    if path.stat().st_size > OUT_BYTES:
-        raise EstimatorFailure("invalid_output", f"it wrote {path.stat().st_size} bytes of poses")
-    text = path.read_text(encoding="utf-8", errors="replace")
     if not content(text):
         raise EstimatorFailure("lost", "it ended well, but {out} is empty")
     errors = list[str]()

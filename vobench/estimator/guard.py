@@ -1,37 +1,53 @@
 """The parent of an estimator's processes: none of them outlives the trial or vobench, whatever session it is in.
 
-Where the kernel allows it they live in namespaces of their own (namespaces(7)): they see no other processes, and
-folders that are hidden from them are empty.
+Where the kernel allows it they are isolated (`isolation`): they see no other processes, and no files but their own.
 
-Run as a script by a bare interpreter, for it should cost next to nothing: nothing of vobench is imported.
+Run by a bare interpreter, because a start should cost next to nothing: nothing of vobench is imported.
 """
 
+import _socket
 import ctypes
-import json
+import marshal
 import os
 import resource
 import select
 import signal
-import socket
 import sys
 import time
 from contextlib import suppress
-from typing import NoReturn
+
+try:
+    from vobench.estimator import isolation
+except ModuleNotFoundError:  # in the bare interpreter, which has this folder alone to look in
+    import isolation  # type: ignore[import-not-found,no-redef]
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any, NoReturn
 
 PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
 LOOK_S = 0.5  # how often we look whether vobench lives, should its end of the line be held open by another
 KILL_S = 0.002
 CANNOT_START = 127
-# linux/sched.h and linux/mount.h
-CLONE_NEWNS, CLONE_NEWUSER, CLONE_NEWPID = 0x00020000, 0x10000000, 0x20000000
-MS_RDONLY, MS_BIND, MS_REC, MS_PRIVATE = 1, 4096, 16384, 1 << 18
+PLAN_BYTES = 1 << 20
 
 
-def guard(line: socket.socket, file_bytes: int, hidden: list[str], argv: list[str]) -> NoReturn:
-    """Start a program, say on the line how that went, and end as it ends, or when the line is cut."""
-    line.set_inheritable(False)
+def main() -> "NoReturn":
+    """Guard the program of the plan that is sent on the line, whose descriptor is the first argument."""
+    line = _socket.socket(fileno=int(sys.argv[1]))
+    plan = marshal.loads(line.recv(PLAN_BYTES))
+    guard(line, plan)
+
+
+def guard(line: _socket.socket, plan: "dict[str, Any]") -> "NoReturn":
+    """Start a program, report on the line how that went, and end as it ends, or when the line is cut.
+
+    `plan` is that of `sandbox.plan`. Two messages go down the line: what the program can see beyond its own, with the
+    descriptors of `isolation.enter`, and the errno of its start, 0 where it runs.
+    """
+    os.set_inheritable(line.fileno(), False)
     parent = os.getppid()
-    for limit, value in ((resource.RLIMIT_FSIZE, file_bytes), (resource.RLIMIT_CORE, 0)):
+    for limit, value in ((resource.RLIMIT_FSIZE, plan["file_bytes"]), (resource.RLIMIT_CORE, 0)):
         with suppress(ValueError):  # where we are given less ourselves
             resource.setrlimit(limit, (value, value))
     _prctl(PR_SET_CHILD_SUBREAPER, 1)  # the orphans of all below us become our own
@@ -41,7 +57,8 @@ def guard(line: socket.socket, file_bytes: int, hidden: list[str], argv: list[st
     signal.signal(signal.SIGCHLD, lambda *_: None)
     signal.set_wakeup_fd(hears)
     ends, writes = os.pipe()
-    main, status = _started(argv, line, hidden, writes), None
+    main = _started(plan, line, writes)
+    status = None
     os.close(writes)
     for fd in (0, 1):  # the program's alone, whose end is then seen at the other side
         os.close(fd)
@@ -56,75 +73,56 @@ def guard(line: socket.socket, file_bytes: int, hidden: list[str], argv: list[st
     _end_as(int(os.read(ends, 16) or status or 0))
 
 
-def _started(argv: list[str], line: socket.socket, hidden: list[str], ended: int) -> int:
-    """The id of the program's process, or of the first in its namespaces, which writes on `ended` how the program did.
-
-    Down the line goes "1" where the hidden folders are hidden, else "0", and errno, 0 where the program runs.
-    """
-    is_apart, (reads, writes) = bool(hidden) and _unshared(), os.pipe()
+def _started(plan: "dict[str, Any]", line: _socket.socket, ended: int) -> int:
+    """The id of the program's process, or of the first in its namespace, which writes the program's end on `ended`."""
+    is_isolated = plan["is_isolated"]
+    has_pid_namespace = is_isolated and isolation.new_pid_namespace()
+    reads, writes = os.pipe()
     pid = os.fork()
     if pid == 0:
         signal.set_wakeup_fd(-1)
         for number in (signal.SIGCHLD, signal.SIGPIPE, signal.SIGXFSZ):  # which our interpreter has changed
             signal.signal(number, signal.SIG_DFL)
         _prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-        os.write(writes, b"1 " if is_apart and _hide(hidden) else b"0 ")
-        if is_apart:
+        if is_isolated:
+            _isolate(plan, line, has_pid_namespace=has_pid_namespace)
+        line.close()
+        if has_pid_namespace:
             _be_first(writes, ended)
         try:
-            os.execvp(argv[0], argv)
+            os.execv(plan["program"], plan["argv"])
         except OSError as error:
             os.write(writes, str(error.errno).encode())
         os._exit(CANNOT_START)
     os.close(writes)
-    said = b""
+    failed = b""
     while more := os.read(reads, 16):
-        said += more
-    line.send(said + b"0" if said.endswith(b" ") else said)
+        failed += more
     os.close(reads)
+    with suppress(OSError):  # where vobench has gone meanwhile
+        line.send(failed or b"0")
     return pid
 
 
-def _unshared() -> bool:
-    """Whether our children are in a namespace of processes of their own, as the system's root or as one of our own."""
-    user, group = os.getuid(), os.getgid()
-    try:
-        libc = ctypes.CDLL(None, use_errno=True)
-        if libc.unshare(CLONE_NEWPID) == 0:
-            return True
-        if libc.unshare(CLONE_NEWUSER | CLONE_NEWPID):
-            return False
-        for name, text in (("setgroups", "deny"), ("uid_map", f"{user} {user} 1"), ("gid_map", f"{group} {group} 1")):
-            with open(f"/proc/self/{name}", "w") as file:
-                file.write(text)
-    except (OSError, AttributeError):
-        return False
-    return True
-
-
-def _hide(paths: list[str]) -> bool:
-    """Whether folders are now empty and files without content for this process and those that come of it."""
-    libc = ctypes.CDLL(None, use_errno=True)
-    if libc.unshare(CLONE_NEWNS) or libc.mount(None, b"/", None, MS_REC | MS_PRIVATE, None):
-        return False
-    libc.mount(b"proc", b"/proc", b"proc", 0, None)  # where the system's own is masked this may not be
-    done = True
-    for path in paths:
-        at = os.fsencode(path)
-        if os.path.isdir(at):
-            done &= libc.mount(b"tmpfs", at, b"tmpfs", MS_RDONLY, b"size=4k") == 0
-        elif os.path.exists(at):
-            done &= libc.mount(b"/dev/null", at, None, MS_BIND, None) == 0
-    return bool(done)
+def _isolate(plan: "dict[str, Any]", line: _socket.socket, *, has_pid_namespace: bool) -> None:
+    """Isolate this process, and send what it can see all the same, why, and the descriptors of its file systems."""
+    sees, why, descriptors = isolation.enter(plan, has_pid_namespace=has_pid_namespace)
+    report = marshal.dumps((sees, why, has_pid_namespace))
+    packed = b"".join(descriptor.to_bytes(4, sys.byteorder) for descriptor in descriptors)
+    rights = [(_socket.SOL_SOCKET, _socket.SCM_RIGHTS, packed)] if packed else []
+    line.sendmsg([report], rights)
+    for descriptor in descriptors:
+        os.close(descriptor)
 
 
 def _be_first(writes: int, ended: int) -> None:
     """Become the first process of our namespace, with which all others go; come back as the program's alone."""
+    isolation.hide_from_children()
     pid = os.fork()
     if pid == 0:
         _prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         return
-    for fd in (0, 1, writes):
+    for fd in (0, 1, 2, writes):
         os.close(fd)
     while True:
         who, status = os.wait()
@@ -154,7 +152,7 @@ def _end_all() -> None:
             time.sleep(KILL_S)
 
 
-def _end_as(status: int) -> NoReturn:
+def _end_as(status: int) -> "NoReturn":
     """End with the exit code or by the signal of another process."""
     if os.WIFSIGNALED(status):
         with suppress(OSError):  # SIGKILL has no other handler
@@ -187,7 +185,3 @@ def stat(pid: int) -> list[str]:
     with suppress(OSError), open(f"/proc/{pid}/stat", errors="replace") as file:
         return file.read().rpartition(")")[2].split()
     return []
-
-
-if __name__ == "__main__":
-    guard(socket.socket(fileno=int(sys.argv[1])), int(sys.argv[2]), json.loads(sys.argv[3]), sys.argv[4:])

@@ -34,6 +34,7 @@ from vobench.estimator.message import (
 )
 from vobench.estimator.program import LOOK_S, Answer, EstimatorFailure, Program
 from vobench.estimator.protocol import Frame
+from vobench.estimator.sandbox import Sandbox
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 
@@ -52,9 +53,20 @@ class Door:
 class EstimatorProcess:
     """A running estimator; what it prints goes to `log`. Its verbs raise EstimatorFailure."""
 
-    def __init__(self, door: Door, *, log: Path, limits: Limits, hidden: Sequence[Path] = ()) -> None:
-        self._door, self._log, self._limits, self._hidden = door, log, limits, hidden
+    def __init__(
+        self, door: Door, *, log: Path, limits: Limits, hidden: Sequence[Path] = (), folder: Path | None = None
+    ) -> None:
+        self._door = door
+        self._log = log
+        self._limits = limits
+        self._hidden = hidden
+        self._folder = folder
         self._running: AbstractContextManager[Program] | None = None
+
+    @property
+    def sandbox(self) -> Sandbox | None:
+        """What the estimator could see; None where it has not been started."""
+        return self._program.sandbox if self._running else None
 
     @classmethod
     def of_class(
@@ -69,12 +81,13 @@ class EstimatorProcess:
         hidden: Sequence[Path] = (),
     ) -> Self:
         """A class in Python, in a process of its own; who `is_watched` fails where it changes a frame."""
+        folder = folder.resolve()
         argv = [*WORKER, str(folder), class_path, name, str(limits.memory_mib << 20)]
 
         def opened(rig: Rig, params: Mapping[str, Any], seed: int) -> tuple[Sequence[str], bytes]:
             return argv, pickle.dumps((rig, dict(params), seed, is_watched))
 
-        return cls(Door(opened, pickled), log=log, limits=limits, hidden=hidden)
+        return cls(Door(opened, pickled), log=log, limits=limits, hidden=hidden, folder=folder)
 
     @classmethod
     def of_stream(
@@ -95,7 +108,7 @@ class EstimatorProcess:
                 said, default=str
             ).encode()
 
-        return cls(Door(opened, framed), log=log, limits=limits, hidden=hidden)
+        return cls(Door(opened, framed), log=log, limits=limits, hidden=hidden, folder=folder)
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
         """Start it, hand over the calibration, and wait until it is ready; a second time, to start again."""
@@ -110,7 +123,14 @@ class EstimatorProcess:
     def _open(self, argv: list[str]) -> None:
         pipe = subprocess.PIPE
         self._program = self._running = Program(
-            argv, log=self._log, limits=self._limits, hidden=self._hidden, stdin=pipe, stdout=pipe, bufsize=0
+            argv,
+            log=self._log,
+            limits=self._limits,
+            hidden=self._hidden,
+            folder=self._folder,
+            stdin=pipe,
+            stdout=pipe,
+            bufsize=0,
         )
         process = self._program.process
         assert process.stdin
@@ -123,6 +143,7 @@ class EstimatorProcess:
     def process(self, frame: Frame) -> Answer:
         """Hand over the next frame; what the estimator says of it, checked."""
         cpu_s, parts = self._program.cpu_s, self._door.framed(frame)
+        self._refuse_early_answer(f"frame {frame.index}")
         began, until = time.monotonic(), self._until(self._limits.frame_s)
         self._send(b"FRAM", parts, until)
         _, payload = self._receive(f"frame {frame.index}", {b"POSE"}, until)
@@ -136,6 +157,7 @@ class EstimatorProcess:
 
     def finish(self) -> dict[int, Array]:
         """Say that there are no more frames; the poses that it revises, until it says so too or ends well."""
+        self._refuse_early_answer("the end")
         revised, until = dict[int, Array](), self._until(self._program.left_s())
         self._send(b"DONE", [], until)
         for _ in range(self._frames + 1):
@@ -147,6 +169,12 @@ class EstimatorProcess:
             except InvalidOutputError as error:
                 raise EstimatorFailure("invalid_output", str(error)) from None
         raise EstimatorFailure("invalid_output", f"the end: more poses revised than the {self._frames} frames it had")
+
+    def _refuse_early_answer(self, what: str) -> None:
+        """Raise EstimatorFailure where it has answered what it has not been asked yet."""
+        answered, _, _ = select.select([self._output], [], [], 0)
+        if answered:
+            self._receive(f"{what}, before it was asked", set(), self._until(self._limits.frame_s))
 
     def _until(self, limit_s: float) -> float:
         self._limit_s = limit_s
@@ -174,6 +202,7 @@ class EstimatorProcess:
         tag, length = HEADER.unpack(head)
         if tag in FAILURES:
             reason = self._read(min(length, REASON_BYTES), what, until).decode("utf-8", "replace")
+            self._program.look(at_once=True)  # a limit, of which the failure may be a consequence
             raise EstimatorFailure(FAILURES[tag], reason)
         if tag not in tags or length > ANSWER_BYTES:
             wanted = " or ".join(sorted(tag.decode() for tag in tags if tag)) or "nothing"

@@ -1,6 +1,6 @@
 """A program in a session and a folder of its own, under limits: what all its processes use, and how it ended."""
 
-import json
+import marshal
 import os
 import resource
 import signal
@@ -19,16 +19,18 @@ from types import TracebackType
 from typing import Any, Self
 
 from vobench import stop
+from vobench.estimator import sandbox
 from vobench.estimator.check import in_one_line
 from vobench.estimator.guard import descendants, stat
+from vobench.estimator.home import Home, UnreadableFileError, held_bytes, read_below
 from vobench.estimator.manifest import Limits
 from vobench.estimator.protocol import Result
+from vobench.estimator.sandbox import Sandbox
 from vobench.portable import PORTABLE, VARIABLES
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 KEPT_ENVIRONMENT = (
     "PATH",
-    "HOME",
     "LANG",
     "LC_ALL",
     "LD_LIBRARY_PATH",
@@ -43,7 +45,10 @@ WEIGH_S = 1.0  # how often its files are
 SHARED = "/dev/shm/"  # Linux's shared memory, where it has a name
 DIE_S = 0.005  # for a process that is killed to be gone
 GUARD_S = 2.0  # the guard's time to end what it guards
-GUARD = (sys.executable, "-I", "-S", str(Path(__file__).with_name("guard.py")))
+GUARD_CODE = "import sys; sys.path.append(sys.argv.pop(1)); import guard; guard.main()"
+GUARD = (sys.executable, "-I", "-S", "-c", GUARD_CODE, str(Path(__file__).parent))
+MESSAGE_BYTES = 1 << 16
+MEBIBYTE = 1 << 20
 CPUCLOCK_SCHED = 2  # of another process's clock: linux/posix-timers.h
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 MOST_OF_A_LINE = 160
@@ -71,8 +76,9 @@ class Program:
     """A running program; what it prints goes to `log`. Its verbs raise EstimatorFailure.
 
     It has a folder of its own to work in, no shell, and of our environment KEPT_ENVIRONMENT alone. All that it
-    starts, in whatever session, has a guard for an ancestor, and is killed with it. Where `is_apart` it sees neither
-    the folders that are `hidden` from it, but for those in which something lies that it needs, nor other processes.
+    starts, in whatever session, has a guard for an ancestor, and is killed with it. It sees the files of
+    `sandbox.plan`, of which `folder` is its own, but for those that are `hidden`; `sandbox` has what it could see
+    beyond these.
     """
 
     def __init__(
@@ -81,45 +87,91 @@ class Program:
         *,
         log: Path,
         limits: Limits,
-        home: Path | None = None,
+        home: Home | None = None,
         hidden: Sequence[Path] = (),
+        folder: Path | None = None,
         **streams: Any,
     ) -> None:
-        self.limits, self._log_path, self._printed = limits, log, 0
-        self.home = home or new_home()
-        self._began, self._looked, self._weighed = time.monotonic(), 0.0, time.monotonic()
-        self._pids, self._files_before = list[int](), _held_bytes(self.home, most=sys.maxsize)
-        self._before_s, self.cpu_s, self.peak_mib = _buried_s(), 0.0, 0.0
-        self._shared, self._shared_before = set[str](), {str(path) for path in Path(SHARED).glob("*")}
-        kept = {name: value for name, value in os.environ.items() if name in KEPT_ENVIRONMENT}
-        one = {**dict.fromkeys(THREADS, str(limits.threads)), "PYTHONHASHSEED": "0", "TMPDIR": str(self.home)}
+        self.limits = limits
+        self._log_path = log
+        self._printed = 0
+        self._began = time.monotonic()
+        self._looked = 0.0
+        self._weighed = time.monotonic()
+        self._pids = list[int]()
+        self._before_s = _buried_s()
+        self.cpu_s = 0.0
+        self.peak_mib = 0.0
+        self._shared = set[str]()
+        self._shared_before = {str(path) for path in Path(SHARED).glob("*")}
+        self.sandbox = sandbox.unsandboxed()
+        self.is_apart = False  # in a process namespace of its own
+        self._disk = self._shared_memory = -1  # descriptors of its file systems, where it has some of its own
         with ExitStack() as undone:
-            undone.enter_context(stop.undone(lambda: stop.remove(self.home)))
-            self._log = undone.enter_context(log.open("ab"))  # to its end, also once we have cut it
-            os.truncate(log, 0)
+            self._home = home or undone.enter_context(Home(log))
+            self.home = self._home.path
+            self._files = self._home.descriptor
+            self._files_before = held_bytes(self._files, most=sys.maxsize)
+            flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC  # to its end, also once cut
+            self._log = os.open(log, flags, 0o666)
+            self._log_mode = os.fstat(self._log).st_mode & 0o777
+            undone.callback(self._close_log)
             undone.callback(self._free_shared)
-            line, theirs = socket.socketpair()
+            undone.callback(self._close_descriptors)
+            line, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             self._line = undone.enter_context(line)
+            plan = sandbox.plan(
+                argv, home=self.home, homes=self._home.base, folder=folder, hidden=hidden, limits=limits
+            )
             given = {"stdin": subprocess.DEVNULL, "stdout": self._log, "stderr": self._log, **streams}
-            unseen = json.dumps([str(path) for path in hidden if not _holds(path, [self.home, *_needed(argv)])])
-            guarded = [*GUARD, str(theirs.fileno()), str(limits.disk_mib << 20), unseen, *argv]
-            given |= {"cwd": self.home, "env": kept | one, "pass_fds": [theirs.fileno()]}
-            try:
-                with theirs:
-                    self.process = subprocess.Popen(guarded, start_new_session=True, **given)
-            except (OSError, ValueError) as error:  # no memory for it, or a NUL in its words
-                raise EstimatorFailure("refused", f"{argv[0]} cannot be started ({error})") from None
+            given |= {"cwd": self.home, "env": self._environment(), "pass_fds": [theirs.fileno()]}
+            with theirs:
+                self.process = self._started([*GUARD, str(theirs.fileno())], argv[0], given)
             for pipe in filter(None, (self.process.stdin, self.process.stdout)):
                 undone.callback(pipe.close)
             undone.enter_context(stop.undone(self._kill, is_awaited=True))
             line.settimeout(limits.start_s)
             try:
-                self.is_apart, errno = map(int, (line.recv(16) or b"0 0").split())
+                line.send(marshal.dumps(plan))
+                if plan["is_isolated"]:
+                    self._take_report()
+                number = int(line.recv(MESSAGE_BYTES) or b"0")
             except TimeoutError:
                 raise EstimatorFailure("timeout", f"it did not run within {limits.start_s:g} s") from None
-            if errno:
-                raise EstimatorFailure("refused", f"{argv[0]} cannot be started ({os.strerror(errno)})")
+            except OSError:  # the guard is gone, and its status says why
+                number = 0
+            if number:
+                raise EstimatorFailure("refused", self._why_not_started(argv[0], number, folder))
             self._undone = undone.pop_all()
+
+    def _environment(self) -> dict[str, str]:
+        """The variables of the program: few of ours, its threads, and its folder as HOME and TMPDIR."""
+        kept = {name: value for name, value in os.environ.items() if name in KEPT_ENVIRONMENT}
+        threads = dict.fromkeys(THREADS, str(self.limits.threads))
+        home = str(self.home)
+        return {**kept, **threads, "PYTHONHASHSEED": "0", "HOME": home, "TMPDIR": home, **sandbox.user_packages()}
+
+    def _started(self, guarded: list[str], name: str, given: dict[str, Any]) -> "subprocess.Popen[bytes]":
+        try:
+            return subprocess.Popen(guarded, start_new_session=True, **given)
+        except (OSError, ValueError) as error:  # no memory for it, or a NUL in its words
+            raise EstimatorFailure("refused", f"{name} cannot be started ({error})") from None
+
+    def _take_report(self) -> None:
+        """Take what the guard reports of the sandbox, and the descriptors of the program's file systems."""
+        message, descriptors, _, _ = socket.recv_fds(self._line, MESSAGE_BYTES, maxfds=3)
+        if not message:
+            return
+        sees, why, self.is_apart = marshal.loads(message)
+        self.sandbox = sandbox.of_report(sees, why)
+        if descriptors:
+            self._disk, self._files, self._shared_memory = descriptors
+
+    def _why_not_started(self, name: str, number: int, folder: Path | None) -> str:
+        said = f"{name} cannot be started ({os.strerror(number)})"
+        if self.sandbox.level != "none" and sandbox.is_out_of_reach(name, folder):
+            return f"{said}: it lies outside of what an estimator may read; name its folder in {sandbox.READ}"
+        return said
 
     def _kill(self) -> None:
         """Have the guard end all of them; and it, and whoever bears our mark, where it cannot."""
@@ -130,6 +182,8 @@ class Program:
         stop.kill_session(self.process)
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(timeout=GUARD_S)
+        if self.is_apart:  # all of them went with the first of their namespace
+            return
         until = time.monotonic() + GUARD_S
         while (strays := _strays(self.home)) and time.monotonic() < until:
             for pid in strays:
@@ -137,54 +191,114 @@ class Program:
                     os.kill(pid, signal.SIGKILL)
             time.sleep(DIE_S)
 
+    def _close_descriptors(self) -> None:
+        if self._disk >= 0:
+            for descriptor in (self._disk, self._files, self._shared_memory):
+                os.close(descriptor)
+            self._disk = self._shared_memory = -1
+
     def _free_shared(self) -> None:
         for path in self._shared:
             with suppress(OSError):
                 os.unlink(path)
 
+    def read(self, name: str, *, most_bytes: int) -> bytes:
+        """What it wrote to a file below its folder. Raises EstimatorFailure, also where that is a link or no file."""
+        try:
+            return read_below(self._files, name, most_bytes=most_bytes, check=self._check_time)
+        except FileNotFoundError:
+            raise EstimatorFailure("invalid_output", "it ended well, but wrote no file {out}") from None
+        except UnreadableFileError as error:
+            raise EstimatorFailure("invalid_output", f"{{out}} {error}") from None
+
     def left_s(self) -> float:
         """Seconds that are left of the whole trial's."""
         return self._began + self.limits.trial_s - time.monotonic()
 
-    def look(self, *, at_once: bool = False) -> None:
-        """Add up what all its processes use, now and then. Raises EstimatorFailure beyond a limit."""
+    def _check_time(self) -> None:
+        """Raise EstimatorFailure where the trial takes too long."""
         stop.check()
         if self.left_s() < 0:
             raise EstimatorFailure("timeout", f"the whole trial took more than {self.limits.trial_s:g} s")
+
+    def look(self, *, at_once: bool = False) -> None:
+        """Add up what all its processes use, now and then. Raises EstimatorFailure beyond a limit."""
+        self._check_time()
         is_time = time.monotonic() > self._looked + LOOK_S
         if is_time:
-            self._looked, self._pids = time.monotonic(), [self.process.pid, *descendants(self.process.pid)]
+            self._looked = time.monotonic()
+            self._pids = [self.process.pid, *descendants(self.process.pid)]
             self._cut_log()
         if not (is_time or at_once):
             return
         stats = {pid: fields for pid in self._pids if (fields := stat(pid))}
         self.cpu_s = max(self.cpu_s, sum(_cpu_s(pid, fields) for pid, fields in stats.items()))
-        ours = self._pids[: 1 + bool(self.is_apart)]  # the guard, and the first of its namespace
-        pages = sum(int(fields[21]) for pid, fields in stats.items() if pid not in ours)
-        memory_mib = pages * resource.getpagesize() / (1 << 20)
+        ours = self._pids[: 1 + self.is_apart]  # the guard, and the first of its namespace
+        memory_mib = self._memory_mib({pid: fields for pid, fields in stats.items() if pid not in ours})
         self.peak_mib = max(self.peak_mib, memory_mib)
         if memory_mib > self.limits.memory_mib:
             limit = f"where the limit is {self.limits.memory_mib} MiB"
             raise EstimatorFailure("out_of_memory", f"its processes hold {memory_mib:.0f} MiB, {limit}")
-        if time.monotonic() > self._weighed + WEIGH_S:
+        if self._disk >= 0:
+            self._weigh_disk()
+        elif time.monotonic() > self._weighed + WEIGH_S:
             self._weigh_files()
+
+    def _memory_mib(self, stats: dict[int, list[str]]) -> float:
+        """The memory of processes by their `stat`, with what lies in shared memory.
+
+        Resident pages are added up, which counts those that processes share once for each. Where that is beyond the
+        limit, or includes shared memory with a name, each page is divided by the number of those who have it (PSS).
+        """
+        in_files = 0
+        if self._shared_memory >= 0:
+            in_files = _used_bytes(self._shared_memory)
+        resident = sum(int(fields[21]) for fields in stats.values()) * resource.getpagesize()
+        memory = resident + in_files
+        if memory > self.limits.memory_mib * MEBIBYTE or in_files > MEBIBYTE:
+            parts = [_proportional_bytes(pid, int(fields[21])) for pid, fields in stats.items()]
+            private = sum(part[0] for part in parts)
+            shared = sum(part[1] for part in parts)
+            memory = private + max(shared, in_files)  # of which files that are mapped are a part
+        return memory / MEBIBYTE
+
+    def _weigh_disk(self) -> None:
+        """Raises EstimatorFailure where the file system of its folder holds more than the limit."""
+        if self._is_disk_full():
+            raise EstimatorFailure(*self._of_files())
+        if time.monotonic() > self._weighed + WEIGH_S:
+            self._weigh_nameless(0)
+
+    def _is_disk_full(self) -> bool:
+        return self._disk >= 0 and _used_bytes(self._disk) > self.limits.disk_mib * MEBIBYTE
+
+    def _of_files(self) -> tuple[str, str]:
+        return "out_of_memory", f"its files hold more than the limit of {self.limits.disk_mib} MiB"
 
     def _weigh_files(self) -> None:
         """Raises EstimatorFailure where its folder and the nameless files that it holds open are beyond the limit."""
-        self._weighed, most = time.monotonic(), self.limits.disk_mib << 20
-        held = _held_bytes(self.home, most=most + self._files_before) - self._files_before
-        nameless = _nameless(self._pids)
-        self._shared |= {target for _, target in nameless.values()} - self._shared_before
-        if held + sum(size for size, _ in nameless.values()) > most:
-            reason = f"its files hold more than the limit of {self.limits.disk_mib} MiB"
-            raise EstimatorFailure("out_of_memory", reason)
+        if self._disk >= 0:
+            self._weigh_nameless(0)
+            return
+        most = self.limits.disk_mib * MEBIBYTE
+        held = held_bytes(self._files, most=most + self._files_before) - self._files_before
+        self._weigh_nameless(held)
+
+    def _weigh_nameless(self, held: int) -> None:
+        self._weighed = time.monotonic()
+        known = [os.fstat(descriptor).st_dev for descriptor in (self._disk, self._shared_memory) if descriptor >= 0]
+        nameless = {key: file for key, file in _nameless(self._pids).items() if key[0] not in known}
+        if self._disk < 0:
+            self._shared |= {target for _, target in nameless.values()} - self._shared_before
+        if held + sum(size for size, _ in nameless.values()) > self.limits.disk_mib * MEBIBYTE:
+            raise EstimatorFailure(*self._of_files())
 
     def _cut_log(self) -> None:
         """Keep the beginning of a log that is filled without end."""
-        size = os.path.getsize(self._log_path)
+        size = os.fstat(self._log).st_size
         if size > LOG_BYTES:
             self._printed += size - LOG_BYTES
-            os.truncate(self._log_path, LOG_BYTES)
+            os.ftruncate(self._log, LOG_BYTES)
 
     def wait(self) -> None:
         """Wait for its end. Raises EstimatorFailure where that is none that it wanted."""
@@ -204,6 +318,8 @@ class Program:
             return "invalid_output", "it closed its output and lives on"
         if not code:
             return "invalid_output", "it ended, with exit code 0"
+        if self._is_disk_full():
+            return self._of_files()
         if code == -signal.SIGKILL:
             return "out_of_memory", "killed by the system, most likely for memory"
         by = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
@@ -211,9 +327,8 @@ class Program:
         return "crashed", f"the process ended with {by}{f': {said}' if said else ''}"
 
     def _last_line(self) -> str:
-        with self._log_path.open("rb") as log:
-            log.seek(max(os.path.getsize(self._log_path) - 4096, 0))
-            lines = log.read(4096).decode("utf-8", "replace").split("\n")
+        size = os.fstat(self._log).st_size
+        lines = os.pread(self._log, 4096, max(size - 4096, 0)).decode("utf-8", "replace").split("\n")
         return next(filter(None, (in_one_line(line, MOST_OF_A_LINE) for line in reversed(lines))), "")
 
     def __enter__(self) -> Self:
@@ -229,41 +344,32 @@ class Program:
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(timeout=0.5 if kind is None else 0)
         self._undone.close()
+
+    def _close_log(self) -> None:
+        """Cut the log a last time, and give it the mode that it had, for the program has its descriptor, too."""
         self._cut_log()
         if self._printed:
-            with self._log_path.open("a", encoding="utf-8") as log:
-                log.write(f"\n[vobench: cut here; the estimator printed {LOG_BYTES + self._printed} bytes]\n")
+            os.write(
+                self._log, f"\n[vobench: cut here; the estimator printed {LOG_BYTES + self._printed} bytes]\n".encode()
+            )
+        os.fchmod(self._log, self._log_mode)
+        os.close(self._log)
 
 
 @cache
-def sandbox_works() -> bool:
-    """Whether this machine lets us hide folders and processes from a program; it is tried once."""
+def sandbox_here() -> Sandbox:
+    """What a program on this machine could see; it is tried once."""
     with tempfile.TemporaryDirectory() as folder:
-        unseen, log = Path(folder, "unseen"), Path(folder, "log.txt")
-        unseen.mkdir()
         try:
-            with Program(["true"], log=log, limits=Limits(), hidden=[unseen]) as program:
-                return bool(program.is_apart)
+            with Program(["true"], log=Path(folder, "log.txt"), limits=Limits()) as program:
+                return program.sandbox
         except EstimatorFailure:
-            return False
+            return sandbox.unsandboxed()
 
 
-def _needed(argv: Sequence[str]) -> list[Path]:
-    """What a program reads: our interpreter and packages, and what its words and our environment name."""
-    named = [*argv, *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
-    own = [Path(sys.prefix), Path(sys.base_prefix), Path(__file__)]
-    return [*own, *(Path(word).absolute() for word in named if os.sep in word)]
-
-
-def _holds(folder: Path, paths: Iterable[Path]) -> bool:
-    """Whether one of the paths lies in a folder, or is it."""
-    real = folder.resolve()
-    return any(path == folder or path.resolve().is_relative_to(real) for path in paths)
-
-
-def new_home() -> Path:
-    """A new folder for a program to work in."""
-    return Path(tempfile.mkdtemp(prefix="vobench-estimator-"))
+def sandbox_works() -> bool:
+    """Whether this machine lets us show a program its own files alone, and nothing else."""
+    return sandbox_here().level == "full"
 
 
 def _strays(home: Path) -> list[int]:
@@ -285,16 +391,23 @@ def _cpu_s(pid: int, fields: list[str]) -> float:
         return sum(map(int, fields[11:13])) / TICKS_PER_S + buried
 
 
-def _held_bytes(folder: Path, *, most: int) -> int:
-    """What the files below a folder take up, counted until that is more than `most`; a block at least for each."""
-    held = 0
-    for at, folders, names in os.walk(folder):
-        for name in (*folders, *names):
-            with suppress(OSError):
-                held += max(os.lstat(os.path.join(at, name)).st_blocks * 512, 4096)
-            if held > most:
-                return held
-    return held
+def _used_bytes(descriptor: int) -> int:
+    """What is taken of a file system that is the program's alone; of a file without content its entry, a block."""
+    facts = os.fstatvfs(descriptor)
+    blocks = (facts.f_blocks - facts.f_bfree) * facts.f_frsize
+    return max(blocks, (facts.f_files - facts.f_ffree) * 4096)
+
+
+def _proportional_bytes(pid: int, resident_pages: int) -> tuple[int, int]:
+    """A process's part of the memory that it has: private and of files, and shared (proc(5), smaps_rollup).
+
+    Where the kernel does not say, all that is resident.
+    """
+    with suppress(OSError, ValueError), open(f"/proc/{pid}/smaps_rollup", encoding="ascii") as file:
+        kib = {line.split(":")[0]: int(line.split()[1]) for line in file if line.startswith("Pss")}
+        shared = kib.get("Pss_Shmem", 0)
+        return 1024 * (kib["Pss"] - shared), 1024 * shared
+    return resident_pages * resource.getpagesize(), 0
 
 
 def _nameless(pids: Iterable[int]) -> dict[tuple[int, int], tuple[int, str]]:

@@ -1,5 +1,6 @@
 """The process an estimator runs in: its folder imported, frames handed to it."""
 
+import errno
 import importlib
 import importlib.machinery
 import importlib.util
@@ -136,8 +137,9 @@ def _answers(asked: BinaryIO, estimator: Estimator) -> Iterator[Says]:
 
 
 def _tag(error: Exception) -> bytes:
+    is_disk_full = isinstance(error, OSError) and error.errno == errno.ENOSPC
     # OpenCV reports a failed allocation as its own error -4.
-    if isinstance(error, MemoryError) or "Insufficient memory" in str(error):
+    if isinstance(error, MemoryError) or is_disk_full or "Insufficient memory" in str(error):
         return b"NMEM"
     if isinstance(error, InvalidOutputError):
         return b"WRNG"

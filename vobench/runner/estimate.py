@@ -22,6 +22,7 @@ from vobench.estimator.oracle import NoisyTruth
 from vobench.estimator.process import EstimatorProcess
 from vobench.estimator.program import Answer, EstimatorFailure
 from vobench.estimator.protocol import EncoderReadings, Frame, Status
+from vobench.estimator.sandbox import Sandbox
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
@@ -48,12 +49,16 @@ DROPPED = "dropped"  # a frame that came while the estimator was busy with anoth
 
 
 class Outcome(BaseModel):
-    """How an estimator's process ended: FINISHED, or the kind of its failure and why."""
+    """How an estimator's process ended: FINISHED, or the kind of its failure and why; and what it could see.
+
+    `sandbox` is None where no process was started.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: str
     reason: str
+    sandbox: Sandbox | None = None
 
 
 def read_outcome(folder: Path) -> Outcome:
@@ -78,17 +83,25 @@ Running = EstimatorProcess | CommandProgram | NoisyTruth
 
 def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress") -> None:
     """Feed a sequence to a trial's estimator; whatever happens, the folder is complete afterwards."""
-    sequence, outcome = Sequence.open(recording), Outcome(kind=FINISHED, reason="")
+    sequence = Sequence.open(recording)
+    kind = FINISHED
+    reason = ""
+    running: Running | None = None
     (folder / LOG).touch()
     with _keeper(folder) as keeper:
         try:
             keeper.T_frame_left = _T_frame_left(sequence.rig, trial.entrant.manifest)
             _check_needs(trial.entrant.manifest.needs, sequence)
-            _feed(trial, sequence, keeper, progress, _running(trial, recording, folder / LOG))
+            running = _running(trial, recording, folder / LOG)
+            _feed(trial, sequence, keeper, progress, running)
         except EstimatorFailure as failure:
-            outcome = Outcome(kind=failure.kind, reason=failure.reason)
+            kind = failure.kind
+            reason = failure.reason
         except SequenceError as error:  # a layout that cannot have this recording
-            outcome = Outcome(kind="refused", reason=str(error))
+            kind = "refused"
+            reason = str(error)
+    saw = None if running is None or isinstance(running, NoisyTruth) else running.sandbox
+    outcome = Outcome(kind=kind, reason=reason, sandbox=saw)
     (folder / OUTCOME).write_text(outcome.model_dump_json(), encoding="utf-8")
 
 
@@ -117,9 +130,15 @@ def _running(trial: "Trial", recording: Path, log: Path) -> Running:
 
 
 def _hidden(trial: "Trial", recording: Path) -> list[Path]:
-    """Where truth lies: the store that the sequence is in, and the recording that it was read from."""
+    """What is hidden should it lie in a folder that the estimator may read.
+
+    That is the store that the sequence is in, the recording that it was read from, and earlier runs.
+    """
+    hidden = [recording.resolve().parents[1], Path("runs").absolute()]
     source = getattr(trial.case, "source", None)
-    return [recording.resolve().parents[1], *([Path(source.path).resolve()] if source else [])]
+    if source:
+        hidden.append(Path(source.path).resolve())
+    return hidden
 
 
 def _write_blind(recording: Path, manifest: Manifest, folder: Path) -> None:

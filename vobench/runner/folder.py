@@ -12,6 +12,7 @@ from typing import Any, Final, Literal, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
 
 from vobench.errors import InputError, TrajectoryError
+from vobench.estimator.sandbox import Sandbox
 from vobench.runner.consistency import Consistency
 from vobench.runner.entry import file_hash
 from vobench.runner.frames import TIMES
@@ -69,7 +70,8 @@ class TrialScore(BaseModel):
 
     `drift_m` is the largest distance of the estimate from its start, in a case that stands still; else None.
     `claims` are the manifest's, such as Sim(3); `consistency` is of the covariances that were stated, and `revised`
-    the score of the poses that came after the last frame, where there were some.
+    the score of the poses that came after the last frame, where there were some. `sandbox` is what the estimator could
+    see; None where none was started, and in runs of an older vobench.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -89,6 +91,7 @@ class TrialScore(BaseModel):
     claims: tuple[str, ...] = ()
     consistency: Consistency | None = None
     revised: dict[str, Any] | None = None
+    sandbox: Sandbox | None = None
 
     @field_validator("score", "revised")
     @classmethod
@@ -144,6 +147,33 @@ def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> fl
     """One statistic of one metric of a score as JSON has it, None where it has no such."""
     entries = (score or {"metrics": []})["metrics"]
     return next((float(entry[statistic]) for entry in entries if entry["name"] == metric), None)
+
+
+ONLY_THEIR_OWN = "Estimators saw only their own files."
+ORACLE = "oracle"  # the claim of the harness's own estimators, which are no programs
+
+
+def visible_to(trials: Iterable[TrialScore]) -> str:
+    """What the estimators of trials could see, in sentences for every form of a board.
+
+    Estimators that saw more than their own files are named, and those of older runs, of which nothing is recorded.
+    """
+    estimators = dict[str, set[str]]()
+    for trial in trials:
+        sentence = _seen_by(trial)
+        if sentence:
+            estimators.setdefault(sentence, set()).add(trial.estimator)
+    named = [f"{', '.join(sorted(labels))}: {sentence}." for sentence, labels in sorted(estimators.items())]
+    return " ".join(named) or ONLY_THEIR_OWN
+
+
+def _seen_by(trial: TrialScore) -> str:
+    """What a trial's estimator saw beyond its own files; empty where that is nothing."""
+    if trial.sandbox is not None:
+        is_strict = trial.sandbox.level == "full" and not trial.sandbox.read
+        return "" if is_strict else trial.sandbox.sentence
+    was_started = trial.status not in ("refused", NOT_APPLICABLE) and ORACLE not in trial.claims
+    return "what it could see is not recorded" if was_started else ""
 
 
 @dataclass(frozen=True, slots=True)

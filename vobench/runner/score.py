@@ -60,6 +60,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
         claims=claims,
         consistency=trial_consistency(estimate, gt, est, start_ns=min(stamps.values()), scale=scale),
         revised=later.as_dict() if later else None,
+        sandbox=outcome.sandbox,
     )
     write_json(folder / SCORE, score.model_dump(mode="json"))
     write_frames(sequence, estimate, scored, folder)

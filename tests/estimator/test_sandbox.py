@@ -1,0 +1,632 @@
+"""The sandbox against programs that look for the truth, for neighbours and for vobench itself, in four languages.
+
+Whatever an attack gets at must be of a kind that the trial's record says it could see. Where the record is "full" that
+is nothing. The file runs again as an ordinary user, and where the kernel gives no namespaces.
+"""
+
+import ctypes
+import hashlib
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import uuid
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from vobench.estimator import isolation
+from vobench.estimator.isolation import FILES, NETWORK, PROCESSES, SHARED_MEMORY, SYSTEM_CALLS
+from vobench.estimator.manifest import Limits
+from vobench.estimator.program import EstimatorFailure, Program, sandbox_here
+from vobench.estimator.sandbox import READ, SWITCH, Sandbox
+
+# ruff: noqa: E501 - one attack is one text
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")
+
+RERUN = "VOBENCH_TEST_RERUN"
+LIMITS = Limits(start_s=30, trial_s=60)
+PREPARE = {
+    "python": "import ctypes, glob, os, socket, struct, sys, time\nfrom contextlib import suppress\nT = dict(word.split('=', 1) for word in sys.argv[1:])\nlibc = ctypes.CDLL(None, use_errno=True)\n",
+    "sh": 'for word in "$@"; do eval "${word%%=*}=\\"\\${word#*=}\\""; done\n',
+    "perl": "my %T = map { split(/=/, $_, 2) } @ARGV;\nsub show { my $f; open($f, '<', $_[0]) and print <$f>; }\n",
+    "c": """
+#define _GNU_SOURCE
+#include <errno.h>
+#include <fcntl.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mount.h>
+#include <sys/ptrace.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/uio.h>
+#include <sys/wait.h>
+#include <unistd.h>
+static char **words; static int number;
+static const char *T(const char *name) {
+  for (int i = 1; i < number; ++i) if (!strncmp(words[i], name, strlen(name)) && words[i][strlen(name)] == '=') return words[i] + strlen(name) + 1;
+  return "";
+}
+static void show(const char *path) {
+  char text[4096]; int fd = open(path, O_RDONLY); if (fd < 0) return;
+  int got = read(fd, text, sizeof text - 1); if (got > 0) { text[got] = 0; puts(text); }
+  close(fd);
+}
+static void attack(void);
+int main(int n, char **w) { number = n; words = w; attack(); fflush(stdout); return 0; }
+""",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Attack:
+    """A program that prints what it gets hold of; `sees` is what it needs to see for that."""
+
+    sees: str
+    language: str
+    code: str
+    works_bare: bool = True  # it succeeds where there is no sandbox
+
+
+ATTACKS = {
+    "opens the truth": Attack(FILES, "python", "print(open(T['truth']).read())"),
+    "opens the truth with sh": Attack(FILES, "sh", 'cat "$truth"'),
+    "opens the truth with perl": Attack(FILES, "perl", "show($T{truth});"),
+    "opens the truth in C": Attack(FILES, "c", 'static void attack(void) { show(T("truth")); }'),
+    "searches earlier runs": Attack(FILES, "python", "for path in glob.glob(T['runs'] + '/**/*.tum', recursive=True): print(open(path).read())"),
+    "searches earlier runs with find": Attack(FILES, "sh", 'find "$runs" -name ground_truth.tum -exec cat {} +'),
+    "follows the link of an earlier run": Attack(FILES, "perl", "show($_) for glob(\"$T{runs}/*/*/cases/*/sequence/*\");"),
+    "follows a link of its own folder": Attack(FILES, "python", "print(open(os.path.join(T['own'], 'link', 'truth.txt')).read())"),
+    "reads what a neighbour works on": Attack(FILES, "python", "for path in glob.glob(T['neighbour_home'] + '/*'): print(open(path).read())"),
+    "reads the user's keys": Attack(FILES, "sh", 'cat "$user/.ssh/id_ed25519"'),
+    "goes through the root of other processes": Attack(FILES, "python", "for root in glob.glob('/proc/[0-9]*/root'):\n    with suppress(OSError): print(open(root + T['truth']).read())"),
+    "goes through the working folder of a neighbour": Attack(PROCESSES, "python", "for cwd in glob.glob('/proc/[0-9]*/cwd'):\n    with suppress(OSError): print(open(cwd + '/truth.txt').read())"),
+    "goes through open files of other processes": Attack(PROCESSES, "python", "for path in glob.glob('/proc/[0-9]*/fd/*'):\n    with suppress(OSError):\n        if os.readlink(path).endswith('truth.txt'): print(open(path).read())"),
+    "reads the environment of other processes": Attack(PROCESSES, "sh", 'cat /proc/[0-9]*/environ 2>/dev/null | tr "\\0" "\\n"'),
+    "reads the words of other processes": Attack(PROCESSES, "perl", "show($_) for glob('/proc/[0-9]*/cmdline');"),
+    "reads the memory of vobench by /proc": Attack(PROCESSES, "python", "file = open(f\"/proc/{T['vobench']}/mem\", 'rb', 0)\nfile.seek(int(T['address']))\nprint(file.read(64))"),
+    "reads the memory of vobench by process_vm_readv": Attack(PROCESSES, "c", """static void attack(void) {
+  char text[65] = {0}; struct iovec here = {text, 64}, there = {(void *)strtoull(T("address"), 0, 10), 64};
+  if (process_vm_readv(atoi(T("vobench")), &here, 1, &there, 1, 0) > 0) puts(text); }"""),
+    "stops a neighbour with ptrace": Attack(PROCESSES, "c", """static void attack(void) {
+  int pids[] = {atoi(T("neighbour")), atoi(T("vobench")), getppid(), 1};
+  for (int i = 0; i < 4; ++i) { long word;
+    if (ptrace(PTRACE_SEIZE, pids[i], 0, 0)) continue;
+    ptrace(PTRACE_DETACH, pids[i], 0, 0); puts(getenv("HOME")); printf("%s%s", T("half"), T("other_half")); return; } }"""),
+    "takes a descriptor of vobench": Attack(PROCESSES, "c", """static void attack(void) {
+  int pid = syscall(434, atoi(T("neighbour")), 0);
+  for (int fd = 0; fd < 64; ++fd) { int mine = syscall(438, pid, fd, 0); char path[64]; if (mine < 0) continue;
+    sprintf(path, "/proc/self/fd/%d", mine); show(path); } }"""),
+    "unmounts everything": Attack(FILES, "c", """static void attack(void) {
+  char line[4096], point[4096]; FILE *mounts = fopen("/proc/self/mountinfo", "r");
+  while (mounts && fgets(line, sizeof line, mounts)) if (sscanf(line, "%*s %*s %*s %*s %4095s", point) == 1 && strcmp(point, "/proc") && strcmp(point, "/")) umount2(point, MNT_DETACH);
+  show(T("truth")); }""", works_bare=False),  # not tried: it would unmount ours
+    "mounts the disk": Attack(FILES, "c", """static void attack(void) {
+  char line[4096], kind[256], device[256]; FILE *mounts = fopen("/proc/self/mounts", "r");
+  while (mounts && fgets(line, sizeof line, mounts)) if (sscanf(line, "%255s %*s %255s", device, kind) == 2) mount(device, "/tmp", kind, MS_RDONLY, 0);
+  char path[4096]; sprintf(path, "/tmp%s", T("truth")); show(path); }""", works_bare=False),
+    "mounts in a user namespace of its own": Attack(FILES, "python", """
+uid, gid = os.getuid(), os.getgid()
+print('unshared', libc.unshare(0x10000000 | 0x00020000))
+with suppress(OSError):
+    open('/proc/self/setgroups', 'w').write('deny'); open('/proc/self/uid_map', 'w').write(f'0 {uid} 1'); open('/proc/self/gid_map', 'w').write(f'0 {gid} 1')
+for line in open('/proc/self/mountinfo').read().splitlines()[::-1]:
+    libc.umount2(line.split()[4].encode(), 2)
+with suppress(OSError): print(open(T['truth']).read())
+""", works_bare=False),
+    "clones into a user namespace": Attack(SYSTEM_CALLS, "c", """static void attack(void) {
+  long flags[] = {CLONE_NEWUSER | SIGCHLD, CLONE_NEWNS | SIGCHLD, CLONE_NEWPID | SIGCHLD};
+  for (int i = 0; i < 3; ++i) { long pid = syscall(SYS_clone, flags[i], 0, 0, 0, 0); if (pid == 0) _exit(0);
+    if (pid > 0) { waitpid(pid, 0, 0); printf("%s%s", T("half"), T("other_half")); } }
+  unsigned long long wide[11] = {CLONE_NEWUSER, 0, 0, 0, SIGCHLD};
+  long pid = syscall(435, wide, sizeof wide); if (pid == 0) _exit(0);
+  if (pid > 0) { waitpid(pid, 0, 0); printf("%s%s", T("half"), T("other_half")); } }""", works_bare=False),
+    "leaves a chroot": Attack(FILES, "c", """static void attack(void) {
+  mkdir("x", 0700); chroot("x"); for (int i = 0; i < 64; ++i) chdir(".."); chroot("."); show(T("truth")); }""", works_bare=False),
+    "joins the namespaces of others": Attack(FILES, "python", """
+for pid in (1, T['vobench'], T['neighbour'], os.getppid()):
+    for kind in ('user', 'pid', 'mnt'):
+        with suppress(OSError): libc.setns(os.open(f'/proc/{pid}/ns/{kind}', os.O_RDONLY), 0)
+with suppress(OSError): print(open(T['truth']).read())
+""", works_bare=False),
+    "opens the disk's root by its handle": Attack(FILES, "c", """static void attack(void) {
+  struct { unsigned bytes; int type; unsigned inode, generation; } handle = {8, 1, 2, 0};
+  int places[] = {2, open(".", O_RDONLY), open("/usr", O_RDONLY)};
+  for (int i = 0; i < 3; ++i) { int root = syscall(SYS_open_by_handle_at, places[i], &handle, O_RDONLY); if (root < 0) continue;
+    fchdir(root); show(T("truth") + 1); } }""", works_bare=False),
+    "makes a device of the disk": Attack(FILES, "perl", "for my $type ('b', 'c') { for my $minor (0 .. 3) { system('mknod', \"d$type$minor\", $type, 1, $minor); my $f; open($f, '<', \"d$type$minor\") or next; print $T{half}.$T{other_half}; } }", works_bare=False),
+    "opens devices of memory, disks and the log": Attack(FILES, "sh", 'for d in /dev/mem /dev/kmem /dev/port /dev/kmsg /dev/vda /dev/sda /dev/nvme0n1 /dev/loop0 /proc/kcore /proc/kmsg; do head -c 1 "$d" 2>/dev/null | grep -q . && echo "$half$other_half $d"; done', works_bare=False),
+    "has descriptors that it should not": Attack(FILES, "c", """static void attack(void) {
+  for (int fd = 3; fd < 4096; ++fd) if (fcntl(fd, F_GETFD) >= 0) printf("%d %s%s", fd, T("half"), T("other_half")); }""", works_bare=False),
+    "reads a socket of an abstract name": Attack(NETWORK, "python", "here = socket.socket(socket.AF_UNIX)\nhere.settimeout(2)\nhere.connect('\\0' + T['abstract'])\nprint(here.recv(100))"),
+    "reads a port of 127.0.0.1": Attack(NETWORK, "perl", "use IO::Socket::INET; my $s = IO::Socket::INET->new(PeerAddr => '127.0.0.1', PeerPort => $T{port}, Timeout => 2); print <$s> if $s;"),
+    "looks for other networks": Attack(NETWORK, "python", "names = [name for _, name in socket.if_nameindex()]\nprint(names)\nif set(names) - {'lo'} : print(T['half'] + T['other_half'])", works_bare=False),
+    "speaks to the host of a virtual machine": Attack(SYSTEM_CALLS, "python", "for family in (40, 38, 17, 31):\n    with suppress(OSError): socket.socket(family, socket.SOCK_SEQPACKET if family == 38 else socket.SOCK_STREAM if family == 40 else socket.SOCK_RAW); print(T['half'] + T['other_half'])", works_bare=False),
+    "reads shared memory by its name": Attack(SHARED_MEMORY, "sh", 'cat "/dev/shm/$shared"'),
+    "reads shared memory of System V": Attack(SHARED_MEMORY, "c", """
+#include <sys/shm.h>
+static void attack(void) { char *at = shmat(atoi(T("segment")), 0, SHM_RDONLY); if (at != (void *)-1) puts(at); }"""),
+    "reads the keyring": Attack(SYSTEM_CALLS, "c", """static void attack(void) { char text[100] = {0};
+  if (syscall(SYS_keyctl, 11, atoi(T("key")), text, 99) > 0) puts(text); }""", works_bare=False),
+    "watches the folder of temporary files": Attack(FILES, "python", """
+watch = libc.inotify_init1(os.O_NONBLOCK)
+for place in (T['temporary'], T['runs'], T['temporary'] + '/vobench-homes-%d' % os.getuid()):
+    if libc.inotify_add_watch(watch, place.encode(), 0xFFF) >= 0 and os.listdir(place): print(os.listdir(place))
+if os.path.exists(T['runs']): print(T['half'] + T['other_half'])
+"""),
+    "has vobench's variables": Attack(PROCESSES, "sh", "env; set", works_bare=False),
+    "asks a program with other rights": Attack(FILES, "sh", 'for tool in "su -c" "sudo -n sh -c" "pkexec sh -c" "unshare -Urm sh -c" "nsenter -t 1 -m sh -c"; do $tool "cat $truth" </dev/null 2>/dev/null; done', works_bare=False),
+    "writes the pattern of core dumps": Attack(FILES, "sh", 'for f in core_pattern modprobe hotplug; do (cat /proc/sys/kernel/$f > kept && cat kept > /proc/sys/kernel/$f) 2>/dev/null && echo "$half$other_half $f"; done', works_bare=False),
+    "loads a library into others": Attack(FILES, "sh", 'for f in /etc/ld.so.preload /etc/ld.so.cache /usr/lib/x.so /usr/local/lib/x.so; do (: >> "$f") 2>/dev/null && echo "$half$other_half $f"; done', works_bare=False),
+    "climbs from its own root": Attack(FILES, "perl", "show(\"$_$T{truth}\") for ('/..', '/../../..', '/proc/self/root/..', '/proc/1/root', '/proc/1/cwd/../../..', '/proc/self/task/../../1/root');"),
+    "opens the truth by an io_uring": Attack(SYSTEM_CALLS, "c", """static void attack(void) {
+  char parameters[120] = {0}; if (syscall(425, 4, parameters) >= 0) printf("%s%s", T("half"), T("other_half")); }""", works_bare=False),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """What there is to be found: everything that can be read has the secret in it."""
+
+    secret: str
+    place: Path
+    own: Path
+    neighbour: subprocess.Popen[bytes]
+    words: list[str]
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    """A store with truth, earlier runs, a user's files, a neighbour, and what vobench itself holds."""
+    secret = f"truth{uuid.uuid4().hex}"
+    place = tmp_path_factory.mktemp("world")
+    own = place / "estimators" / "bad"
+    for folder in ("store/sequences/a", "runs/suite/one/cases/case", "user/.ssh", "neighbour", "estimators/bad"):
+        (place / folder).mkdir(parents=True)
+    for file in (
+        "store/sequences/a/truth.txt",
+        "runs/suite/one/cases/case/ground_truth.tum",
+        "user/.ssh/id_ed25519",
+        "neighbour/poses.txt",
+    ):
+        (place / file).write_text(secret)
+    truth = place / "store/sequences/a/truth.txt"
+    (place / "runs/suite/one/cases/case/sequence").symlink_to(truth.parent)
+    (own / "link").symlink_to(truth.parent)
+    (own / "data.txt").write_text("own")
+    shared = Path("/dev/shm") / f"vobench-test-{uuid.uuid4().hex}"
+    shared.write_text(secret)
+    libc = ctypes.CDLL(None, use_errno=True)
+    libc.shmat.restype = ctypes.c_void_p
+    segment = libc.shmget(0, 4096, 0o600 | 0o1000)
+    ctypes.memmove(libc.shmat(segment, None, 0), secret.encode(), len(secret))
+    memory = ctypes.create_string_buffer(secret.encode())
+    abstract = f"vobench-test-{uuid.uuid4().hex}"
+    servers = [socket.socket(socket.AF_UNIX), socket.socket(socket.AF_INET)]
+    servers[0].bind(f"\0{abstract}")
+    servers[1].bind(("127.0.0.1", 0))
+    for server in servers:
+        server.listen()
+        threading.Thread(target=serve, args=(server, secret), daemon=True).start()
+    with truth.open() as held:
+        neighbour = subprocess.Popen(
+            [sys.executable, "-c", "import time; time.sleep(1000)", secret],
+            cwd=truth.parent,
+            env={**os.environ, "SECRET": secret},
+            pass_fds=[held.fileno()],
+        )
+    key = libc.syscall(
+        isolation.REFUSED["add_key"][os.uname().machine == "aarch64"], b"user", b"vobench-test", secret.encode(), len(secret), -2
+    )  # fmt: skip
+    targets = {
+        "truth": truth,
+        "runs": place / "runs",
+        "own": own,
+        "user": place / "user",
+        "neighbour_home": place / "neighbour",
+        "vobench": os.getpid(),
+        "neighbour": neighbour.pid,
+        "address": ctypes.addressof(memory),
+        "abstract": abstract,
+        "port": servers[1].getsockname()[1],
+        "shared": shared.name,
+        "segment": segment,
+        "key": key,
+        "temporary": place,
+        "half": secret[:20],
+        "other_half": secret[20:],
+    }
+    yield World(secret, place, own, neighbour, [f"{name}={value}" for name, value in targets.items()])
+    neighbour.kill()
+    neighbour.wait()
+    shared.unlink()
+    libc.shmctl(segment, 0, None)
+    for server in servers:
+        server.close()
+
+
+def serve(server, secret):
+    with suppress(OSError):
+        while True:
+            client, _ = server.accept()
+            with client, suppress(OSError):
+                client.sendall(secret.encode() + b"\n")
+
+
+@pytest.fixture
+def run(world, tmp_path, monkeypatch):
+    """Runs an attack in one of four languages; returns what it could see and what it printed."""
+    monkeypatch.setenv("SECRET_TOKEN", world.secret)
+
+    def run(language, code, *, limits=LIMITS, own=world.own):
+        argv = [*command_of(language, code, own), *world.words]
+        log = tmp_path / "log.txt"
+        with Program(argv, log=log, limits=limits, folder=own, hidden=[world.place / "store"]) as program:
+            with suppress(EstimatorFailure):
+                program.wait()
+            saw = program.sandbox
+        return saw, log.read_text(errors="replace")
+
+    return run
+
+
+def command_of(language, code, own):
+    """How a program in a language is started; one in C is compiled first, into the estimator's own folder."""
+    source = PREPARE[language] + code
+    if language == "python":
+        return [sys.executable, "-I", "-S", "-c", source]
+    tool = shutil.which({"sh": "sh", "perl": "perl", "c": "cc"}[language])
+    if tool is None:
+        pytest.skip(f"no {language} on this machine")
+    if language == "sh":
+        return [tool, "-c", source, "attack"]
+    if language == "perl":
+        return [tool, "-e", source]
+    program = own / f"program-{hashlib.sha256(source.encode()).hexdigest()[:12]}"
+    if not program.exists():
+        subprocess.run([tool, "-w", "-O0", "-x", "c", "-o", program, "-"], input=source.encode(), check=True)
+    return [str(program)]
+
+
+@pytest.mark.parametrize("attack", ATTACKS.values(), ids=ATTACKS)
+def test_what_an_attack_gets_at_is_of_a_kind_that_the_record_names(run, world, attack):
+    saw, printed = run(attack.language, attack.code)
+    assert "cannot be started" not in printed
+    if world.secret in printed:
+        # By another process's links one comes to files, and by files to other processes.
+        kinds = {attack.sees, FILES} if attack.sees == PROCESSES else {attack.sees}
+        assert kinds & set(saw.sees), (saw, printed[:500])
+    assert world.neighbour.poll() is None
+
+
+BARE = {name: attack for name, attack in ATTACKS.items() if attack.works_bare}
+
+
+@pytest.mark.skipif(bool(os.environ.get(RERUN)), reason="as another user an attack may fail for other reasons")
+@pytest.mark.parametrize("attack", BARE.values(), ids=BARE)
+def test_an_attack_succeeds_where_there_is_no_sandbox_and_the_record_says_so(run, world, monkeypatch, attack):
+    monkeypatch.setenv(SWITCH, "off")
+    saw, printed = run(attack.language, attack.code)
+    assert saw.level == "none"
+    assert saw.why == f"{SWITCH}=off"
+    if attack.sees in (FILES, PROCESSES, NETWORK):
+        assert attack.sees in saw.sees
+    assert world.secret in printed
+
+
+def test_every_refused_system_call_is_refused(run):
+    if SYSTEM_CALLS in sandbox_here().sees:
+        pytest.skip("no filter of system calls on this machine")
+    column = isolation.MACHINES[os.uname().machine][0]
+    numbers = {name: both[column] for name, both in isolation.REFUSED.items() if both[column] >= 0}
+    code = f"for name, number in {numbers}.items():\n    ctypes.set_errno(0)\n    print(name, libc.syscall(number, -1, 0, 0, 0, 0), ctypes.get_errno())"
+    _, printed = run("python", code)
+    assert [line.split()[1:] for line in printed.splitlines()] == [["-1", "1"]] * len(numbers)
+
+
+def test_the_filter_has_the_numbers_of_this_machines_headers(run):
+    if shutil.which("cc") is None:
+        pytest.skip("no C compiler on this machine")
+    column = isolation.MACHINES[os.uname().machine][0]
+    names = [name for name, both in isolation.REFUSED.items() if both[column] >= 0]
+    lines = "".join(f'#ifdef SYS_{name}\n printf("{name} %d\\n", SYS_{name});\n#endif\n' for name in names)
+    _, printed = run("c", f"static void attack(void) {{\n{lines} }}")
+    known = dict(line.split() for line in printed.splitlines())
+    assert len(known) > 40
+    assert {name: int(number) for name, number in known.items()} == {
+        name: isolation.REFUSED[name][column] for name in known
+    }
+
+
+def test_it_has_no_privileges_and_gets_none(run):
+    saw, printed = run("sh", "cat /proc/self/status")
+    facts = dict(line.split(":", 1) for line in printed.splitlines() if ":" in line)
+    for name in ("CapInh", "CapPrm", "CapEff", "CapAmb"):
+        assert int(facts[name], 16) == 0
+    assert facts["NoNewPrivs"].strip() == "1"
+    if SYSTEM_CALLS not in saw.sees:
+        assert facts["Seccomp"].strip() == "2"
+    if os.getuid() == 0:
+        assert int(facts["CapBnd"], 16) == 0
+
+
+# What lies about it
+
+
+SABOTAGE = {
+    "writes into its own folder": ("sh", 'echo evil > "$own/data.txt"; echo evil > "$own/new"; rm -f "$own/data.txt"; mv "$own" "$own.old"'),
+    "writes into the interpreter's libraries": ("python", "import site\nfor place in {os.path.dirname(os.__file__), sys.prefix, *sys.path, T['package'] if 'package' in T else T['own']}:\n    with suppress(OSError): open(os.path.join(place, 'vobench_test_evil.pth'), 'w').write('evil')\nprint('done')"),
+    "writes into caches of compiled modules": ("python", "for path in glob.glob(os.path.dirname(os.__file__) + '/__pycache__/*.pyc')[:20]:\n    with suppress(OSError): open(path, 'r+b').write(b'evil')"),
+    "writes into the store and into runs": ("perl", "for ($T{truth}, \"$T{runs}/suite/one/cases/case/ground_truth.tum\") { my $f; open($f, '>', $_) and print $f 'evil'; unlink $_; }"),
+    "writes into what a neighbour answers": ("python", "for path in glob.glob(T['neighbour_home'] + '/*') + glob.glob(T['temporary'] + '/*/poses.txt'):\n    with suppress(OSError): open(path, 'w').write('evil')"),
+    "kills everybody": ("c", 'static void attack(void) { kill(-1, SIGTERM); kill(-1, SIGSTOP); }'),
+    "kills its neighbour and vobench by number": ("sh", 'kill -9 "$neighbour" 2>/dev/null; kill -STOP "$neighbour" 2>/dev/null; true'),
+    "slows its neighbour down": ("python", "with suppress(OSError): os.setpriority(os.PRIO_PROCESS, int(T['neighbour']), 19)\nwith suppress(OSError): os.sched_setaffinity(int(T['neighbour']), {0})"),
+    "takes away the permissions of devices": ("sh", "chmod 000 /dev/null /dev/urandom; rm -f /dev/null; mv /dev/zero /dev/nil"),
+    "leaves files in shared memory": ("sh", 'echo evil > /dev/shm/vobench-test-evil'),
+}  # fmt: skip
+# What of it is possible where the record names this; all else never is.
+NEEDS = {
+    "kills its neighbour and vobench by number": PROCESSES,
+    "slows its neighbour down": PROCESSES,
+    "leaves files in shared memory": SHARED_MEMORY,
+}
+# Dangerous to try where it might succeed.
+IN_A_FULL_SANDBOX_ALONE = ("takes away the permissions of devices", "kills everybody")
+
+
+def test_no_signal_goes_to_everybody(run):
+    if PROCESSES not in sandbox_here().sees or SYSTEM_CALLS in sandbox_here().sees:
+        pytest.skip("here everybody is the estimator itself, or nothing can be done")
+    _, printed = run("c", 'static void attack(void) { printf("%d\\n", kill(-1, 0) < 0 && errno == EPERM); }')
+    assert printed == "1\n"
+
+
+@pytest.mark.parametrize("name", SABOTAGE)
+def test_what_it_destroys_is_its_own(run, world, name):
+    missing = NEEDS.get(name, FILES)
+    if sandbox_here().level != "full" and name in IN_A_FULL_SANDBOX_ALONE:
+        pytest.skip("this machine has no sandbox to try it in")
+    if sandbox_here().level != "full" and missing in sandbox_here().sees:
+        pytest.skip(f"this machine cannot keep {missing} from an estimator, and says so")
+    watched = [path for path in world.place.rglob("*") if path.is_file()]
+    watched += sorted(Path(os.__file__).parent.glob("__pycache__/*.pyc"))[:20]
+    before = {path: path.read_bytes() for path in watched}
+    modes = [Path(path).stat().st_mode for path in isolation.DEVICES]
+    affinity = os.sched_getaffinity(world.neighbour.pid)
+    priority = os.getpriority(os.PRIO_PROCESS, world.neighbour.pid)
+    language, code = SABOTAGE[name]
+    run(language, code)
+    assert {path: path.read_bytes() for path in watched} == before
+    assert [Path(path).stat().st_mode for path in isolation.DEVICES] == modes
+    assert world.neighbour.poll() is None
+    assert Path(f"/proc/{world.neighbour.pid}/stat").read_text().rpartition(")")[2].split()[0] in "SR"
+    assert os.sched_getaffinity(world.neighbour.pid) == affinity
+    assert os.getpriority(os.PRIO_PROCESS, world.neighbour.pid) == priority
+    assert not Path("/dev/shm/vobench-test-evil").exists()
+    evil = [place for place in (*sys.path, sys.prefix) if Path(place, "vobench_test_evil.pth").exists()]
+    assert evil == []
+    assert (world.own / "data.txt").read_text() == "own"
+    assert not (world.own / "new").exists()
+
+
+DAEMONS = {
+    "double fork": ("python", "if os.fork() == 0:\n    os.setsid()\n    if os.fork() == 0: os.closerange(0, 9); time.sleep(1000)\n    os._exit(0)\nos.wait()"),
+    "subreaper": ("python", "libc.prctl(36, 1)\nfor _ in range(3):\n    if os.fork() == 0:\n        libc.prctl(36, 1); os.setsid(); os.fork(); time.sleep(1000)"),
+    "deaf to signals": ("perl", "$SIG{$_} = 'IGNORE' for keys %SIG; exit if fork; exit if fork; sleep 1000;"),
+    "nohup": ("sh", "(nohup setsid sleep 1000 >/dev/null 2>&1 &) ; (trap '' TERM HUP; sleep 1000) &"),
+    "forks on": ("c", "static void attack(void) { for (int i = 0; i < 200; ++i) if (fork()) _exit(0); else setsid(); sleep(1000); }"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DAEMONS)
+def test_no_daemon_is_left(run, world, name):
+    before = sleeping()
+    language, code = DAEMONS[name]
+    run(language, code)
+    until = time.monotonic() + 2
+    while sleeping() - before and time.monotonic() < until:
+        time.sleep(0.02)
+    assert sleeping() - before == set()
+
+
+def sleeping():
+    """Processes below us or below nobody, by what they were started as."""
+    found = set()
+    for place in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            words = (place / "cmdline").read_bytes()
+            if b"half=" in words or b"sleep\0001000" in words:
+                found.add((place.name, words[:40]))
+    return found
+
+
+# What it is given
+
+
+def test_it_has_its_folder_its_home_memory_to_share_and_threads(run, world):
+    code = """
+import threading
+print(open(os.path.join(T['own'], 'data.txt')).read())
+open('here', 'w').write('x'); print(os.listdir('.'), os.environ['HOME'] == os.environ['TMPDIR'] == os.getcwd())
+open('/dev/shm/mine', 'w').write('x'); print(len(os.listdir('/dev/shm')) >= 1)
+thread = threading.Thread(target=lambda: print('thread')); thread.start(); thread.join()
+server = socket.create_server(('127.0.0.1', 0)); socket.create_connection(server.getsockname()); print('loopback')
+pair = socket.socketpair(); pair[0].send(b'x'); print(pair[1].recv(1))
+print(len(os.urandom(8)), open('/dev/zero', 'rb').read(2), open('/proc/self/comm').read())
+open('/dev/null', 'w').write('gone'); os.close(os.memfd_create('x'))
+if os.fork() == 0: os._exit(0)
+os.wait(); print('forked')
+"""
+    _, printed = run("python", code)
+    Path("/dev/shm/mine").unlink(missing_ok=True)  # where the machine gives no memory of its own
+    lines = printed.split("\n")
+    assert lines[:7] == [
+        "own",
+        "['here'] True",
+        "True",
+        "thread",
+        "loopback",
+        "b'x'",
+        r"8 b'\x00\x00' python"[: len(lines[6])],
+    ] or lines[6].startswith("8 b'")
+    assert "forked" in printed
+    assert "Traceback" not in printed
+
+
+def test_a_folder_can_be_opened_to_it_which_the_record_names(run, world, monkeypatch):
+    monkeypatch.setenv(READ, str(world.place / "user"))
+    saw, printed = run("sh", 'cat "$user/.ssh/id_ed25519"; cat "$truth"')
+    assert saw.read == (str(world.place / "user"),)
+    if FILES not in saw.sees:
+        assert printed.count(world.secret) == 1
+    if saw.level != "none":
+        assert str(world.place / "user") in saw.sentence
+
+
+def test_what_is_hidden_stays_hidden_in_a_folder_that_is_opened(run, world, monkeypatch):
+    if sandbox_here().level != "full":
+        pytest.skip("without mounts a folder is opened as a whole")
+    monkeypatch.setenv(READ, str(world.place))
+    _, printed = run("sh", 'cat "$truth"; ls "$runs"; ls "$own"')
+    assert world.secret not in printed
+    assert "data.txt" in printed
+    assert "suite" in printed
+
+
+def test_an_estimator_in_a_hidden_folder_sees_itself_and_nothing_beside_it(run, world):
+    own = world.place / "store" / "estimator"
+    own.mkdir(exist_ok=True)
+    (own / "data.txt").write_text("in the store")
+    saw, printed = run("sh", f'cat {own}/data.txt; cat "$truth"', own=own)
+    assert "in the store" in printed
+    if FILES not in saw.sees:
+        assert world.secret not in printed
+
+
+def test_a_program_that_it_may_not_read_is_refused_with_the_variable_to_set(world, tmp_path):
+    if FILES in sandbox_here().sees:
+        pytest.skip("here it may read everything")
+    program = world.place / "user" / "slam"
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o755)
+    with pytest.raises(EstimatorFailure, match=READ), Program([str(program)], log=tmp_path / "log", limits=LIMITS):
+        pass
+
+
+def test_a_sentence_says_what_was_seen():
+    assert Sandbox("full").sentence == "saw only its own files"
+    assert Sandbox("full", read=("/opt/ros",)).sentence == f"saw only its own files and /opt/ros ({READ})"
+    assert Sandbox("partial", (NETWORK,)).sentence == "saw only its own files and the network"
+    assert Sandbox("partial", (FILES, NETWORK)).sentence == "saw the user's files and the network"
+    assert (
+        Sandbox("none", (FILES, PROCESSES)).sentence
+        == "not sandboxed: it could see the user's files and other processes"
+    )
+
+
+def test_nothing_of_it_is_left_in_the_folder_of_temporary_files(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    run("sh", "mkdir -p a/b/c; echo x > a/b/c/d; echo x > /tmp/x")
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+# The same as somebody else, and on a poorer machine
+
+
+WITHOUT = """
+import ctypes, errno, os, struct, sys
+sys.path.append(sys.argv.pop(1))
+import isolation
+column, architecture = isolation.MACHINES[os.uname().machine]
+refused = [isolation.REFUSED['unshare'][column], *map(int, filter(None, sys.argv.pop(1).split(',')))]
+program = [(0x20, 0, 0, 0)]
+for number in refused:
+    program += [(0x15, 0, 1, number), (0x06, 0, 0, isolation.FAIL | errno.EPERM)]
+program += [(0x06, 0, 0, isolation.ALLOW)]
+code = ctypes.create_string_buffer(b''.join(struct.pack('HBBI', *one) for one in program))
+whole = struct.pack('HxxxxxxQ', len(program), ctypes.addressof(code))
+isolation.libc.prctl(38, 1, 0, 0, 0)
+assert isolation.libc.prctl(22, ctypes.c_ulong(2), whole) == 0
+os.execv(sys.argv[1], sys.argv[1:])
+"""
+LANDLOCK = str(isolation.LANDLOCK_CREATE_RULESET)
+
+
+def rerun(before, *, python=sys.executable, environment=None):
+    """Run this file again, started in another way."""
+    with tempfile.TemporaryDirectory(prefix="vobench-test-", dir="/tmp", ignore_cleanup_errors=True) as temporary:
+        Path(temporary).chmod(0o777)
+        options = ["-n", "0", "-q", "-x", "-p", "no:cacheprovider", "--basetemp", f"{temporary}/tests"]
+        argv = [*before, python, "-m", "pytest", *options, __file__]
+        variables = {
+            **os.environ,
+            RERUN: "1",
+            "TMPDIR": temporary,
+            "HOME": temporary,
+            "PYTHONDONTWRITEBYTECODE": "1",
+            **(environment or {}),
+        }
+        root = Path(__file__).parents[2]
+        done = subprocess.run(argv, env=variables, cwd=root, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+
+
+again = pytest.mark.skipif(bool(os.environ.get(RERUN)), reason="this is the second time")
+
+
+@again
+def test_the_same_as_an_ordinary_user():
+    if os.getuid() != 0 or shutil.which("setpriv") is None:
+        pytest.skip("this is an ordinary user already")
+    # env, because setpriv keeps root's rights until it has found a program.
+    drop = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups", "env"]
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    search = os.pathsep.join(
+        dict.fromkeys(path for path in sys.path if path.endswith("packages") or path == str(Path(__file__).parents[2]))
+    )
+    pythons = [sys.executable, f"/usr/bin/python{version}", f"/usr/local/bin/python{version}"]
+    script = "import numpy, pytest, vobench.estimator.program"
+    for python in pythons:
+        environment = {"PYTHONPATH": search, "HOME": "/", "PYTHONDONTWRITEBYTECODE": "1"}
+        with suppress(OSError):
+            tried = subprocess.run(
+                [*drop, python, "-c", script],
+                env={**os.environ, **environment},
+                cwd="/",
+                capture_output=True,
+                check=False,
+            )
+            if tried.returncode == 0:
+                rerun(drop, python=python, environment={"PYTHONPATH": search, READ: search})
+                return
+    pytest.skip("no interpreter that an ordinary user may execute")
+
+
+@again
+@pytest.mark.parametrize("refused", ["", LANDLOCK], ids=["no namespaces", "neither namespaces nor landlock"])
+def test_the_same_where_the_kernel_refuses(refused):
+    folder = str(Path(isolation.__file__).parent)
+    rerun([sys.executable, "-I", "-S", "-c", WITHOUT, folder, refused])
+
+
+def test_without_namespaces_the_record_says_what_can_be_seen():
+    saw = sandbox_here()
+    if not os.environ.get(RERUN):
+        pytest.skip("of the poorer machine")
+    if saw.level != "full":
+        assert {PROCESSES, SHARED_MEMORY, NETWORK} <= set(saw.sees)
+        assert saw.why
+        assert (saw.level == "none") == (FILES in saw.sees)

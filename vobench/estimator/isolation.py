@@ -1,0 +1,584 @@
+"""What an estimator's process may see and do: a mount tree of its own, namespaces, no capabilities, few system calls.
+
+`enter` is called by the process that is about to become the estimator, or the first of its namespace. What the kernel
+does not allow is left out and reported. See namespaces(7), pivot_root(2), capabilities(7), seccomp(2), landlock(7).
+
+Run by a bare interpreter, because a start should cost next to nothing: nothing of vobench is imported.
+"""
+
+import ctypes
+import errno
+import os
+import struct
+
+# What an estimator can see beyond its own, where the kernel does not give a layer.
+FILES = "the user's files"
+NAMES = "names and permissions of the user's files"
+PROCESSES = "other processes"
+NETWORK = "the network"
+SHARED_MEMORY = "shared memory of other processes"
+SYSTEM_CALLS = "every system call"
+
+# linux/sched.h
+CLONE_NEWTIME = 0x00000080
+CLONE_NEWNS = 0x00020000
+CLONE_NEWCGROUP = 0x02000000
+CLONE_NEWUTS = 0x04000000
+CLONE_NEWIPC = 0x08000000
+CLONE_NEWUSER = 0x10000000
+CLONE_NEWPID = 0x20000000
+CLONE_NEWNET = 0x40000000
+CLONE_ANY_NEW = (
+    CLONE_NEWTIME
+    | CLONE_NEWNS
+    | CLONE_NEWCGROUP
+    | CLONE_NEWUTS
+    | CLONE_NEWIPC
+    | CLONE_NEWUSER
+    | CLONE_NEWPID
+    | CLONE_NEWNET
+)
+# linux/mount.h
+MS_RDONLY = 1
+MS_NOSUID = 2
+MS_NODEV = 4
+MS_NOEXEC = 8
+MS_REMOUNT = 32
+MS_BIND = 4096
+MS_REC = 16384
+MS_PRIVATE = 1 << 18
+MNT_DETACH = 2
+# linux/prctl.h
+PR_SET_DUMPABLE = 4
+PR_CAPBSET_DROP = 24
+PR_SET_NO_NEW_PRIVS = 38
+PR_CAP_AMBIENT = 47
+PR_CAP_AMBIENT_CLEAR_ALL = 4
+PR_SET_SECCOMP = 22
+# linux/capability.h
+CAPABILITY_VERSION = 0x20080522
+MOST_CAPABILITIES = 64
+
+# The system's programs and libraries. The last three are those of NixOS and Guix.
+SYSTEM = (
+    "/usr",
+    "/bin",
+    "/sbin",
+    "/lib",
+    "/lib32",
+    "/lib64",
+    "/libx32",
+    "/nix/store",
+    "/gnu/store",
+    "/run/current-system",
+)
+# What the loader, programs with alternatives, fonts and drivers look up.
+SETTINGS = (
+    "/etc/alternatives",
+    "/etc/fonts",
+    "/etc/glvnd",
+    "/etc/hosts",
+    "/etc/ld.so.cache",
+    "/etc/ld.so.conf",
+    "/etc/ld.so.conf.d",
+    "/etc/localtime",
+    "/etc/OpenCL",
+    "/etc/vulkan",
+)
+DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
+# Graphics processors: NVIDIA's, those of Mesa's drivers, AMD's compute, and that of WSL.
+GRAPHICS = ("/dev/dri", "/dev/kfd", "/dev/dxg")
+GRAPHICS_PREFIX = "nvidia"
+PROCESSORS = ("/sys/devices/system/cpu", "/sys/devices/system/node")
+LINKS_OF_DEV = (
+    ("/dev/fd", "/proc/self/fd"),
+    ("/dev/stdin", "/proc/self/fd/0"),
+    ("/dev/stdout", "/proc/self/fd/1"),
+    ("/dev/stderr", "/proc/self/fd/2"),
+)
+ROOT_SIZE = "16m"
+INODE_BYTES = 4096  # a file takes a block at least, as where the size of a folder is counted
+
+libc = ctypes.CDLL(None, use_errno=True)
+
+
+def new_pid_namespace() -> bool:
+    """Whether the children of this process are in a process namespace of their own: as root, or in a user namespace."""
+    user = os.getuid()
+    group = os.getgid()
+    try:
+        if libc.unshare(CLONE_NEWPID) == 0:
+            return True
+        if libc.unshare(CLONE_NEWUSER | CLONE_NEWPID):
+            return False
+        maps = (("setgroups", "deny"), ("uid_map", f"{user} {user} 1"), ("gid_map", f"{group} {group} 1"))
+        for name, text in maps:
+            with open(f"/proc/self/{name}", "w") as file:
+                file.write(text)
+    except (OSError, AttributeError):
+        return False
+    return True
+
+
+def enter(plan: dict[str, object], *, has_pid_namespace: bool) -> tuple[list[str], str, list[int]]:
+    """Isolate this process and all that come of it, as far as the kernel allows.
+
+    `plan` is that of `sandbox.plan`. Returns what can still be seen, why the mount tree could not be had (empty where
+    it could), and descriptors: of the writable file system, of the home in it, and of the shared memory.
+    """
+    sees = []
+    why = ""
+    descriptors: list[int] = []
+    has_own_proc = False
+    before = os.umask(0o022)
+    try:
+        has_own_proc, descriptors = _enter_mount_tree(plan, has_pid_namespace=has_pid_namespace)
+    except OSError as error:
+        why = str(error.strerror)
+    os.umask(before)
+    _prctl(PR_SET_NO_NEW_PRIVS, 1)
+    if not descriptors:
+        sees.append(NAMES if _restrict_files(plan) else FILES)
+        sees.append(SHARED_MEMORY)
+    if not has_own_proc:
+        sees.append(PROCESSES)
+    if not _leave_network():
+        sees.append(NETWORK)
+    libc.unshare(CLONE_NEWIPC)
+    _drop_capabilities()
+    if not _filter_system_calls(kills_all=has_pid_namespace):
+        sees.append(SYSTEM_CALLS)
+    return sees, why, descriptors
+
+
+def hide_from_children() -> None:
+    """Keep children from this process's memory and descriptors, though they have the same user."""
+    _prctl(PR_SET_DUMPABLE, 0)
+
+
+# The mount tree
+
+
+def _enter_mount_tree(plan: dict[str, object], *, has_pid_namespace: bool) -> tuple[bool, list[int]]:
+    """Build the tree below the home's folder and make it the root; on an error all is as it was. Raises OSError.
+
+    Returns whether /proc is its own, and the descriptors of `enter`.
+    """
+    if not has_pid_namespace:
+        raise OSError(errno.EPERM, "no process namespace")
+    if libc.unshare(CLONE_NEWNS):
+        raise _last_error("unshare")
+    _mount(None, "/", None, MS_REC | MS_PRIVATE)
+    home = str(plan["home"])
+    given = os.open(home, os.O_RDONLY | os.O_DIRECTORY)
+    _mount("tmpfs", home, "tmpfs", MS_NOSUID | MS_NODEV, f"mode=0755,size={ROOT_SIZE}")
+    try:
+        tree = _Tree(home)
+        tree.build(plan, given)
+        descriptors = tree.descriptors(home)
+        old = home + "/.old"
+        os.mkdir(old)
+        tree.lock()
+        if libc.pivot_root(os.fsencode(home), os.fsencode(old)):
+            raise _last_error("pivot_root")
+    except OSError:
+        libc.umount2(os.fsencode(home), MNT_DETACH)
+        raise
+    finally:
+        os.close(given)
+    os.chdir("/")
+    if libc.umount2(b"/.old", MNT_DETACH):
+        raise SystemExit("the old root cannot be left")
+    os.rmdir("/.old")
+    _mount(None, "/", None, MS_REMOUNT | MS_BIND | MS_RDONLY | MS_NOSUID | MS_NODEV)
+    os.chdir(home)
+    return tree.has_own_proc, descriptors
+
+
+class _Tree:
+    """A mount tree while it is built: `root` will be /, `writable` are mounts that are not made read-only."""
+
+    def __init__(self, root: str) -> None:
+        self.root = root
+        self.writable = [root + "/tmp", root + "/dev/shm"]
+        self.readable: dict[str, bool] = {}  # by path: whether all below it is readable, or hidden
+        self.has_own_proc = True
+
+    def build(self, plan: dict[str, object], given: int) -> None:
+        """Mount all that an estimator may see; `given` is the folder whose entries its home has from the start."""
+        home = str(plan["home"])
+        self._mount_writable(int(plan["disk_bytes"]), int(plan["memory_bytes"]))  # type: ignore[call-overload]
+        self._mount_proc()
+        self._bind_devices(bool(plan["graphics"]))
+        read = [(path, True) for path in (*SYSTEM, *SETTINGS, *PROCESSORS, *plan["read"])]  # type: ignore[misc]
+        hidden = [(path, False) for path in plan["hidden"]]  # type: ignore[attr-defined]
+        # The shallow ones first, so that a folder to be read may lie in a hidden one, and the other way round.
+        for path, is_read in sorted([*read, *hidden], key=lambda entry: (entry[0].count("/"), entry[1])):
+            if is_read:
+                self._read(path)
+            else:
+                self._hide(path)
+        self._make_home(home, str(plan["homes"]))
+        for name in os.listdir(given):
+            self._bind(f"/proc/self/fd/{given}/{name}", f"{home}/{name}")
+
+    def _mount_writable(self, disk_bytes: int, memory_bytes: int) -> None:
+        """The file system of the home, and shared memory: both end with the namespace, however that ends."""
+        for path, size, inodes in (("/tmp", disk_bytes, disk_bytes // INODE_BYTES), ("/dev/shm", memory_bytes, 65536)):
+            os.makedirs(self.root + path)
+            limits = f"mode=0755,size={size},nr_inodes={inodes}"
+            _mount("tmpfs", self.root + path, "tmpfs", MS_NOSUID | MS_NODEV, limits)
+
+    def _mount_proc(self) -> None:
+        """A /proc of the namespace's processes alone, whose settings of the kernel cannot be written.
+
+        In a container that masks some of it the kernel may refuse that; then it is the system's.
+        """
+        os.mkdir(self.root + "/proc")
+        try:
+            _mount("proc", self.root + "/proc", "proc", MS_RDONLY | MS_NOSUID | MS_NODEV | MS_NOEXEC)
+        except OSError:
+            self.has_own_proc = False
+            self._bind("/proc", "/proc")
+
+    def _bind_devices(self, has_graphics: bool) -> None:
+        devices = list(DEVICES)
+        if has_graphics:
+            devices += GRAPHICS
+            devices += [f"/dev/{name}" for name in os.listdir("/dev") if name.startswith(GRAPHICS_PREFIX)]
+        for path in devices:
+            if os.path.exists(path):
+                self._bind(path, path)
+        for link, target in LINKS_OF_DEV:
+            os.symlink(target, self.root + link)
+        if has_graphics:  # drivers look up their device there
+            self._bind("/sys", "/sys")
+
+    def _read(self, path: str) -> None:
+        """Make a file or folder readable, under the name that is given and under its real one."""
+        real = os.path.realpath(path)
+        if not os.path.exists(real):
+            return
+        if not self._is_readable(real):
+            self._bind(real, real)
+        if path != real and not os.path.lexists(self.root + path):
+            self._link(path, real)
+
+    def _link(self, path: str, real: str) -> None:
+        """Give a place that is readable its other name."""
+        place = self.root + path
+        os.makedirs(os.path.dirname(place), exist_ok=True)
+        os.symlink(os.path.relpath(real, os.path.dirname(path)), place)
+
+    def _is_readable(self, real: str) -> bool:
+        """Whether a path lies in a tree that is bound, and in none in it that is hidden."""
+        place = real
+        while place not in self.readable and place != "/":
+            place = os.path.dirname(place)
+        return self.readable.get(place, False)
+
+    def _bind(self, source: str, path: str) -> None:
+        target = self.root + path
+        if os.path.isdir(source):
+            os.makedirs(target, exist_ok=True)
+        elif not os.path.exists(target):
+            os.makedirs(os.path.dirname(target), exist_ok=True)
+            os.close(os.open(target, os.O_CREAT | os.O_WRONLY | os.O_CLOEXEC, 0o644))
+        _mount(source, target, None, MS_BIND | MS_REC)
+        self.readable[path] = True
+
+    def _hide(self, path: str) -> None:
+        """Put something empty in the place of what lies in a readable folder."""
+        target = self.root + path
+        if not self._is_readable(path) or not os.path.lexists(target):
+            return
+        if os.path.isdir(target):
+            _mount("tmpfs", target, "tmpfs", MS_NOSUID | MS_NODEV, "mode=0755,size=4k")
+        else:
+            _mount("/dev/null", target, None, MS_BIND)
+        self.readable[path] = False
+
+    def _make_home(self, home: str, homes: str) -> None:
+        """The home as an empty folder of the writable file system; those of others are not there."""
+        place = self.root + home
+        if self._is_readable(homes):
+            os.mkdir(self.root + "/tmp/.homes")
+            self._bind(self.root + "/tmp/.homes", homes)
+            self.writable.append(self.root + homes)
+        os.makedirs(place)
+        if os.stat(place).st_dev != os.stat(self.root + "/tmp").st_dev:
+            os.mkdir(self.root + "/tmp/.home")
+            _mount(self.root + "/tmp/.home", place, None, MS_BIND)
+            self.writable.append(place)
+
+    def descriptors(self, home: str) -> list[int]:
+        """Of the writable file system, of the home, and of shared memory."""
+        flags = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
+        return [os.open(self.root + path, flags) for path in ("/tmp", home, "/dev/shm")]
+
+    def lock(self) -> None:
+        """Make all mounts read-only that are not to be written, those within a bound folder included."""
+        with open("/proc/self/mountinfo", errors="surrogateescape") as file:
+            mounts = [line.split(" ")[4:6] for line in file]
+        for escaped, options in mounts:
+            point = _unescaped(escaped)
+            if not point.startswith(self.root + "/"):
+                continue
+            if point in self.writable:
+                continue
+            flags = MS_REMOUNT | MS_BIND | MS_RDONLY | MS_NOSUID
+            if not point.startswith(self.root + "/dev/"):  # where devices are still devices
+                flags |= MS_NODEV
+            if "noexec" in options.split(","):
+                flags |= MS_NOEXEC
+            _mount(None, point, None, flags)
+
+
+def _unescaped(text: str) -> str:
+    """A path of mountinfo as it is; a blank is written there as a backslash and 040."""
+    parts = text.split("\\")
+    return parts[0] + "".join(chr(int(part[:3], 8)) + part[3:] for part in parts[1:])
+
+
+def _mount(source: str | None, target: str, kind: str | None, flags: int, data: str | None = None) -> None:
+    """mount(2). Raises OSError, which names the target."""
+    words = [None if word is None else os.fsencode(word) for word in (source, target, kind)]
+    if libc.mount(*words, ctypes.c_ulong(flags), None if data is None else data.encode()):
+        raise _last_error(f"mount {target}")
+
+
+def _last_error(what: str) -> OSError:
+    number = ctypes.get_errno()
+    return OSError(number, f"{what}: {os.strerror(number)}")
+
+
+# Files, where there are no mounts
+
+LANDLOCK_CREATE_RULESET = 444
+LANDLOCK_ADD_RULE = 445
+LANDLOCK_RESTRICT_SELF = 446
+LANDLOCK_VERSION_ASKED = 1
+LANDLOCK_RULE_PATH_BENEATH = 1
+# linux/landlock.h: bits of access, of which each version knows more than the one before
+EXECUTE_READ_LIST = 0b1101
+READ_WRITE = 0b110
+EXECUTE_READ = 0b101
+BITS_OF_VERSION = {1: 13, 2: 14, 3: 15, 4: 15}
+BITS_SINCE_5 = 16
+IOCTL_BIT = 1 << 15
+ABSTRACT_SOCKETS_AND_SIGNALS = 0b11
+SINCE_NETWORK = 4
+SINCE_SCOPES = 6
+
+
+def _restrict_files(plan: dict[str, object]) -> bool:
+    """Whether this process can open no files but those of the plan: by landlock(7), which needs no namespace."""
+    version = libc.syscall(ctypes.c_long(LANDLOCK_CREATE_RULESET), None, ctypes.c_size_t(0), LANDLOCK_VERSION_ASKED)
+    read = [os.path.realpath(path) for path in (*SYSTEM, *SETTINGS, *PROCESSORS, *plan["read"])]  # type: ignore[misc]
+    hidden = [str(path) for path in plan["hidden"]]  # type: ignore[attr-defined]
+    holds_hidden = any(f"{path}/".startswith(f"{folder}/") for path in hidden for folder in read)
+    if version < 1 or holds_hidden:  # what is allowed for a folder is allowed for all that is in it
+        return False
+    every_access = (1 << BITS_OF_VERSION.get(version, BITS_SINCE_5)) - 1
+    scopes = ABSTRACT_SOCKETS_AND_SIGNALS if version >= SINCE_SCOPES else 0
+    attributes = struct.pack("QQQ", every_access, 0, scopes)
+    size = 24 if version >= SINCE_SCOPES else 16 if version >= SINCE_NETWORK else 8
+    ruleset = libc.syscall(ctypes.c_long(LANDLOCK_CREATE_RULESET), attributes, ctypes.c_size_t(size), 0)
+    if ruleset < 0:
+        return False
+    devices = [*DEVICES, *GRAPHICS, *(f"/dev/{name}" for name in os.listdir("/dev") if GRAPHICS_PREFIX in name)]
+    rules = [(path, EXECUTE_READ_LIST) for path in (*read, "/proc")]
+    rules += [(path, READ_WRITE | IOCTL_BIT) for path in devices]
+    rules += [(str(plan["home"]), every_access), ("/dev/shm", every_access)]
+    for path, access in rules:
+        _allow(ruleset, path, access & every_access)
+    failed = libc.syscall(ctypes.c_long(LANDLOCK_RESTRICT_SELF), ctypes.c_int(ruleset), 0)
+    os.close(ruleset)
+    return bool(failed == 0)
+
+
+def _allow(ruleset: int, path: str, access: int) -> None:
+    """Add a rule for a file or folder, where it exists; nothing is allowed by default."""
+    try:
+        place = os.open(path, os.O_PATH | os.O_CLOEXEC)
+    except OSError:
+        return
+    if not os.path.isdir(path):
+        access &= EXECUTE_READ | READ_WRITE | IOCTL_BIT
+    rule = struct.pack("=Qi", access, place)
+    libc.syscall(ctypes.c_long(LANDLOCK_ADD_RULE), ctypes.c_int(ruleset), LANDLOCK_RULE_PATH_BENEATH, rule, 0)
+    os.close(place)
+
+
+# The network, privileges
+
+
+def _leave_network() -> bool:
+    """Whether this process has a network of its own, with nothing in it but itself."""
+    if libc.unshare(CLONE_NEWNET):
+        return False
+    try:
+        import _socket
+        import fcntl
+
+        device = _socket.socket(_socket.AF_INET, _socket.SOCK_DGRAM)
+        is_up_and_running = 0x1 | 0x40
+        request_to_set_flags = 0x8914  # linux/sockios.h
+        fcntl.ioctl(device.fileno(), request_to_set_flags, struct.pack("16sh14x", b"lo", is_up_and_running))
+        device.close()
+    except OSError:  # then 127.0.0.1 cannot be reached either
+        pass
+    return True
+
+
+def _drop_capabilities() -> None:
+    """Give up what root, or the first of a user namespace, may do beyond others, for good."""
+    for capability in range(MOST_CAPABILITIES):
+        _prctl(PR_CAPBSET_DROP, capability)
+    _prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL)
+    header = struct.pack("Ii", CAPABILITY_VERSION, 0)
+    none_of_them = bytes(24)
+    libc.capset(header, none_of_them)
+
+
+def _prctl(option: int, value: int) -> bool:
+    zero = ctypes.c_ulong(0)
+    return bool(libc.prctl(option, ctypes.c_ulong(value), zero, zero, zero) == 0)
+
+
+# System calls
+
+# By name: the number on x86-64 and on arm64; -1 where there is none.
+REFUSED = {
+    "acct": (163, 89),
+    "add_key": (248, 217),
+    "adjtimex": (159, 171),
+    "bpf": (321, 280),
+    "chroot": (161, 51),
+    "clock_adjtime": (305, 266),
+    "clock_settime": (227, 112),
+    "delete_module": (176, 106),
+    "fanotify_init": (300, 262),
+    "finit_module": (313, 273),
+    "fsconfig": (431, 431),
+    "fsmount": (432, 432),
+    "fsopen": (430, 430),
+    "fspick": (433, 433),
+    "init_module": (175, 105),
+    "io_uring_enter": (426, 426),
+    "io_uring_register": (427, 427),
+    "io_uring_setup": (425, 425),
+    "ioperm": (173, -1),
+    "iopl": (172, -1),
+    "kcmp": (312, 272),
+    "kexec_file_load": (320, 294),
+    "kexec_load": (246, 104),
+    "keyctl": (250, 219),
+    "lookup_dcookie": (212, 18),
+    "mount": (165, 40),
+    "mount_setattr": (442, 442),
+    "move_mount": (429, 429),
+    "name_to_handle_at": (303, 264),
+    "open_by_handle_at": (304, 265),
+    "open_tree": (428, 428),
+    "perf_event_open": (298, 241),
+    "pidfd_getfd": (438, 438),
+    "pivot_root": (155, 41),
+    "process_madvise": (440, 440),
+    "process_vm_readv": (310, 270),
+    "process_vm_writev": (311, 271),
+    "ptrace": (101, 117),
+    "quotactl": (179, 60),
+    "quotactl_fd": (443, 443),
+    "reboot": (169, 142),
+    "request_key": (249, 218),
+    "setdomainname": (171, 162),
+    "sethostname": (170, 161),
+    "setns": (308, 268),
+    "settimeofday": (164, 170),
+    "swapoff": (168, 225),
+    "swapon": (167, 224),
+    "syslog": (103, 116),
+    "umount2": (166, 39),
+    "unshare": (272, 97),
+    "userfaultfd": (323, 282),
+    "vhangup": (153, 58),
+}
+CLONE = (56, 220)
+CLONE3 = (435, 435)
+SOCKET = (41, 198)
+IOCTL = (16, 29)
+KILL = (62, 129)
+SECCOMP = (317, 277)
+FAMILIES = (1, 2, 10, 16)  # AF_UNIX, AF_INET, AF_INET6, AF_NETLINK
+TYPED_INTO_TERMINALS = (0x5412, 0x541C)  # TIOCSTI, TIOCLINUX
+MACHINES = {"x86_64": (0, 0xC000003E), "aarch64": (1, 0xC00000B7)}  # column of the numbers above, linux/audit.h
+X32_BIT = 0x40000000
+# linux/bpf_common.h, linux/seccomp.h: offsets of struct seccomp_data, little-endian
+LOAD = 0x20
+JUMP_IF_EQUAL = 0x15
+JUMP_IF_AT_LEAST = 0x35
+JUMP_IF_ANY_BIT = 0x45
+RETURN = 0x06
+NUMBER = 0
+ARCHITECTURE = 4
+FIRST_ARGUMENT = 16
+SECOND_ARGUMENT = 24
+ALLOW = 0x7FFF0000
+FAIL = 0x00050000
+SECCOMP_SET_MODE_FILTER = 1
+SECCOMP_FILTER_FLAG_SPEC_ALLOW = 4  # else older kernels slow down all that the process computes
+SECCOMP_MODE_FILTER = 2
+
+Instruction = tuple[int, int, int, int]  # code, how far to jump if true, and if false, operand
+
+
+def system_call_filter(machine: str, *, kills_all: bool) -> list[Instruction]:
+    """The filter for a machine, `x86_64` or `aarch64`; `kills_all` allows signals to all processes that it can see."""
+    column, architecture = MACHINES[machine]
+    fails = FAIL | errno.EPERM
+    program: list[Instruction] = [
+        (LOAD, 0, 0, ARCHITECTURE),
+        (JUMP_IF_EQUAL, 1, 0, architecture),
+        (RETURN, 0, 0, fails),
+        (LOAD, 0, 0, NUMBER),
+    ]
+    if machine == "x86_64":
+        program += [(JUMP_IF_AT_LEAST, 0, 1, X32_BIT), (RETURN, 0, 0, fails)]
+    for numbers in REFUSED.values():
+        if numbers[column] >= 0:
+            program += [(JUMP_IF_EQUAL, 0, 1, numbers[column]), (RETURN, 0, 0, fails)]
+    # Libraries fall back on clone, whose flags can be looked at.
+    program += [(JUMP_IF_EQUAL, 0, 1, CLONE3[column]), (RETURN, 0, 0, FAIL | errno.ENOSYS)]
+    new_namespace = [(JUMP_IF_ANY_BIT, 0, 1, CLONE_ANY_NEW & ~0xFF), (RETURN, 0, 0, fails)]
+    program += _of_call(CLONE[column], FIRST_ARGUMENT, new_namespace)
+    family = [(JUMP_IF_EQUAL, len(FAMILIES) - place, 0, known) for place, known in enumerate(FAMILIES)]
+    program += _of_call(SOCKET[column], FIRST_ARGUMENT, [*family, (RETURN, 0, 0, FAIL | errno.EAFNOSUPPORT)])
+    typed = [(JUMP_IF_EQUAL, 0, 1, TYPED_INTO_TERMINALS[0]), (RETURN, 0, 0, fails)]
+    typed += [(JUMP_IF_EQUAL, 0, 1, TYPED_INTO_TERMINALS[1]), (RETURN, 0, 0, fails)]
+    program += _of_call(IOCTL[column], SECOND_ARGUMENT, typed)
+    if not kills_all:
+        everybody = [(JUMP_IF_EQUAL, 0, 1, 0xFFFFFFFF), (RETURN, 0, 0, fails)]
+        program += _of_call(KILL[column], FIRST_ARGUMENT, everybody)
+    return [*program, (RETURN, 0, 0, ALLOW)]
+
+
+def _of_call(number: int, argument: int, body: list[Instruction]) -> list[Instruction]:
+    """Instructions on an argument of one system call, at whose end it is allowed; of all others they are skipped."""
+    return [(JUMP_IF_EQUAL, 0, len(body) + 2, number), (LOAD, 0, 0, argument), *body, (RETURN, 0, 0, ALLOW)]
+
+
+def _filter_system_calls(*, kills_all: bool) -> bool:
+    """Whether the filter is in force."""
+    machine = os.uname().machine
+    if machine not in MACHINES:
+        return False
+    program = system_call_filter(machine, kills_all=kills_all)
+    code = b"".join(struct.pack("HBBI", *instruction) for instruction in program)
+    buffer = ctypes.create_string_buffer(code, len(code))
+    whole = struct.pack("HxxxxxxQ", len(program), ctypes.addressof(buffer))
+    number = SECCOMP[MACHINES[machine][0]]
+    flags = ctypes.c_ulong(SECCOMP_FILTER_FLAG_SPEC_ALLOW)
+    if libc.syscall(ctypes.c_long(number), ctypes.c_ulong(SECCOMP_SET_MODE_FILTER), flags, whole) == 0:
+        return True
+    return bool(libc.prctl(PR_SET_SECCOMP, ctypes.c_ulong(SECCOMP_MODE_FILTER), whole) == 0)

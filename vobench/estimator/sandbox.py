@@ -1,0 +1,136 @@
+"""What an estimator may see: the files that it is given, what it saw beyond them, and the sentence on that."""
+
+import os
+import shutil
+import site
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from vobench.estimator import isolation
+from vobench.estimator.manifest import Limits
+
+READ = "VOBENCH_SANDBOX_READ"
+SWITCH = "VOBENCH_SANDBOX"
+OFF = "off"
+# What is given to every estimator in another form, or would be everything.
+NEVER_READ = ("/", "/dev", "/proc", "/sys", "/tmp")
+MEBIBYTE = 1 << 20
+DISK_ALLOWANCE_BYTES = MEBIBYTE  # beyond the limit, so that whoever exceeds it is seen to
+
+Level = Literal["full", "partial", "none"]
+EVERYTHING = (isolation.FILES, isolation.PROCESSES, isolation.NETWORK)
+
+
+@dataclass(frozen=True, slots=True)
+class Sandbox:
+    """What an estimator could see: `sees` beyond its own, and the folders `read` that the user has opened to it.
+
+    `why` is the reason for which the kernel gave no mount tree; empty where it did.
+    """
+
+    level: Level
+    sees: tuple[str, ...] = ()
+    read: tuple[str, ...] = ()
+    why: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """What the estimator saw, for a person."""
+        opened = [f"{path} ({READ})" for path in self.read]
+        if self.level == "none":
+            return f"not sandboxed: it could see {_listed(self.sees)}"
+        files = [] if isolation.FILES in self.sees else ["only its own files"]
+        return f"saw {_listed([*files, *opened, *self.sees])}"
+
+
+def _listed(things: Sequence[str]) -> str:
+    """Things as a sentence lists them."""
+    if len(things) < 2:
+        return "".join(things)
+    return f"{', '.join(things[:-1])} and {things[-1]}"
+
+
+def of_report(sees: Sequence[str], why: str) -> Sandbox:
+    """The record of a program that is isolated but for what it sees."""
+    level: Level = "partial" if sees else "full"
+    if isolation.FILES in sees and isolation.PROCESSES in sees:
+        level = "none"
+    return Sandbox(level, tuple(sees), opened(), why)
+
+
+def unsandboxed() -> Sandbox:
+    """The record of a program that runs as any other, since the user or the system has it so."""
+    why = f"{SWITCH}={OFF}" if is_switched_off() else "not Linux"
+    return Sandbox("none", EVERYTHING, why=why)
+
+
+def is_switched_off() -> bool:
+    """Whether the user wants no sandbox, say for programs that start containers."""
+    return os.environ.get(SWITCH, "").lower() == OFF
+
+
+def opened() -> tuple[str, ...]:
+    """The folders that the user has opened to all estimators by $VOBENCH_SANDBOX_READ."""
+    words = [word for word in os.environ.get(READ, "").split(os.pathsep) if word]
+    paths = [os.path.abspath(os.path.expanduser(word)) for word in words]
+    return tuple(path for path in paths if os.path.realpath(path) not in NEVER_READ)
+
+
+def libraries() -> list[str]:
+    """The interpreter and its libraries: prefixes, the user's site-packages, and the package vobench."""
+    folders = [sys.prefix, sys.base_prefix, sys.exec_prefix, str(Path(__file__).parents[1])]
+    if site.ENABLE_USER_SITE and os.path.isdir(site.getusersitepackages()):
+        folders.append(site.getusersitepackages())
+    return list(dict.fromkeys(os.path.abspath(folder) for folder in folders))
+
+
+def user_packages() -> dict[str, str]:
+    """The variable that keeps the user's site-packages where they are, though HOME is another."""
+    return {"PYTHONUSERBASE": site.getuserbase()} if site.ENABLE_USER_SITE else {}
+
+
+def plan(
+    argv: Sequence[str], *, home: Path, homes: Path, folder: Path | None, hidden: Sequence[Path], limits: Limits
+) -> dict[str, Any]:
+    """What the guard is to start and what that may see, of types that marshal takes.
+
+    `home` is an empty folder to work in, or one with what the program is given; `homes` holds it and those of others.
+    `folder` is the estimator's own; whatever lies in a readable folder and is `hidden` is empty.
+    """
+    own = [] if folder is None else [str(folder.absolute())]
+    return {
+        "is_isolated": not is_switched_off() and sys.platform == "linux",
+        "program": found(argv[0]),
+        "argv": list(argv),
+        "file_bytes": limits.disk_mib * MEBIBYTE,
+        "disk_bytes": limits.disk_mib * MEBIBYTE + DISK_ALLOWANCE_BYTES,
+        "memory_bytes": limits.memory_mib * MEBIBYTE,
+        "home": str(home),
+        "homes": str(homes),
+        "read": [*libraries(), *opened(), *own],
+        "hidden": [str(path.resolve()) for path in hidden],
+        "graphics": _has_graphics(),
+    }
+
+
+def _has_graphics() -> bool:
+    """Whether there is a graphics processor, which estimators may use."""
+    names = os.listdir("/dev") if os.path.isdir("/dev") else []
+    is_nvidia = any(name.startswith(isolation.GRAPHICS_PREFIX) for name in names)
+    return is_nvidia or any(os.path.exists(path) for path in isolation.GRAPHICS)
+
+
+def found(program: str) -> str:
+    """The path of a program, by PATH as a shell has it."""
+    return shutil.which(program) or program
+
+
+def is_out_of_reach(program: str, folder: Path | None) -> bool:
+    """Whether a program is there, but in no folder that an estimator may read."""
+    path = Path(found(program))
+    readable = [*isolation.SYSTEM, *libraries(), *opened(), *([str(folder)] if folder else [])]
+    real = [Path(place).resolve() for place in readable]
+    return path.exists() and not any(path.resolve().is_relative_to(place) for place in real)
