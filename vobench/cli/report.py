@@ -260,8 +260,9 @@ def print_board(board: Board, metric: str = DEFAULT_METRIC) -> None:
     for note in cell_notes(board):
         out.print(f"  {printable(note)}")
     out.print(LEGEND, style="dim")
-    if line := origin(board):
-        out.print(printable(line), style="dim")
+    for line in (board.visible, origin(board)):
+        if line:
+            out.print(printable(line), style="dim")
 
 
 def _print_totals(title: str, headings: list[str], lines: list[list[str]], out: Console) -> None:

@@ -11,7 +11,6 @@ import typer
 from vobench.cli import terminal
 from vobench.errors import InputError
 from vobench.estimator.manifest import Manifest
-from vobench.estimator.program import sandbox_works
 from vobench.runner.launch import run_plan
 from vobench.runner.motion import cut
 from vobench.runner.preflight import PlanSummary, summarize
@@ -116,8 +115,6 @@ def run_command(
         print(board_as_json(board), end="")
     else:
         print_board(board)
-        if not sandbox_works():
-            terminal.console().print("Estimators were not sandboxed: the kernel gives no namespaces (vobench doctor).")
         if share_time or planned.suite.share_time:
             terminal.console().print(f"CPU times of this run were taken {BESIDE}.")
         vobench = "vobench" if shutil.which("vobench") else sys.argv[0]  # where the environment is not activated

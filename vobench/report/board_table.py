@@ -170,8 +170,7 @@ def markdown(made: Board, metric: str = DEFAULT_METRIC) -> str:
     for over, table in totals(made):
         lines += [f"## Totals: {_md(over)}", "", *_md_table(table, words=2)]
     lines += [*(f"- {_md(said)}" for said in (*remarks(made), *cell_notes(made))), "", LEGEND.replace("~", "\\~"), ""]
-    if line := origin(made):
-        lines += [_md(line), ""]
+    lines += [_md(line) + "\n" for line in (made.visible, origin(made)) if line]
     return "\n".join(lines)
 
 
@@ -193,6 +192,7 @@ def as_json(made: Board) -> str:
         "totals": [asdict(total) for total in made.totals],
         "curves": [asdict(curve) for curve in made.curves],
         "remarks": remarks(made),
+        "visible": made.visible,
         "unmade": [asdict(group) for group in made.unmade],
         "environment": asdict(made.environment) if made.environment else None,
     }
@@ -204,7 +204,7 @@ def _row(cell: Cell) -> dict[str, Any]:
     spreads = {name: cell.spread(name) or (None, None, None) for name in METRICS}
     numbers = {f"{name}{end}": spreads[name][k] for name in METRICS for k, end in enumerate(("", "_min", "_max"))}
     facts = {**asdict(cell.facts), "trials": cell.trials, "failed": cell.failed}
-    said = {name: getattr(cell, name) for name in ("status", "reason", "drift_mm", "scale_gap", "consistency")}
+    said = {name: getattr(cell, name) for name in ("status", "reason", "saw", "drift_mm", "scale_gap", "consistency")}
     frames = cell.answered
     gave = {"frame_reason": frames.reason, "frame_reason_count": frames.count, "frame_reason_first": frames.first}
     dropped = {"frames": frames.frames, "frames_dropped": frames.dropped, "deadlines_missed": frames.late}
@@ -299,11 +299,13 @@ def latex(made: Board, metric: str = DEFAULT_METRIC) -> str:
     split = len(table) if flipped else len(table) - len(feet)
     several = max((cell.trials for cell in made.cells), default=1) > 1
     trials = f", median{' and range' * spans} of its trials" if several else ""
+    seen = f" {made.visible}" if made.visible else ""
     lines = [
         r"% Needs \usepackage{booktabs}" + (r" and \usepackage{graphicx}." if columns > WIDE else "."),
         r"\begin{table}",
         r"\centering",
-        rf"\caption{{{_tex(METRICS[metric].heading)} of each case{trials}. Bold: best; $^{{\sim}}$: not decided.}}",
+        rf"\caption{{{_tex(METRICS[metric].heading)} of each case{trials}. "
+        rf"Bold: best; $^{{\sim}}$: not decided.{_tex(seen)}}}",
         rf"\label{{tab:{re.sub(r'[^A-Za-z0-9-]+', '-', made.title or 'board')}}}",
         r"\footnotesize\setlength{\tabcolsep}{4pt}",
         r"\begin{tabular}{l" + "r" * columns + "}",

@@ -22,14 +22,17 @@ from vobench.runner.folder import (
     SURVIVED,
     TrialScore,
     Unmade,
+    seen_by,
     unmade_in,
     value_of,
+    visible_to,
     with_sequence,
 )
 from vobench.runner.frames import FrameRow
 
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 FAIL_RATIO = 0.1  # of the path, of scores without a lost-aware one
+ONLY_ITS_OWN = "only its own files"
 BROKEN = 0.75  # the lost-aware score of a survivor that is off by half of what counts as failed
 
 
@@ -119,6 +122,7 @@ class Cell:
 
     `values` has each metric's of every trial, infinitely bad where it failed, None where it has none; `status` and
     `reason` are the gravest. `consistency`, `revised_…` and `scale_drift_…` are of the survivors.
+    `saw` is what its trials could see.
     """
 
     case: str
@@ -137,6 +141,7 @@ class Cell:
     revised_ate_mm: float | None = None
     revised_segment_percent: float | None = None
     scale_drift_percent_per_m: float | None = None
+    saw: str = ""
 
     @property
     def trials(self) -> int:
@@ -199,6 +204,7 @@ class Curve:
 class Board:
     """The table of cells and what is derived from it; `remarks` say what its numbers do not.
 
+    `visible` says what the estimators could see.
     `unmade` are the cases that could not be simulated or imported: they have no cells, and count for no estimator.
     `environment` is where the figures come from, as far as it is known.
     """
@@ -210,6 +216,7 @@ class Board:
     remarks: tuple[str, ...]
     unmade: tuple[Unmade, ...] = ()
     environment: Environment | None = None
+    visible: str = ""
     _at: dict[tuple[str, str], Cell] = field(default_factory=dict, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -293,7 +300,16 @@ def board(
     remarks += sorted(
         {f"the truth that is scored is off by {each}" for cell in cells if (each := cell.facts.truth_noise)}
     )
-    return Board(title, tuple(cells), tuple(totals), tuple(_curves(cells)), tuple(remarks), unmade, environment)
+    return Board(
+        title,
+        tuple(cells),
+        tuple(totals),
+        tuple(_curves(cells)),
+        tuple(remarks),
+        unmade,
+        environment,
+        visible_to(with_sequence(scores)),
+    )
 
 
 def _without_sequence(unmade: Sequence[Unmade], *, of: int) -> list[str]:
@@ -329,6 +345,7 @@ def _cell(trials: list[TrialScore], found: EstimatorStatistics, facts: CaseFacts
         losses=tuple(nan if score is None else max(1.0 - score, ranking.MIN_LOSS) for score in scored),
         answered=found,
         claims=worst.claims,
+        saw="; ".join(sorted({seen_by(trial) or ONLY_ITS_OWN for trial in trials})),
         drift_mm=max(drifts, default=None),
         scale_drift_percent_per_m=_mean(moving, "scale_drift", "mean", 100),
         revised_ate_mm=_mean(moving, "ate_trans", "rmse", 1e3, revised=True),

@@ -31,6 +31,7 @@ from vobench.runner.folder import (
     RunFolder,
     TrialScore,
     read_tum,
+    visible_to,
     with_sequence,
 )
 from vobench.runner.frames import FRAMES, GROUND_TRUTH, TIMES, FrameRow, new_table, read_frames
@@ -174,6 +175,7 @@ def _header(folder: RunFolder, scores: list[TrialScore]) -> dict[str, Any]:
         "cores": f"{environment.cores} of {environment.cores_total}" if environment.cores else None,
         "drawn by": environment.driver,
         "portable": "yes" if environment.portable else None,
+        "estimators": visible_to(trials).removeprefix("Estimators "),
         "system": environment.platform,
         "CPU time": f"taken {environment.timed}" if environment.timed else None,
     }

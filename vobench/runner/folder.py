@@ -160,14 +160,14 @@ def visible_to(trials: Iterable[TrialScore]) -> str:
     """
     estimators = dict[str, set[str]]()
     for trial in trials:
-        sentence = _seen_by(trial)
+        sentence = seen_by(trial)
         if sentence:
             estimators.setdefault(sentence, set()).add(trial.estimator)
     named = [f"{', '.join(sorted(labels))}: {sentence}." for sentence, labels in sorted(estimators.items())]
     return " ".join(named) or ONLY_THEIR_OWN
 
 
-def _seen_by(trial: TrialScore) -> str:
+def seen_by(trial: TrialScore) -> str:
     """What a trial's estimator saw beyond its own files; empty where that is nothing."""
     if trial.sandbox is not None:
         is_strict = trial.sandbox.level == "full" and not trial.sandbox.read
