@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from vobench.errors import InputError, UnknownNameError, unknown
 from vobench.notebook.class_source import write_estimator
-from vobench.notebook.display import choose_display, in_notebook
+from vobench.notebook.display import choose_display
 from vobench.runner.folder import open_run
 from vobench.runner.launch import run_plan
 from vobench.runner.motion import cut
@@ -92,8 +92,6 @@ class Run:
         """
         from vobench.report.trial_plot import plot_case
 
-        if in_notebook():
-            import matplotlib.pyplot  # noqa: F401 - registers how Jupyter shows a figure
         chosen = self._require("case", case or self.cases[0], self.cases)
         names = self.estimators if estimators is None else listed(estimators)
         for name in names:

@@ -1,9 +1,12 @@
 """The paths and errors of several estimators on one case, as one figure."""
 
 from collections.abc import Sequence
+from io import BytesIO
 from typing import TYPE_CHECKING
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 
 from vobench.errors import InputError
 from vobench.report.drive_plot import SETTINGS
@@ -14,7 +17,6 @@ from vobench.runner.score import score_estimate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from vobench.metric.score import Score
     from vobench.trajectory.trajectory import Trajectory
@@ -24,12 +26,22 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F
 LINES = ("-", "--", "-.", ":")
 SIZE_INCHES = (9.0, 3.6)
 NS_PER_S = 1e9
+INLINE_DPI = 110
 MARGIN = 1.5  # the side of the picture of paths, against the longer side of the ground truth
 LEAST_SPAN_M = 0.05  # from the centre of that picture to its edge
 LOGARITHMIC_FROM = 20.0  # the ratio of median errors from which on their axis is logarithmic
 
 
-def plot_case(folder: RunFolder, trials: Sequence[TrialScore]) -> "Figure":
+class InlineFigure(Figure):
+    """A figure that Jupyter shows as a picture, whether pyplot has been imported or not."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = BytesIO()
+        self.savefig(buffer, format="png", dpi=INLINE_DPI)
+        return buffer.getvalue()
+
+
+def plot_case(folder: RunFolder, trials: Sequence[TrialScore]) -> Figure:
     """Draw ground truth and aligned estimates from above, and the position error over time.
 
     `trials` are of one case. An estimate that cannot be scored is named in the legend and not drawn. Raises InputError
@@ -37,13 +49,10 @@ def plot_case(folder: RunFolder, trials: Sequence[TrialScore]) -> "Figure":
     """
     if not trials:
         raise InputError("there is no trial to plot")
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
     case = trials[0].case
     truth = read_tum(folder.case(case) / GROUND_TRUTH)
     with mpl.rc_context(SETTINGS):
-        figure = Figure(figsize=SIZE_INCHES, layout="constrained")
+        figure = InlineFigure(figsize=SIZE_INCHES, layout="constrained")
         path_axes, error_axes = figure.subplots(1, 2, width_ratios=[1, 1.25])
         figure.suptitle(case, fontweight="bold", x=0.01, ha="left")
         _draw_truth(path_axes, truth)
