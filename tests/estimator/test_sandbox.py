@@ -22,6 +22,7 @@ from pathlib import Path
 import pytest
 
 from vobench.estimator import isolation
+from vobench.estimator.home import Home
 from vobench.estimator.isolation import FILES, NETWORK, PROCESSES, SHARED_MEMORY, SYSTEM_CALLS
 from vobench.estimator.manifest import Limits
 from vobench.estimator.program import EstimatorFailure, Program, sandbox_here
@@ -541,6 +542,23 @@ def test_nothing_of_it_is_left_in_the_folder_of_temporary_files(run, tmp_path, m
     (tmp_path / "temporary").mkdir()
     run("sh", "mkdir -p a/b/c; echo x > a/b/c/d; echo x > /tmp/x")
     assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def test_homes_may_lie_in_a_folder_that_it_may_read_and_those_of_others_are_not_there(run, world, monkeypatch):
+    if sandbox_here().level != "full":
+        pytest.skip("without mounts a folder is opened as a whole")
+    temporary = world.place / "user" / "temporary"
+    temporary.mkdir(exist_ok=True)
+    monkeypatch.setattr("tempfile.tempdir", str(temporary))
+    monkeypatch.setenv(READ, str(world.place / "user"))
+    with Home(world.place / "log") as other:
+        (other.path / "poses.txt").write_text(world.secret)
+        saw, printed = run("sh", f'echo x > here; ls; cat {other.path}/poses.txt 2>/dev/null; ls "$user/temporary/"*')
+    assert saw.level == "full"
+    assert printed.splitlines()[0] == "here"
+    assert world.secret not in printed
+    assert other.path.parent.name not in printed
+    assert list(temporary.iterdir()) == []
 
 
 # The same as somebody else, and on a poorer machine

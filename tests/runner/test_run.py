@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vobench.estimator.program import sandbox_here
+from vobench.estimator.sandbox import READ
 from vobench.rendering import raster
 from vobench.report.verify import verify_run
 from vobench.runner import estimate
@@ -244,6 +246,11 @@ def test_a_failure_is_a_row_and_is_tried_again_when_its_cause_may_be_gone(bench,
         "import numpy\nfrom vobench.estimator import Result\ndef answer(): return Result(numpy.eye(4))\n"
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    if sandbox_here().level == "full":
+        out_of_reach = bench.run(change).scores()[0]
+        assert out_of_reach.status == "refused"
+        assert f"PYTHONPATH has {tmp_path}, which an estimator may not read: name it in {READ}" in out_of_reach.reason
+    monkeypatch.setenv(READ, str(tmp_path))
     assert {s.status for s in bench.run(change).scores()} == {"ok"}
 
 

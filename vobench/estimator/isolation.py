@@ -331,7 +331,12 @@ class _Tree:
                 flags |= MS_NODEV
             if "noexec" in options.split(","):
                 flags |= MS_NOEXEC
-            _mount(None, point, None, flags)
+            try:
+                _mount(None, point, None, flags)
+            except OSError as error:
+                # The path leads to no mount: another covers it, so nobody gets there.
+                if error.errno not in (errno.EINVAL, errno.ENOENT):
+                    raise
 
 
 def _unescaped(text: str) -> str:

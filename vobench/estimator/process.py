@@ -34,7 +34,7 @@ from vobench.estimator.message import (
 )
 from vobench.estimator.program import LOOK_S, Answer, EstimatorFailure, Program
 from vobench.estimator.protocol import Frame
-from vobench.estimator.sandbox import Sandbox
+from vobench.estimator.sandbox import Sandbox, hint_on_modules
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 
@@ -203,6 +203,9 @@ class EstimatorProcess:
         if tag in FAILURES:
             reason = self._read(min(length, REASON_BYTES), what, until).decode("utf-8", "replace")
             self._program.look(at_once=True)  # a limit, of which the failure may be a consequence
+            is_isolated = self._program.sandbox.level != "none"
+            if is_isolated and "ModuleNotFoundError" in reason:
+                reason += hint_on_modules(self._folder)
             raise EstimatorFailure(FAILURES[tag], reason)
         if tag not in tags or length > ANSWER_BYTES:
             wanted = " or ".join(sorted(tag.decode() for tag in tags if tag)) or "nothing"

@@ -130,7 +130,21 @@ def found(program: str) -> str:
 
 def is_out_of_reach(program: str, folder: Path | None) -> bool:
     """Whether a program is there, but in no folder that an estimator may read."""
-    path = Path(found(program))
+    return bool(_out_of_reach([found(program)], folder))
+
+
+def hint_on_modules(folder: Path | None) -> str:
+    """Why a module may not be found: the folders of PYTHONPATH that an estimator may not read; empty where it may."""
+    named = [path for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path]
+    unreadable = _out_of_reach(named, folder)
+    if not unreadable:
+        return ""
+    return f"; PYTHONPATH has {', '.join(unreadable)}, which an estimator may not read: name it in {READ}"
+
+
+def _out_of_reach(paths: Sequence[str], folder: Path | None) -> list[str]:
+    """Those of some paths that exist, but lie in no folder that an estimator may read."""
     readable = [*isolation.SYSTEM, *libraries(), *opened(), *([str(folder)] if folder else [])]
     real = [Path(place).resolve() for place in readable]
-    return path.exists() and not any(path.resolve().is_relative_to(place) for place in real)
+    found_paths = [path for path in paths if Path(path).exists()]
+    return [path for path in found_paths if not any(Path(path).resolve().is_relative_to(place) for place in real)]
