@@ -50,9 +50,11 @@ def main() -> None:
 
 
 def _baked(scene: Scene) -> BakedScene:
-    started, cpu_started = time.perf_counter(), time.process_time()
+    started = time.perf_counter()
+    cpu_started = time.process_time()
     baked = bake(scene, BakeSettings())
-    wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
+    wall_s = time.perf_counter() - started
+    cpu_s = time.process_time() - cpu_started
     texels = int((baked.patches.surfel_of >= 0).sum())
     gigabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     lights = f"{len(scene.lights)} lights, {texels} samples"
@@ -116,7 +118,8 @@ def _milliseconds(light: Illumination, views: Views | None, pictures: int) -> st
     """Median per picture after the first."""
     spent = []
     for index in range(pictures + 1):
-        wall, cpu = time.perf_counter(), time.process_time()
+        wall = time.perf_counter()
+        cpu = time.process_time()
         light.at(index * NS_PER_PICTURE, index * NS_PER_PICTURE + 10_000_000 + index, views)
         spent.append((time.perf_counter() - wall, time.process_time() - cpu))
     wall_s, cpu_s = np.median(spent[1:], axis=0)

@@ -67,7 +67,8 @@ def matt(scene: Scene) -> Scene:
 def in_blender(python: str, content: dict[str, Any]) -> tuple[Any, Any]:
     """Pictures (ways, poses, H, W) and seconds (ways, poses) of Cycles."""
     with tempfile.TemporaryDirectory() as folder:
-        given, made = Path(folder) / "job.npz", Path(folder) / "pictures.npz"
+        given = Path(folder) / "job.npz"
+        made = Path(folder) / "pictures.npz"
         np.savez(given, **content)
         command = [python, str(Path(__file__).with_name("blender_draw.py")), str(given), str(made)]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -78,7 +79,8 @@ def in_blender(python: str, content: dict[str, Any]) -> tuple[Any, Any]:
 def timed(renderer: Any, camera: Pinhole, poses: Sequence[Array]) -> tuple[list[Radiance], float]:
     """Pictures at all poses, and the median seconds of one; a first one warms up."""
     renderer.radiance(camera, still(camera, poses[0], t_ns=1))
-    pictures, spent = [], []
+    pictures = []
+    spent = []
     for pose in poses:
         started = time.perf_counter()
         pictures.append(renderer.radiance(camera, still(camera, pose)))
@@ -104,7 +106,8 @@ def main() -> None:
     parser.add_argument("--bakes", type=Path)
     arguments = parser.parse_args()
     spec = read_scene(catalog.find("scene", "room").path)
-    scene, camera = matt(build(spec, {})), lens(arguments.width)
+    scene = matt(build(spec, {}))
+    camera = lens(arguments.width)
     poses = [stand(*place) for place in PLACES["room"][:POSES]]
     raster = RasterRenderer(lit(scene, arguments.bakes))
     drawn, raster_s = timed(raster, camera, poses)
@@ -115,12 +118,14 @@ def main() -> None:
     print(f"room, {camera.width_px} x {camera.height_px}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     print(f"{'':28}{'s a picture':>12}{'PSNR dB':>9}{'mean / path':>13}{'times raster':>14}")
     traced = np.mean(halves)
-    error, ratio = error_db(drawn, halves, spec.white_cd_m2), np.mean(drawn) / traced
+    error = error_db(drawn, halves, spec.white_cd_m2)
+    ratio = np.mean(drawn) / traced
     print(f"{'raster':28}{raster_s:12.3f}{error:9.1f}{ratio:13.4f}{1:14.1f}")
     for (samples, denoised), own, spent in zip(WAYS, pictures, seconds, strict=True):
         name = f"Cycles {samples:4} samples{', denoised' if denoised else ''}"
         error = error_db(own, halves, spec.white_cd_m2)
-        ratio, slower = np.mean(own) / traced, np.median(spent) / raster_s
+        ratio = np.mean(own) / traced
+        slower = np.median(spent) / raster_s
         print(f"{name:28}{np.median(spent):12.3f}{error:9.1f}{ratio:13.4f}{slower:14.1f}")
 
 

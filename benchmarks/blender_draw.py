@@ -19,11 +19,14 @@ MAX_BOUNCES = 32
 
 def emissive(material: Any, luminance: float) -> None:
     """Shine from the front only; Cycles' own emission has two sides."""
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    emission, geometry = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeNewGeometry")
+    nodes = material.node_tree.nodes
+    links = material.node_tree.links
+    emission = nodes.new("ShaderNodeEmission")
+    geometry = nodes.new("ShaderNodeNewGeometry")
     front = nodes.new("ShaderNodeMath")
     front.operation = "MULTIPLY_ADD"  # luminance x (1 - is it the back)
-    front.inputs[1].default_value, front.inputs[2].default_value = -luminance, luminance
+    front.inputs[1].default_value = -luminance
+    front.inputs[2].default_value = luminance
     links.new(geometry.outputs["Backfacing"], front.inputs[0])
     links.new(front.outputs[0], emission.inputs["Strength"])
     links.new(emission.outputs[0], nodes["Material Output"].inputs["Surface"])
@@ -31,14 +34,18 @@ def emissive(material: Any, luminance: float) -> None:
 
 def matt(material: Any, tile: Any) -> None:
     """Diffuse reflectance from a tile of linear values, repeated."""
-    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes = material.node_tree.nodes
+    links = material.node_tree.links
     image = bpy.data.images.new(material.name, tile.shape[1], tile.shape[0], float_buffer=True, is_data=True)
     rgba = np.ones((*tile.shape[:2], 4), np.float32)
     rgba[..., :3] = tile.reshape(*tile.shape[:2], -1)
     image.pixels.foreach_set(rgba.ravel())
     image.update()
-    texture, diffuse = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeBsdfDiffuse")
-    texture.image, texture.extension, texture.interpolation = image, "REPEAT", "Linear"
+    texture = nodes.new("ShaderNodeTexImage")
+    diffuse = nodes.new("ShaderNodeBsdfDiffuse")
+    texture.image = image
+    texture.extension = "REPEAT"
+    texture.interpolation = "Linear"
     links.new(texture.outputs["Color"], diffuse.inputs["Color"])
     links.new(diffuse.outputs[0], nodes["Material Output"].inputs["Surface"])
 
@@ -71,15 +78,21 @@ def film(job: Any) -> None:
     scene = bpy.context.scene
     width, height, focal_px = (float(value) for value in job["lens"])
     camera = bpy.data.cameras.new("camera")
-    camera.sensor_fit, camera.sensor_width, camera.lens = "HORIZONTAL", width, focal_px
+    camera.sensor_fit = "HORIZONTAL"
+    camera.sensor_width = width
+    camera.lens = focal_px
     camera.clip_start = 0.01
     scene.camera = bpy.data.objects.new("camera", camera)
     scene.collection.objects.link(scene.camera)
     scene.render.engine = "CYCLES"
-    scene.render.resolution_x, scene.render.resolution_y = int(width), int(height)
+    scene.render.resolution_x = int(width)
+    scene.render.resolution_y = int(height)
     scene.render.use_persistent_data = True
-    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
-    scene.cycles.device, scene.cycles.pixel_filter_type, scene.cycles.filter_width = "CPU", "BOX", 1.0
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    scene.cycles.device = "CPU"
+    scene.cycles.pixel_filter_type = "BOX"
+    scene.cycles.filter_width = 1.0
     scene.cycles.use_adaptive_sampling = False
     scene.cycles.sample_clamp_indirect = scene.cycles.sample_clamp_direct = 0.0
     for kind in ("max_bounces", "diffuse_bounces", "glossy_bounces"):
@@ -91,7 +104,9 @@ def draw(T_world_camera: Any, samples: int, seed: int, denoised: bool) -> tuple[
     scene = bpy.context.scene
     # Blender's camera looks along -z with y up.
     scene.camera.matrix_world = (T_world_camera @ np.diag([1.0, -1.0, -1.0, 1.0])).T.tolist()
-    scene.cycles.samples, scene.cycles.seed, scene.cycles.use_denoising = samples, seed, denoised
+    scene.cycles.samples = samples
+    scene.cycles.seed = seed
+    scene.cycles.use_denoising = denoised
     if denoised:
         scene.cycles.denoiser = "OPENIMAGEDENOISE"
     with tempfile.TemporaryDirectory() as folder:
@@ -102,7 +117,8 @@ def draw(T_world_camera: Any, samples: int, seed: int, denoised: bool) -> tuple[
         image = bpy.data.images.load(scene.render.filepath)
         pixels = np.empty(len(image.pixels), np.float32)
         image.pixels.foreach_get(pixels)
-        height, width = image.size[1], image.size[0]
+        height = image.size[1]
+        width = image.size[0]
         bpy.data.images.remove(image)
     # Blender counts rows from the bottom.
     return pixels.reshape(height, width, -1)[::-1, :, :3] @ [0.2126, 0.7152, 0.0722], spent_s
@@ -114,7 +130,8 @@ def main() -> None:
     build(job)
     film(job)
     draw(job["poses"][0], 1, 0, denoised=True)
-    pictures, seconds = [], []
+    pictures = []
+    seconds = []
     for samples, denoised in job["ways"].tolist():
         drawn = [draw(pose, samples, index, denoised=bool(denoised)) for index, pose in enumerate(job["poses"])]
         pictures.append([picture for picture, _ in drawn])

@@ -56,7 +56,8 @@ def right_dimmer(frames: Frames) -> Frames:
 
 def standing(frames: Frames) -> Frames:
     """The first pair 95 times, each with its own noise of 2 grey levels."""
-    rng, first = np.random.default_rng(3), frames[0]
+    rng = np.random.default_rng(3)
+    first = frames[0]
 
     def grainy(image: np.ndarray) -> np.ndarray:
         return np.clip(np.round(image + rng.normal(0, 2, image.shape)), 0, 255).astype(np.uint8)
@@ -113,7 +114,8 @@ CASES = [
 SEEDS = range(1, 6)
 WHEELS = ("wheel_visual", "stereo_pnp", "wheel_odometry")
 INERTIAL = ("imu_visual", "stereo_pnp", "imu_dead_reckoning")
-IN_LIGHT, BLINKING = ("lit-clean", "lit-dark"), ("blinking-clean", "blinking-dark")
+IN_LIGHT = ("lit-clean", "lit-dark")
+BLINKING = ("blinking-clean", "blinking-dark")
 FUSIONS = (
     ("wheels", WHEELS, (*IN_LIGHT, *BLINKING)),
     ("sparse", WHEELS, ("clean", "dark")),
@@ -198,7 +200,8 @@ def measured(altered: Callable[[Frames], Frames], folder: Path, name: str) -> Ro
     """One row of the table; None where the recording lacks what the estimator needs."""
     home = BUILT_IN / name if (BUILT_IN / name).is_dir() else Path(name)
     manifest = read_manifest(home)
-    sequence, frames = read_sequence(folder), altered(list(frames_of(folder)))
+    sequence = read_sequence(folder)
+    frames = altered(list(frames_of(folder)))
     short = {"stereo": sequence.rig.right, "encoders": sequence.rig.wheels, "imu": sequence.rig.imu}
     if any(need in short and not short[need] for need in manifest.needs):
         return None
@@ -209,10 +212,12 @@ def measured(altered: Callable[[Frames], Frames], folder: Path, name: str) -> Ro
     known = [k for k, result in enumerate(results) if result.T_odom_frame is not None and result.status != "lost"]
     T_frame_left = np.eye(4) if manifest.pose_of == "left_camera" else sequence.rig.T_body_left
     poses = np.stack([se3.inverse(T_frame_left) @ results[k].T_odom_frame @ T_frame_left for k in known])
-    farthest_mm, nan = 1e3 * float(np.linalg.norm(poses[:, :3, 3], axis=1).max()), np.nan
+    farthest_mm = 1e3 * float(np.linalg.norm(poses[:, :3, 3], axis=1).max())
+    nan = np.nan
     if altered is standing or len(known) < 3:
         return Row(nan, nan, nan, nan, farthest_mm, len(known) / len(frames), cpu_ms)
-    truth, stamps = read_trajectory(folder), np.array([frames[k].t_ns for k in known], np.int64)
+    truth = read_trajectory(folder)
+    stamps = np.array([frames[k].t_ns for k in known], np.int64)
     scale = score(truth, Trajectory(stamps, poses), settings=ScoreSettings(alignment="sim3")).alignment.scale
     if not manifest.metric:
         poses[:, :3, 3] *= scale
@@ -233,7 +238,8 @@ def run(home: Path, manifest: Manifest, sequence: Sequence, frames: Frames) -> t
     """What the estimator says of all frames, and its mean CPU time in ms from the second one on."""
     estimator = load(home, manifest.class_path, name=manifest.name)
     estimator.start(sequence.rig, dict(manifest.params), 0)
-    results, spent_ms = [], []
+    results = []
+    spent_ms = []
     for frame in frames:
         begun = time.process_time()
         results.append(estimator.process(frame))
@@ -244,7 +250,9 @@ def run(home: Path, manifest: Manifest, sequence: Sequence, frames: Frames) -> t
 @cache
 def frames_of(folder: Path) -> tuple[Frame, ...]:
     """All that an estimator may ask for, decoded."""
-    sequence, frames, last_ns = read_sequence(folder), [], -1
+    sequence = read_sequence(folder)
+    frames = []
+    last_ns = -1
     encoders = EncoderReadings(*sequence.encoders()) if sequence.rig.wheels else None
     imu = sequence.imu() if sequence.rig.imu else None
     for f in sequence.frames():

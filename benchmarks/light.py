@@ -57,7 +57,8 @@ PLACES = {
 KINDS = ("matt", "polished", "mirror", "glass")
 FAINTEST_MSE = 1e-7  # where noise hides the difference
 FEWEST_PIXELS = 100  # of a kind, for a line of its own
-DIFFERENCE_GAIN, DIFFERENCE_BLUR_PX = 4.0, 2.0
+DIFFERENCE_GAIN = 4.0
+DIFFERENCE_BLUR_PX = 2.0
 Mask = NDArray[np.bool_]
 
 
@@ -96,8 +97,10 @@ class Compared:
 
     def line(self) -> str:
         """Pixels, PSNR and how low and high it may be, noise, and the ratio of the mean luminances."""
-        error, noise = (self.raster - self.a) * (self.raster - self.b), np.mean((self.a - self.b) ** 2) / 4
-        mse, sure = error.mean(), error.std() / np.sqrt(len(error))
+        error = (self.raster - self.a) * (self.raster - self.b)
+        noise = np.mean((self.a - self.b) ** 2) / 4
+        mse = error.mean()
+        sure = error.std() / np.sqrt(len(error))
         low, psnr, high = (decibels(mse + by * sure) for by in (1, 0, -1))
         ratio = 2 * self.raster.sum() / (self.a + self.b).sum()
         return f"{len(error):8}{psnr:9.1f}{low:8.1f}..{high:4.1f}{decibels(noise):10.1f}{ratio:8.3f}"
@@ -185,7 +188,8 @@ def side_by_side(pair: Pair) -> NDArray[np.uint8]:
 def report(name: str, arguments: argparse.Namespace) -> None:
     """Print one scene's table and save its pictures."""
     spec = read_scene(catalog.find("scene", name).path)
-    scene, camera = build(spec, {}), lens(arguments.width)
+    scene = build(spec, {})
+    camera = lens(arguments.width)
     print(
         f"{name}, white {spec.white_cd_m2} cd/m², {camera.width_px} x {camera.height_px}, {arguments.samples} samples"
     )

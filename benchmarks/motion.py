@@ -26,7 +26,8 @@ os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THR
 
 
 TOUR = ((1.0, 0.0), (2.0, 1.0), (0.0, 2.0), (-1.0, 1.0), (1.0, -1.0), (0.0, 0.0))
-RATE_HZ, IMU_HZ = 30.0, 200.0
+RATE_HZ = 30.0
+IMU_HZ = 200.0
 PLACE = {"position_m": (0.2, 0.0, 0.3), "rotation_deg": (-100.0, 0.0, -90.0)}
 IMU = replace(IMUS["adis16448"], rate_hz=IMU_HZ, **PLACE)
 Made = TypeVar("Made")

@@ -35,7 +35,8 @@ def seconds(work: Callable[[int], object], pictures: int) -> tuple[float, float]
     """Median wall and CPU seconds of `work` over pictures; the first one warms up and does not count."""
     spent = []
     for index in range(pictures + 1):
-        wall, cpu = time.perf_counter(), time.process_time()
+        wall = time.perf_counter()
+        cpu = time.process_time()
         work(index)
         spent.append((time.perf_counter() - wall, time.process_time() - cpu))
     wall_s, cpu_s = np.median(spent[1:], axis=0)
@@ -47,7 +48,8 @@ def mitsuba_itself(scene: Scene, T_world_camera: Array, samples: int) -> Callabl
     import mitsuba as mi
 
     world = load(mi, scene)
-    w, h = LENS.width_px, LENS.height_px
+    w = LENS.width_px
+    h = LENS.height_px
     film = {"type": "hdrfilm", "width": w, "height": h, "rfilter": {"type": "box"}, "pixel_format": "luminance"}
     sensor = mi.load_dict(
         {

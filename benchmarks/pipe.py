@@ -57,7 +57,8 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--starts", type=int, default=20)
     args = parser.parse_args()
-    rig, rng = stereo_rig(LENSES["paper_blender"], pitch_deg=90), np.random.default_rng(0)
+    rig = stereo_rig(LENSES["paper_blender"], pitch_deg=90)
+    rng = np.random.default_rng(0)
     print(f"{platform.machine()}, Python {platform.python_version()}; ms a pair")
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
@@ -65,7 +66,8 @@ def main() -> None:
         direct = load(folder, "idle:Idle", name="idle")
         direct.start(rig, {}, 0)
         for size, shape in SIZES.items():
-            picture, best = rng.integers(0, 255, shape).astype(np.uint8), []
+            picture = rng.integers(0, 255, shape).astype(np.uint8)
+            best = []
             frames = max(args.frames * 480 * 720 // picture.size, 20)
             for _ in range(args.repeats):
                 with started(folder) as process:

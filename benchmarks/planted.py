@@ -48,7 +48,8 @@ class World:
 
     def write(self, folder: Path, name: str, changes: Sequence[Mapping[str, Any]], estimators: Sequence[str]) -> Path:
         """The suite of one case, in a folder of its own, with these changes."""
-        scene, suite = deepcopy(self.scene), deepcopy(self.suite)
+        scene = deepcopy(self.scene)
+        suite = deepcopy(self.suite)
         for change in changes:
             scene = changed(scene, change.get("scene", {}))
             suite["rigs"]["ahead"] |= change.get("rig", {})
@@ -146,14 +147,16 @@ def shrink_all(world: World, out: Path, chosen: Sequence[str]) -> int:
     right = 0
     for name in chosen:
         failure = world.failures[name]
-        changes, estimator = [{"trajectories": world.drive}, failure], failure["estimator"]
+        changes = [{"trajectories": world.drive}, failure]
+        estimator = failure["estimator"]
         folder = run(world.write(out, f"long_{name}", changes, [estimator]), out)
         (score,) = folder.scores()
         began = time.process_time()
         trial = folder.path / score.case / score.estimator
         saved = out / f"small_{name}"
         found = shrink_trial(trial, run_plan=plan_runner(out), trials=12, folder=saved).found
-        (first, end), (_, of) = found.window, found.whole
+        (first, end) = found.window
+        (_, of) = found.whole
         share = (end - first) / of
         right += (is_right := of >= 300 and share <= 0.2 and len(found.tried) <= 12)
         print(
@@ -167,7 +170,8 @@ def shrink_all(world: World, out: Path, chosen: Sequence[str]) -> int:
 
 def rank_causes(world: World, out: Path) -> int:
     """Print which conditions `causes` ranks first for each planted thing, of its estimator on all cases."""
-    names, right = ("usual", *world.planted), 0
+    names = ("usual", *world.planted)
+    right = 0
     estimators = tuple(dict.fromkeys(change["estimator"] for change in world.planted.values()))
     folders = {
         name: run(world.write(out, f"all_{name}", [world.planted.get(name, {})], estimators), out) for name in names

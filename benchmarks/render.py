@@ -58,7 +58,8 @@ def measure(work: Callable[[Array], object], poses: list[Array]) -> Cost:
     """The median cost of `work` over poses; the first one warms up and does not count."""
     spent = []
     for T_world_body in poses:
-        wall, cpu = time.perf_counter(), time.process_time()
+        wall = time.perf_counter()
+        cpu = time.process_time()
         work(T_world_body)
         spent.append((time.perf_counter() - wall, time.process_time() - cpu))
     wall_s, cpu_s = np.median(spent[1:], axis=0)
@@ -76,12 +77,17 @@ class Recorder:
     """Renders, exposes, compresses and writes stereo pairs, as a simulation does."""
 
     def __init__(self, renderer: RasterRenderer, rig: Rig, writer: SequenceWriter, white_cd_m2: float) -> None:
-        self._renderer, self._rig, self._writer, self._white_cd_m2 = renderer, rig, writer, white_cd_m2
-        self._noise, self._frames = NoiseStreams(*np.random.default_rng(0).spawn(2)), 0
+        self._renderer = renderer
+        self._rig = rig
+        self._writer = writer
+        self._white_cd_m2 = white_cd_m2
+        self._noise = NoiseStreams(*np.random.default_rng(0).spawn(2))
+        self._frames = 0
 
     def record(self, T_world_body: Array) -> None:
         """Add one pair and its truth."""
-        rig, t_ns = self._rig, self._frames * NS_PER_FRAME
+        rig = self._rig
+        t_ns = self._frames * NS_PER_FRAME
         light = (picture / self._white_cd_m2 for picture in pair(self._renderer, rig, T_world_body))
         left, right = (expose(picture, CameraSettings(), self._noise) for picture in light)
         self._writer.write_frame(t_ns, left, right)
@@ -183,7 +189,8 @@ def main() -> None:
     parser.add_argument("--views", type=int, default=12, help="poses per measurement")
     parser.add_argument("--fine", action="store_true", help="bake as a simulation does, which takes minutes")
     arguments = parser.parse_args()
-    poses, settings = stand_points(arguments.views), BakeSettings() if arguments.fine else QUICK
+    poses = stand_points(arguments.views)
+    settings = BakeSettings() if arguments.fine else QUICK
     specs = {name: read_scene(catalog.find("scene", name).path) for name in ("room", "office")}
     scenes = {name: build(spec, {}) for name, spec in specs.items()}
     print(f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")

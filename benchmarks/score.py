@@ -62,7 +62,8 @@ def with_vobench(gt: Rows, est: Rows) -> list[float]:
     matched = match(as_trajectory(gt), as_trajectory(est))
     T_est = align(matched.T_est, matched.T_gt, kind="se3").apply(matched.T_est)
     pairs = select_pairs(matched.T_gt, matched.t_ns, delta=1, unit="f", all_pairs=False)
-    ate, rpe = absolute_errors(matched.T_gt, T_est), errors_between(matched.T_gt, T_est, *pairs)
+    ate = absolute_errors(matched.T_gt, T_est)
+    rpe = errors_between(matched.T_gt, T_est, *pairs)
     errors = [ate.trans_m, np.rad2deg(ate.rot_rad), rpe.trans_m, np.rad2deg(rpe.rot_rad)]
     return [statistics(e).rmse for e in errors]
 
@@ -76,7 +77,8 @@ def with_evo(gt: Rows, est: Rows) -> list[float]:
     held = [PoseTrajectory3D(r.positions_m, np.roll(r.q_xyzw, 1, axis=1), r.t_ns / 1e9) for r in (gt, est)]
     truth, estimate = sync.associate_trajectories(*held, max_diff=0.01)
     estimate.align(truth)
-    angle, trans = metrics.PoseRelation.rotation_angle_deg, metrics.PoseRelation.translation_part
+    angle = metrics.PoseRelation.rotation_angle_deg
+    trans = metrics.PoseRelation.translation_part
     found = [
         metrics.APE(trans),
         metrics.APE(angle),
@@ -102,7 +104,8 @@ def compare(sizes: list[int], repeats: int) -> None:
     print(f"{'poses':>8} {'evo ms':>10} {'vobench ms':>11} {'ratio':>7}   largest relative difference of the four RMSE")
     for n in sizes:
         gt, est = walk(n, np.random.default_rng(1))
-        ours, theirs = np.array(with_vobench(gt, est)), np.array(with_evo(gt, est))
+        ours = np.array(with_vobench(gt, est))
+        theirs = np.array(with_evo(gt, est))
         ours_s = best_s(lambda: with_vobench(gt, est), 3 * repeats)  # noqa: B023  (called before gt changes)
         theirs_s = best_s(lambda: with_evo(gt, est), repeats if n < 10**5 else 1)  # noqa: B023
         off = np.max(np.abs(ours / theirs - 1))
@@ -124,7 +127,8 @@ def growth() -> None:
     """Print how the search of all pairs by metres grows; n log n means a factor of about 11 a row."""
     for n in (10**3, 10**4, 10**5, 10**6):
         path = as_trajectory(walk(n, np.random.default_rng(1))[0])
-        T, t_ns = path.T_world_frame, path.t_ns
+        T = path.T_world_frame
+        t_ns = path.t_ns
         spent = best_s(lambda: select_pairs(T, t_ns, delta=0.5, unit="m", all_pairs=True), 3)  # noqa: B023
         print(f"{n:8d} poses {1e3 * spent:9.2f} ms")
 

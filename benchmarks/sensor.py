@@ -71,7 +71,8 @@ def noise() -> NoiseStreams:
 
 def chips(sensors: dict[str, CameraSensor]) -> Iterator[tuple[str, Callable[[], object]]]:
     """Exposing a picture on each of the chips."""
-    light, streams = picture(), noise()
+    light = picture()
+    streams = noise()
     for name, sensor in sensors.items():
         pattern = fixed_pattern(SHAPE, sensor, np.random.default_rng(2))
         camera = CameraSettings(chip=sensor)
@@ -88,8 +89,10 @@ def lenses() -> Iterator[tuple[str, Callable[[], object]]]:
 
 def the_rest() -> Iterator[tuple[str, Callable[[], object]]]:
     """What else happens per picture, and what happens once per camera."""
-    loop, chip = AutoExposure(), CAMERAS["mt9v034"]
-    grey, signal = expose(picture(), CameraSettings(), noise()), chip.signal_of_grey
+    loop = AutoExposure()
+    chip = CAMERAS["mt9v034"]
+    grey = expose(picture(), CameraSettings(), noise())
+    signal = chip.signal_of_grey
     state = start(loop, Exposure(0.005))
     yield "auto-exposure, a step", lambda: step(loop, state, grey, signal)
     yield "32 strips of 8 sub-frames", lambda: strips(SHAPE[0], 0.02, 0, 0.01, row_strips=32, sub_frames=8)

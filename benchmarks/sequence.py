@@ -29,7 +29,8 @@ from vobench.sequence import Sequence, SequenceWriter
 from vobench.sequence.picture import Image
 
 RIG = stereo_rig(LENSES["paper_blender"], pitch_deg=30)
-RATE_HZ, PICTURES = 30, 30
+RATE_HZ = 30
+PICTURES = 30
 Pair = tuple[bytes, bytes]
 Message = tuple[int, int, bytes]
 
@@ -56,7 +57,8 @@ def main() -> None:
 
 def compare(folder: Path, count: int, repeats: int) -> None:
     """Writing and reading, ours and the library's."""
-    pictures, pairs = make_pictures(), encoded_pairs()
+    pictures = make_pictures()
+    pairs = encoded_pairs()
     record(folder / "kept", count)
     schemas, messages = load(folder / "kept" / "sensors.mcap")
     for name, packing in (("raw", CompressionType.NONE), ("zstd", CompressionType.ZSTD)):
@@ -122,7 +124,9 @@ def peak_megabytes(folder: Path, only: str, minutes: int) -> float:
 
 def make_pictures() -> list[Image]:
     """Grey pictures of a size and an unrest as recorded ones have them."""
-    rng, (height, width) = np.random.default_rng(0), (RIG.left.height_px, RIG.left.width_px)
+    rng = np.random.default_rng(0)
+    height = RIG.left.height_px
+    width = RIG.left.width_px
     coarse = (cv2.resize(rng.uniform(20, 230, (30, 45)), (width, height)) for _ in range(PICTURES))
     return [np.clip(field + rng.normal(0, 1.2, field.shape), 0, 255).astype(np.uint8) for field in coarse]
 

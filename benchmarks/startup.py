@@ -31,7 +31,8 @@ def write_pair(folder: Path, poses: int) -> tuple[str, str]:
     rng = np.random.default_rng(0)
     turn_rad = np.cumsum(rng.normal(scale=0.01, size=poses))
     steps = np.stack([np.cos(turn_rad), np.sin(turn_rad), 0.1 * np.sin(turn_rad)], -1) * 0.02
-    t_ns, names = np.arange(poses, dtype=np.int64) * NS_PER_FRAME, []
+    t_ns = np.arange(poses, dtype=np.int64) * NS_PER_FRAME
+    names = []
     for name, noise_m in (("gt.tum", 0.0), ("est.tum", 0.002)):
         positions = np.cumsum(steps + rng.normal(scale=noise_m, size=steps.shape), axis=0)
         trajectory = Trajectory(t_ns, se3.transform(se3.rotation_z(turn_rad), positions))

@@ -27,8 +27,11 @@ from vobench.suite import catalog
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
 
-LENS, PITCH_DEG = LENSES["paper_literal"], 15.0
-STEP_NS, STEP_RAD, RING_M = 100_000_000, 0.05, 1.5
+LENS = LENSES["paper_literal"]
+PITCH_DEG = 15.0
+STEP_NS = 100_000_000
+STEP_RAD = 0.05
+RING_M = 1.5
 
 
 def poses(count: int) -> list[tuple[Shot, Shot]]:
@@ -48,7 +51,8 @@ def median_ms(work: Callable[[Shot, Shot], object], pairs: list[tuple[Shot, Shot
     work(*pairs[0])
     spent = []
     for now, later in pairs:
-        wall, cpu = time.perf_counter(), time.process_time()
+        wall = time.perf_counter()
+        cpu = time.process_time()
         work(now, later)
         spent.append((time.perf_counter() - wall, time.process_time() - cpu))
     wall_s, cpu_s = np.median(spent, axis=0)

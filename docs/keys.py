@@ -40,14 +40,16 @@ def _parts(tree: Any) -> Iterator[dict[str, Any]]:
 
 def refreshed(page: str) -> str:
     """A page with its marked tables as the settings are; a key that no row was written for says nothing yet."""
-    known, tables = sections(), TABLE.findall(page)
+    known = sections()
+    tables = TABLE.findall(page)
     said = {name: {} for name, _ in tables}
     for name, table in tables:
         said[name].update(_rows(table))
     last = dict(tables)
 
     def table(match: re.Match[str]) -> str:
-        name, properties = match[1], known[match[1]]["properties"]
+        name = match[1]
+        properties = known[match[1]]["properties"]
         keys = [key for key in _rows(match[2]) if key in properties]
         if match[2] == last[name]:
             keys += [key for key in properties if key not in said[name]]

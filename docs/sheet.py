@@ -13,9 +13,16 @@ from PIL import Image, ImageDraw, ImageFont
 
 from vobench.sequence import Sequence
 
-EYES, TIME = {"baseline", "calib_drift", "desync", "unlike_eyes"}, {"drops", "frame_rate", "repeats", "spin_in_place"}
-SEVERITIES, WIDE, HIGH, HEAD, GAP = (0, 3, 5), 168, 112, 14, 6
-SHEETS, COLUMNS, QUALITY = 2, 2, 80
+EYES = {"baseline", "calib_drift", "desync", "unlike_eyes"}
+TIME = {"drops", "frame_rate", "repeats", "spin_in_place"}
+SEVERITIES = (0, 3, 5)
+WIDE = 168
+HIGH = 112
+HEAD = 14
+GAP = 6
+SHEETS = 2
+COLUMNS = 2
+QUALITY = 80
 
 
 def picture(case: Path, scenario: str) -> Image.Image:
@@ -28,11 +35,14 @@ def picture(case: Path, scenario: str) -> Image.Image:
 
 def sheet(scenarios: dict[str, dict[int, Path]]) -> Image.Image:
     """Scenarios in columns, each with its name above three pictures."""
-    rows, step = -(-len(scenarios) // COLUMNS), 3 * WIDE + 2 * GAP
+    rows = -(-len(scenarios) // COLUMNS)
+    step = 3 * WIDE + 2 * GAP
     drawn = Image.new("RGB", (COLUMNS * step + GAP * (COLUMNS - 1), rows * (HIGH + HEAD + GAP)), "white")
-    pen, font = ImageDraw.Draw(drawn), ImageFont.load_default(size=11)
+    pen = ImageDraw.Draw(drawn)
+    font = ImageFont.load_default(size=11)
     for nth, (name, cases) in enumerate(scenarios.items()):
-        x, y = nth // rows * (step + 2 * GAP), nth % rows * (HIGH + HEAD + GAP)
+        x = nth // rows * (step + 2 * GAP)
+        y = nth % rows * (HIGH + HEAD + GAP)
         for place, severity in enumerate(SEVERITIES):
             at = x + place * (WIDE + GAP // 2)
             pen.text((at + 1, y), f"{name} {severity}" if not place else str(severity), "black", font)

@@ -25,7 +25,8 @@ WAYS: dict[str, Callable[..., Drive]] = {
     "10 Hz, by tolerance": partial(by_tolerance, rate_hz=10.0),
     "10 Hz, by the clock": partial(by_the_clock, rate_hz=10.0),
 }
-FINE, COARSE = "30 Hz, by tolerance", "10 Hz, by the clock"
+FINE = "30 Hz, by tolerance"
+COARSE = "10 Hz, by the clock"
 PRINTED = {FINE: (7e-4, 1.3e-3), COARSE: (4.52e-2, 3.3e-3)}  # the paper's digits, x and y in m
 LABELS = ((8, -16), (8, -16), (-4, 9), (-16, -14), (8, -16))  # where the targets' numbers cover no path
 COLOURS = {FINE: "#1f6fb4", COARSE: "#d1602d", "paper": "#1f6fb4", "smooth": "#2a8c57", "easy": "#8a5aa8"}
@@ -98,7 +99,8 @@ def draw_figure_11(path: Path, runs: dict[str, Drive], spread: dict[str, np.ndar
 
 def draw_error(axes: Axes, run: Drive, name: str, axis: int) -> None:
     """One run's error, the leg to (0, 1) strong, its minimum a dot."""
-    error, leg = errors(run)[:, axis], second_leg(run)
+    error = errors(run)[:, axis]
+    leg = second_leg(run)
     share = np.arange(len(error)) / run.reached[3]
     axes.plot(share, error, color=COLOURS[name], lw=0.8, alpha=0.6)
     axes.plot(share[leg], error[leg], color=COLOURS[name], lw=2, label=name)

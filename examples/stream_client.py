@@ -11,7 +11,8 @@ import sys
 import numpy as np
 
 FRAME = struct.Struct("<qqIIIIII")
-OK, LOST = 1, 4
+OK = 1
+LOST = 4
 
 
 def read(length: int) -> bytes:
@@ -44,7 +45,8 @@ while True:
         print("cameras:", len(calibration["cameras"]), file=sys.stderr)
         send(b"REDY")
     elif tag == b"FRAM":
-        index, eyes = FRAME.unpack_from(payload)[0], pictures(payload)
+        index = FRAME.unpack_from(payload)[0]
+        eyes = pictures(payload)
         pose = np.eye(4)  # T_odom_left
         send(b"POSE", struct.pack("<qII", index, OK, 1) + pose[:3].astype("<f8").tobytes())
     elif tag == b"DONE":

@@ -1,8 +1,14 @@
-"""The house keeps to its plan: no import leads back to where it began."""
+"""The house keeps to its plan: no import circle, and one idea a line."""
 
+import ast
+from collections.abc import Iterator
 from graphlib import TopologicalSorter
+from pathlib import Path
 
 import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = ("vobench", "estimators", "scenes", "benchmarks", "examples", "docs")
 
 
 def test_no_import_leads_back_to_where_it_began() -> None:
@@ -11,3 +17,27 @@ def test_no_import_leads_back_to_where_it_began() -> None:
     # The package's own names are looked up when they are asked for.
     modules = {m: graph.find_modules_directly_imported_by(m) - {"vobench"} for m in graph.modules if m != "vobench"}
     TopologicalSorter(modules).prepare()
+
+
+def _statements() -> Iterator[tuple[Path, ast.AST]]:
+    for folder in SOURCES:
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                yield path, node
+
+
+def _is_packed(node: ast.AST) -> bool:
+    """Whether a statement assigns several values that stand beside each other, as `a, b = x, y`; a swap does not."""
+    if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Tuple):
+        return False
+    if not isinstance(node.targets[0], ast.Tuple):
+        return False
+    targets = {ast.unparse(target) for target in node.targets[0].elts}
+    used = {ast.unparse(name) for value in node.value.elts for name in ast.walk(value) if isinstance(name, ast.expr)}
+    is_starred = any(isinstance(target, ast.Starred) for target in node.targets[0].elts)
+    return not (targets & used) and not is_starred
+
+
+def test_a_statement_assigns_one_value_where_values_are_unlike() -> None:
+    packed = [f"{path.relative_to(ROOT)}:{node.lineno}" for path, node in _statements() if _is_packed(node)]
+    assert packed == []

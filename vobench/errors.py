@@ -71,7 +71,8 @@ class SettingError(InputError, ValueError):
     """A setting is wrong; `keys` lead to it from the object that has it. A ValueError, so that pydantic gathers it."""
 
     def __init__(self, sentence: str, *keys: int | str) -> None:
-        self.sentence, self.keys = sentence, keys
+        self.sentence = sentence
+        self.keys = keys
         super().__init__(f"{'.'.join(map(str, keys))}: {sentence}" if keys else sentence)
 
 

@@ -197,7 +197,8 @@ class Like:
         return _before(self.merged, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
-        section, name = handler.resolve_ref_schema(handler(schema)), {"type": "string", "enum": sorted(self.presets)}
+        section = handler.resolve_ref_schema(handler(schema))
+        name = {"type": "string", "enum": sorted(self.presets)}
         named = {self.key: {**name, "default": None}, **section["properties"]}
         return {"anyOf": [{**section, "properties": named}, name]}
 
@@ -288,7 +289,8 @@ def _unaliased(hint: Any) -> Any:
 
 def _held(value: Any, hint: Any) -> Any:
     hint = _unaliased(hint)
-    origin, args = get_origin(hint), get_args(hint)
+    origin = get_origin(hint)
+    args = get_args(hint)
     if origin is Annotated:
         for mark in args[1:]:
             if isinstance(mark, Check) and mark.first:

@@ -101,7 +101,8 @@ def _dying_with_us() -> Callable[[], object]:
         return lambda: None
     import ctypes
 
-    prctl, us = ctypes.CDLL(None).prctl, os.getpid()
+    prctl = ctypes.CDLL(None).prctl
+    us = os.getpid()
 
     def die_with_us() -> None:
         prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)

@@ -56,7 +56,8 @@ def admit(maker: Path, source: bytes, scene: str) -> None:
     """Name a maker that is about to run. Raises SuiteError if it is a strange one that the user does not trust yet."""
     if not _gates:
         return
-    in_force, path = _gates[-1], maker.resolve()
+    in_force = _gates[-1]
+    path = maker.resolve()
     is_ours = any(path.is_relative_to(folder.resolve()) for folder in in_force.ours())
     trusted = in_force.folder() / hashlib.sha256(source).hexdigest()
     if not is_ours and not trusted.is_file():

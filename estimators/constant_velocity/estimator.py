@@ -35,7 +35,8 @@ class ConstantVelocity:
         if self._is_measured:
             speed_mps = self._path_m * 1e9 / (self._known_ns - self._first_ns)
             ahead_m = speed_mps * (frame.t_ns - self._known_ns) * 1e-9
-        x_m, y_m = self._x_m + ahead_m * np.cos(self._psi_rad), self._y_m + ahead_m * np.sin(self._psi_rad)
+        x_m = self._x_m + ahead_m * np.cos(self._psi_rad)
+        y_m = self._y_m + ahead_m * np.sin(self._psi_rad)
         return Result(se3.transform(se3.rotation_z(self._psi_rad), [x_m, y_m, 0.0]))
 
     @property
@@ -51,11 +52,14 @@ class ConstantVelocity:
                 self._first_ns = t_ns
             else:
                 self._roll(left - self._last[0], right - self._last[1])
-            self._last, self._known_ns = (left, right), t_ns
+            self._last = (left, right)
+            self._known_ns = t_ns
 
     def _roll(self, left_ticks: int, right_ticks: int) -> None:
-        left_m, right_m = left_ticks * self._metres_per_tick, right_ticks * self._metres_per_tick
-        ds, dpsi = (left_m + right_m) / 2, (right_m - left_m) / self._track_m
+        left_m = left_ticks * self._metres_per_tick
+        right_m = right_ticks * self._metres_per_tick
+        ds = (left_m + right_m) / 2
+        dpsi = (right_m - left_m) / self._track_m
         chord = ds * np.sinc(dpsi / 2 / np.pi)
         self._x_m += chord * np.cos(self._psi_rad + dpsi / 2)
         self._y_m += chord * np.sin(self._psi_rad + dpsi / 2)

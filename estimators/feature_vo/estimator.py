@@ -60,7 +60,8 @@ class FeatureVo:
         if name not in DETECTORS:
             raise VobenchError(f"feature_vo: detector is {name!r}, expected one of {', '.join(DETECTORS)}")
         s = parameters(Settings, {key: value for key, value in params.items() if key != "detector"}, "feature_vo")
-        self._settings, self._pair = s, stereo_pair(rig, "feature_vo")
+        self._settings = s
+        self._pair = stereo_pair(rig, "feature_vo")
         is_orb = name == "orb"
         self._detector = (
             cv2.ORB.create(s.features, fastThreshold=s.fast_threshold) if is_orb else cv2.SIFT.create(s.features)
@@ -79,23 +80,27 @@ class FeatureVo:
         if self._last is None:
             self._last = view
             return Result(np.eye(4), Status.INIT)
-        last, before, now = self._last, *self._matched(self._last.descriptors, view.descriptors)
+        last = self._last
+        before, now = self._matched(last.descriptors, view.descriptors)
         flow_px = float(np.median(np.linalg.norm(view.uv_px[now] - last.uv_px[before], axis=1))) if len(now) else 0.0
         if len(now) >= self._settings.min_points and flow_px < self._settings.min_flow_px:
             self._T_odom_now = self._T_odom_last
             return Result(self._pair.T_left(self._T_odom_now), Status.STATIONARY, "no_flow")
         known = np.isfinite(last.disparity_px[before])
-        before, now = before[known], now[known]
+        before = before[known]
+        now = now[known]
         fit = self._fit(view, before, now)
         if fit is None:
-            self._last, self._T_odom_last = view, self._T_odom_now
+            self._last = view
+            self._T_odom_last = self._T_odom_now
             return Result(None, Status.LOST, "no_model", stats={"tracks": len(now)})
         tracks = Tracks(last.uv_px[before], view.uv_px[now], fit.inlier)
         return self._step(view, fit, flow_px, tracks)
 
     def _look(self, left: Image, right: Image) -> View:
         """Features of both pictures; a left one has a disparity where one of the right is alike and in its row."""
-        (uv_px, descriptors), (right_px, others) = self._features(left), self._features(right)
+        (uv_px, descriptors) = self._features(left)
+        (right_px, others) = self._features(right)
         disparity_px = np.full(len(uv_px), np.nan)
         of_left, of_right = self._matched(descriptors, others)
         shift = self._pair.left.in_view(uv_px[of_left]) - self._pair.right.in_view(right_px[of_right])
@@ -136,6 +141,7 @@ class FeatureVo:
         T_odom_now = self._T_odom_last @ se3.inverse(fit.T_now_last)
         self._T_odom_now = se3.transform(se3.nearest_rotation(T_odom_now[:3, :3]), T_odom_now[:3, 3])
         if flow_px >= self._settings.keep_below_px:
-            self._last, self._T_odom_last = view, self._T_odom_now
+            self._last = view
+            self._T_odom_last = self._T_odom_now
         stats = {"tracks": len(fit.inlier), "inliers": int(fit.inlier.sum()), "error_px": fit.error_px}
         return Result(self._pair.T_left(self._T_odom_now), Status.OK, "", tracks, stats)

@@ -22,7 +22,8 @@ class ImuDeadReckoning:
         """Take the IMU's place and its noise."""
         if rig.imu is None:
             raise VobenchError("imu_dead_reckoning needs an IMU, and this recording has none")
-        self._T_body_imu, self._half_step_ns = rig.imu.T_body_imu, 0.5e9 / rig.imu.rate_hz
+        self._T_body_imu = rig.imu.T_body_imu
+        self._half_step_ns = 0.5e9 / rig.imu.rate_hz
         self._standstill = Standstill(rig.imu, float(params["standstill_s"]))
         self._rest: Rest | None = None
         self._state: State | None = None

@@ -9,7 +9,8 @@ from vobench.plugin import STANDARD_GRAVITY_MPS2, Array, ImuCalibration, ImuRead
 # Readings at rest stay within so many sigma of their mean, and a little more for a chip's rounding.
 SIGMAS = 5.0
 COS_TILTED = float(np.cos(np.deg2rad(20)))  # a body on wheels feels no such slant; EuRoC's, with x up, does
-ROUNDING_RADPS, ROUNDING_MPS2 = 2e-3, 0.02
+ROUNDING_RADPS = 2e-3
+ROUNDING_MPS2 = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,8 @@ class Standstill:
     """Listens to the first readings until it is clear that the body moves, or it has stood still for long enough."""
 
     def __init__(self, imu: ImuCalibration, lasts_s: float) -> None:
-        self._imu, self._lasts_ns = imu, lasts_s * 1e9
+        self._imu = imu
+        self._lasts_ns = lasts_s * 1e9
         none = np.zeros((0, 3))
         self.readings = ImuReadings(np.zeros(0, np.int64), none, none)
 
@@ -56,7 +58,8 @@ class Standstill:
 
     def _up(self) -> Array:
         """Upwards (3,) in the IMU's axes: the body's z, unless what is felt so far is far from it."""
-        level, felt_mps2 = self._imu.T_body_imu[2, :3], self.readings.accel_mps2.mean(0)
+        level = self._imu.T_body_imu[2, :3]
+        felt_mps2 = self.readings.accel_mps2.mean(0)
         is_tilted = felt_mps2 @ level < COS_TILTED * np.linalg.norm(felt_mps2)
         return unit(felt_mps2) if is_tilted else level
 

@@ -24,7 +24,8 @@ def carried(state: State, turn_radps: Array, force_mps2: Array, *, gravity_mps2:
     """
     dt = (until_ns - state.t_ns) / 1e9
     half, whole = Rotation.from_rotvec(np.outer([dt / 2, dt], turn_radps)).as_matrix()
-    R_odom_imu, p_m = state.T_odom_imu[:3, :3], state.T_odom_imu[:3, 3]
+    R_odom_imu = state.T_odom_imu[:3, :3]
+    p_m = state.T_odom_imu[:3, 3]
     acceleration = R_odom_imu @ half @ force_mps2 + gravity_mps2
     p_m = p_m + state.v_mps * dt + acceleration * dt**2 / 2
     return State(until_ns, se3.transform(R_odom_imu @ whole, p_m), state.v_mps + acceleration * dt)

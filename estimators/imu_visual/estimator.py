@@ -29,7 +29,9 @@ from vobench.plugin import (
 from .filter import State, anchored, carried, corrected, started
 
 CORRELATED = 4.0  # tracks near each other err alike: so many count as one
-STEREO_M, STEREO_RAD = 2e-5, 2e-5  # what stereo errs by beyond the noise of its tracks
+# what stereo errs by beyond the noise of its tracks
+STEREO_M = 2e-5
+STEREO_RAD = 2e-5
 MOST_DOUBTS = 5  # frames after which stereo is right and the filter wrong
 
 
@@ -49,7 +51,8 @@ class ImuVisual:
         cv2.setRNGSeed(seed)
         if rig.imu is None:
             raise VobenchError("imu_visual needs an IMU, and this recording has none")
-        self._imu, self._settings = rig.imu, parameters(Settings, params, "imu_visual")
+        self._imu = rig.imu
+        self._settings = parameters(Settings, params, "imu_visual")
         self._pair = stereo_pair(rig, "imu_visual")
         self._tracker = StereoTracker(self._pair, self._settings)
         self._T_imu_left = se3.inverse(rig.imu.T_body_imu) @ rig.T_body_left

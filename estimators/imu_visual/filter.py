@@ -14,7 +14,9 @@ from vobench.plugin import Array, ImuCalibration, cross_matrix, se3
 P, THETA, V, TURN, FORCE, GRAVITY = (slice(k, k + 3) for k in range(0, 18, 3))
 POSE = slice(0, 6)
 START_SIGMAS = np.repeat([1e-9, 1e-9, 1.0, 0.01, 0.2, 2.0], 3)  # m, rad, m/s, rad/s, m/s², m/s²
-LEAST_GYRO, LEAST_ACCEL = 1e-5, 1e-3  # densities, and walks, below which no real IMU is: an ideal one has zero
+# densities, and walks, below which no real IMU is: an ideal one has zero
+LEAST_GYRO = 1e-5
+LEAST_ACCEL = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +43,19 @@ def carried(state: State, turn_radps: Array, force_mps2: Array, until_ns: float,
     if dt <= 0:
         return state
     R = state.T_odom_imu[:3, :3]
-    rate, force = turn_radps - state.bias_radps, force_mps2 - state.bias_mps2
+    rate = turn_radps - state.bias_radps
+    force = force_mps2 - state.bias_mps2
     half, whole = (cv2.Rodrigues(rate * share * dt)[0].astype(float) for share in (0.5, 1.0))
     acceleration = R @ half @ force + state.gravity_mps2
     p_m = state.T_odom_imu[:3, 3] + state.v_mps * dt + acceleration * dt**2 / 2
     F = np.eye(18)
     F[P, V] = F[V, GRAVITY] = np.eye(3) * dt
-    F[THETA, THETA], F[THETA, TURN] = whole.T, -np.eye(3) * dt
-    F[V, THETA], F[V, FORCE] = -R @ half @ cross_matrix(force[None])[0] * dt, -R @ half * dt
-    gyro, accel = max(imu.gyro_noise, LEAST_GYRO), max(imu.accel_noise, LEAST_ACCEL)
+    F[THETA, THETA] = whole.T
+    F[THETA, TURN] = -np.eye(3) * dt
+    F[V, THETA] = -R @ half @ cross_matrix(force[None])[0] * dt
+    F[V, FORCE] = -R @ half * dt
+    gyro = max(imu.gyro_noise, LEAST_GYRO)
+    accel = max(imu.accel_noise, LEAST_ACCEL)
     densities = np.repeat([0.0, gyro, accel, max(imu.gyro_walk, LEAST_GYRO), max(imu.accel_walk, LEAST_ACCEL), 0.0], 3)
     covariance = F @ state.covariance @ F.T + np.diag(densities**2 * dt)
     pose = se3.transform(R @ whole, p_m)

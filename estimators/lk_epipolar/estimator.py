@@ -128,13 +128,15 @@ class LkEpipolar:
 
     def _follow(self, last: View, view: View) -> Matches:
         """Tracks from the last view's corners to this picture, looked for where the motion so far would bring them."""
-        pair, rho = self._pair, (self._disparity - self._offset.px) / self._pair.focal_baseline
+        pair = self._pair
+        rho = (self._disparity - self._offset.px) / self._pair.focal_baseline
         T_now_last = se3.inverse(carried_on(self._T_odom_before, self._T_odom_now)) @ self._T_odom_last
         guess = predicted(pair.left, last.corners, rho, T_now_last)
         earlier, now = comparable(last.left, view.left)
         there, found = follow_predicted(earlier, now, last.corners, guess, window_px=self._settings.window_px)
         good = found & inside(there, view.left, self._settings.margin_px) & pair.seen(there)
-        uv0, uv1 = last.corners[good].astype(float), there[good].astype(float)
+        uv0 = last.corners[good].astype(float)
+        uv1 = there[good].astype(float)
         return Matches(pair.left.rays(uv0), pair.left.rays(uv1), uv0, uv1, rho[good], pair.K)
 
     def _step(self, view: View, matches: Matches, views: TwoViews, motion: Motion) -> Result:
@@ -157,7 +159,8 @@ class LkEpipolar:
 
     def _remember(self, view: View) -> None:
         """Follow the next frame from this view, at the pose of now, with disparities from left to right."""
-        self._last, self._T_odom_last = view, self._T_odom_now
+        self._last = view
+        self._T_odom_last = self._T_odom_now
         s = self._settings
         _, self._disparity = self._pair.match(
             view.left, view.right, view.corners, margin_px=s.margin_px, window_px=s.window_px

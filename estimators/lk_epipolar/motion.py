@@ -149,8 +149,11 @@ def scaled(shape: Shape, matches: Matches) -> Motion | None:
     x1 is parallel to R x0 + s rho d, which is linear in s: a s + b = 0, two equations a point.
     """
     seen = np.isfinite(matches.rho)
-    x0, x1, rho = matches.x0[seen], matches.x1[seen], matches.rho[seen, None]
-    turned, shift = x0 @ shape.R.T, rho * shape.direction
+    x0 = matches.x0[seen]
+    x1 = matches.x1[seen]
+    rho = matches.rho[seen, None]
+    turned = x0 @ shape.R.T
+    shift = rho * shape.direction
     b = turned[:, :2] - x1[:, :2] * turned[:, 2:]
     a = shift[:, :2] - x1[:, :2] * shift[:, 2:]
     s = robust_scale(a, b)
@@ -163,7 +166,8 @@ def scaled(shape: Shape, matches: Matches) -> Motion | None:
 
 def robust_scale(a: Array, b: Array) -> float:
     """The s that makes a s + b (N, 2) small for most points: least squares with Cauchy's weights."""
-    aa, ab = (a * a).sum(1), (a * b).sum(1)
+    aa = (a * a).sum(1)
+    ab = (a * b).sum(1)
     s = float(np.median(-ab / np.maximum(aa, np.finfo(float).tiny)))
     for _ in range(SCALE_ITERATIONS):
         squared = ((a * s + b) ** 2).sum(1)
@@ -177,9 +181,12 @@ def refined(motion: Motion, matches: Matches, inlier: Mask) -> Motion:
 
     The distance to the line is Sampson's; the place is that of the transferred point, in px.
     """
-    x0, x1, rho = matches.x0[inlier], matches.x1[inlier], matches.rho[inlier, None]
+    x0 = matches.x0[inlier]
+    x1 = matches.x1[inlier]
+    rho = matches.rho[inlier, None]
     known = np.isfinite(rho[:, 0])
-    focal_px, size_m = matches.focal_px, max(float(np.linalg.norm(motion.T_now_last[:3, 3])), NO_TRANSLATION)
+    focal_px = matches.focal_px
+    size_m = max(float(np.linalg.norm(motion.T_now_last[:3, 3])), NO_TRANSLATION)
 
     def moved(delta: Array) -> Array:
         R = Rotation.from_rotvec(delta[:3]).as_matrix() @ motion.T_now_last[:3, :3]
@@ -207,7 +214,8 @@ def shape_of(T_now_last: Array) -> Shape:
 def sampson(shape: Shape, x0: Array, x1: Array) -> Array:
     """First-order distance (N,) of rays (N, 3) to the epipolar geometry. Source: Sampson (1982)."""
     E = cross_matrix(shape.direction[None])[0] @ shape.R
-    line1, line0 = x0 @ E.T, x1 @ E
+    line1 = x0 @ E.T
+    line0 = x1 @ E
     gradient = line1[:, 0] ** 2 + line1[:, 1] ** 2 + line0[:, 0] ** 2 + line0[:, 1] ** 2
     distance: Array = (x1 * line1).sum(1) / np.sqrt(gradient + np.finfo(float).tiny)
     return distance

@@ -104,7 +104,8 @@ class MonoVo:
             self._begin(image)
             return Result(None, Status.LOST, "no_model")
         T_now_view, inlier = motion
-        self._T_odom_before, T_odom_now = self._T_odom_now, self._T_odom_view @ se3.inverse(T_now_view)
+        self._T_odom_before = self._T_odom_now
+        T_odom_now = self._T_odom_view @ se3.inverse(T_now_view)
         self._T_odom_now = se3.transform(se3.nearest_rotation(T_odom_now[:3, :3]), T_odom_now[:3, 3])
         if flow_px >= self._settings.keep_below_px:
             self._renew(view, image, there, good, T_now_view)
@@ -142,7 +143,8 @@ class MonoVo:
 
     def _renew(self, view: View, image: Image, there: Points, good: Mask, T_now_view: Array) -> None:
         """Take this picture as the view: depths, bettered by the parallax, are carried over, new corners added."""
-        rays0, rays1 = self._eye.rays(view.corners[good]), self._eye.rays(there[good])
+        rays0 = self._eye.rays(view.corners[good])
+        rays1 = self._eye.rays(there[good])
         rho, certainty = triangulated(rays0, rays1, T_now_view, float(self._eye.K[0, 0]))
         joined = certainty + view.certainty[good]
         rho = (certainty * rho + view.certainty[good] * view.rho[good]) / np.maximum(joined, np.finfo(float).tiny)
@@ -171,7 +173,9 @@ class MonoVo:
         fresh = self._added(image, np.zeros((0, 2), np.float32), np.zeros(0), np.zeros(0))
         if len(fresh.corners) < self._settings.min_tracks:
             return Result(None, Status.LOST, "few_corners")
-        self._view, self._T_odom_view, self._T_odom_before = fresh, self._T_odom_now, self._T_odom_now
+        self._view = fresh
+        self._T_odom_view = self._T_odom_now
+        self._T_odom_before = self._T_odom_now
         return Result(self._T_odom_now, Status.INIT)
 
 
@@ -220,7 +224,8 @@ def _agrees(T: Array, rays0: Array, rays1: Array, focal_px: float) -> Mask:
 
 def triangulated(rays0: Array, rays1: Array, T_now_view: Array, focal_px: float) -> tuple[Array, Array]:
     """Inverse depths (N,) along the first view's axis, and 1/sigma² (N,): least squares in x1 ~ R x0 + rho t."""
-    turned, t = rays0 @ T_now_view[:3, :3].T, T_now_view[:3, 3]
+    turned = rays0 @ T_now_view[:3, :3].T
+    t = T_now_view[:3, 3]
     a = t[:2] - rays1[:, :2] * t[2]
     b = rays1[:, :2] * turned[:, 2:] - turned[:, :2]
     aa = (a * a).sum(1)

@@ -61,7 +61,8 @@ class PlanarFloor:
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
         """Take the camera and its mount. Raises VobenchError where it is not above the body's floor."""
         self._settings = parameters(Settings, params, "planar_floor")
-        self._lens, self._T_body_left = rig.left, rig.T_body_left
+        self._lens = rig.left
+        self._T_body_left = rig.T_body_left
         if rig.T_body_left[2, 3] <= 0:
             raise VobenchError(
                 f"planar_floor needs a camera above the floor that its body stands on, and it is at "
@@ -77,7 +78,8 @@ class PlanarFloor:
             return Result(None, Status.LOST, "no_picture")
         if self._view is None:
             return self._look(frame.left, Status.INIT, "few_corners")
-        view, s = self._view, self._settings
+        view = self._view
+        s = self._settings
         step = relative(self._view_pose, compose(self._now, relative(self._before, self._now)))
         guess = self._project(view.ground_m, step)
         start = np.where(np.isfinite(guess), guess, view.corners).astype(np.float32)
@@ -92,7 +94,8 @@ class PlanarFloor:
         step, inlier = self._fitted(view.ground_m[good], there[good].astype(float))
         if inlier.mean() < s.lost_below_share:
             return self._look(frame.left, Status.LOST, "no_plane")
-        self._before, self._now = self._now, compose(self._view_pose, step)
+        self._before = self._now
+        self._now = compose(self._view_pose, step)
         tracks = Tracks(view.corners[good].astype(float), there[good].astype(float), inlier)
         stats = {"tracks": len(inlier), "inliers": int(inlier.sum()), "parallax_px": flow_px}
         if flow_px >= s.keep_below_px:
@@ -107,7 +110,8 @@ class PlanarFloor:
         near = np.isfinite(ground_m).all(1)
         if near.sum() < s.min_points:
             return Result(None, Status.LOST, "few_corners")
-        self._view, self._view_pose = View(image, corners[near], ground_m[near]), self._now
+        self._view = View(image, corners[near], ground_m[near])
+        self._view_pose = self._now
         return Result(None if status is Status.LOST else placed(self._now), status, reason)
 
     def _on_floor(self, uv_px: Points) -> Array:
@@ -154,9 +158,11 @@ class PlanarFloor:
 
 def steps_of_pairs(a0: Array, b0: Array, a1: Array, b1: Array) -> Array:
     """The body's steps (M, 3) that take two places on the floor (M, 2) each from where they were to where they are."""
-    was, now = b0 - a0, b1 - a1
+    was = b0 - a0
+    now = b1 - a1
     turn = np.arctan2(was[:, 1], was[:, 0]) - np.arctan2(now[:, 1], now[:, 0])
-    c, s = np.cos(turn), np.sin(turn)
+    c = np.cos(turn)
+    s = np.sin(turn)
     turned = np.stack([c * a1[:, 0] - s * a1[:, 1], s * a1[:, 0] + c * a1[:, 1]], -1)
     steps: Array = np.c_[a0 - turned, np.arctan2(s, c)]
     return steps
@@ -164,14 +170,16 @@ def steps_of_pairs(a0: Array, b0: Array, a1: Array, b1: Array) -> Array:
 
 def compose(pose: Array, step: Array) -> Array:
     """x, y, psi after a step (3,) in the pose's own axes."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
+    c = np.cos(pose[2])
+    s = np.sin(pose[2])
     moved: Array = pose + np.array([c * step[0] - s * step[1], s * step[0] + c * step[1], step[2]])
     return moved
 
 
 def relative(pose: Array, other: Array) -> Array:
     """The step (3,) from one pose to another, in the first one's axes."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
+    c = np.cos(pose[2])
+    s = np.sin(pose[2])
     d = other - pose
     return np.array([c * d[0] + s * d[1], -s * d[0] + c * d[1], d[2]])
 

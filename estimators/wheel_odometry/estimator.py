@@ -38,7 +38,8 @@ class WheelOdometry:
         """Drive the arcs from the last reading through these (M, 2), left and right."""
         counts = np.concatenate([self._ticks, ticks])
         left_m, right_m = np.diff(counts, axis=0).T * self._metres_per_tick
-        ds, dpsi = (left_m + right_m) / 2, (right_m - left_m) / self._track_m
+        ds = (left_m + right_m) / 2
+        dpsi = (right_m - left_m) / self._track_m
         psi = self._psi_rad + np.cumsum(dpsi) - dpsi / 2  # in the middle of each arc
         chord = ds * np.sinc(dpsi / 2 / np.pi)
         self._x_m += float(chord @ np.cos(psi))

@@ -27,8 +27,13 @@ from vobench.plugin import (
 
 CORRELATED = 4.0  # tracks near each other err alike: so many count as one
 PLANE = (0, 1, 5)  # of a small translation and rotation: along x and y, about z
-STEREO_RATIO, STEREO_M, STEREO_RAD = 0.002, 5e-5, 1e-4  # what stereo errs by beyond the noise of its tracks
-WHEEL_M, WHEEL_RAD = 2e-4, 2e-4  # about a count
+# what stereo errs by beyond the noise of its tracks
+STEREO_RATIO = 0.002
+STEREO_M = 5e-5
+STEREO_RAD = 1e-4
+# about a count
+WHEEL_M = 2e-4
+WHEEL_RAD = 2e-4
 GAIN_SIGMA = 0.03  # of a wheel's nominal radius, and of the track
 
 
@@ -83,7 +88,8 @@ class WheelVisual:
         self._tracker = StereoTracker(pair, self._settings)
         self._T_body_view = rig.T_body_left @ se3.inverse(pair.T_view_left)
         self._ticks: NDArray[np.int64] = np.zeros((1, 2), np.int64)
-        self._length, self._turn = Gain(), Gain()
+        self._length = Gain()
+        self._turn = Gain()
         self._view_pose = np.zeros(3)  # x, y, psi of the view that points are followed from, in odom
         self._rolled = Rolled(np.zeros(3))
 
@@ -116,7 +122,8 @@ class WheelVisual:
         for length, turn in zip(ds, dpsi, strict=True):
             chord = length * np.sinc(turn / 2 / np.pi)
             pose = compose(pose, np.array([chord * np.cos(turn / 2), chord * np.sin(turn / 2), turn]))
-        path_m, turned = np.abs(ds).sum(), np.abs(dpsi).sum()
+        path_m = np.abs(ds).sum()
+        turned = np.abs(dpsi).sum()
         self._rolled = Rolled(pose, self._rolled.path_m + path_m, self._rolled.turned_rad + turned)
         self._ticks = counts[-1:]
 
@@ -131,7 +138,8 @@ class WheelVisual:
         to_plane = adjoint(self._T_body_view)[PLANE, :]
         size_m = STEREO_M + STEREO_RATIO * float(np.hypot(*seen[:2]))
         of_stereo = CORRELATED * to_plane @ fit.covariance @ to_plane.T + np.diag([size_m, size_m, STEREO_RAD]) ** 2
-        s, rolled = self._settings, self._rolled
+        s = self._settings
+        rolled = self._rolled
         length_m = WHEEL_M + s.slip_ratio * rolled.path_m
         turn_rad = WHEEL_RAD + s.slip_turn_ratio * rolled.turned_rad + s.slip_ratio * rolled.path_m / self._track_m / 4
         of_wheels = np.diag([length_m, length_m, turn_rad]) ** 2
@@ -147,13 +155,15 @@ class WheelVisual:
         """Take a new view at this step from the old one; where there is nothing to see, keep the old one."""
         now = compose(self._view_pose, pose)
         if frame.left is not None and frame.right is not None and self._tracker.look(frame.left, frame.right):
-            self._view_pose, self._rolled = now, Rolled(np.zeros(3))
+            self._view_pose = now
+            self._rolled = Rolled(np.zeros(3))
         return Result(placed(now), status, reason)
 
 
 def compose(pose: Array, step: Array) -> Array:
     """x, y, psi after a step (3,) in the pose's own axes."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
+    c = np.cos(pose[2])
+    s = np.sin(pose[2])
     moved: Array = pose + np.array([c * step[0] - s * step[1], s * step[0] + c * step[1], step[2]])
     return moved
 

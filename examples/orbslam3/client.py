@@ -9,9 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-HERE, FRAME = Path(__file__).resolve().parent, struct.Struct("<qqIIIIII")
-OK, LOST = 1, 4
-JUMP_M, JUMP_DEG = 0.15, 8.0  # off a steady motion from frame to frame: no hand does that
+HERE = Path(__file__).resolve().parent
+FRAME = struct.Struct("<qqIIIIII")
+OK = 1
+LOST = 4
+# off a steady motion from frame to frame: no hand does that
+JUMP_M = 0.15
+JUMP_DEG = 8.0
 # What the library prints must not fall among the answers.
 ANSWERS = os.fdopen(os.dup(1), "wb")
 os.dup2(2, 1)
@@ -55,7 +59,8 @@ def settings(calibration: dict, rate_hz: float) -> str:
     values |= {f"ORBextractor.{name}": value for name, value in features.items()}
     sizes = ("KeyFrameSize", "KeyFrameLineWidth", "GraphLineWidth", "PointSize", "CameraSize", "CameraLineWidth")
     values |= {f"Viewer.{name}": 1.0 for name in (*sizes, "ViewpointX", "ViewpointY", "ViewpointZ", "ViewpointF")}
-    text, imu = "%YAML:1.0\n", calibration["imu"]
+    text = "%YAML:1.0\n"
+    imu = calibration["imu"]
     if imu:
         noises = {
             "NoiseGyro": "gyro_noise",
@@ -73,13 +78,16 @@ class Tracker:
     """One system; poses are of the left camera in its first place, kept continuous where the map is aligned anew."""
 
     def __init__(self, mode: str, calibration: dict) -> None:
-        self._mode, self._t0_ns = mode, None
+        self._mode = mode
+        self._t0_ns = None
         file = Path(tempfile.mkdtemp()) / "settings.yaml"
         file.write_text(settings(calibration, calibration["rate_hz"]))
         sensor = {"stereo": "STEREO", "mono": "MONOCULAR", "inertial": "IMU_STEREO"}[mode]
         vocabulary = str(HERE / ".venv" / "vocabulary.txt")
         self._slam = pyorbslam3.Slam(vocabulary, str(file), getattr(pyorbslam3.Sensor, sensor), use_viewer=False)
-        self._T_odom_map, self._last, self._step = None, np.eye(4), np.eye(4)
+        self._T_odom_map = None
+        self._last = np.eye(4)
+        self._step = np.eye(4)
 
     def pose(self, payload: bytes) -> np.ndarray | None:
         """T_odom_left after a frame, None where it is lost."""
@@ -110,7 +118,8 @@ class Tracker:
         T = self._T_odom_map @ T_map_left
         u, _, v = np.linalg.svd(T[:3, :3])
         T[:3, :3] = u @ v
-        self._step, self._last = np.linalg.inv(self._last) @ T, T
+        self._step = np.linalg.inv(self._last) @ T
+        self._last = T
         return T
 
     def _jumps(self, expected: np.ndarray, T_map_left: np.ndarray) -> bool:

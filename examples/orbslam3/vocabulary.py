@@ -10,12 +10,17 @@ import sys
 import cv2
 import numpy as np
 
-BRANCHES, LEVELS, ROUNDS, FEWEST = 10, 5, 6, 12
+BRANCHES = 10
+LEVELS = 5
+ROUNDS = 6
+FEWEST = 12
 
 
 def descriptors(pictures: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """ORB words (N, 256) as bits, and the picture (N,) of each."""
-    orb, found, owner = cv2.ORB_create(2000), [], []
+    orb = cv2.ORB_create(2000)
+    found = []
+    owner = []
     for nth, picture in enumerate(pictures):
         for scale in (0.35, 0.7):
             small = cv2.resize(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), None, fx=scale, fy=scale)
@@ -43,13 +48,16 @@ def main() -> None:
     stored = np.load(sys.argv[1])
     pictures = [stored[name] for name in stored.files]
     bits, owner = descriptors(pictures)
-    rng, lines, branches = np.random.default_rng(0), [], [(0, np.arange(len(bits)))]
+    rng = np.random.default_rng(0)
+    lines = []
+    branches = [(0, np.arange(len(bits)))]
     for level in range(1, LEVELS + 1):
         grown = []
         for parent, own in branches:
             centres, nearest = clustered(bits[own], rng)
             for k in np.unique(nearest):
-                part, node = own[nearest == k], len(lines) + 1
+                part = own[nearest == k]
+                node = len(lines) + 1
                 is_leaf = level == LEVELS or len(part) < FEWEST
                 weight = np.log(len(pictures) / len(np.unique(owner[part]))) if is_leaf else 0.0
                 word = " ".join(str(byte) for byte in np.packbits(centres[k]))

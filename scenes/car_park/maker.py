@@ -32,8 +32,11 @@ from vobench.plugin import (
     tube,
 )
 
-LONG, WIDE, HIGH = 32.0, 17.0, 2.7
-BAY_M, DEEP_M = 2.6, 5.0
+LONG = 32.0
+WIDE = 17.0
+HIGH = 2.7
+BAY_M = 2.6
+DEEP_M = 5.0
 BAYS_X = tuple((k - 5) * BAY_M for k in range(11))
 PILLARS_X = tuple((k - 1.5) * 3 * BAY_M for k in range(4))
 LAMPS = tuple((x, y) for x in (-7.8, 0.0, 7.8) for y in (-2.6, 2.6))
@@ -57,7 +60,8 @@ def make(seed):
 
 def _marks():
     """Lines between bays, arrows along the lane, and a walkway."""
-    line, y0 = matt("#d9d8d2"), WIDE / 2 - DEEP_M
+    line = matt("#d9d8d2")
+    y0 = WIDE / 2 - DEEP_M
     xs = [x + s * BAY_M / 2 for x in BAYS_X for s in ((-1, 1) if x == BAYS_X[-1] else (-1,))]
     lines = [
         quad((x - 0.05, s * (y0 + DEEP_M / 2) - DEEP_M / 2, 0.003), (0.1, 0, 0), (0, DEEP_M, 0))
@@ -78,7 +82,9 @@ def _marks():
 
 def _structure():
     """Pillars with striped feet, beams, lamps' trays and pipes below the ceiling."""
-    raw, yellow, black = matt("#cfcdc6", picture.ground("plaster", 9, 1280, 2.4)), matt("#d8a614"), matt(INK)
+    raw = matt("#cfcdc6", picture.ground("plaster", 9, 1280, 2.4))
+    yellow = matt("#d8a614")
+    black = matt(INK)
     places = [(x, s * 3.9) for x in PILLARS_X for s in (-1, 1)]
     parts = [stood((0.42, 0.42, HIGH), raw, x, y, 0, bevel=0.02, u=x + y) for x, y in places]
     for k in range(5):

@@ -36,8 +36,11 @@ from vobench.plugin import (
     wood,
 )
 
-LONG, WIDE, HIGH = 24.0, 2.4, 2.75
-DADO_M, DOOR_M = 1.05, 0.92
+LONG = 24.0
+WIDE = 2.4
+HIGH = 2.75
+DADO_M = 1.05
+DOOR_M = 0.92
 LAMPS_X = (-10.0, -6.0, -2.0, 2.0, 6.0, 10.0)
 # Doors on the north and the south wall, with their numbers.
 NORTH = {-9.0: "1.02", -5.2: "1.04", 1.4: "1.06", 5.6: "1.08", 9.8: "1.10"}
@@ -48,7 +51,8 @@ def make(seed):
     """Its things and their materials."""
     lino = Procedural("terrazzo", 0.34, 0.35, tile_m=3.0, resolution_px=2048, seed=4)
     floor = Material(colour=(0.86, 0.95, 1.0), texture=lino, eta=1.5, roughness=0.22)
-    wall, ceiling = FINISHES["white_plaster"](), FINISHES["ceiling_tiles"]()
+    wall = FINISHES["white_plaster"]()
+    ceiling = FINISHES["ceiling_tiles"]()
     openings = [Opening("east", (0.0, 1.55), (1.5, 1.5))]
     room = shell((LONG, WIDE, HIGH), openings, floor=floor, ceiling=ceiling, walls=dict.fromkeys(OUTWARD, wall))
     coarse = list(room)
@@ -101,9 +105,11 @@ def _pieces():
 def _wall_furnishing(side, doors):
     """A painted band, its handrail and a skirting along a wall, between its doors."""
     ends = [-LONG / 2, *(x + s * (DOOR_M / 2 + 0.075) for x in doors for s in (-1, 1)), LONG / 2]
-    paint, rail = coated("#a3b8b0", picture.ground("plaster", 3, 1280, 1.6), roughness=0.4), wood("oak")
+    paint = coated("#a3b8b0", picture.ground("plaster", 3, 1280, 1.6), roughness=0.4)
+    rail = wood("oak")
     for k, (a, b) in enumerate(zip(ends[::2], ends[1::2], strict=True)):
-        length, middle = b - a, (a + b) / 2
+        length = b - a
+        middle = (a + b) / 2
         turned = at(middle, side * WIDE / 2, 0, yaw=-90 * side)
         half = length / 2 - 0.06
         bar = tube([[0.075, -half, 0.9], [0.075, half, 0.9]], 0.021, sections=12)
@@ -132,7 +138,8 @@ def _signs():
     """Plates that stand out from the walls over doors, and a board with directions that hangs across."""
     brace = tube([[0, 0, 0], [0, 0, 0.25]], 0.006)
     for k, (x, side, text) in enumerate(((-5.2, 1, "LAB"), (3.4, -1, "WC"), (9.8, 1, "STORE"))):
-        ink, y = (NAVY, TEAL, INKS[5])[k], side * (WIDE / 2 - 0.19)
+        ink = (NAVY, TEAL, INKS[5])[k]
+        y = side * (WIDE / 2 - 0.19)
         plate = matt(texture=picture.sign(text, ink))
         faces = [put(card((0.36, 0.18)), plate, x + s * 0.008, y, 2.28, yaw=90 * (1 - s)) for s in (-1, 1)]
         yield f"sign_{k}", [*faces, put(block((0.014, 0.37, 0.19), bevel_m=0.002), STEEL, x, y, 2.28)]

@@ -45,9 +45,15 @@ from vobench.plugin import (
     wood,
 )
 
-LONG, WIDE, HIGH = 9.6, 5.4, 2.55
-WALL_X, WALL_M = -1.2, 0.14  # the wall between kitchen and living room
-GAP, GAP_M = (-1.2, 0.5), 2.15  # its opening, along y, and how high that is
+LONG = 9.6
+WIDE = 5.4
+HIGH = 2.55
+# the wall between kitchen and living room
+WALL_X = -1.2
+WALL_M = 0.14
+# its opening, along y, and how high that is
+GAP = (-1.2, 0.5)
+GAP_M = 2.15
 TOP_M = 0.9  # of the worktop
 WINDOWS = (
     Opening("south", (2.9, 1.13), (2.2, 2.16)),
@@ -55,13 +61,15 @@ WINDOWS = (
     Opening("south", (-3.0, 1.5), (1.5, 1.3)),
     Opening("west", (0.9, 1.6), (1.1, 1.1)),
 )
-WARM, DIM = (1.25, 0.95, 0.62), Steady(0.01)
+WARM = (1.25, 0.95, 0.62)
+DIM = Steady(0.01)
 FRONTS = "#7f9182"
 
 
 def make(seed):
     """Its things, their materials and its lamps."""
-    plaster, oak = matt("#efe9dc", picture.ground("plaster", 0, 1280, 1.6)), FINISHES["oak_floor"]()
+    plaster = matt("#efe9dc", picture.ground("plaster", 0, 1280, 1.6))
+    oak = FINISHES["oak_floor"]()
     walls = {**dict.fromkeys(OUTWARD, plaster), "east": matt("#a9b5a6", picture.ground("plaster", 1, 1280, 1.6))}
     ceiling = matt("#f4f1ea", picture.ground("plaster", 2, 640, 1.6))
     room = [r for r in shell((LONG, WIDE, HIGH), WINDOWS, floor=oak, ceiling=ceiling, walls=walls) if r[0] != "floor"]
@@ -85,7 +93,9 @@ def _floor(oak):
 
 def _partition(plaster):
     """The wall with the opening, lined with oak."""
-    south, north, wide = GAP[0] + WIDE / 2, WIDE / 2 - GAP[1], GAP[1] - GAP[0]
+    south = GAP[0] + WIDE / 2
+    north = WIDE / 2 - GAP[1]
+    wide = GAP[1] - GAP[0]
     sides = [((GAP[0] - WIDE / 2) / 2, south, 0.0, HIGH), ((GAP[1] + WIDE / 2) / 2, north, 0.0, HIGH)]
     blocks = [
         block((WALL_M, long, high), bevel_m=0).moved(at(WALL_X, y, z + high / 2))
@@ -110,14 +120,17 @@ def _lamps():
 
 def _unit(wide, *, drawers=(), doors=1, high=0.77, deep=0.56, colour=FRONTS):
     """A cupboard from z = 0 up with drawers of some heights, from below, or doors."""
-    paint, grip = coated(colour, roughness=0.35), tube(mm("0 -60 0, 22 -60 0, 22 60 0, 0 60 0"), 0.005)
-    parts, z = [stood((deep, wide - 0.002, high), paint, 0, 0, 0, bevel=0.001)], 0.004
+    paint = coated(colour, roughness=0.35)
+    grip = tube(mm("0 -60 0, 22 -60 0, 22 60 0, 0 60 0"), 0.005)
+    parts = [stood((deep, wide - 0.002, high), paint, 0, 0, 0, bevel=0.001)]
+    z = 0.004
     for tall in drawers:
         parts.append(stood((0.02, wide - 0.006, tall - 0.006), paint, deep / 2 + 0.01, 0, z))
         parts.append(put(grip, STEEL, deep / 2 + 0.02, 0, z + tall - 0.05))
         z += tall
     for k in () if drawers else range(doors):
-        one, y = wide / doors, (k + 0.5) * wide / doors - wide / 2
+        one = wide / doors
+        y = (k + 0.5) * wide / doors - wide / 2
         parts.append(stood((0.02, one - 0.006, high - 0.008), paint, deep / 2 + 0.01, y, 0.004))
         side = 1 if k % 2 == 0 else -1
         up = high - 0.12 if deep > 0.4 else 0.12
@@ -127,7 +140,8 @@ def _unit(wide, *, drawers=(), doors=1, high=0.77, deep=0.56, colour=FRONTS):
 
 def _oven():
     """An oven with a window and knobs, in a unit 0.6 m wide."""
-    glass, knob = coated("#0d0f10", roughness=0.05), lathe(mm("0 0, 20 0, 18 22, 0 22"), sections=20)
+    glass = coated("#0d0f10", roughness=0.05)
+    knob = lathe(mm("0 0, 20 0, 18 22, 0 22"), sections=20)
     front = stood((0.02, 0.594, 0.6), STEEL, 0.29, 0, 0.15)
     window = put(block((0.006, 0.48, 0.36), bevel_m=0.002), glass, 0.301, 0, 0.38)
     bar = put(tube(mm("0 -240 0, 40 -240 0, 40 240 0, 0 240 0"), 0.008), CHROME, 0.3, 0, 0.6)
@@ -139,8 +153,11 @@ def _oven():
 
 def _sink():
     """A basin and a tap, its rim on z = 0."""
-    wide, long, deep = 0.42, 0.56, 0.17
-    x, y = wide / 2, long / 2
+    wide = 0.42
+    long = 0.56
+    deep = 0.17
+    x = wide / 2
+    y = long / 2
     walls = [
         quad((-x, -y, -deep), (0, 0, deep), (0, long, 0)).flipped(),
         quad((x, -y, -deep), (0, long, 0), (0, 0, deep)).flipped(),
@@ -158,7 +175,8 @@ def _sink():
 
 def _fridge():
     """A fridge 1.85 m high with two doors, and notes on it."""
-    paint, grip = coated("#c9cdcc", roughness=0.2), tube(mm("0 0 -200, 40 0 -200, 40 0 200, 0 0 200"), 0.009)
+    paint = coated("#c9cdcc", roughness=0.2)
+    grip = tube(mm("0 0 -200, 40 0 -200, 40 0 200, 0 0 200"), 0.009)
     doors = [stood((0.05, 0.594, high), paint, 0.3, 0, z, bevel=0.012) for z, high in ((0.06, 0.62), (0.69, 1.16))]
     grips = [put(grip, STEEL, 0.325, -0.25, z) for z in (0.48, 0.98)]
     notes = [
@@ -175,7 +193,8 @@ def _fridge():
 
 def _kitchen():
     """Units along the north and the west wall, their worktop, tiles above it, a hob, a hood and a fridge."""
-    north, west = WIDE / 2 - 0.3, -LONG / 2 + 0.3
+    north = WIDE / 2 - 0.3
+    west = -LONG / 2 + 0.3
     rows = (0.34, 0.26, 0.17)
     line = [
         ("drawers", _unit(0.6, drawers=rows), at(-3.9, north, 0.1, yaw=-90)),
@@ -190,7 +209,10 @@ def _kitchen():
         line.append((f"wall_cupboard_{k}", cupboard, at(x, WIDE / 2 - 0.166, 1.45, yaw=-90)))
     for name, parts, place in line:
         yield name, [part.moved(place) for part in parts]
-    x0, x1, y0, y1 = -LONG / 2, -1.9, -0.3, WIDE / 2
+    x0 = -LONG / 2
+    x1 = -1.9
+    y0 = -0.3
+    y1 = WIDE / 2
     outline = [(x0, y0), (x0 + 0.62, y0), (x0 + 0.62, y1 - 0.62), (x1, y1 - 0.62), (x1, y1), (x0, y1)]
     hole = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [0.21, 0.28] + [x0 + 0.32, 0.9]
     top = put(extrusion(outline, 0.03, holes_m=[hole]), wood("beech"), z=TOP_M - 0.03)
@@ -347,7 +369,8 @@ def _windows():
     """Frames and curtains."""
     turn = {"south": 90, "west": 0}
     for k, window in enumerate(WINDOWS):
-        (along, up), (wide, high) = window.center_m, window.size_m
+        (along, up) = window.center_m
+        (wide, high) = window.size_m
         x, y = (along, -WIDE / 2) if window.wall == "south" else (-LONG / 2, along)
         yield Piece(
             "window_frame", f"frame_{k}", (x, y, up), turn[window.wall], size={"width_m": wide, "height_m": high}

@@ -39,18 +39,23 @@ from vobench.plugin import (
     wood,
 )
 
-LONG, WIDE, HIGH = 22.0, 12.0, 4.4
+LONG = 22.0
+WIDE = 12.0
+HIGH = 4.4
 BAYS_X = tuple(3.6 * (k - 2.5) for k in range(6))  # middles of the panes
 PANE_M = (3.5, 4.1)
 COLUMNS = tuple((x, y) for x in (-7.2, 0.0, 7.2) for y in (-2.6, 2.6))
 PANELS = tuple((x, y) for x in (-7.4, -3.6, 0.0, 3.6, 7.4) for y in (-4.2, 0.0, 4.2))
-ROOM_X, ROOM_Y = -6.4, 2.4  # the inner corner of the meeting room
+# the inner corner of the meeting room
+ROOM_X = -6.4
+ROOM_Y = 2.4
 
 
 def make(seed):
     """Its things, their materials and its lamps."""
     floor = replace(FINISHES["terrazzo"](), colour=(0.86, 0.86, 0.88))
-    wall, ceiling = matt("#e6e3dc", picture.ground("plaster", 4, 1280, 1.8)), matt("#efeeea")
+    wall = matt("#e6e3dc", picture.ground("plaster", 4, 1280, 1.8))
+    ceiling = matt("#efeeea")
     walls = {
         **dict.fromkeys(OUTWARD, wall),
         "north": matt("#c9c2b4", picture.masonry("tile", 7, 1024, 2.4, rows=2, columns=2)),
@@ -111,7 +116,9 @@ def _columns():
 
 def _reception():
     """A desk of walnut slats under stone before a panel with a name, and what works on it."""
-    x, y, long = 5.5, 3.3, 4.0
+    x = 5.5
+    y = 3.3
+    long = 4.0
     stone = Material(colour=(0.75, 0.74, 0.72), texture=picture.terrazzo(3, 1024, 1.2), eta=1.5, roughness=0.06)
     yield stood((long, 0.05, 1.02), DARK, x, y - 0.34, 0.04)
     slats = [
@@ -123,7 +130,8 @@ def _reception():
     for s in (-1, 1):
         yield stood((0.05, 0.72, 1.06), wood("walnut"), x + s * (long / 2 - 0.03), y + 0.04)
     yield stood((long, 0.02, 0.04), STEEL, x, y - 0.37, 0, bevel=0.002)
-    panel, back = matt("#3b4a4c"), WIDE / 2 - 0.02
+    panel = matt("#3b4a4c")
+    back = WIDE / 2 - 0.02
     yield stood((4.4, 0.04, 2.96), wood("walnut"), x, back)
     yield put(
         card((1.6, 0.8)),
@@ -242,7 +250,8 @@ def _square():
     """The pavement outside and the house across it."""
     slabs = matt("#f2eee6", picture.masonry("paving", 2, 1024, 2.4, rows=6, columns=4))
     yield "pavement", [Part(quad((-45, -24, -0.06), (90, 0, 0), (0, 17.88, 0)), slabs)]
-    high, columns = 11.0, 26
+    high = 11.0
+    columns = 26
     step = 90 / columns
     holes = [((k + 0.28) * step, (k + 0.72) * step, z, z + (2.5 if z < 2 else 1.8))
              for z in (0.5, 4.2, 7.4) for k in range(columns)]  # fmt: skip
@@ -254,7 +263,8 @@ def _square():
         for u0, u1, v0, _ in holes
     ]
     eaves = block((90, 0.5, 0.3), bevel_m=0).moved(at(0, -23.9, high))
-    brick, glass = matt("#e8d8c8", picture.masonry("brick", 1)), coated("#20282e", roughness=0.12)
+    brick = matt("#e8d8c8", picture.masonry("brick", 1))
+    glass = coated("#20282e", roughness=0.12)
     yield "house", [Part(front, brick), Part(joined(panes), glass), Part(joined([*sills, eaves]), matt("#d9d5ca"))]
 
 

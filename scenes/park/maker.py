@@ -30,11 +30,16 @@ from vobench.plugin import (
     wood,
 )
 
-LONG, WIDE, CELL_M = 72.0, 52.0, 0.5
+LONG = 72.0
+WIDE = 52.0
+CELL_M = 0.5
 LOOP = ((-25, -9), (-14, -14), (1, -9.5), (14, -13), (25, -6), (21, 8), (9, 14.5), (-4, 10), (-15, 14), (-26, 4))
 ACROSS = ((-13.2, -12.7), (-9, -4), (-8.5, 4), (-4.9, 8.9))
-POND, POND_M, LEVEL_M = np.array([10.0, 2.0]), np.array([6.5, 4.5]), -0.62
-PATH_M, LAMP_M = 2.2, 3.3
+POND = np.array([10.0, 2.0])
+POND_M = np.array([6.5, 4.5])
+LEVEL_M = -0.62
+PATH_M = 2.2
+LAMP_M = 3.3
 
 
 def make(seed):
@@ -46,7 +51,8 @@ def make(seed):
     ground, known = things(
         [("path", _paths(ways)), ("grass_near", turf[:3]), ("grass_far", turf[3:]), ("pond", _pond())]
     )
-    lamps, pieces = [], []
+    lamps = []
+    pieces = []
     for k, (x, y, yaw) in enumerate(_beside(ways[0], 12.0, PATH_M / 2 + 0.5)):
         pieces.append(Piece("park_lamp", f"lamp_{k}", (x, y, height(x, y) - 0.03), yaw, size={"height_m": LAMP_M}))
         lamps.append(bulb(x, y, height(x, y) - 0.03 + LAMP_M, 0.26))
@@ -111,12 +117,15 @@ def _beside(way, apart_m, aside_m):
 
 def _gravel():
     """Pebbles of some tones in sand."""
-    rng, px = np.random.default_rng(11), 2048
+    rng = np.random.default_rng(11)
+    px = 2048
     tone = 150 + 8 * picture.noise(rng, px, 2, 16) + 16 * picture.noise(rng, px, 90, 900, slope=0.1)
     sand = np.clip(tone[..., None] * np.array([1.0, 0.93, 0.8]), 20, 235).astype(np.uint8)
     image = Image.fromarray(sand)
     draw = ImageDraw.Draw(image)
-    places, radii, tones = rng.uniform(0, px, (9000, 2)), 1.4 + rng.exponential(1.7, 9000), rng.normal(0.95, 0.2, 9000)
+    places = rng.uniform(0, px, (9000, 2))
+    radii = 1.4 + rng.exponential(1.7, 9000)
+    tones = rng.normal(0.95, 0.2, 9000)
     for (x, y), r, t in zip(places, radii, tones, strict=True):
         ink = tuple(int(np.clip(c * t, 30, 230)) for c in (158, 148, 132))
         draw.ellipse([x - r, y - 0.8 * r, x + r, y + 0.8 * r], fill=ink)
@@ -125,14 +134,14 @@ def _gravel():
 
 def _grass():
     """Blades that lie over one another, from dark ones below to light ones above, with clover between."""
-    rng, px, count = np.random.default_rng(1), 2048, 26000
+    rng = np.random.default_rng(1)
+    px = 2048
+    count = 26000
     image = Image.new("RGB", (px, px), (46, 58, 26))
     draw = ImageDraw.Draw(image)
-    start, turn, long = (
-        rng.uniform(0, px, (count, 2)),
-        rng.uniform(0, 2 * np.pi, count),
-        px * rng.uniform(0.008, 0.028, count),
-    )
+    start = rng.uniform(0, px, (count, 2))
+    turn = rng.uniform(0, 2 * np.pi, count)
+    long = px * rng.uniform(0.008, 0.028, count)
     end = start + long[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     for k in range(count):
         t = (0.55 + 0.5 * k / count) * rng.normal(1, 0.12)
@@ -140,7 +149,8 @@ def _grass():
         draw.line([*start[k].tolist(), *end[k].tolist()], fill=ink, width=int(rng.integers(3, 7)))
     for x, y in rng.uniform(0, px, (120, 2)):
         for a in np.deg2rad(120 * np.arange(3) + rng.uniform(0, 90)):
-            cx, cy = x + 9 * np.cos(a), y + 9 * np.sin(a)
+            cx = x + 9 * np.cos(a)
+            cy = y + 9 * np.sin(a)
             draw.ellipse([cx - 8, cy - 8, cx + 8, cy + 8], fill=(66, 104, 44))
     wide = 1 + 0.1 * picture.noise(rng, px, 1, 8)[..., None]
     return Picture(np.clip(np.asarray(image) * wide, 0, 255).astype(np.uint8), 2.6)
@@ -165,7 +175,8 @@ def _paths(ways):
 
 def _turf(near):
     """The ground as grass in three tints, near the paths and far from them."""
-    x, y = np.arange(-LONG / 2, LONG / 2 + 0.01, CELL_M), np.arange(-WIDE / 2, WIDE / 2 + 0.01, CELL_M)
+    x = np.arange(-LONG / 2, LONG / 2 + 0.01, CELL_M)
+    y = np.arange(-WIDE / 2, WIDE / 2 + 0.01, CELL_M)
     X, Y = np.meshgrid(x, y)
     mesh = sheet(np.stack([X, Y, height(X, Y)], axis=-1))
     mesh = replace(mesh, uv=mesh.vertices_m[:, :2].copy())
@@ -175,7 +186,8 @@ def _turf(near):
         + np.sin(middle[:, 1] / 4.1)
         + 0.8 * np.sin(middle[:, 0] / 1.9 - middle[:, 1] / 2.3)
     )
-    kind, is_near = np.digitize(tint, [-0.9, 0.9]), near.query(middle[:, :2])[0] < 5.5
+    kind = np.digitize(tint, [-0.9, 0.9])
+    is_near = near.query(middle[:, :2])[0] < 5.5
     grass = _grass()
     looks = [matt(colour, grass) for colour in ("#e4efd2", "#f8fbea", "#fff3cf")]
     for want in (True, False):
@@ -237,10 +249,12 @@ def _growth(rng, near):
 def _tufts(rng, near):
     """Tufts of long grass, thick beside the paths and around the pond."""
     places = rng.uniform(-0.5, 0.5, (14000, 2)) * [0.9 * LONG, 0.88 * WIDE]
-    away, far = near.query(places)[0], (((places - POND) / POND_M) ** 2).sum(1)
+    away = near.query(places)[0]
+    far = (((places - POND) / POND_M) ** 2).sum(1)
     chance = np.where((far > 0.75) & (far < 1.25), 0.8, 0.04) + 0.5 * np.exp(-(((away - 1.35) / 0.3) ** 2))
     chosen = places[(rng.random(len(places)) < chance) & (away > 1.12) & (far > 0.7)]
-    blades, cards = _blades(), []
+    blades = _blades()
+    cards = []
     for x, y in chosen:
         high = float(rng.uniform(0.1, 0.26))
         for turn in (0, 90):
@@ -253,10 +267,13 @@ def _tufts(rng, near):
 
 def _blades(px=256):
     """A tuft of grass before nothing."""
-    rng, image = np.random.default_rng(3), Image.new("RGBA", (px, px), (100, 118, 56, 0))
+    rng = np.random.default_rng(3)
+    image = Image.new("RGBA", (px, px), (100, 118, 56, 0))
     draw = ImageDraw.Draw(image)
     for k in range(60):
-        x, lean, high = px / 2 + rng.normal(0, 0.16 * px), rng.normal(0, 0.22 * px), px * rng.uniform(0.45, 0.97)
+        x = px / 2 + rng.normal(0, 0.16 * px)
+        lean = rng.normal(0, 0.22 * px)
+        high = px * rng.uniform(0.45, 0.97)
         t = 0.55 + 0.5 * k / 60
         path = [(x + lean * s**2, px - high * s) for s in np.linspace(0, 1, 7)]
         draw.line(path, fill=(int(122 * t), int(138 * t), int(62 * t), 255), width=int(rng.integers(3, 7)))
@@ -265,7 +282,8 @@ def _blades(px=256):
 
 def _map():
     """A board with a map where the paths part."""
-    x, y = -15.6, -12.2
+    x = -15.6
+    y = -12.2
     parts = [stood((0.09, 0.09, 1.9), wood("walnut"), 0, s * 0.62) for s in (-1, 1)]
     parts.append(put(card((1.15, 0.8)), matt(texture=picture.poster("circles", 41, 1000, 700)), 0.021, 0, 1.35))
     parts += [

@@ -38,12 +38,22 @@ from vobench.plugin import (
     wood,
 )
 
-LONG, WIDE, HIGH = 24.0, 10.0, 6.0
-FOOT_X, HEAD_X, SLOPE = -7.0, 8.0, 0.08
-HALF_M, TOP_M = SLOPE * (HEAD_X - FOOT_X), 2 * SLOPE * (HEAD_X - FOOT_X)  # heights of landing and gallery
-LOWER_Y, UPPER_Y, STAIR_Y = (-4.8, -2.3), (-1.9, 0.6), (1.6, 3.6)
-STEPS, TREAD_M = 15, 0.3
-SLAB_M, KERB_M = 0.28, 0.16
+LONG = 24.0
+WIDE = 10.0
+HIGH = 6.0
+FOOT_X = -7.0
+HEAD_X = 8.0
+SLOPE = 0.08
+# heights of landing and gallery
+HALF_M = SLOPE * (HEAD_X - FOOT_X)
+TOP_M = 2 * SLOPE * (HEAD_X - FOOT_X)
+LOWER_Y = (-4.8, -2.3)
+UPPER_Y = (-1.9, 0.6)
+STAIR_Y = (1.6, 3.6)
+STEPS = 15
+TREAD_M = 0.3
+SLAB_M = 0.28
+KERB_M = 0.16
 WINDOWS_X = (-8.4, -4.2, 0.0, 4.2, 8.4)
 
 
@@ -51,7 +61,8 @@ def make(seed):
     """Its things and their materials."""
     screed = Procedural("plaster", 0.34, 0.28, tile_m=6.0, resolution_px=2048, seed=3)
     floor = Material(colour=(1.0, 0.98, 0.94), texture=screed, eta=1.5, roughness=0.18)
-    wall, raw = matt("#ece7dc", picture.ground("plaster", 5, 1280, 1.9)), matt("#dcdad4", picture.ground("concrete", 2))
+    wall = matt("#ece7dc", picture.ground("plaster", 5, 1280, 1.9))
+    raw = matt("#dcdad4", picture.ground("concrete", 2))
     walls = {**dict.fromkeys(OUTWARD, wall), "west": matt("#8f5a4a", picture.ground("plaster", 6, 1280, 1.9))}
     openings = [Opening("north", (x, 4.3), (2.6, 2.0), 0.25) for x in WINDOWS_X]
     room = shell((LONG, WIDE, HIGH), openings, floor=floor, ceiling=matt("#efece5"), walls=walls)
@@ -100,7 +111,8 @@ def _ramp(raw):
         )
     )
     yield Part(joined(kerbs), matt("#c7c3ba", picture.ground("concrete", 8)))
-    tilt, strips = float(np.rad2deg(np.arctan(SLOPE))), []
+    tilt = float(np.rad2deg(np.arctan(SLOPE)))
+    strips = []
     for k in range(15):
         x = FOOT_X + 0.7 + k
         for (y0, y1), z, pitch in (
@@ -114,10 +126,13 @@ def _ramp(raw):
 
 def _stair(raw):
     """Steps of concrete with dark nosings."""
-    rise, y = TOP_M / STEPS, sum(STAIR_Y) / 2
-    steps, edges = [], []
+    rise = TOP_M / STEPS
+    y = sum(STAIR_Y) / 2
+    steps = []
+    edges = []
     for k in range(STEPS - 1):
-        x, z = FOOT_X + (k + 0.5) * TREAD_M, TOP_M - (k + 1) * rise
+        x = FOOT_X + (k + 0.5) * TREAD_M
+        z = TOP_M - (k + 1) * rise
         steps.append(
             block((TREAD_M, STAIR_Y[1] - STAIR_Y[0], z), bevel_m=0, uv_m=(0.3 * k, 0.7 * k)).moved(at(x, y, z / 2))
         )
@@ -132,7 +147,9 @@ def _stair(raw):
 
 def _gallery(raw):
     """The upper floor on pillars, with a timber deck."""
-    x0, y0, y1 = -LONG / 2, UPPER_Y[0], WIDE / 2
+    x0 = -LONG / 2
+    y0 = UPPER_Y[0]
+    y1 = WIDE / 2
     middle = (x0 + FOOT_X) / 2, (y0 + y1) / 2
     yield put(block((FOOT_X - x0, y1 - y0, SLAB_M), bevel_m=0), raw, *middle, TOP_M - SLAB_M / 2 - 0.02)
     yield put(
@@ -147,7 +164,9 @@ def _gallery(raw):
 
 def _rails():
     """Handrails on posts along whatever one could fall from."""
-    r, s, t = UPPER_Y, STAIR_Y, TOP_M
+    r = UPPER_Y
+    s = STAIR_Y
+    t = TOP_M
     foot = FOOT_X + STEPS * TREAD_M - 0.3
     lines = [[(FOOT_X, y, KERB_M), (HEAD_X, y, HALF_M + KERB_M)] for y in (LOWER_Y[0] + 0.07, LOWER_Y[1] - 0.07)]
     lines += [[(HEAD_X, y, HALF_M + KERB_M), (FOOT_X, y, t + KERB_M)] for y in (r[0] + 0.07, r[1] - 0.07)]
@@ -186,7 +205,8 @@ def _exhibits():
     drop = lathe([[0, 0], [0.05, 0.0], [0.24, 0.3], [0.2, 0.5], [0.05, 0.8], [0, 0.86]], sections=40)
     egg = cushion((0.5, 0.4, 0.45), power=3).moved(at(z_m=0.225))
     bowl = vase.moved(np.diag([1.25, 1.25, 0.6, 1]))
-    knotted, timber = (tube(ring, 0.055, sections=14), replace(STEEL, roughness=0.12)), (joined(tower), wood("walnut"))
+    knotted = (tube(ring, 0.055, sections=14), replace(STEEL, roughness=0.12))
+    timber = (joined(tower), wood("walnut"))
     shapes = [(vase, glaze[0]), knotted, timber, (drop, glaze[1]), (egg, glaze[2]), (bowl, glaze[3])]
     places = [
         (0.2, 2.6, 0.0),

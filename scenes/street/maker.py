@@ -41,10 +41,16 @@ from vobench.plugin import (
 )
 
 LONG = 84.0  # of the street; houses close it at both ends, beyond a crossroad
-ROAD_M, PAVED_M, KERB_M, CROSS_M = 7.0, 3.2, 0.12, 8.0
-STOREY_M, SHOP_M = 3.1, 3.7
-GLASS_NAME, GLASS = "glass", coated("#1a2025", roughness=0.12)
-NORTH_MASTS, SOUTH_MASTS = (-36.0, -12.0, 12.5, 37.0), (-24.5, 0.0, 26.0)
+ROAD_M = 7.0
+PAVED_M = 3.2
+KERB_M = 0.12
+CROSS_M = 8.0
+STOREY_M = 3.1
+SHOP_M = 3.7
+GLASS_NAME = "glass"
+GLASS = coated("#1a2025", roughness=0.12)
+NORTH_MASTS = (-36.0, -12.0, 12.5, 37.0)
+SOUTH_MASTS = (-24.5, 0.0, 26.0)
 OFF = Steady(0.0)
 NAMES = (
     "BAKERY", "BOOKS", "TEA ROOM", "FLORIST", "OPTICIAN", "CYCLES", "TAILOR", "WINES", "PHARMACY", "SHOES", "MUSIC",
@@ -58,8 +64,10 @@ FACES = (
 
 def make(seed):
     """Its things and their materials."""
-    far, near = list(_ground()), []
-    x, k = -LONG / 2, 0
+    far = list(_ground())
+    near = []
+    x = -LONG / 2
+    k = 0
     rng = np.random.default_rng([seed, 1])
     for side in (-1, 1):
         x = -LONG / 2
@@ -68,7 +76,8 @@ def make(seed):
             wide = LONG / 2 - x if LONG / 2 - x - wide < 7 else wide
             place = at(x + wide / 2, side * (ROAD_M / 2 + PAVED_M), 0, yaw=-90 * side)
             far += _moved(f"house_{k}", _house(rng, k, wide), place)
-            x, k = x + wide, k + 1
+            x = x + wide
+            k = k + 1
     for end in (-1, 1):
         for y in (-13.0, 0.0, 13.0):
             place = at(end * (LONG / 2 + CROSS_M + PAVED_M), y, 0, yaw=90 + 90 * end)
@@ -131,12 +140,12 @@ def _asphalt():
 
 def _ground():
     """Roads, pavements with kerbs, lines, a crossing, gullies and lids."""
-    asphalt, slabs = (
-        matt("#ffffff", _asphalt()),
-        matt("#f2eee6", picture.masonry("paving", 2, 1024, 2.4, rows=6, columns=4)),
-    )
-    stone, line = matt("#b9b5ab", picture.ground("concrete", 4)), matt("#d8d7d0", picture.ground("concrete", 6))
-    half, edge = LONG / 2, ROAD_M / 2
+    asphalt = matt("#ffffff", _asphalt())
+    slabs = matt("#f2eee6", picture.masonry("paving", 2, 1024, 2.4, rows=6, columns=4))
+    stone = matt("#b9b5ab", picture.ground("concrete", 4))
+    line = matt("#d8d7d0", picture.ground("concrete", 6))
+    half = LONG / 2
+    edge = ROAD_M / 2
     far = half + CROSS_M
     yield (
         "road",
@@ -190,7 +199,8 @@ def _lid():
 
 def _display(rng):
     """What is to be seen in a shop window: goods on shelves before a wall, with cards and lamps."""
-    w, h = 640, 420
+    w = 640
+    h = 420
     back = picture.rgb(picture.some(rng, "#a08c70", "#8d999a", "#b3a894", "#8f7c80"))
     image = Image.new("RGB", (w, h), back)
     draw = ImageDraw.Draw(image)
@@ -201,7 +211,8 @@ def _display(rng):
         draw.rectangle([20, z, w - 20, z + 9], fill=(120, 92, 62))
         x = 30.0
         while x < w - 60:
-            bw, bh = rng.uniform(16, 58), rng.uniform(28, 96)
+            bw = rng.uniform(16, 58)
+            bh = rng.uniform(28, 96)
             ink = picture.rgb(picture.some(rng, *INKS, PAPER, SAND))
             if rng.random() < 0.4:
                 draw.ellipse([x, z - bh, x + bw, z], fill=ink)
@@ -225,7 +236,8 @@ def _fascia(name, ink):
 def _house(rng, number, wide):
     """A front on x = 0 that faces x: a shop below, storeys of windows above, a cornice, a door and a downpipe."""
     kind, colour = FACES[(number * 3 + number // 8) % len(FACES)]
-    storeys, ink = int(rng.integers(2, 5)), picture.some(rng, NAVY, TEAL, BRICK, PLUM, INK, "#2f4a36")
+    storeys = int(rng.integers(2, 5))
+    ink = picture.some(rng, NAVY, TEAL, BRICK, PLUM, INK, "#2f4a36")
     look = (
         matt(colour, picture.masonry("brick", number % 3))
         if kind == "brick"
@@ -233,9 +245,13 @@ def _house(rng, number, wide):
     )
     trim = matt(("#d9d5ca", "#b9b3a6", "#e8e5dd")[number % 3])
     high = SHOP_M + storeys * STOREY_M + 0.5
-    corner, along, up = np.array([0.0, -wide / 2, 0.0]), np.array([0.0, wide, 0.0]), np.array([0.0, 0.0, high])
+    corner = np.array([0.0, -wide / 2, 0.0])
+    along = np.array([0.0, wide, 0.0])
+    up = np.array([0.0, 0.0, high])
     count = max(2, round(wide / float(rng.uniform(2.3, 3.0))))
-    module, (w, h) = wide / count, (float(rng.uniform(0.95, 1.25)), float(rng.uniform(1.5, 1.9)))
+    module = wide / count
+    w = float(rng.uniform(0.95, 1.25))
+    h = float(rng.uniform(1.5, 1.9))
     upper = [((k + 0.5) * module, SHOP_M + s * STOREY_M + 0.75) for s in range(storeys) for k in range(count)]
     holes = [(y - w / 2, y + w / 2, z, z + h) for y, z in upper]
     door_at = 0.8 if number % 2 else wide - 1.8
@@ -244,9 +260,12 @@ def _house(rng, number, wide):
     parts = [Part(pierced(corner, along, up, [*holes, shop, entry]), look)]
     parts.append(Part(joined([reveal(corner, along, up, hole, 0.18) for hole in holes]), trim))
     parts.append(Part(joined([reveal(corner, along, up, hole, 0.3) for hole in (shop, entry)]), wood("walnut")))
-    bars, sills, panes = [], [], []
+    bars = []
+    sills = []
+    panes = []
     for u0, u1, v0, v1 in holes:
-        y, z = (u0 + u1) / 2 - wide / 2, (v0 + v1) / 2
+        y = (u0 + u1) / 2 - wide / 2
+        z = (v0 + v1) / 2
         bars += [
             block((0.05, 0.06, v1 - v0), bevel_m=0).moved(at(-0.13, y + s * (w / 2 - 0.03), z)) for s in (-1, 0, 1)
         ]
@@ -268,18 +287,9 @@ def _house(rng, number, wide):
                 matt("#b9b2a2"),
             )
         )
-    u0, u1, v0, v1 = shop
+    parts += _shop(rng, shop, wide, ink)
+    u0, u1, _, _ = shop
     middle = (u0 + u1) / 2 - wide / 2
-    bays = max(2, round((u1 - u0) / 2.4))
-    for k in range(bays):
-        width = (u1 - u0) / bays
-        goods = coated("#ffffff", _display(rng), roughness=0.12)
-        parts.append(put(card((width, v1 - v0)), goods, -0.25, u0 - wide / 2 + (k + 0.5) * width, (v0 + v1) / 2))
-    posts = [
-        block((0.07, 0.07, v1 - v0), bevel_m=0).moved(at(-0.2, u0 - wide / 2 + k * (u1 - u0) / bays, (v0 + v1) / 2))
-        for k in range(bays + 1)
-    ]
-    parts.append(Part(joined(posts), coated(ink)))
     name = NAMES[number % len(NAMES)]
     length = min(u1 - u0, 6.0)
     parts.append(stood((0.12, u1 - u0 + 0.2, 0.66), coated(ink), 0.05, middle, 2.86, bevel=0))
@@ -293,11 +303,33 @@ def _house(rng, number, wide):
     if number % 3 == 0:
         parts += _awning(ink, middle, u1 - u0)
     parts.append(put(tube([[0.08, wide / 2 - 0.15, KERB_M], [0.08, wide / 2 - 0.15, high - 0.3]], 0.045), DARK))
+    return [*parts, *_body(wide, high, look)]
+
+
+def _body(wide, high, look):
+    """The roof and the two sides behind a front."""
     deep = 15.5
     roof = [block((deep, wide, 0.1), bevel_m=0).moved(at(-deep / 2, 0, high - 0.06))]
     side = block((deep, 0.1, high - 0.1), bevel_m=0)
     sides = [side.moved(at(-0.02 - deep / 2, s * (wide / 2 - 0.05), high / 2 - 0.06)) for s in (-1, 1)]
-    return [*parts, Part(joined(roof), DARK), Part(joined(sides), look)]
+    return [Part(joined(roof), DARK), Part(joined(sides), look)]
+
+
+def _shop(rng, shop, wide, ink):
+    """The window of a shop: goods behind the glass of each bay, and posts between the bays."""
+    u0, u1, v0, v1 = shop
+    bays = max(2, round((u1 - u0) / 2.4))
+    parts = []
+    for k in range(bays):
+        width = (u1 - u0) / bays
+        goods = coated("#ffffff", _display(rng), roughness=0.12)
+        parts.append(put(card((width, v1 - v0)), goods, -0.25, u0 - wide / 2 + (k + 0.5) * width, (v0 + v1) / 2))
+    posts = [
+        block((0.07, 0.07, v1 - v0), bevel_m=0).moved(at(-0.2, u0 - wide / 2 + k * (u1 - u0) / bays, (v0 + v1) / 2))
+        for k in range(bays + 1)
+    ]
+    parts.append(Part(joined(posts), coated(ink)))
+    return parts
 
 
 def _awning(ink, middle, wide):

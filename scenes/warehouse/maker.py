@@ -35,8 +35,12 @@ from vobench.plugin import (
     tube,
 )
 
-LONG, WIDE, HIGH = 26.0, 16.0, 6.5
-BAY_M, DEEP_M, BAYS = 2.7, 1.1, 6
+LONG = 26.0
+WIDE = 16.0
+HIGH = 6.5
+BAY_M = 2.7
+DEEP_M = 1.1
+BAYS = 6
 LEVELS_M = (0.12, 1.75, 3.3)
 RACKS_Y = (-6.9, -2.6, -1.3, 3.0, 4.3)  # middles of the rows; aisles between them are 3.2 m wide
 BLUE, ORANGE, YELLOW = (coated(c, roughness=0.4) for c in ("#24427a", "#d8641e", "#d8a614"))
@@ -75,8 +79,13 @@ def _bay_x(bay):
 
 def _rack(row, y):
     """Uprights with braces, beams and wire decks of a row of bays."""
-    post, foot = block((0.08, 0.1, 4.6), bevel_m=0.004).moved(at(z_m=2.3)), block((0.14, 0.16, 0.01), bevel_m=0.002)
-    uprights, feet, braces, beams, decks = [], [], [], [], []
+    post = block((0.08, 0.1, 4.6), bevel_m=0.004).moved(at(z_m=2.3))
+    foot = block((0.14, 0.16, 0.01), bevel_m=0.002)
+    uprights = []
+    feet = []
+    braces = []
+    beams = []
+    decks = []
     for k in range(BAYS + 1):
         x = _bay_x(k) - (BAY_M + 0.1) / 2
         for s in (-1, 1):
@@ -119,7 +128,8 @@ def pallet():
 
 def _load(rng, high_m):
     """Cartons of one size in layers on a pallet, some with film around, or a crate, drums or sacks."""
-    kind, z0 = rng.random(), 0.145
+    kind = rng.random()
+    z0 = 0.145
     if kind < 0.12:
         drum = lathe(
             [[0, 0], [0.28, 0], [0.29, 0.02], [0.28, 0.28], [0.29, 0.3], [0.28, 0.58], [0.29, 0.86], [0, 0.86]]
@@ -135,12 +145,17 @@ def _load(rng, high_m):
         ]
     nx, ny = (3, 2) if rng.random() < 0.5 else (2, 2)
     size = 1.16 / nx - 0.01, 0.78 / ny - 0.01, float(rng.uniform(0.22, 0.42))
-    seed, rows, boxes, gone = int(rng.integers(8)), max(1, int((high_m - z0) / size[2])), [], rng.random() < 0.5
+    seed = int(rng.integers(8))
+    rows = max(1, int((high_m - z0) / size[2]))
+    boxes = []
+    gone = rng.random() < 0.5
     rows = int(rng.integers(max(1, rows - 1), rows + 1))
     for r, i, j in np.ndindex(rows, nx, ny):
         if r == rows - 1 and gone and rng.random() < 0.4:
             continue
-        dx, dy, turn = rng.normal(0, 0.006), rng.normal(0, 0.006), rng.normal(0, 0.8) + 180 * rng.integers(2)
+        dx = rng.normal(0, 0.006)
+        dy = rng.normal(0, 0.006)
+        turn = rng.normal(0, 0.8) + 180 * rng.integers(2)
         place = at((i - (nx - 1) / 2) * 1.16 / nx + dx, (j - (ny - 1) / 2) * 0.78 / ny + dy, z0 + r * size[2], yaw=turn)
         tile = max(size)
         boxes.append(block(size, bevel_m=0, uv_m=(tile / 2, tile / 2)).moved(at(z_m=size[2] / 2)).moved(place))
@@ -174,7 +189,8 @@ def _steelwork():
     paint = coated("#6d7579", roughness=0.4)
     corner = np.array([[1, -1], [1, -0.85], [0.07, -0.85], [0.07, 0.85], [1, 0.85], [1, 1]])
     profile = np.concatenate([corner, -corner])
-    column, beam = extrusion(profile * 0.13, HIGH - 0.4), extrusion(profile * [0.1, 0.19], WIDE)
+    column = extrusion(profile * 0.13, HIGH - 0.4)
+    beam = extrusion(profile * [0.1, 0.19], WIDE)
     parts = []
     for x in (-12.8, -6.3, 0.2, 6.7, 12.8):
         parts += [column.moved(at(x, s * (WIDE / 2 - 0.16))) for s in (-1, 1)]

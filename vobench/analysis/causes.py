@@ -13,7 +13,8 @@ SEGMENT_FRAMES = 5
 LEAST_LOSS = 1e-4
 COLLINEAR = 0.9
 RIDGE = 0.02  # of the number of segments, on standardised conditions: as if a few segments more showed nothing
-DRAWS, LOW_HIGH = 400, (2.5, 97.5)
+DRAWS = 400
+LOW_HIGH = (2.5, 97.5)
 USUAL = (5.0, 95.0)  # percentiles: from little of a condition to much
 LEAP = 8.0  # times a trial's middle error between two frames: where it went wrong
 FEWEST = 8  # segments that anything can be learned from
@@ -87,7 +88,8 @@ def attribute(courses: Sequence[Course]) -> Attribution | None:
         return None
     names = tuple(courses[0].conditions)
     means = [[c.conditions[name][f : f + SEGMENT_FRAMES].mean() for name in names] for c, f in parts]
-    X, loss = np.sqrt(np.array(means)), np.array([c.loss[f : f + SEGMENT_FRAMES].mean() for c, f in parts])
+    X = np.sqrt(np.array(means))
+    loss = np.array([c.loss[f : f + SEGMENT_FRAMES].mean() for c, f in parts])
     varies = X.std(0) > 1e-6 * np.maximum(X.max(0), 1e-6)
     if not varies.any():
         return None
@@ -144,6 +146,7 @@ def _slopes(Z: Array, y: Array) -> Array:
 
 def _redrawn(owners: Sequence[Course]) -> list[NDArray[np.intp]]:
     """Rows drawn with replacement, each trial's among its own."""
-    rng, of = np.random.default_rng(0), np.array([id(owner) for owner in owners])
+    rng = np.random.default_rng(0)
+    of = np.array([id(owner) for owner in owners])
     own = [np.flatnonzero(of == owner) for owner in dict.fromkeys(of.tolist())]
     return [np.concatenate([rng.choice(rows, len(rows)) for rows in own]) for _ in range(DRAWS)]

@@ -42,7 +42,8 @@ CONDITIONS: dict[str, tuple[str, str]] = {
     "missing_frames": ("", "frames that are not there since the last one"),
 }
 SAMPLES_ACROSS = 60  # pixels that rays are cast through, in a row of the picture
-BURNT_DN, BLACK_DN = 254, 2
+BURNT_DN = 254
+BLACK_DN = 2
 LEAST_CONTRAST = 0.02
 BLUR_PER_DEFOCUS = 0.25  # standard deviation of a disc over its diameter
 SIGMA_PER_SMEAR = 12**-0.5  # of an even smear over its length
@@ -88,7 +89,8 @@ def conditions(case: Case, gt: Trajectory, frames: Iterable[StereoFrame], exposu
     `gt` is the left camera's path with a pose for each frame; `exposures` are time_s and gain_db by stamp.
     """
     watched = _Watched(case)
-    rows, before = list[dict[str, float]](), None
+    rows = list[dict[str, float]]()
+    before = None
     steps_ns = np.diff(gt.t_ns)
     usual_ns = float(np.median(steps_ns)) if len(steps_ns) else 1.0
     for frame, T, nth in zip(frames, gt.T_world_frame, range(len(gt)), strict=False):
@@ -110,7 +112,9 @@ class _Watched:
     """A case's scene seen by rays through some of the left camera's pixels."""
 
     def __init__(self, case: Case) -> None:
-        scene, self._told, self._true = case.build_scene(), case.build_rig(), case.build_true_rig()
+        scene = case.build_scene()
+        self._told = case.build_rig()
+        self._true = case.build_true_rig()
         self._camera = Sampled(self._true.left, max(1, self._true.left.width_px // SAMPLES_ACROSS))
         self._caster = TruthCaster(scene)
         looks = [scene.materials.get(name) for name in self._caster.names.material]
@@ -135,8 +139,11 @@ class _Watched:
         }
 
     def _shares(self, truth: TruthFrame) -> dict[str, float]:
-        material, mirror, shadow = cast("Any", truth.material), cast("Any", truth.mirror), cast("Any", truth.shadow)
-        coated, edge = self._is_coated[material], np.zeros(shadow.shape, bool)
+        material = cast("Any", truth.material)
+        mirror = cast("Any", truth.mirror)
+        shadow = cast("Any", truth.shadow)
+        coated = self._is_coated[material]
+        edge = np.zeros(shadow.shape, bool)
         edge[:, 1:] |= shadow[:, 1:] != shadow[:, :-1]
         edge[1:] |= shadow[1:] != shadow[:-1]
         return {
@@ -155,7 +162,8 @@ class _Watched:
         return 0.0
 
     def _disparity_px(self, points_m: Array) -> Array:
-        right, T = self._true.camera("right"), se3.inverse(self._true.T_left_right)
+        right = self._true.camera("right")
+        T = se3.inverse(self._true.T_left_right)
         moved = right.project(se3.apply(T, points_m)) - right.project(points_m @ T[:3, :3].T)
         return np.asarray(np.linalg.norm(moved, axis=-1))
 
@@ -205,7 +213,8 @@ def _level(picture: Any) -> float:
 
 def _set(case: Case, row: dict[str, float], *, exposure_s: float, gain_db: float, step_s: float) -> dict[str, float]:
     """What follows from the camera's settings and how fast the picture flows."""
-    camera, speed_pxps = case.camera, row["flow"] / step_s
+    camera = case.camera
+    speed_pxps = row["flow"] / step_s
     smear = SIGMA_PER_SMEAR * speed_pxps * exposure_s * camera.motion_blur
     blur = np.sqrt(smear**2 + camera.blur_sigma_px**2 + (BLUR_PER_DEFOCUS * camera.defocus_px) ** 2)
     return {

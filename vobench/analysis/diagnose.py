@@ -20,7 +20,8 @@ from vobench.trajectory.trajectory import Move, Trajectory
 
 AT_ORIGIN = 1e-6  # m, and the same of a rotation's elements: odometry begins at the identity, a truth seldom
 DENSER = 2.0  # truth from a tracker has more poses a second than frames have
-NOISIER, PLAINLY_NOISIER = 1.5, 2.0
+NOISIER = 1.5
+PLAINLY_NOISIER = 2.0
 NOISE = 5e-3  # of a step; below it motion itself is what is seen
 ENOUGH = 2  # signs that have to agree; each alone has an innocent explanation
 MIN_POSES_SWAP = 8
@@ -40,12 +41,19 @@ Fault = Literal[
 ]
 WHO: dict[Side, str] = {"gt": "ground truth", "est": "estimate"}
 
-MIN_POSES, MAX_POSES = 8, 1000
+MIN_POSES = 8
+MAX_POSES = 1000
 # Real pairs without a fault (KITTI, TUM, TartanAir) keep clear of these.
-SCALE_OFF, SCALE_MENDED = 0.02, 0.5
-LAG_NS, LAG_MENDED, LAG_BY, LAG_ALIKE = 10_000_000, 0.75, 5e-4, 0.5
+SCALE_OFF = 0.02
+SCALE_MENDED = 0.5
+LAG_NS = 10_000_000
+LAG_MENDED = 0.75
+LAG_BY = 5e-4
+LAG_ALIKE = 0.5
 LONGEST_REPR = 100  # characters of a finding in one line
-STEADY_LAG_NS, STEADY_SHARE = 25_000_000, 0.875  # fr1/xyz has 10 ms, the same in all of its stretches
+# fr1/xyz has 10 ms, the same in all of its stretches
+STEADY_LAG_NS = 25_000_000
+STEADY_SHARE = 0.875
 UNRELATED = 0.5  # of the extent, left by the best mend
 SAME_SPAN = 30.0  # times; units are 1000 apart
 
@@ -134,7 +142,8 @@ def _right_unit(read: Reading, other: Reading) -> Reading:
 
     Lost track shortens the one and keyframes lengthen the other, but neither does both.
     """
-    duration, wanted = _duration_ns(read), max(_duration_ns(other), 1)
+    duration = _duration_ns(read)
+    wanted = max(_duration_ns(other), 1)
     if read.unit is None or read.is_unit_told or min(duration / wanted, _step_ns(read) / _step_ns(other)) < SAME_SPAN:
         return read
     finer = [unit for unit in DIGITS if DIGITS[unit] < DIGITS[read.unit]]
@@ -169,7 +178,8 @@ def _on_one_clock(gt: Reading, est: Reading, findings: list[Finding]) -> Reading
         lag = estimate_offset(gt.trajectory, est.trajectory)
     except AlignmentError:  # motion doesn't tell
         return est
-    before, after = likeness(gt.trajectory, est.trajectory, 0), lag.correlation
+    before = likeness(gt.trajectory, est.trajectory, 0)
+    after = lag.correlation
     if abs(lag.offset_ns) <= LAG_NS or after < LAG_ALIKE:
         return est
     is_plain = before is None or (1 - after <= LAG_MENDED * (1 - before) and after - before >= LAG_BY)
@@ -208,7 +218,8 @@ def _in_right_frames(
     found = find_mismatch(T_gt, T_est, gt_order=gt.order, est_order=est.order)
     if found is None:
         return T_gt, T_est
-    before, after = found.before, found.suspect.misfit
+    before = found.before
+    after = found.suspect.misfit
     evidence = [
         Evidence("rotation left after alignment (rms)", "deg", *np.rad2deg([before.rot_rad, after.rot_rad]).tolist()),
         Evidence("position left, of the path's extent (rms)", "%", 100 * before.trans, 100 * after.trans),
@@ -224,7 +235,8 @@ def _in_right_frames(
 
 def _frame_words(found: Mismatch, gt: Reading, est: Reading) -> tuple[str, tuple[str, ...]]:
     """A sentence about a fault of frames, and the options that mend it."""
-    side, move = found.suspect.side, found.suspect.move
+    side = found.suspect.side
+    move = found.suspect.move
     if move is None:
         read_as = (gt if side == "gt" else est).order
         order = "wxyz" if read_as == "xyzw" else "xyzw"
@@ -271,13 +283,16 @@ def _wrong_scale(T_gt: Array, T_est: Array) -> Iterator[Finding]:
 
 def _swapped(gt: Reading, est: Reading) -> Iterator[Finding]:
     """Whether enough signs of two trajectories on one clock, where both have noise, speak for swapped inputs."""
-    truth, estimate = gt.trajectory, est.trajectory
+    truth = gt.trajectory
+    estimate = est.trajectory
     pairs = associate(truth.t_ns, estimate.t_ns)
     noises = [_noise(t.positions_m[chosen]) for t, chosen in ((truth, pairs.gt), (estimate, pairs.est))]
     if len(pairs) < MIN_POSES_SWAP or not min(noises) > 0:
         return
-    noise, density = noises[0] / noises[1], _step_ns(est) / _step_ns(gt)
-    origins, says_truth = (_begins_at_origin(truth), _begins_at_origin(estimate)), (gt.says_truth, est.says_truth)
+    noise = noises[0] / noises[1]
+    density = _step_ns(est) / _step_ns(gt)
+    origins = (_begins_at_origin(truth), _begins_at_origin(estimate))
+    says_truth = (gt.says_truth, est.says_truth)
     # Truth that has a pose at exactly each estimated one was interpolated, and that makes it smooth.
     is_noisy = noises[0] > NOISE
     same_instants = len(truth) == len(estimate) == len(pairs)

@@ -13,7 +13,8 @@ from vobench.geometry.se3 import Array
 from vobench.suite.suite import Case
 from vobench.trajectory.trajectory import Trajectory
 
-SEGMENTS, FEWEST_STEPS = 24, 2
+SEGMENTS = 24
+FEWEST_STEPS = 2
 LEAST_M = 1e-3  # of way, for what stands still
 # A nuisance mends a case alone where as much of what all of them cost together goes with it.
 MENDS = 2 / 3
@@ -21,8 +22,11 @@ TRIED_IN_PAIRS = 3
 # Fewer blocks of segments than these, in all repeats, draw no interval that could be believed.
 FEWEST_BLOCKS = 8
 # Where chance leaves open whether so much of the error goes, the best one is tried under so many times the seeds.
-WORTH_SEEDS, MORE_SEEDS = 0.2, 3
-DRAWS, BLOCK, LOW_HIGH = 2000, 3, (2.5, 97.5)
+WORTH_SEEDS = 0.2
+MORE_SEEDS = 3
+DRAWS = 2000
+BLOCK = 3
+LOW_HIGH = (2.5, 97.5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +142,8 @@ def explain(case: Case, nuisances: Sequence[Nuisance], measure: Measure, *, repe
             removed: [found[f"{folder_name(removed, names)}.{nth}"][0] for nth in range(repeats)] for removed in sets
         }
 
-    whole, (once,) = tuple(names), tried([()], 1)[()]
+    whole = tuple(names)
+    (once,) = tried([()], 1)[()]
     repeats = max(repeats, -(-FEWEST_BLOCKS // _blocks(once)))
     first = tried([(), *((name,) for name in names), *([whole] if len(names) > 1 else [])], repeats)
     base = first[()]
@@ -149,7 +154,8 @@ def explain(case: Case, nuisances: Sequence[Nuisance], measure: Measure, *, repe
         again = tried([(), best, whole], repeats * MORE_SEEDS)
         everything = _change(whole, again[()], again[whole])
         singles = _ranked([_change(best, again[()], again[best]), *singles[1:]])
-    alone, pairs = dict[str, float](), tuple[Change, ...]()
+    alone = dict[str, float]()
+    pairs = tuple[Change, ...]()
     if len(names) > 2 and everything.is_sure and not mends(singles[0], everything):
         rests = {name: tuple(other for other in names if other != name) for name in names}
         alone = {

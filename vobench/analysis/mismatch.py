@@ -184,7 +184,8 @@ def mounted(T_gt: Array, T_est: Array) -> Suspect:
 
     A lever that is no more than noise is left out.
     """
-    lever_m, path = np.zeros(3), []
+    lever_m = np.zeros(3)
+    path = []
     for _ in range(MOUNT_ROUNDS):
         lever = find_lever(T_gt, T_est, _rotation_left(T_gt, T_est, lever_m))
         path.append(lever.m)
@@ -196,7 +197,8 @@ def mounted(T_gt: Array, T_est: Array) -> Suspect:
 
 def _limit(steps: list[Array]) -> Array:
     """Where three steps (3,) that shorten by one ratio are going. Source: Aitken (1926)."""
-    before, after = steps[1] - steps[0], steps[2] - steps[1]
+    before = steps[1] - steps[0]
+    after = steps[2] - steps[1]
     ratio = float(before @ after) / (float(before @ before) + TINY)
     return steps[2] + (ratio / (1 - ratio)) * after if 0 < ratio < STEADY else steps[2]
 

@@ -73,7 +73,8 @@ def _of_materials(change: Callable[[str, MaterialSpec | None], MaterialSpec | No
     """Another material in place of each one that is used; it is given by name, None where it is a finish of ours."""
 
     def changed(scene: SceneFile) -> SceneFile:
-        own, used = dict(scene.materials), {name for _, name in materials_used(scene)} | set(scene.materials)
+        own = dict(scene.materials)
+        used = {name for _, name in materials_used(scene)} | set(scene.materials)
         for name in sorted(used):
             if (other := change(name, own.get(name))) is not None and other != own.get(name):
                 own[name] = other
@@ -87,7 +88,9 @@ STONE = Matt("terrazzo", 0.45, contrast=0.5)
 # The finishes that mirror, and those in which there is little to see; others have a picture for a texture.
 COATED_FINISHES = {"terrazzo": Matt("terrazzo", 0.45, contrast=0.4)}
 FAINT_FINISHES = ("white_plaster", "sage_plaster", "paint")
-FAINT, STRONG = 0.3, 0.7  # contrasts
+# contrasts
+FAINT = 0.3
+STRONG = 0.7
 
 
 def _matt_mirrors(name: str, own: MaterialSpec | None) -> MaterialSpec | None:
@@ -125,7 +128,8 @@ def _still_lights(case: Case) -> Case:
     def steady(light: Any) -> Any:
         return replace(light, level=_first_level(light.level)) if light and light.level else light
 
-    scene, overrides = case.scene, {name: steady(override) for name, override in case.lighting.items()}
+    scene = case.scene
+    overrides = {name: steady(override) for name, override in case.lighting.items()}
     sun = steady(scene.sun)
     if sun and sun.path:
         key = sun.path[0]
@@ -143,7 +147,8 @@ def _shadowless(case: Case) -> Case:
 
     Its level over time is that of the strongest lamp.
     """
-    scene, lighting = case.scene, dict(case.lighting)
+    scene = case.scene
+    lighting = dict(case.lighting)
     if scene.room and scene.lamps:
         overrides = [lighting.pop(lamp.name, LightOverride()) for lamp in scene.lamps]
         powers = [
@@ -162,7 +167,8 @@ def _shadowless(case: Case) -> Case:
         )
         scene = replace(scene, lamps=(panel,))
     if scene.sun:
-        override, below = lighting.pop("sun", LightOverride()), scene.sky.illuminance_lx if scene.sky else 0.0
+        override = lighting.pop("sun", LightOverride())
+        below = scene.sky.illuminance_lx if scene.sky else 0.0
         lux = scene.sun.illuminance_lx if override.illuminance_lx is None else override.illuminance_lx
         scene = replace(scene, sun=None, sky=SkySpec(illuminance_lx=lux + below, kind="uniform"))
     return replace(case, scene=scene, lighting=lighting)
@@ -177,7 +183,8 @@ def _unburnt(case: Case) -> Case:
 
     A fixed exposure that makes white more than white comes down to it first.
     """
-    camera, chip = case.camera, case.camera.chip
+    camera = case.camera
+    chip = case.camera.chip
     stored = np.linspace(0, 1, FULL_SCALE_DN + 1)
     signal = np.interp(stored / KNEE, stored, linear_of_grey(chip.curve))
     above = stored > KNEE

@@ -24,14 +24,25 @@ from vobench.sequence import EncodedFrame
 from vobench.sequence.picture import Image, decode, grey
 from vobench.trajectory.trajectory import poses_at
 
-WINDOW, WINDOWS = 14, 6  # successive pictures, and how often over a recording
-MOST_CORNERS, CORNER_QUALITY, CORNER_DISTANCE_PX = 2000, 0.01, 8
+# successive pictures, and how often over a recording
+WINDOW = 14
+WINDOWS = 6
+MOST_CORNERS = 2000
+CORNER_QUALITY = 0.01
+CORNER_DISTANCE_PX = 8
 CELLS = (8, 6)
-TILE_PX, CYCLES = 256, (4, 100)
-BURNT_DN, DARK_DN = 254, 2
-PATCH_PX, PATCH_STEP_PX, FEWEST_PATCHES, NOISE_ROUNDS = 7, 3, 300, 8
+TILE_PX = 256
+CYCLES = (4, 100)
+BURNT_DN = 254
+DARK_DN = 2
+PATCH_PX = 7
+PATCH_STEP_PX = 3
+FEWEST_PATCHES = 300
+NOISE_ROUNDS = 8
 FLAT_SHARES = np.arange(0.05, 1.0, 0.1)
-EDGE_SHARE, EDGE_PX = 0.01, 9  # the strongest gradients, and the window that has the whole of an edge
+# the strongest gradients, and the window that has the whole of an edge
+EDGE_SHARE = 0.01
+EDGE_PX = 9
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,13 +199,18 @@ def noise_dn(picture: Image) -> tuple[float, Array]:
     kept = patches[(patches.min(1) > DARK_DN) & (patches.max(1) < BURNT_DN - DARK_DN)]
     steps = _patch_differences()
     strength = ((kept @ steps.T) ** 2).sum(1)
-    sigma, most, flat_dn = 0.0, np.inf, np.zeros(0)
+    sigma = 0.0
+    most = np.inf
+    flat_dn = np.zeros(0)
     for _ in range(NOISE_ROUNDS):
-        kept, strength = kept[strength <= most], strength[strength <= most]
+        kept = kept[strength <= most]
+        strength = strength[strength <= most]
         if len(kept) < FEWEST_PATCHES:
             break
         variance = _smallest_variance(kept) / _smallest_of_noise(int(np.log2(len(kept))))
-        sigma, most, flat_dn = variance**0.5, variance * _noise_strength(), np.quantile(kept.mean(1), FLAT_SHARES)
+        sigma = variance**0.5
+        most = variance * _noise_strength()
+        flat_dn = np.quantile(kept.mean(1), FLAT_SHARES)
     return sigma, flat_dn
 
 
@@ -227,14 +243,16 @@ def _patch_differences() -> NDArray[np.float32]:
 def _noise_strength() -> float:
     """The sum of squared differences in a patch of noise of variance 1 that one in a thousand exceeds (a gamma's)."""
     of_noise = _patch_differences().T @ _patch_differences()
-    mean, variance = float(np.trace(of_noise)), 2 * float(np.sum(of_noise**2))
+    mean = float(np.trace(of_noise))
+    variance = 2 * float(np.sum(of_noise**2))
     return float(scipy.stats.gamma.ppf(0.999, mean**2 / variance, scale=variance / mean))
 
 
 def edge_px(picture: Image, gradient: Array) -> float:
     """How many pixels the sharpest edges take from dark to bright: height over steepness, lower quartile."""
     kernel = np.ones((EDGE_PX, EDGE_PX), np.uint8)
-    bright, dark = cv2.dilate(picture, kernel), cv2.erode(picture, kernel)
+    bright = cv2.dilate(picture, kernel)
+    dark = cv2.erode(picture, kernel)
     usable = (bright < BURNT_DN) & (dark > DARK_DN)
     if not usable.any():
         return 0.0
@@ -247,7 +265,8 @@ def spectrum(pictures: Sequence[Image]) -> tuple[float, Array]:
     hann = np.outer(*[np.hanning(TILE_PX)] * 2)
     frequency = np.fft.fftfreq(TILE_PX, 1 / TILE_PX)
     ring = np.rint(np.hypot(frequency[:, None], frequency[None])).astype(int).ravel()
-    total, tiles = np.zeros(TILE_PX * TILE_PX), 0
+    total = np.zeros(TILE_PX * TILE_PX)
+    tiles = 0
     for picture in pictures:
         for tile in _tiles(picture):
             total += np.abs(np.fft.fft2((tile - tile.mean()) * hann)).ravel() ** 2
@@ -270,7 +289,9 @@ def _tiles(picture: Image) -> Iterator[Array]:
 
 def _tracking(pictures: Sequence[Image]) -> tuple[float, float, Array]:
     """Share of corners that come home from the next picture, median flow in px, and the share alive by picture."""
-    home, flows, alive = [], [], [1.0]
+    home = []
+    flows = []
+    alive = [1.0]
     living = corners(pictures[0])
     first = max(len(living), 1)
     for picture, later in pairwise(pictures):
@@ -328,7 +349,9 @@ def _true_pose(t_ns: int, recording: Recording) -> Array | None:
     return pose
 
 
-NO_TURN_DEG, UNLIKE_GAIN = 0.002, 0.05  # what nobody needs to be told
+# what nobody needs to be told
+NO_TURN_DEG = 0.002
+UNLIKE_GAIN = 0.05
 NO_OFFSET_PX = 0.05
 
 
@@ -344,7 +367,8 @@ def says(found: Realism) -> list[str]:
 
 
 def _offset_sentence(pair: StereoFit) -> str:
-    offset_px, yaw_deg = pair.offset_px, pair.yaw_deg
+    offset_px = pair.offset_px
+    yaw_deg = pair.yaw_deg
     if offset_px is None or yaw_deg is None:
         return "The offset of disparity cannot be told: it takes motion, and points near and far."
     if not offset_px.is_plain or abs(offset_px.value) < NO_OFFSET_PX:

@@ -48,7 +48,9 @@ class SceneSurvey:
 def survey(scene: Scene) -> SceneSurvey:
     """Look a scene over; no light is computed."""
     faces = triangles(scene, t_ns=0)
-    caster, corners, point = RayCaster(faces), faces.corners_m.reshape(-1, 3), _points(faces)
+    caster = RayCaster(faces)
+    corners = faces.corners_m.reshape(-1, 3)
+    point = _points(faces)
     free = free_circle(faces, caster)
     middle_m = (corners.min(0) + corners.max(0)) / 2
     eye_m = [free.x_m, free.y_m, free.floor_m + EYE_M] if free else middle_m.tolist()
@@ -113,8 +115,10 @@ def _view(renderer: Renderer, free: Free, yaw_deg: float, white_cd_m2: float) ->
 
 def _plan(scene: Scene, found: SceneSurvey) -> Rgb8:
     """What is seen from above below a height at which rooms are open; the free circle drawn in."""
-    faces, (width, height) = triangles(scene, t_ns=0), CELL_PX
-    low, high = np.array(found.low_m[:2]), np.array(found.high_m[:2])
+    faces = triangles(scene, t_ns=0)
+    (width, height) = CELL_PX
+    low = np.array(found.low_m[:2])
+    high = np.array(found.high_m[:2])
     scale = min(width, height) / max((high - low).max(), 1e-6) * 0.96
     middle = (low + high) / 2
     px = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1).reshape(-1, 2) + 0.5

@@ -73,8 +73,12 @@ class _Search:
     """The smallest case so far, and what was tried."""
 
     def __init__(self, case: Case, whole: Window, fails: Callable[[Case], bool], trials: int) -> None:
-        self._original, self._whole, self._fails, self._left = case, whole, fails, trials
-        self.window, self.removed = whole, list[str]()
+        self._original = case
+        self._whole = whole
+        self._fails = fails
+        self._left = trials
+        self.window = whole
+        self.removed = list[str]()
         self.tried = list[tuple[str, bool]]()
 
     @property
@@ -120,7 +124,8 @@ class _Search:
         said = f"frames {window[0]} to {window[1] - 1}" + (f" without {', '.join(removed)}" if removed else "")
         self.tried.append((said, failed))
         if failed:
-            self.window, self.removed = window, [*removed]
+            self.window = window
+            self.removed = [*removed]
         return failed
 
     def _made(self, window: Window, removed: Sequence[str]) -> Case:

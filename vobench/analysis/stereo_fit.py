@@ -21,18 +21,30 @@ from vobench.sequence.picture import Image
 MAD = 1.4826  # to a normal distribution's standard deviation
 ROWS_APART_PX = 8.0  # beyond it a match is wrong
 WINDOW_PX = 9  # small finds more; what it finds is refined with a larger one
-REFINED_PX, REFINE_STEPS, SETTLED_PX, STRAYED_PX = 21, 5, 0.05, 1.5
-SLANT, AFFINE = 2, 4  # terms of how a patch's neighbourhood moves: disparity along x and y, or all
+REFINED_PX = 21
+REFINE_STEPS = 5
+SETTLED_PX = 0.05
+STRAYED_PX = 1.5
+# terms of how a patch's neighbourhood moves: disparity along x and y, or all
+SLANT = 2
+AFFINE = 4
 DITHER = np.array([0.7548777, 0.5698403])  # of Roberts' R2 sequence: points evenly all over a pixel
-CORNERS_PER_CELL, CORNER_DISTANCE_PX, MARGIN_PX = 30, 8.0, 12
+CORNERS_PER_CELL = 30
+CORNER_DISTANCE_PX = 8.0
+MARGIN_PX = 12
 FEWEST = 50  # matches, for a fit of five numbers
 FIT_STEPS = 20
 CORRELATED = 8.0  # matches near each other err alike: so many count as one
 APART = 5  # pictures between the two views of a motion
-TRUTH_M, TRUTH_SHARE, TRUTH_RAD = 3e-4, 2e-3, 5e-4  # how well a true motion is known, of laser trackers and of cars
+# how well a true motion is known, of laser trackers and of cars
+TRUTH_M = 3e-4
+TRUTH_SHARE = 2e-3
+TRUTH_RAD = 5e-4
 MOST_YAW_DEG = 0.3  # rows that say more are of a lens
-FEWEST_FOLLOWED, LEAST_FLOW_PX = 40, 2.0
-OFFSET_STEPS, DEPTH_STEPS = 6, 2
+FEWEST_FOLLOWED = 40
+LEAST_FLOW_PX = 2.0
+OFFSET_STEPS = 6
+DEPTH_STEPS = 2
 MEDIAN_OF_TWO = 1.1774  # of the length of two normal numbers
 DISPARITY_QUANTILES = (0.1, 0.5, 0.9)
 
@@ -111,7 +123,8 @@ def fit_pair(windows: Sequence[Sequence[PairShot]], pair: StereoPair) -> StereoF
         return None
     rows, sigma, noise_px = _robust_fit(_row_terms(matches.place), matches.row_px)
     usual = [_usual_rows(shot.left, shot.right, pair) for window in windows for shot in window[::3]]
-    fx, fy = float(pair.K[0, 0]), float(pair.K[1, 1])
+    fx = float(pair.K[0, 0])
+    fy = float(pair.K[1, 1])
     of_motion = _offset(matched, pair, np.array([-rows[1], rows[0]]) / fy)
     xy_px = Uncertain(float(rows[3]), float(sigma[3]))
     yaw_deg, yaw_from = _yaw(_degrees(-xy_px.value, xy_px.sigma, fy), of_motion and _degrees(*of_motion, fx))
@@ -208,7 +221,8 @@ def refined(image: Image, later: Image, points: Points, guess: Points, *, shape:
     half = REFINED_PX // 2
     grid = np.stack(np.meshgrid(*[np.arange(-half, half + 1.0)] * 2), -1).reshape(-1, 2).astype(np.float32)
     weight = np.exp(-((grid / half) ** 2).sum(1))
-    then, now = image.astype(np.float32), later.astype(np.float32)
+    then = image.astype(np.float32)
+    now = later.astype(np.float32)
     patch = _sampled(then, points[:, None] + grid)
     slopes = [_sampled(each, points[:, None] + grid) for each in np.gradient(then)[::-1]]
     terms = [*slopes, *(slope * along for slope in slopes for along in (grid / half).T)][: 2 + shape]
@@ -217,7 +231,9 @@ def refined(image: Image, later: Image, points: Points, guess: Points, *, shape:
     hessian = weighted @ jacobian
     hessian += 1e-6 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.eye(hessian.shape[1])
     solve = np.linalg.solve(hessian, weighted).astype(np.float32)
-    there, turn, step = guess.astype(float), np.tile(np.eye(2), (len(points), 1, 1)), np.zeros((len(points), 2))
+    there = guess.astype(float)
+    turn = np.tile(np.eye(2), (len(points), 1, 1))
+    step = np.zeros((len(points), 2))
     for _ in range(REFINE_STEPS):
         seen = _sampled(now, there[:, None] + grid @ np.swapaxes(turn, 1, 2))
         change = (solve @ (seen - patch)[..., None])[..., 0]
@@ -225,7 +241,8 @@ def refined(image: Image, later: Image, points: Points, guess: Points, *, shape:
         by_grid[:, :shape] = change[:, 2 : 2 + shape] / half
         undone = np.linalg.inv(np.eye(2) + by_grid.reshape(-1, 2, 2))
         step = (turn @ undone @ change[:, :2, None])[..., 0]
-        there, turn = there - step, turn @ undone
+        there = there - step
+        turn = turn @ undone
     settled = (np.linalg.norm(step, axis=1) < SETTLED_PX) & (np.linalg.norm(there - guess, axis=1) < STRAYED_PX)
     return there.astype(np.float32), settled
 
@@ -315,15 +332,18 @@ def _offset(windows: Sequence[Sequence[Matched]], pair: StereoPair, turns_rad: A
     followed = [found for run in runs if (found := _follow(run, pair))]
     if not followed:
         return None
-    shared, motions = np.zeros(len(SHARED)), [each.T_after_before for each in followed]
-    changed, held = [np.zeros(6) for _ in followed], np.diag(SHARED**-2)
+    shared = np.zeros(len(SHARED))
+    motions = [each.T_after_before for each in followed]
+    changed = [np.zeros(6) for _ in followed]
+    held = np.diag(SHARED**-2)
     information = held
     for _ in range(OFFSET_STEPS):
         parts = [
             _normal_equations(each, T, moved=moved, shared=shared, pair=pair, turns_rad=turns_rad)
             for each, T, moved in zip(followed, motions, changed, strict=True)
         ]
-        information, rest = held.copy(), -held @ shared
+        information = held.copy()
+        rest = -held @ shared
         for A, b in parts:
             by_motion = np.linalg.solve(A[:6, :6], np.c_[A[:6, 6:], b[:6]])
             information += A[6:, 6:] - A[6:, :6] @ by_motion[:, :-1]
@@ -349,7 +369,8 @@ def _normal_equations(
         return _seen(followed, T, shared, rho, pair=pair, turns_rad=turns_rad)
 
     measured = np.c_[followed.disparity_px, followed.after_px]
-    rho, step = followed.disparity_px / pair.focal_baseline, 1e-3 / pair.focal_baseline
+    rho = followed.disparity_px / pair.focal_baseline
+    step = 1e-3 / pair.focal_baseline
     for _ in range(DEPTH_STEPS):
         expected = seen(T, shared, rho)
         by_rho = (seen(T, shared, rho + step) - expected) / step
@@ -384,7 +405,8 @@ def _seen(followed: Followed, T: Array, shared: Array, rho: Array, *, pair: Ster
     K[:2, :2] *= 1 + focal
     K[:2, 2] += centre_px
     rays = np.c_[followed.before_px, np.ones(len(rho))] @ np.linalg.inv(K).T
-    x, y = rays[:, 0] - followed.disparity_px / K[0, 0], rays[:, 1]
+    x = rays[:, 0] - followed.disparity_px / K[0, 0]
+    y = rays[:, 1]
     roll, pitch = turns_rad
     excess_px = offset_px * (1 + x * x) - K[0, 0] * (roll * y + pitch * x * y)
     there = rays @ T[:3, :3].T + rho[:, None] * T[:3, 3]
@@ -395,25 +417,34 @@ def _seen(followed: Followed, T: Array, shared: Array, rho: Array, *, pair: Ster
 def _follow(shots: Sequence[Matched], pair: StereoPair) -> Followed | None:
     """The points of the first of successive shots in the last that keeps enough of them; None where none does."""
     first = last = shots[0].shot
-    start, disparity_px = shots[0].left_px, shots[0].disparity_px
+    start = shots[0].left_px
+    disparity_px = shots[0].disparity_px
     there = start
     for now in (later.shot for later in shots[1:]):
         moved, found = follow(*comparable(last.left, now.left), there, window_px=WINDOW_PX)
         found &= inside(moved, now.left, MARGIN_PX) & pair.seen(moved)
         if found.sum() < FEWEST_FOLLOWED:
             break
-        start, there, disparity_px, last = start[found], moved[found], disparity_px[found], now
+        start = start[found]
+        there = moved[found]
+        disparity_px = disparity_px[found]
+        last = now
     if last is first:
         return None
     there, settled = refined(first.left, last.left, start, there, shape=AFFINE)
-    start, there, disparity_px = start[settled], there[settled], disparity_px[settled]
+    start = start[settled]
+    there = there[settled]
+    disparity_px = disparity_px[settled]
     if settled.sum() < FEWEST_FOLLOWED:
         return None
-    before_px, after_px = pair.left.in_view(start), pair.left.in_view(there)
+    before_px = pair.left.in_view(start)
+    after_px = pair.left.in_view(there)
     fit = pose_from_points(pair.points(start, disparity_px), after_px, pair.K, ransac_px=3.0)
     if fit is None or float(np.median(np.linalg.norm(after_px - before_px, axis=1))) < LEAST_FLOW_PX:
         return None
-    kept, T, information = fit.inlier, fit.T_now_last, np.zeros((6, 6))
+    kept = fit.inlier
+    T = fit.T_now_last
+    information = np.zeros((6, 6))
     if first.T_world_left is not None and last.T_world_left is not None:
         turn = pair.T_view_left
         T = turn @ se3.inverse(last.T_world_left) @ first.T_world_left @ se3.inverse(turn)

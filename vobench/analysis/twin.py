@@ -39,7 +39,8 @@ def cell_disparities(fit: StereoFit, pair: StereoPair) -> Array:
     matches: Matches = fit.matches
     offset_px = fit.offset_px.value if fit.offset_px and fit.offset_px.is_plain else 0.0
     uv = np.c_[matches.place, np.ones(len(matches.place))] @ pair.K.T
-    column, row = _cell(uv[:, 0] + matches.disparity_px, pair, 0), _cell(uv[:, 1], pair, 1)
+    column = _cell(uv[:, 0] + matches.disparity_px, pair, 0)
+    row = _cell(uv[:, 1], pair, 1)
     cells = np.full((int(matches.window.max()) + 1, CELLS, CELLS), np.nan)
     for window, r, c in np.ndindex(cells.shape):
         inside = (matches.window == window) & (row == r) & (column == c)
@@ -85,9 +86,15 @@ class Placement:
 SCALES = (1.0, 0.7, 1.4, 0.5, 2.0, 0.35, 2.8, 4.0, 5.6)
 HEIGHTS_M = (0.3, 0.5, 0.8, 1.2, 1.65, 2.2)
 CLEAR_M = 0.3
-WAYPOINTS, RAYS = 40, 7
-DRAWS, NEAR_DRAWS = 6000, 1500  # anywhere, and then ever nearer to the best so far
-NEAR_M, NEAR_RAD, NEAREST = 1.0, 0.3, 0.05  # how near at first, and in the end the share of that
+WAYPOINTS = 40
+RAYS = 7
+# anywhere, and then ever nearer to the best so far
+DRAWS = 6000
+NEAR_DRAWS = 1500
+# how near at first, and in the end the share of that
+NEAR_M = 1.0
+NEAR_RAD = 0.3
+NEAREST = 0.05
 UNSCALED = 0.05  # how much misfit a place of its own size is worth, per factor e
 
 
@@ -98,12 +105,16 @@ def place_path(scene: Scene, T_world_left: Array, pair: StereoPair, wanted_px: A
     Raises InputError where no way was found that is free.
     """
     faces = triangles(scene, t_ns=0)
-    caster, facing = RayCaster(faces), faces.plane
+    caster = RayCaster(faces)
+    facing = faces.plane
     corners = faces.corners_m.reshape(-1, 3)
-    low, high = np.quantile(corners, 0.01, axis=0), np.quantile(corners, 0.99, axis=0)
+    low = np.quantile(corners, 0.01, axis=0)
+    high = np.quantile(corners, 0.99, axis=0)
     path = _thinned(T_world_left, WAYPOINTS)
     start = path[0, :3, 3]
-    rng, best, tried = np.random.default_rng(seed), None, 0
+    rng = np.random.default_rng(seed)
+    best = None
+    tried = 0
     for nth in range(DRAWS + NEAR_DRAWS):
         drawn = _anywhere(low, high, rng) if nth < DRAWS or best is None else _near(best[1], nth - DRAWS, rng)
         scale, height_m, heading, xy = drawn
@@ -180,7 +191,8 @@ def _is_free(caster: RayCaster, facing: Array, way_m: Array, clear_m: float) -> 
         return False
     around = np.array([w for w in product((-1, 0, 1), repeat=3) if any(w)], float)
     around /= np.linalg.norm(around, axis=1, keepdims=True)
-    origins, ways = np.repeat(way_m, len(around), axis=0), np.tile(around, (len(way_m), 1))
+    origins = np.repeat(way_m, len(around), axis=0)
+    ways = np.tile(around, (len(way_m), 1))
     hits = caster.hits(origins, ways)
     met = hits.face >= 0
     if np.any(met & (hits.distance < clear_m)):
@@ -231,10 +243,15 @@ def look_of(pictures: Sequence[Image]) -> Look:
 
 
 Develop = Callable[[CameraSettings], list[Image]]  # the pictures that a camera takes of what is there
-WELL_E, READ_E = 20_000.0, 25.0
-GAINS, GAMMAS, BLURS_PX, NOISES = (0.02, 60.0), (0.2, 1.2), (0.0, 3.0), (0.03, 30.0)
+WELL_E = 20_000.0
+READ_E = 25.0
+GAINS = (0.02, 60.0)
+GAMMAS = (0.2, 1.2)
+BLURS_PX = (0.0, 3.0)
+NOISES = (0.03, 30.0)
 ROUNDING = 1 / 12  # variance of a grey value that is rounded
-ROUNDS, HALVINGS = 3, 7
+ROUNDS = 3
+HALVINGS = 7
 
 
 def camera_of(gain: float, gamma: float, blur_px: float, noise: float) -> CameraSettings:
@@ -250,7 +267,10 @@ def camera_of(gain: float, gamma: float, blur_px: float, noise: float) -> Camera
 
 def fit_camera(wanted: Look, develop: Develop) -> tuple[CameraSettings, Look]:
     """The camera whose pictures look as wanted, as near as it can, and how they look."""
-    gain, gamma, blur_px, noise = 1.0, 0.45, 0.0, 0.05
+    gain = 1.0
+    gamma = 0.45
+    blur_px = 0.0
+    noise = 0.05
     for _ in range(ROUNDS):
         gamma = _contrast(blur_px, noise, wanted, develop)
         gain = _exposed(gamma, blur_px, noise, wanted, develop)[0]
@@ -307,7 +327,9 @@ def _solve(of: Callable[[float], float], wanted: float, ends: tuple[float, float
 # --- How far both agree ---
 
 SHARES = np.arange(1, 9) / 12  # of the path, the lengths of segments
-BLOCKS, DRAWN, COVERED = 10, 1000, 0.95
+BLOCKS = 10
+DRAWN = 1000
+COVERED = 0.95
 LOST = 100.0  # percent: what a segment counts that an estimator has not
 
 
@@ -323,14 +345,16 @@ def segment_errors(gt: Trajectory, est: Trajectory, *, scaled: bool = False) -> 
     if scaled and there.sum() > 2:
         fit = align(T_est[there], gt.T_world_frame[there], kind="sim3")
         T_est[:, :3, 3] *= fit.scale
-    distance_m, errors = gt.distances_m(), np.full((len(SHARES), len(gt)), np.nan)
+    distance_m = gt.distances_m()
+    errors = np.full((len(SHARES), len(gt)), np.nan)
     for row, length_m in enumerate(SHARES * distance_m[-1]):
         ends = np.searchsorted(distance_m, distance_m + length_m)
         starts = np.flatnonzero(ends < len(gt))
         ends = ends[starts]
         errors[row, starts] = LOST
         known = there[starts] & there[ends]
-        starts, ends = starts[known], ends[known]
+        starts = starts[known]
+        ends = ends[known]
         true = se3.inverse(gt.T_world_frame[starts]) @ gt.T_world_frame[ends]
         apart = se3.inverse(true) @ se3.inverse(T_est[starts]) @ T_est[ends]
         lengths_m = distance_m[ends] - distance_m[starts]

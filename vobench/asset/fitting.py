@@ -26,14 +26,16 @@ from vobench.asset.shape import at, block, card, lathe, sheet, spline, tube
 from vobench.scene.material import Material
 from vobench.scene.mesh import Mesh, joined
 
-MIRROR, PANE = Material("mirror", tint=0.85), Material("pane", eta=1.5)
+MIRROR = Material("mirror", tint=0.85)
+PANE = Material("pane", eta=1.5)
 
 
 def bars(width_m: float, height_m: float, thick_m: float, deep_m: float, *, bevel_m: float = 0.003) -> Mesh:
     """Four bars around a rectangle around the origin."""
     upright = block((deep_m, thick_m, height_m + 2 * thick_m), bevel_m=bevel_m)
     level = block((deep_m, width_m, thick_m), bevel_m=bevel_m)
-    y, z = (width_m + thick_m) / 2, (height_m + thick_m) / 2
+    y = (width_m + thick_m) / 2
+    z = (height_m + thick_m) / 2
     return joined([*(upright.moved(at(0, s * y)) for s in (-1, 1)), *(level.moved(at(0, 0, s * z)) for s in (-1, 1))])
 
 
@@ -41,7 +43,8 @@ def door(
     rng: Rng, width_m: float = 0.92, height_m: float = 2.05, label: str = "2.14", tones: str = "beech"
 ) -> list[Part]:
     """A leaf in its frame, with a handle, hinges and a plate."""
-    jamb, lintel = block((0.07, 0.07, height_m), bevel_m=0.006), block((0.07, width_m + 0.14, 0.07), bevel_m=0.006)
+    jamb = block((0.07, 0.07, height_m), bevel_m=0.006)
+    lintel = block((0.07, width_m + 0.14, 0.07), bevel_m=0.006)
     jambs = [jamb.moved(at(0, s * (width_m / 2 + 0.035), height_m / 2)) for s in (-1, 1)]
     frame = joined([*jambs, lintel.moved(at(0, 0, height_m + 0.035))])
     grip = tube(spline(mm("0 0 0, 40 0 0, 58 -35 0, 56 -130 0"), 12), 0.009)
@@ -57,8 +60,11 @@ def door(
 
 def window_frame(_: Rng, width_m: float = 1.8, height_m: float = 1.5, depth_m: float = 0.15) -> list[Part]:
     """Frame, mullion, transom and handle in a hole around the origin, depth_m before its pane, and a sill."""
-    x, w, h = 0.035 - depth_m, width_m, height_m
-    mullion, transom = block((0.06, 0.06, h - 0.12)), block((0.056, w - 0.12, 0.05)).moved(at(0, 0, 0.21 * h))
+    x = 0.035 - depth_m
+    w = width_m
+    h = height_m
+    mullion = block((0.06, 0.06, h - 0.12))
+    transom = block((0.056, w - 0.12, 0.05)).moved(at(0, 0, 0.21 * h))
     frame = joined([bars(w - 0.12, h - 0.12, 0.06, 0.06, bevel_m=0.006), mullion, transom])
     sill = stood((depth_m + 0.04, w + 0.1, 0.03), WHITE, 0.06 - depth_m / 2, 0, -h / 2 - 0.028, bevel=0.008)
     return [put(frame, WHITE, x), put(block((0.02, 0.03, 0.12), bevel_m=0.006), STEEL, x + 0.04, 0.01, -0.1), sill]
@@ -66,7 +72,8 @@ def window_frame(_: Rng, width_m: float = 1.8, height_m: float = 1.5, depth_m: f
 
 def blind(rng: Rng, width_m: float = 1.8, drop_m: float = 0.7, slat_deg: float = 40.0) -> list[Part]:
     """Slats that hang drop_m from a rail, and their cords."""
-    slat, levels = block((0.05, width_m - 0.02, 0.0025), bevel_m=0), 0.05 + 0.042 * np.arange(int(drop_m / 0.042))
+    slat = block((0.05, width_m - 0.02, 0.0025), bevel_m=0)
+    levels = 0.05 + 0.042 * np.arange(int(drop_m / 0.042))
     slats = [slat.moved(at(0, 0, -z, pitch=slat_deg + rng.normal(0, 1.5))) for z in levels]
     cords = [tube([[0, s * width_m, -0.03], [0, s * width_m, -levels[-1]]], 0.0012, sections=4) for s in (-0.35, 0.35)]
     rail = stood((0.06, width_m, 0.04), WHITE, 0, 0, -0.03)
@@ -84,7 +91,8 @@ def curtain(rng: Rng, width_m: float = 0.5, height_m: float = 1.9, colour: str =
 
 def radiator(_: Rng, width_m: float = 1.4, height_m: float = 0.55) -> list[Part]:
     """Columns between two headers, a valve and a pipe into the floor."""
-    w, ys = width_m / 2, np.arange(-width_m / 2 + 0.025, width_m / 2, 0.05)
+    w = width_m / 2
+    ys = np.arange(-width_m / 2 + 0.025, width_m / 2, 0.05)
     columns = [tube([[x, y, 0.14], [x, y, 0.1 + height_m]], 0.013) for y in ys for x in (0.05, 0.1)]
     heads = [tube([[0.075, -w, z], [0.075, w, z]], 0.027, sections=12) for z in (0.14, 0.1 + height_m)]
     pipe = tube(spline(mm("75 0 140, 75 60 140, 75 90 110, 75 90 0"), 12), 0.01)
@@ -94,7 +102,8 @@ def radiator(_: Rng, width_m: float = 1.4, height_m: float = 0.55) -> list[Part]
 
 def socket(_: Rng, count: int = 2) -> list[Part]:
     """Outlets in a plate."""
-    well, pin = lathe(mm("0 0, 21 0, 21 2, 0 2"), sections=20), lathe(mm("0 0, 3 0, 0 2"), sections=8)
+    well = lathe(mm("0 0, 21 0, 21 2, 0 2"), sections=20)
+    pin = lathe(mm("0 0, 3 0, 0 2"), sections=8)
     ys = 0.072 * (np.arange(count) - (count - 1) / 2)
     plate = put(block((0.012, 0.072 * count + 0.012, 0.082), bevel_m=0.004), WHITE, 0.006)
     wells = [put(well, GREY, 0.0115, y, pitch=90) for y in ys]
@@ -119,10 +128,15 @@ def framed(
 def noticeboard(rng: Rng, width_m: float = 1.2, height_m: float = 0.9) -> list[Part]:
     """Cork with sheets pinned to it."""
     cork = matt(texture=picture.ground("cork", tile_m=1.0))
-    sheets, pins, pin = [], [], lathe(mm("0 0, 5 0, 5 8, 0 9"), sections=8)
+    sheets = []
+    pins = []
+    pin = lathe(mm("0 0, 5 0, 5 8, 0 9"), sections=8)
     for k in range(int(width_m * height_m * 9)):
-        (y, z), scale = rng.uniform(-0.5, 0.5, 2) * [width_m - 0.3, height_m - 0.36], rng.choice([0.5, 0.7, 1.0])
-        c, r, x = k % 3, k // 3 % 2, 0.0165 + 0.0006 * k
+        (y, z) = rng.uniform(-0.5, 0.5, 2) * [width_m - 0.3, height_m - 0.36]
+        scale = rng.choice([0.5, 0.7, 1.0])
+        c = k % 3
+        r = k // 3 % 2
+        x = 0.0165 + 0.0006 * k
         page = card((0.21 * scale, 0.297 * scale), cell=(c / 3, (c + 1) / 3, r / 2, (r + 1) / 2))
         sheets.append(page.moved(at(x, y, z, roll=rng.normal(0, 5))))
         pins.append(pin.moved(at(x, y, z + 0.13 * scale, pitch=90)))

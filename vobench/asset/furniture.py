@@ -81,7 +81,9 @@ def desk(
     rng: Rng, width_m: float = 1.6, depth_m: float = 0.8, height_m: float = 0.74, tones: str = "oak"
 ) -> list[Part]:
     """A table top on two steel legs, with a pedestal of three drawers and a cable tray."""
-    w, d, h = width_m / 2 - 0.12, depth_m, height_m
+    w = width_m / 2 - 0.12
+    d = depth_m
+    h = height_m
     parts = [stood((d, width_m, 0.026), wood(tones), 0, 0, h - 0.026, bevel=0.004, u=rng.uniform(0, 2))]
     for y in (-w, w):
         parts += [stood((d - 0.08, 0.06, 0.03), BLACK, 0, y), stood((0.06, 0.08, h - 0.08), BLACK, 0, y, 0.03)]
@@ -120,11 +122,14 @@ def chair(rng: Rng, colour: str = NAVY) -> list[Part]:
 
 def _book(spines: Spines, k: int, depth_m: float) -> Mesh:
     """A closed book, its spine towards x: spine and covers from its cell of the picture, pages from the last row."""
-    (u0, u1, v0, v1), (thick, high) = spines.cells[k], spines.sizes_m[k]
+    (u0, u1, v0, v1) = spines.cells[k]
+    (thick, high) = spines.sizes_m[k]
     mesh = block((depth_m, thick, high), bevel_m=0).moved(at(0, 0, high / 2))
-    share, n = mesh.vertices_m / [1, thick, high], mesh.normals
+    share = mesh.vertices_m / [1, thick, high]
+    n = mesh.normals
     spine = np.stack([u0 + (share[:, 1] + 0.5) * (u1 - u0), v1 - share[:, 2] * (v1 - v0)], axis=-1)
-    cover, paper = [(u0 + u1) / 2, v0 + 0.993 * (v1 - v0)], [(u0 + u1) / 2, 0.997]
+    cover = [(u0 + u1) / 2, v0 + 0.993 * (v1 - v0)]
+    paper = [(u0 + u1) / 2, 0.997]
     uv = np.where(n[:, :1] > 0.5, spine, np.where(np.abs(n[:, 1:2]) > 0.5, cover, paper))
     return replace(mesh, uv=uv)
 
@@ -132,7 +137,10 @@ def _book(spines: Spines, k: int, depth_m: float) -> Mesh:
 def _books(rng: Rng, spines: Spines, width_m: float, height_m: float) -> Mesh:
     """A row of books between ±width_m / 2, in runs of neighbours, some leaning, and a pile in what is left."""
     fits = [k for k, (_, high) in enumerate(spines.sizes_m) if high < height_m - 0.01]
-    y, end, meshes, k = -width_m / 2, width_m / 2 - rng.choice([0.0, 0.05, 0.3]), [], int(rng.integers(len(fits)))
+    y = -width_m / 2
+    end = width_m / 2 - rng.choice([0.0, 0.05, 0.3])
+    meshes = []
+    k = int(rng.integers(len(fits)))
     while True:
         k = int(rng.integers(len(fits))) if rng.random() < 0.12 else (k + 1) % len(fits)
         thick, high = spines.sizes_m[fits[k]]
@@ -150,7 +158,8 @@ def _books(rng: Rng, spines: Spines, width_m: float, height_m: float) -> Mesh:
 
 
 def _pile(rng: Rng, spines: Spines, count: int) -> Mesh:
-    z, meshes = 0.0, []
+    z = 0.0
+    meshes = []
     for k in rng.choice([k for k, size in enumerate(spines.sizes_m) if size[1] < 0.3], count, replace=False):
         thick, high = spines.sizes_m[k]
         flat = _book(spines, int(k), 0.7 * high).moved(at(0, high / 2, thick / 2, roll=90))
@@ -169,12 +178,18 @@ def shelf(
     rng: Rng, width_m: float = 1.0, depth_m: float = 0.3, height_m: float = 2.0, *, tones: str = "walnut", seed: int = 0
 ) -> list[Part]:
     """An open bookcase of bays at most 1.1 m wide with books, binders and boxes."""
-    board, rows, bays = wood(tones), max(2, round(height_m / 0.37)), int(np.ceil(width_m / 1.1))
-    wide, pitch, half = (width_m - 0.022) / bays, (height_m - 0.1) / rows, (width_m - 0.022) / 2
+    board = wood(tones)
+    rows = max(2, round(height_m / 0.37))
+    bays = int(np.ceil(width_m / 1.1))
+    wide = (width_m - 0.022) / bays
+    pitch = (height_m - 0.1) / rows
+    half = (width_m - 0.022) / 2
     sides = [stood((depth_m, 0.022, height_m), board, 0, b * wide - half, u=b, bevel=0.002) for b in range(bays + 1)]
     back = stood((0.008, width_m - 0.03, height_m - 0.04), board, 0.005 - depth_m / 2, 0, 0.02, bevel=0)
     top = stood((depth_m, width_m, 0.024), board, 0.002, 0, height_m - 0.02, bevel=0.002)
-    parts, spines, books = [*sides, back, top], picture.spines(seed), []
+    parts = [*sides, back, top]
+    spines = picture.spines(seed)
+    books = []
     for y, z in ((b * wide + wide / 2 - half, 0.06 + r * pitch) for b in range(bays) for r in range(rows)):
         plank = (depth_m - 0.012, wide - 0.022, 0.02)
         parts.append(stood(plank, board, 0, y, z - 0.02, bevel=0.002, u=rng.uniform(0, 2)))
@@ -203,7 +218,9 @@ def papers(rng: Rng, count: int = 4, spread_m: float = 0.07, seed: int = 0) -> l
 
 def monitor(rng: Rng, width_m: float = 0.6, seed: int = 0) -> list[Part]:
     """A display on a foot, switched on, tilted a little."""
-    h, tilt, shines = width_m * 0.58, rng.uniform(-4, 0), picture.screen(seed)
+    h = width_m * 0.58
+    tilt = rng.uniform(-4, 0)
+    shines = picture.screen(seed)
     glow = replace(BLACK, roughness=0.12, emission_cd_m2=(176.0, 180.0, 188.0), emission_texture=shines)
     z = 0.066 + h / 2
     foot = lathe(mm(f"0 0, 115 0, 115 6, 30 12, 18 20, 18 {1000 * z}, 0 {1000 * z}"), sections=32)
@@ -217,7 +234,8 @@ def monitor(rng: Rng, width_m: float = 0.6, seed: int = 0) -> list[Part]:
 
 def keyboard(_: Rng) -> list[Part]:
     """Five rows of keys, the digits apart from the letters, on a board."""
-    key, space = block((0.016, 0.016, 0.008), bevel_m=0), block((0.016, 0.111, 0.008), bevel_m=0)
+    key = block((0.016, 0.016, 0.008), bevel_m=0)
+    space = block((0.016, 0.111, 0.008), bevel_m=0)
     places = [(r, c) for r in range(5) for c in range(23) if c not in (14, 18) and not (r == 4 and 3 <= c <= 8)]
     keys = [key.moved(at(0.038 - 0.019 * r, 0.019 * c - 0.209, 0.014)) for r, c in places]
     keys.append(space.moved(at(-0.038, -0.1045, 0.014)))
@@ -232,7 +250,8 @@ def mouse(rng: Rng) -> list[Part]:
 
 def mug(rng: Rng) -> list[Part]:
     """A glazed mug with a handle and coffee."""
-    glaze, turn = coated(some(rng, BRICK, PAPER, TEAL, OCHRE, NAVY), roughness=0.08), rng.uniform(0, 360)
+    glaze = coated(some(rng, BRICK, PAPER, TEAL, OCHRE, NAVY), roughness=0.08)
+    turn = rng.uniform(0, 360)
     body = lathe(mm("0 0, 34 0, 40 8, 41 94, 38 96, 36 90, 35 12, 0 10"), sections=32)
     grip = tube(spline(mm("38 0 22, 68 0 26, 68 0 72, 39 0 78"), 12), 0.006)
     coffee = lathe(mm("0 60, 35.9 70, 0 70.1"))
@@ -270,11 +289,14 @@ def cables(rng: Rng, length_m: float = 1.2, height_m: float = 0.7) -> list[Part]
 
 def plant(rng: Rng, height_m: float = 1.2, leaves: int = 26) -> list[Part]:
     """Broad leaves on stems in a pot of clay."""
-    h, stems, blades = 0.28 * height_m, [], []
+    h = 0.28 * height_m
+    stems = []
+    blades = []
     pot = mm("0 0, 360 0, 480 920, 520 930, 520 1000, 460 1000, 440 850, 0 860") * h
     t = np.linspace(0, 1, 8)[:, None]
     for _ in range(leaves):
-        way, rise = at(yaw=rng.uniform(0, 360)), rng.uniform(0.4, 0.95) * height_m
+        way = at(yaw=rng.uniform(0, 360))
+        rise = rng.uniform(0.4, 0.95) * height_m
         reach, long, drop = rng.uniform([0.05, 0.14, 0.1], [0.3, 0.26, 0.9]) * [height_m, height_m, 1]
         bend = spline([[0, 0, 0.85 * h], [0.3 * reach, 0, 0.6 * rise], [reach, 0, rise]], 6)
         stems.append(tube(bend, 0.0035 * height_m, sections=5).moved(way))
@@ -300,11 +322,14 @@ def carton(_: Rng, size_m: tuple[float, float, float] = (0.36, 0.46, 0.3), seed:
 
 def crate(rng: Rng, size_m: tuple[float, float, float] = (0.8, 0.8, 1.2)) -> list[Part]:
     """A box of rough planks on posts, with a plate."""
-    (x, y, z), rough = size_m, matt(texture=picture.boards("beech", 5, rows=6))
-    parts, rows = [stood((x - 0.06, y - 0.06, z - 0.01), matt("#2b221a"), bevel=0)], max(2, round(z / 0.14))
+    (x, y, z) = size_m
+    rough = matt(texture=picture.boards("beech", 5, rows=6))
+    parts = [stood((x - 0.06, y - 0.06, z - 0.01), matt("#2b221a"), bevel=0)]
+    rows = max(2, round(z / 0.14))
     for s in (-1, 1):
         for k in range(rows):
-            high, u = z / rows - rng.uniform(0.003, 0.01), rng.uniform(0, 3)
+            high = z / rows - rng.uniform(0.003, 0.01)
+            u = rng.uniform(0, 3)
             parts.append(stood((x - 0.04, 0.02, high), rough, 0, s * (y / 2 - 0.03), k * z / rows, u=u))
             parts.append(stood((0.02, y - 0.04, high), rough, s * (x / 2 - 0.03), 0, k * z / rows, u=u + 0.4))
         for t in (-1, 1):
@@ -317,14 +342,17 @@ def crate(rng: Rng, size_m: tuple[float, float, float] = (0.8, 0.8, 1.2)) -> lis
 
 def sofa(_: Rng, width_m: float = 2.0, depth_m: float = 0.9, height_m: float = 0.7, colour: str = SAGE) -> list[Part]:
     """A sofa of three seats on short legs with two loose cushions."""
-    cover, wide, d = cloth(colour), (width_m - 0.36) / 3, depth_m / 2
+    cover = cloth(colour)
+    wide = (width_m - 0.36) / 3
+    d = depth_m / 2
     back = cushion((0.22, width_m - 0.06, height_m - 0.14), power=7, cells=8)
     parts = [put(cushion((2 * d - 0.04, width_m - 0.1, 0.2), power=12), cover, 0, 0, 0.2)]
     parts.append(put(back, cover, 0.11 - d, 0, 0.07 + height_m / 2))
     for s in (-1, 1):
         parts.append(put(cushion((2 * d - 0.02, 0.18, 0.44), power=7), cover, 0.01, s * (width_m / 2 - 0.09), 0.34))
         parts += [stood((0.05, 0.05, 0.12), wood("walnut"), x, s * (width_m / 2 - 0.1)) for x in (0.08 - d, d - 0.08)]
-        loose, accent = cushion((0.13, 0.42, 0.4), power=2.8), cloth(OCHRE if s > 0 else BRICK)
+        loose = cushion((0.13, 0.42, 0.4), power=2.8)
+        accent = cloth(OCHRE if s > 0 else BRICK)
         parts.append(put(loose, accent, -0.12, s * 0.58, 0.6, pitch=-18, yaw=s * 6))
     for y in (-wide, 0, wide):
         parts.append(put(cushion((2 * d - 0.22, wide - 0.005, 0.15), power=6), cover, 0.1, y, 0.36))
@@ -347,7 +375,10 @@ def cabinet(
     _: Rng, width_m: float = 0.8, depth_m: float = 0.6, height_m: float = 1.2, colour: str = "#8b9493"
 ) -> list[Part]:
     """A steel cupboard with two doors on a plinth."""
-    paint, w, d, h = coated(colour, roughness=0.35), width_m, depth_m, height_m
+    paint = coated(colour, roughness=0.35)
+    w = width_m
+    d = depth_m
+    h = height_m
     parts = [stood((d - 0.02, w, h - 0.06), paint, -0.01, 0, 0.06, bevel=0.005)]
     parts.append(stood((d - 0.06, w - 0.03, 0.06), BLACK, -0.01))
     grip = tube(spline(mm("0 0 -80, 30 0 -60, 30 0 60, 0 0 80"), 12), 0.006)
@@ -361,7 +392,10 @@ def cabinet(
 
 def bench(rng: Rng, width_m: float = 2.0, depth_m: float = 0.9, height_m: float = 0.7) -> list[Part]:
     """A work bench of beech with a shelf below."""
-    beech, d, w, h = wood("beech"), depth_m, width_m, height_m
+    beech = wood("beech")
+    d = depth_m
+    w = width_m
+    h = height_m
     legs = [(s * (d / 2 - 0.07), t * (w / 2 - 0.09)) for s in (-1, 1) for t in (-1, 1)]
     parts = [stood((0.09, 0.09, h - 0.05), beech, x, y, u=rng.uniform(0, 2), bevel=0.005) for x, y in legs]
     tops = [((k - 1.5) * d / 4, rng.uniform(0, 2)) for k in range(4)]
@@ -371,7 +405,8 @@ def bench(rng: Rng, width_m: float = 2.0, depth_m: float = 0.9, height_m: float 
 
 def pillar(rng: Rng, width_m: float = 0.4, height_m: float = 3.0) -> list[Part]:
     """A column of raw concrete with chamfered edges, a kick plate and a sign."""
-    raw, w = matt(texture=picture.ground("concrete")), width_m
+    raw = matt(texture=picture.ground("concrete"))
+    w = width_m
     plate = put(card((0.24, 0.12)), matt(texture=picture.sign("P2", OCHRE)), w / 2 + 0.001, 0, 1.7)
     shaft = stood((w, w, height_m), raw, bevel=0.015, u=rng.uniform(0, 2))
     return [shaft, stood((w + 0.006, w + 0.006, 0.1), STEEL, bevel=0.002), plate]

@@ -30,17 +30,25 @@ from vobench.scene.mesh import Mesh, unit
 Json = dict[str, Any]
 ModelLight = PointLight | SpotLight | Sun
 # More is refused before memory is taken; two cores could not light more faces.
-MOST_FACES, MOST_BYTES, MOST_PIXELS, MOST_INSTANCES, MOST_NESTED = 1_000_000, 1 << 30, 1 << 26, 100_000, 256
+MOST_FACES = 1_000_000
+MOST_BYTES = 1 << 30
+MOST_PIXELS = 1 << 26
+MOST_INSTANCES = 100_000
+MOST_NESTED = 256
 # Pictures are reduced to this side, and further where there are many, to so many texels in all.
-MOST_SIDE, MOST_TEXELS = 4096, 1 << 27
+MOST_SIDE = 4096
+MOST_TEXELS = 1 << 27
 # GGX alpha from which on nothing is seen mirrored: a coat or metal this rough is read as matt, in its colour.
 MATT_ALPHA = 0.4
 # Opacity below which a blended material is a pane, and below which it is not there.
-CLEAR, NOTHING = 0.5, 0.02
+CLEAR = 0.5
+NOTHING = 0.02
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-TRIANGLES, STRIP, FAN = 4, 5, 6
+TRIANGLES = 4
+STRIP = 5
+FAN = 6
 DECOMPRESS = "decompress it: gltf-transform cp in.glb out.glb"
 EXTENSIONS = {
     "KHR_draco_mesh_compression": f"is compressed by Draco; {DECOMPRESS}",
@@ -228,17 +236,20 @@ class Gltf:
 
     def accessor(self, index: Any, rows: int | None = None) -> NDArray[Any]:
         """Numbers (rows, width), as many as asked for; floats where they are normalised."""
-        count, accessor = self.rows(index), self.entry("accessors", index)
+        count = self.rows(index)
+        accessor = self.entry("accessors", index)
         if count > 3 * MOST_FACES or rows not in (None, count):
             raise ModelError(f"accessor {index} has {count:,} rows, and should have {rows or 3 * MOST_FACES:,}")
         if "bufferView" not in accessor and "sparse" not in accessor:
             raise ModelError(f"accessor {index} has no data; where it is compressed, {DECOMPRESS}")
-        kind, width = np.dtype(COMPONENTS[accessor["componentType"]]), WIDTHS[accessor["type"]]
+        kind = np.dtype(COMPONENTS[accessor["componentType"]])
+        width = WIDTHS[accessor["type"]]
         values = np.zeros((count, width), kind)
         if "bufferView" in accessor:
             values = self._rows(accessor, count, kind, width)
         if sparse := accessor.get("sparse"):
-            at, new = sparse["indices"], sparse["values"]
+            at = sparse["indices"]
+            new = sparse["values"]
             where = self._rows(at, min(sparse["count"], count), np.dtype(COMPONENTS[at["componentType"]]), 1)
             values = values.copy()
             values[where[:, 0]] = self._rows(new, len(where), kind, width)
@@ -248,7 +259,9 @@ class Gltf:
 
     def _rows(self, at: Json, count: int, kind: np.dtype[Any], width: int) -> NDArray[Any]:
         """Numbers (count, width) from an offset of a buffer view on."""
-        data, offset, row = self._view(at["bufferView"]), at.get("byteOffset", 0), kind.itemsize * width
+        data = self._view(at["bufferView"])
+        offset = at.get("byteOffset", 0)
+        row = kind.itemsize * width
         stride = self.entry("bufferViews", at["bufferView"]).get("byteStride") or row
         end = offset + (count - 1) * stride + row
         if offset < 0 or stride < row or end > len(data):
@@ -258,7 +271,8 @@ class Gltf:
     def _view(self, index: Any) -> memoryview:
         view = self.entry("bufferViews", index)
         self.entry("buffers", view["buffer"])
-        data, start = self.buffers[view["buffer"]], view.get("byteOffset", 0)
+        data = self.buffers[view["buffer"]]
+        start = view.get("byteOffset", 0)
         end = start + view["byteLength"]
         if not 0 <= start <= end <= len(data):
             raise ModelError(f"byte {end:,} of {len(data):,} is asked for; copy or export it again")
@@ -281,10 +295,13 @@ class Gltf:
         return [self._part(place, primitive, poses) for primitive in mesh["primitives"]]
 
     def _part(self, place: Place, primitive: Json, poses: Mapping[int, Array]) -> Part:
-        at, mode, T = primitive["attributes"], primitive.get("mode", TRIANGLES), place.poses[-1]
+        at = primitive["attributes"]
+        mode = primitive.get("mode", TRIANGLES)
+        T = place.poses[-1]
         vertices = self.accessor(at["POSITION"]).astype(float)
         is_bare = primitive.get("material") is None and "COLOR_0" not in at
-        count, look = len(vertices), BARE if is_bare else self.look(primitive.get("material"))
+        count = len(vertices)
+        look = BARE if is_bare else self.look(primitive.get("material"))
         index = self.accessor(primitive["indices"])[:, 0] if "indices" in primitive else np.arange(count)
         faces = _faces(index.astype(np.int64), mode)
         if faces.size and not 0 <= faces.min() <= faces.max() < count:
@@ -300,7 +317,8 @@ class Gltf:
         if "skin" in place.source and "JOINTS_0" in at:
             blend = self._joints(place.source["skin"], at, poses, count)
             vertices = (blend[:, :3, :3] @ vertices[..., None])[..., 0] + blend[:, :3, 3]
-            normals, T = unit((blend[:, :3, :3] @ normals[..., None])[..., 0]), np.eye(4)
+            normals = unit((blend[:, :3, :3] @ normals[..., None])[..., 0])
+            T = np.eye(4)
             notes.append("skin taken in the pose of the file")
         said = tuple(f"{place}: {note}" for note in notes)
         return Part(place, Mesh(vertices, faces.astype(np.int32), uv, normals), look, T, colours, said)
@@ -312,7 +330,8 @@ class Gltf:
         if "inverseBindMatrices" in skin:
             binds = self.accessor(skin["inverseBindMatrices"], len(joints))
             joints = joints @ binds.reshape(-1, 4, 4).swapaxes(1, 2)
-        weights, which = self.accessor(at["WEIGHTS_0"], count).astype(float), self.accessor(at["JOINTS_0"], count)
+        weights = self.accessor(at["WEIGHTS_0"], count).astype(float)
+        which = self.accessor(at["JOINTS_0"], count)
         weights = weights / np.maximum(weights.sum(1, keepdims=True), 1e-9)
         return np.asarray(sum(weights[:, n, None, None] * joints[which[:, n]] for n in range(4)))
 
@@ -322,14 +341,18 @@ class Gltf:
         if not at:
             return []
         source = self.tree["extensions"]["KHR_lights_punctual"]["lights"][at["light"]]
-        T, name, strength = place.poses[-1], place.names[-1], max(float(numbers(source.get("intensity", 1.0))), 0.0)
+        T = place.poses[-1]
+        name = place.names[-1]
+        strength = max(float(numbers(source.get("intensity", 1.0))), 0.0)
         r, g, b = np.clip(numbers(source.get("color", WHITE), 3), 0, None).tolist()
         backwards = unit(T[:3, 2])
         if source["type"] == "point":
             return [PointLight(name, T[:3, 3], 4 * np.pi * strength, colour=(r, g, b))]
         if source["type"] == "directional":
-            azimuth, elevation = np.arctan2(backwards[1], backwards[0]), np.arcsin(np.clip(backwards[2], -1, 1))
-            azimuth, elevation = float(np.rad2deg(azimuth)), float(np.rad2deg(elevation))
+            azimuth = np.arctan2(backwards[1], backwards[0])
+            elevation = np.arcsin(np.clip(backwards[2], -1, 1))
+            azimuth = float(np.rad2deg(azimuth))
+            elevation = float(np.rad2deg(elevation))
             return [Sun(name, strength, (0.0,), (azimuth,), (elevation,), colour=(r, g, b))]
         if source["type"] != "spot":
             raise ModelError(f"has a light of type '{source['type']}', which glTF does not know")
@@ -350,9 +373,11 @@ class Gltf:
 
     def _look(self, name: str, source: Json) -> Look:
         """F0 by the index of refraction and GGX alpha = roughness², as glTF's appendix B has them."""
-        surface, more = source.get("pbrMetallicRoughness", {}), source.get("extensions", {})
+        surface = source.get("pbrMetallicRoughness", {})
+        more = source.get("extensions", {})
         r, g, b, alpha = np.clip(numbers(surface.get("baseColorFactor", (1, 1, 1, 1)), 4), 0, 1).tolist()
-        info, glow = surface.get("baseColorTexture"), source.get("emissiveTexture")
+        info = surface.get("baseColorTexture")
+        glow = source.get("emissiveTexture")
         rough, metal = (float(numbers(surface.get(key, 1.0))) for key in ("roughnessFactor", "metallicFactor"))
         if means := self._picture(surface.get("metallicRoughnessTexture")):
             rough, metal = np.array([rough, metal]) * means.values[..., 1:].mean((0, 1)) / 255
@@ -450,7 +475,8 @@ def _uv_of(texture: Json) -> tuple[int, Array]:
 
 def _opacity(material: Material, source: Json, alpha: float) -> tuple[Material, list[str]]:
     """A material with the holes, or as the pane, that its opacity makes of it."""
-    mode, texture = source.get("alphaMode", "OPAQUE"), material.texture
+    mode = source.get("alphaMode", "OPAQUE")
+    texture = material.texture
     if mode == "OPAQUE" or material.kind == "pane":
         return material, []
     pixels = texture.pixels() if texture else np.zeros((1, 1, 3), np.uint8)

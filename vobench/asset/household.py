@@ -15,7 +15,10 @@ def table(
     rng: Rng, width_m: float = 1.5, depth_m: float = 0.85, height_m: float = 0.74, tones: str = "oak"
 ) -> list[Part]:
     """A table top on an apron and four tapered legs."""
-    look, d, w, h = wood(tones), depth_m / 2 - 0.06, width_m / 2 - 0.06, height_m
+    look = wood(tones)
+    d = depth_m / 2 - 0.06
+    w = width_m / 2 - 0.06
+    h = height_m
     leg = lathe(np.array([[0, 0], [0.018, 0], [0.03, h - 0.03], [0, h - 0.03]]), sections=12)
     parts = [put(leg, look, s * d, t * w) for s in (-1, 1) for t in (-1, 1)]
     parts += [stood((0.02, 2 * w, 0.07), look, s * d, 0, h - 0.1) for s in (-1, 1)]
@@ -25,7 +28,8 @@ def table(
 
 def dining_chair(_: Rng, colour: str = SAND, tones: str = "oak") -> list[Part]:
     """A wooden chair with a cushion; who sits on it looks along x."""
-    look, legs = wood(tones), [[[0.2, s * 0.19, 0], [0.19, s * 0.18, 0.44]] for s in (-1, 1)]
+    look = wood(tones)
+    legs = [[[0.2, s * 0.19, 0], [0.19, s * 0.18, 0.44]] for s in (-1, 1)]
     legs += [spline(mm(f"-240 {s * 190} 0, -190 {s * 180} 440, -250 {s * 175} 860"), 10).tolist() for s in (-1, 1)]
     rails = [spline(mm(f"{x} -175 {z}, {x - 30} 0 {z}, {x} 175 {z}"), 9) for x, z in ((-232, 740), (-243, 820))]
     return [
@@ -42,11 +46,14 @@ def _weave(seed: int, px: int = 1024) -> Picture:
     rng = np.random.default_rng(seed)
     inks = rng.permutation([NAVY, BRICK, OCHRE, SAGE, INK, "#7d6a58"])
     image = Image.new("RGB", (px, px), SAND)
-    draw, side = ImageDraw.Draw(image), px / 16
+    draw = ImageDraw.Draw(image)
+    side = px / 16
     for row in range(16):
-        y, ink = (row + 0.5) * side, str(inks[row % 5 if row < 8 else (15 - row) % 5])
+        y = (row + 0.5) * side
+        ink = str(inks[row % 5 if row < 8 else (15 - row) % 5])
         for k in range(16):
-            x, r = (k + 0.5) * side, side * (0.62 if row % 3 else 0.3)
+            x = (k + 0.5) * side
+            r = side * (0.62 if row % 3 else 0.3)
             draw.polygon([(x - r, y), (x, y - 0.45 * side), (x + r, y), (x, y + 0.45 * side)], fill=ink)
             draw.ellipse([x - 0.1 * side, y - 0.1 * side, x + 0.1 * side, y + 0.1 * side], fill=SAND)
     for k, ink in enumerate((str(inks[5]), SAND, str(inks[0]))):
@@ -63,7 +70,8 @@ def rug(_: Rng, width_m: float = 2.4, depth_m: float = 1.7, seed: int = 0) -> li
 
 def television(_: Rng, width_m: float = 1.2, seed: int = 0) -> list[Part]:
     """A flat screen on two feet that shows hills."""
-    h, shows = 0.57 * width_m, picture.poster("hills", seed, 960, 540)
+    h = 0.57 * width_m
+    shows = picture.poster("hills", seed, 960, 540)
     glow = Material(colour=(0.02, 0.02, 0.02), emission_cd_m2=(120.0, 120.0, 120.0), emission_texture=shows)
     feet = [stood((0.22, 0.03, 0.05), BLACK, 0, s * 0.3 * width_m) for s in (-1, 1)]
     body = stood((0.04, width_m, h), BLACK, 0, 0, 0.04, bevel=0.004)
@@ -72,7 +80,8 @@ def television(_: Rng, width_m: float = 1.2, seed: int = 0) -> list[Part]:
 
 def _shade(colour: str, wide_m: float, high_m: float) -> list[Part]:
     """A cone of cloth, open at both ends, from z = 0 up, white within."""
-    turn, z = np.linspace(0, 2 * np.pi, 33), np.array([0.0, 1.0])[:, None]
+    turn = np.linspace(0, 2 * np.pi, 33)
+    z = np.array([0.0, 1.0])[:, None]
     r = wide_m / 2 * (1 - 0.35 * z)
     cone = sheet(np.stack([r * np.cos(turn), r * np.sin(turn), high_m * z + 0 * turn], axis=-1))
     outer = cone if cone.normals[0] @ [1, 0, 0] > 0 else cone.flipped()
@@ -107,7 +116,9 @@ def fruit_bowl(rng: Rng) -> list[Part]:
     bowl = lathe(mm("0 0, 50 0, 55 8, 120 50, 150 95, 146 96, 112 56, 50 16, 0 14"), sections=32)
     parts = [put(bowl, coated("#d8d2c4", roughness=0.15))]
     for k in range(7):
-        a, r, z = 2 * np.pi * k / 6, 0.068 if k < 6 else 0.0, 0.075 if k < 6 else 0.12
+        a = 2 * np.pi * k / 6
+        r = 0.068 if k < 6 else 0.0
+        z = 0.075 if k < 6 else 0.12
         skin = coated(some(rng, "#a62a22", "#8fa03a", "#d8812a", "#c9492c"), roughness=0.25)
         parts.append(put(cushion((0.074, 0.074, 0.066), power=2.1, cells=5), skin, r * np.cos(a), r * np.sin(a), z))
     return parts
@@ -117,8 +128,12 @@ def low_board(
     rng: Rng, width_m: float = 1.9, height_m: float = 0.46, depth_m: float = 0.42, tones: str = "oak"
 ) -> list[Part]:
     """A low cupboard on a recessed foot, with doors and an open bay of boxes in its middle."""
-    look, w, d, h = wood(tones), width_m, depth_m, height_m
-    third, inner = w / 3, h - 0.1
+    look = wood(tones)
+    w = width_m
+    d = depth_m
+    h = height_m
+    third = w / 3
+    inner = h - 0.1
     parts = [stood((d - 0.1, w - 0.12, 0.06), DARK), stood((d, w, 0.022), look, 0, 0, h - 0.022, u=rng.uniform(0, 2))]
     parts += [stood((d, w, 0.022), look, 0, 0, 0.06), stood((0.01, w - 0.04, inner), look, 0.01 - d / 2, 0, 0.07)]
     for s in (-1, 1):

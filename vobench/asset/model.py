@@ -21,11 +21,16 @@ Roles = Mapping[str, str]
 Key = TypeVar("Key")
 ROLES = ("mirror", "pane", "lamp", "mover", "ignored")
 # Faces smaller have no area; corners nearer are one.
-LEAST_M2, WELD_M = 1e-12, 1e-5
+LEAST_M2 = 1e-12
+WELD_M = 1e-5
 # No camera gets into a closed body this small: its backs are never seen.
 CLOSED_M = 1.0
 # Beyond these a model is likely in another unit, or damaged; most are about TYPICAL_M across.
-SMALLEST_M, PLACE_M, TYPICAL_M, LARGEST_M, FARTHEST_M = 0.05, 3.0, 5.0, 500.0, 1e7
+SMALLEST_M = 0.05
+PLACE_M = 3.0
+TYPICAL_M = 5.0
+LARGEST_M = 500.0
+FARTHEST_M = 1e7
 LYING = 2.0  # times as much area that looks along the other axis as up and down
 FLAT = 0.5  # a place is likely less high than this share of its length and of its width
 Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
@@ -73,7 +78,8 @@ def read_model(path: Path | str, *, scale: float = 1.0, roles: Mapping[str, str]
     with told(str(path)), np.errstate(all="ignore"):
         if not path.is_file() or not 0 < path.stat().st_size <= MOST_BYTES:
             raise ModelError("is empty or too large" if path.is_file() else "there is no such file")
-        axis, notes = up or ("z" if kind in (".stl", ".ply") else "y"), []
+        axis = up or ("z" if kind in (".stl", ".ply") else "y")
+        notes = []
         if kind not in (".glb", ".gltf"):
             notes = [f"{kind} knows no unit and no axes: read as {scale:g} m each, {axis} up"]
         T_model_file = np.diag([scale, scale, scale, 1.0]) @ (Z_UP if axis == "y" else np.eye(4))
@@ -86,7 +92,8 @@ def read_model(path: Path | str, *, scale: float = 1.0, roles: Mapping[str, str]
             raise ModelError(unknown("node", unmatched[0], names))
         shown = [place for place in places if _role(place, roles)[0] != "ignored"]
         file.require_few(shown)
-        parts, lights = list[Part](), list[ModelLight]()
+        parts = list[Part]()
+        lights = list[ModelLight]()
         for place in shown:
             with told(str(place)):
                 parts += map(_sound, file.parts(place, poses))
@@ -142,7 +149,8 @@ def _shifted(thing: Thing, by_m: Array) -> Thing:
 
 def _apart(wanted: Mapping[Key, str]) -> dict[Key, str]:
     """Names that differ: a second 'chair' is 'chair_2'."""
-    taken, found = set(wanted.values()), dict[str, Key]()
+    taken = set(wanted.values())
+    found = dict[str, Key]()
     for key, name in wanted.items():
         free = (f"{name}_{n}" for n in count(2))
         own = name if name not in found else next(other for other in free if other not in taken)
@@ -207,7 +215,8 @@ def _doubt_of_unit(model: Model) -> list[str]:
 
 def _sound(part: Part) -> Part:
     """Faces of some area in the model's frame, with vertices and normals of their own, with backs if these are seen."""
-    mesh, T = part.mesh, part.T_model_mesh
+    mesh = part.mesh
+    T = part.T_model_mesh
     if not np.isfinite(mesh.vertices_m).all():
         raise ModelError("has vertices at NaN or infinity; mend it where it was made")
     if not np.linalg.det(T[:3, :3]):
@@ -217,7 +226,8 @@ def _sound(part: Part) -> Part:
     if np.abs(mesh.vertices_m).max(initial=0) > FARTHEST_M:
         raise ModelError(f"reaches {np.abs(mesh.vertices_m).max():.3g} m; is it damaged, or of another unit?")
     faces = mesh.faces[areas_m2(mesh.corners_m) > LEAST_M2]
-    normals, planes = np.nan_to_num(mesh.normals)[faces], face_normals(mesh.vertices_m[faces])[:, None]
+    normals = np.nan_to_num(mesh.normals)[faces]
+    planes = face_normals(mesh.vertices_m[faces])[:, None]
     normals = np.where(np.linalg.norm(normals, axis=2, keepdims=True) > 0.5, normals, planes).reshape(-1, 3)
     own = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
     solid = Mesh(mesh.vertices_m[faces].reshape(-1, 3), own, mesh.uv[faces].reshape(-1, 2), normals)
@@ -277,7 +287,8 @@ def _welded(mesh: Mesh) -> NDArray[np.int64]:
 def _open_edges(mesh: Mesh) -> int:
     """How many edges have more faces on one side than on the other."""
     welded = _welded(mesh)
-    start, end = welded.ravel(), np.roll(welded, -1, axis=1).ravel()
+    start = welded.ravel()
+    end = np.roll(welded, -1, axis=1).ravel()
     edges = np.minimum(start, end) * (welded.max(initial=0) + 1) + np.maximum(start, end)
     return int(np.count_nonzero(np.bincount(np.unique(edges, return_inverse=True)[1], np.sign(end - start))))
 
@@ -299,8 +310,10 @@ def _through_trimesh(path: Path) -> bytes:
         scene = trimesh.load_scene(path, process=False)
         for visual in [mesh.visual for mesh in scene.geometry.values()]:
             if visual.kind == "texture":
-                name, visual.material = getattr(visual.material, "name", None), visual.material.to_pbr()
-                visual.material.name, visual.material.metallicFactor = name, 0.0
+                name = getattr(visual.material, "name", None)
+                visual.material = visual.material.to_pbr()
+                visual.material.name = name
+                visual.material.metallicFactor = 0.0
                 if visual.material.baseColorTexture is not None:
                     visual.material.baseColorFactor = None
         return bytes(trimesh.exchange.gltf.export_glb(scene))  # type: ignore[no-untyped-call]
@@ -310,9 +323,11 @@ def _through_trimesh(path: Path) -> bytes:
 
 def _require_few_and_whole(path: Path) -> None:
     """Refuse too many faces before trimesh reads any, and an OBJ whose materials or pictures are lost."""
-    data, kind = path.read_bytes(), path.suffix.lower()
+    data = path.read_bytes()
+    kind = path.suffix.lower()
     if kind == ".obj":
-        faces, files = data.count(b"\nf "), re.findall(rb"^mtllib\s+(.+?)\s*$", data, re.M)
+        faces = data.count(b"\nf ")
+        files = re.findall(rb"^mtllib\s+(.+?)\s*$", data, re.M)
         for file in [path.parent / name.decode("utf-8", "replace") for name in files]:
             files += re.findall(rb"^\s*map_Kd\s+(?:.*\s)?(\S+)\s*$", file.read_bytes(), re.M) if file.is_file() else []
         for name in [name.decode("utf-8", "replace") for name in files]:

@@ -28,7 +28,8 @@ def car(rng: Rng, colour: str = "") -> list[Part]:
     """A hatchback 4.2 m long with wheels, lamps, plates and mirrors, its windows dark."""
     paint = coated(colour or some(rng, *PAINTS), roughness=0.12)
     parts = [Part(_body(), paint), *_cabin(paint)]
-    arch, lamp = lathe(mm("0 0, 350 0, 350 6, 0 6"), sections=18), cushion((0.2, 0.36, 0.14), power=3, cells=5)
+    arch = lathe(mm("0 0, 350 0, 350 6, 0 6"), sections=18)
+    lamp = cushion((0.2, 0.36, 0.14), power=3, cells=5)
     for s in (-1, 1):
         for x in (-1.27, 1.32):
             parts.append(put(arch, BLACK, x, s * 0.876, 0.36, roll=-90 * s))
@@ -71,7 +72,8 @@ def _outward(mesh: Mesh) -> Mesh:
 def _cabin(paint: Material) -> list[Part]:
     """Glass all around below a roof and pillars in the body's paint."""
     x, half, high = spline(mm(CABIN), 30).T
-    waist, bottom = np.interp(x, *mm(BODY)[:, [0, 2]].T) - 0.04, np.interp(x, *mm(BODY)[:, [0, 3]].T) - 0.05
+    waist = np.interp(x, *mm(BODY)[:, [0, 2]].T) - 0.04
+    bottom = np.interp(x, *mm(BODY)[:, [0, 3]].T) - 0.05
     t = np.linspace(-1, 1, 25)
     up = np.minimum(1, 2.2 * (1 - np.abs(t))) ** 0.9
     wide = np.sign(t) * np.where(np.abs(t) < 0.55, np.abs(t) / 0.55, 1)
@@ -96,7 +98,8 @@ def _wheel() -> tuple[Part, ...]:
     return Part(tyre, matt("#1b1c1d")), put(rim, STEEL, 0, 0, 0.07), Part(joined(spokes), GREY)
 
 
-SKINS, HAIR = ("#8d5a3f", "#b98263", "#d0a285", "#5c3a28"), ("#1d1613", "#3b2a1e", "#6b4d30", "#8b8580")
+SKINS = ("#8d5a3f", "#b98263", "#d0a285", "#5c3a28")
+HAIR = ("#1d1613", "#3b2a1e", "#6b4d30", "#8b8580")
 # A trunk from the hips up: height, half its depth, half its width.
 TRUNK = "830 105 165, 930 118 172, 1050 105 150, 1200 118 172, 1340 118 198, 1420 88 165, 1470 60 80, 1500 50 52"
 
@@ -133,17 +136,25 @@ LEG_M = 0.9  # from the hip to the sole
 
 def walker(rng: Rng, height_m: float = 1.74, stride_deg: float = 22.0) -> Walker:
     """Somebody who walks along x, in trousers and a coat or a jumper; their feet stay where they stand."""
-    top, legs = some(rng, NAVY, TEAL, BRICK, PLUM, OCHRE, SAGE, INK, SAND), some(rng, "#2b3442", "#3c3a38", "#5a5142")
-    skin, shoe, upper, lower = matt(some(rng, *SKINS)), matt("#241f1c"), cloth(top), cloth(legs)
+    top = some(rng, NAVY, TEAL, BRICK, PLUM, OCHRE, SAGE, INK, SAND)
+    legs = some(rng, "#2b3442", "#3c3a38", "#5a5142")
+    skin = matt(some(rng, *SKINS))
+    shoe = matt("#241f1c")
+    upper = cloth(top)
+    lower = cloth(legs)
     limbs = [Limb(_trunk(upper, skin, matt(some(rng, *HAIR))), np.zeros((0, 3)), np.zeros((STEPS, 0)))]
-    half, reach = STEPS // 2, np.sin(np.deg2rad(stride_deg))
-    stance, u = np.linspace(1, -1, half, endpoint=False), np.arange(half) / half
+    half = STEPS // 2
+    reach = np.sin(np.deg2rad(stride_deg))
+    stance = np.linspace(1, -1, half, endpoint=False)
+    u = np.arange(half) / half
     swing = np.arcsin(reach * np.concatenate([stance, -np.cos(np.pi * u)]))
     bend = np.concatenate([np.full(half, 0.07), 0.07 + 2.6 * reach * np.sin(np.pi * u) * (1 - 0.3 * u)])
     for s in (-1, 1):
         late = 0 if s > 0 else half
-        hip, turn = np.array([0, s * 0.095, 0.88]), np.roll(swing, late)
-        knee, ankle = hip - [0, 0, 0.43], hip - [0, 0, 0.84]
+        hip = np.array([0, s * 0.095, 0.88])
+        turn = np.roll(swing, late)
+        knee = hip - [0, 0, 0.43]
+        ankle = hip - [0, 0, 0.84]
         shin = [_limb(knee, ankle, 0.06, 0.047, lower)]
         shin.append(put(cushion((0.27, 0.095, 0.085), power=3, cells=5), shoe, 0.06, s * 0.095, 0.01))
         limbs.append(Limb([_limb(hip, knee, 0.088, 0.062, lower)], hip[None], -turn[:, None]))
@@ -168,7 +179,8 @@ def _trunk(upper: Material, skin: Material, hair: Material) -> list[Part]:
     rings = np.stack([depth[:, None] * np.cos(turn), width[:, None] * np.sin(turn), z[:, None] + 0 * turn], axis=-1)
     trunk = sheet(rings)
     parts = [Part(trunk if trunk.normals[30] @ [*trunk.vertices_m[30][:2], 0] > 0 else trunk.flipped(), upper)]
-    head, mop = cushion((0.2, 0.155, 0.235), power=2.2, cells=7), cushion((0.205, 0.17, 0.17), power=2.2, cells=7)
+    head = cushion((0.2, 0.155, 0.235), power=2.2, cells=7)
+    mop = cushion((0.205, 0.17, 0.17), power=2.2, cells=7)
     parts += [put(head, skin, 0.02, 0, 1.62), put(mop, hair, -0.012, 0, 1.668)]
     parts += [put(lathe(mm("0 0, 52 0, 52 90, 0 90")), skin, 0, 0, 1.46)]
     parts += [put(cushion((0.035, 0.03, 0.05), power=2, cells=3), skin, 0.12, 0, 1.605)]
@@ -178,7 +190,8 @@ def _trunk(upper: Material, skin: Material, hair: Material) -> list[Part]:
 
 def person(rng: Rng, height_m: float = 1.74, stride_deg: float = 22.0) -> list[Part]:
     """Somebody amid a step along x."""
-    who, step = walker(rng, height_m, stride_deg), int(rng.choice([0, STEPS // 2]))
+    who = walker(rng, height_m, stride_deg)
+    step = int(rng.choice([0, STEPS // 2]))
     return [part.moved(at(z_m=who.rise_m[step])) for limb in who.limbs for part in limb.posed(step)]
 
 
@@ -203,8 +216,11 @@ def foliage(seed: int = 0, px: int = 512) -> Picture:
     draw = ImageDraw.Draw(image)
     for k in range(260):
         x, y = px / 2 + px * 0.42 * np.sqrt(rng.random()) * np.array([np.cos(a := rng.uniform(0, 7)), np.sin(a)])
-        a, long, tone = rng.uniform(0, 7), px * rng.uniform(0.035, 0.06), 0.55 + 0.45 * k / 260 + rng.normal(0, 0.06)
-        ahead, side = np.array([np.cos(a), np.sin(a)]), np.array([-np.sin(a), np.cos(a)])
+        a = rng.uniform(0, 7)
+        long = px * rng.uniform(0.035, 0.06)
+        tone = 0.55 + 0.45 * k / 260 + rng.normal(0, 0.06)
+        ahead = np.array([np.cos(a), np.sin(a)])
+        side = np.array([-np.sin(a), np.cos(a)])
         t = np.linspace(0, 2 * np.pi, 14)[:, None]
         shape = np.array([x, y]) + long * np.cos(t) * ahead + 0.45 * long * np.sin(t) * (1 - 0.3 * np.cos(t)) * side
         ink = tuple(int(np.clip(c * tone, 0, 255)) for c in (128 + rng.normal(0, 14), 160, 78))
@@ -219,10 +235,13 @@ def tree(rng: Rng, height_m: float = 6.0, clumps: int = 110) -> list[Part]:
     bark = matt("#6d5c4b", picture.boards("walnut", 3, 512, 0.8))
     sway = rng.normal(0, 0.05, 2)
     trunk = lathe(mm("0 0, 32 0, 24 50, 17 400, 8 750, 0 760") * h, sections=14)
-    boughs, cards = [], []
-    middle, size = np.array([*sway, 0.67 * h]), np.array([0.26, 0.26, 0.3]) * h
+    boughs = []
+    cards = []
+    middle = np.array([*sway, 0.67 * h])
+    size = np.array([0.26, 0.26, 0.3]) * h
     for _ in range(9):
-        a, z = rng.uniform(0, 2 * np.pi), rng.uniform(0.34, 0.6) * h
+        a = rng.uniform(0, 2 * np.pi)
+        z = rng.uniform(0.34, 0.6) * h
         out = rng.uniform(0.14, 0.24) * h * np.array([np.cos(a), np.sin(a)])
         path = spline([[0, 0, z], [*(0.5 * out), z + 0.1 * h], [*out, z + 0.24 * h]], 6)
         boughs.append(tube(path, 0.006 * h, sections=6))
@@ -239,7 +258,8 @@ def tree(rng: Rng, height_m: float = 6.0, clumps: int = 110) -> list[Part]:
 
 def street_lamp(_: Rng, height_m: float = 5.0, reach_m: float = 1.2) -> list[Part]:
     """A steel mast with an arm along x; its lamp would shine at (reach_m, 0, height_m)."""
-    iron, h = coated("#2d3532", roughness=0.35), height_m
+    iron = coated("#2d3532", roughness=0.35)
+    h = height_m
     mast = lathe(np.array([[0, 0], [0.1, 0], [0.1, 0.5], [0.06, 0.6], [0.04, h - 0.3], [0, h - 0.3]]), sections=16)
     arm = tube(spline([[0, 0, h - 0.32], [0.25 * reach_m, 0, h + 0.05], [reach_m, 0, h + 0.07]], 10), 0.03)
     return [put(mast, iron), put(arm, iron), stood((0.62, 0.2, 0.09), iron, reach_m, 0, h + 0.005, bevel=0.03)]
@@ -253,7 +273,8 @@ def bollard(_: Rng, height_m: float = 0.95) -> list[Part]:
 
 def bush(rng: Rng, height_m: float = 1.1, width_m: float = 1.6) -> list[Part]:
     """A round bush of leaves down to the ground."""
-    size, cards = np.array([width_m, width_m, height_m]) / 2, []
+    size = np.array([width_m, width_m, height_m]) / 2
+    cards = []
     for _ in range(48):
         way = unit(rng.normal([0, 0, 0.15], 1))
         place = [0, 0, 0.42 * height_m] + size * way * rng.uniform(0.55, 0.95)
@@ -272,7 +293,8 @@ def rock(rng: Rng, size_m: float = 0.6) -> list[Part]:
     for _ in range(9):  # flat breaks
         way = unit(rng.standard_normal(3))
         p = p - np.maximum(p @ way - rng.uniform(0.3, 0.42) * size_m, 0)[:, None] * way
-    waves, phase = rng.normal(0, 9 / size_m, (6, 3)), rng.uniform(0, 7, 6)
+    waves = rng.normal(0, 9 / size_m, (6, 3))
+    phase = rng.uniform(0, 7, 6)
     p = p * (1 + 0.02 * np.sin(p @ waves.T + phase).sum(axis=1))[:, None]
     stone = matt(some(rng, "#c9c4ba", "#a8a59e", "#b9ad9a"), picture.ground("concrete", 3, 1024, 1.4))
     return [put(flat(p, mesh.faces, mesh.uv), stone, z=0.12 * size_m, yaw=rng.uniform(0, 360))]
@@ -280,7 +302,8 @@ def rock(rng: Rng, size_m: float = 0.6) -> list[Part]:
 
 def park_bench(rng: Rng, width_m: float = 1.8) -> list[Part]:
     """Slats of wood on two feet of cast iron; who sits on it looks along x."""
-    iron, slats = coated("#23282a", roughness=0.35), []
+    iron = coated("#23282a", roughness=0.35)
+    slats = []
     foot = tube(spline(mm("240 0 0, 200 0 250, 230 0 420, 0 0 410, -200 0 430, -280 0 860"), 24), 0.022)
     leg = tube(spline(mm("-200 0 430, -230 0 200, -290 0 0"), 8), 0.022)
     for x, z, pitch in ((0.19, 0.45, 0), (0.08, 0.445, 0), (-0.03, 0.44, 0), (-0.14, 0.445, 0), (-0.225, 0.56, 102),
@@ -293,7 +316,8 @@ def park_bench(rng: Rng, width_m: float = 1.8) -> list[Part]:
 
 def park_lamp(_: Rng, height_m: float = 3.4) -> list[Part]:
     """A post with a lantern under a hat; its globe would be at height_m, 0.3 m wide."""
-    iron, h = coated("#27302d", roughness=0.35), height_m
+    iron = coated("#27302d", roughness=0.35)
+    h = height_m
     post = mm("0 0, 130 0, 130 50, 80 120, 70 700, 45 780, 35 1000, 100 1000, 0 1000")
     post[6:, 1] = h - np.array([0.2, 0.16, 0.16])
     hat = mm("0 170, 160 170, 240 150, 236 165, 90 240, 20 290, 0 292")

@@ -48,11 +48,21 @@ GROUNDS: dict[str, tuple[tuple[Box, ...], Box]] = {
     "clay": (((1, 20, 1.0, 0.15), (20, 250, 0.4, 0.08)), (20, 90, 2.4, 0.2)),
 }
 STONES = ("#d9d3c7", "#b9b1a4", "#6e6a66", "#45474a", "#9a7a62", "#7d8a84")
-CEMENT, MORTAR, BRASS = "#aaa49a", "#b9b2a6", (122, 104, 70)
+CEMENT = "#aaa49a"
+MORTAR = "#b9b2a6"
+BRASS = (122, 104, 70)
 SPINE_PX_PER_M = 1300.0
 # What things are printed, woven and painted in.
-NAVY, TEAL, SKY, SAGE, OCHRE = "#27445c", "#3d7a7c", "#8fb3c7", "#8a9a7b", "#d39a3c"
-BRICK, PLUM, SAND, PAPER, INK = "#b4533a", "#6b4353", "#d8c3a0", "#f1ece0", "#262b30"
+NAVY = "#27445c"
+TEAL = "#3d7a7c"
+SKY = "#8fb3c7"
+SAGE = "#8a9a7b"
+OCHRE = "#d39a3c"
+BRICK = "#b4533a"
+PLUM = "#6b4353"
+SAND = "#d8c3a0"
+PAPER = "#f1ece0"
+INK = "#262b30"
 INKS = (NAVY, TEAL, SKY, SAGE, OCHRE, BRICK, PLUM, SAND)
 WORDS = (
     "survey motion atlas light harbour field notes stereo theory index garden vector northern history lens river model "
@@ -91,7 +101,8 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 def _ramp(values: ArrayLike, tones: str) -> Bytes:
     """Colours (..., 3) of values from 0, the first tone, to 1, the last."""
-    stops, at = np.array([rgb(tone) for tone in TONES[tones]]), np.linspace(0, 1, 256)
+    stops = np.array([rgb(tone) for tone in TONES[tones]])
+    at = np.linspace(0, 1, 256)
     table = np.stack([np.interp(at, np.linspace(0, 1, len(stops)), stops[:, k]) for k in range(3)], axis=-1)
     return np.asarray((table + 0.5).astype(np.uint8)[(np.clip(values, 0, 1) * 255).astype(np.uint8)])
 
@@ -106,7 +117,9 @@ def noise(rng: Rng, px: int, low: float, high: float, *, slope: float = 1.0, str
     Above 1024 pixels it repeats within the tile where its lowest frequency allows that.
     """
     repeats = max(1, min(px // 1024, int(low) // 16))
-    n, low, high = px // repeats, low / repeats, high / repeats
+    n = px // repeats
+    low = low / repeats
+    high = high / repeats
     f = np.hypot(scipy.fft.rfftfreq(n) * n * stretch, scipy.fft.fftfreq(n)[:, None] * n).astype(np.float32)
     shape = np.where((f >= low) & (f <= high), np.maximum(f, 1) ** -slope, 0).astype(np.float32)
     values = scipy.fft.irfft2(scipy.fft.rfft2(rng.standard_normal((n, n), dtype=np.float32)) * shape, s=(n, n))
@@ -115,8 +128,10 @@ def noise(rng: Rng, px: int, low: float, high: float, *, slope: float = 1.0, str
 
 def _polygons(image: Image.Image, shapes: Array, tones: NDArray[np.int64], *, is_open: bool = False) -> Map:
     """The image with polygons (N, K, 2) in pixels that run on across its borders, drawn in order, as an array."""
-    draw, px = ImageDraw.Draw(image), image.width
-    low, high = shapes.min(axis=1), shapes.max(axis=1)
+    draw = ImageDraw.Draw(image)
+    px = image.width
+    low = shapes.min(axis=1)
+    high = shapes.max(axis=1)
     for corners, near, far, tone in zip(shapes, low, high, tones.tolist(), strict=True):
         for dx in (0, *([px] if near[0] < 0 else []), *([-px] if far[0] > px else [])):
             for dy in (0, *([px] if near[1] < 0 else []), *([-px] if far[1] > px else [])):
@@ -127,7 +142,8 @@ def _polygons(image: Image.Image, shapes: Array, tones: NDArray[np.int64], *, is
 
 def _scratches(rng: Rng, px: int, count: int) -> Map:
     """Thin bent lines (px, px) in [0, 1]."""
-    start, way = rng.uniform(0, px, (count, 1, 2)), rng.normal(0, 0.03 * px, (count, 1, 2))
+    start = rng.uniform(0, px, (count, 1, 2))
+    way = rng.normal(0, 0.03 * px, (count, 1, 2))
     bend = rng.normal(0, 0.004 * px, (count, 1, 2))
     lines = np.concatenate([start, start + way / 2 + bend, start + way], axis=1)
     return _polygons(Image.new("L", (px, px)), lines, rng.integers(30, 255, count), is_open=True) / np.float32(255)
@@ -137,7 +153,8 @@ def _cells(px: int, cuts: Array) -> tuple[NDArray[np.int64], Map]:
     """The cell (px, px) and its distance in pixels to the next joint, in rows cut at `cuts` (rows, K) of a row."""
     rows, count = cuts.shape
     x = np.arange(px)
-    row, high = x * rows // px, px / rows
+    row = x * rows // px
+    high = px / rows
     place = np.stack([np.searchsorted(np.sort(c * px), x) % count for c in cuts]) + np.arange(rows)[:, None] * count
     apart = np.abs((x - cuts[..., None] * px + px / 2) % px - px / 2).min(axis=1)
     return place[row], np.minimum(apart[row], np.minimum(x % high, high - x % high)[:, None]).astype(np.float32)
@@ -148,11 +165,15 @@ def boards(
     tones: str, seed: int = 0, px: int = 1024, tile_m: float = 1.2, *, rows: int = 8, joint_m: float = 0
 ) -> Picture:
     """Planks along u: rings cut lengthwise, pores, fibres, each plank in a tone of its own, and scratches."""
-    rng, cuts, variety = np.random.default_rng(seed), 2 if joint_m else 1, 0.08 if joint_m else 0.05
+    rng = np.random.default_rng(seed)
+    cuts = 2 if joint_m else 1
+    variety = 0.08 if joint_m else 0.05
     cell, apart = _cells(px, rng.uniform(0, 1, (rows, cuts)))
     planks = rows * cuts
     v = ((np.arange(px) / px * rows) % 1)[:, None] * tile_m / rows
-    heart, depth, phase = rng.uniform(-0.05, 0.15, planks), rng.uniform(0.01, 0.07, planks), rng.uniform(0, 7, planks)
+    heart = rng.uniform(-0.05, 0.15, planks)
+    depth = rng.uniform(0.01, 0.07, planks)
+    phase = rng.uniform(0, 7, planks)
     wave = np.sin(2 * np.pi * np.arange(px) / px + phase[cell]) * 0.02
     bend = noise(rng, px, 1, 12, slope=1.6, stretch=3) * 0.004
     radius = np.hypot(v - heart[cell] + bend, depth[cell] + wave)
@@ -178,7 +199,8 @@ def masonry(
     bond: float = 0.5,
 ) -> Picture:
     """Bricks, slabs or tiles in courses, each shifted by `bond` of a length against the one before."""
-    rng, variety = np.random.default_rng(seed), 0.14 if columns > 3 else 0.05
+    rng = np.random.default_rng(seed)
+    variety = 0.14 if columns > 3 else 0.05
     cell, apart = _cells(px, (np.arange(columns) + bond * (np.arange(rows) % 2)[:, None] + 1e-3) / columns)
     rough = noise(rng, px, 4, 60, slope=0.6) * 0.6 + noise(rng, px, 60, 400, slope=0.2)
     pits = noise(rng, px, 40, 200, slope=0.2) > 2.3
@@ -201,7 +223,8 @@ def ground(kind: str, seed: int = 0, px: int = 1024, tile_m: float = 2.0) -> Pic
 @painted
 def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
     """A plain weave of threads in slightly different greys, to be coloured by its material."""
-    rng, thread = np.random.default_rng(seed), np.arange(px) // 4
+    rng = np.random.default_rng(seed)
+    thread = np.arange(px) // 4
     bulge = np.abs(np.sin(np.arange(px) * np.pi / 4 + 0.4))
     warp, weft = (0.5 + 0.14 * rng.standard_normal(px // 4)[thread] + 0.3 * bulge for _ in range(2))
     is_over = (thread[:, None] + thread) % 2 == 0
@@ -213,7 +236,8 @@ def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
 @painted
 def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
     """Broken stones of all sizes ground flush with their cement, between strips of brass, with stains and scratches."""
-    rng, count = np.random.default_rng(seed), round(11700 * tile_m**2)
+    rng = np.random.default_rng(seed)
+    count = round(11700 * tile_m**2)
     radius = np.sort(0.0016 * rng.uniform(0, 1, count) ** -0.55)[::-1].clip(max=0.014) / tile_m * px
     angle = np.sort(rng.uniform(0, 2 * np.pi, (count, 6)), axis=1)
     shapes = np.stack([np.cos(angle), np.sin(angle)], -1) * radius[:, None, None] + rng.uniform(0, px, (count, 1, 2))
@@ -222,8 +246,10 @@ def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
     table = (tones * rng.uniform(0.86, 1.12, (len(tones), 1))).clip(0, 255).astype(np.uint8)
     grain = 0.045 * noise(rng, px, 20, 1500, slope=0.6) + 0.02 * noise(rng, px, 3, 12)
     grain -= 0.1 * _scratches(rng, px, px // 6)
-    picture, strip = _scaled(table[chips], (1 + grain)[..., None]), slice(round(0.004 / tile_m * px))
-    picture[strip], picture[:, strip] = BRASS, BRASS
+    picture = _scaled(table[chips], (1 + grain)[..., None])
+    strip = slice(round(0.004 / tile_m * px))
+    picture[strip] = BRASS
+    picture[:, strip] = BRASS
     return Picture(picture, tile_m)
 
 
@@ -261,9 +287,11 @@ def _chart(draw: Draw, rng: Rng, box: Box) -> None:
     x0, y0, x1, y1 = box
     draw.line([x0, y0, x0, y1, x1, y1], fill="#777777")
     xs = np.linspace(x0, x1, int(rng.integers(8, 16)))[1:-1]
-    half, has_bars = 0.3 * (xs[1] - xs[0]), rng.random() < 0.4
+    half = 0.3 * (xs[1] - xs[0])
+    has_bars = rng.random() < 0.4
     for _ in range(1 if has_bars else 3):
-        ys, ink = y1 - (y1 - y0) * np.clip(0.5 + np.cumsum(rng.normal(0, 0.16, len(xs))), 0.06, 0.96), some(rng, *INKS)
+        ys = y1 - (y1 - y0) * np.clip(0.5 + np.cumsum(rng.normal(0, 0.16, len(xs))), 0.06, 0.96)
+        ink = some(rng, *INKS)
         for x, y in zip(xs, ys, strict=True):
             draw.rectangle([x - half, y, x + half, y1] if has_bars else [x - 2, y - 2, x + 2, y + 2], fill=ink)
         if not has_bars:
@@ -289,7 +317,8 @@ def pages(seed: int = 0) -> Picture:
     rng = np.random.default_rng(seed)
     image, draw = _canvas(1440, 1360, PAPER)
     for x, y in ((x, y) for y in (0, 680) for x in (0, 480, 960)):
-        band, split = some(rng, PAPER, PAPER, *INKS), rng.choice([220, 440])
+        band = some(rng, PAPER, PAPER, *INKS)
+        split = rng.choice([220, 440])
         draw.rectangle([x, y, x + 479, y + 679], fill=some(rng, "#f4f2ec", PAPER, "#ebe8df"))
         draw.rectangle([x, y, x + 479, y + 90], fill=band)
         _text(draw, (x + 24, y + 36), _words(rng, 3).title(), 29, _on(band))
@@ -310,7 +339,8 @@ class Spines:
 @cache
 def spines(seed: int = 0, count: int = 52) -> Spines:
     """Books of several publishers, volumes of series among them, and ring binders."""
-    rng, high = np.random.default_rng(seed), round(0.325 * SPINE_PX_PER_M)
+    rng = np.random.default_rng(seed)
+    high = round(0.325 * SPINE_PX_PER_M)
     drawn: list[Image.Image] = []
     while len(drawn) < count:
         drawn += _binders(rng) if rng.random() < 0.14 else _series(rng)
@@ -327,8 +357,11 @@ def spines(seed: int = 0, count: int = 52) -> Spines:
 
 def _binders(rng: Rng) -> list[Image.Image]:
     """Ring binders of one owner, lying on their side as books are."""
-    colour, owner, result = some(rng, NAVY, INK, BRICK, "#8a8d8f"), _words(rng, 1).upper(), []
-    w, h = round(0.07 * SPINE_PX_PER_M), round(0.318 * SPINE_PX_PER_M)
+    colour = some(rng, NAVY, INK, BRICK, "#8a8d8f")
+    owner = _words(rng, 1).upper()
+    result = []
+    w = round(0.07 * SPINE_PX_PER_M)
+    h = round(0.318 * SPINE_PX_PER_M)
     for volume in range(int(rng.integers(2, 5))):
         image, draw = _canvas(h, w, colour)
         draw.rectangle([0.12 * h, 0.14 * w, 0.55 * h, 0.86 * w], fill=PAPER)
@@ -340,10 +373,14 @@ def _binders(rng: Rng) -> list[Image.Image]:
 
 def _series(rng: Rng) -> list[Image.Image]:
     """A book, or the volumes of one, each lying on its side: as wide as the book is high."""
-    volumes, w = int(rng.choice([1, 1, 1, 1, 2, 5])), round(rng.uniform(0.012, 0.042) * SPINE_PX_PER_M)
+    volumes = int(rng.choice([1, 1, 1, 1, 2, 5]))
+    w = round(rng.uniform(0.012, 0.042) * SPINE_PX_PER_M)
     h = round(float(rng.choice([0.178, 0.2, 0.216, 0.235, 0.24, 0.28])) * SPINE_PX_PER_M)
-    colour, accent = some(rng, *INKS, INK, PAPER, "#e2d9c6", "#4a5a4d"), some(rng, *INKS, PAPER)
-    title, author, block = _words(rng, int(rng.integers(2, 5))).title(), _words(rng, 1).upper(), rng.uniform(-0.6, 0.6)
+    colour = some(rng, *INKS, INK, PAPER, "#e2d9c6", "#4a5a4d")
+    accent = some(rng, *INKS, PAPER)
+    title = _words(rng, int(rng.integers(2, 5))).title()
+    author = _words(rng, 1).upper()
+    block = rng.uniform(-0.6, 0.6)
     image, draw = _canvas(h, w, colour)
     for start, length in ((0.13, max(block, 0)), *((band, 0.012) for band in rng.choice([0.05, 0.09, 0.84], 2))):
         draw.rectangle([start * h, 0, (start + length) * h, w], fill=accent)
@@ -351,7 +388,8 @@ def _series(rng: Rng) -> list[Image.Image]:
     _text(draw, (0.15 * h, 0.5 * w), title, min(0.6 * w, 0.075 * h, 1.25 * h / len(title)), on_title, anchor="lm")
     result = [image.copy() for _ in range(volumes)]
     for k, spine in enumerate(result):
-        last, size = author if volumes == 1 else str(k + 1), min(0.45 * w, 0.06 * h)
+        last = author if volumes == 1 else str(k + 1)
+        size = min(0.45 * w, 0.06 * h)
         _text(ImageDraw.Draw(spine), (0.97 * h, 0.5 * w), last, size, _on(colour), anchor="rm")
     return result
 
@@ -361,7 +399,8 @@ def screen(seed: int = 0) -> Picture:
     """A display (1280 × 720) with files, an editor, a chart, a log and a bar of icons."""
     rng = np.random.default_rng(seed)
     back, bar = ("#1f252b", "#12161a") if rng.random() < 0.7 else ("#f2f1ec", "#d9dcdc")
-    ink, (image, draw) = _on(back), _canvas(1280, 720, back)
+    ink = _on(back)
+    (image, draw) = _canvas(1280, 720, back)
     for box, fill in (((0, 0, 1280, 26), bar), ((0, 26, 190, 690), bar), ((0, 690, 1280, 720), "#34556b")):
         draw.rectangle(box, fill=fill)
     for y0, y1 in ((60, 360), (380, 670)):
@@ -406,7 +445,8 @@ def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
     side = w // 5
     for x, y in ((x, y) for y in range(0, h, side) for x in range(0, w, side)):
         back, front, dot = (some(rng, *INKS[:6], PAPER) for _ in range(3))
-        quarter, half = int(rng.integers(4)), rng.random() < 0.4
+        quarter = int(rng.integers(4))
+        half = rng.random() < 0.4
         draw.rectangle([x, y, x + side, y + side], fill=back)
         left, up = (x, y) if half else (x - side * (quarter in (0, 3)), y - side * (quarter in (0, 1)))
         across = side if half else 2 * side
@@ -420,7 +460,9 @@ def _talk(draw: Draw, rng: Rng, w: int, h: int) -> None:
     _text(draw, (0.04 * w, 0.03 * h), _words(rng, 4).title(), 0.04 * h, PAPER)
     _text(draw, (0.04 * w, 0.08 * h), _words(rng, 6).title(), 0.02 * h, SAND)
     for k in range(3):
-        x0, x1, y = w * (0.04 + 0.32 * k), w * (0.32 + 0.32 * k), h * (0.2 + 0.3 * (k % 2))
+        x0 = w * (0.04 + 0.32 * k)
+        x1 = w * (0.32 + 0.32 * k)
+        y = h * (0.2 + 0.3 * (k % 2))
         draw.rectangle([x0, 0.15 * h, x1, 0.18 * h], fill=some(rng, *INKS))
         _column(draw, rng, (x0, 0.2 * h, x1, 0.96 * h), 0.011 * h)
         draw.rectangle([x0, y, x1, y + 0.2 * h], fill=PAPER)
@@ -452,7 +494,9 @@ def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
     """Brown board (768 × 768 px) with tape, a label with bars and text, and printed marks."""
     rng = np.random.default_rng(seed)
     image = Image.fromarray(ground("kraft", 0, 768).pixels())
-    draw, x, y = ImageDraw.Draw(image), rng.uniform(300, 480), rng.choice([150, 440])
+    draw = ImageDraw.Draw(image)
+    x = rng.uniform(300, 480)
+    y = rng.choice([150, 440])
     for box, fill in (
         ((0, 352, 768, 416), "#c4a882"),
         ((0, 383, 768, 385), "#7d5d3c"),

@@ -124,6 +124,7 @@ def shell(
 
 
 def _hole(opening: Opening, edge_m: Array) -> Hole:
-    (along, up), (width, height) = opening.center_m, opening.size_m
+    (along, up) = opening.center_m
+    (width, height) = opening.size_m
     u = float(np.abs(edge_m).sum() / 2 + along * np.sign(edge_m.sum()))
     return u - width / 2, u + width / 2, up - height / 2, up + height / 2

@@ -13,7 +13,8 @@ from vobench.geometry.se3 import Array
 from vobench.scene.mesh import Faces, Mesh, cross, face_normals, joined, quad, unit
 
 # A lap lies this far behind a wall's joint and reaches this far to both of its sides.
-LAP_BEHIND_M, LAP_M = 0.002, 0.01
+LAP_BEHIND_M = 0.002
+LAP_M = 0.01
 SMOOTH_DEG = 40.0  # a profile that bends by less is round there
 Hole = tuple[float, float, float, float]  # first and last u, first and last v, in metres from a wall's corner
 
@@ -23,7 +24,8 @@ def at(
 ) -> Array:
     """The pose (4, 4) at a place, turned by Rz(yaw) Ry(pitch) Rx(roll) in degrees."""
     (cz, cy, cx), (sz, sy, sx) = (f(np.deg2rad([yaw, pitch, roll])) for f in (np.cos, np.sin))
-    Rz, Ry = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]]), np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    Rz = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    Ry = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
     R = Rz @ Ry @ np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     return se3.transform(R, [x_m, y_m, z_m])
 
@@ -101,7 +103,8 @@ def lathe(profile_m: ArrayLike, *, sections: int = 24) -> Mesh:
     across = np.stack([out, out], axis=1)
     is_round = np.einsum("kj,kj->k", out[:-1], out[1:]) > np.cos(np.deg2rad(SMOOTH_DEG))
     middle = unit(out[:-1] + out[1:])[is_round]
-    across[1:, 0][is_round], across[:-1, 1][is_round] = middle, middle
+    across[1:, 0][is_round] = middle
+    across[:-1, 1][is_round] = middle
     angle, turn = _circle(sections)
     points, normals = (_revolved(part, turn) for part in (ends, across))
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(step, axis=1))])
@@ -119,7 +122,8 @@ def _revolved(pairs: Array, turn: Array) -> Array:
 
 def spline(points_m: ArrayLike, count: int = 16) -> Array:
     """Points (count, 3) of a smooth curve through some."""
-    p, t = np.asarray(points_m, float), np.linspace(0, 1, count)
+    p = np.asarray(points_m, float)
+    t = np.linspace(0, 1, count)
     if len(p) == 3:  # a parabola, for which the spline would call a solver of dense systems
         return np.asarray(np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=1) @ p)
     return np.asarray(scipy.interpolate.CubicSpline(np.linspace(0, 1, len(p)), p)(t))
@@ -151,7 +155,8 @@ def _end(middle_m: Array, ring_m: Array, normal: Array, uv: Array) -> Mesh:
     rows = np.stack([np.broadcast_to(middle_m, ring_m.shape), ring_m])
     places = np.stack([0 * uv, uv])
     if cross(ring_m[1] - ring_m[0], ring_m[0] - middle_m) @ normal < 0:
-        rows, places = rows[::-1], places[::-1]
+        rows = rows[::-1]
+        places = places[::-1]
     return _patches(rows[None], np.broadcast_to(normal, (1, *rows.shape)), places[None])
 
 
@@ -172,14 +177,16 @@ def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> Mesh:
 def sheet(points_m: ArrayLike) -> Mesh:
     """A smooth surface through a grid (R, C, 3), seen from the side of columns × rows."""
     p = np.asarray(points_m, float)
-    rows, columns = np.gradient(p, axis=0), np.gradient(p, axis=1)
+    rows = np.gradient(p, axis=0)
+    columns = np.gradient(p, axis=1)
     u, v = (np.cumsum(np.linalg.norm(np.diff(p, axis=k, prepend=np.take(p, [0], k)), axis=2), axis=k) for k in (1, 0))
     return _patches(p[None], unit(cross(columns, rows))[None], np.stack([u, v], axis=-1)[None])
 
 
 def card(size_m: tuple[float, float], *, cell: Hole = (0.0, 1.0, 0.0, 1.0)) -> Mesh:
     """An upright rectangle around the origin that faces x and shows a cell of a picture, in shares of its sides."""
-    (w, h), (u0, u1, v0, v1) = size_m, cell
+    (w, h) = size_m
+    (u0, u1, v0, v1) = cell
     mesh = quad((0, -w / 2, -h / 2), (0, w, 0), (0, 0, h))
     return Mesh(mesh.vertices_m, mesh.faces, np.array([[u0, v1], [u1, v1], [u1, v0], [u0, v0]]), mesh.normals)
 
@@ -217,18 +224,22 @@ def triangulated(rings: Sequence[Array]) -> Array:
         edges = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in (loop, *rings[1:])]
         bridge = next(int(k) for k in near if not _crosses(loop[k], hole[start], np.concatenate(edges)))
         loop = np.concatenate([loop[: bridge + 1], np.roll(hole, -start, axis=0), hole[[start]], loop[bridge:]])
-    corners, ears = list(range(len(loop))), []
+    corners = list(range(len(loop)))
+    ears = []
     while len(corners) > 3:
         k = next((k for k in range(len(corners)) if _is_ear(loop, corners, k)), 0)
         ears.append([corners[k - 1], corners[k], corners[(k + 1) % len(corners)]])
         del corners[k]
     triangles = loop[np.array([*ears, corners])]
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    a = triangles[:, 0]
+    b = triangles[:, 1]
+    c = triangles[:, 2]
     return np.asarray(triangles[_cross(b - a, c - a) > 0])
 
 
 def _crosses(a: Array, b: Array, edges: Array) -> bool:
-    p, q = edges[:, 0], edges[:, 1]
+    p = edges[:, 0]
+    q = edges[:, 1]
     split = _cross(b - a, p - a) * _cross(b - a, q - a) < 0
     return bool(np.any(split & (_cross(q - p, a - p) * _cross(q - p, b - p) < 0)))
 
@@ -248,11 +259,13 @@ def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes
     The laps stop the light that would pass where two walls only touch.
     """
     corner, u, v = (np.asarray(part, float) for part in (corner_m, edge_u_m, edge_v_m))
-    width, height = float(np.linalg.norm(u)), float(np.linalg.norm(v))
+    width = float(np.linalg.norm(u))
+    height = float(np.linalg.norm(v))
     cuts_u = np.unique([0, width, *(edge for hole in holes for edge in hole[:2])])
     cuts_v = np.unique([0, height, *(edge for hole in holes for edge in hole[2:])])
     cells = [(*us, *vs) for us in pairwise(cuts_u) for vs in pairwise(cuts_v) if not _in_any(holes, us, vs)]
-    near, far = -LAP_M, LAP_M
+    near = -LAP_M
+    far = LAP_M
     laps = [(near, width - near, e + near, e + far) for e in (0, height)]
     laps += [(e + near, e + far, near, height - near) for e in (0, width)]
     behind = -LAP_BEHIND_M * unit(cross(u, v))
@@ -260,20 +273,26 @@ def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes
 
 
 def _in_any(holes: Sequence[Hole], us: tuple[float, float], vs: tuple[float, float]) -> bool:
-    u, v = sum(us) / 2, sum(vs) / 2
+    u = sum(us) / 2
+    v = sum(vs) / 2
     return any(u0 < u < u1 and v0 < v < v1 for u0, u1, v0, v1 in holes)
 
 
 def _part(corner: Array, u: Array, v: Array, cell: Hole) -> Mesh:
-    (u0, u1, v0, v1), axis_u, axis_v = cell, unit(u), unit(v)
+    (u0, u1, v0, v1) = cell
+    axis_u = unit(u)
+    axis_v = unit(v)
     return quad(corner + u0 * axis_u + v0 * axis_v, (u1 - u0) * axis_u, (v1 - v0) * axis_v, uv_m=(u0, v0))
 
 
 def reveal(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, hole: Hole, depth_m: float) -> Mesh:
     """The four sides of a rectangle's hole, down to depth_m behind its face."""
-    u, v = unit(edge_u_m), unit(edge_v_m)
+    u = unit(edge_u_m)
+    v = unit(edge_v_m)
     u0, u1, v0, v1 = hole
     near = np.asarray(corner_m, float) + u0 * u + v0 * v
-    across, along, deep = (u1 - u0) * u, (v1 - v0) * v, -depth_m * cross(u, v)
+    across = (u1 - u0) * u
+    along = (v1 - v0) * v
+    deep = -depth_m * cross(u, v)
     sides = [(near, deep, along), (near + across, along, deep), (near, across, deep), (near + along, deep, across)]
     return joined([quad(*side) for side in sides])

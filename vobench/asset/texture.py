@@ -67,7 +67,8 @@ def poster(texture: "Procedural", rng: np.random.Generator) -> Map:
     for _ in range(160):
         row, column = rng.integers(0, n, 2)
         height, width = (rng.uniform(0.02, 0.22, 2) * n).astype(int)
-        rows, columns = np.arange(row, row + height) % n, np.arange(column, column + width) % n
+        rows = np.arange(row, row + height) % n
+        columns = np.arange(column, column + width) % n
         pattern[np.ix_(rows, columns)] = rng.uniform(-1, 1)
     return pattern + 0.15 * _noise(texture, rng, coarse_m=0.1, fine_m=0.004, slope=0.5)
 

@@ -15,7 +15,9 @@ from vobench import stop
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SENTENCE = "stopped; finished stages are kept, the same command goes on from there"
 GRACE_S = 0.8  # hardly a frame takes as long, but an import may
-CLEAR_LINE, SHOW_CURSOR = "\r\033[K", "\033[?25h"  # what a progress bar leaves behind
+# what a progress bar leaves behind
+CLEAR_LINE = "\r\033[K"
+SHOW_CURSOR = "\033[?25h"
 
 
 def main() -> None:

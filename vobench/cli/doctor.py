@@ -110,7 +110,8 @@ def _installed_drawing() -> list[Check]:
         return _drawing()
     with terminal.Bars().step(f"apt-get install {' '.join(EGL_PACKAGES)}"):
         # Without a word or a question; whether it helped, the next check tells.
-        environment, nowhere = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}, subprocess.DEVNULL
+        environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+        nowhere = subprocess.DEVNULL
         for words in (["update"], ["install", "-y", "--no-install-recommends", *EGL_PACKAGES]):
             command = ["apt-get", "-qq", *words]
             subprocess.run(command, env=environment, check=False, stdin=nowhere, stdout=nowhere)

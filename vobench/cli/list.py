@@ -30,7 +30,8 @@ def list_command(
     kinds = [known for known in KINDS if kind in (None, known, f"{known}s")]
     if not kinds:
         raise UnknownNameError(unknown("kind", str(kind), [f"{known}s" for known in KINDS]))
-    facts, seen = list[dict[str, Any]](), set[tuple[str, str]]()
+    facts = list[dict[str, Any]]()
+    seen = set[tuple[str, str]]()
     for entry in (entry for wanted in kinds for entry in catalog.entries(wanted)):
         fact = {"kind": entry.kind, "name": entry.name, "summary": _summary(entry), "origin": entry.origin}
         # Where a name is there twice, the second is hidden by the first.

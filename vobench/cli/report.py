@@ -25,7 +25,9 @@ from vobench.runner.signature import signed_by
 
 # A narrow terminal goes without these, in this order; every report has them all.
 LEAST_FIRST = ("MiB", "mean place", "CPU ms/frame", "ATE %", "failed", "decided", "× first")
-ENDLESS, FOLDED = 10_000, 12  # widths: of a table as it would like to be, and of an estimator's name above a column
+# widths: of a table as it would like to be, and of an estimator's name above a column
+ENDLESS = 10_000
+FOLDED = 12
 MOST_CASES = 60  # that a terminal shows
 TERMINAL = "terminal"
 FORMS = (*FORMATS, "html")
@@ -59,7 +61,8 @@ def report_command(
     chosen = _chosen(form, out, as_json=json)
     terminal.known("metric", metric, METRICS)
     with ExitStack() as stack:
-        folders, wrong = [], dict[str, str]()
+        folders = []
+        wrong = dict[str, str]()
         signatures = [told for run in runs if (told := _signature(run, allowed_signers))]
         for run in runs:
             folders.append(stack.enter_context(opened(run, terminal.warn)))
@@ -95,7 +98,8 @@ def _print_claimed(claimed: list[Rescored]) -> None:
     """The trials that only claim a score, apart from the board."""
     rows = []
     for trial in claimed:
-        score, ate_m = trial.score, trial.score.value("ate_trans", "rmse")
+        score = trial.score
+        ate_m = trial.score.value("ate_trans", "rmse")
         rows.append([score.case, score.estimator, score.status, "" if ate_m is None else f"{ate_m:.3g}", trial.claimed])
     if rows:
         headings = ["case", "estimator", "status", "ATE m", "why it cannot be scored again"]
@@ -150,7 +154,8 @@ def compare_command(
 
 def _print_changes(changes: list[compare.Change]) -> None:
     """The totals, then the cells that are not as they were."""
-    out, headings = terminal.console(), ["estimator", "verdict", "old", "new", "ratio", "p"]
+    out = terminal.console()
+    headings = ["estimator", "verdict", "old", "new", "ratio", "p"]
     for title, chosen in (
         ("lost-aware score over all cases", [change for change in changes if not change.case]),
         ("ATE % of path", [change for change in changes if change.case and change.verdict != compare.SAME]),
@@ -186,7 +191,8 @@ def bundle_command(
 ) -> None:
     """Pack a run's suite, versions, truth, estimates, scores and hashes, for others to score again and to merge."""
     require_zip(out)
-    files, size = bundle(open_run(run), out), out.stat().st_size
+    files = bundle(open_run(run), out)
+    size = out.stat().st_size
     signature = make_signature(out, sign) if sign else None
     if json:
         signed = {"signature": str(signature)} if signature else {}
@@ -202,7 +208,8 @@ def score_bundle(path: Path, *, as_json: bool) -> None:
     """Score a bundle again and print its board of the new scores; exit code 1 where they are not those it states."""
     with opened(path, terminal.warn) as folder:
         again = list(scored_again(folder, wrong_truths(folder)))
-        scores, wrong = [score for score, _ in again], [score for score, same in again if not same]
+        scores = [score for score, _ in again]
+        wrong = [score for score, same in again if not same]
         board = page.board_of(folder, scores)
     if as_json:
         terminal.print_json({"trials": len(again), "differ": [_named(score) for score in wrong]})

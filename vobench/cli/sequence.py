@@ -117,7 +117,8 @@ def _print_info(facts: dict[str, Any]) -> None:
 
 
 def _row(topic: dict[str, Any]) -> list[str]:
-    rate_hz, start_ns = topic["rate_hz"], topic["start_ns"]
+    rate_hz = topic["rate_hz"]
+    start_ns = topic["start_ns"]
     span_s = "" if start_ns is None else f"{(topic['end_ns'] - start_ns) / 1e9:.3f}"
     return [topic["name"], topic["type_name"], str(topic["count"]), f"{rate_hz:.2f}" if rate_hz else "", span_s]
 

@@ -62,7 +62,9 @@ def picture(message: Any, name: str) -> Picture:
 
 def _pixels(message: Any, name: str, channels: int, size: int) -> NDArray[Any]:
     """Pixels (H, W, channels) of `size` bytes each; rows may be longer than their pixels need."""
-    height, width, step = int(message.height), int(message.width), int(message.step)
+    height = int(message.height)
+    width = int(message.width)
+    step = int(message.step)
     needed = width * channels * size
     if height < 1 or width < 1 or step < needed or message.data.size < height * step:
         raise InputError(
@@ -124,7 +126,8 @@ def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
 
 def _require_ros2(path: Path) -> None:
     """Raise InputError where an MCAP file holds messages of another kind. Source: mcap.dev/spec, Header."""
-    start, at = head(path), len(MAGIC) + 13
+    start = head(path)
+    at = len(MAGIC) + 13
     if len(start) < at or start[len(MAGIC)] != Opcode.HEADER:
         raise InputError(f"an MCAP file should begin with its header, this one does not: {path}")
     (length,) = struct.unpack_from("<I", start, at - 4)
@@ -163,7 +166,8 @@ def _walk(reader: Any, chosen: Chosen, path: Path) -> Contents:
         if hasattr(message, "header"):
             stamps.setdefault(topic, []).append(ros.stamp_ns(message))
         if topic == chosen.imu:
-            w, a = message.angular_velocity, message.linear_acceleration
+            w = message.angular_velocity
+            a = message.linear_acceleration
             readings.append((w.x, w.y, w.z, a.x, a.y, a.z))
     unheard = next((topic for topic in (chosen.left, chosen.right) if topic and topic not in first), None)
     if unheard:
@@ -199,9 +203,11 @@ def _rising(t_ns: Stamps, topic: str, path: Path) -> Stamps:
 
 
 def _shots(path: Path, chosen: Chosen, found: Contents, options: ReadOptions) -> tuple[Any, Stamps, Notes]:
-    stamps, notes = {chosen.left: found.stamps[chosen.left]}, Notes()
+    stamps = {chosen.left: found.stamps[chosen.left]}
+    notes = Notes()
     if chosen.right is not None:
-        left_ns, right_ns = found.stamps[chosen.left], found.stamps[chosen.right]
+        left_ns = found.stamps[chosen.left]
+        right_ns = found.stamps[chosen.right]
         at_left, at_right, notes = partners(left_ns, right_ns, options.within_ns, str(path))
         stamps = {chosen.left: left_ns[at_left], chosen.right: right_ns[at_right]}
     places = {topic: {int(t): index for index, t in enumerate(t_ns)} for topic, t_ns in stamps.items()}

@@ -17,8 +17,10 @@ from vobench.sequence import messages as ros
 from vobench.sequence.messages import ALL_AROUND, DOUBLE_SPHERE
 from vobench.sequence.recording import POSES
 
-RAW, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
-INFO, IMU = "sensor_msgs/msg/CameraInfo", "sensor_msgs/msg/Imu"
+RAW = "sensor_msgs/msg/Image"
+COMPRESSED = "sensor_msgs/msg/CompressedImage"
+INFO = "sensor_msgs/msg/CameraInfo"
+IMU = "sensor_msgs/msg/Imu"
 # What tells a left from a right topic.
 SIDES = (
     ("left", "right"),
@@ -151,7 +153,8 @@ def tree_of(messages: list[Any], path: str) -> Tree:
     """The transforms of TFMessages. Raises InputError for one that is no rigid transform."""
     links = {}
     for stamped in (stamped for message in messages for stamped in message.transforms):
-        parent, child = plain(stamped.header.frame_id), plain(stamped.child_frame_id)
+        parent = plain(stamped.header.frame_id)
+        child = plain(stamped.child_frame_id)
         fields = np.array(ros.pose_fields(stamped.transform), float)
         norm = float(np.linalg.norm(fields[3:])) if np.isfinite(fields).all() else 0.0
         if abs(norm - 1) > 1e-3:

@@ -35,7 +35,9 @@ IMU_COLUMNS = ("t", "wx", "wy", "wz", "ax", "ay", "az")
 
 def sensor_camera(values: kalibr.Values) -> tuple[Camera, Array]:
     """A camera and its place T_body_camera by its sensor.yaml. Raises InputError."""
-    kind, size, numbers = values.text("camera_model"), values.size("resolution"), values.numbers("intrinsics")
+    kind = values.text("camera_model")
+    size = values.size("resolution")
+    numbers = values.numbers("intrinsics")
     bends = values.numbers("distortion_coefficients") if values.has("distortion_coefficients") else []
     if kind == "ds" and len(numbers) == 6:
         return DoubleSphere(*size, *numbers[2:], *numbers[:2]), values.transform("T_BS")
@@ -67,7 +69,9 @@ def sensor_place(folder: Path) -> Array | None:
     return values.transform("T_BS") if values.has("T_BS") else None
 
 
-CAMERAS, SENSOR, DATA = ("cam0", "cam1"), "sensor.yaml", "data.csv"
+CAMERAS = ("cam0", "cam1")
+SENSOR = "sensor.yaml"
+DATA = "data.csv"
 # In order of trust: the batch estimate, TUM-VI's poses of the IMU, and a tracker's of its marker.
 TRUTHS = ("state_groundtruth_estimate0", "mocap0", "vicon0")
 POSITIONS = "leica0"
@@ -124,7 +128,8 @@ def _rig(root: Path, folder: Path, count: int, options: ReadOptions) -> tuple[Ri
 
 
 def _imu(root: Path, folder: Path, options: ReadOptions) -> tuple[ImuReadings | None, ImuCalibration | None, Notes]:
-    data, sensor = root / "imu0" / DATA, root / "imu0" / SENSOR
+    data = root / "imu0" / DATA
+    sensor = root / "imu0" / SENSOR
     if not data.is_file():
         return None, None, ("There are no readings of an IMU.",)
     noise = options.imu or (None if sensor.is_file() else kalibr.find_imu(folder, options))
@@ -156,7 +161,8 @@ def _tracked(folder: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
     elif (T_body_tracked == np.eye(4)).all():
         how = "which is that of the body"
     else:
-        truth, how = truth.of_mounted(se3.inverse(T_body_tracked)), "moved to the body by its T_BS"
+        truth = truth.of_mounted(se3.inverse(T_body_tracked))
+        how = "moved to the body by its T_BS"
     rest = ("Velocities and biases beside the true poses were not read.",) if folder.name == TRUTHS[0] else ()
     return truth, (f"The truth is {folder.name}, {how}.", *rest, *notes)
 
@@ -179,7 +185,8 @@ IMU_HEADER = (
 
 def write_euroc(source: ExportSource, views: Views, folder: Path) -> list[str]:
     """Fill `folder` with mav0 and say what was converted. Raises SequenceError for a camera that sees all around."""
-    mav, rig = folder / "mav0", views.rig
+    mav = folder / "mav0"
+    rig = views.rig
     T_base_body = rig.imu.T_body_imu if rig.imu else np.eye(4)  # from our body, base_link, to that of EuRoC
     T_body_base = se3.inverse(T_base_body)
     stamps = _write_pictures(source, views, mav)
@@ -243,7 +250,8 @@ def _write_imu(source: ExportSource, imu: ImuCalibration, mav: Path) -> list[str
 def _write_truth(source: ExportSource, T_base_body: Array, mav: Path) -> list[str]:
     if source.truth is None:
         return ["No truth was recorded, so there is no state_groundtruth_estimate0."]
-    notes, columns = [], []
+    notes = []
+    columns = []
     if source.twist is None:
         notes.append("No velocities were recorded, so the truth's rows end after the pose.")
     else:
@@ -266,7 +274,8 @@ def point_velocity(truth: Trajectory, twist: Array, lever_m: Array) -> Array:
 
 def _biases(source: ExportSource) -> tuple[list[Array], str]:
     """Biases (N, 6) at the truth's stamps, where there are some, and the sentence on them."""
-    bias, truth = source.bias, source.truth
+    bias = source.bias
+    truth = source.truth
     if bias is None or truth is None:
         return [], "No biases of an IMU were recorded, so the truth's rows end after the velocity."
     values = np.hstack([bias.gyro_radps, bias.accel_mps2])

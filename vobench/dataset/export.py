@@ -46,7 +46,10 @@ def export_trajectory(trajectory: Trajectory, path: Path, form: str) -> tuple[Pa
     return tuple(texts)
 
 
-NOTES, PHOTOMETRIC, CHAIN, IMU_FILE = "NOTES.txt", "photometric", "camchain.yaml", "imu.yaml"
+NOTES = "NOTES.txt"
+PHOTOMETRIC = "photometric"
+CHAIN = "camchain.yaml"
+IMU_FILE = "imu.yaml"
 TOLD = (
     "The calibration is the one that estimators are told; the pictures were made with another one, as the case asks, "
     "and that one was left out."
@@ -71,7 +74,8 @@ def export(sequence: Path, out: Path, form: str) -> Exported:
     out = out.resolve()
     require_free(out)
     source = open_source(sequence)
-    views, stamps = layout.views(source.rig), layout.stamps(source)
+    views = layout.views(source.rig)
+    stamps = layout.stamps(source)
     with _building(out) as folder:
         notes = layout.write(source, views, folder)
         notes += write_calibration(views.rig, layout, folder)
@@ -133,7 +137,8 @@ def _left_out(source: ExportSource, layout: Writing) -> list[str]:
 
 
 def _told_truly(source: ExportSource) -> bool:
-    told, true = source.rig, source.true_rig
+    told = source.rig
+    true = source.true_rig
     cameras = all(told.camera(side) == true.camera(side) for side in told.sides)
     return cameras and all((told.T_body_camera(side) == true.T_body_camera(side)).all() for side in told.sides)
 

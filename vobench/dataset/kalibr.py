@@ -171,8 +171,11 @@ def focal_camera(
     )
 
 
-KALIBR_RADTAN, EQUI, NO_BEND = "radtan", "equidistant", "none"
-PINHOLE, SPHERES = "pinhole", "ds"
+KALIBR_RADTAN = "radtan"
+EQUI = "equidistant"
+NO_BEND = "none"
+PINHOLE = "pinhole"
+SPHERES = "ds"
 RADTAN_TERMS = ("k1", "k2", "p1", "p2")
 ALL_AROUND = "neither Kalibr nor EuRoC has words for a camera that sees all around (ros2 keeps it)"
 DENSITIES = {
@@ -228,7 +231,8 @@ def camchain(rig: Rig, topics: tuple[str, ...] = ("/cam0/image_raw", "/cam1/imag
 
 def _entry(rig: Rig, index: int, topic: str) -> str:
     side = rig.sides[index]
-    camera, others = rig.camera(side), [other for other in range(len(rig.sides)) if other != index]
+    camera = rig.camera(side)
+    others = [other for other in range(len(rig.sides)) if other != index]
     model, linear, bend, coefficients = intrinsics(camera)
     T_cam_body = se3.inverse(rig.T_body_camera(side))
     lines = [
@@ -263,7 +267,8 @@ def imu_yaml(imu: ImuCalibration, *, topic: str) -> str:
 def read_camchain(path: Path) -> Rig:
     """The rig of a camchain.yaml; the body is the IMU, or cam0 where the chain knows none. Raises InputError."""
     chain = read_yaml(path)
-    left, placed = _camera(chain, "cam0"), chain.has("cam0", "T_cam_imu")
+    left = _camera(chain, "cam0")
+    placed = chain.has("cam0", "T_cam_imu")
     T_body_left = se3.inverse(chain.transform("cam0", "T_cam_imu")) if placed else np.eye(4)
     if not chain.has("cam1"):
         return Rig(left, None, T_body_left, None)
@@ -290,7 +295,8 @@ def read_pair(path: Path) -> Rig:
 
 
 def _camera(chain: Values, name: str) -> Camera:
-    model, linear = chain.text(name, "camera_model"), chain.numbers(name, "intrinsics")
+    model = chain.text(name, "camera_model")
+    linear = chain.numbers(name, "intrinsics")
     size = chain.size(name, "resolution")
     if model == SPHERES and len(linear) == 6:
         return DoubleSphere(*size, *linear[2:], *linear[:2])

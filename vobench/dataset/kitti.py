@@ -19,26 +19,32 @@ from vobench.trajectory.formats import content, format_kitti, format_times, pars
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
 PAIRS = (("image_0", "image_1"), ("image_2", "image_3"))  # grey, colour
-CALIBRATION, TIMES, POSES = "calib.txt", "times.txt", "poses.txt"
+CALIBRATION = "calib.txt"
+TIMES = "times.txt"
+POSES = "poses.txt"
 T_BODY_GREY = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))
 TRUTH = (
     "of the left grey camera; its world is that camera at the start, turned from "
     "x right, y down, z ahead to x ahead, y left, z up."
 )
-USUAL_PX, MOST_OFF_CENTER = (1241, 376), 0.1  # sequences 00 to 02; a share of the size
+# sequences 00 to 02; a share of the size
+USUAL_PX = (1241, 376)
+MOST_OFF_CENTER = 0.1
 SKEW_TOLERANCE = 1e-6  # of KITTI's seven digits: K's lower triangle is zero
 
 
 def read_kitti(folder: Path, options: ReadOptions) -> Recording:
     """A folder such as sequences/00; the body is the camera of image_0, its axes ahead, left, up. Raises InputError."""
     names, pair_notes = _pair(folder)
-    eyes, times = numbered(*(folder / name for name in names)), folder / TIMES
+    eyes = numbered(*(folder / name for name in names))
+    times = folder / TIMES
     t_ns = parse_times(read_text(times), name=str(times))
     if len(t_ns) != len(eyes[0]):
         raise InputError(f"{len(t_ns)} times for {len(eyes[0])} pictures in {folder / names[0]}: {times}")
     stream = picture_files(t_ns, *eyes)
     rig, calibration, lens_notes = _rig(folder, names, stream.size_px, options)
-    named, root = f"{folder.absolute().name}.txt", folder.absolute()
+    named = f"{folder.absolute().name}.txt"
+    root = folder.absolute()
     beside = (root / POSES, root / named, *(up / "poses" / named for up in root.parents[:2]))
     truth, truth_notes = truth_file(options, beside, t_ns, TRUTH, T_BODY_GREY)
     notes = ("The body is the left grey camera, x ahead, y left, z up.", *pair_notes, *lens_notes, *truth_notes)
@@ -85,7 +91,8 @@ def read_pair(path: Path, size_px: tuple[int, int] | None = None) -> Rig:
 
     Without a size the pictures are as KITTI's first ones. Raises InputError, also where they cannot be.
     """
-    matrices, pairs = read_calibration(path), [[f"P{name[-1]}" for name in pair] for pair in PAIRS]
+    matrices = read_calibration(path)
+    pairs = [[f"P{name[-1]}" for name in pair] for pair in PAIRS]
     needed = next((names for names in pairs if matrices.keys() >= set(names)), None)
     if needed is None:
         raise InputError(f"{path}: a pair is P0 and P1, or P2 and P3, and there is {', '.join(matrices) or 'none'}")
@@ -127,7 +134,8 @@ def _camera(P: Array, size_px: tuple[int, int], place: str) -> tuple[Pinhole, Ar
 
 def write_kitti(source: ExportSource, views: Views, folder: Path) -> list[str]:
     """Fill `folder` and say what was converted."""
-    stamps, kept = source.sequence.frame_stamps(), _covered(source)
+    stamps = source.sequence.frame_stamps()
+    kept = _covered(source)
     for index in range(len(views.rig.sides)):
         (folder / f"image_{index}").mkdir()
     frames = (frame for frame in png_frames(source.sequence, views) if kept[frame.index])
@@ -144,7 +152,8 @@ def write_kitti(source: ExportSource, views: Views, folder: Path) -> list[str]:
 
 def _covered(source: ExportSource) -> NDArray[np.bool_]:
     """Which frames (N,) the layout can have: those within the truth's time; all where there is no truth for any."""
-    stamps, truth = source.sequence.frame_stamps(), source.truth
+    stamps = source.sequence.frame_stamps()
+    truth = source.truth
     within = np.zeros(len(stamps), bool)
     if truth is not None:
         within = (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])

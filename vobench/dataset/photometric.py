@@ -110,7 +110,8 @@ def passed(rays: Array, photometry: Photometry) -> Array:
 
 def camera_text(camera: Camera) -> str | None:
     """DSO's camera.txt, where the first pixel's centre is at 0.5, here at 0; None for a lens unknown to it."""
-    width, height = camera.width_px, camera.height_px
+    width = camera.width_px
+    height = camera.height_px
     (fx, _, cx), (_, fy, cy), _ = camera.K.tolist()
     relative = [fx / width, fy / height, (cx + 0.5) / width, (cy + 0.5) / height]
     if isinstance(camera, Pinhole):

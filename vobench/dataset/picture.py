@@ -89,7 +89,9 @@ def unread(folder: Path, *used: str) -> tuple[str, ...]:
 
 
 Form = Literal["png", "jpeg", "pixels"]
-PNG, JPEG, JPEG_END = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\xff\xd9"
+PNG = b"\x89PNG\r\n\x1a\n"
+JPEG = b"\xff\xd8\xff"
+JPEG_END = b"\xff\xd9"
 MOST_PIXELS = 1 << 26  # 67 megapixels; a header that asks for more is a mistake or a trap
 GREY_SHARES = "0.299 red + 0.587 green + 0.114 blue"
 
@@ -201,7 +203,8 @@ def _file_kind(data: bytes, name: str) -> Kind:
 
 def _png_chunks(data: bytes, name: str) -> set[bytes]:
     """The kinds of its chunks; every one's checksum is right, and the last is the end."""
-    place, kinds = len(PNG), set()
+    place = len(PNG)
+    kinds = set()
     while place + 12 <= len(data):
         length, kind = struct.unpack_from(">I4s", data, place)
         end = place + 12 + length

@@ -177,7 +177,8 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
             f"{len(parsed.T)} poses without stamps for {len(frames_ns)} pictures: give one pose a picture, or each "
             f"row its picture's number, from 0, as a first of 13 columns: {path}"
         )
-    T, notes = parsed.T, list(parsed.notes)
+    T = parsed.T
+    notes = list(parsed.notes)
     off = np.abs(np.swapaxes(T[:, :3, :3], -1, -2) @ T[:, :3, :3] - np.eye(3)).max(initial=0.0)
     if parsed.frames is not None:
         notes.append(f"{path.name} has poses of {len(T)} of {len(frames_ns)} pictures, by their numbers.")
@@ -202,7 +203,8 @@ def truth_file(
 
 def cut_to(truth: Trajectory, frames_ns: Stamps) -> tuple[Trajectory | None, Notes]:
     """The truth from the last pose before the first picture to the first after the last one, and what that dropped."""
-    t_ns, inside = truth.t_ns, around(truth.t_ns, frames_ns)
+    t_ns = truth.t_ns
+    inside = around(truth.t_ns, frames_ns)
     if inside is None:
         return None, (apart("truth", t_ns, frames_ns),)
     kept = Trajectory(t_ns[inside], truth.T_world_frame[inside])
@@ -217,7 +219,8 @@ def cut_to(truth: Trajectory, frames_ns: Stamps) -> tuple[Trajectory | None, Not
 
 def around(t_ns: Stamps, frames_ns: Stamps) -> slice | None:
     """From the last stamp before the first picture to the first after the last one; None where they share no time."""
-    first, last = frames_ns[0], frames_ns[-1]
+    first = frames_ns[0]
+    last = frames_ns[-1]
     if not len(t_ns) or t_ns[-1] < first or t_ns[0] > last:
         return None
     begin = max(int(np.searchsorted(t_ns, first, side="right")) - 1, 0)
@@ -284,7 +287,8 @@ def _pair_notes(rig: Rig, calibration: str) -> Notes:
 
 def _imu_within(imu: ImuReadings, frames_ns: Stamps) -> tuple[ImuReadings | None, Notes]:
     """The readings of the pictures' time, with one before and one after as the truth has, and what that dropped."""
-    inside, count = around(imu.t_ns, frames_ns), len(imu.t_ns)
+    inside = around(imu.t_ns, frames_ns)
+    count = len(imu.t_ns)
     if inside is None:
         return None, (apart("IMU", imu.t_ns, frames_ns),)
     kept = ImuReadings(imu.t_ns[inside], imu.gyro_radps[inside], imu.accel_mps2[inside])
@@ -299,7 +303,8 @@ def _imu_within(imu: ImuReadings, frames_ns: Stamps) -> tuple[ImuReadings | None
 
 def _span(t_ns: Stamps, what: str) -> int:
     """The first stamp. Raises InputError where one is no ROS time."""
-    first, last = int(t_ns[0]), int(t_ns[-1])
+    first = int(t_ns[0])
+    last = int(t_ns[-1])
     if first < 0 or last >= END_OF_STAMPS_NS:
         raise InputError(
             f"stamps should be within 0 and {END_OF_STAMPS_NS - 1} ns, but a {what} has {first if first < 0 else last}"
@@ -330,7 +335,9 @@ def read_list(path: Path, folder: Path, *, separator: str | None, unit: Unit) ->
         raise InputError(f"the list has no picture: {path}")
     fields = [[field.strip() for field in body.split(separator, 1)] for _, body in rows]
     if separator == "," and not NUMBER.fullmatch(fields[0][0]):
-        rows, fields = rows[1:], fields[1:]  # a header without its #
+        # a header without its #
+        rows = rows[1:]
+        fields = fields[1:]
     for (line, body), row in zip(rows, fields, strict=True):
         if len(row) != 2 or not NUMBER.fullmatch(row[0]):
             raise InputError(f"{path}:{line}: a row should be a stamp and a picture's name, but is {body[:80]!r}")
@@ -348,7 +355,8 @@ def listed_pictures(
 
     Pictures up to `within_ns` apart are a pair. Raises InputError as `read_list` does, and where no pair is there.
     """
-    eyes, notes = [read_list(path, folder, separator=separator, unit=unit) for path, folder in lists], Notes()
+    eyes = [read_list(path, folder, separator=separator, unit=unit) for path, folder in lists]
+    notes = Notes()
     if len(eyes) > 1:
         left, right = eyes
         at_left, at_right, notes = partners(left.t_ns, right.t_ns, within_ns, f"{left.name} and {right.name}")

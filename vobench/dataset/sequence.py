@@ -25,8 +25,10 @@ def read_own(path: Path, _options: ReadOptions) -> Recording:
     """All that the sensors of a sequence of our own say, and its true path. Raises SequenceError."""
     folder = path.parent if path.is_file() else path
     sequence = Sequence.open(folder)
-    stamps, imu = sequence.frame_stamps(), sequence.imu()
-    encoders, exposures = sequence.encoders(), sequence.exposures()
+    stamps = sequence.frame_stamps()
+    imu = sequence.imu()
+    encoders = sequence.encoders()
+    exposures = sequence.exposures()
     truth = read_truth(folder) if has_truth(folder) else None
     streams = [stamps, imu.t_ns, encoders[0], *([] if truth is None else [truth.t_ns])]
     return Recording(
@@ -79,7 +81,8 @@ def _write_imu(writer: SequenceWriter, imu: ImuReadings, index: int) -> None:
 def _pictures(writer: SequenceWriter, recording: Recording) -> Writes:
     """The pictures, each with its exposure. Raises InputError where they are not as many as the recording says."""
     exposed_ns, settings = recording.exposures or ((), ())
-    exposure_of, count = dict(zip(map(int, exposed_ns), settings, strict=True)), 0
+    exposure_of = dict(zip(map(int, exposed_ns), settings, strict=True))
+    count = 0
     for frame in recording.encoded_frames():
         yield frame.t_ns, partial(writer.write_encoded_frame, frame.t_ns, frame.left, frame.right, frame.form)
         if frame.t_ns in exposure_of:

@@ -137,7 +137,8 @@ def open_source(folder: Path) -> ExportSource:
     readings = imu if len(imu.t_ns) else None
     if not has_truth(folder):
         return ExportSource(folder, sequence, sequence.rig, imu=readings)
-    truth, bias = read_truth(folder), read_imu_bias(folder)
+    truth = read_truth(folder)
+    bias = read_imu_bias(folder)
     return ExportSource(
         folder,
         sequence,
@@ -196,7 +197,8 @@ def pixel_difference(expected: Rig, found: Rig) -> float:
     """The largest distance in px between two rigs' views of the same points; infinite for other pictures."""
     if expected.sides != found.sides:
         return np.inf
-    points, largest = known_points(expected.left), 0.0
+    points = known_points(expected.left)
+    largest = 0.0
     for side in expected.sides:
         cameras = expected.camera(side), found.camera(side)
         if len({(camera.width_px, camera.height_px) for camera in cameras}) > 1:

@@ -13,7 +13,8 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import Rig, looking, side_by_side
 
-RATE_HZ, MOST_HZ = 25.0, 1e6
+RATE_HZ = 25.0
+MOST_HZ = 1e6
 BASELINE_M = 0.25
 FOCAL_PX = 320.0  # 90° across 640 pixels; the centre is half the size, as its authors give it
 SIZES_PX = ((640, 480), (640, 640))

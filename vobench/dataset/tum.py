@@ -29,7 +29,9 @@ from vobench.sequence import read_truth_frames
 from vobench.sequence.picture import write_png
 from vobench.trajectory.formats import format_tum, seconds
 
-LIST, TRUTH, DEPTH = "rgb.txt", "groundtruth.txt", "depth.txt"
+LIST = "rgb.txt"
+TRUTH = "groundtruth.txt"
+DEPTH = "depth.txt"
 # The colour cameras of the three robots, 640 x 480. Source: the benchmark's page "File Formats".
 CAMERAS: dict[str, Camera] = {
     "freiburg1": BrownConrady(640, 480, 517.3, 516.5, 318.6, 255.3, 0.2624, -0.9531, -0.0054, 0.0026, 1.1633),
@@ -102,7 +104,9 @@ def _write_depth(source: ExportSource, folder: Path) -> list[str]:
     if source.true_rig.left.depth_along != "axis":
         return ["The depth along rays was dropped, for TUM's is along the optical axis."]
     (folder / DEPTH_TOPIC).mkdir()
-    stamps, beyond, known = [], 0, 0
+    stamps = []
+    beyond = 0
+    known = 0
     for frame in read_truth_frames(source.folder, (DEPTH_TOPIC,)):
         depth_m = frame.left.depth
         if depth_m is None:
@@ -128,7 +132,8 @@ def depth_values(depth_m: Floats) -> Ids:
 
 def _write_imu(imu: ImuReadings, folder: Path) -> list[str]:
     both = np.hstack([imu.gyro_radps, imu.accel_mps2]).tolist()
-    rows, t_ns = [[repr(value) for value in row] for row in both], imu.t_ns.tolist()
+    rows = [[repr(value) for value in row] for row in both]
+    t_ns = imu.t_ns.tolist()
     accel = (" ".join(row[3:]) for row in rows)
     _write_table(folder / "accelerometer.txt", "accelerometer data", "ax ay az", t_ns, accel)
     _write_table(folder / "imu.txt", "IMU data", "wx wy wz ax ay az", t_ns, map(" ".join, rows))

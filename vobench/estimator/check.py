@@ -13,7 +13,8 @@ from vobench.geometry.se3 import Array
 
 # Beyond any path, and small enough for sums of squares to stay finite.
 FARTHEST_M = 1e12
-REASON_LETTERS, NAME_LETTERS = 500, 80
+REASON_LETTERS = 500
+NAME_LETTERS = 80
 
 
 class InvalidOutputError(VobenchError):
@@ -107,7 +108,8 @@ def _status(status: Any) -> Status:
 def _tracks(tracks: Any) -> Tracks:
     if not isinstance(tracks, Tracks):
         raise InvalidOutputError(f"tracks must be a vobench.estimator.Tracks, got {type(tracks).__name__}")
-    last, now = _array(tracks.uv_last_px, "uv_last_px"), _array(tracks.uv_px, "uv_px")
+    last = _array(tracks.uv_last_px, "uv_last_px")
+    now = _array(tracks.uv_px, "uv_px")
     inlier = _array(tracks.inlier, "inlier").astype(bool)
     if not (last.shape == now.shape == (len(inlier), 2) and inlier.ndim == 1):
         shapes = f"{last.shape}, {now.shape} and {inlier.shape}"

@@ -140,7 +140,8 @@ def _matched(parsed: Parsed, t_ns: Stamps) -> dict[int, Array]:
     after = np.clip(np.searchsorted(t_ns, stamps), 1, max(len(t_ns) - 1, 1))
     near = np.where(stamps - t_ns[after - 1] < t_ns[after] - stamps, after - 1, after) if len(t_ns) > 1 else after - 1
     half_ns = np.diff(t_ns).min() / 2 if len(t_ns) > 1 else np.inf
-    off, again = np.abs(t_ns[near] - stamps) > half_ns, np.diff(near, prepend=-1) < 1
+    off = np.abs(t_ns[near] - stamps) > half_ns
+    again = np.diff(near, prepend=-1) < 1
     for wrong, said in ((off, "no frame"), (again, "the same frame as the one before")):
         if wrong.any():
             row = int(np.argmax(wrong))

@@ -64,7 +64,8 @@ class Home:
         """Remove the folder, wherever it is by now, and what has taken its place; a second call does nothing."""
         if self._lock < 0:
             return
-        lock, self._lock = self._lock, -1
+        lock = self._lock
+        self._lock = -1
         left = remove_below(self.descriptor)
         left += self._remove_renamed()
         left += remove_below(lock)

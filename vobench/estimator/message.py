@@ -24,14 +24,19 @@ VERSION = 1
 HEADER = struct.Struct("<4sI")
 FRAME = struct.Struct("<qqIIIIII")  # index, t_ns, width, height, channels, pictures, IMU readings, encoder readings
 ANSWER = struct.Struct("<qII")  # index, status, what follows: the sum of some of these
-POSE, COVARIANCE, STATS, TRACKS, POINTS = 1, 2, 4, 8, 16
+POSE = 1
+COVARIANCE = 2
+STATS = 4
+TRACKS = 8
+POINTS = 16
 COUNT = struct.Struct("<I")
 STATUSES = tuple(Status)
 LAST_ROW = np.array([0.0, 0.0, 0.0, 1.0])
 # What an estimator may say instead of an answer, and the status of its trial then.
 FAILURES = {b"FAIL": "refused", b"CRSH": "crashed", b"NMEM": "out_of_memory", b"WRNG": "invalid_output"}
 ANSWER_BYTES = 64 << 20  # a pose, some numbers, tracks and points; more is no answer but noise on the connection
-STATS_BYTES, REASON_BYTES = 1 << 16, 1 << 12
+STATS_BYTES = 1 << 16
+REASON_BYTES = 1 << 12
 
 
 def calibration(rig: Rig) -> dict[str, Any]:
@@ -49,7 +54,8 @@ def framed(frame: Frame) -> list[bytes | memoryview]:
     """A frame's parts: FRAME, the pictures row by row, IMU readings and encoder counts, each after its stamp."""
     pictures = [picture for picture in (frame.left, frame.right) if picture is not None]
     height, width, channels = (*pictures[0].shape, 1)[:3] if pictures else (0, 0, 0)
-    imu, encoders = frame.imu, frame.encoders
+    imu = frame.imu
+    encoders = frame.encoders
     counts = (len(pictures), 0 if imu is None else len(imu.t_ns), 0 if encoders is None else len(encoders.t_ns))
     parts: list[bytes | memoryview] = [FRAME.pack(frame.index, frame.t_ns, width, height, channels, *counts)]
     parts += [np.ascontiguousarray(picture).tobytes() for picture in pictures]
@@ -71,7 +77,8 @@ def pickled(frame: Frame) -> list[bytes | memoryview]:
 
 def unpickled(payload: bytearray) -> Frame:
     """The frame of these parts; its arrays are the payload's memory."""
-    view, parts = memoryview(payload), list[memoryview]()
+    view = memoryview(payload)
+    parts = list[memoryview]()
     while view:
         end = COUNT.size + COUNT.unpack_from(view)[0]
         parts.append(view[COUNT.size : end])
@@ -83,7 +90,8 @@ def unpickled(payload: bytearray) -> Frame:
 def answered(result: Result, index: int) -> bytes:
     """What a POSE says: a checked result of a frame as bytes."""
     reason = result.reason.encode("utf-8", "replace")
-    what, parts = 0, list[bytes]()
+    what = 0
+    parts = list[bytes]()
     for bit, table in ((POSE, result.T_odom_frame), (COVARIANCE, result.covariance)):
         if table is not None:
             what |= bit
@@ -151,7 +159,8 @@ class _Reader:
     """Reads one thing after another from a message. Raises InvalidOutputError where it is too short."""
 
     def __init__(self, payload: bytes, at: int) -> None:
-        self._payload, self.at = payload, at
+        self._payload = payload
+        self.at = at
 
     def _take(self, length: int) -> bytes:
         self.at += length

@@ -27,7 +27,8 @@ class NoisyTruth:
         """Take the level of noise."""
         del rig
         self._sigma = np.repeat([params["position_m"], params["rotation_rad"]], 3)
-        self._stated, self._rng = params["stated"], np.random.default_rng([seed, 20260101])
+        self._stated = params["stated"]
+        self._rng = np.random.default_rng([seed, 20260101])
         if not ((self._sigma > 0).all() and self._stated > 0):
             raise EstimatorFailure("refused", "position_m, rotation_rad and stated should be more than 0")
 

@@ -13,8 +13,10 @@ from vobench.estimator.tools import Mask, StereoPair
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
-PNP_ROUNDS, PNP_CONFIDENCE = 100, 0.999
-POSE_STEPS, MIN_POINTS = 10, 6
+PNP_ROUNDS = 100
+PNP_CONFIDENCE = 0.999
+POSE_STEPS = 10
+MIN_POINTS = 6
 NOISE_FLOOR_PX = 0.03  # the least scale of a robust weight: what sub-pixel tracks reach
 
 
@@ -78,7 +80,8 @@ def _least_squares_pose(
 ) -> tuple[Array, Array]:
     """Gauss-Newton from T; the last step's inverse information, scaled by the noise seen, is the covariance."""
     known = np.isfinite(measured_px)
-    information, noise_px = np.eye(6), NOISE_FLOOR_PX
+    information = np.eye(6)
+    noise_px = NOISE_FLOOR_PX
     for _ in range(POSE_STEPS):
         moved = se3.apply(T, points_m)
         residual = np.where(known, measured_px - _stereo_pixels(moved, K, baseline_m), 0.0)
@@ -103,10 +106,13 @@ def _stereo_pixels(points_m: Array, K: Array, baseline_m: float) -> Array:
 
 def _stereo_jacobian(points_m: Array, K: Array, baseline_m: float) -> Array:
     """How these pixels (N, 3) change with a small translation and rotation (6,) of the points: (N, 3, 6)."""
-    fx, skew, fy = K[0, 0], K[0, 1], K[1, 1]
+    fx = K[0, 0]
+    skew = K[0, 1]
+    fy = K[1, 1]
     x, y, z = points_m.T
     z = np.where(z > 0, z, np.finfo(float).eps)
-    zero, one = np.zeros_like(z), np.ones_like(z)
+    zero = np.zeros_like(z)
+    one = np.ones_like(z)
     column = np.stack([fx * one, skew * one, -(fx * x + skew * y) / z], -1)
     row = np.stack([zero, fy * one, -fy * y / z], -1)
     right = column + np.stack([zero, zero, K[0, 0] * baseline_m / z], -1)
@@ -134,9 +140,12 @@ def twist(step: Array) -> Array:
 
 
 OFFSET_PRIOR_PX = 0.3
-OFFSET_SIGMAS, OFFSET_LEAST_PX = 3.0, 0.15
+OFFSET_SIGMAS = 3.0
+OFFSET_LEAST_PX = 0.15
 OFFSET_STEPS = 5
-STEREO_NOISE, STEREO_NOISE_PX = 2.0, 0.1  # of a disparity, over that of a track, and at least
+# of a disparity, over that of a track, and at least
+STEREO_NOISE = 2.0
+STEREO_NOISE_PX = 0.1
 MOST_BIAS_PX = 0.05
 CORRELATED = 8.0  # tracks near each other err alike: so many count as one
 
@@ -190,9 +199,11 @@ def _fitted_offset(
     A point of ray x0 comes to R x0 + t (d - o) / (f b): least squares in t, R and o with Cauchy's weights. Where
     depths differ by little more than their noise, the fit would mistake the noise for depth: no information.
     """
-    focal, unit = np.array([pair.K[0, 0], pair.K[1, 1]]), 1 / pair.focal_baseline
+    focal = np.array([pair.K[0, 0], pair.K[1, 1]])
+    unit = 1 / pair.focal_baseline
     for _ in range(OFFSET_STEPS):
-        rho, turned = (disparity_px - offset_px) * unit, rays0 @ T[:3, :3].T
+        rho = (disparity_px - offset_px) * unit
+        turned = rays0 @ T[:3, :3].T
         moved = turned + rho[:, None] * T[:3, 3]
         slope = moved[:, :2] / moved[:, 2:]
         residual = (rays1[:, :2] - slope) * focal
@@ -200,7 +211,8 @@ def _fitted_offset(
         weight = 1 / (1 + (residual / (2.4 * noise_px)) ** 2)
         by_point = np.concatenate([np.broadcast_to(np.eye(2), (len(rho), 2, 2)), -slope[..., None]], -1)
         by_point = by_point * focal[:, None] / moved[:, 2, None, None]
-        by_turn, by_offset = -by_point @ cross_matrix(turned), -unit * by_point @ T[:3, 3]
+        by_turn = -by_point @ cross_matrix(turned)
+        by_offset = -unit * by_point @ T[:3, 3]
         jacobian = np.concatenate([rho[:, None, None] * by_point, by_turn, by_offset[..., None]], -1)
         information = np.einsum("nij,ni,nik->jk", jacobian, weight, jacobian) + 1e-9 * np.eye(7)
         step = np.linalg.solve(information, np.einsum("nij,ni->j", jacobian, weight * residual))

@@ -115,7 +115,8 @@ class EstimatorProcess:
         argv, said = self._door.opened(rig, params, seed)
         if self._running is None:
             self._open(list(argv))
-        self._frames, until = 0, self._until(self._limits.start_s)
+        self._frames = 0
+        until = self._until(self._limits.start_s)
         self._send(b"CALB", [said], until)
         self._receive("its start", {b"REDY"}, until)
         self._program.look(at_once=True)
@@ -135,19 +136,23 @@ class EstimatorProcess:
         process = self._program.process
         assert process.stdin
         assert process.stdout
-        self._input, self._output = process.stdin.fileno(), process.stdout.fileno()
+        self._input = process.stdin.fileno()
+        self._output = process.stdout.fileno()
         os.set_blocking(self._input, False)
         with suppress(OSError, AttributeError):  # Linux's: a picture goes in one piece
             fcntl.fcntl(self._input, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
 
     def process(self, frame: Frame) -> Answer:
         """Hand over the next frame; what the estimator says of it, checked."""
-        cpu_s, parts = self._program.cpu_s, self._door.framed(frame)
+        cpu_s = self._program.cpu_s
+        parts = self._door.framed(frame)
         self._refuse_early_answer(f"frame {frame.index}")
-        began, until = time.monotonic(), self._until(self._limits.frame_s)
+        began = time.monotonic()
+        until = self._until(self._limits.frame_s)
         self._send(b"FRAM", parts, until)
         _, payload = self._receive(f"frame {frame.index}", {b"POSE"}, until)
-        wall_s, self._frames = time.monotonic() - began, self._frames + 1
+        wall_s = time.monotonic() - began
+        self._frames = self._frames + 1
         self._program.look(at_once=True)
         try:
             result = read_answer(payload, frame.index)
@@ -158,7 +163,8 @@ class EstimatorProcess:
     def finish(self) -> dict[int, Array]:
         """Say that there are no more frames; the poses that it revises, until it says so too or ends well."""
         self._refuse_early_answer("the end")
-        revised, until = dict[int, Array](), self._until(self._program.left_s())
+        revised = dict[int, Array]()
+        until = self._until(self._program.left_s())
         self._send(b"DONE", [], until)
         for _ in range(self._frames + 1):
             tag, payload = self._receive("the end", {b"REVI", b"DONE", b""}, until)

@@ -58,7 +58,8 @@ class EstimatorFailure(Exception):  # noqa: N818 - a result, not a mistake of ou
     """The estimator gave up: `kind` is a run's status, `reason` one line."""
 
     def __init__(self, kind: str, reason: str) -> None:
-        self.kind, self.reason = kind, in_one_line(reason)
+        self.kind = kind
+        self.reason = in_one_line(reason)
         super().__init__(f"{kind}: {self.reason}")
 
 
@@ -374,7 +375,8 @@ def sandbox_works() -> bool:
 
 def _strays(home: Path) -> list[int]:
     """Processes whose environment names this folder, as it does unless they have changed it."""
-    mark, found = f"\0TMPDIR={home}\0".encode(), list[int]()
+    mark = f"\0TMPDIR={home}\0".encode()
+    found = list[int]()
     for pid in os.listdir("/proc") if sys.platform == "linux" else []:
         with suppress(OSError):
             if pid.isdigit() and mark in b"\0" + Path("/proc", pid, "environ").read_bytes():
@@ -417,7 +419,8 @@ def _nameless(pids: Iterable[int]) -> dict[tuple[int, int], tuple[int, str]]:
         with suppress(OSError):
             for name in os.listdir(f"/proc/{pid}/fd"):
                 with suppress(OSError):
-                    target, facts = os.readlink(f"/proc/{pid}/fd/{name}"), os.stat(f"/proc/{pid}/fd/{name}")
+                    target = os.readlink(f"/proc/{pid}/fd/{name}")
+                    facts = os.stat(f"/proc/{pid}/fd/{name}")
                     if S_ISREG(facts.st_mode) and (not facts.st_nlink or target.startswith(SHARED)):
                         held[facts.st_dev, facts.st_ino] = facts.st_blocks * 512, target
     return held

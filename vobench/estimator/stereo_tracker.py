@@ -67,7 +67,8 @@ class StereoTracker:
     """Holds one view and follows its points into later pictures, each from its own eye: the eyes' errors cancel."""
 
     def __init__(self, pair: StereoPair, settings: TrackerSettings) -> None:
-        self._pair, self._settings = pair, settings
+        self._pair = pair
+        self._settings = settings
         self._view: StereoView | None = None
         self.offset = DisparityOffset()
 
@@ -78,7 +79,8 @@ class StereoTracker:
 
     def look(self, left: Image, right: Image) -> bool:
         """Take this pair as the view; False, and nothing happens, where it has too few points with a depth."""
-        s, pair = self._settings, self._pair
+        s = self._settings
+        pair = self._pair
         corners = corners_per_cell(left, s.corners_per_cell, distance_px=s.corner_distance_px, margin_px=s.margin_px)
         corners = corners[pair.seen(corners)]
         in_right, disparity_px = pair.match(
@@ -92,7 +94,8 @@ class StereoTracker:
 
     def follow(self, left: Image, right: Image, T_now_last: Array) -> Followed:
         """The view's points in a later pair, looked for where a predicted motion of the view would bring them."""
-        view, s = self._view, self._settings
+        view = self._view
+        s = self._settings
         assert view is not None
         rho = (view.disparity_px - self.offset.px) / self._pair.focal_baseline
         guess = predicted(self._pair.left, view.in_left, rho, T_now_last)
@@ -104,7 +107,9 @@ class StereoTracker:
 
     def _in_right(self, right: Image, there: Points, good: Mask, T_now_last: Array) -> Array:
         """Disparities (M,) now of the good ones, NaN for those lost: as much nearer as the prediction says, first."""
-        view, pair, s = self._view, self._pair, self._settings
+        view = self._view
+        pair = self._pair
+        s = self._settings
         assert view is not None
         if not good.any():
             return np.zeros(0)
@@ -133,5 +138,6 @@ class StereoTracker:
 
     def learn(self, followed: Followed, T_now_last: Array) -> None:
         """Learn the pair's offset of disparity from points followed over a motion that is known by now."""
-        rays0, rays1 = self._pair.left.rays(followed.uv_last_px), self._pair.left.rays(followed.uv_px)
+        rays0 = self._pair.left.rays(followed.uv_last_px)
+        rays1 = self._pair.left.rays(followed.uv_px)
         self.offset = self.offset.after(rays0, rays1, followed.disparity_last_px, T_now_last, self._pair)

@@ -29,12 +29,18 @@ Kind = TypeVar("Kind")
 
 GRID = (6, 4)  # cells across and down: corners everywhere, not only where the texture is best
 CORNER_QUALITY = 0.01  # of the best corner in the cell
-WINDOW_PX, LEVELS = 21, 3
+WINDOW_PX = 21
+LEVELS = 3
 LK_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.01)
 ROUND_TRIP_PX = 0.5  # forward and backward tracking must meet
-MISLED_PX, MISLED_SHARE = 5.0, 0.4  # a guess so far away that finds fewer than this share is doubted
-COARSE_WIDTH_PX, COARSE_DISPARITIES = 180, 96  # sees disparities up to half the picture's width
-CONTRAST_WINDOW_PX, CONTRAST_FLOOR = 31, 4.0
+# a guess so far away that finds fewer than this share is doubted
+MISLED_PX = 5.0
+MISLED_SHARE = 0.4
+# sees disparities up to half the picture's width
+COARSE_WIDTH_PX = 180
+COARSE_DISPARITIES = 96
+CONTRAST_WINDOW_PX = 31
+CONTRAST_FLOOR = 4.0
 BRIGHTNESS_JUMP = 0.1  # of the mean or the contrast, beyond which plain grey values mislead
 # On the plane z = 1 a pixel grows with 1 / cos² of the angle to the axis; at 60° it is four times as tall.
 WIDEST_COSINE = 0.5
@@ -43,7 +49,9 @@ MIN_DISPARITY_PX = 0.5
 NOWHERE_PX = -1e4
 # A point on an edge of depth has the disparity of what is in front (foreground fattening: Scharstein, Szeliski 2002),
 # the less the smaller the window: one that so small a window moves by more, and more than most, is left out.
-SMALL_WINDOW_PX, FATTENED_PX, FATTENED_RATIO = 5, 0.2, 2.0
+SMALL_WINDOW_PX = 5
+FATTENED_PX = 0.2
+FATTENED_RATIO = 2.0
 
 
 def parameters(kind: type[Kind], params: Mapping[str, Any], name: str) -> Kind:
@@ -297,7 +305,8 @@ def stereo_pair(rig: Rig, name: str) -> StereoPair:
     sizes = [(camera.width_px, camera.height_px) for camera in map(rig.camera, SIDES)]
     if sizes[0] != sizes[1]:
         raise VobenchError(f"{name} needs two pictures of one size, got {sizes[0]} and {sizes[1]} px")
-    left, right = Eye(rig.left, views.R_view_left, views.K), Eye(rig.camera("right"), views.R_view_right, views.K)
+    left = Eye(rig.left, views.R_view_left, views.K)
+    right = Eye(rig.camera("right"), views.R_view_right, views.K)
     return StereoPair(left, right, views.baseline_m, (left.small_map(), right.small_map()))
 
 
@@ -311,7 +320,8 @@ def coarse_disparity(left: Image, right: Image, uv_px: Array, width_px: int) -> 
     matcher = cv2.StereoSGBM.create(0, COARSE_DISPARITIES, 5, P1=200, P2=800, uniquenessRatio=5)
     coarse = matcher.compute(wide[0], wide[1])[:, COARSE_DISPARITIES:] / 16.0
     coarse[coarse < 0] = np.median(coarse[coarse >= 0]) if (coarse >= 0).any() else 0.0
-    shrink, (height, width) = _shrinking(width_px), left.shape
+    shrink = _shrinking(width_px)
+    (height, width) = left.shape
     column, row = (np.nan_to_num(uv_px) / shrink).astype(int).T
     disparity_px: Array = coarse[row.clip(0, height - 1), column.clip(0, width - 1)] * shrink
     return disparity_px

@@ -28,7 +28,8 @@ def load(folder: Path, class_path: str, *, name: str) -> Estimator:
 
     Raises VobenchError, one line, where the plugin cannot be imported, found or constructed.
     """
-    folder, (module_name, _, class_name) = folder.resolve(), class_path.partition(":")
+    folder = folder.resolve()
+    (module_name, _, class_name) = class_path.partition(":")
     file = folder / f"{module_name.replace('.', '/')}.py"
     if not file.is_file():
         raise VobenchError(f"estimator {name!r} says class: {class_path}, but there is no {file}")
@@ -104,7 +105,8 @@ def main(folder: Path, class_path: str, name: str, memory_bytes: int) -> None:
 
 def _taken_over() -> tuple[BinaryIO, BinaryIO]:
     """Standard input and output, which are the estimator's own from here on: nothing, and what is kept as log."""
-    asked, told = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb", buffering=0)
+    asked = os.fdopen(os.dup(0), "rb")
+    told = os.fdopen(os.dup(1), "wb", buffering=0)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.dup2(2, 1)

@@ -27,13 +27,15 @@ def rising_root(g: Callable[[Array], Array], slope: Callable[[Array], Array], ta
     reached = (target >= 0) & (target <= values[-1])
     target = np.where(reached, target, 0.0)
     above = np.searchsorted(values, target).clip(1, KNOTS - 1)
-    low, high = knots[above - 1], knots[above]
+    low = knots[above - 1]
+    high = knots[above]
     x = np.interp(target, values, knots)
     for _ in range(MOST_STEPS):
         error = g(x) - target
         if np.abs(error).max(initial=0.0) <= TOLERANCE:
             break
-        low, high = np.where(error > 0, low, x), np.where(error > 0, x, high)
+        low = np.where(error > 0, low, x)
+        high = np.where(error > 0, x, high)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = x - error / slope(x)
         x = np.where((step >= low) & (step <= high), step, (low + high) / 2)
@@ -46,8 +48,11 @@ def plane_root(f: Plane, target: tuple[Array, Array], start: tuple[Array, Array]
     `f` gives its value and the distinct entries xx, xy, yy of its symmetric Jacobian, which is positive
     within the limit. So every Newton step points downhill, and is halved until it gets there.
     """
-    x, goal = np.stack(start), np.stack(target)
-    state, share, left = _missed(f, x, goal), np.ones(x.shape[1]), np.arange(x.shape[1])
+    x = np.stack(start)
+    goal = np.stack(target)
+    state = _missed(f, x, goal)
+    share = np.ones(x.shape[1])
+    left = np.arange(x.shape[1])
     enough = TOLERANCE * np.maximum(1.0, np.hypot(*goal))
     for _ in range(MOST_STEPS):
         left = left[state[0, left] > enough[left]]
@@ -56,7 +61,8 @@ def plane_root(f: Plane, target: tuple[Array, Array], start: tuple[Array, Array]
         trial = x[:, left] - share[left] * _newton_step(state[:, left])
         trial_state = _missed(f, trial, goal[:, left])
         better = (trial_state[0] < state[0, left]) & (np.hypot(*trial) <= limit)
-        x[:, left[better]], state[:, left[better]] = trial[:, better], trial_state[:, better]
+        x[:, left[better]] = trial[:, better]
+        state[:, left[better]] = trial_state[:, better]
         share[left] = np.where(better, 1.0, share[left] / 2)
     return np.where(state[0] <= enough, x, np.nan)
 
@@ -64,7 +70,8 @@ def plane_root(f: Plane, target: tuple[Array, Array], start: tuple[Array, Array]
 def _missed(f: Plane, x: Array, goal: Array) -> Array:
     """How far, right and down f misses the goal, and its Jacobian's xx, xy, yy: rows of (6, N)."""
     u, v, *jacobian = f(*x)
-    u, v = u - goal[0], v - goal[1]
+    u = u - goal[0]
+    v = v - goal[1]
     return np.stack([np.hypot(u, v), u, v, *jacobian])
 
 
@@ -165,15 +172,20 @@ class BrownConrady(Focal):
         # Along the radius the radial part has d(r R)/dr, across it R. At radius r the tangential part has
         # eigenvalues within 6 p r. While both stay above that the symmetric Jacobian is positive on a disc,
         # which is convex, so the lens is one-to-one there.
-        k1, k2, k3, p = self.k1, self.k2, self.k3, float(np.hypot(self.p1, self.p2))
-        along, across = (1, -6 * p, 3 * k1, 0, 5 * k2, 0, 7 * k3), (1, -6 * p, k1, 0, k2, 0, k3)
+        k1 = self.k1
+        k2 = self.k2
+        k3 = self.k3
+        p = float(np.hypot(self.p1, self.p2))
+        along = (1, -6 * p, 3 * k1, 0, 5 * k2, 0, 7 * k3)
+        across = (1, -6 * p, k1, 0, k2, 0, k3)
         return min(_first_root(along), _first_root(across))
 
     def project(self, points_camera: ArrayLike) -> Array:
         """Pixels (..., 2) of points (..., 3); NaN behind the camera and beyond the fold."""
         x, y = on_plane(points_camera)
         seen = x * x + y * y < self.fold_radius**2
-        x, y = np.where(seen, x, np.nan), np.where(seen, y, np.nan)
+        x = np.where(seen, x, np.nan)
+        y = np.where(seen, y, np.nan)
         return self.to_pixels(*self._bent(x, y)[:2])
 
     def rays(self, uv_px: ArrayLike) -> Array:
@@ -184,7 +196,11 @@ class BrownConrady(Focal):
 
     def _bent(self, x: Array, y: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Where the lens sends x and y, and the entries xx, xy, yy of the Jacobian, which is symmetric."""
-        k1, k2, k3, p1, p2 = self.k1, self.k2, self.k3, self.p1, self.p2
+        k1 = self.k1
+        k2 = self.k2
+        k3 = self.k3
+        p1 = self.p1
+        p2 = self.p2
         s = x * x + y * y
         radial = 1 + s * (k1 + s * (k2 + s * k3))
         slope = 2 * (k1 + s * (2 * k2 + s * 3 * k3))
@@ -208,7 +224,9 @@ class BrownConrady(Focal):
         # Tangential terms move a point by at most 3 |p| s, so what is farther out has no origin.
         edge = float(radial(np.array(limit))) * (1 - 1e-12)
         possible = far <= edge + 3 * np.hypot(self.p1, self.p2) * limit**2
-        u, v, far = u[possible], v[possible], far[possible]
+        u = u[possible]
+        v = v[possible]
+        far = far[possible]
         scale = rising_root(radial, radial_slope, np.minimum(far, edge), limit) / np.maximum(far, 1e-300)
         out = np.full((2, len(possible)), np.nan)
         out[:, possible] = plane_root(self._bent, (u, v), (u * scale, v * scale), limit)
@@ -295,7 +313,8 @@ class DoubleSphere(Focal):
     @property
     def least_cosine(self) -> float:
         """Cosine of the angle on the second sphere at which the lens folds over or its picture ends at infinity."""
-        larger, smaller = max(self.alpha, 1 - self.alpha), min(self.alpha, 1 - self.alpha)
+        larger = max(self.alpha, 1 - self.alpha)
+        smaller = min(self.alpha, 1 - self.alpha)
         return -smaller / larger
 
     def project(self, points_camera: ArrayLike) -> Array:
@@ -334,14 +353,16 @@ class Equirectangular:
     @property
     def K(self) -> Array:
         """The (3, 3) matrix of the pinhole that the picture is like about its middle."""
-        fx, fy = self.width_px / (2 * np.pi), self.height_px / np.pi
+        fx = self.width_px / (2 * np.pi)
+        fy = self.height_px / np.pi
         return camera_matrix(fx, fy, (self.width_px - 1) / 2, (self.height_px - 1) / 2)
 
     def project(self, points_camera: ArrayLike) -> Array:
         """Pixels (..., 2) of points (..., 3); NaN for the camera's own place only."""
         x, y, z = np.moveaxis(np.asarray(points_camera, float), -1, 0)
         somewhere = np.where((x != 0) | (y != 0) | (z != 0), 1.0, np.nan)
-        longitude, latitude = np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))
+        longitude = np.arctan2(x, z)
+        latitude = np.arctan2(y, np.hypot(x, z))
         (fx, _, cx), (_, fy, cy), _ = self.K
         return np.stack([fx * longitude + cx, fy * latitude + cy], -1) * somewhere[..., None]
 
@@ -349,7 +370,8 @@ class Equirectangular:
         """Unit directions (..., 3) through pixels (..., 2); NaN for what lies off the picture's sphere."""
         (fx, _, cx), (_, fy, cy), _ = self.K
         u, v = np.moveaxis(np.asarray(uv_px, float), -1, 0)
-        longitude, latitude = (u - cx) / fx, (v - cy) / fy
+        longitude = (u - cx) / fx
+        latitude = (v - cy) / fy
         latitude = np.where((np.abs(longitude) <= np.pi) & (np.abs(latitude) <= np.pi / 2), latitude, np.nan)
         across = np.cos(latitude)
         return np.stack([across * np.sin(longitude), np.sin(latitude), across * np.cos(longitude)], -1)

@@ -13,7 +13,9 @@ from vobench.geometry.se3 import Array
 from vobench.setting import OneOf, Positive, Triple, nearest_whole, settings
 
 # Focal length, sensor and resolution as the paper gives them (section II-B).
-PAPER_FOCAL_MM, PAPER_SENSOR_MM, PAPER_SIZE_PX = 32.0, (35.0, 28.18), (720, 480)
+PAPER_FOCAL_MM = 32.0
+PAPER_SENSOR_MM = (35.0, 28.18)
+PAPER_SIZE_PX = (720, 480)
 
 
 @settings(kw_only=False)
@@ -432,8 +434,10 @@ def drawn(error: CalibrationError, nominal: Rig, rng: np.random.Generator) -> Ca
     usual = RESIDUALS[error.level]
     factor = rng.choice([-1.0, 1.0], 8) * rng.uniform(1 - SPREAD, 1 + SPREAD, 8)
     left = nominal.left
-    has_focal, is_bent = isinstance(left, Focal), any(getattr(left, name) for name in left.coefficients)
-    f_px, center_px = float(left.K[0, 0]), usual.center_px if has_focal else (0.0, 0.0)
+    has_focal = isinstance(left, Focal)
+    is_bent = any(getattr(left, name) for name in left.coefficients)
+    f_px = float(left.K[0, 0])
+    center_px = usual.center_px if has_focal else (0.0, 0.0)
 
     def turned(given_deg: float, shift_px: float, arm_px: float, by: float) -> float:
         return given_deg + by * float(np.degrees(np.arctan(shift_px / arm_px)))
@@ -453,7 +457,8 @@ def drawn(error: CalibrationError, nominal: Rig, rng: np.random.Generator) -> Ca
 
 def true_rig(nominal: Rig, error: CalibrationError) -> Rig:
     """The rig that the pictures are made with. Raises VobenchError where an error has nothing to act on."""
-    left, right = error.of_eye("left"), error.of_eye("right")
+    left = error.of_eye("left")
+    right = error.of_eye("right")
     # Written so that no error at all changes no bit.
     T_body_right = nominal.T_body_camera("right").copy()
     T_body_right[:3, 3] += error.baseline_ratio * (T_body_right - nominal.T_body_left)[:3, 3]
@@ -564,10 +569,12 @@ def rectification(rig: Rig) -> Rectification | None:
     """
     if rig.right is None:
         return None
-    R_left_right, t = rig.T_left_right[:3, :3], rig.T_left_right[:3, 3]
+    R_left_right = rig.T_left_right[:3, :3]
+    t = rig.T_left_right[:3, 3]
     if t[0] <= 0:
         return None
-    x, ahead = unit(t), np.array([0.0, 0.0, 1.0]) + R_left_right[:, 2]
+    x = unit(t)
+    ahead = np.array([0.0, 0.0, 1.0]) + R_left_right[:, 2]
     z = ahead - (ahead @ x) * x
     if not z.any():
         return None

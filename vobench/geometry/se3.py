@@ -8,9 +8,12 @@ Array = NDArray[np.float64]
 
 def transform(R_a_b: ArrayLike, t_a_b: ArrayLike) -> Array:
     """Stack rotations (..., 3, 3) and translations (..., 3) in metres into (..., 4, 4)."""
-    R, t = np.asarray(R_a_b, float), np.asarray(t_a_b, float)
+    R = np.asarray(R_a_b, float)
+    t = np.asarray(t_a_b, float)
     T = np.zeros((*np.broadcast_shapes(R.shape[:-2], t.shape[:-1]), 4, 4))
-    T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
+    T[..., :3, :3] = R
+    T[..., :3, 3] = t
+    T[..., 3, 3] = 1.0
     return T
 
 
@@ -63,7 +66,8 @@ def rotation_z(angle_rad: ArrayLike) -> Array:
     R = np.zeros((*angle.shape, 3, 3))
     R[..., 0, 0] = R[..., 1, 1] = np.cos(angle)
     R[..., 1, 0] = np.sin(angle)
-    R[..., 0, 1], R[..., 2, 2] = -R[..., 1, 0], 1.0
+    R[..., 0, 1] = -R[..., 1, 0]
+    R[..., 2, 2] = 1.0
     return R
 
 
@@ -86,8 +90,12 @@ def to_quaternion(R: Array) -> Array:
     m = R
     trace = np.trace(m, axis1=-2, axis2=-1)
     d = np.stack([m[..., 0, 0], m[..., 1, 1], m[..., 2, 2], trace], -1)
-    x, y, z = m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]
-    xy, xz, yz = m[..., 0, 1] + m[..., 1, 0], m[..., 0, 2] + m[..., 2, 0], m[..., 1, 2] + m[..., 2, 1]
+    x = m[..., 2, 1] - m[..., 1, 2]
+    y = m[..., 0, 2] - m[..., 2, 0]
+    z = m[..., 1, 0] - m[..., 0, 1]
+    xy = m[..., 0, 1] + m[..., 1, 0]
+    xz = m[..., 0, 2] + m[..., 2, 0]
+    yz = m[..., 1, 2] + m[..., 2, 1]
     diagonal = 1 - trace[..., None] + 2 * d[..., :3]
     forms = np.stack(
         [

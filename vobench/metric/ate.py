@@ -55,7 +55,8 @@ def errors_between(T_gt: Array, T_est: Array, first: Index, last: Index) -> Pose
 
     Source: Sturm et al. (2012), section V-A: (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j).
     """
-    gt, est = _columns(T_gt), _columns(T_est)
+    gt = _columns(T_gt)
+    est = _columns(T_est)
 
     def moved(T: Array, part: slice) -> Array:
         return _moved(T.take(first[part], axis=-1), T.take(last[part], axis=-1))
@@ -82,7 +83,8 @@ def _moved(first: Array, last: Array) -> Array:
 def _left(gt: Array, est: Array) -> Rows:
     """Lengths and angles (N,) of est seen from gt; the angles as `angle_rad` takes them."""
     E = _moved(gt, est)
-    R, t = E[:, :3], E[:, 3]
+    R = E[:, :3]
+    t = E[:, 3]
     steps = -0.5 * np.einsum("kin,kjn->ijn", R, R)
     steps[range(3), range(3)] += 1.5
     R = np.einsum("ikn,kjn->ijn", R, steps)
@@ -110,7 +112,8 @@ def absolute_errors(T_gt: Array, T_est: Array) -> PoseErrors:
     """
 
     def block(part: slice) -> Rows:
-        gt, est = T_gt[part], T_est[part]
+        gt = T_gt[part]
+        est = T_est[part]
         trans_m = np.linalg.norm(est[:, :3, 3] - gt[:, :3, 3], axis=1)
         return trans_m, angle_rad(np.swapaxes(est[:, :3, :3], -1, -2) @ gt[:, :3, :3])
 
@@ -123,13 +126,15 @@ def absolute(of: Comparison) -> PoseErrors:
 
 
 def _matrices(of: Comparison) -> Rows:
-    T_gt, T_est = of.matched.T_gt, of.T_aligned
+    T_gt = of.matched.T_gt
+    T_est = of.T_aligned
     return in_blocks(len(T_gt), lambda part: matrix_norms(se3.inverse(T_est[part]) @ T_gt[part]))
 
 
 def _axes(of: Comparison) -> dict[str, Array]:
     """Signed errors (K,) by axis, in m and degrees, in the truth's world: R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll)."""
-    T_gt, T_est = of.matched.T_gt, of.T_aligned
+    T_gt = of.matched.T_gt
+    T_est = of.T_aligned
     xyz_m = T_est[:, :3, 3] - T_gt[:, :3, 3]
     rpy_rad = se3.roll_pitch_yaw_rad(T_est[:, :3, :3] @ np.swapaxes(T_gt[:, :3, :3], -1, -2))
     names = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -96,7 +96,8 @@ class MetricDefinition:
 # The settings that change poses, which all metrics of poses hang on.
 POSES = ("alignment", "align_n", "scale_rule", "project", "association", "max_diff_ns", "offset_ns")
 OURS = "this project"
-STURM_ATE, STURM_RPE = "Sturm et al. (2012), section V-B", "Sturm et al. (2012), section V-A"
+STURM_ATE = "Sturm et al. (2012), section V-B"
+STURM_RPE = "Sturm et al. (2012), section V-A"
 ZHANG = "Zhang and Scaramuzza (2018), section IV"
 HARTLEY = "Hartley et al. (2013), section 4.3; evo's rot_part"
 
@@ -130,7 +131,8 @@ def _require_covariances(covariance: Array, n: int, settings: ScoreSettings) -> 
 
 def _aligned(matched: Matched, settings: ScoreSettings) -> tuple[Alignment, Array, Array]:
     """The alignment, and the poses (K, 4, 4) that it makes: to compare as they are, and to compare their motions."""
-    T_est, T_gt = matched.T_est, matched.T_gt
+    T_est = matched.T_est
+    T_gt = matched.T_gt
     if settings.scale_rule == "alignment":
         alignment = align(T_est, T_gt, kind=settings.alignment, first_n=settings.align_n)
         T_aligned = alignment.apply(T_est)
@@ -147,9 +149,11 @@ def ate_scale(T_gt: Array, T_est: Array) -> float:
     Umeyama's is Σ gt·est / Σ‖est‖², and never larger; 1 where either side stands still.
     Source: Wang et al. (2020), the evaluation script.
     """
-    gt_m, est_m = T_gt[:, :3, 3], T_est[:, :3, 3]
+    gt_m = T_gt[:, :3, 3]
+    est_m = T_est[:, :3, 3]
     fit = align_positions(gt_m, est_m, kind="se3")
-    x, y = (gt_m - gt_m.mean(axis=0)) @ fit.rotation.T, est_m - est_m.mean(axis=0)
+    x = (gt_m - gt_m.mean(axis=0)) @ fit.rotation.T
+    y = est_m - est_m.mean(axis=0)
     return 1.0 if "rotation" in fit.unobservable else float(np.sum(x * x) / np.sum(x * y))
 
 
@@ -187,5 +191,6 @@ def _no_overlap(gt: Trajectory, est: Trajectory, settings: ScoreSettings) -> str
 def _span(trajectory: Trajectory) -> str:
     if not len(trajectory):
         return "no pose"
-    first, last = seconds(int(trajectory.t_ns[0])), seconds(int(trajectory.t_ns[-1]))
+    first = seconds(int(trajectory.t_ns[0]))
+    last = seconds(int(trajectory.t_ns[-1]))
     return f"{len(trajectory)} poses from {first} s to {last} s"

@@ -54,12 +54,14 @@ def slots(gt_t_ns: Stamps, of: CoverageOf) -> Index:
 
 def coverage(gt_t_ns: Stamps, frames: Index, *, of: CoverageOf = "frames") -> Coverage:
     """Coverage of ground truth stamped gt_t_ns (N,), N > 0, by estimates of its `frames` (K,)."""
-    frames, slot = np.unique(frames), slots(gt_t_ns, of)
+    frames = np.unique(frames)
+    slot = slots(gt_t_ns, of)
     around = np.concatenate([[-1], frames, [len(gt_t_ns)]])
     around_ns = gt_t_ns[np.clip(around, 0, len(gt_t_ns) - 1)]
     lost = np.maximum(np.diff(np.concatenate([[-1], slot[frames], [slot[-1] + 1]])) - 1, 0)
     is_time = bool(slot[-1] < len(gt_t_ns) - 1)
-    longest, first = int(np.argmax(lost)), int(np.argmax(lost > 0))
+    longest = int(np.argmax(lost))
+    first = int(np.argmax(lost > 0))
     # Tracks are the matched poses edges[k] ... edges[k + 1] - 1.
     edges = np.concatenate([[0], np.flatnonzero(lost[1:-1]) + 1, [len(frames)]])
     tracks_ns = around_ns[edges[1:]] - around_ns[1:][edges[:-1]]

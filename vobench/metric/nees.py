@@ -11,7 +11,9 @@ from vobench.geometry.se3 import Array
 from vobench.metric.comparison import POSES, Comparison, MetricDefinition
 from vobench.trajectory.align import Alignment
 
-POSE, POSITION, ROTATION = slice(0, 6), slice(0, 3), slice(3, 6)
+POSE = slice(0, 6)
+POSITION = slice(0, 3)
+ROTATION = slice(3, 6)
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,7 +85,8 @@ class _Trials:
 
         Drawing both would count what differs between repeats twice, for it makes cases differ too.
         """
-        rng, (n_cases, n_repeats) = np.random.default_rng(seed), self.there.shape[1:]
+        rng = np.random.default_rng(seed)
+        (n_cases, n_repeats) = self.there.shape[1:]
         if n_cases >= MIN_UNITS:
             drawn = rng.multinomial(n_cases, np.full(n_cases, 1 / n_cases), size=RESAMPLES).repeat(n_repeats, axis=1)
         else:
@@ -94,7 +95,8 @@ class _Trials:
         total = np.zeros((RESAMPLES, len(self.there)))
         for values, weights in shares:
             flat = weights.reshape(len(weights), -1)
-            mass, sums = drawn @ flat.T, drawn @ (flat * values.reshape(flat.shape)).T
+            mass = drawn @ flat.T
+            sums = drawn @ (flat * values.reshape(flat.shape)).T
             total += np.divide(sums, mass, out=np.zeros_like(mass), where=mass > 0)
         return total
 
@@ -128,8 +130,10 @@ def rank(loss: Array, failed: Array, *, seed: int = 1) -> list[Standing]:
     trials = _Trials(loss, failed)
     fails, losses = (np.round(np.einsum("ecr,ecr->e", *share), 12) for share in trials.shares)
     order = np.lexsort([losses, fails])
-    drawn, drawn_losses = trials.resampled(trials.shares, seed), trials.resampled([trials.losses], seed)
-    pairs, rng = list(pairwise(order.tolist())), np.random.default_rng(seed)
+    drawn = trials.resampled(trials.shares, seed)
+    drawn_losses = trials.resampled([trials.losses], seed)
+    pairs = list(pairwise(order.tolist()))
+    rng = np.random.default_rng(seed)
     p = holm([permutation_p(trials.differences(a, b), rng) for a, b in pairs])
     least = _interval(np.diff(drawn[:, order], axis=1))[0]
     decided = [bool(chance < DECIDED and low > 0) for chance, low in zip(p, least, strict=True)]
@@ -195,7 +199,9 @@ def holm(p: list[float]) -> list[float]:
 
     Source: Holm (1979).
     """
-    order, corrected, least = np.argsort(p, kind="stable"), list(p), 0.0
+    order = np.argsort(p, kind="stable")
+    corrected = list(p)
+    least = 0.0
     for at, k in enumerate(order):
         least = max(least, min(1.0, (len(p) - at) * p[k]))
         corrected[k] = least
@@ -211,7 +217,8 @@ def _places(drawn: Array, decided: list[bool], *, enough: bool) -> list[tuple[in
     low, high = np.quantile(places, [ALPHA / 2, 1 - ALPHA / 2], axis=0, method="nearest").astype(int).tolist()
     for k, is_decided in enumerate(decided):
         if not is_decided:
-            high[k], low[k + 1] = max(high[k], k + 2), min(low[k + 1], k + 1)
+            high[k] = max(high[k], k + 2)
+            low[k + 1] = min(low[k + 1], k + 1)
     return [(min(lo, k + 1), max(hi, k + 1)) for k, (lo, hi) in enumerate(zip(low, high, strict=True))]
 
 
@@ -222,10 +229,13 @@ def repeats_to_decide(differences: Array, *, tests: int = 1) -> int | None:
     F test) and hides the ratio, more cases are needed and this is None. NaN where there is no trial.
     """
     n = np.sum(~np.isnan(differences), axis=1)
-    means, n_cases, free = np.nanmean(differences, axis=1), len(differences), int((n - 1).sum())
+    means = np.nanmean(differences, axis=1)
+    n_cases = len(differences)
+    free = int((n - 1).sum())
     spread = float(np.var(means, ddof=1)) if n_cases > 1 else 0.0
     within = float(np.nansum((differences - means[:, None]) ** 2) / free) if free else spread
-    between, typical = spread, float(np.mean(n))
+    between = spread
+    typical = float(np.mean(n))
     if free and n_cases > 1 and within > 0 and special.fdtrc(n_cases - 1, free, between * typical / within) < ALPHA:
         between = max(0.0, between - within / typical)
     else:
@@ -245,7 +255,8 @@ def mean_places(loss: Array, failed: Array) -> Array:
     missing = np.isnan(loss)
     middle = np.nanmedian(np.where(missing.all(axis=2, keepdims=True), 0.0, loss), axis=2)
     key = np.round(10.0 * np.nanmean(failed, axis=2) + middle, 12)  # no loss is more than 1
-    before, alike = (key < key[:, None]).sum(axis=1), (key == key[:, None]).sum(axis=1)
+    before = (key < key[:, None]).sum(axis=1)
+    alike = (key == key[:, None]).sum(axis=1)
     places: Array = (before + (alike + 1) / 2).mean(axis=1)
     return places
 

@@ -106,7 +106,8 @@ def _gaps(t_ns: Stamps) -> NDArray[np.bool_]:
 
 def _chain(steps: NDArray[Any], delta: float) -> IndexPairs:
     """Pairs end to end, each as soon as its steps sum up to delta: one sum after the other, as it rounds."""
-    chosen, total = [0], 0.0
+    chosen = [0]
+    total = 0.0
     for end, step in enumerate(steps.tolist(), 1):
         total += step
         if total >= delta:
@@ -170,7 +171,8 @@ def distance_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> Rows:
     """
     first, last = pairs
     gt_m, est_m = (np.linalg.norm(T[last, :3, 3] - T[first, :3, 3], axis=1) for T in (T_gt, T_est))
-    point_m, moved = np.abs(gt_m - est_m), gt_m > STILL_M
+    point_m = np.abs(gt_m - est_m)
+    moved = gt_m > STILL_M
     return point_m, point_m[moved] / gt_m[moved] * 100
 
 
@@ -185,7 +187,8 @@ def tum_errors(
     last = nearest(t_ns + round(delta_s * 1e9), t_ns)
     first = np.flatnonzero(last < len(t_ns) - 1)  # the last pose may stand for any later instant, so it ends no pair
     last = last[first]
-    gt_first, gt_last = nearest(t_ns[first], gt.t_ns), nearest(t_ns[last], gt.t_ns)
+    gt_first = nearest(t_ns[first], gt.t_ns)
+    gt_last = nearest(t_ns[last], gt.t_ns)
     longest_ns = MAX_TRUTH_STEPS * np.median(np.diff(gt.t_ns)) if len(gt) > 1 else 0.0
     off_ns = np.maximum(np.abs(gt.t_ns[gt_first] - t_ns[first]), np.abs(gt.t_ns[gt_last] - t_ns[last]))
     near = off_ns <= longest_ns

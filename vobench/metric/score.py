@@ -222,7 +222,8 @@ def score(
     samples = tuple(found for metric in headlines_first if len((found := Samples.measured(metric, of)).errors))
     scored = tuple(found.metric(of.settings, n=len(of.matched), of=len(gt)) for found in samples)
     frames = of.matched.pairs.gt
-    covered, slot = coverage(gt.t_ns, frames, of=settings.coverage_of), slots(gt.t_ns, settings.coverage_of)[frames]
+    covered = coverage(gt.t_ns, frames, of=settings.coverage_of)
+    slot = slots(gt.t_ns, settings.coverage_of)[frames]
     return Score(
         metrics=scored,
         association=Association(len(frames), len(gt), len(est), settings.max_diff_ns / 1e9),
@@ -301,7 +302,8 @@ def _time_warning(covered: Coverage) -> str:
 
 def _missing_warnings(of: Comparison, metrics: tuple[Metric, ...]) -> Iterator[str]:
     present = {metric.name for metric in metrics}
-    settings, path_m = of.settings, float(of.distances_m[-1])
+    settings = of.settings
+    path_m = float(of.distances_m[-1])
     if "rpe_trans" not in present:
         yield f"no relative pose error: no two matched poses are {_delta(settings)} apart"
     if "kitti_t_rel" not in present:

@@ -52,7 +52,10 @@ def segment_errors(
     first, last, over_m = (np.concatenate(parts) for parts in zip(*found, strict=True))
     length_m = np.repeat(np.asarray(lengths_m, float), [len(part[0]) for part in found])
     order = np.lexsort((length_m, first))
-    first, last, over_m, length_m = first[order], last[order], over_m[order], length_m[order]
+    first = first[order]
+    last = last[order]
+    over_m = over_m[order]
+    length_m = length_m[order]
     if precision == "devkit":
         over_m = over_m.astype(np.float32)
         rounded = in_blocks(len(first), lambda part: _devkit_errors(T_gt, T_est, first[part], last[part]))
@@ -76,7 +79,9 @@ def segment_pairs(
     end = np.searchsorted(distances_m, distances_m[frames[first]] + distances_m.dtype.type(length_m), side="right")
     last = np.searchsorted(frames, end, side="left")
     held = last < len(frames)
-    first, last, end = first[held], last[held], end[held]
+    first = first[held]
+    last = last[held]
+    end = end[held]
     travelled_m = distances_m[frames[last]] - distances_m[frames[first]]
     return first, last, np.where(frames[last] == end, length_m, travelled_m)
 
@@ -147,7 +152,8 @@ def scale_errors(T_gt: Array, T_est: Array, along_m: Array, first: Index, last: 
     """
     gt_m, est_m = (np.linalg.norm(T[last, :3, 3] - T[first, :3, 3], axis=1) for T in (T_gt, T_est))
     shown = (gt_m > LEAST_SHARE * np.median(gt_m)) & (gt_m > 0) if len(gt_m) else np.zeros(0, bool)
-    ratio, middle_m = est_m[shown] / gt_m[shown], 0.5 * (along_m[first] + along_m[last])[shown]
+    ratio = est_m[shown] / gt_m[shown]
+    middle_m = 0.5 * (along_m[first] + along_m[last])[shown]
     return ScaleErrors(ratio - 1.0, _slope(middle_m[ratio > 0], np.log(ratio[ratio > 0])))
 
 
@@ -158,7 +164,8 @@ def _slope(x: Array, y: Array) -> float:
 
 
 def _scale(of: Comparison) -> ScaleErrors:
-    frames, found = of.matched.pairs.gt, of.once(segments)
+    frames = of.matched.pairs.gt
+    found = of.once(segments)
     first, last = (np.searchsorted(frames, ends) for ends in (found.first, found.last))
     return scale_errors(of.matched.T_gt, of.T_moving, of.distances_m[frames], first, last)
 

@@ -64,7 +64,8 @@ class ScoreSettings:
 
     def __post_init__(self) -> None:
         require(self)
-        pairs, own_pairs = (self.rpe_unit, self.rpe_all_pairs, self.rpe_pairs_from), PAIRS_OF_RULE.get(self.rpe_rule)
+        pairs = (self.rpe_unit, self.rpe_all_pairs, self.rpe_pairs_from)
+        own_pairs = PAIRS_OF_RULE.get(self.rpe_rule)
         is_tartanair = self.scale_rule == "tartanair"
         demands = [
             ("rpe_delta", self.rpe_unit != "f" or self.rpe_delta.is_integer(), "a whole number of frames"),

@@ -85,7 +85,8 @@ class AckermannMotion:
         stages = [
             _reference(self.target, self.settings, t_s - step_s * share, self.advance[k]) for share in (1.0, 0.5, 0.0)
         ]
-        x, y, psi, delta = state = _stepped(tuple(self.state[k].T), stages, step_s, self.settings)
+        state = _stepped(tuple(self.state[k].T), stages, step_s, self.settings)
+        x, y, psi, delta = state
         (*_, w, delta_rate), u, u_rate = _rates(state, stages[-1], self.settings)
         w_rate = (u_rate * np.tan(delta) + u * delta_rate / np.cos(delta) ** 2) / self.settings.wheelbase_m
         return along(level(x, y, psi), speed=u, acceleration=u_rate, turn=w, turn_rate=w_rate)
@@ -129,13 +130,18 @@ def _rates(state: tuple[Array, ...], way: Reference, settings: AckermannSettings
     more by aside / lookahead² + 2 turned / lookahead: critically damped on the way, whatever the speed.
     """
     x, y, psi, delta = state
-    cosine, sine, turned = np.cos(psi), np.sin(psi), way.heading - psi
+    cosine = np.cos(psi)
+    sine = np.sin(psi)
+    turned = way.heading - psi
     ahead = cosine * (way.x - x) + sine * (way.y - y)
     aside = cosine * (way.y - y) - sine * (way.x - x)
-    straight, slant, hurry = np.cos(turned), np.sin(turned), way.advance / settings.lookahead_m
+    straight = np.cos(turned)
+    slant = np.sin(turned)
+    hurry = way.advance / settings.lookahead_m
 
     bend = way.bend + aside / settings.lookahead_m**2 + 2 * hurry * slant
-    limit, limit_radps = settings.max_steer_rad, settings.max_steer_radps
+    limit = settings.max_steer_rad
+    limit_radps = settings.max_steer_radps
     asked = np.minimum(np.maximum(np.arctan(settings.wheelbase_m * bend), -limit), limit)
     delta_rate = np.minimum(np.maximum((asked - delta) / settings.steer_lag_s, -limit_radps), limit_radps)
 

@@ -64,8 +64,11 @@ def references(
     divided by one factor where either is over its limit: the direction in which h moves, and so the
     straightness of a leg, survives.
     """
-    k, l, a = settings.gain_per_s, settings.axis_speed_mps, settings.a_m  # noqa: E741 - the paper's letter
-    v_x, v_y = path_mps[0] + l * tanh(k * error_x_m / l), path_mps[1] + l * tanh(k * error_y_m / l)
+    k = settings.gain_per_s
+    l = settings.axis_speed_mps  # noqa: E741 - the paper's letter
+    a = settings.a_m
+    v_x = path_mps[0] + l * tanh(k * error_x_m / l)
+    v_y = path_mps[1] + l * tanh(k * error_y_m / l)
     u_ref = v_x * cos(psi) + v_y * sin(psi)
     omega_ref = (v_y * cos(psi) - v_x * sin(psi)) / a
     excess = max(1.0, abs(u_ref) / settings.max_speed_mps, abs(omega_ref) / settings.max_turn_radps)
@@ -88,7 +91,8 @@ def loop_growth(gain_per_s: float, theta: Theta | None, *, period_s: float, subs
 
 def settling_gain(gain_per_s: float, growth: Callable[[float], float]) -> float:
     """The gain below which the loop of this growth is stable, 1/s, where `gain_per_s` is one that is not."""
-    low, high = 0.0, gain_per_s
+    low = 0.0
+    high = gain_per_s
     for _ in range(40):
         middle = (low + high) / 2
         low, high = (middle, high) if growth(middle) < 1 else (low, middle)
@@ -115,7 +119,8 @@ def _axis_growth(
 # Beyond this (m, m/s, rad) the equations have run away: no room is so large and no wheel so fast.
 BOUND = 1e6
 # What is slower or faster is a slip of the pen, and would fill the memory.
-LONGEST_LEG_S, FASTEST_HZ = 3600.0, 1e4
+LONGEST_LEG_S = 3600.0
+FASTEST_HZ = 1e4
 LegTime = Annotated[float, Gt(0), Le(LONGEST_LEG_S)]
 
 
@@ -204,10 +209,14 @@ class Vehicle:
     def contacts_ahead(self, state: Array, slip: SlipNow) -> tuple[tuple[float, float], ...]:
         """Where the left wheel, the right wheel and the axle's middle will be a period on, if nothing changes."""
         x, y, psi, u, omega = state[:5].tolist()
-        period_s, a, half = 1 / self.rate_hz, self.controller.a_m, self.wheels.track_m / 2
+        period_s = 1 / self.rate_hz
+        a = self.controller.a_m
+        half = self.wheels.track_m / 2
         x_rate, y_rate, _ = velocities(psi, u, omega, a_m=a, side_mps=slip.side_speed(u, omega))
-        c, s = cos(psi + omega * period_s), sin(psi + omega * period_s)
-        x, y = x + x_rate * period_s - a * c, y + y_rate * period_s - a * s
+        c = cos(psi + omega * period_s)
+        s = sin(psi + omega * period_s)
+        x = x + x_rate * period_s - a * c
+        y = y + y_rate * period_s - a * s
         return (x - half * s, y + half * c), (x + half * s, y - half * c), (x, y)
 
 
@@ -247,7 +256,8 @@ class Legs:
 
         Raises MotionError where this leg's target has not been entered in time.
         """
-        frame, left_m = len(place_m) - 1, self.targets_m[len(ends) :]
+        frame = len(place_m) - 1
+        left_m = self.targets_m[len(ends) :]
         if self.leg_s:
             return [frame] if len(left_m) and frame == self._clock(len(ends) + 1) else []
         inside = (np.abs(left_m - place_m[-1]) < self.tolerance_m).all(1)
@@ -273,7 +283,8 @@ class Legs:
 
 def _end_of_leg(away_m: Array) -> str:
     """How a leg that was too long ended, from h's distance to its target at every frame."""
-    third, last = away_m[len(away_m) // 2 : -(len(away_m) // 4)], away_m[-(len(away_m) // 4) - 1 :]
+    third = away_m[len(away_m) // 2 : -(len(away_m) // 4)]
+    last = away_m[-(len(away_m) // 4) - 1 :]
     comes_and_goes = {-1.0, 1.0} <= set(np.sign(np.diff(last)).tolist())
     if comes_and_goes and last.min() > 0.98 * third.min() and np.ptp(last) > 0.02 * last.max():
         return f"the robot keeps circling it, between {last.min():.3g} and {last.max():.3g} m away, and comes no nearer"

@@ -150,12 +150,14 @@ class LissajousCurve:
 
 def lissajous_curve(size_m: tuple[float, float], ratio: tuple[int, int], *, phase_rad: float) -> LissajousCurve:
     """One of the given length and width. Raises MotionError where it has points for bends."""
-    half_m, waves = np.array(size_m)[:, None] / 2, np.array(ratio, float)[:, None]
+    half_m = np.array(size_m)[:, None] / 2
+    waves = np.array(ratio, float)[:, None]
     phases = np.array([[phase_rad], [0.0]])
 
     def derivatives(phi: Array) -> Array:
         angle = waves * phi + phases
-        sine, cosine = half_m * np.sin(angle), half_m * np.cos(angle)
+        sine = half_m * np.sin(angle)
+        cosine = half_m * np.cos(angle)
         return np.stack([sine, waves * cosine, -(waves**2) * sine, -(waves**3) * cosine])
 
     def speed(phi: Array) -> Array:
@@ -218,7 +220,8 @@ class Square(Wheeled):
 
     def way(self) -> CurveMotion:
         """As an ideal robot drives it. Raises MotionError."""
-        side, count = -1.0 if self.clockwise else 1.0, CORNERS * self.laps
+        side = -1.0 if self.clockwise else 1.0
+        count = CORNERS * self.laps
         if self.corner_radius_m:
             straight_m, corner = _rounded(self.side_m, self.corner_radius_m, side=side)
             pieces = [Piece(straight_m), *corner] * count
@@ -384,7 +387,8 @@ def rolled(motion: Motion, t_ns: Stamps, wheels: WheelGeometry) -> Array:
     """
     knots = _knots(motion, np.asarray(t_ns, float))
     nodes, weights = np.polynomial.legendre.leggauss(4)
-    middle, half = (knots[1:] + knots[:-1]) / 2, np.diff(knots) / 2
+    middle = (knots[1:] + knots[:-1]) / 2
+    half = np.diff(knots) / 2
     moved = motion.at((middle[:, None] + half[:, None] * nodes).ravel())
     speeds = wheel_speeds(moved.velocity_mps[:, 0], moved.turn_radps[:, 2], track_m=wheels.track_m)
     travel = np.stack(speeds, -1).reshape(-1, 4, 2).transpose(0, 2, 1) @ weights * half[:, None] / 1e9

@@ -59,15 +59,18 @@ class DriveMotion:
 
         Raises MotionError for an instant more than a second after the end, or not finite.
         """
-        t_ns, step_ns = np.asarray(t_ns, float), 1e9 / self.rate_hz / self.substeps
+        t_ns = np.asarray(t_ns, float)
+        step_ns = 1e9 / self.rate_hz / self.substeps
         known_ns = len(self.pieces) * step_ns + 1
         if not (t_ns <= known_ns).all():
             wrong = t_ns[~(t_ns <= known_ns)][0]
             raise MotionError(f"the drive ends at {self.end_ns} ns, and is asked where it is at {wrong:.0f} ns")
         index = np.clip(np.floor(t_ns / step_ns), 0, len(self.pieces) - 1)
-        share, per_s = np.maximum(t_ns / step_ns - index, 0.0), self.rate_hz * self.substeps
+        share = np.maximum(t_ns / step_ns - index, 0.0)
+        per_s = self.rate_hz * self.substeps
         place, speed, rate = _derivatives(self.pieces[index.astype(np.int64)], share[:, None])
-        speed[t_ns < 0], rate[t_ns < 0] = 0.0, 0.0
+        speed[t_ns < 0] = 0.0
+        rate[t_ns < 0] = 0.0
         return _kinematics(place, speed * per_s, rate * per_s**2)
 
 
@@ -79,12 +82,15 @@ def _derived(
     u_rate, omega_rate = vehicle.speed_rates(
         u, omega, (asked[:, 0], asked[:, 1]), (began[:, 0], began[:, 1]), (disturbed[:, 1], disturbed[:, 2])
     )
-    slope, a = np.tan(disturbed[:, 0]), vehicle.controller.a_m
+    slope = np.tan(disturbed[:, 0])
+    a = vehicle.controller.a_m
     slope_rate = (1 + slope**2) * beta_change * vehicle.rate_hz
     side = u * slope - skid_s * u * omega
     side_rate = u_rate * slope + u * slope_rate - skid_s * (u_rate * omega + u * omega_rate)
-    c, s = np.cos(psi), np.sin(psi)
-    ahead, left = u_rate - side * omega, side_rate + u * omega
+    c = np.cos(psi)
+    s = np.sin(psi)
+    ahead = u_rate - side * omega
+    left = side_rate + u * omega
     place = np.stack([x_h - a * c, y_h - a * s, psi], -1)
     speed = np.stack([c * u - s * side, s * u + c * side, omega], -1)
     rate = np.stack([c * ahead - s * left, s * ahead + c * left, omega_rate], -1)
@@ -96,7 +102,9 @@ def _quintics(begin: Array, end: Array, *, step_s: float) -> Array:
     scale = np.array([1.0, step_s, step_s**2])[:, None]
     p0, v0, a0 = np.moveaxis(begin * scale, 1, 0)
     p1, v1, a1 = np.moveaxis(end * scale, 1, 0)
-    p, v, a = p1 - p0 - v0 - a0 / 2, v1 - v0 - a0, (a1 - a0) / 2
+    p = p1 - p0 - v0 - a0 / 2
+    v = v1 - v0 - a0
+    a = (a1 - a0) / 2
     return np.stack([p0, v0, a0 / 2, 10 * p - 4 * v + a, -15 * p + 7 * v - 2 * a, 6 * p - 3 * v + a], -1)
 
 
@@ -108,7 +116,9 @@ def _derivatives(c: Array, s: Array) -> Array:
 
 def _kinematics(place: Array, speed: Array, rate: Array) -> Kinematics:
     """From x, y, psi and their derivatives (K, 3) in the world to body axes."""
-    cos_psi, sin_psi, still = np.cos(place[:, 2]), np.sin(place[:, 2]), np.zeros(len(place))
+    cos_psi = np.cos(place[:, 2])
+    sin_psi = np.sin(place[:, 2])
+    still = np.zeros(len(place))
 
     def in_body(world: Array) -> Array:
         x, y, _ = world.T
@@ -227,7 +237,8 @@ def follow(path_m: ArrayLike, path_mps: ArrayLike, *, start: tuple[float, float,
     on a straight line stays (theta_4 - 1) / gain of its speed behind.
     Raises MotionError as `drive` does, and where the path is faster than the controller's max_speed_mps.
     """
-    path, path_rate = _checked_rows(path_m, "path point"), _checked_rows(path_mps, "path velocity")
+    path = _checked_rows(path_m, "path point")
+    path_rate = _checked_rows(path_mps, "path velocity")
     vehicle, disturbed = _ready(**options)
     _check_path(path, path_rate, vehicle.controller, vehicle.rate_hz)
 
@@ -293,7 +304,10 @@ def _driven(
         raise MotionError(f"the start (x, y, psi) must be three finite values, got {start}")
     state = np.array([*start, 0.0, 0.0, 0.0, 0.0])
     slips = [disturbances.at(0, vehicle.contacts_ahead(state, SlipNow()))]
-    fine, references, ends, places = [state[None]], [], list[int](), [state[:2]]
+    fine = [state[None]]
+    references = []
+    ends = list[int]()
+    places = [state[:2]]
     for frame in range(len(disturbances.rows)):
         ends += legs.ended(places, ends) if legs else []
         references.append(asked(state, frame, len(ends)))
@@ -310,10 +324,13 @@ def _record(
     periods: list[Array], asked: Array, ends: tuple[int, ...], slips: list[SlipNow], *, vehicle: Vehicle
 ) -> Drive:
     """The drive from the states (1 or substeps, 7) of its periods, references (N, 2) and slip at N frames."""
-    fine, disturbed = np.concatenate(periods), np.array(slips)
+    fine = np.concatenate(periods)
+    disturbed = np.array(slips)
     state = fine[:: vehicle.substeps, :5]
-    u, omega = speeds = state[:, 3], state[:, 4]
-    u_ref, omega_ref, delta_u, delta_omega = *asked.T, *disturbed[:, 5:].T
+    speeds = (state[:, 3], state[:, 4])
+    u, omega = speeds
+    u_ref, omega_ref = asked.T
+    delta_u, delta_omega = disturbed[:, 5:].T
     return Drive(
         t_ns=_stamps(len(slips), vehicle.rate_hz, 1),
         state=state,
@@ -331,11 +348,13 @@ def _record(
 
 def _with_tail(fine: Array, asked: Array, slips: list[SlipNow], vehicle: Vehicle) -> DriveMotion:
     """The motion of the drive through states (P + 1, 7), its last references and slip held for a while after it."""
-    tail, last = [fine], slips[-1]
+    tail = [fine]
+    last = slips[-1]
     more = ceil(TAIL_S * vehicle.rate_hz)
     for _ in range(more):
         tail.append(vehicle.advance(tail[-1][-1], tuple(asked[-1].tolist()), last))
-    states, held = np.concatenate(tail), np.concatenate([asked, np.repeat(asked[-1:], more - 1, 0)])
+    states = np.concatenate(tail)
+    held = np.concatenate([asked, np.repeat(asked[-1:], more - 1, 0)])
     disturbed = np.array([*slips, *[last] * more])[:, [2, 5, 6]]  # beta, delta_u and delta_omega at periods' ends
     period, step = np.divmod(np.arange(len(states) - 1), vehicle.substeps)
     began = states[period * vehicle.substeps, 3:5]

@@ -76,7 +76,8 @@ class Shake:
             2 * np.pi * self.frequency_hz.T, self.amplitude.T, self.phase_rad.T, strict=True
         ):
             angle = omega[:, None] * t_s + phase[:, None]
-            sine, cosine = amplitude[:, None] * np.sin(angle), amplitude[:, None] * np.cos(angle)
+            sine = amplitude[:, None] * np.sin(angle)
+            cosine = amplitude[:, None] * np.cos(angle)
             sums += [sine, omega[:, None] * cosine, -(omega[:, None] ** 2) * sine]
         return sums
 
@@ -140,7 +141,8 @@ def draw_shake(settings: ShakeSettings, rng: np.random.Generator) -> Shake:
 
 def composed(carrier: Kinematics, load: Kinematics) -> Kinematics:
     """A body that moves in the axes of a carrier that itself moves: its kinematics in the world."""
-    R_carrier_load, arm_m = load.T_world_body[:, :3, :3], load.T_world_body[:, :3, 3]
+    R_carrier_load = load.T_world_body[:, :3, :3]
+    arm_m = load.T_world_body[:, :3, 3]
     w = carrier.turn_radps
 
     def in_load(vectors: Array) -> Array:
@@ -161,7 +163,9 @@ def composed(carrier: Kinematics, load: Kinematics) -> Kinematics:
 
 def _steps(settings: ShakeSettings, phase_rad: float) -> tuple[Array, Array, Array]:
     """The sines of the steps, one for each degree of freedom (6,): lifted by each, swayed by every other."""
-    frequency_hz, amplitude, phases_rad = np.ones(6), np.zeros(6), np.zeros(6)
+    frequency_hz = np.ones(6)
+    amplitude = np.zeros(6)
+    phases_rad = np.zeros(6)
     if settings.bounce_m:
         frequency_hz[1:3] = settings.step_hz / 2, settings.step_hz
         amplitude[1:3] = settings.bounce_m / 2, settings.bounce_m
@@ -171,7 +175,8 @@ def _steps(settings: ShakeSettings, phase_rad: float) -> tuple[Array, Array, Arr
 
 def _turned(axis: int, angle_rad: Array, rate: Array, change: Array) -> Kinematics:
     """A turn (K,) about x, y or z alone: one about z with its axes renamed."""
-    along, order = np.eye(3)[axis], np.roll(range(3), axis + 1)
+    along = np.eye(3)[axis]
+    order = np.roll(range(3), axis + 1)
     still = np.zeros((len(angle_rad), 3))
     R = se3.rotation_z(angle_rad)[:, order][:, :, order]
     return Kinematics(se3.transform(R, still), still, rate[:, None] * along, still, change[:, None] * along)

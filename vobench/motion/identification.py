@@ -65,7 +65,8 @@ def identify_odometry(t_s: Array, odometry: Array, held_s: Array, references: Ar
     for middle_s in starts_s + WINDOW_S / 2:
         x = (t_s - middle_s) * 2 / WINDOW_S
         inside = np.abs(x) <= 1
-        x, moved = x[inside], (odometry - odometry[inside][0])[inside]
+        x = x[inside]
+        moved = (odometry - odometry[inside][0])[inside]
         held = np.clip((np.stack([held_s, ends_s]) - middle_s) * 2 / WINDOW_S, -1, 1)
         share = WEIGHT.integ()(held[1]) - WEIGHT.integ()(held[0])
         speeds = -np.trapezoid(WEIGHT.deriv()(x)[:, None] * moved, x, axis=0) * 2 / WINDOW_S
@@ -77,7 +78,8 @@ def identify_odometry(t_s: Array, odometry: Array, held_s: Array, references: Ar
 
 def _fit(instants: Array) -> Fit:
     """Theta of (4, N, 2): speeds, their rates, references, and omega^2 with u omega."""
-    no, references = np.zeros(instants.shape[1]), instants[2]
+    no = np.zeros(instants.shape[1])
+    references = instants[2]
     (u, omega), (u_rate, omega_rate), _, (squared, crossed) = instants.transpose(0, 2, 1)
     on_u = np.stack([u_rate, no, -squared, u, no, no], -1)
     on_omega = np.stack([no, omega_rate, no, no, crossed, omega], -1)

@@ -49,8 +49,14 @@ class VoltageTheta:
 
 def voltage_theta_of(motors: MotorConstants) -> VoltageTheta:
     """Equations (2)-(5)."""
-    m, r, d, b = motors.m_kg, motors.r_m, motors.d_m, motors.b_m
-    Iz, Ie, Ra, ka = motors.Iz_kgm2, motors.Ie_kgm2, motors.Ra_ohm, motors.ka_NmpA
+    m = motors.m_kg
+    r = motors.r_m
+    d = motors.d_m
+    b = motors.b_m
+    Iz = motors.Iz_kgm2
+    Ie = motors.Ie_kgm2
+    Ra = motors.Ra_ohm
+    ka = motors.ka_NmpA
     return VoltageTheta(
         t1=Ra / ka * (m * r**2 + 2 * Ie),
         t2=Ra / ka * (Ie * d**2 + 2 * r**2 * (Iz + m * b**2)),
@@ -61,7 +67,10 @@ def voltage_theta_of(motors: MotorConstants) -> VoltageTheta:
 
 def theta_of(motors: MotorConstants) -> Theta:
     """Equations (12)-(17): theta of the robot with its loops, which (11) drives as (1) and (6) would."""
-    r, d, kPT, kPR = motors.r_m, motors.d_m, motors.kPT_Vspm, motors.kPR_Vsprad
+    r = motors.r_m
+    d = motors.d_m
+    kPT = motors.kPT_Vspm
+    kPR = motors.kPR_Vsprad
     t = voltage_theta_of(motors)
     return Theta(
         t1=(t.t1 + 2 * r * motors.kDT_Vs2pm) / (2 * r * kPT),
@@ -75,7 +84,9 @@ def theta_of(motors: MotorConstants) -> Theta:
 
 def accelerations_at(u: Number, omega: Number, v_u: Number, v_omega: Number, *, motors: MotorConstants) -> Pair[Number]:
     """Accelerations u' in m/s^2 and omega' in rad/s^2 at these voltages: rows 4 and 5 of (1)."""
-    r, d, t = motors.r_m, motors.d_m, voltage_theta_of(motors)
+    r = motors.r_m
+    d = motors.d_m
+    t = voltage_theta_of(motors)
     u_rate = (t.t3 * r**2 * omega**2 - 2 * t.t4 * u + 2 * r * v_u) / t.t1
     omega_rate = (-2 * t.t3 * r**2 * u * omega - t.t4 * d**2 * omega + 2 * r * d * v_omega) / t.t2
     return u_rate, omega_rate
@@ -85,7 +96,9 @@ def loop_voltages(
     speeds: Pair[Number], references: Pair[Number], rates: Pair[Number], *, motors: MotorConstants
 ) -> Pair[Number]:
     """v_u and v_omega of (6), in V: the loops differentiate the speeds and not the references."""
-    (u, omega), (u_ref, omega_ref), (u_rate, omega_rate) = speeds, references, rates
+    (u, omega) = speeds
+    (u_ref, omega_ref) = references
+    (u_rate, omega_rate) = rates
     v_u = motors.kPT_Vspm * (u_ref - u) - motors.kDT_Vs2pm * u_rate
     v_omega = motors.kPR_Vsprad * (omega_ref - omega) - motors.kDR_Vs2prad * omega_rate
     return v_u, v_omega

@@ -124,7 +124,8 @@ def _least_snap_times(points: Array, speed_mps: float) -> Array:
 def _headings(position: "scipy.interpolate.BSpline", t_s: Array, points: Array) -> Array:
     """The direction of flight (N,) over ground at each point, turning the shorter way; where it has none, the last."""
     ways = position(t_s, 1)
-    ways[0], ways[-1] = points[1] - points[0], points[-1] - points[-2]
+    ways[0] = points[1] - points[0]
+    ways[-1] = points[-1] - points[-2]
     level = np.hypot(ways[:, 0], ways[:, 1])
     has_heading = level > SLOW * max(level.max(), np.finfo(float).tiny)
     if not has_heading.any():

@@ -108,7 +108,8 @@ def _recorded(trajectory: Trajectory, *, fewest: int, max_gap_s: float) -> tuple
     """Times (N,) in s from 0, and poses (N, 4, 4). Raises MotionError where they are too few or too far apart."""
     if len(trajectory) < fewest:
         raise MotionError(f"a replay needs {fewest} poses or more, but the recording has {len(trajectory)}")
-    t_s, T = (trajectory.t_ns - trajectory.t_ns[0]) / 1e9, trajectory.T_world_frame
+    t_s = (trajectory.t_ns - trajectory.t_ns[0]) / 1e9
+    T = trajectory.T_world_frame
     lasts_s = np.diff(t_s)
     worst = int(np.argmax(lasts_s))
     if not lasts_s[worst] <= max_gap_s:
@@ -123,7 +124,8 @@ def _least_squares(t_s: Array, columns: Array, *, knot_hz: float) -> "scipy.inte
     """The spline (7 columns) nearest to rows (N, 7)."""
     wanted_s = np.arange(1, int(t_s[-1] * knot_hz) + 1) / knot_hz
     before = np.searchsorted(t_s, wanted_s)  # poses before each knot wanted
-    kept, last = [], 0
+    kept = []
+    last = 0
     for knot_s, count in zip(wanted_s.tolist(), before.tolist(), strict=True):
         if count - last >= 2 and len(t_s) - count >= 2:
             kept.append(knot_s)

@@ -66,7 +66,8 @@ class SlipNow(NamedTuple):
         self, left_mps: float, right_mps: float, *, radius_m: float, driven_mps2: tuple[float, float] = (0.0, 0.0)
     ) -> tuple[float, float]:
         """Angular rates of the left and right rim in rad/s that carry the wheels at these speeds and accelerations."""
-        left, right = self.left, self.right
+        left = self.left
+        right = self.right
         if self.traction_s2pm:
             # Acceleration along the way that a wheel goes: negative where it brakes.
             left += self.traction_s2pm * (driven_mps2[0] if left_mps > 0 else -driven_mps2[0])
@@ -135,14 +136,18 @@ class FloorPatch:
 
     def holds(self, x_m: float, y_m: float) -> bool:
         """Whether a point of the floor is on it."""
-        x, y = x_m - self.center_m[0], y_m - self.center_m[1]
-        c, s = cos(radians(self.yaw_deg)), sin(radians(self.yaw_deg))
+        x = x_m - self.center_m[0]
+        y = y_m - self.center_m[1]
+        c = cos(radians(self.yaw_deg))
+        s = sin(radians(self.yaw_deg))
         return abs(c * x + s * y) <= self.size_m[0] / 2 and abs(c * y - s * x) <= self.size_m[1] / 2
 
 
 def under(patches: Sequence[FloorPatch], x_m: float, y_m: float) -> tuple[float, float, float]:
     """Factor, ratio bias and angle bias (rad) under a point: where patches overlap factors multiply, biases add."""
-    factor, ratio_bias, angle_bias_rad = 1.0, 0.0, 0.0
+    factor = 1.0
+    ratio_bias = 0.0
+    angle_bias_rad = 0.0
     for patch in patches:
         if patch.holds(x_m, y_m):
             ground = SURFACES[patch.surface]
@@ -194,7 +199,8 @@ class Disturbances:
         left, right, beta, delta_u, delta_omega = self.rows[frame].tolist()
         if self.floor:
             on_left, on_right, on_middle = (under(self.floor, *place) for place in contacts_m)
-            left, right = left * on_left[0] + on_left[1], right * on_right[0] + on_right[1]
+            left = left * on_left[0] + on_left[1]
+            right = right * on_right[0] + on_right[1]
             beta = beta * on_middle[0] + on_middle[2]
         return SlipNow(_cut(left), _cut(right), _cut(beta), self.skid_s, self.traction_s2pm, delta_u, delta_omega)
 

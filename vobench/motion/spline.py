@@ -168,7 +168,8 @@ def pose_spline(t_s: ArrayLike, T_world_body: ArrayLike, *, ease_s: float = 0.0)
     so that all but the first pose are passed ease_s / 2 later, the last one ease_s.
     Raises MotionError naming the poses that are too few, not finite, no rotations or not in order.
     """
-    times_s, T = np.atleast_1d(np.asarray(t_s, float)), np.asarray(T_world_body, float)
+    times_s = np.atleast_1d(np.asarray(t_s, float))
+    T = np.asarray(T_world_body, float)
     _check_poses(times_s, T)
     curve = through(times_s, T)
     return CurveMotion(

@@ -129,8 +129,10 @@ def true_rims(rim_rad: Array, errors: EncoderErrors) -> Array:
     radius changes how far a wheel turns for its travel. Exact without slip; with slip, short by
     the product of slip ratio and track error, some 1e-5.
     """
-    mean, half_turn = rim_rad.mean(1), (rim_rad[:, 1] - rim_rad[:, 0]) / 2 * (1 + errors.track)
-    left, right = (mean - half_turn) / (1 + errors.radius_left), (mean + half_turn) / (1 + errors.radius_right)
+    mean = rim_rad.mean(1)
+    half_turn = (rim_rad[:, 1] - rim_rad[:, 0]) / 2 * (1 + errors.track)
+    left = (mean - half_turn) / (1 + errors.radius_left)
+    right = (mean + half_turn) / (1 + errors.radius_right)
     return np.stack([left, right], -1)
 
 

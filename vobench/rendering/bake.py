@@ -34,7 +34,9 @@ MOVER_COARSER = 2
 SUNLIT_FINER = 2  # the half shadow of the sun is 1 cm wide for each metre to what casts it
 CELL_TEXELS = 2.5  # along a surfel's side at least, where samples are far apart
 PROBES_M = 0.25  # between places that ask whether the sun reaches a face
-PLACED_DONE, GATHER_DONE = 0.1, 0.4  # the shares of a bake that are done after each, about
+# the shares of a bake that are done after each, about
+PLACED_DONE = 0.1
+GATHER_DONE = 0.4
 SMALL_M2 = 10.0  # of a thing that is sunlit as a whole
 SKY_RAYS = 64  # at least from a surfel to tell whether it sees the sky
 BLIND = 0.02  # of a surfel's rays: one that sees less is inside something
@@ -143,7 +145,8 @@ def spacings_m(scene: Scene, faces: Triangles, settings: BakeSettings) -> Array:
 
 def _sunlit(scene: Scene, faces: Triangles) -> Mask:
     """The faces (F,) of planes and small things that the sun reaches, at any of the instants it is baked for."""
-    lit, suns = np.zeros(len(faces), bool), [light for light in scene.lights if isinstance(light, Sun)]
+    lit = np.zeros(len(faces), bool)
+    suns = [light for light in scene.lights if isinstance(light, Sun)]
     static = np.flatnonzero(bodies(scene, faces) & (faces.mover < 0))
     if not suns or not len(static):
         return lit
@@ -172,7 +175,8 @@ def _panes(scene: Scene, faces: Triangles) -> Mask:
 def static_points(scene: Scene, faces: Triangles, atlas: Atlas, seed: int) -> tuple[Visibility, Texels, Layout]:
     """A scene without its movers, as rays and as points, and these on the map."""
     static = faces.mover < 0
-    visibility, on_map = Visibility(faces, scene.materials, np.flatnonzero(static)), owners(atlas)
+    visibility = Visibility(faces, scene.materials, np.flatnonzero(static))
+    on_map = owners(atlas)
     own = texels(faces, scene.materials, atlas, on_map, among=static, seed=seed, visibility=visibility)
     return visibility, *own
 
@@ -256,10 +260,8 @@ def _point_areas_m2(faces: Triangles, thing: Indices) -> Array:
 
 def _by_mirrors(scene: Scene, rows: list[int], gathered: FinalGather, surfels: int) -> Floats:
     """Illuminance (K, S) of surfels by lamps and the sky that rays found by way of mirrors, of lights `rows` (K,)."""
-    result, skies = (
-        np.zeros((len(rows), surfels), np.float32),
-        [i for i, x in enumerate(scene.lights) if isinstance(x, Sky)],
-    )
+    result = np.zeros((len(rows), surfels), np.float32)
+    skies = [i for i, x in enumerate(scene.lights) if isinstance(x, Sky)]
     for row, index in enumerate(rows):
         light = scene.lights[index]
         if isinstance(light, AreaLight):
@@ -292,14 +294,16 @@ def key_times_ns(light: Light) -> tuple[float, ...]:
 
 def wandered_rad(sun: Sun) -> Array:
     """How far (K,) a sun has gone along its way, at most, at each of its times: not how far it is from the start."""
-    azimuth, elevation = np.deg2rad(sun.azimuth_deg), np.abs(np.deg2rad(sun.elevation_deg))
+    azimuth = np.deg2rad(sun.azimuth_deg)
+    elevation = np.abs(np.deg2rad(sun.elevation_deg))
     across = np.diff(azimuth) * np.cos(np.minimum(elevation[1:], elevation[:-1]))
     return np.concatenate([[0.0], np.cumsum(np.hypot(across, np.diff(np.deg2rad(sun.elevation_deg))))])
 
 
 def direct_points(scene: Scene, index: int, still: StaticScene, settings: BakeSettings, *, t_ns: float) -> Floats:
     """What one light gives the points straight (P,)."""
-    light, total = scene.lights[index], np.zeros(len(still.points), np.float32)
+    light = scene.lights[index]
+    total = np.zeros(len(still.points), np.float32)
     side = round(np.sqrt(settings.light_rays))
     shown = mirror_images(light, still.visibility, t_ns=t_ns)
     for emitter in [*emitters(light, still.visibility, t_ns=t_ns), *shown]:
@@ -313,20 +317,26 @@ def direct_points(scene: Scene, index: int, still: StaticScene, settings: BakeSe
 
 def direct_layer(scene: Scene, index: int, still: StaticScene, light: Floats) -> Floats:
     """The map (H, W) of what one light gives the points straight (P,), its own glow included."""
-    layer, lamp = still.layout.filled(light), scene.lights[index]
+    layer = still.layout.filled(light)
+    lamp = scene.lights[index]
     if isinstance(lamp, AreaLight):
         layer[still.atlas.block(int(np.flatnonzero(still.faces.lamp == index)[0]))] = np.pi * lamp.luminance_cd_m2
     return layer
 
 
-LIGHT, PLACES, TEXTURES, SETTINGS_FILE = "light.npy", "surfels.npz", "textures.npz", "settings.json"
+LIGHT = "light.npy"
+PLACES = "surfels.npz"
+TEXTURES = "textures.npz"
+SETTINGS_FILE = "settings.json"
 
 
 def save_baked(folder: Path, baked: BakedScene) -> None:
     """Write the light of a baked scene into a folder, and its textures as they were painted for it."""
     (folder / SETTINGS_FILE).write_text(json.dumps(asdict(baked.settings)))
     np.save(folder / LIGHT, baked.direct)
-    atlas, patches, spread = baked.atlas, baked.patches, baked.spread
+    atlas = baked.atlas
+    patches = baked.patches
+    spread = baked.spread
     np.savez(
         folder / PLACES,
         light_px=atlas.light_px,
@@ -370,7 +380,8 @@ def load_baked(folder: Path, scene: Scene) -> BakedScene:
     try:
         settings = BakeSettings(**json.loads((folder / SETTINGS_FILE).read_text()))
         shown = _with_pictures(scene, _load(folder / TEXTURES))
-        light, kept = np.load(folder / LIGHT), _load(folder / PLACES)
+        light = np.load(folder / LIGHT)
+        kept = _load(folder / PLACES)
         suns = {sun: _load(folder / f"sun.{sun}.npz") for sun in moving_suns(scene)}
         tracks = tuple(SunTrack(sun, tuple(own["times_ns"].tolist()), own["bounced"]) for sun, own in suns.items())
         atlas = Atlas(kept["light_px"], kept["chart"], *light.shape[1:])

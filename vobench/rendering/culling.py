@@ -86,7 +86,8 @@ def _open_edges(faces: Indices) -> Indices:
 def _cuts(points: Array, edges: Indices) -> dict[int, list[tuple[float, int]]]:
     """By edge, lower end times count of points plus upper end: where along it which others of the points lie."""
     ends = np.unique(edges)
-    start, way = points[edges[:, 0]], points[edges[:, 1]] - points[edges[:, 0]]
+    start = points[edges[:, 0]]
+    way = points[edges[:, 1]] - points[edges[:, 0]]
     length = np.linalg.norm(way, axis=1)
     pieces = np.ceil(length / PIECE_M).astype(int)
     edge = np.repeat(np.arange(len(edges)), pieces)
@@ -95,7 +96,8 @@ def _cuts(points: Array, edges: Indices) -> dict[int, list[tuple[float, int]]]:
     tree = cKDTree(points[ends]) if len(ends) else None
     found = tree.query_ball_point(middle, length[edge] / pieces[edge] / 2 + WELD_M) if tree else []
     counts = [len(some) for some in found]
-    edge, point = np.repeat(edge, counts), ends[np.concatenate([np.zeros(0, int), *found]).astype(int)]
+    edge = np.repeat(edge, counts)
+    point = ends[np.concatenate([np.zeros(0, int), *found]).astype(int)]
     along = np.einsum("ij,ij->i", points[point] - start[edge], way[edge]) / length[edge]
     beside = np.linalg.norm(points[point] - start[edge] - (along / length[edge])[:, None] * way[edge], axis=1)
     on = (beside < WELD_M) & (along > WELD_M) & (along < length[edge] - WELD_M)
@@ -109,14 +111,18 @@ def _split(
     points: Array, face: Indices, keys: Sequence[int], cuts: dict[int, list[tuple[float, int]]]
 ) -> tuple[Array, Array]:
     """Parts of a face, from its middle to its edges (T, 3, 3), and the weights of its corners (T, 3, 3)."""
-    rim, weights, unit = [], [], np.eye(3)
+    rim = []
+    weights = []
+    unit = np.eye(3)
     for nth, key in enumerate(keys):
-        here, there = unit[nth], unit[(nth + 1) % 3]
+        here = unit[nth]
+        there = unit[(nth + 1) % 3]
         forward = face[nth] < face[(nth + 1) % 3]
         on = [(share if forward else 1 - share, p) for share, p in cuts.get(key, [])][:: 1 if forward else -1]
         rim += [face[nth], *(p for _, p in on)]
         weights += [here, *((1 - share) * here + share * there for share, _ in on)]
-    outline, shares = points[rim], np.array(weights)
+    outline = points[rim]
+    shares = np.array(weights)
     middle = np.broadcast_to(points[face].mean(0), outline.shape)
     parts = np.stack([outline, np.roll(outline, -1, axis=0), middle], 1)
     return parts, np.stack([shares, np.roll(shares, -1, axis=0), np.full_like(shares, 1 / 3)], 1)
@@ -284,7 +290,9 @@ def geometry(faces: Triangles, light_uv: Floats, materials: dict[str, Material])
     looks = [materials.get(thing.material, LAMP) for thing in faces.things]
     parts = _sealed_by_mover(faces)
     parent = parts.parent
-    thing, mover, lamp = faces.thing[parent], faces.mover[parent], faces.lamp[parent] >= 0
+    thing = faces.thing[parent]
+    mover = faces.mover[parent]
+    lamp = faces.lamp[parent] >= 0
     areas = np.linalg.norm(np.cross(*np.moveaxis(np.diff(parts.corners_m, axis=1), 1, 0)), axis=1) / 2
     strength = np.array([sharpness(look) for look in looks])[thing] * ~lamp
     pane = np.array([look.kind == "pane" for look in looks], bool)[thing] & ~lamp
@@ -324,8 +332,11 @@ def _sealed_by_mover(faces: Triangles) -> Sealed:
     return Sealed(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-PLANE_TILT, PLANE_OFF_M = np.deg2rad(0.1), 1e-3  # between faces that mirror as one plane
-LEAST_M2, MOST_MIRRORS = 0.05, 64
+# between faces that mirror as one plane
+PLANE_TILT = np.deg2rad(0.1)
+PLANE_OFF_M = 1e-3
+LEAST_M2 = 0.05
+MOST_MIRRORS = 64
 LEAST_FILL = 0.02  # of the rectangle around them: a rim is no mirror
 
 
@@ -338,7 +349,8 @@ def _mirrors(
     normal = normals * sign[:, None]
     offset = -np.einsum("ij,ij->i", normal, corners_m[:, 0])
     free = (strength > 0) & normals.any(1)
-    index, found = np.full(len(areas), -1), list[Mirror]()
+    index = np.full(len(areas), -1)
+    found = list[Mirror]()
     cells = np.round(np.column_stack([500 * normal, 500 * offset, mover, pane]))
     cell = distinct(cells)[1]
     sizes = np.bincount(cell, areas * free)
@@ -354,7 +366,8 @@ def _mirrors(
         least = max(LEAST_M2, LEAST_FILL * float(np.prod(np.linalg.norm(np.diff(outline[:3], axis=0), axis=1))))
         if areas[near].sum() < least:
             continue
-        index[near], free = len(found), free & ~near
+        index[near] = len(found)
+        free = free & ~near
         most = float(strength[near].max())
         found.append(Mirror(len(found), int(mover[seed]), plane, outline, bool(pane[seed]), most))
     return index, found
@@ -366,7 +379,8 @@ def _outline(points_m: Array, plane: Plane) -> Array:
     hull = points_m[ConvexHull(points_m @ axes.T).vertices]
     along = unit(np.roll(hull, -1, axis=0) - hull)
     across = np.cross(plane.normal, along)
-    u, v = hull @ along.T, hull @ across.T
+    u = hull @ along.T
+    v = hull @ across.T
     best = int(np.argmin(np.ptp(u, axis=0) * np.ptp(v, axis=0)))
     a, b = ([x[:, best].min(), x[:, best].max()] for x in (u, v))
     corners = np.array([[a[0], b[0]], [a[1], b[0]], [a[1], b[1]], [a[0], b[1]]])
@@ -385,7 +399,8 @@ def _clustered(centres_m: Array, batch: Indices, thing: Any) -> tuple[Indices, I
 
 def _morton(points_m: Array) -> NDArray[np.uint64]:
     """Numbers (N,) that are near for points (N, 3) that are. Source: Morton (1966)."""
-    low, high = points_m.min(0), points_m.max(0)
+    low = points_m.min(0)
+    high = points_m.max(0)
     cells = ((points_m - low) / max(float((high - low).max()), WELD_M) * 1023).astype(np.uint64)
     for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):
         cells = (cells | cells << np.uint64(shift)) & np.uint64(mask)

@@ -42,7 +42,8 @@ class _MirrorImage:
         return aim
 
     def passing(self, between: Between, origins_m: Floats, way: Floats) -> Floats:
-        share, some = np.zeros(len(origins_m), np.float32), self._meeting(origins_m, way)
+        share = np.zeros(len(origins_m), np.float32)
+        some = self._meeting(origins_m, way)
         reach = self._reach(origins_m[some], way[some])[:, None]
         share[some] = between.passing(origins_m[some], reach * way[some])
         met = origins_m[some] + reach * way[some] + (RAY_OFFSET_M * self.mirror.normal).astype(np.float32)
@@ -88,7 +89,8 @@ def _shown(image: _MirrorImage, what: Ball, points_m: Floats) -> Mask:
     """Points (P, 3) before the mirror from which a ball behind it lies beyond its outline."""
     frame = ball(image.mirror.corners_m)
     way = what.centre_m - points_m.astype(float)
-    height, far = image.mirror.height_m(points_m), way @ image.mirror.normal
+    height = image.mirror.height_m(points_m)
+    far = way @ image.mirror.normal
     share = np.clip(height / np.maximum(-far, 1e-9), 0, 1)
     apart = np.linalg.norm(points_m + share[:, None] * way - frame.centre_m, axis=1)
     return np.asarray((height > 0) & (apart <= frame.radius_m + share * what.radius_m))
@@ -97,7 +99,9 @@ def _shown(image: _MirrorImage, what: Ball, points_m: Floats) -> Mask:
 # Steps of additive recurrences that fill the unit interval evenly: Roberts (2018), R2 and the golden ratio.
 JITTER = np.array([0.7548776662, 0.5698402910], np.float32)
 FOOTPRINT = np.array([0.6180339887, 0.3247179572], np.float32)
-NARROW_RAD, WIDE_RAD = 0.15, 0.6  # emitters that are seen narrower or wider need fewer or more rays
+# emitters that are seen narrower or wider need fewer or more rays
+NARROW_RAD = 0.15
+WIDE_RAD = 0.6
 MOST = 0.7
 RIM = 2  # texels around a place of half shadow
 
@@ -120,7 +124,8 @@ def direct_light(
     Elsewhere many spots on it are added up without rays, and the sky in a pane is smoothed instead.
     """
     light, share = np.zeros((2, len(points)), np.float32)
-    clear, some = np.full(len(points), np.nan, np.float32), reached(emitter, points, np.flatnonzero(among))
+    clear = np.full(len(points), np.nan, np.float32)
+    some = reached(emitter, points, np.flatnonzero(among))
     kinds = first_rays(emitter, points.points_m[some], side)
     is_soft = bool((kinds > 1).any())
     for kind in np.unique(kinds):
@@ -133,7 +138,8 @@ def direct_light(
     if not is_soft:
         light[half] = arriving(emitter, points, half, visibility, Rays(3 * side // 2, spread=True))[0]
         return light
-    share, is_half = layout.between(share), np.zeros(len(points), bool)
+    share = layout.between(share)
+    is_half = np.zeros(len(points), bool)
     is_half[half] = True
     for kind in np.unique(kinds):
         own = some[(kinds == kind) & ~is_half[some] & (share[some] > 0)]
@@ -176,10 +182,12 @@ def _arriving(emitter: Emitter, texels: Texels, between: Between, rays: Rays) ->
         is_lit = light > 0
         # All at once where most are: picking rows costs as much as rays.
         faced = np.flatnonzero(is_lit) if np.count_nonzero(is_lit) < MOST * len(light) else slice(None)
-        start, ahead = texels.points_m[faced], way[faced]
+        start = texels.points_m[faced]
+        ahead = way[faced]
         if rays.spread:
             aside = footprint(texels, faced, cell)
-            start, ahead = start + aside, ahead - aside
+            start = start + aside
+            ahead = ahead - aside
         share = emitter.passing(between, start, ahead)
         total[faced] += light[faced] * share
         passed[faced] += (share > 0) & is_lit[faced]
@@ -224,7 +232,8 @@ def footprint(texels: Texels, some: Places | slice, cell: int) -> Floats:
 
 def _half_shadow(clear: Floats, layout: Layout, cells: Indices, some: Places) -> Places:
     """Those of some points (N,) beside which an emitter is both seen and hidden."""
-    seen, hidden = clear > 0, clear < 1
+    seen = clear > 0
+    hidden = clear < 1
     mixed = np.logical_and(*(np.bincount(cells, part, minlength=1) > 0 for part in (seen, hidden)))
     near = layout.near(seen, steps=RIM) & layout.near(hidden, steps=RIM)
     return some[(near | mixed[cells])[some]]

@@ -30,7 +30,8 @@ from vobench.scene.material import LUMINANCE, Rgb, emitted_cd_m2, inner_reflecta
 # As the shaders say.
 BODY_UNIT, LIGHT_UNIT, LAYERS_UNIT, EMISSION_UNIT, PROBE_UNIT = (GL.GL_TEXTURE0 + unit for unit in range(5))
 LAYERS = GL.GL_TEXTURE_2D_ARRAY
-PASS_BINDING, BATCH_BINDING = 0, 1
+PASS_BINDING = 0
+BATCH_BINDING = 1
 PASS_FLOATS = 116
 MIRRORS = 3  # followed, each seen in the one before
 FOLLOWED = (6, 3, 2)  # planes at each depth, those that show most; the others mirror by the probe
@@ -62,7 +63,8 @@ def render_target(width_px: int, height_px: int, grid: Grid, weights: Rgb | None
 
     in_colour: whether samples have three channels all the same, as where light is mirrored in colours.
     """
-    size, channels = (width_px, height_px), 3 if weights is None else 1
+    size = (width_px, height_px)
+    channels = 3 if weights is None else 1
     canvases = tuple(canvas(*size, grid, 3 if in_colour else channels) for _ in range(1 + MIRRORS))
     return RenderTarget(canvases, flat_target(*size, channels), weights or LUMINANCE)
 
@@ -71,8 +73,10 @@ class DrawCalls:
     """Single draw calls, with the programs and state they share, as long as their context is current."""
 
     def __init__(self, geometry: Geometry, light: LightTexture) -> None:
-        self._program, self._light = cache(Program), light
-        self._batches, self._poses = geometry.batches, b""
+        self._program = cache(Program)
+        self._light = light
+        self._batches = geometry.batches
+        self._poses = b""
         self._textures = _textures(geometry.batches)
         self._elements = Elements(geometry.vertices, geometry.indices)
         self._pass = Blocks(PASS_BINDING, np.zeros((1, PASS_FLOATS), np.float32))
@@ -91,7 +95,8 @@ class DrawCalls:
     def begin(self, view: PinholeView, canvas: Canvas, weights: Rgb, probe: Probe | None) -> None:
         """Set what all draw calls of one view share."""
         shared = np.zeros(PASS_FLOATS, np.float32)
-        shared[:16], shared[16:19] = view.direct.T.ravel(), view.eye_m
+        shared[:16] = view.direct.T.ravel()
+        shared[16:19] = view.eye_m
         if view.mirror is not None:
             # Cut an eighth of a pixel behind the mirror: what goes through it leaves no gap along the cut.
             pixel_m = view.view_projection[3] / min(view.camera.fx_px, view.camera.fy_px)
@@ -99,7 +104,8 @@ class DrawCalls:
         shared[24 : 24 + canvas.layers] = canvas.grid.lod_bias
         for index, plane in enumerate(view.mirrors):
             shared[28 + 4 * index : 32 + 4 * index] = *plane.normal, plane.offset_m
-        shared[40:43], shared[44:48] = view.ambient_cd_m2, [*weights, 1 / sum(weights)]
+        shared[40:43] = view.ambient_cd_m2
+        shared[44:48] = [*weights, 1 / sum(weights)]
         if probe:
             places = [probe.centre_m, probe.low_m, probe.high_m]
             shared[48:60] = np.concatenate([[*place, 0] for place in places])
@@ -200,7 +206,8 @@ def _textures(batches: Sequence[Batch]) -> dict[int, SurfaceTexture]:
     looks = [batch.material for batch in batches]
     used = {id(t): t for look in looks for t in (look.texture, look.emission_texture) if t}
     pixels = {key: texture.pixels() for key, texture in used.items()}
-    sizes, shrink = np.array([p.shape[0] * p.shape[1] for p in pixels.values()], float), np.zeros(len(pixels), int)
+    sizes = np.array([p.shape[0] * p.shape[1] for p in pixels.values()], float)
+    shrink = np.zeros(len(pixels), int)
     while (sizes / 4.0**shrink).sum() > MOST_TEXELS:
         shrink[np.argmax(sizes / 4.0**shrink)] += 1
     return {key: SurfaceTexture(pixels[key], shrink=int(n)) for key, n in zip(pixels, shrink, strict=True)}
@@ -231,7 +238,8 @@ def _abilities(batch: Batch, texture: SurfaceTexture | None) -> tuple[str, ...]:
 def _numbers(batch: Batch, texture: SurfaceTexture | None) -> Array:
     """The numbers of the shader's block."""
     material = batch.material
-    is_body, eta = material.kind == "body", material.eta
+    is_body = material.kind == "body"
+    eta = material.eta
     inner = inner_reflectance(eta)
     # A lamp's light is on the map: its texture only says how that is spread.
     spread = np.divide(
@@ -244,7 +252,8 @@ def _numbers(batch: Batch, texture: SurfaceTexture | None) -> Array:
     colour = [*(scale * np.array(material.colour)), material.tint]
     coat = [eta, inner, 1 / eta**2, 1 / ((1 - inner) * eta**2)]
     # How far a rough coat's facets let it rise towards grazing: Lagarde (2011).
-    straight, dull = ((1 - eta) / (1 + eta)) ** 2, 0.0 if batch.mirror else np.sqrt(material.roughness)
+    straight = ((1 - eta) / (1 + eta)) ** 2
+    dull = 0.0 if batch.mirror else np.sqrt(material.roughness)
     rise = (max(1 - dull, straight) - straight) / (1 - straight)
     finish = [material.metal, rise, material.cutout or 0.0, material.roughness]
     blur = [level_of(material.roughness), _probed(batch), straight, 0.0]
@@ -262,7 +271,8 @@ class BatchDraw:
     """Draws batches onto targets, as long as its context is current."""
 
     def __init__(self, geometry: Geometry, light: LightTexture) -> None:
-        self._calls, self._culling = DrawCalls(geometry, light), CullingSet(geometry.clusters)
+        self._calls = DrawCalls(geometry, light)
+        self._culling = CullingSet(geometry.clusters)
         # Small things first: they hide much of what is large, which is then not shaded there.
         plain = [batch for batch in geometry.batches if batch.mirror is None and not batch.is_pane]
         self._plain = sorted(plain, key=lambda batch: batch.area_m2)
@@ -363,7 +373,8 @@ class BatchDraw:
         self, mirror: Mirror, view: PinholeView, target: RenderTarget, *, box: Box, visible: Runs, seen: Box | None
     ) -> None:
         """What lies in one plane, with what it mirrors in the box that is given, or with what the probe shows."""
-        canvas, plane = target.canvases[view.depth], _plane_towards(mirror, view)
+        canvas = target.canvases[view.depth]
+        plane = _plane_towards(mirror, view)
         abilities = ("IS_LAST",) if view.depth == MIRRORS or not self._probe else ("HAS_PROBE",)
         if seen and plane:
             reflections = target.canvases[view.depth + 1]

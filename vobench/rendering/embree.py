@@ -14,7 +14,9 @@ from vobench.portable import PORTABLE, is_portable
 Floats = NDArray[np.float32]
 PORTABLE_CONFIG = b"isa=sse4.2"
 VERSION_PROPERTY = 0  # RTC_DEVICE_PROPERTY_VERSION
-OLDEST, NEWEST = 40000, 49999  # versions of Embree 4
+# versions of Embree 4
+OLDEST = 40000
+NEWEST = 49999
 POINTER_OFFSET = 16  # of the device in embreex's object: behind Python's reference count and type
 OBJECT_SIZE = 24
 

@@ -13,7 +13,8 @@ from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sk
 from vobench.scene.mesh import areas_m2, face_normals, unit
 
 FAR_OFF = 2.9  # radii of a rectangle, beyond which rays spread over its area tell as well what hides it
-MESH_SPOTS, CURVE_BITS = 8, 10
+MESH_SPOTS = 8
+CURVE_BITS = 10
 LEVEL_M = 1e-6  # a point nearer than this to a rectangle's plane sees none of it
 
 
@@ -35,7 +36,8 @@ def rectangle(corners_m: Array) -> Rectangle | None:
     u = unit(edges[square])
     v = np.cross(normal, u)
     local = (corners_m - corners_m[0, 0]) @ np.stack([u, v, normal]).T
-    low, size = local.min((0, 1)), np.ptp(local, axis=(0, 1))
+    low = local.min((0, 1))
+    size = np.ptp(local, axis=(0, 1))
     turned = np.cross(local[:, 1] - local[:, 0], local[:, 2] - local[:, 0])[:, 2].sum() / 2
     if size[2] > 1e-4 * size.max() or abs(turned - size[0] * size[1]) > 1e-4 * size[0] * size[1]:
         return None
@@ -50,18 +52,26 @@ class SolidAngle:
 
     def __init__(self, face: Rectangle, points_m: Floats) -> None:
         way = face.corner_m - points_m.astype(float)
-        width, length = np.linalg.norm(face.edge_u_m), np.linalg.norm(face.edge_v_m)
-        x_axis, y_axis = face.edge_u_m / width, face.edge_v_m / length
+        width = np.linalg.norm(face.edge_u_m)
+        length = np.linalg.norm(face.edge_v_m)
+        x_axis = face.edge_u_m / width
+        y_axis = face.edge_v_m / length
         height = way @ face.normal
         # The paper's axes: the rectangle lies at negative z.
         self._axes = np.stack([x_axis, y_axis, face.normal]), np.where(height > 0, -1.0, 1.0)
         self._z0 = np.minimum(-np.abs(height), -LEVEL_M)
-        self._x0, self._y0 = way @ x_axis, way @ y_axis
-        self._x1, self._y1 = self._x0 + width, self._y0 + length
-        n0, n2 = (-self._y0 / np.hypot(self._z0, self._y0), self._y1 / np.hypot(self._z0, self._y1))
-        n1, n3 = (self._x1 / np.hypot(self._z0, self._x1), -self._x0 / np.hypot(self._z0, self._x0))
+        self._x0 = way @ x_axis
+        self._y0 = way @ y_axis
+        self._x1 = self._x0 + width
+        self._y1 = self._y0 + length
+        n0 = -self._y0 / np.hypot(self._z0, self._y0)
+        n2 = self._y1 / np.hypot(self._z0, self._y1)
+        n1 = self._x1 / np.hypot(self._z0, self._x1)
+        n3 = -self._x0 / np.hypot(self._z0, self._x0)
         g0, g1, g2, g3 = (np.arccos(np.clip(-a * b, -1, 1)) for a, b in ((n0, n1), (n1, n2), (n2, n3), (n3, n0)))
-        self._b0, self._b1, self._k = n0, n2, 2 * np.pi - g2 - g3
+        self._b0 = n0
+        self._b1 = n2
+        self._k = 2 * np.pi - g2 - g3
         self.steradian = np.where(np.abs(height) > LEVEL_M, np.maximum(g0 + g1 - self._k, 0), 0)
 
     def spot(self, a: Floats, b: Floats) -> Floats:
@@ -72,7 +82,8 @@ class SolidAngle:
         cu = np.clip(np.copysign(1.0, fu) / np.sqrt(fu * fu + self._b0 * self._b0), -1, 1)
         xu = np.clip(-cu * self._z0 / np.sqrt(np.maximum(1 - cu * cu, 1e-30)), self._x0, self._x1)
         d = np.hypot(xu, self._z0)
-        h0, h1 = self._y0 / np.hypot(d, self._y0), self._y1 / np.hypot(d, self._y1)
+        h0 = self._y0 / np.hypot(d, self._y0)
+        h1 = self._y1 / np.hypot(d, self._y1)
         hv = h0 + b * (h1 - h0)
         yv = np.clip(hv * d / np.sqrt(np.maximum(1 - hv * hv, 1e-30)), self._y0, self._y1)
         axes, flip = self._axes
@@ -121,7 +132,8 @@ class Emitter:
 def panel_emitter(light: AreaLight) -> Emitter:
     """A lamp's faces, which shine only to their front: rectangles by solid angle, all else by area."""
     corners = light.mesh.corners_m
-    face, around = rectangle(corners), ball(corners)
+    face = rectangle(corners)
+    around = ball(corners)
     if face is None:
         # In an order in which near triangles are near to one another (Morton).
         shares = (corners.mean(1) - around.centre_m) / around.radius_m / 2 + 0.5
@@ -144,7 +156,9 @@ def panel_emitter(light: AreaLight) -> Emitter:
 
 def _interleaved(shares: Floats) -> Floats:
     """Numbers (N,) in [0, 1) whose bits are by turns those of shares (N, D) in [0, 1)."""
-    rest, place, total = shares.astype(float), 1.0, np.zeros(len(shares))
+    rest = shares.astype(float)
+    place = 1.0
+    total = np.zeros(len(shares))
     for _ in range(CURVE_BITS):
         rest = 2 * rest
         bits = np.floor(rest)
@@ -157,19 +171,21 @@ def _interleaved(shares: Floats) -> Floats:
 
 def _by_area(light: AreaLight, corners_m: Array, texels: Texels, face: Rectangle | None = None) -> Aim:
     """Spots on triangles in proportion to their areas, or all over the rectangle that they fill."""
-    area, normals = areas_m2(corners_m), face_normals(corners_m).astype(np.float32)
-    ends, power = np.cumsum(area) / area.sum(), np.float32(light.luminance_cd_m2 * area.sum())
+    area = areas_m2(corners_m)
+    normals = face_normals(corners_m).astype(np.float32)
+    ends = np.cumsum(area) / area.sum()
+    power = np.float32(light.luminance_cd_m2 * area.sum())
 
     def spot(a: Floats, b: Floats) -> tuple[Floats, Floats]:
         if face is None:
-            a, b = (
-                _interleaved(np.stack([a, b], -1)),
-                b * 2**CURVE_BITS % 1,
-            )  # strata of the square are such of the mesh
+            # strata of the square are such of the mesh
+            a = _interleaved(np.stack([a, b], -1))
+            b = b * 2**CURVE_BITS % 1
             normal = normals[np.minimum(np.searchsorted(ends, a, side="right"), len(ends) - 1)]
             return (spots(corners_m, a, b) + RAY_OFFSET_M * normal).astype(np.float32), normal
         corner = (face.corner_m + RAY_OFFSET_M * face.normal).astype(np.float32)
-        u, v = face.edge_u_m.astype(np.float32), face.edge_v_m.astype(np.float32)
+        u = face.edge_u_m.astype(np.float32)
+        v = face.edge_v_m.astype(np.float32)
         return corner + a[:, None] * u + b[:, None] * v, normals[:1]
 
     def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
@@ -216,7 +232,8 @@ def sun_emitter(light: Sun, t_ns: float) -> Emitter:
 def _pane_emitter(light: Sky, pane: Flat, visibility: Visibility) -> Emitter:
     """The sky through one pane: only rays that cross no other pane behind it, so that none counts twice."""
     followed_back, followed_front = _followed(pane, visibility)
-    face, area = rectangle(pane.corners_m), areas_m2(pane.corners_m).sum()
+    face = rectangle(pane.corners_m)
+    area = areas_m2(pane.corners_m).sum()
 
     def spot(texels: Texels) -> Aim:
         """Ways to spots on the pane, and the solid angle that each stands for."""
@@ -249,7 +266,8 @@ def _pane_emitter(light: Sky, pane: Flat, visibility: Visibility) -> Emitter:
         """Past walls, and through panes before this one."""
         share = between.clear(origins_m, way).astype(np.float32)
         some = np.flatnonzero(share)
-        start, ahead = origins_m[some], way[some]
+        start = origins_m[some]
+        ahead = way[some]
         reach = -pane.height_m(start) / (ahead @ pane.normal)
         share[some] *= between.through_panes(start, ahead * ((1 - 1e-4) * reach[:, None]).astype(np.float32))
         return share
@@ -293,7 +311,8 @@ def _hard(points_m: Floats) -> Floats:
 
 def disc(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """Points x, y spread evenly over the unit disc."""
-    radius, angle = np.sqrt(a), np.float32(2 * np.pi) * b
+    radius = np.sqrt(a)
+    angle = np.float32(2 * np.pi) * b
     return radius * np.cos(angle), radius * np.sin(angle)
 
 
@@ -302,7 +321,8 @@ def cosine_weighted(normals: Floats) -> Callable[[Floats, Floats], Floats]:
     u_axis, v_axis = tangents(normals)
 
     def direction(a: Floats, b: Floats) -> Floats:
-        (x, y), up = disc(a, b), np.sqrt(np.maximum(1 - a, 1e-7))
+        (x, y) = disc(a, b)
+        up = np.sqrt(np.maximum(1 - a, 1e-7))
         return np.asarray(x[..., None] * u_axis + y[..., None] * v_axis + up[..., None] * normals)
 
     return direction

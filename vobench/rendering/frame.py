@@ -29,12 +29,16 @@ class FrameRenderer:
     """Draws in the context that is current when it is made, and must be current when it is used."""
 
     def __init__(self, baked: BakedScene) -> None:
-        self._illumination, self._background = Illumination(baked), Background(baked.scene.lights)
-        self._ambient, self._movers = AmbientLight(baked), baked.scene.movers
+        self._illumination = Illumination(baked)
+        self._background = Background(baked.scene.lights)
+        self._ambient = AmbientLight(baked)
+        self._movers = baked.scene.movers
         self._light = LightTexture(self._illumination.without_movers(0, 0))
         drawn = geometry(baked.faces, baked.light_uv, baked.scene.materials)
-        self._draw, self._lights = BatchDraw(drawn, self._light), baked.scene.lights
-        self._target, self._warp = cache(partial(render_target, in_colour=self._draw.mirrors_in_colour)), cache(warp)
+        self._draw = BatchDraw(drawn, self._light)
+        self._lights = baked.scene.lights
+        self._target = cache(partial(render_target, in_colour=self._draw.mirrors_in_colour))
+        self._warp = cache(warp)
         if self._draw.needs_probe:
             self._draw.use_probe(self._room_probe(baked, baked.faces))
 
@@ -49,13 +53,15 @@ class FrameRenderer:
             targets = [self._target(camera.width_px, camera.height_px, grid, weights) for grid in grids]
             self._expose(targets, camera, views, boxes, targets[0].total.whole)
             return targets[0].total.read(targets[0].total.whole)
-        lens, ordered = self._warp(camera), sorted(views, key=lambda v: v.rows.start)
+        lens = self._warp(camera)
+        ordered = sorted(views, key=lambda v: v.rows.start)
         return np.concatenate([self._strip(lens, view, weights) for view in ordered])
 
     def _room_probe(self, baked: BakedScene, faces: Triangles) -> Probe:
         """The probe of what stands still, with every lamp that varies at level 1."""
         lights = tuple(one if isinstance(one.level, Steady) else replace(one, level=STEADY) for one in self._lights)
-        light, skies = self._illumination.without_movers(0, 0), _skies(Background(lights), 0, 0)
+        light = self._illumination.without_movers(0, 0)
+        skies = _skies(Background(lights), 0, 0)
         if not all(isinstance(one.level, Steady) for one in self._lights):
             light = Illumination(replace(baked, scene=replace(baked.scene, lights=lights, movers=()))).at(0, 0)
         self._light.update(light)
@@ -92,7 +98,8 @@ class FrameRenderer:
 
         It is in the first target's total, in the box around all boxes.
         """
-        count, total = len(views[0].start_ns), targets[0].total
+        count = len(views[0].start_ns)
+        total = targets[0].total
         total.clear(around)
         for index in range(count):
             target = targets[index % len(targets)]
@@ -103,7 +110,8 @@ class FrameRenderer:
 
     def _view(self, camera: Pinhole, view: View, index: int, box: Box) -> PinholeView:
         """A sub-frame of a view, its light on the graphics side."""
-        start_ns, end_ns = int(view.start_ns[index]), int(view.end_ns[index])
+        start_ns = int(view.start_ns[index])
+        end_ns = int(view.end_ns[index])
         poses = [mover.path.pose((start_ns + end_ns) / 2) for mover in self._movers]
         light = self._illumination.without_movers(start_ns, end_ns)
         ambient_cd_m2 = np.broadcast_to(self._ambient.cd_m2(light), 3)

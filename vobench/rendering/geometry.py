@@ -18,10 +18,13 @@ Mask = NDArray[np.bool_]
 T = TypeVar("T")
 
 # Rays start this far off their face, and further the further they are from the origin: float32 resolves 1e-7 of it.
-RAY_OFFSET_M, RAY_OFFSET = 1e-4, 1e-6
+RAY_OFFSET_M = 1e-4
+RAY_OFFSET = 1e-6
 FAR_M = 1e3  # beyond every scene
 MOST_PANES = 16  # crossed by one ray
-FLAT_RAD, FLAT_M = 1e-3, 1e-3  # faces this near to one plane lie in it
+# faces this near to one plane lie in it
+FLAT_RAD = 1e-3
+FLAT_M = 1e-3
 WIDE_M2 = 0.05  # of mirrors that show lamps and of panes that show the sky
 
 
@@ -94,7 +97,8 @@ class Hits:
         """Values (R, ...) between those of faces' corners (F, 3, ...)."""
         a, b, c = of_corners[self.face].swapaxes(0, 1)
         shape = (-1, *[1] * (a.ndim - 1))
-        u, v = self.u.reshape(shape), self.v.reshape(shape)
+        u = self.u.reshape(shape)
+        v = self.v.reshape(shape)
         return np.asarray(a + u * (b - a) + v * (c - a))
 
 
@@ -125,7 +129,8 @@ class RayCaster:
         self._triangles = triangles
         self._scene = new_scene(robust=True)
         self._mesh = mesh_construction.TriangleMesh(self._scene, np.ascontiguousarray(triangles))
-        self._twin, self._planes = twins(faces.corners_m[self._among]), faces.plane[self._among]
+        self._twin = twins(faces.corners_m[self._among])
+        self._planes = faces.plane[self._among]
         self._has_sheets = bool((self._twin >= 0).any())
         self.solid = self._among[self._twin < 0]
 
@@ -194,14 +199,18 @@ class Visibility:
     """Opaque faces and panes of a table, of those `among` (K,) names. Cut-outs count as solid."""
 
     def __init__(self, faces: Triangles, materials: Mapping[str, Material], among: ArrayLike) -> None:
-        own, made_of = np.asarray(among, np.int32), face_materials(faces, materials)
+        own = np.asarray(among, np.int32)
+        made_of = face_materials(faces, materials)
         kinds = np.array([m.kind if m else "" for m in made_of])
-        is_pane, is_mirror = kinds[faces.thing[own]] == "pane", kinds[faces.thing[own]] == "mirror"
+        is_pane = kinds[faces.thing[own]] == "pane"
+        is_mirror = kinds[faces.thing[own]] == "mirror"
         smooth = np.array([m is not None and m.roughness == 0 for m in made_of])[faces.thing[own]]
-        self.faces, self.normals = faces, np.append(faces.plane, np.zeros((1, 3)), 0).astype(np.float32)
+        self.faces = faces
+        self.normals = np.append(faces.plane, np.zeros((1, 3)), 0).astype(np.float32)
         self._eta = np.array([m.eta if m else 1.0 for m in made_of])[faces.thing]
         self._tint = np.array([m.tint if m else 1.0 for m in made_of], np.float32)[faces.thing]
-        self.opaque, self._glass = RayCaster(faces, own[~is_pane]), RayCaster(faces, own[is_pane])
+        self.opaque = RayCaster(faces, own[~is_pane])
+        self._glass = RayCaster(faces, own[is_pane])
         self._has_panes = bool(is_pane.any())
         # Mirrors that show lamps as sharp as they are. Coats mirror too, but faintly.
         found = flats(faces, own[is_mirror & smooth], at_least_m2=WIDE_M2)
@@ -256,7 +265,9 @@ class Visibility:
             ahead = way[rays] * (1 - gone)[:, None]
             hits = self._glass.hits(origins_m[rays] + way[rays] * gone[:, None], ahead)
             met = np.flatnonzero((hits.face >= 0) & (hits.distance < 1))
-            rays, pane, ahead = rays[met], hits.face[met], ahead[met]
+            rays = rays[met]
+            pane = hits.face[met]
+            ahead = ahead[met]
             length = lengths(ahead)
             cosine = np.einsum("ij,ij->i", ahead, self.normals[pane]) / length
             share[rays] *= self._tint[pane] * (1 - pane_reflectance(cosine, self._eta[pane])).astype(np.float32)
@@ -267,7 +278,8 @@ class Visibility:
         """Whether any of 1024 fixed rays, half to each side, leaves the scene without another pane."""
         a, b, tilt, turn = np.random.default_rng(0).random((4, 512))
         across = unit(pane.corners_m[0, 1] - pane.corners_m[0, 0])
-        radius, angle = np.sqrt(tilt)[:, None], 2 * np.pi * turn[:, None]
+        radius = np.sqrt(tilt)[:, None]
+        angle = 2 * np.pi * turn[:, None]
         flat = radius * (np.cos(angle) * across + np.sin(angle) * np.cross(pane.normal, across))
         up = np.sqrt(1 - radius**2) * pane.normal
         directions = np.concatenate([flat + up, flat - up])

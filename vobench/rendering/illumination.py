@@ -20,18 +20,21 @@ class AmbientLight:
     """
 
     def __init__(self, baked: BakedScene) -> None:
-        patches, shape = baked.patches, (*baked.direct.shape[1:], 3)
+        patches = baked.patches
+        shape = (*baked.direct.shape[1:], 3)
         texels = np.bincount(patches.surfel_of + 1, minlength=len(patches.area_m2) + 1)[1:]
         each = (patches.area_m2 / np.maximum(texels, 1) / np.pi / max(patches.area_m2.sum(), 1e-12))[:, None]
         weights = np.append(each * patches.reflectance, np.zeros((1, 3)), 0).astype(np.float32)
         self._weights = weights[patches.surfel_of].reshape(shape)
-        self._light, self._mean_cd_m2 = self._weights, np.zeros(3)
+        self._light = self._weights
+        self._mean_cd_m2 = np.zeros(3)
 
     def cd_m2(self, light: Floats) -> Array:
         """The mean (3,) under a map of light (H, W, 3); the very array of the last call costs nothing."""
         if light is not self._light:
             # No dot product, whose order of adding up hangs on the number of threads.
-            self._light, self._mean_cd_m2 = light, np.sum(self._weights * light, axis=(0, 1), dtype=np.float64)
+            self._light = light
+            self._mean_cd_m2 = np.sum(self._weights * light, axis=(0, 1), dtype=np.float64)
         return self._mean_cd_m2
 
 
@@ -85,7 +88,8 @@ class Illumination:
     """
 
     def __init__(self, baked: BakedScene) -> None:
-        self._baked, self._lights = baked, baked.scene.lights
+        self._baked = baked
+        self._lights = baked.scene.lights
         self._tracks = {track.light: track for track in baked.tracks}
         fixed = [i for i in range(len(self._lights)) if i not in self._tracks]
         steady = [i for i in fixed if isinstance(self._lights[i].level, Steady)]
@@ -107,8 +111,10 @@ class Illumination:
         total = self.without_movers(start_ns, end_ns)
         if not self._movers:
             return total
-        movers, (levels, suns) = self._movers, self._now(start_ns, end_ns)
-        amid_ns, is_on = (start_ns + end_ns) / 2, tuple(level > 0 for level in levels)
+        movers = self._movers
+        (levels, suns) = self._now(start_ns, end_ns)
+        amid_ns = (start_ns + end_ns) / 2
+        is_on = tuple(level > 0 for level in levels)
         poses = tuple(mover.path.pose(amid_ns).tobytes() for mover in self._baked.scene.movers)
         moment = _recent(self._moments, (suns, poses, is_on), lambda: movers.at(amid_ns, suns, is_on))
         movers.shade(moment, views)
@@ -151,7 +157,8 @@ class Illumination:
         """A moving sun's map at an instant: straight light by rays, the rest between the baked ones."""
 
         def make() -> Floats:
-            scene, baked = self._baked.scene, self._baked
+            scene = self._baked.scene
+            baked = self._baked
             light = direct_points(scene, index, self._still, baked.settings, t_ns=t_ns)
             straight = direct_layer(scene, index, self._still, light)[..., None]
             around = (baked.spread @ _between(self._tracks[index], t_ns)).reshape(*straight.shape[:2], 3)
@@ -164,7 +171,8 @@ def _stepped_ns(light: Light, t_ns: float) -> float:
     """When a moving sun last took a step of SUN_TURN_RAD, so that it need not be traced for every picture; else 0."""
     if not isinstance(light, Sun) or not light.moves:
         return 0.0
-    times_ns, way_rad = NS_PER_S * np.array(light.times_s), wandered_rad(light)
+    times_ns = NS_PER_S * np.array(light.times_s)
+    way_rad = wandered_rad(light)
     stepped_rad = SUN_TURN_RAD * np.rint(np.interp(t_ns, times_ns, way_rad) / SUN_TURN_RAD)
     return float(np.interp(stepped_rad, way_rad, times_ns))
 

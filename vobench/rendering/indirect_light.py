@@ -85,7 +85,9 @@ def _grouped(key: Places, points_m: Floats) -> tuple[Places, Places]:
 
 def blend(points: Texels, groups: Surfels, layout: Layout, visibility: Visibility, usable: Mask) -> "csr_matrix":
     """What each texel of the map takes from surfels (H·W, S): those near it that see its own and look its way."""
-    p, n, step = points.points_m[groups.middle], points.normals[groups.middle], groups.step_m[:, None]
+    p = points.points_m[groups.middle]
+    n = points.normals[groups.middle]
+    step = groups.step_m[:, None]
     known = np.flatnonzero(usable)
     if not len(known):
         return scipy.sparse.csr_matrix((layout.source.size, len(groups)), dtype=np.float32)
@@ -108,7 +110,9 @@ def blend(points: Texels, groups: Surfels, layout: Layout, visibility: Visibilit
 def _weights(
     points: Texels, groups: Surfels, of: Indices, near: Places, *, hidden: Mask, middles: tuple[Floats, Floats]
 ) -> "csr_matrix":
-    near, hidden, step = near[of], hidden[of], groups.step_m[of, None]
+    near = near[of]
+    hidden = hidden[of]
+    step = groups.step_m[of, None]
     apart = ((points.points_m[:, None] - middles[0][near]) ** 2).sum(-1) / step**2
     apart += ((points.normals[:, None] - middles[1][near]) ** 2).sum(-1) * TURNED**2
     weights = np.where(hidden, 0, np.exp(-(apart - np.where(hidden, np.inf, apart).min(1, keepdims=True)) / WIDTH))
@@ -267,8 +271,12 @@ class Gatherer:
         return FinalGather(scipy.sparse.vstack([nothing, *(part[0] for part in found)], "csr"), sky, hits, escaped)
 
     def _gather(self, points: Texels, side: int) -> "tuple[csr_matrix, Floats, Floats, Indices]":
-        batch, entries, ends, rays = _start(points, side), [], [], np.float32(side * side)
-        sky, escaped = np.zeros((len(self.skies), len(points)), np.float32), np.zeros(len(points), np.float32)
+        batch = _start(points, side)
+        entries = []
+        ends = []
+        rays = np.float32(side * side)
+        sky = np.zeros((len(self.skies), len(points)), np.float32)
+        escaped = np.zeros(len(points), np.float32)
         for depth in range(MIRRORS + 1):
             hits = self.visibility.opaque.hits(batch.origins_m, batch.directions)
             way = batch.directions * np.where(hits.face < 0, FAR_M, hits.distance)[:, None]
@@ -283,8 +291,11 @@ class Gatherer:
                 sky[nth] += np.bincount(gone.point, np.pi * luminance * gone.weight, minlength=sky.shape[1])
             facing = np.einsum("ij,ij->i", batch.directions, self.visibility.normals[hits.face])
             met = np.flatnonzero((hits.face >= 0) & (facing < 0))
-            batch, hits, cosine = batch.take(met), hits.take(met), -facing[met]
-            lamp, texel = self.response.lamp[hits.face], self.atlas.index(hits.at(self.atlas.light_px))
+            batch = batch.take(met)
+            hits = hits.take(met)
+            cosine = -facing[met]
+            lamp = self.response.lamp[hits.face]
+            texel = self.atlas.index(hits.at(self.atlas.light_px))
             factor = batch.weight * np.where(lamp >= 0, ~batch.is_direct, self.response.scattered(hits.face, cosine))
             column = np.where(lamp >= 0, self.surfels + lamp, self.surfel_of[texel])
             kept = (column >= 0) & (factor > 0)
@@ -303,7 +314,9 @@ class Gatherer:
     def _off_panes(self, batch: _RayBatch, way: Floats) -> _RayBatch:
         """The rays that go back from the first pane in their way; a lamp that they meet is no direct light."""
         rays, hits = self.visibility.first_panes(batch.origins_m, way)
-        batch, way, normals = batch.take(rays), way[rays], self.visibility.normals[hits.face]
+        batch = batch.take(rays)
+        way = way[rays]
+        normals = self.visibility.normals[hits.face]
         along = np.einsum("ij,ij->i", batch.directions, normals)
         ends = batch.origins_m + hits.distance[:, None] * way - RAY_OFFSET_M * batch.directions
         directions = batch.directions - 2 * along[:, None] * normals
@@ -313,7 +326,8 @@ class Gatherer:
     def _mirrored(self, batch: _RayBatch, hits: Hits, cosine: Floats, dither: Floats) -> _RayBatch:
         weight = batch.weight * self.response.mirrored(hits.face, cosine)
         on = np.flatnonzero(weight > FAINT)
-        batch, face = batch.take(on), hits.face[on]
+        batch = batch.take(on)
+        face = hits.face[on]
         plain = self.visibility.normals[face]
         normals = _facets(plain, self.response.roughness[face], dither[batch.point], on)
         along = np.einsum("ij,ij->i", batch.directions, normals)[:, None]
@@ -330,7 +344,8 @@ def _start(points: Texels, side: int) -> _RayBatch:
     directions = cosine_weighted(points.normals)(*cell_spot(points, np.arange(side**2)[:, None], side))
     cosines = points.cosine(directions)
     weight = (points.entering(cosines) * (cosines > 0)).ravel()
-    origins, of = np.tile(points.points_m, (side**2, 1)), np.tile(np.arange(len(points)), side**2)
+    origins = np.tile(points.points_m, (side**2, 1))
+    of = np.tile(np.arange(len(points)), side**2)
     return _RayBatch(of, origins, directions.reshape(-1, 3), weight, np.ones(len(of), bool))
 
 
@@ -348,7 +363,9 @@ def _facets(normals: Floats, roughness: Floats, dither: Floats, turn: NDArray[np
 
 
 # Bounces of a ratio this even, whose rest is this small a share of the light, or a rest too faint, are summed up.
-EVEN, REST, FAINT_REST = 2e-3, 0.03, 1e-4
+EVEN = 2e-3
+REST = 0.03
+FAINT_REST = 1e-4
 
 
 def bounced(straight: Floats, reflectance: Floats, gathered: FinalGather, first: Floats, *, bounces: int) -> Floats:
@@ -358,17 +375,21 @@ def bounced(straight: Floats, reflectance: Floats, gathered: FinalGather, first:
     bounce is the same share of the one before, so the last ones are the sum of a geometric series.
     """
     count, size, channels = straight.shape
-    table, columns = gathered.table[:, :size], (size, count * channels)
+    table = gathered.table[:, :size]
+    columns = (size, count * channels)
     if not bounces:
         return np.zeros(straight.shape, np.float32)
     by_mirrors = np.repeat(first.T[..., None], channels, 2).reshape(columns).astype(np.float32)
     step = table @ straight.transpose(1, 0, 2).reshape(columns) + by_mirrors
-    total, again, ratio = step.copy(), np.tile(reflectance, (1, count)), np.zeros(columns[1])
+    total = step.copy()
+    again = np.tile(reflectance, (1, count))
+    ratio = np.zeros(columns[1])
     for left in reversed(range(bounces - 1)):
         last = step.sum(0, dtype=float)
         step = table @ (again * step)
         total += step
-        earlier, ratio = ratio, np.clip(step.sum(0, dtype=float) / np.maximum(last, 1e-30), 0, 0.999)
+        earlier = ratio
+        ratio = np.clip(step.sum(0, dtype=float) / np.maximum(last, 1e-30), 0, 0.999)
         rest = ratio * (1 - ratio**left) / (1 - ratio)
         share = rest * step.sum(0) / np.maximum(total.sum(0), 1e-30)
         if ((share <= FAINT_REST) | (np.abs(ratio - earlier) <= EVEN) & (share <= REST)).all():

@@ -84,11 +84,14 @@ def unwrap(faces: Triangles, spacing_m: Array, lit: Mask) -> Atlas:
     left = np.flatnonzero(lit & (chart < 0) & (areas_m2(px) > 1e-6))
     if len(left):
         more, own, wide, high = axis_charts(px[left], px[left] * spacing_m[left, None, None], faces.thing[left])
-        places[left], chart[left] = more + np.array([0, height]), own + chart.max() + 1
-        width, height = max(width, wide), height + high
+        places[left] = more + np.array([0, height])
+        chart[left] = own + chart.max() + 1
+        width = max(width, wide)
+        height = height + high
     _settle(faces, places, chart, np.flatnonzero(lit & (chart < 0)))
     height += PADDING
-    width, block = max(width, 3), faces.lamp + 1
+    width = max(width, 3)
+    block = faces.lamp + 1
     shared = np.stack([block % (width // 3) * 3 + 1.5, block // (width // 3) * 3 + 1.5 + height], -1)
     places[chart < 0] = shared[chart < 0, None]
     height += 3 * (int(block.max(initial=0)) // (width // 3) + 1)
@@ -104,13 +107,19 @@ def _parts(thing: Indices, spacing_m: Array, some: Places) -> list[Places]:
 
 def _by_xatlas(px: Array, spacing_m: Array, parts: Sequence[Places]) -> tuple[Array, Indices, int, int]:
     """Places (F, 3, 2) and charts (F,) of parts, -1 for none, the map's width and height; nothing without xatlas."""
-    places, chart = np.zeros((len(px), 3, 2)), np.full(len(px), -1, np.int32)
+    places = np.zeros((len(px), 3, 2))
+    chart = np.full(len(px), -1, np.int32)
     try:
         import xatlas
     except ImportError:  # Python 3.14 has none yet
         return places, chart, 0, 0
-    atlas, packing, added, count = xatlas.Atlas(), xatlas.PackOptions(), [], 0
-    packing.texels_per_unit, packing.padding, packing.bilinear = 1.0, PADDING, True
+    atlas = xatlas.Atlas()
+    packing = xatlas.PackOptions()
+    added = []
+    count = 0
+    packing.texels_per_unit = 1.0
+    packing.padding = PADDING
+    packing.bilinear = True
     for part in parts:
         first, of = _welded(px[part] * spacing_m[part, None, None])
         whole = (of != np.roll(of, 1, axis=1)).all(1)
@@ -157,7 +166,8 @@ def axis_charts(px: Array, corners_m: Array, thing: Indices) -> tuple[Array, Ind
     axes = np.array([[1, 2], [0, 2], [0, 1]])[side // 2]
     flat = np.take_along_axis(px, axes[:, None].repeat(3, 1), 2)
     count = int(chart.max()) + 1
-    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    low = np.full((count, 2), np.inf)
+    high = np.full((count, 2), -np.inf)
     for nth in range(3):
         np.minimum.at(low, chart, flat[:, nth])
         np.maximum.at(high, chart, flat[:, nth])
@@ -176,13 +186,19 @@ def side_of(vectors: Array) -> Places:
 def _shelves(sizes: Places) -> tuple[Places, int, int]:
     """Corners (N, 2) of boxes (N, 2) in shelves, tallest first, and the width and height of them all."""
     width = int(max(np.sqrt(sizes.prod(1).sum()), sizes[:, 0].max()))
-    corners, column, row, shelf = np.zeros_like(sizes), 0, 0, 0
+    corners = np.zeros_like(sizes)
+    column = 0
+    row = 0
+    shelf = 0
     for index in np.lexsort((np.arange(len(sizes)), -sizes[:, 0], -sizes[:, 1])):
         wide, high = sizes[index].tolist()
         if column + wide > width:
-            column, row, shelf = 0, row + shelf, 0
+            column = 0
+            row = row + shelf
+            shelf = 0
         corners[index] = column, row
-        column, shelf = column + wide, max(shelf, high)
+        column = column + wide
+        shelf = max(shelf, high)
     return corners, width, row + shelf
 
 
@@ -236,13 +252,16 @@ def owners(atlas: Atlas) -> Owners:
         counts = size[some].prod(1)
         which = np.repeat(some, counts)
         nth = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
-        row, column = low[which, 1] + nth // size[which, 0], low[which, 0] + nth % size[which, 0]
+        row = low[which, 1] + nth // size[which, 0]
+        column = low[which, 0] + nth % size[which, 0]
         uv, apart = _nearest_on(corners[which], np.stack([column, row], -1) + 0.5)
         texel = row * atlas.width + column
         order = np.flatnonzero(apart < result.apart_px[texel])
         order = order[np.argsort(-apart[order], kind="stable")]  # of several the last one counts
         texel = texel[order]
-        result.face[texel], result.uv[texel], result.apart_px[texel] = which[order], uv[order], apart[order]
+        result.face[texel] = which[order]
+        result.uv[texel] = uv[order]
+        result.apart_px[texel] = apart[order]
     return result
 
 
@@ -251,7 +270,8 @@ def _nearest_on(corners: Array, points: Array) -> tuple[Array, Array]:
 
     What is farther than READ_PX from the line of an edge is infinitely far.
     """
-    edges, ways = np.roll(corners, -1, axis=1) - corners, points[:, None] - corners
+    edges = np.roll(corners, -1, axis=1) - corners
+    ways = points[:, None] - corners
     area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     across = edges[..., 0] * ways[..., 1] - edges[..., 1] * ways[..., 0]
     inwards = across * np.sign(area)[:, None]
@@ -270,7 +290,8 @@ def _nearest_on_edges(edges: Array, ways: Array, squared: Array) -> tuple[Array,
     """Weights (N, 3) of corners, and distance, of the nearest places on edges (N, 3, 2) to points."""
     along = np.clip(np.einsum("nij,nij->ni", ways, edges) / np.maximum(squared, 1e-12), 0, 1)
     apart = np.linalg.norm(ways - along[..., None] * edges, axis=-1)
-    nearest, each = apart.argmin(1), np.arange(len(edges))
+    nearest = apart.argmin(1)
+    each = np.arange(len(edges))
     weights = np.zeros((len(edges), 3))
     weights[each, nearest] = 1 - along[each, nearest]
     weights[each, (nearest + 1) % 3] = along[each, nearest]
@@ -282,7 +303,9 @@ TILTS = ((0.0, 0.0), (1.0, 0.4), (-1.0, -0.3), (0.3, -1.0), (-0.4, 1.0))  # of r
 CHUNK = 1 << 14  # points at once: their arrays fit the processor's cache
 PULLED_M = 1e-3  # points at a chart's rim lie so far inwards, where they see past the neighbour
 FACING = 0.1  # cosine to its flat face from which a normal of the shape counts
-ALIGNED, CONTACT_M = 0.999, 4e-4  # of faces that touch: cosine to an axis, how deep in the thing they are looked for
+# of faces that touch: cosine to an axis, how deep in the thing they are looked for
+ALIGNED = 0.999
+CONTACT_M = 4e-4
 STRAIGHT = np.cos(np.deg2rad(1.5))  # between texels that lie in one plane
 
 
@@ -380,12 +403,15 @@ def texels(
     beside = _beside(index, atlas, own)
     etas = np.array([m.eta if m and m.is_coated else 0.0 for m in face_materials(faces, materials)], np.float32)
     dither = np.random.default_rng([seed, 1]).random((atlas.height * atlas.width, 2), dtype=np.float32)
-    face, vectors = own.face[index], np.empty((5, len(index), 3), np.float32)
+    face = own.face[index]
+    vectors = np.empty((5, len(index), 3), np.float32)
 
     def place(part: slice) -> None:
-        on, uv = face[part], own.uv[index[part]]
+        on = face[part]
+        uv = own.uv[index[part]]
         rim = beside[:, part] == np.arange(len(index))[part]
-        weights, planes = np.column_stack([1 - uv.sum(1), uv]), faces.plane[on]
+        weights = np.column_stack([1 - uv.sum(1), uv])
+        planes = faces.plane[on]
         steps = _steps(faces.corners_m[on], atlas.light_px[on].astype(float))
         points = off(np.einsum("ni,nij->nj", weights, faces.corners_m[on]) + _inwards(steps, rim), planes)
         normals = unit(np.einsum("ni,nij->nj", weights, faces.normals[on]))
@@ -411,7 +437,8 @@ def _beside(index: Places, atlas: Atlas, own: Owners) -> Indices:
     """The points (4, P) left, right, above and below of those at flat places (P,) in the same chart, else itself."""
     point = np.full(atlas.height * atlas.width, -1, np.int32)
     point[index] = np.arange(len(index))
-    chart, column = atlas.chart[own.face[index]], index % atlas.width
+    chart = atlas.chart[own.face[index]]
+    column = index % atlas.width
     found = np.empty((4, len(index)), np.int32)
     for nth, step in enumerate((-1, 1, -atlas.width, atlas.width)):
         other = point[np.clip(index + step, 0, len(point) - 1)]
@@ -449,13 +476,16 @@ def _covered(points: Texels, visibility: Visibility) -> Mask:
     Only where both look along an axis. Raised off their face they are beyond the other, outside in the sky for all
     that rays tell.
     """
-    covered, solid = np.zeros(len(points), bool), visibility.opaque.solid
+    covered = np.zeros(len(points), bool)
+    solid = visibility.opaque.solid
     for axis, sign in np.ndindex(3, 2):
         along = 2 * sign - 1
         some = np.flatnonzero(along * points.planes[:, axis] > ALIGNED)
         others = solid[along * visibility.faces.plane[solid, axis] < -ALIGNED]
         if len(some) and len(others):
-            caster, p, way = RayCaster(visibility.faces, others), points.points_m[some], points.planes[some] * CONTACT_M
+            caster = RayCaster(visibility.faces, others)
+            p = points.points_m[some]
+            way = points.planes[some] * CONTACT_M
             covered[some] = caster.stops(p - way, way)
     return covered
 
@@ -494,7 +524,8 @@ def _kept(
 
 def _weights(few: Mask, beside: Indices) -> "csr_array":
     """Weights (P, P) that make all points' values of the few's: along rows first, then along columns."""
-    known, result = few, scipy.sparse.diags_array(few.astype(np.float32), format="csr")
+    known = few
+    result = scipy.sparse.diags_array(few.astype(np.float32), format="csr")
     for sides in (beside[:2], beside[2:]):
         weight = known[sides[0]].astype(np.float32) + known[sides[1]]
         own, new = (np.flatnonzero(some).astype(np.int32) for some in (known, ~known & (weight > 0)))
@@ -503,7 +534,8 @@ def _weights(few: Mask, beside: Indices) -> "csr_array":
         columns = np.concatenate([own, *(side[one] for one, side in pairs)])
         shares = np.where(known[rows], np.float32(1), 1 / np.maximum(weight[rows], 1))
         step = scipy.sparse.csr_array((shares.astype(np.float32), (rows, columns)), (len(known), len(known)))
-        result, known = step @ result, known | (weight > 0)
+        result = step @ result
+        known = known | (weight > 0)
     return result
 
 
@@ -524,7 +556,8 @@ def _few(index: Places, beside: Indices, width: int) -> Mask:
 
 def _takes(beside: Indices, kept: Mask) -> Places:
     """For each point (P,) itself where it is kept, else the nearest kept one by steps within its chart, or itself."""
-    takes, open_ = np.arange(len(kept)), np.flatnonzero(~kept)
+    takes = np.arange(len(kept))
+    open_ = np.flatnonzero(~kept)
     known = kept.copy()
     while len(open_):
         found = [np.where(known[other], takes[other], -1) for other in beside[:, open_]]
@@ -532,7 +565,8 @@ def _takes(beside: Indices, kept: Mask) -> Places:
         done = best >= 0
         if not done.any():
             break
-        takes[open_[done]], known[open_[done]] = best[done], True
+        takes[open_[done]] = best[done]
+        known[open_[done]] = True
         open_ = open_[~done]
     return takes
 

@@ -141,8 +141,13 @@ def register() -> None:
             disc = mi.warp.square_to_uniform_cone(sample, float(np.cos(SUN_RADIUS_RAD)))
             ds = dr.zeros(mi.DirectionSample3f)
             ds.d = mi.Frame3f(self.direction).to_world(disc)
-            ds.dist, ds.p, ds.n = FAR_M, it.p + FAR_M * ds.d, -ds.d
-            ds.uv, ds.time, ds.pdf, ds.delta = sample, it.time, 1.0, True
+            ds.dist = FAR_M
+            ds.p = it.p + FAR_M * ds.d
+            ds.n = -ds.d
+            ds.uv = sample
+            ds.time = it.time
+            ds.pdf = 1.0
+            ds.delta = True
             ds.emitter = mi.EmitterPtr(self)
             return ds, mi.Spectrum(self.irradiance) & active
 
@@ -184,7 +189,8 @@ class Group:
 
 def groups(scene: Scene, faces: Triangles) -> list[Group]:
     """All faces but the lamps'; of two back to back one that has both sides, unless they glow."""
-    twin, members = twins(faces)[:-1], dict[tuple[int, str, bool], list[Pixels]]()
+    twin = twins(faces)[:-1]
+    members = dict[tuple[int, str, bool], list[Pixels]]()
     glowing = {name for name, material in scene.materials.items() if any(material.emission_cd_m2)}
     both = (twin >= 0) & ~np.array([t.material in glowing for t in faces.things], bool)[faces.thing]
     kept = (faces.lamp < 0) & (~both | (twin > np.arange(len(twin))))
@@ -205,12 +211,14 @@ def load(mi: Any, scene: Scene) -> Any:
     world: Plugin = {"type": "scene"}
     bsdfs = cache(lambda name, two_sided: mi.load_dict(_bsdf(mi, scene.materials[name], two_sided=two_sided)))
     for group in groups(scene, own):
-        material, bsdf = scene.materials[group.material], bsdfs(group.material, group.two_sided)
+        material = scene.materials[group.material]
+        bsdf = bsdfs(group.material, group.two_sided)
         glow = _glow(mi, material) if any(material.emission_cd_m2) else None
         world[group.key] = _mesh(mi, group.key, faces, group.faces, bsdf=bsdf, glow=glow, tile=material.tile_m)
     black = mi.load_dict({"type": "diffuse", "reflectance": _rgb((0, 0, 0))})
     for index, light in enumerate(scene.lights):
-        key, shining = light_key(index), np.flatnonzero(faces.lamp == index)
+        key = light_key(index)
+        shining = np.flatnonzero(faces.lamp == index)
         if not len(shining):
             world[key] = _emitter(mi, light)
             continue

@@ -25,8 +25,12 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 Views = Sequence[tuple[PinholeView, Box]]
-SIDE, SKY_SIDE = 3, 5  # rays along a side from points on movers, to an emitter and to the sky
-SHADE_SIDE, SKY_SHADE_SIDE = 2, 3  # the same from points in their shade
+# rays along a side from points on movers, to an emitter and to the sky
+SIDE = 3
+SKY_SIDE = 5
+# the same from points in their shade
+SHADE_SIDE = 2
+SKY_SHADE_SIDE = 3
 SKY_REACH = 10  # radii beyond which a mover hides less than a hundredth of an open sky
 GATHER_RAYS = 64
 GATHER_M = 0.2  # between places that gather indirect light
@@ -44,7 +48,8 @@ def may_shade(mover: Ball, emitter: Ball, points: Ball) -> Mask:
     All ways lie in a cone frustum about the line between the two balls, here one a little wider.
     """
     to_mover = mover.centre_m - points.centre_m
-    far2, near = np.einsum("ij,ij->i", to_mover, to_mover), mover.radius_m + points.radius_m
+    far2 = np.einsum("ij,ij->i", to_mover, to_mover)
+    near = mover.radius_m + points.radius_m
     if np.isinf(emitter.radius_m):
         return np.asarray(far2 <= (SKY_REACH * mover.radius_m + points.radius_m) ** 2)
     to_emitter = emitter.centre_m - points.centre_m
@@ -108,7 +113,8 @@ class _Lit:
     def near(self, movers: Sequence[Ball], among: Mask) -> Mask:
         """Of which of the cells among all (A,) some point may lose light to one of the movers, given as balls."""
         asked = np.flatnonzero(among[self.cells])
-        balls, near = self.balls.take(asked), np.zeros(len(asked), bool)
+        balls = self.balls.take(asked)
+        near = np.zeros(len(asked), bool)
         for parts_at in movers:
             some = np.flatnonzero(~near & may_shade(_around(parts_at), self.emitter.ball, balls))
             cells = balls.take(some)
@@ -127,8 +133,11 @@ class MoverLight:
     """The light of a baked scene's movers."""
 
     def __init__(self, baked: BakedScene, still: StaticScene) -> None:
-        self._baked, self._still, self._lights = baked, still, baked.scene.lights
-        faces, materials = baked.faces, baked.scene.materials
+        self._baked = baked
+        self._still = still
+        self._lights = baked.scene.lights
+        faces = baked.faces
+        materials = baked.scene.materials
         looks = [m is not None and m.kind == "pane" for m in face_materials(faces, materials)]
         solid = ~np.array(looks, bool)[faces.thing]
         own = [np.flatnonzero((faces.mover == nth) & solid) for nth in range(len(baked.scene.movers))]
@@ -161,7 +170,8 @@ class MoverLight:
 
     def _grouped(self, faces: Triangles) -> "tuple[Places, csr_matrix]":
         """The points that gather light for their neighbours, and how these take it (H·W, S)."""
-        points, moving = self._points, np.flatnonzero(faces.mover >= 0)
+        points = self._points
+        moving = np.flatnonzero(faces.mover >= 0)
         alone = Visibility(faces, self._baked.scene.materials, moving)
         steps = np.full(len(points), GATHER_M, np.float32)
         groups = surfels(points, faces.thing[points.face], steps, alone)
@@ -175,7 +185,8 @@ class MoverLight:
         poses = [mover.path.pose(t_ns) for mover in self._baked.scene.movers]
         movers = RayCaster(self._bodies.moved(poses))
         balls = [_moved_ball(own, poses[n]) for own, n in zip(self._parts, self._solid, strict=True)]
-        points, together = self._placed(poses), copy(self._still.visibility)
+        points = self._placed(poses)
+        together = copy(self._still.visibility)
         together.opaque = Casters(together.opaque, movers)  # type: ignore[assignment]
         direct = np.zeros((len(self._lights), len(points)), np.float32)
         shining = [self._lit_by(i, suns_ns[i]) if is_on[i] else [] for i in range(len(self._lights))]
@@ -207,7 +218,8 @@ class MoverLight:
 
     def add(self, moment: MoverLightAt, still: Floats, levels: Sequence[float]) -> Floats:
         """The map (H, W, 3) of all that stands still with the movers' light and shade."""
-        total, strength = still.copy(), np.asarray(levels, np.float32)
+        total = still.copy()
+        strength = np.asarray(levels, np.float32)
         colours = strength[:, None] * np.array([light.colour for light in self._lights], np.float32)
         flat = total.reshape(-1, 3)
         row = np.zeros(len(self._still.points), np.int32)
@@ -233,7 +245,8 @@ class MoverLight:
 
     def _placed(self, poses: Sequence[Array]) -> Texels:
         """The movers' points where they are."""
-        p, T = self._points, np.array(poses)[self._mover]
+        p = self._points
+        T = np.array(poses)[self._mover]
 
         def turned(vectors: Floats) -> Floats:
             return np.asarray(np.einsum("nij,nj->ni", T[:, :3, :3], vectors), np.float32)
@@ -257,9 +270,11 @@ class MoverLight:
         return self._lit[key]
 
     def _lit_from(self, emitter: Emitter, index: int) -> _Lit:
-        points, straight = self._still.points, self._straight[index]
+        points = self._still.points
+        straight = self._straight[index]
         some = reached(emitter, points, self._by_cell[straight[self._by_cell] > UNNOTICED * straight.max(initial=0)])
-        has, cells = np.zeros(len(points), bool), self._still.cells[some]
+        has = np.zeros(len(points), bool)
+        cells = self._still.cells[some]
         has[some] = True
         starts = np.flatnonzero(np.diff(cells, prepend=-1, append=-1))
         is_soft = bool((emitter.width_rad(points.points_m[some]) > 0).any())
@@ -271,7 +286,8 @@ class MoverLight:
         Soft shadows are asked at few points, and at others where those around differ, as light is. What is found at
         a point does not hang on which others are asked for.
         """
-        straight, layout = self._straight[index], self._still.layout
+        straight = self._straight[index]
+        layout = self._still.layout
         near = lit.near(moment.balls, new)
         wanted = some = lit.within(near)
         if not lit.is_soft:
@@ -286,7 +302,8 @@ class MoverLight:
         side = SKY_SHADE_SIDE if is_pane else SHADE_SIDE
         share = np.zeros(len(straight), np.float32)
         share[few] = self._traced(lit.emitter, few, moment.movers, side) / straight[few]
-        each, known = share[weights.indices], weights.data * lit.has[weights.indices]
+        each = share[weights.indices]
+        known = weights.data * lit.has[weights.indices]
         with np.errstate(invalid="ignore", divide="ignore"):
             count = np.add.reduceat(known, weights.indptr[:-1])
             mean, square = (np.add.reduceat(known * each**power, weights.indptr[:-1]) / count for power in (1, 2))
@@ -314,13 +331,15 @@ class MoverLight:
 
     def _lost_at(self, emitter: Emitter, some: Places, movers: RayCaster, side: int) -> Floats:
         own = self._still.points.take(some)
-        towards, lost = emitter.towards(own), np.zeros(len(own), np.float32)
+        towards = emitter.towards(own)
+        lost = np.zeros(len(own), np.float32)
         for cell in range(side**2):
             way, strength = towards(*cell_spot(own, cell, side))
             cosine = own.cosine(way)
             light = strength * np.maximum(cosine, 0) * own.entering(cosine)
             aside = footprint(own, slice(None), cell)
-            start, ahead = own.points_m + aside, way - aside
+            start = own.points_m + aside
+            ahead = way - aside
             hit = np.flatnonzero(movers.stops(start, ahead) & (light > 0))
             lost[hit] += light[hit] * emitter.passing(self._still.visibility, start[hit], ahead[hit])
         return lost / np.float32(side**2)
@@ -344,7 +363,8 @@ def spans(begins: Places, some: Places) -> Places:
 
 def _cells(baked: BakedScene, still: StaticScene, by_cell: Places) -> Ball:
     """Balls (C,) around all places that read light of the cells of what stands still."""
-    faces, some = still.faces, still.points.face[by_cell]
+    faces = still.faces
+    some = still.points.face[by_cell]
     with np.errstate(divide="ignore", invalid="ignore"):
         texel_m = np.sqrt(2 * areas_m2(faces.corners_m) / np.abs(turns_px2(baked.atlas.light_px)))
     starts = np.flatnonzero(np.diff(still.cells[by_cell], prepend=-1, append=-1))
@@ -387,7 +407,8 @@ MOST_PARTS = 8
 def parts(corners_m: Array) -> Ball:
     """Balls (K,) that enclose faces (F, 3, 3) together: of those in slices across the longest side of their box."""
     points = corners_m.reshape(-1, 3)
-    low, size = points.min(0), np.ptp(points, axis=0)
+    low = points.min(0)
+    size = np.ptp(points, axis=0)
     longest = int(size.argmax())
     count = int(np.clip(np.ceil(size[longest] / max(np.sort(size)[1], 1e-3)), 1, MOST_PARTS))
     part = np.where(np.arange(3) == longest, size / count, size)

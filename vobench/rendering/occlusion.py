@@ -79,7 +79,9 @@ class CutOuts:
         self._holed = {name: m for name, m in materials.items() if m.cutout is not None and m.texture}
         place = {name: nth for nth, name in enumerate(self._holed)}
         own = np.array([place.get(thing.material, -1) for thing in faces.things], np.int32)
-        self.map, self._uv = np.append(own[faces.thing], -1), faces.uv  # (F + 1,), -1 for none
+        # (F + 1,), -1 for none
+        self.map = np.append(own[faces.thing], -1)
+        self._uv = faces.uv
 
     def holes(self, hits: Hits) -> Mask:
         """Which of the places (R,) are holes."""
@@ -87,7 +89,9 @@ class CutOuts:
         which = self.map[hits.face] if self._holed else np.zeros(0)
         for nth, material in enumerate(self._holed.values()):
             at = np.flatnonzero(which == nth)
-            u, v, (a, b, c) = hits.u[at, None], hits.v[at, None], np.moveaxis(self._uv[hits.face[at]], 1, 0)
+            u = hits.u[at, None]
+            v = hits.v[at, None]
+            (a, b, c) = np.moveaxis(self._uv[hits.face[at]], 1, 0)
             found[at] = ~opaque(material, ((1 - u - v) * a + u * b + v * c) / material.tile_m)
         return found
 
@@ -108,10 +112,16 @@ def _opacity(material: Material) -> Floats:
 def _sampled(tile: Floats, places: Array) -> Array:
     """A repeating picture (H, W) at places (R, 2), linear between the middles of its pixels."""
     height, width = tile.shape
-    x, y = places[:, 0] * width - 0.5, places[:, 1] * height - 0.5
-    x0, y0 = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    fx, fy = x - x0, y - y0
-    left, right, top, bottom = x0 % width, (x0 + 1) % width, y0 % height, (y0 + 1) % height
+    x = places[:, 0] * width - 0.5
+    y = places[:, 1] * height - 0.5
+    x0 = np.floor(x).astype(np.int64)
+    y0 = np.floor(y).astype(np.int64)
+    fx = x - x0
+    fy = y - y0
+    left = x0 % width
+    right = (x0 + 1) % width
+    top = y0 % height
+    bottom = (y0 + 1) % height
     upper, lower = (tile[row, left] * (1 - fx) + tile[row, right] * fx for row in (top, bottom))
     return np.asarray(upper * (1 - fy) + lower * fy)
 
@@ -174,7 +184,8 @@ class Bodies:
             near = np.flatnonzero(body.near(origins, turned))
             met = self._meet(body, origins[near], turned[near])
             nearer = met.distance_m < np.nan_to_num(seen.distance_m[near], nan=np.inf)
-            seen.face[near[nearer]], seen.distance_m[near[nearer]] = met.face[nearer], met.distance_m[nearer]
+            seen.face[near[nearer]] = met.face[nearer]
+            seen.distance_m[near[nearer]] = met.distance_m[nearer]
         return seen
 
     def behind_panes(self, directions: Array, T_bodies_camera: Sequence[Array], distance_m: Array) -> Mask:
@@ -192,7 +203,8 @@ class Bodies:
         world, *movers = self._bodies
         hidden = self._stopped(world, starts_m, way, reach)
         for body, T_body_world in zip(movers, T_bodies_world[1:], strict=True):
-            start, turned = moved(T_body_world, starts_m.astype(float)), turn(T_body_world, way.astype(float))
+            start = moved(T_body_world, starts_m.astype(float))
+            turned = turn(T_body_world, way.astype(float))
             length_m = np.linalg.norm(turned, axis=1)
             near = np.flatnonzero(body.near(start, turned / length_m[:, None], length_m) & ~hidden & (reach > 0))
             hidden[near] = self._stopped(body, start[near], turned[near], reach[near])
@@ -209,7 +221,9 @@ class Bodies:
 
         # Of two faces back to back only one is there for rays: they could meet either.
         one = (self._twin[:-1] < 0) | (self._twin[:-1] > np.arange(len(pane)))
-        seen, holed, glass = caster(one & ~pane), member & one & ~pane & (self._cut.map[:-1] >= 0), member & pane
+        seen = caster(one & ~pane)
+        holed = member & one & ~pane & (self._cut.map[:-1] >= 0)
+        glass = member & pane
         opaque = caster(one & ~pane & ~holed) if holed.any() else seen
         holed_caster, glass_caster = (caster(part) if part.any() else None for part in (holed, glass))
         return Body(seen, opaque, holed_caster, glass_caster, center_m, radius_m)
@@ -218,7 +232,8 @@ class Bodies:
         """Whether a body stops light on its way, from either side of its faces but not through their holes."""
         stopped = body.opaque.stops(starts_m, way, reach)
         rays = np.flatnonzero(~stopped & (reach > 0)) if body.holed else np.zeros(0, np.intp)
-        start, ahead = starts_m[rays], way[rays] * reach[rays, None]
+        start = starts_m[rays]
+        ahead = way[rays] * reach[rays, None]
         for _ in range(MOST_PASSED):
             if not len(rays) or not body.holed:
                 break
@@ -227,7 +242,9 @@ class Bodies:
             stopped[rays[(hits.face >= 0) & ~hole]] = True
             on = (hits.distance_m + RAY_OFFSET_M / np.linalg.norm(ahead, axis=1))[:, None]
             further = hole & (on[:, 0] < 1)
-            rays, start, ahead = rays[further], (start + on * ahead)[further], (ahead * (1 - on))[further]
+            rays = rays[further]
+            start = (start + on * ahead)[further]
+            ahead = (ahead * (1 - on))[further]
         return stopped
 
     def _meet(self, body: Body, origins_m: Array, directions: Array) -> Hits:
@@ -258,7 +275,9 @@ class Bodies:
             on_m = hits.distance_m[passed] + 3 * self._edge_m / aside
             start = origins_m[passed] + on_m[:, None] * directions[passed]
             onward, cosine[passed] = self._first_front(body, start, directions[passed], most - 1)
-            hits.face[passed], hits.u[passed], hits.v[passed] = onward.face, onward.u, onward.v
+            hits.face[passed] = onward.face
+            hits.u[passed] = onward.u
+            hits.v[passed] = onward.v
             hits.distance_m[passed] = on_m + onward.distance_m
         return hits, cosine
 
@@ -267,7 +286,8 @@ class Bodies:
         cosine = dot(self.normals[face], directions)
         backs = np.flatnonzero(cosine >= 0)
         backs = backs[self._twin[face[backs]] >= 0]
-        face[backs], cosine[backs] = self._twin[face[backs]], -cosine[backs]
+        face[backs] = self._twin[face[backs]]
+        cosine[backs] = -cosine[backs]
         return cosine
 
     def _seal(self, body: Body, origins_m: Array, directions: Array, seen: Hits) -> None:
@@ -281,9 +301,12 @@ class Bodies:
         """The faces that rays meet in float64, among those that Embree finds there and a little to four sides."""
         if not len(doubtful):
             return
-        origins, ahead, reach_m = origins_m[doubtful], directions[doubtful], seen.distance_m[doubtful]
+        origins = origins_m[doubtful]
+        ahead = directions[doubtful]
+        reach_m = seen.distance_m[doubtful]
         right = unit(np.cross(ahead, AXES[np.argmin(np.abs(ahead), axis=1)]))
-        down, step_m = np.cross(ahead, right), 3 * self._edge_m / np.where(reach_m > 0, reach_m, 1)[:, None]
+        down = np.cross(ahead, right)
+        step_m = 3 * self._edge_m / np.where(reach_m > 0, reach_m, 1)[:, None]
         origins = np.concatenate([origins] * 5)
         aside = np.concatenate([ahead + step_m * way for way in (0 * right, right, down, -right, -down)])
         face = self._first_front(body, origins, aside)[0].face.reshape(5, -1)
@@ -291,14 +314,17 @@ class Bodies:
         distance_m = self._exact_m(face.ravel(), origins, np.concatenate([ahead] * 5)).reshape(5, -1)
         best = distance_m.argmin(0), np.arange(len(doubtful))
         met = np.isfinite(distance_m[best])
-        seen.face[doubtful[met]], seen.distance_m[doubtful[met]] = face[best][met], distance_m[best][met]
+        seen.face[doubtful[met]] = face[best][met]
+        seen.distance_m[doubtful[met]] = distance_m[best][met]
         # Past an outline; where all are faces, the ray is in a joint between them, and Embree's word stands.
         past = doubtful[~met & (face < 0).any(0)]
-        seen.face[past], seen.distance_m[past] = -1, np.nan
+        seen.face[past] = -1
+        seen.distance_m[past] = np.nan
 
     def _exact_m(self, face: Indices, origins_m: Array, directions: Array) -> Array:
         """How far along rays (R, 3) their faces' fronts are, infinite where they pass them by."""
-        normals, corners = self.normals[face], self.faces.corners_m[face]
+        normals = self.normals[face]
+        corners = self.faces.corners_m[face]
         cosine = dot(normals, directions)
         with np.errstate(divide="ignore", invalid="ignore"):
             distance_m = (self.offsets_m[face] - dot(normals, origins_m)) / cosine
@@ -325,17 +351,20 @@ def twins(faces: Triangles) -> Indices:
     corners = _numbered(faces.corners_m.reshape(-1, 3)).reshape(-1, 3)
     key = _numbered(np.column_stack([np.sort(corners, axis=1), faces.thing]))
     order = np.argsort(key, kind="stable")
-    first, second = order[:-1], order[1:]
+    first = order[:-1]
+    second = order[1:]
     pair = (key[first] == key[second]) & (dot(faces.plane[first], faces.plane[second]) < 0)
     pair[1:] &= ~pair[:-1]
     twin = np.full(len(faces) + 1, -1, np.int32)
-    twin[first[pair]], twin[second[pair]] = second[pair], first[pair]
+    twin[first[pair]] = second[pair]
+    twin[second[pair]] = first[pair]
     return twin
 
 
 def _numbered(rows: NDArray[Any]) -> NDArray[np.int64]:
     """Numbers (N,) that are equal where rows (N, K) are."""
-    order, numbers = np.lexsort(rows.T), np.zeros(len(rows), np.int64)
+    order = np.lexsort(rows.T)
+    numbers = np.zeros(len(rows), np.int64)
     numbers[order[1:]] = np.cumsum((np.diff(rows[order], axis=0) != 0).any(1))
     return numbers
 

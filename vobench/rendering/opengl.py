@@ -61,7 +61,9 @@ class SurfaceTexture:
     """
 
     def __init__(self, values: NDArray[Any], *, shrink: int = 0) -> None:
-        self.scale, self.is_grey, self.id = 1.0, values.ndim == 2, GL.glGenTextures(1)
+        self.scale = 1.0
+        self.is_grey = values.ndim == 2
+        self.id = GL.glGenTextures(1)
         GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
         if values.ndim == 3:
             counts = COUNTS[values]
@@ -112,7 +114,8 @@ class Blocks:
     """Numbers (B, N) float32 that shaders read as uniform blocks, one row at a time."""
 
     def __init__(self, binding: int, values: Floats) -> None:
-        self._binding, self._size = binding, 4 * values.shape[1]
+        self._binding = binding
+        self._size = 4 * values.shape[1]
         step = int(GL.glGetIntegerv(GL.GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT))
         self._stride = -(-self._size // step) * step
         self._buffer = GL.glGenBuffers(1)
@@ -222,8 +225,10 @@ class CubeTexture:
     """
 
     def __init__(self, pictures: Sequence[Radiance], axes: Array, roughness: Sequence[float]) -> None:
-        around, self.id = _cube(pictures), _cube(pictures)
-        program, framebuffer = Program("fullscreen", "probe"), GL.glGenFramebuffers(1)
+        around = _cube(pictures)
+        self.id = _cube(pictures)
+        program = Program("fullscreen", "probe")
+        framebuffer = GL.glGenFramebuffers(1)
         GL.glBindVertexArray(GL.glGenVertexArrays(1))
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
         for ability in (GL.GL_SCISSOR_TEST, GL.GL_DEPTH_TEST, GL.GL_CULL_FACE):
@@ -249,7 +254,8 @@ def _cube(pictures: Sequence[Radiance]) -> Any:
     texture = GL.glGenTextures(1)
     GL.glBindTexture(GL.GL_TEXTURE_CUBE_MAP, texture)
     for nth, picture in enumerate(pictures):
-        at, size = GL.GL_TEXTURE_CUBE_MAP_POSITIVE_X + nth, len(picture)
+        at = GL.GL_TEXTURE_CUBE_MAP_POSITIVE_X + nth
+        size = len(picture)
         data = np.ascontiguousarray(picture)
         GL.glTexImage2D(at, 0, GL.GL_RGBA32F, size, size, 0, GL.GL_RGB, GL.GL_FLOAT, data)
     GL.glGenerateMipmap(GL.GL_TEXTURE_CUBE_MAP)
@@ -383,7 +389,8 @@ class FlatTarget:
 def flat_target(width_px: int, height_px: int, channels: int) -> FlatTarget:
     """A target of some size. Raises RenderError where the driver has none such."""
     internal, form = FORMATS[channels]
-    framebuffer, texture = GL.glGenFramebuffers(1), GL.glGenTextures(1)
+    framebuffer = GL.glGenFramebuffers(1)
+    texture = GL.glGenTextures(1)
     GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
     GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
     GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, width_px, height_px, 0, form, GL.GL_FLOAT, None)

@@ -45,8 +45,10 @@ class MitsubaScene:
     def __init__(self, scene: Scene, *, max_depth: int | None) -> None:
         import mitsuba as mi
 
-        self._scene, self._state = scene, SceneState((1.0,) * len(scene.lights), 0.0)
-        self._faces, self._pictures = triangles(scene), dict[int, Any]()
+        self._scene = scene
+        self._state = SceneState((1.0,) * len(scene.lights), 0.0)
+        self._faces = triangles(scene)
+        self._pictures = dict[int, Any]()
         self._world = load(mi, scene)
         self._parameters = mi.traverse(self._world)
         # `path` is faster, but sees through panes and holes only by chance; `volpath` samples lights through them.
@@ -131,10 +133,12 @@ def _primary_rays(rays: Floats, rows: Indices, T_world_camera: Array, samples: i
     import drjit as dr
     import mitsuba as mi
 
-    grid, width = mi.Float(rays.ravel()), rays.shape[1]
+    grid = mi.Float(rays.ravel())
+    width = rays.shape[1]
     # Opaque, for a constant would be compiled into the kernel.
     pixel = dr.arange(mi.UInt32, dr.width(within)) // dr.opaque(mi.UInt32, samples)
-    entry, column = pixel // (width - 1), pixel % (width - 1)
+    entry = pixel // (width - 1)
+    column = pixel % (width - 1)
     corner = dr.gather(mi.UInt32, mi.UInt32(rows.astype(np.uint32)), entry) * width + column
     top = dr.lerp(*(dr.gather(mi.Vector3f, grid, corner + i) for i in (0, 1)), within.x)
     bottom = dr.lerp(*(dr.gather(mi.Vector3f, grid, corner + width + i) for i in (0, 1)), within.x)
@@ -174,7 +178,9 @@ class PathRenderer:
         if max_depth is not None and max_depth < 1:
             raise RenderError(f"cannot trace paths of {max_depth} segments; max_depth must be 1 or more, or None")
         mitsuba.prepare()
-        self._scene, self._samples, self._seed = scene, samples, seed
+        self._scene = scene
+        self._samples = samples
+        self._seed = seed
         self._mitsuba = MitsubaScene(scene, max_depth=max_depth)
 
     def radiance(self, camera: Camera, views: Sequence[View], *, weights: ArrayLike | None = LUMINANCE) -> Radiance:

@@ -54,7 +54,8 @@ def room_probe(
 ) -> Probe:
     """The probe of a scene of faces (F, 3, 3): `draw` gives picture (H, W, 3) and nearness (H, W) of a camera."""
     centre_m = _amid(corners_m)
-    pictures, reach = [], []
+    pictures = []
+    reach = []
     for right, down, ahead in FACES:
         picture, nearness = draw(CAMERA, se3.transform(np.stack([-right, down, ahead], 1), centre_m))
         pictures.append(picture[:, ::-1])
@@ -85,22 +86,28 @@ CLEAR_M = 0.5  # from the probe to what is next to it
 
 def _amid(corners_m: Array) -> Array:
     """A place near the middle of faces (F, 3, 3) with room around it."""
-    low, high = corners_m.min((0, 1)), corners_m.max((0, 1))
+    low = corners_m.min((0, 1))
+    high = corners_m.max((0, 1))
     steps = np.linspace(-0.3, 0.3, 7)
     offsets = np.stack(np.meshgrid(steps, steps, steps / 2, indexing="ij"), -1).reshape(-1, 3)
-    near, far = corners_m.min(1), corners_m.max(1)
+    near = corners_m.min(1)
+    far = corners_m.max(1)
 
-    aside, best, found = np.linalg.norm(offsets, axis=1).round(9), -np.inf, offsets[0]
+    aside = np.linalg.norm(offsets, axis=1).round(9)
+    best = -np.inf
+    found = offsets[0]
     # From the middle outwards, until what is farther out cannot be better.
     for nth in np.argsort(aside, kind="stable"):
-        offset, most = offsets[nth], CLEAR_M - 0.1 * aside[nth]
+        offset = offsets[nth]
+        most = CLEAR_M - 0.1 * aside[nth]
         if best >= most:
             break
         place = (low + high) / 2 + offset * (high - low)
         clear = np.linalg.norm(np.maximum(np.maximum(near - place, place - far), 0), axis=1).min()
         value = min(clear - CLEAR_M, 0) + most
         if value > best:
-            best, found = value, offset
+            best = value
+            found = offset
     return np.asarray((low + high) / 2 + found * (high - low))
 
 
@@ -132,7 +139,8 @@ def glints(lights: Sequence[Light], eye_m: Array, start_ns: int, end_ns: int) ->
 
 def _glint(light: PointLight | SpotLight | Sun, start_ns: int, end_ns: int) -> Array:
     power = light.level.mean(start_ns, end_ns) * np.array(light.colour)
-    everywhere, no_axis = 10.0, [0.0, 0.0, 0.0, 1.0]
+    everywhere = 10.0
+    no_axis = [0.0, 0.0, 0.0, 1.0]
     if isinstance(light, Sun):
         towards = light.direction((start_ns + end_ns) / 2)
         return np.array([[*towards, 0], [*light.illuminance_lx * power, everywhere], no_axis])

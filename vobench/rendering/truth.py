@@ -98,7 +98,8 @@ def lamp_of(corners_m: Array) -> Lamp:
     """The lamp whose faces (F, 3, 3) shine; where they are flat, only before them."""
     doubled = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
     area = np.linalg.norm(doubled, axis=1)
-    center_m, axis = np.average(corners_m.mean(1), axis=0, weights=area), unit(doubled.sum(0))
+    center_m = np.average(corners_m.mean(1), axis=0, weights=area)
+    axis = unit(doubled.sum(0))
     way_m = corners_m.reshape(-1, 3) - center_m
     if np.abs(way_m @ axis).max() < RAY_OFFSET_M:
         return Lamp(center_m, axis, 0.0)
@@ -136,7 +137,8 @@ def pixel_rays(camera: Camera) -> tuple[Array, Array]:
 Values = dict[str, NDArray[np.generic]]
 
 # With a rolling shutter the row that sees a point next is found by iteration, to this or in so many rounds.
-CONVERGED_PX, MOST_ROUNDS = 1e-5, 20
+CONVERGED_PX = 1e-5
+MOST_ROUNDS = 20
 # A point is seen where the ray ends no more than this share of the way before it.
 DEPTH_TOLERANCE = 1e-4
 LAMP_TOLERANCE = 1e-3  # as near to a lamp's middle nothing is in its way
@@ -146,12 +148,15 @@ class Band:
     """Rows of a picture: R pixels."""
 
     def __init__(self, picture: Picture, ids: FaceIds, rows: slice) -> None:
-        self._picture, self._bodies, self._ids_of = picture, picture.bodies, ids
+        self._picture = picture
+        self._bodies = picture.bodies
+        self._ids_of = ids
         self._uv_px, rays = (part[rows].reshape(-1, part.shape[2]) for part in pixel_rays(picture.camera))
         self._rays = rays
         self._T_bodies_camera = at_rows(picture.here.T_bodies_camera, self._uv_px[:, 1])
         seen = self._bodies.visible(rays, self._T_bodies_camera)
-        self._face, self._distance_m = seen.face, seen.distance_m
+        self._face = seen.face
+        self._distance_m = seen.distance_m
         self._points_m = self._distance_m[:, None] * rays
         self._world_m = moved(self._T_bodies_camera[0], self._points_m)
         self._movers = self._seen_movers(self._face)
@@ -161,7 +166,8 @@ class Band:
         found: Values = {}
         if "flow" in names or "occlusion" in names:
             found["flow"], found["occlusion"] = self._flow(hides="occlusion" in names)
-        here, rows = self._picture.here, self._uv_px[:, 1]
+        here = self._picture.here
+        rows = self._uv_px[:, 1]
         makers: dict[str, Callable[[], NDArray[np.generic]]] = {
             "depth": lambda: self._points_m[:, 2] if self._picture.camera.depth_along == "axis" else self._distance_m,
             "normals": lambda: self._normals(at_rows(here.T_camera_bodies, rows)),
@@ -194,13 +200,17 @@ class Band:
         )
 
     def _shadow(self) -> NDArray[np.uint16]:
-        count, here, rows = np.zeros(len(self._face), np.uint16), self._picture.here, self._uv_px[:, 1]
-        matt, T_bodies_world = self._ids_of.matt[self._face], at_rows(here.T_bodies_world, rows)
+        count = np.zeros(len(self._face), np.uint16)
+        here = self._picture.here
+        rows = self._uv_px[:, 1]
+        matt = self._ids_of.matt[self._face]
+        T_bodies_world = at_rows(here.T_bodies_world, rows)
         normals = self._normals(at_rows(here.T_world_bodies, rows))
         starts_m = (self._world_m + self._bodies.ray_offset_m * normals).astype(np.float32)
         away_m = dot(self._world_m, normals) if self._movers else np.empty(0)
         for lamp, faces in self._picture.lamps:
-            faced, way = faces[self._face], lamp.way(starts_m)
+            faced = faces[self._face]
+            way = lamp.way(starts_m)
             for _, these in self._movers:
                 faced[these] = lamp.faced(normals[these], away_m[these])
             lit = matt & faced & lamp.shines(way)
@@ -210,10 +220,12 @@ class Band:
 
     def _flow(self, *, hides: bool) -> tuple[Array, Mask]:
         """Pixels (R, 2) to the place in the next picture, and whether the point is hidden or outside there (R,)."""
-        there, seen = self._picture.there, self._face >= 0
+        there = self._picture.there
+        seen = self._face >= 0
         if there is None:
             return np.full((len(self._rays), 2), np.nan), seen
-        rows, own_m = self._uv_px[:, 1], self._own_m()
+        rows = self._uv_px[:, 1]
+        own_m = self._own_m()
         for _ in range(MOST_ROUNDS):
             next_m = self._carried(own_m, there, rows)
             uv_px = self._picture.camera.project(next_m)
@@ -240,7 +252,8 @@ class Band:
 
     def _gone(self, there: ShotTransforms, next_m: Array, uv_px: Array) -> Mask:
         """Whether points (R, 3) in the next camera's frame are outside its picture (R, 2), or hidden from it."""
-        camera, (u, v) = self._picture.camera, uv_px.T
+        camera = self._picture.camera
+        (u, v) = uv_px.T
         gone: Mask = ~((u >= -0.5) & (u < camera.width_px - 0.5) & (v >= -0.5) & (v < camera.height_px - 0.5))
         inside = np.flatnonzero(~gone)
         gone[inside] = self._hidden(there, inside, next_m[inside], v[inside])
@@ -248,7 +261,8 @@ class Band:
 
     def _hidden(self, there: ShotTransforms, pixels: Pixels, next_m: Array, rows: Array) -> Mask:
         """Whether the next camera, with the points (P, 3) of pixels before it, sees backs or something nearer."""
-        T_bodies_there, face = at_rows(there.T_bodies_camera, rows), self._face[pixels]
+        T_bodies_there = at_rows(there.T_bodies_camera, rows)
+        face = self._face[pixels]
         origins, way = into(T_bodies_there[0], next_m)
         eye_m = origins.copy()
         for body, these in self._seen_movers(face):
@@ -274,7 +288,8 @@ class TruthCaster:
     """Ground truth of one scene; `names` says what its ids mean."""
 
     def __init__(self, scene: Scene) -> None:
-        self._scene, self._bodies = scene, Bodies(scene)
+        self._scene = scene
+        self._bodies = Bodies(scene)
         faces = self._bodies.faces
         movers = dict(zip(faces.thing.tolist(), faces.mover.tolist(), strict=True))
         instances = [
@@ -302,7 +317,8 @@ class TruthCaster:
 
         Raises UnknownNameError for a channel that does not exist.
         """
-        height, width = camera.height_px, camera.width_px
+        height = camera.height_px
+        width = camera.width_px
         wanted = {name: CHANNELS[name] for name in check_channels(channels)}
         values: dict[str, Any] = {name: np.empty(c.shape(height, width), c.dtype) for name, c in wanted.items()}
         lit = lamps(self._scene, self._bodies, int(np.mean(now.t_ns))) if "shadow" in wanted else ()

@@ -54,8 +54,10 @@ def visible_boxes(camera: Pinhole, outlines_camera_m: Array) -> Array:
 
     Edges are cut at the near plane, behind which a projection has no meaning.
     """
-    here, there = outlines_camera_m, np.roll(outlines_camera_m, -1, axis=1)
-    z0, z1 = here[..., 2] - NEAR_M, there[..., 2] - NEAR_M
+    here = outlines_camera_m
+    there = np.roll(outlines_camera_m, -1, axis=1)
+    z0 = here[..., 2] - NEAR_M
+    z1 = there[..., 2] - NEAR_M
     crossing = (z0 < 0) != (z1 < 0)
     share = np.where(crossing, z0 / np.where(crossing, z0 - z1, 1), 0)[..., None]
     points = np.concatenate([here, here + share * (there - here)], 1)
@@ -72,7 +74,10 @@ def visible_boxes(camera: Pinhole, outlines_camera_m: Array) -> Array:
 
 def within(box: Sequence[float], other: Sequence[float]) -> Box | None:
     """What two boxes share, None for nothing."""
-    u0, v0, u1, v1 = max(box[0], other[0]), max(box[2], other[2]), min(box[1], other[1]), min(box[3], other[3])
+    u0 = max(box[0], other[0])
+    v0 = max(box[2], other[2])
+    u1 = min(box[1], other[1])
+    v1 = min(box[3], other[3])
     return (int(u0), int(u1), int(v0), int(v1)) if u0 < u1 and v0 < v1 else None
 
 
@@ -173,8 +178,10 @@ def _projection(camera: Pinhole) -> Array:
     Depth is NEAR_M over the distance ahead: floats are then as fine far away as near by (Reed, 2015).
     """
     P = np.zeros((4, 4))
-    P[0, 0], P[0, 2] = 2 * camera.fx_px / camera.width_px, 1 - 2 * (camera.cx_px + 0.5) / camera.width_px
-    P[1, 1], P[1, 2] = 2 * camera.fy_px / camera.height_px, 2 * (camera.cy_px + 0.5) / camera.height_px - 1
+    P[0, 0] = 2 * camera.fx_px / camera.width_px
+    P[0, 2] = 1 - 2 * (camera.cx_px + 0.5) / camera.width_px
+    P[1, 1] = 2 * camera.fy_px / camera.height_px
+    P[1, 2] = 2 * (camera.cy_px + 0.5) / camera.height_px - 1
     P[2, 3] = NEAR_M
     P[3, 2] = -1
     return P

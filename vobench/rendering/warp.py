@@ -52,7 +52,8 @@ class Face:
         spans = spans[spans[:, 0] < spans[:, 1]]
         if len(spans) == 0:
             return None
-        first, end = spans.min(0).tolist(), spans.max(0).tolist()
+        first = spans.min(0).tolist()
+        end = spans.max(0).tolist()
         return first[0], end[1], first[2], end[3]
 
 
@@ -90,7 +91,8 @@ def warp(camera: Camera) -> Warp:
     face_of, plane = _faces(_rays(camera))
     focal_px = _focal_px(plane, face_of, np.diag(camera.K)[:2])
     pixels = np.moveaxis((plane * focal_px).astype(np.float32), -1, 0)
-    faces, row = [], 0
+    faces = []
+    row = 0
     at = np.full_like(pixels, NOWHERE)
     for index in np.unique(face_of[face_of >= 0]):
         mine = face_of == index
@@ -114,22 +116,22 @@ def _faces(rays: Array) -> tuple[NDArray[np.int8], Array]:
     if np.all(nowhere | (rays[..., 2] > np.cos(ONE_FACE_RAD))):
         return np.where(nowhere, -1, 0).astype(np.int8), np.nan_to_num(rays[..., :2] / rays[..., 2:])
     face_of = np.full(nowhere.shape, -1, np.int8)
-    plane, best = np.zeros((*nowhere.shape, 2)), np.zeros(nowhere.shape)
+    plane = np.zeros((*nowhere.shape, 2))
+    best = np.zeros(nowhere.shape)
     for index, turn in enumerate(FACES):
         along = rays @ turn[:, 2]
         nearer = along > best  # false where there is no ray
-        face_of[nearer], best[nearer] = index, along[nearer]
+        face_of[nearer] = index
+        best[nearer] = along[nearer]
         plane[nearer] = (rays[nearer] @ turn[:, :2]) / along[nearer, None]
     return face_of, plane
 
 
 def _focal_px(plane: Array, face_of: NDArray[np.int8], focal_lengths: Array) -> float:
     """Focal length of faces as fine as the points are where they are finest, in the lens's finer direction."""
-    here, right, down = (
-        (slice(0, -1, 3), slice(0, -1, 3)),
-        (slice(0, -1, 3), slice(1, None, 3)),
-        (slice(1, None, 3), slice(0, -1, 3)),
-    )
+    here = (slice(0, -1, 3), slice(0, -1, 3))
+    right = (slice(0, -1, 3), slice(1, None, 3))
+    down = (slice(1, None, 3), slice(0, -1, 3))
     within = (face_of[here] >= 0) & (face_of[here] == face_of[right]) & (face_of[here] == face_of[down])
     steps = np.sort([np.hypot(*(plane[there] - plane[here])[within].T) for there in (right, down)], 0)
     # Towards a fisheye's rim and a full sphere's poles, points lie close along one direction without showing more.

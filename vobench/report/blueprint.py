@@ -12,11 +12,18 @@ FRAME_TIMELINE = "frame"
 
 # Entities: what a recording holds and the views below show.
 WORLD = "world"
-TRUTH_PATH, SCENE = f"{WORLD}/ground_truth/path", f"{WORLD}/scene"
-TRUTH_LEFT, TRUTH_RIGHT = f"{WORLD}/ground_truth/left", f"{WORLD}/ground_truth/right"
-ERROR, TRACKS = f"{WORLD}/error", f"{TRUTH_LEFT}/tracks"
-POSITION_ERROR, ROTATION_ERROR, STATUS, SUMMARY = "position_error", "rotation_error", "status", "summary"
-STATS, COSTS = "stats", "costs"
+TRUTH_PATH = f"{WORLD}/ground_truth/path"
+SCENE = f"{WORLD}/scene"
+TRUTH_LEFT = f"{WORLD}/ground_truth/left"
+TRUTH_RIGHT = f"{WORLD}/ground_truth/right"
+ERROR = f"{WORLD}/error"
+TRACKS = f"{TRUTH_LEFT}/tracks"
+POSITION_ERROR = "position_error"
+ROTATION_ERROR = "rotation_error"
+STATUS = "status"
+SUMMARY = "summary"
+STATS = "stats"
+COSTS = "costs"
 
 EYE_PITCH_DEG = 38.0
 EYE_DISTANCE_PER_RADIUS = 1.6  # fills the view with Rerun's default field of view, with a margin for frusta
@@ -29,10 +36,14 @@ class Entities:
 
     def __init__(self, label: str) -> None:
         self.path, self.left, self.points = (f"{WORLD}/{label}/{part}" for part in ("path", "left", "points"))
-        self.error_line, self.tracks = f"{ERROR}/{label}", f"{TRACKS}/{label}"
-        self.tails, self.epipolar = f"{self.tracks}/tails", f"{self.tracks}/epipolar_lines"
-        self.position_error, self.rotation_error = f"{POSITION_ERROR}/{label}", f"{ROTATION_ERROR}/{label}"
-        self.status, self.summary = f"{STATUS}/{label}", f"{SUMMARY}/{label}"
+        self.error_line = f"{ERROR}/{label}"
+        self.tracks = f"{TRACKS}/{label}"
+        self.tails = f"{self.tracks}/tails"
+        self.epipolar = f"{self.tracks}/epipolar_lines"
+        self.position_error = f"{POSITION_ERROR}/{label}"
+        self.rotation_error = f"{ROTATION_ERROR}/{label}"
+        self.status = f"{STATUS}/{label}"
+        self.summary = f"{SUMMARY}/{label}"
 
 
 def truth_entity(side: str, channel: str) -> str:
@@ -55,7 +66,8 @@ def layout(
     Several estimators have a left picture each, side by side. Truth channels, where there are any, have tabs of their
     own, and what an estimator counted and a frame cost a plot.
     """
-    seen_m, is_one = _near(truth_m, estimate_m), len(labels) == 1
+    seen_m = _near(truth_m, estimate_m)
+    is_one = len(labels) == 1
     said = [rrb.TimeSeriesView(origin=STATS, name="What the estimator says")] if has_stats else []
     said += [rrb.TimeSeriesView(origin=COSTS, name="Latency (ms), exposure (ms), gain (dB)")] if has_costs else []
     paths = rrb.Vertical(
@@ -167,6 +179,7 @@ def _radius_m(points_m: Array) -> float:
 
 def _near(truth_m: Array, estimate_m: Array) -> Array:
     """The truth and what of the estimate stays near it: one that flies off must not shrink the rest."""
-    centre, reach_m = (truth_m.min(0) + truth_m.max(0)) / 2, 2 * _radius_m(truth_m)
+    centre = (truth_m.min(0) + truth_m.max(0)) / 2
+    reach_m = 2 * _radius_m(truth_m)
     near = np.linalg.norm(estimate_m - centre, axis=1) <= reach_m
     return np.concatenate([truth_m, estimate_m[near]])

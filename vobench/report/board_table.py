@@ -41,7 +41,8 @@ class Shown:
 
 def matrix(made: Board, metric: str) -> list[tuple[str, list[Shown]]]:
     """Each case with its cells, one an estimator, the best estimator first."""
-    marked, names = marks(made, metric), made.estimators
+    marked = marks(made, metric)
+    names = made.estimators
     rows = []
     for case in made.cases:
         of_case = [made.cell(case, name) for name in names]
@@ -51,7 +52,8 @@ def matrix(made: Board, metric: str) -> list[tuple[str, list[Shown]]]:
 
 
 def _shown(cell: Cell, metric: str, mark: str) -> Shown:
-    spread, lost = cell.spread(metric), f"{cell.failed}/{cell.trials} {cell.status}"
+    spread = cell.spread(metric)
+    lost = f"{cell.failed}/{cell.trials} {cell.status}"
     if cell.failed == cell.trials and metric not in COSTS:
         return Shown(cell.status if cell.trials == 1 else lost, failed=True)
     if spread is None:
@@ -89,7 +91,8 @@ def _score(total: Total) -> str:
     return f"{total.score:.{min(max(1 - floor(log10(max(1 - total.score, 1e-9))), 3), 7)}f}"
 
 
-COST, MEMORY = "CPU ms/frame", "MiB"
+COST = "CPU ms/frame"
+MEMORY = "MiB"
 # Heading and cell of each column of the totals, as people read them.
 COLUMNS: tuple[tuple[str, Callable[[Total], str]], ...] = (
     ("#", _places),
@@ -110,7 +113,8 @@ def totals(made: Board) -> list[tuple[str, list[list[str]]]]:
     """Of each group its name, and the headings and cells of its totals; columns of costs only where there are some."""
     timed = any(total.cpu_ms is not None for total in made.totals)
     columns = [column for column in COLUMNS if timed or column[0] not in (COST, MEMORY)]
-    found, groups = [], dict.fromkeys(total.group for total in made.totals)
+    found = []
+    groups = dict.fromkeys(total.group for total in made.totals)
     for group in groups:
         rows = [[cell(total) for _, cell in columns] for total in made.totals if total.group == group]
         cases = next(total.cases for total in made.totals if total.group == group)
@@ -130,7 +134,8 @@ def breakdown(curve: Curve) -> str:
 
 def remarks(made: Board) -> list[str]:
     """What is to know of the totals: what they leave out, and what would decide the undecided."""
-    said, above = list(made.remarks), None
+    said = list(made.remarks)
+    above = None
     for total in made.totals:
         if (
             above
@@ -245,7 +250,8 @@ def rows(made: Board) -> list[dict[str, Any]]:
 
 def as_csv(made: Board) -> str:
     """Every cell and every total as a row, numbers in full."""
-    found, text = rows(made), io.StringIO()
+    found = rows(made)
+    text = io.StringIO()
     columns = list(dict.fromkeys(name for row in found for name in row))
     writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
@@ -270,7 +276,9 @@ def data_frame(made: Board) -> "pd.DataFrame":
 
 TEX = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "–": "--", "×": r"$\times$"}
 TEX |= {letter: f"\\{letter}" for letter in "&%$#_{}"} | {"°": r"$^\circ$", "<": "$<$", ">": "$>$", "|": "$|$"}
-WIDE, NARROW = 6, 3  # columns that fit a page with names as they are, and with the range of each cell
+# columns that fit a page with names as they are, and with the range of each cell
+WIDE = 6
+NARROW = 3
 FEET = (("score", _score), ("place", _places))
 
 
@@ -283,7 +291,9 @@ def latex(made: Board, metric: str = DEFAULT_METRIC) -> str:
 
     Whichever are fewer, cases or estimators, are its columns.
     """
-    names, cases, body = made.estimators, made.cases, matrix(made, metric)
+    names = made.estimators
+    cases = made.cases
+    body = matrix(made, metric)
     claims = {cell.estimator: cell.claims for cell in made.cells}
     by_name = {total.estimator: total for total in made.totals} if len(totals(made)) == 1 else {}
     heads = [_tex(named(name, claims[name])) for name in names]

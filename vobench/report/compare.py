@@ -12,8 +12,14 @@ from vobench.metric.ranking import ALPHA, difference_p, holm
 from vobench.report.leaderboard import Board, Cell
 from vobench.runner.environment import differences
 
-SAME, BETTER, WORSE, UNDECIDED = "same", "better", "worse", "not decided"
-FAILS, MENDED, NEW, GONE = "fails now", "mended", "new", "gone"
+SAME = "same"
+BETTER = "better"
+WORSE = "worse"
+UNDECIDED = "not decided"
+FAILS = "fails now"
+MENDED = "mended"
+NEW = "new"
+GONE = "gone"
 NOT_MADE = "no sequence"  # the case could not be simulated or imported in one of the runs
 REGRESSIONS = (WORSE, FAILS)
 
@@ -77,7 +83,8 @@ def _ordered(cell: Cell) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
 def _said(cell: Cell | None) -> str:
     if cell is None:
         return "–"
-    ate, lost = cell.spread("ate"), f"{cell.failed}/{cell.trials} {cell.status}" if cell.failed else ""
+    ate = cell.spread("ate")
+    lost = f"{cell.failed}/{cell.trials} {cell.status}" if cell.failed else ""
     return ", ".join(filter(None, [f"{ate[0]:.3g} %" if ate else "", lost])) or cell.status
 
 
@@ -124,12 +131,14 @@ def _total(name: str, pairs: list[tuple[Cell, Cell]], at_most: float | None) -> 
     failed = loss.copy()
     for case, pair in enumerate(pairs):
         for row, cell in enumerate(pair):
-            loss[row, case, : cell.trials], failed[row, case, : cell.trials] = cell.losses, cell.failures
+            loss[row, case, : cell.trials] = cell.losses
+            failed[row, case, : cell.trials] = cell.failures
     first, second = ranking.rank(loss, failed)
     is_worse = second.index == 1
     scores = {each.index: f"{1 - each.loss:.4f}" for each in (first, second)}
     sign = 1 if is_worse else -1
-    ratio, interval = second.loss_ratio**sign, second.ratio_interval
+    ratio = second.loss_ratio**sign
+    interval = second.ratio_interval
     ends = sorted(exp(sign * log(end)) for end in interval) if interval else []
     verdict = (WORSE if is_worse else BETTER) if second.decided_above else UNDECIDED
     if all((old.losses, old.failures) == (new.losses, new.failures) for old, new in pairs):

@@ -34,8 +34,13 @@ from vobench.suite.source import RecordedCase, Source
 from vobench.suite.suite import Entrant, Trial
 
 LENS = Pinhole(320, 240, 240.0, 240.0, 159.5, 119.5)
-HEIGHT_M, BASELINE_M, STEP_M, STEP_NS = 0.4, 0.05, 0.005, 50_000_000
-FRAMES, FIRST_ODD, LAST_ODD = 20, 10, 13
+HEIGHT_M = 0.4
+BASELINE_M = 0.05
+STEP_M = 0.005
+STEP_NS = 50_000_000
+FRAMES = 20
+FIRST_ODD = 10
+LAST_ODD = 13
 IMU = ImuCalibration(np.eye(4), 200.0, 1e-4, 1e-3, 1e-5, 1e-4)
 RIG = stereo_rig(LENS, pitch_deg=90, baseline_m=BASELINE_M, height_m=HEIGHT_M)
 STILL_M = 0.01  # farther than this no tracker of a resting picture should come in a second
@@ -75,7 +80,8 @@ class Practice:
         """Record it. A picture that the odd part makes None is missing."""
         floor = np.random.default_rng(7).integers(30, 220, (60, 42)).repeat(12, 0).repeat(12, 1)
         rig = Rig(RIG.left, RIG.right, RIG.T_body_left, RIG.T_body_right, RIG.wheels, IMU)
-        disparity_px, step_px = round(240 * BASELINE_M / HEIGHT_M), round(240 * STEP_M / HEIGHT_M)
+        disparity_px = round(240 * BASELINE_M / HEIGHT_M)
+        step_px = round(240 * STEP_M / HEIGHT_M)
         with SequenceWriter(folder, rig, case_json=b"{}") as writer:
             for index in range(FRAMES):
                 moved = 0 if self.is_still else index
@@ -173,10 +179,12 @@ def _causes(entrant: Entrant, drive: Path, run: Callable[[], Path]) -> Clause:
 
 def _in_one_process(entrant: Entrant, recording: Path, drive: Path) -> Iterator[Clause]:
     """What only a class can be asked: that it leaves its frames alone, and starts again from nothing."""
-    manifest, sequence = entrant.manifest, Sequence.open(recording)
+    manifest = entrant.manifest
+    sequence = Sequence.open(recording)
     if not manifest.class_path:
         return
-    frames, log = list(frames_of(sequence, manifest.needs)), drive / "watched.txt"
+    frames = list(frames_of(sequence, manifest.needs))
+    log = drive / "watched.txt"
     try:
         with EstimatorProcess.of_class(
             entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits, is_watched=True

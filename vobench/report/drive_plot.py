@@ -20,9 +20,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 ENDINGS = (".svg", ".png", ".pdf")
-ROW_INCHES, CELL_INCHES = (9.0, 3.6), 2.3
+ROW_INCHES = (9.0, 3.6)
+CELL_INCHES = 2.3
 # Okabe and Ito (2008): colours that colour-blind readers tell apart.
-BODY, POINT, ASKED, QUIET = "#0072B2", "#009E73", "#D55E00", "#7f7f7f"
+BODY = "#0072B2"
+POINT = "#009E73"
+ASKED = "#D55E00"
+QUIET = "#7f7f7f"
 FLOORS = {"wet": "#56B4E9", "carpet": "#CC79A7", "seam": "#E69F00"}
 # The same drive is the same file: no dates, and ids that come from content.
 SETTINGS: Any = {
@@ -184,7 +188,8 @@ def _path(axes: "Axes", log: DriveLog, *, legend: bool = True) -> None:
 def _headings(axes: "Axes", log: DriveLog, *, length: float) -> None:
     """Arrows along the body's x axis, at even times; `length` is against what suits a large plot."""
     chosen = np.unique(np.linspace(0, len(log.t_s) - 1, ARROWS).astype(int))
-    at, ahead = log.T_world_body[chosen, :2, 3], log.T_world_body[chosen, :2, 0]
+    at = log.T_world_body[chosen, :2, 3]
+    ahead = log.T_world_body[chosen, :2, 0]
     axes.quiver(*at.T, *ahead.T, color=QUIET, scale=18 / length, width=0.004 * length, headwidth=4, label="heading")
 
 

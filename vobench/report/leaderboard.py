@@ -248,7 +248,8 @@ def answers(trials: Sequence[list[FrameRow]]) -> EstimatorStatistics:
     Reasons that differ in numbers alone, as `too few tracks (7)` and `(5)`, are one.
     """
     rows = [row for trial in trials for row in trial]
-    costs_ms, given = [row.cpu_ms for row in rows if row.cpu_ms is not None], [row for row in rows if row.reason]
+    costs_ms = [row.cpu_ms for row in rows if row.cpu_ms is not None]
+    given = [row for row in rows if row.reason]
     cost_ms = fmean(costs_ms) if costs_ms else None
     statuses = [[row.status for row in trial] for trial in trials]
     late = sum(now == DROPPED != before for each in statuses for before, now in pairwise(each))
@@ -404,7 +405,8 @@ def _totals(group: str, cells: Sequence[Cell]) -> tuple[list[Total], list[str]]:
     by_name: dict[str, list[Cell]] = {name: [] for name in names}
     for cell in shown:
         place = rows[cell.estimator], columns[cell.case]
-        loss[place][: cell.trials], failed[place][: cell.trials] = cell.losses, cell.failures
+        loss[place][: cell.trials] = cell.losses
+        failed[place][: cell.trials] = cell.failures
         by_name[cell.estimator].append(cell)
     places = ranking.mean_places(loss, failed)
     standings = ranking.rank(loss, failed)
@@ -443,7 +445,8 @@ def _total(group: str, cells: Sequence[Cell], standing: ranking.Standing, mean_p
 def _efficient(ranked: Sequence[Total]) -> list[Total]:
     """The same, those marked than whom nobody with a better score took less CPU time."""
     costs = {total.estimator: inf if total.cpu_ms is None else total.cpu_ms for total in ranked}
-    least, marked = inf, set[str]()
+    least = inf
+    marked = set[str]()
     for total in sorted(ranked, key=lambda total: (-total.score, costs[total.estimator])):
         if costs[total.estimator] < least:
             least = costs[total.estimator]

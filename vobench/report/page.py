@@ -42,7 +42,9 @@ STEM = "leaderboard"
 COST_COLUMNS = ("case", "estimator", "wall_ms", "cpu_ms", "memory_mib")
 MOST_DETAILS = 200  # cells, the worst of them, that a page can open
 MOST_POINTS = 160  # of a curve or a path in it
-THUMB_PX, RIG_PX, JPEG_QUALITY = 176, 256, 55
+THUMB_PX = 176
+RIG_PX = 256
+JPEG_QUALITY = 55
 MOST_PICTURE_BYTES = 2_200_000  # of all pictures in it, before they are written as text
 UNCALIBRATED = "none"  # the group of cases without a calibration error, as recordings are
 APART = 5  # frames between two of the worst moments
@@ -200,8 +202,10 @@ class Pictures:
     """Small JPEGs of frames of a run's sequences, each once, until there are enough bytes of them."""
 
     def __init__(self, folder: RunFolder) -> None:
-        self._folder, self._bytes = folder, 0
-        self._made, self._open = dict[tuple[str, int, int], str](), dict[str, Any]()
+        self._folder = folder
+        self._bytes = 0
+        self._made = dict[tuple[str, int, int], str]()
+        self._open = dict[str, Any]()
 
     def get(self, case: str, frame: int, width_px: int) -> str | None:
         """A frame of a case as a data URI, None where there is none or no room is left."""
@@ -255,7 +259,8 @@ def _data(
     beside: Path,
 ) -> dict[str, Any]:
     """All that the page's script draws."""
-    names, cases = made.estimators, made.cases
+    names = made.estimators
+    cases = made.cases
     metrics = {
         name: {
             "higher": METRICS[name].higher_is_better,
@@ -294,10 +299,12 @@ def _details(
         trials.setdefault((score.case, score.estimator), []).append(score)
     cells = sorted(made.cells, key=lambda cell: (-cell.failed / cell.trials, -float(np.nanmax([0.0, *cell.losses]))))
     rows, columns = ({name: k for k, name in enumerate(names)} for names in (made.cases, made.estimators))
-    details, truths = dict[str, Any](), dict[str, Any]()
+    details = dict[str, Any]()
+    truths = dict[str, Any]()
     for cell in sorted(cells[:MOST_DETAILS], key=lambda cell: rows[cell.case]):
         stop.check()
-        row, truth = str(rows[cell.case]), folder.case(cell.case) / GROUND_TRUTH
+        row = str(rows[cell.case])
+        truth = folder.case(cell.case) / GROUND_TRUTH
         if row not in truths and truth.is_file():
             truths[row] = points(read_tum(truth).positions_m[:, :2])
         detail = _detail(folder, cell, trials[cell.case, cell.estimator], pictures, beside)
@@ -370,7 +377,8 @@ def moments(frames: Sequence[FrameRow], errors_m: Array) -> list[Moment]:
         return []
     known = np.where(np.isinf(errors_m), -1.0, errors_m)
     is_lost = np.array([row.status in ("lost", "") and k > 0 for k, row in enumerate(frames)], float)
-    found, at = list[Moment](), np.arange(len(frames))
+    found = list[Moment]()
+    at = np.arange(len(frames))
     for why, worth in (("lost", is_lost), ("large error", known), ("jump", np.diff(known, prepend=known[:1]))):
         far = np.min([np.abs(at - other.frame) for other in found], axis=0) >= APART if found else at >= 0
         k = int(np.argmax(np.where(far, worth, -np.inf)))

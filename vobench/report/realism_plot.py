@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73")  # Okabe and Ito (2008)
-BAND, MOST_DOTS = "#c9e4d3", 3000
+BAND = "#c9e4d3"
+MOST_DOTS = 3000
 
 
 def save_plot(path: Path, found: Mapping[str, Realism]) -> None:
@@ -44,7 +45,8 @@ def _bands(axes: "Axes", found: Mapping[str, Realism]) -> None:
             if (value := found[name].values.get(statistic.name)) is None:
                 continue
             place = (value - statistic.low) / (statistic.high - statistic.low)
-            shown, marker = float(np.clip(place, -2, 3)), "o" if -2 <= place <= 3 else "<" if place < 0 else ">"
+            shown = float(np.clip(place, -2, 3))
+            marker = "o" if -2 <= place <= 3 else "<" if place < 0 else ">"
             at = row + 0.28 * (shift - (len(found) - 1) / 2)
             axes.plot([shown], [at], marker, color=colour, ms=6)
             axes.annotate(

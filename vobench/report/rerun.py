@@ -56,7 +56,8 @@ def time_columns(frames: NDArray[np.int64], t_ns: Stamps) -> list[rr.TimeColumn]
     return [rr.TimeColumn(FRAME_TIMELINE, sequence=frames), seconds]
 
 
-UNSET, SET = (0, 0, 0, 0), (255, 255, 255, 160)
+UNSET = (0, 0, 0, 0)
+SET = (255, 255, 255, 160)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +120,9 @@ Unit = tuple[float, str]
 Color = tuple[int, int, int]
 Tracks = tuple[Array, NDArray[np.bool_]]
 
-GREEN, ORANGE, RED = (60, 200, 90), (255, 150, 40), (235, 60, 60)
+GREEN = (60, 200, 90)
+ORANGE = (255, 150, 40)
+RED = (235, 60, 60)
 COLORS = (ORANGE, (80, 160, 255), (200, 110, 230), (240, 220, 90), (120, 220, 220))  # of estimators
 EPIPOLAR = (255, 255, 255, 70)
 STATUS_COLORS = {
@@ -135,14 +138,17 @@ NS_PER_S = 1_000_000_000
 FAILED = ("lost", NO_OUTPUT)
 PIXEL_CENTRE = 0.5  # Rerun puts the corner of the top-left pixel at (0, 0), we its centre
 FRUSTUM_LINE = -1.5  # negative: in screen points, whatever the zoom
-TRACK_RADIUS, PATH_RADIUS = rr.Radius.ui_points(3.5), rr.Radius.ui_points(1.8)
-TAIL_FRAMES, MOST_TAILS = 5, 200
+TRACK_RADIUS = rr.Radius.ui_points(3.5)
+PATH_RADIUS = rr.Radius.ui_points(1.8)
+TAIL_FRAMES = 5
+MOST_TAILS = 200
 MOST_LINES = 40  # of epipolar lines in a picture
 AWAY_M = np.geomspace(0.3, 100.0, 12)  # points of such a line, by their distance from the last place
 
 PictureForm = Literal["jpeg", "png"]
 FRAME_BYTES = 45_000  # of 60,000 with tracks
-BEST_QUALITY, WORST_QUALITY = 85, 10
+BEST_QUALITY = 85
+WORST_QUALITY = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,7 +257,8 @@ def save_trial(path: Path, trial: TrialView, *others: TrialView, form: PictureFo
         log = _Log(stream, _log_pictures(stream, trial.frames(), form), trial.first)
         _log_truth_path(log, trial)
         _log_scene(log, trial.scene)
-        trials, unit = (trial, *others), _unit([trial, *others])
+        trials = (trial, *others)
+        unit = _unit([trial, *others])
         for each, color in zip(trials, COLORS, strict=False):
             _log_trial(log, each, color, unit)
         if trial.truth is not None:
@@ -277,7 +284,8 @@ def _focus(trials: Rows[TrialView]) -> tuple[int, int] | None:
         if found := first_failure(trial.statuses):
             return found[0] + trial.first, found[1] + trial.first
     wrong = [trial.wrong_at for trial in trials if trial.wrong_at is not None]
-    count, around = len(trials[0].statuses), bp.FRAMES_AROUND_FOCUS
+    count = len(trials[0].statuses)
+    around = bp.FRAMES_AROUND_FOCUS
     if not wrong:
         return None
     return max(0, wrong[0] - around) + trials[0].first, min(count - 1, wrong[0] + around) + trials[0].first
@@ -314,7 +322,8 @@ def first_failure(statuses: Rows[str]) -> tuple[int, int] | None:
 
 def _log_pictures(stream: rr.RecordingStream, frames: Iterable[EncodedFrame], form: PictureForm) -> Stamps:
     """Log both pictures, one frame in memory at a time; return the stamps."""
-    stamps, quality = [], BEST_QUALITY
+    stamps = []
+    quality = BEST_QUALITY
     with ThreadPoolExecutor(2) as eyes:
         for frame in frames:
             times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
@@ -336,9 +345,11 @@ def _shown(encoded: bytes, frame: EncodedFrame, form: PictureForm, quality: int)
     if frame.colour != BAYER and (form == "png" or frame.form == "jpeg"):
         return encoded
     name = f"frame {frame.index}"
-    picture, colour = decode(encoded, None, name, colour=frame.colour), frame.colour
+    picture = decode(encoded, None, name, colour=frame.colour)
+    colour = frame.colour
     if colour == BAYER:
-        picture, colour = rgb(picture, BAYER), RGB
+        picture = rgb(picture, BAYER)
+        colour = RGB
     return encode(picture, None, name, jpeg_quality=quality if form == "jpeg" else None, colour=colour)
 
 
@@ -348,7 +359,8 @@ def _log_scene(log: _Log, scene: SceneMesh | None) -> None:
         return
     log.static(bp.SCENE, scene.shown(scene.mover < 0))
     for nth, way in enumerate(scene.ways):
-        entity, poses = f"{bp.SCENE}/mover_{nth}", np.stack([way.pose(t_ns) for t_ns in log.t_ns.tolist()])
+        entity = f"{bp.SCENE}/mover_{nth}"
+        poses = np.stack([way.pose(t_ns) for t_ns in log.t_ns.tolist()])
         log.static(entity, scene.shown(scene.mover == nth))
         columns = rr.Transform3D.columns(translation=poses[:, :3, 3], mat3x3=poses[:, :3, :3])
         log.columns(entity, np.arange(len(poses)), columns)
@@ -378,7 +390,8 @@ def _log_estimate(log: _Log, trial: TrialView, of: bp.Entities, color: Color) ->
 
 def _log_camera(log: _Log, entity: str, camera: Camera, path: Trajectory, *, length_m: float, color: Color) -> None:
     frames, samples = log.frames_of(path.t_ns)
-    poses, count = path.T_world_frame[samples], len(frames)
+    poses = path.T_world_frame[samples]
+    count = len(frames)
     log.columns(entity, frames, rr.Transform3D.columns(translation=poses[:, :3, 3], mat3x3=poses[:, :3, :3]))
     pinhole = rr.Pinhole.columns(
         image_from_camera=[rerun_matrix(camera)] * count,
@@ -426,10 +439,12 @@ def _log_error(log: _Log, trial: TrialView, of: bp.Entities, color: Color, unit:
 
 def _log_tracks(log: _Log, trial: TrialView, of: bp.Entities) -> None:
     """Points in the left picture with tails, and lines on which they would lie; a frame without any clears all."""
-    count, nothing = len(log.t_ns), (np.zeros((0, 2)), np.zeros(0, bool))
+    count = len(log.t_ns)
+    nothing = (np.zeros((0, 2)), np.zeros(0, bool))
     rows = [trial.tracks.get(index, nothing) for index in range(count)]
     colors = np.where(np.concatenate([is_in for _, is_in in rows])[:, None], GREEN, RED).astype(np.uint8)
-    lengths, uv_px = [len(uv) for uv, _ in rows], np.concatenate([uv.reshape(-1, 2) for uv, _ in rows])
+    lengths = [len(uv) for uv, _ in rows]
+    uv_px = np.concatenate([uv.reshape(-1, 2) for uv, _ in rows])
     columns = rr.Points2D.columns(positions=uv_px + PIXEL_CENTRE, colors=colors).partition(lengths)
     log.static(of.tracks, rr.Points2D.from_fields(radii=TRACK_RADIUS))
     log.columns(of.tracks, np.arange(count), columns)
@@ -456,10 +471,12 @@ def _tails(
     """
     places = np.zeros((0, TAIL_FRAMES + 1, 2))
     for index in range(count):
-        now, last = tracks[index][0] if index in tracks else np.zeros((0, 2)), steps.get(index, np.zeros((0, 2)))
+        now = tracks[index][0] if index in tracks else np.zeros((0, 2))
+        last = steps.get(index, np.zeros((0, 2)))
         began = np.full((len(now), TAIL_FRAMES, 2), np.nan)
         began[:, -1] = last
-        ended, starts = _keys(places[:, -1]), _keys(last)
+        ended = _keys(places[:, -1])
+        starts = _keys(last)
         order = np.argsort(ended)
         found = np.searchsorted(ended, starts, sorter=order).clip(max=max(len(ended) - 1, 0))
         goes_on = np.flatnonzero(ended[order[found]] == starts) if len(ended) else np.zeros(0, np.intp)
@@ -476,7 +493,8 @@ def _keys(places: Array) -> NDArray[np.int64]:
 
 def _epipolar_lines(trial: TrialView, index: int) -> list[Array]:
     """For some tracks of a frame, where in the picture what was seen in the last frame must be, (P, 2) each."""
-    truth, left = trial.ground_truth, trial.rig.left
+    truth = trial.ground_truth
+    left = trial.rig.left
     if not 0 < index < len(truth) or index not in trial.steps:
         return []
     last_px = trial.steps[index][:: max(1, len(trial.steps[index]) // MOST_LINES)]
@@ -552,10 +570,13 @@ def trial_view(folder: RunFolder, trial: TrialScore, *, window: slice = slice(No
     link = folder.case(trial.case) / SEQUENCE
     if not link.exists():
         raise InputError(f"the sequence is gone from the cache; run the suite again to make it anew: {link}")
-    sequence, channels = Sequence.open(link), truth_channels(link)
+    sequence = Sequence.open(link)
+    channels = truth_channels(link)
     place = folder.estimate(trial.case, trial.estimator, trial.repeat)
-    est, every = read_tum(place / ESTIMATE), read_frames(place)
-    frames, (first, end, _) = every[window], window.indices(len(sequence))
+    est = read_tum(place / ESTIMATE)
+    every = read_frames(place)
+    frames = every[window]
+    (first, end, _) = window.indices(len(sequence))
     if every and not frames:
         raise InputError(f"--frames {first}:{end} holds none of the {len(every)} frames of {trial.case}")
     shown = slice(frames[0].t_ns, frames[-1].t_ns) if frames else slice(None)
@@ -620,9 +641,11 @@ BRIGHT = 98.0  # per cent of lit texels that are not burnt
 
 def scene_mesh(folder: RunFolder, case: str) -> SceneMesh | None:
     """A case's scene in the light that its pictures were drawn with; None where it has none, or that is gone."""
-    path, link = folder.case(case) / CASE, (folder.case(case) / SEQUENCE).resolve()
+    path = folder.case(case) / CASE
+    link = (folder.case(case) / SEQUENCE).resolve()
     inputs = link / "inputs.json"
-    said, needs = json.loads(path.read_bytes()) if path.is_file() else {}, []
+    said = json.loads(path.read_bytes()) if path.is_file() else {}
+    needs = []
     if "scene" in said and inputs.is_file():
         needs = json.loads(inputs.read_bytes()).get("needs", [])
     baked = next((link.parents[1] / need for need in needs if (link.parents[1] / need).is_dir()), None)
@@ -640,7 +663,8 @@ def scene_mesh(folder: RunFolder, case: str) -> SceneMesh | None:
     shown = srgb(picture / max(float(np.percentile(lit, BRIGHT)) if lit.size else 1.0, 1e-9))
     looks = [light.scene.materials.get(thing.material) for thing in light.faces.things]
     tones = np.array([srgb(_tone(look)) if look else (128, 128, 128) for look in looks], np.uint8)
-    ways, faces = tuple(mover.path for mover in light.scene.movers), light.faces
+    ways = tuple(mover.path for mover in light.scene.movers)
+    faces = light.faces
     return SceneMesh(faces.corners_m, light.light_uv, shown, tones[faces.thing], faces.mover, ways)
 
 

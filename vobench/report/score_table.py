@@ -105,7 +105,9 @@ def summaries(content: Content, scored: Sequence[Score]) -> list[str]:
 
 
 def _summary(scored: Score) -> str:
-    met, ratio, failed = scored.association, scored.coverage.ratio, scored.failure
+    met = scored.association
+    ratio = scored.coverage.ratio
+    failed = scored.failure
     lost_aware = "" if failed.lost_aware is None else f", lost-aware score {failed.lost_aware:.3f}"
     return (
         f"{met.pairs} pairs of {met.gt_poses} true and {met.est_poses} estimated poses, coverage {ratio:.3f}"

@@ -32,7 +32,8 @@ def verify_run(folder: RunFolder) -> Iterator[Finding]:
 
     Raises InputError where the folder is no run.
     """
-    files, hashes = folder.score_files(), read_hashes(folder)
+    files = folder.score_files()
+    hashes = read_hashes(folder)
     for name, held in hashes.items():
         stop.check()
         yield Finding("hash", name, _changed(folder.path / name, held))
@@ -63,7 +64,8 @@ def _truth_differs(case: Path) -> str:
     if not link.exists():
         return "its sequence is gone from the cache; run the suite again to make it anew"
     try:
-        stated, truth = json.loads((case / CASE).read_bytes()), format_tum(left_truth(link))
+        stated = json.loads((case / CASE).read_bytes())
+        truth = format_tum(left_truth(link))
         if noise := stated.get("truth_noise"):
             truth = noisy(truth, TruthNoise(**noise), seed=stated["seed"], frames=stated["frames"])
         same = truth.encode() == (case / GROUND_TRUTH).read_bytes()

@@ -42,7 +42,8 @@ from vobench.runner.frames import FRAMES, GROUND_TRUTH, TIMES
 from vobench.runner.rescore import rescored
 from vobench.runner.store import Tell, write_json
 
-OF_RUN, OF_CASE = (SUITE, ENVIRONMENT, ESTIMATORS), (CASE, GROUND_TRUTH)
+OF_RUN = (SUITE, ENVIRONMENT, ESTIMATORS)
+OF_CASE = (CASE, GROUND_TRUTH)
 OF_TRIAL = (SCORE, ESTIMATE, REVISED, COVARIANCE, FRAMES, TIMES, LOG)
 SEQUENCES = "sequence_hashes.json"  # of the recordings, which are too large for a bundle
 MOST_BYTES = 8 << 30  # unpacked
@@ -151,7 +152,9 @@ def opened(path: Path, tell: Tell = lambda _: None) -> Iterator[RunFolder]:
 def _require_names(folder: RunFolder) -> None:
     """Raise InputError if a case or an estimator has a name that no suite could give it."""
     for file in folder.score_files():
-        case, estimator, repeat = file.parents[3].name, file.parents[1].name, file.parent.name
+        case = file.parents[3].name
+        estimator = file.parents[1].name
+        repeat = file.parent.name
         for what, name, pattern in (
             ("case", case, CASE_NAME),
             ("estimator", estimator, LABEL),
@@ -295,7 +298,8 @@ def _is_same_path(one: Path, other: Path) -> bool:
 
 
 def _link_case(folder: RunFolder, made: RunFolder, case: str, name: str) -> None:
-    source, target = folder.case(case), made.case(case)
+    source = folder.case(case)
+    target = made.case(case)
     truths = [place / GROUND_TRUTH for place in (source, target)]
     if all(truth.is_file() for truth in truths) and not _is_same_path(*truths):
         raise InputError(f"case {case!r} is another one in {name}: its true path differs, so nothing compares")

@@ -19,7 +19,8 @@ UPPER = np.triu_indices(6)
 COLUMNS = ("t", *(f"c{row}{column}" for row, column in zip(*UPPER, strict=True)))
 HEAD = "# timestamp, then the upper triangle by rows: position in m, rotation vector in rad, about the axes of odom\n"
 # Median and 90 % quantile of χ² with six degrees of freedom.
-MEDIAN, NINETY_PERCENT = 5.348121, 10.644641
+MEDIAN = 5.348121
+NINETY_PERCENT = 10.644641
 MOST_GAP = 2.0  # an honest estimator's whole path has one error more or less: 2 and 1/2 are beyond 95 % of such
 
 

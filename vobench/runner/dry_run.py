@@ -40,7 +40,8 @@ def to_do(tasks: Sequence[Task], root: Path) -> list[ToDo]:
     reasons = {stage: Counter[str]() for stage in dict.fromkeys(task.stage for task in tasks)}
     for task in wanted:
         reasons[task.stage][_reason(task, keys, root)] += 1
-    counts, store = Counter(task.stage for task in tasks), Store(root)
+    counts = Counter(task.stage for task in tasks)
+    store = Store(root)
     found = []
     for stage, why in reasons.items():
         took = store.seconds(stage)

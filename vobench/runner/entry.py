@@ -31,7 +31,8 @@ class File:
 
 # By a file's path in its entry: size, time of its last change in ns, and inode. Of an equal state are equal bytes.
 States = Mapping[str, tuple[int, int, int]]
-FILES, STATES = TypeAdapter(dict[str, File]), TypeAdapter(dict[str, tuple[int, int, int]])
+FILES = TypeAdapter(dict[str, File])
+STATES = TypeAdapter(dict[str, tuple[int, int, int]])
 
 
 def file_hash(path: Path) -> str:

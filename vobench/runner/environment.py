@@ -135,7 +135,8 @@ class Environment:
         }
 
 
-ENVIRONMENTS, ORIGINS = TypeAdapter(Environment), TypeAdapter(Origin)
+ENVIRONMENTS = TypeAdapter(Environment)
+ORIGINS = TypeAdapter(Origin)
 
 
 def differences(old: Environment, new: Environment) -> list[str]:

@@ -40,8 +40,10 @@ if TYPE_CHECKING:
     from vobench.runner.store import Progress
     from vobench.suite.suite import Trial
 
-ESTIMATE, REVISED = "estimate.tum", "revised.tum"
-TRACKS, POINTS = "tracks.zip", "points/"
+ESTIMATE = "estimate.tum"
+REVISED = "revised.tum"
+TRACKS = "tracks.zip"
+POINTS = "points/"
 OUTCOME = "outcome.json"
 LOG = "log.txt"
 FINISHED = "finished"
@@ -107,14 +109,17 @@ def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress"
 
 def _running(trial: "Trial", recording: Path, log: Path) -> Running:
     """The trial's estimator as its manifest says that it is run."""
-    entrant, manifest, hidden = trial.entrant, trial.entrant.manifest, _hidden(trial, recording)
+    entrant = trial.entrant
+    manifest = trial.entrant.manifest
+    hidden = _hidden(trial, recording)
     if manifest.oracle:
         return NoisyTruth(read_tum(recording / GROUND_TRUTH))
     if manifest.class_path:
         return EstimatorProcess.of_class(
             entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits, hidden=hidden
         )
-    t_ns, limits = Sequence.open(recording).frame_stamps(), entrant.limits
+    t_ns = Sequence.open(recording).frame_stamps()
+    limits = entrant.limits
     if manifest.stream:
         rate = rate_hz(t_ns)
         return EstimatorProcess.of_stream(
@@ -147,7 +152,8 @@ def _write_blind(recording: Path, manifest: Manifest, folder: Path) -> None:
     from vobench.dataset.layout import writable
     from vobench.dataset.source import ExportSource
 
-    sequence, layout = Sequence.open(recording), writable()[manifest.dataset]
+    sequence = Sequence.open(recording)
+    layout = writable()[manifest.dataset]
     source = ExportSource(recording, sequence, sequence.rig, imu=sequence.imu() if "imu" in manifest.needs else None)
     views = _views(manifest, source.rig)
     layout.write(source, views, folder)
@@ -223,7 +229,9 @@ def frames_of(sequence: Sequence, needs: tuple[str, ...], pace: _Pace | None = N
     imu = sequence.imu() if "imu" in needs else None
     last_ns = np.iinfo(np.int64).min
     # Pictures that nobody asked for are not decoded.
-    looks, stereo, shown = "stereo" in needs or "mono" in needs, "stereo" in needs, rgb if "colour" in needs else grey
+    looks = "stereo" in needs or "mono" in needs
+    stereo = "stereo" in needs
+    shown = rgb if "colour" in needs else grey
     for f in sequence.frames(right=stereo) if looks else sequence.encoded_frames():
         if pace and pace.drops(f.index, f.t_ns):
             continue
@@ -273,7 +281,8 @@ class _Keeper:
         if r.tracks is None:
             self.answers.writerow(answered)
         else:
-            inlier, table = r.tracks.inlier, np.column_stack([r.tracks.uv_last_px, r.tracks.uv_px, r.tracks.inlier])
+            inlier = r.tracks.inlier
+            table = np.column_stack([r.tracks.uv_last_px, r.tracks.uv_px, r.tracks.inlier])
             self.answers.writerow({**answered, "tracks": len(inlier), "inliers": int(inlier.sum())})
             self.tracks.writestr(_member(frame.index), _npy(table))
 

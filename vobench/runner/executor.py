@@ -40,7 +40,8 @@ STOP_S = 0.4  # for its main thread, before another one tidies up and ends it
 CONNECT_S = 10.0
 MOST_OF_A_STACK = 1 << 20  # bytes
 # What a library's fault ends, as once in hundreds of sequences; what is made so is the same however often it is made.
-FAULTS, MADE = (-signal.SIGABRT, -signal.SIGSEGV, -signal.SIGBUS), ("bake", "sequence")
+FAULTS = (-signal.SIGABRT, -signal.SIGSEGV, -signal.SIGBUS)
+MADE = ("bake", "sequence")
 # What a stage makes, in the words of a sentence about what needed it.
 PRODUCTS: dict[Stage, str] = {
     "bake": "scene's light",
@@ -341,7 +342,8 @@ class Dask:
         except (OSError, ValueError) as error:
             raise InputError(f"no Dask scheduler answers ({_line(error)}): {address}") from None
         try:
-            own, theirs = versions(), self._client.run(versions)
+            own = versions()
+            theirs = self._client.run(versions)
         except OSError as error:
             self.close()
             raise InputError(f"a Dask worker went while we asked it, try again ({_line(error)}): {address}") from None
@@ -438,7 +440,8 @@ class _Queue:
 
     @classmethod
     def of(cls, tasks: Sequence[Task]) -> "_Queue":
-        queue, own = cls(), {task.key for task in tasks}
+        queue = cls()
+        own = {task.key for task in tasks}
         for task in tasks:
             needs = own.intersection(task.needs)
             queue.missing[task.key] = len(needs)
@@ -502,7 +505,9 @@ def perform_all(
     An estimator is timed: unless `shares_time`, nothing else runs beside it. `heard` is called with what happens.
     Raises InputError if the disk is full, MissingDependencyError if a library is missing, and Stopped.
     """
-    queue, failures, running = _Queue.of(tasks), dict[str, Done](), dict["Future[Done]", tuple[Task, int]]()
+    queue = _Queue.of(tasks)
+    failures = dict[str, Done]()
+    running = dict["Future[Done]", tuple[Task, int]]()
     last = [""] * executor.slots
     messages: SimpleQueue[Event] = SimpleQueue()
     try:

@@ -20,10 +20,15 @@ from vobench.runner.store import sweep, unfinished, write_json
 from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
-CASE, SCORE, SEQUENCE = "case.json", "score.json", "sequence"
+CASE = "case.json"
+SCORE = "score.json"
+SEQUENCE = "sequence"
 STAMP = "%Y%m%dT%H%M%S"  # of the name of a run's folder
-ESTIMATES, PAGE = "estimates", "leaderboard.html"
-ENVIRONMENT, SUITE, ESTIMATORS = "environment.json", "suite.json", "estimators.json"
+ESTIMATES = "estimates"
+PAGE = "leaderboard.html"
+ENVIRONMENT = "environment.json"
+SUITE = "suite.json"
+ESTIMATORS = "estimators.json"
 
 # Best first. Those from `lost` to `not_applicable` are failures, and no failure ranks before a survivor. The last one
 # is no failure of an estimator: its case is excluded for all of them.
@@ -289,7 +294,8 @@ def read_tum(path: Path) -> Trajectory:
 
 
 # Of runs of equal inputs the first are equal; the second are of the files of times, and of the page that shows them.
-HASHES, TIMES_HASHES = "hashes.json", "times_hashes.json"
+HASHES = "hashes.json"
+TIMES_HASHES = "times_hashes.json"
 
 
 def write_hashes(folder: RunFolder) -> None:

@@ -15,9 +15,11 @@ from vobench.errors import InputError
 if TYPE_CHECKING:
     from vobench.metric.score import Score
 
-FRAMES, TIMES = "frames.csv", "times.csv"
+FRAMES = "frames.csv"
+TIMES = "times.csv"
 # What these are made of: tables in the store, one of a sequence and one of an estimate.
-EXPOSURES, ANSWERS = "exposures.csv", "answers.csv"
+EXPOSURES = "exposures.csv"
+ANSWERS = "answers.csv"
 GROUND_TRUTH = "ground_truth.tum"
 EXPOSURE_COLUMNS = ("frame", "t_ns", "exposure_s", "gain_db")
 ANSWER_COLUMNS = ("frame", "status", "reason", "tracks", "inliers", "stats")

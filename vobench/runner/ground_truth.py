@@ -26,7 +26,8 @@ def left_truth(folder: Path) -> Trajectory:
     Pictures before, after or in a gap of the truth are left out, and so not scored.
     Raises SequenceError where that leaves none.
     """
-    sequence, truth = Sequence.open(folder), read_truth(folder)
+    sequence = Sequence.open(folder)
+    truth = read_truth(folder)
     if not len(truth):
         raise SequenceError(f"no ground truth, so nothing can be scored: {folder}")
     stamps = sequence.frame_stamps()
@@ -49,7 +50,8 @@ def noisy(exact: str, noise: TruthNoise, *, seed: int, frames: Window | None) ->
     """A truth, as TUM text, with noise on each pose; of `frames` the noise is what it is in the whole way."""
     if noise == EXACT:
         return exact
-    truth, before = parse_tum(exact, name=GROUND_TRUTH), frames[0] if frames else 0
+    truth = parse_tum(exact, name=GROUND_TRUTH)
+    before = frames[0] if frames else 0
     draws = np.random.default_rng([seed, NOISE_STREAM]).standard_normal((before + len(truth), 2, 3))
     moved, turned = draws[before:].swapaxes(0, 1)
     R = Rotation.from_rotvec(noise.rotation_deg * turned, degrees=True).as_matrix()

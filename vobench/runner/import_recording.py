@@ -21,7 +21,8 @@ def read_all(plan: Plan) -> dict[str, Recording]:
 
     Raises SuiteError, with the places in the suite's file, where some cannot be read or have no ground truth.
     """
-    recordings, wrong = dict[str, Recording](), plan.mistakes()
+    recordings = dict[str, Recording]()
+    wrong = plan.mistakes()
     for case in plan.recorded:
         stop.check()
         with wrong.at("source", case.entry):
@@ -60,7 +61,8 @@ def import_recording(recording: Recording, folder: Path) -> None:
 
 def content(case: RecordedCase, recording: Recording) -> dict[str, Any]:
     """What is imported: the recording as read; files by size and time of change, for reading gigabytes is slow."""
-    source, truth = case.source, recording.truth
+    source = case.source
+    truth = recording.truth
     files = [Path(file) for file in (source.path, source.calibration, source.imu) if file]
     return {
         "source": plain(source, exclude={"name"}),

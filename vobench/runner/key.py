@@ -85,7 +85,8 @@ def code_digest(*entries: str, package: Path = PACKAGE) -> str:
 
     A room among them stands for all of its modules.
     """
-    known, state = _modules(package), hashlib.sha256()
+    known = _modules(package)
+    state = hashlib.sha256()
     found = closure((n for entry in entries for n in known if f"{n}.".startswith(f"{entry}.")), package=package)
     for name, module in sorted(found.items()):
         state.update(f"{name}\0{module.digest}".encode())
@@ -157,7 +158,9 @@ def closure(entries: Iterable[str], *, package: Path = PACKAGE) -> dict[str, Mod
 
     The package's own file and `vobench.plugin` are none of them: they look names up when these are asked for.
     """
-    known, found, waiting = _modules(package), dict[str, Module](), list(entries)
+    known = _modules(package)
+    found = dict[str, Module]()
+    waiting = list(entries)
     while waiting:
         name = waiting.pop()
         if name in known and name not in found:

@@ -144,7 +144,8 @@ def _along(spec: Planar, rngs: Generators) -> Drive:
 
     Where no point ahead of the axle can lead it, it gets the speeds that would take it there undisturbed.
     """
-    way, robot = spec.way(), options(spec, rngs)
+    way = spec.way()
+    robot = options(spec, rngs)
     t_ns = stamps(way, spec.rate_hz)
     path_m, path_mps = _path_of_h(way, t_ns, robot["controller"])
     x, y = path_m[0].tolist()
@@ -165,8 +166,10 @@ def _path_of_h(way: Motion, t_ns: Stamps, controller: ControllerSettings) -> tup
 def _fed_forward(way: Motion, t_ns: Stamps, theta: Theta) -> Array:
     """References (N, 2) with which the robot of (18) moves as this way does at t_ns: the middles of its frames."""
     ideal = way.at(t_ns)
-    u, omega = ideal.velocity_mps[:, 0], ideal.turn_radps[:, 2]
-    u_rate, omega_rate = ideal.acceleration_mps2[:, 0], ideal.turn_rate_radps2[:, 2]
+    u = ideal.velocity_mps[:, 0]
+    omega = ideal.turn_radps[:, 2]
+    u_rate = ideal.acceleration_mps2[:, 0]
+    omega_rate = ideal.turn_rate_radps2[:, 2]
     return np.stack(feed_forward(u, omega, u_rate, omega_rate, theta=theta), -1)
 
 
@@ -199,7 +202,8 @@ def body_motions(plan: Plan, *, are_checked: bool = True) -> dict[str, BodyMotio
     within a frame, a camera leaves the room, its pictures take longer than a frame, or an IMU would feel the noise of
     a recording.
     """
-    travels, wrong = dict[str, BodyMotion](), plan.mistakes()
+    travels = dict[str, BodyMotion]()
+    wrong = plan.mistakes()
     for name, cases in _by(plan.simulated, "trajectory").items():
         stop.check()
         with wrong.at(*_said_at(cases[0], "trajectory")):
@@ -259,7 +263,8 @@ def _check_heeded(case: Case) -> None:
 
 def _check_fits_frame(case: Case) -> None:
     """Raise MotionError where a picture would still be exposed or read out when the next one begins."""
-    camera, frame_ms = case.camera, 1e3 / case.trajectory.rate_hz
+    camera = case.camera
+    frame_ms = 1e3 / case.trajectory.rate_hz
     durations = {
         "exposure_ms": camera.exposure_ms,
         "readout_ms": camera.readout_ms or 0.0,
@@ -277,7 +282,9 @@ def _check_fits_frame(case: Case) -> None:
 
 def _check_clear(case: Case, travel: BodyMotion) -> None:
     """Raise MotionError where a camera leaves the room, starts inside a thing or goes through one."""
-    rig, room, scene = case.build_rig(), case.scene.room, case.build_scene()
+    rig = case.build_rig()
+    room = case.scene.room
+    scene = case.build_scene()
     T_world_body = travel.at_frames().T_world_body
     for T_body_camera in map(rig.T_body_camera, rig.sides):
         at_m = (T_world_body @ T_body_camera)[:, :3, 3]

@@ -104,7 +104,8 @@ def _rescored(folder: RunFolder, held: TrialScore) -> Rescored:
         why = f"there is no {missing}" if missing else "its run counts no frames"
         return Rescored(held, claimed=why if states_more else "")
 
-    gt, est = read_tum(truth), read_tum(place / ESTIMATE)
+    gt = read_tum(truth)
+    est = read_tum(place / ESTIMATE)
     scored = score_estimate(est, gt, held.claims)
     later = score_estimate(read_tum(place / REVISED), gt, held.claims) if (place / REVISED).is_file() else None
     rows = read_table(place / FRAMES)
@@ -201,7 +202,8 @@ def wrong_truths(folder: RunFolder) -> dict[str, str]:
     paths: dict[str, Trajectory] = {}
     for place in sorted((folder.path / "cases").iterdir()):
         stop.check()
-        case, truth = _case(place / CASE), place / GROUND_TRUTH
+        case = _case(place / CASE)
+        truth = place / GROUND_TRUTH
         if case is None or not truth.is_file():
             continue
         try:

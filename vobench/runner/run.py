@@ -45,7 +45,8 @@ if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
 
 Finish = Callable[[RunFolder, list[TrialScore]], None]
-OF_ESTIMATE, OF_SCORE = (ESTIMATE, TRACKS, LOG, TIMES, COVARIANCE, REVISED), (SCORE, FRAMES)
+OF_ESTIMATE = (ESTIMATE, TRACKS, LOG, TIMES, COVARIANCE, REVISED)
+OF_SCORE = (SCORE, FRAMES)
 OPTIONAL = (COVARIANCE, REVISED)
 # What helps where a sequence could not be made; a refusal's sentence says it already.
 REMEDIES: dict[str, str] = {
@@ -53,7 +54,8 @@ REMEDIES: dict[str, str] = {
     "out_of_memory": " (run fewer tasks at once, as with --jobs 1)",
 }
 # How the cost of estimators was taken that were run this time.
-ALONE, BESIDE = "with nothing beside it", "beside other tasks"
+ALONE = "with nothing beside it"
+BESIDE = "beside other tasks"
 
 
 def run_suite(

@@ -28,7 +28,8 @@ SETTINGS = ScoreSettings(coverage_of="frames")
 NO_SCALE = "Sim(3)"
 OF_NO_SCALE = tuple(metric for metric in DEFINITIONS.values() if not metric.full or metric.id == "scale_drift")
 # What trackers of resting things jitter by. Extents, not path lengths: jitter adds up along a path.
-STILL_M, STILL_RAD = 2e-3, np.deg2rad(0.2)
+STILL_M = 2e-3
+STILL_RAD = np.deg2rad(0.2)
 
 
 def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) -> None:
@@ -36,12 +37,14 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
     exact = (sequence / GROUND_TRUTH).read_text(encoding="utf-8")
     gt = parse_tum(scored_truth(exact, trial.case), name=GROUND_TRUTH)  # as a file has it that anybody can score again
     claims = trial.entrant.claims
-    est, revised = read_tum(estimate / ESTIMATE), estimate / REVISED
+    est = read_tum(estimate / ESTIMATE)
+    revised = estimate / REVISED
     scored = score_estimate(est, gt, claims)
     later = score_estimate(read_tum(revised), gt, claims) if revised.is_file() else None
     stamps = {row["frame"]: int(row["t_ns"]) for row in read_table(sequence / EXPOSURES)}
     dropped = [stamps[row["frame"]] for row in read_table(estimate / ANSWERS) if row["status"] == DROPPED]
-    outcome, scale = read_outcome(estimate), scored.alignment.scale if scored else 1.0
+    outcome = read_outcome(estimate)
+    scale = scored.alignment.scale if scored else 1.0
     status, reason = status_of(outcome, scored, gt)
     if dropped and outcome.kind == FINISHED:
         status, reason = status_of_handed(est, gt, claims, dropped)
@@ -97,7 +100,8 @@ def status_of(outcome: Outcome, scored: Score | None, gt: Trajectory) -> tuple[T
         covered = scored.coverage.ratio if scored else 0.0
         at_the_end = " and none at the end" if covered and scored and scored.coverage.ends_lost else ""
         return "lost", f"a pose for {covered:.0%} of the frames{at_the_end}"
-    ate, path_m = scored.metric("ate_trans"), float(gt.distances_m()[-1])
+    ate = scored.metric("ate_trans")
+    path_m = float(gt.distances_m()[-1])
     if ate is not None and ate.statistics.rmse > max(path_m, 1e-3) and not stands_still(gt):
         return "diverged", f"ATE {ate.statistics.rmse:.3g} m on a path of {path_m:.3g} m"
     if scored.coverage.ratio < 1:

@@ -53,7 +53,8 @@ def _counted(case: Case, travel: BodyMotion) -> tuple[Stamps, Stamps]:
     spec = case.trajectory
     if travel.rims is None or not isinstance(spec, Wheeled):
         return EMPTY, EMPTY.reshape(0, 2)
-    t_ns, counts = travel.rims.t_ns, ticks(travel.rims.rim_rad, spec.wheels, ENCODERS[spec.encoders])
+    t_ns = travel.rims.t_ns
+    counts = ticks(travel.rims.rim_rad, spec.wheels, ENCODERS[spec.encoders])
     if travel.first:
         counts = counts - counts[np.searchsorted(t_ns, travel.t_ns[0])]
     return t_ns, counts
@@ -95,8 +96,11 @@ class PixelTruth:
     """Ground truth of a case's pictures, amid each row's exposure; the true rig sees it."""
 
     def __init__(self, case: Case, scene: Scene, motion: Motion) -> None:
-        self._rig, self._readout_s, self._motion = case.build_true_rig(), case.camera.readout_s, motion
-        self._channels, self._caster = case.truth, TruthCaster(scene)
+        self._rig = case.build_true_rig()
+        self._readout_s = case.camera.readout_s
+        self._motion = motion
+        self._channels = case.truth
+        self._caster = TruthCaster(scene)
 
     @property
     def names(self) -> TruthNames:

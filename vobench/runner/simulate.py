@@ -97,7 +97,8 @@ def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progr
     from vobench.runner.sensors import PixelTruth, SensorFeed
     from vobench.runner.stereo_camera import StereoCamera, World
 
-    travel, scene = body_motion(case), case.build_scene()
+    travel = body_motion(case)
+    scene = case.build_scene()
     truth = PixelTruth(case, scene, travel.motion) if case.truth else None
     renderer = open_renderer(scene, case.rendering, light, white_cd_m2=case.scene.white_cd_m2)
     try:

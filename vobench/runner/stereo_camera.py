@@ -33,7 +33,8 @@ class Displacement:
     """Measures one scene's displacements, at a grid of pixels."""
 
     def __init__(self, scene: Scene) -> None:
-        self._scene, self._at_rest = scene, _solid(scene, 0)
+        self._scene = scene
+        self._at_rest = _solid(scene, 0)
 
     def largest_px(
         self, camera: Camera, T_world_first: Array, T_world_last: Array, *, start_ns: int, end_ns: int
@@ -43,7 +44,8 @@ class Displacement:
         caster, mover_of = _solid(self._scene, start_ns) if self._scene.movers else self._at_rest
         hits = caster.hits(np.broadcast_to(T_world_first[:3, 3], rays.shape), rays)
         before_m = T_world_first[:3, 3] + np.nan_to_num(hits.distance, nan=FAR_M)[:, None] * rays
-        after_m, mover_at = before_m.copy(), np.where(hits.face < 0, -1, mover_of[hits.face])
+        after_m = before_m.copy()
+        mover_at = np.where(hits.face < 0, -1, mover_of[hits.face])
         for index, mover in enumerate(self._scene.movers):
             T_later_now = mover.path.pose(end_ns) @ se3.inverse(mover.path.pose(start_ns))
             after_m[mover_at == index] = se3.apply(T_later_now, before_m[mover_at == index])
@@ -70,7 +72,8 @@ def _grid_rays(camera: Camera) -> Array:
 
 
 # Between two sub-frames, and between the first and last row of a strip, nothing should move further than this.
-SUB_FRAME_PX, STRIP_PX = 1.0, 0.25
+SUB_FRAME_PX = 1.0
+STRIP_PX = 0.25
 MOST_SUB_FRAMES = 32
 # Where lamps change in time, a strip has so few rows that it sees one phase of theirs.
 ROWS_UNDER_CHANGING_LIGHT = 4
@@ -100,7 +103,8 @@ class StereoCamera:
     def __init__(self, case: Case, world: World) -> None:
         displacement = Displacement(world.scene)
         self._left, self._right = (SimulatedCamera(case, side, world, displacement) for side in SIDES)
-        self._settings, first = case.camera, case.camera.exposure
+        self._settings = case.camera
+        first = case.camera.exposure
         loop = case.camera.auto_exposure
         self._state = start(loop, first) if loop else (first,)
 
@@ -111,7 +115,8 @@ class StereoCamera:
 
     def shoot(self, t_ns: int, right_ns: int | None = None) -> StereoPair:
         """The pictures amid whose exposure is t_ns, the right one's where it has its own; call in order of time."""
-        exposure, right_ns = self._state[0], t_ns if right_ns is None else right_ns
+        exposure = self._state[0]
+        right_ns = t_ns if right_ns is None else right_ns
         pair = StereoPair(self._left.picture(t_ns, exposure), self._right.picture(right_ns, exposure), exposure)
         if loop := self._settings.auto_exposure:
             self._state = step(loop, self._state, pair.left, self._settings.chip.signal_of_grey)
@@ -126,10 +131,13 @@ class SimulatedCamera:
             return generator(case.seed, f"camera.{side}.{name}")
 
         rig = case.build_true_rig()
-        self._camera, self._T_body_camera = rig.camera(side), rig.T_body_camera(side)
-        self._world, self._displacement = world, displacement
+        self._camera = rig.camera(side)
+        self._T_body_camera = rig.T_body_camera(side)
+        self._world = world
+        self._displacement = displacement
         self._light_changes = not all(isinstance(light.level, Steady) for light in world.scene.lights)
-        self._settings, self._white_cd_m2 = case.camera.eye(side), np.float32(case.scene.white_cd_m2)
+        self._settings = case.camera.eye(side)
+        self._white_cd_m2 = np.float32(case.scene.white_cd_m2)
         self._lens = lens_maps(self._settings, self._camera, stream("dirt"))
         self._noise = NoiseStreams(stream("shot"), stream("read"))
         shape = (self._camera.height_px, self._camera.width_px)
@@ -137,7 +145,8 @@ class SimulatedCamera:
 
     def skip(self, pictures: int) -> None:
         """Take the draws of so many pictures' noise."""
-        chip, shape = self._settings.chip, (self._camera.height_px, self._camera.width_px)
+        chip = self._settings.chip
+        shape = (self._camera.height_px, self._camera.width_px)
         for _ in range(pictures):
             if chip.shot_noise:
                 self._noise.shot.standard_normal(shape)
@@ -150,7 +159,8 @@ class SimulatedCamera:
 
     def light(self, t_ns: int, exposure: Exposure) -> Radiance:
         """What comes to the lens (H, W), or (H, W, 3) in colour, in shares of matt white."""
-        views, weights = self.views(t_ns, exposure), self._settings.weights
+        views = self.views(t_ns, exposure)
+        weights = self._settings.weights
         light: Radiance = self._world.renderer.radiance(self._camera, views, weights=weights) / self._white_cd_m2
         return light
 
@@ -188,7 +198,8 @@ class SimulatedCamera:
 
     def _moved_px(self, t_ns: int, duration_s: float) -> float:
         half_ns = round(duration_s * 1e9) // 2
-        start_ns, end_ns = t_ns - half_ns, t_ns + half_ns
+        start_ns = t_ns - half_ns
+        end_ns = t_ns + half_ns
         first, last = self._seen_from(np.array([start_ns, end_ns]))
         return self._displacement.largest_px(self._camera, first, last, start_ns=start_ns, end_ns=end_ns)
 
@@ -200,7 +211,8 @@ class SimulatedCamera:
 
 def exposed_by(case: Case, world: World, stamps: Sequence[int]) -> Callable[[CameraSettings], list[Grey]]:
     """What takes a case's left pictures at instants with any camera; the light is drawn once."""
-    displacement, plain = Displacement(world.scene), CameraSettings()
+    displacement = Displacement(world.scene)
+    plain = CameraSettings()
     first = SimulatedCamera(replace(case, camera=plain), "left", world, displacement)
     lights = [first.light(t_ns, plain.exposure) for t_ns in stamps]
 

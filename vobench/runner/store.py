@@ -22,11 +22,14 @@ from vobench.errors import InputError
 from vobench.runner.entry import MANIFEST, States, fault, remember, seal
 from vobench.runner.key import canonical, digest
 
-PREFIX, BAD = ".unfinished-", ".bad-"
-STATE, INPUTS = "state", "inputs.json"
+PREFIX = ".unfinished-"
+BAD = ".bad-"
+STATE = "state"
+INPUTS = "inputs.json"
 TIMED = 50  # results of a stage whose seconds are kept, about
 # How often a lock is asked for that another holds: soon at first, and then so that Ctrl-C is answered in time.
-FIRST_LOOK_S, LOOK_S = 1e-3, 0.2
+FIRST_LOOK_S = 1e-3
+LOOK_S = 0.2
 PATIENCE_S = 0.5  # before the user is told who is waited for
 
 Tell = Callable[[str], object]
@@ -95,7 +98,8 @@ def locked(path: Path, tell: Tell = lambda _: None) -> Iterator[None]:
 
 def _awaited(path: Path, tell: Tell) -> int:
     """The descriptor that holds the lock of this path, once nobody else does."""
-    began, look_s = time.monotonic(), FIRST_LOOK_S
+    began = time.monotonic()
+    look_s = FIRST_LOOK_S
     while (lock := _taken(path)) is None:
         stop.check()
         if began and time.monotonic() - began > PATIENCE_S:
@@ -231,7 +235,8 @@ class Store:
         """
         stop.check()
         final = self.path(kind, inputs)
-        key, before = f"{kind}/{final.name}", _made(final)
+        key = f"{kind}/{final.name}"
+        before = _made(final)
         if self.has(key) and keeps(final):
             return final
         self.require_writable()
@@ -306,7 +311,8 @@ class Store:
         In the end the user is told where the store is larger than he wants it to be. Raises InputError where he does
         not say so as a number.
         """
-        limit, runs = limit_bytes(), self.root / STATE / "runs"
+        limit = limit_bytes()
+        runs = self.root / STATE / "runs"
         if why_unwritable(self.root):
             yield
             return
@@ -348,7 +354,8 @@ class Store:
         now_s = time.time()
         since_s = min((path.stat().st_mtime for path in self.root.glob(f"{STATE}/runs/*")), default=math.inf)
         found = sorted(self.entries(), key=lambda entry: (not entry.is_damaged, entry.used_s))
-        held, removed = sum(entry.bytes for entry in found), list[Entry]()
+        held = sum(entry.bytes for entry in found)
+        removed = list[Entry]()
         for entry in found:
             stop.check()
             is_old = now_s - entry.used_s > older_s

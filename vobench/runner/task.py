@@ -132,7 +132,8 @@ def estimator_code(entrant: Entrant) -> dict[str, str]:
 
 def estimate_task(trial: Trial, sequence: str, code: Mapping[str, str]) -> Task:
     """What lets an estimator run on the sequence of that key; `code` is its `estimator_code`."""
-    entrant, needs = trial.entrant, (sequence,)
+    entrant = trial.entrant
+    needs = (sequence,)
     inputs = {
         "params": entrant.params,
         "repeat": trial.repeat,
@@ -179,7 +180,8 @@ def _portable() -> dict[str, bool]:
 
 def missing(tasks: Iterable[Task], root: Path) -> list[Task]:
     """The tasks to perform, in order: what is there is not made again, nor light that no picture is drawn with."""
-    wanted, found = set[str](), list[Task]()
+    wanted = set[str]()
+    found = list[Task]()
     for task in reversed(list(tasks)):
         if (task.stage != "bake" or task.key in wanted) and not is_done(task, root):
             wanted.update(task.needs)

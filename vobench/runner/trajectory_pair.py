@@ -17,7 +17,8 @@ from vobench.trajectory.trajectory import Move, Trajectory, parse_move
 NS_PER_S = 10**9
 UNITS: tuple[Unit, ...] = get_args(Unit)
 ORDERS: tuple[Order, ...] = get_args(Order)
-TRUTH, SENSORS = "truth.mcap", "sensors.mcap"
+TRUTH = "truth.mcap"
+SENSORS = "sensors.mcap"
 HEAD_BYTES = 4096  # enough to tell text from a recording
 SAYS_TRUTH = re.compile(r"(?<![a-z])(gt|ground[ _-]?truth|truth|reference)(?![a-z])", re.IGNORECASE)
 BY_ROW = "neither file has stamps: poses are paired by row, and a second is a row; --times names a file with stamps"
@@ -99,7 +100,8 @@ def _require_same_frames(reads: Sequence[_Read]) -> None:
 
 
 def _notes(read: _Read) -> list[str]:
-    frames, notes = read.parsed.frames, list(read.parsed.notes)
+    frames = read.parsed.frames
+    notes = list(read.parsed.notes)
     if frames is not None:
         count = f"{len(frames)} poses for frames {frames[0]} to {frames[-1]}"
         notes.append(f"the first of 13 columns was read as the number of a frame ({count}): {read.path}")

@@ -55,7 +55,8 @@ class Flicker:
 
     def mean(self, start_ns: int, end_ns: int) -> float:
         """The integral of the cosine is its value amid the interval times a sinc."""
-        middle_s, length_s = (start_ns + end_ns) / 2 / NS_PER_S, (end_ns - start_ns) / NS_PER_S
+        middle_s = (start_ns + end_ns) / 2 / NS_PER_S
+        length_s = (end_ns - start_ns) / NS_PER_S
         swing = np.cos(4 * np.pi * self.mains_hz * middle_s + float(np.deg2rad(self.phase_deg)))
         return float(1 + self.depth * swing * np.sinc(2 * self.mains_hz * length_s))
 
@@ -69,7 +70,8 @@ class Dimmer:
 
     def mean(self, start_ns: int, end_ns: int) -> float:
         """The trapezia's area over the interval's length."""
-        start_s, end_s = start_ns / NS_PER_S, end_ns / NS_PER_S
+        start_s = start_ns / NS_PER_S
+        end_s = end_ns / NS_PER_S
         inside = [t for t in self.times_s if start_s < t < end_s]
         times = np.array([start_s, *inside, end_s])
         levels = np.interp(times, self.times_s, self.levels)
@@ -88,7 +90,8 @@ class Switched:
 
     def mean(self, start_ns: int, end_ns: int) -> float:
         """The share of the interval in which the light is on."""
-        start_s, end_s = start_ns / NS_PER_S, end_ns / NS_PER_S
+        start_s = start_ns / NS_PER_S
+        end_s = end_ns / NS_PER_S
         passed = int(np.searchsorted(self.times_s, start_s, side="right"))
         is_on = self.on_first ^ bool(passed % 2)
         if end_ns <= start_ns:
@@ -260,7 +263,8 @@ def _level_illuminance(kind: str, *sun_direction: float) -> float:
     """Level illuminance by a sky of relative luminance, by the midpoint rule over the upper half sphere."""
     sine_squared = (np.arange(256) + 0.5) / 256
     azimuth = 2 * np.pi * (np.arange(512) + 0.5) / 512
-    cosine, angle = np.sqrt(1 - sine_squared)[:, None], azimuth[None, :]
+    cosine = np.sqrt(1 - sine_squared)[:, None]
+    angle = azimuth[None, :]
     up = np.broadcast_to(np.sqrt(sine_squared)[:, None], (256, 512))
     directions = np.stack([cosine * np.cos(angle), cosine * np.sin(angle), up], -1)
     return float(np.pi * _relative_luminance(kind, np.array(sun_direction), directions).mean())

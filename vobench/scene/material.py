@@ -115,7 +115,8 @@ def fresnel(cosine: Array, eta: float | Array) -> Array:
     """F (...) at cosines (...) of the angle to the normal, from air onto eta. Source: Born and Wolf, section 1.5."""
     c = np.clip(np.abs(cosine), 0.0, 1.0)
     inside = np.sqrt(1 - (1 - c * c) / eta**2)
-    across, along = (c - eta * inside) / (c + eta * inside), (inside - eta * c) / (inside + eta * c)
+    across = (c - eta * inside) / (c + eta * inside)
+    along = (inside - eta * c) / (inside + eta * c)
     return np.asarray(0.5 * (across**2 + along**2))
 
 

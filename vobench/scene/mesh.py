@@ -56,7 +56,8 @@ def unit(vectors: ArrayLike) -> Array:
     return np.asarray(v / np.where(length > 0, length, 1))
 
 
-NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+NEXT = np.array([1, 2, 0])
+LAST = np.array([2, 0, 1])
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -155,11 +156,14 @@ class Triangles:
 
     def moved(self, T_world_movers: Sequence[Array]) -> "Triangles":
         """The table of things in their movers' frames with the movers at these poses (4, 4)."""
-        corners, normals, plane = self.corners_m.copy(), self.normals.copy(), self.plane.copy()
+        corners = self.corners_m.copy()
+        normals = self.normals.copy()
+        plane = self.plane.copy()
         for index, T in enumerate(T_world_movers):
             own = self.mover == index
             corners[own] = se3.apply(T, corners[own])
-            normals[own], plane[own] = normals[own] @ T[:3, :3].T, plane[own] @ T[:3, :3].T
+            normals[own] = normals[own] @ T[:3, :3].T
+            plane[own] = plane[own] @ T[:3, :3].T
         return replace(self, corners_m=corners, normals=normals, plane=plane)
 
 

@@ -46,7 +46,8 @@ class Path:
     def distance_m(self, t_ns: float) -> float:
         """The length of the way from the first time to an instant."""
         gone_m = np.append(0, np.cumsum(np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1)))
-        rounds, lasts_s = 0.0, self.times_s[-1] - self.times_s[0]
+        rounds = 0.0
+        lasts_s = self.times_s[-1] - self.times_s[0]
         if self.repeats:
             rounds = np.floor((t_ns / 1e9 - self.times_s[0]) / lasts_s)
         return float(rounds * gone_m[-1] + np.interp(t_ns / 1e9 - rounds * lasts_s, self.times_s, gone_m))
@@ -60,7 +61,8 @@ def jointed(joints_m: Array, pitch_rad: Array) -> Array:
     """T_body_limb (4, 4) of a limb turned about y at joints (J, 3), given as they are unturned, from the body on."""
     T = np.eye(4)
     for joint_m, turn in zip(joints_m, pitch_rad, strict=True):
-        c, s = np.cos(turn), np.sin(turn)
+        c = np.cos(turn)
+        s = np.sin(turn)
         R = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
         T = T @ se3.transform(R, joint_m - R @ joint_m)
     return T
@@ -82,7 +84,8 @@ class Gait:
 
     def pose(self, t_ns: float) -> Array:
         """T_world_limb (4, 4) at an instant."""
-        phase, steps = self.path.distance_m(t_ns) / self.cycle_m % 1, np.linspace(0, 1, len(self.rise_m) + 1)
+        phase = self.path.distance_m(t_ns) / self.cycle_m % 1
+        steps = np.linspace(0, 1, len(self.rise_m) + 1)
         rise, *pitch = (np.interp(phase, steps, [*x, x[0]]) for x in (self.rise_m, *self.pitch_rad.T))
         up = se3.transform(np.eye(3), [0, 0, rise])
         return self.path.pose(t_ns) @ up @ jointed(self.joints_m, np.array(pitch))
@@ -131,7 +134,8 @@ def triangles(scene: Scene, *, t_ns: float | None = None) -> Triangles:
 
 def ceiling_light(name: str, center_m: Array, size_m: tuple[float, float], *, power_lm: float) -> AreaLight:
     """A panel that hangs level and shines down."""
-    x, y = np.array([size_m[0], 0, 0]), np.array([0, size_m[1], 0])
+    x = np.array([size_m[0], 0, 0])
+    y = np.array([0, size_m[1], 0])
     return AreaLight(name, quad(np.asarray(center_m, float) - (x + y) / 2, y, x), power_lm)
 
 

@@ -40,7 +40,8 @@ def strips(
     Strips tile the rows, parts tile the exposure. A strip is timed by its middle row, so its outer rows are off by
     readout / (2 · row_strips); a global shutter needs and gets one strip. Source: Kalibr, row v is v · line delay late.
     """
-    exposure_ns, readout_ns = round(exposure_s * NS_PER_S), round(readout_s * NS_PER_S)
+    exposure_ns = round(exposure_s * NS_PER_S)
+    readout_ns = round(readout_s * NS_PER_S)
     if exposure_ns < sub_frames or sub_frames < 1:
         raise InputError(f"an exposure of {exposure_ns} ns cannot be cut into {sub_frames} sub-frames")
     if not 1 <= row_strips <= height:

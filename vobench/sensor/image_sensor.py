@@ -55,7 +55,8 @@ def _expansion(mean: Array, w: Array) -> Array:
 
 def _summed(mean: Array, probability: Array) -> NDArray[np.int8]:
     """The smallest counts (M,) whose distribution function reaches the probabilities (M,)."""
-    counts, term = np.zeros(len(mean), np.int8), np.exp(-mean)
+    counts = np.zeros(len(mean), np.int8)
+    term = np.exp(-mean)
     reached = term.copy()
     for count in range(1, MOST_SMALL + 1):
         beyond = probability > reached
@@ -324,7 +325,8 @@ def expose(
                 _signal(_electrons(radiance, camera, noise, pattern, exposure), camera.chip, exposure), camera.chip
             )
             return np.stack([quantise(plane, camera.chip.curve) for plane in demosaiced(signal)], -1)
-    grey, step = np.empty(radiance.shape, np.uint8), max(1, PIXELS_AT_A_TIME // radiance.shape[1])
+    grey = np.empty(radiance.shape, np.uint8)
+    step = max(1, PIXELS_AT_A_TIME // radiance.shape[1])
     for first in range(0, len(radiance), step):
         rows = slice(first, first + step)
         local = pattern.of(rows) if pattern else None
@@ -365,9 +367,14 @@ def demosaiced(signal: Array) -> Array:
     )
     rgb = np.stack([row, green, column])
     red, first, second, blue = ((slice(v, None, 2), slice(u, None, 2)) for v, u in np.ndindex(2, 2))
-    rgb[0][red], rgb[0][second], rgb[0][blue] = signal[red], column[second], diagonal[blue]
-    rgb[1][first], rgb[1][second] = signal[first], signal[second]
-    rgb[2][red], rgb[2][second], rgb[2][blue] = diagonal[red], row[second], signal[blue]
+    rgb[0][red] = signal[red]
+    rgb[0][second] = column[second]
+    rgb[0][blue] = diagonal[blue]
+    rgb[1][first] = signal[first]
+    rgb[1][second] = signal[second]
+    rgb[2][red] = diagonal[red]
+    rgb[2][second] = row[second]
+    rgb[2][blue] = signal[blue]
     return np.asarray(np.clip(rgb, 0.0, 1.0))
 
 

@@ -108,7 +108,8 @@ def _means_between(motion: Motion, T_body_imu: Array, edges_ns: Array, breaks_ns
     """Means (2, M, 3) between edges (M + 1,), in ns since the start: Gauss-Legendre on each smooth piece."""
     within = breaks_ns[(breaks_ns > edges_ns[0]) & (breaks_ns < edges_ns[-1])]
     cuts_ns = np.union1d(edges_ns, within)
-    half_ns, middle_ns = np.diff(cuts_ns) / 2, (cuts_ns[1:] + cuts_ns[:-1]) / 2
+    half_ns = np.diff(cuts_ns) / 2
+    middle_ns = (cuts_ns[1:] + cuts_ns[:-1]) / 2
     # 3 nodes a piece leave 1e-10 of an 8 Hz shake over 5 ms; longer pieces need more.
     nodes, weights = np.polynomial.legendre.leggauss(min(3 + int(half_ns.max() * 2e-9 / 0.02), 16))
     t_ns = motion.start_ns + middle_ns[:, None] + half_ns[:, None] * nodes
@@ -173,7 +174,8 @@ class ImuSettings:
     @property
     def calibration(self) -> ImuCalibration:
         """What an honest calibration says of it: its place, its rate and the four densities."""
-        g, a = self.gyro, self.accel
+        g = self.gyro
+        a = self.accel
         return ImuCalibration(self.T_body_imu, self.rate_hz, g.noise, a.noise, g.walk, a.walk)
 
 
@@ -183,11 +185,13 @@ def measure(motion: Motion, settings: ImuSettings, *, rngs: Generators | None = 
     A reading is the mean over the 1 / rate_hz around its stamp, so that readings add up to the motion.
     Raises InputError where something is left to chance and its generator is missing.
     """
-    step_s, t_ns = 1 / settings.rate_hz, reading_stamps(motion, settings.rate_hz)
+    step_s = 1 / settings.rate_hz
+    t_ns = reading_stamps(motion, settings.rate_hz)
     truth = mean_inertia(motion, settings.T_body_imu, settings.rate_hz, count=len(t_ns))
     triads = {"gyro": settings.gyro, "accel": settings.accel}
     starts = _draws("start_bias", 2, max(triad.bias_std for triad in triads.values()), rngs)
-    readings, biases = [], []
+    readings = []
+    biases = []
     for (name, triad), true, start in zip(triads.items(), truth, starts, strict=True):
         walk = walked(triad, _draws(f"{name}_walk", len(t_ns), triad.walk, rngs), step_s=step_s)
         biases.append(started(triad, start) + walk)

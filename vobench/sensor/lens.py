@@ -9,12 +9,16 @@ from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
 from vobench.sensor.image_sensor import CameraSettings, Radiance
 
-SMUDGES, SPECKS = 5, 60
-SMUDGE_SHARE, SPECK_SHARE = (0.05, 0.2), (0.004, 0.015)  # radii over the picture's width
+SMUDGES = 5
+SPECKS = 60
+# radii over the picture's width
+SMUDGE_SHARE = (0.05, 0.2)
+SPECK_SHARE = (0.004, 0.015)
 # Of the light that dirt takes, the share that it scatters onto the chip; the rest is absorbed. An assumption.
 SCATTERED = 0.5
 # Over the picture's width: the distance scale of the veil of flare, and the spread of a ghost. Assumptions.
-VEIL_SHARE, GHOST_SHARE = 0.1, 0.02
+VEIL_SHARE = 0.1
+GHOST_SHARE = 0.02
 # Points across a pixel for the share of it that a disc covers.
 FINE = 32
 
@@ -40,8 +44,10 @@ def lens_maps(effects: CameraSettings, camera: Camera, rng: np.random.Generator)
         rays = camera.rays(pixel_grid(camera))
         shade = vignetting(rays, strength=effects.vignetting, cutoff_deg=effects.vignetting_cutoff_deg)
     if effects.dirt > 0:
-        taken, passed = dirt(shape, effects.dirt, rng), np.ones(shape) if shade is None else shade
-        shade, veil = passed * (1 - taken), SCATTERED * passed * taken
+        taken = dirt(shape, effects.dirt, rng)
+        passed = np.ones(shape) if shade is None else shade
+        shade = passed * (1 - taken)
+        veil = SCATTERED * passed * taken
     if effects.blur_sigma_px > 0 or effects.defocus_px > 0:
         transfer = gaussian_transfer(shape, effects.blur_sigma_px) * disc_transfer(shape, effects.defocus_px)
     if effects.flare > 0 or effects.ghost > 0:
@@ -169,10 +175,12 @@ def _smudges(shape: tuple[int, int], rng: np.random.Generator) -> Array:
     thickness = np.zeros(shape)
     v, u = np.mgrid[: shape[0], : shape[1]]
     for _ in range(SMUDGES):
-        dv, du = v - rng.uniform(0, shape[0]), u - rng.uniform(0, shape[1])
+        dv = v - rng.uniform(0, shape[0])
+        du = u - rng.uniform(0, shape[1])
         angle = rng.uniform(0, np.pi)
         long_px, wide_px = np.sort(rng.uniform(*SMUDGE_SHARE, 2))[::-1] * shape[1]
-        along, aside = du * np.cos(angle) + dv * np.sin(angle), dv * np.cos(angle) - du * np.sin(angle)
+        along = du * np.cos(angle) + dv * np.sin(angle)
+        aside = dv * np.cos(angle) - du * np.sin(angle)
         thickness += rng.uniform(0.3, 1.0) * np.exp(-((along / long_px) ** 2 + (aside / wide_px) ** 2) / 2)
     return thickness
 
@@ -182,7 +190,8 @@ def _specks(shape: tuple[int, int], rng: np.random.Generator) -> Array:
     thickness = np.zeros(shape)
     v, u = np.mgrid[: shape[0], : shape[1]]
     for _ in range(SPECKS):
-        middle_v, middle_u = rng.uniform(0, shape[0]), rng.uniform(0, shape[1])
+        middle_v = rng.uniform(0, shape[0])
+        middle_u = rng.uniform(0, shape[1])
         radius_px = rng.uniform(*SPECK_SHARE) * shape[1]
         distance = np.hypot(v - middle_v, u - middle_u) / radius_px
         thickness += rng.uniform(0.3, 1.0) * np.clip(3 * (1 - distance), 0.0, 1.0)

@@ -112,7 +112,8 @@ def _depth(depth_m: NDArray[np.float64]) -> Picture:
     known = depth_m[np.isfinite(depth_m) & (depth_m > 0)]
     if not len(known):
         return np.zeros((*depth_m.shape, 3), np.uint8)
-    low, high = np.log(known.min()), np.log(known.max())
+    low = np.log(known.min())
+    high = np.log(known.max())
     with np.errstate(invalid="ignore", divide="ignore"):
         share = (np.log(depth_m) - low) / max(high - low, 1e-9) * (len(NEAR_TO_FAR) - 1)
     steps = np.arange(len(NEAR_TO_FAR))

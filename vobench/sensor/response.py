@@ -89,7 +89,8 @@ class Table:
 
 
 Response = Srgb | Power | Table
-SRGB, LINEAR = Srgb(), Power(1.0)
+SRGB = Srgb()
+LINEAR = Power(1.0)
 RESPONSES: dict[str, Response] = {"linear": LINEAR, "srgb": SRGB}
 
 
@@ -116,7 +117,8 @@ def quantise(linear: Array, response: Response) -> Grey:
     A table knows the grey value of all signals in a cell; in the few cells that hold a border, signals are
     compared with the borders themselves.
     """
-    borders, table = _borders(response), _cells(response)
+    borders = _borders(response)
+    table = _cells(response)
     looked_up = table.take((linear * CELLS).astype(np.intp))
     torn = np.nonzero(looked_up == TORN)
     looked_up[torn] = np.searchsorted(borders, linear[torn], side="right")
@@ -132,7 +134,8 @@ def _borders(response: Response) -> Array:
 @cache
 def _cells(response: Response) -> NDArray[np.uint16]:
     """The grey value (CELLS + 1,) of all signals in [i, i + 1) / CELLS, or TORN where there are several."""
-    edges, borders = np.arange(CELLS + 2) / CELLS, _borders(response)
+    edges = np.arange(CELLS + 2) / CELLS
+    borders = _borders(response)
     first = np.searchsorted(borders, edges[:-1], side="right")
     last = np.searchsorted(borders, edges[1:], side="left")
     return np.where(first == last, first, TORN).astype(np.uint16)

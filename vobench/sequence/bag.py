@@ -33,19 +33,24 @@ from vobench.errors import SequenceError
 from vobench.sequence.messages import NS_PER_S, TYPES, Topic
 
 NO_CHANNEL = -1
-PROFILE, SCHEMA_ENCODING, MESSAGE_ENCODING = "ros2", "ros2msg", "cdr"
+PROFILE = "ros2"
+SCHEMA_ENCODING = "ros2msg"
+MESSAGE_ENCODING = "cdr"
 # A chunk ends when it is as large or as long as this: it is all that a killed writer loses.
-CHUNK_BYTES, CHUNK_NS = 1 << 20, NS_PER_S
+CHUNK_BYTES = 1 << 20
+CHUNK_NS = NS_PER_S
 NEVER = 1 << 62  # the library would end chunks between two pictures of one instant
 
-MAGIC, LFS_START = b"\x89MCAP0\r\n", b"version https://git-lfs"
+MAGIC = b"\x89MCAP0\r\n"
+LFS_START = b"version https://git-lfs"
 MAX_BYTES = 1 << 28  # of a record, and of a chunk unpacked; a writer's chunks are a thousand times smaller
 MAX_RECORDS = 1 << 20  # in a chunk; a few bytes of zstd could unpack to endless empty ones
 HEAD = struct.Struct("<BQ")  # opcode, length of what follows
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 FOOTER_BYTES = HEAD.size + struct.calcsize("<QQI")  # places of summary and summary offsets, checksum of both
 CRC_BYTES = 4
-MESSAGE_INDEX_HEAD, MESSAGE_INDEX_ENTRY = HEAD.size + struct.calcsize("<HI"), 16
+MESSAGE_INDEX_HEAD = HEAD.size + struct.calcsize("<HI")
+MESSAGE_INDEX_ENTRY = 16
 CHECKSUM = "vobench.crc32"  # the entry of a note of ours that is the checksum of the others
 
 Numbers = NDArray[np.int64]
@@ -89,7 +94,8 @@ class BagWriter:
         Its chunks are not packed, for PNG does not get smaller. Raw pictures are packed, and large ones have a chunk
         of their own, so that one topic can be read without the others.
         """
-        self.path, self._together = path, encoded
+        self.path = path
+        self._together = encoded
         self._stack = ExitStack()
         packing = CompressionType.NONE if encoded else CompressionType.ZSTD
         self._mcap = Writer(self._stack.enter_context(replacing(path)), chunk_size=NEVER, compression=packing)
@@ -135,7 +141,8 @@ class BagWriter:
 
     def flush(self) -> None:
         """Give the file all that was written so far, so that a killed process does not lose it."""
-        self._chunk_ns, self._chunk_bytes = self._end_ns, 0
+        self._chunk_ns = self._end_ns
+        self._chunk_bytes = 0
         self._mcap.flush()  # type: ignore[no-untyped-call]
 
     def __enter__(self) -> Self:
@@ -239,7 +246,8 @@ def messages_in(chunk: Chunk, channels: Container[int]) -> Iterator[tuple[int, i
         if at == len(records):
             return
         opcode, length = HEAD.unpack_from(records, at)
-        begin, at = at + HEAD.size, at + HEAD.size + length
+        begin = at + HEAD.size
+        at = at + HEAD.size + length
         if at > len(records):
             raise ValueError("a record runs over the end of its chunk")
         if opcode == Opcode.MESSAGE:
@@ -282,7 +290,8 @@ def read_summary(stream: BinaryIO) -> tuple[Summary, tuple[dict[int, int], ...]]
     chunks = summary.chunk_indexes
     if any(b.chunk_start_offset < a.chunk_start_offset + a.chunk_length for a, b in pairwise(chunks)):
         raise ValueError("the chunks of its summary overlap")  # few bytes could state endless chunks
-    counts, stated = tuple(map(_counts, chunks)), Counter(summary.statistics.channel_message_counts)
+    counts = tuple(map(_counts, chunks))
+    stated = Counter(summary.statistics.channel_message_counts)
     if stated != sum(map(Counter, counts), Counter()):
         raise ValueError("its summary counts other messages than its message indexes do")
     unknown = {channel.schema_id for channel in summary.channels.values()} - {0, *summary.schemas}
@@ -370,7 +379,8 @@ class Bag:
 
     def _place(self, topic: Topic, number: int) -> tuple[int, int]:
         """Which chunk has a topic's message of that number, and its number there."""
-        channel, within = self._channel(topic), number
+        channel = self._channel(topic)
+        within = number
         for at, counts in enumerate(self.counts):
             if 0 <= within < counts.get(channel, 0):
                 return at, within
@@ -381,7 +391,8 @@ class Bag:
         self, stream: BinaryIO, chunk: ChunkIndex, numbers: Mapping[Topic, int]
     ) -> Iterator[tuple[Topic, memoryview]]:
         """Of each topic the message of its number in a chunk."""
-        wanted, passed = {self._channel(topic): topic for topic in numbers}, Counter[Topic]()
+        wanted = {self._channel(topic): topic for topic in numbers}
+        passed = Counter[Topic]()
         for channel, _, data in _messages(stream, chunk, wanted):
             topic = wanted[channel]
             if passed[topic] == numbers[topic]:
@@ -403,7 +414,8 @@ class Bag:
                 place = chunk.message_index_offsets[channel]
                 index = read_record(stream, place, MessageIndex)
                 stamps = np.array([log_ns for log_ns, _ in index.records], np.int64)
-                low, high = chunk.message_start_time, chunk.message_end_time
+                low = chunk.message_start_time
+                high = chunk.message_end_time
                 if len(stamps) != counts[channel] or stamps.min() < low or stamps.max() > high:
                     raise ValueError(f"the message index at {place} has stamps that its chunk has not")
                 found.append(stamps)

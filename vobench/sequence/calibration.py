@@ -33,7 +33,8 @@ def read_rig(bag: Bag, info_topics: Sequence[ros.Topic]) -> Rig:
     cameras = [ros.camera(_first(bag, topic)) for topic in info_topics if bag.has(topic)]
     stamped = _first(bag, ros.TF_STATIC).transforms
     T_body = {t.child_frame_id: ros.poses(ros.pose_fields(t.transform)) for t in stamped}
-    left, right = cameras[0], cameras[1] if len(cameras) > 1 else None
+    left = cameras[0]
+    right = cameras[1] if len(cameras) > 1 else None
     T_body_right = _mount(bag, T_body, ros.RIGHT) if right else None
     return Rig(left, right, _mount(bag, T_body, ros.LEFT), T_body_right, _read_wheels(bag), _read_imu(bag, T_body))
 
@@ -55,7 +56,8 @@ def _read_wheels(bag: Bag) -> WheelGeometry | None:
     if not entries:
         return None
     try:
-        radius_m, track_m = float(entries["radius_m"]), float(entries["track_m"])
+        radius_m = float(entries["radius_m"])
+        track_m = float(entries["track_m"])
         return WheelGeometry(radius_m, track_m, int(entries["ticks_per_revolution"]))
     except (KeyError, ValueError, InputError) as error:
         raise SequenceError(

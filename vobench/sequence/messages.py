@@ -23,11 +23,19 @@ from vobench.geometry.rig import Rig, projection, rectification
 from vobench.geometry.se3 import Array
 from vobench.sequence.picture import CHANNELS, MONO, RGB
 
-WORLD, BODY, LEFT, RIGHT, IMU_FRAME = "map", "base_link", "cam_left", "cam_right", "imu"
-SENSORS_FILE, TRUTH_FILE = "sensors.mcap", "truth.mcap"
-CASE_ATTACHMENT, NAMES_ATTACHMENT = "case.json", "truth_names.json"
-PROVENANCE_NOTE, IMPORT_NOTE = "vobench.provenance", "vobench.import"
-WHEELS_NOTE, IMU_NOTE = "vobench.wheels", "vobench.imu"
+WORLD = "map"
+BODY = "base_link"
+LEFT = "cam_left"
+RIGHT = "cam_right"
+IMU_FRAME = "imu"
+SENSORS_FILE = "sensors.mcap"
+TRUTH_FILE = "truth.mcap"
+CASE_ATTACHMENT = "case.json"
+NAMES_ATTACHMENT = "truth_names.json"
+PROVENANCE_NOTE = "vobench.provenance"
+IMPORT_NOTE = "vobench.import"
+WHEELS_NOTE = "vobench.wheels"
+IMU_NOTE = "vobench.imu"
 NS_PER_S = 1_000_000_000
 END_OF_STAMPS_NS = 2**31 * NS_PER_S  # ROS counts seconds in 31 bits
 UNKNOWN = -1.0  # in the first element of a covariance: "there is no estimate of this", says sensor_msgs/Imu
@@ -58,7 +66,8 @@ DISTURBANCE = Topic("/ground_truth/disturbance", "vobench_msgs/msg/Disturbance")
 TRUE_LEFT_INFO = Topic(f"/ground_truth{LEFT_INFO.name}", LEFT_INFO.type_name, latched=True)
 TRUE_RIGHT_INFO = Topic(f"/ground_truth{RIGHT_INFO.name}", RIGHT_INFO.type_name, latched=True)
 
-INFO_TOPICS, IMAGE_TOPICS = (LEFT_INFO, RIGHT_INFO), (LEFT_IMAGE, RIGHT_IMAGE)
+INFO_TOPICS = (LEFT_INFO, RIGHT_INFO)
+IMAGE_TOPICS = (LEFT_IMAGE, RIGHT_IMAGE)
 TRUE_INFO_TOPICS = (TRUE_LEFT_INFO, TRUE_RIGHT_INFO)
 SENSOR_TOPICS = (TF_STATIC, *INFO_TOPICS, *IMAGE_TOPICS, EXPOSURE, ENCODERS, IMU)
 TRUTH_TOPICS = (TF_STATIC, TF, ODOMETRY)
@@ -223,7 +232,8 @@ def vector(xyz: ArrayLike) -> Any:
 
 def imu(t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike, variances: tuple[float, float]) -> Any:
     """One reading as a sensor_msgs/Imu; `variances` are those of one axis of gyro and accelerometer, 0 if not known."""
-    upright, unknown = _make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0), np.zeros(9)
+    upright = _make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0)
+    unknown = np.zeros(9)
     unknown[0] = UNKNOWN
     gyro, accel = (np.eye(3).ravel() * variance for variance in variances)
     return message(IMU, t_ns, IMU_FRAME, upright, unknown, vector(gyro_radps), gyro, vector(accel_mps2), accel)
@@ -231,7 +241,9 @@ def imu(t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike, variances: tupl
 
 def odometry(t_ns: int, T_world_body: Array, twist_body: ArrayLike | None) -> Any:
     """A nav_msgs/Odometry: the body's pose in the world, its (6,) twist (m/s, rad/s) in its own axes, or None."""
-    unstated, unknown = np.zeros(36), np.zeros(36)  # ground truth states no covariance
+    # ground truth states no covariance
+    unstated = np.zeros(36)
+    unknown = np.zeros(36)
     unknown[0] = UNKNOWN
     position = _make("geometry_msgs/msg/Point", *T_world_body[:3, 3].tolist())
     pose = _make("geometry_msgs/msg/Pose", position, _quaternion(T_world_body[:3, :3]))
@@ -267,7 +279,8 @@ def poses(fields: ArrayLike) -> Array:
 
 def camera(message: Any) -> Camera:
     """The camera of a CameraInfo. Raises SequenceError for a distortion model that is not ours."""
-    size, d = (int(message.width), int(message.height)), [float(value) for value in message.d]
+    size = (int(message.width), int(message.height))
+    d = [float(value) for value in message.d]
     name = message.distortion_model
     if name == ALL_AROUND:
         return Equirectangular(*size)
@@ -285,7 +298,8 @@ def camera(message: Any) -> Camera:
 
 
 # A serialised message begins with four bytes that tell its byte order, then the stamp of its header.
-STAMP, STAMP_AT = struct.Struct("<iI"), 4
+STAMP = struct.Struct("<iI")
+STAMP_AT = 4
 LENGTH = struct.Struct("<I")
 LITTLE_ENDIAN = b"\x00\x01"
 

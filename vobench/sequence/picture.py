@@ -14,10 +14,15 @@ from vobench.geometry.camera import Camera
 Image = NDArray[np.uint8]
 Encoded = bytes | memoryview | Image
 
-PNG_START, JPEG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR", b"\xff\xd8\xff"
+PNG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
+JPEG_START = b"\xff\xd8\xff"
 PNG_HEADER = struct.Struct(">IIBB")  # width, height, bits, colour type
-PNG_CHANNELS, PALETTE = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}, 3  # by colour type; of a palette the colours count
-JPEG_SEGMENT, JPEG_FRAME = struct.Struct(">BBH"), struct.Struct(">BHHB")  # bits, height, width, components
+# by colour type; of a palette the colours count
+PNG_CHANNELS = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}
+PALETTE = 3
+# bits, height, width, components
+JPEG_SEGMENT = struct.Struct(">BBH")
+JPEG_FRAME = struct.Struct(">BHHB")
 # Those of the markers C0 to CF that begin no frame: Huffman tables, extensions, arithmetic coding.
 NO_FRAME = (0xC4, 0xC8, 0xCC)
 MAX_PX = 1 << 28  # a larger one is a damaged or a hostile header
@@ -30,7 +35,9 @@ def write_png(path: Path, picture: NDArray[np.unsignedinteger[Any]]) -> None:
 
 
 # What pictures can be, by the names that ROS has for them, and their channels.
-MONO, RGB, BAYER = "mono8", "rgb8", "bayer_rggb8"
+MONO = "mono8"
+RGB = "rgb8"
+BAYER = "bayer_rggb8"
 CHANNELS = {MONO: 1, RGB: 3, BAYER: 1}
 RGB_SHAPE: tuple[tuple[int, ...], ...] = ((), (3,))
 

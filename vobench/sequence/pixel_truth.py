@@ -36,7 +36,8 @@ def truth_image(t_ns: int, side: Side, channel: str, values: NDArray[np.generic]
     height, width = values.shape[:2]
     pixels = values.astype(np.uint8) * np.uint8(MASK_IS_SET) if values.dtype == np.bool_ else values
     data = np.ascontiguousarray(pixels).reshape(-1).view(np.uint8)
-    encoding, step = _encoding(CHANNELS[channel]), data.size // height
+    encoding = _encoding(CHANNELS[channel])
+    step = data.size // height
     make: Any = TYPES.types[IMAGE]
     return make(header(t_ns, FRAME_IDS[side]), height, width, encoding, 0, step, data)
 

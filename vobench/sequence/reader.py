@@ -88,7 +88,8 @@ class Sequence:
         return self.frames()
 
     def __repr__(self) -> str:
-        path, cameras = str(self.path), " and ".join(self.rig.sides)
+        path = str(self.path)
+        cameras = " and ".join(self.rig.sides)
         shown = path if len(path) <= LONGEST_PATH else f"…{path[-LONGEST_PATH:]}"
         return f"Sequence({shown}, {self.frame_count} frames of {cameras})"
 
@@ -98,7 +99,9 @@ class Sequence:
 
     def encoded_frames(self) -> Iterator[EncodedFrame]:
         """The frames in order, undecoded."""
-        images, eyes, count = self.bag.raw(self._image_topics), len(self._image_topics), 0
+        images = self.bag.raw(self._image_topics)
+        eyes = len(self._image_topics)
+        count = 0
         for pictures in zip(*[images] * eyes, strict=False):
             stop.check()
             yield self._encoded(count, pictures)
@@ -123,7 +126,8 @@ class Sequence:
 
     def _decoded(self, frame: EncodedFrame) -> StereoFrame:
         name = f"picture {frame.index} of {self.path}"
-        left, right = decode(frame.left, self.rig.left, f"left {name}", colour=frame.colour), None
+        left = decode(frame.left, self.rig.left, f"left {name}", colour=frame.colour)
+        right = None
         if frame.right is not None:
             right = decode(frame.right, self.rig.camera("right"), f"right {name}", colour=frame.colour)
         return StereoFrame(frame.index, frame.t_ns, left, right, frame.colour)
@@ -171,7 +175,8 @@ def _xyz(vector: Any) -> tuple[float, float, float]:
 
 def _table(bag: Bag, topic: ros.Topic, row: Callable[[Any], Iterable[float]], width: int) -> tuple[Stamps, Array]:
     """Stamps (M,) of a topic's messages and what `row` makes of each (M, width)."""
-    stamps, values = array("q"), array("d")
+    stamps = array("q")
+    values = array("d")
     for _, message in bag.messages((topic,)):
         stamps.append(ros.stamp_ns(message))
         values.extend(row(message))
@@ -286,7 +291,8 @@ def read_truth_names(folder: Path) -> TruthNames:
 
 def read_truth_frames(folder: Path, channels: Iterable[str] | None = None) -> Iterator[StereoTruth]:
     """Channels (None: all) of each instant's pictures, one instant in memory. Raises SequenceError if one lacks."""
-    bag, there = _truth_bag(folder), truth_channels(folder)
+    bag = _truth_bag(folder)
+    there = truth_channels(folder)
     wanted = there if channels is None else check_channels(channels)
     for name in wanted:
         if name not in there:

@@ -54,10 +54,14 @@ class SequenceWriter:
         notes: Mapping[str, str] | None = None,
         provenance: Mapping[str, str] | None = None,
     ) -> None:
-        self._rig, self._true_rig, self._channels = rig, true_rig or rig, check_channels(truth_channels)
-        self._jpeg_quality, self._colour = jpeg_quality, colour
+        self._rig = rig
+        self._true_rig = true_rig or rig
+        self._channels = check_channels(truth_channels)
+        self._jpeg_quality = jpeg_quality
+        self._colour = colour
         self._info = [serialise(info) for info in ros.camera_infos(0, rig)]
-        self._form, self._blank = "", [b""]
+        self._form = ""
+        self._blank = [b""]
         folder.mkdir(parents=True, exist_ok=True)
         sensed = ros.sensor_topics(rig)
         topics = (*ros.truth_topics(self._true_rig), *truth_topics(self._channels, self._true_rig.sides))
@@ -128,7 +132,8 @@ class SequenceWriter:
 
     def write_encoders(self, t_ns: ArrayLike, ticks: ArrayLike) -> None:
         """Add encoder readings: stamps (M,) and counts (M, 2) int64, left and right."""
-        stamps, counts = np.asarray(t_ns, np.int64), np.asarray(ticks, np.int64)
+        stamps = np.asarray(t_ns, np.int64)
+        counts = np.asarray(ticks, np.int64)
         for t, pair in zip(stamps.tolist(), counts.reshape(-1, 2).tolist(), strict=True):
             self._sensors.write(ros.ENCODERS, t, serialise(ros.message(ros.ENCODERS, t, ros.BODY, *pair)))
 

@@ -12,7 +12,8 @@ from vobench.motion.replay import Replay
 from vobench.suite.suite import AXES, Case, Entrant
 from vobench.suite.yaml_file import plain, without_nothing
 
-SUITE_FILE, POSES_FILE = "suite.yaml", "poses.tum"
+SUITE_FILE = "suite.yaml"
+POSES_FILE = "poses.tum"
 
 
 def write_case(case: Case, entrants: Sequence[Entrant], folder: Path, *, name: str, summary: str = "") -> Path:
@@ -80,6 +81,7 @@ def _estimator(entrant: Entrant) -> Any:
 
 def _write(path: Path, tree: Any) -> None:
     yaml = YAML()
-    yaml.width, yaml.default_flow_style = 120, None
+    yaml.width = 120
+    yaml.default_flow_style = None
     with path.open("w", encoding="utf-8") as file:
         yaml.dump(tree, file)

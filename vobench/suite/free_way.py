@@ -13,13 +13,25 @@ from vobench.rendering.geometry import RayCaster
 from vobench.scene.mesh import Triangles, areas_m2
 from vobench.scene.scene import Scene, triangles
 
-LEVEL, FLOOR_STEP_M = 0.99, 0.02  # cosine of what counts as level, and how even a floor is
+# cosine of what counts as level, and how even a floor is
+LEVEL = 0.99
+FLOOR_STEP_M = 0.02
 FLOOR_SHARE = 0.4  # of the largest level area, which a floor has at least
-CELL_M, MOST_CELLS, BODY_M = 0.1, 600, 0.6  # of the map of free places, and the height of a body
-HEIGHTS_M, SIDES = (0.1, 0.35, 0.6), np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])  # looked for walls
-LEAST_RADIUS_M, MOST_RADIUS_M, OF_CIRCLE = 0.2, 4.0, 0.6
-SPEED_MPS, RATE_HZ, EASE_S = 0.5, 10.0, 1.0
-CORNERS, MOST_LENGTH_M = 16, 10.0
+# of the map of free places, and the height of a body
+CELL_M = 0.1
+MOST_CELLS = 600
+BODY_M = 0.6
+# looked for walls
+HEIGHTS_M = (0.1, 0.35, 0.6)
+SIDES = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+LEAST_RADIUS_M = 0.2
+MOST_RADIUS_M = 4.0
+OF_CIRCLE = 0.6
+SPEED_MPS = 0.5
+RATE_HZ = 10.0
+EASE_S = 1.0
+CORNERS = 16
+MOST_LENGTH_M = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +78,8 @@ def _floor(faces: Triangles, caster: RayCaster) -> _Floor | None:
     areas = np.bincount(heights - heights.min(), areas_m2(faces.corners_m[level]))
     floor_m = float((np.flatnonzero(areas > FLOOR_SHARE * areas.max())[0] + heights.min()) * FLOOR_STEP_M)
     on_floor = faces.corners_m[level][np.abs(heights * FLOOR_STEP_M - floor_m) < FLOOR_STEP_M].reshape(-1, 3)
-    low, high = on_floor.min(0)[:2], on_floor.max(0)[:2]
+    low = on_floor.min(0)[:2]
+    high = on_floor.max(0)[:2]
     cell_m = max(CELL_M, float((high - low).max()) / MOST_CELLS)
     x, y = (np.arange(a + cell_m / 2, b, cell_m) for a, b in zip(low, high, strict=True))
     if not x.size or not y.size:
@@ -82,7 +95,8 @@ def _clear(at_m: Array, floor_m: float, cell_m: float, faces: Triangles, caster:
     """Whether no wall stands in a cell (N, 2), nor around it: whoever sees backs on all sides is inside a thing."""
     clear = np.ones(len(at_m), bool)
     for height_m in HEIGHTS_M:
-        starts, backs = np.column_stack([at_m, np.full(len(at_m), floor_m + height_m)]), np.ones(len(at_m), bool)
+        starts = np.column_stack([at_m, np.full(len(at_m), floor_m + height_m)])
+        backs = np.ones(len(at_m), bool)
         for way in SIDES:
             hits = caster.hits(starts, np.tile(way, (len(starts), 1)))
             clear &= (hits.face < 0) | (hits.distance > cell_m)
@@ -120,8 +134,12 @@ def free_way(scene: Scene) -> PoseSpline:
     return PoseSpline(poses=tuple(poses), ease_s=EASE_S, rate_hz=RATE_HZ)
 
 
-LOOKS, LAMP_BELOW = 512, 0.35  # ways up that are looked; how far down a lamp hangs, or its spot above drowns all
-LAMPS_APART, MOST_LAMPS = 2.5, 4  # in heights of the ceiling, and along a side
+# ways up that are looked; how far down a lamp hangs, or its spot above drowns all
+LOOKS = 512
+LAMP_BELOW = 0.35
+# in heights of the ceiling, and along a side
+LAMPS_APART = 2.5
+MOST_LAMPS = 4
 
 
 def ceiling_above(scene: Scene) -> tuple[float, list[tuple[float, float, float]]]:

@@ -62,7 +62,8 @@ class Scenario:
 
     def variant(self, severity: int, scene: str) -> dict[str, str]:
         """The name on each axis: the scenario's, with the severity where that changes something."""
-        setup, first = self.setups[severity], self.setups[0]
+        setup = self.setups[severity]
+        first = self.setups[0]
 
         def name(axis: str, whole: str) -> str:
             is_same = getattr(setup, axis) == getattr(first, axis)
@@ -77,7 +78,9 @@ def read_scenario(path: Path) -> Scenario:
     read = yaml_file.read_all(path, ScenarioFile, kind="scenario")
     if read.mistakes:
         raise SuiteError(*read.mistakes)
-    base, wrong, setups = read.source.plain["base"], list[Mistake](), list[Setup]()
+    base = read.source.plain["base"]
+    wrong = list[Mistake]()
+    setups = list[Setup]()
     for severity, changes in enumerate(read.model.severity):
         try:
             place = read.source.place(("severity", severity))

@@ -35,7 +35,8 @@ def build(spec: SceneFile, lighting: Lighting) -> Scene:
     return replace(made, lights=lit(made.lights, lighting))
 
 
-KEPT_SCENES, KEPT_PIECES = 16, 512
+KEPT_SCENES = 16
+KEPT_PIECES = 512
 _scenes: OrderedDict[str, Scene] = OrderedDict()
 _pieces: OrderedDict[str, Instance] = OrderedDict()
 Made = TypeVar("Made")
@@ -162,7 +163,8 @@ def _model(spec: ModelSpec) -> Contents:
     """A model where it stands; with a name of its own, the names in it begin with that."""
     from vobench.asset.model import read_model
 
-    model, T = read_model(spec.file, scale=spec.scale, up=spec.up, roles=spec.roles), at(*spec.at_m, yaw=spec.yaw_deg)
+    model = read_model(spec.file, scale=spec.scale, up=spec.up, roles=spec.roles)
+    T = at(*spec.at_m, yaw=spec.yaw_deg)
     before = f"{spec.name}." if spec.name else ""
     placed = tuple(
         replace(thing, name=before + thing.name, mesh=thing.mesh.moved(T), material=before + thing.material)
@@ -192,7 +194,8 @@ def listed_lights(spec: SceneFile) -> Iterator[Light]:
     if spec.sky:
         # A clear sky is brightest around where the sun stands at first, or overhead without a sun.
         toward = _sun(spec.sun).direction(0) if spec.sun else np.array([0.0, 0.0, 1.0])
-        colour, level = hue(spec.sky.colour), spec.sky.level.build()
+        colour = hue(spec.sky.colour)
+        level = spec.sky.level.build()
         yield Sky(SKY, spec.sky.illuminance_lx, spec.sky.kind, toward, level=level, colour=colour)
 
 
@@ -210,10 +213,12 @@ def _glow(things: Sequence[Thing], materials: Mapping[str, Material]) -> Iterato
     for thing in things:
         emission = emitted_cd_m2(materials[thing.material])
         luminance = float(emission @ np.array(LUMINANCE))
-        nth, count[thing.name] = count[thing.name], count[thing.name] + 1
+        nth = count[thing.name]
+        count[thing.name] = count[thing.name] + 1
         red, green, blue = (emission / luminance).tolist()
         name = f"{thing.name}.{nth}" if nth else thing.name
-        power_lm, colour = luminance * np.pi * areas_m2(thing.mesh.corners_m).sum(), (red, green, blue)
+        power_lm = luminance * np.pi * areas_m2(thing.mesh.corners_m).sum()
+        colour = (red, green, blue)
         yield AreaLight(name, thing.mesh, power_lm, colour=colour, material=thing.material)
 
 
@@ -229,7 +234,8 @@ def _mover(mover: MoverSpec, spec: SceneFile) -> Contents:
         with _sentence(f"mover '{mover.name}'"):
             own = Contents(*things([Piece(mover.kind, mover.name, (0.0, 0.0, 0.0)).build(spec.seed)]))
     else:
-        mesh, look = block(mover.size_m or (), bevel_m=0), mover.material or ""
+        mesh = block(mover.size_m or (), bevel_m=0)
+        look = mover.material or ""
         own = Contents((Thing(mover.name, mesh, look),), {look: _material(look, spec)})
     moving = tuple(replace(thing, name=mover.name) for thing in own.things)
     return Contents(materials=own.materials, movers=(scripted.Mover(mover.name, moving, path),))

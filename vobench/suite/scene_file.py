@@ -33,7 +33,8 @@ from vobench.suite.yaml_file import Keys, Mistakes, YamlFile
 
 Lighting = dict[str, LightOverride]
 # Names of the lights that there is one of.
-SUN, SKY = "sun", "sky"
+SUN = "sun"
+SKY = "sky"
 # How names begin that we give to what has none.
 GIVEN_NAMES = ("box_", "board_", "window_", "wall_", "floor", "ceiling")
 WALLS = ("north", "east", "south", "west")
@@ -58,7 +59,8 @@ def survey(path: Path, changes: Mapping[str, Any] = MappingProxyType({})) -> tup
         return _bare(path), Mistakes(YamlFile(path, {}))
     changes_in_yaml = {key: json.dumps(value) for key, value in changes.items()}
     reading = yaml_file.read_all(path, SceneFile, changes_in_yaml, kind="scene")
-    spec, source = reading.model, reading.source
+    spec = reading.model
+    source = reading.source
     wrong = Mistakes(source, list(reading.mistakes))
     materials = source.marked.get("materials", {})
     for keys, name in materials_used(spec) if isinstance(materials, dict) else ():
@@ -122,8 +124,12 @@ def _bare(path: Path) -> SceneFile:
 
 
 DAYLIGHT = SunSpec(illuminance_lx=30_000, azimuth_deg=30, elevation_deg=50), SkySpec(illuminance_lx=8_000, kind="clear")
-ROOM_LX, LEAST_OPEN, WHITEST = 400.0, 0.1, 0.9
-LARGEST_M, CENTIMETRE = 300.0, 0.01  # a larger model was written in centimetres
+ROOM_LX = 400.0
+LEAST_OPEN = 0.1
+WHITEST = 0.9
+# a larger model was written in centimetres
+LARGEST_M = 300.0
+CENTIMETRE = 0.01
 
 
 def _lit_from_outside(spec: SceneFile, shape: Scene, swallows_m2: float) -> SceneFile:
@@ -242,9 +248,11 @@ def _check_names(spec: SceneFile, source: YamlFile, wrong: Mistakes) -> None:
 
 
 def _check_window(index: int, room: RoomSpec) -> None:
-    window, (x, y, height) = room.windows[index], room.size_m
+    window = room.windows[index]
+    (x, y, height) = room.size_m
     length = y if window.wall in ("east", "west") else x
-    (along, up), (width, high) = window.center_m, window.size_m
+    (along, up) = window.center_m
+    (width, high) = window.size_m
     if abs(along) + width / 2 >= length / 2 or up - high / 2 <= 0 or up + high / 2 >= height:
         raise SuiteError(
             f"the window reaches beyond its wall, which is {length:g} m long around 0 and {height:g} m high: "

@@ -301,7 +301,8 @@ class SpotLamp:
 
     def build(self) -> SpotLight:
         """The light."""
-        center, level = np.asarray(self.center_m), self.level.build()
+        center = np.asarray(self.center_m)
+        level = self.level.build()
         way = np.asarray(self.target_m) - center
         direction: Array = way / np.linalg.norm(way)
         return SpotLight(

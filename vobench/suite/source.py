@@ -96,7 +96,8 @@ def _matches(written: str, folder: Path) -> list[Path]:
     """What a pattern matches, sorted; `**` follows no link. Raises SuiteError where that is too much, or no pattern."""
     parts = _placed(written, folder).parts
     first = next(index for index, part in enumerate(parts) if GLOB.search(part))
-    base, pattern = Path(*parts[:first]), "/".join(parts[first:])
+    base = Path(*parts[:first])
+    pattern = "/".join(parts[first:])
     shows_hidden = any(part.startswith(".") for part in parts[first:])
     found = list[Path]()
     try:

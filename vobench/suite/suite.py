@@ -207,7 +207,8 @@ class Case:
 
     def build_true_rig(self) -> Rig:
         """The stereo pair as it is: what pictures are made with. Raises VobenchError, as `true_rig` does."""
-        rig, rng = self.build_rig(), np.random.default_rng([self.seed, CALIBRATION_STREAM])
+        rig = self.build_rig()
+        rng = np.random.default_rng([self.seed, CALIBRATION_STREAM])
         return true_rig(rig, drawn(self.rig.calibration_error, rig, rng))
 
 
@@ -273,7 +274,8 @@ class Plan:
 
         Raises UnknownNameError for what matches none.
         """
-        names, places = [case.name for case in self.cases], [case.variant.get("scene", "") for case in self.cases]
+        names = [case.name for case in self.cases]
+        places = [case.variant.get("scene", "") for case in self.cases]
         for kind, patterns, known in (("case", cases, names), ("scene", scenes, places)):
             for pattern in patterns:
                 if not fnmatch.filter(known, pattern):
@@ -325,7 +327,8 @@ class _Planner:
     def plan(self, only_estimators: tuple[str, ...] = ()) -> Plan:
         """The plan. Raises SuiteError with all that is wrong."""
         entrants = self._entrants(only_estimators)
-        scenes, replayed = self._scenes(), self._replayed()
+        scenes = self._scenes()
+        replayed = self._replayed()
         axes = self._axes(scenes, self._rigs())
         variants = [*_combinations(axes)]
         if not self.suite.trajectories:
@@ -423,7 +426,8 @@ class _Planner:
         return cases
 
     def _of_scenario(self, scenario: Scenario, severity: int) -> Iterator[Case]:
-        setup, asked = scenario.setup(severity), self.suite.calibrations or {}
+        setup = scenario.setup(severity)
+        asked = self.suite.calibrations or {}
         levels = [level for level in asked if severity in asked[level]] if asked else [None]
         if not levels:
             raise SuiteError(f"none of the calibrations is run at severity {severity}")
@@ -440,7 +444,8 @@ class _Planner:
             text = read_replayed(setup.trajectory, folder, read_times(setup.trajectory, folder))
         variant = scenario.variant(severity, entry.name)
         for level in levels:
-            rig, end = own, f"-{level}" if len(asked) > 1 else ""
+            rig = own
+            end = f"-{level}" if len(asked) > 1 else ""
             if level:
                 rig = replace(rig, calibration_error=replace(rig.calibration_error, level=level))
             yield Case(

@@ -75,17 +75,22 @@ class YamlFile:
 
     def _place(self, keys: Keys) -> tuple[int, Place]:
         """How many of the keys the file has, and the place of the last of them."""
-        tree, line, named, depth = self.marked, None, list[int | str](), 0
+        tree = self.marked
+        line = None
+        named = list[int | str]()
+        depth = 0
         for key in keys:
             if isinstance(key, int) and (isinstance(tree, str | int) or (isinstance(tree, dict) and key not in tree)):
                 continue  # one value stands for a list of one
             named.append(key)
             lines = getattr(tree, "lc", None)  # what was put in place of the file's has none
             if isinstance(tree, dict) and key in tree:
-                tree, line = tree[key], lines.key(key)[0] + 1 if lines and key in (lines.data or ()) else line
+                tree = tree[key]
+                line = lines.key(key)[0] + 1 if lines and key in (lines.data or ()) else line
                 depth = len(named)
             elif isinstance(tree, list) and isinstance(key, int) and key < len(tree):
-                tree, line = tree[key], lines.item(key)[0] + 1 if lines else line
+                tree = tree[key]
+                line = lines.item(key)[0] + 1 if lines else line
                 depth = len(named)
             else:
                 tree = None
@@ -169,7 +174,8 @@ def read_all(
         _change(source.marked, keys, value)
     unread = {keys: sentence for file in source.files for keys, sentence in _unreadable(file.marked, ())}
     mistakes += [Mistake(sentence, (source.place(keys),)) for keys, sentence in unread.items()]
-    data, wrong = source.plain, [*unread]
+    data = source.plain
+    wrong = [*unread]
     try:
         whole = checked(model, data)
         if not mistakes:
@@ -414,9 +420,12 @@ def without_nothing(tree: Any) -> Any:
 
 def _intact(model: type, data: dict[str, Any], wrong: list[Keys]) -> tuple[dict[str, Any], dict[str, Any]]:
     """The sections of a file without the entries in which something is wrong, and which are left of each list."""
-    parts, kept, known = dict[str, Any](), dict[str, tuple[int, ...]](), hints(model)
+    parts = dict[str, Any]()
+    kept = dict[str, tuple[int, ...]]()
+    known = hints(model)
     for key in data.keys() & known.keys():
-        value, bad = data[key], [keys[1:2] for keys in wrong if keys[0:1] == (key,)]
+        value = data[key]
+        bad = [keys[1:2] for keys in wrong if keys[0:1] == (key,)]
         if isinstance(value, dict):
             value = {name: entry for name, entry in value.items() if (name,) not in bad}
         elif isinstance(value, list):
@@ -448,7 +457,8 @@ def _complaints(
     places = [*unread, *map(_loc, found)]
     meant = {(*each["loc"][:-1], _nearest(each, schema)) for each in found if each["type"] == UNKNOWN_KEY}
     for each in found:
-        loc, keys = _loc(each), _walk(schema, _loc(each))[0]
+        loc = _loc(each)
+        keys = _walk(schema, _loc(each))[0]
         is_misspelt = each["type"] == "missing" and loc in meant
         lost_some = each["type"] == "too_short" and any(loc == other[: len(loc)] != other for other in places)
         if not (keys in unread or is_misspelt or lost_some):
@@ -478,7 +488,8 @@ def _complaint(error: Any, schema: dict[str, Any], source: YamlFile) -> str:
         near = _nearest(error, schema)
         guess = f" Did you mean {near!r}?" if near else ""
         return f"unknown key.{guess} Known: {', '.join(_known(error, schema))}"
-    context, template = error.get("ctx", {}), COMPLAINTS.get(error["type"])
+    context = error.get("ctx", {})
+    template = COMPLAINTS.get(error["type"])
     if isinstance(context.get("error"), SettingError):  # names the value itself
         return str(context["error"].sentence)
     return complaint(template or error["msg"], error["input"], context if template else {})
@@ -487,7 +498,9 @@ def _complaint(error: Any, schema: dict[str, Any], source: YamlFile) -> str:
 def _of_other_kinds(loc: Keys, schema: dict[str, Any], source: YamlFile) -> str:
     """What to say of an unknown key that other kinds of the section have; nothing where only its unit is missing."""
     keys, section = _walk(schema, loc[:-2])
-    kind, key, own = str(loc[-2:][0]), str(loc[-1]), _known({"loc": loc}, schema)
+    kind = str(loc[-2:][0])
+    key = str(loc[-1])
+    own = _known({"loc": loc}, schema)
     members = section.get("discriminator", {}).get("mapping", {})
     owners = [name for name in members if key in _referred(schema, {"$ref": members[name]})["properties"]]
     if not owners or kind not in members or any(name.startswith(f"{key}_") for name in own):
@@ -502,7 +515,8 @@ def _walk(schema: dict[str, Any], loc: Keys) -> tuple[Keys, dict[str, Any]]:
     Pydantic's own place also names the kind that was chosen where there are several, and ends in a part
     of its own where a key is wrong, as opposed to its value.
     """
-    keys, part = list[int | str](), _chosen(schema, schema)
+    keys = list[int | str]()
+    part = _chosen(schema, schema)
     for key in loc:
         if key == "[key]":
             continue

@@ -79,12 +79,15 @@ def align(T_est: Array, T_gt: Array, *, kind: Kind, first_n: int | None = None) 
     """
     if kind == "none":
         return Alignment(kind, IDENTITY, np.zeros(3), 1.0, ())
-    T_est, T_gt = T_est[:first_n], T_gt[:first_n]
+    T_est = T_est[:first_n]
+    T_gt = T_gt[:first_n]
     _require_pairs(T_est, T_gt)
     T_origin = T_gt[0] @ se3.inverse(T_est[0])
     if kind == "origin":
         return Alignment(kind, T_origin[:3, :3], T_origin[:3, 3], 1.0, ())
-    est_m, gt_m, toward = T_est[:, :3, 3], T_gt[:, :3, 3], T_origin[:3, :3]
+    est_m = T_est[:, :3, 3]
+    gt_m = T_gt[:, :3, 3]
+    toward = T_origin[:3, :3]
     if kind == "yaw":
         return align_yaw(est_m, gt_m, toward=toward)
     fit = align_positions(est_m, gt_m, kind=kind, toward=toward)
@@ -104,8 +107,10 @@ def align_positions(
     on direction. Raises AlignmentError as `align`. Source: Umeyama (1991), eqs. 34-43.
     """
     _require_pairs(est_m, gt_m)
-    est_mean, gt_mean = est_m.mean(axis=0), gt_m.mean(axis=0)
-    x, y = est_m - est_mean, gt_m - gt_mean
+    est_mean = est_m.mean(axis=0)
+    gt_mean = gt_m.mean(axis=0)
+    x = est_m - est_mean
+    y = gt_m - gt_mean
     covariance = _covariance(y, x)
     shape = _shape(x, y, rounding_m=ROUNDING * float(max(np.abs(est_mean).max(), np.abs(gt_mean).max())))
     is_turned_anyhow = kind == "scale" and shape is _Shape.LINE  # the scale alone needs no roll that is true
@@ -127,8 +132,10 @@ def align_yaw(est_m: Array, gt_m: Array, *, toward: Array = IDENTITY) -> Alignme
     Source: Zhang and Scaramuzza (2018), section III-C.
     """
     _require_pairs(est_m, gt_m)
-    est_mean, gt_mean = est_m.mean(axis=0), gt_m.mean(axis=0)
-    x, y = est_m - est_mean, gt_m - gt_mean
+    est_mean = est_m.mean(axis=0)
+    gt_mean = gt_m.mean(axis=0)
+    x = est_m - est_mean
+    y = gt_m - gt_mean
     covariance = _covariance(y, x)[:2, :2]
     turning = np.array([covariance[0, 0] + covariance[1, 1], covariance[1, 0] - covariance[0, 1]])
     extents = np.sqrt([np.trace(_covariance(path, path)) for path in (x[:, :2], y[:, :2])])
@@ -198,7 +205,8 @@ def _is_noise(x: Array, y: Array) -> bool:
     (x_spread, x_axes), (y_spread, y_axes) = (np.linalg.eigh(_covariance(path, path)) for path in (x, y))
     if min(x_spread[1] / x_spread[2], y_spread[1] / y_spread[2]) > NEARLY_STRAIGHT**2:
         return False
-    a, b = (x @ x_axes[:, :2]) @ [1, 1j], (y @ y_axes[:, :2]) @ [1, 1j]
+    a = (x @ x_axes[:, :2]) @ [1, 1j]
+    b = (y @ y_axes[:, :2]) @ [1, 1j]
     power = float(np.linalg.norm(a) * np.linalg.norm(b))
     r = min(max(abs(np.vdot(a, b)), abs(np.vdot(a, b.conj()))) / power, 1.0)
     free = max(2 * len(x) - 5, 1)  # numbers measured, less two means, a roll, and a direction's two

@@ -71,7 +71,9 @@ def match(
 ) -> Matched:
     """The poses that `associate` pairs; with "interpolate" the longer side is read at the shorter side's stamps."""
     pairs = associate(gt.t_ns, est.t_ns, max_diff_ns=max_diff_ns, offset_ns=offset_ns, method=method)
-    T_gt, T_est, t_ns = gt.T_world_frame[pairs.gt], est.T_world_frame[pairs.est], gt.t_ns[pairs.gt]
+    T_gt = gt.T_world_frame[pairs.gt]
+    T_est = est.T_world_frame[pairs.est]
+    t_ns = gt.t_ns[pairs.gt]
     if method == "interpolate" and len(est) > len(gt):
         T_est = poses_at(est, t_ns - offset_ns)
     elif method == "interpolate":
@@ -89,7 +91,8 @@ def nearest(t: Stamps | Array, among: Stamps | Array) -> Index:
 
 def _as_evo(gt_ns: Stamps, est_ns: Stamps, max_diff_s: float, offset_s: float) -> Pairs:
     """Source: evo 1.38's association, whose float64 seconds leave ties and limits to their rounding."""
-    gt_s, est_s = _seconds(gt_ns), _seconds(est_ns)
+    gt_s = _seconds(gt_ns)
+    est_s = _seconds(est_ns)
     is_est_longer = len(est_s) > len(gt_s)
     asking_s, asked_s = (gt_s, est_s + offset_s) if is_est_longer else (est_s, gt_s - offset_s)
     asked = nearest(asking_s, asked_s)
@@ -127,7 +130,8 @@ def _greedy(gt_ns: Stamps, est_ns: Stamps, max_diff_ns: int) -> Pairs:
     est = np.repeat(np.arange(len(est_ns)), count)
     gt = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count - begin, count)
     order = np.lexsort((est, gt, np.abs(gt_ns[gt] - est_ns[est])))
-    free_gt, free_est = bytearray(b"1" * len(gt_ns)), bytearray(b"1" * len(est_ns))
+    free_gt = bytearray(b"1" * len(gt_ns))
+    free_est = bytearray(b"1" * len(est_ns))
     kept = []
     for k, i, j in zip(order.tolist(), gt[order].tolist(), est[order].tolist(), strict=True):
         if free_gt[i] and free_est[j]:
@@ -139,8 +143,10 @@ def _greedy(gt_ns: Stamps, est_ns: Stamps, max_diff_ns: int) -> Pairs:
 
 
 def _in_order(gt_ns: Stamps, est_ns: Stamps, max_diff_ns: int) -> Pairs:
-    nearest_gt, stamps = nearest(est_ns, gt_ns).tolist(), gt_ns.tolist()
-    left, pairs = 0, []
+    nearest_gt = nearest(est_ns, gt_ns).tolist()
+    stamps = gt_ns.tolist()
+    left = 0
+    pairs = []
     for j, (t_ns, i) in enumerate(zip(est_ns.tolist(), nearest_gt, strict=True)):
         best = max(i, left)
         if best < len(stamps) and abs(stamps[best] - t_ns) <= max_diff_ns:

@@ -216,7 +216,8 @@ def csv_layout(text: str) -> tuple[list[tuple[int, str]], Unit, Order]:
     A header that names w last, or seconds, is believed; stamps with a decimal point are seconds.
     """
     first = text.removeprefix("\ufeff").lstrip().partition("\n")[0]
-    rows, header = content(text), [""]
+    rows = content(text)
+    header = [""]
     if WORD.search(first.lstrip("#")):
         header = [cell.strip().lower() for cell in first.lstrip("#").split(",")]
         rows = rows if first.startswith("#") else rows[1:]
@@ -292,7 +293,9 @@ def _require_rotations(table: Table, R: Array) -> None:
 
 
 LFS_POINTER = "version https://git-lfs.github.com/spec/"
-TUM, KITTI, TARTANAIR = len(COLUMNS), len(KITTI_COLUMNS), len(TARTANAIR_COLUMNS)
+TUM = len(COLUMNS)
+KITTI = len(KITTI_COLUMNS)
+TARTANAIR = len(TARTANAIR_COLUMNS)
 NUMBERED = len(NUMBERED_COLUMNS)
 FORMS_BY_COLUMNS = {len(form): form for form in (COLUMNS, KITTI_COLUMNS, NUMBERED_COLUMNS, TARTANAIR_COLUMNS)}
 FORMS = (
@@ -352,7 +355,8 @@ def parse_any(written: str, *, name: str, unit: Unit | None = None, order: Order
         table = read_table(rows, name=name, columns=EUROC_COLUMNS, separator=",")
         return _stamped(table, unit or found_unit, found_unit, order or found_order)
     columns = FORMS_BY_COLUMNS[len(first.split())]
-    table, order = read_table(content(written), name=name, columns=columns), order or "xyzw"
+    table = read_table(content(written), name=name, columns=columns)
+    order = order or "xyzw"
     if columns is TARTANAIR_COLUMNS:
         T = se3.transform(rotations(table, table.values[:, 3:], order), table.values[:, :3])
         return Parsed(None, T, order=order)
@@ -361,7 +365,9 @@ def parse_any(written: str, *, name: str, unit: Unit | None = None, order: Order
 
 def _matrices(table: Table) -> Parsed:
     """KITTI's poses, the first three rows of each matrix, kept as given; the frame's number may come first."""
-    frames, rows, notes = None, np.arange(len(table.values)), tuple[str, ...]()
+    frames = None
+    rows = np.arange(len(table.values))
+    notes = tuple[str, ...]()
     if table.values.shape[1] == NUMBERED:
         stated = table.values[:, 0]
         bad = np.flatnonzero((stated != np.floor(stated)) | (stated < 0) | (stated > MAX_FRAME))

@@ -37,8 +37,10 @@ class Kinematics:
 
     def of_mounted(self, T_body_sensor: Array) -> "Kinematics":
         """The same of something fixed to the body, in that thing's axes: the lever arm's share is added."""
-        R_sensor_body, lever_m = T_body_sensor[:3, :3].T, T_body_sensor[:3, 3]
-        w, dw = self.turn_radps, self.turn_rate_radps2
+        R_sensor_body = T_body_sensor[:3, :3].T
+        lever_m = T_body_sensor[:3, 3]
+        w = self.turn_radps
+        dw = self.turn_rate_radps2
         swung_mps = np.cross(w, lever_m)
         swung_mps2 = np.cross(dw, lever_m) + np.cross(w, swung_mps)
 
@@ -135,11 +137,13 @@ class TimeLaw:
 
     def when(self, progress: Array) -> Array:
         """The times (B,) at which a progress (B,) is passed, found by halving."""
-        early, late = np.full(len(progress), self.start_s), np.full(len(progress), self.end_s)
+        early = np.full(len(progress), self.start_s)
+        late = np.full(len(progress), self.end_s)
         for _ in range(HALVINGS):
             middle = (early + late) / 2
             is_before = self.progress(middle) < progress
-            early, late = np.where(is_before, middle, early), np.where(is_before, late, middle)
+            early = np.where(is_before, middle, early)
+            late = np.where(is_before, late, middle)
         return late
 
 
@@ -237,7 +241,9 @@ class CurveMotion:
     def at(self, t_ns: Stamps | Array) -> Kinematics:
         """The curve where the law says, by the chain rule."""
         s, rate, change = self.law.at(np.asarray(t_ns, float) / 1e9)
-        by_s, rate, change = self.curve.at(s), rate[:, None], change[:, None]
+        by_s = self.curve.at(s)
+        rate = rate[:, None]
+        change = change[:, None]
         return Kinematics(
             T_world_body=self.T_world_start @ by_s.T_world_body,
             velocity_mps=by_s.velocity_mps * rate,

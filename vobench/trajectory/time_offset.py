@@ -13,7 +13,9 @@ from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 MIN_OVERLAP = 0.5  # share of the shorter recording that has to overlap
 MIN_SAMPLES = 20
 WINDOW_STEPS = 5  # that a speed is measured over: noise of single poses goes, the shape in time stays
-ROUNDS, TRIES = 3, 17  # each search is 8 times as fine as the one before: 1/500 of a step at last
+# each search is 8 times as fine as the one before: 1/500 of a step at last
+ROUNDS = 3
+TRIES = 17
 STRETCHES = 8
 INSTANTS = 800  # looked at in a finer search
 MIN_INSTANTS = 8
@@ -40,7 +42,8 @@ def estimate_offset(gt: Trajectory, est: Trajectory) -> Offset:
     """
     step_ns = int(_step_ns(gt, est))
     _require_samples(gt, est, step_ns)
-    window_ns, found = WINDOW_STEPS * step_ns, []
+    window_ns = WINDOW_STEPS * step_ns
+    found = []
     grids = [np.arange(t.t_ns[0], t.t_ns[-1] - window_ns, step_ns, dtype=np.int64) for t in (gt, est)]
     for a, b in zip(speeds(gt, grids[0], window_ns), speeds(est, grids[1], window_ns), strict=True):
         correlation = _correlations(a, b)
@@ -94,17 +97,21 @@ def _require_samples(gt: Trajectory, est: Trajectory, step_ns: int) -> None:
 
 def speeds(trajectory: Trajectory, t_ns: Stamps, window_ns: int) -> tuple[Array, Array]:
     """Angle turned and distance moved, each (N,), in the window that begins at each instant."""
-    T_begin, T_end = poses_at(trajectory, t_ns), poses_at(trajectory, t_ns + window_ns)
+    T_begin = poses_at(trajectory, t_ns)
+    T_end = poses_at(trajectory, t_ns + window_ns)
     turned = se3.rotation_angle(np.swapaxes(T_begin[:, :3, :3], -1, -2) @ T_end[:, :3, :3])
     return turned, np.linalg.norm(T_end[:, :3, 3] - T_begin[:, :3, 3], axis=1)
 
 
 def _correlations(a: Array, b: Array) -> Array:
     """Pearson's correlation of a[k + lag] with b[k] for each lag from 1 - len(b); -1 with too little overlap."""
-    ones_a, ones_b = np.ones(len(a)), np.ones(len(b))
+    ones_a = np.ones(len(a))
+    ones_b = np.ones(len(b))
     n = np.round(_slide(ones_a, ones_b))
-    a, b = _normalised(a), _normalised(b)
-    sum_a, sum_b = _slide(a, ones_b), _slide(ones_a, b)
+    a = _normalised(a)
+    b = _normalised(b)
+    sum_a = _slide(a, ones_b)
+    sum_b = _slide(ones_a, b)
     covariance = n * _slide(a, b) - sum_a * sum_b
     spread = (n * _slide(a * a, ones_b) - sum_a**2) * (n * _slide(ones_a, b * b) - sum_b**2)
     enough = (n >= max(MIN_OVERLAP * min(len(a), len(b)), MIN_SAMPLES)) & (spread > 1e-9 * n**4)
@@ -128,13 +135,15 @@ def _slide(a: Array, b: Array) -> Array:
 
 def _refined(gt: Trajectory, est: Trajectory, coarse_ns: int, step_ns: float, *, reach_ns: float | None = None) -> int:
     """Search around the coarse offset, finer and finer, up to a step or `reach_ns` away."""
-    best_ns, reach_ns = coarse_ns, step_ns if reach_ns is None else reach_ns
+    best_ns = coarse_ns
+    reach_ns = step_ns if reach_ns is None else reach_ns
     for _ in range(ROUNDS):
         tries = best_ns + np.linspace(-reach_ns, reach_ns, TRIES).round().astype(np.int64)
         found = _likeness(gt, est, tries, round(WINDOW_STEPS * step_ns))
         if found is None:
             return coarse_ns
-        best_ns, reach_ns = int(tries[int(np.argmax(found))]), reach_ns / 8
+        best_ns = int(tries[int(np.argmax(found))])
+        reach_ns = reach_ns / 8
     return best_ns
 
 
@@ -160,7 +169,8 @@ def _alike(gt_speeds: tuple[Array, Array], est_speeds: tuple[Array, Array]) -> f
 
 
 def _correlation(a: Array, b: Array) -> float:
-    a, b = a - a.mean(), b - b.mean()
+    a = a - a.mean()
+    b = b - b.mean()
     return float(a @ b / np.sqrt((a @ a) * (b @ b)))
 
 

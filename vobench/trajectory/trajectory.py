@@ -86,7 +86,8 @@ def poses_at(trajectory: Trajectory, t_ns: Stamps) -> Array:
 
     Source: Shoemake (1985), eq. of slerp, along the shorter way round.
     """
-    stamps, T = trajectory.t_ns, trajectory.T_world_frame
+    stamps = trajectory.t_ns
+    T = trajectory.T_world_frame
     before = np.clip(np.searchsorted(stamps, t_ns, side="right") - 1, 0, max(len(stamps) - 2, 0))
     after = np.minimum(before + 1, len(stamps) - 1)
     step_ns = np.maximum(stamps[after] - stamps[before], 1)
@@ -96,9 +97,11 @@ def poses_at(trajectory: Trajectory, t_ns: Stamps) -> Array:
 
 
 def _slerp(R_begin: Array, R_end: Array, share: Array) -> Array:
-    a, b = se3.to_quaternion(R_begin), se3.to_quaternion(R_end)
+    a = se3.to_quaternion(R_begin)
+    b = se3.to_quaternion(R_end)
     cosine = np.sum(a * b, axis=-1, keepdims=True)
-    b, cosine = np.where(cosine < 0, -b, b), np.abs(cosine)
+    b = np.where(cosine < 0, -b, b)
+    cosine = np.abs(cosine)
     sine = np.linalg.norm(b - cosine * a, axis=-1, keepdims=True)
     angle = np.arctan2(sine, cosine)
     near = sine < 1e-9  # there the weights of a straight line are exact
