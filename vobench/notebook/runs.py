@@ -130,8 +130,10 @@ class Run:
 
     def _repr_html_(self) -> str:
         from vobench.report import board_table
+        from vobench.report.leaderboard import METRICS
 
-        parts = [_html_table(["case", *self.estimators], _matrix_rows(self._board), board_table.DEFAULT_METRIC)]
+        title = METRICS[board_table.DEFAULT_METRIC].heading
+        parts = [_html_table(["case", *self.estimators], _matrix_rows(self._board), title)]
         for over, (headings, *rows) in board_table.totals(self._board):
             parts.append(_html_table(headings, rows, f"totals over {over}"))
         notes = [*board_table.remarks(self._board), *board_table.cell_notes(self._board), str(self.path)]
