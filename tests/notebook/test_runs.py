@@ -123,7 +123,8 @@ def test_a_view_without_a_display_says_what_to_do_and_a_saved_one_is_a_file(ran,
 
 def test_a_run_and_a_check_show_themselves_as_tables(ran, here):
     shown = vobench.read_run(ran)._repr_html_()
-    assert all(word in shown for word in ("<table", "ATE % of path", "wheel_odometry", "stand_still", "totals over 1 case"))
+    words = ("<table", "ATE % of path", "wheel_odometry", "stand_still", "totals over 1 case")
+    assert all(word in shown for word in words)
     assert "<table" in vobench.check("tiny")._repr_html_()
 
 
