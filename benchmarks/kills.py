@@ -230,8 +230,11 @@ def outcome(
 
 def report(kill: Kill) -> None:
     """One line for each kill."""
-    facts = f"alive {kill.survivors}, exit code {kill.exit_code}, left {kill.left_behind}"
-    verdict = "clean" if kill.is_clean else f"{facts}{'' if kill.same_bytes else ', OTHER BYTES'}"
+    verdict = "clean"
+    if not kill.is_clean:
+        verdict = f"alive {kill.survivors}, exit code {kill.exit_code}, left {kill.left_behind}"
+        if not kill.same_bytes:
+            verdict += ", OTHER BYTES"
     print(f"{kill.whom} killed after {kill.after_s:5.2f} s: {verdict}", flush=True)
 
 

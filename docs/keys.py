@@ -5,7 +5,7 @@ by hand. `python docs/keys.py` rewrites the pages beside it.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +32,13 @@ def sections() -> dict[str, dict[str, Any]]:
 
 
 def _parts(tree: Any) -> Iterator[dict[str, Any]]:
+    parts: Iterable[Any] = ()
     if isinstance(tree, dict):
         yield tree
-    for part in tree.values() if isinstance(tree, dict) else tree if isinstance(tree, list) else ():
+        parts = tree.values()
+    elif isinstance(tree, list):
+        parts = tree
+    for part in parts:
         yield from _parts(part)
 
 
@@ -67,7 +71,9 @@ def _rows(table: str) -> dict[str, str]:
 
 def _row(key: str, section: dict[str, Any], said: str) -> str:
     part = section["properties"][key]
-    default = "" if key in section.get("required", ()) else _value(part["default"]) if "default" in part else "as said"
+    default = _value(part["default"]) if "default" in part else "as said"
+    if key in section.get("required", ()):
+        default = ""
     cells = (f"`{key}`", unit_of(key), takes(part), default, said)
     return f"|{'|'.join(f' {cell} ' if cell else ' ' for cell in cells)}|\n"
 

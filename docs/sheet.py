@@ -29,7 +29,9 @@ def picture(case: Path, scenario: str) -> Image.Image:
     """A small picture of a case, from a third of its way."""
     frames = list(Sequence.open(case / "sequence").frames())
     now, then = (frames[min(int(0.3 * len(frames)) + n, len(frames) - 1)] for n in (0, 1))
-    other = now.right if scenario in EYES else then.left if scenario in TIME else now.left
+    other = then.left if scenario in TIME else now.left
+    if scenario in EYES:
+        other = now.right
     return Image.fromarray(np.dstack([now.left, other, other])).resize((WIDE, HIGH), Image.Resampling.LANCZOS)
 
 

@@ -41,3 +41,15 @@ def _is_packed(node: ast.AST) -> bool:
 def test_a_statement_assigns_one_value_where_values_are_unlike() -> None:
     packed = [f"{path.relative_to(ROOT)}:{node.lineno}" for path, node in _statements() if _is_packed(node)]
     assert packed == []
+
+
+def _holds_itself(node: ast.AST, kinds: type | tuple[type, ...]) -> bool:
+    """Whether an expression of one of these kinds has another one of them in it."""
+    return isinstance(node, kinds) and any(isinstance(inner, kinds) for inner in ast.walk(node) if inner is not node)
+
+
+def test_no_conditional_expression_stands_in_another() -> None:
+    nested = [
+        f"{path.relative_to(ROOT)}:{node.lineno}" for path, node in _statements() if _holds_itself(node, ast.IfExp)
+    ]
+    assert nested == []

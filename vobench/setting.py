@@ -381,5 +381,10 @@ def complaint(template: str, value: Any, context: Mapping[str, Any]) -> str:
     said = template.format(**{k: f"{v:g}" if isinstance(v, float) else v for k, v in context.items()})
     if isinstance(value, dict | list | tuple):
         return said
-    seen = "nothing" if value is None else str(value).lower() if isinstance(value, bool) else repr(value)
+    if value is None:
+        seen = "nothing"
+    elif isinstance(value, bool):
+        seen = str(value).lower()
+    else:
+        seen = repr(value)
     return f"{said} (got {seen})"

@@ -59,7 +59,9 @@ class Statistic:
 
     def verdict(self, value: float) -> str:
         """in, low or high."""
-        return "low" if value < self.low else "high" if value > self.high else "in"
+        if value < self.low:
+            return "low"
+        return "high" if value > self.high else "in"
 
     def knob(self, value: float) -> str:
         """What would bring it into its band; nothing where it is there."""

@@ -319,7 +319,11 @@ def _solve(of: Callable[[float], float], wanted: float, ends: tuple[float, float
     low, high = np.log(ends) if log else ends
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        low, high = (middle, high) if of(float(np.exp(middle) if log else middle)) < wanted else (low, middle)
+        place = float(np.exp(middle)) if log else float(middle)
+        if of(place) < wanted:
+            low = middle
+        else:
+            high = middle
     middle = float((low + high) / 2)
     return float(np.exp(middle)) if log else middle
 

@@ -50,10 +50,16 @@ def doctor_command(
     if json:
         terminal.print_json({"well": not ill, "checks": [asdict(c) for c in checks]})
         raise SystemExit(1 if ill else 0)  # the one object has said it all
-    rows = [["ok" if c.well else "optional" if c.optional else "MISSING", c.check, c.result] for c in checks]
+    rows = [[_verdict(check), check.check, check.result] for check in checks]
     terminal.console().print(terminal.table("", ["", "check", "result"], rows))
     if ill:
         raise MissingDependencyError("; ".join(f"{c.check}: {c.remedy}" for c in ill))
+
+
+def _verdict(check: Check) -> str:
+    if check.well:
+        return "ok"
+    return "optional" if check.optional else "MISSING"
 
 
 def _libraries() -> Check:

@@ -126,7 +126,9 @@ def _row(topic: dict[str, Any]) -> list[str]:
 def _entry(key: str, value: Any) -> str:
     if isinstance(value, dict):
         return f"{key}: " + ", ".join(_entry(*item) for item in value.items())
-    return f"{key} {'none' if value is None else f'{value:.6g}' if isinstance(value, float) else value}"
+    if isinstance(value, float):
+        return f"{key} {value:.6g}"
+    return f"{key} {'none' if value is None else value}"
 
 
 Recorded = Annotated[

@@ -202,7 +202,8 @@ class Info:
         if m.distortion_model in OUR_OWN and not self.rectified:
             return ros.camera(m)
         K = self.matrix("p", 3, 4) if self.rectified else self.matrix("k", 3, 3)
-        d = [] if self.rectified else [float(value) for value in (m.d if hasattr(m, "d") else m.D)]
+        coefficients = m.d if hasattr(m, "d") else m.D  # ROS 2, or ROS 1
+        d = [] if self.rectified else [float(value) for value in coefficients]
         if not np.isfinite(d).all():
             raise InputError(f"{self.topic}: D should be finite numbers, but is {d}")
         focal = [float(value) for value in (K[0, 0], K[1, 1], K[0, 2], K[1, 2])]

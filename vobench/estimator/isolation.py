@@ -387,7 +387,11 @@ def _restrict_files(plan: dict[str, object]) -> bool:
     every_access = (1 << BITS_OF_VERSION.get(version, BITS_SINCE_5)) - 1
     scopes = ABSTRACT_SOCKETS_AND_SIGNALS if version >= SINCE_SCOPES else 0
     attributes = struct.pack("QQQ", every_access, 0, scopes)
-    size = 24 if version >= SINCE_SCOPES else 16 if version >= SINCE_NETWORK else 8
+    size = 8  # one field of 64 bits, and one more for each of these
+    if version >= SINCE_NETWORK:
+        size += 8
+    if version >= SINCE_SCOPES:
+        size += 8
     ruleset = libc.syscall(ctypes.c_long(LANDLOCK_CREATE_RULESET), attributes, ctypes.c_size_t(size), 0)
     if ruleset < 0:
         return False

@@ -247,7 +247,8 @@ def _numbers(batch: Batch, texture: SurfaceTexture | None) -> Array:
     )
     glow = spread if batch.is_lamp else material.emission_cd_m2
     repeats = material.tile_m / material.emission_texture.tile_m if material.emission_texture else 1.0
-    scale = (texture.scale if texture else 1.0) if is_body else material.tint
+    texture_scale = texture.scale if texture else 1.0
+    scale = texture_scale if is_body else material.tint
     plane = [*batch.mirror.plane.normal, batch.mirror.plane.offset_m] if batch.mirror else np.zeros(4)
     colour = [*(scale * np.array(material.colour)), material.tint]
     coat = [eta, inner, 1 / eta**2, 1 / ((1 - inner) * eta**2)]

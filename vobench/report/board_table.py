@@ -91,6 +91,12 @@ def _score(total: Total) -> str:
     return f"{total.score:.{min(max(1 - floor(log10(max(1 - total.score, 1e-9))), 3), 7)}f}"
 
 
+def _decided(total: Total) -> str:
+    if total.p_above is None:
+        return NONE
+    return "yes" if total.decided_above else "not decided"
+
+
 COST = "CPU ms/frame"
 MEMORY = "MiB"
 # Heading and cell of each column of the totals, as people read them.
@@ -99,7 +105,7 @@ COLUMNS: tuple[tuple[str, Callable[[Total], str]], ...] = (
     ("estimator", lambda total: named(total.estimator, total.claims)),
     ("score", _score),
     ("× first", _ratio),
-    ("decided", lambda total: NONE if total.p_above is None else "yes" if total.decided_above else "not decided"),
+    ("decided", _decided),
     ("failed", lambda total: f"{total.failed}/{total.trials}"),
     ("ATE %", lambda total: number(total.ate_percent)),
     ("mean place", lambda total: NONE if total.mean_place is None else f"{total.mean_place:.1f}"),
@@ -339,7 +345,10 @@ def _tex_rows(table: list[list[str]]) -> list[str]:
 
 def _tex_cell(shown: Shown, *, spans: bool) -> str:
     text = _tex(shown.text)
-    text = rf"\textbf{{{text}}}" if "*" in shown.mark else rf"\textit{{{text}}}" if shown.failed else text
+    if "*" in shown.mark:
+        text = rf"\textbf{{{text}}}"
+    elif shown.failed:
+        text = rf"\textit{{{text}}}"
     within = rf" {{\tiny {_tex(shown.range)}}}" if shown.range and (spans or shown.failed) else ""
     return text + (r"$^{\sim}$" if "~" in shown.mark else "") + within
 

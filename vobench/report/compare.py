@@ -76,8 +76,9 @@ def environment_differences(old: Board, new: Board) -> list[str]:
 
 def _ordered(cell: Cell) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Its trials as they are ordered: by loss, a failed one the worst."""
-    losses = zip(cell.losses, cell.failures, strict=True)
-    return np.array([np.inf if failed else 0.0 if isnan(loss) else loss for loss, failed in losses])
+    losses = [0.0 if isnan(loss) else loss for loss in cell.losses]
+    ordered = [np.inf if failed else loss for loss, failed in zip(losses, cell.failures, strict=True)]
+    return np.array(ordered)
 
 
 def _said(cell: Cell | None) -> str:
@@ -140,7 +141,8 @@ def _total(name: str, pairs: list[tuple[Cell, Cell]], at_most: float | None) -> 
     ratio = second.loss_ratio**sign
     interval = second.ratio_interval
     ends = sorted(exp(sign * log(end)) for end in interval) if interval else []
-    verdict = (WORSE if is_worse else BETTER) if second.decided_above else UNDECIDED
+    direction = WORSE if is_worse else BETTER
+    verdict = direction if second.decided_above else UNDECIDED
     if all((old.losses, old.failures) == (new.losses, new.failures) for old, new in pairs):
         verdict = SAME
     elif verdict == UNDECIDED and at_most and ratio > at_most:

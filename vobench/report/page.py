@@ -125,7 +125,8 @@ def _costs(rows: list[FrameRow]) -> dict[str, str]:
     found = dict[str, str]()
     for column in COST_COLUMNS[2:]:
         values = [value for row in rows if (value := getattr(row, column)) is not None]
-        found[column] = f"{(max if column == 'memory_mib' else fmean)(values):.3f}" if values else ""
+        summary = max if column == "memory_mib" else fmean
+        found[column] = f"{summary(values):.3f}" if values else ""
     return found
 
 

@@ -46,7 +46,8 @@ def _bands(axes: "Axes", found: Mapping[str, Realism]) -> None:
                 continue
             place = (value - statistic.low) / (statistic.high - statistic.low)
             shown = float(np.clip(place, -2, 3))
-            marker = "o" if -2 <= place <= 3 else "<" if place < 0 else ">"
+            outside = "<" if place < 0 else ">"
+            marker = "o" if -2 <= place <= 3 else outside
             at = row + 0.28 * (shift - (len(found) - 1) / 2)
             axes.plot([shown], [at], marker, color=colour, ms=6)
             axes.annotate(

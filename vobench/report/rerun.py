@@ -415,7 +415,9 @@ def _unit(trials: Rows[TrialView]) -> Unit:
     """How many of a unit a metre has, and its name: the one in which the largest error has few digits."""
     errors = np.concatenate([trial.error_m for trial in trials])
     largest_m = float(errors[np.isfinite(errors)].max(initial=0.0))
-    return (1e3, "mm") if largest_m < 0.1 else (1e2, "cm") if largest_m < 5 else (1.0, "m")
+    if largest_m < 0.1:
+        return (1e3, "mm")
+    return (1e2, "cm") if largest_m < 5 else (1.0, "m")
 
 
 def _log_error(log: _Log, trial: TrialView, of: bp.Entities, color: Color, unit: Unit) -> None:

@@ -108,4 +108,6 @@ def _difference(held: Any, anew: Any, place: str = "") -> str:
 def _brief(value: Any) -> str:
     if isinstance(value, dict | list):
         return f"{len(value)} entries"
-    return "none" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"{value:.9g}"
+    return "none" if value is None else str(value)

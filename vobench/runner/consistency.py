@@ -78,8 +78,11 @@ class Consistency(BaseModel):
     @property
     def sentence(self) -> str:
         """The verdict and what it rests on."""
-        too = "too much" if self.scale_gap > MOST_GAP else "too little" if self.scale_gap < 1 / MOST_GAP else ""
-        verdict = f"claims {too}" if too else "claims what it holds"
+        verdict = "claims what it holds"
+        if self.scale_gap > MOST_GAP:
+            verdict = "claims too much"
+        elif self.scale_gap < 1 / MOST_GAP:
+            verdict = "claims too little"
         return (
             f"{verdict}: errors are {self.scale_gap:.2g} x the deviations it states (median NEES "
             f"{self.nees_median:.3g}, {MEDIAN:.3g} by its law; the 90 % region holds {self.covered_90:.0%})"

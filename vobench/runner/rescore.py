@@ -189,7 +189,9 @@ def _difference(stated: Any, again: Any, place: str = "") -> str:
 def _brief(value: Any) -> str:
     if isinstance(value, dict | list):
         return f"{len(value)} entries"
-    return "nothing" if value is None else f"{value:.9g}" if isinstance(value, float) else repr(value)[:60]
+    if isinstance(value, float):
+        return f"{value:.9g}"
+    return "nothing" if value is None else repr(value)[:60]
 
 
 def wrong_truths(folder: RunFolder) -> dict[str, str]:

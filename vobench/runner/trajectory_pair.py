@@ -78,7 +78,9 @@ def read_pair(
     else:
         _require_same_frames(unstamped)
         stamped = [_numbered(read) for read in reads]
-        by_frame = None if not unstamped else BY_ROW if all(r.parsed.frames is None for r in reads) else BY_FRAME
+        if unstamped:
+            has_frames = any(read.parsed.frames is not None for read in reads)
+            by_frame = BY_FRAME if has_frames else BY_ROW
     notes = [note for read in reads for note in _notes(read)]
     return TrajectoryPair(_reading(stamped[0]), _reading(stamped[1]), tuple(notes), by_frame)
 

@@ -216,7 +216,10 @@ def image(t_ns: int, frame_id: str, encoded: bytes, form: str, colour: str = MON
 
     Others are named as ROS's compressed_image_transport names them: "rgb8; png compressed bgr8".
     """
-    named = form if colour == MONO else f"{colour}; {form} compressed {'bgr8' if colour == RGB else MONO}"
+    named = form
+    if colour != MONO:
+        packed_as = "bgr8" if colour == RGB else MONO
+        named = f"{colour}; {form} compressed {packed_as}"
     return message(LEFT_IMAGE, t_ns, frame_id, named, np.frombuffer(encoded, np.uint8))
 
 

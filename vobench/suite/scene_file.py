@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -178,7 +178,12 @@ def require_possible(name: str, source: YamlFile) -> None:
 
 
 def _names_in(tree: Any) -> Iterator[str]:
-    for value in tree.values() if isinstance(tree, dict) else tree if isinstance(tree, list) else ():
+    values: Iterable[Any] = ()
+    if isinstance(tree, dict):
+        values = tree.values()
+    elif isinstance(tree, list):
+        values = tree
+    for value in values:
         if isinstance(value, dict) and isinstance(value.get("name"), str):
             yield str(value["name"])
         yield from _names_in(value)

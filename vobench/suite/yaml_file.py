@@ -353,7 +353,12 @@ def _parse(path: Path) -> tuple[YamlFile, list[Mistake]]:
         raise SuiteError(Mistake(TOO_DEEP, (Place(str(path)),))) from None
     if not isinstance(source.marked, dict):
         tree = source.marked
-        kind = "empty" if tree is None else "a list" if isinstance(tree, list) else f"the single value {tree!r}"
+        if tree is None:
+            kind = "empty"
+        elif isinstance(tree, list):
+            kind = "a list"
+        else:
+            kind = f"the single value {tree!r}"
         raise SuiteError(Mistake(f"should be keys with values, but is {kind}", (source.place(()),)))
     return source, [*twice]
 
