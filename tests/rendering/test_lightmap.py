@@ -8,6 +8,7 @@ import trimesh
 
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
+from vobench.rendering import lightmap
 from vobench.rendering.geometry import Visibility
 from vobench.rendering.lightmap import Atlas, Layout, Texels, owners, texels, unwrap
 from vobench.scene.material import Material
@@ -176,3 +177,12 @@ def test_where_things_touch_neither_side_has_light_of_its_own():
     x, y, _ = points.points_m[name == "floor"].T
     assert not ((np.abs(x) < 0.09) & (np.abs(y) < 0.09)).any()
     assert ((np.abs(x - 0.5) < 0.09) & (np.abs(y) < 0.09)).sum() > 30
+
+
+def test_an_atlas_of_xatlas_is_never_destroyed():
+    """Its destructor may wait for ever."""
+    xatlas = pytest.importorskip("xatlas")
+    atlas = xatlas.Atlas()
+    before = sys.getrefcount(atlas)
+    lightmap._keep_for_ever(atlas)
+    assert sys.getrefcount(atlas) == before + 1

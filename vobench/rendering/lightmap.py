@@ -1,5 +1,6 @@
 """The light map: where each face's light is kept, and the texels it is computed at."""
 
+import ctypes
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -114,6 +115,7 @@ def _by_xatlas(px: Array, spacing_m: Array, parts: Sequence[Places]) -> tuple[Ar
     except ImportError:  # Python 3.14 has none yet
         return places, chart, 0, 0
     atlas = xatlas.Atlas()
+    _keep_for_ever(atlas)
     packing = xatlas.PackOptions()
     added = []
     count = 0
@@ -137,6 +139,16 @@ def _by_xatlas(px: Array, spacing_m: Array, parts: Sequence[Places]) -> tuple[Ar
         chart[part] = np.where(has_place, own + count, -1)
         count += own.max() + 1
     return places, chart, atlas.width, atlas.height
+
+
+def _keep_for_ever(atlas: object) -> None:
+    """Never destroy an atlas of xatlas, which may wait for ever when it is destroyed.
+
+    Its scheduler sets a flag and notifies its threads without holding their lock. A thread that has just looked at the
+    flag misses both, and the scheduler joins it in vain. Seen once, in a run of all tests. What is kept is the
+    memory of one unwrapped scene and its idle threads; a bake has a process of its own.
+    """
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(atlas))
 
 
 def _welded(corners_m: Array, *also: NDArray[np.int64]) -> tuple[Places, Places]:
