@@ -21,7 +21,7 @@ from pathlib import Path
 
 import pytest
 
-from vobench.estimator import isolation
+from vobench.estimator import isolation, sandbox
 from vobench.estimator.home import Home
 from vobench.estimator.isolation import FILES, NETWORK, PROCESSES, SHARED_MEMORY, SYSTEM_CALLS
 from vobench.estimator.manifest import Limits
@@ -648,3 +648,17 @@ def test_without_namespaces_the_record_says_what_can_be_seen():
         assert {PROCESSES, SHARED_MEMORY, NETWORK} <= set(saw.sees)
         assert saw.why
         assert (saw.level == "none") == (FILES in saw.sees)
+
+
+def test_a_program_is_the_first_on_path_that_an_estimator_may_read(tmp_path, monkeypatch):
+    shim = tmp_path / "shims" / "sh"
+    shim.parent.mkdir()
+    shim.write_text("#!/bin/sh\n")
+    shim.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{shim.parent}:/usr/bin:/bin")
+    assert sandbox.found("sh", None) in ("/usr/bin/sh", "/bin/sh")
+    assert sandbox.found("sh", shim.parent) == str(shim)  # its own folder
+    assert sandbox.found(str(shim), None) == str(shim)
+    monkeypatch.setenv("PATH", str(shim.parent))
+    assert sandbox.found("sh", None) == str(shim)
+    assert sandbox.is_out_of_reach("sh", None)

@@ -103,7 +103,7 @@ def plan(
     own = [] if folder is None else [str(folder.absolute())]
     return {
         "is_isolated": not is_switched_off() and sys.platform == "linux",
-        "program": found(argv[0]),
+        "program": found(argv[0], folder),
         "argv": list(argv),
         "file_bytes": limits.disk_mib * MEBIBYTE,
         "disk_bytes": limits.disk_mib * MEBIBYTE + DISK_ALLOWANCE_BYTES,
@@ -123,14 +123,22 @@ def _has_graphics() -> bool:
     return is_nvidia or any(os.path.exists(path) for path in isolation.GRAPHICS)
 
 
-def found(program: str) -> str:
-    """The path of a program, by PATH as a shell has it."""
-    return shutil.which(program) or program
+def found(program: str, folder: Path | None) -> str:
+    """The path of a program: the first on PATH that an estimator may read, else the first of all.
+
+    So `python3` is the system's where the shim of a version manager, in the user's home, comes before it.
+    """
+    if os.sep in program:
+        return program
+    places = os.environ.get("PATH", os.defpath).split(os.pathsep)
+    paths = [path for place in places if (path := shutil.which(program, path=place))]
+    readable = [path for path in paths if not _out_of_reach([path], folder)]
+    return next(iter([*readable, *paths]), program)
 
 
 def is_out_of_reach(program: str, folder: Path | None) -> bool:
     """Whether a program is there, but in no folder that an estimator may read."""
-    return bool(_out_of_reach([found(program)], folder))
+    return bool(_out_of_reach([found(program, folder)], folder))
 
 
 def hint_on_modules(folder: Path | None) -> str:
