@@ -10,6 +10,8 @@ import pytest
 
 from vobench import retired
 
+pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
+
 
 @pytest.mark.parametrize(("module", "name"), [(m, name) for m, names in retired.MOVED.items() for name in names])
 def test_every_name_that_moved_works_and_warns(module: str, name: str) -> None:

@@ -16,6 +16,8 @@ import pytest
 from vobench import stop
 from vobench.runner import motion
 
+pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
+
 SENTENCE = "vobench: stopped; finished stages are kept, the same command goes on from there"
 HANGING = """
 import os, time

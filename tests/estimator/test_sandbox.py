@@ -30,7 +30,7 @@ from vobench.estimator.sandbox import READ, SWITCH, Sandbox
 
 # ruff: noqa: E501 - one attack is one text
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")]
 
 RERUN = "VOBENCH_TEST_RERUN"
 LIMITS = Limits(start_s=30, trial_s=60)
@@ -638,6 +638,18 @@ def test_the_same_as_an_ordinary_user():
 def test_the_same_where_the_kernel_refuses(refused):
     folder = str(Path(isolation.__file__).parent)
     rerun([sys.executable, "-I", "-S", "-c", WITHOUT, folder, refused])
+
+
+@again
+@pytest.mark.parametrize("refused", ["", LANDLOCK], ids=["no namespaces", "neither namespaces nor landlock"])
+def test_an_estimator_of_the_house_is_found_and_runs_where_the_kernel_refuses(refused):
+    folder = str(Path(isolation.__file__).parent)
+    search = {"PYTHONPATH": ""}  # what finds vobench is its installation
+    tried = [sys.executable, "-m", "vobench", "try", "stand_still"]
+    argv = [sys.executable, "-I", "-S", "-c", WITHOUT, folder, refused, *tried]
+    done = subprocess.run(argv, env={**os.environ, **search}, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    assert "BROKEN" not in done.stdout
 
 
 def test_without_namespaces_the_record_says_what_can_be_seen():

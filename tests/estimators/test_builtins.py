@@ -23,6 +23,8 @@ from vobench.geometry.rig import (
 from vobench.motion.drive import drive
 from vobench.sensor.imu import IMUS, STREAMS, measure
 
+pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
+
 LENS = paper_lens(square_pixels=True)
 DOWN, AHEAD = stereo_rig(LENS, pitch_deg=90), stereo_rig(LENS, pitch_deg=10)
 LEGS = {"down": ((8, 0.5, 0.0), (8, 0.4, 1.2)), "ahead": ((8, 0.5, 0.0), (8, 0.4, 1.0))}

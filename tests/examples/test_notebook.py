@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
+
 NOTEBOOK = Path(__file__).parents[2] / "examples" / "notebook.ipynb"
 SCENE = """
 name: {name}

@@ -20,6 +20,8 @@ from vobench.runner.run import run_suite
 from vobench.runner.store import locked
 from vobench.runner.task import Task, plan
 
+pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
+
 
 def task(name: str, stage: str = "sequence", needs: tuple[str, ...] = ()) -> Task:
     return Task(stage, None, {"name": name}, needs)

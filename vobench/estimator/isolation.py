@@ -366,6 +366,7 @@ LANDLOCK_VERSION_ASKED = 1
 LANDLOCK_RULE_PATH_BENEATH = 1
 # linux/landlock.h: bits of access, of which each version knows more than the one before
 EXECUTE_READ_LIST = 0b1101
+LIST = 0b1000
 READ_WRITE = 0b110
 EXECUTE_READ = 0b101
 BITS_OF_VERSION = {1: 13, 2: 14, 3: 15, 4: 15}
@@ -397,6 +398,9 @@ def _restrict_files(plan: dict[str, object]) -> bool:
         return False
     devices = [*DEVICES, *GRAPHICS, *(f"/dev/{name}" for name in os.listdir("/dev") if GRAPHICS_PREFIX in name)]
     rules = [(path, EXECUTE_READ_LIST) for path in (*read, "/proc")]
+    # Python lists a folder to find a package in it: that in which vobench lies is not in `read` where it is a clone.
+    package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    rules.append((os.path.dirname(package), LIST))
     rules += [(path, READ_WRITE | IOCTL_BIT) for path in devices]
     rules += [(str(plan["home"]), every_access), ("/dev/shm", every_access)]
     for path, access in rules:
