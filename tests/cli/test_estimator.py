@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
+
 
 @pytest.mark.parametrize("words", [(), ("--command",)], ids=["class", "command"])
 def test_from_new_to_a_row_of_the_board_in_three_commands(vobench, here, words):

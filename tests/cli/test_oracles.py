@@ -11,9 +11,12 @@ from vobench.estimator import isolation
 from vobench.estimator.program import sandbox_here
 from vobench.runner.folder import ONLY_THEIR_OWN, open_run, visible_to
 
-pytestmark = pytest.mark.skipif(
-    isolation.FILES in sandbox_here().sees, reason="this machine cannot keep files from an estimator, and says so"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        isolation.FILES in sandbox_here().sees, reason="this machine cannot keep files from an estimator, and says so"
+    ),
+]
 
 MANIFEST = """name: {name}
 version: "1"

@@ -7,6 +7,8 @@ import pytest
 from vobench.report.contract import Verdict, assert_contract, contract, foreign_imports
 from vobench.suite.catalog import builtin_root
 
+pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
+
 # ruff: noqa: E501 - one way to break it is one line
 
 HEAD = """
