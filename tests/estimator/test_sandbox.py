@@ -587,7 +587,7 @@ def rerun(before, *, python=sys.executable, environment=None):
     """Run this file again, started in another way."""
     with tempfile.TemporaryDirectory(prefix="vobench-test-", dir="/tmp", ignore_cleanup_errors=True) as temporary:
         Path(temporary).chmod(0o777)
-        options = ["-n", "0", "-q", "-x", "-p", "no:cacheprovider", "--basetemp", f"{temporary}/tests"]
+        options = ["-n", "0", "-q", "-x", "-m", "slow", "-p", "no:cacheprovider", "--basetemp", f"{temporary}/tests"]
         argv = [*before, python, "-m", "pytest", *options, __file__]
         variables = {
             **os.environ,
