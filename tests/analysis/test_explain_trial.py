@@ -6,6 +6,8 @@ from tests.analysis.conftest import NoisyRun
 from vobench.analysis.explain_trial import explain_trial
 from vobench.errors import InputError, UnknownNameError
 
+pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
+
 
 @pytest.mark.usefixtures("cheap_pictures")
 def test_noise_is_named_and_mends_the_trial(noisy_run: NoisyRun) -> None:

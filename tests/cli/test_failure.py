@@ -7,6 +7,8 @@ import pytest
 
 from tests.cli.conftest import Said
 
+pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
+
 BLIND = '''
 import numpy as np
 from vobench.estimator import Result, Status

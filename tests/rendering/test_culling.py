@@ -25,6 +25,8 @@ from vobench.scene.scene import Scene
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
 
+pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
+
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 MATERIALS: list[Material] = [Material(texture=Procedural("plain", 0.5, 0, 1, 8, 0)), Material("pane", eta=1.5)]
 BOXES = [(0, 180, 0, 120), (0, 180, 40, 48), (60, 120, 20, 50)]

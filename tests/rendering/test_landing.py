@@ -19,6 +19,8 @@ from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose
 from vobench.sequence import Sequence, SequenceWriter, read_truth
 
+pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
+
 POSES = ((0.0, 0.0, 17.0), (0.31, -0.47, 71.0), (-1.1, 0.83, 200.0), (0.5, 0.5, -40.0))  # x, y in m, heading in deg
 EYES = ("left", "right")
 every_lens = pytest.mark.parametrize("lens", LENSES.values(), ids=list(LENSES))
