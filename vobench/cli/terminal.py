@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar
 
 import typer
 
-from vobench.errors import UnknownNameError, printable, unknown
+from vobench.errors import printable, require_known
 from vobench.runner.progress import RunProgress
 
 if TYPE_CHECKING:
@@ -50,8 +50,7 @@ LEFT_ALIGNED = {
 
 def known(kind: str, name: str, names: Iterable[str]) -> str:
     """The name, where it is known. Raises UnknownNameError where it is not."""
-    if name not in names:
-        raise UnknownNameError(unknown(kind, name, list(names)))
+    require_known(kind, name, names)
     return name
 
 
