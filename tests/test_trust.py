@@ -1,4 +1,4 @@
-"""Makers are programs: on the command line strange ones run once they are trusted, and all are named."""
+"""Without a sandbox strange makers run once they are trusted; on the command line all are named."""
 
 from pathlib import Path
 
@@ -15,13 +15,13 @@ def asked(tmp_path, monkeypatch):
     (tmp_path / "mine").mkdir()
     monkeypatch.chdir(tmp_path / "mine")
 
-    def ask(maker: Path, source: bytes = b"code", *, trusts_new: bool = False) -> list[str]:
+    def ask(maker: Path, *sources: bytes, trusts_new: bool = False, is_contained: bool = False) -> list[str]:
         told = []
         with trust.gate(told.append, ours=lambda: (builtin_root(), Path.cwd()), folder=lambda: tmp_path / "trusted"):
             if trusts_new:
                 trust.trust_new()
             for _ in range(2):
-                trust.admit(maker, source, "hall")
+                trust.admit(maker, sources or (b"code",), "hall", is_contained=is_contained)
         return told
 
     return ask
@@ -40,6 +40,14 @@ def test_a_strange_one_is_refused_until_it_is_trusted_and_again_when_it_changes(
     assert asked(maker) == [f"scene hall runs the program {maker}"]
     with pytest.raises(SuiteError, match="--trust"):
         asked(maker, b"other code")
+    with pytest.raises(SuiteError, match="--trust"):
+        asked(maker, b"co", b"de")  # two files that are one in a row
+
+
+def test_one_in_a_sandbox_needs_no_trust_and_is_named_all_the_same(asked, tmp_path):
+    maker = tmp_path / "strangers" / "maker.py"
+    assert asked(maker, is_contained=True) == [f"scene hall runs the program {maker}"]
+    assert not (tmp_path / "trusted").exists()
 
 
 def test_a_link_in_the_working_folder_does_not_make_a_strange_one_ours(asked, tmp_path):
@@ -52,4 +60,4 @@ def test_a_link_in_the_working_folder_does_not_make_a_strange_one_ours(asked, tm
 
 
 def test_from_python_nobody_is_asked(tmp_path):
-    trust.admit(tmp_path / "maker.py", b"code", "hall")
+    trust.admit(tmp_path / "maker.py", [b"code"], "hall", is_contained=False)

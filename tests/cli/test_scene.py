@@ -4,6 +4,8 @@ import cv2
 import pytest
 import trimesh
 
+from vobench.estimator import isolation
+from vobench.estimator.program import sandbox_here
 from vobench.suite import scene_build
 
 
@@ -55,17 +57,36 @@ from vobench.asset.room import things
 def make(seed):
     return (), {{}}
 """
+VERBS = ("check", "scene", "render", "drive", "run")
 
 
-@pytest.mark.parametrize("verb", ["check", "scene", "render", "drive", "run"])
-def test_a_strangers_maker_does_not_run_before_it_is_trusted(vobench, here, tmp_path_factory, verb):
-    strange = tmp_path_factory.mktemp("strange")
-    ran = strange / "ran"
-    (strange / "maker.py").write_text(MAKER.format(ran=str(ran)))
-    (strange / "theirs.yaml").write_text((here / "scenes" / "closet.yaml").read_text() + "maker: maker.py\n")
-    suite = (here / "suites" / "tiny.yaml").read_text().replace("[closet]", f"['{strange}/theirs.yaml']")
+@pytest.fixture
+def strange(here, tmp_path_factory):
+    """A stranger's folder with the scene `theirs`, whose maker leaves a file `ran`, and a suite of it in ours."""
+    folder = tmp_path_factory.mktemp("strange")
+    (folder / "maker.py").write_text(MAKER.format(ran=str(folder / "ran")))
+    (folder / "theirs.yaml").write_text((here / "scenes" / "closet.yaml").read_text() + "maker: maker.py\n")
+    suite = (here / "suites" / "tiny.yaml").read_text().replace("[closet]", f"['{folder}/theirs.yaml']")
     (here / "suites" / "theirs.yaml").write_text(suite)
-    asked = f"{strange}/theirs.yaml" if verb in ("scene", "render") else "theirs"
+    return folder
+
+
+@pytest.fixture
+def no_sandbox(monkeypatch):
+    monkeypatch.setenv("VOBENCH_SANDBOX", "off")
+    sandbox_here.cache_clear()
+    yield
+    sandbox_here.cache_clear()
+
+
+def _asked(verb, strange):
+    return f"{strange}/theirs.yaml" if verb in ("scene", "render") else "theirs"
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_without_a_sandbox_a_strangers_maker_does_not_run_before_it_is_trusted(vobench, strange, no_sandbox, verb):
+    ran = strange / "ran"
+    asked = _asked(verb, strange)
     said = vobench(verb, asked)
     assert said.code == (0 if verb == "drive" else 1)  # which goes on, and says what cameras cannot be checked
     assert "--trust" in said.err + said.out
@@ -77,3 +98,13 @@ def test_a_strangers_maker_does_not_run_before_it_is_trusted(vobench, here, tmp_
     scene_build._scenes.clear()  # what this process has built it does not build again
     vobench(verb, asked)
     assert ran.exists() or verb == "run"  # what is cached needs no maker
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_in_the_sandbox_a_strangers_maker_leaves_nothing_and_is_named(vobench, strange, verb):
+    if isolation.FILES in sandbox_here().sees:
+        pytest.skip("this machine has no sandbox")
+    said = vobench(verb, _asked(verb, strange))
+    assert not (strange / "ran").exists()
+    assert said.err.count(f"runs the program {strange}/maker.py") == 1
+    assert "Read-only file system" in said.err + said.out or "Permission denied" in said.err + said.out

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
+from importlib import import_module
 from pathlib import Path
-from runpy import run_path
 from typing import TypeVar
 
 import numpy as np
@@ -24,9 +24,9 @@ from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Su
 from vobench.scene.material import LUMINANCE, Material, emitted_cd_m2
 from vobench.scene.mesh import Thing, areas_m2
 from vobench.scene.scene import Scene
+from vobench.suite.maker_message import MakerScene
 from vobench.suite.scene_file import SKY, SUN, Lighting, content, lit, materials_used
 from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile, SunSpec, hue
-from vobench.trust import admit
 
 
 def build(spec: SceneFile, lighting: Lighting) -> Scene:
@@ -132,20 +132,12 @@ def _boxes(spec: SceneFile, of: Callable[[str], Material]) -> Iterator[Instance]
 
 
 def _from_maker(spec: SceneFile) -> Iterator[Contents]:
-    """What `make(seed)` of the scene's Python file returns: things, their materials by name, and lights if it likes."""
-    if spec.maker is None:
-        return
-    with _sentence(spec.maker):
-        admit(Path(spec.maker), Path(spec.maker).read_bytes(), spec.name)
-        # Never from bytecode: that of a file edited twice within a second would be the first one's.
-        make = run_path(spec.maker).get("make")
-        if make is None:
-            raise SuiteError(f"{spec.maker} has no function make(seed)")
-        found, materials, *lights = make(spec.seed)
-        missing = {thing.material for thing in found} - materials.keys()
-        if missing:
-            raise SuiteError(f"make() returns things without materials: {', '.join(sorted(missing))}")
-    yield Contents(tuple(found), materials, *map(tuple, lights))
+    """What the scene's maker returns."""
+    if spec.maker is not None:
+        # By its name, so that a change of the sandbox does not change the keys of scenes.
+        maker = import_module("vobench.suite.maker")
+        made: MakerScene = maker.made_by(Path(spec.maker), seed=spec.seed, scene=spec.name)
+        yield Contents(made.things, made.materials, made.lights)
 
 
 @contextmanager

@@ -1,0 +1,131 @@
+"""The maker of a scene runs in a sandbox, hands back what it made, and harms nobody whatever it does."""
+
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from vobench.errors import SuiteError
+from vobench.estimator import isolation
+from vobench.estimator.manifest import Limits
+from vobench.estimator.program import sandbox_here
+from vobench.suite import maker
+from vobench.suite.catalog import builtin_root
+from vobench.suite.maker import made_by
+from vobench.suite.maker_message import encode
+
+needs_a_sandbox = pytest.mark.skipif(
+    sys.platform != "linux" or isolation.FILES in sandbox_here().sees, reason="this machine has no sandbox"
+)
+HEAD = """
+import os, signal, socket
+from pathlib import Path
+from vobench.plugin import Material, Thing, quad
+
+WALL = quad((0, 0, 0), (1, 0, 0), (0, 1, 0))
+
+def wall(colour):
+    return [Thing("wall", WALL, "paint")], {"paint": Material(colour=colour)}
+"""
+
+
+@pytest.fixture
+def make(tmp_path):
+    """Runs a maker whose `make(seed)` has these lines."""
+
+    def run(body: str, *, seed: int = 0):
+        path = tmp_path / "strangers" / "maker.py"
+        path.parent.mkdir(exist_ok=True)
+        lines = "".join(f"    {line}\n" for line in body.splitlines())
+        path.write_text(f"{HEAD}\ndef make(seed):\n{lines}")
+        return made_by(path, seed=seed, scene="theirs")
+
+    return run
+
+
+def test_it_gets_the_seed_and_its_scene_arrives(make) -> None:
+    made = make("return wall((0.1 * seed, 0.0, 0.0))", seed=3)
+    assert made.materials["paint"].colour == (pytest.approx(0.3), 0, 0)
+    assert [thing.name for thing in made.things] == ["wall"]
+
+
+@pytest.mark.slow
+def test_one_of_ours_makes_the_same_in_the_sandbox(monkeypatch) -> None:
+    ramp = builtin_root() / "scenes" / "ramp" / "maker.py"
+    in_this_process = encode(made_by(ramp, seed=2, scene="ramp"))
+    monkeypatch.setattr(maker, "builtin_root", lambda: Path("/nowhere"))
+    assert encode(made_by(ramp, seed=2, scene="ramp")) == in_this_process
+
+
+def test_it_may_read_the_files_beside_it(make, tmp_path) -> None:
+    (tmp_path / "strangers").mkdir()
+    (tmp_path / "strangers" / "red.txt").write_text("0.75")
+    made = make('return wall((float(Path(__file__).with_name("red.txt").read_text()), 0.0, 0.0))')
+    assert made.materials["paint"].colour[0] == 0.75
+
+
+@needs_a_sandbox
+def test_it_reads_no_other_file_of_the_users(make, tmp_path) -> None:
+    secret = tmp_path / "secret.txt"
+    secret.write_text("0.75")
+    with pytest.raises(SuiteError, match=r"No such file or directory|Permission denied"):
+        make(f"return wall((float(Path({str(secret)!r}).read_text()), 0.0, 0.0))")
+
+
+@needs_a_sandbox
+def test_it_writes_nowhere_that_stays(make, tmp_path) -> None:
+    for place in (tmp_path / "left", tmp_path / "strangers" / "left", Path.home() / "vobench_maker_left"):
+        with suppress(SuiteError):  # where it does not write into a folder that ends with it
+            make(f"Path({str(place)!r}).write_text('x')\nreturn wall((0.5, 0.5, 0.5))")
+        assert not place.exists()
+
+
+@needs_a_sandbox
+@pytest.mark.skipif(
+    isolation.NETWORK in sandbox_here().sees, reason="this machine cannot keep programs off the network"
+)
+def test_it_has_no_network(make) -> None:
+    with pytest.raises(SuiteError, match=r"OSError.*unreachable"):
+        make("socket.create_connection(('192.0.2.1', 80), timeout=1)\nreturn wall((0.5, 0.5, 0.5))")
+
+
+def test_what_it_prints_does_not_reach_our_output(make, capfd) -> None:
+    make("print('hello')\nreturn wall((0.5, 0.5, 0.5))")
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        ("return 1 / 0", r"maker\.py: ZeroDivisionError: division by zero"),
+        ("import no_such_module", r"maker\.py: ModuleNotFoundError: No module named 'no_such_module'"),
+        ("os._exit(0)", "ended without handing back a scene"),
+        ("os._exit(3)", "the process ended with exit code 3"),
+        ("os.kill(os.getpid(), signal.SIGSEGV)", "SIGSEGV"),
+        ("raise ValueError('a\\x1b[31m\\nb')", r"ValueError: a.?\[31m b$"),
+        ("Path('scene.bin').write_bytes(b'junk')\nos._exit(0)", "what the maker handed back cannot be read"),
+        ("Path('scene.bin').symlink_to('/etc/passwd')\nos._exit(0)", "ended without handing back a scene"),
+        ("Path('error.txt').write_text('all is lost')\nos._exit(0)", "all is lost"),
+        ("return None", "should return things, materials by name and, optionally, lights"),
+    ],
+)
+def test_whatever_goes_wrong_is_one_line_that_names_the_maker(make, body, sentence) -> None:
+    with pytest.raises(SuiteError, match=sentence) as raised:
+        make(body)
+    assert "maker.py: " in str(raised.value)
+    assert "\n" not in str(raised.value)
+    assert "\x1b" not in str(raised.value)
+
+
+def test_one_that_does_not_end_is_ended(make, monkeypatch) -> None:
+    monkeypatch.setattr(maker, "LIMITS", Limits(trial_s=3.0))
+    with pytest.raises(SuiteError, match=r"maker\.py: took more than 3 s"):
+        make("while True: pass")
+
+
+def test_a_file_without_make_is_named(tmp_path) -> None:
+    path = tmp_path / "maker.py"
+    path.write_text("x = 1\n")
+    with pytest.raises(SuiteError, match=r"has no function make\(seed\)"):
+        made_by(path, seed=0, scene="theirs")

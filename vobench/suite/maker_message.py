@@ -1,0 +1,277 @@
+"""What the maker of a scene hands back, as bytes: things, materials and lights, without anything that runs.
+
+A maker runs in a process of its own. Whatever that process writes is data from a stranger: it names one of the classes
+of `CLASSES`, and each field is checked against the class's own types before an object is made of it.
+
+The bytes are the length of a JSON header, the header, and the arrays that the header names by offset.
+"""
+
+import json
+import math
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache, partial
+from typing import Annotated, Any, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, create_model
+
+from vobench.asset.texture import Procedural
+from vobench.errors import SuiteError, VobenchError
+from vobench.scene.light import (
+    AreaLight,
+    Dimmer,
+    Flicker,
+    Level,
+    Light,
+    PointLight,
+    Scaled,
+    Sky,
+    SpotLight,
+    Steady,
+    Sun,
+    Switched,
+)
+from vobench.scene.material import Material, Picture, Texture
+from vobench.scene.mesh import Mesh, Thing
+
+LIGHTS = (AreaLight, PointLight, SpotLight, Sun, Sky)
+LEVELS = (Steady, Flicker, Dimmer, Switched, Scaled)
+TEXTURES = (Picture, Procedural)
+CLASSES: dict[str, type] = {each.__name__: each for each in (Mesh, Thing, Material, *LIGHTS, *LEVELS, *TEXTURES)}
+DTYPES = ("float64", "float32", "int64", "int32", "uint8", "bool")
+OBJECT = "object"
+ARRAY = "array"
+LENGTH = struct.Struct("<Q")  # of the header
+ALIGNMENT = 16  # of the beginning of an array
+
+
+@dataclass(frozen=True, slots=True)
+class MakerScene:
+    """What `make(seed)` returned."""
+
+    things: tuple[Thing, ...]
+    materials: Mapping[str, Material]
+    lights: tuple[Light, ...] = ()
+
+
+def checked(returned: Any) -> MakerScene:
+    """What `make(seed)` returned: things, their materials by name and, if it likes, lights. Raises SuiteError."""
+    if not isinstance(returned, Sequence) or len(returned) not in (2, 3):
+        raise SuiteError("make() should return things, materials by name and, optionally, lights")
+    things, materials, *rest = returned
+    lights = rest[0] if rest else ()
+    _require_all("thing", things, (Thing,))
+    _require_all("light", lights, LIGHTS)
+    if not isinstance(materials, Mapping):
+        raise SuiteError(f"make() should return materials by name, not {type(materials).__name__}")
+    _require_all("material", materials.values(), (Material,))
+
+    missing = {thing.material for thing in things} - materials.keys()
+    if missing:
+        raise SuiteError(f"make() returns things without materials: {', '.join(sorted(map(str, missing)))}")
+    for thing in things:
+        _require_sound(thing)
+    return MakerScene(tuple(things), dict(materials), tuple(lights))
+
+
+def _require_all(noun: str, objects: Any, classes: tuple[type, ...]) -> None:
+    """Raise SuiteError where something returned is of another class."""
+    try:
+        strange = [each for each in objects if not isinstance(each, classes)]
+    except TypeError:
+        raise SuiteError(f"make() should return a list of {noun}s, not {type(objects).__name__}") from None
+    if strange:
+        names = " or ".join(each.__name__ for each in classes)
+        raise SuiteError(f"make() returns a {noun} that is no {names}: {type(strange[0]).__name__}")
+
+
+def _require_sound(thing: Thing) -> None:
+    """Raise SuiteError where a mesh's arrays do not fit together, or where a number is not finite."""
+    mesh = thing.mesh
+    vertices = len(mesh.vertices_m)
+    shapes: dict[str, tuple[NDArray[Any], tuple[int, int]]] = {
+        "vertices_m": (mesh.vertices_m, (vertices, 3)),
+        "uv": (mesh.uv, (vertices, 2)),
+        "normals": (mesh.normals, (vertices, 3)),
+        "faces": (mesh.faces, (len(mesh.faces), 3)),
+    }
+    for name, (array, shape) in shapes.items():
+        if array.shape != shape:
+            raise SuiteError(f"thing '{thing.name}': mesh.{name} has shape {array.shape}, where {shape} is right")
+        if not np.isfinite(array).all():
+            raise SuiteError(f"thing '{thing.name}': mesh.{name} has a number that is not finite")
+    if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < vertices:
+        raise SuiteError(f"thing '{thing.name}': mesh.faces names a vertex that is not there")
+
+
+# Writing
+
+
+class _Writer:
+    """Objects in the order in which they can be made again; one that is used twice stands there once."""
+
+    def __init__(self) -> None:
+        self.objects: list[dict[str, Any]] = []
+        self.arrays: list[bytes] = []
+        self._offset = 0
+        self._places: dict[int, int] = {}
+        self._alive: list[Any] = []  # so that no id is given to another object meanwhile
+
+    def value(self, value: Any) -> Any:
+        """The JSON form of a field's value."""
+        if isinstance(value, np.ndarray):
+            return {ARRAY: self._array(value)}
+        if isinstance(value, np.generic):
+            return value.item()
+        if isinstance(value, list | tuple):
+            return [self.value(each) for each in value]
+        if value is None or isinstance(value, str | int | float | bool):
+            return value
+        return {OBJECT: self.place(value)}
+
+    def place(self, thing: Any) -> int:
+        """The place of an object in the list; it is added if it is new."""
+        if id(thing) in self._places:
+            return self._places[id(thing)]
+        kind = type(thing)
+        if CLASSES.get(kind.__name__) is kind and is_dataclass(thing):
+            entry = {field.name: self.value(getattr(thing, field.name)) for field in fields(thing)}
+        elif callable(getattr(thing, "pixels", None)):  # a texture of the maker's own: its picture is what counts
+            kind = Picture
+            entry = {"values": self.value(np.asarray(thing.pixels())), "tile_m": self.value(thing.tile_m)}
+        else:
+            known = ", ".join(CLASSES)
+            raise SuiteError(f"make() returns something of class {kind.__name__}, which is none of {known}")
+        self.objects.append({"class": kind.__name__, "fields": entry})
+        self._alive.append(thing)
+        self._places[id(thing)] = len(self.objects) - 1
+        return self._places[id(thing)]
+
+    def _array(self, array: Any) -> dict[str, Any]:
+        """Dtype, shape and offset of an array, which is added to the arrays."""
+        name = array.dtype.name
+        if name not in DTYPES:
+            raise SuiteError(f"make() returns an array of {name}, which is none of {', '.join(DTYPES)}")
+        content = np.ascontiguousarray(array).tobytes()
+        offset = self._offset
+        padding = b"\0" * (-len(content) % ALIGNMENT)
+        self.arrays += [content, padding]
+        self._offset += len(content) + len(padding)
+        return {"dtype": name, "shape": list(array.shape), "offset": offset}
+
+
+def encode(scene: MakerScene) -> bytes:
+    """The bytes of a maker's scene. Raises SuiteError where it has a class that is not in `CLASSES`."""
+    writer = _Writer()
+    header = {
+        "things": [writer.place(thing) for thing in scene.things],
+        "materials": {str(name): writer.place(material) for name, material in scene.materials.items()},
+        "lights": [writer.place(light) for light in scene.lights],
+        "objects": writer.objects,
+    }
+    text = json.dumps(header).encode("utf-8")
+    text += b" " * (-(LENGTH.size + len(text)) % ALIGNMENT)
+    return b"".join([LENGTH.pack(len(text)), text, *writer.arrays])
+
+
+# Reading
+
+
+def decode(content: bytes) -> MakerScene:
+    """A maker's scene from bytes that a stranger may have written. Raises SuiteError."""
+    try:
+        (length,) = LENGTH.unpack_from(content)
+        first = LENGTH.size + length
+        header = json.loads(content[LENGTH.size : first])
+        arrays = memoryview(content)[first:]
+        objects: list[Any] = []
+        for entry in header["objects"]:
+            objects.append(_object(entry, objects, arrays))
+        materials = {name: objects[place] for name, place in header["materials"].items()}
+        things = [objects[place] for place in header["things"]]
+        lights = [objects[place] for place in header["lights"]]
+    except ValidationError as error:
+        mistake = error.errors()[0]
+        place = ".".join(map(str, mistake["loc"]))
+        raise SuiteError(f"make() returns a {error.title} with a wrong {place}: {mistake['msg']}") from None
+    except VobenchError:
+        raise
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError, struct.error) as error:
+        raise SuiteError(f"what the maker handed back cannot be read ({type(error).__name__}: {error})") from None
+    return checked((things, materials, lights))
+
+
+def _object(entry: Any, earlier: Sequence[Any], arrays: memoryview) -> Any:
+    """The object of an entry, whose own objects are among the earlier ones."""
+    name = entry["class"]
+    values = {key: _value(value, earlier, arrays) for key, value in entry["fields"].items()}
+    fields_read = _reader(name).model_validate(values)
+    made = CLASSES[name](**{key: getattr(fields_read, key) for key in values})
+    if isinstance(made, Picture):
+        _require_picture(made)
+    return made
+
+
+def _require_class(value: Any, *, classes: tuple[type, ...]) -> Any:
+    """The value, if it is of one of these classes. Raises ValueError."""
+    if not isinstance(value, classes):
+        names = " or ".join(each.__name__ for each in classes)
+        raise ValueError(f"it should be of class {names}, not {type(value).__name__}")
+    return value
+
+
+def _instance_of(*classes: type) -> Any:
+    """The type of a field that holds an object, which was checked when it was made."""
+    return Annotated[Any, AfterValidator(partial(_require_class, classes=classes))]
+
+
+_OF_FIELDS: dict[Any, Any] = {
+    Mesh: _instance_of(Mesh),
+    Level: _instance_of(*LEVELS),
+    Texture | None: _instance_of(*TEXTURES, type(None)),
+}
+
+
+@cache
+def _reader(name: str) -> type[BaseModel]:
+    """Checks the fields of a class of `CLASSES`; an array by its class alone."""
+    known = CLASSES[name]
+    hints = get_type_hints(known, include_extras=True)
+    types = {field.name: _OF_FIELDS.get(hints[field.name], hints[field.name]) for field in fields(known)}
+    config = ConfigDict(arbitrary_types_allowed=True, extra="forbid")
+    required: dict[str, Any] = {key: (kind, ...) for key, kind in types.items()}
+    return create_model(name, __config__=config, **required)
+
+
+def _value(value: Any, earlier: Sequence[Any], arrays: memoryview) -> Any:
+    if isinstance(value, list):
+        return tuple(_value(each, earlier, arrays) for each in value)
+    if not isinstance(value, dict):
+        return value
+    if OBJECT in value:
+        return earlier[value[OBJECT]]
+    return _array(value[ARRAY], arrays)
+
+
+def _array(entry: Any, arrays: memoryview) -> Any:
+    """An array as the header describes it; it cannot be written to."""
+    name = entry["dtype"]
+    shape = [int(length) for length in entry["shape"]]
+    offset = int(entry["offset"])
+    if name not in DTYPES or min([offset, *shape]) < 0:
+        raise ValueError(f"an array of {name}, shape {shape}")
+    return np.frombuffer(arrays, name, math.prod(shape), offset).reshape(shape)
+
+
+def _require_picture(texture: Picture) -> None:
+    shape = texture.values.shape
+    is_grey = len(shape) == 2
+    is_colour = len(shape) == 3 and shape[2] in (3, 4) and texture.values.dtype == np.uint8
+    if not (is_grey or is_colour) or 0 in shape:
+        kind = texture.values.dtype.name
+        raise SuiteError(
+            f"make() returns a picture of shape {shape} and {kind}: (H, W) or uint8 (H, W, 3 or 4) is right"
+        )
