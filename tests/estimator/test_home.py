@@ -12,8 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from vobench import temporary as temporary_folders
 from vobench.estimator import home as home_file
-from vobench.estimator.home import Home, UnreadableFileError, held_bytes, read_below, remove_below
+from vobench.estimator.home import Home, UnreadableFileError, held_bytes, read_below
+from vobench.temporary import BASE, remove_below
 
 
 @pytest.fixture
@@ -22,7 +24,7 @@ def temporary(tmp_path, monkeypatch):
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(folder))
-    home_file._sweep_once.cache_clear()
+    temporary_folders._sweep_once.cache_clear()
     return folder
 
 
@@ -264,7 +266,7 @@ def test_what_cannot_be_removed_is_noted_in_the_log(temporary, tmp_path, monkeyp
 
 def test_a_folder_that_somebody_else_has_laid_out_is_not_used(temporary, tmp_path):
     (tmp_path / "trap").mkdir()
-    (temporary / f"{home_file.BASE}-{os.getuid()}").symlink_to(tmp_path / "trap")
+    (temporary / f"{BASE}-{os.getuid()}").symlink_to(tmp_path / "trap")
     with Home(tmp_path / "log") as home:
         assert home.path.is_relative_to(temporary)
         assert list((tmp_path / "trap").iterdir()) == []
@@ -285,11 +287,11 @@ os.kill(os.getpid(), signal.SIGKILL)
 def test_what_a_killed_vobench_has_left_is_swept_by_the_next_and_what_is_in_use_is_not(temporary, tmp_path):
     killed = subprocess.run([sys.executable, "-c", KILLED, str(temporary)], check=False)
     assert killed.returncode == -signal.SIGKILL
-    base = temporary / f"{home_file.BASE}-{os.getuid()}"
+    base = temporary / f"{BASE}-{os.getuid()}"
     (left,) = base.iterdir()
     with Home(tmp_path / "log") as first:
         assert not left.exists()
-        home_file._sweep_once.cache_clear()
+        temporary_folders._sweep_once.cache_clear()
         with Home(tmp_path / "log"):
             assert first.path.is_dir()
     assert list(temporary.iterdir()) == []

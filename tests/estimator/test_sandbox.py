@@ -162,7 +162,7 @@ static void attack(void) { char *at = shmat(atoi(T("segment")), 0, SHM_RDONLY); 
   if (syscall(SYS_keyctl, 11, atoi(T("key")), text, 99) > 0) puts(text); }""", works_bare=False),
     "watches the folder of temporary files": Attack(FILES, "python", """
 watch = libc.inotify_init1(os.O_NONBLOCK)
-for place in (T['temporary'], T['runs'], T['temporary'] + '/vobench-homes-%d' % os.getuid()):
+for place in (T['temporary'], T['runs'], T['temporary'] + '/vobench-%d' % os.getuid()):
     if libc.inotify_add_watch(watch, place.encode(), 0xFFF) >= 0 and os.listdir(place): print(os.listdir(place))
 if os.path.exists(T['runs']): print(T['half'] + T['other_half'])
 """),
