@@ -116,7 +116,7 @@ def test_a_layout_that_reads_back_as_something_else_is_refused_from_outside_too(
     install("LAYOUT")
     site = tmp_path / "site" / "lent_layout.py"
     site.write_text(LENT.replace("lens=lens", "lens=lens + 1e-5"))
-    with pytest.raises(SequenceError, match="the npz folder, read back, does not say what was exported"):
+    with pytest.raises(SequenceError, match="the npz folder, read back, differs from what was exported"):
         export(make_sequence().folder, tmp_path / "out", "npz")
 
 
@@ -128,7 +128,9 @@ def test_what_two_layouts_take_for_theirs_is_for_the_user_to_say_whatever_was_in
     for order in (("LAYOUT", "TWIN"), ("TWIN", "LAYOUT")):
         install(*order)
         assert list(layouts())[-2:] == ["npz", "npz2"]
-        with pytest.raises(InputError, match=r"^both npz and npz2 by what is in it; say the form that is meant: ") as e:
+        with pytest.raises(
+            InputError, match=r"^the content fits more than one form, npz and npz2; name the one to use: "
+        ) as e:
             sniff(tmp_path)
         said.add(str(e.value))
     assert len(said) == 1

@@ -35,7 +35,7 @@ def test_the_colour_pair_sits_beside_the_grey_one_that_the_truth_is_of(scene, tm
     recording = read(scene.kitti(tmp_path, pair=("image_2", "image_3"), colour=True))
     assert recording.rig.T_body_left[1, 3] == pytest.approx(0.06)
     assert recording.rig.baseline_m == pytest.approx(0.54)
-    assert any("turned grey" in note for note in recording.notes)
+    assert any("converted to grey" in note for note in recording.notes)
     for frame, left in zip(recording.frames(), scene.left, strict=True):
         assert np.array_equal(frame.left, left)  # three equal channels come to themselves
 

@@ -58,7 +58,7 @@ def test_a_folder_of_something_else_says_what_it_has(tmp_path):
         (tmp_path / name).mkdir()
     with pytest.raises(
         VobenchError,
-        match=r"none of the forms that are read \(.*a sequence of vobench.*\)\. It has notes\.txt, photos: ",
+        match=r"none of the forms that are read \(.*a sequence of vobench.*\)\. The folder has notes\.txt, photos: ",
     ):
         sniff(tmp_path)
 
@@ -75,7 +75,7 @@ def test_nothing_at_all(tmp_path):
     with pytest.raises(VobenchError, match="no file or folder at"):
         sniff(tmp_path / "gone")
     (tmp_path / "empty").touch()
-    with pytest.raises(VobenchError, match="for it is empty"):
+    with pytest.raises(VobenchError, match=r"\(MCAP, ROS bag or SQLite\): it is empty"):
         sniff(tmp_path / "empty")
 
 
@@ -85,7 +85,7 @@ def test_an_mcap_file_of_another_kind_is_told_what_is_read(tmp_path, profile, sa
         writer = McapWriter(stream)
         writer.start(profile=profile, library="somebody")
         writer.finish()
-    with pytest.raises(VobenchError, match=f"{said}.*read are MCAP files in ROS 2 form"):
+    with pytest.raises(VobenchError, match=f"{said}.*supported are MCAP files in ROS 2 form"):
         read(tmp_path / "a.mcap")
 
 

@@ -26,7 +26,13 @@ def test_everything_of_a_recording_arrives(scene, tmp_path, imported):
 
 def test_what_was_assumed_and_dropped_is_said(scene, tmp_path):
     notes = read(scene.tum(tmp_path)).notes
-    for said in ("one camera", "freiburg1's colour camera", "Depth pictures were dropped", "turned grey", "outside"):
+    for said in (
+        "one camera",
+        "freiburg1's colour camera",
+        "Depth pictures were dropped",
+        "converted to grey",
+        "outside",
+    ):
         assert any(said in note for note in notes), said
 
 
@@ -67,4 +73,4 @@ def test_of_true_poses_with_one_stamp_the_first_is_kept_and_a_missing_picture_is
     assert len(recording.truth) == len(whole.truth) - 1
     assert recording.truth.positions_m[:2, 1].tolist() == [0.25, 1.25]
     assert recording.frame_count == 4
-    assert any("1 amid the others (a gap of up to 2 s)" in note for note in recording.notes)
+    assert any("1 between others (a gap of up to 2 s)" in note for note in recording.notes)
