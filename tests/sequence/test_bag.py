@@ -20,14 +20,14 @@ from rosbags.interfaces import QosDurability
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import (
+from vobench.sequence.bag import Bag
+from vobench.sequence.bag_writer import BagWriter
+from vobench.sequence.mcap_file import (
     HEAD,
     MAGIC,
     MAX_BYTES,
     MAX_RECORDS,
     MESSAGE,
-    Bag,
-    BagWriter,
     BoundedFile,
     messages_in,
     read_record,
@@ -324,7 +324,7 @@ def test_a_chunk_unpacks_to_its_messages_and_one_that_states_another_size_is_ref
     [
         (chunk("", RECORDS, checksum=1), "the checksum of a chunk differs"),
         (chunk("zstd", PACK["zstd"](RECORDS), size=12), f"a chunk states 12 bytes unpacked and {SIZE}"),
-        (chunk("gzip", RECORDS), "packed as 'gzip'; zstd and lz4 are known"),
+        (chunk("gzip", RECORDS), "the compression 'gzip'; zstd and lz4 are known"),
         (chunk("", RECORDS[:-1], size=SIZE - 1), "runs over the end of its chunk"),
         (chunk("", bytes(9 * (MAX_RECORDS + 1)), size=9 * (MAX_RECORDS + 1)), f"{MAX_RECORDS} records and more"),
     ],

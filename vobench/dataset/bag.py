@@ -33,7 +33,7 @@ from vobench.errors import InputError
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import MAGIC
+from vobench.sequence.mcap_file import MAGIC
 from vobench.sequence.recording import MAGICS, METADATA, opened, read_first_poses
 from vobench.trajectory.trajectory import Stamps
 

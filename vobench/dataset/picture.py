@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.errors import InputError
-from vobench.sequence.picture import Image, header
+from vobench.sequence.picture import Header, Image, header
 from vobench.trajectory.formats import LFS_POINTER
 
 MOST_NAME = 1024  # characters of a file's name in a list, folders and all
@@ -219,23 +219,23 @@ def _decoded(picture: Picture, kind: Kind) -> NDArray[Any]:
 def _file_kind(data: bytes, name: str) -> Kind:
     if data.startswith(PNG):
         has_transparency = b"tRNS" in _png_chunks(data, name)
-        _, height, width, bits, channels = _header(data, "PNG", name)
-        return Kind(width, height, channels + has_transparency, bits, "png")
+        png = _header(data, "PNG", name)
+        return Kind(png.width, png.height, png.channels + has_transparency, png.bits, "png")
 
     if not data.rstrip(b"\0").endswith(JPEG_END):
         raise InputError(f"the JPEG is cut off after {len(data)} bytes: {name}")
-    _, height, width, bits, channels = _header(data, "JPEG", name)
-    if bits != 8 or channels not in (1, 3):
-        raise InputError(f"a JPEG should have 8 bits and 1 or 3 channels, not {bits} and {channels}: {name}")
-    return Kind(width, height, channels, bits, "jpeg")
+    jpeg = _header(data, "JPEG", name)
+    if jpeg.bits != 8 or jpeg.channels not in (1, 3):
+        raise InputError(f"a JPEG should have 8 bits and 1 or 3 channels, not {jpeg.bits} and {jpeg.channels}: {name}")
+    return Kind(jpeg.width, jpeg.height, jpeg.channels, jpeg.bits, "jpeg")
 
 
-def _header(data: bytes, form: str, name: str) -> tuple[str, int, int, int, int]:
+def _header(data: bytes, form: str, name: str) -> Header:
     try:
         stated = header(memoryview(data))
     except struct.error:
         stated = None
-    if stated is None or stated[-1] == 0:  # no channels
+    if stated is None or not stated.channels:
         raise InputError(f"the {form} has no valid header: {name}")
     return stated
 
