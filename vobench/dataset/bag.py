@@ -155,7 +155,11 @@ def _contents(reader: Any, chosen: Chosen, path: Path) -> Contents:
     return Contents(stamps, first, imu, tree_of(static, str(path)))
 
 
-def _require_pictures(chosen: Chosen, first: Mapping[str, Any], path: Path) -> None:
+def _require_pictures(
+    chosen: Chosen,
+    first: Mapping[str, Any],
+    path: Path,
+) -> None:
     for topic in (chosen.left, chosen.right):
         if topic and topic not in first:
             raise InputError(f"{topic} should have messages, but has none that can be read in {path}")
@@ -174,7 +178,12 @@ def _imu_fields(message: Any) -> tuple[float, ...]:
     return gyro.x, gyro.y, gyro.z, accel.x, accel.y, accel.z
 
 
-def _readings(topic: str, t_ns: Stamps, rows: list[tuple[float, ...]], path: Path) -> ImuReadings:
+def _readings(
+    topic: str,
+    t_ns: Stamps,
+    rows: list[tuple[float, ...]],
+    path: Path,
+) -> ImuReadings:
     values = np.array(rows, float)
     is_finite = np.isfinite(values).all(1)
     if not is_finite.all():
@@ -202,7 +211,12 @@ class _Pictures(NamedTuple):
     notes: Notes
 
 
-def _pictures(path: Path, chosen: Chosen, contents: Contents, options: ReadOptions) -> _Pictures:
+def _pictures(
+    path: Path,
+    chosen: Chosen,
+    contents: Contents,
+    options: ReadOptions,
+) -> _Pictures:
     left_ns = contents.stamps[chosen.left]
     stamps = {chosen.left: left_ns}
     notes = Notes()
@@ -218,7 +232,11 @@ def _pictures(path: Path, chosen: Chosen, contents: Contents, options: ReadOptio
     return _Pictures(partial(_read_pictures, path, indices, frames_ns), frames_ns, notes)
 
 
-def _read_pictures(path: Path, indices: dict[str, dict[int, int]], t_ns: Stamps) -> Iterator[RecordedFrame]:
+def _read_pictures(
+    path: Path,
+    indices: dict[str, dict[int, int]],
+    t_ns: Stamps,
+) -> Iterator[RecordedFrame]:
     """The frames in order; a picture is held until its partner comes, and a limited number of them at once."""
     waiting: dict[int, dict[str, Picture]] = {}  # pictures by topic, by the frame's index
     due = 0
@@ -269,7 +287,13 @@ def _truth_frame(chosen: Chosen, contents: Contents) -> str:
     return plain(getattr(first, "child_frame_id", ""))
 
 
-def _rig(path: Path, chosen: Chosen, contents: Contents, body: str | None, options: ReadOptions) -> CalibratedRig:
+def _rig(
+    path: Path,
+    chosen: Chosen,
+    contents: Contents,
+    body: str | None,
+    options: ReadOptions,
+) -> CalibratedRig:
     """The rig by the options' chain, or else by the bag."""
     if options.calibration is not None:
         return _chain_rig(options.calibration, 2 if chosen.right else 1)
@@ -298,7 +322,13 @@ def _chain_rig(chain: Path, count: int) -> CalibratedRig:
     return CalibratedRig(rig, str(chain), (note, *notes[1:]))
 
 
-def _imu(path: Path, chosen: Chosen, contents: Contents, body: str | None, options: ReadOptions) -> CalibratedImu:
+def _imu(
+    path: Path,
+    chosen: Chosen,
+    contents: Contents,
+    body: str | None,
+    options: ReadOptions,
+) -> CalibratedImu:
     if contents.imu is None or chosen.imu is None:
         return CalibratedImu(None, None, ())
     noise = find_imu(path, options)

@@ -40,7 +40,12 @@ def picture(message: Any, name: str) -> Picture:
     raise InputError(f"the encoding {message.encoding!r} is not supported. Known: {known}: {name}")
 
 
-def _pixels(message: Any, name: str, channels: int, channel_bytes: int) -> NDArray[Any]:
+def _pixels(
+    message: Any,
+    name: str,
+    channels: int,
+    channel_bytes: int,
+) -> NDArray[Any]:
     """Pixels (H, W, channels); a row of the message may be longer than its pixels need."""
     height = int(message.height)
     width = int(message.width)

@@ -22,7 +22,11 @@ ROTATION_TOLERANCE = 1e-3
 Tree = Mapping[tuple[str, str], Array]  # T_parent_child of frames that never move, by the names of both
 
 
-def between(tree: Tree, start: str, end: str) -> Array | None:
+def between(
+    tree: Tree,
+    start: str,
+    end: str,
+) -> Array | None:
     """T_start_end along the transforms of a tree; None where they don't connect the two frames."""
     T_start = {start: np.eye(4)}  # T_start_frame of every frame that was reached
     queue = [start]
@@ -143,7 +147,11 @@ class FramedInfo:
     frame: str
 
 
-def info_rig(cameras: Sequence[FramedInfo], tree: Tree, body: str | None) -> tuple[Rig, tuple[str, ...]]:
+def info_rig(
+    cameras: Sequence[FramedInfo],
+    tree: Tree,
+    body: str | None,
+) -> tuple[Rig, tuple[str, ...]]:
     """The rig of one or two cameras on the frame `body`, None for the left camera, and notes on it.
 
     Raises InputError where the cameras or the place of the right one are not known.
@@ -165,7 +173,11 @@ def info_rig(cameras: Sequence[FramedInfo], tree: Tree, body: str | None) -> tup
     return Rig(left.info.camera, right.info.camera, T_body_left, T_body_left @ T_left_right), notes
 
 
-def _T_body_left(left: FramedInfo, tree: Tree, body: str | None) -> Array:
+def _T_body_left(
+    left: FramedInfo,
+    tree: Tree,
+    body: str | None,
+) -> Array:
     T_body_camera = between(tree, body, left.frame) if body else None
     if T_body_camera is None:
         return np.eye(4)

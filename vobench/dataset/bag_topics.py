@@ -75,7 +75,11 @@ def choose(types: Types, topics: Topics, path: str) -> Chosen:
     return Chosen(left, right, left_info, right_info, imu, truth, notes)
 
 
-def _picture_topics(types: Types, topics: Topics, path: str) -> tuple[str, str | None]:
+def _picture_topics(
+    types: Types,
+    topics: Topics,
+    path: str,
+) -> tuple[str, str | None]:
     for topic in (topics.left, topics.right):
         if topic is not None:
             _require(types, topic, (RAW, COMPRESSED), path)
@@ -157,7 +161,12 @@ def _truth_topic(types: Types, topics: Topics) -> tuple[str | None, tuple[str, .
     return None, ()
 
 
-def _require(types: Types, topic: str, allowed: tuple[str, ...], path: str) -> None:
+def _require(
+    types: Types,
+    topic: str,
+    allowed: tuple[str, ...],
+    path: str,
+) -> None:
     """Raise InputError unless a topic is there and has one of the allowed message types."""
     if topic not in types:
         raise InputError(f"no topic {topic!r} in {path}; its topics: {_listed(types)}")

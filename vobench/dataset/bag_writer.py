@@ -83,7 +83,12 @@ def _copy(reader: AnyReader, writer: Writer, *, true_mounts_differ: bool) -> Non
             writer.write(copy, t_ns, data)
 
 
-def _copied_name(connection: Connection, reader: AnyReader, *, true_mounts_differ: bool) -> str | None:
+def _copied_name(
+    connection: Connection,
+    reader: AnyReader,
+    *,
+    true_mounts_differ: bool,
+) -> str | None:
     """A topic's name in the new bag; None for the truth's /tf_static where it repeats the sensors'."""
     is_of_sensors = connection.owner is reader.connections[0].owner  # the sensors' file comes first
     if connection.topic != ros.TF_STATIC.name or is_of_sensors:

@@ -16,7 +16,12 @@ EQUIDISTANT_COUNT = 4
 
 
 def focal_camera(
-    size_px: tuple[int, int], focal_px: Sequence[float], model: str, coefficients: Sequence[float], *, place: str
+    size_px: tuple[int, int],
+    focal_px: Sequence[float],
+    model: str,
+    coefficients: Sequence[float],
+    *,
+    place: str,
 ) -> Camera:
     """The camera of fx, fy, cx, cy and a distortion model by any of its names. Raises InputError naming `place`."""
     if len(focal_px) != 4 or not all(focal > 0 for focal in focal_px[:2]):

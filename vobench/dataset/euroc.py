@@ -95,7 +95,13 @@ def read_imu_csv(path: Path) -> ImuReadings:
             rows = rows[1:]
     if not rows:
         raise InputError(f"no reading of the IMU: {path}")
-    table = read_table(rows, name=str(path), columns=IMU_COLUMNS, separator=",", row="a reading")
+    table = read_table(
+        rows,
+        name=str(path),
+        columns=IMU_COLUMNS,
+        separator=",",
+        row="a reading",
+    )
     gyro_radps = table.values[:, 1:4].copy()
     accel_mps2 = table.values[:, 4:7].copy()
     return ImuReadings(stamps_ns(table, "ns"), gyro_radps, accel_mps2)
@@ -130,7 +136,12 @@ def _is_euroc(folder: Path) -> bool:
     return _is_asl(folder) and not _has_dso(folder)
 
 
-def read_euroc(folder: Path, options: ReadOptions, *, form: str = "euroc") -> Recording:
+def read_euroc(
+    folder: Path,
+    options: ReadOptions,
+    *,
+    form: str = "euroc",
+) -> Recording:
     """The recording of a folder with mav0/, or of that folder; the body is the IMU. Raises InputError."""
     root = folder / MAV if (folder / MAV).is_dir() else folder
     cameras, picture_notes = _pictures(root, options)
@@ -152,7 +163,16 @@ def read_euroc(folder: Path, options: ReadOptions, *, form: str = "euroc") -> Re
     truth_folder = next((name for name in TRUTHS if (root / name / DATA).is_file()), POSITIONS)
     unread_notes = unread(root, *CAMERAS, IMU, BASE, truth_folder, "body.yaml")
     notes = [body_note, *picture_notes, *calibration.notes, *imu.notes, *truth_notes, *unread_notes]
-    return assemble(form, rig, stream, t_ns, truth=truth, imu=imu.readings, notes=notes, calibration=calibration.source)
+    return assemble(
+        form,
+        rig,
+        stream,
+        t_ns,
+        truth=truth,
+        imu=imu.readings,
+        notes=notes,
+        calibration=calibration.source,
+    )
 
 
 def _pictures(root: Path, options: ReadOptions) -> tuple[list[PictureList], Notes]:
@@ -166,7 +186,12 @@ def _pictures(root: Path, options: ReadOptions) -> tuple[list[PictureList], Note
     return cameras, notes
 
 
-def _cameras_on_imu(root: Path, folder: Path, count: int, options: ReadOptions) -> CalibratedRig:
+def _cameras_on_imu(
+    root: Path,
+    folder: Path,
+    count: int,
+    options: ReadOptions,
+) -> CalibratedRig:
     """The cameras on the IMU: by the chain of the options, by every sensor.yaml, or by a chain in the folder."""
     sensors = [root / name / SENSOR for name in CAMERAS[:count]]
     missing = [path for path in sensors if not path.is_file()]
@@ -207,7 +232,11 @@ def _imu(root: Path, folder: Path, options: ReadOptions) -> CalibratedImu:
     return CalibratedImu(readings, densities.calibration(imu.T_BS, imu.rate_hz), ())
 
 
-def _truth(root: Path, frames_ns: Stamps, options: ReadOptions) -> tuple[Trajectory | None, Notes]:
+def _truth(
+    root: Path,
+    frames_ns: Stamps,
+    options: ReadOptions,
+) -> tuple[Trajectory | None, Notes]:
     if options.truth is not None:
         return truth_file(options, (), frames_ns, "assumed to be of the body.")
     for name in TRUTHS:
@@ -294,7 +323,12 @@ def _write_pictures(source: ExportSource, views: Views, mav: Path) -> Stamps:
     return np.array(stamps, np.int64)
 
 
-def _camera_yaml(index: int, camera: Camera, T_BS: Array, rate: float) -> str:
+def _camera_yaml(
+    index: int,
+    camera: Camera,
+    T_BS: Array,
+    rate: float,
+) -> str:
     model = kalibr.intrinsics(camera)
     return _sensor_yaml("camera", f"cam{index} of vobench", T_BS) + (
         f"rate_hz: {kalibr.number(rate)}\n"

@@ -35,7 +35,11 @@ TRAJECTORY_FORMS = tuple(TRAJECTORY_TEXTS)
 TIMES_SUFFIX = ".times.txt"
 
 
-def export_trajectory(trajectory: Trajectory, path: Path, form: str) -> tuple[Path, ...]:
+def export_trajectory(
+    trajectory: Trajectory,
+    path: Path,
+    form: str,
+) -> tuple[Path, ...]:
     """Write a trajectory, exactly, as one file, or two in KITTI's form; return their paths.
 
     Raises InputError for an unknown form, and for a file that exists.
@@ -170,7 +174,12 @@ def _has_true_calibration(source: ExportSource) -> bool:
     return True
 
 
-def _check_read_back(views: Views, expected_path: Trajectory | None, form: str, folder: Path) -> None:
+def _check_read_back(
+    views: Views,
+    expected_path: Trajectory | None,
+    form: str,
+    folder: Path,
+) -> None:
     """Read the export and compare rig, chain and path with what was exported. Raises SequenceError."""
     recording = read(folder, form=form)
     what = f"the {form} folder, read back,"
@@ -190,7 +199,12 @@ def _check_read_back(views: Views, expected_path: Trajectory | None, form: str, 
         check_path(what, expected_path, truth.of_mounted(recording.rig.T_body_left))
 
 
-def _expected_path(source: ExportSource, rig: Rig, stamps: Stamps, layout: Writing) -> Trajectory | None:
+def _expected_path(
+    source: ExportSource,
+    rig: Rig,
+    stamps: Stamps,
+    layout: Writing,
+) -> Trajectory | None:
     """The left camera's path as the form should give it, cut to the pictures' time as readers do."""
     if source.truth is None:
         return None

@@ -306,7 +306,11 @@ def chain_has_imu(path: Path) -> bool:
     return cameras["cam0"].T_cam_imu is not None
 
 
-def chain_rig(path: Path, cameras: int, T_body_left: Array | None) -> tuple[Rig, tuple[str, ...]]:
+def chain_rig(
+    path: Path,
+    cameras: int,
+    T_body_left: Array | None,
+) -> tuple[Rig, tuple[str, ...]]:
     """The rig of the first one or two cameras of a camchain.yaml, and the notes on it.
 
     The left camera is placed at T_body_left; without one, the body is the IMU of the chain. Raises InputError.

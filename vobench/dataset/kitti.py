@@ -82,7 +82,10 @@ def _pair(folder: Path) -> tuple[tuple[str, ...], Notes]:
 
 
 def _calibrated_rig(
-    folder: Path, names: tuple[str, ...], size_px: tuple[int, int], options: ReadOptions
+    folder: Path,
+    names: tuple[str, ...],
+    size_px: tuple[int, int],
+    options: ReadOptions,
 ) -> CalibratedRig:
     """The cameras by Kalibr's chain, where the options name one, or by calib.txt, which has no picture's size."""
     if options.calibration is not None:
@@ -138,7 +141,12 @@ def _matrix_pair(path: Path, matrices: dict[str, Array]) -> list[str]:
     raise InputError(f"{path}: a pair needs P0 and P1, or P2 and P3; the matrices there are {present}")
 
 
-def _rig(path: Path, matrices: dict[str, Array], names: list[str], size_px: tuple[int, int]) -> Rig:
+def _rig(
+    path: Path,
+    matrices: dict[str, Array],
+    names: list[str],
+    size_px: tuple[int, int],
+) -> Rig:
     cameras = [_camera(matrices[name], size_px, f"{path}: {name}") for name in names]
     return mounted_rig(*cameras)
 
@@ -161,7 +169,11 @@ def read_calibration(path: Path) -> dict[str, Array]:
     return {name: values.reshape(3, 4) for name, values in zip(names, table.values, strict=True)}
 
 
-def _camera(P: Array, size_px: tuple[int, int], place: str) -> MountedCamera:
+def _camera(
+    P: Array,
+    size_px: tuple[int, int],
+    place: str,
+) -> MountedCamera:
     """The camera of P = K [1 | t] on the body from whose axes P takes points."""
     K = P[:, :3]
     deviations = np.abs([K[0, 1], *K[1:, 0], K[2, 1], K[2, 2] - 1])
@@ -210,7 +222,11 @@ def _exported_stamps(source: ExportSource) -> Stamps:
     return source.sequence.frame_stamps()[_covered(source)]
 
 
-def kitti_path(truth: Trajectory, rig: Rig, stamps: Stamps) -> Trajectory | None:
+def kitti_path(
+    truth: Trajectory,
+    rig: Rig,
+    stamps: Stamps,
+) -> Trajectory | None:
     """The left camera's poses at stamps (N,), relative to the first one, as KITTI has them.
 
     None where the stamps share no time with the truth.
@@ -247,7 +263,12 @@ def _picture_notes(source: ExportSource, views: Views) -> list[str]:
     ]
 
 
-def _write_poses(source: ExportSource, views: Views, stamps: Stamps, folder: Path) -> list[str]:
+def _write_poses(
+    source: ExportSource,
+    views: Views,
+    stamps: Stamps,
+    folder: Path,
+) -> list[str]:
     truth = source.truth
     if truth is None:
         return ["No truth was recorded, so there is no poses.txt."]
@@ -267,7 +288,11 @@ def _write_poses(source: ExportSource, views: Views, stamps: Stamps, folder: Pat
     return notes
 
 
-def _path_read_back(source: ExportSource, rig: Rig, stamps: Stamps) -> Trajectory | None:
+def _path_read_back(
+    source: ExportSource,
+    rig: Rig,
+    stamps: Stamps,
+) -> Trajectory | None:
     """The left camera's path in the axes that `read_kitti` turns it into."""
     path = kitti_path(source.truth, rig, stamps) if source.truth else None
     if path is None:

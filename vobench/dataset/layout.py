@@ -194,7 +194,12 @@ def _children(folder: Path) -> list[Path]:
     return [folder / name for name in listed(folder)[:MOST_SEARCHED]]
 
 
-def read(path: Path, *, form: str | None = None, options: ReadOptions | None = None) -> Recording:
+def read(
+    path: Path,
+    *,
+    form: str | None = None,
+    options: ReadOptions | None = None,
+) -> Recording:
     """The recording at a path, its pictures not yet read, as `form` or by content. Raises VobenchError."""
     options = options or ReadOptions()
     try:

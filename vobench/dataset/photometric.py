@@ -91,7 +91,12 @@ def _present(section: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in section.items() if value is not None}
 
 
-def write_photometric(source: ExportSource, views: Views, stamps: Stamps, folder: Path) -> list[str]:
+def write_photometric(
+    source: ExportSource,
+    views: Views,
+    stamps: Stamps,
+    folder: Path,
+) -> list[str]:
     """Write cam0 and cam1 into a folder; return notes on what is not known.
 
     `stamps` (N,) are those of the exported frames.
@@ -169,7 +174,12 @@ def camera_text(camera: Camera) -> str | None:
             return None
 
 
-def _camera_lines(model: str, values: list[float], rectification: str, camera: Camera) -> str:
+def _camera_lines(
+    model: str,
+    values: list[float],
+    rectification: str,
+    camera: Camera,
+) -> str:
     numbers = " ".join(map(repr, values))
     size = f"{camera.width_px} {camera.height_px}"
     return f"{model} {numbers}\n{size}\n{rectification}\n{size}\n"

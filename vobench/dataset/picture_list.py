@@ -35,7 +35,13 @@ class PictureList:
         return PictureList(self.name, self.t_ns[index], paths)
 
 
-def read_list(path: Path, folder: Path, *, separator: str | None, unit: Unit) -> PictureList:
+def read_list(
+    path: Path,
+    folder: Path,
+    *,
+    separator: str | None,
+    unit: Unit,
+) -> PictureList:
     """A list of stamps and names of pictures below `folder`. Raises InputError naming file and line."""
     rows = content(read_text(path))
     if not rows:
@@ -56,7 +62,11 @@ def read_list(path: Path, folder: Path, *, separator: str | None, unit: Unit) ->
     return PictureList(str(path), t_ns, tuple(paths))
 
 
-def _require_stamps_and_names(path: Path, rows: list[tuple[int, str]], cells: list[list[str]]) -> None:
+def _require_stamps_and_names(
+    path: Path,
+    rows: list[tuple[int, str]],
+    cells: list[list[str]],
+) -> None:
     for (line, body), row in zip(rows, cells, strict=True):
         if len(row) != 2 or not NUMBER.fullmatch(row[0]):
             start = body[:LONGEST_ROW_SHOWN]
@@ -68,7 +78,10 @@ def _stripped(cells: list[str]) -> list[str]:
 
 
 def listed_pictures(
-    *lists: tuple[Path, Path], separator: str | None, unit: Unit, within_ns: int = 0
+    *lists: tuple[Path, Path],
+    separator: str | None,
+    unit: Unit,
+    within_ns: int = 0,
 ) -> tuple[list[PictureList], Notes]:
     """The existing pictures of one or two cameras, and notes on what was dropped.
 
@@ -108,7 +121,11 @@ def _present(cameras: list[PictureList]) -> tuple[list[PictureList], Notes]:
     return [camera.at(indices) for camera in cameras], (note,)
 
 
-def _dropped(exists: NDArray[np.bool_], t_ns: Stamps, what: str) -> str:
+def _dropped(
+    exists: NDArray[np.bool_],
+    t_ns: Stamps,
+    what: str,
+) -> str:
     """How many pictures are missing, and where: those between others leave gaps."""
     indices = np.flatnonzero(exists)
     dropped = len(exists) - len(indices)
@@ -183,7 +200,12 @@ class Partners(NamedTuple):
     notes: Notes
 
 
-def partners(left_ns: Stamps, right_ns: Stamps, within_ns: int, name: str) -> Partners:
+def partners(
+    left_ns: Stamps,
+    right_ns: Stamps,
+    within_ns: int,
+    name: str,
+) -> Partners:
     """The stereo pairs of pictures whose stamps are up to `within_ns` apart. Raises InputError where there is none."""
     pairs = associate(left_ns, right_ns, max_diff_ns=within_ns)
     if not len(pairs):

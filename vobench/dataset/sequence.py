@@ -57,14 +57,24 @@ def read_own(path: Path, _options: ReadOptions) -> Recording:
 LAYOUTS = (Layout("vobench", f"a sequence of vobench: {SENSORS_FILE}", is_sequence, read_own),)
 
 
-def convert(recording: Recording, folder: Path, *, provenance: Mapping[str, str] | None = None) -> None:
+def convert(
+    recording: Recording,
+    folder: Path,
+    *,
+    provenance: Mapping[str, str] | None = None,
+) -> None:
     """Write a recording as a sequence: stamps exactly, 8-bit grey pictures bit for bit. Raises VobenchError."""
     notes = {"form": recording.form}
     for index, note in enumerate(recording.notes, 1):
         notes[f"note_{index:02d}"] = note
 
     with SequenceWriter(
-        folder, recording.rig, case_json=None, start_ns=recording.start_ns, notes=notes, provenance=provenance
+        folder,
+        recording.rig,
+        case_json=None,
+        start_ns=recording.start_ns,
+        notes=notes,
+        provenance=provenance,
     ) as writer:
         if truth := recording.truth:  # without a twist, which is not known
             for t_ns, T_world_body in zip(truth.t_ns.tolist(), truth.T_world_frame, strict=True):

@@ -181,7 +181,13 @@ def png_frames(sequence: Sequence, views: Views) -> Iterator[PngFrame]:
         yield PngFrame(frame.index, frame.t_ns, pictures)
 
 
-def _as_png(rig: Rig, views: Views, side: Side, encoded: bytes | None, form: str) -> bytes:
+def _as_png(
+    rig: Rig,
+    views: Views,
+    side: Side,
+    encoded: bytes | None,
+    form: str,
+) -> bytes:
     if encoded is None:
         raise SequenceError(f"a frame has no {side} picture, but the rig has a {side} camera")
     if views.source_px is None and form == PNG:

@@ -77,7 +77,12 @@ def read_tartanair(folder: Path, options: ReadOptions) -> Recording:
     )
 
 
-def _rig(folder: Path, size_px: tuple[int, int], count: int, options: ReadOptions) -> CalibratedRig:
+def _rig(
+    folder: Path,
+    size_px: tuple[int, int],
+    count: int,
+    options: ReadOptions,
+) -> CalibratedRig:
     T_body_left = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))
     if options.calibration is not None:
         rig, notes = chain_rig(options.calibration, count, T_body_left)

@@ -54,7 +54,11 @@ def _unstamped(parsed: Parsed, frame_count: int, path: Path) -> InputError:
 
 
 def truth_file(
-    options: ReadOptions, beside: Iterable[Path], frames_ns: Stamps, whose: str, turn: Array | None = None
+    options: ReadOptions,
+    beside: Iterable[Path],
+    frames_ns: Stamps,
+    whose: str,
+    turn: Array | None = None,
 ) -> tuple[Trajectory | None, Notes]:
     """The truth that the options name, or else the first existing file of `beside`, and notes on it.
 

@@ -169,7 +169,13 @@ def _row(values: list[float]) -> str:
     return " ".join(map(repr, values))
 
 
-def _write_table(path: Path, what: str, columns: str, t_ns: Iterable[int], rows: Iterable[str]) -> None:
+def _write_table(
+    path: Path,
+    what: str,
+    columns: str,
+    t_ns: Iterable[int],
+    rows: Iterable[str],
+) -> None:
     lines = [f"{seconds(t)} {row}\n" for t, row in zip(t_ns, rows, strict=True)]
     header = f"# {what}\n# file: vobench\n# timestamp {columns}\n"
     path.write_text(header + "".join(lines), encoding="utf-8")

@@ -34,7 +34,13 @@ class Strip:
 
 
 def strips(
-    height: int, readout_s: float, t_ns: int, exposure_s: float, *, row_strips: int, sub_frames: int
+    height: int,
+    readout_s: float,
+    t_ns: int,
+    exposure_s: float,
+    *,
+    row_strips: int,
+    sub_frames: int,
 ) -> list[Strip]:
     """The exposure of a picture, strip by strip from the top; t_ns is the middle of its middle row's exposure.
 
@@ -69,7 +75,12 @@ def row_stamps(height: int, readout_s: float, t_ns: int) -> Stamps:
     return np.array(stamps, np.int64)
 
 
-def _delay_ns(first: int, end: int, height: int, readout_ns: int) -> int:
+def _delay_ns(
+    first: int,
+    end: int,
+    height: int,
+    readout_ns: int,
+) -> int:
     """The delay of the middle of rows [first, end) after the picture's middle, rounded.
 
     It is odd about the middle: rows of the lower half are as late as their mirror images are early.
@@ -130,7 +141,12 @@ def start(loop: AutoExposure, exposure: Exposure) -> PendingExposures:
     return (settled,) * loop.lag_frames
 
 
-def step(loop: AutoExposure, pending: PendingExposures, grey: Grey, linear_of_grey: Array) -> PendingExposures:
+def step(
+    loop: AutoExposure,
+    pending: PendingExposures,
+    grey: Grey,
+    linear_of_grey: Array,
+) -> PendingExposures:
     """The pending exposures after a picture (H, W) that was taken with the first of `pending`.
 
     `linear_of_grey` (256,) is the signal of each grey value in shares of full scale, without the black level. The

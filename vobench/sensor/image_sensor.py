@@ -122,7 +122,13 @@ CAMERAS = {
     "clean": CameraSensor(),
     # EuRoC's cameras
     "mt9v034": CameraSensor(
-        shot_noise=True, read_noise_e=25.0, prnu=0.01, dsnu_e=10.0, column_e=2.0, dark_e_per_s=100.0, adc_bits=10
+        shot_noise=True,
+        read_noise_e=25.0,
+        prnu=0.01,
+        dsnu_e=10.0,
+        column_e=2.0,
+        dark_e_per_s=100.0,
+        adc_bits=10,
     ),
     # small pixels (3 µm) behind a global shutter: RealSense D435i, OAK-D
     "ov9282": CameraSensor(
@@ -150,10 +156,22 @@ CAMERAS = {
     ),
     # machine vision with large (5.86 µm) and middling (3.45 µm) pixels
     "imx249": CameraSensor(
-        full_well_e=32_400.0, shot_noise=True, read_noise_e=7.0, prnu=0.005, dsnu_e=2.0, dark_e_per_s=5.0, adc_bits=12
+        full_well_e=32_400.0,
+        shot_noise=True,
+        read_noise_e=7.0,
+        prnu=0.005,
+        dsnu_e=2.0,
+        dark_e_per_s=5.0,
+        adc_bits=12,
     ),
     "imx255": CameraSensor(
-        full_well_e=10_700.0, shot_noise=True, read_noise_e=3.0, prnu=0.005, dsnu_e=1.0, dark_e_per_s=5.0, adc_bits=12
+        full_well_e=10_700.0,
+        shot_noise=True,
+        read_noise_e=3.0,
+        prnu=0.005,
+        dsnu_e=1.0,
+        dark_e_per_s=5.0,
+        adc_bits=12,
     ),
 }
 
@@ -290,7 +308,11 @@ class FixedPattern:
         return FixedPattern(self.gain[rows], self.offset_e[rows], self.dark_e_per_s[rows])
 
 
-def fixed_pattern(shape: tuple[int, int], sensor: CameraSensor, rng: np.random.Generator) -> FixedPattern:
+def fixed_pattern(
+    shape: tuple[int, int],
+    sensor: CameraSensor,
+    rng: np.random.Generator,
+) -> FixedPattern:
     """Draw one chip's pattern, once per camera; each effect has a child of `rng` of its own.
 
     Hot pixels stay hot when `hot_share` grows; their dark current is exponential with mean `hot_e_per_s`.
@@ -341,7 +363,11 @@ def _require_radiance(radiance: Radiance) -> None:
 
 
 def _exposed_grey(
-    radiance: Radiance, camera: CameraSettings, noise: NoiseStreams, pattern: FixedPattern | None, exposure: Exposure
+    radiance: Radiance,
+    camera: CameraSettings,
+    noise: NoiseStreams,
+    pattern: FixedPattern | None,
+    exposure: Exposure,
 ) -> Grey:
     """Grey values (H, W) of radiance (H, W), a few rows at a time."""
     height, width = radiance.shape
@@ -356,7 +382,11 @@ def _exposed_grey(
 
 
 def _exposed_colour(
-    radiance: Radiance, camera: CameraSettings, noise: NoiseStreams, pattern: FixedPattern | None, exposure: Exposure
+    radiance: Radiance,
+    camera: CameraSettings,
+    noise: NoiseStreams,
+    pattern: FixedPattern | None,
+    exposure: Exposure,
 ) -> Grey:
     """Red, green and blue grey values (H, W, 3) of radiance (H, W) behind the filters."""
     electrons = _electrons(radiance, camera, noise, pattern, exposure)
@@ -436,7 +466,11 @@ def _interpolated(signal: Array, kernel: Array) -> Array:
 
 
 def _electrons(
-    radiance: Radiance, camera: CameraSettings, noise: NoiseStreams, pattern: FixedPattern | None, exposure: Exposure
+    radiance: Radiance,
+    camera: CameraSettings,
+    noise: NoiseStreams,
+    pattern: FixedPattern | None,
+    exposure: Exposure,
 ) -> Array:
     """Electrons (H, W) as read out of the wells."""
     sensor = camera.chip
@@ -463,7 +497,11 @@ def _mean_electrons(
     return mean_e
 
 
-def _collected(mean_e: Array, sensor: CameraSensor, rng: np.random.Generator) -> Array:
+def _collected(
+    mean_e: Array,
+    sensor: CameraSensor,
+    rng: np.random.Generator,
+) -> Array:
     """Electrons (H, W) in the wells: Poisson where shot noise is on, then saturation."""
     if sensor.shot_noise:
         # Means above twice a full well saturate as surely as that.

@@ -71,7 +71,14 @@ def walked(triad: Triad, draws: Array, *, step_s: float) -> Array:
     return walk
 
 
-def read_out(triad: Triad, true: Array, bias: Array, draws: Array, *, step_s: float) -> Array:
+def read_out(
+    triad: Triad,
+    true: Array,
+    bias: Array,
+    draws: Array,
+    *,
+    step_s: float,
+) -> Array:
     """Readings (M, 3) of the truth (M, 3), with a bias (M, 3) and standard normal numbers (M, 3).
 
     White noise of a density has the standard deviation density / √step in the mean over a step, so that readings at a
@@ -98,7 +105,13 @@ def reading_stamps(motion: Motion, rate_hz: float) -> Stamps:
     return stamps
 
 
-def mean_inertia(motion: Motion, T_body_imu: Array, rate_hz: float, *, count: int) -> Array:
+def mean_inertia(
+    motion: Motion,
+    T_body_imu: Array,
+    rate_hz: float,
+    *,
+    count: int,
+) -> Array:
     """Mean angular rate and specific force (2, count, 3) in the IMU's axes, over 1 / rate around each stamp.
 
     Neighbouring intervals share their edges, so the means add up to the whole motion, also where it jerks.
@@ -118,7 +131,12 @@ SECONDS_PER_NODE = 0.02
 MOST_NODES = 16
 
 
-def _means_between(motion: Motion, T_body_imu: Array, edges_ns: Array, breaks_ns: Array) -> Array:
+def _means_between(
+    motion: Motion,
+    T_body_imu: Array,
+    edges_ns: Array,
+    breaks_ns: Array,
+) -> Array:
     """Means (2, M, 3) between edges (M + 1,), in ns since the start: Gauss-Legendre on each smooth piece."""
     is_inside = (breaks_ns > edges_ns[0]) & (breaks_ns < edges_ns[-1])
     ends_ns = np.union1d(edges_ns, breaks_ns[is_inside])  # of P pieces, (P + 1,)
@@ -203,7 +221,12 @@ class ImuSettings:
         )
 
 
-def measure(motion: Motion, settings: ImuSettings, *, rngs: Generators | None = None) -> tuple[ImuReadings, ImuBias]:
+def measure(
+    motion: Motion,
+    settings: ImuSettings,
+    *,
+    rngs: Generators | None = None,
+) -> tuple[ImuReadings, ImuBias]:
     """Readings over the whole of a motion, and the biases in them; `rngs` holds the generators of STREAMS.
 
     A reading is the mean over the 1 / rate_hz around its stamp, so that readings add up to the motion.
@@ -227,13 +250,26 @@ def measure(motion: Motion, settings: ImuSettings, *, rngs: Generators | None = 
     return ImuReadings(t_ns, gyro_radps, accel_mps2), ImuBias(t_ns, gyro_bias, accel_bias)
 
 
-def _bias(name: str, triad: Triad, start: Array, *, count: int, step_s: float, rngs: Generators | None) -> Array:
+def _bias(
+    name: str,
+    triad: Triad,
+    start: Array,
+    *,
+    count: int,
+    step_s: float,
+    rngs: Generators | None,
+) -> Array:
     """The bias (count, 3) of gyroscopes or accelerometers, for standard normal numbers (3,) of the start."""
     walk = walked(triad, _draws(f"{name}_walk", count, triad.walk, rngs), step_s=step_s)
     return started(triad, start) + walk
 
 
-def _draws(stream: str, count: int, size: float, rngs: Generators | None) -> Array:
+def _draws(
+    stream: str,
+    count: int,
+    size: float,
+    rngs: Generators | None,
+) -> Array:
     """Standard normal numbers (count, 3) of a stream; zeros where the size of their effect is 0."""
     if not size:
         return np.zeros((count, 3))
@@ -255,8 +291,20 @@ def _walk(spread: float, correlation_s: float) -> float:
 IMUS = {
     "exact": ImuSettings(),
     "adis16448": ImuSettings(
-        gyro=Triad(noise=1.6968e-4, walk=1.9393e-5, bias_std=0.5 * DEG, limit=1000 * DEG, step=DEG / 25),
-        accel=Triad(noise=2e-3, walk=3e-3, bias_std=20 * MILLI_G, limit=18e3 * MILLI_G, step=1e3 * MILLI_G / 1200),
+        gyro=Triad(
+            noise=1.6968e-4,
+            walk=1.9393e-5,
+            bias_std=0.5 * DEG,
+            limit=1000 * DEG,
+            step=DEG / 25,
+        ),
+        accel=Triad(
+            noise=2e-3,
+            walk=3e-3,
+            bias_std=20 * MILLI_G,
+            limit=18e3 * MILLI_G,
+            step=1e3 * MILLI_G / 1200,
+        ),
     ),
     "mpu6000": ImuSettings(
         gyro=Triad(

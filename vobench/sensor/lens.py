@@ -36,7 +36,11 @@ class LensMaps:
     transfer: Array | None = None
 
 
-def lens_maps(effects: CameraSettings, camera: Camera, rng: np.random.Generator) -> LensMaps:
+def lens_maps(
+    effects: CameraSettings,
+    camera: Camera,
+    rng: np.random.Generator,
+) -> LensMaps:
     """The maps of a camera's lens; only dirt draws from `rng`."""
     shape = (camera.height_px, camera.width_px)
     shade = None
@@ -74,7 +78,12 @@ def through_lens(radiance: Radiance, maps: LensMaps) -> Radiance:
     return transmitted if maps.transfer is None else blur(transmitted, maps.transfer)
 
 
-def vignetting(rays: Array, *, strength: float = 1.0, cutoff_deg: float | None = None) -> Array:
+def vignetting(
+    rays: Array,
+    *,
+    strength: float = 1.0,
+    cutoff_deg: float | None = None,
+) -> Array:
     """The share of light (H, W) along rays (H, W, 3): cos⁴ of the angle to the axis, to the power of `strength`.
 
     With a cutoff it is multiplied by the overlap of two equal discs whose distance grows as tan θ and that no longer
@@ -119,7 +128,12 @@ def disc_transfer(shape: tuple[int, int], diameter_px: float) -> Array:
     return transfer
 
 
-def flare_transfer(direct: Array | float, shape: tuple[int, int], flare: float, ghost: float) -> Array:
+def flare_transfer(
+    direct: Array | float,
+    shape: tuple[int, int],
+    flare: float,
+    ghost: float,
+) -> Array:
     """Transfer (H, W) of a lens with the transfer `direct` but for the shares of light in flare and in the ghost.
 
     Flare falls with the distance r as (h² + r²)^-1.5, half of it within √3 h. The ghost is the picture turned by half
@@ -181,7 +195,11 @@ def _disc(diameter_px: float) -> Array:
     return shares
 
 
-def dirt(shape: tuple[int, int], amount: float, rng: np.random.Generator) -> Array:
+def dirt(
+    shape: tuple[int, int],
+    amount: float,
+    rng: np.random.Generator,
+) -> Array:
     """The share of light (H, W) that is lost to smudges and dust on the front lens; `amount` on average.
 
     A larger amount is the same dirt, thicker: light is absorbed exponentially in it (Beer and Lambert).

@@ -52,7 +52,13 @@ class Schedule:
     repeats: NDArray[np.bool_]
 
 
-def schedule(timing: Timing, t_ns: Stamps, rngs: Mapping[str, np.random.Generator], *, before: int = 0) -> Schedule:
+def schedule(
+    timing: Timing,
+    t_ns: Stamps,
+    rngs: Mapping[str, np.random.Generator],
+    *,
+    before: int = 0,
+) -> Schedule:
     """The frames of a motion with stamps t_ns (N,); `rngs` has a generator for each of STREAMS.
 
     A larger share adds to the effects of a smaller one: a frame that is lost at one share is lost at a larger one. The

@@ -82,7 +82,11 @@ class Bag:
             for topic, data in self.raw(topics):
                 yield topic, TYPES.deserialize_cdr(data, topic.type_name)
 
-    def nth(self, topics: Sequence[Topic], number: int) -> list[tuple[Topic, memoryview]]:
+    def nth(
+        self,
+        topics: Sequence[Topic],
+        number: int,
+    ) -> list[tuple[Topic, memoryview]]:
         """Each topic's message of a number; only the chunks that hold them are read.
 
         Raises SequenceError where a topic has no message of that number.
@@ -184,7 +188,12 @@ class Bag:
         return SequenceError(f"{topic.name} should be {topic.type_name} but is {actual} in {self.path}")
 
 
-def _chunk_stamps(stream: BinaryIO, chunk: ChunkIndex, channel: int, count: int) -> Numbers:
+def _chunk_stamps(
+    stream: BinaryIO,
+    chunk: ChunkIndex,
+    channel: int,
+    count: int,
+) -> Numbers:
     """Log times in ns (N,) of a channel's messages in a chunk. Raises ValueError where they can't be those."""
     place = chunk.message_index_offsets[channel]
     index = read_record(stream, place, MessageIndex)

@@ -69,7 +69,13 @@ def _type_hash(type_name: str) -> str:
 class BagWriter:
     """Writes one bag under a temporary name and renames it when closed without an error."""
 
-    def __init__(self, path: Path, topics: Sequence[Topic], *, encoded: bool) -> None:
+    def __init__(
+        self,
+        path: Path,
+        topics: Sequence[Topic],
+        *,
+        encoded: bool,
+    ) -> None:
         """A bag of `encoded` pictures keeps the messages of one stamp in one chunk, to be lost or kept together.
 
         Its chunks are not compressed, as PNG does not get smaller. Raw pictures are compressed, and large ones have a
@@ -138,7 +144,10 @@ class BagWriter:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         if kind is None:
             self._mcap.finish()  # type: ignore[no-untyped-call]

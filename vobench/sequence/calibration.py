@@ -59,7 +59,11 @@ def _first(bag: Bag, topic: ros.Topic) -> Any:
     raise SequenceError(f"{topic.name} has no message in {bag.path}")
 
 
-def _mount(bag: Bag, T_body: dict[str, Array], frame: str) -> Array:
+def _mount(
+    bag: Bag,
+    T_body: dict[str, Array],
+    frame: str,
+) -> Array:
     if frame not in T_body:
         raise SequenceError(f"{ros.TF_STATIC.name} does not say where {frame} is mounted in {bag.path}")
     return T_body[frame]

@@ -179,7 +179,11 @@ def header(t_ns: int, frame_id: str) -> Any:
     return _make("std_msgs/msg/Header", stamp, frame_id)
 
 
-def transforms(t_ns: int, parent: str, T_parent_child: dict[str, Array]) -> Any:
+def transforms(
+    t_ns: int,
+    parent: str,
+    T_parent_child: dict[str, Array],
+) -> Any:
     """A tf2_msgs/TFMessage with the pose of each child frame on `parent`."""
     stamped = []
     for child, T in T_parent_child.items():
@@ -200,7 +204,14 @@ def camera_infos(t_ns: int, rig: Rig) -> tuple[Any, ...]:
     return left, right
 
 
-def camera_info(t_ns: int, frame_id: str, camera: Camera, *, R: Array | None = None, P: Array | None = None) -> Any:
+def camera_info(
+    t_ns: int,
+    frame_id: str,
+    camera: Camera,
+    *,
+    R: Array | None = None,
+    P: Array | None = None,
+) -> Any:
     """A sensor_msgs/CameraInfo; without R (3, 3) and P (3, 4), that of a camera on its own."""
     if R is None:
         R = np.eye(3)
@@ -234,7 +245,13 @@ def _model_matrix(camera: Camera) -> Array:
     return camera.K
 
 
-def image(t_ns: int, frame_id: str, encoded: bytes, form: str, colour: str = MONO) -> Any:
+def image(
+    t_ns: int,
+    frame_id: str,
+    encoded: bytes,
+    form: str,
+    colour: str = MONO,
+) -> Any:
     """A sensor_msgs/CompressedImage; `form` is png or jpeg.
 
     The format of a grey picture is its form; that of others is as in ROS's compressed_image_transport:
@@ -247,7 +264,12 @@ def image(t_ns: int, frame_id: str, encoded: bytes, form: str, colour: str = MON
     return message(LEFT_IMAGE, t_ns, frame_id, format_name, np.frombuffer(encoded, np.uint8))
 
 
-def message(topic: Topic, t_ns: int, frame_id: str, *fields: Any) -> Any:
+def message(
+    topic: Topic,
+    t_ns: int,
+    frame_id: str,
+    *fields: Any,
+) -> Any:
     """A message that is a header and these fields, as those of vobench_msgs are."""
     return _make(topic.type_name, header(t_ns, frame_id), *fields)
 
@@ -257,7 +279,12 @@ def vector(xyz: ArrayLike) -> Any:
     return _make("geometry_msgs/msg/Vector3", *np.asarray(xyz, float).tolist())
 
 
-def imu(t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike, variances: tuple[float, float]) -> Any:
+def imu(
+    t_ns: int,
+    gyro_radps: ArrayLike,
+    accel_mps2: ArrayLike,
+    variances: tuple[float, float],
+) -> Any:
     """One reading as a sensor_msgs/Imu; `variances` are those of one axis of gyro and accelerometer, 0 if not known."""
     orientation = _make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0)
     gyro_variance, accel_variance = variances
@@ -282,7 +309,11 @@ def _unknown_covariance(size: int) -> Array:
     return covariance
 
 
-def odometry(t_ns: int, T_world_body: Array, twist_body: ArrayLike | None) -> Any:
+def odometry(
+    t_ns: int,
+    T_world_body: Array,
+    twist_body: ArrayLike | None,
+) -> Any:
     """A nav_msgs/Odometry: the body's pose in the world, its (6,) twist (m/s, rad/s) in its own axes, or None."""
     position = _make("geometry_msgs/msg/Point", *T_world_body[:3, 3].tolist())
     pose = _make("geometry_msgs/msg/Pose", position, _quaternion(T_world_body[:3, :3]))

@@ -43,7 +43,11 @@ BAYER = "bayer_rggb8"
 CHANNELS = {MONO: 1, RGB: 3, BAYER: 1}
 
 
-def _shape(height: int, width: int, colour: str) -> tuple[int, ...]:
+def _shape(
+    height: int,
+    width: int,
+    colour: str,
+) -> tuple[int, ...]:
     """The shape of a picture's array."""
     return (height, width, 3) if colour == RGB else (height, width)
 
@@ -65,7 +69,12 @@ def rgb(image: Image, colour: str) -> Image:
 
 
 def encode(
-    image: Image, camera: Camera | None, name: str, *, jpeg_quality: int | None = None, colour: str = MONO
+    image: Image,
+    camera: Camera | None,
+    name: str,
+    *,
+    jpeg_quality: int | None = None,
+    colour: str = MONO,
 ) -> bytes:
     """A grey or RGB picture as PNG, or as JPEG of a quality.
 
@@ -84,7 +93,13 @@ def encode(
     return encoded.tobytes()
 
 
-def decode(encoded: Encoded, camera: Camera | None, name: str, *, colour: str = MONO) -> Image:
+def decode(
+    encoded: Encoded,
+    camera: Camera | None,
+    name: str,
+    *,
+    colour: str = MONO,
+) -> Image:
     """A picture (H, W), or (H, W, 3) of rgb8, whose header is checked first.
 
     Raises SequenceError, also for another size.
@@ -97,7 +112,13 @@ def decode(encoded: Encoded, camera: Camera | None, name: str, *, colour: str = 
     return in_rgb_order.astype(np.uint8, copy=False)
 
 
-def require_picture(encoded: Encoded, camera: Camera | None, name: str, *, colour: str = MONO) -> tuple[str, int, int]:
+def require_picture(
+    encoded: Encoded,
+    camera: Camera | None,
+    name: str,
+    *,
+    colour: str = MONO,
+) -> tuple[str, int, int]:
     """Form, height and width by a picture's header.
 
     Raises SequenceError unless it has 8 bits, the channels of the colour, and the camera's size.

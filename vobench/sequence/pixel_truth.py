@@ -31,7 +31,12 @@ def truth_topics(channels: Iterable[str] = tuple(CHANNELS), sides: Iterable[Side
     return tuple(truth_topic(side, channel) for side in sides for channel in channels)
 
 
-def truth_image(t_ns: int, side: Side, channel: str, values: NDArray[np.generic]) -> Any:
+def truth_image(
+    t_ns: int,
+    side: Side,
+    channel: str,
+    values: NDArray[np.generic],
+) -> Any:
     """A sensor_msgs/Image of a channel's values (H, W) or (H, W, n); masks as 0 and 255."""
     height, width = values.shape[:2]
     is_mask = values.dtype == np.bool_
@@ -60,7 +65,12 @@ def truth_values(channel: str, message: Any) -> NDArray[np.generic]:
     return values
 
 
-def check_truth(frame: TruthFrame, channels: tuple[str, ...], camera: Camera, side: Side) -> None:
+def check_truth(
+    frame: TruthFrame,
+    channels: tuple[str, ...],
+    camera: Camera,
+    side: Side,
+) -> None:
     """Raise SequenceError unless the frame has exactly these channels, in the camera's size and their own types."""
     actual = {name: (values.shape, values.dtype.name) for name, values in frame.channels().items()}
     expected = {}

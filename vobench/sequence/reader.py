@@ -112,7 +112,11 @@ class Sequence:
         if count != self.frame_count:
             raise SequenceError(f"{count} frames found, but its summary says {self.frame_count}: {self.path}")
 
-    def _encoded(self, index: int, messages: Iterable[tuple[ros.Topic, memoryview]]) -> EncodedFrame:
+    def _encoded(
+        self,
+        index: int,
+        messages: Iterable[tuple[ros.Topic, memoryview]],
+    ) -> EncodedFrame:
         """The frame of one message of each camera. Raises SequenceError where they are not of one instant."""
         topics = []
         pictures = []
@@ -206,7 +210,12 @@ def _disturbance_fields(message: Any) -> list[float]:
     return [getattr(message, name) for name in DISTURBANCE_FIELDS]
 
 
-def _table(bag: Bag, topic: ros.Topic, row: Callable[[Any], Iterable[float]], width: int) -> tuple[Stamps, Array]:
+def _table(
+    bag: Bag,
+    topic: ros.Topic,
+    row: Callable[[Any], Iterable[float]],
+    width: int,
+) -> tuple[Stamps, Array]:
     """Stamps (M,) of a topic's messages, and `row` of each of them (M, width)."""
     stamps = array("q")
     values = array("d")

@@ -124,7 +124,11 @@ def opened(path: Path) -> Iterator[AnyReader]:
             raise SequenceError(f"not a whole recording ({type(error).__name__}: {reason}): {path}") from error
 
 
-def _rows(reader: AnyReader, path: Path, topic: str | None) -> Iterator[tuple[int, PoseFields]]:
+def _rows(
+    reader: AnyReader,
+    path: Path,
+    topic: str | None,
+) -> Iterator[tuple[int, PoseFields]]:
     """Stamps in ns and poses of a topic's messages."""
     name, _, frames = (topic or _only_topic(reader, path)).partition(":")
     connections = [connection for connection in reader.connections if connection.topic == name]
@@ -143,7 +147,12 @@ def _rows(reader: AnyReader, path: Path, topic: str | None) -> Iterator[tuple[in
         yield ros.stamp_ns(message), ros.pose_fields(pose)
 
 
-def _transforms(reader: AnyReader, connections: list[Any], frames: str, path: Path) -> Iterator[tuple[int, PoseFields]]:
+def _transforms(
+    reader: AnyReader,
+    connections: list[Any],
+    frames: str,
+    path: Path,
+) -> Iterator[tuple[int, PoseFields]]:
     """Stamps in ns and poses of the frames `parent.child`, which may be empty where there is one pair only."""
     by_frames: dict[str, list[tuple[int, PoseFields]]] = {}
     for connection, _, raw in reader.messages(connections):

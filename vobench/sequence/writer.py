@@ -90,7 +90,12 @@ class SequenceWriter:
         for bag in (self._sensors, self._truth):
             bag.flush()
 
-    def write_frame(self, t_ns: int, left: Image, right: Image | None) -> None:
+    def write_frame(
+        self,
+        t_ns: int,
+        left: Image,
+        right: Image | None,
+    ) -> None:
         """Add the picture of each camera, (H, W) or (H, W, 3) uint8, with its calibration."""
         form = "png" if self._jpeg_quality is None else "jpeg"
         encoded = []
@@ -99,7 +104,13 @@ class SequenceWriter:
             encoded.append(encode(picture, camera, name, jpeg_quality=self._jpeg_quality, colour=self._colour))
         self._write_pictures(t_ns, encoded, form)
 
-    def write_encoded_frame(self, t_ns: int, left: bytes, right: bytes | None, form: str) -> None:
+    def write_encoded_frame(
+        self,
+        t_ns: int,
+        left: bytes,
+        right: bytes | None,
+        form: str,
+    ) -> None:
         """Add pictures that are 8-bit PNG or JPEG already, bit for bit; `form` is png or jpeg."""
         encoded = self._present(left, right)
         for side, name, picture in zip(self._rig.sides, NAMES, encoded, strict=False):
@@ -116,7 +127,12 @@ class SequenceWriter:
             raise SequenceError(f"this rig has {cameras} cameras, but a frame has {len(pictures)} pictures")
         return pictures
 
-    def _write_pictures(self, t_ns: int, encoded: Sequence[bytes], form: str) -> None:
+    def _write_pictures(
+        self,
+        t_ns: int,
+        encoded: Sequence[bytes],
+        form: str,
+    ) -> None:
         stop.check()
         t_ns = int(t_ns)
         if form != self._form:
@@ -169,7 +185,12 @@ class SequenceWriter:
         message = ros.message(ros.DISTURBANCE, t_ns, ros.BODY, *fields)
         self._truth.write(ros.DISTURBANCE, int(t_ns), serialise(message))
 
-    def write_truth(self, t_ns: int, T_world_body: Array, twist_body: ArrayLike | None) -> None:
+    def write_truth(
+        self,
+        t_ns: int,
+        T_world_body: Array,
+        twist_body: ArrayLike | None,
+    ) -> None:
         """Add the body's true pose (4, 4) and its twist (6,), m/s then rad/s, in body axes; None where unknown."""
         is_rigid = se3.is_rotation(T_world_body[:3, :3]) and np.isfinite(T_world_body).all()
         if not is_rigid:
@@ -191,6 +212,9 @@ class SequenceWriter:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self._stack.__exit__(kind, error, trace)
