@@ -63,7 +63,8 @@ def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
     if form == "mcap":
         _require_ros2(path)
     with opened(path) as reader:
-        types = {connection.topic: connection.msgtype for connection in reader.connections if connection.msgcount}
+        non_empty = [connection for connection in reader.connections if connection.msgcount]
+        types = {connection.topic: connection.msgtype for connection in non_empty}
         chosen = choose(types, options.topics, str(path))
         contents = _contents(reader, chosen, path)
     pictures = _pictures(path, chosen, contents, options)
@@ -148,7 +149,9 @@ def _contents(reader: Any, chosen: Chosen, path: Path) -> Contents:
             readings.append(_imu_fields(message))
 
     _require_pictures(chosen, first, path)
-    stamps = {topic: _increasing(np.array(t_ns, np.int64), topic, path) for topic, t_ns in stamps_lists.items()}
+    stamps = {}
+    for topic, topic_ns in stamps_lists.items():
+        stamps[topic] = _increasing(np.array(topic_ns, np.int64), topic, path)
     imu = None
     if chosen.imu in stamps:
         imu = _readings(chosen.imu, stamps[chosen.imu], readings, path)

@@ -67,7 +67,8 @@ def read_kitti(folder: Path, options: ReadOptions) -> Recording:
 
 def _pair(folder: Path) -> tuple[tuple[str, ...], Notes]:
     """The folders of the cameras, and a note: pairs come before single cameras, grey ones before colour ones."""
-    present = [name for pair in PAIRS for name in pair if (folder / name).is_dir()]
+    names = [*GREY_PAIR, *COLOUR_PAIR]
+    present = [name for name in names if (folder / name).is_dir()]
     for pair in PAIRS:
         if set(pair) <= set(present):
             others = [name for name in present if name not in pair]
@@ -166,7 +167,8 @@ def read_calibration(path: Path) -> dict[str, Array]:
             rows.append((line, numbers))
     columns = [f"{row}{column}" for row in range(3) for column in range(4)]
     table = read_table(rows, name=str(path), columns=tuple(columns), row="a matrix")
-    return {name: values.reshape(3, 4) for name, values in zip(names, table.values, strict=True)}
+    matrices = table.values.reshape(-1, 3, 4)
+    return dict(zip(names, matrices, strict=True))
 
 
 def _camera(
@@ -176,7 +178,8 @@ def _camera(
 ) -> MountedCamera:
     """The camera of P = K [1 | t] on the body from whose axes P takes points."""
     K = P[:, :3]
-    deviations = np.abs([K[0, 1], *K[1:, 0], K[2, 1], K[2, 2] - 1])
+    below_diagonal = [*K[1:, 0], K[2, 1]]
+    deviations = np.abs([K[0, 1], *below_diagonal, K[2, 2] - 1])
     is_upright = deviations.max() <= SKEW_TOLERANCE
     has_focal_lengths = K[0, 0] > 0 and K[1, 1] > 0
     if not (is_upright and has_focal_lengths):
@@ -254,8 +257,10 @@ def _picture_notes(source: ExportSource, views: Views) -> list[str]:
         if views.rig.right is None:
             return []
         return ["The pair was recorded rectified, so its pixels are unchanged."]
-    dark_shares = [views.dark_share(side, source.rig.camera(side)) for side in views.rig.sides]
-    dark = max(dark_shares)
+    dark = 0.0  # share of a picture
+    for side in views.rig.sides:
+        recorded = source.rig.camera(side)
+        dark = max(dark, views.dark_share(side, recorded))
     dark_note = f"; up to {dark:.1%} of a picture is outside the recorded one and black" if dark else ""
     return [
         "KITTI needs rectified pictures: these were resampled, with linear interpolation between pixels, "

@@ -75,7 +75,10 @@ def rectified(rig: Rig) -> Views:
     if pixel_difference(rig, flat.rig) < PIXEL_TOLERANCE:
         return Views(flat.rig)
     rays = flat.rig.left.rays(pixel_grid(flat.rig.left))  # (H, W, 3), the same for both views
-    source_px = {side: rig.camera(side).project(rays @ flat.R_view_camera[side]) for side in rig.sides}
+    source_px = {}
+    for side in rig.sides:
+        rays_camera = rays @ flat.R_view_camera[side]
+        source_px[side] = rig.camera(side).project(rays_camera)
     return Views(flat.rig, source_px)
 
 
@@ -177,7 +180,9 @@ def png_frames(sequence: Sequence, views: Views) -> Iterator[PngFrame]:
     """The pictures as PNG files of these views; files that are PNG already and not resampled are kept."""
     for frame in sequence.encoded_frames():
         recorded: dict[Side, bytes | None] = {"left": frame.left, "right": frame.right}
-        pictures = {side: _as_png(sequence.rig, views, side, recorded[side], frame.form) for side in views.rig.sides}
+        pictures = {}
+        for side in views.rig.sides:
+            pictures[side] = _as_png(sequence.rig, views, side, recorded[side], frame.form)
         yield PngFrame(frame.index, frame.t_ns, pictures)
 
 

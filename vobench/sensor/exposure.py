@@ -158,7 +158,8 @@ def step(
     newest = pending[-1]
     error = math.log(_level(target) / _level(newest))
     if abs(error) > _dead_band(loop, linear_of_grey):
-        newest = _within(loop, _level(newest) * math.exp((1 - loop.damping) * error))
+        correction = math.exp((1 - loop.damping) * error)
+        newest = _within(loop, _level(newest) * correction)
     return (*pending[1:], newest)
 
 

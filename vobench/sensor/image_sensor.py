@@ -260,8 +260,9 @@ class CameraSettings:
     def eye(self, side: Literal["left", "right"]) -> "CameraSettings":
         """The settings of one of the two cameras."""
         eye: Eye = getattr(self.unlike, side)
-        overrides = {key: value for key, value in asdict(eye).items() if value is not None}
-        del overrides["gain"]
+        settings_of_eye = asdict(eye)
+        del settings_of_eye["gain"]
+        overrides = {key: value for key, value in settings_of_eye.items() if value is not None}
         return replace(self, exposure_gain=self.exposure_gain * eye.gain, **overrides)
 
     @property

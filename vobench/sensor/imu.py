@@ -84,8 +84,9 @@ def read_out(
     White noise of a density has the standard deviation density / √step in the mean over a step, so that readings at a
     lower rate are less noisy. Source: Kalibr's IMU noise model.
     """
+    gain = np.asarray(triad.gain)
     white_std = triad.noise / sqrt(step_s)
-    readings: Array = true @ np.asarray(triad.gain).T + bias + white_std * draws
+    readings: Array = true @ gain.T + bias + white_std * draws
     if triad.limit is not None:
         readings = np.clip(readings, -triad.limit, triad.limit)
     if triad.step:
@@ -100,7 +101,8 @@ def reading_stamps(motion: Motion, rate_hz: float) -> Stamps:
     """Stamps (M,) index / rate from a motion's start up to its end."""
     duration_ns = motion.end_ns - motion.start_ns
     count = int(duration_ns * rate_hz / NS_PER_S) + 2  # with one or two that lie beyond the end
-    offsets_ns = np.rint(np.arange(count) * float(NS_PER_S) / rate_hz).astype(np.int64)
+    exact_ns = np.arange(count) * float(NS_PER_S) / rate_hz
+    offsets_ns = np.rint(exact_ns).astype(np.int64)
     stamps: Stamps = motion.start_ns + offsets_ns[offsets_ns <= duration_ns]
     return stamps
 
@@ -153,7 +155,8 @@ def _means_between(
 
     first_pieces = np.searchsorted(ends_ns, edges_ns[:-1])  # of each interval between edges
     duration_ns = np.add.reduceat(2 * half_ns, first_pieces)
-    means: Array = np.add.reduceat(integrals, first_pieces, axis=1) / duration_ns[:, None]
+    totals = np.add.reduceat(integrals, first_pieces, axis=1)
+    means: Array = totals / duration_ns[:, None]
     return means
 
 

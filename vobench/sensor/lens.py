@@ -90,10 +90,12 @@ def vignetting(
     overlap at that angle. The share is 0 from 90° on (with `strength` above 0), and where a ray is NaN.
     Source: Asada et al. (1996).
     """
-    cosine = np.clip(rays[..., 2] / np.linalg.norm(rays, axis=-1), 0.0, 1.0)
+    length = np.linalg.norm(rays, axis=-1)
+    cosine = np.clip(rays[..., 2] / length, 0.0, 1.0)
     share: Array = cosine ** (4 * strength)
     if cutoff_deg is not None:
-        tangent = np.sqrt(1 - cosine**2) / np.maximum(cosine, 1e-9)
+        sine = np.sqrt(1 - cosine**2)
+        tangent = sine / np.maximum(cosine, 1e-9)
         distance = np.minimum(tangent / np.tan(np.deg2rad(cutoff_deg)), 1.0)  # of the discs, in diameters
         overlap = np.arccos(distance) - distance * np.sqrt(1 - distance**2)
         share = share * 2 / np.pi * overlap
@@ -105,8 +107,9 @@ def blur(radiance: Radiance, transfer: Array) -> Radiance:
     spectrum = scipy.fft.dctn(radiance.astype(np.float64))
     blurred = scipy.fft.idctn(spectrum * transfer, overwrite_x=True)
     # Rounding may leave -1e-17 where there was no light.
-    positive: Radiance = np.maximum(blurred, 0.0, out=blurred).astype(np.float32)
-    return positive
+    np.maximum(blurred, 0.0, out=blurred)
+    single: Radiance = blurred.astype(np.float32)
+    return single
 
 
 def gaussian_transfer(shape: tuple[int, int], sigma_px: float) -> Array:
@@ -146,7 +149,8 @@ def flare_transfer(
     veil = np.exp(-VEIL_SCALE * width * np.pi * frequency)
     half_turn = np.where(np.add.outer(rows, columns) % 2, -1.0, 1.0)
     reflection = half_turn * gaussian_transfer(shape, GHOST_SPREAD * width)
-    transfer: Array = (1 - flare - ghost) * direct + flare * veil + ghost * reflection
+    direct_share = 1 - flare - ghost
+    transfer: Array = direct_share * direct + flare * veil + ghost * reflection
     return transfer
 
 
@@ -241,7 +245,8 @@ def _specks(shape: tuple[int, int], rng: np.random.Generator) -> Array:
         middle_u = rng.uniform(0, width)
         radius_px = rng.uniform(*SPECK_RADII) * width
         distance = np.hypot(v - middle_v, u - middle_u) / radius_px  # in radii
-        thickness += rng.uniform(0.3, 1.0) * np.clip(3 * (1 - distance), 0.0, 1.0)
+        profile = np.clip(3 * (1 - distance), 0.0, 1.0)
+        thickness += rng.uniform(0.3, 1.0) * profile
     return thickness
 
 

@@ -106,8 +106,9 @@ def picture(channel: str, values: NDArray[np.generic]) -> Picture:
         return _flow(values.astype(np.float64))
     if channel in {"instance", "material"}:
         return _ids(values.astype(np.int64))
-    largest = max(1, int(values.astype(np.int64).max(initial=0)))
-    grey = _rounded(255 * (values.astype(np.float64) / largest))
+    largest = int(values.astype(np.int64).max(initial=0))
+    share = values.astype(np.float64) / max(1, largest)
+    grey = _rounded(255 * share)
     return np.repeat(grey[..., None], 3, -1)
 
 
@@ -120,7 +121,8 @@ def _depth(depth_m: NDArray[np.float64]) -> Picture:
     farthest = np.log(known_m.max())
     last = len(NEAR_TO_FAR) - 1
     with np.errstate(invalid="ignore", divide="ignore"):
-        place = (np.log(depth_m) - nearest) / max(farthest - nearest, 1e-9) * last  # in the colour map
+        share = (np.log(depth_m) - nearest) / max(farthest - nearest, 1e-9)
+    place = share * last  # in the colour map
     places = np.arange(last + 1)
     channels = [np.interp(place, places, channel) for channel in NEAR_TO_FAR.T]
     return _rounded(np.stack(channels, -1))
@@ -132,7 +134,9 @@ def _flow(flow_px: NDArray[np.float64]) -> Picture:
     full_px = 1.0
     if is_known.any():
         full_px = max(float(np.percentile(speed_px[is_known], FLOW_PERCENTILE)), 1e-6)
-    direction: Shares = np.arctan2(flow_px[..., 1], flow_px[..., 0]) / (2 * np.pi)  # in turns
+    right_px = flow_px[..., 0]
+    down_px = flow_px[..., 1]
+    direction: Shares = np.arctan2(down_px, right_px) / (2 * np.pi)  # in turns
     strength = np.minimum(speed_px / full_px, 1)
     return _rounded(255 * _wheel(direction, strength))
 

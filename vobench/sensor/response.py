@@ -28,7 +28,8 @@ class Srgb:
     def encode(self, linear: Array) -> Array:
         """Stored value in 0..1 of a linear signal in 0..1."""
         line = 12.92 * linear
-        power: Array = 1.055 * np.maximum(linear, SRGB_KNEE_LINEAR) ** (1 / 2.4) - 0.055
+        above_knee = np.maximum(linear, SRGB_KNEE_LINEAR)
+        power: Array = 1.055 * above_knee ** (1 / 2.4) - 0.055
         return np.where(linear <= SRGB_KNEE_LINEAR, line, power)
 
     def decode(self, stored: Array) -> Array:
@@ -81,17 +82,23 @@ class Table:
 
     def encode(self, linear: Array) -> Array:
         """Stored value in 0..1 of a linear signal in 0..1."""
-        stored: Array = np.interp(linear, *self._knots)
+        stored: Array = np.interp(linear, self._linear, self._stored)
         return stored
 
     def decode(self, stored: Array) -> Array:
         """Linear signal in 0..1 of a stored value in 0..1."""
-        linear: Array = np.interp(stored, *self._knots[::-1])
+        linear: Array = np.interp(stored, self._stored, self._linear)
         return linear
 
     @property
-    def _knots(self) -> tuple[Array, Array]:
-        return np.array(self.inverse) / self.inverse[-1], np.linspace(0, 1, len(self.inverse))
+    def _linear(self) -> Array:
+        """The linear signals of the knots, from 0 to 1."""
+        return np.array(self.inverse) / self.inverse[-1]
+
+    @property
+    def _stored(self) -> Array:
+        """The stored values of the knots, from 0 to 1."""
+        return np.linspace(0, 1, len(self.inverse))
 
 
 Response = Srgb | Power | Table

@@ -64,7 +64,8 @@ class Bag:
 
     def raw(self, topics: Iterable[Topic]) -> Iterator[tuple[Topic, memoryview]]:
         """The serialised messages of those topics that exist, in order of time, one chunk in memory at a time."""
-        topic_of = {self._channel(topic): topic for topic in topics if self.has(topic)}  # by channel
+        existing = [topic for topic in topics if self.has(topic)]
+        topic_of = {self._channel(topic): topic for topic in existing}
         last_ns = 0
         with parsing(self.path), BoundedFile(self.path) as stream:
             for chunk, counts in zip(self.summary.chunk_indexes, self.counts, strict=True):
@@ -142,11 +143,11 @@ class Bag:
 
     def note(self, name: str) -> dict[str, str]:
         """The entries of a metadata record; none where there is no such record. Raises SequenceError if damaged."""
-        place = next((entry.offset for entry in self.summary.metadata_indexes if entry.name == name), None)
-        if place is None:
+        places = {entry.name: entry.offset for entry in reversed(self.summary.metadata_indexes)}
+        if name not in places:
             return {}
         with parsing(self.path), BoundedFile(self.path) as stream:
-            entries = dict(read_record(stream, place, Metadata).metadata)
+            entries = dict(read_record(stream, places[name], Metadata).metadata)
             stated = entries.pop(NOTE_CHECKSUM, None)
             if stated is not None and stated != note_checksum(entries):
                 raise ValueError(f"the checksum of the note {name!r} differs from its content")
@@ -158,9 +159,12 @@ class Bag:
 
     def attachment(self, name: str) -> bytes:
         """The attached file of that name. Raises SequenceError where there is none, or it is damaged."""
-        place = next((entry.offset for entry in self.summary.attachment_indexes if entry.name == name), None)
-        if place is None:
+        places = {
+            entry.name: entry.offset for entry in reversed(self.summary.attachment_indexes)
+        }  # the first of a name
+        if name not in places:
             raise SequenceError(f"no attachment {name!r} in {self.path}")
+        place = places[name]
         with parsing(self.path), BoundedFile(self.path) as stream:
             data = bytes(read_record(stream, place, Attachment).data)
             record_end = stream.tell()
@@ -197,9 +201,10 @@ def _chunk_stamps(
     """Log times in ns (N,) of a channel's messages in a chunk. Raises ValueError where they can't be those."""
     place = chunk.message_index_offsets[channel]
     index = read_record(stream, place, MessageIndex)
-    stamps = np.array([log_ns for log_ns, _ in index.records], np.int64)
-    first_ns = chunk.message_start_time
-    last_ns = chunk.message_end_time
-    if len(stamps) != count or stamps.min() < first_ns or stamps.max() > last_ns:
+    logged_ns = [log_ns for log_ns, _ in index.records]
+    stamps = np.array(logged_ns, np.int64)
+    starts_too_early = min(logged_ns, default=0) < chunk.message_start_time
+    ends_too_late = max(logged_ns, default=0) > chunk.message_end_time
+    if len(stamps) != count or starts_too_early or ends_too_late:
         raise ValueError(f"the message index at {place} has stamps that its chunk does not have")
     return stamps

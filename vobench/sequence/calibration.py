@@ -33,13 +33,15 @@ def write_mounts(bag: BagWriter, rig: Rig, t_ns: int) -> None:
         T_body[ros.RIGHT] = rig.T_body_right
     if rig.imu:
         T_body[ros.IMU_FRAME] = rig.imu.T_body_imu
-    bag.write(ros.TF_STATIC, t_ns, serialise(ros.transforms(t_ns, ros.BODY, T_body)))
+    transforms = ros.transforms(t_ns, ros.BODY, T_body)
+    bag.write(ros.TF_STATIC, t_ns, serialise(transforms))
 
 
 def read_rig(bag: Bag, info_topics: Sequence[ros.Topic]) -> Rig:
     """The rig of a bag, by the topics of its left and right camera. Raises SequenceError where that is wrong."""
     bag.require((ros.TF_STATIC, info_topics[0]))
-    cameras = [ros.camera(_first(bag, topic)) for topic in info_topics if bag.has(topic)]
+    existing = [topic for topic in info_topics if bag.has(topic)]
+    cameras = [ros.camera(_first(bag, topic)) for topic in existing]
     T_body = {}
     for stamped in _first(bag, ros.TF_STATIC).transforms:
         T_body[stamped.child_frame_id] = ros.poses(ros.pose_fields(stamped.transform))

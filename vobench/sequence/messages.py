@@ -344,7 +344,9 @@ def pose_fields(message: Any) -> tuple[float, ...]:
     """Translation and quaternion (x, y, z, qx, qy, qz, qw) of a Transform or a Pose."""
     t = message.translation if hasattr(message, "translation") else message.position
     q = message.rotation if hasattr(message, "rotation") else message.orientation
-    return t.x, t.y, t.z, q.x, q.y, q.z, q.w
+    translation = (t.x, t.y, t.z)
+    quaternion = (q.x, q.y, q.z, q.w)
+    return translation + quaternion
 
 
 def poses(fields: ArrayLike) -> Array:

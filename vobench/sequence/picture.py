@@ -106,7 +106,8 @@ def decode(
     """
     _, height, width = require_picture(encoded, camera, name, colour=colour)
     image = cv2.imdecode(np.frombuffer(encoded, np.uint8), cv2.IMREAD_UNCHANGED)
-    if image is None or image.shape != _shape(height, width, colour) or image.dtype != np.uint8:
+    expected = _shape(height, width, colour)
+    if image is None or image.shape != expected or image.dtype != np.uint8:
         raise SequenceError(f"not a whole 8-bit {_colour_word(colour)} PNG or JPEG: {name}")
     in_rgb_order = np.ascontiguousarray(image[..., ::-1]) if colour == RGB else image
     return in_rgb_order.astype(np.uint8, copy=False)

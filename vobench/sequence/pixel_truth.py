@@ -72,7 +72,9 @@ def check_truth(
     side: Side,
 ) -> None:
     """Raise SequenceError unless the frame has exactly these channels, in the camera's size and their own types."""
-    actual = {name: (values.shape, values.dtype.name) for name, values in frame.channels().items()}
+    actual = {}
+    for name, values in frame.channels().items():
+        actual[name] = (values.shape, values.dtype.name)
     expected = {}
     for name in channels:
         kind = CHANNELS[name]

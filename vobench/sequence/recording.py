@@ -84,7 +84,8 @@ def _read(path: Path, topic: str | None) -> tuple[Stamps, Array]:
 
 def _trajectory(t_ns: Stamps, fields: Array, path: Path) -> Trajectory:
     _require_valid(t_ns, fields, path)
-    fields[:, 3:] /= np.linalg.norm(fields[:, 3:], axis=1, keepdims=True)
+    norm = np.linalg.norm(fields[:, 3:], axis=1, keepdims=True)
+    fields[:, 3:] /= norm
     return Trajectory(t_ns, ros.poses(fields))
 
 
@@ -198,7 +199,8 @@ def _require_valid(t_ns: Stamps, fields: Array, path: Path) -> None:
     """Raise SequenceError unless poses are finite with unit quaternions, and stamps increase."""
     with np.errstate(over="ignore", invalid="ignore"):
         norm = np.linalg.norm(fields[:, 3:], axis=1)
-    is_valid = np.isfinite(fields).all(1) & (np.abs(norm - 1) <= NORM_TOLERANCE)
+    is_unit = np.abs(norm - 1) <= NORM_TOLERANCE
+    is_valid = np.isfinite(fields).all(1) & is_unit
     if not is_valid.all():
         row = int(np.flatnonzero(~is_valid)[0])
         numbers = ", ".join(f"{value:g}" for value in fields[row])

@@ -69,7 +69,8 @@ class SequenceWriter:
         with ExitStack() as stack:
             # Contexts end in reverse order: where there is a file of the sensors, the truth is whole.
             self._sensors = stack.enter_context(sensors)
-            self._truth = stack.enter_context(BagWriter(folder / ros.TRUTH_FILE, topics, encoded=False))
+            truth = BagWriter(folder / ros.TRUTH_FILE, topics, encoded=False)
+            self._truth = stack.enter_context(truth)
             if case_json is not None:
                 self._truth.attach(ros.CASE_ATTACHMENT, "application/json", case_json)
             if self._channels:
@@ -85,7 +86,8 @@ class SequenceWriter:
     def _write_rigs(self, start_ns: int) -> None:
         write_mounts(self._sensors, self._rig, start_ns)
         write_mounts(self._truth, self._true_rig, start_ns)
-        for topic, info in zip(ros.TRUE_INFO_TOPICS, ros.camera_infos(start_ns, self._true_rig), strict=False):
+        infos = ros.camera_infos(start_ns, self._true_rig)
+        for topic, info in zip(ros.TRUE_INFO_TOPICS, infos, strict=False):
             self._truth.write(topic, start_ns, serialise(info))
         for bag in (self._sensors, self._truth):
             bag.flush()
@@ -99,7 +101,8 @@ class SequenceWriter:
         """Add the picture of each camera, (H, W) or (H, W, 3) uint8, with its calibration."""
         form = "png" if self._jpeg_quality is None else "jpeg"
         encoded = []
-        for side, name, picture in zip(self._rig.sides, NAMES, self._present(left, right), strict=False):
+        pictures = self._present(left, right)
+        for side, name, picture in zip(self._rig.sides, NAMES, pictures, strict=False):
             camera = self._rig.camera(side)
             encoded.append(encode(picture, camera, name, jpeg_quality=self._jpeg_quality, colour=self._colour))
         self._write_pictures(t_ns, encoded, form)
@@ -114,7 +117,8 @@ class SequenceWriter:
         """Add pictures that are 8-bit PNG or JPEG already, bit for bit; `form` is png or jpeg."""
         encoded = self._present(left, right)
         for side, name, picture in zip(self._rig.sides, NAMES, encoded, strict=False):
-            actual, _, _ = require_picture(picture, self._rig.camera(side), name, colour=self._colour)
+            camera = self._rig.camera(side)
+            actual, _, _ = require_picture(picture, camera, name, colour=self._colour)
             if actual != form:
                 raise SequenceError(f"{name} should be {form} but is {actual}")
         self._write_pictures(t_ns, encoded, form)
@@ -172,7 +176,9 @@ class SequenceWriter:
 
     def write_imu_bias(self, t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike) -> None:
         """Add the biases in the IMU's readings, (3,) each, which vary slowly."""
-        message = ros.message(ros.IMU_BIAS, t_ns, ros.IMU_FRAME, ros.vector(gyro_radps), ros.vector(accel_mps2))
+        gyro = ros.vector(gyro_radps)
+        accel = ros.vector(accel_mps2)
+        message = ros.message(ros.IMU_BIAS, t_ns, ros.IMU_FRAME, gyro, accel)
         self._truth.write(ros.IMU_BIAS, int(t_ns), serialise(message))
 
     def write_disturbance(self, t_ns: int, slip: ArrayLike, push: ArrayLike) -> None:
