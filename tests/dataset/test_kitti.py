@@ -13,7 +13,7 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.sequence import Sequence, read_truth
 
-POSES = Path(__file__).parents[4] / "shared" / "data" / "trajectories" / "KITTI_00_gt.txt"
+POSES = Path(__file__).parents[3] / "shared" / "data" / "trajectories" / "KITTI_00_gt.txt"
 LEVEL = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))  # ahead, left, up of a camera's right, down, ahead
 TIMES = POSES.with_name("KITTI_00_gt_times.txt")
 

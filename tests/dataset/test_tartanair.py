@@ -12,7 +12,7 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.sequence import Sequence, read_truth
 
-NED = Path(__file__).parents[4] / "shared" / "data" / "trajectories" / "tartanair" / "pose_gt.txt"
+NED = Path(__file__).parents[3] / "shared" / "data" / "trajectories" / "tartanair" / "pose_gt.txt"
 UP = np.diag([1.0, -1.0, -1.0])
 
 
