@@ -205,11 +205,11 @@ def assemble(
     if imu is None:
         rig = replace(rig, imu=None)
 
-    starts_ns = [_checked_start_ns(t_ns, "picture")]
+    starts_ns = [_checked_start_ns(t_ns, "a picture")]
     if truth is not None and len(truth):
-        starts_ns.append(_checked_start_ns(truth.t_ns, "true pose"))
+        starts_ns.append(_checked_start_ns(truth.t_ns, "a true pose"))
     if imu is not None and len(imu.t_ns):
-        starts_ns.append(_checked_start_ns(imu.t_ns, "IMU reading"))
+        starts_ns.append(_checked_start_ns(imu.t_ns, "an IMU reading"))
     return Recording(
         form=form,
         rig=rig,
@@ -241,5 +241,5 @@ def _checked_start_ns(t_ns: Stamps, what: str) -> int:
     last_ns = int(t_ns[-1])
     if first_ns < 0 or last_ns >= END_OF_STAMPS_NS:
         wrong_ns = first_ns if first_ns < 0 else last_ns
-        raise InputError(f"stamps should be within 0 and {END_OF_STAMPS_NS - 1} ns, but a {what} has {wrong_ns}")
+        raise InputError(f"stamps should be within 0 and {END_OF_STAMPS_NS - 1} ns, but {what} has {wrong_ns}")
     return first_ns
