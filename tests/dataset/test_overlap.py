@@ -53,13 +53,13 @@ def test_the_truth_says_how_many_poses_and_pictures_are_without_the_other(
 
 
 def test_what_shares_no_time_is_dropped_with_both_times() -> None:
-    truth, notes = overlapping_truth(truth_at([1, 2]), np.array([5, 7]))
+    truth, notes = overlapping_truth(truth_at([1, 2, 3]), np.array([5, 6, 7]))
     assert truth is None
-    assert notes == ["The truth (1 to 2 ns) was dropped: it shares no time with the pictures (5 to 7 ns)."]
-    readings = ImuReadings(np.array([8, 9]), np.zeros((2, 3)), np.zeros((2, 3)))
-    imu, notes = overlapping_imu(readings, np.array([5, 7]))
+    assert notes == ["The truth (1 to 3 ns) was dropped: it shares no time with the pictures (5 to 7 ns)."]
+    readings = ImuReadings(np.array([8, 9, 11]), np.zeros((3, 3)), np.zeros((3, 3)))
+    imu, notes = overlapping_imu(readings, np.array([5, 6, 7]))
     assert imu is None
-    assert notes == ["The IMU (8 to 9 ns) was dropped: it shares no time with the pictures (5 to 7 ns)."]
+    assert notes == ["The IMU (8 to 11 ns) was dropped: it shares no time with the pictures (5 to 7 ns)."]
 
 
 def test_readings_stay_together_and_their_durations_are_in_seconds() -> None:
