@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vobench.dataset.calibration_file import read_yaml
-from vobench.dataset.euroc import ImuSensor, read_imu_csv, sensor_camera
+from vobench.dataset.euroc import SensorYamlImu, read_imu_csv, sensor_camera
 from vobench.dataset.kalibr import ImuDensities, read_camchain, read_imu
 from vobench.dataset.kitti import read_calibration
 from vobench.dataset.picture import read_text
@@ -198,7 +198,7 @@ def test_calibrations(tmp_path, data):
     path = tmp_path / "any.yaml"
     for read in (
         sensor_camera,
-        lambda p: read_yaml(p).checked(ImuSensor),
+        lambda p: read_yaml(p).checked(SensorYamlImu),
         lambda p: read_yaml(p).checked(ImuDensities),
         read_camchain,
         lambda p: read_imu(p, np.eye(4)),

@@ -44,7 +44,7 @@ MOST_WAITING = 64  # pictures held until their partner comes
 
 
 @dataclass(frozen=True, slots=True)
-class Contents:
+class BagContents:
     """What one pass through a bag finds: stamps by topic, first messages by topic, the IMU's readings, /tf_static."""
 
     stamps: dict[str, Stamps]
@@ -124,7 +124,7 @@ def _require_ros2(path: Path) -> None:
     raise InputError(f"an MCAP file {problem}; {advice}: {path}")
 
 
-def _contents(reader: Any, chosen: Chosen, path: Path) -> Contents:
+def _contents(reader: Any, chosen: Chosen, path: Path) -> BagContents:
     """Read the chosen topics once, without decoding or keeping pictures. Raises InputError."""
     wanted = {*chosen.sensors, ros.TF_STATIC.name, chosen.truth_topic}
     first_only = (chosen.truth_topic, chosen.left_info, chosen.right_info)
@@ -155,7 +155,7 @@ def _contents(reader: Any, chosen: Chosen, path: Path) -> Contents:
     imu = None
     if chosen.imu in stamps:
         imu = _readings(chosen.imu, stamps[chosen.imu], readings, path)
-    return Contents(stamps, first, imu, tree_of(static, str(path)))
+    return BagContents(stamps, first, imu, tree_of(static, str(path)))
 
 
 def _require_pictures(
@@ -217,7 +217,7 @@ class _Pictures(NamedTuple):
 def _pictures(
     path: Path,
     chosen: Chosen,
-    contents: Contents,
+    contents: BagContents,
     options: ReadOptions,
 ) -> _Pictures:
     left_ns = contents.stamps[chosen.left]
@@ -262,7 +262,7 @@ def _read_pictures(
                 due += 1
 
 
-def _body(chosen: Chosen, contents: Contents) -> tuple[str | None, Notes]:
+def _body(chosen: Chosen, contents: BagContents) -> tuple[str | None, Notes]:
     """The body's frame, None for the left camera, and the note on it.
 
     It is the frame of the truth, else base_link, if /tf_static connects it with the left camera.
@@ -281,7 +281,7 @@ def _body(chosen: Chosen, contents: Contents) -> tuple[str | None, Notes]:
     return None, (f"The body is the left camera{assumed}.",)
 
 
-def _truth_frame(chosen: Chosen, contents: Contents) -> str:
+def _truth_frame(chosen: Chosen, contents: BagContents) -> str:
     """The frame whose poses the truth has; empty where it is not named."""
     child = chosen.truth_frames.rpartition(".")[2]
     if child:
@@ -293,7 +293,7 @@ def _truth_frame(chosen: Chosen, contents: Contents) -> str:
 def _rig(
     path: Path,
     chosen: Chosen,
-    contents: Contents,
+    contents: BagContents,
     body: str | None,
     options: ReadOptions,
 ) -> CalibratedRig:
@@ -328,7 +328,7 @@ def _chain_rig(chain: Path, count: int) -> CalibratedRig:
 def _imu(
     path: Path,
     chosen: Chosen,
-    contents: Contents,
+    contents: BagContents,
     body: str | None,
     options: ReadOptions,
 ) -> CalibratedImu:

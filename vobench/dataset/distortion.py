@@ -25,8 +25,8 @@ def focal_camera(
 ) -> Camera:
     """The camera of fx, fy, cx, cy and a distortion model by any of its names. Raises InputError naming `place`."""
     if len(focal_px) != 4 or not all(focal > 0 for focal in focal_px[:2]):
-        found = list(focal_px)
-        raise InputError(f"{place}: a camera should have fx, fy, cx, cy with fx and fy above 0, but has {found}")
+        actual = list(focal_px)
+        raise InputError(f"{place}: a camera should have fx, fy, cx, cy with fx and fy above 0, but has {actual}")
 
     name = model.strip().lower()
     is_undistorted = not any(coefficients)

@@ -38,7 +38,7 @@ IMU_COLUMNS = ("t", "wx", "wy", "wz", "ax", "ay", "az")
 
 
 @dataclass(frozen=True, slots=True)
-class CameraSensor:
+class SensorYamlCamera:
     """The sensor.yaml of a camera."""
 
     camera_model: Text
@@ -50,7 +50,7 @@ class CameraSensor:
 
 
 @dataclass(frozen=True, slots=True)
-class ImuSensor:
+class SensorYamlImu:
     """The keys of an IMU's sensor.yaml besides the densities of its noise."""
 
     rate_hz: AboveZero
@@ -58,7 +58,7 @@ class ImuSensor:
 
 
 @dataclass(frozen=True, slots=True)
-class Mount:
+class SensorYamlMount:
     """The key of any sensor.yaml that says where the sensor is on the body; None where it does not say."""
 
     T_BS: RigidTransform | None = None
@@ -67,7 +67,7 @@ class Mount:
 def sensor_camera(path: Path) -> MountedCamera:
     """The camera of a sensor.yaml. Raises InputError."""
     file = read_yaml(path)
-    sensor = file.checked(CameraSensor)
+    sensor = file.checked(SensorYamlCamera)
     width, height = sensor.resolution
     size_px = (int(width), int(height))
     if sensor.camera_model == kalibr.DOUBLE_SPHERE and len(sensor.intrinsics) == 6:
@@ -112,7 +112,7 @@ def sensor_mount(folder: Path) -> Array | None:
     path = folder / SENSOR
     if not path.is_file():
         return None
-    return read_yaml(path).checked(Mount).T_BS
+    return read_yaml(path).checked(SensorYamlMount).T_BS
 
 
 def _is_asl(folder: Path) -> bool:
@@ -228,7 +228,7 @@ def _imu(root: Path, folder: Path, options: ReadOptions) -> CalibratedImu:
     readings = read_imu_csv(data)
     file = read_yaml(sensor)
     densities = file.checked(kalibr.ImuDensities)
-    imu = file.checked(ImuSensor)
+    imu = file.checked(SensorYamlImu)
     return CalibratedImu(readings, densities.calibration(imu.T_BS, imu.rate_hz), ())
 
 

@@ -75,9 +75,9 @@ def photometry_of(case: Mapping[str, Any] | None) -> Photometry | None:
         return None
 
 
-def _differ(eyes: Mapping[str, Mapping[str, Any]]) -> bool:
+def _differ(unlike: Mapping[str, Mapping[str, Any]]) -> bool:
     """Whether the settings of each camera change anything: None and a gain of 1 don't."""
-    values = [value for eye in eyes.values() for value in eye.values()]
+    values = [value for camera in unlike.values() for value in camera.values()]
     return any(value not in (None, 1) for value in values)
 
 
