@@ -70,18 +70,10 @@ if TYPE_CHECKING:
     from vobench.dataset.layout import Layout, Writing
     from vobench.dataset.picture import Picture as RecordedPicture
     from vobench.dataset.picture import unread
-    from vobench.dataset.recording import (
-        PictureStream,
-        ReadOptions,
-        RecordedFrame,
-        Recording,
-        Topics,
-        assemble,
-        numbered,
-        picture_files,
-        truth_file,
-    )
+    from vobench.dataset.picture_list import numbered, picture_files
+    from vobench.dataset.recording import PictureStream, ReadOptions, RecordedFrame, Recording, Topics, assemble
     from vobench.dataset.source import ExportSource, Views, png_frames, rectified
+    from vobench.dataset.truth_file import truth_file
     from vobench.errors import InputError, SequenceError, SettingError, VobenchError
     from vobench.estimator.pose import (
         DisparityOffset,
@@ -207,9 +199,9 @@ HOMES = {
     "Recording": "vobench.dataset.recording",
     "Topics": "vobench.dataset.recording",
     "assemble": "vobench.dataset.recording",
-    "numbered": "vobench.dataset.recording",
-    "picture_files": "vobench.dataset.recording",
-    "truth_file": "vobench.dataset.recording",
+    "numbered": "vobench.dataset.picture_list",
+    "picture_files": "vobench.dataset.picture_list",
+    "truth_file": "vobench.dataset.truth_file",
     "ExportSource": "vobench.dataset.source",
     "Views": "vobench.dataset.source",
     "png_frames": "vobench.dataset.source",

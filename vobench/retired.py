@@ -61,7 +61,7 @@ MOVED = {
         "read_text": "vobench.dataset.picture.read_text",
         "unread": "vobench.plugin.unread",
     },
-    "vobench.dataset.reproject": {"check_path": "vobench.dataset.source.check_path"},
+    "vobench.dataset.reproject": {"check_path": "vobench.dataset.read_back.check_path"},
     "vobench.dataset.stream": {
         "PictureStream": "vobench.plugin.PictureStream",
         "Shot": "vobench.plugin.RecordedFrame",

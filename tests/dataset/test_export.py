@@ -175,7 +175,7 @@ def test_a_pair_above_each_other_is_no_kitti_pair_but_keeps_in_euroc(
 ) -> None:
     up = se3.transform(np.eye(3), [0.0, -0.1, 0.0])
     made = make_sequence(rig_of(T_left_right=up))
-    with pytest.raises(SequenceError, match="nothing rectifies the pair"):
+    with pytest.raises(SequenceError, match="so the pair cannot be rectified"):
         export(made.folder, tmp_path / "kitti", "kitti")
     assert export(made.folder, tmp_path / "euroc", "euroc").files
 
@@ -186,7 +186,7 @@ def test_kitti_leaves_out_frames_without_truth_and_says_so(make_sequence: Make, 
     exported = export(made.folder, tmp_path / "out", "kitti")
     assert sum(name.startswith("image_0") for name in exported.files) == 3
     assert any(note.startswith("2 of 5 frames lie before or after") for note in exported.notes)
-    assert any("2 poses lie between true ones" in note for note in exported.notes)
+    assert any("2 poses were interpolated between true ones" in note for note in exported.notes)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -211,7 +211,7 @@ def test_a_declared_calibration_error_is_said(rig_of: Callable[..., Rig], make_s
     told = rig_of()
     made = make_sequence(told, true_rig=true_rig(told, CalibrationError(focal_ratio=0.01, baseline_ratio=0.02)))
     notes = export(made.folder, tmp_path / "out", "euroc").notes
-    assert any("estimators are told" in note for note in notes)
+    assert any("the nominal one, which estimators are given" in note for note in notes)
     bag = export(made.folder, tmp_path / "bag", "ros2")
     assert any("/ground_truth/tf_static" in note for note in bag.notes)
     with AnyReader([tmp_path / "bag"]) as reader:
@@ -270,7 +270,7 @@ def test_a_chain_that_puts_the_imu_elsewhere_is_refused(
         return camchain(replace(rig, imu=replace(rig.imu, T_body_imu=T_body_imu)), *more)
 
     monkeypatch.setattr(exporting.kalibr, "camchain", nudged)
-    with pytest.raises(SequenceError, match=r"camchain\.yaml, read back, puts the IMU \d\.\d*e-09 beside"):
+    with pytest.raises(SequenceError, match=r"camchain\.yaml, read back, puts the IMU \d\.\d*e-09 from its place"):
         export(made.folder, tmp_path / "out", form)
 
 
@@ -337,6 +337,6 @@ def test_a_file_that_is_there_and_an_unknown_form_are_sentences(tmp_path: Path) 
     for form in ("kitti", "tum"):
         if form == "tum":
             file.write_text("mine")
-        with pytest.raises(InputError, match="there is a file already"):
+        with pytest.raises(InputError, match="the file exists already"):
             export_trajectory(path, file, form)
     assert (tmp_path / "path.times.txt").read_bytes() == before[tmp_path / "path.times.txt"]

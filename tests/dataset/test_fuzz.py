@@ -6,11 +6,13 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vobench.dataset.euroc import read_imu_csv, sensor_camera
-from vobench.dataset.kalibr import imu_numbers, read_camchain, read_imu, read_yaml
+from vobench.dataset.calibration_file import read_yaml
+from vobench.dataset.euroc import SensorYamlImu, read_imu_csv, sensor_camera
+from vobench.dataset.kalibr import ImuDensities, read_camchain, read_imu
 from vobench.dataset.kitti import read_calibration
 from vobench.dataset.picture import read_text
-from vobench.dataset.recording import read_list, read_truth_file
+from vobench.dataset.picture_list import read_list
+from vobench.dataset.truth_file import read_truth_file
 from vobench.errors import VobenchError
 from vobench.trajectory.formats import parse_times
 from vobench.trajectory.trajectory import Trajectory
@@ -195,8 +197,9 @@ def test_matrices_of_kitti(tmp_path, data):
 def test_calibrations(tmp_path, data):
     path = tmp_path / "any.yaml"
     for read in (
-        lambda p: sensor_camera(read_yaml(p)),
-        lambda p: (values := read_yaml(p)) and imu_numbers(values, values.transform("T_BS"), ("rate_hz",), ()),
+        sensor_camera,
+        lambda p: read_yaml(p).checked(SensorYamlImu),
+        lambda p: read_yaml(p).checked(ImuDensities),
         read_camchain,
         lambda p: read_imu(p, np.eye(4)),
     ):

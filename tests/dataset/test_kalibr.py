@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from vobench.dataset.kalibr import camchain, imu_yaml, number, read_camchain, read_imu
-from vobench.dataset.source import PIXEL_TOLERANCE, check_rig, known_points, pixel_difference
+from vobench.dataset.read_back import check_rig, pixel_difference
 from vobench.errors import InputError, SequenceError
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera, DoubleSphere, Equirectangular
+from vobench.geometry.camera import DoubleSphere, Equirectangular
 from vobench.geometry.rig import PRESETS, ImuCalibration, Rig, mounted
 from vobench.sensor.imu import IMUS
 
@@ -111,10 +111,10 @@ def test_a_camera_that_sees_all_around_is_refused_with_a_sentence(rig_of: Callab
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("camera_model: pinhole", "camera_model: omni"), "cam0 is omni"),
+        (("camera_model: pinhole", "camera_model: omni"), "cam0.camera_model should be pinhole .* but is omni with 4"),
         (("  resolution: [752, 480]\n", ""), "cam0.resolution is missing"),
         (("distortion_model: radtan", "distortion_model: fov"), "distortion model 'fov'"),
-        (("cam0:", "cam7:"), "cam0.camera_model is missing"),
+        (("cam0:", "cam7:"), "the key cam0 is missing; the keys beside it are cam7, cam1"),
     ],
 )
 def test_a_chain_that_says_something_else_is_refused_by_file_and_key(
@@ -164,7 +164,7 @@ def test_what_kalibr_refuses_is_refused_by_name(value: float) -> None:
 def test_an_imu_with_less_than_no_noise_or_no_rate_is_none(key: str, value: str, tmp_path: Path) -> None:
     path = tmp_path / "imu.yaml"
     path.write_text(re.sub(f"{key}: .*", f"{key}: {value}", imu_yaml(MPU, topic="/imu")), encoding="utf-8")
-    with pytest.raises(InputError, match=rf"imu\.yaml: {key} should be (above 0|0 or more), but is"):
+    with pytest.raises(InputError, match=rf"imu\.yaml: {key} should be (greater than 0|0 or more), but is"):
         read_imu(path, np.eye(4))
 
 
@@ -172,40 +172,3 @@ def test_a_head_as_opencv_wants_it_is_passed_over(rig_of: Callable[..., Rig], tm
     rig = rig_of(imu=True)
     headed = read_camchain(written(tmp_path, "%YAML:1.0 # for OpenVINS\n\n" + camchain(rig)))
     assert pixel_difference(rig, headed) < 1e-9
-
-
-@pytest.mark.parametrize("field", ["fx_px", "cy_px", "k1", "p2"])
-def test_a_lens_off_by_little_is_found_by_the_points(field: str) -> None:
-    rig = preset_rig("euroc")
-    off: Camera = replace(rig.left, **{field: getattr(rig.left, field) * (1 + 1e-6) + 1e-6})  # type: ignore[type-var]
-    assert PIXEL_TOLERANCE < pixel_difference(rig, replace(rig, left=off)) < 0.1
-    with pytest.raises(SequenceError, match="known points come to lie"):
-        check_rig("the chain", rig, replace(rig, left=off))
-
-
-def test_a_moved_right_camera_or_imu_or_a_missing_one_is_found(rig_of: Callable[..., Rig]) -> None:
-    rig = rig_of(imu=True)
-    assert rig.imu
-    assert rig.T_body_right is not None
-    nudge = se3.transform(np.eye(3), [0.0, 1e-6, 0.0])
-    assert pixel_difference(rig, replace(rig, T_body_right=rig.T_body_right @ nudge)) > PIXEL_TOLERANCE
-    assert pixel_difference(rig, rig_of(stereo=False)) == np.inf
-    with pytest.raises(SequenceError, match="puts the IMU"):
-        check_rig("the chain", rig, replace(rig, imu=replace(rig.imu, T_body_imu=rig.imu.T_body_imu @ nudge)))
-
-
-def test_where_the_body_is_makes_no_difference_to_what_is_seen(rig_of: Callable[..., Rig]) -> None:
-    rig, T = rig_of(), se3.transform(se3.rotation_z(np.array(0.7)), [1.0, 2.0, 3.0])
-    assert rig.T_body_right is not None
-    moved = replace(rig, T_body_left=T @ rig.T_body_left, T_body_right=T @ rig.T_body_right)
-    assert pixel_difference(rig, moved) < 1e-9
-
-
-def test_known_points_fill_the_picture_from_near_to_far() -> None:
-    camera = preset_rig("fisheye").left
-    points = known_points(camera)
-    pixels = camera.project(points)
-    assert np.isfinite(pixels).all()
-    assert pixels.min() < 1
-    assert pixels.max() > 510
-    assert np.linalg.norm(points, axis=1).max() > 100 * np.linalg.norm(points, axis=1).min()

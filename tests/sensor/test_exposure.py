@@ -268,10 +268,10 @@ def test_an_exposure_of_a_whole_period_has_no_bands() -> None:
 @pytest.mark.parametrize(
     ("exposure_s", "row_strips", "sub_frames", "said"),
     [
-        (1e-9, 1, 2, "an exposure of 1 ns cannot be cut into 2 sub-frames"),
-        (0.01, 1, 0, "cannot be cut into 0 sub-frames"),
-        (0.01, 0, 1, "480 rows cannot be cut into 0 strips"),
-        (0.01, 481, 1, "480 rows cannot be cut into 481 strips"),
+        (1e-9, 1, 2, "an exposure of 1 ns cannot be divided into 2 sub-frames"),
+        (0.01, 1, 0, "cannot be divided into 0 sub-frames"),
+        (0.01, 0, 1, "480 rows cannot be divided into 0 strips"),
+        (0.01, 481, 1, "480 rows cannot be divided into 481 strips"),
     ],
 )
 def test_cuts_that_cannot_be_are_refused(exposure_s: float, row_strips: int, sub_frames: int, said: str) -> None:

@@ -9,6 +9,7 @@ from scipy.special import ndtri
 
 from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
+from vobench.sensor import image_sensor
 from vobench.sensor.exposure import Exposure
 from vobench.sensor.image_sensor import (
     CAMERAS,
@@ -381,3 +382,20 @@ def test_each_pixel_has_its_own_mean() -> None:
     counts = poisson(np.broadcast_to(means, draws.shape).copy(), draws)
     np.testing.assert_allclose(counts.mean(0), means, atol=5 * np.sqrt(means.max() / 20_000), rtol=0.02)
     assert (counts[:, 0, 0] == 0).all()
+
+
+@pytest.mark.parametrize("bits", [8, 10, 12])
+def test_a_converter_in_colour_has_two_to_the_power_of_its_bits_counts(bits: int) -> None:
+    chip = CameraSensor(response="linear", adc_bits=bits)  # type: ignore[arg-type]
+    signals = np.unique(image_sensor._digital(np.linspace(0, 1, 60_000), chip))
+    np.testing.assert_allclose(signals, np.arange(2**bits) / (2**bits - 1))
+
+
+@pytest.mark.parametrize("bits", [8, 10, 12])
+def test_grey_values_change_where_the_converter_counts_on(bits: int) -> None:
+    chip = CameraSensor(response="linear", adc_bits=bits)  # type: ignore[arg-type]
+    largest = 2**bits - 1
+    signal = np.linspace(0, 1, 60_000)
+    counts = np.floor(signal * largest + 0.5)
+    grey = image_sensor._grey(signal.copy(), chip)
+    np.testing.assert_array_equal(grey, np.floor(255 * counts / largest + 0.5))

@@ -372,3 +372,16 @@ def test_a_bound_that_is_none_is_refused_by_name(field, value):
 def test_numbers_that_are_too_few_or_none_are_refused_by_name(field, value):
     with pytest.raises(SettingError, match=rf"^{field}(\.\d)?: (this key is missing|should be a (finite number|list))"):
         replace(FLAWLESS, **{field: value})
+
+
+def test_by_itself_an_imu_is_at_the_origin_of_the_body_along_its_axes():
+    np.testing.assert_array_equal(ImuSettings().T_body_imu, np.eye(4))
+
+
+@pytest.mark.parametrize(
+    ("name", "gyro_deg_per_s", "accel_g"),
+    [("adis16448", 1000, 18), ("mpu6000", 2000, 16), ("bmi055", 1000, 4)],
+)
+def test_a_preset_has_the_range_of_its_chip(name, gyro_deg_per_s, accel_g):
+    np.testing.assert_allclose(IMUS[name].gyro.limit, np.deg2rad(gyro_deg_per_s))
+    np.testing.assert_allclose(IMUS[name].accel.limit, accel_g * 9.80665)

@@ -240,3 +240,11 @@ def test_a_lens_that_cannot_be_is_refused(change: dict[str, float], said: str) -
     with pytest.raises(SettingError) as refused:
         CameraSettings(**change)
     assert str(refused.value) == said
+
+
+def test_each_channel_of_a_colour_picture_passes_the_lens_as_a_grey_one_would() -> None:
+    lens = maps(CameraSettings(dirt=0.1, vignetting=1.0, blur_sigma_px=1.0, flare=0.1))
+    picture = np.random.default_rng(3).random((*SHAPE, 3), np.float32)
+    seen = through_lens(picture, lens)
+    for channel in range(3):
+        np.testing.assert_array_equal(seen[..., channel], through_lens(picture[..., channel], lens))

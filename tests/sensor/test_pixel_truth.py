@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from vobench.sensor.pixel_truth import CHANNELS, picture
+from vobench.errors import UnknownNameError
+from vobench.sensor.pixel_truth import CHANNELS, NEAR_TO_FAR, TruthFrame, check_channels, picture
 
 RNG = np.random.default_rng(0)
 
@@ -58,3 +59,37 @@ def test_masks_are_white_and_shadows_the_lighter_the_more_lights_are_hidden():
     assert picture("moving", np.array([[True, False]]))[0].tolist() == [[255] * 3, [0] * 3]
     shades = picture("shadow", np.arange(4, dtype=np.uint16)[None])[0, :, 0]
     assert (np.diff(shades.astype(int)) > 0).all()
+
+
+def test_flows_a_third_of_a_turn_apart_are_red_green_and_blue():
+    angles = np.array([0, 2 * np.pi / 3, -2 * np.pi / 3])
+    flow = np.stack([np.cos(angles), np.sin(angles)], -1)[None].astype(np.float32)
+    np.testing.assert_array_equal(picture("flow", flow)[0], 255 * np.eye(3, dtype=int))
+
+
+def test_the_speed_of_all_but_the_fastest_hundredth_has_full_strength_and_half_of_it_half():
+    flow = np.zeros((1, 200, 2), np.float32)
+    flow[0, :, 0] = 4.0
+    flow[0, 0, 0] = 1000.0
+    flow[0, 1, 0] = 2.0
+    seen = picture("flow", flow)[0]
+    assert seen[0].tolist() == seen[5].tolist() == [255, 0, 0]
+    assert seen[1].tolist() == [255, 128, 128]
+
+
+def test_the_nearest_distance_has_the_first_colour_and_the_farthest_the_last():
+    seen = picture("depth", np.array([[2.0, 8.0, 4.0, np.nan, -1.0]], np.float32))[0]
+    assert seen[[0, 1]].tolist() == NEAR_TO_FAR[[0, -1]].astype(int).tolist()
+    assert seen[2].tolist() == NEAR_TO_FAR[2].astype(int).tolist(), "half way on a logarithmic scale"
+    assert not seen[3].any()
+
+
+def test_a_frame_names_the_channels_it_has_in_their_own_order():
+    frame = TruthFrame(moving=np.zeros((2, 2), bool), depth=np.zeros((2, 2), np.float32))
+    assert list(frame.channels()) == ["depth", "moving"]
+    assert check_channels(["moving", "depth", "moving"]) == ("depth", "moving")
+    assert CHANNELS["normals"].shape(4, 5) == (4, 5, 3)
+    assert CHANNELS["flow"].shape(4, 5) == (4, 5, 2)
+    assert CHANNELS["depth"].shape(4, 5) == (4, 5)
+    with pytest.raises(UnknownNameError, match=r"no truth channel 'flo'\. Known: depth, normals, flow"):
+        check_channels(["flo"])

@@ -1,17 +1,13 @@
 """A bag opens in other people's readers, and ours believes no more of one than agrees with itself."""
 
 import struct
-import zlib
 from dataclasses import replace
 
 import cv2
-import lz4.frame
 import numpy as np
 import pytest
-import zstandard
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Chunk, Metadata
 from mcap.writer import CompressionType, IndexType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -20,17 +16,11 @@ from rosbags.interfaces import QosDurability
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import (
+from vobench.sequence.bag import Bag
+from vobench.sequence.bag_writer import BagWriter
+from vobench.sequence.mcap_file import (
     HEAD,
     MAGIC,
-    MAX_BYTES,
-    MAX_RECORDS,
-    MESSAGE,
-    Bag,
-    BagWriter,
-    BoundedFile,
-    messages_in,
-    read_record,
 )
 from vobench.sequence.messages import serialise
 
@@ -293,69 +283,3 @@ def test_chunks_that_overlap_are_refused(summary):
     path = summary(Opcode.CHUNK_INDEX, 1, 24, "<Q", 150)
     with pytest.raises(SequenceError, match="the chunks of its summary overlap"):
         Bag.open(path)
-
-
-DATA = b"abcd"
-RECORDS = (
-    HEAD.pack(99, 2) + b"??" + HEAD.pack(Opcode.MESSAGE, MESSAGE.size + len(DATA)) + MESSAGE.pack(3, 0, 7, 7) + DATA
-)
-PACK = {"": bytes, "zstd": zstandard.ZstdCompressor().compress, "lz4": lz4.frame.compress}
-SIZE = len(RECORDS)
-
-
-def chunk(packing, packed, *, size=SIZE, checksum=0):
-    return Chunk(packing, packed, 7, 7, checksum, size)
-
-
-@pytest.mark.parametrize("packing", PACK)
-def test_a_chunk_unpacks_to_its_messages_and_one_that_states_another_size_is_refused(packing):
-    packed = PACK[packing](RECORDS)
-    for checksum in (0, zlib.crc32(RECORDS)):
-        ((channel, log_ns, data),) = messages_in(chunk(packing, packed, checksum=checksum), {3})
-        assert (channel, log_ns, bytes(data)) == (3, 7, DATA)
-    assert list(messages_in(chunk(packing, packed), {4})) == []
-    for size in (SIZE - 1, SIZE + 1, MAX_BYTES + 1, 2**63):
-        with pytest.raises((ValueError, RuntimeError)):
-            list(messages_in(chunk(packing, packed, size=size), {3}))
-
-
-@pytest.mark.parametrize(
-    ("bad", "said"),
-    [
-        (chunk("", RECORDS, checksum=1), "the checksum of a chunk differs"),
-        (chunk("zstd", PACK["zstd"](RECORDS), size=12), f"a chunk states 12 bytes unpacked and {SIZE}"),
-        (chunk("gzip", RECORDS), "packed as 'gzip'; zstd and lz4 are known"),
-        (chunk("", RECORDS[:-1], size=SIZE - 1), "runs over the end of its chunk"),
-        (chunk("", bytes(9 * (MAX_RECORDS + 1)), size=9 * (MAX_RECORDS + 1)), f"{MAX_RECORDS} records and more"),
-    ],
-)
-def test_a_damaged_chunk_is_told_by_what_is_wrong(bad, said):
-    with pytest.raises(ValueError, match=said):
-        list(messages_in(bad, {3}))
-
-
-def test_no_more_is_read_than_there_is(tmp_path):
-    (tmp_path / "a").write_bytes(bytes(range(13)))
-    with BoundedFile(tmp_path / "a") as stream:
-        stream.seek(9)
-        assert stream.read(4) == bytes(range(9, 13))
-        for offset, length, said in ((9, 5, "but 4 are left"), (99, 1, "but 0 are left"), (0, 1 << 60, "at most 13")):
-            stream.seek(offset)
-            with pytest.raises(ValueError, match=said):
-                stream.read(length)
-        for length in (-1, None):
-            with pytest.raises(ValueError, match="at most 13 are read"):
-                stream.read(length)
-
-
-def test_a_record_of_another_kind_or_with_a_false_length_within_is_refused(tmp_path):
-    """The length of a note's name says 4 GiB: the library would ask for them."""
-    (tmp_path / "a").write_bytes(HEAD.pack(Opcode.METADATA, 8) + struct.pack("<II", 0xFFFFFFFF, 0))
-    said = "4294967295 bytes are stated where at most 17 are read"
-    with BoundedFile(tmp_path / "a") as stream, pytest.raises(ValueError, match=said):
-        read_record(stream, 0, Metadata)
-    (tmp_path / "b").write_bytes(HEAD.pack(Opcode.METADATA, 8) + bytes(8))
-    with BoundedFile(tmp_path / "b") as stream:
-        assert read_record(stream, 0, Metadata).name == ""
-        with pytest.raises(ValueError, match="a Chunk should begin at 0, but a Metadata does"):
-            read_record(stream, 0, Chunk)

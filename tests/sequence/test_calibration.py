@@ -12,7 +12,8 @@ from vobench.geometry.rig import ImuCalibration
 from vobench.sensor.imu import ImuBias, ImuReadings
 from vobench.sequence import Sequence, SequenceWriter, read_imu_bias, read_true_rig
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import Bag, BagWriter
+from vobench.sequence.bag import Bag
+from vobench.sequence.bag_writer import BagWriter
 from vobench.sequence.calibration import read_rig, write_mounts
 from vobench.sequence.messages import serialise
 from vobench.sequence.recording import topic_facts
@@ -85,7 +86,7 @@ def test_what_the_rig_does_not_have_cannot_be_written(recording, tmp_path):
             (writer.write_encoders, ([1], [[1, 2]]), "/encoders"),
             (writer.write_imu_bias, (1, np.zeros(3), np.zeros(3)), "/ground_truth/imu_bias"),
         ):
-            with pytest.raises(SequenceError, match=rf"has nothing that sends {topic}: "):
+            with pytest.raises(SequenceError, match=rf"has no sensor for {topic}: "):
                 write(*arguments)
         with pytest.raises(SequenceError, match=r"^this rig has 1 cameras, but a frame has 2 pictures$"):
             writer.write_frame(1, recording.left[0], recording.right[0])
@@ -133,5 +134,5 @@ def test_a_calibration_with_a_hole_is_refused_by_name(recording, tmp_path):
     whole = {**numbers, "accel_walk": "0"}
     with pytest.raises(SequenceError, match=r"^/tf_static does not say where imu is mounted in"):
         read_rig(bag_with(tmp_path / "d", rig, notes=[("vobench.imu", whole)]), there)
-    with pytest.raises(SequenceError, match=r"the wheels are not described as radius, track and ticks"):
+    with pytest.raises(SequenceError, match=r"the wheels are not described as radius_m, track_m, ticks_per_revolution"):
         read_rig(bag_with(tmp_path / "e", rig, notes=[("vobench.wheels", {"radius_m": "x"})]), there)

@@ -10,8 +10,10 @@ import pytest
 from vobench.errors import SequenceError
 from vobench.sequence import Sequence, SequenceWriter, has_truth, read_case, read_truth
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import HEAD, MESSAGE_INDEX_ENTRY, MESSAGE_INDEX_HEAD, Bag, BagWriter
+from vobench.sequence.bag import Bag
+from vobench.sequence.bag_writer import BagWriter
 from vobench.sequence.calibration import write_mounts
+from vobench.sequence.mcap_file import HEAD, MESSAGE_INDEX_ENTRY, MESSAGE_INDEX_HEAD
 from vobench.sequence.messages import serialise
 from vobench.sequence.picture import encode
 
@@ -79,7 +81,10 @@ def test_a_flipped_bit_in_the_index_of_stamps_is_refused(folder, tmp_path):
     bag, whole = Bag.open(folder / "sensors.mcap"), (folder / "sensors.mcap").read_bytes()
     channel = next(c.id for c in bag.summary.channels.values() if c.topic == ros.LEFT_IMAGE.name)
     at = bag.summary.chunk_indexes[-1].message_index_offsets[channel] + MESSAGE_INDEX_HEAD
-    for byte, said in ((7, "has stamps that its chunk has not"), (0, "pictures and calibration should have the same")):
+    for byte, said in (
+        (7, "has stamps that its chunk does not have"),
+        (0, "pictures and calibration should have the same"),
+    ):
         data = bytearray(whole)
         data[at + MESSAGE_INDEX_ENTRY + byte] ^= 1
         (bad / "sensors.mcap").write_bytes(data)
@@ -98,7 +103,7 @@ def test_a_truth_that_was_never_finished_is_not_taken_for_none(folder, tmp_path)
     [
         ([], r"as many left as right pictures and at least one, got 2 and 0: "),
         ([5], r"as many left as right pictures and at least one, got 2 and 1: "),
-        ([5, 7], r"^frame 1 is no left and right picture of one stamp in "),
+        ([5, 7], r"^frame 1 is not a left and a right picture of one stamp in "),
     ],
 )
 def test_pictures_that_are_no_pairs_are_refused(recording, tmp_path, right_ns, said):

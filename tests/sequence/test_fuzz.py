@@ -32,7 +32,8 @@ from vobench.sequence import (
     read_twist,
 )
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import MAGIC, MAX_BYTES, Bag
+from vobench.sequence.bag import Bag
+from vobench.sequence.mcap_file import MAGIC, MAX_BYTES
 from vobench.sequence.recording import read_poses
 
 COUNT, LIMIT_S = 1000, 5

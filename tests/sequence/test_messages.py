@@ -140,3 +140,22 @@ def test_a_pair_that_nothing_rectifies_states_each_camera_on_its_own():
     for info in ros.camera_infos(0, above):
         np.testing.assert_array_equal(info.r.reshape(3, 3), np.eye(3))
         np.testing.assert_array_equal(info.p.reshape(3, 4)[:, 3], np.zeros(3))
+
+
+def test_an_imu_has_no_orientation_and_the_variances_of_each_axis():
+    message = ros.imu(5, [1, 2, 3], [4, 5, 6], (0.25, 4.0))
+    q = message.orientation
+    assert (q.x, q.y, q.z, q.w) == (0, 0, 0, 1)
+    assert message.orientation_covariance.tolist() == [-1] + [0] * 8
+    np.testing.assert_array_equal(message.angular_velocity_covariance.reshape(3, 3), 0.25 * np.eye(3))
+    np.testing.assert_array_equal(message.linear_acceleration_covariance.reshape(3, 3), 4.0 * np.eye(3))
+
+
+def test_a_twist_that_is_not_known_says_so_and_one_that_is_has_its_numbers():
+    known = ros.odometry(5, np.eye(4), [1, 2, 3, 4, 5, 6]).twist
+    assert (known.twist.linear.x, known.twist.linear.z, known.twist.angular.x, known.twist.angular.z) == (1, 3, 4, 6)
+    assert not known.covariance.any()
+    unknown = ros.odometry(5, np.eye(4), None)
+    assert unknown.twist.covariance.tolist() == [-1] + [0] * 35
+    assert not unknown.pose.covariance.any()
+    assert (unknown.header.frame_id, unknown.child_frame_id) == (ros.WORLD, ros.BODY)

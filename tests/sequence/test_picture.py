@@ -8,7 +8,19 @@ import pytest
 
 from vobench.errors import SequenceError
 from vobench.geometry.camera import Pinhole
-from vobench.sequence.picture import BAYER, MONO, RGB, decode, encode, grey, require_picture, rgb
+from vobench.sequence.picture import (
+    BAYER,
+    MONO,
+    PNG_START,
+    RGB,
+    decode,
+    encode,
+    grey,
+    header,
+    require_picture,
+    rgb,
+    write_png,
+)
 
 CAMERA = Pinhole(48, 32, 40.5, 41.25, 23.5, 15.5)
 HUFFMAN_TABLES, START_OF_SCAN = 0xC4, 0xDA
@@ -108,3 +120,27 @@ def test_a_mosaic_begins_with_red() -> None:
     red, green, blue = rgb(raw, BAYER)[2:6, 2:6].reshape(-1, 3).mean(0).tolist()
     assert red > 150
     assert max(green, blue) == 0
+
+
+def test_what_is_neither_png_nor_jpeg_has_an_empty_header() -> None:
+    for data in (b"", b"hello, this is no picture", b"\xff\xd8\xff\xe0\x00\x04\x00\x00junk that is no marker"):
+        assert header(memoryview(data)) == ("", 0, 0, 0, 0)
+    palette = struct.pack(">IIBB", 7, 5, 2, 3)
+    assert header(memoryview(PNG_START + palette)) == ("png", 5, 7, 8, 3)
+    assert header(memoryview(PNG_START + struct.pack(">IIBB", 7, 5, 16, 5))) == ("png", 5, 7, 16, 0)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_a_written_png_has_the_channels_in_their_order(tmp_path, dtype) -> None:
+    red_green_blue = np.random.default_rng(4).integers(0, np.iinfo(dtype).max, (6, 8, 3), dtype)
+    write_png(tmp_path / "a.png", red_green_blue)
+    read = cv2.imread(str(tmp_path / "a.png"), cv2.IMREAD_UNCHANGED)
+    np.testing.assert_array_equal(read[..., ::-1], red_green_blue)
+    write_png(tmp_path / "b.png", red_green_blue[..., 0])
+    np.testing.assert_array_equal(cv2.imread(str(tmp_path / "b.png"), cv2.IMREAD_UNCHANGED), red_green_blue[..., 0])
+
+
+def test_a_colour_picture_of_another_shape_is_refused() -> None:
+    with pytest.raises(SequenceError, match=r"^a takes \(32, 48, 3\) uint8 pictures, got \(32, 48\) uint8$"):
+        encode(GREY, CAMERA, "a", colour=RGB)
+    assert decode(encode(GREY, None, "a"), None, "a").shape == (32, 48)

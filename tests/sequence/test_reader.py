@@ -46,7 +46,8 @@ from vobench.sequence import (
     truth_channels,
 )
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import Bag, BagWriter
+from vobench.sequence.bag import Bag
+from vobench.sequence.bag_writer import BagWriter
 from vobench.sequence.calibration import write_mounts
 from vobench.sequence.messages import serialise
 from vobench.sequence.picture import encode

@@ -16,7 +16,8 @@ from rosbags.typesys import Stores, get_typestore
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import MAGIC, Bag
+from vobench.sequence.bag import Bag
+from vobench.sequence.mcap_file import MAGIC
 from vobench.sequence.recording import TopicFacts, is_recording, read_poses, topic_facts
 from vobench.trajectory.trajectory import Trajectory
 

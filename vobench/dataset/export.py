@@ -1,4 +1,4 @@
-"""A sequence exported in the layouts of others, with its calibration, tested before it gets its name."""
+"""A sequence exported in the layout of a dataset, with its calibration, and read back before it gets its name."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,34 +11,48 @@ import numpy as np
 from vobench import stop
 from vobench.dataset import kalibr
 from vobench.dataset.layout import Writing, read, writable
+from vobench.dataset.overlap import overlapping_truth
 from vobench.dataset.photometric import write_photometric
 from vobench.dataset.picture import require_free
-from vobench.dataset.recording import cut_to
-from vobench.dataset.source import PNG, ExportSource, Views, check_path, check_rig, open_source
+from vobench.dataset.read_back import check_path, check_rig
+from vobench.dataset.source import PNG, ExportSource, Views, open_source
 from vobench.errors import InputError, SequenceError, unknown
 from vobench.geometry.rig import Rig
 from vobench.trajectory.formats import format_euroc, format_kitti, format_times, format_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
+
+def _kitti_text(trajectory: Trajectory) -> str:
+    return format_kitti(trajectory.T_world_frame)
+
+
 TRAJECTORY_TEXTS: dict[str, Callable[[Trajectory], str]] = {
     "tum": format_tum,
-    "kitti": lambda trajectory: format_kitti(trajectory.T_world_frame),
+    "kitti": _kitti_text,
     "euroc": format_euroc,
 }
 TRAJECTORY_FORMS = tuple(TRAJECTORY_TEXTS)
 TIMES_SUFFIX = ".times.txt"
 
 
-def export_trajectory(trajectory: Trajectory, path: Path, form: str) -> tuple[Path, ...]:
-    """Write a trajectory, exactly, as one file, or two in KITTI's form. Raises InputError, also for a file there."""
+def export_trajectory(
+    trajectory: Trajectory,
+    path: Path,
+    form: str,
+) -> tuple[Path, ...]:
+    """Write a trajectory, exactly, as one file, or two in KITTI's form; return their paths.
+
+    Raises InputError for an unknown form, and for a file that exists.
+    """
     if form not in TRAJECTORY_TEXTS:
         raise InputError(f"no form of trajectory '{form}'. Known: {', '.join(TRAJECTORY_FORMS)}")
     texts = {path: TRAJECTORY_TEXTS[form](trajectory)}
     if form == "kitti":
-        texts[path.with_name(path.stem + TIMES_SUFFIX)] = format_times(trajectory.t_ns)
+        times = path.with_name(path.stem + TIMES_SUFFIX)
+        texts[times] = format_times(trajectory.t_ns)
     for file in texts:
         if file.exists():
-            raise InputError(f"there is a file already; choose another name or take it away: {file}")
+            raise InputError(f"the file exists already; choose another name or remove it: {file}")
     for file, text in texts.items():
         part = file.with_name(file.name + ".part")
         part.write_text(text, encoding="utf-8")
@@ -50,15 +64,15 @@ NOTES = "NOTES.txt"
 PHOTOMETRIC = "photometric"
 CHAIN = "camchain.yaml"
 IMU_FILE = "imu.yaml"
-TOLD = (
-    "The calibration is the one that estimators are told; the pictures were made with another one, as the case asks, "
-    "and that one was left out."
+NOMINAL = (
+    "The calibration is the nominal one, which estimators are given; the pictures were simulated with another one, "
+    "as the case asks, and that one was left out."
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """What was made: sentences on everything that was converted or left out, and the files, relative to `folder`."""
+    """An export: sentences on everything that was converted or left out, and the files, relative to `folder`."""
 
     folder: Path
     form: str
@@ -67,7 +81,10 @@ class Exported:
 
 
 def export(sequence: Path, out: Path, form: str) -> Exported:
-    """Write a sequence in another form into a new folder and test it, read back. Raises InputError, SequenceError."""
+    """Write a sequence in another form into a new folder, and compare it, read back, with the sequence.
+
+    Raises InputError for a folder or a form that can't be used, SequenceError where reading back gives something else.
+    """
     layout = writable().get(form)
     if layout is None:
         raise InputError(unknown("form to export to", form, list(writable())))
@@ -76,20 +93,23 @@ def export(sequence: Path, out: Path, form: str) -> Exported:
     source = open_source(sequence)
     views = layout.views(source.rig)
     stamps = layout.stamps(source)
+    expected_path = _expected_path(source, views.rig, stamps, layout)
+
     with _building(out) as folder:
         notes = layout.write(source, views, folder)
         notes += write_calibration(views.rig, layout, folder)
         notes += write_photometric(source, views, stamps, folder / PHOTOMETRIC)
         notes += _left_out(source, layout)
-        (folder / NOTES).write_text("".join(f"{note}\n" for note in notes), encoding="utf-8")
-        _test(views, _expected_path(source, views.rig, stamps, layout), form, folder)
-        files = tuple(sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()))
-    return Exported(out, form, tuple(notes), files)
+        text = "".join(f"{note}\n" for note in notes)
+        (folder / NOTES).write_text(text, encoding="utf-8")
+        _check_read_back(views, expected_path, form, folder)
+        files = [str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()]
+    return Exported(out, form, tuple(notes), tuple(sorted(files)))
 
 
 @contextmanager
 def _building(out: Path) -> Iterator[Path]:
-    """A folder to fill, which gets its name when the context ends without an error, and is gone after one."""
+    """A folder to fill, which gets its name when the context ends without an error, and is removed after one."""
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         part = Path(mkdtemp(dir=out.parent, prefix=f".{out.name}.", suffix=".part"))
@@ -105,7 +125,7 @@ def _building(out: Path) -> Iterator[Path]:
 
 
 def write_calibration(rig: Rig, layout: Writing, folder: Path) -> list[str]:
-    """Kalibr's files of a rig, and what they cannot say."""
+    """Write Kalibr's files of a rig into a folder; return notes on what they cannot hold."""
     *image_topics, imu_topic = layout.topics
     notes = kalibr.remarks(rig)
     try:
@@ -121,46 +141,74 @@ def write_calibration(rig: Rig, layout: Writing, folder: Path) -> list[str]:
 
 
 def _left_out(source: ExportSource, layout: Writing) -> list[str]:
+    """Sentences on what the sequence has and the layout has not."""
     if layout.keeps is None:
         return []
+    notes = []
+    first = next(source.sequence.encoded_frames())
+    if first.form != PNG:
+        notes.append("The pictures were recorded as JPEG; here they are PNG files of the decoded pictures.")
+    if source.imu is not None and "imu" not in layout.keeps:
+        notes.append("The IMU's readings were left out.")
+    if source.rig.wheels is not None:
+        notes.append("Wheels and encoder readings were left out.")
     channels = [name for name in source.channels if name not in layout.keeps]
-    is_jpeg = next(source.sequence.encoded_frames()).form != PNG
-    found = [
-        (is_jpeg, "The pictures were recorded as JPEG; here they are PNG of what that decodes to."),
-        (source.imu is not None and "imu" not in layout.keeps, "The IMU's readings were left out."),
-        (source.rig.wheels is not None, "Wheels and encoder readings were left out."),
-        (bool(channels), f"The truth of every pixel was left out: {', '.join(channels)}."),
-        (source.case is not None, "The case that it was simulated from was left out."),
-        (not _told_truly(source), TOLD),
-    ]
-    return [sentence for is_there, sentence in found if is_there]
+    if channels:
+        notes.append(f"The per-pixel ground truth was left out: {', '.join(channels)}.")
+    if source.case is not None:
+        notes.append("The case that it was simulated from was left out.")
+    if not _has_true_calibration(source):
+        notes.append(NOMINAL)
+    return notes
 
 
-def _told_truly(source: ExportSource) -> bool:
-    told = source.rig
+def _has_true_calibration(source: ExportSource) -> bool:
+    """Whether the nominal calibration of the cameras is the one that the pictures were made with."""
+    nominal = source.rig
     true = source.true_rig
-    cameras = all(told.camera(side) == true.camera(side) for side in told.sides)
-    return cameras and all((told.T_body_camera(side) == true.T_body_camera(side)).all() for side in told.sides)
+    for side in nominal.sides:
+        same_lens = nominal.camera(side) == true.camera(side)
+        same_mount = (nominal.T_body_camera(side) == true.T_body_camera(side)).all()
+        if not (same_lens and same_mount):
+            return False
+    return True
 
 
-def _test(views: Views, expected: Trajectory | None, form: str, folder: Path) -> None:
-    """Read the export back and send known points and the true path through it. Raises SequenceError."""
-    found = read(folder, form=form)
-    check_rig(f"the {form} folder, read back,", views.rig, found.rig)
+def _check_read_back(
+    views: Views,
+    expected_path: Trajectory | None,
+    form: str,
+    folder: Path,
+) -> None:
+    """Read the export and compare rig, chain and path with what was exported. Raises SequenceError."""
+    recording = read(folder, form=form)
+    what = f"the {form} folder, read back,"
+    check_rig(what, views.rig, recording.rig)
     if (folder / CHAIN).is_file():
-        imu = views.rig.imu and replace(views.rig.imu, T_body_imu=np.eye(4))  # where there is one, the chain's body
-        check_rig(f"{CHAIN}, read back,", views.rig, replace(kalibr.read_camchain(folder / CHAIN), imu=imu))
-    path = found.truth
-    if expected is not None and path is not None:
-        check_path(f"the {form} folder, read back,", expected, path.of_mounted(found.rig.T_body_left))
-    elif expected is not None or path is not None:
-        raise SequenceError(f"the {form} folder, read back, {'has no truth any more' if expected else 'has a truth'}")
+        chain_rig = kalibr.read_camchain(folder / CHAIN)
+        imu = views.rig.imu
+        if imu is not None:  # the body of the chain is the IMU
+            chain_rig = replace(chain_rig, imu=replace(imu, T_body_imu=np.eye(4)))
+        check_rig(f"{CHAIN}, read back,", views.rig, chain_rig)
+
+    truth = recording.truth
+    if (expected_path is None) != (truth is None):
+        problem = "has a truth" if expected_path is None else "has no truth any more"
+        raise SequenceError(f"{what} {problem}")
+    if expected_path is not None and truth is not None:
+        check_path(what, expected_path, truth.of_mounted(recording.rig.T_body_left))
 
 
-def _expected_path(source: ExportSource, rig: Rig, stamps: Stamps, layout: Writing) -> Trajectory | None:
-    """The left camera's path as the form should give it, cut to the pictures as every reader cuts it."""
+def _expected_path(
+    source: ExportSource,
+    rig: Rig,
+    stamps: Stamps,
+    layout: Writing,
+) -> Trajectory | None:
+    """The left camera's path as the form should give it, cut to the pictures' time as readers do."""
     if source.truth is None:
         return None
     if layout.path:
         return layout.path(source, rig, stamps)
-    return cut_to(source.truth.of_mounted(rig.T_body_left), stamps)[0]
+    path, _ = overlapping_truth(source.truth.of_mounted(rig.T_body_left), stamps)
+    return path

@@ -5,20 +5,26 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.dataset.kalibr import chain_rig, no_calibration, on_body, rig_of
+from vobench.dataset.body import MountedCamera, mounted_rig, on_body
+from vobench.dataset.kalibr import chain_rig, no_calibration
 from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
-from vobench.dataset.recording import Notes, ReadOptions, Recording, assemble, numbered, picture_files, truth_file
+from vobench.dataset.picture_list import numbered, picture_files
+from vobench.dataset.recording import CalibratedRig, Notes, ReadOptions, Recording, assemble
 from vobench.dataset.source import ExportSource, Views, png_frames, rectified
+from vobench.dataset.truth_file import truth_file
 from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import Rig, looking, projection
 from vobench.geometry.se3 import Array
 from vobench.trajectory.formats import content, format_kitti, format_times, parse_times, read_table
+from vobench.trajectory.nanoseconds import NS_PER_MS
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
-PAIRS = (("image_0", "image_1"), ("image_2", "image_3"))  # grey, colour
+GREY_PAIR = ("image_0", "image_1")
+COLOUR_PAIR = ("image_2", "image_3")
+PAIRS = (GREY_PAIR, COLOUR_PAIR)  # in order of preference
 CALIBRATION = "calib.txt"
 TIMES = "times.txt"
 POSES = "poses.txt"
@@ -27,190 +33,285 @@ TRUTH = (
     "of the left grey camera; its world is that camera at the start, turned from "
     "x right, y down, z ahead to x ahead, y left, z up."
 )
-# sequences 00 to 02; a share of the size
-USUAL_PX = (1241, 376)
-MOST_OFF_CENTER = 0.1
-SKEW_TOLERANCE = 1e-6  # of KITTI's seven digits: K's lower triangle is zero
+FIRST_SIZE_PX = (1241, 376)  # of sequences 00 to 02
+MOST_OFF_CENTER = 0.1  # of the picture's size
+SKEW_TOLERANCE = 1e-6  # of the zeros below K's diagonal, which KITTI prints with seven digits
+
+
+def _is_kitti(folder: Path) -> bool:
+    return any((folder / left).is_dir() for left, _ in PAIRS)
 
 
 def read_kitti(folder: Path, options: ReadOptions) -> Recording:
     """A folder such as sequences/00; the body is the camera of image_0, its axes ahead, left, up. Raises InputError."""
     names, pair_notes = _pair(folder)
-    eyes = numbered(*(folder / name for name in names))
+    cameras = numbered(*(folder / name for name in names))
     times = folder / TIMES
     t_ns = parse_times(read_text(times), name=str(times))
-    if len(t_ns) != len(eyes[0]):
-        raise InputError(f"{len(t_ns)} times for {len(eyes[0])} pictures in {folder / names[0]}: {times}")
-    stream = picture_files(t_ns, *eyes)
-    rig, calibration, lens_notes = _rig(folder, names, stream.size_px, options)
-    named = f"{folder.absolute().name}.txt"
+    if len(t_ns) != len(cameras[0]):
+        raise InputError(f"{len(t_ns)} times for {len(cameras[0])} pictures in {folder / names[0]}: {times}")
+    stream = picture_files(t_ns, *cameras)
+    calibration = _calibrated_rig(folder, names, stream.size_px, options)
+
     root = folder.absolute()
-    beside = (root / POSES, root / named, *(up / "poses" / named for up in root.parents[:2]))
+    poses_name = f"{root.name}.txt"
+    beside = [root / POSES, root / poses_name]
+    beside += [parent / "poses" / poses_name for parent in root.parents[:2]]
     truth, truth_notes = truth_file(options, beside, t_ns, TRUTH, T_BODY_GREY)
-    notes = ("The body is the left grey camera, x ahead, y left, z up.", *pair_notes, *lens_notes, *truth_notes)
-    notes += unread(folder, *PAIRS[0], *PAIRS[1], CALIBRATION, TIMES, POSES, named)
-    return assemble("kitti", rig, stream, t_ns, truth=truth, notes=notes, calibration=str(calibration))
+
+    notes = ["The body is the left grey camera, x ahead, y left, z up."]
+    notes += [*pair_notes, *calibration.notes, *truth_notes]
+    notes += unread(folder, *GREY_PAIR, *COLOUR_PAIR, CALIBRATION, TIMES, POSES, poses_name)
+    return assemble("kitti", calibration.rig, stream, t_ns, truth=truth, notes=notes, calibration=calibration.source)
 
 
 def _pair(folder: Path) -> tuple[tuple[str, ...], Notes]:
-    """The folders of the eyes: grey ones before colour ones, two before one."""
-    there = [tuple(name for name in pair if (folder / name).is_dir()) for pair in PAIRS]
-    whole = [pair for pair in PAIRS if pair in there]
-    if whole:
-        others = [name for pair in there for name in pair if name not in whole[0]]
-        return whole[0], ((f"The pictures of {' and '.join(others)} were dropped.",) if others else ())
-    single = next((pair[:1] for pair in PAIRS if pair[0] in there[0] + there[1]), None)
-    if single is None:
-        wanted = " or ".join(" and ".join(pair) for pair in PAIRS)
-        raise InputError(f"no folders {wanted} with pictures in {folder}")
-    return single, (f"There is one camera: {single[0]} has no partner.",)
+    """The folders of the cameras, and a note: pairs come before single cameras, grey ones before colour ones."""
+    names = [*GREY_PAIR, *COLOUR_PAIR]
+    present = [name for name in names if (folder / name).is_dir()]
+    for pair in PAIRS:
+        if set(pair) <= set(present):
+            others = [name for name in present if name not in pair]
+            if not others:
+                return pair, ()
+            return pair, (f"The pictures of {' and '.join(others)} were dropped.",)
+    for left, _ in PAIRS:
+        if left in present:
+            return (left,), (f"There is one camera: {left} has no partner.",)
+    wanted = " or ".join(" and ".join(pair) for pair in PAIRS)
+    raise InputError(f"no folders {wanted} with pictures in {folder}")
 
 
-def _rig(
-    folder: Path, names: tuple[str, ...], size_px: tuple[int, int], options: ReadOptions
-) -> tuple[Rig, Path, Notes]:
-    """The cameras by calib.txt, which knows no picture's size, or by Kalibr's chain; and which file that was."""
+def _calibrated_rig(
+    folder: Path,
+    names: tuple[str, ...],
+    size_px: tuple[int, int],
+    options: ReadOptions,
+) -> CalibratedRig:
+    """The cameras by Kalibr's chain, where the options name one, or by calib.txt, which has no picture's size."""
     if options.calibration is not None:
         rig, notes = chain_rig(options.calibration, len(names), T_BODY_GREY)
-        return rig, options.calibration, notes
+        return CalibratedRig(rig, str(options.calibration), notes)
     path = folder / CALIBRATION
     if not path.exists():
         raise no_calibration(path)
+
     matrices = read_calibration(path)
-    needed = [f"P{name[-1]}" for name in names]
-    missing = [name for name in needed if name not in matrices]
-    if missing:
-        raise InputError(f"{path}: no matrix {missing[0]}, which is that of {names[needed.index(missing[0])]}")
-    rig = _of_matrices(path, matrices, needed, size_px)
-    others = ", ".join(name for name in matrices if name not in needed)
-    return on_body(rig, T_BODY_GREY), path, (f"{others} of {CALIBRATION} were not used.",) if others else ()
+    needed = [_matrix_name(name) for name in names]
+    for matrix, name in zip(needed, names, strict=True):
+        if matrix not in matrices:
+            raise InputError(f"{path}: no matrix {matrix}, which is that of {name}")
+    rig = on_body(_rig(path, matrices, needed, size_px), T_BODY_GREY)
+    others = [name for name in matrices if name not in needed]
+    notes = (f"{', '.join(others)} of {CALIBRATION} were not used.",) if others else ()
+    return CalibratedRig(rig, str(path), notes)
+
+
+def _matrix_name(folder_name: str) -> str:
+    """The name in calib.txt of the matrix of a folder's camera: P0 of image_0."""
+    return f"P{folder_name[-1]}"
 
 
 def read_pair(path: Path, size_px: tuple[int, int] | None = None) -> Rig:
-    """The pair of calib.txt alone: P0 and P1 where they are there, else P2 and P3; the body is the first camera of all.
+    """The pair of a calib.txt: P0 and P1 if there are both, else P2 and P3; the body is the camera of P0.
 
-    Without a size the pictures are as KITTI's first ones. Raises InputError, also where they cannot be.
+    Without a size, the pictures are as large as KITTI's first ones. Raises InputError, also where that can't be.
     """
     matrices = read_calibration(path)
-    pairs = [[f"P{name[-1]}" for name in pair] for pair in PAIRS]
-    needed = next((names for names in pairs if matrices.keys() >= set(names)), None)
-    if needed is None:
-        raise InputError(f"{path}: a pair is P0 and P1, or P2 and P3, and there is {', '.join(matrices) or 'none'}")
-    rig = _of_matrices(path, matrices, needed, size_px or USUAL_PX)
+    needed = _matrix_pair(path, matrices)
+    rig = _rig(path, matrices, needed, size_px or FIRST_SIZE_PX)
+    if size_px is not None:
+        return rig
     center_px = rig.left.K[:2, 2]
-    if size_px is None and np.abs(center_px / USUAL_PX - 0.5).max() > MOST_OFF_CENTER:
+    off_center = np.abs(center_px / FIRST_SIZE_PX - 0.5).max()
+    if off_center > MOST_OFF_CENTER:
+        width, height = FIRST_SIZE_PX
         raise InputError(
-            f"{path}: {needed[0]} has its centre at {center_px.tolist()}, so pictures are not {USUAL_PX[0]} x "
-            f"{USUAL_PX[1]} as KITTI's are; give size_px"
+            f"{path}: {needed[0]} has its centre at {center_px.tolist()}, so pictures are not {width} x "
+            f"{height} as KITTI's are; give size_px"
         )
     return rig
 
 
-def _of_matrices(path: Path, matrices: dict[str, Array], needed: list[str], size_px: tuple[int, int]) -> Rig:
-    return rig_of(*(_camera(matrices[name], size_px, f"{path}: {name}") for name in needed))
+def _matrix_pair(path: Path, matrices: dict[str, Array]) -> list[str]:
+    for pair in PAIRS:
+        names = [_matrix_name(folder_name) for folder_name in pair]
+        if matrices.keys() >= set(names):
+            return names
+    present = ", ".join(matrices) or "none"
+    raise InputError(f"{path}: a pair needs P0 and P1, or P2 and P3; the matrices there are {present}")
+
+
+def _rig(
+    path: Path,
+    matrices: dict[str, Array],
+    names: list[str],
+    size_px: tuple[int, int],
+) -> Rig:
+    cameras = [_camera(matrices[name], size_px, f"{path}: {name}") for name in names]
+    return mounted_rig(*cameras)
 
 
 def read_calibration(path: Path) -> dict[str, Array]:
-    """The matrices (3, 4) of calib.txt by name. Raises TrajectoryError naming the line that is none."""
-    rows = [(line, *body.partition(":")) for line, body in content(read_text(path))]
-    odd = next((line for line, _, colon, _ in rows if not colon), None)
-    if odd is not None:
-        raise InputError(f"{path}:{odd}: a line should be a name, a colon and a matrix, as in `P0: 718.9 0 607.2 ...`")
-    named = [(line, name.strip(), rest) for line, name, _, rest in rows if name.strip()[:1] in "PT"]
-    columns = tuple(f"{row}{column}" for row in range(3) for column in range(4))
-    table = read_table([(line, rest) for line, _, rest in named], name=str(path), columns=columns, row="a matrix")
-    return {name: values.reshape(3, 4) for (_, name, _), values in zip(named, table.values, strict=True)}
+    """The matrices (3, 4) of calib.txt by name. Raises TrajectoryError naming an invalid line."""
+    names = []
+    rows = []
+    for line, body in content(read_text(path)):
+        label, colon, numbers = body.partition(":")
+        if not colon:
+            example = "`P0: 718.9 0 607.2 ...`"
+            raise InputError(f"{path}:{line}: a line should be a name, a colon and a matrix, as in {example}")
+        name = label.strip()
+        if name.startswith(("P", "T")):
+            names.append(name)
+            rows.append((line, numbers))
+    columns = [f"{row}{column}" for row in range(3) for column in range(4)]
+    table = read_table(rows, name=str(path), columns=tuple(columns), row="a matrix")
+    matrices = table.values.reshape(-1, 3, 4)
+    return dict(zip(names, matrices, strict=True))
 
 
-def _camera(P: Array, size_px: tuple[int, int], place: str) -> tuple[Pinhole, Array]:
-    """A pinhole K and its place T_body_camera, of P = K [1 | t] where the body is what P takes points from."""
+def _camera(
+    P: Array,
+    size_px: tuple[int, int],
+    place: str,
+) -> MountedCamera:
+    """The camera of P = K [1 | t] on the body from whose axes P takes points."""
     K = P[:, :3]
-    upright = np.abs([K[0, 1], *K[1:, 0], K[2, 1], K[2, 2] - 1]).max() <= SKEW_TOLERANCE
-    if not (upright and K[0, 0] > 0 and K[1, 1] > 0):
+    below_diagonal = [*K[1:, 0], K[2, 1]]
+    deviations = np.abs([K[0, 1], *below_diagonal, K[2, 2] - 1])
+    is_upright = deviations.max() <= SKEW_TOLERANCE
+    has_focal_lengths = K[0, 0] > 0 and K[1, 1] > 0
+    if not (is_upright and has_focal_lengths):
         raise InputError(f"{place} should be a rectified camera, fx 0 cx / 0 fy cy / 0 0 1, but is {K.tolist()}")
-    camera = Pinhole(*size_px, float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
-    return camera, se3.transform(np.eye(3), -np.linalg.solve(K, P[:, 3]))
+    fx, fy, cx, cy = K[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
+    position_m = -np.linalg.solve(K, P[:, 3])
+    return MountedCamera(Pinhole(*size_px, fx, fy, cx, cy), se3.transform(np.eye(3), position_m))
 
 
 def write_kitti(source: ExportSource, views: Views, folder: Path) -> list[str]:
-    """Fill `folder` and say what was converted."""
-    stamps = source.sequence.frame_stamps()
-    kept = _covered(source)
+    """Write pictures, calibration, times and poses into a folder; return notes on what was converted."""
+    is_exported = _covered(source)
+    stamps = _exported_stamps(source)
     for index in range(len(views.rig.sides)):
         (folder / f"image_{index}").mkdir()
-    frames = (frame for frame in png_frames(source.sequence, views) if kept[frame.index])
+    frames = (frame for frame in png_frames(source.sequence, views) if is_exported[frame.index])
     for number, frame in enumerate(frames):
         for index, picture in enumerate(frame.pictures.values()):
-            (folder / f"image_{index}" / f"{number:06d}.png").write_bytes(picture)
-    (folder / "calib.txt").write_text(_calibration(views.rig), encoding="utf-8")
-    (folder / "times.txt").write_text(format_times(stamps[kept]), encoding="utf-8")
+            path = folder / f"image_{index}" / f"{number:06d}.png"
+            path.write_bytes(picture)
+    (folder / CALIBRATION).write_text(_calibration_text(views.rig), encoding="utf-8")
+    (folder / TIMES).write_text(format_times(stamps), encoding="utf-8")
+
     notes = _picture_notes(source, views)
-    if not kept.all():
-        notes.append(f"{np.sum(~kept)} of {len(kept)} frames lie before or after the truth and were left out.")
-    return notes + _write_poses(source, views, stamps[kept], folder)
+    left_out = np.sum(~is_exported)
+    if left_out:
+        notes.append(f"{left_out} of {len(is_exported)} frames lie before or after the truth and were left out.")
+    return notes + _write_poses(source, views, stamps, folder)
 
 
 def _covered(source: ExportSource) -> NDArray[np.bool_]:
-    """Which frames (N,) the layout can have: those within the truth's time; all where there is no truth for any."""
+    """Which frames (N,) are exported: those within the truth's time; all frames where that is none of them."""
     stamps = source.sequence.frame_stamps()
     truth = source.truth
-    within = np.zeros(len(stamps), bool)
-    if truth is not None:
-        within = (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])
-    return within if within.any() else ~within
+    every = np.ones(len(stamps), bool)
+    if truth is None:
+        return every
+    within = (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])
+    return within if within.any() else every
 
 
-def kitti_path(truth: Trajectory, rig: Rig, stamps: Stamps) -> Trajectory | None:
-    """The left camera's poses at some stamps, since the first of them, as KITTI counts; None outside the truth."""
+def _exported_stamps(source: ExportSource) -> Stamps:
+    return source.sequence.frame_stamps()[_covered(source)]
+
+
+def kitti_path(
+    truth: Trajectory,
+    rig: Rig,
+    stamps: Stamps,
+) -> Trajectory | None:
+    """The left camera's poses at stamps (N,), relative to the first one, as KITTI has them.
+
+    None where the stamps share no time with the truth.
+    """
     if stamps[-1] < truth.t_ns[0] or stamps[0] > truth.t_ns[-1]:
         return None
     T_world_left = poses_at(truth, stamps) @ rig.T_body_left
-    return Trajectory(stamps, se3.inverse(T_world_left[:1]) @ T_world_left)
+    T_first_left = se3.inverse(T_world_left[:1]) @ T_world_left
+    return Trajectory(stamps, T_first_left)
 
 
-def _calibration(rig: Rig) -> str:
-    """P0 and P1, each (3, 4) in a row: what sends points in the left camera's axes to pixels."""
-    shifts_m = [0.0, rig.baseline_m] if rig.right else [0.0]
-    rows = [(projection(rig.left.K, shift_m) + 0.0).ravel().tolist() for shift_m in shifts_m]  # no -0.0
-    return "".join(f"P{index}: {' '.join(map(repr, row))}\n" for index, row in enumerate(rows))
+def _calibration_text(rig: Rig) -> str:
+    """P0 and P1, each (3, 4) in a row: the projections of points in the left camera's axes to pixels."""
+    positions_m = [0.0, rig.baseline_m] if rig.right else [0.0]
+    lines = []
+    for index, position_m in enumerate(positions_m):
+        P = projection(rig.left.K, position_m) + 0.0  # no -0.0
+        numbers = " ".join(map(repr, P.ravel().tolist()))
+        lines.append(f"P{index}: {numbers}\n")
+    return "".join(lines)
 
 
 def _picture_notes(source: ExportSource, views: Views) -> list[str]:
     if views.source_px is None:
-        return ["The pair is rectified as it was recorded, so its pixels are unchanged."] if views.rig.right else []
-    dark = max(views.dark_share(side, source.rig.camera(side)) for side in views.rig.sides)
-    rest = f"; up to {dark:.1%} of a picture shows nothing and is black" if dark else ""
-    return [f"KITTI means rectified pictures: these were resampled, linear between pixels, which loses detail{rest}."]
+        if views.rig.right is None:
+            return []
+        return ["The pair was recorded rectified, so its pixels are unchanged."]
+    dark = 0.0  # share of a picture
+    for side in views.rig.sides:
+        recorded = source.rig.camera(side)
+        dark = max(dark, views.dark_share(side, recorded))
+    dark_note = f"; up to {dark:.1%} of a picture is outside the recorded one and black" if dark else ""
+    return [
+        "KITTI needs rectified pictures: these were resampled, with linear interpolation between pixels, "
+        f"which loses detail{dark_note}."
+    ]
 
 
-def _write_poses(source: ExportSource, views: Views, stamps: Stamps, folder: Path) -> list[str]:
+def _write_poses(
+    source: ExportSource,
+    views: Views,
+    stamps: Stamps,
+    folder: Path,
+) -> list[str]:
     truth = source.truth
     if truth is None:
         return ["No truth was recorded, so there is no poses.txt."]
     path = kitti_path(truth, views.rig, stamps)
     if path is None:
         return ["The truth shares no time with the pictures, so there is no poses.txt."]
-    (folder / "poses.txt").write_text(format_kitti(path.T_world_frame), encoding="utf-8")
-    notes = ["The poses are those of the left camera since the first picture, as KITTI counts: no world, no gravity."]
-    between = int(np.sum(~np.isin(stamps, truth.t_ns)))
-    if between:
-        gap_ms = np.diff(truth.t_ns).max() / 1e6
-        notes.append(f"{between} poses lie between true ones, which are at most {gap_ms:.3g} ms apart: interpolated.")
+    (folder / POSES).write_text(format_kitti(path.T_world_frame), encoding="utf-8")
+
+    notes = ["The poses are those of the left camera relative to the first picture, as in KITTI: no world, no gravity."]
+    is_between = ~np.isin(stamps, truth.t_ns)
+    interpolated = int(np.sum(is_between))
+    if interpolated:
+        gap_ms = np.diff(truth.t_ns).max() / NS_PER_MS
+        notes.append(
+            f"{interpolated} poses were interpolated between true ones, which are at most {gap_ms:.3g} ms apart."
+        )
     return notes
 
 
-def _path_read_back(source: ExportSource, rig: Rig, stamps: Stamps) -> Trajectory | None:
+def _path_read_back(
+    source: ExportSource,
+    rig: Rig,
+    stamps: Stamps,
+) -> Trajectory | None:
+    """The left camera's path in the axes that `read_kitti` turns it into."""
     path = kitti_path(source.truth, rig, stamps) if source.truth else None
-    return path and Trajectory(path.t_ns, T_BODY_GREY @ path.T_world_frame)
+    if path is None:
+        return None
+    return Trajectory(path.t_ns, T_BODY_GREY @ path.T_world_frame)
 
 
 LAYOUTS = (
     Layout(
         "kitti",
         "KITTI odometry: image_0/ or image_2/",
-        lambda path: any((path / left).is_dir() for left, _ in PAIRS),
+        _is_kitti,
         read_kitti,
         frozenset({"calibration", "truth"}),
-        Writing(write_kitti, rectified, lambda s: s.sequence.frame_stamps()[_covered(s)], _path_read_back),
+        Writing(write_kitti, rectified, _exported_stamps, _path_read_back),
     ),
 )

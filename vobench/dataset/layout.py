@@ -1,17 +1,17 @@
-"""Layouts of recordings: what each is known by, how it is read and written, and which of them a path is.
+"""Layouts of recordings: how each is recognised, read and written, and which of them a path has.
 
-A layout is one module of this room with LAYOUTS, or an entry point of the group `vobench.datasets` that is a Layout.
+A layout is an entry of LAYOUTS in a module of this room, or an entry point of the group `vobench.datasets`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from pkgutil import iter_modules
 
-from vobench.dataset.picture import listed, require_itself
+from vobench.dataset.picture import enumerated, listed, require_itself
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.dataset.source import ExportSource, Views
 from vobench.errors import InputError, unknown
@@ -21,23 +21,31 @@ from vobench.trajectory.trajectory import Stamps, Trajectory
 GROUP = "vobench.datasets"
 ARCHIVES = {b"PK\x03\x04": "zip", b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"7z\xbc\xaf": "7z", b"\xfd7zXZ": "xz"}
 HEAD_BYTES = 512
-TAR = slice(257, 262), b"ustar"
-MOST_LOOKED_AT = 200  # folders below, for a hint on where the recordings are
-LEVELS_ABOVE = 3  # mav0/cam0/data is in one
+MAGIC_BYTES_SHOWN = 8
+TAR_MAGIC = b"ustar"
+TAR_MAGIC_PLACE = slice(257, 262)
+MOST_SEARCHED = 200  # files and folders below a path, for a hint on where the recordings are
+MOST_SUGGESTED = 5  # recordings below a path
+MOST_NAMES_SHOWN = 8
+LEVELS_ABOVE = 3  # the folder mav0/cam0/data lies three levels below its recording
+
+
+def _frame_stamps(source: ExportSource) -> Stamps:
+    return source.sequence.frame_stamps()
 
 
 @dataclass(frozen=True, slots=True)
 class Writing:
-    """How a layout is written: `write` fills a folder and says what was converted.
+    """How a layout is written: `write` fills a folder and returns notes on what was converted.
 
     `views` makes the pictures' rig, `stamps` are those of the exported frames, and `path` is the left camera's path
-    in the layout (None: as recorded). `topics` are those that Kalibr's files name: left, right, IMU. `keeps` says
+    in the layout (None: as recorded). `topics` are those that Kalibr's files name: left, right, IMU. `keeps` names
     what the layout has besides pictures and truth (`imu`, channels of pixels); None stands for everything.
     """
 
     write: Callable[[ExportSource, Views, Path], list[str]]
     views: Callable[[Rig], Views] = Views
-    stamps: Callable[[ExportSource], Stamps] = lambda source: source.sequence.frame_stamps()
+    stamps: Callable[[ExportSource], Stamps] = _frame_stamps
     path: Callable[[ExportSource, Rig, Stamps], Trajectory | None] | None = None
     topics: tuple[str, str, str] = ("/cam0/image_raw", "/cam1/image_raw", "/imu0")
     keeps: tuple[str, ...] | None = ()
@@ -45,7 +53,7 @@ class Writing:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A form of recordings, how it is told, read and written; `heeds` names the ReadOptions that make a difference."""
+    """A form of recordings: how it is recognised, read and written; `heeds` names the ReadOptions that it uses."""
 
     name: str
     known_by: str
@@ -56,26 +64,36 @@ class Layout:
 
 
 def layouts() -> dict[str, Layout]:
-    """Every layout by its name, those that vobench brings along first. Raises InputError for two of one name."""
-    found = {layout.name: layout for layout in _built_in()}
-    for point in sorted(entry_points(group=GROUP), key=lambda point: (point.name, point.value)):
-        try:
-            layout = point.load()
-        except Exception as error:  # somebody else's code raises what it likes
-            raise InputError(f"the layout {point.value} does not load ({type(error).__name__}: {error})") from error
-        if not isinstance(layout, Layout):
-            raise InputError(f"{point.value} should be a Layout, but is {type(layout).__name__}")
-        if layout.name in found:
+    """Every layout by its name, those of vobench first. Raises InputError for two of one name."""
+    by_name = {layout.name: layout for layout in _built_in()}
+    points = sorted(entry_points(group=GROUP), key=lambda point: (point.name, point.value))
+    for point in points:
+        layout = _loaded(point)
+        if layout.name in by_name:
             raise InputError(f"two layouts are called '{layout.name}'; one of them is {point.value}: rename it")
-        found[layout.name] = layout
-    return found
+        by_name[layout.name] = layout
+    return by_name
+
+
+def _loaded(point: EntryPoint) -> Layout:
+    try:
+        layout = point.load()
+    except Exception as error:  # a plugin may raise anything
+        reason = f"{type(error).__name__}: {error}"
+        raise InputError(f"the layout {point.value} does not load ({reason})") from error
+    if not isinstance(layout, Layout):
+        raise InputError(f"{point.value} should be a Layout, but is {type(layout).__name__}")
+    return layout
 
 
 @cache
 def _built_in() -> tuple[Layout, ...]:
     room = import_module(__package__ or "")
-    modules = [import_module(f"{room.__name__}.{module.name}") for module in iter_modules(room.__path__)]
-    return tuple(layout for module in modules for layout in getattr(module, "LAYOUTS", ()))
+    built_in: list[Layout] = []
+    for info in iter_modules(room.__path__):
+        module = import_module(f"{room.__name__}.{info.name}")
+        built_in += getattr(module, "LAYOUTS", ())
+    return tuple(built_in)
 
 
 def writable() -> dict[str, Writing]:
@@ -84,25 +102,28 @@ def writable() -> dict[str, Writing]:
 
 
 def sniff(path: Path) -> str:
-    """The name of the layout. Raises InputError saying what was looked for and found, and what there is below."""
+    """The name of the layout of a path.
+
+    Raises InputError where the path has none, with what was looked for and what there is, or more than one.
+    """
     if not path.exists():
         raise InputError(f"no file or folder at {path}")
     if path.is_file():
         require_itself(head(path), str(path))
-    names = _told(path)
+    names = _matching(path)
     if not names:
-        raise InputError(_sentence(path))
+        raise InputError(_unrecognised(path))
     if len(names) > 1:
-        raise InputError(f"both {' and '.join(names)} by what is in it; say the form that is meant: {path}")
+        raise InputError(f"the content fits more than one form, {' and '.join(names)}; name the one to use: {path}")
     return names[0]
 
 
-def _told(path: Path) -> list[str]:
+def _matching(path: Path) -> list[str]:
     return [name for name, layout in layouts().items() if layout.sniff(path)]
 
 
 def head(path: Path) -> bytes:
-    """The first bytes of a file; none of a folder. Raises InputError where it may not be read."""
+    """The first bytes of a file; none of a folder. Raises InputError where it can't be read."""
     try:
         with path.open("rb") as file:
             return file.read(HEAD_BYTES)
@@ -112,62 +133,94 @@ def head(path: Path) -> bytes:
         raise InputError(f"cannot read {path}: {error.strerror}") from None
 
 
-def _sentence(path: Path) -> str:
+def _unrecognised(path: Path) -> str:
+    """What is at a path that is no recording, and what to name instead."""
     if not path.is_dir():
-        if packed := _packed(head(path)):
-            return f"a {packed} archive; unpack it and name the folder: {path}"
-        begins = f"it begins with {head(path)[:8]!r}" if head(path) else "it is empty"
-        return f"no recording (MCAP, ROS bag or SQLite), for {begins}: {path}"
-    for above in path.resolve().parents[:LEVELS_ABOVE]:
-        if names := _told(above):
-            return f"a part of a recording ({names[0]}), which is {above}; name that instead of {path}"
+        return _unrecognised_file(path)
+    for parent in path.resolve().parents[:LEVELS_ABOVE]:
+        names = _matching(parent)
+        if names:
+            return f"a part of a recording ({names[0]}), which is {parent}; name that instead of {path}"
     names = listed(path)
     if not names:
         return f"an empty folder: {path}"
-    if below := _below(path):
-        return f"no recording itself, but there are some below; name one of {', '.join(below)}: {path}"
-    some = ", ".join(names[:8]) + (f" and {len(names) - 8} more" if len(names) > 8 else "")
+    recordings = _recordings_below(path)
+    if recordings:
+        suggested = enumerated(recordings, MOST_SUGGESTED)
+        return f"not a recording itself, but some lie below it; name one of {suggested}: {path}"
+    content = enumerated(names, MOST_NAMES_SHOWN)
     known = "; ".join(layout.known_by for layout in layouts().values())
-    return f"none of the forms that are read ({known}). It has {some}: {path}"
+    return f"none of the forms that are read ({known}). The folder has {content}: {path}"
 
 
-def _packed(start: bytes) -> str | None:
-    """Which kind of archive a file is by its first bytes; tar says so late."""
-    place, magic = TAR
-    return "tar" if start[place] == magic else next((ARCHIVES[m] for m in ARCHIVES if start.startswith(m)), None)
+def _unrecognised_file(path: Path) -> str:
+    start = head(path)
+    archive = _archive_kind(start)
+    if archive:
+        return f"a {archive} archive; unpack it and name the folder: {path}"
+    begins = f"it begins with {start[:MAGIC_BYTES_SHOWN]!r}" if start else "it is empty"
+    return f"not a recording (MCAP, ROS bag or SQLite): {begins}: {path}"
 
 
-def _below(folder: Path) -> list[str]:
-    """Recordings one or two levels down, a few of them, as `name (form)`."""
-    first = [folder / name for name in listed(folder)[:MOST_LOOKED_AT]]
-    second = [inner / name for inner in first if inner.is_dir() for name in listed(inner)[:MOST_LOOKED_AT]]
-    found: dict[Path, str] = {}
-    for path in [path for path in (*first, *second) if path.exists()][:MOST_LOOKED_AT]:
-        if not found.keys() & {path.parent} and (names := _told(path)):
-            found[path] = f"{path.relative_to(folder)} ({names[0]})"
-    some = list(found.values())
-    return some[:5] + ([f"{len(some) - 5} more"] if len(some) > 5 else [])
+def _archive_kind(start: bytes) -> str | None:
+    """Which kind of archive a file is by its first bytes."""
+    if start[TAR_MAGIC_PLACE] == TAR_MAGIC:
+        return "tar"
+    for magic, kind in ARCHIVES.items():
+        if start.startswith(magic):
+            return kind
+    return None
 
 
-def read(path: Path, *, form: str | None = None, options: ReadOptions | None = None) -> Recording:
+def _recordings_below(folder: Path) -> list[str]:
+    """Recordings one or two levels below a folder, as `name (form)`."""
+    first_level = _children(folder)
+    second_level: list[Path] = []
+    for child in first_level:
+        if child.is_dir():
+            second_level += _children(child)
+
+    searched = [path for path in (*first_level, *second_level) if path.exists()]
+    recordings: dict[Path, str] = {}
+    for path in searched[:MOST_SEARCHED]:
+        is_part = path.parent in recordings
+        names = [] if is_part else _matching(path)
+        if names:
+            recordings[path] = f"{path.relative_to(folder)} ({names[0]})"
+    return list(recordings.values())
+
+
+def _children(folder: Path) -> list[Path]:
+    return [folder / name for name in listed(folder)[:MOST_SEARCHED]]
+
+
+def read(
+    path: Path,
+    *,
+    form: str | None = None,
+    options: ReadOptions | None = None,
+) -> Recording:
     """The recording at a path, its pictures not yet read, as `form` or by content. Raises VobenchError."""
     options = options or ReadOptions()
     try:
-        if form is not None and form not in layouts():
-            raise InputError(unknown("form", form, list(layouts())))
-        layout = layouts()[sniff(path) if form is None else form]
+        known = layouts()
+        if form is not None and form not in known:
+            raise InputError(unknown("form", form, list(known)))
+        layout = known[sniff(path) if form is None else form]
         _require_heeded(options, layout)
         return layout.read(path, options)
-    except OSError as error:  # a folder that may not be looked into
+    except OSError as error:  # a folder without permission
         raise InputError(f"cannot read {error.filename or path}: {error.strerror or error}") from None
 
 
 def _require_heeded(options: ReadOptions, layout: Layout) -> None:
-    plain = ReadOptions()
-    said = [field.name for field in fields(ReadOptions) if getattr(options, field.name) != getattr(plain, field.name)]
-    idle = [name for name in said if name not in layout.heeds]
-    if idle:
-        knows = ", ".join(sorted(layout.heeds)) or "none"
-        raise InputError(
-            f"the option {idle[0]} means nothing to a recording of the form {layout.name}; it heeds: {knows}"
-        )
+    """Raise InputError for an option that the layout does not use."""
+    defaults = ReadOptions()
+    for field in fields(ReadOptions):
+        is_set = getattr(options, field.name) != getattr(defaults, field.name)
+        if is_set and field.name not in layout.heeds:
+            used = ", ".join(sorted(layout.heeds)) or "none"
+            raise InputError(
+                f"the option {field.name} does not apply to a recording of the form {layout.name}; "
+                f"the options that apply: {used}"
+            )

@@ -1,4 +1,4 @@
-"""What a camera does to light, in the files of TUM's monocular benchmark that DSO and its kin read.
+"""Photometric calibration in the files of TUM's monocular benchmark, which DSO and similar methods read.
 
 camera.txt (lens), times.txt (number, s, exposure in ms), pcalib.txt (inverse response), vignette.png (16 bit).
 Source: Engel, Usenko and Cremers (2016); the readme of DSO, "Geometric Calibration File".
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vobench.dataset import kalibr
 from vobench.dataset.source import ExportSource, Views
@@ -24,16 +25,13 @@ from vobench.trajectory.formats import seconds
 from vobench.trajectory.trajectory import Stamps
 
 WHITE_16 = 65535
+MS_PER_S = 1e3
 UNKNOWN = "Response and vignette of this camera are not known: there is no pcalib.txt and no vignette.png."
-DSO_TERMS: dict[type, tuple[str, tuple[str, ...]]] = {
-    BrownConrady: ("RadTan", kalibr.RADTAN_TERMS),
-    KannalaBrandt: ("EquiDistant", KannalaBrandt.coefficients),
-}
 
 
 @dataclass(frozen=True, slots=True)
 class Photometry:
-    """What a simulated camera did to light, by its case."""
+    """What a simulated camera does to light, by its case; `scattered` is the light that dirt and flare take away."""
 
     response: Response
     black_dn: float
@@ -41,104 +39,171 @@ class Photometry:
     cutoff_deg: float | None
     scattered: float
     readout_ms: float
-    unlike: bool
+    cameras_differ: bool
 
     def remarks(self) -> list[str]:
-        """Sentences on what the files have no place for."""
-        found = [
-            (self.black_dn, f"pcalib.txt leaves in the black level: {self.black_dn:g} grey values of linear signal."),
-            (self.scattered, "What dirt and flare take and scatter is not in vignette.png."),
-            (self.readout_ms, f"The shutter rolls, {self.readout_ms:g} ms a picture; stamps are the middle row's."),
-            (self.unlike, "What sets one eye apart (unlike) is in neither pcalib.txt nor vignette.png."),
-        ]
-        return [sentence for amount, sentence in found if amount]
+        """Sentences on what the files cannot hold."""
+        sentences = []
+        if self.black_dn:
+            sentences.append(f"pcalib.txt includes the black level: {self.black_dn:g} grey values of linear signal.")
+        if self.scattered:
+            sentences.append("The light that dirt and flare absorb and scatter is not in vignette.png.")
+        if self.readout_ms:
+            sentences.append(
+                f"The shutter rolls, with {self.readout_ms:g} ms a picture; stamps are those of the middle row."
+            )
+        if self.cameras_differ:
+            sentences.append("The differences between the two cameras (unlike) are not in pcalib.txt or vignette.png.")
+        return sentences
 
 
 def photometry_of(case: Mapping[str, Any] | None) -> Photometry | None:
-    """The camera of a case; None for a recording that has none, or one of another make."""
+    """The camera of a case; None for a recording without a case, or with one of another kind."""
     try:
-        camera = SENSOR_PRESETS.merged(_without_nothing((case or {})["camera"]))
-        chip = camera["chip"]
+        settings = SENSOR_PRESETS.merged(_without_null((case or {})["camera"]))
+        chip = settings["chip"]
         return Photometry(
             response=response_of(chip["response"]),
             black_dn=float(chip["black_dn"]),
-            vignetting=float(camera.get("vignetting", 0.0)),
-            cutoff_deg=camera.get("vignetting_cutoff_deg"),
-            scattered=sum(float(camera.get(key, 0.0)) for key in ("dirt", "flare", "ghost")),
-            readout_ms=float(camera.get("readout_ms", 0.0)),
-            unlike=any(value not in (None, 1) for eye in camera.get("unlike", {}).values() for value in eye.values()),
+            vignetting=float(settings.get("vignetting", 0.0)),
+            cutoff_deg=settings.get("vignetting_cutoff_deg"),
+            scattered=sum(float(settings.get(key, 0.0)) for key in ("dirt", "flare", "ghost")),
+            readout_ms=float(settings.get("readout_ms", 0.0)),
+            cameras_differ=_differ(settings.get("unlike", {})),
         )
     except (InputError, KeyError, TypeError, ValueError, AttributeError):
         return None
 
 
-def _without_nothing(section: Mapping[str, Any]) -> dict[str, Any]:
-    """What is said: older cases say null of what they leave to the sensor that they name."""
-    said = {key: value for key, value in section.items() if value is not None}
-    return {**said, "chip": {key: value for key, value in said.get("chip", {}).items() if value is not None}}
+def _differ(unlike: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Whether the settings of each camera change anything: None and a gain of 1 don't."""
+    values = [value for camera in unlike.values() for value in camera.values()]
+    return any(value not in (None, 1) for value in values)
 
 
-def write_photometric(source: ExportSource, views: Views, stamps: Stamps, folder: Path) -> list[str]:
-    """Fill `folder` with cam0 and cam1, and say what is not known; `stamps` are those of the exported frames."""
+def _without_null(section: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings of a camera that have a value: older cases have null where the named sensor's value counts."""
+    settings = _present(section)
+    return {**settings, "chip": _present(settings.get("chip", {}))}
+
+
+def _present(section: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in section.items() if value is not None}
+
+
+def write_photometric(
+    source: ExportSource,
+    views: Views,
+    stamps: Stamps,
+    folder: Path,
+) -> list[str]:
+    """Write cam0 and cam1 into a folder; return notes on what is not known.
+
+    `stamps` (N,) are those of the exported frames.
+    """
     photometry = photometry_of(source.case)
     times, notes = _times(source, stamps)
     notes += photometry.remarks() if photometry else [UNKNOWN]
-    lenses = [camera_text(views.rig.camera(side)) for side in views.rig.sides]
-    if None in lenses:
-        notes.append("DSO has no model for such a lens, so there is no camera.txt.")
+    has_unknown_lens = False
     for index, side in enumerate(views.rig.sides):
         cam = folder / f"cam{index}"
         cam.mkdir(parents=True)
-        texts = {"times.txt": times, "camera.txt": lenses[index]}
+        _write(cam / "times.txt", times)
+        lens = camera_text(views.rig.camera(side))
+        if lens is None:
+            has_unknown_lens = True
+        else:
+            _write(cam / "camera.txt", lens)
         if photometry:
-            signals_dn = linear_of_grey(photometry.response) * FULL_SCALE_DN  # of all grey values, from 0 to 255
-            texts["pcalib.txt"] = " ".join(map(repr, signals_dn.tolist())) + "\n"
-            shade = passed(views.rays_of(side, source.true_rig.camera(side)), photometry)
-            write_png(cam / "vignette.png", np.rint(shade / shade.max() * WHITE_16).astype(np.uint16))
-        for name, text in texts.items():
-            if text:
-                (cam / name).write_text(text, encoding="utf-8")
+            rays = views.rays_of(side, source.true_rig.camera(side))
+            _write(cam / "pcalib.txt", response_text(photometry.response))
+            write_png(cam / "vignette.png", _vignette(rays, photometry))
+    if has_unknown_lens:
+        notes.append("DSO has no model for such a lens, so there is no camera.txt.")
     return notes
 
 
-def passed(rays: Array, photometry: Photometry) -> Array:
-    """Share of light (H, W) along rays (H, W, 3) that the lens lets pass."""
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def response_text(response: Response) -> str:
+    """pcalib.txt: the linear signals, from 0 to 255, of all grey values."""
+    signals_dn = linear_of_grey(response) * FULL_SCALE_DN
+    return " ".join(map(repr, signals_dn.tolist())) + "\n"
+
+
+def _vignette(rays: Array, photometry: Photometry) -> NDArray[np.uint16]:
+    """The picture (H, W) of the share of light that passes the lens, relative to the largest one."""
+    share = transmitted_share(rays, photometry)
+    vignette: NDArray[np.uint16] = np.rint(share / share.max() * WHITE_16).astype(np.uint16)
+    return vignette
+
+
+def transmitted_share(rays: Array, photometry: Photometry) -> Array:
+    """The share of light (H, W) along rays (H, W, 3) that the lens transmits."""
     if not photometry.vignetting and photometry.cutoff_deg is None:
         return np.ones(rays.shape[:2])
     return vignetting(rays, strength=photometry.vignetting, cutoff_deg=photometry.cutoff_deg)
 
 
 def camera_text(camera: Camera) -> str | None:
-    """DSO's camera.txt, where the first pixel's centre is at 0.5, here at 0; None for a lens unknown to it."""
+    """DSO's camera.txt; None for a lens without a model in DSO.
+
+    DSO's first pixel has its centre at 0.5, vobench's at 0.
+    """
     width = camera.width_px
     height = camera.height_px
-    (fx, _, cx), (_, fy, cy), _ = camera.K.tolist()
-    relative = [fx / width, fy / height, (cx + 0.5) / width, (cy + 0.5) / height]
-    if isinstance(camera, Pinhole):
-        return _lines("Pinhole", [*relative, 0.0], "none", width, height)
-    if type(camera) not in DSO_TERMS or (isinstance(camera, BrownConrady) and camera.k3):
-        return None
-    name, terms = DSO_TERMS[type(camera)]
-    return _lines(name, [*relative, *(getattr(camera, term) for term in terms)], "crop", width, height)
+    fx, fy, cx, cy = camera.K[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
+    relative = [
+        fx / width,
+        fy / height,
+        (cx + 0.5) / width,
+        (cy + 0.5) / height,
+    ]
+    match camera:
+        case Pinhole():
+            return _camera_lines("Pinhole", [*relative, 0.0], "none", camera)
+        case BrownConrady() if not camera.k3:
+            terms = [getattr(camera, name) for name in kalibr.RADTAN_TERMS]
+            return _camera_lines("RadTan", [*relative, *terms], "crop", camera)
+        case KannalaBrandt():
+            terms = [getattr(camera, name) for name in camera.coefficients]
+            return _camera_lines("EquiDistant", [*relative, *terms], "crop", camera)
+        case _:
+            return None
 
 
-def _lines(model: str, values: list[float], fit: str, width: int, height: int) -> str:
-    return f"{model} {' '.join(map(repr, values))}\n{width} {height}\n{fit}\n{width} {height}\n"
+def _camera_lines(
+    model: str,
+    values: list[float],
+    rectification: str,
+    camera: Camera,
+) -> str:
+    numbers = " ".join(map(repr, values))
+    size = f"{camera.width_px} {camera.height_px}"
+    return f"{model} {numbers}\n{size}\n{rectification}\n{size}\n"
 
 
 def _times(source: ExportSource, stamps: Stamps) -> tuple[str, list[str]]:
+    """times.txt of frames at stamps (N,), and notes on it."""
     exposed_ns, settings = source.sequence.exposures()
     row_of = dict(zip(exposed_ns.tolist(), settings.tolist(), strict=True))
-    found = [row_of.get(t) for t in stamps.tolist()]
-    if any(row is None for row in found):
-        text = "".join(f"{index:05d} {seconds(t)}\n" for index, t in enumerate(stamps.tolist()))
-        return text, ["Exposures are not known of every picture, so times.txt has no third column."]
-    time_s, gain_db = np.array(found, float).reshape(-1, 2).T
+    t_ns = stamps.tolist()
+    rows = [row_of[t] for t in t_ns if t in row_of]
+    if len(rows) < len(t_ns):
+        lines = [f"{index:05d} {seconds(t)}\n" for index, t in enumerate(t_ns)]
+        return "".join(lines), ["The exposure of some pictures is not known, so times.txt has no third column."]
+
+    time_s, gain_db = np.array(rows, float).reshape(-1, 2).T
     notes = []
     if np.ptp(gain_db) > 0:
         time_s = time_s * 10 ** (gain_db / 20)
-        notes.append("The gain changes, which times.txt has no column for: its exposures are multiplied by it.")
+        notes.append("The gain changes, and times.txt has no column for it: the exposures are multiplied by it.")
     elif gain_db[0]:
-        notes.append(f"The gain, {gain_db[0]:g} dB throughout, is not in times.txt, which has no column for it.")
-    rows = enumerate(zip(stamps.tolist(), (time_s * 1e3).tolist(), strict=True))
-    return "".join(f"{index:05d} {seconds(t)} {ms!r}\n" for index, (t, ms) in rows), notes
+        notes.append(f"The gain, constant at {gain_db[0]:g} dB, is not in times.txt, which has no column for it.")
+    time_ms = (time_s * MS_PER_S).tolist()
+    lines = []
+    for index, (t, exposure_ms) in enumerate(zip(t_ns, time_ms, strict=True)):
+        lines.append(f"{index:05d} {seconds(t)} {exposure_ms!r}\n")
+    return "".join(lines), notes

@@ -1,4 +1,4 @@
-"""Sequences of our own: read as a recording, and any recording written as one, a pair of pictures in memory."""
+"""Sequences of vobench: read as a recording, and any recording written as one, a pair of pictures at a time."""
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -11,62 +11,85 @@ from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import Sequence, SequenceWriter, has_truth, read_truth
-from vobench.sequence.bag import part_of
+from vobench.sequence.mcap_file import part_of
 from vobench.sequence.messages import SENSORS_FILE
+
+LEFT_OUT = "The sequence's case, true rig, true velocities and per-pixel ground truth were not carried over."
 
 
 def is_sequence(path: Path) -> bool:
-    """Whether a folder has a sensors.mcap, finished or not, or a file is one; a torn one is told by its reader."""
+    """Whether a path is a sensors.mcap or a folder with one, which may be unfinished or damaged."""
     sensors = path / SENSORS_FILE if path.is_dir() else path
-    return sensors.name == SENSORS_FILE and (sensors.is_file() or part_of(sensors).is_file())
+    if sensors.name != SENSORS_FILE:
+        return False
+    return sensors.is_file() or part_of(sensors).is_file()
 
 
 def read_own(path: Path, _options: ReadOptions) -> Recording:
-    """All that the sensors of a sequence of our own say, and its true path. Raises SequenceError."""
+    """The sensors' messages of a sequence, and its true path. Raises SequenceError."""
     folder = path.parent if path.is_file() else path
     sequence = Sequence.open(folder)
-    stamps = sequence.frame_stamps()
+    frames_ns = sequence.frame_stamps()
     imu = sequence.imu()
     encoders = sequence.encoders()
     exposures = sequence.exposures()
     truth = read_truth(folder) if has_truth(folder) else None
-    streams = [stamps, imu.t_ns, encoders[0], *([] if truth is None else [truth.t_ns])]
+
+    streams_ns = [frames_ns, imu.t_ns, encoders[0]]
+    if truth is not None:
+        streams_ns.append(truth.t_ns)
+    start_ns = min(int(t_ns[0]) for t_ns in streams_ns if len(t_ns))
     return Recording(
         form="vobench",
         rig=sequence.rig,
         frames=sequence.frames,
         encoded_frames=sequence.encoded_frames,
-        t_ns=stamps,
-        start_ns=min(int(t_ns[0]) for t_ns in streams if len(t_ns)),
+        t_ns=frames_ns,
+        start_ns=start_ns,
         truth=truth,
         imu=imu if len(imu.t_ns) else None,
         encoders=encoders if len(encoders[0]) else None,
         exposures=exposures if len(exposures[0]) else None,
-        notes=("The sequence's case, true rig, true velocities and what is true of pixels were not carried over.",),
+        notes=(LEFT_OUT,),
     )
 
 
 LAYOUTS = (Layout("vobench", f"a sequence of vobench: {SENSORS_FILE}", is_sequence, read_own),)
 
 
-def convert(recording: Recording, folder: Path, *, provenance: Mapping[str, str] | None = None) -> None:
+def convert(
+    recording: Recording,
+    folder: Path,
+    *,
+    provenance: Mapping[str, str] | None = None,
+) -> None:
     """Write a recording as a sequence: stamps exactly, 8-bit grey pictures bit for bit. Raises VobenchError."""
-    notes = {"form": recording.form, **{f"note_{index:02d}": note for index, note in enumerate(recording.notes, 1)}}
+    notes = {"form": recording.form}
+    for index, note in enumerate(recording.notes, 1):
+        notes[f"note_{index:02d}"] = note
+
     with SequenceWriter(
-        folder, recording.rig, case_json=None, start_ns=recording.start_ns, notes=notes, provenance=provenance
+        folder,
+        recording.rig,
+        case_json=None,
+        start_ns=recording.start_ns,
+        notes=notes,
+        provenance=provenance,
     ) as writer:
-        if truth := recording.truth:  # how fast the body was is not known
+        if truth := recording.truth:  # without a twist, which is not known
             for t_ns, T_world_body in zip(truth.t_ns.tolist(), truth.T_world_frame, strict=True):
                 writer.write_truth(t_ns, T_world_body, None)
-        for _, write in merge(*_readings(writer, recording), _pictures(writer, recording), key=itemgetter(0)):
+        # Readings come before the picture of their stamp: `merge` keeps the order of streams at equal stamps.
+        streams = [*_reading_writes(writer, recording), _picture_writes(writer, recording)]
+        for _, write in merge(*streams, key=itemgetter(0)):
             write()
 
 
-Writes = Iterator[tuple[int, Callable[[], None]]]  # stamps in ns, and what writes something that has them
+Writes = Iterator[tuple[int, Callable[[], None]]]  # a stamp in ns, and the call that writes what has it
 
 
-def _readings(writer: SequenceWriter, recording: Recording) -> Iterator[Writes]:
-    """The readings of IMU and encoders, which come before the picture of their stamp."""
+def _reading_writes(writer: SequenceWriter, recording: Recording) -> Iterator[Writes]:
+    """The readings of the IMU and of the encoders."""
     if imu := recording.imu:
         yield ((int(t), partial(_write_imu, writer, imu, index)) for index, t in enumerate(imu.t_ns))
     if encoders := recording.encoders:
@@ -74,19 +97,21 @@ def _readings(writer: SequenceWriter, recording: Recording) -> Iterator[Writes]:
 
 
 def _write_imu(writer: SequenceWriter, imu: ImuReadings, index: int) -> None:
-    one = slice(index, index + 1)
-    writer.write_imu(ImuReadings(imu.t_ns[one], imu.gyro_radps[one], imu.accel_mps2[one]))
+    row = slice(index, index + 1)
+    reading = ImuReadings(imu.t_ns[row], imu.gyro_radps[row], imu.accel_mps2[row])
+    writer.write_imu(reading)
 
 
-def _pictures(writer: SequenceWriter, recording: Recording) -> Writes:
-    """The pictures, each with its exposure. Raises InputError where they are not as many as the recording says."""
+def _picture_writes(writer: SequenceWriter, recording: Recording) -> Writes:
+    """The pictures, each with its exposure. Raises InputError where their number differs from the recording's."""
     exposed_ns, settings = recording.exposures or ((), ())
     exposure_of = dict(zip(map(int, exposed_ns), settings, strict=True))
     count = 0
     for frame in recording.encoded_frames():
         yield frame.t_ns, partial(writer.write_encoded_frame, frame.t_ns, frame.left, frame.right, frame.form)
         if frame.t_ns in exposure_of:
-            yield frame.t_ns, partial(writer.write_exposure, frame.t_ns, *exposure_of[frame.t_ns].tolist())
+            exposure = exposure_of[frame.t_ns].tolist()
+            yield frame.t_ns, partial(writer.write_exposure, frame.t_ns, *exposure)
         count += 1
     if count != recording.frame_count:
-        raise InputError(f"{count} pictures came, but the recording should have {recording.frame_count}")
+        raise InputError(f"{count} pictures were read, but the recording should have {recording.frame_count}")

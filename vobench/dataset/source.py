@@ -1,17 +1,15 @@
-"""A sequence as the writers of layouts see it, and the test that what they wrote says the same.
-
-The test sends known points and the true path through what was read back as through the sequence.
-"""
+"""A sequence as the writers of layouts see it: its rig, pictures, truth and readings, and rectified views."""
 
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 
+from vobench.dataset.read_back import PIXEL_TOLERANCE, pixel_difference
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole, pixel_grid
@@ -29,33 +27,32 @@ from vobench.sequence import (
     truth_channels,
 )
 from vobench.sequence.picture import Image, decode, encode
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
-FAR_PX = 30_000.0  # outside of any picture that OpenCV resamples, which takes NaN for any place
-PIXEL_TOLERANCE = 1e-6
-POSE_TOLERANCE = 1e-9  # metres, and entries of rotations
-DEPTHS_M = (0.3, 1.0, 5.0, 30.0, 1000.0)
-GRID = 9  # points across a picture and down it
+FAR_PX = 30_000.0  # outside any picture; OpenCV resamples NaN from an arbitrary pixel
 
 
 @dataclass(frozen=True, slots=True)
 class Views:
-    """The rig of some pictures, and where their pixels (H, W, 2) lie in the recorded ones; None: as recorded."""
+    """The rig of resampled pictures, and where their pixels (H, W, 2) lie in the recorded ones; None: as recorded."""
 
     rig: Rig
     source_px: dict[Side, Array] | None = None
 
     def rays_of(self, side: Side, camera: Camera) -> Array:
         """Directions (H, W, 3) that light came from, in the axes of the camera that recorded; NaN for none."""
-        pixels = self.source_px[side] if self.source_px else pixel_grid(camera)
-        return camera.rays(pixels)
+        if self.source_px:
+            return camera.rays(self.source_px[side])
+        return camera.rays(pixel_grid(camera))
 
     def show(self, side: Side, picture: Image) -> Image:
         """A recorded picture in this view: linear between its pixels, black where it shows nothing."""
         if self.source_px is None:
             return picture
-        places = np.clip(np.nan_to_num(self.source_px[side], nan=-FAR_PX), -FAR_PX, FAR_PX).astype(np.float32)
-        u, v = np.moveaxis(places, -1, 0)
+        finite_px = np.nan_to_num(self.source_px[side], nan=-FAR_PX)
+        pixels = np.clip(finite_px, -FAR_PX, FAR_PX).astype(np.float32)
+        u, v = np.moveaxis(pixels, -1, 0)
         shown = cv2.remap(picture, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
         return shown.astype(np.uint8, copy=False)
 
@@ -63,36 +60,53 @@ class Views:
         """The share of this view's pixels that lie outside the recorded picture."""
         if self.source_px is None:
             return 0.0
-        last = (recorded.width_px - 1, recorded.height_px - 1)
-        inside = (self.source_px[side] >= 0) & (self.source_px[side] <= last)
+        pixels = self.source_px[side]
+        last_px = (recorded.width_px - 1, recorded.height_px - 1)
+        inside = (pixels >= 0) & (pixels <= last_px)
         return 1.0 - float(inside.all(-1).mean())
 
 
 def rectified(rig: Rig) -> Views:
-    """The pinholes side by side that stand for a rig, or the rig where it is that. Raises SequenceError for no pair."""
-    flat, turns = _flat(rig)
-    if pixel_difference(rig, flat) < PIXEL_TOLERANCE:
-        return Views(flat)
-    rays = flat.left.rays(pixel_grid(flat.left))
-    return Views(flat, {side: rig.camera(side).project(rays @ turns[side]) for side in rig.sides})
+    """The rectified pair of a rig; pictures of a rig that is rectified already are left as recorded.
+
+    Raises SequenceError where the pair cannot be rectified.
+    """
+    flat = _rectified_rig(rig)
+    if pixel_difference(rig, flat.rig) < PIXEL_TOLERANCE:
+        return Views(flat.rig)
+    rays = flat.rig.left.rays(pixel_grid(flat.rig.left))  # (H, W, 3), the same for both views
+    source_px = {}
+    for side in rig.sides:
+        rays_camera = rays @ flat.R_view_camera[side]
+        source_px[side] = rig.camera(side).project(rays_camera)
+    return Views(flat.rig, source_px)
 
 
-def _flat(rig: Rig) -> tuple[Rig, dict[Side, Array]]:
-    """The pinholes, and nothing else that the rig has; and how each of them is turned: R_view_camera."""
+class _Rectified(NamedTuple):
+    """A rig of pinholes side by side, without wheels and IMU, and the rotation of each from the recorded camera."""
+
+    rig: Rig
+    R_view_camera: dict[Side, Array]
+
+
+def _rectified_rig(rig: Rig) -> _Rectified:
     views = rectification(rig)
     if rig.right and views is None:
         raise SequenceError(
-            "the right camera is not to the right of the left one and looking the same way, so nothing rectifies "
-            "the pair as KITTI needs it; euroc and ros2 keep it as it is"
+            "the right camera is not to the right of the left one and looking the same way, so the pair cannot be "
+            "rectified, as KITTI needs it; the forms euroc and ros2 keep it as it is"
         )
-    R_view_left = views.R_view_left if views else np.eye(3)
-    K = rig.left.K
-    hole = Pinhole(rig.left.width_px, rig.left.height_px, *K[[0, 1, 0, 1], [0, 1, 2, 2]].tolist())
+
+    focal_px = rig.left.K[[0, 1, 0, 1], [0, 1, 2, 2]]  # fx, fy, cx, cy
+    pinhole = Pinhole(rig.left.width_px, rig.left.height_px, *focal_px.tolist())
+    R_view_left = np.eye(3) if views is None else views.R_view_left
     T_body_left = rig.T_body_left @ se3.transform(R_view_left.T, np.zeros(3))
     if views is None:
-        return Rig(hole, None, T_body_left, None), {"left": R_view_left}
+        return _Rectified(Rig(pinhole, None, T_body_left, None), {"left": R_view_left})
+
     T_body_right = T_body_left @ side_by_side(views.baseline_m)
-    return Rig(hole, hole, T_body_left, T_body_right), {"left": R_view_left, "right": views.R_view_right}
+    turns: dict[Side, Array] = {"left": R_view_left, "right": views.R_view_right}
+    return _Rectified(Rig(pinhole, pinhole, T_body_left, T_body_right), turns)
 
 
 PNG = "png"
@@ -117,8 +131,9 @@ class ExportSource:
 
     @property
     def rig(self) -> Rig:
-        """The rig as estimators are told it; an IMU without a reading is none."""
-        return self.sequence.rig if self.imu else replace(self.sequence.rig, imu=None)
+        """The reported calibration; an IMU without a reading is left out."""
+        rig = self.sequence.rig
+        return rig if self.imu else replace(rig, imu=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,24 +146,25 @@ class PngFrame:
 
 
 def open_source(folder: Path) -> ExportSource:
-    """Look into a sequence's two files. Raises SequenceError where they are not whole."""
+    """What a sequence's two files hold for an export. Raises SequenceError where they are not whole."""
     sequence = Sequence.open(folder)
     imu = sequence.imu()
     readings = imu if len(imu.t_ns) else None
     if not has_truth(folder):
         return ExportSource(folder, sequence, sequence.rig, imu=readings)
+
     truth = read_truth(folder)
     bias = read_imu_bias(folder)
     return ExportSource(
-        folder,
-        sequence,
-        read_true_rig(folder),
-        truth if len(truth) else None,
-        read_twist(folder),
-        bias if len(bias.t_ns) else None,
-        readings,
-        truth_channels(folder),
-        _case(folder),
+        folder=folder,
+        sequence=sequence,
+        true_rig=read_true_rig(folder),
+        truth=truth if len(truth) else None,
+        twist=read_twist(folder),
+        bias=bias if len(bias.t_ns) else None,
+        imu=readings,
+        channels=truth_channels(folder),
+        case=_case(folder),
     )
 
 
@@ -161,99 +177,34 @@ def _case(folder: Path) -> Mapping[str, Any] | None:
 
 
 def png_frames(sequence: Sequence, views: Views) -> Iterator[PngFrame]:
-    """The pictures as a layout shows them; bytes that are PNG already pass as they are."""
+    """The pictures as PNG files of these views; files that are PNG already and not resampled are kept."""
     for frame in sequence.encoded_frames():
-        found: dict[Side, bytes | None] = {"left": frame.left, "right": frame.right}
-        shown = {side: _shown(sequence.rig, views, side, found[side], frame.form) for side in views.rig.sides}
-        yield PngFrame(frame.index, frame.t_ns, shown)
+        recorded: dict[Side, bytes | None] = {"left": frame.left, "right": frame.right}
+        pictures = {}
+        for side in views.rig.sides:
+            pictures[side] = _as_png(sequence.rig, views, side, recorded[side], frame.form)
+        yield PngFrame(frame.index, frame.t_ns, pictures)
 
 
-def _shown(rig: Rig, views: Views, side: Side, encoded: bytes | None, form: str) -> bytes:
+def _as_png(
+    rig: Rig,
+    views: Views,
+    side: Side,
+    encoded: bytes | None,
+    form: str,
+) -> bytes:
     if encoded is None:
-        raise SequenceError(f"a frame has no {side} picture, and the rig says there is one")
+        raise SequenceError(f"a frame has no {side} picture, but the rig has a {side} camera")
     if views.source_px is None and form == PNG:
         return bytes(encoded)
-    picture = views.show(side, decode(encoded, rig.camera(side), f"a {side} picture"))
-    return encode(picture, views.rig.camera(side), side)
+    recorded = decode(encoded, rig.camera(side), f"a {side} picture")
+    return encode(views.show(side, recorded), views.rig.camera(side), side)
 
 
 def rate_hz(t_ns: Stamps) -> float:
-    """How often something was recorded, on average; 0 for a single time."""
-    span_ns = int(t_ns[-1]) - int(t_ns[0]) if len(t_ns) > 1 else 0
-    return (len(t_ns) - 1) * 1e9 / span_ns if span_ns else 0.0
-
-
-def known_points(camera: Camera) -> Array:
-    """Points (N, 3) before a camera, evenly over its picture and at several depths."""
-    u, v = (np.linspace(0, size - 1, GRID) for size in (camera.width_px, camera.height_px))
-    pixels = np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)
-    rays = camera.rays(pixels)
-    seen = rays[np.isfinite(rays).all(1)]
-    points: Array = (seen * np.array(DEPTHS_M)[:, None, None]).reshape(-1, 3)
-    return points
-
-
-def pixel_difference(expected: Rig, found: Rig) -> float:
-    """The largest distance in px between two rigs' views of the same points; infinite for other pictures."""
-    if expected.sides != found.sides:
-        return np.inf
-    points = known_points(expected.left)
-    largest = 0.0
-    for side in expected.sides:
-        cameras = expected.camera(side), found.camera(side)
-        if len({(camera.width_px, camera.height_px) for camera in cameras}) > 1:
-            return np.inf
-        pixels = [_seen_from_left(rig, points, right=side == "right") for rig in (expected, found)]
-        largest = max(largest, _largest(pixels[0], pixels[1]))
-    return largest
-
-
-def _seen_from_left(rig: Rig, points_left: Array, *, right: bool) -> Array:
-    if not right:
-        return rig.left.project(points_left)
-    return rig.camera("right").project(se3.apply(se3.inverse(rig.T_left_right), points_left))
-
-
-def _largest(expected: Array, found: Array) -> float:
-    blind = np.isnan(expected[:, 0])
-    if not (~blind).any():
-        return np.inf
-    off = np.linalg.norm(expected[~blind] - found[~blind], axis=-1)
-    return float(off.max()) if np.isfinite(off).all() else np.inf
-
-
-def check_rig(what: str, expected: Rig, found: Rig) -> None:
-    """Raises SequenceError unless a rig that was read back sends known points where the exported one does."""
-    off = pixel_difference(expected, found)
-    if not off < PIXEL_TOLERANCE:
-        raise SequenceError(
-            f"{what} does not say what was exported: known points come to lie {off:.3g} px beside their place, "
-            f"and {PIXEL_TOLERANCE:g} px would be right"
-        )
-    if expected.imu and found.imu:
-        mounts = ((expected, expected.imu), (found, found.imu))
-        off = _pose_difference(*(se3.inverse(rig.T_body_left) @ imu.T_body_imu for rig, imu in mounts))
-        if not off < POSE_TOLERANCE:
-            raise SequenceError(
-                f"{what} puts the IMU {off:.3g} beside its place, and {POSE_TOLERANCE:g} would be right"
-            )
-
-
-def check_path(what: str, expected: Trajectory, found: Trajectory) -> None:
-    """Raises SequenceError unless a path that was read back has the same stamps, and poses to 1e-9."""
-    if not np.array_equal(expected.t_ns, found.t_ns):
-        raise SequenceError(f"{what} has other stamps than were exported: {_first_stamps(expected, found)}")
-    off = _pose_difference(expected.T_world_frame, found.T_world_frame)
-    if not off < POSE_TOLERANCE:
-        raise SequenceError(f"{what} has poses {off:.3g} beside those exported, and {POSE_TOLERANCE:g} would be right")
-
-
-def _pose_difference(expected: Array, found: Array) -> float:
-    return float(np.abs(expected - found).max(initial=0.0))
-
-
-def _first_stamps(expected: Trajectory, found: Trajectory) -> str:
-    if len(expected) != len(found):
-        return f"{len(found)} of {len(expected)}"
-    at = int(np.flatnonzero(expected.t_ns != found.t_ns)[0])
-    return f"pose {at} at {found.t_ns[at]} ns and not {expected.t_ns[at]} ns"
+    """The mean rate of stamps (N,); 0 for a single one."""
+    intervals = len(t_ns) - 1
+    span_ns = int(t_ns[-1]) - int(t_ns[0]) if intervals > 0 else 0
+    if not span_ns:
+        return 0.0
+    return intervals * float(NS_PER_S) / span_ns

@@ -13,10 +13,10 @@ from vobench.scene.scene import Scene
 from vobench.sensor.exposure import row_stamps
 from vobench.sensor.imu import STREAMS, ImuBias, ImuReadings, measure
 from vobench.sensor.pixel_truth import TruthFrame, TruthNames
-from vobench.sensor.timing import NS_PER_MS
 from vobench.sequence import SequenceWriter
 from vobench.suite.suite import Case
 from vobench.trajectory.kinematics import Motion
+from vobench.trajectory.nanoseconds import NS_PER_MS
 from vobench.trajectory.trajectory import Stamps
 
 EMPTY = np.zeros(0, np.int64)

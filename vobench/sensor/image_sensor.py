@@ -15,6 +15,7 @@ from vobench.sensor.response import FULL_SCALE_DN, Grey, Response, linear_of_gre
 from vobench.sensor.timing import Timing
 from vobench.setting import Check, Like, NonNegative, Positive, Share, settings
 
+MS_PER_S = 1e3
 # From this mean on the expansion below is off by less than 6e-4 in total variation, 1e-4 in variance and 1e-5 in mean.
 EXPANSION_FROM = 10.0
 # A Poisson count of mean 10 exceeds this with probability 1e-25.
@@ -22,21 +23,22 @@ MOST_SMALL = 60
 
 
 def poisson(mean: Array, normal: Array) -> Array:
-    """Counts (...) of means (...), as float64: the quantile of each draw of a standard normal (...).
+    """Poisson counts (...) of means (...), as float64: the quantiles of draws of a standard normal (...).
 
-    The draws don't depend on the light, so a brighter frame leaves the noise of the next one as it was.
-    Means of 10 or more by the expansion of the quantile in powers of 1/√mean, smaller ones by summing the distribution.
+    The number of draws doesn't depend on the light, so a brighter frame doesn't change the noise of the next one.
+    The quantile is expanded in powers of 1/√mean from a mean of 10 on, and found by summing the distribution below.
     Source: Giles (2016), Algorithm 955, ACM TOMS 42(1), Q_N1.
     """
     counts = _expansion(mean, normal)
     small = mean < EXPANSION_FROM
     if small.any():
-        counts[small] = _summed(mean[small], scipy.special.ndtr(normal[small]))
+        probability = scipy.special.ndtr(normal[small])
+        counts[small] = _summed(mean[small], probability)
     return counts
 
 
 def _expansion(mean: Array, w: Array) -> Array:
-    """floor(mean + √mean w + 1/3 + w²/6 - (w³ + 2 w) / (72 √mean)), step by step in place, as pictures are large."""
+    """floor(mean + √mean w + 1/3 + w²/6 - (w³ + 2 w) / (72 √mean)), computed in place, as pictures are large."""
     root = np.sqrt(mean)
     square = w * w
     counts: Array = root * w
@@ -45,11 +47,11 @@ def _expansion(mean: Array, w: Array) -> Array:
     counts += square / 6
     square += 2.0
     square *= w
-    # Below 1 the sum takes over; this only keeps the division finite.
+    # Means below EXPANSION_FROM are replaced later; this only keeps the division finite.
     square /= 72 * np.maximum(root, 1.0, out=root)
     counts -= square
     np.floor(counts, out=counts)
-    # At mean 10, one draw in a million would come out at -1.
+    # At mean 10, one draw in a million would be -1.
     return np.maximum(counts, 0.0, out=counts)
 
 
@@ -70,9 +72,9 @@ def _summed(mean: Array, probability: Array) -> NDArray[np.int8]:
 
 
 Radiance = NDArray[np.float32]
-# Grey value of radiance 1, matt white in the scene's own light: what a careful photographer would expose for.
+# Grey value of radiance 1, diffuse white in the scene's own light: the usual exposure of photographers.
 WHITE_DN = 200
-# Pictures are exposed some rows at a time: what is needed on the way then stays in the processor's cache.
+# Pictures are exposed a few rows at a time, so that intermediate arrays stay in the processor's cache.
 PIXELS_AT_A_TIME = 1 << 15
 
 
@@ -109,7 +111,7 @@ class CameraSensor:
 
     @property
     def signal_of_grey(self) -> Array:
-        """Shares of full scale (256,) that light gives each grey value: what auto-exposure meters."""
+        """The signal (256,) of light at each grey value, in shares of full scale, which auto-exposure meters."""
         return linear_of_grey(self.curve) - self.black_dn / FULL_SCALE_DN
 
 
@@ -120,7 +122,13 @@ CAMERAS = {
     "clean": CameraSensor(),
     # EuRoC's cameras
     "mt9v034": CameraSensor(
-        shot_noise=True, read_noise_e=25.0, prnu=0.01, dsnu_e=10.0, column_e=2.0, dark_e_per_s=100.0, adc_bits=10
+        shot_noise=True,
+        read_noise_e=25.0,
+        prnu=0.01,
+        dsnu_e=10.0,
+        column_e=2.0,
+        dark_e_per_s=100.0,
+        adc_bits=10,
     ),
     # small pixels (3 µm) behind a global shutter: RealSense D435i, OAK-D
     "ov9282": CameraSensor(
@@ -148,10 +156,22 @@ CAMERAS = {
     ),
     # machine vision with large (5.86 µm) and middling (3.45 µm) pixels
     "imx249": CameraSensor(
-        full_well_e=32_400.0, shot_noise=True, read_noise_e=7.0, prnu=0.005, dsnu_e=2.0, dark_e_per_s=5.0, adc_bits=12
+        full_well_e=32_400.0,
+        shot_noise=True,
+        read_noise_e=7.0,
+        prnu=0.005,
+        dsnu_e=2.0,
+        dark_e_per_s=5.0,
+        adc_bits=12,
     ),
     "imx255": CameraSensor(
-        full_well_e=10_700.0, shot_noise=True, read_noise_e=3.0, prnu=0.005, dsnu_e=1.0, dark_e_per_s=5.0, adc_bits=12
+        full_well_e=10_700.0,
+        shot_noise=True,
+        read_noise_e=3.0,
+        prnu=0.005,
+        dsnu_e=1.0,
+        dark_e_per_s=5.0,
+        adc_bits=12,
     ),
 }
 
@@ -239,35 +259,38 @@ class CameraSettings:
 
     def eye(self, side: Literal["left", "right"]) -> "CameraSettings":
         """The settings of one of the two cameras."""
-        own: Eye = getattr(self.unlike, side)
-        given = {key: value for key, value in asdict(own).items() if key != "gain" and value is not None}
-        return replace(self, exposure_gain=self.exposure_gain * own.gain, **given)
+        eye: Eye = getattr(self.unlike, side)
+        settings_of_eye = asdict(eye)
+        del settings_of_eye["gain"]
+        overrides = {key: value for key, value in settings_of_eye.items() if value is not None}
+        return replace(self, exposure_gain=self.exposure_gain * eye.gain, **overrides)
 
     @property
     def weights(self) -> tuple[float, float, float] | None:
-        """What the chip makes of red, green and blue in one number; None where it tells them apart."""
-        return None if self.colour != "mono" else self.spectrum
+        """The weights of red, green and blue in the chip's one number; None where it tells them apart."""
+        return self.spectrum if self.colour == "mono" else None
 
     @property
     def exposure(self) -> Exposure:
         """The exposure of every picture, or of the first ones where auto-exposure follows."""
-        return Exposure(self.exposure_ms / 1e3, self.gain_db)
+        return Exposure(self.exposure_ms / MS_PER_S, self.gain_db)
 
     @property
     def readout_s(self) -> float:
         """The time from the first row to the one that would follow the last; 0 for a global shutter."""
-        return (self.readout_ms or 0.0) / 1e3
+        return (self.readout_ms or 0.0) / MS_PER_S
 
     @property
     def white_e(self) -> float:
-        """mu_e of radiance 1 at the exposure that the aperture is set for."""
-        share = self.chip.curve.decode(np.array(WHITE_DN / FULL_SCALE_DN))
-        return float(share) * self.chip.full_well_e * self.exposure_gain
+        """Mean electrons (mu_e) of radiance 1 at the exposure that the aperture is set for."""
+        stored = np.array(WHITE_DN / FULL_SCALE_DN)
+        share = float(self.chip.curve.decode(stored))
+        return share * self.chip.full_well_e * self.exposure_gain
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseStreams:
-    """A generator for each kind of noise; each picture takes as many draws as any other, however bright it is."""
+    """A generator for each kind of noise; every picture takes the same number of draws, whatever its brightness."""
 
     shot: np.random.Generator
     read: np.random.Generator
@@ -275,7 +298,7 @@ class NoiseStreams:
 
 @dataclass(frozen=True, slots=True)
 class FixedPattern:
-    """What sets one pixel of a chip apart for good, all (H, W): relative gain, offset and dark current in electrons."""
+    """Deviations of a chip's pixels that don't change, all (H, W): relative gain, offset and dark current."""
 
     gain: Array
     offset_e: Array
@@ -286,17 +309,26 @@ class FixedPattern:
         return FixedPattern(self.gain[rows], self.offset_e[rows], self.dark_e_per_s[rows])
 
 
-def fixed_pattern(shape: tuple[int, int], sensor: CameraSensor, rng: np.random.Generator) -> FixedPattern:
+def fixed_pattern(
+    shape: tuple[int, int],
+    sensor: CameraSensor,
+    rng: np.random.Generator,
+) -> FixedPattern:
     """Draw one chip's pattern, once per camera; each effect has a child of `rng` of its own.
 
-    Hot pixels stay hot when more are asked for; their dark current is exponential with mean `hot_e_per_s`.
+    Hot pixels stay hot when `hot_share` grows; their dark current is exponential with mean `hot_e_per_s`.
     """
     prnu, dsnu, column, hot = rng.spawn(4)
     gain = 1 + sensor.prnu * prnu.standard_normal(shape)
-    offset_e = sensor.dsnu_e * dsnu.standard_normal(shape) + sensor.column_e * column.standard_normal(shape[1])
+    pixel_offset_e = sensor.dsnu_e * dsnu.standard_normal(shape)
+    column_offset_e = sensor.column_e * column.standard_normal(shape[1])
     is_hot = hot.random(shape) < sensor.hot_share
     hot_e_per_s = is_hot * sensor.hot_e_per_s * hot.standard_exponential(shape)
-    return FixedPattern(np.maximum(gain, 0.0), offset_e, sensor.dark_e_per_s + hot_e_per_s)
+    return FixedPattern(
+        gain=np.maximum(gain, 0.0),
+        offset_e=pixel_offset_e + column_offset_e,
+        dark_e_per_s=sensor.dark_e_per_s + hot_e_per_s,
+    )
 
 
 def expose(
@@ -307,32 +339,61 @@ def expose(
     pattern: FixedPattern | None = None,
     exposure: Exposure | None = None,
 ) -> Grey:
-    """One picture of linear radiance, where 1 is matt white in the scene's own light: (H, W) of (H, W).
+    """One picture of linear radiance, where 1 is diffuse white in the scene's own light: (H, W) of (H, W).
 
     Of radiance (H, W, 3) in red, green and blue: the mosaic (H, W), or (H, W, 3) where the camera's colour is rgb.
-    Without an exposure it is the one that the aperture is set for.
-    Longer exposure is more electrons, gain only a larger K. Radiance is the mean over the exposure.
+    The default exposure is the one that the aperture is set for. A longer exposure gives more electrons, gain only a
+    larger K. Radiance is the mean over the exposure.
     Raises RenderError for radiance that is negative or not a number. Source: EMVA 1288, release 3.1, section 2.
     """
-    if not radiance.min() >= 0:
-        v, u = np.argwhere(~(radiance >= 0))[0][:2]
-        raise RenderError(f"radiance must be 0 or more, got {radiance[v, u]} at pixel ({u}, {v})")
-    exposure = exposure or Exposure(camera.exposure_ms / 1e3)
-    if radiance.ndim == 3:
-        radiance = mosaic(radiance)
-        if camera.colour == "rgb":
-            signal = _digital(
-                _signal(_electrons(radiance, camera, noise, pattern, exposure), camera.chip, exposure), camera.chip
-            )
-            return np.stack([quantise(plane, camera.chip.curve) for plane in demosaiced(signal)], -1)
+    _require_radiance(radiance)
+    exposure = exposure or Exposure(camera.exposure_ms / MS_PER_S)
+    if radiance.ndim == 2:
+        return _exposed_grey(radiance, camera, noise, pattern, exposure)
+    filtered = mosaic(radiance)
+    if camera.colour == "rgb":
+        return _exposed_colour(filtered, camera, noise, pattern, exposure)
+    return _exposed_grey(filtered, camera, noise, pattern, exposure)
+
+
+def _require_radiance(radiance: Radiance) -> None:
+    if radiance.min() >= 0:  # False for NaN
+        return
+    v, u = np.argwhere(~(radiance >= 0))[0][:2]
+    raise RenderError(f"radiance must be 0 or more, got {radiance[v, u]} at pixel ({u}, {v})")
+
+
+def _exposed_grey(
+    radiance: Radiance,
+    camera: CameraSettings,
+    noise: NoiseStreams,
+    pattern: FixedPattern | None,
+    exposure: Exposure,
+) -> Grey:
+    """Grey values (H, W) of radiance (H, W), a few rows at a time."""
+    height, width = radiance.shape
+    step = max(1, PIXELS_AT_A_TIME // width)  # rows
     grey = np.empty(radiance.shape, np.uint8)
-    step = max(1, PIXELS_AT_A_TIME // radiance.shape[1])
-    for first in range(0, len(radiance), step):
+    for first in range(0, height, step):
         rows = slice(first, first + step)
-        local = pattern.of(rows) if pattern else None
-        electrons = _electrons(radiance[rows], camera, noise, local, exposure)
-        grey[rows] = _convert(_signal(electrons, camera.chip, exposure), camera.chip)
+        rows_pattern = pattern.of(rows) if pattern else None
+        electrons = _electrons(radiance[rows], camera, noise, rows_pattern, exposure)
+        grey[rows] = _grey(_signal(electrons, camera.chip, exposure), camera.chip)
     return grey
+
+
+def _exposed_colour(
+    radiance: Radiance,
+    camera: CameraSettings,
+    noise: NoiseStreams,
+    pattern: FixedPattern | None,
+    exposure: Exposure,
+) -> Grey:
+    """Red, green and blue grey values (H, W, 3) of radiance (H, W) behind the filters."""
+    electrons = _electrons(radiance, camera, noise, pattern, exposure)
+    signal = _digital(_signal(electrons, camera.chip, exposure), camera.chip)
+    planes = [quantise(plane, camera.chip.curve) for plane in demosaiced(signal)]
+    return np.stack(planes, -1)
 
 
 # The channel behind each of two by two pixels (Bayer, 1976): red, green; green, blue.
@@ -340,50 +401,82 @@ RGGB = np.array([[0, 1], [1, 2]])
 
 
 def mosaic(radiance: Radiance) -> Radiance:
-    """What the filters before a chip's pixels let pass (H, W) of light (H, W, 3) in red, green and blue."""
-    passed = np.empty(radiance.shape[:2], radiance.dtype)
+    """The light (H, W) behind the filters of a chip's pixels, of light (H, W, 3) in red, green and blue."""
+    filtered = np.empty(radiance.shape[:2], radiance.dtype)
     for v, u in np.ndindex(RGGB.shape):
-        passed[v::2, u::2] = radiance[v::2, u::2, RGGB[v, u]]
-    return passed
+        channel = RGGB[v, u]
+        filtered[v::2, u::2] = radiance[v::2, u::2, channel]
+    return filtered
 
 
-# Source: Malvar, He, Cutler (2004), High-quality linear interpolation for demosaicing, figure 2.
-GREEN_AT_OTHER = (
-    np.array([[0, 0, -1, 0, 0], [0, 0, 2, 0, 0], [-1, 2, 4, 2, -1], [0, 0, 2, 0, 0], [0, 0, -1, 0, 0]]) / 8.0
-)
-ALONG_ROW = (
-    np.array([[0, 0, 0.5, 0, 0], [0, -1, 0, -1, 0], [-1, 4, 5, 4, -1], [0, -1, 0, -1, 0], [0, 0, 0.5, 0, 0]]) / 8.0
-)
-ACROSS = (
-    np.array([[0, 0, -1.5, 0, 0], [0, 2, 0, 2, 0], [-1.5, 0, 6, 0, -1.5], [0, 2, 0, 2, 0], [0, 0, -1.5, 0, 0]]) / 8.0
-)
+# Source: Malvar, He, Cutler (2004), High-quality linear interpolation for demosaicing, figure 2. Each weighs the
+# pixels around one whose colour is missing.
+# fmt: off
+GREEN_AT_OTHER = np.array([
+    [ 0, 0, -1, 0,  0],
+    [ 0, 0,  2, 0,  0],
+    [-1, 2,  4, 2, -1],
+    [ 0, 0,  2, 0,  0],
+    [ 0, 0, -1, 0,  0],
+]) / 8.0
+ALONG_ROW = np.array([
+    [ 0,  0, 0.5,  0,  0],
+    [ 0, -1, 0,   -1,  0],
+    [-1,  4, 5,    4, -1],
+    [ 0, -1, 0,   -1,  0],
+    [ 0,  0, 0.5,  0,  0],
+]) / 8.0
+ACROSS = np.array([
+    [ 0,   0, -1.5, 0,  0],
+    [ 0,   2,  0,   2,  0],
+    [-1.5, 0,  6,   0, -1.5],
+    [ 0,   2,  0,   2,  0],
+    [ 0,   0, -1.5, 0,  0],
+]) / 8.0
+# fmt: on
+# The pixels of each colour in a mosaic: of the two greens, one is in the rows of red and one in those of blue.
+RED = (slice(0, None, 2), slice(0, None, 2))
+GREEN_IN_RED_ROWS = (slice(0, None, 2), slice(1, None, 2))
+GREEN_IN_BLUE_ROWS = (slice(1, None, 2), slice(0, None, 2))
+BLUE = (slice(1, None, 2), slice(1, None, 2))
 
 
 def demosaiced(signal: Array) -> Array:
     """Red, green and blue (3, H, W) in 0..1 of a mosaic of signals (H, W)."""
-    green, row, column, diagonal = (
-        scipy.ndimage.correlate(signal, kernel, mode="mirror")
-        for kernel in (GREEN_AT_OTHER, ALONG_ROW, ALONG_ROW.T, ACROSS)
-    )
-    rgb = np.stack([row, green, column])
-    red, first, second, blue = ((slice(v, None, 2), slice(u, None, 2)) for v, u in np.ndindex(2, 2))
-    rgb[0][red] = signal[red]
-    rgb[0][second] = column[second]
-    rgb[0][blue] = diagonal[blue]
-    rgb[1][first] = signal[first]
-    rgb[1][second] = signal[second]
-    rgb[2][red] = diagonal[red]
-    rgb[2][second] = row[second]
-    rgb[2][blue] = signal[blue]
+    green = _interpolated(signal, GREEN_AT_OTHER)
+    along_row = _interpolated(signal, ALONG_ROW)
+    along_column = _interpolated(signal, ALONG_ROW.T)
+    diagonal = _interpolated(signal, ACROSS)
+
+    rgb = np.stack([along_row, green, along_column])
+    rgb[0][RED] = signal[RED]
+    rgb[0][GREEN_IN_BLUE_ROWS] = along_column[GREEN_IN_BLUE_ROWS]
+    rgb[0][BLUE] = diagonal[BLUE]
+
+    rgb[1][GREEN_IN_RED_ROWS] = signal[GREEN_IN_RED_ROWS]
+    rgb[1][GREEN_IN_BLUE_ROWS] = signal[GREEN_IN_BLUE_ROWS]
+
+    rgb[2][RED] = diagonal[RED]
+    rgb[2][GREEN_IN_BLUE_ROWS] = along_row[GREEN_IN_BLUE_ROWS]
+    rgb[2][BLUE] = signal[BLUE]
     return np.asarray(np.clip(rgb, 0.0, 1.0))
 
 
+def _interpolated(signal: Array, kernel: Array) -> Array:
+    return np.asarray(scipy.ndimage.correlate(signal, kernel, mode="mirror"))
+
+
 def _electrons(
-    radiance: Radiance, camera: CameraSettings, noise: NoiseStreams, pattern: FixedPattern | None, exposure: Exposure
+    radiance: Radiance,
+    camera: CameraSettings,
+    noise: NoiseStreams,
+    pattern: FixedPattern | None,
+    exposure: Exposure,
 ) -> Array:
-    """What the wells hold (H, W), read out."""
+    """Electrons (H, W) as read out of the wells."""
     sensor = camera.chip
-    electrons = _collect(_mean_electrons(radiance, camera, pattern, exposure), sensor, noise.shot)
+    mean_e = _mean_electrons(radiance, camera, pattern, exposure)
+    electrons = _collected(mean_e, sensor, noise.shot)
     if pattern is not None:
         electrons += pattern.offset_e
     if sensor.read_noise_e > 0:
@@ -394,9 +487,10 @@ def _electrons(
 def _mean_electrons(
     radiance: Radiance, camera: CameraSettings, pattern: FixedPattern | None, exposure: Exposure
 ) -> Array:
-    """mu_e (H, W), of light and of warmth."""
+    """Mean electrons mu_e (H, W) of light and dark current."""
+    relative_time = exposure.time_s / (camera.exposure_ms / MS_PER_S)
     mean_e = radiance.astype(float)
-    mean_e *= camera.white_e * (exposure.time_s / (camera.exposure_ms / 1e3))
+    mean_e *= camera.white_e * relative_time
     if pattern is None:
         return mean_e + camera.chip.dark_e_per_s * exposure.time_s
     mean_e *= pattern.gain
@@ -404,41 +498,50 @@ def _mean_electrons(
     return mean_e
 
 
-def _collect(mean_e: Array, sensor: CameraSensor, rng: np.random.Generator) -> Array:
+def _collected(
+    mean_e: Array,
+    sensor: CameraSensor,
+    rng: np.random.Generator,
+) -> Array:
     """Electrons (H, W) in the wells: Poisson where shot noise is on, then saturation."""
     if sensor.shot_noise:
-        # Twice a full well is as full as infinitely much.
-        mean_e = poisson(np.minimum(mean_e, 2 * sensor.full_well_e), rng.standard_normal(mean_e.shape))
+        # Means above twice a full well saturate as surely as that.
+        limited_e = np.minimum(mean_e, 2 * sensor.full_well_e)
+        mean_e = poisson(limited_e, rng.standard_normal(mean_e.shape))
     return np.minimum(mean_e, sensor.full_well_e, out=mean_e)
 
 
 def _signal(electrons: Array, sensor: CameraSensor, exposure: Exposure) -> Array:
-    """What the wells hold (H, W) as shares of full scale, amplified; in place."""
+    """Electrons (H, W) amplified, as shares of full scale; in place."""
     electrons *= sensor.dn_per_electron * exposure.amplification
     electrons += sensor.black_dn
     electrons /= FULL_SCALE_DN
     return np.clip(electrons, 0.0, 1.0, out=electrons)
 
 
-def _convert(signal: Array, sensor: CameraSensor) -> Grey:
-    """Grey values (H, W) of signals."""
+def _grey(signal: Array, sensor: CameraSensor) -> Grey:
+    """Grey values (H, W) of signals; the signals are overwritten."""
     if sensor.adc_bits is None:
         return quantise(signal, sensor.curve)
-    counts, largest = _counts(signal, sensor.adc_bits)
-    return quantise(np.arange(largest + 1) / largest, sensor.curve).take(counts)
+    counts = _counts(signal, sensor.adc_bits)
+    largest = _largest_count(sensor.adc_bits)
+    grey_of_count = quantise(np.arange(largest + 1) / largest, sensor.curve)
+    return grey_of_count.take(counts)
 
 
 def _digital(signal: Array, sensor: CameraSensor) -> Array:
-    """Signals (H, W) as the converter counts them."""
+    """Signals (H, W) rounded to the converter's counts; the signals are overwritten."""
     if sensor.adc_bits is None:
         return signal
-    counts, largest = _counts(signal, sensor.adc_bits)
-    return counts / largest
+    return _counts(signal, sensor.adc_bits) / _largest_count(sensor.adc_bits)
 
 
-def _counts(signal: Array, bits: int) -> tuple[NDArray[np.intp], int]:
-    """What a converter counts (H, W), and its largest count; the signal is used up."""
-    largest = (1 << bits) - 1
-    signal *= largest
+def _largest_count(bits: int) -> int:
+    return (1 << bits) - 1
+
+
+def _counts(signal: Array, bits: int) -> NDArray[np.intp]:
+    """The counts (H, W) of a converter; the signals are overwritten."""
+    signal *= _largest_count(bits)
     signal += 0.5
-    return signal.astype(np.intp), largest
+    return signal.astype(np.intp)

@@ -14,6 +14,7 @@ from vobench.geometry.rig import ImuCalibration
 from vobench.geometry.se3 import Array
 from vobench.setting import Positive, settings
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, Kinematics, Motion
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps
 
 Size = Annotated[float, Ge(0), Le(1e3)]
@@ -45,15 +46,16 @@ FLAWLESS = Triad()
 
 
 def started(triad: Triad, draw: Array) -> Array:
-    """The bias (3,) that this start begins with, for standard normal numbers (3,)."""
+    """The initial bias (3,) of one start, for standard normal numbers (3,)."""
     return np.asarray(triad.bias) + triad.bias_std * draw
 
 
 def walked(triad: Triad, draws: Array, *, step_s: float) -> Array:
-    """How far the bias has walked (M, 3) for standard normal numbers (M, 3): exact for any step.
+    """The random walk of the bias (M, 3) for standard normal numbers (M, 3): exact for any step.
 
-    A walk that is never forgotten begins at 0. One that is has the spread walk √(correlation_s / 2) from the
-    first reading on. Source: Kalibr's IMU noise model; Gillespie (1996) for the exact step with memory.
+    Without a correlation time it begins at 0. With one it is stationary, with the standard deviation
+    walk √(correlation_s / 2) from the first reading on.
+    Source: Kalibr's IMU noise model; Gillespie (1996) for the exact step of a correlated walk.
     """
     if triad.correlation_s is None:
         shocks = triad.walk * sqrt(step_s) * draws
@@ -61,80 +63,118 @@ def walked(triad: Triad, draws: Array, *, step_s: float) -> Array:
         return np.cumsum(shocks, axis=0)
     from scipy.signal import lfilter
 
-    spread = triad.walk * sqrt(triad.correlation_s / 2)
-    shocks = spread * draws
+    stationary_std = triad.walk * sqrt(triad.correlation_s / 2)
+    shocks = stationary_std * draws
     shocks[1:] *= sqrt(-expm1(-2 * step_s / triad.correlation_s))
-    walk: Array = lfilter([1.0], [1.0, -exp(-step_s / triad.correlation_s)], shocks, axis=0)
+    decay = exp(-step_s / triad.correlation_s)
+    walk: Array = lfilter([1.0], [1.0, -decay], shocks, axis=0)
     return walk
 
 
-def read_out(triad: Triad, true: Array, bias: Array, draws: Array, *, step_s: float) -> Array:
+def read_out(
+    triad: Triad,
+    true: Array,
+    bias: Array,
+    draws: Array,
+    *,
+    step_s: float,
+) -> Array:
     """Readings (M, 3) of the truth (M, 3), with a bias (M, 3) and standard normal numbers (M, 3).
 
-    A density of white noise is that of the mean over a step when divided by the step's root: what is
-    read half as often is less noisy. Source: Kalibr's IMU noise model.
+    White noise of a density has the standard deviation density / √step in the mean over a step, so that readings at a
+    lower rate are less noisy. Source: Kalibr's IMU noise model.
     """
-    analogue = true @ np.asarray(triad.gain).T + bias + triad.noise / sqrt(step_s) * draws
-    cut: Array = analogue if triad.limit is None else np.clip(analogue, -triad.limit, triad.limit)
-    return triad.step * np.rint(cut / triad.step) if triad.step else cut
+    gain = np.asarray(triad.gain)
+    white_std = triad.noise / sqrt(step_s)
+    readings: Array = true @ gain.T + bias + white_std * draws
+    if triad.limit is not None:
+        readings = np.clip(readings, -triad.limit, triad.limit)
+    if triad.step:
+        readings = triad.step * np.rint(readings / triad.step)
+    return readings
 
 
-AT_ONCE = 4096  # readings: what is held in memory does not grow with the motion's length
+BLOCK = 4096  # readings that are computed at once, so that memory does not grow with the motion's length
 
 
 def reading_stamps(motion: Motion, rate_hz: float) -> Stamps:
     """Stamps (M,) index / rate from a motion's start up to its end."""
-    lasts_ns = motion.end_ns - motion.start_ns
-    since_ns = np.rint(np.arange(int(lasts_ns * rate_hz / 1e9) + 2) * 1e9 / rate_hz).astype(np.int64)
-    stamps: Stamps = motion.start_ns + since_ns[since_ns <= lasts_ns]
+    duration_ns = motion.end_ns - motion.start_ns
+    count = int(duration_ns * rate_hz / NS_PER_S) + 2  # with one or two that lie beyond the end
+    exact_ns = np.arange(count) * float(NS_PER_S) / rate_hz
+    offsets_ns = np.rint(exact_ns).astype(np.int64)
+    stamps: Stamps = motion.start_ns + offsets_ns[offsets_ns <= duration_ns]
     return stamps
 
 
-def mean_inertia(motion: Motion, T_body_imu: Array, rate_hz: float, *, count: int) -> Array:
+def mean_inertia(
+    motion: Motion,
+    T_body_imu: Array,
+    rate_hz: float,
+    *,
+    count: int,
+) -> Array:
     """Mean angular rate and specific force (2, count, 3) in the IMU's axes, over 1 / rate around each stamp.
 
-    Neighbouring means share their edges, so they add up to the whole motion also where it jerks.
+    Neighbouring intervals share their edges, so the means add up to the whole motion, also where it jerks.
     """
     means = np.empty((2, count, 3))
     breaks_ns = np.append(motion.breaks_ns, [motion.start_ns, motion.end_ns]) - motion.start_ns
-    for first in range(0, count, AT_ONCE):
-        last = min(first + AT_ONCE, count)
-        edges_ns = (np.arange(first, last + 1, dtype=np.float64) - 0.5) * 1e9 / rate_hz
+    for first in range(0, count, BLOCK):
+        last = min(first + BLOCK, count)
+        edges = np.arange(first, last + 1, dtype=np.float64) - 0.5  # in steps
+        edges_ns = edges * NS_PER_S / rate_hz
         means[:, first:last] = _means_between(motion, T_body_imu, edges_ns, breaks_ns)
     return means
 
 
-def _means_between(motion: Motion, T_body_imu: Array, edges_ns: Array, breaks_ns: Array) -> Array:
+NODES_PER_PIECE = 3  # leave 1e-10 of an 8 Hz shake over 5 ms; longer pieces need more
+SECONDS_PER_NODE = 0.02
+MOST_NODES = 16
+
+
+def _means_between(
+    motion: Motion,
+    T_body_imu: Array,
+    edges_ns: Array,
+    breaks_ns: Array,
+) -> Array:
     """Means (2, M, 3) between edges (M + 1,), in ns since the start: Gauss-Legendre on each smooth piece."""
-    within = breaks_ns[(breaks_ns > edges_ns[0]) & (breaks_ns < edges_ns[-1])]
-    cuts_ns = np.union1d(edges_ns, within)
-    half_ns = np.diff(cuts_ns) / 2
-    middle_ns = (cuts_ns[1:] + cuts_ns[:-1]) / 2
-    # 3 nodes a piece leave 1e-10 of an 8 Hz shake over 5 ms; longer pieces need more.
-    nodes, weights = np.polynomial.legendre.leggauss(min(3 + int(half_ns.max() * 2e-9 / 0.02), 16))
-    t_ns = motion.start_ns + middle_ns[:, None] + half_ns[:, None] * nodes
-    felt = _felt(motion.at(t_ns.ravel()).of_mounted(T_body_imu)).reshape(2, *t_ns.shape, 3)
-    pieces = np.einsum("apni,n,p->api", felt, weights / 2, 2 * half_ns)
-    begin = np.searchsorted(cuts_ns, edges_ns[:-1])
-    lasts_ns = np.add.reduceat(2 * half_ns, begin)
-    means: Array = np.add.reduceat(pieces, begin, axis=1) / lasts_ns[:, None]
+    is_inside = (breaks_ns > edges_ns[0]) & (breaks_ns < edges_ns[-1])
+    ends_ns = np.union1d(edges_ns, breaks_ns[is_inside])  # of P pieces, (P + 1,)
+    half_ns = np.diff(ends_ns) / 2
+    middle_ns = (ends_ns[1:] + ends_ns[:-1]) / 2
+    longest_s = half_ns.max() * 2e-9
+    node_count = min(NODES_PER_PIECE + int(longest_s / SECONDS_PER_NODE), MOST_NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(node_count)
+
+    t_ns = motion.start_ns + middle_ns[:, None] + half_ns[:, None] * nodes  # (P, nodes)
+    kinematics = motion.at(t_ns.ravel()).of_mounted(T_body_imu)
+    inertia = _inertia(kinematics).reshape(2, *t_ns.shape, 3)
+    integrals = np.einsum("apni,n,p->api", inertia, weights / 2, 2 * half_ns)  # of each piece
+
+    first_pieces = np.searchsorted(ends_ns, edges_ns[:-1])  # of each interval between edges
+    duration_ns = np.add.reduceat(2 * half_ns, first_pieces)
+    totals = np.add.reduceat(integrals, first_pieces, axis=1)
+    means: Array = totals / duration_ns[:, None]
     return means
 
 
-def _felt(imu: Kinematics) -> Array:
+def _inertia(imu: Kinematics) -> Array:
     """Angular rate and specific force (2, K, 3): R'(a - g), which is upwards at rest."""
     up = imu.T_world_body[:, 2, :3]  # the world's z axis in the IMU's axes
-    return np.stack([imu.turn_radps, imu.acceleration_mps2 + STANDARD_GRAVITY_MPS2 * up])
+    specific_force_mps2 = imu.acceleration_mps2 + STANDARD_GRAVITY_MPS2 * up
+    return np.stack([imu.turn_radps, specific_force_mps2])
 
 
-# The random streams, one for each process: switching one off leaves the others as they were.
+# The random streams, one for each process: switching one off does not change the others.
 STREAMS = ("gyro_white", "accel_white", "gyro_walk", "accel_walk", "start_bias")
 Generators = Mapping[str, np.random.Generator]
 
 
 @dataclass(frozen=True, slots=True)
 class ImuReadings:
-    """What an IMU says, in its own axes: t_ns (M,), gyro_radps (M, 3), accel_mps2 (M, 3) with gravity's reaction."""
+    """Readings of an IMU in its own axes: t_ns (M,), gyro_radps (M, 3), accel_mps2 (M, 3) with gravity's reaction."""
 
     t_ns: Stamps
     gyro_radps: Array
@@ -173,35 +213,67 @@ class ImuSettings:
 
     @property
     def calibration(self) -> ImuCalibration:
-        """What an honest calibration says of it: its place, its rate and the four densities."""
-        g = self.gyro
-        a = self.accel
-        return ImuCalibration(self.T_body_imu, self.rate_hz, g.noise, a.noise, g.walk, a.walk)
+        """The exact calibration of the IMU: its mount, its rate and the four densities."""
+        return ImuCalibration(
+            self.T_body_imu,
+            self.rate_hz,
+            gyro_noise=self.gyro.noise,
+            accel_noise=self.accel.noise,
+            gyro_walk=self.gyro.walk,
+            accel_walk=self.accel.walk,
+        )
 
 
-def measure(motion: Motion, settings: ImuSettings, *, rngs: Generators | None = None) -> tuple[ImuReadings, ImuBias]:
+def measure(
+    motion: Motion,
+    settings: ImuSettings,
+    *,
+    rngs: Generators | None = None,
+) -> tuple[ImuReadings, ImuBias]:
     """Readings over the whole of a motion, and the biases in them; `rngs` holds the generators of STREAMS.
 
     A reading is the mean over the 1 / rate_hz around its stamp, so that readings add up to the motion.
-    Raises InputError where something is left to chance and its generator is missing.
+    Raises InputError where a random process has no generator.
     """
     step_s = 1 / settings.rate_hz
     t_ns = reading_stamps(motion, settings.rate_hz)
-    truth = mean_inertia(motion, settings.T_body_imu, settings.rate_hz, count=len(t_ns))
-    triads = {"gyro": settings.gyro, "accel": settings.accel}
-    starts = _draws("start_bias", 2, max(triad.bias_std for triad in triads.values()), rngs)
-    readings = []
-    biases = []
-    for (name, triad), true, start in zip(triads.items(), truth, starts, strict=True):
-        walk = walked(triad, _draws(f"{name}_walk", len(t_ns), triad.walk, rngs), step_s=step_s)
-        biases.append(started(triad, start) + walk)
-        white = _draws(f"{name}_white", len(t_ns), triad.noise, rngs)
-        readings.append(read_out(triad, true, biases[-1], white, step_s=step_s))
-    return ImuReadings(t_ns, *readings), ImuBias(t_ns, *biases)
+    count = len(t_ns)
+    true_gyro, true_accel = mean_inertia(motion, settings.T_body_imu, settings.rate_hz, count=count)
+    largest_bias_std = max(settings.gyro.bias_std, settings.accel.bias_std)
+    gyro_start, accel_start = _draws("start_bias", 2, largest_bias_std, rngs)
+
+    gyro_bias = _bias("gyro", settings.gyro, gyro_start, count=count, step_s=step_s, rngs=rngs)
+    gyro_white = _draws("gyro_white", count, settings.gyro.noise, rngs)
+    gyro_radps = read_out(settings.gyro, true_gyro, gyro_bias, gyro_white, step_s=step_s)
+
+    accel_bias = _bias("accel", settings.accel, accel_start, count=count, step_s=step_s, rngs=rngs)
+    accel_white = _draws("accel_white", count, settings.accel.noise, rngs)
+    accel_mps2 = read_out(settings.accel, true_accel, accel_bias, accel_white, step_s=step_s)
+
+    return ImuReadings(t_ns, gyro_radps, accel_mps2), ImuBias(t_ns, gyro_bias, accel_bias)
 
 
-def _draws(stream: str, count: int, size: float, rngs: Generators | None) -> Array:
-    """Standard normal numbers (count, 3) of a stream; zeros where what they are for has no size."""
+def _bias(
+    name: str,
+    triad: Triad,
+    start: Array,
+    *,
+    count: int,
+    step_s: float,
+    rngs: Generators | None,
+) -> Array:
+    """The bias (count, 3) of gyroscopes or accelerometers, for standard normal numbers (3,) of the start."""
+    walk = walked(triad, _draws(f"{name}_walk", count, triad.walk, rngs), step_s=step_s)
+    return started(triad, start) + walk
+
+
+def _draws(
+    stream: str,
+    count: int,
+    size: float,
+    rngs: Generators | None,
+) -> Array:
+    """Standard normal numbers (count, 3) of a stream; zeros where the size of their effect is 0."""
     if not size:
         return np.zeros((count, 3))
     if rngs is None or stream not in rngs:
@@ -215,15 +287,27 @@ MILLI_G = STANDARD_GRAVITY_MPS2 / 1000
 
 
 def _walk(spread: float, correlation_s: float) -> float:
-    """The density of a walk that stays within `spread` (one sigma) because it is forgotten after correlation_s."""
+    """The density of a walk of a correlation time whose stationary standard deviation is `spread`."""
     return spread * sqrt(2 / correlation_s)
 
 
 IMUS = {
     "exact": ImuSettings(),
     "adis16448": ImuSettings(
-        gyro=Triad(noise=1.6968e-4, walk=1.9393e-5, bias_std=0.5 * DEG, limit=1000 * DEG, step=DEG / 25),
-        accel=Triad(noise=2e-3, walk=3e-3, bias_std=20 * MILLI_G, limit=18e3 * MILLI_G, step=1e3 * MILLI_G / 1200),
+        gyro=Triad(
+            noise=1.6968e-4,
+            walk=1.9393e-5,
+            bias_std=0.5 * DEG,
+            limit=1000 * DEG,
+            step=DEG / 25,
+        ),
+        accel=Triad(
+            noise=2e-3,
+            walk=3e-3,
+            bias_std=20 * MILLI_G,
+            limit=18e3 * MILLI_G,
+            step=1e3 * MILLI_G / 1200,
+        ),
     ),
     "mpu6000": ImuSettings(
         gyro=Triad(

@@ -1,4 +1,4 @@
-"""What the lens does to light on its way: falloff to the corners, blur, flare and dirt, on linear radiance. Pure."""
+"""Effects of the lens on linear radiance: vignetting, blur, flare and dirt. Pure."""
 
 from dataclasses import dataclass
 
@@ -11,24 +11,24 @@ from vobench.sensor.image_sensor import CameraSettings, Radiance
 
 SMUDGES = 5
 SPECKS = 60
-# radii over the picture's width
-SMUDGE_SHARE = (0.05, 0.2)
-SPECK_SHARE = (0.004, 0.015)
-# Of the light that dirt takes, the share that it scatters onto the chip; the rest is absorbed. An assumption.
+# Smallest and largest radii, relative to the picture's width.
+SMUDGE_RADII = (0.05, 0.2)
+SPECK_RADII = (0.004, 0.015)
+# The share of the light lost to dirt that it scatters onto the chip; the rest is absorbed. An assumption.
 SCATTERED = 0.5
-# Over the picture's width: the distance scale of the veil of flare, and the spread of a ghost. Assumptions.
-VEIL_SHARE = 0.1
-GHOST_SHARE = 0.02
+# Relative to the picture's width: the distance scale of veiling glare, and the spread of a ghost. Assumptions.
+VEIL_SCALE = 0.1
+GHOST_SPREAD = 0.02
 # Points across a pixel for the share of it that a disc covers.
-FINE = 32
+SUBPIXELS = 32
 
 
 @dataclass(frozen=True, slots=True)
 class LensMaps:
-    """One lens, made once per camera; None is no effect.
+    """The effects of one lens, computed once per camera; None is no effect.
 
-    `shade` (H, W) is the share of light that passes; `veil` (H, W) the share of the picture's mean that dirt adds;
-    `transfer` (H, W) the blur and flare over the frequencies of a cosine transform.
+    `shade` (H, W) is the share of light that is transmitted; `veil` (H, W) the share of the picture's mean that dirt
+    adds; `transfer` (H, W) the blur and flare over the frequencies of a cosine transform.
     """
 
     shade: Radiance | None = None
@@ -36,165 +36,217 @@ class LensMaps:
     transfer: Array | None = None
 
 
-def lens_maps(effects: CameraSettings, camera: Camera, rng: np.random.Generator) -> LensMaps:
+def lens_maps(
+    effects: CameraSettings,
+    camera: Camera,
+    rng: np.random.Generator,
+) -> LensMaps:
     """The maps of a camera's lens; only dirt draws from `rng`."""
     shape = (camera.height_px, camera.width_px)
-    shade = veil = transfer = None
+    shade = None
+    veil = None
     if effects.vignetting > 0 or effects.vignetting_cutoff_deg is not None:
         rays = camera.rays(pixel_grid(camera))
         shade = vignetting(rays, strength=effects.vignetting, cutoff_deg=effects.vignetting_cutoff_deg)
     if effects.dirt > 0:
-        taken = dirt(shape, effects.dirt, rng)
-        passed = np.ones(shape) if shade is None else shade
-        shade = passed * (1 - taken)
-        veil = SCATTERED * passed * taken
+        lost = dirt(shape, effects.dirt, rng)
+        transmitted = np.ones(shape) if shade is None else shade
+        shade = transmitted * (1 - lost)
+        veil = SCATTERED * transmitted * lost
+
+    transfer = None
     if effects.blur_sigma_px > 0 or effects.defocus_px > 0:
         transfer = gaussian_transfer(shape, effects.blur_sigma_px) * disc_transfer(shape, effects.defocus_px)
     if effects.flare > 0 or effects.ghost > 0:
-        transfer = flare_transfer(1.0 if transfer is None else transfer, shape, effects.flare, effects.ghost)
+        direct = 1.0 if transfer is None else transfer
+        transfer = flare_transfer(direct, shape, effects.flare, effects.ghost)
     return LensMaps(_single(shade), _single(veil), transfer)
 
 
 def through_lens(radiance: Radiance, maps: LensMaps) -> Radiance:
-    """Radiance (H, W), or (H, W, 3) in colour, as it reaches the chip: past dirt, falloff, blur and flare.
+    """Radiance (H, W), or (H, W, 3) in colour, as it reaches the chip behind dirt, vignetting, blur and flare.
 
     Source of the dirt's two terms: Gu, Ramamoorthi, Belhumeur and Nayar (2009), equation 3.
     """
     if radiance.ndim == 3:
-        return np.stack([through_lens(channel, maps) for channel in np.moveaxis(radiance, -1, 0)], -1)
-    passed = radiance if maps.shade is None else radiance * maps.shade
+        channels = [through_lens(channel, maps) for channel in np.moveaxis(radiance, -1, 0)]
+        return np.stack(channels, -1)
+    transmitted = radiance if maps.shade is None else radiance * maps.shade
     if maps.veil is not None:
-        passed = passed + maps.veil * np.float32(radiance.mean(dtype=np.float64))
-    return passed if maps.transfer is None else blur(passed, maps.transfer)
+        mean = np.float32(radiance.mean(dtype=np.float64))
+        transmitted = transmitted + maps.veil * mean
+    return transmitted if maps.transfer is None else blur(transmitted, maps.transfer)
 
 
-def vignetting(rays: Array, *, strength: float = 1.0, cutoff_deg: float | None = None) -> Array:
-    """Share of light (H, W) along rays (H, W, 3): cos⁴ of the angle to the axis to the power of `strength`.
+def vignetting(
+    rays: Array,
+    *,
+    strength: float = 1.0,
+    cutoff_deg: float | None = None,
+) -> Array:
+    """The share of light (H, W) along rays (H, W, 3): cos⁴ of the angle to the axis, to the power of `strength`.
 
-    With a cutoff also the overlap of two equal pupils that part as tan θ and lose each other at that angle.
-    No light comes from 90° on (with `strength` above 0), nor where a ray is NaN. Source: Asada et al. (1996).
+    With a cutoff it is multiplied by the overlap of two equal discs whose distance grows as tan θ and that no longer
+    overlap at that angle. The share is 0 from 90° on (with `strength` above 0), and where a ray is NaN.
+    Source: Asada et al. (1996).
     """
-    cosine = np.clip(rays[..., 2] / np.linalg.norm(rays, axis=-1), 0.0, 1.0)
+    length = np.linalg.norm(rays, axis=-1)
+    cosine = np.clip(rays[..., 2] / length, 0.0, 1.0)
     share: Array = cosine ** (4 * strength)
     if cutoff_deg is not None:
-        tangent = np.sqrt(1 - cosine**2) / np.maximum(cosine, 1e-9)
-        apart = np.minimum(tangent / np.tan(np.deg2rad(cutoff_deg)), 1.0)
-        share = share * 2 / np.pi * (np.arccos(apart) - apart * np.sqrt(1 - apart**2))
+        sine = np.sqrt(1 - cosine**2)
+        tangent = sine / np.maximum(cosine, 1e-9)
+        distance = np.minimum(tangent / np.tan(np.deg2rad(cutoff_deg)), 1.0)  # of the discs, in diameters
+        overlap = np.arccos(distance) - distance * np.sqrt(1 - distance**2)
+        share = share * 2 / np.pi * overlap
     return np.nan_to_num(share, nan=0.0)
 
 
 def blur(radiance: Radiance, transfer: Array) -> Radiance:
-    """Radiance (H, W) spread by that transfer; the picture is mirrored at its borders.
-
-    What leaves a pixel arrives in others: the sum stays.
-    """
-    blurred = scipy.fft.idctn(scipy.fft.dctn(radiance.astype(np.float64)) * transfer, overwrite_x=True)
+    """Radiance (H, W) spread by a transfer; the picture is mirrored at its borders, and its sum is conserved."""
+    spectrum = scipy.fft.dctn(radiance.astype(np.float64))
+    blurred = scipy.fft.idctn(spectrum * transfer, overwrite_x=True)
     # Rounding may leave -1e-17 where there was no light.
-    arrived: Radiance = np.maximum(blurred, 0.0, out=blurred).astype(np.float32)
-    return arrived
+    np.maximum(blurred, 0.0, out=blurred)
+    single: Radiance = blurred.astype(np.float32)
+    return single
 
 
 def gaussian_transfer(shape: tuple[int, int], sigma_px: float) -> Array:
     """Transfer (H, W) of a Gaussian over pixels; its variance is sigma² exactly, also far below a pixel."""
+    height, width = shape
     weights = _gaussian(sigma_px)
-    down, across = (_cosines(size, len(weights)) @ weights for size in shape)
-    return np.outer(down, across)
+    vertical = _cosines(height, len(weights)) @ weights
+    horizontal = _cosines(width, len(weights)) @ weights
+    return np.outer(vertical, horizontal)
 
 
 def disc_transfer(shape: tuple[int, int], diameter_px: float) -> Array:
-    """Transfer (H, W) of an even disc around a pixel's centre: each pixel gets the share that falls on its area."""
+    """Transfer (H, W) of a uniform disc around a pixel's centre: each pixel gets the share that covers its area."""
+    height, width = shape
     shares = _disc(diameter_px)
-    down, across = (_cosines(size, len(shares)) for size in shape)
-    transfer: Array = down @ shares @ across.T
+    vertical = _cosines(height, len(shares))
+    horizontal = _cosines(width, len(shares))
+    transfer: Array = vertical @ shares @ horizontal.T
     return transfer
 
 
-def flare_transfer(straight: Array | float, shape: tuple[int, int], flare: float, ghost: float) -> Array:
-    """Transfer (H, W) of a lens that is `straight` but for the shares of light that it scatters and that it mirrors.
+def flare_transfer(
+    direct: Array | float,
+    shape: tuple[int, int],
+    flare: float,
+    ghost: float,
+) -> Array:
+    """Transfer (H, W) of a lens with the transfer `direct` but for the shares of light in flare and in the ghost.
 
-    The scattered share falls at distance r as (h² + r²)^-1.5, half of it within √3 h; the mirrored share comes, out of
-    focus, to where a half turn about the picture's middle takes it.
+    Flare falls with the distance r as (h² + r²)^-1.5, half of it within √3 h. The ghost is the picture turned by half
+    a turn about its middle, out of focus.
     """
     height, width = shape
-    down, across = (np.arange(size) for size in shape)
-    veil = np.exp(-VEIL_SHARE * width * np.pi * np.hypot(down[:, None] / height, across / width))
-    turned = np.where(np.add.outer(down, across) % 2, -1.0, 1.0) * gaussian_transfer(shape, GHOST_SHARE * width)
-    transfer: Array = (1 - flare - ghost) * straight + flare * veil + ghost * turned
+    rows = np.arange(height)  # vertical frequencies
+    columns = np.arange(width)  # horizontal frequencies
+    frequency = np.hypot(rows[:, None] / height, columns / width)
+    veil = np.exp(-VEIL_SCALE * width * np.pi * frequency)
+    half_turn = np.where(np.add.outer(rows, columns) % 2, -1.0, 1.0)
+    reflection = half_turn * gaussian_transfer(shape, GHOST_SPREAD * width)
+    direct_share = 1 - flare - ghost
+    transfer: Array = direct_share * direct + flare * veil + ghost * reflection
     return transfer
 
 
 def _cosines(size: int, taps: int) -> Array:
     """The cosine waves (size, taps) of a transform over `size` pixels, at an odd number of taps around 0."""
-    waves: Array = np.cos(np.outer(np.pi * np.arange(size) / size, np.arange(taps) - taps // 2))
+    frequencies = np.pi * np.arange(size) / size
+    positions = np.arange(taps) - taps // 2
+    waves: Array = np.cos(np.outer(frequencies, positions))
     return waves
+
+
+NARROWEST_PX = 0.03  # the width of a sampled Gaussian without weight on neighbouring pixels
 
 
 def _gaussian(sigma_px: float) -> Array:
     """Weights (N,) on the pixels around the centre, N odd, proportional to a Gaussian; their variance is sigma².
 
-    A Gaussian of that very sigma, sampled, would be too narrow below a pixel, so a little wider one is sampled.
+    A Gaussian of that very sigma, sampled, would be too narrow below a pixel, so a slightly wider one is sampled.
     """
     reach = int(np.ceil(6 * sigma_px)) + 2
-    squares = (np.arange(2 * reach + 1) - reach) ** 2.0
+    squares = (np.arange(2 * reach + 1) - reach) ** 2.0  # squared distances to the centre
 
     def weights(width_px: float) -> Array:
         values: Array = np.exp(-squares / (2 * width_px**2))
-        normed: Array = values / values.sum()
-        return normed
+        normalised: Array = values / values.sum()
+        return normalised
 
     def excess_px2(width_px: float) -> float:
         return float(weights(width_px) @ squares) - sigma_px**2
 
-    return weights(scipy.optimize.brentq(excess_px2, 0.03, sigma_px + 1) if sigma_px > 0 else 0.03)
+    if sigma_px <= 0:
+        return weights(NARROWEST_PX)
+    return weights(scipy.optimize.brentq(excess_px2, NARROWEST_PX, sigma_px + 1))
 
 
 def _disc(diameter_px: float) -> Array:
     """Shares (N, N) of a disc on the pixels around its centre, N odd; they sum to 1."""
     reach = int(np.ceil(max(diameter_px - 1, 0) / 2))
     size = 2 * reach + 1
-    fine = (np.arange(size * FINE) + 0.5) / FINE - size / 2
-    inside = np.add.outer(fine**2, fine**2) <= max(diameter_px, 2 / FINE) ** 2 / 4
-    counts = inside.reshape(size, FINE, size, FINE).sum((1, 3))
+    points_px = (np.arange(size * SUBPIXELS) + 0.5) / SUBPIXELS - size / 2
+    squared_distances = np.add.outer(points_px**2, points_px**2)
+    least_px = 2 / SUBPIXELS  # so that the disc covers some points
+    is_inside = squared_distances <= max(diameter_px, least_px) ** 2 / 4
+    counts = is_inside.reshape(size, SUBPIXELS, size, SUBPIXELS).sum((1, 3))
     shares: Array = counts / counts.sum()
     return shares
 
 
-def dirt(shape: tuple[int, int], amount: float, rng: np.random.Generator) -> Array:
-    """Share of light (H, W) that smudges and dust on the front lens take; `amount` on average.
+def dirt(
+    shape: tuple[int, int],
+    amount: float,
+    rng: np.random.Generator,
+) -> Array:
+    """The share of light (H, W) that is lost to smudges and dust on the front lens; `amount` on average.
 
-    More of it is the same dirt, thicker: light falls off exponentially in it (Beer and Lambert).
+    A larger amount is the same dirt, thicker: light is absorbed exponentially in it (Beer and Lambert).
     """
     thickness = _smudges(shape, rng) + _specks(shape, rng)
-    grown = scipy.optimize.brentq(lambda by: float(np.mean(-np.expm1(-by * thickness))) - amount, 0.0, 1e6, xtol=1e-12)
-    taken: Array = -np.expm1(-grown * thickness)
-    return taken
+
+    def excess(density: float) -> float:
+        return float(np.mean(-np.expm1(-density * thickness))) - amount
+
+    density = scipy.optimize.brentq(excess, 0.0, 1e6, xtol=1e-12)
+    lost: Array = -np.expm1(-density * thickness)
+    return lost
 
 
 def _smudges(shape: tuple[int, int], rng: np.random.Generator) -> Array:
-    """Fingerprints (H, W): a few long, soft blobs."""
+    """The thickness (H, W) of fingerprints: a few long, soft blobs."""
+    height, width = shape
     thickness = np.zeros(shape)
-    v, u = np.mgrid[: shape[0], : shape[1]]
+    v, u = np.mgrid[:height, :width]
     for _ in range(SMUDGES):
-        dv = v - rng.uniform(0, shape[0])
-        du = u - rng.uniform(0, shape[1])
+        dv = v - rng.uniform(0, height)
+        du = u - rng.uniform(0, width)
         angle = rng.uniform(0, np.pi)
-        long_px, wide_px = np.sort(rng.uniform(*SMUDGE_SHARE, 2))[::-1] * shape[1]
+        radii_px = np.sort(rng.uniform(*SMUDGE_RADII, 2)) * width
         along = du * np.cos(angle) + dv * np.sin(angle)
-        aside = dv * np.cos(angle) - du * np.sin(angle)
-        thickness += rng.uniform(0.3, 1.0) * np.exp(-((along / long_px) ** 2 + (aside / wide_px) ** 2) / 2)
+        across = dv * np.cos(angle) - du * np.sin(angle)
+        squares = (along / radii_px[1]) ** 2 + (across / radii_px[0]) ** 2
+        thickness += rng.uniform(0.3, 1.0) * np.exp(-squares / 2)
     return thickness
 
 
 def _specks(shape: tuple[int, int], rng: np.random.Generator) -> Array:
-    """Dust (H, W): small discs with soft rims, far out of focus as the front lens is."""
+    """The thickness (H, W) of dust: small discs with soft rims, as the front lens is far out of focus."""
+    height, width = shape
     thickness = np.zeros(shape)
-    v, u = np.mgrid[: shape[0], : shape[1]]
+    v, u = np.mgrid[:height, :width]
     for _ in range(SPECKS):
-        middle_v = rng.uniform(0, shape[0])
-        middle_u = rng.uniform(0, shape[1])
-        radius_px = rng.uniform(*SPECK_SHARE) * shape[1]
-        distance = np.hypot(v - middle_v, u - middle_u) / radius_px
-        thickness += rng.uniform(0.3, 1.0) * np.clip(3 * (1 - distance), 0.0, 1.0)
+        middle_v = rng.uniform(0, height)
+        middle_u = rng.uniform(0, width)
+        radius_px = rng.uniform(*SPECK_RADII) * width
+        distance = np.hypot(v - middle_v, u - middle_u) / radius_px  # in radii
+        profile = np.clip(3 * (1 - distance), 0.0, 1.0)
+        thickness += rng.uniform(0.3, 1.0) * profile
     return thickness
 
 

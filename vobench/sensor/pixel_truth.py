@@ -1,4 +1,4 @@
-"""Ground truth of every pixel: its channels, and pictures of them."""
+"""Per-pixel ground truth: its channels, and pictures of them."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,14 +15,16 @@ Ids = NDArray[np.uint16]
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """Values of one kind: their type, and how many a pixel has."""
+    """A kind of per-pixel ground truth: the type of its values, and how many a pixel has."""
 
     dtype: type[np.generic]
     depth: int = 1
 
     def shape(self, height_px: int, width_px: int) -> tuple[int, ...]:
-        """Of the array that holds a picture's values: (H, W) or (H, W, depth)."""
-        return (height_px, width_px) if self.depth == 1 else (height_px, width_px, self.depth)
+        """The shape of the array of a picture's values: (H, W) or (H, W, depth)."""
+        if self.depth == 1:
+            return (height_px, width_px)
+        return (height_px, width_px, self.depth)
 
 
 CHANNELS = {
@@ -40,7 +42,7 @@ CHANNELS = {
 
 @dataclass(frozen=True, slots=True)
 class TruthFrame:
-    """One picture's truth; None for a channel that was not asked for.
+    """The ground truth of one picture; None for a channel that was not asked for.
 
     depth (H, W) metres along the optical axis, along the ray for a camera that sees all around;
     normals (H, W, 3) unit, in the camera's frame; flow (H, W, 2) pixels to where the point is in the next
@@ -59,88 +61,103 @@ class TruthFrame:
     moving: Mask | None = None
 
     def channels(self) -> dict[str, NDArray[np.generic]]:
-        """The channels that are there, by name and in the order of CHANNELS."""
-        held = {name: getattr(self, name) for name in CHANNELS}
-        return {name: values for name, values in held.items() if values is not None}
+        """The channels that are not None, by name and in the order of CHANNELS."""
+        channels = {name: getattr(self, name) for name in CHANNELS}
+        return {name: values for name, values in channels.items() if values is not None}
 
 
 @dataclass(frozen=True, slots=True)
 class TruthNames:
-    """What the numbers of the channels `instance` and `material` mean: places here; 0 is nothing named."""
+    """The names of the ids in the channels `instance` and `material`, which are indices here; 0 has no name."""
 
     instance: tuple[str, ...] = ("",)
     material: tuple[str, ...] = ("",)
 
 
 def check_channels(names: Iterable[str]) -> tuple[str, ...]:
-    """The channels in their own order, each once. Raises UnknownNameError for one that does not exist."""
-    asked = set(names)
-    for name in sorted(asked):
+    """The channels in the order of CHANNELS, each once. Raises UnknownNameError for one that does not exist."""
+    requested = set(names)
+    for name in sorted(requested):
         if name not in CHANNELS:
             raise UnknownNameError(f"no truth channel '{name}'. Known: {', '.join(CHANNELS)}")
-    return tuple(name for name in CHANNELS if name in asked)
+    return tuple(name for name in CHANNELS if name in requested)
 
 
 Picture = NDArray[np.uint8]
 Shares = NDArray[np.float64]
 
-# Near to far: light to dark, and told apart by the colour-blind.
+# From light to dark, and distinguishable for the colour-blind.
 NEAR_TO_FAR = np.array([[255, 245, 160], [250, 160, 60], [200, 50, 100], [90, 20, 130], [20, 10, 60]], float)
-GOLDEN = 0.618034  # steps around the colour wheel by it never come close to an earlier one soon
-MOST_FLOW = 99.0  # per cent of pixels that are not too fast for the scale
+GOLDEN = 0.618034  # steps of it around the colour wheel stay away from earlier ones for long
+FLOW_PERCENTILE = 99.0  # of the speeds, whose value has full strength
 
 
 def picture(channel: str, values: NDArray[np.generic]) -> Picture:
-    """A channel of a TruthFrame (H, W, ...) as red, green and blue (H, W, 3); black where nothing is known.
+    """A channel of a TruthFrame (H, W, ...) as red, green and blue (H, W, 3); black where the value is unknown.
 
     Distances on a logarithmic scale; normals (right, down, ahead) as colours around grey; flow's direction
-    as hue and length as strength; ids as colours of their own; masks white, shadows the lighter the more.
+    as hue and length as strength; ids as distinct colours; masks white, shadows the lighter the more.
     """
     if channel == "depth":
         return _depth(values.astype(np.float64))
     if channel == "normals":
-        return _known(127.5 * (1 - values.astype(np.float64)))
+        return _rounded(127.5 * (1 - values.astype(np.float64)))
     if channel == "flow":
         return _flow(values.astype(np.float64))
     if channel in {"instance", "material"}:
         return _ids(values.astype(np.int64))
-    share = values.astype(np.float64) / max(1, int(values.astype(np.int64).max(initial=0)))
-    return np.repeat(_known(255 * share)[..., None], 3, -1)
+    largest = int(values.astype(np.int64).max(initial=0))
+    share = values.astype(np.float64) / max(1, largest)
+    grey = _rounded(255 * share)
+    return np.repeat(grey[..., None], 3, -1)
 
 
 def _depth(depth_m: NDArray[np.float64]) -> Picture:
-    known = depth_m[np.isfinite(depth_m) & (depth_m > 0)]
-    if not len(known):
+    is_known = np.isfinite(depth_m) & (depth_m > 0)
+    known_m = depth_m[is_known]
+    if not len(known_m):
         return np.zeros((*depth_m.shape, 3), np.uint8)
-    low = np.log(known.min())
-    high = np.log(known.max())
+    nearest = np.log(known_m.min())
+    farthest = np.log(known_m.max())
+    last = len(NEAR_TO_FAR) - 1
     with np.errstate(invalid="ignore", divide="ignore"):
-        share = (np.log(depth_m) - low) / max(high - low, 1e-9) * (len(NEAR_TO_FAR) - 1)
-    steps = np.arange(len(NEAR_TO_FAR))
-    return _known(np.stack([np.interp(share, steps, part) for part in NEAR_TO_FAR.T], -1))
+        share = (np.log(depth_m) - nearest) / max(farthest - nearest, 1e-9)
+    place = share * last  # in the colour map
+    places = np.arange(last + 1)
+    channels = [np.interp(place, places, channel) for channel in NEAR_TO_FAR.T]
+    return _rounded(np.stack(channels, -1))
 
 
 def _flow(flow_px: NDArray[np.float64]) -> Picture:
     speed_px = np.linalg.norm(flow_px, axis=-1)
-    known = np.isfinite(speed_px)
-    scale_px = max(float(np.percentile(speed_px[known], MOST_FLOW)), 1e-6) if known.any() else 1.0
-    turn: Shares = np.arctan2(flow_px[..., 1], flow_px[..., 0]) / (2 * np.pi)
-    return _known(255 * _wheel(turn, np.minimum(speed_px / scale_px, 1)))
+    is_known = np.isfinite(speed_px)
+    full_px = 1.0
+    if is_known.any():
+        full_px = max(float(np.percentile(speed_px[is_known], FLOW_PERCENTILE)), 1e-6)
+    right_px = flow_px[..., 0]
+    down_px = flow_px[..., 1]
+    direction: Shares = np.arctan2(down_px, right_px) / (2 * np.pi)  # in turns
+    strength = np.minimum(speed_px / full_px, 1)
+    return _rounded(255 * _wheel(direction, strength))
 
 
 def _ids(ids: NDArray[np.int64]) -> Picture:
     numbers = ids.astype(np.float64)
-    colors = _known(255 * _wheel(GOLDEN * numbers, 0.45 + 0.3 * (numbers % 2)))
-    colors[ids == 0] = 0
-    return colors
+    strength = 0.45 + 0.3 * (numbers % 2)
+    colours = _rounded(255 * _wheel(GOLDEN * numbers, strength))
+    colours[ids == 0] = 0
+    return colours
 
 
-def _wheel(turn: Shares, strength: Shares) -> Shares:
-    """Colours (..., 3) in [0, 1] at places on the colour wheel, in turns; white at strength 0."""
-    distance = np.abs((turn[..., None] - np.array([0, 1 / 3, 2 / 3]) + 0.5) % 1 - 0.5)  # to red, green and blue
-    return np.asarray(1 - strength[..., None] * (1 - np.clip(2 - 6 * distance, 0, 1)))
+def _wheel(hue: Shares, strength: Shares) -> Shares:
+    """Colours (..., 3) in [0, 1] at hues on the colour wheel, in turns; white at strength 0."""
+    primaries = np.array([0, 1 / 3, 2 / 3])  # red, green and blue
+    distance = np.abs((hue[..., None] - primaries + 0.5) % 1 - 0.5)  # in turns
+    saturated = np.clip(2 - 6 * distance, 0, 1)
+    return np.asarray(1 - strength[..., None] * (1 - saturated))
 
 
-def _known(values: NDArray[np.float64]) -> Picture:
+def _rounded(values: NDArray[np.float64]) -> Picture:
     """Whole numbers from 0 to 255, 0 for NaN."""
-    return np.rint(np.clip(np.nan_to_num(values), 0, 255)).astype(np.uint8)
+    clipped = np.clip(np.nan_to_num(values), 0, 255)
+    return np.rint(clipped).astype(np.uint8)

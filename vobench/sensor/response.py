@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,21 +15,28 @@ Grey = NDArray[np.uint8]
 FULL_SCALE_DN = 255
 # Cells of the look-up table over the signal; a power of two, so that finding a signal's cell rounds nothing.
 CELLS = 1 << 14
-TORN = FULL_SCALE_DN + 1  # marks a cell that two or more grey values share
+SHARED = FULL_SCALE_DN + 1  # marks a cell that two or more grey values share
+# IEC 61966-2-1: below these values the curve of sRGB is a straight line.
+SRGB_KNEE_LINEAR = 0.0031308
+SRGB_KNEE_STORED = 0.04045
 
 
 @dataclass(frozen=True, slots=True)
 class Srgb:
-    """IEC 61966-2-1, two pieces that meet at 0.0031308; pictures made by Blender, as the paper's were, carry it."""
+    """The curve of sRGB (IEC 61966-2-1), which Blender's pictures have, and so the paper's."""
 
     def encode(self, linear: Array) -> Array:
         """Stored value in 0..1 of a linear signal in 0..1."""
-        power: Array = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
-        return np.where(linear <= 0.0031308, 12.92 * linear, power)
+        line = 12.92 * linear
+        above_knee = np.maximum(linear, SRGB_KNEE_LINEAR)
+        power: Array = 1.055 * above_knee ** (1 / 2.4) - 0.055
+        return np.where(linear <= SRGB_KNEE_LINEAR, line, power)
 
     def decode(self, stored: Array) -> Array:
         """Linear signal in 0..1 of a stored value in 0..1."""
-        return np.where(stored <= 0.04045, stored / 12.92, ((np.maximum(stored, 0.04045) + 0.055) / 1.055) ** 2.4)
+        line = stored / 12.92
+        power = ((np.maximum(stored, SRGB_KNEE_STORED) + 0.055) / 1.055) ** 2.4
+        return np.where(stored <= SRGB_KNEE_STORED, line, power)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +62,9 @@ class Power:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A measured curve: the linear signals of equally spaced stored values, straight lines between.
+    """A measured curve: the linear signals of equally spaced stored values, interpolated linearly.
 
-    256 of them are the inverse response of a photometric calibration; the scale is free, the last is full scale.
+    256 of them are the inverse response of a photometric calibration; the last one is full scale, in any unit.
     Source: Engel, Usenko and Cremers (2016), TUM monoVO, pcalib.txt.
     """
 
@@ -69,23 +77,28 @@ class Table:
             raise SettingError(f"a tabulated response should begin with 0, the signal of black, got {self.inverse[0]}")
         for index, (value, following) in enumerate(pairwise(self.inverse)):
             if not value < following < np.inf:
-                raise SettingError(
-                    f"a tabulated response should rise, but value {index + 1} is {following} after {value}"
-                )
+                order = f"value {index + 1} is {following} after {value}"
+                raise SettingError(f"a tabulated response should rise, but {order}")
 
     def encode(self, linear: Array) -> Array:
         """Stored value in 0..1 of a linear signal in 0..1."""
-        stored: Array = np.interp(linear, *self._knots)
+        stored: Array = np.interp(linear, self._linear, self._stored)
         return stored
 
     def decode(self, stored: Array) -> Array:
         """Linear signal in 0..1 of a stored value in 0..1."""
-        linear: Array = np.interp(stored, *self._knots[::-1])
+        linear: Array = np.interp(stored, self._stored, self._linear)
         return linear
 
     @property
-    def _knots(self) -> tuple[Array, Array]:
-        return np.array(self.inverse) / self.inverse[-1], np.linspace(0, 1, len(self.inverse))
+    def _linear(self) -> Array:
+        """The linear signals of the knots, from 0 to 1."""
+        return np.array(self.inverse) / self.inverse[-1]
+
+    @property
+    def _stored(self) -> Array:
+        """The stored values of the knots, from 0 to 1."""
+        return np.linspace(0, 1, len(self.inverse))
 
 
 Response = Srgb | Power | Table
@@ -94,48 +107,54 @@ LINEAR = Power(1.0)
 RESPONSES: dict[str, Response] = {"linear": LINEAR, "srgb": SRGB}
 
 
-def response_of(said: str | float | tuple[float, ...]) -> Response:
+def response_of(value: str | float | tuple[float, ...]) -> Response:
     """The response of a name, a gamma or a table. Raises SettingError."""
-    if isinstance(said, str):
-        if said not in RESPONSES:
-            raise SettingError(unknown("response", said, list(RESPONSES)))
-        return RESPONSES[said]
-    numbers = said if isinstance(said, list | tuple) else [said]
-    if not all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers):
-        raise SettingError(f"should be linear, srgb, a gamma such as 2.2 or a list of rising signals (got {said!r})")
-    return Table(tuple(map(float, said))) if isinstance(said, list | tuple) else Power(float(said))
+    if isinstance(value, str):
+        if value not in RESPONSES:
+            raise SettingError(unknown("response", value, list(RESPONSES)))
+        return RESPONSES[value]
+    if isinstance(value, list | tuple) and all(map(_is_number, value)):
+        return Table(tuple(map(float, value)))
+    if _is_number(value):
+        return Power(float(value))
+    raise SettingError(f"should be linear, srgb, a gamma such as 2.2 or a list of rising signals (got {value!r})")
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def linear_of_grey(response: Response) -> Array:
-    """Linear signals (256,) in 0..1 of all grey values: the inverse response, as photometric calibrations list it."""
-    return response.decode(np.arange(FULL_SCALE_DN + 1) / FULL_SCALE_DN)
+    """Linear signals (256,) in 0..1 of all grey values: the inverse response of photometric calibrations."""
+    stored = np.arange(FULL_SCALE_DN + 1) / FULL_SCALE_DN
+    return response.decode(stored)
 
 
 def quantise(linear: Array, response: Response) -> Grey:
     """Grey values of linear signals in 0..1: floor(255 · encode(linear) + 1/2), without evaluating the curve.
 
-    A table knows the grey value of all signals in a cell; in the few cells that hold a border, signals are
-    compared with the borders themselves.
+    A look-up table has the grey value of all signals in a cell. Signals in the few cells that contain a border between
+    grey values are compared with the borders themselves.
     """
-    borders = _borders(response)
-    table = _cells(response)
-    looked_up = table.take((linear * CELLS).astype(np.intp))
-    torn = np.nonzero(looked_up == TORN)
-    looked_up[torn] = np.searchsorted(borders, linear[torn], side="right")
-    return looked_up.astype(np.uint8)
+    cells = (linear * CELLS).astype(np.intp)
+    grey = _cells(response).take(cells)
+    shared = np.nonzero(grey == SHARED)
+    grey[shared] = np.searchsorted(_borders(response), linear[shared], side="right")
+    return grey.astype(np.uint8)
 
 
 @cache
 def _borders(response: Response) -> Array:
     """The signals (255,) at which grey values 1, 2, ... 255 begin."""
-    return response.decode((np.arange(FULL_SCALE_DN) + 0.5) / FULL_SCALE_DN)
+    stored = (np.arange(FULL_SCALE_DN) + 0.5) / FULL_SCALE_DN
+    return response.decode(stored)
 
 
 @cache
 def _cells(response: Response) -> NDArray[np.uint16]:
-    """The grey value (CELLS + 1,) of all signals in [i, i + 1) / CELLS, or TORN where there are several."""
+    """The grey value (CELLS + 1,) of all signals in [i, i + 1) / CELLS, or SHARED where there are several."""
     edges = np.arange(CELLS + 2) / CELLS
     borders = _borders(response)
     first = np.searchsorted(borders, edges[:-1], side="right")
     last = np.searchsorted(borders, edges[1:], side="left")
-    return np.where(first == last, first, TORN).astype(np.uint16)
+    return np.where(first == last, first, SHARED).astype(np.uint16)

@@ -1,4 +1,4 @@
-"""When sensors really look: frames that are lost or come twice, stamps that jitter, a late eye or IMU. Pure."""
+"""Errors of timing: lost and repeated frames, jitter of stamps, delays of the right camera or the IMU. Pure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,11 +9,11 @@ from annotated_types import Ge, Le
 from numpy.typing import NDArray
 
 from vobench.setting import Share, settings
+from vobench.trajectory.nanoseconds import NS_PER_MS
 from vobench.trajectory.trajectory import Stamps
 
-NS_PER_MS = 1e6
 STREAMS = ("drop", "repeat", "jitter")
-WIDEST_JITTER = 3.0  # standard deviations; a stamp is no further off
+WIDEST_JITTER = 3.0  # standard deviations; larger draws are clipped
 
 
 @settings()
@@ -34,15 +34,15 @@ class Timing:
 
     @property
     def latest_ms(self) -> float:
-        """How far from its stamp a picture can be taken."""
+        """The most that a picture is taken before or after its stamp."""
         return WIDEST_JITTER * self.jitter_ms + abs(self.right_delay_ms)
 
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """Which of a way's frames come (K,), and of each: its stamp, when both eyes took it, whether it is the last again.
+    """The frames of a motion that are delivered, all (K,): stamps, when each camera took them, and repetitions.
 
-    `index` numbers the frames of the way; all are (K,).
+    `index` numbers the frames of the motion; `repeats` marks frames that show the picture before again.
     """
 
     index: NDArray[np.int64]
@@ -52,22 +52,38 @@ class Schedule:
     repeats: NDArray[np.bool_]
 
 
-def schedule(timing: Timing, t_ns: Stamps, rngs: Mapping[str, np.random.Generator], *, before: int = 0) -> Schedule:
-    """The frames of a way with stamps t_ns (N,); `rngs` has a generator for each of STREAMS.
+def schedule(
+    timing: Timing,
+    t_ns: Stamps,
+    rngs: Mapping[str, np.random.Generator],
+    *,
+    before: int = 0,
+) -> Schedule:
+    """The frames of a motion with stamps t_ns (N,); `rngs` has a generator for each of STREAMS.
 
-    More of a kind adds to what happened before: a frame that is lost at one share is lost at a larger one. The first
-    frame and the last always come, and the first shows its own picture. So many of the way's frames come `before`.
+    A larger share adds to the effects of a smaller one: a frame that is lost at one share is lost at a larger one. The
+    first and the last frame are never lost, and the first is never a repetition. `before` is the number of earlier
+    frames of the same motion, which use up the first random numbers.
     """
     count = len(t_ns)
-    chances = {name: rngs[name].random(before + count) for name in ("drop", "repeat")}
-    jitter = np.clip(rngs["jitter"].standard_normal(before + count)[before:], -WIDEST_JITTER, WIDEST_JITTER)
-    begins = chances["drop"] < timing.drop_share / timing.drop_burst
-    lost = np.convolve(begins, np.ones(timing.drop_burst, int))[before : before + count] > 0
+    drop_chance = rngs["drop"].random(before + count)
+    repeat_chance = rngs["repeat"].random(before + count)
+    draws = rngs["jitter"].standard_normal(before + count)[before:]
+    jitter = np.clip(draws, -WIDEST_JITTER, WIDEST_JITTER)  # standard deviations
+
+    burst_begins = drop_chance < timing.drop_share / timing.drop_burst
+    bursts = np.convolve(burst_begins, np.ones(timing.drop_burst, int))
+    lost = bursts[before : before + count] > 0
     lost[[0, -1]] = False
     index = np.flatnonzero(~lost)
-    left_ns = t_ns + np.rint(jitter * timing.jitter_ms * NS_PER_MS).astype(np.int64)
+
+    jitter_ns = np.rint(jitter * timing.jitter_ms * NS_PER_MS).astype(np.int64)
+    left_ns = t_ns + jitter_ns
     right_ns = left_ns + round(timing.right_delay_ms * NS_PER_MS)
-    repeats = chances["repeat"][before + index] < timing.repeat_share
+
+    repeats = repeat_chance[before + index] < timing.repeat_share
     repeats[0] = False
-    shown = index[np.maximum.accumulate(np.where(repeats, 0, np.arange(len(index))))]
+    delivered = np.arange(len(index))
+    own_picture = np.where(repeats, 0, delivered)
+    shown = index[np.maximum.accumulate(own_picture)]  # the frame of the motion whose picture each one shows
     return Schedule(index, t_ns[index], left_ns[shown], right_ns[shown], repeats)

@@ -2,7 +2,7 @@
 
 import struct
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +22,7 @@ from vobench.geometry.camera import (
 from vobench.geometry.rig import Rig, projection, rectification
 from vobench.geometry.se3 import Array
 from vobench.sequence.picture import CHANNELS, MONO, RGB
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 WORLD = "map"
 BODY = "base_link"
@@ -36,9 +37,8 @@ PROVENANCE_NOTE = "vobench.provenance"
 IMPORT_NOTE = "vobench.import"
 WHEELS_NOTE = "vobench.wheels"
 IMU_NOTE = "vobench.imu"
-NS_PER_S = 1_000_000_000
 END_OF_STAMPS_NS = 2**31 * NS_PER_S  # ROS counts seconds in 31 bits
-UNKNOWN = -1.0  # in the first element of a covariance: "there is no estimate of this", says sensor_msgs/Imu
+UNKNOWN = -1.0  # first element of a covariance that is not estimated; see sensor_msgs/Imu
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ TRUE_INFO_TOPICS = (TRUE_LEFT_INFO, TRUE_RIGHT_INFO)
 SENSOR_TOPICS = (TF_STATIC, *INFO_TOPICS, *IMAGE_TOPICS, EXPOSURE, ENCODERS, IMU)
 TRUTH_TOPICS = (TF_STATIC, TF, ODOMETRY)
 
-# ROS names the first two; the others it does not know, and their names are ours.
+# Names of camera models: the first two are ROS's, the others are defined here.
 PLUMB_BOB = "plumb_bob"
 EQUIDISTANT = "equidistant"
 DOUBLE_SPHERE = "double_sphere"
@@ -82,8 +82,17 @@ FOCAL_MODELS: dict[str, type[BrownConrady] | type[KannalaBrandt] | type[DoubleSp
     DOUBLE_SPHERE: DoubleSphere,
 }
 ALL_AROUND = "equirectangular"
-# A pinhole is a plumb bob that does not bend.
-MODEL_NAMES: dict[type, str] = {Equirectangular: ALL_AROUND, **{kind: name for name, kind in FOCAL_MODELS.items()}}
+
+
+def model_name(camera: Camera) -> str:
+    """The name of a camera's distortion model; that of a pinhole is a plumb bob without distortion."""
+    if isinstance(camera, Equirectangular):
+        return ALL_AROUND
+    for name, model in FOCAL_MODELS.items():
+        if isinstance(camera, model):
+            return name
+    return PLUMB_BOB
+
 
 WHEEL_TICKS_DEFINITION = """\
 # Counts of the two wheel encoders since the start of the recording, positive when the robot drives ahead.
@@ -129,16 +138,24 @@ for _definition, _topic in (
 
 def sensor_topics(rig: Rig) -> tuple[Topic, ...]:
     """The topics that a recording of this rig can have."""
-    eyes = len(rig.sides)
-    moved = ((ENCODERS, rig.wheels), (IMU, rig.imu))
-    there = [topic for topic, sensor in moved if sensor]
-    return (TF_STATIC, *INFO_TOPICS[:eyes], *IMAGE_TOPICS[:eyes], EXPOSURE, *there)
+    cameras = len(rig.sides)
+    topics = [TF_STATIC, *INFO_TOPICS[:cameras], *IMAGE_TOPICS[:cameras], EXPOSURE]
+    if rig.wheels:
+        topics.append(ENCODERS)
+    if rig.imu:
+        topics.append(IMU)
+    return tuple(topics)
 
 
 def truth_topics(rig: Rig) -> tuple[Topic, ...]:
-    """The topics that the truth about this rig can have, those of pixels apart."""
-    noise = ((IMU_BIAS, rig.imu), (DISTURBANCE, rig.wheels))
-    return (*TRUTH_TOPICS, *TRUE_INFO_TOPICS[: len(rig.sides)], *(topic for topic, source in noise if source))
+    """The topics that the truth of this rig can have, except those of pixels."""
+    cameras = len(rig.sides)
+    topics = [*TRUTH_TOPICS, *TRUE_INFO_TOPICS[:cameras]]
+    if rig.imu:
+        topics.append(IMU_BIAS)
+    if rig.wheels:
+        topics.append(DISTURBANCE)
+    return tuple(topics)
 
 
 def _make(type_name: str, *fields: Any) -> Any:
@@ -150,7 +167,7 @@ def _quaternion(R: Array) -> Any:
 
 
 def split_stamp(t_ns: int) -> tuple[int, int]:
-    """Seconds and nanoseconds of a stamp, as ROS has it. Raises SequenceError outside the years 1970 to 2038."""
+    """Seconds and nanoseconds of a stamp, as in ROS. Raises SequenceError outside the years 1970 to 2038."""
     if not 0 <= t_ns < END_OF_STAMPS_NS:
         raise SequenceError(f"a ROS stamp lies between 0 and {END_OF_STAMPS_NS - 1} ns (in 2038), got {t_ns} ns")
     return divmod(int(t_ns), NS_PER_S)
@@ -158,72 +175,101 @@ def split_stamp(t_ns: int) -> tuple[int, int]:
 
 def header(t_ns: int, frame_id: str) -> Any:
     """A std_msgs/Header."""
-    return _make("std_msgs/msg/Header", _make("builtin_interfaces/msg/Time", *split_stamp(t_ns)), frame_id)
+    stamp = _make("builtin_interfaces/msg/Time", *split_stamp(t_ns))
+    return _make("std_msgs/msg/Header", stamp, frame_id)
 
 
-def transforms(t_ns: int, parent: str, T_parent_child: dict[str, Array]) -> Any:
-    """A tf2_msgs/TFMessage that hangs each child frame on `parent`."""
-    stamped = [
-        _make(
-            "geometry_msgs/msg/TransformStamped",
-            header(t_ns, parent),
-            child,
-            _make("geometry_msgs/msg/Transform", vector(T[:3, 3]), _quaternion(T[:3, :3])),
-        )
-        for child, T in T_parent_child.items()
-    ]
+def transforms(
+    t_ns: int,
+    parent: str,
+    T_parent_child: dict[str, Array],
+) -> Any:
+    """A tf2_msgs/TFMessage with the pose of each child frame on `parent`."""
+    stamped = []
+    for child, T in T_parent_child.items():
+        transform = _make("geometry_msgs/msg/Transform", vector(T[:3, 3]), _quaternion(T[:3, :3]))
+        stamped.append(_make("geometry_msgs/msg/TransformStamped", header(t_ns, parent), child, transform))
     return _make(TF.type_name, stamped)
 
 
 def camera_infos(t_ns: int, rig: Rig) -> tuple[Any, ...]:
-    """The sensor_msgs/CameraInfo of each camera, with the R and P that rectify a pair where anything does."""
+    """The sensor_msgs/CameraInfo of each camera, with the R and P that rectify a pair if it can be rectified."""
+    if rig.right is None:
+        return (camera_info(t_ns, LEFT, rig.left),)
     views = rectification(rig)
     if views is None:
-        names = (LEFT, RIGHT)
-        return tuple(camera_info(t_ns, name, rig.camera(side)) for name, side in zip(names, rig.sides, strict=False))
+        return camera_info(t_ns, LEFT, rig.left), camera_info(t_ns, RIGHT, rig.right)
     left = camera_info(t_ns, LEFT, rig.left, R=views.R_view_left, P=views.P_left)
-    return left, camera_info(t_ns, RIGHT, rig.camera("right"), R=views.R_view_right, P=views.P_right)
+    right = camera_info(t_ns, RIGHT, rig.right, R=views.R_view_right, P=views.P_right)
+    return left, right
 
 
-def camera_info(t_ns: int, frame_id: str, camera: Camera, *, R: Array | None = None, P: Array | None = None) -> Any:
-    """A sensor_msgs/CameraInfo; without R (3, 3) and P (3, 4) that of a camera on its own."""
+def camera_info(
+    t_ns: int,
+    frame_id: str,
+    camera: Camera,
+    *,
+    R: Array | None = None,
+    P: Array | None = None,
+) -> Any:
+    """A sensor_msgs/CameraInfo; without R (3, 3) and P (3, 4), that of a camera on its own."""
+    if R is None:
+        R = np.eye(3)
+    if P is None:
+        P = projection(camera.K, 0.0)
+    d = np.zeros(5)
+    if not isinstance(camera, Pinhole):
+        d = np.array([getattr(camera, name) for name in camera.coefficients])
+    binning = 0
     region = _make("sensor_msgs/msg/RegionOfInterest", 0, 0, 0, 0, False)  # all of the picture
     return _make(
         LEFT_INFO.type_name,
         header(t_ns, frame_id),
         camera.height_px,
         camera.width_px,
-        MODEL_NAMES.get(type(camera), PLUMB_BOB),
-        np.zeros(5) if isinstance(camera, Pinhole) else np.array([getattr(camera, k) for k in camera.coefficients]),
-        _own_matrix(camera).ravel(),
-        (np.eye(3) if R is None else R).ravel(),
-        (projection(camera.K, 0.0) if P is None else P).ravel(),
-        0,
-        0,
+        model_name(camera),
+        d,
+        _model_matrix(camera).ravel(),
+        R.ravel(),
+        P.ravel(),
+        binning,
+        binning,
         region,
     )
 
 
-def _own_matrix(camera: Camera) -> Array:
-    """The camera matrix with the model's own focal length, which a double sphere does not have at its axis."""
+def _model_matrix(camera: Camera) -> Array:
+    """The camera matrix of the model's focal lengths; those of a double sphere do not hold at its axis."""
     if isinstance(camera, DoubleSphere):
         return camera_matrix(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px)
     return camera.K
 
 
-def image(t_ns: int, frame_id: str, encoded: bytes, form: str, colour: str = MONO) -> Any:
-    """A sensor_msgs/CompressedImage; `form` is png or jpeg, which says all of a grey picture.
+def image(
+    t_ns: int,
+    frame_id: str,
+    encoded: bytes,
+    form: str,
+    colour: str = MONO,
+) -> Any:
+    """A sensor_msgs/CompressedImage; `form` is png or jpeg.
 
-    Others are named as ROS's compressed_image_transport names them: "rgb8; png compressed bgr8".
+    The format of a grey picture is its form; that of others is as in ROS's compressed_image_transport:
+    "rgb8; png compressed bgr8".
     """
-    named = form
+    format_name = form
     if colour != MONO:
-        packed_as = "bgr8" if colour == RGB else MONO
-        named = f"{colour}; {form} compressed {packed_as}"
-    return message(LEFT_IMAGE, t_ns, frame_id, named, np.frombuffer(encoded, np.uint8))
+        compressed_as = "bgr8" if colour == RGB else MONO
+        format_name = f"{colour}; {form} compressed {compressed_as}"
+    return message(LEFT_IMAGE, t_ns, frame_id, format_name, np.frombuffer(encoded, np.uint8))
 
 
-def message(topic: Topic, t_ns: int, frame_id: str, *fields: Any) -> Any:
+def message(
+    topic: Topic,
+    t_ns: int,
+    frame_id: str,
+    *fields: Any,
+) -> Any:
     """A message that is a header and these fields, as those of vobench_msgs are."""
     return _make(topic.type_name, header(t_ns, frame_id), *fields)
 
@@ -233,31 +279,58 @@ def vector(xyz: ArrayLike) -> Any:
     return _make("geometry_msgs/msg/Vector3", *np.asarray(xyz, float).tolist())
 
 
-def imu(t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike, variances: tuple[float, float]) -> Any:
+def imu(
+    t_ns: int,
+    gyro_radps: ArrayLike,
+    accel_mps2: ArrayLike,
+    variances: tuple[float, float],
+) -> Any:
     """One reading as a sensor_msgs/Imu; `variances` are those of one axis of gyro and accelerometer, 0 if not known."""
-    upright = _make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0)
-    unknown = np.zeros(9)
-    unknown[0] = UNKNOWN
-    gyro, accel = (np.eye(3).ravel() * variance for variance in variances)
-    return message(IMU, t_ns, IMU_FRAME, upright, unknown, vector(gyro_radps), gyro, vector(accel_mps2), accel)
+    orientation = _make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0)
+    gyro_variance, accel_variance = variances
+    gyro_covariance = np.eye(3).ravel() * gyro_variance
+    accel_covariance = np.eye(3).ravel() * accel_variance
+    return message(
+        IMU,
+        t_ns,
+        IMU_FRAME,
+        orientation,
+        _unknown_covariance(9),
+        vector(gyro_radps),
+        gyro_covariance,
+        vector(accel_mps2),
+        accel_covariance,
+    )
 
 
-def odometry(t_ns: int, T_world_body: Array, twist_body: ArrayLike | None) -> Any:
+def _unknown_covariance(size: int) -> Array:
+    covariance = np.zeros(size)
+    covariance[0] = UNKNOWN
+    return covariance
+
+
+def odometry(
+    t_ns: int,
+    T_world_body: Array,
+    twist_body: ArrayLike | None,
+) -> Any:
     """A nav_msgs/Odometry: the body's pose in the world, its (6,) twist (m/s, rad/s) in its own axes, or None."""
-    # ground truth states no covariance
-    unstated = np.zeros(36)
-    unknown = np.zeros(36)
-    unknown[0] = UNKNOWN
     position = _make("geometry_msgs/msg/Point", *T_world_body[:3, 3].tolist())
     pose = _make("geometry_msgs/msg/Pose", position, _quaternion(T_world_body[:3, :3]))
-    linear, angular = np.zeros((2, 3)) if twist_body is None else np.asarray(twist_body, float).reshape(2, 3)
-    twist = _make("geometry_msgs/msg/Twist", vector(linear), vector(angular))
+    exact = np.zeros(36)  # the covariance of a ground truth
+    linear_mps = np.zeros(3)
+    angular_radps = np.zeros(3)
+    twist_covariance = _unknown_covariance(36)
+    if twist_body is not None:
+        linear_mps, angular_radps = np.asarray(twist_body, float).reshape(2, 3)
+        twist_covariance = exact
+    twist = _make("geometry_msgs/msg/Twist", vector(linear_mps), vector(angular_radps))
     return _make(
         ODOMETRY.type_name,
         header(t_ns, WORLD),
         BODY,
-        _make("geometry_msgs/msg/PoseWithCovariance", pose, unstated),
-        _make("geometry_msgs/msg/TwistWithCovariance", twist, unknown if twist_body is None else unstated),
+        _make("geometry_msgs/msg/PoseWithCovariance", pose, exact),
+        _make("geometry_msgs/msg/TwistWithCovariance", twist, twist_covariance),
     )
 
 
@@ -271,7 +344,9 @@ def pose_fields(message: Any) -> tuple[float, ...]:
     """Translation and quaternion (x, y, z, qx, qy, qz, qw) of a Transform or a Pose."""
     t = message.translation if hasattr(message, "translation") else message.position
     q = message.rotation if hasattr(message, "rotation") else message.orientation
-    return t.x, t.y, t.z, q.x, q.y, q.z, q.w
+    translation = (t.x, t.y, t.z)
+    quaternion = (q.x, q.y, q.z, q.w)
+    return translation + quaternion
 
 
 def poses(fields: ArrayLike) -> Array:
@@ -281,28 +356,30 @@ def poses(fields: ArrayLike) -> Array:
 
 
 def camera(message: Any) -> Camera:
-    """The camera of a CameraInfo. Raises SequenceError for a distortion model that is not ours."""
-    size = (int(message.width), int(message.height))
+    """The camera of a CameraInfo. Raises SequenceError for an unknown distortion model."""
+    size_px = (int(message.width), int(message.height))
     d = [float(value) for value in message.d]
     name = message.distortion_model
     if name == ALL_AROUND:
-        return Equirectangular(*size)
+        return Equirectangular(*size_px)
     fx, _, cx, _, fy, cy = message.k[:6].tolist()
     if name == PLUMB_BOB and not any(d):
-        return Pinhole(*size, fx, fy, cx, cy)
+        return Pinhole(*size_px, fx, fy, cx, cy)
     model = FOCAL_MODELS.get(name)
     if model is None or len(d) != len(model.coefficients):
-        known = ", ".join(f"{key} ({len(kind.coefficients)})" for key, kind in FOCAL_MODELS.items())
+        models = [f"{key} ({len(kind.coefficients)})" for key, kind in FOCAL_MODELS.items()]
+        known = ", ".join(models)
         raise SequenceError(
             f"camera {message.header.frame_id} has the distortion model '{name}' with {len(d)} coefficients. "
             f"Known: {known}, {ALL_AROUND} (0)"
         )
-    return model(*size, fx, fy, cx, cy, *d)
+    return model(*size_px, fx, fy, cx, cy, *d)
 
 
-# A serialised message begins with four bytes that tell its byte order, then the stamp of its header.
+# A serialised message begins with four bytes that state its byte order, then the stamp of its header.
 STAMP = struct.Struct("<iI")
-STAMP_AT = 4
+STAMP_BEGIN = 4
+STAMP_END = STAMP_BEGIN + STAMP.size
 LENGTH = struct.Struct("<I")
 LITTLE_ENDIAN = b"\x00\x01"
 
@@ -314,40 +391,56 @@ def serialise(message: Any) -> bytes:
 
 def stamped(template: bytes, t_ns: int) -> bytes:
     """A serialised message that begins with a header, at another stamp."""
-    return b"".join((template[:STAMP_AT], STAMP.pack(*split_stamp(t_ns)), template[STAMP_AT + STAMP.size :]))
+    stamp = STAMP.pack(*split_stamp(t_ns))
+    return b"".join((template[:STAMP_BEGIN], stamp, template[STAMP_END:]))
 
 
 def pictured(template: bytes, t_ns: int, encoded: bytes) -> bytes:
-    """A serialised CompressedImage without a picture, given a stamp and one: the picture is its last field."""
-    head = template[:STAMP_AT], STAMP.pack(*split_stamp(t_ns)), template[STAMP_AT + STAMP.size : -LENGTH.size]
-    return b"".join((*head, LENGTH.pack(len(encoded)), encoded))
+    """A serialised CompressedImage without a picture, given a stamp and a picture, which is its last field."""
+    stamp = STAMP.pack(*split_stamp(t_ns))
+    frame_and_format = template[STAMP_END : -LENGTH.size]
+    length = LENGTH.pack(len(encoded))
+    return b"".join((template[:STAMP_BEGIN], stamp, frame_and_format, length, encoded))
 
 
-def picture_in(data: memoryview) -> tuple[int, str, str, memoryview]:
-    """Stamp in ns, form, colour and picture of a serialised CompressedImage. Raises ValueError where it is none."""
+class StampedPicture(NamedTuple):
+    """The content of a serialised CompressedImage."""
+
+    t_ns: int
+    form: str
+    colour: str
+    encoded: memoryview
+
+
+def picture_in(data: memoryview) -> StampedPicture:
+    """The content of a serialised CompressedImage. Raises ValueError where the data is something else."""
     if data[: len(LITTLE_ENDIAN)] != LITTLE_ENDIAN:
         raise ValueError("a picture's message is not in little-endian CDR")
-    sec, nanosec = STAMP.unpack_from(data, STAMP_AT)
-    _, at = _string(data, STAMP_AT + STAMP.size)  # the frame
-    named, at = _string(data, at)
-    colour, _, form = named.rpartition("; ")
-    if (colour or MONO) not in CHANNELS:
-        raise ValueError(f"a picture has the unknown format {named!r}")
-    begin, end = _counted(data, at)
-    return sec * NS_PER_S + nanosec, form.partition(" ")[0], colour or MONO, data[begin:end]
+    sec, nanosec = STAMP.unpack_from(data, STAMP_BEGIN)
+    _, place = _string(data, STAMP_END)  # the frame
+    format_name, place = _string(data, place)
+    colour, _, rest = format_name.rpartition("; ")
+    colour = colour or MONO
+    form = rest.partition(" ")[0]
+    if colour not in CHANNELS:
+        raise ValueError(f"a picture has the unknown format {format_name!r}")
+    begin, end = _counted(data, place)
+    return StampedPicture(sec * NS_PER_S + nanosec, form, colour, data[begin:end])
 
 
-def _string(data: memoryview, at: int) -> tuple[str, int]:
-    """A string, which ends with a zero, and where what follows it begins."""
-    begin, end = _counted(data, at)
-    return bytes(data[begin : max(begin, end - 1)]).decode(), end
+def _string(data: memoryview, place: int) -> tuple[str, int]:
+    """A string, which ends with a zero, and the place of what follows it."""
+    begin, end = _counted(data, place)
+    text_end = max(begin, end - 1)
+    return bytes(data[begin:text_end]).decode(), end
 
 
-def _counted(data: memoryview, at: int) -> tuple[int, int]:
-    """Where the bytes begin and end whose number is stated at `at` or up to three bytes later, for it is aligned."""
-    at += -at % LENGTH.size
-    (length,) = LENGTH.unpack_from(data, at)
-    begin = at + LENGTH.size
-    if begin + length > len(data):
-        raise ValueError(f"a message of {len(data)} bytes states {length} more at {at}")
-    return begin, begin + length
+def _counted(data: memoryview, place: int) -> tuple[int, int]:
+    """The begin and end of bytes whose number is stated at a place, or at the next multiple of four."""
+    aligned = place + -place % LENGTH.size
+    (length,) = LENGTH.unpack_from(data, aligned)
+    begin = aligned + LENGTH.size
+    end: int = begin + length
+    if end > len(data):
+        raise ValueError(f"a message of {len(data)} bytes states {length} more at {aligned}")
+    return begin, end

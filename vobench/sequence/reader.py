@@ -1,4 +1,4 @@
-"""Reading a sequence: sensors and truth through separate doors, frames one at a time or by number."""
+"""Reading a sequence: the sensors by `Sequence`, the truth by functions; frames one at a time or by number."""
 
 import hashlib
 from array import array
@@ -13,19 +13,21 @@ from numpy.typing import NDArray
 
 from vobench import stop
 from vobench.errors import SequenceError
-from vobench.geometry.rig import SIDES, Rig
+from vobench.geometry.rig import SIDES, Rig, Side
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuBias, ImuReadings
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, check_channels
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import Bag, parsing, part_of
+from vobench.sequence.bag import Bag
 from vobench.sequence.calibration import read_rig
+from vobench.sequence.mcap_file import parsing, part_of
 from vobench.sequence.messages import picture_in
 from vobench.sequence.picture import MONO, Image, decode
 from vobench.sequence.pixel_truth import names_from_json, truth_topic, truth_topics, truth_values
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
-LONGEST_PATH = 60  # characters of it in a repr
+DISTURBANCE_FIELDS = ("left_slip", "right_slip", "side_slip_rad", "push_mps2", "turn_push_radps2")
+LONGEST_PATH = 60  # characters in a repr
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +43,7 @@ class StereoFrame:
 
 @dataclass(frozen=True, slots=True)
 class EncodedFrame:
-    """The same pictures as they lie in the file; `form` is png or jpeg."""
+    """The pictures of one instant as the file has them; `form` is png or jpeg."""
 
     index: int
     t_ns: int
@@ -53,7 +55,7 @@ class EncodedFrame:
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """All that an estimator may see of a recording; the truth is read by `read_truth`."""
+    """Everything that an estimator may see of a recording; the truth is read by `read_truth`."""
 
     path: Path
     rig: Rig
@@ -68,9 +70,9 @@ class Sequence:
         rig = read_rig(bag, ros.INFO_TOPICS)
         counts = [bag.count(topic) for topic in ros.IMAGE_TOPICS[: len(rig.sides)]]
         if len(set(counts)) > 1 or not counts[0]:
+            got = " and ".join(map(str, counts))
             raise SequenceError(
-                f"a recording needs as many left as right pictures and at least one, "
-                f"got {' and '.join(map(str, counts))}: {bag.path}"
+                f"a recording needs as many left as right pictures and at least one, got {got}: {bag.path}"
             )
         return cls(bag.path, rig, counts[0], bag)
 
@@ -89,9 +91,10 @@ class Sequence:
 
     def __repr__(self) -> str:
         path = str(self.path)
+        if len(path) > LONGEST_PATH:
+            path = f"…{path[-LONGEST_PATH:]}"
         cameras = " and ".join(self.rig.sides)
-        shown = path if len(path) <= LONGEST_PATH else f"…{path[-LONGEST_PATH:]}"
-        return f"Sequence({shown}, {self.frame_count} frames of {cameras})"
+        return f"Sequence({path}, {self.frame_count} frames of {cameras})"
 
     @property
     def _image_topics(self) -> tuple[ros.Topic, ...]:
@@ -100,27 +103,36 @@ class Sequence:
     def encoded_frames(self) -> Iterator[EncodedFrame]:
         """The frames in order, undecoded."""
         images = self.bag.raw(self._image_topics)
-        eyes = len(self._image_topics)
+        cameras = len(self._image_topics)
         count = 0
-        for pictures in zip(*[images] * eyes, strict=False):
+        for pictures in zip(*[images] * cameras, strict=False):
             stop.check()
             yield self._encoded(count, pictures)
             count += 1
         if count != self.frame_count:
             raise SequenceError(f"{count} frames found, but its summary says {self.frame_count}: {self.path}")
 
-    def _encoded(self, index: int, pictures: Iterable[tuple[ros.Topic, memoryview]]) -> EncodedFrame:
-        """One message of each camera. Raises SequenceError where they are not of one instant."""
-        topics, messages = zip(*pictures, strict=True)
+    def _encoded(
+        self,
+        index: int,
+        messages: Iterable[tuple[ros.Topic, memoryview]],
+    ) -> EncodedFrame:
+        """The frame of one message of each camera. Raises SequenceError where they are not of one instant."""
+        topics = []
+        pictures = []
         with parsing(self.path):
-            stamps, forms, colours, encoded = zip(*map(picture_in, messages), strict=True)
-        if topics != self._image_topics or len(set(stamps)) > 1:
-            raise SequenceError(f"frame {index} is no left and right picture of one stamp in {self.path}")
-        left, *others = map(bytes, encoded)
-        return EncodedFrame(index, stamps[0], forms[0], left, others[0] if others else None, colours[0])
+            for topic, data in messages:
+                topics.append(topic)
+                pictures.append(picture_in(data))
+        stamps = {picture.t_ns for picture in pictures}
+        if tuple(topics) != self._image_topics or len(stamps) > 1:
+            raise SequenceError(f"frame {index} is not a left and a right picture of one stamp in {self.path}")
+        left = pictures[0]
+        right = bytes(pictures[1].encoded) if len(pictures) > 1 else None
+        return EncodedFrame(index, left.t_ns, left.form, bytes(left.encoded), right, left.colour)
 
     def frames(self, *, right: bool = True) -> Iterator[StereoFrame]:
-        """The frames in order, the right picture only where it is wanted; one frame at a time is held in memory."""
+        """The frames in order, one in memory at a time; without `right`, the right pictures are not decoded."""
         for frame in self.encoded_frames():
             yield self._decoded(frame if right else replace(frame, right=None))
 
@@ -133,39 +145,44 @@ class Sequence:
         return StereoFrame(frame.index, frame.t_ns, left, right, frame.colour)
 
     def frame(self, index: int) -> StereoFrame:
-        """One frame, of which only its part of the file is read. Raises SequenceError where there is none."""
-        return self._decoded(self._encoded(index, self.bag.nth(self._image_topics, index)))
+        """One frame; only its part of the file is read. Raises SequenceError where there is none."""
+        messages = self.bag.nth(self._image_topics, index)
+        return self._decoded(self._encoded(index, messages))
 
     def frame_at(self, t_ns: int) -> StereoFrame:
         """The last frame at or before an instant. Raises SequenceError where there is none yet."""
-        until = int(np.searchsorted(self.bag.stamps(ros.LEFT_IMAGE), t_ns, side="right"))
-        if not until:
+        stamps = self.bag.stamps(ros.LEFT_IMAGE)
+        not_later = int(np.searchsorted(stamps, t_ns, side="right"))
+        if not not_later:
             raise SequenceError(f"there is no frame at or before {t_ns} ns in {self.path}")
-        return self.frame(until - 1)
+        return self.frame(not_later - 1)
 
     def frame_stamps(self) -> Stamps:
         """The stamps (N,) of all frames, without reading a picture. Raises SequenceError where they are damaged.
 
         An index has no checksum, but the calibration of each frame has one of its own.
         """
-        stamps, again = (self.bag.stamps(topic) for topic in (ros.LEFT_IMAGE, ros.LEFT_INFO))
-        if len(stamps) == len(again) and not np.array_equal(stamps, again):
+        stamps = self.bag.stamps(ros.LEFT_IMAGE)
+        info_stamps = self.bag.stamps(ros.LEFT_INFO)
+        if len(stamps) == len(info_stamps) and not np.array_equal(stamps, info_stamps):
             raise SequenceError(f"pictures and calibration should have the same stamps, but do not in {self.path}")
         return stamps
 
     def encoders(self) -> tuple[Stamps, NDArray[np.int64]]:
         """Stamps (M,) and counts (M, 2) of all encoder readings, left and right; empty where there are no encoders."""
-        readings = [(ros.stamp_ns(m), m.left, m.right) for _, m in self.bag.messages((ros.ENCODERS,))]
+        readings = []
+        for _, message in self.bag.messages((ros.ENCODERS,)):
+            readings.append((ros.stamp_ns(message), message.left, message.right))
         table = np.array(readings, np.int64).reshape(-1, 3)
         return table[:, 0].copy(), table[:, 1:].copy()
 
     def exposures(self) -> tuple[Stamps, Array]:
         """Stamps (N,) of all frames, and their exposure times in s and gains in dB (N, 2); empty where not known."""
-        return _table(self.bag, ros.EXPOSURE, lambda m: (m.time_s, m.gain_db), 2)
+        return _table(self.bag, ros.EXPOSURE, _exposure_fields, 2)
 
     def imu(self) -> ImuReadings:
         """All readings of the IMU, in its own axes; empty where there is none."""
-        stamps, rows = _table(self.bag, ros.IMU, lambda m: (*_xyz(m.angular_velocity), *_xyz(m.linear_acceleration)), 6)
+        stamps, rows = _table(self.bag, ros.IMU, _imu_fields, 6)
         return ImuReadings(stamps, rows[:, :3].copy(), rows[:, 3:].copy())
 
 
@@ -173,8 +190,33 @@ def _xyz(vector: Any) -> tuple[float, float, float]:
     return vector.x, vector.y, vector.z
 
 
-def _table(bag: Bag, topic: ros.Topic, row: Callable[[Any], Iterable[float]], width: int) -> tuple[Stamps, Array]:
-    """Stamps (M,) of a topic's messages and what `row` makes of each (M, width)."""
+def _exposure_fields(message: Any) -> tuple[float, float]:
+    return message.time_s, message.gain_db
+
+
+def _imu_fields(message: Any) -> tuple[float, ...]:
+    return *_xyz(message.angular_velocity), *_xyz(message.linear_acceleration)
+
+
+def _bias_fields(message: Any) -> tuple[float, ...]:
+    return *_xyz(message.gyro), *_xyz(message.accel)
+
+
+def _pose_fields(message: Any) -> tuple[float, ...]:
+    return ros.pose_fields(message.pose.pose)
+
+
+def _disturbance_fields(message: Any) -> list[float]:
+    return [getattr(message, name) for name in DISTURBANCE_FIELDS]
+
+
+def _table(
+    bag: Bag,
+    topic: ros.Topic,
+    row: Callable[[Any], Iterable[float]],
+    width: int,
+) -> tuple[Stamps, Array]:
+    """Stamps (M,) of a topic's messages, and `row` of each of them (M, width)."""
     stamps = array("q")
     values = array("d")
     for _, message in bag.messages((topic,)):
@@ -191,42 +233,48 @@ def read_truth(folder: Path) -> Trajectory:
     """The true path of base_link in map. Raises SequenceError where the file is not whole."""
     bag = _truth_bag(folder)
     bag.require(ros.TRUTH_TOPICS)
-    stamps, fields = _table(bag, ros.ODOMETRY, lambda m: ros.pose_fields(m.pose.pose), 7)
+    stamps, fields = _table(bag, ros.ODOMETRY, _pose_fields, 7)
     return Trajectory(stamps, ros.poses(fields))
 
 
 def has_truth(folder: Path) -> bool:
-    """Whether the true path is known: not of every imported recording. Raises SequenceError where its file is torn."""
+    """Whether the true path is known; imported recordings may lack it. Raises SequenceError where its file is torn."""
     path = Path(folder) / ros.TRUTH_FILE
-    return (path.exists() or part_of(path).exists()) and Bag.open(path).count(ros.ODOMETRY) > 0
+    has_file = path.exists() or part_of(path).exists()
+    return has_file and Bag.open(path).count(ros.ODOMETRY) > 0
 
 
 def read_twist(folder: Path) -> Array | None:
     """The true twist (N, 6) at the poses of `read_truth`, m/s then rad/s, in body axes; None where it is not known."""
     _, rows = _table(_truth_bag(folder), ros.ODOMETRY, _twist_fields, 7)
-    return None if not len(rows) or np.any(rows[:, 6] == ros.UNKNOWN) else rows[:, :6].copy()
+    is_unknown = rows[:, 6] == ros.UNKNOWN
+    if not len(rows) or is_unknown.any():
+        return None
+    return rows[:, :6].copy()
 
 
 def _twist_fields(message: Any) -> tuple[float, ...]:
-    """The six numbers of a twist and the first of its covariance, which says whether it is known."""
+    """The six numbers of a twist, and the first of its covariance, which is UNKNOWN for a twist that is not known."""
     twist = message.twist.twist
     return *_xyz(twist.linear), *_xyz(twist.angular), message.twist.covariance[0]
 
 
 def read_imu_bias(folder: Path) -> ImuBias:
-    """What the IMU's readings were off by; empty where there is no IMU."""
-    stamps, rows = _table(_truth_bag(folder), ros.IMU_BIAS, lambda m: (*_xyz(m.gyro), *_xyz(m.accel)), 6)
+    """The biases in the IMU's readings; empty where there is no IMU."""
+    stamps, rows = _table(_truth_bag(folder), ros.IMU_BIAS, _bias_fields, 6)
     return ImuBias(stamps, rows[:, :3].copy(), rows[:, 3:].copy())
 
 
 def read_disturbances(folder: Path) -> tuple[Stamps, Array]:
-    """Stamps (N,) and left and right slip ratio, side slip in rad, pushes in m/s² and rad/s² (N, 5), if noted."""
-    names = ("left_slip", "right_slip", "side_slip_rad", "push_mps2", "turn_push_radps2")
-    return _table(_truth_bag(folder), ros.DISTURBANCE, lambda m: [getattr(m, name) for name in names], 5)
+    """Stamps (N,), and left and right slip ratio, side slip in rad, pushes in m/s² and rad/s² (N, 5).
+
+    Both are empty where no disturbances were recorded.
+    """
+    return _table(_truth_bag(folder), ros.DISTURBANCE, _disturbance_fields, len(DISTURBANCE_FIELDS))
 
 
 def read_true_rig(folder: Path) -> Rig:
-    """The rig that the pictures were made with; `Sequence.rig` is what estimators are told. Raises SequenceError."""
+    """The rig that the pictures were made with; `Sequence.rig` is the nominal one. Raises SequenceError."""
     return read_rig(_truth_bag(folder), ros.TRUE_INFO_TOPICS)
 
 
@@ -236,41 +284,56 @@ def read_case(folder: Path) -> bytes:
 
 
 def read_provenance(folder: Path) -> dict[str, str]:
-    """The versions of what made a recording, by name; nothing in it for one of the time before they were noted."""
+    """The versions of the software that made a recording, by name; empty where they were not noted."""
     return _truth_bag(folder).note(ros.PROVENANCE_NOTE)
 
 
 def read_import_notes(folder: Path) -> dict[str, str]:
-    """What was noted when a recording was imported; nothing in it where it was not."""
+    """The notes on the import of a recording, by name; empty for a recording that was not imported."""
     return _truth_bag(folder).note(ros.IMPORT_NOTE)
 
 
 def payload_hash(folder: Path) -> str:
-    """SHA-256 over all that was recorded: pixels instead of encoded bytes, which change with libpng."""
+    """SHA-256 over everything that was recorded: pixels instead of encoded bytes, which change with libpng."""
+    sensors = Bag.open(Path(folder) / ros.SENSORS_FILE)
+    truth = _truth_bag(folder)
+    optional_topics = (*ros.TRUE_INFO_TOPICS, ros.IMU_BIAS, ros.DISTURBANCE, *truth_topics())
     digest = hashlib.sha256()
-    later = (*ros.TRUE_INFO_TOPICS, ros.IMU_BIAS, ros.DISTURBANCE, *truth_topics())
-    sensors, truth = (Bag.open(Path(folder) / name) for name in (ros.SENSORS_FILE, ros.TRUTH_FILE))
-    for bag, topics in ((sensors, ros.SENSOR_TOPICS), (truth, (*ros.TRUTH_TOPICS, *later))):
-        for topic, data in bag.raw(topics):
-            payload = _pixels(data, bag.path) if topic in ros.IMAGE_TOPICS else data
-            digest.update(f"{topic.name} {len(payload)}\n".encode())
-            digest.update(payload)
-    digest.update(repr(sorted(sensors.note(ros.WHEELS_NOTE).items())).encode())
-    if imu := sensors.note(ros.IMU_NOTE):
-        digest.update(repr(sorted(imu.items())).encode())
+    for topic, data in sensors.raw(ros.SENSOR_TOPICS):
+        payload = _pixels(data, sensors.path) if topic in ros.IMAGE_TOPICS else data
+        digest.update(_length_line(topic, payload))
+        digest.update(payload)
+    for topic, data in truth.raw((*ros.TRUTH_TOPICS, *optional_topics)):
+        digest.update(_length_line(topic, data))
+        digest.update(data)
+
+    wheels = sensors.note(ros.WHEELS_NOTE)
+    digest.update(_sorted_entries(wheels))
+    imu = sensors.note(ros.IMU_NOTE)
+    if imu:
+        digest.update(_sorted_entries(imu))
     return digest.hexdigest()
+
+
+def _length_line(topic: ros.Topic, payload: bytes | memoryview) -> bytes:
+    return f"{topic.name} {len(payload)}\n".encode()
+
+
+def _sorted_entries(note: dict[str, str]) -> bytes:
+    entries = sorted(note.items())
+    return repr(entries).encode()
 
 
 def _pixels(data: memoryview, path: Path) -> bytes:
     with parsing(path):
-        t_ns, _, colour, encoded = picture_in(data)
-    image = decode(encoded, None, f"a picture of {path}", colour=colour)
-    return f"{t_ns} {image.shape}\n".encode() + image.tobytes()
+        picture = picture_in(data)
+    image = decode(picture.encoded, None, f"a picture of {path}", colour=picture.colour)
+    return f"{picture.t_ns} {image.shape}\n".encode() + image.tobytes()
 
 
 @dataclass(frozen=True, slots=True)
 class StereoTruth:
-    """What is true of the pictures of one instant; no `right` where there is one camera."""
+    """Per-pixel ground truth of the pictures of one instant; no `right` where there is one camera."""
 
     index: int
     t_ns: int
@@ -279,38 +342,57 @@ class StereoTruth:
 
 
 def truth_channels(folder: Path) -> tuple[str, ...]:
-    """The channels that were recorded with a sequence; none for most. Raises SequenceError for a torn file."""
+    """The channels of per-pixel ground truth in a sequence; most have none. Raises SequenceError for a torn file."""
     bag = _truth_bag(folder)
     return tuple(name for name in CHANNELS if bag.has(truth_topic("left", name)))
 
 
 def read_truth_names(folder: Path) -> TruthNames:
-    """What the ids of `instance` and `material` mean. Raises SequenceError where no channels were recorded."""
+    """The names of the ids of `instance` and `material`. Raises SequenceError where no channels were recorded."""
     return names_from_json(_truth_bag(folder).attachment(ros.NAMES_ATTACHMENT))
 
 
 def read_truth_frames(folder: Path, channels: Iterable[str] | None = None) -> Iterator[StereoTruth]:
-    """Channels (None: all) of each instant's pictures, one instant in memory. Raises SequenceError if one lacks."""
+    """Channels (None: all) of the pictures of each instant, one instant in memory at a time.
+
+    Raises SequenceError where a channel was not recorded.
+    """
     bag = _truth_bag(folder)
-    there = truth_channels(folder)
-    wanted = there if channels is None else check_channels(channels)
+    recorded = truth_channels(folder)
+    wanted = recorded if channels is None else check_channels(channels)
     for name in wanted:
-        if name not in there:
-            recorded = ", ".join(there) or "none"
-            raise SequenceError(f"no truth channel '{name}' was recorded, only {recorded}: {bag.path}")
-    return _frames(bag, wanted)
+        if name not in recorded:
+            known = ", ".join(recorded) or "none"
+            raise SequenceError(f"no truth channel '{name}' was recorded, only {known}: {bag.path}")
+    return _truth_frames(bag, wanted)
 
 
-def _frames(bag: Bag, channels: tuple[str, ...]) -> Iterator[StereoTruth]:
-    present = [side for side in SIDES if any(bag.has(truth_topic(side, name)) for name in channels)]
-    places = {truth_topic(side, name): (side, name) for side in present for name in channels}
-    pictures = bag.messages(places)
-    for index, (t_ns, group) in enumerate(groupby(pictures, key=lambda found: ros.stamp_ns(found[1]))):
-        found: dict[str, dict[str, Any]] = {side: {} for side in present}
-        for topic, message in group:
-            side, name = places[topic]
-            found[side][name] = truth_values(name, message)
-        if any(len(values) != len(channels) for values in found.values()):
+def _channel_topics(bag: Bag, channels: tuple[str, ...]) -> dict[ros.Topic, tuple[Side, str]]:
+    """Side and channel by topic, of the cameras that have channels."""
+    channel_of: dict[ros.Topic, tuple[Side, str]] = {}
+    for side in SIDES:
+        topics = {truth_topic(side, name): (side, name) for name in channels}
+        if any(bag.has(topic) for topic in topics):
+            channel_of.update(topics)
+    return channel_of
+
+
+def _truth_frames(bag: Bag, channels: tuple[str, ...]) -> Iterator[StereoTruth]:
+    channel_of = _channel_topics(bag, channels)
+    sides = {side for side, _ in channel_of.values()}
+
+    instants = groupby(bag.messages(channel_of), key=_stamp_of)
+    for index, (t_ns, messages) in enumerate(instants):
+        values: dict[Side, dict[str, Any]] = {side: {} for side in sides}
+        for topic, message in messages:
+            side, name = channel_of[topic]
+            values[side][name] = truth_values(name, message)
+        if any(len(by_name) != len(channels) for by_name in values.values()):
             raise SequenceError(f"truth frame {index} at {t_ns} ns lacks channels in {bag.path}")
-        right = TruthFrame(**found["right"]) if "right" in found else None
-        yield StereoTruth(index, t_ns, TruthFrame(**found["left"]), right)
+        right = TruthFrame(**values["right"]) if "right" in values else None
+        yield StereoTruth(index, t_ns, TruthFrame(**values["left"]), right)
+
+
+def _stamp_of(entry: tuple[ros.Topic, Any]) -> int:
+    _, message = entry
+    return ros.stamp_ns(message)

@@ -1,4 +1,4 @@
-"""Poses and topics of anybody's recording: MCAP, ROS 2 and ROS 1 bags."""
+"""Poses and topics of recordings of any origin: MCAP, ROS 2 and ROS 1 bags."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,64 +16,97 @@ from vobench import stop
 from vobench.errors import SequenceError, VobenchError
 from vobench.geometry.se3 import Array
 from vobench.sequence import messages as ros
-from vobench.sequence.bag import unpack
+from vobench.sequence.mcap_file import decompressed
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 MAGICS = {b"\x89MCAP": ".mcap", b"#ROSBAG V2.0": ".bag", b"SQLite format 3\x00": ".db3"}
-METADATA = "metadata.yaml"  # what makes a folder a ROS 2 bag
-POSES = {
-    "geometry_msgs/msg/PoseStamped": lambda m: m.pose,
-    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: m.pose.pose,
-    "geometry_msgs/msg/TransformStamped": lambda m: m.transform,
-    "nav_msgs/msg/Odometry": lambda m: m.pose.pose,
-}
+LONGEST_MAGIC = 16
+METADATA = "metadata.yaml"  # the file that makes a folder a ROS 2 bag
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
-NORM_TOLERANCE = 1e-3
+NORM_TOLERANCE = 1e-3  # of a quaternion
+
+PoseFields = tuple[float, ...]  # x, y, z, qx, qy, qz, qw
+
+
+def _pose(message: Any) -> Any:
+    return message.pose
+
+
+def _pose_with_covariance(message: Any) -> Any:
+    return message.pose.pose
+
+
+def _transform(message: Any) -> Any:
+    return message.transform
+
+
+# The pose in a message, by its type.
+POSES = {
+    "geometry_msgs/msg/PoseStamped": _pose,
+    "geometry_msgs/msg/PoseWithCovarianceStamped": _pose_with_covariance,
+    "geometry_msgs/msg/TransformStamped": _transform,
+    "nav_msgs/msg/Odometry": _pose_with_covariance,
+}
 
 
 def is_recording(path: Path) -> bool:
     """Whether a file begins as MCAP, ROS bag or SQLite, or a folder is a ROS 2 bag."""
-    return (path / METADATA).is_file() if path.is_dir() else _suffix(path) is not None
+    if path.is_dir():
+        return (path / METADATA).is_file()
+    return _suffix(path) is not None
 
 
 def read_poses(path: Path, topic: str | None) -> Trajectory:
-    """The poses of a topic, or `/tf:parent.child`; None: of the only one with poses. Raises SequenceError."""
-    return _trajectory(*_read(path, topic), path)
+    """The poses of a topic, or of `/tf:parent.child`; None: of the only topic with poses. Raises SequenceError."""
+    t_ns, fields = _read(path, topic)
+    return _trajectory(t_ns, fields, path)
 
 
 def read_first_poses(path: Path, topic: str | None) -> tuple[Trajectory, int]:
-    """The same, of poses in a row that have one stamp the first; and how many that left out."""
+    """As `read_poses`, of successive poses with one stamp only the first; and how many were left out."""
     t_ns, fields = _read(path, topic)
-    first = np.diff(t_ns, prepend=t_ns[0] - 1) != 0
-    return _trajectory(t_ns[first], fields[first], path), int(np.sum(~first))
+    is_first = np.diff(t_ns, prepend=t_ns[0] - 1) != 0
+    left_out = int(np.sum(~is_first))
+    return _trajectory(t_ns[is_first], fields[is_first], path), left_out
 
 
 def _read(path: Path, topic: str | None) -> tuple[Stamps, Array]:
-    """Stamps (N,) and `pose_fields` (N, 7) of a topic, as they are."""
+    """Stamps (N,) and `pose_fields` (N, 7) of a topic, unchecked."""
     with opened(path) as reader:
         rows = list(_rows(reader, path, topic))
     if not rows:
         raise SequenceError(f"no pose on {topic or 'its topic'} in {path}")
-    return np.array([t for t, _ in rows], np.int64), np.array([pose for _, pose in rows], float)
+    stamps = [t for t, _ in rows]
+    poses = [pose for _, pose in rows]
+    return np.array(stamps, np.int64), np.array(poses, float)
 
 
 def _trajectory(t_ns: Stamps, fields: Array, path: Path) -> Trajectory:
     _require_valid(t_ns, fields, path)
-    fields[:, 3:] /= np.linalg.norm(fields[:, 3:], axis=1, keepdims=True)
+    norm = np.linalg.norm(fields[:, 3:], axis=1, keepdims=True)
+    fields[:, 3:] /= norm
     return Trajectory(t_ns, ros.poses(fields))
 
 
 def _suffix(path: Path) -> str | None:
+    """The suffix of files with the first bytes of this one."""
     with path.open("rb") as file:
-        start = file.read(16)
-    return next((suffix for magic, suffix in MAGICS.items() if start.startswith(magic)), None)
+        start = file.read(LONGEST_MAGIC)
+    for magic, suffix in MAGICS.items():
+        if start.startswith(magic):
+            return suffix
+    return None
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[AnyReader]:
-    """A reader of any recording; rosbags goes by endings, so the file gets one. Its errors become SequenceError."""
-    # rosbags looks at the size of a chunk after it has unpacked it: a few kB can make many GB.
-    DECOMPRESSORS.update({packing: partial(unpack, packing) for packing in ("zstd", "lz4")})
+    """A reader of any recording, whose errors become SequenceError.
+
+    rosbags recognises files by their suffixes, so the file gets a link with the right one.
+    """
+    # rosbags checks the size of a chunk after it has decompressed it: a few kB can become many GB.
+    DECOMPRESSORS.update({name: partial(decompressed, name) for name in ("zstd", "lz4")})
     folder = Path(mkdtemp(prefix="vobench-bag-"))
     with stop.undone(lambda: stop.remove(folder)):
         link = path
@@ -92,60 +125,86 @@ def opened(path: Path) -> Iterator[AnyReader]:
             raise SequenceError(f"not a whole recording ({type(error).__name__}: {reason}): {path}") from error
 
 
-def _rows(reader: AnyReader, path: Path, topic: str | None) -> Iterator[tuple[int, tuple[float, ...]]]:
+def _rows(
+    reader: AnyReader,
+    path: Path,
+    topic: str | None,
+) -> Iterator[tuple[int, PoseFields]]:
+    """Stamps in ns and poses of a topic's messages."""
     name, _, frames = (topic or _only_topic(reader, path)).partition(":")
-    chosen = [connection for connection in reader.connections if connection.topic == name]
-    if not chosen:
-        raise SequenceError(f"no topic {name!r} in {path}. With poses: {_known(reader)}")
-    if chosen[0].msgtype in TRANSFORMS:
-        yield from _transforms(reader, chosen, frames, path)
+    connections = [connection for connection in reader.connections if connection.topic == name]
+    if not connections:
+        raise SequenceError(f"no topic {name!r} in {path}. With poses: {_listed_topics(reader)}")
+    message_type = connections[0].msgtype
+    if message_type in TRANSFORMS:
+        yield from _transforms(reader, connections, frames, path)
         return
-    if chosen[0].msgtype not in POSES:
-        raise SequenceError(
-            f"{name} is {chosen[0].msgtype}, which has no pose, in {path}. With poses: {_known(reader)}"
-        )
-    for connection, _, raw in reader.messages(chosen):
+    if message_type not in POSES:
+        known = _listed_topics(reader)
+        raise SequenceError(f"{name} is {message_type}, which has no pose, in {path}. With poses: {known}")
+    for connection, _, raw in reader.messages(connections):
         message: Any = reader.deserialize(raw, connection.msgtype)
-        yield ros.stamp_ns(message), ros.pose_fields(POSES[connection.msgtype](message))
+        pose = POSES[connection.msgtype](message)
+        yield ros.stamp_ns(message), ros.pose_fields(pose)
 
 
 def _transforms(
-    reader: AnyReader, chosen: list[Any], frames: str, path: Path
-) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """The poses of one child frame in its parent; `frames` may be left out where there is one pair only."""
-    found: dict[str, list[tuple[int, tuple[float, ...]]]] = {}
-    for connection, _, raw in reader.messages(chosen):
+    reader: AnyReader,
+    connections: list[Any],
+    frames: str,
+    path: Path,
+) -> Iterator[tuple[int, PoseFields]]:
+    """Stamps in ns and poses of the frames `parent.child`, which may be empty where there is one pair only."""
+    by_frames: dict[str, list[tuple[int, PoseFields]]] = {}
+    for connection, _, raw in reader.messages(connections):
         message: Any = reader.deserialize(raw, connection.msgtype)
         for stamped in message.transforms:
-            pair = f"{stamped.header.frame_id.lstrip('/')}.{stamped.child_frame_id.lstrip('/')}"
-            found.setdefault(pair, []).append((ros.stamp_ns(stamped), ros.pose_fields(stamped.transform)))
-    if not frames and len(found) == 1:
-        frames = next(iter(found))
-    if frames not in found:
-        topics = ", ".join(f"{chosen[0].topic}:{pair}" for pair in sorted(found))
-        raise SequenceError(f"name one of the transforms in {path}: {topics or 'there is none'}")
-    yield from found[frames]
+            parent = stamped.header.frame_id.lstrip("/")
+            child = stamped.child_frame_id.lstrip("/")
+            row = (ros.stamp_ns(stamped), ros.pose_fields(stamped.transform))
+            by_frames.setdefault(f"{parent}.{child}", []).append(row)
+    if not frames and len(by_frames) == 1:
+        frames = next(iter(by_frames))
+    if frames not in by_frames:
+        topic = connections[0].topic
+        known = ", ".join(f"{topic}:{pair}" for pair in sorted(by_frames))
+        raise SequenceError(f"name one of the transforms in {path}: {known or 'there is none'}")
+    yield from by_frames[frames]
 
 
 def _only_topic(reader: AnyReader, path: Path) -> str:
-    poses = sorted({c.topic for c in reader.connections if c.msgtype in POSES and c.msgcount})
-    moving = sorted({c.topic for c in reader.connections if c.msgtype in TRANSFORMS and c.topic != ros.TF_STATIC.name})
-    if len(poses or moving) != 1:
-        raise SequenceError(f"name the topic with the poses of {path}: {_known(reader)}")
-    return (poses or moving)[0]
+    """The only topic with poses, or else the only one with moving transforms. Raises SequenceError."""
+    poses = set()
+    moving = set()
+    for connection in reader.connections:
+        if connection.msgtype in POSES and connection.msgcount:
+            poses.add(connection.topic)
+        if connection.msgtype in TRANSFORMS:
+            moving.add(connection.topic)
+    moving.discard(ros.TF_STATIC.name)
+    candidates = poses or moving
+    if len(candidates) != 1:
+        raise SequenceError(f"name the topic with the poses of {path}: {_listed_topics(reader)}")
+    return next(iter(candidates))
 
 
-def _known(reader: AnyReader) -> str:
-    return ", ".join(sorted({c.topic for c in reader.connections if c.msgtype in (*POSES, *TRANSFORMS)})) or "none"
+def _listed_topics(reader: AnyReader) -> str:
+    """The topics with poses or transforms."""
+    known = (*POSES, *TRANSFORMS)
+    topics = {connection.topic for connection in reader.connections if connection.msgtype in known}
+    return ", ".join(sorted(topics)) or "none"
 
 
 def _require_valid(t_ns: Stamps, fields: Array, path: Path) -> None:
+    """Raise SequenceError unless poses are finite with unit quaternions, and stamps increase."""
     with np.errstate(over="ignore", invalid="ignore"):
         norm = np.linalg.norm(fields[:, 3:], axis=1)
-    bad = np.flatnonzero(~np.isfinite(fields).all(1) | ~(np.abs(norm - 1) <= NORM_TOLERANCE))
-    if bad.size:
-        stated = ", ".join(f"{value:g}" for value in fields[bad[0]])
-        raise SequenceError(f"pose {bad[0]} of {path} should be finite with a unit quaternion, but is ({stated})")
+    is_unit = np.abs(norm - 1) <= NORM_TOLERANCE
+    is_valid = np.isfinite(fields).all(1) & is_unit
+    if not is_valid.all():
+        row = int(np.flatnonzero(~is_valid)[0])
+        numbers = ", ".join(f"{value:g}" for value in fields[row])
+        raise SequenceError(f"pose {row} of {path} should be finite with a unit quaternion, but is ({numbers})")
     late = np.flatnonzero(np.diff(t_ns) <= 0)
     if late.size:
         raise SequenceError(f"stamps must increase, but pose {late[0] + 1} is not after the one before it in {path}")
@@ -153,7 +212,7 @@ def _require_valid(t_ns: Stamps, fields: Array, path: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class TopicFacts:
-    """A topic, and when its first and last message were logged; stamps are None where it has none."""
+    """A topic, and when its first and last messages were logged; stamps are None for a topic without messages."""
 
     name: str
     type_name: str
@@ -166,18 +225,20 @@ class TopicFacts:
         """Messages a second on average, None for fewer than two instants."""
         if self.start_ns is None or self.end_ns is None or self.end_ns == self.start_ns:
             return None
-        return (self.count - 1) / (self.end_ns - self.start_ns) * 1e9
+        return (self.count - 1) / (self.end_ns - self.start_ns) * NS_PER_S
 
 
 def topic_facts(path: Path) -> tuple[TopicFacts, ...]:
-    """All topics of a bag of any make, by name; no message is decoded. Raises SequenceError where it is torn."""
+    """All topics of a bag of any origin, by name; no message is decoded. Raises SequenceError where it is torn."""
     stamps: dict[tuple[str, str], list[int]] = {}
     with opened(path) as reader:
         for connection in reader.connections:
             stamps[connection.topic, connection.msgtype] = []
         for connection, t_ns, _ in reader.messages():
             stamps[connection.topic, connection.msgtype].append(t_ns)
-    return tuple(
-        TopicFacts(*names, len(found), min(found, default=None), max(found, default=None))
-        for names, found in sorted(stamps.items())
-    )
+    facts = []
+    for (name, type_name), logged_ns in sorted(stamps.items()):
+        start_ns = min(logged_ns, default=None)
+        end_ns = max(logged_ns, default=None)
+        facts.append(TopicFacts(name, type_name, len(logged_ns), start_ns, end_ns))
+    return tuple(facts)

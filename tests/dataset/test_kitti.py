@@ -13,7 +13,7 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.sequence import Sequence, read_truth
 
-POSES = Path(__file__).parents[4] / "shared" / "data" / "trajectories" / "KITTI_00_gt.txt"
+POSES = Path(__file__).parents[3] / "shared" / "data" / "trajectories" / "KITTI_00_gt.txt"
 LEVEL = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))  # ahead, left, up of a camera's right, down, ahead
 TIMES = POSES.with_name("KITTI_00_gt_times.txt")
 
@@ -35,7 +35,7 @@ def test_the_colour_pair_sits_beside_the_grey_one_that_the_truth_is_of(scene, tm
     recording = read(scene.kitti(tmp_path, pair=("image_2", "image_3"), colour=True))
     assert recording.rig.T_body_left[1, 3] == pytest.approx(0.06)
     assert recording.rig.baseline_m == pytest.approx(0.54)
-    assert any("turned grey" in note for note in recording.notes)
+    assert any("converted to grey" in note for note in recording.notes)
     for frame, left in zip(recording.frames(), scene.left, strict=True):
         assert np.array_equal(frame.left, left)  # three equal channels come to themselves
 

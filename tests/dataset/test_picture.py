@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from vobench.dataset.picture import Picture, as_file, conversions, grey, kind_of
+from vobench.dataset.picture import Picture, as_file, conversions, enumerated, grey, kind_of, unread
 from vobench.errors import VobenchError
 
 RNG = np.random.default_rng(4)
@@ -53,7 +53,7 @@ def test_16_bits_give_back_8_however_they_were_widened(factor):
 def test_an_alpha_channel_makes_no_difference_but_for_a_note():
     with_alpha = encoded(np.dstack([COLOUR, GREY]))
     assert np.array_equal(as_grey(with_alpha), as_grey(encoded(COLOUR)))
-    assert "The pictures' alpha channel was dropped." in conversions(kind_of(with_alpha))
+    assert "The alpha channel of the pictures was dropped." in conversions(kind_of(with_alpha))
 
 
 def chunk(kind: bytes, data: bytes) -> bytes:
@@ -80,7 +80,7 @@ def test_kinds_of_png_that_opencv_does_not_write():
 
 def test_a_header_that_asks_for_the_moon_costs_nothing():
     for width, height in ((2**31 - 1, 2**31 - 1), (0, 4)):
-        with pytest.raises(VobenchError, match="are no picture"):
+        with pytest.raises(VobenchError, match="a picture should have 1 to 67108864 pixels, but has "):
             kind_of(by_hand(width, height, 8, 0, b""))
 
 
@@ -108,3 +108,33 @@ def test_spoilt_bytes_are_a_picture_or_a_sentence(ending, colour, data):
         return
     assert result.dtype == np.uint8
     assert ending == ".jpg"
+
+
+@pytest.mark.parametrize(
+    ("count", "said"), [(1, "a0"), (3, "a0, a1, a2"), (4, "a0, a1, a2 and 1 more"), (9, "a0, a1, a2 and 6 more")]
+)
+def test_long_lists_of_names_end_with_how_many_more_there_are(count, said):
+    assert enumerated([f"a{index}" for index in range(count)], 3) == said
+
+
+def test_what_was_not_read_is_named_but_hidden_files_are_not(tmp_path):
+    for name in ("used", "b", "a", ".hidden"):
+        (tmp_path / name).touch()
+    assert unread(tmp_path, "used") == ("Not read: a, b.",)
+    assert unread(tmp_path, "used", "a", "b") == ()
+
+
+@pytest.mark.parametrize(
+    ("pixels", "text", "is_grey8"),
+    [
+        (np.zeros((2, 3), np.uint8), "3 x 2 pixels, 8-bit grey", True),
+        (np.zeros((2, 3, 3), np.uint8), "3 x 2 pixels, 8-bit colour", False),
+        (np.zeros((2, 3), np.uint16), "3 x 2 pixels, 16-bit grey", False),
+    ],
+)
+def test_pixels_have_a_kind_as_files_have(pixels, text, is_grey8):
+    kind = kind_of(Picture("x", pixels))
+    assert str(kind) == text
+    assert kind.is_grey8 == is_grey8
+    form = as_file(Picture("x", pixels), kind)[1]
+    assert form == "png"

@@ -1,5 +1,6 @@
 """TartanAir's layouts."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.sequence import Sequence, read_truth
 
-NED = Path(__file__).parents[4] / "shared" / "data" / "trajectories" / "tartanair" / "pose_gt.txt"
+NED = Path(__file__).parents[3] / "shared" / "data" / "trajectories" / "tartanair" / "pose_gt.txt"
 UP = np.diag([1.0, -1.0, -1.0])
 
 
@@ -33,6 +34,17 @@ def test_the_camera_looks_where_ned_s_x_points(scene, tmp_path):
     ahead, right = T_world_left[:, :3, 2] @ UP, T_world_left[:, :3, 0] @ UP
     assert np.allclose(ahead, scene.T_world_body[:, :3, 0], rtol=0, atol=1e-12)
     assert np.allclose(right, scene.T_world_body[:, :3, 1], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("cameras", [1, 2])
+def test_the_body_is_at_the_left_camera_and_looks_ahead(scene, tmp_path, camchain, cameras):
+    folder = scene.tartanair(tmp_path)
+    if cameras == 1:
+        shutil.rmtree(folder / "image_right")
+    rig = read(folder).rig
+    assert len(rig.sides) == cameras
+    ahead, right, down = np.eye(3)[0], -np.eye(3)[1], -np.eye(3)[2]
+    assert np.allclose(rig.T_body_left, se3.transform(np.stack([right, down, ahead], -1), np.zeros(3)), atol=1e-15)
 
 
 def test_another_rate_may_be_given(scene, tmp_path):

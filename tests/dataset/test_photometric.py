@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from vobench.dataset.export import export
 from vobench.dataset.photometric import camera_text
-from vobench.dataset.source import known_points, rectified
+from vobench.dataset.read_back import known_points
+from vobench.dataset.source import rectified
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, pixel_grid
 from vobench.geometry.rig import PRESETS, Rig
@@ -131,7 +132,7 @@ def test_exposures_are_in_milliseconds_by_number_and_stamp(make_sequence: Make, 
     assert [row[0] for row in rows] == ["00000", "00001", "00002", "00003", "00004"]
     assert [int(row[1].replace(".", "")) for row in rows] == made.t_ns.tolist()
     np.testing.assert_allclose([float(row[2]) for row in rows], [2.0, 5.0, 12.5, 4.0, 3.0], rtol=1e-12)
-    assert any("6 dB throughout" in note for note in notes)
+    assert any("constant at 6 dB" in note for note in notes)
 
 
 def test_what_is_not_known_is_not_written_and_said(make_sequence: Make, tmp_path: Path) -> None:
@@ -142,7 +143,7 @@ def test_what_is_not_known_is_not_written_and_said(make_sequence: Make, tmp_path
         len(line.split()) == 2 for line in (tmp_path / "out/photometric/cam0/times.txt").read_text().splitlines()
     )
     assert any("not known: there is no pcalib.txt" in note for note in exported.notes)
-    assert any("Exposures are not known" in note for note in exported.notes)
+    assert any("The exposure of some pictures is not known" in note for note in exported.notes)
 
 
 def test_black_level_and_dirt_are_said(make_sequence: Make, tmp_path: Path) -> None:

@@ -1,0 +1,66 @@
+"""The pictures of ROS messages: raw ones in any known encoding, and compressed ones."""
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench.dataset.picture import Picture
+from vobench.errors import InputError
+
+# Bytes of a pixel by the encodings of grey pictures, channels by those of 8-bit colour ones.
+GREY = {"mono8": 1, "8uc1": 1, "mono16": 2, "16uc1": 2}
+COLOURS = {"bgr8": 3, "8uc3": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4}
+# OpenCV's conversions of colour mosaics to grey.
+MOSAICS = {
+    "bayer_rggb8": cv2.COLOR_BayerRGGB2GRAY,
+    "bayer_bggr8": cv2.COLOR_BayerBGGR2GRAY,
+    "bayer_gbrg8": cv2.COLOR_BayerGBRG2GRAY,
+    "bayer_grbg8": cv2.COLOR_BayerGRBG2GRAY,
+}
+
+
+def picture(message: Any, name: str) -> Picture:
+    """The picture of an Image or CompressedImage. Raises InputError for an unknown encoding."""
+    if not hasattr(message, "encoding"):
+        return Picture(name, message.data.tobytes())
+    encoding = message.encoding.lower()
+    if encoding in GREY:
+        grey = _pixels(message, name, 1, GREY[encoding])
+        return Picture(name, grey[..., 0])
+    if encoding in COLOURS:
+        colour = _pixels(message, name, COLOURS[encoding], 1)[..., :3]  # without alpha
+        blue_green_red = colour[..., ::-1] if encoding.startswith("rgb") else colour
+        return Picture(name, np.ascontiguousarray(blue_green_red))
+    if encoding in MOSAICS:
+        mosaic = _pixels(message, name, 1, 1)[..., 0]
+        return Picture(name, np.asarray(cv2.cvtColor(mosaic, MOSAICS[encoding])))
+    known = ", ".join((*GREY, *COLOURS, *MOSAICS))
+    raise InputError(f"the encoding {message.encoding!r} is not supported. Known: {known}: {name}")
+
+
+def _pixels(
+    message: Any,
+    name: str,
+    channels: int,
+    channel_bytes: int,
+) -> NDArray[Any]:
+    """Pixels (H, W, channels); a row of the message may be longer than its pixels need."""
+    height = int(message.height)
+    width = int(message.width)
+    step = int(message.step)  # bytes a row
+    needed = width * channels * channel_bytes
+    is_possible = height >= 1 and width >= 1 and step >= needed
+    if not is_possible or message.data.size < height * step:
+        raise InputError(
+            f"{message.data.size} bytes are not a {width} x {height} picture in {message.encoding} "
+            f"with {step} bytes a row: {name}"
+        )
+    data = message.data[: height * step]
+    rows = np.asarray(data, np.uint8).reshape(height, step)[:, :needed]
+    if channel_bytes == 1:
+        return rows.reshape(height, width, channels).copy()
+    byte_order = ">u2" if message.is_bigendian else "<u2"
+    words = np.ascontiguousarray(rows).view(byte_order)
+    return words.reshape(height, width, channels).astype(np.uint16)

@@ -1,0 +1,96 @@
+"""ROS 2 bags, written from sequences."""
+
+import json
+from pathlib import Path
+from typing import Final
+
+from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, ReaderError, StoragePlugin, Writer
+
+from vobench.dataset.source import ExportSource, Views
+from vobench.errors import SequenceError
+from vobench.sequence import messages as ros
+from vobench.sequence.bag import Bag
+from vobench.sequence.messages import TYPES
+
+TRUE_TF_STATIC = f"/ground_truth{ros.TF_STATIC.name}"
+VERSION: Final = 8  # of rosbag2's metadata; ROS 2 Iron and later read it
+NOTE_NAMES = (ros.WHEELS_NOTE, ros.IMU_NOTE, ros.PROVENANCE_NOTE, ros.IMPORT_NOTE)
+ATTACHMENT_NAMES = (ros.CASE_ATTACHMENT, ros.NAMES_ATTACHMENT)
+
+
+def write_ros2(source: ExportSource, views: Views, folder: Path) -> list[str]:
+    """Write every message of a sequence's two files, bit for bit; return notes on what was converted."""
+    del views  # a bag holds the pictures as they were recorded
+    paths = [source.folder / name for name in (ros.SENSORS_FILE, ros.TRUTH_FILE)]
+    paths = [path for path in paths if path.is_file()]
+    true_mounts_differ = len({_mounts(path) for path in paths}) > 1
+
+    folder.rmdir()  # rosbags creates it
+    writer = Writer(folder, version=VERSION, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    for name, text in _custom_data(paths).items():
+        writer.set_custom_data(name, text)
+    try:
+        with AnyReader(paths, default_typestore=TYPES) as reader, writer:
+            _copy(reader, writer, true_mounts_differ=true_mounts_differ)
+    except (AnyReaderError, ReaderError) as error:
+        raise SequenceError(f"rosbags does not read this sequence ({error}): {source.folder}") from error
+
+    notes = ["Notes and attachments (wheels, IMU, case, versions) became custom_data of metadata.yaml."]
+    if true_mounts_differ:
+        notes.append(f"The true mounts differ from the nominal ones: they are on {TRUE_TF_STATIC}.")
+    return notes
+
+
+def _mounts(path: Path) -> tuple[bytes, ...]:
+    """The messages on /tf_static."""
+    return tuple(bytes(data) for _, data in Bag.open(path).raw((ros.TF_STATIC,)))
+
+
+def _custom_data(paths: list[Path]) -> dict[str, str]:
+    texts = {}
+    for path in paths:
+        bag = Bag.open(path)
+        for name in NOTE_NAMES:
+            entries = bag.note(name)
+            if entries:
+                texts[name] = json.dumps(entries, sort_keys=True)
+        for name in ATTACHMENT_NAMES:
+            if bag.has_attachment(name):
+                texts[name] = bag.attachment(name).decode()
+    return texts
+
+
+def _copy(reader: AnyReader, writer: Writer, *, true_mounts_differ: bool) -> None:
+    """Copy every message at its time; the truth's /tf_static is renamed, or dropped where it repeats the sensors'."""
+    copies = {}  # connections of the new bag, by the id of the one that is copied
+    for connection in reader.connections:
+        name = _copied_name(connection, reader, true_mounts_differ=true_mounts_differ)
+        if name is None or not connection.msgcount:
+            continue
+        copies[id(connection)] = writer.add_connection(
+            name,
+            connection.msgtype,
+            msgdef=connection.msgdef.data,
+            rihs01=TYPES.hash_rihs01(connection.msgtype),
+            offered_qos_profiles=getattr(connection.ext, "offered_qos_profiles", ()),
+        )
+    for connection, t_ns, data in reader.messages():
+        copy = copies.get(id(connection))
+        if copy is not None:
+            writer.write(copy, t_ns, data)
+
+
+def _copied_name(
+    connection: Connection,
+    reader: AnyReader,
+    *,
+    true_mounts_differ: bool,
+) -> str | None:
+    """A topic's name in the new bag; None for the truth's /tf_static where it repeats the sensors'."""
+    is_of_sensors = connection.owner is reader.connections[0].owner  # the sensors' file comes first
+    if connection.topic != ros.TF_STATIC.name or is_of_sensors:
+        return connection.topic
+    return TRUE_TF_STATIC if true_mounts_differ else None

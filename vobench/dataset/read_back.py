@@ -1,0 +1,111 @@
+"""The comparison of an export, read back, with what was exported: known points and the true path."""
+
+import numpy as np
+
+from vobench.errors import SequenceError
+from vobench.geometry import se3
+from vobench.geometry.camera import Camera
+from vobench.geometry.rig import ImuCalibration, Rig, Side
+from vobench.geometry.se3 import Array
+from vobench.trajectory.trajectory import Trajectory
+
+PIXEL_TOLERANCE = 1e-6
+POSE_TOLERANCE = 1e-9  # metres, and entries of rotations
+DEPTHS_M = (0.3, 1.0, 5.0, 30.0, 1000.0)
+GRID = 9  # points across a picture and down it
+
+
+def known_points(camera: Camera) -> Array:
+    """Points (N, 3) in front of a camera, evenly over its picture and at several depths."""
+    u = np.linspace(0, camera.width_px - 1, GRID)
+    v = np.linspace(0, camera.height_px - 1, GRID)
+    pixels = np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)
+    rays = camera.rays(pixels)  # (81, 3), NaN outside the lens's field of view
+    visible = rays[np.isfinite(rays).all(1)]
+    depths_m = np.array(DEPTHS_M)[:, None, None]
+    points_m: Array = (visible * depths_m).reshape(-1, 3)
+    return points_m
+
+
+def pixel_difference(expected: Rig, actual: Rig) -> float:
+    """The largest distance in px between two rigs' projections of the same points.
+
+    It is infinite for rigs with other cameras, or pictures of another size.
+    """
+    if expected.sides != actual.sides:
+        return np.inf
+    points_m = known_points(expected.left)
+    largest_px = 0.0
+    for side in expected.sides:
+        if _size_px(expected.camera(side)) != _size_px(actual.camera(side)):
+            return np.inf
+        expected_px = _projected(expected, points_m, side)
+        actual_px = _projected(actual, points_m, side)
+        largest_px = max(largest_px, _largest_distance(expected_px, actual_px))
+    return largest_px
+
+
+def _size_px(camera: Camera) -> tuple[int, int]:
+    return camera.width_px, camera.height_px
+
+
+def _projected(rig: Rig, points_left_m: Array, side: Side) -> Array:
+    """Pixels (N, 2) in one camera of points (N, 3) in the left camera's axes."""
+    if side == "left":
+        return rig.left.project(points_left_m)
+    points_right_m = se3.apply(se3.inverse(rig.T_left_right), points_left_m)
+    return rig.camera("right").project(points_right_m)
+
+
+def _largest_distance(expected_px: Array, actual_px: Array) -> float:
+    is_visible = ~np.isnan(expected_px[:, 0])
+    if not is_visible.any():
+        return np.inf
+    distances_px = np.linalg.norm(expected_px[is_visible] - actual_px[is_visible], axis=-1)
+    if not np.isfinite(distances_px).all():
+        return np.inf
+    return float(distances_px.max())
+
+
+def check_rig(what: str, expected: Rig, actual: Rig) -> None:
+    """Raise SequenceError unless a rig that was read back projects known points as the exported one does."""
+    distance_px = pixel_difference(expected, actual)
+    if not distance_px < PIXEL_TOLERANCE:
+        raise SequenceError(
+            f"{what} differs from what was exported: known points are projected up to {distance_px:.3g} px "
+            f"from their places, and less than {PIXEL_TOLERANCE:g} px would be right"
+        )
+    if expected.imu is None or actual.imu is None:
+        return
+    difference = _pose_difference(_T_left_imu(expected, expected.imu), _T_left_imu(actual, actual.imu))
+    if not difference < POSE_TOLERANCE:
+        raise SequenceError(
+            f"{what} puts the IMU {difference:.3g} from its place, and less than {POSE_TOLERANCE:g} would be right"
+        )
+
+
+def _T_left_imu(rig: Rig, imu: ImuCalibration) -> Array:
+    return se3.inverse(rig.T_body_left) @ imu.T_body_imu
+
+
+def check_path(what: str, expected: Trajectory, actual: Trajectory) -> None:
+    """Raise SequenceError unless a path that was read back has the same stamps, and poses to 1e-9."""
+    if not np.array_equal(expected.t_ns, actual.t_ns):
+        raise SequenceError(f"{what} has other stamps than were exported: {_stamp_difference(expected, actual)}")
+    difference = _pose_difference(expected.T_world_frame, actual.T_world_frame)
+    if not difference < POSE_TOLERANCE:
+        raise SequenceError(
+            f"{what} has poses that differ by {difference:.3g} from those exported, "
+            f"and less than {POSE_TOLERANCE:g} would be right"
+        )
+
+
+def _pose_difference(expected: Array, actual: Array) -> float:
+    return float(np.abs(expected - actual).max(initial=0.0))
+
+
+def _stamp_difference(expected: Trajectory, actual: Trajectory) -> str:
+    if len(expected) != len(actual):
+        return f"{len(actual)} of {len(expected)}"
+    first = int(np.flatnonzero(expected.t_ns != actual.t_ns)[0])
+    return f"pose {first} is at {actual.t_ns[first]} ns and not at {expected.t_ns[first]} ns"

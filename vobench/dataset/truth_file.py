@@ -1,0 +1,76 @@
+"""A ground truth read from a trajectory file in any form of text."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from vobench.dataset.picture import read_text
+from vobench.dataset.recording import Notes, ReadOptions
+from vobench.errors import InputError
+from vobench.geometry import se3
+from vobench.geometry.se3 import Array
+from vobench.trajectory.formats import Parsed, parse_any
+from vobench.trajectory.trajectory import Stamps, Trajectory
+
+EXACT = 1e-9  # |RᵀR - I| up to which a rotation was written with all its digits
+
+
+def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
+    """A trajectory, and notes on what was done to it; a row without a stamp gets that of its picture.
+
+    A row of 13 numbers is KITTI's behind the picture's number, from 0. Of rows with one stamp the first is kept.
+    Raises TrajectoryError naming file and line for an invalid pose, InputError where rows and pictures differ.
+    """
+    parsed = parse_any(read_text(path), name=str(path))
+    t_ns = parsed.stamped_by(frames_ns) if parsed.t_ns is None else parsed.t_ns
+    if t_ns is None:
+        raise _unstamped(parsed, len(frames_ns), path)
+
+    T = parsed.T
+    notes = list(parsed.notes)
+    if parsed.frames is not None:
+        notes.append(f"{path.name} has poses of {len(T)} of {len(frames_ns)} pictures, by their numbers.")
+
+    R = T[:, :3, :3]
+    gram = np.swapaxes(R, -1, -2) @ R  # the identity for a rotation
+    deviation = np.abs(gram - np.eye(3)).max(initial=0.0)
+    if deviation > EXACT:
+        T = se3.transform(se3.nearest_rotation(R), T[:, :3, 3])
+        notes.append(f"Rotations of {path.name} were made exact; they were up to {deviation:.1g} off.")
+    return Trajectory(t_ns, T), tuple(notes)
+
+
+def _unstamped(parsed: Parsed, frame_count: int, path: Path) -> InputError:
+    if parsed.frames is not None:
+        return InputError(
+            f"the first of 13 columns should be a picture's number, from 0 to {frame_count - 1}, "
+            f"but there is {parsed.frames[-1]}: {path}"
+        )
+    return InputError(
+        f"{len(parsed.T)} poses without stamps for {frame_count} pictures: give one pose a picture, or each "
+        f"row its picture's number, from 0, as a first of 13 columns: {path}"
+    )
+
+
+def truth_file(
+    options: ReadOptions,
+    beside: Iterable[Path],
+    frames_ns: Stamps,
+    whose: str,
+    turn: Array | None = None,
+) -> tuple[Trajectory | None, Notes]:
+    """The truth that the options name, or else the first existing file of `beside`, and notes on it.
+
+    `turn` (4, 4) is the change of axes that is applied to the world and to the body. `whose` ends the sentence that
+    names the file.
+    """
+    path = options.truth
+    if path is None:
+        path = next((candidate for candidate in beside if candidate.exists()), None)
+    if path is None:
+        return None, ()
+    truth, notes = read_truth_file(path, frames_ns)
+    if turn is not None:
+        truth = Trajectory(truth.t_ns, turn @ truth.T_world_frame @ turn.T)
+    return truth, (f"The truth is {path.name}, {whose}", *notes)
