@@ -11,10 +11,11 @@ from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakedScene
 from vobench.rendering.culling import geometry
-from vobench.rendering.draw import BatchDraw, RenderTarget, render_target
+from vobench.rendering.draw import BatchDraw
 from vobench.rendering.illumination import AmbientLight, Background, Illumination
 from vobench.rendering.opengl import CENTRE, HALVES, TURNED, LightTexture
 from vobench.rendering.probe import Probe, glints, room_probe
+from vobench.rendering.render_target import RenderTarget, render_target
 from vobench.rendering.renderer import Radiance, View
 from vobench.rendering.view import NO_GLINTS, Box, PinholeView, pinhole_view
 from vobench.rendering.warp import Warp, warp

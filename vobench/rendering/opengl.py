@@ -16,6 +16,7 @@ from vobench.errors import MissingDependencyError, RenderError
 from vobench.geometry.se3 import Array
 from vobench.rendering.context import SOFTWARE_REMEDY
 from vobench.rendering.renderer import Radiance
+from vobench.rendering.uniform_block import BLOCKS
 from vobench.rendering.view import Box
 from vobench.scene.material import linear
 
@@ -111,27 +112,27 @@ class Elements:
 
 
 class Blocks:
-    """Numbers (B, N) float32 that shaders read as uniform blocks, one row at a time."""
+    """Values (B,) of a uniform block's type that shaders read one at a time."""
 
-    def __init__(self, binding: int, values: Floats) -> None:
+    def __init__(self, binding: int, values: NDArray[np.void]) -> None:
         self._binding = binding
-        self._size = 4 * values.shape[1]
-        step = int(GL.glGetIntegerv(GL.GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT))
-        self._stride = -(-self._size // step) * step
+        self._size = values.dtype.itemsize
+        alignment = int(GL.glGetIntegerv(GL.GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT))
+        self._stride = -(-self._size // alignment) * alignment
         self._buffer = GL.glGenBuffers(1)
         GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._buffer)
         GL.glBufferData(GL.GL_UNIFORM_BUFFER, self._stride * len(values), None, GL.GL_DYNAMIC_DRAW)
-        for row, numbers in enumerate(values):
-            self.update(row, numbers)
+        for index, value in enumerate(values):
+            self.update(index, value)
 
-    def update(self, row: int, numbers: Floats) -> None:
-        """Replace a row."""
+    def update(self, index: int, value: np.void | NDArray[np.void]) -> None:
+        """Replace a value."""
         GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._buffer)
-        GL.glBufferSubData(GL.GL_UNIFORM_BUFFER, row * self._stride, numbers.nbytes, numbers)
+        GL.glBufferSubData(GL.GL_UNIFORM_BUFFER, index * self._stride, self._size, value.tobytes())
 
-    def use(self, row: int) -> None:
-        """Let shaders read a row."""
-        offset = row * self._stride
+    def use(self, index: int) -> None:
+        """Let shaders read a value."""
+        offset = index * self._stride
         GL.glBindBufferRange(GL.GL_UNIFORM_BUFFER, self._binding, self._buffer, offset, self._size)
 
 
@@ -212,10 +213,15 @@ class Program:
 
 
 def _source(name: str, defines: Sequence[str]) -> str:
-    """The text of a shader's file, with names defined after its first line, which says the version."""
-    version, rest = (SHADERS / name).read_text(encoding="utf-8").split("\n", 1)
+    """The text of a shader's file, with its uniform blocks declared and names defined.
+
+    The names follow the first line, which says the version; a line `#include <Pass>` becomes the block of that name.
+    """
+    version, body = (SHADERS / name).read_text(encoding="utf-8").split("\n", 1)
+    for block in BLOCKS.values():
+        body = body.replace(f"#include <{block.name}>", block.declaration)
     lines = [f"#define {define} 1" for define in sorted(defines)]
-    return "\n".join([version, *lines, rest])
+    return "\n".join([version, *lines, body])
 
 
 class CubeTexture:

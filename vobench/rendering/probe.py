@@ -11,6 +11,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.culling import PROBE_MOST
 from vobench.rendering.opengl import CubeTexture
 from vobench.rendering.renderer import Radiance
+from vobench.rendering.uniform_block import MOST_GLINTS
 from vobench.rendering.view import NEAR_M
 from vobench.scene.light import Light, PointLight, SpotLight, Sun
 from vobench.scene.material import LUMINANCE
@@ -121,9 +122,6 @@ def _irradiance(pictures: Array) -> Array:
     return np.array([*2 * np.einsum("fij,fijk->k", weighted, towards), weighted.sum()])
 
 
-GLINTS = 4  # as the shader says
-
-
 def glints(lights: Sequence[Light], eye_m: Array, start_ns: int, end_ns: int) -> Array:
     """Lamps (G, 3, 4) that no picture shows, the sun among them: those that shine most on an eye (3,).
 
@@ -132,9 +130,9 @@ def glints(lights: Sequence[Light], eye_m: Array, start_ns: int, end_ns: int) ->
     """
     shining = [light for light in lights if isinstance(light, PointLight | SpotLight | Sun)]
     found = [_glint(light, start_ns, end_ns) for light in shining]
-    if len(found) > GLINTS:
+    if len(found) > MOST_GLINTS:
         found.sort(key=lambda rows: float(-rows[1, :3].sum() / np.sum((rows[0, :3] - rows[0, 3] * eye_m) ** 2)))
-    return np.array(found[:GLINTS]).reshape(-1, 3, 4)
+    return np.array(found[:MOST_GLINTS]).reshape(-1, 3, 4)
 
 
 def _glint(light: PointLight | SpotLight | Sun, start_ns: int, end_ns: int) -> Array:
