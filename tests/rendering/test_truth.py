@@ -19,7 +19,8 @@ from vobench.geometry.camera import (
 )
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
-from vobench.rendering.truth import Shot, TruthCaster, lamp_of
+from vobench.rendering.lamp import lamp_of
+from vobench.rendering.truth import Shot, TruthCaster
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import Mesh, Thing, Triangles, flat, joined, quad, unit

@@ -15,11 +15,16 @@ from annotated_types import Ge
 from vobench import stop
 from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
+from vobench.rendering.atlas import Atlas
 from vobench.rendering.direct_light import direct_light, mirror_images
 from vobench.rendering.emitter import emitters
-from vobench.rendering.geometry import FAR_M, Floats, Indices, Mask, RayCaster, Visibility, face_materials, off
+from vobench.rendering.geometry import FAR_M, Floats, Indices, Mask, RayCaster, face_materials, offset_from_surface
 from vobench.rendering.indirect_light import FinalGather, Gatherer, albedo, blend, bounced, response, surfels
-from vobench.rendering.lightmap import Atlas, Layout, Texels, owners, texels, unwrap
+from vobench.rendering.texel import Texels, texels
+from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.texel_owner import owners
+from vobench.rendering.unwrap import unwrap
+from vobench.rendering.visibility import Visibility
 from vobench.scene.light import NS_PER_S, AreaLight, Light, Sky, Sun
 from vobench.scene.material import Material, Picture, Texture
 from vobench.scene.mesh import Triangles, areas_m2, distinct
@@ -119,7 +124,7 @@ class StaticScene:
     visibility: Visibility
     atlas: Atlas
     points: Texels
-    layout: Layout
+    layout: TexelLayout
     cells: Indices
     open_sky: Mask
 
@@ -154,7 +159,7 @@ def _sunlit(scene: Scene, faces: Triangles) -> Mask:
     which = np.repeat(static, 1 + (area_m2[static] / PROBES_M**2).astype(int))
     a, b = np.random.default_rng(0).random((2, len(which), 1))
     first, second, third = faces.corners_m[which].swapaxes(0, 1)
-    points = off(first + np.sqrt(a) * (second - first + b * (third - second)), faces.plane[which])
+    points = offset_from_surface(first + np.sqrt(a) * (second - first + b * (third - second)), faces.plane[which])
     caster = RayCaster(faces, np.flatnonzero((faces.mover < 0) & ~_panes(scene, faces)))
     for way in [sun.direction(t_ns) for sun in suns for t_ns in key_times_ns(sun)]:
         faced = np.flatnonzero(faces.plane[which] @ way > 0)
@@ -172,7 +177,7 @@ def _panes(scene: Scene, faces: Triangles) -> Mask:
     return np.array([m is not None and m.kind == "pane" for m in face_materials(faces, scene.materials)])[faces.thing]
 
 
-def static_points(scene: Scene, faces: Triangles, atlas: Atlas, seed: int) -> tuple[Visibility, Texels, Layout]:
+def static_points(scene: Scene, faces: Triangles, atlas: Atlas, seed: int) -> tuple[Visibility, Texels, TexelLayout]:
     """A scene without its movers, as rays and as points, and these on the map."""
     static = faces.mover < 0
     visibility = Visibility(faces, scene.materials, np.flatnonzero(static))

@@ -8,8 +8,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vobench.rendering.emitter import Aim, Between, Emitter, emitters
-from vobench.rendering.geometry import RAY_OFFSET_M, Ball, Flat, Floats, Indices, Mask, RayCaster, Visibility, ball
-from vobench.rendering.lightmap import Layout, Places, Texels, chunked
+from vobench.rendering.geometry import (
+    RAY_OFFSET_M,
+    BoundingSphere,
+    Floats,
+    Indices,
+    Mask,
+    PlanarPatch,
+    RayCaster,
+    Rows,
+    bounding_sphere,
+)
+from vobench.rendering.texel import Texels
+from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.thread_pool import chunked
+from vobench.rendering.visibility import Visibility
 from vobench.scene.light import Light, Sky
 
 
@@ -18,7 +31,7 @@ class _MirrorImage:
     """An emitter in a mirror: rays go straight to where its image is, through the mirror's faces."""
 
     emitter: Emitter
-    mirror: Flat
+    mirror: PlanarPatch
     tint: float
     caster: RayCaster
 
@@ -59,7 +72,7 @@ class _MirrorImage:
             reach: Floats = -self.mirror.height_m(points_m) / (way @ self.mirror.normal)
         return reach.astype(np.float32)
 
-    def _meeting(self, points_m: Floats, way: Floats) -> Places:
+    def _meeting(self, points_m: Floats, way: Floats) -> Rows:
         """Which ways (P, 3) from points pass the mirror's faces from their front."""
         reach = self._reach(points_m, way)
         some = np.flatnonzero((way @ self.mirror.normal < 0) & (reach > 0) & (reach < 1))
@@ -77,7 +90,7 @@ def mirror_images(light: Light, visibility: Visibility, *, t_ns: float) -> list[
     own = emitters(light, visibility, t_ns=t_ns)
     found = []
     for image in [_MirrorImage(emitter, *mirror) for mirror in visibility.mirrors for emitter in own]:
-        around = Ball(image.behind(image.emitter.ball.centre_m[None])[0], image.emitter.ball.radius_m)
+        around = BoundingSphere(image.behind(image.emitter.ball.centre_m[None])[0], image.emitter.ball.radius_m)
         found.append(Emitter(
             around, image.towards, image.width_rad, image.passing, may_light=partial(_shown, image, around),
             evenly=image.evenly, spots=image.emitter.spots,
@@ -85,9 +98,9 @@ def mirror_images(light: Light, visibility: Visibility, *, t_ns: float) -> list[
     return found
 
 
-def _shown(image: _MirrorImage, what: Ball, points_m: Floats) -> Mask:
+def _shown(image: _MirrorImage, what: BoundingSphere, points_m: Floats) -> Mask:
     """Points (P, 3) before the mirror from which a ball behind it lies beyond its outline."""
-    frame = ball(image.mirror.corners_m)
+    frame = bounding_sphere(image.mirror.corners_m)
     way = what.centre_m - points_m.astype(float)
     height = image.mirror.height_m(points_m)
     far = way @ image.mirror.normal
@@ -115,7 +128,14 @@ class Rays:
 
 
 def direct_light(
-    emitter: Emitter, points: Texels, layout: Layout, cells: Indices, visibility: Visibility, *, side: int, among: Mask
+    emitter: Emitter,
+    points: Texels,
+    layout: TexelLayout,
+    cells: Indices,
+    visibility: Visibility,
+    *,
+    side: int,
+    among: Mask,
 ) -> Floats:
     """Illuminance (P,) in lux that one emitter gives at level 1 to those among the points; of coats what enters.
 
@@ -129,16 +149,16 @@ def direct_light(
     kinds = first_rays(emitter, points.points_m[some], side)
     is_soft = bool((kinds > 1).any())
     for kind in np.unique(kinds):
-        own = some[(kinds == kind) & (layout.few[some] if is_soft else True)]
+        own = some[(kinds == kind) & (layout.is_sparse[some] if is_soft else True)]
         light[own], clear[own], unshaded = arriving(emitter, points, own, visibility, Rays(int(kind)))
         share[own] = light[own] / np.maximum(unshaded, 1e-30)
     if emitter.sky == "pane":
-        return layout.blurred(layout.between(light))
+        return layout.blurred(layout.interpolated(light))
     half = _half_shadow(clear, layout, cells, some)
     if not is_soft:
         light[half] = arriving(emitter, points, half, visibility, Rays(3 * side // 2, spread=True))[0]
         return light
-    share = layout.between(share)
+    share = layout.interpolated(share)
     is_half = np.zeros(len(points), bool)
     is_half[half] = True
     for kind in np.unique(kinds):
@@ -149,10 +169,10 @@ def direct_light(
     return np.where(is_half | bool(emitter.sky or emitter.spots), layout.blurred(light), light)
 
 
-def reached(emitter: Emitter, points: Texels, some: Places) -> Places:
+def reached(emitter: Emitter, points: Texels, some: Rows) -> Rows:
     """Those of some points (N,) that any light of an emitter can reach, as far as that is known without rays."""
 
-    def of(part: slice) -> Places:
+    def of(part: slice) -> Rows:
         own = some[part]
         ahead = np.einsum("ij,ij->i", emitter.ball.centre_m - points.points_m[own], points.normals[own])
         own = own[ahead > -emitter.ball.radius_m]
@@ -168,7 +188,7 @@ def first_rays(emitter: Emitter, points_m: Floats, side: int) -> NDArray[np.int6
     return np.select([width == 0, width < NARROW_RAD, width < WIDE_RAD], [1, max(side // 2, 1), max(middle, 1)], side)
 
 
-def arriving(emitter: Emitter, points: Texels, some: Places, between: Between, rays: Rays) -> Floats:
+def arriving(emitter: Emitter, points: Texels, some: Rows, between: Between, rays: Rays) -> Floats:
     """(3, N) of some points: illuminance, share of rays that met nothing opaque (NaN: none sent), light unshaded."""
     return chunked(lambda part: _arriving(emitter, points.take(some[part]), between, rays), len(some)).T
 
@@ -196,7 +216,7 @@ def _arriving(emitter: Emitter, texels: Texels, between: Between, rays: Rays) ->
         return np.stack([total / rays.side**2, passed / cast, unshaded / rays.side**2], -1)
 
 
-def open_light(emitter: Emitter, points: Texels, some: Places, side: int) -> Floats:
+def open_light(emitter: Emitter, points: Texels, some: Rows, side: int) -> Floats:
     """Illuminance (N,) of some points if nothing were in the way."""
 
     def of(part: slice) -> Floats:
@@ -223,17 +243,17 @@ def cell_spot(texels: Texels, cell: ArrayLike, side: int) -> tuple[Floats, Float
     return (cells % side + jitter[..., 0]) / np.float32(side), (cells // side + jitter[..., 1]) / np.float32(side)
 
 
-def footprint(texels: Texels, some: Places | slice, cell: int) -> Floats:
+def footprint(texels: Texels, some: Rows | slice, cell: int) -> Floats:
     """Steps (N, 3) from the middle of texels to somewhere on their area."""
     spot = texels.dither[some] + cell * FOOTPRINT
     spot -= np.floor(spot) + np.float32(0.5)
     return np.asarray(spot[:, 1:] * texels.step_u_m[some] + spot[:, :1] * texels.step_v_m[some])
 
 
-def _half_shadow(clear: Floats, layout: Layout, cells: Indices, some: Places) -> Places:
+def _half_shadow(clear: Floats, layout: TexelLayout, cells: Indices, some: Rows) -> Rows:
     """Those of some points (N,) beside which an emitter is both seen and hidden."""
     seen = clear > 0
     hidden = clear < 1
     mixed = np.logical_and(*(np.bincount(cells, part, minlength=1) > 0 for part in (seen, hidden)))
-    near = layout.near(seen, steps=RIM) & layout.near(hidden, steps=RIM)
+    near = layout.dilated(seen, steps=RIM) & layout.dilated(hidden, steps=RIM)
     return some[(near | mixed[cells])[some]]

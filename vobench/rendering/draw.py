@@ -73,15 +73,15 @@ class BatchDraw:
         mirrors = [self._mirrors[index] for index in boxes if self._is_visible(self._mirrors[index], visible)]
         for mirror in mirrors:
             if not mirror.is_pane:
-                mirror_box = followed.get(mirror.index)
-                self._draw_mirror(mirror, view, target, box=box, visible=visible, mirror_box=mirror_box)
+                part = followed.get(mirror.index)
+                self._draw_mirror(mirror, view, target, box=box, visible=visible, part=part)
 
         self._calls.background(view, canvas, target.weights)
         self._draw_unmirrored(self._panes, visible, view, canvas)
         panes = [mirror for mirror in mirrors if mirror.is_pane]
         for mirror in sorted(panes, key=lambda pane: -_distance_m(pane, view)):
-            mirror_box = followed.get(mirror.index)
-            self._draw_mirror(mirror, view, target, box=box, visible=visible, mirror_box=mirror_box)
+            part = followed.get(mirror.index)
+            self._draw_mirror(mirror, view, target, box=box, visible=visible, part=part)
 
     def add(self, target: RenderTarget, total: FlatTarget, box: Box, share: float) -> None:
         """Add the mean of a target's samples in a box, times a share, to a total."""
@@ -148,17 +148,24 @@ class BatchDraw:
         return followed
 
     def _draw_mirror(
-        self, mirror: Mirror, view: PinholeView, target: RenderTarget, *, box: Box, visible: Runs, mirror_box: Box | None
+        self,
+        mirror: Mirror,
+        view: PinholeView,
+        target: RenderTarget,
+        *,
+        box: Box,
+        visible: Runs,
+        part: Box | None,
     ) -> None:
-        """Draw what lies in one plane, with what it mirrors in its box, or without one with what the probe shows."""
+        """Draw what lies in one plane, with what it mirrors in a part of the picture, or with what the probe shows."""
         canvas = target.canvases[view.depth]
         plane = _plane_towards(mirror, view)
         is_last = view.depth == MIRRORS or not self._probe
         abilities = ("IS_LAST",) if is_last else ("HAS_PROBE",)
-        if mirror_box and plane:
+        if part and plane:
             reflections = target.canvases[view.depth + 1]
-            reflections.clear(mirror_box)
-            self.draw(view.through(plane), target, mirror_box)
+            reflections.clear(part)
+            self.draw(view.through(plane), target, part)
             self._begin(view, target, box)
             bind(LAYERS_UNIT, reflections.colour, LAYERS)
             abilities = ("HAS_REFLECTION",)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 from OpenGL import GL
 
 from vobench.geometry.se3 import Array
@@ -33,6 +34,7 @@ PROBE_UNIT = GL.GL_TEXTURE0 + 4
 
 LAYERS = GL.GL_TEXTURE_2D_ARRAY
 CLIP_MARGIN_PX = 1 / 8
+Block = NDArray[np.void]  # a single value () of a uniform block's type
 FADE = 0.1  # of roughness, over which the probe gives way
 
 
@@ -203,7 +205,7 @@ def _abilities(batch: Batch, texture: SurfaceTexture | None) -> tuple[str, ...]:
     return tuple(name for name, has in names.items() if has)
 
 
-def _set_view(values: np.ndarray[tuple[()], np.dtype[np.void]], view: PinholeView, canvas: Canvas, weights: Rgb) -> None:
+def _set_view(values: Block, view: PinholeView, canvas: Canvas, weights: Rgb) -> None:
     values["direct"] = view.direct.T
     values["eye"] = view.eye_m
     if view.mirror is not None:
@@ -219,7 +221,7 @@ def _set_view(values: np.ndarray[tuple[()], np.dtype[np.void]], view: PinholeVie
     values["inverse_weight_sum"] = 1 / sum(weights)
 
 
-def _set_probe(values: np.ndarray[tuple[()], np.dtype[np.void]], view: PinholeView, probe: Probe) -> None:
+def _set_probe(values: Block, view: PinholeView, probe: Probe) -> None:
     values["probe_centre"] = probe.centre_m
     values["probe_low"] = probe.low_m
     values["probe_high"] = probe.high_m

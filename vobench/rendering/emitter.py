@@ -7,8 +7,20 @@ from typing import Protocol
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, Ball, Flat, Floats, Mask, Visibility, ball, lengths, spots
-from vobench.rendering.lightmap import Texels, tangents
+from vobench.rendering.geometry import (
+    FAR_M,
+    RAY_OFFSET_M,
+    BoundingSphere,
+    Floats,
+    Mask,
+    PlanarPatch,
+    bounding_sphere,
+    lengths,
+    sample_points,
+    tangents,
+)
+from vobench.rendering.texel import Texels
+from vobench.rendering.visibility import Visibility
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.mesh import areas_m2, face_normals, unit
 
@@ -119,7 +131,7 @@ class Emitter:
     least, 0 where its light is even.
     """
 
-    ball: Ball
+    ball: BoundingSphere
     towards: Callable[[Texels], Aim]
     width_rad: Callable[[Floats], Floats]
     passing: Callable[[Between, Floats, Floats], Floats] = lambda between, *ways: between.passing(*ways)
@@ -133,7 +145,7 @@ def panel_emitter(light: AreaLight) -> Emitter:
     """A lamp's faces, which shine only to their front: rectangles by solid angle, all else by area."""
     corners = light.mesh.corners_m
     face = rectangle(corners)
-    around = ball(corners)
+    around = bounding_sphere(corners)
     if face is None:
         # In an order in which near triangles are near to one another (Morton).
         shares = (corners.mean(1) - around.centre_m) / around.radius_m / 2 + 0.5
@@ -182,7 +194,7 @@ def _by_area(light: AreaLight, corners_m: Array, texels: Texels, face: Rectangle
             a = _interleaved(np.stack([a, b], -1))
             b = b * 2**CURVE_BITS % 1
             normal = normals[np.minimum(np.searchsorted(ends, a, side="right"), len(ends) - 1)]
-            return (spots(corners_m, a, b) + RAY_OFFSET_M * normal).astype(np.float32), normal
+            return (sample_points(corners_m, a, b) + RAY_OFFSET_M * normal).astype(np.float32), normal
         corner = (face.corner_m + RAY_OFFSET_M * face.normal).astype(np.float32)
         u = face.edge_u_m.astype(np.float32)
         v = face.edge_v_m.astype(np.float32)
@@ -207,7 +219,7 @@ def bulb_emitter(light: PointLight | SpotLight) -> Emitter:
         strength = (light.intensity_cd(-way / np.sqrt(squared)[:, None]) / squared).astype(np.float32)
         return lambda _a, _b: (way, strength)
 
-    return Emitter(Ball(light.position_m, 0.0), towards, _hard)
+    return Emitter(BoundingSphere(light.position_m, 0.0), towards, _hard)
 
 
 def sun_emitter(light: Sun, t_ns: float) -> Emitter:
@@ -226,10 +238,10 @@ def sun_emitter(light: Sun, t_ns: float) -> Emitter:
 
         return aim
 
-    return Emitter(Ball(FARTHEST_M * centre, FARTHEST_M * SUN_RADIUS_RAD), towards, _hard)
+    return Emitter(BoundingSphere(FARTHEST_M * centre, FARTHEST_M * SUN_RADIUS_RAD), towards, _hard)
 
 
-def _pane_emitter(light: Sky, pane: Flat, visibility: Visibility) -> Emitter:
+def _pane_emitter(light: Sky, pane: PlanarPatch, visibility: Visibility) -> Emitter:
     """The sky through one pane: only rays that cross no other pane behind it, so that none counts twice."""
     followed_back, followed_front = _followed(pane, visibility)
     face = rectangle(pane.corners_m)
@@ -242,7 +254,7 @@ def _pane_emitter(light: Sky, pane: Flat, visibility: Visibility) -> Emitter:
             return lambda a, b: (angle.spot(a, b), angle.steradian)
 
         def by_area(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-            way = spots(pane.corners_m, a, b) - texels.points_m
+            way = sample_points(pane.corners_m, a, b) - texels.points_m
             return way, area * np.abs(way @ pane.normal) / np.maximum(np.linalg.norm(way, axis=1), 1e-6) ** 3
 
         return by_area
@@ -272,7 +284,7 @@ def _pane_emitter(light: Sky, pane: Flat, visibility: Visibility) -> Emitter:
         share[some] *= between.through_panes(start, ahead * ((1 - 1e-4) * reach[:, None]).astype(np.float32))
         return share
 
-    around = ball(pane.corners_m)
+    around = bounding_sphere(pane.corners_m)
     return Emitter(around, towards, _width_rad(around), passing, sky="pane")
 
 
@@ -295,10 +307,10 @@ def _open_sky_emitter(light: Sky, visibility: Visibility) -> Emitter:
     def width_rad(points_m: Floats) -> Floats:
         return np.full(len(points_m), np.sqrt(2 * np.pi), np.float32)
 
-    return Emitter(Ball(np.zeros(3), np.inf), towards, width_rad, sky="open")
+    return Emitter(BoundingSphere(np.zeros(3), np.inf), towards, width_rad, sky="open")
 
 
-def _width_rad(around: Ball) -> Callable[[Floats], Floats]:
+def _width_rad(around: BoundingSphere) -> Callable[[Floats], Floats]:
     """As wide as the ball is seen, at most."""
     return lambda points_m: (
         np.sqrt(np.pi) * around.radius_m / np.maximum(np.linalg.norm(around.centre_m - points_m, axis=1), 1e-6)
@@ -342,7 +354,7 @@ def emitters(light: Light, visibility: Visibility, *, t_ns: float = 0) -> list[E
             return [*panes, _open_sky_emitter(light, visibility)]
 
 
-def _followed(pane: Flat, visibility: Visibility) -> tuple[bool, bool]:
+def _followed(pane: PlanarPatch, visibility: Visibility) -> tuple[bool, bool]:
     """Whether any other pane that shows the sky reaches to the back of a pane, and to its front."""
     height = np.concatenate([pane.height_m(other.corners_m).ravel() for other in visibility.sky_panes])
     return bool((height < -RAY_OFFSET_M).any()), bool((height > RAY_OFFSET_M).any())

@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from vobench.rendering.atlas import Atlas
 from vobench.rendering.direct_light import JITTER, cell_spot
 from vobench.rendering.emitter import cosine_weighted
 from vobench.rendering.geometry import (
@@ -18,11 +19,16 @@ from vobench.rendering.geometry import (
     Hits,
     Indices,
     Mask,
-    Visibility,
+    Rows,
     face_materials,
     take,
+    tangents,
 )
-from vobench.rendering.lightmap import Atlas, Layout, Places, Texels, chunked, in_chunks, side_of, tangents
+from vobench.rendering.texel import Texels
+from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.thread_pool import chunked, in_chunks
+from vobench.rendering.unwrap import nearest_axis
+from vobench.rendering.visibility import Visibility
 from vobench.scene.light import Sky
 from vobench.scene.material import LUMINANCE, Material, fresnel, linear_texture, under_coat
 from vobench.scene.mesh import Triangles
@@ -45,7 +51,7 @@ class Surfels:
     """
 
     of: Indices
-    middle: Places
+    middle: Rows
     step_m: Floats
 
     def __len__(self) -> int:
@@ -62,7 +68,7 @@ def surfels(points: Texels, thing: Indices, step_m: Floats, visibility: Visibili
     """Of points whose things (P,) and cells' sides (P,) are known."""
     cell = np.floor(points.points_m / step_m[:, None]).astype(np.int64)
     cell -= cell.min(0, initial=0)
-    key = thing.astype(np.int64) * 6 + side_of(points.planes)
+    key = thing.astype(np.int64) * 6 + nearest_axis(points.planes)
     for axis in cell.T:
         key = key * (axis.max(initial=0) + 1) + axis
     of, middle = _grouped(key, points.points_m)
@@ -73,7 +79,7 @@ def surfels(points: Texels, thing: Indices, step_m: Floats, visibility: Visibili
     return Surfels(of.astype(np.int32), middle, step_m[middle].astype(np.float32))
 
 
-def _grouped(key: Places, points_m: Floats) -> tuple[Places, Places]:
+def _grouped(key: Rows, points_m: Floats) -> tuple[Rows, Rows]:
     """Groups (P,) of equal keys (P,), and the point nearest to the mean of each."""
     of = np.unique(key, return_inverse=True)[1].ravel()
     count = np.bincount(of)
@@ -83,7 +89,7 @@ def _grouped(key: Places, points_m: Floats) -> tuple[Places, Places]:
     return of, order[np.cumsum(count) - count]
 
 
-def blend(points: Texels, groups: Surfels, layout: Layout, visibility: Visibility, usable: Mask) -> "csr_matrix":
+def blend(points: Texels, groups: Surfels, layout: TexelLayout, visibility: Visibility, usable: Mask) -> "csr_matrix":
     """What each texel of the map takes from surfels (H·W, S): those near it that see its own and look its way."""
     p = points.points_m[groups.middle]
     n = points.normals[groups.middle]
@@ -108,7 +114,7 @@ def blend(points: Texels, groups: Surfels, layout: Layout, visibility: Visibilit
 
 
 def _weights(
-    points: Texels, groups: Surfels, of: Indices, near: Places, *, hidden: Mask, middles: tuple[Floats, Floats]
+    points: Texels, groups: Surfels, of: Indices, near: Rows, *, hidden: Mask, middles: tuple[Floats, Floats]
 ) -> "csr_matrix":
     near = near[of]
     hidden = hidden[of]
@@ -221,7 +227,7 @@ class FinalGather:
 
     table: "csr_matrix"
     sky: Floats
-    hits: Places
+    hits: Rows
     escaped: Floats
 
 
@@ -232,7 +238,7 @@ class _RayBatch:
     is_direct: whether a lamp that they meet next is direct light, and counted as such.
     """
 
-    point: Places
+    point: Rows
     origins_m: Floats
     directions: Floats
     weight: Floats

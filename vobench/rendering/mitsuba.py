@@ -18,7 +18,9 @@ import numpy as np
 from vobench import stop
 from vobench.errors import MissingDependencyError
 from vobench.geometry.se3 import Array
-from vobench.rendering.occlusion import Pixels, opaque, twins
+from vobench.rendering.cutout import opaque
+from vobench.rendering.occlusion import back_faces
+from vobench.rendering.shot import Pixels
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import Map, Material, Rgb, Texture, linear_texture
 from vobench.scene.mesh import Triangles
@@ -189,7 +191,7 @@ class Group:
 
 def groups(scene: Scene, faces: Triangles) -> list[Group]:
     """All faces but the lamps'; of two back to back one that has both sides, unless they glow."""
-    twin = twins(faces)[:-1]
+    twin = back_faces(faces)[:-1]
     members = dict[tuple[int, str, bool], list[Pixels]]()
     glowing = {name for name, material in scene.materials.items() if any(material.emission_cd_m2)}
     both = (twin >= 0) & ~np.array([t.material in glowing for t in faces.things], bool)[faces.thing]

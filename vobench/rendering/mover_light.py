@@ -10,14 +10,18 @@ from numpy.typing import NDArray
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.rendering.atlas import doubled_areas_px2
 from vobench.rendering.bake import BakedScene, StaticScene, bodies
 from vobench.rendering.culling import bounds
 from vobench.rendering.direct_light import Rays, arriving, cell_spot, footprint, mirror_images, reached
 from vobench.rendering.emitter import Emitter, emitters
-from vobench.rendering.geometry import Ball, Floats, Indices, Mask, RayCaster, Visibility, face_materials
+from vobench.rendering.geometry import BoundingSphere, Floats, Indices, Mask, RayCaster, Rows, face_materials
 from vobench.rendering.indirect_light import FinalGather, Gatherer, blend, response, surfels
-from vobench.rendering.lightmap import Places, Texels, chunked, owners, texels, turns_px2
+from vobench.rendering.texel import Texels, texels
+from vobench.rendering.texel_owner import owners
+from vobench.rendering.thread_pool import chunked
 from vobench.rendering.view import Box, PinholeView
+from vobench.rendering.visibility import Visibility
 from vobench.scene.light import AreaLight, Light, Sky, Sun
 from vobench.scene.mesh import Triangles, areas_m2
 
@@ -42,7 +46,7 @@ AHEAD_M = 0.3  # beyond what a view needs: the other eye is about there
 UNSURE = 0.2  # spread of what the points around keep from each other, as a share: there a point asks for itself
 
 
-def may_shade(mover: Ball, emitter: Ball, points: Ball) -> Mask:
+def may_shade(mover: BoundingSphere, emitter: BoundingSphere, points: BoundingSphere) -> Mask:
     """Whether a way from within each of `points` (N,) to within the emitter's ball can pass the mover's.
 
     All ways lie in a cone frustum about the line between the two balls, here one a little wider.
@@ -89,10 +93,10 @@ class MoverLightAt:
     direct: Floats
     gathered: FinalGather
     movers: RayCaster
-    balls: list[Ball]
+    balls: list[BoundingSphere]
     shining: "list[list[_Lit]]"
     known: Mask
-    lost: list[tuple[int, Places, Floats]]
+    lost: list[tuple[int, Rows, Floats]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,12 +109,12 @@ class _Lit:
     emitter: Emitter
     is_soft: bool
     has: Mask
-    points: Places
+    points: Rows
     cells: Indices
-    balls: Ball
-    starts: Places
+    balls: BoundingSphere
+    starts: Rows
 
-    def near(self, movers: Sequence[Ball], among: Mask) -> Mask:
+    def near(self, movers: Sequence[BoundingSphere], among: Mask) -> Mask:
         """Of which of the cells among all (A,) some point may lose light to one of the movers, given as balls."""
         asked = np.flatnonzero(among[self.cells])
         balls = self.balls.take(asked)
@@ -124,7 +128,7 @@ class _Lit:
         found[self.cells[asked[near]]] = True
         return found
 
-    def within(self, among: Mask) -> Places:
+    def within(self, among: Mask) -> Rows:
         """Its points in the cells among all (A,)."""
         return self.points[spans(self.starts, np.flatnonzero(among[self.cells]))]
 
@@ -168,7 +172,7 @@ class MoverLight:
         )
         self._straight = [layer.ravel()[still.points.index] for layer in baked.direct]
 
-    def _grouped(self, faces: Triangles) -> "tuple[Places, csr_matrix]":
+    def _grouped(self, faces: Triangles) -> "tuple[Rows, csr_matrix]":
         """The points that gather light for their neighbours, and how these take it (H·W, S)."""
         points = self._points
         moving = np.flatnonzero(faces.mover >= 0)
@@ -280,7 +284,7 @@ class MoverLight:
         is_soft = bool((emitter.width_rad(points.points_m[some]) > 0).any())
         return _Lit(emitter, is_soft, has, some, cells[starts[:-1]], _balls(points.points_m[some], starts), starts)
 
-    def _lost(self, lit: _Lit, index: int, moment: MoverLightAt, new: Mask) -> tuple[Places, Floats]:
+    def _lost(self, lit: _Lit, index: int, moment: MoverLightAt, new: Mask) -> tuple[Rows, Floats]:
         """Points (N,) in new cells and the illuminance (N,) that movers take from them.
 
         Soft shadows are asked at few points, and at others where those around differ, as light is. What is found at
@@ -294,8 +298,8 @@ class MoverLight:
             return some, self._traced(lit.emitter, some, moment.movers, SHADE_SIDE)
         is_pane = lit.emitter.sky == "pane"
         for _ in range(SMOOTHINGS if is_pane else 0):
-            some = self._may_lose(lit, moment, near, np.append(some, layout.beside[:, some]))
-        is_few = layout.few[some]
+            some = self._may_lose(lit, moment, near, np.append(some, layout.neighbours[:, some]))
+        is_few = layout.is_sparse[some]
         rest = some[~is_few]
         weights = layout.weights[rest]
         few = self._may_lose(lit, moment, near, np.append(some[is_few], weights.indices))
@@ -312,10 +316,10 @@ class MoverLight:
         asked = rest[unsure]
         share[asked] = self._traced(lit.emitter, asked, moment.movers, side) / straight[asked]
         for _ in range(SMOOTHINGS if is_pane else 0):
-            share[some] = (4 * share[some] + share[layout.beside[:, some]].sum(0)) / 8
+            share[some] = (4 * share[some] + share[layout.neighbours[:, some]].sum(0)) / 8
         return wanted, share[wanted] * straight[wanted]
 
-    def _may_lose(self, lit: _Lit, moment: MoverLightAt, near: Mask, points: Places) -> Places:
+    def _may_lose(self, lit: _Lit, moment: MoverLightAt, near: Mask, points: Rows) -> Rows:
         """Those of some points, each once, that have an emitter's light and may lose some of it.
 
         near (C,): the cells of which that is known; it is asked for others.
@@ -326,10 +330,10 @@ class MoverLight:
         others[cells[~near[cells]]] = True
         return points[(near | lit.near(moment.balls, others))[cells]]
 
-    def _traced(self, emitter: Emitter, some: Places, movers: RayCaster, side: int) -> Floats:
+    def _traced(self, emitter: Emitter, some: Rows, movers: RayCaster, side: int) -> Floats:
         return chunked(lambda part: self._lost_at(emitter, some[part], movers, side), len(some))
 
-    def _lost_at(self, emitter: Emitter, some: Places, movers: RayCaster, side: int) -> Floats:
+    def _lost_at(self, emitter: Emitter, some: Rows, movers: RayCaster, side: int) -> Floats:
         own = self._still.points.take(some)
         towards = emitter.towards(own)
         lost = np.zeros(len(own), np.float32)
@@ -348,32 +352,32 @@ class MoverLight:
 NONE = np.zeros(0, np.int64)
 
 
-def _distinct(points: Places) -> Places:
+def _distinct(points: Rows) -> Rows:
     """Each of some points (N,) once, in order."""
     points = np.sort(points)
     return np.asarray(points[np.diff(points, prepend=-1) > 0])
 
 
-def spans(begins: Places, some: Places) -> Places:
+def spans(begins: Rows, some: Rows) -> Rows:
     """All numbers from begins[i] to begins[i + 1] for some i (N,), one after the other."""
     count = begins[some + 1] - begins[some]
     ends = np.cumsum(count)
     return np.asarray(np.arange(ends[-1] if len(ends) else 0) + np.repeat(begins[some] - ends + count, count))
 
 
-def _cells(baked: BakedScene, still: StaticScene, by_cell: Places) -> Ball:
+def _cells(baked: BakedScene, still: StaticScene, by_cell: Rows) -> BoundingSphere:
     """Balls (C,) around all places that read light of the cells of what stands still."""
     faces = still.faces
     some = still.points.face[by_cell]
     with np.errstate(divide="ignore", invalid="ignore"):
-        texel_m = np.sqrt(2 * areas_m2(faces.corners_m) / np.abs(turns_px2(baked.atlas.light_px)))
+        texel_m = np.sqrt(2 * areas_m2(faces.corners_m) / np.abs(doubled_areas_px2(baked.atlas.light_px)))
     starts = np.flatnonzero(np.diff(still.cells[by_cell], prepend=-1, append=-1))
     around = _balls(still.points.points_m[by_cell], starts)
     farthest = np.maximum.reduceat(np.where(np.isfinite(texel_m), texel_m, 0)[some], starts[:-1])
-    return Ball(around.centre_m, around.radius_m + READ_TEXELS * farthest)
+    return BoundingSphere(around.centre_m, around.radius_m + READ_TEXELS * farthest)
 
 
-def _inside_m(cells: Ball, views: Views) -> Floats:
+def _inside_m(cells: BoundingSphere, views: Views) -> Floats:
     """How far cells (C,) reach into what one of the views shows, at least; negative for how far they are from all."""
     farthest = np.full(len(cells.radius_m), -np.inf)
     for view, box in views:
@@ -384,27 +388,27 @@ def _inside_m(cells: Ball, views: Views) -> Floats:
     return farthest
 
 
-def _balls(points_m: Floats, starts: NDArray[np.int64]) -> Ball:
+def _balls(points_m: Floats, starts: NDArray[np.int64]) -> BoundingSphere:
     """Balls (C,) around points (N, 3) from each start (C + 1,) to the next."""
     if not len(points_m):
-        return Ball(np.zeros((0, 3)), np.zeros(0))
+        return BoundingSphere(np.zeros((0, 3)), np.zeros(0))
     count = np.diff(starts)
     centre = np.add.reduceat(points_m.astype(float), starts[:-1]) / count[:, None]
     apart = np.linalg.norm(points_m - np.repeat(centre, count, axis=0), axis=1)
-    return Ball(centre, np.maximum.reduceat(apart, starts[:-1]))
+    return BoundingSphere(centre, np.maximum.reduceat(apart, starts[:-1]))
 
 
-def _around(balls: Ball) -> Ball:
+def _around(balls: BoundingSphere) -> BoundingSphere:
     """One ball (1,) around several."""
     centre = balls.centre_m.mean(0)
     reach = np.linalg.norm(balls.centre_m - centre, axis=1) + balls.radius_m
-    return Ball(centre[None], reach.max(keepdims=True))
+    return BoundingSphere(centre[None], reach.max(keepdims=True))
 
 
 MOST_PARTS = 8
 
 
-def parts(corners_m: Array) -> Ball:
+def parts(corners_m: Array) -> BoundingSphere:
     """Balls (K,) that enclose faces (F, 3, 3) together: of those in slices across the longest side of their box."""
     points = corners_m.reshape(-1, 3)
     low = points.min(0)
@@ -413,8 +417,8 @@ def parts(corners_m: Array) -> Ball:
     count = int(np.clip(np.ceil(size[longest] / max(np.sort(size)[1], 1e-3)), 1, MOST_PARTS))
     part = np.where(np.arange(3) == longest, size / count, size)
     centres = low + part / 2 + np.arange(count)[:, None] * np.eye(3)[longest] * part
-    return Ball(centres, np.full(count, float(np.linalg.norm(part) / 2)))
+    return BoundingSphere(centres, np.full(count, float(np.linalg.norm(part) / 2)))
 
 
-def _moved_ball(own: Ball, T_world_body: NDArray[np.float64]) -> Ball:
-    return Ball(se3.apply(T_world_body, own.centre_m), own.radius_m)
+def _moved_ball(own: BoundingSphere, T_world_body: NDArray[np.float64]) -> BoundingSphere:
+    return BoundingSphere(se3.apply(T_world_body, own.centre_m), own.radius_m)

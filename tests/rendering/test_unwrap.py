@@ -8,9 +8,13 @@ import trimesh
 
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
-from vobench.rendering import lightmap
-from vobench.rendering.geometry import Visibility
-from vobench.rendering.lightmap import Atlas, Layout, Texels, owners, texels, unwrap
+from vobench.rendering import unwrap as unwrapping
+from vobench.rendering.atlas import Atlas
+from vobench.rendering.texel import Texels, texels
+from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.texel_owner import owners
+from vobench.rendering.unwrap import unwrap
+from vobench.rendering.visibility import Visibility
 from vobench.scene.material import Material
 from vobench.scene.mesh import Mesh, Thing, Triangles, areas_m2, flat, joined, quad, table
 
@@ -46,7 +50,7 @@ FACES = zoo()
 LIT = np.ones(len(FACES), bool)
 
 
-def laid_out(spacing_m: float) -> tuple[Atlas, Texels, Layout]:
+def laid_out(spacing_m: float) -> tuple[Atlas, Texels, TexelLayout]:
     atlas = unwrap(FACES, np.full(len(FACES), spacing_m), LIT)
     return atlas, *texels(FACES, MATERIALS, atlas, owners(atlas), among=LIT, seed=0)
 
@@ -113,8 +117,8 @@ def test_light_known_at_every_other_sample_is_whole_up_to_the_edges(wide: int, h
     atlas = unwrap(faces, np.full(2, 0.1), lit)
     points, layout = texels(faces, MATERIALS, atlas, owners(atlas), among=lit, seed=0)
     ramp = points.points_m @ [1.0, 2.0, 0.0]
-    assert layout.few.sum() < 0.75 * len(points) or min(wide, high) < 3
-    np.testing.assert_allclose(layout.between(np.where(layout.few, ramp, 1e9)), ramp, atol=2e-3)
+    assert layout.is_sparse.sum() < 0.75 * len(points) or min(wide, high) < 3
+    np.testing.assert_allclose(layout.interpolated(np.where(layout.is_sparse, ramp, 1e9)), ramp, atol=2e-3)
 
 
 def test_a_front_and_its_back_have_places_of_their_own() -> None:
@@ -184,5 +188,5 @@ def test_an_atlas_of_xatlas_is_never_destroyed():
     xatlas = pytest.importorskip("xatlas")
     atlas = xatlas.Atlas()
     before = sys.getrefcount(atlas)
-    lightmap._keep_for_ever(atlas)
+    unwrapping._keep_for_ever(atlas)
     assert sys.getrefcount(atlas) == before + 1
