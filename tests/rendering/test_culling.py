@@ -14,10 +14,12 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
-from vobench.rendering.culling import Batch, CullingSet, Geometry, geometry, sealed
+from vobench.rendering.batch import Batch, Geometry, geometry
+from vobench.rendering.culling import CullingSet
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import still
 from vobench.rendering.view import NEAR_M, PinholeView, Plane, pinhole_view
+from vobench.rendering.watertight import watertight
 from vobench.scene.light import Sky
 from vobench.scene.material import Material
 from vobench.scene.mesh import Mesh, Thing, quad, table
@@ -162,7 +164,7 @@ def halves(quads: list[Array]) -> Array:
 
 def test_in_a_wall_of_any_rectangles_each_edge_but_the_outer_ones_is_met_by_the_same_edge_backwards() -> None:
     faces = halves(list(tiling(np.random.default_rng(0), (-3.0, 4.0), (0.0, 2.6), 6)))
-    parts = sealed(faces)
+    parts = watertight(faces)
     directed = edges(parts.corners_m)
     alone = [(a, b) for a, b in directed if (b, a) not in set(directed)]
     assert len(faces) == 128 < len(parts.corners_m)
@@ -180,27 +182,27 @@ def test_in_a_wall_of_any_rectangles_each_edge_but_the_outer_ones_is_met_by_the_
 
 def test_the_backs_of_a_wall_are_sealed_as_its_front_is() -> None:
     front = halves(list(tiling(np.random.default_rng(2), (0.0, 5.0), (0.0, 3.0), 4)))
-    both = sealed(np.concatenate([front, front[:, ::-1]]))
-    alone = sealed(front)
+    both = watertight(np.concatenate([front, front[:, ::-1]]))
+    alone = watertight(front)
     assert len(both.corners_m) == 2 * len(alone.corners_m)
 
 
 def test_sealing_what_is_sealed_changes_nothing() -> None:
-    once = sealed(halves(list(tiling(np.random.default_rng(1), (0.0, 5.0), (0.0, 3.0), 5)))).corners_m
-    np.testing.assert_array_equal(sealed(once).corners_m, once)
+    once = watertight(halves(list(tiling(np.random.default_rng(1), (0.0, 5.0), (0.0, 3.0), 5)))).corners_m
+    np.testing.assert_array_equal(watertight(once).corners_m, once)
 
 
 def test_what_only_comes_near_is_left_as_it_is() -> None:
     square = quad((0, 0, 0), (1, 0, 0), (0, 1, 0)).corners_m
     beside = quad((0.2, -1, 0), (0.5, 0, 0), (0, 0.999, 0)).corners_m
     both = np.concatenate([square, beside])
-    np.testing.assert_array_equal(sealed(both).corners_m, both)
+    np.testing.assert_array_equal(watertight(both).corners_m, both)
 
 
 def test_a_closed_mesh_is_left_as_it_is() -> None:
     ball = sphere(40).corners_m
     ball = ball[np.linalg.norm(np.cross(*np.moveaxis(np.diff(ball, axis=1), 1, 0)), axis=1) > 1e-9]
-    assert len(sealed(ball).corners_m) == len(ball)
+    assert len(watertight(ball).corners_m) == len(ball)
 
 
 def plainly(material: Material, *, closed: bool, mirrors: bool) -> Material:

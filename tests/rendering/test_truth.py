@@ -614,10 +614,10 @@ def test_a_lamp_with_faces_to_all_sides_shines_to_all_sides_and_is_not_in_its_ow
         lamp_of(mesh.corners_m) for mesh in (icosphere(center_m, 0.5, splits=1), sides(center_m, (1, 1, 0))[4])
     )
     for lamp, stops_m, half in ((ball, 1.5, False), (panel, 2.0, True)):
-        way = lamp.way(points_m)
+        vectors_m = lamp.vectors_m(points_m)
         np.testing.assert_allclose(lamp.center_m, center_m, atol=1e-9)
-        np.testing.assert_allclose(np.linalg.norm(way, axis=1), stops_m, rtol=1e-5)
-        assert (np.broadcast_to(lamp.shines(way), 50) == (points_m[:, 2] > 3 if half else True)).all()
+        np.testing.assert_allclose(np.linalg.norm(vectors_m, axis=1), stops_m, rtol=1e-5)
+        assert (np.broadcast_to(lamp.shines(vectors_m), 50) == (points_m[:, 2] > 3 if half else True)).all()
 
 
 def test_things_far_from_the_origin_throw_no_shadow_on_themselves():

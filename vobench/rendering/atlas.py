@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.rendering.geometry import Floats, Indices, Rows
+from vobench.rendering.array_types import Floats, Indices, Rows
 
 CORNER_TEXELS = ((0, 0), (1, 0), (0, 1), (1, 1))  # columns and rows from the upper left of four texels
 

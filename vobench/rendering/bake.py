@@ -15,10 +15,11 @@ from annotated_types import Ge
 from vobench import stop
 from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Floats, Indices, Mask
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.direct_light import direct_light, mirror_images
 from vobench.rendering.emitter import emitters
-from vobench.rendering.geometry import FAR_M, Floats, Indices, Mask, RayCaster, face_materials, offset_from_surface
+from vobench.rendering.geometry import FAR_M, RayCaster, face_materials, offset_from_surface
 from vobench.rendering.indirect_light import FinalGather, Gatherer, albedo, blend, bounced, response, surfels
 from vobench.rendering.texel import Texels, texels
 from vobench.rendering.texel_layout import TexelLayout

@@ -5,7 +5,8 @@ from functools import lru_cache
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.rendering.embree import Floats, Hits, Mask
+from vobench.rendering.array_types import Floats, Mask
+from vobench.rendering.embree import Hits
 from vobench.scene.material import Material
 from vobench.scene.mesh import Triangles
 

@@ -7,18 +7,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.emitter import Aim, Between, Emitter, emitters
-from vobench.rendering.geometry import (
-    RAY_OFFSET_M,
-    BoundingSphere,
-    Floats,
-    Indices,
-    Mask,
-    PlanarPatch,
-    RayCaster,
-    Rows,
-    bounding_sphere,
-)
+from vobench.rendering.geometry import RAY_OFFSET_M, BoundingSphere, PlanarPatch, RayCaster, bounding_sphere
 from vobench.rendering.texel import Texels
 from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.thread_pool import chunked

@@ -5,9 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from vobench.geometry import se3
-from vobench.rendering.culling import Batch, CullingSet, Geometry, Mirror, Runs
+from vobench.rendering.batch import Batch, Geometry
+from vobench.rendering.culling import CullingSet, Runs
 from vobench.rendering.draw_call import LAYERS, LAYERS_UNIT, DrawCalls, probe_share
 from vobench.rendering.opengl import Canvas, FlatTarget, LightTexture, bind
+from vobench.rendering.planar_mirror import Mirror
 from vobench.rendering.probe import Probe
 from vobench.rendering.render_target import MIRRORS, RenderTarget
 from vobench.rendering.view import Box, PinholeView, Plane, visible_boxes, within

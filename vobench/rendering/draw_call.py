@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from OpenGL import GL
 
 from vobench.geometry.se3 import Array
-from vobench.rendering.culling import PROBE_MOST, Batch, Geometry, Runs
+from vobench.rendering.batch import Batch, Geometry
+from vobench.rendering.culling import Runs
 from vobench.rendering.opengl import (
     Blocks,
     Canvas,
@@ -19,7 +20,7 @@ from vobench.rendering.opengl import (
     SurfaceTexture,
     bind,
 )
-from vobench.rendering.probe import Probe, level_of
+from vobench.rendering.probe import PROBE_MOST, Probe, level_of
 from vobench.rendering.render_target import RenderTarget
 from vobench.rendering.uniform_block import BATCH, PASS
 from vobench.rendering.view import Box, PinholeView, Plane

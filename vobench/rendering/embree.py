@@ -11,10 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from vobench.errors import MissingDependencyError
 from vobench.portable import PORTABLE, is_portable
+from vobench.rendering.array_types import Floats, Indices, Mask
 
-Floats = NDArray[Any]  # float32 where there are many, float64 inside formulas
-Indices = NDArray[np.int32]
-Mask = NDArray[np.bool_]
 PORTABLE_CONFIG = b"isa=sse4.2"
 VERSION_PROPERTY = 0  # RTC_DEVICE_PROPERTY_VERSION
 # versions of Embree 4

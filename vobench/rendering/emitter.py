@@ -7,12 +7,11 @@ from typing import Protocol
 import numpy as np
 
 from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Floats, Mask
 from vobench.rendering.geometry import (
     FAR_M,
     RAY_OFFSET_M,
     BoundingSphere,
-    Floats,
-    Mask,
     PlanarPatch,
     bounding_sphere,
     lengths,

@@ -10,7 +10,7 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakedScene
-from vobench.rendering.culling import geometry
+from vobench.rendering.batch import geometry
 from vobench.rendering.draw import BatchDraw
 from vobench.rendering.illumination import AmbientLight, Background, Illumination
 from vobench.rendering.opengl import CENTRE, HALVES, TURNED, LightTexture

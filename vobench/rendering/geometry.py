@@ -5,14 +5,14 @@ from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vobench.geometry.se3 import Array
-from vobench.rendering.embree import Floats, Hits, Indices, Mask, TriangleCaster
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
+from vobench.rendering.embree import Hits, TriangleCaster
 from vobench.scene.material import Material
 from vobench.scene.mesh import Triangles, areas_m2, distinct, unit
 
-Rows = NDArray[np.int64]
 T = TypeVar("T")
 
 # Rays start this far off their face, and further the further they are from the origin: float32 resolves 1e-7 of it.

@@ -7,8 +7,8 @@ from typing import TypeVar
 import numpy as np
 
 from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Floats
 from vobench.rendering.bake import BakedScene, SunTrack, direct_layer, direct_points, static_scene, wandered_rad
-from vobench.rendering.geometry import Floats
 from vobench.rendering.mover_light import MoverLight, MoverLightAt, Views
 from vobench.scene.light import NS_PER_S, SKIES, Light, Sky, Steady, Sun
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.rendering.embree import Floats, Mask
+from vobench.rendering.array_types import Floats, Mask
 from vobench.rendering.geometry import RAY_OFFSET_M
 from vobench.rendering.occlusion import Bodies, dot
 from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun
@@ -43,8 +43,8 @@ class Lamp:
     def is_before(self, normals: Array, offsets_m: Array) -> Mask:
         """Which planes (F, 3), offsets_m (F,) from the origin, have it before them."""
         if self.center_m is None:
-            return normals @ self.axis > 0
-        return normals @ self.center_m > offsets_m + RAY_OFFSET_M
+            return np.asarray(normals @ self.axis > 0)
+        return np.asarray(normals @ self.center_m > offsets_m + RAY_OFFSET_M)
 
     def shines(self, vectors_m: Floats) -> Mask | bool:
         """Whether it shines to where vectors (R, 3) lead to its middle from."""

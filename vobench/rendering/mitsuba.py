@@ -18,9 +18,9 @@ import numpy as np
 from vobench import stop
 from vobench.errors import MissingDependencyError
 from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Pixels
 from vobench.rendering.cutout import opaque
 from vobench.rendering.occlusion import back_faces
-from vobench.rendering.shot import Pixels
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import Map, Material, Rgb, Texture, linear_texture
 from vobench.scene.mesh import Triangles

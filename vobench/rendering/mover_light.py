@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import doubled_areas_px2
 from vobench.rendering.bake import BakedScene, StaticScene, bodies
 from vobench.rendering.culling import bounds
 from vobench.rendering.direct_light import Rays, arriving, cell_spot, footprint, mirror_images, reached
 from vobench.rendering.emitter import Emitter, emitters
-from vobench.rendering.geometry import BoundingSphere, Floats, Indices, Mask, RayCaster, Rows, face_materials
+from vobench.rendering.geometry import BoundingSphere, RayCaster, face_materials
 from vobench.rendering.indirect_light import FinalGather, Gatherer, blend, response, surfels
 from vobench.rendering.texel import Texels, texels
 from vobench.rendering.texel_owner import owners

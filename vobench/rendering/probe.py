@@ -8,7 +8,6 @@ import numpy as np
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
-from vobench.rendering.culling import PROBE_MOST
 from vobench.rendering.opengl import CubeTexture
 from vobench.rendering.renderer import Radiance
 from vobench.rendering.uniform_block import MOST_GLINTS
@@ -16,6 +15,7 @@ from vobench.rendering.view import NEAR_M
 from vobench.scene.light import Light, PointLight, SpotLight, Sun
 from vobench.scene.material import LUMINANCE
 
+PROBE_MOST = 0.4  # roughness above which what is mirrored looks like what lights the place
 SIZE_PX = 256
 CAMERA = Pinhole(SIZE_PX, SIZE_PX, SIZE_PX / 2, SIZE_PX / 2, (SIZE_PX - 1) / 2, (SIZE_PX - 1) / 2)
 LEVELS = 6

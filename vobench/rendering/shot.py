@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Pixels
 from vobench.scene.scene import Mover
-
-Pixels = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,19 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas, doubled_areas_px2
-from vobench.rendering.geometry import (
-    Floats,
-    Indices,
-    Mask,
-    RayCaster,
-    Rows,
-    face_materials,
-    lengths,
-    offset_from_surface,
-    take,
-    tangents,
-)
+from vobench.rendering.geometry import RayCaster, face_materials, lengths, offset_from_surface, take, tangents
 from vobench.rendering.texel_layout import TexelLayout, neighbours, texel_layout
 from vobench.rendering.texel_owner import Owners, claimed
 from vobench.rendering.thread_pool import chunked, in_chunks

@@ -7,8 +7,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas
-from vobench.rendering.geometry import Floats, Indices, Mask, Rows
 from vobench.rendering.texel_owner import Owners
 from vobench.rendering.thread_pool import chunked
 from vobench.rendering.visibility import Visibility

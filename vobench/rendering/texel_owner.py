@@ -7,8 +7,8 @@ import numpy as np
 
 from vobench import stop
 from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas, doubled_areas_px2
-from vobench.rendering.geometry import Floats, Indices, Mask, Rows
 
 CLAIMED_PX = 0.7072  # half a texel's diagonal: every place of a face is nearest to a texel that belongs to it
 READ_PX = 1.4143  # from a face, texels that interpolation on it can read

@@ -12,20 +12,10 @@ from numpy.typing import NDArray
 
 from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
-from vobench.rendering.embree import Indices, Mask
+from vobench.rendering.array_types import Indices, Mask, Pixels
 from vobench.rendering.lamp import Lamp, lamps
 from vobench.rendering.occlusion import Bodies, dot
-from vobench.rendering.shot import (
-    Pixels,
-    Shot,
-    ShotTransforms,
-    at_rows,
-    moved,
-    of_rays,
-    rays_in,
-    shot_transforms,
-    turn,
-)
+from vobench.rendering.shot import Shot, ShotTransforms, at_rows, moved, of_rays, rays_in, shot_transforms, turn
 from vobench.scene.scene import Scene
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, check_channels
 

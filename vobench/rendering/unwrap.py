@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from vobench import stop
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas, doubled_areas_px2
-from vobench.rendering.geometry import Indices, Mask, Rows
 from vobench.scene.mesh import Triangles, areas_m2, distinct
 
 WELD_M = 1e-5  # corners nearer than this are one

@@ -5,13 +5,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vobench.rendering.embree import Floats, Hits, Indices, Mask
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
+from vobench.rendering.embree import Hits
 from vobench.rendering.geometry import (
     FAR_M,
     RAY_OFFSET_M,
     PlanarPatch,
     RayCaster,
-    Rows,
     face_materials,
     lengths,
     planar_patches,
