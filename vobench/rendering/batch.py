@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,8 +70,8 @@ class Geometry:
 class _Parts:
     """What is known of triangles (T,) of the watertight mesh by the faces that they are parts of."""
 
-    thing: Indices
-    mover: Indices
+    thing: NDArray[Any]
+    mover: NDArray[Any]
     is_lamp: Mask
     normals: Array
     area_m2: Array
@@ -164,7 +165,7 @@ def _batches(
     return batch, tuple(batches)
 
 
-def _clustered(centres_m: Array, batch: Indices, thing: Indices) -> tuple[Indices, Indices]:
+def _clustered(centres_m: Array, batch: Indices, thing: NDArray[Any]) -> tuple[Indices, Indices]:
     """An order of faces by batch, thing and place, and the cluster of each in that order; small things share one."""
     key = batch * (thing.max() + 1) + thing
     _, part, count = np.unique(key, return_inverse=True, return_counts=True)

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.direct_light import JITTER, cell_spot
+from vobench.rendering.embree import Hits
 from vobench.rendering.emitter import cosine_weighted
-from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, Hits, face_materials, take, tangents
+from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, face_materials, take, tangents
 from vobench.rendering.texel import Texels
 from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.thread_pool import chunked, in_chunks

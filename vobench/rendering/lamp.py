@@ -38,7 +38,7 @@ class Lamp:
         if self.radius_m == 0:
             return vectors_m
         outside = np.maximum(1 - self.radius_m / np.linalg.norm(vectors_m, axis=1), 0)
-        return vectors_m * outside[:, None]
+        return np.asarray(vectors_m * outside[:, None])
 
     def is_before(self, normals: Array, offsets_m: Array) -> Mask:
         """Which planes (F, 3), offsets_m (F,) from the origin, have it before them."""

@@ -1,6 +1,7 @@
 """Planar mirrors: faces that mirror sharply in one plane, which are drawn by a view from behind it."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +51,7 @@ class MirrorFaces:
     corners_m: Array
     normals: Array
     area_m2: Array
-    mover: Indices
+    mover: NDArray[Any]
     strength: Array
     is_pane: Mask
 
