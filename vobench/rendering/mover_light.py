@@ -14,7 +14,7 @@ from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import doubled_areas_px2
 from vobench.rendering.bake import BakedScene, StaticScene, bodies
 from vobench.rendering.culling import bounds
-from vobench.rendering.direct_light import Rays, arriving, cell_spot, footprint, mirror_images, reached
+from vobench.rendering.direct_light import Rays, arriving, footprint_m, mirror_images, place_in_cell, reached
 from vobench.rendering.emitter import Emitter, emitters
 from vobench.rendering.geometry import BoundingSphere, RayCaster, face_materials
 from vobench.rendering.indirect_light import FinalGather, Gatherer, blend, response, surfels
@@ -339,10 +339,10 @@ class MoverLight:
         towards = emitter.towards(own)
         lost = np.zeros(len(own), np.float32)
         for cell in range(side**2):
-            way, strength = towards(*cell_spot(own, cell, side))
+            way, strength = towards(*place_in_cell(own, cell, side))
             cosine = own.cosine(way)
             light = strength * np.maximum(cosine, 0) * own.entering(cosine)
-            aside = footprint(own, slice(None), cell)
+            aside = footprint_m(own, slice(None), cell)
             start = own.points_m + aside
             ahead = way - aside
             hit = np.flatnonzero(movers.stops(start, ahead) & (light > 0))
