@@ -264,11 +264,11 @@ def test_each_light_has_a_layer_of_its_own_and_dimming_one_leaves_the_others_byt
 
 def test_under_a_coat_light_counts_by_what_the_coat_lets_in() -> None:
     bulb = PointLight("bulb", np.array([0.0, 0.0, 1.0]), 1000.0)
-    x, y, matt = floor_light(bake(scene(bulb), DIRECT))
+    x, y, diffuse = floor_light(bake(scene(bulb), DIRECT))
     coated = Scene("coat", (FLOOR,), {"grey": Material(texture=Procedural(*BODY), eta=1.5)}, (bulb,))
     _, _, let_in = floor_light(bake(coated, DIRECT))
     cosine = 1 / np.sqrt(x**2 + y**2 + 1)
-    np.testing.assert_allclose(let_in, matt * (1 - fresnel(cosine, 1.5)), rtol=1e-3)
+    np.testing.assert_allclose(let_in, diffuse * (1 - fresnel(cosine, 1.5)), rtol=1e-3)
 
 
 def test_a_white_coated_box_keeps_its_light_as_a_white_matt_one_does() -> None:
@@ -280,8 +280,8 @@ def test_a_white_coated_box_keeps_its_light_as_a_white_matt_one_does() -> None:
         Material(texture=Procedural("plain", 0.98, resolution_px=8), eta=1.5),
     ):
         settings = replace(ALL_EQUAL, bounces=6, indirect_rays=64)
-        walls = tuple(room((2, 2, 2), floor="grey", wall="matt", ceiling="matt"))
-        materials = {"grey": material, "matt": Material(texture=Procedural("plain", 0.5, resolution_px=8))}
+        walls = tuple(room((2, 2, 2), floor="grey", wall="diffuse", ceiling="diffuse"))
+        materials = {"grey": material, "diffuse": Material(texture=Procedural("plain", 0.5, resolution_px=8))}
         baked = bake(Scene("box", walls, materials, (lamp,)), settings)
         places = np.meshgrid(*[np.linspace(0, 1, 21)] * 2)
         kept.append(np.mean([on_quad(baked, whole(baked), wall, *places).mean() for wall in range(1, 6)]))

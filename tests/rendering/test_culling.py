@@ -177,7 +177,7 @@ def test_in_a_wall_of_any_rectangles_each_edge_but_the_outer_ones_is_met_by_the_
     assert followed == len(alone) >= 4
     areas = np.linalg.norm(np.cross(*np.moveaxis(np.diff(parts.corners_m, axis=1), 1, 0)), axis=1) / 2
     assert areas.sum() == pytest.approx(7 * 2.6, rel=1e-5)
-    np.testing.assert_allclose(parts.of(faces), parts.corners_m, atol=2e-5)
+    np.testing.assert_allclose(parts.interpolated(faces), parts.corners_m, atol=2e-5)
 
 
 def test_the_backs_of_a_wall_are_sealed_as_its_front_is() -> None:

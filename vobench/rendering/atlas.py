@@ -35,7 +35,13 @@ class Atlas:
         column = np.clip(column, 0, self.width - 1)
         return np.asarray(row * self.width + column)
 
-    def read(self, light: Floats, face: Indices, u: Floats, v: Floats) -> Floats:
+    def read(
+        self,
+        light: Floats,
+        face: Indices,
+        u: Floats,
+        v: Floats,
+    ) -> Floats:
         """What a picture shows (R, ...) of a map (H, W, ...) at places of faces: between the four nearest texels."""
         a, b, c = self.light_px[face].astype(float).swapaxes(0, 1)
         places_px = a + u[:, None] * (b - a) + v[:, None] * (c - a)

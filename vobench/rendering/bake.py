@@ -188,7 +188,12 @@ def _sunlit(scene: Scene, faces: Triangles) -> Mask:
     return np.asarray(has_lit_face[group])
 
 
-def static_points(scene: Scene, faces: Triangles, atlas: Atlas, seed: int) -> tuple[Visibility, Texels, TexelLayout]:
+def static_points(
+    scene: Scene,
+    faces: Triangles,
+    atlas: Atlas,
+    seed: int,
+) -> tuple[Visibility, Texels, TexelLayout]:
     """A scene without its movers, as rays and as points, and these on the map."""
     is_static = faces.mover < 0
     visibility = Visibility(faces, scene.materials, np.flatnonzero(is_static))
@@ -206,7 +211,11 @@ def static_scene(baked: BakedScene) -> StaticScene:
     return StaticScene(baked.faces, visibility, baked.atlas, points, layout, cells, open_sky)
 
 
-def bake(scene: Scene, settings: BakeSettings, report: Report = lambda _: None) -> BakedScene:
+def bake(
+    scene: Scene,
+    settings: BakeSettings,
+    report: Report = lambda _: None,
+) -> BakedScene:
     """Compute the light of a scene; the same bytes for the same arguments.
 
     `report` is called now and then with the share of the work that is done, about.
@@ -278,7 +287,12 @@ def _point_areas_m2(faces: Triangles, thing: Indices) -> Array:
     return np.asarray(thing_areas_m2[thing] / point_counts[thing])
 
 
-def _by_mirrors(scene: Scene, rows: list[int], gathered: FinalGather, surfel_count: int) -> Floats:
+def _by_mirrors(
+    scene: Scene,
+    rows: list[int],
+    gathered: FinalGather,
+    surfel_count: int,
+) -> Floats:
     """Illuminance (K, S) of surfels by lamps and the sky that rays found by way of mirrors, of lights `rows` (K,)."""
     result = np.zeros((len(rows), surfel_count), np.float32)
     skies = [index for index, light in enumerate(scene.lights) if isinstance(light, Sky)]
@@ -292,7 +306,11 @@ def _by_mirrors(scene: Scene, rows: list[int], gathered: FinalGather, surfel_cou
     return result
 
 
-def _tracks(instants: list[tuple[int, float]], indirect: Floats, scene: Scene) -> tuple[SunTrack, ...]:
+def _tracks(
+    instants: list[tuple[int, float]],
+    indirect: Floats,
+    scene: Scene,
+) -> tuple[SunTrack, ...]:
     tracks = []
     for sun in moving_suns(scene):
         rows = [row for row, (index, _) in enumerate(instants) if index == sun]
@@ -331,7 +349,14 @@ def travelled_rad(sun: Sun) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps_rad)])
 
 
-def direct_points(scene: Scene, index: int, static: StaticScene, settings: BakeSettings, *, t_ns: float) -> Floats:
+def direct_points(
+    scene: Scene,
+    index: int,
+    static: StaticScene,
+    settings: BakeSettings,
+    *,
+    t_ns: float,
+) -> Floats:
     """The direct light (P,) of one light on the points."""
     light = scene.lights[index]
     total = np.zeros(len(static.points), np.float32)
@@ -352,7 +377,12 @@ def direct_points(scene: Scene, index: int, static: StaticScene, settings: BakeS
     return total
 
 
-def direct_layer(scene: Scene, index: int, static: StaticScene, light: Floats) -> Floats:
+def direct_layer(
+    scene: Scene,
+    index: int,
+    static: StaticScene,
+    light: Floats,
+) -> Floats:
     """The map (H, W) of the direct light (P,) of one light on the points, its glow included."""
     layer = static.layout.filled(light)
     lamp = scene.lights[index]

@@ -77,7 +77,11 @@ class _Parts:
     area_m2: Array
 
 
-def geometry(faces: Triangles, light_uv: Floats, materials: dict[str, Material]) -> Geometry:
+def geometry(
+    faces: Triangles,
+    light_uv: Floats,
+    materials: dict[str, Material],
+) -> Geometry:
     """All faces of a table, movers in their own frame, in an order that never changes."""
     of_things = [materials.get(thing.material, LAMP) for thing in faces.things]
     mesh = _watertight_by_mover(faces)
@@ -165,7 +169,11 @@ def _batches(
     return batch, tuple(batches)
 
 
-def _clustered(centres_m: Array, batch: Indices, thing: NDArray[Any]) -> tuple[Indices, Indices]:
+def _clustered(
+    centres_m: Array,
+    batch: Indices,
+    thing: NDArray[Any],
+) -> tuple[Indices, Indices]:
     """An order of faces by batch, thing and place, and the cluster of each in that order; small things share one."""
     key = batch * (thing.max() + 1) + thing
     _, part, count = np.unique(key, return_inverse=True, return_counts=True)

@@ -87,7 +87,12 @@ class _MirrorImage:
         return (vectors - 2 * (vectors @ normal)[:, None] * normal).astype(vectors.dtype)
 
 
-def mirror_images(light: Light, visibility: Visibility, *, t_ns: float) -> list[Emitter]:
+def mirror_images(
+    light: Light,
+    visibility: Visibility,
+    *,
+    t_ns: float,
+) -> list[Emitter]:
     """A lamp or the sun in every smooth mirror; the sky's come with the rays that gather indirect light."""
     if isinstance(light, Sky):
         return []
@@ -204,7 +209,11 @@ def reached(emitter: Emitter, points: Texels, rows: Rows) -> Rows:
     return chunked(reached_part, len(rows))
 
 
-def first_rays(emitter: Emitter, points_m: Floats, side: int) -> NDArray[np.int64]:
+def first_rays(
+    emitter: Emitter,
+    points_m: Floats,
+    side: int,
+) -> NDArray[np.int64]:
     """How many rays along a side points (P, 3) need to tell whether they see an emitter: one where shadows are hard."""
     width_rad = chunked(lambda part: emitter.width_rad(points_m[part]), len(points_m))
     narrow = max(side // 2, 1)
@@ -213,7 +222,13 @@ def first_rays(emitter: Emitter, points_m: Floats, side: int) -> NDArray[np.int6
     return np.select(conditions, [1, narrow, middle], side)
 
 
-def arriving(emitter: Emitter, points: Texels, rows: Rows, occluder: Occluder, rays: Rays) -> Floats:
+def arriving(
+    emitter: Emitter,
+    points: Texels,
+    rows: Rows,
+    occluder: Occluder,
+    rays: Rays,
+) -> Floats:
     """(3, N) of points at rows: illuminance, share of rays that met nothing opaque (NaN: none sent), light unshaded."""
 
     def arriving_part(part: slice) -> Floats:
@@ -222,7 +237,12 @@ def arriving(emitter: Emitter, points: Texels, rows: Rows, occluder: Occluder, r
     return chunked(arriving_part, len(rows)).T
 
 
-def _arriving(emitter: Emitter, texels: Texels, occluder: Occluder, rays: Rays) -> Floats:
+def _arriving(
+    emitter: Emitter,
+    texels: Texels,
+    occluder: Occluder,
+    rays: Rays,
+) -> Floats:
     total = np.zeros(len(texels), np.float32)
     unshaded = np.zeros(len(texels), np.float32)
     passed_count = np.zeros(len(texels), np.float32)
@@ -250,7 +270,12 @@ def _arriving(emitter: Emitter, texels: Texels, occluder: Occluder, rays: Rays) 
     return np.stack([total / rays.side**2, clear_share, unshaded / rays.side**2], -1)
 
 
-def open_light(emitter: Emitter, points: Texels, rows: Rows, side: int) -> Floats:
+def open_light(
+    emitter: Emitter,
+    points: Texels,
+    rows: Rows,
+    side: int,
+) -> Floats:
     """Illuminance (N,) of the points at rows if nothing hid the emitter."""
 
     def open_part(part: slice) -> Floats:
@@ -262,7 +287,12 @@ def open_light(emitter: Emitter, points: Texels, rows: Rows, side: int) -> Float
     return chunked(open_part, len(rows))
 
 
-def _sent(towards: Aim, texels: Texels, cell: int, side: int) -> tuple[Floats, Floats]:
+def _sent(
+    towards: Aim,
+    texels: Texels,
+    cell: int,
+    side: int,
+) -> tuple[Floats, Floats]:
     """Vectors (P, 3) to an emitter, and the illuminance (P,) that enters from there if nothing hides it."""
     a, b = place_in_cell(texels, cell, side)
     vectors_m, strength = towards(a, b)
@@ -270,7 +300,11 @@ def _sent(towards: Aim, texels: Texels, cell: int, side: int) -> tuple[Floats, F
     return vectors_m, strength * np.maximum(cosine, 0) * texels.entering(cosine)
 
 
-def place_in_cell(texels: Texels, cell: ArrayLike, side: int) -> tuple[Floats, Floats]:
+def place_in_cell(
+    texels: Texels,
+    cell: ArrayLike,
+    side: int,
+) -> tuple[Floats, Floats]:
     """Where in a cell of side x side of the unit square each point aims (P,), of cells (K, 1) (K, P): by its dither."""
     cells = np.asarray(cell, np.float32)
     jitter = texels.dither + cells[..., None] * JITTER
@@ -280,14 +314,23 @@ def place_in_cell(texels: Texels, cell: ArrayLike, side: int) -> tuple[Floats, F
     return a, b
 
 
-def footprint_m(texels: Texels, rows: Rows | slice, cell: int) -> Floats:
+def footprint_m(
+    texels: Texels,
+    rows: Rows | slice,
+    cell: int,
+) -> Floats:
     """Steps (N, 3) from the middle of texels to somewhere on their area."""
     place = texels.dither[rows] + cell * FOOTPRINT
     place -= np.floor(place) + np.float32(0.5)
     return np.asarray(place[:, 1:] * texels.step_u_m[rows] + place[:, :1] * texels.step_v_m[rows])
 
 
-def _half_shadow(clear: Floats, layout: TexelLayout, cells: Indices, lit: Rows) -> Rows:
+def _half_shadow(
+    clear: Floats,
+    layout: TexelLayout,
+    cells: Indices,
+    lit: Rows,
+) -> Rows:
     """Those of the points (N,) beside which an emitter is both seen and hidden."""
     is_seen = clear > 0
     is_hidden = clear < 1

@@ -85,7 +85,13 @@ class BatchDraw:
             part = followed.get(mirror.index)
             self._draw_mirror(mirror, view, target, box=box, visible=visible, part=part)
 
-    def add(self, target: RenderTarget, total: FlatTarget, box: Box, share: float) -> None:
+    def add(
+        self,
+        target: RenderTarget,
+        total: FlatTarget,
+        box: Box,
+        share: float,
+    ) -> None:
         """Add the mean of a target's samples in a box, times a share, to a total."""
         self._calls.add(target, total, box, share)
 
@@ -95,7 +101,13 @@ class BatchDraw:
         self._calls.begin(view, canvas, target.weights, self._probe)
         return canvas
 
-    def _draw_unmirrored(self, batches: Sequence[Batch], visible: Runs, view: PinholeView, canvas: Canvas) -> None:
+    def _draw_unmirrored(
+        self,
+        batches: Sequence[Batch],
+        visible: Runs,
+        view: PinholeView,
+        canvas: Canvas,
+    ) -> None:
         """Draw batches that lie in no mirror's plane, with what the probe shows."""
         for batch in batches:
             if batch.index in visible:
@@ -131,7 +143,12 @@ class BatchDraw:
     def _is_visible(self, mirror: Mirror, visible: Runs) -> bool:
         return any(batch.index in visible for batch in self._batches_of[mirror.index])
 
-    def _followed(self, view: PinholeView, boxes: dict[int, Box], box: Box) -> dict[int, Box]:
+    def _followed(
+        self,
+        view: PinholeView,
+        boxes: dict[int, Box],
+        box: Box,
+    ) -> dict[int, Box]:
         """Mirrors in a picture that are drawn again from behind, those that show most, and where in a box of it."""
         if view.depth == MIRRORS or (self.needs_probe and not self._probe):
             return {}

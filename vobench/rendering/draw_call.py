@@ -68,7 +68,13 @@ class DrawCalls:
         GL.glDepthFunc(GL.GL_GEQUAL)
         GL.glClearDepth(0.0)
 
-    def begin(self, view: PinholeView, canvas: Canvas, weights: Rgb, probe: Probe | None) -> None:
+    def begin(
+        self,
+        view: PinholeView,
+        canvas: Canvas,
+        weights: Rgb,
+        probe: Probe | None,
+    ) -> None:
         """Set what all draw calls of one view share."""
         values = self._pass_values
         values[...] = np.zeros((), PASS.dtype)
@@ -98,7 +104,14 @@ class DrawCalls:
                 values["plane"] = _coefficients(view.plane(batch.mirror.plane, batch.mover))
             self._block.update(batch.index, values)
 
-    def surface(self, batch: Batch, visible: Runs, view: PinholeView, canvas: Canvas, *abilities: str) -> None:
+    def surface(
+        self,
+        batch: Batch,
+        visible: Runs,
+        view: PinholeView,
+        canvas: Canvas,
+        *abilities: str,
+    ) -> None:
         """Draw what is visible of a batch; the reflections that it is able to show must be bound."""
         batch_abilities = self.abilities[batch.index]
         names = [*abilities, "IS_MIRRORED"] if view.mirror else abilities
@@ -130,7 +143,13 @@ class DrawCalls:
             self._cover(canvas.layers)
         GL.glDisable(GL.GL_BLEND)
 
-    def add(self, target: RenderTarget, total: FlatTarget, box: Box, share: float) -> None:
+    def add(
+        self,
+        target: RenderTarget,
+        total: FlatTarget,
+        box: Box,
+        share: float,
+    ) -> None:
         """Add the mean of a target's samples in a box, times a share, to a total."""
         total.begin(box)
         canvas = target.canvas
@@ -154,7 +173,13 @@ class DrawCalls:
         GL.glDrawArraysInstanced(GL.GL_TRIANGLES, 0, 3, copies)
         GL.glEnable(GL.GL_CULL_FACE)
 
-    def _pane(self, runs: Sequence[tuple[int, int]], copies: int, *, is_grey: bool) -> None:
+    def _pane(
+        self,
+        runs: Sequence[tuple[int, int]],
+        copies: int,
+        *,
+        is_grey: bool,
+    ) -> None:
         """Draw both sides over what is behind them: alpha, or the second colour, is the share that shines through."""
         GL.glDisable(GL.GL_CULL_FACE)
         GL.glDepthMask(GL.GL_FALSE)
@@ -206,7 +231,12 @@ def _abilities(batch: Batch, texture: SurfaceTexture | None) -> tuple[str, ...]:
     return tuple(name for name, has in names.items() if has)
 
 
-def _set_view(values: Block, view: PinholeView, canvas: Canvas, weights: Rgb) -> None:
+def _set_view(
+    values: Block,
+    view: PinholeView,
+    canvas: Canvas,
+    weights: Rgb,
+) -> None:
     values["direct"] = view.direct.T
     values["eye"] = view.eye_m
     if view.mirror is not None:
@@ -238,7 +268,11 @@ def _coefficients(plane: Plane) -> Array:
     return np.array([*plane.normal, plane.offset_m])
 
 
-def _set_batch(values: np.void, batch: Batch, texture: SurfaceTexture | None) -> None:
+def _set_batch(
+    values: np.void,
+    batch: Batch,
+    texture: SurfaceTexture | None,
+) -> None:
     material = batch.material
     values["model"] = np.eye(4)
 

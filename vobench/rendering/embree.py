@@ -56,7 +56,13 @@ class TriangleCaster:
     robust: no ray slips between two triangles that share an edge.
     """
 
-    def __init__(self, corners_m: NDArray[Any], among: NDArray[Any], *, robust: bool) -> None:
+    def __init__(
+        self,
+        corners_m: NDArray[Any],
+        among: NDArray[Any],
+        *,
+        robust: bool,
+    ) -> None:
         from embreex import mesh_construction
 
         self._among = np.append(among, -1).astype(np.int32)
@@ -87,14 +93,18 @@ class TriangleCaster:
         return np.asarray(is_blocked & (rays[2] > 0))
 
 
-def _rays(origins_m: ArrayLike, directions: ArrayLike, reach: ArrayLike) -> tuple[Floats, Floats, Floats]:
+def _rays(
+    origins_m: ArrayLike,
+    directions: ArrayLike,
+    reach: ArrayLike,
+) -> tuple[Floats, Floats, Floats]:
     """Contiguous float32 arrays, as Embree wants them; reach (R,) or one for all, in lengths of the direction."""
     origins = np.ascontiguousarray(origins_m, np.float32)
     reaches = np.full(len(origins), reach, np.float32) if np.ndim(reach) == 0 else reach
     return origins, np.ascontiguousarray(directions, np.float32), np.ascontiguousarray(reaches, np.float32)
 
 
-def new_scene(*, robust: bool) -> Any:
+def new_scene(*, robust: bool = False) -> Any:
     """An empty scene of Embree's."""
     from embreex.rtcore_scene import EmbreeScene
 
@@ -129,7 +139,10 @@ def _portable_device() -> Any:
 
 
 def with_portable_places(
-    hit: dict[str, Any], triangles_m: NDArray[Any], origins_m: NDArray[Any], directions: NDArray[Any]
+    hit: dict[str, Any],
+    triangles_m: NDArray[Any],
+    origins_m: NDArray[Any],
+    directions: NDArray[Any],
 ) -> dict[str, Any]:
     """The hits of rays (R, 3) on triangles (K, 3, 3), with `u`, `v` and `tfar` recomputed where results are portable.
 

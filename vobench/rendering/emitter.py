@@ -208,7 +208,12 @@ def _interleaved(shares: Floats) -> Floats:
     return total
 
 
-def _by_area(light: AreaLight, corners_m: Array, texels: Texels, face: Rectangle | None = None) -> Aim:
+def _by_area(
+    light: AreaLight,
+    corners_m: Array,
+    texels: Texels,
+    face: Rectangle | None = None,
+) -> Aim:
     """Places on triangles in proportion to their areas, or all over the rectangle that they fill."""
     area_m2 = areas_m2(corners_m)
     normals = face_normals(corners_m).astype(np.float32)
@@ -224,7 +229,11 @@ def _by_area(light: AreaLight, corners_m: Array, texels: Texels, face: Rectangle
         places_m = sample_points(corners_m, along_curve, rest) + RAY_OFFSET_M * normal
         return places_m.astype(np.float32), normal
 
-    def on_rectangle(filled: Rectangle, a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    def on_rectangle(
+        filled: Rectangle,
+        a: Floats,
+        b: Floats,
+    ) -> tuple[Floats, Floats]:
         corner_m = (filled.corner_m + RAY_OFFSET_M * filled.normal).astype(np.float32)
         u_m = filled.edge_u_m.astype(np.float32)
         v_m = filled.edge_v_m.astype(np.float32)
@@ -384,7 +393,12 @@ def cosine_weighted(normals: Floats) -> Callable[[Floats, Floats], Floats]:
     return direction
 
 
-def emitters(light: Light, visibility: Visibility, *, t_ns: float = 0) -> list[Emitter]:
+def emitters(
+    light: Light,
+    visibility: Visibility,
+    *,
+    t_ns: float = 0,
+) -> list[Emitter]:
     """The emitters that one light consists of."""
     match light:
         case AreaLight():

@@ -44,7 +44,12 @@ class FrameRenderer:
         if self._draw.needs_probe:
             self._draw.use_probe(self._room_probe(baked, baked.faces))
 
-    def picture(self, camera: Camera, views: Sequence[View], weights: Rgb | None) -> Radiance:
+    def picture(
+        self,
+        camera: Camera,
+        views: Sequence[View],
+        weights: Rgb | None,
+    ) -> Radiance:
         """Luminance of views that tile a picture's rows, each with the same number of sub-frames; see `Renderer`."""
         _require_tiling(camera, views)
         if isinstance(camera, Pinhole):
@@ -53,7 +58,12 @@ class FrameRenderer:
         views_in_order = sorted(views, key=lambda view: view.rows.start)
         return np.concatenate([self._strip(lens, view, weights) for view in views_in_order])
 
-    def _pinhole_picture(self, camera: Pinhole, views: Sequence[View], weights: Rgb | None) -> Radiance:
+    def _pinhole_picture(
+        self,
+        camera: Pinhole,
+        views: Sequence[View],
+        weights: Rgb | None,
+    ) -> Radiance:
         boxes = [(0, camera.width_px, view.rows.start, view.rows.stop) for view in views]
         frame_count = len(views[0].start_ns)
         # An even number of sub-frames, four or more, share the samples between them at half the cost.
@@ -89,7 +99,12 @@ class FrameRenderer:
 
         return room_probe(draw, faces.corners_m[faces.mover < 0], ambient_cd_m2)
 
-    def _strip(self, lens: Warp, view: View, weights: Rgb | None) -> Radiance:
+    def _strip(
+        self,
+        lens: Warp,
+        view: View,
+        weights: Rgb | None,
+    ) -> Radiance:
         """The rows of a view through a lens, put together of pinhole faces."""
         atlas = lens.blank(3 if weights is None else 1)
         for face in lens.faces:
@@ -125,7 +140,13 @@ class FrameRenderer:
                 self._draw.draw(self._lit_view(camera, view, index, box), target, box)
             self._draw.add(target, total, around, 1 / frame_count)
 
-    def _lit_view(self, camera: Pinhole, view: View, index: int, box: Box) -> PinholeView:
+    def _lit_view(
+        self,
+        camera: Pinhole,
+        view: View,
+        index: int,
+        box: Box,
+    ) -> PinholeView:
         """A sub-frame of a view, whose light is then in the texture."""
         start_ns = int(view.start_ns[index])
         end_ns = int(view.end_ns[index])

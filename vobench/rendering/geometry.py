@@ -66,7 +66,12 @@ class PlanarPatch:
         return bool(apart_m < FLAT_M and self.normal @ other.normal < 0)
 
 
-def planar_patches(faces: Triangles, among: ArrayLike, *, at_least_m2: float = 0.0) -> list[PlanarPatch]:
+def planar_patches(
+    faces: Triangles,
+    among: ArrayLike,
+    *,
+    at_least_m2: float = 0.0,
+) -> list[PlanarPatch]:
     """The faces among a table's, plane by plane of each thing, without planes that hold less than some area."""
     rows = np.asarray(among, np.int32)
     offset = np.einsum("ij,ij->i", faces.plane[rows], faces.corners_m[rows, 0])
@@ -99,7 +104,11 @@ class RayCaster:
     Of the two sides of a sheet rays meet the one that they come from.
     """
 
-    def __init__(self, faces: Triangles, among: ArrayLike | None = None) -> None:
+    def __init__(
+        self,
+        faces: Triangles,
+        among: ArrayLike | None = None,
+    ) -> None:
         rows = np.arange(len(faces), dtype=np.int32) if among is None else np.asarray(among, np.int32)
         self._triangles = TriangleCaster(faces.corners_m, rows, robust=True)
         self._planes = faces.plane
@@ -175,7 +184,10 @@ def sample_points(corners_m: Array, a: Floats, b: Floats) -> Array:
     return np.asarray(first + share[:, None] * (second - first + b[:, None] * (third - second)))
 
 
-def face_materials(faces: Triangles, materials: Mapping[str, Material]) -> list[Material | None]:
+def face_materials(
+    faces: Triangles,
+    materials: Mapping[str, Material],
+) -> list[Material | None]:
     """The material of each thing of a table, None for lamps and things without one."""
     lamps = set(faces.thing[faces.lamp >= 0].tolist())
     return [None if i in lamps else materials.get(thing.material) for i, thing in enumerate(faces.things)]

@@ -79,7 +79,11 @@ def _coefficients(sky: Sky) -> Array:
 T = TypeVar("T")
 
 
-def _cached(cache: OrderedDict[Hashable, T], key: Hashable, compute: Callable[[], T]) -> T:
+def _cached(
+    cache: OrderedDict[Hashable, T],
+    key: Hashable,
+    compute: Callable[[], T],
+) -> T:
     """The value of a key among the CACHED ones that were asked for last."""
     if key not in cache:
         cache[key] = compute()
@@ -116,7 +120,12 @@ class Illumination:
         self._moments: OrderedDict[Hashable, MoverLightAt] = OrderedDict()
         self._suns: OrderedDict[Hashable, Floats] = OrderedDict()
 
-    def at(self, start_ns: int, end_ns: int, views: Views | None = None) -> Floats:
+    def at(
+        self,
+        start_ns: int,
+        end_ns: int,
+        views: Views | None = None,
+    ) -> Floats:
         """Map (H, W, 3) float32 of linear RGB: illuminance in lux, pi times their luminance on lamps.
 
         The mean from start_ns to end_ns; the very array of an earlier call where nothing differs. Movers may have
@@ -143,14 +152,22 @@ class Illumination:
             return self._steady
         return _cached(self._maps, (levels, suns_ns), lambda: self._map(levels, suns_ns))
 
-    def _now(self, start_ns: int, end_ns: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    def _now(
+        self,
+        start_ns: int,
+        end_ns: int,
+    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """The level of each light, and the instant of each sun that moves."""
         middle_ns = (start_ns + end_ns) / 2
         levels = tuple(light.level.mean(start_ns, end_ns) for light in self._lights)
         suns_ns = tuple(_stepped_ns(light, middle_ns) for light in self._lights)
         return levels, suns_ns
 
-    def _map(self, levels: tuple[float, ...], suns_ns: tuple[float, ...]) -> Floats:
+    def _map(
+        self,
+        levels: tuple[float, ...],
+        suns_ns: tuple[float, ...],
+    ) -> Floats:
         total = self._steady.copy()
         if self._varying:
             total += self._sum({index: levels[index] for index in self._varying})

@@ -55,7 +55,12 @@ class Surfels:
         return (np.stack(sums, -1) / totals[:, None]).astype(np.float32)
 
 
-def surfels(points: Texels, thing: Indices, step_m: Floats, visibility: Visibility) -> Surfels:
+def surfels(
+    points: Texels,
+    thing: Indices,
+    step_m: Floats,
+    visibility: Visibility,
+) -> Surfels:
     """The surfels of points whose things (P,) and cells' sides (P,) are known."""
     cell = np.floor(points.points_m / step_m[:, None]).astype(np.int64)
     cell -= cell.min(0, initial=0)
@@ -87,7 +92,13 @@ def _grouped(key: Rows, points_m: Floats) -> tuple[Rows, Rows]:
     return group, order[first]
 
 
-def blend(points: Texels, groups: Surfels, layout: TexelLayout, visibility: Visibility, usable: Mask) -> "csr_matrix":
+def blend(
+    points: Texels,
+    groups: Surfels,
+    layout: TexelLayout,
+    visibility: Visibility,
+    usable: Mask,
+) -> "csr_matrix":
     """Weights (H·W, S) of surfels at each texel of the map: of those near it that see its surfel and face alike."""
     known = np.flatnonzero(usable)
     if not len(known):
@@ -158,7 +169,11 @@ MOST_PX = 256  # along a texture's side, finer than texels are apart
 BRIGHTEST = 0.99  # reflectance, which keeps bounces from adding up without end
 
 
-def albedo(faces: Triangles, materials: Mapping[str, Material], points: Texels) -> Floats:
+def albedo(
+    faces: Triangles,
+    materials: Mapping[str, Material],
+    points: Texels,
+) -> Floats:
     """Linear reflectance (P, 3) of the body there, of what its coat lets in."""
     result = np.zeros((len(points), 3), np.float32)
     number = {name: nth for nth, name in enumerate(materials)}
@@ -228,7 +243,11 @@ class Response:
         return fresnel(cosine, np.maximum(self.eta[face], 1.0)).astype(np.float32)
 
 
-def response(faces: Triangles, materials: Mapping[str, Material], visibility: Visibility) -> Response:
+def response(
+    faces: Triangles,
+    materials: Mapping[str, Material],
+    visibility: Visibility,
+) -> Response:
     """How a table's faces respond to light. Metal mirrors in the luminance of its colour."""
     kinds = [*face_materials(faces, materials), None]  # the last one for nothing
     thing = np.append(faces.thing, len(kinds) - 1)
@@ -323,7 +342,13 @@ class Gatherer:
     surfels: int
     lamps: int
 
-    def gather(self, points: Texels, *, rays: int, done: Callable[[float], object] | None = None) -> FinalGather:
+    def gather(
+        self,
+        points: Texels,
+        *,
+        rays: int,
+        done: Callable[[float], object] | None = None,
+    ) -> FinalGather:
         """Send about `rays` rays from every point; `done` is called with shares."""
         rays_each = min(rays, MOST_RAYS / max(len(points), 1))
         side = int(np.sqrt(rays_each))
@@ -415,7 +440,13 @@ class Gatherer:
         is_direct = np.zeros(len(weight), bool)
         return _RayBatch(batch.point, ends_m, directions, weight, is_direct).take(weight > FAINT)
 
-    def _mirrored(self, batch: _RayBatch, hits: Hits, cosine: Floats, dither: Floats) -> _RayBatch:
+    def _mirrored(
+        self,
+        batch: _RayBatch,
+        hits: Hits,
+        cosine: Floats,
+        dither: Floats,
+    ) -> _RayBatch:
         """The rays that go on from the faces that they have hit."""
         weight = batch.weight * self.response.mirrored(hits.face, cosine)
         rays = np.flatnonzero(weight > FAINT)
@@ -444,7 +475,12 @@ def _start(points: Texels, side: int) -> _RayBatch:
     return _RayBatch(point, origins_m, directions.reshape(-1, 3), weight, np.ones(len(point), bool))
 
 
-def _facets(normals: Floats, roughness: Floats, dither: Floats, turn: NDArray[np.int64]) -> Floats:
+def _facets(
+    normals: Floats,
+    roughness: Floats,
+    dither: Floats,
+    turn: NDArray[np.int64],
+) -> Floats:
     """Unit normals (R, 3) of facets around a face's, by GGX. Source: Walter et al. (2007), eqs 35 and 36."""
     rough = np.flatnonzero(roughness)
     a, b = ((dither[rough] + turn[rough, None] * JITTER) % 1).T
@@ -463,7 +499,14 @@ REST = 0.03
 FAINT_REST = 1e-4
 
 
-def bounced(straight: Floats, reflectance: Floats, gathered: FinalGather, first: Floats, *, bounces: int) -> Floats:
+def bounced(
+    straight: Floats,
+    reflectance: Floats,
+    gathered: FinalGather,
+    first: Floats,
+    *,
+    bounces: int,
+) -> Floats:
     """Illuminance (K, S, C) of surfels by one bounce or more, of the radiosity (K, S, C) that direct light gives them.
 
     reflectance (S, C) of surfels; first (K, S): what comes by mirrors from lamps and the sky, grey. In the end each

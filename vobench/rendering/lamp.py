@@ -56,7 +56,11 @@ class Lamp:
         return np.asarray(along > self.min_cosine * np.sqrt(dot(vectors_m, vectors_m)))
 
 
-def lamps(scene: Scene, bodies: Bodies, t_ns: int) -> Iterator[tuple[Lamp, Mask]]:
+def lamps(
+    scene: Scene,
+    bodies: Bodies,
+    t_ns: int,
+) -> Iterator[tuple[Lamp, Mask]]:
     """The lights that are on at an instant, but for the sky, which has no middle; and the faces turned to each."""
     for index, light in enumerate(scene.lights):
         if not isinstance(light, Sky) and light.level.mean(t_ns, t_ns) > 0:
@@ -64,7 +68,11 @@ def lamps(scene: Scene, bodies: Bodies, t_ns: int) -> Iterator[tuple[Lamp, Mask]
             yield lamp, lamp.is_before(bodies.normals, bodies.offsets_m)
 
 
-def _lamp(light: AreaLight | PointLight | SpotLight | Sun, corners_m: Array, t_ns: int) -> Lamp:
+def _lamp(
+    light: AreaLight | PointLight | SpotLight | Sun,
+    corners_m: Array,
+    t_ns: int,
+) -> Lamp:
     match light:
         case Sun():
             return Lamp(None, light.direction(t_ns))

@@ -193,7 +193,12 @@ class MoverLight:
         usable = np.ones(len(groups), bool)
         return groups.middle, blend(points, groups, self._layout, visibility, usable)
 
-    def at(self, t_ns: float, suns_ns: Sequence[float], is_on: Sequence[bool]) -> MoverLightAt:
+    def at(
+        self,
+        t_ns: float,
+        suns_ns: Sequence[float],
+        is_on: Sequence[bool],
+    ) -> MoverLightAt:
         """What the movers' places decide, but for their shade.
 
         suns_ns (L,): the instant of each sun that moves; is_on (L,): which lights are on at all.
@@ -240,7 +245,12 @@ class MoverLight:
             available_lx = self._direct[index][points]
             moment.lost.append((index, points, np.minimum(taken_lx[points], available_lx)))
 
-    def add(self, moment: MoverLightAt, static_light: Floats, levels: Sequence[float]) -> Floats:
+    def add(
+        self,
+        moment: MoverLightAt,
+        static_light: Floats,
+        levels: Sequence[float],
+    ) -> Floats:
         """The map (H, W, 3) of the stationary part with the movers' light and shade."""
         total = static_light.copy()
         flat = total.reshape(-1, 3)
@@ -324,7 +334,13 @@ class MoverLight:
         balls = _balls(points.points_m[rows], starts)
         return _Lit(emitter, is_soft, has, rows, cells[starts[:-1]], balls, starts)
 
-    def _lost(self, lit: _Lit, index: int, moment: MoverLightAt, new: Mask) -> tuple[Rows, Floats]:
+    def _lost(
+        self,
+        lit: _Lit,
+        index: int,
+        moment: MoverLightAt,
+        new: Mask,
+    ) -> tuple[Rows, Floats]:
         """Points (N,) in new cells and the illuminance (N,) that movers take from them.
 
         Soft shadows are asked at few points, and at others where those around differ, as light is. What is found at
@@ -357,7 +373,13 @@ class MoverLight:
             share[rows] = (4 * share[rows] + share[layout.neighbours[:, rows]].sum(0)) / 8
         return wanted, share[wanted] * direct_lx[wanted]
 
-    def _may_lose(self, lit: _Lit, moment: MoverLightAt, shaded: Mask, points: Rows) -> Rows:
+    def _may_lose(
+        self,
+        lit: _Lit,
+        moment: MoverLightAt,
+        shaded: Mask,
+        points: Rows,
+    ) -> Rows:
         """Those of the points, each once, that have an emitter's light and may lose some of it.
 
         shaded (C,): the cells of which that is known; it is asked for others.
@@ -369,11 +391,23 @@ class MoverLight:
         may_lose = shaded | lit.shaded_cells(moment.balls, others)
         return points[may_lose[cells]]
 
-    def _traced(self, emitter: Emitter, rows: Rows, movers: RayCaster, side: int) -> Floats:
+    def _traced(
+        self,
+        emitter: Emitter,
+        rows: Rows,
+        movers: RayCaster,
+        side: int,
+    ) -> Floats:
         """The illuminance (N,) that movers take from the points at rows, by side x side rays each."""
         return chunked(lambda part: self._lost_at(emitter, rows[part], movers, side), len(rows))
 
-    def _lost_at(self, emitter: Emitter, rows: Rows, movers: RayCaster, side: int) -> Floats:
+    def _lost_at(
+        self,
+        emitter: Emitter,
+        rows: Rows,
+        movers: RayCaster,
+        side: int,
+    ) -> Floats:
         points = self._static.points.take(rows)
         towards = emitter.towards(points)
         lost_lx = np.zeros(len(points), np.float32)
@@ -391,7 +425,11 @@ class MoverLight:
         return lost_lx / np.float32(side**2)
 
 
-def _weighted_mean(weights: "csr_array", share: Floats, has: Mask) -> tuple[Floats, Mask]:
+def _weighted_mean(
+    weights: "csr_array",
+    share: Floats,
+    has: Mask,
+) -> tuple[Floats, Mask]:
     """The mean (N,) of shares (P,) by the rows of weights (N, P), of points that have light; and which are unsure.
 
     A mean is unsure where the shares differ by more than UNSURE, or where there are none.

@@ -38,7 +38,12 @@ class Body:
     center_m: Array
     radius_m: float
 
-    def near(self, origins_m: Array, directions: Array, reach_m: Array | float = np.inf) -> Mask:
+    def near(
+        self,
+        origins_m: Array,
+        directions: Array,
+        reach_m: Array | float = np.inf,
+    ) -> Mask:
         """Which rays (R, 3) of unit length pass the sphere within `reach_m` of their origins (R, 3)."""
         to_center = self.center_m - origins_m
         along = dot(to_center, directions)
@@ -86,7 +91,12 @@ class Bodies:
             hits.distance[rays[is_nearer]] = body_hits.distance[is_nearer]
         return hits
 
-    def behind_panes(self, directions: Array, T_bodies_camera: Sequence[Array], distance_m: Array) -> Mask:
+    def behind_panes(
+        self,
+        directions: Array,
+        T_bodies_camera: Sequence[Array],
+        distance_m: Array,
+    ) -> Mask:
         """Whether glass is before what is seen at some distance (R,), or before nothing where that is NaN."""
         is_behind = np.zeros(len(directions), bool)
         limit_m = np.nan_to_num(distance_m, nan=REACH_M)
@@ -96,7 +106,13 @@ class Bodies:
                 is_behind |= body.panes.stops(origins_m, body_directions, limit_m)
         return is_behind
 
-    def blocked(self, starts_m: Floats, vectors_m: Floats, T_bodies_world: Sequence[Array], reach: Floats) -> Mask:
+    def blocked(
+        self,
+        starts_m: Floats,
+        vectors_m: Floats,
+        T_bodies_world: Sequence[Array],
+        reach: Floats,
+    ) -> Mask:
         """Whether anything but glass is between starts and starts + reach * vectors (R, 3), both in the world."""
         world, *movers = self._bodies
         is_blocked = self._stopped(world, starts_m, vectors_m, reach)
@@ -134,7 +150,13 @@ class Bodies:
             radius_m=radius_m,
         )
 
-    def _stopped(self, body: Body, starts_m: Array | Floats, vectors_m: Array | Floats, reach: Floats) -> Mask:
+    def _stopped(
+        self,
+        body: Body,
+        starts_m: Array | Floats,
+        vectors_m: Array | Floats,
+        reach: Floats,
+    ) -> Mask:
         """Whether a body stops light between two points, from either side of its faces but not through their holes."""
         is_stopped = body.opaque.stops(starts_m, vectors_m, reach)
         if not body.holed:
@@ -199,7 +221,13 @@ class Bodies:
         cosine[backs] = -cosine[backs]
         return cosine
 
-    def _close_gaps(self, body: Body, origins_m: Array, directions: Array, hits: Hits) -> None:
+    def _close_gaps(
+        self,
+        body: Body,
+        origins_m: Array,
+        directions: Array,
+        hits: Hits,
+    ) -> None:
         """Close the gaps that float32 leaves between faces: rays that meet nothing are tried again a hair aside."""
         missed = np.flatnonzero(hits.face < 0)
         aside = directions[missed] + (self._edge_m * AXES.sum(0))
@@ -207,7 +235,14 @@ class Bodies:
         gaps = missed[face_aside >= 0]
         self._decide(body, origins_m, directions, hits, gaps)
 
-    def _decide(self, body: Body, origins_m: Array, directions: Array, hits: Hits, doubtful: Pixels) -> None:
+    def _decide(
+        self,
+        body: Body,
+        origins_m: Array,
+        directions: Array,
+        hits: Hits,
+        doubtful: Pixels,
+    ) -> None:
         """Set the doubtful hits to what float64 says, among the faces that Embree finds there and a little aside."""
         if not len(doubtful):
             return

@@ -61,7 +61,12 @@ class SurfaceTexture:
     values: (H, W) float32, or (H, W, 3 or 4) uint8 in sRGB; shrink: how often the sides in pixels are halved.
     """
 
-    def __init__(self, values: NDArray[Any], *, shrink: int = 0) -> None:
+    def __init__(
+        self,
+        values: NDArray[Any],
+        *,
+        shrink: int = 0,
+    ) -> None:
         self.scale = 1.0
         self.is_grey = values.ndim == 2
         self.id = GL.glGenTextures(1)
@@ -83,7 +88,10 @@ class SurfaceTexture:
 COLOURS = {1: (GL.GL_R16, GL.GL_RED), 3: (GL.GL_RGBA16, GL.GL_RGB), 4: (GL.GL_RGBA16, GL.GL_RGBA)}
 
 
-def _halved(values: NDArray[np.uint16], times: int) -> NDArray[np.uint16]:
+def _halved(
+    values: NDArray[np.uint16],
+    times: int,
+) -> NDArray[np.uint16]:
     """A picture (H, W, ...) whose sides in pixels are halved so many times."""
     if not times:
         return values
@@ -136,7 +144,11 @@ class Blocks:
         for index, value in enumerate(values):
             self.update(index, value)
 
-    def update(self, index: int, value: np.void | NDArray[np.void]) -> None:
+    def update(
+        self,
+        index: int,
+        value: np.void | NDArray[np.void],
+    ) -> None:
         """Replace a value."""
         GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._buffer)
         GL.glBufferSubData(GL.GL_UNIFORM_BUFFER, index * self._stride, self._size, value.tobytes())
@@ -147,13 +159,22 @@ class Blocks:
         GL.glBindBufferRange(GL.GL_UNIFORM_BUFFER, self._binding, self._buffer, offset, self._size)
 
 
-def bind(unit: int, texture: Any, kind: int = GL.GL_TEXTURE_2D) -> None:
+def bind(
+    unit: int,
+    texture: Any,
+    kind: int = GL.GL_TEXTURE_2D,
+) -> None:
     """Let shaders sample a texture by a unit."""
     GL.glActiveTexture(unit)
     GL.glBindTexture(kind, texture)
 
 
-def _upload(internal: int, form: int, values: NDArray[Any], kind: int) -> None:
+def _upload(
+    internal: int,
+    form: int,
+    values: NDArray[Any],
+    kind: int,
+) -> None:
     """Fill the texture that is bound."""
     GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
     rows, columns = values.shape[:2]
@@ -180,7 +201,12 @@ SHADERS = Path(__file__).parent / "shaders"
 class Program:
     """A vertex and a fragment shader of this package, compiled with some preprocessor names defined, and linked."""
 
-    def __init__(self, vertex: str, fragment: str, *defines: str) -> None:
+    def __init__(
+        self,
+        vertex: str,
+        fragment: str,
+        *defines: str,
+    ) -> None:
         # Core contexts check a program against a vertex array, whichever it is.
         GL.glBindVertexArray(GL.glGenVertexArrays(1))
         try:
@@ -205,7 +231,11 @@ class Program:
                 self._values[name] = key
                 self._upload(name, data)
 
-    def _upload(self, name: str, value: float | NDArray[np.float32]) -> None:
+    def _upload(
+        self,
+        name: str,
+        value: float | NDArray[np.float32],
+    ) -> None:
         if name not in self._locations:
             self._locations[name] = GL.glGetUniformLocation(self._id, name)
         location = self._locations[name]
@@ -238,7 +268,12 @@ class CubeTexture:
     Each level is blurred by another roughness (L,), the first by none.
     """
 
-    def __init__(self, pictures: Sequence[Radiance], axes: Array, roughness: Sequence[float]) -> None:
+    def __init__(
+        self,
+        pictures: Sequence[Radiance],
+        axes: Array,
+        roughness: Sequence[float],
+    ) -> None:
         around = _cube(pictures)
         self.id = _cube(pictures)
         program = Program("fullscreen", "probe")
@@ -343,7 +378,12 @@ class Canvas:
 FORMATS = {1: (GL.GL_R32F, GL.GL_RED), 3: (GL.GL_RGBA32F, GL.GL_RGBA)}
 
 
-def canvas(width_px: int, height_px: int, grid: Grid, channels: int) -> Canvas:
+def canvas(
+    width_px: int,
+    height_px: int,
+    grid: Grid,
+    channels: int,
+) -> Canvas:
     """A canvas of a size in pixels. Raises RenderError where the driver has no room or form for it."""
     framebuffer = GL.glGenFramebuffers(1)
     GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
@@ -357,7 +397,11 @@ def canvas(width_px: int, height_px: int, grid: Grid, channels: int) -> Canvas:
     return Canvas(width_px, height_px, channels, grid, framebuffer, colour, depth)
 
 
-def _layers(size: tuple[int, int, int], internal: int, form: int) -> Any:
+def _layers(
+    size: tuple[int, int, int],
+    internal: int,
+    form: int,
+) -> Any:
     """An empty texture of a width and height in pixels and so many layers."""
     texture = GL.glGenTextures(1)
     GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, texture)

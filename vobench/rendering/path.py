@@ -103,7 +103,14 @@ class MitsubaScene:
             self._parameters[f"{group.key}.vertex_positions"] = corners_m.ravel().astype(np.float32)
             self._parameters[f"{group.key}.vertex_normals"] = normals.ravel().astype(np.float32)
 
-    def trace(self, rays: Floats, rows: Indices, T_world_camera: Array, samples: int, seed: int) -> Floats:
+    def trace(
+        self,
+        rays: Floats,
+        rows: Indices,
+        T_world_camera: Array,
+        samples: int,
+        seed: int,
+    ) -> Floats:
         """Radiance (R, W, 3), the sum over `samples` paths a pixel, of rows (R,) seen from T_world_camera (R, 4, 4).
 
         rays (H + 1, W + 1, 3) are directions in the camera's frame through the corners of its pixels.
@@ -137,7 +144,13 @@ class MitsubaScene:
         return dr.while_loop(state, lambda _, is_active: is_active, step)[0]
 
 
-def _primary_rays(rays: Floats, rows: Indices, T_world_camera: Array, samples: int, within: Any) -> Any:
+def _primary_rays(
+    rays: Floats,
+    rows: Indices,
+    T_world_camera: Array,
+    samples: int,
+    within: Any,
+) -> Any:
     """Rays `within` [0, 1)² of the pixels, sample by sample, pixel by pixel, row by row.
 
     Bilinear between the directions of a pixel's corners, which is exact to 1e-3 px.
@@ -191,7 +204,14 @@ class PathRenderer:
     and pose: the same picture has the same bytes, and no two pictures share their noise.
     """
 
-    def __init__(self, scene: Scene, *, samples: int = SAMPLES, seed: int = 0, max_depth: int | None = 16) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        samples: int = SAMPLES,
+        seed: int = 0,
+        max_depth: int | None = 16,
+    ) -> None:
         if samples < 1:
             raise RenderError(f"cannot trace {samples} paths a pixel; samples must be 1 or more")
         if max_depth is not None and max_depth < 1:
@@ -202,7 +222,13 @@ class PathRenderer:
         self._seed = seed
         self._mitsuba = MitsubaScene(scene, max_depth=max_depth)
 
-    def radiance(self, camera: Camera, views: Sequence[View], *, weights: ArrayLike | None = LUMINANCE) -> Radiance:
+    def radiance(
+        self,
+        camera: Camera,
+        views: Sequence[View],
+        *,
+        weights: ArrayLike | None = LUMINANCE,
+    ) -> Radiance:
         """Radiance (H, W) in cd/m², linear and unclipped, averaged over each pixel's area; views tile the rows.
 
         It is the sum of red, green and blue times weights, or (H, W, 3) where these are None. A pixel one of whose
@@ -243,7 +269,11 @@ def _corner_rays(camera: Camera) -> Radiance:
     return camera.rays(np.stack([u, v], -1)).astype(np.float32)
 
 
-def _batches(scene: Scene, views: Sequence[View], samples: int) -> Iterator[tuple[tuple[SceneState, int], RowBatch]]:
+def _batches(
+    scene: Scene,
+    views: Sequence[View],
+    samples: int,
+) -> Iterator[tuple[tuple[SceneState, int], RowBatch]]:
     """All rows at all their moments, gathered by the scene's state and by the paths a pixel has at that moment.
 
     A row exposed in M moments has its samples spread evenly over them, at least one for each.

@@ -136,7 +136,12 @@ EVERYWHERE_RAD = 10.0  # more than any angle to an axis
 NO_AXIS = (0.0, 0.0, 0.0, 1.0)
 
 
-def glints(lights: Sequence[Light], eye_m: Array, start_ns: int, end_ns: int) -> Array:
+def glints(
+    lights: Sequence[Light],
+    eye_m: Array,
+    start_ns: int,
+    end_ns: int,
+) -> Array:
     """Lamps (G, 3, 4) that no picture shows, the sun among them: those that shine most on an eye (3,).
 
     Each: place and 1, or direction and 0; intensity or illuminance of three channels, and the angle at which a spot
@@ -157,7 +162,11 @@ def _illuminance(glint: Array, eye_m: Array) -> float:
     return float(power[:3].sum() / squared_m2)
 
 
-def _glint(light: PointLight | SpotLight | Sun, start_ns: int, end_ns: int) -> Array:
+def _glint(
+    light: PointLight | SpotLight | Sun,
+    start_ns: int,
+    end_ns: int,
+) -> Array:
     """The three rows of a lamp in `glints`."""
     level = light.level.mean(start_ns, end_ns) * np.array(light.colour)
     if isinstance(light, Sun):

@@ -26,7 +26,14 @@ class RenderTarget:
         return self.canvases[0]
 
 
-def render_target(width_px: int, height_px: int, grid: Grid, weights: Rgb | None, *, in_colour: bool) -> RenderTarget:
+def render_target(
+    width_px: int,
+    height_px: int,
+    grid: Grid,
+    weights: Rgb | None,
+    *,
+    in_colour: bool,
+) -> RenderTarget:
     """A target for pictures of a size and grid of samples, with one channel or, without weights, three.
 
     in_colour: whether samples have three channels in either case, as where mirrors are tinted.

@@ -44,7 +44,10 @@ def shot_transforms(movers: Sequence[Mover], shot: Shot) -> ShotTransforms:
     return ShotTransforms(T_world_bodies, T_bodies_world, T_bodies_camera, T_camera_bodies)
 
 
-def _poses(movers: Sequence[Mover], t_ns: NDArray[np.int64]) -> list[Array]:
+def _poses(
+    movers: Sequence[Mover],
+    t_ns: NDArray[np.int64],
+) -> list[Array]:
     """Where the bodies are at an instant () or at several (H,): (4, 4) each, or (H, 4, 4) for what moves."""
     T_world_bodies: list[Array] = [np.eye(4)]
     for mover in movers:

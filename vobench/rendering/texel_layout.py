@@ -122,7 +122,12 @@ def _read_points(index: Rows, atlas: Atlas, owner: Owners) -> Rows:
     return point
 
 
-def _in_plane(points_m: Floats, planes: Floats, beside: Indices, visibility: Visibility | None) -> Mask:
+def _in_plane(
+    points_m: Floats,
+    planes: Floats,
+    beside: Indices,
+    visibility: Visibility | None,
+) -> Mask:
     """Whether points (P, 3) lie in one plane with their neighbours (4, P), which no wall hides from them."""
     is_other = beside != np.arange(len(points_m))
     cosine = np.einsum("nij,ij->ni", planes[beside], planes)

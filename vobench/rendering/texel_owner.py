@@ -93,7 +93,11 @@ def _nearest_on(corners: Array, points: Array) -> tuple[Array, Array]:
     return weights[:, 1:], distance
 
 
-def _nearest_on_edges(edges: Array, from_corners: Array, squared_lengths: Array) -> tuple[Array, Array]:
+def _nearest_on_edges(
+    edges: Array,
+    from_corners: Array,
+    squared_lengths: Array,
+) -> tuple[Array, Array]:
     """Weights (N, 3) of corners, and distance, of the nearest places on edges (N, 3, 2) to points."""
     along = np.einsum("nij,nij->ni", from_corners, edges) / np.maximum(squared_lengths, 1e-12)
     along = np.clip(along, 0, 1)

@@ -15,7 +15,11 @@ CHUNK = 1 << 14  # points at once: their arrays fit the processor's cache
 
 
 def in_chunks(
-    work: Callable[[slice], T], count: int, *, chunk: int = CHUNK, done: Callable[[float], object] | None = None
+    work: Callable[[slice], T],
+    count: int,
+    *,
+    chunk: int = CHUNK,
+    done: Callable[[float], object] | None = None,
 ) -> list[T]:
     """The results of `work` for each slice of `count` things, in order; `done` is called with shares of the work."""
     slices = [slice(start, min(start + chunk, count)) for start in range(0, count, chunk)]

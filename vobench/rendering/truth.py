@@ -195,7 +195,13 @@ class Band:
         is_gone[inside] = self._hidden(there, inside, next_m[inside], v[inside])
         return is_gone
 
-    def _hidden(self, there: ShotTransforms, pixels: Pixels, next_m: Array, rows: Array) -> Mask:
+    def _hidden(
+        self,
+        there: ShotTransforms,
+        pixels: Pixels,
+        next_m: Array,
+        rows: Array,
+    ) -> Mask:
         """Whether the next camera, with the points (P, 3) of pixels before it, sees backs or something nearer."""
         T_bodies_there = at_rows(there.T_bodies_camera, rows)
         face = self._face[pixels]
@@ -256,7 +262,12 @@ class TruthCaster:
         self._pool = ThreadPoolExecutor(THREADS)
 
     def frame(
-        self, camera: Camera, now: Shot, channels: Iterable[str] = tuple(CHANNELS), *, later: Shot | None = None
+        self,
+        camera: Camera,
+        now: Shot,
+        channels: Iterable[str] = tuple(CHANNELS),
+        *,
+        later: Shot | None = None,
     ) -> TruthFrame:
         """The channels of these names; `later` is the next picture, without which flow is NaN and all is occluded.
 
@@ -292,7 +303,10 @@ def _table(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(["", *names]))
 
 
-def _ids(names: Sequence[str], table: Sequence[str]) -> NDArray[np.uint16]:
+def _ids(
+    names: Sequence[str],
+    table: Sequence[str],
+) -> NDArray[np.uint16]:
     """The names' places in a table (S + 1,); the last one is nothing."""
     place = {name: nth for nth, name in enumerate(table)}
     return np.array([*(place[name] for name in names), 0], np.uint16)

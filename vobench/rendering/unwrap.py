@@ -138,7 +138,10 @@ def _keep_for_ever(atlas: object) -> None:
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(atlas))
 
 
-def _welded(corners_m: Array, *also: NDArray[np.int64]) -> tuple[Rows, Rows]:
+def _welded(
+    corners_m: Array,
+    *also: NDArray[np.int64],
+) -> tuple[Rows, Rows]:
     """Of corners (F, 3, 3) the first (V,) of those at one place, and which each is (F, 3); `also` (F,) keeps apart."""
     keys = np.rint(corners_m / WELD_M).astype(np.int64).reshape(-1, 3)
     keys = np.column_stack([keys, *(np.repeat(other, 3) for other in also)])
@@ -155,7 +158,11 @@ def _connected(index: Rows) -> Indices:
     return np.unique(labels, return_inverse=True)[1].astype(np.int32)
 
 
-def axis_charts(corners_px: Array, corners_m: Array, thing: Indices) -> tuple[Array, Indices, int, int]:
+def axis_charts(
+    corners_px: Array,
+    corners_m: Array,
+    thing: Indices,
+) -> tuple[Array, Indices, int, int]:
     """Charts of connected faces whose normals are nearest to one axis, seen along it: for what xatlas leaves.
 
     corners_px (F, 3, 3): in texels. Returns places (F, 3, 2), charts (F,), width and height.
@@ -207,7 +214,12 @@ def _shelves(sizes: Rows) -> tuple[Rows, int, int]:
     return corners, width, row + shelf_height
 
 
-def _place_thin_faces(faces: Triangles, places: Array, chart: Indices, thin: Rows) -> None:
+def _place_thin_faces(
+    faces: Triangles,
+    places: Array,
+    chart: Indices,
+    thin: Rows,
+) -> None:
     """Give faces that are too thin for a place that of a neighbour's corner."""
     if not len(thin):
         return

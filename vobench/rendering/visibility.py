@@ -28,7 +28,12 @@ SKY_PROBES = 512  # rays to each side of a pane that tell whether the sky is see
 class Visibility:
     """Opaque faces and panes of a table, of those `among` (K,) names. Cut-outs count as solid."""
 
-    def __init__(self, faces: Triangles, materials: Mapping[str, Material], among: ArrayLike) -> None:
+    def __init__(
+        self,
+        faces: Triangles,
+        materials: Mapping[str, Material],
+        among: ArrayLike,
+    ) -> None:
         rows = np.asarray(among, np.int32)
         kinds = face_materials(faces, materials)
         thing = faces.thing[rows]

@@ -74,7 +74,13 @@ class Warp:
         shape = (rows, columns) if channels == 1 else (rows, columns, channels)
         return np.zeros(shape, np.float32)
 
-    def put(self, atlas: Radiance, face: Face, box: Box, picture: Radiance) -> None:
+    def put(
+        self,
+        atlas: Radiance,
+        face: Face,
+        box: Box,
+        picture: Radiance,
+    ) -> None:
         """Lay a box of a face's picture into the atlas."""
         first, end, top, bottom = box
         atlas[face.row + top : face.row + bottom, first:end] = picture
@@ -138,7 +144,11 @@ def _faces(rays: Array) -> tuple[NDArray[np.int8], Array]:
     return face_of, plane
 
 
-def _focal_px(plane: Array, face_of: NDArray[np.int8], focal_lengths: Array) -> float:
+def _focal_px(
+    plane: Array,
+    face_of: NDArray[np.int8],
+    focal_lengths: Array,
+) -> float:
     """Focal length of faces as fine as the points are where they are finest, in the lens's finer direction."""
     # Every third point along rows and columns, and those next to it.
     here = (slice(0, -1, 3), slice(0, -1, 3))
@@ -155,7 +165,14 @@ def _focal_px(plane: Array, face_of: NDArray[np.int8], focal_lengths: Array) -> 
     return float(focal_lengths.max() / focal_lengths.min() / finest)
 
 
-def _face(pixels: Radiance, is_member: NDArray[np.bool_], axes: Array, row: int, *, focal_px: float) -> Face:
+def _face(
+    pixels: Radiance,
+    is_member: NDArray[np.bool_],
+    axes: Array,
+    row: int,
+    *,
+    focal_px: float,
+) -> Face:
     """The face that holds its members of all pixels (2, R, C), which count from its axis."""
     low = np.floor(np.where(is_member, pixels, np.inf).min(2))  # (2, R): of each row of points
     high = np.ceil(np.where(is_member, pixels, -np.inf).max(2))

@@ -126,7 +126,12 @@ def _near_edges(points_m: Array, edges: Indices) -> tuple[Indices, Indices]:
     return np.repeat(edge, counts), point
 
 
-def _split(points_m: Array, face: Indices, keys: Sequence[int], cuts: Cuts) -> tuple[Array, Array]:
+def _split(
+    points_m: Array,
+    face: Indices,
+    keys: Sequence[int],
+    cuts: Cuts,
+) -> tuple[Array, Array]:
     """Parts of a face, from its middle to its edges (T, 3, 3), and the weights of its corners (T, 3, 3)."""
     rim = []
     rim_weights = []
