@@ -19,7 +19,8 @@ class CutOuts:
             name: material for name, material in materials.items() if material.cutout is not None and material.texture
         }
         number = {name: nth for nth, name in enumerate(self._holed)}
-        of_things = np.array([number.get(thing.material, -1) for thing in faces.things], np.int32)
+        numbers = [number.get(thing.material, -1) for thing in faces.things]
+        of_things = np.array(numbers, np.int32)
         # The number (F + 1,) of a face's material among those with holes, -1 for none; the last one for the face -1.
         self.material = np.append(of_things[faces.thing], -1)
         self._uv = faces.uv
@@ -34,8 +35,10 @@ class CutOuts:
             rays = np.flatnonzero(material_of == number)
             u = hits.u[rays, None]
             v = hits.v[rays, None]
-            a, b, c = np.moveaxis(self._uv[hits.face[rays]], 1, 0)
-            places = ((1 - u - v) * a + u * b + v * c) / material.tile_m
+            corners_uv = self._uv[hits.face[rays]]
+            a, b, c = np.moveaxis(corners_uv, 1, 0)
+            uv_m = (1 - u - v) * a + u * b + v * c
+            places = uv_m / material.tile_m
             is_hole[rays] = ~opaque(material, places)
         return is_hole
 
@@ -49,9 +52,13 @@ def opaque(material: Material, places: Array) -> Mask:
 @lru_cache(maxsize=64)
 def _opacity(material: Material) -> Floats:
     """The opacity (H, W) float32 of a material's texture, one pixel where it has none."""
-    pixels = material.texture.pixels() if material.texture else np.ones((1, 1))
+    if material.texture is None:
+        return np.ones((1, 1), np.float32)
+    pixels = material.texture.pixels()
     has_opacity = pixels.ndim == 3 and pixels.shape[-1] == 4
-    return np.asarray(pixels[..., 3] / 255 if has_opacity else np.ones((1, 1)), np.float32)
+    if not has_opacity:
+        return np.ones((1, 1), np.float32)
+    return np.asarray(pixels[..., 3] / 255, np.float32)
 
 
 def _sampled(tile: Floats, places: Array) -> Array:

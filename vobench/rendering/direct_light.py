@@ -59,7 +59,8 @@ class _MirrorImage:
         reach = self._reach(origins_m, segments_m)[:, None]
         to_mirror_m = reach * segments_m
         share[rays] = occluder.passing(origins_m, to_mirror_m)
-        met_m = origins_m + to_mirror_m + (RAY_OFFSET_M * self.mirror.normal).astype(np.float32)
+        lift_m = (RAY_OFFSET_M * self.mirror.normal).astype(np.float32)
+        met_m = origins_m + to_mirror_m + lift_m
         onwards_m = self._reflected((1 - reach) * segments_m)
         share[rays] *= self.emitter.passing(occluder, met_m, onwards_m)
         return share
@@ -67,7 +68,8 @@ class _MirrorImage:
     def behind_m(self, points_m: Floats) -> Floats:
         """The images of points (P, 3) behind the mirror."""
         height_m = self.mirror.height_m(points_m)
-        return (points_m - 2 * height_m[:, None] * self.mirror.normal).astype(points_m.dtype)
+        images_m = points_m - 2 * height_m[:, None] * self.mirror.normal
+        return images_m.astype(points_m.dtype)
 
     def _reach(self, points_m: Floats, segments_m: Floats) -> Floats:
         """The share (P,) of each segment at which it meets the mirror's plane."""
@@ -126,7 +128,8 @@ def _sees_image(image: _MirrorImage, around: BoundingSphere, points_m: Floats) -
     share = np.clip(height_m / np.maximum(depth_m, 1e-9), 0, 1)
     crossing_m = points_m + share[:, None] * vectors_m
     aside_m = np.linalg.norm(crossing_m - outline.centre_m, axis=1)
-    return np.asarray((height_m > 0) & (aside_m <= outline.radius_m + share * around.radius_m))
+    reach_m = outline.radius_m + share * around.radius_m
+    return np.asarray((height_m > 0) & (aside_m <= reach_m))
 
 
 # Steps of additive recurrences that fill the unit interval evenly: Roberts (2018), R2 and the golden ratio.
@@ -181,7 +184,8 @@ def direct_light(
 
     half = _half_shadow(clear, layout, cells, lit)
     if not is_soft:
-        light[half] = arriving(emitter, points, half, visibility, Rays(3 * side // 2, spread=True))[0]
+        many = Rays(3 * side // 2, spread=True)
+        light[half] = arriving(emitter, points, half, visibility, many)[0]
         return light
     share = layout.interpolated(share)
     is_half = np.zeros(len(points), bool)
@@ -281,7 +285,8 @@ def open_light(
     def open_part(part: slice) -> Floats:
         texels = points.take(rows[part])
         towards = (emitter.evenly or emitter.towards)(texels)
-        light = np.sum([_sent(towards, texels, cell, side)[1] for cell in range(side**2)], axis=0)
+        cell_light = [_sent(towards, texels, cell, side)[1] for cell in range(side**2)]
+        light = np.sum(cell_light, axis=0)
         return np.asarray(light / np.float32(side**2), np.float32)
 
     return chunked(open_part, len(rows))
@@ -322,7 +327,9 @@ def footprint_m(
     """Steps (N, 3) from the middle of texels to somewhere on their area."""
     place = texels.dither[rows] + cell * FOOTPRINT
     place -= np.floor(place) + np.float32(0.5)
-    return np.asarray(place[:, 1:] * texels.step_u_m[rows] + place[:, :1] * texels.step_v_m[rows])
+    along_u_m = place[:, 1:] * texels.step_u_m[rows]
+    along_v_m = place[:, :1] * texels.step_v_m[rows]
+    return np.asarray(along_u_m + along_v_m)
 
 
 def _half_shadow(
@@ -337,5 +344,6 @@ def _half_shadow(
     seen_in_cell = np.bincount(cells, is_seen, minlength=1) > 0
     hidden_in_cell = np.bincount(cells, is_hidden, minlength=1) > 0
     is_mixed = np.logical_and(seen_in_cell, hidden_in_cell)
-    is_near = layout.dilated(is_seen, steps=RIM) & layout.dilated(is_hidden, steps=RIM)
+    is_near_seen = layout.dilated(is_seen, steps=RIM)
+    is_near = is_near_seen & layout.dilated(is_hidden, steps=RIM)
     return lit[(is_near | is_mixed[cells])[lit]]

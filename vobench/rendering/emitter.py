@@ -52,11 +52,14 @@ def rectangle(corners_m: Array) -> Rectangle | None:
     local_m = (corners_m - first) @ np.stack([u_axis, v_axis, normal]).T
     low_m = local_m.min((0, 1))
     size_m = np.ptp(local_m, axis=(0, 1))
-    doubled_areas = np.cross(local_m[:, 1] - local_m[:, 0], local_m[:, 2] - local_m[:, 0])[:, 2]
+    first_edge_m = local_m[:, 1] - local_m[:, 0]
+    second_edge_m = local_m[:, 2] - local_m[:, 0]
+    doubled_areas = np.cross(first_edge_m, second_edge_m)[:, 2]
     area_m2 = doubled_areas.sum() / 2
     box_area_m2 = size_m[0] * size_m[1]
     is_thick = size_m[2] > FILLED * size_m.max()
-    if is_thick or abs(area_m2 - box_area_m2) > FILLED * size_m[0] * size_m[1]:
+    tolerance_m2 = FILLED * size_m[0] * size_m[1]
+    if is_thick or abs(area_m2 - box_area_m2) > tolerance_m2:
         return None
     corner_m = first + low_m[0] * u_axis + low_m[1] * v_axis
     return Rectangle(corner_m, size_m[0] * u_axis, size_m[1] * v_axis, normal)
@@ -103,7 +106,8 @@ class SolidAngle:
         """Vectors (P, 3) to places on the rectangle, by two numbers (P,) in [0, 1) each."""
         au = a * self.steradian + self._k
         sine = np.sin(au)
-        fu = (np.cos(au) * self._b0 - self._b1) / np.where(sine == 0, 1e-12, sine)
+        divisor = np.where(sine == 0, 1e-12, sine)
+        fu = (np.cos(au) * self._b0 - self._b1) / divisor
         cu = np.copysign(1.0, fu) / np.sqrt(fu * fu + self._b0 * self._b0)
         cu = np.clip(cu, -1, 1)
         xu = -cu * self._z0 / np.sqrt(np.maximum(1 - cu * cu, 1e-30))
@@ -170,7 +174,8 @@ def panel_emitter(light: AreaLight) -> Emitter:
     if face is None:
         # In an order in which near triangles are near to one another (Morton).
         shares = (corners_m.mean(1) - around.centre_m) / around.radius_m / 2 + 0.5
-        order = np.argsort(_interleaved(np.clip(shares, 0, 1 - 1e-6)), kind="stable")
+        along_curve = _interleaved(np.clip(shares, 0, 1 - 1e-6))
+        order = np.argsort(along_curve, kind="stable")
         ordered_m = corners_m[order]
 
         def by_area(texels: Texels) -> Aim:
@@ -179,14 +184,16 @@ def panel_emitter(light: AreaLight) -> Emitter:
         return Emitter(around, by_area, _width_rad(around), side_samples=MESH_SAMPLES)
 
     def towards(texels: Texels) -> Aim:
-        nearest_m = lengths(texels.points_m - around.centre_m).min(initial=np.inf)
+        distances_m = lengths(texels.points_m - around.centre_m)
+        nearest_m = distances_m.min(initial=np.inf)
         is_far = nearest_m > FAR_OFF * around.radius_m
         return _by_area(light, corners_m, texels, face) if is_far else evenly(texels)
 
     def evenly(texels: Texels) -> Aim:
         angle = SolidAngle(face, texels.points_m)
         is_before = (texels.points_m - face.corner_m) @ face.normal > LEVEL_M
-        strength = np.where(is_before, light.luminance_cd_m2 * angle.steradian, 0).astype(np.float32)
+        arriving_lx = light.luminance_cd_m2 * angle.steradian
+        strength = np.where(is_before, arriving_lx, 0).astype(np.float32)
         lift_m = (RAY_OFFSET_M * face.normal).astype(np.float32)
         return lambda a, b: (angle.vectors_m(a, b) + lift_m, strength)
 
@@ -224,7 +231,8 @@ def _by_area(
         # strata of the square are such of the mesh
         along_curve = _interleaved(np.stack([a, b], -1))
         rest = b * 2**CURVE_BITS % 1
-        triangle = np.minimum(np.searchsorted(ends, along_curve, side="right"), len(ends) - 1)
+        triangle = np.searchsorted(ends, along_curve, side="right")
+        triangle = np.minimum(triangle, len(ends) - 1)
         normal = normals[triangle]
         places_m = sample_points(corners_m, along_curve, rest) + RAY_OFFSET_M * normal
         return places_m.astype(np.float32), normal
@@ -234,7 +242,8 @@ def _by_area(
         a: Floats,
         b: Floats,
     ) -> tuple[Floats, Floats]:
-        corner_m = (filled.corner_m + RAY_OFFSET_M * filled.normal).astype(np.float32)
+        lift_m = RAY_OFFSET_M * filled.normal
+        corner_m = (filled.corner_m + lift_m).astype(np.float32)
         u_m = filled.edge_u_m.astype(np.float32)
         v_m = filled.edge_v_m.astype(np.float32)
         return corner_m + a[:, None] * u_m + b[:, None] * v_m, normals[:1]
@@ -275,7 +284,8 @@ def sun_emitter(light: Sun, t_ns: float) -> Emitter:
             x, y = disc(a, b)
             x_offset = np.tan(SUN_RADIUS_RAD) * x
             y_offset = np.tan(SUN_RADIUS_RAD) * y
-            direction = (centre + x_offset[:, None] * u_axis + y_offset[:, None] * v_axis).astype(np.float32)
+            towards_disc = centre + x_offset[:, None] * u_axis + y_offset[:, None] * v_axis
+            direction = towards_disc.astype(np.float32)
             # One ray alone must not tell where on the disc it went.
             cosine = np.maximum(texels.cosine(direction), SUN_RADIUS_RAD)
             return FAR_M * direction, arriving_lx / cosine
@@ -301,7 +311,8 @@ def _pane_emitter(light: Sky, pane: PlanarPatch, visibility: Visibility) -> Emit
         def by_area(a: Floats, b: Floats) -> tuple[Floats, Floats]:
             vectors_m = sample_points(pane.corners_m, a, b) - texels.points_m
             distance_m = np.maximum(np.linalg.norm(vectors_m, axis=1), 1e-6)
-            return vectors_m, area_m2 * np.abs(vectors_m @ pane.normal) / distance_m**3
+            height_m = np.abs(vectors_m @ pane.normal)
+            return vectors_m, area_m2 * height_m / distance_m**3
 
         return by_area
 

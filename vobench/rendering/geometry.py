@@ -21,6 +21,8 @@ RAY_OFFSET = 1e-6
 FAR_M = 1e3  # beyond every scene
 ENDLESS = 1e8  # lengths of a direction, beyond every scene
 SHORT_OF_END = 1 - 1e-3  # share of the segment between two points in which something blocks it
+X_AXIS = (1.0, 0.0, 0.0)
+Z_AXIS = (0.0, 0.0, 1.0)
 # faces this near to one plane lie in it
 FLAT_RAD = 1e-3
 FLAT_M = 1e-3
@@ -45,7 +47,8 @@ def bounding_sphere(points_m: Array) -> BoundingSphere:
     """A sphere around points (..., 3)."""
     points = points_m.reshape(-1, 3)
     centre = (points.min(0) + points.max(0)) / 2
-    return BoundingSphere(centre, float(np.linalg.norm(points - centre, axis=1).max()))
+    distances = np.linalg.norm(points - centre, axis=1)
+    return BoundingSphere(centre, float(distances.max()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +65,9 @@ class PlanarPatch:
 
     def coincides(self, other: "PlanarPatch") -> bool:
         """Whether they are the front and the back of one sheet."""
-        apart_m = np.abs(self.corners_m.mean((0, 1)) - other.corners_m.mean((0, 1))).max()
+        middle_m = self.corners_m.mean((0, 1))
+        other_middle_m = other.corners_m.mean((0, 1))
+        apart_m = np.abs(middle_m - other_middle_m).max()
         return bool(apart_m < FLAT_M and self.normal @ other.normal < 0)
 
 
@@ -75,7 +80,8 @@ def planar_patches(
     """The faces among a table's, plane by plane of each thing, without planes that hold less than some area."""
     rows = np.asarray(among, np.int32)
     offset = np.einsum("ij,ij->i", faces.plane[rows], faces.corners_m[rows, 0])
-    cells = np.column_stack([faces.plane[rows] / FLAT_RAD, offset / FLAT_M, faces.thing[rows]])
+    normal_cells = faces.plane[rows] / FLAT_RAD
+    cells = np.column_stack([normal_cells, offset / FLAT_M, faces.thing[rows]])
     group = distinct(np.rint(cells).astype(np.int64))[1]
     patches = []
     for number in range(group.max(initial=-1) + 1):
@@ -92,7 +98,8 @@ def reversed_faces(corners_m: Array) -> Indices:
     keys = np.einsum("fij,ij->f", np.ascontiguousarray(corners_m), weights)
     wanted = np.einsum("fij,ij->f", reverse, weights)
     order = np.argsort(keys, kind="stable")
-    place = np.clip(np.searchsorted(keys[order], wanted), 0, max(len(order) - 1, 0))
+    last = max(len(order) - 1, 0)
+    place = np.clip(np.searchsorted(keys[order], wanted), 0, last)
     candidate = order[place]
     is_same = (corners_m[candidate] == reverse).all((1, 2))
     return np.where(is_same, candidate, -1).astype(np.int32)
@@ -109,7 +116,8 @@ class RayCaster:
         faces: Triangles,
         among: ArrayLike | None = None,
     ) -> None:
-        rows = np.arange(len(faces), dtype=np.int32) if among is None else np.asarray(among, np.int32)
+        chosen = np.arange(len(faces)) if among is None else among
+        rows = np.asarray(chosen, np.int32)
         self._triangles = TriangleCaster(faces.corners_m, rows, robust=True)
         self._planes = faces.plane
         twin = reversed_faces(faces.corners_m[rows])
@@ -139,7 +147,8 @@ class RayCaster:
         if not self._has_sheets:
             return np.zeros(0, np.int64)
         rays = np.flatnonzero(self._twin[face] >= 0)
-        facing = np.einsum("ij,ij->i", self._planes[face[rays]], np.asarray(directions)[rays])
+        ray_directions = np.asarray(directions)[rays]
+        facing = np.einsum("ij,ij->i", self._planes[face[rays]], ray_directions)
         return np.asarray(rays[facing > 0])
 
     def hits(self, origins_m: ArrayLike, directions: ArrayLike) -> Hits:
@@ -160,7 +169,7 @@ def lengths(vectors: Floats) -> Floats:
 def tangents(normals: Floats) -> tuple[Floats, Floats]:
     """Two unit vectors (P, 3) each, at right angles to the normals and to each other."""
     is_upright = np.abs(normals[:, 2:]) >= 0.9
-    helper = np.where(is_upright, [[1.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]]).astype(normals.dtype)
+    helper = np.where(is_upright, X_AXIS, Z_AXIS).astype(normals.dtype)
     u = np.cross(helper, normals)
     u /= np.linalg.norm(u, axis=1, keepdims=True)
     return u, np.cross(normals, u)
@@ -168,7 +177,8 @@ def tangents(normals: Floats) -> tuple[Floats, Floats]:
 
 def offset_from_surface(points_m: Floats, normals: Floats) -> Floats:
     """Points (P, 3) lifted off their faces, so that rays from there do not meet these."""
-    lift = RAY_OFFSET_M + RAY_OFFSET * np.abs(points_m).max(1, keepdims=True)
+    largest_m = np.abs(points_m).max(1, keepdims=True)
+    lift = RAY_OFFSET_M + RAY_OFFSET * largest_m
     return np.asarray(points_m + lift * normals)
 
 
@@ -177,11 +187,14 @@ def sample_points(corners_m: Array, a: Floats, b: Floats) -> Array:
     ends_m2 = np.cumsum(areas_m2(corners_m))
     starts_m2 = np.concatenate([[0.0], ends_m2])
     sample_m2 = a * ends_m2[-1]
-    triangle = np.minimum(np.searchsorted(ends_m2, sample_m2, side="right"), len(ends_m2) - 1)
+    triangle = np.searchsorted(ends_m2, sample_m2, side="right")
+    triangle = np.minimum(triangle, len(ends_m2) - 1)
     area_m2 = np.maximum(ends_m2[triangle] - starts_m2[triangle], 1e-30)
-    share = np.sqrt(np.clip((sample_m2 - starts_m2[triangle]) / area_m2, 0, 1))
+    within = (sample_m2 - starts_m2[triangle]) / area_m2
+    share = np.sqrt(np.clip(within, 0, 1))
     first, second, third = corners_m[triangle].swapaxes(0, 1)
-    return np.asarray(first + share[:, None] * (second - first + b[:, None] * (third - second)))
+    on_far_edge = second - first + b[:, None] * (third - second)
+    return np.asarray(first + share[:, None] * on_far_edge)
 
 
 def face_materials(

@@ -33,11 +33,13 @@ class Lamp:
     def vectors_m(self, starts_m: Floats) -> Floats:
         """From points (R, 3) to the middle, or as far as matters towards the sun."""
         if self.center_m is None:
-            return np.broadcast_to((SUN_DISTANCE_M * self.axis).astype(np.float32), starts_m.shape)
+            to_sun_m = (SUN_DISTANCE_M * self.axis).astype(np.float32)
+            return np.broadcast_to(to_sun_m, starts_m.shape)
         vectors_m = self.center_m.astype(np.float32) - starts_m
         if self.radius_m == 0:
             return vectors_m
-        outside = np.maximum(1 - self.radius_m / np.linalg.norm(vectors_m, axis=1), 0)
+        distance_m = np.linalg.norm(vectors_m, axis=1)
+        outside = np.maximum(1 - self.radius_m / distance_m, 0)
         return np.asarray(vectors_m * outside[:, None])
 
     def is_before(self, normals: Array, offsets_m: Array) -> Mask:
@@ -50,10 +52,12 @@ class Lamp:
         """Whether it shines to where vectors (R, 3) lead to its middle from."""
         if self.min_cosine < -1:
             return True
-        along = np.einsum("ri,i->r", vectors_m, (-self.axis).astype(np.float32))
+        backwards = (-self.axis).astype(np.float32)
+        along = np.einsum("ri,i->r", vectors_m, backwards)
         if self.min_cosine == 0:
             return np.asarray(along > 0)
-        return np.asarray(along > self.min_cosine * np.sqrt(dot(vectors_m, vectors_m)))
+        length_m = np.sqrt(dot(vectors_m, vectors_m))
+        return np.asarray(along > self.min_cosine * length_m)
 
 
 def lamps(
@@ -63,8 +67,10 @@ def lamps(
 ) -> Iterator[tuple[Lamp, Mask]]:
     """The lights that are on at an instant, but for the sky, which has no middle; and the faces turned to each."""
     for index, light in enumerate(scene.lights):
-        if not isinstance(light, Sky) and light.level.mean(t_ns, t_ns) > 0:
-            lamp = _lamp(light, bodies.faces.corners_m[bodies.faces.lamp == index], t_ns)
+        is_on = light.level.mean(t_ns, t_ns) > 0
+        if is_on and not isinstance(light, Sky):
+            is_face = bodies.faces.lamp == index
+            lamp = _lamp(light, bodies.faces.corners_m[is_face], t_ns)
             yield lamp, lamp.is_before(bodies.normals, bodies.offsets_m)
 
 
@@ -79,17 +85,22 @@ def _lamp(
         case PointLight():
             return Lamp(light.position_m, np.zeros(3))
         case SpotLight():
-            return Lamp(light.position_m, light.direction, float(np.cos(np.deg2rad(light.outer_deg))))
+            min_cosine = float(np.cos(np.deg2rad(light.outer_deg)))
+            return Lamp(light.position_m, light.direction, min_cosine)
         case AreaLight():
             return lamp_of(corners_m)
 
 
 def lamp_of(corners_m: Array) -> Lamp:
     """The lamp whose faces (F, 3, 3) shine; where they are flat, only before them."""
-    doubled_areas = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])  # (F, 3)
-    center_m = np.average(corners_m.mean(1), axis=0, weights=np.linalg.norm(doubled_areas, axis=1))
+    first_edge_m = corners_m[:, 1] - corners_m[:, 0]
+    second_edge_m = corners_m[:, 2] - corners_m[:, 0]
+    doubled_areas = np.cross(first_edge_m, second_edge_m)  # (F, 3): normals twice as long as faces are large
+    weights = np.linalg.norm(doubled_areas, axis=1)
+    center_m = np.average(corners_m.mean(1), axis=0, weights=weights)
     axis = unit(doubled_areas.sum(0))
     from_center_m = corners_m.reshape(-1, 3) - center_m
     if np.abs(from_center_m @ axis).max() < RAY_OFFSET_M:
         return Lamp(center_m, axis, 0.0)
-    return Lamp(center_m, axis, radius_m=float(np.linalg.norm(from_center_m, axis=1).max()))
+    distances_m = np.linalg.norm(from_center_m, axis=1)
+    return Lamp(center_m, axis, radius_m=float(distances_m.max()))

@@ -63,18 +63,24 @@ class Bodies:
         self.faces = triangles(scene)
         self.movers = scene.movers
         corners_m = self.faces.corners_m
-        self.normals = np.append(self.faces.plane, np.full((1, 3), np.nan), axis=0)
-        self.offsets_m = np.append(dot(self.faces.plane, corners_m.mean(1)), np.nan)
+        no_plane = np.full((1, 3), np.nan)
+        self.normals = np.append(self.faces.plane, no_plane, axis=0)
+        offsets_m = dot(self.faces.plane, corners_m.mean(1))
+        self.offsets_m = np.append(offsets_m, np.nan)
         self.body = np.append(self.faces.mover + 1, 0)
-        self._height_m = np.append(_least_height_m(corners_m), np.nan).astype(np.float32)
-        self._edge_m = RESOLUTION * max(1.0, float(np.abs(corners_m).max(initial=0.0)))
+        heights_m = np.append(_least_height_m(corners_m), np.nan)
+        self._height_m = heights_m.astype(np.float32)
+        largest_m = float(np.abs(corners_m).max(initial=0.0))
+        self._edge_m = RESOLUTION * max(1.0, largest_m)
         self.ray_offset_m = max(RAY_OFFSET_M, self._edge_m)
         self._twin = back_faces(self.faces)
         self._cut_outs = CutOuts(self.faces, scene.materials)
-        materials = [scene.materials.get(thing.material) for thing in self.faces.things]
-        of_glass = [material is not None and material.kind == "pane" for material in materials]
+
+        glass = {name for name, material in scene.materials.items() if material.kind == "pane"}
+        of_glass = [thing.material in glass for thing in self.faces.things]
         is_pane = np.array(of_glass, bool)[self.faces.thing]
-        self._bodies = [self._body(index, is_pane) for index in range(len(scene.movers) + 1)]
+        body_count = 1 + len(scene.movers)
+        self._bodies = [self._body(index, is_pane) for index in range(body_count)]
 
     def visible(self, directions: Array, T_bodies_camera: Sequence[Array]) -> Hits:
         """What a camera sees along unit directions (R, 3) in its frame, at a distance of NaN where that is nothing."""
@@ -86,7 +92,8 @@ class Bodies:
             origins_m, body_directions = rays_in(T_body_camera, directions)
             rays = np.flatnonzero(body.near(origins_m, body_directions))
             body_hits = self._first_hits(body, origins_m[rays], body_directions[rays])
-            is_nearer = body_hits.distance < np.nan_to_num(hits.distance[rays], nan=np.inf)
+            nearest_m = np.nan_to_num(hits.distance[rays], nan=np.inf)
+            is_nearer = body_hits.distance < nearest_m
             hits.face[rays[is_nearer]] = body_hits.face[is_nearer]
             hits.distance[rays[is_nearer]] = body_hits.distance[is_nearer]
         return hits
@@ -126,19 +133,25 @@ class Bodies:
         return is_blocked
 
     def _body(self, index: int, is_pane: Mask) -> Body:
-        is_member = (self.body[:-1] == index) & (self._height_m[:-1] > 0)
+        has_area = self._height_m[:-1] > 0
+        is_member = (self.body[:-1] == index) & has_area
         points_m = self.faces.corners_m[is_member].reshape(-1, 3)
-        center_m = (points_m.min(0) + points_m.max(0)) / 2 if len(points_m) else np.zeros(3)
-        radius_m = float(np.linalg.norm(points_m - center_m, axis=1).max(initial=0.0)) + RAY_OFFSET_M
+        center_m = np.zeros(3)
+        if len(points_m):
+            center_m = (points_m.min(0) + points_m.max(0)) / 2
+        distances_m = np.linalg.norm(points_m - center_m, axis=1)
+        radius_m = float(distances_m.max(initial=0.0)) + RAY_OFFSET_M
 
         def caster(is_included: Mask) -> TriangleCaster:
-            return TriangleCaster(self.faces.corners_m, np.flatnonzero(is_member & is_included), robust=False)
+            rows = np.flatnonzero(is_member & is_included)
+            return TriangleCaster(self.faces.corners_m, rows, robust=False)
 
         # Of two faces back to back only one is there for rays: they could meet either.
         twin = self._twin[:-1]
         is_first = (twin < 0) | (twin > np.arange(len(is_pane)))
         is_solid = is_first & ~is_pane
-        has_holes = is_member & is_solid & (self._cut_outs.material[:-1] >= 0)
+        is_cut_out = self._cut_outs.material[:-1] >= 0
+        has_holes = is_member & is_solid & is_cut_out
         is_glass = is_member & is_pane
         visible = caster(is_solid)
         return Body(
@@ -170,7 +183,8 @@ class Bodies:
             hits = body.holed.hits(start_m, ahead_m, 1.0)
             is_hole = self._cut_outs.holes(hits)
             is_stopped[rays[(hits.face >= 0) & ~is_hole]] = True
-            step = (hits.distance + RAY_OFFSET_M / np.linalg.norm(ahead_m, axis=1))[:, None]
+            offset = RAY_OFFSET_M / np.linalg.norm(ahead_m, axis=1)
+            step = (hits.distance + offset)[:, None]
             goes_on = is_hole & (step[:, 0] < 1)
             rays = rays[goes_on]
             start_m = (start_m + step * ahead_m)[goes_on]
@@ -184,8 +198,10 @@ class Bodies:
         float32 may take the wrong face, float64 decides.
         """
         hits, cosine = self._float32_hits(body, origins_m, directions)
-        distance_m = (self.offsets_m[hits.face] - dot(self.normals[hits.face], origins_m)) / cosine
-        least_weight = np.minimum(np.minimum(hits.u, hits.v), 1 - hits.u - hits.v)
+        origin_offsets_m = dot(self.normals[hits.face], origins_m)
+        distance_m = (self.offsets_m[hits.face] - origin_offsets_m) / cosine
+        first_weight = 1 - hits.u - hits.v
+        least_weight = np.minimum(np.minimum(hits.u, hits.v), first_weight)
         edge_distance_m = least_weight * self._height_m[hits.face]
         doubtful = np.flatnonzero(-cosine * edge_distance_m < self._edge_m)
         distance_m[doubtful] = hits.distance[doubtful]
@@ -248,16 +264,20 @@ class Bodies:
             return
         ahead = directions[doubtful]
         reach_m = hits.distance[doubtful]
-        right = unit(np.cross(ahead, AXES[np.argmin(np.abs(ahead), axis=1)]))
+        least_along = AXES[np.argmin(np.abs(ahead), axis=1)]
+        right = unit(np.cross(ahead, least_along))
         down = np.cross(ahead, right)
-        step = STEP_EDGES * self._edge_m / np.where(reach_m > 0, reach_m, 1)[:, None]
+        lever_m = np.where(reach_m > 0, reach_m, 1)[:, None]
+        step = STEP_EDGES * self._edge_m / lever_m
         origins = np.concatenate([origins_m[doubtful]] * ASIDE)
         shifts = (0 * right, right, down, -right, -down)
         aside = np.concatenate([ahead + step * shift for shift in shifts])
 
-        candidates = self._float32_hits(body, origins, aside)[0].face.reshape(ASIDE, -1)
+        aside_hits, _ = self._float32_hits(body, origins, aside)
+        candidates = aside_hits.face.reshape(ASIDE, -1)
         candidates[0] = hits.face[doubtful]
-        exact_m = self._exact_m(candidates.ravel(), origins, np.concatenate([ahead] * ASIDE)).reshape(ASIDE, -1)
+        straight_on = np.concatenate([ahead] * ASIDE)
+        exact_m = self._exact_m(candidates.ravel(), origins, straight_on).reshape(ASIDE, -1)
         nearest = exact_m.argmin(0), np.arange(len(doubtful))
         is_met = np.isfinite(exact_m[nearest])
         hits.face[doubtful[is_met]] = candidates[nearest][is_met]
@@ -286,19 +306,24 @@ class Bodies:
 def _least_height_m(corners_m: Array) -> Array:
     """The least of the three heights (F,) of triangles (F, 3, 3)."""
     edges_m = corners_m - np.roll(corners_m, 1, axis=1)
-    longest_m = np.maximum(np.linalg.norm(edges_m, axis=2).max(1), 1e-30)
-    doubled_area_m2 = np.linalg.norm(np.cross(edges_m[:, 0], edges_m[:, 1]), axis=1)
+    lengths_m = np.linalg.norm(edges_m, axis=2)
+    longest_m = np.maximum(lengths_m.max(1), 1e-30)
+    doubled_normals = np.cross(edges_m[:, 0], edges_m[:, 1])
+    doubled_area_m2 = np.linalg.norm(doubled_normals, axis=1)
     return np.asarray(doubled_area_m2 / longest_m)
 
 
 def back_faces(faces: Triangles) -> Indices:
     """The face (F + 1,) of the same thing with the same corners that looks the other way, -1 for none."""
-    corner = _numbered(faces.corners_m.reshape(-1, 3)).reshape(-1, 3)
-    key = _numbered(np.column_stack([np.sort(corner, axis=1), faces.thing]))
+    points_m = faces.corners_m.reshape(-1, 3)
+    corner = _numbered(points_m).reshape(-1, 3)
+    corner_sets = np.sort(corner, axis=1)
+    key = _numbered(np.column_stack([corner_sets, faces.thing]))
     order = np.argsort(key, kind="stable")
     first = order[:-1]
     second = order[1:]
-    is_pair = (key[first] == key[second]) & (dot(faces.plane[first], faces.plane[second]) < 0)
+    cosine = dot(faces.plane[first], faces.plane[second])
+    is_pair = (key[first] == key[second]) & (cosine < 0)
     is_pair[1:] &= ~is_pair[:-1]
     back = np.full(len(faces) + 1, -1, np.int32)
     back[first[is_pair]] = second[is_pair]

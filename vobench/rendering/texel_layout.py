@@ -40,7 +40,8 @@ class TexelLayout:
 
     def filled(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values (P, ...) as a map (H, W, ...)."""
-        padded = np.concatenate([values, np.zeros((1, *values.shape[1:]), values.dtype)])
+        no_value = np.zeros((1, *values.shape[1:]), values.dtype)  # of the point P
+        padded = np.concatenate([values, no_value])
         return padded[self.source].reshape(self.height, self.width, *values.shape[1:])
 
     def dilated(self, marked: Mask, *, steps: int) -> Mask:
@@ -116,7 +117,8 @@ def _read_points(index: Rows, atlas: Atlas, owner: Owners) -> Rows:
     point[index] = np.arange(len(index))
     # A texel beside a face reads the one that the nearest place of the face lies in.
     read = np.flatnonzero((owner.face >= 0) & (point == len(index)))
-    corner_weights = np.column_stack([1 - owner.uv[read].sum(1), owner.uv[read]])
+    uv = owner.uv[read]
+    corner_weights = np.column_stack([1 - uv.sum(1), uv])
     nearest_px = np.einsum("ni,nij->nj", corner_weights, atlas.light_px[owner.face[read]])
     point[read] = point[atlas.index(nearest_px)]
     return point
@@ -155,7 +157,8 @@ def _interpolation(is_sparse: Mask, beside: Indices) -> "csr_array":
     for sides in (beside[:2], beside[2:]):
         known_beside = is_known[sides[0]].astype(np.float32) + is_known[sides[1]]
         known = np.flatnonzero(is_known).astype(np.int32)
-        new = np.flatnonzero(~is_known & (known_beside > 0)).astype(np.int32)
+        becomes_known = ~is_known & (known_beside > 0)
+        new = np.flatnonzero(becomes_known).astype(np.int32)
         rows = [known]
         columns = [known]
         for side in sides:
@@ -164,7 +167,8 @@ def _interpolation(is_sparse: Mask, beside: Indices) -> "csr_array":
             columns.append(side[taking])
         row = np.concatenate(rows)
         column = np.concatenate(columns)
-        shares = np.where(is_known[row], np.float32(1), 1 / np.maximum(known_beside[row], 1))
+        mean_share = 1 / np.maximum(known_beside[row], 1)
+        shares = np.where(is_known[row], np.float32(1), mean_share)
         shape = (len(is_known), len(is_known))
         step = scipy.sparse.csr_array((shares.astype(np.float32), (row, column)), shape)
         result = step @ result
@@ -177,7 +181,9 @@ def _is_sparse(index: Rows, beside: Indices, width: int) -> Mask:
     at_rim = beside == np.arange(len(index))
     in_even_column = index % width % 2 == 0
     in_even_row = index // width % 2 == 0
-    is_sparse = (in_even_column | at_rim[:2].any(0)) & (in_even_row | at_rim[2:].any(0))
+    in_column = in_even_column | at_rim[:2].any(0)
+    in_row = in_even_row | at_rim[2:].any(0)
+    is_sparse = in_column & in_row
     is_known = is_sparse
     for first, second in (beside[:2], beside[2:]):
         is_known = is_known | is_known[first] | is_known[second]

@@ -51,14 +51,17 @@ def owners(atlas: Atlas) -> Owners:
 def _nearby(atlas: Atlas, corners_px: Array) -> Iterator[tuple[Rows, Rows, Rows]]:
     """All faces with all texels in their boxes, READ_PX larger: face, column and row (N,), some PAIRS at a time."""
     size_px = (atlas.width, atlas.height)
-    low = np.maximum(np.ceil(corners_px.min(1) - READ_PX - 0.5), 0).astype(np.int64)
-    high = np.minimum(np.floor(corners_px.max(1) + READ_PX - 0.5) + 1, size_px).astype(np.int64)
+    box_low_px = corners_px.min(1) - READ_PX - 0.5
+    low = np.maximum(np.ceil(box_low_px), 0).astype(np.int64)
+    box_high_px = corners_px.max(1) + READ_PX - 0.5
+    high = np.minimum(np.floor(box_high_px) + 1, size_px).astype(np.int64)
     is_charted = (atlas.chart >= 0) & (doubled_areas_px2(corners_px) != 0)
     size = np.where(is_charted[:, None], high - low, 0)  # (F, 2): columns and rows of each face's box
 
     ends = np.cumsum(size.prod(1))
     pair_count = int(ends[-1]) if len(ends) else 0
-    cuts = np.unique(np.searchsorted(ends, np.arange(PAIRS, pair_count + PAIRS, PAIRS)) + 1)
+    limits = np.arange(PAIRS, pair_count + PAIRS, PAIRS)
+    cuts = np.unique(np.searchsorted(ends, limits) + 1)
     for faces in np.split(np.arange(len(corners_px)), cuts):
         counts = size[faces].prod(1)
         face = np.repeat(faces, counts)
@@ -76,21 +79,28 @@ def _nearest_on(corners: Array, points: Array) -> tuple[Array, Array]:
     """
     edges = np.roll(corners, -1, axis=1) - corners
     from_corners = points[:, None] - corners
-    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]  # twice the triangle's, signed
-    across = edges[..., 0] * from_corners[..., 1] - edges[..., 1] * from_corners[..., 0]
+    area = _cross(edges[:, 0], edges[:, 1])  # twice the triangle's, signed
+    across = _cross(edges, from_corners)
     inwards = across * np.sign(area)[:, None]
     squared_lengths = np.einsum("nij,nij->ni", edges, edges)
     is_inside = (inwards >= 0).all(1) & (area != 0)
-    is_near = ((inwards > 0) | (inwards**2 <= READ_PX**2 * squared_lengths)).all(1)
+    is_in_reach = inwards**2 <= READ_PX**2 * squared_lengths
+    is_near = ((inwards > 0) | is_in_reach).all(1)
 
     # The first edge lies across from the third corner.
-    weights = np.roll(across, -1, axis=1) / np.where(area == 0, 1, area)[:, None]
+    divisor = np.where(area == 0, 1, area)[:, None]
+    weights = np.roll(across, -1, axis=1) / divisor
     distance = np.where(is_inside, 0, np.inf)
     beside = np.flatnonzero(is_near & ~is_inside)
     edge_weights, edge_distance = _nearest_on_edges(edges[beside], from_corners[beside], squared_lengths[beside])
     weights[beside] = edge_weights
     distance[beside] = edge_distance
     return weights[:, 1:], distance
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Cross products (...) of vectors (..., 2)."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def _nearest_on_edges(
@@ -101,7 +111,8 @@ def _nearest_on_edges(
     """Weights (N, 3) of corners, and distance, of the nearest places on edges (N, 3, 2) to points."""
     along = np.einsum("nij,nij->ni", from_corners, edges) / np.maximum(squared_lengths, 1e-12)
     along = np.clip(along, 0, 1)
-    distances = np.linalg.norm(from_corners - along[..., None] * edges, axis=-1)
+    from_edges = from_corners - along[..., None] * edges
+    distances = np.linalg.norm(from_edges, axis=-1)
     nearest = distances.argmin(1)
     rows = np.arange(len(edges))
     weights = np.zeros((len(edges), 3))
@@ -112,5 +123,6 @@ def _nearest_on_edges(
 
 def claimed(owner: Owners, among: Mask) -> Rows:
     """The flat indices (P,) of the texels that belong to those among the faces (F,)."""
-    is_claimed = (owner.face >= 0) & (owner.distance_px <= CLAIMED_PX) & among[owner.face]
+    is_near = owner.distance_px <= CLAIMED_PX
+    is_claimed = (owner.face >= 0) & is_near & among[owner.face]
     return np.flatnonzero(is_claimed)

@@ -103,19 +103,22 @@ class Band:
         return self._points_m[:, 2] if along_axis else self._distance_m
 
     def _camera_normals(self) -> Array:
-        return self._normals(at_rows(self._picture.here.T_camera_bodies, self._uv_px[:, 1]))
+        T_camera_bodies = at_rows(self._picture.here.T_camera_bodies, self._uv_px[:, 1])
+        return self._normals(T_camera_bodies)
 
     def _mirror(self) -> Mask:
         """Which pixels (R,) show a mirror, or something through glass."""
+        mirrors = self._picture.ids.mirrors[self._face]
         behind_panes = self._bodies.behind_panes(self._rays, self._T_bodies_camera, self._distance_m)
-        return np.asarray(self._picture.ids.mirrors[self._face] | behind_panes)
+        return np.asarray(mirrors | behind_panes)
 
     def _seen_movers(self, face: Indices) -> list[tuple[int, Pixels]]:
         """The movers among faces (P,), and which of these are of each."""
         if len(self._T_bodies_camera) == 1:
             return []
         body = self._bodies.body[face]
-        return [(int(mover), np.flatnonzero(body == mover)) for mover in np.unique(body) if mover]
+        movers = [int(index) for index in np.unique(body) if index]
+        return [(mover, np.flatnonzero(body == mover)) for mover in movers]
 
     def _normals(self, T_frame_bodies: Sequence[Array]) -> Array:
         """Normals (R, 3) in a frame that the transforms, (4, 4) or (R, 4, 4) each, lead to."""
@@ -133,7 +136,8 @@ class Band:
         is_diffuse = self._picture.ids.diffuse[self._face]
         T_bodies_world = at_rows(here.T_bodies_world, rows)
         normals = self._normals(at_rows(here.T_world_bodies, rows))
-        starts_m = (self._world_m + self._bodies.ray_offset_m * normals).astype(np.float32)
+        lift_m = self._bodies.ray_offset_m * normals
+        starts_m = (self._world_m + lift_m).astype(np.float32)
         offsets_m = dot(self._world_m, normals) if self._movers else np.empty(0)
         for lamp, faces in self._picture.lamps:
             is_turned = faces[self._face]
@@ -157,7 +161,8 @@ class Band:
         for _ in range(MOST_ROUNDS):
             next_m = self._in_next_camera_m(body_m, there, rows)
             uv_px = camera.project(next_m)
-            change_px = np.nanmax(np.abs(uv_px[:, 1] - rows), initial=0.0) if there.by_row else 0.0
+            changes_px = np.abs(uv_px[:, 1] - rows)
+            change_px = np.nanmax(changes_px, initial=0.0) if there.by_row else 0.0
             if change_px < CONVERGED_PX:
                 break
             rows = uv_px[:, 1]
@@ -209,7 +214,8 @@ class Band:
         eye_m = origins_m.copy()  # (P, 3), each in the frame of the body that is seen
         for mover, of_mover in self._seen_movers(face):
             eye_m[of_mover] = of_rays(T_bodies_there[mover], of_mover)[..., :3, 3]
-        is_hidden: Mask = dot(self._bodies.normals[face], eye_m) <= self._bodies.offsets_m[face]
+        eye_offset_m = dot(self._bodies.normals[face], eye_m)
+        is_hidden: Mask = eye_offset_m <= self._bodies.offsets_m[face]
 
         T_bodies_world = at_rows(there.T_bodies_world, rows)
         reach = np.where(is_hidden, NO_RAY, np.float32(1 - DEPTH_TOLERANCE))
@@ -253,11 +259,12 @@ class TruthCaster:
             mirrors.append(is_glossy or is_metal)
             diffuse.append(is_body and material is not None and material.metal < 1)
         thing_of = np.append(faces.thing, len(faces.things))  # the last one is nothing, for the face -1
+        is_no_lamp = np.append(faces.lamp, -1) < 0
         self._ids = FaceIds(
             instance=_ids(instances, self.names.instance)[thing_of],
             material=_ids(material_names, self.names.material)[thing_of],
             mirrors=np.array([*mirrors, False])[thing_of],
-            diffuse=np.array([*diffuse, False])[thing_of] & (np.append(faces.lamp, -1) < 0),
+            diffuse=np.array([*diffuse, False])[thing_of] & is_no_lamp,
         )
         self._pool = ThreadPoolExecutor(THREADS)
 
@@ -279,7 +286,8 @@ class TruthCaster:
         for name, channel in wanted.items():
             values[name] = np.empty(channel.shape(height, camera.width_px), channel.dtype)
         movers = self._scene.movers
-        lit = lamps(self._scene, self._bodies, int(np.mean(now.t_ns))) if "shadow" in wanted else ()
+        middle_ns = int(np.mean(now.t_ns))
+        lit = lamps(self._scene, self._bodies, middle_ns) if "shadow" in wanted else ()
         picture = TruthPicture(
             bodies=self._bodies,
             ids=self._ids,

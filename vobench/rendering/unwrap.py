@@ -43,7 +43,8 @@ def unwrap(faces: Triangles, spacing_m: Array, lit: Mask) -> Atlas:
     corners_px = (faces.corners_m - lowest_m) / spacing_m[:, None, None]
     charts = _xatlas_charts(corners_px, spacing_m, _parts(faces.thing, spacing_m, np.flatnonzero(lit)))
 
-    unplaced = np.flatnonzero(lit & (charts.chart < 0) & (areas_m2(corners_px) > LEAST_PX2))
+    has_area = areas_m2(corners_px) > LEAST_PX2
+    unplaced = np.flatnonzero(lit & (charts.chart < 0) & has_area)
     if len(unplaced):
         unplaced_px = corners_px[unplaced]
         places, chart, width, height = axis_charts(
@@ -53,7 +54,8 @@ def unwrap(faces: Triangles, spacing_m: Array, lit: Mask) -> Atlas:
         charts.chart[unplaced] = chart + charts.chart.max() + 1
         charts.width = max(charts.width, width)
         charts.height = charts.height + height
-    _place_thin_faces(faces, charts.places, charts.chart, np.flatnonzero(lit & (charts.chart < 0)))
+    thin = np.flatnonzero(lit & (charts.chart < 0))
+    _place_thin_faces(faces, charts.places, charts.chart, thin)
     return _with_shared_blocks(charts, faces.lamp + 1)
 
 
@@ -78,7 +80,8 @@ def _with_shared_blocks(charts: _Charts, block: Indices) -> Atlas:
     has_no_chart = charts.chart < 0
     charts.places[has_no_chart] = middle[has_no_chart, None]
     height += BLOCK * (int(block.max(initial=0)) // blocks_a_row + 1)
-    light_px = (np.rint(charts.places * FINENESS) / FINENESS).astype(np.float32)
+    rounded_px = np.rint(charts.places * FINENESS) / FINENESS
+    light_px = rounded_px.astype(np.float32)
     return Atlas(light_px, charts.chart, height, width)
 
 
@@ -87,13 +90,17 @@ def _parts(thing: Indices, spacing_m: Array, faces: Rows) -> list[Rows]:
     if not len(faces):
         return []
     order = faces[np.lexsort((spacing_m[faces], thing[faces]))]
-    begins_part = (np.diff(thing[order]) != 0) | (np.diff(spacing_m[order]) != 0)
+    is_new_thing = np.diff(thing[order]) != 0
+    is_new_spacing = np.diff(spacing_m[order]) != 0
+    begins_part = is_new_thing | is_new_spacing
     return np.split(order, np.flatnonzero(begins_part) + 1)
 
 
 def _xatlas_charts(corners_px: Array, spacing_m: Array, parts: Sequence[Rows]) -> _Charts:
     """Charts of the parts of faces with corners (F, 3, 3) in texels; none without xatlas."""
-    charts = _Charts(np.zeros((len(corners_px), 3, 2)), np.full(len(corners_px), -1, np.int32), 0, 0)
+    places = np.zeros((len(corners_px), 3, 2))
+    no_chart = np.full(len(corners_px), -1, np.int32)
+    charts = _Charts(places, no_chart, 0, 0)
     try:
         import xatlas
     except ImportError:  # Python 3.14 has none yet
@@ -106,7 +113,8 @@ def _xatlas_charts(corners_px: Array, spacing_m: Array, parts: Sequence[Rows]) -
         is_whole = (vertex != np.roll(vertex, 1, axis=1)).all(1)
         if is_whole.any():
             vertices_px = corners_px[part].reshape(-1, 3)[first]
-            atlas.add_mesh((vertices_px - vertices_px.min(0)).astype(np.float32), vertex[is_whole].astype(np.uint32))
+            from_lowest_px = (vertices_px - vertices_px.min(0)).astype(np.float32)
+            atlas.add_mesh(from_lowest_px, vertex[is_whole].astype(np.uint32))
             added.append(part[is_whole])
     stop.check()
 
@@ -183,7 +191,8 @@ def axis_charts(
     size = np.maximum(np.ceil(high - low - 1e-6), 1)
     stretch = size / np.maximum(high - low, 1e-9)
     places = (places - low[chart, None]) * stretch[chart, None]
-    box_corner, width, height = _shelves(size.astype(np.int64) + 1 + 2 * PADDING)
+    padded_size = size.astype(np.int64) + 1 + 2 * PADDING
+    box_corner, width, height = _shelves(padded_size)
     return places + box_corner[chart, None] + PADDING + 0.5, chart, width, height
 
 
@@ -196,7 +205,8 @@ def nearest_axis(vectors: Array) -> Rows:
 
 def _shelves(sizes: Rows) -> tuple[Rows, int, int]:
     """Corners (N, 2) of boxes (N, 2) in shelves, tallest first, and the width and height of them all."""
-    width = int(max(np.sqrt(sizes.prod(1).sum()), sizes[:, 0].max()))
+    square_side = np.sqrt(sizes.prod(1).sum())
+    width = int(max(square_side, sizes[:, 0].max()))
     corners = np.zeros_like(sizes)
     column = 0
     row = 0

@@ -35,17 +35,21 @@ class Visibility:
         among: ArrayLike,
     ) -> None:
         rows = np.asarray(among, np.int32)
-        kinds = face_materials(faces, materials)
+        materials_of = face_materials(faces, materials)
         thing = faces.thing[rows]
-        kind_names = np.array([kind.kind if kind else "" for kind in kinds])
-        is_pane = kind_names[thing] == "pane"
-        is_mirror = kind_names[thing] == "mirror"
-        is_smooth = np.array([kind is not None and kind.roughness == 0 for kind in kinds])[thing]
+        names = np.array([material.kind if material else "" for material in materials_of])
+        is_pane = names[thing] == "pane"
+        is_mirror = names[thing] == "mirror"
+        roughness = np.array([material.roughness if material else np.nan for material in materials_of])
+        is_smooth = roughness[thing] == 0
 
         self.faces = faces
-        self.normals = np.append(faces.plane, np.zeros((1, 3)), 0).astype(np.float32)
-        self._eta = np.array([kind.eta if kind else 1.0 for kind in kinds])[faces.thing]
-        self._tint = np.array([kind.tint if kind else 1.0 for kind in kinds], np.float32)[faces.thing]
+        normals = np.append(faces.plane, np.zeros((1, 3)), 0)  # the last one for the face -1
+        self.normals = normals.astype(np.float32)
+        etas = [material.eta if material else 1.0 for material in materials_of]
+        self._eta = np.array(etas)[faces.thing]
+        tints = [material.tint if material else 1.0 for material in materials_of]
+        self._tint = np.array(tints, np.float32)[faces.thing]
         self.opaque = RayCaster(faces, rows[~is_pane])
         self._glass = RayCaster(faces, rows[is_pane])
         self._has_panes = bool(is_pane.any())
@@ -59,7 +63,8 @@ class Visibility:
         # Panes that the sky is seen through are lamps of their own.
         self.sky_panes: list[PlanarPatch] = []
         for pane in planar_patches(faces, rows[is_pane], at_least_m2=WIDE_M2):
-            if self._sees_sky(pane) and not any(pane.coincides(other) for other in self.sky_panes):
+            is_back = any(pane.coincides(other) for other in self.sky_panes)
+            if not is_back and self._sees_sky(pane):
                 self.sky_panes.append(pane)
         sky_pane_faces = [face for pane in self.sky_panes for face in pane.faces]
         self._sky_panes = RayCaster(faces, sky_pane_faces)
@@ -90,7 +95,9 @@ class Visibility:
 
     def first_panes(self, origins_m: Floats, segments_m: Floats) -> tuple[Rows, Hits]:
         """Which rays from origins along segments (R, 3) cross a pane (K,), and where they meet their first."""
-        crosses = self._glass.stops(origins_m, segments_m) if self._has_panes else np.zeros(len(origins_m), bool)
+        crosses = np.zeros(len(origins_m), bool)
+        if self._has_panes:
+            crosses = self._glass.stops(origins_m, segments_m)
         rays = np.flatnonzero(crosses)
         return rays, self._glass.hits(origins_m[rays], segments_m[rays])
 
@@ -118,9 +125,11 @@ class Visibility:
             length_m = lengths(ahead)
             cosine = np.einsum("ij,ij->i", ahead, self.normals[pane]) / length_m
             reflected = pane_reflectance(cosine, self._eta[pane])
-            share[rays] *= self._tint[pane] * (1 - reflected).astype(np.float32)
+            passed = (1 - reflected).astype(np.float32)
+            share[rays] *= self._tint[pane] * passed
             step = hits.distance[crossing] + RAY_OFFSET_M / length_m
-            travelled = (travelled[crossing] + (1 - travelled[crossing]) * step).astype(np.float32)
+            before = travelled[crossing]
+            travelled = (before + (1 - before) * step).astype(np.float32)
         return share
 
     def _sees_sky(self, pane: PlanarPatch) -> bool:
@@ -136,5 +145,6 @@ class Visibility:
         points_m = np.tile(sample_points(pane.corners_m, a, b), (2, 1))
         origins_m = points_m + RAY_OFFSET_M * directions
         segments_m = FAR_M * directions
-        is_blocked = self.opaque.stops(origins_m, segments_m) | self._glass.stops(origins_m, segments_m)
+        is_walled = self.opaque.stops(origins_m, segments_m)
+        is_blocked = is_walled | self._glass.stops(origins_m, segments_m)
         return not is_blocked.all()

@@ -95,7 +95,8 @@ def _cuts(points_m: Array, edges: Indices) -> Cuts:
     from_start_m = points_m[point] - start_m[edge]
     along_m = np.einsum("ij,ij->i", from_start_m, vector_m[edge]) / length_m[edge]
     share = along_m / length_m[edge]
-    beside_m = np.linalg.norm(from_start_m - share[:, None] * vector_m[edge], axis=1)
+    from_edge_m = from_start_m - share[:, None] * vector_m[edge]
+    beside_m = np.linalg.norm(from_edge_m, axis=1)
     is_between = (along_m > WELD_M) & (along_m < length_m[edge] - WELD_M)
     is_on_edge = (beside_m < WELD_M) & is_between
 
@@ -152,5 +153,7 @@ def _split(
     weights = np.array(rim_weights)
     middle_m = np.broadcast_to(points_m[face].mean(0), outline_m.shape)
     middle_weights = np.full_like(weights, 1 / 3)
-    parts_m = np.stack([outline_m, np.roll(outline_m, -1, axis=0), middle_m], 1)
-    return parts_m, np.stack([weights, np.roll(weights, -1, axis=0), middle_weights], 1)
+    next_m = np.roll(outline_m, -1, axis=0)
+    parts_m = np.stack([outline_m, next_m, middle_m], 1)
+    next_weights = np.roll(weights, -1, axis=0)
+    return parts_m, np.stack([weights, next_weights, middle_weights], 1)
