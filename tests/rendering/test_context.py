@@ -167,5 +167,5 @@ def test_a_display_that_fails_is_one_line_too(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(context, "_display", fail)
     sentence = refusal()
-    assert "says AssertionError: eglInitialize returned 0" in sentence
+    assert "reports AssertionError: eglInitialize returned 0" in sentence
     assert sentence.endswith(context.EGL_REMEDY)

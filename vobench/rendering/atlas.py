@@ -26,7 +26,8 @@ class Atlas:
     @property
     def light_uv(self) -> Floats:
         """The places (F, 3, 2) float32 in [0, 1]."""
-        return (self.light_px / (self.width, self.height)).astype(np.float32)
+        size_px = (self.width, self.height)
+        return (self.light_px / size_px).astype(np.float32)
 
     def index(self, places_px: Floats) -> Rows:
         """The flat index (R,) of the texel at places (R, 2)."""
@@ -49,7 +50,9 @@ class Atlas:
         flat = light.reshape(self.height * self.width, -1)
         total = np.zeros((len(share), flat.shape[1]))
         for right, below in CORNER_TEXELS:
-            weight = np.abs(1 - right - share[:, 0]) * np.abs(1 - below - share[:, 1])
+            column_weight = np.abs(1 - right - share[:, 0])
+            row_weight = np.abs(1 - below - share[:, 1])
+            weight = column_weight * row_weight
             texel = self.index(upper_left + np.array([right, below]))
             total += weight[:, None] * flat[texel]
         return total.reshape(len(share), *light.shape[2:])

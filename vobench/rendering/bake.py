@@ -141,7 +141,8 @@ def spacings_m(scene: Scene, faces: Triangles, settings: BakeSettings) -> Array:
 
     On what asks for nothing it grows with the scene, so that SAMPLES do.
     """
-    asked_m = np.array([thing.spacing_m or 0.0 for thing in faces.things])[faces.thing]
+    things_ask_m = [thing.spacing_m or 0.0 for thing in faces.things]
+    asked_m = np.array(things_ask_m)[faces.thing]
     static_factor = np.where(_sunlit(scene, faces), 1 / SUNLIT_FINER, 1.0)
     factor = np.where(faces.mover < 0, static_factor, MOVER_COARSER)
     spacing_m = np.where(asked_m, asked_m, settings.spacing_m) * factor
@@ -164,7 +165,8 @@ def _sunlit(scene: Scene, faces: Triangles) -> Mask:
     face = np.repeat(static, probe_count)
     a, b = np.random.default_rng(0).random((2, len(face), 1))
     first, second, third = faces.corners_m[face].swapaxes(0, 1)
-    probes_m = first + np.sqrt(a) * (second - first + b * (third - second))
+    on_far_edge = second - first + b * (third - second)
+    probes_m = first + np.sqrt(a) * on_far_edge
     origins_m = offset_from_surface(probes_m, faces.plane[face])
 
     is_opaque = (faces.mover < 0) & ~are_panes(faces, scene.materials)
@@ -180,7 +182,8 @@ def _sunlit(scene: Scene, faces: Triangles) -> Mask:
     # All of a plane and of a small thing, so that no map changes its spacing in the middle of either.
     thing_area_m2 = np.bincount(faces.thing, area_m2)
     is_small = thing_area_m2[faces.thing] < SMALL_M2
-    offset = np.rint(np.einsum("ij,ij->i", faces.plane, faces.corners_m[:, 0]) * 1e3)
+    offset_m = np.einsum("ij,ij->i", faces.plane, faces.corners_m[:, 0])
+    offset = np.rint(offset_m * 1e3)
     normal = np.rint(faces.plane * 1e3)
     plane_keys = [np.where(is_small, 0, column) for column in (*normal.T, offset)]
     group = distinct(np.column_stack([faces.thing, *plane_keys]))[1]
@@ -225,7 +228,8 @@ def bake(
     atlas = unwrap(faces, spacing_m, bodies(scene, faces))
     visibility, points, layout = static_points(scene, faces, atlas, settings.seed)
     thing = faces.thing[points.face]
-    step_m = np.maximum(settings.indirect_spacing_m, CELL_TEXELS * spacing_m[points.face]).astype(np.float32)
+    cell_m = CELL_TEXELS * spacing_m[points.face]
+    step_m = np.maximum(settings.indirect_spacing_m, cell_m).astype(np.float32)
     groups = surfels(points, thing, step_m, visibility)
     surfel_of = np.append(groups.of, np.int32(-1))[layout.source]
     report(PLACED_DONE)
@@ -245,13 +249,15 @@ def bake(
         rays=max(settings.indirect_rays, SKY_RAYS if skies else 0),
         done=lambda share: report(PLACED_DONE + (GATHER_DONE - PLACED_DONE) * share),
     )
-    is_usable = np.asarray(gathered.table.sum(1)).ravel() + gathered.escaped > BLIND
+    met_share = np.asarray(gathered.table.sum(1)).ravel()
+    is_usable = met_share + gathered.escaped > BLIND
     spread = blend(points, groups, layout, visibility, is_usable)
     open_sky = (spread @ gathered.escaped)[points.index] > 0
     static = StaticScene(faces, visibility, atlas, points, layout, groups.of, open_sky)
 
     # A surfel is represented by its points that rays have found, not by those that lie hidden under a rug.
-    weights = np.bincount(layout.source, gathered.hits, len(points) + 1)[: len(points)] + UNSEEN
+    point_hits = np.bincount(layout.source, gathered.hits, len(points) + 1)
+    weights = point_hits[: len(points)] + UNSEEN
     scatters = albedo(faces, scene.materials, points)
     instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
     direct = np.zeros((len(scene.lights), atlas.height, atlas.width), np.float32)
@@ -331,7 +337,8 @@ def key_times_ns(light: Light) -> tuple[float, ...]:
     if not light.moves:
         return (light.times_s[0] * NS_PER_S,)
     times_ns = np.array(light.times_s) * NS_PER_S
-    step_counts = np.maximum(np.ceil(np.diff(travelled_rad(light)) / SUN_STEP_RAD), 1).astype(int)
+    steps = np.ceil(np.diff(travelled_rad(light)) / SUN_STEP_RAD)
+    step_counts = np.maximum(steps, 1).astype(int)
     inner_ns = []
     for (start_ns, end_ns), count in zip(pairwise(times_ns), step_counts, strict=True):
         inner_ns.append(np.linspace(start_ns, end_ns, count, endpoint=False))
@@ -364,7 +371,8 @@ def direct_points(
     images = mirror_images(light, static.visibility, t_ns=t_ns)
     for emitter in [*emitters(light, static.visibility, t_ns=t_ns), *images]:
         stop.check()
-        is_reachable = static.open_sky if emitter.sky == "open" else np.ones(len(static.points), bool)
+        everywhere = np.ones(len(static.points), bool)
+        is_reachable = static.open_sky if emitter.sky == "open" else everywhere
         total += direct_light(
             emitter,
             static.points,
@@ -423,7 +431,8 @@ def _painted(baked: BakedScene) -> dict[str, Any]:
     materials = baked.scene.materials
     names = {thing.material for thing in baked.faces.things} & materials.keys()
     shown = {id(getattr(materials[name], part)) for name in names for part in TEXTURE_FIELDS}
-    return {name: texture.pixels() for name, texture in _textures(materials).items() if id(texture) in shown}
+    painted = {name: texture for name, texture in _textures(materials).items() if id(texture) in shown}
+    return {name: texture.pixels() for name, texture in painted.items()}
 
 
 def _textures(materials: Mapping[str, Material]) -> dict[str, Texture]:
@@ -466,7 +475,7 @@ def load_baked(folder: Path, scene: Scene) -> BakedScene:
             tracks.append(SunTrack(sun, tuple(track["times_ns"].tolist()), track["bounced"]))
         atlas = Atlas(arrays["light_px"], arrays["chart"], *light.shape[1:])
         patches = Patches(*(arrays[field.name] for field in fields(Patches)))
-        texel_count = light[0].size if len(light) else atlas.height * atlas.width
+        texel_count = atlas.height * atlas.width
         spread_arrays = tuple(arrays[f"spread_{name}"] for name in SPREAD_ARRAYS)
         spread = scipy.sparse.csr_matrix(spread_arrays, (texel_count, len(patches.area_m2)))
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, SettingError) as error:

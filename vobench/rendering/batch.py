@@ -97,7 +97,8 @@ def geometry(
     order, cluster = _clustered(mesh.corners_m.mean(1), batch, parts.thing)
 
     tile_m = np.array([material.tile_m for material in of_things])[parts.thing]
-    needs_normals = np.array([batch.has_gloss and batch.mirror is None for batch in batches])[batch]
+    shows_gloss = [one.has_gloss and one.mirror is None for one in batches]
+    needs_normals = np.array(shows_gloss)[batch]
     columns = [
         mesh.corners_m,
         mesh.interpolated(faces.normals) * needs_normals[:, None, None],
@@ -132,7 +133,8 @@ def _areas_m2(corners_m: Array) -> Array:
 
 def _mirror_faces(mesh: WatertightMesh, parts: _Parts, of_things: Sequence[Material]) -> MirrorFaces:
     strength = np.array([sharpness(material) for material in of_things])[parts.thing]
-    of_glass = np.array([material.kind == "pane" for material in of_things], bool)[parts.thing]
+    glass = [material.kind == "pane" for material in of_things]
+    of_glass = np.array(glass, bool)[parts.thing]
     return MirrorFaces(
         corners_m=mesh.corners_m,
         normals=parts.normals,

@@ -41,8 +41,10 @@ class CullingSet:
     def __init__(self, clusters: Clusters) -> None:
         self._clusters = clusters
         self._centre_m = (clusters.low_m + clusters.high_m) / 2
-        self._radius_m = np.linalg.norm(clusters.high_m - clusters.low_m, axis=1) / 2
-        self._of_movers = {int(mover): np.flatnonzero(clusters.mover == mover) for mover in np.unique(clusters.mover)}
+        size_m = clusters.high_m - clusters.low_m
+        self._radius_m = np.linalg.norm(size_m, axis=1) / 2
+        movers = np.unique(clusters.mover).tolist()
+        self._of_movers = {mover: np.flatnonzero(clusters.mover == mover) for mover in movers}
 
     def visible(self, view: PinholeView, box: Box) -> Runs:
         """By batch the runs (first, count) of indices that can touch a box of a picture; no others can."""
@@ -68,7 +70,8 @@ class CullingSet:
         distance_m = np.linalg.norm(from_eye_m, axis=1)
         along_axis_m = np.einsum("ij,ij->i", from_eye_m, self._clusters.axis[members])
         nearest_m = along_axis_m - self._radius_m[members]
-        return np.asarray(nearest_m < self._clusters.sine[members] * distance_m + WELD_M)
+        limit_m = self._clusters.sine[members] * distance_m
+        return np.asarray(nearest_m < limit_m + WELD_M)
 
     def _runs(self, members: Indices) -> Runs:
         """The indices of clusters (K,), those of neighbours joined."""
@@ -82,8 +85,9 @@ class CullingSet:
         first = clusters.first[members[begins]]
         count = np.add.reduceat(clusters.count[members], begins)
         runs: Runs = {}
-        for index, run in zip(batch[begins].tolist(), zip(first.tolist(), count.tolist(), strict=True), strict=True):
-            runs.setdefault(index, []).append(run)
+        batches = batch[begins].tolist()
+        for index, *run in zip(batches, first.tolist(), count.tolist(), strict=True):
+            runs.setdefault(index, []).append((run[0], run[1]))
         return runs
 
 
@@ -96,7 +100,8 @@ def bounds(view: PinholeView, box: Box) -> Array:
     top = 1 - 2 * (v0 - MARGIN_PX) / camera.height_px
     bottom = 1 - 2 * (v1 + MARGIN_PX) / camera.height_px
     x, y, nearness, w = view.view_projection
-    planes = [x - left * w, right * w - x, y - bottom * w, top * w - y, w - nearness]
+    sides = [x - left * w, right * w - x, y - bottom * w, top * w - y]
+    planes = [*sides, w - nearness]
     if view.mirror is not None:
         planes.append(np.array([*view.mirror.normal, view.mirror.offset_m]))
     return np.array(planes)

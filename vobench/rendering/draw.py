@@ -134,7 +134,8 @@ class BatchDraw:
 
         whole = (0, view.camera.width_px, 0, view.camera.height_px)
         boxes = {}
-        for mirror, outline_box in zip(mirrors, visible_boxes(view.camera, outlines_camera_m).tolist(), strict=True):
+        outline_boxes = visible_boxes(view.camera, outlines_camera_m).tolist()
+        for mirror, outline_box in zip(mirrors, outline_boxes, strict=True):
             box = within(outline_box, whole)
             if box:
                 boxes[mirror.index] = box
@@ -155,7 +156,8 @@ class BatchDraw:
         least_px = LEAST_SHARE * view.camera.width_px * view.camera.height_px
         ranked = []
         for index, (u0, u1, v0, v1) in boxes.items():
-            shown_px = (u1 - u0) * (v1 - v0) * self._mirrors[index].strength
+            box_px = (u1 - u0) * (v1 - v0)
+            shown_px = box_px * self._mirrors[index].strength
             ranked.append((shown_px, index))
         ranked.sort(reverse=True)
 
@@ -203,12 +205,14 @@ def _plane_towards(mirror: Mirror, view: PinholeView) -> Plane | None:
         plane = plane.flipped()
         if not mirror.is_pane:
             return None
-    is_looked_into = view.mirror and view.mirror.key in (plane.key, plane.flipped().key)
+    keys = (plane.key, plane.flipped().key)
+    is_looked_into = view.mirror and view.mirror.key in keys
     return None if is_looked_into else plane
 
 
 def _distance_m(mirror: Mirror, view: PinholeView) -> float:
     """How far the nearest corner of a mirror is from the camera."""
     T_camera_world = se3.inverse(view.T_world_camera) @ view.images
-    corners_m = se3.apply(T_camera_world @ view.pose(mirror.mover), mirror.outline_m)
+    T_camera_mover = T_camera_world @ view.pose(mirror.mover)
+    corners_m = se3.apply(T_camera_mover, mirror.outline_m)
     return float(np.linalg.norm(corners_m, axis=-1).min())

@@ -135,7 +135,8 @@ class DrawCalls:
         GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
         for gradation, scatter, sun, colour in view.skies:
             is_mono = canvas.abilities != ()
-            shown = np.array([colour[:3] @ weights, 0, 0, 0]) if is_mono else colour
+            mono = np.array([colour[:3] @ weights, 0, 0, 0])
+            shown = mono if is_mono else colour
             program = self._program("background", "background")
             program.use(
                 world_from_screen=view.world_from_screen, gradation=gradation, scatter=scatter, sun=sun, colour=shown
@@ -158,7 +159,8 @@ class DrawCalls:
         weights = target.weights if is_mixed else np.ones(3)
         defines = ["IS_MONO"] if is_mixed else []
         program = self._program("fullscreen", "mean", *defines)
-        program.use(count=canvas.layers, weight=share / canvas.layers * np.array([*weights, 0.0]))
+        weight = share / canvas.layers * np.array([*weights, 0.0])
+        program.use(count=canvas.layers, weight=weight)
         GL.glEnable(GL.GL_BLEND)
         GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
         GL.glDisable(GL.GL_DEPTH_TEST)
@@ -202,7 +204,7 @@ def _textures(batches: Sequence[Batch]) -> dict[int, SurfaceTexture]:
             if texture:
                 textures[id(texture)] = texture
     pixels = {key: texture.pixels() for key, texture in textures.items()}
-    sizes = np.array([picture.shape[0] * picture.shape[1] for picture in pixels.values()], float)
+    sizes = np.array([np.prod(picture.shape[:2]) for picture in pixels.values()], float)
     shrink = np.zeros(len(pixels), int)
     while (sizes / 4.0**shrink).sum() > MOST_TEXELS:
         shrink[np.argmax(sizes / 4.0**shrink)] += 1
@@ -285,8 +287,9 @@ def _set_batch(
     emitted = emitted_cd_m2(material)
     spread = np.divide(material.emission_cd_m2, emitted, out=np.ones(3), where=emitted > 0)
     values["emission"] = spread if batch.is_lamp else material.emission_cd_m2
-    repeats = material.tile_m / material.emission_texture.tile_m if material.emission_texture else 1.0
-    values["emission_repeats"] = repeats
+    values["emission_repeats"] = 1.0
+    if material.emission_texture:
+        values["emission_repeats"] = material.tile_m / material.emission_texture.tile_m
 
     if batch.mirror:
         values["plane"] = _coefficients(batch.mirror.plane)
@@ -314,4 +317,5 @@ def probe_share(batch: Batch) -> float:
     """How much a batch shows of the probe instead of what lights it."""
     if batch.material.kind != "body":
         return 1.0
-    return float(np.clip((PROBE_MOST - batch.material.roughness) / FADE, 0, 1))
+    below = PROBE_MOST - batch.material.roughness
+    return float(np.clip(below / FADE, 0, 1))

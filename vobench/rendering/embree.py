@@ -100,8 +100,10 @@ def _rays(
 ) -> tuple[Floats, Floats, Floats]:
     """Contiguous float32 arrays, as Embree wants them; reach (R,) or one for all, in lengths of the direction."""
     origins = np.ascontiguousarray(origins_m, np.float32)
-    reaches = np.full(len(origins), reach, np.float32) if np.ndim(reach) == 0 else reach
-    return origins, np.ascontiguousarray(directions, np.float32), np.ascontiguousarray(reaches, np.float32)
+    is_same = np.ndim(reach) == 0
+    reaches = np.full(len(origins), reach, np.float32) if is_same else reach
+    float32_directions = np.ascontiguousarray(directions, np.float32)
+    return origins, float32_directions, np.ascontiguousarray(reaches, np.float32)
 
 
 def new_scene(*, robust: bool = False) -> Any:
@@ -154,7 +156,8 @@ def with_portable_places(
         return hit
     triangle = hit["primID"].astype(np.int64)
     rays = np.flatnonzero((triangle >= 0) & (triangle < len(triangles_m)))
-    a, b, c = np.moveaxis(triangles_m[triangle[rays]].astype(np.float64), 1, 0)
+    corners_m = triangles_m[triangle[rays]].astype(np.float64)
+    a, b, c = np.moveaxis(corners_m, 1, 0)
     origin = origins_m[rays].astype(np.float64)
     direction = directions[rays].astype(np.float64)
 

@@ -69,7 +69,8 @@ class FrameRenderer:
         # An even number of sub-frames, four or more, share the samples between them at half the cost.
         can_share = frame_count >= HALVED_FRAMES and frame_count % 2 == 0
         grids = HALVES if can_share else (TURNED,)
-        targets = [self._target(camera.width_px, camera.height_px, grid, weights) for grid in grids]
+        size_px = (camera.width_px, camera.height_px)
+        targets = [self._target(*size_px, grid, weights) for grid in grids]
         total = targets[0].total
         self._expose(targets, camera, views, boxes, total.whole)
         return total.read(total.whole)
@@ -85,7 +86,8 @@ class FrameRenderer:
             light_map = Illumination(replace(baked, scene=steady_scene)).at(0, 0)
         self._light.update(light_map)
         ambient_cd_m2 = np.broadcast_to(self._ambient.cd_m2(light_map), 3)
-        away = [se3.transform(np.eye(3), [0, 0, -AWAY_M])] * len(self._movers)
+        T_world_away = se3.transform(np.eye(3), [0, 0, -AWAY_M])
+        away = [T_world_away] * len(self._movers)
 
         def draw(camera: Pinhole, T_world_camera: Array) -> tuple[Radiance, Radiance]:
             target = self._target(camera.width_px, camera.height_px, TURNED, None)
@@ -166,7 +168,8 @@ class FrameRenderer:
             glints=shown_glints,
         )
         if self._movers:
-            light = self._illumination.at(start_ns, end_ns, self._draw.views(pinhole, box))
+            views = self._draw.views(pinhole, box)
+            light = self._illumination.at(start_ns, end_ns, views)
         self._light.update(light)
         return pinhole
 
@@ -178,7 +181,8 @@ def _steady(light: Light) -> Light:
 
 def _skies(background: Background, start_ns: int, end_ns: int) -> Array:
     """The shader's coefficients (S, 4, 4) of every sky, its colour the last."""
-    colours = np.array([[[*sky.colour, 0.0]] for sky in background.skies]).reshape(-1, 1, 4)
+    rows = [[*sky.colour, 0.0] for sky in background.skies]
+    colours = np.array(rows).reshape(-1, 1, 4)
     return np.concatenate([background.coefficients(start_ns, end_ns), colours], 1)
 
 

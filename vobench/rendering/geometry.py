@@ -106,7 +106,7 @@ def reversed_faces(corners_m: Array) -> Indices:
 
 
 class RayCaster:
-    """Rays against faces of a table, with Embree; `among` (K,) says which; hits name them as the table does.
+    """Rays against the faces `among` (K,) of a table, by Embree; hits name them by their place in the table.
 
     Of the two sides of a sheet rays meet the one that they come from.
     """

@@ -26,11 +26,13 @@ class AmbientLight:
     def __init__(self, baked: BakedScene) -> None:
         patches = baked.patches
         # Counted from -1, the texels of no surfel.
-        texel_count = np.bincount(patches.surfel_of + 1, minlength=len(patches.area_m2) + 1)[1:]
+        surfel_count = len(patches.area_m2)
+        texel_count = np.bincount(patches.surfel_of + 1, minlength=surfel_count + 1)[1:]
         total_m2 = max(patches.area_m2.sum(), 1e-12)
         texel_share = patches.area_m2 / np.maximum(texel_count, 1) / np.pi / total_m2
         surfel_weights = texel_share[:, None] * patches.reflectance
-        weights = np.append(surfel_weights, np.zeros((1, 3)), 0).astype(np.float32)
+        with_none = np.append(surfel_weights, np.zeros((1, 3)), 0)  # the last one for the surfel -1
+        weights = with_none.astype(np.float32)
         self._weights = weights[patches.surfel_of].reshape(*baked.direct.shape[1:], 3)
         self._light = self._weights
         self._mean_cd_m2 = np.zeros(3)
@@ -49,7 +51,8 @@ class Background:
 
     def __init__(self, lights: Sequence[Light]) -> None:
         self.skies = [light for light in lights if isinstance(light, Sky)]
-        self._nominal = np.array([_coefficients(sky) for sky in self.skies]).reshape(-1, 3, 4)
+        nominal = [_coefficients(sky) for sky in self.skies]
+        self._nominal = np.array(nominal).reshape(-1, 3, 4)
 
     def coefficients(self, start_ns: int, end_ns: int) -> Array:
         """(S, 3, 4): `gradation`, `scatter` and `sun` of the shader, with the mean level over an interval."""
@@ -63,7 +66,8 @@ def _coefficients(sky: Sky) -> Array:
     """Source: ISO 15469:2004, eqs 1 to 7; the scale follows from the luminance at the zenith."""
     a, b, c, d, e = SKIES[sky.kind]
     scatter_across = np.exp(d * np.pi / 2)
-    chi = np.arccos(np.clip(ZENITH @ sky.sun_direction, -1, 1))  # from the sun to the zenith
+    cosine = np.clip(ZENITH @ sky.sun_direction, -1, 1)
+    chi = np.arccos(cosine)  # from the sun to the zenith
     gradation = 1 + a * np.exp(b)
     scatter = 1 + c * (np.exp(d * chi) - scatter_across) + e * np.cos(chi) ** 2
     zenith, ground = sky.luminance_cd_m2(np.stack([ZENITH, -ZENITH]))
@@ -181,7 +185,8 @@ class Illumination:
         total = np.zeros((*baked.direct.shape[1:], 3), np.float32)
         indirect = np.zeros(baked.bounced.shape[1:], np.float32)
         for index, level in levels.items():
-            colour = (level * np.array(self._lights[index].colour)).astype(np.float32)
+            nominal_colour = np.array(self._lights[index].colour)
+            colour = (level * nominal_colour).astype(np.float32)
             indirect += colour * baked.bounced[index]
             for channel in range(3):
                 total[..., channel] += colour[channel] * baked.direct[index]
@@ -198,7 +203,8 @@ class Illumination:
             direct = direct_layer(scene, index, self._static, light)[..., None]
             indirect = baked.spread @ _between(self._tracks[index], t_ns)
             colour = np.array(self._lights[index].colour, np.float32)
-            return np.asarray((direct + indirect.reshape(*direct.shape[:2], 3)) * colour)
+            total = direct + indirect.reshape(*direct.shape[:2], 3)
+            return np.asarray(total * colour)
 
         return _cached(self._suns, (index, t_ns), compute)
 
@@ -215,8 +221,11 @@ def _stepped_ns(light: Light, t_ns: float) -> float:
 
 def _between(track: SunTrack, t_ns: float) -> Floats:
     """Indirect light of surfels (S, 3) at an instant, straight lines between the baked ones."""
-    after = int(np.clip(np.searchsorted(track.times_ns, t_ns), 1, len(track.times_ns) - 1))
+    last = len(track.times_ns) - 1
+    after = int(np.clip(np.searchsorted(track.times_ns, t_ns), 1, last))
     start_ns = track.times_ns[after - 1]
     end_ns = track.times_ns[after]
     share = np.float32((t_ns - start_ns) / (end_ns - start_ns))
-    return np.asarray((1 - share) * track.bounced[after - 1] + share * track.bounced[after])
+    start = track.bounced[after - 1]
+    end = track.bounced[after]
+    return np.asarray((1 - share) * start + share * end)

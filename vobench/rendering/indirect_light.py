@@ -52,7 +52,8 @@ class Surfels:
         """Weighted means (S, C) of points' values (P, C)."""
         totals = np.maximum(np.bincount(self.of, weights, len(self)), 1e-30)
         sums = [np.bincount(self.of, weights * column, len(self)) for column in values.T]
-        return (np.stack(sums, -1) / totals[:, None]).astype(np.float32)
+        means = np.stack(sums, -1) / totals[:, None]
+        return means.astype(np.float32)
 
 
 def surfels(
@@ -84,7 +85,8 @@ def _grouped(key: Rows, points_m: Floats) -> tuple[Rows, Rows]:
     """Groups (P,) of equal keys (P,), and the point nearest to the mean of each."""
     group = np.unique(key, return_inverse=True)[1].ravel()
     count = np.bincount(group)
-    sums_m = np.stack([np.bincount(group, coordinate) for coordinate in points_m.T], -1)
+    coordinate_sums_m = [np.bincount(group, coordinate) for coordinate in points_m.T]
+    sums_m = np.stack(coordinate_sums_m, -1)
     mean_m = sums_m / np.maximum(count, 1)[:, None]
     squared_m2 = ((points_m - mean_m[group]) ** 2).sum(1)
     order = np.lexsort((squared_m2, group))
@@ -108,8 +110,8 @@ def blend(
     step_m = groups.step_m[:, None]
     places = np.hstack([middles_m, TURNED * step_m * normals])  # (S, 6): apart in space or in direction
     tree = scipy.spatial.cKDTree(places[known])
-    nearest = tree.query(places, k=min(NEIGHBOURS, len(known)))[1].reshape(len(groups), -1)
-    neighbours = known[nearest]  # (S, K)
+    _, nearest = tree.query(places, k=min(NEIGHBOURS, len(known)))
+    neighbours = known[nearest.reshape(len(groups), -1)]  # (S, K)
 
     raised_m = middles_m + RAISED * step_m * points.planes[groups.middle]
     surfel = np.repeat(np.arange(len(groups)), neighbours.shape[1])
@@ -151,10 +153,13 @@ def _weights(
     candidates = neighbours[of]
     hidden = is_hidden[of]
     step_m = groups.step_m[of, None]
-    squared = ((points.points_m[:, None] - middles_m[candidates]) ** 2).sum(-1) / step_m**2
-    squared += ((points.normals[:, None] - normals[candidates]) ** 2).sum(-1) * TURNED**2
+    offset_m = points.points_m[:, None] - middles_m[candidates]
+    squared = (offset_m**2).sum(-1) / step_m**2
+    turn = points.normals[:, None] - normals[candidates]
+    squared += (turn**2).sum(-1) * TURNED**2
     nearest = np.where(hidden, np.inf, squared).min(1, keepdims=True)
-    weights = np.where(hidden, 0, np.exp(-(squared - nearest) / WIDTH))
+    closeness = np.exp(-(squared - nearest) / WIDTH)
+    weights = np.where(hidden, 0, closeness)
     weights[weights < LEAST * weights.sum(1, keepdims=True)] = 0
     weights /= weights.sum(1, keepdims=True)
 
@@ -177,7 +182,8 @@ def albedo(
     """Linear reflectance (P, 3) of the body there, of what its coat lets in."""
     result = np.zeros((len(points), 3), np.float32)
     number = {name: nth for nth, name in enumerate(materials)}
-    of_things = np.array([number.get(thing.material, -1) for thing in faces.things], np.int32)
+    numbers = [number.get(thing.material, -1) for thing in faces.things]
+    of_things = np.array(numbers, np.int32)
     material_of = of_things[faces.thing[points.face]]
     corner_weights = np.column_stack([1 - points.uv.sum(1), points.uv])
     for name, material in materials.items():
@@ -232,7 +238,8 @@ class Response:
     def mirrored(self, face: Indices, cosine: Floats) -> Floats:
         """Share (R,) that goes on as from a mirror."""
         coat = np.where(self.eta[face] > 0, self._reflected(face, cosine), 0)
-        return np.asarray(self.tint[face] * coat + (1 - coat) * self.metal[face])
+        by_metal = (1 - coat) * self.metal[face]
+        return np.asarray(self.tint[face] * coat + by_metal)
 
     def scattered(self, face: Indices, cosine: Floats) -> Floats:
         """Luminance times pi (R,) towards a cosine, per light that entered and was scattered."""
@@ -411,7 +418,8 @@ class Gatherer:
             batch = batch.joined(from_panes)
             if not len(batch.point):
                 break
-        entries = (np.concatenate(factors) / ray_count, (np.concatenate(rows), np.concatenate(columns)))
+        places = (np.concatenate(rows), np.concatenate(columns))
+        entries = (np.concatenate(factors) / ray_count, places)
         shape = (len(points), self.surfels + self.lamps)
         table = scipy.sparse.csr_matrix(entries, shape, dtype=np.float32)
         return _Gathered(table, sky / ray_count, escaped, np.concatenate(texels).astype(np.int32))
@@ -425,7 +433,8 @@ class Gatherer:
         """Add the illuminance of points (K, P) by rays that met nothing, from each of the skies."""
         for nth, light in enumerate(self.skies):
             luminance_cd_m2 = light.luminance_cd_m2(gone.directions)
-            sky[nth] += np.bincount(gone.point, np.pi * luminance_cd_m2 * gone.weight, minlength=sky.shape[1])
+            ray_lx = np.pi * luminance_cd_m2 * gone.weight
+            sky[nth] += np.bincount(gone.point, ray_lx, minlength=sky.shape[1])
 
     def _reflected_by_panes(self, batch: _RayBatch, segments_m: Floats) -> _RayBatch:
         """The rays that go back from the first pane on their segment; a lamp that they meet is no direct light."""
@@ -438,7 +447,8 @@ class Gatherer:
         directions = batch.directions - 2 * along_normal[:, None] * normals
         weight = batch.weight * self.visibility.pane_mirrors(hits.face, along_normal)
         is_direct = np.zeros(len(weight), bool)
-        return _RayBatch(batch.point, ends_m, directions, weight, is_direct).take(weight > FAINT)
+        reflected = _RayBatch(batch.point, ends_m, directions, weight, is_direct)
+        return reflected.take(weight > FAINT)
 
     def _mirrored(
         self,
@@ -461,7 +471,8 @@ class Gatherer:
         is_leaving = np.einsum("ij,ij->i", directions, face_normals) > 0
         shows_lamps = self.response.shows_lamps[face]
         origins_m = ends_m + RAY_OFFSET_M * face_normals
-        return _RayBatch(batch.point, origins_m, directions, weight[rays], shows_lamps).take(is_leaving)
+        mirrored = _RayBatch(batch.point, origins_m, directions, weight[rays], shows_lamps)
+        return mirrored.take(is_leaving)
 
 
 def _start(points: Texels, side: int) -> _RayBatch:
@@ -483,11 +494,14 @@ def _facets(
 ) -> Floats:
     """Unit normals (R, 3) of facets around a face's, by GGX. Source: Walter et al. (2007), eqs 35 and 36."""
     rough = np.flatnonzero(roughness)
-    a, b = ((dither[rough] + turn[rough, None] * JITTER) % 1).T
-    slope = (roughness[rough] * np.sqrt(a / np.maximum(1 - a, 1e-6)))[:, None]
+    jitter = (dither[rough] + turn[rough, None] * JITTER) % 1
+    a, b = jitter.T
+    steepness = np.sqrt(a / np.maximum(1 - a, 1e-6))
+    slope = (roughness[rough] * steepness)[:, None]
     u_axis, v_axis = tangents(normals[rough])
     angle = 2 * np.pi * b[:, None]
-    tilted = normals[rough] + slope * (np.cos(angle) * u_axis + np.sin(angle) * v_axis)
+    aside = np.cos(angle) * u_axis + np.sin(angle) * v_axis
+    tilted = normals[rough] + slope * aside
     facets = normals.copy()
     facets[rough] = tilted / np.linalg.norm(tilted, axis=1, keepdims=True)
     return facets
@@ -517,8 +531,10 @@ def bounced(
         return np.zeros(straight.shape, np.float32)
     table = gathered.table[:, :surfel_count]
     columns = (surfel_count, light_count * channels)
-    by_mirrors = np.repeat(first.T[..., None], channels, 2).reshape(columns).astype(np.float32)
-    step = table @ straight.transpose(1, 0, 2).reshape(columns) + by_mirrors
+    grey = np.repeat(first.T[..., None], channels, 2)
+    by_mirrors = grey.reshape(columns).astype(np.float32)
+    sent = straight.transpose(1, 0, 2).reshape(columns)
+    step = table @ sent + by_mirrors
     total = step.copy()
     column_reflectance = np.tile(reflectance, (1, light_count))
     ratio = np.zeros(columns[1])
@@ -527,9 +543,11 @@ def bounced(
         step = table @ (column_reflectance * step)
         total += step
         previous_ratio = ratio
-        ratio = np.clip(step.sum(0, dtype=float) / np.maximum(previous_sum, 1e-30), 0, 0.999)
+        growth = step.sum(0, dtype=float) / np.maximum(previous_sum, 1e-30)
+        ratio = np.clip(growth, 0, 0.999)
         rest = ratio * (1 - ratio**bounces_left) / (1 - ratio)  # of the geometric series, in units of the last step
-        rest_share = rest * step.sum(0) / np.maximum(total.sum(0), 1e-30)
+        total_sum = np.maximum(total.sum(0), 1e-30)
+        rest_share = rest * step.sum(0) / total_sum
         is_even = np.abs(ratio - previous_ratio) <= EVEN
         is_done = (rest_share <= FAINT_REST) | is_even & (rest_share <= REST)
         if is_done.all():

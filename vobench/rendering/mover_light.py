@@ -63,7 +63,8 @@ def may_shade(mover: BoundingSphere, emitter: BoundingSphere, points: BoundingSp
     along_m = np.einsum("ij,ij->i", to_mover_m, to_emitter_m) / emitter_distance_m
     aside_m = np.sqrt(np.maximum(squared_m2 - along_m**2, 0))
     sine = np.minimum((emitter.radius_m + points.radius_m) / emitter_distance_m, STEEPEST)
-    is_in_cone = aside_m * np.sqrt(1 - sine**2) <= near_m + sine * np.maximum(along_m, 0)
+    cone_radius_m = near_m + sine * np.maximum(along_m, 0)
+    is_in_cone = aside_m * np.sqrt(1 - sine**2) <= cone_radius_m
     is_before_emitter = along_m <= emitter_distance_m + emitter.radius_m + near_m
     is_ahead = along_m >= -near_m
     return np.asarray((squared_m2 <= near_m**2) | (is_in_cone & is_before_emitter & is_ahead))
@@ -104,7 +105,7 @@ class MoverLightAt:
 
 @dataclass(frozen=True, slots=True)
 class _Lit:
-    """Stationary points that have an emitter's light, surfel by surfel: has (P,) says which.
+    """Stationary points that have an emitter's light, surfel by surfel: has (P,) marks them.
 
     points (N,): in the order of their cells (C,), cell by cell from starts (C + 1,) on; balls around each of these.
     """
@@ -151,7 +152,8 @@ class MoverLight:
 
         # What casts shade: the movers' faces but for panes.
         is_solid = ~are_panes(faces, materials)
-        mover_faces = [np.flatnonzero((faces.mover == nth) & is_solid) for nth in range(len(baked.scene.movers))]
+        mover_count = len(baked.scene.movers)
+        mover_faces = [np.flatnonzero((faces.mover == nth) & is_solid) for nth in range(mover_count)]
         self._solid = [nth for nth, rows in enumerate(mover_faces) if len(rows)]
         self._bodies = faces.some(np.concatenate([NO_ROWS, *mover_faces]))
         self._parts = [parts(faces.corners_m[mover_faces[nth]]) for nth in self._solid]
@@ -163,7 +165,8 @@ class MoverLight:
         )
         self._mover = faces.mover[self._points.face]
         self._groups, blend_table = self._grouped(faces)
-        self._mover_texels = np.flatnonzero(self._layout.source < len(self._points))
+        is_mover_texel = self._layout.source < len(self._points)
+        self._mover_texels = np.flatnonzero(is_mover_texel)
         self._blend = blend_table[self._mover_texels]
         self._gatherer = Gatherer(
             baked.atlas,
@@ -178,9 +181,11 @@ class MoverLight:
         # The stationary points by cell, and the texels of the map by point.
         self._by_cell = np.argsort(static.cells, kind="stable")
         self._cells = _cells(baked, static, self._by_cell)
-        self._texels = np.argsort(static.layout.source, kind="stable").astype(np.int32)
+        by_point = np.argsort(static.layout.source, kind="stable")
+        self._texels = by_point.astype(np.int32)
         sources = static.layout.source[self._texels]
-        self._texel_starts = np.searchsorted(sources, np.arange(len(static.points) + 1))
+        point_limits = np.arange(len(static.points) + 1)
+        self._texel_starts = np.searchsorted(sources, point_limits)
         self._lit: dict[tuple[int, float], list[_Lit]] = {}
 
     def _grouped(self, faces: Triangles) -> "tuple[Rows, csr_matrix]":
@@ -227,7 +232,9 @@ class MoverLight:
 
     def shade(self, moment: MoverLightAt, views: Views | None) -> None:
         """Find the light that the movers take from all that views show, or from everything."""
-        inside_m = np.full(len(moment.known), np.inf) if views is None else _inside_m(self._cells, views)
+        inside_m = np.full(len(moment.known), np.inf)
+        if views is not None:
+            inside_m = _inside_m(self._cells, views)
         is_missing = (inside_m > 0) & ~moment.known
         if not is_missing.any():
             return
@@ -255,9 +262,11 @@ class MoverLight:
         total = static_light.copy()
         flat = total.reshape(-1, 3)
         strength = np.asarray(levels, np.float32)
-        colours = strength[:, None] * np.array([light.colour for light in self._lights], np.float32)
+        nominal_colours = np.array([light.colour for light in self._lights], np.float32)
+        colours = strength[:, None] * nominal_colours
 
-        points = _distinct(np.concatenate([NO_ROWS, *(rows for _, rows, _ in moment.lost)]))
+        shaded = [rows for _, rows, _ in moment.lost]
+        points = _distinct(np.concatenate([NO_ROWS, *shaded]))
         row_of = np.zeros(len(self._static.points), np.int32)
         row_of[points] = np.arange(len(points))
         shade = np.zeros((len(points), 3), np.float32)
@@ -268,8 +277,10 @@ class MoverLight:
         texel_shade = np.repeat(shade, texel_counts, axis=0)
         flat[shaded_texels] = np.maximum(flat[shaded_texels] - texel_shade, 0)
 
-        direct = (moment.direct.T @ colours)[self._layout.source[self._mover_texels]]
-        flat[self._mover_texels] = direct + self._blend @ self._indirect(moment.gathered, colours)
+        point_light = moment.direct.T @ colours
+        direct = point_light[self._layout.source[self._mover_texels]]
+        indirect = self._blend @ self._indirect(moment.gathered, colours)
+        flat[self._mover_texels] = direct + indirect
         return total
 
     def _indirect(self, gathered: FinalGather, colours: Floats) -> Floats:
@@ -283,7 +294,8 @@ class MoverLight:
                 sky_colours.append(colour)
         glow = np.array(lamp_radiosity, np.float32)[:, None] * colours
         sent = np.concatenate([radiosity, glow])
-        by_mirrors = gathered.sky.T @ np.array(sky_colours, np.float32).reshape(-1, 3)
+        sky_table = np.array(sky_colours, np.float32).reshape(-1, 3)
+        by_mirrors = gathered.sky.T @ sky_table
         return np.asarray(gathered.table @ sent + by_mirrors, np.float32)
 
     def _placed(self, poses: Sequence[Array]) -> Texels:
@@ -292,7 +304,8 @@ class MoverLight:
         T_world_movers = np.array(poses)[self._mover]
 
         def turned(vectors: Floats) -> Floats:
-            return np.asarray(np.einsum("nij,nj->ni", T_world_movers[:, :3, :3], vectors), np.float32)
+            R_world_movers = T_world_movers[:, :3, :3]
+            return np.asarray(np.einsum("nij,nj->ni", R_world_movers, vectors), np.float32)
 
         points_m = turned(points.points_m) + T_world_movers[:, :3, 3]
         return replace(
@@ -357,20 +370,25 @@ class MoverLight:
 
         rows = wanted
         for _ in range(smoothings):
-            rows = self._may_lose(lit, moment, cells, np.append(rows, layout.neighbours[:, rows]))
+            with_neighbours: Rows = np.append(rows, layout.neighbours[:, rows])
+            rows = self._may_lose(lit, moment, cells, with_neighbours)
         is_sparse = layout.is_sparse[rows]
         rest = rows[~is_sparse]
         weights = layout.weights[rest]
-        sparse = self._may_lose(lit, moment, cells, np.append(rows[is_sparse], weights.indices))
+        read: Rows = np.append(rows[is_sparse], weights.indices)
+        sparse = self._may_lose(lit, moment, cells, read)
         share = np.zeros(len(direct_lx), np.float32)
-        share[sparse] = self._traced(lit.emitter, sparse, moment.movers, side) / direct_lx[sparse]
+        sparse_lx = self._traced(lit.emitter, sparse, moment.movers, side)
+        share[sparse] = sparse_lx / direct_lx[sparse]
 
         mean, is_unsure = _weighted_mean(weights, share, lit.has)
         share[rest] = np.where(is_unsure, 0, mean)
         asked = rest[is_unsure]
-        share[asked] = self._traced(lit.emitter, asked, moment.movers, side) / direct_lx[asked]
+        asked_lx = self._traced(lit.emitter, asked, moment.movers, side)
+        share[asked] = asked_lx / direct_lx[asked]
         for _ in range(smoothings):
-            share[rows] = (4 * share[rows] + share[layout.neighbours[:, rows]].sum(0)) / 8
+            around = share[layout.neighbours[:, rows]].sum(0)
+            share[rows] = (4 * share[rows] + around) / 8
         return wanted, share[wanted] * direct_lx[wanted]
 
     def _may_lose(
@@ -471,9 +489,11 @@ def _cells(baked: BakedScene, static: StaticScene, by_cell: Rows) -> BoundingSph
         face_px2 = np.abs(doubled_areas_px2(baked.atlas.light_px))
         texel_m = np.sqrt(2 * areas_m2(faces.corners_m) / face_px2)
     texel_m = np.where(np.isfinite(texel_m), texel_m, 0)
-    starts = np.flatnonzero(np.diff(static.cells[by_cell], prepend=-1, append=-1))
+    cells = static.cells[by_cell]
+    starts = np.flatnonzero(np.diff(cells, prepend=-1, append=-1))
     around = _balls(static.points.points_m[by_cell], starts)
-    largest_m = np.maximum.reduceat(texel_m[static.points.face[by_cell]], starts[:-1])
+    point_texel_m = texel_m[static.points.face[by_cell]]
+    largest_m = np.maximum.reduceat(point_texel_m, starts[:-1])
     return BoundingSphere(around.centre_m, around.radius_m + READ_TEXELS * largest_m)
 
 
@@ -482,7 +502,8 @@ def _inside_m(cells: BoundingSphere, views: Views) -> Floats:
     farthest_m = np.full(len(cells.radius_m), -np.inf)
     for view, box in views:
         planes = bounds(view, box)
-        planes /= np.linalg.norm(planes[:, :3], axis=1)[:, None]
+        normal_lengths = np.linalg.norm(planes[:, :3], axis=1)
+        planes /= normal_lengths[:, None]
         heights_m = np.einsum("ij,kj->ik", planes[:, :3], cells.centre_m) + planes[:, 3:]
         farthest_m = np.maximum(farthest_m, heights_m.min(0) + cells.radius_m)
     return farthest_m
@@ -493,15 +514,18 @@ def _balls(points_m: Floats, starts: NDArray[np.int64]) -> BoundingSphere:
     if not len(points_m):
         return BoundingSphere(np.zeros((0, 3)), np.zeros(0))
     count = np.diff(starts)
-    centre_m = np.add.reduceat(points_m.astype(float), starts[:-1]) / count[:, None]
-    distance_m = np.linalg.norm(points_m - np.repeat(centre_m, count, axis=0), axis=1)
+    sums_m = np.add.reduceat(points_m.astype(float), starts[:-1])
+    centre_m = sums_m / count[:, None]
+    own_centre_m = np.repeat(centre_m, count, axis=0)
+    distance_m = np.linalg.norm(points_m - own_centre_m, axis=1)
     return BoundingSphere(centre_m, np.maximum.reduceat(distance_m, starts[:-1]))
 
 
 def _around(balls: BoundingSphere) -> BoundingSphere:
     """One sphere (1,) around several."""
     centre_m = balls.centre_m.mean(0)
-    reach_m = np.linalg.norm(balls.centre_m - centre_m, axis=1) + balls.radius_m
+    distance_m = np.linalg.norm(balls.centre_m - centre_m, axis=1)
+    reach_m = distance_m + balls.radius_m
     return BoundingSphere(centre_m[None], reach_m.max(keepdims=True))
 
 
@@ -518,7 +542,8 @@ def parts(corners_m: Array) -> BoundingSphere:
     count = int(np.clip(np.ceil(size_m[longest] / middle_size_m), 1, MOST_PARTS))
     part_m = np.where(np.arange(3) == longest, size_m / count, size_m)
     along = np.eye(3)[longest]
-    centres_m = low_m + part_m / 2 + np.arange(count)[:, None] * along * part_m
+    steps_m = np.arange(count)[:, None] * along * part_m
+    centres_m = low_m + part_m / 2 + steps_m
     radius_m = float(np.linalg.norm(part_m) / 2)
     return BoundingSphere(centres_m, np.full(count, radius_m))
 

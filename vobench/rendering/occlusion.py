@@ -194,8 +194,8 @@ class Bodies:
     def _first_hits(self, body: Body, origins_m: Array, directions: Array) -> Hits:
         """The first face of a body that rays (R, 3) in its frame meet from its front.
 
-        Embree, in float32, says which; where, the plane's equation does. Where a ray passes so close to an edge that
-        float32 may take the wrong face, float64 decides.
+        Embree finds the face, in float32; the distance follows from the plane's equation. Where a ray passes so close
+        to an edge that float32 may take the wrong face, float64 decides.
         """
         hits, cosine = self._float32_hits(body, origins_m, directions)
         origin_offsets_m = dot(self.normals[hits.face], origins_m)
@@ -212,7 +212,7 @@ class Bodies:
     def _float32_hits(
         self, body: Body, origins_m: Array, directions: Array, most: int = MOST_PASSED
     ) -> tuple[Hits, Array]:
-        """What rays meet as Embree says, backs and holes passed, and the cosines (R,) to the faces' normals."""
+        """What rays meet by Embree, backs and holes passed, and the cosines (R,) to the faces' normals."""
         hits = body.visible.hits(origins_m, directions, REACH_M)
         is_hole = self._cut_outs.holes(hits)
         cosine = self._turn_to_fronts(hits.face, directions)
@@ -259,7 +259,7 @@ class Bodies:
         hits: Hits,
         doubtful: Pixels,
     ) -> None:
-        """Set the doubtful hits to what float64 says, among the faces that Embree finds there and a little aside."""
+        """Decide the doubtful hits in float64, among the faces that Embree finds there and a little aside."""
         if not len(doubtful):
             return
         ahead = directions[doubtful]

@@ -35,7 +35,8 @@ class SceneState:
 def state(scene: Scene, start_ns: int, end_ns: int) -> SceneState:
     """Lights at their mean over an interval, things where they are at its middle; 0 where nothing ever moves."""
     levels = tuple(light.level.mean(start_ns, end_ns) for light in scene.lights)
-    something_moves = bool(scene.movers) or any(light.moves for light in scene.lights)
+    suns_move = any(light.moves for light in scene.lights)
+    something_moves = bool(scene.movers) or suns_move
     middle_ns = (start_ns + end_ns) / 2
     return SceneState(levels, middle_ns if something_moves else 0.0)
 
@@ -125,7 +126,8 @@ class MitsubaScene:
         is_valid = dr.isfinite(ray.d.x)  # false where the lens sees nothing
         ray.o = self._past_backs(ray, is_valid)
         radiance, _, _ = self._integrator.sample(self._world, sampler, ray, None, is_valid)
-        paths = dr.select(is_valid, radiance, 0.0).numpy().reshape(3, len(rows), columns, samples)
+        path_radiance = dr.select(is_valid, radiance, 0.0).numpy()
+        paths = path_radiance.reshape(3, len(rows), columns, samples)
         return np.moveaxis(paths.sum(-1), 0, -1)
 
     def _past_backs(self, ray: Any, is_valid: Any) -> Any:
@@ -134,8 +136,10 @@ class MitsubaScene:
         import mitsuba as mi
 
         def step(origin: Any, is_active: Any) -> tuple[Any, Any]:
-            hit = self._world.ray_intersect(mi.Ray3f(origin, ray.d), mi.RayFlags.Minimal, True, is_active)
-            is_back = is_active & hit.is_valid() & (dr.dot(hit.n, ray.d) > 0)
+            onward = mi.Ray3f(origin, ray.d)
+            hit = self._world.ray_intersect(onward, mi.RayFlags.Minimal, True, is_active)
+            faces_away = dr.dot(hit.n, ray.d) > 0
+            is_back = is_active & hit.is_valid() & faces_away
             shape = dr.reinterpret_array(mi.UInt32, hit.shape)
             is_back &= dr.gather(mi.Bool, self._one_sided, shape, is_back)
             return dr.select(is_back, hit.spawn_ray(ray.d).o, origin), is_back
@@ -238,8 +242,11 @@ class PathRenderer:
         for (moment, samples), batch in _batches(self._scene, views, self._samples):
             self._mitsuba.become(moment)
             light = self._trace(camera, batch, samples)
-            np.add.at(picture, batch.rows, light * batch.weight[:, None, None].astype(np.float32))
-        return picture if weights is None else np.asarray(picture @ np.asarray(weights, np.float32))
+            row_weight = batch.weight[:, None, None].astype(np.float32)
+            np.add.at(picture, batch.rows, light * row_weight)
+        if weights is None:
+            return picture
+        return np.asarray(picture @ np.asarray(weights, np.float32))
 
     def close(self) -> None:
         """Give back Mitsuba's copy of the scene."""
@@ -308,4 +315,5 @@ def _seeds(seed: int, batch: RowBatch, count: int) -> list[int]:
     """Seeds that differ between pictures from other places or times."""
     moment = batch.rows, batch.start_ns, batch.T_world_camera
     words = [zlib.crc32(np.ascontiguousarray(part).tobytes()) for part in moment]
-    return [int(word) for word in np.random.SeedSequence([seed, *words]).generate_state(count)]
+    sequence = np.random.SeedSequence([seed, *words])
+    return [int(word) for word in sequence.generate_state(count)]

@@ -77,8 +77,8 @@ def planar_mirrors(faces: MirrorFaces) -> tuple[Indices, list[Mirror]]:
     is_free = (faces.strength > 0) & normal.any(1)
     index = np.full(len(faces.area_m2), -1)
     mirrors = list[Mirror]()
-    cell_keys = np.round(np.column_stack([CELLS * normal, CELLS * offset_m, faces.mover, faces.is_pane]))
-    cell = distinct(cell_keys)[1]
+    keys = np.column_stack([CELLS * normal, CELLS * offset_m, faces.mover, faces.is_pane])
+    cell = distinct(np.round(keys))[1]
     cell_areas_m2 = np.bincount(cell, faces.area_m2 * is_free)
     largest_first = np.argsort(-cell_areas_m2, kind="stable")
     for nth in largest_first[: 4 * MOST_MIRRORS].tolist():
@@ -87,8 +87,10 @@ def planar_mirrors(faces: MirrorFaces) -> tuple[Indices, list[Mirror]]:
             continue
         seed = members[np.argmax(faces.area_m2[members])]
         plane = Plane(normal[seed], float(offset_m[seed]))
-        is_alike = (faces.mover == faces.mover[seed]) & (faces.is_pane == faces.is_pane[seed])
-        in_plane = is_free & is_alike & (normal @ plane.normal > np.cos(PLANE_TILT))
+        moves_along = faces.mover == faces.mover[seed]
+        is_alike = moves_along & (faces.is_pane == faces.is_pane[seed])
+        is_parallel = normal @ plane.normal > np.cos(PLANE_TILT)
+        in_plane = is_free & is_alike & is_parallel
         heights_m = np.abs(faces.corners_m[in_plane] @ plane.normal + plane.offset_m)
         in_plane[in_plane] = heights_m.max(1) < PLANE_OFF_M
 
@@ -120,10 +122,12 @@ def _outline(points_m: Array, plane: Plane) -> Array:
     across = np.cross(plane.normal, along)
     u = hull_m @ along.T  # (points, sides): each point along each side
     v = hull_m @ across.T
-    best = int(np.argmin(np.ptp(u, axis=0) * np.ptp(v, axis=0)))
+    areas_m2 = np.ptp(u, axis=0) * np.ptp(v, axis=0)
+    best = int(np.argmin(areas_m2))
     u_low = u[:, best].min()
     u_high = u[:, best].max()
     v_low = v[:, best].min()
     v_high = v[:, best].max()
     corners = np.array([[u_low, v_low], [u_high, v_low], [u_high, v_high], [u_low, v_high]])
-    return np.asarray(corners @ np.stack([along[best], across[best]]) - plane.offset_m * plane.normal)
+    in_plane_m = corners @ np.stack([along[best], across[best]])
+    return np.asarray(in_plane_m - plane.offset_m * plane.normal)

@@ -99,7 +99,8 @@ def _free_place(corners_m: Array) -> Array:
     face_low_m = corners_m.min(1)
     face_high_m = corners_m.max(1)
     steps = np.linspace(-0.3, 0.3, 7)
-    offsets = np.stack(np.meshgrid(steps, steps, steps / 2, indexing="ij"), -1).reshape(-1, 3)
+    grid = np.meshgrid(steps, steps, steps / 2, indexing="ij")
+    offsets = np.stack(grid, -1).reshape(-1, 3)
 
     distance = np.linalg.norm(offsets, axis=1).round(9)
     best_value = -np.inf

@@ -35,7 +35,7 @@ DOWN = se3.transform(np.array([[1.0, 0, 0], [0, -1, 0], [0, 0, -1]]), CAMERA_M)
 class DrawingCheck:
     """How far a picture is from the expected one: the largest relative error on the floor, the most light beside it.
 
-    `well` says whether both are within the tolerance.
+    `well`: whether both are within the tolerance.
     """
 
     well: bool

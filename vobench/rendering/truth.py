@@ -16,6 +16,7 @@ from vobench.rendering.array_types import Indices, Mask, Pixels
 from vobench.rendering.lamp import Lamp, lamps
 from vobench.rendering.occlusion import Bodies, dot
 from vobench.rendering.shot import Shot, ShotTransforms, at_rows, moved, of_rays, rays_in, shot_transforms, turn
+from vobench.scene.material import Material
 from vobench.scene.scene import Scene
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, check_channels
 
@@ -235,7 +236,7 @@ THREADS = max(1, min(2, os.cpu_count() or 1))
 
 
 class TruthCaster:
-    """Ground truth of one scene; `names` says what its ids mean."""
+    """Ground truth of one scene; `names` lists what its ids mean."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -249,15 +250,9 @@ class TruthCaster:
         material_names = [thing.material for thing in faces.things]
         self.names = TruthNames(_table(instances), _table(material_names))
 
-        mirrors = []
-        diffuse = []
-        for name in material_names:
-            material = scene.materials.get(name)
-            is_body = material is not None and material.kind == "body"
-            is_metal = material is not None and material.metal > 0
-            is_glossy = material is not None and (material.kind == "mirror" or material.is_coated)
-            mirrors.append(is_glossy or is_metal)
-            diffuse.append(is_body and material is not None and material.metal < 1)
+        materials = [scene.materials.get(name) for name in material_names]
+        mirrors = [material is not None and _mirrors(material) for material in materials]
+        diffuse = [material is not None and _is_diffuse(material) for material in materials]
         thing_of = np.append(faces.thing, len(faces.things))  # the last one is nothing, for the face -1
         is_no_lamp = np.append(faces.lamp, -1) < 0
         self._ids = FaceIds(
@@ -305,6 +300,14 @@ class TruthCaster:
         bands = [slice(row, min(row + BAND_ROWS, height)) for row in range(0, height, BAND_ROWS)]
         list(self._pool.map(fill, bands))
         return TruthFrame(**values)
+
+
+def _mirrors(material: Material) -> bool:
+    return material.kind == "mirror" or material.is_coated or material.metal > 0
+
+
+def _is_diffuse(material: Material) -> bool:
+    return material.kind == "body" and material.metal < 1
 
 
 def _table(names: Iterable[str]) -> tuple[str, ...]:

@@ -1,9 +1,10 @@
 """How much light passes between two points of a scene, through panes and past opaque faces."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.embree import Hits
@@ -36,38 +37,41 @@ class Visibility:
     ) -> None:
         rows = np.asarray(among, np.int32)
         materials_of = face_materials(faces, materials)
-        thing = faces.thing[rows]
-        names = np.array([material.kind if material else "" for material in materials_of])
-        is_pane = names[thing] == "pane"
-        is_mirror = names[thing] == "mirror"
-        roughness = np.array([material.roughness if material else np.nan for material in materials_of])
-        is_smooth = roughness[thing] == 0
+        kind = _by_face(faces, materials_of, lambda material: material.kind, "")[rows]
+        roughness = _by_face(faces, materials_of, lambda material: material.roughness, np.nan)[rows]
+        tint = _by_face(faces, materials_of, lambda material: material.tint, 1.0)
+        is_pane = kind == "pane"
+        is_smooth_mirror = (kind == "mirror") & (roughness == 0)
 
         self.faces = faces
         normals = np.append(faces.plane, np.zeros((1, 3)), 0)  # the last one for the face -1
         self.normals = normals.astype(np.float32)
-        etas = [material.eta if material else 1.0 for material in materials_of]
-        self._eta = np.array(etas)[faces.thing]
-        tints = [material.tint if material else 1.0 for material in materials_of]
-        self._tint = np.array(tints, np.float32)[faces.thing]
+        self._eta = _by_face(faces, materials_of, lambda material: material.eta, 1.0)
+        self._tint = tint.astype(np.float32)
         self.opaque = RayCaster(faces, rows[~is_pane])
         self._glass = RayCaster(faces, rows[is_pane])
         self._has_panes = bool(is_pane.any())
-
-        # Mirrors that show lamps as sharp as they are. Coats mirror too, but faintly.
-        self.mirrors: list[tuple[PlanarPatch, float, RayCaster]] = []
-        for patch in planar_patches(faces, rows[is_mirror & is_smooth], at_least_m2=WIDE_M2):
-            tint = float(self._tint[patch.faces[0]])
-            self.mirrors.append((patch, tint, RayCaster(faces, patch.faces)))
-
-        # Panes that the sky is seen through are lamps of their own.
-        self.sky_panes: list[PlanarPatch] = []
-        for pane in planar_patches(faces, rows[is_pane], at_least_m2=WIDE_M2):
-            is_back = any(pane.coincides(other) for other in self.sky_panes)
-            if not is_back and self._sees_sky(pane):
-                self.sky_panes.append(pane)
+        self.mirrors = self._mirrors(rows[is_smooth_mirror])
+        self.sky_panes = self._panes_before_sky(rows[is_pane])
         sky_pane_faces = [face for pane in self.sky_panes for face in pane.faces]
         self._sky_panes = RayCaster(faces, sky_pane_faces)
+
+    def _mirrors(self, rows: Indices) -> list[tuple[PlanarPatch, float, RayCaster]]:
+        """Mirrors that show lamps as sharp as they are, with their tints. Coats mirror too, but faintly."""
+        mirrors = []
+        for patch in planar_patches(self.faces, rows, at_least_m2=WIDE_M2):
+            tint = float(self._tint[patch.faces[0]])
+            mirrors.append((patch, tint, RayCaster(self.faces, patch.faces)))
+        return mirrors
+
+    def _panes_before_sky(self, rows: Indices) -> list[PlanarPatch]:
+        """Panes that the sky is seen through, which are lamps of their own; of a pane's two sides one."""
+        panes = list[PlanarPatch]()
+        for pane in planar_patches(self.faces, rows, at_least_m2=WIDE_M2):
+            is_back = any(pane.coincides(other) for other in panes)
+            if not is_back and self._sees_sky(pane):
+                panes.append(pane)
+        return panes
 
     def passing(self, origins_m: Floats, segments_m: Floats) -> Floats:
         """Share (R,) of light that comes from origins + segments (R, 3) to the origins (R, 3)."""
@@ -148,3 +152,14 @@ class Visibility:
         is_walled = self.opaque.stops(origins_m, segments_m)
         is_blocked = is_walled | self._glass.stops(origins_m, segments_m)
         return not is_blocked.all()
+
+
+def _by_face(
+    faces: Triangles,
+    materials_of: Sequence[Material | None],
+    read: Callable[[Material], Any],
+    default: Any,
+) -> NDArray[Any]:
+    """A property (F,) of each face's material, by the materials of a table's things; the default where one is None."""
+    values = [read(material) if material else default for material in materials_of]
+    return np.array(values)[faces.thing]
