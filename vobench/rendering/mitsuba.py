@@ -65,7 +65,7 @@ def prepare() -> None:
 def working_library() -> Path:
     """The first candidate that renders.
 
-    Raises MissingDependencyError where Mitsuba is not installed, or no library renders; the message gives the reason of each.
+    Raises MissingDependencyError where Mitsuba is not installed, or no library renders, with the reason of each.
     """
     if find_spec("mitsuba") is None:
         raise MissingDependencyError(f"path tracing needs Mitsuba; run: {MITSUBA_REMEDY}")

@@ -253,7 +253,7 @@ class Program:
 def _source(name: str, defines: Sequence[str]) -> str:
     """The text of a shader's file, with its uniform blocks declared and names defined.
 
-    The names follow the first line, which declares the version; a line `#include <Pass>` becomes the block of that name.
+    The names follow the first line, that of the version; a line `#include <Pass>` becomes the block of that name.
     """
     version, body = (SHADERS / name).read_text(encoding="utf-8").split("\n", 1)
     for block in BLOCKS.values():
