@@ -144,8 +144,8 @@ class MitsubaScene:
             is_back &= dr.gather(mi.Bool, self._one_sided, shape, is_back)
             return dr.select(is_back, hit.spawn_ray(ray.d).o, origin), is_back
 
-        state = (mi.Point3f(ray.o), mi.Bool(is_valid))
-        return dr.while_loop(state, lambda _, is_active: is_active, step)[0]
+        loop_state = (mi.Point3f(ray.o), mi.Bool(is_valid))
+        return dr.while_loop(loop_state, lambda _, is_active: is_active, step)[0]
 
 
 def _primary_rays(
