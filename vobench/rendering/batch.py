@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats, Mask
 from vobench.rendering.culling import Clusters
-from vobench.rendering.planar_mirror import Mirror, MirrorFaces, planar_mirrors, sharpness
+from vobench.rendering.planar_mirror import MirrorFaces, PlanarMirror, planar_mirrors, sharpness
 from vobench.rendering.watertight import WELD_M, WatertightMesh, watertight
 from vobench.scene.material import Material
 from vobench.scene.mesh import Triangles, distinct, unit
@@ -37,7 +37,7 @@ class Batch:
     index: int
     material: Material
     mover: int
-    mirror: Mirror | None
+    mirror: PlanarMirror | None
     is_lamp: bool
     area_m2: float
 
@@ -62,7 +62,7 @@ class Geometry:
     vertices: Floats
     indices: NDArray[np.uint32]
     batches: tuple[Batch, ...]
-    mirrors: tuple[Mirror, ...]
+    mirrors: tuple[PlanarMirror, ...]
     clusters: Clusters
 
 
@@ -148,7 +148,7 @@ def _mirror_faces(mesh: WatertightMesh, parts: _Parts, of_things: Sequence[Mater
 def _batches(
     parts: _Parts,
     mirror: Indices,
-    mirrors: Sequence[Mirror],
+    mirrors: Sequence[PlanarMirror],
     of_things: Sequence[Material],
 ) -> tuple[Indices, tuple[Batch, ...]]:
     """The batch that each triangle (T,) is drawn with, and the batches."""

@@ -9,7 +9,7 @@ from vobench.rendering.batch import Batch, Geometry
 from vobench.rendering.culling import CullingSet, Runs
 from vobench.rendering.draw_call import LAYERS, LAYERS_UNIT, DrawCalls, probe_share
 from vobench.rendering.opengl import Canvas, FlatTarget, LightTexture, bind
-from vobench.rendering.planar_mirror import Mirror
+from vobench.rendering.planar_mirror import PlanarMirror
 from vobench.rendering.probe import Probe
 from vobench.rendering.render_target import MIRRORS, RenderTarget
 from vobench.rendering.view import Box, PinholeView, Plane, visible_boxes, within
@@ -141,7 +141,7 @@ class BatchDraw:
                 boxes[mirror.index] = box
         return boxes
 
-    def _is_visible(self, mirror: Mirror, visible: Runs) -> bool:
+    def _is_visible(self, mirror: PlanarMirror, visible: Runs) -> bool:
         return any(batch.index in visible for batch in self._batches_of[mirror.index])
 
     def _followed(
@@ -170,7 +170,7 @@ class BatchDraw:
 
     def _draw_mirror(
         self,
-        mirror: Mirror,
+        mirror: PlanarMirror,
         view: PinholeView,
         target: RenderTarget,
         *,
@@ -195,7 +195,7 @@ class BatchDraw:
                 self._calls.surface(batch, visible, view, canvas, *abilities)
 
 
-def _plane_towards(mirror: Mirror, view: PinholeView) -> Plane | None:
+def _plane_towards(mirror: PlanarMirror, view: PinholeView) -> Plane | None:
     """The plane of a mirror with its normal towards the eye.
 
     None where its mirroring side is not seen, or where it is the mirror that is looked into.
@@ -210,7 +210,7 @@ def _plane_towards(mirror: Mirror, view: PinholeView) -> Plane | None:
     return None if is_looked_into else plane
 
 
-def _distance_m(mirror: Mirror, view: PinholeView) -> float:
+def _distance_m(mirror: PlanarMirror, view: PinholeView) -> float:
     """How far the nearest corner of a mirror is from the camera."""
     T_camera_world = se3.inverse(view.T_world_camera) @ view.images
     T_camera_mover = T_camera_world @ view.pose(mirror.mover)

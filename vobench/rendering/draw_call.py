@@ -16,7 +16,7 @@ from vobench.rendering.opengl import (
     Elements,
     FlatTarget,
     LightTexture,
-    Program,
+    ShaderProgram,
     SurfaceTexture,
     bind,
 )
@@ -43,7 +43,7 @@ class DrawCalls:
     """Single draw calls, with the programs and state they share, as long as their context is current."""
 
     def __init__(self, geometry: Geometry, light: LightTexture) -> None:
-        self._program = cache(Program)
+        self._program = cache(ShaderProgram)
         self._light = light
         self._batches = geometry.batches
         self._poses = b""

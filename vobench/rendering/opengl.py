@@ -198,7 +198,7 @@ def _texture_parameters(minify: int, magnify: int, wrap: int) -> None:
 SHADERS = Path(__file__).parent / "shaders"
 
 
-class Program:
+class ShaderProgram:
     """A vertex and a fragment shader of this package, compiled with some preprocessor names defined, and linked."""
 
     def __init__(
@@ -276,7 +276,7 @@ class CubeTexture:
     ) -> None:
         around = _cube(pictures)
         self.id = _cube(pictures)
-        program = Program("fullscreen", "probe")
+        program = ShaderProgram("fullscreen", "probe")
         framebuffer = GL.glGenFramebuffers(1)
         GL.glBindVertexArray(GL.glGenVertexArrays(1))
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)

@@ -27,7 +27,7 @@ LEAST_FILL = 0.02  # of the rectangle around them: a rim is no mirror
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mirror:
+class PlanarMirror:
     """Faces that mirror sharply in one plane of their mover's frame.
 
     outline_m (4, 3): corners around them all. strength: the share that they mirror of what comes from ahead, about.
@@ -66,7 +66,7 @@ def sharpness(material: Material) -> float:
     return max(share, material.metal)
 
 
-def planar_mirrors(faces: MirrorFaces) -> tuple[Indices, list[Mirror]]:
+def planar_mirrors(faces: MirrorFaces) -> tuple[Indices, list[PlanarMirror]]:
     """Which mirror each face belongs to (F,), -1 for none, and the mirrors, the largest first."""
     # Panes mirror on both sides: those that face away are the same plane.
     faces_away = faces.is_pane & (faces.normals @ [1e-4, 1e-2, 1.0] < 0)
@@ -76,7 +76,7 @@ def planar_mirrors(faces: MirrorFaces) -> tuple[Indices, list[Mirror]]:
 
     is_free = (faces.strength > 0) & normal.any(1)
     index = np.full(len(faces.area_m2), -1)
-    mirrors = list[Mirror]()
+    mirrors = list[PlanarMirror]()
     keys = np.column_stack([CELLS * normal, CELLS * offset_m, faces.mover, faces.is_pane])
     cell = distinct(np.round(keys))[1]
     cell_areas_m2 = np.bincount(cell, faces.area_m2 * is_free)
@@ -102,7 +102,7 @@ def planar_mirrors(faces: MirrorFaces) -> tuple[Indices, list[Mirror]]:
         index[in_plane] = len(mirrors)
         is_free = is_free & ~in_plane
         mirrors.append(
-            Mirror(
+            PlanarMirror(
                 index=len(mirrors),
                 mover=int(faces.mover[seed]),
                 plane=plane,
