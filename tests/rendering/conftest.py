@@ -15,8 +15,8 @@ from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
+from vobench.rendering.atlas import Atlas
 from vobench.rendering.bake import BakedScene, Patches
-from vobench.rendering.lightmap import Atlas
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, still
 from vobench.scene.light import STEADY, Level, PointLight

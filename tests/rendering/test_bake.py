@@ -24,10 +24,12 @@ from vobench.rendering.bake import (
     save_baked,
     spacings_m,
 )
+from vobench.rendering.embree import Hits
 from vobench.rendering.emitter import cosine_weighted
-from vobench.rendering.geometry import Hits, Visibility, off
+from vobench.rendering.geometry import offset_from_surface
 from vobench.rendering.illumination import AmbientLight, Illumination
-from vobench.rendering.lightmap import owners
+from vobench.rendering.texel_owner import owners
+from vobench.rendering.visibility import Visibility
 from vobench.scene.light import AreaLight, Flicker, Light, PointLight, SpotLight, Sun
 from vobench.scene.material import Material, Picture, fresnel
 from vobench.scene.mesh import Mesh, Thing, areas_m2, flat, quad
@@ -262,11 +264,11 @@ def test_each_light_has_a_layer_of_its_own_and_dimming_one_leaves_the_others_byt
 
 def test_under_a_coat_light_counts_by_what_the_coat_lets_in() -> None:
     bulb = PointLight("bulb", np.array([0.0, 0.0, 1.0]), 1000.0)
-    x, y, matt = floor_light(bake(scene(bulb), DIRECT))
+    x, y, diffuse = floor_light(bake(scene(bulb), DIRECT))
     coated = Scene("coat", (FLOOR,), {"grey": Material(texture=Procedural(*BODY), eta=1.5)}, (bulb,))
     _, _, let_in = floor_light(bake(coated, DIRECT))
     cosine = 1 / np.sqrt(x**2 + y**2 + 1)
-    np.testing.assert_allclose(let_in, matt * (1 - fresnel(cosine, 1.5)), rtol=1e-3)
+    np.testing.assert_allclose(let_in, diffuse * (1 - fresnel(cosine, 1.5)), rtol=1e-3)
 
 
 def test_a_white_coated_box_keeps_its_light_as_a_white_matt_one_does() -> None:
@@ -278,8 +280,8 @@ def test_a_white_coated_box_keeps_its_light_as_a_white_matt_one_does() -> None:
         Material(texture=Procedural("plain", 0.98, resolution_px=8), eta=1.5),
     ):
         settings = replace(ALL_EQUAL, bounces=6, indirect_rays=64)
-        walls = tuple(room((2, 2, 2), floor="grey", wall="matt", ceiling="matt"))
-        materials = {"grey": material, "matt": Material(texture=Procedural("plain", 0.5, resolution_px=8))}
+        walls = tuple(room((2, 2, 2), floor="grey", wall="diffuse", ceiling="diffuse"))
+        materials = {"grey": material, "diffuse": Material(texture=Procedural("plain", 0.5, resolution_px=8))}
         baked = bake(Scene("box", walls, materials, (lamp,)), settings)
         places = np.meshgrid(*[np.linspace(0, 1, 21)] * 2)
         kept.append(np.mean([on_quad(baked, whole(baked), wall, *places).mean() for wall in range(1, 6)]))
@@ -344,7 +346,7 @@ def test_the_number_of_threads_changes_no_byte(threads: int, monkeypatch: pytest
     settings = replace(DIRECT, indirect_spacing_m=0.1, indirect_rays=16, bounces=2)
     coated = {"grey": Material(texture=Procedural(*BODY), eta=1.5, roughness=0.1)}
     usual = maps(bake(Scene("s", GLOBE, coated, (LAMP,)), settings))
-    monkeypatch.setattr("vobench.rendering.lightmap.os.cpu_count", lambda: threads)
+    monkeypatch.setattr("vobench.rendering.thread_pool.os.cpu_count", lambda: threads)
     assert maps(bake(Scene("s", GLOBE, coated, (LAMP,)), settings)) == usual
 
 
@@ -406,7 +408,7 @@ def traced(baked: BakedScene, bulb: PointLight, *, count: int, paths: int) -> tu
     face = numbers.choice(len(faces), count, p=area_m2 / area_m2.sum()).astype(np.int32)
     a, b = numbers.random((2, count))
     place = (face, np.sqrt(a) * (1 - b), np.sqrt(a) * b)
-    start = off(Hits(*place, place[1]).at(faces.corners_m), faces.plane[face]).astype(np.float32)
+    start = offset_from_surface(Hits(*place, place[1]).at(faces.corners_m), faces.plane[face]).astype(np.float32)
     points, normals, path = (
         np.repeat(start, paths, 0),
         np.repeat(faces.plane[face], paths, 0).astype(np.float32),
@@ -425,7 +427,7 @@ def traced(baked: BakedScene, bulb: PointLight, *, count: int, paths: int) -> tu
         )
         carried = carried * reflected(baked, hits)
         normals = visibility.normals[hits.face]
-        points = off(ends, normals).astype(np.float32)
+        points = offset_from_surface(ends, normals).astype(np.float32)
         way = (bulb.position_m - points).astype(np.float32)
         squared = np.einsum("ij,ij->i", way, way)
         cosine = np.maximum(np.einsum("ij,ij->i", way, normals), 0) / np.sqrt(squared)

@@ -79,7 +79,7 @@ def test_a_device_that_is_asked_for_and_fails_is_not_replaced_by_another(monkeyp
     monkeypatch.setattr(context, "devices", lambda: [GPU, CPU])
     monkeypatch.setattr(context, "_capable_context", fail)
     monkeypatch.setenv(context.DEVICE_VARIABLE, "gpu")
-    assert "EGL on device 0: /dev/dri/card0 (GPU) says RuntimeError: no permission" in refusal()
+    assert "EGL on device 0: /dev/dri/card0 (GPU) reports RuntimeError: no permission" in refusal()
 
 
 def test_facts_name_the_driver_and_the_device() -> None:
@@ -167,5 +167,5 @@ def test_a_display_that_fails_is_one_line_too(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(context, "_display", fail)
     sentence = refusal()
-    assert "says AssertionError: eglInitialize returned 0" in sentence
+    assert "reports AssertionError: eglInitialize returned 0" in sentence
     assert sentence.endswith(context.EGL_REMEDY)

@@ -12,8 +12,8 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
-from vobench.rendering.draw import MIRRORS
 from vobench.rendering.illumination import AmbientLight, Illumination
+from vobench.rendering.render_target import MIRRORS
 from vobench.rendering.renderer import View, still
 from vobench.rendering.view import Plane
 from vobench.scene.light import Sky

@@ -35,7 +35,7 @@ def test_the_solid_angle_is_the_integral_over_the_rectangle_from_either_side(poi
 def test_spots_lie_on_the_rectangle_and_are_spread_evenly_over_its_solid_angle(point: Array) -> None:
     a, b = grid(200)
     seen = SolidAngle(FACE, np.repeat(point[None], len(a), axis=0))
-    spots = seen.spot(a, b) + point
+    spots = seen.vectors_m(a, b) + point
     local = spots - PANEL.corner_m
     assert np.abs(local @ PANEL.normal).max() < 1e-5
     for edge in (PANEL.edge_u_m, PANEL.edge_v_m):
@@ -45,4 +45,4 @@ def test_spots_lie_on_the_rectangle_and_are_spread_evenly_over_its_solid_angle(p
     way = PANEL.at(*grid(1000)) - point
     weight = np.abs(way @ PANEL.normal) / np.linalg.norm(way, axis=1) ** 3
     expected = (unit(way) * weight[:, None]).sum(0) / weight.sum()
-    np.testing.assert_allclose(unit(seen.spot(a, b)).mean(0), expected, atol=1e-3)
+    np.testing.assert_allclose(unit(seen.vectors_m(a, b)).mean(0), expected, atol=1e-3)

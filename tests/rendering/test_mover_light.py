@@ -14,7 +14,7 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.rendering.bake import BakedScene, BakeSettings, bake
 from vobench.rendering.emitter import Emitter, bulb_emitter, panel_emitter
-from vobench.rendering.geometry import Ball, RayCaster
+from vobench.rendering.geometry import BoundingSphere, RayCaster
 from vobench.rendering.illumination import Illumination
 from vobench.rendering.mover_light import Casters, may_shade, parts
 from vobench.rendering.renderer import still
@@ -32,7 +32,7 @@ BULB = bulb_emitter(PointLight("bulb", np.array([-1.0, 0.5, 2.0]), 500.0))
 CASTER = RayCaster(table([Thing("pillar", PILLAR, "grey")], [-1], [-1]))
 
 
-def each(balls: Ball) -> list[Ball]:
+def each(balls: BoundingSphere) -> list[BoundingSphere]:
     return [balls.take(slice(nth, nth + 1)) for nth in range(len(balls.radius_m))]
 
 
@@ -53,7 +53,9 @@ def test_a_place_from_which_a_ray_meets_the_thing_is_never_left_out(emitter: Emi
     spots = np.einsum("nk,kj->nj", numbers.dirichlet((1, 1, 1), 4000), LAMP.mesh.corners_m[0])
     lamp = spots if emitter is PANEL else np.broadcast_to(emitter.ball.centre_m, points.shape)
     hidden = CASTER.occluded(points, lamp)
-    kept = np.any([may_shade(b, emitter.ball, Ball(points, np.zeros(4000))) for b in each(parts(PILLAR.corners_m))], 0)
+    kept = np.any(
+        [may_shade(b, emitter.ball, BoundingSphere(points, np.zeros(4000))) for b in each(parts(PILLAR.corners_m))], 0
+    )
     assert hidden.any()
     assert not (hidden & ~kept).any()
     assert kept.mean() < 0.6

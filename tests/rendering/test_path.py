@@ -387,9 +387,9 @@ def test_metal_mirrors_in_its_colour_and_scatters_nothing(trace):
         shown = trace(floor_under(sky, material=material), samples=1000, weights=None).mean((0, 1))
         np.testing.assert_allclose(shown, colour * 1000 / np.pi, rtol=0.02)
     bulb = PointLight("bulb", np.array([1.0, 0, 1.0]), 800.0)
-    matt = trace(floor_under(bulb, material=Material(colour=tuple(colour))), samples=1000)
+    diffuse = trace(floor_under(bulb, material=Material(colour=tuple(colour))), samples=1000)
     assert not trace(floor_under(bulb, material=metal)).any()
-    assert trace(floor_under(bulb, material=half), samples=1000).mean() == pytest.approx(0.5 * matt.mean(), rel=0.02)
+    assert trace(floor_under(bulb, material=half), samples=1000).mean() == pytest.approx(0.5 * diffuse.mean(), rel=0.02)
 
 
 def test_what_glows_is_seen_as_its_emission_and_lights_what_is_before_it(trace):

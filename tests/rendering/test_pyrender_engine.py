@@ -101,7 +101,7 @@ def test_a_texture_is_neither_mirrored_nor_upside_down() -> None:
 def test_a_point_light_gives_what_the_inverse_square_law_says() -> None:
     picture = drawn(scene(floor()))
     below = CAMERA.project(se3.apply(se3.inverse(DOWN), np.zeros((1, 3))))[0].round().astype(int)
-    # pyrender's matt surfaces reflect 96 % diffusely, and have a faint highlight of a roughness of 1.
+    # pyrender's diffuse surfaces reflect 96 % diffusely, and have a faint highlight of a roughness of 1.
     expected = 0.5 * 2000 / (4 * np.pi) / 2.0**2 / np.pi / WHITE_CD_M2
     assert picture[below[1], below[0], 0] == pytest.approx(expected, rel=0.08)
 

@@ -8,7 +8,7 @@ import pytest
 from vobench.asset.shape import at, block
 from vobench.asset.texture import Procedural
 from vobench.rendering.bake import BakeSettings, bake
-from vobench.rendering.geometry import RayCaster, twins
+from vobench.rendering.geometry import RayCaster, reversed_faces
 from vobench.rendering.illumination import Illumination
 from vobench.scene.light import PointLight
 from vobench.scene.material import Material
@@ -38,9 +38,9 @@ def test_a_ray_meets_the_side_of_a_sheet_that_it_comes_from(back_first: bool) ->
 
 def test_only_faces_with_the_same_corners_in_reverse_are_twins() -> None:
     solid = block((1, 1, 1))
-    assert (twins(solid.corners_m) < 0).all()
+    assert (reversed_faces(solid.corners_m) < 0).all()
     doubled = solid.two_sided().corners_m
-    found, count = twins(doubled), len(solid.faces)
+    found, count = reversed_faces(doubled), len(solid.faces)
     np.testing.assert_array_equal(found, np.roll(np.arange(2 * count), count))
 
 

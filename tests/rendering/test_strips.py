@@ -123,12 +123,12 @@ def test_two_renderers_side_by_side_draw_the_same_bytes(gallery: RasterRenderer,
 def test_a_mover_is_where_its_path_says_amid_the_interval(draw: Any, even_light: Any) -> None:
     start, end, rows = instants(SECOND_NS // 2), instants(SECOND_NS), slice(0, PINHOLE.height_px)
     T = PATH.pose(0.75 * SECOND_NS)
-    matt = replace(DARK, materials=MATERIALS | {"wax": MATERIALS["wall"], "steel": MATERIALS["wall"]})
-    parked = replace(matt, movers=(), things=(*SURFACES, *(s.moved(T) for s in CART.things)))
-    empty = replace(matt, movers=())
+    diffuse = replace(DARK, materials=MATERIALS | {"wax": MATERIALS["wall"], "steel": MATERIALS["wall"]})
+    parked = replace(diffuse, movers=(), things=(*SURFACES, *(s.moved(T) for s in CART.things)))
+    empty = replace(diffuse, movers=())
     moving, standing, without = (
         draw(even_light(scene)).radiance(PINHOLE, [View(rows, AHEAD[None], start, end)])
-        for scene in (matt, parked, empty)
+        for scene in (diffuse, parked, empty)
     )
     # How the mover is lit is another matter; where it hides the room is this one.
     np.testing.assert_array_equal(moving != without, standing != without)
@@ -142,8 +142,8 @@ def test_a_mirror_that_moves_mirrors_from_where_it_is(draw: Any, even_light: Any
     moving = draw(even_light(replace(plain, movers=(cart,)))).radiance(PINHOLE, still(PINHOLE, AHEAD, t_ns=SECOND_NS))
     T = PATH.pose(SECOND_NS)
     parked = replace(plain, movers=(), things=(*SURFACES, *(s.moved(T) for s in cart.things)))
-    matt = replace(parked, materials=materials | {"chrome": MATERIALS["board"]})
-    standing, without = (draw(even_light(one)).radiance(PINHOLE, still(PINHOLE, AHEAD)) for one in (parked, matt))
+    diffuse = replace(parked, materials=materials | {"chrome": MATERIALS["board"]})
+    standing, without = (draw(even_light(one)).radiance(PINHOLE, still(PINHOLE, AHEAD)) for one in (parked, diffuse))
     assert (np.abs(moving - standing) > 0.01 * standing).mean() < 0.002
     assert (standing != without).mean() > 0.01
 

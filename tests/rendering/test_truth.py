@@ -19,7 +19,8 @@ from vobench.geometry.camera import (
 )
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
-from vobench.rendering.truth import Shot, TruthCaster, lamp_of
+from vobench.rendering.lamp import lamp_of
+from vobench.rendering.truth import Shot, TruthCaster
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import Mesh, Thing, Triangles, flat, joined, quad, unit
@@ -28,7 +29,7 @@ from vobench.sensor.pixel_truth import CHANNELS, TruthFrame
 
 PLAIN = ("plain", 0.5, 0.0, 1.0, 8, 0)
 MATERIALS = {
-    "matt": Material(texture=Procedural(*PLAIN)),
+    "diffuse": Material(texture=Procedural(*PLAIN)),
     "wax": Material(texture=Procedural(*PLAIN), eta=1.5),
     "steel": Material("mirror", tint=0.9),
     "glass": Material("pane", eta=1.5),
@@ -36,7 +37,7 @@ MATERIALS = {
 SECOND_NS = 1_000_000_000
 
 
-def sheet(name: str, center_m, edge_u_m, edge_v_m, material: str = "matt") -> Thing:
+def sheet(name: str, center_m, edge_u_m, edge_v_m, material: str = "diffuse") -> Thing:
     """A rectangle around a middle."""
     u, v = np.asarray(edge_u_m, float), np.asarray(edge_v_m, float)
     return Thing(name, quad(np.asarray(center_m) - (u + v) / 2, u, v), material)
@@ -50,14 +51,14 @@ def sides(center_m, size_m, *, yaw_deg: float = 0.0) -> list[Mesh]:
 
 
 def block(name: str, center_m, size_m, *, yaw_deg: float = 0.0) -> Thing:
-    return Thing(name, joined(sides(center_m, size_m, yaw_deg=yaw_deg)), "matt")
+    return Thing(name, joined(sides(center_m, size_m, yaw_deg=yaw_deg)), "diffuse")
 
 
-def shell(size_m, *, floor: str = "matt") -> list[Thing]:
+def shell(size_m, *, floor: str = "diffuse") -> list[Thing]:
     """The inner sides of a block that stands on the floor."""
     names = ("wall_east", "wall_west", "wall_north", "wall_south", "ceiling", "floor")
     meshes = [side.flipped() for side in sides([0, 0, size_m[2] / 2], size_m)]
-    return [Thing(n, mesh, floor if n == "floor" else "matt") for n, mesh in zip(names, meshes, strict=True)]
+    return [Thing(n, mesh, floor if n == "floor" else "diffuse") for n, mesh in zip(names, meshes, strict=True)]
 
 
 RIDE = Path(np.array([0.0, 2.0]), np.array([[1.5, -1.2, 0.3], [1.9, 1.0, 0.3]]), np.array([0.0, 50.0]))
@@ -350,7 +351,7 @@ def shadow(caster: TruthCaster, *, t_ns: int = 0) -> np.ndarray:
     return found
 
 
-def plate(*, material: str = "matt", x_m: float = 0.0) -> Thing:
+def plate(*, material: str = "diffuse", x_m: float = 0.0) -> Thing:
     """0.2 m square, half a metre above the floor, seen from below and so not from the camera above."""
     return sheet("plate", [x_m, 0, 0.5], [0, 0.2, 0], [0.2, 0, 0], material)
 
@@ -453,7 +454,7 @@ def _is_face(corners: Array, which: tuple[int, ...]) -> bool:
 
 def ball_scene(*, splits: int) -> tuple[TruthCaster, Array, float]:
     center_m, radius_m = np.array([2.0, 0.1, 0.4]), 0.5
-    ball = Thing("ball", icosphere(center_m, radius_m, splits=splits), "matt")
+    ball = Thing("ball", icosphere(center_m, radius_m, splits=splits), "diffuse")
     return TruthCaster(Scene("ball", (ball,), MATERIALS, ())), center_m, radius_m
 
 
@@ -500,7 +501,7 @@ def shards(count: int, seed: int) -> Scene:
         Thing(
             f"shard {n}",
             flat(c, [[0, 1, 2]], np.zeros((3, 2))).two_sided() if n % 3 else flat(c, [[0, 1, 2]], np.zeros((3, 2))),
-            "matt",
+            "diffuse",
         )
         for n, c in enumerate(corners)
     ]
@@ -536,7 +537,7 @@ def test_rays_through_corners_and_edges_of_faces_meet_one_of_them():
     # Every pixel's ray goes through a corner of the wall's squares, 5 m away: 1/20 m a pixel.
     wall = tessellated([5.0, -1.5, -1.0], [0, 3.0, 0], [0, 0, 2.0], 20).flipped()
     camera, pose = Pinhole(21, 21, 100.0 / 3, 50.0, 10.0, 10.0), looking(pitch_deg=0, position_m=(0, 0, 0))
-    caster = TruthCaster(Scene("wall", (Thing("wall", wall, "matt"),), MATERIALS, ()))
+    caster = TruthCaster(Scene("wall", (Thing("wall", wall, "diffuse"),), MATERIALS, ()))
     truth = caster.frame(camera, Shot(pose, 0), ["depth", "instance"])
     inner = slice(1, -1), slice(1, -1)
     np.testing.assert_allclose(truth.depth[inner], 5.0, rtol=1e-7)
@@ -549,7 +550,7 @@ def test_every_ray_inside_a_closed_room_ends(seed):
     turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     T = se3.transform(turned * np.linalg.det(turned), rng.uniform(-40, 40, 3))
     inside = joined([side.flipped() for side in sides([0, 0, 1.5], rng.uniform(3, 12, 3))]).moved(T)
-    caster = TruthCaster(Scene("room", (Thing("room", inside, "matt"),), MATERIALS, ()))
+    caster = TruthCaster(Scene("room", (Thing("room", inside, "diffuse"),), MATERIALS, ()))
     shot = Shot(T @ se3.transform(np.eye(3), [0.1, -0.3, 1.6]), 0)
     truth = caster.frame(Equirectangular(720, 360), shot, ["depth", "normals", "instance"])
     assert np.isfinite(truth.depth).all()
@@ -558,7 +559,7 @@ def test_every_ray_inside_a_closed_room_ends(seed):
 
 
 def test_the_back_of_a_sheet_of_two_sides_is_seen_as_its_front_is():
-    both = Thing("card", quad([2.0, -0.5, -0.5], [0, 1.0, 0], [0, 0, 1.0]).two_sided(), "matt")
+    both = Thing("card", quad([2.0, -0.5, -0.5], [0, 1.0, 0], [0, 0, 1.0]).two_sided(), "diffuse")
     caster = TruthCaster(Scene("card", (both,), MATERIALS, ()))
     camera = CAMERAS["pinhole"]
     ahead = looking(pitch_deg=0, position_m=(0, 0, 0))
@@ -613,15 +614,15 @@ def test_a_lamp_with_faces_to_all_sides_shines_to_all_sides_and_is_not_in_its_ow
         lamp_of(mesh.corners_m) for mesh in (icosphere(center_m, 0.5, splits=1), sides(center_m, (1, 1, 0))[4])
     )
     for lamp, stops_m, half in ((ball, 1.5, False), (panel, 2.0, True)):
-        way = lamp.way(points_m)
+        vectors_m = lamp.vectors_m(points_m)
         np.testing.assert_allclose(lamp.center_m, center_m, atol=1e-9)
-        np.testing.assert_allclose(np.linalg.norm(way, axis=1), stops_m, rtol=1e-5)
-        assert (np.broadcast_to(lamp.shines(way), 50) == (points_m[:, 2] > 3 if half else True)).all()
+        np.testing.assert_allclose(np.linalg.norm(vectors_m, axis=1), stops_m, rtol=1e-5)
+        assert (np.broadcast_to(lamp.shines(vectors_m), 50) == (points_m[:, 2] > 3 if half else True)).all()
 
 
 def test_things_far_from_the_origin_throw_no_shadow_on_themselves():
     floor = sheet("floor", [300.0, -200.0, 0], [40.0, 0, 0], [0, 40.0, 0])
-    ball = Thing("ball", icosphere([300.0, -200.0, 1.0], 1.0, splits=3), "matt")
+    ball = Thing("ball", icosphere([300.0, -200.0, 1.0], 1.0, splits=3), "diffuse")
     sun = Sun("sun", 1e5, (0.0,), (0.0,), (60.0,))
     caster = TruthCaster(Scene("far", (floor, ball), MATERIALS, (sun,)))
     above = se3.transform(np.diag([1.0, -1.0, -1.0]), [300.0, -200.0, 8.0])

@@ -15,11 +15,17 @@ from annotated_types import Ge
 from vobench import stop
 from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Floats, Indices, Mask
+from vobench.rendering.atlas import Atlas
 from vobench.rendering.direct_light import direct_light, mirror_images
 from vobench.rendering.emitter import emitters
-from vobench.rendering.geometry import FAR_M, Floats, Indices, Mask, RayCaster, Visibility, face_materials, off
+from vobench.rendering.geometry import FAR_M, RayCaster, are_panes, face_materials, offset_from_surface
 from vobench.rendering.indirect_light import FinalGather, Gatherer, albedo, blend, bounced, response, surfels
-from vobench.rendering.lightmap import Atlas, Layout, Texels, owners, texels, unwrap
+from vobench.rendering.texel import Texels, texels
+from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.texel_owner import owners
+from vobench.rendering.unwrap import unwrap
+from vobench.rendering.visibility import Visibility
 from vobench.scene.light import NS_PER_S, AreaLight, Light, Sky, Sun
 from vobench.scene.material import Material, Picture, Texture
 from vobench.scene.mesh import Triangles, areas_m2, distinct
@@ -32,7 +38,7 @@ if TYPE_CHECKING:
 Report = Callable[[float], object]
 MOVER_COARSER = 2
 SUNLIT_FINER = 2  # the half shadow of the sun is 1 cm wide for each metre to what casts it
-CELL_TEXELS = 2.5  # along a surfel's side at least, where samples are far apart
+CELL_TEXELS = 2.5  # along a surfel's side at least, where samples are far from each other
 PROBES_M = 0.25  # between places that ask whether the sun reaches a face
 # the shares of a bake that are done after each, about
 PLACED_DONE = 0.1
@@ -119,15 +125,15 @@ class StaticScene:
     visibility: Visibility
     atlas: Atlas
     points: Texels
-    layout: Layout
+    layout: TexelLayout
     cells: Indices
     open_sky: Mask
 
 
 def bodies(scene: Scene, faces: Triangles) -> Mask:
     """The faces (F,) that light can show on."""
-    own = face_materials(faces, scene.materials)
-    return np.array([material is not None and material.kind == "body" for material in own], bool)[faces.thing]
+    kinds = face_materials(faces, scene.materials)
+    return np.array([kind is not None and kind.kind == "body" for kind in kinds], bool)[faces.thing]
 
 
 def spacings_m(scene: Scene, faces: Triangles, settings: BakeSettings) -> Array:
@@ -135,61 +141,84 @@ def spacings_m(scene: Scene, faces: Triangles, settings: BakeSettings) -> Array:
 
     On what asks for nothing it grows with the scene, so that SAMPLES do.
     """
-    asked = np.array([thing.spacing_m or 0.0 for thing in faces.things])[faces.thing]
-    share = np.where(_sunlit(scene, faces), 1 / SUNLIT_FINER, 1.0)
-    spacing_m = np.where(asked, asked, settings.spacing_m) * np.where(faces.mover < 0, share, MOVER_COARSER)
-    own = bodies(scene, faces) & (asked == 0)
-    samples = (areas_m2(faces.corners_m[own]) / spacing_m[own] ** 2).sum()
-    return np.asarray(spacing_m * np.where(own, max(1.0, float(np.sqrt(samples / SAMPLES))), 1.0))
+    things_ask_m = [thing.spacing_m or 0.0 for thing in faces.things]
+    asked_m = np.array(things_ask_m)[faces.thing]
+    static_factor = np.where(_sunlit(scene, faces), 1 / SUNLIT_FINER, 1.0)
+    factor = np.where(faces.mover < 0, static_factor, MOVER_COARSER)
+    spacing_m = np.where(asked_m, asked_m, settings.spacing_m) * factor
+
+    is_free = bodies(scene, faces) & (asked_m == 0)
+    sample_count = (areas_m2(faces.corners_m[is_free]) / spacing_m[is_free] ** 2).sum()
+    growth = max(1.0, float(np.sqrt(sample_count / SAMPLES)))
+    return np.asarray(spacing_m * np.where(is_free, growth, 1.0))
 
 
 def _sunlit(scene: Scene, faces: Triangles) -> Mask:
     """The faces (F,) of planes and small things that the sun reaches, at any of the instants it is baked for."""
-    lit = np.zeros(len(faces), bool)
+    is_lit = np.zeros(len(faces), bool)
     suns = [light for light in scene.lights if isinstance(light, Sun)]
     static = np.flatnonzero(bodies(scene, faces) & (faces.mover < 0))
     if not suns or not len(static):
-        return lit
+        return is_lit
     area_m2 = areas_m2(faces.corners_m)
-    which = np.repeat(static, 1 + (area_m2[static] / PROBES_M**2).astype(int))
-    a, b = np.random.default_rng(0).random((2, len(which), 1))
-    first, second, third = faces.corners_m[which].swapaxes(0, 1)
-    points = off(first + np.sqrt(a) * (second - first + b * (third - second)), faces.plane[which])
-    caster = RayCaster(faces, np.flatnonzero((faces.mover < 0) & ~_panes(scene, faces)))
-    for way in [sun.direction(t_ns) for sun in suns for t_ns in key_times_ns(sun)]:
-        faced = np.flatnonzero(faces.plane[which] @ way > 0)
-        shaded = caster.stops(points[faced], np.broadcast_to(FAR_M * way, (len(faced), 3)))
-        lit[which[faced[~shaded]]] = True
-    # All of a plane and of a small thing, so that no map changes its spacing amid either.
-    small = np.bincount(faces.thing, area_m2)[faces.thing] < SMALL_M2
-    offset = np.rint(np.einsum("ij,ij->i", faces.plane, faces.corners_m[:, 0]) * 1e3)
-    keys = np.column_stack([faces.thing, *(np.where(small, 0, x) for x in (*np.rint(faces.plane * 1e3).T, offset))])
-    group = distinct(keys)[1]
-    return np.asarray((np.bincount(group, lit) > 0)[group])
+    probe_count = 1 + (area_m2[static] / PROBES_M**2).astype(int)
+    face = np.repeat(static, probe_count)
+    a, b = np.random.default_rng(0).random((2, len(face), 1))
+    first, second, third = faces.corners_m[face].swapaxes(0, 1)
+    on_far_edge = second - first + b * (third - second)
+    probes_m = first + np.sqrt(a) * on_far_edge
+    origins_m = offset_from_surface(probes_m, faces.plane[face])
+
+    is_opaque = (faces.mover < 0) & ~are_panes(faces, scene.materials)
+    caster = RayCaster(faces, np.flatnonzero(is_opaque))
+    for sun in suns:
+        for t_ns in key_times_ns(sun):
+            direction = sun.direction(t_ns)
+            facing = np.flatnonzero(faces.plane[face] @ direction > 0)
+            segments_m = np.broadcast_to(FAR_M * direction, (len(facing), 3))
+            is_shaded = caster.stops(origins_m[facing], segments_m)
+            is_lit[face[facing[~is_shaded]]] = True
+
+    # All of a plane and of a small thing, so that no map changes its spacing in the middle of either.
+    thing_area_m2 = np.bincount(faces.thing, area_m2)
+    is_small = thing_area_m2[faces.thing] < SMALL_M2
+    offset_m = np.einsum("ij,ij->i", faces.plane, faces.corners_m[:, 0])
+    offset = np.rint(offset_m * 1e3)
+    normal = np.rint(faces.plane * 1e3)
+    plane_keys = [np.where(is_small, 0, column) for column in (*normal.T, offset)]
+    group = distinct(np.column_stack([faces.thing, *plane_keys]))[1]
+    has_lit_face = np.bincount(group, is_lit) > 0
+    return np.asarray(has_lit_face[group])
 
 
-def _panes(scene: Scene, faces: Triangles) -> Mask:
-    return np.array([m is not None and m.kind == "pane" for m in face_materials(faces, scene.materials)])[faces.thing]
-
-
-def static_points(scene: Scene, faces: Triangles, atlas: Atlas, seed: int) -> tuple[Visibility, Texels, Layout]:
+def static_points(
+    scene: Scene,
+    faces: Triangles,
+    atlas: Atlas,
+    seed: int,
+) -> tuple[Visibility, Texels, TexelLayout]:
     """A scene without its movers, as rays and as points, and these on the map."""
-    static = faces.mover < 0
-    visibility = Visibility(faces, scene.materials, np.flatnonzero(static))
-    on_map = owners(atlas)
-    own = texels(faces, scene.materials, atlas, on_map, among=static, seed=seed, visibility=visibility)
-    return visibility, *own
+    is_static = faces.mover < 0
+    visibility = Visibility(faces, scene.materials, np.flatnonzero(is_static))
+    points, layout = texels(
+        faces, scene.materials, atlas, owners(atlas), among=is_static, seed=seed, visibility=visibility
+    )
+    return visibility, points, layout
 
 
 def static_scene(baked: BakedScene) -> StaticScene:
-    """What does not move of a baked scene, once more."""
+    """The stationary part of a baked scene, computed once more."""
     visibility, points, layout = static_points(baked.scene, baked.faces, baked.atlas, baked.settings.seed)
     cells = baked.patches.surfel_of[points.index]
-    every = np.ones(len(points), bool)
-    return StaticScene(baked.faces, visibility, baked.atlas, points, layout, cells, every)
+    open_sky = np.ones(len(points), bool)
+    return StaticScene(baked.faces, visibility, baked.atlas, points, layout, cells, open_sky)
 
 
-def bake(scene: Scene, settings: BakeSettings, report: Report = lambda _: None) -> BakedScene:
+def bake(
+    scene: Scene,
+    settings: BakeSettings,
+    report: Report = lambda _: None,
+) -> BakedScene:
     """Compute the light of a scene; the same bytes for the same arguments.
 
     `report` is called now and then with the share of the work that is done, about.
@@ -199,10 +228,12 @@ def bake(scene: Scene, settings: BakeSettings, report: Report = lambda _: None) 
     atlas = unwrap(faces, spacing_m, bodies(scene, faces))
     visibility, points, layout = static_points(scene, faces, atlas, settings.seed)
     thing = faces.thing[points.face]
-    step_m = np.maximum(settings.indirect_spacing_m, CELL_TEXELS * spacing_m[points.face]).astype(np.float32)
+    cell_m = CELL_TEXELS * spacing_m[points.face]
+    step_m = np.maximum(settings.indirect_spacing_m, cell_m).astype(np.float32)
     groups = surfels(points, thing, step_m, visibility)
     surfel_of = np.append(groups.of, np.int32(-1))[layout.source]
     report(PLACED_DONE)
+
     skies = [light for light in scene.lights if isinstance(light, Sky)]
     gatherer = Gatherer(
         atlas,
@@ -213,114 +244,159 @@ def bake(scene: Scene, settings: BakeSettings, report: Report = lambda _: None) 
         len(groups),
         len(scene.lights),
     )
-    rays = max(settings.indirect_rays, SKY_RAYS if skies else 0)
     gathered = gatherer.gather(
         points.take(groups.middle),
-        rays=rays,
+        rays=max(settings.indirect_rays, SKY_RAYS if skies else 0),
         done=lambda share: report(PLACED_DONE + (GATHER_DONE - PLACED_DONE) * share),
     )
-    usable = np.asarray(gathered.table.sum(1)).ravel() + gathered.escaped > BLIND
-    spread = blend(points, groups, layout, visibility, usable)
+    met_share = np.asarray(gathered.table.sum(1)).ravel()
+    is_usable = met_share + gathered.escaped > BLIND
+    spread = blend(points, groups, layout, visibility, is_usable)
     open_sky = (spread @ gathered.escaped)[points.index] > 0
-    still = StaticScene(faces, visibility, atlas, points, layout, groups.of, open_sky)
-    # What rays have found of a surfel stands for it, not what hides under a rug.
-    weights = np.bincount(layout.source, gathered.hits, len(points) + 1)[: len(points)] + UNSEEN
+    static = StaticScene(faces, visibility, atlas, points, layout, groups.of, open_sky)
+
+    # A surfel is represented by its points that rays have found, not by those that lie hidden under a rug.
+    point_hits = np.bincount(layout.source, gathered.hits, len(points) + 1)
+    weights = point_hits[: len(points)] + UNSEEN
     scatters = albedo(faces, scene.materials, points)
     instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
     direct = np.zeros((len(scene.lights), atlas.height, atlas.width), np.float32)
     received = np.zeros((len(instants), len(groups), 3), np.float32)
     # Backwards, so that a moving sun's layer ends as that of its first instant.
-    for row, (index, t_ns) in reversed(list(enumerate(instants))):
-        light = direct_points(scene, index, still, settings, t_ns=t_ns)
+    for row in reversed(range(len(instants))):
+        index, t_ns = instants[row]
+        light = direct_points(scene, index, static, settings, t_ns=t_ns)
         received[row] = groups.mean(scatters * light[:, None], weights)
-        direct[index] = direct_layer(scene, index, still, light)
+        direct[index] = direct_layer(scene, index, static, light)
         report(1 - (1 - GATHER_DONE) * row / len(instants))
     reflectance = groups.mean(scatters, weights)
-    del still, points, layout  # bounces take memory of their own
+
+    del static, points, layout  # bounces take memory of their own
     by_mirrors = _by_mirrors(scene, [index for index, _ in instants], gathered, len(groups))
-    around = bounced(received, reflectance, gathered, by_mirrors, bounces=settings.bounces)
-    first = [instants.index((index, key_times_ns(one)[0])) for index, one in enumerate(scene.lights)]
-    areas = _point_areas_m2(faces, thing)
+    indirect = bounced(received, reflectance, gathered, by_mirrors, bounces=settings.bounces)
+    first = [instants.index((index, key_times_ns(light)[0])) for index, light in enumerate(scene.lights)]
+    point_areas_m2 = _point_areas_m2(faces, thing)
     patches = Patches(
-        surfel_of,
-        reflectance,
-        np.bincount(groups.of, areas, len(groups)),
-        received[first] + reflectance * around[first],
+        surfel_of=surfel_of,
+        reflectance=reflectance,
+        area_m2=np.bincount(groups.of, point_areas_m2, len(groups)),
+        radiosity=received[first] + reflectance * indirect[first],
     )
-    return BakedScene(
-        scene, faces, atlas, direct, around[first], spread, patches, settings, _tracks(instants, around, scene)
-    )
+    tracks = _tracks(instants, indirect, scene)
+    return BakedScene(scene, faces, atlas, direct, indirect[first], spread, patches, settings, tracks)
 
 
 def _point_areas_m2(faces: Triangles, thing: Indices) -> Array:
     """The area (P,) that each point stands for among all of its thing's, whose index (P,) is given."""
-    of_thing = np.bincount(faces.thing, areas_m2(faces.corners_m))
-    return np.asarray(of_thing[thing] / np.bincount(thing, minlength=len(of_thing))[thing])
+    thing_areas_m2 = np.bincount(faces.thing, areas_m2(faces.corners_m))
+    point_counts = np.bincount(thing, minlength=len(thing_areas_m2))
+    return np.asarray(thing_areas_m2[thing] / point_counts[thing])
 
 
-def _by_mirrors(scene: Scene, rows: list[int], gathered: FinalGather, surfels: int) -> Floats:
+def _by_mirrors(
+    scene: Scene,
+    rows: list[int],
+    gathered: FinalGather,
+    surfel_count: int,
+) -> Floats:
     """Illuminance (K, S) of surfels by lamps and the sky that rays found by way of mirrors, of lights `rows` (K,)."""
-    result = np.zeros((len(rows), surfels), np.float32)
-    skies = [i for i, x in enumerate(scene.lights) if isinstance(x, Sky)]
+    result = np.zeros((len(rows), surfel_count), np.float32)
+    skies = [index for index, light in enumerate(scene.lights) if isinstance(light, Sky)]
     for row, index in enumerate(rows):
         light = scene.lights[index]
         if isinstance(light, AreaLight):
-            shown = gathered.table[:, surfels + index].toarray().ravel()
-            result[row] = np.pi * light.luminance_cd_m2 * shown
+            seen = gathered.table[:, surfel_count + index].toarray().ravel()
+            result[row] = np.pi * light.luminance_cd_m2 * seen
         elif isinstance(light, Sky):
             result[row] = gathered.sky[skies.index(index)]
     return result
 
 
-def _tracks(instants: list[tuple[int, float]], around: Floats, scene: Scene) -> tuple[SunTrack, ...]:
-    rows = {sun: [row for row, (index, _) in enumerate(instants) if index == sun] for sun in moving_suns(scene)}
-    return tuple(SunTrack(sun, tuple(instants[row][1] for row in own), around[own]) for sun, own in rows.items())
+def _tracks(
+    instants: list[tuple[int, float]],
+    indirect: Floats,
+    scene: Scene,
+) -> tuple[SunTrack, ...]:
+    tracks = []
+    for sun in moving_suns(scene):
+        rows = [row for row, (index, _) in enumerate(instants) if index == sun]
+        times_ns = tuple(instants[row][1] for row in rows)
+        tracks.append(SunTrack(sun, times_ns, indirect[rows]))
+    return tuple(tracks)
 
 
 def moving_suns(scene: Scene) -> tuple[int, ...]:
     """Which lights are suns that move."""
-    return tuple(i for i, light in enumerate(scene.lights) if isinstance(light, Sun) and light.moves)
+    return tuple(index for index, light in enumerate(scene.lights) if light.moves)
 
 
 def key_times_ns(light: Light) -> tuple[float, ...]:
-    """When a light's place is baked: once, or so often that a moving sun wanders SUN_STEP_RAD between."""
-    if not isinstance(light, Sun) or not light.moves:
-        return (light.times_s[0] * NS_PER_S if isinstance(light, Sun) else 0.0,)
-    times = np.array(light.times_s) * NS_PER_S
-    steps = np.maximum(np.ceil(np.diff(wandered_rad(light)) / SUN_STEP_RAD), 1).astype(int)
-    inner = [np.linspace(*span, count, endpoint=False) for span, count in zip(pairwise(times), steps, strict=True)]
-    return (*np.concatenate(inner).tolist(), float(times[-1]))
+    """The instants that a light is baked for: one, or so many that a moving sun travels SUN_STEP_RAD between."""
+    if not isinstance(light, Sun):
+        return (0.0,)
+    if not light.moves:
+        return (light.times_s[0] * NS_PER_S,)
+    times_ns = np.array(light.times_s) * NS_PER_S
+    steps = np.ceil(np.diff(travelled_rad(light)) / SUN_STEP_RAD)
+    step_counts = np.maximum(steps, 1).astype(int)
+    inner_ns = []
+    for (start_ns, end_ns), count in zip(pairwise(times_ns), step_counts, strict=True):
+        inner_ns.append(np.linspace(start_ns, end_ns, count, endpoint=False))
+    return (*np.concatenate(inner_ns).tolist(), float(times_ns[-1]))
 
 
-def wandered_rad(sun: Sun) -> Array:
-    """How far (K,) a sun has gone along its way, at most, at each of its times: not how far it is from the start."""
-    azimuth = np.deg2rad(sun.azimuth_deg)
-    elevation = np.abs(np.deg2rad(sun.elevation_deg))
-    across = np.diff(azimuth) * np.cos(np.minimum(elevation[1:], elevation[:-1]))
-    return np.concatenate([[0.0], np.cumsum(np.hypot(across, np.diff(np.deg2rad(sun.elevation_deg))))])
+def travelled_rad(sun: Sun) -> Array:
+    """How far (K,) a sun has travelled along its path, at most, at each of its times."""
+    azimuth_rad = np.deg2rad(sun.azimuth_deg)
+    elevation_rad = np.deg2rad(sun.elevation_deg)
+    height_rad = np.abs(elevation_rad)
+    widest = np.cos(np.minimum(height_rad[1:], height_rad[:-1]))  # of the circles of equal elevation
+    across_rad = np.diff(azimuth_rad) * widest
+    steps_rad = np.hypot(across_rad, np.diff(elevation_rad))
+    return np.concatenate([[0.0], np.cumsum(steps_rad)])
 
 
-def direct_points(scene: Scene, index: int, still: StaticScene, settings: BakeSettings, *, t_ns: float) -> Floats:
-    """What one light gives the points straight (P,)."""
+def direct_points(
+    scene: Scene,
+    index: int,
+    static: StaticScene,
+    settings: BakeSettings,
+    *,
+    t_ns: float,
+) -> Floats:
+    """The direct light (P,) of one light on the points."""
     light = scene.lights[index]
-    total = np.zeros(len(still.points), np.float32)
+    total = np.zeros(len(static.points), np.float32)
     side = round(np.sqrt(settings.light_rays))
-    shown = mirror_images(light, still.visibility, t_ns=t_ns)
-    for emitter in [*emitters(light, still.visibility, t_ns=t_ns), *shown]:
+    images = mirror_images(light, static.visibility, t_ns=t_ns)
+    for emitter in [*emitters(light, static.visibility, t_ns=t_ns), *images]:
         stop.check()
-        among = still.open_sky if emitter.sky == "open" else np.ones(len(still.points), bool)
+        everywhere = np.ones(len(static.points), bool)
+        is_reachable = static.open_sky if emitter.sky == "open" else everywhere
         total += direct_light(
-            emitter, still.points, still.layout, still.cells, still.visibility, side=side, among=among
+            emitter,
+            static.points,
+            static.layout,
+            static.cells,
+            static.visibility,
+            side=side,
+            among=is_reachable,
         )
     return total
 
 
-def direct_layer(scene: Scene, index: int, still: StaticScene, light: Floats) -> Floats:
-    """The map (H, W) of what one light gives the points straight (P,), its own glow included."""
-    layer = still.layout.filled(light)
+def direct_layer(
+    scene: Scene,
+    index: int,
+    static: StaticScene,
+    light: Floats,
+) -> Floats:
+    """The map (H, W) of the direct light (P,) of one light on the points, its glow included."""
+    layer = static.layout.filled(light)
     lamp = scene.lights[index]
     if isinstance(lamp, AreaLight):
-        layer[still.atlas.block(int(np.flatnonzero(still.faces.lamp == index)[0]))] = np.pi * lamp.luminance_cd_m2
+        lamp_face = int(np.flatnonzero(static.faces.lamp == index)[0])
+        layer[static.atlas.block(lamp_face)] = np.pi * lamp.luminance_cd_m2
     return layer
 
 
@@ -328,69 +404,85 @@ LIGHT = "light.npy"
 PLACES = "surfels.npz"
 TEXTURES = "textures.npz"
 SETTINGS_FILE = "settings.json"
+SPREAD_ARRAYS = ("data", "indices", "indptr")
 
 
 def save_baked(folder: Path, baked: BakedScene) -> None:
     """Write the light of a baked scene into a folder, and its textures as they were painted for it."""
     (folder / SETTINGS_FILE).write_text(json.dumps(asdict(baked.settings)))
     np.save(folder / LIGHT, baked.direct)
-    atlas = baked.atlas
-    patches = baked.patches
-    spread = baked.spread
+    spread = {f"spread_{name}": getattr(baked.spread, name) for name in SPREAD_ARRAYS}
+    patches = {field.name: getattr(baked.patches, field.name) for field in fields(Patches)}
     np.savez(
         folder / PLACES,
-        light_px=atlas.light_px,
-        chart=atlas.chart,
+        light_px=baked.atlas.light_px,
+        chart=baked.atlas.chart,
         bounced=baked.bounced,
-        **{f"spread_{name}": getattr(spread, name) for name in ("data", "indices", "indptr")},
-        **{field.name: getattr(patches, field.name) for field in fields(Patches)},
+        **spread,
+        **patches,
     )
     for track in baked.tracks:
         np.savez(folder / f"sun.{track.light}.npz", times_ns=track.times_ns, bounced=track.bounced)
+    np.savez(folder / TEXTURES, **_painted(baked))
+
+
+def _painted(baked: BakedScene) -> dict[str, Any]:
+    """The pixels of all textures of a baked scene's things that are no pictures, by the names of `_textures`."""
     materials = baked.scene.materials
-    seen = {thing.material for thing in baked.faces.things} & materials.keys()
-    shown = {id(getattr(materials[name], part)) for name in seen for part in TEXTURE_FIELDS}
-    painted: dict[str, Any] = {name: t.pixels() for name, t in _textures(materials).items() if id(t) in shown}
-    np.savez(folder / TEXTURES, **painted)
+    names = {thing.material for thing in baked.faces.things} & materials.keys()
+    shown = {id(getattr(materials[name], part)) for name in names for part in TEXTURE_FIELDS}
+    painted = {name: texture for name, texture in _textures(materials).items() if id(texture) in shown}
+    return {name: texture.pixels() for name, texture in painted.items()}
 
 
 def _textures(materials: Mapping[str, Material]) -> dict[str, Texture]:
     """The textures that are no pictures yet, each by the first material and the field that have it."""
-    found = {
-        id(texture): (f"{name}.{part}", texture)
-        for name, material in reversed(list(materials.items()))
-        for part in TEXTURE_FIELDS
-        if (texture := getattr(material, part)) is not None and not isinstance(texture, Picture)
-    }
-    return dict(found.values())
+    named = dict[int, tuple[str, Texture]]()
+    for name, material in reversed(list(materials.items())):
+        for part in TEXTURE_FIELDS:
+            texture = getattr(material, part)
+            if texture is not None and not isinstance(texture, Picture):
+                named[id(texture)] = (f"{name}.{part}", texture)
+    return dict(named.values())
 
 
 def _with_pictures(scene: Scene, pictures: Mapping[str, Any]) -> Scene:
     """The scene with pictures, by the names of `_textures`, in place of textures that would be painted once more."""
-    own = {id(t): Picture(pictures[n], t.tile_m) for n, t in _textures(scene.materials).items() if n in pictures}
+    painted = {}
+    for name, texture in _textures(scene.materials).items():
+        if name in pictures:
+            painted[id(texture)] = Picture(pictures[name], texture.tile_m)
 
-    def ready(material: Material) -> Material:
-        return replace(material, **{p: own.get(id(t := getattr(material, p)), t) for p in TEXTURE_FIELDS})
+    def with_pictures(material: Material) -> Material:
+        textures = {part: getattr(material, part) for part in TEXTURE_FIELDS}
+        replaced = {part: painted.get(id(texture), texture) for part, texture in textures.items()}
+        return replace(material, **replaced)
 
-    return replace(scene, materials={name: ready(material) for name, material in scene.materials.items()})
+    materials = {name: with_pictures(material) for name, material in scene.materials.items()}
+    return replace(scene, materials=materials)
 
 
 def load_baked(folder: Path, scene: Scene) -> BakedScene:
     """The light that `save_baked` wrote, for the same scene. Raises RenderError where it is damaged."""
     try:
         settings = BakeSettings(**json.loads((folder / SETTINGS_FILE).read_text()))
-        shown = _with_pictures(scene, _load(folder / TEXTURES))
+        pictured = _with_pictures(scene, _load(folder / TEXTURES))
         light = np.load(folder / LIGHT)
-        kept = _load(folder / PLACES)
-        suns = {sun: _load(folder / f"sun.{sun}.npz") for sun in moving_suns(scene)}
-        tracks = tuple(SunTrack(sun, tuple(own["times_ns"].tolist()), own["bounced"]) for sun, own in suns.items())
-        atlas = Atlas(kept["light_px"], kept["chart"], *light.shape[1:])
-        patches = Patches(*(kept[field.name] for field in fields(Patches)))
-        shape = (light[0].size if len(light) else atlas.height * atlas.width, len(patches.area_m2))
-        spread = scipy.sparse.csr_matrix(tuple(kept[f"spread_{name}"] for name in ("data", "indices", "indptr")), shape)
+        arrays = _load(folder / PLACES)
+        tracks = []
+        for sun in moving_suns(scene):
+            track = _load(folder / f"sun.{sun}.npz")
+            tracks.append(SunTrack(sun, tuple(track["times_ns"].tolist()), track["bounced"]))
+        atlas = Atlas(arrays["light_px"], arrays["chart"], *light.shape[1:])
+        patches = Patches(*(arrays[field.name] for field in fields(Patches)))
+        texel_count = atlas.height * atlas.width
+        spread_arrays = tuple(arrays[f"spread_{name}"] for name in SPREAD_ARRAYS)
+        spread = scipy.sparse.csr_matrix(spread_arrays, (texel_count, len(patches.area_m2)))
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, SettingError) as error:
         raise RenderError(f"the scene's light cannot be read ({error}); delete this folder: {folder}") from error
-    return BakedScene(shown, triangles(scene), atlas, light, kept["bounced"], spread, patches, settings, tracks)
+    return BakedScene(
+        pictured, triangles(scene), atlas, light, arrays["bounced"], spread, patches, settings, tuple(tracks)
+    )
 
 
 def _load(path: Path) -> dict[str, Any]:

@@ -152,7 +152,7 @@ def _capable_context(device: Device) -> Context:
 
 
 def _no_device(failures: Sequence[tuple[Device, Exception]]) -> MissingDependencyError:
-    """What to tell where every device failed: the last one's error, which is the software device where there is one."""
+    """The error where every device failed: the last one's, which is the software device where there is one."""
     device, error = failures[-1]
     if isinstance(error, MissingDependencyError):
         return error
@@ -161,7 +161,7 @@ def _no_device(failures: Sequence[tuple[Device, Exception]]) -> MissingDependenc
 
 def _cannot_draw(error: Exception, where: str = "") -> MissingDependencyError:
     missing = missing_libraries()
-    cause = f"missing lib{', lib'.join(missing)}" if missing else f"EGL{where} says {_reason(error)}"
+    cause = f"missing lib{', lib'.join(missing)}" if missing else f"EGL{where} reports {_reason(error)}"
     return MissingDependencyError(f"cannot draw without a display ({cause}); run: {EGL_REMEDY}")
 
 
@@ -216,7 +216,7 @@ def _pyopengl_version() -> str:
 
 
 def missing_features() -> list[str]:
-    """What drawing needs and the driver of the current context lacks, each in words."""
+    """The features that drawing needs and the driver of the current context lacks, each in words."""
     from OpenGL import GL
 
     lacking = [f"{name} ({purpose})" for name, purpose in FUNCTIONS.items() if not bool(getattr(GL, name))]
@@ -306,7 +306,11 @@ def devices() -> list[Device]:
     return [_described(index, handle, query_string) for index, handle in enumerate(handles[: count.value])]
 
 
-def _described(index: int, handle: int | None, query_string: Any) -> Device:
+def _described(
+    index: int,
+    handle: int | None,
+    query_string: Any,
+) -> Device:
     from OpenGL import EGL
 
     words = (query_string(handle, EGL.EGL_EXTENSIONS) or b"").decode("ascii", "replace").split()
@@ -336,7 +340,7 @@ def _display(device: Device) -> Any:
 
 
 def _config(display: Any) -> Any:
-    """A configuration of 8 bits a colour and 24 of depth, of which only the API matters: we draw into textures."""
+    """A configuration of 8 bits a colour and 24 of depth, of which only the API matters: pictures are textures."""
     from OpenGL import EGL
 
     wanted = (EGL.EGLint * 13)(

@@ -1,17 +1,18 @@
-"""Embree's scenes; where results must not depend on the make of the processor, with one instruction set."""
+"""Rays against triangles by Embree; where results must not depend on the processor, with one instruction set."""
 
 import ctypes
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vobench.errors import MissingDependencyError
 from vobench.portable import PORTABLE, is_portable
+from vobench.rendering.array_types import Floats, Indices, Mask
 
-Floats = NDArray[np.float32]
 PORTABLE_CONFIG = b"isa=sse4.2"
 VERSION_PROPERTY = 0  # RTC_DEVICE_PROPERTY_VERSION
 # versions of Embree 4
@@ -21,8 +22,92 @@ POINTER_OFFSET = 16  # of the device in embreex's object: behind Python's refere
 OBJECT_SIZE = 24
 
 
+BEYOND_M = 1e9  # farther than any ray leads
+
+
+@dataclass(frozen=True, slots=True)
+class Hits:
+    """Where rays end: face (R,) int32, -1 for none; u, v (R,) are the weights of its second and third corner.
+
+    distance (R,) is in lengths of the ray's direction, NaN for none.
+    """
+
+    face: Indices
+    u: Floats
+    v: Floats
+    distance: Floats
+
+    def take(self, rays: Any) -> "Hits":
+        """The hits of some rays, given by a mask, a slice or their indices."""
+        return Hits(self.face[rays], self.u[rays], self.v[rays], self.distance[rays])
+
+    def at(self, values: Floats) -> Floats:
+        """Values (R, ...) between those of faces' corners (F, 3, ...)."""
+        a, b, c = values[self.face].swapaxes(0, 1)
+        shape = (-1, *[1] * (a.ndim - 1))
+        u = self.u.reshape(shape)
+        v = self.v.reshape(shape)
+        return np.asarray(a + u * (b - a) + v * (c - a))
+
+
+class TriangleCaster:
+    """Embree over some triangles (K,) of a table of corners (F, 3, 3); hits name them by their place in the table.
+
+    robust: no ray slips between two triangles that share an edge.
+    """
+
+    def __init__(
+        self,
+        corners_m: NDArray[Any],
+        among: NDArray[Any],
+        *,
+        robust: bool,
+    ) -> None:
+        from embreex import mesh_construction
+
+        self._among = np.append(among, -1).astype(np.int32)
+        # A scene without triangles would make Embree fail; one beyond everything is never hit.
+        corners = corners_m[among] if len(among) else np.full((1, 3, 3), BEYOND_M)
+        self._triangles = np.ascontiguousarray(corners, np.float32)
+        self._scene = new_scene(robust=robust)
+        self._mesh = mesh_construction.TriangleMesh(self._scene, self._triangles)
+
+    def hits(self, origins_m: ArrayLike, directions: ArrayLike, reach: float) -> Hits:
+        """The nearest face along rays (R, 3), no farther than `reach` lengths of their directions."""
+        rays = _rays(origins_m, directions, reach)
+        result = self._scene.run(*rays, query="INTERSECT", output=1)
+        hit = with_portable_places(result, self._triangles, rays[0], rays[1])
+        face = self._among[hit["primID"]]
+        distance = np.where(face < 0, np.float32(np.nan), hit["tfar"])
+        return Hits(face, hit["u"], hit["v"], distance)
+
+    def nearest(self, origins_m: ArrayLike, directions: ArrayLike, reach: float) -> Indices:
+        """The face of `hits` (R,) alone, which costs less."""
+        triangle = self._scene.run(*_rays(origins_m, directions, reach), query="INTERSECT")
+        return np.asarray(self._among[triangle])
+
+    def stops(self, origins_m: ArrayLike, directions: ArrayLike, reach: ArrayLike) -> Mask:
+        """Whether a face is between origins and origins + reach * directions (R, 3); none where reach is negative."""
+        rays = _rays(origins_m, directions, reach)
+        is_blocked = self._scene.run(*rays, query="OCCLUDED") >= 0
+        return np.asarray(is_blocked & (rays[2] > 0))
+
+
+def _rays(
+    origins_m: ArrayLike,
+    directions: ArrayLike,
+    reach: ArrayLike,
+) -> tuple[Floats, Floats, Floats]:
+    """Contiguous float32 arrays, as Embree wants them; reach (R,) or one for all, in lengths of the direction."""
+    origins = np.ascontiguousarray(origins_m, np.float32)
+    is_same = np.ndim(reach) == 0
+    reaches = np.full(len(origins), reach, np.float32) if is_same else reach
+    float32_directions = np.ascontiguousarray(directions, np.float32)
+    return origins, float32_directions, np.ascontiguousarray(reaches, np.float32)
+
+
 def new_scene(*, robust: bool = False) -> Any:
-    """An empty scene for rays; `robust`: no ray slips between two triangles that share an edge."""
+    """An empty scene of Embree's."""
     from embreex.rtcore_scene import EmbreeScene
 
     return EmbreeScene(_portable_device(), robust=robust) if is_portable() else EmbreeScene(robust=robust)
@@ -38,10 +123,10 @@ def _portable_device() -> Any:
     import embreex
     from embreex.rtcore import EmbreeDevice
 
-    found = list(Path(embreex.__file__).parent.parent.glob("embreex.libs/libembree4*"))
+    libraries = list(Path(embreex.__file__).parent.parent.glob("embreex.libs/libembree4*"))
     device = EmbreeDevice()
-    if len(found) == 1 and EmbreeDevice.__basicsize__ == OBJECT_SIZE:
-        embree = ctypes.CDLL(str(found[0]))
+    if len(libraries) == 1 and EmbreeDevice.__basicsize__ == OBJECT_SIZE:
+        embree = ctypes.CDLL(str(libraries[0]))
         embree.rtcNewDevice.restype = ctypes.c_void_p
         embree.rtcNewDevice.argtypes = [ctypes.c_char_p]
         embree.rtcReleaseDevice.argtypes = [ctypes.c_void_p]
@@ -56,7 +141,10 @@ def _portable_device() -> Any:
 
 
 def with_portable_places(
-    hit: dict[str, Any], triangles_m: NDArray[Any], origins_m: NDArray[Any], directions: NDArray[Any]
+    hit: dict[str, Any],
+    triangles_m: NDArray[Any],
+    origins_m: NDArray[Any],
+    directions: NDArray[Any],
 ) -> dict[str, Any]:
     """The hits of rays (R, 3) on triangles (K, 3, 3), with `u`, `v` and `tfar` recomputed where results are portable.
 
@@ -67,16 +155,19 @@ def with_portable_places(
     if not is_portable():
         return hit
     triangle = hit["primID"].astype(np.int64)
-    met = np.flatnonzero((triangle >= 0) & (triangle < len(triangles_m)))
-    a, b, c = np.moveaxis(triangles_m[triangle[met]].astype(np.float64), 1, 0)
-    origin = origins_m[met].astype(np.float64)
-    direction = directions[met].astype(np.float64)
+    rays = np.flatnonzero((triangle >= 0) & (triangle < len(triangles_m)))
+    corners_m = triangles_m[triangle[rays]].astype(np.float64)
+    a, b, c = np.moveaxis(corners_m, 1, 0)
+    origin = origins_m[rays].astype(np.float64)
+    direction = directions[rays].astype(np.float64)
 
+    # Named as in the paper.
     p = np.cross(direction, c - a)
     q = np.cross(origin - a, b - a)
     determinant = _dot(b - a, p)
-    for name, value in (("u", _dot(origin - a, p)), ("v", _dot(direction, q)), ("tfar", _dot(c - a, q))):
-        hit[name][met] = value / determinant
+    hit["u"][rays] = _dot(origin - a, p) / determinant
+    hit["v"][rays] = _dot(direction, q) / determinant
+    hit["tfar"][rays] = _dot(c - a, q) / determinant
     return hit
 
 

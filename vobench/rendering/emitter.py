@@ -7,13 +7,25 @@ from typing import Protocol
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, Ball, Flat, Floats, Mask, Visibility, ball, lengths, spots
-from vobench.rendering.lightmap import Texels, tangents
+from vobench.rendering.array_types import Floats, Mask
+from vobench.rendering.geometry import (
+    FAR_M,
+    RAY_OFFSET_M,
+    BoundingSphere,
+    PlanarPatch,
+    bounding_sphere,
+    lengths,
+    sample_points,
+    tangents,
+)
+from vobench.rendering.texel import Texels
+from vobench.rendering.visibility import Visibility
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.mesh import areas_m2, face_normals, unit
 
 FAR_OFF = 2.9  # radii of a rectangle, beyond which rays spread over its area tell as well what hides it
-MESH_SPOTS = 8
+MESH_SAMPLES = 8  # along a side, of a mesh's light without rays
+FILLED = 1e-4  # share by which triangles may miss the rectangle that they fill
 CURVE_BITS = 10
 LEVEL_M = 1e-6  # a point nearer than this to a rectangle's plane sees none of it
 
@@ -30,76 +42,101 @@ class Rectangle:
 
 def rectangle(corners_m: Array) -> Rectangle | None:
     """The rectangle that triangles (K, 3, 3) fill between them, if they do."""
-    normal = unit(np.cross(corners_m[0, 1] - corners_m[0, 0], corners_m[0, 2] - corners_m[0, 0]))
+    first, second, third = corners_m[0]
+    normal = unit(np.cross(second - first, third - first))
     edges = np.roll(corners_m[0], -1, axis=0) - corners_m[0]
     square = np.abs([edges[i] @ edges[i - 1] for i in range(3)]).argmin()  # the corner with the right angle
-    u = unit(edges[square])
-    v = np.cross(normal, u)
-    local = (corners_m - corners_m[0, 0]) @ np.stack([u, v, normal]).T
-    low = local.min((0, 1))
-    size = np.ptp(local, axis=(0, 1))
-    turned = np.cross(local[:, 1] - local[:, 0], local[:, 2] - local[:, 0])[:, 2].sum() / 2
-    if size[2] > 1e-4 * size.max() or abs(turned - size[0] * size[1]) > 1e-4 * size[0] * size[1]:
+    u_axis = unit(edges[square])
+    v_axis = np.cross(normal, u_axis)
+
+    local_m = (corners_m - first) @ np.stack([u_axis, v_axis, normal]).T
+    low_m = local_m.min((0, 1))
+    size_m = np.ptp(local_m, axis=(0, 1))
+    first_edge_m = local_m[:, 1] - local_m[:, 0]
+    second_edge_m = local_m[:, 2] - local_m[:, 0]
+    doubled_areas = np.cross(first_edge_m, second_edge_m)[:, 2]
+    area_m2 = doubled_areas.sum() / 2
+    box_area_m2 = size_m[0] * size_m[1]
+    is_thick = size_m[2] > FILLED * size_m.max()
+    tolerance_m2 = FILLED * size_m[0] * size_m[1]
+    if is_thick or abs(area_m2 - box_area_m2) > tolerance_m2:
         return None
-    return Rectangle(corners_m[0, 0] + low[0] * u + low[1] * v, size[0] * u, size[1] * v, normal)
+    corner_m = first + low_m[0] * u_axis + low_m[1] * v_axis
+    return Rectangle(corner_m, size_m[0] * u_axis, size_m[1] * v_axis, normal)
 
 
 class SolidAngle:
-    """A rectangle as seen from points, and spots on it spread evenly over its solid angle.
+    """A rectangle as seen from points, and places on it spread evenly over its solid angle.
 
-    Source: Ureña, Fajardo, King (2013), An area-preserving parametrization for spherical rectangles.
+    Names are those of the source: Ureña, Fajardo, King (2013), An area-preserving parametrization for spherical
+    rectangles.
     """
 
     def __init__(self, face: Rectangle, points_m: Floats) -> None:
-        way = face.corner_m - points_m.astype(float)
-        width = np.linalg.norm(face.edge_u_m)
-        length = np.linalg.norm(face.edge_v_m)
-        x_axis = face.edge_u_m / width
-        y_axis = face.edge_v_m / length
-        height = way @ face.normal
+        to_corner_m = face.corner_m - points_m.astype(float)
+        width_m = np.linalg.norm(face.edge_u_m)
+        length_m = np.linalg.norm(face.edge_v_m)
+        x_axis = face.edge_u_m / width_m
+        y_axis = face.edge_v_m / length_m
+        height_m = to_corner_m @ face.normal
         # The paper's axes: the rectangle lies at negative z.
-        self._axes = np.stack([x_axis, y_axis, face.normal]), np.where(height > 0, -1.0, 1.0)
-        self._z0 = np.minimum(-np.abs(height), -LEVEL_M)
-        self._x0 = way @ x_axis
-        self._y0 = way @ y_axis
-        self._x1 = self._x0 + width
-        self._y1 = self._y0 + length
+        self._axes = np.stack([x_axis, y_axis, face.normal])
+        self._flip = np.where(height_m > 0, -1.0, 1.0)
+        self._z0 = np.minimum(-np.abs(height_m), -LEVEL_M)
+        self._x0 = to_corner_m @ x_axis
+        self._y0 = to_corner_m @ y_axis
+        self._x1 = self._x0 + width_m
+        self._y1 = self._y0 + length_m
+
         n0 = -self._y0 / np.hypot(self._z0, self._y0)
         n2 = self._y1 / np.hypot(self._z0, self._y1)
         n1 = self._x1 / np.hypot(self._z0, self._x1)
         n3 = -self._x0 / np.hypot(self._z0, self._x0)
-        g0, g1, g2, g3 = (np.arccos(np.clip(-a * b, -1, 1)) for a, b in ((n0, n1), (n1, n2), (n2, n3), (n3, n0)))
+        g0 = _angle(n0, n1)
+        g1 = _angle(n1, n2)
+        g2 = _angle(n2, n3)
+        g3 = _angle(n3, n0)
         self._b0 = n0
         self._b1 = n2
         self._k = 2 * np.pi - g2 - g3
-        self.steradian = np.where(np.abs(height) > LEVEL_M, np.maximum(g0 + g1 - self._k, 0), 0)
+        is_seen = np.abs(height_m) > LEVEL_M
+        self.steradian = np.where(is_seen, np.maximum(g0 + g1 - self._k, 0), 0)
 
-    def spot(self, a: Floats, b: Floats) -> Floats:
-        """Ways (P, 3) to spots."""
+    def vectors_m(self, a: Floats, b: Floats) -> Floats:
+        """Vectors (P, 3) to places on the rectangle, by two numbers (P,) in [0, 1) each."""
         au = a * self.steradian + self._k
         sine = np.sin(au)
-        fu = (np.cos(au) * self._b0 - self._b1) / np.where(sine == 0, 1e-12, sine)
-        cu = np.clip(np.copysign(1.0, fu) / np.sqrt(fu * fu + self._b0 * self._b0), -1, 1)
-        xu = np.clip(-cu * self._z0 / np.sqrt(np.maximum(1 - cu * cu, 1e-30)), self._x0, self._x1)
+        divisor = np.where(sine == 0, 1e-12, sine)
+        fu = (np.cos(au) * self._b0 - self._b1) / divisor
+        cu = np.copysign(1.0, fu) / np.sqrt(fu * fu + self._b0 * self._b0)
+        cu = np.clip(cu, -1, 1)
+        xu = -cu * self._z0 / np.sqrt(np.maximum(1 - cu * cu, 1e-30))
+        xu = np.clip(xu, self._x0, self._x1)
         d = np.hypot(xu, self._z0)
         h0 = self._y0 / np.hypot(d, self._y0)
         h1 = self._y1 / np.hypot(d, self._y1)
         hv = h0 + b * (h1 - h0)
-        yv = np.clip(hv * d / np.sqrt(np.maximum(1 - hv * hv, 1e-30)), self._y0, self._y1)
-        axes, flip = self._axes
-        return np.asarray((np.stack([xu, yv, self._z0 * flip], -1) @ axes).astype(np.float32))
+        yv = hv * d / np.sqrt(np.maximum(1 - hv * hv, 1e-30))
+        yv = np.clip(yv, self._y0, self._y1)
+        local_m = np.stack([xu, yv, self._z0 * self._flip], -1)
+        return np.asarray((local_m @ self._axes).astype(np.float32))
 
 
-class Between(Protocol):
-    """What may stand between points and an emitter; rays run from origins to origins + way (R, 3)."""
+def _angle(a: Floats, b: Floats) -> Floats:
+    """The inner angle of a spherical rectangle between sides whose normals have these z."""
+    return np.asarray(np.arccos(np.clip(-a * b, -1, 1)))
 
-    def clear(self, origins_m: Floats, way: Floats) -> Mask:
+
+class Occluder(Protocol):
+    """Whatever may stand between points and an emitter; rays run from origins to origins + segments (R, 3)."""
+
+    def clear(self, origins_m: Floats, segments_m: Floats) -> Mask:
         """Whether nothing opaque is there."""
 
-    def passing(self, origins_m: Floats, way: Floats) -> Floats:
+    def passing(self, origins_m: Floats, segments_m: Floats) -> Floats:
         """Share (R,) of light that passes what is there."""
 
-    def through_panes(self, origins_m: Floats, way: Floats) -> Floats:
+    def through_panes(self, origins_m: Floats, segments_m: Floats) -> Floats:
         """Share (R,) that all panes there let through."""
 
 
@@ -113,43 +150,52 @@ class Emitter:
 
     towards: for points and two random numbers each, vectors (P, 3) to it and illuminance (P,) square to them.
     width_rad: roughly how wide it is (P,) seen from points (P, 3), 0 for hard shadows.
-    passing: share (R,) of light that comes from origins + way (R, 3) to the origins (R, 3), of what `towards` does
-    not count. may_light: the points (P, 3) that any of it can reach, as far as that is known without rays.
-    evenly: as `towards`, with less grain and at more cost, for light without rays; spots: along a side for that, at
-    least, 0 where its light is even.
+    passing: share (R,) of light that comes from origins + segments (R, 3) to the origins (R, 3), of what `towards`
+    does not count. may_light: the points (P, 3) that any of it can reach, as far as that is known without rays.
+    evenly: as `towards`, with less grain and at more cost, for light without rays; side_samples: along a side for
+    that, at least, 0 where its light is even.
     """
 
-    ball: Ball
+    ball: BoundingSphere
     towards: Callable[[Texels], Aim]
     width_rad: Callable[[Floats], Floats]
-    passing: Callable[[Between, Floats, Floats], Floats] = lambda between, *ways: between.passing(*ways)
+    passing: Callable[[Occluder, Floats, Floats], Floats] = lambda occluder, *rays: occluder.passing(*rays)
     sky: str = ""
     may_light: Callable[[Floats], Mask] = lambda points_m: np.ones(len(points_m), bool)
     evenly: Callable[[Texels], Aim] | None = None
-    spots: int = 0
+    side_samples: int = 0
 
 
 def panel_emitter(light: AreaLight) -> Emitter:
     """A lamp's faces, which shine only to their front: rectangles by solid angle, all else by area."""
-    corners = light.mesh.corners_m
-    face = rectangle(corners)
-    around = ball(corners)
+    corners_m = light.mesh.corners_m
+    face = rectangle(corners_m)
+    around = bounding_sphere(corners_m)
     if face is None:
         # In an order in which near triangles are near to one another (Morton).
-        shares = (corners.mean(1) - around.centre_m) / around.radius_m / 2 + 0.5
-        curve = corners[np.argsort(_interleaved(np.clip(shares, 0, 1 - 1e-6)), kind="stable")]
-        return Emitter(around, lambda texels: _by_area(light, curve, texels), _width_rad(around), spots=MESH_SPOTS)
+        shares = (corners_m.mean(1) - around.centre_m) / around.radius_m / 2 + 0.5
+        along_curve = _interleaved(np.clip(shares, 0, 1 - 1e-6))
+        order = np.argsort(along_curve, kind="stable")
+        ordered_m = corners_m[order]
+
+        def by_area(texels: Texels) -> Aim:
+            return _by_area(light, ordered_m, texels)
+
+        return Emitter(around, by_area, _width_rad(around), side_samples=MESH_SAMPLES)
 
     def towards(texels: Texels) -> Aim:
-        nearest = lengths(texels.points_m - around.centre_m).min(initial=np.inf)
-        is_far = nearest > FAR_OFF * around.radius_m
-        return _by_area(light, corners, texels, face) if is_far else evenly(texels)
+        distances_m = lengths(texels.points_m - around.centre_m)
+        nearest_m = distances_m.min(initial=np.inf)
+        is_far = nearest_m > FAR_OFF * around.radius_m
+        return _by_area(light, corners_m, texels, face) if is_far else evenly(texels)
 
     def evenly(texels: Texels) -> Aim:
         angle = SolidAngle(face, texels.points_m)
-        in_front = (texels.points_m - face.corner_m) @ face.normal > LEVEL_M
-        strength = np.where(in_front, light.luminance_cd_m2 * angle.steradian, 0).astype(np.float32)
-        return lambda a, b: (angle.spot(a, b) + (RAY_OFFSET_M * face.normal).astype(np.float32), strength)
+        is_before = (texels.points_m - face.corner_m) @ face.normal > LEVEL_M
+        arriving_lx = light.luminance_cd_m2 * angle.steradian
+        strength = np.where(is_before, arriving_lx, 0).astype(np.float32)
+        lift_m = (RAY_OFFSET_M * face.normal).astype(np.float32)
+        return lambda a, b: (angle.vectors_m(a, b) + lift_m, strength)
 
     return Emitter(around, towards, _width_rad(around), evenly=evenly)
 
@@ -169,31 +215,46 @@ def _interleaved(shares: Floats) -> Floats:
     return total
 
 
-def _by_area(light: AreaLight, corners_m: Array, texels: Texels, face: Rectangle | None = None) -> Aim:
-    """Spots on triangles in proportion to their areas, or all over the rectangle that they fill."""
-    area = areas_m2(corners_m)
+def _by_area(
+    light: AreaLight,
+    corners_m: Array,
+    texels: Texels,
+    face: Rectangle | None = None,
+) -> Aim:
+    """Places on triangles in proportion to their areas, or all over the rectangle that they fill."""
+    area_m2 = areas_m2(corners_m)
     normals = face_normals(corners_m).astype(np.float32)
-    ends = np.cumsum(area) / area.sum()
-    power = np.float32(light.luminance_cd_m2 * area.sum())
+    ends = np.cumsum(area_m2) / area_m2.sum()
+    intensity_cd = np.float32(light.luminance_cd_m2 * area_m2.sum())  # straight ahead
 
-    def spot(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-        if face is None:
-            # strata of the square are such of the mesh
-            a = _interleaved(np.stack([a, b], -1))
-            b = b * 2**CURVE_BITS % 1
-            normal = normals[np.minimum(np.searchsorted(ends, a, side="right"), len(ends) - 1)]
-            return (spots(corners_m, a, b) + RAY_OFFSET_M * normal).astype(np.float32), normal
-        corner = (face.corner_m + RAY_OFFSET_M * face.normal).astype(np.float32)
-        u = face.edge_u_m.astype(np.float32)
-        v = face.edge_v_m.astype(np.float32)
-        return corner + a[:, None] * u + b[:, None] * v, normals[:1]
+    def on_triangles(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+        # strata of the square are such of the mesh
+        along_curve = _interleaved(np.stack([a, b], -1))
+        rest = b * 2**CURVE_BITS % 1
+        triangle = np.searchsorted(ends, along_curve, side="right")
+        triangle = np.minimum(triangle, len(ends) - 1)
+        normal = normals[triangle]
+        places_m = sample_points(corners_m, along_curve, rest) + RAY_OFFSET_M * normal
+        return places_m.astype(np.float32), normal
+
+    def on_rectangle(
+        filled: Rectangle,
+        a: Floats,
+        b: Floats,
+    ) -> tuple[Floats, Floats]:
+        lift_m = RAY_OFFSET_M * filled.normal
+        corner_m = (filled.corner_m + lift_m).astype(np.float32)
+        u_m = filled.edge_u_m.astype(np.float32)
+        v_m = filled.edge_v_m.astype(np.float32)
+        return corner_m + a[:, None] * u_m + b[:, None] * v_m, normals[:1]
 
     def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-        ends_m, normal = spot(a, b)
-        way = ends_m - texels.points_m
-        squared = np.maximum(np.einsum("ij,ij->i", way, way), np.float32(1e-9))
-        before = np.maximum(-np.einsum("ij,ij->i", way, np.broadcast_to(normal, way.shape)), 0)
-        return way, power * before / (squared * np.sqrt(squared))
+        places_m, normal = on_triangles(a, b) if face is None else on_rectangle(face, a, b)
+        vectors_m = places_m - texels.points_m
+        squared_m2 = np.maximum(np.einsum("ij,ij->i", vectors_m, vectors_m), np.float32(1e-9))
+        along_normal = np.einsum("ij,ij->i", vectors_m, np.broadcast_to(normal, vectors_m.shape))
+        ahead = np.maximum(-along_normal, 0)
+        return vectors_m, intensity_cd * ahead / (squared_m2 * np.sqrt(squared_m2))
 
     return aim
 
@@ -202,12 +263,13 @@ def bulb_emitter(light: PointLight | SpotLight) -> Emitter:
     """A point or spot: inverse square."""
 
     def towards(texels: Texels) -> Aim:
-        way = (light.position_m - texels.points_m).astype(np.float32)
-        squared = np.einsum("ij,ij->i", way, way)
-        strength = (light.intensity_cd(-way / np.sqrt(squared)[:, None]) / squared).astype(np.float32)
-        return lambda _a, _b: (way, strength)
+        vectors_m = (light.position_m - texels.points_m).astype(np.float32)
+        squared_m2 = np.einsum("ij,ij->i", vectors_m, vectors_m)
+        from_lamp = -vectors_m / np.sqrt(squared_m2)[:, None]
+        strength = (light.intensity_cd(from_lamp) / squared_m2).astype(np.float32)
+        return lambda _a, _b: (vectors_m, strength)
 
-    return Emitter(Ball(light.position_m, 0.0), towards, _hard)
+    return Emitter(BoundingSphere(light.position_m, 0.0), towards, _hard)
 
 
 def sun_emitter(light: Sun, t_ns: float) -> Emitter:
@@ -215,64 +277,73 @@ def sun_emitter(light: Sun, t_ns: float) -> Emitter:
     centre = light.direction(t_ns)
 
     def towards(texels: Texels) -> Aim:
-        axes = tangents(centre[None])
-        arriving = light.illuminance_lx * np.maximum(texels.normals @ centre, 0)
+        u_axis, v_axis = tangents(centre[None])
+        arriving_lx = light.illuminance_lx * np.maximum(texels.normals @ centre, 0)
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-            x, y = (np.tan(SUN_RADIUS_RAD) * part for part in disc(a, b))
-            direction = (centre + x[:, None] * axes[0] + y[:, None] * axes[1]).astype(np.float32)
+            x, y = disc(a, b)
+            x_offset = np.tan(SUN_RADIUS_RAD) * x
+            y_offset = np.tan(SUN_RADIUS_RAD) * y
+            towards_disc = centre + x_offset[:, None] * u_axis + y_offset[:, None] * v_axis
+            direction = towards_disc.astype(np.float32)
             # One ray alone must not tell where on the disc it went.
-            return FAR_M * direction, arriving / np.maximum(texels.cosine(direction), SUN_RADIUS_RAD)
+            cosine = np.maximum(texels.cosine(direction), SUN_RADIUS_RAD)
+            return FAR_M * direction, arriving_lx / cosine
 
         return aim
 
-    return Emitter(Ball(FARTHEST_M * centre, FARTHEST_M * SUN_RADIUS_RAD), towards, _hard)
+    around = BoundingSphere(FARTHEST_M * centre, FARTHEST_M * SUN_RADIUS_RAD)
+    return Emitter(around, towards, _hard)
 
 
-def _pane_emitter(light: Sky, pane: Flat, visibility: Visibility) -> Emitter:
+def _pane_emitter(light: Sky, pane: PlanarPatch, visibility: Visibility) -> Emitter:
     """The sky through one pane: only rays that cross no other pane behind it, so that none counts twice."""
     followed_back, followed_front = _followed(pane, visibility)
     face = rectangle(pane.corners_m)
-    area = areas_m2(pane.corners_m).sum()
+    area_m2 = areas_m2(pane.corners_m).sum()
 
-    def spot(texels: Texels) -> Aim:
-        """Ways to spots on the pane, and the solid angle that each stands for."""
+    def aim_at_pane(texels: Texels) -> Aim:
+        """Vectors to places on the pane, and the solid angle that each stands for."""
         if face is not None:
             angle = SolidAngle(face, texels.points_m)
-            return lambda a, b: (angle.spot(a, b), angle.steradian)
+            return lambda a, b: (angle.vectors_m(a, b), angle.steradian)
 
         def by_area(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-            way = spots(pane.corners_m, a, b) - texels.points_m
-            return way, area * np.abs(way @ pane.normal) / np.maximum(np.linalg.norm(way, axis=1), 1e-6) ** 3
+            vectors_m = sample_points(pane.corners_m, a, b) - texels.points_m
+            distance_m = np.maximum(np.linalg.norm(vectors_m, axis=1), 1e-6)
+            height_m = np.abs(vectors_m @ pane.normal)
+            return vectors_m, area_m2 * height_m / distance_m**3
 
         return by_area
 
     def towards(texels: Texels) -> Aim:
-        spot_of = spot(texels)
+        vector_and_angle = aim_at_pane(texels)
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-            way, steradian = spot_of(a, b)
-            direction = way / lengths(way)[:, None]
-            strength = steradian * light.luminance_cd_m2(direction) * visibility.pane_passes(pane, direction)
-            outward = direction @ pane.normal > 0
-            doubtful = np.flatnonzero(np.where(outward, followed_front, followed_back))
-            beyond = (texels.points_m + way + 2 * RAY_OFFSET_M * direction)[doubtful]
-            strength[doubtful] *= ~visibility.crosses_sky_pane(beyond, FAR_M * direction[doubtful])
+            vectors_m, steradian = vector_and_angle(a, b)
+            direction = vectors_m / lengths(vectors_m)[:, None]
+            luminance = steradian * light.luminance_cd_m2(direction)
+            strength = luminance * visibility.pane_passes(pane, direction)
+            is_outward = direction @ pane.normal > 0
+            doubtful = np.flatnonzero(np.where(is_outward, followed_front, followed_back))
+            beyond_m = (texels.points_m + vectors_m + 2 * RAY_OFFSET_M * direction)[doubtful]
+            strength[doubtful] *= ~visibility.crosses_sky_pane(beyond_m, FAR_M * direction[doubtful])
             return (FAR_M * direction).astype(np.float32), strength.astype(np.float32)
 
         return aim
 
-    def passing(between: Between, origins_m: Floats, way: Floats) -> Floats:
+    def passing(occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
         """Past walls, and through panes before this one."""
-        share = between.clear(origins_m, way).astype(np.float32)
-        some = np.flatnonzero(share)
-        start = origins_m[some]
-        ahead = way[some]
-        reach = -pane.height_m(start) / (ahead @ pane.normal)
-        share[some] *= between.through_panes(start, ahead * ((1 - 1e-4) * reach[:, None]).astype(np.float32))
+        share = occluder.clear(origins_m, segments_m).astype(np.float32)
+        rays = np.flatnonzero(share)
+        start_m = origins_m[rays]
+        ahead_m = segments_m[rays]
+        reach = -pane.height_m(start_m) / (ahead_m @ pane.normal)
+        short_of_pane = ((1 - 1e-4) * reach[:, None]).astype(np.float32)
+        share[rays] *= occluder.through_panes(start_m, ahead_m * short_of_pane)
         return share
 
-    around = ball(pane.corners_m)
+    around = bounding_sphere(pane.corners_m)
     return Emitter(around, towards, _width_rad(around), passing, sky="pane")
 
 
@@ -284,9 +355,10 @@ def _open_sky_emitter(light: Sky, visibility: Visibility) -> Emitter:
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
             direction = around(a, b)
-            luminance = light.luminance_cd_m2(direction)
+            luminance_cd_m2 = light.luminance_cd_m2(direction)
             # The rays are as dense as their cosine, hence over it.
-            strength = np.pi * luminance / np.maximum(np.einsum("ij,ij->i", direction, texels.normals), 1e-6)
+            cosine = np.einsum("ij,ij->i", direction, texels.normals)
+            strength = np.pi * luminance_cd_m2 / np.maximum(cosine, 1e-6)
             strength[visibility.crosses_sky_pane(texels.points_m, FAR_M * direction)] = 0
             return FAR_M * direction, strength.astype(np.float32)
 
@@ -295,14 +367,18 @@ def _open_sky_emitter(light: Sky, visibility: Visibility) -> Emitter:
     def width_rad(points_m: Floats) -> Floats:
         return np.full(len(points_m), np.sqrt(2 * np.pi), np.float32)
 
-    return Emitter(Ball(np.zeros(3), np.inf), towards, width_rad, sky="open")
+    return Emitter(BoundingSphere(np.zeros(3), np.inf), towards, width_rad, sky="open")
 
 
-def _width_rad(around: Ball) -> Callable[[Floats], Floats]:
-    """As wide as the ball is seen, at most."""
-    return lambda points_m: (
-        np.sqrt(np.pi) * around.radius_m / np.maximum(np.linalg.norm(around.centre_m - points_m, axis=1), 1e-6)
-    ).astype(np.float32)
+def _width_rad(around: BoundingSphere) -> Callable[[Floats], Floats]:
+    """As wide as the sphere is seen, at most."""
+
+    def width_rad(points_m: Floats) -> Floats:
+        distance_m = np.linalg.norm(around.centre_m - points_m, axis=1)
+        width = np.sqrt(np.pi) * around.radius_m / np.maximum(distance_m, 1e-6)
+        return np.asarray(width, np.float32)
+
+    return width_rad
 
 
 def _hard(points_m: Floats) -> Floats:
@@ -321,15 +397,20 @@ def cosine_weighted(normals: Floats) -> Callable[[Floats, Floats], Floats]:
     u_axis, v_axis = tangents(normals)
 
     def direction(a: Floats, b: Floats) -> Floats:
-        (x, y) = disc(a, b)
-        up = np.sqrt(np.maximum(1 - a, 1e-7))
-        return np.asarray(x[..., None] * u_axis + y[..., None] * v_axis + up[..., None] * normals)
+        x, y = disc(a, b)
+        z = np.sqrt(np.maximum(1 - a, 1e-7))
+        return np.asarray(x[..., None] * u_axis + y[..., None] * v_axis + z[..., None] * normals)
 
     return direction
 
 
-def emitters(light: Light, visibility: Visibility, *, t_ns: float = 0) -> list[Emitter]:
-    """All that one light is made of."""
+def emitters(
+    light: Light,
+    visibility: Visibility,
+    *,
+    t_ns: float = 0,
+) -> list[Emitter]:
+    """The emitters that one light consists of."""
     match light:
         case AreaLight():
             return [panel_emitter(light)]
@@ -342,7 +423,8 @@ def emitters(light: Light, visibility: Visibility, *, t_ns: float = 0) -> list[E
             return [*panes, _open_sky_emitter(light, visibility)]
 
 
-def _followed(pane: Flat, visibility: Visibility) -> tuple[bool, bool]:
+def _followed(pane: PlanarPatch, visibility: Visibility) -> tuple[bool, bool]:
     """Whether any other pane that shows the sky reaches to the back of a pane, and to its front."""
-    height = np.concatenate([pane.height_m(other.corners_m).ravel() for other in visibility.sky_panes])
-    return bool((height < -RAY_OFFSET_M).any()), bool((height > RAY_OFFSET_M).any())
+    heights_m = [pane.height_m(other.corners_m).ravel() for other in visibility.sky_panes]
+    height_m = np.concatenate(heights_m)
+    return bool((height_m < -RAY_OFFSET_M).any()), bool((height_m > RAY_OFFSET_M).any())

@@ -9,20 +9,17 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from vobench.rendering.direct_light import JITTER, cell_spot
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
+from vobench.rendering.atlas import Atlas
+from vobench.rendering.direct_light import JITTER, place_in_cell
+from vobench.rendering.embree import Hits
 from vobench.rendering.emitter import cosine_weighted
-from vobench.rendering.geometry import (
-    FAR_M,
-    RAY_OFFSET_M,
-    Floats,
-    Hits,
-    Indices,
-    Mask,
-    Visibility,
-    face_materials,
-    take,
-)
-from vobench.rendering.lightmap import Atlas, Layout, Places, Texels, chunked, in_chunks, side_of, tangents
+from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, face_materials, take, tangents
+from vobench.rendering.texel import Texels
+from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.thread_pool import chunked, in_chunks
+from vobench.rendering.unwrap import nearest_axis
+from vobench.rendering.visibility import Visibility
 from vobench.scene.light import Sky
 from vobench.scene.material import LUMINANCE, Material, fresnel, linear_texture, under_coat
 from vobench.scene.mesh import Triangles
@@ -39,13 +36,13 @@ LEAST = 0.02  # of the weights of a blend
 
 @dataclass(frozen=True, slots=True)
 class Surfels:
-    """Groups of points of one thing in one cell, that look the same of six ways and see each other.
+    """Groups of points of one thing in one cell, whose normals are nearest to one axis and that see each other.
 
     of (P,): the group that a point is in; middle (S,): the point that stands for it; step_m (S,): its cell's side.
     """
 
     of: Indices
-    middle: Places
+    middle: Rows
     step_m: Floats
 
     def __len__(self) -> int:
@@ -53,95 +50,155 @@ class Surfels:
 
     def mean(self, values: Floats, weights: Floats) -> Floats:
         """Weighted means (S, C) of points' values (P, C)."""
-        total = np.maximum(np.bincount(self.of, weights, len(self)), 1e-30)
+        totals = np.maximum(np.bincount(self.of, weights, len(self)), 1e-30)
         sums = [np.bincount(self.of, weights * column, len(self)) for column in values.T]
-        return (np.stack(sums, -1) / total[:, None]).astype(np.float32)
+        means = np.stack(sums, -1) / totals[:, None]
+        return means.astype(np.float32)
 
 
-def surfels(points: Texels, thing: Indices, step_m: Floats, visibility: Visibility) -> Surfels:
-    """Of points whose things (P,) and cells' sides (P,) are known."""
+def surfels(
+    points: Texels,
+    thing: Indices,
+    step_m: Floats,
+    visibility: Visibility,
+) -> Surfels:
+    """The surfels of points whose things (P,) and cells' sides (P,) are known."""
     cell = np.floor(points.points_m / step_m[:, None]).astype(np.int64)
     cell -= cell.min(0, initial=0)
-    key = thing.astype(np.int64) * 6 + side_of(points.planes)
-    for axis in cell.T:
-        key = key * (axis.max(initial=0) + 1) + axis
-    of, middle = _grouped(key, points.points_m)
-    # What a thin wall parts is not one.
-    high = points.points_m + RAISED * step_m[:, None] * points.planes
-    beyond = chunked(lambda part: visibility.opaque.occluded(high[part], high[middle[of[part]]]), len(points))
-    of, middle = _grouped(2 * of + beyond, points.points_m)
-    return Surfels(of.astype(np.int32), middle, step_m[middle].astype(np.float32))
+    key = thing.astype(np.int64) * 6 + nearest_axis(points.planes)
+    for coordinate in cell.T:
+        key = key * (coordinate.max(initial=0) + 1) + coordinate
+    group, middle = _grouped(key, points.points_m)
+
+    # Points on both sides of a thin wall are not one surfel.
+    raised_m = points.points_m + RAISED * step_m[:, None] * points.planes
+
+    def hidden(part: slice) -> Mask:
+        return visibility.opaque.occluded(raised_m[part], raised_m[middle[group[part]]])
+
+    is_beyond = chunked(hidden, len(points))
+    group, middle = _grouped(2 * group + is_beyond, points.points_m)
+    return Surfels(group.astype(np.int32), middle, step_m[middle].astype(np.float32))
 
 
-def _grouped(key: Places, points_m: Floats) -> tuple[Places, Places]:
+def _grouped(key: Rows, points_m: Floats) -> tuple[Rows, Rows]:
     """Groups (P,) of equal keys (P,), and the point nearest to the mean of each."""
-    of = np.unique(key, return_inverse=True)[1].ravel()
-    count = np.bincount(of)
-    mean = np.stack([np.bincount(of, axis) for axis in points_m.T], -1) / np.maximum(count, 1)[:, None]
-    apart = ((points_m - mean[of]) ** 2).sum(1)
-    order = np.lexsort((apart, of))
-    return of, order[np.cumsum(count) - count]
+    group = np.unique(key, return_inverse=True)[1].ravel()
+    count = np.bincount(group)
+    coordinate_sums_m = [np.bincount(group, coordinate) for coordinate in points_m.T]
+    sums_m = np.stack(coordinate_sums_m, -1)
+    mean_m = sums_m / np.maximum(count, 1)[:, None]
+    squared_m2 = ((points_m - mean_m[group]) ** 2).sum(1)
+    order = np.lexsort((squared_m2, group))
+    first = np.cumsum(count) - count
+    return group, order[first]
 
 
-def blend(points: Texels, groups: Surfels, layout: Layout, visibility: Visibility, usable: Mask) -> "csr_matrix":
-    """What each texel of the map takes from surfels (H·W, S): those near it that see its own and look its way."""
-    p = points.points_m[groups.middle]
-    n = points.normals[groups.middle]
-    step = groups.step_m[:, None]
+def blend(
+    points: Texels,
+    groups: Surfels,
+    layout: TexelLayout,
+    visibility: Visibility,
+    usable: Mask,
+) -> "csr_matrix":
+    """Weights (H·W, S) of surfels at each texel of the map: of those near it that see its surfel and face alike."""
     known = np.flatnonzero(usable)
     if not len(known):
         return scipy.sparse.csr_matrix((layout.source.size, len(groups)), dtype=np.float32)
-    tree = scipy.spatial.cKDTree(np.hstack([p, TURNED * step * n])[known])
-    near = tree.query(np.hstack([p, TURNED * step * n]), k=min(NEIGHBOURS, len(known)))[1].reshape(len(groups), -1)
-    near = known[near]
-    high = p + RAISED * step * points.planes[groups.middle]
-    own = np.repeat(np.arange(len(groups)), near.shape[1])
-    hidden = chunked(lambda part: visibility.opaque.occluded(high[own[part]], p[near.ravel()[part]]), len(own))
-    hidden = hidden.reshape(near.shape) & (near != np.arange(len(groups))[:, None])
-    hidden &= ~hidden.all(1, keepdims=True)
-    blends = in_chunks(
-        lambda part: _weights(points.take(part), groups, groups.of[part], near, hidden=hidden, middles=(p, n)),
-        len(points),
-    )
-    table = scipy.sparse.vstack([*blends, scipy.sparse.csr_matrix((1, len(groups)), dtype=np.float32)], "csr")
+    middles_m = points.points_m[groups.middle]
+    normals = points.normals[groups.middle]
+    step_m = groups.step_m[:, None]
+    places = np.hstack([middles_m, TURNED * step_m * normals])  # (S, 6): apart in space or in direction
+    tree = scipy.spatial.cKDTree(places[known])
+    _, nearest = tree.query(places, k=min(NEIGHBOURS, len(known)))
+    neighbours = known[nearest.reshape(len(groups), -1)]  # (S, K)
+
+    raised_m = middles_m + RAISED * step_m * points.planes[groups.middle]
+    surfel = np.repeat(np.arange(len(groups)), neighbours.shape[1])
+
+    def hidden(part: slice) -> Mask:
+        return visibility.opaque.occluded(raised_m[surfel[part]], middles_m[neighbours.ravel()[part]])
+
+    is_hidden = chunked(hidden, len(surfel)).reshape(neighbours.shape)
+    is_hidden = is_hidden & (neighbours != np.arange(len(groups))[:, None])
+    is_hidden &= ~is_hidden.all(1, keepdims=True)
+
+    def weights(part: slice) -> "csr_matrix":
+        return _weights(
+            points.take(part),
+            groups,
+            groups.of[part],
+            neighbours,
+            is_hidden=is_hidden,
+            middles=(middles_m, normals),
+        )
+
+    blends = in_chunks(weights, len(points))
+    none = scipy.sparse.csr_matrix((1, len(groups)), dtype=np.float32)  # of the point that stands for none
+    table = scipy.sparse.vstack([*blends, none], "csr")
     return table[layout.source]
 
 
 def _weights(
-    points: Texels, groups: Surfels, of: Indices, near: Places, *, hidden: Mask, middles: tuple[Floats, Floats]
+    points: Texels,
+    groups: Surfels,
+    of: Indices,
+    neighbours: Rows,
+    *,
+    is_hidden: Mask,
+    middles: tuple[Floats, Floats],
 ) -> "csr_matrix":
-    near = near[of]
-    hidden = hidden[of]
-    step = groups.step_m[of, None]
-    apart = ((points.points_m[:, None] - middles[0][near]) ** 2).sum(-1) / step**2
-    apart += ((points.normals[:, None] - middles[1][near]) ** 2).sum(-1) * TURNED**2
-    weights = np.where(hidden, 0, np.exp(-(apart - np.where(hidden, np.inf, apart).min(1, keepdims=True)) / WIDTH))
+    """Weights (P, S) of surfels at points whose surfels (P,) are known, by position and normal (S, 3) of each."""
+    middles_m, normals = middles
+    candidates = neighbours[of]
+    hidden = is_hidden[of]
+    step_m = groups.step_m[of, None]
+    offset_m = points.points_m[:, None] - middles_m[candidates]
+    squared = (offset_m**2).sum(-1) / step_m**2
+    turn = points.normals[:, None] - normals[candidates]
+    squared += (turn**2).sum(-1) * TURNED**2
+    nearest = np.where(hidden, np.inf, squared).min(1, keepdims=True)
+    closeness = np.exp(-(squared - nearest) / WIDTH)
+    weights = np.where(hidden, 0, closeness)
     weights[weights < LEAST * weights.sum(1, keepdims=True)] = 0
     weights /= weights.sum(1, keepdims=True)
-    rows = np.repeat(np.arange(len(of)), near.shape[1])
-    table = scipy.sparse.csr_matrix((weights.ravel().astype(np.float32), (rows, near.ravel())), (len(of), len(groups)))
+
+    rows = np.repeat(np.arange(len(of)), candidates.shape[1])
+    entries = (weights.ravel().astype(np.float32), (rows, candidates.ravel()))
+    table = scipy.sparse.csr_matrix(entries, (len(of), len(groups)))
     table.eliminate_zeros()
     return table
 
 
 MOST_PX = 256  # along a texture's side, finer than texels are apart
+BRIGHTEST = 0.99  # reflectance, which keeps bounces from adding up without end
 
 
-def albedo(faces: Triangles, materials: Mapping[str, Material], points: Texels) -> Floats:
+def albedo(
+    faces: Triangles,
+    materials: Mapping[str, Material],
+    points: Texels,
+) -> Floats:
     """Linear reflectance (P, 3) of the body there, of what its coat lets in."""
     result = np.zeros((len(points), 3), np.float32)
     number = {name: nth for nth, name in enumerate(materials)}
-    of = np.array([number.get(thing.material, -1) for thing in faces.things], np.int32)[faces.thing[points.face]]
-    weights = np.column_stack([1 - points.uv.sum(1), points.uv])
+    numbers = [number.get(thing.material, -1) for thing in faces.things]
+    of_things = np.array(numbers, np.int32)
+    material_of = of_things[faces.thing[points.face]]
+    corner_weights = np.column_stack([1 - points.uv.sum(1), points.uv])
     for name, material in materials.items():
-        own = np.flatnonzero(of == number[name])
-        if len(own) and material.kind == "body":
-            tile = _tile(material)
-            rows, columns = tile.shape[:2]
-            uv = np.einsum("ni,nij->nj", weights[own], faces.uv[points.face[own]]) / material.tile_m % 1
-            values = tile[(uv[:, 1] * rows).astype(int) % rows, (uv[:, 0] * columns).astype(int) % columns]
-            values = np.clip(values * np.array(material.colour), 0, 0.99)
-            result[own] = (1 - material.metal) * (under_coat(values, material.eta) if material.is_coated else values)
+        rows = np.flatnonzero(material_of == number[name])
+        if not len(rows) or material.kind != "body":
+            continue
+        tile = _tile(material)
+        height, width = tile.shape[:2]
+        corners_uv = faces.uv[points.face[rows]]
+        uv = np.einsum("ni,nij->nj", corner_weights[rows], corners_uv) / material.tile_m % 1
+        row = (uv[:, 1] * height).astype(int) % height
+        column = (uv[:, 0] * width).astype(int) % width
+        values = np.clip(tile[row, column] * np.array(material.colour), 0, BRIGHTEST)
+        scattered = under_coat(values, material.eta) if material.is_coated else values
+        result[rows] = (1 - material.metal) * scattered
     return result
 
 
@@ -150,7 +207,8 @@ def _tile(material: Material) -> Floats:
     if material.texture is None:
         return np.ones((1, 1, 1), np.float32)
     pixels = linear_texture(material.texture)
-    height, width = (min(side, MOST_PX) for side in pixels.shape[:2])
+    height = min(pixels.shape[0], MOST_PX)
+    width = min(pixels.shape[1], MOST_PX)
     small = cv2.resize(pixels, (width, height), interpolation=cv2.INTER_AREA)
     return np.asarray(small.reshape(height, width, -1), np.float32)
 
@@ -180,36 +238,60 @@ class Response:
     def mirrored(self, face: Indices, cosine: Floats) -> Floats:
         """Share (R,) that goes on as from a mirror."""
         coat = np.where(self.eta[face] > 0, self._reflected(face, cosine), 0)
-        return np.asarray(self.tint[face] * coat + (1 - coat) * self.metal[face])
+        by_metal = (1 - coat) * self.metal[face]
+        return np.asarray(self.tint[face] * coat + by_metal)
 
     def scattered(self, face: Indices, cosine: Floats) -> Floats:
         """Luminance times pi (R,) towards a cosine, per light that entered and was scattered."""
-        return self.scatters[face] * np.where(self.eta[face] > 0, 1 - self._reflected(face, cosine), 1)
+        leaving = np.where(self.eta[face] > 0, 1 - self._reflected(face, cosine), 1)
+        return self.scatters[face] * leaving
 
     def _reflected(self, face: Indices, cosine: Floats) -> Floats:
         return fresnel(cosine, np.maximum(self.eta[face], 1.0)).astype(np.float32)
 
 
-def response(faces: Triangles, materials: Mapping[str, Material], visibility: Visibility) -> Response:
+def response(
+    faces: Triangles,
+    materials: Mapping[str, Material],
+    visibility: Visibility,
+) -> Response:
     """How a table's faces respond to light. Metal mirrors in the luminance of its colour."""
-    own = [*face_materials(faces, materials), None]
-    thing = np.append(faces.thing, len(own) - 1)
-    bodies = [m if m and m.kind == "body" else Material("mirror", tint=0) for m in own]
-    metals = [
-        m.tint if m and m.kind == "mirror" else b.metal * float(np.array(b.colour) @ LUMINANCE)
-        for m, b in zip(own, bodies, strict=True)
-    ]
-    shows = np.zeros(len(thing), bool)
-    shows[[face for mirror, *_ in visibility.mirrors for face in mirror.faces]] = True
+    kinds = [*face_materials(faces, materials), None]  # the last one for nothing
+    thing = np.append(faces.thing, len(kinds) - 1)
+    shows_lamps = np.zeros(len(thing), bool)
+    for mirror, *_ in visibility.mirrors:
+        shows_lamps[mirror.faces] = True
     return Response(
-        np.array([b.kind == "body" for b in bodies])[thing],
-        np.array([b.eta if b.is_coated else 0 for b in bodies], np.float32)[thing],
-        np.array([b.tint for b in bodies], np.float32)[thing],
-        np.array(metals, np.float32)[thing],
-        np.array([m.roughness if m else 0 for m in own], np.float32)[thing],
-        np.append(faces.lamp, -1),
-        shows,
+        scatters=np.array([_is_body(kind) for kind in kinds])[thing],
+        eta=np.array([_coat_eta(kind) for kind in kinds], np.float32)[thing],
+        tint=np.array([kind.tint if kind and _is_body(kind) else 0 for kind in kinds], np.float32)[thing],
+        metal=np.array([_metal(kind) for kind in kinds], np.float32)[thing],
+        roughness=np.array([kind.roughness if kind else 0 for kind in kinds], np.float32)[thing],
+        lamp=np.append(faces.lamp, -1),
+        shows_lamps=shows_lamps,
     )
+
+
+def _is_body(material: Material | None) -> bool:
+    return material is not None and material.kind == "body"
+
+
+def _coat_eta(material: Material | None) -> float:
+    """The refractive index of a body's coat, 0 without one."""
+    if material is None or material.kind != "body" or not material.is_coated:
+        return 0
+    return material.eta
+
+
+def _metal(material: Material | None) -> float:
+    """The share that a mirror or a metal reflects."""
+    if material is None:
+        return 0.0
+    if material.kind == "mirror":
+        return material.tint
+    if material.kind != "body":
+        return 0.0
+    return material.metal * float(np.array(material.colour) @ LUMINANCE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,18 +303,18 @@ class FinalGather:
 
     table: "csr_matrix"
     sky: Floats
-    hits: Places
+    hits: Rows
     escaped: Floats
 
 
 @dataclass(slots=True)
 class _RayBatch:
-    """The rays under way: the point they belong to, from where, whereto, and what they weigh.
+    """Rays on their journey: the point they belong to, from where, whereto, and what they weigh.
 
     is_direct: whether a lamp that they meet next is direct light, and counted as such.
     """
 
-    point: Places
+    point: Rows
     origins_m: Floats
     directions: Floats
     weight: Floats
@@ -241,7 +323,18 @@ class _RayBatch:
     take = take
 
     def joined(self, other: "_RayBatch") -> "_RayBatch":
-        return _RayBatch(*(np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(self)))
+        columns = [(getattr(self, field.name), getattr(other, field.name)) for field in fields(self)]
+        return _RayBatch(*(np.concatenate(column) for column in columns))
+
+
+@dataclass(frozen=True, slots=True)
+class _Gathered:
+    """What the rays of a part of the points found: as in FinalGather, but the texels (R,) where they ended."""
+
+    table: "csr_matrix"
+    sky: Floats
+    escaped: Floats
+    texels: Indices
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,107 +349,159 @@ class Gatherer:
     surfels: int
     lamps: int
 
-    def gather(self, points: Texels, *, rays: int, done: Callable[[float], object] | None = None) -> FinalGather:
+    def gather(
+        self,
+        points: Texels,
+        *,
+        rays: int,
+        done: Callable[[float], object] | None = None,
+    ) -> FinalGather:
         """Send about `rays` rays from every point; `done` is called with shares."""
-        side = int(np.sqrt(min(rays, MOST_RAYS / max(len(points), 1))))
-        found = []
+        rays_each = min(rays, MOST_RAYS / max(len(points), 1))
+        side = int(np.sqrt(rays_each))
+        parts = list[_Gathered]()
         if side and len(points):
-            found = in_chunks(lambda part: self._gather(points.take(part), side), len(points), chunk=ROWS, done=done)
-        ends = np.concatenate([np.zeros(0, np.int32), *(part[3] for part in found)])
-        hits = np.bincount(ends, minlength=self.atlas.height * self.atlas.width)
-        shape = (0 if found else len(points), self.surfels + self.lamps)
-        nothing = scipy.sparse.csr_matrix(shape, dtype=np.float32)
-        sky = np.concatenate([np.zeros((len(self.skies), shape[0]), np.float32), *(part[1] for part in found)], 1)
-        escaped = np.concatenate([np.ones(shape[0], np.float32), *(part[2] for part in found)])
-        return FinalGather(scipy.sparse.vstack([nothing, *(part[0] for part in found)], "csr"), sky, hits, escaped)
+            parts = in_chunks(lambda part: self._gather(points.take(part), side), len(points), chunk=ROWS, done=done)
+        unasked = 0 if parts else len(points)
+        no_entries = scipy.sparse.csr_matrix((unasked, self.surfels + self.lamps), dtype=np.float32)
+        no_sky = np.zeros((len(self.skies), unasked), np.float32)
+        all_escaped = np.ones(unasked, np.float32)
+        texels = np.concatenate([np.zeros(0, np.int32), *(part.texels for part in parts)])
+        return FinalGather(
+            table=scipy.sparse.vstack([no_entries, *(part.table for part in parts)], "csr"),
+            sky=np.concatenate([no_sky, *(part.sky for part in parts)], 1),
+            hits=np.bincount(texels, minlength=self.atlas.height * self.atlas.width),
+            escaped=np.concatenate([all_escaped, *(part.escaped for part in parts)]),
+        )
 
-    def _gather(self, points: Texels, side: int) -> "tuple[csr_matrix, Floats, Floats, Indices]":
+    def _gather(self, points: Texels, side: int) -> _Gathered:
         batch = _start(points, side)
-        entries = []
-        ends = []
-        rays = np.float32(side * side)
+        factors = []
+        rows = []
+        columns = []
+        texels = []
+        ray_count = np.float32(side * side)
         sky = np.zeros((len(self.skies), len(points)), np.float32)
         escaped = np.zeros(len(points), np.float32)
         for depth in range(MIRRORS + 1):
             hits = self.visibility.opaque.hits(batch.origins_m, batch.directions)
-            way = batch.directions * np.where(hits.face < 0, FAR_M, hits.distance)[:, None]
-            off_panes = self._off_panes(batch, way)
-            batch.weight *= self.visibility.through_panes(batch.origins_m, way)
+            lengths_m = np.where(hits.face < 0, FAR_M, hits.distance)
+            segments_m = batch.directions * lengths_m[:, None]
+            from_panes = self._reflected_by_panes(batch, segments_m)
+            batch.weight *= self.visibility.through_panes(batch.origins_m, segments_m)
             gone = batch.take(hits.face < 0)
-            if not depth:
-                bare = ~self.visibility.crosses_sky_pane(gone.origins_m, FAR_M * gone.directions)
-                escaped += np.bincount(gone.point, bare, minlength=len(points)).astype(np.float32) / rays
-            for nth, light in enumerate(self.skies) if depth else ():
-                luminance = light.luminance_cd_m2(gone.directions)
-                sky[nth] += np.bincount(gone.point, np.pi * luminance * gone.weight, minlength=sky.shape[1])
-            facing = np.einsum("ij,ij->i", batch.directions, self.visibility.normals[hits.face])
-            met = np.flatnonzero((hits.face >= 0) & (facing < 0))
+            if depth == 0:
+                escaped += self._escaped(gone, len(points)) / ray_count
+            else:
+                self._add_sky(sky, gone)
+
+            along_normal = np.einsum("ij,ij->i", batch.directions, self.visibility.normals[hits.face])
+            met = np.flatnonzero((hits.face >= 0) & (along_normal < 0))
             batch = batch.take(met)
             hits = hits.take(met)
-            cosine = -facing[met]
+            cosine = -along_normal[met]
+
             lamp = self.response.lamp[hits.face]
+            is_lamp = lamp >= 0
             texel = self.atlas.index(hits.at(self.atlas.light_px))
-            factor = batch.weight * np.where(lamp >= 0, ~batch.is_direct, self.response.scattered(hits.face, cosine))
-            column = np.where(lamp >= 0, self.surfels + lamp, self.surfel_of[texel])
-            kept = (column >= 0) & (factor > 0)
-            entries.append((factor[kept], batch.point[kept], column[kept]))
-            ends.append(texel[kept])
+            scattered = self.response.scattered(hits.face, cosine)
+            factor = batch.weight * np.where(is_lamp, ~batch.is_direct, scattered)
+            column = np.where(is_lamp, self.surfels + lamp, self.surfel_of[texel])
+            counts = (column >= 0) & (factor > 0)
+            factors.append(factor[counts])
+            rows.append(batch.point[counts])
+            columns.append(column[counts])
+            texels.append(texel[counts])
+
             batch = self._mirrored(batch, hits, cosine, points.dither)
             batch.is_direct &= depth == 0
-            batch = batch.joined(off_panes)
+            batch = batch.joined(from_panes)
             if not len(batch.point):
                 break
-        factor, row, column = (np.concatenate(part) for part in zip(*entries, strict=True))
+        places = (np.concatenate(rows), np.concatenate(columns))
+        entries = (np.concatenate(factors) / ray_count, places)
         shape = (len(points), self.surfels + self.lamps)
-        table = scipy.sparse.csr_matrix((factor / rays, (row, column)), shape, dtype=np.float32)
-        return table, sky / rays, escaped, np.concatenate(ends).astype(np.int32)
+        table = scipy.sparse.csr_matrix(entries, shape, dtype=np.float32)
+        return _Gathered(table, sky / ray_count, escaped, np.concatenate(texels).astype(np.int32))
 
-    def _off_panes(self, batch: _RayBatch, way: Floats) -> _RayBatch:
-        """The rays that go back from the first pane in their way; a lamp that they meet is no direct light."""
-        rays, hits = self.visibility.first_panes(batch.origins_m, way)
+    def _escaped(self, gone: _RayBatch, point_count: int) -> Floats:
+        """How many (P,) of the rays of each point that met nothing crossed no pane that shows the sky."""
+        by_no_pane = ~self.visibility.crosses_sky_pane(gone.origins_m, FAR_M * gone.directions)
+        return np.bincount(gone.point, by_no_pane, minlength=point_count).astype(np.float32)
+
+    def _add_sky(self, sky: Floats, gone: _RayBatch) -> None:
+        """Add the illuminance of points (K, P) by rays that met nothing, from each of the skies."""
+        for nth, light in enumerate(self.skies):
+            luminance_cd_m2 = light.luminance_cd_m2(gone.directions)
+            ray_lx = np.pi * luminance_cd_m2 * gone.weight
+            sky[nth] += np.bincount(gone.point, ray_lx, minlength=sky.shape[1])
+
+    def _reflected_by_panes(self, batch: _RayBatch, segments_m: Floats) -> _RayBatch:
+        """The rays that go back from the first pane on their segment; a lamp that they meet is no direct light."""
+        rays, hits = self.visibility.first_panes(batch.origins_m, segments_m)
         batch = batch.take(rays)
-        way = way[rays]
         normals = self.visibility.normals[hits.face]
-        along = np.einsum("ij,ij->i", batch.directions, normals)
-        ends = batch.origins_m + hits.distance[:, None] * way - RAY_OFFSET_M * batch.directions
-        directions = batch.directions - 2 * along[:, None] * normals
-        weight = batch.weight * self.visibility.pane_mirrors(hits.face, along)
-        return _RayBatch(batch.point, ends, directions, weight, np.zeros(len(weight), bool)).take(weight > FAINT)
+        along_normal = np.einsum("ij,ij->i", batch.directions, normals)
+        to_pane_m = hits.distance[:, None] * segments_m[rays]
+        ends_m = batch.origins_m + to_pane_m - RAY_OFFSET_M * batch.directions
+        directions = batch.directions - 2 * along_normal[:, None] * normals
+        weight = batch.weight * self.visibility.pane_mirrors(hits.face, along_normal)
+        is_direct = np.zeros(len(weight), bool)
+        reflected = _RayBatch(batch.point, ends_m, directions, weight, is_direct)
+        return reflected.take(weight > FAINT)
 
-    def _mirrored(self, batch: _RayBatch, hits: Hits, cosine: Floats, dither: Floats) -> _RayBatch:
+    def _mirrored(
+        self,
+        batch: _RayBatch,
+        hits: Hits,
+        cosine: Floats,
+        dither: Floats,
+    ) -> _RayBatch:
+        """The rays that go on from the faces that they have hit."""
         weight = batch.weight * self.response.mirrored(hits.face, cosine)
-        on = np.flatnonzero(weight > FAINT)
-        batch = batch.take(on)
-        face = hits.face[on]
-        plain = self.visibility.normals[face]
-        normals = _facets(plain, self.response.roughness[face], dither[batch.point], on)
-        along = np.einsum("ij,ij->i", batch.directions, normals)[:, None]
-        directions = batch.directions - 2 * along * normals
-        ends = batch.origins_m + hits.distance[on, None] * batch.directions
+        rays = np.flatnonzero(weight > FAINT)
+        batch = batch.take(rays)
+        face = hits.face[rays]
+        face_normals = self.visibility.normals[face]
+        normals = _facets(face_normals, self.response.roughness[face], dither[batch.point], rays)
+        along_normal = np.einsum("ij,ij->i", batch.directions, normals)[:, None]
+        directions = batch.directions - 2 * along_normal * normals
+        ends_m = batch.origins_m + hits.distance[rays, None] * batch.directions
         # A facet may reflect a ray into its own surface.
-        leaving = np.einsum("ij,ij->i", directions, plain) > 0
-        shown = self.response.shows_lamps[face]
-        return _RayBatch(batch.point, ends + RAY_OFFSET_M * plain, directions, weight[on], shown).take(leaving)
+        is_leaving = np.einsum("ij,ij->i", directions, face_normals) > 0
+        shows_lamps = self.response.shows_lamps[face]
+        origins_m = ends_m + RAY_OFFSET_M * face_normals
+        mirrored = _RayBatch(batch.point, origins_m, directions, weight[rays], shows_lamps)
+        return mirrored.take(is_leaving)
 
 
 def _start(points: Texels, side: int) -> _RayBatch:
     """Side x side cosine-weighted rays from each point; their weights average to what enters its coat."""
-    directions = cosine_weighted(points.normals)(*cell_spot(points, np.arange(side**2)[:, None], side))
+    a, b = place_in_cell(points, np.arange(side**2)[:, None], side)
+    directions = cosine_weighted(points.normals)(a, b)  # (side², P, 3)
     cosines = points.cosine(directions)
     weight = (points.entering(cosines) * (cosines > 0)).ravel()
-    origins = np.tile(points.points_m, (side**2, 1))
-    of = np.tile(np.arange(len(points)), side**2)
-    return _RayBatch(of, origins, directions.reshape(-1, 3), weight, np.ones(len(of), bool))
+    origins_m = np.tile(points.points_m, (side**2, 1))
+    point = np.tile(np.arange(len(points)), side**2)
+    return _RayBatch(point, origins_m, directions.reshape(-1, 3), weight, np.ones(len(point), bool))
 
 
-def _facets(normals: Floats, roughness: Floats, dither: Floats, turn: NDArray[np.int64]) -> Floats:
+def _facets(
+    normals: Floats,
+    roughness: Floats,
+    dither: Floats,
+    turn: NDArray[np.int64],
+) -> Floats:
     """Unit normals (R, 3) of facets around a face's, by GGX. Source: Walter et al. (2007), eqs 35 and 36."""
     rough = np.flatnonzero(roughness)
-    a, b = ((dither[rough] + turn[rough, None] * JITTER) % 1).T
-    slope = (roughness[rough] * np.sqrt(a / np.maximum(1 - a, 1e-6)))[:, None]
+    jitter = (dither[rough] + turn[rough, None] * JITTER) % 1
+    a, b = jitter.T
+    steepness = np.sqrt(a / np.maximum(1 - a, 1e-6))
+    slope = (roughness[rough] * steepness)[:, None]
     u_axis, v_axis = tangents(normals[rough])
     angle = 2 * np.pi * b[:, None]
-    tilted = normals[rough] + slope * (np.cos(angle) * u_axis + np.sin(angle) * v_axis)
+    aside = np.cos(angle) * u_axis + np.sin(angle) * v_axis
+    tilted = normals[rough] + slope * aside
     facets = normals.copy()
     facets[rough] = tilted / np.linalg.norm(tilted, axis=1, keepdims=True)
     return facets
@@ -368,31 +513,45 @@ REST = 0.03
 FAINT_REST = 1e-4
 
 
-def bounced(straight: Floats, reflectance: Floats, gathered: FinalGather, first: Floats, *, bounces: int) -> Floats:
+def bounced(
+    straight: Floats,
+    reflectance: Floats,
+    gathered: FinalGather,
+    first: Floats,
+    *,
+    bounces: int,
+) -> Floats:
     """Illuminance (K, S, C) of surfels by one bounce or more, of the radiosity (K, S, C) that direct light gives them.
 
     reflectance (S, C) of surfels; first (K, S): what comes by mirrors from lamps and the sky, grey. In the end each
     bounce is the same share of the one before, so the last ones are the sum of a geometric series.
     """
-    count, size, channels = straight.shape
-    table = gathered.table[:, :size]
-    columns = (size, count * channels)
+    light_count, surfel_count, channels = straight.shape
     if not bounces:
         return np.zeros(straight.shape, np.float32)
-    by_mirrors = np.repeat(first.T[..., None], channels, 2).reshape(columns).astype(np.float32)
-    step = table @ straight.transpose(1, 0, 2).reshape(columns) + by_mirrors
+    table = gathered.table[:, :surfel_count]
+    columns = (surfel_count, light_count * channels)
+    grey = np.repeat(first.T[..., None], channels, 2)
+    by_mirrors = grey.reshape(columns).astype(np.float32)
+    sent = straight.transpose(1, 0, 2).reshape(columns)
+    step = table @ sent + by_mirrors
     total = step.copy()
-    again = np.tile(reflectance, (1, count))
+    column_reflectance = np.tile(reflectance, (1, light_count))
     ratio = np.zeros(columns[1])
-    for left in reversed(range(bounces - 1)):
-        last = step.sum(0, dtype=float)
-        step = table @ (again * step)
+    for bounces_left in reversed(range(bounces - 1)):
+        previous_sum = step.sum(0, dtype=float)
+        step = table @ (column_reflectance * step)
         total += step
-        earlier = ratio
-        ratio = np.clip(step.sum(0, dtype=float) / np.maximum(last, 1e-30), 0, 0.999)
-        rest = ratio * (1 - ratio**left) / (1 - ratio)
-        share = rest * step.sum(0) / np.maximum(total.sum(0), 1e-30)
-        if ((share <= FAINT_REST) | (np.abs(ratio - earlier) <= EVEN) & (share <= REST)).all():
+        previous_ratio = ratio
+        growth = step.sum(0, dtype=float) / np.maximum(previous_sum, 1e-30)
+        ratio = np.clip(growth, 0, 0.999)
+        rest = ratio * (1 - ratio**bounces_left) / (1 - ratio)  # of the geometric series, in units of the last step
+        total_sum = np.maximum(total.sum(0), 1e-30)
+        rest_share = rest * step.sum(0) / total_sum
+        is_even = np.abs(ratio - previous_ratio) <= EVEN
+        is_done = (rest_share <= FAINT_REST) | is_even & (rest_share <= REST)
+        if is_done.all():
             total += step * rest.astype(np.float32)
             break
-    return np.ascontiguousarray(total.reshape(size, count, channels).transpose(1, 0, 2))
+    by_surfel = total.reshape(surfel_count, light_count, channels)
+    return np.ascontiguousarray(by_surfel.transpose(1, 0, 2))

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,9 @@ import numpy as np
 from vobench import stop
 from vobench.errors import MissingDependencyError
 from vobench.geometry.se3 import Array
-from vobench.rendering.occlusion import Pixels, opaque, twins
+from vobench.rendering.array_types import Pixels
+from vobench.rendering.cutout import opaque
+from vobench.rendering.occlusion import back_faces
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import Map, Material, Rgb, Texture, linear_texture
 from vobench.scene.mesh import Triangles
@@ -31,6 +34,7 @@ FOLDERS = ("usr/lib/*-linux-gnu", "usr/lib64", "usr/lib", "usr/lib/llvm*/lib", "
 LLVM_REMEDY = "apt-get update && apt-get install -y libllvm19"
 MITSUBA_REMEDY = f"{sys.executable} -m pip install 'mitsuba>=3.9,<4'"
 PROBE_TIMEOUT_S = 120
+MOST_CHARACTERS = 200  # of a reason in a message
 
 # Renders for real: a library that loads may still abort when the first kernel is compiled.
 PROBE = f"""
@@ -61,7 +65,7 @@ def prepare() -> None:
 def working_library() -> Path:
     """The first candidate that renders.
 
-    Raises MissingDependencyError where Mitsuba is not installed, or none renders: names them and says why not.
+    Raises MissingDependencyError where Mitsuba is not installed, or no library renders, with the reason of each.
     """
     if find_spec("mitsuba") is None:
         raise MissingDependencyError(f"path tracing needs Mitsuba; run: {MITSUBA_REMEDY}")
@@ -79,9 +83,12 @@ def candidates() -> Iterator[Path]:
     named = os.environ.get(VARIABLE)
     if named:
         yield Path(named)
-    found = {path.resolve() for folder in FOLDERS for path in Path("/").glob(f"{folder}/libLLVM*.so*")}
-    ranked = sorted(found, key=lambda path: (major(path), str(path)), reverse=True)
-    yield from (path for path in ranked if major(path) >= OLDEST_MAJOR and str(path) != named)
+    libraries = set[Path]()
+    for folder in FOLDERS:
+        libraries.update(path.resolve() for path in Path("/").glob(f"{folder}/libLLVM*.so*"))
+    for library in sorted(libraries, key=lambda path: (major(path), str(path)), reverse=True):
+        if major(library) >= OLDEST_MAJOR and str(library) != named:
+            yield library
 
 
 def major(library: Path) -> int:
@@ -102,8 +109,11 @@ def failure(library: Path) -> str:
             return f"no picture after {PROBE_TIMEOUT_S} s"
     if done.returncode < 0:
         return f"killed by {signal.Signals(-done.returncode).name}"
-    silent = [f"died with {done.returncode}"]
-    return (done.stderr.strip().splitlines() or silent)[-1][:200] if done.returncode else ""
+    if done.returncode == 0:
+        return ""
+    lines = done.stderr.strip().splitlines()
+    reason = lines[-1] if lines else f"died with {done.returncode}"
+    return reason[:MOST_CHARACTERS]
 
 
 PLUGIN = "vobench_sun"
@@ -137,7 +147,12 @@ def register() -> None:
             # Constants would be compiled into the kernel, one kernel for each value.
             dr.make_opaque(self.irradiance, self.direction)
 
-        def sample_direction(self, it: Any, sample: Any, active: Any = True) -> tuple[Any, Any]:
+        def sample_direction(
+            self,
+            it: Any,
+            sample: Any,
+            active: Any = True,
+        ) -> tuple[Any, Any]:
             disc = mi.warp.square_to_uniform_cone(sample, float(np.cos(SUN_RADIUS_RAD)))
             ds = dr.zeros(mi.DirectionSample3f)
             ds.d = mi.Frame3f(self.direction).to_world(disc)
@@ -189,28 +204,33 @@ class Group:
 
 def groups(scene: Scene, faces: Triangles) -> list[Group]:
     """All faces but the lamps'; of two back to back one that has both sides, unless they glow."""
-    twin = twins(faces)[:-1]
-    members = dict[tuple[int, str, bool], list[Pixels]]()
+    back = back_faces(faces)[:-1]
     glowing = {name for name, material in scene.materials.items() if any(material.emission_cd_m2)}
-    both = (twin >= 0) & ~np.array([t.material in glowing for t in faces.things], bool)[faces.thing]
-    kept = (faces.lamp < 0) & (~both | (twin > np.arange(len(twin))))
+    is_glowing = np.array([thing.material in glowing for thing in faces.things], bool)[faces.thing]
+    is_two_sided = (back >= 0) & ~is_glowing
+    is_first = back > np.arange(len(back))
+    is_included = (faces.lamp < 0) & (~is_two_sided | is_first)
     starts = np.searchsorted(faces.thing, np.arange(len(faces.things) + 1))  # things are in order
-    for thing, first, end in zip(faces.things, starts, starts[1:], strict=False):
+    members = dict[tuple[int, str, bool], list[Pixels]]()
+    for thing, (first, end) in zip(faces.things, pairwise(starts), strict=True):
         for two_sided in (False, True):
-            own = first + np.flatnonzero(kept[first:end] & (both[first:end] == two_sided))
-            if len(own):
-                members.setdefault((int(faces.mover[first]), thing.material, two_sided), []).append(own)
+            is_member = is_included[first:end] & (is_two_sided[first:end] == two_sided)
+            rows = first + np.flatnonzero(is_member)
+            if len(rows):
+                kind = (int(faces.mover[first]), thing.material, two_sided)
+                members.setdefault(kind, []).append(rows)
     return [Group(*kind, np.concatenate(parts)) for kind, parts in members.items()]
 
 
 def load(mi: Any, scene: Scene) -> Any:
     """Mitsuba's scene at the first instant, every light at level 1."""
-    own = triangles(scene)
-    faces = own.moved([mover.path.pose(0) for mover in scene.movers])
+    body_faces = triangles(scene)
+    poses = [mover.path.pose(0) for mover in scene.movers]
+    faces = body_faces.moved(poses)
     register()
     world: Plugin = {"type": "scene"}
     bsdfs = cache(lambda name, two_sided: mi.load_dict(_bsdf(mi, scene.materials[name], two_sided=two_sided)))
-    for group in groups(scene, own):
+    for group in groups(scene, body_faces):
         material = scene.materials[group.material]
         bsdf = bsdfs(group.material, group.two_sided)
         glow = _glow(mi, material) if any(material.emission_cd_m2) else None
@@ -223,7 +243,8 @@ def load(mi: Any, scene: Scene) -> Any:
             world[key] = _emitter(mi, light)
             continue
         look = lamp_look(scene, light)
-        glow = _glow(mi, look) if look else mi.load_dict({"type": "area", "radiance": _rgb(nominal(light))})
+        plain = {"type": "area", "radiance": _rgb(nominal(light))}
+        glow = _glow(mi, look) if look else mi.load_dict(plain)
         tile = look.emission_texture.tile_m if look and look.emission_texture else 1.0
         world[key] = _mesh(mi, key, faces, shining, bsdf=black, glow=glow, tile=tile)
     return mi.load_dict(world, optimize=False)
@@ -233,9 +254,16 @@ def one_sided(mi: Any, scene: Scene, world: Any) -> Any:
     """Whether the shapes of Mitsuba's scene, by their number there, are not to be seen from behind."""
     import drjit as dr
 
-    seen = {g.key for g in groups(scene, triangles(scene)) if g.two_sided or scene.materials[g.material].kind == "pane"}
-    numbers = {int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(s))[0]): s.id() not in seen for s in world.shapes()}
-    return mi.Bool([numbers.get(number, False) for number in range(max(numbers, default=0) + 1)])
+    seen_from_behind = set[str]()
+    for group in groups(scene, triangles(scene)):
+        if group.two_sided or scene.materials[group.material].kind == "pane":
+            seen_from_behind.add(group.key)
+    by_number = dict[int, bool]()
+    for shape in world.shapes():
+        number = int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
+        by_number[number] = shape.id() not in seen_from_behind
+    count = max(by_number, default=0) + 1
+    return mi.Bool([by_number.get(number, False) for number in range(count)])
 
 
 # Where each kind of light keeps how strong it is.
@@ -266,8 +294,10 @@ def nominal(light: Light) -> Array:
 
 def lamp_look(scene: Scene, light: Light) -> Material | None:
     """The material of a lamp that shows a picture."""
-    look = scene.materials.get(light.material) if isinstance(light, AreaLight) else None
-    return look if look and look.emission_texture else None
+    if not isinstance(light, AreaLight):
+        return None
+    material = scene.materials.get(light.material)
+    return material if material and material.emission_texture else None
 
 
 def light_key(index: int) -> str:
@@ -275,19 +305,35 @@ def light_key(index: int) -> str:
     return f"light_{index}"
 
 
-def _mesh(mi: Any, name: str, faces: Triangles, own: Pixels, *, bsdf: Any, glow: Any = None, tile: float = 1.0) -> Any:
-    """Some faces (K,) of a table, their corners not shared."""
+def _mesh(
+    mi: Any,
+    name: str,
+    faces: Triangles,
+    rows: Pixels,
+    *,
+    bsdf: Any,
+    glow: Any = None,
+    tile: float = 1.0,
+) -> Any:
+    """The faces `rows` (K,) of a table, their corners not shared."""
     properties = mi.Properties()
     properties["mesh_bsdf"] = bsdf
     if glow:
         properties["mesh_emitter"] = glow
-    counts = {"vertex_count": 3 * len(own), "face_count": len(own)}
-    mesh = mi.Mesh(name, **counts, props=properties, has_vertex_normals=True, has_vertex_texcoords=True)
+    vertex_count = 3 * len(rows)
+    mesh = mi.Mesh(
+        name,
+        vertex_count=vertex_count,
+        face_count=len(rows),
+        props=properties,
+        has_vertex_normals=True,
+        has_vertex_texcoords=True,
+    )
     parameters = mi.traverse(mesh)
-    parameters["faces"] = np.arange(3 * len(own), dtype=np.uint32)
-    parameters["vertex_positions"] = faces.corners_m[own].ravel().astype(np.float32)
-    parameters["vertex_normals"] = faces.normals[own].ravel().astype(np.float32)
-    parameters["vertex_texcoords"] = (faces.uv[own] / tile).ravel().astype(np.float32)
+    parameters["faces"] = np.arange(vertex_count, dtype=np.uint32)
+    parameters["vertex_positions"] = faces.corners_m[rows].ravel().astype(np.float32)
+    parameters["vertex_normals"] = faces.normals[rows].ravel().astype(np.float32)
+    parameters["vertex_texcoords"] = (faces.uv[rows] / tile).ravel().astype(np.float32)
     parameters.update()
     return mesh
 
@@ -295,19 +341,28 @@ def _mesh(mi: Any, name: str, faces: Triangles, own: Pixels, *, bsdf: Any, glow:
 def _bsdf(mi: Any, material: Material, *, two_sided: bool) -> Plugin:
     """The material as one of Mitsuba's plugins."""
     if material.kind == "pane":
-        passing = {"specular_transmittance": _rgb((material.tint,) * 3)}
-        return {"type": "thindielectric", "int_ior": material.eta, "ext_ior": 1.0, **passing}
-    bsdf = {"type": "twosided", "bsdf": _opaque(mi, material)} if two_sided else _opaque(mi, material)
+        return {
+            "type": "thindielectric",
+            "int_ior": material.eta,
+            "ext_ior": 1.0,
+            "specular_transmittance": _rgb((material.tint,) * 3),
+        }
+    bsdf = _opaque(mi, material)
+    if two_sided:
+        bsdf = {"type": "twosided", "bsdf": bsdf}
     if material.cutout is None or material.texture is None:
         return bsdf
-    height, width = material.texture.pixels().shape[:2]
-    v, u = ((np.arange(CUTOUT_PX * n) + 0.5) / (CUTOUT_PX * n) for n in (height, width))
-    solid = opaque(material, np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)).reshape(len(v), len(u))
-    return {"type": "mask", "opacity": _bitmap(mi, solid.astype(np.float32), filter_type="nearest"), "bsdf": bsdf}
+    rows, columns = (CUTOUT_PX * side for side in material.texture.pixels().shape[:2])
+    v = (np.arange(rows) + 0.5) / rows
+    u = (np.arange(columns) + 0.5) / columns
+    places = np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)
+    is_solid = opaque(material, places).reshape(rows, columns)
+    opacity = _bitmap(mi, is_solid.astype(np.float32), filter_type="nearest")
+    return {"type": "mask", "opacity": opacity, "bsdf": bsdf}
 
 
 def _opaque(mi: Any, material: Material) -> Plugin:
-    """A mirror, or a body, which may be partly metal and partly matt or under a coat."""
+    """A mirror, or a body, which may be partly metal and partly diffuse or under a coat."""
     polish = {"distribution": "ggx", "alpha": material.roughness} if material.roughness else {}
     rough = "rough" if material.roughness else ""
     mirror: Plugin = {"type": f"{rough}conductor", "material": "none", **polish}
@@ -316,39 +371,56 @@ def _opaque(mi: Any, material: Material) -> Plugin:
     colour = _texture(mi, material.texture, material.colour)
     body: Plugin = {"type": "diffuse", "reflectance": colour}
     if material.is_coated:
-        coat = {"int_ior": material.eta, "ext_ior": 1.0, "nonlinear": True}
-        tint = _rgb((material.tint,) * 3)
         body = {
             "type": f"{rough}plastic",
             **polish,
-            **coat,
-            "specular_reflectance": tint,
+            "int_ior": material.eta,
+            "ext_ior": 1.0,
+            "nonlinear": True,
+            "specular_reflectance": _rgb((material.tint,) * 3),
             "diffuse_reflectance": colour,
         }
     if not material.metal:
         return body
-    return {"type": "blendbsdf", "weight": material.metal, "0": body, "1": {**mirror, "specular_reflectance": colour}}
+    metal = {**mirror, "specular_reflectance": colour}
+    return {"type": "blendbsdf", "weight": material.metal, "0": body, "1": metal}
 
 
 def _rgb(values: Array | Rgb) -> Plugin:
     return {"type": "rgb", "value": [float(value) for value in values]}
 
 
-def _texture(mi: Any, texture: Texture | None, colour: Rgb) -> Plugin:
+def _texture(
+    mi: Any,
+    texture: Texture | None,
+    colour: Rgb,
+) -> Plugin:
     """A colour times a texture, linear, repeated, linear between texels, row 0 at v = 0."""
     if texture is None:
         return _rgb(colour)
     return _bitmap(mi, linear_texture(texture) * np.array(colour, np.float32))
 
 
-def _bitmap(mi: Any, tile: Map, *, filter_type: str = "bilinear") -> Plugin:
-    tile = np.ascontiguousarray(tile if tile.ndim == 3 else tile[..., None])
-    return {"type": "bitmap", "bitmap": mi.Bitmap(tile), "raw": True, "wrap_mode": "repeat", "filter_type": filter_type}
+def _bitmap(
+    mi: Any,
+    tile: Map,
+    *,
+    filter_type: str = "bilinear",
+) -> Plugin:
+    with_channels = np.ascontiguousarray(tile if tile.ndim == 3 else tile[..., None])
+    return {
+        "type": "bitmap",
+        "bitmap": mi.Bitmap(with_channels),
+        "raw": True,
+        "wrap_mode": "repeat",
+        "filter_type": filter_type,
+    }
 
 
 def _glow(mi: Any, material: Material) -> Any:
-    """What a material emits, as an area light."""
-    return mi.load_dict({"type": "area", "radiance": _texture(mi, material.emission_texture, material.emission_cd_m2)})
+    """The emission of a material, as an area light."""
+    radiance = _texture(mi, material.emission_texture, material.emission_cd_m2)
+    return mi.load_dict({"type": "area", "radiance": radiance})
 
 
 def _emitter(mi: Any, light: Light) -> Plugin:
@@ -357,17 +429,23 @@ def _emitter(mi: Any, light: Light) -> Plugin:
         case PointLight():
             return {"type": "point", "position": list(light.position_m), "intensity": _rgb(nominal(light))}
         case SpotLight():
-            aim = {"origin": list(light.position_m), "target": list(light.position_m + light.direction)}
+            target_m = light.position_m + light.direction
             up = np.eye(3)[np.argmin(np.abs(light.direction))]
-            beam = {"cutoff_angle": light.outer_deg, "beam_width": min(light.inner_deg, light.outer_deg - 1e-3)}
-            pose = mi.ScalarTransform4f().look_at(**aim, up=list(up))
-            return {"type": "spot", "to_world": pose, **beam, "intensity": _rgb(nominal(light))}
+            pose = mi.ScalarTransform4f().look_at(origin=list(light.position_m), target=list(target_m), up=list(up))
+            return {
+                "type": "spot",
+                "to_world": pose,
+                "cutoff_angle": light.outer_deg,
+                "beam_width": min(light.inner_deg, light.outer_deg - 1e-3),
+                "intensity": _rgb(nominal(light)),
+            }
         case Sun():
             strength = mi.ScalarColor3f(nominal(light).tolist())
             return {"type": PLUGIN, "irradiance": strength, "direction": list(light.direction(0))}
         case Sky():
+            picture = mi.Bitmap(_sky_picture(light))
             upright = mi.ScalarTransform4f().rotate([1, 0, 0], 90)
-            return {"type": "envmap", "bitmap": mi.Bitmap(_sky_picture(light)), "to_world": upright}
+            return {"type": "envmap", "bitmap": picture, "to_world": upright}
         case AreaLight():
             raise ValueError(f"the lamp '{light.name}' has no faces")
 
@@ -378,7 +456,9 @@ def _sky_picture(sky: Sky) -> Map:
     theta = np.pi * np.arange(rows)[:, None] / (rows - 1)
     phi = 2 * np.pi * (np.arange(columns) + 0.5) / columns
     # Turned upright, the map's (x, y, z) are our (x, z, -y).
-    directions = np.stack(
-        np.broadcast_arrays(np.sin(theta) * np.sin(phi), np.sin(theta) * np.cos(phi), np.cos(theta)), -1
-    )
-    return np.asarray(sky.luminance_cd_m2(directions)[..., None] * np.array(sky.colour), np.float32)
+    x = np.sin(theta) * np.sin(phi)
+    y = np.sin(theta) * np.cos(phi)
+    z = np.cos(theta)
+    directions = np.stack(np.broadcast_arrays(x, y, z), -1)
+    luminance_cd_m2 = sky.luminance_cd_m2(directions)[..., None]
+    return np.asarray(luminance_cd_m2 * np.array(sky.colour), np.float32)

@@ -1,4 +1,4 @@
-"""What OpenGL holds: shader programs, textures, framebuffers."""
+"""Objects of OpenGL: shader programs, textures, buffers, framebuffers."""
 
 import ctypes
 from collections.abc import Sequence
@@ -16,6 +16,7 @@ from vobench.errors import MissingDependencyError, RenderError
 from vobench.geometry.se3 import Array
 from vobench.rendering.context import SOFTWARE_REMEDY
 from vobench.rendering.renderer import Radiance
+from vobench.rendering.uniform_block import BLOCKS
 from vobench.rendering.view import Box
 from vobench.scene.material import linear
 
@@ -41,7 +42,8 @@ class LightTexture:
         GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
         is_grey = values.ndim == 2 or bool((values[..., :1] == values[..., 1:]).all())
         if is_grey:
-            _upload(GL.GL_R32F, GL.GL_RED, values if values.ndim == 2 else values[..., 0], GL.GL_FLOAT)
+            channel = values if values.ndim == 2 else values[..., 0]
+            _upload(GL.GL_R32F, GL.GL_RED, channel, GL.GL_FLOAT)
         else:
             _upload(GL.GL_RGBA32F, GL.GL_RGB, values, GL.GL_FLOAT)
         _swizzle(is_grey)
@@ -56,11 +58,15 @@ COUNTS = np.rint(65535 * linear(np.arange(256, dtype=np.uint8))).astype(np.uint1
 class SurfaceTexture:
     """A tile that repeats, with mipmaps, row 0 at v = 0: linear, 16 bits of `scale`.
 
-    It is made of (H, W) float32, or of (H, W, 3 or 4) uint8 in sRGB; with `shrink` of half as many pixels each way,
-    or a quarter, and so on.
+    values: (H, W) float32, or (H, W, 3 or 4) uint8 in sRGB; shrink: how often the sides in pixels are halved.
     """
 
-    def __init__(self, values: NDArray[Any], *, shrink: int = 0) -> None:
+    def __init__(
+        self,
+        values: NDArray[Any],
+        *,
+        shrink: int = 0,
+    ) -> None:
         self.scale = 1.0
         self.is_grey = values.ndim == 2
         self.id = GL.glGenTextures(1)
@@ -71,7 +77,8 @@ class SurfaceTexture:
         else:
             self.scale = max(1.0, float(values.max()))
             counts = np.rint(values * (65535 / self.scale)).astype(np.uint16)
-        internal, form = COLOURS[values.shape[2] if values.ndim == 3 else 1]
+        channels = values.shape[2] if values.ndim == 3 else 1
+        internal, form = COLOURS[channels]
         _upload(internal, form, _halved(counts, shrink), GL.GL_UNSIGNED_SHORT)
         _swizzle(self.is_grey)
         GL.glGenerateMipmap(GL.GL_TEXTURE_2D)
@@ -81,14 +88,26 @@ class SurfaceTexture:
 COLOURS = {1: (GL.GL_R16, GL.GL_RED), 3: (GL.GL_RGBA16, GL.GL_RGB), 4: (GL.GL_RGBA16, GL.GL_RGBA)}
 
 
-def _halved(values: NDArray[np.uint16], times: int) -> NDArray[np.uint16]:
-    """A picture (H, W, ...) of half as many pixels each way, some times over."""
-    size = [max(1, edge >> times) for edge in values.shape[1::-1]]
-    return np.asarray(cv2.resize(values, size, interpolation=cv2.INTER_AREA)) if times else values
+def _halved(
+    values: NDArray[np.uint16],
+    times: int,
+) -> NDArray[np.uint16]:
+    """A picture (H, W, ...) whose sides in pixels are halved so many times."""
+    if not times:
+        return values
+    width = max(1, values.shape[1] >> times)
+    height = max(1, values.shape[0] >> times)
+    return np.asarray(cv2.resize(values, [width, height], interpolation=cv2.INTER_AREA))
+
+
+# Position, normal, place on the texture, place on the map of light: by their locations in the vertex shader.
+ATTRIBUTE_FLOATS = (3, 3, 2, 2)
+FLOAT_BYTES = 4
+INDEX_BYTES = 4
 
 
 class Elements:
-    """Vertices (V, 10) and indices (N,) as culling.Geometry has them, on the graphics side."""
+    """Vertices (V, 10) and indices (N,) of a `Geometry` in OpenGL's memory."""
 
     def __init__(self, vertices: Floats, indices: NDArray[np.uint32]) -> None:
         self._array = GL.glGenVertexArrays(1)
@@ -96,52 +115,66 @@ class Elements:
         for kind, values in ((GL.GL_ARRAY_BUFFER, vertices), (GL.GL_ELEMENT_ARRAY_BUFFER, indices)):
             GL.glBindBuffer(kind, GL.glGenBuffers(1))
             GL.glBufferData(kind, values.nbytes, values, GL.GL_STATIC_DRAW)
-        for place, (count, first) in enumerate(((3, 0), (3, 3), (2, 6), (2, 8))):
-            GL.glEnableVertexAttribArray(place)
-            GL.glVertexAttribPointer(
-                place, count, GL.GL_FLOAT, GL.GL_FALSE, vertices.strides[0], ctypes.c_void_p(4 * first)
-            )
+        first = 0
+        for location, count in enumerate(ATTRIBUTE_FLOATS):
+            offset = ctypes.c_void_p(FLOAT_BYTES * first)
+            GL.glEnableVertexAttribArray(location)
+            GL.glVertexAttribPointer(location, count, GL.GL_FLOAT, GL.GL_FALSE, vertices.strides[0], offset)
+            first += count
 
     def draw(self, runs: Sequence[tuple[int, int]], copies: int) -> None:
         """Draw runs (first, count) of indices, once for each sample, in the program in use."""
         GL.glBindVertexArray(self._array)
         for first, count in runs:
-            start = ctypes.c_void_p(4 * first)
+            start = ctypes.c_void_p(INDEX_BYTES * first)
             GL.glDrawElementsInstanced(GL.GL_TRIANGLES, count, GL.GL_UNSIGNED_INT, start, copies)
 
 
 class Blocks:
-    """Numbers (B, N) float32 that shaders read as uniform blocks, one row at a time."""
+    """Values (B,) of a uniform block's type that shaders read one at a time."""
 
-    def __init__(self, binding: int, values: Floats) -> None:
+    def __init__(self, binding: int, values: NDArray[np.void]) -> None:
         self._binding = binding
-        self._size = 4 * values.shape[1]
-        step = int(GL.glGetIntegerv(GL.GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT))
-        self._stride = -(-self._size // step) * step
+        self._size = values.dtype.itemsize
+        alignment = int(GL.glGetIntegerv(GL.GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT))
+        self._stride = -(-self._size // alignment) * alignment
         self._buffer = GL.glGenBuffers(1)
         GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._buffer)
         GL.glBufferData(GL.GL_UNIFORM_BUFFER, self._stride * len(values), None, GL.GL_DYNAMIC_DRAW)
-        for row, numbers in enumerate(values):
-            self.update(row, numbers)
+        for index, value in enumerate(values):
+            self.update(index, value)
 
-    def update(self, row: int, numbers: Floats) -> None:
-        """Replace a row."""
+    def update(
+        self,
+        index: int,
+        value: np.void | NDArray[np.void],
+    ) -> None:
+        """Replace a value."""
         GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._buffer)
-        GL.glBufferSubData(GL.GL_UNIFORM_BUFFER, row * self._stride, numbers.nbytes, numbers)
+        GL.glBufferSubData(GL.GL_UNIFORM_BUFFER, index * self._stride, self._size, value.tobytes())
 
-    def use(self, row: int) -> None:
-        """Let shaders read a row."""
-        offset = row * self._stride
+    def use(self, index: int) -> None:
+        """Let shaders read a value."""
+        offset = index * self._stride
         GL.glBindBufferRange(GL.GL_UNIFORM_BUFFER, self._binding, self._buffer, offset, self._size)
 
 
-def bind(unit: int, texture: Any, kind: int = GL.GL_TEXTURE_2D) -> None:
+def bind(
+    unit: int,
+    texture: Any,
+    kind: int = GL.GL_TEXTURE_2D,
+) -> None:
     """Let shaders sample a texture by a unit."""
     GL.glActiveTexture(unit)
     GL.glBindTexture(kind, texture)
 
 
-def _upload(internal: int, form: int, values: NDArray[Any], kind: int) -> None:
+def _upload(
+    internal: int,
+    form: int,
+    values: NDArray[Any],
+    kind: int,
+) -> None:
     """Fill the texture that is bound."""
     GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
     rows, columns = values.shape[:2]
@@ -149,35 +182,37 @@ def _upload(internal: int, form: int, values: NDArray[Any], kind: int) -> None:
 
 
 def _swizzle(is_grey: bool) -> None:
-    """Whether shaders read the one channel of the texture that is bound as all three colours."""
+    """Let shaders read the only channel of the texture that is bound as all three colours, if it is grey."""
     colours = [GL.GL_RED] * 3 if is_grey else [GL.GL_RED, GL.GL_GREEN, GL.GL_BLUE]
     last = GL.GL_ONE if is_grey else GL.GL_ALPHA
     GL.glTexParameteriv(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_SWIZZLE_RGBA, np.array([*colours, last], np.int32))
 
 
 def _texture_parameters(minify: int, magnify: int, wrap: int) -> None:
-    for key, value in (
-        (GL.GL_TEXTURE_MIN_FILTER, minify),
-        (GL.GL_TEXTURE_MAG_FILTER, magnify),
-        (GL.GL_TEXTURE_WRAP_S, wrap),
-        (GL.GL_TEXTURE_WRAP_T, wrap),
-    ):
-        GL.glTexParameteri(GL.GL_TEXTURE_2D, key, value)
+    GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_MIN_FILTER, minify)
+    GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_MAG_FILTER, magnify)
+    GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_WRAP_S, wrap)
+    GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_WRAP_T, wrap)
 
 
 SHADERS = Path(__file__).parent / "shaders"
 
 
-class Program:
+class ShaderProgram:
     """A vertex and a fragment shader of this package, compiled with some preprocessor names defined, and linked."""
 
-    def __init__(self, vertex: str, fragment: str, *defines: str) -> None:
+    def __init__(
+        self,
+        vertex: str,
+        fragment: str,
+        *defines: str,
+    ) -> None:
         # Core contexts check a program against a vertex array, whichever it is.
         GL.glBindVertexArray(GL.glGenVertexArrays(1))
-        stages = ((f"{vertex}.vert", GL.GL_VERTEX_SHADER), (f"{fragment}.frag", GL.GL_FRAGMENT_SHADER))
         try:
-            compiled = [shaders.compileShader(_source(name, defines), stage) for name, stage in stages]
-            self._id = shaders.compileProgram(*compiled)
+            vertex_shader = shaders.compileShader(_source(f"{vertex}.vert", defines), GL.GL_VERTEX_SHADER)
+            fragment_shader = shaders.compileShader(_source(f"{fragment}.frag", defines), GL.GL_FRAGMENT_SHADER)
+            self._id = shaders.compileProgram(vertex_shader, fragment_shader)
         except Exception as error:  # PyOpenGL's, whichever stage fails
             reason = " ".join(str(error).split())[:200]
             raise MissingDependencyError(
@@ -187,7 +222,7 @@ class Program:
         self._values: dict[str, float | bytes] = {}
 
     def use(self, **uniforms: float | Array) -> None:
-        """Draw with this program from now on, with some of its uniforms: numbers, vectors (4,), matrices."""
+        """Draw with this program from now on, with these of its uniforms: numbers, vectors (4,), matrices."""
         GL.glUseProgram(self._id)
         for name, value in uniforms.items():
             data = value if isinstance(value, int | float) else np.ascontiguousarray(value, np.float32)
@@ -196,7 +231,11 @@ class Program:
                 self._values[name] = key
                 self._upload(name, data)
 
-    def _upload(self, name: str, value: float | NDArray[np.float32]) -> None:
+    def _upload(
+        self,
+        name: str,
+        value: float | NDArray[np.float32],
+    ) -> None:
         if name not in self._locations:
             self._locations[name] = GL.glGetUniformLocation(self._id, name)
         location = self._locations[name]
@@ -212,22 +251,32 @@ class Program:
 
 
 def _source(name: str, defines: Sequence[str]) -> str:
-    """The text of a shader's file, with names defined after its first line, which says the version."""
-    version, rest = (SHADERS / name).read_text(encoding="utf-8").split("\n", 1)
+    """The text of a shader's file, with its uniform blocks declared and names defined.
+
+    The names follow the first line, that of the version; a line `#include <Pass>` becomes the block of that name.
+    """
+    version, body = (SHADERS / name).read_text(encoding="utf-8").split("\n", 1)
+    for block in BLOCKS.values():
+        body = body.replace(f"#include <{block.name}>", block.declaration)
     lines = [f"#define {define} 1" for define in sorted(defines)]
-    return "\n".join([version, *lines, rest])
+    return "\n".join([version, *lines, body])
 
 
 class CubeTexture:
-    """What is around a place: six pictures (N, N, 3) whose right, down and ahead axes are rows (6, 3, 3).
+    """A cube map of six pictures (N, N, 3) whose right, down and ahead axes are rows (6, 3, 3).
 
     Each level is blurred by another roughness (L,), the first by none.
     """
 
-    def __init__(self, pictures: Sequence[Radiance], axes: Array, roughness: Sequence[float]) -> None:
+    def __init__(
+        self,
+        pictures: Sequence[Radiance],
+        axes: Array,
+        roughness: Sequence[float],
+    ) -> None:
         around = _cube(pictures)
         self.id = _cube(pictures)
-        program = Program("fullscreen", "probe")
+        program = ShaderProgram("fullscreen", "probe")
         framebuffer = GL.glGenFramebuffers(1)
         GL.glBindVertexArray(GL.glGenVertexArrays(1))
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
@@ -239,8 +288,8 @@ class CubeTexture:
             size = side >> level
             GL.glViewport(0, 0, size, size)
             for nth, face in enumerate(axes):
-                at = GL.GL_TEXTURE_CUBE_MAP_POSITIVE_X + nth
-                GL.glFramebufferTexture2D(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, at, self.id, level)
+                target = GL.GL_TEXTURE_CUBE_MAP_POSITIVE_X + nth
+                GL.glFramebufferTexture2D(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, target, self.id, level)
                 program.use(axes=face.T, roughness=alpha, size_px=float(size), around_px=float(side))
                 GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
         for ability in (GL.GL_SCISSOR_TEST, GL.GL_DEPTH_TEST, GL.GL_CULL_FACE):
@@ -254,10 +303,10 @@ def _cube(pictures: Sequence[Radiance]) -> Any:
     texture = GL.glGenTextures(1)
     GL.glBindTexture(GL.GL_TEXTURE_CUBE_MAP, texture)
     for nth, picture in enumerate(pictures):
-        at = GL.GL_TEXTURE_CUBE_MAP_POSITIVE_X + nth
+        target = GL.GL_TEXTURE_CUBE_MAP_POSITIVE_X + nth
         size = len(picture)
         data = np.ascontiguousarray(picture)
-        GL.glTexImage2D(at, 0, GL.GL_RGBA32F, size, size, 0, GL.GL_RGB, GL.GL_FLOAT, data)
+        GL.glTexImage2D(target, 0, GL.GL_RGBA32F, size, size, 0, GL.GL_RGB, GL.GL_FLOAT, data)
     GL.glGenerateMipmap(GL.GL_TEXTURE_CUBE_MAP)
     GL.glTexParameteri(GL.GL_TEXTURE_CUBE_MAP, GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR_MIPMAP_LINEAR)
     GL.glEnable(GL.GL_TEXTURE_CUBE_MAP_SEAMLESS)
@@ -276,9 +325,9 @@ class Grid:
 # Each sample takes the one nearest mipmap level: by different choices, levels blend from one into the next.
 TURNED = Grid(((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)), (-2.875, -2.375, -2.625, -2.125))
 # The same in two halves, each even about the centre, for sub-frames by turns.
-HALVES = tuple(
-    Grid((TURNED.points[a], TURNED.points[b]), (TURNED.lod_bias[a], TURNED.lod_bias[b])) for a, b in ((0, 3), (1, 2))
-)
+OUTER_HALF = Grid((TURNED.points[0], TURNED.points[3]), (TURNED.lod_bias[0], TURNED.lod_bias[3]))
+INNER_HALF = Grid((TURNED.points[1], TURNED.points[2]), (TURNED.lod_bias[1], TURNED.lod_bias[2]))
+HALVES = (OUTER_HALF, INNER_HALF)
 # For pictures of twice as many pixels each way.
 CENTRE = Grid(((0.5, 0.5),), (-1.5,))
 
@@ -321,31 +370,45 @@ class Canvas:
         """Nearness (rows, columns) of the first sample of each pixel, top row first."""
         GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, self.depth)
         buffer = GL.glGetTexImage(GL.GL_TEXTURE_2D_ARRAY, 0, GL.GL_DEPTH_COMPONENT, GL.GL_FLOAT)
-        return np.frombuffer(buffer, np.float32).reshape(self.layers, self.height_px, self.width_px)[0, ::-1]
+        layers = np.frombuffer(buffer, np.float32).reshape(self.layers, self.height_px, self.width_px)
+        return layers[0, ::-1]
 
 
 # By how many channels a picture has; drivers need not draw into three.
 FORMATS = {1: (GL.GL_R32F, GL.GL_RED), 3: (GL.GL_RGBA32F, GL.GL_RGBA)}
 
 
-def canvas(width_px: int, height_px: int, grid: Grid, channels: int) -> Canvas:
-    """A canvas of some size. Raises RenderError where the driver has no room or form for it."""
+def canvas(
+    width_px: int,
+    height_px: int,
+    grid: Grid,
+    channels: int,
+) -> Canvas:
+    """A canvas of a size in pixels. Raises RenderError where the driver has no room or form for it."""
     framebuffer = GL.glGenFramebuffers(1)
     GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, framebuffer)
-    names = []
-    for attachment, internal, form in (
-        (GL.GL_COLOR_ATTACHMENT0, *FORMATS[channels]),
-        (GL.GL_DEPTH_ATTACHMENT, GL.GL_DEPTH_COMPONENT32F, GL.GL_DEPTH_COMPONENT),
-    ):
-        names.append(GL.glGenTextures(1))
-        GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, names[-1])
-        size = (width_px, height_px, len(grid.points))
-        GL.glTexImage3D(GL.GL_TEXTURE_2D_ARRAY, 0, internal, *size, 0, form, GL.GL_FLOAT, None)
-        for filtering in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):
-            GL.glTexParameteri(GL.GL_TEXTURE_2D_ARRAY, filtering, GL.GL_NEAREST)
-        GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, attachment, names[-1], 0)
+    size = (width_px, height_px, len(grid.points))
+    internal, form = FORMATS[channels]
+    colour = _layers(size, internal, form)
+    GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, colour, 0)
+    depth = _layers(size, GL.GL_DEPTH_COMPONENT32F, GL.GL_DEPTH_COMPONENT)
+    GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, GL.GL_DEPTH_ATTACHMENT, depth, 0)
     _require_complete(width_px, height_px)
-    return Canvas(width_px, height_px, channels, grid, framebuffer, *names)
+    return Canvas(width_px, height_px, channels, grid, framebuffer, colour, depth)
+
+
+def _layers(
+    size: tuple[int, int, int],
+    internal: int,
+    form: int,
+) -> Any:
+    """An empty texture of a width and height in pixels and so many layers."""
+    texture = GL.glGenTextures(1)
+    GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, texture)
+    GL.glTexImage3D(GL.GL_TEXTURE_2D_ARRAY, 0, internal, *size, 0, form, GL.GL_FLOAT, None)
+    GL.glTexParameteri(GL.GL_TEXTURE_2D_ARRAY, GL.GL_TEXTURE_MIN_FILTER, GL.GL_NEAREST)
+    GL.glTexParameteri(GL.GL_TEXTURE_2D_ARRAY, GL.GL_TEXTURE_MAG_FILTER, GL.GL_NEAREST)
+    return texture
 
 
 @dataclass(frozen=True, slots=True)
@@ -374,20 +437,22 @@ class FlatTarget:
         GL.glClear(GL.GL_COLOR_BUFFER_BIT)
 
     def read(self, box: Box) -> Radiance:
-        """A box of the picture (rows, columns) or (rows, columns, 3) float32, top row first; an array of its own."""
+        """A box of the picture (rows, columns) or (rows, columns, 3) float32, top row first; a new array."""
         u0, u1, v0, v1 = box
+        width = u1 - u0
+        height = v1 - v0
         _, form = FORMATS[self.channels]
         GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self.framebuffer)
         GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 1)
-        buffer = GL.glReadPixels(u0, self.height_px - v1, u1 - u0, v1 - v0, form, GL.GL_FLOAT)
-        pixels = np.frombuffer(buffer, np.float32).reshape(v1 - v0, u1 - u0, -1)
+        buffer = GL.glReadPixels(u0, self.height_px - v1, width, height, form, GL.GL_FLOAT)
+        pixels = np.frombuffer(buffer, np.float32).reshape(height, width, -1)
         colours = cv2.cvtColor(pixels, cv2.COLOR_RGBA2RGB) if self.channels == 3 else pixels
         # OpenGL's first row is the lowest.
         return np.asarray(cv2.flip(colours, 0), np.float32)
 
 
 def flat_target(width_px: int, height_px: int, channels: int) -> FlatTarget:
-    """A target of some size. Raises RenderError where the driver has none such."""
+    """A target of a size in pixels. Raises RenderError where the driver has no room or form for it."""
     internal, form = FORMATS[channels]
     framebuffer = GL.glGenFramebuffers(1)
     texture = GL.glGenTextures(1)

@@ -1,4 +1,4 @@
-"""Ambient light for pyrender, which has no bounces: what surfaces get on average of all that it does not draw."""
+"""Ambient light for pyrender, which has no bounces: the mean on all surfaces of the light that it does not draw."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -27,8 +27,9 @@ class MeanLight:
     illuminance_lx: Array
 
     def radiance(self, levels: Sequence[float]) -> Array:
-        """What a white surface shows (3,) in cd/m² by ambient light alone, at levels (L,)."""
-        return np.asarray(np.asarray(levels) @ self.illuminance_lx / np.pi)
+        """Radiance of a white surface (3,) in cd/m² by ambient light alone, at levels (L,)."""
+        total_lx = np.asarray(levels) @ self.illuminance_lx
+        return np.asarray(total_lx / np.pi)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +41,10 @@ class SurfacePoints:
     mean_reflectance: float
     caster: RayCaster
 
-    def reached(self, way: Array) -> NDArray[np.bool_]:
+    def reached(self, vectors_m: Array) -> NDArray[np.bool_]:
         """Whether nothing lies between each point and the point plus its vector (N, 3)."""
-        return ~self.caster.stops(self.points_m + OFF_M * self.normals, way)
+        origins_m = self.points_m + OFF_M * self.normals
+        return ~self.caster.stops(origins_m, vectors_m)
 
 
 def mean_light(scene: Scene, *, drawn: Collection[int]) -> MeanLight:
@@ -63,10 +65,10 @@ def mean_light(scene: Scene, *, drawn: Collection[int]) -> MeanLight:
     rows = []
     for index, light in enumerate(scene.lights):
         if isinstance(light, Sky):
-            seen = [
-                np.where(free, light.luminance_cd_m2(way), 0) for free, way in zip(escaped, directions, strict=True)
-            ]
-            direct_lx = np.pi * float(np.mean(seen))
+            seen_cd_m2 = []
+            for is_free, direction in zip(escaped, directions, strict=True):
+                seen_cd_m2.append(np.where(is_free, light.luminance_cd_m2(direction), 0))
+            direct_lx = np.pi * float(np.mean(seen_cd_m2))
         else:
             direct_lx = _mean_direct_lx(light, surfaces)
         share = bounced if index in drawn else 1 + bounced
@@ -78,41 +80,53 @@ def _surfaces(scene: Scene) -> SurfacePoints | None:
     """Points on all that is opaque and no lamp; None where a scene has no such face."""
     faces = triangles(scene, t_ns=0)
     materials = [scene.materials.get(thing.material) for thing in faces.things]
-    is_solid = np.array([material is not None and material.kind != "pane" for material in materials], bool)
-    solid = np.flatnonzero(is_solid[faces.thing] & (faces.lamp < 0))
-    areas = areas_m2(faces.corners_m[solid])
-    if not areas.sum() > 0:
+    of_solid = [material is not None and material.kind != "pane" for material in materials]
+    is_solid = np.array(of_solid, bool)[faces.thing]
+    solid = np.flatnonzero(is_solid & (faces.lamp < 0))
+    area_m2 = areas_m2(faces.corners_m[solid])
+    total_m2 = area_m2.sum()
+    if not total_m2 > 0:
         return None
     rng = np.random.default_rng(0)
-    picked = solid[rng.choice(len(solid), POINTS, p=areas / areas.sum())]
-    weights = rng.dirichlet(np.ones(3), POINTS)
-    points_m = np.einsum("nc,ncd->nd", weights, faces.corners_m[picked])
-    reflected = np.array([_mean_reflectance(material) for material in materials])
-    caster = RayCaster(faces, solid)
-    return SurfacePoints(points_m, faces.plane[picked], float(reflected[faces.thing[picked]].mean()), caster)
+    face = solid[rng.choice(len(solid), POINTS, p=area_m2 / total_m2)]
+    corner_weights = rng.dirichlet(np.ones(3), POINTS)
+    reflectances = np.array([_mean_reflectance(material) for material in materials])
+    return SurfacePoints(
+        points_m=np.einsum("nc,ncd->nd", corner_weights, faces.corners_m[face]),
+        normals=faces.plane[face],
+        mean_reflectance=float(reflectances[faces.thing[face]].mean()),
+        caster=RayCaster(faces, solid),
+    )
 
 
 def _mean_reflectance(material: Material | None) -> float:
     """Luminous reflectance of a body or mirror; 0 of what is neither."""
     if material is None or material.kind == "pane":
         return 0.0
-    return material.tint if material.kind == "mirror" else float(reflectance(material).mean())
+    if material.kind == "mirror":
+        return material.tint
+    return float(reflectance(material).mean())
 
 
 def _hemispheres(normals: Array) -> list[Array]:
     """SKY_RAYS directions (N, 3) each around normals (N, 3), as dense as their cosine (Malley's method)."""
     rng = np.random.default_rng(1)
-    return [unit(normals + unit(rng.standard_normal(normals.shape))) for _ in range(SKY_RAYS)]
+    directions = []
+    for _ in range(SKY_RAYS):
+        on_sphere = unit(rng.standard_normal(normals.shape))
+        directions.append(unit(normals + on_sphere))
+    return directions
 
 
 def _mean_direct_lx(light: Light, surfaces: SurfacePoints) -> float:
     """Mean illuminance by a sun, or by a lamp as if all of it shone from its middle."""
     if isinstance(light, Sun):
         towards = np.broadcast_to(light.direction(0), surfaces.normals.shape)
-        arriving = light.illuminance_lx * np.maximum(np.einsum("nd,nd->n", surfaces.normals, towards), 0)
-        return float(np.mean(arriving * surfaces.reached(FAR_M * towards)))
+        cosine = np.maximum(np.einsum("nd,nd->n", surfaces.normals, towards), 0)
+        arriving_lx = light.illuminance_lx * cosine
+        return float(np.mean(arriving_lx * surfaces.reached(FAR_M * towards)))
     if isinstance(light, Sky):
-        raise ValueError("the sky is around, it has no middle")
+        raise ValueError("the sky surrounds the scene and has no middle")
     if isinstance(light, AreaLight):
         corners_m = light.mesh.corners_m
         areas = areas_m2(corners_m)
@@ -121,13 +135,13 @@ def _mean_direct_lx(light: Light, surfaces: SurfacePoints) -> float:
     else:
         middle_m = light.position_m
         nearest_m = 0.1
-    way = middle_m - surfaces.points_m
-    distance_m = np.linalg.norm(way, axis=1)
-    towards = unit(way)
+    vectors_m = middle_m - surfaces.points_m
+    distance_m = np.linalg.norm(vectors_m, axis=1)
+    towards = unit(vectors_m)
     cosine = np.maximum(np.einsum("nd,nd->n", surfaces.normals, towards), 0)
     intensity_cd = _intensity_cd(light, -towards)
-    arriving = intensity_cd * cosine / np.maximum(distance_m, nearest_m) ** 2
-    return float(np.mean(arriving * surfaces.reached(way)))
+    arriving_lx = intensity_cd * cosine / np.maximum(distance_m, nearest_m) ** 2
+    return float(np.mean(arriving_lx * surfaces.reached(vectors_m)))
 
 
 def _intensity_cd(light: Light, directions: Array) -> Array:
@@ -136,7 +150,8 @@ def _intensity_cd(light: Light, directions: Array) -> Array:
         corners_m = light.mesh.corners_m
         edges = corners_m[:, 1:] - corners_m[:, :1]
         facing_m2 = np.cross(edges[:, 0], edges[:, 1]) / 2  # (F, 3): normals as long as faces are large
-        return np.asarray(light.luminance_cd_m2 * np.maximum(directions @ facing_m2.T, 0).sum(1))
+        seen_m2 = np.maximum(directions @ facing_m2.T, 0).sum(1)
+        return np.asarray(light.luminance_cd_m2 * seen_m2)
     if isinstance(light, Sun | Sky):
         raise ValueError("sun and sky have no intensity")
     return light.intensity_cd(directions)

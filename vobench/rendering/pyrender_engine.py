@@ -52,8 +52,8 @@ LEAST_AHEAD = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
-    """What of a scene changes: each light's level (L,), and the instant of movers and suns."""
+class PyrenderMoment:
+    """The parts of a scene that change: each light's level (L,), and the instant of movers and suns."""
 
     levels: tuple[float, ...]
     t_ns: float
@@ -83,13 +83,21 @@ class PyrenderRenderer:
         self._renderer = pyrender.Renderer(1, 1)
         self._warp = cache(warp)
 
-    def radiance(self, camera: Camera, views: Sequence[View], *, weights: Rgb | None = LUMINANCE) -> Radiance:
+    def radiance(
+        self,
+        camera: Camera,
+        views: Sequence[View],
+        *,
+        weights: Rgb | None = LUMINANCE,
+    ) -> Radiance:
         """Luminance (H, W) in cd/m² of weighted channels, or (H, W, 3) without weights; see `Renderer`."""
         self._context.make_current()
         rows_in_order = sorted(views, key=lambda view: view.rows.start)
         strips = [self._exposed(camera, view) for view in rows_in_order]
         picture = self._white_cd_m2 * np.concatenate(strips)
-        return picture if weights is None else np.asarray(picture @ np.asarray(weights, np.float32))
+        if weights is None:
+            return picture
+        return np.asarray(picture @ np.asarray(weights, np.float32))
 
     def close(self) -> None:
         """Free the OpenGL context and all in it."""
@@ -102,19 +110,20 @@ class PyrenderRenderer:
         count = len(view.start_ns)
         total: Radiance | None = None
         for index in range(count):
-            self._scene.become(self._moment(int(view.start_ns[index]), int(view.end_ns[index])))
+            moment = self._moment(int(view.start_ns[index]), int(view.end_ns[index]))
+            self._scene.become(moment)
             rows = self._rows(camera, view.T_world_camera[index], view.rows)
             total = rows if total is None else total + rows
         if total is None:
             raise ValueError("a view needs one sub-frame or more, got none")
         return total / np.float32(count)
 
-    def _moment(self, start_ns: int, end_ns: int) -> Moment:
+    def _moment(self, start_ns: int, end_ns: int) -> PyrenderMoment:
         levels = tuple(light.level.mean(start_ns, end_ns) for light in self._lights)
-        return Moment(levels, (start_ns + end_ns) / 2)
+        return PyrenderMoment(levels, (start_ns + end_ns) / 2)
 
     def _rows(self, camera: Camera, T_world_camera: Array, rows: slice) -> Radiance:
-        """Some rows (R, W, 3) of one sub-frame; a lens that is no pinhole is resampled from pinhole faces."""
+        """Rows (R, W, 3) of one sub-frame; a lens other than a pinhole is resampled from pinhole faces."""
         if isinstance(camera, Pinhole):
             return self._pinhole(camera, T_world_camera)[rows]
         lens = self._warp(camera)
@@ -149,7 +158,7 @@ class PyrenderScene:
         self.pyrender_scene = pyrender.Scene(ambient_light=np.zeros(3), bg_color=np.zeros(4))
         self._scene = scene
         self._white_cd_m2 = white_cd_m2
-        self._moment: Moment | None = None
+        self._moment: PyrenderMoment | None = None
         self._materials = cache(lambda name: pyrender_material(scene.materials[name], white_cd_m2))
 
         suns = [light.direction(0) for light in scene.lights if isinstance(light, Sun)]
@@ -157,11 +166,10 @@ class PyrenderScene:
         if suns:
             self._add_backs(scene.things)
         self._movers = [(mover, self._add_things(mover.things)) for mover in scene.movers]
-        self._lamp_faces = {
-            index: self._add_lamp_faces(light)
-            for index, light in enumerate(scene.lights)
-            if isinstance(light, AreaLight)
-        }
+        self._lamp_faces = {}
+        for index, light in enumerate(scene.lights):
+            if isinstance(light, AreaLight):
+                self._lamp_faces[index] = self._add_lamp_faces(light)
         chosen = _chosen(scene.lights)
         self._light_nodes = {index: self._add_light(scene.lights[index]) for index in chosen}
         self._mean_light: MeanLight = mean_light(scene, drawn=chosen)
@@ -190,7 +198,7 @@ class PyrenderScene:
         self._camera.cy = camera.cy_px + 0.5
         self.pyrender_scene.set_pose(self._camera_node, T_world_camera @ T_CV_GL)
 
-    def become(self, wanted: Moment) -> None:
+    def become(self, wanted: PyrenderMoment) -> None:
         """Set every light's level, and move suns and movers to where they are."""
         if wanted == self._moment:
             return
@@ -207,7 +215,7 @@ class PyrenderScene:
         light = self._scene.lights[index]
         if index in self._light_nodes:
             node = self._light_nodes[index]
-            node.light.intensity = level * _nominal(light) / self._white_cd_m2
+            node.light.intensity = level * _strength(light) / self._white_cd_m2
             if isinstance(light, Sun) and light.moves:
                 self.pyrender_scene.set_pose(node, _shining_along(-light.direction(t_ns), np.zeros(3)))
         if isinstance(light, AreaLight):
@@ -220,11 +228,17 @@ class PyrenderScene:
         colour = np.zeros(3)
         for light, level in zip(self._scene.lights, levels, strict=True):
             if isinstance(light, Sky):
-                colour += level * light.illuminance_lx / np.pi / self._white_cd_m2 * np.array(light.colour)
+                white_share = level * light.illuminance_lx / np.pi / self._white_cd_m2
+                colour += white_share * np.array(light.colour)
         return np.append(np.clip(colour, 0, 1) ** (1 / GAMMA), 1.0)
 
-    def _add_things(self, things: Sequence[Thing], *, sun: Array | None = None) -> list[Any]:
-        """One node for each material of some things, in their common frame; panes let the sun (3,) through."""
+    def _add_things(
+        self,
+        things: Sequence[Thing],
+        *,
+        sun: Array | None = None,
+    ) -> list[Any]:
+        """One node for each material of things, in their common frame; panes let the sun (3,) through."""
         by_material = dict[str, list[Mesh]]()
         for thing in things:
             by_material.setdefault(thing.material, []).append(thing.mesh)
@@ -248,7 +262,12 @@ class PyrenderScene:
         )
         self._add_mesh(joined(sheets), material, TILE_EDGES_M)
 
-    def _add_mesh(self, mesh: Mesh, material: Any, tile_m: float) -> list[Any]:
+    def _add_mesh(
+        self,
+        mesh: Mesh,
+        material: Any,
+        tile_m: float,
+    ) -> list[Any]:
         import pyrender
 
         if not len(mesh.faces):
@@ -277,31 +296,37 @@ class PyrenderScene:
         import pyrender
 
         colour = np.array(light.colour, float)
-        intensity = _nominal(light) / self._white_cd_m2
+        intensity = _strength(light) / self._white_cd_m2
         match light:
             case Sun():
-                made = pyrender.DirectionalLight(color=colour, intensity=intensity)
+                node_light = pyrender.DirectionalLight(color=colour, intensity=intensity)
                 pose = _shining_along(-light.direction(0), np.zeros(3))
             case SpotLight():
                 inner_rad, outer_rad = np.deg2rad([light.inner_deg, light.outer_deg])
-                made = _spot(colour, intensity, inner_rad=inner_rad, outer_rad=outer_rad)
+                node_light = _spot(colour, intensity, inner_rad=inner_rad, outer_rad=outer_rad)
                 pose = _shining_along(light.direction, light.position_m)
             case AreaLight() if _is_ahead(light):
-                made = _spot(colour, intensity, inner_rad=PANEL_INNER_RAD, outer_rad=PANEL_OUTER_RAD)
+                node_light = _spot(colour, intensity, inner_rad=PANEL_INNER_RAD, outer_rad=PANEL_OUTER_RAD)
                 ahead = _mean_normal(light)
                 pose = _shining_along(ahead, _middle_m(light) + SPOT_AHEAD_M * ahead)
             case AreaLight():
-                made = pyrender.PointLight(color=colour, intensity=intensity)
+                node_light = pyrender.PointLight(color=colour, intensity=intensity)
                 pose = se3.transform(np.eye(3), _middle_m(light))
             case PointLight():
-                made = pyrender.PointLight(color=colour, intensity=intensity)
+                node_light = pyrender.PointLight(color=colour, intensity=intensity)
                 pose = se3.transform(np.eye(3), light.position_m)
             case Sky():
-                raise ValueError("the sky is no light of pyrender's")
-        return self.pyrender_scene.add(made, pose=pose)
+                raise ValueError("pyrender has no light for the sky")
+        return self.pyrender_scene.add(node_light, pose=pose)
 
 
-def _spot(colour: Array, intensity: float, *, inner_rad: float, outer_rad: float) -> Any:
+def _spot(
+    colour: Array,
+    intensity: float,
+    *,
+    inner_rad: float,
+    outer_rad: float,
+) -> Any:
     import pyrender
 
     widest_rad = min(outer_rad, np.pi / 2)
@@ -335,13 +360,14 @@ def _chosen(lights: Sequence[Light]) -> list[int]:
     for index, light in enumerate(lights):
         if isinstance(light, Sun | Sky):
             continue
-        is_spot = isinstance(light, SpotLight) or (isinstance(light, AreaLight) and _is_ahead(light))
-        (spots if is_spot else points).append((-light.power_lm, index))
+        is_panel = isinstance(light, AreaLight) and _is_ahead(light)
+        kind = spots if isinstance(light, SpotLight) or is_panel else points
+        kind.append((-light.power_lm, index))
     strongest = [*sorted(spots)[:MOST_SPOTS], *sorted(points)[:MOST_POINTS]]
     return sorted(suns + [index for _, index in strongest])
 
 
-def _nominal(light: Light) -> float:
+def _strength(light: Light) -> float:
     """Strength at level 1 in the unit of pyrender's light: candela, lux of the sun."""
     match light:
         case Sun():
@@ -353,7 +379,7 @@ def _nominal(light: Light) -> float:
         case AreaLight() | PointLight():
             return light.power_lm / (4 * np.pi)
         case Sky():
-            raise ValueError("the sky is no light of pyrender's")
+            raise ValueError("pyrender has no light for the sky")
 
 
 def _is_ahead(light: AreaLight) -> bool:
@@ -382,6 +408,8 @@ def _middle_m(light: AreaLight) -> Array:
 def _shining_along(direction: Array, position_m: Array) -> NDArray[np.float64]:
     """T_world_light (4, 4) of a light that shines along a unit vector (3,): pyrender's shine along their -z."""
     z = -unit(direction)
-    sideways = np.array([1.0, 0, 0]) if abs(z[0]) < 0.9 else np.array([0, 1.0, 0])
+    is_along_x = abs(z[0]) >= 0.9
+    sideways = np.array([0, 1.0, 0]) if is_along_x else np.array([1.0, 0, 0])
     x = unit(cross(sideways, z))
-    return se3.transform(np.stack([x, cross(z, x), z], -1), position_m)
+    R_world_light = np.stack([x, cross(z, x), z], -1)
+    return se3.transform(R_world_light, position_m)

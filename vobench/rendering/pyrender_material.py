@@ -30,7 +30,7 @@ def require_pyrender() -> None:
     except Exception as error:  # whatever an old release trips over first
         reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
         raise MissingDependencyError(
-            f"the engine pyrender cannot be used, stock pyrender seems to be installed beside pyrender2 ({reason}); "
+            f"the engine pyrender cannot be used; stock pyrender seems to be installed beside pyrender2 ({reason}); "
             f"run: {REMEDY}"
         ) from error
 
@@ -47,10 +47,14 @@ def pyrender_material(material: Material, white_cd_m2: float) -> Any:
 
     if material.kind == "pane":
         # What it mirrors straight ahead and what it swallows hides what is behind; it is seen from both sides.
-        hides = 1 - material.tint * (1 - float(pane_reflectance(np.array(1.0), material.eta)))
-        factor = [1.0, 1.0, 1.0, hides]
+        reflected = float(pane_reflectance(np.array(1.0), material.eta))
+        opacity = 1 - material.tint * (1 - reflected)
         return pyrender.MetallicRoughnessMaterial(
-            baseColorFactor=factor, metallicFactor=0.0, roughnessFactor=0.0, alphaMode="BLEND", doubleSided=True
+            baseColorFactor=[1.0, 1.0, 1.0, opacity],
+            metallicFactor=0.0,
+            roughnessFactor=0.0,
+            alphaMode="BLEND",
+            doubleSided=True,
         )
     # pyrender's roughness is the root of GGX's alpha; a body without a coat has no highlight to speak of.
     has_highlight = material.kind == "mirror" or material.is_coated or material.metal > 0
@@ -60,11 +64,17 @@ def pyrender_material(material: Material, white_cd_m2: float) -> Any:
         return pyrender.MetallicRoughnessMaterial(
             baseColorFactor=[tint, tint, tint, 1.0], metallicFactor=1.0, roughnessFactor=roughness
         )
-    texture, scale = _texture(material.texture, material.cutout) if material.texture else (None, 1.0)
+    texture = None
+    scale = 1.0
+    if material.texture:
+        texture, scale = _texture(material.texture, material.cutout)
+    emission = None
+    if material.emission_texture:
+        emission, _ = _texture(material.emission_texture, None)
     is_cut = material.cutout is not None and material.texture is not None
-    emission, _ = _texture(material.emission_texture, None) if material.emission_texture else (None, 1.0)
+    colour = (scale * np.array(material.colour)).tolist()
     return pyrender.MetallicRoughnessMaterial(
-        baseColorFactor=[*(scale * np.array(material.colour)).tolist(), CUTOUT_ALPHA if is_cut else 1.0],
+        baseColorFactor=[*colour, CUTOUT_ALPHA if is_cut else 1.0],
         baseColorTexture=texture,
         metallicFactor=float(material.metal),
         roughnessFactor=roughness,
@@ -75,7 +85,10 @@ def pyrender_material(material: Material, white_cd_m2: float) -> Any:
     )
 
 
-def lamp_material(light: AreaLight, look: Material | None) -> tuple[Any, Array, float]:
+def lamp_material(
+    light: AreaLight,
+    look: Material | None,
+) -> tuple[Any, Array, float]:
     """A lamp's faces: black, and glowing; with what they emit (3,) in cd/m² at level 1, and a repeat of their texture.
 
     look: the material that a lamp names, whose emission texture it shows.
@@ -89,10 +102,13 @@ def lamp_material(light: AreaLight, look: Material | None) -> tuple[Any, Array, 
         texture, _ = _texture(look.emission_texture, None)
         tile_m = look.emission_texture.tile_m
         emitted = np.array(look.emission_cd_m2, float)
-    made = pyrender.MetallicRoughnessMaterial(
-        baseColorFactor=[0.0, 0.0, 0.0, 1.0], metallicFactor=0.0, roughnessFactor=1.0, emissiveTexture=texture
+    glowing = pyrender.MetallicRoughnessMaterial(
+        baseColorFactor=[0.0, 0.0, 0.0, 1.0],
+        metallicFactor=0.0,
+        roughnessFactor=1.0,
+        emissiveTexture=texture,
     )
-    return made, emitted, tile_m
+    return glowing, emitted, tile_m
 
 
 def _texture(texture: Texture, cutout: float | None) -> tuple[Any, float]:
@@ -107,9 +123,12 @@ def _texture(texture: Texture, cutout: float | None) -> tuple[Any, float]:
         colours = np.stack([grey, grey, grey], -1)
     else:
         colours = pixels[..., :3]
-    alpha = np.full((*colours.shape[:2], 1), 255, np.uint8)
-    if cutout is not None and pixels.ndim == 3 and pixels.shape[2] == 4:
-        alpha = np.where(pixels[..., 3:] < 255 * cutout, 0, 255).astype(np.uint8)
+    height, width = colours.shape[:2]
+    alpha = np.full((height, width, 1), 255, np.uint8)
+    has_opacity = pixels.ndim == 3 and pixels.shape[2] == 4
+    if cutout is not None and has_opacity:
+        is_hole = pixels[..., 3:] < 255 * cutout
+        alpha = np.where(is_hole, 0, 255).astype(np.uint8)
     # Four bytes a texel: rows of three would need padding, which pyrender leaves out.
     source: NDArray[np.uint8] = np.concatenate([colours, alpha], -1)
     return pyrender.Texture(source=source, source_channels="RGBA"), scale

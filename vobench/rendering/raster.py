@@ -30,7 +30,13 @@ class RasterRenderer:
 
         self._frames = FrameRenderer(baked)
 
-    def radiance(self, camera: Camera, views: Sequence[View], *, weights: Rgb | None = LUMINANCE) -> Radiance:
+    def radiance(
+        self,
+        camera: Camera,
+        views: Sequence[View],
+        *,
+        weights: Rgb | None = LUMINANCE,
+    ) -> Radiance:
         """Luminance (H, W) in cd/m² of weighted channels, or (H, W, 3) without weights; see `Renderer`."""
         self._context.make_current()
         return self._frames.picture(camera, views, weights)

@@ -1,4 +1,4 @@
-"""What every renderer promises, whatever draws the picture."""
+"""The protocol of renderers, and the views that they draw."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ class View:
     """Rows of a picture that are exposed together, and how: the mean of M equally long sub-frames.
 
     Sub-frame m lasts from start_ns[m] to end_ns[m] (M,) int64; lights count with their mean over it,
-    the camera and movers are where they are amid it: T_world_camera (M, 4, 4).
+    the camera and movers are where they are at its middle: T_world_camera (M, 4, 4).
     """
 
     rows: slice
@@ -28,7 +28,12 @@ class View:
     end_ns: NDArray[np.int64]
 
 
-def still(camera: Camera, T_world_camera: Array, *, t_ns: int = 0) -> tuple[View]:
+def still(
+    camera: Camera,
+    T_world_camera: Array,
+    *,
+    t_ns: int = 0,
+) -> tuple[View]:
     """The whole picture at one instant."""
     instant = np.array([t_ns], np.int64)
     return (View(slice(0, camera.height_px), T_world_camera[None], instant, instant),)
@@ -37,7 +42,13 @@ def still(camera: Camera, T_world_camera: Array, *, t_ns: int = 0) -> tuple[View
 class Renderer(Protocol):
     """Pictures of one scene."""
 
-    def radiance(self, camera: Camera, views: Sequence[View], *, weights: Rgb | None = LUMINANCE) -> Radiance:
+    def radiance(
+        self,
+        camera: Camera,
+        views: Sequence[View],
+        *,
+        weights: Rgb | None = LUMINANCE,
+    ) -> Radiance:
         """Linear, unclipped and averaged over each pixel's area; views tile the rows.
 
         (H, W): the sum of red, green and blue times the weights, with those of luminance in cd/m². (H, W, 3) without
@@ -45,4 +56,4 @@ class Renderer(Protocol):
         """
 
     def close(self) -> None:
-        """Give back what the renderer holds."""
+        """Free the renderer's resources."""

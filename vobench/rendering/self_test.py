@@ -1,4 +1,4 @@
-"""Draws a small picture as a run does, and compares it with what geometry and photometry say it should be."""
+"""Draws a small picture as a run does, and compares it with the one expected by geometry and photometry."""
 
 import json
 import sys
@@ -35,7 +35,7 @@ DOWN = se3.transform(np.array([[1.0, 0, 0], [0, -1, 0], [0, 0, -1]]), CAMERA_M)
 class DrawingCheck:
     """How far a picture is from the expected one: the largest relative error on the floor, the most light beside it.
 
-    `well` says whether both are within the tolerance.
+    `well`: whether both are within the tolerance.
     """
 
     well: bool
@@ -62,10 +62,17 @@ def check_drawing() -> DrawingCheck:
 
 def _drawn() -> Radiance:
     """The picture (H, W, 3) in cd/m², by the raster engine."""
-    floor = quad((-FLOOR_M / 2, -FLOOR_M / 2, 0), (FLOOR_M, 0, 0), (0, FLOOR_M, 0))
+    half_m = FLOOR_M / 2
+    floor = quad((-half_m, -half_m, 0), (FLOOR_M, 0, 0), (0, FLOOR_M, 0))
     lamp = PointLight("lamp", np.array(LAMP_M), 4 * np.pi * LAMP_CD)
     scene = Scene("self-test", (Thing("floor", floor, "paint"),), {"paint": Material(colour=REFLECTANCE)}, (lamp,))
-    settings = BakeSettings(spacing_m=0.02, light_rays=1, indirect_spacing_m=1.0, indirect_rays=1, bounces=0)
+    settings = BakeSettings(
+        spacing_m=0.02,
+        light_rays=1,
+        indirect_spacing_m=1.0,
+        indirect_rays=1,
+        bounces=0,
+    )
     renderer = RasterRenderer(bake(scene, settings))
     try:
         return renderer.radiance(CAMERA, still(CAMERA, DOWN), weights=None)
@@ -76,7 +83,8 @@ def _drawn() -> Radiance:
 def _expected() -> tuple[Array, Array, Array]:
     """Radiance (H, W, 3) in cd/m², and which pixels (H, W) are wholly on the floor, and wholly beside it."""
     rays = CAMERA.rays(pixel_grid(CAMERA)) @ DOWN[:3, :3].T
-    points_m = np.array(CAMERA_M) + rays * (CAMERA_M[2] / -rays[..., 2:])
+    lengths = CAMERA_M[2] / -rays[..., 2:]
+    points_m = np.array(CAMERA_M) + rays * lengths
     towards_lamp = np.array(LAMP_M) - points_m
     distance_m = np.linalg.norm(towards_lamp, axis=-1)
     illuminance_lx = LAMP_CD * towards_lamp[..., 2] / distance_m**3
@@ -90,12 +98,13 @@ def _expected() -> tuple[Array, Array, Array]:
 def main() -> None:
     """Print the check as one JSON object, or what this machine lacks: {"error": sentence}."""
     try:
-        found = asdict(check_drawing())
+        result = asdict(check_drawing())
     except VobenchError as error:
-        found = {"error": str(error)}
+        result = {"error": str(error)}
     except Exception as error:  # a driver may fail with anything
-        found = {"error": f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"}
-    json.dump(found, sys.stdout)
+        reason = " ".join(str(error).split())
+        result = {"error": f"{type(error).__name__}: {reason[:300]}"}
+    json.dump(result, sys.stdout)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Exact ground truth of a picture by rays through its pixels' centres."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,333 +12,312 @@ from numpy.typing import NDArray
 
 from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
-from vobench.rendering.occlusion import (
-    RAY_OFFSET_M,
-    Bodies,
-    Floats,
-    Indices,
-    Mask,
-    Pixels,
-    Shot,
-    ShotTransforms,
-    at_rows,
-    dot,
-    into,
-    moved,
-    of,
-    shot_transforms,
-    turn,
-)
-from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun
-from vobench.scene.mesh import unit
+from vobench.rendering.array_types import Indices, Mask, Pixels
+from vobench.rendering.lamp import Lamp, lamps
+from vobench.rendering.occlusion import Bodies, dot
+from vobench.rendering.shot import Shot, ShotTransforms, at_rows, moved, of_rays, rays_in, shot_transforms, turn
+from vobench.scene.material import Material
 from vobench.scene.scene import Scene
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, check_channels
 
-SUN_WAY_M = 1e4  # beyond every scene
+__all__ = ["Shot", "TruthCaster"]
+
+# With a rolling shutter the row that sees a point next is found by iteration, to this or in so many rounds.
+CONVERGED_PX = 1e-5
+MOST_ROUNDS = 20
+# A point is seen where the ray ends no more than this share of its length before it.
+DEPTH_TOLERANCE = 1e-4
+LAMP_TOLERANCE = 1e-3  # share of the distance to a lamp's middle in which nothing hides it
+NO_RAY = np.float32(-1)  # reach of a ray that is not traced
 
 
 @dataclass(frozen=True, slots=True)
-class Lamp:
-    """A light that is on, seen from its middle: what it reaches and does not.
+class FaceIds:
+    """Of each face, the last one none (F + 1,): ids, whether it mirrors, whether it scatters the light of lamps."""
 
-    center_m (3,), None for the sun; axis (3,): along which it shines, or to the sun; beyond cosine `least` of the
-    angle to the axis it does not shine. own_m: as near to the middle its own faces are not in the light's way.
+    instance: NDArray[np.uint16]
+    material: NDArray[np.uint16]
+    mirrors: Mask
+    diffuse: Mask
+
+
+@dataclass(frozen=True, slots=True)
+class TruthPicture:
+    """A picture to find the ground truth of: its scene, its camera now and for the next picture, None for no next one.
+
+    lamps: each with the faces (F + 1,) turned to it.
     """
 
-    center_m: Array | None
-    axis: Array
-    least: float = -2.0
-    own_m: float = 0.0
-
-    def way(self, starts_m: Floats) -> Floats:
-        """From points (R, 3) to the middle, or as far as matters towards the sun."""
-        if self.center_m is None:
-            return np.broadcast_to((SUN_WAY_M * self.axis).astype(np.float32), starts_m.shape)
-        way = self.center_m.astype(np.float32) - starts_m
-        return way if self.own_m == 0 else way * np.maximum(1 - self.own_m / np.linalg.norm(way, axis=1), 0)[:, None]
-
-    def faced(self, normals: Array, away_m: Array) -> Mask:
-        """Which planes (F, 3), away_m (F,) from the origin, have it before them."""
-        if self.center_m is None:
-            return normals @ self.axis > 0
-        return normals @ self.center_m > away_m + RAY_OFFSET_M
-
-    def shines(self, way: Floats) -> Mask | bool:
-        """Whether it shines to where ways (R, 3) lead to its middle."""
-        if self.least < -1:
-            return True
-        return _along(way, -self.axis) > (self.least * np.sqrt(dot(way, way)) if self.least else 0)
-
-
-def _along(vectors: Floats, axis: Array) -> Floats:
-    return np.asarray(np.einsum("ri,i->r", vectors, axis.astype(np.float32)))
-
-
-def lamps(scene: Scene, bodies: Bodies, t_ns: int) -> Iterator[tuple[Lamp, Mask]]:
-    """The lights that are on at an instant, but for the sky, which has no middle; and the faces turned to each."""
-    for index, light in enumerate(scene.lights):
-        if not isinstance(light, Sky) and light.level.mean(t_ns, t_ns) > 0:
-            lamp = _lamp(light, bodies.faces.corners_m[bodies.faces.lamp == index], t_ns)
-            yield lamp, lamp.faced(bodies.normals, bodies.offsets_m)
-
-
-def _lamp(light: AreaLight | PointLight | SpotLight | Sun, corners_m: Array, t_ns: int) -> Lamp:
-    match light:
-        case Sun():
-            return Lamp(None, light.direction(t_ns))
-        case PointLight():
-            return Lamp(light.position_m, np.zeros(3))
-        case SpotLight():
-            return Lamp(light.position_m, light.direction, float(np.cos(np.deg2rad(light.outer_deg))))
-        case AreaLight():
-            return lamp_of(corners_m)
-
-
-def lamp_of(corners_m: Array) -> Lamp:
-    """The lamp whose faces (F, 3, 3) shine; where they are flat, only before them."""
-    doubled = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
-    area = np.linalg.norm(doubled, axis=1)
-    center_m = np.average(corners_m.mean(1), axis=0, weights=area)
-    axis = unit(doubled.sum(0))
-    way_m = corners_m.reshape(-1, 3) - center_m
-    if np.abs(way_m @ axis).max() < RAY_OFFSET_M:
-        return Lamp(center_m, axis, 0.0)
-    return Lamp(center_m, axis, own_m=float(np.linalg.norm(way_m, axis=1).max()))
-
-
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """A picture to tell the truth of, the next one, and its lamps, each with the faces (F + 1,) turned to it."""
-
     bodies: Bodies
+    ids: FaceIds
     camera: Camera
     here: ShotTransforms
     there: ShotTransforms | None
     lamps: tuple[tuple[Lamp, Mask], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class FaceIds:
-    """Of each face, the last one none (F + 1,): ids, whether it mirrors, whether it shows what light falls on it."""
-
-    instance: NDArray[np.uint16]
-    material: NDArray[np.uint16]
-    mirrors: Mask
-    matt: Mask
-
-
 @lru_cache(maxsize=4)
 def pixel_rays(camera: Camera) -> tuple[Array, Array]:
-    """A camera's pixels (H, W, 2) and their unit rays (H, W, 3); kept, as cameras are few and pictures many."""
+    """A camera's pixels (H, W, 2) and their unit rays (H, W, 3); cached, as cameras are few and pictures many."""
     uv_px = pixel_grid(camera)
     return uv_px, camera.rays(uv_px)
 
 
-Values = dict[str, NDArray[np.generic]]
-
-# With a rolling shutter the row that sees a point next is found by iteration, to this or in so many rounds.
-CONVERGED_PX = 1e-5
-MOST_ROUNDS = 20
-# A point is seen where the ray ends no more than this share of the way before it.
-DEPTH_TOLERANCE = 1e-4
-LAMP_TOLERANCE = 1e-3  # as near to a lamp's middle nothing is in its way
+Values = NDArray[np.generic]
 
 
 class Band:
     """Rows of a picture: R pixels."""
 
-    def __init__(self, picture: Picture, ids: FaceIds, rows: slice) -> None:
+    def __init__(self, picture: TruthPicture, rows: slice) -> None:
         self._picture = picture
         self._bodies = picture.bodies
-        self._ids_of = ids
-        self._uv_px, rays = (part[rows].reshape(-1, part.shape[2]) for part in pixel_rays(picture.camera))
-        self._rays = rays
+        uv_px, rays = pixel_rays(picture.camera)
+        self._uv_px = uv_px[rows].reshape(-1, 2)
+        self._rays = rays[rows].reshape(-1, 3)
         self._T_bodies_camera = at_rows(picture.here.T_bodies_camera, self._uv_px[:, 1])
-        seen = self._bodies.visible(rays, self._T_bodies_camera)
-        self._face = seen.face
-        self._distance_m = seen.distance_m
-        self._points_m = self._distance_m[:, None] * rays
-        self._world_m = moved(self._T_bodies_camera[0], self._points_m)
+        hits = self._bodies.visible(self._rays, self._T_bodies_camera)
+        self._face = hits.face
+        self._distance_m = hits.distance
+        self._points_m = self._distance_m[:, None] * self._rays  # (R, 3), camera
+        self._world_m = moved(self._T_bodies_camera[0], self._points_m)  # (R, 3), world
         self._movers = self._seen_movers(self._face)
 
-    def values(self, names: Sequence[str]) -> Values:
-        """The channels asked for, (R,) or (R, n)."""
-        found: Values = {}
+    def values(self, names: Sequence[str]) -> dict[str, Values]:
+        """The channels of these names, (R,) or (R, n)."""
+        flow: dict[str, Values] = {}
         if "flow" in names or "occlusion" in names:
-            found["flow"], found["occlusion"] = self._flow(hides="occlusion" in names)
-        here = self._picture.here
-        rows = self._uv_px[:, 1]
-        makers: dict[str, Callable[[], NDArray[np.generic]]] = {
-            "depth": lambda: self._points_m[:, 2] if self._picture.camera.depth_along == "axis" else self._distance_m,
-            "normals": lambda: self._normals(at_rows(here.T_camera_bodies, rows)),
-            "instance": lambda: self._ids_of.instance[self._face],
-            "material": lambda: self._ids_of.material[self._face],
+            flow["flow"], flow["occlusion"] = self._flow(hides="occlusion" in names)
+        channels: dict[str, Callable[[], Values]] = {
+            "depth": self._depth_m,
+            "normals": self._camera_normals,
+            "instance": lambda: self._picture.ids.instance[self._face],
+            "material": lambda: self._picture.ids.material[self._face],
             "mirror": self._mirror,
             "shadow": self._shadow,
             "moving": lambda: self._bodies.body[self._face] > 0,
         }
-        return {name: found[name] if name in found else makers[name]() for name in names}
+        return {name: flow[name] if name in flow else channels[name]() for name in names}
+
+    def _depth_m(self) -> Array:
+        along_axis = self._picture.camera.depth_along == "axis"
+        return self._points_m[:, 2] if along_axis else self._distance_m
+
+    def _camera_normals(self) -> Array:
+        T_camera_bodies = at_rows(self._picture.here.T_camera_bodies, self._uv_px[:, 1])
+        return self._normals(T_camera_bodies)
+
+    def _mirror(self) -> Mask:
+        """Which pixels (R,) show a mirror, or something through glass."""
+        mirrors = self._picture.ids.mirrors[self._face]
+        behind_panes = self._bodies.behind_panes(self._rays, self._T_bodies_camera, self._distance_m)
+        return np.asarray(mirrors | behind_panes)
 
     def _seen_movers(self, face: Indices) -> list[tuple[int, Pixels]]:
         """The movers among faces (P,), and which of these are of each."""
         if len(self._T_bodies_camera) == 1:
             return []
         body = self._bodies.body[face]
-        return [(int(b), np.flatnonzero(body == b)) for b in np.unique(body) if b]
+        movers = [int(index) for index in np.unique(body) if index]
+        return [(mover, np.flatnonzero(body == mover)) for mover in movers]
 
     def _normals(self, T_frame_bodies: Sequence[Array]) -> Array:
         """Normals (R, 3) in a frame that the transforms, (4, 4) or (R, 4, 4) each, lead to."""
         normals = self._bodies.normals[self._face]
         turned = turn(T_frame_bodies[0], normals)
-        for body, these in self._movers:
-            turned[these] = turn(of(T_frame_bodies[body], these), normals[these])
+        for mover, pixels in self._movers:
+            turned[pixels] = turn(of_rays(T_frame_bodies[mover], pixels), normals[pixels])
         return turned
 
-    def _mirror(self) -> Mask:
-        return self._ids_of.mirrors[self._face] | self._bodies.behind_panes(
-            self._rays, self._T_bodies_camera, self._distance_m
-        )
-
     def _shadow(self) -> NDArray[np.uint16]:
+        """How many lamps (R,) that what is seen is turned to shine on it, hidden by nothing."""
         count = np.zeros(len(self._face), np.uint16)
         here = self._picture.here
         rows = self._uv_px[:, 1]
-        matt = self._ids_of.matt[self._face]
+        is_diffuse = self._picture.ids.diffuse[self._face]
         T_bodies_world = at_rows(here.T_bodies_world, rows)
         normals = self._normals(at_rows(here.T_world_bodies, rows))
-        starts_m = (self._world_m + self._bodies.ray_offset_m * normals).astype(np.float32)
-        away_m = dot(self._world_m, normals) if self._movers else np.empty(0)
+        lift_m = self._bodies.ray_offset_m * normals
+        starts_m = (self._world_m + lift_m).astype(np.float32)
+        offsets_m = dot(self._world_m, normals) if self._movers else np.empty(0)
         for lamp, faces in self._picture.lamps:
-            faced = faces[self._face]
-            way = lamp.way(starts_m)
-            for _, these in self._movers:
-                faced[these] = lamp.faced(normals[these], away_m[these])
-            lit = matt & faced & lamp.shines(way)
-            reach = np.where(lit, np.float32(1 - LAMP_TOLERANCE), np.float32(-1))
-            count += self._bodies.blocked(starts_m, way, T_bodies_world, reach)
+            is_turned = faces[self._face]
+            for _, pixels in self._movers:
+                is_turned[pixels] = lamp.is_before(normals[pixels], offsets_m[pixels])
+            vectors_m = lamp.vectors_m(starts_m)
+            is_lit = is_diffuse & is_turned & lamp.shines(vectors_m)
+            reach = np.where(is_lit, np.float32(1 - LAMP_TOLERANCE), NO_RAY)
+            count += self._bodies.blocked(starts_m, vectors_m, T_bodies_world, reach)
         return count
 
     def _flow(self, *, hides: bool) -> tuple[Array, Mask]:
         """Pixels (R, 2) to the place in the next picture, and whether the point is hidden or outside there (R,)."""
         there = self._picture.there
-        seen = self._face >= 0
+        is_seen = self._face >= 0
         if there is None:
-            return np.full((len(self._rays), 2), np.nan), seen
+            return np.full((len(self._rays), 2), np.nan), is_seen
+        camera = self._picture.camera
         rows = self._uv_px[:, 1]
-        own_m = self._own_m()
+        body_m = self._in_bodies_m()
         for _ in range(MOST_ROUNDS):
-            next_m = self._carried(own_m, there, rows)
-            uv_px = self._picture.camera.project(next_m)
-            change_px = np.nanmax(np.abs(uv_px[:, 1] - rows), initial=0.0) if there.by_row else 0.0
+            next_m = self._in_next_camera_m(body_m, there, rows)
+            uv_px = camera.project(next_m)
+            changes_px = np.abs(uv_px[:, 1] - rows)
+            change_px = np.nanmax(changes_px, initial=0.0) if there.by_row else 0.0
             if change_px < CONVERGED_PX:
                 break
             rows = uv_px[:, 1]
-        return uv_px - self._uv_px, seen & self._gone(there, next_m, uv_px) if hides else seen
+        flow_px = uv_px - self._uv_px
+        if not hides:
+            return flow_px, is_seen
+        return flow_px, is_seen & self._gone(there, next_m, uv_px)
 
-    def _own_m(self) -> Array:
+    def _in_bodies_m(self) -> Array:
         """The seen points (R, 3), each in the frame of the body that it is on."""
-        own_m = self._world_m.copy() if self._movers else self._world_m
-        for body, these in self._movers:
-            own_m[these] = moved(of(self._T_bodies_camera[body], these), self._points_m[these])
-        return own_m
+        if not self._movers:
+            return self._world_m
+        body_m = self._world_m.copy()
+        for mover, pixels in self._movers:
+            body_m[pixels] = moved(of_rays(self._T_bodies_camera[mover], pixels), self._points_m[pixels])
+        return body_m
 
-    def _carried(self, own_m: Array, there: ShotTransforms, rows: Array) -> Array:
+    def _in_next_camera_m(self, body_m: Array, there: ShotTransforms, rows: Array) -> Array:
         """The points (R, 3) in the next camera's frame, where it is on the rows (R,) that see them."""
-        carried = moved(at_rows(there.T_camera_bodies[:1], rows)[0], own_m)
-        for body, these in self._movers:
-            (T_there_body,) = at_rows(there.T_camera_bodies[body : body + 1], rows[these])
-            carried[these] = moved(T_there_body, own_m[these])
-        return carried
+        (T_there_world,) = at_rows(there.T_camera_bodies[:1], rows)
+        next_m = moved(T_there_world, body_m)
+        for mover, pixels in self._movers:
+            (T_there_body,) = at_rows(there.T_camera_bodies[mover : mover + 1], rows[pixels])
+            next_m[pixels] = moved(T_there_body, body_m[pixels])
+        return next_m
 
     def _gone(self, there: ShotTransforms, next_m: Array, uv_px: Array) -> Mask:
         """Whether points (R, 3) in the next camera's frame are outside its picture (R, 2), or hidden from it."""
         camera = self._picture.camera
-        (u, v) = uv_px.T
-        gone: Mask = ~((u >= -0.5) & (u < camera.width_px - 0.5) & (v >= -0.5) & (v < camera.height_px - 0.5))
-        inside = np.flatnonzero(~gone)
-        gone[inside] = self._hidden(there, inside, next_m[inside], v[inside])
-        return gone
+        u, v = uv_px.T
+        in_columns = (u >= -0.5) & (u < camera.width_px - 0.5)
+        in_rows = (v >= -0.5) & (v < camera.height_px - 0.5)
+        is_gone: Mask = ~(in_columns & in_rows)
+        inside = np.flatnonzero(~is_gone)
+        is_gone[inside] = self._hidden(there, inside, next_m[inside], v[inside])
+        return is_gone
 
-    def _hidden(self, there: ShotTransforms, pixels: Pixels, next_m: Array, rows: Array) -> Mask:
+    def _hidden(
+        self,
+        there: ShotTransforms,
+        pixels: Pixels,
+        next_m: Array,
+        rows: Array,
+    ) -> Mask:
         """Whether the next camera, with the points (P, 3) of pixels before it, sees backs or something nearer."""
         T_bodies_there = at_rows(there.T_bodies_camera, rows)
         face = self._face[pixels]
-        origins, way = into(T_bodies_there[0], next_m)
-        eye_m = origins.copy()
-        for body, these in self._seen_movers(face):
-            eye_m[these] = of(T_bodies_there[body], these)[..., :3, 3]
-        hidden: Mask = dot(self._bodies.normals[face], eye_m) <= self._bodies.offsets_m[face]
+        origins_m, vectors_m = rays_in(T_bodies_there[0], next_m)
+        eye_m = origins_m.copy()  # (P, 3), each in the frame of the body that is seen
+        for mover, of_mover in self._seen_movers(face):
+            eye_m[of_mover] = of_rays(T_bodies_there[mover], of_mover)[..., :3, 3]
+        eye_offset_m = dot(self._bodies.normals[face], eye_m)
+        is_hidden: Mask = eye_offset_m <= self._bodies.offsets_m[face]
+
         T_bodies_world = at_rows(there.T_bodies_world, rows)
-        reach = np.where(hidden, np.float32(-1), np.float32(1 - DEPTH_TOLERANCE))
-        met = self._bodies.blocked(origins.astype(np.float32), way.astype(np.float32), T_bodies_world, reach)
-        doubtful = np.flatnonzero(met)  # backs and places within float32's reach are no hindrance
-        reach_m = np.linalg.norm(next_m[doubtful], axis=1)
-        seen = self._bodies.visible(next_m[doubtful] / reach_m[:, None], [of(T, doubtful) for T in T_bodies_there])
-        hidden[doubtful] = seen.distance_m < reach_m * (1 - DEPTH_TOLERANCE)
-        return hidden
+        reach = np.where(is_hidden, NO_RAY, np.float32(1 - DEPTH_TOLERANCE))
+        is_blocked = self._bodies.blocked(
+            origins_m.astype(np.float32), vectors_m.astype(np.float32), T_bodies_world, reach
+        )
+        doubtful = np.flatnonzero(is_blocked)  # backs and places within float32's reach hide nothing
+        distance_m = np.linalg.norm(next_m[doubtful], axis=1)
+        T_bodies_doubtful = [of_rays(T, doubtful) for T in T_bodies_there]
+        seen = self._bodies.visible(next_m[doubtful] / distance_m[:, None], T_bodies_doubtful)
+        is_hidden[doubtful] = seen.distance < distance_m * (1 - DEPTH_TOLERANCE)
+        return is_hidden
 
-
-__all__ = ["Shot", "TruthCaster"]
 
 BAND_ROWS = 60  # worked on at a time: their arrays stay in the processor's cache
 THREADS = max(1, min(2, os.cpu_count() or 1))
 
 
 class TruthCaster:
-    """Ground truth of one scene; `names` says what its ids mean."""
+    """Ground truth of one scene; `names` lists what its ids mean."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._bodies = Bodies(scene)
         faces = self._bodies.faces
-        movers = dict(zip(faces.thing.tolist(), faces.mover.tolist(), strict=True))
-        instances = [
-            thing.name if movers.get(nth, -1) < 0 else scene.movers[movers[nth]].name
-            for nth, thing in enumerate(faces.things)
-        ]
-        materials = [thing.material for thing in faces.things]
-        self.names = TruthNames(_table(instances), _table(materials))
-        kinds = [scene.materials.get(name) for name in materials]
-        mirrors = [m is not None and (m.kind == "mirror" or m.is_coated or m.metal > 0) for m in kinds]
-        matt = [m is not None and m.kind == "body" and m.metal < 1 for m in kinds]
-        thing = np.append(faces.thing, len(faces.things))  # the last one is nothing, for the face -1
-        self._ids_of = FaceIds(
-            _ids(instances, self.names.instance)[thing],
-            _ids(materials, self.names.material)[thing],
-            np.array([*mirrors, False])[thing],
-            np.array([*matt, False])[thing] & (np.append(faces.lamp, -1) < 0),
+        mover_of = dict(zip(faces.thing.tolist(), faces.mover.tolist(), strict=True))
+        instances = []
+        for index, thing in enumerate(faces.things):
+            mover = mover_of.get(index, -1)
+            instances.append(thing.name if mover < 0 else scene.movers[mover].name)
+        material_names = [thing.material for thing in faces.things]
+        self.names = TruthNames(_table(instances), _table(material_names))
+
+        materials = [scene.materials.get(name) for name in material_names]
+        mirrors = [material is not None and _mirrors(material) for material in materials]
+        diffuse = [material is not None and _is_diffuse(material) for material in materials]
+        thing_of = np.append(faces.thing, len(faces.things))  # the last one is nothing, for the face -1
+        is_no_lamp = np.append(faces.lamp, -1) < 0
+        self._ids = FaceIds(
+            instance=_ids(instances, self.names.instance)[thing_of],
+            material=_ids(material_names, self.names.material)[thing_of],
+            mirrors=np.array([*mirrors, False])[thing_of],
+            diffuse=np.array([*diffuse, False])[thing_of] & is_no_lamp,
         )
         self._pool = ThreadPoolExecutor(THREADS)
 
     def frame(
-        self, camera: Camera, now: Shot, channels: Iterable[str] = tuple(CHANNELS), *, later: Shot | None = None
+        self,
+        camera: Camera,
+        now: Shot,
+        channels: Iterable[str] = tuple(CHANNELS),
+        *,
+        later: Shot | None = None,
     ) -> TruthFrame:
-        """The channels asked for; `later` is the next picture, without which flow is NaN and all is occluded.
+        """The channels of these names; `later` is the next picture, without which flow is NaN and all is occluded.
 
         Raises UnknownNameError for a channel that does not exist.
         """
         height = camera.height_px
-        width = camera.width_px
         wanted = {name: CHANNELS[name] for name in check_channels(channels)}
-        values: dict[str, Any] = {name: np.empty(c.shape(height, width), c.dtype) for name, c in wanted.items()}
-        lit = lamps(self._scene, self._bodies, int(np.mean(now.t_ns))) if "shadow" in wanted else ()
-        there = shot_transforms(self._bodies, later) if later else None
-        whole = Picture(self._bodies, camera, shot_transforms(self._bodies, now), there, tuple(lit))
+        values: dict[str, Any] = {}
+        for name, channel in wanted.items():
+            values[name] = np.empty(channel.shape(height, camera.width_px), channel.dtype)
+        movers = self._scene.movers
+        middle_ns = int(np.mean(now.t_ns))
+        lit = lamps(self._scene, self._bodies, middle_ns) if "shadow" in wanted else ()
+        picture = TruthPicture(
+            bodies=self._bodies,
+            ids=self._ids,
+            camera=camera,
+            here=shot_transforms(movers, now),
+            there=shot_transforms(movers, later) if later else None,
+            lamps=tuple(lit),
+        )
 
         def fill(rows: slice) -> None:
-            for name, found in Band(whole, self._ids_of, rows).values(tuple(wanted)).items():
-                values[name][rows] = found.reshape(values[name][rows].shape)
+            band = Band(picture, rows)
+            for name, channel in band.values(tuple(wanted)).items():
+                values[name][rows] = channel.reshape(values[name][rows].shape)
 
-        starts = range(0, height, BAND_ROWS)
-        list(self._pool.map(fill, [slice(row, min(row + BAND_ROWS, height)) for row in starts]))
+        bands = [slice(row, min(row + BAND_ROWS, height)) for row in range(0, height, BAND_ROWS)]
+        list(self._pool.map(fill, bands))
         return TruthFrame(**values)
+
+
+def _mirrors(material: Material) -> bool:
+    return material.kind == "mirror" or material.is_coated or material.metal > 0
+
+
+def _is_diffuse(material: Material) -> bool:
+    return material.kind == "body" and material.metal < 1
 
 
 def _table(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(["", *names]))
 
 
-def _ids(names: Sequence[str], table: Sequence[str]) -> NDArray[np.uint16]:
+def _ids(
+    names: Sequence[str],
+    table: Sequence[str],
+) -> NDArray[np.uint16]:
     """The names' places in a table (S + 1,); the last one is nothing."""
     place = {name: nth for nth, name in enumerate(table)}
     return np.array([*(place[name] for name in names), 0], np.uint16)

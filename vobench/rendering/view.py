@@ -43,10 +43,12 @@ class Plane:
     @property
     def key(self) -> tuple[float, ...]:
         """Equal for planes that coincide to 10 µm."""
-        return tuple(float(x) + 0.0 for x in np.round([*self.normal, self.offset_m], 5))
+        coefficients = np.round([*self.normal, self.offset_m], 5)
+        return tuple(float(coefficient) + 0.0 for coefficient in coefficients)
 
 
 NEAR_M = 0.05
+FARTHEST_PX = 1e6  # from the picture's corner; whatever lies beyond is as good as there
 
 
 def visible_boxes(camera: Pinhole, outlines_camera_m: Array) -> Array:
@@ -54,31 +56,35 @@ def visible_boxes(camera: Pinhole, outlines_camera_m: Array) -> Array:
 
     Edges are cut at the near plane, behind which a projection has no meaning.
     """
-    here = outlines_camera_m
-    there = np.roll(outlines_camera_m, -1, axis=1)
-    z0 = here[..., 2] - NEAR_M
-    z1 = there[..., 2] - NEAR_M
-    crossing = (z0 < 0) != (z1 < 0)
-    share = np.where(crossing, z0 / np.where(crossing, z0 - z1, 1), 0)[..., None]
-    points = np.concatenate([here, here + share * (there - here)], 1)
-    ahead = np.concatenate([z0 >= 0, crossing], 1)
-    z = np.where(ahead, points[..., 2], 1)
-    u, v = (
-        np.clip(points[..., axis] / z * focal + centre, -1e6, 1e6)
-        for axis, focal, centre in ((0, camera.fx_px, camera.cx_px), (1, camera.fy_px, camera.cy_px))
-    )
-    low = [np.where(ahead, x, np.inf).min(1) - 1 for x in (u, v)]
-    high = [np.where(ahead, x, -np.inf).max(1) + 2 for x in (u, v)]
-    return np.asarray(np.floor(np.stack([low[0], high[0], low[1], high[1]], -1)))
+    start_m = outlines_camera_m
+    end_m = np.roll(outlines_camera_m, -1, axis=1)
+    start_depth_m = start_m[..., 2] - NEAR_M  # beyond the near plane
+    end_depth_m = end_m[..., 2] - NEAR_M
+    is_crossing = (start_depth_m < 0) != (end_depth_m < 0)
+    depth_change_m = np.where(is_crossing, start_depth_m - end_depth_m, 1)
+    share = np.where(is_crossing, start_depth_m / depth_change_m, 0)[..., None]
+    points_m = np.concatenate([start_m, start_m + share * (end_m - start_m)], 1)
+    is_ahead = np.concatenate([start_depth_m >= 0, is_crossing], 1)
+
+    z_m = np.where(is_ahead, points_m[..., 2], 1)
+    u = np.clip(points_m[..., 0] / z_m * camera.fx_px + camera.cx_px, -FARTHEST_PX, FARTHEST_PX)
+    v = np.clip(points_m[..., 1] / z_m * camera.fy_px + camera.cy_px, -FARTHEST_PX, FARTHEST_PX)
+    first_column = np.where(is_ahead, u, np.inf).min(1) - 1
+    end_column = np.where(is_ahead, u, -np.inf).max(1) + 2
+    first_row = np.where(is_ahead, v, np.inf).min(1) - 1
+    end_row = np.where(is_ahead, v, -np.inf).max(1) + 2
+    return np.asarray(np.floor(np.stack([first_column, end_column, first_row, end_row], -1)))
 
 
 def within(box: Sequence[float], other: Sequence[float]) -> Box | None:
-    """What two boxes share, None for nothing."""
+    """The intersection of two boxes, None where it is empty."""
     u0 = max(box[0], other[0])
-    v0 = max(box[2], other[2])
     u1 = min(box[1], other[1])
+    v0 = max(box[2], other[2])
     v1 = min(box[3], other[3])
-    return (int(u0), int(u1), int(v0), int(v1)) if u0 < u1 and v0 < v1 else None
+    if u0 >= u1 or v0 >= v1:
+        return None
+    return int(u0), int(u1), int(v0), int(v1)
 
 
 STATIC = -1
@@ -135,16 +141,14 @@ class PinholeView:
     @property
     def world_from_screen(self) -> Array:
         """(3, 3): from (x, y, 1) on OpenGL's screen, -1 to 1 and upwards, to the ray there in the world."""
-        c = self.camera
+        camera = self.camera
+        half_width = camera.width_px / 2
+        half_height = camera.height_px / 2
         # The camera matrix's inverse, after the step from the screen to pixels.
-        rays = np.array(
-            [
-                [c.width_px / 2 / c.fx_px, 0, (c.width_px / 2 - 0.5 - c.cx_px) / c.fx_px],
-                [0, -c.height_px / 2 / c.fy_px, (c.height_px / 2 - 0.5 - c.cy_px) / c.fy_px],
-                [0, 0, 1],
-            ]
-        )
-        return np.asarray(self.images[:3, :3].T @ self.T_world_camera[:3, :3] @ rays)
+        x_axis = [half_width / camera.fx_px, 0, (half_width - 0.5 - camera.cx_px) / camera.fx_px]
+        y_axis = [0, -half_height / camera.fy_px, (half_height - 0.5 - camera.cy_px) / camera.fy_px]
+        camera_from_screen = np.array([x_axis, y_axis, [0, 0, 1]])
+        return np.asarray(self.images[:3, :3].T @ self.T_world_camera[:3, :3] @ camera_from_screen)
 
     def pose(self, mover: int) -> Array:
         """T_world_mover, the identity for what is static."""
@@ -166,9 +170,17 @@ def pinhole_view(
 ) -> PinholeView:
     """The view without a mirror."""
     direct = _projection(camera) @ T_CV_GL @ se3.inverse(T_world_camera)
-    eye_m = T_world_camera[:3, 3]
     return PinholeView(
-        camera, T_world_camera, T_world_movers, skies, ambient_cd_m2, eye_m, direct, direct, IDENTITY, glints
+        camera=camera,
+        T_world_camera=T_world_camera,
+        T_world_movers=T_world_movers,
+        skies=skies,
+        ambient_cd_m2=ambient_cd_m2,
+        eye_m=T_world_camera[:3, 3],
+        direct=direct,
+        view_projection=direct,
+        images=IDENTITY,
+        glints=glints,
     )
 
 

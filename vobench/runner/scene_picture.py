@@ -13,8 +13,8 @@ from vobench.errors import InputError, SettingError, require_known
 from vobench.geometry import se3
 from vobench.geometry.rig import PRESETS, looking
 from vobench.geometry.se3 import Array
-from vobench.rendering.occlusion import Shot
 from vobench.rendering.renderer import Radiance, still
+from vobench.rendering.shot import Shot
 from vobench.runner.key import cache_folder
 from vobench.runner.simulate import open_renderer
 from vobench.runner.store import SILENT, Progress

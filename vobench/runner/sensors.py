@@ -6,7 +6,7 @@ import numpy as np
 
 from vobench.geometry.rig import Side
 from vobench.motion.wheeled import ENCODERS, Wheeled, ticks
-from vobench.rendering.occlusion import Shot
+from vobench.rendering.shot import Shot
 from vobench.rendering.truth import TruthCaster
 from vobench.runner.motion import BodyMotion, generator
 from vobench.scene.scene import Scene

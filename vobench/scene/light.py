@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
-from typing import Annotated, Protocol
+from typing import Annotated, ClassVar, Protocol
 
 import numpy as np
 from annotated_types import MinLen
@@ -134,6 +134,7 @@ class AreaLight:
     level: Level = STEADY
     colour: Rgb = WHITE
     material: str = ""
+    moves: ClassVar[bool] = False
 
     @property
     def luminance_cd_m2(self) -> float:
@@ -150,6 +151,7 @@ class PointLight:
     power_lm: float
     level: Level = STEADY
     colour: Rgb = WHITE
+    moves: ClassVar[bool] = False
 
     def intensity_cd(self, directions: Array) -> Array:
         """Luminous intensity (...) towards unit directions (..., 3)."""
@@ -171,6 +173,7 @@ class SpotLight:
     outer_deg: float
     level: Level = STEADY
     colour: Rgb = WHITE
+    moves: ClassVar[bool] = False
 
     @property
     def peak_cd(self) -> float:
@@ -238,6 +241,7 @@ class Sky:
     ground_albedo: float = 0.2
     level: Level = STEADY
     colour: Rgb = WHITE
+    moves: ClassVar[bool] = False
 
     def luminance_cd_m2(self, directions: Array) -> Array:
         """Luminance (...) seen along unit directions (..., 3). Source: ISO 15469:2004, eqs 1 to 7."""

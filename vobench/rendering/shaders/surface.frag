@@ -1,30 +1,8 @@
 #version 410 core
 #extension GL_ARB_shading_language_420pack : require
 // Luminance of a surface's three channels, linear and unclipped: what its body scatters, what it mirrors, its glow.
-layout(std140, binding = 0) uniform Pass {
-    mat4 direct;
-    vec4 eye;
-    vec4 clip_plane;
-    vec4 lod_bias;
-    vec4 mirrors[3];
-    vec4 ambient;  // what is mirrored where no mirror is followed
-    vec4 weights;  // of the channels in a picture that has one, and 1 / their sum
-    vec4 probe_centre;
-    vec4 probe_low;
-    vec4 probe_high;
-    vec4 probe_light;  // luminance around: all over, and how it rises towards a direction
-    vec4 probe_scale;  // the light now over that of the probe, and the number of glints
-    vec4 glints[12];   // place, intensity and axis of each
-} view;
-layout(std140, binding = 1) uniform Batch {
-    mat4 model;
-    vec4 colour;    // and the tint of what a coat mirrors
-    vec4 emission;  // and repeats of its texture in one of the body's
-    vec4 plane;     // of a mirror, where it is
-    vec4 coat;      // eta, what it sends back down, 1 / eta^2, illuminance over what enters
-    vec4 finish;    // metal, share of Fresnel's rise that roughness leaves, cut-out, roughness
-    vec4 blur;      // level of the probe, how much of it is shown; Fresnel's share square on
-} batch;
+#include <Pass>
+#include <Batch>
 layout(binding = 0) uniform sampler2D body_texture;
 layout(binding = 1) uniform sampler2D light_texture;
 layout(binding = 2) uniform sampler2DArray reflection;
@@ -50,7 +28,7 @@ layout(location = 0, index = 1) out vec4 passes;
 #define SHADE(c) (c).r
 #ifdef IS_MONO
 #define Light float
-#define LIGHT(c) dot(view.weights.rgb, c)
+#define LIGHT(c) dot(view.weights, c)
 #else
 #define Light vec3
 #define LIGHT(c) (c)
@@ -79,11 +57,11 @@ const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 // What a probe shows along a ray, put right for where the ray starts in the room (Lagarde and Zanuttini, 2012).
 vec3 probed(vec3 from, vec3 ray)
 {
-    from = clamp(from, view.probe_low.xyz, view.probe_high.xyz);
+    from = clamp(from, view.probe_low, view.probe_high);
     ray = mix(ray, vec3(1e-9), equal(ray, vec3(0.0)));  // or 0 / 0, at the probe's bounds
-    vec3 reach = max((view.probe_low.xyz - from) / ray, (view.probe_high.xyz - from) / ray);
+    vec3 reach = max((view.probe_low - from) / ray, (view.probe_high - from) / ray);
     vec3 met = from + min(reach.x, min(reach.y, reach.z)) * ray;
-    return view.probe_scale.rgb * textureLod(probe, met - view.probe_centre.xyz, batch.blur.x).rgb;
+    return view.probe_scale * textureLod(probe, met - view.probe_centre, batch.probe_level).rgb;
 }
 
 // The lamps that no picture shows, as rough facets mirror them (GGX; Heitz 2014), where what arrives is not less
@@ -91,8 +69,8 @@ vec3 probed(vec3 from, vec3 ray)
 vec3 glint(vec3 from, vec3 N, vec3 V, float arrives)
 {
     vec3 light = vec3(0.0);
-    float alpha = batch.finish.w + 0.0025, squared = alpha * alpha, cv = max(abs(dot(N, V)), 0.01);
-    for (int i = 0; i < int(view.probe_scale.a); i++) {
+    float alpha = batch.roughness + 0.0025, squared = alpha * alpha, cv = max(abs(dot(N, V)), 0.01);
+    for (int i = 0; i < int(view.glint_count); i++) {
         vec4 place = view.glints[3 * i], power = view.glints[3 * i + 1], axis = view.glints[3 * i + 2];
         vec3 way = place.xyz - place.w * from, L = normalize(way);
         float cl = dot(N, L), edge = clamp((power.w - acos(clamp(-dot(L, axis.xyz), -1.0, 1.0))) * axis.w, 0.0, 1.0);
@@ -117,7 +95,7 @@ void main()
     vec4 texel = texture(body_texture, at_texture, view.lod_bias[layer]);
     colour *= SHADE(texel);
 #ifdef HAS_CUTOUT
-    if (texel.a < batch.finish.z) discard;
+    if (texel.a < batch.cutout) discard;
 #endif
 #endif
 #ifdef HAS_LIGHT
@@ -126,33 +104,33 @@ void main()
 #endif
 #ifdef HAS_GLOSS
 #ifdef IS_PLANAR
-    float above = dot(batch.plane, vec4(view.eye.xyz, 1.0)), c = clamp(abs(above) / length(to_eye), 0.0, 1.0);
+    float above = dot(batch.plane, vec4(view.eye, 1.0)), c = clamp(abs(above) / length(to_eye), 0.0, 1.0);
     vec3 N = sign(above) * batch.plane.xyz;
 #else
     float above = dot(facing, to_eye), c = clamp(abs(above) / (length(facing) * length(to_eye)), 0.0, 1.0);
     vec3 N = sign(above) * normalize(facing);
 #endif
-    float F = batch.blur.z + batch.finish.y * (fresnel(c, batch.coat.x, batch.coat.z) - batch.blur.z);
+    float F = batch.normal_reflectance + batch.grazing_rise * (fresnel(c, batch.eta, batch.inverse_eta_squared) - batch.normal_reflectance);
 #ifdef HAS_REFLECTION
     vec3 seen = texelFetch(reflection, ivec3(ivec2(gl_FragCoord.xy), layer), 0).rgb;
 #ifdef IS_MONO
-    seen = vec3(view.weights.a * seen.r);  // which has been weighted
+    seen = vec3(view.inverse_weight_sum * seen.r);  // which has been weighted
 #endif
 #else
-    vec3 seen = view.ambient.rgb;
+    vec3 seen = view.ambient;
     float arrives = 1e9;
 #ifndef IS_LAST
 #ifdef HAS_LIGHT
-    seen = batch.coat.w * around;  // as bright as what lights the place
+    seen = batch.arriving_over_entering * around;  // as bright as what lights the place
     arrives = dot(LUMINANCE, seen);
 #endif
 #endif
 #ifdef HAS_PROBE
-    vec3 from = view.eye.xyz - to_eye, V = normalize(to_eye);
+    vec3 from = view.eye - to_eye, V = normalize(to_eye);
     // Where less light arrives than at the probe, something hides what the probe sees.
-    float most = max(view.probe_light.a + dot(view.probe_light.xyz, N), 0.05 * view.probe_light.a);
-    float open = min(1.0, arrives / (most * dot(LUMINANCE, view.probe_scale.rgb)));
-    seen = mix(seen, open * probed(from, reflect(-V, N)) + glint(from, N, V, arrives), batch.blur.y);
+    float most = max(view.probe_mean + dot(view.probe_gradient, N), 0.05 * view.probe_mean);
+    float open = min(1.0, arrives / (most * dot(LUMINANCE, view.probe_scale)));
+    seen = mix(seen, open * probed(from, reflect(-V, N)) + glint(from, N, V, arrives), batch.probe_share);
 #endif
 #endif
     Light mirrored = LIGHT(seen);
@@ -167,13 +145,13 @@ void main()
     Light radiance = colour * mirrored;
 #else
 #ifdef HAS_GLOSS
-    Shade body = colour, mirrors = Shade(batch.colour.a * F);
+    Shade body = colour, mirrors = Shade(batch.tint * F);
 #ifdef HAS_METAL
-    float metal = batch.finish.x, away = 1.0 - c, grazing = batch.finish.y * away * away * away * away * away;
+    float metal = batch.metal, away = 1.0 - c, grazing = batch.grazing_rise * away * away * away * away * away;
     body *= 1.0 - metal;
     mirrors = (1.0 - metal) * mirrors + metal * (colour + (1.0 - colour) * grazing);
 #endif
-    body *= batch.coat.z * (1.0 - F) / (1.0 - body * batch.coat.y);
+    body *= batch.inverse_eta_squared * (1.0 - F) / (1.0 - body * batch.inner_reflectance);
     Light radiance = body * light + mirrors * mirrored;
 #else
     Light radiance = colour * light;
@@ -181,9 +159,9 @@ void main()
 #endif
 #endif
 #ifdef HAS_EMISSION
-    vec3 glow = batch.emission.rgb;
+    vec3 glow = batch.emission;
 #ifdef HAS_EMISSION_TEXTURE
-    glow *= texture(emission_texture, batch.emission.a * at_texture, view.lod_bias[layer]).rgb;
+    glow *= texture(emission_texture, batch.emission_repeats * at_texture, view.lod_bias[layer]).rgb;
 #endif
 #ifdef IS_LAMP
     radiance = LIGHT(glow * around);
@@ -195,7 +173,7 @@ void main()
 #ifdef IS_GREY
     frag_color = vec4(radiance, 0.0, 0.0, 1.0);
 #else
-    frag_color = vec4(dot(view.weights.rgb, radiance), 0.0, 0.0, 1.0);
+    frag_color = vec4(dot(view.weights, radiance), 0.0, 0.0, 1.0);
 #endif
 #else
     frag_color = vec4(radiance, 1.0);

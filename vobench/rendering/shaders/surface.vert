@@ -7,16 +7,8 @@ layout(location = 1) in vec3 normal;
 layout(location = 2) in vec2 uv_texture;
 layout(location = 3) in vec2 uv_light;
 
-layout(std140, binding = 0) uniform Camera {
-    mat4 direct;      // from the world to the screen as if there were no mirrors
-    vec4 eye;         // where the picture is seen from
-    vec4 clip_plane;  // what lies behind it is not drawn
-    vec4 lod_bias;    // of each layer
-    vec4 mirrors[3];  // planes, the one seen first to begin with; 0 for none
-} view;
-layout(std140, binding = 1) uniform Pose {
-    mat4 model;
-} body;
+#include <Pass>
+#include <Batch>
 
 // Surfaces that meet are drawn by several programs; each puts a corner in the same place, so that no gap opens.
 invariant gl_Position;
@@ -38,7 +30,7 @@ float height(vec4 plane, vec3 point)
 
 void main()
 {
-    vec4 world = body.model * vec4(position, 1.0);
+    vec4 world = batch.model * vec4(position, 1.0);
     // Mirror by mirror, so that what touches a mirror lands on its own image to the last bit, and leaves no gap.
     vec3 image = world.xyz;
     for (int i = 2; i >= 0; i--) image -= 2.0 * height(view.mirrors[i], image) * view.mirrors[i].xyz;
@@ -49,6 +41,6 @@ void main()
     layer = gl_InstanceID;
     at_texture = uv_texture;
     at_light = uv_light;
-    to_eye = view.eye.xyz - world.xyz;
-    facing = mat3(body.model) * normal;
+    to_eye = view.eye - world.xyz;
+    facing = mat3(batch.model) * normal;
 }

@@ -8,9 +8,12 @@ import trimesh
 
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
-from vobench.rendering import lightmap
-from vobench.rendering.geometry import Visibility
-from vobench.rendering.lightmap import Atlas, Layout, Texels, owners, texels, unwrap
+from vobench.rendering import unwrap as unwrapping
+from vobench.rendering.atlas import Atlas
+from vobench.rendering.texel import Texels, texels
+from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.texel_owner import owners
+from vobench.rendering.unwrap import unwrap
 from vobench.scene.material import Material
 from vobench.scene.mesh import Mesh, Thing, Triangles, areas_m2, flat, joined, quad, table
 
@@ -46,7 +49,7 @@ FACES = zoo()
 LIT = np.ones(len(FACES), bool)
 
 
-def laid_out(spacing_m: float) -> tuple[Atlas, Texels, Layout]:
+def laid_out(spacing_m: float) -> tuple[Atlas, Texels, TexelLayout]:
     atlas = unwrap(FACES, np.full(len(FACES), spacing_m), LIT)
     return atlas, *texels(FACES, MATERIALS, atlas, owners(atlas), among=LIT, seed=0)
 
@@ -105,18 +108,6 @@ def test_the_outer_samples_of_a_rectangle_lie_on_its_edges() -> None:
     assert sorted(np.ptp(corners, axis=0).tolist()) == [15, 20]
 
 
-@pytest.mark.parametrize(("wide", "high"), [(5, 5), (6, 5), (5, 6), (6, 6), (2, 4), (2, 3)])
-def test_light_known_at_every_other_sample_is_whole_up_to_the_edges(wide: int, high: int) -> None:
-    """What rises evenly is told exactly by some of the samples, none of them beyond the outermost known ones."""
-    things = [Thing("board", quad([0, 0, 0], [0.1 * (wide - 1), 0, 0], [0, 0.1 * (high - 1), 0]), "grey")]
-    faces, lit = table(things, [-1], [-1]), np.ones(2, bool)
-    atlas = unwrap(faces, np.full(2, 0.1), lit)
-    points, layout = texels(faces, MATERIALS, atlas, owners(atlas), among=lit, seed=0)
-    ramp = points.points_m @ [1.0, 2.0, 0.0]
-    assert layout.few.sum() < 0.75 * len(points) or min(wide, high) < 3
-    np.testing.assert_allclose(layout.between(np.where(layout.few, ramp, 1e9)), ramp, atol=2e-3)
-
-
 def test_a_front_and_its_back_have_places_of_their_own() -> None:
     atlas, points, _ = laid_out(0.05)
     front, back = np.flatnonzero(FACES.thing == 5).reshape(2, 2)
@@ -148,41 +139,10 @@ def test_a_map_too_large_for_memory_is_refused_with_what_would_do() -> None:
         unwrap(FACES, np.full(len(FACES), 2e-4), LIT)
 
 
-def test_where_things_touch_neither_side_has_light_of_its_own():
-    """The bottom of a box on a floor is beyond it, in the open sky for all that rays tell."""
-    floor = quad([-1, -1, 0], [2, 0, 0], [0, 2, 0])
-    meshes = {
-        "floor": floor,
-        "standing": shape(
-            trimesh.creation.box((0.2, 0.2, 0.2), trimesh.transformations.translation_matrix([0, 0, 0.1])), smooth=False
-        ),
-        "raised": shape(
-            trimesh.creation.box((0.2, 0.2, 0.2), trimesh.transformations.translation_matrix([0.5, 0, 0.12])),
-            smooth=False,
-        ),
-        "sheet": quad([-0.6, 0, 0.3], [0.2, 0, 0], [0, 0.2, 0]).two_sided(),
-    }
-    things = [Thing(name, mesh, "grey") for name, mesh in meshes.items()]
-    faces = table(things, [-1] * len(things), [-1] * len(things))
-    lit = np.ones(len(faces), bool)
-    atlas = unwrap(faces, np.full(len(faces), 0.025), lit)
-    visibility = Visibility(faces, MATERIALS, np.arange(len(faces)))
-    points, _ = texels(faces, MATERIALS, atlas, owners(atlas), among=lit, seed=0, visibility=visibility)
-    name = np.array(list(meshes))[faces.thing[points.face]]
-    down, up = points.planes[:, 2] < -0.9, points.planes[:, 2] > 0.9
-    assert not (down & (name == "standing")).any()
-    assert (up & (name == "standing")).sum() == pytest.approx(64, rel=0.4)
-    assert (down & (name == "raised")).sum() == pytest.approx(64, rel=0.4)
-    assert (down & (name == "sheet")).sum() == (up & (name == "sheet")).sum() > 30
-    x, y, _ = points.points_m[name == "floor"].T
-    assert not ((np.abs(x) < 0.09) & (np.abs(y) < 0.09)).any()
-    assert ((np.abs(x - 0.5) < 0.09) & (np.abs(y) < 0.09)).sum() > 30
-
-
 def test_an_atlas_of_xatlas_is_never_destroyed():
     """Its destructor may wait for ever."""
     xatlas = pytest.importorskip("xatlas")
     atlas = xatlas.Atlas()
     before = sys.getrefcount(atlas)
-    lightmap._keep_for_ever(atlas)
+    unwrapping._keep_for_ever(atlas)
     assert sys.getrefcount(atlas) == before + 1

@@ -1,0 +1,77 @@
+"""The layout of points on the map: neighbours are mutual, smoothing keeps even light, interpolation linear light."""
+
+import numpy as np
+import pytest
+
+from vobench.rendering.texel import Texels, texels
+from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.texel_owner import owners
+from vobench.rendering.unwrap import unwrap
+from vobench.scene.material import Material
+from vobench.scene.mesh import Thing, quad, table
+
+MATERIALS = {"grey": Material()}
+LEFT, RIGHT, ABOVE, BELOW = range(4)
+
+
+def board(wide: int, high: int) -> tuple[Texels, TexelLayout]:
+    """Points 10 cm apart."""
+    things = [Thing("board", quad([0, 0, 0], [0.1 * (wide - 1), 0, 0], [0, 0.1 * (high - 1), 0]), "grey")]
+    faces, lit = table(things, [-1], [-1]), np.ones(2, bool)
+    atlas = unwrap(faces, np.full(2, 0.1), lit)
+    return texels(faces, MATERIALS, atlas, owners(atlas), among=lit, seed=0)
+
+
+@pytest.mark.parametrize(("wide", "high"), [(5, 5), (6, 5), (5, 6), (6, 6), (2, 4), (2, 3)])
+def test_light_known_at_every_other_sample_is_whole_up_to_the_edges(wide: int, high: int) -> None:
+    """What rises evenly is told exactly by some of the samples, none of them beyond the outermost known ones."""
+    points, layout = board(wide, high)
+    ramp = points.points_m @ [1.0, 2.0, 0.0]
+    assert layout.is_sparse.sum() < 0.75 * len(points) or min(wide, high) < 3
+    np.testing.assert_allclose(layout.interpolated(np.where(layout.is_sparse, ramp, 1e9)), ramp, atol=2e-3)
+
+
+def test_the_neighbour_of_a_neighbour_on_the_other_side_is_the_point_itself() -> None:
+    points, layout = board(7, 5)
+    itself = np.arange(len(points))
+    for there, back in ((LEFT, RIGHT), (RIGHT, LEFT), (ABOVE, BELOW), (BELOW, ABOVE)):
+        other = layout.neighbours[there]
+        inner = other != itself
+        assert inner.sum() > len(points) / 2
+        np.testing.assert_array_equal(layout.neighbours[back][other[inner]], itself[inner])
+
+
+def test_blurring_keeps_even_light_and_the_mean_and_makes_grain_finer() -> None:
+    points, layout = board(9, 9)
+    even = np.full(len(points), 3.0)
+    np.testing.assert_allclose(layout.blurred(even), even)
+    grain = np.random.default_rng(0).random(len(points))
+    blurred = layout.blurred(grain)
+    assert blurred.mean() == pytest.approx(grain.mean())
+    assert blurred.std() < 0.5 * grain.std()
+
+
+def test_a_mark_spreads_by_so_many_steps_along_rows_and_columns() -> None:
+    points, layout = board(9, 9)
+    centre = int(np.argmin(np.linalg.norm(points.points_m[:, :2] - 0.4, axis=1)))
+    marked = np.arange(len(points)) == centre
+    for steps in range(4):
+        distance = np.abs(points.points_m[:, :2] - points.points_m[centre, :2]).sum(1)
+        np.testing.assert_array_equal(layout.dilated(marked, steps=steps), distance < 0.1 * steps + 0.05)
+
+
+def test_texels_take_their_value_from_a_point_or_stay_dark() -> None:
+    points, layout = board(5, 4)
+    values = np.arange(1, 1 + len(points), dtype=np.float32)
+    light = layout.filled(values)
+    assert light.shape == (layout.height, layout.width)
+    np.testing.assert_array_equal(light.ravel()[points.index], values)
+    assert (light.ravel()[layout.source == len(points)] == 0).all()
+    assert set(np.unique(light)) <= {0.0, *values.tolist()}
+
+
+def test_weights_of_points_add_up_to_one() -> None:
+    for wide, high in ((5, 5), (8, 3), (2, 9)):
+        points, layout = board(wide, high)
+        np.testing.assert_allclose(layout.weights.sum(1), np.ones(len(points)), rtol=1e-6)
+        assert layout.is_sparse.any()

@@ -1,0 +1,106 @@
+"""Lamps: lights as ground truth of shadows sees them, each from its middle."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Floats, Mask
+from vobench.rendering.geometry import RAY_OFFSET_M
+from vobench.rendering.occlusion import Bodies, dot
+from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun
+from vobench.scene.mesh import unit
+from vobench.scene.scene import Scene
+
+SUN_DISTANCE_M = 1e4  # beyond every scene
+EVERYWHERE = -2.0  # cosine less than any
+
+
+@dataclass(frozen=True, slots=True)
+class Lamp:
+    """A light that is on, seen from its middle: what it reaches and does not.
+
+    center_m (3,), None for the sun; axis (3,): along which it shines, or to the sun; where the cosine of the angle to
+    the axis is less than min_cosine it does not shine. radius_m: as near to the middle its faces hide nothing.
+    """
+
+    center_m: Array | None
+    axis: Array
+    min_cosine: float = EVERYWHERE
+    radius_m: float = 0.0
+
+    def vectors_m(self, starts_m: Floats) -> Floats:
+        """From points (R, 3) to the middle, or as far as matters towards the sun."""
+        if self.center_m is None:
+            to_sun_m = (SUN_DISTANCE_M * self.axis).astype(np.float32)
+            return np.broadcast_to(to_sun_m, starts_m.shape)
+        vectors_m = self.center_m.astype(np.float32) - starts_m
+        if self.radius_m == 0:
+            return vectors_m
+        distance_m = np.linalg.norm(vectors_m, axis=1)
+        outside = np.maximum(1 - self.radius_m / distance_m, 0)
+        return np.asarray(vectors_m * outside[:, None])
+
+    def is_before(self, normals: Array, offsets_m: Array) -> Mask:
+        """Which planes (F, 3), offsets_m (F,) from the origin, have it before them."""
+        if self.center_m is None:
+            return np.asarray(normals @ self.axis > 0)
+        return np.asarray(normals @ self.center_m > offsets_m + RAY_OFFSET_M)
+
+    def shines(self, vectors_m: Floats) -> Mask | bool:
+        """Whether it shines to where vectors (R, 3) lead to its middle from."""
+        if self.min_cosine < -1:
+            return True
+        backwards = (-self.axis).astype(np.float32)
+        along = np.einsum("ri,i->r", vectors_m, backwards)
+        if self.min_cosine == 0:
+            return np.asarray(along > 0)
+        length_m = np.sqrt(dot(vectors_m, vectors_m))
+        return np.asarray(along > self.min_cosine * length_m)
+
+
+def lamps(
+    scene: Scene,
+    bodies: Bodies,
+    t_ns: int,
+) -> Iterator[tuple[Lamp, Mask]]:
+    """The lights that are on at an instant, but for the sky, which has no middle; and the faces turned to each."""
+    for index, light in enumerate(scene.lights):
+        is_on = light.level.mean(t_ns, t_ns) > 0
+        if is_on and not isinstance(light, Sky):
+            is_face = bodies.faces.lamp == index
+            lamp = _lamp(light, bodies.faces.corners_m[is_face], t_ns)
+            yield lamp, lamp.is_before(bodies.normals, bodies.offsets_m)
+
+
+def _lamp(
+    light: AreaLight | PointLight | SpotLight | Sun,
+    corners_m: Array,
+    t_ns: int,
+) -> Lamp:
+    match light:
+        case Sun():
+            return Lamp(None, light.direction(t_ns))
+        case PointLight():
+            return Lamp(light.position_m, np.zeros(3))
+        case SpotLight():
+            min_cosine = float(np.cos(np.deg2rad(light.outer_deg)))
+            return Lamp(light.position_m, light.direction, min_cosine)
+        case AreaLight():
+            return lamp_of(corners_m)
+
+
+def lamp_of(corners_m: Array) -> Lamp:
+    """The lamp whose faces (F, 3, 3) shine; where they are flat, only before them."""
+    first_edge_m = corners_m[:, 1] - corners_m[:, 0]
+    second_edge_m = corners_m[:, 2] - corners_m[:, 0]
+    doubled_areas = np.cross(first_edge_m, second_edge_m)  # (F, 3): normals twice as long as faces are large
+    weights = np.linalg.norm(doubled_areas, axis=1)
+    center_m = np.average(corners_m.mean(1), axis=0, weights=weights)
+    axis = unit(doubled_areas.sum(0))
+    from_center_m = corners_m.reshape(-1, 3) - center_m
+    if np.abs(from_center_m @ axis).max() < RAY_OFFSET_M:
+        return Lamp(center_m, axis, 0.0)
+    distances_m = np.linalg.norm(from_center_m, axis=1)
+    return Lamp(center_m, axis, radius_m=float(distances_m.max()))

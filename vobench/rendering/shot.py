@@ -1,0 +1,98 @@
+"""Where the camera and a scene's bodies are while a picture is taken, also row by row of a rolling shutter."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench.geometry import se3
+from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Pixels
+from vobench.scene.scene import Mover
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """Where a camera is and when it takes a picture: a pose (4, 4) and an instant, or (H, 4, 4) and (H,) by row."""
+
+    T_world_camera: Array
+    t_ns: NDArray[np.int64] | int
+
+
+@dataclass(frozen=True, slots=True)
+class ShotTransforms:
+    """A shot as transforms, there and back: each body's (4, 4), or (H, 4, 4) by row; body 0 is all that stands."""
+
+    T_world_bodies: list[Array]
+    T_bodies_world: list[Array]
+    T_bodies_camera: list[Array]
+    T_camera_bodies: list[Array]
+
+    @property
+    def by_row(self) -> bool:
+        """Whether the camera or a body moves while the rows are exposed."""
+        return any(T.ndim == 3 for T in self.T_bodies_camera)
+
+
+def shot_transforms(movers: Sequence[Mover], shot: Shot) -> ShotTransforms:
+    """The transforms of a shot of a scene with these movers."""
+    T_world_bodies = _poses(movers, np.asarray(shot.t_ns, np.int64))
+    T_bodies_world = [se3.inverse(T) for T in T_world_bodies]
+    T_bodies_camera = [T @ shot.T_world_camera for T in T_bodies_world]
+    T_camera_bodies = [se3.inverse(T) for T in T_bodies_camera]
+    return ShotTransforms(T_world_bodies, T_bodies_world, T_bodies_camera, T_camera_bodies)
+
+
+def _poses(
+    movers: Sequence[Mover],
+    t_ns: NDArray[np.int64],
+) -> list[Array]:
+    """Where the bodies are at an instant () or at several (H,): (4, 4) each, or (H, 4, 4) for what moves."""
+    T_world_bodies: list[Array] = [np.eye(4)]
+    for mover in movers:
+        T_world_body = np.array([mover.path.pose(t) for t in np.ravel(t_ns).tolist()])
+        T_world_bodies.append(T_world_body if np.ndim(t_ns) else T_world_body[0])
+    return T_world_bodies
+
+
+def at_rows(tables: Sequence[Array], rows: Array) -> list[Array]:
+    """The transforms of each table for rays on rows (R,): (4, 4) as it is, (H, 4, 4) as (R, 4, 4)."""
+    return [_between(T, rows) if T.ndim == 3 else T for T in tables]
+
+
+def _between(table: Array, rows: Array) -> Array:
+    """Transforms (R, 4, 4) at rows between those of a table (H, 4, 4); beyond its ends the last ones.
+
+    Two rows differ by so little that a straight line between matrices is a rotation to the last bits.
+    """
+    place = np.clip(np.nan_to_num(rows), 0, len(table) - 1)
+    first = np.minimum(place.astype(np.int64), max(len(table) - 2, 0))
+    share = (place - first)[:, None, None]
+    if not share.any():
+        return table[first]
+    second = np.minimum(first + 1, len(table) - 1)
+    return np.asarray((1 - share) * table[first] + share * table[second])
+
+
+def of_rays(T: Array, rays: Pixels) -> Array:
+    """The transforms of some rays: the only one (4, 4), or those rows of (R, 4, 4)."""
+    return T if T.ndim == 2 else T[rays]
+
+
+def rays_in(T_body_camera: Array, directions: Array) -> tuple[Array, Array]:
+    """Rays from a camera's centre along unit directions (R, 3): origins (R, 3) and directions in a body's frame."""
+    turned = turn(T_body_camera, directions)
+    return np.broadcast_to(T_body_camera[..., :3, 3], turned.shape), turned
+
+
+def turn(T_a_b: Array, vectors: Array) -> Array:
+    """Directions (R, 3) in b as directions in a."""
+    R = T_a_b[..., :3, :3]
+    # Not by BLAS: its threads spin on products as narrow as these.
+    return np.asarray(np.einsum("ij,rj->ri" if R.ndim == 2 else "rij,rj->ri", R, vectors))
+
+
+def moved(T_a_b: Array, points: Array) -> Array:
+    """Points (R, 3) in b as points in a."""
+    return turn(T_a_b, points) + T_a_b[..., :3, 3]

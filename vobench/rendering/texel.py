@@ -1,0 +1,203 @@
+"""Texels: the points of a scene that its light is computed at, and those of them that lie inside things."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
+from vobench.rendering.atlas import Atlas, doubled_areas_px2
+from vobench.rendering.geometry import RayCaster, face_materials, lengths, offset_from_surface, take, tangents
+from vobench.rendering.texel_layout import TexelLayout, neighbours, texel_layout
+from vobench.rendering.texel_owner import Owners, claimed
+from vobench.rendering.thread_pool import chunked, in_chunks
+from vobench.rendering.visibility import Visibility
+from vobench.scene.material import Material, fresnel
+from vobench.scene.mesh import Triangles, unit
+
+TILTS = ((0.0, 0.0), (1.0, 0.4), (-1.0, -0.3), (0.3, -1.0), (-0.4, 1.0))  # of rays that search a way out
+PULLED_M = 1e-3  # points at a chart's rim lie so far inwards, where they see past the neighbour
+FACING = 0.1  # cosine to its flat face from which a normal of the shape counts
+# of faces that touch: cosine to an axis, how deep in the thing they are looked for
+ALIGNED = 0.999
+CONTACT_M = 4e-4
+
+
+@dataclass(frozen=True, slots=True)
+class Texels:
+    """P points: position, normal of the shape and of the flat face, steps to the next along u and v, all (P, 3).
+
+    A step is 0 where the texel lies at a rim. index (P,) is flat in the map, face (P,) in the table, uv (P, 2) its
+    place there; eta (P,) of the coat, 0 for none; dither (P, 2) in [0, 1) turns each point's pattern of rays.
+    """
+
+    points_m: Floats
+    normals: Floats
+    planes: Floats
+    step_u_m: Floats
+    step_v_m: Floats
+    index: Rows
+    face: Indices
+    uv: Floats
+    eta: Floats
+    dither: Floats
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    take = take
+
+    def entering(self, cosine: Floats) -> Floats:
+        """Share (..., P) of light that arrives at a cosine (..., P) and passes the coat, 1 where there is none."""
+        share = np.ones(cosine.shape, np.float32)
+        coated = np.flatnonzero(self.eta)
+        share[..., coated] -= fresnel(cosine[..., coated], self.eta[coated]).astype(np.float32)
+        return share
+
+    def cosine(self, directions: Floats) -> Floats:
+        """Cosine (..., P) of the angle between each normal and a vector (..., P, 3), 0 from behind the face."""
+        is_before = np.einsum("...ij,ij->...i", directions, self.planes) > 0
+        along_normal = np.einsum("...ij,ij->...i", directions, self.normals)
+        return np.asarray(is_before * along_normal / lengths(directions))
+
+
+def texels(
+    faces: Triangles,
+    materials: Mapping[str, Material],
+    atlas: Atlas,
+    owner: Owners,
+    *,
+    among: Mask,
+    seed: int,
+    visibility: Visibility | None = None,
+) -> tuple[Texels, TexelLayout]:
+    """The points of those among the faces (F,) that light can show on; with a visibility those that lie in no thing."""
+    index = claimed(owner, among)
+    beside = neighbours(index, atlas, owner)
+    points = _placed(faces, materials, atlas, owner, index=index, beside=beside, seed=seed)
+    is_inside = np.zeros(len(index), bool)
+    if visibility is not None:
+        is_inside = chunked(lambda part: _sees_only_backs(points.take(part), visibility), len(points))
+        is_inside = is_inside | _touches_other_face(points, visibility)
+    is_outside = ~is_inside
+    outside = points.take(is_outside)
+    layout, in_plane = texel_layout(
+        index,
+        beside,
+        is_outside,
+        points_m=outside.points_m,
+        planes=outside.planes,
+        atlas=atlas,
+        owner=owner,
+        visibility=visibility,
+    )
+    outside.step_u_m[~in_plane[:2].all(0)] = 0
+    outside.step_v_m[~in_plane[2:].all(0)] = 0
+    return outside, layout
+
+
+def _placed(
+    faces: Triangles,
+    materials: Mapping[str, Material],
+    atlas: Atlas,
+    owner: Owners,
+    *,
+    index: Rows,
+    beside: Indices,
+    seed: int,
+) -> Texels:
+    """The points at flat indices (P,) of the map, whose neighbours (4, P) are known, slightly off their faces."""
+    face = owner.face[index]
+    points_m = np.empty((len(index), 3), np.float32)
+    normals = np.empty_like(points_m)
+    planes = np.empty_like(points_m)
+    steps_u_m = np.empty_like(points_m)
+    steps_v_m = np.empty_like(points_m)
+
+    def place(part: slice) -> None:
+        part_face = face[part]
+        uv = owner.uv[index[part]]
+        corner_weights = np.column_stack([1 - uv.sum(1), uv])
+        plane = faces.plane[part_face]
+        step_u_m, step_v_m = _steps_m(faces.corners_m[part_face], atlas.light_px[part_face].astype(float))
+        is_missing = beside[:, part] == np.arange(len(index))[part]
+        on_face_m = np.einsum("ni,nij->nj", corner_weights, faces.corners_m[part_face])
+        inwards_m = _inwards_m(step_u_m, step_v_m, is_missing)
+        shape_normal = unit(np.einsum("ni,nij->nj", corner_weights, faces.normals[part_face]))
+        agrees = np.einsum("ij,ij->i", shape_normal, plane)[:, None] > FACING
+        points_m[part] = offset_from_surface(on_face_m + inwards_m, plane)
+        normals[part] = np.where(agrees, shape_normal, plane)
+        planes[part] = plane
+        steps_u_m[part] = step_u_m
+        steps_v_m[part] = step_v_m
+
+    in_chunks(place, len(index))
+    kinds = face_materials(faces, materials)
+    etas = np.array([kind.eta if kind and kind.is_coated else 0.0 for kind in kinds], np.float32)
+    dither = np.random.default_rng([seed, 1]).random((atlas.height * atlas.width, 2), dtype=np.float32)
+    return Texels(
+        points_m,
+        normals,
+        planes,
+        steps_u_m,
+        steps_v_m,
+        index,
+        face,
+        owner.uv[index],
+        etas[faces.thing[face]],
+        dither[index],
+    )
+
+
+def _inwards_m(step_u_m: Array, step_v_m: Array, is_missing: Mask) -> Array:
+    """How far points (P, 3) move from a chart's rim, where neighbours (4, P) on four sides are missing."""
+    along_u = (is_missing[0] * 1.0 - is_missing[1])[:, None] * unit(step_u_m)
+    along_v = (is_missing[2] * 1.0 - is_missing[3])[:, None] * unit(step_v_m)
+    return np.asarray(PULLED_M * (along_u + along_v))
+
+
+def _steps_m(corners_m: Array, places: Array) -> tuple[Array, Array]:
+    """What one texel along u and v is (P, 3) on faces with corners (P, 3, 3) and places (P, 3, 2)."""
+    first_u, first_v = places[:, 1].T - places[:, 0].T
+    second_u, second_v = places[:, 2].T - places[:, 0].T
+    area = doubled_areas_px2(places)
+    area = np.where(np.abs(area) < 1e-9, np.inf, area)[:, None]
+    first_m = corners_m[:, 1] - corners_m[:, 0]
+    second_m = corners_m[:, 2] - corners_m[:, 0]
+    step_u_m = (second_v[:, None] * first_m - first_v[:, None] * second_m) / area
+    step_v_m = (first_u[:, None] * second_m - second_u[:, None] * first_m) / area
+    return step_u_m, step_v_m
+
+
+def _sees_only_backs(points: Texels, visibility: Visibility) -> Mask:
+    """Which points (P,) see only backs of faces, as does the floor under a crate."""
+    is_inside = np.ones(len(points), bool)
+    for tilt_u, tilt_v in TILTS:
+        rows = np.flatnonzero(is_inside)
+        undecided = points.take(rows)
+        u_axis, v_axis = tangents(undecided.planes)
+        direction = tilt_u * u_axis + tilt_v * v_axis + undecided.planes
+        face = visibility.opaque.nearest(undecided.points_m, direction)
+        is_back = np.einsum("ij,ij->i", direction, visibility.normals[face]) > 0
+        is_inside[rows] = (face >= 0) & is_back & (visibility.faces.lamp[face] < 0)
+    return is_inside
+
+
+def _touches_other_face(points: Texels, visibility: Visibility) -> Mask:
+    """Which points (P,) lie on a face that looks the other way, as does the bottom of a crate on the floor.
+
+    Only where both look along an axis. Raised off their face they are beyond the other, outside in the sky for all
+    that rays tell.
+    """
+    is_touching = np.zeros(len(points), bool)
+    solid = visibility.opaque.solid
+    for axis, is_positive in np.ndindex(3, 2):
+        sign = 2 * is_positive - 1
+        rows = np.flatnonzero(sign * points.planes[:, axis] > ALIGNED)
+        opposite = solid[sign * visibility.faces.plane[solid, axis] < -ALIGNED]
+        if len(rows) and len(opposite):
+            caster = RayCaster(visibility.faces, opposite)
+            depth_m = points.planes[rows] * CONTACT_M
+            is_touching[rows] = caster.stops(points.points_m[rows] - depth_m, depth_m)
+    return is_touching

@@ -1,0 +1,207 @@
+"""The layout of texels on the light map: their neighbours, what fills the rest of the map, interpolation, smoothing."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
+from vobench.rendering.atlas import Atlas
+from vobench.rendering.texel_owner import Owners
+from vobench.rendering.thread_pool import chunked
+from vobench.rendering.visibility import Visibility
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+STRAIGHT = np.cos(np.deg2rad(1.5))  # between texels that lie in one plane
+BLURS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class TexelLayout:
+    """How P points lie on a map of a height and width.
+
+    source (H·W,) is the point that each texel takes its value from, P for none: texels beside a face are read by
+    interpolation, and those inside things have the light of the nearest of their chart, so that no darkness reaches
+    out. neighbours (4, P) are the points left, right, above and below in the same chart, the point itself for none.
+    is_sparse (P,): every other point along rows and columns, and those that have none of these beside them; weights
+    (P, P) interpolate all points' values between those of the sparse ones.
+    """
+
+    height: int
+    width: int
+    source: Indices
+    neighbours: Indices
+    is_sparse: Mask
+    weights: "csr_array"
+
+    def filled(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Values (P, ...) as a map (H, W, ...)."""
+        no_value = np.zeros((1, *values.shape[1:]), values.dtype)  # of the point P
+        padded = np.concatenate([values, no_value])
+        return padded[self.source].reshape(self.height, self.width, *values.shape[1:])
+
+    def dilated(self, marked: Mask, *, steps: int) -> Mask:
+        """Points (P,) that so many steps from texel to texel lead to from a marked one."""
+        for _ in range(steps):
+            marked_neighbours = [marked[neighbour] for neighbour in self.neighbours]
+            marked = np.logical_or.reduce([marked, *marked_neighbours])
+        return marked
+
+    def interpolated(self, values: Floats) -> Floats:
+        """Values (P,) known at the sparse points, at all of them."""
+        return np.asarray(self.weights @ values)
+
+    def blurred(self, values: Floats) -> Floats:
+        """Values (P,) smoothed by about one texel, each chart by itself."""
+        left, right, above, below = self.neighbours
+        for _ in range(BLURS):
+            values = (2 * values + values[left] + values[right]) / 4
+            values = (2 * values + values[above] + values[below]) / 4
+        return values
+
+
+def neighbours(index: Rows, atlas: Atlas, owner: Owners) -> Indices:
+    """The points (4, P) left, right, above and below of those at flat indices (P,) in the same chart, else itself."""
+    point_at = np.full(atlas.height * atlas.width, -1, np.int32)
+    point_at[index] = np.arange(len(index))
+    chart = atlas.chart[owner.face[index]]
+    column = index % atlas.width
+    result = np.empty((4, len(index)), np.int32)
+    for side, step in enumerate((-1, 1, -atlas.width, atlas.width)):
+        other = point_at[np.clip(index + step, 0, len(point_at) - 1)]
+        is_next_in_row = np.abs(column[other] - column) == 1
+        is_next_in_column = np.abs(index[other] - index) == atlas.width
+        adjoins = is_next_in_row if side < 2 else is_next_in_column
+        is_neighbour = (other >= 0) & (chart[other] == chart) & adjoins
+        result[side] = np.where(is_neighbour, other, np.arange(len(index)))
+    return result
+
+
+def texel_layout(
+    index: Rows,
+    beside: Indices,
+    is_valid: Mask,
+    *,
+    points_m: Floats,
+    planes: Floats,
+    atlas: Atlas,
+    owner: Owners,
+    visibility: Visibility | None,
+) -> tuple[TexelLayout, Mask]:
+    """The layout of the valid ones (P,) among points (A,), and which of their neighbours (4, P) lie in one plane.
+
+    index (A,), beside (4, A) and is_valid (A,) are of all points; points_m and planes (P, 3) of the valid ones.
+    """
+    count = len(points_m)
+    new_index = np.where(is_valid, np.cumsum(is_valid) - 1, -1)
+    nearest_valid = np.append(new_index[_nearest_valid(beside, is_valid)], -1)
+    source = nearest_valid[_read_points(index, atlas, owner)]
+    source = np.where(source < 0, count, source).astype(np.int32)
+
+    valid_beside = new_index[beside[:, is_valid]]
+    itself = np.arange(count)
+    valid_beside = np.where(valid_beside < 0, itself, valid_beside).astype(np.int32)
+    in_plane = _in_plane(points_m, planes, valid_beside, visibility)
+    is_sparse = _is_sparse(index[is_valid], valid_beside, atlas.width)
+    weights = _interpolation(is_sparse, valid_beside)
+    return TexelLayout(atlas.height, atlas.width, source, valid_beside, is_sparse, weights), in_plane
+
+
+def _read_points(index: Rows, atlas: Atlas, owner: Owners) -> Rows:
+    """The point (H·W,) that each texel takes its value from, of those at flat indices (P,); P for none."""
+    point = np.full(atlas.height * atlas.width, len(index))
+    point[index] = np.arange(len(index))
+    # A texel beside a face reads the one that the nearest place of the face lies in.
+    read = np.flatnonzero((owner.face >= 0) & (point == len(index)))
+    uv = owner.uv[read]
+    corner_weights = np.column_stack([1 - uv.sum(1), uv])
+    nearest_px = np.einsum("ni,nij->nj", corner_weights, atlas.light_px[owner.face[read]])
+    point[read] = point[atlas.index(nearest_px)]
+    return point
+
+
+def _in_plane(
+    points_m: Floats,
+    planes: Floats,
+    beside: Indices,
+    visibility: Visibility | None,
+) -> Mask:
+    """Whether points (P, 3) lie in one plane with their neighbours (4, P), which no wall hides from them."""
+    is_other = beside != np.arange(len(points_m))
+    cosine = np.einsum("nij,ij->ni", planes[beside], planes)
+    in_plane: Mask = is_other & (cosine > STRAIGHT)
+    if visibility is None:
+        return in_plane
+    # A texel that reaches behind a thin wall has its light from its middle alone.
+    opaque = visibility.opaque
+    for first, second in ((0, 1), (2, 3)):
+        neighbour = beside[second]
+
+        def hidden(part: slice, others: Indices = neighbour) -> Mask:
+            return np.asarray(opaque.occluded(points_m[part], points_m[others[part]]))
+
+        is_hidden = chunked(hidden, len(points_m))
+        in_plane[second] &= ~is_hidden
+        in_plane[first] &= ~is_hidden[beside[first]]
+    return in_plane
+
+
+def _interpolation(is_sparse: Mask, beside: Indices) -> "csr_array":
+    """Weights (P, P) that make all points' values of the sparse ones': along rows first, then along columns."""
+    is_known = is_sparse
+    result = scipy.sparse.diags_array(is_sparse.astype(np.float32), format="csr")
+    for sides in (beside[:2], beside[2:]):
+        known_beside = is_known[sides[0]].astype(np.float32) + is_known[sides[1]]
+        known = np.flatnonzero(is_known).astype(np.int32)
+        becomes_known = ~is_known & (known_beside > 0)
+        new = np.flatnonzero(becomes_known).astype(np.int32)
+        rows = [known]
+        columns = [known]
+        for side in sides:
+            taking = new[is_known[side[new]]]
+            rows.append(taking)
+            columns.append(side[taking])
+        row = np.concatenate(rows)
+        column = np.concatenate(columns)
+        mean_share = 1 / np.maximum(known_beside[row], 1)
+        shares = np.where(is_known[row], np.float32(1), mean_share)
+        shape = (len(is_known), len(is_known))
+        step = scipy.sparse.csr_array((shares.astype(np.float32), (row, column)), shape)
+        result = step @ result
+        is_known = is_known | (known_beside > 0)
+    return result
+
+
+def _is_sparse(index: Rows, beside: Indices, width: int) -> Mask:
+    """Every other point along rows and columns, and points at rims that would have one neighbour's value alone."""
+    at_rim = beside == np.arange(len(index))
+    in_even_column = index % width % 2 == 0
+    in_even_row = index // width % 2 == 0
+    in_column = in_even_column | at_rim[:2].any(0)
+    in_row = in_even_row | at_rim[2:].any(0)
+    is_sparse = in_column & in_row
+    is_known = is_sparse
+    for first, second in (beside[:2], beside[2:]):
+        is_known = is_known | is_known[first] | is_known[second]
+    return np.asarray(is_sparse | ~is_known)
+
+
+def _nearest_valid(beside: Indices, is_valid: Mask) -> Rows:
+    """For each point (P,) itself if valid, else the nearest valid one by steps within its chart, or itself."""
+    nearest = np.arange(len(is_valid))
+    is_known = is_valid.copy()
+    unknown = np.flatnonzero(~is_valid)
+    while len(unknown):
+        candidates = [np.where(is_known[other], nearest[other], -1) for other in beside[:, unknown]]
+        best = np.max(candidates, axis=0)
+        is_found = best >= 0
+        if not is_found.any():
+            break
+        nearest[unknown[is_found]] = best[is_found]
+        is_known[unknown[is_found]] = True
+        unknown = unknown[~is_found]
+    return nearest

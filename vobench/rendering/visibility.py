@@ -1,0 +1,165 @@
+"""How much light passes between two points of a scene, through panes and past opaque faces."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
+from vobench.rendering.embree import Hits
+from vobench.rendering.geometry import (
+    FAR_M,
+    RAY_OFFSET_M,
+    PlanarPatch,
+    RayCaster,
+    face_materials,
+    lengths,
+    planar_patches,
+    sample_points,
+)
+from vobench.scene.material import Material, pane_reflectance
+from vobench.scene.mesh import Triangles, unit
+
+MOST_PANES = 16  # crossed by one ray
+WIDE_M2 = 0.05  # of mirrors that show lamps and of panes that show the sky
+SKY_PROBES = 512  # rays to each side of a pane that tell whether the sky is seen through it
+
+
+class Visibility:
+    """Opaque faces and panes of a table, of those `among` (K,) names. Cut-outs count as solid."""
+
+    def __init__(
+        self,
+        faces: Triangles,
+        materials: Mapping[str, Material],
+        among: ArrayLike,
+    ) -> None:
+        rows = np.asarray(among, np.int32)
+        materials_of = face_materials(faces, materials)
+        kind = _by_face(faces, materials_of, lambda material: material.kind, "")[rows]
+        roughness = _by_face(faces, materials_of, lambda material: material.roughness, np.nan)[rows]
+        tint = _by_face(faces, materials_of, lambda material: material.tint, 1.0)
+        is_pane = kind == "pane"
+        is_smooth_mirror = (kind == "mirror") & (roughness == 0)
+
+        self.faces = faces
+        normals = np.append(faces.plane, np.zeros((1, 3)), 0)  # the last one for the face -1
+        self.normals = normals.astype(np.float32)
+        self._eta = _by_face(faces, materials_of, lambda material: material.eta, 1.0)
+        self._tint = tint.astype(np.float32)
+        self.opaque = RayCaster(faces, rows[~is_pane])
+        self._glass = RayCaster(faces, rows[is_pane])
+        self._has_panes = bool(is_pane.any())
+        self.mirrors = self._mirrors(rows[is_smooth_mirror])
+        self.sky_panes = self._panes_before_sky(rows[is_pane])
+        sky_pane_faces = [face for pane in self.sky_panes for face in pane.faces]
+        self._sky_panes = RayCaster(faces, sky_pane_faces)
+
+    def _mirrors(self, rows: Indices) -> list[tuple[PlanarPatch, float, RayCaster]]:
+        """Mirrors that show lamps as sharp as they are, with their tints. Coats mirror too, but faintly."""
+        mirrors = []
+        for patch in planar_patches(self.faces, rows, at_least_m2=WIDE_M2):
+            tint = float(self._tint[patch.faces[0]])
+            mirrors.append((patch, tint, RayCaster(self.faces, patch.faces)))
+        return mirrors
+
+    def _panes_before_sky(self, rows: Indices) -> list[PlanarPatch]:
+        """Panes that the sky is seen through, which are lamps of their own; of a pane's two sides one."""
+        panes = list[PlanarPatch]()
+        for pane in planar_patches(self.faces, rows, at_least_m2=WIDE_M2):
+            is_back = any(pane.coincides(other) for other in panes)
+            if not is_back and self._sees_sky(pane):
+                panes.append(pane)
+        return panes
+
+    def passing(self, origins_m: Floats, segments_m: Floats) -> Floats:
+        """Share (R,) of light that comes from origins + segments (R, 3) to the origins (R, 3)."""
+        share = (~self.opaque.stops(origins_m, segments_m)).astype(np.float32)
+        if self._has_panes:
+            clear = np.flatnonzero(share)
+            share[clear] = self.through_panes(origins_m[clear], segments_m[clear])
+        return share
+
+    def clear(self, origins_m: Floats, segments_m: Floats) -> Mask:
+        """Whether nothing opaque is between origins and origins + segments (R, 3)."""
+        return ~self.opaque.stops(origins_m, segments_m)
+
+    def pane_passes(self, pane: PlanarPatch, directions: Floats) -> Floats:
+        """Share (R,) that one pane lets through along unit directions (R, 3)."""
+        face = pane.faces[0]
+        reflected = pane_reflectance(directions @ pane.normal, float(self._eta[face]))
+        return np.asarray(self._tint[face] * (1 - reflected))
+
+    def crosses_sky_pane(self, origins_m: Floats, segments_m: Floats) -> Mask:
+        """Whether one of the panes that show the sky is between origins and origins + segments (R, 3)."""
+        if not self.sky_panes:
+            return np.zeros(len(origins_m), bool)
+        return self._sky_panes.stops(origins_m, segments_m)
+
+    def first_panes(self, origins_m: Floats, segments_m: Floats) -> tuple[Rows, Hits]:
+        """Which rays from origins along segments (R, 3) cross a pane (K,), and where they meet their first."""
+        crosses = np.zeros(len(origins_m), bool)
+        if self._has_panes:
+            crosses = self._glass.stops(origins_m, segments_m)
+        rays = np.flatnonzero(crosses)
+        return rays, self._glass.hits(origins_m[rays], segments_m[rays])
+
+    def pane_mirrors(self, panes: Indices, cosine: Floats) -> Floats:
+        """Share (R,) that panes, given by their faces (R,), reflect at cosines (R,)."""
+        return pane_reflectance(cosine, self._eta[panes]).astype(np.float32)
+
+    def through_panes(self, origins_m: Floats, segments_m: Floats) -> Floats:
+        """Share (R,) that all panes between origins and origins + segments (R, 3) let through."""
+        share = np.ones(len(origins_m), np.float32)
+        if not self._has_panes:
+            return share
+        rays = np.flatnonzero(self._glass.stops(origins_m, segments_m))
+        travelled = np.zeros(len(rays), np.float32)  # share of the segment
+        for _ in range(MOST_PANES):
+            if not len(rays):
+                break
+            ahead = segments_m[rays] * (1 - travelled)[:, None]
+            start_m = origins_m[rays] + segments_m[rays] * travelled[:, None]
+            hits = self._glass.hits(start_m, ahead)
+            crossing = np.flatnonzero((hits.face >= 0) & (hits.distance < 1))
+            rays = rays[crossing]
+            pane = hits.face[crossing]
+            ahead = ahead[crossing]
+            length_m = lengths(ahead)
+            cosine = np.einsum("ij,ij->i", ahead, self.normals[pane]) / length_m
+            reflected = pane_reflectance(cosine, self._eta[pane])
+            passed = (1 - reflected).astype(np.float32)
+            share[rays] *= self._tint[pane] * passed
+            step = hits.distance[crossing] + RAY_OFFSET_M / length_m
+            before = travelled[crossing]
+            travelled = (before + (1 - before) * step).astype(np.float32)
+        return share
+
+    def _sees_sky(self, pane: PlanarPatch) -> bool:
+        """Whether any of fixed rays, half to each side, leaves the scene without another pane."""
+        a, b, tilt, turn = np.random.default_rng(0).random((4, SKY_PROBES))
+        u_axis = unit(pane.corners_m[0, 1] - pane.corners_m[0, 0])
+        v_axis = np.cross(pane.normal, u_axis)
+        radius = np.sqrt(tilt)[:, None]
+        angle = 2 * np.pi * turn[:, None]
+        in_plane = radius * (np.cos(angle) * u_axis + np.sin(angle) * v_axis)
+        upwards = np.sqrt(1 - radius**2) * pane.normal
+        directions = np.concatenate([in_plane + upwards, in_plane - upwards])
+        points_m = np.tile(sample_points(pane.corners_m, a, b), (2, 1))
+        origins_m = points_m + RAY_OFFSET_M * directions
+        segments_m = FAR_M * directions
+        is_walled = self.opaque.stops(origins_m, segments_m)
+        is_blocked = is_walled | self._glass.stops(origins_m, segments_m)
+        return not is_blocked.all()
+
+
+def _by_face(
+    faces: Triangles,
+    materials_of: Sequence[Material | None],
+    read: Callable[[Material], Any],
+    default: Any,
+) -> NDArray[Any]:
+    """A property (F,) of each face's material, by the materials of a table's things; the default where one is None."""
+    values = [read(material) if material else default for material in materials_of]
+    return np.array(values)[faces.thing]
