@@ -8,7 +8,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vobench.geometry.vector import Array, unit
+from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 
 TOLERANCE = 1e-13  # of a focal length: 1e-10 px
 KNOTS = 1025

@@ -9,7 +9,8 @@ from annotated_types import Ge, Gt, Le, Lt
 from vobench.errors import InputError, SettingError, VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Focal, KannalaBrandt, Pinhole
-from vobench.geometry.vector import Array, unit
+from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.setting import OneOf, Positive, Triple, nearest_whole, settings
 
 # Focal length, sensor and resolution as the paper gives them (section II-B).

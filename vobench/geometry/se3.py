@@ -1,9 +1,9 @@
 """Rigid transforms as (..., 4, 4) float64 arrays: T_a_b takes coordinates in b to coordinates in a."""
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from vobench.geometry.vector import Array
+Array = NDArray[np.float64]
 
 MERGED_COSINE = 1e-12  # of the pitch: below it roll and yaw turn about the same axis
 

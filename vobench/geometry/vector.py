@@ -1,9 +1,9 @@
 """Vectors as arrays whose last axis has the components: directions and cross products."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from vobench.geometry.se3 import Array
 
 # Components of the factors of a cross product: x from y and z, y from z and x, z from x and y.
 NEXT_AXIS = np.array([1, 2, 0])
