@@ -132,6 +132,12 @@ def motions(T_world_frame: Array, first: Index, last: Index) -> Array:
     return T_first_last
 
 
+def distances_between(T: Array, first: Index, last: Index) -> Array:
+    """Distances (N,) in m between poses `first` and `last` (N,) of a trajectory (K, 4, 4)."""
+    offset_m = T[last, :3, 3] - T[first, :3, 3]
+    return np.asarray(np.linalg.norm(offset_m, axis=1))
+
+
 def absolute_errors(T_gt: Array, T_est: Array) -> PoseErrors:
     """Distances and angles between matched poses (K, 4, 4), the estimate already aligned.
 

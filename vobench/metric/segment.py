@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
-from vobench.metric.ate import PoseErrors, Rows, errors_between, in_blocks
+from vobench.metric.ate import PoseErrors, Rows, distances_between, errors_between, in_blocks
 from vobench.metric.comparison import POSES, Comparison, MetricDefinition, OverLengths
 from vobench.metric.settings import INDOOR_LENGTHS_M, Mean, Precision
 from vobench.trajectory.associate import Index
@@ -192,12 +192,6 @@ class ScaleErrors:
 
     error: Array
     drift_per_m: float
-
-
-def distances_between(T: Array, first: Index, last: Index) -> Array:
-    """Distances (N,) in m between poses `first` and `last` (N,) of a trajectory (K, 4, 4)."""
-    offset_m = T[last, :3, 3] - T[first, :3, 3]
-    return np.asarray(np.linalg.norm(offset_m, axis=1))
 
 
 def scale_errors(
