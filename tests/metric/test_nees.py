@@ -79,5 +79,5 @@ def test_covariances_in_space_are_not_compared_in_a_plane():
     t_ns = np.arange(5, dtype=np.int64) * 10**8
     T = se3.transform(np.eye(3), np.arange(15.0).reshape(5, 3) ** 2)
     truth = Trajectory(t_ns, T)
-    with pytest.raises(AlignmentError, match="covariances should be of poses in space, but project=xy"):
+    with pytest.raises(AlignmentError, match="covariances need poses in space, but the setting project is xy"):
         score(truth, truth, settings=ScoreSettings(project="xy"), covariance=np.tile(np.eye(6), (5, 1, 1)))

@@ -155,7 +155,7 @@ def _gaps(t_ns: Stamps) -> Mask:
     steps_ns = np.diff(t_ns)
     if not len(steps_ns):
         return np.zeros(0, bool)
-    return steps_ns > GAP_STEPS * np.median(steps_ns)
+    return np.asarray(steps_ns > GAP_STEPS * np.median(steps_ns))
 
 
 def _chain(steps: NDArray[Any], delta: float) -> IndexPairs:
