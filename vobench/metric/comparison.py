@@ -13,7 +13,7 @@ from vobench.metric.settings import Plane, ScoreSettings, settled
 from vobench.trajectory.align import Alignment, align, align_positions
 from vobench.trajectory.associate import Matched, match
 from vobench.trajectory.formats import seconds
-from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.trajectory import Trajectory, step_lengths_m
 
 Result = TypeVar("Result")
 DEFAULTS = ScoreSettings()
@@ -196,19 +196,13 @@ def motion_scale(T_gt: Array, T_est: Array) -> float:
     It is 1 / mean of the estimate's steps over the truth's, 1 if either side is stationary.
     Source: Wang et al. (2020), the evaluation script.
     """
-    gt_m = _step_lengths(T_gt)
-    est_m = _step_lengths(T_est)
+    gt_m = step_lengths_m(T_gt[:, :3, 3])
+    est_m = step_lengths_m(T_est[:, :3, 3])
     is_moving = gt_m > STILL_M
     if not is_moving.any():
         return 1.0
     ratio = float(np.mean(est_m[is_moving] / gt_m[is_moving]))
     return 1.0 / ratio if ratio > 0 else 1.0
-
-
-def _step_lengths(T: Array) -> Array:
-    """Distances (K - 1,) in m between successive poses (K, 4, 4)."""
-    steps_m = np.diff(T[:, :3, 3], axis=0)
-    return np.asarray(np.linalg.norm(steps_m, axis=1))
 
 
 def in_plane(T: Array, plane: Plane) -> Array:

@@ -25,7 +25,7 @@ from vobench.metric.ate import (
 from vobench.metric.comparison import HARTLEY, POSES, STURM_RPE, ZHANG, Comparison, MetricDefinition, OverLengths
 from vobench.metric.settings import RelativeRule, Unit
 from vobench.trajectory.associate import Index, nearest
-from vobench.trajectory.trajectory import Stamps, Trajectory
+from vobench.trajectory.trajectory import Stamps, Trajectory, path_lengths_m, step_lengths_m
 
 TOLERANCE = 0.1  # of delta, by which a pair of all pairs may miss it; evo's
 GAP_STEPS = 1.5  # a step this many times the usual one is a gap
@@ -61,11 +61,11 @@ def select_pairs(
         delta_rad = float(np.deg2rad(delta)) if unit == "d" else delta
         return _pairs_by_angle(T[:, :3, :3], delta_rad, all_pairs=all_pairs)
     if all_pairs:
-        along = _path_lengths(T) if unit == "m" else (t_ns - t_ns[:1]) / 1e9
+        along = path_lengths_m(T[:, :3, 3]) if unit == "m" else (t_ns - t_ns[:1]) / 1e9
         gaps = _gaps(t_ns) if spanning else None
         return pairs_along(along, delta, tolerance=TOLERANCE * delta, gaps=gaps)
     if unit == "m":
-        return _chain(_step_lengths(T), delta)
+        return _chain(step_lengths_m(T[:, :3, 3]), delta)
     return _chain(np.diff(t_ns), delta * 1e9)
 
 
@@ -136,18 +136,6 @@ def _first_of_equal(along: Array, poses: Index, first: Index) -> Index:
     """The first poses at the distances of others, but later than `first`, all (N,)."""
     arrivals = np.searchsorted(along, along[poses], side="left")
     return np.asarray(np.maximum(arrivals, first + 1))
-
-
-def _step_lengths(T: Array) -> Array:
-    """Distances (K - 1,) in m between successive poses (K, 4, 4)."""
-    steps_m = np.diff(T[:, :3, 3], axis=0)
-    return np.asarray(np.linalg.norm(steps_m, axis=1))
-
-
-def _path_lengths(T: Array) -> Array:
-    """Path length (K,) in m from the first pose to each of poses (K, 4, 4)."""
-    sums_m = np.cumsum(_step_lengths(T))
-    return np.concatenate([[0.0], sums_m])[: len(T)]
 
 
 def _gaps(t_ns: Stamps) -> Mask:
@@ -309,7 +297,7 @@ def part_errors(
 
     Gravity points along z of the world. Source: Zhang and Scaramuzza (2018), section IV.
     """
-    along_m = _path_lengths(T_gt)
+    along_m = path_lengths_m(T_gt[:, :3, 3])
     firsts = [NO_POSES]
     lasts = [NO_POSES]
     part_lengths_m = [np.zeros(0)]
