@@ -62,7 +62,7 @@ def test_too_short_or_without_a_change_of_speed_there_is_no_offset(n, step_m, me
 def test_25_steps_are_enough_and_24_are_not():
     stamps = np.arange(26) * 10**8
     assert estimate_offset(wander(stamps), wander(stamps)).offset_ns == pytest.approx(0, abs=1_000_000)
-    with pytest.raises(AlignmentError, match="hold 24 and 24"):
+    with pytest.raises(AlignmentError, match="have 24 and 24"):
         estimate_offset(wander(stamps[:-1]), wander(stamps[:-1]))
 
 
