@@ -290,7 +290,7 @@ class TestWaysOfAllKinds:
             ("kind: circle, radius_m: 1, speed_mps: 3", "the path of h moves at 1.32 m/s after 4.9 s, but the controller allows 0.75 m/s"),
             ("kind: circle, radius_m: 1000, mover: unicycle, rate_hz: 100", "2.095e+04 s at 100 Hz are 20945"),
             ("kind: square, side_m: 1, mover: ackermann", "a car cannot turn on the spot"),
-            ("kind: pose_spline, poses: [{t_s: 5, position_m: [0, 0, 1]}, {t_s: 6, position_m: [1, 0, 1]}, {t_s: 6, position_m: [2, 0, 1]}]", "pose 2 is at 6 s, the same time as pose 1 at 6 s; times should rise"),
+            ("kind: pose_spline, poses: [{t_s: 5, position_m: [0, 0, 1]}, {t_s: 6, position_m: [1, 0, 1]}, {t_s: 6, position_m: [2, 0, 1]}]", "pose 2 is at 6 s, the same time as pose 1 at 6 s; times should increase"),
             ("kind: quadrotor, points_m: [[0, 0, 1], [0, 0.1, 1]], t_s: [0, 0.02]", "the way ends within its first frame at 30 Hz"),
             ("targets_m: [[0, 0]]", "the way ends within its first frame at 30 Hz"),
             ("kind: quadrotor, points_m: [[0, 0, 1], [1, 0, 1]], t_s: [5, 4]", "point 1 is at 4 s, earlier than point 0 at 5 s"),

@@ -118,8 +118,8 @@ def ackermann(target: CurveMotion, settings: AckermannSettings = ACKERMANNS["sma
     """
     _require_drivable(target, settings)
     breaks_s = _breaks_s(target, settings)
-    marks_s = [[target.law.start_s], breaks_s, [target.law.end_s]]
-    nodes_s = _nodes(np.concatenate(marks_s))
+    ends_s = [target.law.start_s, target.law.end_s]
+    nodes_s = _nodes(np.insert(ends_s, 1, breaks_s))
     step_s = np.diff(nodes_s)
     middles_s = nodes_s[:-1] + step_s / 2
     advance, _ = _by_progress(target, middles_s)
