@@ -235,7 +235,10 @@ def test_what_is_told_does_not_depend_on_where_the_robot_is() -> None:
     ("asked", "sentence"),
     [
         ([(0.1, 0.0), (-0.8, 0.0)], r"reference after 0\.0 s is 0\.8 m/s, but the controller allows 0\.75 m/s"),
-        ([(0.0, 0.0)] * 30 + [(0.0, 2.0)], r"reference after 1\.0 s is 2 rad/s, but the controller allows 1\.745 rad/s"),
+        (
+            [(0.0, 0.0)] * 30 + [(0.0, 2.0)],
+            r"reference after 1\.0 s is 2 rad/s, but the controller allows 1\.745 rad/s",
+        ),
         ([(0.0, float("nan"))], "reference 1"),
     ],
 )
