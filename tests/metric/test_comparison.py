@@ -189,3 +189,16 @@ def test_a_comparison_and_a_definition_describe_themselves():
         "full": True,
     }
     assert "measure" not in replace(metric, measure=len).as_dict()
+
+
+def test_a_changed_comparison_has_no_results_of_the_one_it_was_made_of():
+    first = compare(curved(), curved())
+    second = compare(curved(), curved(scale=2.0))
+    assert first.once(lambda comparison: comparison.distances_m[-1]) > 0
+
+    def last_x(comparison):
+        return comparison.T_moving[-1, 0, 3]
+
+    before = first.once(last_x)
+    changed = replace(first, T_moving=3 * second.T_moving)
+    assert changed.once(last_x) == 3 * second.T_moving[-1, 0, 3] != before

@@ -430,3 +430,46 @@ def test_an_order_is_all_that_counts_on_one_case():
     b = np.array([4.0, 5.0, 6.0, 7.0, 8.0])
 
     assert difference_p(a, b) == difference_p(np.exp(a), np.exp(b)) == difference_p(-a, -b)
+
+
+def test_the_interval_of_a_ratio_is_that_of_a_paired_bootstrap_over_cases():
+    loss = losses_of(np.random.default_rng(21), [1, 1.5], cases=9, repeats=2)
+    counts = np.random.default_rng(1).multinomial(9, np.full(9, 1 / 9), size=1000)
+    case_log_ratios = (np.log(loss[1]) - np.log(loss[0])).mean(1)
+    expected = np.exp(np.quantile(counts @ case_log_ratios / 9, [0.025, 0.975]))
+
+    assert ranked(loss)[1].ratio_interval == pytest.approx(tuple(expected))
+    assert ranked(loss) == rank(loss, np.zeros_like(loss), seed=1)
+    assert ranked(loss) != rank(loss, np.zeros_like(loss), seed=2)
+
+
+def test_the_chance_of_neighbours_is_that_of_their_paired_differences_corrected_by_holm():
+    loss = losses_of(np.random.default_rng(22), [1, 1.2, 1.5], cases=6, repeats=2)
+    standings = ranked(loss)
+    order = [standing.index for standing in standings]
+    rng = np.random.default_rng(1)
+    p_values = []
+    for a, b in pairwise(order):
+        differences = (np.log(loss[b]) - np.log(loss[a])).ravel() / 12
+        p_values.append(permutation_p(differences, rng))
+
+    assert [standing.p_above for standing in standings[1:]] == pytest.approx(holm(p_values))
+
+
+def test_required_repeats_are_those_of_the_log_losses_of_both():
+    loss = losses_of(np.random.default_rng(23), [1, 1.05, 1.1], cases=6, repeats=4)
+    standings = ranked(loss)
+    for above, standing in pairwise(standings):
+        differences = np.log(loss[standing.index]) - np.log(loss[above.index])
+        assert standing.repeats == repeats_to_decide(differences, tests=2)
+
+
+def test_one_more_failure_outweighs_every_difference_of_losses_in_the_draws():
+    loss = np.stack([np.full((30, 1), 1.0), np.full((30, 1), 1e-9)])
+    failed = np.zeros_like(loss)
+    failed[1, :12] = 1.0
+    first, second = rank(loss, failed)
+
+    assert (first.index, second.index, second.decided_above) == (0, 1, True)
+    assert [first.places, second.places] == [(1, 1), (2, 2)]
+    assert second.loss_ratio == pytest.approx(1e-9)
