@@ -126,7 +126,7 @@ LENSES = {
 }
 
 
-def looking(*, pitch_deg: float, position_m: Position) -> Array:
+def looking(*, pitch_deg: float, position_m: tuple[float, float, float]) -> Array:
     """T_body_camera of a camera that looks ahead and `pitch_deg` below the horizon (90: at the floor)."""
     pitch = np.deg2rad(pitch_deg)
     forward = np.array([np.cos(pitch), 0.0, -np.sin(pitch)])

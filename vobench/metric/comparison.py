@@ -15,7 +15,7 @@ from vobench.trajectory.associate import Matched, match
 from vobench.trajectory.formats import seconds
 from vobench.trajectory.trajectory import Trajectory, step_lengths_m
 
-Result = TypeVar("Result")
+Found = TypeVar("Found")
 DEFAULTS = ScoreSettings()
 STILL_M = 1e-4  # a step that TartanAir's script counts as no motion
 
@@ -45,11 +45,11 @@ class Comparison:
         compare=False,
     )
 
-    def once(self, work: Callable[["Comparison"], Result]) -> Result:
+    def once(self, work: Callable[["Comparison"], Found]) -> Found:
         """The result of `work` for this comparison, computed on the first call."""
         if work not in self._results:
             self._results[work] = work(self)
-        result: Result = self._results[work]
+        result: Found = self._results[work]
         return result
 
     def __repr__(self) -> str:
