@@ -111,7 +111,6 @@ if TYPE_CHECKING:
         Equirectangular,
         KannalaBrandt,
         Pinhole,
-        unit,
     )
     from vobench.geometry.rig import (
         ImuCalibration,
@@ -123,6 +122,7 @@ if TYPE_CHECKING:
         side_by_side,
     )
     from vobench.geometry.se3 import Array
+    from vobench.geometry.vector import unit
     from vobench.metric.comparison import POSES, Comparison, MetricDefinition, OverLengths
     from vobench.metric.settings import ScoreSettings
     from vobench.report.contract import assert_contract
@@ -248,7 +248,7 @@ HOMES = {
     "Equirectangular": "vobench.geometry.camera",
     "KannalaBrandt": "vobench.geometry.camera",
     "Pinhole": "vobench.geometry.camera",
-    "unit": "vobench.geometry.camera",
+    "unit": "vobench.geometry.vector",
     "ImuCalibration": "vobench.geometry.rig",
     "Rectification": "vobench.geometry.rig",
     "Rig": "vobench.geometry.rig",

@@ -569,7 +569,7 @@ def test_what_cannot_be_scored_is_one_sentence(vobench, files_scoring, name, con
         (("--list", "odd"), "odd:2: a line should name a truth and an estimate, but has 3 words"),
         (("--list", "nothing"), "cannot read nothing: No such file or directory"),
         (("g.format_tum", "e.format_tum", "--project", "zx"), "no plane named 'zx'. Known: xy, xz, yz"),
-        (("g.format_tum", "e.format_tum", "--like", "tartanair_mono", "-a", "sim3"), "--align: should be se3 where TartanAir's own scale is asked for (got 'sim3')"),
+        (("g.format_tum", "e.format_tum", "--like", "tartanair_mono", "-a", "sim3"), "--align: should be se3 with the scale of TartanAir (got 'sim3')"),
         (("g.kitti", "e.kitti", "-u", "s"), "a delta in seconds needs stamps, and neither file has any; name one with --times"),
         (("g.format_tum", "e.format_tum", "--times", "times"), "--times is for files without stamps, but both files have theirs: times"),
         (("g.format_tum", "e.format_tum", "--est-topic", "/a"), "a topic is for a recording, but this is a text file: e.format_tum"),

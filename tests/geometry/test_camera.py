@@ -142,7 +142,7 @@ def test_the_fold_of_a_lens_is_where_its_jacobian_may_vanish_and_no_sooner(name:
     camera = CAMERAS[name]
     # Against the tangential terms is where it bends the most.
     x, y = camera.fold_radius * np.array([-camera.p2, -camera.p1])[:, None] / np.hypot(camera.p1, camera.p2)
-    _, _, xx, xy, yy = camera._bent(x, y)
+    _, _, xx, xy, yy = camera._distorted(x, y)
     assert abs(np.linalg.eigvalsh([[xx[0], xy[0]], [xy[0], yy[0]]])[0]) < 1e-9
 
 

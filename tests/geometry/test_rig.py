@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from vobench.errors import SettingError, VobenchError
+from vobench.errors import InputError, SettingError, VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import Equirectangular, Pinhole
 from vobench.geometry.rig import (
@@ -18,13 +18,18 @@ from vobench.geometry.rig import (
     SPREAD,
     CalibrationError,
     EyeError,
+    Lens,
+    OwnPair,
     Rig,
     StereoPreset,
     drawn,
+    lens_of,
     looking,
     mounted,
     own_pair,
     paper_lens,
+    projection,
+    rectification,
     resized,
     stereo_rig,
     true_rig,
@@ -174,7 +179,7 @@ def test_a_resized_picture_shows_the_same_in_other_pixels(rig: Rig) -> None:
     half = resized(rig.left, 0.5)
     points = np.random.default_rng(1).uniform([-0.3, -0.3, 1], [0.3, 0.3, 3], (50, 3))
     np.testing.assert_allclose(half.project(points), (rig.left.project(points) + 0.5) / 2 - 0.5)
-    with pytest.raises(VobenchError, match=r"picture_scale 0\.3333 should leave whole pixels"):
+    with pytest.raises(VobenchError, match=r"picture_scale 0\.3333 needs a focal length"):
         resized(rig.left, 0.3333)
 
 
@@ -187,7 +192,7 @@ def test_a_scale_that_leaves_whole_pixels_is_not_refused_for_rounding(percent: i
 
 @pytest.mark.parametrize("scale", [0.3501, 0.35 + 1e-6, 1 / 1280])
 def test_a_scale_that_leaves_part_of_a_pixel_or_hardly_one_is_refused(scale: float) -> None:
-    with pytest.raises(VobenchError, match=r"should leave whole pixels"):
+    with pytest.raises(VobenchError, match=r"must give a whole width and height"):
         resized(Pinhole(1280, 720, 640.0, 640.0, 639.5, 359.5), scale)
 
 
@@ -344,3 +349,105 @@ def test_the_cameras_sit_astride_the_robots_middle() -> None:
 def test_a_wheel_without_size_is_refused_by_name(name: str, value: float) -> None:
     with pytest.raises(SettingError, match=f"^{name}: should be (greater than 0|a whole number|a finite number)"):
         replace(PIONEER_WHEELS, **{name: value})
+
+
+def test_the_errors_drawn_from_a_seed_stay_the_same() -> None:
+    given = CalibrationError(level="worn", right_roll_deg=0.2, baseline_ratio=0.1)
+    rng = np.random.default_rng(3)
+    signs = rng.choice([-1.0, 1.0], 8)
+    yaw, roll, pitch, focal, baseline, x, y, distortion = signs * rng.uniform(1 - SPREAD, 1 + SPREAD, 8)
+    usual = RESIDUALS["worn"]
+    error = drawn(given, EUROC, np.random.default_rng(3))
+    f_px = EUROC.left.fx_px
+
+    assert error.right_yaw_deg == pytest.approx(np.degrees(yaw * np.arctan(usual.yaw_px / f_px)))
+    assert error.right_pitch_deg == pytest.approx(np.degrees(pitch * np.arctan(usual.pitch_px / f_px)))
+    roll_deg = np.degrees(np.arctan(usual.roll_px / (EUROC.left.width_px / 2)))
+    assert error.right_roll_deg == pytest.approx(0.2 + roll * roll_deg)
+    assert error.focal_ratio == pytest.approx(focal * usual.focal_ratio)
+    assert error.baseline_ratio == pytest.approx(0.1 + baseline * usual.baseline_ratio)
+    assert error.center_px == pytest.approx((x * usual.center_px[0], y * usual.center_px[1]))
+    assert error.distortion_ratio == pytest.approx(distortion * usual.distortion_ratio)
+    assert error.level == "none"
+
+
+def test_a_settings_class_of_errors_is_no_error_by_default() -> None:
+    numbers = [getattr(EyeError(), name) for name in EyeError.__dataclass_fields__]
+    assert numbers == [0.0, (0.0, 0.0), 0.0, 0.0, 0.0, 0.0]
+    error = CalibrationError()
+    assert (error.level, error.left, error.right) == ("none", EyeError(), EyeError())
+    assert error.of_eye("left") == error.of_eye("right") == EyeError()
+    assert drawn(error, EUROC, np.random.default_rng(0)) is error
+
+
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=list(PRESETS))
+def test_a_presets_lens_has_nearly_square_pixels_and_its_centre_near_that_of_the_picture(preset: StereoPreset) -> None:
+    for camera in (preset.left, preset.right):
+        if camera != LENSES["paper_literal"]:
+            assert camera.fx_px == pytest.approx(camera.fy_px, rel=0.01)
+        assert camera.cx_px == pytest.approx(camera.width_px / 2, rel=0.05)
+        assert camera.cy_px == pytest.approx(camera.height_px / 2, rel=0.1)
+    assert preset.left.fx_px == pytest.approx(preset.right.fx_px, rel=0.01)
+
+
+def test_an_own_pair_without_turns_is_parallel_and_its_right_lens_is_by_default_the_left_one() -> None:
+    lens = lens_of(EUROC.left)
+    pair = OwnPair(left=lens, right_at_m=(0.3, 0.0, 0.0)).preset()
+
+    assert pair.right == pair.left == EUROC.left
+    np.testing.assert_array_equal(pair.T_left_right, se3.transform(np.eye(3), [0.3, 0, 0]))
+
+
+@pytest.mark.parametrize(
+    ("model", "distortion", "fits"),
+    [
+        ("pinhole", (), True),
+        ("pinhole", (0.1,), False),
+        ("brown_conrady", (0.1,), False),
+        ("brown_conrady", (0.1, 0.2), True),
+        ("brown_conrady", (0.1, 0.2, 0.0, 0.0, 0.3), True),
+        ("brown_conrady", (0.1, 0.2, 0.0, 0.0, 0.3, 0.4), False),
+        ("double_sphere", (0.1, 0.5), True),
+        ("double_sphere", (0.1,), False),
+        ("kannala_brandt", (0.1, 0.0, 0.0, 0.0), True),
+    ],
+)
+def test_a_lens_takes_the_coefficients_of_its_model(model: str, distortion: tuple[float, ...], fits: bool) -> None:
+    lens = Lens(model=model, size_px=(64, 48), focal_px=(50.0, 51.0), center_px=(32.0, 24.0), distortion=distortion)
+    if not fits:
+        with pytest.raises(SettingError, match="distortion"):
+            lens.build()
+        return
+    camera = lens.build()
+    assert (camera.width_px, camera.height_px, camera.fx_px, camera.cy_px) == (64, 48, 50.0, 24.0)
+    assert tuple(getattr(camera, name) for name in camera.coefficients)[: len(distortion)] == distortion
+
+
+def test_a_camera_without_a_focal_length_is_no_lens_of_a_suite() -> None:
+    with pytest.raises(InputError, match="need a focal length, which this camera lacks"):
+        lens_of(Equirectangular(64, 32))
+
+
+def test_a_rig_of_one_camera_has_no_right_one() -> None:
+    single = replace(EUROC, right=None, T_body_right=None)
+
+    assert single.sides == ("left",)
+    assert EUROC.sides == ("left", "right")
+    assert single.camera("left") == EUROC.camera("left") == EUROC.left
+    for ask in (single.camera, single.T_body_camera):
+        with pytest.raises(InputError, match="a stereo pair needs two cameras, but this rig has one"):
+            ask("right")
+    assert rectification(single) is None
+
+
+def test_a_baseline_of_a_rig_is_the_distance_of_its_cameras() -> None:
+    assert stereo_rig(LENSES["paper_blender"], baseline_m=0.25, pitch_deg=30).baseline_m == pytest.approx(0.25)
+    distance_m = np.linalg.norm(EUROC.T_body_left[:3, 3] - EUROC.T_body_right[:3, 3])
+    assert EUROC.baseline_m == pytest.approx(distance_m)
+
+
+def test_a_projection_matrix_shifts_points_before_it_projects_them() -> None:
+    K = np.array([[100.0, 0, 50], [0, 110, 40], [0, 0, 1]])
+    pixel = projection(K, 0.5) @ [1.0, 2.0, 4.0, 1.0]
+
+    np.testing.assert_allclose(pixel[:2] / pixel[2], [100 * (1 - 0.5) / 4 + 50, 110 * 2 / 4 + 40])

@@ -104,3 +104,58 @@ def test_a_mirror_a_stretch_and_nonsense_are_no_rotations(matrix: Array) -> None
     assert se3.is_rotation(np.eye(3))
     assert not se3.is_rotation(matrix)
     assert not se3.is_rotation(np.stack([np.eye(3), matrix]))
+
+
+def test_roll_pitch_and_yaw_multiply_to_the_rotation() -> None:
+    R = random_transforms(100)[:, :3, :3]
+    roll, pitch, yaw = se3.roll_pitch_yaw_rad(R).T
+    expected = Rotation.from_euler("ZYX", np.stack([yaw, pitch, roll], -1)).as_matrix()
+    np.testing.assert_allclose(expected, R, atol=1e-14)
+    assert (np.abs(pitch) <= np.pi / 2).all()
+
+
+@pytest.mark.parametrize("pitch_rad", [np.pi / 2, -np.pi / 2])
+@pytest.mark.parametrize(("yaw_rad", "roll_rad"), [(0.3, 0.0), (0.3, 0.5), (-2.0, 0.1)])
+def test_at_90_degrees_of_pitch_the_whole_turn_is_yaw(pitch_rad: float, yaw_rad: float, roll_rad: float) -> None:
+    yaw, pitch, roll = (se3.rotation_z(yaw_rad), turn_y(pitch_rad), turn_x(roll_rad))
+    R = yaw @ pitch @ roll
+    R[2, 1:] = 0.0  # exactly at the pole
+    R[:2, 0] = 0.0
+    angles = se3.roll_pitch_yaw_rad(R)
+    assert angles[0] == 0.0
+    np.testing.assert_allclose(angles[1], pitch_rad)
+    np.testing.assert_allclose(se3.rotation_z(angles[2]) @ turn_y(pitch_rad), R, atol=1e-12)
+
+
+def turn_y(angle_rad: float) -> Array:
+    return Rotation.from_euler("y", angle_rad).as_matrix()
+
+
+def turn_x(angle_rad: float) -> Array:
+    return Rotation.from_euler("x", angle_rad).as_matrix()
+
+
+@pytest.mark.parametrize(("cosine", "is_merged"), [(0.9e-12, True), (1.1e-12, False)])
+def test_roll_and_yaw_merge_where_the_cosine_of_pitch_is_below_a_millionth_of_a_millionth(
+    cosine: float, is_merged: bool
+) -> None:
+    R = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, cosine, 0.0]])
+    assert (se3.roll_pitch_yaw_rad(R)[0] == 0.0) == is_merged
+
+
+def test_a_transform_broadcasts_one_rotation_over_many_translations() -> None:
+    t = np.arange(6.0).reshape(2, 3)
+    T = se3.transform(np.eye(3), t)
+    np.testing.assert_array_equal(T[:, :3, 3], t)
+    np.testing.assert_array_equal(T[:, 3], [[0, 0, 0, 1]] * 2)
+    assert se3.transform(se3.rotation_z([0.1, 0.2]), [0, 0, 0]).shape == (2, 4, 4)
+
+
+@pytest.mark.parametrize(("tolerance", "is_one"), [(1.9e-3, False), (2.1e-3, True)])
+def test_the_tolerance_of_a_rotation_is_that_of_its_product_with_its_transpose(tolerance: float, is_one: bool) -> None:
+    assert se3.is_rotation(np.sqrt(1.002) * np.eye(3), tolerance=tolerance) == is_one
+
+
+def test_a_transpose_is_the_inverse_of_a_rotation() -> None:
+    R = random_transforms(20)[:, :3, :3]
+    np.testing.assert_allclose(se3.transposed(R) @ R, np.broadcast_to(np.eye(3), R.shape), atol=1e-14)

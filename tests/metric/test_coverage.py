@@ -203,3 +203,51 @@ def test_frames_claimed_far_off_are_confidently_wrong():
     )
     assert result.failure.confidently_wrong == 4
     assert result.as_dict()["failure"]["confidently_wrong"] == 4
+
+
+def test_a_dense_truth_of_less_than_two_slots_is_one_slot():
+    t_ns = np.arange(61) * 5_000_000  # 0.3 s
+    assert slots(t_ns, "auto").tolist() == [0] * 61
+    assert coverage(t_ns, np.array([30]), of="auto").ratio == 1.0
+    assert slots(np.arange(81) * 5_000_000, "auto").tolist() == [0] * 40 + [1] * 41  # 0.4 s
+
+
+@pytest.mark.parametrize(("step_ns", "is_time"), [(29_999_999, True), (30_000_000, False)])
+def test_truth_with_thirty_milliseconds_between_its_poses_has_frames(step_ns, is_time):
+    t_ns = np.arange(100) * step_ns
+    assert coverage(t_ns, np.arange(100), of="auto").of == ("time" if is_time else "frames")
+    assert coverage(t_ns, np.arange(100), of="frames").of == "frames"
+
+
+@pytest.mark.parametrize(("left_ns", "ends_lost"), [(100_000_000, False), (105_000_000, True)])
+def test_by_time_the_last_tenth_of_a_second_needs_a_pose(left_ns, ends_lost):
+    t_ns = np.arange(401) * 5_000_000
+    frames = np.flatnonzero(t_ns <= t_ns[-1] - left_ns)
+    assert coverage(t_ns, frames, of="auto").ends_lost == ends_lost
+
+
+@pytest.mark.parametrize(("share", "survived"), [(5, True), (4, False)])
+def test_an_estimate_survives_with_half_of_the_frames_and_a_pose_at_the_end(share, survived):
+    frames = np.arange(10 - share, 10)
+    covered = coverage(T_NS, frames)
+    result = failure(np.zeros(share), frames, covered, fail_m=1.0)
+    assert result.survived == survived
+    assert result.lost_aware == pytest.approx(0.5 + 0.5 * share / 10 if survived else 0.5 * share / 10)
+
+    without_end = coverage(T_NS, np.arange(9))
+    assert not failure(np.zeros(9), np.arange(9), without_end, fail_m=1.0).survived
+
+
+def test_a_stationary_truth_has_no_lost_aware_score():
+    covered = coverage(T_NS, np.arange(10))
+    result = failure(np.ones(10), np.arange(10), covered, fail_m=0.0)
+    assert (result.survived, result.lost_aware, result.fail_m, result.confidently_wrong) == (True, None, 0.0, None)
+
+
+def test_poses_beyond_the_limit_are_confidently_wrong_and_the_best_of_a_slot_counts():
+    covered = coverage(T_NS, np.arange(10))
+    errors_m = np.array([0.5, 1.0, 1.5, 0.0])
+    result = failure(errors_m, np.array([0, 0, 1, 2]), covered, fail_m=1.0)
+    assert result.confidently_wrong == 1
+    accuracy = np.mean([0.5, 0.0, 1.0])
+    assert result.lost_aware == pytest.approx(0.5 + 0.5 * accuracy)

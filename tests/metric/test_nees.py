@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from vobench.errors import AlignmentError, TrajectoryError
 from vobench.geometry import se3
-from vobench.metric.nees import consistency, rotation_vector
+from vobench.metric.nees import METRICS, consistency, rotation_vector
 from vobench.metric.score import ScoreSettings, score
 from vobench.trajectory.align import Alignment
 from vobench.trajectory.trajectory import Trajectory
@@ -79,5 +79,37 @@ def test_covariances_in_space_are_not_compared_in_a_plane():
     t_ns = np.arange(5, dtype=np.int64) * 10**8
     T = se3.transform(np.eye(3), np.arange(15.0).reshape(5, 3) ** 2)
     truth = Trajectory(t_ns, T)
-    with pytest.raises(AlignmentError, match="covariances should be of poses in space, but project=xy"):
+    with pytest.raises(AlignmentError, match="covariances need poses in space, but the setting project is xy"):
         score(truth, truth, settings=ScoreSettings(project="xy"), covariance=np.tile(np.eye(6), (5, 1, 1)))
+
+
+def test_each_definition_states_the_degrees_of_freedom_of_its_part():
+    stated = {metric.id: metric.blind.split()[-3] for metric in METRICS}
+    assert stated == {"nees_pose": "6", "nees_trans": "3", "nees_rot": "3"}
+    assert {metric.unit for metric in METRICS} == {"1"}
+    assert {metric.headline for metric in METRICS} == {"mean"}
+
+
+def test_a_position_error_of_one_standard_deviation_counts_one():
+    T = se3.transform(np.eye(3), [[0.0, 0, 0]])
+    T_est = se3.transform(np.eye(3), [[0.2, 0, 0]])
+    P = np.diag([0.2**2, 1, 1, 1, 1, 1])[None]
+    result = consistency(T, T_est, P, STAY)
+    np.testing.assert_allclose([result.pose[0], result.trans[0], result.rot[0]], [1.0, 1.0, 0.0])
+
+
+def test_an_alignment_with_scale_scales_the_covariance_of_positions_alone():
+    alignment = Alignment("sim3", np.eye(3), np.zeros(3), 3.0, ())
+    R = Rotation.from_rotvec([[0.1, 0, 0]]).as_matrix()
+    T_gt = se3.transform(R, [[3.0 + 0.6, 0, 0]])
+    T_est = se3.transform(np.eye(3), [[1.0, 0, 0]])
+    P = np.diag([0.2**2, 1, 1, 0.1**2, 1, 1])[None]
+    result = consistency(T_gt, T_est, P, alignment)
+    np.testing.assert_allclose([result.trans[0], result.rot[0], result.pose[0]], [1.0, 1.0, 2.0])
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-13, 1e-6, 1.0, 3.1])
+def test_a_rotation_vector_is_axis_times_angle(angle):
+    axis = np.array([1.0, -2.0, 2.0]) / 3
+    R = Rotation.from_rotvec(angle * axis).as_matrix()
+    np.testing.assert_allclose(rotation_vector(R), angle * axis, atol=1e-15, rtol=1e-9)

@@ -6,7 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vobench.geometry import se3
-from vobench.metric.segment import devkit_distances, mean_drift, segment_errors, segment_pairs
+from vobench.metric.score import ScoreSettings, score
+from vobench.metric.segment import devkit_distances, mean_drift, scale_errors, segment_errors, segment_pairs
+from vobench.trajectory.trajectory import Trajectory
 
 STEP_M = 0.25  # a power of two, so that path lengths are exact and "strictly beyond" shows
 
@@ -122,3 +124,71 @@ def test_the_devkits_cosine_that_six_digits_push_beyond_one_is_cut(angle, half_t
     T_est[1:, :3, :3] = (1 - 1e-6) * se3.rotation_z(angle)  # its inverse is as much too large
     s = segment_errors(T_gt, T_est, np.arange(4), np.arange(4.0), lengths_m=(2.5,), precision="devkit")
     assert s.rot_radpm == pytest.approx(half_turns * np.pi / 2.5)
+
+
+# Scale: found where it is, and its drift with it.
+N = 200
+ALONG_M = np.arange(N) * 0.1
+FIRST = np.arange(N - 10)
+
+
+def line(positions_m):
+    return se3.transform(np.eye(3), np.asarray(positions_m)[:, None] * [0.6, 0.8, 0.0])
+
+
+@given(st.floats(0.01, 100))
+def test_a_constant_scale_is_found_everywhere_and_does_not_drift(factor):
+    found = scale_errors(line(ALONG_M), line(factor * ALONG_M), ALONG_M, FIRST, FIRST + 10)
+    np.testing.assert_allclose(found.error, factor - 1, atol=1e-9 * max(factor, 1))
+    assert found.drift_per_m == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_scale_that_grows_by_a_percent_a_metre_drifts_by_a_percent_a_metre():
+    steps = 0.1 * np.exp(0.01 * (ALONG_M[:-1] + 0.05))
+    found = scale_errors(line(ALONG_M), line(np.concatenate([[0], np.cumsum(steps)])), ALONG_M, FIRST, FIRST + 10)
+    assert found.drift_per_m == pytest.approx(0.01, rel=1e-6)
+
+
+def test_segments_that_come_back_show_no_scale():
+    there_and_back = np.concatenate([ALONG_M[:100], ALONG_M[100:0:-1]])
+    found = scale_errors(line(there_and_back), line(1.1 * there_and_back), ALONG_M, FIRST, FIRST + 10)
+    np.testing.assert_allclose(found.error, 0.1, atol=1e-9)
+    assert len(found.error) < len(FIRST)
+
+
+def test_a_truth_that_stands_shows_no_scale():
+    found = scale_errors(line(0 * ALONG_M), line(ALONG_M), ALONG_M, FIRST, FIRST + 10)
+    assert (len(found.error), found.drift_per_m) == (0, 0.0)
+    none = scale_errors(line(ALONG_M), line(ALONG_M), ALONG_M, FIRST[:0], FIRST[:0])
+    assert (len(none.error), none.drift_per_m) == (0, 0.0)
+
+
+def test_a_score_in_full_has_the_ten_percent_that_rpgs_index_bug_hides():
+    T = line(ALONG_M)
+    T[:, 2, 3] = np.sin(ALONG_M)
+    scaled = T.copy()
+    scaled[:, :3, 3] *= 1.1
+    t_ns = np.arange(N) * 10**8
+    result = score(Trajectory(t_ns, T), Trajectory(t_ns, scaled), settings=ScoreSettings(full=True))
+    assert result.metric("scale_error").statistics.mean == pytest.approx(0.1)
+
+
+def test_a_segment_that_ends_within_a_tenth_of_the_median_distance_shows_no_scale():
+    x_m = np.array([0.0, 1.0, 0.0, 1.0, 0.0, 0.11, 0.0, 0.09])
+    first = np.array([0, 2, 4, 6])
+    found = scale_errors(line(x_m), line(3 * x_m), np.arange(8.0), first, first + 1)
+
+    assert len(found.error) == 4  # the median is 0.555
+    first_long = np.array([0, 0, 0, 4, 6])
+    found = scale_errors(line(x_m), line(3 * x_m), np.arange(8.0), first_long, np.array([1, 3, 1, 5, 7]))
+    np.testing.assert_allclose(found.error, [2.0] * 4)  # the median is 1: 0.11 counts, 0.09 does not
+
+
+def test_the_drift_of_scale_is_the_slope_over_the_middles_of_segments():
+    along_m = np.array([0.0, 2.0, 10.0, 14.0])
+    gt = line([0.0, 1.0, 2.0, 3.0])
+    est = line([0.0, 1.0, 0.0, np.e])
+    found = scale_errors(gt, est, along_m, np.array([0, 2]), np.array([1, 3]))
+
+    np.testing.assert_allclose(found.error, [0.0, np.e - 1])
+    assert found.drift_per_m == pytest.approx(1 / (12 - 1))  # the logarithm rises by 1 from 1 m to 12 m

@@ -147,5 +147,5 @@ class Unwinding:
 
 
 def test_a_way_too_sharp_in_its_first_metre_alone_is_a_sentence():
-    with pytest.raises(MotionError, match=r"the way turns with a radius of 0\.1 m, but a wheelbase"):
+    with pytest.raises(MotionError, match=r"the path turns with a radius of 0\.1 m, but a wheelbase"):
         ackermann(CurveMotion(Unwinding(), evenly(0.0, 40.0)), ACKERMANNS["kitti_like"])

@@ -83,7 +83,7 @@ def test_the_order_and_the_mirror_of_the_instants_do_not_matter() -> None:
 )
 def test_a_run_that_cannot_tell_a_parameter_names_it(speeds: Array, untold: str) -> None:
     references = np.random.default_rng(2).uniform(-1, 1, (50, 2)) * (np.abs(speeds).max(0) > 0)
-    with pytest.raises(MotionError, match=f"does not tell {untold}: drive with"):
+    with pytest.raises(MotionError, match=f"does not determine {untold}: drive with"):
         identify(*run_of(speeds, references, THETAS["pioneer_3dx"]))
 
 

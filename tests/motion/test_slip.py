@@ -17,7 +17,7 @@ from vobench.motion.pioneer import THETAS, accelerations
 from vobench.motion.slip import (
     DELTAS,
     DISTURBANCE_STREAMS,
-    MOST_SLIP,
+    MAX_SLIP,
     SLIP_STREAMS,
     SLIPS,
     SURFACES,
@@ -255,7 +255,7 @@ def test_a_pull_to_the_left_is_added_to_the_angle_at_which_the_robot_slides() ->
 
 def test_slip_is_cut_before_the_formulas_lose_their_meaning() -> None:
     run = driven(patch_of("icy", *EVERYWHERE))
-    assert np.abs(run.slip).max() == MOST_SLIP
+    assert np.abs(run.slip).max() == MAX_SLIP
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
-from vobench.motion.spline import Jet, cross, of_axes, of_quaternion, pose_spline, quintic, turned, unit
+from vobench.motion.spline import Jet, of_axes, of_quaternion, pose_spline, quintic, turned
 
 SEEDS = st.integers(0, 2**32 - 1)
 STEP = 1e-3
@@ -57,7 +57,7 @@ def test_a_quaternion_of_any_changing_length_gives_the_same(seed, growth):
 
 
 @given(SEEDS)
-def test_unit_and_cross_differentiate_as_they_should(seed):
+def test_a_direction_and_a_cross_product_differentiate_as_they_should(seed):
     p, q, r, s = np.random.default_rng(seed).normal(size=(4, 3))
 
     def a(t):
@@ -67,8 +67,8 @@ def test_unit_and_cross_differentiate_as_they_should(seed):
         return s * np.cos(t) + p * np.sin(t)
 
     for found, expected in (
-        (unit(jet(a)), jet(lambda t: a(t) / np.linalg.norm(a(t)))),
-        (cross(jet(a), jet(b)), jet(lambda t: np.cross(a(t), b(t)))),
+        (jet(a).direction(), jet(lambda t: a(t) / np.linalg.norm(a(t)))),
+        (jet(a).cross(jet(b)), jet(lambda t: np.cross(a(t), b(t)))),
     ):
         np.testing.assert_allclose(found, expected, atol=1e-5)
 
@@ -159,15 +159,15 @@ def turned_half_round():
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        (at_times(p3=2.0), "pose 3 is at 2 s, the same time as pose 2 at 2 s; times should rise"),
+        (at_times(p3=2.0), "pose 3 is at 2 s, the same time as pose 2 at 2 s; times should increase"),
         (at_times(p3=1.5), "pose 3 is at 1.5 s, earlier than pose 2 at 2 s"),
         (at_times(p4=np.nan), "the time of pose 4 is nan"),
         (broken(5, np.nan), "pose 5 at .* s is not finite"),
         ((np.arange(2.0), np.stack([np.eye(4)] * 2)), "needs 3 poses or more, but there are 2"),
         ((np.arange(1.0), np.eye(4)[None]), "needs 3 poses or more, but there is 1"),
         ((np.arange(4.0), np.stack([np.eye(4)] * 3)), "4 times need as many poses"),
-        ((np.arange(3.0), np.stack([np.eye(4), 2 * np.eye(4), np.eye(4)])), "the rotation of pose 1 at 1 s is none"),
-        (turned_half_round(), "pose 1 is turned by 180 deg against the one before"),
+        ((np.arange(3.0), np.stack([np.eye(4), 2 * np.eye(4), np.eye(4)])), "the rotation of pose 1 at 1 s is invalid"),
+        (turned_half_round(), "pose 1 is turned by 180 deg from the one before"),
     ],
 )
 def test_poses_that_make_no_spline_are_named(given, sentence):

@@ -259,3 +259,45 @@ def test_a_slight_bend_that_both_sides_show_does_tell_the_roll(seed):
     fit = align(T_est, T_gt, kind="se3")
     assert fit.unobservable == ()
     assert se3.rotation_angle(fit.rotation @ R) < 0.1
+
+
+@pytest.mark.parametrize("is_est_straight", [True, False])
+def test_a_roll_is_uncertain_if_either_side_is_nearly_straight_and_the_other_does_not_follow(is_est_straight):
+    rng = np.random.default_rng(3)
+    straight = line(100).copy()
+    straight[:, 1:3, 3] = 0.005 * 5 * rng.normal(size=(100, 2)) / 4
+    swaying = line(100).copy()
+    swaying[:, 1:3, 3] = 0.05 * 5 * rng.normal(size=(100, 2))
+    est, gt = (straight, swaying) if is_est_straight else (swaying, straight)
+
+    assert align(est, gt, kind="se3").unobservable == ("roll about the path",)
+
+
+def test_two_paths_that_sway_differently_by_more_than_a_hundredth_still_have_a_roll():
+    rng = np.random.default_rng(3)
+    est, gt = line(100).copy(), line(100).copy()
+    for T in (est, gt):
+        T[:, 1:3, 3] = 0.3 * rng.normal(size=(100, 2))
+
+    assert align(est, gt, kind="se3").unobservable == ()
+
+
+@pytest.mark.parametrize(("share", "is_stationary"), [(0.9e-6, True), (1.1e-6, False)])
+@pytest.mark.parametrize("kind", ["se3", "yaw"])
+def test_a_side_counts_as_stationary_below_a_millionth_of_the_others_extent(share, is_stationary, kind):
+    T = random_poses(np.random.default_rng(4), 30)
+    small = moved(T, np.eye(3), np.zeros(3), share)
+
+    for est, gt in ((small, T), (T, small)):
+        assert bool(align(est, gt, kind=kind).unobservable) == is_stationary
+
+
+@pytest.mark.parametrize(("share", "is_line"), [(0.9e-6, True), (1.2e-6, False)])
+def test_a_path_counts_as_a_line_below_a_millionth_of_its_extent(share, is_line):
+    x = np.linspace(-1, 1, 41)
+    y = share * np.cos(np.arange(41) * 2.0) * np.std(x) / np.std(np.cos(np.arange(41) * 2.0))
+    T = se3.transform(np.eye(3), np.stack([x, y, 0 * x], -1))
+    rotation = random_rotation(np.random.default_rng(5))
+    est = se3.transform(np.eye(3), T[:, :3, 3] @ rotation.T)
+
+    assert (align(est, T, kind="se3").unobservable != ()) == is_line

@@ -11,6 +11,10 @@ from vobench.errors import TrajectoryError
 from vobench.geometry import se3
 from vobench.trajectory.formats import (
     NUMBER,
+    csv_rows,
+    format_euroc,
+    format_kitti,
+    format_times,
     format_tum,
     parse_any,
     parse_times,
@@ -272,3 +276,77 @@ def test_the_scalar_may_come_first():
 def test_huge_numbers_are_no_rotation_and_no_warning():
     with pytest.raises(TrajectoryError, match="should be a rotation"):
         parse_any("1e200 0 0 0 0 1e200 0 0 0 0 1 0", name="k")
+
+
+def test_euroc_text_has_its_header_the_scalar_first_and_is_read_back():
+    before = random_trajectory(50, seed=2)
+    text = format_euroc(before)
+    header = text.partition("\n")[0]
+    parsed = parse_any(text, name="x")
+
+    assert header.startswith("#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x []")
+    assert header.count(",") == 7
+    assert (parsed.unit, parsed.order) == ("ns", "wxyz")
+    np.testing.assert_array_equal(parsed.t_ns, before.t_ns)
+    np.testing.assert_allclose(parsed.T, before.T_world_frame, rtol=0, atol=1.5e-15)
+
+
+@pytest.mark.parametrize(("columns", "last"), [(3, "v_RS_R_z [m s^-1]"), (9, "b_a_RS_S_z [m s^-2]")])
+def test_euroc_text_may_have_velocities_and_biases(columns, last):
+    before = random_trajectory(3, seed=2)
+    more = np.arange(3.0 * columns).reshape(3, columns)
+    header, *rows = format_euroc(before, more).splitlines()
+
+    assert header.endswith(last)
+    assert [[float(field) for field in row.split(",")[8:]] for row in rows] == more.tolist()
+
+
+def test_kitti_text_and_times_are_read_back_with_every_digit():
+    before = random_trajectory(20, seed=3)
+    parsed = parse_any(format_kitti(before.T_world_frame), name="x")
+
+    np.testing.assert_array_equal(parsed.T, before.T_world_frame)
+    np.testing.assert_array_equal(parse_times(format_times(before.t_ns), name="x"), before.t_ns)
+
+
+def test_rows_of_a_csv_have_a_stamp_and_every_digit():
+    assert csv_rows(np.array([7, -8]), np.array([[0.1, 2.0], [1e-300, -0.0]])) == "7,0.1,2.0\n-8,1e-300,-0.0\n"
+
+
+@pytest.mark.parametrize(
+    ("t_ns", "text"),
+    [(0, "0.000000000"), (1, "0.000000001"), (-1, "-0.000000001"), (-1_500_000_000, "-1.500000000")],
+)
+def test_seconds_have_nine_decimals_and_a_sign(t_ns, text):
+    assert seconds(t_ns) == text
+
+
+@pytest.mark.parametrize(
+    ("unit", "text", "limit"),
+    [
+        ("s", "9223372036.854775808", "9223372036.854775807"),
+        ("ms", "9223372036854.775808", "9223372036854.775807"),
+        ("ns", "9223372036854775808", "9223372036854775807"),
+    ],
+)
+def test_a_stamp_beyond_int64_is_refused_and_the_last_one_is_not(unit, text, limit):
+    assert parse_any(f"{limit} {POSE}", name="x", unit=unit).t_ns.tolist() == [2**63 - 1]
+    with pytest.raises(TrajectoryError, match=re.escape(f"below {limit}, but is {text} (is it in another unit?)")):
+        parse_any(f"{text} {POSE}", name="x", unit=unit)
+
+
+def test_the_row_of_a_wrong_quaternion_is_named_with_its_numbers():
+    with pytest.raises(
+        TrajectoryError, match=re.escape("x:2: the quaternion's norm should be 1 within 0.001, but (0, 0, 0, 2) has 2")
+    ):
+        parse_any(f"1 {POSE}\n2 0 0 0 0 0 0 2\n3 0 0 0 0 0 0 3\n", name="x")
+
+
+@pytest.mark.parametrize(("norm", "is_right"), [(1.0009, True), (0.9991, True), (1.0011, False), (0.9989, False)])
+def test_a_norm_may_be_a_thousandth_off(norm, is_right):
+    text = f"1 0 0 0 0 0 0 {norm}\n"
+    if is_right:
+        np.testing.assert_allclose(parse_any(text, name="x").T[0], np.eye(4), atol=1e-15)
+        return
+    with pytest.raises(TrajectoryError, match="the quaternion's norm should be 1"):
+        parse_any(text, name="x")

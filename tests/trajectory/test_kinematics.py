@@ -77,10 +77,10 @@ def test_a_law_that_ends_while_it_speeds_up_goes_on_evenly():
 @pytest.mark.parametrize(
     ("figures", "sentence"),
     [
-        ((0, 1, 1), "the length of the way is 0; it should be a finite number above 0"),
-        ((1, np.nan, 1), "the speed on it is nan"),
-        ((1, 1, -2), "the acceleration on it is -2"),
-        ((1, np.inf, 1), "the speed on it is inf"),
+        ((0, 1, 1), "the length of the path is 0; it should be a finite number above 0"),
+        ((1, np.nan, 1), "the speed on the path is nan"),
+        ((1, 1, -2), "the acceleration on the path is -2"),
+        ((1, np.inf, 1), "the speed on the path is inf"),
         ((1, 1e-9, 1), r"takes 1e\+09 s; it should be from a nanosecond to a day"),
     ],
 )

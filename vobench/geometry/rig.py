@@ -8,8 +8,9 @@ from annotated_types import Ge, Gt, Le, Lt
 
 from vobench.errors import InputError, SettingError, VobenchError
 from vobench.geometry import se3
-from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Focal, KannalaBrandt, Pinhole, unit
+from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Focal, KannalaBrandt, Pinhole
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.setting import OneOf, Positive, Triple, nearest_whole, settings
 
 # Focal length, sensor and resolution as the paper gives them (section II-B).
@@ -20,7 +21,7 @@ PAPER_SIZE_PX = (720, 480)
 
 @settings(kw_only=False)
 class WheelGeometry:
-    """Nominal geometry of the two driven wheels, as an odometer believes it."""
+    """Nominal geometry of the two driven wheels, which the odometry uses."""
 
     radius_m: Positive
     track_m: Positive
@@ -33,9 +34,9 @@ PIONEER_WHEELS = WheelGeometry(radius_m=0.0975, track_m=0.331, ticks_per_revolut
 
 @dataclass(frozen=True, slots=True)
 class ImuCalibration:
-    """An IMU on the body as its calibration has it: where it sits, and how noisy it is said to be.
+    """The nominal calibration of an IMU on the body: its pose, its rate and its noise.
 
-    White noise as densities in rad/s/√Hz and m/s²/√Hz, the walks of both biases in rad/s²/√Hz and
+    White noise is given as densities in rad/s/√Hz and m/s²/√Hz, the random walks of both biases in rad/s²/√Hz and
     m/s³/√Hz: the four numbers of Kalibr's imu.yaml.
     """
 
@@ -47,17 +48,19 @@ class ImuCalibration:
     accel_walk: float
 
 
+Position = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 Side = Literal["left", "right"]
 SIDES: tuple[Side, ...] = ("left", "right")
-ONE_CAMERA = "this rig has one camera, and a stereo pair is asked for"
+ONE_CAMERA = "a stereo pair needs two cameras, but this rig has one"
 
 
 @dataclass(frozen=True, slots=True)
 class Rig:
-    """The cameras, where they sit on the body, the wheels and the IMU: all the calibration there is.
+    """The complete calibration of a body: cameras and their poses, wheels and IMU.
 
-    The left camera is the reference; all look along their own z axis. A rig of one camera has no
-    right one; wheels and imu are None where the recording has none.
+    The left camera is the reference; each camera looks along its z axis. A rig of one camera has no
+    right one; `wheels` and `imu` are None for a recording without them.
     """
 
     left: Camera
@@ -69,18 +72,18 @@ class Rig:
 
     @property
     def sides(self) -> tuple[Side, ...]:
-        """The cameras there are."""
+        """The sides that have a camera."""
         return SIDES if self.right else SIDES[:1]
 
     def camera(self, side: Side) -> Camera:
-        """One of the cameras. Raises InputError where the rig has no right one."""
+        """The camera of one side. Raises InputError if the rig has no right one."""
         camera = self.left if side == "left" else self.right
         if camera is None:
             raise InputError(ONE_CAMERA)
         return camera
 
     def T_body_camera(self, side: Side) -> Array:
-        """Where it sits on the body. Raises InputError where the rig has no right one."""
+        """The pose (4, 4) of one camera on the body. Raises InputError if the rig has no right one."""
         T_body_camera = self.T_body_left if side == "left" else self.T_body_right
         if T_body_camera is None:
             raise InputError(ONE_CAMERA)
@@ -88,7 +91,7 @@ class Rig:
 
     @property
     def T_left_right(self) -> Array:
-        """Pose of the right camera seen from the left one."""
+        """The pose (4, 4) of the right camera in the left camera's frame."""
         return se3.inverse(self.T_body_left) @ self.T_body_camera("right")
 
     @property
@@ -103,13 +106,24 @@ def paper_lens(*, square_pixels: bool) -> Pinhole:
     Taken literally both sensor sides count and pixels are not square (fx 658.3, fy 545.1);
     Blender fits the width alone, which gives fx = fy = 658.3.
     """
-    width, height = PAPER_SIZE_PX
-    fx = PAPER_FOCAL_MM / PAPER_SENSOR_MM[0] * width
-    fy = fx if square_pixels else PAPER_FOCAL_MM / PAPER_SENSOR_MM[1] * height
-    return Pinhole(width, height, fx, fy, (width - 1) / 2, (height - 1) / 2)
+    width_px, height_px = PAPER_SIZE_PX
+    width_mm, height_mm = PAPER_SENSOR_MM
+    fx_px = PAPER_FOCAL_MM / width_mm * width_px
+    fy_px = fx_px if square_pixels else PAPER_FOCAL_MM / height_mm * height_px
+    return Pinhole(
+        width_px=width_px,
+        height_px=height_px,
+        fx_px=fx_px,
+        fy_px=fy_px,
+        cx_px=(width_px - 1) / 2,
+        cy_px=(height_px - 1) / 2,
+    )
 
 
-LENSES = {"paper_literal": paper_lens(square_pixels=False), "paper_blender": paper_lens(square_pixels=True)}
+LENSES = {
+    "paper_literal": paper_lens(square_pixels=False),
+    "paper_blender": paper_lens(square_pixels=True),
+}
 
 
 def looking(*, pitch_deg: float, position_m: tuple[float, float, float]) -> Array:
@@ -117,7 +131,9 @@ def looking(*, pitch_deg: float, position_m: tuple[float, float, float]) -> Arra
     pitch = np.deg2rad(pitch_deg)
     forward = np.array([np.cos(pitch), 0.0, -np.sin(pitch)])
     right = np.array([0.0, -1.0, 0.0])
-    return se3.transform(np.stack([right, np.cross(forward, right), forward], -1), position_m)
+    down = np.cross(forward, right)
+    R_body_camera = np.stack([right, down, forward], -1)
+    return se3.transform(R_body_camera, position_m)
 
 
 def mounted(
@@ -130,15 +146,18 @@ def mounted(
     height_m: float = 0.4,
     wheels: WheelGeometry = PIONEER_WHEELS,
 ) -> Rig:
-    """A pair astride the robot's middle, `forward_m` ahead of its axle; pitch and height are the left camera's."""
+    """A pair centred on the robot, `forward_m` ahead of its axle; pitch and height are the left camera's."""
     baseline_m = float(np.linalg.norm(T_left_right[:3, 3]))
-    T_body_left = looking(pitch_deg=pitch_deg, position_m=(forward_m, baseline_m / 2, height_m))
-    return Rig(left, right, T_body_left, T_body_left @ T_left_right, wheels)
+    left_position_m = (forward_m, baseline_m / 2, height_m)
+    T_body_left = looking(pitch_deg=pitch_deg, position_m=left_position_m)
+    T_body_right = T_body_left @ T_left_right
+    return Rig(left, right, T_body_left, T_body_right, wheels)
 
 
 def stereo_rig(lens: Camera, *, baseline_m: float = 0.12, **mount: Any) -> Rig:
-    """Two equal cameras side by side across the robot, as `mounted`."""
-    return mounted(lens, lens, side_by_side(baseline_m), **mount)
+    """A rig of two equal, parallel cameras side by side, with the arguments of `mounted`."""
+    T_left_right = side_by_side(baseline_m)
+    return mounted(lens, lens, T_left_right, **mount)
 
 
 def side_by_side(baseline_m: float) -> Array:
@@ -148,7 +167,7 @@ def side_by_side(baseline_m: float) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class StereoPreset:
-    """Two cameras as one buys or publishes them, before they are put on a robot; `source` says whose figures."""
+    """Two cameras as sold or published, before they are put on a robot; `source` cites the figures."""
 
     left: Camera
     right: Camera
@@ -163,23 +182,29 @@ class StereoPreset:
     def at_baseline(self, baseline_m: float) -> Array:
         """T_left_right with the right camera moved along the baseline to that distance."""
         T_left_right = self.T_left_right.copy()
-        T_left_right[:3, 3] = T_left_right[:3, 3] / self.baseline_m * baseline_m
+        direction = T_left_right[:3, 3] / self.baseline_m
+        T_left_right[:3, 3] = direction * baseline_m
         return T_left_right
 
 
 def _between(T_imu_left: Array, T_imu_right: Array) -> Array:
+    """T_left_right of two cameras whose poses are published relative to an IMU."""
     return se3.inverse(T_imu_left) @ T_imu_right
 
 
 def _from_rows(*rows: tuple[float, float, float, float]) -> Array:
     """A transform from its upper three rows, which are printed with too few digits to be a rotation."""
     table = np.array(rows)
-    return se3.transform(se3.nearest_rotation(table[:, :3]), table[:, 3])
+    R = se3.nearest_rotation(table[:, :3])
+    t_m = table[:, 3]
+    return se3.transform(R, t_m)
 
 
-def _from_quaternion(t_m: tuple[float, float, float], q_xyzw: tuple[float, float, float, float]) -> Array:
+def _from_quaternion(t_m: Position, q_xyzw: Quaternion) -> Array:
+    """A transform from its translation and its quaternion, which is printed with few digits."""
     q = np.array(q_xyzw)
-    return se3.transform(se3.from_quaternion(q / np.linalg.norm(q)), t_m)
+    R = se3.from_quaternion(q / np.linalg.norm(q))
+    return se3.transform(R, t_m)
 
 
 def _paper(lens: Pinhole, reading: str) -> StereoPreset:
@@ -193,10 +218,28 @@ def _paper(lens: Pinhole, reading: str) -> StereoPreset:
 
 EUROC = StereoPreset(
     left=BrownConrady(
-        752, 480, 458.654, 457.296, 367.215, 248.375, -0.28340811, 0.07395907, 0.00019359, 1.76187114e-05
+        width_px=752,
+        height_px=480,
+        fx_px=458.654,
+        fy_px=457.296,
+        cx_px=367.215,
+        cy_px=248.375,
+        k1=-0.28340811,
+        k2=0.07395907,
+        p1=0.00019359,
+        p2=1.76187114e-05,
     ),
     right=BrownConrady(
-        752, 480, 457.587, 456.134, 379.999, 255.238, -0.28368365, 0.07451284, -0.00010473, -3.55590700e-05
+        width_px=752,
+        height_px=480,
+        fx_px=457.587,
+        fy_px=456.134,
+        cx_px=379.999,
+        cy_px=255.238,
+        k1=-0.28368365,
+        k2=0.07451284,
+        p1=-0.00010473,
+        p2=-3.55590700e-05,
     ),
     T_left_right=_between(
         _from_rows(
@@ -222,7 +265,19 @@ D435I = StereoPreset(
     "orb_slam_2_ros issue 46 (baseline); that a D435i has the same stereo module is by its data sheet",
 )
 
-ZED2I_LENS = BrownConrady(1280, 720, 531.99, 532.04, 638.79, 364.9, -0.058, 0.032, 0.0005, -0.0009, -0.012)
+ZED2I_LENS = BrownConrady(
+    width_px=1280,
+    height_px=720,
+    fx_px=531.99,
+    fy_px=532.04,
+    cx_px=638.79,
+    cy_px=364.9,
+    k1=-0.058,
+    k2=0.032,
+    p1=0.0005,
+    p2=-0.0009,
+    k3=-0.012,
+)
 ZED2I = StereoPreset(
     left=ZED2I_LENS,
     right=ZED2I_LENS,
@@ -242,12 +297,28 @@ TARTANAIR = StereoPreset(
 
 FISHEYE = StereoPreset(
     left=KannalaBrandt(
-        *(512, 512, 190.97847715128717, 190.9733070521226, 254.93170605935475, 256.8974428996504),
-        *(0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202, 0.00020293673591811182),
+        width_px=512,
+        height_px=512,
+        fx_px=190.97847715128717,
+        fy_px=190.9733070521226,
+        cx_px=254.93170605935475,
+        cy_px=256.8974428996504,
+        k1=0.0034823894022493434,
+        k2=0.0007150348452162257,
+        k3=-0.0020532361418706202,
+        k4=0.00020293673591811182,
     ),
     right=KannalaBrandt(
-        *(512, 512, 190.44236969414825, 190.4344384721956, 252.59949716835982, 254.91723064636983),
-        *(0.0034003170790442797, 0.001766278153469831, -0.00266312569781606, 0.0003299517423931039),
+        width_px=512,
+        height_px=512,
+        fx_px=190.44236969414825,
+        fy_px=190.4344384721956,
+        cx_px=252.59949716835982,
+        cy_px=254.91723064636983,
+        k1=0.0034003170790442797,
+        k2=0.001766278153469831,
+        k3=-0.00266312569781606,
+        k4=0.0003299517423931039,
     ),
     T_left_right=_between(
         _from_quaternion(
@@ -283,7 +354,7 @@ LENS_MODELS: dict[str, Any] = {
 
 @settings()
 class Lens:
-    """One lens: its model, and that model's numbers; `distortion` in the model's own order."""
+    """One lens: its model and the parameters of that model, `distortion` in the model's order."""
 
     model: Annotated[str, OneOf("model of a lens", LENS_MODELS)] = "pinhole"
     size_px: tuple[Annotated[int, Gt(0)], Annotated[int, Gt(0)]]
@@ -294,21 +365,28 @@ class Lens:
     def build(self) -> Camera:
         """The camera. Raises SettingError where the model takes another number of coefficients."""
         model = LENS_MODELS[self.model]
-        takes = model.coefficients
-        if len(self.distortion) > len(takes) or (len(self.distortion) < min(len(takes), 2)):
-            wanted = ", ".join(takes) or "nothing"
-            raise SettingError(f"should be {wanted} for {self.model}, but are {list(self.distortion)}", "distortion")
-        camera: Camera = model(*self.size_px, *self.focal_px, *self.center_px, *self.distortion)
+        coefficients = model.coefficients
+        most = len(coefficients)
+        least = min(most, 2)
+        if not least <= len(self.distortion) <= most:
+            expected = ", ".join(coefficients) or "nothing"
+            raise SettingError(f"should be {expected} for {self.model}, but are {list(self.distortion)}", "distortion")
+        camera: Camera = model(
+            *self.size_px,
+            *self.focal_px,
+            *self.center_px,
+            *self.distortion,
+        )
         return camera
 
 
 def lens_of(camera: Camera) -> Lens:
-    """The lens that says what a camera is. Raises InputError for a camera without a focal length."""
-    model = next((name for name, each in LENS_MODELS.items() if isinstance(camera, each)), None)
-    if model is None or not isinstance(camera, Focal):
-        raise InputError(f"a rig of a suite has lenses with a focal length, and {camera} is none")
+    """The settings of a camera's lens. Raises InputError for a camera without a focal length."""
+    names = [name for name, model in LENS_MODELS.items() if isinstance(camera, model)]
+    if not names or not isinstance(camera, Focal):
+        raise InputError(f"the lenses of a suite's rig need a focal length, which this camera lacks: {camera}")
     return Lens(
-        model=model,
+        model=names[0],
         size_px=(camera.width_px, camera.height_px),
         focal_px=(camera.fx_px, camera.fy_px),
         center_px=(camera.cx_px, camera.cy_px),
@@ -318,9 +396,9 @@ def lens_of(camera: Camera) -> Lens:
 
 @settings()
 class OwnPair:
-    """Two lenses of one's own: where the right one is in the left one's axes, and how it is turned (rotation vector).
+    """Two user-defined lenses, with the right camera's position and rotation vector in the left camera's frame.
 
-    Without `right` it is as the left one.
+    Without `right` both lenses are equal.
     """
 
     left: Lens
@@ -332,21 +410,27 @@ class OwnPair:
         """The pair before it is put on a body."""
         from scipy.spatial.transform import Rotation
 
-        R = Rotation.from_rotvec(np.array(self.right_turned_deg), degrees=True).as_matrix()
+        turn_deg = np.array(self.right_turned_deg)
+        R_left_right = Rotation.from_rotvec(turn_deg, degrees=True).as_matrix()
         left = self.left.build()
         right = self.right.build() if self.right else left
-        return StereoPreset(left, right, se3.transform(R, self.right_at_m), "the suite")
+        T_left_right = se3.transform(R_left_right, self.right_at_m)
+        return StereoPreset(left, right, T_left_right, "the suite")
 
 
 def own_pair(rig: Rig) -> OwnPair:
-    """The pair of a rig, as a suite says it. Raises InputError where it has one camera."""
+    """The pair of a rig as the settings of a suite. Raises InputError if the rig has one camera."""
     from scipy.spatial.transform import Rotation
 
     T = rig.T_left_right
+    turn = Rotation.from_matrix(T[:3, :3])
     right_at_m: Any = tuple(T[:3, 3].tolist())
-    turned: Any = tuple(Rotation.from_matrix(T[:3, :3]).as_rotvec(degrees=True).tolist())
+    right_turned_deg: Any = tuple(turn.as_rotvec(degrees=True).tolist())
     return OwnPair(
-        left=lens_of(rig.left), right=lens_of(rig.camera("right")), right_at_m=right_at_m, right_turned_deg=turned
+        left=lens_of(rig.left),
+        right=lens_of(rig.camera("right")),
+        right_at_m=right_at_m,
+        right_turned_deg=right_turned_deg,
     )
 
 
@@ -356,7 +440,7 @@ Angle = Annotated[float, Ge(-10), Le(10)]
 
 @settings()
 class EyeError:
-    """One camera minus what its calibration says; it is turned as the right one of CalibrationError is."""
+    """The true parameters of one camera minus the nominal ones; turns are those of CalibrationError."""
 
     focal_ratio: Ratio = 0.0
     center_px: tuple[float, float] = (0.0, 0.0)
@@ -371,11 +455,11 @@ Level = Literal["none", "factory", "worn"]
 
 @settings()
 class CalibrationError:
-    """The true rig minus what its calibration says; ratios are shares of what it says.
+    """The true rig minus the nominal one; ratios are relative to the nominal value.
 
-    Focal length, centre and distortion are off in both cameras alike. The right camera is turned, about its own z
+    Errors of focal length, centre and distortion apply to both cameras. The right camera is turned, about its own z
     (roll, to the right), x (pitch, upwards) and y (yaw, to the right), and shifted along the baseline. `left` and
-    `right` add what is off in one camera alone. A level other than none adds errors of its size, which `drawn` draws.
+    `right` add errors of a single camera. A level other than none adds random errors of its size (see `drawn`).
     """
 
     level: Level = "none"
@@ -390,24 +474,28 @@ class CalibrationError:
     right: EyeError = EyeError()
 
     def of_eye(self, side: Side) -> EyeError:
-        """All that is off in one camera."""
-        own, is_right = (self.left, 0) if side == "left" else (self.right, 1)
+        """The total error of one camera."""
+        single = self.left if side == "left" else self.right
+        right_turns_deg = (self.right_roll_deg, self.right_pitch_deg, self.right_yaw_deg)
+        roll_deg, pitch_deg, yaw_deg = right_turns_deg if side == "right" else (0.0, 0.0, 0.0)
+        center_x_px = self.center_px[0] + single.center_px[0]
+        center_y_px = self.center_px[1] + single.center_px[1]
         return EyeError(
-            focal_ratio=self.focal_ratio + own.focal_ratio,
-            center_px=(self.center_px[0] + own.center_px[0], self.center_px[1] + own.center_px[1]),
-            distortion_ratio=self.distortion_ratio + own.distortion_ratio,
-            roll_deg=is_right * self.right_roll_deg + own.roll_deg,
-            pitch_deg=is_right * self.right_pitch_deg + own.pitch_deg,
-            yaw_deg=is_right * self.right_yaw_deg + own.yaw_deg,
+            focal_ratio=self.focal_ratio + single.focal_ratio,
+            center_px=(center_x_px, center_y_px),
+            distortion_ratio=self.distortion_ratio + single.distortion_ratio,
+            roll_deg=roll_deg + single.roll_deg,
+            pitch_deg=pitch_deg + single.pitch_deg,
+            yaw_deg=yaw_deg + single.yaw_deg,
         )
 
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """The usual size of what a calibration leaves over: of turns, what they shift in the picture."""
+    """The usual size of the errors that a calibration leaves; of turns, the shift that they cause in the image."""
 
-    yaw_px: float  # in the middle, an offset of every disparity
-    roll_px: float  # of rows, at the picture's side
+    yaw_px: float  # at the centre, an offset of every disparity
+    roll_px: float  # of rows, at the left and right edges
     pitch_px: float  # of all rows
     focal_ratio: float
     baseline_ratio: float
@@ -416,76 +504,106 @@ class Residual:
 
 
 # By experiment with recordings of cars and drones: the first has the row errors of EuRoC, the second those of KITTI,
-# whose disparities are off by 0.2 to 0.4 px in the middle.
+# whose disparities are off by 0.2 to 0.4 px at the centre.
 RESIDUALS: dict[Level, Residual] = {
-    "factory": Residual(0.17, 0.25, 0.12, 0.001, 0.001, (0.5, 0.3), 0.003),
-    "worn": Residual(0.55, 0.55, 0.3, 0.005, 0.004, (3.0, 2.0), 0.02),
+    "factory": Residual(
+        yaw_px=0.17,
+        roll_px=0.25,
+        pitch_px=0.12,
+        focal_ratio=0.001,
+        baseline_ratio=0.001,
+        center_px=(0.5, 0.3),
+        distortion_ratio=0.003,
+    ),
+    "worn": Residual(
+        yaw_px=0.55,
+        roll_px=0.55,
+        pitch_px=0.3,
+        focal_ratio=0.005,
+        baseline_ratio=0.004,
+        center_px=(3.0, 2.0),
+        distortion_ratio=0.02,
+    ),
 }
 SPREAD = 0.25  # a drawn error is its usual size, more or less by up to this share
 
 
-def drawn(error: CalibrationError, nominal: Rig, rng: np.random.Generator) -> CalibrationError:
-    """The error with what its level stands for: sizes near the usual ones, signs by chance.
+def drawn(
+    error: CalibrationError,
+    nominal: Rig,
+    rng: np.random.Generator,
+) -> CalibrationError:
+    """The error with the errors of its level added: sizes near the usual ones, random signs.
 
-    Turns are drawn in pixels, for so a calibration is off, and one of this focal length shifts the picture that far.
+    Turns are drawn as the shift in pixels that they cause, since calibrations are off by that much.
     """
     if error.level == "none":
         return error
     usual = RESIDUALS[error.level]
-    factor = rng.choice([-1.0, 1.0], 8) * rng.uniform(1 - SPREAD, 1 + SPREAD, 8)
-    left = nominal.left
-    has_focal = isinstance(left, Focal)
-    is_bent = any(getattr(left, name) for name in left.coefficients)
-    f_px = float(left.K[0, 0])
-    center_px = usual.center_px if has_focal else (0.0, 0.0)
+    signs = rng.choice([-1.0, 1.0], 8)
+    sizes = rng.uniform(1 - SPREAD, 1 + SPREAD, 8)
+    yaw, roll, pitch, focal, baseline, center_x, center_y, distortion = signs * sizes
 
-    def turned(given_deg: float, shift_px: float, arm_px: float, by: float) -> float:
-        return given_deg + by * float(np.degrees(np.arctan(shift_px / arm_px)))
+    left = nominal.left
+    f_px = float(left.K[0, 0])
+    half_width_px = left.width_px / 2
+    has_focal_length = isinstance(left, Focal)
+    has_distortion = any(getattr(left, name) for name in left.coefficients)
+    usual_center_x_px, usual_center_y_px = usual.center_px if has_focal_length else (0.0, 0.0)
+    center_x_px = error.center_px[0] + usual_center_x_px * center_x
+    center_y_px = error.center_px[1] + usual_center_y_px * center_y
+
+    def turn_deg(shift_px: float, arm_px: float) -> float:
+        """The angle that shifts a point at this distance by so many pixels."""
+        return float(np.degrees(np.arctan(shift_px / arm_px)))
 
     return replace(
         error,
         level="none",
-        right_yaw_deg=turned(error.right_yaw_deg, usual.yaw_px, f_px, factor[0]),
-        right_roll_deg=turned(error.right_roll_deg, usual.roll_px, left.width_px / 2, factor[1]),
-        right_pitch_deg=turned(error.right_pitch_deg, usual.pitch_px, f_px, factor[2]),
-        focal_ratio=error.focal_ratio + usual.focal_ratio * factor[3] * has_focal,
-        baseline_ratio=error.baseline_ratio + usual.baseline_ratio * factor[4],
-        center_px=(error.center_px[0] + center_px[0] * factor[5], error.center_px[1] + center_px[1] * factor[6]),
-        distortion_ratio=error.distortion_ratio + usual.distortion_ratio * factor[7] * is_bent,
+        right_yaw_deg=error.right_yaw_deg + yaw * turn_deg(usual.yaw_px, f_px),
+        right_roll_deg=error.right_roll_deg + roll * turn_deg(usual.roll_px, half_width_px),
+        right_pitch_deg=error.right_pitch_deg + pitch * turn_deg(usual.pitch_px, f_px),
+        focal_ratio=error.focal_ratio + usual.focal_ratio * focal * has_focal_length,
+        baseline_ratio=error.baseline_ratio + usual.baseline_ratio * baseline,
+        center_px=(center_x_px, center_y_px),
+        distortion_ratio=error.distortion_ratio + usual.distortion_ratio * distortion * has_distortion,
     )
 
 
 def true_rig(nominal: Rig, error: CalibrationError) -> Rig:
-    """The rig that the pictures are made with. Raises VobenchError where an error has nothing to act on."""
-    left = error.of_eye("left")
-    right = error.of_eye("right")
-    # Written so that no error at all changes no bit.
+    """The rig that images are rendered with. Raises VobenchError for an error that has nothing to act on."""
+    left_error = error.of_eye("left")
+    right_error = error.of_eye("right")
+    # The baseline's change is added, so that an error of 0 changes no bit.
     T_body_right = nominal.T_body_camera("right").copy()
-    T_body_right[:3, 3] += error.baseline_ratio * (T_body_right - nominal.T_body_left)[:3, 3]
+    baseline_m = (T_body_right - nominal.T_body_left)[:3, 3]
+    T_body_right[:3, 3] += error.baseline_ratio * baseline_m
     return replace(
         nominal,
-        left=true_camera(nominal.left, left),
-        right=true_camera(nominal.camera("right"), right),
-        T_body_left=_turned(nominal.T_body_left, left),
-        T_body_right=_turned(T_body_right, right),
+        left=true_camera(nominal.left, left_error),
+        right=true_camera(nominal.camera("right"), right_error),
+        T_body_left=_turned(nominal.T_body_left, left_error),
+        T_body_right=_turned(T_body_right, right_error),
     )
 
 
 def true_camera(nominal: Camera, error: EyeError) -> Camera:
-    """The camera with its focal length, centre and distortion off. Raises VobenchError."""
-    if error.distortion_ratio and not any(getattr(nominal, name) for name in nominal.coefficients):
+    """The camera with the errors of its focal length, centre and distortion. Raises VobenchError."""
+    coefficients = {name: getattr(nominal, name) for name in nominal.coefficients}
+    if error.distortion_ratio and not any(coefficients.values()):
         raise VobenchError(f"distortion_ratio {error.distortion_ratio:g} needs a lens with distortion, got {nominal}")
     if not isinstance(nominal, Focal):
         if error.focal_ratio or any(error.center_px):
             raise VobenchError(f"focal_ratio and center_px need a camera with a focal length, got {nominal}")
         return nominal
+    distortion = {name: value * (1 + error.distortion_ratio) for name, value in coefficients.items()}
     return replace(
         nominal,
         fx_px=nominal.fx_px * (1 + error.focal_ratio),
         fy_px=nominal.fy_px * (1 + error.focal_ratio),
         cx_px=nominal.cx_px + error.center_px[0],
         cy_px=nominal.cy_px + error.center_px[1],
-        **{name: getattr(nominal, name) * (1 + error.distortion_ratio) for name in nominal.coefficients},
+        **distortion,
     )
 
 
@@ -496,8 +614,9 @@ def _turned(T_body_camera: Array, error: EyeError) -> Array:
         return T_body_camera
     from scipy.spatial.transform import Rotation
 
+    turn = Rotation.from_euler("ZXY", np.array(angles_deg), degrees=True)
     T_body_turned = T_body_camera.copy()
-    T_body_turned[:3, :3] @= Rotation.from_euler("ZXY", np.array(angles_deg), degrees=True).as_matrix()
+    T_body_turned[:3, :3] @= turn.as_matrix()
     return T_body_turned
 
 
@@ -507,7 +626,7 @@ SMALLEST_SIDE_PX = 2
 def resized(camera: Camera, scale: float) -> Camera:
     """The camera with `scale` times as many pixels across, behind the same lens.
 
-    Raises VobenchError where it has no focal length, or where half a pixel would be left.
+    Raises VobenchError for a camera without a focal length, or if the width or height is no whole number.
     """
     if scale == 1:
         return camera
@@ -515,7 +634,7 @@ def resized(camera: Camera, scale: float) -> Camera:
     height_px = nearest_whole(camera.height_px * scale) or 0
     if not isinstance(camera, Focal) or min(width_px, height_px) < SMALLEST_SIDE_PX:
         raise VobenchError(
-            f"picture_scale {scale:g} should leave whole pixels of a camera with a focal length, got {camera}"
+            f"picture_scale {scale:g} needs a focal length and must give a whole width and height, got {camera}"
         )
     return replace(
         camera,
@@ -528,15 +647,15 @@ def resized(camera: Camera, scale: float) -> Camera:
     )
 
 
-PARALLEL_RAD = 1e-6  # a pair this straight is rectified as it stands
-MAX_TURN_RAD = np.deg2rad(30)  # beyond it the two would hardly look at the same things
+PARALLEL_RAD = 1e-6  # a pair with smaller angles counts as rectified
+MAX_TURN_RAD = np.deg2rad(30)  # beyond it the two fields of view hardly overlap
 
 
 @dataclass(frozen=True, slots=True)
 class Rectification:
-    """Views from the two optical centres that are parallel to each other and across the baseline.
+    """Views from the two optical centres that are parallel to each other and perpendicular to the baseline.
 
-    K is that of both views. A point's rows agree in them, and its columns differ by
+    Both views have the matrix K. A point has the same row in both, and its columns differ by
     K[0, 0] · baseline_m / z.
     """
 
@@ -547,43 +666,48 @@ class Rectification:
 
     @property
     def P_left(self) -> Array:
-        """The (3, 4) matrix that sends points in metres, in the left view's axes, to its pixels."""
+        """The matrix (3, 4) that projects points in metres, in the left view's frame, to its pixels."""
         return projection(self.K, 0.0)
 
     @property
     def P_right(self) -> Array:
-        """The (3, 4) matrix that sends points in metres, in the left view's axes, to the right view's pixels."""
+        """The matrix (3, 4) that projects points in metres, in the left view's frame, to the right view's pixels."""
         return projection(self.K, self.baseline_m)
 
 
 def projection(K: Array, shift_m: float) -> Array:
-    """The (3, 4) matrix of a pinhole `shift_m` to the right of the axes that points are given in."""
+    """The projection matrix (3, 4) of a pinhole `shift_m` to the right of the frame that points are given in."""
     return np.hstack([K, [[-K[0, 0] * shift_m], [0.0], [0.0]]])
 
 
 def rectification(rig: Rig) -> Rectification | None:
-    """The views of a pair, turned as little as may be; None where there is no right camera, or it is not to the right.
+    """The rectified views of a pair, turned as little as possible; None if no camera is to the right of the left one.
 
-    Their x runs along the baseline, their z as near as possible to the mean of the optical axes.
+    Their x axis points along the baseline, their z axis as near as possible to the mean of the optical axes.
     Source: Fusiello, Trucco and Verri (2000).
     """
     if rig.right is None:
         return None
     R_left_right = rig.T_left_right[:3, :3]
-    t = rig.T_left_right[:3, 3]
-    if t[0] <= 0:
+    baseline_m = rig.T_left_right[:3, 3]
+    if baseline_m[0] <= 0:
         return None
-    x = unit(t)
-    ahead = np.array([0.0, 0.0, 1.0]) + R_left_right[:, 2]
+
+    x = unit(baseline_m)
+    left_axis = np.array([0.0, 0.0, 1.0])
+    right_axis = R_left_right[:, 2]
+    ahead = left_axis + right_axis
     z = ahead - (ahead @ x) * x
     if not z.any():
         return None
     z = unit(z)
+
     R_view_left = np.stack([x, np.cross(z, x), z])
-    turns = [R_view_left, R_view_left @ R_left_right]
-    angles = [float(se3.rotation_angle(R)) for R in turns]
-    if max(angles) > MAX_TURN_RAD:
+    R_view_right = R_view_left @ R_left_right
+    largest_rad = max(float(se3.rotation_angle(R_view_left)), float(se3.rotation_angle(R_view_right)))
+    if largest_rad > MAX_TURN_RAD:
         return None
-    if max(angles) <= PARALLEL_RAD:
-        turns = [np.eye(3), np.eye(3)]
-    return Rectification(rig.left.K, rig.baseline_m, turns[0], turns[1])
+    if largest_rad <= PARALLEL_RAD:
+        R_view_left = np.eye(3)
+        R_view_right = np.eye(3)
+    return Rectification(rig.left.K, rig.baseline_m, R_view_left, R_view_right)

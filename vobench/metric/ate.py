@@ -27,82 +27,115 @@ class PoseErrors:
 
 
 def angle_rad(R: Array) -> Array:
-    """Angles (...) of rotations (..., 3, 3) that text with few digits has left slightly skew.
+    """Angles (...) of rotations (..., 3, 3), corrected for the skew of text with few digits.
 
     One Newton step towards the nearest rotation first: KITTI's six digits leave R 2e-7 off
     orthonormal, which alone would shift an angle by 3e-7 rad. Source: Higham (1986), eq. 3.6.
     """
-    steps = 1.5 * np.eye(3) - 0.5 * np.swapaxes(R, -1, -2) @ R
-    return se3.rotation_angle(R @ steps)
+    R_transposed = se3.transposed(R)
+    correction = 1.5 * np.eye(3) - 0.5 * R_transposed @ R
+    return se3.rotation_angle(R @ correction)
 
 
 def matrix_norms(E: Array) -> Rows:
-    """Norms (N,) of errors (N, 4, 4) less the identity: the rotation's, and the whole's with its metres.
+    """Frobenius norms (N,) of errors (N, 4, 4) minus the identity: of the rotation, and of the whole matrix.
 
     They are evo's rot_part and full.
     """
     squares = np.square(E - np.eye(4))
-    return np.sqrt(squares[:, :3, :3].sum((1, 2))), np.sqrt(squares.sum((1, 2)))
+    rotation_norm = np.sqrt(squares[:, :3, :3].sum((1, 2)))
+    full_norm = np.sqrt(squares.sum((1, 2)))
+    return rotation_norm, full_norm
 
 
 def motion_errors(T_gt_first_last: Array, T_est_first_last: Array) -> PoseErrors:
-    """What is left of true motions (N, 4, 4) after the estimated ones are undone."""
-    return PoseErrors(*_left(_columns(T_gt_first_last), _columns(T_est_first_last)))
+    """Errors of estimated motions (N, 4, 4) relative to the true ones."""
+    gt = _pose_columns(T_gt_first_last)
+    est = _pose_columns(T_est_first_last)
+    return PoseErrors(*_relative_errors(gt, est))
 
 
-def errors_between(T_gt: Array, T_est: Array, first: Index, last: Index) -> PoseErrors:
-    """`motion_errors` of the motions from poses `first` to `last` (N,) of trajectories (K, 4, 4).
+def errors_between(
+    T_gt: Array,
+    T_est: Array,
+    first: Index,
+    last: Index,
+) -> PoseErrors:
+    """Errors of the motions from poses `first` to `last` (N,) of trajectories (K, 4, 4), as `motion_errors`.
 
     Source: Sturm et al. (2012), section V-A: (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j).
     """
-    gt = _columns(T_gt)
-    est = _columns(T_est)
+    gt = _pose_columns(T_gt)
+    est = _pose_columns(T_est)
 
-    def moved(T: Array, part: slice) -> Array:
-        return _moved(T.take(first[part], axis=-1), T.take(last[part], axis=-1))
+    def motion(poses: Array, block: slice) -> Array:
+        first_poses = poses.take(first[block], axis=-1)
+        last_poses = poses.take(last[block], axis=-1)
+        return _relative_poses(first_poses, last_poses)
 
-    found = in_blocks(len(first), lambda part: _left(moved(gt, part), moved(est, part)))
-    return PoseErrors(*found)
+    def errors(block: slice) -> Rows:
+        return _relative_errors(motion(gt, block), motion(est, block))
+
+    return PoseErrors(*in_blocks(len(first), errors))
 
 
 # Below, N poses are (3, 4, N): each number of all of them side by side, which is faster than N small matrices.
 
 
-def _columns(T: Array) -> Array:
-    return np.ascontiguousarray(np.moveaxis(T[:, :3], 0, -1))
+def _pose_columns(T: Array) -> Array:
+    """Poses (N, 4, 4) as (3, 4, N)."""
+    upper_rows = T[:, :3]
+    return np.ascontiguousarray(np.moveaxis(upper_rows, 0, -1))
 
 
-def _moved(first: Array, last: Array) -> Array:
-    """Poses `last` seen from `first`."""
-    back = first[:, :3]
-    R = np.einsum("kin,kjn->ijn", back, last[:, :3])
-    t = np.einsum("kin,kn->in", back, last[:, 3] - first[:, 3])
+def _relative_poses(first: Array, last: Array) -> Array:
+    """Poses `last` in the frames of `first`, all (3, 4, N)."""
+    R_first = first[:, :3]
+    R_last = last[:, :3]
+    offset = last[:, 3] - first[:, 3]
+    R = np.einsum("kin,kjn->ijn", R_first, R_last)
+    t = np.einsum("kin,kn->in", R_first, offset)
     return np.concatenate([R, t[:, None]], axis=1)
 
 
-def _left(gt: Array, est: Array) -> Rows:
-    """Lengths and angles (N,) of est seen from gt; the angles as `angle_rad` takes them."""
-    E = _moved(gt, est)
+def _relative_errors(gt: Array, est: Array) -> Rows:
+    """Lengths and angles (N,) of poses est in the frames of gt, both (3, 4, N), corrected as by `angle_rad`."""
+    E = _relative_poses(gt, est)
     R = E[:, :3]
     t = E[:, 3]
-    steps = -0.5 * np.einsum("kin,kjn->ijn", R, R)
-    steps[range(3), range(3)] += 1.5
-    R = np.einsum("ikn,kjn->ijn", R, steps)
-    vee = np.stack([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    cosine = R[0, 0] + R[1, 1] + R[2, 2] - 1.0
-    return np.sqrt(np.einsum("in,in->n", t, t)), np.arctan2(np.sqrt(np.einsum("in,in->n", vee, vee)), cosine)
+    correction = -0.5 * np.einsum("kin,kjn->ijn", R, R)
+    correction[range(3), range(3)] += 1.5
+    R = np.einsum("ikn,kjn->ijn", R, correction)
+
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R
+    axis_times_sine = np.stack([zy - yz, xz - zx, yx - xy])  # twice the sine of the angle along the axis
+    twice_sine = np.sqrt(np.einsum("in,in->n", axis_times_sine, axis_times_sine))
+    twice_cosine = xx + yy + zz - 1.0
+    length = np.sqrt(np.einsum("in,in->n", t, t))
+    angle = np.arctan2(twice_sine, twice_cosine)
+    return length, angle
 
 
 def in_blocks(n: int, work: Callable[[slice], Rows]) -> Rows:
-    """What `work` makes of n samples, each a tuple of arrays (n,), a block at a time."""
-    found = [work(slice(begin, min(begin + BLOCK, n))) for begin in range(0, max(n, 1), BLOCK)]
-    return tuple(np.concatenate(arrays) for arrays in zip(*found, strict=True))
+    """The arrays (n,) that `work` returns for n samples, computed one block of samples at a time."""
+    results = []
+    for begin in range(0, max(n, 1), BLOCK):
+        end = min(begin + BLOCK, n)
+        results.append(work(slice(begin, end)))
+    return tuple(np.concatenate(blocks) for blocks in zip(*results, strict=True))
 
 
 def motions(T_world_frame: Array, first: Index, last: Index) -> Array:
-    """Pose of frame `last` seen from frame `first`, (N, 4, 4), for index arrays (N,)."""
-    T_first_last: Array = se3.inverse(T_world_frame[first]) @ T_world_frame[last]
+    """Poses (N, 4, 4) of frames `last` in frames `first`, for index arrays (N,)."""
+    T_first_world = se3.inverse(T_world_frame[first])
+    T_first_last: Array = T_first_world @ T_world_frame[last]
     return T_first_last
+
+
+def distances_between(T: Array, first: Index, last: Index) -> Array:
+    """Distances (N,) in m between poses `first` and `last` (N,) of a trajectory (K, 4, 4)."""
+    offset_m = T[last, :3, 3] - T[first, :3, 3]
+    return np.asarray(np.linalg.norm(offset_m, axis=1))
 
 
 def absolute_errors(T_gt: Array, T_est: Array) -> PoseErrors:
@@ -111,38 +144,47 @@ def absolute_errors(T_gt: Array, T_est: Array) -> PoseErrors:
     Source: Sturm et al. (2012), section V-B; the rotation is the angle of R_est⁻¹ R_gt.
     """
 
-    def block(part: slice) -> Rows:
-        gt = T_gt[part]
-        est = T_est[part]
-        trans_m = np.linalg.norm(est[:, :3, 3] - gt[:, :3, 3], axis=1)
-        return trans_m, angle_rad(np.swapaxes(est[:, :3, :3], -1, -2) @ gt[:, :3, :3])
+    def errors(block: slice) -> Rows:
+        gt = T_gt[block]
+        est = T_est[block]
+        offset_m = est[:, :3, 3] - gt[:, :3, 3]
+        R_est_gt = se3.transposed(est[:, :3, :3]) @ gt[:, :3, :3]
+        return np.linalg.norm(offset_m, axis=1), angle_rad(R_est_gt)
 
-    return PoseErrors(*in_blocks(len(T_gt), block))
+    return PoseErrors(*in_blocks(len(T_gt), errors))
 
 
-def absolute(of: Comparison) -> PoseErrors:
+def absolute(comparison: Comparison) -> PoseErrors:
     """`absolute_errors` of a comparison."""
-    return absolute_errors(of.matched.T_gt, of.T_aligned)
+    return absolute_errors(comparison.matched.T_gt, comparison.T_aligned)
 
 
-def _matrices(of: Comparison) -> Rows:
-    T_gt = of.matched.T_gt
-    T_est = of.T_aligned
-    return in_blocks(len(T_gt), lambda part: matrix_norms(se3.inverse(T_est[part]) @ T_gt[part]))
+def _matrix_errors(comparison: Comparison) -> Rows:
+    """`matrix_norms` of the errors of matched poses."""
+    T_gt = comparison.matched.T_gt
+    T_est = comparison.T_aligned
+
+    def norms(block: slice) -> Rows:
+        T_error = se3.inverse(T_est[block]) @ T_gt[block]
+        return matrix_norms(T_error)
+
+    return in_blocks(len(T_gt), norms)
 
 
-def _axes(of: Comparison) -> dict[str, Array]:
+def _axis_errors(comparison: Comparison) -> dict[str, Array]:
     """Signed errors (K,) by axis, in m and degrees, in the truth's world: R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll)."""
-    T_gt = of.matched.T_gt
-    T_est = of.T_aligned
-    xyz_m = T_est[:, :3, 3] - T_gt[:, :3, 3]
-    rpy_rad = se3.roll_pitch_yaw_rad(T_est[:, :3, :3] @ np.swapaxes(T_gt[:, :3, :3], -1, -2))
-    names = ("x", "y", "z", "roll", "pitch", "yaw")
-    return dict(zip(names, (*xyz_m.T, *np.rad2deg(rpy_rad).T), strict=True))
+    T_gt = comparison.matched.T_gt
+    T_est = comparison.T_aligned
+    x, y, z = (T_est[:, :3, 3] - T_gt[:, :3, 3]).T
+    R_error = T_est[:, :3, :3] @ se3.transposed(T_gt[:, :3, :3])
+    angles_deg = np.rad2deg(se3.roll_pitch_yaw_rad(R_error))
+    roll, pitch, yaw = angles_deg.T
+    return {"x": x, "y": y, "z": z, "roll": roll, "pitch": pitch, "yaw": yaw}
 
 
-def _of_axis(axis: str) -> Callable[[Comparison], Array]:
-    return lambda of: of.once(_axes)[axis]
+def _axis_measure(axis: str) -> Callable[[Comparison], Array]:
+    """A measure of the signed error along or about one axis."""
+    return lambda comparison: comparison.once(_axis_errors)[axis]
 
 
 DRIFT = "where along the path an error was made: one early turn moves everything after it"
@@ -157,7 +199,7 @@ METRICS = (
         STURM_ATE,
         blind=f"{DRIFT}; {LOST}",
         full=False,
-        measure=lambda of: of.once(absolute).trans_m,
+        measure=lambda comparison: comparison.once(absolute).trans_m,
     ),
     _pose_metric(
         "ate_rot",
@@ -167,7 +209,7 @@ METRICS = (
         STURM_ATE,
         blind=f"a roll that the alignment had to guess: read alignment.unobservable; {LOST}",
         full=False,
-        measure=lambda of: np.rad2deg(of.once(absolute).rot_rad),
+        measure=lambda comparison: np.rad2deg(comparison.once(absolute).rot_rad),
     ),
     _pose_metric(
         "ate_rot_chordal",
@@ -176,7 +218,7 @@ METRICS = (
         "‖R_est⁻¹ R_gt − I‖_F = 2√2 sin(angle / 2)",
         HARTLEY,
         blind=f"the same as ate_rot on another scale; {LOST}",
-        measure=lambda of: of.once(_matrices)[0],
+        measure=lambda comparison: comparison.once(_matrix_errors)[0],
     ),
     _pose_metric(
         "ate_full",
@@ -185,7 +227,7 @@ METRICS = (
         "‖T_est⁻¹ T_gt − I‖_F",
         "evo's full",
         blind=f"metres and rotations are added: it changes with the unit of length; {LOST}",
-        measure=lambda of: of.once(_matrices)[1],
+        measure=lambda comparison: comparison.once(_matrix_errors)[1],
     ),
     *(
         _pose_metric(
@@ -195,7 +237,7 @@ METRICS = (
             f"{axis} of p_est − p_gt, with its sign",
             OURS,
             blind=f"errors along the other axes; {LOST}",
-            measure=_of_axis(axis),
+            measure=_axis_measure(axis),
         )
         for axis in ("x", "y", "z")
     ),
@@ -207,7 +249,7 @@ METRICS = (
             f"{axis} of R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll), with its sign",
             ZHANG,
             blind=f"the angles of rotations near 90° of pitch, where roll and yaw are one; {LOST}",
-            measure=_of_axis(axis),
+            measure=_axis_measure(axis),
         )
         for axis in ("roll", "pitch", "yaw")
     ),

@@ -8,8 +8,9 @@ from vobench.metric import ate, coverage, nees, rpe, segment
 from vobench.metric.comparison import DEFAULTS, MetricDefinition
 from vobench.metric.settings import ScoreSettings
 
-ROOM = (ate, rpe, segment, nees, coverage)
-DEFINITIONS: dict[str, MetricDefinition] = {metric.id: metric for family in ROOM for metric in family.METRICS}
+FAMILIES = (ate, rpe, segment, nees, coverage)
+METRICS = [metric for family in FAMILIES for metric in family.METRICS]
+DEFINITIONS: dict[str, MetricDefinition] = {metric.id: metric for metric in METRICS}
 
 NS_PER_MS = 10**6
 _PAIRS = {False: "consecutive", True: "all"}
@@ -17,9 +18,9 @@ _PAIRS = {False: "consecutive", True: "all"}
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One `key=value` of an identity, said where one of its settings changes the metric; none for every metric.
+    """One `key=value` of an identity, written for metrics that one of its settings changes, or for all if it has none.
 
-    `write` gives None where there is nothing to say.
+    `write` returns None if the part is left out.
     """
 
     key: str
@@ -27,54 +28,98 @@ class Part:
     write: Callable[[ScoreSettings], str | None]
 
 
-def identity(metric: MetricDefinition, settings: ScoreSettings, *, n: int, of: int) -> str:
-    """The id of a metric's number, such as `ate.trans.rmse[align=se3; ...]`."""
-    concern = [part for part in PARTS if not part.settings or set(part.settings) & set(metric.settings)]
-    said = [f"{part.key}={value}" for part in concern if (value := part.write(settings)) is not None]
-    return f"{metric.identity}.{metric.headline}[{'; '.join([*said, f'n={n}/{of}'])}]"
+def identity(
+    metric: MetricDefinition,
+    settings: ScoreSettings,
+    *,
+    n: int,
+    of: int,
+) -> str:
+    """The id of a metric's number, such as `ate.trans.rmse[align=se3; ...]`, from n of so many true poses."""
+    items = []
+    for part in PARTS:
+        is_relevant = not part.settings or set(part.settings) & set(metric.settings)
+        value = part.write(settings) if is_relevant else None
+        if value is not None:
+            items.append(f"{part.key}={value}")
+    items.append(f"n={n}/{of}")
+    return f"{metric.identity}.{metric.headline}[{'; '.join(items)}]"
 
 
 def _number(value: float) -> str:
+    """The shortest text of a number, without a decimal point for a whole one."""
     return repr(float(value)).removesuffix(".0")
 
 
 def _ms(t_ns: int) -> str:
     """Nanoseconds as milliseconds, exactly."""
-    whole, part = divmod(abs(t_ns), NS_PER_MS)
-    return f"{'-' if t_ns < 0 else ''}{whole}.{part:06d}".rstrip("0").rstrip(".") + "ms"
+    whole, fraction = divmod(abs(t_ns), NS_PER_MS)
+    sign = "-" if t_ns < 0 else ""
+    digits = f"{whole}.{fraction:06d}".rstrip("0").rstrip(".")
+    return f"{sign}{digits}ms"
 
 
-def _align(s: ScoreSettings) -> str:
-    return s.alignment if s.align_n is None else f"{s.alignment}/first{s.align_n}"
+def _align(settings: ScoreSettings) -> str:
+    if settings.align_n is None:
+        return settings.alignment
+    return f"{settings.alignment}/first{settings.align_n}"
 
 
-def _stated(key: str, setting: str, write: Callable[[Any], str] = str, *, always: bool = False) -> Part:
-    """The part of one setting, said where it differs from the default, or always."""
+def _delta(settings: ScoreSettings) -> str | None:
+    if settings.rpe_rule == "tartanair":
+        return None
+    return f"{_number(settings.rpe_delta)}{settings.rpe_unit}"
 
-    def written(s: ScoreSettings) -> str | None:
-        value = getattr(s, setting)
-        return write(value) if always or value != getattr(DEFAULTS, setting) else None
+
+def _pairs(settings: ScoreSettings) -> str:
+    return f"{_PAIRS[settings.rpe_all_pairs]}/{settings.rpe_pairs_from}"
+
+
+def _lengths(settings: ScoreSettings) -> str:
+    lengths_m = settings.segment_lengths_m or ()
+    return f"{','.join(map(_number, lengths_m))}m"
+
+
+def _association(settings: ScoreSettings) -> str:
+    return f"{settings.association}<={_ms(settings.max_diff_ns)}"
+
+
+def _ddof(settings: ScoreSettings) -> str | None:
+    return str(settings.std_ddof) if settings.std_ddof else None
+
+
+def _setting_part(
+    key: str,
+    setting: str,
+    write: Callable[[Any], str] = str,
+    *,
+    always: bool = False,
+) -> Part:
+    """The part of one setting, written if its value is not the default, or always."""
+
+    def written(settings: ScoreSettings) -> str | None:
+        value = getattr(settings, setting)
+        is_default = value == getattr(DEFAULTS, setting)
+        return None if is_default and not always else write(value)
 
     return Part(key, (setting,), written)
 
 
 PARTS = (
-    Part(
-        "delta", ("rpe_delta",), lambda s: None if s.rpe_rule == "tartanair" else f"{_number(s.rpe_delta)}{s.rpe_unit}"
-    ),
-    Part("pairs", ("rpe_all_pairs",), lambda s: f"{_PAIRS[s.rpe_all_pairs]}/{s.rpe_pairs_from}"),
-    _stated("rule", "rpe_rule"),
-    Part("lengths", ("segment_lengths_m",), lambda s: f"{','.join(map(_number, s.segment_lengths_m or ()))}m"),
-    _stated("step", "segment_step_frames", always=True),
-    _stated("precision", "segment_precision"),
-    _stated("mean", "segment_mean"),
-    Part("lengths", ("relative_rule",), lambda s: s.relative_rule),
-    _stated("fail", "fail_ratio", _number, always=True),
-    _stated("slots", "coverage_of", always=True),
+    Part("delta", ("rpe_delta",), _delta),
+    Part("pairs", ("rpe_all_pairs",), _pairs),
+    _setting_part("rule", "rpe_rule"),
+    Part("lengths", ("segment_lengths_m",), _lengths),
+    _setting_part("step", "segment_step_frames", always=True),
+    _setting_part("precision", "segment_precision"),
+    _setting_part("mean", "segment_mean"),
+    _setting_part("lengths", "relative_rule", always=True),
+    _setting_part("fail", "fail_ratio", _number, always=True),
+    _setting_part("slots", "coverage_of", always=True),
     Part("align", ("alignment",), _align),
-    _stated("scale", "scale_rule"),
-    _stated("project", "project"),
-    Part("assoc", ("association",), lambda s: f"{s.association}<={_ms(s.max_diff_ns)}"),
-    _stated("offset", "offset_ns", _ms),
-    Part("ddof", (), lambda s: str(s.std_ddof) if s.std_ddof else None),
+    _setting_part("scale", "scale_rule"),
+    _setting_part("project", "project"),
+    Part("assoc", ("association",), _association),
+    _setting_part("offset", "offset_ns", _ms),
+    Part("ddof", (), _ddof),
 )

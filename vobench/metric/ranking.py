@@ -1,9 +1,9 @@
-"""Who is better, and whether that is decided: paired tests over cases and repeats, rank intervals, repeats to ask for.
+"""Ranks of estimators and their significance: paired tests over cases and repeats, rank intervals, required repeats.
 
-Of each trial its loss counts, 1 minus the lost-aware score: about the error as a share of the path. Estimators are
-ordered by the share of trials that failed, then by the geometric mean of the loss, in which no case outweighs another.
+A trial counts by its loss, 1 minus the lost-aware score, which is about the error as a share of the path. Estimators
+are ordered by the share of failed trials, then by the geometric mean of the loss, which no single case dominates.
 
-Symbols: E estimators, C cases, R repeats; a unit is a case and a repeat, on which estimators are compared in pairs.
+Symbols: E estimators, C cases, R repeats. A unit is one case and one repeat; estimators are compared in pairs on units.
 """
 
 from collections.abc import Sequence
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,28 +19,34 @@ from scipy import special
 
 from vobench.geometry.se3 import Array
 
-ALPHA = 0.05  # of intervals, and of tests within a case
-DECIDED = 0.02  # of tests of neighbours, so that of two alike 95 in 100 boards say so with room to spare
+Mask = NDArray[np.bool_]
+
+ALPHA = 0.05  # significance level of intervals, and of tests within a case
+INTERVAL = (ALPHA / 2, 1 - ALPHA / 2)
+DECIDED = 0.02  # of tests of neighbours: stricter, so that at most 5 in 100 boards decide between two equal estimators
 RESAMPLES = 1000  # of the bootstrap
-FLIPS = 4095  # of signs, where all of them would be more
-EXACT_UNITS = 12  # up to here all signs are tried
-MANY_UNITS = 200  # beyond these none is, for the sum is normal
-MIN_UNITS = 7  # with fewer no permutation of signs has a chance below 2 %
+FLIPS = 4095  # random sign patterns of a permutation test with too many units to try all
+EXACT_UNITS = 12  # up to here all sign patterns are tried
+MANY_UNITS = 200  # above it the sum is taken as normal
+MIN_UNITS = 7  # with fewer no permutation of signs has a p-value below 2 %
 MIN_TRIALS = 4  # of each of two on one case, for the same reason
 MIN_LOSS = 1e-9
-EFFECT = 1.1  # the ratio of losses that repeats are asked for to find
+MIN_LOSS_RATIO_RANGE = 1e-9  # an interval narrower than this is a single value
+EFFECT = 1.1  # the ratio of losses that the required repeats would detect
 POWER = 0.95
-MOST_REPEATS = 10_000
+MAX_REPEATS = 10_000
+DIGITS = 12  # decimals at which means count as equal
+ROUNDING = 1e-15  # spread of equal differences
 
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """How one estimator stands among others; what cannot be told from so few units is None.
+    """The rank of one estimator and its uncertainty; what too few units cannot show is None.
 
-    `place` counts from 1; with 95 % it is one of `places`. `loss_ratio` is its mean loss over the first's, within
-    `ratio_interval`. `p_above`: the chance that it and the one ranked above differ so by luck, corrected for the
-    number of such tests; `decided_above` also asks that the interval of their difference leaves 0 out. Where it is
-    not, `repeats` would find a difference of 10 %, None where repeats alone cannot.
+    `place` counts from 1, and `places` is its 95 % interval. `loss_ratio` is the mean loss relative to the first's,
+    with its 95 % interval `ratio_interval`. `p_above` is the p-value of the difference to the estimator ranked above,
+    corrected for the number of such tests; `decided_above` also requires that the interval of the difference excludes
+    0. If it is not decided, `repeats` would detect a difference of 10 %, None if repeats alone cannot.
     """
 
     index: int
@@ -55,231 +62,335 @@ class Standing:
 
 
 def trial_loss(lost_aware: float | None, *, survived: bool) -> float:
-    """A trial's loss in (0, 1], 1 minus its lost-aware score; of a failed one 1/2 or more, whatever its score says."""
+    """A trial's loss in (0, 1], 1 minus its lost-aware score; at least 1/2 for a failed trial, whatever its score."""
     score = lost_aware if lost_aware is not None else 0.5 * survived
     if not survived and score >= 0.5:
-        score -= 0.5  # it was scored as a survivor's, by its poses alone
+        score -= 0.5  # it was scored as a survivor, by its poses alone
     return max(1.0 - score, MIN_LOSS)
 
 
-class _Trials:
-    """Losses and failures of trials (E, C, R), and what each trial weighs in its estimator's means.
+class _Criterion(NamedTuple):
+    """Values of trials and their weights, both (E, C, R), in the means that order estimators."""
 
-    A share is values and weights, whose products add up to the means that estimators are ordered by.
-    """
+    values: Array
+    weights: Array
+
+    def means(self) -> Array:
+        """The weighted mean (E,) of each estimator, rounded so that equal ones are equal."""
+        means = np.einsum("ecr,ecr->e", self.values, self.weights)
+        return np.asarray(np.round(means, DIGITS))
+
+
+class _Trials:
+    """Log losses and failures of trials (E, C, R). `exists` (E, C, R) marks the trials that were run."""
 
     def __init__(self, loss: Array, failed: Array) -> None:
         has_loss = ~np.isnan(loss)
-        self.there = ~np.isnan(failed)
-        self.losses = np.log(np.where(has_loss, np.maximum(loss, MIN_LOSS), 1.0)), _weights(has_loss)
-        # One trial more that fails weighs more than any difference of losses.
-        self.fails = 100.0 * max(loss[0].size, 1) * np.nan_to_num(failed), _weights(self.there)
-        self.shares = self.fails, self.losses
+        log_loss = np.log(np.where(has_loss, np.maximum(loss, MIN_LOSS), 1.0))
+        # One more failed trial outweighs any difference of losses.
+        failure_cost = 100.0 * max(loss[0].size, 1)
 
-    def enough(self, *estimators: int) -> bool:
-        """Whether so many units have trials of all of these that anything can be decided."""
-        return int(self.there[list(estimators)].all(axis=0).sum()) >= MIN_UNITS
+        self.exists = ~np.isnan(failed)
+        self.losses = _Criterion(log_loss, _weights(has_loss))
+        self.failures = _Criterion(failure_cost * np.nan_to_num(failed), _weights(self.exists))
+        self.criteria = (self.failures, self.losses)
 
-    def resampled(self, shares: Sequence[tuple[Array, Array]], seed: int) -> Array:
-        """Means (B, E) over cases drawn with replacement, the same for everybody; of few cases their repeats are drawn.
+    def has_enough(self, *estimators: int) -> bool:
+        """Whether all of these estimators share enough units to decide anything."""
+        is_shared = self.exists[list(estimators)].all(axis=0)
+        return int(is_shared.sum()) >= MIN_UNITS
 
-        Drawing both would count what differs between repeats twice, for it makes cases differ too.
+    def resampled(self, criteria: Sequence[_Criterion], seed: int) -> Array:
+        """Bootstrap means (B, E), with the same draws for all estimators.
+
+        Cases are drawn with replacement, or repeats if there are few cases. Drawing both would count the variance
+        between repeats twice, since it also makes cases differ. scipy.stats.bootstrap can draw neither repeats within
+        cases nor weights, and would change the printed intervals.
         """
         rng = np.random.default_rng(seed)
-        (n_cases, n_repeats) = self.there.shape[1:]
+        n_cases, n_repeats = self.exists.shape[1:]
         if n_cases >= MIN_UNITS:
-            drawn = rng.multinomial(n_cases, np.full(n_cases, 1 / n_cases), size=RESAMPLES).repeat(n_repeats, axis=1)
+            even = np.full(n_cases, 1 / n_cases)
+            case_counts = rng.multinomial(n_cases, even, size=RESAMPLES)
+            counts = case_counts.repeat(n_repeats, axis=1)
         else:
-            drawn = rng.multinomial(n_repeats, np.full(n_repeats, 1 / n_repeats), size=(RESAMPLES, n_cases))
-            drawn = drawn.reshape(RESAMPLES, -1)
-        total = np.zeros((RESAMPLES, len(self.there)))
-        for values, weights in shares:
-            flat = weights.reshape(len(weights), -1)
-            mass = drawn @ flat.T
-            sums = drawn @ (flat * values.reshape(flat.shape)).T
+            even = np.full(n_repeats, 1 / n_repeats)
+            repeat_counts = rng.multinomial(n_repeats, even, size=(RESAMPLES, n_cases))
+            counts = repeat_counts.reshape(RESAMPLES, -1)  # (B, C R)
+
+        total = np.zeros((RESAMPLES, len(self.exists)))
+        for values, weights in criteria:
+            flat_weights = weights.reshape(len(weights), -1)
+            flat_values = values.reshape(flat_weights.shape)
+            mass = counts @ flat_weights.T
+            sums = counts @ (flat_weights * flat_values).T
             total += np.divide(sums, mass, out=np.zeros_like(mass), where=mass > 0)
         return total
 
     def differences(self, a: int, b: int) -> Array:
-        """What b is worse than a by on each unit, so that they add up to the difference of means.
+        """How much worse b is than a on each unit (N,); the sum is the difference of their means.
 
-        A case whose repeats are all alike, as those of estimators without chance are, is one unit.
+        A case whose repeats are all equal, as for deterministic estimators, is one unit.
         """
-        has = self.there[a] & self.there[b]
-        d = np.zeros(has.shape)
-        for values, weights in self.shares:
-            both = (weights[a] > 0) & (weights[b] > 0)
-            d += np.where(both, values[b] - values[a], 0.0) * _weights(both[None])[0]
-        single = np.ptp(np.where(has, d, d[:, :1]), axis=1) <= 1e-15
-        return np.concatenate([d[single].sum(axis=1), d[~single][has[~single]]])
+        is_shared = self.exists[a] & self.exists[b]
+        difference = np.zeros(is_shared.shape)
+        for values, weights in self.criteria:
+            has_both = (weights[a] > 0) & (weights[b] > 0)
+            pair_weights = _weights(has_both[None])[0]
+            worse = np.where(has_both, values[b] - values[a], 0.0)
+            difference += worse * pair_weights
+
+        filled = np.where(is_shared, difference, difference[:, :1])
+        is_constant = np.ptp(filled, axis=1) <= ROUNDING
+        constant_cases = difference[is_constant].sum(axis=1)
+        varying_units = difference[~is_constant][is_shared[~is_constant]]
+        return np.concatenate([constant_cases, varying_units])
 
     def repeats(self, a: int, b: int, tests: int) -> int | None:
-        """How many repeats of each case would find a ratio of 1.1 between the losses of two."""
+        """Repeats of each case that would detect a ratio of 1.1 between the losses of two estimators."""
         values, weights = self.losses
-        has = (weights[a] > 0) & (weights[b] > 0)
-        d = np.where(has, values[b] - values[a], np.nan)[has.any(axis=1)]
-        return repeats_to_decide(d, tests=tests) if len(d) else None
+        has_both = (weights[a] > 0) & (weights[b] > 0)
+        difference = np.where(has_both, values[b] - values[a], np.nan)
+        cases = difference[has_both.any(axis=1)]
+        return repeats_to_decide(cases, tests=tests) if len(cases) else None
 
 
 def rank(loss: Array, failed: Array, *, seed: int = 1) -> list[Standing]:
-    """Estimators, best first, by their trials' `loss` and `failed` (E, C, R).
+    """Standings of estimators, best first, by the `loss` and `failed` (E, C, R) of their trials.
 
-    `failed` is 1 or 0, NaN where there is no such trial; `loss` is NaN too where a trial has none, as one of a case
-    that stands still. Means are over cases, within a case over repeats: give cases that all estimators have.
+    `failed` is 1 or 0, NaN if there is no such trial; `loss` is also NaN for a trial without one, as in a case whose
+    ground truth is stationary. Means are over cases, within a case over repeats: pass cases that all estimators have.
     """
     trials = _Trials(loss, failed)
-    fails, losses = (np.round(np.einsum("ecr,ecr->e", *share), 12) for share in trials.shares)
-    order = np.lexsort([losses, fails])
-    drawn = trials.resampled(trials.shares, seed)
-    drawn_losses = trials.resampled([trials.losses], seed)
-    pairs = list(pairwise(order.tolist()))
+    failures = trials.failures.means()
+    losses = trials.losses.means()
+    order = np.lexsort([losses, failures])
+    neighbours = list(pairwise(order.tolist()))
+
     rng = np.random.default_rng(seed)
-    p = holm([permutation_p(trials.differences(a, b), rng) for a, b in pairs])
-    least = _interval(np.diff(drawn[:, order], axis=1))[0]
-    decided = [bool(chance < DECIDED and low > 0) for chance, low in zip(p, least, strict=True)]
-    places = _places(drawn[:, order], decided, enough=trials.enough(*order))
-    ratios = np.exp(_interval(drawn_losses - drawn_losses[:, order[:1]]))
-    shares = np.einsum("ecr,ecr->e", np.nan_to_num(failed), trials.fails[1])
-    found = list[Standing]()
-    for at, e in enumerate(order.tolist()):
-        above = order[at - 1]
-        is_tied = at > 0 and (fails[e], losses[e]) == (fails[above], losses[above])
-        is_told = trials.enough(order[0], e) and np.ptp(ratios[:, e]) > 1e-9
-        place = found[-1].place if is_tied else at + 1
+    p_values = holm([permutation_p(trials.differences(a, b), rng) for a, b in neighbours])
+    ranked_means = trials.resampled(trials.criteria, seed)[:, order]  # (B, E)
+    lower_ends = _interval(np.diff(ranked_means, axis=1))[0]
+    is_decided = (np.array(p_values) < DECIDED) & (lower_ends > 0)
+    decided: list[bool] = is_decided.tolist()
+    intervals = _place_intervals(ranked_means, decided, is_enough=trials.has_enough(*order))
+
+    log_losses = trials.resampled([trials.losses], seed)
+    first_log_loss = log_losses[:, order[:1]]
+    ratios = np.exp(_interval(log_losses - first_log_loss))  # (2, E)
+    failed_shares = np.einsum("ecr,ecr->e", np.nan_to_num(failed), trials.failures.weights)
+
+    standings = list[Standing]()
+    places = _shared_places(failures[order], losses[order])
+    for position, (estimator, place) in enumerate(zip(order.tolist(), places, strict=True)):
+        is_first = position == 0
+        pair = position - 1
+        low, high = ratios[:, estimator].tolist()
+        has_interval = trials.has_enough(order[0], estimator) and high - low > MIN_LOSS_RATIO_RANGE
+        first_place, last_place = intervals[position]
         standing = Standing(
-            index=e,
+            index=estimator,
             place=place,
-            places=(min(places[at][0], place), places[at][1]),
-            failed=float(shares[e]),
-            loss=float(np.exp(losses[e])),
-            loss_ratio=float(np.exp(losses[e] - losses[order[0]])),
-            ratio_interval=(float(ratios[0, e]), float(ratios[1, e])) if is_told else None,
-            p_above=p[at - 1] if at else None,
-            decided_above=at > 0 and decided[at - 1],
-            repeats=trials.repeats(int(above), e, len(pairs)) if at else None,
+            places=(min(first_place, place), last_place),
+            failed=float(failed_shares[estimator]),
+            loss=float(np.exp(losses[estimator])),
+            loss_ratio=float(np.exp(losses[estimator] - losses[order[0]])),
+            ratio_interval=(low, high) if has_interval else None,
+            p_above=None if is_first else p_values[pair],
+            decided_above=not is_first and decided[pair],
+            repeats=None if is_first else trials.repeats(*neighbours[pair], len(neighbours)),
         )
-        found.append(standing)
-    return found
+        standings.append(standing)
+    return standings
 
 
-def _weights(has: NDArray[np.bool_]) -> Array:
-    """What each trial (E, C, R) weighs in its estimator's mean: cases alike, within a case repeats alike."""
-    repeats = has.sum(axis=2, keepdims=True)
+def _weights(has_value: Mask) -> Array:
+    """The weight of each trial (E, C, R) in its estimator's mean: equal for cases, and for repeats within a case."""
+    repeats = has_value.sum(axis=2, keepdims=True)
     cases = (repeats > 0).sum(axis=1, keepdims=True)
-    weights: Array = has / np.maximum(repeats, 1) / np.maximum(cases, 1)
+    share_of_case = has_value / np.maximum(repeats, 1)
+    weights: Array = share_of_case / np.maximum(cases, 1)
     return weights
 
 
-def _interval(drawn: Array) -> Array:
-    """The ends (2, N) between which 95 % of the draws (B, N) lie."""
-    ends: Array = np.quantile(drawn, [ALPHA / 2, 1 - ALPHA / 2], axis=0)
+def _interval(draws: Array) -> Array:
+    """The ends (2, N) of the interval that holds 95 % of the draws (B, N)."""
+    ends: Array = np.quantile(draws, INTERVAL, axis=0)
     return ends
 
 
-def permutation_p(differences: Array, rng: np.random.Generator) -> float:
-    """The chance of a sum so far from 0 were the sign of each difference (N,) a toss of a coin.
+def _shared_places(failures: Array, losses: Array) -> list[int]:
+    """Places from 1 of estimators in order, with means (E,); equal ones share the first of their places."""
+    places = list[int]()
+    means = list(zip(failures.tolist(), losses.tolist(), strict=True))
+    for position, mean in enumerate(means):
+        is_tied = position > 0 and mean == means[position - 1]
+        places.append(places[-1] if is_tied else position + 1)
+    return places
 
-    All signs are tried up to 12 differences, else 4,095 drawn ones; of more than 200 the sum is taken as normal.
+
+def permutation_p(differences: Array, rng: np.random.Generator) -> float:
+    """Two-sided p-value of the sum of paired differences (N,), whose signs are random under the null hypothesis.
+
+    All signs are tried up to 12 differences, otherwise 4,095 random patterns; above 200 the sum is taken as normal.
+    scipy.stats.permutation_test draws other patterns, which would change the printed p-values.
     Source: Fisher (1935), section 21.
     """
-    d = differences[differences != 0]
-    n = len(d)
+    differences = differences[differences != 0]
+    n = len(differences)
     if n > MANY_UNITS:
-        return float(2 * special.ndtr(-abs(d.sum()) / np.sqrt(np.sum(d * d))))
+        std = np.sqrt(np.sum(differences * differences))
+        z = -abs(differences.sum()) / std
+        return float(2 * special.ndtr(z))
+
     if n <= EXACT_UNITS:
-        signs = 1.0 - 2.0 * ((np.arange(2**n)[:, None] >> np.arange(n)) & 1)
+        patterns = np.arange(2**n)[:, None]
+        is_flipped = (patterns >> np.arange(n)) & 1
+        signs = 1.0 - 2.0 * is_flipped
     else:
-        signs = np.concatenate([np.ones((1, n)), 1.0 - 2.0 * rng.integers(0, 2, (FLIPS, n))])
-    sums = np.abs(signs @ d)
-    return float(np.mean(sums >= sums[0] * (1 - 1e-12) - 1e-300))
+        is_flipped = rng.integers(0, 2, (FLIPS, n))
+        observed_signs = np.ones((1, n))
+        signs = np.concatenate([observed_signs, 1.0 - 2.0 * is_flipped])
+    sums = np.abs(signs @ differences)
+    observed = sums[0] * (1 - 1e-12) - 1e-300  # equal sums must count as such in spite of rounding
+    return float(np.mean(sums >= observed))
 
 
-def holm(p: list[float]) -> list[float]:
-    """Chances of several tests, the least so corrected that it is the chance of any wrong finding.
+def holm(p_values: list[float]) -> list[float]:
+    """Adjusted p-values of several tests, which bound the probability of any false positive.
 
     Source: Holm (1979).
     """
-    order = np.argsort(p, kind="stable")
-    corrected = list(p)
-    least = 0.0
-    for at, k in enumerate(order):
-        least = max(least, min(1.0, (len(p) - at) * p[k]))
-        corrected[k] = least
+    corrected = list(p_values)
+    largest = 0.0
+    for position, test in enumerate(np.argsort(p_values, kind="stable")):
+        remaining = len(p_values) - position
+        largest = max(largest, min(1.0, remaining * p_values[test]))
+        corrected[test] = largest
     return corrected
 
 
-def _places(drawn: Array, decided: list[bool], *, enough: bool) -> list[tuple[int, int]]:
-    """The places that each of the ranked may have: those of 95 % of the draws, and its neighbours' if undecided."""
-    n = drawn.shape[1]
-    if not enough:
+def _place_intervals(ranked_means: Array, decided: list[bool], *, is_enough: bool) -> list[tuple[int, int]]:
+    """First and last place of each ranked estimator, over 95 % of draws (B, E) and including undecided neighbours."""
+    n = ranked_means.shape[1]
+    if not is_enough:
         return [(1, n)] * n
-    places = np.argsort(np.argsort(np.round(drawn, 12), axis=1, kind="stable"), axis=1) + 1
-    low, high = np.quantile(places, [ALPHA / 2, 1 - ALPHA / 2], axis=0, method="nearest").astype(int).tolist()
-    for k, is_decided in enumerate(decided):
+    rounded = np.round(ranked_means, DIGITS)
+    order = np.argsort(rounded, axis=1, kind="stable")
+    places = np.argsort(order, axis=1) + 1
+    ends = np.quantile(places, INTERVAL, axis=0, method="nearest")
+    first, last = ends.astype(int).tolist()
+    for position, is_decided in enumerate(decided):
+        place = position + 1
         if not is_decided:
-            high[k] = max(high[k], k + 2)
-            low[k + 1] = min(low[k + 1], k + 1)
-    return [(min(lo, k + 1), max(hi, k + 1)) for k, (lo, hi) in enumerate(zip(low, high, strict=True))]
+            last[position] = max(last[position], place + 1)
+            first[position + 1] = min(first[position + 1], place)
+    for position in range(n):  # the place itself is always included
+        first[position] = min(first[position], position + 1)
+        last[position] = max(last[position], position + 1)
+    return list(zip(first, last, strict=True))
 
 
 def repeats_to_decide(differences: Array, *, tests: int = 1) -> int | None:
-    """How many repeats find a ratio of 1.1 in 95 of 100 boards, from differences (C, R) of log losses of a pair.
+    """Repeats that detect a ratio of 1.1 with a power of 95 %, from differences (C, R) of log losses of a pair.
 
-    Repeats average what differs within a case, not what differs between cases: where that is more than chance (an
-    F test) and hides the ratio, more cases are needed and this is None. NaN where there is no trial.
+    Repeats average the variance within a case, not that between cases: if an F test shows the latter and it hides
+    the ratio, more cases are needed and the result is None. NaN marks a missing trial.
     """
-    n = np.sum(~np.isnan(differences), axis=1)
-    means = np.nanmean(differences, axis=1)
     n_cases = len(differences)
-    free = int((n - 1).sum())
-    spread = float(np.var(means, ddof=1)) if n_cases > 1 else 0.0
-    within = float(np.nansum((differences - means[:, None]) ** 2) / free) if free else spread
-    between = spread
-    typical = float(np.mean(n))
-    if free and n_cases > 1 and within > 0 and special.fdtrc(n_cases - 1, free, between * typical / within) < ALPHA:
-        between = max(0.0, between - within / typical)
-    else:
-        between = between if free and within == 0 else 0.0
-    z = special.ndtri(POWER) - special.ndtri(DECIDED / 2 / max(tests, 1))
-    left = (np.log(EFFECT) / z) ** 2 - between / n_cases
-    least = ceil(max(MIN_UNITS, np.log2(2 * max(tests, 1) / DECIDED)) / n_cases)
-    needed = max(least, ceil(within / n_cases / left)) if left > 0 else MOST_REPEATS + 1
-    return needed if needed <= MOST_REPEATS else None
+    trials_per_case = np.sum(~np.isnan(differences), axis=1)
+    typical_trials = float(np.mean(trials_per_case))
+    degrees_of_freedom = int((trials_per_case - 1).sum())
+    case_means = np.nanmean(differences, axis=1)
+    spread = float(np.var(case_means, ddof=1)) if n_cases > 1 else 0.0
+    within = spread
+    if degrees_of_freedom:
+        residuals = differences - case_means[:, None]
+        within = float(np.nansum(residuals**2) / degrees_of_freedom)
+    between = _variance_between_cases(
+        spread,
+        within,
+        n_cases=n_cases,
+        degrees_of_freedom=degrees_of_freedom,
+        trials=typical_trials,
+    )
+
+    n_tests = max(tests, 1)
+    z = special.ndtri(POWER) - special.ndtri(DECIDED / 2 / n_tests)
+    allowed = (np.log(EFFECT) / z) ** 2  # variance of the mean difference
+    left = allowed - between / n_cases
+    if left <= 0:
+        return None
+    units = max(MIN_UNITS, np.log2(2 * n_tests / DECIDED))
+    fewest = ceil(units / n_cases)
+    needed = max(fewest, ceil(within / n_cases / left))
+    return needed if needed <= MAX_REPEATS else None
+
+
+def _variance_between_cases(
+    spread: float,
+    within: float,
+    *,
+    n_cases: int,
+    degrees_of_freedom: int,
+    trials: float,
+) -> float:
+    """The variance of case means beyond that which repeats explain; 0 if an F test does not show any."""
+    if not degrees_of_freedom:
+        return 0.0
+    if within == 0:
+        return spread
+    if n_cases == 1:
+        return 0.0
+    f_ratio = spread * trials / within
+    p = special.fdtrc(n_cases - 1, degrees_of_freedom, f_ratio)
+    return max(0.0, spread - within / trials) if p < ALPHA else 0.0
 
 
 def mean_places(loss: Array, failed: Array) -> Array:
-    """Each estimator's place (E,) in a case, by failed trials and then the median loss, as a mean over cases.
+    """Each estimator's place (E,) in a case, by failed trials and then the median loss, averaged over cases.
 
-    Equal ones share their places. `loss` and `failed` (E, C, R) are those of `rank`.
+    Equal estimators share the mean of their places. `loss` and `failed` (E, C, R) are those of `rank`.
     """
-    missing = np.isnan(loss)
-    middle = np.nanmedian(np.where(missing.all(axis=2, keepdims=True), 0.0, loss), axis=2)
-    key = np.round(10.0 * np.nanmean(failed, axis=2) + middle, 12)  # no loss is more than 1
-    before = (key < key[:, None]).sum(axis=1)
-    alike = (key == key[:, None]).sum(axis=1)
-    places: Array = (before + (alike + 1) / 2).mean(axis=1)
+    has_no_loss = np.isnan(loss).all(axis=2, keepdims=True)
+    median_loss = np.nanmedian(np.where(has_no_loss, 0.0, loss), axis=2)
+    failed_share = np.nanmean(failed, axis=2)
+    key = np.round(10.0 * failed_share + median_loss, DIGITS)  # no loss is more than 1
+    better = (key < key[:, None]).sum(axis=1)
+    equal = (key == key[:, None]).sum(axis=1)  # itself included
+    case_places = better + (equal + 1) / 2
+    places: Array = case_places.mean(axis=1)
     return places
 
 
 def difference_p(a: Array, b: Array) -> float:
-    """The chance that values (N,) and (M,) of two on one case are so unlike by luck; 1 with fewer than four of each.
+    """Two-sided p-value of values (N,) and (M,) of two estimators on one case; 1 with fewer than four of either.
 
-    Only their order counts, so that infinity may stand for a failure. Source: Mann and Whitney (1947).
+    Only their order counts, so infinity may stand for a failure. Unlike scipy.stats.mannwhitneyu it is exact with ties.
+    Source: Mann and Whitney (1947).
     """
     if min(len(a), len(b)) < MIN_TRIALS:
         return 1.0
-    wins = float(np.sum(a[:, None] < b) + 0.5 * np.sum(a[:, None] == b))
-    least = int(np.ceil(min(wins, len(a) * len(b) - wins)))
-    return min(1.0, 2 * float(_chance_of_wins(len(a), len(b))[least]))
+    n_pairs = len(a) * len(b)
+    wins_of_a = np.sum(a[:, None] < b)
+    ties = np.sum(a[:, None] == b)
+    wins = float(wins_of_a + 0.5 * ties)
+    fewer_wins = int(np.ceil(min(wins, n_pairs - wins)))
+    one_sided = float(_chance_of_wins(len(a), len(b))[fewer_wins])
+    return min(1.0, 2 * one_sided)
 
 
 @cache
 def _chance_of_wins(n: int, m: int) -> Array:
-    """The chance of k or fewer wins, for each k, among the n m pairs of two that are alike."""
-    ways = np.ones(1)
-    for i in range(1, n + 1):  # the Gaussian binomial coefficient, a factor (1 - q^(m + i)) / (1 - q^i) at a time
-        product = np.concatenate([ways, np.zeros(m + i)])
-        product[m + i :] -= ways
-        ways = np.array([product[k::-i].sum() for k in range(len(ways) + m)])
-    chances: Array = np.cumsum(ways) / ways.sum()
+    """The probability of k or fewer wins, for each k, among the n m pairs of two equal estimators.
+
+    The counts are the coefficients of the Gaussian binomial, the product of (1 - q^(m + i)) / (1 - q^i) for i to n.
+    """
+    counts = np.ones(1)
+    for i in range(1, n + 1):
+        product = np.concatenate([counts, np.zeros(m + i)])
+        product[m + i :] -= counts
+        n_wins = range(len(counts) + m)
+        counts = np.array([product[k::-i].sum() for k in n_wins])
+    chances: Array = np.cumsum(counts) / counts.sum()
     return chances

@@ -15,6 +15,7 @@ from vobench.metric.ate import (
     PoseErrors,
     Rows,
     angle_rad,
+    distances_between,
     errors_between,
     in_blocks,
     matrix_norms,
@@ -24,38 +25,63 @@ from vobench.metric.ate import (
 from vobench.metric.comparison import HARTLEY, POSES, STURM_RPE, ZHANG, Comparison, MetricDefinition, OverLengths
 from vobench.metric.settings import RelativeRule, Unit
 from vobench.trajectory.associate import Index, nearest
-from vobench.trajectory.trajectory import Stamps, Trajectory
+from vobench.trajectory.trajectory import Stamps, Trajectory, path_lengths_m, step_lengths_m
 
-TOLERANCE = 0.1  # of delta, that a pair may be off among all pairs; evo's
-GAP_STEPS = 1.5  # a step so many times the usual one is a gap
+TOLERANCE = 0.1  # of delta, by which a pair of all pairs may miss it; evo's
+GAP_STEPS = 1.5  # a step this many times the usual one is a gap
 MAX_PAIRS = 20_000_000  # all pairs by angle grow with the square of the poses; this many need 3 GB
-MAX_POSES = 2000  # whose every pair is looked at: 4 million
-CHUNK = 4_000_000  # relative angles looked at in one go: 32 MB
+MAX_POSES = 2000  # up to which every pair is compared: 4 million
+CHUNK = 4_000_000  # relative angles computed at once: 32 MB
+TRACE_MARGIN = 1e-4  # more than matrices with six digits are off
 
 IndexPairs = tuple[Index, Index]
+Mask = NDArray[np.bool_]
+NO_POSES = np.zeros(0, np.int64)
 
 
 def select_pairs(
-    T: Array, t_ns: Stamps, *, delta: float, unit: Unit, all_pairs: bool, spanning: bool = True
+    T: Array,
+    t_ns: Stamps,
+    *,
+    delta: float,
+    unit: Unit,
+    all_pairs: bool,
+    spanning: bool = True,
 ) -> IndexPairs:
     """Indices (first, last), each (P,), of matched poses T (K, 4, 4), stamped t_ns (K,), that are `delta` apart.
 
     Consecutive: from the first pose on, each pair begins where the one before ended, at the first pose
     `delta` or more further along. All pairs: every pose with the later one nearest to `delta` away, if it
-    is within a tenth; with `spanning` a pose whose partner fell into a gap goes with the one after the gap,
-    so that what went wrong meanwhile is counted. Frames count matched poses. Source: evo's rules; gaps ours.
+    is within a tenth; with `spanning` a pose whose partner fell into a gap is paired with the one after the
+    gap, so that errors made in the gap are counted. Frames count matched poses. Source: evo's rules; gaps ours.
     """
     if unit == "f":
-        first = np.arange(0, max(len(T) - int(delta), 0), 1 if all_pairs else int(delta))
-        return first, first + int(delta)
+        return _pairs_by_frames(len(T), int(delta), all_pairs=all_pairs)
     if unit in ("d", "r"):
-        delta = float(np.deg2rad(delta)) if unit == "d" else delta
-        R = T[:, :3, :3]
-        return _all_by_angle(R, delta) if all_pairs else _chain(angle_rad(np.swapaxes(R[:-1], -1, -2) @ R[1:]), delta)
-    if not all_pairs:
-        return _chain(_moves(T) if unit == "m" else np.diff(t_ns), delta if unit == "m" else delta * 1e9)
-    along = _along(T) if unit == "m" else (t_ns - t_ns[:1]) / 1e9
-    return pairs_along(along, delta, tolerance=TOLERANCE * delta, gaps=_gaps(t_ns) if spanning else None)
+        delta_rad = float(np.deg2rad(delta)) if unit == "d" else delta
+        return _pairs_by_angle(T[:, :3, :3], delta_rad, all_pairs=all_pairs)
+    if all_pairs:
+        along = path_lengths_m(T[:, :3, 3]) if unit == "m" else (t_ns - t_ns[:1]) / 1e9
+        gaps = _gaps(t_ns) if spanning else None
+        return pairs_along(along, delta, tolerance=TOLERANCE * delta, gaps=gaps)
+    if unit == "m":
+        return _chain(step_lengths_m(T[:, :3, 3]), delta)
+    return _chain(np.diff(t_ns), delta * 1e9)
+
+
+def _pairs_by_frames(n: int, delta: int, *, all_pairs: bool) -> IndexPairs:
+    """Pairs of n poses that are `delta` frames apart."""
+    step = 1 if all_pairs else delta
+    first = np.arange(0, max(n - delta, 0), step)
+    return first, first + delta
+
+
+def _pairs_by_angle(R: Array, delta_rad: float, *, all_pairs: bool) -> IndexPairs:
+    """Pairs of rotations (K, 3, 3) that are an angle apart."""
+    if all_pairs:
+        return _all_by_angle(R, delta_rad)
+    R_steps = se3.transposed(R[:-1]) @ R[1:]
+    return _chain(angle_rad(R_steps), delta_rad)
 
 
 def every_pair(n: int) -> IndexPairs:
@@ -64,104 +90,126 @@ def every_pair(n: int) -> IndexPairs:
     Of more than MAX_POSES poses, as many pairs as these have are drawn, always the same.
     """
     if n <= MAX_POSES:
-        return np.repeat(np.arange(n), n), np.tile(np.arange(n), n)
+        poses = np.arange(n)
+        return np.repeat(poses, n), np.tile(poses, n)
     first, last = np.random.default_rng(0).integers(n, size=(2, MAX_POSES**2))
     return first, last
 
 
-def pairs_along(along: Array, delta: float, *, tolerance: float, gaps: NDArray[np.bool_] | None = None) -> IndexPairs:
-    """Of every pose the later one whose way `along` (K,), not decreasing, is nearest to delta further on.
+def pairs_along(
+    along: Array,
+    delta: float,
+    *,
+    tolerance: float,
+    gaps: Mask | None = None,
+) -> IndexPairs:
+    """For every pose the later one whose distance `along` (K,), not decreasing, is nearest to delta further on.
 
     Pairs that miss it by more than `tolerance` are dropped, unless the partner fell into one of the `gaps`
-    (K-1,), the steps that have holes in them: then the pose after the gap is taken. O(K log K).
+    (K-1,), the steps with missing poses: then the pose after the gap is taken. O(K log K).
     """
     n = len(along)
     first = np.arange(max(n - 1, 0))
-    beyond = np.clip(np.searchsorted(along, along[first] + delta, side="left"), first + 1, max(n - 1, 0))
-    # Poses that stand still share a distance; the first of them is the one that arrives there.
-    beyond, short = (
-        np.maximum(np.searchsorted(along, along[last], side="left"), first + 1) for last in (beyond, beyond - 1)
-    )
-    miss_beyond, miss_short = (np.abs(along[last] - along[first] - delta) for last in (beyond, short))
-    last = np.where(miss_short <= miss_beyond, short, beyond)
-    near = np.minimum(miss_short, miss_beyond) <= tolerance
-    spans = np.zeros(len(first), bool) if gaps is None else gaps[beyond - 1] & (along[beyond] - along[first] > delta)
-    kept = near | spans
-    return first[kept], np.where(near, last, beyond)[kept]
+    goal = along[first] + delta
+    beyond = np.searchsorted(along, goal, side="left")
+    beyond = np.clip(beyond, first + 1, max(n - 1, 0))
+
+    # While the body is stationary poses share a distance; the first of them is the one that arrives there.
+    short = _first_of_equal(along, beyond - 1, first)
+    beyond = _first_of_equal(along, beyond, first)
+    distance_beyond = along[beyond] - along[first]
+    distance_short = along[short] - along[first]
+    miss_beyond = np.abs(distance_beyond - delta)
+    miss_short = np.abs(distance_short - delta)
+    nearest_pose = np.where(miss_short <= miss_beyond, short, beyond)
+    is_near = np.minimum(miss_short, miss_beyond) <= tolerance
+
+    spans_gap = np.zeros(len(first), bool)
+    if gaps is not None:
+        spans_gap = gaps[beyond - 1] & (distance_beyond > delta)
+    is_pair = is_near | spans_gap
+    last = np.where(is_near, nearest_pose, beyond)
+    return first[is_pair], last[is_pair]
 
 
-def _moves(T: Array) -> Array:
-    return np.asarray(np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1))
+def _first_of_equal(along: Array, poses: Index, first: Index) -> Index:
+    """The first poses at the distances of others, but later than `first`, all (N,)."""
+    arrivals = np.searchsorted(along, along[poses], side="left")
+    return np.asarray(np.maximum(arrivals, first + 1))
 
 
-def _along(T: Array) -> Array:
-    return np.concatenate([[0.0], np.cumsum(_moves(T))])[: len(T)]
-
-
-def _gaps(t_ns: Stamps) -> NDArray[np.bool_]:
+def _gaps(t_ns: Stamps) -> Mask:
     """Which steps (K-1,) between matched poses take longer than usual."""
-    steps = np.diff(t_ns)
-    return steps > GAP_STEPS * np.median(steps) if len(steps) else np.zeros(0, bool)
+    steps_ns = np.diff(t_ns)
+    if not len(steps_ns):
+        return np.zeros(0, bool)
+    return np.asarray(steps_ns > GAP_STEPS * np.median(steps_ns))
 
 
 def _chain(steps: NDArray[Any], delta: float) -> IndexPairs:
-    """Pairs end to end, each as soon as its steps sum up to delta: one sum after the other, as it rounds."""
-    chosen = [0]
+    """Pairs end to end, each as soon as its steps sum up to delta; steps are added one by one, as evo does."""
+    ends = [0]
     total = 0.0
     for end, step in enumerate(steps.tolist(), 1):
         total += step
         if total >= delta:
-            chosen.append(end)
+            ends.append(end)
             total = 0.0
-    ends = np.array(chosen, np.int64)
-    return ends[:-1], ends[1:]
+    chain = np.array(ends, np.int64)
+    return chain[:-1], chain[1:]
 
 
 def _all_by_angle(R: Array, delta_rad: float) -> IndexPairs:
-    """Every two rotations (K, 3, 3) that are delta ± a tenth apart, whatever the way between them."""
-    found: list[IndexPairs] = []
+    """All pairs of rotations (K, 3, 3) that are delta ± a tenth apart, whatever the rotations between them."""
+    firsts = [NO_POSES]
+    lasts = [NO_POSES]
     total = 0
     for first, last in _candidates(R, delta_rad):
-        angle = angle_rad(np.swapaxes(R[first], -1, -2) @ R[last])
-        kept = np.abs(angle - delta_rad) <= TOLERANCE * delta_rad
-        found.append((first[kept], last[kept]))
-        total += int(np.count_nonzero(kept))
+        angle = angle_rad(se3.transposed(R[first]) @ R[last])
+        is_pair = np.abs(angle - delta_rad) <= TOLERANCE * delta_rad
+        firsts.append(first[is_pair])
+        lasts.append(last[is_pair])
+        total += int(np.count_nonzero(is_pair))
         if total > MAX_PAIRS:
             raise AlignmentError(
                 f"all pairs {np.rad2deg(delta_rad):g} degrees apart should be {MAX_PAIRS} or fewer, but {len(R)} poses "
                 f"have more; take consecutive pairs"
             )
-    firsts, lasts = zip(*found, strict=True) if found else ((np.zeros(0, np.int64),), (np.zeros(0, np.int64),))
     return np.concatenate(firsts), np.concatenate(lasts)
 
 
 def _candidates(R: Array, delta_rad: float) -> Iterator[IndexPairs]:
-    """Pairs whose trace says that they may fit, chunk after chunk; the margin is more than six digits lose."""
+    """Pairs with a trace near that of the angle, one chunk after the other."""
     flat = R.reshape(-1, 9)
-    margin = 1e-4
-    low = 1 + 2 * np.cos(min((1 + TOLERANCE) * delta_rad, np.pi)) - margin
-    high = 1 + 2 * np.cos(max((1 - TOLERANCE) * delta_rad, 0.0)) + margin
+    largest_rad = min((1 + TOLERANCE) * delta_rad, np.pi)
+    smallest_rad = max((1 - TOLERANCE) * delta_rad, 0.0)
+    lowest_trace = 1 + 2 * np.cos(largest_rad) - TRACE_MARGIN
+    highest_trace = 1 + 2 * np.cos(smallest_rad) + TRACE_MARGIN
     rows = max(1, CHUNK // max(len(R), 1))
     for begin in range(0, len(R) - 1, rows):
-        traces = flat[begin : begin + rows] @ flat[begin + 1 :].T
-        first, last = np.nonzero((traces >= low) & (traces <= high))
-        later = last >= first
-        yield first[later] + begin, last[later] + begin + 1
+        chunk = flat[begin : begin + rows]
+        traces = chunk @ flat[begin + 1 :].T
+        is_candidate = (traces >= lowest_trace) & (traces <= highest_trace)
+        first, last = np.nonzero(is_candidate)
+        is_later = last >= first
+        yield first[is_later] + begin, last[is_later] + begin + 1
 
 
-MAX_TRUTH_STEPS = 2.0  # TUM's: a truth further off than this many of its usual steps is none
-STILL_M = 1e-100  # a motion of the truth below it has no percentage that could be squared
+# TUM's: a true pose more than this many of its usual steps away counts as missing.
+MAX_TRUTH_STEPS = 2.0
+STILL_M = 1e-100  # a true motion below it has no percentage that could be squared
 
 
 def relative_matrix_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> Rows:
     """`matrix_norms` (P,) of the errors of the motions between matched poses (K, 4, 4) from first to last."""
     first, last = pairs
 
-    def block(part: slice) -> Rows:
-        gt, est = (motions(T, first[part], last[part]) for T in (T_gt, T_est))
+    def norms(block: slice) -> Rows:
+        gt = motions(T_gt, first[block], last[block])
+        est = motions(T_est, first[block], last[block])
         return matrix_norms(se3.inverse(gt) @ est)
 
-    return in_blocks(len(first), block)
+    return in_blocks(len(first), norms)
 
 
 def distance_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> Rows:
@@ -169,15 +217,21 @@ def distance_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> Rows:
 
     Pairs between which the truth didn't move have no percentage. Source: evo's point_distance and its ratio.
     """
-    first, last = pairs
-    gt_m, est_m = (np.linalg.norm(T[last, :3, 3] - T[first, :3, 3], axis=1) for T in (T_gt, T_est))
-    point_m = np.abs(gt_m - est_m)
-    moved = gt_m > STILL_M
-    return point_m, point_m[moved] / gt_m[moved] * 100
+    gt_m = distances_between(T_gt, *pairs)
+    est_m = distances_between(T_est, *pairs)
+    errors_m = np.abs(gt_m - est_m)
+    is_moving = gt_m > STILL_M
+    percent = errors_m[is_moving] / gt_m[is_moving] * 100
+    return errors_m, percent
 
 
 def tum_errors(
-    gt: Trajectory, est: Trajectory, *, delta_s: float, offset_ns: int = 0, scale: float = 1.0
+    gt: Trajectory,
+    est: Trajectory,
+    *,
+    delta_s: float,
+    offset_ns: int = 0,
+    scale: float = 1.0,
 ) -> PoseErrors:
     """Errors of the estimate's motions over delta_s seconds, from every pose on; est's positions times scale.
 
@@ -185,23 +239,29 @@ def tum_errors(
     """
     t_ns = est.t_ns + np.int64(offset_ns)
     last = nearest(t_ns + round(delta_s * 1e9), t_ns)
-    first = np.flatnonzero(last < len(t_ns) - 1)  # the last pose may stand for any later instant, so it ends no pair
+    first = np.flatnonzero(last < len(t_ns) - 1)  # the last pose is nearest to any later instant, so it ends no pair
     last = last[first]
+
     gt_first = nearest(t_ns[first], gt.t_ns)
     gt_last = nearest(t_ns[last], gt.t_ns)
-    longest_ns = MAX_TRUTH_STEPS * np.median(np.diff(gt.t_ns)) if len(gt) > 1 else 0.0
-    off_ns = np.maximum(np.abs(gt.t_ns[gt_first] - t_ns[first]), np.abs(gt.t_ns[gt_last] - t_ns[last]))
-    near = off_ns <= longest_ns
-    T_est = motions(est.T_world_frame, last[near], first[near])
+    first_miss_ns = np.abs(gt.t_ns[gt_first] - t_ns[first])
+    last_miss_ns = np.abs(gt.t_ns[gt_last] - t_ns[last])
+    largest_miss_ns = 0.0
+    if len(gt) > 1:
+        largest_miss_ns = MAX_TRUTH_STEPS * np.median(np.diff(gt.t_ns))
+    is_near = np.maximum(first_miss_ns, last_miss_ns) <= largest_miss_ns
+
+    T_est = motions(est.T_world_frame, last[is_near], first[is_near])
     T_est[:, :3, 3] *= scale
-    return motion_errors(motions(gt.T_world_frame, gt_last[near], gt_first[near]), T_est)
+    T_gt = motions(gt.T_world_frame, gt_last[is_near], gt_first[is_near])
+    return motion_errors(T_gt, T_est)
 
 
 OPENVINS_LENGTHS_M = (8.0, 16.0, 24.0, 32.0, 40.0, 48.0)
 OPENVINS_TOLERANCE_M = 0.5
 RPG_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5)
 RPG_TOLERANCE = 0.2  # of the length
-MIN_SAMPLES = 2  # a length with fewer is left out
+MIN_SAMPLES = 2  # a length with fewer parts is left out
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,81 +279,132 @@ class RelativeErrors:
 
 
 def relative_lengths(path_m: float, rule: RelativeRule) -> tuple[float, ...]:
-    """The rule's lengths: 8 to 48 m, or 10 to 50 % of the path with two decimals cut off."""
+    """The rule's lengths: 8 to 48 m, or 10 to 50 % of the path, truncated to two decimals."""
     if rule == "openvins":
         return OPENVINS_LENGTHS_M
-    shares = (float(np.trunc(share * path_m * 100) / 100) for share in RPG_SHARES)
-    return tuple(length for length in shares if length > 0)
+    lengths_m = [float(np.trunc(share * path_m * 100) / 100) for share in RPG_SHARES]
+    return tuple(length for length in lengths_m if length > 0)
 
 
-def part_errors(T_gt: Array, T_est: Array, lengths_m: Sequence[float], *, rule: RelativeRule) -> RelativeErrors:
+def part_errors(
+    T_gt: Array,
+    T_est: Array,
+    lengths_m: Sequence[float],
+    *,
+    rule: RelativeRule,
+) -> RelativeErrors:
     """Errors of the motions from each pose (K, 4, 4) to the one whose true path is nearest to each length.
 
     Gravity points along z of the world. Source: Zhang and Scaramuzza (2018), section IV.
     """
-    along = _along(T_gt)
-    kept: list[tuple[float, Index, Index]] = []
-    for length in lengths_m:
-        # rpg's tolerance is strictly less
-        tolerance_m = OPENVINS_TOLERANCE_M if rule == "openvins" else float(np.nextafter(RPG_TOLERANCE * length, 0.0))
-        first, last = pairs_along(along, length, tolerance=tolerance_m)
-        kept += [(length, first, last)] if len(first) >= MIN_SAMPLES else []
-    first, last = (np.concatenate([np.zeros(0, np.int64), *(part[side] for part in kept)]) for side in (1, 2))
-    lengths = np.repeat([part[0] for part in kept], [len(part[1]) for part in kept])
-    errors = in_blocks(len(first), lambda part: _errors(T_gt, T_est, first[part], last[part]))
-    return RelativeErrors(lengths, *errors)
+    along_m = path_lengths_m(T_gt[:, :3, 3])
+    firsts = [NO_POSES]
+    lasts = [NO_POSES]
+    part_lengths_m = [np.zeros(0)]
+    for length_m in lengths_m:
+        first, last = pairs_along(along_m, length_m, tolerance=_part_tolerance_m(length_m, rule))
+        if len(first) >= MIN_SAMPLES:
+            firsts.append(first)
+            lasts.append(last)
+            part_lengths_m.append(np.full(len(first), length_m))
+    first = np.concatenate(firsts)
+    last = np.concatenate(lasts)
+
+    def errors(block: slice) -> Rows:
+        return _part_errors(T_gt, T_est, first[block], last[block])
+
+    return RelativeErrors(np.concatenate(part_lengths_m), *in_blocks(len(first), errors))
 
 
-def _errors(T_gt: Array, T_est: Array, first: Index, last: Index) -> Rows:
-    """Translation, angle, yaw and tilt (N,) of what is left between motions."""
+def _part_tolerance_m(length_m: float, rule: RelativeRule) -> float:
+    """By how much the path of a part may differ from its length."""
+    if rule == "openvins":
+        return OPENVINS_TOLERANCE_M
+    limit_m = RPG_TOLERANCE * length_m
+    return float(np.nextafter(limit_m, 0.0))  # rpg's tolerance is strictly less
+
+
+def _part_errors(
+    T_gt: Array,
+    T_est: Array,
+    first: Index,
+    last: Index,
+) -> Rows:
+    """Translation, angle, yaw and tilt (N,) of the errors of motions."""
     E = se3.inverse(motions(T_gt, first, last)) @ motions(T_est, first, last)
+    R_error = E[:, :3, :3]
     R_est = T_est[last, :3, :3]
-    roll, pitch, yaw = se3.roll_pitch_yaw_rad(R_est @ E[:, :3, :3] @ np.swapaxes(R_est, -1, -2)).T
-    return np.linalg.norm(E[:, :3, 3], axis=1), angle_rad(E[:, :3, :3]), np.abs(yaw), np.hypot(pitch, roll)
+    R_world = R_est @ R_error @ se3.transposed(R_est)
+    roll, pitch, yaw = se3.roll_pitch_yaw_rad(R_world).T
+    length = np.linalg.norm(E[:, :3, 3], axis=1)
+    tilt = np.hypot(pitch, roll)
+    return length, angle_rad(R_error), np.abs(yaw), tilt
 
 
-def _pairs(of: Comparison) -> IndexPairs:
-    s = of.settings
-    if s.rpe_rule == "tartanair":
-        return every_pair(len(of.matched))
-    if s.rpe_rule == "tum":  # their script pairs other poses, and has no other forms of errors than theirs
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+def _pairs(comparison: Comparison) -> IndexPairs:
+    """The pairs of matched poses whose motions are compared."""
+    settings = comparison.settings
+    if settings.rpe_rule == "tartanair":
+        return every_pair(len(comparison.matched))
+    if settings.rpe_rule == "tum":  # that script pairs other poses, and measures other errors in no other form
+        return NO_POSES, NO_POSES
+    is_from_truth = settings.rpe_pairs_from == "gt"
     return select_pairs(
-        of.matched.T_gt if s.rpe_pairs_from == "gt" else of.T_moving,
-        of.matched.t_ns,
-        delta=s.rpe_delta,
-        unit=s.rpe_unit,
-        all_pairs=s.rpe_all_pairs,
-        spanning=s.rpe_rule == "spanning",
+        comparison.matched.T_gt if is_from_truth else comparison.T_moving,
+        comparison.matched.t_ns,
+        delta=settings.rpe_delta,
+        unit=settings.rpe_unit,
+        all_pairs=settings.rpe_all_pairs,
+        spanning=settings.rpe_rule == "spanning",
     )
 
 
-def _relative(of: Comparison) -> PoseErrors:
-    s = of.settings
-    if s.rpe_rule == "tum":
-        return tum_errors(of.gt, of.est, delta_s=s.rpe_delta, offset_ns=s.offset_ns, scale=of.alignment.scale)
-    return errors_between(of.matched.T_gt, of.T_moving, *of.once(_pairs))
+def _relative(comparison: Comparison) -> PoseErrors:
+    settings = comparison.settings
+    if settings.rpe_rule == "tum":
+        return tum_errors(
+            comparison.gt,
+            comparison.est,
+            delta_s=settings.rpe_delta,
+            offset_ns=settings.offset_ns,
+            scale=comparison.alignment.scale,
+        )
+    first, last = comparison.once(_pairs)
+    return errors_between(comparison.matched.T_gt, comparison.T_moving, first, last)
 
 
-def _matrices(of: Comparison) -> Rows:
-    return relative_matrix_errors(of.matched.T_gt, of.T_moving, of.once(_pairs))
+def _matrices(comparison: Comparison) -> Rows:
+    pairs = comparison.once(_pairs)
+    return relative_matrix_errors(comparison.matched.T_gt, comparison.T_moving, pairs)
 
 
-def _distances(of: Comparison) -> Rows:
-    return distance_errors(of.matched.T_gt, of.T_moving, of.once(_pairs))
+def _distances(comparison: Comparison) -> Rows:
+    pairs = comparison.once(_pairs)
+    return distance_errors(comparison.matched.T_gt, comparison.T_moving, pairs)
 
 
-def _parts_of(of: Comparison) -> RelativeErrors:
-    rule = of.settings.relative_rule
-    T_est = of.T_moving
-    if rule == "rpg" and not of.settings.project:  # rpg turns errors into the estimate's own world
-        T_est = se3.transform(of.matched.T_est[:, :3, :3], of.alignment.scale * of.matched.T_est[:, :3, 3])
-    lengths_m = relative_lengths(float(of.distances_m[-1]), rule)
-    return part_errors(of.matched.T_gt, T_est, lengths_m, rule=rule)
+def _parts(comparison: Comparison) -> RelativeErrors:
+    """`part_errors` of a comparison, over the lengths of its rule."""
+    matched = comparison.matched
+    settings = comparison.settings
+    T_est = comparison.T_moving
+    if settings.relative_rule == "rpg" and not settings.project:  # rpg turns errors into the estimate's own world
+        R_est = matched.T_est[:, :3, :3]
+        positions_m = comparison.alignment.scale * matched.T_est[:, :3, 3]
+        T_est = se3.transform(R_est, positions_m)
+    path_m = float(comparison.distances_m[-1])
+    lengths_m = relative_lengths(path_m, settings.relative_rule)
+    return part_errors(matched.T_gt, T_est, lengths_m, rule=settings.relative_rule)
 
 
-def _over_parts(chosen: Callable[[RelativeErrors], Array]) -> Callable[[Comparison], OverLengths]:
-    return lambda of: OverLengths(chosen(of.once(_parts_of)), of.once(_parts_of).length_m)
+def _over_parts(errors: Callable[[RelativeErrors], Array]) -> Callable[[Comparison], OverLengths]:
+    """A measure of one kind of errors of parts."""
+
+    def measure(comparison: Comparison) -> OverLengths:
+        parts = comparison.once(_parts)
+        return OverLengths(errors(parts), parts.length_m)
+
+    return measure
 
 
 MOTIONS = ("rpe_delta", "rpe_unit", "rpe_all_pairs", "rpe_pairs_from", "rpe_rule", *POSES)
@@ -311,7 +422,7 @@ METRICS = (
         STURM_RPE,
         blind=GLOBAL,
         full=False,
-        measure=lambda of: of.once(_relative).trans_m,
+        measure=lambda comparison: comparison.once(_relative).trans_m,
     ),
     _motion_metric(
         "rpe_rot",
@@ -321,7 +432,7 @@ METRICS = (
         STURM_RPE,
         blind=GLOBAL,
         full=False,
-        measure=lambda of: np.rad2deg(of.once(_relative).rot_rad),
+        measure=lambda comparison: np.rad2deg(comparison.once(_relative).rot_rad),
     ),
     _motion_metric(
         "rpe_rot_chordal",
@@ -330,7 +441,7 @@ METRICS = (
         "‖R − I‖_F of the same E as rpe_rot",
         HARTLEY,
         blind=GLOBAL,
-        measure=lambda of: of.once(_matrices)[0],
+        measure=lambda comparison: comparison.once(_matrices)[0],
     ),
     _motion_metric(
         "rpe_full",
@@ -339,7 +450,7 @@ METRICS = (
         "‖E − I‖_F",
         "evo's full",
         blind=f"metres and rotations are added: it changes with the unit of length; {GLOBAL}",
-        measure=lambda of: of.once(_matrices)[1],
+        measure=lambda comparison: comparison.once(_matrices)[1],
     ),
     _motion_metric(
         "rpe_point",
@@ -348,7 +459,7 @@ METRICS = (
         "| ‖q_j − q_i‖ − ‖p_j − p_i‖ |",
         "evo's point_distance",
         blind="every direction: a motion of the right length to the wrong side has no error",
-        measure=lambda of: of.once(_distances)[0],
+        measure=lambda comparison: comparison.once(_distances)[0],
     ),
     _motion_metric(
         "rpe_point_percent",
@@ -357,7 +468,7 @@ METRICS = (
         "100 | ‖q_j − q_i‖ − ‖p_j − p_i‖ | / ‖q_j − q_i‖, pairs where the truth stood still left out",
         "evo's point_distance_error_ratio",
         blind="every direction, and drift while the truth stands still",
-        measure=lambda of: of.once(_distances)[1],
+        measure=lambda comparison: comparison.once(_distances)[1],
     ),
     _part_metric(
         "rel_trans",

@@ -19,6 +19,7 @@ from vobench.trajectory.align import Alignment
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 PERCENTILES = np.array([0.5, 0.95, 0.99])
+UNIT_NAMES = {"m": "m", "s": "s", "d": "°", "r": "rad"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,23 +43,32 @@ def statistics(errors: ArrayLike, *, ddof: int = 0) -> Statistics:
 
     Raises ValueError without errors: nothing measured is not an error of zero.
     """
-    e = np.asarray(errors, float).ravel()
+    e = np.sort(np.asarray(errors, float).ravel())
     if not e.size:
         raise ValueError("statistics need one error or more, got none")
-    e = np.sort(e)
-    at = (e.size - 1) * PERCENTILES
-    below = at.astype(int)
+    position = (e.size - 1) * PERCENTILES
+    below = position.astype(int)
     above = np.minimum(below + 1, e.size - 1)
-    median, p95, p99 = e[below] + (at - below) * (e[above] - e[below])
-    sse = np.sum(e * e)
-    std = e.std(ddof=ddof) if e.size > ddof else 0.0
-    numbers = [np.sqrt(sse / e.size), e.mean(), median, std, e[0], e[-1], sse, p95, p99]
-    return Statistics(e.size, *map(float, numbers))
+    share = position - below
+    median, p95, p99 = (e[below] + share * (e[above] - e[below])).tolist()
+    sse = float(np.sum(e * e))
+    return Statistics(
+        n=e.size,
+        rmse=float(np.sqrt(sse / e.size)),
+        mean=float(e.mean()),
+        median=median,
+        std=float(e.std(ddof=ddof)) if e.size > ddof else 0.0,
+        min=float(e[0]),
+        max=float(e[-1]),
+        sse=sse,
+        p95=p95,
+        p99=p99,
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """One metric's statistics; `id` says how it was computed, so equal ids may be compared."""
+    """One metric's statistics; `id` identifies how it was computed, so that numbers with equal ids are comparable."""
 
     id: str
     name: str
@@ -86,49 +96,69 @@ class LengthMetric:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """All errors (N,) of one metric, in its unit; `over` has their lengths where each is of a stretch of the path."""
+    """All errors (N,) of one metric, in its unit; `over` has their lengths if each is of a part of the path."""
 
     of: MetricDefinition
     errors: Array
     over: OverLengths | None = None
 
     @classmethod
-    def measured(cls, metric: MetricDefinition, of: Comparison) -> "Samples":
+    def measured(cls, metric: MetricDefinition, comparison: Comparison) -> "Samples":
         """The errors of a metric in a comparison; there may be none."""
-        found = metric.measure(of) if metric.measure else np.zeros(0)
-        return cls(metric, found.errors, found) if isinstance(found, OverLengths) else cls(metric, found)
+        if metric.measure is None:
+            return cls(metric, np.zeros(0))
+        measurement = metric.measure(comparison)
+        if isinstance(measurement, OverLengths):
+            return cls(metric, measurement.errors, measurement)
+        return cls(metric, measurement)
 
     def statistics(self, settings: ScoreSettings) -> Statistics:
         """The statistics of one error or more."""
-        found = statistics(self.errors, ddof=settings.std_ddof)
+        result = statistics(self.errors, ddof=settings.std_ddof)
         if self.over is None or self.over.drift is None:
-            return found
+            return result
         mean = mean_drift(self.over.drift, self.over.length_m, mean=settings.segment_mean)
-        return replace(found, mean=float(np.rad2deg(mean)) if self.of.unit == "deg/m" else mean)
+        is_angle = self.of.unit == "deg/m"
+        return replace(result, mean=float(np.rad2deg(mean)) if is_angle else mean)
 
     def metric(self, settings: ScoreSettings, *, n: int, of: int) -> Metric:
         """The metric of errors of n matched out of so many true poses."""
-        text = identity(self.of, settings, n=n, of=of)
-        return Metric(text, self.of.id, self.of.unit, self.statistics(settings))
+        metric_id = identity(self.of, settings, n=n, of=of)
+        return Metric(metric_id, self.of.id, self.of.unit, self.statistics(settings))
 
     def per_length(self, settings: ScoreSettings) -> Iterator[LengthMetric]:
-        """The metric over each length alone, none where it has no lengths."""
-        lengths_m = np.zeros(0) if self.over is None else self.over.length_m
-        for length in np.unique(lengths_m):
-            of_length = _joined([self], lengths_m == length)
-            yield LengthMetric(self.of.id, self.of.unit, float(length), of_length.statistics(settings))
+        """The metric over each length alone; none for a metric without lengths."""
+        if self.over is None:
+            return
+        for length_m in np.unique(self.over.length_m):
+            of_length = self.selected(self.over.length_m == length_m)
+            yield LengthMetric(
+                name=self.of.id,
+                unit=self.of.unit,
+                length_m=float(length_m),
+                statistics=of_length.statistics(settings),
+            )
+
+    def selected(self, mask: NDArray[np.bool_]) -> "Samples":
+        """The samples (N,) that a mask selects."""
+        errors = self.errors[mask]
+        if self.over is None:
+            return Samples(self.of, errors)
+        drift = None if self.over.drift is None else self.over.drift[mask]
+        return Samples(self.of, errors, OverLengths(errors, self.over.length_m[mask], drift))
 
 
-def _joined(parts: Sequence[Samples], which: "NDArray[np.bool_] | slice" = slice(None)) -> Samples:
-    """The samples of one metric of several sequences one after the other, or `which` of them."""
-    errors = np.concatenate([part.errors for part in parts])[which]
+def _joined(parts: Sequence[Samples]) -> Samples:
+    """The samples of one metric of several sequences one after the other."""
+    definition = parts[0].of
+    errors = np.concatenate([part.errors for part in parts])
     overs = [part.over for part in parts if part.over is not None]
     if not overs:
-        return Samples(parts[0].of, errors)
-    length_m = np.concatenate([over.length_m for over in overs])[which]
+        return Samples(definition, errors)
+    length_m = np.concatenate([over.length_m for over in overs])
     drifts = [over.drift for over in overs if over.drift is not None]
-    drift = np.concatenate(drifts)[which] if drifts else None
-    return Samples(parts[0].of, errors, OverLengths(errors, length_m, drift))
+    drift = np.concatenate(drifts) if drifts else None
+    return Samples(definition, errors, OverLengths(errors, length_m, drift))
 
 
 if TYPE_CHECKING:
@@ -137,7 +167,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Association:
-    """How many poses met: pairs, all poses on either side, and how far apart a pair may be."""
+    """The number of pairs, of all poses on either side, and the largest time difference of a pair."""
 
     pairs: int
     gt_poses: int
@@ -150,7 +180,7 @@ class Score:
     """An estimate's metrics, and for plots the error and aligned position of every matched frame.
 
     gt_frames, gt_t_ns, ate_trans_m and ate_rot_deg are (K,), aligned_positions_m is (K, 3), in truth's frame.
-    `settings` leave nothing open; `samples` are the errors behind the metrics, in their order.
+    `settings` are complete; `samples` are the errors of the metrics, in the same order.
     """
 
     metrics: tuple[Metric, ...]
@@ -170,34 +200,43 @@ class Score:
 
     @property
     def per_length(self) -> tuple[LengthMetric, ...]:
-        """The metrics that go by lengths of path, over each length alone."""
-        return tuple(row for samples in self.samples for row in samples.per_length(self.settings))
+        """The metrics that are measured over lengths of path, for each length alone."""
+        metrics = list[LengthMetric]()
+        for samples in self.samples:
+            metrics.extend(samples.per_length(self.settings))
+        return tuple(metrics)
 
     def metric(self, name: str) -> Metric | None:
-        """The metric of that name, None where the trajectories gave it no sample."""
+        """The metric of that name, None if the trajectories give it no sample."""
         return next((metric for metric in self.metrics if metric.name == name), None)
 
     def __repr__(self) -> str:
-        shown = [f"{m.name} {m.statistics.rmse:.4g} {m.unit}" for m in self.metrics[:3]]
-        said = f"{len(self.metrics)} metrics, {len(self.warnings)} warning{'' if len(self.warnings) == 1 else 's'}"
-        return f"Score({', '.join(shown)}, coverage {self.coverage.ratio:.3f}; {said})"
+        first = [f"{metric.name} {metric.statistics.rmse:.4g} {metric.unit}" for metric in self.metrics[:3]]
+        counts = f"{len(self.metrics)} metrics, {_count(len(self.warnings), 'warning')}"
+        return f"Score({', '.join(first)}, coverage {self.coverage.ratio:.3f}; {counts})"
 
     def to_frame(self) -> "pd.DataFrame":
-        """A pandas table, one row a metric by its name: unit, every statistic, and the id."""
+        """A pandas table with one row per metric, by its name: unit, every statistic, and the id."""
         import pandas as pd
 
-        rows = [{"name": m.name, "unit": m.unit, **asdict(m.statistics), "id": m.id} for m in self.metrics]
+        rows = []
+        for metric in self.metrics:
+            start = {"name": metric.name, "unit": metric.unit}
+            rows.append({**start, **asdict(metric.statistics), "id": metric.id})
         return pd.DataFrame(rows).set_index("name")
 
     def as_dict(self) -> dict[str, Any]:
-        """The score as plain JSON values, without the series; coverage is the ratio, its details go to failure."""
-        covered = asdict(self.coverage)
+        """The score as plain JSON values, without the series; the details of coverage are part of failure."""
+        coverage_details = asdict(self.coverage)
+        ratio = coverage_details.pop("ratio")
+        coverage_of = coverage_details.pop("of")
+        failure = {"id": self.lost_aware_id, **asdict(self.failure), "coverage_of": coverage_of, **coverage_details}
         return {
             "metrics": [metric.as_dict() for metric in self.metrics],
             "association": asdict(self.association),
-            "coverage": covered.pop("ratio"),
+            "coverage": ratio,
             "alignment": self.alignment.as_dict(),
-            "failure": {"id": self.lost_aware_id, **asdict(self.failure), "coverage_of": covered.pop("of"), **covered},
+            "failure": failure,
             "warnings": list(self.warnings),
         }
 
@@ -213,33 +252,49 @@ def score(
     """Score an estimate of the motion of one frame against the truth of the same frame.
 
     `covariance` (N, 6, 6) of the estimate's poses adds their consistency (see `nees`). A metric without
-    samples is left out and a warning says why, never a zero. Raises AlignmentError where no poses match in time.
+    samples is left out and a warning says why, never a zero. Raises AlignmentError if no poses match in time.
     """
-    of = compare(gt, est, settings, covariance=covariance)
-    ate = of.once(absolute)
-    asked = [metric for metric in metrics if settings.full or not metric.full or metric in nees.METRICS]
-    headlines_first = sorted(asked, key=lambda metric: metric.full)
-    samples = tuple(found for metric in headlines_first if len((found := Samples.measured(metric, of)).errors))
-    scored = tuple(found.metric(of.settings, n=len(of.matched), of=len(gt)) for found in samples)
-    frames = of.matched.pairs.gt
+    comparison = compare(gt, est, settings, covariance=covariance)
+    complete_settings = comparison.settings
+    frames = comparison.matched.pairs.gt
+    n = len(frames)
+    samples = _samples(comparison, metrics)
+    scored = tuple(part.metric(complete_settings, n=n, of=len(gt)) for part in samples)
+
+    ate = comparison.once(absolute)
     covered = coverage(gt.t_ns, frames, of=settings.coverage_of)
     slot = slots(gt.t_ns, settings.coverage_of)[frames]
+    path_m = float(comparison.distances_m[-1])
+    warnings = (*_matching_warnings(comparison, covered), *_missing_warnings(comparison, scored))
     return Score(
         metrics=scored,
-        association=Association(len(frames), len(gt), len(est), settings.max_diff_ns / 1e9),
+        association=Association(n, len(gt), len(est), settings.max_diff_ns / 1e9),
         coverage=covered,
-        failure=failure(ate.trans_m, slot, covered, fail_m=settings.fail_ratio * float(of.distances_m[-1])),
-        lost_aware_id=identity(DEFINITIONS["lost_aware"], of.settings, n=len(frames), of=len(gt)),
-        alignment=of.alignment,
-        warnings=(*_matching_warnings(of, covered), *_missing_warnings(of, scored)),
+        failure=failure(ate.trans_m, slot, covered, fail_m=settings.fail_ratio * path_m),
+        lost_aware_id=identity(DEFINITIONS["lost_aware"], complete_settings, n=n, of=len(gt)),
+        alignment=comparison.alignment,
+        warnings=warnings,
         gt_frames=frames,
         gt_t_ns=gt.t_ns[frames],
         ate_trans_m=ate.trans_m,
         ate_rot_deg=np.rad2deg(ate.rot_rad),
-        aligned_positions_m=of.T_aligned[:, :3, 3],
-        settings=of.settings,
+        aligned_positions_m=comparison.T_aligned[:, :3, 3],
+        settings=complete_settings,
         samples=samples,
     )
+
+
+def _samples(comparison: Comparison, metrics: Iterable[MetricDefinition]) -> tuple[Samples, ...]:
+    """The samples of the requested metrics that have any, headline metrics first."""
+    requested = []
+    for metric in metrics:
+        is_headline = not metric.full
+        is_of_covariance = metric in nees.METRICS
+        if comparison.settings.full or is_headline or is_of_covariance:
+            requested.append(metric)
+    headlines_first = sorted(requested, key=lambda metric: metric.full)
+    measured = [Samples.measured(metric, comparison) for metric in headlines_first]
+    return tuple(samples for samples in measured if len(samples.errors))
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,69 +312,85 @@ def pooled(scores: Sequence[Score]) -> Pooled:
     For segments this is the mean of KITTI's table. A metric that the sequences measured in different ways, such
     as over other lengths of path, is left out with a warning.
     """
-    n, of = (sum(getattr(scored.association, side) for scored in scores) for side in ("pairs", "gt_poses"))
+    n = sum(score.association.pairs for score in scores)
+    n_true = sum(score.association.gt_poses for score in scores)
     metrics: list[Metric] = []
     lengths: list[LengthMetric] = []
     warnings: list[str] = []
-    for name in dict.fromkeys(metric.name for scored in scores for metric in scored.metrics):
-        found = [(part, scored.settings) for scored in scores for part in scored.samples if part.of.id == name]
-        ids = {part.metric(settings, n=0, of=0).id for part, settings in found}
+    for name, samples in _samples_by_metric(scores).items():
+        settings = [score.settings for score in scores if score.metric(name)]
+        ids = {part.metric(each, n=0, of=0).id for part, each in zip(samples, settings, strict=True)}
         if len(ids) > 1:
             warnings.append(f"{name} is not pooled, for the sequences measure it in different ways: compare their ids")
             continue
-        together = _joined([part for part, _ in found])
-        metrics.append(together.metric(found[0][1], n=n, of=of))
-        lengths += together.per_length(found[0][1])
+        joined = _joined(samples)
+        metrics.append(joined.metric(settings[0], n=n, of=n_true))
+        lengths += joined.per_length(settings[0])
     return Pooled(tuple(metrics), tuple(lengths), tuple(warnings))
 
 
-def _matching_warnings(of: Comparison, covered: Coverage) -> Iterator[str]:
-    if of.alignment.unobservable:
+def _samples_by_metric(scores: Sequence[Score]) -> dict[str, list[Samples]]:
+    """The samples of each metric, in the order in which metrics and scores come first."""
+    by_metric: dict[str, list[Samples]] = {}
+    for score in scores:
+        for samples in score.samples:
+            by_metric.setdefault(samples.of.id, []).append(samples)
+    return by_metric
+
+
+def _matching_warnings(comparison: Comparison, covered: Coverage) -> Iterator[str]:
+    n = len(comparison.matched)
+    n_estimated = len(comparison.est)
+    unobservable = comparison.alignment.unobservable
+    if unobservable:
         yield (
-            f"the positions leave open: {', '.join(of.alignment.unobservable)}; "
+            f"the positions leave open: {', '.join(unobservable)}; "
             f"the first matched orientation decides, so rotation errors are relative to it"
         )
     if covered.of == "time":
         yield _time_warning(covered)
     elif covered.gaps:
         yield (
-            f"the estimate has {len(of.matched)} of {_frames(len(of.gt))}; the first lost is "
-            f"{covered.first_lost_frame}, the longest gap {_frames(covered.longest_gap_frames)} "
+            f"the estimate has {n} of {_count(len(comparison.gt), 'frame')}; the first lost is "
+            f"{covered.first_lost_frame}, the longest gap {_count(covered.longest_gap_frames, 'frame')} "
             f"({covered.longest_gap_s:.3f} s)"
         )
-    if len(of.matched) < len(of.est):
-        yield f"{len(of.est) - len(of.matched)} of {len(of.est)} estimated poses have no ground truth of their own"
+    if n < n_estimated:
+        yield f"{n_estimated - n} of {n_estimated} estimated poses have no ground truth of their own"
 
 
 def _time_warning(covered: Coverage) -> str:
-    gaps = f"{covered.gaps} gap{'' if covered.gaps == 1 else 's'}"
     longest = f", the longest of {covered.longest_gap_s:.3f} s" if covered.gaps else ""
     return (
         f"the truth is too dense to have a pose a frame, so coverage counts time, in slots of {SLOT_NS / 1e9:g} s: "
-        f"{covered.ratio:.1%}, the first pose after {covered.time_to_first_pose_s:.3f} s, {gaps}{longest}"
+        f"{covered.ratio:.1%}, the first pose after {covered.time_to_first_pose_s:.3f} s, "
+        f"{_count(covered.gaps, 'gap')}{longest}"
     )
 
 
-def _missing_warnings(of: Comparison, metrics: tuple[Metric, ...]) -> Iterator[str]:
-    present = {metric.name for metric in metrics}
-    settings = of.settings
-    path_m = float(of.distances_m[-1])
-    if "rpe_trans" not in present:
+def _missing_warnings(comparison: Comparison, metrics: tuple[Metric, ...]) -> Iterator[str]:
+    measured = {metric.name for metric in metrics}
+    settings = comparison.settings
+    path_m = float(comparison.distances_m[-1])
+    if "rpe_trans" not in measured:
         yield f"no relative pose error: no two matched poses are {_delta(settings)} apart"
-    if "kitti_t_rel" not in present:
+    if "kitti_t_rel" not in measured:
+        shortest_m = min(settings.segment_lengths_m or (0.0,))
         yield (
-            f"no segment error: no two matched poses are more than {min(settings.segment_lengths_m or (0.0,)):g} m of "
+            f"no segment error: no two matched poses are more than {shortest_m:g} m of "
             f"path apart; the whole path is {path_m:.3g} m"
         )
     if not path_m:
         yield "no lost-aware score: the truth stands still, so no error can be measured against its path"
 
 
-def _frames(count: int) -> str:
-    return f"{count} frame{'' if count == 1 else 's'}"
+def _count(number: int, noun: str) -> str:
+    """A number of things, in words."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _delta(settings: ScoreSettings) -> str:
+    """The distance between the poses of a pair, in words."""
     if settings.rpe_unit == "f":
-        return _frames(int(settings.rpe_delta))
-    return f"{settings.rpe_delta:g} { {'m': 'm', 's': 's', 'd': '°', 'r': 'rad'}[settings.rpe_unit] }"
+        return _count(int(settings.rpe_delta), "frame")
+    return f"{settings.rpe_delta:g} {UNIT_NAMES[settings.rpe_unit]}"

@@ -1,4 +1,4 @@
-"""Everything that changes a score besides the two trajectories, and how other tools set it."""
+"""Settings of a score, and those with which other tools score."""
 
 from dataclasses import dataclass, replace
 from math import inf, pi
@@ -25,19 +25,20 @@ INDOOR_LENGTHS_M = (0.5, 1.0, 1.5, 2.0)
 TARTANAIR_LENGTHS_M = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0)
 KITTI_LENGTHS_M = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
 KITTI_STEP_FRAMES = 10
-LARGEST = {"d": 180.0, "r": pi}  # half a turn
-# Unit, all pairs and side: the only pairs that these tools have.
+SHORTEST_KITTI_PATH_M = 300.0  # from which segments are as long as in KITTI
+LARGEST_DELTA = {"d": 180.0, "r": pi}  # half a turn
+# Unit, all pairs and side: the only pairs that these tools support.
 PAIRS_OF_RULE: dict[PairRule, tuple[Unit, bool, Side]] = {"tum": ("s", True, "est"), "tartanair": ("f", True, "gt")}
 
 
 @dataclass(frozen=True, slots=True)
 class ScoreSettings:
-    """What is asked of a score; the part that concerns a metric is written into its identity.
+    """The settings of a score; those that affect a metric are part of its identity.
 
     `align_n` fits only the first so many matched poses; `offset_ns` is added to the estimate's stamps;
-    `project` drops, after the alignment, what is not in a plane of the truth's world, as evo does;
-    segment lengths and step left None follow the length of the true path (`settled`); `full`
-    measures everything, not only the headline metrics. Raises SettingError for what measures nothing.
+    `project` projects poses, after the alignment, to a plane of the truth's world, as evo does;
+    segment lengths and step of None follow from the length of the true path (`settled`); `full`
+    measures all metrics, not only the headline metrics. Raises SettingError for values that cannot be measured.
     """
 
     alignment: Kind = "se3"
@@ -65,32 +66,45 @@ class ScoreSettings:
     def __post_init__(self) -> None:
         require(self)
         pairs = (self.rpe_unit, self.rpe_all_pairs, self.rpe_pairs_from)
-        own_pairs = PAIRS_OF_RULE.get(self.rpe_rule)
-        is_tartanair = self.scale_rule == "tartanair"
-        demands = [
-            ("rpe_delta", self.rpe_unit != "f" or self.rpe_delta.is_integer(), "a whole number of frames"),
-            ("rpe_delta", self.rpe_delta <= LARGEST.get(self.rpe_unit, inf), "half a turn or less"),
-            ("rpe_rule", own_pairs in (None, pairs), f"spanning but for {self.rpe_rule}'s own pairs"),
-            ("rpe_rule", self.rpe_rule != "tum" or not self.project, "spanning in a plane"),
-            ("alignment", not is_tartanair or self.alignment == "se3", "se3 where TartanAir's own scale is asked for"),
-        ]
-        for name, is_right, right in demands:
-            if not is_right:
-                raise SettingError(f"should be {right} (got {getattr(self, name)!r})", name)
+        pairs_of_rule = PAIRS_OF_RULE.get(self.rpe_rule, pairs)
+        largest_delta = LARGEST_DELTA.get(self.rpe_unit, inf)
+        counts_frames = self.rpe_unit == "f"
+        has_tartanair_scale = self.scale_rule == "tartanair"
+        if counts_frames and not self.rpe_delta.is_integer():
+            raise self._error("rpe_delta", "a whole number of frames")
+        if self.rpe_delta > largest_delta:
+            raise self._error("rpe_delta", "half a turn or less")
+        if pairs != pairs_of_rule:
+            raise self._error("rpe_rule", f"spanning unless the pairs are those of {self.rpe_rule}")
+        if self.rpe_rule == "tum" and self.project:
+            raise self._error("rpe_rule", "spanning in a plane")
+        if has_tartanair_scale and self.alignment != "se3":
+            raise self._error("alignment", "se3 with the scale of TartanAir")
+
+    def _error(self, name: str, expected: str) -> SettingError:
+        """The error of one setting."""
+        return SettingError(f"should be {expected} (got {getattr(self, name)!r})", name)
 
 
 def settled(settings: ScoreSettings, path_m: float) -> ScoreSettings:
-    """The settings with the segments that suit a true path of path_m, where they leave them open.
+    """The settings, completed by the segments for a true path of path_m.
 
     KITTI's 100..800 m every tenth frame from 300 m on (its shortest sequence has 394 m), TartanAir's
-    5..40 m from 40 m on, 0.5..2 m for what is shorter.
+    5..40 m from 40 m on, 0.5..2 m for a shorter path.
     """
-    fitting = INDOOR_LENGTHS_M if path_m < TARTANAIR_LENGTHS_M[-1] else TARTANAIR_LENGTHS_M
-    fitting = KITTI_LENGTHS_M if path_m >= KITTI_LENGTHS_M[2] else fitting
-    lengths = settings.segment_lengths_m or fitting
-    usual_step = KITTI_STEP_FRAMES if lengths == KITTI_LENGTHS_M else 1
-    step = settings.segment_step_frames or usual_step
-    return replace(settings, segment_lengths_m=lengths, segment_step_frames=step)
+    lengths_m = settings.segment_lengths_m or _segment_lengths(path_m)
+    usual_step = KITTI_STEP_FRAMES if lengths_m == KITTI_LENGTHS_M else 1
+    step_frames = settings.segment_step_frames or usual_step
+    return replace(settings, segment_lengths_m=lengths_m, segment_step_frames=step_frames)
+
+
+def _segment_lengths(path_m: float) -> tuple[float, ...]:
+    """The lengths in m of segments for a path."""
+    if path_m >= SHORTEST_KITTI_PATH_M:
+        return KITTI_LENGTHS_M
+    if path_m >= TARTANAIR_LENGTHS_M[-1]:
+        return TARTANAIR_LENGTHS_M
+    return INDOOR_LENGTHS_M
 
 
 _TARTANAIR = ScoreSettings(
@@ -100,8 +114,8 @@ _TARTANAIR = ScoreSettings(
     segment_step_frames=1,
     segment_mean="macro",
 )
-# The settings with which other tools score, so that their numbers come out here: what differs from ours.
-# Sources: each tool's own defaults, as its code has them; docs/metrics.md has the table.
+# The settings that reproduce the numbers of other tools, where they differ from the defaults here.
+# Sources: the defaults in the code of each tool; docs/metrics.md has the table.
 LIKE: dict[str, ScoreSettings] = {
     "evo": ScoreSettings(alignment="none", association="evo", rpe_pairs_from="est", rpe_rule="evo"),
     "kitti": ScoreSettings(

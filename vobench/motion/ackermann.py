@@ -1,7 +1,7 @@
-"""A car: the bicycle model with a steering that lags and has limits, kept on a planar way by feedback.
+"""A car: the bicycle model with lagged and limited steering, kept on a planar path by feedback.
 
 ACKERMANNS: the presets by name. ackermann: the motion.
-x' = u cos psi, y' = u sin psi, psi' = u tan(delta) / L, delta' = (asked - delta) / lag, at the middle of the rear axle.
+x' = u cos psi, y' = u sin psi, psi' = u tan(delta) / L, delta' = (requested - delta) / lag, at the rear axle's middle.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from vobench.trajectory.kinematics import CurveMotion, Kinematics, along, level
 from vobench.trajectory.trajectory import Stamps
 
 STEP_S = 0.01
-LOOKS = 8192
+CHECKED_POINTS = 8192
 
 
 @settings(kw_only=False)
 class AckermannSettings:
-    """A vehicle and its driver, who comes back to the way over about lookahead_m."""
+    """A vehicle and its driver, who returns to the path over about lookahead_m."""
 
     wheelbase_m: Positive
     max_steer_rad: Annotated[float, Gt(0), Lt(pi / 2)]
@@ -33,7 +33,7 @@ class AckermannSettings:
 
     @property
     def sharpest_radius_m(self) -> float:
-        """Of the rear axle's middle at full lock."""
+        """The smallest radius of the path of the rear axle's middle, at full lock."""
         return float(self.wheelbase_m / np.tan(self.max_steer_rad))
 
 
@@ -46,9 +46,9 @@ ACKERMANNS = {
 
 
 class Reference(NamedTuple):
-    """Where the way is at an instant, and at which speed; numbers or arrays (K,).
+    """Position, heading and motion of the target at an instant; numbers or arrays (K,).
 
-    bend: its curvature in 1/m when the steering will have answered; advance: 1 ahead, -1 back.
+    curvature: in 1/m, one steering lag later; advance: 1 ahead, -1 back.
     """
 
     x: Array
@@ -56,16 +56,25 @@ class Reference(NamedTuple):
     heading: Array
     speed: Array
     acceleration: Array
-    turn: Array
-    bend: Array
+    angular_velocity: Array
+    curvature: Array
     advance: Array
+
+
+class State(NamedTuple):
+    """Position, heading and steering angle of a car, in m and rad, or their rates; numbers or arrays (K,)."""
+
+    x: Array
+    y: Array
+    heading: Array
+    steer: Array
 
 
 @dataclass(frozen=True, slots=True)
 class AckermannMotion:
-    """A Motion: state (M + 1, 4) of x, y, psi, delta at nodes_s, integrated on from the last one at any instant.
+    """A Motion with the state (M + 1, 4) of x, y, psi, delta at nodes_s, integrated from the node before an instant.
 
-    advance (M,) is whether each step goes ahead (1) or back (-1).
+    advance (M,) is the direction of each step, ahead (1) or back (-1).
     """
 
     target: CurveMotion
@@ -75,147 +84,205 @@ class AckermannMotion:
     advance: Array
     start_ns: int
     end_ns: int
-    breaks_ns: Array  # those of the target, and where the steering begins to answer them
+    breaks_ns: Array  # those of the target, and the times at which the steering begins to answer them
 
     def at(self, t_ns: Stamps | Array) -> Kinematics:
-        """One Runge-Kutta step from the last node."""
+        """The kinematics (K,) after one Runge-Kutta step from the last node."""
         t_s = np.asarray(t_ns, float) / 1e9
-        k = np.clip(np.searchsorted(self.nodes_s, t_s, side="right") - 1, 0, len(self.advance) - 1)
-        step_s = t_s - self.nodes_s[k]
-        stages = [
-            _reference(self.target, self.settings, t_s - step_s * share, self.advance[k]) for share in (1.0, 0.5, 0.0)
-        ]
-        state = _stepped(tuple(self.state[k].T), stages, step_s, self.settings)
-        x, y, psi, delta = state
-        (*_, w, delta_rate), u, u_rate = _rates(state, stages[-1], self.settings)
-        w_rate = (u_rate * np.tan(delta) + u * delta_rate / np.cos(delta) ** 2) / self.settings.wheelbase_m
-        return along(level(x, y, psi), speed=u, acceleration=u_rate, turn=w, turn_rate=w_rate)
+        node = np.searchsorted(self.nodes_s, t_s, side="right") - 1
+        node = np.clip(node, 0, len(self.advance) - 1)
+        step_s = t_s - self.nodes_s[node]
+        stages = []
+        for share in (1.0, 0.5, 0.0):  # of the step before t_s
+            stage_s = t_s - step_s * share
+            stages.append(_reference(self.target, self.settings, stage_s, self.advance[node]))
+
+        state = _stepped(State(*self.state[node].T), stages, step_s, self.settings)
+        rates, speed, acceleration = _rates(state, stages[-1], self.settings)
+        cosine_squared = np.cos(state.steer) ** 2
+        curvature_rate = speed * rates.steer / cosine_squared
+        angular_acceleration = (acceleration * np.tan(state.steer) + curvature_rate) / self.settings.wheelbase_m
+        return along(
+            level(state.x, state.y, state.heading),
+            speed=speed,
+            acceleration=acceleration,
+            turn=rates.heading,
+            turn_rate=angular_acceleration,
+        )
 
 
 def ackermann(target: CurveMotion, settings: AckermannSettings = ACKERMANNS["small_robot"]) -> AckermannMotion:
-    """A car on a planar motion from its start: it steers by the way's curvature, and back to the way where it is off.
+    """The motion of a car that follows a planar motion from its start, steering by curvature and position error.
 
-    Raises MotionError where the way turns on the spot, or sharper than the steering allows.
+    Raises MotionError if the target turns on the spot, or more sharply than the steering allows.
     """
-    _check_way(target, settings)
+    _require_drivable(target, settings)
     breaks_s = _breaks_s(target, settings)
-    nodes_s = _nodes(np.concatenate([[target.law.start_s], breaks_s, [target.law.end_s]]))
+    ends_s = [target.law.start_s, target.law.end_s]
+    nodes_s = _nodes(np.insert(ends_s, 1, breaks_s))
     step_s = np.diff(nodes_s)
-    advance = _by_progress(target, nodes_s[:-1] + step_s / 2)[0]
-    stages = [
-        np.array(_reference(target, settings, nodes_s[:-1] + step_s * share, advance)).T.tolist()
-        for share in (0.0, 0.5, 1.0)
-    ]
+    middles_s = nodes_s[:-1] + step_s / 2
+    advance, _ = _by_progress(target, middles_s)
+
+    # The references of all steps at once, as Python floats, which are faster than arrays of one element.
+    stages = []
+    for share in (0.0, 0.5, 1.0):
+        reference = _reference(target, settings, nodes_s[:-1] + step_s * share, advance)
+        stages.append(np.array(reference).T.tolist())
+
     first = Reference(*stages[0][0])
     limit = settings.max_steer_rad
-    delta = np.clip(np.arctan(settings.wheelbase_m * first.bend), -limit, limit)
-    state: tuple[Array, ...] = (first.x, first.y, first.heading, delta)
+    steer = np.clip(np.arctan(settings.wheelbase_m * first.curvature), -limit, limit)
+    state = State(first.x, first.y, first.heading, steer)
     states = [state]
-    for at_stages, lasts_s in zip(zip(*stages, strict=True), step_s.tolist(), strict=True):
-        state = _stepped(state, [Reference(*stage) for stage in at_stages], lasts_s, settings)
+    for *step_stages, duration_s in zip(*stages, step_s.tolist(), strict=True):
+        references = [Reference(*stage) for stage in step_stages]
+        state = _stepped(state, references, duration_s, settings)
         states.append(state)
-    ends_ns = target.start_ns, target.end_ns
-    return AckermannMotion(target, settings, nodes_s, np.array(states, float), advance, *ends_ns, breaks_s * 1e9)
+    return AckermannMotion(
+        target=target,
+        settings=settings,
+        nodes_s=nodes_s,
+        state=np.array(states, float),
+        advance=advance,
+        start_ns=target.start_ns,
+        end_ns=target.end_ns,
+        breaks_ns=breaks_s * 1e9,
+    )
 
 
-Rates = tuple[tuple[Array, ...], Array, Array]
-
-
-def _rates(state: tuple[Array, ...], way: Reference, settings: AckermannSettings) -> Rates:
-    """Derivatives of x, y, psi, delta; the speed u and its derivative: the model and its driver.
+def _rates(
+    state: State,
+    target: Reference,
+    settings: AckermannSettings,
+) -> tuple[State, Array, Array]:
+    """Rates of the state, the speed and its derivative: the model and its driver.
 
     After Kanayama et al. (1990), with gains by distance: at rest nothing moves.
 
-    Off the way by (ahead, aside, turned), the driver goes faster by ahead / lookahead, and asks for a curvature
-    more by aside / lookahead² + 2 turned / lookahead: critically damped on the way, whatever the speed.
+    At a position error (ahead, aside) and a heading error, the driver goes faster by ahead / lookahead, and increases
+    the curvature by aside / lookahead² + 2 sin(heading error) / lookahead: critically damped along the path, whatever
+    the speed.
     """
-    x, y, psi, delta = state
-    cosine = np.cos(psi)
-    sine = np.sin(psi)
-    turned = way.heading - psi
-    ahead = cosine * (way.x - x) + sine * (way.y - y)
-    aside = cosine * (way.y - y) - sine * (way.x - x)
-    straight = np.cos(turned)
-    slant = np.sin(turned)
-    hurry = way.advance / settings.lookahead_m
+    x, y, heading, steer = state
+    cosine = np.cos(heading)
+    sine = np.sin(heading)
+    error_x = target.x - x
+    error_y = target.y - y
+    ahead = cosine * error_x + sine * error_y
+    aside = cosine * error_y - sine * error_x
+    heading_error = target.heading - heading
+    error_cosine = np.cos(heading_error)
+    error_sine = np.sin(heading_error)
+    gain = target.advance / settings.lookahead_m
 
-    bend = way.bend + aside / settings.lookahead_m**2 + 2 * hurry * slant
-    limit = settings.max_steer_rad
-    limit_radps = settings.max_steer_radps
-    asked = np.minimum(np.maximum(np.arctan(settings.wheelbase_m * bend), -limit), limit)
-    delta_rate = np.minimum(np.maximum((asked - delta) / settings.steer_lag_s, -limit_radps), limit_radps)
+    curvature = target.curvature + aside / settings.lookahead_m**2 + 2 * gain * error_sine
+    requested_steer = np.arctan(settings.wheelbase_m * curvature)
+    requested_steer = _clipped(requested_steer, settings.max_steer_rad)
+    steer_rate = (requested_steer - steer) / settings.steer_lag_s
+    steer_rate = _clipped(steer_rate, settings.max_steer_radps)
 
-    u = way.speed * (straight + hurry * ahead)
-    w = u * np.tan(delta) / settings.wheelbase_m
-    ahead_rate = w * aside - u + way.speed * straight
-    eagerness_rate = hurry * ahead_rate - slant * (way.turn - w)
-    u_rate = way.acceleration * (straight + hurry * ahead) + way.speed * eagerness_rate
-    return (u * cosine, u * sine, w, delta_rate), u, u_rate
+    speed_factor = error_cosine + gain * ahead
+    speed = target.speed * speed_factor
+    heading_rate = speed * np.tan(steer) / settings.wheelbase_m
+    ahead_rate = heading_rate * aside - speed + target.speed * error_cosine
+    heading_error_rate = target.angular_velocity - heading_rate
+    speed_factor_rate = gain * ahead_rate - error_sine * heading_error_rate
+    acceleration = target.acceleration * speed_factor + target.speed * speed_factor_rate
+    rates = State(speed * cosine, speed * sine, heading_rate, steer_rate)
+    return rates, speed, acceleration
+
+
+def _clipped(value: Array, limit: float) -> Array:
+    """A number or array within ±limit."""
+    return np.minimum(np.maximum(value, -limit), limit)
 
 
 def _stepped(
-    state: tuple[Array, ...], stages: list[Reference], step_s: Array | float, settings: AckermannSettings
-) -> tuple[Array, ...]:
-    """The state a step on, by the classical Runge-Kutta method; `stages` are at its start, middle and end."""
+    state: State,
+    stages: list[Reference],
+    step_s: Array | float,
+    settings: AckermannSettings,
+) -> State:
+    """The state after a step of the classical Runge-Kutta method; `stages` are at its start, middle and end."""
     start, middle, end = stages
-
-    def after(share: float, rate: tuple[Array, ...]) -> tuple[Array, ...]:
-        return tuple(value + share * step_s * change for value, change in zip(state, rate, strict=True))
-
-    k1 = _rates(state, start, settings)[0]
-    k2 = _rates(after(0.5, k1), middle, settings)[0]
-    k3 = _rates(after(0.5, k2), middle, settings)[0]
-    k4 = _rates(after(1.0, k3), end, settings)[0]
-    mean = tuple((a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
-    return after(1.0, mean)
+    k1, _, _ = _rates(state, start, settings)
+    k2, _, _ = _rates(_advanced(state, k1, 0.5 * step_s), middle, settings)
+    k3, _, _ = _rates(_advanced(state, k2, 0.5 * step_s), middle, settings)
+    k4, _, _ = _rates(_advanced(state, k3, 1.0 * step_s), end, settings)
+    weighted_sums = (a + 2 * b + 2 * c + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
+    mean_rates = State(*(total / 6 for total in weighted_sums))
+    return _advanced(state, mean_rates, 1.0 * step_s)
 
 
-def _reference(target: CurveMotion, settings: AckermannSettings, t_s: Array, advance: Array) -> Reference:
-    """The way at t_s (K,); its curvature is that of a steering lag later."""
+def _advanced(state: State, rates: State, duration_s: Array | float) -> State:
+    """The state after a duration at constant rates."""
+    values = (value + duration_s * rate for value, rate in zip(state, rates, strict=True))
+    return State(*values)
+
+
+def _reference(
+    target: CurveMotion,
+    settings: AckermannSettings,
+    t_s: Array,
+    advance: Array,
+) -> Reference:
+    """The target at t_s (K,), with its curvature one steering lag later."""
     now = target.at(t_s * 1e9)
     T = now.T_world_body
-    _, bend = _by_progress(target, t_s + settings.steer_lag_s)
+    _, curvature = _by_progress(target, t_s + settings.steer_lag_s)
     return Reference(
         x=T[:, 0, 3],
         y=T[:, 1, 3],
         heading=np.arctan2(T[:, 1, 0], T[:, 0, 0]),
         speed=now.velocity_mps[:, 0],
         acceleration=now.acceleration_mps2[:, 0],
-        turn=now.turn_radps[:, 2],
-        bend=bend,
+        angular_velocity=now.turn_radps[:, 2],
+        curvature=curvature,
         advance=advance,
     )
 
 
 def _by_progress(target: CurveMotion, t_s: Array) -> tuple[Array, Array]:
-    """Advance (K,), 1 ahead, -1 back, 0 on the spot, and curvature in 1/m (K,) of the way at t_s."""
+    """Advance (K,), 1 ahead, -1 back, 0 on the spot, and curvature in 1/m (K,) of the target at t_s."""
     inside_s = np.clip(t_s, target.law.start_s, target.law.end_s)
-    by_progress = target.curve.at(target.law.at(inside_s)[0])
+    progress, _, _ = target.law.at(inside_s)
+    by_progress = target.curve.at(progress)
     advance = by_progress.velocity_mps[:, 0]
-    return advance, advance * by_progress.turn_radps[:, 2]
+    curvature = advance * by_progress.turn_radps[:, 2]
+    return advance, curvature
 
 
 def _breaks_s(target: CurveMotion, settings: AckermannSettings) -> Array:
-    breaks_s = target.breaks_ns / 1e9
-    both = np.unique(np.concatenate([breaks_s, breaks_s - settings.steer_lag_s]))
-    return both[(both > target.law.start_s) & (both < target.law.end_s)]
+    """The times at which the target has a break, or the steering begins to answer one."""
+    target_breaks_s = target.breaks_ns / 1e9
+    steering_breaks_s = target_breaks_s - settings.steer_lag_s
+    breaks_s = np.unique(np.concatenate([target_breaks_s, steering_breaks_s]))
+    is_inside = (breaks_s > target.law.start_s) & (breaks_s < target.law.end_s)
+    return breaks_s[is_inside]
 
 
-def _nodes(marks: Array) -> Array:
-    """Times at most STEP_S apart, with every mark among them."""
-    counts = np.ceil(np.diff(marks) / STEP_S).astype(int)
-    spans = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(marks[:-1], marks[1:], counts, strict=True)]
-    return np.concatenate([*spans, marks[-1:]])
+def _nodes(marks_s: Array) -> Array:
+    """Times at most STEP_S apart that include all marks."""
+    starts_s = marks_s[:-1]
+    ends_s = marks_s[1:]
+    counts = np.ceil(np.diff(marks_s) / STEP_S).astype(int)
+    spans = []
+    for start_s, end_s, count in zip(starts_s, ends_s, counts, strict=True):
+        spans.append(np.linspace(start_s, end_s, count, endpoint=False))
+    return np.concatenate([*spans, marks_s[-1:]])
 
 
-def _check_way(target: CurveMotion, settings: AckermannSettings) -> None:
-    s = np.concatenate([np.linspace(0, target.law.length, LOOKS), target.curve.breaks])
-    by_progress = target.curve.at(s)
+def _require_drivable(target: CurveMotion, settings: AckermannSettings) -> None:
+    """Raise MotionError for a target that turns on the spot, or more sharply than the steering allows."""
+    even_progress = np.linspace(0, target.law.length, CHECKED_POINTS)
+    progress = np.concatenate([even_progress, target.curve.breaks])
+    by_progress = target.curve.at(progress)
     if (by_progress.velocity_mps[:, 0] == 0).any():
-        raise MotionError("a car cannot turn on the spot; give the way corners with a radius, or drive another robot")
+        raise MotionError("a car cannot turn on the spot; give the path corners with a radius, or use another robot")
     sharpest = float(np.abs(by_progress.turn_radps[:, 2]).max())
     if sharpest * settings.sharpest_radius_m > 1:
         raise MotionError(
-            f"the way turns with a radius of {1 / sharpest:.3g} m, but a wheelbase of {settings.wheelbase_m:g} m and "
+            f"the path turns with a radius of {1 / sharpest:.3g} m, but a wheelbase of {settings.wheelbase_m:g} m and "
             f"{np.rad2deg(settings.max_steer_rad):.3g} deg of steering allow {settings.sharpest_radius_m:.3g} m or more"
         )

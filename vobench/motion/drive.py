@@ -1,4 +1,4 @@
-"""A drive of the Pioneer: control, dynamics and slip together, and its exact motion."""
+"""A drive of the Pioneer: control, dynamics and slip combined, and its exact motion."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -35,12 +35,12 @@ from vobench.trajectory.trajectory import Stamps
 
 @dataclass(frozen=True, slots=True)
 class DriveMotion:
-    """A Motion of the axle's middle: at rest before its start, and goes on with the last references after its end.
+    """A Motion of the axle's middle: at rest before its start, continued with the last references after its end.
 
-    It meets every recorded state; pose, velocity and acceleration are each other's derivatives to rounding.
+    It passes through every recorded state; pose, velocity and acceleration are each other's derivatives to rounding.
     pieces (P, 3, 6): coefficients in the share 0..1 of each sub-step, of x and y in m and heading in rad:
     quintics that have at both its ends the velocities and accelerations of (18)-(19), sliding included.
-    Euler's positions lag behind their own speeds: there acceleration swings within a step.
+    Euler's positions lag behind their own speeds, so with it acceleration oscillates within a step.
     """
 
     start_ns: int
@@ -52,97 +52,151 @@ class DriveMotion:
     @property
     def breaks_ns(self) -> Array:
         """The control instants, those after the end included."""
-        return np.arange(len(self.pieces) // self.substeps + 1, dtype=float) * (1e9 / self.rate_hz)
+        periods = len(self.pieces) // self.substeps
+        period_ns = 1e9 / self.rate_hz
+        return np.arange(periods + 1, dtype=float) * period_ns
 
     def at(self, t_ns: Stamps | Array) -> Kinematics:
-        """Where the axle's middle is and how it moves at instants (K,).
+        """The kinematics (K,) of the axle's middle at instants (K,).
 
         Raises MotionError for an instant more than a second after the end, or not finite.
         """
         t_ns = np.asarray(t_ns, float)
         step_ns = 1e9 / self.rate_hz / self.substeps
         known_ns = len(self.pieces) * step_ns + 1
-        if not (t_ns <= known_ns).all():
-            wrong = t_ns[~(t_ns <= known_ns)][0]
-            raise MotionError(f"the drive ends at {self.end_ns} ns, and is asked where it is at {wrong:.0f} ns")
-        index = np.clip(np.floor(t_ns / step_ns), 0, len(self.pieces) - 1)
-        share = np.maximum(t_ns / step_ns - index, 0.0)
+        is_known = t_ns <= known_ns  # false for NaN
+        if not is_known.all():
+            unknown_ns = t_ns[~is_known][0]
+            raise MotionError(f"the drive ends at {self.end_ns} ns, but its position at {unknown_ns:.0f} ns is needed")
+
+        piece = np.clip(np.floor(t_ns / step_ns), 0, len(self.pieces) - 1)
+        share = np.maximum(t_ns / step_ns - piece, 0.0)
+        coefficients = self.pieces[piece.astype(np.int64)]
+        position, velocity, acceleration = _derivatives(coefficients, share[:, None])
+        velocity[t_ns < 0] = 0.0
+        acceleration[t_ns < 0] = 0.0
         per_s = self.rate_hz * self.substeps
-        place, speed, rate = _derivatives(self.pieces[index.astype(np.int64)], share[:, None])
-        speed[t_ns < 0] = 0.0
-        rate[t_ns < 0] = 0.0
-        return _kinematics(place, speed * per_s, rate * per_s**2)
+        return _kinematics(position, velocity * per_s, acceleration * per_s**2)
 
 
-def _derived(
-    state: Array, asked: Array, began: Array, disturbed: Array, beta_change: Array, *, vehicle: Vehicle, skid_s: float
+def _boundary_values(
+    state: Array,
+    reference: Array,
+    began: Array,
+    disturbance: Array,
+    beta_change: Array,
+    *,
+    vehicle: Vehicle,
+    skid_s: float,
 ) -> Array:
-    """x, y, psi of the axle's middle, their first and their second derivatives in the world, (P, 3, 3)."""
+    """x, y, psi of the axle's middle, their first and their second derivatives in the world, (P, 3, 3).
+
+    state (P, 7); references, and the speeds as the period began, (P, 2); disturbance (P, 3): beta, delta_u and
+    delta_omega; beta_change (P,): how much beta changes in the period.
+    """
     x_h, y_h, psi, u, omega = state.T[:5]
+    beta, delta_u, delta_omega = disturbance.T
+    u_ref, omega_ref = reference.T
+    u_began, omega_began = began.T
     u_rate, omega_rate = vehicle.speed_rates(
-        u, omega, (asked[:, 0], asked[:, 1]), (began[:, 0], began[:, 1]), (disturbed[:, 1], disturbed[:, 2])
+        u,
+        omega,
+        (u_ref, omega_ref),
+        (u_began, omega_began),
+        (delta_u, delta_omega),
     )
-    slope = np.tan(disturbed[:, 0])
-    a = vehicle.controller.a_m
+
+    # The speed of sliding to the left, and its derivative.
+    slope = np.tan(beta)
     slope_rate = (1 + slope**2) * beta_change * vehicle.rate_hz
     side = u * slope - skid_s * u * omega
-    side_rate = u_rate * slope + u * slope_rate - skid_s * (u_rate * omega + u * omega_rate)
+    skid_rate = skid_s * (u_rate * omega + u * omega_rate)
+    side_rate = u_rate * slope + u * slope_rate - skid_rate
+
+    a_m = vehicle.controller.a_m
     c = np.cos(psi)
     s = np.sin(psi)
     ahead = u_rate - side * omega
     left = side_rate + u * omega
-    place = np.stack([x_h - a * c, y_h - a * s, psi], -1)
-    speed = np.stack([c * u - s * side, s * u + c * side, omega], -1)
-    rate = np.stack([c * ahead - s * left, s * ahead + c * left, omega_rate], -1)
-    return np.stack([place, speed, rate], 1)
+    x = x_h - a_m * c
+    y = y_h - a_m * s
+    x_rate = c * u - s * side
+    y_rate = s * u + c * side
+    x_acceleration = c * ahead - s * left
+    y_acceleration = s * ahead + c * left
+    position = np.stack([x, y, psi], -1)
+    velocity = np.stack([x_rate, y_rate, omega], -1)
+    acceleration = np.stack([x_acceleration, y_acceleration, omega_rate], -1)
+    return np.stack([position, velocity, acceleration], 1)
 
 
 def _quintics(begin: Array, end: Array, *, step_s: float) -> Array:
     """Coefficients (P, 3, 6) of the quintics with these values and two derivatives (P, 3, 3) at share 0 and 1."""
-    scale = np.array([1.0, step_s, step_s**2])[:, None]
+    scale = np.array([1.0, step_s, step_s**2])[:, None]  # derivatives by the share of the step
     p0, v0, a0 = np.moveaxis(begin * scale, 1, 0)
     p1, v1, a1 = np.moveaxis(end * scale, 1, 0)
+
+    # What the quadratic from the start misses at the end.
     p = p1 - p0 - v0 - a0 / 2
     v = v1 - v0 - a0
     a = (a1 - a0) / 2
-    return np.stack([p0, v0, a0 / 2, 10 * p - 4 * v + a, -15 * p + 7 * v - 2 * a, 6 * p - 3 * v + a], -1)
+    cubic = 10 * p - 4 * v + a
+    quartic = -15 * p + 7 * v - 2 * a
+    quintic = 6 * p - 3 * v + a
+    return np.stack([p0, v0, a0 / 2, cubic, quartic, quintic], -1)
 
 
-def _derivatives(c: Array, s: Array) -> Array:
-    """Value, first and second derivative (3, K, 3) by s (K, 1) of the quintics c (K, 3, 6)."""
-    c = np.moveaxis(c, -1, 0)
-    return np.array([polyval(s, polyder(c, order), tensor=False) for order in range(3)], float)
+def _derivatives(coefficients: Array, share: Array) -> Array:
+    """Value, first and second derivative (3, K, 3) at shares (K, 1) of the quintics (K, 3, 6)."""
+    powers_first = np.moveaxis(coefficients, -1, 0)
+    derivatives = []
+    for order in range(3):
+        polynomial = polyder(powers_first, order)
+        derivatives.append(polyval(share, polynomial, tensor=False))
+    return np.array(derivatives, float)
 
 
-def _kinematics(place: Array, speed: Array, rate: Array) -> Kinematics:
-    """From x, y, psi and their derivatives (K, 3) in the world to body axes."""
-    cos_psi = np.cos(place[:, 2])
-    sin_psi = np.sin(place[:, 2])
-    still = np.zeros(len(place))
+def _kinematics(position: Array, velocity: Array, acceleration: Array) -> Kinematics:
+    """The kinematics in body axes from x, y, psi and their derivatives (K, 3) in the world."""
+    heading = position[:, 2]
+    cosine = np.cos(heading)
+    sine = np.sin(heading)
+    zero = np.zeros(len(position))
 
     def in_body(world: Array) -> Array:
         x, y, _ = world.T
-        return np.stack([cos_psi * x + sin_psi * y, cos_psi * y - sin_psi * x, still], -1)
+        ahead = cosine * x + sine * y
+        left = cosine * y - sine * x
+        return np.stack([ahead, left, zero], -1)
 
-    def upright(about_z: Array) -> Array:
-        return np.stack([still, still, about_z], -1)
+    def about_z(rate: Array) -> Array:
+        return np.stack([zero, zero, rate], -1)
 
-    return Kinematics(level(*place.T), in_body(speed), upright(speed[:, 2]), in_body(rate), upright(rate[:, 2]))
+    return Kinematics(
+        T_world_body=level(*position.T),
+        velocity_mps=in_body(velocity),
+        turn_radps=about_z(velocity[:, 2]),
+        acceleration_mps2=in_body(acceleration),
+        turn_rate_radps2=about_z(acceleration[:, 2]),
+    )
 
 
-# How long a drive is known after its end, where it goes on with its last references: for shutters open there.
+# How long a drive is known after its end, where it continues with its last references: for shutters open there.
 TAIL_S = 1.0
+
+
+Start = tuple[float, float, float]
+References = Callable[[Array, int, int], tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """What the robot did, at N frames and M = (N - 1) substeps + 1 encoder instants.
+    """The recorded drive of a robot, at N frames and M = (N - 1) substeps + 1 encoder instants.
 
-    state (N, 5): x, y of h in m, psi in rad, u, omega; references (N, 2) hold from their frame on, and rates (N, 2) are
-    u' and omega' as they begin to. `motion` is of the axle midpoint B, sliding included. reached: the frame that ended
-    each leg, by entering its target or by the clock.
-    rim_rad (M, 2): left, right. slip (N, 3): both sigmas and beta in rad; delta (N, 2). theta: this very robot's,
-    None if ideal.
+    state (N, 5): x, y of h in m, psi in rad, u, omega. references (N, 2) apply from their frame on; rates (N, 2) are
+    u' and omega' at that instant. `motion` is of the axle midpoint B, sliding included. reached: the frame that ended
+    each leg, by entering its target or by the clock. rim_rad (M, 2): left, right. slip (N, 3): both sigmas and beta in
+    rad. delta (N, 2). theta: that of this robot after perturbation, None if ideal.
     """
 
     t_ns: Stamps
@@ -160,7 +214,7 @@ class Drive:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Waypoints(Wheeled):
-    """Targets that the paper's controller steers the point h through, `start_m` being h's."""
+    """Targets that the paper's controller steers the point h through; `start_m` is the start of h."""
 
     mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = {
         "pioneer": PIONEER_KEYS,
@@ -174,7 +228,7 @@ class Waypoints(Wheeled):
     max_time_s: LegTime = 60.0
 
     def drive(self, rngs: Generators) -> Drive:
-        """From rest through the targets. Raises MotionError."""
+        """The drive from rest through the targets. Raises MotionError."""
         return drive(
             self.targets_m,
             start=self.start,
@@ -186,7 +240,7 @@ class Waypoints(Wheeled):
 
 
 def options(robot: Wheeled, rngs: Generators) -> dict[str, Any]:
-    """Which robot it is, and what is done to it: `_ready`'s."""
+    """The keyword arguments of drives for a robot and its disturbances: those of `_ready`."""
     is_ideal = robot.mover == "unicycle"
     return {
         "theta": None if is_ideal else robot.theta,
@@ -207,62 +261,70 @@ def options(robot: Wheeled, rngs: Generators) -> dict[str, Any]:
 def drive(
     targets_m: ArrayLike,
     *,
-    start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    start: Start = (0.0, 0.0, 0.0),
     tolerance_m: float = 0.01,
     settle_s: float = 0.0,
     max_time_s: float = 60.0,
     leg_s: float | None = None,
     **options: Any,
 ) -> Drive:
-    """Drive h from rest at `start` (x, y, psi) through targets (K, 2) in order, its speed carried over between them.
+    """Drive h from rest at `start` (x, y, psi) through targets (K, 2) in order, without stopping between them.
 
     A target is reached in the first frame with h within `tolerance_m` on both axes, for each within `max_time_s`;
-    with `leg_s` each is held for that time whatever happens. The drive ends `settle_s` after the last.
+    with `leg_s` each is held for exactly that time. The drive ends `settle_s` after the last.
     Raises MotionError for values that are not finite, a loop that cannot settle, a target not reached in time.
     """
     targets = _checked_rows(targets_m, "target")
-    vehicle, disturbed = _ready(**options)
+    vehicle, disturbances = _ready(**options)
     legs = Legs(targets, vehicle.rate_hz, tolerance_m, max_time_s, leg_s, settle_s)
 
-    def asked(state: Array, _: int, leg: int) -> tuple[float, float]:
-        return vehicle.references(state, targets[min(leg, len(targets) - 1)])
+    def reference(state: Array, _frame: int, leg: int) -> tuple[float, float]:
+        target = targets[min(leg, len(targets) - 1)]
+        return vehicle.references(state, target)
 
-    return _driven(asked, vehicle, disturbed(legs.longest), start, legs)
+    return _driven(reference, vehicle, disturbances(legs.longest), start, legs)
 
 
-def follow(path_m: ArrayLike, path_mps: ArrayLike, *, start: tuple[float, float, float], **options: Any) -> Drive:
-    """Drive h from rest at `start` (x, y, psi) after a target that moves: one row (N, 2) of place and velocity a frame.
+def follow(
+    path_m: ArrayLike,
+    path_mps: ArrayLike,
+    *,
+    start: Start,
+    **options: Any,
+) -> Drive:
+    """Drive h from rest at `start` (x, y, psi) after a moving target: one row (N, 2) of position and velocity a frame.
 
-    The path's velocity is fed forward and tanh pulls h back to it; a real robot lags where it speeds up, and
+    The path's velocity is fed forward and tanh pulls h back to it; a real robot lags while it accelerates, and
     on a straight line stays (theta_4 - 1) / gain of its speed behind.
-    Raises MotionError as `drive` does, and where the path is faster than the controller's max_speed_mps.
+    Raises MotionError as `drive` does, and if the path is faster than the controller's max_speed_mps.
     """
     path = _checked_rows(path_m, "path point")
     path_rate = _checked_rows(path_mps, "path velocity")
-    vehicle, disturbed = _ready(**options)
+    vehicle, disturbances = _ready(**options)
     _check_path(path, path_rate, vehicle.controller, vehicle.rate_hz)
 
-    def asked(state: Array, frame: int, _: int) -> tuple[float, float]:
-        return vehicle.references(state, path[frame], tuple(path_rate[frame].tolist()))
+    def reference(state: Array, frame: int, _leg: int) -> tuple[float, float]:
+        velocity_mps = tuple(path_rate[frame].tolist())
+        return vehicle.references(state, path[frame], velocity_mps)
 
-    return _driven(asked, vehicle, disturbed(len(path)), start)
+    return _driven(reference, vehicle, disturbances(len(path)), start)
 
 
-def led_by(references: ArrayLike, *, start: tuple[float, float, float], **options: Any) -> Drive:
-    """Drive from rest with references (N, 2) of u in m/s and omega in rad/s, one row a frame, nothing fed back.
+def led_by(references: ArrayLike, *, start: Start, **options: Any) -> Drive:
+    """Drive from rest with references (N, 2) of u in m/s and omega in rad/s, one row a frame, without feedback.
 
-    This is how a robot goes backwards or turns on the spot, where no point h ahead of the axle can lead it.
-    Of the controller it takes the place of h and the largest references.
-    Raises MotionError as `drive` does, and where a reference is larger than the controller gives.
+    This is how a robot drives backwards or turns on the spot, where no point h ahead of the axle can lead it.
+    Of the controller it uses the position of h and the largest references.
+    Raises MotionError as `drive` does, and for a reference larger than the controller's limits.
     """
     rows = _checked_rows(references, "reference")
-    vehicle, disturbed = _ready(**options)
+    vehicle, disturbances = _ready(**options)
     _check_references(rows, vehicle.controller, vehicle.rate_hz)
 
-    def asked(_: Array, frame: int, __: int) -> tuple[float, float]:
+    def reference(_state: Array, frame: int, _leg: int) -> tuple[float, float]:
         return tuple(rows[frame].tolist())
 
-    return _driven(asked, vehicle, disturbed(len(rows)), start)
+    return _driven(reference, vehicle, disturbances(len(rows)), start)
 
 
 def _ready(
@@ -280,7 +342,7 @@ def _ready(
     integrator: str = "rk4",
     rngs: Generators | None = None,
 ) -> tuple[Vehicle, Callable[[int], Disturbances]]:
-    """The robot, and what disturbs it in so many frames: the options of all drives.
+    """The robot, and its disturbances as a function of the number of frames, from the options of all drives.
 
     Without a theta (None) the robot is an ideal unicycle; `theta_std` perturbs it. rngs: DISTURBANCE_STREAMS.
     """
@@ -289,119 +351,186 @@ def _ready(
             raise MotionError("an ideal unicycle has no theta that theta_std could perturb")
         theta = theta.perturbed(theta_std, generator_of(rngs, "theta"))
     vehicle = Vehicle(theta, controller, wheels, rate_hz, substeps, integrator, limits)
-    return vehicle, lambda frames: drawn(frames, slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
+
+    def disturbances(frames: int) -> Disturbances:
+        return drawn(frames, slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
+
+    return vehicle, disturbances
 
 
 def _driven(
-    asked: Callable[[Array, int, int], tuple[float, float]],
+    reference: References,
     vehicle: Vehicle,
     disturbances: Disturbances,
-    start: tuple[float, float, float],
+    start: Start,
     legs: Legs | None = None,
 ) -> Drive:
-    """The robot on its way, frame by frame, and a little on; `asked` takes its state, the frame and the leg."""
+    """The drive of a robot, frame by frame; `reference` takes its state, the frame and the leg."""
     if np.shape(start) != (3,) or not np.isfinite(start).all():
         raise MotionError(f"the start (x, y, psi) must be three finite values, got {start}")
     state = np.array([*start, 0.0, 0.0, 0.0, 0.0])
-    slips = [disturbances.at(0, vehicle.contacts_ahead(state, SlipNow()))]
-    fine = [state[None]]
+    first_contacts = vehicle.contacts_ahead(state, SlipNow())
+    slips = [disturbances.at(0, first_contacts)]
+    periods = [state[None]]
     references = []
+    positions_m = [state[:2]]
     ends = list[int]()
-    places = [state[:2]]
-    for frame in range(len(disturbances.rows)):
-        ends += legs.ended(places, ends) if legs else []
-        references.append(asked(state, frame, len(ends)))
-        if frame + 1 == len(disturbances.rows) or (legs and legs.are_over(frame, ends)):
+    last_frame = len(disturbances.rows) - 1
+    for frame in range(last_frame + 1):
+        if legs:
+            ends += legs.ended(positions_m, ends)
+        references.append(reference(state, frame, len(ends)))
+        if frame == last_frame or (legs and legs.are_over(frame, ends)):
             break
-        slips.append(disturbances.at(frame + 1, vehicle.contacts_ahead(state, slips[-1])))
-        fine.append(vehicle.advance(state, references[-1], *slips[-2:]))
-        state = fine[-1][-1]
-        places.append(state[:2])
-    return _record(fine, np.array(references), tuple(ends), slips, vehicle=vehicle)
+
+        # Slip at the next frame depends on the floor there, which the robot is about to reach.
+        contacts = vehicle.contacts_ahead(state, slips[-1])
+        slips.append(disturbances.at(frame + 1, contacts))
+        slip_now, slip_then = slips[-2:]
+        periods.append(vehicle.advance(state, references[-1], slip_now, slip_then))
+        state = periods[-1][-1]
+        positions_m.append(state[:2])
+    return _record(periods, np.array(references), tuple(ends), slips, vehicle=vehicle)
 
 
 def _record(
-    periods: list[Array], asked: Array, ends: tuple[int, ...], slips: list[SlipNow], *, vehicle: Vehicle
+    periods: list[Array],
+    references: Array,
+    ends: tuple[int, ...],
+    slips: list[SlipNow],
+    *,
+    vehicle: Vehicle,
 ) -> Drive:
     """The drive from the states (1 or substeps, 7) of its periods, references (N, 2) and slip at N frames."""
-    fine = np.concatenate(periods)
+    states = np.concatenate(periods)  # (M, 7), at the encoder's instants
     disturbed = np.array(slips)
-    state = fine[:: vehicle.substeps, :5]
-    speeds = (state[:, 3], state[:, 4])
-    u, omega = speeds
-    u_ref, omega_ref = asked.T
-    delta_u, delta_omega = disturbed[:, 5:].T
+    frame_states = states[:: vehicle.substeps, :5]
+    u = frame_states[:, 3]
+    omega = frame_states[:, 4]
+    u_ref, omega_ref = references.T
+    delta = disturbed[:, 5:]
+    delta_u, delta_omega = delta.T
+    rates = vehicle.speed_rates(u, omega, (u_ref, omega_ref), (u, omega), (delta_u, delta_omega))
     return Drive(
         t_ns=_stamps(len(slips), vehicle.rate_hz, 1),
-        state=state,
-        references=asked,
-        rates=np.stack(vehicle.speed_rates(u, omega, (u_ref, omega_ref), speeds, (delta_u, delta_omega)), -1),
+        state=frame_states,
+        references=references,
+        rates=np.stack(rates, -1),
         reached=ends,
-        encoder_t_ns=_stamps(len(fine), vehicle.rate_hz, vehicle.substeps),
-        rim_rad=fine[:, 5:],
+        encoder_t_ns=_stamps(len(states), vehicle.rate_hz, vehicle.substeps),
+        rim_rad=states[:, 5:],
         slip=disturbed[:, :3],
-        delta=disturbed[:, 5:],
+        delta=delta,
         theta=vehicle.theta,
-        motion=_with_tail(fine, asked, slips, vehicle),
+        motion=_with_tail(states, references, slips, vehicle),
     )
 
 
-def _with_tail(fine: Array, asked: Array, slips: list[SlipNow], vehicle: Vehicle) -> DriveMotion:
-    """The motion of the drive through states (P + 1, 7), its last references and slip held for a while after it."""
-    tail = [fine]
-    last = slips[-1]
-    more = ceil(TAIL_S * vehicle.rate_hz)
-    for _ in range(more):
-        tail.append(vehicle.advance(tail[-1][-1], tuple(asked[-1].tolist()), last))
-    states = np.concatenate(tail)
-    held = np.concatenate([asked, np.repeat(asked[-1:], more - 1, 0)])
-    disturbed = np.array([*slips, *[last] * more])[:, [2, 5, 6]]  # beta, delta_u and delta_omega at periods' ends
-    period, step = np.divmod(np.arange(len(states) - 1), vehicle.substeps)
+def _with_tail(
+    states: Array,
+    references: Array,
+    slips: list[SlipNow],
+    vehicle: Vehicle,
+) -> DriveMotion:
+    """The motion of the drive through states (P + 1, 7), continued with its last references and slip."""
+    last_slip = slips[-1]
+    last_reference = tuple(references[-1].tolist())
+    tail_periods = ceil(TAIL_S * vehicle.rate_hz)
+    periods = [states]
+    for _ in range(tail_periods):
+        periods.append(vehicle.advance(periods[-1][-1], last_reference, last_slip))
+    states = np.concatenate(periods)
+    held = np.concatenate([references, np.repeat(references[-1:], tail_periods - 1, 0)])
+    all_slips = np.array([*slips, *[last_slip] * tail_periods])
+    disturbances = all_slips[:, [2, 5, 6]]  # beta, delta_u and delta_omega at the ends of periods
+
+    # Each sub-step is a piece: its period, and its place in the period.
+    pieces = np.arange(len(states) - 1)
+    period, step = np.divmod(pieces, vehicle.substeps)
     began = states[period * vehicle.substeps, 3:5]
-    change = disturbed[period + 1] - disturbed[period]
+    change = disturbances[period + 1] - disturbances[period]
 
-    def seen(state: Array, share: Array) -> Array:
-        disturbance = disturbed[period] + share[:, None] * change
-        return _derived(state, held[period], began, disturbance, change[:, 0], vehicle=vehicle, skid_s=last.skid_s)
+    def values(boundary_states: Array, share: Array) -> Array:
+        """The boundary values of all pieces at shares (P,) of their periods."""
+        return _boundary_values(
+            boundary_states,
+            held[period],
+            began,
+            disturbances[period] + share[:, None] * change,
+            change[:, 0],
+            vehicle=vehicle,
+            skid_s=last_slip.skid_s,
+        )
 
-    ends = seen(states[:-1], step / vehicle.substeps), seen(states[1:], (step + 1) / vehicle.substeps)
-    pieces = _quintics(*ends, step_s=1 / vehicle.rate_hz / vehicle.substeps)
-    return DriveMotion(0, round((len(asked) - 1) * 1e9 / vehicle.rate_hz), vehicle.rate_hz, vehicle.substeps, pieces)
+    begin = values(states[:-1], step / vehicle.substeps)
+    end = values(states[1:], (step + 1) / vehicle.substeps)
+    step_s = 1 / vehicle.rate_hz / vehicle.substeps
+    duration_ns = (len(references) - 1) * 1e9 / vehicle.rate_hz
+    return DriveMotion(
+        start_ns=0,
+        end_ns=round(duration_ns),
+        rate_hz=vehicle.rate_hz,
+        substeps=vehicle.substeps,
+        pieces=_quintics(begin, end, step_s=step_s),
+    )
 
 
 def _stamps(count: int, rate_hz: float, substeps: int) -> Stamps:
-    """Stamps index / (rate substeps), divided in the order that lets every `substeps`-th be exactly a frame's."""
-    return np.rint(np.arange(count) * 1e9 / substeps / rate_hz).astype(np.int64)
+    """Stamps index / (rate substeps), divided in the order that makes every `substeps`-th exactly a frame's."""
+    t_ns = np.arange(count) * 1e9 / substeps / rate_hz
+    return np.rint(t_ns).astype(np.int64)
 
 
 def _checked_rows(rows: ArrayLike, what: str) -> Array:
+    """Rows (K, 2), one or more. Raises MotionError for other shapes, and for values that are not finite."""
     pairs = np.asarray(rows, float)
-    if pairs.ndim != 2 or pairs.shape[1] != 2 or not len(pairs):
+    has_pairs = pairs.ndim == 2 and pairs.shape[1] == 2
+    if not has_pairs or not len(pairs):
         raise MotionError(f"a drive needs one or more {what}s of two coordinates (K, 2), got shape {pairs.shape}")
-    if not np.isfinite(pairs).all():
-        bad = int(np.flatnonzero(~np.isfinite(pairs).all(1))[0])
-        raise MotionError(f"{what} {bad + 1} is ({pairs[bad, 0]}, {pairs[bad, 1]}); both coordinates must be finite")
+    bad = np.flatnonzero(~np.isfinite(pairs).all(1))
+    if bad.size:
+        x, y = pairs[bad[0]]
+        raise MotionError(f"{what} {bad[0] + 1} is ({x}, {y}); both coordinates must be finite")
     return pairs
 
 
-def _check_path(path_m: Array, path_mps: Array, controller: ControllerSettings, rate_hz: float) -> None:
+def _check_path(
+    path_m: Array,
+    path_mps: Array,
+    controller: ControllerSettings,
+    rate_hz: float,
+) -> None:
+    """Raise MotionError for a path without a velocity at every point, or faster than the controller allows."""
     if path_m.shape != path_mps.shape:
         raise MotionError(
             f"a path needs a velocity for every point, got {len(path_m)} points and {len(path_mps)} velocities"
         )
-    speed = np.hypot(*path_mps.T)
-    if speed.max() > controller.max_speed_mps:
+    speed_mps = np.hypot(*path_mps.T)
+    if speed_mps.max() > controller.max_speed_mps:
+        fastest_s = speed_mps.argmax() / rate_hz
         raise MotionError(
-            f"the path of h moves at {speed.max():.3g} m/s after {speed.argmax() / rate_hz:.1f} s, "
-            f"and the controller gives {controller.max_speed_mps:g} m/s at most"
+            f"the path of h moves at {speed_mps.max():.3g} m/s after {fastest_s:.1f} s, "
+            f"but the controller allows {controller.max_speed_mps:g} m/s"
         )
 
 
-def _check_references(asked: Array, controller: ControllerSettings, rate_hz: float) -> None:
-    mosts = (controller.max_speed_mps, "m/s"), (controller.max_turn_radps, "rad/s")
-    for sizes, (most, unit) in zip(np.abs(asked).T, mosts, strict=True):
-        if sizes.max() > most:
-            raise MotionError(
-                f"the robot would be asked for {sizes.max():.3g} {unit} after {sizes.argmax() / rate_hz:.1f} s, "
-                f"and {most:g} {unit} is the most"
-            )
+def _check_references(references: Array, controller: ControllerSettings, rate_hz: float) -> None:
+    """Raise MotionError for references (N, 2) above the limits of the controller."""
+    u, omega = np.abs(references).T
+    _check_limit(u, controller.max_speed_mps, "m/s", rate_hz)
+    _check_limit(omega, controller.max_turn_radps, "rad/s", rate_hz)
+
+
+def _check_limit(
+    sizes: Array,
+    limit: float,
+    unit: str,
+    rate_hz: float,
+) -> None:
+    """Raise MotionError if the largest of sizes (N,), one a frame, exceeds a limit."""
+    if sizes.max() > limit:
+        largest_s = sizes.argmax() / rate_hz
+        raise MotionError(
+            f"the reference after {largest_s:.1f} s is {sizes.max():.3g} {unit}, "
+            f"but the controller allows {limit:g} {unit}"
+        )

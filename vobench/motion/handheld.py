@@ -1,4 +1,4 @@
-"""A body carried by hand: a smooth way through poses, with a shake of six degrees of freedom on top."""
+"""A body carried by hand: a smooth path through poses, with a shake of six degrees of freedom added."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -16,7 +16,7 @@ from vobench.trajectory.trajectory import Stamps
 
 BAND_HZ = (0.5, 8.0)
 WAVES = 16  # for each degree of freedom
-# How amplitude falls with frequency: as its square, so that every octave shakes as hard, as a mass would.
+# How amplitude falls with frequency: as its square, so that accelerations are equal in every octave, as for a mass.
 FALL = 2.0
 
 
@@ -25,10 +25,10 @@ Sizes = tuple[NonNegative, NonNegative, NonNegative]
 
 @settings(kw_only=False)
 class ShakeSettings:
-    """How a hand shakes, in the axes of the body: rms along and about x, y, z over the band of 0.5 to 8 Hz.
+    """The shake of a hand in the axes of the body: rms along and about x, y, z over the band of 0.5 to 8 Hz.
 
     Each step lifts the body as a sine of amplitude bounce_m, step_hz times a second, and sways it by half as
-    much to one side and the other. Both are 0 for one who stands.
+    much to alternate sides. Both are 0 for a person who stands.
     """
 
     rms_m: Sizes = (0.0, 0.0, 0.0)
@@ -38,7 +38,9 @@ class ShakeSettings:
 
     def __post_init__(self) -> None:
         low_hz, high_hz = BAND_HZ
-        if self.bounce_m and not 2 * low_hz <= self.step_hz <= high_hz:
+        is_walking = self.bounce_m > 0
+        is_in_band = 2 * low_hz <= self.step_hz <= high_hz
+        if is_walking and not is_in_band:
             raise SettingError(f"should be from {2 * low_hz:g} to {high_hz:g} (got {self.step_hz:g})", "step_hz")
 
 
@@ -61,24 +63,34 @@ class Shake:
     phase_rad: Array
 
     def at(self, t_s: Array) -> Kinematics:
-        """T_carrier_body (K, 4, 4): moved, then turned about z, y and x, each of these about the axis of the last."""
+        """The kinematics (K,) relative to the carrier: a shift, then turns about z, the new y and the newest x."""
         value, rate, change = self._sums(t_s)
-        still = np.zeros((len(t_s), 3))
-        moved = Kinematics(se3.transform(np.eye(3), value[:3].T), rate[:3].T, still, change[:3].T, still)
+        zero = np.zeros((len(t_s), 3))
+        kinematics = Kinematics(
+            T_world_body=se3.transform(np.eye(3), value[:3].T),
+            velocity_mps=rate[:3].T,
+            turn_radps=zero,
+            acceleration_mps2=change[:3].T,
+            turn_rate_radps2=zero,
+        )
         for axis in (2, 1, 0):
-            moved = composed(moved, _turned(axis, value[3 + axis], rate[3 + axis], change[3 + axis]))
-        return moved
+            row = 3 + axis
+            turn = _turned(axis, value[row], rate[row], change[row])
+            kinematics = composed(kinematics, turn)
+        return kinematics
 
     def _sums(self, t_s: Array) -> Array:
         """The six sums and their first two derivatives (3, 6, K)."""
         sums = np.zeros((3, 6, len(t_s)))
-        for omega, amplitude, phase in zip(
-            2 * np.pi * self.frequency_hz.T, self.amplitude.T, self.phase_rad.T, strict=True
-        ):
+        angular_frequency = 2 * np.pi * self.frequency_hz
+        waves = zip(angular_frequency.T, self.amplitude.T, self.phase_rad.T, strict=True)
+        for omega, amplitude, phase in waves:  # each (6,)
             angle = omega[:, None] * t_s + phase[:, None]
             sine = amplitude[:, None] * np.sin(angle)
             cosine = amplitude[:, None] * np.cos(angle)
-            sums += [sine, omega[:, None] * cosine, -(omega[:, None] ** 2) * sine]
+            rate = omega[:, None] * cosine
+            change = -(omega[:, None] ** 2) * sine
+            sums += [sine, rate, change]
         return sums
 
 
@@ -101,17 +113,18 @@ class HandheldMotion:
 
     @property
     def breaks_ns(self) -> Array:
-        """The carrier's: a shake has none."""
+        """The breaks of the carrier; a shake has none."""
         return self.carrier.breaks_ns
 
     def at(self, t_ns: Stamps | Array) -> Kinematics:
-        """The carrier's kinematics and the shake's, composed."""
-        return composed(self.carrier.at(t_ns), self.shake.at(np.asarray(t_ns, float) / 1e9))
+        """The kinematics (K,) of the carrier composed with those of the shake."""
+        t_s = np.asarray(t_ns, float) / 1e9
+        return composed(self.carrier.at(t_ns), self.shake.at(t_s))
 
 
 @settings()
 class Handheld:
-    """A smooth way through poses, carried by somebody whose hands shake, also where the way is at rest."""
+    """A smooth path through poses, carried by a person whose hands shake, also while the path is at rest."""
 
     kind: Literal["handheld"] = "handheld"
     poses: Poses
@@ -121,48 +134,63 @@ class Handheld:
 
     def motion(self, rng: np.random.Generator) -> HandheldMotion:
         """The motion with its shake drawn from `rng`. Raises MotionError."""
-        carrier = pose_spline(*columns(self.poses), ease_s=self.ease_s)
-        return HandheldMotion(carrier, draw_shake(SHAKES[self.shake], rng))
+        t_s, T_world_body = columns(self.poses)
+        carrier = pose_spline(t_s, T_world_body, ease_s=self.ease_s)
+        shake = draw_shake(SHAKES[self.shake], rng)
+        return HandheldMotion(carrier, shake)
 
 
 def draw_shake(settings: ShakeSettings, rng: np.random.Generator) -> Shake:
-    """One shake: a sine in each of equal steps of log frequency, of random frequency and phase."""
+    """A random shake: a sine in each of equal steps of log frequency, of random frequency and phase."""
     rms = np.array([*settings.rms_m, *settings.rms_rad])
     low_hz, high_hz = BAND_HZ
-    cells = (np.arange(WAVES) + rng.random((6, WAVES))) / WAVES
-    frequency_hz = low_hz * (high_hz / low_hz) ** cells
+    share_of_band = (np.arange(WAVES) + rng.random((6, WAVES))) / WAVES
+    frequency_hz = low_hz * (high_hz / low_hz) ** share_of_band
     amplitude = frequency_hz**-FALL
-    amplitude *= (rms / np.sqrt(np.sum(amplitude**2, axis=1) / 2))[:, None]
+    unscaled_rms = np.sqrt(np.sum(amplitude**2, axis=1) / 2)
+    amplitude *= (rms / unscaled_rms)[:, None]
     phase_rad = 2 * np.pi * rng.random((6, WAVES))
-    steps = _steps(settings, 2 * np.pi * rng.random())
-    columns = zip((frequency_hz, amplitude, phase_rad), steps, strict=True)
-    return Shake(*(np.column_stack(pair) for pair in columns))
+
+    step_phase_rad = 2 * np.pi * rng.random()
+    step_frequency_hz, step_amplitude, step_phases_rad = _steps(settings, step_phase_rad)
+    return Shake(
+        frequency_hz=np.column_stack([frequency_hz, step_frequency_hz]),
+        amplitude=np.column_stack([amplitude, step_amplitude]),
+        phase_rad=np.column_stack([phase_rad, step_phases_rad]),
+    )
 
 
 def composed(carrier: Kinematics, load: Kinematics) -> Kinematics:
-    """A body that moves in the axes of a carrier that itself moves: its kinematics in the world."""
+    """The kinematics in the world of a body that moves relative to a carrier that itself moves."""
     R_carrier_load = load.T_world_body[:, :3, :3]
     arm_m = load.T_world_body[:, :3, 3]
-    w = carrier.turn_radps
+    R_load_carrier = se3.transposed(R_carrier_load)
+    angular_velocity = carrier.turn_radps
 
-    def in_load(vectors: Array) -> Array:
-        return turned(np.swapaxes(R_carrier_load, -1, -2), vectors)
+    # Velocity and acceleration of the point of the carrier at the load, in the carrier's axes.
+    arm_mps = np.cross(angular_velocity, arm_m)
+    euler_mps2 = np.cross(carrier.turn_rate_radps2, arm_m)
+    centripetal_mps2 = np.cross(angular_velocity, arm_mps)
+    arm_mps2 = euler_mps2 + centripetal_mps2
+    relative_mps = turned(R_carrier_load, load.velocity_mps)
+    coriolis_mps2 = 2 * np.cross(angular_velocity, relative_mps)
 
-    swung_mps = np.cross(w, arm_m)
-    swung_mps2 = np.cross(carrier.turn_rate_radps2, arm_m) + np.cross(w, swung_mps)
-    coriolis_mps2 = 2 * np.cross(w, turned(R_carrier_load, load.velocity_mps))
-    seen_w = in_load(w)
+    carried_mps = turned(R_load_carrier, carrier.velocity_mps + arm_mps)
+    carried_mps2 = turned(R_load_carrier, carrier.acceleration_mps2 + arm_mps2 + coriolis_mps2)
+    carried_radps = turned(R_load_carrier, angular_velocity)
+    carried_radps2 = turned(R_load_carrier, carrier.turn_rate_radps2)
+    axis_change_radps2 = np.cross(carried_radps, load.turn_radps)
     return Kinematics(
         T_world_body=carrier.T_world_body @ load.T_world_body,
-        velocity_mps=in_load(carrier.velocity_mps + swung_mps) + load.velocity_mps,
-        turn_radps=seen_w + load.turn_radps,
-        acceleration_mps2=in_load(carrier.acceleration_mps2 + swung_mps2 + coriolis_mps2) + load.acceleration_mps2,
-        turn_rate_radps2=in_load(carrier.turn_rate_radps2) + np.cross(seen_w, load.turn_radps) + load.turn_rate_radps2,
+        velocity_mps=carried_mps + load.velocity_mps,
+        turn_radps=carried_radps + load.turn_radps,
+        acceleration_mps2=carried_mps2 + load.acceleration_mps2,
+        turn_rate_radps2=carried_radps2 + axis_change_radps2 + load.turn_rate_radps2,
     )
 
 
 def _steps(settings: ShakeSettings, phase_rad: float) -> tuple[Array, Array, Array]:
-    """The sines of the steps, one for each degree of freedom (6,): lifted by each, swayed by every other."""
+    """Frequencies, amplitudes and phases (6,) of the sines of walking: z moves once per step, y once per two."""
     frequency_hz = np.ones(6)
     amplitude = np.zeros(6)
     phases_rad = np.zeros(6)
@@ -173,10 +201,22 @@ def _steps(settings: ShakeSettings, phase_rad: float) -> tuple[Array, Array, Arr
     return frequency_hz, amplitude, phases_rad
 
 
-def _turned(axis: int, angle_rad: Array, rate: Array, change: Array) -> Kinematics:
-    """A turn (K,) about x, y or z alone: one about z with its axes renamed."""
-    along = np.eye(3)[axis]
+def _turned(
+    axis: int,
+    angle_rad: Array,
+    rate: Array,
+    change: Array,
+) -> Kinematics:
+    """The kinematics (K,) of a turn about x, y or z alone: one about z with its axes renamed."""
+    direction = np.eye(3)[axis]
     order = np.roll(range(3), axis + 1)
-    still = np.zeros((len(angle_rad), 3))
-    R = se3.rotation_z(angle_rad)[:, order][:, :, order]
-    return Kinematics(se3.transform(R, still), still, rate[:, None] * along, still, change[:, None] * along)
+    about_z = se3.rotation_z(angle_rad)
+    R = about_z[:, order][:, :, order]
+    zero = np.zeros((len(angle_rad), 3))
+    return Kinematics(
+        T_world_body=se3.transform(R, zero),
+        velocity_mps=zero,
+        turn_radps=rate[:, None] * direction,
+        acceleration_mps2=zero,
+        turn_rate_radps2=change[:, None] * direction,
+    )

@@ -1,7 +1,7 @@
-"""The robot's motors and their inner loops, equations (1)-(10), and the theta that they come to, (12)-(17).
+"""The robot's motors and their inner loops, equations (1)-(10), and the theta that results, (12)-(17).
 
 u, omega: forward speed of the axle midpoint (m/s), yaw rate (rad/s); v_u, v_omega: mean and half difference (V).
-No slip, no inductance, no limit on voltage. The equations are the paper's as docs/paper.md mends them.
+No slip, no inductance, no limit on voltage. The equations are the paper's as corrected in docs/paper.md.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from vobench.setting import NonNegative, Positive, settings
 
 @settings()
 class MotorConstants:
-    """What theta is made of, by the paper's symbols with their SI units; the defaults are no measured robot's.
+    """The constants that determine theta, by the paper's symbols with their SI units; defaults are not measured.
 
     r, d: the wheels' radius and track; m, b: mass, and how far its centre lies ahead of the axle; Iz, Ie: inertia of
     the robot about that centre, of a wheel with its motor; Ra, ka, kb: a motor's resistance, torque constant times gear
@@ -20,7 +20,7 @@ class MotorConstants:
     """
 
     # None are published of a Pioneer 3-DX. r and d are the robot's; m and the sign of b fit it; the rest was chosen so
-    # that a drive at 0.8 m/s asks a 12 V motor for about 7 V.
+    # that a drive at 0.8 m/s needs about 7 V of a 12 V motor.
     r_m: Positive = 0.0975
     d_m: Positive = 0.331
     m_kg: Positive = 12.0
@@ -55,13 +55,16 @@ def voltage_theta_of(motors: MotorConstants) -> VoltageTheta:
     b = motors.b_m
     Iz = motors.Iz_kgm2
     Ie = motors.Ie_kgm2
-    Ra = motors.Ra_ohm
-    ka = motors.ka_NmpA
+    volts_per_torque = motors.Ra_ohm / motors.ka_NmpA
+    linear_inertia = m * r**2 + 2 * Ie
+    inertia_about_axle = Iz + m * b**2
+    turning_inertia = Ie * d**2 + 2 * r**2 * inertia_about_axle
+    back_emf = motors.ka_NmpA * motors.kb_Vsprad / motors.Ra_ohm
     return VoltageTheta(
-        t1=Ra / ka * (m * r**2 + 2 * Ie),
-        t2=Ra / ka * (Ie * d**2 + 2 * r**2 * (Iz + m * b**2)),
-        t3=Ra / ka * m * b,
-        t4=Ra / ka * (ka * motors.kb_Vsprad / Ra + motors.Be_Nmsprad),
+        t1=volts_per_torque * linear_inertia,
+        t2=volts_per_torque * turning_inertia,
+        t3=volts_per_torque * m * b,
+        t4=volts_per_torque * (back_emf + motors.Be_Nmsprad),
     )
 
 
@@ -72,9 +75,11 @@ def theta_of(motors: MotorConstants) -> Theta:
     kPT = motors.kPT_Vspm
     kPR = motors.kPR_Vsprad
     t = voltage_theta_of(motors)
+    speed_damping = 2 * r * motors.kDT_Vs2pm
+    turn_damping = 2 * r * d * motors.kDR_Vs2prad
     return Theta(
-        t1=(t.t1 + 2 * r * motors.kDT_Vs2pm) / (2 * r * kPT),
-        t2=(t.t2 + 2 * r * d * motors.kDR_Vs2prad) / (2 * r * d * kPR),
+        t1=(t.t1 + speed_damping) / (2 * r * kPT),
+        t2=(t.t2 + turn_damping) / (2 * r * d * kPR),
         t3=t.t3 * r / (2 * kPT),
         t4=t.t4 / (r * kPT) + 1,
         t5=t.t3 * r / (d * kPR),
@@ -82,23 +87,37 @@ def theta_of(motors: MotorConstants) -> Theta:
     )
 
 
-def accelerations_at(u: Number, omega: Number, v_u: Number, v_omega: Number, *, motors: MotorConstants) -> Pair[Number]:
+def accelerations_at(
+    u: Number,
+    omega: Number,
+    v_u: Number,
+    v_omega: Number,
+    *,
+    motors: MotorConstants,
+) -> Pair[Number]:
     """Accelerations u' in m/s^2 and omega' in rad/s^2 at these voltages: rows 4 and 5 of (1)."""
     r = motors.r_m
     d = motors.d_m
     t = voltage_theta_of(motors)
-    u_rate = (t.t3 * r**2 * omega**2 - 2 * t.t4 * u + 2 * r * v_u) / t.t1
-    omega_rate = (-2 * t.t3 * r**2 * u * omega - t.t4 * d**2 * omega + 2 * r * d * v_omega) / t.t2
+    u_coupling = t.t3 * r**2 * omega**2
+    u_rate = (u_coupling - 2 * t.t4 * u + 2 * r * v_u) / t.t1
+    omega_coupling = -2 * t.t3 * r**2 * u * omega
+    omega_friction = t.t4 * d**2 * omega
+    omega_rate = (omega_coupling - omega_friction + 2 * r * d * v_omega) / t.t2
     return u_rate, omega_rate
 
 
 def loop_voltages(
-    speeds: Pair[Number], references: Pair[Number], rates: Pair[Number], *, motors: MotorConstants
+    speeds: Pair[Number],
+    references: Pair[Number],
+    rates: Pair[Number],
+    *,
+    motors: MotorConstants,
 ) -> Pair[Number]:
     """v_u and v_omega of (6), in V: the loops differentiate the speeds and not the references."""
-    (u, omega) = speeds
-    (u_ref, omega_ref) = references
-    (u_rate, omega_rate) = rates
+    u, omega = speeds
+    u_ref, omega_ref = references
+    u_rate, omega_rate = rates
     v_u = motors.kPT_Vspm * (u_ref - u) - motors.kDT_Vs2pm * u_rate
     v_omega = motors.kPR_Vsprad * (omega_ref - omega) - motors.kDR_Vs2prad * omega_rate
     return v_u, v_omega

@@ -21,8 +21,8 @@ class Theta:
     """The six parameters of (18), from a least-squares fit to a real robot (Martins et al., 2009).
 
     t1, t2 in s are the lags of u and omega; t3 in s m/rad^2 and t5 in s/m couple them, because the
-    centre of mass is not on the axle; t4 and t6 are 1 for a robot that reaches what it is asked.
-    Raises MotionError where one is not finite, or a lag not positive.
+    centre of mass is not on the axle; t4 and t6 are 1 for a robot that reaches its references.
+    Raises MotionError for a value that is not finite, and for a lag that is not positive.
     """
 
     t1: float
@@ -33,17 +33,22 @@ class Theta:
     t6: float
 
     def __post_init__(self) -> None:
-        if not (all(map(isfinite, astuple(self))) and self.t1 > 0 and self.t2 > 0):
-            raise MotionError(f"theta must be six finite values with positive lags t1 and t2, got {astuple(self)}")
+        values = astuple(self)
+        is_finite = all(map(isfinite, values))
+        has_lags = self.t1 > 0 and self.t2 > 0
+        if not is_finite or not has_lags:
+            raise MotionError(f"theta must be six finite values with positive lags t1 and t2, got {values}")
 
     def perturbed(self, relative_std: float, rng: np.random.Generator) -> "Theta":
-        """Another robot of the kind: each parameter times exp(relative_std N(0, 1)), so that none changes sign.
+        """A similar robot: each parameter times exp(relative_std N(0, 1)), so that none changes sign.
 
-        Raises MotionError where `relative_std` is not in 0..0.5.
+        Raises MotionError for a `relative_std` outside 0..0.5.
         """
         if not 0 <= relative_std <= 0.5:
             raise MotionError(f"theta_std is a fraction of each parameter, 0..0.5, got {relative_std}")
-        return Theta(*(np.array(astuple(self)) * np.exp(relative_std * rng.standard_normal(6))).tolist())
+        factors = np.exp(relative_std * rng.standard_normal(6))
+        values = np.array(astuple(self)) * factors
+        return Theta(*values.tolist())
 
 
 # Source: help text of Martins' Simulink toolbox, and Laut (2011) where named; the first as the paper prints it.
@@ -63,29 +68,55 @@ THETAS = {
 
 
 def accelerations(
-    u: Number, omega: Number, u_ref: Number, omega_ref: Number, *, theta: Theta, delta: Pair[float] = (0.0, 0.0)
+    u: Number,
+    omega: Number,
+    u_ref: Number,
+    omega_ref: Number,
+    *,
+    theta: Theta,
+    delta: Pair[float] = (0.0, 0.0),
 ) -> Pair[Number]:
     """Accelerations u' in m/s^2 and omega' in rad/s^2 of (18); `delta` is the paper's (delta_u, delta_omega)."""
-    u_rate = (theta.t3 * omega**2 - theta.t4 * u + u_ref) / theta.t1 + delta[0]
-    omega_rate = (-theta.t5 * u * omega - theta.t6 * omega + omega_ref) / theta.t2 + delta[1]
+    u_drive = theta.t3 * omega**2 - theta.t4 * u + u_ref
+    omega_drive = -theta.t5 * u * omega - theta.t6 * omega + omega_ref
+    u_rate = u_drive / theta.t1 + delta[0]
+    omega_rate = omega_drive / theta.t2 + delta[1]
     return u_rate, omega_rate
 
 
-def feed_forward(u: Number, omega: Number, u_rate: Number, omega_rate: Number, *, theta: Theta) -> Pair[Number]:
-    """u_ref in m/s and omega_ref in rad/s that (18) turns into these accelerations: it, solved for them."""
-    u_ref = theta.t1 * u_rate - theta.t3 * omega**2 + theta.t4 * u
-    omega_ref = theta.t2 * omega_rate + theta.t5 * u * omega + theta.t6 * omega
+def feed_forward(
+    u: Number,
+    omega: Number,
+    u_rate: Number,
+    omega_rate: Number,
+    *,
+    theta: Theta,
+) -> Pair[Number]:
+    """u_ref in m/s and omega_ref in rad/s for which (18) gives these accelerations."""
+    u_coupling = theta.t3 * omega**2
+    omega_coupling = theta.t5 * u * omega
+    u_ref = theta.t1 * u_rate - u_coupling + theta.t4 * u
+    omega_ref = theta.t2 * omega_rate + omega_coupling + theta.t6 * omega
     return u_ref, omega_ref
 
 
-def velocities(psi: float, u: float, omega: float, *, a_m: float, side_mps: float = 0.0) -> tuple[float, float, float]:
+def velocities(
+    psi: float,
+    u: float,
+    omega: float,
+    *,
+    a_m: float,
+    side_mps: float = 0.0,
+) -> tuple[float, float, float]:
     """x', y' of the point h and psi', equation (19).
 
     `side_mps` is the speed at which the whole robot slides to its left: the paper's
     delta_x = -side sin(psi), delta_y = side cos(psi). Sliding turns nothing, so psi' = omega stays exact.
     """
     left = a_m * omega + side_mps
-    return u * cos(psi) - left * sin(psi), u * sin(psi) + left * cos(psi), omega
+    x_rate = u * cos(psi) - left * sin(psi)
+    y_rate = u * sin(psi) + left * cos(psi)
+    return x_rate, y_rate, omega
 
 
 def wheel_speeds(u: Number, omega: Number, *, track_m: float) -> Pair[Number]:
@@ -96,10 +127,10 @@ def wheel_speeds(u: Number, omega: Number, *, track_m: float) -> Pair[Number]:
 
 @dataclass(frozen=True, slots=True)
 class AccelerationLimits:
-    """Largest |u'| in m/s^2 and |omega'| in rad/s^2 that (18) may give, before delta pushes.
+    """Largest |u'| in m/s^2 and |omega'| in rad/s^2 that (18) may give, before delta is added.
 
-    Where one is reached the equations have a corner: the integrator's order drops to 2 in that sub-step.
-    Raises MotionError where one is not positive.
+    At a limit the equations are not smooth: the integrator's order drops to 2 in that sub-step.
+    Raises MotionError for a limit that is not positive.
     """
 
     speed_mps2: float = inf
@@ -107,20 +138,21 @@ class AccelerationLimits:
 
     def __post_init__(self) -> None:
         for name in ("speed_mps2", "turn_radps2"):
-            if not getattr(self, name) > 0:
-                raise MotionError(f"the acceleration limit {name} must be positive, got {getattr(self, name)}")
+            limit = getattr(self, name)
+            if not limit > 0:
+                raise MotionError(f"the acceleration limit {name} must be positive, got {limit}")
 
     def held(self, u_rate: Number, omega_rate: Number) -> Pair[Number]:
-        """Both rates, each cut at its limit."""
+        """Both rates, each clipped at its limit."""
         if self.speed_mps2 == self.turn_radps2 == inf:
             return u_rate, omega_rate
-        return _cut(u_rate, self.speed_mps2), _cut(omega_rate, self.turn_radps2)
+        return _clipped(u_rate, self.speed_mps2), _clipped(omega_rate, self.turn_radps2)
 
 
 UNLIMITED = AccelerationLimits()
 
 
-def _cut(rate: Number, limit: float) -> Number:
+def _clipped(rate: Number, limit: float) -> Number:
     if isinstance(rate, np.ndarray):
         return np.clip(rate, -limit, limit)
     return max(-limit, min(limit, rate))
@@ -136,24 +168,35 @@ def euler(rates: Rates, state: Array, step_s: float) -> Array:
 
 def rk4(rates: Rates, state: Array, step_s: float) -> Array:
     """One classical Runge-Kutta step, order 4 (Kutta, 1901)."""
+    half_s = step_s / 2
     k1 = rates(state)
-    k2 = rates(state + step_s / 2 * k1)
-    k3 = rates(state + step_s / 2 * k2)
+    k2 = rates(state + half_s * k1)
+    k3 = rates(state + half_s * k2)
     k4 = rates(state + step_s * k3)
-    return state + step_s / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    weighted_sum = k1 + 2 * k2 + 2 * k3 + k4
+    return state + step_s / 6 * weighted_sum
 
 
 INTEGRATORS = {"rk4": rk4, "euler": euler}
 
 
-def over_period(rates: Rates, state: Array, *, period_s: float, substeps: int, integrator: str = "rk4") -> Array:
+def over_period(
+    rates: Rates,
+    state: Array,
+    *,
+    period_s: float,
+    substeps: int,
+    integrator: str = "rk4",
+) -> Array:
     """States (substeps, n) at the end of every sub-step of one period; the last is the period's end.
 
     `rates` must be smooth over the period: change the inputs between periods, never inside one,
     and the method keeps its order.
     """
     step = INTEGRATORS[integrator]
+    step_s = period_s / substeps
     states = np.empty((substeps, len(state)))
     for i in range(substeps):
-        states[i] = state = step(rates, state, period_s / substeps)
+        state = step(rates, state, step_s)
+        states[i] = state
     return states

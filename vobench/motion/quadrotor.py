@@ -1,4 +1,4 @@
-"""A quadrotor through points on the way of least snap, tilted as its thrust must be.
+"""A quadrotor that flies through points with the least snap, tilted as its thrust requires.
 
 Source: Mellinger and Kumar (2011), minimum snap and differential flatness.
 """
@@ -16,15 +16,16 @@ from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.rail import check_apart
-from vobench.motion.spline import Jet, cross, from_zero, of_axes, unit
+from vobench.motion.spline import Jet, from_zero, of_axes
 from vobench.motion.wheeled import Rate, Speed
 from vobench.setting import Triple, settings
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, CurveMotion, Kinematics, evenly
+from vobench.trajectory.trajectory import step_lengths_m
 
-HELD_MPS2 = np.array([0.0, 0.0, STANDARD_GRAVITY_MPS2])  # what the rotors give beyond the acceleration
-LEAST_LIFT = 0.1  # of the weight: below it the rotors all but stop, and which way is up is lost
-LOOKS_PER_LEG = 64
-SLOW = 1e-3  # of the way's mean speed: what moves slower over ground has no heading
+HELD_MPS2 = np.array([0.0, 0.0, STANDARD_GRAVITY_MPS2])  # added to the acceleration by the rotors
+LEAST_LIFT = 0.1  # of the weight: below it the rotors nearly stop, and the direction of thrust is undefined
+CHECKS_PER_LEG = 64
+SLOW = 1e-3  # of the largest ground speed: below it there is no heading
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact for the square of a cubic
 
 
@@ -37,28 +38,44 @@ class QuadrotorCurve:
     breaks: Array
 
     def at(self, s: Array) -> Kinematics:
-        """Poses (K, 4, 4) at s (K,) in s: z along the thrust, x as near to the yaw's direction as that allows."""
-        p, v, a, jerk, snap = (self.position(s, order) for order in range(5))
-        z = unit(Jet(a + HELD_MPS2, jerk, snap))
-        y = unit(cross(z, self._ahead(s)))
-        held = of_axes(cross(y, z), y, z)
-        return Kinematics(se3.transform(held.R, p), held.in_body(v), held.turn, held.in_body(a), held.turn_rate)
+        """Poses (K, 4, 4) at s (K,) in s: z along the thrust, x as near to the yaw's direction as possible."""
+        velocity = self.position(s, 1)
+        acceleration = self.position(s, 2)
+        jerk = self.position(s, 3)
+        snap = self.position(s, 4)
+        thrust = Jet(acceleration + HELD_MPS2, jerk, snap)
+        z = thrust.direction()
+        y = z.cross(self._ahead(s)).direction()
+        x = y.cross(z)
+        attitude = of_axes(x, y, z)
+        return Kinematics(
+            T_world_body=se3.transform(attitude.R, self.position(s)),
+            velocity_mps=attitude.in_body(velocity),
+            turn_radps=attitude.turn,
+            acceleration_mps2=attitude.in_body(acceleration),
+            turn_rate_radps2=attitude.turn_rate,
+        )
 
     def _ahead(self, s: Array) -> Jet:
-        """The level direction of the yaw."""
-        yaw, rate, change = (self.yaw_rad(s, order)[:, None] for order in range(3))
-        still = np.zeros_like(yaw)
-        ahead = np.concatenate([np.cos(yaw), np.sin(yaw), still], -1)
-        left = np.concatenate([-np.sin(yaw), np.cos(yaw), still], -1)
-        return Jet(ahead, left * rate, left * change - ahead * rate**2)
+        """The horizontal direction of the yaw."""
+        yaw = self.yaw_rad(s)[:, None]
+        rate = self.yaw_rad(s, 1)[:, None]
+        change = self.yaw_rad(s, 2)[:, None]
+        cosine = np.cos(yaw)
+        sine = np.sin(yaw)
+        zero = np.zeros_like(yaw)
+        ahead = np.concatenate([cosine, sine, zero], -1)
+        left = np.concatenate([-sine, cosine, zero], -1)
+        ahead_change = left * change - ahead * rate**2
+        return Jet(ahead, left * rate, ahead_change)
 
 
 @settings()
 class Quadrotor:
-    """Through points on the way of least snap, from hover to hover, tilted as thrust must be.
+    """A flight through points with the least snap, from hover to hover, tilted as the thrust requires.
 
-    Without `t_s` each leg has the time that snap asks for, and all of them the mean speed; without `yaw_deg`
-    it looks the way it flies.
+    Without `t_s` the legs have the durations of least snap at the mean speed; without `yaw_deg` it faces the
+    direction of flight.
     """
 
     kind: Literal["quadrotor"] = "quadrotor"
@@ -69,25 +86,32 @@ class Quadrotor:
     rate_hz: Rate = 30.0
 
     def motion(self) -> CurveMotion:
-        """The motion. Raises MotionError for points or times that make no way, or rotors that would have to pull."""
-        points = np.array(self.points_m)
-        check_apart(points, of="flight")
-        t_s = _least_snap_times(points, self.speed_mps) if self.t_s is None else from_zero(self.t_s, of="point")
-        if len(t_s) != len(points):
-            raise MotionError(f"there are {len(t_s)} times for {len(points)} points; each point needs one")
-        position = minimum_snap(t_s, points)
-        yaw = _headings(position, t_s, points)
+        """The motion. Raises MotionError for invalid points or times, and for rotors that would have to pull."""
+        points_m = np.array(self.points_m)
+        check_apart(points_m, of="flight")
+        t_s = self._times(points_m)
+        if len(t_s) != len(points_m):
+            raise MotionError(f"there are {len(t_s)} times for {len(points_m)} points; each point needs one")
+        position = minimum_snap(t_s, points_m)
+        yaw = _headings(position, t_s, points_m)
         if self.yaw_deg is not None:
             yaw = np.full(len(t_s), radians(self.yaw_deg))
-        rest = [(1, 0.0), (2, 0.0)]
+        rest = [(1, 0.0), (2, 0.0)]  # derivatives at both ends
         yaw_rad = scipy.interpolate.make_interp_spline(t_s, yaw, k=5, bc_type=(rest, rest))
         curve = QuadrotorCurve(position, yaw_rad, t_s[1:-1])
         _check_lift(curve, t_s)
-        return CurveMotion(curve, evenly(t_s[0], t_s[-1], begin=t_s[0]))
+        law = evenly(t_s[0], t_s[-1], begin=t_s[0])
+        return CurveMotion(curve, law)
+
+    def _times(self, points_m: Array) -> Array:
+        """Times (N,) in s since the first point."""
+        if self.t_s is None:
+            return _least_snap_times(points_m, self.speed_mps)
+        return from_zero(self.t_s, of="point")
 
 
 def minimum_snap(t_s: Array, points_m: Array) -> "scipy.interpolate.BSpline":
-    """Of all ways through points (N, 3) at t_s (N,), from hover to hover, the one of the least integral of snap².
+    """Of all paths through points (N, 3) at t_s (N,), from hover to hover, the one of the least integral of snap².
 
     That is the interpolating spline of degree 7 with velocity, acceleration and jerk 0 at both ends.
     Source: the optimality of odd-degree splines, de Boor (1963).
@@ -98,50 +122,64 @@ def minimum_snap(t_s: Array, points_m: Array) -> "scipy.interpolate.BSpline":
 
 def snap_cost(position: "scipy.interpolate.BSpline", t_s: Array) -> float:
     """∫ |snap|² dt between the times t_s (N,) that are its knots."""
-    half = np.diff(t_s) / 2
-    at_s = (t_s[:-1] + half)[:, None] + half[:, None] * NODES
-    squared = np.sum(position(at_s.ravel(), 4) ** 2, axis=-1).reshape(at_s.shape)
-    return float(squared @ WEIGHTS @ half)
+    half_s = np.diff(t_s) / 2
+    middle_s = t_s[:-1] + half_s
+    nodes_s = middle_s[:, None] + half_s[:, None] * NODES
+    snap = position(nodes_s.ravel(), 4)
+    squared = np.sum(snap**2, axis=-1).reshape(nodes_s.shape)
+    return float(squared @ WEIGHTS @ half_s)
 
 
-def _least_snap_times(points: Array, speed_mps: float) -> Array:
-    """Times of the points, the whole as long as `speed_mps` asks, shared out so that snap is least."""
-    legs_m = np.linalg.norm(np.diff(points, axis=0), axis=1)
+def _least_snap_times(points_m: Array, speed_mps: float) -> Array:
+    """Times (N,) of the points that give the least snap, for a flight at a mean speed."""
+    legs_m = step_lengths_m(points_m)
 
     def times(log_shares: Array) -> Array:
-        shares = np.exp(log_shares - log_shares.max())
-        return np.concatenate([[0.0], np.cumsum(shares / shares.sum())])
+        """Times from 0 to 1."""
+        weights = np.exp(log_shares - log_shares.max())
+        shares = weights / weights.sum()
+        return np.concatenate([[0.0], np.cumsum(shares)])
 
-    def cost(log_shares: Array) -> float:
+    def log_cost(log_shares: Array) -> float:
         t = times(log_shares)
-        return float(np.log(snap_cost(minimum_snap(t, points), t)))
+        cost = snap_cost(minimum_snap(t, points_m), t)
+        return float(np.log(cost))
 
-    found = scipy.optimize.minimize(cost, np.log(legs_m) / 2, method="L-BFGS-B")
-    lasts_s: float = legs_m.sum() / speed_mps
-    return times(found.x) * lasts_s
+    start = np.log(legs_m) / 2
+    optimum = scipy.optimize.minimize(log_cost, start, method="L-BFGS-B")
+    duration_s: float = legs_m.sum() / speed_mps
+    return times(optimum.x) * duration_s
 
 
-def _headings(position: "scipy.interpolate.BSpline", t_s: Array, points: Array) -> Array:
-    """The direction of flight (N,) over ground at each point, turning the shorter way; where it has none, the last."""
-    ways = position(t_s, 1)
-    ways[0] = points[1] - points[0]
-    ways[-1] = points[-1] - points[-2]
-    level = np.hypot(ways[:, 0], ways[:, 1])
-    has_heading = level > SLOW * max(level.max(), np.finfo(float).tiny)
+def _headings(position: "scipy.interpolate.BSpline", t_s: Array, points_m: Array) -> Array:
+    """The direction of flight (N,) over ground at each point, unwrapped; while it is undefined, the last one."""
+    velocities = position(t_s, 1)
+    velocities[0] = points_m[1] - points_m[0]
+    velocities[-1] = points_m[-1] - points_m[-2]
+    ground_speed = np.hypot(velocities[:, 0], velocities[:, 1])
+    fastest = max(ground_speed.max(), np.finfo(float).tiny)
+    has_heading = ground_speed > SLOW * fastest
     if not has_heading.any():
         return np.zeros(len(t_s))
-    known = np.maximum.accumulate(np.where(has_heading, np.arange(len(t_s)), int(np.argmax(has_heading))))
-    headings: Array = np.unwrap(np.arctan2(ways[known, 1], ways[known, 0]))
+
+    # The last point with a heading up to each point, or else the first one.
+    first_known = int(np.argmax(has_heading))
+    known = np.where(has_heading, np.arange(len(t_s)), first_known)
+    known = np.maximum.accumulate(known)
+    angles_rad = np.arctan2(velocities[known, 1], velocities[known, 0])
+    headings: Array = np.unwrap(angles_rad)
     return headings
 
 
 def _check_lift(curve: QuadrotorCurve, t_s: Array) -> None:
-    """Raise MotionError where the thrust does not point up."""
-    look_s = np.concatenate([np.linspace(a, b, LOOKS_PER_LEG) for a, b in pairwise(t_s)])
-    lift = 1 + curve.position(look_s, 2)[:, 2] / STANDARD_GRAVITY_MPS2
+    """Raise MotionError if the thrust does not point up."""
+    legs_s = [np.linspace(start_s, end_s, CHECKS_PER_LEG) for start_s, end_s in pairwise(t_s)]
+    checked_s = np.concatenate(legs_s)
+    vertical_mps2 = curve.position(checked_s, 2)[:, 2]
+    lift = 1 + vertical_mps2 / STANDARD_GRAVITY_MPS2
     if lift.min() < LEAST_LIFT:
         k = int(np.argmin(lift))
         raise MotionError(
-            f"after {look_s[k] - t_s[0]:.2f} s the rotors would lift {lift[k]:.2g} of the weight; "
+            f"after {checked_s[k] - t_s[0]:.2f} s the rotors would lift {lift[k]:.2g} of the weight; "
             f"allow more time, so that it is {LEAST_LIFT:g} or more"
         )

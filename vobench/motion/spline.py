@@ -20,6 +20,23 @@ from vobench.trajectory.kinematics import CurveMotion, Kinematics, TimeLaw, even
 class Jet(NamedTuple):
     """Vectors (K, n) with their first and second derivatives (K, n)."""
 
+    def direction(self) -> "Jet":
+        """The unit vectors of these, which may nowhere be zero."""
+        length = np.linalg.norm(self.value, axis=-1, keepdims=True)
+        direction = self.value / length
+        length_rate = _dot(direction, self.rate)
+        rate = (self.rate - direction * length_rate) / length
+        length_change = _dot(rate, self.rate) + _dot(direction, self.change)
+        scaled_change = self.change - 2 * rate * length_rate - direction * length_change
+        return Jet(direction, rate, scaled_change / length)
+
+    def cross(self, other: "Jet") -> "Jet":
+        """The cross product with other vectors (K, 3)."""
+        rate = np.cross(self.rate, other.value) + np.cross(self.value, other.rate)
+        outer_change = np.cross(self.change, other.value) + 2 * np.cross(self.rate, other.rate)
+        change = outer_change + np.cross(self.value, other.change)
+        return Jet(np.cross(self.value, other.value), rate, change)
+
     value: Array
     rate: Array
     change: Array
@@ -38,46 +55,44 @@ class Attitude(NamedTuple):
 
 
 def turned(R: Array, vectors: Array) -> Array:
-    """Vectors (K, 3), each by its own rotation of (K, 3, 3)."""
+    """Vectors (K, 3), each rotated by its matrix of R (K, 3, 3)."""
     return (R @ vectors[..., None])[..., 0]
 
 
-def unit(v: Jet) -> Jet:
-    """The direction of v, which may nowhere be zero."""
-    length = np.linalg.norm(v.value, axis=-1, keepdims=True)
-    n = v.value / length
-    length_rate = _dot(n, v.rate)
-    rate = (v.rate - n * length_rate) / length
-    length_change = _dot(rate, v.rate) + _dot(n, v.change)
-    return Jet(n, rate, (v.change - 2 * rate * length_rate - n * length_change) / length)
-
-
-def cross(a: Jet, b: Jet) -> Jet:
-    """The product a × b."""
-    rate = np.cross(a.rate, b.value) + np.cross(a.value, b.rate)
-    change = np.cross(a.change, b.value) + 2 * np.cross(a.rate, b.rate) + np.cross(a.value, b.change)
-    return Jet(np.cross(a.value, b.value), rate, change)
-
-
 def of_axes(x: Jet, y: Jet, z: Jet) -> Attitude:
-    """The attitude whose body axes are these unit vectors of the world, each square to the others."""
-    turn = np.concatenate([_dot(z.value, y.rate), _dot(x.value, z.rate), _dot(y.value, x.rate)], -1)
+    """The attitude whose body axes are these orthogonal unit vectors of the world."""
+    turn_x = _dot(z.value, y.rate)
+    turn_y = _dot(x.value, z.rate)
+    turn_z = _dot(y.value, x.rate)
+    turn = np.concatenate([turn_x, turn_y, turn_z], -1)
+
     # y'' = R ([turn']x + [turn]x²) e_y, whose z part is turn_rate_x + turn_y turn_z; the others in turn.
-    swept = np.concatenate([_dot(z.value, y.change), _dot(x.value, z.change), _dot(y.value, x.change)], -1)
-    turn_rate = swept - np.roll(turn, -1, -1) * np.roll(turn, -2, -1)
-    return Attitude(np.stack([x.value, y.value, z.value], -1), turn, turn_rate)
+    part_x = _dot(z.value, y.change)
+    part_y = _dot(x.value, z.change)
+    part_z = _dot(y.value, x.change)
+    parts = np.concatenate([part_x, part_y, part_z], -1)
+    turn_rate = parts - np.roll(turn, -1, -1) * np.roll(turn, -2, -1)
+    R = np.stack([x.value, y.value, z.value], -1)
+    return Attitude(R, turn, turn_rate)
 
 
 def of_quaternion(q_xyzw: Jet) -> Attitude:
     """The attitude of quaternions (K, 4) of any length above 0: turn = 2 vec(q* q'), turn_rate = 2 vec(q* q'')."""
-    q = unit(q_xyzw)
-    return Attitude(se3.from_quaternion(q.value), _seen(q.value, q.rate), _seen(q.value, q.change))
+    q = q_xyzw.direction()
+    R = se3.from_quaternion(q.value)
+    turn = _twice_vector_part(q.value, q.rate)
+    turn_rate = _twice_vector_part(q.value, q.change)
+    return Attitude(R, turn, turn_rate)
 
 
-def _seen(q: Array, p: Array) -> Array:
-    """2 vec(q* p)."""
-    seen: Array = 2 * (q[:, 3:] * p[:, :3] - p[:, 3:] * q[:, :3] - np.cross(q[:, :3], p[:, :3]))
-    return seen
+def _twice_vector_part(q: Array, p: Array) -> Array:
+    """2 vec(q* p) of quaternions (K, 4)."""
+    q_vector = q[:, :3]
+    p_vector = p[:, :3]
+    q_scalar = q[:, 3:]
+    p_scalar = p[:, 3:]
+    vector = q_scalar * p_vector - p_scalar * q_vector - np.cross(q_vector, p_vector)
+    return np.asarray(2 * vector)
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -86,14 +101,14 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 FEWEST = 3
-WIDEST_TURN_RAD = np.deg2rad(175.0)  # beyond it rounding or noise decides which way round
+WIDEST_TURN_RAD = np.deg2rad(175.0)  # beyond it rounding or noise decides the direction
 
 
 @dataclass(frozen=True, slots=True)
 class PoseCurve:
     """A Curve by time in s: positions of a spline (3 columns), attitudes of a function of time (K,).
 
-    breaks: where the spline of rotations changes its piece.
+    breaks: the times at which the spline of rotations changes its piece.
     """
 
     position: "scipy.interpolate.BSpline"
@@ -102,19 +117,19 @@ class PoseCurve:
 
     def at(self, s: Array) -> Kinematics:
         """Poses (K, 4, 4) at s (K,) in s, with their velocities and accelerations."""
-        held = self.attitude(s)
+        attitude = self.attitude(s)
         return Kinematics(
-            T_world_body=se3.transform(held.R, self.position(s)),
-            velocity_mps=held.in_body(self.position(s, 1)),
-            turn_radps=held.turn,
-            acceleration_mps2=held.in_body(self.position(s, 2)),
-            turn_rate_radps2=held.turn_rate,
+            T_world_body=se3.transform(attitude.R, self.position(s)),
+            velocity_mps=attitude.in_body(self.position(s, 1)),
+            turn_radps=attitude.turn,
+            acceleration_mps2=attitude.in_body(self.position(s, 2)),
+            turn_rate_radps2=attitude.turn_rate,
         )
 
 
 @settings()
 class Pose:
-    """Where the body is at a time, and how it is turned: yaw to the left, pitch down, roll to the right."""
+    """Time, position and attitude of the body: yaw to the left, pitch down, roll to the right."""
 
     t_s: float
     position_m: Triple
@@ -127,8 +142,9 @@ class Pose:
         """The pose (4, 4): rolled about x first, then pitched about y, then turned about z."""
         from scipy.spatial.transform import Rotation
 
-        angles = (self.roll_deg, self.pitch_deg, self.yaw_deg)
-        return se3.transform(Rotation.from_euler("xyz", angles, degrees=True).as_matrix(), np.array(self.position_m))
+        angles_deg = (self.roll_deg, self.pitch_deg, self.yaw_deg)
+        R = Rotation.from_euler("xyz", angles_deg, degrees=True).as_matrix()
+        return se3.transform(R, np.array(self.position_m))
 
 
 Poses = Annotated[tuple[Pose, ...], MinLen(FEWEST)]
@@ -136,7 +152,7 @@ Poses = Annotated[tuple[Pose, ...], MinLen(FEWEST)]
 
 @settings()
 class PoseSpline:
-    """A smooth way through poses at given times; with ease_s from rest to rest."""
+    """A smooth path through poses at given times; with ease_s from rest to rest."""
 
     kind: Literal["pose_spline"] = "pose_spline"
     poses: Poses
@@ -145,75 +161,82 @@ class PoseSpline:
 
     def motion(self) -> CurveMotion:
         """The motion. Raises MotionError."""
-        return pose_spline(*columns(self.poses), ease_s=self.ease_s)
+        t_s, T_world_body = columns(self.poses)
+        return pose_spline(t_s, T_world_body, ease_s=self.ease_s)
 
 
 def columns(poses: Sequence[Pose]) -> tuple[Array, Array]:
-    """Times (N,) from the first pose on, and poses (N, 4, 4). Raises MotionError where times do not rise."""
-    return from_zero([pose.t_s for pose in poses], of="pose"), np.stack([pose.T_world_body for pose in poses])
+    """Times (N,) since the first pose, and poses (N, 4, 4). Raises MotionError for times that do not increase."""
+    t_s = from_zero([pose.t_s for pose in poses], of="pose")
+    T_world_body = np.stack([pose.T_world_body for pose in poses])
+    return t_s, T_world_body
 
 
 def from_zero(t_s: Sequence[float], *, of: str) -> Array:
-    """Times (N,) since the first; what is wrong with them is said in the times that were written."""
-    written: Array = np.array(t_s)
-    check_times(written, fewest=2, of=of)
-    since: Array = written - written[0]
-    return since
+    """Times (N,) since the first. Raises MotionError as `check_times`, whose message has the times as given."""
+    times_s: Array = np.array(t_s)
+    check_times(times_s, fewest=2, of=of)
+    since_first_s: Array = times_s - times_s[0]
+    return since_first_s
 
 
 def pose_spline(t_s: ArrayLike, T_world_body: ArrayLike, *, ease_s: float = 0.0) -> CurveMotion:
-    """Through N >= 3 poses (N, 4, 4) at rising times (N,) in s.
+    """The motion through N >= 3 poses (N, 4, 4) at increasing times (N,) in s.
 
-    With ease_s it starts and ends at rest: it takes that long to come to the poses' own pace and to leave it,
+    With ease_s it starts and ends at rest: it takes that long to accelerate to the pace of the poses and to stop,
     so that all but the first pose are passed ease_s / 2 later, the last one ease_s.
-    Raises MotionError naming the poses that are too few, not finite, no rotations or not in order.
+    Raises MotionError for poses that are too few, not finite, no rotations or not in order.
     """
     times_s = np.atleast_1d(np.asarray(t_s, float))
     T = np.asarray(T_world_body, float)
     _check_poses(times_s, T)
-    curve = through(times_s, T)
-    return CurveMotion(
-        curve, evenly(times_s[0], times_s[-1], begin=times_s[0]) if not ease_s else _eased(times_s, ease_s)
-    )
+    law = evenly(times_s[0], times_s[-1], begin=times_s[0])
+    if ease_s:
+        law = _eased(times_s, ease_s)
+    return CurveMotion(through(times_s, T), law)
 
 
 def through(t_s: Array, T: Array) -> PoseCurve:
     """The curve through poses (N, 4, 4): SciPy's rotation spline, and positions of the least jerk."""
     from scipy.spatial.transform import Rotation, RotationSpline
 
-    rotation = RotationSpline(t_s, Rotation.from_matrix(se3.nearest_rotation(T[:, :3, :3])))
+    R = se3.nearest_rotation(T[:, :3, :3])
+    spline = RotationSpline(t_s, Rotation.from_matrix(R))
 
-    def turned(s: Array) -> Attitude:
-        return Attitude(rotation(s).as_matrix(), rotation(s, 1), rotation(s, 2))
+    def attitude(s: Array) -> Attitude:
+        return Attitude(spline(s).as_matrix(), spline(s, 1), spline(s, 2))
 
-    return PoseCurve(quintic(t_s, T[:, :3, 3]), turned, t_s[1:-1])
+    position = quintic(t_s, T[:, :3, 3])
+    return PoseCurve(position, attitude, breaks=t_s[1:-1])
 
 
 def quintic(t: Array, values: Array) -> "scipy.interpolate.BSpline":
     """The natural quintic through values (N, n) at t (N,), N >= 3: of all curves through them the one of least jerk."""
-    natural = [(3, np.zeros(values.shape[1:])), (4, np.zeros(values.shape[1:]))]
+    zero = np.zeros(values.shape[1:])
+    natural = [(3, zero), (4, zero)]  # derivatives at both ends
     return scipy.interpolate.make_interp_spline(t, values, k=5, bc_type=(natural, natural))
 
 
 def check_times(t_s: Array, *, fewest: int, of: str) -> None:
-    """Raise MotionError where times (N,) are too few, not finite or not rising; `of` names what is at them."""
+    """Raise MotionError for times (N,) that are too few, not finite or not increasing; `of` is what they belong to."""
     if len(t_s) < fewest:
-        raise MotionError(
-            f"a spline needs {fewest} {of}s or more, but there {'is' if len(t_s) == 1 else 'are'} {len(t_s)}"
-        )
-    if not np.isfinite(t_s).all():
-        bad = int(np.flatnonzero(~np.isfinite(t_s))[0])
-        raise MotionError(f"the time of {of} {bad} is {t_s[bad]:g}; it should be finite")
+        count = "is 1" if len(t_s) == 1 else f"are {len(t_s)}"
+        raise MotionError(f"a spline needs {fewest} {of}s or more, but there {count}")
+    bad = np.flatnonzero(~np.isfinite(t_s))
+    if bad.size:
+        k = int(bad[0])
+        raise MotionError(f"the time of {of} {k} is {t_s[k]:g}; it should be finite")
     late = np.flatnonzero(np.diff(t_s) <= 0)
     if late.size:
         k = int(late[0])
-        how = "the same time as" if t_s[k + 1] == t_s[k] else "earlier than"
+        relation = "the same time as" if t_s[k + 1] == t_s[k] else "earlier than"
         raise MotionError(
-            f"{of} {k + 1} is at {t_s[k + 1]:.12g} s, {how} {of} {k} at {t_s[k]:.12g} s; times should rise"
+            f"{of} {k + 1} is at {t_s[k + 1]:.12g} s, {relation} {of} {k} at {t_s[k]:.12g} s; times should increase"
         )
 
 
 def _check_poses(t_s: Array, T: Array) -> None:
+    """Raise MotionError for poses that a spline cannot go through."""
     if T.shape != (len(t_s), 4, 4):
         raise MotionError(f"{len(t_s)} times need as many poses of 4 by 4, but they have the shape {T.shape}")
     check_times(t_s, fewest=FEWEST, of="pose")
@@ -221,23 +244,25 @@ def _check_poses(t_s: Array, T: Array) -> None:
         if not np.isfinite(pose).all():
             raise MotionError(f"pose {k} at {t_s[k]:.12g} s is not finite")
         if not se3.is_rotation(pose[:3, :3]):
-            raise MotionError(f"the rotation of pose {k} at {t_s[k]:.12g} s is none; it should be orthonormal")
+            raise MotionError(f"the rotation of pose {k} at {t_s[k]:.12g} s is invalid; it should be orthonormal")
     R = T[:, :3, :3]
-    turned = se3.rotation_angle(np.swapaxes(R[:-1], -1, -2) @ R[1:])
-    wide = np.flatnonzero(turned > WIDEST_TURN_RAD)
+    turns_rad = se3.rotation_angle(se3.transposed(R[:-1]) @ R[1:])
+    wide = np.flatnonzero(turns_rad > WIDEST_TURN_RAD)
     if wide.size:
         k = int(wide[0])
         raise MotionError(
-            f"pose {k + 1} is turned by {np.rad2deg(turned[k]):.0f} deg against the one before, "
-            "which could be either way round; set a pose between them"
+            f"pose {k + 1} is turned by {np.rad2deg(turns_rad[k]):.0f} deg from the one before, "
+            "which could be in either direction; add a pose between them"
         )
 
 
 def _eased(t_s: Array, ease_s: float) -> TimeLaw:
-    lasts_s = t_s[-1] - t_s[0]
-    if not 0 < ease_s <= lasts_s:
-        raise MotionError(f"ease_s is {ease_s:g}; it should be from 0 to the {lasts_s:g} s that the poses last")
-    progress = rest_to_rest(lasts_s, speed=1.0, acceleration=15 / 8 / ease_s).progress
-    c = progress.c.copy()
-    c[-1] += t_s[0]
-    return TimeLaw(scipy.interpolate.PPoly(c, progress.x + t_s[0]))
+    """The law from the first to the last of times (N,), from rest to rest. Raises MotionError for `ease_s`."""
+    duration_s = t_s[-1] - t_s[0]
+    if not 0 < ease_s <= duration_s:
+        raise MotionError(f"ease_s is {ease_s:g}; it should be from 0 to the {duration_s:g} s that the poses last")
+    acceleration = 15 / 8 / ease_s
+    progress = rest_to_rest(duration_s, speed=1.0, acceleration=acceleration).progress
+    coefficients = progress.c.copy()
+    coefficients[-1] += t_s[0]
+    return TimeLaw(scipy.interpolate.PPoly(coefficients, progress.x + t_s[0]))

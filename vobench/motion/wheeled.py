@@ -1,4 +1,4 @@
-"""What every trajectory on wheels says: who goes, from where, over what floor, how it is driven; wheel encoders."""
+"""Settings of all trajectories on wheels: the robot, its start, the floor, the control; and wheel encoders."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -28,16 +28,29 @@ Rate = Annotated[float, Gt(0), Le(1000)]
 Pause = Annotated[float, Ge(0), Le(3600)]
 
 Mover = Literal["pioneer", "unicycle", "ackermann"]
-# Which keys are of some movers only; a kind of trajectory may leave out more.
+# The keys of single movers; a kind of trajectory may leave out more.
 PIONEER_KEYS = (
-    *("robot", "motors", "robot_spread", "controller", "max_accel_mps2", "max_turn_accel_radps2"),
-    *("slip", "floor", "delta", "integrator", "substeps"),
+    "robot",
+    "motors",
+    "robot_spread",
+    "controller",
+    "max_accel_mps2",
+    "max_turn_accel_radps2",
+    "slip",
+    "floor",
+    "delta",
+    "integrator",
+    "substeps",
 )
-MOVER_KEYS: dict[Mover, tuple[str, ...]] = {"pioneer": PIONEER_KEYS, "unicycle": (), "ackermann": ("car",)}
-# Where the Pioneer is told its speeds beforehand, no controller leads it.
+MOVER_KEYS: dict[Mover, tuple[str, ...]] = {
+    "pioneer": PIONEER_KEYS,
+    "unicycle": (),
+    "ackermann": ("car",),
+}
+# A Pioneer whose speeds are given beforehand has no controller.
 UNLED_KEYS = tuple(key for key in PIONEER_KEYS if key != "controller")
-# The wheels of each car that turn without being steered. The large one's are a Passat's (205/55 R16); those of
-# the small one, and how finely both count, are engineering choices.
+# The wheels of each car that are not steered. The large car's are those of a Passat (205/55 R16); those of the small
+# one, and the resolution of both encoders, are engineering choices.
 CAR_WHEELS = {
     "kitti_like": WheelGeometry(radius_m=0.316, track_m=1.55, ticks_per_revolution=4096),
     "small_robot": WheelGeometry(radius_m=0.05, track_m=0.25, ticks_per_revolution=4096),
@@ -46,7 +59,7 @@ CAR_WHEELS = {
 
 @settings()
 class Wheeled:
-    """A robot on the floor, and how it is driven; `mover` says which of the keys belong here."""
+    """A robot on the floor and its control; `mover` determines which of the keys apply."""
 
     mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = MOVER_KEYS
 
@@ -79,17 +92,19 @@ class Wheeled:
 
     @property
     def T_world_start(self) -> Array:
-        """The pose (4, 4) at first."""
-        T_world_start: Array = level(*(np.array([value], float) for value in self.start))[0]
+        """The pose (4, 4) at the start."""
+        x_m, y_m, heading_rad = np.array(self.start, float)[:, None]
+        T_world_start: Array = level(x_m, y_m, heading_rad)[0]
         return T_world_start
 
     @property
     def wheels(self) -> WheelGeometry:
-        """The wheels that turn without being steered, as an odometer believes them."""
+        """The nominal geometry of the wheels that are not steered."""
         if self.mover == "ackermann":
             return CAR_WHEELS[self.car]
-        motors = self.motors
-        return replace(PIONEER_WHEELS, radius_m=motors.r_m, track_m=motors.d_m) if motors else PIONEER_WHEELS
+        if self.motors:
+            return replace(PIONEER_WHEELS, radius_m=self.motors.r_m, track_m=self.motors.d_m)
+        return PIONEER_WHEELS
 
     @property
     def theta(self) -> Theta:
@@ -98,8 +113,10 @@ class Wheeled:
 
     @property
     def limits(self) -> AccelerationLimits:
-        """What the drive train can give."""
-        return AccelerationLimits(self.max_accel_mps2 or inf, self.max_turn_accel_radps2 or inf)
+        """The limits of the drive train."""
+        speed_mps2 = self.max_accel_mps2 or inf
+        turn_radps2 = self.max_turn_accel_radps2 or inf
+        return AccelerationLimits(speed_mps2, turn_radps2)
 
 
 Fraction = Annotated[float, Ge(-0.2), Le(0.2)]
@@ -107,10 +124,10 @@ Fraction = Annotated[float, Ge(-0.2), Le(0.2)]
 
 @settings()
 class EncoderErrors:
-    """How the true wheels differ from the nominal ones, relative: true = nominal (1 + error).
+    """The relative errors of the nominal wheels: true = nominal (1 + error).
 
-    They are truth about the robot; the odometer goes on with the nominal geometry. So a larger left
-    wheel turns less and the estimate bends left, and a larger track overstates every turn.
+    The robot has the true wheels, the odometry uses the nominal geometry. So a larger left wheel turns less
+    and the estimate bends left, and with a larger track every turn is overestimated.
     Source: Borenstein and Feng (1996), who name these as the two dominant systematic errors.
     """
 
@@ -119,23 +136,33 @@ class EncoderErrors:
     track: Fraction = 0.0
 
 
-ENCODERS = {"exact": EncoderErrors(), "nominal": EncoderErrors(radius_left=0.0015, radius_right=-0.0015, track=0.005)}
+ENCODERS = {
+    "exact": EncoderErrors(),
+    "nominal": EncoderErrors(radius_left=0.0015, radius_right=-0.0015, track=0.005),
+}
 
 
 def true_rims(rim_rad: Array, errors: EncoderErrors) -> Array:
     """Angles (M, 2) of the true wheels on a motion that turns nominal wheels by rim_rad (M, 2), left and right.
 
-    The track changes what each wheel must travel in a turn: half the difference of the two. The
-    radius changes how far a wheel turns for its travel. Exact without slip; with slip, short by
+    The track changes the distance that each wheel travels in a turn: half the difference of the two. The
+    radius changes how far a wheel turns over its distance. This is exact without slip; with slip, it misses
     the product of slip ratio and track error, some 1e-5.
     """
+    left_rad, right_rad = rim_rad.T
     mean = rim_rad.mean(1)
-    half_turn = (rim_rad[:, 1] - rim_rad[:, 0]) / 2 * (1 + errors.track)
+    half_turn = (right_rad - left_rad) / 2 * (1 + errors.track)
     left = (mean - half_turn) / (1 + errors.radius_left)
     right = (mean + half_turn) / (1 + errors.radius_right)
     return np.stack([left, right], -1)
 
 
-def ticks(rim_rad: Array, wheels: WheelGeometry, errors: EncoderErrors = ENCODERS["exact"]) -> NDArray[np.int64]:
+def ticks(
+    rim_rad: Array,
+    wheels: WheelGeometry,
+    errors: EncoderErrors = ENCODERS["exact"],
+) -> NDArray[np.int64]:
     """Counts (M, 2) since angle zero, left and right: whole ticks passed, rounded down also when rolling back."""
-    return np.floor(true_rims(rim_rad, errors) * wheels.ticks_per_revolution / (2 * np.pi)).astype(np.int64)
+    rims_rad = true_rims(rim_rad, errors)
+    exact_ticks = rims_rad * wheels.ticks_per_revolution / (2 * np.pi)
+    return np.floor(exact_ticks).astype(np.int64)

@@ -1,4 +1,4 @@
-"""The motion (and scale) that lays an estimate over the ground truth, and what of it the data can't tell."""
+"""Alignment of an estimate with the ground truth, and the parts of it that the data do not determine."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from vobench.geometry.se3 import Array
 
 Kind = Literal["none", "origin", "se3", "sim3", "scale", "yaw"]
 
-# A path that leaves its line, or moves against the other, by less than this share of its extent
-# shows rounding and not shape. Taking it for a line moves no point by more than this share.
+# A deviation from a line, or a motion relative to the other path, below this share of the extent is
+# rounding. Treating the path as a line moves no point by more than this share.
 NEGLIGIBLE = 1e-6
-ROUNDING = 1e-14  # what a mean over equal float64 coordinates may be off, relative to them
+ROUNDING = 1e-14  # relative error of a mean over equal float64 coordinates
 UNCORRELATED = 1e-12  # a normalised covariance this small is rounding
-# A path that leaves its line by less than this share of its extent is nearly straight. Its roll counts as
-# seen where the sides agree so well about it that chance leaves it uncertain by less than nine degrees.
+# A path that deviates from a line by less than this share of its extent is nearly straight. Its roll is
+# observable if the lateral motions correlate so well that its standard deviation is below nine degrees.
 NEARLY_STRAIGHT = 1e-2
 MAX_ROLL_STD_RAD = 0.15
 IDENTITY = np.eye(3)
@@ -35,10 +35,35 @@ class _Shape(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class _Centred:
+    """Matched positions (K, 3) in m minus their means; `rounding_m` is the resolution of their coordinates."""
+
+    est: Array
+    gt: Array
+    est_mean: Array
+    gt_mean: Array
+    rounding_m: float
+
+    @classmethod
+    def of_positions(cls, est_m: Array, gt_m: Array) -> "_Centred":
+        """Positions (K, 3), centred."""
+        est_mean = est_m.mean(axis=0)
+        gt_mean = gt_m.mean(axis=0)
+        largest_m = max(np.abs(est_mean).max(), np.abs(gt_mean).max())
+        return cls(
+            est=est_m - est_mean,
+            gt=gt_m - gt_mean,
+            est_mean=est_mean,
+            gt_mean=gt_mean,
+            rounding_m=ROUNDING * float(largest_m),
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Alignment:
     """x_gt = scale · rotation @ x_est + translation, with rotation (3, 3) and translation (3,) in metres.
 
-    `unobservable` names what the positions leave open: "rotation", "roll about the path", "scale".
+    `unobservable` names what the positions do not determine: "rotation", "roll about the path", "scale".
     """
 
     kind: Kind
@@ -58,24 +83,37 @@ class Alignment:
         }
 
     @classmethod
-    def from_dict(cls, stated: Mapping[str, Any]) -> "Alignment":
+    def from_dict(cls, values: Mapping[str, Any]) -> "Alignment":
         """The alignment that `as_dict` wrote."""
-        arrays = {key: np.array(stated[key]) for key in ("rotation", "translation")}
-        return cls(**{**stated, **arrays, "unobservable": tuple(stated["unobservable"])})
+        return cls(
+            kind=values["kind"],
+            rotation=np.array(values["rotation"]),
+            translation=np.array(values["translation"]),
+            scale=values["scale"],
+            unobservable=tuple(values["unobservable"]),
+        )
 
     def apply(self, T_est: Array) -> Array:
-        """Poses (..., 4, 4) of the estimate, moved: positions are scaled, orientations only turned."""
-        positions = self.scale * T_est[..., :3, 3] @ self.rotation.T + self.translation
-        return se3.transform(self.rotation @ T_est[..., :3, :3], positions)
+        """Aligned poses (..., 4, 4) of the estimate: positions are scaled, orientations only rotated."""
+        scaled_m = self.scale * T_est[..., :3, 3]
+        positions_m = scaled_m @ self.rotation.T + self.translation
+        R = self.rotation @ T_est[..., :3, :3]
+        return se3.transform(R, positions_m)
 
 
-def align(T_est: Array, T_gt: Array, *, kind: Kind, first_n: int | None = None) -> Alignment:
+def align(
+    T_est: Array,
+    T_gt: Array,
+    *,
+    kind: Kind,
+    first_n: int | None = None,
+) -> Alignment:
     """Alignment of matched poses (K, 4, 4), fitted to the first `first_n` of them, or to all.
 
-    se3, sim3, yaw (a turn about z) and scale (sim3's, without its motion) fit the positions, origin the
-    first pose. A rotation that the positions leave open is taken as near as they allow to the one that
-    lays the first orientation over the truth's, so that no score hangs on the estimate's own frame.
-    Raises AlignmentError without pairs, or where positions are too large to square.
+    se3, sim3, yaw (a rotation about z) and scale (sim3's, without its motion) fit the positions, origin the
+    first pose. If the positions do not determine the rotation, it is as near as possible to the one that aligns
+    the first orientations, so that no score depends on the estimate's own frame.
+    Raises AlignmentError without pairs, or for positions too large to square.
     """
     if kind == "none":
         return Alignment(kind, IDENTITY, np.zeros(3), 1.0, ())
@@ -83,145 +121,195 @@ def align(T_est: Array, T_gt: Array, *, kind: Kind, first_n: int | None = None) 
     T_gt = T_gt[:first_n]
     _require_pairs(T_est, T_gt)
     T_origin = T_gt[0] @ se3.inverse(T_est[0])
+    R_origin = T_origin[:3, :3]
     if kind == "origin":
-        return Alignment(kind, T_origin[:3, :3], T_origin[:3, 3], 1.0, ())
+        return Alignment(kind, R_origin, T_origin[:3, 3], 1.0, ())
     est_m = T_est[:, :3, 3]
     gt_m = T_gt[:, :3, 3]
-    toward = T_origin[:3, :3]
     if kind == "yaw":
-        return align_yaw(est_m, gt_m, toward=toward)
-    fit = align_positions(est_m, gt_m, kind=kind, toward=toward)
+        return align_yaw(est_m, gt_m, toward=R_origin)
+    fit = align_positions(est_m, gt_m, kind=kind, toward=R_origin)
     if kind == "scale":
-        left_open = tuple(name for name in fit.unobservable if name == "scale")
-        return Alignment(kind, IDENTITY, np.zeros(3), fit.scale, left_open)
+        unobservable = tuple(name for name in fit.unobservable if name == "scale")
+        return Alignment(kind, IDENTITY, np.zeros(3), fit.scale, unobservable)
     return fit
 
 
 def align_positions(
-    est_m: Array, gt_m: Array, *, kind: Literal["se3", "sim3", "scale"], toward: Array = IDENTITY
+    est_m: Array,
+    gt_m: Array,
+    *,
+    kind: Literal["se3", "sim3", "scale"],
+    toward: Array = IDENTITY,
 ) -> Alignment:
     """Least-squares alignment of positions (K, 3); of equally good rotations the one nearest to `toward`.
 
-    Where either side stands still the rotation is `toward` and the scale 1, so that what is left is
-    the spread about the mean. On a line it is the smallest turn from `toward` that lays direction
-    on direction. Raises AlignmentError as `align`. Source: Umeyama (1991), eqs. 34-43.
+    If either side is stationary the rotation is `toward` and the scale 1, so that the errors are the
+    spread about the mean. On a line it is the smallest rotation from `toward` that aligns the directions.
+    Raises AlignmentError as `align`. Source: Umeyama (1991), eqs. 34-43.
     """
     _require_pairs(est_m, gt_m)
-    est_mean = est_m.mean(axis=0)
-    gt_mean = gt_m.mean(axis=0)
-    x = est_m - est_mean
-    y = gt_m - gt_mean
-    covariance = _covariance(y, x)
-    shape = _shape(x, y, rounding_m=ROUNDING * float(max(np.abs(est_mean).max(), np.abs(gt_mean).max())))
-    is_turned_anyhow = kind == "scale" and shape is _Shape.LINE  # the scale alone needs no roll that is true
-    rotation = _rotation(covariance, _Shape.FULL if is_turned_anyhow else shape, toward)
-    known_scale = kind == "se3" or shape is _Shape.POINT
-    scale = 1.0 if known_scale else float(np.sum(rotation * covariance) / np.mean(np.sum(x * x, axis=1)))
-    unobservable = {
-        _Shape.POINT: ("rotation",) if kind == "se3" else ("rotation", "scale"),
-        _Shape.LINE: ("roll about the path",),
-        _Shape.FULL: (),
-    }[shape]
-    return Alignment(kind, rotation, gt_mean - scale * rotation @ est_mean, scale, unobservable)
+    centred = _Centred.of_positions(est_m, gt_m)
+    shape = _shape(centred)
+    # The scale alone does not need the true roll.
+    is_rotation_free = kind == "scale" and shape is _Shape.LINE
+    covariance = _covariance(centred.gt, centred.est)
+    rotation = _rotation(covariance, _Shape.FULL if is_rotation_free else shape, toward)
+
+    scale = 1.0
+    if kind != "se3" and shape is not _Shape.POINT:
+        correlation = np.sum(rotation * covariance)
+        variance = np.mean(np.sum(centred.est * centred.est, axis=1))
+        scale = float(correlation / variance)
+    translation = centred.gt_mean - scale * rotation @ centred.est_mean
+    return Alignment(kind, rotation, translation, scale, _unobservable(shape, kind))
 
 
-def align_yaw(est_m: Array, gt_m: Array, *, toward: Array = IDENTITY) -> Alignment:
-    """Least-squares turn about z and translation of positions (K, 3), for worlds that know the vertical.
+def _unobservable(shape: _Shape, kind: Kind) -> tuple[str, ...]:
+    """The parts of an alignment that paths of a shape do not determine."""
+    if shape is _Shape.FULL:
+        return ()
+    if shape is _Shape.LINE:
+        return ("roll about the path",)
+    return ("rotation",) if kind == "se3" else ("rotation", "scale")
 
-    Where the level motion leaves the yaw open, that of `toward` is taken. Raises AlignmentError as `align`.
+
+def _yaw_direction(M: Array) -> tuple[float, float]:
+    """Cosine and sine, times a common factor, of the yaw that best explains a matrix (2 or 3, 2 or 3)."""
+    cosine = M[0, 0] + M[1, 1]
+    sine = M[1, 0] - M[0, 1]
+    return cosine, sine
+
+
+def align_yaw(
+    est_m: Array,
+    gt_m: Array,
+    *,
+    toward: Array = IDENTITY,
+) -> Alignment:
+    """Least-squares rotation about z and translation of positions (K, 3), for worlds with a known vertical.
+
+    If the horizontal motion does not determine the yaw, it is that of `toward`. Raises AlignmentError as `align`.
     Source: Zhang and Scaramuzza (2018), section III-C.
     """
     _require_pairs(est_m, gt_m)
-    est_mean = est_m.mean(axis=0)
-    gt_mean = gt_m.mean(axis=0)
-    x = est_m - est_mean
-    y = gt_m - gt_mean
-    covariance = _covariance(y, x)[:2, :2]
-    turning = np.array([covariance[0, 0] + covariance[1, 1], covariance[1, 0] - covariance[0, 1]])
-    extents = np.sqrt([np.trace(_covariance(path, path)) for path in (x[:, :2], y[:, :2])])
-    rounding_m = ROUNDING * float(max(np.abs(est_mean).max(), np.abs(gt_mean).max()))
-    if (
-        extents.min() <= max(NEGLIGIBLE * extents.max(), rounding_m)
-        or np.hypot(*turning) <= UNCORRELATED * extents.prod()
-    ):
-        turning = np.array([toward[0, 0] + toward[1, 1], toward[1, 0] - toward[0, 1]])
-        left_open: tuple[str, ...] = ("yaw",)
-    else:
-        left_open = ()
-    rotation = se3.rotation_z(np.arctan2(turning[1], turning[0]))
-    return Alignment("yaw", rotation, gt_mean - rotation @ est_mean, 1.0, left_open)
+    centred = _Centred.of_positions(est_m, gt_m)
+    covariance = _covariance(centred.gt, centred.est)[:2, :2]
+    cosine, sine = _yaw_direction(covariance)
+    extents = np.array([_extent(centred.est[:, :2]), _extent(centred.gt[:, :2])])
+    is_stationary = _is_stationary(extents, centred.rounding_m)
+    is_uncorrelated = np.hypot(cosine, sine) <= UNCORRELATED * extents.prod()
+
+    unobservable: tuple[str, ...] = ()
+    if is_stationary or is_uncorrelated:
+        cosine, sine = _yaw_direction(toward)
+        unobservable = ("yaw",)
+    rotation = se3.rotation_z(np.arctan2(sine, cosine))
+    translation = centred.gt_mean - rotation @ centred.est_mean
+    return Alignment("yaw", rotation, translation, 1.0, unobservable)
 
 
 def turn(from_direction: ArrayLike, to_direction: ArrayLike) -> Array:
-    """The smallest rotation (3, 3) that takes one direction (3,) onto another; Rodrigues' formula.
+    """The smallest rotation (3, 3) from one direction (3,) to another, by Rodrigues' formula.
 
-    Of opposite directions it turns about the axis across them that is nearest to a coordinate axis.
+    Between opposite directions it turns about the perpendicular axis that is nearest to a coordinate axis.
     """
-    a, b = (np.asarray(v, float) / np.linalg.norm(v) for v in (from_direction, to_direction))
+    a = np.asarray(from_direction, float) / np.linalg.norm(from_direction)
+    b = np.asarray(to_direction, float) / np.linalg.norm(to_direction)
     axis = np.cross(a, b)
+    angle = np.arctan2(np.linalg.norm(axis), a @ b)
     if np.linalg.norm(axis) < UNCORRELATED:
         axis = IDENTITY[np.argmin(np.abs(a))]
     axis = axis - (axis @ a) * a
     K = np.cross(IDENTITY, axis / np.linalg.norm(axis))
-    angle = np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)
-    rotation: Array = IDENTITY + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+    versine = 1 - np.cos(angle)
+    rotation: Array = IDENTITY + np.sin(angle) * K + versine * K @ K
     return rotation
 
 
 def _rotation(covariance: Array, shape: _Shape, toward: Array) -> Array:
+    """The rotation that maximises the correlation of two paths of a shape."""
     if shape is _Shape.POINT:
         return toward
     U, _, Vt = np.linalg.svd(covariance)
     if shape is _Shape.LINE:
-        return turn(toward @ Vt[0], U[:, 0]) @ toward
-    handed = np.array([1.0, 1.0, np.sign(np.linalg.det(U) * np.linalg.det(Vt))])
-    rotation: Array = (U * handed) @ Vt
+        est_direction = toward @ Vt[0]
+        gt_direction = U[:, 0]
+        return turn(est_direction, gt_direction) @ toward
+    handedness = np.sign(np.linalg.det(U) * np.linalg.det(Vt))
+    rotation: Array = (U * np.array([1.0, 1.0, handedness])) @ Vt
     return rotation
 
 
-def _shape(x: Array, y: Array, *, rounding_m: float) -> _Shape:
-    """What two centred paths (K, 3) determine together; `rounding_m` is what their coordinates can't resolve."""
-    extents = np.sqrt([np.trace(_covariance(path, path)) for path in (x, y)])
-    if extents.min() <= max(NEGLIGIBLE * extents.max(), rounding_m):
+def _shape(centred: _Centred) -> _Shape:
+    """What two matched paths determine together."""
+    extents = np.array([_extent(centred.est), _extent(centred.gt)])
+    if _is_stationary(extents, centred.rounding_m):
         return _Shape.POINT
-    common = np.linalg.svd(_covariance(y, x) / extents.prod(), compute_uv=False)
-    if common[0] <= UNCORRELATED:
+    covariance = _covariance(centred.gt, centred.est)
+    correlations = np.linalg.svd(covariance / extents.prod(), compute_uv=False)
+    if correlations[0] <= UNCORRELATED:
         return _Shape.POINT
-    if common[1] <= UNCORRELATED * common[0] or _is_line(x) or _is_line(y) or _is_noise(x, y):
+    is_common_line = correlations[1] <= UNCORRELATED * correlations[0]
+    is_line = is_common_line or _is_line(centred.est) or _is_line(centred.gt)
+    if is_line or _is_roll_uncertain(centred.est, centred.gt):
         return _Shape.LINE
     return _Shape.FULL
 
 
-def _is_line(x: Array) -> bool:
-    spread = np.linalg.eigvalsh(_covariance(x, x))
-    return bool(spread[1] <= NEGLIGIBLE**2 * spread[2])
+def _extent(path: Array) -> float:
+    """The root mean square distance in m of a centred path (K, n) from its mean."""
+    return float(np.sqrt(np.trace(_covariance(path, path))))
 
 
-def _is_noise(x: Array, y: Array) -> bool:
-    """Whether two paths (K, 3), one nearly straight, leave their lines in ways too unlike to tell the roll.
+def _is_stationary(extents: Array, rounding_m: float) -> bool:
+    """Whether either of two paths, with their extents (2,) in m, moves no more than rounding."""
+    smallest_m = max(NEGLIGIBLE * extents.max(), rounding_m)
+    return bool(extents.min() <= smallest_m)
 
-    After the best roll, sideways motions with correlation r leave it uncertain by √((1 - r²) / (r² n)).
+
+def _is_line(path: Array) -> bool:
+    """Whether a centred path (K, 3) is straight to rounding."""
+    variances = np.linalg.eigvalsh(_covariance(path, path))
+    return bool(variances[1] <= NEGLIGIBLE**2 * variances[2])
+
+
+def _is_roll_uncertain(x: Array, y: Array) -> bool:
+    """Whether the lateral motions of two centred paths (K, 3), one nearly straight, correlate too little for the roll.
+
+    After the best roll, lateral motions with correlation r leave it uncertain by √((1 - r²) / (r² n)).
     """
-    (x_spread, x_axes), (y_spread, y_axes) = (np.linalg.eigh(_covariance(path, path)) for path in (x, y))
-    if min(x_spread[1] / x_spread[2], y_spread[1] / y_spread[2]) > NEARLY_STRAIGHT**2:
+    x_variances, x_axes = np.linalg.eigh(_covariance(x, x))
+    y_variances, y_axes = np.linalg.eigh(_covariance(y, y))
+    x_straightness = x_variances[1] / x_variances[2]
+    y_straightness = y_variances[1] / y_variances[2]
+    if min(x_straightness, y_straightness) > NEARLY_STRAIGHT**2:
         return False
-    a = (x @ x_axes[:, :2]) @ [1, 1j]
-    b = (y @ y_axes[:, :2]) @ [1, 1j]
-    power = float(np.linalg.norm(a) * np.linalg.norm(b))
-    r = min(max(abs(np.vdot(a, b)), abs(np.vdot(a, b.conj()))) / power, 1.0)
-    free = max(2 * len(x) - 5, 1)  # numbers measured, less two means, a roll, and a direction's two
-    return bool(1 - r**2 > r**2 * free * MAX_ROLL_STD_RAD**2)
+
+    # The lateral motions as complex numbers: a roll is a factor, a reflection a conjugate.
+    x_lateral = (x @ x_axes[:, :2]) @ [1, 1j]
+    y_lateral = (y @ y_axes[:, :2]) @ [1, 1j]
+    power = float(np.linalg.norm(x_lateral) * np.linalg.norm(y_lateral))
+    rotated = abs(np.vdot(x_lateral, y_lateral))
+    reflected = abs(np.vdot(x_lateral, y_lateral.conj()))
+    r = min(max(rotated, reflected) / power, 1.0)
+
+    # The measured numbers minus those fitted: two means, a roll, and two angles of a direction.
+    degrees_of_freedom = max(2 * len(x) - 5, 1)
+    return bool(1 - r**2 > r**2 * degrees_of_freedom * MAX_ROLL_STD_RAD**2)
 
 
 def _covariance(y: Array, x: Array) -> Array:
+    """The covariance (n, n) of two centred paths (K, n). Raises AlignmentError if it overflows."""
     with np.errstate(over="ignore", invalid="ignore"):
         covariance: Array = y.T @ x / len(x)
     if not np.isfinite(covariance).all():
-        largest = max(np.abs(x).max(), np.abs(y).max())
-        raise AlignmentError(f"positions should be finite and below 1e150 m to be aligned, but reach {largest:.3g} m")
+        largest_m = max(np.abs(x).max(), np.abs(y).max())
+        raise AlignmentError(f"positions should be finite and below 1e150 m to be aligned, but reach {largest_m:.3g} m")
     return covariance
 
 
 def _require_pairs(est: Array, gt: Array) -> None:
+    """Raise AlignmentError unless there are as many estimated as true poses, and one or more."""
     if est.shape != gt.shape or not len(est):
         raise AlignmentError(f"alignment needs one or more matched poses, got {len(est)} estimated and {len(gt)} true")

@@ -1,4 +1,4 @@
-"""Trajectory files: TUM, KITTI, EuRoC, TartanAir, told apart by their content."""
+"""Trajectory files in the formats of TUM, KITTI, EuRoC and TartanAir, recognised by their content."""
 
 import re
 from collections.abc import Sequence
@@ -18,11 +18,13 @@ Rows = NDArray[np.intp]
 Unit = Literal["s", "ms", "us", "ns"]
 Order = Literal["xyzw", "wxyz"]  # of a quaternion's four numbers
 
-NORM_TOLERANCE = 1e-3  # 4 printed digits leave a norm off by 1e-4; a file in other units or order by far more
+NORM_TOLERANCE = 1e-3  # 4 printed digits change a norm by 1e-4; other units or another order by far more
 DIGITS: dict[Unit, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}  # decimals down to the nanosecond
 WORDS: dict[Unit, str] = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 MAX_NS = 2**63 - 1
-SCALAR_FIRST = [1, 2, 3, 0]  # where x, y, z, w stand among w, x, y, z
+NS_PER_S = 10**9
+SCALAR_LAST = [1, 2, 3, 0]  # the places of x, y, z, w among w, x, y, z
+SCALAR_FIRST = [3, 0, 1, 2]  # the places of w, x, y, z among x, y, z, w
 # Stricter than float(), which also takes 1_000, nan, infinity and the digits of other scripts.
 NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 PLAIN = re.compile(r"([0-9]{1,9}|[0-8][0-9]{9})\.([0-9]{1,9})")  # seconds as nearly every file has them, below MAX_NS
@@ -32,7 +34,7 @@ EXACT = Context(prec=64, rounding=ROUND_HALF_EVEN)  # digits of seconds; int64 n
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """The numbers of a text, (N, columns), with each row's line number and its first field as it stands."""
+    """The numbers of a text, (N, columns), with the line number and the text of the first field of each row."""
 
     name: str
     lines: Sequence[int]
@@ -45,9 +47,14 @@ class Table:
 
 
 def content(text: str) -> list[tuple[int, str]]:
-    """Line numbers and lines that say something: no byte order mark, comments, blank lines or CR."""
-    lines = enumerate(text.removeprefix("\ufeff").split("\n"), 1)
-    return [(number, body) for number, line in lines if (body := line.partition("#")[0].strip())]
+    """Line numbers and lines with content: no byte order mark, comments, blank lines or CR."""
+    rows = []
+    lines = text.removeprefix("\ufeff").split("\n")
+    for number, line in enumerate(lines, 1):
+        body = line.partition("#")[0].strip()
+        if body:
+            rows.append((number, body))
+    return rows
 
 
 def read_table(
@@ -61,14 +68,15 @@ def read_table(
     """The numbers of `content`, one per column and line; with a `separator` more columns may follow.
 
     `row` is what a line stands for, for the error message.
-    Raises TrajectoryError naming file, line and value for what is no finite number.
+    Raises TrajectoryError with file, line and value for a field that is not a finite number.
     """
+    numbers = [number for number, _ in rows]
     bodies = [body for _, body in rows]
+    first = [body.split(separator, 1)[0].strip() for body in bodies]
     values = _read_fast(bodies, len(columns), separator)
     if values is None:
         values = _read_checked(rows, name, columns, separator, row)
-    first = [body.split(separator, 1)[0].strip() for body in bodies]
-    return Table(name, [number for number, _ in rows], first, values)
+    return Table(name, numbers, first, values)
 
 
 def stamps_ns(table: Table, unit: Unit) -> Stamps:
@@ -79,71 +87,98 @@ def stamps_ns(table: Table, unit: Unit) -> Stamps:
 
 
 def first_of_equal(table: Table, numbers: Stamps, what: str) -> tuple[Stamps, Rows, tuple[str, ...]]:
-    """Of the rows' numbers (N,), such as stamps, the first of those that repeat, their rows (K,), and a note of others.
+    """The rows' numbers (N,), such as stamps, without repetitions; their rows (K,); and a note of those left out.
 
-    Raises TrajectoryError where numbers go back.
+    Raises TrajectoryError for decreasing numbers.
     """
     _require_rising(table, numbers, f"{what}s must increase", least=0)
     rows = np.flatnonzero(np.diff(numbers, prepend=numbers[:1] - 1))
-    again = np.flatnonzero(np.diff(numbers) == 0) + 1
-    if not again.size:
+    repeated = np.flatnonzero(np.diff(numbers) == 0) + 1
+    if not repeated.size:
         return numbers, rows, ()
-    place = f"the first at {table.place(again[0])}"
-    note = f"rows that repeat the {what} of the row before were left out: {again.size} of {len(numbers)}, {place}"
+    place = table.place(repeated[0])
+    note = (
+        f"rows that repeat the {what} of the row before were left out: {repeated.size} of {len(numbers)}, "
+        f"the first at {place}"
+    )
     return numbers[rows], rows, (note,)
 
 
 def rotations(table: Table, q: Array, order: Order) -> Array:
-    """Rotations (N, 3, 3) of the rows' quaternions (N, 4). Raises TrajectoryError where a norm is not 1."""
+    """Rotations (N, 3, 3) of the rows' quaternions (N, 4). Raises TrajectoryError for a norm other than 1."""
     with np.errstate(over="ignore"):
         norm = np.linalg.norm(q, axis=1)
     bad = np.flatnonzero(np.abs(norm - 1) > NORM_TOLERANCE)
     if bad.size:
-        stated = ", ".join(f"{value:g}" for value in q[bad[0]])
+        row = bad[0]
+        values = ", ".join(f"{value:g}" for value in q[row])
         raise TrajectoryError(
-            f"{table.place(bad[0])}: the quaternion's norm should be 1 within {NORM_TOLERANCE}, "
-            f"but ({stated}) has {norm[bad[0]]:.6g}"
+            f"{table.place(row)}: the quaternion's norm should be 1 within {NORM_TOLERANCE}, "
+            f"but ({values}) has {norm[row]:.6g}"
         )
-    unit = q / norm[:, None]
-    return se3.from_quaternion(unit[:, SCALAR_FIRST] if order == "wxyz" else unit)
+    q = q / norm[:, None]
+    if order == "wxyz":
+        q = q[:, SCALAR_LAST]
+    return se3.from_quaternion(q)
 
 
 def _all_ns(table: Table, unit: Unit) -> Stamps:
-    return np.array([_ns(text, unit, table, row) for row, text in enumerate(table.first)], np.int64)
+    """The first column in ns."""
+    stamps = [_ns(text, unit, table, row) for row, text in enumerate(table.first)]
+    return np.array(stamps, np.int64)
 
 
-def _require_rising(table: Table, numbers: Stamps, demand: str, *, least: int) -> None:
+def _require_rising(
+    table: Table,
+    numbers: Stamps,
+    demand: str,
+    *,
+    least: int,
+) -> None:
+    """Raise TrajectoryError for the first number that is not `least` or more above the one before."""
     late = np.flatnonzero(np.diff(numbers) < least)
     if late.size:
-        last, this = (table.first[late[0] + i] for i in (0, 1))
-        raise TrajectoryError(f"{table.place(late[0] + 1)}: {demand}, but {this} follows {last}")
+        row = late[0]
+        raise TrajectoryError(
+            f"{table.place(row + 1)}: {demand}, but {table.first[row + 1]} follows {table.first[row]}"
+        )
 
 
 def _read_fast(bodies: list[str], columns: int, separator: str | None) -> Array | None:
-    """What NumPy reads in one go, None where anything is odd and wants a sentence."""
+    """The numbers as NumPy reads them at once; None for text that needs a closer look."""
     if not bodies or not all(map(NUMERIC.fullmatch, bodies)):
         return None
+    used_columns = range(columns) if separator else None
     try:
-        wanted = range(columns) if separator else None
-        values = np.loadtxt(bodies, comments=None, delimiter=separator, usecols=wanted, ndmin=2)
+        values = np.loadtxt(bodies, comments=None, delimiter=separator, usecols=used_columns, ndmin=2)
     except ValueError:
         return None
-    return values if values.shape[1] == columns and np.isfinite(values).all() else None
+    is_valid = values.shape[1] == columns and np.isfinite(values).all()
+    return values if is_valid else None
 
 
 def _read_checked(
-    rows: Sequence[tuple[int, str]], name: str, columns: Sequence[str], separator: str | None, what: str
+    rows: Sequence[tuple[int, str]],
+    name: str,
+    columns: Sequence[str],
+    separator: str | None,
+    what: str,
 ) -> Array:
+    """The numbers field by field, with an error message for the first that is wrong."""
     values = np.empty((len(rows), len(columns)))
     for row, (number, body) in enumerate(rows):
         fields = [field.strip() for field in body.split(separator)]
-        end = " (the last row: was the file cut off?)" if row == len(rows) - 1 and row else ""
-        if len(fields) < len(columns) or (len(fields) > len(columns) and not separator):
+        is_short = len(fields) < len(columns)
+        is_long = len(fields) > len(columns) and not separator
+        if is_short or is_long:
+            is_last = row > 0 and row == len(rows) - 1
+            hint = " (the last row: was the file cut off?)" if is_last else ""
             raise TrajectoryError(
                 f"{name}:{number}: {what} has {len(columns)} columns ({' '.join(columns)}), "
-                f"this line has {len(fields)}{end}"
+                f"this line has {len(fields)}{hint}"
             )
-        values[row] = [_number(*pair, f"{name}:{number}") for pair in zip(fields, columns, strict=False)]
+        place = f"{name}:{number}"
+        values[row] = [_number(field, column, place) for field, column in zip(fields, columns, strict=False)]
     return values
 
 
@@ -156,52 +191,72 @@ def _number(field: str, column: str, place: str) -> float:
     return value
 
 
-def _ns(text: str, unit: Unit, table: Table, row: int) -> int:
+def _ns(
+    text: str,
+    unit: Unit,
+    table: Table,
+    row: int,
+) -> int:
+    """The stamp of a row in ns, rounded to even. Raises TrajectoryError beyond int64."""
     if unit == "s" and (plain := PLAIN.fullmatch(text)):
-        return int(plain[1]) * 10**9 + int(plain[2].ljust(9, "0"))
-    scaled = Decimal(text).scaleb(DIGITS[unit], EXACT)
-    if abs(scaled) > MAX_NS:
-        most = Decimal(MAX_NS).scaleb(-DIGITS[unit], EXACT)
+        whole_s = int(plain[1])
+        fraction_ns = int(plain[2].ljust(9, "0"))
+        return whole_s * NS_PER_S + fraction_ns
+    t_ns = Decimal(text).scaleb(DIGITS[unit], EXACT)
+    if abs(t_ns) > MAX_NS:
+        limit = Decimal(MAX_NS).scaleb(-DIGITS[unit], EXACT)
         raise TrajectoryError(
-            f"{table.place(row)}: t should be {WORDS[unit]} below {most}, but is {text} (is it in another unit?)"
+            f"{table.place(row)}: t should be {WORDS[unit]} below {limit}, but is {text} (is it in another unit?)"
         )
-    return int(scaled.to_integral_value(context=EXACT))
+    return int(t_ns.to_integral_value(context=EXACT))
 
 
 COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
-NS_PER_S = 10**9
 
 
 def parse_tum(text: str, *, name: str) -> Trajectory:
     """The trajectory in a TUM file's text; `name` is the file, for messages.
 
-    Comments (#), blank lines, tabs and CRLF pass. Digits beyond the nanosecond are rounded, ties to even.
-    Raises TrajectoryError naming file, line and value for what is not 8 finite numbers, for
+    Comments (#), blank lines, tabs and CRLF are accepted. Digits beyond the nanosecond are rounded, ties to even.
+    Raises TrajectoryError with file, line and value for a line other than 8 finite numbers, for
     quaternions whose norm is not 1, and for stamps that don't increase.
     """
     table = read_table(content(text), name=name, columns=COLUMNS)
     R = rotations(table, table.values[:, 4:], "xyzw")
-    return Trajectory(stamps_ns(table, "s"), se3.transform(R, table.values[:, 1:4]))
+    t_ns = stamps_ns(table, "s")
+    return Trajectory(t_ns, se3.transform(R, table.values[:, 1:4]))
 
 
 def format_tum(trajectory: Trajectory) -> str:
-    """TUM text: stamps with 9 decimals from the integers, values with every digit they have."""
+    """TUM text: stamps with 9 decimals, exact, and values with all their digits."""
     q_xyzw = se3.to_quaternion(trajectory.T_world_frame[:, :3, :3])
-    positions_m = trajectory.T_world_frame[:, :3, 3]
-    rows = zip(trajectory.t_ns.tolist(), positions_m.tolist(), q_xyzw.tolist(), strict=True)
-    return "".join(f"{seconds(t)} {' '.join(map(repr, p + q))}\n" for t, p, q in rows)
+    rows = np.hstack([trajectory.positions_m, q_xyzw]).tolist()
+    lines = []
+    for t_ns, row in zip(trajectory.t_ns.tolist(), rows, strict=True):
+        lines.append(f"{seconds(t_ns)} {' '.join(map(repr, row))}\n")
+    return "".join(lines)
 
 
 def seconds(t_ns: int) -> str:
     """An instant or duration in ns as seconds with 9 decimals, exact."""
-    whole, part = divmod(abs(t_ns), NS_PER_S)
-    return f"{'-' if t_ns < 0 else ''}{whole}.{part:09d}"
+    whole_s, fraction_ns = divmod(abs(t_ns), NS_PER_S)
+    sign = "-" if t_ns < 0 else ""
+    return f"{sign}{whole_s}.{fraction_ns:09d}"
 
 
 EUROC_COLUMNS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")
-# EuRoC's own names, for what a state may say: the pose, then the velocity in the world, then the biases.
+POSE_STATE = (
+    "p_RS_R_x [m]",
+    "p_RS_R_y [m]",
+    "p_RS_R_z [m]",
+    "q_RS_w []",
+    "q_RS_x []",
+    "q_RS_y []",
+    "q_RS_z []",
+)
+# EuRoC's names for the columns of a state: the pose, then the velocity in the world, then the biases.
 STATE = (
-    *("p_RS_R_x [m]", "p_RS_R_y [m]", "p_RS_R_z [m]", "q_RS_w []", "q_RS_x []", "q_RS_y []", "q_RS_z []"),
+    *POSE_STATE,
     *("v_RS_R_x [m s^-1]", "v_RS_R_y [m s^-1]", "v_RS_R_z [m s^-1]"),
     *("b_w_RS_S_x [rad s^-1]", "b_w_RS_S_y [rad s^-1]", "b_w_RS_S_z [rad s^-1]"),
     *("b_a_RS_S_x [m s^-2]", "b_a_RS_S_y [m s^-2]", "b_a_RS_S_z [m s^-2]"),
@@ -213,56 +268,71 @@ WORD = re.compile(r"[a-df-z]", re.IGNORECASE)  # an e may be an exponent's
 def csv_layout(text: str) -> tuple[list[tuple[int, str]], Unit, Order]:
     """The rows below a csv's header, the unit of its stamps and the order of its quaternions.
 
-    A header that names w last, or seconds, is believed; stamps with a decimal point are seconds.
+    They follow a header that names w last, or seconds; stamps with a decimal point are seconds.
     """
-    first = text.removeprefix("\ufeff").lstrip().partition("\n")[0]
+    first_line = text.removeprefix("\ufeff").lstrip().partition("\n")[0]
+    title = first_line.lstrip("#")
     rows = content(text)
     header = [""]
-    if WORD.search(first.lstrip("#")):
-        header = [cell.strip().lower() for cell in first.lstrip("#").split(",")]
-        rows = rows if first.startswith("#") else rows[1:]
-    names = [cell.partition("[")[0].strip() for cell in header[4:8]]
-    order: Order = "xyzw" if [name[-1:] for name in names] == ["x", "y", "z", "w"] else "wxyz"
+    if WORD.search(title):
+        header = [cell.strip().lower() for cell in title.split(",")]
+        is_comment = first_line.startswith("#")
+        rows = rows if is_comment else rows[1:]
+
+    quaternion_names = [cell.partition("[")[0].strip() for cell in header[4:8]]
+    last_letters = [name[-1:] for name in quaternion_names]
+    order: Order = "xyzw" if last_letters == ["x", "y", "z", "w"] else "wxyz"
     return rows, _unit(header[0], rows), order
 
 
 def format_euroc(trajectory: Trajectory, more: Array | None = None) -> str:
-    """EuRoC's csv, stamps in ns, every digit of the values.
+    """EuRoC's csv, stamps in ns and values with all their digits.
 
     `more` (N, 3) or (N, 9): velocities in the world, then the biases of gyroscope and accelerometer.
     """
-    T = trajectory.T_world_frame
-    q_xyzw = se3.to_quaternion(T[:, :3, :3])
-    values = np.hstack([T[:, :3, 3], q_xyzw[:, [3, 0, 1, 2]], *([] if more is None else [more])])
+    q_xyzw = se3.to_quaternion(trajectory.T_world_frame[:, :3, :3])
+    columns = [trajectory.positions_m, q_xyzw[:, SCALAR_FIRST]]
+    if more is not None:
+        columns.append(more)
+    values = np.hstack(columns)
     header = ", ".join(STATE[: values.shape[1]])
     return f"#timestamp [ns], {header}\n" + csv_rows(trajectory.t_ns, values)
 
 
 def csv_rows(t_ns: Stamps, values: Array) -> str:
-    """Rows `t,...` of stamps (N,) in ns and values (N, K), every digit of them."""
-    rows = zip(t_ns.tolist(), values.tolist(), strict=True)
-    return "".join(f"{t},{','.join(map(repr, row))}\n" for t, row in rows)
+    """Rows `t,...` of stamps (N,) in ns and values (N, K) with all their digits."""
+    lines = []
+    for t, row in zip(t_ns.tolist(), values.tolist(), strict=True):
+        lines.append(f"{t},{','.join(map(repr, row))}\n")
+    return "".join(lines)
 
 
 def _unit(header: str, rows: list[tuple[int, str]]) -> Unit:
+    """The unit of the stamps below a header."""
     if "[ns]" in header.replace(" ", ""):
         return "ns"
-    has_point = any("." in body.partition(",")[0] for _, body in rows)
-    return "s" if has_point or IN_SECONDS.search(header) else "ns"
+    has_decimal_point = any("." in body.partition(",")[0] for _, body in rows)
+    is_in_seconds = has_decimal_point or IN_SECONDS.search(header)
+    return "s" if is_in_seconds else "ns"
 
 
-KITTI_COLUMNS = tuple(f"{part}{row}" for row in (1, 2, 3) for part in ("r1", "r2", "r3", "t"))
+KITTI_COLUMNS = (
+    *("r11", "r12", "r13", "t1"),
+    *("r21", "r22", "r23", "t2"),
+    *("r31", "r32", "r33", "t3"),
+)
 NUMBERED_COLUMNS = ("frame", *KITTI_COLUMNS)
 TARTANAIR_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
-# KITTI prints six digits, so its matrices are 1e-6 off a rotation; nothing that means to be one is this far off.
+# KITTI prints six digits, so its matrices are 1e-6 off a rotation; no intended rotation is this far off.
 SKEW_TOLERANCE = 1e-3
 MAX_FRAME = 10**9
 
 
 def format_kitti(T: Array) -> str:
-    """KITTI text of poses (N, 4, 4), every digit of them."""
+    """KITTI text of poses (N, 4, 4) with all their digits."""
     rows = T[:, :3].reshape(-1, len(KITTI_COLUMNS)).tolist()
-    return "".join(f"{' '.join(map(repr, row))}\n" for row in rows)
+    lines = [" ".join(map(repr, row)) + "\n" for row in rows]
+    return "".join(lines)
 
 
 def format_times(t_ns: Stamps) -> str:
@@ -271,13 +341,16 @@ def format_times(t_ns: Stamps) -> str:
 
 
 def parse_times(text: str, *, name: str) -> Stamps:
-    """Stamps (N,) of a file with one time in seconds a line. Raises TrajectoryError."""
-    return stamps_ns(read_table(content(text), name=name, columns=("t",), row="a line of times"), "s")
+    """Stamps (N,) of a file with one time in seconds per line. Raises TrajectoryError."""
+    table = read_table(content(text), name=name, columns=("t",), row="a line of times")
+    return stamps_ns(table, "s")
 
 
 def _require_rotations(table: Table, R: Array) -> None:
+    """Raise TrajectoryError for the first matrix (N, 3, 3) that is no rotation."""
     with np.errstate(over="ignore", invalid="ignore"):
-        skew = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0.0)
+        residual = se3.transposed(R) @ R - np.eye(3)
+    skew = np.abs(residual).max(axis=(1, 2), initial=0.0)
     bad = np.flatnonzero(~(skew <= SKEW_TOLERANCE))
     if bad.size:
         raise TrajectoryError(
@@ -297,7 +370,8 @@ TUM = len(COLUMNS)
 KITTI = len(KITTI_COLUMNS)
 TARTANAIR = len(TARTANAIR_COLUMNS)
 NUMBERED = len(NUMBERED_COLUMNS)
-FORMS_BY_COLUMNS = {len(form): form for form in (COLUMNS, KITTI_COLUMNS, NUMBERED_COLUMNS, TARTANAIR_COLUMNS)}
+FORMS_WITHOUT_COMMAS = (COLUMNS, KITTI_COLUMNS, NUMBERED_COLUMNS, TARTANAIR_COLUMNS)
+FORMS_BY_COLUMNS = {len(columns): columns for columns in FORMS_WITHOUT_COMMAS}
 FORMS = (
     f"TUM has {TUM} ({' '.join(COLUMNS)}), KITTI {KITTI}, or {NUMBERED} with a frame number first, "
     f"TartanAir {TARTANAIR}, EuRoC {TUM} and commas"
@@ -306,10 +380,10 @@ FORMS = (
 
 @dataclass(frozen=True, slots=True)
 class Parsed:
-    """Poses (N, 4, 4) and how they were read; None for stamps, their unit or an order that the form doesn't have.
+    """Poses (N, 4, 4) and how they were read; stamps, unit and order are None for a format without them.
 
-    `form_unit` is the unit that files of this form should be in; `frames` (N,) are the numbers that a file without
-    stamps gives its poses; `notes` say in sentences what was left out.
+    `form_unit` is the unit of the format; `frames` (N,) are the frame numbers of poses in a file without stamps;
+    `notes` are sentences about rows that were left out.
     """
 
     t_ns: Stamps | None
@@ -321,18 +395,20 @@ class Parsed:
     notes: tuple[str, ...] = ()
 
     def stamped_by(self, frames_ns: Stamps) -> Stamps | None:
-        """Stamps (N,) for poses that have none, out of those of all frames; None where they do not fit together."""
+        """Stamps (N,) for poses without any, from the stamps of all frames; None if their numbers do not match."""
         if self.frames is None:
-            return frames_ns if len(frames_ns) == len(self.T) else None
-        return frames_ns[self.frames] if self.frames[-1] < len(frames_ns) else None
+            has_all = len(frames_ns) == len(self.T)
+            return frames_ns if has_all else None
+        is_covered = self.frames[-1] < len(frames_ns)
+        return frames_ns[self.frames] if is_covered else None
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A trajectory and how it was read: its stamps' unit, its quaternions' order, None where that can't be wrong.
+    """A trajectory and how it was read: the unit of its stamps and the order of its quaternions, if they have one.
 
-    `form_unit` is the unit that such a file should be in; `says_truth`, whether it calls itself ground truth;
-    `is_unit_told`, whether somebody who knows gave the unit.
+    `form_unit` is the unit of the format; `says_truth`, whether the file is named as ground truth;
+    `is_unit_told`, whether the user gave the unit.
     """
 
     trajectory: Trajectory
@@ -343,24 +419,34 @@ class Reading:
     is_unit_told: bool = False
 
 
-def parse_any(written: str, *, name: str, unit: Unit | None = None, order: Order | None = None) -> Parsed:
+def parse_any(
+    written: str,
+    *,
+    name: str,
+    unit: Unit | None = None,
+    order: Order | None = None,
+) -> Parsed:
     """The poses in TUM, KITTI, TartanAir or EuRoC text.
 
-    `unit` and `order` override what the form says of stamps and quaternions. Of rows that repeat a stamp the first
-    counts. Raises TrajectoryError where there is no pose, no such form, or a row is wrong.
+    `unit` and `order` override those of the format for stamps and quaternions. Of rows that repeat a stamp the first
+    counts. Raises TrajectoryError for a text without poses, an unknown format, or a wrong row.
     """
     first = _first_row(written, name)
     if "," in first:
-        rows, found_unit, found_order = csv_layout(written)
+        rows, header_unit, header_order = csv_layout(written)
         table = read_table(rows, name=name, columns=EUROC_COLUMNS, separator=",")
-        return _stamped(table, unit or found_unit, found_unit, order or found_order)
+        return _stamped(table, unit or header_unit, header_unit, order or header_order)
+
     columns = FORMS_BY_COLUMNS[len(first.split())]
     table = read_table(content(written), name=name, columns=columns)
     order = order or "xyzw"
     if columns is TARTANAIR_COLUMNS:
-        T = se3.transform(rotations(table, table.values[:, 3:], order), table.values[:, :3])
+        R = rotations(table, table.values[:, 3:], order)
+        T = se3.transform(R, table.values[:, :3])
         return Parsed(None, T, order=order)
-    return _stamped(table, unit or "s", "s", order) if columns is COLUMNS else _matrices(table)
+    if columns is COLUMNS:
+        return _stamped(table, unit or "s", "s", order)
+    return _matrices(table)
 
 
 def _matrices(table: Table) -> Parsed:
@@ -369,35 +455,52 @@ def _matrices(table: Table) -> Parsed:
     rows = np.arange(len(table.values))
     notes = tuple[str, ...]()
     if table.values.shape[1] == NUMBERED:
-        stated = table.values[:, 0]
-        bad = np.flatnonzero((stated != np.floor(stated)) | (stated < 0) | (stated > MAX_FRAME))
-        if bad.size:
-            raise TrajectoryError(
-                f"{table.place(bad[0])}: the first of 13 columns should be the number of a frame, whole and from 0 on, "
-                f"but is {table.first[bad[0]]}"
-            )
-        frames, rows, notes = first_of_equal(table, stated.astype(np.int64), "frame number")
+        frames, rows, notes = first_of_equal(table, _frame_numbers(table), "frame number")
     matrices = table.values[:, -KITTI:].reshape(-1, 3, 4)
-    _require_rotations(table, matrices[:, :, :3])
-    T = se3.transform(matrices[rows, :, :3], matrices[rows, :, 3])
+    R = matrices[:, :, :3]
+    positions_m = matrices[:, :, 3]
+    _require_rotations(table, R)
+    T = se3.transform(R[rows], positions_m[rows])
     return Parsed(None, T, frames=frames, notes=notes)
 
 
-def _stamped(table: Table, unit: Unit, form_unit: Unit, order: Order) -> Parsed:
+def _frame_numbers(table: Table) -> Stamps:
+    """The first column (N,) as numbers of frames. Raises TrajectoryError for other numbers."""
+    numbers = table.values[:, 0]
+    is_whole = numbers == np.floor(numbers)
+    is_in_range = (numbers >= 0) & (numbers <= MAX_FRAME)
+    bad = np.flatnonzero(~(is_whole & is_in_range))
+    if bad.size:
+        raise TrajectoryError(
+            f"{table.place(bad[0])}: the first of 13 columns should be the number of a frame, whole and from 0 on, "
+            f"but is {table.first[bad[0]]}"
+        )
+    return numbers.astype(np.int64)
+
+
+def _stamped(
+    table: Table,
+    unit: Unit,
+    form_unit: Unit,
+    order: Order,
+) -> Parsed:
     """The poses of rows with a stamp, a position and a quaternion."""
     t_ns, rows, notes = first_of_equal(table, _all_ns(table, unit), "stamp")
-    T = se3.transform(rotations(table, table.values[:, 4:8], order), table.values[:, 1:4])
+    R = rotations(table, table.values[:, 4:8], order)
+    T = se3.transform(R, table.values[:, 1:4])
     return Parsed(t_ns, T[rows], unit, form_unit, order, notes=notes)
 
 
 def _first_row(written: str, name: str) -> str:
-    """The first line with something to say. Raises TrajectoryError where it is of none of the forms."""
+    """The first line with content. Raises TrajectoryError if it has none of the formats."""
     start = written.lstrip()
     if start.startswith(LFS_POINTER):
         raise TrajectoryError(f"a Git-LFS pointer, not the file itself; fetch it with git lfs pull: {name}")
-    number, first = next(iter(content(written)), (0, ""))
-    if not first:
-        raise TrajectoryError(f"no pose, {'for all lines are comments' if start else 'for the file is empty'}: {name}")
+    rows = content(written)
+    if not rows:
+        reason = "all lines are comments" if start else "the file is empty"
+        raise TrajectoryError(f"no pose, for {reason}: {name}")
+    number, first = rows[0]
     columns = len(first.split())
     if "," not in first and columns not in FORMS_BY_COLUMNS:
         raise TrajectoryError(f"{name}:{number}: no form of trajectory has {columns} columns: {FORMS}")

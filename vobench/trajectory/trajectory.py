@@ -13,9 +13,10 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
 Stamps = NDArray[np.int64]
-SKEW = 1e-2  # text with three digits leaves RᵀR up to 3e-3 off the identity; what is no rotation by far more
+SKEW = 1e-2  # text with three digits leaves RᵀR up to 3e-3 off the identity; a matrix that is no rotation far more
 LARGEST_M = 1e18  # a hundred light years; beyond it squares overflow float32, which the KITTI devkit sums in
-BLOCK = 1 << 14  # poses looked at together: little memory, and they stay in the processor's cache
+BLOCK = 1 << 14  # poses checked together: little memory, and they stay in the processor's cache
+SMALL_SINE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,7 @@ class Trajectory:
     """Poses of one moving frame in one fixed frame, in order of time.
 
     t_ns is (N,) int64, strictly increasing; T_world_frame is (N, 4, 4) in metres.
-    Raises TrajectoryError where shapes, order or size are wrong, or a rotation is none.
+    Raises TrajectoryError for wrong shapes, order or size, or an invalid rotation.
     """
 
     t_ns: Stamps
@@ -39,7 +40,9 @@ class Trajectory:
         if late.size:
             raise TrajectoryError(f"stamps must increase, but pose {late[0] + 1} is not later than the one before it")
         for begin in range(0, len(self.t_ns), BLOCK):
-            _require_poses(self.T_world_frame[begin : begin + BLOCK], begin)
+            block = self.T_world_frame[begin : begin + BLOCK]
+            _require_positions(block, begin)
+            _require_rotations(block, begin)
 
     def __len__(self) -> int:
         return len(self.t_ns)
@@ -47,8 +50,10 @@ class Trajectory:
     def __repr__(self) -> str:
         if not len(self):
             return "Trajectory(no pose)"
-        first, last = (f"{t_ns / 1e9:.3f}" for t_ns in (self.t_ns[0], self.t_ns[-1]))
-        return f"Trajectory({len(self)} poses from {first} s to {last} s, path {self.distances_m()[-1]:.4g} m)"
+        first_s = self.t_ns[0] / 1e9
+        last_s = self.t_ns[-1] / 1e9
+        path_m = self.distances_m()[-1]
+        return f"Trajectory({len(self)} poses from {first_s:.3f} s to {last_s:.3f} s, path {path_m:.4g} m)"
 
     @property
     def positions_m(self) -> Array:
@@ -57,57 +62,91 @@ class Trajectory:
 
     def distances_m(self) -> Array:
         """Path length (N,) from the first pose to each pose."""
-        steps = np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])[: len(self)]
+        return path_lengths_m(self.positions_m)
 
     def of_mounted(self, T_frame_mounted: Array) -> "Trajectory":
-        """The trajectory of something fixed to this frame, such as a camera on a body."""
+        """The trajectory of a frame fixed to this one, such as a camera on a body."""
         return Trajectory(self.t_ns, self.T_world_frame @ T_frame_mounted)
 
 
-def _require_poses(T: Array, begin: int) -> None:
-    """Raise TrajectoryError for the first of poses (N, 4, 4) that is none; `begin` is the number of the first."""
-    if not (np.abs(T) < LARGEST_M).all():  # which nan isn't either
-        bad = int(np.flatnonzero(~(np.abs(T) < LARGEST_M).all((1, 2)))[0])
-        what = "is not finite" if not np.isfinite(T[bad]).all() else f"is {np.abs(T[bad]).max():.3g} m away"
-        raise TrajectoryError(f"pose {begin + bad} {what}; positions should be finite and below {LARGEST_M:g} m")
+def step_lengths_m(positions_m: Array) -> Array:
+    """Distances (N - 1,) between successive positions (N, 3)."""
+    return np.asarray(np.linalg.norm(np.diff(positions_m, axis=0), axis=1))
+
+
+def path_lengths_m(positions_m: Array) -> Array:
+    """Path length (N,) from the first of positions (N, 3) to each of them."""
+    sums_m = np.cumsum(step_lengths_m(positions_m))
+    return np.concatenate([[0.0], sums_m])[: len(positions_m)]
+
+
+def _require_positions(T: Array, begin: int) -> None:
+    """Raise TrajectoryError for the first of poses (N, 4, 4) that is not finite or too far away.
+
+    `begin` is the number of the first pose, for the message.
+    """
+    is_wrong = ~(np.abs(T) < LARGEST_M).all((1, 2))  # NaN compares as false
+    if not is_wrong.any():
+        return
+    bad = int(np.flatnonzero(is_wrong)[0])
+    is_finite = np.isfinite(T[bad]).all()
+    what = f"is {np.abs(T[bad]).max():.3g} m away" if is_finite else "is not finite"
+    raise TrajectoryError(f"pose {begin + bad} {what}; positions should be finite and below {LARGEST_M:g} m")
+
+
+def _require_rotations(T: Array, begin: int) -> None:
+    """Raise TrajectoryError for the first of poses (N, 4, 4) whose rotation is skew or mirrored.
+
+    `begin` is the number of the first pose, for the message.
+    """
     R = T[:, :3, :3]
-    skew = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max((1, 2))
-    mirrors = np.sum(np.cross(R[:, :, 0], R[:, :, 1]) * R[:, :, 2], axis=1) < 0
-    wrong = np.flatnonzero(mirrors | (skew > SKEW))
+    residual = se3.transposed(R) @ R - np.eye(3)
+    skew = np.abs(residual).max((1, 2))
+    x_cross_y = np.cross(R[:, :, 0], R[:, :, 1])
+    is_mirrored = np.sum(x_cross_y * R[:, :, 2], axis=1) < 0
+    wrong = np.flatnonzero(is_mirrored | (skew > SKEW))
     if wrong.size:
         bad = int(wrong[0])
-        what = "is mirrored (determinant -1)" if mirrors[bad] else f"is off by {skew[bad]:.3g} (RᵀR - 1)"
+        what = "is mirrored (determinant -1)" if is_mirrored[bad] else f"is off by {skew[bad]:.3g} (RᵀR - 1)"
         raise TrajectoryError(f"the rotation of pose {begin + bad} {what}; it should be orthonormal and right-handed")
 
 
 def poses_at(trajectory: Trajectory, t_ns: Stamps) -> Array:
-    """Poses (N, 4, 4) of a trajectory of one pose or more at t_ns (N,); before and after it its ends.
+    """Poses (N, 4, 4) of a trajectory of one pose or more, interpolated at t_ns (N,); outside its time its end poses.
 
-    Source: Shoemake (1985), eq. of slerp, along the shorter way round.
+    Source: Shoemake (1985), eq. of slerp, along the shorter arc.
     """
     stamps = trajectory.t_ns
     T = trajectory.T_world_frame
-    before = np.clip(np.searchsorted(stamps, t_ns, side="right") - 1, 0, max(len(stamps) - 2, 0))
+    last_start = max(len(stamps) - 2, 0)
+    before = np.searchsorted(stamps, t_ns, side="right") - 1
+    before = np.clip(before, 0, last_start)
     after = np.minimum(before + 1, len(stamps) - 1)
+
     step_ns = np.maximum(stamps[after] - stamps[before], 1)
-    share = np.clip((t_ns - stamps[before]) / step_ns, 0.0, 1.0)[:, None]
-    positions = (1 - share) * T[before, :3, 3] + share * T[after, :3, 3]
-    return se3.transform(_slerp(T[before, :3, :3], T[after, :3, :3], share), positions)
+    elapsed_ns = t_ns - stamps[before]
+    share = np.clip(elapsed_ns / step_ns, 0.0, 1.0)[:, None]
+    positions_m = (1 - share) * T[before, :3, 3] + share * T[after, :3, 3]
+    R = _slerp(T[before, :3, :3], T[after, :3, :3], share)
+    return se3.transform(R, positions_m)
 
 
 def _slerp(R_begin: Array, R_end: Array, share: Array) -> Array:
-    a = se3.to_quaternion(R_begin)
-    b = se3.to_quaternion(R_end)
-    cosine = np.sum(a * b, axis=-1, keepdims=True)
-    b = np.where(cosine < 0, -b, b)
+    """Rotations (N, 3, 3) at shares (N, 1) of the shorter arcs between rotations (N, 3, 3)."""
+    begin = se3.to_quaternion(R_begin)
+    end = se3.to_quaternion(R_end)
+    cosine = np.sum(begin * end, axis=-1, keepdims=True)
+    end = np.where(cosine < 0, -end, end)
     cosine = np.abs(cosine)
-    sine = np.linalg.norm(b - cosine * a, axis=-1, keepdims=True)
+    sine = np.linalg.norm(end - cosine * begin, axis=-1, keepdims=True)
     angle = np.arctan2(sine, cosine)
-    near = sine < 1e-9  # there the weights of a straight line are exact
-    safe = np.where(near, 1.0, sine)
-    q = np.where(near, 1 - share, np.sin((1 - share) * angle) / safe) * a
-    q = q + np.where(near, share, np.sin(share * angle) / safe) * b
+
+    is_small = sine < SMALL_SINE  # there linear weights are exact
+    divisor = np.where(is_small, 1.0, sine)
+    begin_weight = np.where(is_small, 1 - share, np.sin((1 - share) * angle) / divisor)
+    end_weight = np.where(is_small, share, np.sin(share * angle) / divisor)
+    q = begin_weight * begin
+    q = q + end_weight * end
     return se3.from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
 
 
@@ -115,15 +154,16 @@ Kind = Literal["axes", "positions", "mount", "inverse", "rotations"]
 INVERSES: dict[str, Kind] = {"inverse": "inverse", "rotations:inverse": "rotations"}
 AXIS = re.compile(r"([+-]?)([xyz])")
 MOUNT_VALUES = 7
+NORM_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """A change of poses: `matrix` is signed axes S (3, 3), or for a mount T_est_gt (4, 4).
+    """A change of the convention of poses: `matrix` is signed axes S (3, 3), or for a mount T_est_gt (4, 4).
 
-    `axes`: the file's axes are others, T' = S T S⁻¹. `positions`: only its positions are in
-    other axes, p' = S p. `mount`: it is of another frame of the same body, T' = T T_est_gt.
-    `inverse`: it takes the world to the frame, T' = T⁻¹. `rotations`: only its rotations do, R' = Rᵀ.
+    `axes`: the file uses other axes, T' = S T S⁻¹. `positions`: only its positions use other axes, p' = S p.
+    `mount`: its poses are of another frame of the same body, T' = T T_est_gt. `inverse`: its poses transform the
+    world to the frame, T' = T⁻¹. `rotations`: only its rotations do, R' = Rᵀ.
     """
 
     kind: Kind
@@ -131,60 +171,80 @@ class Move:
 
     def apply(self, T: Array) -> Array:
         """Poses (..., 4, 4), changed."""
+        R = T[..., :3, :3]
+        positions_m = T[..., :3, 3]
         if self.kind == "mount":
             moved: Array = T @ self.matrix
             return moved
         if self.kind == "inverse":
             return se3.inverse(T)
         if self.kind == "rotations":
-            return se3.transform(np.swapaxes(T[..., :3, :3], -1, -2), T[..., :3, 3])
+            return se3.transform(se3.transposed(R), positions_m)
         S = self.matrix
-        R = S @ T[..., :3, :3] @ S.T if self.kind == "axes" else T[..., :3, :3]
-        return se3.transform(R, T[..., :3, 3] @ S.T)
+        if self.kind == "axes":
+            R = S @ R @ S.T
+        return se3.transform(R, positions_m @ S.T)
 
     def __str__(self) -> str:
         for word, kind in INVERSES.items():
             if kind == self.kind:
                 return word
-        if self.kind != "mount":
-            return f"{self.kind}:{','.join(map(_axis_name, self.matrix))}"
-        q_xyzw = se3.to_quaternion(self.matrix[:3, :3])
-        return f"mount:{','.join(f'{v:.6g}' for v in (*self.matrix[:3, 3], *q_xyzw))}"
+        if self.kind == "mount":
+            q_xyzw = se3.to_quaternion(self.matrix[:3, :3])
+            values = [*self.matrix[:3, 3], *q_xyzw]
+            return f"mount:{','.join(f'{value:.6g}' for value in values)}"
+        axes = [_axis_name(row) for row in self.matrix]
+        return f"{self.kind}:{','.join(axes)}"
 
 
 def parse_move(word: str) -> Move:
     """The move in words such as `axes:z,-x,-y`, `inverse` or `mount:x,y,z,qx,qy,qz,qw`. Raises InputError."""
     if word in INVERSES:
         return Move(INVERSES[word])
-    kind, _, stated = word.partition(":")
-    values = [part.strip() for part in stated.split(",")]
+    kind, _, arguments = word.partition(":")
+    values = [part.strip() for part in arguments.split(",")]
     if kind == "mount":
         return Move("mount", _mount(values, word))
-    if kind in ("axes", "positions"):
-        return Move("axes" if kind == "axes" else "positions", _axes(values, word))
+    if kind == "axes":
+        return Move("axes", _axes(values, word))
+    if kind == "positions":
+        return Move("positions", _axes(values, word))
     raise InputError(
         f"a file may be read as axes:…, positions:…, mount:…, inverse or rotations:inverse, but not as {word!r}"
     )
 
 
 def _axes(values: Sequence[str], word: str) -> Array:
-    found = [AXIS.fullmatch(value) for value in values]
-    if len(values) != 3 or sorted(match[2] for match in found if match) != ["x", "y", "z"]:
+    """The signed permutation (3, 3) of three names of axes."""
+    rows = []
+    names = []
+    for value in values:
+        match = AXIS.fullmatch(value)
+        if match:
+            sign = -1.0 if match[1] == "-" else 1.0
+            names.append(match[2])
+            rows.append(sign * np.eye(3)["xyz".index(match[2])])
+    if len(values) != 3 or sorted(names) != ["x", "y", "z"]:
         raise InputError(f"axes are x, y and z, each once, with or without a minus, such as z,-x,-y; not {word!r}")
-    rows = [(-1.0 if m[1] == "-" else 1.0) * np.eye(3)["xyz".index(m[2])] for m in found if m]
     return np.stack(rows)
 
 
 def _mount(values: Sequence[str], word: str) -> Array:
+    """The transform (4, 4) of the texts of a position and a quaternion."""
     try:
         numbers = np.array([float(value) for value in values])
     except ValueError:
         numbers = np.zeros(0)
-    if len(numbers) != MOUNT_VALUES or not np.isfinite(numbers).all() or abs(np.linalg.norm(numbers[3:]) - 1) > 1e-3:
+    position_m = numbers[:3]
+    q_xyzw = numbers[3:]
+    norm = np.linalg.norm(q_xyzw)
+    is_complete = len(numbers) == MOUNT_VALUES and np.isfinite(numbers).all()
+    if not is_complete or abs(norm - 1) > NORM_TOLERANCE:
         raise InputError(f"a mount is x,y,z,qx,qy,qz,qw in metres with a quaternion of norm 1, not {word!r}")
-    return se3.transform(se3.from_quaternion(numbers[3:] / np.linalg.norm(numbers[3:])), numbers[:3])
+    return se3.transform(se3.from_quaternion(q_xyzw / norm), position_m)
 
 
 def _axis_name(row: Array) -> str:
     axis = int(np.argmax(np.abs(row)))
-    return f"{'-' if row[axis] < 0 else ''}{'xyz'[axis]}"
+    sign = "-" if row[axis] < 0 else ""
+    return f"{sign}{'xyz'[axis]}"
