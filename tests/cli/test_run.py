@@ -100,7 +100,7 @@ def test_without_its_cache_a_run_still_reports_and_view_says_how_to_get_the_pict
     assert vobench("report", "runs/tiny").code == 0
     said = vobench("view", "runs/tiny", "--save", "a.rrd")
     assert said.code == 1
-    assert said.err.startswith("vobench: the sequence is gone from the cache; run the suite again to make it anew: ")
+    assert said.err.startswith("vobench: the sequence is no longer in the cache; run the suite again to recreate it: ")
     assert vobench("run", "tiny").code == 0
     assert vobench("view", "runs/tiny", "--save", "a.rrd").code == 0
 

@@ -130,7 +130,7 @@ class Run:
 
     def _repr_html_(self) -> str:
         from vobench.report import board_table
-        from vobench.report.leaderboard import METRICS
+        from vobench.report.board_metric import METRICS
 
         title = METRICS[board_table.DEFAULT_METRIC].heading
         parts = [_html_table(["case", *self.estimators], _matrix_rows(self._board), title)]
@@ -266,10 +266,10 @@ def read_board(path: Path | str) -> "pd.DataFrame":
 
     Raises InputError where the folder is none of a run.
     """
-    from vobench.report import board_table, page
+    from vobench.report import board_records, page
 
     folder = open_run(Path(path))
-    return board_table.data_frame(page.board_of(folder, folder.scores()))
+    return board_records.data_frame(page.board_of(folder, folder.scores()))
 
 
 def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | None = None) -> "pd.DataFrame":
