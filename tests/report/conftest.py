@@ -10,7 +10,8 @@ import pytest
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
-from vobench.report.rerun import TrialView, save_trial
+from vobench.report.rerun import save_trial
+from vobench.report.trial_view import TrialView
 from vobench.runner import estimate as estimate_file
 from vobench.runner.folder import SCORE, RunFolder, TrialScore
 from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table

@@ -172,11 +172,13 @@ def totals(board: Board) -> list[tuple[str, list[list[str]]]]:
         members = [total for total in board.totals if total.group == group]
         cases = _counted(members[0].cases, "case")
         scope = f"{group or 'none'}, {cases}" if len(groups) > 1 else cases
-        table = [headings]
-        for total in members:
-            table.append([COLUMNS[heading](total) for heading in headings])
-        tables.append((scope, table))
+        rows = [_total_row(total, headings) for total in members]
+        tables.append((scope, [headings, *rows]))
     return tables
+
+
+def _total_row(total: Total, headings: Sequence[str]) -> list[str]:
+    return [COLUMNS[heading](total) for heading in headings]
 
 
 def _counted(count: int, noun: str) -> str:

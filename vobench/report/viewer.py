@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vobench.errors import InputError, MissingDependencyError
-from vobench.report.rerun import PictureForm, pick, ranked, save_trial, trial_view
+from vobench.report.rerun import PictureForm, save_trial
+from vobench.report.trial_choice import pick, ranked
+from vobench.report.trial_view import trial_view
 from vobench.runner.folder import RunFolder, TrialScore
 
 # Without -P, a rerun.py in the working folder would be run in its place.
