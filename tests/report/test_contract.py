@@ -39,7 +39,7 @@ BROKEN = {
     "rigid poses in time": ("return Result(2 * np.eye(4))", {}, "invalid_output after 0 frames: frame 0: the pose is no"),
     "determinism": ("T = np.eye(4); T[0, 3] = 1e-3 * np.random.default_rng().normal(); return Result(T)", {}, "two runs are not the same, declared deterministic: true"),
     "frames unchanged, restart": ("frame.left[0] = 0; return Result(np.eye(4))", {}, "invalid_output: frame 0: process() changed the frame it was given"),
-    "restart": ("self.n += 1; T = np.eye(4); T[0, 3] = 1e-4 * self.n; return Result(T)", {"start": "self.n = getattr(self, 'n', 0)"}, "start() once more gives other poses"),
+    "restart": ("self.n += 1; T = np.eye(4); T[0, 3] = 1e-4 * self.n; return Result(T)", {"start": "self.n = getattr(self, 'n', 0)"}, "a second start() gives other poses"),
     "black frames": ("return Result(np.eye(4) / bool(frame.left.max()))", {}, "invalid_output after 10 frames"),
     "missing frames": ("assert frame.t_ns == self.n * 50_000_000, 'late'; self.n += 1; return Result(np.eye(4))", {}, "crashed after 10 frames: AssertionError: late"),
 }  # fmt: skip
@@ -65,7 +65,7 @@ def test_a_poor_standstill_says_the_limit_and_breaks_no_contract(plugin):
     folder = plugin("T = np.eye(4); self.n += 1; T[0, 3] = 1e-3 * self.n; return Result(T)")
     clauses = {clause.name: clause for clause in contract(folder)}
     assert clauses["standstill"].verdict is Verdict.POOR
-    assert clauses["standstill"].seen == "at most 19.00 mm away within a second; at most 10 mm is good"
+    assert clauses["standstill"].seen == "moves by up to 19.00 mm within a second; up to 10 mm is good"
     assert_contract(folder)
 
 
@@ -95,7 +95,7 @@ IMPORTS = [
     ),
     (
         "from vobench.dataset.picture import inside",
-        "vobench.dataset.picture.inside: vobench.plugin does not offer it, so it may change or leave without notice",
+        "vobench.dataset.picture.inside: vobench.plugin does not offer it, so it may change or be removed without notice",
     ),
     (
         "from vobench.metric.scale import ate_scale",
@@ -104,7 +104,7 @@ IMPORTS = [
     ("from vobench.scene.surface import box", "vobench.scene.surface.box: vobench.plugin.block makes a box"),
     (
         "from vobench import geometry",
-        "vobench.geometry: vobench.plugin does not offer it, so it may change or leave without notice",
+        "vobench.geometry: vobench.plugin does not offer it, so it may change or be removed without notice",
     ),
 ]
 

@@ -39,14 +39,14 @@ def test_a_led_robot_is_drawn_against_what_was_asked_of_it(log, tmp_path):
     save_plot(tmp_path / "it.svg", [log])
     said = words(tmp_path / "it.svg")
     labels = {"straight", "x (m)", "y (m)", "u (m/s)", "ω (rad/s)", "to target (m)", "time (s); dotted: end of a leg"}
-    assert labels | {"u asked for", "ω asked for", "body B", "point h", "targets of h", "start"} <= set(said)
+    assert labels | {"u requested", "ω requested", "body B", "point h", "targets of h", "start"} <= set(said)
 
 
 def test_what_nobody_leads_has_no_references_and_what_flies_a_height(log, tmp_path):
     alone = replace(log, point_m=None, references=None, targets_m=None, reached_s=None)
     save_plot(tmp_path / "floor.svg", [alone])
     assert "heading (°)" in words(tmp_path / "floor.svg")
-    assert not {"u asked for", "point h", "height z (m)"} & set(words(tmp_path / "floor.svg"))
+    assert not {"u requested", "point h", "height z (m)"} & set(words(tmp_path / "floor.svg"))
     poses = log.T_world_body.copy()
     poses[:, 2, 3] = T_S
     save_plot(tmp_path / "air.svg", [replace(alone, T_world_body=poses)])
