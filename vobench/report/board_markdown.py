@@ -13,12 +13,13 @@ from vobench.report.leaderboard import Board
 
 def markdown(board: Board, metric: str = DEFAULT_METRIC) -> str:
     """The matrix of a metric, the totals, and sentences on both."""
-    rows = [["case", *board.estimators]]
+    rows = [_escaped_row(["case", *board.estimators])]
     for case, cells in matrix(board, metric):
-        rows.append([case, *(str(cell) for cell in cells)])
-    lines = [f"## {METRICS[metric].heading}", "", *markdown_table(rows, words=1), ""]
+        rows.append(_escaped_row([case, *(str(cell) for cell in cells)]))
+    lines = [f"## {METRICS[metric].heading}", "", *plain_table(rows, words=1), ""]
     for scope, table in totals(board):
-        lines += [f"## Totals: {_escaped(scope)}", "", *markdown_table(table, words=2), ""]
+        escaped = [_escaped_row(row) for row in table]
+        lines += [f"## Totals: {_escaped(scope)}", "", *plain_table(escaped, words=2), ""]
     for sentence in (*remarks(board), *cell_notes(board)):
         lines.append(f"- {_escaped(sentence)}")
     lines += ["", LEGEND.replace("~", "\\~"), ""]
@@ -28,14 +29,15 @@ def markdown(board: Board, metric: str = DEFAULT_METRIC) -> str:
     return "\n".join(lines)
 
 
-def markdown_table(rows: Sequence[Sequence[str]], *, words: int) -> list[str]:
+def plain_table(rows: Sequence[Sequence[str]], *, words: int) -> list[str]:
     """The lines of a table whose first row is the headings; after `words` columns of text come columns of numbers."""
-    lines = []
-    for row in rows:
-        escaped = [_escaped(text) for text in row]
-        lines.append(f"| {' | '.join(escaped)} |")
+    lines = [f"| {' | '.join(row)} |" for row in rows]
     rule = "|" + "---|" * words + "---:|" * (len(rows[0]) - words)
     return [lines[0], rule, *lines[1:]]
+
+
+def _escaped_row(row: Sequence[str]) -> list[str]:
+    return [_escaped(text) for text in row]
 
 
 def _escaped(text: str) -> str:
