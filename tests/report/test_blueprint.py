@@ -51,7 +51,7 @@ def test_estimate_that_flies_off_does_not_change_the_view():
     truth = PATHS["circle"]
     near = truth + np.array([0.1, 0, 0])
     flown = np.concatenate([near, [[1e6, 0, 0]]])
-    np.testing.assert_array_equal(bp._near(truth, flown), bp._near(truth, near))
+    np.testing.assert_array_equal(bp._near_truth(truth, flown), bp._near_truth(truth, near))
 
 
 @pytest.mark.parametrize("extent_m", [0.5, 1.0, 7.0, 20.0, 300.0])

@@ -8,7 +8,8 @@ import pytest
 
 from vobench.cli import report as cli_report
 from vobench.estimator.sandbox import Sandbox
-from vobench.report import board_table
+from vobench.report.board_formats import FORMATS
+from vobench.report.board_records import as_csv, as_json
 from vobench.report.leaderboard import Board, board
 from vobench.runner.folder import TrialScore
 
@@ -43,24 +44,24 @@ def test_every_form_names_the_estimators_that_saw_more_than_their_own_files(form
         cli_report.print_board(made)
         text = capsys.readouterr().out
     else:
-        text = board_table.FORMATS[form](made, "ate")
+        text = FORMATS[form](made, "ate")
     assert "not sandboxed: it could see the user" in " ".join(text.split())
 
 
 @pytest.mark.parametrize("form", ["md", "json", "latex"])
 def test_a_board_of_sandboxed_estimators_says_so(form):
-    text = board_table.FORMATS[form](board_of(honest=CLOSED), "ate")
+    text = FORMATS[form](board_of(honest=CLOSED), "ate")
     assert "Estimators saw only their own files." in text
 
 
 def test_each_row_says_what_its_own_trials_saw():
     made = board_of(honest=CLOSED, watched=OPEN, older=None)
-    rows = list(csv.DictReader(io.StringIO(board_table.as_csv(made))))
+    rows = list(csv.DictReader(io.StringIO(as_csv(made))))
     saw = {row["estimator"]: row["saw"] for row in rows if row["case"] == "room"}
     assert saw == {
         "honest": "only its own files",
         "watched": "not sandboxed: it could see the user's files and the network",
         "older": "what it could see is not recorded",
     }
-    cells = json.loads(board_table.as_json(made))["cells"]
+    cells = json.loads(as_json(made))["cells"]
     assert {cell["estimator"]: cell["saw"] for cell in cells} == saw

@@ -104,5 +104,8 @@ def test_another_processor_is_named_and_runs_that_do_not_state_theirs_differ_in_
 
 
 def test_runs_of_different_suites_are_a_sentence(scored):
-    with pytest.raises(InputError, match="no estimator has a case in both runs: a on down in the old one, a on ahead"):
+    with pytest.raises(
+        InputError,
+        match="the two runs have no estimator on the same case: the old run has a on down, the new run has a on ahead",
+    ):
         compare(board([scored("a")], {}), board([scored("a", case="ahead")], {}))

@@ -12,7 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vobench.report import board_table, page
-from vobench.report.leaderboard import CaseFacts, EstimatorStatistics, answers, board, lost_aware, marks
+from vobench.report.board_formats import FORMATS
+from vobench.report.board_latex import latex
+from vobench.report.board_markdown import markdown
+from vobench.report.board_metric import lost_aware
+from vobench.report.board_records import as_csv, as_json
+from vobench.report.cell import CaseFacts
+from vobench.report.frame_statistics import EstimatorStatistics, summarize_frames
+from vobench.report.leaderboard import board
+from vobench.report.marks import marks
 from vobench.runner.environment import Environment, Processor
 from vobench.runner.folder import NO_SEQUENCE, NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore
 from vobench.runner.frames import COLUMNS, FRAMES, TIMES, FrameRow, new_table
@@ -135,7 +143,7 @@ def test_who_lacks_a_sensor_in_some_cases_is_ranked_on_the_others_and_in_all_of_
         ("wheels", 0, 1),
         ("blind", 0, 1),
     ]
-    assert "over the 1 of 2 cases that every estimator has (wheels has 1)" in made.remarks[0]
+    assert "Totals cover the 1 of 2 cases that all estimators share (wheels has 1)" in made.remarks[0]
     everywhere = [scored("wheels", "not_applicable", case=case, ate_m=None, coverage=0.0) for case in ("down", "flat")]
     last = board([*trials[:2], *everywhere], {}).totals[-1]
     assert (last.estimator, last.failed) == ("wheels", 2)
@@ -164,9 +172,9 @@ def test_cases_without_a_sequence_are_one_sentence_and_change_nothing_else(incom
     )
 
 
-@pytest.mark.parametrize("form", board_table.FORMATS)
+@pytest.mark.parametrize("form", FORMATS)
 def test_every_form_but_a_table_for_a_paper_says_which_cases_have_no_sequence(incomplete, form):
-    text = board_table.FORMATS[form](board(incomplete, {}), "ate")
+    text = FORMATS[form](board(incomplete, {}), "ate")
     assert ("no light" in text) == (form != "latex")
     assert "a" in text
 
@@ -174,7 +182,7 @@ def test_every_form_but_a_table_for_a_paper_says_which_cases_have_no_sequence(in
 def test_a_board_without_any_sequence_is_empty_and_says_why(incomplete):
     made = board([score for score in incomplete if score.case != "down"], {})
     assert (made.cells, made.totals) == ((), ())
-    for form, write in board_table.FORMATS.items():
+    for form, write in FORMATS.items():
         assert write(made, "ate"), form
 
 
@@ -187,27 +195,27 @@ def placed(scored):
     return board([scored("a"), scored("b")], {}, environment=here)
 
 
-@pytest.mark.parametrize("form", board_table.FORMATS)
+@pytest.mark.parametrize("form", FORMATS)
 def test_every_form_names_processor_driver_and_date(placed, form):
-    text = board_table.FORMATS[form](placed, "ate")
+    text = FORMATS[form](placed, "ate")
     for part in ("CPU 9", "x86-64-v3", "pipe", "2026-11-24"):
         assert part in text
 
 
 def test_in_csv_the_origin_is_columns_of_every_row(placed):
-    frame = pd.read_csv(io.StringIO(board_table.as_csv(placed)))
+    frame = pd.read_csv(io.StringIO(as_csv(placed)))
     assert set(frame.processor) == {"Some_CPU 9"}
     assert set(frame.simd) == {"x86-64-v3"}
     assert len(frame) == 4
 
 
 def test_in_latex_the_origin_is_a_comment(placed):
-    (line,) = [line for line in board_table.latex(placed).splitlines() if "Some_CPU" in line]
+    (line,) = [line for line in latex(placed).splitlines() if "Some_CPU" in line]
     assert line.startswith("% Made on Some_CPU 9 (x86-64-v3), ")
 
 
 def test_csv_has_a_row_for_each_case_without_a_sequence(incomplete):
-    frame = pd.read_csv(io.StringIO(board_table.as_csv(board(incomplete, {}))))
+    frame = pd.read_csv(io.StringIO(as_csv(board(incomplete, {}))))
     unmade = frame[frame.status == NO_SEQUENCE]
     assert dict(zip(unmade.case, unmade.reason, strict=True)) == {
         "dark": "no light",
@@ -219,14 +227,14 @@ def test_csv_has_a_row_for_each_case_without_a_sequence(incomplete):
 def test_totals_are_over_the_cases_that_all_have_and_say_so(scored):
     made = board([scored("a"), scored("a", case="ahead"), scored("b")], {})
     assert {total.cases for total in made.totals} == {1}
-    assert "over the 1 of 2 cases that every estimator has (b has 1)" in made.remarks[0]
+    assert "Totals cover the 1 of 2 cases that all estimators share (b has 1)" in made.remarks[0]
 
 
 def test_estimators_that_share_no_case_are_not_ranked(scored):
     made = board([scored("a"), scored("b", case="ahead")], {})
     assert made.totals == ()
-    assert "nobody is ranked" in made.remarks[0]
-    assert "| ahead |" in board_table.markdown(made)
+    assert "No estimator is ranked" in made.remarks[0]
+    assert "| ahead |" in markdown(made)
 
 
 def test_calibrations_have_totals_of_their_own(scored):
@@ -241,7 +249,7 @@ def test_a_scenario_says_at_which_severity_each_estimator_breaks(scored):
     weak = [scored("weak", "ok" if k < 2 else "lost", case=f"s{k}", ate_m=0.001) for k in range(4)]
     made = board([*strong, *weak], {}, facts)
     assert {curve.estimator: curve.breaks_at for curve in made.curves} == {"strong": None, "weak": 2}
-    assert "blur 0 to 3: weak breaks at 2 (0.99, 0.99, 0.49, 0.49)" in board_table.remarks(made)
+    assert "blur, severity 0 to 3: weak breaks down at 2 (scores 0.99, 0.99, 0.49, 0.49)" in board_table.remarks(made)
 
 
 def test_whoever_is_cheaper_than_all_before_is_efficient(scored):
@@ -286,12 +294,12 @@ def frames(*reasons):
 
 def test_the_commonest_reason_of_frames_is_counted_whatever_its_numbers():
     rows = frames("", "blurred", "too few tracks (7)", "", "too few tracks (-1.5e3)", "too few tracks")
-    assert answers([rows]) == EstimatorStatistics(2.0, "too few tracks (7)", 2, 12, frames=6)
+    assert summarize_frames([rows]) == EstimatorStatistics(2.0, "too few tracks (7)", 2, 12, frames=6)
 
 
 def test_frames_without_a_reason_have_none_and_no_frame_no_answer():
-    assert answers([frames("", ""), []]) == EstimatorStatistics(2.0, frames=2)
-    assert answers([[], []]) == EstimatorStatistics()
+    assert summarize_frames([frames("", ""), []]) == EstimatorStatistics(2.0, frames=2)
+    assert summarize_frames([[], []]) == EstimatorStatistics()
 
 
 @pytest.fixture
@@ -300,7 +308,7 @@ def made(run, mixed):
 
 
 def test_json_holds_every_cell_and_total_in_full(made):
-    read = json.loads(board_table.as_json(made))
+    read = json.loads(as_json(made))
     assert [(c["case"], c["estimator"], c["status"]) for c in read["cells"]] == [
         (cell.case, cell.estimator, cell.status) for cell in made.cells
     ]
@@ -309,7 +317,7 @@ def test_json_holds_every_cell_and_total_in_full(made):
 
 
 def test_csv_is_read_by_pandas_with_gaps_where_there_is_no_number(made):
-    read = pd.read_csv(io.StringIO(board_table.as_csv(made)))
+    read = pd.read_csv(io.StringIO(as_csv(made)))
     assert list(read["estimator"]) == [cell.estimator for cell in (*made.cells, *made.totals)]
     errors = [math.nan if (s := cell.spread("ate")) is None else s[0] for cell in made.cells]
     assert list(read["ate"])[: len(errors)] == pytest.approx(errors, rel=1e-12, nan_ok=True)
@@ -317,7 +325,7 @@ def test_csv_is_read_by_pandas_with_gaps_where_there_is_no_number(made):
 
 
 def test_markdown_has_as_many_cells_in_every_line_of_a_table(made):
-    text = board_table.markdown(made)
+    text = markdown(made)
     for table in text.split("\n\n"):
         if table.startswith("|"):
             assert len({len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}) == 1
@@ -328,12 +336,12 @@ def test_markdown_has_as_many_cells_in_every_line_of_a_table(made):
 HOSTILE = "<script>alert(1)</script>|&_%$#{}~^\\\x1b[2J\0"
 
 
-@pytest.mark.parametrize("form", [*board_table.FORMATS, "html"])
+@pytest.mark.parametrize("form", [*FORMATS, "html"])
 def test_a_hostile_name_and_reason_harm_no_form(tmp_path, scored, write_run, form):
     scores = [scored("<script>", "crashed", ate_m=None, reason=HOSTILE), scored("fine")]
     folder = write_run(tmp_path / "suite" / "stamp", scores)
     made = page.board_of(folder, scores)
-    text = page.html(folder, scores, made, tmp_path) if form == "html" else board_table.FORMATS[form](made, "ate")
+    text = page.html(folder, scores, made, tmp_path) if form == "html" else FORMATS[form](made, "ate")
     assert not {"\x1b", "\0"} & set(text)
     if form in ("md", "html"):
         assert "<script>alert" not in text
@@ -343,7 +351,7 @@ def test_a_hostile_name_and_reason_harm_no_form(tmp_path, scored, write_run, for
 
 
 def test_latex_is_a_table_with_caption_label_and_every_special_character_escaped(made):
-    text = board_table.latex(made)
+    text = latex(made)
     assert text.count("\\caption{") == text.count("\\label{tab:suite}") == 1
     assert re.search(r"\\begin\{tabular\}\{lr+\}", text)
     rows = [line for line in text.splitlines() if line.endswith("\\\\")]
@@ -380,11 +388,11 @@ def test_every_report_says_the_drift_of_a_still_case_and_the_commonest_reason_of
     page.write_reports(folder, scores)
     text = (folder.path / f"leaderboard.{form}").read_text(encoding="utf-8")
     if form == "md":
-        assert "still_one: stood still: drift 2.3 mm" in text
-        assert 'still_one: 2 frames "few &lt;7>", first at frame 1' in text
+        assert "still_one: drift of 2.3 mm while the camera is stationary" in text
+        assert 'still_one: 2 frames with "few &lt;7>", first in frame 1' in text
     elif form == "html":
         data = json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL)[1])
-        assert 'still_one: 2 frames "few <7>", first at frame 1' in str(data["details"])
+        assert 'still_one: 2 frames with "few <7>", first in frame 1' in str(data["details"])
     elif form == "csv":
         (row,) = pd.read_csv(io.StringIO(text)).query("estimator == 'still_one' and case == 'down'").to_dict("records")
         assert (row["drift_mm"], row["frame_reason"], row["frame_reason_count"]) == (2.34, "few <7>", 2)

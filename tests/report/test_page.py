@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from vobench.report import page
+from vobench.report.frame_moment import worst_moments
+from vobench.report.plot_points import MOST_POINTS, path_points, peak_indices
 from vobench.runner.folder import RunFolder
 from vobench.runner.frames import FrameRow
 
@@ -96,8 +98,8 @@ def test_it_is_called_after_its_suite_from_wherever_it_is_read(run, mixed, monke
 def test_the_details_of_a_hundred_cells_of_a_thousand_frames_are_small():
     """Each curve and each path has no more points than a plot can show."""
     errors = np.abs(np.random.default_rng(0).normal(size=5000))
-    assert len(page.peaks(errors)) <= page.MOST_POINTS >= len(page.points(errors[:, None].repeat(2, 1)))
-    assert np.argmax(errors) in page.peaks(errors)
+    assert len(peak_indices(errors)) <= MOST_POINTS >= len(path_points(errors[:, None].repeat(2, 1)))
+    assert np.argmax(errors) in peak_indices(errors)
 
 
 def rows(errors, statuses):
@@ -110,6 +112,6 @@ def test_the_worst_moments_are_where_track_was_lost_the_largest_error_and_its_la
     errors[40], errors[20:30] = 9, np.inf
     errors[50:] = 5
     frames = rows(errors, ["lost" if np.isinf(e) else "ok" for e in errors])
-    found = [(moment.frame, moment.why) for moment in page.moments(frames, errors)]
+    found = [(moment.frame, moment.why) for moment in worst_moments(frames, errors)]
     assert found == [(20, "lost"), (40, "large error"), (50, "jump")]
-    assert page.moments([], np.zeros(0)) == []
+    assert worst_moments([], np.zeros(0)) == []

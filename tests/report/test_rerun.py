@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from vobench.report.rerun import SceneMesh, TruthView, application_id, first_failure, rerun_matrix, save_trial
+from vobench.report.rerun import application_id, first_failure, rerun_matrix, save_trial
+from vobench.report.rerun_scene import SceneMesh
+from vobench.report.rerun_truth import TruthView
 from vobench.scene.scene import Path
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames
 from vobench.sequence import EncodedFrame, StereoTruth

@@ -136,7 +136,8 @@ def _pictures_column(labels: Sequence[str]) -> rrb.Vertical:
 
 def _plot(origin: str, name: str) -> rrb.TimeSeriesView:
     legend = rrb.PlotLegend(corner=rrb.Corner2D.RightTop)
-    return rrb.TimeSeriesView(origin=origin, name=name, axis_y=rrb.ScalarAxis(zoom_lock=True), plot_legend=legend)
+    axis = rrb.ScalarAxis(zoom_lock=True)
+    return rrb.TimeSeriesView(origin=origin, name=name, axis_y=axis, plot_legend=legend)
 
 
 def _left_picture(label: str, labels: Sequence[str]) -> rrb.Spatial2DView:
@@ -196,12 +197,15 @@ def eye_and_target(points_m: Array) -> tuple[Array, Array]:
     The eye is beside their longer side, on the side of -y.
     """
     target_m = (points_m.min(0) + points_m.max(0)) / 2
-    covariance = np.cov(points_m[:, :2].T, bias=True) if len(points_m) > 1 else np.eye(2)
+    covariance = np.eye(2)
+    if len(points_m) > 1:
+        covariance = np.cov(points_m[:, :2].T, bias=True)
     _, axes = np.linalg.eigh(covariance)
     shorter_axis = axes[:, 0]
     side = shorter_axis * (-1.0 if shorter_axis[1] > 0 else 1.0)
     pitch_rad = np.deg2rad(EYE_PITCH_DEG)
-    direction = np.array([*(np.cos(pitch_rad) * side), np.sin(pitch_rad)])
+    horizontal = np.cos(pitch_rad) * side
+    direction = np.array([*horizontal, np.sin(pitch_rad)])
     return target_m + EYE_DISTANCE_PER_RADIUS * _radius_m(points_m) * direction, target_m
 
 
@@ -217,7 +221,8 @@ def frustum_m(truth_m: Array) -> float:
 
 def _radius_m(points_m: Array) -> float:
     """Half the diagonal of the bounding box, at least LEAST_RADIUS_M so that a stationary robot is framed, too."""
-    return max(LEAST_RADIUS_M, float(np.linalg.norm(np.ptp(points_m, axis=0))) / 2)
+    diagonal_m = float(np.linalg.norm(np.ptp(points_m, axis=0)))
+    return max(LEAST_RADIUS_M, diagonal_m / 2)
 
 
 def _near_truth(truth_m: Array, estimate_m: Array) -> Array:

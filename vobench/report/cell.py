@@ -63,7 +63,8 @@ class Cell:
 
     def spread(self, metric: str) -> tuple[float, float, float] | None:
         """The median, minimum and maximum of a metric over the trials that have it, None if no trial has."""
-        known = [value for value in self.values[metric] if value is not None and abs(value) < inf]
+        present = [value for value in self.values[metric] if value is not None]
+        known = [value for value in present if abs(value) < inf]
         if not known:
             return None
         return median(known), min(known), max(known)

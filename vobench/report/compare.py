@@ -1,7 +1,7 @@
 """Two runs compared: whether each estimator, and each of its cells, got better or worse, and by how much."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp, isnan, log
 
 import numpy as np
@@ -58,7 +58,8 @@ class CellPair:
     @property
     def is_same(self) -> bool:
         """Whether losses and failures are equal to the last digit."""
-        return self.old.losses == self.new.losses and self.old.failures == self.new.failures
+        has_same_losses = self.old.losses == self.new.losses
+        return has_same_losses and self.old.failures == self.new.failures
 
 
 def compare(old: Board, new: Board, *, at_most: float | None = None) -> list[Change]:
@@ -81,7 +82,8 @@ def compare(old: Board, new: Board, *, at_most: float | None = None) -> list[Cha
             changes.append(_cell_change(pairs[key], p_values[key], at_most))
         else:
             case, estimator = key
-            changes.append(_unpaired_change(key, old.cell(case, estimator), new.cell(case, estimator), not_made))
+            change = _unpaired_change(case, estimator, old.cell(case, estimator), new.cell(case, estimator))
+            changes.append(replace(change, verdict=NOT_MADE) if case in not_made else change)
 
     totals = []
     for name in sorted({estimator for _, estimator in pairs}):
@@ -153,12 +155,9 @@ def _summary(cell: Cell | None) -> str:
     return ", ".join(parts) or cell.status
 
 
-def _unpaired_change(key: CellKey, old: Cell | None, new: Cell | None, not_made: set[str]) -> Change:
-    """The change of a cell that one run lacks; `not_made` are cases that one of the runs could not make."""
-    case, estimator = key
+def _unpaired_change(case: str, estimator: str, old: Cell | None, new: Cell | None) -> Change:
+    """The change of a cell that one run lacks."""
     verdict = NEW if new else GONE
-    if case in not_made:
-        verdict = NOT_MADE
     return Change(case, estimator, verdict, _summary(old), _summary(new))
 
 
@@ -167,7 +166,8 @@ def _cell_change(pair: CellPair, p: float, at_most: float | None) -> Change:
     new_losses = [loss for loss in pair.new.losses if not isnan(loss)]
     ratio = None
     if old_losses and new_losses:
-        ratio = exp(float(np.mean(np.log(new_losses)) - np.mean(np.log(old_losses))))
+        log_ratio = np.mean(np.log(new_losses)) - np.mean(np.log(old_losses))
+        ratio = exp(float(log_ratio))
     verdict = _cell_verdict(pair, p, is_beyond_limit=_exceeds(ratio, at_most))
 
     interval = None
@@ -208,11 +208,19 @@ def _cell_verdict(pair: CellPair, p: float, *, is_beyond_limit: bool) -> str:
 def _ratio_interval(old: Sequence[float], new: Sequence[float]) -> tuple[float, float] | None:
     """The bootstrap confidence interval of the ratio of mean losses; trials of both are drawn with replacement."""
     rng = np.random.default_rng(1)
-    old_means = rng.choice(np.log(old), (ranking.RESAMPLES, len(old))).mean(1)
-    new_means = rng.choice(np.log(new), (ranking.RESAMPLES, len(new))).mean(1)
-    quantiles = np.quantile(new_means - old_means, [ALPHA / 2, 1 - ALPHA / 2])
+    old_means = _resampled_log_means(old, rng)
+    new_means = _resampled_log_means(new, rng)
+    tail = ALPHA / 2
+    quantiles = np.quantile(new_means - old_means, [tail, 1 - tail])
     low, high = np.exp(quantiles).tolist()
     return (low, high) if high - low > LEAST_INTERVAL else None
+
+
+def _resampled_log_means(losses: Sequence[float], rng: np.random.Generator) -> Array:
+    """The mean logarithms (RESAMPLES,) of losses drawn with replacement."""
+    drawn = rng.choice(np.log(losses), (ranking.RESAMPLES, len(losses)))
+    means: Array = drawn.mean(1)
+    return means
 
 
 def _total_change(name: str, pairs: Sequence[CellPair], at_most: float | None) -> Change:
@@ -222,12 +230,12 @@ def _total_change(name: str, pairs: Sequence[CellPair], at_most: float | None) -
     is_worse = second.index == 1
     sign = 1 if is_worse else -1  # the ratios are of the second to the first
     ratio = second.loss_ratio**sign
+    direction = WORSE if is_worse else BETTER
+    verdict = WORSE if _exceeds(ratio, at_most) else UNDECIDED
+    if second.decided_above:
+        verdict = direction
     if all(pair.is_same for pair in pairs):
         verdict = SAME
-    elif second.decided_above:
-        verdict = WORSE if is_worse else BETTER
-    else:
-        verdict = WORSE if _exceeds(ratio, at_most) else UNDECIDED
 
     interval = None
     if second.ratio_interval and verdict != SAME:
@@ -239,7 +247,9 @@ def _total_change(name: str, pairs: Sequence[CellPair], at_most: float | None) -
 
 def _trial_arrays(pairs: Sequence[CellPair]) -> tuple[Array, Array]:
     """Losses and failures of the old and the new trials, both (2, cases, repeats), NaN for no trial."""
-    repeats = max(max(pair.old.trials, pair.new.trials) for pair in pairs)
+    most_old = max(pair.old.trials for pair in pairs)
+    most_new = max(pair.new.trials for pair in pairs)
+    repeats = max(most_old, most_new)
     losses = np.full((2, len(pairs), repeats), np.nan)
     failures = losses.copy()
     for case, pair in enumerate(pairs):

@@ -73,7 +73,9 @@ class DriveLog:
         if self.targets_m is None or self.point_m is None or self.reached_s is None:
             return None
         leg = np.searchsorted(self.reached_s, self.t_s, side="right")
-        error_m: Array = self.targets_m[np.minimum(leg, len(self.targets_m) - 1)] - self.point_m
+        last_leg = len(self.targets_m) - 1
+        target_m = self.targets_m[np.minimum(leg, last_leg)]
+        error_m: Array = target_m - self.point_m
         return error_m
 
     @property
@@ -147,7 +149,8 @@ def _figure(width: float, height: float) -> "Figure":
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    return Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=0.05, w_pad=0.05, hspace=0, wspace=0))
+    layout = ConstrainedLayoutEngine(h_pad=0.05, w_pad=0.05, hspace=0, wspace=0)
+    return Figure(figsize=(width, height), layout=layout)
 
 
 def undated(suffix: str) -> dict[str, None]:
@@ -177,7 +180,8 @@ def _path(axes: "Axes", log: DriveLog, *, legend: bool = True) -> None:
     """The path in top view, with headings, targets and patches of floor."""
     x, y = log.T_world_body[:, :2, 3].T
     for surface, corners_m in log.patches:
-        axes.fill(*corners_m.T, color=FLOORS.get(surface, NEUTRAL), alpha=0.25, lw=0, label=surface)
+        color = FLOORS.get(surface, NEUTRAL)
+        axes.fill(*corners_m.T, color=color, alpha=0.25, lw=0, label=surface)
     axes.plot(x, y, color=BODY, lw=1.4, label="body B")
     if log.point_m is not None:
         axes.plot(*log.point_m.T, color=POINT, lw=0.9, label="point h")
@@ -198,7 +202,8 @@ def _path(axes: "Axes", log: DriveLog, *, legend: bool = True) -> None:
 
 def _headings(axes: "Axes", log: DriveLog, *, length: float) -> None:
     """Arrows along the body's x axis, at even times; `length` is relative to that in a large plot."""
-    chosen = np.unique(np.linspace(0, len(log.t_s) - 1, ARROWS).astype(int))
+    last = len(log.t_s) - 1
+    chosen = np.unique(np.linspace(0, last, ARROWS).astype(int))
     positions_m = log.T_world_body[chosen, :2, 3]
     directions = log.T_world_body[chosen, :2, 0]
     axes.quiver(
@@ -253,8 +258,9 @@ def _last_panel(axes: "Axes", log: DriveLog) -> None:
         axes.plot(log.t_s, log.T_world_body[:, 2, 3], color=BODY, lw=1.2)
         axes.set_ylabel("height z (m)")
     else:
-        heading = np.unwrap(np.arctan2(log.T_world_body[:, 1, 0], log.T_world_body[:, 0, 0]))
-        axes.plot(log.t_s, np.rad2deg(heading), color=BODY, lw=1.2)
+        forward = log.T_world_body[:, :2, 0]  # (N, 2), world
+        heading_rad = np.unwrap(np.arctan2(forward[:, 1], forward[:, 0]))
+        axes.plot(log.t_s, np.rad2deg(heading_rad), color=BODY, lw=1.2)
         axes.set_ylabel("heading (°)")
 
 

@@ -22,7 +22,7 @@ from vobench.report.plot_points import path_points, peak_indices, spread_indices
 from vobench.report.thumbnail import Thumbnails
 from vobench.runner.estimate import ESTIMATE, LOG
 from vobench.runner.folder import SCORE, SURVIVED, RunFolder, TrialScore, read_tum, with_sequence
-from vobench.runner.frames import FRAMES, GROUND_TRUTH, read_frames
+from vobench.runner.frames import FRAMES, GROUND_TRUTH, FrameRow, read_frames
 from vobench.trajectory.align import Alignment
 
 MOST_DETAILS = 200  # cells that a page can open, the worst of all
@@ -134,7 +134,7 @@ class _Details:
         frames = read_frames(place)
         t_s = np.array([row.t_ns for row in frames]) / NS_PER_S
         # (N,), infinite for a frame without a pose
-        errors_m = np.array([inf if row.position_error_m is None else row.position_error_m for row in frames])
+        errors_m = np.array([_error_m(row) for row in frames])
         drawn = peak_indices(np.where(np.isinf(errors_m), -1.0, errors_m))
         path_m = _aligned_path(place, trial)
         link = quote(os.path.relpath(place, self._beside))
@@ -160,6 +160,10 @@ class _Details:
         return shown
 
 
+def _error_m(row: FrameRow) -> float:
+    return inf if row.position_error_m is None else row.position_error_m
+
+
 def _by_failures_and_loss(cell: Cell) -> tuple[float, float]:
     """A key that sorts the worst cell first."""
     largest_loss = float(np.nanmax([0.0, *cell.losses]))
@@ -170,7 +174,8 @@ def _worst_trial(trials: Sequence[TrialScore], losses: Sequence[float]) -> Trial
     """The trial with the largest loss, of those that failed if there are any; `losses` are by repeat."""
     ordered = sorted(trials, key=lambda trial: trial.repeat)
     loss_of = {trial.repeat: loss for trial, loss in zip(ordered, losses, strict=True)}
-    return max(trials, key=lambda trial: (trial.status not in SURVIVED, np.nan_to_num(loss_of[trial.repeat])))
+    failed = [trial for trial in trials if trial.status not in SURVIVED]
+    return max(failed or trials, key=lambda trial: np.nan_to_num(loss_of[trial.repeat]))
 
 
 def _aligned_path(place: Path, trial: TrialScore) -> Array:

@@ -81,7 +81,8 @@ class Practice:
                 if left is not None:
                     t_ns = index * STEP_NS
                     writer.write_frame(t_ns, left, right)
-                    writer.write_truth(t_ns, transform(np.eye(3), [STEP_M * steps, 0.0, 0.0]), np.zeros(6))
+                    T_world_left = transform(np.eye(3), [STEP_M * steps, 0.0, 0.0])
+                    writer.write_truth(t_ns, T_world_left, np.zeros(6))
         write_ground_truth(folder)
         return folder
 
@@ -113,7 +114,8 @@ def _write_readings(writer: SequenceWriter, index: int, steps: int) -> None:
     writer.write_imu(ImuReadings(t_ns, np.zeros_like(force_mps2), force_mps2))
     wheels = RIG.wheels
     assert wheels
-    ticks = round(STEP_M * steps / (2 * np.pi * wheels.radius_m) * wheels.ticks_per_revolution)
+    revolutions = STEP_M * steps / (2 * np.pi * wheels.radius_m)
+    ticks = round(revolutions * wheels.ticks_per_revolution)
     writer.write_encoders([index * STEP_NS], [[ticks, ticks]])
 
 

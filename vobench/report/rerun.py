@@ -144,7 +144,7 @@ def _log_pictures(stream: rr.RecordingStream, frames: Iterable[EncodedFrame], fo
                 encoded[blueprint.TRUTH_RIGHT] = frame.right
             recode = partial(_recoded, frame=frame, form=form)
             pictures = list(threads.map(partial(recode, quality=quality), encoded.values()))
-            while form == "jpeg" and sum(map(len, pictures)) > FRAME_BYTES and quality > WORST_QUALITY:
+            while form == "jpeg" and quality > WORST_QUALITY and _bytes(pictures) > FRAME_BYTES:
                 quality -= QUALITY_STEP
                 pictures = [recode(picture, quality=quality) for picture in encoded.values()]
 
@@ -155,6 +155,10 @@ def _log_pictures(stream: rr.RecordingStream, frames: Iterable[EncodedFrame], fo
                 stream.send_columns(f"{entity}/image", times, columns)
             stamps.append(frame.t_ns)
     return np.array(stamps, np.int64)
+
+
+def _bytes(pictures: Iterable[bytes]) -> int:
+    return sum(len(picture) for picture in pictures)
 
 
 def _recoded(encoded: bytes, *, frame: EncodedFrame, form: PictureForm, quality: int) -> bytes:
@@ -168,7 +172,8 @@ def _recoded(encoded: bytes, *, frame: EncodedFrame, form: PictureForm, quality:
     if colour == BAYER:
         picture = rgb(picture, BAYER)
         colour = RGB
-    return encode(picture, None, name, jpeg_quality=quality if form == "jpeg" else None, colour=colour)
+    jpeg_quality = quality if form == "jpeg" else None
+    return encode(picture, None, name, jpeg_quality=jpeg_quality, colour=colour)
 
 
 def _log_truth_path(log: FrameStream, trial: TrialView) -> None:
@@ -197,7 +202,8 @@ def _log_trial(log: FrameStream, trial: TrialView, color: Color, unit: Unit) -> 
     _log_numbers(log, f"{blueprint.STATS}/{trial.label}", trial.stats)
     _log_numbers(log, f"{blueprint.COSTS}/{trial.label}", trial.costs)
     _log_statuses(log, trial.statuses, entities)
-    log.static(entities.summary, rr.TextDocument(trial.summary_md, media_type=rr.MediaType.MARKDOWN))
+    summary = rr.TextDocument(trial.summary_md, media_type=rr.MediaType.MARKDOWN)
+    log.static(entities.summary, summary)
 
 
 def _log_estimate(log: FrameStream, trial: TrialView, entities: Entities, color: Color) -> None:
@@ -209,7 +215,8 @@ def _log_estimate(log: FrameStream, trial: TrialView, entities: Entities, color:
     length_m = blueprint.frustum_m(trial.ground_truth.positions_m)
     _log_camera(log, entities.left, trial.rig.left, trial.estimate, length_m=length_m, color=color)
     without_pose = np.setdiff1d(np.arange(log.count), frames)
-    log.columns(entities.left, without_pose, rr.Clear.columns(is_recursive=[False] * len(without_pose)))
+    clear = rr.Clear.columns(is_recursive=[False] * len(without_pose))
+    log.columns(entities.left, without_pose, clear)
 
 
 def _log_camera(
@@ -217,9 +224,8 @@ def _log_camera(
 ) -> None:
     """Log a camera along a path, drawn as a pyramid of a length."""
     frames, samples = log.match(path.t_ns)
-    poses = path.T_world_frame[samples]
     count = len(frames)
-    log.columns(entity, frames, rr.Transform3D.columns(translation=poses[:, :3, 3], mat3x3=poses[:, :3, :3]))
+    log.poses(entity, frames, path.T_world_frame[samples])
     pinhole = rr.Pinhole.columns(
         image_from_camera=[rerun_matrix(camera)] * count,
         resolution=[[camera.width_px, camera.height_px]] * count,
@@ -269,9 +275,10 @@ def _log_error_lines(log: FrameStream, trial: TrialView, entities: Entities) -> 
     truth_m = trial.ground_truth.positions_m[truth_samples[truth_rows]]
     estimate_m = trial.estimate.positions_m[estimate_samples[estimate_rows]]
     lines_per_frame = np.isin(np.arange(log.count), frames).astype(int)
-    columns = rr.LineStrips3D.columns(strips=np.stack([truth_m, estimate_m], 1)).partition(lines_per_frame)
+    lines_m = np.stack([truth_m, estimate_m], 1)  # (K, 2, 3), world
+    columns = rr.LineStrips3D.columns(strips=list(lines_m)).partition(lines_per_frame)
     log.static(entities.error_line, rr.LineStrips3D.from_fields(colors=RED, radii=LINE_RADIUS))
-    log.columns(entities.error_line, np.arange(log.count), columns)
+    log.every(entities.error_line, columns)
 
 
 def _log_points(log: FrameStream, points: Mapping[int, Array], entities: Entities, color: Color) -> None:
@@ -279,10 +286,11 @@ def _log_points(log: FrameStream, points: Mapping[int, Array], entities: Entitie
     if not points:
         return
     frames = sorted(points)
-    columns = rr.Points3D.columns(positions=np.concatenate([points[index] for index in frames]))
-    counts = [len(points[index]) for index in frames]
+    points_m = [points[index] for index in frames]
+    columns = rr.Points3D.columns(positions=np.concatenate(points_m))
+    counts = [len(each) for each in points_m]
     log.static(entities.points, rr.Points3D.from_fields(colors=color, radii=LINE_RADIUS))
-    log.columns(entities.points, np.array(frames, np.int64), columns.partition(counts))
+    log.columns(entities.points, np.array(frames), columns.partition(counts))
 
 
 def _log_numbers(log: FrameStream, origin: str, numbers: Mapping[str, Array]) -> None:

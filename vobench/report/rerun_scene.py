@@ -64,9 +64,8 @@ def log_scene(log: FrameStream, scene: SceneMesh) -> None:
     for index, path in enumerate(scene.paths):
         entity = f"{blueprint.SCENE}/mover_{index}"
         log.static(entity, scene.mesh(scene.mover == index))
-        poses = np.stack([path.pose(t_ns) for t_ns in log.t_ns.tolist()])  # (N, 4, 4), world
-        columns = rr.Transform3D.columns(translation=poses[:, :3, 3], mat3x3=poses[:, :3, :3])
-        log.columns(entity, np.arange(len(poses)), columns)
+        poses = [path.pose(t_ns) for t_ns in log.t_ns.tolist()]
+        log.poses(entity, np.arange(log.count), np.stack(poses))
 
 
 def scene_mesh(folder: RunFolder, case: str) -> SceneMesh | None:

@@ -7,6 +7,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from vobench.geometry.se3 import Array
 from vobench.report.blueprint import FRAME_TIMELINE
 from vobench.trajectory.trajectory import Stamps
 
@@ -47,7 +48,17 @@ class FrameStream:
     def columns(self, entity: str, frames: Indices, columns: Any) -> None:
         """Send one row for each of these frames, on both time lines."""
         if len(frames):
-            self.stream.send_columns(entity, time_columns(frames + self.first, self.t_ns[frames]), columns)
+            times = time_columns(frames + self.first, self.t_ns[frames])
+            self.stream.send_columns(entity, times, columns)
+
+    def every(self, entity: str, columns: Any) -> None:
+        """Send one row for each frame."""
+        self.columns(entity, np.arange(self.count), columns)
+
+    def poses(self, entity: str, frames: Indices, T: Array) -> None:
+        """Send the pose of an entity (K, 4, 4) in its parent, for each of these frames."""
+        columns = rr.Transform3D.columns(translation=T[:, :3, 3], mat3x3=T[:, :3, :3])
+        self.columns(entity, frames, columns)
 
     def match(self, t_ns: Stamps) -> tuple[Indices, Indices]:
         """The frames that have a sample within half the time between frames, and the index of that sample."""
@@ -58,5 +69,6 @@ class FrameStream:
         is_before_nearer = self.t_ns - t_ns[before] < t_ns[after] - self.t_ns
         nearest = np.where(is_before_nearer, before, after)
         step_ns = np.diff(self.t_ns).min(initial=NS_PER_S)
-        frames = np.flatnonzero(2 * np.abs(t_ns[nearest] - self.t_ns) < step_ns)
+        distance_ns = np.abs(t_ns[nearest] - self.t_ns)
+        frames = np.flatnonzero(2 * distance_ns < step_ns)
         return frames, nearest[frames]

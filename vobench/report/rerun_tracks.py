@@ -1,7 +1,6 @@
 """The tracks of an estimator in a Rerun recording: points, their tails, and true epipolar lines."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -34,7 +33,7 @@ def log_tracks(log: FrameStream, tracks: Mapping[int, Tracks], entities: Entitie
     is_inlier = np.concatenate([inliers for _, inliers in rows])
     columns = rr.Points2D.columns(positions=points_px + PIXEL_CENTRE, colors=_colors(is_inlier))
     log.static(entities.tracks, rr.Points2D.from_fields(radii=TRACK_RADIUS))
-    log.columns(entities.tracks, np.arange(log.count), columns.partition([len(points) for points, _ in rows]))
+    log.every(entities.tracks, columns.partition([len(points) for points, _ in rows]))
 
 
 def _tracks_of(tracks: Mapping[int, Tracks], index: int) -> Tracks:
@@ -57,7 +56,9 @@ def log_tails(log: FrameStream, tracks: Mapping[int, Tracks], steps: Mapping[int
         is_inlier.append(inliers[chosen])
         lengths.append(len(tails))
     columns = rr.LineStrips2D.columns(strips=strips, colors=_colors(np.concatenate(is_inlier)))
-    _log_strips(log, entities.tails, rr.LineStrips2D.from_fields(radii=TAIL_RADIUS), columns.partition(lengths))
+    style = rr.LineStrips2D.from_fields(radii=TAIL_RADIUS)
+    log.static(entities.tails, style)
+    log.every(entities.tails, columns.partition(lengths))
 
 
 def log_epipolar_lines(
@@ -72,12 +73,8 @@ def log_epipolar_lines(
         lengths.append(len(lines))
     columns = rr.LineStrips2D.columns(strips=strips)
     style = rr.LineStrips2D.from_fields(colors=EPIPOLAR, radii=EPIPOLAR_RADIUS)
-    _log_strips(log, entities.epipolar, style, columns.partition(lengths))
-
-
-def _log_strips(log: FrameStream, entity: str, style: Any, columns: Any) -> None:
-    log.static(entity, style)
-    log.columns(entity, np.arange(log.count), columns)
+    log.static(entities.epipolar, style)
+    log.every(entities.epipolar, columns.partition(lengths))
 
 
 def track_tails(
@@ -130,7 +127,8 @@ def epipolar_lines(rig: Rig, ground_truth: Trajectory, steps: Mapping[int, Array
     step = max(1, len(steps[index]) // MOST_LINES)
     previous_px = steps[index][::step]
     points_m = camera.rays(previous_px)[:, None] * DISTANCES_M[:, None]  # (L, P, 3), previous camera
-    T_current_previous = se3.inverse(ground_truth.T_world_frame[index]) @ ground_truth.T_world_frame[index - 1]
+    T_current_world = se3.inverse(ground_truth.T_world_frame[index])
+    T_current_previous = T_current_world @ ground_truth.T_world_frame[index - 1]
     lines_px = camera.project(se3.apply(T_current_previous, points_m.reshape(-1, 3)))
     lines_px = lines_px.reshape(*points_m.shape[:2], 2)
 

@@ -78,4 +78,5 @@ def _classes(channel: str, names: TruthNames) -> list[rr.AnnotationInfo]:
 def _named_ids(channel: str, names: tuple[str, ...]) -> list[rr.AnnotationInfo]:
     ids = np.arange(len(names), dtype=np.uint16)
     colors = picture(channel, ids[None])[0]
-    return [rr.AnnotationInfo(index, name, tuple(colors[index].tolist())) for index, name in enumerate(names)]
+    named_colors = zip(names, colors.tolist(), strict=True)
+    return [rr.AnnotationInfo(index, name, tuple(color)) for index, (name, color) in enumerate(named_colors)]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from vobench.metric.score import Score
-from vobench.report.board_markdown import plain_table
+from vobench.report.markdown_table import markdown_table
 
 COLUMNS = ("n", "rmse", "mean", "median", "std", "min", "max", "sse", "p95", "p99")
 SHOWN = ("n", "rmse", "mean", "median", "std", "min", "max", "p95", "p99")
@@ -48,7 +48,7 @@ def as_markdown(content: Content, scored: Sequence[Score], *, per_length: bool) 
     lines = []
     for headings, rows in tables(content, per_length=per_length):
         words = sum(heading in WORDS for heading in headings)
-        lines += [*plain_table([headings, *rows], words=words), ""]
+        lines += [*markdown_table([headings, *rows], words=words), ""]
     sentences = [*ids(content), *summaries(content, scored)]
     sentences += [f"warning: {warning}" for warning in warnings(content)]
     lines += [f"- {sentence}" for sentence in sentences]
@@ -76,10 +76,13 @@ def _metric_table(content: Content) -> Table:
 
 def _length_table(content: Content) -> Table:
     """The metrics by length of path."""
-    rows = []
-    for metric in content["per_length"]:
-        rows.append([metric["name"], metric["unit"], f"{metric['length_m']:g}", *_statistics(metric)])
+    rows = [_length_row(metric) for metric in content["per_length"]]
     return ["metric", "unit", "length m", *SHOWN], rows
+
+
+def _length_row(metric: Content) -> Row:
+    length = f"{metric['length_m']:g}"
+    return [metric["name"], metric["unit"], length, *_statistics(metric)]
 
 
 def _sequence_tables(content: Content) -> list[Table]:

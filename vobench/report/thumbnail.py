@@ -46,7 +46,8 @@ def _jpeg(picture: Any, width_px: int) -> bytes:
     """A picture (H, W) or (H, W, 3) in RGB, scaled to a width."""
     import cv2
 
-    height_px = max(1, round(picture.shape[0] * width_px / picture.shape[1]))
+    height, width = picture.shape[:2]
+    height_px = max(1, round(height * width_px / width))
     scaled = cv2.resize(picture, (width_px, height_px), interpolation=cv2.INTER_AREA)
     if scaled.ndim == 3:
         scaled = scaled[..., ::-1]  # OpenCV encodes blue, green, red

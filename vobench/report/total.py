@@ -155,13 +155,15 @@ def _medians(cells: Sequence[Cell], metric: str) -> list[float]:
 
 def _mark_efficient(totals: Sequence[Total]) -> list[Total]:
     """The same totals, marked as efficient if no estimator with a better score used less CPU time."""
-    costs_ms = {total.estimator: inf if total.cpu_ms is None else total.cpu_ms for total in totals}
-    best_first = sorted(totals, key=lambda total: (-total.score, costs_ms[total.estimator]))
+    best_first = sorted(totals, key=lambda total: (-total.score, _cpu_ms(total)))
     least_ms = inf
     efficient = set[str]()
     for total in best_first:
-        cost_ms = costs_ms[total.estimator]
-        if cost_ms < least_ms:
-            least_ms = cost_ms
+        if _cpu_ms(total) < least_ms:
+            least_ms = _cpu_ms(total)
             efficient.add(total.estimator)
     return [replace(total, is_efficient=total.estimator in efficient) for total in totals]
+
+
+def _cpu_ms(total: Total) -> float:
+    return inf if total.cpu_ms is None else total.cpu_ms

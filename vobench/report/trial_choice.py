@@ -37,7 +37,11 @@ def _selected(scores: Sequence[TrialScore], case: str | None, estimator: str | N
     """The trials of a case and an estimator that have a sequence to show."""
     _require_known("case", case, {score.case for score in scores})
     _require_known("estimator", estimator, {score.estimator for score in scores})
-    selected = [score for score in scores if case in (None, score.case) and estimator in (None, score.estimator)]
+    selected = list(scores)
+    if case is not None:
+        selected = [score for score in selected if score.case == case]
+    if estimator is not None:
+        selected = [score for score in selected if score.estimator == estimator]
     shown = with_sequence(selected)
     if selected and not shown:
         unmade = selected[0]

@@ -93,7 +93,7 @@ def trial_view(folder: RunFolder, trial: TrialScore, *, window: slice = slice(No
         error_m=error_m,
         rotation_deg=_column(shown, "rotation_error_deg"),
         statuses=[row.status or NO_OUTPUT for row in shown],
-        tracks={index: (table[:, 2:4].astype(float), table[:, 4] > 0) for index, table in tables.items()},
+        tracks={index: _tracks(table) for index, table in tables.items()},
         steps={index: table[:, :2].astype(float) for index, table in tables.items()},
         points=_points(place, alignment, first, end),
         stats=_stats(shown),
@@ -111,6 +111,11 @@ def _in_window(tables: Iterable[tuple[int, Table]], first: int, end: int) -> dic
     return {index - first: table for index, table in tables if first <= index < end}
 
 
+def _tracks(table: Table) -> Tracks:
+    """The points of a frame's tracks, and which of them are inliers."""
+    return table[:, 2:4].astype(float), table[:, 4] > 0
+
+
 def _aligned(estimate: Trajectory, alignment: Alignment | None) -> Trajectory:
     if alignment is None:
         return estimate
@@ -123,7 +128,8 @@ def _points(place: Path, alignment: Alignment | None, first: int, end: int) -> d
     for index, table in _in_window(read_tracks(place, of=POINTS), first, end).items():
         points_m = table.astype(float)
         if alignment is not None:
-            points_m = alignment.apply(se3.transform(np.eye(3), points_m))[:, :3, 3]
+            poses = se3.transform(np.eye(3), points_m)  # (K, 4, 4), as an alignment applies to poses
+            points_m = alignment.apply(poses)[:, :3, 3]
         points[index] = points_m
     return points
 
@@ -140,7 +146,9 @@ def _between(path: Trajectory, rows: Sequence[FrameRow]) -> Trajectory:
     """The poses of a path from the first to the last of these frames, all of them if there are no frames."""
     if not rows:
         return path
-    is_shown = (path.t_ns >= rows[0].t_ns) & (path.t_ns <= rows[-1].t_ns)
+    is_not_before = path.t_ns >= rows[0].t_ns
+    is_not_after = path.t_ns <= rows[-1].t_ns
+    is_shown = is_not_before & is_not_after
     return Trajectory(path.t_ns[is_shown], path.T_world_frame[is_shown])
 
 
