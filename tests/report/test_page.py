@@ -1,17 +1,16 @@
 """The page is well-formed, needs no network, shows everybody, and stays small."""
 
+import io
 import json
 import re
 from html.parser import HTMLParser
 
-import numpy as np
+import pandas as pd
 import pytest
 
 from vobench.report import page
-from vobench.report.frame_moment import worst_moments
-from vobench.report.plot_points import MOST_POINTS, path_points, peak_indices
 from vobench.runner.folder import RunFolder
-from vobench.runner.frames import FrameRow
+from vobench.runner.frames import COLUMNS, FRAMES, TIMES, new_table
 
 VOID = {"meta", "img", "input", "wbr"}
 
@@ -95,23 +94,41 @@ def test_it_is_called_after_its_suite_from_wherever_it_is_read(run, mixed, monke
     assert "<title>vobench: suite</title>" in text_of(here, mixed)
 
 
-def test_the_details_of_a_hundred_cells_of_a_thousand_frames_are_small():
-    """Each curve and each path has no more points than a plot can show."""
-    errors = np.abs(np.random.default_rng(0).normal(size=5000))
-    assert len(peak_indices(errors)) <= MOST_POINTS >= len(path_points(errors[:, None].repeat(2, 1)))
-    assert np.argmax(errors) in peak_indices(errors)
+def test_the_reports_of_a_run_are_written_beside_it(run, mixed):
+    page.write_reports(run, mixed)
+    assert {path.suffix for path in run.path.glob("leaderboard.*")} == {".md", ".json", ".csv", ".html"}
+    assert json.loads((run.path / "leaderboard.json").read_text(encoding="utf-8"))
 
 
-def rows(errors, statuses):
-    known = enumerate(zip(errors, statuses, strict=True))
-    return [FrameRow(k, k * 10**9, s, "", e, None, None, None, None, None, "", None, None) for k, (e, s) in known]
+def test_no_time_stands_in_a_report_but_in_a_file_of_its_own_and_in_the_page(run, mixed):
+    page.write_reports(run, mixed)
+    said = {path.suffix: path.read_text(encoding="utf-8") for path in run.path.glob("leaderboard.*")}
+    assert "CPU" in said.pop(".html")
+    assert "CPU" not in said[".md"]
+    assert {cell["cpu_ms"] for cell in json.loads(said[".json"])["cells"]} == {None}
+    with (run.path / TIMES).open(encoding="utf-8") as file:
+        assert {line.split(",")[3] for line in file} == {"cpu_ms", "2.000", ""}
 
 
-def test_the_worst_moments_are_where_track_was_lost_the_largest_error_and_its_largest_jump_well_apart():
-    errors = np.ones(60)
-    errors[40], errors[20:30] = 9, np.inf
-    errors[50:] = 5
-    frames = rows(errors, ["lost" if np.isinf(e) else "ok" for e in errors])
-    found = [(moment.frame, moment.why) for moment in worst_moments(frames, errors)]
-    assert found == [(20, "lost"), (40, "large error"), (50, "jump")]
-    assert worst_moments([], np.zeros(0)) == []
+@pytest.mark.parametrize("form", ["md", "html", "csv", "json"])
+def test_every_report_says_the_drift_of_a_still_case_and_the_commonest_reason_of_frames(
+    tmp_path, scored, write_run, form
+):
+    scores = [scored("still_one", drift_m=0.00234, ate_m=5.0), scored("moving_one", case="ahead")]
+    folder = write_run(tmp_path / "suite" / "stamp", scores)
+    with new_table(folder.estimate("down", "still_one", 0) / FRAMES, COLUMNS) as table:
+        table.writerows({"frame": k, "t_ns": k, "status": "lost", "reason": f"few <{9 - 2 * k}>"} for k in (1, 2))
+    page.write_reports(folder, scores)
+    text = (folder.path / f"leaderboard.{form}").read_text(encoding="utf-8")
+    if form == "md":
+        assert "still_one: drift of 2.3 mm while the camera is stationary" in text
+        assert 'still_one: 2 frames with "few &lt;7>", first in frame 1' in text
+    elif form == "html":
+        data = json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL)[1])
+        assert 'still_one: 2 frames with "few <7>", first in frame 1' in str(data["details"])
+    elif form == "csv":
+        (row,) = pd.read_csv(io.StringIO(text)).query("estimator == 'still_one' and case == 'down'").to_dict("records")
+        assert (row["drift_mm"], row["frame_reason"], row["frame_reason_count"]) == (2.34, "few <7>", 2)
+    else:
+        (row,) = (c for c in json.loads(text)["cells"] if c["estimator"] == "still_one")
+        assert (row["drift_mm"], row["ate_mm"], row["frame_reason_first"]) == (2.34, None, 1)
