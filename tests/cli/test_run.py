@@ -252,7 +252,9 @@ def test_a_run_of_which_some_cases_cannot_be_simulated_has_a_board_and_ends_with
     assert vobench("bundle", "runs/tiny", "partial.zip").code == 0
     assert vobench("score", "partial.zip").code == 0
     shown = vobench("view", "runs/tiny", "--case", "ahead", "--save", "a.rrd")
-    assert shown.err.startswith("vobench: 'ahead' has no sequence to show because it could not be simulated or imported: ")
+    assert shown.err.startswith(
+        "vobench: 'ahead' has no sequence to show because it could not be simulated or imported: "
+    )
 
 
 def test_the_board_and_the_page_say_where_the_figures_come_from(vobench, ran, here):

@@ -34,19 +34,21 @@ def worst_moments(frames: Sequence[FrameRow], errors_m: Array) -> list[FrameMome
     growth_m = np.diff(known_m, prepend=known_m[:1])
     criteria = (("lost", np.array(is_lost, float)), ("large error", known_m), ("jump", growth_m))
 
-    moments: list[FrameMoment] = []
+    moments = []
+    chosen: list[int] = []
     for why, values in criteria:
-        is_apart = _far_from(moments, len(frames))
+        is_apart = _far_from(chosen, len(frames))
         index = int(np.argmax(np.where(is_apart, values, -np.inf)))
         if is_apart[index] and values[index] > 0:
+            chosen.append(index)
             t_s = (frames[index].t_ns - frames[0].t_ns) / NS_PER_S
             moments.append(FrameMoment(frames[index].frame, round(t_s, 2), why))
     return moments
 
 
-def _far_from(moments: Sequence[FrameMoment], count: int) -> Array:
-    """Which of `count` frames are at least LEAST_GAP_FRAMES from all moments (N,)."""
+def _far_from(chosen: Sequence[int], count: int) -> Array:
+    """Which of `count` frames are at least LEAST_GAP_FRAMES from those chosen (N,)."""
     is_apart = np.ones(count, bool)
-    for moment in moments:
-        is_apart &= np.abs(np.arange(count) - moment.frame) >= LEAST_GAP_FRAMES
+    for index in chosen:
+        is_apart &= np.abs(np.arange(count) - index) >= LEAST_GAP_FRAMES
     return is_apart
