@@ -8,8 +8,6 @@ import pytest
 from rerun.chunk import RrdReader
 
 from vobench.report.rerun import application_id, first_failure, rerun_matrix, save_trial
-from vobench.report.rerun_scene import SceneMesh
-from vobench.scene.scene import Path
 from vobench.sequence import EncodedFrame
 from vobench.sequence.picture import encode
 from vobench.trajectory.trajectory import Trajectory
@@ -133,22 +131,6 @@ def test_tails_follow_tracks_back_and_epipolar_lines_pass_through_points_that_st
         along = np.diff(line, axis=0)
         share = np.clip(((point - line[:-1]) * along).sum(1) / np.maximum((along**2).sum(1), 1e-12), 0, 1)
         assert np.linalg.norm(line[:-1] + share[:, None] * along - point, axis=1).min() < 0.05
-
-
-def test_what_moves_is_a_mesh_of_its_own_that_goes_its_way(run_viewer, tmp_path):
-    corners = np.arange(27.0).reshape(3, 3, 3)
-    way = Path(np.array([0.0, 1.0]), np.array([[1.0, 2, 3], [2, 0, 3]]), np.array([0.0, 90]))
-    tones, light = np.zeros((3, 3), np.uint8), np.zeros((4, 4, 3), np.uint8)
-    scene = SceneMesh(corners, np.zeros((3, 3, 2)), light, tones, np.array([-1, 0, -1], np.int32), (way,))
-    save_trial(tmp_path / "moves.rrd", replace(run_viewer, scene=scene))
-    (still,) = rows(tmp_path / "moves.rrd", "/world/scene", static=True)
-    assert len(still["Mesh3D:vertex_positions"]) == 6
-    (walker,) = rows(tmp_path / "moves.rrd", "/world/scene/mover_0", static=True)
-    np.testing.assert_array_equal(walker["Mesh3D:vertex_positions"], corners[1])
-    at = values(tmp_path / "moves.rrd", "/world/scene/mover_0", "Transform3D:translation")
-    stamps = [frame.t_ns for frame in run_viewer.frames()]
-    np.testing.assert_allclose([at[i][0] for i in range(12)], [way.pose(t)[:3, 3] for t in stamps], atol=1e-6)
-    assert at[0] != at[11]
 
 
 def test_a_window_keeps_its_frames_numbers(run_viewer, tmp_path):

@@ -1,6 +1,8 @@
 """What is shown of a trial: its frames, aligned like its score, and its numbers by frame."""
 
+import io
 import json
+import zipfile
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from vobench.errors import InputError
 from vobench.report.practice import FRAMES as COUNT
 from vobench.report.practice import PRACTICES, STEP_NS
 from vobench.report.trial_view import NO_OUTPUT, summary, trial_view
-from vobench.runner.estimate import ESTIMATE
+from vobench.runner.estimate import ESTIMATE, POINTS, TRACKS
 from vobench.runner.folder import SEQUENCE, RunFolder, read_tum
 from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.trajectory.align import Alignment
@@ -45,7 +47,18 @@ def folder(tmp_path, trial) -> RunFolder:
                 row["stats"] = json.dumps({"depth_m": index} if index % 2 else {})
             frames.writerow(row)
             times.writerow({"frame": index, "wall_ms": index, "cpu_ms": 1, "memory_mib": 9})
+    with zipfile.ZipFile(place / TRACKS, "w") as archive:
+        for index in (2, 6):
+            archive.writestr(f"{index:06d}.npy", npy([[1, 2, 3, 4, 1], [5, 6, 7, 8, 0]]))
+        archive.writestr(f"{POINTS}000006.npy", npy([[1.0, 0.0, 0.0]]))
     return run
+
+
+def npy(rows):
+    """An array in single precision as the bytes of its file."""
+    file = io.BytesIO()
+    np.save(file, np.array(rows, np.float32))
+    return file.getvalue()
 
 
 def test_every_frame_has_its_errors_status_and_numbers(folder, trial):
@@ -99,7 +112,26 @@ def test_a_window_beyond_the_recording_and_a_sequence_that_is_gone_are_sentences
 
 def test_without_recorded_truth_of_pixels_and_scene_there_is_none(folder, trial):
     view = trial_view(folder, trial)
-    assert (view.truth, view.scene, view.tracks, view.points, view.steps) == (None, None, {}, {}, {})
+    assert (view.truth, view.scene) == (None, None)
+
+
+@pytest.mark.parametrize(("window", "frames"), [(slice(None), [2, 6]), (slice(6, 9), [0]), (slice(3, 6), [])])
+def test_tracks_and_points_are_those_of_the_window_by_its_frames(folder, trial, window, frames):
+    view = trial_view(folder, trial, window=window)
+    assert sorted(view.tracks) == sorted(view.steps) == frames
+    assert sorted(view.points) == frames[-1:]
+    for index in frames:
+        points_px, is_inlier = view.tracks[index]
+        assert points_px.tolist() == [[3, 4], [7, 8]]
+        assert is_inlier.tolist() == [True, False]
+        assert view.steps[index].tolist() == [[1, 2], [5, 6]]
+    for points_m in view.points.values():
+        np.testing.assert_allclose(points_m, [[2.0, 2.0, 3.0]])
+
+
+def test_points_of_an_estimate_without_a_score_are_not_aligned(folder, trial):
+    view = trial_view(folder, trial.model_copy(update={"score": None}))
+    assert view.points[6].tolist() == [[1.0, 0.0, 0.0]]
 
 
 def test_the_summary_is_the_score_in_markdown(trial):
