@@ -174,7 +174,10 @@ def test_a_table_of_totals_is_named_by_its_cases_and_its_group_where_there_are_s
     two = board([scored("a"), scored("a", case="ahead")], {})
     assert [scope for scope, _ in totals(two)] == ["2 cases"]
     groups = tuple(replace(two.totals[0], group=group) for group in ("", "worn"))
-    assert [scope for scope, _ in totals(replace(two, totals=groups))] == ["none, 2 cases", "worn, 2 cases"]
+    assert [scope for scope, _ in totals(replace(two, totals=groups))] == [
+        "calibration none, 2 cases",
+        "calibration worn, 2 cases",
+    ]
 
 
 def test_an_undecided_order_says_what_would_decide_it(scored):

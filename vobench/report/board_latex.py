@@ -75,8 +75,7 @@ def latex(board: Board, metric: str = DEFAULT_METRIC) -> str:
 
 def _rows(board: Board, metric: str, *, has_ranges: bool) -> tuple[Row, list[Row], list[Row]]:
     """The head, the rows of cases, and the rows of totals, if all cases are of one calibration group."""
-    claims_of = {cell.estimator: cell.claims for cell in board.cells}
-    head = ["", *(_escaped(named(name, claims_of[name])) for name in board.estimators)]
+    head = ["", *_names(board)]
     body = []
     for case, cells in matrix(board, metric):
         body.append([_escaped(case), *(_cell(cell, has_range=has_ranges) for cell in cells)])
@@ -84,11 +83,15 @@ def _rows(board: Board, metric: str, *, has_ranges: bool) -> tuple[Row, list[Row
     ranked = [total_of[name] for name in board.estimators if name in total_of]
     if len(totals(board)) != 1 or len(ranked) < len(board.estimators):
         return head, body, []
-    foot = [
-        ["score", *(_escaped(total_score(total)) for total in ranked)],
-        ["place", *(_escaped(place(total)) for total in ranked)],
-    ]
-    return head, body, foot
+    scores = [_escaped(total_score(total)) for total in ranked]
+    places = [_escaped(place(total)) for total in ranked]
+    return head, body, [["score", *scores], ["place", *places]]
+
+
+def _names(board: Board) -> Row:
+    """The estimators with their claims."""
+    claims_of = {cell.estimator: cell.claims for cell in board.cells}
+    return [_escaped(named(name, claims_of[name])) for name in board.estimators]
 
 
 def _transposed(table: Sequence[Row]) -> list[Row]:

@@ -171,7 +171,7 @@ def totals(board: Board) -> list[tuple[str, list[list[str]]]]:
     for group in groups:
         members = [total for total in board.totals if total.group == group]
         cases = _counted(members[0].cases, "case")
-        scope = f"{group or 'none'}, {cases}" if len(groups) > 1 else cases
+        scope = f"calibration {group or 'none'}, {cases}" if len(groups) > 1 else cases
         rows = [_total_row(total, headings) for total in members]
         tables.append((scope, [headings, *rows]))
     return tables

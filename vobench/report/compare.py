@@ -200,9 +200,14 @@ def _cell_verdict(pair: CellPair, p: float, *, is_beyond_limit: bool) -> str:
     if old.failed == old.trials and not new.failed:
         return MENDED
     if p < ALPHA:
-        is_worse = float(np.median(_ranked_losses(new))) > float(np.median(_ranked_losses(old)))
-        return WORSE if is_worse else BETTER
+        old_median = float(np.median(_ranked_losses(old)))
+        new_median = float(np.median(_ranked_losses(new)))
+        return _direction(is_worse=new_median > old_median)
     return WORSE if is_beyond_limit else UNDECIDED
+
+
+def _direction(*, is_worse: bool) -> str:
+    return WORSE if is_worse else BETTER
 
 
 def _ratio_interval(old: Sequence[float], new: Sequence[float]) -> tuple[float, float] | None:
@@ -230,12 +235,13 @@ def _total_change(name: str, pairs: Sequence[CellPair], at_most: float | None) -
     is_worse = second.index == 1
     sign = 1 if is_worse else -1  # the ratios are of the second to the first
     ratio = second.loss_ratio**sign
-    direction = WORSE if is_worse else BETTER
-    verdict = WORSE if _exceeds(ratio, at_most) else UNDECIDED
-    if second.decided_above:
-        verdict = direction
+    verdict = UNDECIDED
     if all(pair.is_same for pair in pairs):
         verdict = SAME
+    elif second.decided_above:
+        verdict = _direction(is_worse=is_worse)
+    elif _exceeds(ratio, at_most):
+        verdict = WORSE
 
     interval = None
     if second.ratio_interval and verdict != SAME:

@@ -76,9 +76,11 @@ def board(
     groups = sorted({cell.facts.group for cell in cells})
     totals = []
     for group in groups:
-        group_totals, group_remarks = rank_group(group, [cell for cell in cells if cell.facts.group == group])
+        group_cells = [cell for cell in cells if cell.facts.group == group]
+        group_totals, group_remarks = rank_group(group, group_cells)
         totals += group_totals
-        remarks += group_remarks
+        suffix = f" (calibration {group or 'none'})" if len(groups) > 1 else ""
+        remarks += [f"{remark}{suffix}" for remark in group_remarks]
     remarks += _group_remark(groups)
     remarks += _truth_noise_remarks(cells)
     return Board(

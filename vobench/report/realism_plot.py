@@ -26,7 +26,7 @@ LINE_SAMPLES = 30
 LEAST_REACH_PX = 0.3
 
 
-def save_plot(path: Path, found: Mapping[str, Realism]) -> None:
+def save_plot(path: Path, recordings: Mapping[str, Realism]) -> None:
     """Plot recordings by their names side by side, as SVG, PNG or PDF. Raises InputError for another ending."""
     check_ending(path)
     import matplotlib as mpl
@@ -38,20 +38,20 @@ def save_plot(path: Path, found: Mapping[str, Realism]) -> None:
             [["bands", "rows", "side"], ["bands", "spectrum", "gradient"], ["bands", "tracks", "grey"]],
             width_ratios=[1.25, 1, 1],
         )
-        _bands(panels["bands"], found)
-        _rows(panels["rows"], panels["side"], found)
-        _curves(panels, found)
+        _bands(panels["bands"], recordings)
+        _rows(panels["rows"], panels["side"], recordings)
+        _curves(panels, recordings)
         figure.savefig(path, dpi=DPI, metadata=undated(path.suffix))
 
 
-def _bands(axes: "Axes", found: Mapping[str, Realism]) -> None:
+def _bands(axes: "Axes", recordings: Mapping[str, Realism]) -> None:
     """Each statistic on a scale of its own, from the low end of its band (0) to the high end (1)."""
     axes.axvspan(0, 1, color=BAND, lw=0)
-    for index, (name, colour) in enumerate(zip(found, COLOURS, strict=False)):
+    for index, (name, colour) in enumerate(zip(recordings, COLOURS, strict=False)):
         axes.plot([], [], "o", color=colour, ms=6, label=name)
-        offset = RECORDING_SPACING * (index - (len(found) - 1) / 2)
+        offset = RECORDING_SPACING * (index - (len(recordings) - 1) / 2)
         for row, statistic in enumerate(STATISTICS):
-            value = found[name].values.get(statistic.name)
+            value = recordings[name].values.get(statistic.name)
             if value is not None:
                 _band_marker(axes, statistic, value, row + offset, colour)
     labels = [f"{each.title}\n{each.low:g} … {each.high:g} {each.unit}".rstrip() for each in STATISTICS]
@@ -59,7 +59,7 @@ def _bands(axes: "Axes", found: Mapping[str, Realism]) -> None:
     axes.set(ylim=(len(STATISTICS) - 0.4, -0.6), xlim=(SCALE_LOW - 0.3, SCALE_HIGH + 0.3))
     axes.set_title("statistics in the bands of real pictures")
     axes.set_xticks([0, 1], ["low end", "high end"])
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.09), ncols=len(found), frameon=False)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.09), ncols=len(recordings), frameon=False)
 
 
 def _band_marker(axes: "Axes", statistic: Statistic, value: float, y: float, colour: str) -> None:
@@ -83,9 +83,9 @@ def _band_marker(axes: "Axes", statistic: Statistic, value: float, y: float, col
     )
 
 
-def _rows(across: "Axes", down: "Axes", found: Mapping[str, Realism]) -> None:
+def _rows(across: "Axes", down: "Axes", recordings: Mapping[str, Realism]) -> None:
     """Row errors of stereo matches along the width and along the height of the picture."""
-    for realism, colour in zip(found.values(), COLOURS, strict=False):
+    for realism, colour in zip(recordings.values(), COLOURS, strict=False):
         if realism.pair:
             _row_errors(across, realism.pair, 0, colour)
             _row_errors(down, realism.pair, 1, colour)
@@ -112,8 +112,8 @@ def _row_errors(axes: "Axes", pair: StereoFit, axis: int, colour: str) -> None:
     axes.set_ylim(-reach, reach)
 
 
-def _curves(panels: "Mapping[str, Axes]", found: Mapping[str, Realism]) -> None:
-    for realism, colour in zip(found.values(), COLOURS, strict=False):
+def _curves(panels: "Mapping[str, Axes]", recordings: Mapping[str, Realism]) -> None:
+    for realism, colour in zip(recordings.values(), COLOURS, strict=False):
         _spectrum(panels["spectrum"], realism.curves["power"], colour)
         gradient = realism.curves["gradient"]
         panels["gradient"].semilogy(gradient / gradient.sum(), color=colour, lw=1.2, drawstyle="steps-mid")

@@ -57,10 +57,10 @@ def as_markdown(content: Content, scored: Sequence[Score], *, per_length: bool) 
 
 def tables(content: Content, *, per_length: bool) -> list[Table]:
     """Headings and rows of each table: the metrics, or the sequences and all of them pooled; then the lengths."""
-    found = _sequence_tables(content) if "sequences" in content else [_metric_table(content)]
-    if per_length:
-        found.append(_length_table(_whole(content)))
-    return found
+    metric_tables = _sequence_tables(content) if "sequences" in content else [_metric_table(content)]
+    if not per_length:
+        return metric_tables
+    return [*metric_tables, _length_table(_whole(content))]
 
 
 def _whole(content: Content) -> Content:
@@ -91,12 +91,13 @@ def _sequence_tables(content: Content) -> list[Table]:
     metrics = [metric for part in parts for metric in part["metrics"]]
     heading_of = {metric["name"]: _heading(metric) for metric in metrics}
     names = list(heading_of)
-    found = []
+    sequence_tables = []
     for first in range(0, len(names), MOST_METRICS):
         shown = names[first : first + MOST_METRICS]
         rows = [_sequence_row(name, part, shown) for name, part in _named_parts(content)]
-        found.append((["sequence", "coverage", *(heading_of[name] for name in shown)], rows))
-    return found
+        headings = [heading_of[name] for name in shown]
+        sequence_tables.append((["sequence", "coverage", *headings], rows))
+    return sequence_tables
 
 
 def _heading(metric: Content) -> str:
