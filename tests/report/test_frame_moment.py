@@ -62,3 +62,8 @@ def test_a_time_counts_from_the_first_frame_and_a_number_is_the_frames():
         frames.append(replace(row, frame=7 + index, t_ns=5 * 10**9 + row.t_ns // 3))
     (moment,) = worst_moments(frames, errors_m)
     assert moment == FrameMoment(frame=9, t_s=0.67, why="large error")
+
+
+def test_six_frames_are_enough_between_two_moments():
+    statuses = ["ok"] * 10 + ["lost"] + ["ok"] * 29
+    assert whys(errors_of(40, e16=9.0), statuses)[:2] == [(10, "lost"), (16, "large error")]

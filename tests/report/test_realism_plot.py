@@ -116,3 +116,52 @@ def test_curves_are_in_the_units_of_their_axes():
     assert panels["tracks"].get_lines()[0].get_ydata()[0] == 100.0
     (area,) = panels["grey"].collections
     assert area.get_paths()[0].vertices[:, 1].max() == pytest.approx(100 / 256)
+
+
+def test_limits_and_titles_tell_what_is_drawn(axes):
+    from matplotlib.figure import Figure
+
+    realism_plot._bands(axes, {"street": realism()})
+    (band,) = axes.patches
+    assert (band.get_x(), band.get_width(), band.get_facecolor()[:3]) == (
+        0,
+        1,
+        pytest.approx((201 / 255, 228 / 255, 211 / 255)),
+    )
+    assert axes.get_xlim() == pytest.approx((-2.3, 3.3))
+    assert axes.get_ylim() == pytest.approx((len(STATISTICS) - 0.4, -0.6))
+    panels = Figure().subplot_mosaic([["spectrum", "gradient", "tracks", "grey"]])
+    realism_plot._curves(panels, {"street": realism()})
+    dotted = [line.get_xdata()[0] for line in panels["spectrum"].get_lines() if line.get_linestyle() == ":"]
+    assert dotted == list(realism_plot.CYCLES)
+    assert panels["tracks"].get_ylim() == (0, 103)
+    assert [line.get_xdata()[0] for line in panels["grey"].get_lines()] == [realism_plot.BURNT_DN]
+
+
+def test_curves_are_thin_and_helping_lines_thinner():
+    from matplotlib.figure import Figure
+
+    panels = Figure().subplot_mosaic([["spectrum", "gradient", "tracks", "grey"]])
+    realism_plot._curves(panels, {"street": realism()})
+    for name in ("spectrum", "gradient", "tracks"):
+        assert panels[name].get_lines()[0].get_linewidth() == 1.2
+    helping = [*panels["spectrum"].get_lines()[1:], *panels["grey"].get_lines()]
+    assert {line.get_linewidth() for line in helping} == {0.6}
+    assert panels["tracks"].get_lines()[0].get_markersize() == 3
+
+
+def test_dots_of_row_errors_are_faint_and_the_fit_is_not(axes):
+    realism_plot._row_errors(axes, pair(), 0, COLOURS[0])
+    dots, fit = axes.get_lines()
+    assert (dots.get_markersize(), dots.get_alpha()) == (1.5, 0.3)
+    assert (fit.get_linewidth(), len(fit.get_xdata())) == (2, 30)
+
+
+def test_both_axes_of_the_picture_have_a_panel():
+    from matplotlib.figure import Figure
+
+    across, down = Figure().subplots(1, 2)
+    realism_plot._rows(across, down, {"street": realism(fit=pair()), "mono": realism()})
+    np.testing.assert_allclose(across.get_lines()[1].get_ydata(), 0.5 + 0.2 * across.get_lines()[1].get_xdata())
+    np.testing.assert_allclose(down.get_lines()[1].get_ydata(), 0.5)
+    assert (across.get_xlabel(), down.get_xlabel()) == ("x / f", "y / f")

@@ -3,13 +3,15 @@
 from collections import Counter
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from vobench.report import rerun
 from vobench.report.rerun import application_id, first_failure, rerun_matrix, save_trial
 from vobench.sequence import EncodedFrame
-from vobench.sequence.picture import encode
+from vobench.sequence.picture import BAYER, encode
 from vobench.trajectory.trajectory import Trajectory
 
 LEFT, RIGHT = "/world/ground_truth/left", "/world/ground_truth/right"
@@ -217,3 +219,57 @@ def test_right_camera_stands_beside_the_left(run_viewer, rrd):
     np.testing.assert_allclose(np.linalg.norm(gap, axis=1), run_viewer.rig.baseline_m, atol=1e-6)
     axis = run_viewer.ground_truth.T_world_frame[:, :3, 0]
     np.testing.assert_allclose(gap, run_viewer.rig.baseline_m * axis, atol=1e-6)
+
+
+@pytest.mark.parametrize(("error_m", "shown", "unit"), [(0.05, 50.0, "mm"), (2.0, 200.0, "cm"), (7.0, 7.0, "m")])
+def test_errors_are_in_the_unit_in_which_they_have_few_digits(run_viewer, tmp_path, error_m, shown, unit):
+    save_trial(tmp_path / "unit.rrd", replace(run_viewer, error_m=np.full(12, error_m)))
+    errors = values(tmp_path / "unit.rrd", "/position_error/estimate", "Scalars:scalars")
+    assert errors[3] == [pytest.approx(shown)]
+    (style,) = rows(tmp_path / "unit.rrd", "/position_error/estimate", static=True)
+    assert style["SeriesLines:names"] == [f"estimate ({unit})"]
+
+
+@pytest.mark.parametrize(("error_m", "unit"), [(0.1, "cm"), (5.0, "m")])
+def test_a_unit_changes_at_a_tenth_of_a_metre_and_at_five(run_viewer, error_m, unit):
+    assert rerun._unit([replace(run_viewer, error_m=np.array([error_m, np.nan]))])[1] == unit
+
+
+def test_a_mosaic_is_shown_in_colour(run_viewer, tmp_path):
+    mosaic = np.zeros((32, 48), np.uint8)
+    mosaic[::2, ::2] = 200  # red, in a mosaic that begins with it
+    png = encode(mosaic, None, "mosaic", colour=BAYER)
+    frames = [EncodedFrame(i, i * 10**8, "png", png, None, BAYER) for i in range(12)]
+    for form in ("png", "jpeg"):
+        save_trial(tmp_path / f"{form}.rrd", replace(run_viewer, frames=lambda: frames), form=form)
+        (blob,) = values(tmp_path / f"{form}.rrd", f"{LEFT}/image", "EncodedImage:blob")[4]
+        picture = cv2.imdecode(np.frombuffer(bytes(blob), np.uint8), cv2.IMREAD_COLOR)
+        blue, green, red = picture[8:-8, 8:-8].reshape(-1, 3).mean(0)
+        assert red > 100 > 2 * max(blue, green)
+
+
+def test_a_recording_opens_at_the_first_failure_of_any_trial_or_where_one_goes_wrong(run_viewer):
+    fine = replace(run_viewer, statuses=["ok"] * 60, first=100)
+    failed = replace(fine, statuses=["ok"] * 40 + ["lost"] + ["ok"] * 19)
+    wrong = replace(fine, wrong_at=50)
+    assert rerun._focus([fine]) is None
+    assert rerun._focus([fine, failed]) == (125, 155)
+    assert rerun._focus([fine, wrong]) == (135, 159)
+    assert rerun._focus([wrong, failed]) == (125, 155)
+
+
+def test_a_layout_has_a_plot_of_numbers_and_of_costs_where_there_are_some(run_viewer, tmp_path):
+    def names(trial):
+        save_trial(tmp_path / "it.rrd", trial)
+        (layout,) = RrdReader(tmp_path / "it.rrd").blueprints()
+        chunks = RrdReader(tmp_path / "it.rrd").stream(store=layout)
+        found = [row for chunk in chunks for row in chunk.to_record_batch().to_pylist()]
+        return {name for row in found for name in row.get("ViewBlueprint:display_name") or []}
+
+    numbers = {"a": np.arange(12.0)}
+    assert "Numbers reported by the estimator" in names(replace(run_viewer, stats=numbers))
+    assert "Latency (ms), exposure (ms), gain (dB)" in names(replace(run_viewer, costs=numbers))
+    plain = names(run_viewer)
+    assert "Right" in plain
+    assert not {"Numbers reported by the estimator", "Latency (ms), exposure (ms), gain (dB)"} & plain
+    assert "Truth green, estimate orange, error red" in plain

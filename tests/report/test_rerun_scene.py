@@ -2,14 +2,17 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from vobench.report import rerun_scene
 from vobench.report.rerun import save_trial
 from vobench.report.rerun_scene import SceneMesh, _baked_folder, scene_mesh
 from vobench.runner.folder import CASE, SEQUENCE, RunFolder
+from vobench.scene.material import Material, srgb
 from vobench.scene.scene import Path
 
 
@@ -85,3 +88,33 @@ def test_what_moves_is_a_mesh_of_its_own_that_goes_its_way(run_viewer, tmp_path)
     stamps = [frame.t_ns for frame in run_viewer.frames()]
     np.testing.assert_allclose([at[i][0] for i in range(12)], [way.pose(t)[:3, 3] for t in stamps], atol=1e-6)
     assert at[0] != at[11]
+
+
+def test_the_light_map_is_white_at_its_percentile_and_small(monkeypatch):
+    radiance = np.zeros((3000, 40, 3))
+    radiance[:1000] = np.linspace(0.001, 2.0, 1000)[:, None, None]
+    monkeypatch.setattr(rerun_scene, "Illumination", lambda light: SimpleNamespace(at=lambda layer, t_ns: radiance))
+    texture = rerun_scene._light_texture(None)
+    assert texture.shape == (1000, 14, 3)
+    assert texture.dtype == np.uint8
+    shown = radiance[::3, ::3]
+    white = np.percentile(shown[shown > 0], 98)
+    assert (texture[shown >= white] == 255).all()
+    assert texture[shown < 0.9 * white].max() < 255
+    np.testing.assert_array_equal(texture, srgb(shown / white))
+
+
+def test_a_scene_without_light_is_black(monkeypatch):
+    monkeypatch.setattr(
+        rerun_scene, "Illumination", lambda light: SimpleNamespace(at=lambda layer, t_ns: np.zeros((8, 8, 3)))
+    )
+    assert rerun_scene._light_texture(None).max() == 0
+
+
+def test_faces_have_the_colour_of_their_material_and_grey_without_one():
+    materials = {"red": Material(colour=(1.0, 0.0, 0.0))}
+    faces = SimpleNamespace(
+        things=[SimpleNamespace(material="red"), SimpleNamespace(material="none")], thing=np.array([1, 0, 0])
+    )
+    light = SimpleNamespace(scene=SimpleNamespace(materials=materials), faces=faces)
+    assert rerun_scene._face_colors(light).tolist() == [[128, 128, 128], [255, 0, 0], [255, 0, 0]]

@@ -96,3 +96,16 @@ def test_jupyter_shows_a_png_and_no_trial_is_an_error(plot, run):
     assert plot(0.01)._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(InputError, match="there is no trial to plot"):
         plot_case(run, [])
+
+
+def test_the_ground_truth_is_a_wide_pale_line_and_estimates_are_thin(plot):
+    figure = plot(0.01)
+    paths, errors = figure.axes
+    truth, start, estimate = paths.get_lines()
+    assert (truth.get_color(), truth.get_linewidth(), truth.get_alpha()) == ("black", 2.2, 0.45)
+    assert (start.get_marker(), start.get_markersize(), len(start.get_xdata())) == ("o", 4, 1)
+    assert estimate.get_linewidth() == errors.get_lines()[0].get_linewidth() == 1.2
+    assert figure.get_size_inches().tolist() == [9.0, 3.6]
+    figure.canvas.draw()
+    ratio = errors.get_gridspec().get_width_ratios()
+    assert ratio[1] == 1.25 * ratio[0]

@@ -197,9 +197,7 @@ def eye_and_target(points_m: Array) -> tuple[Array, Array]:
     The eye is beside their longer side, on the side of -y.
     """
     target_m = (points_m.min(0) + points_m.max(0)) / 2
-    covariance = np.eye(2)
-    if len(points_m) > 1:
-        covariance = np.cov(points_m[:, :2].T, bias=True)
+    covariance = np.cov(points_m[:, :2].T, bias=True)
     _, axes = np.linalg.eigh(covariance)
     shorter_axis = axes[:, 0]
     side = shorter_axis * (-1.0 if shorter_axis[1] > 0 else 1.0)

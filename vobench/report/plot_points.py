@@ -24,6 +24,7 @@ def path_points(path_m: Array) -> list[list[float]]:
 
 def peak_indices(errors: Array) -> list[int]:
     """At most MOST_POINTS of the indices of a curve (N,): the largest of each part, so that no peak is lost."""
-    count = min(len(errors), MOST_POINTS) or 1
-    parts = np.array_split(np.arange(len(errors)), count)
-    return [int(part[np.argmax(errors[part])]) for part in parts if len(part)]
+    if not len(errors):
+        return []
+    parts = np.array_split(np.arange(len(errors)), min(len(errors), MOST_POINTS))
+    return [int(part[np.argmax(errors[part])]) for part in parts]
