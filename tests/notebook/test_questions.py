@@ -88,6 +88,9 @@ def test_a_twin_is_made_in_its_folder_with_reports_of_its_runs(asked, monkeypatc
     asked(explain_trial, "explain_trial")
     vobench.explain("runs/x/case/a", out="runs")
     assert plans[1]["finish"] is None
+    vobench.twin("street")
+    assert [plan["make_display"].keywords["is_quiet"] for plan in plans] == [True, False, False]
+    assert plans[2]["out"] == Path("twin/runs")
 
 
 def test_drives_of_a_suite_are_those_of_its_trajectories(here):

@@ -1,5 +1,6 @@
 """The page is well-formed, needs no network, shows everybody, and stays small."""
 
+import csv
 import io
 import json
 import re
@@ -9,8 +10,10 @@ import pandas as pd
 import pytest
 
 from vobench.report import page
-from vobench.runner.folder import RunFolder
-from vobench.runner.frames import COLUMNS, FRAMES, TIMES, new_table
+from vobench.report.practice import PRACTICES
+from vobench.runner.environment import ENVIRONMENT, ENVIRONMENTS, Environment, Processor
+from vobench.runner.folder import CASE, SEQUENCE, SUITE, RunFolder
+from vobench.runner.frames import COLUMNS, FRAMES, TIME_COLUMNS, TIMES, new_table
 
 VOID = {"meta", "img", "input", "wbr"}
 
@@ -132,3 +135,92 @@ def test_every_report_says_the_drift_of_a_still_case_and_the_commonest_reason_of
     else:
         (row,) = (c for c in json.loads(text)["cells"] if c["estimator"] == "still_one")
         assert (row["drift_mm"], row["ate_mm"], row["frame_reason_first"]) == (2.34, None, 1)
+
+
+@pytest.fixture
+def seen(tmp_path, scored, write_run):
+    """A run of cases with pictures, each with the rig that its name begins with."""
+    practice = PRACTICES["drive"].write(tmp_path / "practice")
+
+    def make(*cases):
+        trials = [scored("a", case=case) for case in cases]
+        folder = write_run(tmp_path / "suite" / "stamp", trials)
+        for case in cases:
+            rig = case.partition("_")[0]
+            (folder.case(case) / CASE).write_text(json.dumps({"variant": {"rig": rig}}))
+            (folder.case(case) / SEQUENCE).symlink_to(practice)
+        return text_of(folder, trials)
+
+    return make
+
+
+def captions(text):
+    return re.findall(r'<img src="data:image/jpeg;base64,[^"]+" alt="First picture of (\w+)">', text)
+
+
+def test_each_rig_is_shown_once_by_its_first_picture(seen):
+    assert captions(seen("ahead_1", "ahead_2", "down_1", "down_2")) == ["ahead", "down"]
+
+
+def test_at_most_four_rigs_are_shown(seen):
+    assert captions(seen(*(f"{letter}_1" for letter in "abcdef"))) == ["a", "b", "c", "d"]
+
+
+def test_a_case_without_pictures_or_a_rig_shows_none(run, mixed):
+    assert captions(text_of(run, mixed)) == []
+
+
+def facts_of(text):
+    return dict(re.findall(r"<dt>([^<]*)</dt><dd>([^<]*)</dd>", text))
+
+
+def test_the_header_states_what_was_run_and_leaves_out_what_is_not_known(run, mixed):
+    assert facts_of(text_of(run, mixed)) == {
+        "trials": "6, 3 failed",
+        "estimators": "dead, good_one, mad: what it could see is not recorded.",
+    }
+    (run.path / SUITE).write_text(json.dumps({"seed": 3, "repeats": 4, "summary": "Two rooms"}))
+    text = text_of(run, mixed)
+    assert facts_of(text)["seed"] == "3"
+    assert facts_of(text)["repeats"] == "4"
+    assert "<p>Two rooms</p>" in text
+    assert "<details" not in text
+
+
+def test_the_header_states_the_machine(run, mixed):
+    environment = Environment(
+        vobench="1.0",
+        python="3.12.1",
+        platform="Linux",
+        processors=(Processor("Some CPU", "x86-64-v3"),),
+        cores=2,
+        cores_total=8,
+        drawn_by=("llvmpipe",),
+        portable=True,
+        libraries={"numpy": "2.4"},
+        timed="alone",
+    )
+    (run.path / ENVIRONMENT).write_bytes(ENVIRONMENTS.dump_json(environment))
+    text = text_of(run, mixed)
+    facts = facts_of(text)
+    assert facts["processor"] == "Some CPU (x86-64-v3)"
+    assert (facts["cores"], facts["driver"], facts["portable"]) == ("2 of 8", "llvmpipe", "yes")
+    assert (facts["vobench"], facts["system"], facts["CPU time"]) == ("vobench 1.0", "Linux", "taken alone")
+    assert "Python 3.12.1, numpy 2.4</details>" in text
+
+
+def test_costs_are_means_and_memory_a_maximum(scored, write_run, tmp_path):
+    trials = [scored("a", repeat=repeat) for repeat in (0, 1)]
+    folder = write_run(tmp_path / "suite" / "stamp", trials)
+    with new_table(folder.estimate("down", "a", 1) / TIMES, TIME_COLUMNS) as table:
+        table.writerow({"frame": 0, "wall_ms": 4.0, "cpu_ms": 8.0, "memory_mib": 1.0})
+    page.write_reports(folder, trials)
+    (row,) = csv.DictReader(io.StringIO((folder.path / TIMES).read_text()))
+    assert row == {"case": "down", "estimator": "a", "wall_ms": "2.500", "cpu_ms": "5.000", "memory_mib": "3.000"}
+
+
+def test_a_run_without_any_number_has_a_page(tmp_path, scored, write_run):
+    trials = [scored("a", "crashed", ate_m=None, drift_m=0.0, coverage=0.0)]
+    folder = write_run(tmp_path / "suite" / "stamp", trials)
+    made = page.board_of(folder, [])
+    assert '<option value="ate" selected>ATE % of path</option>' in page.html(folder, [], made, tmp_path)

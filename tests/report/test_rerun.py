@@ -273,3 +273,14 @@ def test_a_layout_has_a_plot_of_numbers_and_of_costs_where_there_are_some(run_vi
     assert "Right" in plain
     assert not {"Numbers reported by the estimator", "Latency (ms), exposure (ms), gain (dB)"} & plain
     assert "Truth green, estimate orange, error red" in plain
+
+
+def test_each_status_has_its_colour_and_an_unknown_one_is_grey(run_viewer, tmp_path):
+    save_trial(tmp_path / "it.rrd", replace(run_viewer, statuses=["odd", *["ok"] * 11]))
+    (row,) = rows(tmp_path / "it.rrd", "/status/estimate", static=True)
+    named = dict(zip(row["StateConfiguration:values"], row["StateConfiguration:colors"], strict=True))
+    colors = {name: (value >> 24, value >> 16 & 255, value >> 8 & 255) for name, value in named.items()}
+    assert colors["odd"] == (128, 128, 128)
+    assert colors["ok"] == (60, 200, 90)
+    assert colors["lost"] == (235, 60, 60)
+    assert list(colors) == ["init", "ok", "stationary", "degraded", "lost", "no output", "odd"]
