@@ -74,6 +74,10 @@ def test_those_of_the_house_keep_it(name):
     assert_contract(builtin_root() / "estimators" / name)
 
 
+def test_a_restart_has_the_seed_of_the_run(plugin):
+    assert_contract(plugin("return Result(np.eye(4))", start="assert seed == 0; self.n = 0"))
+
+
 def test_a_plugins_own_test_says_all_that_is_broken(plugin):
     folder = plugin("frame.left[0] = 0; return Result(np.eye(4))")
     with pytest.raises(AssertionError, match=r"does not keep the contract: frames unchanged, restart: invalid_output"):
