@@ -85,6 +85,8 @@ def test_row_errors_are_dots_and_their_fit_is_a_line_within_a_symmetric_range(ax
     realism_plot._row_errors(axes, pair(), 0, COLOURS[0])
     dots, fit = axes.get_lines()
     assert len(dots.get_xdata()) == realism_plot.MOST_DOTS
+    ends = [0, -1]
+    np.testing.assert_array_equal(dots.get_xdata()[ends], pair().matches.place[ends, 0])
     np.testing.assert_allclose(fit.get_ydata(), 0.5 + 0.2 * fit.get_xdata())
     assert -0.6 < fit.get_xdata()[0] < -0.59
     assert axes.get_ylim() == pytest.approx((-0.8, 0.8))
