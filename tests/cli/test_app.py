@@ -162,8 +162,8 @@ def test_a_mistake_in_the_words_themselves_is_exit_code_2(vobench):
     [
         (("report", "runs/tiny", "--out", "no/board.md"), "No such file or directory: no/board.md"),
         (("report", "runs/tiny", "--format", "md", "--out", "runs"), "Is a directory: runs"),
-        (("view", "runs/tiny", "--save", "no/a.rrd"), "--save should be a file to write, but this is in a folder that cannot be written: no/a.rrd"),
-        (("view", "runs/tiny", "--save", "runs"), "--save should be a file to write, but this is a folder: runs"),
+        (("view", "runs/tiny", "--save", "no/a.rrd"), "--save should name a file in a folder that can be written to, got no/a.rrd"),
+        (("view", "runs/tiny", "--save", "runs"), "--save should name a file, but this is a folder: runs"),
         (("view", "runs/tiny", "--case", "long"), "no case 'long' in this run. Known: short"),
         (("view", "runs/tiny", "--estimator", "me"), "no estimator 'me' in this run. Known: stand_still, wheel_odometry"),
     ],

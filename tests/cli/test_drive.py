@@ -83,8 +83,8 @@ def test_the_plot_shows_the_floor_and_the_point_that_is_led_where_there_are_such
     for name in ("legs", "spin"):
         assert vobench("drive", "ways", "-t", name, "--out", f"{name}.svg").code == 0
     legs, spin = ((ways / f"{name}.svg").read_text() for name in ("legs", "spin"))
-    assert [word in legs for word in ("point h", "carpet", "u asked for")] == [True, False, True]
-    assert [word in spin for word in ("point h", "carpet", "u asked for")] == [False, True, True]
+    assert [word in legs for word in ("point h", "carpet", "u requested")] == [True, False, True]
+    assert [word in spin for word in ("point h", "carpet", "u requested")] == [False, True, True]
 
 
 @pytest.mark.parametrize("ending", ["svg", "png", "pdf"])

@@ -70,7 +70,7 @@ def test_a_poor_one_ends_with_0_and_imports_from_inside_vobench_are_named(vobenc
     assert tried.code == 0, tried.out
     advice = "advice    imports: estimator.py:3: vobench.estimator.Result: from vobench.plugin import Result\n"
     assert tried.out.startswith(advice)
-    assert "poor      standstill: at most 19.00 mm away within a second; at most 10 mm is good\n" in tried.out
+    assert "poor      standstill: moves by up to 19.00 mm within a second; up to 10 mm is good\n" in tried.out
     assert "BROKEN" not in tried.out
 
 

@@ -18,4 +18,4 @@ def test_a_plot_of_another_kind_is_refused_in_one_line(vobench, ran):
     case = next((ran / "latest" / "cases").iterdir())
     said = vobench("realism", case, "--plot", "plot.gif")
     assert said.code == 1
-    assert "a plot's name should end in .svg, .png, .pdf" in said.err
+    assert "the name of a plot should end in .svg, .png, .pdf" in said.err

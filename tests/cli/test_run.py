@@ -100,7 +100,7 @@ def test_without_its_cache_a_run_still_reports_and_view_says_how_to_get_the_pict
     assert vobench("report", "runs/tiny").code == 0
     said = vobench("view", "runs/tiny", "--save", "a.rrd")
     assert said.code == 1
-    assert said.err.startswith("vobench: the sequence is gone from the cache; run the suite again to make it anew: ")
+    assert said.err.startswith("vobench: the sequence is no longer in the cache; run the suite again to recreate it: ")
     assert vobench("run", "tiny").code == 0
     assert vobench("view", "runs/tiny", "--save", "a.rrd").code == 0
 
@@ -252,7 +252,9 @@ def test_a_run_of_which_some_cases_cannot_be_simulated_has_a_board_and_ends_with
     assert vobench("bundle", "runs/tiny", "partial.zip").code == 0
     assert vobench("score", "partial.zip").code == 0
     shown = vobench("view", "runs/tiny", "--case", "ahead", "--save", "a.rrd")
-    assert shown.err.startswith("vobench: 'ahead' has no sequence to show, as it could not be made: ")
+    assert shown.err.startswith(
+        "vobench: 'ahead' has no sequence to show because it could not be simulated or imported: "
+    )
 
 
 def test_the_board_and_the_page_say_where_the_figures_come_from(vobench, ran, here):

@@ -93,7 +93,7 @@ def test_a_run_verifies_and_a_changed_one_does_not(vobench, ran):
     estimate.write_text(estimate.read_text().replace("0.000000000 0.0 ", "0.000000000 0.1 ", 1))
     said = vobench("verify", "runs/tiny")
     assert said.code == 1
-    assert "not the bytes that the run wrote" in said.out
+    assert "the file has changed since the run wrote it" in said.out
     assert vobench("verify", "runs/tiny", "--json").json["wrong"] == 2
 
 

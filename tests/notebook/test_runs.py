@@ -117,7 +117,7 @@ def test_a_view_without_a_display_says_what_to_do_and_a_saved_one_is_a_file(ran,
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     run = vobench.read_run(ran)
     assert run.view("short", estimator="stand_still", save=tmp_path / "look.rrd").stat().st_size > 1000
-    with pytest.raises(MissingDependencyError, match="no display to open the viewer on"):
+    with pytest.raises(MissingDependencyError, match="there is no display to open the viewer on"):
         run.view()
 
 

@@ -29,7 +29,7 @@ def test_pictures_and_truth_go_together(here):
 def test_a_case_that_is_not_there_is_named(here):
     with pytest.raises(UnknownNameError, match=r"no case named 'shirt'. Did you mean 'short'"):
         vobench.simulate("tiny", name="shirt")
-    with pytest.raises(InputError, match="name and changes belong to a suite"):
+    with pytest.raises(InputError, match="name and changes apply to a suite"):
         vobench.simulate(vobench.check("tiny").plan.cases[0], name="short")
 
 

@@ -10,9 +10,12 @@ import pytest
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
-from vobench.report.rerun import TrialView, save_trial
+from vobench.report.leaderboard import board
+from vobench.report.rerun import save_trial
+from vobench.report.trial_view import TrialView
 from vobench.runner import estimate as estimate_file
-from vobench.runner.folder import SCORE, RunFolder, TrialScore
+from vobench.runner.environment import Environment, Processor
+from vobench.runner.folder import NO_SEQUENCE, SCORE, RunFolder, TrialScore
 from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.runner.store import write_json
 from vobench.sequence import EncodedFrame
@@ -124,3 +127,25 @@ def rrd(run_viewer: TrialView, tmp_path_factory: pytest.TempPathFactory) -> Path
     path = tmp_path_factory.mktemp("viewer") / "run.rrd"
     save_trial(path, run_viewer)
     return path
+
+
+@pytest.fixture
+def incomplete(scored):
+    """Two estimators on a case that was simulated, and on three that were not, for two causes."""
+    causes = {"dark": "no light", "dim": "no light", "far": "too far"}
+    return [
+        scored(name, case=case, ate_m=ate_m)
+        if case == "down"
+        else scored(name, NO_SEQUENCE, case=case, ate_m=None, reason=causes[case])
+        for name, ate_m in (("a", 0.01), ("b", 0.02))
+        for case in ("down", *causes)
+    ]
+
+
+@pytest.fixture
+def placed(scored):
+    """A board of which is known where it was made."""
+    here = Environment(
+        vobench="1.0", processors=(Processor("Some_CPU 9", "x86-64-v3"),), drawn_by=("pipe & co",), date="2026-11-24"
+    )
+    return board([scored("a"), scored("b")], {}, environment=here)

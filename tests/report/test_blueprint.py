@@ -1,5 +1,7 @@
 """The eye sees the whole path, whatever its shape, and stands where a path looks long."""
 
+import colorsys
+
 import numpy as np
 import pytest
 
@@ -51,7 +53,7 @@ def test_estimate_that_flies_off_does_not_change_the_view():
     truth = PATHS["circle"]
     near = truth + np.array([0.1, 0, 0])
     flown = np.concatenate([near, [[1e6, 0, 0]]])
-    np.testing.assert_array_equal(bp._near(truth, flown), bp._near(truth, near))
+    np.testing.assert_array_equal(bp._near_truth(truth, flown), bp._near_truth(truth, near))
 
 
 @pytest.mark.parametrize("extent_m", [0.5, 1.0, 7.0, 20.0, 300.0])
@@ -59,3 +61,36 @@ def test_grid_has_three_to_thirty_lines(extent_m):
     spacing_m = bp.grid_spacing_m(extent_m)
     assert 3 <= extent_m / spacing_m <= 30 + 1e-9
     assert np.log10(spacing_m) == pytest.approx(round(np.log10(spacing_m)))
+
+
+@pytest.mark.parametrize(
+    ("name", "hue_deg"), [("orange", 32), ("blue", 212), ("violet", 285), ("yellow", 52), ("cyan", 180)]
+)
+def test_each_colour_is_what_it_is_called(name, hue_deg):
+    red, green, blue = (value / 255 for value in bp.ESTIMATOR_COLORS[name])
+    hue, lightness, saturation = colorsys.rgb_to_hls(red, green, blue)
+    assert 360 * hue == pytest.approx(hue_deg, abs=3)
+    assert 0.5 < lightness < 0.75
+    assert saturation > 0.55
+
+
+def test_a_camera_is_drawn_in_proportion_to_its_path():
+    assert bp.frustum_m(2 * PATHS["circle"]) == pytest.approx(2 * bp.frustum_m(PATHS["circle"]))
+    assert bp.frustum_m(PATHS["straight"]) == pytest.approx(0.8)
+    assert bp.frustum_m(PATHS["at rest"]) == pytest.approx(0.04)
+
+
+def test_the_eye_is_as_far_away_as_the_path_is_large():
+    for path in (PATHS["straight"], PATHS["circle"]):
+        eye, target = bp.eye_and_target(path)
+        radius_m = np.linalg.norm(np.ptp(path, axis=0)) / 2
+        assert np.linalg.norm(eye - target) == pytest.approx(1.6 * radius_m)
+        assert np.rad2deg(np.arcsin((eye - target)[2] / (1.6 * radius_m))) == pytest.approx(38.0)
+        assert eye[1] < target[1]
+
+
+def test_an_estimate_counts_up_to_twice_the_radius_from_the_middle():
+    truth = PATHS["straight"]  # of 10 m around (5, 0)
+    near, far = np.array([[14.9, 0, 0.4]]), np.array([[15.1, 0, 0.4]])
+    assert len(bp._near_truth(truth, near)) == len(truth) + 1
+    assert len(bp._near_truth(truth, far)) == len(truth)

@@ -104,5 +104,100 @@ def test_another_processor_is_named_and_runs_that_do_not_state_theirs_differ_in_
 
 
 def test_runs_of_different_suites_are_a_sentence(scored):
-    with pytest.raises(InputError, match="no estimator has a case in both runs: a on down in the old one, a on ahead"):
+    with pytest.raises(
+        InputError,
+        match="the two runs have no estimator on the same case: the old run has a on down, the new run has a on ahead",
+    ):
         compare(board([scored("a")], {}), board([scored("a", case="ahead")], {}))
+
+
+def one_cell(scored, errors, statuses=None):
+    statuses = statuses or ["ok"] * len(errors)
+    return board(
+        [
+            scored("a", status, repeat=n, ate_m=ate)
+            for n, (status, ate) in enumerate(zip(statuses, errors, strict=True))
+        ],
+        {},
+    )
+
+
+def cell_change(scored, old, new, **options):
+    ((change,),) = [verdicts(one_cell(scored, *old), one_cell(scored, *new), **options)[1]]
+    return change
+
+
+def test_a_cell_is_described_by_its_error_and_its_failures(scored):
+    change = cell_change(scored, ([0.02, 0.04, 0.03],), ([0.05, 0.05], ["ok", "lost"]))
+    assert (change.old, change.new) == ("3 %", "5 %, 1/2 lost")
+    failed = cell_change(scored, ([None], ["crashed"]), ([0.02],))
+    assert (failed.old, failed.new) == ("1/1 crashed", "2 %")
+    stationary = board([scored("a", drift_m=0.1)], {})
+    assert verdicts(stationary, stationary)[1][0].old == "ok"
+
+
+def test_a_cell_of_one_run_alone_has_a_dash_for_the_other(scored):
+    old, new = board([scored("a"), scored("b")], {}), board([scored("a")], {})
+    gone = next(change for change in verdicts(old, new)[1] if change.verdict == GONE)
+    assert (gone.old, gone.new, gone.ratio, gone.p) == ("10 %", "–", None, None)
+
+
+def test_a_ratio_is_that_of_the_geometric_means_of_the_losses(scored):
+    change = cell_change(scored, ([0.01, 0.04],), ([0.02, 0.02],))
+    assert change.ratio == pytest.approx(1.0)
+    assert cell_change(scored, ([0.01],), ([0.03],)).ratio == pytest.approx(3.0)
+    assert cell_change(scored, ([None], ["crashed"]), ([0.03],)).ratio < 0.2
+
+
+@pytest.mark.parametrize(("trials", "has_interval"), [(3, False), (4, True)])
+def test_an_interval_takes_four_trials_of_both(scored, trials, has_interval):
+    old = [0.010, 0.011, 0.012, 0.013, 0.014][:trials]
+    new = [2 * ate for ate in [0.010, 0.011, 0.012, 0.013, 0.014]]
+    for pair in ((old, new), (new, old)):
+        change = cell_change(scored, (pair[0],), (pair[1],))
+        assert (change.interval is not None) == has_interval
+    if has_interval:
+        low, high = cell_change(scored, (old,), (new,)).interval
+        assert 1.7 < low < 2.0 < high < 2.4
+
+
+def test_trials_that_are_all_alike_have_no_interval(scored):
+    assert cell_change(scored, ([0.01] * 4,), ([0.02] * 4,)).interval is None
+
+
+def test_a_cell_that_fails_in_part_has_not_failed_altogether(scored):
+    partly = ([0.01, 0.01], ["ok", "lost"])
+    assert cell_change(scored, ([0.01, 0.01],), partly).verdict == UNDECIDED
+    assert cell_change(scored, ([0.01, 0.01], ["lost", "lost"]), partly).verdict == UNDECIDED
+    assert cell_change(scored, ([0.01, 0.01], ["lost", "lost"]), ([0.01, 0.01],)).verdict == MENDED
+
+
+def test_a_limit_is_exceeded_by_more_than_itself_only(scored):
+    limit = cell_change(scored, ([0.01],), ([0.02],)).ratio
+    assert cell_change(scored, ([0.01],), ([0.02],), at_most=limit).verdict == UNDECIDED
+    assert cell_change(scored, ([0.01],), ([0.02],), at_most=0.999 * limit).verdict == WORSE
+
+
+def test_a_total_has_both_scores_and_the_limit_counts_for_it_too(trials):
+    old, new = trials(cases=2), trials(cases=2, factor=2.0, seed=1)
+    (change,) = verdicts(old, new)[0].values()
+    assert (change.case, change.verdict) == ("", UNDECIDED)
+    assert float(change.old) == pytest.approx(old.totals[0].score, abs=6e-5)
+    assert float(change.new) == pytest.approx(new.totals[0].score, abs=6e-5)
+    assert change.ratio == pytest.approx((1 - new.totals[0].score) / (1 - old.totals[0].score), rel=1e-6)
+    assert verdicts(old, new, at_most=1.2)[0]["a"].verdict == WORSE
+    (better,) = verdicts(new, old)[0].values()
+    assert better.ratio == pytest.approx(1 / change.ratio)
+
+
+def test_totals_come_first_by_name_and_then_every_cell(trials, scored):
+    made = board([scored(name, case=case) for name in ("b", "a") for case in ("x", "y")], {})
+    changes = compare(made, made)
+    assert [(change.estimator, change.case) for change in changes] == [
+        ("a", ""),
+        ("b", ""),
+        ("a", "x"),
+        ("b", "x"),
+        ("a", "y"),
+        ("b", "y"),
+    ]

@@ -1,15 +1,19 @@
 """The page is well-formed, needs no network, shows everybody, and stays small."""
 
+import csv
+import io
 import json
 import re
 from html.parser import HTMLParser
 
-import numpy as np
+import pandas as pd
 import pytest
 
 from vobench.report import page
-from vobench.runner.folder import RunFolder
-from vobench.runner.frames import FrameRow
+from vobench.report.practice import PRACTICES
+from vobench.runner.environment import ENVIRONMENT, ENVIRONMENTS, Environment, Processor
+from vobench.runner.folder import CASE, SEQUENCE, SUITE, RunFolder
+from vobench.runner.frames import COLUMNS, FRAMES, TIME_COLUMNS, TIMES, new_table
 
 VOID = {"meta", "img", "input", "wbr"}
 
@@ -93,23 +97,130 @@ def test_it_is_called_after_its_suite_from_wherever_it_is_read(run, mixed, monke
     assert "<title>vobench: suite</title>" in text_of(here, mixed)
 
 
-def test_the_details_of_a_hundred_cells_of_a_thousand_frames_are_small():
-    """Each curve and each path has no more points than a plot can show."""
-    errors = np.abs(np.random.default_rng(0).normal(size=5000))
-    assert len(page.peaks(errors)) <= page.MOST_POINTS >= len(page.points(errors[:, None].repeat(2, 1)))
-    assert np.argmax(errors) in page.peaks(errors)
+def test_the_reports_of_a_run_are_written_beside_it(run, mixed):
+    page.write_reports(run, mixed)
+    assert {path.suffix for path in run.path.glob("leaderboard.*")} == {".md", ".json", ".csv", ".html"}
+    assert json.loads((run.path / "leaderboard.json").read_text(encoding="utf-8"))
 
 
-def rows(errors, statuses):
-    known = enumerate(zip(errors, statuses, strict=True))
-    return [FrameRow(k, k * 10**9, s, "", e, None, None, None, None, None, "", None, None) for k, (e, s) in known]
+def test_no_time_stands_in_a_report_but_in_a_file_of_its_own_and_in_the_page(run, mixed):
+    page.write_reports(run, mixed)
+    said = {path.suffix: path.read_text(encoding="utf-8") for path in run.path.glob("leaderboard.*")}
+    assert "CPU" in said.pop(".html")
+    assert "CPU" not in said[".md"]
+    assert {cell["cpu_ms"] for cell in json.loads(said[".json"])["cells"]} == {None}
+    with (run.path / TIMES).open(encoding="utf-8") as file:
+        assert {line.split(",")[3] for line in file} == {"cpu_ms", "2.000", ""}
 
 
-def test_the_worst_moments_are_where_track_was_lost_the_largest_error_and_its_largest_jump_well_apart():
-    errors = np.ones(60)
-    errors[40], errors[20:30] = 9, np.inf
-    errors[50:] = 5
-    frames = rows(errors, ["lost" if np.isinf(e) else "ok" for e in errors])
-    found = [(moment.frame, moment.why) for moment in page.moments(frames, errors)]
-    assert found == [(20, "lost"), (40, "large error"), (50, "jump")]
-    assert page.moments([], np.zeros(0)) == []
+@pytest.mark.parametrize("form", ["md", "html", "csv", "json"])
+def test_every_report_says_the_drift_of_a_still_case_and_the_commonest_reason_of_frames(
+    tmp_path, scored, write_run, form
+):
+    scores = [scored("still_one", drift_m=0.00234, ate_m=5.0), scored("moving_one", case="ahead")]
+    folder = write_run(tmp_path / "suite" / "stamp", scores)
+    with new_table(folder.estimate("down", "still_one", 0) / FRAMES, COLUMNS) as table:
+        table.writerows({"frame": k, "t_ns": k, "status": "lost", "reason": f"few <{9 - 2 * k}>"} for k in (1, 2))
+    page.write_reports(folder, scores)
+    text = (folder.path / f"leaderboard.{form}").read_text(encoding="utf-8")
+    if form == "md":
+        assert "still_one: drift of 2.3 mm while the camera is stationary" in text
+        assert 'still_one: 2 frames with "few &lt;7>", first in frame 1' in text
+    elif form == "html":
+        data = json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL)[1])
+        assert 'still_one: 2 frames with "few <7>", first in frame 1' in str(data["details"])
+    elif form == "csv":
+        (row,) = pd.read_csv(io.StringIO(text)).query("estimator == 'still_one' and case == 'down'").to_dict("records")
+        assert (row["drift_mm"], row["frame_reason"], row["frame_reason_count"]) == (2.34, "few <7>", 2)
+    else:
+        (row,) = (c for c in json.loads(text)["cells"] if c["estimator"] == "still_one")
+        assert (row["drift_mm"], row["ate_mm"], row["frame_reason_first"]) == (2.34, None, 1)
+
+
+@pytest.fixture
+def seen(tmp_path, scored, write_run):
+    """A run of cases with pictures, each with the rig that its name begins with."""
+    practice = PRACTICES["drive"].write(tmp_path / "practice")
+
+    def make(*cases):
+        trials = [scored("a", case=case) for case in cases]
+        folder = write_run(tmp_path / "suite" / "stamp", trials)
+        for case in cases:
+            rig = case.partition("_")[0]
+            (folder.case(case) / CASE).write_text(json.dumps({"variant": {"rig": rig}}))
+            (folder.case(case) / SEQUENCE).symlink_to(practice)
+        return text_of(folder, trials)
+
+    return make
+
+
+def captions(text):
+    return re.findall(r'<img src="data:image/jpeg;base64,[^"]+" alt="First picture of (\w+)">', text)
+
+
+def test_each_rig_is_shown_once_by_its_first_picture(seen):
+    assert captions(seen("ahead_1", "ahead_2", "down_1", "down_2")) == ["ahead", "down"]
+
+
+def test_at_most_four_rigs_are_shown(seen):
+    assert captions(seen(*(f"{letter}_1" for letter in "abcdef"))) == ["a", "b", "c", "d"]
+
+
+def test_a_case_without_pictures_or_a_rig_shows_none(run, mixed):
+    assert captions(text_of(run, mixed)) == []
+
+
+def facts_of(text):
+    return dict(re.findall(r"<dt>([^<]*)</dt><dd>([^<]*)</dd>", text))
+
+
+def test_the_header_states_what_was_run_and_leaves_out_what_is_not_known(run, mixed):
+    assert facts_of(text_of(run, mixed)) == {
+        "trials": "6, 3 failed",
+        "estimators": "dead, good_one, mad: what it could see is not recorded.",
+    }
+    (run.path / SUITE).write_text(json.dumps({"seed": 3, "repeats": 4, "summary": "Two rooms"}))
+    text = text_of(run, mixed)
+    assert facts_of(text)["seed"] == "3"
+    assert facts_of(text)["repeats"] == "4"
+    assert "<p>Two rooms</p>" in text
+    assert "<details" not in text
+
+
+def test_the_header_states_the_machine(run, mixed):
+    environment = Environment(
+        vobench="1.0",
+        python="3.12.1",
+        platform="Linux",
+        processors=(Processor("Some CPU", "x86-64-v3"),),
+        cores=2,
+        cores_total=8,
+        drawn_by=("llvmpipe",),
+        portable=True,
+        libraries={"numpy": "2.4"},
+        timed="alone",
+    )
+    (run.path / ENVIRONMENT).write_bytes(ENVIRONMENTS.dump_json(environment))
+    text = text_of(run, mixed)
+    facts = facts_of(text)
+    assert facts["processor"] == "Some CPU (x86-64-v3)"
+    assert (facts["cores"], facts["driver"], facts["portable"]) == ("2 of 8", "llvmpipe", "yes")
+    assert (facts["vobench"], facts["system"], facts["CPU time"]) == ("vobench 1.0", "Linux", "taken alone")
+    assert "Python 3.12.1, numpy 2.4</details>" in text
+
+
+def test_costs_are_means_and_memory_a_maximum(scored, write_run, tmp_path):
+    trials = [scored("a", repeat=repeat) for repeat in (0, 1)]
+    folder = write_run(tmp_path / "suite" / "stamp", trials)
+    with new_table(folder.estimate("down", "a", 1) / TIMES, TIME_COLUMNS) as table:
+        table.writerow({"frame": 0, "wall_ms": 4.0, "cpu_ms": 8.0, "memory_mib": 1.0})
+    page.write_reports(folder, trials)
+    (row,) = csv.DictReader(io.StringIO((folder.path / TIMES).read_text()))
+    assert row == {"case": "down", "estimator": "a", "wall_ms": "2.500", "cpu_ms": "5.000", "memory_mib": "3.000"}
+
+
+def test_a_run_without_any_number_has_a_page(tmp_path, scored, write_run):
+    trials = [scored("a", "crashed", ate_m=None, drift_m=0.0, coverage=0.0)]
+    folder = write_run(tmp_path / "suite" / "stamp", trials)
+    made = page.board_of(folder, [])
+    assert '<option value="ate" selected>ATE % of path</option>' in page.html(folder, [], made, tmp_path)

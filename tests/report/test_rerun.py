@@ -3,15 +3,15 @@
 from collections import Counter
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from vobench.report.rerun import SceneMesh, TruthView, application_id, first_failure, rerun_matrix, save_trial
-from vobench.scene.scene import Path
-from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames
-from vobench.sequence import EncodedFrame, StereoTruth
-from vobench.sequence.picture import encode
+from vobench.report import rerun
+from vobench.report.rerun import application_id, first_failure, rerun_matrix, save_trial
+from vobench.sequence import EncodedFrame
+from vobench.sequence.picture import BAYER, encode
 from vobench.trajectory.trajectory import Trajectory
 
 LEFT, RIGHT = "/world/ground_truth/left", "/world/ground_truth/right"
@@ -135,22 +135,6 @@ def test_tails_follow_tracks_back_and_epipolar_lines_pass_through_points_that_st
         assert np.linalg.norm(line[:-1] + share[:, None] * along - point, axis=1).min() < 0.05
 
 
-def test_what_moves_is_a_mesh_of_its_own_that_goes_its_way(run_viewer, tmp_path):
-    corners = np.arange(27.0).reshape(3, 3, 3)
-    way = Path(np.array([0.0, 1.0]), np.array([[1.0, 2, 3], [2, 0, 3]]), np.array([0.0, 90]))
-    tones, light = np.zeros((3, 3), np.uint8), np.zeros((4, 4, 3), np.uint8)
-    scene = SceneMesh(corners, np.zeros((3, 3, 2)), light, tones, np.array([-1, 0, -1], np.int32), (way,))
-    save_trial(tmp_path / "moves.rrd", replace(run_viewer, scene=scene))
-    (still,) = rows(tmp_path / "moves.rrd", "/world/scene", static=True)
-    assert len(still["Mesh3D:vertex_positions"]) == 6
-    (walker,) = rows(tmp_path / "moves.rrd", "/world/scene/mover_0", static=True)
-    np.testing.assert_array_equal(walker["Mesh3D:vertex_positions"], corners[1])
-    at = values(tmp_path / "moves.rrd", "/world/scene/mover_0", "Transform3D:translation")
-    stamps = [frame.t_ns for frame in run_viewer.frames()]
-    np.testing.assert_allclose([at[i][0] for i in range(12)], [way.pose(t)[:3, 3] for t in stamps], atol=1e-6)
-    assert at[0] != at[11]
-
-
 def test_a_window_keeps_its_frames_numbers(run_viewer, tmp_path):
     frames = list(run_viewer.frames())[5:9]
     t_ns, T = run_viewer.ground_truth.t_ns[5:9], run_viewer.ground_truth.T_world_frame[5:9]
@@ -237,76 +221,66 @@ def test_right_camera_stands_beside_the_left(run_viewer, rrd):
     np.testing.assert_allclose(gap, run_viewer.rig.baseline_m * axis, atol=1e-6)
 
 
-COUNT = 3
+@pytest.mark.parametrize(("error_m", "shown", "unit"), [(0.05, 50.0, "mm"), (2.0, 200.0, "cm"), (7.0, 7.0, "m")])
+def test_errors_are_in_the_unit_in_which_they_have_few_digits(run_viewer, tmp_path, error_m, shown, unit):
+    save_trial(tmp_path / "unit.rrd", replace(run_viewer, error_m=np.full(12, error_m)))
+    errors = values(tmp_path / "unit.rrd", "/position_error/estimate", "Scalars:scalars")
+    assert errors[3] == [pytest.approx(shown)]
+    (style,) = rows(tmp_path / "unit.rrd", "/position_error/estimate", static=True)
+    assert style["SeriesLines:names"] == [f"estimate ({unit})"]
 
 
-def make_truth(index: int) -> TruthFrame:
-    rng = np.random.default_rng(index)
-    values = {}
-    for name, channel in CHANNELS.items():
-        shape = channel.shape(32, 48)
-        values[name] = rng.uniform(0, 3, shape).astype(channel.dtype)
-    values["depth"][0] = np.nan
-    return TruthFrame(**values)
+@pytest.mark.parametrize(("error_m", "unit"), [(0.1, "cm"), (5.0, "m")])
+def test_a_unit_changes_at_a_tenth_of_a_metre_and_at_five(run_viewer, error_m, unit):
+    assert rerun._unit([replace(run_viewer, error_m=np.array([error_m, np.nan]))])[1] == unit
 
 
-@pytest.fixture(scope="module")
-def view() -> TruthView:
-    names = TruthNames(("", "floor", "cart"), ("", "oak", "glass"))
-    frames = [StereoTruth(i, i * 33_000_000, make_truth(i), make_truth(i + 100)) for i in range(COUNT)]
-    return TruthView(tuple(CHANNELS), names, lambda: frames)
+def test_a_mosaic_is_shown_in_colour(run_viewer, tmp_path):
+    mosaic = np.zeros((32, 48), np.uint8)
+    mosaic[::2, ::2] = 200  # red, in a mosaic that begins with it
+    png = encode(mosaic, None, "mosaic", colour=BAYER)
+    frames = [EncodedFrame(i, i * 10**8, "png", png, None, BAYER) for i in range(12)]
+    for form in ("png", "jpeg"):
+        save_trial(tmp_path / f"{form}.rrd", replace(run_viewer, frames=lambda: frames), form=form)
+        (blob,) = values(tmp_path / f"{form}.rrd", f"{LEFT}/image", "EncodedImage:blob")[4]
+        picture = cv2.imdecode(np.frombuffer(bytes(blob), np.uint8), cv2.IMREAD_COLOR)
+        blue, green, red = picture[8:-8, 8:-8].reshape(-1, 3).mean(0)
+        assert red > 100 > 2 * max(blue, green)
 
 
-@pytest.fixture(scope="module")
-def path(run_viewer, view, tmp_path_factory):
-    path = tmp_path_factory.mktemp("truth") / "run.rrd"
-    save_trial(path, replace(run_viewer, truth=view))
-    return path
+def test_a_recording_opens_at_the_first_failure_of_any_trial_or_where_one_goes_wrong(run_viewer):
+    fine = replace(run_viewer, statuses=["ok"] * 60, first=100)
+    failed = replace(fine, statuses=["ok"] * 40 + ["lost"] + ["ok"] * 19)
+    wrong = replace(fine, wrong_at=50)
+    assert rerun._focus([fine]) is None
+    assert rerun._focus([fine, failed]) == (125, 155)
+    assert rerun._focus([fine, wrong]) == (135, 159)
+    assert rerun._focus([wrong, failed]) == (125, 155)
 
 
-def rows_truth(path, entity, *, static=False):
-    chunks = [c for c in RrdReader(path).stream() if c.entity_path == entity and c.is_static == static]
-    return [row for chunk in chunks for row in chunk.to_record_batch().to_pylist()]
+def test_a_layout_has_a_plot_of_numbers_and_of_costs_where_there_are_some(run_viewer, tmp_path):
+    def names(trial):
+        save_trial(tmp_path / "it.rrd", trial)
+        (layout,) = RrdReader(tmp_path / "it.rrd").blueprints()
+        chunks = RrdReader(tmp_path / "it.rrd").stream(store=layout)
+        found = [row for chunk in chunks for row in chunk.to_record_batch().to_pylist()]
+        return {name for row in found for name in row.get("ViewBlueprint:display_name") or []}
+
+    numbers = {"a": np.arange(12.0)}
+    assert "Numbers reported by the estimator" in names(replace(run_viewer, stats=numbers))
+    assert "Latency (ms), exposure (ms), gain (dB)" in names(replace(run_viewer, costs=numbers))
+    plain = names(run_viewer)
+    assert "Right" in plain
+    assert not {"Numbers reported by the estimator", "Latency (ms), exposure (ms), gain (dB)"} & plain
+    assert "Truth green, estimate orange, error red" in plain
 
 
-def test_depth_is_the_same_numbers_on_the_frames_time_line(path, view):
-    for side in ("left", "right"):
-        found = rows_truth(path, f"/truth/{side}/depth")
-        assert [row["frame"] for row in found] == list(range(COUNT))
-        for row, frame in zip(found, view.frames(), strict=True):
-            depth = np.frombuffer(bytes(row["DepthImage:buffer"][0]), np.float32).reshape(32, 48)
-            np.testing.assert_array_equal(depth, getattr(frame, side).depth)
-
-
-@pytest.mark.parametrize("channel", ["instance", "material", "shadow", "occlusion", "mirror", "moving"])
-def test_ids_counts_and_masks_are_classes_with_names(path, view, channel):
-    (last,) = [row for row in rows_truth(path, f"/truth/left/{channel}") if row["frame"] == COUNT - 1]
-    classes = np.frombuffer(bytes(last["SegmentationImage:buffer"][0]), np.uint16).reshape(32, 48)
-    np.testing.assert_array_equal(classes, list(view.frames())[-1].left.channels()[channel].astype(np.uint16))
-    (context,) = rows_truth(path, f"/truth/left/{channel}", static=True)
-    text = str(context)
-    named = {"instance": "floor", "material": "glass", "shadow": "one light hidden"}
-    assert named.get(channel, channel) in text
-
-
-@pytest.mark.parametrize("channel", ["flow", "normals"])
-def test_directions_are_colours(path, channel):
-    buffers = [bytes(row["Image:buffer"][0]) for row in rows_truth(path, f"/truth/right/{channel}")]
-    assert [len(b) for b in buffers] == [32 * 48 * 3] * COUNT
-    assert len(set(buffers)) == COUNT
-
-
-def test_layout_has_a_view_for_each_channel_of_each_camera(path, rrd):
-    def origins(of):
-        reader = RrdReader(of)
-        (layout,) = reader.blueprints()
-        found = [row for c in reader.stream(store=layout) for row in c.to_record_batch().to_pylist()]
-        return [origin for row in found for origin in row.get("ViewBlueprint:space_origin") or []]
-
-    asked = {f"truth/{side}/{channel}" for side in ("left", "right") for channel in CHANNELS}
-    assert {origin for origin in origins(path) if origin.startswith("truth/")} == asked
-    assert not asked & set(origins(rrd))
-
-
-def test_run_without_truth_has_no_entity_of_it(rrd):
-    assert not [c for c in RrdReader(rrd).stream() if c.entity_path.startswith("/truth")]
+def test_each_status_has_its_colour_and_an_unknown_one_is_grey(run_viewer, tmp_path):
+    save_trial(tmp_path / "it.rrd", replace(run_viewer, statuses=["odd", *["ok"] * 11]))
+    (row,) = rows(tmp_path / "it.rrd", "/status/estimate", static=True)
+    named = dict(zip(row["StateConfiguration:values"], row["StateConfiguration:colors"], strict=True))
+    colors = {name: (value >> 24, value >> 16 & 255, value >> 8 & 255) for name, value in named.items()}
+    assert colors["odd"] == (128, 128, 128)
+    assert colors["ok"] == (60, 200, 90)
+    assert colors["lost"] == (235, 60, 60)
+    assert list(colors) == ["init", "ok", "stationary", "degraded", "lost", "no output", "odd"]

@@ -98,7 +98,7 @@ def test_poses_of_afterwards_are_a_second_track(bench, first, plugin):
     score = run.scores()[0]
     assert value_of(score.revised, "ate_trans", "rmse") not in (None, score.value("ate_trans", "rmse"))
     assert score.revised["association"]["pairs"] == 2
-    assert "mine: after the fact: ATE " in (run.path / "leaderboard.md").read_text()
+    assert "mine: revised estimate: ATE " in (run.path / "leaderboard.md").read_text()
     assert [finding for finding in verify_run(run) if finding.wrong] == []
     assert len((run.estimate(score.case, "mine", 0) / REVISED).read_text().splitlines()) == 2
 

@@ -119,7 +119,7 @@ def test_a_recording_that_stands_still_has_a_drift_and_no_error_among_others(ben
     unfit = scores["rest", "constant_velocity"]
     assert (unfit.status, unfit.reason) == ("not_applicable", "it needs 'encoders', but this recording has no wheels")
     board = (run.path / "leaderboard.md").read_text()
-    assert f"lk_epipolar: stood still: drift {1e3 * drift_m:.1f} mm" in board
+    assert f"lk_epipolar: drift of {1e3 * drift_m:.1f} mm while the camera is stationary" in board
     made = page.board_of(run, run.scores())
     kitti = {cell.estimator: cell.spread("ate") for cell in made.cells if cell.case == "kitti"}
     assert all(total.ate_percent == kitti[total.estimator][0] for total in made.totals if kitti[total.estimator])
@@ -175,7 +175,7 @@ def test_a_changed_score_is_found(changed):
         ("score", "stand_still on full, 0"),
     ]
     (said,) = (finding.wrong for finding in verify_run(run) if finding.wrong and finding.kind == "score")
-    assert re.fullmatch(r"the score differs: metrics ate_trans rmse: 1\.\d+ is 0\.\d+ now", said)
+    assert re.fullmatch(r"the score differs: metrics ate_trans rmse: 1\.\d+ is stated, 0\.\d+ is computed", said)
 
 
 def test_a_changed_estimate_is_found_by_its_hash_and_by_its_score(changed):
@@ -194,7 +194,7 @@ def test_a_score_that_cannot_be_read_and_one_that_was_added_are_found_beside_all
     }
     assert sorted(sentences) == ["mine on full, 0", "stand_still on full, 0"]
     assert "not a score as vobench writes it (Invalid JSON" in sentences["stand_still on full, 0"]
-    assert sentences["mine on full, 0"] == "not of this run, whose hashes do not name it"
+    assert sentences["mine on full, 0"] == "not part of the run: its hashes do not list this file"
 
 
 def test_a_changed_truth_is_found_even_where_its_hash_is_changed_too(changed):
@@ -223,8 +223,8 @@ def test_a_sequence_that_is_gone_and_a_missing_file_are_said(changed, tmp_path):
     (run.case("full") / SEQUENCE).symlink_to(tmp_path / "gone")
     sentences = {finding.what: finding.wrong for finding in verify_run(run) if finding.wrong}
     assert sentences["leaderboard.md"] == "the file is missing"
-    assert "gone from the cache" in sentences[f"cases/full/{SEQUENCE}/sensors.mcap"]
-    assert "gone from the cache" in sentences["full"]
+    assert "no longer in the cache" in sentences[f"cases/full/{SEQUENCE}/sensors.mcap"]
+    assert "no longer in the cache" in sentences["full"]
 
 
 def sequence(folder: Path, frames_ns, truth_ns, first) -> Path:

@@ -11,7 +11,7 @@ from zipfile import ZipFile, ZipInfo
 import pytest
 
 from vobench.errors import InputError
-from vobench.report import board_table, page
+from vobench.report import board_records, page
 from vobench.runner.bundle import bundle, merged, opened
 from vobench.runner.folder import HASHES
 from vobench.runner.rescore import check, wrong_truths
@@ -189,7 +189,7 @@ def test_the_name_of_a_runs_file_gets_into_no_label_as_it_is(honest, tmp_path):
 def test_a_text_that_a_spreadsheet_would_execute_is_a_text(first):
     scores = first.scores()
     scores[0] = scores[0].model_copy(update={"reason": "=cmd|' /C calc'!A0", "status": "crashed"})
-    text = board_table.as_csv(page.board_of(first, scores))
+    text = board_records.as_csv(page.board_of(first, scores))
     assert "'=cmd|" in text
     assert ",=cmd|" not in text
 

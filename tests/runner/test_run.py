@@ -75,7 +75,7 @@ def test_a_noisy_truth_changes_scores_and_no_sequence_and_no_estimate(bench, fir
     ate_m, exact_ate_m = ([score.value("ate_trans", "rmse") for score in scores] for scores in by_wheels)
     assert ate_m[0] == ate_m[1] > exact_ate_m[0] + 0.002
     (said,) = contents(noisy, "leaderboard.md").values()
-    assert "the truth that is scored is off by 5 mm on each axis and 0.2 ° about each" in said.decode()
+    assert "The ground truth used for scoring is perturbed by 5 mm per axis and 0.2° per axis" in said.decode()
     assert not [finding for finding in verify_run(noisy) if finding.wrong]
 
 

@@ -14,8 +14,10 @@ from rich.table import Table
 from vobench.cli import terminal
 from vobench.errors import UnknownNameError, printable
 from vobench.report import compare, page
-from vobench.report.board_table import DEFAULT_METRIC, FORMATS, LEGEND, cell_notes, matrix, origin, remarks, totals
-from vobench.report.leaderboard import METRICS, Board
+from vobench.report.board_formats import FORMATS
+from vobench.report.board_metric import METRICS
+from vobench.report.board_table import DEFAULT_METRIC, LEGEND, cell_notes, matrix, origin, remarks, totals
+from vobench.report.leaderboard import Board
 from vobench.report.verify import verify_run
 from vobench.runner.bundle import bundle, merged, opened, require_zip, scored_again
 from vobench.runner.folder import TrialScore, open_run

@@ -93,7 +93,7 @@ def run_command(
 
     from vobench.cli.report import print_board
     from vobench.report import page
-    from vobench.report.board_table import as_json as board_as_json
+    from vobench.report.board_records import as_json as board_as_json
     from vobench.runner.run import BESIDE
 
     is_serial = jobs == 1 and not scheduler

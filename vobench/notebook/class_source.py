@@ -1,7 +1,7 @@
 """The folder of an estimator, written from a class that is defined in a notebook or a program.
 
-An estimator runs in a process of its own, which imports it from a file. So the source of the class is written to one,
-together with the source of what it uses of its module: imports, functions, other classes and plain constants.
+An estimator runs in a separate process, which imports it from a file. Therefore the source of the class is written to
+a file, together with what it uses from its module: imports, functions, other classes and plain constants.
 """
 
 import ast
@@ -13,6 +13,7 @@ import re
 import symtable
 import sys
 import types
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from vobench.estimator.manifest import MANIFEST_FILE
 ESTIMATORS = Path("estimators")
 MODULE = "estimator"
 MARK = "# Written by vobench from a Python class; run the cell or the program again to change it."
-# What a class may say of itself, and what holds where it does not.
+# The attributes of a class that are keys of its manifest, with their defaults.
 ATTRIBUTES: dict[str, Any] = {
     "version": "1",
     "needs": ("stereo",),
@@ -40,21 +41,22 @@ def write_estimator(cls: type, *, root: Path = ESTIMATORS) -> Path:
     """Write a class as an estimator's folder, `root`/<name>, and return that folder.
 
     The class has the methods of `vobench.plugin.Estimator`. Its attributes `needs`, `pose_of`, `params`, `version`,
-    `metric`, `causal` and `deterministic` stand for the keys of a manifest; the first line of its docstring is the
-    summary. Raises InputError where its source cannot be found or uses what cannot be written to a file, and where
-    the folder holds something that was not written by this function.
+    `metric`, `causal` and `deterministic` become keys of the manifest, and the first line of its docstring becomes the
+    summary. Raises InputError if its source cannot be found or uses a value that cannot be written to a file, or if
+    the folder holds an estimator that was not written by this function.
     """
     for method in ("start", "process"):
         if not callable(getattr(cls, method, None)):
-            raise InputError(f"an estimator has a method {method}(), but {cls.__name__} has none")
+            raise InputError(f"an estimator must have a method {method}(), but {cls.__name__} has none")
     name = snake_case(cls.__name__)
     manifest = _manifest(cls, name)
     source = class_module(cls)
 
     folder = root / name
     file = folder / MANIFEST_FILE
-    if folder.exists() and not (file.is_file() and file.read_text(encoding="utf-8").startswith(MARK)):
-        raise InputError(f"there is an estimator of that name that was not written from a class: {folder}")
+    is_ours = file.is_file() and file.read_text(encoding="utf-8").startswith(MARK)
+    if folder.exists() and not is_ours:
+        raise InputError(f"an estimator of that name exists that was not written from a class: {folder}")
     folder.mkdir(parents=True, exist_ok=True)
     file.write_text(manifest, encoding="utf-8")
     (folder / f"{MODULE}.py").write_text(source, encoding="utf-8")
@@ -62,13 +64,13 @@ def write_estimator(cls: type, *, root: Path = ESTIMATORS) -> Path:
 
 
 def snake_case(name: str) -> str:
-    """A class's name as an estimator's: `MyLKTracker` is my_lk_tracker."""
+    """The name of a class as the name of an estimator: `MyLKTracker` is my_lk_tracker."""
     split = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name)
     return split.strip("_").lower()
 
 
 def _manifest(cls: type, name: str) -> str:
-    """The manifest as YAML, which JSON values are, too."""
+    """The manifest as YAML; its values are JSON, which is valid YAML."""
     docstring = (inspect.getdoc(cls) or "").strip()
     summary = docstring.splitlines()[0] if docstring else f"The class {cls.__name__}"
     content = {"name": name, "class": f"{MODULE}:{cls.__name__}", "summary": summary}
@@ -80,20 +82,20 @@ def _manifest(cls: type, name: str) -> str:
         try:
             lines.append(f"{key}: {json.dumps(value)}")
         except TypeError:
-            raise InputError(f"{cls.__name__}.{key} should be plain values, got {value!r}") from None
+            raise InputError(f"{cls.__name__}.{key} should consist of plain values, got {value!r}") from None
     return "\n".join([*lines, ""])
 
 
 def class_module(cls: type) -> str:
-    """The source of a module that holds a class and all that it uses of its own module. Raises InputError."""
+    """The source of a module with a class and everything that it uses from its own module. Raises InputError."""
     module = sys.modules.get(cls.__module__)
-    collected = _Collected(module)
-    collected.add_source(cls.__name__, cls)
-    return collected.text(f"The estimator {cls.__name__}.")
+    parts = _ModuleParts(module)
+    parts.add_source(cls.__name__, cls)
+    return parts.text(f"The estimator {cls.__name__}.")
 
 
 @dataclass(slots=True)
-class _Collected:
+class _ModuleParts:
     """The parts of a module that is being written: imports, constants, and definitions in order of their use."""
 
     module: types.ModuleType | None
@@ -103,7 +105,7 @@ class _Collected:
     visiting: set[str] = field(default_factory=set)
 
     def add_source(self, name: str, defined: Any) -> None:
-        """Add a class or a function with what it uses."""
+        """Add a class or a function, and everything that it uses."""
         if name in self.visiting:
             return
         self.visiting.add(name)
@@ -129,23 +131,24 @@ class _Collected:
         else:
             raise InputError(
                 f"{by} uses {name}, a {type(value).__name__}, which cannot be written to a file; "
-                "make it inside the class, or pass it by `params`"
+                "create it inside the class, or pass it in `params`"
             )
 
     def text(self, docstring: str) -> str:
-        imports = sorted(self.imports.values())
-        constants = list(self.constants.values())
-        sections = [f'"""{docstring}"""', "\n".join(imports), "\n".join(constants), *self.definitions.values()]
+        """The source of the module."""
+        imports = "\n".join(sorted(self.imports.values()))
+        constants = "\n".join(self.constants.values())
+        sections = [f'"""{docstring}"""', imports, constants, *self.definitions.values()]
         return "\n\n".join(section for section in sections if section) + "\n"
 
 
 def _public_home(value: Any) -> str:
-    """The module from which a plugin imports a value: `vobench.plugin` for what vobench offers."""
+    """The module from which a plugin imports a value: `vobench.plugin` if that offers it."""
     from vobench import plugin
 
-    if value.__module__.startswith("vobench.") and value.__qualname__ in plugin.__all__:
-        return plugin.__name__
-    return str(value.__module__)
+    home = str(value.__module__)
+    is_offered = home.startswith("vobench.") and value.__qualname__ in plugin.__all__
+    return plugin.__name__ if is_offered else home
 
 
 def _import_module(module: str, name: str) -> str:
@@ -153,74 +156,94 @@ def _import_module(module: str, name: str) -> str:
 
 
 def _import_name(module: str, original: str, name: str) -> str:
-    return f"from {module} import {original}" + ("" if original == name else f" as {name}")
+    alias = "" if original == name else f" as {name}"
+    return f"from {module} import {original}{alias}"
 
 
 def _is_importable(value: Any, module: types.ModuleType | None) -> bool:
-    """Whether a value is an object at the top level of another module than the one that is being written."""
+    """Whether a value is an object at the top level of a module other than the one that is being written."""
     home = getattr(value, "__module__", None)
     name = getattr(value, "__qualname__", None)
     if not isinstance(home, str) or not isinstance(name, str) or "." in name:
         return False
-    if home == "__main__" or (module is not None and home == module.__name__):
+    is_own_module = module is not None and home == module.__name__
+    if home == "__main__" or is_own_module:
         return False
     return getattr(sys.modules.get(home), name, None) is value
 
 
 def _is_plain(value: Any) -> bool:
-    """Whether the repr of a value makes it again."""
+    """Whether the repr of a value is an expression that recreates it."""
     if isinstance(value, PLAIN):
         return True
     if isinstance(value, (tuple, list, set, frozenset)):
-        return all(_is_plain(each) for each in value)
+        return all(_is_plain(item) for item in value)
     if isinstance(value, dict):
-        return all(_is_plain(key) and _is_plain(each) for key, each in value.items())
+        return all(_is_plain(item) for item in (*value.keys(), *value.values()))
     return False
 
 
 def source_of(defined: Any) -> str:
-    """The source of a class or function, also of one that was defined in a notebook's cell. Raises InputError."""
+    """The source of a class or function, even if it was defined in a notebook's cell. Raises InputError."""
     function = _a_function(defined)
     if function is None:
-        raise InputError(f"the source of {defined.__name__} cannot be found: it has no function of its own")
+        raise InputError(f"the source of {defined.__name__} cannot be found: it defines no function")
     code = function.__code__
     lines = linecache.getlines(code.co_filename)
-    try:
-        tree = ast.parse("".join(lines))
-    except SyntaxError:
-        tree = ast.Module([], [])
-    kinds = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-    for node in ast.walk(tree):
-        if not isinstance(node, kinds) or node.name != defined.__name__:
-            continue
-        first = min([node.lineno, *(decorator.lineno for decorator in node.decorator_list)])
-        if first <= code.co_firstlineno <= (node.end_lineno or first):
-            return inspect.cleandoc("\n" + "".join(lines[first - 1 : node.end_lineno])) + "\n"
+    for node in _definitions("".join(lines), defined.__name__):
+        decorator_lines = [decorator.lineno for decorator in node.decorator_list]
+        first = min([node.lineno, *decorator_lines])
+        last = node.end_lineno or first
+        if first <= code.co_firstlineno <= last:
+            source = "".join(lines[first - 1 : last])
+            return inspect.cleandoc("\n" + source) + "\n"
     raise InputError(f"the source of {defined.__name__} cannot be found; define it in a cell or a file")
 
 
+def _definitions(source: str, name: str) -> Iterator[ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef]:
+    """The classes and functions of a name in a source; none if it is not valid Python."""
+    try:
+        tree = ast.parse(source)
+    except SyntaxError:
+        return
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)) and node.name == name:
+            yield node
+
+
 def _a_function(defined: Any) -> types.FunctionType | None:
-    """A function whose code says where a class or function stands."""
+    """A function whose code object tells where a class or function is defined."""
     if isinstance(defined, types.FunctionType):
         unwrapped = inspect.unwrap(defined)
         return unwrapped if isinstance(unwrapped, types.FunctionType) else None
     for value in vars(defined).values():
         function = getattr(value, "__func__", value)
-        if isinstance(function, types.FunctionType) and function.__qualname__.startswith(defined.__qualname__):
+        if not isinstance(function, types.FunctionType):
+            continue
+        is_defined_here = function.__qualname__.startswith(defined.__qualname__)
+        if is_defined_here:
             return function
     return None
 
 
 def global_names(source: str) -> list[str]:
-    """The names that a source takes from its module, or from Python's builtins, in order of their spelling."""
-    found: set[str] = set()
+    """The names that a source takes from its module or from Python's builtins, in alphabetical order."""
+    module = symtable.symtable(source, "source", "exec")
+    names = set[str]()
+    for symbol in module.get_symbols():
+        if symbol.is_referenced() and not symbol.is_assigned():
+            names.add(symbol.get_name())
+    for scope in module.get_children():
+        names |= _global_names_of_scope(scope)
+    return sorted(names)
 
-    def look(table: symtable.SymbolTable, *, is_top: bool) -> None:
-        for symbol in table.get_symbols():
-            if symbol.is_referenced() and (symbol.is_global() or is_top) and not (is_top and symbol.is_assigned()):
-                found.add(symbol.get_name())
-        for inner in table.get_children():
-            look(inner, is_top=False)
 
-    look(symtable.symtable(source, "source", "exec"), is_top=True)
-    return sorted(found)
+def _global_names_of_scope(scope: symtable.SymbolTable) -> set[str]:
+    """The global names that a class or function refers to, and those of the scopes in it."""
+    names = set[str]()
+    for symbol in scope.get_symbols():
+        if symbol.is_referenced() and symbol.is_global():
+            names.add(symbol.get_name())
+    for inner in scope.get_children():
+        names |= _global_names_of_scope(inner)
+    return names

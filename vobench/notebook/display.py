@@ -1,4 +1,4 @@
-"""The progress of a run in Jupyter, as a bar, or in a plain Python program, as lines on standard error."""
+"""The progress of a run: a bar in Jupyter, or lines on standard error in a Python program."""
 
 import html
 import sys
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from vobench.runner.executor import Event
     from vobench.runner.task import Task
 
-REDRAW_S = 0.2  # a notebook is sent no more than five pictures of a bar in a second
+REDRAW_S = 0.2  # a notebook gets at most five updates of the bar per second
 
 
 def in_notebook() -> bool:
-    """Whether this is a Jupyter kernel, which shows HTML."""
+    """Whether this process is a Jupyter kernel, which shows HTML."""
     if "IPython" not in sys.modules:
         return False
     from IPython import get_ipython
@@ -27,26 +27,26 @@ def in_notebook() -> bool:
 
 
 def choose_display(*, is_quiet: bool) -> RunDisplay:
-    """The display that suits where this code runs."""
+    """The display for the program that runs this code."""
     if is_quiet:
         return QuietDisplay()
     return NotebookDisplay() if in_notebook() else LineDisplay()
 
 
 class QuietDisplay:
-    """Shows only the tasks that fail, and what the user must know."""
+    """Shows only failed tasks, and messages to the user."""
 
     def __init__(self) -> None:
         self._progress = RunProgress()
         self._began_s = time.monotonic()
 
     def begin(self, tasks: "Sequence[Task]", seconds: Mapping[str, float]) -> None:
-        """Take the tasks that are to be performed."""
+        """Start with the tasks to perform."""
         self._progress = RunProgress(tasks, seconds)
         self._began_s = time.monotonic()
 
     def hear(self, event: "Event") -> None:
-        """Count a task, and name one that failed."""
+        """Count a finished task, and print a failure."""
         self._progress.count(event)
         if event.what == "told":
             self.say(event.told)
@@ -65,10 +65,10 @@ class QuietDisplay:
 
 
 class LineDisplay(QuietDisplay):
-    """Prints a line on standard error for each task that ends."""
+    """Prints a line on standard error for each finished task."""
 
     def hear(self, event: "Event") -> None:
-        """Name a task that ended, and how much is left."""
+        """Print a finished task, and how much is left."""
         super().hear(event)
         if event.what == "done":
             left = self._progress.describe(time.monotonic() - self._began_s)
@@ -76,7 +76,7 @@ class LineDisplay(QuietDisplay):
 
 
 class NotebookDisplay(QuietDisplay):
-    """Draws one bar in the output of a cell, and removes it at the end."""
+    """Draws a bar in the output of a cell, and replaces it by one line at the end."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -85,7 +85,7 @@ class NotebookDisplay(QuietDisplay):
         self._drawn_s = 0.0
 
     def begin(self, tasks: "Sequence[Task]", seconds: Mapping[str, float]) -> None:
-        """Take the tasks that are to be performed, and draw an empty bar where there are some."""
+        """Start with the tasks to perform, and draw an empty bar if there are any."""
         super().begin(tasks, seconds)
         if tasks:
             from IPython.display import HTML, display
@@ -93,7 +93,7 @@ class NotebookDisplay(QuietDisplay):
             self._handle = display(HTML(self._html()), display_id=True)
 
     def hear(self, event: "Event") -> None:
-        """Move the bar."""
+        """Update the bar."""
         super().hear(event)
         if event.what == "started":
             self._running[event.task.key] = f"{event.task.stage} {event.task.name}"
@@ -117,7 +117,7 @@ class NotebookDisplay(QuietDisplay):
         return f"<div>{bar} {text}<br><small>{running}</small></div>"
 
     def __exit__(self, *_: object) -> None:
-        """Leave one line with the number of tasks and the time that they took."""
+        """Replace the bar by the number of tasks and the time that they took."""
         if self._handle is None:
             return
         from IPython.display import HTML

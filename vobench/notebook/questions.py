@@ -1,6 +1,5 @@
-"""Questions from Python: why an estimator fails, how real pictures are, what a recording's twin is worth."""
+"""Questions from Python: why an estimator fails, how realistic pictures are, how well a simulated twin agrees."""
 
-from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,11 +30,11 @@ def explain(
     out: Path | str = RUNS,
     quiet: bool = False,
 ) -> "TrialExplanation":
-    """Run a trial again without each thing that makes its case hard, and say which removal mends the estimator.
+    """Run a trial again without each difficulty of its case, and report whose removal fixes the estimator.
 
     `run`, `case` and `estimator` name the trial; a path RUN/CASE/ESTIMATOR names all three. `repeats` is the number of
-    seeds of each variant, `out` where the folders of runs go. The result has `named`, `rows()` and `to_frame()`.
-    Raises InputError where the case is a recording or has nothing that can be removed, and UnknownNameError.
+    seeds of each variant, and `out` the parent folder of the runs. The result has `named`, `rows()` and `to_frame()`.
+    Raises InputError if the case is a recording or has no difficulty that can be removed, and UnknownNameError.
     """
     from vobench.analysis.explain_trial import explain_trial
 
@@ -57,7 +56,7 @@ def shrink(
 ) -> "ShrunkTrial":
     """Find the shortest part of a failed trial that fails in the same way, and save it as a suite in `folder`.
 
-    The trial is named as in `explain`; at most `trials` candidates are run. Raises InputError where nothing fails.
+    The trial is named as in `explain`; at most `trials` candidates are run. Raises InputError if it did not fail.
     """
     from vobench.analysis.shrink_trial import shrink_trial
 
@@ -70,9 +69,9 @@ def shrink(
 
 
 def causes(run: Run | Path | str, *, estimator: str | None = None) -> "RunCauses":
-    """What the errors of each estimator of a run, or of one of them, depend on; `to_frame()` is a table.
+    """The conditions that the errors of the estimators of a run depend on; `to_frame()` is a table.
 
-    Raises InputError where the sequences of the run are no longer in the cache.
+    With `estimator`, of that one only. Raises InputError if the sequences of the run are no longer in the cache.
     """
     from vobench.analysis.run_causes import find_causes
 
@@ -80,9 +79,9 @@ def causes(run: Run | Path | str, *, estimator: str | None = None) -> "RunCauses
 
 
 def realism(recording: Path | str, *, against: Path | str | None = None, form: str | None = None) -> "RealismReport":
-    """How real the pictures of a recording are: nine statistics beside those of real ones, or of `against`.
+    """How realistic the pictures of a recording are: nine statistics, compared with real pictures or with `against`.
 
-    `recording` is a sequence, a run's case, a dataset's folder or a bag. Raises InputError where it cannot be read.
+    `recording` is a sequence, a case of a run, a folder of a dataset or a bag. Raises InputError if it cannot be read.
     """
     from vobench.analysis.realism_report import measure_realism
 
@@ -100,10 +99,10 @@ def twin(
     jobs: int | None = None,
     quiet: bool = False,
 ) -> "TwinReport":
-    """Repeat a recording in simulation, run the same estimators on both, and say how far they agree.
+    """Simulate a twin of a recording, run the same estimators on both, and report how well the results agree.
 
-    `out` is a new folder for the suite and its runs. Raises InputError where the recording lacks a stereo pair, a
-    ground truth or motion, and UnknownNameError for the place.
+    `out` is a new folder for the suite and its runs. Raises InputError if the recording has no stereo pair, no ground
+    truth or no motion, and UnknownNameError for the place.
     """
     from vobench.analysis.recording_twin import make_twin
 
@@ -121,7 +120,7 @@ def twin(
 def drive(suite: str | Path, *, trajectory: str | None = None, changes: dict[str, Any] | None = None) -> "SuiteDrive":
     """Drive the trajectories of a suite, or one of them, without rendering.
 
-    Raises SuiteError where a body cannot follow its trajectory, and UnknownNameError.
+    Raises SuiteError if a body cannot follow its trajectory, and UnknownNameError.
     """
     from vobench.runner.drive import drive_plan
 
@@ -134,17 +133,17 @@ def _plan_runner(out: Path, jobs: int | None, *, is_quiet: bool, with_reports: b
         from vobench.report.page import write_reports
 
         finish = write_reports
-    return plan_runner(out=out, jobs=jobs, make_display=partial(choose_display, is_quiet=is_quiet), finish=finish)
+    make_display = partial(choose_display, is_quiet=is_quiet)
+    return plan_runner(out=out, jobs=jobs, make_display=make_display, finish=finish)
 
 
 def _trial_path(run: Run | Path | str, case: str | None, estimator: str | None, repeat: int) -> Path:
-    """RUN/CASE/ESTIMATOR/REPEAT. Raises InputError where only one of case and estimator is given."""
+    """The path RUN/CASE/ESTIMATOR/REPEAT. Raises InputError if only one of case and estimator is given."""
     path = run_path(run)
     if case is None and estimator is None:
         if isinstance(run, Run):
-            raise InputError("a trial is named by its case and estimator, as in explain(run, case, estimator)")
+            raise InputError("name a trial by its case and its estimator, as in explain(run, case, estimator)")
         return path
     if case is None or estimator is None:
-        raise InputError("a trial is named by both its case and its estimator")
-    parts: Iterable[str] = (case, estimator, str(repeat))
-    return path.joinpath(*parts)
+        raise InputError("name a trial by both its case and its estimator")
+    return path / case / estimator / str(repeat)

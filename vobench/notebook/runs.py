@@ -1,9 +1,9 @@
-"""Suites from Python: check one, run it, and look at what came of it."""
+"""Suites from Python: validate one, run it, and look at its results."""
 
+import fnmatch
 import html
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatch
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,7 +33,7 @@ class Run:
     """A finished run of a suite, by its folder: tables, plots and recordings of its trials."""
 
     def __init__(self, path: Path | str) -> None:
-        """The run at a path, where a suite's folder stands for its latest run. Raises InputError for another folder."""
+        """The run at a path; the folder of a suite stands for its latest run. Raises InputError if it is no run."""
         self._folder = open_run(Path(path))
         self._scores = self._folder.scores()
 
@@ -86,9 +86,9 @@ class Run:
         return self._folder.case(name)
 
     def plot(self, case: str | None = None, *, estimators: Names | None = None) -> "Figure":
-        """Paths from above and errors over time on one case, the first by default, of all or some estimators.
+        """Paths in top view and errors over time on one case, by default the first, of all or some estimators.
 
-        Raises UnknownNameError for a name that the run does not have.
+        Raises UnknownNameError for a name that is not in the run.
         """
         from vobench.report.trial_plot import plot_case
 
@@ -96,9 +96,10 @@ class Run:
         names = self.estimators if estimators is None else listed(estimators)
         for name in names:
             self._require("estimator", name, self.estimators)
+        place_of = {name: place for place, name in enumerate(names)}
         trials = [score for score in self._scores if score.case == chosen and score.repeat == 0]
-        order = {name: place for place, name in enumerate(names)}
-        shown = sorted((trial for trial in trials if trial.estimator in order), key=lambda t: order[t.estimator])
+        shown = [trial for trial in trials if trial.estimator in place_of]
+        shown.sort(key=lambda trial: place_of[trial.estimator])
         return plot_case(self._folder, shown)
 
     def view(
@@ -109,17 +110,16 @@ class Run:
         save: Path | str | None = None,
         web: bool = False,
     ) -> Path:
-        """Write one trial as a Rerun recording and open it in the viewer; the path of the recording.
+        """Write one trial as a Rerun recording, open it in the viewer, and return the path of the recording.
 
-        Without `case` and `estimator` it is the gravest failure, or the worst error. With `save` the recording is
-        written there and no viewer is opened; `web` serves it to a browser on this machine until interrupted. Raises
-        MissingDependencyError where there is no display, and UnknownNameError.
+        Without `case` and `estimator` it is the gravest failure, or else the trial with the largest error. With `save`
+        the recording is written there and no viewer is opened. `web` serves it to a browser on this machine until
+        interrupted. Raises MissingDependencyError if there is no display, and UnknownNameError.
         """
         from vobench.report.viewer import open_viewer, save_recordings
 
-        recordings = save_recordings(
-            self._folder, case=case, estimator=estimator, save=None if save is None else Path(save)
-        )
+        target = None if save is None else Path(save)
+        recordings = save_recordings(self._folder, case=case, estimator=estimator, save=target)
         paths = [recording.path for recording in recordings]
         if save is None or web:
             open_viewer(paths, web=web)
@@ -130,14 +130,15 @@ class Run:
 
     def _repr_html_(self) -> str:
         from vobench.report import board_table
-        from vobench.report.leaderboard import METRICS
+        from vobench.report.board_metric import METRICS
 
+        board = self._board
         title = METRICS[board_table.DEFAULT_METRIC].heading
-        parts = [_html_table(["case", *self.estimators], _matrix_rows(self._board), title)]
-        for over, (headings, *rows) in board_table.totals(self._board):
-            parts.append(_html_table(headings, rows, f"totals over {over}"))
-        notes = [*board_table.remarks(self._board), *board_table.cell_notes(self._board), str(self.path)]
-        parts += [f"<small>{html.escape(note)}</small><br>" for note in notes]
+        parts = [_html_table(["case", *self.estimators], _matrix_rows(board), title)]
+        for scope, (headings, *rows) in board_table.totals(board):
+            parts.append(_html_table(headings, rows, f"totals over {scope}"))
+        sentences = [*board_table.remarks(board), *board_table.cell_notes(board), str(self.path)]
+        parts += [f"<small>{html.escape(sentence)}</small><br>" for sentence in sentences]
         return "\n".join(parts)
 
     @cached_property
@@ -154,7 +155,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A valid suite before it is run: its cases and estimators as tables, and the plan itself."""
+    """A valid suite before it is run: tables of its cases and estimators, and the plan."""
 
     summary: PlanSummary
 
@@ -201,9 +202,9 @@ def check(
     only: Names | None = None,
     changes: Mapping[str, Any] | None = None,
 ) -> Check:
-    """Validate a suite and say what running it comes to; nothing is rendered.
+    """Validate a suite and report what a run of it would do; nothing is rendered.
 
-    The options are those of `run`. Raises SuiteError, which lists all that is wrong, and UnknownNameError.
+    The options are those of `run`. Raises SuiteError, which lists every mistake, and UnknownNameError.
     """
     planned = plan(suite, estimators=estimators, only=only, changes=changes)
     return Check(summarize(planned, with_stages=True))
@@ -221,19 +222,20 @@ def run(
     fresh: bool = False,
     quiet: bool = False,
 ) -> Run:
-    """Run a suite: simulate, estimate, score. What the cache holds already is not made again.
+    """Run a suite: simulate, estimate, score. Results that are in the cache are reused.
 
     Args:
         suite: A suite's name, or the path of its YAML file.
-        estimators: Names, patterns, folders or classes of estimators to run in place of the suite's. A class is saved
-            as `estimators/<name>` in the working folder, from where every command finds it, too.
-        only: Patterns such as `"room-*"` of the cases, scenes or estimators that are run, out of the suite's.
-        changes: Values in place of the suite's, by their keys, as in `{"repeats": 3, "rigs.ahead.pitch_deg": 20}`.
-        jobs: Tasks at once; by default one a core, and no more than 8.
-        out: Where the folders of runs go.
-        frames: Of each simulated case only so many frames, from its first on.
-        fresh: Whether everything is made again, whatever the cache holds.
-        quiet: Whether to show no progress.
+        estimators: Names, patterns, folders or classes of estimators to run instead of those of the suite. A class is
+            saved as `estimators/<name>` in the working folder, where every command finds it.
+        only: Patterns such as `"room-*"` that select cases, scenes or estimators of the suite.
+        changes: Values to use instead of those of the suite, by key, as in
+            `{"repeats": 3, "rigs.ahead.pitch_deg": 20}`.
+        jobs: Number of simultaneous tasks; by default one per core, and at most 8.
+        out: Parent folder of the folders of runs.
+        frames: Number of frames of each simulated case, from the first one; all by default.
+        fresh: Whether to recompute everything instead of using the cache.
+        quiet: Whether to hide the progress.
 
     Raises:
         SuiteError: The suite is wrong; the message lists every mistake.
@@ -257,26 +259,26 @@ def run(
 
 
 def read_run(path: Path | str) -> Run:
-    """The run in a folder, or the latest of runs/<suite>. Raises InputError where the folder is none of a run."""
+    """The run in a folder, or the latest of runs/<suite>. Raises InputError if the folder is not a run."""
     return Run(path)
 
 
 def read_board(path: Path | str) -> "pd.DataFrame":
-    """The leaderboard of a run's folder, or of the latest of runs/<suite>: a row per cell, then one per total.
+    """The leaderboard of a run's folder, or of the latest of runs/<suite>: one row per cell, then one per total.
 
-    Raises InputError where the folder is none of a run.
+    Raises InputError if the folder is not a run.
     """
-    from vobench.report import board_table, page
+    from vobench.report import board_records, page
 
     folder = open_run(Path(path))
-    return board_table.data_frame(page.board_of(folder, folder.scores()))
+    return board_records.data_frame(page.board_of(folder, folder.scores()))
 
 
 def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | None = None) -> "pd.DataFrame":
-    """What became better or worse from one run to another: one row per estimator, then one per case and estimator.
+    """What got better or worse from one run to another: one row per estimator, then one per case and estimator.
 
-    A ratio of losses beyond `at_most` counts as worse. A run is given by itself, its folder or a bundle. Raises
-    InputError where the two have nothing in common.
+    A ratio of losses above `at_most` counts as worse. A run is a `Run`, its folder or a bundle. Raises InputError if
+    the two runs have nothing in common.
     """
     import pandas as pd
 
@@ -293,7 +295,7 @@ def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | No
 
 
 def bundle(run: Run | Path | str, out: Path | str) -> Path:
-    """Pack a run into one zip file that others can score again and merge. Raises InputError for another name."""
+    """Pack a run into a zip file that others can rescore and merge. Raises InputError if `out` is not a .zip."""
     from vobench.runner import bundle as packing
 
     path = Path(out)
@@ -317,29 +319,35 @@ def plan(
 
 
 def _only(planned: Plan, patterns: Sequence[str]) -> Plan:
-    """The cases and estimators that match; a pattern is of cases, of scenes or of estimators."""
+    """The cases and estimators that match; each pattern selects cases, or else scenes, or else estimators."""
+    case_names = [case.name for case in planned.cases]
+    scene_names = [case.variant.get("scene", "") for case in planned.cases]
     labels = [entrant.label for entrant in planned.entrants]
     cases: list[str] = []
     scenes: list[str] = []
-    wanted: list[str] = []
+    estimators: list[str] = []
     for pattern in patterns:
-        if any(fnmatch(case.name, pattern) for case in planned.cases):
+        if fnmatch.filter(case_names, pattern):
             cases.append(pattern)
-        elif any(fnmatch(case.variant.get("scene", ""), pattern) for case in planned.cases):
+        elif fnmatch.filter(scene_names, pattern):
             scenes.append(pattern)
-        elif any(fnmatch(label, pattern) for label in labels):
-            wanted.append(pattern)
+        elif fnmatch.filter(labels, pattern):
+            estimators.append(pattern)
         else:
-            known = sorted({*(case.name for case in planned.cases), *labels})
+            known = sorted({*case_names, *labels})
             raise UnknownNameError(unknown("case, scene or estimator", pattern, known))
     entrants = planned.entrants
-    if wanted:
-        entrants = tuple(each for each in entrants if any(fnmatch(each.label, pattern) for pattern in wanted))
+    if estimators:
+        entrants = tuple(entrant for entrant in entrants if _matches_any(entrant.label, estimators))
     return replace(planned.only(cases, scenes), entrants=entrants)
 
 
+def _matches_any(name: str, patterns: Iterable[str]) -> bool:
+    return any(fnmatch.fnmatch(name, pattern) for pattern in patterns)
+
+
 def listed(given: Any) -> list[Any]:
-    """One or several things, as a list; nothing for None."""
+    """One or several values as a list, empty for None."""
     if given is None:
         return []
     if isinstance(given, (str, type, Path)):
@@ -348,14 +356,14 @@ def listed(given: Any) -> list[Any]:
 
 
 def _estimator_name(given: str | type | Path) -> str:
-    """The name or folder of an estimator; a class gets a folder first."""
+    """The name or folder of an estimator; a class is first written to a folder."""
     if isinstance(given, type):
         return str(write_estimator(given).resolve())
     return str(given)
 
 
 def _as_yaml(value: Any) -> str:
-    """A value as the command line's --set has it."""
+    """A value as the option --set takes it."""
     import json
 
     if isinstance(value, str):
@@ -363,11 +371,11 @@ def _as_yaml(value: Any) -> str:
     try:
         return json.dumps(value)
     except TypeError:
-        raise InputError(f"a change should be a number, a text, a list or a dict, got {value!r}") from None
+        raise InputError(f"a change should be a number, a string, a list or a dict, got {value!r}") from None
 
 
 def run_path(given: Run | Path | str) -> Path:
-    """The folder or the bundle of a run that is given in any form."""
+    """The folder or the bundle of a run."""
     return given.path if isinstance(given, Run) else Path(given)
 
 
@@ -389,7 +397,8 @@ def _change_row(change: "Change") -> dict[str, Any]:
 def _matrix_rows(board: "Board") -> list[list[str]]:
     from vobench.report import board_table
 
-    return [[case, *map(str, cells)] for case, cells in board_table.matrix(board, board_table.DEFAULT_METRIC)]
+    matrix = board_table.matrix(board, board_table.DEFAULT_METRIC)
+    return [[case, *map(str, cells)] for case, cells in matrix]
 
 
 def _html_table(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str) -> str:

@@ -1,4 +1,4 @@
-"""Sequences from Python: simulate a case, and open what was recorded."""
+"""Sequences from Python: simulate a case, render a picture, and open a recorded sequence."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class RenderOptions(TypedDict, total=False):
-    """Where the camera of `render` stands, where and when it looks, and what draws the picture."""
+    """The options of `render`: pose, time and model of the camera, and the engine that draws the picture."""
 
     camera: str
     at_m: tuple[float, float, float]
@@ -39,7 +39,7 @@ class RenderOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """A simulated or imported case: the folder with its two MCAP files, what an estimator may see, and the truth."""
+    """A simulated or imported case: its folder, what an estimator may see, and the ground truth."""
 
     case: Case | RecordedCase
     path: Path
@@ -65,7 +65,7 @@ def simulate(
     changes: Mapping[str, Any] | None = None,
     quiet: bool = False,
 ) -> Simulation:
-    """Simulate one case, or import it where it is a recording; one that is in the cache is not made again.
+    """Simulate one case, or import it if it is a recording; a case that is in the cache is reused.
 
     `case` is a case of a plan, as `check(suite).plan.cases` has them, or the name or path of a suite, of which `name`
     is the case: the first one without it. `changes` are those of `run`. Raises SuiteError and UnknownNameError.
@@ -74,7 +74,7 @@ def simulate(
         planned = plan(case, changes=changes)
         chosen = _case_of(planned.cases, name)
     elif name or changes:
-        raise InputError("name and changes belong to a suite; a case of a plan has both already")
+        raise InputError("name and changes apply to a suite; a case of a plan already has both")
     else:
         chosen = case
     recordings: dict[str, Recording] = {}
@@ -99,7 +99,7 @@ def render(scene: str, **options: Unpack[RenderOptions]) -> "NDArray[np.uint8]":
 
 
 def read_sequence(folder: Path | str) -> "Sequence":
-    """The pictures and readings of a sequence, read when they are asked for. Raises SequenceError."""
+    """The pictures and readings of a sequence, which are read on access. Raises SequenceError."""
     from vobench.sequence import Sequence
 
     return Sequence.open(Path(folder))

@@ -1,4 +1,4 @@
-"""Trajectories of any form, their scores, and what is wrong between two of them."""
+"""Trajectories in any format, their scores, and a diagnosis of what is wrong between two of them."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -20,30 +20,33 @@ Given = Trajectory | Path | str
 def read_trajectory(
     path: Path | str, *, topic: str | None = None, read_as: Iterable[str] = (), times: Path | str | None = None
 ) -> Trajectory:
-    """The trajectory in a file of any form, or the true path of a sequence's left camera.
+    """The trajectory in a file of any known format, or the true path of a sequence's left camera.
 
-    `topic` chooses among a recording's; `read_as` are the words of `--gt-as`, such as ns or wxyz; `times` is a file
-    of stamps for forms without (KITTI, TartanAir). Raises InputError.
+    `topic` selects one of a recording. `read_as` are words as in `--gt-as`, such as ns or wxyz. `times` is a file of
+    stamps for formats that have none (KITTI, TartanAir). Raises InputError.
     """
-    return read_one(TrajectorySource(Path(path), topic, tuple(read_as)), times=_paths(times)).trajectory
+    source = TrajectorySource(Path(path), topic, tuple(read_as))
+    return read_one(source, times=_paths(times)).trajectory
 
 
 def score(gt: Given, est: Given, *, settings: ScoreSettings = DEFAULTS, times: Path | str | None = None) -> Score:
-    """Score an estimate against ground truth, each a trajectory or its file, as `vobench score` does.
+    """Score an estimate against ground truth, each a trajectory or a file, as `vobench score` does.
 
-    `settings=LIKE["evo"]` measures as evo would. Raises InputError or AlignmentError.
+    `settings=LIKE["evo"]` gives the numbers of evo. Raises InputError or AlignmentError.
     """
     pair = _pair(gt, est, times)
     scored = scoring.score(pair.gt.trajectory, pair.est.trajectory, settings=settings)
-    notes = (*pair.notes, pair.by_frame) if pair.by_frame else pair.notes
+    notes = list(pair.notes)
+    if pair.by_frame:
+        notes.append(pair.by_frame)
     return replace(scored, warnings=(*notes, *scored.warnings))
 
 
 def diagnose(gt: Given, est: Given, *, times: Path | str | None = None) -> tuple[Finding, ...]:
-    """What is wrong between two trajectories or their files; nothing where they only differ by errors.
+    """What is wrong between two trajectories or their files; empty if they differ by estimation errors alone.
 
-    Files tell more than trajectories: in which unit their stamps and in which order their quaternions were written.
-    Raises InputError or AlignmentError.
+    Files give more information than trajectories: the unit of their stamps and the order of their quaternions. Raises
+    InputError or AlignmentError.
     """
     pair = _pair(gt, est, times, any_unit=True)
     return diagnosis.diagnose(pair.gt, pair.est)
@@ -51,14 +54,19 @@ def diagnose(gt: Given, est: Given, *, times: Path | str | None = None) -> tuple
 
 def _pair(gt: Given, est: Given, times: Path | str | None, *, any_unit: bool = False) -> TrajectoryPair:
     if isinstance(gt, Trajectory) or isinstance(est, Trajectory):
-        return TrajectoryPair(_reading(gt, times, any_unit=any_unit), _reading(est, times, any_unit=any_unit))
-    return read_pair(TrajectorySource(Path(gt)), TrajectorySource(Path(est)), times=_paths(times), any_unit=any_unit)
+        gt_reading = _reading(gt, times, any_unit=any_unit)
+        est_reading = _reading(est, times, any_unit=any_unit)
+        return TrajectoryPair(gt_reading, est_reading)
+    gt_source = TrajectorySource(Path(gt))
+    est_source = TrajectorySource(Path(est))
+    return read_pair(gt_source, est_source, times=_paths(times), any_unit=any_unit)
 
 
 def _reading(given: Given, times: Path | str | None, *, any_unit: bool) -> Reading:
     if isinstance(given, Trajectory):
         return Reading(given, unit="ns", form_unit="ns", order=None)
-    return read_one(TrajectorySource(Path(given)), times=_paths(times), any_unit=any_unit)
+    source = TrajectorySource(Path(given))
+    return read_one(source, times=_paths(times), any_unit=any_unit)
 
 
 def _paths(file: Path | str | None) -> tuple[Path, ...]:

@@ -1,1 +1,1 @@
-"""Leaderboards, pages, plots, tables of scores, the Rerun recording of a trial, and what is checked afterwards."""
+"""Leaderboards, pages, plots, tables of scores, Rerun recordings of trials, and the verification of runs."""

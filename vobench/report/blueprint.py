@@ -1,6 +1,7 @@
-"""The first view of a recording in Rerun: which panels, where, and where the 3-D eye stands."""
+"""The initial layout of a recording in Rerun: its views, and where the 3-D view looks from."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -25,17 +26,40 @@ SUMMARY = "summary"
 STATS = "stats"
 COSTS = "costs"
 
+# The colour of each estimator of a recording, in their order.
+ESTIMATOR_COLORS = {
+    "orange": (255, 150, 40),
+    "blue": (80, 160, 255),
+    "violet": (200, 110, 230),
+    "yellow": (240, 220, 90),
+    "cyan": (120, 220, 220),
+}
+GRID_COLOR = (255, 255, 255, 24)
 EYE_PITCH_DEG = 38.0
 EYE_DISTANCE_PER_RADIUS = 1.6  # fills the view with Rerun's default field of view, with a margin for frusta
+FRUSTUM_PER_RADIUS = 0.16
+LEAST_RADIUS_M = 0.25
 FRAMES_AROUND_FOCUS = 15
 REPLAY_FPS = 5.0  # slow enough to see single frames
 
+# Shares of height and width.
+SPACE_SHARE = 6.0
+PLOT_SHARE = 2.2
+STATUS_SHARE = 1.2
+STATUS_SHARE_PER_ESTIMATOR = 0.4
+NUMBERS_SHARE = 2.0
+PICTURE_SHARE = 3.0
+SUMMARY_SHARE = 2.6
+COLUMN_SHARES = [3, 2]
+
 
 class Entities:
-    """Where a recording holds what is one estimator's."""
+    """The entities of one estimator in a recording."""
 
     def __init__(self, label: str) -> None:
-        self.path, self.left, self.points = (f"{WORLD}/{label}/{part}" for part in ("path", "left", "points"))
+        self.path = f"{WORLD}/{label}/path"
+        self.left = f"{WORLD}/{label}/left"
+        self.points = f"{WORLD}/{label}/points"
         self.error_line = f"{ERROR}/{label}"
         self.tracks = f"{TRACKS}/{label}"
         self.tails = f"{self.tracks}/tails"
@@ -47,7 +71,7 @@ class Entities:
 
 
 def truth_entity(side: str, channel: str) -> str:
-    """Where one camera's truth channel is; apart from the world, for a depth map there hides the paths."""
+    """The entity of a channel of one camera; not in the world, where a depth image would hide the paths."""
     return f"truth/{side}/{channel}"
 
 
@@ -61,83 +85,98 @@ def layout(
     has_stats: bool = False,
     has_costs: bool = False,
 ) -> rrb.Blueprint:
-    """The default blueprint for paths (N, 3) and (M, 3); `focus` is a range of frames to start at.
+    """The default blueprint for paths (N, 3) and (M, 3); `focus` is a range of frames to start with.
 
-    Several estimators have a left picture each, side by side. Truth channels, where there are any, have tabs of their
-    own, and what an estimator counted and a frame cost a plot.
+    Several estimators have one left picture each. Channels of ground truth have a tab for each camera, and the numbers
+    that an estimator reports and the cost of frames have a plot each.
     """
-    seen_m = _near(truth_m, estimate_m)
-    is_one = len(labels) == 1
-    said = [rrb.TimeSeriesView(origin=STATS, name="What the estimator says")] if has_stats else []
-    said += [rrb.TimeSeriesView(origin=COSTS, name="Latency (ms), exposure (ms), gain (dB)")] if has_costs else []
-    paths = rrb.Vertical(
-        _space(truth_m, seen_m, labels),
-        rrb.Horizontal(_plot(POSITION_ERROR, "Position error"), _plot(ROTATION_ERROR, "Rotation error")),
-        rrb.StateTimelineView(origin=STATUS, name="Status of each frame"),
-        *([rrb.Tabs(*said, active_tab=0)] if said else []),
-        row_shares=[6, 2.2, 1.2 + 0.4 * (len(labels) - 1), *([2.0] if said else [])],
+    run: rrb.Container = rrb.Horizontal(
+        _paths_column(truth_m, estimate_m, labels, has_stats=has_stats, has_costs=has_costs),
+        _pictures_column(labels),
+        column_shares=COLUMN_SHARES,
     )
-    summaries = [rrb.TextDocumentView(origin=Entities(label).summary, name=f"Score of {label}") for label in labels]
-    right = [rrb.Spatial2DView(origin=TRUTH_RIGHT, name="Right")] if is_one else []
-    pictures = rrb.Vertical(
-        *(_left(label, labels) for label in labels),
-        *right,
-        rrb.Tabs(*summaries, active_tab=0),
-        row_shares=[3] * (len(labels) + len(right)) + [2.6],
-    )
-    columns = rrb.Horizontal(paths, pictures, column_shares=[3, 2])
-    run = rrb.Tabs(rrb.Horizontal(columns, name="Run"), *_truth(channels), active_tab=0) if channels else columns
+    if channels:
+        tabs = [_truth_tab(side, channels) for side in ("left", "right")]
+        run = rrb.Tabs(rrb.Horizontal(run, name="Run"), *tabs, active_tab=0)
     return rrb.Blueprint(
         run, _time_panel(focus), rrb.SelectionPanel(state="hidden"), rrb.BlueprintPanel(state="hidden")
     )
 
 
+def _paths_column(
+    truth_m: Array, estimate_m: Array, labels: Sequence[str], *, has_stats: bool, has_costs: bool
+) -> rrb.Vertical:
+    """The paths in 3-D, and below them plots of errors, statuses and numbers."""
+    views: list[rrb.View | rrb.Container] = [
+        _space(truth_m, _near_truth(truth_m, estimate_m), labels),
+        rrb.Horizontal(_plot(POSITION_ERROR, "Position error"), _plot(ROTATION_ERROR, "Rotation error")),
+        rrb.StateTimelineView(origin=STATUS, name="Status of each frame"),
+    ]
+    shares = [SPACE_SHARE, PLOT_SHARE, STATUS_SHARE + STATUS_SHARE_PER_ESTIMATOR * (len(labels) - 1)]
+    plots = []
+    if has_stats:
+        plots.append(rrb.TimeSeriesView(origin=STATS, name="Numbers reported by the estimator"))
+    if has_costs:
+        plots.append(rrb.TimeSeriesView(origin=COSTS, name="Latency (ms), exposure (ms), gain (dB)"))
+    if plots:
+        views.append(rrb.Tabs(*plots, active_tab=0))
+        shares.append(NUMBERS_SHARE)
+    return rrb.Vertical(*views, row_shares=shares)
+
+
+def _pictures_column(labels: Sequence[str]) -> rrb.Vertical:
+    """The pictures with tracks, and below them the scores."""
+    pictures = [_left_picture(label, labels) for label in labels]
+    if len(labels) == 1:
+        pictures.append(rrb.Spatial2DView(origin=TRUTH_RIGHT, name="Right"))
+    summaries = [rrb.TextDocumentView(origin=Entities(label).summary, name=f"Score of {label}") for label in labels]
+    shares = [PICTURE_SHARE] * len(pictures) + [SUMMARY_SHARE]
+    return rrb.Vertical(*pictures, rrb.Tabs(*summaries, active_tab=0), row_shares=shares)
+
+
 def _plot(origin: str, name: str) -> rrb.TimeSeriesView:
     legend = rrb.PlotLegend(corner=rrb.Corner2D.RightTop)
-    return rrb.TimeSeriesView(origin=origin, name=name, axis_y=rrb.ScalarAxis(zoom_lock=True), plot_legend=legend)
+    axis = rrb.ScalarAxis(zoom_lock=True)
+    return rrb.TimeSeriesView(origin=origin, name=name, axis_y=axis, plot_legend=legend)
 
 
-def _left(label: str, labels: Sequence[str]) -> rrb.Spatial2DView:
+def _left_picture(label: str, labels: Sequence[str]) -> rrb.Spatial2DView:
     """The left picture with the tracks of one estimator."""
     hidden = [f"- {Entities(other).tracks}/**" for other in labels if other != label]
-    of = f" of {label}" if len(labels) > 1 else ""
-    name = f"Left, tracks{of}: inliers green, outliers red, true epipolar lines white"
+    owner = f" of {label}" if len(labels) > 1 else ""
+    name = f"Left, tracks{owner}: inliers green, outliers red, true epipolar lines white"
     return rrb.Spatial2DView(origin=TRUTH_LEFT, name=name, contents=["$origin/**", *hidden])
 
 
-def _truth(channels: Sequence[str]) -> list[rrb.Grid]:
-    """A tab for each camera, a view for each channel."""
-    return [
-        rrb.Grid(*(rrb.Spatial2DView(origin=truth_entity(s, c), name=c) for c in channels), name=f"Truth, {s}")
-        for s in ("left", "right")
-    ]
+def _truth_tab(side: str, channels: Sequence[str]) -> rrb.Grid:
+    """The channels of one camera, a view for each."""
+    views = [rrb.Spatial2DView(origin=truth_entity(side, channel), name=channel) for channel in channels]
+    return rrb.Grid(*views, name=f"Truth, {side}")
 
 
-NAMES = ("orange", "blue", "violet", "yellow", "cyan")  # of report.rerun.COLORS
-
-
-def _space(truth_m: Array, seen_m: Array, labels: Sequence[str]) -> rrb.Spatial3DView:
-    eye, target = eye_and_target(seen_m)
+def _space(truth_m: Array, shown_m: Array, labels: Sequence[str]) -> rrb.Spatial3DView:
+    """The 3-D view of the paths, named by their colours."""
+    eye_m, target_m = eye_and_target(shown_m)
+    estimates = [f"{label} {color}" for label, color in zip(labels, ESTIMATOR_COLORS, strict=False)]
+    grid: Any = rrb.LineGrid3D(
+        visible=True,
+        spacing=grid_spacing_m(2 * _radius_m(truth_m)),
+        plane=rr.components.Plane3D.XY,
+        color=GRID_COLOR,
+    )
     return rrb.Spatial3DView(
         origin=WORLD,
-        name=", ".join(
-            ["Truth green", *(f"{label} {color}" for label, color in zip(labels, NAMES, strict=False)), "error red"]
-        ),
+        name=", ".join(["Truth green", *estimates, "error red"]),
         contents=["$origin/**", f"- {TRUTH_RIGHT}/**", f"- {TRACKS}/**"],
-        eye_controls=rrb.EyeControls3D(position=eye, look_target=target, eye_up=(0, 0, 1)),
-        line_grid=rrb.LineGrid3D(
-            visible=True,
-            spacing=grid_spacing_m(2 * _radius_m(truth_m)),
-            plane=rr.components.Plane3D.XY,
-            color=(255, 255, 255, 24),
-        ),
+        eye_controls=rrb.EyeControls3D(position=eye_m, look_target=target_m, eye_up=(0, 0, 1)),
+        line_grid=grid,
     )
 
 
 def _time_panel(focus: tuple[int, int] | None) -> rrb.TimePanel:
-    """The `frame` time line: at rest at its start, or replaying the frames around a failure.
+    """The time line `frame`: paused at its start, or replaying the frames around a failure.
 
-    A blueprint cannot place the time cursor, but a playing loop pulls it to where the loop starts.
+    A blueprint cannot place the time cursor, but a playing loop moves it to where the loop starts.
     """
     if focus is None:
         return rrb.TimePanel(timeline=FRAME_TIMELINE, play_state="paused", state="collapsed")
@@ -153,33 +192,40 @@ def _time_panel(focus: tuple[int, int] | None) -> rrb.TimePanel:
 
 
 def eye_and_target(points_m: Array) -> tuple[Array, Array]:
-    """Where to stand and where to look so that points (N, 3) fill the view: beside their longer side."""
-    target = (points_m.min(0) + points_m.max(0)) / 2
-    _, axes = np.linalg.eigh(np.cov(points_m[:, :2].T, bias=True) if len(points_m) > 1 else np.eye(2))
-    side = axes[:, 0] * (-1.0 if axes[1, 0] > 0 else 1.0)  # of the two sides, the one towards -y
-    pitch = np.deg2rad(EYE_PITCH_DEG)
-    direction = np.array([*(np.cos(pitch) * side), np.sin(pitch)])
-    return target + EYE_DISTANCE_PER_RADIUS * _radius_m(points_m) * direction, target
+    """The position of the eye and the point that it looks at, so that points (N, 3) fill the view.
+
+    The eye is beside their longer side, on the side of -y.
+    """
+    target_m = (points_m.min(0) + points_m.max(0)) / 2
+    covariance = np.cov(points_m[:, :2].T, bias=True)
+    _, axes = np.linalg.eigh(covariance)
+    shorter_axis = axes[:, 0]
+    side = shorter_axis * (-1.0 if shorter_axis[1] > 0 else 1.0)
+    pitch_rad = np.deg2rad(EYE_PITCH_DEG)
+    horizontal = np.cos(pitch_rad) * side
+    direction = np.array([*horizontal, np.sin(pitch_rad)])
+    return target_m + EYE_DISTANCE_PER_RADIUS * _radius_m(points_m) * direction, target_m
 
 
 def grid_spacing_m(extent_m: float) -> float:
-    """A power of ten that cuts `extent_m` into 3 to 30 parts."""
+    """A power of ten that divides `extent_m` into 3 to 30 parts."""
     return float(10.0 ** np.floor(np.log10(extent_m / 3)))
 
 
 def frustum_m(truth_m: Array) -> float:
-    """How long to draw a camera so that it is seen, but does not hide a path (N, 3)."""
-    return 0.16 * _radius_m(truth_m)
+    """The length of a drawn camera, which is visible but does not hide a path (N, 3)."""
+    return FRUSTUM_PER_RADIUS * _radius_m(truth_m)
 
 
 def _radius_m(points_m: Array) -> float:
-    """Half the diagonal of the bounding box, at least 0.25 m so that a robot at rest is framed too."""
-    return max(0.25, float(np.linalg.norm(np.ptp(points_m, axis=0))) / 2)
+    """Half the diagonal of the bounding box, at least LEAST_RADIUS_M so that a stationary robot is framed, too."""
+    diagonal_m = float(np.linalg.norm(np.ptp(points_m, axis=0)))
+    return max(LEAST_RADIUS_M, diagonal_m / 2)
 
 
-def _near(truth_m: Array, estimate_m: Array) -> Array:
-    """The truth and what of the estimate stays near it: one that flies off must not shrink the rest."""
-    centre = (truth_m.min(0) + truth_m.max(0)) / 2
+def _near_truth(truth_m: Array, estimate_m: Array) -> Array:
+    """The truth and the part of the estimate near it (K, 3), so that a diverged estimate does not shrink the rest."""
+    centre_m = (truth_m.min(0) + truth_m.max(0)) / 2
     reach_m = 2 * _radius_m(truth_m)
-    near = np.linalg.norm(estimate_m - centre, axis=1) <= reach_m
-    return np.concatenate([truth_m, estimate_m[near]])
+    is_near = np.linalg.norm(estimate_m - centre_m, axis=1) <= reach_m
+    return np.concatenate([truth_m, estimate_m[is_near]])

@@ -1,4 +1,4 @@
-"""Drives as pictures: each path from above, and its speeds against what the controller asked for."""
+"""Plots of drives: the path of each in top view, and its speeds against those that the controller requests."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,10 +25,10 @@ CELL_INCHES = 2.3
 # Okabe and Ito (2008): colours that colour-blind readers tell apart.
 BODY = "#0072B2"
 POINT = "#009E73"
-ASKED = "#D55E00"
-QUIET = "#7f7f7f"
+REFERENCE = "#D55E00"
+NEUTRAL = "#7f7f7f"
 FLOORS = {"wet": "#56B4E9", "carpet": "#CC79A7", "seam": "#E69F00"}
-# The same drive is the same file: no dates, and ids that come from content.
+# Equal drives give equal files: no dates, and ids that depend on content only.
 SETTINGS: Any = {
     "svg.hashsalt": "vobench",
     "font.size": 8,
@@ -40,15 +40,18 @@ SETTINGS: Any = {
 }
 ARROWS = 24
 LEAST_SPAN_M = 0.1
+LEAST_SPAN_S = 1e-3
+LEVEL = 1e-6  # metres or radians of a body on a level floor
+DPI = 110
 
 
 @dataclass(frozen=True, slots=True)
 class DriveLog:
-    """What a body did at N instants t_s (N,): its poses (N, 4, 4) and twist (N, 6) in its own axes.
+    """The motion of a body at the times t_s (N,): its poses (N, 4, 4), and twist (N, 6) in the body frame.
 
-    A robot under the controller has more: point_m (N, 2), where the point h was; references (N, 2), the speed
-    and the yaw rate asked for; targets_m (K, 2), and reached_s (K,), when the leg to each ended; patches of floor
-    by their surface, with corners (4, 2).
+    A robot with the controller also has point_m (N, 2), the position of the point h; references (N, 2), the requested
+    speed and yaw rate; targets_m (K, 2) and reached_s (K,), the end of the leg to each. Patches of floor have a
+    surface and corners (4, 2).
     """
 
     title: str
@@ -63,27 +66,33 @@ class DriveLog:
 
     @property
     def to_target_m(self) -> Array | None:
-        """The way (N, 2) from the point h to its leg's target, the last one's after it; None without targets."""
+        """The vector (N, 2) from the point h to the target of the current leg, or the last target after all legs.
+
+        None without targets.
+        """
         if self.targets_m is None or self.point_m is None or self.reached_s is None:
             return None
         leg = np.searchsorted(self.reached_s, self.t_s, side="right")
-        error_m: Array = self.targets_m[np.minimum(leg, len(self.targets_m) - 1)] - self.point_m
+        last_leg = len(self.targets_m) - 1
+        target_m = self.targets_m[np.minimum(leg, last_leg)]
+        error_m: Array = target_m - self.point_m
         return error_m
 
     @property
     def leaves_the_floor(self) -> bool:
-        """Whether it does anything that a robot on a level floor cannot: rise, roll or pitch."""
+        """Whether the body rises, rolls or pitches, which a robot on a level floor cannot do."""
         tilt = np.abs(self.T_world_body[:, 2, :2]).max()
-        return bool(np.ptp(self.T_world_body[:, 2, 3]) > 1e-6 or tilt > 1e-6)
+        rise_m = np.ptp(self.T_world_body[:, 2, 3])
+        return bool(rise_m > LEVEL or tilt > LEVEL)
 
 
 def log_of(drive: TrajectoryDrive) -> DriveLog:
-    """Return what there is to draw of a driven trajectory."""
+    """The log of a driven trajectory."""
     spec = drive.case.trajectory
-    whole = drive.motion.drive
+    simulated = drive.motion.drive
     point_m = None
-    if whole is not None and not isinstance(spec, Unled):
-        point_m = whole.state[drive.frames, :2]
+    if simulated is not None and not isinstance(spec, Unled):
+        point_m = simulated.state[drive.frames, :2]
     patches: tuple[tuple[str, Array], ...] = ()
     if isinstance(spec, Wheeled):
         patches = tuple((patch.surface, patch.corners_m) for patch in spec.floor)
@@ -101,7 +110,7 @@ def log_of(drive: TrajectoryDrive) -> DriveLog:
 
 
 def save_plot(path: Path, logs: Sequence[DriveLog]) -> None:
-    """Draw one row for each log, as SVG, PNG or PDF by the path's ending. Raises InputError for another ending."""
+    """Draw one row per log, as SVG, PNG or PDF by the ending of the path. Raises InputError for another ending."""
     check_ending(path)
     import matplotlib as mpl
 
@@ -111,11 +120,11 @@ def save_plot(path: Path, logs: Sequence[DriveLog]) -> None:
         rows = figure.subfigures(len(logs), 1, squeeze=False)[:, 0]
         for row, log in zip(rows, logs, strict=True):
             _draw(row, log)
-        figure.savefig(path, dpi=110, metadata=undated(path.suffix))
+        figure.savefig(path, dpi=DPI, metadata=undated(path.suffix))
 
 
 def save_sheet(path: Path, logs: Sequence[DriveLog], *, columns: int = 5) -> None:
-    """Draw the paths alone, in a grid, to the same forms. Raises InputError as `save_plot`."""
+    """Draw the paths alone, in a grid, in the same formats. Raises InputError as `save_plot`."""
     check_ending(path)
     import matplotlib as mpl
 
@@ -126,25 +135,26 @@ def save_sheet(path: Path, logs: Sequence[DriveLog], *, columns: int = 5) -> Non
             axes = figure.add_subplot(rows, columns, place)
             _path(axes, log, legend=False)
             axes.set_title(log.title, fontsize=8, fontweight="bold")
-        figure.savefig(path, dpi=110, metadata=undated(path.suffix))
+        figure.savefig(path, dpi=DPI, metadata=undated(path.suffix))
 
 
 def check_ending(path: Path) -> None:
-    """Raise InputError for a plot that is no SVG, PNG or PDF."""
+    """Raise InputError unless the path ends like an SVG, PNG or PDF file."""
     if path.suffix not in ENDINGS:
-        raise InputError(f"a plot's name should end in {', '.join(ENDINGS)}, got {path}")
+        raise InputError(f"the name of a plot should end in {', '.join(ENDINGS)}, got {path}")
 
 
 def _figure(width: float, height: float) -> "Figure":
-    """An empty page in inches, its gaps the same however long it is."""
+    """An empty figure, size in inches, whose gaps do not grow with it."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    return Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=0.05, w_pad=0.05, hspace=0, wspace=0))
+    layout = ConstrainedLayoutEngine(h_pad=0.05, w_pad=0.05, hspace=0, wspace=0)
+    return Figure(figsize=(width, height), layout=layout)
 
 
 def undated(suffix: str) -> dict[str, None]:
-    """What keeps dates out of a plot of that suffix."""
+    """The metadata that keeps dates out of a plot with this suffix."""
     return {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix, {})
 
 
@@ -152,22 +162,26 @@ def _draw(row: "SubFigure", log: DriveLog) -> None:
     panels = row.subplot_mosaic([["path", "speed"], ["path", "turn"], ["path", "rest"]], width_ratios=[1, 1.25])
     row.suptitle(log.title, fontweight="bold", x=0.01, ha="left")
     _path(panels["path"], log)
-    times = [panels[name] for name in ("speed", "turn", "rest")]
-    _speeds(times[0], times[1], log)
-    _rest(times[2], log)
+    times = [panels["speed"], panels["turn"], panels["rest"]]
+    _speeds(panels["speed"], panels["turn"], log)
+    _last_panel(panels["rest"], log)
+    leg_ends_s = [] if log.reached_s is None else log.reached_s.tolist()
+    last_s = max(log.t_s[-1], log.t_s[0] + LEAST_SPAN_S)
     for axes in times:
-        axes.set_xlim(log.t_s[0], max(log.t_s[-1], log.t_s[0] + 1e-3))
-        for reached_s in () if log.reached_s is None else log.reached_s:
-            axes.axvline(reached_s, color="black", lw=0.6, ls=":")
+        axes.set_xlim(log.t_s[0], last_s)
+        for leg_end_s in leg_ends_s:
+            axes.axvline(leg_end_s, color="black", lw=0.6, ls=":")
     for axes in times[:2]:
         axes.tick_params(labelbottom=False)
-    times[-1].set_xlabel("time (s); dotted: end of a leg" if log.reached_s is not None else "time (s)")
+    times[-1].set_xlabel("time (s)" if log.reached_s is None else "time (s); dotted: end of a leg")
 
 
 def _path(axes: "Axes", log: DriveLog, *, legend: bool = True) -> None:
+    """The path in top view, with headings, targets and patches of floor."""
     x, y = log.T_world_body[:, :2, 3].T
     for surface, corners_m in log.patches:
-        axes.fill(*corners_m.T, color=FLOORS.get(surface, QUIET), alpha=0.25, lw=0, label=surface)
+        color = FLOORS.get(surface, NEUTRAL)
+        axes.fill(*corners_m.T, color=color, alpha=0.25, lw=0, label=surface)
     axes.plot(x, y, color=BODY, lw=1.4, label="body B")
     if log.point_m is not None:
         axes.plot(*log.point_m.T, color=POINT, lw=0.9, label="point h")
@@ -181,40 +195,59 @@ def _path(axes: "Axes", log: DriveLog, *, legend: bool = True) -> None:
     _widen(axes, log.T_world_body[0, :2, 3])
     axes.set_aspect("equal", adjustable="datalim")
     if legend:
-        named = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-        axes.legend(named.values(), named.keys(), loc="best")
+        handles, labels = axes.get_legend_handles_labels()
+        handle_of = dict(zip(labels, handles, strict=True))  # two patches of one surface have one entry
+        axes.legend(handle_of.values(), handle_of.keys(), loc="best")
 
 
 def _headings(axes: "Axes", log: DriveLog, *, length: float) -> None:
-    """Arrows along the body's x axis, at even times; `length` is against what suits a large plot."""
-    chosen = np.unique(np.linspace(0, len(log.t_s) - 1, ARROWS).astype(int))
-    at = log.T_world_body[chosen, :2, 3]
-    ahead = log.T_world_body[chosen, :2, 0]
-    axes.quiver(*at.T, *ahead.T, color=QUIET, scale=18 / length, width=0.004 * length, headwidth=4, label="heading")
+    """Arrows along the body's x axis, at even times; `length` is relative to that in a large plot."""
+    last = len(log.t_s) - 1
+    chosen = np.unique(np.linspace(0, last, ARROWS).astype(int))
+    positions_m = log.T_world_body[chosen, :2, 3]
+    directions = log.T_world_body[chosen, :2, 0]
+    axes.quiver(
+        *positions_m.T,
+        *directions.T,
+        color=NEUTRAL,
+        scale=18 / length,
+        width=0.004 * length,
+        headwidth=4,
+        label="heading",
+    )
 
 
 def _widen(axes: "Axes", middle_m: Array) -> None:
-    """See to it that a body that stays in place, or on a line, is drawn to a sensible scale."""
+    """Widen the range of axes so that a body in one place, or on a line, is drawn at a sensible scale."""
     axes.update_datalim([middle_m - LEAST_SPAN_M / 2, middle_m + LEAST_SPAN_M / 2])
     axes.margins(0.1)
 
 
 def _speeds(speed: "Axes", turn: "Axes", log: DriveLog) -> None:
-    free = log.leaves_the_floor
-    values = [np.linalg.norm(log.twist[:, :3], axis=1), np.linalg.norm(log.twist[:, 3:], axis=1)]
-    shown = values if free else [log.twist[:, 0], log.twist[:, 5]]
-    names = ("|v|", "|ω|") if free else ("u", "ω")
-    for column, (axes, name, unit) in enumerate(zip((speed, turn), names, ("m/s", "rad/s"), strict=True)):
-        if log.references is not None:
-            axes.plot(log.t_s, log.references[:, column], color=ASKED, lw=0.8, label=f"{name} asked for")
-        axes.plot(log.t_s, shown[column], color=BODY, lw=1.2, label=name)
-        axes.set_ylabel(f"{name} ({unit})")
-        if log.references is not None:
-            _legend_above(axes)
+    """Linear and angular velocity: of a body on the floor its forward speed and yaw rate, or else their magnitudes."""
+    references = [None, None] if log.references is None else list(log.references.T)
+    if log.leaves_the_floor:
+        magnitude_mps = np.linalg.norm(log.twist[:, :3], axis=1)
+        magnitude_radps = np.linalg.norm(log.twist[:, 3:], axis=1)
+        _speed(speed, log.t_s, magnitude_mps, references[0], name="|v|", unit="m/s")
+        _speed(turn, log.t_s, magnitude_radps, references[1], name="|ω|", unit="rad/s")
+    else:
+        _speed(speed, log.t_s, log.twist[:, 0], references[0], name="u", unit="m/s")
+        _speed(turn, log.t_s, log.twist[:, 5], references[1], name="ω", unit="rad/s")
 
 
-def _rest(axes: "Axes", log: DriveLog) -> None:
-    """The error to the next target as in the paper's Fig. 11, else the height, else the heading."""
+def _speed(axes: "Axes", t_s: Array, values: Array, reference: Array | None, *, name: str, unit: str) -> None:
+    """One speed over time, with its reference if there is one."""
+    if reference is not None:
+        axes.plot(t_s, reference, color=REFERENCE, lw=0.8, label=f"{name} requested")
+    axes.plot(t_s, values, color=BODY, lw=1.2, label=name)
+    axes.set_ylabel(f"{name} ({unit})")
+    if reference is not None:
+        _legend_above(axes)
+
+
+def _last_panel(axes: "Axes", log: DriveLog) -> None:
+    """The distance to the next target as in the paper's Fig. 11, or else the height, or else the heading."""
     if log.to_target_m is not None:
         x, y = log.to_target_m.T
         axes.plot(log.t_s, x, color=BODY, lw=1.2, label="x")
@@ -225,11 +258,12 @@ def _rest(axes: "Axes", log: DriveLog) -> None:
         axes.plot(log.t_s, log.T_world_body[:, 2, 3], color=BODY, lw=1.2)
         axes.set_ylabel("height z (m)")
     else:
-        heading = np.unwrap(np.arctan2(log.T_world_body[:, 1, 0], log.T_world_body[:, 0, 0]))
-        axes.plot(log.t_s, np.rad2deg(heading), color=BODY, lw=1.2)
+        forward = log.T_world_body[:, :2, 0]  # (N, 2), world
+        heading_rad = np.unwrap(np.arctan2(forward[:, 1], forward[:, 0]))
+        axes.plot(log.t_s, np.rad2deg(heading_rad), color=BODY, lw=1.2)
         axes.set_ylabel("heading (°)")
 
 
 def _legend_above(axes: "Axes") -> None:
-    """One line of names above the curves, where it hides none of them."""
+    """A legend in one line above the curves, where it hides none of them."""
     axes.legend(loc="lower right", bbox_to_anchor=(1, 0.96), ncols=2, frameon=False, borderpad=0)

@@ -4,73 +4,80 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from vobench.report import board_table
-from vobench.report.leaderboard import COSTS, METRICS, Board, lost_aware
+from vobench.report.board_metric import COSTS, METRICS, lost_aware
+from vobench.report.board_records import cell_records
+from vobench.report.leaderboard import Board
+from vobench.report.total import Total
 from vobench.runner.folder import RunFolder, TrialScore
 from vobench.runner.frames import read_frames
 
 if TYPE_CHECKING:
     import pandas as pd
 
-# What a reader looks at first, in a notebook that shows a few columns.
+Record = dict[str, Any]
+# The columns that a notebook shows if it has room for few.
 FIRST_COLUMNS = ("place", "estimator", "score", "ate_percent", "failed", "trials", "cases")
-# Of a total, what a table holds as two columns each.
+# The intervals of a total, which are two columns each, and the names of these.
 INTERVALS = {"places": "place", "ratio_interval": "loss_ratio"}
 
 
 def board_frame(board: Board) -> "pd.DataFrame":
-    """One row per estimator over all cases, the best first; `group` tells calibrations apart where there are some."""
+    """One row per estimator over all cases, the best first; the column `group` tells calibration groups apart."""
     import pandas as pd
 
-    rows = []
-    for total in board.totals:
-        row: dict[str, Any] = asdict(total)
-        row["claims"] = ", ".join(total.claims)
-        for name, of in INTERVALS.items():
-            low, high = row.pop(name) or (None, None)
-            row[f"{of}_low"] = low
-            row[f"{of}_high"] = high
-        rows.append(row)
-    table = pd.DataFrame(rows)
+    table = pd.DataFrame([_total_record(total) for total in board.totals])
+    if table.empty:
+        return table
     others = [name for name in table.columns if name not in FIRST_COLUMNS]
-    return table[[*FIRST_COLUMNS, *others]] if rows else table
+    return table[[*FIRST_COLUMNS, *others]]
+
+
+def _total_record(total: Total) -> Record:
+    record: Record = asdict(total)
+    record["claims"] = ", ".join(total.claims)
+    for interval, name in INTERVALS.items():
+        low, high = record.pop(interval) or (None, None)
+        record[f"{name}_low"] = low
+        record[f"{name}_high"] = high
+    return record
 
 
 def cell_frame(board: Board) -> "pd.DataFrame":
-    """One row per case and estimator: of each metric the median, the least and the largest over its trials."""
+    """One row per case and estimator: the median, minimum and maximum of each metric over the trials."""
     import pandas as pd
 
-    return pd.DataFrame(board_table.cell_rows(board))
+    return pd.DataFrame(cell_records(board))
 
 
 def trial_frame(scores: Iterable[TrialScore]) -> "pd.DataFrame":
     """One row per trial: its case and the choices that make it, its status, and its metrics."""
     import pandas as pd
 
-    rows = []
-    for score in scores:
-        row: dict[str, Any] = {
-            "case": score.case,
-            "estimator": score.estimator,
-            "repeat": score.repeat,
-            **score.variant,
-            "status": score.status,
-            "reason": score.reason,
-            "coverage": score.coverage,
-            "frames": score.frames,
-            "path_m": score.path_m,
-            "drift_m": score.drift_m,
-        }
-        for name, metric in METRICS.items():
-            if name not in COSTS and name not in row:
-                row[name] = metric.of(score)
-        row["score"] = lost_aware(score)
-        rows.append(row)
-    return pd.DataFrame(rows)
+    return pd.DataFrame([_trial_record(score) for score in scores])
+
+
+def _trial_record(score: TrialScore) -> Record:
+    record: Record = {
+        "case": score.case,
+        "estimator": score.estimator,
+        "repeat": score.repeat,
+        **score.variant,
+        "status": score.status,
+        "reason": score.reason,
+        "coverage": score.coverage,
+        "frames": score.frames,
+        "path_m": score.path_m,
+        "drift_m": score.drift_m,
+    }
+    for name, metric in METRICS.items():
+        if name not in COSTS and name not in record:
+            record[name] = metric.read(score)
+    record["score"] = lost_aware(score)
+    return record
 
 
 def frames_frame(folder: RunFolder, scores: Iterable[TrialScore]) -> "pd.DataFrame":
-    """One row per frame of every trial: status, errors after alignment, tracks, exposure, cost."""
+    """One row per frame of every trial: status, errors after alignment, tracks, exposure and cost."""
     import pandas as pd
 
     tables = []

@@ -1,4 +1,4 @@
-"""Thresholds on scores, as `vobench run --fail-if` takes them: 'ate_trans.rmse > 0.2', 'coverage < 0.9'."""
+"""Thresholds on scores, as in `vobench run --fail-if`: 'ate_trans.rmse > 0.2', 'coverage < 0.9'."""
 
 import operator
 import re
@@ -9,7 +9,8 @@ from vobench.errors import InputError, unknown
 from vobench.metric.definitions import DEFINITIONS
 from vobench.runner.folder import SURVIVED, TrialScore, with_sequence
 
-STATISTICS = ("rmse", "mean", "median", "std", "min", "max")
+DEFAULT_STATISTIC = "rmse"
+STATISTICS = (DEFAULT_STATISTIC, "mean", "median", "std", "min", "max")
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge,
     "<=": operator.le,
@@ -22,7 +23,7 @@ COVERAGE = "coverage"
 
 @dataclass(frozen=True, slots=True)
 class Threshold:
-    """What a metric's statistic, in the metric's unit, must not be."""
+    """A range that a statistic of a metric, in the unit of the metric, must not be in."""
 
     metric: str
     statistic: str
@@ -30,17 +31,23 @@ class Threshold:
     value: float
 
     def broken_by(self, scores: Sequence[TrialScore]) -> Iterator[str]:
-        """A sentence for each trial that is beyond it or has no value.
+        """A sentence for each trial that is beyond the threshold or has no value.
 
-        A trial without a sequence says nothing about its estimator, and breaks no threshold.
+        A trial without a sequence is no result of its estimator, and breaks no threshold.
         """
+        is_beyond = COMPARISONS[self.comparison]
         for score in with_sequence(scores):
-            on = f"{score.estimator} on {score.case}"
-            value = score.coverage if self.metric == COVERAGE else score.value(self.metric, self.statistic)
+            trial = f"{score.estimator} on {score.case}"
+            value = self._value(score)
             if score.status not in SURVIVED or value is None:
-                yield f"{on}: {score.status}, so it has no {self}"
-            elif COMPARISONS[self.comparison](value, self.value):
-                yield f"{on}: {self.name} is {value:.4g}, which is {self.comparison} {self.value:g}"
+                yield f"{trial}: {score.status}, so it has no {self}"
+            elif is_beyond(value, self.value):
+                yield f"{trial}: {self.name} is {value:.4g}, which is {self.comparison} {self.value:g}"
+
+    def _value(self, score: TrialScore) -> float | None:
+        if self.metric == COVERAGE:
+            return score.coverage
+        return score.value(self.metric, self.statistic)
 
     @property
     def name(self) -> str:
@@ -52,16 +59,21 @@ class Threshold:
 
 
 def parse_threshold(text: str) -> Threshold:
-    """A threshold of its text; without a statistic it is the RMSE. Raises InputError or UnknownNameError."""
+    """The threshold in a text; without a statistic it is on the RMSE. Raises InputError or UnknownNameError."""
     match = FORM.fullmatch(text)
     if not match:
         raise InputError(f"should be a metric, a comparison and a number, as in 'ate_trans.rmse > 0.2', got {text!r}")
-    metric, statistic, comparison, number = match.groups()
-    known = (COVERAGE, *DEFINITIONS)
-    for kind, name, names in (("metric", metric, known), ("statistic", statistic or "rmse", STATISTICS)):
-        if name not in names:
-            raise InputError(unknown(kind, name, list(names)))
+    metric, stated_statistic, comparison, number = match.groups()
+    statistic = stated_statistic or DEFAULT_STATISTIC
+    _require_known("metric", metric, [COVERAGE, *DEFINITIONS])
+    _require_known("statistic", statistic, STATISTICS)
     try:
-        return Threshold(metric, statistic or "rmse", comparison, float(number))
+        limit = float(number)
     except ValueError:
         raise InputError(f"should be compared with a number, got {number!r} in {text!r}") from None
+    return Threshold(metric, statistic, comparison, limit)
+
+
+def _require_known(kind: str, name: str, known: Sequence[str]) -> None:
+    if name not in known:
+        raise InputError(unknown(kind, name, list(known)))

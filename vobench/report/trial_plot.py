@@ -21,15 +21,16 @@ if TYPE_CHECKING:
     from vobench.metric.score import Score
     from vobench.trajectory.trajectory import Trajectory
 
-# Okabe and Ito (2008): colours that colour-blind readers tell apart; black is the ground truth's.
+# Okabe and Ito (2008): colours that colour-blind readers can distinguish; black is for the ground truth.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
 LINES = ("-", "--", "-.", ":")
 SIZE_INCHES = (9.0, 3.6)
 NS_PER_S = 1e9
 INLINE_DPI = 110
-MARGIN = 1.5  # the side of the picture of paths, against the longer side of the ground truth
-LEAST_SPAN_M = 0.05  # from the centre of that picture to its edge
-LOGARITHMIC_FROM = 20.0  # the ratio of median errors from which on their axis is logarithmic
+MARGIN = 1.5  # the side of the plot of paths, relative to the longer side of the ground truth
+LEAST_SPAN_M = 0.05  # from the centre of that plot to its edge
+LOGARITHMIC_FROM = 20.0  # the ratio of median errors above which their axis is logarithmic
+MM_PER_M = 1e3
 
 
 class InlineFigure(Figure):
@@ -42,10 +43,10 @@ class InlineFigure(Figure):
 
 
 def plot_case(folder: RunFolder, trials: Sequence[TrialScore]) -> Figure:
-    """Draw ground truth and aligned estimates from above, and the position error over time.
+    """Draw ground truth and aligned estimates in top view, and the position error over time.
 
-    `trials` are of one case. An estimate that cannot be scored is named in the legend and not drawn. Raises InputError
-    without a trial.
+    `trials` are of one case. An estimate that cannot be scored is listed in the legend but not drawn. Raises InputError
+    if there is no trial.
     """
     if not trials:
         raise InputError("there is no trial to plot")
@@ -93,15 +94,17 @@ def _draw_trial(
     x_m, y_m, _ = scored.aligned_positions_m.T
     path_axes.plot(x_m, y_m, color=colour, ls=line, lw=1.2, label=name)
     time_s = scored.gt_t_ns / NS_PER_S
-    error_axes.plot(time_s, 1e3 * scored.ate_trans_m, color=colour, ls=line, lw=1.2, label=name)
+    error_mm = MM_PER_M * scored.ate_trans_m
+    error_axes.plot(time_s, error_mm, color=colour, ls=line, lw=1.2, label=name)
 
 
 def _finish_path(axes: "Axes", truth: "Trajectory") -> None:
-    """Show what is around the ground truth: an estimate that diverged leaves the picture instead of shrinking it."""
+    """Show what is near the ground truth: a diverged estimate leaves the plot instead of shrinking the rest."""
     low_m = truth.positions_m[:, :2].min(axis=0)
     high_m = truth.positions_m[:, :2].max(axis=0)
     centre_m = (low_m + high_m) / 2
-    half_m = max(float((high_m - low_m).max()) * MARGIN / 2, LEAST_SPAN_M)
+    longer_side_m = float((high_m - low_m).max())
+    half_m = max(longer_side_m * MARGIN / 2, LEAST_SPAN_M)
     axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.set_xlim(centre_m[0] - half_m, centre_m[0] + half_m)
     axes.set_ylim(centre_m[1] - half_m, centre_m[1] + half_m)
@@ -110,9 +113,10 @@ def _finish_path(axes: "Axes", truth: "Trajectory") -> None:
 
 
 def _finish_errors(axes: "Axes") -> None:
-    """A linear axis from zero, or a logarithmic one where errors differ too much to be seen on it."""
+    """A linear axis from zero, or a logarithmic one if errors differ too much for a linear axis."""
     axes.set(xlabel="time (s)", ylabel="position error (mm)")
-    medians_mm = [float(np.median(np.asarray(line.get_ydata(), float))) for line in axes.get_lines()]
+    curves_mm = [np.asarray(line.get_ydata(), float) for line in axes.get_lines()]
+    medians_mm = [float(np.median(curve_mm)) for curve_mm in curves_mm]
     positive_mm = [median for median in medians_mm if median > 0]
     if positive_mm and max(positive_mm) > LOGARITHMIC_FROM * min(positive_mm):
         axes.set_yscale("log")

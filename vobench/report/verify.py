@@ -1,7 +1,7 @@
-"""Whether a run is still what it says: files against their hashes, scores against estimates and truth."""
+"""Whether the files of a run are unchanged: hashes are compared, and scores recomputed from estimates and truth."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,101 +13,141 @@ from vobench.runner.estimate import ESTIMATE, REVISED
 from vobench.runner.folder import CASE, SEQUENCE, RunFolder, read_hashes, read_score, read_tum
 from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.ground_truth import left_truth, noisy
+from vobench.runner.rescore import brief_value
 from vobench.runner.score import score_estimate
 from vobench.suite.suite import TruthNoise
 from vobench.trajectory.formats import format_tum
 
+NOT_IN_CACHE = "no longer in the cache; run the suite again to recreate it"
+
 
 @dataclass(frozen=True, slots=True)
-class Finding:
-    """One thing that was looked at: `wrong` says what is the matter with it, empty where nothing is."""
+class VerifiedItem:
+    """An item of a run that was verified; `wrong` states what is wrong with it, empty if nothing is."""
 
     kind: str
     what: str
     wrong: str = ""
 
 
-def verify_run(folder: RunFolder) -> Iterator[Finding]:
-    """Recompute all hashes and scores of a run, and compare its sequences with the cache's manifests.
+def verify_run(folder: RunFolder) -> Iterator[VerifiedItem]:
+    """Recompute all hashes and scores of a run, and compare its sequences with the manifests of the cache.
 
-    Raises InputError where the folder is no run.
+    Raises InputError if the folder is not a run.
     """
-    files = folder.score_files()
+    scores = folder.score_files()
     hashes = read_hashes(folder)
-    for name, held in hashes.items():
-        stop.check()
-        yield Finding("hash", name, _changed(folder.path / name, held))
-    for case in sorted({file.parents[3].name for file in files}):
-        yield Finding("ground truth", case, _truth_differs(folder.case(case)))
-        if (link := folder.case(case) / SEQUENCE).exists():
-            yield Finding("cache", case, fault(link.resolve()))
-    for file in files:
-        stop.check()
-        place = file.relative_to(folder.path)
-        _, case, _, estimator, repeat, _ = place.parts
-        wrong = _rescored(file) if str(place) in hashes else "not of this run, whose hashes do not name it"
-        yield Finding("score", f"{estimator} on {case}, {repeat}", wrong)
+    yield from _verify_hashes(folder, hashes)
+    yield from _verify_cases(folder, scores)
+    yield from _verify_scores(folder, scores, hashes)
 
 
-def _changed(path: Path, held: str) -> str:
+def _verify_hashes(folder: RunFolder, hashes: dict[str, str]) -> Iterator[VerifiedItem]:
+    for name, expected in hashes.items():
+        stop.check()
+        yield VerifiedItem("hash", name, _hash_fault(folder.path / name, expected))
+
+
+def _verify_cases(folder: RunFolder, scores: Iterable[Path]) -> Iterator[VerifiedItem]:
+    """The ground truth of each case, and its sequence if it is in the cache."""
+    cases = {score.parents[3].name for score in scores}
+    for case in sorted(cases):
+        yield VerifiedItem("ground truth", case, _truth_fault(folder.case(case)))
+        sequence = folder.case(case) / SEQUENCE
+        if sequence.exists():
+            yield VerifiedItem("cache", case, fault(sequence.resolve()))
+
+
+def _verify_scores(folder: RunFolder, scores: Iterable[Path], hashes: dict[str, str]) -> Iterator[VerifiedItem]:
+    for score in scores:
+        stop.check()
+        path = score.relative_to(folder.path)
+        _, case, _, estimator, repeat, _ = path.parts
+        is_of_run = str(path) in hashes
+        wrong = _score_fault(score) if is_of_run else "not part of the run: its hashes do not list this file"
+        yield VerifiedItem("score", f"{estimator} on {case}, {repeat}", wrong)
+
+
+def _hash_fault(path: Path, expected: str) -> str:
     if not path.is_file():
-        gone = "gone from the cache; run the suite again to make it anew" if SEQUENCE in path.parts else "missing"
-        return f"the file is {gone}"
-    return "" if file_hash(path) == held else "not the bytes that the run wrote"
+        return f"the file is {NOT_IN_CACHE}" if SEQUENCE in path.parts else "the file is missing"
+    return "" if file_hash(path) == expected else "the file has changed since the run wrote it"
 
 
-def _truth_differs(case: Path) -> str:
-    """The path that was scored against, compared with that in the recording."""
+def _truth_fault(case: Path) -> str:
+    """The difference between the ground truth that was scored against and the one in the recording."""
     link = case / SEQUENCE
-    if not link.is_symlink() and not (case / GROUND_TRUTH).is_file():
-        return ""  # there never was one
+    truth = case / GROUND_TRUTH
+    was_never_made = not link.is_symlink() and not truth.is_file()
+    if was_never_made:
+        return ""
     if not link.exists():
-        return "its sequence is gone from the cache; run the suite again to make it anew"
+        return f"its sequence is {NOT_IN_CACHE}"
     try:
-        stated = json.loads((case / CASE).read_bytes())
-        truth = format_tum(left_truth(link))
-        if noise := stated.get("truth_noise"):
-            truth = noisy(truth, TruthNoise(**noise), seed=stated["seed"], frames=stated["frames"])
-        same = truth.encode() == (case / GROUND_TRUTH).read_bytes()
+        is_same = _recorded_truth(case).encode() == truth.read_bytes()
     except (VobenchError, OSError, ValueError, LookupError) as error:
         return str(error)
-    return "" if same else f"{GROUND_TRUTH} is not the path in its sequence"
+    return "" if is_same else f"{GROUND_TRUTH} differs from the path in the sequence"
 
 
-def _rescored(file: Path) -> str:
-    """A trial's score, computed anew and compared digit by digit."""
+def _recorded_truth(case: Path) -> str:
+    """The path in a case's recording as text, with the noise that its scores are computed with."""
+    settings = json.loads((case / CASE).read_bytes())
+    truth = format_tum(left_truth(case / SEQUENCE))
+    noise = settings.get("truth_noise")
+    if not noise:
+        return truth
+    return noisy(truth, TruthNoise(**noise), seed=settings["seed"], frames=settings["frames"])
+
+
+def _score_fault(file: Path) -> str:
+    """The first difference between a trial's score and the one recomputed from its estimate, digit by digit."""
     try:
-        held = read_score(file)
-        if held.score is None and not held.frames:
-            return ""  # it came to nothing that could be scored
-        gt = read_tum(file.parents[3] / GROUND_TRUTH)
-        tracks = {name: file.parent / name for name in (ESTIMATE, REVISED) if (file.parent / name).is_file()}
-        scored = {name: score_estimate(read_tum(path), gt, held.claims) for name, path in tracks.items()}
+        score = read_score(file)
+        has_no_estimate = score.score is None and not score.frames
+        if has_no_estimate:
+            return ""
+        truth = read_tum(file.parents[3] / GROUND_TRUTH)
+        recomputed = {}
+        for name in (ESTIMATE, REVISED):
+            path = file.parent / name
+            if path.is_file():
+                rescored = score_estimate(read_tum(path), truth, score.claims)
+                recomputed[name] = json.loads(json.dumps(rescored.as_dict())) if rescored else None
     except (VobenchError, OSError) as error:
         return str(error)
-    anew = {name: json.loads(json.dumps(each.as_dict())) for name, each in scored.items() if each}
-    for name, before in ((ESTIMATE, held.score), (REVISED, held.revised)):
-        if anew.get(name) != before:
-            return f"the score differs: {_difference(before, anew.get(name))}"
+
+    for name, stated in ((ESTIMATE, score.score), (REVISED, score.revised)):
+        computed = recomputed.get(name)
+        if computed != stated:
+            return f"the score differs: {first_difference(stated, computed)}"
     return ""
 
 
-def _difference(held: Any, anew: Any, place: str = "") -> str:
-    """Where two JSON values differ first, and how; empty where they don't."""
-    if isinstance(held, list) and isinstance(anew, list) and len(held) == len(anew):
-        named = ((str(row.get("name", at)) if isinstance(row, dict) else str(at)) for at, row in enumerate(held))
-        pairs = list(zip(named, held, anew, strict=True))
-    elif isinstance(held, dict) and isinstance(anew, dict) and held.keys() == anew.keys():
-        pairs = [(name, value, anew[name]) for name, value in held.items()]
-    else:
-        return "" if held == anew else f"{place or 'all of it'}: {_brief(held)} is {_brief(anew)} now"
-    found = (_difference(before, now, f"{place} {name}".strip()) for name, before, now in pairs)
-    return next(filter(None, found), "")
+def first_difference(stated: Any, computed: Any, path: str = "") -> str:
+    """The first difference between two JSON values, with its path; empty if they are equal."""
+    members = _common_members(stated, computed)
+    if members is None:
+        if stated == computed:
+            return ""
+        return f"{path or 'all of it'}: {brief_value(stated)} is stated, {brief_value(computed)} is computed"
+    for name, stated_member, computed_member in members:
+        difference = first_difference(stated_member, computed_member, f"{path} {name}".strip())
+        if difference:
+            return difference
+    return ""
 
 
-def _brief(value: Any) -> str:
-    if isinstance(value, dict | list):
-        return f"{len(value)} entries"
-    if isinstance(value, float):
-        return f"{value:.9g}"
-    return "none" if value is None else str(value)
+def _common_members(stated: Any, computed: Any) -> list[tuple[str, Any, Any]] | None:
+    """The members of two JSON objects or arrays with their names, None if these are not of the same form."""
+    if isinstance(stated, dict) and isinstance(computed, dict) and stated.keys() == computed.keys():
+        return [(name, value, computed[name]) for name, value in stated.items()]
+    if isinstance(stated, list) and isinstance(computed, list) and len(stated) == len(computed):
+        names = [_member_name(index, value) for index, value in enumerate(stated)]
+        return list(zip(names, stated, computed, strict=True))
+    return None
+
+
+def _member_name(index: int, value: Any) -> str:
+    """The name of an array's member: its key `name` if it has one, or else its index."""
+    return str(value.get("name", index)) if isinstance(value, dict) else str(index)

@@ -1,4 +1,4 @@
-"""Trials of a run as Rerun recordings, and the viewer that shows them."""
+"""Trials of a run as Rerun recordings, and the viewer that opens them."""
 
 import os
 import subprocess
@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vobench.errors import InputError, MissingDependencyError
-from vobench.report.rerun import PictureForm, pick, ranked, save_trial, trial_view
+from vobench.report.rerun import PictureForm, save_trial
+from vobench.report.trial_choice import pick, ranked
+from vobench.report.trial_view import trial_view
 from vobench.runner.folder import RunFolder, TrialScore
 
-# Without -P, a rerun.py in the working folder would be run in its place.
+# Without -P, Python would import a rerun.py in the working folder.
 RERUN = (sys.executable, "-P", "-m", "rerun")
 
 
@@ -34,11 +36,12 @@ def save_recordings(
     form: PictureForm = "jpeg",
     save: Path | None = None,
 ) -> list[Recording]:
-    """Write the trials that were asked for as Rerun files, failures first.
+    """Write trials of a run as Rerun files, failures first.
 
-    Without `case` and `estimator` it is the gravest failure, else the worst error. `compare` names two estimators to
-    be shown side by side; `worst` is the number of trials, each in a file; `window` the frames. Files go beside their
-    estimates, or to `save`. Raises InputError where a file cannot be written there, and UnknownNameError.
+    Without `case` and `estimator` it is the gravest failure, or else the trial with the largest error. `compare` names
+    two estimators to be shown side by side, `worst` is the number of trials, each in a file of its own, and `window`
+    selects frames. Files are written next to the estimates, or to `save`. Raises InputError if a file cannot be written
+    there, and UnknownNameError.
     """
     recordings = []
     for trials in _chosen(folder, case=case, estimator=estimator, compare=compare, worst=worst):
@@ -50,19 +53,19 @@ def save_recordings(
 
 
 def open_viewer(paths: Sequence[Path], *, web: bool = False) -> None:
-    """Hand files to Rerun's viewer, or with `web` serve them to a browser on this machine until interrupted.
+    """Open files in Rerun's viewer, or with `web` serve them to a browser on this machine until interrupted.
 
-    Raises MissingDependencyError where there is no display.
+    Raises MissingDependencyError if there is no display.
     """
     if web:
         subprocess.run([*RERUN, "--serve-web", "--bind", "127.0.0.1", *map(str, paths)], check=False)
         return
     has_display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.platform == "linux" and not has_display:
-        shown = " ".join(map(str, paths))
+        files = " ".join(map(str, paths))
         raise MissingDependencyError(
-            f"no display to open the viewer on; on a machine that has one, run: rerun {shown} "
-            "(or give --web and open the page that it names)"
+            f"there is no display to open the viewer on; on a machine with a display, run: rerun {files} "
+            "(or use --web, and open the address that it prints)"
         )
     subprocess.Popen([*RERUN, *map(str, paths)], start_new_session=True)
 
@@ -73,25 +76,30 @@ def _chosen(
     """The trials of each recording."""
     scores = folder.scores()
     if compare:
-        first, *_ = ranked(scores, case=case, estimator=compare[0])
-        others = ranked(scores, case=first.case, estimator=compare[1])
-        same_repeat = min(others, key=lambda other: other.repeat != first.repeat)
-        return [[first, same_repeat]]
+        first_estimator, second_estimator = compare
+        first = ranked(scores, case=case, estimator=first_estimator)[0]
+        candidates = ranked(scores, case=first.case, estimator=second_estimator)
+        same_repeat = [trial for trial in candidates if trial.repeat == first.repeat]
+        second = (same_repeat or candidates)[0]
+        return [[first, second]]
     if worst > 1:
-        every = ranked(scores, case=case, estimator=estimator)
-        return [[trial] for trial in every[:worst]]
+        by_rank = ranked(scores, case=case, estimator=estimator)
+        return [[trial] for trial in by_rank[:worst]]
     return [[pick(scores, case=case, estimator=estimator)]]
 
 
 def _target(save: Path | None, folder: RunFolder, trials: Sequence[TrialScore], worst: int) -> Path:
-    """The file of a recording. Raises InputError where no file can be written there."""
-    chosen = trials[0]
-    name = "run.rrd" if len(trials) == 1 else "compare.rrd"
-    path = save or folder.estimate(chosen.case, chosen.estimator, chosen.repeat) / name
-    if save and worst > 1:
-        path = save.with_name(f"{save.stem}_{chosen.case}_{chosen.estimator}_{chosen.repeat}{save.suffix}")
+    """The file of a recording. Raises InputError if no file can be written there."""
+    first = trials[0]
+    if save is None:
+        name = "run.rrd" if len(trials) == 1 else "compare.rrd"
+        path = folder.estimate(first.case, first.estimator, first.repeat) / name
+    elif worst > 1:
+        path = save.with_name(f"{save.stem}_{first.case}_{first.estimator}_{first.repeat}{save.suffix}")
+    else:
+        path = save
     if path.is_dir():
-        raise InputError(f"--save should be a file to write, but this is a folder: {path}")
+        raise InputError(f"--save should name a file, but this is a folder: {path}")
     if not os.access(path.parent, os.W_OK):
-        raise InputError(f"--save should be a file to write, but this is in a folder that cannot be written: {path}")
+        raise InputError(f"--save should name a file in a folder that can be written to, got {path}")
     return path

@@ -183,10 +183,15 @@ def _difference(stated: Any, again: Any, place: str = "") -> str:
     are_numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (stated, again))
     if are_numbers and isclose(stated, again, rel_tol=RELATIVE, abs_tol=ABSOLUTE):
         return ""
-    return "" if stated == again else f"{place or 'all of it'}: {_brief(stated)} is stated, {_brief(again)} computed"
+    return (
+        ""
+        if stated == again
+        else f"{place or 'all of it'}: {brief_value(stated)} is stated, {brief_value(again)} computed"
+    )
 
 
-def _brief(value: Any) -> str:
+def brief_value(value: Any) -> str:
+    """A JSON value in a few characters."""
     if isinstance(value, dict | list):
         return f"{len(value)} entries"
     if isinstance(value, float):

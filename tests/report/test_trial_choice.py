@@ -1,0 +1,65 @@
+"""Which trials of a run are most worth a look."""
+
+import pytest
+
+from vobench.errors import InputError, UnknownNameError
+from vobench.report.trial_choice import pick, ranked
+
+
+def names(trials):
+    return [(trial.estimator, trial.case) for trial in trials]
+
+
+@pytest.fixture
+def trials(scored):
+    return [
+        scored("good", ate_m=0.1),
+        scored("good", case="ahead", ate_m=0.2),
+        scored("poor", ate_m=0.15),
+        scored("poor", case="ahead", ate_m=0.9),
+    ]
+
+
+def test_without_failures_it_is_the_worst_case_of_the_best_estimator(trials):
+    assert names([pick(trials, case=None, estimator=None)]) == [("good", "ahead")]
+    assert names([pick(trials, case=None, estimator="poor")]) == [("poor", "ahead")]
+    assert names([pick(trials, case="down", estimator=None)]) == [("good", "down")]
+
+
+def test_the_gravest_failure_comes_first(scored, trials):
+    failures = [scored("good", "lost", case="far"), scored("good", "crashed", ate_m=None, case="dark")]
+    assert names([pick([*trials, *failures], case=None, estimator=None)]) == [("good", "dark")]
+    order = names(ranked([*trials, *failures], case=None, estimator=None))
+    assert order[:2] == [("good", "dark"), ("good", "far")]
+
+
+def test_trials_are_ranked_by_error_where_none_failed(trials):
+    assert names(ranked(trials, case=None, estimator=None)) == [
+        ("poor", "ahead"),
+        ("good", "ahead"),
+        ("poor", "down"),
+        ("good", "down"),
+    ]
+    assert names(ranked(trials, case="down", estimator=None)) == [("poor", "down"), ("good", "down")]
+    assert names(ranked(trials, case="down", estimator="good")) == [("good", "down")]
+
+
+def test_a_trial_without_an_error_is_the_worst(scored, trials):
+    unknown = scored("good", case="far", ate_m=None)
+    assert names(ranked([*trials, unknown], case=None, estimator=None))[0] == ("good", "far")
+    assert names([pick([*trials, unknown], case=None, estimator=None)]) == [("poor", "ahead")]
+
+
+def test_names_that_are_not_in_the_run_are_answered_with_those_that_are(trials):
+    with pytest.raises(UnknownNameError, match=r"no case 'up' in this run\. Known: ahead, down"):
+        pick(trials, case="up", estimator=None)
+    with pytest.raises(UnknownNameError, match=r"no estimator 'best' in this run\. Known: good, poor"):
+        ranked(trials, case=None, estimator="best")
+
+
+def test_a_case_without_a_sequence_is_left_out_and_said_where_it_is_asked_for(scored, trials):
+    unmade = scored("good", "no_sequence", case="dark", ate_m=None, reason="no light")
+    assert ("good", "dark") not in names(ranked([*trials, unmade], case=None, estimator=None))
+    message = "'dark' has no sequence to show because it could not be simulated or imported: no light"
+    with pytest.raises(InputError, match=message):
+        pick([*trials, unmade], case="dark", estimator=None)

@@ -1,0 +1,138 @@
+"""A board as a LaTeX table."""
+
+import re
+from collections.abc import Sequence
+
+from vobench.errors import printable
+from vobench.report.board_metric import METRICS
+from vobench.report.board_table import (
+    DEFAULT_METRIC,
+    ShownCell,
+    matrix,
+    named,
+    origin,
+    place,
+    total_score,
+    totals,
+)
+from vobench.report.leaderboard import Board
+
+# Not by pandas' to_latex: it draws no rule above the totals, and leaves characters such as ° and × to the encoding.
+
+ESCAPED = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "–": "--",
+    "×": r"$\times$",
+    "°": r"$^\circ$",
+    "<": "$<$",
+    ">": "$>$",
+    "|": "$|$",
+    **{letter: f"\\{letter}" for letter in "&%$#_{}"},
+}
+MOST_UPRIGHT_COLUMNS = 6  # that fit a page with names that are not rotated
+MOST_RANGED_COLUMNS = 3  # that fit a page with the range of each cell
+
+Row = list[str]
+
+
+def latex(board: Board, metric: str = DEFAULT_METRIC) -> str:
+    """The matrix and the totals as a table with booktabs' rules: the best in bold, numbers right-aligned.
+
+    The columns are the cases or the estimators, whichever are fewer.
+    """
+    has_ranges = min(len(board.estimators), len(board.cases)) <= MOST_RANGED_COLUMNS
+    head, body, foot = _rows(board, metric, has_ranges=has_ranges)
+    if len(board.cases) < len(board.estimators):
+        head, *body = _transposed([head, *body, *foot])
+        foot = []
+    columns = len(head) - 1
+    is_wide = columns > MOST_UPRIGHT_COLUMNS
+    if is_wide:
+        head = [head[0], *(rf"\rotatebox{{60}}{{{name}}}" for name in head[1:])]
+
+    lines = [
+        r"% Needs \usepackage{booktabs}" + (r" and \usepackage{graphicx}." if is_wide else "."),
+        r"\begin{table}",
+        r"\centering",
+        rf"\caption{{{_caption(board, metric, has_ranges=has_ranges)}}}",
+        rf"\label{{tab:{_label(board.title)}}}",
+        r"\footnotesize\setlength{\tabcolsep}{4pt}",
+        r"\begin{tabular}{l" + "r" * columns + "}",
+        r"\toprule",
+        _line(head),
+        r"\midrule",
+        *(_line(row) for row in body),
+    ]
+    if foot:
+        lines += [r"\midrule", *(_line(row) for row in foot)]
+    lines += [r"\bottomrule", r"\end{tabular}", r"\end{table}"]
+    if origin(board):
+        lines.append(f"% {printable(origin(board))}")
+    return "\n".join([*lines, ""])
+
+
+def _rows(board: Board, metric: str, *, has_ranges: bool) -> tuple[Row, list[Row], list[Row]]:
+    """The head, the rows of cases, and the rows of totals, if all cases are of one calibration group."""
+    head = ["", *_names(board)]
+    body = []
+    for case, cells in matrix(board, metric):
+        body.append([_escaped(case), *(_cell(cell, has_range=has_ranges) for cell in cells)])
+    total_of = {total.estimator: total for total in board.totals}
+    ranked = [total_of[name] for name in board.estimators if name in total_of]
+    if len(totals(board)) != 1 or len(ranked) < len(board.estimators):
+        return head, body, []
+    scores = [_escaped(total_score(total)) for total in ranked]
+    places = [_escaped(place(total)) for total in ranked]
+    return head, body, [["score", *scores], ["place", *places]]
+
+
+def _names(board: Board) -> Row:
+    """The estimators with their claims."""
+    claims_of = {cell.estimator: cell.claims for cell in board.cells}
+    return [_escaped(named(name, claims_of[name])) for name in board.estimators]
+
+
+def _transposed(table: Sequence[Row]) -> list[Row]:
+    return [list(column) for column in zip(*table, strict=True)]
+
+
+def _caption(board: Board, metric: str, *, has_ranges: bool) -> str:
+    statistics = "median and range" if has_ranges else "median"
+    most_trials = max((cell.trials for cell in board.cells), default=1)
+    trials = f", {statistics} of its trials" if most_trials > 1 else ""
+    visible = f" {board.visible}" if board.visible else ""
+    heading = _escaped(METRICS[metric].heading)
+    return rf"{heading} of each case{trials}. Bold: best; $^{{\sim}}$: not decided.{_escaped(visible)}"
+
+
+def _label(title: str) -> str:
+    return re.sub(r"[^A-Za-z0-9-]+", "-", title or "board")
+
+
+def _line(row: Row) -> str:
+    return rf"{' & '.join(row)} \\"
+
+
+def _cell(shown: ShownCell, *, has_range: bool) -> str:
+    text = _escaped(shown.text)
+    if "*" in shown.mark:
+        text = rf"\textbf{{{text}}}"
+    elif shown.failed:
+        text = rf"\textit{{{text}}}"
+    if "~" in shown.mark:
+        text += r"$^{\sim}$"
+    if shown.range and (has_range or shown.failed):
+        text += rf" {{\tiny {_escaped(shown.range)}}}"
+    return text
+
+
+def _escaped(text: str) -> str:
+    """Text that LaTeX shows as it is, in one line; a question mark stands for a character that it may not have."""
+    line = printable(text).replace("\n", " ")
+    return "".join(_escaped_letter(letter) for letter in line)
+
+
+def _escaped_letter(letter: str) -> str:
+    return ESCAPED.get(letter, letter if letter.isascii() else "?")

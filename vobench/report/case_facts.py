@@ -1,0 +1,37 @@
+"""What the file of a case states that a board needs: calibration group, scenario, and noise of the ground truth."""
+
+from collections.abc import Mapping
+
+from vobench.report.cell import CaseFacts
+from vobench.report.json_file import read_object
+from vobench.runner.folder import CASE, RunFolder
+
+UNCALIBRATED = "none"  # the level of cases without a calibration error, such as recordings
+MM_PER_M = 1e3
+
+
+def case_facts(folder: RunFolder, case: str) -> CaseFacts:
+    """The facts of a case; empty if its file is missing or states none."""
+    content = read_object(folder.case(case) / CASE)
+    rig = content.get("rig") or {}
+    level = (rig.get("calibration_error") or {}).get("level")
+    group = level if isinstance(level, str) and level != UNCALIBRATED else ""
+    severity = content.get("severity")
+    return CaseFacts(
+        group=group,
+        scenario=str(content.get("scenario") or ""),
+        severity=severity if isinstance(severity, int) else None,
+        truth_noise=_truth_noise(content.get("truth_noise") or {}),
+    )
+
+
+def _truth_noise(noise: Mapping[str, float]) -> str:
+    """The standard deviation of the ground truth's noise in words, empty if there is none."""
+    position_mm = MM_PER_M * noise.get("position_m", 0)
+    rotation_deg = noise.get("rotation_deg", 0)
+    parts = []
+    if position_mm:
+        parts.append(f"{position_mm:g} mm per axis")
+    if rotation_deg:
+        parts.append(f"{rotation_deg:g}° per axis")
+    return " and ".join(parts)

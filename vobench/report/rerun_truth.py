@@ -1,0 +1,82 @@
+"""The ground truth of pixels in a Rerun recording: one entity per camera and channel."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from vobench.report.blueprint import truth_entity
+from vobench.report.rerun_stream import time_columns
+from vobench.sensor.pixel_truth import CHANNELS, TruthNames, picture
+from vobench.sequence import StereoTruth
+
+UNSET = (0, 0, 0, 0)
+SET = (255, 255, 255, 160)
+
+
+@dataclass(frozen=True, slots=True)
+class TruthView:
+    """The recorded channels, the names of ids, and a function that iterates over the frames from the first one."""
+
+    channels: tuple[str, ...]
+    names: TruthNames
+    frames: Callable[[], Iterable[StereoTruth]]
+
+
+def log_truth(stream: rr.RecordingStream, view: TruthView) -> None:
+    """Log all channels of both cameras, with one frame in memory at a time."""
+    for side in ("left", "right"):
+        for channel in view.channels:
+            classes = _classes(channel, view.names)
+            if classes:
+                stream.log(truth_entity(side, channel), rr.AnnotationContext(classes), static=True)
+    for frame in view.frames():
+        times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
+        for side, truth in (("left", frame.left), ("right", frame.right)):
+            channels = truth.channels() if truth else {}
+            for channel, values in channels.items():
+                stream.send_columns(truth_entity(side, channel), times, _columns(channel, values))
+
+
+def _columns(channel: str, values: NDArray[np.generic]) -> Any:
+    """Depth as a depth image, ids, counts and masks as classes, directions as colours."""
+    if channel == "depth":
+        return rr.DepthImage.columns(buffer=[_bytes(values)], format=[_format(values, "F32")], meter=[1.0])
+    if CHANNELS[channel].depth == 1:
+        classes = values.astype(np.uint16)
+        return rr.SegmentationImage.columns(buffer=[_bytes(classes)], format=[_format(classes, "U16")])
+    colors = picture(channel, values)
+    return rr.Image.columns(buffer=[_bytes(colors)], format=[_format(colors, "U8", rr.ColorModel.RGB)])
+
+
+def _format(values: NDArray[np.generic], kind: str, colors: rr.ColorModel | None = None) -> rr.components.ImageFormat:
+    height_px, width_px = values.shape[:2]
+    datatype = getattr(rr.ChannelDatatype, kind)
+    return rr.components.ImageFormat(width_px, height_px, color_model=colors, channel_datatype=datatype)
+
+
+def _bytes(values: NDArray[np.generic]) -> NDArray[np.uint8]:
+    return np.ascontiguousarray(values).reshape(-1).view(np.uint8)
+
+
+def _classes(channel: str, names: TruthNames) -> list[rr.AnnotationInfo]:
+    """The name and the colour of each id, count or value of a mask; empty for other channels."""
+    if channel == "instance":
+        return _named_ids(channel, names.instance)
+    if channel == "material":
+        return _named_ids(channel, names.material)
+    if CHANNELS[channel].dtype is np.bool_:
+        return [rr.AnnotationInfo(0, "", UNSET), rr.AnnotationInfo(1, channel, SET)]
+    if channel == "shadow":
+        return [rr.AnnotationInfo(0, "lit", UNSET), rr.AnnotationInfo(1, "one light hidden", SET)]
+    return []
+
+
+def _named_ids(channel: str, names: tuple[str, ...]) -> list[rr.AnnotationInfo]:
+    ids = np.arange(len(names), dtype=np.uint16)
+    colors = picture(channel, ids[None])[0]
+    named_colors = zip(names, colors.tolist(), strict=True)
+    return [rr.AnnotationInfo(index, name, tuple(color)) for index, (name, color) in enumerate(named_colors)]

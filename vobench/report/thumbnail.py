@@ -1,0 +1,56 @@
+"""Small pictures of frames for a page."""
+
+import base64
+from typing import Any
+
+from vobench.errors import VobenchError
+from vobench.runner.folder import SEQUENCE, RunFolder
+
+JPEG_QUALITY = 55
+MOST_BYTES = 2_200_000  # of all pictures of a page, before they are encoded as text
+
+
+class Thumbnails:
+    """Small JPEG pictures of frames of a run's sequences, until they reach MOST_BYTES."""
+
+    def __init__(self, folder: RunFolder) -> None:
+        self._folder = folder
+        self._bytes = 0
+        self._uris = dict[tuple[str, int, int], str]()
+        self._open_case = ""
+        self._open_sequence: Any = None
+
+    def get(self, case: str, frame: int, width_px: int) -> str | None:
+        """A frame of a case as a data URI, None if there is no such frame or no space left."""
+        key = case, frame, width_px
+        if key not in self._uris and self._bytes < MOST_BYTES:
+            try:
+                encoded = _jpeg(self._sequence(case).frame(frame).left, width_px)
+            except (VobenchError, OSError):
+                return None
+            self._bytes += len(encoded)
+            self._uris[key] = f"data:image/jpeg;base64,{base64.b64encode(encoded).decode()}"
+        return self._uris.get(key)
+
+    def _sequence(self, case: str) -> Any:
+        """The sequence of a case; one is open at a time."""
+        from vobench.sequence import Sequence
+
+        if case != self._open_case:
+            self._open_sequence = Sequence.open(self._folder.case(case) / SEQUENCE)
+            self._open_case = case
+        return self._open_sequence
+
+
+def _jpeg(picture: Any, width_px: int) -> bytes:
+    """A picture (H, W) or (H, W, 3) in RGB, scaled to a width."""
+    import cv2
+
+    height, width = picture.shape[:2]
+    height_px = max(1, round(height * width_px / width))
+    scaled = cv2.resize(picture, (width_px, height_px), interpolation=cv2.INTER_AREA)
+    if scaled.ndim == 3:
+        scaled = scaled[..., ::-1]  # OpenCV encodes blue, green, red
+    _, encoded = cv2.imencode(".jpg", scaled, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    jpeg: bytes = encoded.tobytes()
+    return jpeg

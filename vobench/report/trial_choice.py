@@ -1,0 +1,70 @@
+"""The trials of a run that are most worth a look."""
+
+from collections.abc import Sequence
+from math import inf
+from statistics import fmean
+
+from vobench.errors import InputError, UnknownNameError
+from vobench.runner.folder import STATUSES, SURVIVED, TrialScore, with_sequence
+
+
+def ranked(scores: Sequence[TrialScore], *, case: str | None, estimator: str | None) -> list[TrialScore]:
+    """The trials of a case and an estimator, the gravest failure first, then by error.
+
+    Without a case or an estimator, those of all. Raises UnknownNameError if no trial is of that case or estimator,
+    and InputError if its case has no sequence.
+    """
+    return sorted(_selected(scores, case, estimator), key=_gravest_first)
+
+
+def pick(scores: Sequence[TrialScore], *, case: str | None, estimator: str | None) -> TrialScore:
+    """The trial most worth a look: the gravest failure, or else the worst case of the best estimator.
+
+    Without a case or an estimator, of all trials. Raises as `ranked`.
+    """
+    selected = _selected(scores, case, estimator)
+    failed = [score for score in selected if score.status not in SURVIVED]
+    if failed:
+        return max(failed, key=lambda score: STATUSES.index(score.status))
+    by_estimator: dict[str, list[TrialScore]] = {}
+    for score in sorted(selected, key=lambda score: score.estimator):
+        by_estimator.setdefault(score.estimator, []).append(score)
+    best = min(by_estimator.values(), key=_mean_error_m)
+    return max(best, key=_error_m)
+
+
+def _selected(scores: Sequence[TrialScore], case: str | None, estimator: str | None) -> list[TrialScore]:
+    """The trials of a case and an estimator that have a sequence to show."""
+    _require_known("case", case, {score.case for score in scores})
+    _require_known("estimator", estimator, {score.estimator for score in scores})
+    selected = list(scores)
+    if case is not None:
+        selected = [score for score in selected if score.case == case]
+    if estimator is not None:
+        selected = [score for score in selected if score.estimator == estimator]
+    shown = with_sequence(selected)
+    if selected and not shown:
+        unmade = selected[0]
+        raise InputError(
+            f"'{unmade.case}' has no sequence to show because it could not be simulated or imported: {unmade.reason}"
+        )
+    return shown
+
+
+def _require_known(kind: str, name: str | None, known: set[str]) -> None:
+    if name is not None and name not in known:
+        raise UnknownNameError(f"no {kind} '{name}' in this run. Known: {', '.join(sorted(known))}")
+
+
+def _gravest_first(score: TrialScore) -> tuple[bool, int, float]:
+    return score.status in SURVIVED, -STATUSES.index(score.status), -_error_m(score)
+
+
+def _error_m(score: TrialScore) -> float:
+    """The RMSE of position, infinite if there is none."""
+    error_m = score.value("ate_trans", "rmse")
+    return inf if error_m is None else error_m
+
+
+def _mean_error_m(scores: Sequence[TrialScore]) -> float:
+    return fmean(_error_m(score) for score in scores)
