@@ -15,7 +15,7 @@ WRONG = [
     (("--camera", "fisheyes"), "no camera named 'fisheyes'. Did you mean 'fisheye'?"),
     (("--sensor", "film"), "no camera sensor named 'film'. Known: clean"),
     (("--engine", "rater"), "--engine: no engine named 'rater'. Did you mean 'raster'?"),
-    (("--samples", "4"), "samples belongs to engine path, but the engine is raster; leave samples out"),
+    (("--samples", "4"), "samples requires engine path, but the engine is raster; remove samples"),
     (
         ("--engine", "pyrender", "--samples", "4"),
         "samples belongs to engine path, but the engine is pyrender; leave samples out",

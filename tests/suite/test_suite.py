@@ -6,8 +6,8 @@ import pytest
 
 from vobench.errors import MOST_SAID, Place, SuiteError, UnknownNameError, VobenchError
 from vobench.runner.motion import body_motions
-from vobench.suite import catalog, scene_build, scene_file
-from vobench.suite import suite as expand
+from vobench.suite import catalog, entrant, scene_build, scene_file
+
 from vobench.suite.catalog import builtin_root
 from vobench.suite.suite import AXES, read_plan
 from vobench.suite.yaml_file import checked, plain
@@ -183,7 +183,7 @@ def test_what_cases_share_is_made_once_however_many_there_are(bent, monkeypatch)
     for module, name in (
         (scene_file, "survey"),
         (scene_build, "build"),
-        (expand, "read_manifest"),
+        (entrant, "read_manifest"),
     ):
         made = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *args, made=made, name=name: (calls.append(name), made(*args))[1])
@@ -269,7 +269,7 @@ WRONG = [
     ("seed: 1", "seed: 1.5", ":2: seed: should be a whole number (got 1.5)"),
     ("seed: 1", "seed:", ":2: seed: should be a whole number (got nothing)"),
     ("seed: 1", "seed: -1", ":2: seed: should be 0 or more (got -1)"),
-    ("seed: 1", "seed: 1\nrendering: {samples: 4}", ":3: rendering: samples belongs to engine path, but the engine is raster; leave samples out"),
+    ("seed: 1", "seed: 1\nrendering: {samples: 4}", ":3: rendering: samples requires engine path, but the engine is raster; remove samples"),
     ("seed: 1", "seed: 1\nrendering: {engine: pyrendr}", ":3: rendering.engine: no engine named 'pyrendr'. Did you mean 'pyrender'? Known: path, pyrender, raster"),
     ("seed: 1", "seed: 1\nrendering: {engine: path, samples: 65537}", ":3: rendering.samples: should be 65536 or less (got 65537)"),
     ("seed: 1", "seed: 1\nrepeats: 101", ":3: repeats: should be 100 or less (got 101)"),
@@ -291,7 +291,7 @@ WRONG = [
     ("[closet]", "closet", ":3: scenes: should be a list, as in [a, b] (got 'closet')"),
     ("[closet]", "[closset]", ":3: scenes.0: no scene named 'closset'. Did you mean 'closet'? Known: car_park, closet, corridor, flat, hall, office, park, ramp, room, street, warehouse"),
     ("[closet]", "[./no.yaml]", ":3: scenes.0: no scene file at no.yaml. Known by name: car_park, closet, corridor, flat, hall, office, park, ramp, room, street, warehouse"),
-    ("[closet]", "[closet, closet]", ":3: scenes.1: two scenes are called 'closet'; give each once, from files of different names"),
+    ("[closet]", "[closet, closet]", ":3: scenes.1: two scenes are called 'closet'; list each once, from files with different names"),
     ("{lamp:", "{lmp:", ":4: lightings.dim.lmp: lighting: no light named 'lmp'. Did you mean 'lamp'? Known: lamp"),
     ("pitch_deg: 90", "pitch_deg: 90, lens: x", f":5: rigs.down.lens: no lens named 'x'. Known: {LENSES}"),
     ("pitch_deg: 90", "pitch_deg: 90, lens: eurok", f":5: rigs.down.lens: no lens named 'eurok'. Did you mean 'euroc'? Known: {LENSES}"),
@@ -308,9 +308,9 @@ WRONG = [
     ("stand_still,", "stnd_still,", f":8: estimators.0: no estimator named 'stnd_still'. Did you mean 'stand_still'? Known: {ESTIMATORS}"),
     ("stand_still,", "./stand_still,", f":8: estimators.0: no estimator file at stand_still/estimator.yaml. Known by name: {ESTIMATORS}"),
     ("stand_still,", "3,", ":8: estimators.0: should be keys with values (got 3)"),
-    ("stand_still,", "constant_velocity,", ":8: estimators.1: two estimators are called 'constant_velocity'; give one a label of its own"),
+    ("stand_still,", "constant_velocity,", ":8: estimators.1: two estimators are called 'constant_velocity'; give one of them another label"),
     ("measure_s", "mesure_s", ":8: estimators.1.params.mesure_s: no parameter named 'mesure_s'. Did you mean 'measure_s'? Known: measure_s"),
-    ("measure_s: 0.1", "measure_s: fast", ":8: estimators.1.params.measure_s: parameter 'measure_s' should be of the kind of its default 1.0, got 'fast'"),
+    ("measure_s: 0.1", "measure_s: fast", ":8: estimators.1.params.measure_s: parameter 'measure_s' should be of the type of its default 1.0, got 'fast'"),
     ("measure_s: 0.1", "measure_s: 2020-01-01", ":8: estimators.1.params.measure_s: should be a number, text, a list or keys with values (got 2020-01-01)"),
     ("rigs:", "\trigs:", r":5:1: found character '\t' that cannot start any token"),
 ]  # fmt: skip
