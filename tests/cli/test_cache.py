@@ -27,7 +27,7 @@ def test_ls_says_what_is_kept_and_gc_makes_it_smaller(vobench, here):
 
 def test_verify_names_what_is_damaged_and_the_next_run_mends_it_with_a_sentence(vobench, here):
     assert vobench("run", "tiny").code == 0
-    assert vobench("cache", "verify").out == f"6 of 6 entries as they were: {here / 'cache'}\n"
+    assert vobench("cache", "verify").out == f"6 of 6 entries unchanged: {here / 'cache'}\n"
     estimate = next((here / "cache" / "estimates").glob("*/estimate.tum"))
     right = estimate.read_bytes()
     estimate.write_bytes(right[: len(right) // 2])
@@ -44,7 +44,7 @@ def test_verify_names_what_is_damaged_and_the_next_run_mends_it_with_a_sentence(
 
 
 def test_options_of_another_action_and_unknown_actions_are_refused(vobench):
-    assert vobench("cache", "ls", "--older", "3").err == "vobench: --keep-gb and --older go with gc, not with ls\n"
+    assert vobench("cache", "ls", "--older", "3").err == "vobench: --keep-gb and --older require gc, not ls\n"
     assert "no action named 'lss'. Did you mean 'ls'?" in vobench("cache", "lss").err
 
 

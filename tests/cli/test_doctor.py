@@ -61,11 +61,11 @@ def test_doctor_draws_a_picture_and_says_which_driver_and_device_drew(vobench, w
     said = vobench("doctor", "--json")
     (drawing,) = rows(said, "drawing without a display (EGL)")
     assert (said.code, drawing["well"]) == (0, True)
-    assert "a test picture is right, by " in drawing["result"]
+    assert "a test image is correct, with " in drawing["result"]
     assert "OpenGL 4" in drawing["result"]
     assert "device 0: " in drawing["result"]
     (devices,) = rows(said, "drawing devices")
-    assert devices["result"].endswith("VOBENCH_EGL_DEVICE chooses")
+    assert devices["result"].endswith("VOBENCH_EGL_DEVICE selects one")
 
 
 def test_a_wrong_picture_is_not_well_and_its_figures_are_said(vobench, without_mitsuba, monkeypatch):
@@ -91,4 +91,4 @@ def test_a_driver_that_kills_the_process_is_not_well(vobench, without_mitsuba, m
     drawing_says(monkeypatch, code=-11)
     said = vobench("doctor", "--json")
     (drawing,) = rows(said, "drawing without a display (EGL)")
-    assert (said.code, drawing["result"]) == (1, "the process that drew died with -11")
+    assert (said.code, drawing["result"]) == (1, "the test process died with -11")

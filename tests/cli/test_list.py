@@ -60,7 +60,7 @@ def test_a_summary_that_is_none_is_said_to_be_wrong(entry, line):
 
 
 def test_a_plain_summary_is_read_without_the_models(entry, monkeypatch):
-    monkeypatch.setattr(listing, "_checked_summary", lambda _: pytest.fail("read whole"))
+    monkeypatch.setattr(listing, "_parsed_summary", lambda _: pytest.fail("read whole"))
     for line in FORMS[:3]:
         (entry.path / "estimator.yaml").write_text(f"{line}\n{MANIFEST}")
         assert listing._summary(entry).startswith("Two words")

@@ -5,7 +5,9 @@ import io
 import pytest
 from rich.console import Console
 
-from vobench.cli import report, terminal
+from vobench.cli import board as cli_board
+from vobench.cli import terminal
+from vobench.cli.progress import Bars
 from vobench.report.board_table import COST, HEADINGS, MEMORY
 from vobench.report.leaderboard import board
 from vobench.runner.folder import TrialScore
@@ -18,7 +20,7 @@ def drawn(width, monkeypatch):
     file = io.StringIO()
     out = Console(file=file, width=width, markup=False, highlight=False)
     monkeypatch.setattr(terminal, "console", lambda: out)
-    report.print_board(board([trial(name, k) for name in NAMES for k in range(3)], {}))
+    cli_board.print_board(board([trial(name, k) for name in NAMES for k in range(3)], {}))
     return file.getvalue()
 
 
@@ -48,11 +50,11 @@ def test_a_wide_terminal_shows_every_column_that_has_anything(monkeypatch):
 
 
 def test_the_columns_that_may_go_exist():
-    assert set(report.LEAST_FIRST) < set(HEADINGS)
+    assert set(cli_board.LEAST_FIRST) < set(HEADINGS)
 
 
 def test_work_that_tells_its_share_shows_it_in_percent(monkeypatch):
-    file, bars = io.StringIO(), terminal.Bars()
+    file, bars = io.StringIO(), Bars()
     monkeypatch.setattr(bars, "_console", Console(file=file, force_terminal=True, width=80))
     with bars.step("light of office") as tell:
         tell(0.42)
@@ -71,11 +73,11 @@ def test_no_text_of_others_steers_the_terminal():
     [("./estimators", "stand_still", True), ("path", "stand_still", False), ("./estimators", "mine", False)],
 )
 def test_an_estimator_that_hides_a_built_in_one_is_said(tmp_path, capsys, origin, name, is_said):
-    terminal.say_hidden([Entry("estimator", name, tmp_path / name, origin)])
-    said = f"vobench: {name} is {tmp_path / name}, not vobench's own\n"
+    terminal.warn_about_hidden([Entry("estimator", name, tmp_path / name, origin)])
+    said = f"vobench: {name} is {tmp_path / name}, not the estimator included with vobench\n"
     assert capsys.readouterr() == ("", said if is_said else "")
 
 
 def test_a_built_in_one_hides_none(capsys):
-    terminal.say_hidden([find("estimator", "lk_epipolar")])
+    terminal.warn_about_hidden([find("estimator", "lk_epipolar")])
     assert capsys.readouterr().err == ""

@@ -147,7 +147,9 @@ def test_a_wrong_lighting_is_named(hall, lighting, sentence):
 
 
 def test_a_light_that_is_nothing_cannot_be_made_brighter(hall):
-    with pytest.raises(SuiteError, match="'bulb' is 0 in the scene, so it cannot be 5; give it more there"):
+    with pytest.raises(
+        SuiteError, match="'bulb' is 0 in the scene, so it cannot be set to 5; increase it in the scene"
+    ):
         hall("power_lm: 500", "power_lm: 0", lighting={"bulb": LightOverride(power_lm=5)})
 
 
@@ -163,15 +165,15 @@ WRONG = [
     ("kind: point", "kind: point, size_m: [1, 1]", ":19: lamps.1.size_m: belongs to panel; this is point"),
     ("center_m: [1, 1.5], size_m: [1, 0.8]", "center_m: [2.8, 1.5], size_m: [1, 0.8]", ":14: room.windows.0: the window reaches beyond its wall, which is 6 m long around 0 and 3 m high: center_m [2.8, 1.5], size_m [1.0, 0.8]"),
     ("pane: pane, reveal", "pane: pain, reveal", ":14: room.windows.0.pane: no material named 'pain'. Did you mean 'paint'? Known: brick, carpet, ceiling_tiles, concrete, glow, grain, mirror, oak_floor, paint, pane, paving, sage_plaster, steel, stone, terrazzo, white_plaster"),
-    ("name: crate", "name: cart", ":24: movers.0: two things are called 'cart'; give one another name"),
-    ("{name: bulb", "{name: sky", ":19: lamps.1: two things are called 'sky'; give one another name"),
-    ("name: crate", "name: window_0", ":15: boxes.0: two things are called 'window_0'; give one another name"),
-    ("{name: bulb", "{name: box_1", ":15: boxes.1: two things are called 'box_1'; give one another name"),
+    ("name: crate", "name: cart", ":24: movers.0: two things are called 'cart'; rename one of them"),
+    ("{name: bulb", "{name: sky", ":19: lamps.1: two things are called 'sky'; rename one of them"),
+    ("name: crate", "name: window_0", ":15: boxes.0: two things are called 'window_0'; rename one of them"),
+    ("{name: bulb", "{name: box_1", ":15: boxes.1: two things are called 'box_1'; rename one of them"),
     ("reveal: grain}]", "reveal: grain}, {wall: north, center_m: [1.9, 1.5], size_m: [1, 0.8], pane: pane, reveal: grain}]", ":14: room.windows.1: the window overlaps window 0 of the north wall, which has center_m [1.0, 1.5], size_m [1.0, 0.8]; move one or make it smaller"),
     ("[-2.9, 0, 1.5]", "[-3, 0, 1.5]", ":16: boards.0.center_m: should be inside the room, 6 × 4 × 3 m around the origin (got [-3.0, 0.0, 1.5])"),
     ("[0, 0, 2.9]", "[0, 0, 3.1]", ":18: lamps.0.center_m: should be inside the room, 6 × 4 × 3 m around the origin (got [0.0, 0.0, 3.1])"),
     ("[1, 0, 0.3]", "[4, 0, 0.3]", ":24: movers.0.path.1: should be inside the room, 6 × 4 × 3 m around the origin (got [4.0, 0.0, 0.3])"),
-    ("size_m: [0.5, 0.4, 0.6], material: grain", "size_m: [0.5, 0.4, 0.6], material: glow", ":24: movers.0.material: 'glow' shines, and what moves cannot; choose a material of another kind"),
+    ("size_m: [0.5, 0.4, 0.6], material: grain", "size_m: [0.5, 0.4, 0.6], material: glow", ":24: movers.0.material: 'glow' is luminous, but movers cannot emit light; use another kind of material"),
     ("{t_s: 2, position", "{t_s: 0, position", ":24: movers.0: times should increase, but 0 follows 0"),
     ("azimuth_deg: 90, elevation_deg: 30", "azimuth_deg: 90", ":21: sun: should have either azimuth_deg and elevation_deg, or a path"),
     ("azimuth_deg: 90, elevation_deg: 30", "azimuth_deg: 90, path: [{t_s: 0, azimuth_deg: 0, elevation_deg: 9}]", ":21: sun: should have either azimuth_deg and elevation_deg, or a path"),
@@ -192,7 +194,9 @@ def test_windows_may_touch(hall):
     assert len(of_material(hall("reveal: grain}]", f"reveal: grain}}, {beside}"), "pane").faces) == 4
 
 
-@pytest.mark.parametrize(("light", "zero"), [("", ""), ("sky: {illuminance_lx: 0}\n", "; all that it has are 0")])
+@pytest.mark.parametrize(
+    ("light", "zero"), [("", ""), ("sky: {illuminance_lx: 0}\n", "; all lights that it has are 0")]
+)
 def test_a_scene_without_any_light_is_refused(tmp_path, light, zero):
     text = f"name: cave\nwhite_cd_m2: 1\nmaterials: {{m: {{pattern: plain, albedo: 0.5}}}}\n{light}"
     (tmp_path / "cave.yaml").write_text(f"{text}room: {{size_m: [3, 3, 3], floor: m, wall: m, ceiling: m}}\n")

@@ -7,7 +7,6 @@ import pytest
 from vobench.errors import MOST_SAID, Place, SuiteError, UnknownNameError, VobenchError
 from vobench.runner.motion import body_motions
 from vobench.suite import catalog, entrant, scene_build, scene_file
-
 from vobench.suite.catalog import builtin_root
 from vobench.suite.suite import AXES, read_plan
 from vobench.suite.yaml_file import checked, plain

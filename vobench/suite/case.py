@@ -9,7 +9,7 @@ from vobench.motion.wheeled import Wheeled
 from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import CameraSettings
 from vobench.suite.axis import RigSettings
-from vobench.suite.scene_file import Lighting
+from vobench.suite.scene_lighting import Lighting
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.suite_spec import EXACT, Rendering, TruthNoise, Window
 from vobench.suite.trajectory import TrajectorySpec

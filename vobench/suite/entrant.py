@@ -113,12 +113,12 @@ class EntrantReader:
 
 def _with_limit(limits: Limits, key: str, value: float) -> Limits:
     """The limits with another value for one of them. Raises SuiteError for a fraction of what is counted."""
-    if not isinstance(getattr(limits, key), int):
-        return replace(limits, **{key: value})
-    whole = nearest_whole(value)
-    if whole is None:
+    new_value: float | None = value
+    if isinstance(getattr(limits, key), int):
+        new_value = nearest_whole(value)
+    if new_value is None:
         raise SuiteError(f"should be a whole number (got {value:g})")
-    changed: dict[str, Any] = {key: whole}
+    changed: dict[str, Any] = {key: new_value}
     return replace(limits, **changed)
 
 

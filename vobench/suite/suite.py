@@ -106,6 +106,6 @@ def _recorded_cases(suite: Suite, mistakes: Mistakes, simulated_names: set[str])
     for case in recorded:
         with mistakes.at("source", case.entry):
             if case.name in taken_names:
-                raise SuiteError(f"two cases are called '{case.name}'; give one another name: {case.source.path}")
+                raise SuiteError(f"two cases are called '{case.name}'; rename one of them: {case.source.path}")
         taken_names.add(case.name)
     return tuple(recorded)

@@ -14,7 +14,7 @@ from vobench.sensor.pixel_truth import CHANNELS
 from vobench.setting import Name, OneOf, Short, hints, settings
 from vobench.suite.axis import Camera, RigSettings
 from vobench.suite.scenario import MOST_SEVERE
-from vobench.suite.scene_file import Lighting
+from vobench.suite.scene_lighting import Lighting
 from vobench.suite.source import SOURCES, Source
 from vobench.suite.trajectory import TrajectorySpec
 
