@@ -18,7 +18,7 @@ def test_every_name_that_moved_works_and_warns(module: str, name: str) -> None:
     new_place = retired.MOVED[module][name]
     home, _, new_name = new_place.rpartition(".")
     with pytest.warns(
-        DeprecationWarning, match=f"{module}.{name} is now {new_place}; the old name goes with"
+        DeprecationWarning, match=f"{module}.{name} is now {new_place}; the old name will be removed"
     ) as caught:
         value = getattr(importlib.import_module(module), name)
     assert value is getattr(importlib.import_module(home), new_name)

@@ -46,9 +46,9 @@ def entry(tmp_path):
 @pytest.mark.parametrize("line", FORMS)
 def test_a_summary_is_what_the_checked_model_says(entry, line):
     (entry.path / "estimator.yaml").write_text(f"{line}\n{MANIFEST}")
-    above = listing._summary(entry), listing._checked_summary(entry)
+    above = listing._summary(entry), listing._parsed_summary(entry)
     (entry.path / "estimator.yaml").write_text(f"{MANIFEST}{line}")
-    below = listing._summary(entry), listing._checked_summary(entry)
+    below = listing._summary(entry), listing._parsed_summary(entry)
     assert above[0] == above[1] == below[0] == below[1]
     assert above[0]
 

@@ -18,7 +18,7 @@ WRONG = [
     (("--samples", "4"), "samples requires engine path, but the engine is raster; remove samples"),
     (
         ("--engine", "pyrender", "--samples", "4"),
-        "samples belongs to engine path, but the engine is pyrender; leave samples out",
+        "samples requires engine path, but the engine is pyrender; remove samples",
     ),
     (("--engine", "pyrenderer"), "--engine: no engine named 'pyrenderer'. Did you mean 'pyrender'?"),
     (("--engine", "path", "--samples", "0"), "--samples: should be 1 or more (got 0)"),

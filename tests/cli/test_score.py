@@ -90,7 +90,7 @@ def test_the_command_mends_a_real_file(vobench, here, fault):
 
 
 def test_nothing_wrong_is_said_in_words_and_as_an_empty_list(vobench, files):
-    assert vobench("diagnose", "true", "estimated").out.startswith("nothing wrong was found")
+    assert vobench("diagnose", "true", "estimated").out.startswith("no fault was found")
     said = vobench("diagnose", "true", "estimated", "--json").json
     assert (said["findings"], said["command"]) == ([], None)
 

@@ -2,7 +2,7 @@
 
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,6 +22,7 @@ from vobench.suite.plan import Plan
 from vobench.suite.suite import read_plan
 
 if TYPE_CHECKING:
+    from vobench.report.leaderboard import Board
     from vobench.runner.folder import RunFolder
 
 INCOMPLETE_RUN = 1  # exit codes
@@ -43,6 +44,11 @@ class Selection:
     scene: Annotated[
         list[str] | None, typer.Option("--scene", "-s", help="Run only scenes that match; can be repeated.")
     ] = None
+
+    def read_plan(self, suite: str, changes: Mapping[str, str]) -> Plan:
+        """The plan of a suite, restricted to these trials. Raises SuiteError or UnknownNameError."""
+        plan = read_plan(suite, only_estimators=tuple(self.estimator or ()), changes=changes)
+        return plan.only(self.case or (), self.scene or ())
 
 
 @option_group
@@ -146,8 +152,7 @@ def run_command(
     from vobench.report.threshold import parse_threshold
 
     thresholds = [parse_threshold(text) for text in fail_if or ()]
-    plan = read_plan(suite, only_estimators=tuple(selection.estimator or ()), changes=changes.values())
-    plan = plan.only(selection.case or (), selection.scene or ())
+    plan = selection.read_plan(suite, changes.values())
     terminal.warn_about_hidden(plan.found)
     plan = limits.apply(plan)
     if dry_run:
@@ -159,19 +164,13 @@ def run_command(
     folder = _run(plan, out, execution, progress)
     scores = folder.scores()
     board = page.board_of(folder, scores)
+    _print_board(board, as_json=json)
+    if not json:
+        _print_remarks(folder, shares_time=execution.share_time or plan.suite.share_time)
+
     broken_limits = list[str]()
     for threshold in thresholds:
         broken_limits += threshold.broken_by(scores)
-
-    if json:
-        from vobench.report.board_table import as_json
-
-        print(as_json(board), end="")
-    else:
-        from vobench.cli.board import print_board
-
-        print_board(board)
-        _print_remarks(folder, shares_time=execution.share_time or plan.suite.share_time)
     for sentence in broken_limits:
         terminal.warn(sentence)
     if board.unmade:  # an incomplete run fails, whatever the thresholds are
@@ -201,6 +200,17 @@ def _run(plan: Plan, out: Path, execution: Execution, progress: ProgressOptions)
         shares_time=execution.share_time,
         is_fresh=execution.fresh,
     )
+
+
+def _print_board(board: "Board", *, as_json: bool) -> None:
+    if as_json:
+        from vobench.report import board_table
+
+        print(board_table.as_json(board), end="")
+    else:
+        from vobench.cli.board import print_board
+
+        print_board(board)
 
 
 def _print_remarks(folder: "RunFolder", *, shares_time: bool) -> None:
