@@ -6,54 +6,14 @@ import numpy as np
 import pytest
 
 from vobench.errors import SuiteError
-from vobench.scene.light import AreaLight, Flicker, PointLight, Sky, SpotLight, Steady, Sun
+from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE
 from vobench.scene.mesh import Mesh, joined
 from vobench.scene.scene import Scene
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
-from vobench.suite.scene_spec import LevelSpec, LightOverride
 
 # ruff: noqa: E501 - tables of sentences are easier to read a line each
-
-
-HALL = """name: hall
-white_cd_m2: 50
-materials:
-  grain: {pattern: terrazzo, albedo: 0.5, resolution_px: 8}
-  stone: {kind: polished, pattern: plain, albedo: 0.4, eta: 1.4, roughness: 0.1}
-  steel: {kind: mirror, tint: 0.6}
-  pane: {kind: glass}
-  glow: {kind: luminous, luminance_cd_m2: 100}
-room:
-  size_m: [6, 4, 3]
-  floor: stone
-  wall: grain
-  ceiling: grain
-  windows: [{wall: north, center_m: [1, 1.5], size_m: [1, 0.8], pane: pane, reveal: grain}]
-boxes: [{name: crate, center_m: [1, 0, 0.5], size_m: [0.4, 0.4, 1], material: grain}, {center_m: [-1, 0, 2], size_m: [0.1, 0.1, 0.1], material: glow}]
-boards: [{name: looking_glass, center_m: [-2.9, 0, 1.5], size_m: [1, 2], material: steel}]
-lamps:
-  - {name: panel, center_m: [0, 0, 2.9], size_m: [0.6, 0.6], power_lm: 800, level: {flicker: {depth: 0.3}}}
-  - {name: bulb, kind: point, center_m: [2, 1, 2], power_lm: 500}
-  - {name: spot, kind: spot, center_m: [2, -1, 2], target_m: [2, -1, 0], power_lm: 300}
-sun: {illuminance_lx: 30000, azimuth_deg: 90, elevation_deg: 30}
-sky: {illuminance_lx: 8000}
-movers:
-  - {name: cart, size_m: [0.5, 0.4, 0.6], material: grain, path: [{t_s: 0, position_m: [0, 0, 0.3]}, {t_s: 2, position_m: [1, 0, 0.3]}]}
-"""
-
-
-@pytest.fixture
-def hall(tmp_path: Path):
-    """Builds the hall with some text of it replaced, under some lighting."""
-
-    def bent(old: str = "", new: str = "", lighting: dict[str, LightOverride] | None = None) -> Scene:
-        assert old in HALL
-        (tmp_path / "hall.yaml").write_text(HALL.replace(old, new, 1) if old else HALL, encoding="utf-8")
-        return build(read_scene(tmp_path / "hall.yaml"), lighting or {})
-
-    return bent
 
 
 def of_material(scene: Scene, material: str) -> Mesh:
@@ -115,42 +75,6 @@ def test_movers_go_with_their_path(hall):
     (cart,) = hall().movers
     np.testing.assert_allclose(cart.path.pose(1e9)[:3, 3], [0.5, 0, 0.3])
     assert sum(len(thing.mesh.faces) for thing in cart.things) == 12
-
-
-def test_a_lighting_changes_levels_and_leaves_the_light_itself_alone(hall):
-    dim = hall(lighting={"bulb": LightOverride(power_lm=50), "sky": LightOverride(illuminance_lx=800)})
-    for before, after in zip(hall().lights, dim.lights, strict=True):
-        share = {"bulb": 0.1, "sky": 0.1}.get(after.name, 1.0)
-        assert after.level.mean(0, 10**9) == pytest.approx(share * before.level.mean(0, 10**9))
-        assert getattr(after, "power_lm", None) == getattr(before, "power_lm", None)
-        assert isinstance(after.level, Steady) == isinstance(before.level, Steady), "what is steady stays so"
-
-
-def test_a_lighting_may_let_a_light_flicker(hall):
-    flicker = LevelSpec(flicker=Flicker(depth=0.5))
-    (bulb,) = (light for light in hall(lighting={"bulb": LightOverride(level=flicker)}).lights if light.name == "bulb")
-    assert (bulb.level.mean(0, 0), bulb.level.mean(5_000_000, 5_000_000)) == (pytest.approx(1.5), pytest.approx(0.5))
-
-
-@pytest.mark.parametrize(
-    ("lighting", "sentence"),
-    [
-        ({"blub": LightOverride(power_lm=1)}, "lighting: no light named 'blub'. Did you mean 'bulb'?"),
-        ({"bulb": LightOverride(illuminance_lx=1)}, "lighting: illuminance_lx does not belong to 'bulb'"),
-        ({"sun": LightOverride(power_lm=1)}, "lighting: power_lm does not belong to 'sun'"),
-    ],
-)
-def test_a_wrong_lighting_is_named(hall, lighting, sentence):
-    with pytest.raises(SuiteError) as refused:
-        hall(lighting=lighting)
-    assert str(refused.value).startswith(sentence)
-
-
-def test_a_light_that_is_nothing_cannot_be_made_brighter(hall):
-    with pytest.raises(
-        SuiteError, match="'bulb' is 0 in the scene, so it cannot be set to 5; increase it in the scene"
-    ):
-        hall("power_lm: 500", "power_lm: 0", lighting={"bulb": LightOverride(power_lm=5)})
 
 
 WRONG = [

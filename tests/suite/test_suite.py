@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vobench.errors import MOST_SAID, Place, SuiteError, UnknownNameError, VobenchError
+from vobench.errors import MOST_SAID, Place, SuiteError, VobenchError
 from vobench.runner.motion import body_motions
 from vobench.suite import catalog, entrant, scene_build, scene_file
 from vobench.suite.catalog import builtin_root
@@ -46,27 +46,6 @@ def test_one_line_changes_one_factor(bent, axis, change):
     assert [name for name in AXES if getattr(before, name) != getattr(after, name)] == [axis]
 
 
-def test_a_lighting_sets_the_lamps_it_names_and_leaves_the_others(bent):
-    levels = [case.build_scene().lights[0].level.mean(0, 0) for case in bent().cases]
-    assert levels == [1, 150 / 600]
-
-
-def test_a_suites_parameters_go_over_the_manifests(bent):
-    assert [entrant.params for entrant in bent().entrants] == [{}, {"measure_s": 0.1}]
-
-
-def test_one_estimator_takes_part_twice_under_two_labels(bent):
-    planned = bent(("stand_still,", "{name: constant_velocity, label: slow, params: {measure_s: 1}},"))
-    assert [(e.label, e.params["measure_s"]) for e in planned.entrants] == [("slow", 1), ("constant_velocity", 0.1)]
-
-
-def test_a_suites_limits_go_over_the_manifests(bent):
-    planned = bent(("stand_still,", "{name: stand_still, limits: {frame_s: 1, memory_mib: 512}},"))
-    limits, usual = (entrant.limits for entrant in planned.entrants)
-    assert (limits.frame_s, limits.memory_mib, limits.start_s) == (1.0, 512, usual.start_s)
-    assert usual == planned.entrants[1].manifest.limits
-
-
 @pytest.fixture
 def building(bent, tmp_path):
     """Reads the plan of a suite with this text that includes one that includes the suite, which has some text replaced."""
@@ -103,61 +82,6 @@ def test_a_mistake_is_said_with_the_file_that_it_is_in(building):
         SuiteError, match=r"over.yaml:1: include: .*middle.yaml:1: include: .*cannot include itself: .*over"
     ):
         building("", ("name: tiny", "name: tiny\ninclude: over.yaml"))
-
-
-def test_each_mode_has_an_entrant_of_its_own(bent):
-    planned = bent(("estimators:", "modes: [step, real_time]\nestimators:"))
-    assert [(e.label, e.mode, e.claims) for e in planned.entrants[:2]] == [
-        ("stand_still", "step", ()),
-        ("stand_still.real_time", "real_time", ("real time",)),
-    ]
-    alone = bent(("estimators:", "modes: [real_time]\nestimators:"))
-    assert next((e.label, e.mode) for e in alone.entrants) == ("stand_still", "real_time")
-
-
-@pytest.mark.parametrize(
-    ("limits", "sentence"),
-    [
-        ("{frame_s: 0}", "limits: frame_s: should be greater than 0 (got 0"),
-        ("{memory_mib: 1}", "limits: memory_mib: should be 64 or more (got 1)"),
-        ("{memory_mib: 512.5}", "limits: should be a whole number (got 512.5)"),
-        ("{frames: 1}", "no limit named 'frames'. Did you mean 'frame_s'?"),
-    ],
-)
-def test_a_limit_that_is_none_is_refused_with_its_place(bent, limits, sentence):
-    with pytest.raises(SuiteError) as refused:
-        bent(("stand_still,", f"{{name: stand_still, limits: {limits}}},"))
-    assert sentence in str(refused.value)
-    assert "estimators.0" in str(refused.value)
-
-
-def test_parameters_reach_an_estimator_as_plain_python(bent):
-    (value,) = bent().entrants[1].params.values()
-    assert type(value) is float
-
-
-def test_every_estimator_runs_repeats_times_on_every_case(bent):
-    planned = bent(("seed: 1", "seed: 1\nrepeats: 3"))
-    runs = [run for case in planned.cases for run in planned.trials(case)]
-    assert len(runs) == len({(run.case.name, run.entrant.label, run.repeat) for run in runs}) == 2 * 2 * 3
-
-
-def test_asking_for_estimators_takes_the_suites_own_settings_first(bent):
-    planned = bent(only=("constant_velocity", "wheel_odometry"))
-    assert [(e.label, e.params) for e in planned.entrants] == [
-        ("constant_velocity", {"measure_s": 0.1}),
-        ("wheel_odometry", {}),
-    ]
-
-
-def test_asking_for_one_estimator_twice_is_an_error(bent):
-    with pytest.raises(SuiteError, match="two estimators are called 'stand_still'"):
-        bent(only=("stand_still", "stand_still"))
-
-
-def test_asking_for_an_unknown_estimator_names_the_nearest(bent):
-    with pytest.raises(UnknownNameError, match="Did you mean 'stand_still'"):
-        bent(only=("stand_stil",))
 
 
 def test_scenes_and_estimators_are_found_beside_their_suite_from_anywhere(bent, tmp_path, monkeypatch):
@@ -217,28 +141,6 @@ def test_every_suite_of_the_house_is_valid_and_called_as_its_file(name, monkeypa
     assert plan.suite.name == name
     assert plan.cases
     assert catalog.find("suite", name).origin == "built in"
-
-
-def test_a_rig_takes_lenses_and_their_places_from_its_preset_and_a_baseline_over_it(bent):
-    euroc = bent(("pitch_deg: 90", "pitch_deg: 90, lens: euroc")).cases[0].build_rig()
-    assert euroc.left != euroc.right
-    assert euroc.baseline_m == pytest.approx(0.110, abs=1e-3)
-    wide = bent(("pitch_deg: 90", "pitch_deg: 90, lens: euroc, baseline_m: 0.3")).cases[0].build_rig()
-    assert (wide.left, wide.right) == (euroc.left, euroc.right)
-    assert wide.baseline_m == pytest.approx(0.3)
-
-
-def test_a_calibration_error_makes_the_true_rig_another_and_the_told_one_not(bent):
-    plain, off = (
-        bent(("pitch_deg: 90", f"pitch_deg: 90{more}")).cases[0]
-        for more in ("", ", calibration_error: {focal_ratio: 0.02, right_yaw_deg: 0.5}")
-    )
-    told, true = off.build_rig(), off.build_true_rig()
-    assert told.left == plain.build_rig().left == plain.build_true_rig().left
-    assert told.T_body_right.tobytes() == plain.build_true_rig().T_body_right.tobytes()
-    assert true.left.fx_px == pytest.approx(1.02 * told.left.fx_px)
-    assert true.T_body_left.tobytes() == told.T_body_left.tobytes()
-    assert true.T_body_right.tobytes() != told.T_body_right.tobytes()
 
 
 # ruff: noqa: E501 - a sentence stands in one line
