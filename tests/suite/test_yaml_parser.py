@@ -6,7 +6,7 @@ import pytest
 
 from vobench.errors import Place, SuiteError
 from vobench.suite import yaml_parser
-from vobench.suite.yaml_parser import MOST_BYTES, MOST_DEPTH, MOST_DIGITS, MOST_NODES, parse_file, parse_text
+from vobench.suite.yaml_parser import MOST_BYTES, MOST_DEPTH, MOST_DIGITS, parse_file, parse_text
 
 FILE = Path("file.yaml")
 
@@ -49,26 +49,25 @@ def test_a_long_text_is_no_long_number():
     assert parse_text(FILE, f"a: '{'7' * 2 * MOST_DIGITS}'\n").tree["a"] == "7" * 2 * MOST_DIGITS
 
 
-@pytest.mark.parametrize("depth", [MOST_DEPTH - 2, MOST_DEPTH - 1])
-def test_a_tree_has_at_most_so_many_levels(depth):
-    text = f"a: {'[' * depth}{']' * depth}\n"  # the mapping is a level, and its deepest list
-    if depth + 1 < MOST_DEPTH:
-        assert parse_text(FILE, text).tree["a"] is not None
-    else:
-        parsed = parse_text(FILE, text)
-        assert parsed.tree["a"] is not None
-        assert "is nested more than 100 deep" in refusal(f"a: {'[' * (depth + 1)}{']' * (depth + 1)}\n")
+def nested(list_count: int) -> str:
+    """A mapping with lists in lists, which is a level more than there are lists."""
+    return f"a: {'[' * list_count}{']' * list_count}\n"
 
 
-@pytest.mark.parametrize("entries", [MOST_NODES - 3, MOST_NODES - 2])
-def test_a_tree_has_at_most_so_many_values(entries, monkeypatch):
+def test_a_tree_has_at_most_so_many_levels():
+    assert parse_text(FILE, nested(MOST_DEPTH - 1)).tree["a"] is not None
+    assert refusal(nested(MOST_DEPTH)) == f"file.yaml:1:{3 + MOST_DEPTH}: is nested more than 100 deep"
+
+
+def test_a_tree_has_at_most_so_many_values(monkeypatch):
     monkeypatch.setattr(yaml_parser, "MOST_NODES", 20)
-    count = entries - MOST_NODES + 20
-    text = f"a: [{', '.join(['1'] * count)}]\n"  # beside the mapping, its key and the list
-    if count + 3 <= 20:
-        assert len(parse_text(FILE, text).tree["a"]) == count
-    else:
-        assert refusal(text).startswith("file.yaml:1:1: holds more than 20 values")
+
+    def listed(count: int) -> str:
+        return f"a: [{', '.join(['1'] * count)}]\n"
+
+    # The mapping, its key and the list count, too.
+    assert len(parse_text(FILE, listed(17)).tree["a"]) == 17
+    assert refusal(listed(18)).startswith("file.yaml:1:1: holds more than 20 values")
 
 
 def test_an_alias_counts_as_what_it_repeats(monkeypatch):
@@ -87,7 +86,7 @@ def test_a_file_has_at_most_so_many_bytes(tmp_path, size):
     path = tmp_path / "file.yaml"
     path.write_text("a: 1\n#".ljust(size, "x"))
     if size > MOST_BYTES:
-        with pytest.raises(SuiteError, match="file.yaml: should be text of at most 2 MiB"):
+        with pytest.raises(SuiteError, match=r"file\.yaml: should be text of at most 2 MiB"):
             parse_file(path)
     else:
         assert parse_file(path).tree == {"a": 1}
