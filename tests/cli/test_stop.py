@@ -86,7 +86,7 @@ PLACES = {
     "runner.score": "score_trial",
     "report.page": "html",
     "runner.folder.RunFolder": "estimate",
-    "cli.report": "print_board",
+    "cli.board": "print_board",
 }
 
 
