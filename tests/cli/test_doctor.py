@@ -92,3 +92,32 @@ def test_a_driver_that_kills_the_process_is_not_well(vobench, without_mitsuba, m
     said = vobench("doctor", "--json")
     (drawing,) = rows(said, "drawing without a display (EGL)")
     assert (said.code, drawing["result"]) == (1, "the test process died with -11")
+
+
+@pytest.mark.parametrize(
+    ("user_id", "has_apt", "installs"), [(0, True, True), (0, False, False), (1000, True, False), (1000, False, False)]
+)
+def test_fix_installs_with_apt_as_root_alone(monkeypatch, user_id, has_apt, installs):
+    commands = []
+    monkeypatch.setattr(doctor.os, "geteuid", lambda: user_id)
+    monkeypatch.setattr(doctor.shutil, "which", lambda _: "/usr/bin/apt-get" if has_apt else None)
+    monkeypatch.setattr(doctor.subprocess, "run", lambda command, **_: commands.append(command[:3]))
+    monkeypatch.setattr(doctor, "_check_drawing", lambda: ["checked again"])
+    assert doctor._install_drawing() == ["checked again"]
+    assert commands == ([["apt-get", "-qq", "update"], ["apt-get", "-qq", "install"]] if installs else [])
+
+
+@pytest.mark.parametrize(("user_id", "command"), [(0, "apt-get install x"), (1000, "sudo apt-get install x")])
+def test_a_remedy_is_a_command_that_this_user_can_run(monkeypatch, user_id, command):
+    monkeypatch.setattr(doctor.os, "geteuid", lambda: user_id)
+    assert doctor._with_sudo("apt-get install x") == command
+
+
+def test_a_missing_library_is_named_with_the_command_that_installs_it(monkeypatch):
+    needed = ["numpy>=2", "no_such_library>=1 ; python_version > '3'", "mitsuba ; extra == 'path'"]
+    monkeypatch.setattr(doctor, "requires", lambda _: needed)
+    check = doctor._check_libraries()
+    assert (check.well, check.result) == (False, "missing: no_such_library")
+    assert check.remedy.endswith("-m pip install no_such_library")
+    monkeypatch.setattr(doctor, "requires", lambda _: needed[:1])
+    assert (doctor._check_libraries().well, doctor._check_libraries().result) == (True, "all installed")

@@ -3,6 +3,8 @@
 import cv2
 import pytest
 
+from vobench.cli.render import CameraOptions, EngineOptions
+
 WRONG = [
     (("--at", "9", "0", "1"), "--at should be inside the room (2 × 2 × 1.5 m around the origin), got (9.0, 0.0, 1.0)"),
     (("--at", "nan", "0", "1"), "--at should be inside the room"),
@@ -50,3 +52,10 @@ def test_stock_pyrender_draws_without_light_computed_before(vobench, here):
     picture = cv2.imread("look.png")
     assert picture.std() > 0
     assert not (here / "cache" / "bakes").exists()
+
+
+def test_without_options_the_camera_stands_a_little_above_the_origin_and_adds_no_gain():
+    camera = CameraOptions()
+    assert (camera.at, camera.yaw, camera.pitch) == ((0.0, 0.0, 1.2), 0.0, 10.0)
+    assert (camera.gain, camera.time, camera.sensor, camera.camera) == (1.0, 0.0, "clean", "paper_blender")
+    assert (EngineOptions().engine, EngineOptions().samples) == ("raster", None)
