@@ -7,6 +7,7 @@ from rich.console import Console
 
 from vobench.cli import board as cli_board
 from vobench.cli import terminal
+from vobench.report.board_table import COST, HEADINGS, MEMORY
 from vobench.report.leaderboard import board
 from vobench.runner.folder import TrialScore
 
@@ -87,3 +88,43 @@ def test_a_narrow_terminal_omits_the_least_important_columns_of_the_totals_first
 )
 def test_a_cell_has_its_mark_behind_and_its_range_below(cell, text):
     assert cli_board._cell_text(cell) == text
+
+
+NAMES = ("wheel_odometry", "an_estimator_of_a_long_name", "lk_epipolar", "stereo_pnp")
+
+
+def drawn(width, monkeypatch):
+    file = io.StringIO()
+    out = Console(file=file, width=width, markup=False, highlight=False)
+    monkeypatch.setattr(terminal, "console", lambda: out)
+    cli_board.print_board(board([repeated(name, k) for name in NAMES for k in range(3)], {}))
+    return file.getvalue()
+
+
+def repeated(name, repeat):
+    score = {"metrics": [{"name": "ate_trans", "rmse": 1.2345 + repeat}]}
+    facts = {"variant": {}, "reason": "", "coverage": 1.0, "frames": 9, "path_m": 100.0, "score": score}
+    return TrialScore(case="down-short", estimator=name, repeat=repeat, status="ok", **facts)
+
+
+@pytest.mark.parametrize("width", [60, 80, 100, 140])
+def test_a_board_fits_with_every_cell_in_one_piece_and_what_has_no_room_is_said(width, monkeypatch):
+    lines = drawn(width, monkeypatch).splitlines()
+    assert max(map(len, lines)) <= width
+    assert any("2.23" in line for line in lines)
+    assert any("1.23–3.23" in line for line in lines)
+    folded = ("wheel_", "estimator_", "lk_epipolar", "stereo_pnp")
+    gone = " ".join(lines).split("no room for ", 1)[1].split(":")[0] if width < 80 else ""
+    assert all(
+        any(part in line for line in lines[:6]) or name in gone for name, part in zip(NAMES, folded, strict=True)
+    )
+
+
+def test_a_wide_terminal_shows_every_column_that_has_anything(monkeypatch):
+    text = drawn(160, monkeypatch)
+    assert all(heading in text for heading in HEADINGS if heading not in (COST, MEMORY))
+    assert "no room" not in text
+
+
+def test_the_columns_that_may_go_exist():
+    assert set(cli_board.LEAST_FIRST) < set(HEADINGS)

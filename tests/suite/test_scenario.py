@@ -138,8 +138,10 @@ def test_what_is_wrong_with_a_scenario_is_said_with_its_place(plan, old, new, sa
         (SUITE.replace("[0, 2, 3, 4, 5]", "6"), "scenarios.dusk: should be 5 or less (got 6)"),
         ("name: tiny\nestimators: [stand_still]\n", "or only scenarios or a source"),
         ("name: t\nsource: x\ncalibrations: [worn]\nestimators: [stand_still]\n", "calibrations: requires scenarios"),
+        (SUITE + "calibrations: [worn, 3]\n", "calibrations: should be keys with values"),
+        (SUITE + "calibrations: [worn, borked]\n", "calibrations.borked: should be"),
     ],
-    ids=["name", "severity", "nothing", "calibrations"],
+    ids=["name", "severity", "nothing", "calibrations", "no level", "unknown level"],
 )
 def test_what_is_wrong_with_a_suite_of_scenarios_is_said(plan, suite, said):
     with pytest.raises(SuiteError) as refused:
