@@ -4,6 +4,7 @@ import io
 
 import pytest
 from rich.console import Console
+from rich.measure import Measurement
 
 from vobench.cli import board as cli_board
 from vobench.cli import terminal
@@ -128,3 +129,10 @@ def test_a_wide_terminal_shows_every_column_that_has_anything(monkeypatch):
 
 def test_the_columns_that_may_go_exist():
     assert set(cli_board.LEAST_FIRST) < set(HEADINGS)
+
+
+def test_a_table_that_is_exactly_as_wide_as_the_terminal_fits():
+    table = terminal.table("", ["name"], [["x" * 30]])
+    width = Measurement.get(Console(width=200), Console(width=200).options, table).maximum
+    assert cli_board._fits(table, Console(width=width))
+    assert not cli_board._fits(table, Console(width=width - 1))

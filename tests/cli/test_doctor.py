@@ -1,5 +1,6 @@
 import json
 from subprocess import CompletedProcess
+from types import SimpleNamespace
 
 import pytest
 
@@ -121,3 +122,18 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(monkeypatc
     assert check.remedy.endswith("-m pip install no_such_library")
     monkeypatch.setattr(doctor, "requires", lambda _: needed[:1])
     assert (doctor._check_libraries().well, doctor._check_libraries().result) == (True, "all installed")
+
+
+@pytest.mark.parametrize(
+    ("level", "why", "result"),
+    [
+        ("full", "", "estimators see their own files and nothing else"),
+        ("files", "no namespaces", "estimators can see the network (no namespaces); every trial records this"),
+        ("files", "", "estimators can see the network; every trial records this"),
+    ],
+)
+def test_the_sandbox_is_optional_and_what_estimators_can_see_is_named(monkeypatch, level, why, result):
+    monkeypatch.setattr(doctor, "sandbox_here", lambda: SimpleNamespace(level=level, why=why, sees=("the network",)))
+    check = doctor._check_sandbox()
+    assert (check.well, check.result, check.optional) == (level == "full", result, True)
+    assert bool(check.remedy) is not check.well

@@ -95,9 +95,12 @@ def test_no_thing_may_have_the_name_of_another_or_of_a_part_of_the_room(hall, na
 
 
 def test_a_second_window_takes_a_name_of_its_own(hall):
-    two = f"{WINDOW}, {window('south', 0, 1.5)}"
-    hall(WINDOW, two.replace("{wall: north", "{wall: north", 1))
-    assert is_accepted(hall, "name: crate", "name: window_1")
+    crate = "]\nboxes: [{name: crate"
+    window_1 = "]\nboxes: [{name: window_1"
+    two_windows = f"{WINDOW}, {window('south', 0, 1.5)}"
+    assert is_accepted(hall, f"{WINDOW}{crate}", f"{WINDOW}{window_1}")
+    assert is_accepted(hall, f"{WINDOW}{crate}", f"{two_windows}{crate}")
+    assert not is_accepted(hall, f"{WINDOW}{crate}", f"{two_windows}{window_1}")
 
 
 @pytest.mark.parametrize(
@@ -119,5 +122,5 @@ def test_a_scene_needs_something_that_can_emit_light(tmp_path, light, is_lit):
     if is_lit:
         read_scene(path)
     else:
-        with pytest.raises(SuiteError, match="a scene needs a light: .*; all lights that it has are 0"):
+        with pytest.raises(SuiteError, match=r"a scene needs a light: .*; all lights that it has are 0"):
             read_scene(path)
