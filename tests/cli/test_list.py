@@ -3,7 +3,7 @@
 import pytest
 
 from vobench.cli import list as listing
-from vobench.suite.catalog import Entry
+from vobench.suite.catalog import KINDS, Entry, entries
 
 MANIFEST = "name: mine\nversion: '1'\nclass: mine:Mine\npose_of: body\n"
 FORMS = [
@@ -64,3 +64,11 @@ def test_a_plain_summary_is_read_without_the_models(entry, monkeypatch):
     for line in FORMS[:3]:
         (entry.path / "estimator.yaml").write_text(f"{line}\n{MANIFEST}")
         assert listing._summary(entry).startswith("Two words")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_file_of_every_kind_that_is_read_whole_has_the_summary_that_is_read_off(kind):
+    for entry in entries(kind)[:2]:
+        summary = listing._parsed_summary(entry)
+        assert summary
+        assert listing._summary(entry) == summary
