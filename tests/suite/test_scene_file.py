@@ -145,3 +145,13 @@ def test_who_walks_is_a_mover_for_each_limb_and_may_stand_on_the_floor(tmp_path)
     assert {mover.name for mover in scene.movers} == {"ada"} == {t.name for m in scene.movers for t in m.things}
     assert len(scene.movers) == 7
     assert {thing.material for mover in scene.movers for thing in mover.things} <= set(scene.materials)
+
+
+@pytest.mark.parametrize("scale", [0.5, 2.0])
+def test_a_scale_multiplies_every_length(hall, scale):
+    whole = hall()
+    sized = hall("white_cd_m2: 50", f"white_cd_m2: 50\nscale: {scale}")
+    for before, after in zip(whole.things, sized.things, strict=True):
+        np.testing.assert_allclose(after.mesh.vertices_m, scale * before.mesh.vertices_m, atol=1e-9)
+    for before, after in zip(whole.movers, sized.movers, strict=True):
+        np.testing.assert_allclose(after.path.pose(1e9)[:3, 3], scale * before.path.pose(1e9)[:3, 3])

@@ -54,8 +54,8 @@ def import_command(
 
 
 @dataclass(frozen=True, slots=True)
-class Exported:
-    """What an export wrote: the number of files, and notes on what was lost."""
+class WrittenFiles:
+    """The number of files that an export wrote, and notes on what was lost."""
 
     file_count: int
     notes: tuple[str, ...]
@@ -81,20 +81,20 @@ def export_command(
     print(f"exported {exported.file_count} {noun} of the form '{form}': {out}")
 
 
-def _export_sequence(folder: Path, out: Path, form: str) -> Exported:
+def _export_sequence(folder: Path, out: Path, form: str) -> WrittenFiles:
     """Raises VobenchError if the folder is not a sequence, or the form is unknown."""
     is_sequence = (folder / SENSORS_FILE).is_file()
     if form in writable() and folder.is_dir() and not is_sequence:
         raise InputError(f"not a vobench sequence (it has no {SENSORS_FILE}); vobench import creates one: {folder}")
     exported = export(folder, out, form)
-    return Exported(len(exported.files), exported.notes)
+    return WrittenFiles(len(exported.files), exported.notes)
 
 
-def _export_trajectory(path: Path, out: Path, form: str) -> Exported:
+def _export_trajectory(path: Path, out: Path, form: str) -> WrittenFiles:
     """Raises VobenchError if the trajectory cannot be read, or the form is unknown."""
     files = export_trajectory(_read_trajectory(path), out, form)
     notes = tuple(f"Poses in KITTI's form have no stamps; the stamps are in {file.name}." for file in files[1:])
-    return Exported(len(files), notes)
+    return WrittenFiles(len(files), notes)
 
 
 def _read_trajectory(path: Path) -> Trajectory:
