@@ -1,6 +1,9 @@
 """A case builds its scene, its nominal rig and its true rig."""
 
+import numpy as np
 import pytest
+
+from vobench.geometry.rig import drawn, true_rig
 
 # ruff: noqa: E501 - an entry stands in one line
 
@@ -47,3 +50,16 @@ def test_a_drawn_calibration_error_depends_on_the_seed_alone(bent):
     assert true_right() == true_right()
     assert true_right(("seed: 1", "seed: 2")) != true_right()
     assert true_right(("sensor: clean", "sensor: mt9v034")) == true_right()
+
+
+def test_random_calibration_errors_come_from_a_stream_of_their_own(bent):
+    case = bent(("pitch_deg: 90", "pitch_deg: 90, calibration_error: worn")).cases[0]
+    rig = case.build_rig()
+    expected = true_rig(rig, drawn(case.rig.calibration_error, rig, np.random.default_rng([1, 7_301])))
+    assert case.build_true_rig().T_body_right.tobytes() == expected.T_body_right.tobytes()
+
+
+def test_without_rigs_a_pair_looks_ahead_ten_degrees_below_the_horizon(bent):
+    (case, *_) = bent(("rigs: {down: {pitch_deg: 90}}\n", "")).cases
+    assert (case.variant["rig"], case.rig.pitch_deg) == ("ahead", 10)
+    assert (case.rig.forward_m, case.rig.height_m, case.rig.picture_scale) == (0.25, 0.4, 1)

@@ -104,7 +104,7 @@ def test_a_body_does_not_fit_into_a_box_that_is_open_below() -> None:
     assert max(abs(solid.x_m), abs(solid.y_m)) > 1.5
 
 
-@pytest.mark.parametrize(("height_m", "is_free"), [(BODY_M - 0.1, False), (BODY_M + 0.1, True)])
+@pytest.mark.parametrize(("height_m", "is_free"), [(0.5, False), (0.62, True), (1.1, True)])
 def test_what_hangs_lower_than_a_body_is_high_takes_the_floor_below_it(height_m: float, is_free: bool) -> None:
     free = circle(floor(4, 4), box(0.0, 0.0, (4.0, 4.0, 0.04), z_m=height_m))
     if is_free:
@@ -256,3 +256,22 @@ def test_a_huge_hall_gets_at_most_four_lamps_along_a_side() -> None:
 def test_a_scene_without_a_floor_gets_a_lamp_at_the_origin_and_all_of_the_sky() -> None:
     wall = Thing("wall", quad((0, -1, 0), (0, 2, 0), (0, 0, 2)), "grey")
     assert ceiling_above(scene(wall)) == (1.0, [(0.0, 0.0, 0.0)])
+
+
+def test_the_path_of_ten_metres_takes_twenty_seconds_at_ten_frames_a_second() -> None:
+    path = circular_path(scene(floor(30, 30)))
+    assert path.poses[-1].t_s == pytest.approx(20)
+    assert (path.rate_hz, path.ease_s) == (10, 1)
+
+
+@pytest.mark.parametrize(("low_m", "high_m"), [(0.0, 0.15), (0.3, 0.4), (0.55, 0.65)])
+def test_a_thin_sheet_at_any_height_of_a_body_blocks_it(low_m: float, high_m: float) -> None:
+    sheet = Thing("sheet", quad((0.03, -2, low_m), (0, 4, 0), (0, 0, high_m - low_m)), "grey")
+    free = circle(floor(4, 4), sheet)
+    assert free is not None
+    assert abs(free.x_m - 0.03) >= free.radius_m
+
+
+def test_a_lamp_hangs_a_third_below_the_ceiling_of_a_low_room() -> None:
+    ((_, _, z_m),) = ceiling_above(hall(4, 4))[1]
+    assert z_m == pytest.approx(0.6 + 0.65 * 1.9)

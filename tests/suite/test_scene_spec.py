@@ -7,19 +7,27 @@ from vobench.errors import SettingError
 from vobench.scene.light import Dimmer, Flicker, Steady
 from vobench.scene.material import LUMINANCE
 from vobench.suite.scene_spec import (
+    BoardSpec,
+    BoxSpec,
+    FurnitureSpec,
     Glass,
     LevelSpec,
     Luminous,
+    Matt,
     Mirror,
+    ModelSpec,
     MoverSpec,
     PanelLamp,
     PathKey,
     PointLamp,
+    Polished,
     RoomSpec,
     SceneFile,
+    SkySpec,
     SpotLamp,
     SunKey,
     SunSpec,
+    WindowSpec,
     hue,
 )
 
@@ -170,3 +178,49 @@ def test_a_scene_needs_something_visible():
     with pytest.raises(SettingError, match="a scene needs something visible"):
         SceneFile(name="a", white_cd_m2=1.0)
     assert SceneFile(name="a", white_cd_m2=1.0, maker="a.py").seed == 0
+
+
+def test_what_is_left_out_changes_nothing():
+    model = ModelSpec(file="a.glb")
+    assert (model.at_m, model.yaw_deg, model.scale, model.up, model.roles) == ((0, 0, 0), 0, 1, None, {})
+    desk = FurnitureSpec(kind="table", name="desk", at_m=(1.0, 0.0, 0.0))
+    assert (desk.yaw_deg, desk.pitch_deg, desk.size) == (0, 0, {})
+    box = BoxSpec(center_m=(0.0, 0.0, 1.0), size_m=(1.0, 1.0, 1.0), material="oak")
+    assert (box.yaw_deg, box.name) == (0, None)
+    assert BoardSpec(center_m=(0.0, 0.0, 1.0), size_m=(1.0, 1.0), material="oak").yaw_deg == 0
+    assert (KEYS[0].yaw_deg, MoverSpec(name="a", path=KEYS, kind="person").repeats) == (0, False)
+    scene = SceneFile(name="a", white_cd_m2=1.0, maker="a.py")
+    assert (scene.seed, scene.scale, scene.lamps, scene.materials) == (0, 1, (), {})
+    assert (SkySpec(illuminance_lx=1.0).kind, PointLamp(name="b", center_m=(0.0, 0.0, 1.0), power_lm=1.0).level) == (
+        "overcast",
+        LevelSpec(steady=1.0),
+    )
+    window = WindowSpec(wall="north", center_m=(0.0, 1.0), size_m=(1.0, 1.0), pane="p", reveal="r")
+    assert window.depth_m == 0.15
+
+
+def test_materials_have_usual_values_if_nothing_is_said():
+    assert (Mirror().tint, Mirror().roughness) == (0.9, 0)
+    assert (Glass().eta, Glass().tint) == (1.5, 1)
+    polished = Polished(pattern="plain", albedo=0.5)
+    assert (polished.eta, polished.tint, polished.roughness, polished.colour) == (1.5, 1, 0, (1, 1, 1))
+    assert Matt(pattern="plain", albedo=0.5).build().is_coated is False
+    assert polished.build().is_coated is True
+
+
+@pytest.mark.parametrize(
+    ("build", "bound"),
+    [
+        (lambda value: Glass(eta=value), (1.0, 4.0)),
+        (lambda value: Mirror(roughness=value), (0.0, 0.5)),
+        (lambda value: Mirror(tint=value), (0.0, 1.0)),
+        (lambda value: SceneFile(name="a", white_cd_m2=1.0, maker="a.py", scale=value), (0.05, 20.0)),
+    ],
+)
+def test_values_within_their_bounds_are_taken_and_others_refused(build, bound):
+    least, most = bound
+    build(least)
+    build(most)
+    for value in (least - 0.01, most + 0.01):
+        with pytest.raises(SettingError, match="should be "):
+            build(value)
