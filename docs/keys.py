@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from vobench.cli.run import FILES
+from vobench.cli.schema import FILES
 from vobench.setting import unit_of
 from vobench.suite.yaml_file import json_schema
 

@@ -18,7 +18,7 @@ def test_every_name_that_moved_works_and_warns(module: str, name: str) -> None:
     new_place = retired.MOVED[module][name]
     home, _, new_name = new_place.rpartition(".")
     with pytest.warns(
-        DeprecationWarning, match=f"{module}.{name} is now {new_place}; the old name goes with"
+        DeprecationWarning, match=f"{module}.{name} is now {new_place}; the old name will be removed"
     ) as caught:
         value = getattr(importlib.import_module(module), name)
     assert value is getattr(importlib.import_module(home), new_name)
@@ -27,7 +27,7 @@ def test_every_name_that_moved_works_and_warns(module: str, name: str) -> None:
 
 @pytest.mark.parametrize(("module", "name"), [(m, name) for m, names in retired.GONE.items() for name in names])
 def test_every_name_that_has_gone_says_what_replaces_it(module: str, name: str) -> None:
-    with pytest.raises(ImportError, match=f"{module}.{name} has gone: ") as raised:
+    with pytest.raises(ImportError, match=f"{module}.{name} was removed: ") as raised:
         getattr(importlib.import_module(module), name)
     for word in str(raised.value).split(": ", 1)[1].split():
         place, _, offered = word.strip(",`").rpartition(".")
@@ -36,7 +36,7 @@ def test_every_name_that_has_gone_says_what_replaces_it(module: str, name: str) 
 
 
 def test_a_name_that_a_retired_module_never_had_is_one_sentence() -> None:
-    with pytest.raises(ImportError, match=r"^vobench\.geometry\.rectify has gone, and warp with it; what plugins may"):
+    with pytest.raises(ImportError, match=r"^vobench\.geometry\.rectify was removed, with warp; import from"):
         from vobench.geometry.rectify import warp  # noqa: F401
 
 
@@ -44,7 +44,8 @@ def test_a_name_that_a_retired_module_never_had_is_one_sentence() -> None:
 def test_a_renamed_room_says_its_new_name(module: str) -> None:
     room = ".".join(module.split(".")[:2])
     with pytest.raises(
-        ModuleNotFoundError, match=f"{room} is now {retired.ROOMS[room]}; what plugins may import is in"
+        ModuleNotFoundError,
+        match=f"{room} is now {retired.ROOMS[room]}; import from vobench.plugin what plugins may use",
     ):
         importlib.import_module(module)
 
@@ -129,7 +130,7 @@ def test_an_old_estimators_trial_ends_with_the_sentence_that_names_the_new_place
     done = vobench("try", "./old")
     assert done.returncode == 1
     sentence = (
-        "ImportError: vobench.geometry.rectify.rectify has gone: vobench.plugin.rectification gives the rectified"
+        "ImportError: vobench.geometry.rectify.rectify was removed: vobench.plugin.rectification gives the rectified"
     )
     assert sentence in done.stdout
     # Before it is run, the line that has to change is named.
@@ -151,7 +152,7 @@ def test_an_old_maker_ends_with_the_sentence_that_names_the_new_place(
     (tmp_path / "old.yaml").write_text("name: old\nwhite_cd_m2: 50\nmaker: maker.py\n")
     done = vobench("scene", "./old.yaml")
     assert done.returncode == 1
-    assert "ImportError: vobench.scene.surface.box has gone: vobench.plugin.block makes a box" in done.stderr
+    assert "ImportError: vobench.scene.surface.box was removed: vobench.plugin.block makes a box" in done.stderr
 
 
 def test_an_old_layout_ends_with_the_sentence_that_names_the_new_place(
@@ -164,7 +165,7 @@ def test_an_old_layout_ends_with_the_sentence_that_names_the_new_place(
     assert (
         "the layout old_layout:LAYOUT does not load (ImportError: vobench.dataset.yaml_values.read_yaml" in done.stderr
     )
-    assert "has gone: vobench.plugin.chain_rig reads Kalibr's files" in done.stderr
+    assert "was removed: vobench.plugin.chain_rig reads Kalibr's files" in done.stderr
 
 
 def test_an_old_metric_ends_with_the_sentence_that_names_the_new_place(
@@ -174,7 +175,7 @@ def test_an_old_metric_ends_with_the_sentence_that_names_the_new_place(
     install(tmp_path, "vobench.metrics", "old_metric", source, "METRIC")
     done = vobench("metrics")
     assert done.returncode == 1
-    sentence = "the metric old_metric:METRIC does not load (ImportError: vobench.metric.measure.Metric has gone: "
+    sentence = "the metric old_metric:METRIC does not load (ImportError: vobench.metric.measure.Metric was removed: "
     assert f"{sentence}vobench.plugin.MetricDefinition is a metric)" in done.stderr
 
 

@@ -1,7 +1,7 @@
-"""vobench: simulate, run and score visual odometry, and explain where it breaks.
+"""vobench: simulate, run and score visual odometry, and explain why it fails.
 
-Everything that the command line does can be done from Python; docs/python.md shows it. Each name is imported when it
-is first used.
+Python code can do everything that the command line does; see docs/python.md. Each name is imported when it is first
+used.
 """
 
 import sys
@@ -88,7 +88,7 @@ __all__ = [
 if not TYPE_CHECKING:  # otherwise a type checker would take every misspelt name for one of these
 
     def __getattr__(name):
-        """Import a public name now."""
+        """Import a public name on first use."""
         if name not in _HOMES:
             raise AttributeError(f"module 'vobench' has no attribute {name!r}")
         value = getattr(import_module(_HOMES[name]), name)
@@ -101,11 +101,11 @@ if not TYPE_CHECKING:  # otherwise a type checker would take every misspelt name
 
 
 class _Retired:
-    """A finder of modules that earlier releases had, asked after all others: old plugins get a sentence."""
+    """A finder of modules from earlier releases, used after all others, so that old plugins get a clear message."""
 
     @staticmethod
     def find_spec(name: str, _path: object = None, _target: object = None) -> "ModuleSpec | None":
-        """The spec of a retired module, as `vobench.retired` says; None for any other name."""
+        """The spec of a module in `vobench.retired`; None for any other name."""
         if not name.startswith("vobench."):
             return None
         from vobench import retired

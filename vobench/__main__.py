@@ -5,6 +5,6 @@ import sys
 from vobench.cli import main
 
 if __name__ == "__main__":
-    # Messages that name a command to run next start with this.
+    # Messages that name the next command start with this.
     sys.argv[0] = f"{sys.executable} -m vobench"
     main()

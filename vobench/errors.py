@@ -1,18 +1,18 @@
 """Every error that vobench raises on purpose, in one tree.
 
-VobenchError               the user's mistake or machine: one line, exit code 1
-├── InputError             a file does not say what it should
-│   ├── SettingError       a setting is not what its field takes, or does not fit the others
+VobenchError               an error that the user can correct: one line, exit code 1
+├── InputError             a file or an argument is wrong
+│   ├── SettingError       a setting has a wrong value, or contradicts others
 │   ├── SuiteError         a suite, scene or manifest: names file, line, key and value of every mistake
 │   ├── ModelError         a model of triangles: a glTF, OBJ, STL or PLY file
 │   └── TrajectoryError    a trajectory file or array
-├── UnknownNameError       no scene, suite or estimator of that name
-├── MissingDependencyError this machine lacks something; the message says how to get it
-├── AlignmentError         two trajectories cannot be compared as asked
-├── MotionError            the robot cannot drive as asked
+├── UnknownNameError       no scene, suite or estimator has that name
+├── MissingDependencyError this machine lacks something; the message names the remedy
+├── AlignmentError         two trajectories cannot be compared in the requested way
+├── MotionError            the robot cannot drive in the requested way
 ├── NoSequenceError        no case of a suite could be simulated or imported
-├── RenderError            the renderer cannot make this picture
-└── SequenceError          a recording is incomplete, torn or of another form
+├── RenderError            the renderer cannot render this image
+└── SequenceError          a recording is incomplete, damaged or of another form
 """
 
 from collections.abc import Iterable
@@ -20,13 +20,12 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
-# More than fit a screen are counted.
-MOST_SAID = 10
+MOST_SAID = 10  # mistakes in one message; the others are counted
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A place in a file: its line and column from 1 on, and the key and value there, as far as they are known."""
+    """A place in a file: line and column, counted from 1, and the key and value there, as far as they are known."""
 
     file: str
     line: int | None = None
@@ -35,13 +34,13 @@ class Place:
     value: Any = None
 
     def __str__(self) -> str:
-        where = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
-        return f"{where}: {self.key}" if self.key else where
+        position = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
+        return f"{position}: {self.key}" if self.key else position
 
 
 @dataclass(frozen=True, slots=True)
 class Mistake:
-    """One thing that is wrong, in a sentence; its places lead from the file asked for to the one at fault."""
+    """One mistake in a sentence; its places lead from the requested file to the wrong one."""
 
     sentence: str
     places: tuple[Place, ...] = ()
@@ -51,24 +50,24 @@ class Mistake:
 
 
 class VobenchError(Exception):
-    """Something the person at the keyboard can mend; the message is one line."""
+    """An error that the user can correct; the message is one line."""
 
     @property
     def mistakes(self) -> tuple[Mistake, ...]:
-        """What is wrong, one by one."""
+        """The mistakes, one by one."""
         return (Mistake(str(self)),)
 
     def _render_traceback_(self) -> list[str]:
-        """What Jupyter shows in place of a traceback."""
+        """The lines that Jupyter shows instead of a traceback."""
         return [f"{type(self).__name__}: {line}" for line in printable(str(self)).splitlines()]
 
 
 class InputError(VobenchError):
-    """A file does not say what it should."""
+    """A file or an argument is wrong."""
 
 
 class SettingError(InputError, ValueError):
-    """A setting is wrong; `keys` lead to it from the object that has it. A ValueError, so that pydantic gathers it."""
+    """A setting is wrong; `keys` lead to it from its object. It is a ValueError so that pydantic gathers it."""
 
     def __init__(self, sentence: str, *keys: int | str) -> None:
         self.sentence = sentence
@@ -77,23 +76,25 @@ class SettingError(InputError, ValueError):
 
 
 class SuiteError(InputError):
-    """A suite, scene or manifest is wrong; the message names file, line, key and value, a line for each mistake."""
+    """A suite, scene or manifest is wrong; the message has a line with file, line, key and value for each mistake."""
 
     def __init__(self, *mistakes: Mistake | str) -> None:
         self._mistakes = tuple(Mistake(each) if isinstance(each, str) else each for each in mistakes)
-        said = [*map(str, self._mistakes[:MOST_SAID])]
-        if more := len(self._mistakes) - len(said):
-            said.append(f"and {more} more mistake{'s' if more > 1 else ''}")
-        super().__init__("\n".join(said))
+        lines = [str(mistake) for mistake in self._mistakes[:MOST_SAID]]
+        more_count = len(self._mistakes) - len(lines)
+        if more_count:
+            noun = "mistake" if more_count == 1 else "mistakes"
+            lines.append(f"and {more_count} more {noun}")
+        super().__init__("\n".join(lines))
 
     @property
     def mistakes(self) -> tuple[Mistake, ...]:
-        """Every one, also those that the message only counts."""
+        """All mistakes, including those that the message only counts."""
         return self._mistakes
 
 
 class ModelError(InputError):
-    """A model of triangles, or a picture on it, is wrong; the message names file, node and what would help."""
+    """A model of triangles or its texture is wrong; the message names the file, the node and the remedy."""
 
 
 class TrajectoryError(InputError):
@@ -101,43 +102,48 @@ class TrajectoryError(InputError):
 
 
 class UnknownNameError(VobenchError):
-    """No scene, suite or estimator of that name."""
+    """No scene, suite or estimator has that name."""
 
 
 class MissingDependencyError(VobenchError):
-    """This machine lacks something; the message says how to get it."""
+    """This machine lacks something; the message names the remedy."""
 
 
 class AlignmentError(VobenchError):
-    """Two trajectories cannot be compared as asked."""
+    """Two trajectories cannot be compared in the requested way."""
 
 
 class MotionError(VobenchError):
-    """The robot cannot drive as asked."""
+    """The robot cannot drive in the requested way."""
 
 
 class NoSequenceError(VobenchError):
-    """Cases of a suite could not be simulated or imported; the message says which, why and what helps."""
+    """Cases of a suite could not be simulated or imported; the message names them, the reason and the remedy."""
 
 
 class RenderError(VobenchError):
-    """The renderer cannot make this picture."""
+    """The renderer cannot render this image."""
 
 
 class SequenceError(VobenchError):
-    """A recording is incomplete, torn or of another form."""
+    """A recording is incomplete, damaged or of another form."""
 
 
 def printable(text: str) -> str:
-    """A text of somebody else's as a terminal may have it: without ESC, NUL and their like, or lone surrogates."""
-    return "".join(letter if letter.isprintable() or letter == "\n" else " " for letter in text)
+    """A text of unknown origin that is safe on a terminal: control characters and lone surrogates become spaces."""
+    return "".join(character if _is_safe(character) else " " for character in text)
+
+
+def _is_safe(character: str) -> bool:
+    return character.isprintable() or character == "\n"
 
 
 def unknown(kind: str, name: str, known: list[str]) -> str:
-    """One line for a name that nothing has, with the nearest one and all there are."""
-    near = get_close_matches(name, known, n=1)
-    guess = f" Did you mean '{near[0]}'?" if near else ""
-    return f"no {kind} named '{name}'.{guess} Known: {', '.join(sorted(known)) or 'none'}"
+    """The sentence about an unknown name, with the nearest known name and all known ones."""
+    nearest = get_close_matches(name, known, n=1)
+    guess = f" Did you mean '{nearest[0]}'?" if nearest else ""
+    known_names = ", ".join(sorted(known)) or "none"
+    return f"no {kind} named '{name}'.{guess} Known: {known_names}"
 
 
 def require_known(kind: str, name: str, known: Iterable[str]) -> None:

@@ -1,4 +1,4 @@
-"""Everything that a plugin may import: `from vobench.plugin import Result, Status, stereo_pair`.
+"""All names that a plugin may import: `from vobench.plugin import Result, Status, stereo_pair`.
 
 Estimators   Estimator Frame Result Status Tracks Image EncoderReadings ImuReadings: the protocol
              Rig ImuCalibration WheelGeometry Rectification rectification STANDARD_GRAVITY_MPS2: the calibration
@@ -14,7 +14,7 @@ Makers       Mesh Thing joined quad at block card cushion extrusion lathe pierce
              Part Piece put stood things mm bars bulb: furniture
              Opening shell FINISHES OUTWARD: rooms
              AreaLight PointLight SpotLight Sun Sky Steady Flicker Dimmer Switched: lights
-Layouts      Layout Writing ReadOptions Topics: what a layout is, and what its reader is asked for
+Layouts      Layout Writing ReadOptions Topics: the definition of a layout, and the options of its reader
              Recording RecordedFrame RecordedPicture PictureStream assemble picture_files numbered truth_file unread
              chain_rig: reading
              ExportSource Views rectified png_frames: writing
@@ -22,10 +22,10 @@ Metrics      MetricDefinition Comparison OverLengths POSES ScoreSettings
 All          se3 Array adjoint cross_matrix twist unit: rigid motions
              Camera Pinhole BrownConrady KannalaBrandt DoubleSphere Equirectangular looking side_by_side: cameras
              Trajectory Stamps: stamped poses
-             VobenchError InputError SequenceError SettingError: errors that end as one sentence
+             VobenchError InputError SequenceError SettingError: errors that are reported in one sentence
 
-A name is imported from its home when it is first asked for, so an estimator does not load what scenes are made of.
-`tests/plugin_surface.txt` freezes names and signatures. A name that leaves works for one release with a
+A name is imported from its module on first use, so an estimator does not load the modules for scenes.
+`tests/plugin_surface.txt` freezes names and signatures. A name that is removed works for one more release with a
 DeprecationWarning (`vobench/retired.py`). Everything else in vobench may change at any time.
 """
 
@@ -425,10 +425,10 @@ __all__ = [
     "wood",
 ]
 
-if not TYPE_CHECKING:  # else every misspelt name would pass for one of ours
+if not TYPE_CHECKING:  # otherwise a type checker would accept every misspelt name
 
     def __getattr__(name):
-        """A name of `__all__`, imported now; one that has left `__all__` as `vobench.retired` says."""
+        """Import a name of `__all__`, or a retired name, on first use."""
         if name.startswith("__"):  # asked for by the import system, with every `from vobench.plugin import ...`
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         if name not in HOMES:
@@ -438,9 +438,9 @@ if not TYPE_CHECKING:  # else every misspelt name would pass for one of ours
         module, _, attribute = HOMES[name].partition(":")
         is_module = module.rpartition(".")[2] == name
         value = import_module(module) if is_module else getattr(import_module(module), attribute or name)
-        globals()[name] = value  # the next time it is found without this function
+        globals()[name] = value  # found without this function from now on
         return value
 
     def __dir__():
-        """What there is to complete, imported or not."""
+        """All names, imported or not."""
         return sorted({*globals(), *__all__})

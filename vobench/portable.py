@@ -1,8 +1,8 @@
-"""Equal bytes on processors of other makes: libraries held to instructions that all of them execute alike.
+"""Restricts libraries to instructions that give equal bytes on all x86-64 processors.
 
-Libraries choose their code by what the processor offers, and sums then round differently. With VOBENCH_PORTABLE=1 they
-are held to SSE4, which every x86-64 processor has; Embree, which reads no variable, in `vobench.rendering.embree`.
-The variables must be set before the libraries load, so `vobench` sets them when it is first imported.
+Libraries select their code by the features of the processor, and sums then round differently. With VOBENCH_PORTABLE=1
+they are restricted to SSE4, which every x86-64 processor has. Embree, which reads no variable, is restricted in
+`vobench.rendering.embree`. The variables must be set before the libraries load, so `vobench` sets them on import.
 """
 
 import os
@@ -24,12 +24,12 @@ LOADED_TOO_EARLY = ("numpy", "cv2")
 
 
 def is_portable() -> bool:
-    """Whether VOBENCH_PORTABLE asks for bytes that do not depend on the make of the processor."""
+    """Whether VOBENCH_PORTABLE requests bytes that do not depend on the processor."""
     return os.environ.get(PORTABLE, "") not in ("", "0")
 
 
 def hold() -> None:
-    """Set the variables for libraries that load later, in this process and in those that it starts."""
+    """Set the variables for libraries that load later, in this process and its child processes."""
     is_too_late = any(name in sys.modules for name in LOADED_TOO_EARLY)
     if is_portable() and not is_too_late:
         os.environ.update(VARIABLES)
@@ -37,5 +37,6 @@ def hold() -> None:
 
 def require_held() -> None:
     """Raise InputError if VOBENCH_PORTABLE is set, but libraries were loaded before it could take effect."""
-    if is_portable() and any(os.environ.get(name) != value for name, value in VARIABLES.items()):
+    are_set = all(os.environ.get(name) == value for name, value in VARIABLES.items())
+    if is_portable() and not are_set:
         raise InputError(f"{PORTABLE} takes effect only if it is set, and vobench imported, before numpy and OpenCV")

@@ -1,8 +1,8 @@
-"""Names that plugins imported in earlier releases and that have moved or gone, each kept for one release.
+"""Names from earlier releases that have moved or were removed, each supported for one more release.
 
-A name that lives on elsewhere in the same form still works, with a DeprecationWarning that names the new place. For a
-name that has gone, or changed its form, the import ends with an ImportError of one sentence that says what replaces it.
-`vobench/__init__.py` asks this module only when an import from vobench is about to fail.
+A name that has only moved still works, with a DeprecationWarning that names the new module. For a name that was removed
+or changed, the import raises an ImportError with a sentence that names the replacement. `vobench/__init__.py` uses this
+module only when an import from vobench is about to fail.
 """
 
 import warnings
@@ -10,7 +10,7 @@ from importlib import import_module
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-ADVICE = "what plugins may import is in vobench.plugin (docs/estimators.md)"
+ADVICE = "import from vobench.plugin what plugins may use (docs/estimators.md)"
 
 # Old module: name: the name that replaces it, in the same form. Cache keys read this table without importing it
 # (`runner/key.py`), so it must stay a literal.
@@ -84,7 +84,7 @@ MOVED = {
     "vobench.trajectory.text": {"format_tum": "vobench.trajectory.formats.format_tum"},
 }
 
-# Old module: name: what replaces it, as the end of a sentence.
+# Old module: name: the replacement, as the end of a sentence.
 GONE = {
     "vobench.geometry.rectify": {
         "rectify": "vobench.plugin.rectification gives the rectified views of a rig, vobench.plugin.stereo_pair a pair "
@@ -114,7 +114,7 @@ GONE = {
     "vobench.trajectory.text": {"parse_tum": "vobench.read_trajectory reads a trajectory in any format"},
 }
 
-# Rooms that were renamed as a whole.
+# Packages that were renamed as a whole.
 ROOMS = {
     "vobench.catalog": "vobench.suite",
     "vobench.pipeline": "vobench.runner",
@@ -129,31 +129,31 @@ ROOMS = {
 def lookup(module: str, name: str) -> object:
     """The value that `from module import name` gave in an earlier release, with a DeprecationWarning.
 
-    Raises ImportError with one sentence where the name has gone, AttributeError where the module never had it.
+    Raises ImportError with one sentence if the name was removed, AttributeError if the module never had it.
     """
     moved = MOVED.get(module, {}).get(name)
     if moved is not None:
-        message = f"{module}.{name} is now {moved}; the old name goes with the next release"
+        message = f"{module}.{name} is now {moved}; the old name will be removed in the next release"
         warnings.warn(message, DeprecationWarning, stacklevel=3)
         home, _, new_name = moved.rpartition(".")
         return getattr(import_module(home), new_name)
     gone = GONE.get(module, {}).get(name)
     if gone is not None:
-        raise ImportError(f"{module}.{name} has gone: {gone}", name=module)
+        raise ImportError(f"{module}.{name} was removed: {gone}", name=module)
     raise AttributeError(f"module {module!r} has no attribute {name!r}")
 
 
 class RetiredModule(ModuleType):
-    """A module that is no file any more: its names are looked up in the tables above."""
+    """A module that was removed; its names are looked up in the tables above."""
 
     def __getattr__(self, name: str) -> object:
-        """The retired name. Raises ImportError, as for what never was there the module itself is the reason."""
+        """The retired name. Raises ImportError if there is no such name."""
         if name.startswith("__"):  # asked for by the import system
             raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
         try:
             return lookup(self.__name__, name)
         except AttributeError:
-            raise ImportError(f"{self.__name__} has gone, and {name} with it; {ADVICE}", name=self.__name__) from None
+            raise ImportError(f"{self.__name__} was removed, with {name}; {ADVICE}", name=self.__name__) from None
 
 
 class _Loader:
@@ -167,10 +167,10 @@ class _Loader:
 
 
 def find_spec(module: str) -> ModuleSpec | None:
-    """The retired module of that name, None where there never was one. Raises ImportError in a renamed room."""
+    """The retired module with that name; None if there never was one. Raises ImportError for a renamed package."""
     if module in MOVED or module in GONE:
         return ModuleSpec(module, _Loader())  # type: ignore[arg-type]
-    for room, new_room in ROOMS.items():
-        if module == room or module.startswith(f"{room}."):
-            raise ModuleNotFoundError(f"{room} is now {new_room}; {ADVICE}", name=module)
+    for package, new_package in ROOMS.items():
+        if module == package or module.startswith(f"{package}."):
+            raise ModuleNotFoundError(f"{package} is now {new_package}; {ADVICE}", name=module)
     return None

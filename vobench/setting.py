@@ -1,12 +1,12 @@
-"""Settings: frozen dataclasses whose fields state the name with its unit, the default and the bounds of each once.
+"""Settings: frozen dataclasses whose fields define the name with its unit, the default and the bounds of each once.
 
-A class of settings says what it takes, and holds it whoever builds one:
+A class of settings checks its values whoever creates an object:
 
     @settings()
     class Shutter:
         readout_ms: Annotated[float, Ge(0), Le(1000)] = 0.0
 
-YAML files are read into such classes, and JSON Schemas and the tables of the docs are made from them: see `suite`.
+YAML files are read into such classes, and JSON Schemas and the tables of the docs are generated from them: see `suite`.
 """
 
 import re
@@ -22,7 +22,7 @@ from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 
 from vobench.errors import SettingError, unknown
 
-# What may be wrong with a value, in the words of somebody who writes YAML, by pydantic's names; {} are filled in.
+# Sentences about wrong values for those who write YAML, by pydantic's type of the error; {} are filled in.
 COMPLAINTS = {
     "missing": "this key is missing",
     "string_type": "should be text (a number or a date needs quotes)",
@@ -44,7 +44,7 @@ COMPLAINTS = {
     "less_than": "should be less than {lt}",
     "less_than_equal": "should be {le} or less",
 }
-# What a suffix of a name says of its value.
+# The unit of a value, by the suffix of its name.
 UNITS = {
     **{unit: unit for unit in ("m", "s", "ms", "ns", "rad", "deg", "px", "kg", "V", "lm", "lx")},
     "hz": "Hz",
@@ -64,56 +64,63 @@ T = TypeVar("T")
 
 
 def unit_of(name: str) -> str:
-    """The unit that a setting's name ends in; empty where it has none."""
+    """The unit that a setting's name ends in; empty if it has none."""
     parts = name.split("_")
-    return next((UNITS[end] for end in ("_".join(parts[n:]) for n in range(1, len(parts))) if end in UNITS), "")
+    for first in range(1, len(parts)):
+        suffix = "_".join(parts[first:])
+        if suffix in UNITS:
+            return UNITS[suffix]
+    return ""
 
 
-WHOLE_WITHIN = 1e-9  # relative: far more than rounding does, far less than anybody writes
+WHOLE_TOLERANCE = 1e-9  # relative: far more than rounding errors, far less than anybody writes
 
 
 def nearest_whole(value: float) -> int | None:
-    """The whole number that a value is but for rounding, as 0.35 × 720 is 252; None where it is none."""
+    """The whole number that a value equals up to rounding errors, such as 252 for 0.35 × 720; None if there is none."""
     nearest = round(value)
-    return nearest if isclose(value, nearest, rel_tol=WHOLE_WITHIN) else None
+    return nearest if isclose(value, nearest, rel_tol=WHOLE_TOLERANCE) else None
 
 
 def tupled(value: Any) -> Any:
-    """Lists as tuples, all the way down."""
+    """The value with lists as tuples at every level."""
     if isinstance(value, dict):
         return {key: tupled(part) for key, part in value.items()}
-    return tuple(map(tupled, value)) if isinstance(value, list | tuple) else value
+    if isinstance(value, list | tuple):
+        return tuple(tupled(part) for part in value)
+    return value
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(field,))
 def settings(*, kw_only: bool = True) -> Callable[[type[T]], type[T]]:
-    """A frozen dataclass whose fields are held to their annotations, then to its own `__post_init__`."""
+    """A frozen dataclass whose fields are checked against their annotations, then by its own `__post_init__`."""
 
     def decorate(cls: type[T]) -> type[T]:
-        further = getattr(cls, "__post_init__", None)
+        own_check = getattr(cls, "__post_init__", None)
 
-        def checked(self: T) -> None:
+        def check_fields(self: T) -> None:
             require(self)
-            if further:
-                further(self)
+            if own_check:
+                own_check(self)
 
-        # How pydantic reads the class: unknown keys, NaN and infinity are errors.
-        config = {"extra": "forbid", "allow_inf_nan": False, **vars(cls).get("__pydantic_config__", {})}
-        for name, value in (("__post_init__", checked), ("__pydantic_config__", config)):
-            setattr(cls, name, value)
+        # For pydantic, unknown keys, NaN and infinity are errors.
+        own_config = vars(cls).get("__pydantic_config__", {})
+        config = {"extra": "forbid", "allow_inf_nan": False, **own_config}
+        setattr(cls, "__post_init__", check_fields)  # noqa: B010 - mypy refuses a method of another signature
+        setattr(cls, "__pydantic_config__", config)  # noqa: B010
         return dataclass(frozen=True, slots=True, kw_only=kw_only)(cls)
 
     return decorate
 
 
-# Marks in annotations. Pydantic asks them how to read and describe a value; nobody else needs it.
+# Marks in annotations. Their two dunder methods tell pydantic how to read and describe a value.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Check:
-    """A value that `check` raises no SettingError for; `schema` is what a JSON Schema can say of that.
+    """A value that `check` accepts, which raises SettingError otherwise; `schema` describes it in a JSON Schema.
 
-    What is to be checked `first`, before its type is, is handed over as it was written, lists as tuples.
+    With `first`, the value is checked before its type is, as it was written, with lists as tuples.
     """
 
     check: Callable[[Any], object]
@@ -136,7 +143,7 @@ class Check:
 
 
 def OneOf(what: str, known: Collection[str]) -> Check:
-    """Text that is one of the known names; a near one is suggested. `what` says what they are names of."""
+    """Text that is one of the known names, which are names of a `what`; for other text the nearest is suggested."""
 
     def check(name: str) -> None:
         if name not in known:
@@ -146,7 +153,7 @@ def OneOf(what: str, known: Collection[str]) -> Check:
 
 
 def Matching(pattern: str, words: str) -> Check:
-    """Text that matches all of a pattern; `words` say what would be right."""
+    """Text that matches a pattern as a whole; `words` describe the pattern."""
 
     def check(text: str) -> None:
         if not re.fullmatch(pattern, text):
@@ -157,7 +164,7 @@ def Matching(pattern: str, words: str) -> Check:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Short:
-    """What is written in a shorter form, too, which `expand` makes the full one of; `schema` describes it."""
+    """A value with a short form, which `expand` turns into the full form; `schema` describes the short form."""
 
     expand: Callable[[Any], Any]
     schema: Mapping[str, Any]
@@ -171,9 +178,9 @@ class Short:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Like:
-    """A section may begin as a preset: `like: name` and what differs from it; a bare name is the preset as it is.
+    """A section that may start from a preset: `like: name` and the keys that differ; a bare name is the preset itself.
 
-    `key` is another word for `like`, and `section` the part that presets are of, where it is not the whole.
+    `key` replaces `like`. `section` is the key of the part that the presets describe, if they do not describe all.
     """
 
     what: str
@@ -182,32 +189,33 @@ class Like:
     section: str = ""
 
     def merged(self, value: Any) -> Any:
-        """The section with the values of its preset where it has none. Raises SettingError."""
-        given = {self.key: value} if isinstance(value, str) else tupled(value)
-        if not isinstance(given, dict) or self.key not in given:
-            return given
-        name = given.pop(self.key)
+        """The section with the preset's values for keys that it lacks. Raises SettingError."""
+        written = {self.key: value} if isinstance(value, str) else tupled(value)
+        if not isinstance(written, dict) or self.key not in written:
+            return written
+        name = written.pop(self.key)
         if name not in self.presets:
-            place = [] if value == name else [self.key]
-            raise SettingError(unknown(self.what, str(name), list(self.presets)), *place)
+            is_bare_name = value == name
+            keys = [] if is_bare_name else [self.key]
+            raise SettingError(unknown(self.what, str(name), list(self.presets)), *keys)
         preset = asdict(self.presets[name])
-        return over({self.section: preset} if self.section else preset, given)
+        return over({self.section: preset} if self.section else preset, written)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> Any:
         return _before(self.merged, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
         section = handler.resolve_ref_schema(handler(schema))
-        name = {"type": "string", "enum": sorted(self.presets)}
-        named = {self.key: {**name, "default": None}, **section["properties"]}
-        return {"anyOf": [{**section, "properties": named}, name]}
+        bare_name = {"type": "string", "enum": sorted(self.presets)}
+        properties = {self.key: {**bare_name, "default": None}, **section["properties"]}
+        return {"anyOf": [{**section, "properties": properties}, bare_name]}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ByKind:
-    """A union of classes of settings, told apart by the literal of their field `kind`; `what` says kinds of what.
+    """A union of classes of settings, distinguished by the literal of their field `kind`: a kind of a `what`.
 
-    Where a section has no kind, it is of the `default` one, if there is any.
+    A section without a kind is of the `default` kind, if there is one.
     """
 
     what: str
@@ -216,7 +224,10 @@ class ByKind:
     def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> Any:
         from pydantic_core import core_schema
 
-        members = {get_args(hints(member)["kind"])[0]: handler(member) for member in get_args(source)}
+        members = dict[str, Any]()
+        for member in get_args(source):
+            (kind_name,) = get_args(hints(member)["kind"])
+            members[kind_name] = handler(member)
 
         def with_kind(value: Any) -> Any:
             if not isinstance(value, dict):
@@ -228,8 +239,8 @@ class ByKind:
                 raise SettingError(unknown(f"kind of {self.what}", str(kind), list(members)), "kind")
             return {**tupled(value), "kind": kind}
 
-        told_apart = core_schema.tagged_union_schema(members, discriminator="kind")
-        return _before(with_kind, told_apart)
+        union = core_schema.tagged_union_schema(members, discriminator="kind")
+        return _before(with_kind, union)
 
 
 def _before(change: Callable[[Any], Any], schema: Any) -> Any:
@@ -239,9 +250,12 @@ def _before(change: Callable[[Any], Any], schema: Any) -> Any:
 
 
 def over(preset: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
-    """What is given, and the preset's values elsewhere: sections key by key, all else as a whole."""
-    both = [key for key in given if isinstance(given[key], dict) and isinstance(preset.get(key), dict)]
-    return {**preset, **given, **{key: over(preset[key], given[key]) for key in both}}
+    """The preset with the given values in place of its own: sections are merged key by key, other values replaced."""
+    merged = {**preset, **given}
+    for key, value in given.items():
+        if isinstance(value, dict) and isinstance(preset.get(key), dict):
+            merged[key] = over(preset[key], value)
+    return merged
 
 
 Positive = Annotated[float, Gt(0)]
@@ -252,78 +266,105 @@ Triple = tuple[float, float, float]
 Name = Annotated[str, Matching(r"[a-z0-9][a-z0-9_.]*", "lower-case letters, digits, _ and ., a letter or digit first")]
 
 
-def _hints(settings: Any) -> dict[str, Any]:
-    found = get_type_hints(settings, include_extras=True)
-    return {each.name: found[each.name] for each in fields(settings)}
+def _field_hints(settings_class: Any) -> dict[str, Any]:
+    all_hints = get_type_hints(settings_class, include_extras=True)
+    return {each.name: all_hints[each.name] for each in fields(settings_class)}
 
 
 # The annotation of each field of a class of settings, marks included.
-hints: Callable[[Any], dict[str, Any]] = cache(_hints)
+hints: Callable[[Any], dict[str, Any]] = cache(_field_hints)
 
 
 def require(settings: Any) -> None:
-    """Hold an object's fields to their annotations: types, bounds, marks; to be called by `__post_init__`.
+    """Check an object's fields against their annotations: types, bounds and marks. For use in `__post_init__`.
 
-    Whole numbers become fractions where those are meant, so that 5 and 5.0 are one setting. Raises SettingError.
+    Whole numbers become floats in fields of that type, so that 5 and 5.0 are equal settings. Raises SettingError.
     """
     for name, hint in hints(type(settings)).items():
-        object.__setattr__(settings, name, _at(name, getattr(settings, name), hint))
+        object.__setattr__(settings, name, _checked_at(name, getattr(settings, name), hint))
 
 
-def _at(key: int | str, value: Any, hint: Any) -> Any:
+def _checked_at(key: int | str, value: Any, hint: Any) -> Any:
+    """The checked value; an error names the key."""
     try:
-        return _held(value, hint)
+        return _checked(value, hint)
     except SettingError as error:
         raise SettingError(error.sentence, key, *error.keys) from None
 
 
 def _unaliased(hint: Any) -> Any:
-    """The type that an alias made by a `type` statement stands for, such as NDArray from NumPy 2.5 on."""
+    """The type that an alias of a `type` statement stands for, such as NDArray from NumPy 2.5 on."""
     alias = get_origin(hint) or hint
-    meant = getattr(alias, "__value__", None)
-    if meant is None:
+    aliased = getattr(alias, "__value__", None)
+    if aliased is None:
         return hint
     args = get_args(hint)
-    return _unaliased(meant[args] if args else meant)
+    return _unaliased(aliased[args] if args else aliased)
 
 
-def _held(value: Any, hint: Any) -> Any:
+def _checked(value: Any, hint: Any) -> Any:
+    """The value as an annotation requires it. Raises SettingError."""
     hint = _unaliased(hint)
     origin = get_origin(hint)
     args = get_args(hint)
     if origin is Annotated:
-        for mark in args[1:]:
-            if isinstance(mark, Check) and mark.first:
-                mark.check(value)
-        value = _held(value, args[0])
-        for mark in args[1:]:
-            _hold_to(mark, value)
-        return value
+        return _checked_by_marks(value, args[0], args[1:])
     if origin in (Union, UnionType):
-        if value is None and NoneType in args:
-            return value
-        some = [choice for choice in args if choice is not NoneType]
-        return _held(value, next((choice for choice in some if _is_type(value, choice)), some[0]))
+        return _checked_choice(value, args)
+    if origin is Literal:
+        return _checked_literal(value, args)
     if origin is tuple and isinstance(value, tuple | list):
-        return _held_entries(tuple(value), args)
+        return _checked_entries(tuple(value), args)
     if origin is dict and isinstance(value, dict):
-        return {_held(key, args[0]): _at(key, entry, args[1]) for key, entry in value.items()}
-    if origin is Literal and value not in args:
-        raise _wrong("literal_error", value, expected=" or ".join([", ".join(map(repr, args[:-1])), repr(args[-1])]))
-    return value if origin is Literal or hint is Any else _held_plain(value, origin or hint)
+        key_hint, value_hint = args
+        return {_checked(key, key_hint): _checked_at(key, entry, value_hint) for key, entry in value.items()}
+    return _checked_plain(value, origin or hint)
 
 
-def _held_entries(entries: tuple[Any, ...], args: tuple[Any, ...]) -> tuple[Any, ...]:
-    if args[1:] == (...,):
-        args = args[:1] * len(entries)
-    if len(entries) < len(args):
+def _checked_by_marks(value: Any, hint: Any, marks: tuple[Any, ...]) -> Any:
+    """The value of an annotated type."""
+    for mark in marks:
+        if isinstance(mark, Check) and mark.first:
+            mark.check(value)
+    checked = _checked(value, hint)
+    for mark in marks:
+        _require_mark(mark, checked)
+    return checked
+
+
+def _checked_choice(value: Any, choices: tuple[Any, ...]) -> Any:
+    """The value of a union: of the first type that fits, or else of the first type."""
+    if value is None and NoneType in choices:
+        return value
+    types = [choice for choice in choices if choice is not NoneType]
+    for choice in types:
+        if _is_type(value, choice):
+            return _checked(value, choice)
+    return _checked(value, types[0])
+
+
+def _checked_literal(value: Any, literals: tuple[Any, ...]) -> Any:
+    if value in literals:
+        return value
+    *others, last = map(repr, literals)
+    raise _error("literal_error", value, expected=f"{', '.join(others)} or {last}")
+
+
+def _checked_entries(entries: tuple[Any, ...], entry_hints: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The entries of a tuple, of any length if its annotation ends in `...`."""
+    if entry_hints[1:] == (...,):
+        entry_hints = entry_hints[:1] * len(entries)
+    if len(entries) < len(entry_hints):
         raise SettingError(COMPLAINTS["missing"], len(entries))
-    if len(entries) > len(args):
-        raise _wrong("too_long", entries, max_length=len(args), actual_length=len(entries))
-    return tuple(_at(index, entry, hint) for index, (entry, hint) in enumerate(zip(entries, args, strict=True)))
+    if len(entries) > len(entry_hints):
+        raise _error("too_long", entries, max_length=len(entry_hints), actual_length=len(entries))
+    checked = list[Any]()
+    for index, (entry, hint) in enumerate(zip(entries, entry_hints, strict=True)):
+        checked.append(_checked_at(index, entry, hint))
+    return tuple(checked)
 
 
-# How pydantic calls a value that is not of a type, and what is.
+# Pydantic's type of the error for a value that is not of a type, and the classes of values that are.
 TYPES: dict[Any, tuple[str, Any]] = {
     float: ("float_type", Real),
     int: ("int_type", Integral),
@@ -334,11 +375,15 @@ TYPES: dict[Any, tuple[str, Any]] = {
 }
 
 
-def _held_plain(value: Any, kind: Any) -> Any:
+def _checked_plain(value: Any, kind: Any) -> Any:
+    """The value of a type without arguments."""
+    if kind is Any:
+        return value
     if not _is_type(value, kind):
-        raise _wrong(TYPES.get(kind, ("dataclass_type", kind))[0], value)
+        error_type, _ = TYPES.get(kind, ("dataclass_type", kind))
+        raise _error(error_type, value)
     if kind is float and not isfinite(value):
-        raise _wrong("finite_number", value)
+        raise _error("finite_number", value)
     return kind(value) if kind in (float, int) else value
 
 
@@ -349,42 +394,51 @@ def _is_type(value: Any, hint: Any) -> bool:
         return _is_type(value, get_args(hint)[0])
     if kind is Literal:
         return value in get_args(hint)
-    _, wanted = TYPES.get(kind, ("", kind))
-    return isinstance(value, wanted) and (kind is bool or not isinstance(value, bool))
+    _, classes = TYPES.get(kind, ("", kind))
+    is_truth_value = isinstance(value, bool)  # which Python counts as a whole number
+    return isinstance(value, classes) and (kind is bool or not is_truth_value)
 
 
-def _hold_to(mark: Any, value: Any) -> None:
+def _require_mark(mark: Any, value: Any) -> None:
+    """Raise SettingError if a value is not within a bound, or a check fails."""
     match mark:
         case Gt(bound) if not value > bound:
-            raise _wrong("greater_than", value, gt=bound)
+            raise _error("greater_than", value, gt=bound)
         case Ge(bound) if not value >= bound:
-            raise _wrong("greater_than_equal", value, ge=bound)
+            raise _error("greater_than_equal", value, ge=bound)
         case Lt(bound) if not value < bound:
-            raise _wrong("less_than", value, lt=bound)
+            raise _error("less_than", value, lt=bound)
         case Le(bound) if not value <= bound:
-            raise _wrong("less_than_equal", value, le=bound)
+            raise _error("less_than_equal", value, le=bound)
         case MinLen(bound) if len(value) < bound:
-            name = "string_too_short" if isinstance(value, str) else "too_short"
-            raise _wrong(name, value, min_length=bound, actual_length=len(value))
+            error_type = "string_too_short" if isinstance(value, str) else "too_short"
+            raise _error(error_type, value, min_length=bound, actual_length=len(value))
         case MaxLen(bound) if len(value) > bound:
-            raise _wrong("too_long", value, max_length=bound, actual_length=len(value))
+            raise _error("too_long", value, max_length=bound, actual_length=len(value))
         case Check(first=False):
             mark.check(value)
 
 
-def _wrong(name: str, value: Any, **context: Any) -> SettingError:
-    return SettingError(complaint(COMPLAINTS[name], value, context))
+def _error(error_type: str, value: Any, **context: Any) -> SettingError:
+    return SettingError(complaint(COMPLAINTS[error_type], value, context))
 
 
 def complaint(template: str, value: Any, context: Mapping[str, Any]) -> str:
-    """What is wrong with a value, and the value; a whole section is no help in a line."""
-    said = template.format(**{k: f"{v:g}" if isinstance(v, float) else v for k, v in context.items()})
+    """The sentence of a template, with the value unless that is a whole section."""
+    sentence = template.format(**{key: _format_number(each) for key, each in context.items()})
     if isinstance(value, dict | list | tuple):
-        return said
+        return sentence
+    return f"{sentence} (got {_format_value(value)})"
+
+
+def _format_number(value: Any) -> Any:
+    return f"{value:g}" if isinstance(value, float) else value
+
+
+def _format_value(value: Any) -> str:
+    """A value as YAML has it."""
     if value is None:
-        seen = "nothing"
-    elif isinstance(value, bool):
-        seen = str(value).lower()
-    else:
-        seen = repr(value)
-    return f"{said} (got {seen})"
+        return "nothing"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value)

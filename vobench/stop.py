@@ -1,6 +1,7 @@
-"""The request to stop, by Ctrl-C or SIGTERM: a flag that every frame and stage looks at, and what a stop tidies up.
+"""Requests to stop, by Ctrl-C or SIGTERM: a flag that every frame and stage checks, and what is cleaned up.
 
-Nothing is raised where a signal arrives: amid an import, a library would swallow it. `check` raises, in our own loops.
+A signal does not raise an exception where it arrives, because a library could suppress it in the middle of an import.
+Instead `check` raises, in vobench's own loops.
 """
 
 import os
@@ -8,6 +9,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,108 +18,116 @@ if TYPE_CHECKING:
 
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
-Undo = tuple[Callable[[], object], bool]  # what is called, and whether it ends something that we may be waiting for
 
-_requests: list[int] = []
-_undos: list[Undo] = []
+@dataclass(frozen=True, slots=True, eq=False)
+class _Cleanup:
+    """A function that cleans up, and whether it ends something that this process may be waiting for."""
+
+    call: Callable[[], object]
+    is_awaited: bool
+
+
+_requests: list[int] = []  # numbers of signals
+_cleanups: list[_Cleanup] = []
 
 
 class Stopped(BaseException):
-    """Raised by `check`; no Exception, so that nobody takes it for a failure of his own."""
+    """Raised by `check`; not an Exception, so that no caller handles it as a failure."""
 
 
 def request(number: int) -> None:
-    """Ask this process to stop, by the number of a signal; what it may be waiting for ends at once."""
+    """Ask this process to stop, with the number of a signal. Whatever it may be waiting for ends at once."""
     _requests.append(number)
-    _call(undo for undo in _undos.copy() if undo[1])
+    _call([cleanup for cleanup in _cleanups.copy() if cleanup.is_awaited])
 
 
 def requested() -> int:
-    """The signal that asked first, 0 where none has."""
+    """The number of the first signal that requested a stop; 0 if there is none."""
     return _requests[0] if _requests else 0
 
 
 def check() -> None:
-    """Raise Stopped where a stop is requested."""
+    """Raise Stopped if a stop is requested."""
     if _requests:
         raise Stopped
 
 
 def forget() -> None:
-    """Take all requests back."""
+    """Withdraw all requests."""
     _requests.clear()
 
 
 def undo_all() -> None:
-    """Tidy up for a process that ends here and now, from whichever thread: first what runs, then what lies about."""
-    latest_first = _undos[::-1]
-    _call([undo for undo in latest_first if undo[1]])
+    """Clean up from any thread for a process that ends now: first end what is running, then remove what is left."""
+    latest_first = _cleanups[::-1]
+    _call([cleanup for cleanup in latest_first if cleanup.is_awaited])
     _call(latest_first)
 
 
-def _call(undos: Iterable[Undo]) -> None:
-    for call, _ in undos:
+def _call(cleanups: Iterable[_Cleanup]) -> None:
+    for cleanup in cleanups:
         with suppress(Exception):
-            call()
+            cleanup.call()
 
 
 @contextmanager
 def undone(call: Callable[[], object], *, is_awaited: bool = False) -> Iterator[None]:
-    """Call something after the block, however it ends: even with the process. Raises Stopped as `check` does.
+    """Call a function after the block, however it ends, even if the process ends. Raises Stopped as `check` does.
 
-    What `is_awaited`, say another process, is also undone as soon as a stop is requested.
+    If it ends something `is_awaited`, such as another process, it is also called as soon as a stop is requested.
     """
-    undo = call, is_awaited
-    _undos.append(undo)
+    cleanup = _Cleanup(call, is_awaited)
+    _cleanups.append(cleanup)
     try:
         check()
         yield
     finally:
         call()
-        _undos.remove(undo)
+        _cleanups.remove(cleanup)
 
 
 def remove(folder: Path) -> None:
-    """Delete a folder, where it is still of that name.
+    """Delete a folder, if it still exists.
 
-    It is renamed first: whoever goes on filling it cannot then publish what is left of it.
+    It is renamed first, so that a process that still writes to it cannot publish an incomplete folder.
     """
     import shutil
 
     with suppress(OSError):
-        gone = folder.rename(folder.with_name(f"{folder.name}-gone"))
-        shutil.rmtree(gone, ignore_errors=True)
+        renamed = folder.rename(folder.with_name(f"{folder.name}-gone"))
+        shutil.rmtree(renamed, ignore_errors=True)
 
 
 def kill_session(process: "Popen[str] | Popen[bytes]") -> None:
-    """Kill a process that was started in a session of its own, and all that it has started there."""
+    """Kill a process that was started in its own session, and all processes that it has started there."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
 
 
-def _dying_with_us() -> Callable[[], object]:
-    """What a new process calls, on Linux, to be killed when the thread that started it ends, and so when we do."""
+def _die_with_parent() -> Callable[[], object]:
+    """A function for a new process, which on Linux is then killed when the thread that started it ends."""
     if sys.platform != "linux":
         return lambda: None
     import ctypes
 
     prctl = ctypes.CDLL(None).prctl
-    us = os.getpid()
+    parent_pid = os.getpid()
 
-    def die_with_us() -> None:
+    def request_death_signal() -> None:
         prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-        if os.getppid() != us:  # we were faster
+        has_parent_ended = os.getppid() != parent_pid
+        if has_parent_ended:
             os._exit(1)
 
-    return die_with_us
+    return request_death_signal
 
 
 def run(
     command: list[str], *, env: Mapping[str, str] | None = None, timeout_s: float | None = None
 ) -> "CompletedProcess[str]":
-    """Run a command, hidden from the terminal and its Ctrl-C, and take what it says; on Linux it ends with us.
+    """Run a command without access to the terminal and its Ctrl-C, and capture its output.
 
-    Raises Stopped where we are, and TimeoutExpired.
+    On Linux it ends with this process. Raises Stopped if this process is asked to stop, and TimeoutExpired.
     """
     from subprocess import DEVNULL, PIPE, CompletedProcess, Popen
 
@@ -130,7 +140,7 @@ def run(
             stdout=PIPE,
             stderr=PIPE,
             start_new_session=True,
-            preexec_fn=_dying_with_us(),  # noqa: PLW1509 - one system call, whose library is loaded before the fork
+            preexec_fn=_die_with_parent(),  # noqa: PLW1509 - one system call, whose library is loaded before the fork
         ) as process,
         undone(lambda: kill_session(process), is_awaited=True),
     ):

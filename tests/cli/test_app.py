@@ -141,7 +141,7 @@ WRONG = [
     (("score", "a", "b", "--t-max-diff", "nan"), "--t-max-diff should be 0 to 1e+06 seconds, got nan"),
     (("report", "suites"), "not the folder of a run (no cases/*/estimates/*/*/score.json in it): suites"),
     (("report", "suites", "--format", "htm"), "no format named 'htm'. Did you mean 'html'? Known: csv, html, json, latex, md, terminal"),
-    (("report", "suites", "--out", "a.xls"), "no format goes with 'a.xls'; name one with --format: md, json, csv, latex, html"),
+    (("report", "suites", "--out", "a.xls"), "no format has the ending of 'a.xls'; choose one with --format: md, json, csv, latex, html"),
     (("view", "suites"), "not the folder of a run (no cases/*/estimates/*/*/score.json in it): suites"),
 ]  # fmt: skip
 

@@ -3,7 +3,14 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from vobench.cli.cache import DAY_S, _cells, _facts
+from vobench.runner.store import GB
 
 KINDS = {"bakes": 1, "sequences": 1, "estimates": 2, "scores": 2}
 
@@ -27,7 +34,7 @@ def test_ls_says_what_is_kept_and_gc_makes_it_smaller(vobench, here):
 
 def test_verify_names_what_is_damaged_and_the_next_run_mends_it_with_a_sentence(vobench, here):
     assert vobench("run", "tiny").code == 0
-    assert vobench("cache", "verify").out == f"6 of 6 entries as they were: {here / 'cache'}\n"
+    assert vobench("cache", "verify").out == f"6 of 6 entries unchanged: {here / 'cache'}\n"
     estimate = next((here / "cache" / "estimates").glob("*/estimate.tum"))
     right = estimate.read_bytes()
     estimate.write_bytes(right[: len(right) // 2])
@@ -44,7 +51,7 @@ def test_verify_names_what_is_damaged_and_the_next_run_mends_it_with_a_sentence(
 
 
 def test_options_of_another_action_and_unknown_actions_are_refused(vobench):
-    assert vobench("cache", "ls", "--older", "3").err == "vobench: --keep-gb and --older go with gc, not with ls\n"
+    assert vobench("cache", "ls", "--older", "3").err == "vobench: --keep-gb and --older require gc, not ls\n"
     assert "no action named 'lss'. Did you mean 'ls'?" in vobench("cache", "lss").err
 
 
@@ -81,3 +88,16 @@ def test_two_runs_at_once_on_one_empty_cache_make_nothing_twice(here):
     made = (here / "made").read_text().split()
     assert {stage: made.count(stage) for stage in made} == {"bake": 1, "sequence": 1, "estimate": 2, "score": 2}
     assert len(list((here / "runs" / "tiny").glob("2*"))) == 2
+
+
+def test_facts_are_of_the_oldest_and_of_the_last_used_entry():
+    now_s = time.time()
+    entries = [
+        SimpleNamespace(made_s=now_s - 3 * DAY_S, used_s=now_s - 2 * DAY_S, bytes=10, is_damaged=False),
+        SimpleNamespace(made_s=now_s - 5 * DAY_S, used_s=now_s - 1 * DAY_S, bytes=20, is_damaged=True),
+    ]
+    facts = _facts("light", entries)
+    assert (facts["count"], facts["damaged"], facts["bytes"]) == (2, 1, 30)
+    assert facts["oldest_days"] == pytest.approx(5, abs=0.01)
+    assert facts["used_days"] == pytest.approx(1, abs=0.01)
+    assert _cells({**facts, "bytes": 2.5 * GB}) == ["light", "2", "1", "2.5", "5.0", "1.0"]

@@ -1,5 +1,6 @@
 import json
 from subprocess import CompletedProcess
+from types import SimpleNamespace
 
 import pytest
 
@@ -61,11 +62,11 @@ def test_doctor_draws_a_picture_and_says_which_driver_and_device_drew(vobench, w
     said = vobench("doctor", "--json")
     (drawing,) = rows(said, "drawing without a display (EGL)")
     assert (said.code, drawing["well"]) == (0, True)
-    assert "a test picture is right, by " in drawing["result"]
+    assert "a test image is correct, with " in drawing["result"]
     assert "OpenGL 4" in drawing["result"]
     assert "device 0: " in drawing["result"]
     (devices,) = rows(said, "drawing devices")
-    assert devices["result"].endswith("VOBENCH_EGL_DEVICE chooses")
+    assert devices["result"].endswith("VOBENCH_EGL_DEVICE selects one")
 
 
 def test_a_wrong_picture_is_not_well_and_its_figures_are_said(vobench, without_mitsuba, monkeypatch):
@@ -91,4 +92,48 @@ def test_a_driver_that_kills_the_process_is_not_well(vobench, without_mitsuba, m
     drawing_says(monkeypatch, code=-11)
     said = vobench("doctor", "--json")
     (drawing,) = rows(said, "drawing without a display (EGL)")
-    assert (said.code, drawing["result"]) == (1, "the process that drew died with -11")
+    assert (said.code, drawing["result"]) == (1, "the test process died with -11")
+
+
+@pytest.mark.parametrize(
+    ("user_id", "has_apt", "installs"), [(0, True, True), (0, False, False), (1000, True, False), (1000, False, False)]
+)
+def test_fix_installs_with_apt_as_root_alone(monkeypatch, user_id, has_apt, installs):
+    commands = []
+    monkeypatch.setattr(doctor.os, "geteuid", lambda: user_id)
+    monkeypatch.setattr(doctor.shutil, "which", lambda _: "/usr/bin/apt-get" if has_apt else None)
+    monkeypatch.setattr(doctor.subprocess, "run", lambda command, **_: commands.append(command[:3]))
+    monkeypatch.setattr(doctor, "_check_drawing", lambda: ["checked again"])
+    assert doctor._install_drawing() == ["checked again"]
+    assert commands == ([["apt-get", "-qq", "update"], ["apt-get", "-qq", "install"]] if installs else [])
+
+
+@pytest.mark.parametrize(("user_id", "command"), [(0, "apt-get install x"), (1000, "sudo apt-get install x")])
+def test_a_remedy_is_a_command_that_this_user_can_run(monkeypatch, user_id, command):
+    monkeypatch.setattr(doctor.os, "geteuid", lambda: user_id)
+    assert doctor._with_sudo("apt-get install x") == command
+
+
+def test_a_missing_library_is_named_with_the_command_that_installs_it(monkeypatch):
+    needed = ["numpy>=2", "no_such_library>=1 ; python_version > '3'", "mitsuba ; extra == 'path'"]
+    monkeypatch.setattr(doctor, "requires", lambda _: needed)
+    check = doctor._check_libraries()
+    assert (check.well, check.result) == (False, "missing: no_such_library")
+    assert check.remedy.endswith("-m pip install no_such_library")
+    monkeypatch.setattr(doctor, "requires", lambda _: needed[:1])
+    assert (doctor._check_libraries().well, doctor._check_libraries().result) == (True, "all installed")
+
+
+@pytest.mark.parametrize(
+    ("level", "why", "result"),
+    [
+        ("full", "", "estimators see their own files and nothing else"),
+        ("files", "no namespaces", "estimators can see the network (no namespaces); every trial records this"),
+        ("files", "", "estimators can see the network; every trial records this"),
+    ],
+)
+def test_the_sandbox_is_optional_and_what_estimators_can_see_is_named(monkeypatch, level, why, result):
+    monkeypatch.setattr(doctor, "sandbox_here", lambda: SimpleNamespace(level=level, why=why, sees=("the network",)))
+    check = doctor._check_sandbox()
+    assert (check.well, check.result, check.optional) == (level == "full", result, True)
+    assert bool(check.remedy) is not check.well

@@ -109,10 +109,10 @@ def test_a_suite_of_the_house_needs_no_file(vobench, here):
     [
         (("-t", "leg"), "no trajectory named 'leg'. Did you mean 'legs'? Known: away, legs, lift, spin"),
         (("--out", "a.jpg"), "--out should end in .svg, .png, .pdf, got a.jpg"),
-        (("--out", "no/a.svg"), "should be a file in a folder that exists: no/a.svg"),
+        (("--out", "no/a.svg"), "should be a file in an existing folder: no/a.svg"),
         (
             ("--tum", "a.tum"),
-            "--tum and --csv are for one trajectory; choose one with --trajectory: legs, spin, away, lift",
+            "--tum and --csv need one trajectory; choose one with --trajectory: legs, spin, away, lift",
         ),
     ],
 )

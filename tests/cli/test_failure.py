@@ -51,7 +51,7 @@ def test_noise_is_named_as_the_cause_and_the_failure_shrinks_to_a_suite_of_its_o
     assert said.json["singles"][0]["removed"] == ["noise"]
     assert said.json["singles"][0]["survived"] == 4  # of so few frames one repeat is too little to tell by
     shown = vobench("explain", failed, "--repeats", 1)
-    assert "It fails for noise." in shown.out
+    assert "Cause of the failure: noise." in shown.out
 
     small = vobench("shrink", failed, "--trials", 2, "--save", "small", "--json").json
     first, end = small["frames"]

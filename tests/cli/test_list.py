@@ -3,7 +3,7 @@
 import pytest
 
 from vobench.cli import list as listing
-from vobench.suite.catalog import Entry
+from vobench.suite.catalog import KINDS, Entry, entries
 
 MANIFEST = "name: mine\nversion: '1'\nclass: mine:Mine\npose_of: body\n"
 FORMS = [
@@ -46,9 +46,9 @@ def entry(tmp_path):
 @pytest.mark.parametrize("line", FORMS)
 def test_a_summary_is_what_the_checked_model_says(entry, line):
     (entry.path / "estimator.yaml").write_text(f"{line}\n{MANIFEST}")
-    above = listing._summary(entry), listing._checked_summary(entry)
+    above = listing._summary(entry), listing._parsed_summary(entry)
     (entry.path / "estimator.yaml").write_text(f"{MANIFEST}{line}")
-    below = listing._summary(entry), listing._checked_summary(entry)
+    below = listing._summary(entry), listing._parsed_summary(entry)
     assert above[0] == above[1] == below[0] == below[1]
     assert above[0]
 
@@ -60,7 +60,15 @@ def test_a_summary_that_is_none_is_said_to_be_wrong(entry, line):
 
 
 def test_a_plain_summary_is_read_without_the_models(entry, monkeypatch):
-    monkeypatch.setattr(listing, "_checked_summary", lambda _: pytest.fail("read whole"))
+    monkeypatch.setattr(listing, "_parsed_summary", lambda _: pytest.fail("read whole"))
     for line in FORMS[:3]:
         (entry.path / "estimator.yaml").write_text(f"{line}\n{MANIFEST}")
         assert listing._summary(entry).startswith("Two words")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_file_of_every_kind_that_is_read_whole_has_the_summary_that_is_read_off(kind):
+    for entry in entries(kind)[:2]:
+        summary = listing._parsed_summary(entry)
+        assert summary
+        assert listing._summary(entry) == summary

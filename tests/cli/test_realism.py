@@ -11,7 +11,7 @@ def test_a_case_is_measured_beside_the_bands_and_beside_another(vobench, ran, he
     assert (here / "plot.png").stat().st_size > 10_000
     beside = vobench("realism", cases[0], "--against", cases[0], "--json").json
     assert {row["is"] for row in beside["statistics"]} == {"in"}
-    assert "moved by" in vobench("realism", cases[0]).out
+    assert "changed by" in vobench("realism", cases[0]).out
 
 
 def test_a_plot_of_another_kind_is_refused_in_one_line(vobench, ran):

@@ -3,6 +3,8 @@
 import cv2
 import pytest
 
+from vobench.cli.render import CameraOptions, EngineOptions
+
 WRONG = [
     (("--at", "9", "0", "1"), "--at should be inside the room (2 × 2 × 1.5 m around the origin), got (9.0, 0.0, 1.0)"),
     (("--at", "nan", "0", "1"), "--at should be inside the room"),
@@ -10,15 +12,15 @@ WRONG = [
     (("--pitch", "inf"), "--pitch should be a finite number, got inf"),
     (("--time", "nan"), "--time should be a finite number, got nan"),
     (("--time", "1e12"), "--time should be within 1e+09 s of the start, got 1e+12"),
-    (("--out", "look.jpg"), "--out should be a .png in a folder that exists, got look.jpg"),
-    (("--out", "nowhere/look.png"), "--out should be a .png in a folder that exists, got nowhere/look.png"),
+    (("--out", "look.jpg"), "--out should be a .png in an existing folder, got look.jpg"),
+    (("--out", "nowhere/look.png"), "--out should be a .png in an existing folder, got nowhere/look.png"),
     (("--camera", "fisheyes"), "no camera named 'fisheyes'. Did you mean 'fisheye'?"),
     (("--sensor", "film"), "no camera sensor named 'film'. Known: clean"),
     (("--engine", "rater"), "--engine: no engine named 'rater'. Did you mean 'raster'?"),
-    (("--samples", "4"), "samples belongs to engine path, but the engine is raster; leave samples out"),
+    (("--samples", "4"), "samples requires engine path, but the engine is raster; remove samples"),
     (
         ("--engine", "pyrender", "--samples", "4"),
-        "samples belongs to engine path, but the engine is pyrender; leave samples out",
+        "samples requires engine path, but the engine is pyrender; remove samples",
     ),
     (("--engine", "pyrenderer"), "--engine: no engine named 'pyrenderer'. Did you mean 'pyrender'?"),
     (("--engine", "path", "--samples", "0"), "--samples: should be 1 or more (got 0)"),
@@ -50,3 +52,10 @@ def test_stock_pyrender_draws_without_light_computed_before(vobench, here):
     picture = cv2.imread("look.png")
     assert picture.std() > 0
     assert not (here / "cache" / "bakes").exists()
+
+
+def test_without_options_the_camera_stands_a_little_above_the_origin_and_adds_no_gain():
+    camera = CameraOptions()
+    assert (camera.at, camera.yaw, camera.pitch) == ((0.0, 0.0, 1.2), 0.0, 10.0)
+    assert (camera.gain, camera.time, camera.sensor, camera.camera) == (1.0, 0.0, "clean", "paper_blender")
+    assert (EngineOptions().engine, EngineOptions().samples) == ("raster", None)

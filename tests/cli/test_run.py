@@ -19,7 +19,7 @@ def test_run_ends_in_a_leaderboard_and_says_where_everything_is(vobench, here):
     latest = (Path("runs") / "tiny" / "latest").readlink()
     assert said.code == 0
     assert "wheel_odometry" in said.out
-    assert said.out.endswith(f"Everything is in runs/tiny/{latest}\nLook into it: vobench view runs/tiny/{latest}\n")
+    assert said.out.endswith(f"Everything is in runs/tiny/{latest}\nView it: vobench view runs/tiny/{latest}\n")
 
 
 def test_where_nobody_watches_each_stage_is_one_line_and_one_in_the_cache_is_none(vobench, here):

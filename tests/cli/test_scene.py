@@ -28,7 +28,7 @@ def test_it_draws_a_plan_and_views_to_four_sides(vobench, here):
 def test_a_wrong_path_is_one_line(vobench, here):
     said = vobench("scene", "closet", "--out", "nowhere/look.png")
     assert said.code == 1
-    assert said.err.strip().endswith("--out should be a .png in a folder that exists, got nowhere/look.png")
+    assert said.err.strip().endswith("--out should be a .png in an existing folder, got nowhere/look.png")
     (here / "bad.glb").write_bytes(b"no model")
     assert "bad.glb: " in vobench("scene", "bad.glb").err
 

@@ -90,7 +90,7 @@ def test_the_command_mends_a_real_file(vobench, here, fault):
 
 
 def test_nothing_wrong_is_said_in_words_and_as_an_empty_list(vobench, files):
-    assert vobench("diagnose", "true", "estimated").out.startswith("nothing wrong was found")
+    assert vobench("diagnose", "true", "estimated").out.startswith("no fault was found")
     said = vobench("diagnose", "true", "estimated", "--json").json
     assert (said["findings"], said["command"]) == ([], None)
 
@@ -100,7 +100,7 @@ def test_a_finding_has_its_evidence_its_mend_and_a_command(vobench, files):
     out = vobench("diagnose", "true", "broken").out
     assert out.startswith("mirrored_axes: the axes of the estimate's positions, but not its rotations, are mirrored")
     assert "rotation left after alignment (rms): " in out
-    assert " mended " in out
+    assert " corrected " in out
     assert out.endswith("vobench score true broken --est-as positions:x,-y,z\n")
 
 
@@ -165,7 +165,7 @@ def test_unrelated_files_get_no_command(vobench, files):
     assert ([finding["fault"] for finding in said["findings"]], said["command"]) == (["unrelated"], None)
     out = vobench("diagnose", "true", "other").out
     assert out.startswith("unrelated: these trajectories are not of one motion")
-    assert "mend: none" in out
+    assert "correction: none" in out
     assert "vobench score" not in out
 
 
@@ -454,7 +454,7 @@ def test_stated_covariances_are_held_against_the_errors(vobench, files_scoring):
     assert {"nees_pose", "nees_trans", "nees_rot"} <= {metric["name"] for metric in found["honest"]["metrics"]}
     assert "claims too much: errors are " in vobench("score", "gt.tum", "est.tum", "--cov", "bold.txt").out
     refused = vobench("score", "gt.tum", "est.tum", "gt.tum", "est.tum", "--cov", "bold.txt")
-    assert "--cov comes once for each pair of files, 2 times (got 1)" in refused.err
+    assert "--cov should be given once for each pair of files, 2 times (got 1)" in refused.err
 
 
 def test_several_sequences_have_a_row_each_and_one_for_all_of_their_errors(vobench, files_scoring):

@@ -18,7 +18,7 @@ from vobench.runner import motion
 
 pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
 
-SENTENCE = "vobench: stopped; finished stages are kept, the same command goes on from there"
+SENTENCE = "vobench: stopped; completed stages are cached, run the same command again to resume"
 HANGING = """
 import os, time
 class Hanging:
@@ -86,7 +86,7 @@ PLACES = {
     "runner.score": "score_trial",
     "report.page": "html",
     "runner.folder.RunFolder": "estimate",
-    "cli.report": "print_board",
+    "cli.board": "print_board",
 }
 
 

@@ -121,7 +121,7 @@ def test_reading_a_manifest_imports_neither_opencv_nor_the_code():
         ),
         ({"class": None, "command": "[./run]", "out": "../poses.txt"}, r"out: should be a file below the work folder"),
         ({"class": None, "stream": "[./run, '{out}']"}, r"stream: no placeholder or parameter named 'out'"),
-        ({"class": None, "oracle": "true"}, r"oracle: only vobench's own estimators may be drawn from the truth"),
+        ({"class": None, "oracle": "true"}, r"oracle: only estimators included with vobench may use the ground truth"),
         ({"limits": "{frame_s: 0}"}, r":7: limits\.frame_s: should be greater than 0 \(got 0\)"),
     ],
 )

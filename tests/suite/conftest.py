@@ -1,9 +1,14 @@
 """A small suite whose text can be bent, read in its own folder."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
+from vobench.scene.scene import Scene
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import read_scene
+from vobench.suite.scene_spec import LightOverride
 from vobench.suite.suite import Plan, read_plan
 
 SUITE = """name: tiny
@@ -44,3 +49,45 @@ def bent(tmp_path, monkeypatch) -> Callable[..., Plan]:
         return read_plan("./tiny.yaml", only_estimators=only)
 
     return read
+
+
+# ruff: noqa: E501 - an entry stands in one line
+
+
+HALL = """name: hall
+white_cd_m2: 50
+materials:
+  grain: {pattern: terrazzo, albedo: 0.5, resolution_px: 8}
+  stone: {kind: polished, pattern: plain, albedo: 0.4, eta: 1.4, roughness: 0.1}
+  steel: {kind: mirror, tint: 0.6}
+  pane: {kind: glass}
+  glow: {kind: luminous, luminance_cd_m2: 100}
+room:
+  size_m: [6, 4, 3]
+  floor: stone
+  wall: grain
+  ceiling: grain
+  windows: [{wall: north, center_m: [1, 1.5], size_m: [1, 0.8], pane: pane, reveal: grain}]
+boxes: [{name: crate, center_m: [1, 0, 0.5], size_m: [0.4, 0.4, 1], material: grain}, {center_m: [-1, 0, 2], size_m: [0.1, 0.1, 0.1], material: glow}]
+boards: [{name: looking_glass, center_m: [-2.9, 0, 1.5], size_m: [1, 2], material: steel}]
+lamps:
+  - {name: panel, center_m: [0, 0, 2.9], size_m: [0.6, 0.6], power_lm: 800, level: {flicker: {depth: 0.3}}}
+  - {name: bulb, kind: point, center_m: [2, 1, 2], power_lm: 500}
+  - {name: spot, kind: spot, center_m: [2, -1, 2], target_m: [2, -1, 0], power_lm: 300}
+sun: {illuminance_lx: 30000, azimuth_deg: 90, elevation_deg: 30}
+sky: {illuminance_lx: 8000}
+movers:
+  - {name: cart, size_m: [0.5, 0.4, 0.6], material: grain, path: [{t_s: 0, position_m: [0, 0, 0.3]}, {t_s: 2, position_m: [1, 0, 0.3]}]}
+"""
+
+
+@pytest.fixture
+def hall(tmp_path: Path):
+    """Builds the hall with some text of it replaced, under some lighting."""
+
+    def bent(old: str = "", new: str = "", lighting: dict[str, LightOverride] | None = None) -> Scene:
+        assert old in HALL
+        (tmp_path / "hall.yaml").write_text(HALL.replace(old, new, 1) if old else HALL, encoding="utf-8")
+        return build(read_scene(tmp_path / "hall.yaml"), lighting or {})
+
+    return bent

@@ -61,7 +61,7 @@ CALIB, CAMCHAIN = "{pitch_deg: 0, calib: it}", "{pitch_deg: 0, camchain: it}"
         (CHAIN.split("cam1", maxsplit=1)[0], CAMCHAIN, "a pair of cameras needs cam1, which is missing in"),
         (CHAIN.replace("  resolution: [640, 400]\n", "", 1), CAMCHAIN, "it: the key cam0.resolution is missing"),
         (CHAIN, "{pitch_deg: 0, camchain: it, calib: it}", "camchain: gives the lenses, which calib gives"),
-        (CHAIN, "{pitch_deg: 0, camchain: it, size_px: [4, 4]}", "size_px: belongs to calib"),
+        (CHAIN, "{pitch_deg: 0, camchain: it, size_px: [4, 4]}", "size_px: requires calib"),
     ],
 )
 def test_what_a_file_lacks_is_said_with_its_name(bent, tmp_path, text, rig, wrong):

@@ -10,7 +10,7 @@ from vobench.errors import SuiteError
 from vobench.sensor.exposure import AutoExposure, Exposure
 from vobench.sensor.image_sensor import CAMERAS, CameraSensor, CameraSettings
 from vobench.setting import hints
-from vobench.suite.suite import Camera
+from vobench.suite.axis import Camera
 from vobench.suite.yaml_file import checked, plain
 
 # ruff: noqa: E501 - a sentence stands in one line

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from ruamel.yaml import YAML
 
 from vobench.runner.simulate import content
 from vobench.suite.case_file import write_case
@@ -52,3 +53,13 @@ def test_what_is_written_reads_as_the_same_case_wherever_it_lies(tmp_path: Path,
     assert content(again.simulated[0]) == content(case)
     assert again.simulated[0].truth_noise == case.truth_noise
     assert again.entrants == plan.entrants
+
+
+def test_an_estimator_is_written_with_those_limits_alone_that_are_not_its_manifests(bent, tmp_path):
+    plan = bent(("stand_still,", "{name: stand_still, label: slow, limits: {frame_s: 1.5}},"))
+    path = write_case(plan.simulated[0], plan.entrants, tmp_path / "case", name="copy")
+    estimators = YAML(typ="safe").load(path)["estimators"]
+    assert estimators == [
+        {"name": "stand_still", "label": "slow", "params": {}, "limits": {"frame_s": 1.5}},
+        {"name": "constant_velocity", "label": "constant_velocity", "params": {"measure_s": 0.1}, "limits": {}},
+    ]

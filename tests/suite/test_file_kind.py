@@ -64,13 +64,13 @@ def test_all_that_vobench_brings_along_is_of_its_kind(kind: file_kind.Kind) -> N
 
 def test_a_scene_where_a_suite_belongs(here: Path) -> None:
     assert said(lambda path: read_plan(str(path)), here / "my/lab.yaml") == (
-        "my/lab.yaml: this is a scene, not a suite; draw it with `vobench render my/lab.yaml`"
+        "my/lab.yaml: this is a scene, not a suite; render it with `vobench render my/lab.yaml`"
     )
 
 
 def test_a_scenario_where_a_suite_belongs(here: Path) -> None:
     assert said(lambda path: read_plan(str(path)), here / "my/dusk.yaml") == (
-        "my/dusk.yaml: this is a scenario, not a suite; name it in a suite, as in `scenarios: {dusk: [1, 3, 5]}`"
+        "my/dusk.yaml: this is a scenario, not a suite; add it to a suite, as in `scenarios: {dusk: [1, 3, 5]}`"
     )
 
 
@@ -84,7 +84,7 @@ def test_a_manifest_where_a_suite_belongs(here: Path) -> None:
 def test_a_model_where_a_suite_belongs(here: Path) -> None:
     (here / "house.glb").write_bytes(b"glTF\x02\x00\x00\x00\xff\xfe")
     assert said(lambda path: read_plan(str(path)), here / "house.glb") == (
-        "house.glb: this is a model, not a suite; look it over with `vobench scene house.glb`"
+        "house.glb: this is a model, not a suite; inspect it with `vobench scene house.glb`"
     )
 
 
@@ -118,18 +118,18 @@ def test_a_folder_where_a_suite_belongs_says_what_is_in_it(here: Path, name: str
     with pytest.raises(UnknownNameError) as refused:
         catalog.find("suite", name)
     assert str(refused.value) == (
-        "my is a folder, and a suite is a YAML file with scenes and estimators; in it are my/mine.yaml"
+        "my is a folder, and a suite is a YAML file with scenes and estimators; it contains my/mine.yaml"
     )
 
 
 def test_a_folder_without_any_says_so(here: Path) -> None:
     (here / "empty").mkdir()
-    with pytest.raises(UnknownNameError, match=r"^empty is a folder, and a suite is .*; in it is no suite$"):
+    with pytest.raises(UnknownNameError, match=r"^empty is a folder, and a suite is .*; it contains no suite$"):
         catalog.find("suite", "empty")
 
 
 def test_a_folder_where_a_scene_belongs_says_what_is_in_it(here: Path) -> None:
-    with pytest.raises(UnknownNameError, match=r"^my is a folder, and a scene is .*; in it are my/lab.yaml$"):
+    with pytest.raises(UnknownNameError, match=r"^my is a folder, and a scene is .*; it contains my/lab.yaml$"):
         catalog.find("scene", "my")
 
 
@@ -140,11 +140,11 @@ def test_a_name_comes_before_a_folder_that_is_called_so(here: Path) -> None:
 
 def test_a_folder_that_is_an_estimator_or_a_scene_is_one_by_its_path_alone(here: Path, monkeypatch) -> None:
     monkeypatch.chdir(here / "my")
-    with pytest.raises(UnknownNameError, match=r"^no estimator named 'vo'; for the folder write \./vo$"):
+    with pytest.raises(UnknownNameError, match=r"^no estimator named 'vo'; to use the folder, write \./vo$"):
         catalog.find("estimator", "vo")
     assert catalog.find("estimator", "./vo").path == here / "my/vo"
     (here / "my/barn").mkdir()
     (here / "my/barn/scene.yaml").write_text(SCENE)
-    with pytest.raises(UnknownNameError, match=r"^no scene named 'barn'; for the folder write \./barn$"):
+    with pytest.raises(UnknownNameError, match=r"^no scene named 'barn'; to use the folder, write \./barn$"):
         catalog.find("scene", "barn")
     assert catalog.find("scene", "./barn").path == here / "my/barn/scene.yaml"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vobench.cli.run import FILES
+from vobench.cli.schema import FILES
 from vobench.setting import unit_of
 from vobench.suite.yaml_file import json_schema
 

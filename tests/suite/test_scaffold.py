@@ -85,18 +85,18 @@ def test_a_scene_in_one_file_is_copied_as_one_file() -> None:
 def test_what_is_there_is_not_written_over(make) -> None:
     path = make("mine")
     before = path.read_bytes()
-    with pytest.raises(InputError, match=rf"^there is one already; .*: {path}$"):
+    with pytest.raises(InputError, match=rf"^already exists; .*: {path}$"):
         make("mine", source="quickstart" if make is new_suite else "room")
     assert path.read_bytes() == before
 
 
 def test_a_model_is_not_copied() -> None:
     Path("house.glb").write_bytes(b"glTF")
-    with pytest.raises(InputError, match=r"^a model has no YAML to copy; `vobench new scene mine`, and give"):
+    with pytest.raises(InputError, match=r"^a model has no YAML to copy; run `vobench new scene mine` and add"):
         new_scene("mine", source="house.glb")
     assert not Path("scenes").exists()
 
 
 def test_a_name_that_makes_a_path_is_refused() -> None:
-    with pytest.raises(InputError, match=r"^a name should be lower-case letters"):
+    with pytest.raises(InputError, match=r"^a name should consist of lower-case letters"):
         new_suite("../mine")

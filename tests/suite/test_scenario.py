@@ -110,7 +110,7 @@ def test_a_calibration_may_be_run_at_some_severities_alone(plan):
     suite = SUITE.replace("[0, 2, 3, 4, 5]", "[2, 3]")
     cases = plan(suite=suite + "calibrations: {none: [2, 3], worn: 2}\n").cases
     assert [case.name for case in cases] == ["dusk-2-none", "dusk-2-worn", "dusk-3-none"]
-    with pytest.raises(SuiteError, match=r"scenarios\.dusk: none of the calibrations is run at severity 3"):
+    with pytest.raises(SuiteError, match=r"scenarios\.dusk: no calibration lists severity 3"):
         plan(suite=suite + "calibrations: {worn: 2}\n")
 
 
@@ -136,10 +136,12 @@ def test_what_is_wrong_with_a_scenario_is_said_with_its_place(plan, old, new, sa
     [
         (SUITE.replace("dusk:", "dsuk:"), "scenarios.dsuk: no scenario named 'dsuk'. Did you mean 'dusk'?"),
         (SUITE.replace("[0, 2, 3, 4, 5]", "6"), "scenarios.dusk: should be 5 or less (got 6)"),
-        ("name: tiny\nestimators: [stand_still]\n", "or scenarios or a source alone"),
-        ("name: t\nsource: x\ncalibrations: [worn]\nestimators: [stand_still]\n", "calibrations: belongs to scenarios"),
+        ("name: tiny\nestimators: [stand_still]\n", "or only scenarios or a source"),
+        ("name: t\nsource: x\ncalibrations: [worn]\nestimators: [stand_still]\n", "calibrations: requires scenarios"),
+        (SUITE + "calibrations: [worn, 3]\n", "calibrations: should be keys with values"),
+        (SUITE + "calibrations: [worn, borked]\n", "calibrations.borked: should be"),
     ],
-    ids=["name", "severity", "nothing", "calibrations"],
+    ids=["name", "severity", "nothing", "calibrations", "no level", "unknown level"],
 )
 def test_what_is_wrong_with_a_suite_of_scenarios_is_said(plan, suite, said):
     with pytest.raises(SuiteError) as refused:

@@ -220,7 +220,7 @@ def test_a_material_takes_a_colour_and_a_lamp_a_hue(yard) -> None:
 
 def test_a_scene_of_nothing_is_refused(tmp_path: Path) -> None:
     (tmp_path / "void.yaml").write_text("name: void\nwhite_cd_m2: 1\nsky: {illuminance_lx: 1}\n")
-    with pytest.raises(SuiteError, match="a scene needs something to see: room, boxes, boards, furniture"):
+    with pytest.raises(SuiteError, match="a scene needs something visible: room, boxes, boards, furniture"):
         read_scene(tmp_path / "void.yaml")
 
 

@@ -6,54 +6,14 @@ import numpy as np
 import pytest
 
 from vobench.errors import SuiteError
-from vobench.scene.light import AreaLight, Flicker, PointLight, Sky, SpotLight, Steady, Sun
+from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE
 from vobench.scene.mesh import Mesh, joined
 from vobench.scene.scene import Scene
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
-from vobench.suite.scene_spec import LevelSpec, LightOverride
 
 # ruff: noqa: E501 - tables of sentences are easier to read a line each
-
-
-HALL = """name: hall
-white_cd_m2: 50
-materials:
-  grain: {pattern: terrazzo, albedo: 0.5, resolution_px: 8}
-  stone: {kind: polished, pattern: plain, albedo: 0.4, eta: 1.4, roughness: 0.1}
-  steel: {kind: mirror, tint: 0.6}
-  pane: {kind: glass}
-  glow: {kind: luminous, luminance_cd_m2: 100}
-room:
-  size_m: [6, 4, 3]
-  floor: stone
-  wall: grain
-  ceiling: grain
-  windows: [{wall: north, center_m: [1, 1.5], size_m: [1, 0.8], pane: pane, reveal: grain}]
-boxes: [{name: crate, center_m: [1, 0, 0.5], size_m: [0.4, 0.4, 1], material: grain}, {center_m: [-1, 0, 2], size_m: [0.1, 0.1, 0.1], material: glow}]
-boards: [{name: looking_glass, center_m: [-2.9, 0, 1.5], size_m: [1, 2], material: steel}]
-lamps:
-  - {name: panel, center_m: [0, 0, 2.9], size_m: [0.6, 0.6], power_lm: 800, level: {flicker: {depth: 0.3}}}
-  - {name: bulb, kind: point, center_m: [2, 1, 2], power_lm: 500}
-  - {name: spot, kind: spot, center_m: [2, -1, 2], target_m: [2, -1, 0], power_lm: 300}
-sun: {illuminance_lx: 30000, azimuth_deg: 90, elevation_deg: 30}
-sky: {illuminance_lx: 8000}
-movers:
-  - {name: cart, size_m: [0.5, 0.4, 0.6], material: grain, path: [{t_s: 0, position_m: [0, 0, 0.3]}, {t_s: 2, position_m: [1, 0, 0.3]}]}
-"""
-
-
-@pytest.fixture
-def hall(tmp_path: Path):
-    """Builds the hall with some text of it replaced, under some lighting."""
-
-    def bent(old: str = "", new: str = "", lighting: dict[str, LightOverride] | None = None) -> Scene:
-        assert old in HALL
-        (tmp_path / "hall.yaml").write_text(HALL.replace(old, new, 1) if old else HALL, encoding="utf-8")
-        return build(read_scene(tmp_path / "hall.yaml"), lighting or {})
-
-    return bent
 
 
 def of_material(scene: Scene, material: str) -> Mesh:
@@ -117,40 +77,6 @@ def test_movers_go_with_their_path(hall):
     assert sum(len(thing.mesh.faces) for thing in cart.things) == 12
 
 
-def test_a_lighting_changes_levels_and_leaves_the_light_itself_alone(hall):
-    dim = hall(lighting={"bulb": LightOverride(power_lm=50), "sky": LightOverride(illuminance_lx=800)})
-    for before, after in zip(hall().lights, dim.lights, strict=True):
-        share = {"bulb": 0.1, "sky": 0.1}.get(after.name, 1.0)
-        assert after.level.mean(0, 10**9) == pytest.approx(share * before.level.mean(0, 10**9))
-        assert getattr(after, "power_lm", None) == getattr(before, "power_lm", None)
-        assert isinstance(after.level, Steady) == isinstance(before.level, Steady), "what is steady stays so"
-
-
-def test_a_lighting_may_let_a_light_flicker(hall):
-    flicker = LevelSpec(flicker=Flicker(depth=0.5))
-    (bulb,) = (light for light in hall(lighting={"bulb": LightOverride(level=flicker)}).lights if light.name == "bulb")
-    assert (bulb.level.mean(0, 0), bulb.level.mean(5_000_000, 5_000_000)) == (pytest.approx(1.5), pytest.approx(0.5))
-
-
-@pytest.mark.parametrize(
-    ("lighting", "sentence"),
-    [
-        ({"blub": LightOverride(power_lm=1)}, "lighting: no light named 'blub'. Did you mean 'bulb'?"),
-        ({"bulb": LightOverride(illuminance_lx=1)}, "lighting: illuminance_lx does not belong to 'bulb'"),
-        ({"sun": LightOverride(power_lm=1)}, "lighting: power_lm does not belong to 'sun'"),
-    ],
-)
-def test_a_wrong_lighting_is_named(hall, lighting, sentence):
-    with pytest.raises(SuiteError) as refused:
-        hall(lighting=lighting)
-    assert str(refused.value).startswith(sentence)
-
-
-def test_a_light_that_is_nothing_cannot_be_made_brighter(hall):
-    with pytest.raises(SuiteError, match="'bulb' is 0 in the scene, so it cannot be 5; give it more there"):
-        hall("power_lm: 500", "power_lm: 0", lighting={"bulb": LightOverride(power_lm=5)})
-
-
 WRONG = [
     ("{kind: mirror, tint: 0.6}", "{kind: mirror, albedo: 0.6}", ":6: materials.steel.albedo: belongs to matt, polished; this is mirror"),
     ("{kind: mirror, tint: 0.6}", "{kind: chrome}", ":6: materials.steel.kind: no kind of material named 'chrome'. Known: glass, luminous, matt, mirror, polished"),
@@ -163,15 +89,15 @@ WRONG = [
     ("kind: point", "kind: point, size_m: [1, 1]", ":19: lamps.1.size_m: belongs to panel; this is point"),
     ("center_m: [1, 1.5], size_m: [1, 0.8]", "center_m: [2.8, 1.5], size_m: [1, 0.8]", ":14: room.windows.0: the window reaches beyond its wall, which is 6 m long around 0 and 3 m high: center_m [2.8, 1.5], size_m [1.0, 0.8]"),
     ("pane: pane, reveal", "pane: pain, reveal", ":14: room.windows.0.pane: no material named 'pain'. Did you mean 'paint'? Known: brick, carpet, ceiling_tiles, concrete, glow, grain, mirror, oak_floor, paint, pane, paving, sage_plaster, steel, stone, terrazzo, white_plaster"),
-    ("name: crate", "name: cart", ":24: movers.0: two things are called 'cart'; give one another name"),
-    ("{name: bulb", "{name: sky", ":19: lamps.1: two things are called 'sky'; give one another name"),
-    ("name: crate", "name: window_0", ":15: boxes.0: two things are called 'window_0'; give one another name"),
-    ("{name: bulb", "{name: box_1", ":15: boxes.1: two things are called 'box_1'; give one another name"),
+    ("name: crate", "name: cart", ":24: movers.0: two things are called 'cart'; rename one of them"),
+    ("{name: bulb", "{name: sky", ":19: lamps.1: two things are called 'sky'; rename one of them"),
+    ("name: crate", "name: window_0", ":15: boxes.0: two things are called 'window_0'; rename one of them"),
+    ("{name: bulb", "{name: box_1", ":15: boxes.1: two things are called 'box_1'; rename one of them"),
     ("reveal: grain}]", "reveal: grain}, {wall: north, center_m: [1.9, 1.5], size_m: [1, 0.8], pane: pane, reveal: grain}]", ":14: room.windows.1: the window overlaps window 0 of the north wall, which has center_m [1.0, 1.5], size_m [1.0, 0.8]; move one or make it smaller"),
     ("[-2.9, 0, 1.5]", "[-3, 0, 1.5]", ":16: boards.0.center_m: should be inside the room, 6 × 4 × 3 m around the origin (got [-3.0, 0.0, 1.5])"),
     ("[0, 0, 2.9]", "[0, 0, 3.1]", ":18: lamps.0.center_m: should be inside the room, 6 × 4 × 3 m around the origin (got [0.0, 0.0, 3.1])"),
     ("[1, 0, 0.3]", "[4, 0, 0.3]", ":24: movers.0.path.1: should be inside the room, 6 × 4 × 3 m around the origin (got [4.0, 0.0, 0.3])"),
-    ("size_m: [0.5, 0.4, 0.6], material: grain", "size_m: [0.5, 0.4, 0.6], material: glow", ":24: movers.0.material: 'glow' shines, and what moves cannot; choose a material of another kind"),
+    ("size_m: [0.5, 0.4, 0.6], material: grain", "size_m: [0.5, 0.4, 0.6], material: glow", ":24: movers.0.material: 'glow' is luminous, but movers cannot emit light; use another kind of material"),
     ("{t_s: 2, position", "{t_s: 0, position", ":24: movers.0: times should increase, but 0 follows 0"),
     ("azimuth_deg: 90, elevation_deg: 30", "azimuth_deg: 90", ":21: sun: should have either azimuth_deg and elevation_deg, or a path"),
     ("azimuth_deg: 90, elevation_deg: 30", "azimuth_deg: 90, path: [{t_s: 0, azimuth_deg: 0, elevation_deg: 9}]", ":21: sun: should have either azimuth_deg and elevation_deg, or a path"),
@@ -192,7 +118,9 @@ def test_windows_may_touch(hall):
     assert len(of_material(hall("reveal: grain}]", f"reveal: grain}}, {beside}"), "pane").faces) == 4
 
 
-@pytest.mark.parametrize(("light", "zero"), [("", ""), ("sky: {illuminance_lx: 0}\n", "; all that it has are 0")])
+@pytest.mark.parametrize(
+    ("light", "zero"), [("", ""), ("sky: {illuminance_lx: 0}\n", "; all lights that it has are 0")]
+)
 def test_a_scene_without_any_light_is_refused(tmp_path, light, zero):
     text = f"name: cave\nwhite_cd_m2: 1\nmaterials: {{m: {{pattern: plain, albedo: 0.5}}}}\n{light}"
     (tmp_path / "cave.yaml").write_text(f"{text}room: {{size_m: [3, 3, 3], floor: m, wall: m, ceiling: m}}\n")
@@ -217,3 +145,13 @@ def test_who_walks_is_a_mover_for_each_limb_and_may_stand_on_the_floor(tmp_path)
     assert {mover.name for mover in scene.movers} == {"ada"} == {t.name for m in scene.movers for t in m.things}
     assert len(scene.movers) == 7
     assert {thing.material for mover in scene.movers for thing in mover.things} <= set(scene.materials)
+
+
+@pytest.mark.parametrize("scale", [0.5, 2.0])
+def test_a_scale_multiplies_every_length(hall, scale):
+    whole = hall()
+    sized = hall("white_cd_m2: 50", f"white_cd_m2: 50\nscale: {scale}")
+    for before, after in zip(whole.things, sized.things, strict=True):
+        np.testing.assert_allclose(after.mesh.vertices_m, scale * before.mesh.vertices_m, atol=1e-9)
+    for before, after in zip(whole.movers, sized.movers, strict=True):
+        np.testing.assert_allclose(after.path.pose(1e9)[:3, 3], scale * before.path.pose(1e9)[:3, 3])

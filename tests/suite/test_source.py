@@ -69,7 +69,7 @@ def test_home_is_found(tmp_path, monkeypatch):
         ),
         ("[data/V1, 'data/x*']", r":2: source\.1: no folder or file matches .*/data/x\*$"),
         ("{path: 'data/MH*', name: one}", "2 recordings match 'data/MH\\*', so one name 'one' is not enough"),
-        ("[data/V1, data/V1/mav0]", "two cases are called 'v1'; name one another: .*/data/V1/mav0"),
+        ("[data/V1, data/V1/mav0]", "two cases are called 'v1'; rename one of them: .*/data/V1/mav0"),
         ("{pth: data/V1}", r":2: source\.pth: unknown key. Did you mean 'path'"),
         ("{path: data/V1, rate_hz: 0}", "rate_hz: should be greater than 0"),
         ("{path: data/V1, topics: {lft: /cam0}}", "topics.lft: no topic named 'lft'. Did you mean 'left'"),
@@ -81,7 +81,7 @@ def test_what_is_wrong_names_the_place_in_the_suite(suite, source, sentence):
 
 
 def test_a_suite_has_all_axes_or_a_source_alone(suite):
-    said = "scenes: this key is missing; a suite has scenes, or scenarios or a source alone"
+    said = "scenes: this key is missing; a suite needs scenes, or only scenarios or a source"
     with pytest.raises(SuiteError, match=said):
         suite("data/V1", "rigs: {down: {pitch_deg: 90}}\n")
 

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from vobench.errors import MOST_SAID, Place, SuiteError, UnknownNameError, VobenchError
+from vobench.errors import MOST_SAID, Place, SuiteError, VobenchError
 from vobench.runner.motion import body_motions
-from vobench.suite import catalog, scene_build, scene_file
-from vobench.suite import suite as expand
+from vobench.suite import catalog, entrant, scene_build, scene_file
 from vobench.suite.catalog import builtin_root
 from vobench.suite.suite import AXES, read_plan
 from vobench.suite.yaml_file import checked, plain
@@ -45,27 +44,6 @@ def test_a_case_without_any_choice_is_called_by_its_trajectory(bent):
 def test_one_line_changes_one_factor(bent, axis, change):
     before, after = (bent(*changes).cases[-1] for changes in ((), (change,)))
     assert [name for name in AXES if getattr(before, name) != getattr(after, name)] == [axis]
-
-
-def test_a_lighting_sets_the_lamps_it_names_and_leaves_the_others(bent):
-    levels = [case.build_scene().lights[0].level.mean(0, 0) for case in bent().cases]
-    assert levels == [1, 150 / 600]
-
-
-def test_a_suites_parameters_go_over_the_manifests(bent):
-    assert [entrant.params for entrant in bent().entrants] == [{}, {"measure_s": 0.1}]
-
-
-def test_one_estimator_takes_part_twice_under_two_labels(bent):
-    planned = bent(("stand_still,", "{name: constant_velocity, label: slow, params: {measure_s: 1}},"))
-    assert [(e.label, e.params["measure_s"]) for e in planned.entrants] == [("slow", 1), ("constant_velocity", 0.1)]
-
-
-def test_a_suites_limits_go_over_the_manifests(bent):
-    planned = bent(("stand_still,", "{name: stand_still, limits: {frame_s: 1, memory_mib: 512}},"))
-    limits, usual = (entrant.limits for entrant in planned.entrants)
-    assert (limits.frame_s, limits.memory_mib, limits.start_s) == (1.0, 512, usual.start_s)
-    assert usual == planned.entrants[1].manifest.limits
 
 
 @pytest.fixture
@@ -106,61 +84,6 @@ def test_a_mistake_is_said_with_the_file_that_it_is_in(building):
         building("", ("name: tiny", "name: tiny\ninclude: over.yaml"))
 
 
-def test_each_mode_has_an_entrant_of_its_own(bent):
-    planned = bent(("estimators:", "modes: [step, real_time]\nestimators:"))
-    assert [(e.label, e.mode, e.claims) for e in planned.entrants[:2]] == [
-        ("stand_still", "step", ()),
-        ("stand_still.real_time", "real_time", ("real time",)),
-    ]
-    alone = bent(("estimators:", "modes: [real_time]\nestimators:"))
-    assert next((e.label, e.mode) for e in alone.entrants) == ("stand_still", "real_time")
-
-
-@pytest.mark.parametrize(
-    ("limits", "sentence"),
-    [
-        ("{frame_s: 0}", "limits: frame_s: should be greater than 0 (got 0"),
-        ("{memory_mib: 1}", "limits: memory_mib: should be 64 or more (got 1)"),
-        ("{memory_mib: 512.5}", "limits: should be a whole number (got 512.5)"),
-        ("{frames: 1}", "no limit named 'frames'. Did you mean 'frame_s'?"),
-    ],
-)
-def test_a_limit_that_is_none_is_refused_with_its_place(bent, limits, sentence):
-    with pytest.raises(SuiteError) as refused:
-        bent(("stand_still,", f"{{name: stand_still, limits: {limits}}},"))
-    assert sentence in str(refused.value)
-    assert "estimators.0" in str(refused.value)
-
-
-def test_parameters_reach_an_estimator_as_plain_python(bent):
-    (value,) = bent().entrants[1].params.values()
-    assert type(value) is float
-
-
-def test_every_estimator_runs_repeats_times_on_every_case(bent):
-    planned = bent(("seed: 1", "seed: 1\nrepeats: 3"))
-    runs = [run for case in planned.cases for run in planned.trials(case)]
-    assert len(runs) == len({(run.case.name, run.entrant.label, run.repeat) for run in runs}) == 2 * 2 * 3
-
-
-def test_asking_for_estimators_takes_the_suites_own_settings_first(bent):
-    planned = bent(only=("constant_velocity", "wheel_odometry"))
-    assert [(e.label, e.params) for e in planned.entrants] == [
-        ("constant_velocity", {"measure_s": 0.1}),
-        ("wheel_odometry", {}),
-    ]
-
-
-def test_asking_for_one_estimator_twice_is_an_error(bent):
-    with pytest.raises(SuiteError, match="two estimators are called 'stand_still'"):
-        bent(only=("stand_still", "stand_still"))
-
-
-def test_asking_for_an_unknown_estimator_names_the_nearest(bent):
-    with pytest.raises(UnknownNameError, match="Did you mean 'stand_still'"):
-        bent(only=("stand_stil",))
-
-
 def test_scenes_and_estimators_are_found_beside_their_suite_from_anywhere(bent, tmp_path, monkeypatch):
     manifest = "name: stand_still\nversion: mine\nclass: estimator:Mine\npose_of: body\nsummary: Mine.\n"
     bent()
@@ -183,7 +106,7 @@ def test_what_cases_share_is_made_once_however_many_there_are(bent, monkeypatch)
     for module, name in (
         (scene_file, "survey"),
         (scene_build, "build"),
-        (expand, "read_manifest"),
+        (entrant, "read_manifest"),
     ):
         made = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *args, made=made, name=name: (calls.append(name), made(*args))[1])
@@ -220,28 +143,6 @@ def test_every_suite_of_the_house_is_valid_and_called_as_its_file(name, monkeypa
     assert catalog.find("suite", name).origin == "built in"
 
 
-def test_a_rig_takes_lenses_and_their_places_from_its_preset_and_a_baseline_over_it(bent):
-    euroc = bent(("pitch_deg: 90", "pitch_deg: 90, lens: euroc")).cases[0].build_rig()
-    assert euroc.left != euroc.right
-    assert euroc.baseline_m == pytest.approx(0.110, abs=1e-3)
-    wide = bent(("pitch_deg: 90", "pitch_deg: 90, lens: euroc, baseline_m: 0.3")).cases[0].build_rig()
-    assert (wide.left, wide.right) == (euroc.left, euroc.right)
-    assert wide.baseline_m == pytest.approx(0.3)
-
-
-def test_a_calibration_error_makes_the_true_rig_another_and_the_told_one_not(bent):
-    plain, off = (
-        bent(("pitch_deg: 90", f"pitch_deg: 90{more}")).cases[0]
-        for more in ("", ", calibration_error: {focal_ratio: 0.02, right_yaw_deg: 0.5}")
-    )
-    told, true = off.build_rig(), off.build_true_rig()
-    assert told.left == plain.build_rig().left == plain.build_true_rig().left
-    assert told.T_body_right.tobytes() == plain.build_true_rig().T_body_right.tobytes()
-    assert true.left.fx_px == pytest.approx(1.02 * told.left.fx_px)
-    assert true.T_body_left.tobytes() == told.T_body_left.tobytes()
-    assert true.T_body_right.tobytes() != told.T_body_right.tobytes()
-
-
 # ruff: noqa: E501 - a sentence stands in one line
 
 
@@ -269,7 +170,7 @@ WRONG = [
     ("seed: 1", "seed: 1.5", ":2: seed: should be a whole number (got 1.5)"),
     ("seed: 1", "seed:", ":2: seed: should be a whole number (got nothing)"),
     ("seed: 1", "seed: -1", ":2: seed: should be 0 or more (got -1)"),
-    ("seed: 1", "seed: 1\nrendering: {samples: 4}", ":3: rendering: samples belongs to engine path, but the engine is raster; leave samples out"),
+    ("seed: 1", "seed: 1\nrendering: {samples: 4}", ":3: rendering: samples requires engine path, but the engine is raster; remove samples"),
     ("seed: 1", "seed: 1\nrendering: {engine: pyrendr}", ":3: rendering.engine: no engine named 'pyrendr'. Did you mean 'pyrender'? Known: path, pyrender, raster"),
     ("seed: 1", "seed: 1\nrendering: {engine: path, samples: 65537}", ":3: rendering.samples: should be 65536 or less (got 65537)"),
     ("seed: 1", "seed: 1\nrepeats: 101", ":3: repeats: should be 100 or less (got 101)"),
@@ -291,7 +192,7 @@ WRONG = [
     ("[closet]", "closet", ":3: scenes: should be a list, as in [a, b] (got 'closet')"),
     ("[closet]", "[closset]", ":3: scenes.0: no scene named 'closset'. Did you mean 'closet'? Known: car_park, closet, corridor, flat, hall, office, park, ramp, room, street, warehouse"),
     ("[closet]", "[./no.yaml]", ":3: scenes.0: no scene file at no.yaml. Known by name: car_park, closet, corridor, flat, hall, office, park, ramp, room, street, warehouse"),
-    ("[closet]", "[closet, closet]", ":3: scenes.1: two scenes are called 'closet'; give each once, from files of different names"),
+    ("[closet]", "[closet, closet]", ":3: scenes.1: two scenes are called 'closet'; list each once, from files with different names"),
     ("{lamp:", "{lmp:", ":4: lightings.dim.lmp: lighting: no light named 'lmp'. Did you mean 'lamp'? Known: lamp"),
     ("pitch_deg: 90", "pitch_deg: 90, lens: x", f":5: rigs.down.lens: no lens named 'x'. Known: {LENSES}"),
     ("pitch_deg: 90", "pitch_deg: 90, lens: eurok", f":5: rigs.down.lens: no lens named 'eurok'. Did you mean 'euroc'? Known: {LENSES}"),
@@ -308,9 +209,9 @@ WRONG = [
     ("stand_still,", "stnd_still,", f":8: estimators.0: no estimator named 'stnd_still'. Did you mean 'stand_still'? Known: {ESTIMATORS}"),
     ("stand_still,", "./stand_still,", f":8: estimators.0: no estimator file at stand_still/estimator.yaml. Known by name: {ESTIMATORS}"),
     ("stand_still,", "3,", ":8: estimators.0: should be keys with values (got 3)"),
-    ("stand_still,", "constant_velocity,", ":8: estimators.1: two estimators are called 'constant_velocity'; give one a label of its own"),
+    ("stand_still,", "constant_velocity,", ":8: estimators.1: two estimators are called 'constant_velocity'; give one of them another label"),
     ("measure_s", "mesure_s", ":8: estimators.1.params.mesure_s: no parameter named 'mesure_s'. Did you mean 'measure_s'? Known: measure_s"),
-    ("measure_s: 0.1", "measure_s: fast", ":8: estimators.1.params.measure_s: parameter 'measure_s' should be of the kind of its default 1.0, got 'fast'"),
+    ("measure_s: 0.1", "measure_s: fast", ":8: estimators.1.params.measure_s: parameter 'measure_s' should be of the type of its default 1.0, got 'fast'"),
     ("measure_s: 0.1", "measure_s: 2020-01-01", ":8: estimators.1.params.measure_s: should be a number, text, a list or keys with values (got 2020-01-01)"),
     ("rigs:", "\trigs:", r":5:1: found character '\t' that cannot start any token"),
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""The verbs of vobench, each loaded when it is called; what goes wrong is said in one line."""
+"""The commands of vobench, each imported only when it is called, and how errors are reported."""
 
 import json as json_module
 import os
@@ -15,36 +15,36 @@ from typer.core import TyperGroup
 
 from vobench import stop
 from vobench.cli.terminal import warn
-from vobench.errors import SuiteError, VobenchError, printable
+from vobench.errors import SuiteError, VobenchError
 from vobench.trust import gate
 
-# Where each verb is: module and function; its first sentence is the verb's summary. Others are installed as entry
-# points of the group below.
+# The module and function of each command. The first line of its docstring is its summary. Installed distributions may
+# add commands as entry points of the group below.
 VERBS = {
     "run": "vobench.cli.run:run_command",
-    "check": "vobench.cli.run:check_command",
+    "check": "vobench.cli.check:check_command",
     "drive": "vobench.cli.drive:drive_command",
     "identify": "vobench.cli.identify:identify_command",
     "render": "vobench.cli.render:render_command",
     "scene": "vobench.cli.scene:scene_command",
     "list": "vobench.cli.list:list_command",
-    "schema": "vobench.cli.run:schema_command",
+    "schema": "vobench.cli.schema:schema_command",
     "score": "vobench.cli.score:score_command",
-    "diagnose": "vobench.cli.score:diagnose_command",
-    "new": "vobench.cli.estimator:new_command",
-    "try": "vobench.cli.estimator:try_command",
-    "metrics": "vobench.cli.score:metrics_command",
+    "diagnose": "vobench.cli.diagnose:diagnose_command",
+    "new": "vobench.cli.new:new_command",
+    "try": "vobench.cli.try_estimator:try_command",
+    "metrics": "vobench.cli.metrics:metrics_command",
     "import": "vobench.cli.sequence:import_command",
     "export": "vobench.cli.sequence:export_command",
-    "info": "vobench.cli.sequence:info_command",
+    "info": "vobench.cli.info:info_command",
     "realism": "vobench.cli.realism:realism_command",
     "twin": "vobench.cli.twin:twin_command",
-    "verify": "vobench.cli.report:verify_command",
+    "verify": "vobench.cli.verify:verify_command",
     "report": "vobench.cli.report:report_command",
-    "compare": "vobench.cli.report:compare_command",
-    "bundle": "vobench.cli.report:bundle_command",
+    "compare": "vobench.cli.compare:compare_command",
+    "bundle": "vobench.cli.bundle:bundle_command",
     "view": "vobench.cli.view:view_command",
-    "causes": "vobench.cli.failure:causes_command",
+    "causes": "vobench.cli.causes:causes_command",
     "explain": "vobench.cli.failure:explain_command",
     "shrink": "vobench.cli.failure:shrink_command",
     "cache": "vobench.cli.cache:cache_command",
@@ -54,48 +54,53 @@ GROUP = "vobench.commands"
 
 
 class Verbs(TyperGroup):
-    """The verbs, of which only the one that is called is imported."""
+    """The commands, of which only the one that is called is imported."""
 
     def list_commands(self, _: Any) -> list[str]:
-        """Names of our own verbs, and of installed ones."""
-        return [*VERBS, *sorted(_installed().keys() - VERBS.keys())]
+        """Names of vobench's commands, and of installed ones."""
+        return [*VERBS, *sorted(_installed_commands().keys() - VERBS.keys())]
 
     def get_command(self, _: Any, cmd_name: str) -> Any:
-        """The verb of that name, None where there is none."""
-        target = VERBS.get(cmd_name) or _installed().get(cmd_name)
+        """The command with that name; None if there is none."""
+        target = VERBS.get(cmd_name) or _installed_commands().get(cmd_name)
         if target is None:
             return None
-        module, _, function = target.partition(":")
-        verb = typer.Typer(add_completion=False, rich_markup_mode=None)
-        family = import_module(module)
-        verb.command(cmd_name, cls=getattr(family, "COMMAND_CLASS", None))(getattr(family, function))
-        return typer.main.get_command(verb)
+        module_name, _, function_name = target.partition(":")
+        module = import_module(module_name)
+        function = getattr(module, function_name)
+        command_class = getattr(module, "COMMAND_CLASS", None)
+        command_app = typer.Typer(add_completion=False, rich_markup_mode=None)
+        command_app.command(cmd_name, cls=command_class)(function)
+        return typer.main.get_command(command_app)
 
     def format_commands(self, _: Any, formatter: Any) -> None:
-        """Every verb with its summary."""
+        """Write every command with its summary."""
+        targets = {**_installed_commands(), **VERBS}
         with formatter.section("Commands"):
-            formatter.write_dl([(name, _summary(target)) for name, target in {**_installed(), **VERBS}.items()])
+            formatter.write_dl([(name, _summary(target)) for name, target in targets.items()])
 
 
-def _installed() -> dict[str, str]:
+def _installed_commands() -> dict[str, str]:
+    """The targets of commands that installed distributions offer, by name."""
     from importlib.metadata import entry_points
 
     return {point.name: point.value for point in entry_points(group=GROUP)}
 
 
 def _summary(target: str) -> str:
-    """The first line about a verb, read off its source: importing them all would take seconds."""
-    module, _, function = target.partition(":")
-    spec = find_spec(module)
+    """The first line of a command's docstring, read from its source: to import all commands would take seconds."""
+    module_name, _, function_name = target.partition(":")
+    spec = find_spec(module_name)
     source = Path(spec.origin).read_text(encoding="utf-8") if spec and spec.origin else ""
-    found = re.search(rf'^def {function}\(.*?"""(.+?)(?:\n|""")', source, re.MULTILINE | re.DOTALL)
-    return found[1] if found else ""
+    match = re.search(rf'^def {function_name}\(.*?"""(.+?)(?:\n|""")', source, re.MULTILINE | re.DOTALL)
+    return match[1] if match else ""
 
 
+SUMMARY = "Simulate, run and score visual odometry, and find out why it fails."
 app = typer.Typer(
     name="vobench",
     cls=Verbs,
-    help="Simulate, run and score visual odometry, and see where it breaks.",
+    help=SUMMARY,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -105,81 +110,87 @@ DEBUG = "--debug"
 
 
 def run() -> None:
-    """Run a command; a user's mistake or machine is one line and exit code 1."""
+    """Run a command. An error that the user can correct is one line, with exit code 1."""
     for stream in filter(None, (sys.stdout, sys.stderr)):
-        stream.reconfigure(errors="replace")  # a terminal without ° gets a ? for it
+        stream.reconfigure(errors="replace")  # terminals that have no ° show a ?
     try:
-        with gate(warn, ours=_ours, folder=_trusted):
-            # Nobody remembers whether --debug goes before the command or after it.
-            app([word for word in sys.argv[1:] if word != DEBUG], prog_name=app.info.name)
+        with gate(warn, ours=_trusted_folders, folder=_trusted_hashes):
+            # --debug is accepted before and after the command.
+            words = [word for word in sys.argv[1:] if word != DEBUG]
+            app(words, prog_name=app.info.name)
     except SystemExit as end:
         if not isinstance(end.__context__, BrokenPipeError):
             raise
-        _hang_up()  # a reader that has seen enough is no failure
+        _discard_output()  # a reader that stops reading, such as `head`, is no failure
     except (VobenchError, OSError) as error:
-        stop.check()  # then it may come of that
+        stop.check()  # a request to stop may have caused the error
         _fail(_sentence(error), error)
     finally:
-        try:  # now, not at exit, where a reader that has seen enough would make a traceback
+        try:  # now, because at exit a closed pipe would print a traceback
             sys.stdout.flush()
         except BrokenPipeError:
-            _hang_up()
+            _discard_output()
 
 
-def _ours() -> tuple[Path, ...]:
-    """Below which folders makers run unasked."""
+def _trusted_folders() -> tuple[Path, ...]:
+    """The folders whose makers run without --trust."""
     from vobench.suite.catalog import builtin_root
 
     return builtin_root(), Path.cwd()
 
 
-def _trusted() -> Path:
-    """Where the hashes of makers are kept that the user trusts."""
+def _trusted_hashes() -> Path:
+    """The folder with the hashes of makers that the user trusts."""
     from vobench.runner.key import cache_folder
 
     return cache_folder() / "state" / "trusted"
 
 
-def _hang_up() -> None:
-    """Let what is still to be printed go nowhere."""
+def _discard_output() -> None:
+    """Discard what is still to be printed."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _sentence(error: BaseException) -> str:
-    """One line; the system's errors with what it is about in front."""
+    """The error in one line; errors of the system name their file."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.strerror}: {error.filename}"
-    if isinstance(error, SuiteError) and (more := len(error.mistakes) - 1):
-        return f"{error.mistakes[0]} (and {more} more mistake{'s' if more > 1 else ''})"
+    if isinstance(error, SuiteError) and len(error.mistakes) > 1:
+        more_count = len(error.mistakes) - 1
+        noun = "mistake" if more_count == 1 else "mistakes"
+        return f"{error.mistakes[0]} (and {more_count} more {noun})"
     return " ".join(str(error).split())
 
 
 def _fail(sentence: str, error: BaseException) -> None:
+    """Print an error and end with exit code 1; with --debug, raise it."""
     if DEBUG in sys.argv:
         raise error
     if "--json" in sys.argv:
-        print(json_module.dumps({"error": sentence, **_mistakes(error)}, ensure_ascii=False))
-    for line in str(error).splitlines() if isinstance(error, SuiteError) else [sentence]:
-        print(f"vobench: {printable(line)}", file=sys.stderr)
+        content = {"error": sentence, **_mistakes(error)}
+        print(json_module.dumps(content, ensure_ascii=False))
+    lines = str(error).splitlines() if isinstance(error, SuiteError) else [sentence]
+    for line in lines:
+        warn(line)
     raise SystemExit(1) from None
 
 
 def _mistakes(error: BaseException) -> dict[str, Any]:
-    """Of a file that is wrong: every mistake with its file, line, key and value; `asked_by` is what named the file."""
+    """Every mistake in a file with its place and value; `asked_by` are the places that name the file."""
     if not isinstance(error, SuiteError):
         return {}
-    said = list[dict[str, Any]]()
+    rows = list[dict[str, Any]]()
     for mistake in error.mistakes:
         place = {"file": None, "line": None, "column": None, "key": None, "value": None}
         if mistake.places:
             place = asdict(mistake.places[-1])
-        asked_by = [str(outer) for outer in mistake.places[:-1]]
-        said.append({**place, "sentence": mistake.sentence, "asked_by": asked_by})
-    return {"mistakes": said}
+        naming_places = [str(outer) for outer in mistake.places[:-1]]
+        rows.append({**place, "sentence": mistake.sentence, "asked_by": naming_places})
+    return {"mistakes": rows}
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
+def _print_version(is_requested: bool) -> None:
+    if is_requested:
         from vobench import __version__
 
         print(__version__)
@@ -189,10 +200,10 @@ def _print_version(asked: bool) -> None:
 @app.callback()
 def common(
     *,
-    debug: Annotated[bool, typer.Option(DEBUG, help="Show a traceback where there would be one line.")] = False,
+    debug: Annotated[bool, typer.Option(DEBUG, help="Show a traceback instead of one line.")] = False,
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
-    """Simulate, run and score visual odometry, and see where it breaks."""
-    del debug, version  # the one is read by _fail, the other done by its callback
+    """Define the options that every command has."""
+    del debug, version  # _fail reads the first, the callback of the second has the effect

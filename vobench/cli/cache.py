@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Sequence
 from itertools import groupby
 from typing import Annotated, Any
 
@@ -9,12 +10,14 @@ import typer
 
 from vobench import stop
 from vobench.cli import terminal
+from vobench.cli.option import Json
 from vobench.errors import InputError
 from vobench.runner.key import cache_folder
 from vobench.runner.store import GB, Entry, Store
 
 ACTIONS = ("ls", "gc", "verify")
 DAY_S = 86400.0
+HEADINGS = ("kind", "entries", "damaged", "GB", "oldest, days", "last used, days ago")
 
 
 def cache_command(
@@ -22,42 +25,54 @@ def cache_command(
         str,
         typer.Argument(
             metavar="[ls|gc|verify]",
-            help="List what is kept; remove what is damaged, unfinished or not wanted; check every file's hash.",
+            help="List the entries; remove damaged, unfinished or unwanted ones; check the hash of every file.",
         ),
     ] = "ls",
     *,
     keep_gb: Annotated[
-        float | None, typer.Option(min=0, help="gc: remove the least recently used until so much is left.")
+        float | None, typer.Option(min=0, help="gc: remove the least recently used entries until this size is left.")
     ] = None,
-    older: Annotated[float | None, typer.Option(min=0, help="gc: remove what was not used for so many days.")] = None,
-    json: terminal.Json = False,
+    older: Annotated[float | None, typer.Option(min=0, help="gc: remove entries not used for this many days.")] = None,
+    json: Json = False,
 ) -> None:
-    """Say what the cache holds, make it smaller, or check all of it; exit code 1 where anything is damaged."""
+    """List the content of the cache, make it smaller, or check all of it; exit code 1 if anything is damaged."""
     terminal.known("action", action, ACTIONS)
-    if action != "gc" and (keep_gb is not None or older is not None):
-        raise InputError(f"--keep-gb and --older go with gc, not with {action}")
+    has_limits = keep_gb is not None or older is not None
+    if has_limits and action != "gc":
+        raise InputError(f"--keep-gb and --older require gc, not {action}")
     store = Store(cache_folder())
     if action == "verify":
         _verify(store, as_json=json)
         return
-    removed = list[Entry]()
-    if action == "gc":
-        limits = math.inf if keep_gb is None else keep_gb * GB, math.inf if older is None else older * DAY_S
-        removed = store.collect(keep_bytes=limits[0], older_s=limits[1])
-    kinds = [_facts(kind, list(found)) for kind, found in groupby(store.entries(), key=lambda entry: entry.kind)]
-    gone = {"count": len(removed), "bytes": sum(entry.bytes for entry in removed)}
-    if json:
-        said = {"removed": gone} if action == "gc" else {}
-        terminal.print_json({"path": str(store.root), **said, "kinds": kinds})
+    removed = _collect(store, keep_gb, older) if action == "gc" else None
+    _list(store, removed, as_json=json)
+
+
+def _collect(store: Store, keep_gb: float | None, older_days: float | None) -> list[Entry]:
+    """Remove entries; return those that were removed."""
+    keep_bytes = math.inf if keep_gb is None else keep_gb * GB
+    older_s = math.inf if older_days is None else older_days * DAY_S
+    return store.collect(keep_bytes=keep_bytes, older_s=older_s)
+
+
+def _list(store: Store, removed: Sequence[Entry] | None, *, as_json: bool) -> None:
+    """Print the entries of each kind, and what was removed before, if anything was to be."""
+    kinds = [_facts(kind, list(entries)) for kind, entries in groupby(store.entries(), key=lambda entry: entry.kind)]
+    removed_bytes = sum(entry.bytes for entry in removed or ())
+    if as_json:
+        content: dict[str, Any] = {"path": str(store.root)}
+        if removed is not None:
+            content["removed"] = {"count": len(removed), "bytes": removed_bytes}
+        content["kinds"] = kinds
+        terminal.print_json(content)
         return
-    rows = [_cells(fact) for fact in kinds]
-    headings = ["kind", "entries", "damaged", "GB", "oldest, days", "last used, days ago"]
-    terminal.console().print(terminal.table(str(store.root), headings, rows))
-    if action == "gc":
-        print(f"removed {gone['count']} entries of {gone['bytes'] / GB:.3g} GB")
+    rows = [_cells(facts) for facts in kinds]
+    terminal.console().print(terminal.table(str(store.root), HEADINGS, rows))
+    if removed is not None:
+        print(f"removed {len(removed)} entries of {removed_bytes / GB:.3g} GB")
 
 
-def _facts(kind: str, entries: list[Entry]) -> dict[str, Any]:
+def _facts(kind: str, entries: Sequence[Entry]) -> dict[str, Any]:
     now_s = time.time()
     return {
         "kind": kind,
@@ -69,24 +84,28 @@ def _facts(kind: str, entries: list[Entry]) -> dict[str, Any]:
     }
 
 
-def _cells(fact: dict[str, Any]) -> list[str]:
-    counts = [str(fact[name]) for name in ("kind", "count", "damaged")]
-    return [*counts, f"{fact['bytes'] / GB:.3g}", *(f"{fact[name]:.1f}" for name in ("oldest_days", "used_days"))]
+def _cells(facts: dict[str, Any]) -> list[str]:
+    counts = [str(facts[name]) for name in ("kind", "count", "damaged")]
+    size = f"{facts['bytes'] / GB:.3g}"
+    ages = [f"{facts[name]:.1f}" for name in ("oldest_days", "used_days")]
+    return [*counts, size, *ages]
 
 
 def _verify(store: Store, *, as_json: bool) -> None:
-    """Hash every file that a manifest names."""
-    found = [entry for entry in store.entries() if entry.path.is_dir() and not entry.is_damaged]
+    """Hash every file of the complete entries; exit code 1 if one differs from its manifest."""
+    entries = [entry for entry in store.entries() if entry.path.is_dir() and not entry.is_damaged]
     wrong = list[dict[str, str]]()
-    for entry in found:
+    for entry in entries:
         stop.check()
-        if why := store.fault(entry.key, anew=True):
-            wrong.append({"path": str(entry.path), "wrong": why})
+        fault = store.fault(entry.key, anew=True)
+        if fault:
+            wrong.append({"path": str(entry.path), "wrong": fault})
+
     if as_json:
-        terminal.print_json({"path": str(store.root), "entries": len(found), "wrong": wrong})
+        terminal.print_json({"path": str(store.root), "entries": len(entries), "wrong": wrong})
     else:
         for each in wrong:
             print(f"{each['wrong']}: {each['path']}")
-        print(f"{len(found) - len(wrong)} of {len(found)} entries as they were: {store.root}")
+        print(f"{len(entries) - len(wrong)} of {len(entries)} entries unchanged: {store.root}")
     if wrong:
         raise typer.Exit(1)

@@ -1,4 +1,4 @@
-"""vobench doctor: what this machine lacks, and the command that mends it."""
+"""vobench doctor: what this machine lacks, and the command that installs it."""
 
 import json as json_module
 import os
@@ -14,6 +14,8 @@ import typer
 
 from vobench import stop
 from vobench.cli import terminal
+from vobench.cli.option import Json
+from vobench.cli.progress import Bars
 from vobench.errors import MissingDependencyError
 from vobench.estimator.program import sandbox_here
 from vobench.rendering import mitsuba
@@ -21,12 +23,15 @@ from vobench.rendering.context import DEVICE_VARIABLE, EGL_PACKAGES, EGL_REMEDY
 from vobench.runner.key import cache_folder
 from vobench.runner.store import why_unwritable
 
+# Names of checks.
 DRAWING = "drawing without a display (EGL)"
+SANDBOX = "sandbox for estimators"
+PATH_TRACING = "path tracing (Mitsuba)"
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing looked at: what was found, and the command that mends it; what is optional may be missing."""
+    """The result of one check, and the command that helps if it failed; optional dependencies may be missing."""
 
     check: str
     well: bool
@@ -37,23 +42,27 @@ class Check:
 
 def doctor_command(
     *,
-    fix: Annotated[bool, typer.Option("--fix", help="Install what is missing, where we may.")] = False,
-    json: terminal.Json = False,
+    fix: Annotated[bool, typer.Option("--fix", help="Install what is missing, if permissions allow.")] = False,
+    json: Json = False,
 ) -> None:
-    """Say what this machine lacks, and the command that mends it."""
-    python = Check("Python", True, sys.version.split()[0])
-    drawing = _drawing()
-    if fix and not drawing[0].well:
-        drawing = _installed_drawing()
-    checks = [python, _libraries(), *drawing, _cache(), _sandbox(), _path_tracing()]
-    ill = [c for c in checks if not (c.well or c.optional)]
+    """Check what this machine lacks, and print the command that installs it."""
+    checks = _all_checks(fix=fix)
+    failed = [check for check in checks if not (check.well or check.optional)]
     if json:
-        terminal.print_json({"well": not ill, "checks": [asdict(c) for c in checks]})
-        raise SystemExit(1 if ill else 0)  # the one object has said it all
+        terminal.print_json({"well": not failed, "checks": [asdict(check) for check in checks]})
+        raise SystemExit(1 if failed else 0)  # the JSON object has all remedies
     rows = [[_verdict(check), check.check, check.result] for check in checks]
     terminal.console().print(terminal.table("", ["", "check", "result"], rows))
-    if ill:
-        raise MissingDependencyError("; ".join(f"{c.check}: {c.remedy}" for c in ill))
+    if failed:
+        raise MissingDependencyError("; ".join(f"{check.check}: {check.remedy}" for check in failed))
+
+
+def _all_checks(*, fix: bool) -> list[Check]:
+    python = Check("Python", True, sys.version.split()[0])
+    drawing = _check_drawing()
+    if fix and not drawing[0].well:
+        drawing = _install_drawing()
+    return [python, _check_libraries(), *drawing, _check_cache(), _check_sandbox(), _check_path_tracing()]
 
 
 def _verdict(check: Check) -> str:
@@ -62,91 +71,104 @@ def _verdict(check: Check) -> str:
     return "optional" if check.optional else "MISSING"
 
 
-def _libraries() -> Check:
-    """All that our distribution requires, extras aside, is installed."""
-    missing = []
-    for line in requires("vobench") or []:
-        if "extra ==" in line:
+def _check_libraries() -> Check:
+    """Whether all requirements of the vobench distribution, without extras, are installed."""
+    missing = list[str]()
+    for requirement in requires("vobench") or []:
+        if "extra ==" in requirement:
             continue
-        name = re.split(r"[^\w.-]", line, maxsplit=1)[0]
+        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
         try:
             version(name)
         except PackageNotFoundError:
             missing.append(name)
+    result = f"missing: {', '.join(missing)}" if missing else "all installed"
     remedy = f"run: {sys.executable} -m pip install {' '.join(missing)}"
-    return Check("Python libraries", not missing, f"missing: {', '.join(missing)}" if missing else "all there", remedy)
+    return Check("Python libraries", not missing, result, remedy)
 
 
-def _drawing() -> list[Check]:
-    """Whether a picture comes out right, drawn in a process of its own: a broken driver may kill it."""
-    tried = stop.run([sys.executable, "-P", "-m", "vobench.rendering.self_test"])
-    if tried.returncode != 0:
-        last = tried.stderr.strip().splitlines()[-1:] or [f"the process that drew died with {tried.returncode}"]
-        return [Check(DRAWING, False, last[0], f"run: {_as_we_are(EGL_REMEDY)}")]
-    said = json_module.loads(tried.stdout)
-    if "error" in said:
-        result, _, remedy = said["error"].partition("; run: ")
-        return [Check(DRAWING, False, result, f"run: {_as_we_are(remedy or EGL_REMEDY)}")]
+def _check_drawing() -> list[Check]:
+    """Whether a test image is correct, rendered in a process of its own, which a broken driver may kill."""
+    process = stop.run([sys.executable, "-P", "-m", "vobench.rendering.self_test"])
+    if process.returncode != 0:
+        error_lines = process.stderr.strip().splitlines()
+        result = error_lines[-1] if error_lines else f"the test process died with {process.returncode}"
+        return [_failed_drawing(result, EGL_REMEDY)]
+    report = json_module.loads(process.stdout)
+    if "error" in report:
+        result, _, remedy = report["error"].partition("; run: ")
+        return [_failed_drawing(result, remedy or EGL_REMEDY)]
 
-    driver = "{renderer}, OpenGL {version}, device {device}".format(**said["driver"])
-    devices = Check("drawing devices", True, f"{', '.join(said['devices'])}; {DEVICE_VARIABLE} chooses", optional=True)
-    if not said["well"]:
-        return [_wrong_picture(driver, said), devices]
-    result = f"a test picture is right, by {driver}; light and truth are computed on the CPU"
+    driver = "{renderer}, OpenGL {version}, device {device}".format(**report["driver"])
+    device_names = ", ".join(report["devices"])
+    devices = Check("drawing devices", True, f"{device_names}; {DEVICE_VARIABLE} selects one", optional=True)
+    if not report["well"]:
+        return [_wrong_image(driver, report), devices]
+    result = f"a test image is correct, with {driver}; light and truth are computed on the CPU"
     return [Check(DRAWING, True, result), devices]
 
 
-def _wrong_picture(driver: str, said: dict[str, Any]) -> Check:
-    """A driver that draws, but not what geometry and photometry say."""
-    largest = 100 * said["largest_error"]
-    result = (
-        f"a test picture is wrong by up to {largest:.3g} %, stray light {said['stray_cd_m2']:.3g} cd/m², by {driver}"
-    )
-    remedy = f"update the driver, or set {DEVICE_VARIABLE} to another device ({', '.join(said['devices'])})"
+def _failed_drawing(result: str, remedy: str) -> Check:
+    return Check(DRAWING, False, result, f"run: {_with_sudo(remedy)}")
+
+
+def _wrong_image(driver: str, report: dict[str, Any]) -> Check:
+    """The check of a driver that renders, but not what geometry and photometry predict."""
+    error_percent = 100 * report["largest_error"]
+    stray_light = f"stray light {report['stray_cd_m2']:.3g} cd/m²"
+    result = f"a test image is wrong by up to {error_percent:.3g} %, {stray_light}, with {driver}"
+    remedy = f"update the driver, or set {DEVICE_VARIABLE} to another device ({', '.join(report['devices'])})"
     return Check(DRAWING, False, result, remedy)
 
 
-def _as_we_are(command: str) -> str:
+def _with_sudo(command: str) -> str:
+    """The command as this user can run it."""
     return command if os.geteuid() == 0 else command.replace("apt-get", "sudo apt-get")
 
 
-def _installed_drawing() -> list[Check]:
-    """Install Mesa's EGL with apt where we are root, and look again."""
+def _install_drawing() -> list[Check]:
+    """Install Mesa's EGL with apt if this user may, and check again."""
     if os.geteuid() != 0 or shutil.which("apt-get") is None:
-        return _drawing()
-    with terminal.Bars().step(f"apt-get install {' '.join(EGL_PACKAGES)}"):
-        # Without a word or a question; whether it helped, the next check tells.
-        environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
-        nowhere = subprocess.DEVNULL
-        for words in (["update"], ["install", "-y", "--no-install-recommends", *EGL_PACKAGES]):
-            command = ["apt-get", "-qq", *words]
-            subprocess.run(command, env=environment, check=False, stdin=nowhere, stdout=nowhere)
-    return _drawing()
+        return _check_drawing()
+    environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+    steps = (["update"], ["install", "-y", "--no-install-recommends", *EGL_PACKAGES])
+    with Bars().step(f"apt-get install {' '.join(EGL_PACKAGES)}"):
+        for step in steps:
+            # Its exit code does not matter: the next check shows whether it helped.
+            subprocess.run(
+                ["apt-get", "-qq", *step],
+                env=environment,
+                check=False,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+            )
+    return _check_drawing()
 
 
-def _cache() -> Check:
+def _check_cache() -> Check:
     root = cache_folder()
-    writable = not why_unwritable(root)
-    remedy = "set VOBENCH_CACHE to a folder that can be written"
-    return Check("cache", writable, str(root) if writable else f"cannot write {root}", remedy)
+    is_writable = not why_unwritable(root)
+    result = str(root) if is_writable else f"cannot write {root}"
+    return Check("cache", is_writable, result, "set VOBENCH_CACHE to a folder that can be written")
 
 
-def _sandbox() -> Check:
-    """Whether estimators can be kept from seeing the truth; they run all the same."""
-    saw = sandbox_here()
-    if saw.level == "full":
-        return Check("sandbox for estimators", True, "they see their own files and nothing else", optional=True)
+def _check_sandbox() -> Check:
+    """Whether estimators can be kept from reading the ground truth; they run without a sandbox, too."""
+    sandbox = sandbox_here()
+    if sandbox.level == "full":
+        return Check(SANDBOX, True, "estimators see their own files and nothing else", optional=True)
+    reason = f" ({sandbox.why})" if sandbox.why else ""
+    result = f"estimators can see {', '.join(sandbox.sees)}{reason}; every trial records this"
     remedy = "allow user namespaces: sysctl user.max_user_namespaces, kernel.apparmor_restrict_unprivileged_userns"
-    why = f" ({saw.why})" if saw.why else ""
-    seen = f"estimators can see {', '.join(saw.sees)}{why}; every trial records it"
-    return Check("sandbox for estimators", False, seen, remedy, True)
+    return Check(SANDBOX, False, result, remedy, optional=True)
 
 
-def _path_tracing() -> Check:
-    """Whether Mitsuba can render, tried in a process of its own: a wrong libLLVM would kill this one."""
+def _check_path_tracing() -> Check:
+    """Whether Mitsuba can render, in a process of its own, which a wrong libLLVM would kill."""
     try:
         library = mitsuba.working_library()
     except MissingDependencyError as error:
-        result, _, remedy = str(error).partition("; run: ")
-        return Check("path tracing (Mitsuba)", False, f"{result}; run: {_as_we_are(remedy)}", _as_we_are(remedy), True)
-    return Check("path tracing (Mitsuba)", True, f"works with {library}", optional=True)
+        result, _, command = str(error).partition("; run: ")
+        remedy = _with_sudo(command)
+        return Check(PATH_TRACING, False, f"{result}; run: {remedy}", remedy, optional=True)
+    return Check(PATH_TRACING, True, f"works with {library}", optional=True)

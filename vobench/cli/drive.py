@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from vobench.cli import terminal
+from vobench.cli.option import Json, SuiteName, Trust
 from vobench.errors import InputError
 from vobench.report.drive_plot import ENDINGS, log_of, save_plot
 from vobench.runner.drive import SuiteDrive, chosen_trajectories, drive_plan
@@ -21,43 +22,47 @@ HEADINGS = (
     "max m/s",
     "max °/s",
     "°/frame",
-    "wheels off m",
+    "wheel error m",
     "max V",
-    "legs end at s",
+    "targets reached at s",
 )
 
 
 def drive_command(
-    suite: terminal.SuiteName,
+    suite: SuiteName,
     *,
-    trajectory: Annotated[str | None, typer.Option("--trajectory", "-t", help="Only this one of the suite's.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Plot paths and speeds to this .svg, .png or .pdf.")] = None,
-    tum: Annotated[Path | None, typer.Option(help="Write the body's true path of one trajectory, as TUM.")] = None,
-    csv: Annotated[
-        Path | None, typer.Option(help="The same with speeds, wheels, references and voltages, as CSV.")
+    trajectory: Annotated[
+        str | None, typer.Option("--trajectory", "-t", help="Drive only this trajectory of the suite.")
     ] = None,
-    trust: terminal.Trust = False,
-    json: terminal.Json = False,
+    out: Annotated[Path | None, typer.Option(help="Plot paths and speeds to this .svg, .png or .pdf.")] = None,
+    tum: Annotated[
+        Path | None, typer.Option(help="Write the true path of the body on one trajectory, in TUM format.")
+    ] = None,
+    csv: Annotated[
+        Path | None, typer.Option(help="Write the path, speeds, wheels, references and voltages as CSV.")
+    ] = None,
+    trust: Trust = False,
+    json: Json = False,
 ) -> None:
-    """Drive a suite's trajectories without rendering: a summary, and plots."""
-    del trust  # done by its callback
+    """Drive the trajectories of a suite without rendering, and print a summary or plots."""
+    del trust  # its callback has the effect
     plan = read_plan(suite)
     names = chosen_trajectories(plan, trajectory=trajectory)
     _check_files(out, [path for path in (tum, csv) if path], names)
 
-    found = drive_plan(plan, trajectory=trajectory)
+    driven = drive_plan(plan, trajectory=trajectory)
     if out:
-        save_plot(out, [log_of(drive) for drive in found.drives])
+        save_plot(out, [log_of(drive) for drive in driven.drives])
     if tum:
-        tum.write_text(found.drives[0].tum(), encoding="utf-8")
+        tum.write_text(driven.drives[0].tum(), encoding="utf-8")
     if csv:
-        csv.write_text(found.drives[0].csv(), encoding="utf-8")
+        csv.write_text(driven.drives[0].csv(), encoding="utf-8")
 
     files = [str(path) for path in (out, tum, csv) if path]
     if json:
-        terminal.print_json({**found.as_dict(), "files": files})
+        terminal.print_json({**driven.as_dict(), "files": files})
     else:
-        _print(found, files)
+        _print_drives(driven, files)
 
 
 def _check_files(out: Path | None, exports: Sequence[Path], names: Sequence[str]) -> None:
@@ -65,17 +70,17 @@ def _check_files(out: Path | None, exports: Sequence[Path], names: Sequence[str]
     if out and out.suffix not in ENDINGS:
         raise InputError(f"--out should end in {', '.join(ENDINGS)}, got {out}")
     if exports and len(names) > 1:
-        raise InputError(f"--tum and --csv are for one trajectory; choose one with --trajectory: {', '.join(names)}")
+        raise InputError(f"--tum and --csv need one trajectory; choose one with --trajectory: {', '.join(names)}")
     for path in [out, *exports]:
         if path and (path.is_dir() or not path.parent.is_dir()):
-            raise InputError(f"should be a file in a folder that exists: {path}")
+            raise InputError(f"should be a file in an existing folder: {path}")
 
 
-def _print(found: SuiteDrive, files: Sequence[str]) -> None:
+def _print_drives(driven: SuiteDrive, files: Sequence[str]) -> None:
     console = terminal.console()
-    rows = [_row(facts) for facts in found.as_dict()["trajectories"]]
+    rows = [_row(facts) for facts in driven.as_dict()["trajectories"]]
     console.print(terminal.table("", HEADINGS, rows))
-    for sentence in found.refusals:
+    for sentence in driven.refusals:
         console.print(f"vobench run will refuse this: {sentence}")
     for file in files:
         console.print(file)
@@ -96,5 +101,5 @@ def _row(facts: dict[str, Any]) -> list[str]:
         f"{facts['max_turn_per_frame_deg']:.1f}",
         "" if wheel_error_m is None else f"{wheel_error_m:.3f}",
         "" if peak_V is None else f"{peak_V:.1f}",
-        " ".join(f"{at_s:.2f}" for at_s in reached_s),
+        " ".join(f"{time_s:.2f}" for time_s in reached_s),
     ]

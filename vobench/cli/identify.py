@@ -1,6 +1,7 @@
-"""Find theta in recorded drives: vobench identify."""
+"""vobench identify: the parameters θ of the Pioneer from recorded drives."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import astuple
 from pathlib import Path
 from typing import Annotated
@@ -8,6 +9,7 @@ from typing import Annotated
 import typer
 
 from vobench.cli import terminal
+from vobench.cli.option import Json
 from vobench.motion.pioneer import Theta
 from vobench.runner.identify import Identification, IdentifiedDrive, identify_drives
 
@@ -17,39 +19,44 @@ HEADINGS = ("name", *PARAMETERS, "u_ref rms m/s", "ω_ref rms °/s", "condition"
 
 def identify_command(
     path: Annotated[
-        Path, typer.Argument(metavar="PATH", help="A run's or a sequence's folder, or a CSV file of `vobench drive`.")
+        Path,
+        typer.Argument(metavar="PATH", help="The folder of a run or a sequence, or a CSV file of `vobench drive`."),
     ],
     *,
-    radius_m: Annotated[float | None, typer.Option(help="The wheels' radius, for a CSV; the Pioneer's.")] = None,
-    track_m: Annotated[float | None, typer.Option(help="The wheels' track, for a CSV; the Pioneer's.")] = None,
-    json: terminal.Json = False,
+    radius_m: Annotated[
+        float | None, typer.Option(help="The radius of the wheels, for a CSV file; the Pioneer's by default.")
+    ] = None,
+    track_m: Annotated[
+        float | None, typer.Option(help="The track of the wheels, for a CSV file; the Pioneer's by default.")
+    ] = None,
+    json: Json = False,
 ) -> None:
-    """Find theta in recorded drives of the Pioneer, from its wheels and what it was asked for; say what is left."""
-    found = identify_drives(path, radius_m=radius_m, track_m=track_m)
+    """Identify theta of the Pioneer from its wheels and speed commands in recorded drives, and print the residuals."""
+    identification = identify_drives(path, radius_m=radius_m, track_m=track_m)
     if json:
-        terminal.print_json(found.as_dict())
+        terminal.print_json(identification.as_dict())
     else:
-        _print(found)
+        _print_identification(identification)
 
 
-def _print(found: Identification) -> None:
-    rows = []
-    for drive in found.drives:
-        rows.append(_fitted_row(drive))
+def _print_identification(identification: Identification) -> None:
+    rows = list[Sequence[str]]()
+    for drive in identification.drives:
+        rows.append(_identified_row(drive))
         if drive.driven_theta:
-            rows.append(["  driven with", *_parameters(drive.driven_theta), "", "", ""])
+            rows.append(["  true value", *_parameter_cells(drive.driven_theta), "", "", ""])
     console = terminal.console()
     console.print(terminal.table("", HEADINGS, rows))
-    for name, sentence in found.failures.items():
+    for name, sentence in identification.failures.items():
         console.print(f"{name}: {sentence}")
 
 
-def _fitted_row(drive: IdentifiedDrive) -> list[str]:
+def _identified_row(drive: IdentifiedDrive) -> list[str]:
     fit = drive.fit
     omega_ref_rms_degps = math.degrees(fit.omega_ref_rms_radps)
     residuals = [f"{fit.u_ref_rms_mps:.4f}", f"{omega_ref_rms_degps:.3f}", f"{fit.condition:.1f}"]
-    return [drive.name, *_parameters(fit.theta), *residuals]
+    return [drive.name, *_parameter_cells(fit.theta), *residuals]
 
 
-def _parameters(theta: Theta) -> list[str]:
+def _parameter_cells(theta: Theta) -> list[str]:
     return [f"{value:.4f}" for value in astuple(theta)]

@@ -7,12 +7,16 @@ import typer
 
 from vobench.asset import MODEL_SUFFIXES
 from vobench.cli import terminal
+from vobench.cli.option import Json
 from vobench.errors import UnknownNameError, VobenchError, unknown
 from vobench.suite import catalog
 from vobench.suite.catalog import KINDS, Entry
+from vobench.suite.file_kind import Kind
 
-# The values of a top-level key `summary` that say the same without a YAML parser: on one line, in quotes without
-# escapes, or two words or more of plain text without a colon or a comment.
+COLUMNS = ("kind", "name", "summary", "origin", "path")
+
+# The top-level key `summary` with a value that needs no YAML parser: on one line, in quotes without escapes, or as two
+# words or more of plain text without a colon or a comment.
 QUOTED = r"""(?:"(?P<double>[^"\\\x00-\x1f]*)"|'(?P<single>[^'\x00-\x1f]*)') *$"""
 PLAIN = r"(?P<plain>[^\W\d_][^:#\x00-\x1f]* [^:#\x00-\x1f]*\w[.!?)]?) *$(?=\n+\S|\s*\Z)"
 SUMMARY = re.compile(rf"^summary: +(?:{QUOTED}|{PLAIN})", re.MULTILINE)
@@ -21,56 +25,81 @@ SUMMARY_KEY = re.compile(r"^[\"']?summary\b", re.MULTILINE)
 
 def list_command(
     kind: Annotated[
-        str | None, typer.Argument(metavar="[suites|scenes|estimators]", help="All where left out.")
+        str | None, typer.Argument(metavar="[suites|scenes|estimators]", help="The kind; all kinds if omitted.")
     ] = None,
     *,
-    json: terminal.Json = False,
+    json: Json = False,
 ) -> None:
-    """List the suites, scenes and estimators that can be found, and where."""
+    """List the suites, scenes and estimators that can be found, and where they are."""
     kinds = [known for known in KINDS if kind in (None, known, f"{known}s")]
     if not kinds:
-        raise UnknownNameError(unknown("kind", str(kind), [f"{known}s" for known in KINDS]))
-    facts = list[dict[str, Any]]()
-    seen = set[tuple[str, str]]()
-    for entry in (entry for wanted in kinds for entry in catalog.entries(wanted)):
-        fact = {"kind": entry.kind, "name": entry.name, "summary": _summary(entry), "origin": entry.origin}
-        # Where a name is there twice, the second is hidden by the first.
-        facts.append({**fact, "path": str(entry.path), "hidden": (entry.kind, entry.name) in seen})
-        seen.add((entry.kind, entry.name))
+        known_kinds = [f"{known}s" for known in KINDS]
+        raise UnknownNameError(unknown("kind", str(kind), known_kinds))
+    rows = list[dict[str, Any]]()
+    for each in kinds:
+        rows += _entry_rows(each)
     if json:
-        terminal.print_json({"entries": facts})
+        terminal.print_json({"entries": rows})
         return
-    columns = ["kind", "name", "summary", "origin", "path"]
-    rows = [[f[name] + (" (hidden)" if name == "name" and f["hidden"] else "") for name in columns] for f in facts]
-    terminal.console().print(terminal.table("", columns, rows))
+    cells = [_cells(row) for row in rows]
+    terminal.console().print(terminal.table("", COLUMNS, cells))
+
+
+def _entry_rows(kind: Kind) -> list[dict[str, Any]]:
+    """The facts about each entry of a kind. Of entries with one name, the first hides the others."""
+    rows = list[dict[str, Any]]()
+    names = set[str]()
+    for entry in catalog.entries(kind):
+        rows.append(
+            {
+                "kind": entry.kind,
+                "name": entry.name,
+                "summary": _summary(entry),
+                "origin": entry.origin,
+                "path": str(entry.path),
+                "hidden": entry.name in names,
+            }
+        )
+        names.add(entry.name)
+    return rows
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    name = f"{row['name']} (hidden)" if row["hidden"] else row["name"]
+    return [name if column == "name" else row[column] for column in COLUMNS]
 
 
 def _summary(entry: Entry) -> str:
-    """What the file says of itself; one that is read whole and cannot be says why."""
+    """The summary in an entry's file, or why the file cannot be read."""
     if entry.path.suffix in MODEL_SUFFIXES:
-        return "a model; vobench scene looks it over"
+        return "a model; inspect it with vobench scene"
+    match = SUMMARY.search(_text(entry))
+    if match and len(SUMMARY_KEY.findall(match.string)) == 1:
+        return next(value for value in match.groups() if value is not None)
     try:
-        path = entry.path / "estimator.yaml" if entry.kind == "estimator" else entry.path
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        text = ""
-    found = SUMMARY.search(text)
-    if found and len(SUMMARY_KEY.findall(text)) == 1:
-        return next(value for value in found.groups() if value is not None)
-    try:
-        return _checked_summary(entry)
+        return _parsed_summary(entry)
     except VobenchError as error:
-        more = len(error.mistakes) - 1
-        return f"unreadable: {error.mistakes[0]}{f' (and {more} more)' if more else ''}"
+        more_count = len(error.mistakes) - 1
+        more = f" (and {more_count} more)" if more_count else ""
+        return f"unreadable: {error.mistakes[0]}{more}"
 
 
-def _checked_summary(entry: Entry) -> str:
-    """The same by the checked models. Raises VobenchError."""
+def _text(entry: Entry) -> str:
+    """The text of an entry's file; empty if it cannot be read."""
+    path = entry.path / "estimator.yaml" if entry.kind == "estimator" else entry.path
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return ""
+
+
+def _parsed_summary(entry: Entry) -> str:
+    """The summary in an entry's file, which is parsed and checked as a whole. Raises VobenchError."""
     from vobench.suite import yaml_file
     from vobench.suite.manifest import read_manifest
     from vobench.suite.scenario import ScenarioFile
     from vobench.suite.scene_file import read_scene
-    from vobench.suite.suite import Suite
+    from vobench.suite.suite_spec import Suite
 
     if entry.kind == "estimator":
         return read_manifest(entry.path).described

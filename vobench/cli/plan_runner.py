@@ -1,9 +1,10 @@
-"""How commands that run variants of a case or a twin have them run: as `vobench run` does."""
+"""Runs variants of a case or a twin as `vobench run` does."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vobench.cli import terminal
+from vobench.cli.progress import Bars
+from vobench.cli.run_display import TerminalDisplay
 from vobench.runner import launch
 from vobench.runner.plan_runner import PlanRunner
 
@@ -12,14 +13,14 @@ if TYPE_CHECKING:
 
 
 def plan_runner(*, out: Path, jobs: int, finish: "Finish | None" = None) -> PlanRunner:
-    """Return what runs a plan in a new folder below `out`, `jobs` tasks at once, and shows its progress.
+    """A function that runs a plan in a new folder below `out` with `jobs` parallel tasks, and shows its progress.
 
     `finish` adds reports to the folder of the run; by default there are none.
     """
     return launch.plan_runner(
         out=out,
         jobs=jobs,
-        make_display=lambda: terminal.TerminalDisplay(is_serial=jobs == 1),
+        make_display=lambda: TerminalDisplay(is_serial=jobs == 1),
         finish=finish,
-        task_progress=terminal.Bars(),
+        task_progress=Bars(),
     )

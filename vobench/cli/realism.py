@@ -1,4 +1,4 @@
-"""How real pictures are: vobench realism."""
+"""vobench realism: how realistic images are."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,31 +8,29 @@ import typer
 from vobench.analysis.realism import OFFSET_BAND_PX, Realism, residual
 from vobench.analysis.realism_report import RealismReport, measure_realism
 from vobench.cli import terminal
-from vobench.cli.sequence import Calibration, Form, FormCommand, Rate, TopicOf, Truth, topics_of
-from vobench.dataset.recording import ReadOptions
+from vobench.cli.option import Json, with_option_groups
+from vobench.cli.recording_option import FormCommand, RecordingOptions
 
 COMMAND_CLASS = FormCommand
 
 
+@with_option_groups
 def realism_command(
     path: Annotated[
-        Path, typer.Argument(metavar="PATH", help="A sequence, a run's case, a dataset's folder, or a bag.")
+        Path, typer.Argument(metavar="PATH", help="A sequence, the case of a run, the folder of a dataset, or a bag.")
     ],
     *,
     against: Annotated[
-        Path | None, typer.Option(help="Put this recording in the bands' place; its form is told by content.")
+        Path | None,
+        typer.Option(help="Compare with this recording instead of the bands of real ones; detected from content."),
     ] = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw the statistics to this .png, .svg or .pdf.")] = None,
-    form: Form = None,
-    calibration: Calibration = None,
-    truth: Truth = None,
-    rate: Rate = None,
-    topic: TopicOf = None,
-    json: terminal.Json = False,
+    plot: Annotated[Path | None, typer.Option(help="Plot the statistics to this .png, .svg or .pdf.")] = None,
+    recording_options: RecordingOptions,
+    json: Json = False,
 ) -> None:
-    """Say how real pictures are, how far the pair is off from its calibration, and which knob moves what."""
-    options = ReadOptions(calibration=calibration, truth=truth, rate_hz=rate, topics=topics_of(topic))
-    report = measure_realism(path, against=against, form=form, options=options)
+    """Measure how realistic images are, how large the calibration error is, and which settings change what."""
+    options = recording_options.read_options()
+    report = measure_realism(path, against=against, form=recording_options.form, options=options)
     if plot:
         _save_plot(plot, report)
     if json:
@@ -44,55 +42,56 @@ def realism_command(
 def _save_plot(file: Path, report: RealismReport) -> None:
     from vobench.report.realism_plot import save_plot
 
-    drawn = {report.path.name: report.found}
+    realism_by_name = {report.path.name: report.found}
     if report.against_path and report.against:
-        drawn[report.against_path.name] = report.against
-    save_plot(file, drawn)
+        realism_by_name[report.against_path.name] = report.against
+    save_plot(file, realism_by_name)
 
 
 def _print(report: RealismReport) -> None:
-    found = report.found
+    realism = report.found
     console = terminal.console()
-    in_bands = f"{found.inside} of {len(found.values)} statistics in their bands"
-    title = f"{report.path}: {in_bands}, by {found.pictures} pictures"
-    headings = ["statistic", "value", "unit", "against" if report.against else "real ones", "is", "moved by"]
+    band_count = f"{realism.inside} of {len(realism.values)} statistics in their bands"
+    title = f"{report.path}: {band_count}, measured on {realism.pictures} images"
+    reference = "against" if report.against else "real ones"
+    headings = ["statistic", "value", "unit", reference, "is", "changed by"]
     console.print(terminal.table(title, headings, [_row(row) for row in report.rows()]))
-    for line in _more(found):
+    for line in _other_measurements(realism):
         console.print(line)
     for sentence in report.sentences():
         console.print(sentence)
-    error = residual(found.pair) if found.pair else {}
+    error = residual(realism.pair) if realism.pair else {}
     if error:
         entries = ", ".join(f"{name}: {value:g}" for name, value in error.items())
-        console.print(f"A rig with this error: calibration_error: {{{entries}}}")
+        console.print(f"To give a rig this error: calibration_error: {{{entries}}}")
 
 
 def _row(row: dict[str, Any]) -> list[str]:
-    return [row["statistic"], f"{row['value']:.2f}", row["unit"], _band(row), row["is"], row["knob"]]
+    return [row["statistic"], f"{row['value']:.2f}", row["unit"], _reference(row), row["is"], row["knob"]]
 
 
-def _band(row: dict[str, Any]) -> str:
+def _reference(row: dict[str, Any]) -> str:
     """The band of a statistic, or its value in the other recording."""
     if "against" not in row:
         return f"{row['low']:g} … {row['high']:g}"
     return "" if row["against"] is None else f"{row['against']:.2f}"
 
 
-def _more(found: Realism) -> list[str]:
-    """What else is measured of the pictures and of the pair, a line each."""
+def _other_measurements(realism: Realism) -> list[str]:
+    """Measurements of the images and of the stereo pair that have no band, a line each."""
     lines = [
-        f"noise where flat: {found.also['noise_dn']:.2f} DN",
-        f"sharpest edges: {found.also['edge_px']:.1f} px",
-        f"flow: {found.also['flow_px']:.1f} px a picture",
+        f"noise in uniform areas: {realism.also['noise_dn']:.2f} DN",
+        f"sharpest edges: {realism.also['edge_px']:.1f} px",
+        f"flow: {realism.also['flow_px']:.1f} px per image",
     ]
-    pair = found.pair
+    pair = realism.pair
     if pair is None:
         return lines
-    disparities = ", ".join(f"{each:.1f}" for each in pair.disparity_px)
-    lines.append(f"disparity: {disparities} px (a tenth, half and nine tenths of the matches are below)")
-    lines.append(f"gain of the right eye: {pair.gain:.3f}")
+    disparities = ", ".join(f"{disparity_px:.1f}" for disparity_px in pair.disparity_px)
+    lines.append(f"disparity: {disparities} px (10th, 50th and 90th percentile)")
+    lines.append(f"gain of the right camera: {pair.gain:.3f}")
     if pair.offset_px:
         low, high = OFFSET_BAND_PX
         offset = f"{pair.offset_px.value:+.2f} ± {pair.offset_px.sigma:.2f} px"
-        lines.append(f"offset of disparity: {offset} (real pairs: {low:g} … {high:g} either way)")
+        lines.append(f"disparity offset: {offset} (real pairs: magnitude {low:g} … {high:g} px)")
     return lines

@@ -1,4 +1,4 @@
-"""Draw one picture of a scene: vobench render."""
+"""vobench render."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,50 +6,66 @@ from typing import Annotated
 import typer
 
 from vobench.cli import terminal
-from vobench.errors import InputError
+from vobench.cli.option import Json, Trust, option_group, with_option_groups
+from vobench.cli.png_file import require_png
+from vobench.cli.progress import Bars
 from vobench.runner.scene_picture import render_scene
 from vobench.setting import Triple
 
 
-def render_command(
-    scene: Annotated[str, typer.Argument(metavar="SCENE", help="A scene's name, or a path to its YAML.")],
-    *,
-    out: Annotated[Path, typer.Option(help="The picture to write.")] = Path("frame.png"),
-    camera: Annotated[str, typer.Option(help="The left lens of this rig preset.")] = "paper_blender",
-    at: Annotated[Triple, typer.Option(metavar="X Y Z", help="Where it stands, in metres.")] = (0.0, 0.0, 1.2),
-    yaw: Annotated[float, typer.Option(help="Where it looks, in degrees: 0 along x, 90 along y.")] = 0.0,
-    pitch: Annotated[float, typer.Option(help="How far below the horizon it looks, in degrees.")] = 10.0,
-    time: Annotated[float, typer.Option(help="When, in seconds; lights and things may move.")] = 0.0,
-    sensor: Annotated[str, typer.Option(help="The chip behind the lens.")] = "clean",
-    gain: Annotated[float, typer.Option(min=1e-6, help="Multiplies the exposure.")] = 1.0,
+@option_group
+class CameraOptions:
+    """The camera, its pose and its exposure."""
+
+    camera: Annotated[str, typer.Option(help="A rig preset, whose left camera is used.")] = "paper_blender"
+    at: Annotated[Triple, typer.Option(metavar="X Y Z", help="The position of the camera in metres.")] = (0.0, 0.0, 1.2)
+    yaw: Annotated[float, typer.Option(help="The yaw of the camera in degrees: 0 along x, 90 along y.")] = 0.0
+    pitch: Annotated[float, typer.Option(help="The pitch of the camera in degrees below the horizon.")] = 10.0
+    time: Annotated[float, typer.Option(help="The time in seconds, for lights and things that change.")] = 0.0
+    sensor: Annotated[str, typer.Option(help="The preset of the image sensor.")] = "clean"
+    gain: Annotated[float, typer.Option(min=1e-6, help="A factor of the exposure.")] = 1.0
+
+
+@option_group
+class EngineOptions:
+    """The engine that renders the image."""
+
     engine: Annotated[
-        str, typer.Option(help="raster; path, Mitsuba's path tracer; or pyrender, as it comes.")
-    ] = "raster",
-    samples: Annotated[int | None, typer.Option(help="Light paths a pixel, for --engine path alone.")] = None,
-    truth: Annotated[bool, typer.Option("--truth", help="Write ground truth beside the picture.")] = False,
-    trust: terminal.Trust = False,
-    json: terminal.Json = False,
+        str, typer.Option(help="raster; path, Mitsuba's path tracer; or pyrender, the stock renderer.")
+    ] = "raster"
+    samples: Annotated[int | None, typer.Option(help="Light paths per pixel, with --engine path.")] = None
+
+
+@with_option_groups
+def render_command(
+    scene: Annotated[str, typer.Argument(metavar="SCENE", help="The name of a scene, or the path of its YAML.")],
+    *,
+    out: Annotated[Path, typer.Option(help="The image to write.")] = Path("frame.png"),
+    camera_options: CameraOptions,
+    engine_options: EngineOptions,
+    truth: Annotated[bool, typer.Option("--truth", help="Write ground truth beside the image.")] = False,
+    trust: Trust = False,
+    json: Json = False,
 ) -> None:
-    """Draw one picture of a scene, to look at and to debug scenes with."""
-    del trust  # done by its callback
-    if out.suffix != ".png" or out.is_dir() or not out.parent.is_dir():
-        raise InputError(f"--out should be a .png in a folder that exists, got {out}")
-    drawn = render_scene(
+    """Render one image of a scene, to inspect and debug it."""
+    del trust  # its callback has the effect
+    require_png(out)
+    image = render_scene(
         scene,
-        camera=camera,
-        at_m=at,
-        yaw_deg=yaw,
-        pitch_deg=pitch,
-        time_s=time,
-        sensor=sensor,
-        gain=gain,
-        engine=engine,
-        samples=samples,
+        camera=camera_options.camera,
+        at_m=camera_options.at,
+        yaw_deg=camera_options.yaw,
+        pitch_deg=camera_options.pitch,
+        time_s=camera_options.time,
+        sensor=camera_options.sensor,
+        gain=camera_options.gain,
+        engine=engine_options.engine,
+        samples=engine_options.samples,
         with_truth=truth,
-        progress=terminal.Bars(),
+        progress=Bars(),
     )
-    written = [str(path) for path in drawn.save(out)]
+    files = [str(path) for path in image.save(out)]
     if json:
-        terminal.print_json({"files": written})
+        terminal.print_json({"files": files})
     else:
-        print("\n".join(written))
+        print("\n".join(files))

@@ -1,47 +1,98 @@
-"""vobench run, check and schema."""
+"""vobench run."""
 
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from vobench.cli import terminal
+from vobench.cli.check import print_summary
+from vobench.cli.option import Json, SuiteName, Trust, option_group, with_option_groups
+from vobench.cli.progress import Bars
+from vobench.cli.run_display import TerminalDisplay
 from vobench.errors import InputError
-from vobench.estimator.manifest import Manifest
 from vobench.runner.launch import run_plan
 from vobench.runner.motion import cut
-from vobench.runner.preflight import PlanSummary, summarize
+from vobench.runner.preflight import summarize
 from vobench.runner.store import SilentProgress
-from vobench.suite.scenario import ScenarioFile
-from vobench.suite.scene_spec import SceneFile
-from vobench.suite.suite import Suite, read_plan
-from vobench.suite.yaml_file import json_schema
+from vobench.suite.plan import Plan
+from vobench.suite.suite import read_plan
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from vobench.report.leaderboard import Board
+    from vobench.runner.folder import RunFolder
 
-FAILED_LIMIT = 3  # exit code where a limit of --fail-if is broken
+INCOMPLETE_RUN = 1  # exit codes
+BROKEN_LIMIT = 3
 
 
-def run_command(
-    suite: terminal.SuiteName,
-    *,
+@option_group
+class Selection:
+    """Which trials of the suite are run."""
+
     estimator: Annotated[
         list[str] | None,
-        typer.Option("--estimator", "-e", help="Run only this one, or those that match; may be given several times."),
-    ] = None,
+        typer.Option("--estimator", "-e", help="Run only this estimator, or those that match; can be repeated."),
+    ] = None
     case: Annotated[
-        list[str] | None, typer.Option("--case", "-c", help="Only cases that match, as in 'dark*'.")
-    ] = None,
-    scene: Annotated[list[str] | None, typer.Option("--scene", "-s", help="Only scenes that match.")] = None,
-    repeats: Annotated[int | None, typer.Option("--repeats", "-n", help="Run each trial so often.")] = None,
+        list[str] | None,
+        typer.Option("--case", "-c", help="Run only cases that match, as in 'dark*'; can be repeated."),
+    ] = None
+    scene: Annotated[
+        list[str] | None, typer.Option("--scene", "-s", help="Run only scenes that match; can be repeated.")
+    ] = None
+
+    def read_plan(self, suite: str, changes: Mapping[str, str]) -> Plan:
+        """The plan of a suite, restricted to these trials. Raises SuiteError or UnknownNameError."""
+        plan = read_plan(suite, only_estimators=tuple(self.estimator or ()), changes=changes)
+        return plan.only(self.case or (), self.scene or ())
+
+
+@option_group
+class Changes:
+    """What is changed in the suite."""
+
+    repeats: Annotated[int | None, typer.Option("--repeats", "-n", help="Run each trial this many times.")] = None
     changes: Annotated[
-        list[str] | None, typer.Option("--set", help="Put a value in place of the suite's, as in seed=3.")
-    ] = None,
-    out: Annotated[Path, typer.Option(help="Where the folders of runs go.")] = Path("runs"),
+        list[str] | None, typer.Option("--set", help="Replace a value of the suite, as in seed=3; can be repeated.")
+    ] = None
+
+    def values(self) -> dict[str, str]:
+        """The changed values in YAML, by their keys joined by dots. Raises InputError."""
+        assignments = list(self.changes or ())
+        if self.repeats:
+            assignments.append(f"repeats={self.repeats}")
+        return _split_assignments(assignments)
+
+
+@option_group
+class TrialLimits:
+    """Limits of each trial."""
+
+    limit: Annotated[
+        int | None, typer.Option(min=2, help="Use only this many frames of each simulated case, from the first on.")
+    ] = None
+    timeout: Annotated[float | None, typer.Option(min=0.001, help="Seconds that a whole trial may take.")] = None
+    memory: Annotated[int | None, typer.Option(min=1, help="MiB that the processes of an estimator may use.")] = None
+
+    def apply(self, plan: Plan) -> Plan:
+        """The plan with these limits."""
+        limits = dict[str, Any]()
+        if self.timeout is not None:
+            limits["trial_s"] = self.timeout
+        if self.memory is not None:
+            limits["memory_mib"] = self.memory
+        limited = plan.limited(**limits)
+        return cut(limited, self.limit) if self.limit else limited
+
+
+@option_group
+class Execution:
+    """Where and how tasks are performed."""
+
     jobs: Annotated[
         int | None,
         typer.Option(
@@ -49,151 +100,137 @@ def run_command(
             "-j",
             min=1,
             envvar="VOBENCH_JOBS",
-            help="Tasks at once; one a core by default, 8 at most.",
+            help="The number of parallel tasks; by default one per core, at most 8.",
         ),
-    ] = None,
+    ] = None
     scheduler: Annotated[
-        str | None, typer.Option(help="Let the workers of a Dask scheduler do it, as in tcp://host:8786.")
-    ] = None,
+        str | None, typer.Option(help="Use the workers of a Dask scheduler, as in tcp://host:8786.")
+    ] = None
     share_time: Annotated[
-        bool, typer.Option("--share-time", help="Let estimators run beside other tasks; the board says so.")
-    ] = False,
+        bool,
+        typer.Option("--share-time", help="Let estimators run in parallel with other tasks; the board notes this."),
+    ] = False
+    fresh: Annotated[bool, typer.Option("--fresh", help="Compute everything again, even what is in the cache.")] = False
+
+    @property
+    def is_serial(self) -> bool:
+        """Whether tasks are performed one by one in this process."""
+        return self.jobs == 1 and not self.scheduler
+
+
+@option_group
+class ProgressOptions:
+    """What is shown and logged while the suite runs."""
+
     events: Annotated[
-        Path | None, typer.Option(help="Write what happens to each task here, a JSON object a line.")
-    ] = None,
+        Path | None, typer.Option(help="Log the events of all tasks to this file, one JSON object a line.")
+    ] = None
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only failures, no progress.")] = False
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print a line for each finished task.")] = False
+
+
+@with_option_groups
+def run_command(
+    suite: SuiteName,
+    *,
+    selection: Selection,
+    changes: Changes,
+    limits: TrialLimits,
+    execution: Execution,
+    progress: ProgressOptions,
+    out: Annotated[Path, typer.Option(help="The folder for the runs.")] = Path("runs"),
     fail_if: Annotated[
-        list[str] | None, typer.Option("--fail-if", help="End with code 3 if so, as in 'ate_trans.rmse > 0.2'.")
+        list[str] | None,
+        typer.Option("--fail-if", help="Exit with code 3 if this holds, as in 'ate_trans.rmse > 0.2'."),
     ] = None,
-    limit: Annotated[int | None, typer.Option(min=2, help="Frames of each simulated case, from its first on.")] = None,
-    timeout: Annotated[float | None, typer.Option(min=0.001, help="Seconds that a whole trial may take.")] = None,
-    memory: Annotated[int | None, typer.Option(min=1, help="MiB that an estimator's processes may hold.")] = None,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Make everything anew, whatever the cache holds.")] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress, only failures.")] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print a line for each finished task.")] = False,
-    trust: terminal.Trust = False,
-    json: terminal.Json = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print what would be run, and stop.")] = False,
+    trust: Trust = False,
+    json: Json = False,
 ) -> None:
     """Run a suite: simulate, estimate, score, and print the leaderboard."""
-    del trust  # done by its callback
+    del trust  # its callback has the effect
     from vobench.report.threshold import parse_threshold
 
-    assignments = [*(changes or ()), *([f"repeats={repeats}"] if repeats else [])]
     thresholds = [parse_threshold(text) for text in fail_if or ()]
-    planned = read_plan(suite, only_estimators=tuple(estimator or ()), changes=_assigned(assignments))
-    planned = planned.only(case or (), scene or ())
-    limits = {"trial_s": timeout, "memory_mib": memory}
-    planned = planned.limited(**{name: value for name, value in limits.items() if value is not None})
-    terminal.say_hidden(planned.found)
-    if limit:
-        planned = cut(planned, limit)
+    plan = selection.read_plan(suite, changes.values())
+    terminal.warn_about_hidden(plan.found)
+    plan = limits.apply(plan)
     if dry_run:
-        _print_summary(summarize(planned, with_stages=True), as_json=json)
+        print_summary(summarize(plan, with_stages=True), as_json=json)
         return
 
-    from vobench.cli.report import print_board
     from vobench.report import page
-    from vobench.report.board_records import as_json as board_as_json
-    from vobench.runner.run import BESIDE
 
-    is_serial = jobs == 1 and not scheduler
-    folder = run_plan(
-        planned,
-        out=out,
-        finish=page.write_reports,
-        display=terminal.TerminalDisplay(events, is_serial=is_serial, is_quiet=quiet, is_verbose=verbose),
-        jobs=jobs,
-        scheduler=scheduler,
-        task_progress=SilentProgress() if quiet else terminal.Bars(),
-        shares_time=share_time,
-        is_fresh=fresh,
-    )
+    folder = _run(plan, out, execution, progress)
     scores = folder.scores()
     board = page.board_of(folder, scores)
-    broken = [line for threshold in thresholds for line in threshold.broken_by(scores)]
-    if json:
+    _print_board(board, as_json=json)
+    if not json:
+        _print_remarks(folder, shares_time=execution.share_time or plan.suite.share_time)
+
+    broken_limits = list[str]()
+    for threshold in thresholds:
+        broken_limits += threshold.broken_by(scores)
+    for sentence in broken_limits:
+        terminal.warn(sentence)
+    if board.unmade:  # an incomplete run fails, whatever the thresholds are
+        raise typer.Exit(INCOMPLETE_RUN)
+    if broken_limits:
+        raise typer.Exit(BROKEN_LIMIT)
+
+
+def _run(plan: Plan, out: Path, execution: Execution, progress: ProgressOptions) -> "RunFolder":
+    """Run a plan with progress on the terminal; return the folder of the run."""
+    from vobench.report import page
+
+    display = TerminalDisplay(
+        progress.events,
+        is_serial=execution.is_serial,
+        is_quiet=progress.quiet,
+        is_verbose=progress.verbose,
+    )
+    return run_plan(
+        plan,
+        out=out,
+        finish=page.write_reports,
+        display=display,
+        jobs=execution.jobs,
+        scheduler=execution.scheduler,
+        task_progress=SilentProgress() if progress.quiet else Bars(),
+        shares_time=execution.share_time,
+        is_fresh=execution.fresh,
+    )
+
+
+def _print_board(board: "Board", *, as_json: bool) -> None:
+    if as_json:
+        from vobench.report.board_records import as_json as board_as_json
+
         print(board_as_json(board), end="")
     else:
+        from vobench.cli.board import print_board
+
         print_board(board)
-        if share_time or planned.suite.share_time:
-            terminal.console().print(f"CPU times of this run were taken {BESIDE}.")
-        vobench = "vobench" if shutil.which("vobench") else sys.argv[0]  # where the environment is not activated
-        terminal.console().print(f"Everything is in {folder.path}\nLook into it: {vobench} view {folder.path}")
-    for line in broken:
-        print(f"vobench: {line}", file=sys.stderr)
-    if board.unmade:  # the run is incomplete, whatever the thresholds say
-        raise typer.Exit(1)
-    if broken:
-        raise typer.Exit(FAILED_LIMIT)
 
 
-def _assigned(changes: Sequence[str]) -> dict[str, str]:
-    """key=value by key. Raises InputError."""
-    for change in changes:
-        if "=" not in change:
-            raise InputError(f"--set should be key=value, as in rigs.ahead.pitch_deg=20, got {change!r}")
-    return dict(change.split("=", 1) for change in changes)
+def _print_remarks(folder: "RunFolder", *, shares_time: bool) -> None:
+    """Print where the results of a run are, and what affects its CPU times."""
+    from vobench.runner.run import BESIDE
+
+    console = terminal.console()
+    if shares_time:
+        console.print(f"CPU times of this run were measured {BESIDE}.")
+    is_on_path = shutil.which("vobench") is not None
+    command = "vobench" if is_on_path else sys.argv[0]
+    console.print(f"Everything is in {folder.path}\nView it: {command} view {folder.path}")
 
 
-def check_command(suite: terminal.SuiteName, *, trust: terminal.Trust = False, json: terminal.Json = False) -> None:
-    """Validate a suite and print its plan; nothing is rendered."""
-    del trust  # done by its callback
-    _print_summary(summarize(read_plan(suite)), as_json=json)
-
-
-def _print_summary(summary: PlanSummary, *, as_json: bool) -> None:
-    """Print what a suite comes to; after a dry run also what is to be done for it."""
-    if as_json:
-        terminal.print_json(summary.as_dict())
-        return
-    out = terminal.console()
-    suite = summary.plan.suite.name
-    cases = [[case.case, str(case.frames), f"{case.duration_s:.1f}", case.sequence] for case in summary.cases]
-    out.print(terminal.table(f"{suite}: cases", ["case", "frames", "seconds", "sequence"], cases))
-    estimators = [
-        [row["estimator"], row["version"], ", ".join(row["needs"]) or "nothing"] for row in summary.estimators()
-    ]
-    out.print(terminal.table("estimators", ["estimator", "version", "needs"], estimators))
-    found = [list(row.values()) for row in summary.found()]
-    out.print(terminal.table("found", ["kind", "name", "origin", "path"], found))
-    for case in summary.cases:
-        for note in case.notes or ():
-            out.print(f"{case.case}: {note}")
-    if summary.stages is not None:
-        _print_stages(summary.tasks(), out)
-    out.print(f"{len(cases)} cases, {len(estimators)} estimators, {summary.trials} trials: the suite is valid")
-
-
-def _print_stages(stages: list[dict[str, Any]], out: "Console") -> None:
-    rows = [
-        [row["stage"], str(row["tasks"]), str(row["in the cache"]), str(row["to do"]), _spell_seconds(row["seconds"])]
-        for row in stages
-    ]
-    out.print(terminal.table("tasks", ["stage", "tasks", "in the cache", "to do", "about"], rows))
-    for row in stages:
-        for reason, count in row["reasons"].items():
-            out.print(f"{row['stage']}: {count} to do: {reason}", highlight=False)
-
-
-def _spell_seconds(seconds: float | None) -> str:
-    """So many seconds of one core's work; empty where nothing is known."""
-    if seconds is None:
-        return ""
-    return f"{seconds:.0f} s" if seconds < SHORT_S else f"{seconds / 60:.0f} min"
-
-
-SHORT_S = 600  # spelled in seconds below, in minutes from there on
-
-
-FILES = {"suite": Suite, "scenario": ScenarioFile, "scene": SceneFile, "estimator": Manifest}
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
-
-
-def schema_command(
-    kind: Annotated[str, typer.Argument(metavar="[suite|scenario|scene|estimator]", help="Kind of file.")] = "suite",
-    *,
-    json: Annotated[bool, typer.Option("--json", help="It is JSON in any case.")] = False,
-) -> None:
-    """Print the JSON Schema of a suite's, scenario's, scene's or estimator's YAML, for editors and other programs."""
-    del json
-    terminal.print_json({"$schema": DIALECT, **json_schema(FILES[terminal.known("schema", kind, FILES)])})
+def _split_assignments(assignments: Sequence[str]) -> dict[str, str]:
+    """The values of key=value by key. Raises InputError."""
+    value_by_key = dict[str, str]()
+    for assignment in assignments:
+        key, equals_sign, value = assignment.partition("=")
+        if not equals_sign:
+            raise InputError(f"--set should be key=value, as in rigs.ahead.pitch_deg=20, got {assignment!r}")
+        value_by_key[key] = value
+    return value_by_key

@@ -1,4 +1,4 @@
-"""Look a scene or a model over: vobench scene."""
+"""vobench scene."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,23 +7,29 @@ import typer
 
 from vobench.analysis.scene_report import survey_scene
 from vobench.cli import terminal
-from vobench.errors import InputError
+from vobench.cli.option import Json, Trust
+from vobench.cli.png_file import require_png
+from vobench.cli.progress import Bars
 
 
 def scene_command(
-    scene: Annotated[str, typer.Argument(metavar="SCENE", help="A scene's name, a path to it, or a model's file.")],
+    scene: Annotated[
+        str, typer.Argument(metavar="SCENE", help="The name of a scene, or the path of its YAML or of a model.")
+    ],
     *,
-    out: Annotated[Path | None, typer.Option(help="Draw a plan and four views to this PNG; light is computed.")] = None,
-    trust: terminal.Trust = False,
-    json: terminal.Json = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Draw a plan and four views to this PNG, with computed light.")
+    ] = None,
+    trust: Trust = False,
+    json: Json = False,
 ) -> None:
-    """Say what is in a scene, where a body can drive, and what is doubtful in its models."""
-    del trust  # done by its callback
-    if out and (out.suffix != ".png" or out.is_dir() or not out.parent.is_dir()):
-        raise InputError(f"--out should be a .png in a folder that exists, got {out}")
+    """Print what is in a scene, where a body can drive, and what looks wrong in its models."""
+    del trust  # its callback has the effect
+    if out:
+        require_png(out)
     report = survey_scene(scene)
     if out:
-        report.save_picture(out, progress=terminal.Bars())
+        report.save_picture(out, progress=Bars())
     if json:
         terminal.print_json(report.as_dict())
     else:

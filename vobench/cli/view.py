@@ -1,49 +1,74 @@
-"""vobench view: trials in Rerun."""
+"""vobench view."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from vobench.cli import terminal
+from vobench.cli.option import Json, RunPath, option_group, with_option_groups
 from vobench.errors import InputError
 from vobench.report.rerun import PictureForm
 from vobench.report.viewer import Recording, open_viewer, save_recordings
 from vobench.runner.folder import open_run
 
-FORMS: tuple[PictureForm, ...] = ("jpeg", "png")
+IMAGE_FORMS: dict[str, PictureForm] = {"jpeg": "jpeg", "png": "png"}
 
 
-def view_command(
-    run: terminal.RunPath,
-    *,
+@option_group
+class TrialSelection:
+    """Which trials of the run are shown."""
+
     case: Annotated[
-        str | None, typer.Option(help="The case; the gravest failure or the worst error where left out.")
-    ] = None,
+        str | None, typer.Option(help="The case; by default that of the worst failure or the largest error.")
+    ] = None
     estimator: Annotated[
-        str | None, typer.Option(help="The estimator; a failed one where left out, else the best.")
-    ] = None,
+        str | None, typer.Option(help="The estimator; by default one that failed, or else the best.")
+    ] = None
     compare: Annotated[
-        tuple[str, str] | None, typer.Option(metavar="A B", help="Two estimators side by side, at the worst of A.")
-    ] = None,
-    worst: Annotated[int, typer.Option(min=1, help="So many trials, the gravest failure first.")] = 1,
-    frames: Annotated[str | None, typer.Option(metavar="A:B", help="Only these frames, as in 40:80.")] = None,
-    pictures: Annotated[str, typer.Option(help="jpeg, small; or png, to the last bit.")] = "jpeg",
+        tuple[str, str] | None,
+        typer.Option(metavar="A B", help="Two estimators side by side, on the worst case of A."),
+    ] = None
+    worst: Annotated[int, typer.Option(min=1, help="The number of trials, the worst failure first.")] = 1
+    frames: Annotated[
+        str | None, typer.Option(metavar="A:B", help="Only the frames from A up to, not including, B, as in 40:80.")
+    ] = None
+
+    def require_consistent(self) -> None:
+        """Raise InputError if --compare is combined with options that it replaces."""
+        if self.compare and (self.estimator or self.worst > 1):
+            raise InputError("--compare names two estimators on one case; remove --estimator and --worst")
+
+    def window(self) -> slice:
+        """The frames that are shown. Raises InputError."""
+        first, colon, end = (self.frames or ":").partition(":")
+        are_numbers = all(part.isdigit() for part in (first, end) if part)
+        if not colon or not are_numbers:
+            raise InputError(f"--frames should be A:B, two frame numbers, as in 40:80 (got {self.frames!r})")
+        return slice(int(first) if first else None, int(end) if end else None)
+
+
+@with_option_groups
+def view_command(
+    run: RunPath,
+    *,
+    selection: TrialSelection,
+    pictures: Annotated[str, typer.Option(help="The form of the images: jpeg, smaller; or png, lossless.")] = "jpeg",
     save: Annotated[Path | None, typer.Option(help="Write this .rrd instead of opening the viewer.")] = None,
-    web: Annotated[bool, typer.Option("--web", help="Show it in a browser, served on this machine alone.")] = False,
-    json: terminal.Json = False,
+    web: Annotated[bool, typer.Option("--web", help="Show it in a browser, served on this machine only.")] = False,
+    json: Json = False,
 ) -> None:
-    """Open one run in Rerun, failures first."""
-    form: PictureForm = "png" if terminal.known("form of pictures", pictures, FORMS) == "png" else "jpeg"
-    if compare and (estimator or worst > 1):
-        raise InputError("--compare names its estimators, of one case; leave out --estimator and --worst")
+    """Show a run in Rerun, failures first."""
+    form = IMAGE_FORMS[terminal.known("form of pictures", pictures, IMAGE_FORMS)]
+    selection.require_consistent()
     recordings = save_recordings(
         open_run(run),
-        case=case,
-        estimator=estimator,
-        compare=compare,
-        worst=worst,
-        window=_window(frames),
+        case=selection.case,
+        estimator=selection.estimator,
+        compare=selection.compare,
+        worst=selection.worst,
+        window=selection.window(),
         form=form,
         save=save,
     )
@@ -51,36 +76,31 @@ def view_command(
         terminal.print_json(_facts(recordings))
         return
     for recording in recordings:
-        told = " and ".join(f"{trial.estimator} on {trial.case} ({trial.status})" for trial in recording.trials)
-        print(f"{told}: {recording.path}")
+        print(f"{_trial_names(recording)}: {recording.path}")
     if save is None or web:
         open_viewer([recording.path for recording in recordings], web=web)
 
 
-def _facts(recordings: list[Recording]) -> dict[str, Any]:
-    """The first recording, and all of them, as JSON has them."""
+def _trial_names(recording: Recording) -> str:
+    return " and ".join(f"{trial.estimator} on {trial.case} ({trial.status})" for trial in recording.trials)
+
+
+def _facts(recordings: Sequence[Recording]) -> dict[str, Any]:
+    """The first recording, and all of them, as JSON."""
     first = recordings[0]
-    trial = first.trials[0]
-    rows = [
-        {
-            "path": str(recording.path),
-            "case": recording.trials[0].case,
-            "estimators": [trial.estimator for trial in recording.trials],
-        }
-        for recording in recordings
-    ]
+    first_trial = first.trials[0]
     return {
-        "case": trial.case,
-        "estimator": trial.estimator,
-        "repeat": trial.repeat,
+        "case": first_trial.case,
+        "estimator": first_trial.estimator,
+        "repeat": first_trial.repeat,
         "path": str(first.path),
-        "recordings": rows,
+        "recordings": [_recording_facts(recording) for recording in recordings],
     }
 
 
-def _window(said: str | None) -> slice:
-    """Frames as A:B. Raises InputError."""
-    first, colon, end = (said or ":").partition(":")
-    if not colon or any(part and not part.isdigit() for part in (first, end)):
-        raise InputError(f"--frames should be A:B, from one frame to before another, as in 40:80 (got {said!r})")
-    return slice(int(first) if first else None, int(end) if end else None)
+def _recording_facts(recording: Recording) -> dict[str, Any]:
+    return {
+        "path": str(recording.path),
+        "case": recording.trials[0].case,
+        "estimators": [trial.estimator for trial in recording.trials],
+    }

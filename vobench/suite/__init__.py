@@ -1,1 +1,1 @@
-"""What a suite says, and the cases and trials that follow from it."""
+"""Suites, scenarios and scenes in YAML, and the cases and trials that follow from them."""

@@ -1,4 +1,4 @@
-"""What the axes of a suite hold: rigs, lightings and cameras, as its YAML has them."""
+"""The axes of a suite that YAML describes with settings of their own: rigs and cameras."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,25 +12,24 @@ from vobench.sensor.image_sensor import SENSOR_PRESETS, CameraSettings
 from vobench.sensor.imu import IMUS, ImuSettings
 from vobench.setting import Like, OneOf, Positive, Short, settings
 
-LENSES = ("own", "calib", "camchain")  # in the preset's place
-HONEST = CalibrationError()
+LENS_KEYS = ("own", "calib", "camchain")  # replace the preset
+EXACT_CALIBRATION = CalibrationError()
 Camera = Annotated[CameraSettings, SENSOR_PRESETS]
 
 
-def _levelled(value: Any) -> Any:
+def _as_level(value: Any) -> Any:
     return {"level": value} if isinstance(value, str) else value
 
 
-Calibration = Annotated[CalibrationError, Short(_levelled, {"type": "string", "enum": ["none", *RESIDUALS]})]
+Calibration = Annotated[CalibrationError, Short(_as_level, {"type": "string", "enum": ["none", *RESIDUALS]})]
 
 
 @settings()
 class RigSettings:
-    """A stereo pair on the body: a preset with both lenses, placed, how far its calibration is off, and an IMU.
+    """A stereo pair on the body: its lenses and mounting, its calibration error, and an IMU.
 
-    In the preset's place are `own` lenses, or those of a file: KITTI's `calib`, whose pictures are of `size_px`, or
-    Kalibr's `camchain`.
-    Without `baseline_m` the cameras stand to each other as the preset has them; `picture_scale` .5 has half the pixels.
+    The lenses are a preset's, or `own` ones, or those of a file: KITTI's `calib`, with images of `size_px`, or Kalibr's
+    `camchain`. Without `baseline_m` the baseline is the preset's. `picture_scale` 0.5 halves width and height.
     """
 
     lens: Annotated[str, OneOf("lens", PRESETS)] = "paper_blender"
@@ -43,17 +42,18 @@ class RigSettings:
     baseline_m: Positive | None = None
     forward_m: float = 0.25
     height_m: float = 0.4
-    calibration_error: Calibration = HONEST
+    calibration_error: Calibration = EXACT_CALIBRATION
     imu: Annotated[ImuSettings, Like("IMU", IMUS)] | None = None
 
     def __post_init__(self) -> None:
-        if len(given := [key for key in LENSES if getattr(self, key) is not None]) > 1:
-            raise SettingError(f"gives the lenses, which {given[0]} gives; leave one of them out", given[1])
+        given = [key for key in LENS_KEYS if getattr(self, key) is not None]
+        if len(given) > 1:
+            raise SettingError(f"gives the lenses, which {given[0]} gives as well; remove one of them", given[1])
         if self.size_px and not self.calib:
-            raise SettingError("belongs to calib, and there is none", "size_px")
+            raise SettingError("requires calib, and there is none", "size_px")
 
     def read(self, folder: Path) -> "RigSettings":
-        """The rig with the lenses of its file, whose path starts in a folder. Raises InputError."""
+        """The rig with the lenses of its file; relative paths start at `folder`. Raises InputError."""
         if not (self.calib or self.camchain):
             return self
         from vobench.dataset import kalibr, kitti
@@ -65,14 +65,16 @@ class RigSettings:
         return replace(self, own=own_pair(pair), calib=None, size_px=None, camchain=None)
 
     def build(self) -> Rig:
-        """The sensors on the body as their calibration has them. Raises InputError where its file was not read."""
-        if file := self.calib or self.camchain:
-            raise InputError(f"the lenses are those of a file that was not read: {file}")
+        """The sensors on the body with their nominal calibration. Raises InputError if `read` was not called."""
+        unread_file = self.calib or self.camchain
+        if unread_file:
+            raise InputError(f"the lenses are in a file that was not read: {unread_file}")
         preset = self.own.preset() if self.own else PRESETS[self.lens]
+        T_left_right = preset.T_left_right if self.baseline_m is None else preset.at_baseline(self.baseline_m)
         cameras = mounted(
             resized(preset.left, self.picture_scale),
             resized(preset.right, self.picture_scale),
-            preset.T_left_right if self.baseline_m is None else preset.at_baseline(self.baseline_m),
+            T_left_right,
             pitch_deg=self.pitch_deg,
             forward_m=self.forward_m,
             height_m=self.height_m,

@@ -1,9 +1,13 @@
-"""One search order for scenes, suites, scenarios and estimators; the first of a name wins.
+"""Finds scenes, suites, scenarios and estimators by name, in one search order; the first match wins.
 
-Beside the suite that asks, in <kind>s/ and then in its own folder; ./<kind>s/; <folder>/<kind>s/ for each folder of
-$VOBENCH_PATH; installed entry points (groups vobench.scenes, vobench.suites, vobench.estimators); what vobench
-brings along. A suite is <name>.yaml, an estimator a folder <name>/ with an estimator.yaml; a scene is <name>.yaml, a
-folder <name>/ with a scene.yaml, or a model <name>.glb. A scenario is <name>.yaml in scenarios/ beside suites.
+1. Beside the suite that names them: in <kind>s/, then in the suite's own folder
+2. ./<kind>s/
+3. <folder>/<kind>s/ for each folder of $VOBENCH_PATH
+4. Installed entry points (groups vobench.scenes, vobench.suites, vobench.estimators)
+5. Those included with vobench
+
+A suite is <name>.yaml, an estimator a folder <name>/ with an estimator.yaml. A scene is <name>.yaml, a folder <name>/
+with a scene.yaml, or a model <name>.glb. A scenario is <name>.yaml in suites/scenarios/.
 """
 
 import os
@@ -20,6 +24,7 @@ from vobench.errors import UnknownNameError, unknown
 from vobench.suite.file_kind import Kind, kind_in, shown
 
 KINDS: tuple[Kind, ...] = ("suite", "scenario", "scene", "estimator")
+# Paths below a folder of the kind; {} is the name.
 FORMS: dict[Kind, tuple[str, ...]] = {
     "suite": ("{}.yaml",),
     "scenario": ("{}.yaml",),
@@ -32,15 +37,17 @@ WHAT_IT_IS: dict[Kind, str] = {
     "scene": "a scene is a YAML file, a folder with a scene.yaml, or a model",
     "estimator": "an estimator is a folder with an estimator.yaml",
 }
-NO_NAMES = ("", ".", "..")
-NO_SCENE = re.compile(rb"^(estimators|severity|include)\s*:", re.MULTILINE)
+NOT_NAMES = ("", ".", "..")
+BESIDE_SUITE = "beside the suite"
+# Keys of suites and scenarios, at the start of a line, that scenes do not have.
+OTHER_KEY = re.compile(rb"^(estimators|severity|include)\s*:", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Something with a name, where it lies, and which stop of the search order it came from.
+    """A named scene, suite, scenario or estimator, its path, and the step of the search order that found it.
 
-    `path` is the file of a scene, suite or scenario, the folder of an estimator.
+    `path` is the file of a scene, suite or scenario, and the folder of an estimator.
     """
 
     kind: Kind
@@ -50,117 +57,155 @@ class Entry:
 
 
 def builtin_root() -> Path:
-    """The folder that holds the scenes, suites and estimators that vobench brings along."""
+    """The folder of the scenes, suites and estimators that are included with vobench."""
     package = Path(__file__).resolve().parents[1]
-    wheel = package / "builtin"
-    return wheel if wheel.is_dir() else package.parent
+    in_wheel = package / "builtin"
+    return in_wheel if in_wheel.is_dir() else package.parent
 
 
 def entries(kind: Kind) -> list[Entry]:
-    """Everything of a kind, by name; where a name is there twice, the one that wins comes first."""
+    """All entries of a kind, sorted by name. If a name occurs twice, the one that wins comes first."""
     by_path: dict[Path, Entry] = {}
-    for entry in _all(kind):
+    for entry in _search(kind):
         by_path.setdefault(entry.path, entry)
     return sorted(by_path.values(), key=lambda entry: entry.name)
 
 
 def find(kind: Kind, name: str, *, suite: Path | None = None) -> Entry:
-    """The entry of that name that wins; a path, with a / or a suffix, is taken from here or from beside the suite.
+    """The entry with a name, or at a path: a name with a slash or a suffix is a path.
 
-    `suite` is the file that asks, beside which is looked first. Raises UnknownNameError with the nearest name and
-    all known ones.
+    `suite` is the file that names it; names and relative paths are looked up beside it first. Raises UnknownNameError
+    with the nearest name and all known ones.
     """
     path = Path(name)
-    if path.suffix in {".yaml", ".yml", *MODEL_SUFFIXES} or "/" in name or os.sep in name:
-        return _at(kind, path, suite)
-    for entry in _all(kind, suite, name=name):
+    has_suffix = path.suffix in {".yaml", ".yml", *MODEL_SUFFIXES}
+    if has_suffix or "/" in name or os.sep in name:
+        return _entry_at(kind, path, suite)
+    for entry in _search(kind, suite, name=name):
         return entry
-    if name not in NO_NAMES and path.is_dir():
+    if name not in NOT_NAMES and path.is_dir():
         raise UnknownNameError(_about_folder(kind, path))
-    raise UnknownNameError(unknown(kind, name, _names(kind, suite)))
+    raise UnknownNameError(unknown(kind, name, _known_names(kind, suite)))
 
 
 def examples() -> list[Entry]:
-    """The example suites that vobench brings along, which `vobench new suite` copies; no name finds them otherwise."""
+    """The example suites included with vobench, which `vobench new suite` copies; `find` does not find them."""
     return [*_in_folder("suite", builtin_root() / "examples", "example", None)]
 
 
 def _about_folder(kind: Kind, folder: Path) -> str:
-    """What to say of a folder where a name or a file is wanted: how to write its path, or what is in it."""
-    if kind == "estimator" and (folder / "estimator.yaml").is_file():
-        return f"no estimator named '{folder}'; for the folder write ./{folder}"
-    if kind == "scene" and (folder / "scene.yaml").is_file():
-        return f"no scene named '{folder}'; for the folder write ./{folder}"
+    """The sentence about a folder that was given as a name or a file."""
+    holds_scene = kind == "scene" and (folder / "scene.yaml").is_file()
+    holds_estimator = kind == "estimator" and (folder / "estimator.yaml").is_file()
+    if holds_scene or holds_estimator:
+        return f"no {kind} named '{folder}'; to use the folder, write ./{folder}"
     inside = [entry for entry in _in_folder(kind, folder, "", None) if _is_of_kind(kind, entry.path)]
     paths = ", ".join(shown(entry.path) for entry in inside)
-    found = f"in it are {paths}" if inside else f"in it is no {kind}"
-    return f"{shown(folder)} is a folder, and {WHAT_IT_IS[kind]}; {found}"
+    contents = f"it contains {paths}" if inside else f"it contains no {kind}"
+    return f"{shown(folder)} is a folder, and {WHAT_IT_IS[kind]}; {contents}"
 
 
 def _is_of_kind(kind: Kind, path: Path) -> bool:
-    """Whether what lies there is of a kind, as far as its keys tell."""
-    return path.is_dir() or path.suffix.lower() in MODEL_SUFFIXES or kind_in(path) == kind
+    """Whether a path is of a kind, judged by its keys."""
+    if path.is_dir() or path.suffix.lower() in MODEL_SUFFIXES:
+        return True
+    return kind_in(path) == kind
 
 
-def _at(kind: Kind, path: Path, suite: Path | None) -> Entry:
+def _entry_at(kind: Kind, path: Path, suite: Path | None) -> Entry:
+    """The entry at a path. Raises UnknownNameError."""
+    path = _entry_path(kind, path, suite)
+    if path.is_dir() and kind != "estimator":
+        raise UnknownNameError(_about_folder(kind, path))
+    file = path / "estimator.yaml" if kind == "estimator" else path
+    if not file.is_file():
+        known = ", ".join(_known_names(kind, suite)) or "none"
+        raise UnknownNameError(f"no {kind} file at {file}. Known by name: {known}")
+    resolved = path.resolve()
+    return Entry(kind, _name_of(kind, resolved), resolved, "path")
+
+
+def _entry_path(kind: Kind, written: Path, suite: Path | None) -> Path:
+    """The path of an entry as `Entry` holds it: relative paths may start at the suite's folder."""
+    path = written
     if suite and not path.exists() and (suite.parent / path).exists():
         path = suite.parent / path
     if kind == "estimator" and path.name == "estimator.yaml":
-        path = path.parent
+        return path.parent
     if kind == "scene" and (path / "scene.yaml").is_file():
-        path /= "scene.yaml"
-    wanted = path / "estimator.yaml" if kind == "estimator" else path
-    if path.is_dir() and kind != "estimator":
-        raise UnknownNameError(_about_folder(kind, path))
-    if not wanted.is_file():
-        known = ", ".join(_names(kind, suite)) or "none"
-        raise UnknownNameError(f"no {kind} file at {wanted}. Known by name: {known}")
-    return Entry(kind, _name(kind, path.resolve()), path.resolve(), "path")
+        return path / "scene.yaml"
+    return path
 
 
-def _names(kind: Kind, suite: Path | None) -> list[str]:
-    return sorted({entry.name for entry in _all(kind, suite)})
+def _known_names(kind: Kind, suite: Path | None) -> list[str]:
+    return sorted({entry.name for entry in _search(kind, suite)})
 
 
-def _all(kind: Kind, suite: Path | None = None, *, name: str | None = None) -> Iterator[Entry]:
-    """Every entry of a kind, or those of a name, in the order of search."""
-    among = "suites/scenarios" if kind == "scenario" else f"{kind}s"
+def _search(kind: Kind, suite: Path | None = None, *, name: str | None = None) -> Iterator[Entry]:
+    """Every entry of a kind, or those of one name, in the search order."""
+    kind_folder = "suites/scenarios" if kind == "scenario" else f"{kind}s"
     if suite:
-        yield from _in_folder(kind, suite.parent / f"{kind}s", "beside the suite", name)
-        if kind != "scenario":
-            yield from (e for e in _in_folder(kind, suite.parent, "beside the suite", name) if not _is_other(e.path))
-    yield from _in_folder(kind, Path(among), f"./{among}", name)
-    for folder in filter(None, os.environ.get("VOBENCH_PATH", "").split(os.pathsep)):
-        yield from _in_folder(kind, Path(folder) / among, "$VOBENCH_PATH", name)
-    yield from (entry for entry in _installed(kind) if name in (None, entry.name))
-    yield from _in_folder(kind, builtin_root() / among, "built in", name)
+        yield from _beside(kind, suite.parent, name)
+    yield from _in_folder(kind, Path(kind_folder), f"./{kind_folder}", name)
+    for folder in os.environ.get("VOBENCH_PATH", "").split(os.pathsep):
+        if folder:
+            yield from _in_folder(kind, Path(folder) / kind_folder, "$VOBENCH_PATH", name)
+    for entry in _installed(kind):
+        if name in (None, entry.name):
+            yield entry
+    yield from _in_folder(kind, builtin_root() / kind_folder, "built in", name)
+
+
+def _beside(kind: Kind, folder: Path, name: str | None) -> Iterator[Entry]:
+    """The entries in the folder of a suite. A suite or a scenario may have the name of its scene."""
+    yield from _in_folder(kind, folder / f"{kind}s", BESIDE_SUITE, name)
+    if kind == "scenario":
+        return
+    for entry in _in_folder(kind, folder, BESIDE_SUITE, name):
+        if not _is_suite_or_scenario(entry.path):
+            yield entry
+
+
+def _is_suite_or_scenario(path: Path) -> bool:
+    return path.is_file() and OTHER_KEY.search(path.read_bytes()) is not None
 
 
 def _installed(kind: Kind) -> Iterator[Entry]:
+    """The entries that installed distributions offer: the package that an entry point names holds the files."""
     for point in entry_points(group=f"vobench.{kind}s"):
         spec = find_spec(point.value)
-        for folder in spec.submodule_search_locations or [] if spec else []:
-            found = [Path(folder, form.format(point.name)) for form in (*FORMS[kind], "scene.yaml")]
-            path = Path(folder) if kind == "estimator" else next((p for p in found if p.is_file()), found[0])
-            yield Entry(kind, point.name, path, f"installed: {point.dist.name if point.dist else point.value}")
+        package_folders = (spec.submodule_search_locations or []) if spec else []
+        for folder in package_folders:
+            path = Path(folder) if kind == "estimator" else _installed_file(kind, Path(folder), point.name)
+            distribution = point.dist.name if point.dist else point.value
+            yield Entry(kind, point.name, path, f"installed: {distribution}")
+
+
+def _installed_file(kind: Kind, folder: Path, name: str) -> Path:
+    """The file of an installed entry; the first possible one if none exists."""
+    candidates = [folder / form.format(name) for form in FORMS[kind]]
+    candidates.append(folder / "scene.yaml")
+    for candidate in candidates:
+        if candidate.is_file():
+            return candidate
+    return candidates[0]
 
 
 def _in_folder(kind: Kind, folder: Path, origin: str, name: str | None) -> Iterator[Entry]:
-    if name in NO_NAMES:
+    """The entries of a kind in a folder, or those of one name."""
+    if name in NOT_NAMES:
         return
-    named = "*" if name is None else escape(name)
+    pattern = "*" if name is None else escape(name)
     for form in FORMS[kind]:
-        for path in sorted(folder.glob(form.format(named))):
-            own = path.parent if kind == "estimator" else path
-            yield Entry(kind, _name(kind, own), own.resolve(), origin)
+        for file in sorted(folder.glob(form.format(pattern))):
+            path = file.parent if kind == "estimator" else file
+            yield Entry(kind, _name_of(kind, path), path.resolve(), origin)
 
 
-def _name(kind: Kind, path: Path) -> str:
+def _name_of(kind: Kind, path: Path) -> str:
+    """The name of the entry at a path."""
     if kind == "estimator":
         return path.name
-    return path.parent.name if kind == "scene" and path.name == "scene.yaml" else path.stem
-
-
-def _is_other(path: Path) -> bool:
-    """Whether this file is a suite or a scenario, which may be called as its scene is."""
-    return path.is_file() and NO_SCENE.search(path.read_bytes()) is not None
+    if kind == "scene" and path.name == "scene.yaml":
+        return path.parent.name
+    return path.stem

@@ -1,4 +1,4 @@
-"""Tells suites, scenarios, scenes and estimators' manifests apart by their keys, to say so where one is mistaken."""
+"""Tells suites, scenarios, scenes and estimators' manifests apart by their keys."""
 
 import os
 import re
@@ -9,7 +9,7 @@ from typing import Literal
 from vobench.asset import MODEL_SUFFIXES
 
 Kind = Literal["scene", "suite", "scenario", "estimator"]
-# Keys of the top level that files of one kind alone have.
+# Top-level keys that only files of one kind have.
 MARKS: dict[Kind, frozenset[str]] = {
     "suite": frozenset(
         {"estimators", "scenes", "scenarios", "source", "rigs", "trajectories", "cameras", "lightings", "repeats"}
@@ -30,14 +30,14 @@ TOP_LEVEL_KEY = re.compile(r"^(\w+)\s*:", re.MULTILINE)
 
 
 def kind_of(keys: Collection[str]) -> Kind | None:
-    """The kind of file that has most of these keys of the top level; None where no key tells."""
+    """The kind of file that most of these top-level keys belong to; None if none of them tells."""
     counts = {kind: len(marks & set(keys)) for kind, marks in MARKS.items()}
     likeliest = max(counts, key=lambda kind: counts[kind])
     return likeliest if counts[likeliest] else None
 
 
 def kind_in(path: Path) -> Kind | None:
-    """The kind of a YAML file by the keys at the starts of its lines, without parsing it; None where no key tells."""
+    """The kind of a YAML file by the keys at the starts of its lines, without parsing; None if none of them tells."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
@@ -46,36 +46,38 @@ def kind_in(path: Path) -> Kind | None:
 
 
 def mistaken_for(wanted: Kind, path: Path, keys: Collection[str]) -> str | None:
-    """What to say of a file with these keys where one of another kind is wanted; None if it may be what is wanted."""
+    """The sentence about a file whose keys are those of another kind; None if it may be of the wanted kind."""
     if MARKS[wanted] & set(keys):
         return None
-    found = kind_of(keys)
-    if found is None:
+    actual = kind_of(keys)
+    if actual is None:
         return None
-    return f"this is {NOUNS[found]}, not {NOUNS[wanted]}; {_what_to_do(found, path)}"
+    return f"this is {NOUNS[actual]}, not {NOUNS[wanted]}; {_advice(actual, path)}"
 
 
 def model_mistaken_for(wanted: Kind, path: Path) -> str | None:
-    """What to say of a model's file where a YAML file is wanted; None if it is no model."""
+    """The sentence about a model's file that was given in place of a YAML file; None if it is not a model."""
     if path.suffix.lower() not in MODEL_SUFFIXES:
         return None
-    return f"this is a model, not {NOUNS[wanted]}; look it over with `vobench scene {shown(path)}`"
+    return f"this is a model, not {NOUNS[wanted]}; inspect it with `vobench scene {shown(path)}`"
 
 
 def shown(path: Path) -> str:
-    """A path as somebody here would type it: relative where it is below the working directory."""
-    whole = path.resolve()
-    here = Path.cwd()
-    return os.path.relpath(whole, here) if whole.is_relative_to(here) else str(whole)
+    """A path as a user would type it: relative if it is below the working directory."""
+    absolute = path.resolve()
+    working_folder = Path.cwd()
+    if absolute.is_relative_to(working_folder):
+        return os.path.relpath(absolute, working_folder)
+    return str(absolute)
 
 
-def _what_to_do(found: Kind, path: Path) -> str:
-    match found:
+def _advice(kind: Kind, path: Path) -> str:
+    match kind:
         case "suite":
             return f"run it with `vobench run {shown(path)}`"
         case "scene":
-            return f"draw it with `vobench render {shown(path)}`"
+            return f"render it with `vobench render {shown(path)}`"
         case "scenario":
-            return f"name it in a suite, as in `scenarios: {{{path.stem}: [1, 3, 5]}}`"
+            return f"add it to a suite, as in `scenarios: {{{path.stem}: [1, 3, 5]}}`"
         case "estimator":
             return f"run it with `vobench run quickstart -e {shown(path.parent)}`"

@@ -1,4 +1,4 @@
-"""Where a body can drive in a scene, found by rays: its largest free circle, and a way round in it."""
+"""The free space on the floor of a scene, found by ray casting: its largest free circle, and a path in it."""
 
 from dataclasses import dataclass
 
@@ -13,30 +13,40 @@ from vobench.rendering.geometry import RayCaster
 from vobench.scene.mesh import Triangles, areas_m2
 from vobench.scene.scene import Scene, triangles
 
-# cosine of what counts as level, and how even a floor is
-LEVEL = 0.99
+Mask = NDArray[np.bool_]
+
+# The floor: nearly level faces at one height, to within a step.
+LEVEL = 0.99  # cosine of the steepest level face
 FLOOR_STEP_M = 0.02
-FLOOR_SHARE = 0.4  # of the largest level area, which a floor has at least
-# of the map of free places, and the height of a body
+FLOOR_SHARE = 0.4  # of the largest level area at one height, which the floor has at least
+
+# The map of the floor, and the height of a body.
 CELL_M = 0.1
-MOST_CELLS = 600
+MOST_CELLS = 600  # along one side
 BODY_M = 0.6
-# looked for walls
-HEIGHTS_M = (0.1, 0.35, 0.6)
-SIDES = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
-LEAST_RADIUS_M = 0.2
-MOST_RADIUS_M = 4.0
-OF_CIRCLE = 0.6
+WALL_HEIGHTS_M = (0.1, 0.35, 0.6)  # where horizontal rays look for walls
+SIDES = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])  # (4, 3) unit directions
+
+# The circular path of a body.
+LEAST_RADIUS_M = 0.2  # of the free circle
+MOST_RADIUS_M = 4.0  # of the path
+SHARE_OF_CIRCLE = 0.6  # radius of the path relative to the free circle's
+MOST_LENGTH_M = 10.0
+CORNERS = 16
 SPEED_MPS = 0.5
 RATE_HZ = 10.0
 EASE_S = 1.0
-CORNERS = 16
-MOST_LENGTH_M = 10.0
+
+# Lamps below a ceiling.
+SKY_RAYS = 512
+LAMP_BELOW = 0.35  # of the ceiling's height; a lamp near the ceiling overexposes the ceiling
+LAMP_SPACING = 2.5  # in heights of the ceiling
+MOST_LAMPS = 4  # along one side
 
 
 @dataclass(frozen=True, slots=True)
 class Free:
-    """The largest free circle on the floor: its middle (x, y), the floor's height and the radius, in metres."""
+    """The largest free circle on the floor: its centre (x, y), the floor's height and the radius, in metres."""
 
     x_m: float
     y_m: float
@@ -45,134 +55,185 @@ class Free:
 
 
 @dataclass(frozen=True, slots=True)
-class _Floor:
-    """Cells of a floor: their middles x (W,), y (H,), whether nothing stands there (H, W), and the floor's height."""
+class _FloorMap:
+    """A grid on the floor: cell centres x (W,) and y (H,), and which cells (H, W) are free."""
 
     x_m: Array
     y_m: Array
-    free: NDArray[np.bool_]
+    free: Mask
     floor_m: float
     cell_m: float
 
-    def largest(self) -> Free | None:
-        distance = scipy.ndimage.distance_transform_edt(np.pad(self.free, 1))[1:-1, 1:-1]
-        row, column = np.unravel_index(distance.argmax(), distance.shape)
-        radius_m = float((distance[row, column] - 0.5) * self.cell_m)
-        return Free(float(self.x_m[column]), float(self.y_m[row]), self.floor_m, radius_m) if radius_m > 0 else None
+    def largest_circle(self) -> Free | None:
+        """The largest circle around the centre of a cell that contains free cells only."""
+        # Cells beyond the map count as occupied.
+        padded = np.pad(self.free, 1)
+        distance_cells = scipy.ndimage.distance_transform_edt(padded)[1:-1, 1:-1]
+        row, column = np.unravel_index(distance_cells.argmax(), distance_cells.shape)
+
+        # Distances are between cell centres, but an occupied cell begins half a cell before its centre.
+        radius_m = float((distance_cells[row, column] - 0.5) * self.cell_m)
+        if radius_m <= 0:
+            return None
+        return Free(float(self.x_m[column]), float(self.y_m[row]), self.floor_m, radius_m)
 
 
 def free_circle(faces: Triangles, caster: RayCaster) -> Free | None:
-    """The largest circle on the floor over which nothing stands lower than a body is high.
+    """The largest circle on the floor with nothing above it that is lower than a body's height; None if there is none.
 
-    The floor is the lowest height at which much level area lies: roofs and storeys above may have more.
+    The floor is the lowest height with much level area, because roofs and upper storeys may have more of it.
     """
-    floor = _floor(faces, caster)
-    return floor.largest() if floor else None
+    floor = _floor_map(faces, caster)
+    return floor.largest_circle() if floor else None
 
 
-def _floor(faces: Triangles, caster: RayCaster) -> _Floor | None:
-    level = (faces.plane[:, 2] > LEVEL) & (faces.mover < 0)
-    if not level.any():
+def _floor_map(faces: Triangles, caster: RayCaster) -> _FloorMap | None:
+    """The map of the floor; None if the scene has no level face."""
+    is_level = (faces.plane[:, 2] > LEVEL) & (faces.mover < 0)
+    if not is_level.any():
         return None
-    heights = np.rint(faces.corners_m[level].mean(1)[:, 2] / FLOOR_STEP_M).astype(int)
-    areas = np.bincount(heights - heights.min(), areas_m2(faces.corners_m[level]))
-    floor_m = float((np.flatnonzero(areas > FLOOR_SHARE * areas.max())[0] + heights.min()) * FLOOR_STEP_M)
-    on_floor = faces.corners_m[level][np.abs(heights * FLOOR_STEP_M - floor_m) < FLOOR_STEP_M].reshape(-1, 3)
-    low = on_floor.min(0)[:2]
-    high = on_floor.max(0)[:2]
-    cell_m = max(CELL_M, float((high - low).max()) / MOST_CELLS)
-    x, y = (np.arange(a + cell_m / 2, b, cell_m) for a, b in zip(low, high, strict=True))
-    if not x.size or not y.size:
+    level_corners_m = faces.corners_m[is_level]  # (F, 3, 3)
+    height_steps = np.rint(level_corners_m.mean(1)[:, 2] / FLOOR_STEP_M).astype(int)  # (F,)
+    floor_m = _floor_height_m(level_corners_m, height_steps)
+
+    # The grid covers the bounds of all faces at the floor's height.
+    is_floor_face = np.abs(height_steps * FLOOR_STEP_M - floor_m) < FLOOR_STEP_M
+    floor_corners_m = level_corners_m[is_floor_face].reshape(-1, 3)
+    low_m = floor_corners_m.min(0)[:2]
+    high_m = floor_corners_m.max(0)[:2]
+    cell_m = max(CELL_M, float((high_m - low_m).max()) / MOST_CELLS)
+    x_m = np.arange(low_m[0] + cell_m / 2, high_m[0], cell_m)
+    y_m = np.arange(low_m[1] + cell_m / 2, high_m[1], cell_m)
+    if not x_m.size or not y_m.size:
         return None
-    starts = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
-    hits = caster.hits(np.column_stack([starts, np.full(len(starts), floor_m + BODY_M)]), down(len(starts)))
-    is_floor = (np.abs(hits.distance - BODY_M) < FLOOR_STEP_M) & (faces.plane[hits.face, 2] > 0)
-    is_floor[is_floor] = _clear(starts[is_floor], floor_m, cell_m, faces, caster)
-    return _Floor(x, y, is_floor.reshape(len(y), len(x)), floor_m, cell_m)
+
+    # A cell is free if a ray from a body's height meets the floor first, and no wall is near.
+    centres_m = np.stack(np.meshgrid(x_m, y_m), -1).reshape(-1, 2)  # (H * W, 2)
+    starts_m = _at_height(centres_m, floor_m + BODY_M)
+    hits = caster.hits(starts_m, down(len(starts_m)))
+    meets_floor = np.abs(hits.distance - BODY_M) < FLOOR_STEP_M
+    is_free = meets_floor & (faces.plane[hits.face, 2] > 0)
+    is_free[is_free] = _away_from_walls(centres_m[is_free], floor_m, cell_m, faces, caster)
+    return _FloorMap(x_m, y_m, is_free.reshape(len(y_m), len(x_m)), floor_m, cell_m)
 
 
-def _clear(at_m: Array, floor_m: float, cell_m: float, faces: Triangles, caster: RayCaster) -> Array:
-    """Whether no wall stands in a cell (N, 2), nor around it: whoever sees backs on all sides is inside a thing."""
-    clear = np.ones(len(at_m), bool)
-    for height_m in HEIGHTS_M:
-        starts = np.column_stack([at_m, np.full(len(at_m), floor_m + height_m)])
-        backs = np.ones(len(at_m), bool)
-        for way in SIDES:
-            hits = caster.hits(starts, np.tile(way, (len(starts), 1)))
-            clear &= (hits.face < 0) | (hits.distance > cell_m)
-            backs &= (hits.face >= 0) & (faces.plane[hits.face, :3] @ way > 0)
-        clear &= ~backs
-    return clear
+def _floor_height_m(level_corners_m: Array, height_steps: NDArray[np.int_]) -> float:
+    """The lowest height of level faces (F, 3, 3) with a large enough area; `height_steps` (F,) are their heights."""
+    lowest_step = height_steps.min()
+    area_by_step_m2 = np.bincount(height_steps - lowest_step, areas_m2(level_corners_m))
+    large_steps = np.flatnonzero(area_by_step_m2 > FLOOR_SHARE * area_by_step_m2.max())
+    return float((large_steps[0] + lowest_step) * FLOOR_STEP_M)
+
+
+def _at_height(places_m: Array, z_m: float) -> Array:
+    """Points (N, 3) at one height above places (N, 2)."""
+    return np.column_stack([places_m, np.full(len(places_m), z_m)])
+
+
+def _away_from_walls(centres_m: Array, floor_m: float, cell_m: float, faces: Triangles, caster: RayCaster) -> Mask:
+    """Which cells (N, 2) have no wall within a cell's width, and are not inside a thing.
+
+    A point is inside a thing if rays to all sides hit faces from behind.
+    """
+    is_clear = np.ones(len(centres_m), bool)
+    for height_m in WALL_HEIGHTS_M:
+        starts_m = _at_height(centres_m, floor_m + height_m)
+        is_inside = np.ones(len(centres_m), bool)
+        for direction in SIDES:
+            hits = caster.hits(starts_m, np.tile(direction, (len(starts_m), 1)))
+            is_hit = hits.face >= 0
+            is_clear &= ~is_hit | (hits.distance > cell_m)
+            is_inside &= is_hit & (faces.plane[hits.face, :3] @ direction > 0)
+        is_clear &= ~is_inside
+    return is_clear
 
 
 def down(count: int) -> Array:
-    """Rays (N, 3) straight down."""
+    """Directions (N, 3) straight down."""
     return np.tile([0.0, 0.0, -1.0], (count, 1))
 
 
-def free_way(scene: Scene) -> PoseSpline:
-    """A way round in the scene's largest free circle, for a body that looks ahead. Raises SuiteError for none."""
+def circular_path(scene: Scene) -> PoseSpline:
+    """A path around the centre of the scene's largest free circle, of a body that looks ahead.
+
+    Raises SuiteError if the free circle is too small, or there is no floor.
+    """
     faces = triangles(scene, t_ns=0)
     free = free_circle(faces, RayCaster(faces))
-    if free is None or free.radius_m < LEAST_RADIUS_M:
-        found = "it has no level floor; is another axis up?"
-        found = f"the largest free circle on its floor has {free.radius_m:.2f} m" if free else found
-        raise SuiteError(f"no way for a body was found in '{scene.name}' ({found}); give trajectories")
-    radius_m = min(OF_CIRCLE * free.radius_m, MOST_RADIUS_M)
-    whole = 2 * np.pi * min(1.0, MOST_LENGTH_M / (2 * np.pi * radius_m))
-    turned = np.linspace(0, whole, CORNERS)
-    poses = [
-        Pose(
-            t_s=float(angle * radius_m / SPEED_MPS),
-            position_m=(
-                free.x_m + radius_m * float(np.cos(angle)), free.y_m + radius_m * float(np.sin(angle)), free.floor_m
-            ),
-            yaw_deg=float(np.rad2deg(angle)) + 90,
-        )
-        for angle in turned
-    ]  # fmt: skip
-    return PoseSpline(poses=tuple(poses), ease_s=EASE_S, rate_hz=RATE_HZ)
+    if free is None:
+        raise _no_path(scene, "it has no level floor; is another axis up?")
+    if free.radius_m < LEAST_RADIUS_M:
+        raise _no_path(scene, f"the largest free circle on its floor has a radius of {free.radius_m:.2f} m")
+
+    radius_m = min(SHARE_OF_CIRCLE * free.radius_m, MOST_RADIUS_M)
+    share_of_turn = min(1.0, MOST_LENGTH_M / (2 * np.pi * radius_m))
+    angles_rad = np.linspace(0, 2 * np.pi * share_of_turn, CORNERS)
+    poses = tuple(_pose_on_circle(free, radius_m, angle_rad) for angle_rad in angles_rad)
+    return PoseSpline(poses=poses, ease_s=EASE_S, rate_hz=RATE_HZ)
 
 
-# ways up that are looked; how far down a lamp hangs, or its spot above drowns all
-LOOKS = 512
-LAMP_BELOW = 0.35
-# in heights of the ceiling, and along a side
-LAMPS_APART = 2.5
-MOST_LAMPS = 4
+def _no_path(scene: Scene, reason: str) -> SuiteError:
+    return SuiteError(f"no free path was found in '{scene.name}' ({reason}); add trajectories to the suite")
+
+
+def _pose_on_circle(free: Free, radius_m: float, angle_rad: float) -> Pose:
+    """The pose on a circle around the centre of the free circle, along its tangent."""
+    x_m = free.x_m + radius_m * float(np.cos(angle_rad))
+    y_m = free.y_m + radius_m * float(np.sin(angle_rad))
+    return Pose(
+        t_s=float(angle_rad * radius_m / SPEED_MPS),
+        position_m=(x_m, y_m, free.floor_m),
+        yaw_deg=float(np.rad2deg(angle_rad)) + 90,
+    )
 
 
 def ceiling_above(scene: Scene) -> tuple[float, list[tuple[float, float, float]]]:
-    """The share of the sky that a body sees where it is free, all without a floor; and where lamps would hang.
+    """The share of the sky that a body on the floor sees, and the positions of lamps below the ceiling.
 
-    That is above the free circle, or all over the floor of a hall that is much wider than high.
+    There is one lamp above the free circle, or in a hall that is much wider than high a grid of them. In a scene
+    without a floor, all of the sky is visible.
     """
     faces = triangles(scene, t_ns=0)
     caster = RayCaster(faces)
-    floor = _floor(faces, caster)
-    free = floor.largest() if floor else None
+    floor = _floor_map(faces, caster)
+    free = floor.largest_circle() if floor else None
     if floor is None or free is None:
         return 1.0, [(0.0, 0.0, 0.0)]
-    at = np.array([free.x_m, free.y_m, free.floor_m + BODY_M])
-    ways = np.abs(np.random.default_rng(0).standard_normal((LOOKS, 3)))
-    ways[:, :2] *= np.sign(np.random.default_rng(1).standard_normal((LOOKS, 2)))
-    seen = caster.nearest(np.tile(at, (LOOKS, 1)), ways)
-    above = caster.hits(at[None], np.array([[0.0, 0.0, 1.0]]))
-    height_m = float(above.distance[0]) if above.face[0] >= 0 else BODY_M
-    places = _apart(floor, LAMPS_APART * (BODY_M + height_m))
-    starts = np.column_stack([places, np.full(len(places), at[2])]) if len(places) > 1 else at[None]
-    ceiling = caster.hits(starts, -down(len(starts)))
-    ends = starts - (1 - LAMP_BELOW) * np.where(ceiling.face < 0, height_m, ceiling.distance)[:, None] * down(1)
-    return float((seen < 0).mean()), [(x, y, z) for x, y, z in ends.tolist()]
+
+    eye_m = np.array([free.x_m, free.y_m, free.floor_m + BODY_M])
+    hit_faces = caster.nearest(np.tile(eye_m, (SKY_RAYS, 1)), _upward_directions())
+    sky_share = float((hit_faces < 0).mean())
+
+    overhead = caster.hits(eye_m[None], -down(1))
+    height_m = float(overhead.distance[0]) if overhead.face[0] >= 0 else BODY_M
+    places_m = _grid_places(floor, LAMP_SPACING * (BODY_M + height_m))
+    starts_m = _at_height(places_m, eye_m[2]) if len(places_m) > 1 else eye_m[None]
+
+    # Where no ceiling is above a place, the one above the circle counts.
+    ceiling = caster.hits(starts_m, -down(len(starts_m)))
+    clearance_m = np.where(ceiling.face < 0, height_m, ceiling.distance)
+    lamps_m = starts_m - (1 - LAMP_BELOW) * clearance_m[:, None] * down(1)
+    return sky_share, [(x, y, z) for x, y, z in lamps_m.tolist()]
 
 
-def _apart(floor: _Floor, step_m: float) -> Array:
-    """The free cells (N, 2) next to the middles of parts of a floor some step wide, one in each where there is any."""
-    cells = np.argwhere(floor.free)[:, ::-1]
-    size = np.array(floor.free.shape[::-1])
-    parts = np.clip(np.rint(size * floor.cell_m / step_m), 1, MOST_LAMPS)
-    part = np.floor(cells / size * parts)
-    apart = np.abs(cells / size * parts - part - 0.5).max(1)
-    order = np.lexsort((apart, part[:, 1], part[:, 0]))
-    first = order[np.unique(part[order], axis=0, return_index=True)[1]]
-    return np.column_stack([floor.x_m[cells[first, 0]], floor.y_m[cells[first, 1]]])
+def _upward_directions() -> Array:
+    """Random directions (SKY_RAYS, 3) of the upper hemisphere, the same in every run."""
+    directions = np.abs(np.random.default_rng(0).standard_normal((SKY_RAYS, 3)))
+    signs = np.sign(np.random.default_rng(1).standard_normal((SKY_RAYS, 2)))
+    directions[:, :2] *= signs
+    return directions
+
+
+def _grid_places(floor: _FloorMap, spacing_m: float) -> Array:
+    """Free places (N, 2) on a regular grid of about some spacing: in each part of the floor, the most central cell."""
+    cells = np.argwhere(floor.free)[:, ::-1]  # (N, 2) column and row
+    size_cells = np.array(floor.free.shape[::-1])
+    part_count = np.clip(np.rint(size_cells * floor.cell_m / spacing_m), 1, MOST_LAMPS)  # along x and y
+
+    position = cells / size_cells * part_count  # in parts
+    part = np.floor(position)
+    off_centre = np.abs(position - part - 0.5).max(1)
+    order = np.lexsort((off_centre, part[:, 1], part[:, 0]))
+    first_of_each_part = np.unique(part[order], axis=0, return_index=True)[1]
+    chosen = order[first_of_each_part]
+    return np.column_stack([floor.x_m[cells[chosen, 0]], floor.y_m[cells[chosen, 1]]])

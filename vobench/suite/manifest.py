@@ -1,4 +1,4 @@
-"""An estimator's `estimator.yaml`, read without importing its code."""
+"""Reads an estimator's `estimator.yaml` without importing its code."""
 
 from pathlib import Path
 
@@ -9,8 +9,10 @@ from vobench.suite.catalog import builtin_root
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """The manifest in an estimator's folder. Raises SuiteError, one line, where it is wrong."""
-    manifest = yaml_file.read(folder / MANIFEST_FILE, Manifest, kind="estimator")
-    if manifest.oracle and folder.resolve().parent != builtin_root() / "estimators":
-        raise SuiteError(f"{folder / MANIFEST_FILE}: oracle: only vobench's own estimators may be drawn from the truth")
+    """The manifest in an estimator's folder. Raises SuiteError with all mistakes in it."""
+    path = folder / MANIFEST_FILE
+    manifest = yaml_file.read(path, Manifest, kind="estimator")
+    is_builtin = folder.resolve().parent == builtin_root() / "estimators"
+    if manifest.oracle and not is_builtin:
+        raise SuiteError(f"{path}: oracle: only estimators included with vobench may use the ground truth")
     return manifest

@@ -1,4 +1,4 @@
-"""New suites and scenes: a commented file that works as it is, or a copy of one that there is."""
+"""Creates suites and scenes: from a commented template that works as it is, or as a copy."""
 
 import re
 import shutil
@@ -14,25 +14,27 @@ NAME_LINE = re.compile(r"^name\s*:\s*[^\s#]+", re.MULTILINE)
 
 
 def require_name(name: str) -> None:
-    """Raise InputError for a name that cannot be that of a new file."""
+    """Raise InputError for a name that a new file cannot have."""
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
-        raise InputError(f"a name should be lower-case letters, digits and _, a letter first (got {name!r})")
+        raise InputError(
+            f"a name should consist of lower-case letters, digits and _, and begin with a letter (got {name!r})"
+        )
 
 
 def require_free(path: Path) -> None:
-    """Raise InputError where there is a file or a folder already."""
+    """Raise InputError if a file or a folder exists at the path."""
     if path.exists():
-        raise InputError(f"there is one already; choose another name or take it away: {path}")
+        raise InputError(f"already exists; choose another name, or remove it: {path}")
 
 
 def new_suite(name: str, *, out: Path = Path("suites"), source: str | None = None) -> Path:
-    """Write out/<name>.yaml, a suite; return its path.
+    """Write a suite to out/<name>.yaml; return its path.
 
-    `source` names the suite or the example that is copied, or is its path; without it, it is a commented template.
+    `source` is the name or path of the suite or example to copy; without it, a commented template is used.
 
     Raises:
-        InputError: The name is not possible or taken.
-        UnknownNameError: There is no suite or example called `source`.
+        InputError: The name is not valid, or taken.
+        UnknownNameError: There is no suite or example with the name `source`.
     """
     require_name(name)
     path = out / f"{name}.yaml"
@@ -47,12 +49,12 @@ def new_suite(name: str, *, out: Path = Path("suites"), source: str | None = Non
 def new_scene(name: str, *, out: Path = Path("scenes"), source: str | None = None) -> Path:
     """Write a scene; return the path of its YAML file.
 
-    `source` names the scene that is copied, or is its path; without it, it is a commented template. The copy is
-    out/<name>.yaml, or out/<name>/scene.yaml with all files beside it where the original is in a folder of its own.
+    `source` is the name or path of the scene to copy; without it, a commented template is used. The copy is
+    out/<name>.yaml, or out/<name>/scene.yaml with all files beside it if the original has a folder of its own.
 
     Raises:
-        InputError: The name is not possible or taken, or `source` is a model.
-        UnknownNameError: There is no scene called `source`.
+        InputError: The name is not valid or taken, or `source` is a model.
+        UnknownNameError: There is no scene with the name `source`.
     """
     require_name(name)
     file = out / f"{name}.yaml"
@@ -62,7 +64,7 @@ def new_scene(name: str, *, out: Path = Path("scenes"), source: str | None = Non
     original = catalog.find("scene", source).path if source else TEMPLATES / "scene.yaml"
     if original.suffix.lower() in MODEL_SUFFIXES:
         raise InputError(
-            f"a model has no YAML to copy; `vobench new scene {name}`, and give it `meshes: [{{file: {original}}}]`"
+            f"a model has no YAML to copy; run `vobench new scene {name}` and add `meshes: [{{file: {original}}}]`"
         )
     text = _renamed(original, name)
     out.mkdir(parents=True, exist_ok=True)
@@ -74,7 +76,7 @@ def new_scene(name: str, *, out: Path = Path("scenes"), source: str | None = Non
 
 
 def _suite_or_example(name: str) -> Entry:
-    """The example of this name, else the suite. Raises UnknownNameError."""
+    """The example with this name, or else the suite. Raises UnknownNameError."""
     examples = {entry.name: entry for entry in catalog.examples()}
     if name in examples:
         return examples[name]
@@ -83,12 +85,13 @@ def _suite_or_example(name: str) -> Entry:
     except UnknownNameError:
         if "/" in name or name.endswith(".yaml"):
             raise
-    suites = {entry.name for entry in catalog.entries("suite")}
-    raise UnknownNameError(unknown("suite or example", name, sorted(suites | examples.keys())))
+    suite_names = {entry.name for entry in catalog.entries("suite")}
+    known_names = sorted(suite_names | examples.keys())
+    raise UnknownNameError(unknown("suite or example", name, known_names))
 
 
 def _renamed(original: Path, name: str) -> str:
-    """The text of a file with another name, which its comments about commands use too."""
+    """The text of a file with another name, which also replaces the name in its comments."""
     text = original.read_text(encoding="utf-8")
     if original.parent == TEMPLATES:
         return text.replace("NAME", name)

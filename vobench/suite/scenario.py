@@ -1,4 +1,4 @@
-"""A scenario: one thing that makes odometry hard, at severities from 0 to 5, all else the same."""
+"""A scenario: one difficulty for odometry at severities from 0 to 5, with everything else the same."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +11,7 @@ from vobench.sensor.image_sensor import CameraSettings
 from vobench.setting import Name, over, settings
 from vobench.suite import yaml_file
 from vobench.suite.axis import Camera, RigSettings
-from vobench.suite.scene_file import Lighting
+from vobench.suite.scene_lighting import Lighting
 from vobench.suite.trajectory import TrajectorySpec
 
 MOST_SEVERE = 5
@@ -21,9 +21,9 @@ NO_CAMERA = CameraSettings()
 
 @settings()
 class Setup:
-    """What a case is simulated with: one variant of each axis.
+    """The setup that a case is simulated with: one variant of each axis.
 
-    `scene_changes` are values in place of those of the scene's file, by keys with dots between.
+    `scene_changes` are values that replace those of the scene's file; their keys are joined by dots.
     """
 
     scene: str
@@ -36,9 +36,9 @@ class Setup:
 
 @settings()
 class ScenarioFile:
-    """A scenario's YAML: a setup, and for each severity what is changed in it, key by key.
+    """A scenario's YAML: a base setup, and for each severity the keys that change.
 
-    What it does not say itself is as the file has it that it includes: another scenario, or one with a `base` alone.
+    Keys that the file omits are those of the file that it includes: another scenario, or a file with only a `base`.
     """
 
     include: str | None = None
@@ -50,43 +50,43 @@ class ScenarioFile:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """A scenario as its file has it: the name, and the setup of each severity."""
+    """A scenario that was read: its name, its file, and the setup of each severity."""
 
     name: str
     path: Path
     setups: tuple[Setup, ...]
 
     def setup(self, severity: int) -> Setup:
-        """What a case of this severity is simulated with."""
+        """The setup of a case of this severity."""
         return self.setups[severity]
 
     def variant(self, severity: int, scene: str) -> dict[str, str]:
-        """The name on each axis: the scenario's, with the severity where that changes something."""
+        """The name on each axis: the scenario's, with the severity appended if that changes the axis."""
         setup = self.setups[severity]
-        first = self.setups[0]
+        names = {axis: self._name_on(axis, severity, self.name) for axis in AXES}
+        if setup.scene_changes:
+            scene = self._name_on("scene_changes", severity, f"{scene}.{self.name}")
+        return {"scene": scene, **names}
 
-        def name(axis: str, whole: str) -> str:
-            is_same = getattr(setup, axis) == getattr(first, axis)
-            return whole if is_same else f"{whole}.{severity}"
-
-        placed = name("scene_changes", f"{scene}.{self.name}") if setup.scene_changes else scene
-        return {"scene": placed, **{axis: name(axis, self.name) for axis in AXES}}
+    def _name_on(self, axis: str, severity: int, name: str) -> str:
+        is_unchanged = getattr(self.setups[severity], axis) == getattr(self.setups[0], axis)
+        return name if is_unchanged else f"{name}.{severity}"
 
 
 def read_scenario(path: Path) -> Scenario:
-    """The scenario in a file. Raises SuiteError with all that is wrong with it."""
-    read = yaml_file.read_all(path, ScenarioFile, kind="scenario")
-    if read.mistakes:
-        raise SuiteError(*read.mistakes)
-    base = read.source.plain["base"]
-    wrong = list[Mistake]()
+    """The scenario in a file. Raises SuiteError with all mistakes in it."""
+    reading = yaml_file.read_all(path, ScenarioFile, kind="scenario")
+    if reading.mistakes:
+        raise SuiteError(*reading.mistakes)
+    base = reading.source.plain["base"]
+    mistakes = list[Mistake]()
     setups = list[Setup]()
-    for severity, changes in enumerate(read.model.severity):
+    for severity, changes in enumerate(reading.model.severity):
+        place = reading.source.place(("severity", severity))
         try:
-            place = read.source.place(("severity", severity))
             setups.append(yaml_file.checked_section(Setup, over(base, changes), place))
         except SuiteError as error:
-            wrong += error.mistakes
-    if wrong:
-        raise SuiteError(*wrong)
-    return Scenario(read.model.name, path, tuple(setups))
+            mistakes += error.mistakes
+    if mistakes:
+        raise SuiteError(*mistakes)
+    return Scenario(reading.model.name, path, tuple(setups))

@@ -1,4 +1,4 @@
-"""What a scene's YAML may say, beside the materials and levels of the room `scene`."""
+"""What a scene's YAML may say."""
 
 from dataclasses import field, replace
 from typing import Annotated, Any, Literal
@@ -30,7 +30,7 @@ from vobench.setting import ByKind, Check, Name, NonNegative, OneOf, Positive, S
 
 @settings()
 class LevelSpec:
-    """A light's brightness over time, relative to its nominal one: exactly one of these."""
+    """The brightness of a light over time, relative to its nominal brightness; exactly one field is set."""
 
     steady: NonNegative | None = None
     flicker: Flicker | None = None
@@ -38,14 +38,18 @@ class LevelSpec:
     switched: Switched | None = None
 
     def __post_init__(self) -> None:
-        if sum(way is not None for way in (self.steady, self.flicker, self.dimmer, self.switched)) != 1:
+        alternatives = (self.steady, self.flicker, self.dimmer, self.switched)
+        given_count = sum(alternative is not None for alternative in alternatives)
+        if given_count != 1:
             raise SettingError("should have exactly one of steady, flicker, dimmer, switched")
-        require_increasing([t for t, _ in self.dimmer or ()])
+        require_increasing([t_s for t_s, _ in self.dimmer or ()])
 
     def build(self) -> Level:
-        """The function of time."""
+        """The level as a function of time."""
         if self.dimmer:
-            return Dimmer(tuple(t for t, _ in self.dimmer), tuple(level for _, level in self.dimmer))
+            times_s = tuple(t_s for t_s, _ in self.dimmer)
+            levels = tuple(level for _, level in self.dimmer)
+            return Dimmer(times_s, levels)
         return self.flicker or self.switched or Steady(self.steady or 0.0)
 
 
@@ -54,7 +58,7 @@ STEADY = LevelSpec(steady=1.0)
 
 @settings()
 class LightOverride:
-    """A light as a lighting sets it: another power (lamps) or illuminance (sun and sky), or a level over time."""
+    """Another power (lamps) or illuminance (sun and sky) of a light, or another level over time."""
 
     power_lm: NonNegative | None = None
     illuminance_lx: NonNegative | None = None
@@ -65,7 +69,7 @@ Colour = tuple[Share, Share, Share]  # linear red, green and blue
 
 
 def hue(colour: Colour) -> Rgb:
-    """The colour at luminance 1. Raises SettingError for black, which is no colour of light."""
+    """The colour scaled to luminance 1. Raises SettingError for black, which light cannot have."""
     luminance = float(np.array(colour) @ np.array(LUMINANCE))
     if not luminance:
         raise SettingError("light should not be black (got [0, 0, 0])")
@@ -73,10 +77,10 @@ def hue(colour: Colour) -> Rgb:
     return red, green, blue
 
 
-Hue = Annotated[Colour, Check(hue)]  # of light, whose power it leaves as it is
+Hue = Annotated[Colour, Check(hue)]  # of a light; it does not change the power
 
 
-# The light of anything larger would take more memory than machines have.
+# The light map of anything larger would not fit into memory.
 Side = Annotated[float, Gt(0), Le(300)]
 Size = tuple[Side, Side, Side]
 Elevation = Annotated[float, Gt(0), Le(90)]
@@ -84,7 +88,7 @@ Elevation = Annotated[float, Gt(0), Le(90)]
 
 @settings()
 class Luminous:
-    """A material of lamps: what has it shines evenly to all sides of its front, in the hue of a linear RGB `colour`."""
+    """A light-emitting material: its front emits diffusely, in the hue of a linear RGB `colour`."""
 
     kind: Literal["luminous"] = "luminous"
     luminance_cd_m2: Positive
@@ -96,13 +100,13 @@ class Luminous:
         return Material(emission_cd_m2=(red, green, blue))
 
 
-Eta = Annotated[float, Ge(1), Le(4)]  # 1 is an open pane, or no coat
+Eta = Annotated[float, Ge(1), Le(4)]  # refractive index; 1 means no pane, or no coat
 Roughness = Annotated[float, Ge(0), Le(0.5)]
 
 
 @settings(kw_only=False)
 class Matt(Procedural):
-    """Reflects its texture's share of the light alike in all directions (Lambert), times its linear RGB `colour`."""
+    """A diffuse (Lambertian) material: its reflectance is its texture's times its linear RGB `colour`."""
 
     colour: Colour = WHITE
     kind: Literal["matt"] = "matt"
@@ -114,9 +118,9 @@ class Matt(Procedural):
 
 @settings(kw_only=False)
 class Polished(Procedural):
-    """A texture as in Matt under a clear coat, such as waxed stone: matt below, and a mirror that grows to grazing.
+    """A diffuse material under a clear coat, such as waxed stone, which reflects more at grazing angles.
 
-    `tint` scales what the coat mirrors; `roughness` is the RMS slope of its facets (GGX alpha), 0 for none.
+    `tint` scales the coat's reflection; `roughness` is the RMS slope of its facets (GGX alpha), 0 for a smooth coat.
     """
 
     eta: Eta = 1.5
@@ -132,7 +136,7 @@ class Polished(Procedural):
 
 @settings(kw_only=False)
 class Mirror:
-    """A metal that reflects the share `tint` at every angle; `roughness` as in Polished."""
+    """A metal that reflects the share `tint` of the light at every angle; `roughness` as in Polished."""
 
     tint: Share = 0.9
     roughness: Roughness = 0.0
@@ -145,7 +149,7 @@ class Mirror:
 
 @settings(kw_only=False)
 class Glass:
-    """A thin pane: mirrors a little, lets the rest pass straight; `tint` scales what passes. It dims light, no more."""
+    """A thin pane that reflects a little and transmits the rest without refraction; `tint` scales the transmission."""
 
     eta: Eta = 1.5
     tint: Share = 1.0
@@ -162,7 +166,7 @@ MaterialSpec = Annotated[Matt | Polished | Mirror | Glass | Luminous, ByKind("ma
 
 @settings()
 class WindowSpec:
-    """A hole in a wall with a pane depth_m behind it; center_m is the place along the wall (world x or y) and z."""
+    """An opening in a wall with a pane depth_m behind it; center_m is the position along the wall (x or y) and z."""
 
     wall: Wall
     center_m: tuple[float, float]
@@ -174,7 +178,7 @@ class WindowSpec:
 
 @settings()
 class RoomSpec:
-    """Four walls, a floor at z = 0 and a ceiling, around the origin; `walls` are those of another material."""
+    """Four walls around the origin, a floor at z = 0 and a ceiling; `walls` are materials of single walls."""
 
     size_m: Size
     floor: str
@@ -185,19 +189,21 @@ class RoomSpec:
 
     @property
     def extent(self) -> str:
-        """Its size in words."""
+        """The size of the room in words."""
         return f"{' × '.join(f'{side:g}' for side in self.size_m)} m around the origin"
 
     def holds(self, points_m: ArrayLike) -> NDArray[np.bool_]:
         """Which points (..., 3) are within the walls, above the floor and below the ceiling."""
-        half = np.array(self.size_m) / 2
-        within: NDArray[np.bool_] = np.all(np.abs(np.asarray(points_m) - [0, 0, half[2]]) < half, axis=-1)
-        return within
+        half_size_m = np.array(self.size_m) / 2
+        center_m = [0, 0, half_size_m[2]]
+        offset_m = np.abs(np.asarray(points_m) - center_m)
+        is_inside: NDArray[np.bool_] = np.all(offset_m < half_size_m, axis=-1)
+        return is_inside
 
 
 @settings()
 class BoxSpec:
-    """A piece of furniture."""
+    """A box, such as a simple piece of furniture."""
 
     name: Name | None = None
     center_m: Triple
@@ -208,7 +214,7 @@ class BoxSpec:
 
 @settings()
 class BoardSpec:
-    """An upright rectangle seen from the side that faces yaw_deg (0 along x): a picture, a screen, a mirror, a pane."""
+    """An upright rectangle, such as a picture, screen, mirror or pane; its visible side faces yaw_deg (0 along x)."""
 
     name: Name | None = None
     center_m: Triple
@@ -219,7 +225,7 @@ class BoardSpec:
 
 @settings()
 class FurnitureSpec:
-    """A piece of furniture that stands at at_m with its front towards yaw_deg; its chances hang on seed and name."""
+    """A piece of furniture at at_m with its front facing yaw_deg; its random details depend on seed and name."""
 
     kind: Annotated[str, OneOf("piece of furniture", FURNITURE)]
     name: Name
@@ -231,9 +237,10 @@ class FurnitureSpec:
 
 @settings()
 class ModelSpec:
-    """A model from a glTF, OBJ, STL or PLY file, with its origin at at_m; roles of its nodes by globs of their names.
+    """A model from a glTF, OBJ, STL or PLY file with its origin at at_m.
 
-    `scale`: metres of the file's unit. `up`: its upward axis, where it is not what the format says.
+    `roles` maps globs of node names to roles. `scale` is the length of the file's unit in metres. `up` is the upward
+    axis, if it is not the format's.
     """
 
     file: Annotated[str, MinLen(1)]
@@ -247,7 +254,7 @@ class ModelSpec:
 
 @settings()
 class PanelLamp:
-    """A level panel that shines down from a rectangle of size_m."""
+    """A horizontal panel of size_m that emits light downwards."""
 
     name: Name
     kind: Literal["panel"] = "panel"
@@ -265,7 +272,7 @@ class PanelLamp:
 
 @settings()
 class PointLamp:
-    """A bulb."""
+    """A lamp that emits light equally in all directions."""
 
     name: Name
     kind: Literal["point"] = "point"
@@ -281,7 +288,7 @@ class PointLamp:
 
 @settings()
 class SpotLamp:
-    """A bulb in a reflector that points at target_m."""
+    """A lamp in a reflector that points at target_m."""
 
     name: Name
     kind: Literal["spot"] = "spot"
@@ -303,8 +310,8 @@ class SpotLamp:
         """The light."""
         center = np.asarray(self.center_m)
         level = self.level.build()
-        way = np.asarray(self.target_m) - center
-        direction: Array = way / np.linalg.norm(way)
+        towards_target = np.asarray(self.target_m) - center
+        direction: Array = towards_target / np.linalg.norm(towards_target)
         return SpotLight(
             self.name, center, direction, self.power_lm, self.inner_deg, self.outer_deg, level, hue(self.colour)
         )
@@ -315,7 +322,7 @@ LampSpec = Annotated[PanelLamp | PointLamp | SpotLamp, ByKind("lamp", default="p
 
 @settings()
 class SunKey:
-    """Where the sun is at a time."""
+    """The position of the sun at a time."""
 
     t_s: float
     azimuth_deg: float
@@ -324,7 +331,7 @@ class SunKey:
 
 @settings()
 class SunSpec:
-    """Direct sunlight on a surface that faces it; one place, or several in order of time."""
+    """Direct sunlight, as the illuminance of a surface that faces it, from one position or along a path."""
 
     illuminance_lx: NonNegative
     azimuth_deg: float | None = None
@@ -334,15 +341,16 @@ class SunSpec:
     level: LevelSpec = STEADY
 
     def __post_init__(self) -> None:
-        angles = [angle for angle in (self.azimuth_deg, self.elevation_deg) if angle is not None]
-        if len(angles) != (0 if self.path else 2):
+        angles_deg = [angle for angle in (self.azimuth_deg, self.elevation_deg) if angle is not None]
+        needed_count = 0 if self.path else 2
+        if len(angles_deg) != needed_count:
             raise SettingError("should have either azimuth_deg and elevation_deg, or a path")
         require_increasing([key.t_s for key in self.path])
 
 
 @settings()
 class SkySpec:
-    """A sky that gives illuminance_lx on open level ground."""
+    """A sky, as the illuminance of open horizontal ground."""
 
     illuminance_lx: NonNegative
     kind: Annotated[str, OneOf("sky", SKIES)] = "overcast"
@@ -352,7 +360,7 @@ class SkySpec:
 
 @settings()
 class PathKey:
-    """Where a mover is at a time."""
+    """The pose of a mover at a time."""
 
     t_s: float
     position_m: Triple
@@ -361,9 +369,9 @@ class PathKey:
 
 @settings()
 class MoverSpec:
-    """What goes straight from key to key; again and again where it repeats.
+    """A thing that moves in straight lines from key to key, again and again if it `repeats`.
 
-    It is a box around position_m of size_m and material, or a piece of furniture or a model that stands there.
+    It is a box of size_m and material with its centre at position_m, or furniture or a model with its origin there.
     """
 
     name: Name
@@ -378,7 +386,8 @@ class MoverSpec:
         require_increasing([key.t_s for key in self.path])
         if (self.size_m is None) != (self.material is None):
             raise SettingError("a box that moves should have both size_m and material")
-        if sum(shape is not None for shape in (self.size_m, self.kind, self.file)) != 1:
+        shape_count = sum(shape is not None for shape in (self.size_m, self.kind, self.file))
+        if shape_count != 1:
             raise SettingError(
                 "should be a box with size_m and material, or a kind of furniture, or the file of a model"
             )
@@ -386,11 +395,10 @@ class MoverSpec:
 
 @settings()
 class SceneFile:
-    """A scene, and the luminance of matt white that cameras are exposed for.
+    """A scene, and the luminance of diffuse white that cameras are exposed for.
 
-    What stands in it: a room, boxes, boards, furniture, models, and what `maker`, a Python file, makes. Files are named
-    from where the scene's own lies. `seed` decides what furniture and makers leave to chance. `scale` makes all lengths
-    so many times as large.
+    It contains a room, boxes, boards, furniture, models, and what the Python file `maker` creates. Paths are relative
+    to the scene's file. `seed` determines the random details of furniture and makers. `scale` multiplies all lengths.
     """
 
     name: Name
@@ -412,4 +420,4 @@ class SceneFile:
 
     def __post_init__(self) -> None:
         if not (self.room or self.maker or any((self.boxes, self.boards, self.furniture, self.meshes))):
-            raise SettingError("a scene needs something to see: room, boxes, boards, furniture, meshes or a maker")
+            raise SettingError("a scene needs something visible: room, boxes, boards, furniture, meshes or a maker")

@@ -1,4 +1,4 @@
-"""What YAML may say of recordings made elsewhere."""
+"""The recordings in a suite: what YAML may say of them, and the cases that follow."""
 
 import re
 from collections.abc import Iterator
@@ -17,11 +17,11 @@ GLOB = re.compile(r"[*?\[]")
 
 @settings()
 class Source:
-    """A recording, or several by a pattern: a sequence of vobench, a dataset's folder, or a bag.
+    """A recording, or several that match a pattern: sequences of vobench, dataset folders or bags.
 
-    Paths are relative to the suite's file; the form is told by content where it is not given. `calibration` and
-    `imu` are Kalibr's camchain.yaml and imu.yaml, `truth` a trajectory, `rate_hz` for pictures without stamps.
-    `topics` says which of a bag are meant, where its own names do not.
+    Paths are relative to the suite's file. The form is detected from the content if it is not given. `calibration` and
+    `imu` are Kalibr's camchain.yaml and imu.yaml, `truth` is a trajectory file, and `rate_hz` the frame rate of images
+    without stamps. `topics` names the topics of a bag, if their own names are ambiguous.
     """
 
     path: str
@@ -34,18 +34,18 @@ class Source:
     topics: dict[Annotated[str, OneOf("topic", TOPICS)], str] = field(default_factory=dict)
 
     def placed(self, path: Path, folder: Path) -> "Source":
-        """The source of one recording, its files where they are seen from everywhere."""
-        files = {key: getattr(self, key) for key in FILE_KEYS}
-        placed: dict[str, Any] = {key: str(_placed(file, folder)) for key, file in files.items() if file}
-        return replace(self, path=str(path), name=self.name or case_name(path), **placed)
+        """The source of one recording, with absolute paths."""
+        files = dict[str, Any]()
+        for key in FILE_KEYS:
+            written = getattr(self, key)
+            if written:
+                files[key] = str(_absolute(written, folder))
+        return replace(self, path=str(path), name=self.name or case_name(path), **files)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedCase:
-    """One recording that was made elsewhere; `variant` names it on the axis `source`.
-
-    `entry` is which of the suite's sources it is of.
-    """
+    """One recording as a case; `variant` is its name on the axis `source`, `entry` its number in the suite's list."""
 
     name: str
     variant: dict[str, str]
@@ -54,7 +54,7 @@ class RecordedCase:
 
 
 def as_sources(value: Any) -> Any:
-    """One path or mapping stands for a list of one; a bare path for a source with nothing else to say."""
+    """A list of sources: one path or mapping is a list of one, and a path is a source without other keys."""
     entries = value if isinstance(value, tuple | list) else (value,)
     return tuple({"path": entry} if isinstance(entry, str) else entry for entry in entries)
 
@@ -63,56 +63,74 @@ SOURCES = Short(as_sources, {"anyOf": [{"type": "string"}, {"type": "object"}]})
 
 
 def recorded_cases(spec: Source, folder: Path, *, entry: int = 0) -> Iterator[RecordedCase]:
-    """The cases of one source; `folder` is where relative paths start. Raises SuiteError where a pattern finds none."""
-    paths = _found(spec.path, folder)
+    """The cases of one source; relative paths start at `folder`. Raises SuiteError if there is no such recording."""
+    paths = _recording_paths(spec.path, folder)
     if spec.name and len(paths) > 1:
         raise SuiteError(f"{len(paths)} recordings match '{spec.path}', so one name '{spec.name}' is not enough")
     for path in paths:
-        placed = spec.placed(path, folder)
-        name = placed.name or case_name(path)
-        yield RecordedCase(name=name, variant={"source": name}, source=placed, entry=entry)
+        source = spec.placed(path, folder)
+        name = source.name or case_name(path)
+        yield RecordedCase(name=name, variant={"source": name}, source=source, entry=entry)
 
 
 def case_name(path: Path) -> str:
-    """What a recording is called: its folder or file, in characters that are fit for a case; ASL's mav0 is no name."""
-    called = path.parent if path.name == "mav0" else path
-    stem = called.name if called.is_dir() else called.stem
+    """The name of a recording: that of its folder or file, in characters that a case's name may have.
+
+    In the ASL layout the folder mav0 is the same for every recording, so the folder above it counts.
+    """
+    recording = path.parent if path.name == "mav0" else path
+    stem = recording.name if recording.is_dir() else recording.stem
     return re.sub(r"[^a-z0-9_.]+", "_", stem.lower()).strip("_.") or "recording"
 
 
-def _found(written: str, folder: Path) -> list[Path]:
-    placed = _placed(written, folder)
-    if not GLOB.search(written):
-        if not placed.exists():
-            raise SuiteError(f"no folder or file at {placed}")
-        return [placed]
-    paths = _matches(written, folder)
-    if not paths:
-        raise SuiteError(f"no folder or file matches {placed}")
-    return paths
+def _recording_paths(written: str, folder: Path) -> list[Path]:
+    """The paths that a suite's path or pattern refers to. Raises SuiteError if there are none."""
+    absolute = _absolute(written, folder)
+    if GLOB.search(written):
+        paths = _matches(written, folder)
+        if not paths:
+            raise SuiteError(f"no folder or file matches {absolute}")
+        return paths
+    if not absolute.exists():
+        raise SuiteError(f"no folder or file at {absolute}")
+    return [absolute]
 
 
 def _matches(written: str, folder: Path) -> list[Path]:
-    """What a pattern matches, sorted; `**` follows no link. Raises SuiteError where that is too much, or no pattern."""
-    parts = _placed(written, folder).parts
-    first = next(index for index, part in enumerate(parts) if GLOB.search(part))
-    base = Path(*parts[:first])
-    pattern = "/".join(parts[first:])
-    shows_hidden = any(part.startswith(".") for part in parts[first:])
-    found = list[Path]()
+    """The paths that match a pattern, sorted. `**` does not follow links.
+
+    Raises SuiteError if there are too many, or if the pattern is not valid.
+    """
+    parts = _absolute(written, folder).parts
+    first_glob = next(index for index, part in enumerate(parts) if GLOB.search(part))
+    base = Path(*parts[:first_glob])
+    pattern_parts = parts[first_glob:]
     try:
-        for path in base.glob(pattern):
-            is_hidden = any(part.startswith(".") for part in path.relative_to(base).parts)
-            if is_hidden and not shows_hidden:
-                continue
-            found.append(path)
-            if len(found) > MOST_MATCHES:
-                raise SuiteError(f"more than {MOST_MATCHES} files and folders match '{written}'")
-    except (OSError, RecursionError, ValueError) as error:
-        cause = "folders are nested too deep" if isinstance(error, RecursionError) else error
-        raise SuiteError(f"'{written}' cannot be searched for ({cause})") from None
-    return sorted(path for path in found if path.is_dir() or not written.endswith("/"))
+        matches = [*_visible_matches(base, pattern_parts, written)]
+    except RecursionError:
+        raise SuiteError(f"'{written}' cannot be searched for (folders are nested too deep)") from None
+    except (OSError, ValueError) as error:
+        raise SuiteError(f"'{written}' cannot be searched for ({error})") from None
+    only_folders = written.endswith("/")
+    return sorted(path for path in matches if path.is_dir() or not only_folders)
 
 
-def _placed(written: str, folder: Path) -> Path:
+def _visible_matches(base: Path, pattern_parts: tuple[str, ...], written: str) -> Iterator[Path]:
+    """The matches below a folder, without hidden ones unless the pattern asks for them. Raises SuiteError."""
+    shows_hidden = _is_hidden(pattern_parts)
+    count = 0
+    for path in base.glob("/".join(pattern_parts)):
+        if _is_hidden(path.relative_to(base).parts) and not shows_hidden:
+            continue
+        count += 1
+        if count > MOST_MATCHES:
+            raise SuiteError(f"more than {MOST_MATCHES} files and folders match '{written}'")
+        yield path
+
+
+def _is_hidden(parts: tuple[str, ...]) -> bool:
+    return any(part.startswith(".") for part in parts)
+
+
+def _absolute(written: str, folder: Path) -> Path:
     return folder.resolve() / Path(written).expanduser()

@@ -1,4 +1,4 @@
-"""What YAML may say of trajectories: their kinds, the keys that fit who goes, and the files of replayed ones."""
+"""What YAML may say of trajectories: their kinds, the keys of each mover, and the files of replayed ones."""
 
 from pathlib import Path
 from typing import Annotated, Any, get_args
@@ -23,62 +23,78 @@ from vobench.trajectory.trajectory import Stamps, Trajectory
 Spatial = PoseSpline | Handheld | Rail | Quadrotor
 AnyTrajectory = Waypoints | Planar | Spatial | Replay
 KINDS = {get_args(hints(each)["kind"])[0]: each for each in get_args(AnyTrajectory)}
-SOME_MOVERS = {key for keys in MOVER_KEYS.values() for key in keys}
+# Keys of wheeled trajectories that not every mover has.
+MOVER_SPECIFIC_KEYS = set[str]().union(*MOVER_KEYS.values())
 
 
 def known_keys(spec: Wheeled) -> set[str]:
-    """The keys that its mover takes."""
-    return set(hints(type(spec))) - SOME_MOVERS | set(spec.mover_keys[spec.mover])
+    """The keys of a trajectory with its mover."""
+    common_keys = set(hints(type(spec))) - MOVER_SPECIFIC_KEYS
+    return common_keys | set(spec.mover_keys[spec.mover])
 
 
-def _fitting(value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
-    """A trajectory whose keys all belong to its mover. Raises SettingError."""
+def _require_keys_of_mover(value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
+    """The trajectory, whose keys all belong to its mover. Raises SettingError."""
     spec = handler(value)
     if not isinstance(spec, Wheeled) or not isinstance(value, dict):
         return spec
     known = known_keys(spec)
     for key in sorted(set(value) - known):
-        belongs = f"does not belong to mover '{spec.mover}', which has {', '.join(sorted(known))}"
-        raise SettingError(belongs, key)
+        raise SettingError(f"does not belong to mover '{spec.mover}', which has {', '.join(sorted(known))}", key)
     if {"robot", "motors"} <= set(value):
-        raise SettingError("gives the robot anew, which is given by robot; leave one of them out", "motors")
+        raise SettingError("sets the robot, which robot sets as well; remove one of them", "motors")
     return spec
 
 
-def _of_mover(spec: Any, handler: Any) -> Any:
-    """What belongs to the mover: all that its motion depends on, and what can be read again."""
-    dumped = handler(spec)
+def _keys_of_mover(spec: Any, handler: Any) -> Any:
+    """The serialised trajectory with those keys alone that its mover has, so that it can be read again."""
+    serialised = handler(spec)
     if not isinstance(spec, Wheeled):
-        return dumped
-    unused = SOME_MOVERS - known_keys(spec) | ({"robot"} if spec.motors else {"motors"})
-    return {key: value for key, value in dumped.items() if key not in unused}
+        return serialised
+    unused_robot_key = "robot" if spec.motors else "motors"
+    unused_keys = (MOVER_SPECIFIC_KEYS - known_keys(spec)) | {unused_robot_key}
+    return {key: value for key, value in serialised.items() if key not in unused_keys}
 
 
 TrajectorySpec = Annotated[
-    AnyTrajectory, ByKind("trajectory", default="waypoints"), WrapValidator(_fitting), WrapSerializer(_of_mover)
+    AnyTrajectory,
+    ByKind("trajectory", default="waypoints"),
+    WrapValidator(_require_keys_of_mover),
+    WrapSerializer(_keys_of_mover),
 ]
 
 
 def read_times(spec: Replay, folder: Path) -> Stamps | None:
-    """The stamps in the file `times`, where there is one. Raises InputError."""
-    path = folder / spec.times if spec.times else None
-    return parse_times(_text(path), name=str(path)) if path else None
+    """The stamps in the file `times`; None if the trajectory names none. Raises InputError."""
+    if not spec.times:
+        return None
+    path = folder / spec.times
+    return parse_times(_read_text(path), name=str(path))
 
 
 def read_replayed(spec: Replay, folder: Path, times: Stamps | None) -> str:
-    """The poses of the file as TUM text, in our axes; relative paths start in `folder`. Raises InputError."""
+    """The poses of the trajectory's file as TUM text, in body axes; relative paths start at `folder`.
+
+    Raises InputError.
+    """
     path = folder / spec.file
-    parsed = parse_any(_text(path), name=str(path))
-    t_ns = parsed.t_ns if parsed.t_ns is not None else _stamps(spec, times, parsed)
-    if parsed.t_ns is not None and (spec.times or spec.recorded_hz):
-        raise SuiteError(f"times and recorded_hz are for files without stamps, but this one has its own: {path}")
+    parsed = parse_any(_read_text(path), name=str(path))
+    if parsed.t_ns is None:
+        t_ns = _stamps(spec, times, parsed)
+    elif spec.times or spec.recorded_hz:
+        raise SuiteError(f"times and recorded_hz are for files without stamps, but this file has stamps: {path}")
+    else:
+        t_ns = parsed.t_ns
+
     move = spec.move()
-    T = move.apply(parsed.T) if move else parsed.T
-    # KITTI's six digits are made rotations again.
-    return format_tum(Trajectory(t_ns, se3.transform(se3.nearest_rotation(T[:, :3, :3]), T[:, :3, 3])))
+    T = move.apply(parsed.T) if move else parsed.T  # (N, 4, 4)
+    # KITTI's six digits are not exact rotations.
+    rotations = se3.nearest_rotation(T[:, :3, :3])
+    return format_tum(Trajectory(t_ns, se3.transform(rotations, T[:, :3, 3])))
 
 
 def _stamps(spec: Replay, times: Stamps | None, parsed: Parsed) -> Stamps:
+    """The stamps of poses without any: from a file, or from a constant rate. Raises VobenchError."""
     if times is not None:
         t_ns = parsed.stamped_by(times)
         if t_ns is None:
@@ -87,10 +103,10 @@ def _stamps(spec: Replay, times: Stamps | None, parsed: Parsed) -> Stamps:
     if spec.recorded_hz:
         frames = np.arange(len(parsed.T)) if parsed.frames is None else parsed.frames
         return np.rint(frames * NS_PER_S / spec.recorded_hz).astype(np.int64)
-    raise SuiteError(f"no stamps in {spec.file}; give times, a file that has them, or recorded_hz")
+    raise SuiteError(f"no stamps in {spec.file}; set times, to a file with stamps, or recorded_hz")
 
 
-def _text(path: Path) -> str:
+def _read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:

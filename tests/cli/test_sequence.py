@@ -39,14 +39,14 @@ def test_a_trajectory_is_exported_as_text(vobench, here, ran, form, files):
 def test_a_trajectory_without_stamps_is_not_exported(vobench, here):
     (here / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 2)
     said = vobench("export", "poses.txt", "out.tum", "--form", "tum")
-    assert said.err == "vobench: poses without stamps, which the other forms need: poses.txt\n"
+    assert said.err == "vobench: the poses have no stamps, which the other forms need: poses.txt\n"
 
 
 def test_an_import_says_all_that_it_assumed(vobench, sequence):
     vobench("export", sequence, "out", "--form", "kitti")
     said = vobench("import", "out", "back")
     assert "- The body is the left grey camera" in said.out
-    assert said.out.endswith("frames of a recording in the form 'kitti': back\n")
+    assert said.out.endswith("frames of a recording of the form 'kitti': back\n")
     assert "The body is the left grey camera" in vobench("info", "back").out
 
 
@@ -88,7 +88,7 @@ def test_a_sequence_that_was_never_finished_is_recognised(vobench, sequence, her
 def test_a_run_verifies_and_a_changed_one_does_not(vobench, ran):
     said = vobench("verify", "runs/tiny")
     assert said.code == 0
-    assert "score: 2 of 2 as they were" in said.out
+    assert "score: 2 of 2 unchanged" in said.out
     estimate = ran / "latest" / "cases" / "short" / "estimates" / "stand_still" / "0" / "estimate.tum"
     estimate.write_text(estimate.read_text().replace("0.000000000 0.0 ", "0.000000000 0.1 ", 1))
     said = vobench("verify", "runs/tiny")
@@ -105,7 +105,7 @@ WRONG = [
     (("import", "suites", "out", "--topic", "lft=/a"), "no topic named 'lft'. Did you mean 'left'?"),
     (
         ("export", "suites", "out", "--form", "euroc"),
-        "no sequence of ours (it has no sensors.mcap); vobench import makes one: suites",
+        "not a vobench sequence (it has no sensors.mcap); vobench import creates one: suites",
     ),
     (("export", "suites", "out", "--form", "eurok"), "eurok"),
     (("verify", "suites"), "not the folder of a run"),

@@ -79,12 +79,15 @@ def test_a_poor_one_ends_with_0_and_imports_from_inside_vobench_are_named(vobenc
     [
         (
             ("new", "estimator", "My-Own"),
-            "a name should be lower-case letters, digits and _, a letter first (got 'My-Own')",
+            "a name should consist of lower-case letters, digits and _, and begin with a letter (got 'My-Own')",
         ),
-        (("new", "suit", "mine"), "no kind of thing to make named 'suit'. Did you mean 'suite'?"),
-        (("new", "suite", "My-Own"), "a name should be lower-case letters, digits and _, a letter first"),
-        (("new", "suite", "mine", "--command"), "--command is for an estimator, not for a suite"),
-        (("new", "estimator", "mine", "--from", "lk_epipolar"), "--from is for a suite or a scene"),
+        (("new", "suit", "mine"), "no kind of thing to create named 'suit'. Did you mean 'suite'?"),
+        (
+            ("new", "suite", "My-Own"),
+            "a name should consist of lower-case letters, digits and _, and begin with a letter",
+        ),
+        (("new", "suite", "mine", "--command"), "--command requires an estimator, not a suite"),
+        (("new", "estimator", "mine", "--from", "lk_epipolar"), "--from requires a suite or a scene"),
         (
             ("new", "suite", "mine", "--from", "lightning"),
             "no suite or example named 'lightning'. Did you mean 'lighting'?",
@@ -103,12 +106,12 @@ def test_what_is_there_is_not_written_over(vobench, here):
     vobench("new", "estimator", "mine")
     again = vobench("new", "estimator", "mine")
     assert again.code == 1
-    assert "there is one already; choose another name or take it away: estimators/mine" in again.err
+    assert "already exists; choose another name, or remove it: estimators/mine" in again.err
 
 
 def test_a_new_suite_and_scene_are_checked_and_run_by_the_commands_that_new_prints(vobench, here):
     made = vobench("new", "suite", "mine")
-    assert made.out == "Made suites/mine.yaml. Check it: vobench check mine\nRun it: vobench run mine\n"
+    assert made.out == "Created suites/mine.yaml. Check it: vobench check mine\nRun it: vobench run mine\n"
     assert "4 cases, 3 estimators, 12 trials: the suite is valid" in vobench("check", "mine").out
 
     made = vobench("new", "scene", "lab")

@@ -1,0 +1,74 @@
+"""vobench check."""
+
+from typing import TYPE_CHECKING, Any
+
+from vobench.cli import terminal
+from vobench.cli.option import Json, SuiteName, Trust
+from vobench.runner.preflight import PlanSummary, summarize
+from vobench.suite.suite import read_plan
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+LEAST_MINUTES_S = 600  # shorter times are printed in seconds
+
+
+def check_command(suite: SuiteName, *, trust: Trust = False, json: Json = False) -> None:
+    """Validate a suite and print its plan; nothing is rendered."""
+    del trust  # its callback has the effect
+    print_summary(summarize(read_plan(suite)), as_json=json)
+
+
+def print_summary(summary: PlanSummary, *, as_json: bool) -> None:
+    """Print the cases and estimators of a suite; for a dry run also the tasks."""
+    if as_json:
+        terminal.print_json(summary.as_dict())
+        return
+    console = terminal.console()
+    _print_cases(summary, console)
+    _print_estimators(summary, console)
+    found_rows = [list(row.values()) for row in summary.found()]
+    console.print(terminal.table("found", ["kind", "name", "origin", "path"], found_rows))
+    for case in summary.cases:
+        for note in case.notes or ():
+            console.print(f"{case.case}: {note}")
+    if summary.stages is not None:
+        _print_stages(summary.tasks(), console)
+    counts = f"{len(summary.cases)} cases, {len(summary.estimators())} estimators, {summary.trials} trials"
+    console.print(f"{counts}: the suite is valid")
+
+
+def _print_cases(summary: PlanSummary, console: "Console") -> None:
+    rows = list[list[str]]()
+    for case in summary.cases:
+        rows.append([case.case, str(case.frames), f"{case.duration_s:.1f}", case.sequence])
+    title = f"{summary.plan.suite.name}: cases"
+    console.print(terminal.table(title, ["case", "frames", "seconds", "sequence"], rows))
+
+
+def _print_estimators(summary: PlanSummary, console: "Console") -> None:
+    rows = list[list[str]]()
+    for estimator in summary.estimators():
+        needs = ", ".join(estimator["needs"]) or "nothing"
+        rows.append([estimator["estimator"], estimator["version"], needs])
+    console.print(terminal.table("estimators", ["estimator", "version", "needs"], rows))
+
+
+def _print_stages(stages: list[dict[str, Any]], console: "Console") -> None:
+    rows = list[list[str]]()
+    for stage in stages:
+        counts = [str(stage[column]) for column in ("tasks", "in the cache", "to do")]
+        rows.append([stage["stage"], *counts, _format_duration(stage["seconds"])])
+    console.print(terminal.table("tasks", ["stage", "tasks", "in the cache", "to do", "about"], rows))
+    for stage in stages:
+        for reason, count in stage["reasons"].items():
+            console.print(f"{stage['stage']}: {count} to do: {reason}", highlight=False)
+
+
+def _format_duration(seconds: float | None) -> str:
+    """The work of one core in seconds or minutes; empty if it is unknown."""
+    if seconds is None:
+        return ""
+    if seconds < LEAST_MINUTES_S:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min"

@@ -1,0 +1,98 @@
+"""vobench compare."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vobench.cli import terminal
+from vobench.cli.option import Json
+from vobench.report import compare, page
+from vobench.report.leaderboard import Board
+from vobench.runner.bundle import merged, opened
+from vobench.runner.folder import RunFolder
+from vobench.runner.rescore import check, wrong_truths
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+REGRESSED = 3  # exit code if something got worse
+HEADINGS = ("estimator", "verdict", "old", "new", "ratio", "p")
+
+
+def compare_command(
+    old: Annotated[Path, typer.Argument(metavar="OLD", help="A run or a bundle.")],
+    new: Annotated[Path, typer.Argument(metavar="NEW", help="Another run or bundle of the same suite.")],
+    *,
+    at_most: Annotated[
+        float | None,
+        typer.Option(help="Errors of more than this times the old ones count as worse, significant or not."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Print what became better or worse between two runs; exit code 3 if something got worse or fails now."""
+    with (
+        opened(old, terminal.warn) as old_folder,
+        opened(new, terminal.warn) as new_folder,
+        merged([old_folder, new_folder], ["old", "new"]),
+    ):
+        old_board = _checked_board(old_folder, old)
+        new_board = _checked_board(new_folder, new)
+    changes = compare.compare(old_board, new_board, at_most=at_most)
+    regressions = [change for change in changes if change.verdict in compare.REGRESSIONS]
+    differences = compare.environment_differences(old_board, new_board)
+    if json:
+        rows = [asdict(change) for change in changes]
+        terminal.print_json({"worse": len(regressions), "changes": rows, "environment": differences})
+    else:
+        _print_changes(changes, differences)
+    if regressions:
+        raise SystemExit(REGRESSED)
+
+
+def _checked_board(folder: RunFolder, path: Path) -> Board:
+    """The board of a run whose trials were scored again, with a warning about those that differ."""
+    checked = check(folder, wrong_truths(folder) if path.is_file() else {})
+    for note in checked.notes:
+        terminal.warn(f"{path.name}: {note}")
+    return page.board_of(folder, checked.scores)
+
+
+def _print_changes(changes: Sequence[compare.Change], environment_differences: Sequence[str]) -> None:
+    """Print the totals, the cells that changed, and what the environments have not in common."""
+    console = terminal.console()
+    totals = [change for change in changes if not change.case]
+    cells = [change for change in changes if change.case]
+    changed_cells = [cell for cell in cells if cell.verdict != compare.SAME]
+
+    if totals:
+        rows = [_row(change) for change in totals]
+        console.print(terminal.table("lost-aware score over all cases", HEADINGS, rows))
+    if changed_cells:
+        rows = [[cell.case, *_row(cell)] for cell in changed_cells]
+        console.print(terminal.table("ATE % of path", ["case", *HEADINGS], rows))
+    _print_same_count(len(cells) - len(changed_cells), len(cells), console)
+    if environment_differences:
+        console.print(f"The runs differ in what can change scores: {'; '.join(environment_differences)}")
+
+
+def _print_same_count(same_count: int, cell_count: int, console: "Console") -> None:
+    explanation = "ratio: new loss to old, 1 - lost-aware score"
+    console.print(f"{same_count} of {cell_count} cells are the same to the last digit; {explanation}")
+
+
+def _row(change: compare.Change) -> list[str]:
+    p_value = "" if change.p is None else f"{change.p:.2g}"
+    return [change.estimator, change.verdict, change.old, change.new, _format_ratio(change), p_value]
+
+
+def _format_ratio(change: compare.Change) -> str:
+    """The ratio of the losses with its interval, if they are known."""
+    if change.ratio is None:
+        return ""
+    if not change.interval:
+        return f"{change.ratio:.3g}"
+    low, high = change.interval
+    return f"{change.ratio:.3g} [{low:.3g}, {high:.3g}]"

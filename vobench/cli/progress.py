@@ -1,0 +1,49 @@
+"""Progress of a command on standard error."""
+
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, ProgressColumn
+
+Item = TypeVar("Item")
+
+
+class Bars:
+    """Progress bars on a terminal; elsewhere one line for each stage."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+
+        self._console = Console(stderr=True, markup=False)
+
+    def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
+        """The same items, counted on a bar that disappears at the end."""
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with self._progress(f"{what}: {total} frames", *columns) as progress:
+            yield from progress.track(items, total=total, description=what)
+
+    @contextmanager
+    def step(self, what: str) -> Iterator[Callable[[float], object]]:
+        """A spinner around work of unknown length; the function it yields takes the share that is done."""
+        from rich.progress import SpinnerColumn, TaskProgressColumn, TextColumn
+
+        with self._progress(what, SpinnerColumn(), TextColumn(what), TaskProgressColumn()) as progress:
+            task = progress.add_task(what, total=None)
+            yield lambda share: progress.update(task, total=1.0, completed=share)
+
+    def say(self, sentence: str) -> None:
+        """Print a line of its own."""
+        print(f"vobench: {sentence}", file=sys.stderr, flush=True)
+
+    def _progress(self, line: str, *columns: "ProgressColumn") -> "Progress":
+        from rich.progress import Progress
+
+        is_terminal = self._console.is_terminal
+        if not is_terminal:
+            print(line, file=sys.stderr, flush=True)
+        return Progress(*columns, console=self._console, transient=True, disable=not is_terminal)

@@ -1,0 +1,74 @@
+"""Lightings: other powers and levels for the lights of a scene."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from vobench.errors import SuiteError, unknown
+from vobench.scene.light import Light, Sky, Sun, scaled
+from vobench.suite.scene_spec import LightOverride
+from vobench.suite.yaml_source import YamlFile
+
+Lighting = dict[str, LightOverride]  # by the light's name
+
+# Names of the lights that a scene has at most one of.
+SUN = "sun"
+SKY = "sky"
+# Prefixes of the names of things without a name in the file.
+GENERATED_NAMES = ("box_", "board_", "window_", "wall_", "floor", "ceiling")
+
+
+def lit(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, ...]:
+    """The lights under a lighting. Raises SuiteError for an unknown light, or a value that a light cannot have."""
+    names = list(dict.fromkeys(light.name for light in lights))
+    for name in lighting:
+        if name not in names:
+            raise SuiteError(f"lighting: {unknown('light', name, names)}")
+    overridden = list[Light]()
+    for light in lights:
+        override = lighting.get(light.name)
+        overridden.append(light if override is None else _override_light(light, override))
+    return tuple(overridden)
+
+
+def _override_light(light: Light, override: LightOverride) -> Light:
+    """The light with another level. Another power becomes a level, so that its light is computed only once."""
+    is_daylight = isinstance(light, Sun | Sky)
+    unsuitable_key = "power_lm" if is_daylight else "illuminance_lx"
+    if getattr(override, unsuitable_key) is not None:
+        raise SuiteError(f"lighting: {unsuitable_key} does not belong to '{light.name}'")
+
+    level = override.level.build() if override.level else light.level
+    target = override.illuminance_lx if is_daylight else override.power_lm
+    if target is None:
+        return replace(light, level=level)
+    nominal = light.illuminance_lx if isinstance(light, Sun | Sky) else light.power_lm
+    if nominal == 0 and target > 0:
+        raise SuiteError(
+            f"lighting: '{light.name}' is 0 in the scene, so it cannot be set to {target:g}; increase it in the scene"
+        )
+    factor = target / nominal if nominal else 0.0
+    return replace(light, level=scaled(level, factor))
+
+
+def require_possible(name: str, scene: YamlFile) -> None:
+    """Raise SuiteError if no light can have this name, in a scene that was read only in part."""
+    written_names = [*_written_names(scene.marked)]
+    daylight_names = [light for light in (SUN, SKY) if light in scene.marked]
+    known_names = [*written_names, *daylight_names]
+    thing_name = name.partition(".")[0]
+    if thing_name not in known_names and not name.startswith(GENERATED_NAMES):
+        raise SuiteError(f"lighting: {unknown('light', name, known_names)}")
+
+
+def _written_names(tree: Any) -> Iterator[str]:
+    """The value of every key `name` in a tree."""
+    values: Iterable[Any] = ()
+    if isinstance(tree, dict):
+        values = tree.values()
+    elif isinstance(tree, list):
+        values = tree
+    for value in values:
+        if isinstance(value, dict) and isinstance(value.get("name"), str):
+            yield str(value["name"])
+        yield from _written_names(value)

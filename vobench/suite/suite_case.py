@@ -1,0 +1,187 @@
+"""The cases of a suite's axes: every combination of scene, lighting, rig, trajectory and camera."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from vobench.errors import SuiteError
+from vobench.geometry.rig import true_rig
+from vobench.motion.replay import Replay
+from vobench.scene.light import Light
+from vobench.suite import scene_file
+from vobench.suite.axis import RigSettings
+from vobench.suite.case import AXES, Case
+from vobench.suite.lookup import Lookup
+from vobench.suite.scene_spec import SceneFile
+from vobench.suite.suite_spec import Suite
+from vobench.suite.trajectory import read_replayed, read_times
+from vobench.suite.yaml_file import Mistakes
+
+USUAL_RIG = "ahead"  # name of the rig of suites that have none
+USUAL_PITCH_DEG = 10
+SHARED_SETTINGS = ("rendering", "truth", "truth_noise", "frames", "seed")  # of all cases of a suite
+
+Axes = dict[str, Mapping[str, Any]]  # the variants of each axis by name, in the order of AXES
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One combination of the axes: the case's name, and its name on each axis."""
+
+    name: str
+    by_axis: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class AxisReader:
+    """Reads the variants of a suite's axes, of which entries may be missing, and gathers mistakes."""
+
+    suite: Suite
+    mistakes: Mistakes
+    lookup: Lookup
+
+    def _folder(self) -> Path:
+        """The suite's folder, where its relative paths start."""
+        return self.mistakes.source.path.parent
+
+    def scenes(self) -> dict[str, SceneFile]:
+        """The scenes by the names of their files. The suite's lightings are checked on each."""
+        scenes = dict[str, SceneFile]()
+        for index, name in enumerate(self.suite.scenes or ()):
+            with self.mistakes.at("scenes", index):
+                entry = self.lookup.find("scene", name)
+                if entry.name in scenes:
+                    raise SuiteError(
+                        f"two scenes are called '{entry.name}'; list each once, from files with different names"
+                    )
+                scenes[entry.name], scene_mistakes = scene_file.survey(entry.path)
+                self._check_lightings(scenes[entry.name], scene_mistakes)
+                scene_mistakes.require_none()
+        return scenes
+
+    def _check_lightings(self, scene: SceneFile, scene_mistakes: Mistakes) -> None:
+        """Find lightings that name no light of the scene now, rather than after an hour of simulation."""
+        lightings = self.suite.lightings
+        is_scene_complete = not scene_mistakes.found
+        lights: tuple[Light, ...] = ()
+        if is_scene_complete:
+            names = {name for overrides in lightings.values() for name in overrides}
+            lights = scene_lights(scene, names)
+
+        for lighting, overrides in lightings.items():
+            for name, override in overrides.items():
+                with self.mistakes.at("lightings", lighting, name):
+                    if is_scene_complete:
+                        scene_file.lit(lights, {name: override})
+                    else:
+                        scene_file.require_possible(name, scene_mistakes.source)
+
+    def replayed_poses(self) -> dict[str, str]:
+        """The poses of each replayed trajectory as TUM text, by the trajectory's name."""
+        texts = dict[str, str]()
+        for name, spec in (self.suite.trajectories or {}).items():
+            if not isinstance(spec, Replay):
+                continue
+            with self.mistakes.at("trajectories", name, "times"):
+                times = read_times(spec, self._folder())
+                with self.mistakes.at("trajectories", name, "file"):
+                    texts[name] = read_replayed(spec, self._folder(), times)
+        return texts
+
+    def rigs(self) -> dict[str, RigSettings]:
+        """The rigs with the lenses of their files. Rigs that cannot be built are mistakes."""
+        rigs = dict(self.suite.rigs or {})
+        for name, rig in rigs.items():
+            with self.mistakes.at("rigs", name):
+                rigs[name] = check_buildable(rig.read(self._folder()))
+        return rigs
+
+    def axes(self, scenes: dict[str, SceneFile], rigs: dict[str, RigSettings]) -> Axes:
+        """The variants of each axis, with a default rig and default trajectories if there are scenes."""
+        trajectories: Mapping[str, Any] = self.suite.trajectories or {}
+        if scenes and not rigs:
+            rigs = {USUAL_RIG: RigSettings(pitch_deg=USUAL_PITCH_DEG)}
+        if scenes and not trajectories:
+            trajectories = self._default_trajectories(scenes)
+        return {
+            "scene": scenes,
+            "lighting": self.suite.lightings,
+            "rig": rigs,
+            "trajectory": trajectories,
+            "camera": self.suite.cameras,
+        }
+
+    def _default_trajectories(self, scenes: dict[str, SceneFile]) -> dict[str, Any]:
+        """A circle in the free space of each scene."""
+        from vobench.suite.free_way import circular_path
+        from vobench.suite.scene_build import build
+
+        trajectories = dict[str, Any]()
+        for index, (name, scene) in enumerate(scenes.items()):
+            with self.mistakes.at("scenes", index):
+                if not self.mistakes.found:
+                    trajectories[_default_trajectory_name(name, scenes)] = circular_path(build(scene, {}))
+        return trajectories
+
+    def variants(self, axes: Axes) -> list[Variant]:
+        """Every combination of the axes; a default trajectory is combined with its own scene only."""
+        variants = _combinations(axes)
+        if self.suite.trajectories:
+            return variants
+        scenes = axes["scene"]
+        own_variants = list[Variant]()
+        for variant in variants:
+            own_trajectory = _default_trajectory_name(variant.by_axis["scene"], scenes)
+            if variant.by_axis["trajectory"] == own_trajectory:
+                own_variants.append(variant)
+        return own_variants
+
+    def case(self, variant: Variant, axes: Axes, replayed: Mapping[str, str]) -> Case:
+        """The case of one combination."""
+        chosen = {axis: axes[axis][name] for axis, name in variant.by_axis.items()}
+        return Case(
+            name=variant.name,
+            variant=variant.by_axis,
+            **chosen,
+            replayed=replayed.get(variant.by_axis["trajectory"]),
+            **shared_settings(self.suite),
+        )
+
+
+def _default_trajectory_name(scene: str, scenes: Collection[str]) -> str:
+    return "found" if len(scenes) == 1 else f"found_{scene}"
+
+
+def _combinations(axes: Axes) -> list[Variant]:
+    """Every combination of the axes, named after the variants of those axes that have several."""
+    variants = list[Variant]()
+    for names in product(*axes.values()):
+        by_axis = dict(zip(AXES, names, strict=True))
+        differing = [name for axis, name in by_axis.items() if len(axes[axis]) > 1]
+        variants.append(Variant("-".join(differing) or by_axis["trajectory"], by_axis))
+    return variants
+
+
+def shared_settings(suite: Suite) -> dict[str, Any]:
+    """The settings that all cases of a suite share."""
+    return {key: getattr(suite, key) for key in SHARED_SETTINGS}
+
+
+def check_buildable(rig: RigSettings) -> RigSettings:
+    """The same rig. Raises VobenchError if it, or its calibration error, cannot be built."""
+    true_rig(rig.build(), rig.calibration_error)
+    return rig
+
+
+def scene_lights(scene: SceneFile, names: Collection[str]) -> tuple[Light, ...]:
+    """The lights of a scene, which include those of `names`.
+
+    If the scene's file lists all of `names`, only the listed lights are returned and no geometry is built.
+    """
+    from vobench.suite.scene_build import build, listed_lights
+
+    listed = tuple(listed_lights(scene))
+    listed_names = {light.name for light in listed}
+    return listed if listed_names.issuperset(names) else build(scene, {}).lights

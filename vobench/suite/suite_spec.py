@@ -1,0 +1,162 @@
+"""What a suite's YAML may say."""
+
+from collections.abc import Collection
+from dataclasses import field, fields
+from typing import Annotated, Any, Literal, get_args
+
+from annotated_types import Ge, Le, MinLen
+
+from vobench.errors import SettingError
+from vobench.estimator.manifest import Limits
+from vobench.geometry.rig import Level
+from vobench.sensor.image_sensor import CameraSettings
+from vobench.sensor.pixel_truth import CHANNELS
+from vobench.setting import Name, OneOf, Short, hints, settings
+from vobench.suite.axis import Camera, RigSettings
+from vobench.suite.scenario import MOST_SEVERE
+from vobench.suite.scene_lighting import Lighting
+from vobench.suite.source import SOURCES, Source
+from vobench.suite.trajectory import TrajectorySpec
+
+ENGINES = ("raster", "path", "pyrender")
+MOST_SAMPLES = 65536
+
+NEEDS_NO_SCENES = {"scenarios", "source"}
+NEEDS_SCENES = {"rigs", "trajectories"}
+
+
+@settings()
+class Rendering:
+    """The engine that renders the images.
+
+    `raster` rasterises with precomputed light, `path` traces `samples` light paths through each pixel (None: the path
+    tracer's own default), and `pyrender` is the stock renderer of that name.
+    """
+
+    engine: Annotated[str, OneOf("engine", ENGINES)] = "raster"
+    samples: Annotated[int, Ge(1), Le(MOST_SAMPLES)] | None = None
+
+    def __post_init__(self) -> None:
+        if self.engine != "path" and self.samples is not None:
+            raise SettingError(f"samples requires engine path, but the engine is {self.engine}; remove samples")
+
+    @property
+    def needs_bake(self) -> bool:
+        """Whether the engine needs the precomputed light of the scene."""
+        return self.engine == "raster"
+
+
+@settings()
+class TruthNoise:
+    """Noise of the poses of the scored ground truth, as in a reference system of a real recording.
+
+    Standard deviations of the position along each axis, and of the rotation about each axis.
+    """
+
+    position_m: Annotated[float, Ge(0), Le(1)] = 0.0
+    rotation_deg: Annotated[float, Ge(0), Le(10)] = 0.0
+
+
+EXACT = TruthNoise()
+
+
+@settings()
+class EstimatorSettings:
+    """An estimator with parameters and limits other than its manifest's."""
+
+    name: str
+    label: Name | None = None
+    params: dict[str, Any] = field(default_factory=dict)
+    limits: dict[Annotated[str, OneOf("limit", hints(Limits))], float] = field(default_factory=dict)
+
+
+def _as_tuple(value: Any) -> Any:
+    return (value,) if isinstance(value, int) else value
+
+
+Severity = Annotated[int, Ge(0), Le(MOST_SEVERE)]
+Severities = Annotated[tuple[Severity, ...], MinLen(1), Short(_as_tuple, {"type": "integer"})]
+
+
+def _at_all_severities(value: Any) -> Any:
+    """A list of calibration levels as a mapping that runs each at every severity."""
+    if not isinstance(value, (list, tuple)):
+        return value
+    if not all(isinstance(level, str) for level in value):
+        return value
+    severities = range(MOST_SEVERE + 1)
+    return {level: list(severities) for level in value}
+
+
+Calibrations = Annotated[
+    dict[Level, Severities],
+    MinLen(1),
+    Short(_at_all_severities, {"type": "array", "items": {"enum": get_args(Level)}, "minItems": 1}),
+]
+
+
+def _as_named(value: Any) -> Any:
+    return {"name": value} if isinstance(value, str) else value
+
+
+ChannelName = Annotated[str, OneOf("ground-truth channel", CHANNELS)]
+NamedEstimator = Annotated[EstimatorSettings, Short(_as_named, {"type": "string"})]
+Window = tuple[Annotated[int, Ge(0)], Annotated[int, Ge(2)]]
+Mode = Literal["step", "real_time"]
+
+
+@settings()
+class Suite:
+    """A suite: estimators, and the cases that they run on.
+
+    The cases are every combination of scene, lighting, rig, trajectory and camera, every recording of `source`, and
+    each of `scenarios` at the severities it is listed with. Each axis names its variants; change one axis to change
+    one factor. Without rigs, a stereo pair looks ahead; without trajectories, the body drives a circle in the free
+    space of each scene. A suite of recordings or scenarios alone has no axes. Scenarios are repeated for each of
+    `calibrations` that lists their severity. With `frames`, only the frames from the first number up to, not
+    including, the second are rendered. Keys that the file omits are those of the suite that it includes.
+    """
+
+    include: str | None = None
+    name: Name
+    summary: str = ""
+    seed: Annotated[int, Ge(0)] = 0
+    repeats: Annotated[int, Ge(1), Le(100)] = 1
+    source: Annotated[tuple[Source, ...], SOURCES] = ()
+    scenarios: Annotated[dict[str, Severities], MinLen(1)] | None = None
+    calibrations: Calibrations | None = None
+    scenes: Annotated[tuple[str, ...], MinLen(1)] | None = None
+    lightings: Annotated[dict[Name, Lighting], MinLen(1)] = field(default_factory=lambda: {"as_built": {}})
+    rigs: Annotated[dict[Name, RigSettings], MinLen(1)] | None = None
+    trajectories: Annotated[dict[Name, TrajectorySpec], MinLen(1)] | None = None
+    cameras: Annotated[dict[Name, Camera], MinLen(1)] = field(default_factory=lambda: {"clean": CameraSettings()})
+    rendering: Rendering = Rendering()
+    truth: tuple[ChannelName, ...] = ()
+    truth_noise: TruthNoise = EXACT
+    frames: Window | None = None
+    modes: Annotated[tuple[Mode, ...], MinLen(1)] = ("step",)
+    share_time: bool = False
+    estimators: Annotated[tuple[NamedEstimator, ...], MinLen(1)]
+
+    def __post_init__(self) -> None:
+        given_keys = {each.name for each in fields(self) if getattr(self, each.name)}
+        missing = missing_axis(given_keys)
+        if missing:
+            raise SettingError(missing)
+        if self.calibrations and not self.scenarios:
+            raise SettingError(
+                "requires scenarios, and the suite has none; use calibration_error of a rig", "calibrations"
+            )
+
+
+def missing_axis(given_keys: Collection[str]) -> str | None:
+    """What a suite with these keys lacks, in a sentence; None if it lacks nothing.
+
+    A suite needs scenes, scenarios or a source, and rigs and trajectories need scenes.
+    """
+    keys = set(given_keys)
+    if "scenes" in keys:
+        return None
+    if keys & NEEDS_NO_SCENES and not keys & NEEDS_SCENES:
+        return None
+    return "scenes: this key is missing; a suite needs scenes, or only scenarios or a source"
