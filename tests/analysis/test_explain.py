@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vobench.analysis.explain import (
-    FEWEST_BLOCKS,
-    MORE_SEEDS,
+    MIN_BLOCKS,
+    MORE_REPEATS,
     Explanation,
     Outcome,
     explain,
@@ -28,7 +28,7 @@ def explained(
     """The explanation where a case with these nuisances left has that mean error."""
     nuisances = nuisances_of(hard)
     rng = np.random.default_rng(1)
-    shape = {nth: rng.lognormal(0, 0.5, parts) for nth in range(MORE_SEEDS * max(repeats, FEWEST_BLOCKS))}
+    shape = {nth: rng.lognormal(0, 0.5, parts) for nth in range(MORE_REPEATS * max(repeats, MIN_BLOCKS))}
 
     def measure(cases: Mapping[str, Case]) -> Mapping[str, Sequence[Outcome]]:
         return {name: [outcome(case)] for name, case in cases.items()}

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vobench.analysis.explain import Change, Explanation, Outcome, explain, mends
+from vobench.analysis.explain import Change, Explanation, Outcome, explain, is_sufficient
 from vobench.analysis.nuisance import NUISANCES, Nuisance, nuisances_of
 from vobench.analysis.trial_data import read_conditions, read_outcome
 from vobench.errors import InputError
@@ -34,7 +34,7 @@ class TrialExplanation:
 
     def verdict(self, change: Change) -> str:
         """What removing these nuisances does: "mends it", "helps", "harms" or "no difference"."""
-        if mends(change, self.explanation.everything):
+        if is_sufficient(change, self.explanation.everything):
             return "mends it"
         if change.is_sure:
             return "helps"
