@@ -6,18 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from vobench.analysis.realism import (
-    STATISTICS,
-    WINDOW,
-    Shot,
-    edge_px,
-    gradients,
-    measure,
-    noise_dn,
-    says,
-    spectrum,
-    window_starts,
-)
+from vobench.analysis.image_noise import noise_dn
+from vobench.analysis.image_statistics import edge_px, gradients, spectrum
+from vobench.analysis.realism import STATISTICS, WINDOW, Shot, measure, says, window_starts
 from vobench.errors import InputError
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
@@ -77,7 +68,7 @@ def test_one_eye_has_eight_statistics_and_a_sentence():
     found = measure([[Shot(picture, None)] * 3], RIG)
     assert list(found.values) == [s.name for s in STATISTICS][1:]
     assert found.values["tracks_home"] == 100
-    assert says(found)[0].startswith("There is no pair to judge")
+    assert says(found)[0].startswith("There is no stereo pair to judge")
 
 
 def test_a_statistic_says_what_brings_it_into_its_band():

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vobench.analysis import recording_twin, twin
+from vobench.analysis import camera_fit, path_placement, recording_twin
+from vobench.analysis.path_placement import Placement
 from vobench.analysis.realism import Realism
 from vobench.analysis.realism_report import realism_of
 from vobench.analysis.recording_twin import REAL, TWIN, TwinSuite, compare_twin, write_twin_suite
-from vobench.analysis.twin import Placement
 from vobench.dataset.recording import Recording
 from vobench.errors import InputError, UnknownNameError
 from vobench.geometry import se3
@@ -36,8 +36,10 @@ def realism(recording: Recording) -> Realism:
 @pytest.fixture
 def suite(recorded_case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> TwinSuite:
     """The suite of a twin in the closet that was recorded, placed and fitted in few steps."""
-    for name, value in (("DRAWS", 600), ("NEAR_DRAWS", 100), ("ROUNDS", 1), ("HALVINGS", 2)):
-        monkeypatch.setattr(twin, name, value)
+    monkeypatch.setattr(path_placement, "DRAWS", 600)
+    monkeypatch.setattr(path_placement, "NEAR_DRAWS", 100)
+    monkeypatch.setattr(camera_fit, "ROUNDS", 1)
+    monkeypatch.setattr(camera_fit, "HALVINGS", 2)
     monkeypatch.setattr(recording_twin, "FITTED_PICTURES", 2)
     monkeypatch.setenv("VOBENCH_CACHE", str(tmp_path / "cache"))
     closet = next(recorded_case.resolve().parents[4].glob("closet.yaml"))

@@ -4,7 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from vobench.analysis.stereo_fit import SLANT, PairShot, fit_pair, refined
+from vobench.analysis.patch_refinement import SLANT, refined
+from vobench.analysis.stereo_fit import fit_pair
+from vobench.analysis.stereo_matches import PairShot
 from vobench.estimator.tools import stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole

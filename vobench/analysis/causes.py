@@ -1,6 +1,6 @@
 """Regression of an estimator's error on the conditions of its frames, and where each trial diverged."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +38,8 @@ class Course:
     @property
     def first_divergence(self) -> int | None:
         """The first frame whose error is far above the trial's median, or that has no pose; None if there is none."""
-        threshold = np.clip(DIVERGENCE_FACTOR * np.median(self.loss[1:]), MIN_LOSS, MAX_DIVERGENCE_LOSS)
+        median = np.median(self.loss[1:])
+        threshold = np.clip(DIVERGENCE_FACTOR * median, MIN_LOSS, MAX_DIVERGENCE_LOSS)
         outliers = np.flatnonzero(self.loss > threshold)
         return int(outliers[0]) if len(outliers) else None
 
@@ -105,6 +106,12 @@ class _Window:
         """The mean over the segment of values (N,) of all frames."""
         return float(values[self.first : self.end].mean())
 
+    def mean_loss(self) -> float:
+        return self.mean(self.trial.loss)
+
+    def mean_conditions(self, names: Sequence[str]) -> list[float]:
+        return [self.mean(self.trial.conditions[name]) for name in names]
+
 
 def attribute(courses: Sequence[Course]) -> Attribution | None:
     """Regress the logarithm of the error on all conditions that vary; return None if there are too few segments.
@@ -112,19 +119,20 @@ def attribute(courses: Sequence[Course]) -> Attribution | None:
     Conditions whose correlation is COLLINEAR or more are merged. The confidence intervals come from resampling the
     segments of each trial: they cover other frames of the same scenes, not other scenes.
     """
-    windows = _windows(courses)
+    windows = list(_windows(courses))
     if len(windows) < MIN_SEGMENTS:
         return None
 
     names = tuple(courses[0].conditions)
     levels = np.sqrt(_mean_conditions(windows, names))  # (M, C)
-    varies = levels.std(0) > MIN_RELATIVE_SPREAD * np.maximum(levels.max(0), MIN_RELATIVE_SPREAD)
+    largest = np.maximum(levels.max(0), MIN_RELATIVE_SPREAD)
+    varies = levels.std(0) > MIN_RELATIVE_SPREAD * largest
     if not varies.any():
         return None
     varying = [names[index] for index in np.flatnonzero(varies)]
     constant = [names[index] for index in np.flatnonzero(~varies)]
 
-    losses = np.array([window.mean(window.trial.loss) for window in windows])  # (M,)
+    losses = np.array([window.mean_loss() for window in windows])  # (M,)
     log_losses = np.log(np.maximum(losses, MIN_LOSS))
     groups, predictors = _merge_collinear(varying, levels[:, varies])  # (M, K)
     slopes = _ridge_slopes(predictors, log_losses)  # (K,)
@@ -134,11 +142,13 @@ def attribute(courses: Sequence[Course]) -> Attribution | None:
     causes = []
     for k, group in enumerate(groups):
         interval = np.percentile(resampled_slopes[:, k] * ranges[k], INTERVAL_PERCENT)
-        factor, low, high = np.exp([slopes[k] * ranges[k], *interval]).tolist()
+        effect = slopes[k] * ranges[k]
+        factor, low, high = np.exp([effect, *interval]).tolist()
         causes.append(Cause(group, factor, low, high))
 
     contributions = (predictors - np.median(predictors, axis=0)) * slopes  # (M, K), to the logarithm of the error
-    residual = log_losses - log_losses.mean() - (predictors - predictors.mean(0)) @ slopes
+    predicted = (predictors - predictors.mean(0)) @ slopes
+    residual = log_losses - log_losses.mean() - predicted
     return Attribution(
         causes=tuple(sorted(causes, key=_strength, reverse=True)),
         segments=_segments(windows, losses, causes, contributions),
@@ -148,27 +158,23 @@ def attribute(courses: Sequence[Course]) -> Attribution | None:
     )
 
 
-def _windows(courses: Sequence[Course]) -> list[_Window]:
-    """All segments of all trials; the first frame has no error and belongs to none."""
-    windows = []
+def _windows(courses: Sequence[Course]) -> Iterator[_Window]:
+    """Yield all segments of all trials; the first frame has no error and belongs to none."""
     for number, course in enumerate(courses):
         for first in range(1, len(course.loss), SEGMENT_FRAMES):
-            windows.append(_Window(course, number, first))
-    return windows
+            yield _Window(course, number, first)
 
 
 def _mean_conditions(windows: Sequence[_Window], names: Sequence[str]) -> Array:
     """The mean of each condition over each segment (M, C)."""
-    rows = []
-    for window in windows:
-        rows.append([window.mean(window.trial.conditions[name]) for name in names])
-    return np.array(rows)
+    return np.array([window.mean_conditions(names) for window in windows])
 
 
 def _usual_ranges(predictors: Array) -> Array:
     """The range (K,) of each predictor (M, K) between its percentiles, or all of it where these coincide."""
     low, high = np.percentile(predictors, USUAL_RANGE_PERCENT, axis=0)
-    return np.where(high > low, high - low, np.ptp(predictors, axis=0))
+    full_range = np.ptp(predictors, axis=0)
+    return np.asarray(np.where(high > low, high - low, full_range))
 
 
 def _strength(cause: Cause) -> float:
@@ -177,18 +183,24 @@ def _strength(cause: Cause) -> float:
 
 
 def _segments(
-    windows: Sequence[_Window], losses: Array, causes: Sequence[Cause], contributions: Array
+    windows: Sequence[_Window],
+    losses: Array,
+    causes: Sequence[Cause],
+    contributions: Array,
 ) -> tuple[Segment, ...]:
     """The segments with their errors (M,) and factors, the largest error first."""
     segments = []
     for window, loss, contribution in zip(windows, losses.tolist(), contributions, strict=True):
         factors = _factors(causes, contribution)
-        segments.append(Segment(window.trial.case, window.trial.repeat, window.first, window.end, loss, factors))
+        trial = window.trial
+        segments.append(Segment(trial.case, trial.repeat, window.first, window.end, loss, factors))
     return tuple(sorted(segments, key=lambda segment: segment.loss, reverse=True))
 
 
 def _factors_by_case(
-    windows: Sequence[_Window], causes: Sequence[Cause], contributions: Array
+    windows: Sequence[_Window],
+    causes: Sequence[Cause],
+    contributions: Array,
 ) -> dict[str, tuple[tuple[Cause, float], ...]]:
     """The mean factors of each case."""
     case_of_window = np.array([window.trial.case for window in windows])
@@ -221,7 +233,7 @@ def _merge_collinear(names: Sequence[str], levels: Array) -> tuple[list[tuple[st
     merged_names = []
     columns = []
     for number in dict.fromkeys(group.tolist()):
-        members = np.flatnonzero(group == number)
+        members = np.flatnonzero(group == number).tolist()
         signs = np.sign(correlation[members[0], members])
         merged_names.append(tuple(names[member] for member in members))
         columns.append((standardised[:, members] * signs).mean(1))
@@ -233,7 +245,8 @@ def _ridge_slopes(predictors: Array, values: Array) -> Array:
     centred = predictors - predictors.mean(0)
     penalty = RIDGE * len(predictors) * np.eye(predictors.shape[1])
     normal_matrix = centred.T @ centred + penalty
-    return np.asarray(np.linalg.solve(normal_matrix, centred.T @ (values - values.mean())))
+    right_side = centred.T @ (values - values.mean())
+    return np.asarray(np.linalg.solve(normal_matrix, right_side))
 
 
 def _resampled_slopes(windows: Sequence[_Window], predictors: Array, values: Array) -> Array:
@@ -249,6 +262,9 @@ def _resampled_slopes(windows: Sequence[_Window], predictors: Array, values: Arr
     return np.array(slopes)
 
 
-def _resampled_rows(rows_of_trials: Sequence[NDArray[np.intp]], rng: np.random.Generator) -> NDArray[np.intp]:
+def _resampled_rows(
+    rows_of_trials: Sequence[NDArray[np.intp]],
+    rng: np.random.Generator,
+) -> NDArray[np.intp]:
     """As many rows of each trial as it has, drawn with replacement."""
     return np.concatenate([rng.choice(rows, len(rows)) for rows in rows_of_trials])

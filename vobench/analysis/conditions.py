@@ -7,6 +7,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from vobench.analysis.image_noise import BLACK_DN, SATURATED_DN
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
@@ -42,8 +43,6 @@ CONDITIONS: dict[str, tuple[str, str]] = {
     "missing_frames": ("", "frames missing since the previous one"),
 }
 RAYS_PER_ROW = 60  # about as many pixels of an image row are traced
-SATURATED_DN = 254
-BLACK_DN = 2
 MIN_CONTRAST = 0.02  # keeps the faintness of a plain surface finite
 MIN_MEAN_REFLECTANCE = 1e-3
 RESPONSE_GAMMA = 2.2  # of grey values over the linear signal, approximately
@@ -54,7 +53,12 @@ DB_PER_STOP = 20 * np.log10(2)
 Exposures = Mapping[int, tuple[float, float]]  # exposure time in s and gain in dB, by time stamp
 
 
-def conditions(case: Case, gt: Trajectory, frames: Iterable[StereoFrame], exposures: Exposures) -> dict[str, Array]:
+def conditions(
+    case: Case,
+    gt: Trajectory,
+    frames: Iterable[StereoFrame],
+    exposures: Exposures,
+) -> dict[str, Array]:
     """Compute all CONDITIONS (N,) of the N frames of a simulated case; shares are from 0 to 1.
 
     `gt` is the trajectory of the left camera with a pose for each frame.
@@ -121,11 +125,16 @@ class SubsampledCamera:
 
     def rays(self, uv_px: Array) -> Array:
         """Unit rays (..., 3) of pixels (..., 2) of this camera."""
-        return self.full.rays(uv_px * self.step + (self.step - 1) / 2)
+        return self.full.rays(uv_px * self.step + self._first_px)
 
     def project(self, points_camera: Array) -> Array:
         """Pixels (..., 2) of this camera in which points (..., 3) are seen."""
-        return (self.full.project(points_camera) - (self.step - 1) / 2) / self.step
+        return (self.full.project(points_camera) - self._first_px) / self.step
+
+    @property
+    def _first_px(self) -> float:
+        """The pixel of the full camera at the centre of the first pixel of this one."""
+        return (self.step - 1) / 2
 
 
 class _SceneObserver:
@@ -140,7 +149,7 @@ class _SceneObserver:
         self._caster = TruthCaster(scene)
         materials = [scene.materials.get(name) for name in self._caster.names.material]
         self._contrast = np.array([_contrast(material) for material in materials])  # (materials,)
-        self._is_coated = np.array([material is not None and material.is_coated for material in materials])
+        self._is_coated = np.array([bool(material and material.is_coated) for material in materials])
         self._rays = self._camera.rays(pixel_grid(cast("Camera", self._camera)))  # (H, W, 3)
 
     def conditions(self, now: Shot, later: Shot) -> dict[str, float]:
@@ -209,7 +218,9 @@ class _SceneObserver:
         in_true_right_m = se3.apply(se3.inverse(true.T_left_right), points_m)
         nominal_right_px = nominal.camera("right").project(in_nominal_right_m)
         right_error_px = nominal_right_px - true.camera("right").project(in_true_right_m)
-        return np.asarray((np.linalg.norm(left_error_px, axis=-1) + np.linalg.norm(right_error_px, axis=-1)) / 2)
+        left_length_px = np.linalg.norm(left_error_px, axis=-1)
+        right_length_px = np.linalg.norm(right_error_px, axis=-1)
+        return np.asarray((left_length_px + right_length_px) / 2)
 
 
 def _contrast(material: Material | None) -> float:
@@ -222,7 +233,8 @@ def _contrast(material: Material | None) -> float:
     if material.texture is None:
         return 0.0
     pixels = np.asarray(material.texture.pixels()[::2, ::2])
-    grey = pixels.astype(np.float32) if pixels.ndim == 2 else linear(pixels[..., :3]).mean(-1)
+    is_grey = pixels.ndim == 2
+    grey = pixels.astype(np.float32) if is_grey else linear(pixels[..., :3]).mean(-1)
     return float(grey.std() / max(float(grey.mean()), MIN_MEAN_REFLECTANCE))
 
 
@@ -264,13 +276,19 @@ def _brightness_stops(image: Any) -> float:
 
 
 def _camera_conditions(
-    case: Case, *, speed_pxps: float, mean_dn: float, exposure_s: float, gain_db: float
+    case: Case,
+    *,
+    speed_pxps: float,
+    mean_dn: float,
+    exposure_s: float,
+    gain_db: float,
 ) -> dict[str, float]:
     """The conditions that follow from the camera's settings, the image motion and the mean grey value."""
     camera = case.camera
     motion_sigma_px = SIGMA_PER_SMEAR * speed_pxps * exposure_s * camera.motion_blur
+    lens_sigma_px = camera.blur_sigma_px
     defocus_sigma_px = SIGMA_PER_DEFOCUS * camera.defocus_px
-    blur_px = np.sqrt(motion_sigma_px**2 + camera.blur_sigma_px**2 + defocus_sigma_px**2)
+    blur_px = np.sqrt(motion_sigma_px**2 + lens_sigma_px**2 + defocus_sigma_px**2)
     return {
         "blur": float(blur_px),
         "rolling": speed_pxps * camera.readout_s,
@@ -281,11 +299,13 @@ def _camera_conditions(
 def chip_noise_dn(chip: CameraSensor, grey_dn: float, *, gain_db: float = 0.0) -> float:
     """The temporal noise of a chip at a grey value. Source: EMVA 1288, release 3.1, eq. 10."""
     amplification = 10 ** (gain_db / 20)
-    neighbours = np.clip(np.array([grey_dn - 1, grey_dn + 1]), 0, FULL_SCALE_DN) / FULL_SCALE_DN
-    low, high = chip.curve.decode(neighbours)
+    neighbours_dn = np.array([grey_dn - 1, grey_dn + 1])
+    below, above = np.clip(neighbours_dn, 0, FULL_SCALE_DN) / FULL_SCALE_DN
+    low, high = chip.curve.decode(np.array([below, above]))
     electrons = (low + high) / 2 * chip.full_well_e / amplification
-    sigma_e = np.sqrt(chip.read_noise_e**2 + chip.shot_noise * electrons)
-    slope_dn = (neighbours[1] - neighbours[0]) * FULL_SCALE_DN / max(high - low, 1e-9)  # grey values per full well
+    shot_variance_e = chip.shot_noise * electrons
+    sigma_e = np.sqrt(chip.read_noise_e**2 + shot_variance_e)
+    slope_dn = (above - below) * FULL_SCALE_DN / max(high - low, 1e-9)  # grey values per full well
     return float(slope_dn * sigma_e * amplification / chip.full_well_e)
 
 
@@ -306,7 +326,8 @@ def _changes(previous: _FrameState, current: _FrameState, usual_step_ns: float) 
     """The conditions that compare a frame with the previous one; the first frame is compared with itself."""
     exposure_change = current.exposure_stops - previous.exposure_stops
     brightness_change = current.brightness_stops - previous.brightness_stops
-    R_previous_current = previous.T_world_left[:3, :3].T @ current.T_world_left[:3, :3]
+    R_world_previous = previous.T_world_left[:3, :3]
+    R_previous_current = R_world_previous.T @ current.T_world_left[:3, :3]
     steps = (current.t_ns - previous.t_ns) / usual_step_ns
     return {
         "exposure_jump": abs(exposure_change),

@@ -34,12 +34,19 @@ def segment_loss(gt: Trajectory, est: Trajectory, *, scale: float = 1.0) -> Arra
     count = max(1, min(SEGMENTS, (len(gt) - 1) // MIN_STEPS))
     borders_ns = np.linspace(gt.t_ns[0], gt.t_ns[-1], count + 1)
     after = np.searchsorted(gt.t_ns, borders_ns).clip(1, len(gt) - 1)
-    is_before_nearer = borders_ns - gt.t_ns[after - 1] < gt.t_ns[after] - borders_ns
-    nearest = np.where(is_before_nearer, after - 1, after)
+    since_before_ns = borders_ns - gt.t_ns[after - 1]
+    until_after_ns = gt.t_ns[after] - borders_ns
+    nearest = np.where(since_before_ns < until_after_ns, after - 1, after)
     return loss_between(gt, est, nearest, scale=scale)
 
 
-def loss_between(gt: Trajectory, est: Trajectory, at: NDArray[np.intp], *, scale: float = 1.0) -> Array:
+def loss_between(
+    gt: Trajectory,
+    est: Trajectory,
+    at: NDArray[np.intp],
+    *,
+    scale: float = 1.0,
+) -> Array:
     """The error (S,) from each of the frames `at` (S + 1,) to the next, relative to the path length, 0 to 1.
 
     It is the position error at the end of the segment relative to its length, plus the rotation error in rad, which
@@ -60,8 +67,10 @@ def loss_between(gt: Trajectory, est: Trajectory, at: NDArray[np.intp], *, scale
     true_motion = _motions(gt.T_world_frame[at])
 
     error = se3.inverse(estimated_motion[has_both_poses]) @ true_motion[has_both_poses]
-    position_error = np.linalg.norm(error[:, :3, 3], axis=1) / lengths_m[has_both_poses]
-    loss[has_both_poses] = np.minimum(position_error + se3.rotation_angle(error[:, :3, :3]), 1.0)
+    position_error_m = np.linalg.norm(error[:, :3, 3], axis=1)
+    rotation_error_rad = se3.rotation_angle(error[:, :3, :3])
+    total_error = position_error_m / lengths_m[has_both_poses] + rotation_error_rad
+    loss[has_both_poses] = np.minimum(total_error, 1.0)
     return loss
 
 
@@ -135,7 +144,13 @@ Measure = Callable[[Mapping[str, Case]], Mapping[str, Sequence[Outcome]]]
 Outcomes = dict[tuple[str, ...], list[Outcome]]  # of repeats, by the removed nuisances
 
 
-def explain(case: Case, nuisances: Sequence[Nuisance], measure: Measure, *, repeats: int = 3) -> Explanation:
+def explain(
+    case: Case,
+    nuisances: Sequence[Nuisance],
+    measure: Measure,
+    *,
+    repeats: int = 3,
+) -> Explanation:
     """Run a case without each nuisance and without all; if none explains the failure, with each alone and in pairs.
 
     Each repeat has its own seed, which all variants share. Short cases get more repeats, and so does the best single
@@ -146,13 +161,12 @@ def explain(case: Case, nuisances: Sequence[Nuisance], measure: Measure, *, repe
     (first_outcome,) = variants.run([()], 1)[()]
     repeats = max(repeats, -(-MIN_BLOCKS // _block_count(first_outcome)))
 
-    removals = [(), *((name,) for name in names)]
-    if len(names) > 1:
-        removals.append(names)
-    outcomes = variants.run(removals, repeats)
+    singly = [(name,) for name in names]
+    removals = dict.fromkeys([(), *singly, names])  # a single nuisance is all nuisances, too
+    outcomes = variants.run(list(removals), repeats)
     baseline = outcomes[()]
     everything = _change(names, baseline, outcomes[names])
-    singles = _ranked(_change((name,), baseline, outcomes[name,]) for name in names)
+    singles = _ranked(_change(removed, baseline, outcomes[removed]) for removed in singly)
 
     if _needs_more_repeats(singles[0], everything):
         best = singles[0].removed
@@ -162,7 +176,8 @@ def explain(case: Case, nuisances: Sequence[Nuisance], measure: Measure, *, repe
 
     alone: dict[str, float] = {}
     pairs: tuple[Change, ...] = ()
-    if len(names) > 2 and everything.is_sure and not is_sufficient(singles[0], everything):
+    is_explained = not everything.is_sure or is_sufficient(singles[0], everything)
+    if len(names) > 2 and not is_explained:
         alone = variants.loss_with_only_one_left(repeats)
         suspects = _suspects(singles, alone, everything)
         suspected_pairs = [pair for pair in combinations(names, 2) if suspects.issuperset(pair)]
@@ -172,7 +187,7 @@ def explain(case: Case, nuisances: Sequence[Nuisance], measure: Measure, *, repe
     return Explanation(
         loss=_mean_loss(baseline),
         status=_most_frequent_status(baseline),
-        repeats_differ=any(not np.array_equal(baseline[0].loss, other.loss) for other in baseline[1:]),
+        repeats_differ=_differ(baseline),
         everything=everything,
         singles=singles,
         alone=alone,
@@ -194,7 +209,8 @@ class _Variants:
         for removed in removals:
             variant = without(self.case, removed)
             for repeat in range(repeats):
-                cases[self._name(removed, repeat)] = replace(variant, seed=self.case.seed + repeat)
+                name = self._name(removed, repeat)
+                cases[name] = replace(variant, seed=self.case.seed + repeat)
         measured = self.measure(cases)
 
         outcomes = {}
@@ -240,13 +256,17 @@ def _needs_more_repeats(best: Change, everything: Change) -> bool:
     return not is_sure and best.mended >= PROMISING_SHARE and may_suffice
 
 
-def _suspects(singles: Sequence[Change], alone: Mapping[str, float], everything: Change) -> set[str]:
+def _suspects(
+    singles: Sequence[Change],
+    alone: Mapping[str, float],
+    everything: Change,
+) -> set[str]:
     """The nuisances that cost most, either as the only one removed or as the only one left."""
     total_mended = everything.mended or 1.0
+    total_cost = 1.0
     if everything.mended < 1:
-        total_cost = everything.loss / (1 - everything.mended) - everything.loss
-    else:
-        total_cost = 1.0
+        loss_before = everything.loss / (1 - everything.mended)
+        total_cost = loss_before - everything.loss
 
     costs = {}
     for change in singles:
@@ -263,6 +283,12 @@ def _ranked(changes: Iterable[Change]) -> tuple[Change, ...]:
 
 def _improvement(change: Change) -> float:
     return change.mended
+
+
+def _differ(outcomes: Sequence[Outcome]) -> bool:
+    """Whether some repeats have other errors than the first."""
+    first, *others = outcomes
+    return any(not np.array_equal(first.loss, other.loss) for other in others)
 
 
 def _mean_loss(outcomes: Sequence[Outcome]) -> float:
@@ -286,7 +312,11 @@ def _block_count(outcome: Outcome) -> int:
     return -(-len(outcome.loss) // BLOCK_SEGMENTS)
 
 
-def _change(removed: tuple[str, ...], baseline: Sequence[Outcome], changed: Sequence[Outcome]) -> Change:
+def _change(
+    removed: tuple[str, ...],
+    baseline: Sequence[Outcome],
+    changed: Sequence[Outcome],
+) -> Change:
     """How much of the error went, with a bootstrap interval over repeats and blocks of segments, before and after."""
     # Equal generators draw the same repeats and blocks on both sides.
     loss_before = _resampled_means(baseline, np.random.default_rng(0))

@@ -59,15 +59,22 @@ def misfit(T_gt: Array, T_est: Array) -> Misfit:
     """Measure how far matched poses (K, 4, 4) disagree, independent of their world frames and scales."""
     alignment = align(T_est, T_gt, kind="sim3")
     aligned = alignment.apply(T_est)
-    position_error_m = np.sqrt(np.sum((aligned - T_gt)[:, :3, 3] ** 2, axis=1).mean())
+    position_errors_m = (aligned - T_gt)[:, :3, 3]
+    position_error_m = np.sqrt(np.sum(position_errors_m**2, axis=1).mean())
     extent_m = np.sqrt(T_gt[:, :3, 3].var(axis=0).sum())
-    R_est_gt = np.swapaxes(aligned[:, :3, :3], 1, 2) @ T_gt[:, :3, :3]
-    angles_rad = se3.rotation_angle(R_est_gt)
+    angles_rad = se3.rotation_angle(_rotations_between(aligned, T_gt))
     return Misfit(
         trans=float(position_error_m / extent_m),
         rot_rad=float(np.sqrt(np.mean(angles_rad**2))),
         turned_rad=float(se3.rotation_angle(alignment.rotation)),
     )
+
+
+def _rotations_between(T_est: Array, T_gt: Array) -> Array:
+    """The rotations R_est_gt (K, 3, 3) between matched poses (K, 4, 4)."""
+    R_est_world = np.swapaxes(T_est[:, :3, :3], 1, 2)
+    rotations: Array = R_est_world @ T_gt[:, :3, :3]
+    return rotations
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +98,15 @@ class Correction:
     @property
     def is_axis_rotation(self) -> bool:
         """Whether it changes axes, of positions and rotations, without mirroring."""
-        return self.move is not None and self.move.kind == "axes" and float(np.linalg.det(self.move.matrix)) > 0
+        if self.move is None or self.move.kind != "axes":
+            return False
+        return float(np.linalg.det(self.move.matrix)) > 0
 
     def reduces(self, before: Misfit) -> bool:
         """Whether it reduces the misfit so much that no real pair without a fault does."""
         after = self.misfit.total
-        return after <= min(MAX_SHARE_LEFT * before.total, MAX_MISFIT) and before.total - after >= MIN_REDUCTION
+        limit = min(MAX_SHARE_LEFT * before.total, MAX_MISFIT)
+        return after <= limit and before.total - after >= MIN_REDUCTION
 
     def reduces_by_lever(self, before: Misfit) -> bool:
         """Whether it reduces the misfit enough for a lever that the motions show; they show millimetres."""
@@ -136,7 +146,13 @@ class Mismatch:
     lever: Lever | None
 
 
-def find_mismatch(T_gt: Array, T_est: Array, *, gt_order: Order | None, est_order: Order | None) -> Mismatch | None:
+def find_mismatch(
+    T_gt: Array,
+    T_est: Array,
+    *,
+    gt_order: Order | None,
+    est_order: Order | None,
+) -> Mismatch | None:
     """Find the fault of frames that explains most between matched poses (K, 4, 4); None if there is none.
 
     A discrete correction (axes, inverse, order) is preferred to a fitted one unless that is clearly better.
@@ -157,13 +173,18 @@ def find_mismatch(T_gt: Array, T_est: Array, *, gt_order: Order | None, est_orde
 
 
 def _best_discrete(
-    before: Misfit, T_gt: Array, T_est: Array, *, gt_order: Order | None, est_order: Order | None
+    before: Misfit,
+    T_gt: Array,
+    T_est: Array,
+    *,
+    gt_order: Order | None,
+    est_order: Order | None,
 ) -> Correction:
     """The discrete correction with the smallest misfit."""
     candidates = list(discrete_corrections(T_gt, T_est, gt_order=gt_order, est_order=est_order))
     # In one world frame, inverting either side has the same effect; ground truth is seldom given inverted.
-    is_est_inverse = any(each.side == "est" and each.is_inverse and each.reduces(before) for each in candidates)
-    if is_est_inverse:
+    est_inverses = [each for each in candidates if each.side == "est" and each.is_inverse]
+    if any(inverse.reduces(before) for inverse in est_inverses):
         candidates = [each for each in candidates if each.side == "est" or each.move is None]
     return min(candidates, key=lambda candidate: candidate.misfit.total)
 
@@ -192,7 +213,11 @@ def _kind(correction: Correction) -> Kind:
 
 
 def discrete_corrections(
-    T_gt: Array, T_est: Array, *, gt_order: Order | None, est_order: Order | None
+    T_gt: Array,
+    T_est: Array,
+    *,
+    gt_order: Order | None,
+    est_order: Order | None,
 ) -> Iterator[Correction]:
     """Yield the other quaternion order and the inverses of either side, and all 47 other signed axes of the estimate.
 
@@ -211,7 +236,12 @@ def discrete_corrections(
             yield _correction("est", move, T_gt, move.apply(T_est))
 
 
-def _correction(side: Side, move: Move | None, T_gt: Array, T_est: Array) -> Correction:
+def _correction(
+    side: Side,
+    move: Move | None,
+    T_gt: Array,
+    T_est: Array,
+) -> Correction:
     return Correction(side, move, misfit(T_gt, T_est), T_gt, T_est)
 
 
@@ -269,8 +299,7 @@ def _mean_rotation_left(T_gt: Array, T_est: Array, lever_m: Array) -> Array:
     """The mean rotation (3, 3) from the estimate, moved by a lever and aligned, to the truth."""
     moved = T_est @ se3.transform(IDENTITY, lever_m)
     aligned = align(moved, T_gt, kind="sim3").apply(moved)
-    R_est_gt = np.swapaxes(aligned[:, :3, :3], 1, 2) @ T_gt[:, :3, :3]
-    return se3.nearest_rotation(np.mean(R_est_gt, axis=0))
+    return se3.nearest_rotation(np.mean(_rotations_between(aligned, T_gt), axis=0))
 
 
 def find_lever(T_gt: Array, T_est: Array, rotation: Array) -> Lever:
@@ -305,13 +334,15 @@ def _lever_of_motions(T_gt: Array, T_est: Array, rotation: Array, window: int) -
     along_axes = (axes.T @ (terms.T @ values)) / strength
 
     # Windows overlap: only every window-th motion is independent.
-    noise_m = np.sqrt(np.mean((values - terms @ (axes @ along_axes)) ** 2) * window)
+    residuals_m = values - terms @ (axes @ along_axes)
+    noise_m = np.sqrt(np.mean(residuals_m**2) * window)
     sigmas = np.abs(along_axes) * np.sqrt(strength) / (noise_m + TINY)
     lever_m = axes @ np.where(sigmas >= SIGNIFICANT_SIGMAS, along_axes, 0.0)
 
     after_m = _rms_length(values - terms @ lever_m)
     scale = float(t_est @ (t_gt - lever_terms @ lever_m)) / t_est_sq
-    return Lever(lever_m / scale if scale > 0 else np.zeros(3), before_m, after_m)
+    scaled_lever_m = lever_m / scale if scale > 0 else np.zeros(3)
+    return Lever(scaled_lever_m, before_m, after_m)
 
 
 def _rms_length(residuals_m: Array) -> float:

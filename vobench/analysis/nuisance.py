@@ -49,8 +49,8 @@ def nuisances_of(case: Case, largest: Mapping[str, float] = MappingProxyType({})
     """Return the NUISANCES that a case has; `largest` are the largest values of conditions that are known."""
     present = []
     for nuisance in NUISANCES:
-        is_shown = nuisance.shown_by is None or largest.get(nuisance.shown_by, 1.0) > MIN_SHOWN_SHARE
-        if is_shown and nuisance.remove(case) != case:
+        largest_share = largest.get(nuisance.shown_by or "", 1.0)
+        if largest_share > MIN_SHOWN_SHARE and nuisance.remove(case) != case:
             present.append(nuisance)
     return tuple(present)
 
@@ -190,8 +190,8 @@ def _without_coat(name: str, defined: MaterialSpec | None) -> MaterialSpec | Non
     if defined is None:
         return COATED_FINISHES.get(name)
     if isinstance(defined, Polished):
-        below = {field.name: getattr(defined, field.name) for field in fields(Matt) if field.name != "kind"}
-        return Matt(**below)
+        names = [field.name for field in fields(Matt) if field.name != "kind"]
+        return Matt(**{name: getattr(defined, name) for name in names})
     return defined
 
 
@@ -199,7 +199,9 @@ def _with_strong_texture(name: str, defined: MaterialSpec | None) -> MaterialSpe
     """A pattern of strong contrast in place of a plain or faint one."""
     if defined is None and name in FAINT_FINISHES:
         return Matt("poster", STRONG_ALBEDO, contrast=STRONG_CONTRAST, tile_m=STRONG_TILE_M)
-    if isinstance(defined, Matt | Polished) and (defined.contrast < FAINT_CONTRAST or defined.pattern == "plain"):
+    if not isinstance(defined, Matt | Polished):
+        return defined
+    if defined.contrast < FAINT_CONTRAST or defined.pattern == "plain":
         albedo = min(defined.albedo, STRONG_ALBEDO)
         return replace(defined, pattern="poster", contrast=STRONG_CONTRAST, tile_m=STRONG_TILE_M, albedo=albedo)
     return defined
@@ -248,24 +250,23 @@ def _without_shadows(case: Case) -> Case:
     scene = case.scene
     lighting = dict(case.lighting)
     if scene.room and scene.lamps:
-        panel = _ceiling_panel(scene, [lighting.pop(lamp.name, LightOverride()) for lamp in scene.lamps])
-        scene = replace(scene, lamps=(panel,))
+        overrides = [lighting.pop(lamp.name, LightOverride()) for lamp in scene.lamps]
+        scene = replace(scene, lamps=(_ceiling_panel(scene, overrides),))
 
     if scene.sun:
         override = lighting.pop("sun", LightOverride())
-        sun_lx = scene.sun.illuminance_lx if override.illuminance_lx is None else override.illuminance_lx
+        sun_lx = _overridden(scene.sun.illuminance_lx, override.illuminance_lx)
         sky_lx = scene.sky.illuminance_lx if scene.sky else 0.0
-        scene = replace(scene, sun=None, sky=SkySpec(illuminance_lx=sun_lx + sky_lx, kind="uniform"))
+        uniform_sky = SkySpec(illuminance_lx=sun_lx + sky_lx, kind="uniform")
+        scene = replace(scene, sun=None, sky=uniform_sky)
     return replace(case, scene=scene, lighting=lighting)
 
 
 def _ceiling_panel(scene: SceneFile, overrides: Sequence[LightOverride]) -> PanelLamp:
     """One panel with the power of all lamps of a room, given the override of each."""
     assert scene.room is not None
-    powers_lm = []
-    for lamp, override in zip(scene.lamps, overrides, strict=True):
-        powers_lm.append(lamp.power_lm if override.power_lm is None else override.power_lm)
-
+    lamps = zip(scene.lamps, overrides, strict=True)
+    powers_lm = [_overridden(lamp.power_lm, override.power_lm) for lamp, override in lamps]
     index = int(np.argmax(powers_lm))
     strongest = scene.lamps[index]
     length_m, width_m, height_m = scene.room.size_m
@@ -279,6 +280,10 @@ def _ceiling_panel(scene: SceneFile, overrides: Sequence[LightOverride]) -> Pane
     )
 
 
+def _overridden(nominal: float, override: float | None) -> float:
+    return nominal if override is None else override
+
+
 NUISANCES = (
     Nuisance("mirrors", "diffuse stone, and panes without reflections", _with_materials(_diffuse_mirror), "mirror"),
     Nuisance("gloss", "diffuse surfaces", _with_materials(_without_coat), "gloss"),
@@ -286,7 +291,9 @@ NUISANCES = (
     Nuisance("changing light", "steady lamps and sun", _with_steady_light),
     Nuisance("moving things", "a static scene", _without_movers, "moving"),
     Nuisance("low texture", "strong patterns on faint surfaces", _with_materials(_with_strong_texture)),
-    Nuisance("burnt pixels", "an exposure that just fits white, and eight times the range", _without_saturation, "burnt"),
+    Nuisance(
+        "burnt pixels", "an exposure that just fits white, and eight times the range", _without_saturation, "burnt"
+    ),
     Nuisance("blur", "a short exposure and a sharp lens", _without_blur),
     Nuisance("noise", "a chip without noise", _without_noise),
     Nuisance("unlike eyes", "two equal cameras", _with_camera(unlike=Eyes())),

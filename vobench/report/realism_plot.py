@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vobench.analysis.realism import BURNT_DN, CYCLES, STATISTICS, Realism
+from vobench.analysis.image_noise import SATURATED_DN
+from vobench.analysis.image_statistics import CYCLES
+from vobench.analysis.realism import STATISTICS, Realism
 from vobench.analysis.stereo_fit import StereoFit, row_error
 from vobench.report.drive_plot import SETTINGS, check_ending, undated
 
@@ -96,12 +98,12 @@ def _curves(panels: "Mapping[str, Axes]", found: Mapping[str, Realism]) -> None:
         panels["spectrum"].loglog(cycles, 10 ** power[1:], color=colour, lw=1.2)
         panels["gradient"].semilogy(gradient / gradient.sum(), color=colour, lw=1.2, drawstyle="steps-mid")
         panels["tracks"].plot(100 * alive, "o-", color=colour, ms=3, lw=1.2)
-        shares = 100 * grey[:BURNT_DN] / grey.sum()
-        panels["grey"].fill_between(np.arange(BURNT_DN), shares, color=colour, alpha=0.4, lw=0, step="mid")
+        shares = 100 * grey[:SATURATED_DN] / grey.sum()
+        panels["grey"].fill_between(np.arange(SATURATED_DN), shares, color=colour, alpha=0.4, lw=0, step="mid")
     for end in CYCLES:
         panels["spectrum"].axvline(end, color="black", lw=0.6, ls=":")
     panels["spectrum"].set(title="power spectrum, slope between dots", xlabel="cycles in 256 px")
     panels["gradient"].set(title="gradients", xlabel="DN a pixel", ylabel="share of pixels")
     panels["tracks"].set(title="tracks alive", xlabel="pictures later", ylabel="%", ylim=(0, 103))
-    panels["grey"].axvline(BURNT_DN, color="black", lw=0.6, ls=":")
+    panels["grey"].axvline(SATURATED_DN, color="black", lw=0.6, ls=":")
     panels["grey"].set(title="grey values", xlabel="DN", ylabel="% of pixels")
