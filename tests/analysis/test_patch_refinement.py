@@ -1,6 +1,5 @@
 """Matches are refined to where the patches are, however they shift, stretch and shear."""
 
-import cv2
 import numpy as np
 import pytest
 
@@ -9,22 +8,39 @@ from vobench.analysis.patch_refinement import AFFINE, SLANT, refined
 CENTRE_PX = np.array([120.0, 90.0])
 
 
+def painted(places_px: np.ndarray) -> np.ndarray:
+    """Grey values at places (..., 2) of a texture that is known between pixels, too: a sum of waves."""
+    rng = np.random.default_rng(0)
+    values = np.full(places_px.shape[:-1], 128.0)
+    for _ in range(60):
+        angle, wavelength_px, phase = rng.uniform(0, np.pi), rng.uniform(6, 40), rng.uniform(0, 2 * np.pi)
+        along_px = places_px @ [np.cos(angle), np.sin(angle)]
+        values += 8 * np.sin(2 * np.pi * along_px / wavelength_px + phase)
+    return values
+
+
+PIXELS = np.stack(np.meshgrid(np.arange(240.0), np.arange(180.0)), -1)
+
+
 def texture() -> np.ndarray:
-    noise = np.random.default_rng(0).uniform(0, 255, (180, 240)).astype(np.float32)
-    return cv2.normalize(cv2.GaussianBlur(noise, (0, 0), 2.0), None, 30, 220, cv2.NORM_MINMAX)
+    return painted(PIXELS)
 
 
 def warped(A: np.ndarray, shift_px: tuple[float, float]) -> np.ndarray:
     """The texture with each point p moved to A (p - centre) + centre + shift."""
-    offset = CENTRE_PX + shift_px - A @ CENTRE_PX
-    return cv2.warpAffine(
-        texture(), np.c_[A, offset], (240, 180), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
-    )
+    return painted((PIXELS - CENTRE_PX - shift_px) @ np.linalg.inv(A).T + CENTRE_PX)
 
 
 def grid_of_points() -> np.ndarray:
     x, y = np.meshgrid(np.arange(60.0, 181, 20), np.arange(40.0, 141, 20))
-    return np.stack([x, y], -1).reshape(-1, 2).astype(np.float32) + np.float32(0.3)
+    points = np.stack([x, y], -1).reshape(-1, 2)
+    dither_px = np.random.default_rng(1).uniform(-0.5, 0.5, points.shape)
+    return (points + dither_px).astype(np.float32)
+
+
+def is_small(error_px: np.ndarray) -> bool:
+    """Whether errors are no larger than those of sampling between pixels, which cancel on average."""
+    return bool(np.abs(error_px).max() < 0.15 and np.abs(error_px.mean(0)).max() < 0.025)
 
 
 def refine(A: np.ndarray, shift_px: tuple[float, float], *, shape: int, guess_px=(0.4, -0.3), gain=1.0, brightness=0.0):
@@ -44,7 +60,7 @@ def linear(a=0.0, b=0.0, c=0.0, d=0.0) -> np.ndarray:
 def test_a_shift_is_found_between_pixels(shift_px, shape) -> None:
     error_px, settled = refine(linear(), shift_px, shape=shape)
     assert settled.all()
-    assert np.abs(error_px).max() < 0.03
+    assert is_small(error_px)
 
 
 @pytest.mark.parametrize("A", [linear(a=0.05), linear(b=0.06), linear(a=-0.04, b=0.03)])
@@ -52,14 +68,14 @@ def test_a_slanted_surface_stretches_and_shears_along_rows(A) -> None:
     for shape in (SLANT, AFFINE):
         error_px, settled = refine(A, (0.5, 0.0), shape=shape)
         assert settled.mean() > 0.9
-        assert np.abs(error_px[settled]).max() < 0.06
+        assert is_small(error_px[settled])
 
 
 @pytest.mark.parametrize("A", [linear(d=0.06), linear(c=0.05), linear(b=-0.04, c=0.04), linear(a=0.05, d=0.05)])
 def test_a_turn_or_an_approach_takes_all_four_terms(A) -> None:
     affine_px, settled = refine(A, (0.5, 0.3), shape=AFFINE)
     assert settled.mean() > 0.9
-    assert np.abs(affine_px[settled]).max() < 0.06
+    assert is_small(affine_px[settled])
 
 
 def test_gain_and_brightness_do_not_matter() -> None:
@@ -80,5 +96,5 @@ def test_no_points_and_no_texture_settle_nowhere() -> None:
     found, settled = refined(texture(), texture(), nothing, nothing, shape=SLANT)
     assert (len(found), len(settled)) == (0, 0)
     points = grid_of_points()
-    other = cv2.flip(texture(), -1)
+    other = texture()[::-1, ::-1]
     assert refined(texture(), other, points, points, shape=AFFINE)[1].mean() < 0.3
