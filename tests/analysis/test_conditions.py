@@ -1,16 +1,17 @@
 """Each condition grows with its physical cause, and where a law is exact, as that says."""
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from vobench.analysis.conditions import CONDITIONS, SubsampledCamera, chip_noise_dn, conditions
+from vobench.analysis.conditions import CONDITIONS, SubsampledCamera, _contrast, chip_noise_dn, conditions
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.rig import CalibrationError, EyeError, looking, own_pair, stereo_rig
+from vobench.scene.material import Material, srgb
 from vobench.sensor.image_sensor import CameraSensor
 from vobench.sequence.reader import StereoFrame
 from vobench.suite.axis import RigSettings
@@ -433,3 +434,34 @@ def test_frames_are_read_in_order(wall: Case) -> None:
     stamps = (0, STEP_NS, 2 * STEP_NS)
     left = (grey(255, 0.1), grey(255, 0.2), grey(255, 0.3))
     assert conditions_of(wall, t_ns=stamps, left=left)["burnt"] == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_of_mirrors_alone_nothing_has_a_texture(wall: Case) -> None:
+    assert one(scene(wall, materials={"plaster": Mirror()}), "faintness") == pytest.approx(50)
+
+
+@dataclass(frozen=True, slots=True)
+class Stripes:
+    """A texture of stripes of two pixels, dark and bright."""
+
+    axis: int
+    colours: bool = False
+
+    def pixels(self) -> np.ndarray:
+        rows = np.where(np.arange(64) % 4 < 2, 0.2, 0.6)
+        grey = np.tile(rows[:, None], (1, 64))
+        grey = grey if self.axis == 0 else grey.T
+        return np.repeat(srgb(np.float32(grey)[..., None]), 3, axis=-1) if self.colours else grey
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("colours", [False, True])
+def test_stripes_of_two_pixels_are_seen_in_both_directions(axis: int, colours: bool) -> None:
+    contrast = _contrast(Material(texture=Stripes(axis, colours)))
+    assert contrast == pytest.approx(0.2 / 0.4, rel=0.02)
+
+
+def test_bodies_without_a_texture_have_no_contrast_and_mirrors_none_that_is_known() -> None:
+    assert _contrast(Material()) == 0
+    assert np.isnan(_contrast(None))
+    assert np.isnan(_contrast(Mirror().build()))

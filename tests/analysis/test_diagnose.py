@@ -495,3 +495,32 @@ def test_names_and_an_origin_are_signs_too_and_one_of_them_alone_is_not_enough()
     assert faults(replace(begins, says_truth=True), replace(noisy, says_truth=True)) == []
     # Signs against it weigh as much as those for it.
     assert faults(replace(begins, says_truth=True), noisy) == []
+
+
+@pytest.mark.parametrize(("step", "is_sign"), [(3, True), (1, False)])
+def test_more_than_twice_the_rate_is_a_sign_of_a_tracker(step, is_sign):
+    gt, _ = loop(n=1200)
+    rng = np.random.default_rng(1)
+    est = with_positions(gt, gt.trajectory.positions_m + rng.normal(0, 1e-6, (1200, 3)))
+    sparse = Trajectory(gt.trajectory.t_ns[::step], gt.trajectory.T_world_frame[::step])
+    given = (replace(gt, trajectory=sparse), replace(est, says_truth=True))
+    assert faults(*given) == (["swapped_inputs"] if is_sign else [])
+    if is_sign:  # the same rates the other way round are a sign against it
+        begins = se3.inverse(est.trajectory.T_world_frame[0]) @ est.trajectory.T_world_frame
+        fine = replace(gt, trajectory=changed(est.trajectory, begins))
+        assert faults(fine, replace(gt, trajectory=sparse, says_truth=True)) == []
+
+
+@pytest.mark.parametrize(("sigma_m", "is_sign"), [(3e-4, True), (1e-6, False)])
+def test_noise_is_a_sign_only_where_it_is_more_than_motion(sigma_m, is_sign):
+    gt, _ = loop(n=1200)
+    rng = np.random.default_rng(1)
+    noisy = with_positions(gt, gt.trajectory.positions_m + rng.normal(0, sigma_m, (1200, 3)))
+    smooth = with_positions(gt, gt.trajectory.positions_m + rng.normal(0, sigma_m / 1.7, (1200, 3)))
+    # Noise 1.7 times as large is one sign, and the name of the file another.
+    assert faults(noisy, replace(smooth, says_truth=True)) == (["swapped_inputs"] if is_sign else [])
+    smoother = with_positions(gt, gt.trajectory.positions_m + rng.normal(0, sigma_m / 2.5, (1200, 3)))
+    # Noise 2.5 times as large at the same instants is two signs.
+    assert faults(noisy, smoother) == (["swapped_inputs"] if is_sign else [])
+    few = Trajectory(smoother.trajectory.t_ns[:-1], smoother.trajectory.T_world_frame[:-1])
+    assert faults(noisy, replace(smoother, trajectory=few)) == []

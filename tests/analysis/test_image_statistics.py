@@ -235,3 +235,19 @@ def test_of_images_without_corners_nothing_is_tracked() -> None:
     flat = np.full((64, 64), 128, np.uint8)
     found = track_statistics([flat, flat])
     assert (found.consistent_share, found.flow_px, found.alive_share.tolist()) == (0, 0, [1.0, 0.0])
+
+
+@pytest.mark.parametrize("size", [(256, 256), (256, 512), (512, 256)])
+def test_whole_tiles_are_taken_without_overlap(size: tuple[int, int]) -> None:
+    picture = as_grey(128 + 30 * power_law(-2.0))[: size[0], : size[1]]
+    window = np.outer(np.hanning(TILE_PX), np.hanning(TILE_PX))
+    powers = []
+    for row in range(0, size[0], TILE_PX):
+        for column in range(0, size[1], TILE_PX):
+            tile = picture[row : row + TILE_PX, column : column + TILE_PX].astype(float)
+            powers.append(np.abs(np.fft.fft2((tile - tile.mean()) * window)) ** 2)
+    x, y = np.meshgrid(np.fft.fftfreq(TILE_PX, 1 / TILE_PX), np.fft.fftfreq(TILE_PX, 1 / TILE_PX))
+    rings = np.rint(np.hypot(x, y))
+    _, log_power = spectrum([picture])
+    for cycles in (1, 4, 30, 100):
+        assert 10 ** log_power[cycles] == pytest.approx(np.mean([power[rings == cycles].mean() for power in powers]))

@@ -329,3 +329,13 @@ def test_the_placement_is_in_the_scale_of_the_recording() -> None:
     in_place_m = (found.T_place_world @ straight(1.5))[:, :3, 3]
     low_m, high_m = np.array([-4, -3, 0]) * found.scale, np.array([4, 3, 3]) * found.scale
     assert ((in_place_m > low_m + 0.29) & (in_place_m < high_m - 0.29)).all()
+
+
+def test_every_face_counts_the_first_one_too(place: _Place) -> None:
+    near_first = np.array([[-3.8, -2.0, 2.4], [-3.7, -2.0, 2.4]])  # the first triangle is that part of the wall
+    hits = place.caster.hits(near_first[:1], np.array([[-1.0, 0.0, 0.0]]))
+    assert hits.face.tolist() == [0]
+    assert not place._is_free(near_first, 0.3)
+    assert place._is_free(near_first, 0.1)
+    through_first = np.array([[-3.5, -2.0, 2.4], [-4.5, -2.0, 2.4]])
+    assert not place._is_free(through_first, 0.01)

@@ -168,3 +168,19 @@ def test_a_robust_fit_scales_with_its_values():
     np.testing.assert_allclose(twice, 2 * once, rtol=1e-5)
     np.testing.assert_allclose(sigmas_of_twice, 2 * sigmas, rtol=1e-4)
     assert noise_of_twice == pytest.approx(2 * noise, rel=1e-4)
+
+
+def test_angles_have_the_values_and_deviations_of_their_own_coefficients(fits):
+    fit = fits[0.15, -0.1, 0.12]
+    x, y = fit.matches.place.T
+    terms = np.c_[np.ones(len(x)), x, y, x * y, y * y]
+    coefficients, sigmas, noise = robust_fit(terms, fit.matches.row_px)
+    np.testing.assert_allclose(fit.coefficients, coefficients)
+    assert fit.row_noise_px == pytest.approx(noise)
+    for angle_deg, value_px, sigma_px in (
+        (fit.roll_deg, -coefficients[1], sigmas[1]),
+        (fit.pitch_deg, coefficients[0], sigmas[0]),
+    ):
+        assert np.deg2rad([angle_deg.value, angle_deg.sigma]) * 300 == pytest.approx([value_px, sigma_px])
+    assert (fit.xy_px.value, fit.xy_px.sigma) == pytest.approx((coefficients[3], sigmas[3]))
+    np.testing.assert_allclose(row_error(coefficients, fit.matches.place), terms @ coefficients)
