@@ -75,6 +75,15 @@ def test_a_camera_has_the_settings_that_are_named_and_noise_grows_as_it_is_asked
         assert noisy == pytest.approx(2 * quiet)
 
 
+@pytest.mark.parametrize("noise", [0.5, 1.0, 3.0])
+def test_the_noise_is_that_of_20_000_electrons_and_a_read_noise_of_25_times_as_large(noise: float) -> None:
+    chip = camera_of(1.0, 1.0, 0.0, noise).chip
+    assert chip.adc_bits == 10
+    for grey_dn in (40.0, 150.0):
+        sigma_e = np.sqrt(25**2 + 20_000 * grey_dn / 255)
+        assert chip_noise_dn(chip, grey_dn) == pytest.approx(noise * 255 * sigma_e / 20_000, rel=1e-6)
+
+
 def test_the_noise_is_solved_from_that_of_flat_parts_less_that_of_rounding() -> None:
     flat_dn = np.array([60.0, 120.0])
     parameters = _Parameters(gain=1.0, gamma=0.6, blur_px=0.0, noise=1.0)
