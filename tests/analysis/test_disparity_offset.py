@@ -239,7 +239,8 @@ def test_without_a_true_motion_it_is_estimated_and_nothing_is_known_beforehand(m
 
 
 def test_a_view_that_stands_still_or_is_lost_has_no_tracks(matched) -> None:
-    assert disparity_offset._track([matched[0]] * 3, PAIR) is None  # no flow
+    again = [replace(matched[0], shot=replace(matched[0].shot)) for _ in range(3)]
+    assert disparity_offset._track(again, PAIR) is None  # no flow
     assert disparity_offset._track(matched[:1], PAIR) is None
     blank = replace(matched[1], shot=replace(matched[1].shot, left=np.full((240, 320), 90, np.uint8)))
     assert disparity_offset._track([matched[0], blank], PAIR) is None
@@ -247,6 +248,11 @@ def test_a_view_that_stands_still_or_is_lost_has_no_tracks(matched) -> None:
         matched[0], **{name: getattr(matched[0], name)[:39] for name in ("left_px", "right_px", "disparity_px")}
     )
     assert disparity_offset._track([few, *matched[1:]], PAIR) is None
+
+
+def test_tracks_without_a_motion_that_explains_them_are_left_out(matched, monkeypatch) -> None:
+    monkeypatch.setattr(disparity_offset, "pose_from_points", lambda *_, **__: None)
+    assert disparity_offset._track(matched, PAIR) is None
 
 
 def test_tracks_that_are_lost_later_end_at_the_last_view_that_has_them(matched) -> None:
