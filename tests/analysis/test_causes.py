@@ -1,8 +1,11 @@
-"""What errors hang on, where that is known."""
+"""What errors depend on, where that is known."""
+
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from vobench.analysis.causes import Course, attribute
+from vobench.analysis.causes import Attribution, Cause, Course, attribute
 from vobench.geometry.se3 import Array
 
 
@@ -62,3 +65,210 @@ def test_nothing_is_learned_from_a_few_segments_or_frames_that_are_all_alike() -
     assert attribute(courses({}, trials=1, frames=20)) is None
     (course,) = courses({}, trials=1)
     assert attribute([Course("c", 0, {"flat": course.conditions["flat"]}, course.loss)]) is None
+
+
+# --- Exact laws, on errors without noise ---
+
+SEGMENTS = 40
+RIDGE = 0.02  # shrinks a slope by 1 + RIDGE
+
+
+def constant_in_segments(values: np.ndarray) -> np.ndarray:
+    """Values of frames (N,) that are constant in each segment of 5 frames; the first frame belongs to none."""
+    return np.append(values[0], np.repeat(values, 5))
+
+
+def fitted(levels: dict[str, np.ndarray], log_loss: np.ndarray) -> Attribution:
+    """Causes of one trial with these square roots of conditions and logarithms of the error in each segment."""
+    loss = constant_in_segments(np.exp(log_loss))
+    loss[0] = 0.0
+    conditions = {name: constant_in_segments(level**2) for name, level in levels.items()}
+    found = attribute([Course("case", 0, conditions, loss)])
+    assert found is not None
+    return found
+
+
+def usual_range(level: np.ndarray) -> float:
+    low, high = np.percentile(level, [5, 95])
+    return float(high - low)
+
+
+def drawn(count: int, *, seed: int = 0) -> list[np.ndarray]:
+    """Levels of `count` conditions (SEGMENTS,) that do not correlate at all, nor with a constant."""
+    rng = np.random.default_rng(seed)
+    basis, _ = np.linalg.qr(np.c_[np.ones(SEGMENTS), rng.standard_normal((SEGMENTS, count))])
+    return [10 + 6 * basis[:, k + 1] for k in range(count)]
+
+
+@pytest.mark.parametrize("slope", [0.7, -0.4])
+def test_a_factor_is_what_the_error_is_multiplied_by_from_the_5th_to_the_95th_percentile(slope: float) -> None:
+    level, other = drawn(2)
+    found = fitted({"a": level, "b": other}, slope * (level - 10) - 4)
+    first, second = found.causes
+    assert first.conditions == ("a",)
+    assert np.log(first.factor) * (1 + RIDGE) == pytest.approx(slope * usual_range(level), rel=1e-6)
+    assert second.factor == pytest.approx(1, abs=1e-9)
+    assert found.explained == pytest.approx(1 - (RIDGE / (1 + RIDGE)) ** 2, abs=1e-6)
+
+
+def test_a_condition_of_few_segments_is_judged_by_its_whole_range() -> None:
+    level = np.full(SEGMENTS, 1.0)
+    level[7] = 3.0
+    (cause,) = fitted({"a": level}, 0.5 * level - 5).causes
+    assert np.log(cause.factor) * (1 + RIDGE) == pytest.approx(0.5 * 2.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_correlated_conditions_are_averaged_with_the_sign_of_their_correlation(sign: int) -> None:
+    level, other = drawn(2)
+    follows = 20 + sign * (level - 10)
+    found = fitted({"a": level, "follows": follows, "b": other}, 0.5 * level - 9)
+    first, second = found.causes
+    assert first.conditions == ("a", "follows")
+    assert np.log(first.factor) * (1 + RIDGE) == pytest.approx(0.5 * usual_range(level), rel=1e-6)
+    assert second.factor == pytest.approx(1, abs=1e-9)
+    # The first of a group gives the direction: if it falls as the error rises, the factor is below 1.
+    (turned, _) = fitted({"follows": follows, "a": level, "b": other}, 0.5 * level - 9).causes
+    assert turned.conditions == ("follows", "a")
+    assert np.log(turned.factor) == pytest.approx(sign * np.log(first.factor), rel=0.02)
+
+
+@pytest.mark.parametrize(("correlation", "groups"), [(0.95, 1), (0.85, 2), (-0.95, 1), (-0.85, 2)])
+def test_conditions_are_merged_from_a_correlation_of_0_9_on(correlation: float, groups: int) -> None:
+    level, other = drawn(2)
+    mixed = 10 + correlation * (level - 10) + np.sqrt(1 - correlation**2) * (other - 10)
+    found = fitted({"a": level, "b": mixed}, 0.5 * level - 9)
+    assert len(found.causes) == groups
+
+
+def test_conditions_are_merged_through_a_third_one() -> None:
+    level, other = drawn(2)
+    between, beyond = (10 + np.cos(t) * (level - 10) + np.sin(t) * (other - 10) for t in (0.4, 0.8))
+    found = fitted({"a": level, "beyond": beyond, "between": between}, 0.5 * level - 9)
+    assert [cause.conditions for cause in found.causes] == [("a", "beyond", "between")]
+
+
+def test_the_factors_of_a_segment_say_how_it_differs_from_the_median_one() -> None:
+    a, b = drawn(2)
+    found = fitted({"a": a, "b": b}, 0.8 * a - 0.3 * b - 9)
+    for segment in found.segments:
+        row = segment.first // 5
+        expected = {
+            ("a",): 0.8 * (a[row] - np.median(a)) / (1 + RIDGE),
+            ("b",): -0.3 * (b[row] - np.median(b)) / (1 + RIDGE),
+        }
+        factors = [factor for _, factor in segment.factors]
+        assert factors == sorted(factors, reverse=True)
+        for cause, factor in segment.factors:
+            assert np.log(factor) == pytest.approx(expected[cause.conditions], abs=1e-6)
+        assert segment.loss == pytest.approx(np.exp(0.8 * a[row] - 0.3 * b[row] - 9))
+
+
+def test_segments_cover_every_frame_but_the_first_once_and_belong_to_their_trial() -> None:
+    trials = [Course(f"case_{nth}", nth, each.conditions, each.loss) for nth, each in enumerate(courses({"a": 1.0}))]
+    shorter = replace(trials[0], case="short", loss=trials[0].loss[:38])
+    found = attribute([*trials, shorter])
+    assert found is not None
+    frames: dict[str, list[int]] = {}
+    for segment in found.segments:
+        frames.setdefault(segment.case, []).extend(range(segment.first, segment.end))
+        loss = shorter.loss if segment.case == "short" else trials[segment.repeat].loss
+        assert segment.loss == pytest.approx(loss[segment.first : segment.end].mean())
+    assert {case: sorted(of_case) for case, of_case in frames.items()} == {
+        **{f"case_{nth}": list(range(1, 121)) for nth in range(4)},
+        "short": list(range(1, 38)),
+    }
+
+
+def test_the_factors_of_a_case_are_the_geometric_means_of_its_segments() -> None:
+    found = attribute(courses({"a": 1.0, "b": -0.5}))
+    assert found is not None
+    assert list(found.cases) == [f"case_{nth}" for nth in range(4)]
+    for case, of_case in found.cases.items():
+        for cause, factor in of_case:
+            logs = [np.log(dict(segment.factors)[cause]) for segment in found.segments if segment.case == case]
+            assert np.log(factor) == pytest.approx(np.mean(logs), abs=1e-9)
+
+
+def test_eight_segments_are_enough_and_seven_are_not() -> None:
+    rng = np.random.default_rng(1)
+    for segments, is_enough in ((8, True), (7, False)):
+        frames = 1 + 5 * segments
+        course = Course("c", 0, {"a": rng.uniform(0, 4, frames)}, rng.uniform(0, 1, frames))
+        assert (attribute([course]) is not None) == is_enough
+
+
+def test_errors_below_a_ten_thousandth_are_all_alike() -> None:
+    level, _ = drawn(2)
+    small = fitted({"a": level}, np.log(1e-4) - 0.1 - 0.1 * (level - level.min()))
+    assert small.causes[0].factor == pytest.approx(1)
+    assert small.explained == pytest.approx(1)
+    larger = fitted({"a": level}, np.log(1e-4) + 0.1 + 0.1 * (level - level.min()))
+    assert larger.causes[0].factor > 1.1
+
+
+def test_what_varies_by_rounding_alone_is_constant() -> None:
+    level, _ = drawn(2)
+    rounding = 3 + 1e-9 * level
+    found = fitted({"a": level, "b": rounding, "zero": 0 * level}, 0.5 * level - 9)
+    assert found.constant == ("b", "zero")
+
+
+# --- Divergence ---
+
+
+def diverging(threshold_loss: float, *, others: float) -> int | None:
+    loss = np.full(50, others)
+    loss[0] = 0.0
+    loss[30] = threshold_loss
+    return Course("c", 0, {}, loss).first_divergence
+
+
+@pytest.mark.parametrize(
+    ("others", "threshold"),
+    [(0.01, 0.08), (0.02, 0.16), (1e-6, 1e-4), (0.2, 0.5)],  # 8 times the median, between 1e-4 and 0.5
+)
+def test_a_trial_diverges_above_eight_times_its_median_error_within_limits(others: float, threshold: float) -> None:
+    assert diverging(1.01 * threshold, others=others) == 30
+    assert diverging(0.99 * threshold, others=others) is None
+
+
+# --- Confidence intervals ---
+
+
+def test_intervals_have_the_width_of_a_normal_distribution_and_cover_both_sides_alike() -> None:
+    slope, sigma = 0.5, 0.3
+    lower, upper, covered = [], [], []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        level = np.sqrt(rng.uniform(0, 4, SEGMENTS))
+        found = fitted({"a": level}, slope * level - 6 + rng.normal(0, sigma, SEGMENTS))
+        (cause,) = found.causes
+        reach = usual_range(level)
+        sigma_of_slope = sigma / np.sqrt(SEGMENTS) / level.std()
+        factor, low, high = np.log([cause.factor, cause.low, cause.high]) / reach / sigma_of_slope
+        lower.append(factor - low)
+        upper.append(high - factor)
+        covered.append(np.log(cause.low) <= slope * reach / (1 + RIDGE) <= np.log(cause.high))
+    assert np.mean(lower) == pytest.approx(1.96, rel=0.12)
+    assert np.mean(upper) == pytest.approx(1.96, rel=0.12)
+    assert np.mean(covered) >= 0.85
+
+
+def test_each_trial_keeps_its_number_of_segments_when_they_are_resampled() -> None:
+    # Trials that differ from one another but not within themselves: resampling within trials changes nothing.
+    rng = np.random.default_rng(0)
+    trials = []
+    for nth in range(10):
+        level = constant_in_segments(np.full(4, rng.uniform(1, 3)))
+        loss = np.exp(0.8 * level - 6 + rng.normal(0, 0.3))
+        trials.append(Course(f"case_{nth}", 0, {"a": level**2}, loss))
+    found = attribute(trials)
+    assert found is not None
+    (cause,) = found.causes
+    assert (cause.low, cause.high) == pytest.approx((cause.factor, cause.factor))
+
+
+@pytest.mark.parametrize(("low", "high", "is_sure"), [(1.1, 2.0, True), (0.4, 0.9, True), (0.9, 1.1, False)])
+def test_a_cause_is_sure_if_its_interval_excludes_1(low: float, high: float, is_sure: bool) -> None:
+    assert Cause(("a",), 1.0, low, high).is_sure == is_sure

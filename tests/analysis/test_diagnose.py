@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from vobench.analysis.diagnose import diagnose
-from vobench.analysis.mismatch import misfit
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
-from vobench.trajectory.align import align
 from vobench.trajectory.formats import Reading, parse_any, parse_times
 from vobench.trajectory.trajectory import Trajectory, parse_move
 
@@ -106,18 +104,6 @@ def test_a_fault_of_a_made_up_drive_is_named(fault, variant):
     gt, est = loop()
     broken = (FRAMES | CLOCKS)[fault][variant](est.trajectory)
     assert_named(fault, gt, replace(est, trajectory=broken))
-
-
-@pytest.mark.parametrize("factor", [0.01, 0.5, 30.0])
-def test_the_misfit_does_not_see_world_nor_scale_and_is_a_share_of_the_truths_extent(factor):
-    gt, est = (reading.trajectory for reading in loop())
-    left = misfit(gt.T_world_frame, scaled(changed(est, TILT @ est.T_world_frame), factor).T_world_frame)
-    known = misfit(gt.T_world_frame, est.T_world_frame)
-    assert (left.trans, left.rot_rad) == pytest.approx((known.trans, known.rot_rad), rel=1e-6)
-    aligned = align(est.T_world_frame, gt.T_world_frame, kind="sim3").apply(est.T_world_frame)
-    off_m = np.linalg.norm((aligned - gt.T_world_frame)[:, :3, 3], axis=1)
-    from_middle_m = np.linalg.norm(gt.positions_m - gt.positions_m.mean(axis=0), axis=1)
-    assert known.trans == pytest.approx(np.sqrt(np.mean(off_m**2) / np.mean(from_middle_m**2)))
 
 
 def test_a_clean_drive_has_no_fault_however_noisy():
@@ -343,3 +329,198 @@ def test_real_trajectories_of_other_places_are_not_of_one_motion(real, one, othe
 def test_a_monocular_path_is_known_by_its_scale(real):
     gt, est = real["tum"][0], read("freiburg1_xyz-ORB_kf_mono.txt")
     assert_named("scale", gt, est)
+
+
+# --- Limits, on drives that were made up ---
+
+
+def with_positions(reading, positions_m):
+    T = reading.trajectory.T_world_frame.copy()
+    T[:, :3, 3] = positions_m
+    return replace(reading, trajectory=changed(reading.trajectory, T))
+
+
+def test_the_figures_of_an_offset_are_correlations_and_its_sentence_says_behind_or_ahead():
+    gt, est = loop()
+    for offset_ns, word in ((-250_000_000, "behind"), (250_000_000, "ahead")):
+        shifted = replace(est, trajectory=changed(est.trajectory, t_ns=est.trajectory.t_ns + offset_ns))
+        finding = assert_named("time_offset", gt, shifted)
+        assert finding.sentence == f"the estimate's clock is 0.250 s {word}"
+        (evidence,) = finding.evidence
+        assert evidence.before < evidence.after <= 1
+
+
+@pytest.mark.parametrize("factor", [0.25, 2.0, 1.03])
+def test_a_scale_is_stated_as_how_many_times_larger_the_estimate_is(factor):
+    gt, _ = loop()
+    finding = assert_named("scale", gt, replace(gt, trajectory=scaled(gt.trajectory, factor)))
+    assert finding.sentence == f"the estimate is {factor:.4g} times as large as the truth"
+    (evidence,) = finding.evidence
+    from_middle_m = gt.trajectory.positions_m - gt.trajectory.positions_m.mean(0)
+    rms_m = np.sqrt((from_middle_m**2).sum(1).mean())
+    assert evidence.before == pytest.approx(abs(factor - 1) * rms_m, rel=1e-3)
+    assert evidence.after == pytest.approx(0, abs=1e-6)
+
+
+def test_a_scale_of_1_percent_or_one_that_explains_little_is_no_fault():
+    gt, est = loop()
+    assert diagnose(gt, replace(gt, trajectory=scaled(gt.trajectory, 1.01))) == ()
+    rng = np.random.default_rng(0)
+    noisy = scaled(gt.trajectory, 1.03).positions_m + rng.normal(0, 0.3, (len(gt.trajectory), 3))
+    assert diagnose(gt, with_positions(est, noisy)) == ()
+
+
+def test_the_evidence_of_a_fault_of_frames_is_in_degrees_and_percent_of_the_extent():
+    gt, est = loop()
+    broken = replace(est, trajectory=est.trajectory.of_mounted(TILT))
+    finding = assert_named("body_frame_offset", gt, broken)
+    rotation, position, motions = finding.evidence
+    assert [e.unit for e in finding.evidence] == ["deg", "%", "m"]
+    # The mean rotation between both frames is in the world's alignment, too, so less than its angle is left before.
+    assert rotation.after < 1 < rotation.before < np.rad2deg(float(se3.rotation_angle(TILT[:3, :3]))) + 1
+    assert position.after < 2 < position.before < 20
+    assert motions.after < motions.before
+    angle_deg = np.rad2deg(float(se3.rotation_angle(TILT[:3, :3])))
+    assert f"rotated by {angle_deg:.1f} deg and 0.4" in finding.sentence
+
+
+@pytest.mark.parametrize(
+    ("word", "sentence"),
+    [
+        ("inverse", "the estimate's poses are inverse"),
+        ("rotations:inverse", "the estimate's rotations are inverse"),
+        ("positions:x,-y,z", "positions, but not its rotations, are mirrored: the truth's x,y,z are its x,-y,z"),
+        ("positions:y,z,x", "positions, but not its rotations, are swapped: the truth's x,y,z are its z,x,y"),
+        ("axes:x,y,-z", "positions and rotations are mirrored: the truth's x,y,z are its x,y,-z"),
+    ],
+)
+def test_the_sentence_says_what_is_wrong_and_the_option_corrects_it(word, sentence):
+    gt, est = loop()
+    broken = replace(est, trajectory=moved(word)(est.trajectory))
+    (finding,) = diagnose(gt, broken)
+    assert sentence in finding.sentence
+    _, option = finding.options
+    corrected = replace(est, trajectory=moved(option)(broken.trajectory))
+    assert diagnose(gt, corrected) == ()
+
+
+@pytest.mark.parametrize(("as_read", "right"), [("xyzw", "wxyz"), ("wxyz", "xyzw")])
+@pytest.mark.parametrize("side", ["gt", "est"])
+def test_the_right_order_of_quaternions_is_named_for_either_side(side, as_read, right):
+    gt, est = loop()
+    readings = {"gt": replace(gt, order=as_read), "est": replace(est, order=as_read)}
+    q = se3.to_quaternion(readings[side].trajectory.T_world_frame[:, :3, :3])
+    columns = [3, 0, 1, 2] if as_read == "xyzw" else [1, 2, 3, 0]
+    R = se3.from_quaternion(q[:, columns])
+    misread = changed(readings[side].trajectory, se3.transform(R, readings[side].trajectory.positions_m))
+    readings[side] = replace(readings[side], trajectory=misread)
+    (finding,) = diagnose(readings["gt"], readings["est"])
+    name = {"gt": "ground truth", "est": "estimate"}[side]
+    assert finding.sentence == f"the {name}'s quaternions are {right}"
+    assert finding.options == (f"--{side}-as", right)
+
+
+# --- Units ---
+
+
+@pytest.mark.parametrize(("factor", "right"), [(10**3, "ms"), (10**6, "us"), (10**9, "ns")])
+def test_stamps_in_any_finer_unit_are_known_by_the_duration(factor, right):
+    gt, est = loop()
+    t_ns = (est.trajectory.t_ns - est.trajectory.t_ns[0]) // 10**6 * 10**6  # as far as int64 reaches
+    if factor == 10**9:
+        t_ns = t_ns // 10**4
+        gt = replace(gt, trajectory=changed(gt.trajectory, t_ns=gt.trajectory.t_ns // 10**4))
+    finding = diagnose(gt, replace(est, trajectory=changed(est.trajectory, t_ns=t_ns * factor)))[0]
+    assert (finding.fault, finding.options) == ("stamp_unit", ("--est-as", right))
+    (evidence,) = finding.evidence
+    assert evidence.name == "duration over that of the ground truth"
+    assert (evidence.before, evidence.after) == pytest.approx((factor, 1.0), rel=1e-6)
+
+
+def test_a_recording_that_is_merely_longer_or_sparser_has_no_wrong_unit():
+    gt, est = loop()
+    for step in (1, 40):
+        chosen = slice(None, None, step)
+        sparse = Trajectory(est.trajectory.t_ns[chosen] * (1 if step > 1 else 20), est.trajectory.T_world_frame[chosen])
+        try:
+            faults = [finding.fault for finding in diagnose(gt, replace(est, trajectory=sparse))]
+        except AlignmentError:
+            faults = []
+        assert "stamp_unit" not in faults
+
+
+# --- Swapped inputs ---
+
+
+def tracked_and_estimated():
+    """A smooth estimate at 20 Hz, and a noisy truth at 100 Hz of the same drive, in each other's place."""
+    gt, _ = loop(n=2000)
+    fine = replace(gt, trajectory=changed(gt.trajectory, t_ns=gt.trajectory.t_ns // 5))
+    coarse = Trajectory(fine.trajectory.t_ns[::5], fine.trajectory.T_world_frame[::5])
+    noise_m = np.random.default_rng(3).normal(0, 2e-4, (len(coarse), 3))
+    return with_positions(replace(gt, trajectory=coarse), coarse.positions_m + noise_m), fine
+
+
+def faults(gt, est):
+    return [finding.fault for finding in diagnose(gt, est)]
+
+
+def test_a_truth_that_is_sparser_and_noisier_than_the_estimate_is_the_estimate():
+    gt, est = tracked_and_estimated()
+    noisy = with_positions(gt, gt.trajectory.positions_m + np.random.default_rng(5).normal(0, 3e-3, (400, 3)))
+    est = with_positions(est, est.trajectory.positions_m + np.random.default_rng(6).normal(0, 1e-5, (2000, 3)))
+    finding = assert_named("swapped_inputs", noisy, est)
+    assert finding.sentence == "ground truth and estimate seem to be exchanged"
+    noise, rate = finding.evidence
+    assert noise.before > 1.5
+    assert noise.before * noise.after == pytest.approx(1)
+    assert (rate.before, rate.after) == pytest.approx((0.2, 5.0))
+    assert "swapped_inputs" not in faults(est, noisy)
+
+
+def test_names_and_an_origin_are_signs_too_and_one_of_them_alone_is_not_enough():
+    gt, est = loop()
+    at_origin = se3.inverse(gt.trajectory.T_world_frame[0])
+    rng = np.random.default_rng(1)
+    noisy = with_positions(est, est.trajectory.positions_m + rng.normal(0, 1e-5, (400, 3)))
+    begins = replace(gt, trajectory=changed(gt.trajectory, at_origin @ gt.trajectory.T_world_frame))
+    assert faults(begins, noisy) == []
+    assert faults(gt, replace(noisy, says_truth=True)) == []
+    finding = assert_named("swapped_inputs", begins, replace(noisy, says_truth=True))
+    assert finding.sentence == (
+        "ground truth and estimate seem to be exchanged; the truth begins at the identity and the estimate does not; "
+        "the estimate's file calls itself ground truth"
+    )
+    # Both that say so, or neither, are no sign.
+    assert faults(replace(begins, says_truth=True), replace(noisy, says_truth=True)) == []
+    # Signs against it weigh as much as those for it.
+    assert faults(replace(begins, says_truth=True), noisy) == []
+
+
+@pytest.mark.parametrize(("step", "is_sign"), [(3, True), (1, False)])
+def test_more_than_twice_the_rate_is_a_sign_of_a_tracker(step, is_sign):
+    gt, _ = loop(n=1200)
+    rng = np.random.default_rng(1)
+    est = with_positions(gt, gt.trajectory.positions_m + rng.normal(0, 1e-6, (1200, 3)))
+    sparse = Trajectory(gt.trajectory.t_ns[::step], gt.trajectory.T_world_frame[::step])
+    given = (replace(gt, trajectory=sparse), replace(est, says_truth=True))
+    assert faults(*given) == (["swapped_inputs"] if is_sign else [])
+    if is_sign:  # the same rates the other way round are a sign against it
+        begins = se3.inverse(est.trajectory.T_world_frame[0]) @ est.trajectory.T_world_frame
+        fine = replace(gt, trajectory=changed(est.trajectory, begins))
+        assert faults(fine, replace(gt, trajectory=sparse, says_truth=True)) == []
+
+
+@pytest.mark.parametrize(("sigma_m", "is_sign"), [(3e-4, True), (1e-6, False)])
+def test_noise_is_a_sign_only_where_it_is_more_than_motion(sigma_m, is_sign):
+    gt, _ = loop(n=1200)
+    rng = np.random.default_rng(1)
+    noisy = with_positions(gt, gt.trajectory.positions_m + rng.normal(0, sigma_m, (1200, 3)))
+    smooth = with_positions(gt, gt.trajectory.positions_m + rng.normal(0, sigma_m / 1.7, (1200, 3)))
+    # Noise 1.7 times as large is one sign, and the name of the file another.
+    assert faults(noisy, replace(smooth, says_truth=True)) == (["swapped_inputs"] if is_sign else [])
+    smoother = with_positions(gt, gt.trajectory.positions_m + rng.normal(0, sigma_m / 2.5, (1200, 3)))
+    # Noise 2.5 times as large at the same instants is two signs.
+    assert faults(noisy, smoother) == (["swapped_inputs"] if is_sign else [])
+    few = Trajectory(smoother.trajectory.t_ns[:-1], smoother.trajectory.T_world_frame[:-1])
+    assert faults(noisy, replace(smoother, trajectory=few)) == []

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vobench.analysis.diagnose_files import diagnose_files
+from vobench.analysis.diagnose import Finding
+from vobench.analysis.diagnose_files import FileDiagnosis, _exchanged, diagnose_files
 from vobench.geometry import se3
 from vobench.runner.trajectory_pair import TrajectorySource
 from vobench.trajectory.formats import format_tum
@@ -69,3 +70,38 @@ def test_unrelated_files_get_no_command(sources, tmp_path: Path) -> None:
     found = diagnose_files(sources[0], TrajectorySource(tmp_path / "other.tum"))
     assert "unrelated" in [finding.fault for finding in found.findings]
     assert found.command is None
+
+
+def diagnosis(*findings: Finding, **changes) -> FileDiagnosis:
+    return FileDiagnosis(TrajectorySource(Path("gt.tum")), TrajectorySource(Path("est.tum")), findings, **changes)
+
+
+def test_options_exchange_their_sides_with_the_files() -> None:
+    options = ("--est-as", "--gt-as", "--t-offset=0.25", "--t-offset=-3", "-a", "xyzw")
+    assert [_exchanged(option) for option in options] == [
+        "--gt-as", "--est-as", "--t-offset=-0.25", "--t-offset=3", "-a", "xyzw",
+    ]  # fmt: skip
+
+
+def test_swapped_files_are_exchanged_in_the_command_of_that_finding_and_in_that_of_all() -> None:
+    offset = Finding("time_offset", "late", (), ("--t-offset=0.25",))
+    found = diagnosis(offset, Finding("swapped_inputs", "swapped", ()))
+    assert found.command == "vobench score est.tum gt.tum --t-offset=-0.25"
+    commands = [finding["command"] for finding in found.as_dict()["findings"]]
+    assert commands == ["vobench score gt.tum est.tum --t-offset=0.25", "vobench score est.tum gt.tum"]
+
+
+def test_notes_warnings_and_files_of_stamps_are_told() -> None:
+    found = diagnosis(
+        Finding("scale", "large", (), ("-a", "sim3")), times=(Path("times.txt"),), by_frame="by row", notes=("a note",)
+    )
+    assert found.command == "vobench score gt.tum est.tum -a sim3 --times times.txt"
+    facts = found.as_dict()
+    assert (facts["warnings"], facts["notes"]) == (["by row"], ["a note"])
+    assert diagnosis().as_dict() == {"findings": [], "command": None, "warnings": [], "notes": []}
+
+
+def test_the_topic_of_a_bag_is_in_the_command() -> None:
+    source = TrajectorySource(Path("run.bag"), topic="/odom")
+    found = FileDiagnosis(source, TrajectorySource(Path("est.tum")), (Finding("scale", "large", (), ("-a", "sim3")),))
+    assert found.command == "vobench score run.bag est.tum --gt-topic /odom -a sim3"

@@ -1,65 +1,32 @@
-"""Statistics of pictures that were made with known ones."""
+"""Statistics of recordings that were made with known ones, and what is said about them."""
 
+from dataclasses import replace
 from itertools import pairwise
 
-import cv2
 import numpy as np
 import pytest
 
+from tests.analysis.test_image_noise import as_grey, boards
+from vobench.analysis.image_statistics import gradients, picture_statistics
 from vobench.analysis.realism import (
     STATISTICS,
     WINDOW,
+    Realism,
     Shot,
-    edge_px,
-    gradients,
     measure,
-    noise_dn,
+    residual,
     says,
-    spectrum,
+    shots_of,
     window_starts,
 )
+from vobench.analysis.stereo_fit import StereoFit, Uncertain
+from vobench.analysis.stereo_matches import Matches
 from vobench.errors import InputError
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
+from vobench.runner.recording import read_recording
 
 RIG = stereo_rig(Pinhole(320, 240, 300.0, 300.0, 159.5, 119.5), pitch_deg=0)
-
-
-def boards(sigma_px: float = 0.8) -> np.ndarray:
-    """A picture (240, 320) of rectangles of even grey, blurred."""
-    rng, picture = np.random.default_rng(0), np.full((240, 320), 128.0)
-    for _ in range(40):
-        x, y, grey = rng.integers(0, 320), rng.integers(0, 240), rng.uniform(40, 220)
-        picture[y : y + rng.integers(10, 60), x : x + rng.integers(10, 80)] = grey
-    return cv2.GaussianBlur(picture, (0, 0), sigma_px)
-
-
-def as_grey(picture: np.ndarray) -> np.ndarray:
-    return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
-
-
-@pytest.mark.parametrize("sigma", [1.0, 2.0, 5.0])
-def test_noise_is_found_beside_texture(sigma):
-    noisy = boards() + np.random.default_rng(1).normal(0, sigma, (240, 320))
-    assert noise_dn(as_grey(noisy))[0] == pytest.approx(sigma, rel=0.1)
-
-
-def test_a_picture_without_noise_has_little():
-    assert noise_dn(as_grey(boards()))[0] < 0.4
-
-
-def test_a_power_law_has_its_slope():
-    frequency = np.hypot(*np.meshgrid(np.fft.fftfreq(512), np.fft.fftfreq(512)))
-    frequency[0, 0] = np.inf
-    white = np.fft.fft2(np.random.default_rng(2).standard_normal((512, 512)))
-    picture = np.fft.ifft2(white * frequency**-1.4).real
-    assert spectrum([as_grey(128 + 40 * picture / picture.std())])[0] == pytest.approx(-2.8, abs=0.1)
-
-
-def test_more_blur_makes_edges_wider():
-    widths = [edge_px(as_grey(boards(s)), gradients(as_grey(boards(s)))) for s in (0.6, 0.9, 1.3)]
-    assert widths == sorted(widths)
-    assert widths[2] > 1.4 * widths[0]
 
 
 def test_runs_of_pictures_lie_apart_and_within_the_recording():
@@ -77,7 +44,7 @@ def test_one_eye_has_eight_statistics_and_a_sentence():
     found = measure([[Shot(picture, None)] * 3], RIG)
     assert list(found.values) == [s.name for s in STATISTICS][1:]
     assert found.values["tracks_home"] == 100
-    assert says(found)[0].startswith("There is no pair to judge")
+    assert says(found)[0].startswith("There is no stereo pair to judge")
 
 
 def test_a_statistic_says_what_brings_it_into_its_band():
@@ -85,3 +52,195 @@ def test_a_statistic_says_what_brings_it_into_its_band():
     assert burnt.knob(5.0) == ""
     assert burnt.knob(0.0).startswith("more exposure_gain")
     assert burnt.verdict(20.0) == "high"
+
+
+# --- The nine statistics ---
+
+
+def run(*images: np.ndarray) -> list[Shot]:
+    return [Shot(image, None) for image in images]
+
+
+def flat(grey: int) -> np.ndarray:
+    return np.full((240, 320), grey, np.uint8)
+
+
+def test_statistics_of_images_are_means_over_the_images_of_all_runs() -> None:
+    images = [as_grey(boards()), as_grey(boards(sigma_px=2.0)), flat(255)]
+    found = measure([run(images[0], images[1]), run(images[2])], RIG)
+    of_images = [picture_statistics(image) for image in images]
+    for name in ("gradient_p99", "gradient_kurtosis", "corner_unevenness", "grey_sd", "burnt"):
+        assert found.values[name] == pytest.approx(np.mean([each[name] for each in of_images])), name
+    for name in ("grey_mean", "noise_dn", "edge_px", "corners"):
+        assert found.also[name] == pytest.approx(np.mean([each[name] for each in of_images])), name
+    assert found.values["burnt"] == pytest.approx(100 / 3)
+    assert found.pictures == 3
+
+
+def test_tracks_of_a_still_run_are_all_consistent_and_last_for_the_13_images_after_the_first() -> None:
+    found = measure([run(*[as_grey(boards())] * WINDOW)], RIG)
+    assert found.values["tracks_home"] == 100
+    assert found.values["track_life"] == 13
+    assert found.also["flow_px"] == pytest.approx(0, abs=0.01)
+
+
+def test_track_length_counts_the_images_until_the_view_is_blocked() -> None:
+    texture = as_grey(boards())
+    found = measure([run(*[texture] * 5, *[flat(128)] * (WINDOW - 5))], RIG)
+    assert found.values["track_life"] == pytest.approx(4, abs=0.3)
+    short = measure([run(*[texture] * 5)], RIG)
+    assert short.values["track_life"] == 4
+    both = measure([run(*[texture] * 5), run(*[texture] * WINDOW)], RIG)
+    assert both.values["track_life"] == pytest.approx((4 + 13) / 2)
+    assert len(both.curves["alive"]) == WINDOW
+
+
+def test_curves_count_every_pixel_of_every_image_once() -> None:
+    images = [as_grey(boards()), flat(200)]
+    curves = measure([run(*images)], RIG).curves
+    assert curves["grey"].shape == (256,)
+    assert curves["grey"].sum() == curves["gradient"].sum() == 2 * 240 * 320
+    assert curves["grey"][200] == 240 * 320 + (images[0] == 200).sum()
+    assert curves["gradient"].shape == (128,)
+    assert curves["gradient"][0] == sum((gradients(image) < 1).sum() for image in images)
+    assert curves["power"].shape == (128,)
+
+
+def test_the_ranges_are_those_of_the_documentation() -> None:
+    from pathlib import Path
+
+    text = (Path(__file__).parents[2] / "docs" / "realism.md").read_text()
+    for statistic in STATISTICS:
+        assert f"\n| {statistic.title} | {statistic.low:g} … {statistic.high:g} |" in text, statistic.name
+
+
+# --- Runs of a recording ---
+
+
+def test_long_recordings_have_six_runs_from_the_first_image_to_the_last() -> None:
+    starts = window_starts(500)
+    assert len(starts) == 6
+    assert (starts[0], starts[-1]) == (0, 500 - WINDOW)
+    assert window_starts(3 * WINDOW) == [0, WINDOW, 2 * WINDOW]
+    assert window_starts(3 * WINDOW - 1) == [0, 2 * WINDOW - 1]
+    assert window_starts(WINDOW) == window_starts(2) == [0]
+    assert window_starts(500, windows=1) == [0]
+
+
+def test_the_runs_of_a_recording_have_its_images_and_true_poses_in_order(recorded_case) -> None:
+    recording = read_recording(recorded_case)
+    runs = shots_of(recording)
+    starts = window_starts(recording.frame_count)
+    assert [len(shots) for shots in runs] == [min(WINDOW, recording.frame_count)] * len(starts)
+    every_frame = list(recording.encoded_frames())
+    truth = recording.truth
+    for start, shots in zip(starts, runs, strict=True):
+        for frame, shot in zip(every_frame[start:], shots, strict=False):
+            row = np.flatnonzero(truth.t_ns == frame.t_ns)
+            expected = truth.T_world_frame[row[0]] @ recording.rig.T_body_left
+            np.testing.assert_allclose(shot.T_world_left, expected, atol=1e-9)
+            assert shot.right is not None
+            assert shot.left.shape == shot.right.shape == (160, 240)
+    assert not np.array_equal(runs[0][0].left, runs[0][1].left)
+
+
+def test_outside_of_the_ground_truth_no_pose_is_known(recorded_case) -> None:
+    recording = read_recording(recorded_case)
+    inner = replace(recording.truth, t_ns=recording.truth.t_ns[2:5], T_world_frame=recording.truth.T_world_frame[2:5])
+    (shots, *_) = shots_of(replace(recording, truth=inner))
+    stamps = [frame.t_ns for frame in recording.encoded_frames()][: len(shots)]
+    known = [shot.T_world_left is not None for shot in shots]
+    assert known == [bool(inner.t_ns[0] <= t_ns <= inner.t_ns[-1]) for t_ns in stamps]
+    assert sum(known) == 3
+    assert all(shot.T_world_left is None for shot in shots_of(replace(recording, truth=None))[0])
+
+
+# --- Sentences ---
+
+
+def fit(**changes) -> StereoFit:
+    """The fit of a pair that is right, with some changes."""
+    nothing = Uncertain(0.0, 0.01)
+    empty = np.zeros(0)
+    matches = Matches(np.zeros((0, 2)), empty, empty, np.zeros(0, np.int64))
+    perfect = StereoFit(
+        focal_px=300.0,
+        baseline_m=0.2,
+        matches=matches,
+        row_mad_px=0.2,
+        row_noise_px=0.1,
+        coefficients=np.zeros(5),
+        roll_deg=nothing,
+        pitch_deg=nothing,
+        xy_px=nothing,
+        gain=1.0,
+        disparity_px=(1.0, 2.0, 3.0),
+        yaw_deg=nothing,
+        yaw_from="rows",
+    )
+    return replace(perfect, **changes)
+
+
+def sentences(pair: StereoFit | None) -> list[str]:
+    return says(Realism({}, {}, {}, pair, 1))
+
+
+def test_of_a_pair_that_is_right_nothing_significant_is_said() -> None:
+    (sentence,) = sentences(fit())
+    assert sentence == "The disparity has no significant offset: +0.00 ± 0.05 px."
+    assert residual(fit()) == {}
+
+
+def test_a_yaw_is_an_offset_of_disparity() -> None:
+    (sentence,) = sentences(fit(yaw_deg=Uncertain(-0.1, 0.01), yaw_from="motion"))
+    assert "offset of -0.52 ± 0.05 px" in sentence
+    assert "yaw of -0.100 ± 0.010° (by motion)" in sentence
+    # Significant, but too small to matter.
+    assert "no significant offset" in sentences(fit(yaw_deg=Uncertain(0.009, 0.0001)))[0]
+    assert "cannot be determined" in sentences(fit(yaw_deg=None, yaw_from=""))[0]
+
+
+def test_roll_and_pitch_are_named_where_they_are_significant_and_not_tiny() -> None:
+    roll, pitch = Uncertain(0.2, 0.01), Uncertain(-0.1, 0.01)
+    (_, sentence) = sentences(fit(roll_deg=roll, pitch_deg=pitch))
+    assert "roll +0.200 ± 0.010° and pitch -0.100 ± 0.010°" in sentence
+    assert "0.20 px" in sentence
+    assert "0.10 px are left" in sentence
+    (_, sentence) = sentences(fit(pitch_deg=pitch))
+    assert "roll" not in sentence
+    assert len(sentences(fit(roll_deg=Uncertain(0.001, 0.0001)))) == 1
+    assert len(sentences(fit(roll_deg=Uncertain(0.02, 0.01)))) == 1
+
+
+def test_rows_that_no_rotation_explains_are_the_lenss_unless_they_gave_the_yaw() -> None:
+    xy_px = Uncertain(0.5, 0.01)
+    (_, sentence) = sentences(fit(xy_px=xy_px, yaw_from="motion"))
+    assert "+0.50 px × xy, which no rotation of a camera explains" in sentence
+    assert len(sentences(fit(xy_px=xy_px, yaw_from="rows and motion"))) == 1
+
+
+@pytest.mark.parametrize(("gain", "word"), [(1.06, "brighter"), (0.94, "darker"), (1.04, None), (0.96, None)])
+def test_a_gain_of_more_than_5_percent_is_said(gain: float, word: str | None) -> None:
+    found = sentences(fit(gain=gain))
+    assert len(found) == (2 if word else 1)
+    if word:
+        assert found[1] == f"The right image is {word}: {gain:.2f} of the left."
+
+
+def test_the_residual_has_the_significant_angles_alone() -> None:
+    pair = fit(yaw_deg=Uncertain(0.123456, 0.01), roll_deg=Uncertain(-0.2, 0.01), pitch_deg=Uncertain(0.02, 0.01))
+    assert residual(pair) == {"right_yaw_deg": 0.1235, "right_roll_deg": -0.2}
+    assert residual(replace(pair, yaw_deg=None)) == {"right_roll_deg": -0.2}
+
+
+def test_inside_counts_the_statistics_in_their_ranges() -> None:
+    middle = {statistic.name: (statistic.low + statistic.high) / 2 for statistic in STATISTICS}
+    assert Realism(middle, {}, {}, None, 1).inside == 9
+    assert Realism({**middle, "burnt": 50.0}, {}, {}, None, 1).inside == 8
+    del middle["row_error_px"]
+    assert Realism(middle, {}, {}, None, 1).inside == 8
+    for statistic in STATISTICS:
+        assert [statistic.verdict(value) for value in (statistic.low, statistic.high)] == ["in", "in"]
+        assert statistic.verdict(statistic.low - 0.01) == "low"
+        assert statistic.knob(statistic.low - 0.01) == statistic.raised_by
+        assert statistic.knob(statistic.high + 0.01) == statistic.lowered_by

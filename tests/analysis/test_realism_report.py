@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vobench.analysis.realism import STATISTICS
+from vobench.analysis.realism import STATISTICS, Realism
 from vobench.analysis.realism_report import RealismReport, measure_realism
 from vobench.errors import InputError
 
@@ -46,3 +46,44 @@ def test_the_table_has_the_rows(report: RealismReport) -> None:
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="an empty folder"):
         measure_realism(tmp_path)
+
+
+def realism(**values: float) -> Realism:
+    return Realism(values, {}, {}, None, 14)
+
+
+@pytest.mark.parametrize(
+    ("other", "verdict"), [(50.0, "in"), (41.0, "in"), (39.0, "high"), (66.0, "in"), (68.0, "low")]
+)
+def test_values_of_two_recordings_are_alike_within_a_quarter_of_the_others(other: float, verdict: str) -> None:
+    report = RealismReport(Path("a"), realism(grey_sd=50.0), Path("b"), realism(grey_sd=other))
+    (row,) = report.rows()
+    assert row == {
+        "statistic": "standard deviation of grey",
+        "name": "grey_sd",
+        "unit": "DN",
+        "value": 50.0,
+        "against": other,
+        "is": verdict,
+        "knob": row["knob"],
+    }
+    assert bool(row["knob"]) == (verdict != "in")
+
+
+def test_negative_values_are_compared_by_their_size() -> None:
+    report = RealismReport(Path("a"), realism(spectrum_slope=-2.5), Path("b"), realism(spectrum_slope=-3.0))
+    assert report.rows()[0]["is"] == "in"
+
+
+def test_a_statistic_that_the_other_recording_lacks_is_judged_by_its_range() -> None:
+    report = RealismReport(Path("a"), realism(row_error_px=0.3, burnt=50.0), Path("b"), realism(burnt=50.0))
+    rows = {row["name"]: row for row in report.rows()}
+    assert (rows["row_error_px"]["against"], rows["row_error_px"]["is"]) == (None, "in")
+    assert rows["burnt"]["is"] == "in"
+    assert {row["name"]: row["is"] for row in RealismReport(Path("a"), report.found).rows()}["burnt"] == "high"
+
+
+def test_facts_of_a_report_without_a_pair() -> None:
+    facts = RealismReport(Path("a"), realism(burnt=5.0)).as_dict()
+    assert (facts["pair"], facts["inside"], facts["pictures"]) == (None, 1, 14)
+    assert facts["says"] == RealismReport(Path("a"), realism(burnt=5.0)).sentences()

@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vobench.analysis import recording_twin, twin
+from vobench.analysis import camera_fit, path_placement, recording_twin
+from vobench.analysis.path_placement import Placement
 from vobench.analysis.realism import Realism
 from vobench.analysis.realism_report import realism_of
 from vobench.analysis.recording_twin import REAL, TWIN, TwinSuite, compare_twin, write_twin_suite
-from vobench.analysis.twin import Placement
 from vobench.dataset.recording import Recording
 from vobench.errors import InputError, UnknownNameError
 from vobench.geometry import se3
+from vobench.geometry.rig import looking
 from vobench.runner.folder import RunFolder, read_tum
 from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.recording import read_recording
@@ -36,8 +37,10 @@ def realism(recording: Recording) -> Realism:
 @pytest.fixture
 def suite(recorded_case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> TwinSuite:
     """The suite of a twin in the closet that was recorded, placed and fitted in few steps."""
-    for name, value in (("DRAWS", 600), ("NEAR_DRAWS", 100), ("ROUNDS", 1), ("HALVINGS", 2)):
-        monkeypatch.setattr(twin, name, value)
+    monkeypatch.setattr(path_placement, "DRAWS", 600)
+    monkeypatch.setattr(path_placement, "NEAR_DRAWS", 100)
+    monkeypatch.setattr(camera_fit, "ROUNDS", 1)
+    monkeypatch.setattr(camera_fit, "HALVINGS", 2)
     monkeypatch.setattr(recording_twin, "FITTED_PICTURES", 2)
     monkeypatch.setenv("VOBENCH_CACHE", str(tmp_path / "cache"))
     closet = next(recorded_case.resolve().parents[4].glob("closet.yaml"))
@@ -171,3 +174,81 @@ def test_two_estimators_are_no_order(known) -> None:
     two = {name: NOISE_M[name] for name in ("good", "bad")}
     with pytest.raises(InputError, match="an order needs 3 estimators"):
         known(two, two)
+
+
+# --- Parts, without a run ---
+
+
+def test_the_replay_has_the_rate_of_the_recording_and_half_as_many_knots(recording, realism) -> None:
+    settings = recording_twin._recorded_path(recording, realism).trajectory_settings()
+    assert settings == {"kind": "replay", "file": "path.tum", "rate_hz": 10.0, "knot_hz": 5.0}
+
+
+def test_the_path_in_the_place_is_the_bodys_from_time_0_on(recording, realism) -> None:
+    path = recording_twin._recorded_path(recording, realism)
+    T_place_world = se3.transform(se3.rotation_z(0.4), (1.0, 2.0, 3.0))
+    placed = path.in_place(Placement(T_place_world, 1.0, 0.0, 1))
+    assert placed.t_ns[0] == 0
+    np.testing.assert_array_equal(np.diff(placed.t_ns), np.diff(path.t_ns))
+    T_body_left = path.rig.build().T_body_left
+    np.testing.assert_allclose(placed.T_world_frame @ T_body_left, T_place_world @ path.T_world_left, atol=1e-9)
+
+
+def test_frames_from_the_first_to_the_last_true_pose_are_repeated(recording, realism) -> None:
+    t_ns = recording.truth.t_ns
+    inner = Trajectory(t_ns[1:-1], recording.truth.T_world_frame[1:-1])
+    path = recording_twin._recorded_path(replace(recording, truth=inner), realism)
+    assert path.t_ns.tolist() == t_ns[1:-1].tolist()
+
+
+@pytest.mark.parametrize(("count", "is_enough"), [(12, True), (11, False)])
+def test_twelve_pictures_are_enough_for_a_twin(recording, realism, count, is_enough) -> None:
+    truth = Trajectory(recording.truth.t_ns[:count], recording.truth.T_world_frame[:count])
+    short = replace(recording, truth=truth)
+    if is_enough:
+        assert len(recording_twin._recorded_path(short, realism).t_ns) == count
+    else:
+        with pytest.raises(InputError, match=f"12 pictures or more with a truth, and this recording has {count}"):
+            recording_twin._recorded_path(short, realism)
+
+
+def test_only_a_kitti_recording_is_levelled(recording, realism) -> None:
+    tilt = looking(pitch_deg=5, position_m=(0, 0, 0))[:3, [2, 0, 1]] * [1, -1, -1]
+    T = se3.transform(tilt, np.zeros(3)) @ recording.truth.T_world_frame
+    tilted = replace(recording, truth=Trajectory(recording.truth.t_ns, T))
+    heights = {}
+    for form in ("kitti", recording.form):
+        path = recording_twin._recorded_path(replace(tilted, form=form), realism)
+        heights[form] = np.ptp(path.T_world_left[:, 2, 3])
+    assert heights["kitti"] < 0.2 * heights[recording.form]
+
+
+def test_items_are_chosen_evenly_from_the_first_to_the_last() -> None:
+    assert recording_twin._evenly(list(range(23))) == list(range(0, 23, 2))
+    assert len(recording_twin._evenly([1, 2, 3])) == 12
+
+
+def test_the_gain_of_the_right_camera_is_stated_in_the_linear_signal() -> None:
+    settings = camera_fit.camera_of(0.8, 0.5, 0.9, 1.0)
+    stated = recording_twin._camera_settings(settings, gain=1.1)
+    assert stated["unlike"] == {"right": {"gain": 1.21}}  # grey values are the root of light here
+    assert (stated["exposure_gain"], stated["blur_sigma_px"]) == (0.8, 0.9)
+    assert stated["chip"]["full_well_e"] == 20_000
+
+
+def test_the_spread_of_errors_is_that_of_the_known_ones() -> None:
+    errors = np.append(np.arange(101.0), [np.nan, np.nan])
+    assert recording_twin._spread(errors) == {"mean": 50, "p10": 10, "p50": 50, "p90": 90}
+
+
+def test_figures_of_the_pair_are_compared_where_both_are_known(realism: Realism) -> None:
+    pair = realism.pair
+    assert pair is not None
+    compared = recording_twin._compared(realism, realism)
+    assert compared["roll of the right eye,°"] == (pair.roll_deg.value, pair.roll_deg.value)
+    assert compared["disparity, 50 % are below, px"] == (pair.disparity_px[1],) * 2
+    assert compared["noise where flat, DN"] == (realism.also["noise_dn"],) * 2
+    unknown = replace(realism, pair=replace(pair, yaw_deg=None))
+    assert "yaw of the right eye,°" not in recording_twin._compared(realism, unknown)
+    assert "offset of the right eye, px" not in recording_twin._compared(unknown, realism)
+    assert len(recording_twin._compared(realism, replace(realism, pair=None))) == 4

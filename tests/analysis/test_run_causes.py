@@ -63,3 +63,20 @@ def test_progress_hears_of_every_case(noisy_run: NoisyRun) -> None:
 
     find_causes(noisy_run.folder.path, progress=Counting())
     assert heard == [("look at", 1)]
+
+
+def test_each_trial_is_listed_with_the_frame_at_which_it_diverges() -> None:
+    (found,) = planted().estimators
+    loss = found.courses[0].loss.copy()
+    loss[50] = 1.0
+    diverged = EstimatorCauses("mine", ("lost",), (Course("walk", 1, found.courses[0].conditions, loss),), None)
+    assert diverged.trials() == [{"case": "walk", "repeat": 1, "status": "lost", "first_divergence_frame": 50}]
+
+
+def test_the_dictionary_has_the_factors_of_cases_and_eight_segments_unless_more_are_asked_for() -> None:
+    (facts,) = planted().as_dict()["estimators"]
+    attribution = planted().estimators[0].attribution
+    assert len(facts["worst"]) == 8
+    assert facts["explained"] == attribution.explained
+    (factors,) = facts["cases"].values()
+    assert factors == [[cause.conditions, factor] for cause, factor in attribution.cases["walk"]]

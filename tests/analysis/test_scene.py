@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vobench.analysis.scene import survey
+from vobench.analysis.scene import strength, survey
 from vobench.asset.shape import at, block
-from vobench.scene.light import PointLight
+from vobench.scene.light import PointLight, Sky
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, joined, quad
 from vobench.scene.scene import Scene
@@ -87,3 +87,58 @@ def test_backs_are_seen_from_inside_a_thing_that_looks_outwards() -> None:
 def test_a_scene_without_a_floor_has_no_free_circle() -> None:
     wall = Thing("wall", quad((0, 0, 0), (1, 0, 0), (0, 0, 1)), "grey")
     assert survey(scene(wall)).free is None
+
+
+def test_textures_are_counted_once_each_in_megabytes() -> None:
+    from vobench.suite.scene_spec import Matt
+
+    texture = Matt("terrazzo", 0.4, contrast=0.5, resolution_px=64)
+    materials = {
+        "grey": Material(colour=(0.5, 0.5, 0.5), texture=texture),
+        "again": Material(colour=(0.2, 0.5, 0.5), texture=texture),
+    }
+    found = survey(Scene("s", (FLOOR,), materials, (LIGHT,)))
+    assert found.textures_mb == pytest.approx(texture.pixels().nbytes / 1e6)
+    assert found.materials == 2
+    assert survey(scene(FLOOR)).textures_mb == 0
+
+
+def test_the_strength_of_a_light_has_its_unit() -> None:
+    sky = Sky("sky", 1234.5)
+    room = Scene("s", (FLOOR,), GREY, (LIGHT, sky))
+    assert strength(room, "bulb") == "500 lm"
+    assert strength(room, "sky") == "1234 lx"
+
+
+def test_corners_nearer_than_a_hundredth_of_a_millimetre_are_one_point() -> None:
+    solid = crate(1.0, 0.0)
+    for gap_m, open_edges in ((1e-7, 0), (1e-3, 3)):
+        vertices = solid.mesh.vertices_m[solid.mesh.faces].reshape(-1, 3).copy()  # each face has corners of its own
+        vertices[:3] += gap_m
+        faces = np.arange(len(vertices)).reshape(-1, 3)
+        uv = np.zeros((len(vertices), 2))
+        normals = np.repeat(np.array([[0.0, 0.0, 1.0]]), len(vertices), axis=0)
+        apart = Thing("apart", type(solid.mesh)(vertices, faces, uv, normals), "grey")
+        found = survey(scene(FLOOR, apart)).open_edges
+        assert found == 0 if open_edges == 0 else found >= open_edges
+
+
+def test_a_face_that_stands_twice_in_another_order_of_corners_is_a_twin() -> None:
+    solid = crate(1.0, 0.0)
+    turned = type(solid.mesh)(
+        solid.mesh.vertices_m,
+        np.vstack([solid.mesh.faces, np.roll(solid.mesh.faces[:2], 1, axis=1)]),
+        solid.mesh.uv,
+        solid.mesh.normals,
+    )
+    assert survey(scene(FLOOR, solid)).twins == 0
+    assert survey(scene(FLOOR, Thing("turned", turned, "grey"))).twins == 2
+
+
+def test_backs_are_looked_for_from_the_middle_where_there_is_no_floor() -> None:
+    roof = Thing("roof", quad((-4, 3, 2), (8, 0, 0), (0, -6, 0)), "grey")  # faces down
+    lower = Thing("lower", quad((-4, -3, 0), (0, 6, 0), (8, 0, 0)), "grey")  # faces down, too: no floor
+    found = survey(scene(roof, lower))
+    assert found.free is None
+    # From 1 m above it the back of the lower one is all that is below, but for what passes beside it.
+    assert 0.3 < found.backs < 0.5

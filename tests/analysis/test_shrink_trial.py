@@ -1,10 +1,18 @@
-"""A failed trial shrinks to a suite on which it still fails alike."""
+"""A failed trial is shrunk to a suite that still fails in the same way."""
 
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from tests.analysis.conftest import NoisyRun
-from vobench.analysis.shrink_trial import shrink_trial
+from vobench.analysis import shrink_trial as shrink_trial_module
+from vobench.analysis.shrink import Failure
+from vobench.analysis.shrink_trial import _fails, _first_without_pose_ns, _likely_windows, _part, shrink_trial
+from vobench.analysis.trial_data import read_paths
 from vobench.errors import InputError
+from vobench.runner.finished_trial import FinishedTrial, read_finished_trial
 from vobench.suite.suite import read_plan
 
 
@@ -35,3 +43,74 @@ def test_a_trial_that_does_not_fail_is_refused_before_anything_is_run(noisy_run:
     with pytest.raises(InputError, match="wheel_odometry on short is ok: nothing fails"):
         shrink_trial(noisy_run.trial("wheel_odometry"), run_plan=never, folder=tmp_path / "small")
     assert not (tmp_path / "small").exists()
+
+
+# --- Windows that are likely to fail ---
+
+
+@dataclass(frozen=True)
+class Row:
+    t_ns: int
+    status: str
+
+
+@pytest.fixture
+def finished(noisy_run: NoisyRun) -> FinishedTrial:
+    return read_finished_trial(noisy_run.trial("wheel_odometry"))
+
+
+def stamps_of(trial: FinishedTrial) -> dict[int, int]:
+    """The stamps of the frames that have a true pose, numbered from 5 on."""
+    gt = read_paths(trial.folder, trial.score).gt
+    return dict(enumerate(gt.t_ns.tolist(), 5))
+
+
+@pytest.mark.parametrize("failing", [0, 2, -1])
+def test_after_a_crash_windows_with_the_first_frame_without_a_pose_are_likely(finished, monkeypatch, failing) -> None:
+    stamps_ns = stamps_of(finished)
+    numbers = list(stamps_ns)
+    failed = numbers[failing]
+    rows = [Row(t_ns, "ok" if number < failed else "") for number, t_ns in stamps_ns.items()]
+    monkeypatch.setattr(shrink_trial_module, "read_frames", lambda _: rows)
+    is_likely = _likely_windows(finished, stamps_ns, Failure.of("crashed", "it does not say"))
+    for first in numbers:
+        for end in range(first + 1, numbers[-1] + 2):
+            assert is_likely((first, end)) == (first <= failed < end), (first, end)
+
+
+def test_where_every_frame_has_a_pose_the_first_is_taken(finished, monkeypatch) -> None:
+    stamps_ns = stamps_of(finished)
+    paths = read_paths(finished.folder, finished.score)
+    monkeypatch.setattr(shrink_trial_module, "read_frames", lambda _: [Row(t, "ok") for t in stamps_ns.values()])
+    assert _first_without_pose_ns(finished, paths) == min(stamps_ns.values())
+    lost = [Row(1, "ok"), Row(2, "lost"), Row(3, "")]
+    monkeypatch.setattr(shrink_trial_module, "read_frames", lambda _: lost)
+    assert _first_without_pose_ns(finished, paths) == 2
+
+
+def test_windows_are_judged_by_the_poses_that_the_trial_has_in_them(finished: FinishedTrial) -> None:
+    stamps_ns = stamps_of(finished)
+    first, last = min(stamps_ns), max(stamps_ns)
+    is_likely = _likely_windows(finished, stamps_ns, Failure.of(finished.score.status, finished.score.reason))
+    assert finished.score.status == "ok"
+    assert is_likely((first, last + 1))
+    assert is_likely((first, first + 4))
+    assert not is_likely((first, first + 3))  # too short to be judged
+
+
+def test_a_part_has_the_poses_from_one_stamp_to_another(finished: FinishedTrial) -> None:
+    paths = read_paths(finished.folder, finished.score)
+    t_ns = paths.gt.t_ns
+    part = _part(paths, first_ns=int(t_ns[1]), last_ns=int(t_ns[3]))
+    assert part.gt.t_ns.tolist() == t_ns[1:4].tolist()
+    np.testing.assert_array_equal(part.gt.T_world_frame, paths.gt.T_world_frame[1:4])
+    assert set(part.est.t_ns.tolist()) <= set(t_ns[1:4].tolist())
+    assert part.scale == paths.scale
+
+
+@pytest.mark.parametrize(
+    ("status", "reason", "fails"),
+    [("ok", "", False), ("partial", "", False), ("partial", "a gap", True), ("lost", "", True), ("crashed", "x", True)],
+)
+def test_a_partial_trial_fails_if_it_has_a_reason(status: str, reason: str, fails: bool) -> None:
+    assert _fails(SimpleNamespace(status=status, reason=reason)) == fails

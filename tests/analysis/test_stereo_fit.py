@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from vobench.analysis.stereo_fit import SLANT, PairShot, fit_pair, refined
+from vobench.analysis.stereo_fit import Uncertain, combined_yaw, fit_pair, robust_fit, row_error
+from vobench.analysis.stereo_matches import PairShot
 from vobench.estimator.tools import stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
@@ -76,18 +77,110 @@ def test_the_right_eyes_turns_are_found(fits):
     assert fit.row_noise_px < fit.row_mad_px / 3
 
 
-def test_places_on_slanted_walls_are_found_between_pixels():
-    shot = shots(CalibrationError())[0]
-    points = np.float32([[x, y] for x in range(80, 290, 15) for y in range(40, 210, 15)]) + 0.3
-    rays = LENS.rays(points)
-    z_m = np.min([np.where(rays @ n > 0, m / (rays @ n), np.inf) for n, m in WALLS], axis=0) * rays[:, 2]
-    there = points - np.c_[300 * 0.2 / z_m, np.zeros(len(z_m))]
-    found, settled = refined(shot.left, shot.right, points, np.float32(there + 0.5), shape=SLANT)
-    assert settled.mean() > 0.8
-    assert np.median(np.abs(found - there)[settled], axis=0) == pytest.approx([0, 0], abs=0.04)
-    assert not refined(shot.left, shot.right, points, np.float32(there + 9), shape=SLANT)[1].all()
-
-
 def test_pictures_without_texture_have_no_fit():
     plain = np.full((240, 320), 90, np.uint8)
     assert fit_pair([[PairShot(plain, plain)] * 4], stereo_pair(RIG, "test")) is None
+
+
+def test_the_spread_of_rows_is_that_of_the_roll_and_doubles_with_it(fits):
+    fit = fits[0.15, -0.1, 0.12]
+    x, y = fit.matches.place.T
+    roll, pitch, yaw = np.deg2rad([0.15, -0.1, 0.12])
+    expected_px = 300 * (pitch * (1 + y * y) - roll * x - yaw * x * y)
+    np.testing.assert_allclose(np.median(fit.matches.row_px - expected_px), 0, atol=0.02)
+    # The spread is measured on other matches of the same view.
+    deviation_px = np.abs(expected_px - np.median(expected_px))
+    assert fit.row_mad_px == pytest.approx(1.4826 * np.median(deviation_px), rel=0.25)
+    assert np.median(np.abs(row_error(fit.coefficients, fit.matches.place) - expected_px)) < 0.03
+
+
+def test_figures_of_the_pair_are_those_of_its_lens_and_matches(fits):
+    fit = fits[0.0, 0.0, 0.0]
+    assert (fit.focal_px, fit.baseline_m) == (300, pytest.approx(0.2))
+    assert fit.disparity_px == pytest.approx(tuple(np.quantile(fit.matches.disparity_px, (0.1, 0.5, 0.9))))
+    assert set(fit.matches.window.tolist()) == {0}
+    assert fit.roll_deg.sigma < 0.01
+
+
+# --- The yaw ---
+
+
+def test_yaws_that_agree_are_weighted_by_their_inverse_variances():
+    yaw, source = combined_yaw(Uncertain(0.10, 0.01), Uncertain(0.13, 0.02))
+    assert source == "rows and motion"
+    assert yaw.value == pytest.approx((0.10 * 4 + 0.13) / 5)
+    assert yaw.sigma == pytest.approx(0.01 * 0.02 / np.hypot(0.01, 0.02))
+    other, _ = combined_yaw(Uncertain(0.13, 0.02), Uncertain(0.10, 0.01))
+    assert (other.value, other.sigma) == pytest.approx((yaw.value, yaw.sigma))
+
+
+def test_rows_that_contradict_the_motion_are_left_to_the_lens():
+    motion = Uncertain(0.0, 0.004)
+    assert combined_yaw(Uncertain(0.016, 0.003), motion) == (motion, "motion")  # 3.2 standard deviations apart
+    assert combined_yaw(Uncertain(0.014, 0.003), motion)[1] == "rows and motion"  # 2.8
+    assert combined_yaw(Uncertain(-0.016, 0.003), motion) == (motion, "motion")
+
+
+def test_without_motion_small_yaws_are_believed_of_rows():
+    small = Uncertain(-0.29, 0.01)
+    assert combined_yaw(small, None) == (small, "rows")
+    assert combined_yaw(Uncertain(-0.31, 0.01), None) == (None, "")
+
+
+@pytest.mark.parametrize(("value", "is_plain"), [(3.1, True), (-3.1, True), (2.9, False)])
+def test_a_value_is_significant_beyond_three_standard_deviations(value, is_plain):
+    assert Uncertain(value, 1.0).is_plain == is_plain
+
+
+# --- The robust fit ---
+
+
+def terms_and_values(count: int, *, sigma: float, outliers: float = 0.0, seed: int = 0):
+    rng = np.random.default_rng(seed)
+    terms = np.c_[np.ones(count), rng.uniform(-1, 1, (count, 2))]
+    values = terms @ [0.5, -2.0, 1.0] + rng.normal(0, sigma, count)
+    values[: int(outliers * count)] += 10
+    return terms, values
+
+
+def test_a_robust_fit_is_exact_without_noise_and_hardly_moved_by_outliers():
+    coefficients, _, noise = robust_fit(*terms_and_values(200, sigma=0))
+    np.testing.assert_allclose(coefficients, [0.5, -2.0, 1.0], atol=1e-7)
+    assert noise == 1e-3  # the least that is believed
+    coefficients, _, noise = robust_fit(*terms_and_values(2000, sigma=0.1, outliers=0.2))
+    np.testing.assert_allclose(coefficients, [0.5, -2.0, 1.0], atol=0.03)
+    assert noise == pytest.approx(0.14, abs=0.03)
+
+
+def test_the_noise_and_the_deviations_of_a_robust_fit_are_those_of_repeated_fits():
+    fits = [robust_fit(*terms_and_values(400, sigma=0.1, seed=seed)) for seed in range(60)]
+    spread = np.std([coefficients for coefficients, _, _ in fits], axis=0)
+    stated = np.mean([sigmas for _, sigmas, _ in fits], axis=0)
+    assert np.mean([noise for _, _, noise in fits]) == pytest.approx(0.1, rel=0.05)
+    # Eight correlated matches count as one, and Cauchy's weights cost some information.
+    np.testing.assert_allclose(stated / spread, np.sqrt(8), rtol=0.3)
+
+
+def test_a_robust_fit_scales_with_its_values():
+    terms, values = terms_and_values(300, sigma=0.1)
+    once, sigmas, noise = robust_fit(terms, values)
+    twice, sigmas_of_twice, noise_of_twice = robust_fit(terms, 2 * values)
+    np.testing.assert_allclose(twice, 2 * once, rtol=1e-5)
+    np.testing.assert_allclose(sigmas_of_twice, 2 * sigmas, rtol=1e-4)
+    assert noise_of_twice == pytest.approx(2 * noise, rel=1e-4)
+
+
+def test_angles_have_the_values_and_deviations_of_their_own_coefficients(fits):
+    fit = fits[0.15, -0.1, 0.12]
+    x, y = fit.matches.place.T
+    terms = np.c_[np.ones(len(x)), x, y, x * y, y * y]
+    coefficients, sigmas, noise = robust_fit(terms, fit.matches.row_px)
+    np.testing.assert_allclose(fit.coefficients, coefficients)
+    assert fit.row_noise_px == pytest.approx(noise)
+    for angle_deg, value_px, sigma_px in (
+        (fit.roll_deg, -coefficients[1], sigmas[1]),
+        (fit.pitch_deg, coefficients[0], sigmas[0]),
+    ):
+        assert np.deg2rad([angle_deg.value, angle_deg.sigma]) * 300 == pytest.approx([value_px, sigma_px])
+    assert (fit.xy_px.value, fit.xy_px.sigma) == pytest.approx((coefficients[3], sigmas[3]))
+    np.testing.assert_allclose(row_error(coefficients, fit.matches.place), terms @ coefficients)

@@ -137,7 +137,7 @@ def test_limits_and_titles_tell_what_is_drawn(axes):
     dotted = [line.get_xdata()[0] for line in panels["spectrum"].get_lines() if line.get_linestyle() == ":"]
     assert dotted == list(realism_plot.CYCLES)
     assert panels["tracks"].get_ylim() == (0, 103)
-    assert [line.get_xdata()[0] for line in panels["grey"].get_lines()] == [realism_plot.BURNT_DN]
+    assert [line.get_xdata()[0] for line in panels["grey"].get_lines()] == [realism_plot.SATURATED_DN]
 
 
 def test_curves_are_thin_and_helping_lines_thinner():

@@ -1,4 +1,4 @@
-"""What makes each frame of a case hard, as only its simulator knows: by rays, from the pictures and from settings."""
+"""Conditions that make each frame of a simulated case hard, computed by rays, from the images and from settings."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from vobench.analysis.image_noise import BLACK_DN, SATURATED_DN
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
@@ -19,232 +20,318 @@ from vobench.sequence.reader import StereoFrame
 from vobench.suite.suite import Case
 from vobench.trajectory.trajectory import Trajectory
 
-# What there is to know of a frame, each with its unit and what it is.
+# Every condition of a frame, with its unit and what it is.
 CONDITIONS: dict[str, tuple[str, str]] = {
     "mirror": ("%", "pixels on mirrors, or seen through panes"),
-    "gloss": ("%", "pixels on coats that mirror"),
+    "gloss": ("%", "pixels on glossy coats"),
     "shadow_edge": ("%", "pixels at the edge of a shadow"),
-    "moving": ("%", "pixels on things that move"),
+    "moving": ("%", "pixels on moving objects"),
     "burnt": ("%", "pixels at 254 or more"),
     "black": ("%", "pixels at 2 or less"),
-    "faintness": ("", "one over the contrast of the textures in view, whatever the camera makes of them"),
-    "depth": ("m", "the middle distance"),
-    "disparity": ("px", "the middle one between the eyes"),
-    "flow": ("px", "how far the middle pixel goes to the next frame"),
-    "turn": ("°", "rotation since the frame before"),
-    "blur": ("px", "the smear of motion, lens and focus together"),
-    "rolling": ("px", "what moves between the first row and the last"),
-    "noise": ("DN", "its standard deviation at the picture's mean"),
-    "calibration": ("px", "between where a point is and where the calibration has it"),
-    "exposure_jump": ("stops", "between this frame's exposure and the last one's"),
-    "light_jump": ("stops", "between this picture's mean and the last one's, the exposure taken out"),
-    "unlike_eyes": ("stops", "between the left picture's mean and the right one's"),
-    "missing_frames": ("", "frames that are not there since the last one"),
+    "faintness": ("", "inverse contrast of the textures in view, before the camera's exposure"),
+    "depth": ("m", "median distance"),
+    "disparity": ("px", "median disparity between the two cameras"),
+    "flow": ("px", "median motion of a pixel until the next frame"),
+    "turn": ("°", "rotation since the previous frame"),
+    "blur": ("px", "standard deviation of motion blur, lens blur and defocus together"),
+    "rolling": ("px", "image motion between the first row and the last"),
+    "noise": ("DN", "standard deviation of the noise at the mean grey value"),
+    "calibration": ("px", "median reprojection error of the nominal calibration"),
+    "exposure_jump": ("stops", "change of exposure since the previous frame"),
+    "light_jump": ("stops", "change of mean brightness since the previous frame, corrected for exposure"),
+    "unlike_eyes": ("stops", "difference of mean brightness between the left and the right image"),
+    "missing_frames": ("", "frames missing since the previous one"),
 }
-SAMPLES_ACROSS = 60  # pixels that rays are cast through, in a row of the picture
-BURNT_DN = 254
-BLACK_DN = 2
-LEAST_CONTRAST = 0.02
-BLUR_PER_DEFOCUS = 0.25  # standard deviation of a disc over its diameter
-SIGMA_PER_SMEAR = 12**-0.5  # of an even smear over its length
+RAYS_PER_ROW = 60  # about as many pixels of an image row are traced
+MIN_CONTRAST = 0.02  # keeps the faintness of a plain surface finite
+MIN_MEAN_REFLECTANCE = 1e-3
+RESPONSE_GAMMA = 2.2  # of grey values over the linear signal, approximately
+SIGMA_PER_DEFOCUS = 0.25  # standard deviation of a disc over its diameter
+SIGMA_PER_SMEAR = 12**-0.5  # standard deviation of a uniform smear over its length
+DB_PER_STOP = 20 * np.log10(2)
+
+Exposures = Mapping[int, tuple[float, float]]  # exposure time in s and gain in dB, by time stamp
+
+
+def conditions(
+    case: Case,
+    gt: Trajectory,
+    frames: Iterable[StereoFrame],
+    exposures: Exposures,
+) -> dict[str, Array]:
+    """Compute all CONDITIONS (N,) of the N frames of a simulated case; shares are from 0 to 1.
+
+    `gt` is the trajectory of the left camera with a pose for each frame.
+    """
+    observer = _SceneObserver(case)
+    steps_ns = np.diff(gt.t_ns)
+    usual_step_ns = float(np.median(steps_ns)) if len(steps_ns) else 1.0
+
+    rows: list[dict[str, float]] = []
+    previous = None
+    for frame, T_world_left, index in zip(frames, gt.T_world_frame, range(len(gt)), strict=False):
+        next_index = min(index + 1, len(gt) - 1)
+        next_shot = Shot(gt.T_world_frame[next_index], int(gt.t_ns[next_index]))
+        of_scene = observer.conditions(Shot(T_world_left, frame.t_ns), next_shot)
+
+        nominal_exposure = (case.camera.exposure_ms / 1e3, case.camera.gain_db)
+        exposure_s, gain_db = exposures.get(frame.t_ns, nominal_exposure)
+        step_ns = float(steps_ns[min(index, len(steps_ns) - 1)]) if len(steps_ns) else usual_step_ns
+        of_camera = _camera_conditions(
+            case,
+            speed_pxps=of_scene["flow"] / (step_ns / 1e9),
+            mean_dn=_mean_dn(frame),
+            exposure_s=exposure_s,
+            gain_db=gain_db,
+        )
+
+        exposure_stops = float(np.log2(exposure_s) + gain_db / DB_PER_STOP)
+        current = _FrameState(exposure_stops, _brightness_stops(frame.left), T_world_left, frame.t_ns)
+        changes = _changes(previous or current, current, usual_step_ns)
+        rows.append({**of_scene, **_image_conditions(frame), **of_camera, **changes})
+        previous = current
+
+    return {name: _column(rows, name) for name in CONDITIONS}
+
+
+def _column(rows: list[dict[str, float]], name: str) -> Array:
+    return np.array([row[name] for row in rows])
+
+
+# --- The scene, by rays ---
 
 
 @dataclass(frozen=True, slots=True)
-class Sampled:
-    """Every `step`-th pixel of a camera's rows and columns, as a camera."""
+class SubsampledCamera:
+    """A camera with every `step`-th pixel of the rows and columns of another one."""
 
-    of: Camera
+    full: Camera
     step: int
 
     @property
     def width_px(self) -> int:
-        """How many pixels a row has."""
-        return self.of.width_px // self.step
+        """Number of columns."""
+        return self.full.width_px // self.step
 
     @property
     def height_px(self) -> int:
-        """How many rows there are."""
-        return self.of.height_px // self.step
+        """Number of rows."""
+        return self.full.height_px // self.step
 
     @property
     def depth_along(self) -> Literal["axis", "ray"]:
-        """As of the whole camera."""
-        return self.of.depth_along
+        """Whether depth is measured along the optical axis or along the ray, as for the full camera."""
+        return self.full.depth_along
 
     def rays(self, uv_px: Array) -> Array:
-        """The rays of its pixels."""
-        return self.of.rays(uv_px * self.step + (self.step - 1) / 2)
+        """Unit rays (..., 3) of pixels (..., 2) of this camera."""
+        return self.full.rays(uv_px * self.step + self._first_px)
 
     def project(self, points_camera: Array) -> Array:
-        """Where points are in its pixels."""
-        return (self.of.project(points_camera) - (self.step - 1) / 2) / self.step
+        """Pixels (..., 2) of this camera in which points (..., 3) are seen."""
+        return (self.full.project(points_camera) - self._first_px) / self.step
+
+    @property
+    def _first_px(self) -> float:
+        """The pixel of the full camera at the centre of the first pixel of this one."""
+        return (self.step - 1) / 2
 
 
-Exposures = Mapping[int, tuple[float, float]]
-
-
-def conditions(case: Case, gt: Trajectory, frames: Iterable[StereoFrame], exposures: Exposures) -> dict[str, Array]:
-    """All of CONDITIONS (N,) of a simulated case's frames; shares from 0 to 1.
-
-    `gt` is the left camera's path with a pose for each frame; `exposures` are time_s and gain_db by stamp.
-    """
-    watched = _Watched(case)
-    rows = list[dict[str, float]]()
-    before = None
-    steps_ns = np.diff(gt.t_ns)
-    usual_ns = float(np.median(steps_ns)) if len(steps_ns) else 1.0
-    for frame, T, nth in zip(frames, gt.T_world_frame, range(len(gt)), strict=False):
-        later = min(nth + 1, len(gt) - 1)
-        row = watched.seen(Shot(T, frame.t_ns), Shot(gt.T_world_frame[later], int(gt.t_ns[later])))
-        exposure_s, gain_db = exposures.get(frame.t_ns, (case.camera.exposure_ms / 1e3, case.camera.gain_db))
-        row |= _pictured(frame)
-        step_s = (float(steps_ns[min(nth, len(steps_ns) - 1)]) if len(steps_ns) else usual_ns) / 1e9
-        row |= _set(case, row, exposure_s=exposure_s, gain_db=gain_db, step_s=step_s)
-        stops = np.log2(exposure_s) + gain_db / (20 * np.log10(2))
-        since = (stops, row.pop("level"), T, frame.t_ns)
-        row |= _since(before or since, since, usual_ns)
-        before = since
-        rows.append(row)
-    return {name: np.array([row[name] for row in rows]) for name in CONDITIONS}
-
-
-class _Watched:
-    """A case's scene seen by rays through some of the left camera's pixels."""
+class _SceneObserver:
+    """The scene of a case, seen by rays through a subset of the left camera's pixels."""
 
     def __init__(self, case: Case) -> None:
         scene = case.build_scene()
-        self._told = case.build_rig()
-        self._true = case.build_true_rig()
-        self._camera = Sampled(self._true.left, max(1, self._true.left.width_px // SAMPLES_ACROSS))
+        self._nominal_rig = case.build_rig()
+        self._true_rig = case.build_true_rig()
+        left = self._true_rig.left
+        self._camera = SubsampledCamera(left, max(1, left.width_px // RAYS_PER_ROW))
         self._caster = TruthCaster(scene)
-        looks = [scene.materials.get(name) for name in self._caster.names.material]
-        self._contrast = np.array([np.nan if look is None else _contrast(look) for look in looks])
-        self._is_coated = np.array([look is not None and look.is_coated for look in looks])
-        self._rays = self._camera.rays(pixel_grid(cast("Camera", self._camera)))
+        materials = [scene.materials.get(name) for name in self._caster.names.material]
+        self._contrast = np.array([_contrast(material) for material in materials])  # (materials,)
+        self._is_coated = np.array([bool(material and material.is_coated) for material in materials])
+        self._rays = self._camera.rays(pixel_grid(cast("Camera", self._camera)))  # (H, W, 3)
 
-    def seen(self, now: Shot, later: Shot) -> dict[str, float]:
+    def conditions(self, now: Shot, later: Shot) -> dict[str, float]:
+        """The conditions that follow from geometry and materials, with the flow to a later shot."""
         channels = ("depth", "flow", "material", "mirror", "shadow", "moving")
         truth = self._caster.frame(cast("Camera", self._camera), now, channels, later=later)
-        assert truth.depth is not None and truth.flow is not None  # noqa: PT018 - both were asked for
-        shares = self._shares(truth)
-        known = np.isfinite(truth.depth)
+        assert truth.depth is not None
+        assert truth.flow is not None
         flow_px = np.linalg.norm(truth.flow, axis=-1) * self._camera.step
-        lengths = truth.depth / (self._rays[..., 2] if self._camera.depth_along == "axis" else 1.0)
-        points_m = (lengths[..., None] * self._rays)[known]
-        return shares | {
-            "depth": _middle(truth.depth),
-            "flow": _middle(flow_px),
-            "disparity": _middle(self._disparity_px(points_m)),
-            "calibration": _middle(self._off_px(points_m)),
+        points_m = self._points(truth.depth)
+        return {
+            **self._pixel_shares(truth),
+            "depth": _median(truth.depth),
+            "flow": _median(flow_px),
+            "disparity": _median(self._disparity_px(points_m)),
+            "calibration": _median(self._reprojection_error_px(points_m)),
         }
 
-    def _shares(self, truth: TruthFrame) -> dict[str, float]:
+    def _points(self, depth_m: NDArray[np.float32]) -> Array:
+        """The points (N, 3) in the left camera's frame of pixels whose depth (H, W) is finite."""
+        axis_share = self._rays[..., 2] if self._camera.depth_along == "axis" else 1.0
+        distance_m = depth_m / axis_share
+        points_m: Array = (distance_m[..., None] * self._rays)[np.isfinite(depth_m)]
+        return points_m
+
+    def _pixel_shares(self, truth: TruthFrame) -> dict[str, float]:
+        """Shares of pixels with a property, and the faintness of what they show."""
         material = cast("Any", truth.material)
         mirror = cast("Any", truth.mirror)
         shadow = cast("Any", truth.shadow)
-        coated = self._is_coated[material]
-        edge = np.zeros(shadow.shape, bool)
-        edge[:, 1:] |= shadow[:, 1:] != shadow[:, :-1]
-        edge[1:] |= shadow[1:] != shadow[:-1]
+        is_coated = self._is_coated[material]
+        is_edge = np.zeros(shadow.shape, bool)
+        is_edge[:, 1:] |= shadow[:, 1:] != shadow[:, :-1]
+        is_edge[1:] |= shadow[1:] != shadow[:-1]
         return {
-            "mirror": float((mirror & ~coated).mean()),
-            "gloss": float((mirror & coated).mean()),
-            "shadow_edge": float(edge.mean()),
-            "faintness": 1 / (LEAST_CONTRAST + self._seen_contrast(material)),
+            "mirror": float((mirror & ~is_coated).mean()),
+            "gloss": float((mirror & is_coated).mean()),
+            "shadow_edge": float(is_edge.mean()),
+            "faintness": 1 / (MIN_CONTRAST + self._mean_contrast(material)),
             "moving": float(cast("Any", truth.moving).mean()),
         }
 
-    def _seen_contrast(self, material: NDArray[np.uint16]) -> float:
-        """The mean over pixels of things with a texture; of all things, where none is in view."""
-        for values in (self._contrast[material], self._contrast):
-            if (known := values[np.isfinite(values)]).size:
+    def _mean_contrast(self, material: NDArray[np.uint16]) -> float:
+        """The mean contrast over pixels whose material has one; over all materials where there is no such pixel."""
+        for contrasts in (self._contrast[material], self._contrast):
+            known = contrasts[np.isfinite(contrasts)]
+            if known.size:
                 return float(known.mean())
         return 0.0
 
     def _disparity_px(self, points_m: Array) -> Array:
-        right = self._true.camera("right")
-        T = se3.inverse(self._true.T_left_right)
-        moved = right.project(se3.apply(T, points_m)) - right.project(points_m @ T[:3, :3].T)
-        return np.asarray(np.linalg.norm(moved, axis=-1))
+        """How far apart (N,) the right camera sees points (N, 3) from where it would see them without a baseline."""
+        right = self._true_rig.camera("right")
+        T_right_left = se3.inverse(self._true_rig.T_left_right)
+        at_infinity_px = right.project(points_m @ T_right_left[:3, :3].T)
+        shift_px = right.project(se3.apply(T_right_left, points_m)) - at_infinity_px
+        return np.asarray(np.linalg.norm(shift_px, axis=-1))
 
-    def _off_px(self, points_m: Array) -> Array:
-        """The mean over both eyes of how far a point is from where it is said to be."""
-        left = self._told.left.project(points_m) - self._true.left.project(points_m)
-        right = [
-            rig.camera("right").project(se3.apply(se3.inverse(rig.T_left_right), points_m))
-            for rig in (self._told, self._true)
-        ]
-        return np.asarray((np.linalg.norm(left, axis=-1) + np.linalg.norm(right[0] - right[1], axis=-1)) / 2)
+    def _reprojection_error_px(self, points_m: Array) -> Array:
+        """How far (N,) the nominal calibration projects points (N, 3) from where they are, as mean of both cameras."""
+        nominal = self._nominal_rig
+        true = self._true_rig
+        left_error_px = nominal.left.project(points_m) - true.left.project(points_m)
+
+        in_nominal_right_m = se3.apply(se3.inverse(nominal.T_left_right), points_m)
+        in_true_right_m = se3.apply(se3.inverse(true.T_left_right), points_m)
+        nominal_right_px = nominal.camera("right").project(in_nominal_right_m)
+        right_error_px = nominal_right_px - true.camera("right").project(in_true_right_m)
+        left_length_px = np.linalg.norm(left_error_px, axis=-1)
+        right_length_px = np.linalg.norm(right_error_px, axis=-1)
+        return np.asarray((left_length_px + right_length_px) / 2)
 
 
-def _contrast(look: Material) -> float:
-    """The spread of a material's texture over its mean; NaN for a mirror or a pane, which shows other things."""
-    if look.kind != "body":
+def _contrast(material: Material | None) -> float:
+    """Standard deviation of a material's texture over its mean.
+
+    NaN where there is no material, and for mirrors and panes, which show other surfaces.
+    """
+    if material is None or material.kind != "body":
         return float("nan")
-    if look.texture is None:
+    if material.texture is None:
         return 0.0
-    pixels = np.asarray(look.texture.pixels()[::2, ::2])
-    grey = pixels.astype(np.float32) if pixels.ndim == 2 else linear(pixels[..., :3]).mean(-1)
-    return float(grey.std() / max(float(grey.mean()), 1e-3))
+    pixels = np.asarray(material.texture.pixels()[::2, ::2])
+    is_grey = pixels.ndim == 2
+    grey = pixels.astype(np.float32) if is_grey else linear(pixels[..., :3]).mean(-1)
+    return float(grey.std() / max(float(grey.mean()), MIN_MEAN_REFLECTANCE))
 
 
-def _middle(values: NDArray[np.floating[Any]]) -> float:
+def _median(values: NDArray[np.floating[Any]]) -> float:
+    """The median of finite values; 0 if there are none."""
     known = values[np.isfinite(values)]
     return float(np.median(known)) if known.size else 0.0
 
 
-def _pictured(frame: StereoFrame) -> dict[str, float]:
-    """What pictures show; `level` is the left one's mean in stops of the linear signal, roughly."""
-    left = frame.left.astype(np.float32)
-    left = left.mean(-1) if left.ndim == 3 else left
-    level = _level(frame.left)
+# --- The images and the camera ---
+
+
+def _image_conditions(frame: StereoFrame) -> dict[str, float]:
+    """The conditions that the two images show by themselves."""
+    left = _grey(frame)
+    difference_stops = 0.0
+    if frame.right is not None:
+        difference_stops = abs(_brightness_stops(frame.left) - _brightness_stops(frame.right))
     return {
-        "burnt": float((left >= BURNT_DN).mean()),
+        "burnt": float((left >= SATURATED_DN).mean()),
         "black": float((left <= BLACK_DN).mean()),
-        "unlike_eyes": 0.0 if frame.right is None else abs(level - _level(frame.right)),
-        "level": level,
-        "mean": float(left.mean()),
+        "unlike_eyes": difference_stops,
     }
 
 
-def _level(picture: Any) -> float:
-    return float(2.2 * np.log2(max(float(picture.mean()), 1.0)))
+def _grey(frame: StereoFrame) -> NDArray[np.float32]:
+    """The left image (H, W) in grey values."""
+    left = frame.left.astype(np.float32)
+    return left.mean(-1) if left.ndim == 3 else left
 
 
-def _set(case: Case, row: dict[str, float], *, exposure_s: float, gain_db: float, step_s: float) -> dict[str, float]:
-    """What follows from the camera's settings and how fast the picture flows."""
+def _mean_dn(frame: StereoFrame) -> float:
+    return float(_grey(frame).mean())
+
+
+def _brightness_stops(image: Any) -> float:
+    """The mean of an image in stops of the linear signal, approximately."""
+    return float(RESPONSE_GAMMA * np.log2(max(float(image.mean()), 1.0)))
+
+
+def _camera_conditions(
+    case: Case,
+    *,
+    speed_pxps: float,
+    mean_dn: float,
+    exposure_s: float,
+    gain_db: float,
+) -> dict[str, float]:
+    """The conditions that follow from the camera's settings, the image motion and the mean grey value."""
     camera = case.camera
-    speed_pxps = row["flow"] / step_s
-    smear = SIGMA_PER_SMEAR * speed_pxps * exposure_s * camera.motion_blur
-    blur = np.sqrt(smear**2 + camera.blur_sigma_px**2 + (BLUR_PER_DEFOCUS * camera.defocus_px) ** 2)
+    motion_sigma_px = SIGMA_PER_SMEAR * speed_pxps * exposure_s * camera.motion_blur
+    lens_sigma_px = camera.blur_sigma_px
+    defocus_sigma_px = SIGMA_PER_DEFOCUS * camera.defocus_px
+    blur_px = np.sqrt(motion_sigma_px**2 + lens_sigma_px**2 + defocus_sigma_px**2)
     return {
-        "blur": float(blur),
+        "blur": float(blur_px),
         "rolling": speed_pxps * camera.readout_s,
-        "noise": chip_noise_dn(camera.chip, row["mean"], gain_db=gain_db),
+        "noise": chip_noise_dn(camera.chip, mean_dn, gain_db=gain_db),
     }
 
 
 def chip_noise_dn(chip: CameraSensor, grey_dn: float, *, gain_db: float = 0.0) -> float:
     """The temporal noise of a chip at a grey value. Source: EMVA 1288, release 3.1, eq. 10."""
     amplification = 10 ** (gain_db / 20)
-    around = np.clip(np.array([grey_dn - 1, grey_dn + 1]), 0, FULL_SCALE_DN) / FULL_SCALE_DN
-    low, high = chip.curve.decode(around)
+    neighbours_dn = np.array([grey_dn - 1, grey_dn + 1])
+    below, above = np.clip(neighbours_dn, 0, FULL_SCALE_DN) / FULL_SCALE_DN
+    low, high = chip.curve.decode(np.array([below, above]))
     electrons = (low + high) / 2 * chip.full_well_e / amplification
-    sigma_e = np.sqrt(chip.read_noise_e**2 + chip.shot_noise * electrons)
-    slope = (around[1] - around[0]) * FULL_SCALE_DN / max(high - low, 1e-9)
-    return float(slope * sigma_e * amplification / chip.full_well_e)
+    shot_variance_e = chip.shot_noise * electrons
+    sigma_e = np.sqrt(chip.read_noise_e**2 + shot_variance_e)
+    slope_dn = (above - below) * FULL_SCALE_DN / max(high - low, 1e-9)  # grey values per full well
+    return float(slope_dn * sigma_e * amplification / chip.full_well_e)
 
 
-Before = tuple[float, float, Array, int]
+# --- Changes since the previous frame ---
 
 
-def _since(before: Before, now: Before, usual_ns: float) -> dict[str, float]:
-    exposure_jump = now[0] - before[0]
-    turned_rad = se3.rotation_angle((before[2][:3, :3].T @ now[2][:3, :3])[None])[0]
-    gap = (now[3] - before[3]) / usual_ns
+@dataclass(frozen=True, slots=True)
+class _FrameState:
+    """What a frame is compared by with the next one."""
+
+    exposure_stops: float
+    brightness_stops: float
+    T_world_left: Array
+    t_ns: int
+
+
+def _changes(previous: _FrameState, current: _FrameState, usual_step_ns: float) -> dict[str, float]:
+    """The conditions that compare a frame with the previous one; the first frame is compared with itself."""
+    exposure_change = current.exposure_stops - previous.exposure_stops
+    brightness_change = current.brightness_stops - previous.brightness_stops
+    R_world_previous = previous.T_world_left[:3, :3]
+    R_previous_current = R_world_previous.T @ current.T_world_left[:3, :3]
+    steps = (current.t_ns - previous.t_ns) / usual_step_ns
     return {
-        "exposure_jump": abs(exposure_jump),
-        "light_jump": abs(now[1] - before[1] - exposure_jump),
-        "turn": float(np.rad2deg(turned_rad)),
-        "missing_frames": max(0.0, round(gap) - 1.0),
+        "exposure_jump": abs(exposure_change),
+        "light_jump": abs(brightness_change - exposure_change),
+        "turn": float(np.rad2deg(se3.rotation_angle(R_previous_current[None])[0])),
+        "missing_frames": max(0.0, round(steps) - 1.0),
     }

@@ -1,4 +1,4 @@
-"""Faults between an estimate and its ground truth: units, clocks, frames, scale; each with evidence and its mend."""
+"""Faults between an estimate and its ground truth (units, clocks, frames, scale), with evidence and the correction."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
@@ -18,14 +18,6 @@ from vobench.trajectory.formats import DIGITS, WORDS, Reading, seconds
 from vobench.trajectory.time_offset import estimate_offset, likeness, offsets_in_stretches
 from vobench.trajectory.trajectory import Move, Trajectory
 
-AT_ORIGIN = 1e-6  # m, and the same of a rotation's elements: odometry begins at the identity, a truth seldom
-DENSER = 2.0  # truth from a tracker has more poses a second than frames have
-NOISIER = 1.5
-PLAINLY_NOISIER = 2.0
-NOISE = 5e-3  # of a step; below it motion itself is what is seen
-ENOUGH = 2  # signs that have to agree; each alone has an innocent explanation
-MIN_POSES_SWAP = 8
-
 Fault = Literal[
     "stamp_unit",
     "time_offset",
@@ -42,25 +34,15 @@ Fault = Literal[
 WHO: dict[Side, str] = {"gt": "ground truth", "est": "estimate"}
 
 MIN_POSES = 8
-MAX_POSES = 1000
-# Real pairs without a fault (KITTI, TUM, TartanAir) keep clear of these.
-SCALE_OFF = 0.02
-SCALE_MENDED = 0.5
-LAG_NS = 10_000_000
-LAG_MENDED = 0.75
-LAG_BY = 5e-4
-LAG_ALIKE = 0.5
-LONGEST_REPR = 100  # characters of a finding in one line
-# fr1/xyz has 10 ms, the same in all of its stretches
-STEADY_LAG_NS = 25_000_000
-STEADY_SHARE = 0.875
-UNRELATED = 0.5  # of the extent, left by the best mend
-SAME_SPAN = 30.0  # times; units are 1000 apart
+MAX_POSES = 1000  # that frames are compared by
+# Real pairs without a fault (KITTI, TUM, TartanAir) are clear of this limit, and of those of scale and clock below.
+UNRELATED_MISFIT = 0.5  # share of the extent that is left after the best correction
+LONGEST_REPR = 100  # characters
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """One figure as it is, and as it is once the fault is mended; `before` is None where there was none."""
+    """One figure before and after the correction of a fault; `before` is None where it could not be computed."""
 
     name: str
     unit: str
@@ -70,9 +52,9 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A fault, a sentence about it, its evidence, and the options of `vobench score` that mend it.
+    """A fault, a sentence about it, its evidence, and the options of `vobench score` that correct it.
 
-    Swapped inputs are mended by swapping them, for which there is no option; nothing mends unrelated ones.
+    Swapped inputs have no option: exchange the files. Nothing corrects unrelated ones.
     """
 
     fault: Fault
@@ -94,251 +76,350 @@ class Finding:
 
 
 def diagnose(gt: Reading, est: Reading) -> tuple[Finding, ...]:
-    """The faults between two trajectories of one motion; none where they only differ by errors.
+    """Find the faults between two trajectories of one motion; none if they only differ by errors of the estimate.
 
-    Each is looked for with those before it mended. Raises AlignmentError where fewer than 8 poses match
-    and no fault of the clocks says why.
+    Each fault is looked for after the previous ones are corrected. Raises AlignmentError where fewer than MIN_POSES
+    poses match and no fault of the clocks explains it.
     """
     findings: list[Finding] = []
     if gt.unit and est.unit:
         gt, est = _in_right_units(gt, est, findings)
         est = _on_one_clock(gt, est, findings)
-    T_gt, T_est = _matched(gt, est)
+
+    T_gt, T_est = _matched_poses(gt, est)
     if len(T_gt) < MIN_POSES:
         if findings:
             return tuple(findings)
         raise AlignmentError(f"a diagnosis needs {MIN_POSES} matched poses or more, but {len(T_gt)} match")
+
     if min(_extent_m(T_gt), _extent_m(T_est)) > 0:
-        given = misfit(T_gt, T_est).trans
+        misfit_before = misfit(T_gt, T_est).trans
         T_gt, T_est = _in_right_frames(T_gt, T_est, gt, est, findings)
-        left = misfit(T_gt, T_est).trans
-        if left >= UNRELATED:
-            return (*(finding for finding in findings if finding.fault == "stamp_unit"), _unrelated(given, left))
+        misfit_after = misfit(T_gt, T_est).trans
+        if misfit_after >= UNRELATED_MISFIT:
+            units = (finding for finding in findings if finding.fault == "stamp_unit")
+            return (*units, _unrelated(misfit_before, misfit_after))
         findings += _wrong_scale(T_gt, T_est)
-        findings += _swapped(gt, est)
+        findings += _swapped_inputs(gt, est)
     return tuple(findings)
 
 
-def _unrelated(given: float, left: float) -> Finding:
+def _unrelated(before: float, after: float) -> Finding:
     return Finding(
         "unrelated",
-        "these trajectories are not of one motion, or the estimate lost it: no mend brings them together",
-        (Evidence("position left, of the path's extent (rms)", "%", 100 * given, 100 * left),),
+        "these trajectories are not of one motion, or the estimate lost it: no correction makes them agree",
+        (Evidence("position left, of the path's extent (rms)", "%", 100 * before, 100 * after),),
     )
+
+
+# --- Units of time stamps ---
+
+MAX_DURATION_RATIO = 30.0  # between recordings in one unit; units differ by a factor of 1000
 
 
 def _in_right_units(gt: Reading, est: Reading, findings: list[Finding]) -> tuple[Reading, Reading]:
-    """Both in units in which they last about equally long; first those in which they could be read at all."""
-    right = _right_unit(gt, est), _right_unit(est, gt)
-    if right[0].unit != gt.form_unit:
-        findings.append(_unit_finding("gt", gt, right[0], est))
-    if right[1].unit != est.form_unit:
-        findings.append(_unit_finding("est", est, right[1], gt))
-    return right
+    """Both trajectories in units in which their durations are similar."""
+    gt_in_unit = _in_right_unit(gt, est)
+    est_in_unit = _in_right_unit(est, gt)
+    if gt_in_unit.unit != gt.form_unit:
+        findings.append(_unit_finding("gt", gt, gt_in_unit, est))
+    if est_in_unit.unit != est.form_unit:
+        findings.append(_unit_finding("est", est, est_in_unit, gt))
+    return gt_in_unit, est_in_unit
 
 
-def _right_unit(read: Reading, other: Reading) -> Reading:
-    """Read in the finer unit that makes durations fit, where steps and durations are both far too long.
+def _in_right_unit(reading: Reading, other: Reading) -> Reading:
+    """The trajectory in the finer unit that makes durations similar, if both its steps and duration are far too long.
 
-    Lost track shortens the one and keyframes lengthen the other, but neither does both.
+    A lost track shortens the duration and keyframes lengthen the steps, but neither does both.
     """
-    duration = _duration_ns(read)
-    wanted = max(_duration_ns(other), 1)
-    if read.unit is None or read.is_unit_told or min(duration / wanted, _step_ns(read) / _step_ns(other)) < SAME_SPAN:
-        return read
-    finer = [unit for unit in DIGITS if DIGITS[unit] < DIGITS[read.unit]]
-    factors = {unit: 10 ** (DIGITS[read.unit] - DIGITS[unit]) for unit in finer}
-    best = min(finer, key=lambda unit: abs(np.log(duration / factors[unit] / wanted)), default=None)
-    if best is None or not 1 / SAME_SPAN < duration / factors[best] / wanted < SAME_SPAN:
-        return read
-    t_ns = read.trajectory.t_ns // factors[best]
+    if reading.unit is None or reading.is_unit_told:
+        return reading
+    duration_ns = _duration_ns(reading)
+    other_duration_ns = max(_duration_ns(other), 1)
+    duration_ratio = duration_ns / other_duration_ns
+    step_ratio = _step_ns(reading) / _step_ns(other)
+    if min(duration_ratio, step_ratio) < MAX_DURATION_RATIO:
+        return reading
+
+    factors = {}
+    for unit, digits in DIGITS.items():
+        if digits < DIGITS[reading.unit]:
+            factors[unit] = 10 ** (DIGITS[reading.unit] - digits)
+    ratios = {unit: duration_ns / factor / other_duration_ns for unit, factor in factors.items()}
+    unit_of_best = min(ratios, key=lambda unit: abs(np.log(ratios[unit])), default=None)
+    if unit_of_best is None or not 1 / MAX_DURATION_RATIO < ratios[unit_of_best] < MAX_DURATION_RATIO:
+        return reading
+
+    t_ns = reading.trajectory.t_ns // factors[unit_of_best]
     if np.any(np.diff(t_ns) <= 0):
-        return read
-    return replace(read, trajectory=Trajectory(t_ns, read.trajectory.T_world_frame), unit=best)
+        return reading
+    return replace(reading, trajectory=Trajectory(t_ns, reading.trajectory.T_world_frame), unit=unit_of_best)
 
 
-def _unit_finding(side: Side, read: Reading, right: Reading, other: Reading) -> Finding:
-    assert read.form_unit is not None
-    assert read.unit is not None
-    assert right.unit is not None
-    stated = DIGITS[read.form_unit] - DIGITS[read.unit]
-    lasts = [_duration_ns(read) * 10.0**stated, float(_duration_ns(right))]
-    ratios = [duration / max(_duration_ns(other), 1) for duration in lasts]
+def _unit_finding(side: Side, as_read: Reading, corrected: Reading, other: Reading) -> Finding:
+    """The finding that time stamps are not in the unit that files of their form have."""
+    assert as_read.form_unit is not None
+    assert as_read.unit is not None
+    assert corrected.unit is not None
+    digits = DIGITS[as_read.form_unit] - DIGITS[as_read.unit]
+    other_duration_ns = max(_duration_ns(other), 1)
+    before = _duration_ns(as_read) * 10.0**digits / other_duration_ns
+    after = float(_duration_ns(corrected)) / other_duration_ns
+
+    other_side: Side = "est" if side == "gt" else "gt"
     return Finding(
         "stamp_unit",
-        f"the {WHO[side]}'s stamps are {WORDS[right.unit]}, not {WORDS[read.form_unit]}",
-        (Evidence(f"duration over that of the {WHO['est' if side == 'gt' else 'gt']}", "1", ratios[0], ratios[1]),),
-        (f"--{side}-as", right.unit),
+        f"the {WHO[side]}'s time stamps are {WORDS[corrected.unit]}, not {WORDS[as_read.form_unit]}",
+        (Evidence(f"duration over that of the {WHO[other_side]}", "1", before, after),),
+        (f"--{side}-as", corrected.unit),
     )
 
 
+# --- Clocks ---
+
+MIN_OFFSET_NS = 10_000_000
+MIN_CORRELATION = 0.5  # of the speeds on one clock
+# An offset counts where it leaves at most this share of the missing correlation, and adds this much to it.
+MAX_CORRELATION_LEFT = 0.75
+MIN_CORRELATION_GAIN = 5e-4
+# A smaller gain counts too where most stretches of the recording show the same offset.
+MIN_STEADY_OFFSET_NS = 25_000_000  # fr1/xyz of TUM has 10 ms, the same in all of its stretches
+MIN_STEADY_SHARE = 0.875
+STEADY_TOLERANCE = 0.5  # of the offset
+STRETCH_SEARCH = 1.5  # of the offset
+
+
 def _on_one_clock(gt: Reading, est: Reading, findings: list[Finding]) -> Reading:
-    """The estimate with its clock set right."""
+    """The estimate on the clock of the ground truth."""
     try:
         lag = estimate_offset(gt.trajectory, est.trajectory)
-    except AlignmentError:  # motion doesn't tell
+    except AlignmentError:  # too little motion to compare clocks
         return est
     before = likeness(gt.trajectory, est.trajectory, 0)
     after = lag.correlation
-    if abs(lag.offset_ns) <= LAG_NS or after < LAG_ALIKE:
+    if abs(lag.offset_ns) <= MIN_OFFSET_NS or after < MIN_CORRELATION:
         return est
-    is_plain = before is None or (1 - after <= LAG_MENDED * (1 - before) and after - before >= LAG_BY)
-    if not is_plain and not _is_steady(gt.trajectory, est.trajectory, lag.offset_ns):
+    if not (_is_clear_gain(before, after) or _is_steady(gt.trajectory, est.trajectory, lag.offset_ns)):
         return est
+
     offset = seconds(lag.offset_ns).rstrip("0").rstrip(".")
-    sentence = f"the estimate's clock is {abs(lag.offset_ns) / 1e9:.3f} s {'behind' if lag.offset_ns > 0 else 'ahead'}"
+    direction = "behind" if lag.offset_ns > 0 else "ahead"
+    sentence = f"the estimate's clock is {abs(lag.offset_ns) / 1e9:.3f} s {direction}"
     evidence = Evidence("correlation of the speeds", "1", before, after)
     findings.append(Finding("time_offset", sentence, (evidence,), (f"--t-offset={offset}",)))
-    moved = est.trajectory.t_ns + lag.offset_ns
-    return replace(est, trajectory=Trajectory(moved, est.trajectory.T_world_frame))
+    t_ns = est.trajectory.t_ns + lag.offset_ns
+    return replace(est, trajectory=Trajectory(t_ns, est.trajectory.T_world_frame))
+
+
+def _is_clear_gain(before: float | None, after: float) -> bool:
+    """Whether an offset raises the correlation of the speeds clearly; before is None without an overlap."""
+    if before is None:
+        return True
+    gain = after - before
+    missing_before = 1 - before
+    return 1 - after <= MAX_CORRELATION_LEFT * missing_before and gain >= MIN_CORRELATION_GAIN
 
 
 def _is_steady(gt: Trajectory, est: Trajectory, offset_ns: int) -> bool:
-    """Whether nearly every stretch of the recording shows the offset by itself, to within half of it."""
-    if abs(offset_ns) <= STEADY_LAG_NS:
+    """Whether nearly every stretch of the recording shows the offset by itself."""
+    if abs(offset_ns) <= MIN_STEADY_OFFSET_NS:
         return False
-    found = offsets_in_stretches(gt, est, within_ns=round(1.5 * abs(offset_ns)))
-    alike = np.abs(found - offset_ns) <= 0.5 * abs(offset_ns)
-    return len(found) > 0 and bool(np.mean(alike) >= STEADY_SHARE)
+    of_stretches_ns = offsets_in_stretches(gt, est, within_ns=round(STRETCH_SEARCH * abs(offset_ns)))
+    is_similar = np.abs(of_stretches_ns - offset_ns) <= STEADY_TOLERANCE * abs(offset_ns)
+    return len(of_stretches_ns) > 0 and bool(np.mean(is_similar) >= MIN_STEADY_SHARE)
 
 
-def _matched(gt: Reading, est: Reading) -> tuple[Array, Array]:
-    """At most MAX_POSES matched poses, evenly chosen; as far apart as half a step of the slower truth."""
+# --- Frames ---
+
+
+def _matched_poses(gt: Reading, est: Reading) -> tuple[Array, Array]:
+    """At most MAX_POSES matched poses (K, 4, 4), evenly chosen, at most half a step of the ground truth apart."""
     steps_ns = np.diff(gt.trajectory.t_ns)
-    window_ns = max(MAX_DIFF_NS, int(np.median(steps_ns)) // 2 if len(steps_ns) else 0)
-    pairs = associate(gt.trajectory.t_ns, est.trajectory.t_ns, max_diff_ns=window_ns)
-    chosen = np.linspace(0, len(pairs) - 1, min(len(pairs), MAX_POSES)).round().astype(int)
-    return gt.trajectory.T_world_frame[pairs.gt[chosen]], est.trajectory.T_world_frame[pairs.est[chosen]]
+    half_step_ns = int(np.median(steps_ns)) // 2 if len(steps_ns) else 0
+    pairs = associate(gt.trajectory.t_ns, est.trajectory.t_ns, max_diff_ns=max(MAX_DIFF_NS, half_step_ns))
+    count = min(len(pairs), MAX_POSES)
+    chosen = np.linspace(0, len(pairs) - 1, count).round().astype(int)
+    T_gt = gt.trajectory.T_world_frame[pairs.gt[chosen]]
+    T_est = est.trajectory.T_world_frame[pairs.est[chosen]]
+    return T_gt, T_est
 
 
 def _in_right_frames(
-    T_gt: Array, T_est: Array, gt: Reading, est: Reading, findings: list[Finding]
+    T_gt: Array,
+    T_est: Array,
+    gt: Reading,
+    est: Reading,
+    findings: list[Finding],
 ) -> tuple[Array, Array]:
-    """The matched poses (K, 4, 4) without their fault of frames."""
-    found = find_mismatch(T_gt, T_est, gt_order=gt.order, est_order=est.order)
-    if found is None:
+    """The matched poses (K, 4, 4) with their fault of frames corrected."""
+    mismatch = find_mismatch(T_gt, T_est, gt_order=gt.order, est_order=est.order)
+    if mismatch is None:
         return T_gt, T_est
-    before = found.before
-    after = found.suspect.misfit
+
+    before = mismatch.before
+    after = mismatch.correction.misfit
+    angles_deg = np.rad2deg([before.rot_rad, after.rot_rad]).tolist()
     evidence = [
-        Evidence("rotation left after alignment (rms)", "deg", *np.rad2deg([before.rot_rad, after.rot_rad]).tolist()),
+        Evidence("rotation left after alignment (rms)", "deg", *angles_deg),
         Evidence("position left, of the path's extent (rms)", "%", 100 * before.trans, 100 * after.trans),
     ]
-    if found.lever:
-        evidence.append(
-            Evidence("translation of short motions left (rms)", "m", found.lever.before_m, found.lever.after_m)
-        )
-    sentence, options = _frame_words(found, gt, est)
-    findings.append(Finding(found.kind, sentence, tuple(evidence), options))
-    return found.suspect.T_gt, found.suspect.T_est
+    lever = mismatch.lever
+    if lever:
+        evidence.append(Evidence("translation of short motions left (rms)", "m", lever.before_m, lever.after_m))
+    sentence, options = _frame_sentence(mismatch, gt, est)
+    findings.append(Finding(mismatch.kind, sentence, tuple(evidence), options))
+    return mismatch.correction.T_gt, mismatch.correction.T_est
 
 
-def _frame_words(found: Mismatch, gt: Reading, est: Reading) -> tuple[str, tuple[str, ...]]:
-    """A sentence about a fault of frames, and the options that mend it."""
-    side = found.suspect.side
-    move = found.suspect.move
+def _frame_sentence(
+    mismatch: Mismatch,
+    gt: Reading,
+    est: Reading,
+) -> tuple[str, tuple[str, ...]]:
+    """A sentence about a fault of frames, and the options that correct it."""
+    side = mismatch.correction.side
+    move = mismatch.correction.move
     if move is None:
         read_as = (gt if side == "gt" else est).order
         order = "wxyz" if read_as == "xyzw" else "xyzw"
         return f"the {WHO[side]}'s quaternions are {order}", (f"--{side}-as", order)
-    option = (f"--{side}-as", str(move))
-    if found.kind == "inverse_poses":
-        return (
-            f"the {WHO[side]}'s poses take the world to the frame (T_cw): they are the inverse of what is wanted",
-            option,
-        )
-    if found.kind == "inverse_rotations":
-        return f"the {WHO[side]}'s rotations are inverse (JPL's, not Hamilton's), but its positions are not", option
-    return _move_words(found.kind, move), option
 
-
-def _move_words(kind: Fault, move: Move) -> str:
+    options = (f"--{side}-as", str(move))
+    if mismatch.kind == "inverse_poses":
+        return f"the {WHO[side]}'s poses are inverse: they map world to frame (T_cw)", options
+    if mismatch.kind == "inverse_rotations":
+        return f"the {WHO[side]}'s rotations are inverse (JPL's, not Hamilton's), but its positions are not", options
     if move.kind == "mount":
-        angle = float(np.rad2deg(se3.rotation_angle(move.matrix[:3, :3])))
-        length = float(np.linalg.norm(move.matrix[:3, 3]))
-        return (
-            f"the estimate is of another frame of the same body, turned by {angle:.1f} deg and {length:.2g} m away: "
-            f"a camera's, perhaps, against the body's"
-        )
-    of = "positions and rotations" if move.kind == "axes" else "positions, but not its rotations,"
+        return _mount_sentence(move), options
+    return _axes_sentence(mismatch.kind, move), options
+
+
+def _mount_sentence(move: Move) -> str:
+    angle_rad = se3.rotation_angle(move.matrix[:3, :3])
+    angle_deg = float(np.rad2deg(angle_rad))
+    length_m = float(np.linalg.norm(move.matrix[:3, 3]))
+    return (
+        f"the estimate is of another frame of the same body, rotated by {angle_deg:.1f} deg and {length_m:.2g} m away, "
+        f"for example the camera's instead of the body's"
+    )
+
+
+def _axes_sentence(kind: Fault, move: Move) -> str:
+    values = "positions and rotations" if move.kind == "axes" else "positions, but not its rotations,"
     axes = str(move).partition(":")[2]
-    how = "mirrored" if kind == "mirrored_axes" else "swapped"
-    return f"the axes of the estimate's {of} are {how}: the truth's x,y,z are its {axes}"
+    verb = "mirrored" if kind == "mirrored_axes" else "swapped"
+    return f"the axes of the estimate's {values} are {verb}: the truth's x,y,z are its {axes}"
+
+
+# --- Scale ---
+
+MIN_LOG_SCALE = 0.02
+MAX_ERROR_LEFT = 0.5  # share of the ATE that is left once the scale is corrected
 
 
 def _wrong_scale(T_gt: Array, T_est: Array) -> Iterator[Finding]:
-    fits = {kind: align(T_est, T_gt, kind=kind) for kind in ("se3", "sim3")}
-    scale = fits["sim3"].scale
-    if not scale > 0:
+    """Yield a finding if the estimate has another scale than the ground truth."""
+    rigid = align(T_est, T_gt, kind="se3")
+    similar = align(T_est, T_gt, kind="sim3")
+    if not similar.scale > 0:
         return
-    before, after = (_ate_m(fits[kind].apply(T_est), T_gt) for kind in ("se3", "sim3"))
-    if abs(np.log(scale)) > SCALE_OFF and after <= SCALE_MENDED * before:
+    before_m = _ate_m(rigid.apply(T_est), T_gt)
+    after_m = _ate_m(similar.apply(T_est), T_gt)
+    is_scaled = abs(np.log(similar.scale)) > MIN_LOG_SCALE
+    if is_scaled and after_m <= MAX_ERROR_LEFT * before_m:
         yield Finding(
             "scale",
-            f"the estimate is {1 / scale:.4g} times as large as the truth",
-            (Evidence("ATE (rmse)", "m", before, after),),
+            f"the estimate is {1 / similar.scale:.4g} times as large as the truth",
+            (Evidence("ATE (rmse)", "m", before_m, after_m),),
             ("-a", "sim3"),
         )
 
 
-def _swapped(gt: Reading, est: Reading) -> Iterator[Finding]:
-    """Whether enough signs of two trajectories on one clock, where both have noise, speak for swapped inputs."""
-    truth = gt.trajectory
-    estimate = est.trajectory
-    pairs = associate(truth.t_ns, estimate.t_ns)
-    noises = [_noise(t.positions_m[chosen]) for t, chosen in ((truth, pairs.gt), (estimate, pairs.est))]
-    if len(pairs) < MIN_POSES_SWAP or not min(noises) > 0:
+# --- Swapped inputs ---
+
+MIN_POSES_SWAP = 8
+MIN_SIGNS = 2  # that agree; each alone has an innocent explanation
+IDENTITY_TOLERANCE = 1e-6  # m, and of a rotation's elements: odometry begins at the identity, ground truth seldom
+RATE_RATIO = 2.0  # a tracker has more poses per second than a camera has frames
+MIN_NOISE = 5e-3  # of a step; smaller values are motion rather than noise
+NOISE_RATIO = 1.5
+CLEAR_NOISE_RATIO = 2.0
+
+
+def _swapped_inputs(gt: Reading, est: Reading) -> Iterator[Finding]:
+    """Yield a finding if enough signs show that ground truth and estimate are exchanged."""
+    pairs = associate(gt.trajectory.t_ns, est.trajectory.t_ns)
+    gt_noise = _noise(gt.trajectory.positions_m[pairs.gt])
+    est_noise = _noise(est.trajectory.positions_m[pairs.est])
+    if len(pairs) < MIN_POSES_SWAP or not min(gt_noise, est_noise) > 0:
         return
-    noise = noises[0] / noises[1]
-    density = _step_ns(est) / _step_ns(gt)
-    origins = (_begins_at_origin(truth), _begins_at_origin(estimate))
+
+    noise_ratio = gt_noise / est_noise
+    rate_ratio = _step_ns(est) / _step_ns(gt)
+    begins_at_identity = (_begins_at_identity(gt.trajectory), _begins_at_identity(est.trajectory))
     says_truth = (gt.says_truth, est.says_truth)
-    # Truth that has a pose at exactly each estimated one was interpolated, and that makes it smooth.
-    is_noisy = noises[0] > NOISE
-    same_instants = len(truth) == len(estimate) == len(pairs)
-    votes = [
-        int(is_noisy and noise > NOISIER) + int(is_noisy and noise > PLAINLY_NOISIER and same_instants),
-        int(density < 1 / DENSER) - int(density > DENSER),
-        int(origins == (True, False)) - int(origins == (False, True)),
+
+    # Ground truth at exactly the times of the estimate was interpolated, which makes it smooth.
+    is_noisy = gt_noise > MIN_NOISE
+    has_same_times = len(gt.trajectory) == len(est.trajectory) == len(pairs)
+    signs = [
+        int(is_noisy and noise_ratio > NOISE_RATIO),
+        int(is_noisy and noise_ratio > CLEAR_NOISE_RATIO and has_same_times),
+        int(rate_ratio < 1 / RATE_RATIO) - int(rate_ratio > RATE_RATIO),
+        int(begins_at_identity == (True, False)) - int(begins_at_identity == (False, True)),
         int(says_truth == (False, True)) - int(says_truth == (True, False)),
     ]
-    if sum(votes) < ENOUGH:
+    if sum(signs) < MIN_SIGNS:
         return
+
     evidence = (
-        Evidence("noise of the truth over that of the estimate", "1", noise, 1 / noise),
-        Evidence("poses a second of the truth over those of the estimate", "1", density, 1 / density),
+        Evidence("noise of the truth over that of the estimate", "1", noise_ratio, 1 / noise_ratio),
+        Evidence("poses a second of the truth over those of the estimate", "1", rate_ratio, 1 / rate_ratio),
     )
-    too = ["the truth begins at the identity and the estimate doesn't"] * (origins == (True, False))
-    too += ["the estimate's file calls itself ground truth"] * (says_truth == (False, True))
-    sentence = "; ".join(["ground truth and estimate seem to be in each other's place", *too])
-    yield Finding("swapped_inputs", sentence, evidence)
+    clauses = ["ground truth and estimate seem to be exchanged"]
+    if begins_at_identity == (True, False):
+        clauses.append("the truth begins at the identity and the estimate does not")
+    if says_truth == (False, True):
+        clauses.append("the estimate's file calls itself ground truth")
+    yield Finding("swapped_inputs", "; ".join(clauses), evidence)
 
 
 def _noise(positions_m: Array) -> float:
-    """Median third difference as share of the median step: of steady motion nearly 0, of noise up to 20."""
+    """Median third difference relative to the median step: nearly 0 for steady motion, up to 20 for noise."""
     if len(positions_m) < MIN_POSES_SWAP:
         return 0.0
-    jerks, steps = (np.linalg.norm(np.diff(positions_m, order, axis=0), axis=1) for order in (3, 1))
-    return float(np.median(jerks) / max(np.median(steps), 1e-300))
+    steps_m = np.diff(positions_m, axis=0)
+    third_differences_m = np.diff(positions_m, 3, axis=0)
+    median_step_m = np.median(np.linalg.norm(steps_m, axis=1))
+    median_third_m = np.median(np.linalg.norm(third_differences_m, axis=1))
+    return float(median_third_m / max(median_step_m, 1e-300))
 
 
-def _begins_at_origin(trajectory: Trajectory) -> bool:
-    return bool(np.abs(trajectory.T_world_frame[0] - np.eye(4)).max() <= AT_ORIGIN)
+def _begins_at_identity(trajectory: Trajectory) -> bool:
+    difference = np.abs(trajectory.T_world_frame[0] - np.eye(4))
+    return bool(difference.max() <= IDENTITY_TOLERANCE)
+
+
+# --- Sizes of trajectories ---
 
 
 def _ate_m(T_est: Array, T_gt: Array) -> float:
-    return float(np.sqrt(np.sum((T_est - T_gt)[:, :3, 3] ** 2, axis=1).mean()))
+    """The absolute trajectory error (rms) of aligned poses (K, 4, 4)."""
+    errors_m = (T_est - T_gt)[:, :3, 3]
+    return float(np.sqrt(np.sum(errors_m**2, axis=1).mean()))
 
 
 def _extent_m(T: Array) -> float:
+    """The rms distance of positions from their mean."""
     return float(np.sqrt(T[:, :3, 3].var(axis=0).sum()))
 
 
-def _step_ns(read: Reading) -> float:
-    steps = np.diff(read.trajectory.t_ns)
-    return float(np.median(steps)) if len(steps) else 1.0
+def _step_ns(reading: Reading) -> float:
+    steps_ns = np.diff(reading.trajectory.t_ns)
+    return float(np.median(steps_ns)) if len(steps_ns) else 1.0
 
 
-def _duration_ns(read: Reading) -> int:
-    t_ns = read.trajectory.t_ns
+def _duration_ns(reading: Reading) -> int:
+    t_ns = reading.trajectory.t_ns
     return int(t_ns[-1] - t_ns[0]) if len(t_ns) else 0

@@ -20,10 +20,10 @@ OFFSET_OPTION = "--t-offset="
 
 @dataclass(frozen=True, slots=True)
 class FileDiagnosis:
-    """The faults found between two files; none where they only differ by errors of the estimate.
+    """The faults found between two files; none if they only differ by errors of the estimate.
 
-    `times` are the files of stamps that the two were read with. `by_frame` says how poses were paired where neither
-    file has stamps. `notes` say what was done to read the files.
+    `times` are the files of time stamps that the two were read with. `by_frame` describes how poses were paired if
+    neither file has stamps. `notes` describe what was done to read the files.
     """
 
     gt: TrajectorySource
@@ -56,7 +56,7 @@ class FileDiagnosis:
         )
 
     def _command_for(self, findings: Sequence[Finding]) -> str | None:
-        """The command that corrects some findings; of swapped files, each is named for what it is."""
+        """The command that corrects these findings; it exchanges swapped files."""
         faults_of_all = [finding.fault for finding in self.findings]
         if not findings or "unrelated" in faults_of_all:
             return None
@@ -73,9 +73,9 @@ class FileDiagnosis:
 
 
 def diagnose_files(gt: TrajectorySource, est: TrajectorySource, *, times: Sequence[Path] = ()) -> FileDiagnosis:
-    """Find what is wrong between two files: units, clocks, quaternions, frames, axes, scale, or swapped files.
+    """Find the faults between two files: units, clocks, quaternions, frames, axes, scale, or swapped files.
 
-    `times` are files of stamps for files without (KITTI).
+    `times` are files of time stamps for trajectories without them (KITTI).
 
     Raises:
         InputError: a file cannot be read, or the two do not fit together.
@@ -87,7 +87,7 @@ def diagnose_files(gt: TrajectorySource, est: TrajectorySource, *, times: Sequen
 
 
 def _source_options(side: Side, source: TrajectorySource) -> list[str]:
-    """The options of `vobench score` that say how a file was read."""
+    """The options of `vobench score` that make it read a file in the same way."""
     options = []
     if source.topic:
         options += [f"--{side}-topic", source.topic]
@@ -97,7 +97,7 @@ def _source_options(side: Side, source: TrajectorySource) -> list[str]:
 
 
 def _exchanged(option: str) -> str:
-    """An option as it reads once ground truth and estimate have changed places."""
+    """The same option once ground truth and estimate are exchanged."""
     for side, other in OTHER_SIDE.items():
         if option.startswith(f"--{side}-"):
             return f"--{other}-{option.removeprefix(f'--{side}-')}"

@@ -1,4 +1,4 @@
-"""Which nuisance makes an estimator fail: the case again without each, and how much of the error goes with it."""
+"""Which nuisance makes an estimator fail: the case is run again without each, and the error is compared."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,20 +13,11 @@ from vobench.geometry.se3 import Array
 from vobench.suite.suite import Case
 from vobench.trajectory.trajectory import Trajectory
 
+# --- The error of a trial ---
+
 SEGMENTS = 24
-FEWEST_STEPS = 2
-LEAST_M = 1e-3  # of way, for what stands still
-# A nuisance mends a case alone where as much of what all of them cost together goes with it.
-MENDS = 2 / 3
-TRIED_IN_PAIRS = 3
-# Fewer blocks of segments than these, in all repeats, draw no interval that could be believed.
-FEWEST_BLOCKS = 8
-# Where chance leaves open whether so much of the error goes, the best one is tried under so many times the seeds.
-WORTH_SEEDS = 0.2
-MORE_SEEDS = 3
-DRAWS = 2000
-BLOCK = 3
-LOW_HIGH = (2.5, 97.5)
+MIN_STEPS = 2  # frames per segment
+MIN_LENGTH_M = 1e-3  # length of a segment on which the body stands still
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,41 +30,69 @@ class Outcome:
 
 
 def segment_loss(gt: Trajectory, est: Trajectory, *, scale: float = 1.0) -> Array:
-    """The error (S,) of up to SEGMENTS parts that are equally long in time, as `loss_between`."""
-    count = max(1, min(SEGMENTS, (len(gt) - 1) // FEWEST_STEPS))
+    """The error (S,) of up to SEGMENTS parts of equal duration, as `loss_between` defines it."""
+    count = max(1, min(SEGMENTS, (len(gt) - 1) // MIN_STEPS))
     borders_ns = np.linspace(gt.t_ns[0], gt.t_ns[-1], count + 1)
     after = np.searchsorted(gt.t_ns, borders_ns).clip(1, len(gt) - 1)
-    is_before = borders_ns - gt.t_ns[after - 1] < gt.t_ns[after] - borders_ns
-    return loss_between(gt, est, np.where(is_before, after - 1, after), scale=scale)
+    since_before_ns = borders_ns - gt.t_ns[after - 1]
+    until_after_ns = gt.t_ns[after] - borders_ns
+    nearest = np.where(since_before_ns < until_after_ns, after - 1, after)
+    return loss_between(gt, est, nearest, scale=scale)
 
 
-def loss_between(gt: Trajectory, est: Trajectory, at: NDArray[np.intp], *, scale: float = 1.0) -> Array:
-    """The error (S,) from each of some frames (S + 1,) to the next, as a share of the way: 0 is perfect, 1 the most.
+def loss_between(
+    gt: Trajectory,
+    est: Trajectory,
+    at: NDArray[np.intp],
+    *,
+    scale: float = 1.0,
+) -> Array:
+    """The error (S,) from each of the frames `at` (S + 1,) to the next, relative to the path length, 0 to 1.
 
-    What the end is off, seen from the start, over the way's length, and the radians that it is turned wrongly by: what
-    they cost of every metre that follows. Without a pose at both ends it is 1. `scale` is put on the estimate.
+    It is the position error at the end of the segment relative to its length, plus the rotation error in rad, which
+    is what the rotation costs per metre of the path that follows. The error is 1 without a pose at both ends. `scale`
+    multiplies the positions of the estimate.
     """
     lengths_m = np.diff(gt.distances_m()[at])
-    lengths_m = np.maximum(lengths_m, max(float(lengths_m.mean()), LEAST_M))
-    place = np.searchsorted(est.t_ns, gt.t_ns[at]).clip(max=max(len(est) - 1, 0))
+    lengths_m = np.maximum(lengths_m, max(float(lengths_m.mean()), MIN_LENGTH_M))
     loss = np.ones(len(at) - 1)
     if not len(est):
         return loss
-    known = est.t_ns[place] == gt.t_ns[at]
-    both = np.flatnonzero(known[:-1] & known[1:])
-    moved, true = (
-        se3.inverse(T[index[:-1]]) @ T[index[1:]] for T, index in ((est.T_world_frame, place), (gt.T_world_frame, at))
-    )
-    moved[:, :3, 3] *= scale
-    wrong = se3.inverse(moved[both]) @ true[both]
-    off = np.linalg.norm(wrong[:, :3, 3], axis=1) / lengths_m[both] + se3.rotation_angle(wrong[:, :3, :3])
-    loss[both] = np.minimum(off, 1.0)
+
+    rows = np.searchsorted(est.t_ns, gt.t_ns[at]).clip(max=len(est) - 1)
+    has_pose = est.t_ns[rows] == gt.t_ns[at]
+    has_both_poses = np.flatnonzero(has_pose[:-1] & has_pose[1:])
+    estimated_motion = _motions(est.T_world_frame[rows])
+    estimated_motion[:, :3, 3] *= scale
+    true_motion = _motions(gt.T_world_frame[at])
+
+    error = se3.inverse(estimated_motion[has_both_poses]) @ true_motion[has_both_poses]
+    position_error_m = np.linalg.norm(error[:, :3, 3], axis=1)
+    rotation_error_rad = se3.rotation_angle(error[:, :3, :3])
+    total_error = position_error_m / lengths_m[has_both_poses] + rotation_error_rad
+    loss[has_both_poses] = np.minimum(total_error, 1.0)
     return loss
+
+
+def _motions(T: Array) -> Array:
+    """The motions (N - 1, 4, 4) between successive poses (N, 4, 4)."""
+    motions: Array = se3.inverse(T[:-1]) @ T[1:]
+    return motions
+
+
+# --- The variants of a case ---
+
+SUFFICIENT_SHARE = 2 / 3  # of what removing all nuisances achieves: one that achieves it explains the failure
+SUSPECTS = 3  # nuisances that are removed in pairs
+MIN_BLOCKS = 8  # blocks of segments in all repeats that a confidence interval takes
+# If the interval leaves open whether a promising nuisance explains the failure, it gets this multiple of the repeats.
+PROMISING_SHARE = 0.2
+MORE_REPEATS = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What is left of the error without these nuisances, and how much of it went, with a 95 % interval.
+    """The error that is left without some nuisances, and the share of it that went, with a 95 % interval.
 
     `survived` of `repeats` trials ended well.
     """
@@ -88,16 +107,16 @@ class Change:
 
     @property
     def is_sure(self) -> bool:
-        """Whether less error without them is more than chance."""
+        """Whether the error is significantly smaller without them."""
         return self.low > 0
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """Why a case is hard: `singles` and `pairs` with the most mended first, `everything` is all removed at once.
+    """Why a case is hard: what removing single nuisances, pairs and all of them changes.
 
-    `alone` is the error where all but that nuisance is removed; it is measured where no single one mends the case.
-    `named` mend it, surely; none where nothing of ours does.
+    `singles` and `pairs` have the largest improvement first. `alone` is the error where only that nuisance is left; it
+    is measured if no single nuisance explains the failure.
     """
 
     loss: float
@@ -110,135 +129,225 @@ class Explanation:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """The nuisances that explain the failure, fewest first."""
+        """The nuisances that explain the failure: one or two; empty if none does."""
         if not self.everything.is_sure:
             return ()
-        best, *_ = self.singles
-        if mends(best, self.everything) or not (self.pairs and self.pairs[0].is_sure):
+        best = self.singles[0]
+        has_sure_pair = bool(self.pairs) and self.pairs[0].is_sure
+        if is_sufficient(best, self.everything) or not has_sure_pair:
             return best.removed if best.is_sure else ()
-        return max(best, self.pairs[0], key=lambda change: change.mended).removed
+        return max(best, self.pairs[0], key=_improvement).removed
 
 
-# Makes every trial of the cases by their names: their outcomes, in order of repeats.
+# Runs cases by their names, and returns the outcomes of each in the order of its repeats.
 Measure = Callable[[Mapping[str, Case]], Mapping[str, Sequence[Outcome]]]
+Outcomes = dict[tuple[str, ...], list[Outcome]]  # of repeats, by the removed nuisances
 
 
-def explain(case: Case, nuisances: Sequence[Nuisance], measure: Measure, *, repeats: int = 3) -> Explanation:
-    """Try a case without each nuisance and without all; where none mends it alone, with each alone and in pairs.
+def explain(
+    case: Case,
+    nuisances: Sequence[Nuisance],
+    measure: Measure,
+    *,
+    repeats: int = 3,
+) -> Explanation:
+    """Run a case without each nuisance and without all; if none explains the failure, with each alone and in pairs.
 
-    A repeat is the case under another seed, the same for all variants. A short case is given more of them, and the
-    best single one where they leave it open.
+    Each repeat has its own seed, which all variants share. Short cases get more repeats, and so does the best single
+    nuisance if the confidence intervals leave it open.
     """
-    names = [nuisance.name for nuisance in nuisances]
+    variants = _Variants(case, tuple(nuisance.name for nuisance in nuisances), measure)
+    names = variants.names
+    (first_outcome,) = variants.run([()], 1)[()]
+    repeats = max(repeats, -(-MIN_BLOCKS // _block_count(first_outcome)))
 
-    def tried(sets: Sequence[tuple[str, ...]], repeats: int) -> dict[tuple[str, ...], list[Outcome]]:
-        cases = {
-            f"{folder_name(removed, names)}.{nth}": replace(without(case, removed), seed=case.seed + nth)
-            for removed in sets
-            for nth in range(repeats)
-        }
-        found = measure(cases)
-        return {
-            removed: [found[f"{folder_name(removed, names)}.{nth}"][0] for nth in range(repeats)] for removed in sets
-        }
+    singly = [(name,) for name in names]
+    removals = dict.fromkeys([(), *singly, names])  # a single nuisance is all nuisances, too
+    outcomes = variants.run(list(removals), repeats)
+    baseline = outcomes[()]
+    everything = _change(names, baseline, outcomes[names])
+    singles = _ranked(_change(removed, baseline, outcomes[removed]) for removed in singly)
 
-    whole = tuple(names)
-    (once,) = tried([()], 1)[()]
-    repeats = max(repeats, -(-FEWEST_BLOCKS // _blocks(once)))
-    first = tried([(), *((name,) for name in names), *([whole] if len(names) > 1 else [])], repeats)
-    base = first[()]
-    everything = _change(whole, base, first[whole])
-    singles = _ranked(_change((name,), base, first[name,]) for name in names)
-    if _is_open(singles[0], everything):
+    if _needs_more_repeats(singles[0], everything):
         best = singles[0].removed
-        again = tried([(), best, whole], repeats * MORE_SEEDS)
-        everything = _change(whole, again[()], again[whole])
-        singles = _ranked([_change(best, again[()], again[best]), *singles[1:]])
-    alone = dict[str, float]()
-    pairs = tuple[Change, ...]()
-    if len(names) > 2 and everything.is_sure and not mends(singles[0], everything):
-        rests = {name: tuple(other for other in names if other != name) for name in names}
-        alone = {
-            name: _mean(outcomes)
-            for name, outcomes in zip(names, tried([*rests.values()], repeats).values(), strict=True)
-        }
-        chosen = _suspects(singles, alone, everything)
-        found = tried([pair for pair in combinations(names, 2) if set(pair) <= chosen], repeats)
-        pairs = _ranked(_change(pair, base, outcomes) for pair, outcomes in found.items())
-    differ = any(not np.array_equal(base[0].loss, other.loss) for other in base[1:])
-    return Explanation(_mean(base), _status(base), differ, everything, singles, alone, pairs)
+        more = variants.run([(), best, names], repeats * MORE_REPEATS)
+        everything = _change(names, more[()], more[names])
+        singles = _ranked([_change(best, more[()], more[best]), *singles[1:]])
+
+    alone: dict[str, float] = {}
+    pairs: tuple[Change, ...] = ()
+    is_explained = not everything.is_sure or is_sufficient(singles[0], everything)
+    if len(names) > 2 and not is_explained:
+        alone = variants.loss_with_only_one_left(repeats)
+        suspects = _suspects(singles, alone, everything)
+        suspected_pairs = [pair for pair in combinations(names, 2) if suspects.issuperset(pair)]
+        outcomes_of_pairs = variants.run(suspected_pairs, repeats)
+        pairs = _ranked(_change(pair, baseline, of_pair) for pair, of_pair in outcomes_of_pairs.items())
+
+    return Explanation(
+        loss=_mean_loss(baseline),
+        status=_most_frequent_status(baseline),
+        repeats_differ=_differ(baseline),
+        everything=everything,
+        singles=singles,
+        alone=alone,
+        pairs=pairs,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Variants:
+    """Runs variants of a case from which some of its nuisances are removed."""
+
+    case: Case
+    names: tuple[str, ...]
+    measure: Measure
+
+    def run(self, removals: Sequence[tuple[str, ...]], repeats: int) -> Outcomes:
+        """Run the case without each of these sets of nuisances, under as many seeds."""
+        cases = {}
+        for removed in removals:
+            variant = without(self.case, removed)
+            for repeat in range(repeats):
+                name = self._name(removed, repeat)
+                cases[name] = replace(variant, seed=self.case.seed + repeat)
+        measured = self.measure(cases)
+
+        outcomes = {}
+        for removed in removals:
+            outcomes[removed] = [measured[self._name(removed, repeat)][0] for repeat in range(repeats)]
+        return outcomes
+
+    def loss_with_only_one_left(self, repeats: int) -> dict[str, float]:
+        """The mean error of each nuisance where all others are removed."""
+        others = {}
+        for name in self.names:
+            others[name] = tuple(other for other in self.names if other != name)
+        outcomes = self.run(list(others.values()), repeats)
+        return {name: _mean_loss(outcomes[removed]) for name, removed in others.items()}
+
+    def _name(self, removed: Sequence[str], repeat: int) -> str:
+        return f"{folder_name(removed, self.names)}.{repeat}"
 
 
 def folder_name(removed: Sequence[str], names: Sequence[str]) -> str:
-    """A variant as cases are called, by what is removed or, where that is most, by what is left."""
+    """The case name of a variant: the removed nuisances or, where only one is left, that one."""
+    if not removed:
+        return "as_it_is"
     left = [name for name in names if name not in removed]
-    if removed and len(left) < 2 < len(names):
+    if len(names) > 2 and len(left) < 2:
         return f"with_{_word(left[0])}_alone" if left else "without_all"
-    return "without_" + "_and_".join(map(_word, removed)) if removed else "as_it_is"
+    return "without_" + "_and_".join(map(_word, removed))
 
 
 def _word(name: str) -> str:
     return name.lower().replace(" ", "_").replace("-", "_")
 
 
-def mends(change: Change, everything: Change) -> bool:
-    """Whether a change does most of what removing everything does."""
-    return change.is_sure and change.mended >= MENDS * everything.mended
+def is_sufficient(change: Change, everything: Change) -> bool:
+    """Whether a change achieves most of what removing all nuisances does."""
+    return change.is_sure and change.mended >= SUFFICIENT_SHARE * everything.mended
 
 
-def _is_open(best: Change, everything: Change) -> bool:
-    """Whether a single one may well mend the case, but not surely."""
+def _needs_more_repeats(best: Change, everything: Change) -> bool:
+    """Whether the best single nuisance may well explain the failure, but not significantly yet."""
     is_sure = best.is_sure and everything.is_sure
-    return not is_sure and best.mended >= WORTH_SEEDS and best.high >= MENDS * everything.mended
+    may_suffice = best.high >= SUFFICIENT_SHARE * everything.mended
+    return not is_sure and best.mended >= PROMISING_SHARE and may_suffice
 
 
-def _suspects(singles: Sequence[Change], alone: Mapping[str, float], everything: Change) -> set[str]:
-    """Those that cost most, be it as the only one removed or as the only one left."""
-    total = everything.mended or 1.0
-    left = everything.loss / (1 - everything.mended) - everything.loss if everything.mended < 1 else 1.0
-    cost = {
-        change.removed[0]: max(change.mended / total, (alone[change.removed[0]] - everything.loss) / max(left, 1e-9))
-        for change in singles
-    }
-    return set(sorted(cost, key=cost.__getitem__, reverse=True)[:TRIED_IN_PAIRS])
+def _suspects(
+    singles: Sequence[Change],
+    alone: Mapping[str, float],
+    everything: Change,
+) -> set[str]:
+    """The nuisances that cost most, either as the only one removed or as the only one left."""
+    total_mended = everything.mended or 1.0
+    total_cost = 1.0
+    if everything.mended < 1:
+        loss_before = everything.loss / (1 - everything.mended)
+        total_cost = loss_before - everything.loss
+
+    costs = {}
+    for change in singles:
+        name = change.removed[0]
+        cost_if_removed = change.mended / total_mended
+        cost_if_left = (alone[name] - everything.loss) / max(total_cost, 1e-9)
+        costs[name] = max(cost_if_removed, cost_if_left)
+    return set(sorted(costs, key=costs.__getitem__, reverse=True)[:SUSPECTS])
 
 
 def _ranked(changes: Iterable[Change]) -> tuple[Change, ...]:
-    return tuple(sorted(changes, key=lambda change: change.mended, reverse=True))
+    return tuple(sorted(changes, key=_improvement, reverse=True))
 
 
-def _mean(outcomes: Sequence[Outcome]) -> float:
+def _improvement(change: Change) -> float:
+    return change.mended
+
+
+def _differ(outcomes: Sequence[Outcome]) -> bool:
+    """Whether some repeats have other errors than the first."""
+    first, *others = outcomes
+    return any(not np.array_equal(first.loss, other.loss) for other in others)
+
+
+def _mean_loss(outcomes: Sequence[Outcome]) -> float:
     return float(np.mean([outcome.loss.mean() for outcome in outcomes]))
 
 
-def _status(outcomes: Sequence[Outcome]) -> str:
+def _most_frequent_status(outcomes: Sequence[Outcome]) -> str:
     statuses = [outcome.status for outcome in outcomes]
     return max(statuses, key=statuses.count)
 
 
-def _blocks(outcome: Outcome) -> int:
-    return -(-len(outcome.loss) // BLOCK)
+# --- Confidence intervals ---
+
+RESAMPLES = 2000
+BLOCK_SEGMENTS = 3  # neighbouring segments are not independent, so blocks of them are resampled
+INTERVAL_PERCENT = (2.5, 97.5)
+MIN_MEAN_LOSS = 1e-12
 
 
-def _change(removed: tuple[str, ...], base: Sequence[Outcome], changed: Sequence[Outcome]) -> Change:
-    """How much of the error went: repeats and blocks of segments are drawn again, in pairs of before and after."""
-    before, after = (_means(outcomes, np.random.default_rng(0)) for outcomes in (base, changed))
-    low, high = np.percentile(1 - after / before, LOW_HIGH).tolist()
-    loss = _mean(changed)
+def _block_count(outcome: Outcome) -> int:
+    return -(-len(outcome.loss) // BLOCK_SEGMENTS)
+
+
+def _change(
+    removed: tuple[str, ...],
+    baseline: Sequence[Outcome],
+    changed: Sequence[Outcome],
+) -> Change:
+    """How much of the error went, with a bootstrap interval over repeats and blocks of segments, before and after."""
+    # Equal generators draw the same repeats and blocks on both sides.
+    loss_before = _resampled_means(baseline, np.random.default_rng(0))
+    loss_after = _resampled_means(changed, np.random.default_rng(0))
+    low, high = np.percentile(1 - loss_after / loss_before, INTERVAL_PERCENT).tolist()
+
+    loss = _mean_loss(changed)
+    mended = 1 - loss / max(_mean_loss(baseline), MIN_MEAN_LOSS)
     survived = sum(outcome.survived for outcome in changed)
-    return Change(removed, loss, 1 - loss / max(_mean(base), 1e-12), low, high, survived, len(changed))
+    return Change(removed, loss, mended, low, high, survived, len(changed))
 
 
-def _means(outcomes: Sequence[Outcome], rng: np.random.Generator) -> Array:
-    """Mean errors (DRAWS,) of repeats and blocks of segments drawn with replacement; the same draws for equal rng."""
-    sums = np.zeros(DRAWS)
-    chosen = rng.integers(len(outcomes), size=(DRAWS, len(outcomes)))
-    places = rng.random((DRAWS, len(outcomes), SEGMENTS // BLOCK + 1))
-    for nth in range(len(outcomes)):
-        for draw_of, outcome in enumerate(outcomes):
-            these = np.flatnonzero(chosen[:, nth] == draw_of)
-            count = len(outcome.loss)
-            starts = (places[these, nth, : _blocks(outcome)] * count).astype(int)
-            index = (starts[..., None] + np.arange(BLOCK)).reshape(len(these), -1)[:, :count] % count
-            sums[these] += outcome.loss[index].mean(1)
-    return np.maximum(sums / len(outcomes), 1e-12)
+def _resampled_means(outcomes: Sequence[Outcome], rng: np.random.Generator) -> Array:
+    """Mean errors (RESAMPLES,) of repeats, and of blocks of segments in them, drawn with replacement."""
+    repeats = len(outcomes)
+    chosen = rng.integers(repeats, size=(RESAMPLES, repeats))
+    starts = rng.random((RESAMPLES, repeats, SEGMENTS // BLOCK_SEGMENTS + 1))  # of blocks, as shares of the trial
+
+    sums = np.zeros(RESAMPLES)
+    for slot in range(repeats):
+        for repeat, outcome in enumerate(outcomes):
+            samples = np.flatnonzero(chosen[:, slot] == repeat)
+            sums[samples] += _block_means(outcome, starts[samples, slot])
+    return np.maximum(sums / repeats, MIN_MEAN_LOSS)
+
+
+def _block_means(outcome: Outcome, starts: Array) -> Array:
+    """Mean errors (R,) of a trial whose segments are put together from blocks that begin at these shares (R, B)."""
+    segments = len(outcome.loss)
+    first = (starts[:, : _block_count(outcome)] * segments).astype(int)
+    blocks = first[..., None] + np.arange(BLOCK_SEGMENTS)  # (R, blocks, BLOCK_SEGMENTS), round the end to the start
+    rows = blocks.reshape(len(starts), -1)[:, :segments] % segments
+    means: Array = outcome.loss[rows].mean(1)
+    return means

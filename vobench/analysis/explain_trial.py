@@ -1,11 +1,11 @@
-"""Why a trial of a run fails: its case is run again without each nuisance that it has."""
+"""Why a trial of a run fails: its case is run again without each of its nuisances."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vobench.analysis.explain import Change, Explanation, Outcome, explain, mends
+from vobench.analysis.explain import Change, Explanation, Outcome, explain, is_sufficient
 from vobench.analysis.nuisance import NUISANCES, Nuisance, nuisances_of
 from vobench.analysis.trial_data import read_conditions, read_outcome
 from vobench.errors import InputError
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class TrialExplanation:
-    """The explanation of a trial: of an estimator on a case."""
+    """Why an estimator fails on a case."""
 
     case: str
     estimator: str
@@ -29,12 +29,12 @@ class TrialExplanation:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """The nuisances that explain the failure; empty where none of them does."""
+        """The nuisances that explain the failure; empty if none does."""
         return self.explanation.named
 
     def verdict(self, change: Change) -> str:
-        """What removing these nuisances does: "mends it", "helps", "harms" or "no difference"."""
-        if mends(change, self.explanation.everything):
+        """The effect of removing these nuisances: "mends it", "helps", "harms" or "no difference"."""
+        if is_sufficient(change, self.explanation.everything):
             return "mends it"
         if change.is_sure:
             return "helps"
@@ -48,10 +48,10 @@ class TrialExplanation:
         `loss` is the error without them; `mended`, `low` and `high` are the share of the error that went, with its
         95 % interval; `survived` of `repeats` trials ended well.
         """
-        found = self.explanation
-        changes = [*found.singles, *found.pairs]
-        if len(found.everything.removed) > 1:
-            changes.append(found.everything)
+        explanation = self.explanation
+        changes = [*explanation.singles, *explanation.pairs]
+        if len(explanation.everything.removed) > 1:
+            changes.append(explanation.everything)
         return [self._row(change) for change in changes]
 
     def _row(self, change: Change) -> dict[str, Any]:
@@ -82,12 +82,12 @@ def explain_trial(
     Args:
         trial: the trial as RUN/CASE/ESTIMATOR, or its folder in the run.
         run_plan: runs the variants of the case.
-        repeats: how many seeds each variant is run with; a short case is given more.
-        estimator: the folder of the estimator, where it is not found by its name.
-        progress: is told when the estimator has changed since the run.
+        repeats: how many seeds each variant is run with; short cases get more.
+        estimator: the folder of the estimator, if it cannot be found by its name.
+        progress: shows a note if the estimator has changed since the run.
 
     Raises:
-        InputError: there is no such trial, it is of a recording, or its case has nothing that can be removed.
+        InputError: there is no such trial, it is of a recording, or its case has no nuisance.
         UnknownNameError: the run has no such case or estimator.
         SuiteError: a variant cannot be simulated.
     """
@@ -99,14 +99,14 @@ def explain_trial(
         folder = run_variants(finished, cases, name=suite_name, run_plan=run_plan)
         return {score.case: [read_outcome(folder, score)] for score in folder.scores()}
 
-    found = explain(finished.case, nuisances, measure, repeats=repeats)
-    return TrialExplanation(finished.score.case, finished.score.estimator, found)
+    explanation = explain(finished.case, nuisances, measure, repeats=repeats)
+    return TrialExplanation(finished.score.case, finished.score.estimator, explanation)
 
 
 def _present_nuisances(trial: FinishedTrial) -> tuple[Nuisance, ...]:
-    """The nuisances that the frames of a trial show. Raises InputError where there are none."""
-    of_frames = read_conditions(trial.folder, trial.case)
-    largest = {name: float(values.max()) for name, values in of_frames.items()}
+    """The nuisances that the frames of a trial show. Raises InputError if there are none."""
+    frame_conditions = read_conditions(trial.folder, trial.case)
+    largest = {name: float(values.max()) for name, values in frame_conditions.items()}
     nuisances = nuisances_of(trial.case, largest)
     if not nuisances:
         known = ", ".join(nuisance.name for nuisance in NUISANCES)

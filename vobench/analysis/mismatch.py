@@ -1,4 +1,4 @@
-"""Wrong axes, wrong quaternions, inverses or another frame of the body: which of them one mend takes away."""
+"""The fault of frames between matched poses: wrong axes, quaternions, inverses, or another frame of the body."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,12 +19,13 @@ Kind = Literal[
     "quaternion_order", "axis_swap", "mirrored_axes", "body_frame_offset", "inverse_poses", "inverse_rotations"
 ]
 
-# Real pairs without such a fault (KITTI, TUM, TartanAir) keep 0.73 of their misfit and more, or lose 0.045 at most.
-MENDED = 0.6  # a mend leaves at most this share of the misfit
-MENDED_BY = 0.03  # and takes away this much: rad, or share of the extent
-LEVER_MENDED_BY = 0.002  # a lever of 1 m on KITTI 00 takes 0.003
-BELIEVED = 0.5  # rad and share of the extent; an estimate that is worse than this has no frame to speak of
-AS_GOOD = 1.6  # a mend in one word is preferred to a fitted one up to this ratio of misfits
+# On real pairs without such a fault (KITTI, TUM, TartanAir) a correction leaves 73 % of the misfit or more, or
+# reduces it by 0.045 at most.
+MAX_SHARE_LEFT = 0.6  # of the misfit, after a correction that counts
+MIN_REDUCTION = 0.03  # of the misfit: rad, or share of the extent
+MIN_LEVER_REDUCTION = 0.002  # a lever of 1 m on KITTI 00 reduces the misfit by 0.003
+MAX_MISFIT = 0.5  # rad and share of the extent; frames cannot be told from a worse estimate
+AS_GOOD = 1.6  # a discrete correction is preferred to a fitted one up to this ratio of misfits
 
 INVERSE: dict[MoveKind, Kind] = {"inverse": "inverse_poses", "rotations": "inverse_rotations"}
 IDENTITY = np.eye(3)
@@ -34,20 +35,14 @@ SIGNED_AXES = [
     for signs in product((1.0, -1.0), repeat=3)
     if (order, signs) != ((0, 1, 2), (1.0, 1.0, 1.0))
 ]
-MOUNT_ROUNDS = 15
-STEADY = 0.97  # a ratio of steps nearer to 1 leads too far away to be believed
-WINDOWS = (30, 60, 120, 240)  # motions a path is cut into, to see a lever: it shows in turns, drift shows with length
-EXPLAINED = 0.75  # share of the motions' misfit that real pairs without a lever keep is 0.78 and more
-SIGNIFICANT = 5.0  # standard errors
-ROUNDING = 1e-6  # of how well turning determines a lever; below it there is no turning
-TINY = 1e-300  # keeps 0/0 from being a nan
+TINY = 1e-300  # prevents 0/0
 
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
     """What is left after the best similarity: positions as share of the truth's extent, rotations in rad (rms).
 
-    `turned_rad` is how far that similarity turned the estimate.
+    `turned_rad` is the rotation angle of that similarity.
     """
 
     trans: float
@@ -56,13 +51,38 @@ class Misfit:
 
     @property
     def total(self) -> float:
-        """One number of both."""
+        """Position and rotation misfit as one number."""
         return float(np.hypot(self.trans, self.rot_rad))
 
 
+def misfit(T_gt: Array, T_est: Array) -> Misfit:
+    """Measure how far matched poses (K, 4, 4) disagree, independent of their world frames and scales."""
+    alignment = align(T_est, T_gt, kind="sim3")
+    aligned = alignment.apply(T_est)
+    position_errors_m = (aligned - T_gt)[:, :3, 3]
+    position_error_m = np.sqrt(np.sum(position_errors_m**2, axis=1).mean())
+    extent_m = np.sqrt(T_gt[:, :3, 3].var(axis=0).sum())
+    angles_rad = se3.rotation_angle(_rotations_between(aligned, T_gt))
+    return Misfit(
+        trans=float(position_error_m / extent_m),
+        rot_rad=float(np.sqrt(np.mean(angles_rad**2))),
+        turned_rad=float(se3.rotation_angle(alignment.rotation)),
+    )
+
+
+def _rotations_between(T_est: Array, T_gt: Array) -> Array:
+    """The rotations R_est_gt (K, 3, 3) between matched poses (K, 4, 4)."""
+    R_est_world = np.swapaxes(T_est[:, :3, :3], 1, 2)
+    rotations: Array = R_est_world @ T_gt[:, :3, :3]
+    return rotations
+
+
 @dataclass(frozen=True, slots=True)
-class Suspect:
-    """One thing that may be wrong on one side, and the misfit once it is mended: a move, or the quaternions' order."""
+class Correction:
+    """A correction of one side, the corrected poses (K, 4, 4), and the misfit that is left.
+
+    `move` is None for the other order of the quaternions.
+    """
 
     side: Side
     move: Move | None
@@ -70,12 +90,35 @@ class Suspect:
     T_gt: Array
     T_est: Array
 
+    @property
+    def is_inverse(self) -> bool:
+        """Whether it inverts poses or rotations."""
+        return self.move is not None and self.move.kind in INVERSE
+
+    @property
+    def is_axis_rotation(self) -> bool:
+        """Whether it changes axes, of positions and rotations, without mirroring."""
+        if self.move is None or self.move.kind != "axes":
+            return False
+        return float(np.linalg.det(self.move.matrix)) > 0
+
+    def reduces(self, before: Misfit) -> bool:
+        """Whether it reduces the misfit so much that no real pair without a fault does."""
+        after = self.misfit.total
+        limit = min(MAX_SHARE_LEFT * before.total, MAX_MISFIT)
+        return after <= limit and before.total - after >= MIN_REDUCTION
+
+    def reduces_by_lever(self, before: Misfit) -> bool:
+        """Whether it reduces the misfit enough for a lever that the motions show; they show millimetres."""
+        after = self.misfit.total
+        return after <= MAX_MISFIT and before.total - after >= MIN_LEVER_REDUCTION
+
 
 @dataclass(frozen=True, slots=True)
 class Lever:
-    """A lever (3,) in m, and the motions' misfit (rms) without and with it.
+    """A lever (3,) in m, and the misfit (rms, m) of motions without and with it.
 
-    Its part along an axis that the path hardly turns about can't be known and is 0.
+    Its component along an axis that the path hardly rotates about cannot be observed and is 0.
     """
 
     m: Array
@@ -84,172 +127,224 @@ class Lever:
 
     @property
     def ratio(self) -> float:
-        """What the lever leaves of the misfit, 0..1."""
+        """The share of the misfit that is left with the lever, 0 to 1."""
         return self.after_m / (self.before_m + TINY)
 
     @property
     def is_plain(self) -> bool:
-        """Whether the lever is more than what noise makes of none."""
-        return self.ratio <= EXPLAINED and bool(np.any(self.m))
+        """Whether the lever is more than noise would give."""
+        return self.ratio <= MAX_LEVER_RATIO and bool(np.any(self.m))
 
 
 @dataclass(frozen=True, slots=True)
 class Mismatch:
-    """A fault of frames, the misfit before and after its mend, and the poses (K, 4, 4) once mended."""
+    """A fault of frames, its correction, the misfit before it, and the lever if the motions show one."""
 
     kind: Kind
-    suspect: Suspect
+    correction: Correction
     before: Misfit
     lever: Lever | None
 
 
-def find_mismatch(T_gt: Array, T_est: Array, *, gt_order: Order | None, est_order: Order | None) -> Mismatch | None:
-    """The fault of frames that explains most between matched poses (K, 4, 4), None where there is none.
+def find_mismatch(
+    T_gt: Array,
+    T_est: Array,
+    *,
+    gt_order: Order | None,
+    est_order: Order | None,
+) -> Mismatch | None:
+    """Find the fault of frames that explains most between matched poses (K, 4, 4); None if there is none.
 
-    A change that is said in one word comes before a fitted one, unless that fits plainly better.
+    A discrete correction (axes, inverse, order) is preferred to a fitted one unless that is clearly better.
     """
     before = misfit(T_gt, T_est)
-    tried = list(suspects(T_gt, T_est, gt_order=gt_order, est_order=est_order))
-    # In one world the inverse of either side mends; truths are seldom given so.
-    inverted = [s for s in tried if s.side == "est" and s.move and s.move.kind in INVERSE and _mends(before, s)]
-    doubted = [s for s in tried if not (inverted and s.side == "gt" and s.move)]
-    worded = min(doubted, key=lambda suspect: suspect.misfit.total)
+    discrete = _best_discrete(before, T_gt, T_est, gt_order=gt_order, est_order=est_order)
     fitted = mounted(T_gt, T_est)
-    if _mends(before, worded) and not _is_rather_mounted(worded, fitted):
-        return Mismatch(_kind(worded), worded, before, None)
-    lever = find_lever(T_gt, T_est, fitted.move.matrix[:3, :3]) if fitted.move else None
-    if _mends(before, fitted) or (lever is not None and lever.is_plain and _matters(before, fitted)):
-        return Mismatch("body_frame_offset", fitted, before, lever if lever and lever.is_plain else None)
+    if discrete.reduces(before) and not _is_fitted_preferred(discrete, fitted):
+        return Mismatch(_kind(discrete), discrete, before, None)
+
+    assert fitted.move is not None
+    lever = find_lever(T_gt, T_est, fitted.move.matrix[:3, :3])
+    if not lever.is_plain:
+        return Mismatch("body_frame_offset", fitted, before, None) if fitted.reduces(before) else None
+    if fitted.reduces(before) or fitted.reduces_by_lever(before):
+        return Mismatch("body_frame_offset", fitted, before, lever)
     return None
 
 
-def _mends(before: Misfit, suspect: Suspect) -> bool:
-    after = suspect.misfit.total
-    return after <= min(MENDED * before.total, BELIEVED) and before.total - after >= MENDED_BY
+def _best_discrete(
+    before: Misfit,
+    T_gt: Array,
+    T_est: Array,
+    *,
+    gt_order: Order | None,
+    est_order: Order | None,
+) -> Correction:
+    """The discrete correction with the smallest misfit."""
+    candidates = list(discrete_corrections(T_gt, T_est, gt_order=gt_order, est_order=est_order))
+    # In one world frame, inverting either side has the same effect; ground truth is seldom given inverted.
+    est_inverses = [each for each in candidates if each.side == "est" and each.is_inverse]
+    if any(inverse.reduces(before) for inverse in est_inverses):
+        candidates = [each for each in candidates if each.side == "est" or each.move is None]
+    return min(candidates, key=lambda candidate: candidate.misfit.total)
 
 
-def _matters(before: Misfit, levered: Suspect) -> bool:
-    """Whether a lever that motions show is worth a word: they show a millimetre that nobody would see."""
-    after = levered.misfit.total
-    return after <= BELIEVED and before.total - after >= LEVER_MENDED_BY
+def _is_fitted_preferred(discrete: Correction, fitted: Correction) -> bool:
+    """Whether the estimate is of another frame of the body rather than in other axes.
 
-
-def _is_rather_mounted(worded: Suspect, fitted: Suspect) -> bool:
-    """Turned axes look the same to motions as a turned body; then the one that leaves the world in place is meant."""
-    if fitted.misfit.total * AS_GOOD < worded.misfit.total:
+    Motions do not distinguish rotated axes from a rotated body; the correction that leaves the world in place counts.
+    """
+    if fitted.misfit.total * AS_GOOD < discrete.misfit.total:
         return True
-    is_turn = worded.move is not None and worded.move.kind == "axes" and np.linalg.det(worded.move.matrix) > 0
-    as_good = fitted.misfit.total <= AS_GOOD * worded.misfit.total
-    return is_turn and as_good and fitted.misfit.turned_rad < worded.misfit.turned_rad
+    is_as_good = fitted.misfit.total <= AS_GOOD * discrete.misfit.total
+    leaves_world = fitted.misfit.turned_rad < discrete.misfit.turned_rad
+    return discrete.is_axis_rotation and is_as_good and leaves_world
 
 
-def _kind(suspect: Suspect) -> Kind:
-    if suspect.move is None:
+def _kind(correction: Correction) -> Kind:
+    """The fault that a discrete correction undoes."""
+    move = correction.move
+    if move is None:
         return "quaternion_order"
-    if suspect.move.kind in INVERSE:
-        return INVERSE[suspect.move.kind]
-    return "mirrored_axes" if np.count_nonzero(np.diag(suspect.move.matrix)) == 3 else "axis_swap"
+    if move.kind in INVERSE:
+        return INVERSE[move.kind]
+    is_diagonal = np.count_nonzero(np.diag(move.matrix)) == 3
+    return "mirrored_axes" if is_diagonal else "axis_swap"
 
 
-def misfit(T_gt: Array, T_est: Array) -> Misfit:
-    """How badly matched poses (K, 4, 4) agree, whatever their worlds and scales are."""
-    alignment = align(T_est, T_gt, kind="sim3")
-    aligned = alignment.apply(T_est)
-    trans_m = np.sqrt(np.sum((aligned - T_gt)[:, :3, 3] ** 2, axis=1).mean())
-    angles = se3.rotation_angle(np.swapaxes(aligned[:, :3, :3], 1, 2) @ T_gt[:, :3, :3])
-    extent_m = np.sqrt(T_gt[:, :3, 3].var(axis=0).sum())
-    turned = float(se3.rotation_angle(alignment.rotation))
-    return Misfit(float(trans_m / extent_m), float(np.sqrt(np.mean(angles**2))), turned)
-
-
-def suspects(T_gt: Array, T_est: Array, *, gt_order: Order | None, est_order: Order | None) -> Iterator[Suspect]:
-    """The other quaternion order and the inverses of either side, and all 47 other signed axes of the estimate.
+def discrete_corrections(
+    T_gt: Array,
+    T_est: Array,
+    *,
+    gt_order: Order | None,
+    est_order: Order | None,
+) -> Iterator[Correction]:
+    """Yield the other quaternion order and the inverses of either side, and all 47 other signed axes of the estimate.
 
     The orders are those that the files were read in, None where they hold matrices.
     """
     if est_order:
-        yield _suspect("est", None, T_gt, _reordered(T_est, est_order))
+        yield _correction("est", None, T_gt, _reordered(T_est, est_order))
     if gt_order:
-        yield _suspect("gt", None, _reordered(T_gt, gt_order), T_est)
+        yield _correction("gt", None, _reordered(T_gt, gt_order), T_est)
     for kind in INVERSE:
-        yield _suspect("est", Move(kind), T_gt, Move(kind).apply(T_est))
-        yield _suspect("gt", Move(kind), Move(kind).apply(T_gt), T_est)
+        inverse = Move(kind)
+        yield _correction("est", inverse, T_gt, inverse.apply(T_est))
+        yield _correction("gt", inverse, inverse.apply(T_gt), T_est)
     for axes in SIGNED_AXES:
         for move in (Move("positions", axes), Move("axes", axes)):
-            yield _suspect("est", move, T_gt, move.apply(T_est))
+            yield _correction("est", move, T_gt, move.apply(T_est))
 
 
-def mounted(T_gt: Array, T_est: Array) -> Suspect:
-    """The estimate moved by the constant T_est_gt that fits best: rotation by the mean, lever by the motions.
+def _correction(
+    side: Side,
+    move: Move | None,
+    T_gt: Array,
+    T_est: Array,
+) -> Correction:
+    return Correction(side, move, misfit(T_gt, T_est), T_gt, T_est)
+
+
+def _reordered(T: Array, read_as: Order) -> Array:
+    """Poses (K, 4, 4) as they read if the quaternions have the other order than `read_as`."""
+    as_read = se3.to_quaternion(T[:, :3, :3])  # (K, 4), scalar last
+    # The numbers in the file were taken as x, y, z, w or as w, x, y, z; exchange the two readings.
+    columns = [1, 2, 3, 0] if read_as == "xyzw" else [3, 0, 1, 2]
+    return se3.transform(se3.from_quaternion(as_read[:, columns]), T[:, :3, 3])
+
+
+# --- Another frame of the same body ---
+
+MOUNT_ROUNDS = 15
+ROUNDS_PER_EXTRAPOLATION = 3
+MAX_STEP_RATIO = 0.97  # a ratio of steps nearer to 1 would extrapolate too far
+# Parts that a path is cut into to find a lever, which shows in rotations; drift shows with length instead.
+PATH_PARTS = (30, 60, 120, 240)
+MAX_LEVER_RATIO = 0.75  # real pairs without a lever keep 78 % of the motions' misfit or more
+SIGNIFICANT_SIGMAS = 5.0
+MIN_RELATIVE_STRENGTH = 1e-6  # of how well the rotations determine a lever; below it there is no rotation
+
+
+def mounted(T_gt: Array, T_est: Array) -> Correction:
+    """Fit the constant T_est_gt that moves the estimate onto the truth: rotation by the mean, lever by the motions.
 
     A lever that is no more than noise is left out.
     """
     lever_m = np.zeros(3)
-    path = []
+    iterates_m: list[Array] = []
     for _ in range(MOUNT_ROUNDS):
-        lever = find_lever(T_gt, T_est, _rotation_left(T_gt, T_est, lever_m))
-        path.append(lever.m)
-        lever_m = _limit(path[-3:]) if len(path) % 3 == 0 else lever.m
-    lever_m = lever_m if lever.is_plain else np.zeros(3)
-    move = Move("mount", se3.transform(_rotation_left(T_gt, T_est, lever_m), lever_m))
-    return _suspect("est", move, T_gt, move.apply(T_est))
+        lever = find_lever(T_gt, T_est, _mean_rotation_left(T_gt, T_est, lever_m))
+        iterates_m.append(lever.m)
+        is_extrapolated = len(iterates_m) % ROUNDS_PER_EXTRAPOLATION == 0
+        lever_m = _limit(iterates_m[-3:]) if is_extrapolated else lever.m
+    if not lever.is_plain:
+        lever_m = np.zeros(3)
+
+    R_est_gt = _mean_rotation_left(T_gt, T_est, lever_m)
+    move = Move("mount", se3.transform(R_est_gt, lever_m))
+    return _correction("est", move, T_gt, move.apply(T_est))
 
 
-def _limit(steps: list[Array]) -> Array:
-    """Where three steps (3,) that shorten by one ratio are going. Source: Aitken (1926)."""
-    before = steps[1] - steps[0]
-    after = steps[2] - steps[1]
-    ratio = float(before @ after) / (float(before @ before) + TINY)
-    return steps[2] + (ratio / (1 - ratio)) * after if 0 < ratio < STEADY else steps[2]
+def _limit(iterates: list[Array]) -> Array:
+    """The limit of three iterates (3,) whose steps shrink by a constant ratio. Source: Aitken (1926)."""
+    first_step = iterates[1] - iterates[0]
+    second_step = iterates[2] - iterates[1]
+    ratio = float(first_step @ second_step) / (float(first_step @ first_step) + TINY)
+    if not 0 < ratio < MAX_STEP_RATIO:
+        return iterates[2]
+    return iterates[2] + (ratio / (1 - ratio)) * second_step
 
 
-def _rotation_left(T_gt: Array, T_est: Array, lever_m: Array) -> Array:
+def _mean_rotation_left(T_gt: Array, T_est: Array, lever_m: Array) -> Array:
     """The mean rotation (3, 3) from the estimate, moved by a lever and aligned, to the truth."""
     moved = T_est @ se3.transform(IDENTITY, lever_m)
     aligned = align(moved, T_gt, kind="sim3").apply(moved)
-    return se3.nearest_rotation(np.mean(np.swapaxes(aligned[:, :3, :3], 1, 2) @ T_gt[:, :3, :3], axis=0))
+    return se3.nearest_rotation(np.mean(_rotations_between(aligned, T_gt), axis=0))
 
 
 def find_lever(T_gt: Array, T_est: Array, rotation: Array) -> Lever:
-    """The lever that explains most of the motions, given the rotation (3, 3) between both bodies."""
-    windows = sorted({max(1, len(T_gt) // parts) for parts in WINDOWS})
-    return min((_lever(T_gt, T_est, rotation, window) for window in windows), key=lambda lever: lever.ratio)
+    """Find the lever that explains most of the motions, given the rotation (3, 3) between both frames of the body."""
+    windows = sorted({max(1, len(T_gt) // parts) for parts in PATH_PARTS})
+    levers = [_lever_of_motions(T_gt, T_est, rotation, window) for window in windows]
+    return min(levers, key=lambda lever: lever.ratio)
 
 
-def _lever(T_gt: Array, T_est: Array, rotation: Array, window: int) -> Lever:
-    """Least squares of X t_gt = s t_est + (X R_gt Xᵀ − I) l over all motions of `window` poses.
+def _lever_of_motions(T_gt: Array, T_est: Array, rotation: Array, window: int) -> Lever:
+    """Fit X t_gt = s t_est + (X R_gt Xᵀ − I) l to the motions over `window` poses by least squares.
 
-    The truth's rotations, for the noise of the estimate's goes together with that of its translations.
+    It uses the rotations of the truth, as errors of the estimate's rotations correlate with those of its translations.
     """
-    motion_gt, motion_est = (se3.inverse(T[:-window]) @ T[window:] for T in (T_gt, T_est))
-    moved = motion_est[:, :3, 3].reshape(-1)
-    moved_sq = float(moved @ moved) + TINY
-    seen = (motion_gt[:, :3, 3] @ rotation.T).reshape(-1)
-    turning = (rotation @ motion_gt[:, :3, :3] @ rotation.T - IDENTITY).reshape(-1, 3)
-    # The scale is taken out of either side first; what is left are three equations a motion for the lever.
-    without = seen - moved * float(moved @ seen) / moved_sq
-    free = turning - np.outer(moved, moved @ turning) / moved_sq
-    strength, axes = np.linalg.eigh(free.T @ free)
-    before = float(np.sqrt(3 * np.mean(without * without)))
+    motion_gt = se3.inverse(T_gt[:-window]) @ T_gt[window:]
+    motion_est = se3.inverse(T_est[:-window]) @ T_est[window:]
+    t_est = motion_est[:, :3, 3].reshape(-1)  # (3 M,)
+    t_gt = (motion_gt[:, :3, 3] @ rotation.T).reshape(-1)
+    rotated = rotation @ motion_gt[:, :3, :3] @ rotation.T
+    lever_terms = (rotated - IDENTITY).reshape(-1, 3)  # (3 M, 3)
+
+    # Eliminate the scale from both sides: three equations per motion are left for the lever.
+    t_est_sq = float(t_est @ t_est) + TINY
+    values = t_gt - t_est * float(t_est @ t_gt) / t_est_sq
+    terms = lever_terms - np.outer(t_est, t_est @ lever_terms) / t_est_sq
+
+    strength, axes = np.linalg.eigh(terms.T @ terms)  # ascending
+    before_m = _rms_length(values)
     if not strength[2] > 0:
-        return Lever(np.zeros(3), before, before)
-    strength = np.maximum(strength, ROUNDING * strength[2])
-    stated = (axes.T @ (free.T @ without)) / strength
-    # Windows overlap, so that only every window-th motion is news.
-    noise_m = np.sqrt(np.mean((without - free @ (axes @ stated)) ** 2) * window)
-    certainty = np.abs(stated) * np.sqrt(strength) / (noise_m + TINY)
-    solution = axes @ np.where(certainty >= SIGNIFICANT, stated, 0.0)
-    after = float(np.sqrt(3 * np.mean((without - free @ solution) ** 2)))
-    scale = float(moved @ (seen - turning @ solution)) / moved_sq
-    return Lever(solution / scale if scale > 0 else np.zeros(3), before, after)
+        return Lever(np.zeros(3), before_m, before_m)
+    strength = np.maximum(strength, MIN_RELATIVE_STRENGTH * strength[2])
+    along_axes = (axes.T @ (terms.T @ values)) / strength
+
+    # Windows overlap: only every window-th motion is independent.
+    residuals_m = values - terms @ (axes @ along_axes)
+    noise_m = np.sqrt(np.mean(residuals_m**2) * window)
+    sigmas = np.abs(along_axes) * np.sqrt(strength) / (noise_m + TINY)
+    lever_m = axes @ np.where(sigmas >= SIGNIFICANT_SIGMAS, along_axes, 0.0)
+
+    after_m = _rms_length(values - terms @ lever_m)
+    scale = float(t_est @ (t_gt - lever_terms @ lever_m)) / t_est_sq
+    scaled_lever_m = lever_m / scale if scale > 0 else np.zeros(3)
+    return Lever(scaled_lever_m, before_m, after_m)
 
 
-def _suspect(side: Side, move: Move | None, T_gt: Array, T_est: Array) -> Suspect:
-    return Suspect(side, move, misfit(T_gt, T_est), T_gt, T_est)
-
-
-def _reordered(T: Array, read_as: Order) -> Array:
-    """Poses whose quaternions' four numbers were read in the wrong one of the two orders."""
-    q = se3.to_quaternion(T[:, :3, :3])
-    other = [1, 2, 3, 0] if read_as == "xyzw" else [3, 0, 1, 2]
-    return se3.transform(se3.from_quaternion(q[:, other]), T[:, :3, 3])
+def _rms_length(residuals_m: Array) -> float:
+    """The root mean square length of vectors whose components are (3 M,)."""
+    return float(np.sqrt(3 * np.mean(residuals_m**2)))

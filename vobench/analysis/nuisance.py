@@ -1,6 +1,6 @@
-"""What makes a case hard, each as a change of its settings that takes it away."""
+"""Nuisances: what makes a case hard, each with the change of its settings that removes it."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import Any
@@ -26,216 +26,286 @@ from vobench.suite.scene_spec import (
 )
 from vobench.suite.suite import Case
 
-LEAST_SHOWN = 2e-3  # of a picture's pixels
+MIN_SHOWN_SHARE = 2e-3  # of the pixels of a frame
+
+Change = Callable[[Case], Case]
 
 
 @dataclass(frozen=True, slots=True)
 class Nuisance:
-    """One of NUISANCES: its name, what the case has instead once it is removed, and the change that does it.
+    """One of NUISANCES: its name, what the case has instead once it is removed, and the change that removes it.
 
-    A case does not have it where the change leaves the case as it is, or where `shown_by`, one of the conditions of
-    its frames, is 0 in all of them.
+    A case lacks it if the change leaves the case as it is, or if `shown_by`, a condition of its frames, is 0 in all
+    of them.
     """
 
     name: str
     instead: str
-    remove: Callable[[Case], Case]
+    remove: Change
     shown_by: str | None = None
 
 
 def nuisances_of(case: Case, largest: Mapping[str, float] = MappingProxyType({})) -> tuple[Nuisance, ...]:
-    """Those of NUISANCES that the case has; `largest` are conditions' largest values, where they are known."""
-    shown = (each for each in NUISANCES if largest.get(each.shown_by or "", 1.0) > LEAST_SHOWN)
-    return tuple(each for each in shown if each.remove(case) != case)
+    """Return the NUISANCES that a case has; `largest` are the largest values of conditions that are known."""
+    present = []
+    for nuisance in NUISANCES:
+        largest_share = largest.get(nuisance.shown_by or "", 1.0)
+        if largest_share > MIN_SHOWN_SHARE and nuisance.remove(case) != case:
+            present.append(nuisance)
+    return tuple(present)
 
 
 def without(case: Case, removed: Iterable[str]) -> Case:
-    """The case with these nuisances removed."""
+    """Return the case with these nuisances removed, in the order of NUISANCES."""
+    names = set(removed)
     for nuisance in NUISANCES:
-        if nuisance.name in set(removed):
+        if nuisance.name in names:
             case = nuisance.remove(case)
     return case
 
 
-def _camera(**changes: Any) -> Callable[[Case], Case]:
-    return lambda case: replace(case, camera=replace(case.camera, **changes))
+# --- Settings of the camera and its timing ---
 
 
-def _timed(**changes: Any) -> Callable[[Case], Case]:
-    return lambda case: _camera(timing=replace(case.camera.timing, **changes))(case)
+def _with_camera(**settings: Any) -> Change:
+    """A change of some settings of the camera."""
+    return lambda case: replace(case, camera=replace(case.camera, **settings))
 
 
-def _of_scene(change: Callable[[SceneFile], SceneFile]) -> Callable[[Case], Case]:
-    return lambda case: replace(case, scene=change(case.scene))
+def _with_timing(**settings: Any) -> Change:
+    """A change of some settings of the camera's timing."""
+
+    def change(case: Case) -> Case:
+        timing = replace(case.camera.timing, **settings)
+        return replace(case, camera=replace(case.camera, timing=timing))
+
+    return change
 
 
-def _of_materials(change: Callable[[str, MaterialSpec | None], MaterialSpec | None]) -> Callable[[Case], Case]:
-    """Another material in place of each one that is used; it is given by name, None where it is a finish of ours."""
-
-    def changed(scene: SceneFile) -> SceneFile:
-        own = dict(scene.materials)
-        used = {name for _, name in materials_used(scene)} | set(scene.materials)
-        for name in sorted(used):
-            if (other := change(name, own.get(name))) is not None and other != own.get(name):
-                own[name] = other
-        return replace(scene, materials=own)
-
-    return _of_scene(changed)
+def _without_blur(case: Case) -> Case:
+    return _with_camera(motion_blur=False, blur_sigma_px=0.0, defocus_px=0.0)(case)
 
 
-# In place of a mirror: something that can be followed, or low texture would come in its place.
-STONE = Matt("terrazzo", 0.45, contrast=0.5)
-# The finishes that mirror, and those in which there is little to see; others have a picture for a texture.
-COATED_FINISHES = {"terrazzo": Matt("terrazzo", 0.45, contrast=0.4)}
-FAINT_FINISHES = ("white_plaster", "sage_plaster", "paint")
-# contrasts
-FAINT = 0.3
-STRONG = 0.7
+def _without_noise(case: Case) -> Case:
+    chip = case.camera.chip
+    noiseless = CameraSensor(full_well_e=chip.full_well_e, black_dn=chip.black_dn, response=chip.response)
+    return replace(case, camera=replace(case.camera, chip=noiseless))
 
 
-def _matt_mirrors(name: str, own: MaterialSpec | None) -> MaterialSpec | None:
-    if isinstance(own, Mirror) or (own is None and name == "mirror"):
-        return STONE
-    if isinstance(own, Glass):
-        return replace(own, eta=1.0)
-    return Glass(eta=1.0) if own is None and name == "pane" else own
+HEADROOM = 8.0  # full wells of the wider chip in one of the original
+KNEE = 0.9  # share of the grey values for signals that were in range before
 
 
-def _without_coat(name: str, own: MaterialSpec | None) -> MaterialSpec | None:
-    if isinstance(own, Polished):
-        kept = {each.name: getattr(own, each.name) for each in fields(Matt) if each.name != "kind"}
-        return Matt(**kept)
-    return COATED_FINISHES.get(name) if own is None else own
+def _without_saturation(case: Case) -> Case:
+    """Give the chip eight times the full well: signals that were in range look nearly as before, brighter ones fit.
 
-
-def _textured(name: str, own: MaterialSpec | None) -> MaterialSpec | None:
-    if isinstance(own, Matt | Polished) and (own.contrast < FAINT or own.pattern == "plain"):
-        return replace(own, pattern="poster", contrast=STRONG, tile_m=2.0, albedo=min(own.albedo, 0.55))
-    return Matt("poster", 0.55, contrast=STRONG, tile_m=2.0) if own is None and name in FAINT_FINISHES else own
-
-
-def _first_level(level: LevelSpec) -> LevelSpec:
-    """As a light is at first, where it dims or is switched; its mean, where it flickers."""
-    if level.flicker:
-        return STEADY
-    at_first = level.build().mean(0, 0)
-    return LevelSpec(steady=at_first or 1.0)
-
-
-def _still_lights(case: Case) -> Case:
-    """Lamps that neither flicker nor dim, and a sun that stands."""
-
-    def steady(light: Any) -> Any:
-        return replace(light, level=_first_level(light.level)) if light and light.level else light
-
-    scene = case.scene
-    overrides = {name: steady(override) for name, override in case.lighting.items()}
-    sun = steady(scene.sun)
-    if sun and sun.path:
-        key = sun.path[0]
-        sun = replace(sun, path=(), azimuth_deg=key.azimuth_deg, elevation_deg=key.elevation_deg)
-    lamps = tuple(map(steady, scene.lamps))
-    return replace(case, scene=replace(scene, lamps=lamps, sun=sun, sky=steady(scene.sky)), lighting=overrides)
-
-
-CEILING_SHARE = 0.96  # of a room's sides: a panel that throws no shadow to speak of
-LOWER_M = 0.02
-
-
-def _shadowless(case: Case) -> Case:
-    """All lamps as one panel under the whole ceiling, and the sun's light as a sky that is bright alike everywhere.
-
-    Its level over time is that of the strongest lamp.
-    """
-    scene = case.scene
-    lighting = dict(case.lighting)
-    if scene.room and scene.lamps:
-        overrides = [lighting.pop(lamp.name, LightOverride()) for lamp in scene.lamps]
-        powers = [
-            lamp.power_lm if override.power_lm is None else override.power_lm
-            for lamp, override in zip(scene.lamps, overrides, strict=True)
-        ]
-        strongest = int(np.argmax(powers))
-        x, y, height = scene.room.size_m
-        panel = PanelLamp(
-            name=scene.lamps[strongest].name,
-            center_m=(0.0, 0.0, height - LOWER_M),
-            size_m=(CEILING_SHARE * x, CEILING_SHARE * y),
-            power_lm=float(sum(powers)),
-            colour=scene.lamps[strongest].colour,
-            level=overrides[strongest].level or scene.lamps[strongest].level,
-        )
-        scene = replace(scene, lamps=(panel,))
-    if scene.sun:
-        override = lighting.pop("sun", LightOverride())
-        below = scene.sky.illuminance_lx if scene.sky else 0.0
-        lux = scene.sun.illuminance_lx if override.illuminance_lx is None else override.illuminance_lx
-        scene = replace(scene, sun=None, sky=SkySpec(illuminance_lx=lux + below, kind="uniform"))
-    return replace(case, scene=scene, lighting=lighting)
-
-
-HEADROOM = 8.0
-KNEE = 0.9  # of the grey values, for what fitted before; the rest is for what burned
-
-
-def _unburnt(case: Case) -> Case:
-    """A chip with eight times the full well: what was in its range looks nearly as before, the rest fits above.
-
-    A fixed exposure that makes white more than white comes down to it first.
+    A fixed exposure that saturates white is lowered first, so that white just fits.
     """
     camera = case.camera
-    chip = case.camera.chip
-    stored = np.linspace(0, 1, FULL_SCALE_DN + 1)
-    signal = np.interp(stored / KNEE, stored, linear_of_grey(chip.curve))
-    above = stored > KNEE
-    signal[above] = np.linspace(1, HEADROOM, 1 + int(above.sum()))[1:]
-    wide = replace(
+    chip = camera.chip
+    grey = np.linspace(0, 1, FULL_SCALE_DN + 1)
+    signal = np.interp(grey / KNEE, grey, linear_of_grey(chip.curve))  # in full wells of the original chip
+    is_above = grey > KNEE
+    signal[is_above] = np.linspace(1, HEADROOM, 1 + int(is_above.sum()))[1:]
+    wide_chip = replace(
         chip,
         full_well_e=chip.full_well_e * HEADROOM,
         black_dn=chip.black_dn / HEADROOM,
         adc_bits=None,
         response=tuple(signal.tolist()),
     )
+
     loop = camera.auto_exposure
-    loop = replace(loop, target_share=loop.target_share / HEADROOM) if loop else None
-    probe = replace(camera, chip=wide, exposure_gain=1.0, auto_exposure=loop)
-    most = camera.exposure_gain if loop else min(camera.exposure_gain, 10 ** (-camera.gain_db / 20))
-    exposed = replace(camera, exposure_gain=most)
-    return replace(case, camera=replace(probe, exposure_gain=exposed.white_e / probe.white_e))
+    if loop:
+        loop = replace(loop, target_share=loop.target_share / HEADROOM)
+        exposure_gain = camera.exposure_gain
+    else:
+        gain_of_white = 10 ** (-camera.gain_db / 20)
+        exposure_gain = min(camera.exposure_gain, gain_of_white)
+
+    white_e = replace(camera, exposure_gain=exposure_gain).white_e
+    wide = replace(camera, chip=wide_chip, exposure_gain=1.0, auto_exposure=loop)
+    return replace(case, camera=replace(wide, exposure_gain=white_e / wide.white_e))
 
 
-def _noiseless(case: Case) -> Case:
-    chip = case.camera.chip
-    kept = {name: getattr(chip, name) for name in ("full_well_e", "black_dn", "response")}
-    return replace(case, camera=replace(case.camera, chip=CameraSensor(**kept)))
+def _with_true_calibration(case: Case) -> Case:
+    return replace(case, rig=replace(case.rig, calibration_error=CalibrationError()))
 
 
-def _lens_blur(case: Case) -> Case:
-    return _camera(motion_blur=False, blur_sigma_px=0.0, defocus_px=0.0)(case)
+# --- Materials and moving objects ---
+
+MaterialChange = Callable[[str, MaterialSpec | None], MaterialSpec | None]
+
+
+def _without_movers(case: Case) -> Case:
+    return replace(case, scene=replace(case.scene, movers=()))
+
+
+def _with_materials(change: MaterialChange) -> Change:
+    """A change of every material that a scene uses.
+
+    `change` gets its name and its definition in the scene, which is None for a built-in finish.
+    """
+
+    def changed(case: Case) -> Case:
+        scene = case.scene
+        materials = dict(scene.materials)
+        used = {name for _, name in materials_used(scene)} | set(materials)
+        for name in sorted(used):
+            defined = scene.materials.get(name)
+            replacement = change(name, defined)
+            if replacement is not None and replacement != defined:
+                materials[name] = replacement
+        return replace(case, scene=replace(scene, materials=materials))
+
+    return changed
+
+
+# Mirrors become textured stone: a plain surface would add the nuisance of low texture.
+STONE = Matt("terrazzo", 0.45, contrast=0.5)
+# Built-in finishes with a glossy coat, and those with little texture; the others are textured by a picture.
+COATED_FINISHES = {"terrazzo": Matt("terrazzo", 0.45, contrast=0.4)}
+FAINT_FINISHES = ("white_plaster", "sage_plaster", "paint")
+FAINT_CONTRAST = 0.3
+STRONG_CONTRAST = 0.7
+STRONG_TILE_M = 2.0
+STRONG_ALBEDO = 0.55  # at most: a brighter pattern of this contrast would be clipped
+
+
+def _diffuse_mirror(name: str, defined: MaterialSpec | None) -> MaterialSpec | None:
+    """Stone in place of a mirror, and a pane without reflections."""
+    if isinstance(defined, Mirror):
+        return STONE
+    if isinstance(defined, Glass):
+        return replace(defined, eta=1.0)
+    if defined is None and name == "mirror":
+        return STONE
+    if defined is None and name == "pane":
+        return Glass(eta=1.0)
+    return defined
+
+
+def _without_coat(name: str, defined: MaterialSpec | None) -> MaterialSpec | None:
+    """The diffuse material below a glossy coat."""
+    if defined is None:
+        return COATED_FINISHES.get(name)
+    if isinstance(defined, Polished):
+        names = [field.name for field in fields(Matt) if field.name != "kind"]
+        return Matt(**{name: getattr(defined, name) for name in names})
+    return defined
+
+
+def _with_strong_texture(name: str, defined: MaterialSpec | None) -> MaterialSpec | None:
+    """A pattern of strong contrast in place of a plain or faint one."""
+    if defined is None and name in FAINT_FINISHES:
+        return Matt("poster", STRONG_ALBEDO, contrast=STRONG_CONTRAST, tile_m=STRONG_TILE_M)
+    if not isinstance(defined, Matt | Polished):
+        return defined
+    if defined.contrast < FAINT_CONTRAST or defined.pattern == "plain":
+        albedo = min(defined.albedo, STRONG_ALBEDO)
+        return replace(defined, pattern="poster", contrast=STRONG_CONTRAST, tile_m=STRONG_TILE_M, albedo=albedo)
+    return defined
+
+
+# --- Light ---
+
+
+def _with_steady_light(case: Case) -> Case:
+    """Keep lamps from flickering and dimming, and the sun from moving."""
+    scene = case.scene
+    overrides = {name: _steady(override) for name, override in case.lighting.items()}
+    sun = _steady(scene.sun)
+    if sun and sun.path:
+        start = sun.path[0]
+        sun = replace(sun, path=(), azimuth_deg=start.azimuth_deg, elevation_deg=start.elevation_deg)
+    lamps = tuple(_steady(lamp) for lamp in scene.lamps)
+    scene = replace(scene, lamps=lamps, sun=sun, sky=_steady(scene.sky))
+    return replace(case, scene=scene, lighting=overrides)
+
+
+def _steady(light: Any) -> Any:
+    """A light, or an override of one, whose level does not change."""
+    if light is None or light.level is None:
+        return light
+    return replace(light, level=_first_level(light.level))
+
+
+def _first_level(level: LevelSpec) -> LevelSpec:
+    """The level at the start of a light that dims or is switched; the mean of one that flickers."""
+    if level.flicker:
+        return STEADY
+    at_start = level.build().mean(0, 0)
+    return LevelSpec(steady=at_start or 1.0)
+
+
+CEILING_SHARE = 0.96  # of the sides of a room: the shadows of so large a panel are negligible
+PANEL_BELOW_CEILING_M = 0.02
+
+
+def _without_shadows(case: Case) -> Case:
+    """Replace lamps by one panel under the whole ceiling, and the sun by a uniformly bright sky of equal illuminance.
+
+    The level of the panel over time is that of the strongest lamp.
+    """
+    scene = case.scene
+    lighting = dict(case.lighting)
+    if scene.room and scene.lamps:
+        overrides = [lighting.pop(lamp.name, LightOverride()) for lamp in scene.lamps]
+        scene = replace(scene, lamps=(_ceiling_panel(scene, overrides),))
+
+    if scene.sun:
+        override = lighting.pop("sun", LightOverride())
+        sun_lx = _overridden(scene.sun.illuminance_lx, override.illuminance_lx)
+        sky_lx = scene.sky.illuminance_lx if scene.sky else 0.0
+        uniform_sky = SkySpec(illuminance_lx=sun_lx + sky_lx, kind="uniform")
+        scene = replace(scene, sun=None, sky=uniform_sky)
+    return replace(case, scene=scene, lighting=lighting)
+
+
+def _ceiling_panel(scene: SceneFile, overrides: Sequence[LightOverride]) -> PanelLamp:
+    """One panel with the power of all lamps of a room, given the override of each."""
+    assert scene.room is not None
+    lamps = zip(scene.lamps, overrides, strict=True)
+    powers_lm = [_overridden(lamp.power_lm, override.power_lm) for lamp, override in lamps]
+    index = int(np.argmax(powers_lm))
+    strongest = scene.lamps[index]
+    length_m, width_m, height_m = scene.room.size_m
+    return PanelLamp(
+        name=strongest.name,
+        center_m=(0.0, 0.0, height_m - PANEL_BELOW_CEILING_M),
+        size_m=(CEILING_SHARE * length_m, CEILING_SHARE * width_m),
+        power_lm=float(sum(powers_lm)),
+        colour=strongest.colour,
+        level=overrides[index].level or strongest.level,
+    )
+
+
+def _overridden(nominal: float, override: float | None) -> float:
+    return nominal if override is None else override
 
 
 NUISANCES = (
-    Nuisance("mirrors", "matt stone, and panes that mirror nothing", _of_materials(_matt_mirrors), shown_by="mirror"),
-    Nuisance("gloss", "matt surfaces", _of_materials(_without_coat), shown_by="gloss"),
-    Nuisance("shadows", "light from the whole ceiling or sky", _shadowless, shown_by="shadow_edge"),
-    Nuisance("changing light", "lamps and a sun that stay as they are", _still_lights),
-    Nuisance("moving things", "a world at rest", _of_scene(lambda scene: replace(scene, movers=())), "moving"),
-    Nuisance("low texture", "strong patterns on faint surfaces", _of_materials(_textured)),
-    Nuisance("burnt pixels", "no more light than white needs, and eight times the range", _unburnt, shown_by="burnt"),
-    Nuisance("blur", "a short exposure and a sharp lens", _lens_blur),
-    Nuisance("noise", "a chip without noise", _noiseless),
-    Nuisance("unlike eyes", "two equal eyes", _camera(unlike=Eyes())),
-    Nuisance("dropped frames", "every frame, once", _timed(drop_share=0.0, repeat_share=0.0)),
-    Nuisance("late pictures", "both taken at their stamp", _timed(jitter_ms=0.0, right_delay_ms=0.0)),
-    Nuisance("late IMU", "readings stamped when they are taken", _timed(imu_delay_ms=0.0)),
-    Nuisance("rolling shutter", "a global shutter", _camera(shutter="global", readout_ms=None)),
-    Nuisance("auto-exposure", "the first exposure throughout", _camera(auto_exposure=None)),
-    Nuisance("vignetting and dirt", "an even, clean lens", _camera(vignetting=0, vignetting_cutoff_deg=None, dirt=0)),
-    Nuisance("flare", "a lens that scatters nothing", _camera(flare=0, ghost=0)),
-    Nuisance("JPEG", "pictures without loss", _camera(jpeg_quality=None)),
+    Nuisance("mirrors", "diffuse stone, and panes without reflections", _with_materials(_diffuse_mirror), "mirror"),
+    Nuisance("gloss", "diffuse surfaces", _with_materials(_without_coat), "gloss"),
+    Nuisance("shadows", "light from the whole ceiling or sky", _without_shadows, "shadow_edge"),
+    Nuisance("changing light", "steady lamps and sun", _with_steady_light),
+    Nuisance("moving things", "a static scene", _without_movers, "moving"),
+    Nuisance("low texture", "strong patterns on faint surfaces", _with_materials(_with_strong_texture)),
     Nuisance(
-        "calibration",
-        "a calibration that is true",
-        lambda case: replace(case, rig=replace(case.rig, calibration_error=CalibrationError())),
+        "burnt pixels", "an exposure that just fits white, and eight times the range", _without_saturation, "burnt"
     ),
+    Nuisance("blur", "a short exposure and a sharp lens", _without_blur),
+    Nuisance("noise", "a chip without noise", _without_noise),
+    Nuisance("unlike eyes", "two equal cameras", _with_camera(unlike=Eyes())),
+    Nuisance("dropped frames", "every frame, once", _with_timing(drop_share=0.0, repeat_share=0.0)),
+    Nuisance("late pictures", "both images taken at their time stamp", _with_timing(jitter_ms=0.0, right_delay_ms=0.0)),
+    Nuisance("late IMU", "readings stamped when they are taken", _with_timing(imu_delay_ms=0.0)),
+    Nuisance("rolling shutter", "a global shutter", _with_camera(shutter="global", readout_ms=None)),
+    Nuisance("auto-exposure", "the first exposure throughout", _with_camera(auto_exposure=None)),
+    Nuisance(
+        "vignetting and dirt", "an even, clean lens", _with_camera(vignetting=0, vignetting_cutoff_deg=None, dirt=0)
+    ),
+    Nuisance("flare", "a lens without stray light", _with_camera(flare=0, ghost=0)),
+    Nuisance("JPEG", "lossless images", _with_camera(jpeg_quality=None)),
+    Nuisance("calibration", "the true calibration", _with_true_calibration),
 )

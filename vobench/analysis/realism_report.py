@@ -1,4 +1,4 @@
-"""How real the pictures of a recording are: its statistics beside the bands of real ones, or beside another's."""
+"""How realistic the images of a recording are, compared with real ones or with another recording."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,8 +13,7 @@ from vobench.runner.recording import NOTHING_MORE, read_recording
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
 
-# Values of two recordings that differ by a smaller share count as equal.
-ALIKE = 0.25
+SIMILAR_SHARE = 0.25  # relative difference below which values of two recordings count as equal
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,15 +29,16 @@ class RealismReport:
     against: Realism | None = None
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row per statistic: its value, its band or the other recording's value, and what would move it.
+        """One row per statistic: its value, its range or the other recording's value, and what would change it.
 
-        `is` says "in", "low" or "high" of the band; the band of another recording is its value ± 25 %.
+        `is` is "in", "low" or "high" relative to the range; the range of another recording is its value ± 25 %.
         """
-        measured = [statistic for statistic in STATISTICS if statistic.name in self.found.values]
-        return [_row(statistic, self.found, self.against) for statistic in measured]
+        values = self.found.values
+        measured = [statistic for statistic in STATISTICS if statistic.name in values]
+        return [_row(statistic, values[statistic.name], self.against) for statistic in measured]
 
     def sentences(self) -> list[str]:
-        """What is off in the stereo pair, and of what, in sentences."""
+        """The errors of the stereo pair and their most likely causes, in sentences."""
         return says(self.found)
 
     def as_dict(self) -> dict[str, Any]:
@@ -59,14 +59,18 @@ class RealismReport:
 
 
 def measure_realism(
-    path: Path, *, against: Path | None = None, form: str | None = None, options: ReadOptions = NOTHING_MORE
+    path: Path,
+    *,
+    against: Path | None = None,
+    form: str | None = None,
+    options: ReadOptions = NOTHING_MORE,
 ) -> RealismReport:
-    """Measure how real the pictures of a recording are.
+    """Measure how realistic the images of a recording are.
 
     Args:
         path: a sequence, the folder of a run's case, a dataset's folder, or a bag.
-        against: another recording that takes the place of the bands of real pictures.
-        form: the form of the recording at `path`, where its content does not tell.
+        against: another recording that replaces the ranges of real images.
+        form: the form of the recording at `path`, if its content does not determine it.
         options: what the recording at `path` does not state itself: calibration, ground truth, rate, topics.
 
     Raises:
@@ -75,25 +79,29 @@ def measure_realism(
     recording = read_recording(path, form=form, options=options)
     other = None if against is None else read_recording(against)
     found = realism_of(recording)
-    beside = None if other is None else realism_of(other)
-    return RealismReport(path, found, against, beside)
+    found_in_other = None if other is None else realism_of(other)
+    return RealismReport(path, found, against, found_in_other)
 
 
 def realism_of(recording: Recording) -> Realism:
-    """Measure the statistics of a recording's pictures."""
+    """Measure the statistics of a recording's images."""
     return measure(shots_of(recording), recording.rig)
 
 
-def _row(statistic: Statistic, found: Realism, against: Realism | None) -> dict[str, Any]:
-    value = found.values[statistic.name]
-    row = {"statistic": statistic.title, "name": statistic.name, "unit": statistic.unit, "value": value}
+def _row(
+    statistic: Statistic,
+    value: float,
+    against: Realism | None,
+) -> dict[str, Any]:
+    row: dict[str, Any] = {"statistic": statistic.title, "name": statistic.name}
+    row |= {"unit": statistic.unit, "value": value}
     if against is None:
         row |= {"low": statistic.low, "high": statistic.high}
     else:
         other = against.values.get(statistic.name)
         row |= {"against": other}
         if other is not None:
-            half_width = ALIKE * abs(other)
+            half_width = SIMILAR_SHARE * abs(other)
             statistic = replace(statistic, low=other - half_width, high=other + half_width)
     return {**row, "is": statistic.verdict(value), "knob": statistic.knob(value)}
 

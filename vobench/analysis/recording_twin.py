@@ -9,21 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vobench.analysis.camera_fit import Look, fit_camera, look_of
+from vobench.analysis.path_placement import Placement, cell_disparities, levelled, place_path
+from vobench.analysis.rank_agreement import Agreement, agreement, segment_errors
 from vobench.analysis.realism import Realism, residual, shots_of
 from vobench.analysis.realism_report import RealismReport, realism_of
 from vobench.analysis.stereo_fit import StereoFit
-from vobench.analysis.twin import (
-    Agreement,
-    Look,
-    Placement,
-    agreement,
-    cell_disparities,
-    fit_camera,
-    levelled,
-    look_of,
-    place_path,
-    segment_errors,
-)
 from vobench.dataset.picture import require_free
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
@@ -62,7 +53,7 @@ PLACE_FILE = "place.yaml"
 PATH_FILE = "path.tum"
 REPORT_FILE = "twin.json"
 
-# What is run where no estimators are asked for: five that differ, and two of them with other parameters.
+# Estimators that are run by default: five different ones, and two of them with other parameters.
 ESTIMATORS: tuple[str | Mapping[str, Any], ...] = (
     "lk_epipolar",
     {"name": "lk_epipolar", "label": "lk_epipolar_plain", "params": {"estimate_offset": 0}},
@@ -84,7 +75,7 @@ QUANTILES = (0.1, 0.5, 0.9)
 class TwinSuite:
     """The suite of a recording and its twin, written to a folder.
 
-    `file` is the suite. `placement` is where the recorded path lies in the place, `realism` that of the recording.
+    `file` is the suite, `placement` where the recorded path is in the scene, and `realism` that of the recording.
     """
 
     file: Path
@@ -94,9 +85,9 @@ class TwinSuite:
 
 @dataclass(frozen=True, slots=True)
 class TwinReport:
-    """How far a recording and its twin agree: on the order of estimators, their errors, and the pictures.
+    """How far a recording and its twin agree: on the order of estimators, on their errors, and on the images.
 
-    `errors` are by estimator, then by case ("real" or "twin"): errors (8, N) of segments in percent of their length,
+    `errors` are those of segments (8, N) by estimator, then by case ("real" or "twin"), in percent of their length;
     NaN where there is no segment.
     """
 
@@ -107,8 +98,9 @@ class TwinReport:
     twin: Realism
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row per estimator, by their error on the recording: mean and quantiles of errors on both cases."""
-        ordered = sorted(self.agreement.errors, key=lambda name: self.agreement.errors[name][0])
+        """One row per estimator, by error on the recording, with mean and quantiles of errors on both cases."""
+        mean_errors = self.agreement.errors
+        ordered = sorted(mean_errors, key=lambda name: mean_errors[name][0])
         rows = []
         for name in ordered:
             sides = self.errors[name]
@@ -155,17 +147,17 @@ def write_twin_suite(
 ) -> TwinSuite:
     """Write the suite of a recording and of its repetition in a simulated place.
 
-    The recorded path is laid into the place where disparities agree best and nothing is in the way. The rig gets the
-    errors of calibration that are found in the recording, and the camera its exposure, contrast, blur and noise.
+    The recorded path is placed where disparities agree best and nothing is in its way. The rig gets the calibration
+    errors that are found in the recording, and the camera its exposure, contrast, blur and noise.
 
     Args:
         recording: a recording with ground truth, or the folder of a run's case.
         out: the new folder for the suite.
         place: the name of the scene, or the path of its file or model.
-        estimators: names of three estimators or more, in place of the usual seven.
-        form: the form of the recording, where its content does not tell.
+        estimators: names of three estimators or more, instead of the default seven.
+        form: the form of the recording, if its content does not determine it.
         options: what the recording does not state itself: calibration, ground truth, rate, topics.
-        progress: is told of the light of the place, which is computed unless it is in the cache.
+        progress: shows the computation of the scene's light, unless that is in the cache.
 
     Raises:
         InputError: the folder is in use; fewer than three estimators; or the recording has no stereo pair that can be
@@ -211,9 +203,11 @@ def compare_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> TwinReport:
     twin = realism_of(read_recording(folder.case(TWIN)))
     real_errors = _errors(folder, REAL)
     twin_errors = _errors(folder, TWIN)
-    found = agreement(real_errors, twin_errors)
-    errors = {name: {REAL: real_errors[name], TWIN: twin_errors[name]} for name in found.errors}
-    report = TwinReport(suite, folder, found, errors, twin)
+    orders = agreement(real_errors, twin_errors)
+    errors = {}
+    for name in orders.errors:
+        errors[name] = {REAL: real_errors[name], TWIN: twin_errors[name]}
+    report = TwinReport(suite, folder, orders, errors, twin)
     _write_json(suite.file.parent / REPORT_FILE, report.as_dict())
     return report
 
@@ -244,7 +238,7 @@ def make_twin(
 
 @dataclass(frozen=True, slots=True)
 class _RecordedPath:
-    """What a twin repeats: the poses T_world_left (N, 4, 4) of the left camera at t_ns (N,), the rig and its fit."""
+    """What a twin repeats: poses T_world_left (N, 4, 4) of the left camera at times t_ns (N,), the rig and its fit."""
 
     t_ns: Stamps
     T_world_left: Array
@@ -252,25 +246,25 @@ class _RecordedPath:
     fit: StereoFit
 
     def in_place(self, placement: Placement) -> Trajectory:
-        """The path of the body in the place, from time 0 on."""
+        """The path of the body in the scene, from time 0."""
         T_body_left = self.rig.build().T_body_left
         T_place_body = placement.T_place_world @ self.T_world_left @ inverse(T_body_left)
         return Trajectory(self.t_ns - self.t_ns[0], T_place_body)
 
     def rig_settings(self) -> dict[str, Any]:
-        """The rig as a suite states it, with the errors of calibration that were found."""
+        """The rig for a suite, with the calibration errors that were found."""
         settings: Any = plain(self.rig)
         stated = {key: settings[key] for key in ("own", "pitch_deg", "forward_m", "height_m")}
         return {**stated, "calibration_error": residual(self.fit)}
 
     def trajectory_settings(self) -> dict[str, Any]:
-        """The replay of this path as a suite states it."""
+        """The replay of this path for a suite."""
         rate_hz = round(NS_PER_S / float(np.median(np.diff(self.t_ns))), 3)
         return {"kind": "replay", "file": PATH_FILE, "rate_hz": rate_hz, "knot_hz": rate_hz * KNOTS_PER_PICTURE}
 
 
 def _recorded_path(recording: Recording, realism: Realism) -> _RecordedPath:
-    """The path of a recording's pictures that have a true pose. Raises InputError where it cannot be repeated."""
+    """The path of a recording's images that have a true pose. Raises InputError if it cannot be repeated."""
     if realism.pair is None:
         raise InputError("a twin repeats a pair of eyes, and this recording has none that can be rectified and matched")
     truth = recording.truth
@@ -297,8 +291,12 @@ def _recorded_path(recording: Recording, realism: Realism) -> _RecordedPath:
     return _RecordedPath(t_ns, T_world_left, rig, realism.pair)
 
 
-def _source(recording: Path, form: str | None, options: ReadOptions) -> dict[str, Any]:
-    """The recording as the `source` of a suite; what is not given is left out."""
+def _source(
+    recording: Path,
+    form: str | None,
+    options: ReadOptions,
+) -> dict[str, Any]:
+    """The recording as the `source` of a suite, without the options that are not given."""
     topics = {name: getattr(options.topics, name) for name in type(options.topics).__dataclass_fields__}
     source = {
         "path": str(sequence_path(recording).resolve()),
@@ -321,11 +319,17 @@ def _write_json(path: Path, content: Any) -> None:
 # --- The camera ---
 
 
-def _fit_camera(file: Path, recording: Recording, *, gain: float, progress: Progress) -> dict[str, Any]:
-    """The camera, as a suite states it, whose pictures of the twin look most like those of the recording.
+def _fit_camera(
+    file: Path,
+    recording: Recording,
+    *,
+    gain: float,
+    progress: Progress,
+) -> dict[str, Any]:
+    """The camera for a suite whose images of the twin look most like those of the recording.
 
-    `file` is the suite of the twin, still without a camera. `gain` is the ratio of the grey values of the right picture
-    to those of the left one.
+    `file` is the suite of the twin, still without a camera. `gain` is the ratio of grey values of the right image to
+    those of the left one.
     """
     from vobench.runner.simulate import open_renderer
     from vobench.runner.stereo_camera import World, exposed_by
@@ -342,19 +346,19 @@ def _fit_camera(file: Path, recording: Recording, *, gain: float, progress: Prog
 
 
 def _look(recording: Recording) -> Look:
-    """How the pictures of a recording look, by some that are spread over it."""
+    """The look of a recording's images, from some that are spread over it."""
     pictures = [shot.left for run in shots_of(recording) for shot in run]
     return look_of(_evenly(pictures))
 
 
 def _evenly(items: list[Any]) -> list[Any]:
-    """As many items as the camera is fitted to, evenly spread over all."""
+    """FITTED_PICTURES items, evenly spread over all."""
     indices = np.linspace(0, len(items) - 1, FITTED_PICTURES).astype(int)
     return [items[index] for index in indices]
 
 
 def _camera_settings(settings: CameraSettings, *, gain: float) -> dict[str, Any]:
-    """A fitted camera as a suite states it, with a gain of the right eye in the linear signal."""
+    """A fitted camera for a suite, with the gain of the right camera in the linear signal."""
     chip = settings.chip
     linear_gain = gain ** float(str(chip.response))
     return {
@@ -391,14 +395,14 @@ def _trial_errors(folder: RunFolder, gt: Trajectory, score: TrialScore) -> Array
 
 
 def _spread(errors: Array) -> dict[str, float]:
-    """Mean and quantiles of the errors that are known."""
+    """Mean and quantiles of known errors."""
     known = errors[np.isfinite(errors)]
     p10, p50, p90 = np.quantile(known, QUANTILES).tolist()
     return {"mean": float(known.mean()), "p10": p10, "p50": p50, "p90": p90}
 
 
 def _compared(real: Realism, twin: Realism) -> dict[str, tuple[float, float]]:
-    """What has no band, in the recording and in its twin, by a name with its unit."""
+    """Figures without a range, of the recording and of its twin, by a title with the unit."""
     compared = {}
     for key, title in (
         ("noise_dn", "noise where flat, DN"),
@@ -413,7 +417,7 @@ def _compared(real: Realism, twin: Realism) -> dict[str, tuple[float, float]]:
 
 
 def _compared_pairs(real: StereoFit, twin: StereoFit) -> dict[str, tuple[float, float]]:
-    """The right eye's turns where both are known, and the quantiles of disparity."""
+    """The right camera's rotation where both are known, and the quantiles of disparity."""
     compared = {}
     for name, unit in (("yaw_deg", "°"), ("roll_deg", "°"), ("pitch_deg", "°"), ("offset_px", " px")):
         of_real = getattr(real, name)

@@ -1,4 +1,4 @@
-"""What the errors of a run depend on: a regression on the conditions of all its frames, for each estimator."""
+"""What the errors of a run depend on: for each estimator, a regression on the conditions of all its frames."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -25,8 +25,8 @@ WORST_SEGMENTS = 8  # how many segments are listed unless more are asked for
 class EstimatorCauses:
     """One estimator of a run: its trials frame by frame, and what its errors depend on.
 
-    `statuses` are those of the trials in `courses`. `attribution` is None where there are too few frames, or frames
-    that are too much alike, for a regression.
+    `statuses` are those of the trials in `courses`. `attribution` is None if there are too few frames for a
+    regression, or if no condition varies.
     """
 
     estimator: str
@@ -35,7 +35,7 @@ class EstimatorCauses:
     attribution: Attribution | None
 
     def trials(self) -> list[dict[str, Any]]:
-        """One row per trial: its case, repeat and status, and the first frame at which its error leaps."""
+        """One row per trial: its case, repeat and status, and the frame at which it diverges."""
         rows = []
         for status, course in zip(self.statuses, self.courses, strict=True):
             row = {"case": course.case, "repeat": course.repeat, "status": status}
@@ -45,20 +45,20 @@ class EstimatorCauses:
     def as_dict(self, *, worst: int = WORST_SEGMENTS) -> dict[str, Any]:
         """Plain JSON values, with the `worst` segments of the largest error."""
         facts: dict[str, Any] = {"estimator": self.estimator, "trials": self.trials()}
-        found = self.attribution
-        if found is None:
+        attribution = self.attribution
+        if attribution is None:
             return facts
 
         factors_of_cases = {}
-        for case, factors in found.cases.items():
+        for case, factors in attribution.cases.items():
             factors_of_cases[case] = [[cause.conditions, factor] for cause, factor in factors]
         return {
             **facts,
-            "explained": found.explained,
-            "causes": [asdict(cause) for cause in found.causes],
-            "constant": found.constant,
+            "explained": attribution.explained,
+            "causes": [asdict(cause) for cause in attribution.causes],
+            "constant": attribution.constant,
             "cases": factors_of_cases,
-            "worst": [asdict(segment) for segment in found.segments[:worst]],
+            "worst": [asdict(segment) for segment in attribution.segments[:worst]],
         }
 
 
@@ -77,7 +77,7 @@ class RunCauses:
     def to_frame(self) -> "DataFrame":
         """A pandas table with one row per estimator and cause, the strongest cause first.
 
-        `factor` is what the error is multiplied by between little and much of the condition, with its 95 % interval.
+        `factor` multiplies the error from low to high values of the condition; `low` and `high` are its 95 % interval.
         """
         rows = []
         for each in self.estimators:
@@ -87,8 +87,13 @@ class RunCauses:
         return data_frame(rows)
 
 
-def find_causes(run: Path, *, estimator: str | None = None, progress: Progress = SILENT) -> RunCauses:
-    """Find what the errors of each estimator of a run, or of one of them, depend on.
+def find_causes(
+    run: Path,
+    *,
+    estimator: str | None = None,
+    progress: Progress = SILENT,
+) -> RunCauses:
+    """Find what the errors of each estimator of a run depend on, or those of one estimator.
 
     Raises:
         InputError: the folder is not of a run, a case is a recording, or its sequence is no longer in the cache.
@@ -102,21 +107,24 @@ def find_causes(run: Path, *, estimator: str | None = None, progress: Progress =
         estimators = [estimator]
 
     cases = sorted({score.case for score in scores})
-    of_cases = {}
+    conditions_of_cases = {}
     for case in progress.track(cases, "look at", total=len(cases)):
-        of_cases[case] = read_conditions(folder, read_simulated_case(folder, case))
+        conditions_of_cases[case] = read_conditions(folder, read_simulated_case(folder, case))
 
-    found = []
+    causes = []
     for name in estimators:
         trials = [score for score in scores if score.estimator == name and score.frames]
-        found.append(_causes_of(folder, name, trials, of_cases))
-    return RunCauses(folder.path, tuple(found))
+        causes.append(_causes_of(folder, name, trials, conditions_of_cases))
+    return RunCauses(folder.path, tuple(causes))
 
 
 def _causes_of(
-    folder: RunFolder, estimator: str, trials: Sequence[TrialScore], of_cases: Mapping[str, Mapping[str, Array]]
+    folder: RunFolder,
+    estimator: str,
+    trials: Sequence[TrialScore],
+    conditions_of_cases: Mapping[str, Mapping[str, Array]],
 ) -> EstimatorCauses:
-    """The causes of one estimator. `of_cases` are the conditions of frames by case."""
-    courses = tuple(read_course(folder, score, of_cases[score.case]) for score in trials)
+    """The causes of one estimator. `conditions_of_cases` are those of frames, by case."""
+    courses = tuple(read_course(folder, score, conditions_of_cases[score.case]) for score in trials)
     statuses = tuple(score.status for score in trials)
     return EstimatorCauses(estimator, statuses, courses, attribute(courses))

@@ -1,4 +1,4 @@
-"""What a scene or a model holds, as sentences, as a table, and as a picture of a plan and four views."""
+"""What a scene or a model contains, as lines of text, as a table, and as a picture with a plan and four views."""
 
 from collections.abc import Sequence
 from contextlib import closing
@@ -6,7 +6,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from vobench.analysis.scene import SceneSurvey, sheet, strength, survey
+from vobench.analysis.scene import SceneSurvey, strength, survey
+from vobench.analysis.scene_sheet import sheet
 from vobench.asset import MODEL_SUFFIXES
 from vobench.runner.key import cache_folder
 from vobench.runner.simulate import open_renderer
@@ -23,7 +24,7 @@ from vobench.suite.suite import Rendering
 
 @dataclass(frozen=True, slots=True)
 class SceneReport:
-    """A scene looked over: its file, the scene built from it, what was found, and what is doubtful in its models."""
+    """A survey of a scene: its file, the scene built from it, what was found, and notes about its models."""
 
     spec: SceneFile
     scene: Scene
@@ -31,10 +32,10 @@ class SceneReport:
     notes: tuple[str, ...]
 
     def lines(self) -> list[str]:
-        """What is in the scene, a line each, without the notes."""
+        """The contents of the scene, one line each, without the notes."""
         found = self.found
-        sides_m = [high - low for low, high in zip(found.low_m, found.high_m, strict=True)]
-        size = " x ".join(f"{side_m:.2f}" for side_m in sides_m)
+        corners_m = zip(found.low_m, found.high_m, strict=True)
+        size = " x ".join(f"{high_m - low_m:.2f}" for low_m, high_m in corners_m)
         lines = [
             f"{self.spec.name}: {found.things} things, {found.faces:,} faces, {found.materials} materials",
             f"size: {size} m",
@@ -65,9 +66,9 @@ class SceneReport:
 
 
 def survey_scene(scene: str) -> SceneReport:
-    """Look a scene over, by its name or by the path of its file or model; no light is computed.
+    """Survey a scene, given its name or the path of its file or model; no light is computed.
 
-    Raises UnknownNameError where there is no such scene, and SuiteError or ModelError where its files are wrong.
+    Raises UnknownNameError if there is no such scene, and SuiteError or ModelError if its files are invalid.
     """
     spec = read_scene(catalog.find("scene", scene).path)
     built = build(spec, {})
@@ -75,7 +76,7 @@ def survey_scene(scene: str) -> SceneReport:
 
 
 def _notes(models: Sequence[ModelSpec]) -> list[str]:
-    """What reading the models changed or doubted."""
+    """What was changed or doubtful when the models were read."""
     from vobench.asset.model import read_model
 
     notes = []

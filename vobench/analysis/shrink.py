@@ -8,29 +8,30 @@ from itertools import takewhile
 from vobench.analysis.nuisance import Nuisance, without
 from vobench.suite.suite import Case, Window
 
-FIRST_SHARE = 0.1  # of all frames: what is tried first
-STRIDES = 4  # to a window: how closely places are looked at
-FEWEST_FRAMES = 4
+FIRST_SHARE = 0.1  # of all frames, in the first windows
+WINDOW_OVERLAP = 4  # windows begin a quarter of their length apart
+MIN_FRAMES = 4
+MIN_STEP_SHARE = 1 / 8  # of a window, by which it is still cut
 
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """How a trial failed: its status, and its reason with every number left out."""
+    """How a trial failed: its status, and its reason without the numbers."""
 
     status: str
     reason: str
 
     @classmethod
     def of(cls, status: str, reason: str) -> "Failure":
-        """What two failures of one kind have in common."""
+        """Return what two failures of one kind have in common."""
         return cls(status, re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", reason))
 
 
 @dataclass(frozen=True, slots=True)
 class Shrunk:
-    """The smallest case that was found to fail in the same way, and what was tried: which case, and whether it did.
+    """The smallest case found that fails in the same way, and the candidates that were tried with their results.
 
-    `window` are its frames of the `whole` way's.
+    `window` are its frames, `whole` those of the whole case.
     """
 
     case: Case
@@ -40,7 +41,7 @@ class Shrunk:
     tried: tuple[tuple[str, bool], ...]
 
 
-class _Spent(Exception):  # noqa: N818 - no error: the trials are used up
+class _TrialsUsedUp(Exception):  # noqa: N818 - no error: the search ends
     pass
 
 
@@ -53,63 +54,77 @@ def shrink(
     *,
     trials: int,
 ) -> Shrunk:
-    """Cut a case of the frames `whole`, then remove nuisances, in so many trials at most.
+    """Cut a case down to a part of its frames, then remove nuisances, in a limited number of trials.
 
-    First a window where the whole trial's own estimate fails alike, which is what `likely` says, doubled until it
-    does so by itself; then its end and its start are moved inwards by halves; then all nuisances at once, or one after
-    the other. `fails` runs a case and says whether it fails the same way.
+    First, find a window in which the estimate of the whole trial fails in the same way, according to `likely`; double
+    it until it also fails by itself. Then move its end and its start inwards, by half the length and less. Then remove
+    all nuisances at once, or one after the other. `fails` runs a case and returns whether it fails in the same way.
     """
     search = _Search(case, whole, fails, trials)
     try:
-        search.find(likely)
-        search.cut()
+        search.find_window(likely)
+        search.cut_window()
         search.remove(nuisances)
-    except _Spent:
+    except _TrialsUsedUp:
         pass
     return Shrunk(search.case, search.window, whole, tuple(search.removed), tuple(search.tried))
 
 
 class _Search:
-    """The smallest case so far, and what was tried."""
+    """The smallest failing case so far, and what was tried."""
 
-    def __init__(self, case: Case, whole: Window, fails: Callable[[Case], bool], trials: int) -> None:
+    def __init__(
+        self,
+        case: Case,
+        whole: Window,
+        fails: Callable[[Case], bool],
+        trials: int,
+    ) -> None:
         self._original = case
         self._whole = whole
         self._fails = fails
-        self._left = trials
+        self._trials_left = trials
         self.window = whole
-        self.removed = list[str]()
-        self.tried = list[tuple[str, bool]]()
+        self.removed: list[str] = []
+        self.tried: list[tuple[str, bool]] = []
 
     @property
     def case(self) -> Case:
-        """The smallest that is known to fail."""
-        return self._made(self.window, self.removed)
+        """The smallest case that is known to fail."""
+        return self._variant(self.window, self.removed)
 
-    def find(self, likely: Callable[[Window], bool]) -> None:
-        """A window that is likely to fail, twice as long each time, the whole where no shorter one does."""
+    def find_window(self, likely: Callable[[Window], bool]) -> None:
+        """Find a window that fails, twice as long each time; the whole case if no shorter one does."""
         first, end = self._whole
-        length = max(FEWEST_FRAMES, round(FIRST_SHARE * (end - first)))
+        length = max(MIN_FRAMES, round(FIRST_SHARE * (end - first)))
         while length < end - first:
-            begins = [*range(first, end - length, max(1, length // STRIDES)), end - length]
-            middle = _middle_of_first_run([likely((begin, begin + length)) for begin in begins])
-            if middle is not None and self._try((begins[middle], begins[middle] + length)):
+            step = max(1, length // WINDOW_OVERLAP)
+            starts = [*range(first, end - length, step), end - length]
+            is_likely = [likely((start, start + length)) for start in starts]
+            middle = middle_of_first_run(is_likely)
+            if middle is not None and self._try((starts[middle], starts[middle] + length)):
                 return
             length *= 2
 
-    def cut(self) -> None:
-        """Take away from the end, then from the start, half of what is left each time, while it goes on failing."""
-        for is_end in (True, False):
-            step = (self.window[1] - self.window[0]) // 2
-            while step >= 1 and self.window[1] - self.window[0] - step >= FEWEST_FRAMES:
-                first, end = self.window
-                if not self._try((first, end - step) if is_end else (first + step, end)):
-                    step //= 2
-                    if step < (end - first) / 8:
-                        break
+    def cut_window(self) -> None:
+        """Cut frames off the end, then off the start, as long as the case goes on failing."""
+        self._cut(at_end=True)
+        self._cut(at_end=False)
+
+    def _cut(self, *, at_end: bool) -> None:
+        """Cut by half the window, and after each success again by as much; after a failure, by half of that."""
+        step = _length(self.window) // 2
+        while step >= 1 and _length(self.window) - step >= MIN_FRAMES:
+            first, end = self.window
+            shorter = (first, end - step) if at_end else (first + step, end)
+            if self._try(shorter):
+                continue
+            step //= 2
+            if step < (end - first) * MIN_STEP_SHARE:
+                return
 
     def remove(self, nuisances: Sequence[Nuisance]) -> None:
-        """Remove all, else each by itself."""
+        """Remove all nuisances at once or, if the case does not fail then, one after the other."""
         names = [nuisance.name for nuisance in nuisances]
         if not names or self._try(self.window, names) or len(names) == 1:
             return
@@ -117,24 +132,33 @@ class _Search:
             self._try(self.window, [*self.removed, name])
 
     def _try(self, window: Window, removed: Sequence[str] = ()) -> bool:
-        if self._left == 0:
-            raise _Spent
-        self._left -= 1
-        failed = self._fails(self._made(window, removed))
-        said = f"frames {window[0]} to {window[1] - 1}" + (f" without {', '.join(removed)}" if removed else "")
-        self.tried.append((said, failed))
-        if failed:
+        """Run a variant of the case, and keep it if it fails in the same way."""
+        if self._trials_left == 0:
+            raise _TrialsUsedUp
+        self._trials_left -= 1
+        is_failure = self._fails(self._variant(window, removed))
+        description = f"frames {window[0]} to {window[1] - 1}"
+        if removed:
+            description += f" without {', '.join(removed)}"
+        self.tried.append((description, is_failure))
+        if is_failure:
             self.window = window
             self.removed = [*removed]
-        return failed
+        return is_failure
 
-    def _made(self, window: Window, removed: Sequence[str]) -> Case:
+    def _variant(self, window: Window, removed: Sequence[str]) -> Case:
         return replace(without(self._original, removed), frames=window)
 
 
-def _middle_of_first_run(holds: Sequence[bool]) -> int | None:
-    """The place in the middle of the first that hold in a row; None where none does."""
-    if True not in holds:
+def _length(window: Window) -> int:
+    first, end = window
+    return end - first
+
+
+def middle_of_first_run(is_set: Sequence[bool]) -> int | None:
+    """The index in the middle of the first run of true values; None if there is none."""
+    if True not in is_set:
         return None
-    first = holds.index(True)
-    return first + sum(1 for _ in takewhile(bool, holds[first:])) // 2
+    first = is_set.index(True)
+    run_length = sum(1 for _ in takewhile(bool, is_set[first:]))
+    return first + run_length // 2

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vobench.analysis.nuisance import nuisances_of
-from vobench.analysis.shrink import FEWEST_FRAMES, Failure, Shrunk, shrink
+from vobench.analysis.shrink import MIN_FRAMES, Failure, Shrunk, shrink
 from vobench.analysis.trial_data import TrialPaths, read_paths
 from vobench.errors import InputError
 from vobench.runner.data_frame import data_frame
@@ -25,15 +25,15 @@ from vobench.trajectory.trajectory import Trajectory
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
 
-# Statuses of a row of the table of frames that has no pose.
+# Statuses in the table of frames of those without a pose.
 WITHOUT_POSE = ("", "lost")
 
 
 @dataclass(frozen=True, slots=True)
 class ShrunkTrial:
-    """A failed trial and the smallest case found on which its estimator fails in the same way.
+    """A failed trial, and the smallest case found on which its estimator fails in the same way.
 
-    `suite` is the file of the suite of that case.
+    `suite` is the suite file of that case.
     """
 
     score: TrialScore
@@ -42,7 +42,7 @@ class ShrunkTrial:
 
     @property
     def frame_count(self) -> int:
-        """How many frames the whole case has."""
+        """The number of frames of the whole case."""
         first, end = self.found.whole
         return end - first
 
@@ -82,8 +82,8 @@ def shrink_trial(
         run_plan: runs the candidates.
         trials: how many candidates are run at most.
         folder: the folder for the suite of the smaller case; by default shrunk/CASE_ESTIMATOR.
-        estimator: the folder of the estimator, where it is not found by its name.
-        progress: is told when the estimator has changed since the run.
+        estimator: the folder of the estimator, if it cannot be found by its name.
+        progress: shows a note if the estimator has changed since the run.
 
     Raises:
         InputError: there is no such trial, it is of a recording, or it does not fail.
@@ -94,15 +94,15 @@ def shrink_trial(
     if not _fails(score):
         raise InputError(f"{score.estimator} on {score.case} is {score.status}: nothing fails")
 
-    found = _search(finished, run_plan, trials)
+    shrunk = _search(finished, run_plan, trials)
     suite = write_case(
-        found.case,
+        shrunk.case,
         [finished.entrant],
         folder or Path("shrunk") / f"{score.case}_{score.estimator}",
         name=f"{score.case}_shrunk".replace("-", "_"),
         summary=_summary(score),
     )
-    return ShrunkTrial(score, found, suite)
+    return ShrunkTrial(score, shrunk, suite)
 
 
 def _summary(score: TrialScore) -> str:
@@ -110,7 +110,7 @@ def _summary(score: TrialScore) -> str:
 
 
 def _fails(score: TrialScore) -> bool:
-    """Whether there is a failure to reproduce: a partial trial fails where it has a reason."""
+    """Whether there is a failure to reproduce: a partial trial is one if it has a reason."""
     if score.status == "partial":
         return bool(score.reason)
     return score.status != "ok"
@@ -133,18 +133,22 @@ def _search(trial: FinishedTrial, run_plan: PlanRunner, trials: int) -> Shrunk:
     return shrink(trial.case, whole, is_likely, nuisances_of(trial.case), fails_alike, trials=trials)
 
 
-def _likely_windows(trial: FinishedTrial, stamps_ns: dict[int, int], wanted: Failure) -> Callable[[Window], bool]:
-    """Return a test of whether the estimator is likely to fail alike on a window of frames; nothing is run for it.
+def _likely_windows(
+    trial: FinishedTrial,
+    stamps_ns: dict[int, int],
+    wanted: Failure,
+) -> Callable[[Window], bool]:
+    """Return a test of whether the estimator is likely to fail in the same way on a window of frames.
 
-    The poses that the trial has in the window are scored by themselves. If those of the whole trial do not show the
-    failure (after a crash, say), the window must contain the first frame without a pose instead. `stamps_ns` has the
-    stamp of every frame of the trajectory, also of frames that were dropped.
+    Nothing is run for it: the poses that the trial has in the window are scored by themselves. If those of the whole
+    trial do not show the failure (for example after a crash), the window must contain the first frame without a pose
+    instead. `stamps_ns` are the stamps of all frames of the trajectory, including dropped ones.
     """
     paths = read_paths(trial.folder, trial.score)
 
     def fails_alike_in(window: Window) -> bool:
         part = _part(paths, first_ns=stamps_ns[window[0]], last_ns=stamps_ns[window[1] - 1])
-        if len(part.gt) < FEWEST_FRAMES:
+        if len(part.gt) < MIN_FRAMES:
             return False
         scored = score_estimate(part.est, part.gt, trial.score.claims)
         status, reason = status_of(Outcome(kind=FINISHED, reason=""), scored, part.gt)
@@ -159,7 +163,7 @@ def _likely_windows(trial: FinishedTrial, stamps_ns: dict[int, int], wanted: Fai
 
 
 def _first_without_pose_ns(trial: FinishedTrial, paths: TrialPaths) -> int:
-    """The stamp of the first frame without a pose, that of the first frame where all have one."""
+    """The stamp of the first frame without a pose; of the first frame if all have one."""
     for row in read_frames(trial.path):
         if row.status in WITHOUT_POSE:
             return row.t_ns

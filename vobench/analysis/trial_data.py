@@ -1,4 +1,4 @@
-"""What the analyses read of a finished trial: its two paths, its errors, and the conditions of its frames."""
+"""Reads the two paths of a finished trial, its errors, and the conditions of its frames."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class TrialPaths:
 
 
 def read_paths(folder: RunFolder, score: TrialScore) -> TrialPaths:
-    """Read the paths of a trial; the estimate is empty where there was no pose at all."""
+    """Read the paths of a trial; the estimate is empty if it has no pose."""
     gt = read_tum(folder.case(score.case) / GROUND_TRUTH)
     est = read_tum(folder.estimate(score.case, score.estimator, score.repeat) / ESTIMATE)
     scale = float(score.score["alignment"]["scale"]) if score.score else 1.0
@@ -42,13 +42,13 @@ def read_outcome(folder: RunFolder, score: TrialScore) -> Outcome:
     return Outcome(score.status, survived, segment_loss(paths.gt, paths.est, scale=paths.scale))
 
 
-def read_course(folder: RunFolder, score: TrialScore, of_frames: Mapping[str, Array]) -> Course:
-    """Read the error of a trial frame by frame. `of_frames` are the conditions of its case, by `read_conditions`."""
+def read_course(folder: RunFolder, score: TrialScore, frame_conditions: Mapping[str, Array]) -> Course:
+    """Read the error of a trial frame by frame; `frame_conditions` are those of its case, by `read_conditions`."""
     paths = read_paths(folder, score)
     every_frame = np.arange(len(paths.gt))
     loss = loss_between(paths.gt, paths.est, every_frame, scale=paths.scale)
-    loss = np.append(0.0, loss)  # nothing is before the first frame
-    return Course(score.case, score.repeat, of_frames, loss)
+    loss = np.append(0.0, loss)  # the first frame has no predecessor
+    return Course(score.case, score.repeat, frame_conditions, loss)
 
 
 def read_conditions(folder: RunFolder, case: Case) -> dict[str, Array]:
@@ -58,7 +58,7 @@ def read_conditions(folder: RunFolder, case: Case) -> dict[str, Array]:
     """
     link = folder.case(case.name) / SEQUENCE
     if not link.exists():
-        raise InputError(f"the sequence is gone from the cache; run the suite again to make it anew: {link}")
+        raise InputError(f"the sequence is gone from the cache; run the suite again to recreate it: {link}")
 
     # The exposures of frames belong to the sequence and so are the same in the table of every trial.
     any_trial = next(folder.case(case.name).glob(f"{ESTIMATES}/*/*"))

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vobench.analysis.realism import BURNT_DN, CYCLES, STATISTICS, Realism, Statistic
+from vobench.analysis.image_noise import SATURATED_DN
+from vobench.analysis.image_statistics import CYCLES
+from vobench.analysis.realism import STATISTICS, Realism, Statistic
 from vobench.analysis.stereo_fit import StereoFit, row_error
 from vobench.geometry.se3 import Array
 from vobench.report.drive_plot import DPI, SETTINGS, check_ending, undated
@@ -124,7 +126,7 @@ def _curves(panels: "Mapping[str, Axes]", recordings: Mapping[str, Realism]) -> 
     panels["spectrum"].set(title="power spectrum, slope between the dotted lines", xlabel="cycles in 256 px")
     panels["gradient"].set(title="gradients", xlabel="DN per pixel", ylabel="share of pixels")
     panels["tracks"].set(title="tracks alive", xlabel="pictures later", ylabel="%", ylim=(0, 103))
-    panels["grey"].axvline(BURNT_DN, color="black", lw=0.6, ls=":")
+    panels["grey"].axvline(SATURATED_DN, color="black", lw=0.6, ls=":")
     panels["grey"].set(title="grey values", xlabel="DN", ylabel="% of pixels")
 
 
@@ -134,5 +136,5 @@ def _spectrum(axes: "Axes", log_power: Array, colour: str) -> None:
 
 
 def _grey_values(axes: "Axes", counts: Array, colour: str) -> None:
-    shares_percent = 100 * counts[:BURNT_DN] / counts.sum()
-    axes.fill_between(np.arange(BURNT_DN), shares_percent, color=colour, alpha=0.4, lw=0, step="mid")
+    shares_percent = 100 * counts[:SATURATED_DN] / counts.sum()
+    axes.fill_between(np.arange(SATURATED_DN), shares_percent, color=colour, alpha=0.4, lw=0, step="mid")

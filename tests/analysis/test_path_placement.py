@@ -1,0 +1,341 @@
+"""A path is placed where it is free and where the disparities along it agree."""
+
+import numpy as np
+import pytest
+
+from vobench.analysis import path_placement
+from vobench.analysis.path_placement import (
+    _Place,
+    _Start,
+    cell_disparities,
+    levelled,
+    place_path,
+    stretch_disparities,
+)
+from vobench.analysis.stereo_fit import StereoFit, Uncertain
+from vobench.analysis.stereo_matches import Matches
+from vobench.errors import InputError
+from vobench.estimator.tools import stereo_pair
+from vobench.geometry import se3
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import looking, stereo_rig
+from vobench.rendering.geometry import RayCaster
+from vobench.scene.material import Material
+from vobench.scene.mesh import Thing, flat
+from vobench.scene.scene import Scene, triangles
+
+LENS = Pinhole(160, 120, 150.0, 150.0, 79.5, 59.5)
+PAIR = stereo_pair(stereo_rig(LENS, pitch_deg=0, baseline_m=0.2), "test")
+
+
+@pytest.fixture(autouse=True)
+def few_draws(monkeypatch):
+    monkeypatch.setattr(path_placement, "DRAWS", 600)
+    monkeypatch.setattr(path_placement, "NEAR_DRAWS", 200)
+
+
+def hall(*, pillar: bool = False) -> Scene:
+    """A room of 8 x 6 x 3 m seen from within, and perhaps a pillar that leaves no way through its middle."""
+    boxes = [((-4, -3, 0), (4, 3, 3), True), *([((-2.9, -1.9, 0), (2.9, 1.9, 2.9), False)] if pillar else [])]
+    things = []
+    for number, (low, high, inward) in enumerate(boxes):
+        corners = np.array(
+            [[(low, high)[i >> 2 & 1][0], (low, high)[i >> 1 & 1][1], (low, high)[i & 1][2]] for i in range(8)], float
+        )
+        faces = np.array(
+            [
+                [0, 1, 3],
+                [0, 3, 2],
+                [4, 6, 7],
+                [4, 7, 5],
+                [0, 4, 5],
+                [0, 5, 1],
+                [2, 3, 7],
+                [2, 7, 6],
+                [0, 2, 6],
+                [0, 6, 4],
+                [1, 5, 7],
+                [1, 7, 3],
+            ]
+        )
+        corners_m = corners[faces]
+        vertices = corners_m.reshape(-1, 3)
+        mesh = flat(vertices, np.arange(len(vertices)).reshape(-1, 3), np.zeros((len(vertices), 2)))
+        outward = np.einsum("ij,ij->i", mesh.normals[::3], corners_m.mean(1) - corners.mean(0)) > 0
+        turned = mesh.flipped() if outward.all() == inward else mesh
+        things.append(Thing(f"box_{number}", turned, "paint"))
+    return Scene("hall", tuple(things), {"paint": Material()}, ())
+
+
+def straight(length_m: float, count: int = 20) -> np.ndarray:
+    way = np.zeros((count, 3))
+    way[:, 0] = np.linspace(0, length_m, count)
+    return se3.transform(np.eye(3), way) @ looking(pitch_deg=0, position_m=(0, 0, 0))
+
+
+def test_a_path_lies_free_and_its_disparities_agree():
+    wanted = np.full((1, 3, 3), 150 * 0.2 / 2.5)
+    found = place_path(hall(), straight(1.5), PAIR, wanted)
+    places = (found.T_place_world @ straight(1.5))[:, :3, 3] / found.scale
+    assert (np.abs(places) < [3.9, 2.9, 3.0]).all()
+    assert found.misfit < 0.5
+    assert place_path(hall(), straight(1.5), PAIR, wanted / 20).scale > 1.5  # a hall of 8 m has nothing so far away
+
+
+def test_where_a_path_was_is_found_by_its_disparities_along_the_way():
+    scene = hall()
+    there = se3.transform(se3.rotation_z(0.4), (-2.5, 0.6, 1.2)) @ straight(4.0)
+    wanted = stretch_disparities(RayCaster(triangles(scene, t_ns=0)), there, PAIR, 1.0, 4)
+    found = place_path(scene, straight(4.0), PAIR, wanted)
+    ends = (found.T_place_world @ straight(4.0))[[0, -1], :2, 3] / found.scale
+    assert found.misfit < 0.05
+    # The hall is its own image when it is turned by half.
+    assert min(np.abs(sign * ends - there[[0, -1], :2, 3]).max() for sign in (1, -1)) < 0.25
+
+
+def test_a_place_without_a_free_way_is_refused():
+    with pytest.raises(InputError, match=r"no free path of 60.0 m was found in 'hall'; take fewer pictures"):
+        place_path(hall(pillar=True), straight(60.0), PAIR, np.full((1, 3, 3), 10.0))
+
+
+def test_a_tilted_world_is_levelled():
+    turn = np.linspace(0, 5, 60)
+    circle = np.stack([np.cos(turn), np.sin(turn), np.zeros(60)], -1) * 3
+    level = se3.transform(np.eye(3), circle)
+    tilt = se3.transform(se3.rotation_z(0.3) @ looking(pitch_deg=-8, position_m=(0, 0, 0))[:3, [2, 0, 1]], np.zeros(3))
+    assert np.ptp((tilt @ level)[:, 2, 3]) > 0.5
+    assert np.ptp(levelled(tilt @ level)[:, 2, 3]) < 0.02
+
+
+# --- Disparities by cells ---
+
+
+def fit_of(places, disparity_px, window, *, yaw_deg=None) -> StereoFit:
+    matches = Matches(
+        np.array(places, float), np.zeros(len(places)), np.array(disparity_px, float), np.array(window, np.int64)
+    )
+    nothing = Uncertain(0.0, 1.0)
+    return StereoFit(
+        focal_px=150.0,
+        baseline_m=0.2,
+        matches=matches,
+        row_mad_px=0.0,
+        row_noise_px=0.0,
+        coefficients=np.zeros(5),
+        roll_deg=nothing,
+        pitch_deg=nothing,
+        xy_px=nothing,
+        gain=1.0,
+        disparity_px=(0.0, 0.0, 0.0),
+        yaw_deg=yaw_deg,
+        yaw_from="",
+    )
+
+
+def cells(left_px, disparity_px, *, count=30, window=0, yaw_deg=None) -> np.ndarray:
+    """Disparities by cell where `count` matches have one left pixel and disparity."""
+    right_px = np.array(left_px) - [disparity_px, 0]
+    place = (right_px - [79.5, 59.5]) / 150
+    return cell_disparities(fit_of([place] * count, [disparity_px] * count, [window] * count, yaw_deg=yaw_deg), PAIR)
+
+
+@pytest.mark.parametrize("row", range(3))
+@pytest.mark.parametrize("column", range(3))
+def test_a_match_counts_in_the_cell_of_its_left_pixel(row: int, column: int) -> None:
+    found = cells(((column + 0.5) * 160 / 3, (row + 0.5) * 40), 12.0)
+    assert found.shape == (1, 3, 3)
+    assert found[0, row, column] == pytest.approx(12)
+    assert np.isfinite(found).sum() == 1
+
+
+def test_cells_of_fewer_than_30_matches_are_unknown_and_stretches_are_counted_from_the_first() -> None:
+    assert np.isnan(cells((20, 20), 12.0, count=29)).all()
+    later = cells((20, 20), 12.0, window=2)
+    assert later.shape == (3, 3, 3)
+    assert np.isnan(later[:2]).all()
+    assert later[2, 0, 0] == pytest.approx(12)
+
+
+def test_a_significant_offset_is_taken_off_and_far_points_are_at_a_third_of_a_pixel() -> None:
+    yaw_deg = float(np.rad2deg(0.5 / 150))
+    assert cells((20, 20), 12.0, yaw_deg=Uncertain(yaw_deg, yaw_deg / 10))[0, 0, 0] == pytest.approx(11.5)
+    assert cells((20, 20), 12.0, yaw_deg=Uncertain(yaw_deg, yaw_deg))[0, 0, 0] == pytest.approx(12)
+    assert cells((20, 20), 0.1)[0, 0, 0] == 0.3
+
+
+def test_a_cell_has_the_median_of_its_matches() -> None:
+    px = [10.0] * 20 + [20.0] * 40
+    places = [((20 - d) / 150 - 79.5 / 150, (20 - 59.5) / 150) for d in px]
+    assert cell_disparities(fit_of(places, px, [0] * 60), PAIR)[0, 0, 0] == 20
+
+
+# --- Levelling ---
+
+
+def test_a_level_path_stays_and_levelling_is_a_rotation_of_the_world() -> None:
+    turn = np.linspace(0, 5, 60)
+    level = se3.transform(se3.rotation_z(turn), np.stack([3 * np.cos(turn), 2 * np.sin(turn), 0 * turn], -1))
+    np.testing.assert_allclose(levelled(level), level, atol=1e-9)
+    tilt = looking(pitch_deg=-8, position_m=(0, 0, 0))
+    found = levelled(tilt @ level)
+    T = found @ se3.inverse(tilt @ level)
+    np.testing.assert_allclose(T, np.broadcast_to(T[0], T.shape), atol=1e-9)
+    np.testing.assert_allclose(T[0, :3, 3], 0, atol=1e-9)
+
+
+def test_a_straight_climb_is_levelled_along_its_way_alone() -> None:
+    along = np.linspace(0, 5, 40)
+    climb = se3.transform(np.eye(3), np.stack([along, 0 * along, 0.2 * along], -1))
+    found = levelled(climb)
+    assert np.ptp(found[:, 2, 3]) == pytest.approx(1e-3 * np.ptp(climb[:, 2, 3]), rel=0.1)  # but for the damping
+    np.testing.assert_allclose(found[:, 1, 3], 0, atol=1e-9)  # not turned aside
+    assert found[-1, 0, 3] == pytest.approx(5 * np.hypot(1, 0.2), rel=1e-3)
+
+
+# --- Disparities in a scene ---
+
+
+def test_disparities_of_a_wall_follow_from_its_distance_in_every_cell_and_with_the_scale() -> None:
+    caster = RayCaster(triangles(hall(), t_ns=0))
+    pose = se3.transform(np.eye(3), (2.0, 0.0, 1.5)) @ looking(pitch_deg=0, position_m=(0, 0, 0))
+    for scale in (1.0, 2.0):
+        found = stretch_disparities(caster, pose[None], PAIR, scale, 1)
+        assert found.shape == (1, 3, 3)
+        assert found == pytest.approx(150 * 0.2 / (2.0 * scale), rel=1e-5)  # the wall at x = 4 fills the view
+
+
+def test_each_stretch_is_seen_from_its_middle_and_cells_are_rows_then_columns() -> None:
+    caster = RayCaster(triangles(hall(), t_ns=0))
+    path = straight(3.0, count=40)
+    path[:, :3, 3] += [-3.0, 0.0, 1.0]
+    path[:, 1, 3] = 1.5  # nearer to the left wall
+    found = stretch_disparities(caster, path, PAIR, 1.0, 2)
+    middles = [path[10], path[30]]
+    for stretch, pose in enumerate(middles):
+        np.testing.assert_allclose(found[stretch], stretch_disparities(caster, pose[None], PAIR, 1.0, 1)[0])
+    assert found[0, 1, 0] > found[0, 1, 2]  # left is nearer than right
+    assert found[0, 2, 1] > found[0, 0, 1]  # the floor is nearer than the ceiling, from 1 m above it
+
+
+def test_where_nothing_is_seen_disparities_are_those_of_far_points() -> None:
+    caster = RayCaster(triangles(hall(), t_ns=0))
+    outside = se3.transform(np.eye(3), (10.0, 0.0, 1.5)) @ looking(pitch_deg=0, position_m=(0, 0, 0))
+    assert (stretch_disparities(caster, outside[None], PAIR, 1.0, 1) == 0.3).all()
+
+
+# --- The place ---
+
+
+@pytest.fixture(scope="module")
+def place() -> _Place:
+    return _Place.of(hall())
+
+
+def start(**changes) -> _Start:
+    return _Start(**{"scale": 1.0, "height_m": 1.2, "heading_rad": 0.0, "xy_m": np.array([-1.0, 0.5]), **changes})
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_a_path_starts_at_its_start_in_its_direction_and_at_its_height(place: _Place, scale: float) -> None:
+    path = se3.transform(se3.rotation_z(0.2), (7.0, 8.0, 9.0)) @ straight(1.0)
+    T = place.free_pose(path, start(scale=scale, heading_rad=0.3))
+    first, second = (T @ se3.transform(path[:, :3, :3], path[:, :3, 3] / scale))[[0, -1]]
+    np.testing.assert_allclose(first[:3, 3], [-1.0, 0.5, 1.2 / scale], atol=1e-6)
+    direction = second[:3, 3] - first[:3, 3]
+    np.testing.assert_allclose(direction, np.array([np.cos(0.5), np.sin(0.5), 0]) / scale, atol=1e-6)
+
+
+def test_a_path_that_descends_starts_so_high_that_its_lowest_point_is_at_the_height(place: _Place) -> None:
+    path = straight(1.0)
+    path[:, 2, 3] = np.linspace(0, -0.6, len(path))
+    T = place.free_pose(path, start(height_m=0.8))
+    heights_m = (T @ path)[:, 2, 3]
+    assert heights_m[0] == pytest.approx(1.4)
+    assert heights_m.min() == pytest.approx(0.8)
+
+
+@pytest.mark.parametrize(
+    ("changes", "is_free"),
+    [
+        ({}, True),
+        ({"xy_m": np.array([3.2, 0.5])}, False),  # through the wall at x = 4
+        ({"xy_m": np.array([2.65, 0.5])}, True),  # 0.35 m before it
+        ({"xy_m": np.array([2.75, 0.5])}, False),  # 0.25 m before it
+        ({"xy_m": np.array([-1.0, 2.8])}, False),  # too near to the wall beside it
+        ({"height_m": 2.6}, True),
+        ({"height_m": 2.8}, False),  # too near to the ceiling
+        ({"height_m": 3.1}, False),  # above it
+        ({"height_m": 0.2}, False),  # too near to the floor
+        ({"xy_m": np.array([5.0, 0.5])}, False),  # without a floor
+    ],
+)
+def test_a_path_is_free_at_0_3_m_from_everything(place: _Place, changes, is_free) -> None:
+    assert (place.free_pose(straight(1.0), start(**changes)) is not None) == is_free
+
+
+def test_inside_of_an_object_nothing_is_free() -> None:
+    blocked = _Place.of(hall(pillar=True))
+    assert blocked._ground_m(np.array([-3.4, 0.0])) == pytest.approx(0, abs=1e-6)
+    assert blocked._ground_m(np.array([0.0, 0.0])) is not None
+    assert blocked.free_pose(straight(0.5), start(xy_m=np.array([0.0, 0.0]))) is None
+    assert not blocked._is_free(np.array([[0.0, 0.0, 1.0], [0.1, 0.0, 1.0]]), 0.05)
+    assert blocked._is_free(np.array([[-3.4, 0.0, 1.0], [-3.4, 0.5, 1.0]]), 0.3)
+
+
+def test_the_extent_is_that_of_the_walls_and_starts_are_drawn_all_over_it(place: _Place) -> None:
+    np.testing.assert_allclose([place.low_m, place.high_m], [[-4, -3, 0], [4, 3, 3]], atol=1e-9)
+    rng = np.random.default_rng(0)
+    starts = [place.any_start(rng) for _ in range(3000)]
+    xy_m = np.array([each.xy_m for each in starts])
+    np.testing.assert_allclose([xy_m.min(0), xy_m.max(0)], [[-4, -3], [4, 3]], atol=0.05)
+    assert {each.height_m for each in starts} == {0.3, 0.5, 0.8, 1.2, 1.65, 2.2}
+    headings = [each.heading_rad for each in starts]
+    assert (min(headings), max(headings)) == (pytest.approx(0, abs=0.02), pytest.approx(2 * np.pi, abs=0.02))
+    scales = [each.scale for each in starts]
+    shares = [scales.count(scale) / 3000 for scale in path_placement.SCALES]
+    # An exponential of mean 2.5, in steps of one; the last has all of the rest.
+    expected = [np.exp(-n / 2.5) * (1 - np.exp(-1 / 2.5)) for n in range(8)]
+    assert shares[:8] == pytest.approx(expected, abs=0.03)
+    assert shares[8] == pytest.approx(np.exp(-8 / 2.5), abs=0.02)
+
+
+def test_starts_near_another_are_spread_by_the_share_of_a_metre_and_0_3_rad() -> None:
+    rng = np.random.default_rng(0)
+    for share in (1.0, 0.1):
+        near = [start().near(share, rng) for _ in range(2000)]
+        assert np.std([each.xy_m - start().xy_m for each in near], axis=0) == pytest.approx([share] * 2, rel=0.06)
+        assert np.mean([each.xy_m for each in near], axis=0) == pytest.approx([-1.0, 0.5], abs=0.1 * share)
+        assert np.std([each.heading_rad for each in near]) == pytest.approx(0.3 * share, rel=0.06)
+        assert np.std(np.log([each.height_m / 1.2 for each in near])) == pytest.approx(0.3 * share, rel=0.06)
+        assert {each.scale for each in near} == {1.0}
+
+
+def test_the_scale_costs_a_twentieth_of_its_logarithm(monkeypatch) -> None:
+    wanted = np.full((1, 3, 3), 150 * 0.2 / 2.5)
+    found = place_path(hall(), straight(1.5), PAIR, wanted)
+    assert found.tried > 50
+    # With scales that cost nothing another place may fit better, but never by more than the scale costs.
+    monkeypatch.setattr(path_placement, "SCALE_COST", 0.0)
+    free = place_path(hall(), straight(1.5), PAIR, wanted)
+    assert free.misfit <= found.misfit + 1e-9
+    monkeypatch.setattr(path_placement, "SCALE_COST", 100.0)
+    assert place_path(hall(), straight(1.5), PAIR, wanted).scale == 1
+
+
+def test_the_placement_is_in_the_scale_of_the_recording() -> None:
+    wanted = np.full((1, 3, 3), 0.9)
+    found = place_path(hall(), straight(1.5), PAIR, wanted)
+    assert found.scale > 1
+    in_place_m = (found.T_place_world @ straight(1.5))[:, :3, 3]
+    low_m, high_m = np.array([-4, -3, 0]) * found.scale, np.array([4, 3, 3]) * found.scale
+    assert ((in_place_m > low_m + 0.29) & (in_place_m < high_m - 0.29)).all()
+
+
+def test_every_face_counts_the_first_one_too(place: _Place) -> None:
+    near_first = np.array([[-3.8, -2.0, 2.4], [-3.7, -2.0, 2.4]])  # the first triangle is that part of the wall
+    hits = place.caster.hits(near_first[:1], np.array([[-1.0, 0.0, 0.0]]))
+    assert hits.face.tolist() == [0]
+    assert not place._is_free(near_first, 0.3)
+    assert place._is_free(near_first, 0.1)
+    through_first = np.array([[-3.5, -2.0, 2.4], [-4.5, -2.0, 2.4]])
+    assert not place._is_free(through_first, 0.01)

@@ -1,0 +1,138 @@
+"""A picture of a scene: its plan, lines of text, and views from the free circle."""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench.analysis.scene import EYE_HEIGHT_M, SceneSurvey
+from vobench.geometry import se3
+from vobench.geometry.camera import Pinhole
+from vobench.geometry.rig import looking
+from vobench.geometry.se3 import Array
+from vobench.rendering.geometry import RayCaster
+from vobench.rendering.renderer import Renderer, still
+from vobench.scene.material import reflectance, srgb
+from vobench.scene.mesh import Triangles
+from vobench.scene.scene import Scene, triangles
+from vobench.suite.free_way import Free, down
+
+Rgb8 = NDArray[np.uint8]
+CELL_WIDTH_PX = 480
+CELL_HEIGHT_PX = 320
+VIEWS_DEG = (45, 135, 225, 315)  # yaw
+VIEW_PITCH_DEG = 8
+VIEW_WHITE = 1.5  # times the scene's white: views are a little darker than its images
+LENS = Pinhole(CELL_WIDTH_PX, CELL_HEIGHT_PX, 240.0, 240.0, 239.5, 159.5)
+
+
+def sheet(
+    scene: Scene,
+    found: SceneSurvey,
+    renderer: Renderer,
+    white_cd_m2: float,
+    lines: Sequence[str],
+) -> Rgb8:
+    """Draw a picture (640, 1440, 3): the plan, lines of text, and views in four directions from the free circle."""
+    free = found.free or Free(0.0, 0.0, found.low_m[2], 0.0)
+    views = [_view(renderer, free, yaw_deg, white_cd_m2) for yaw_deg in VIEWS_DEG]
+    upper = np.hstack([plan(scene, found), views[0], views[1]])
+    lower = np.hstack([_text(lines), views[2], views[3]])
+    return np.vstack([upper, lower])
+
+
+def _view(renderer: Renderer, free: Free, yaw_deg: float, white_cd_m2: float) -> Rgb8:
+    """A view (H, W, 3) from the centre of the free circle."""
+    eye_m = [free.x_m, free.y_m, free.floor_m + EYE_HEIGHT_M]
+    T_world_body = se3.transform(se3.rotation_z(np.deg2rad(yaw_deg)), eye_m)
+    T_world_camera = T_world_body @ looking(pitch_deg=VIEW_PITCH_DEG, position_m=(0, 0, 0))
+    radiance = renderer.radiance(LENS, still(LENS, T_world_camera), weights=None)
+    return srgb(radiance / (VIEW_WHITE * white_cd_m2))
+
+
+# --- The plan ---
+
+PLAN_MARGIN = 0.96  # of the cell that the plan fills
+PLAN_HEIGHT_M = 2.0  # above the floor, where the plan is cut: below lamps and ceilings
+MIN_EXTENT_M = 1e-6
+TONE_OF_UNKNOWN = 0.9  # reflectance of objects without a material
+AMBIENT = 0.35  # brightness of a vertical face relative to a horizontal one
+CIRCLE_RGB = (20, 140, 60)
+CIRCLE_WIDTH_PX = 2
+
+
+class _PlanScale:
+    """Maps positions in the plane to pixels of the plan."""
+
+    def __init__(self, found: SceneSurvey) -> None:
+        low_m = np.array(found.low_m[:2])
+        high_m = np.array(found.high_m[:2])
+        extent_m = max((high_m - low_m).max(), MIN_EXTENT_M)
+        self.px_per_m = min(CELL_WIDTH_PX, CELL_HEIGHT_PX) / extent_m * PLAN_MARGIN
+        self._centre_m = (low_m + high_m) / 2
+        self._centre_px = np.array([CELL_WIDTH_PX / 2, CELL_HEIGHT_PX / 2])
+        self._axes = np.array([1, -1])  # rows of pixels go down
+
+    def positions_m(self, pixels: Array) -> Array:
+        """Positions (N, 2) of pixels (N, 2)."""
+        from_centre_m = (pixels - self._centre_px) / self.px_per_m * self._axes
+        positions_m: Array = from_centre_m + self._centre_m
+        return positions_m
+
+    def pixel(self, x_m: float, y_m: float) -> tuple[int, int]:
+        """The pixel of a position."""
+        from_centre_m = np.array([x_m, y_m]) - self._centre_m
+        exact_px = from_centre_m * self._axes * self.px_per_m + self._centre_px
+        column, row = np.rint(exact_px).astype(int).tolist()
+        return column, row
+
+
+def plan(scene: Scene, found: SceneSurvey) -> Rgb8:
+    """Draw a scene from above (H, W, 3), cut where rooms are open, with the free circle."""
+    faces = triangles(scene, t_ns=0)
+    scale = _PlanScale(found)
+    column, row = np.meshgrid(np.arange(CELL_WIDTH_PX), np.arange(CELL_HEIGHT_PX))
+    centres_px = np.stack([column, row], -1).reshape(-1, 2).astype(float) + 0.5
+    floor_m = found.free.floor_m if found.free else found.low_m[2]
+    heights_m = np.full(len(centres_px), floor_m + PLAN_HEIGHT_M)
+    origins_m = np.column_stack([scale.positions_m(centres_px), heights_m])
+
+    grey = _shaded(scene, faces, origins_m)
+    rgb = srgb(grey[:, None].repeat(3, 1).astype(np.float32))
+    picture = rgb.reshape(CELL_HEIGHT_PX, CELL_WIDTH_PX, 3).copy()
+    if found.free:
+        centre_px = scale.pixel(found.free.x_m, found.free.y_m)
+        radius_px = round(found.free.radius_m * scale.px_per_m)
+        cv2.circle(picture, centre_px, radius_px, CIRCLE_RGB, CIRCLE_WIDTH_PX, cv2.LINE_AA)
+    return picture
+
+
+def _shaded(scene: Scene, faces: Triangles, origins_m: Array) -> Array:
+    """The shade (N,) of what is below points (N, 3), white where there is nothing."""
+    hits = RayCaster(faces).hits(origins_m, down(len(origins_m)))
+    is_hit = hits.face >= 0
+    tone_of_material = {name: reflectance(material).mean() for name, material in scene.materials.items()}
+    materials = [thing.material for thing in faces.things]
+    tone_of_thing = np.array([tone_of_material.get(name, TONE_OF_UNKNOWN) for name in materials])
+    tone = tone_of_thing[faces.thing[hits.face]]
+    light = AMBIENT + (1 - AMBIENT) * np.abs(faces.plane[hits.face, 2])
+    return np.where(is_hit, tone * light, 1.0)
+
+
+# --- The text ---
+
+FONT_SCALE = 0.45
+TEXT_RGB = (30, 30, 30)
+FIRST_LINE_PX = (16, 30)
+LINE_HEIGHT_PX = 22
+
+
+def _text(lines: Sequence[str]) -> Rgb8:
+    """A cell (H, W, 3) with lines of text on white."""
+    page = np.full((CELL_HEIGHT_PX, CELL_WIDTH_PX, 3), 255, np.uint8)
+    left_px, top_px = FIRST_LINE_PX
+    for number, line in enumerate(lines):
+        position_px = (left_px, top_px + LINE_HEIGHT_PX * number)
+        cv2.putText(page, line, position_px, cv2.FONT_HERSHEY_SIMPLEX, FONT_SCALE, TEXT_RGB, 1, cv2.LINE_AA)
+    return page
