@@ -1,10 +1,10 @@
-"""Motion and the offset of disparity from points: exact without noise, honest with it."""
+"""Motion from points: exact without noise, and with noise its covariance is that of its errors."""
 
 import numpy as np
 import pytest
 
-from vobench.estimator.pose import DisparityOffset, adjoint, carried_on, pose_from_points, twist
-from vobench.estimator.tools import stereo_pair
+from vobench.estimator.pose import adjoint, carried_on, pose_from_points, twist
+from vobench.estimator.stereo import stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.rig import paper_lens, stereo_rig
 
@@ -91,51 +91,3 @@ def test_who_moves_as_before_is_where_that_leads():
     np.testing.assert_allclose(carried_on(before, before @ STEP), before @ STEP @ STEP, atol=1e-12)
     np.testing.assert_allclose(carried_on(before, before), before, atol=1e-12)
     np.testing.assert_allclose(carried_on(before, before @ STEP, share=0.0), before @ STEP, atol=1e-12)
-
-
-def learnt(true_px, frames, *, flat=False, noise_px=0.1, start_scale=1.0):
-    """What is known of an offset after so many steps; the motion that is handed in is off by start_scale."""
-    rng, offset = np.random.default_rng(6), DisparityOffset()
-    for _ in range(frames):
-        uv, disparity_px, points = cloud(rng, 300, 4.0, 30.0)
-        if flat:
-            disparity_px = np.full(300, 200.0)
-            points = PAIR.points(uv, disparity_px)
-        now = PAIR.left.project(se3.apply(STEP, points)) + rng.normal(0, noise_px, uv.shape)
-        measured_px = disparity_px + true_px + rng.normal(0, noise_px, 300)
-        told = se3.transform(STEP[:3, :3], start_scale * STEP[:3, 3])
-        offset = offset.after(PAIR.left.rays(uv), PAIR.left.rays(now), measured_px, told, PAIR)
-    return offset
-
-
-@pytest.mark.parametrize("true_px", [0.5, -0.5, 0.3])
-def test_an_offset_is_learnt_though_it_spoils_the_motion_handed_in(true_px):
-    offset = learnt(true_px, 30, start_scale=1.05)
-    assert offset.px == pytest.approx(true_px, abs=max(3 * offset.information**-0.5, 0.05))
-    assert offset.px != 0
-
-
-def test_a_perfect_pair_is_left_as_it_is():
-    offset = learnt(0.0, 60)
-    assert offset.px == 0.0
-    assert abs(offset.estimate_px) < 0.1
-
-
-@pytest.mark.parametrize(
-    ("guess_px", "sigma_px", "is_taken"), [(0.4, 0.1, True), (0.4, 0.2, False), (0.14, 0.01, False), (-0.2, 0.05, True)]
-)
-def test_a_guess_is_taken_off_once_it_is_large_and_certain(guess_px, sigma_px, is_taken):
-    offset = DisparityOffset(sigma_px**-2, guess_px * sigma_px**-2)
-    assert offset.px == pytest.approx(guess_px if is_taken else 0.0)
-
-
-def test_points_at_one_distance_tell_nothing():
-    """Their disparities differ by noise alone, which must not be taken for depth."""
-    offset = learnt(0.5, 30, flat=True)
-    assert offset.information == DisparityOffset().information
-    assert offset.px == 0.0
-
-
-def test_without_depths_nothing_is_learnt():
-    rays = PAIR.left.rays(np.random.default_rng(7).uniform(100, 400, (50, 2)))
-    assert DisparityOffset().after(rays, rays, np.full(50, np.nan), STEP, PAIR) == DisparityOffset()
