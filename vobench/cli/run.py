@@ -11,6 +11,7 @@ import typer
 from vobench.cli import terminal
 from vobench.errors import InputError
 from vobench.estimator.manifest import Manifest
+from vobench.runner.folder import total_failure
 from vobench.runner.launch import run_plan
 from vobench.runner.motion import cut
 from vobench.runner.preflight import PlanSummary, summarize
@@ -121,7 +122,10 @@ def run_command(
         terminal.console().print(f"Everything is in {folder.path}\nLook into it: {vobench} view {folder.path}")
     for line in broken:
         print(f"vobench: {line}", file=sys.stderr)
-    if board.unmade:  # the run is incomplete, whatever the thresholds say
+    failure = total_failure(scores)
+    if failure:
+        print(f"vobench: {failure}", file=sys.stderr)
+    if board.unmade or failure:  # the run is incomplete, whatever the thresholds say
         raise typer.Exit(1)
     if broken:
         raise typer.Exit(FAILED_LIMIT)
