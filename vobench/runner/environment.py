@@ -28,8 +28,7 @@ LIBRARIES = (*SCORING, "pyrender2", "mcap", "rosbags", "pandas", "rerun-sdk")
 # What of vobench's clone a result depends on.
 SOURCES = ("vobench", "scenes", "estimators", "suites")
 GIT_S = 10.0
-# The texts of an environment that are joined where several runs are merged.
-JOINED_TEXTS = ("vobench", "commit", "python", "platform", "timed", "date")
+
 
 # The levels of the x86-64 psABI, by flags as Linux names them, the highest first.
 V2 = {"cx16", "lahf_lm", "popcnt", "pni", "sse4_1", "sse4_2", "ssse3"}
@@ -301,13 +300,22 @@ def read_environment(folder: RunFolder) -> Environment | None:
 def merged_environment(environments: Sequence[Environment]) -> dict[str, Any]:
     """The environment of several runs together: all processors and drivers, and versions, joined if they differ."""
     origin = joined(Origin(each.processors, each.drawn_by) for each in environments)
-    texts = {name: _joined(getattr(each, name) for each in environments) for name in JOINED_TEXTS}
+    are_portable = bool(environments) and all(each.portable for each in environments)
+
+    def text(name: str) -> str:
+        return _joined(getattr(each, name) for each in environments)
+
     merged = Environment(
-        **texts,
+        vobench=text("vobench"),
+        commit=text("commit"),
+        python=text("python"),
+        platform=text("platform"),
         processors=origin.processors,
         drawn_by=origin.drawn_by,
-        portable=bool(environments) and all(each.portable for each in environments),
+        portable=are_portable,
         libraries=_merged_libraries(environments),
+        timed=text("timed"),
+        date=text("date"),
     )
     return asdict(merged)
 

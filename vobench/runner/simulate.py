@@ -108,7 +108,7 @@ def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progr
         frames = frames_of(case, travel)
         watched = progress.track(_pairs(camera, frames), f"simulate {case.name}", total=len(frames.t_ns))
         with _writer(case, folder, truth) as writer:
-            _write(writer, travel, frames, SensorFeed(case, travel), watched, truth)
+            _write(writer, travel, frames, feed=SensorFeed(case, travel), pairs=watched, truth=truth)
     finally:
         renderer.close()
 
@@ -151,6 +151,7 @@ def _write(
     writer: "SequenceWriter",
     travel: BodyMotion,
     frames: "Schedule",
+    *,
     feed: "SensorFeed",
     pairs: "Iterator[StereoPair]",
     truth: "PixelTruth | None",
