@@ -86,3 +86,19 @@ def test_noise_of_disparities_alone_is_no_offset():
     """
     offsets_px = [fitted(0.2, seed) for seed in range(12)]
     assert abs(np.mean(offsets_px)) < 0.011
+
+
+@pytest.mark.parametrize("noise_px", [0.05, 0.1])
+def test_the_information_of_a_fit_is_an_eighth_of_that_of_its_scatter(noise_px):
+    """Errors of near tracks are correlated, so that eight count as one; here they are independent."""
+    prior = DisparityOffset()
+    offsets_px = []
+    information = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        uv, disparity_px, points = cloud(rng, 1000, 4.0, 30.0)
+        now = PAIR.left.project(se3.apply(STEP, points)) + rng.normal(0, noise_px, uv.shape)
+        after = prior.after(PAIR.left.rays(uv), PAIR.left.rays(now), disparity_px, STEP, PAIR)
+        information.append(after.information - prior.information)
+        offsets_px.append(after.weighted / information[-1])
+    assert 5 < 1 / np.var(offsets_px) / np.mean(information) < 10

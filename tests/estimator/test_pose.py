@@ -3,7 +3,18 @@
 import numpy as np
 import pytest
 
-from vobench.estimator.pose import adjoint, carried_on, pose_from_points, twist
+from vobench.estimator.pose import (
+    NOISE_FLOOR_PX,
+    _stereo_jacobian,
+    _stereo_pixels,
+    adjoint,
+    carried_on,
+    cauchy_weights,
+    normal_equations,
+    pose_from_points,
+    robust_noise_px,
+    twist,
+)
 from vobench.estimator.stereo import stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.rig import paper_lens, stereo_rig
@@ -91,3 +102,44 @@ def test_who_moves_as_before_is_where_that_leads():
     np.testing.assert_allclose(carried_on(before, before @ STEP), before @ STEP @ STEP, atol=1e-12)
     np.testing.assert_allclose(carried_on(before, before), before, atol=1e-12)
     np.testing.assert_allclose(carried_on(before, before @ STEP, share=0.0), before @ STEP, atol=1e-12)
+
+
+def test_the_derivatives_of_the_pixels_are_those_of_small_motions():
+    rng = np.random.default_rng(9)
+    *_, points = cloud(rng, 20)
+    K = PAIR.K.copy()
+    K[0, 1] = 3.0  # skew
+    jacobian = _stereo_jacobian(points, K, 0.2)
+    size = 1e-6
+    for column in range(6):
+        step = np.zeros(6)
+        step[column] = size
+        later = _stereo_pixels(se3.apply(twist(step), points), K, 0.2)
+        earlier = _stereo_pixels(se3.apply(twist(-step), points), K, 0.2)
+        np.testing.assert_allclose(jacobian[:, :, column], (later - earlier) / (2 * size), rtol=1e-5, atol=1e-3)
+
+
+def test_the_pixels_of_a_pair_differ_by_the_disparity_and_points_behind_are_far_outside():
+    pixels_px = _stereo_pixels(np.array([[0.1, -0.2, 2.0], [0.1, -0.2, -2.0]]), PAIR.K, 0.2)
+    assert pixels_px[0, 0] - pixels_px[0, 2] == pytest.approx(PAIR.K[0, 0] * 0.2 / 2.0)
+    assert np.abs(pixels_px[1]).min() > 1e9
+
+
+def test_weights_are_one_at_zero_and_a_half_at_their_scale():
+    np.testing.assert_allclose(cauchy_weights(np.array([0.0, 0.24, -0.24]), 0.1), [1, 0.5, 0.5])
+
+
+def test_the_noise_of_residuals_is_that_of_most_of_them_and_never_below_its_floor():
+    residual_px = np.random.default_rng(3).normal(0, 0.4, 20_000)
+    residual_px[:2000] = 50.0
+    assert robust_noise_px(residual_px) == pytest.approx(0.4, rel=0.2)
+    assert robust_noise_px(np.zeros(5)) == NOISE_FLOOR_PX
+
+
+def test_the_normal_equations_are_those_of_weighted_least_squares():
+    rng = np.random.default_rng(4)
+    jacobian, weight, residual = rng.normal(size=(30, 2, 3)), rng.uniform(size=(30, 2)), rng.normal(size=(30, 2))
+    information, gradient = normal_equations(jacobian, weight, residual)
+    A, w, r = jacobian.reshape(-1, 3), weight.ravel(), residual.ravel()
+    np.testing.assert_allclose(information, A.T @ np.diag(w) @ A, rtol=1e-8)
+    np.testing.assert_allclose(gradient, A.T @ (w * r))
