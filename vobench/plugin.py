@@ -75,8 +75,9 @@ if TYPE_CHECKING:
     from vobench.dataset.source import ExportSource, Views, png_frames, rectified
     from vobench.dataset.truth_file import truth_file
     from vobench.errors import InputError, SequenceError, SettingError, VobenchError
+    from vobench.estimator.disparity_offset import DisparityOffset
+    from vobench.estimator.parameter import parameters
     from vobench.estimator.pose import (
-        DisparityOffset,
         PoseFit,
         adjoint,
         carried_on,
@@ -85,13 +86,11 @@ if TYPE_CHECKING:
         twist,
     )
     from vobench.estimator.protocol import EncoderReadings, Estimator, Frame, Image, Result, Status, Tracks
+    from vobench.estimator.stereo import Eye, StereoPair, coarse_disparity, predicted, stereo_pair
     from vobench.estimator.stereo_tracker import Followed, StereoTracker, TrackerSettings
-    from vobench.estimator.tools import (
-        Eye,
+    from vobench.estimator.tracking import (
         Mask,
         Points,
-        StereoPair,
-        coarse_disparity,
         comparable,
         corners_per_cell,
         follow,
@@ -99,9 +98,6 @@ if TYPE_CHECKING:
         inside,
         local_contrast,
         lucas_kanade,
-        parameters,
-        predicted,
-        stereo_pair,
     )
     from vobench.geometry import se3
     from vobench.geometry.camera import (
@@ -210,7 +206,8 @@ HOMES = {
     "SequenceError": "vobench.errors",
     "SettingError": "vobench.errors",
     "VobenchError": "vobench.errors",
-    "DisparityOffset": "vobench.estimator.pose",
+    "DisparityOffset": "vobench.estimator.disparity_offset",
+    "parameters": "vobench.estimator.parameter",
     "PoseFit": "vobench.estimator.pose",
     "adjoint": "vobench.estimator.pose",
     "carried_on": "vobench.estimator.pose",
@@ -224,24 +221,23 @@ HOMES = {
     "Result": "vobench.estimator.protocol",
     "Status": "vobench.estimator.protocol",
     "Tracks": "vobench.estimator.protocol",
+    "Eye": "vobench.estimator.stereo",
+    "StereoPair": "vobench.estimator.stereo",
+    "coarse_disparity": "vobench.estimator.stereo",
+    "predicted": "vobench.estimator.stereo",
+    "stereo_pair": "vobench.estimator.stereo",
     "Followed": "vobench.estimator.stereo_tracker",
     "StereoTracker": "vobench.estimator.stereo_tracker",
     "TrackerSettings": "vobench.estimator.stereo_tracker",
-    "Eye": "vobench.estimator.tools",
-    "Mask": "vobench.estimator.tools",
-    "Points": "vobench.estimator.tools",
-    "StereoPair": "vobench.estimator.tools",
-    "coarse_disparity": "vobench.estimator.tools",
-    "comparable": "vobench.estimator.tools",
-    "corners_per_cell": "vobench.estimator.tools",
-    "follow": "vobench.estimator.tools",
-    "follow_predicted": "vobench.estimator.tools",
-    "inside": "vobench.estimator.tools",
-    "local_contrast": "vobench.estimator.tools",
-    "lucas_kanade": "vobench.estimator.tools",
-    "parameters": "vobench.estimator.tools",
-    "predicted": "vobench.estimator.tools",
-    "stereo_pair": "vobench.estimator.tools",
+    "Mask": "vobench.estimator.tracking",
+    "Points": "vobench.estimator.tracking",
+    "comparable": "vobench.estimator.tracking",
+    "corners_per_cell": "vobench.estimator.tracking",
+    "follow": "vobench.estimator.tracking",
+    "follow_predicted": "vobench.estimator.tracking",
+    "inside": "vobench.estimator.tracking",
+    "local_contrast": "vobench.estimator.tracking",
+    "lucas_kanade": "vobench.estimator.tracking",
     "BrownConrady": "vobench.geometry.camera",
     "Camera": "vobench.geometry.camera",
     "DoubleSphere": "vobench.geometry.camera",

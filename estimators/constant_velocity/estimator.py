@@ -1,4 +1,4 @@
-"""Dead reckoning without a sensor after the first second: straight ahead, at the speed that the wheels had."""
+"""Dead reckoning without a sensor after the first second: straight ahead at the mean speed of the wheels."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,13 +9,13 @@ from vobench.plugin import EncoderReadings, Frame, Result, Rig, Status, VobenchE
 
 
 class ConstantVelocity:
-    """Follows the wheels for `measure_s`, then holds the heading it has and the mean speed it had.
+    """Follows the wheels for `measure_s`, then keeps the last heading and the mean speed.
 
     Between two readings it drives the chord of an arc, along the heading in the arc's middle.
     """
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:  # noqa: ARG002
-        """Take the nominal wheels, and how long to look at them."""
+        """Take the nominal wheels, and how long to measure their speed."""
         wheels = rig.wheels
         if wheels is None:
             raise VobenchError("constant_velocity needs wheels, and this recording has none")
@@ -23,17 +23,22 @@ class ConstantVelocity:
         self._track_m = wheels.track_m
         self._measure_ns = round(float(params["measure_s"]) * 1e9)
         self._last: tuple[int, int] | None = None
-        self._first_ns = self._known_ns = 0
-        self._x_m = self._y_m = self._psi_rad = self._path_m = 0.0
+        self._first_ns = 0
+        self._known_ns = 0
+        self._x_m = 0.0
+        self._y_m = 0.0
+        self._psi_rad = 0.0
+        self._path_m = 0.0
 
     def process(self, frame: Frame) -> Result:
-        """The wheels' pose; once they were seen for long enough, as far ahead of it as the time since allows."""
+        """The wheels' pose; once the speed is measured, extrapolated to the frame."""
         if frame.encoders is None:
             return Result(None, Status.LOST, "no_encoders")
         self._measure(frame.encoders)
         ahead_m = 0.0
         if self._is_measured:
-            speed_mps = self._path_m * 1e9 / (self._known_ns - self._first_ns)
+            duration_ns = self._known_ns - self._first_ns
+            speed_mps = self._path_m * 1e9 / duration_ns
             ahead_m = speed_mps * (frame.t_ns - self._known_ns) * 1e-9
         x_m = self._x_m + ahead_m * np.cos(self._psi_rad)
         y_m = self._y_m + ahead_m * np.sin(self._psi_rad)
@@ -44,8 +49,9 @@ class ConstantVelocity:
         return self._known_ns - self._first_ns >= max(self._measure_ns, 1)
 
     def _measure(self, readings: EncoderReadings) -> None:
-        """Follow the wheels until they were seen for long enough."""
-        for t_ns, (left, right) in zip(readings.t_ns.tolist(), readings.ticks.tolist(), strict=True):
+        """Follow the wheels until the speed is measured."""
+        rows = zip(readings.t_ns.tolist(), readings.ticks.tolist(), strict=True)
+        for t_ns, (left, right) in rows:
             if self._is_measured:
                 return
             if self._last is None:
@@ -61,7 +67,8 @@ class ConstantVelocity:
         ds = (left_m + right_m) / 2
         dpsi = (right_m - left_m) / self._track_m
         chord = ds * np.sinc(dpsi / 2 / np.pi)
-        self._x_m += chord * np.cos(self._psi_rad + dpsi / 2)
-        self._y_m += chord * np.sin(self._psi_rad + dpsi / 2)
+        psi_middle = self._psi_rad + dpsi / 2
+        self._x_m += chord * np.cos(psi_middle)
+        self._y_m += chord * np.sin(psi_middle)
         self._psi_rad += dpsi
         self._path_m += ds

@@ -1,4 +1,4 @@
-"""Stereo visual odometry from features that are found anew in every picture and told apart by their descriptors."""
+"""Stereo visual odometry from features that are detected in every picture and matched by their descriptors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,6 +25,7 @@ from vobench.plugin import (
 )
 
 Descriptors = NDArray[Any]
+Indices = NDArray[np.intp]
 DETECTORS = ("orb", "sift")
 
 
@@ -51,27 +52,32 @@ class View:
 
 
 class FeatureVo:
-    """Matches each pair's features with those of the last view and fits the motion to the points they stand for."""
+    """Matches the features of each pair with those of the last view and fits the motion to their points."""
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Take the calibration. Raises VobenchError for a rig that is no stereo pair, or a detector nobody knows."""
+        """Take the calibration. Raises VobenchError for a rig that is not a stereo pair, or an unknown detector."""
         cv2.setRNGSeed(seed)
         name = params.get("detector")
         if name not in DETECTORS:
             raise VobenchError(f"feature_vo: detector is {name!r}, expected one of {', '.join(DETECTORS)}")
-        s = parameters(Settings, {key: value for key, value in params.items() if key != "detector"}, "feature_vo")
+        numbers = {key: value for key, value in params.items() if key != "detector"}
+        s = parameters(Settings, numbers, "feature_vo")
         self._settings = s
         self._pair = stereo_pair(rig, "feature_vo")
-        is_orb = name == "orb"
-        self._detector = (
-            cv2.ORB.create(s.features, fastThreshold=s.fast_threshold) if is_orb else cv2.SIFT.create(s.features)
-        )
-        self._matcher = cv2.BFMatcher(cv2.NORM_HAMMING if is_orb else cv2.NORM_L2, crossCheck=True)
+        self._detector: cv2.Feature2D
+        if name == "orb":
+            self._detector = cv2.ORB.create(s.features, fastThreshold=s.fast_threshold)
+            self._matcher = cv2.BFMatcher(cv2.NORM_HAMMING, crossCheck=True)
+        else:
+            self._detector = cv2.SIFT.create(s.features)
+            self._matcher = cv2.BFMatcher(cv2.NORM_L2, crossCheck=True)
         self._last: View | None = None
-        self._T_odom_last = self._T_odom_now = np.eye(4)  # in the view's axes
+        # Poses in the view's axes.
+        self._T_odom_last = np.eye(4)
+        self._T_odom_now = np.eye(4)
 
     def process(self, frame: Frame) -> Result:
-        """Find features, match them with the last view's, fit the motion, take a new view when the old one is far."""
+        """Detect features, match them with the last view's, and fit the motion to the matched points."""
         if frame.left is None or frame.right is None:
             return Result(None, Status.LOST, "no_picture")
         view = self._look(frame.left, frame.right)
@@ -80,68 +86,85 @@ class FeatureVo:
         if self._last is None:
             self._last = view
             return Result(np.eye(4), Status.INIT)
+
         last = self._last
-        before, now = self._matched(last.descriptors, view.descriptors)
-        flow_px = float(np.median(np.linalg.norm(view.uv_px[now] - last.uv_px[before], axis=1))) if len(now) else 0.0
-        if len(now) >= self._settings.min_points and flow_px < self._settings.min_flow_px:
+        of_last, of_view = self._matched(last.descriptors, view.descriptors)
+        flow_px = 0.0
+        if len(of_view):
+            lengths_px = np.linalg.norm(view.uv_px[of_view] - last.uv_px[of_last], axis=1)
+            flow_px = float(np.median(lengths_px))
+        if len(of_view) >= self._settings.min_points and flow_px < self._settings.min_flow_px:
             self._T_odom_now = self._T_odom_last
             return Result(self._pair.T_left(self._T_odom_now), Status.STATIONARY, "no_flow")
-        known = np.isfinite(last.disparity_px[before])
-        before = before[known]
-        now = now[known]
-        fit = self._fit(view, before, now)
+
+        has_depth = np.isfinite(last.disparity_px[of_last])
+        of_last = of_last[has_depth]
+        of_view = of_view[has_depth]
+        fit = self._fit(last, view, of_last, of_view)
         if fit is None:
             self._last = view
             self._T_odom_last = self._T_odom_now
-            return Result(None, Status.LOST, "no_model", stats={"tracks": len(now)})
-        tracks = Tracks(last.uv_px[before], view.uv_px[now], fit.inlier)
+            return Result(None, Status.LOST, "no_model", stats={"tracks": len(of_view)})
+        tracks = Tracks(last.uv_px[of_last], view.uv_px[of_view], fit.inlier)
         return self._step(view, fit, flow_px, tracks)
 
     def _look(self, left: Image, right: Image) -> View:
-        """Features of both pictures; a left one has a disparity where one of the right is alike and in its row."""
-        (uv_px, descriptors) = self._features(left)
-        (right_px, others) = self._features(right)
-        disparity_px = np.full(len(uv_px), np.nan)
-        of_left, of_right = self._matched(descriptors, others)
-        shift = self._pair.left.in_view(uv_px[of_left]) - self._pair.right.in_view(right_px[of_right])
+        """Features of both pictures; a left one has a disparity if a right one matches it in the same row."""
+        uv_left_px, descriptors_left = self._features(left)
+        uv_right_px, descriptors_right = self._features(right)
+        of_left, of_right = self._matched(descriptors_left, descriptors_right)
+        in_left_view = self._pair.left.in_view(uv_left_px[of_left])
+        in_right_view = self._pair.right.in_view(uv_right_px[of_right])
+        columns_px, rows_px = (in_left_view - in_right_view).T
         with np.errstate(invalid="ignore"):
-            good = (np.abs(shift[:, 1]) < self._settings.row_px) & (shift[:, 0] > self._settings.row_px)
-        disparity_px[of_left[good]] = shift[good, 0]
-        return View(uv_px, descriptors, disparity_px)
+            is_same_row = np.abs(rows_px) < self._settings.row_px
+            is_ahead = columns_px > self._settings.row_px
+        is_match = is_same_row & is_ahead
+
+        disparity_px = np.full(len(uv_left_px), np.nan)
+        disparity_px[of_left[is_match]] = columns_px[is_match]
+        return View(uv_left_px, descriptors_left, disparity_px)
 
     def _features(self, image: Image) -> tuple[Array, Descriptors]:
-        found, descriptors = self._detector.detectAndCompute(image, None)
+        keypoints, descriptors = self._detector.detectAndCompute(image, None)
         if descriptors is None:
             return np.zeros((0, 2)), np.zeros((0, 1), np.uint8)
-        return np.array([feature.pt for feature in found], float), descriptors
+        uv_px = np.array([keypoint.pt for keypoint in keypoints], float)
+        return uv_px, descriptors
 
-    def _matched(self, one: Descriptors, other: Descriptors) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def _matched(self, queries: Descriptors, candidates: Descriptors) -> tuple[Indices, Indices]:
         """Indices (M,) and (M,) of descriptors that are each other's nearest."""
-        if not len(one) or not len(other):
+        if not len(queries) or not len(candidates):
             return np.zeros(0, np.intp), np.zeros(0, np.intp)
-        pairs = self._matcher.match(one, other)
-        return np.array([m.queryIdx for m in pairs], np.intp), np.array([m.trainIdx for m in pairs], np.intp)
+        matches = self._matcher.match(queries, candidates)
+        of_queries = np.array([match.queryIdx for match in matches], np.intp)
+        of_candidates = np.array([match.trainIdx for match in matches], np.intp)
+        return of_queries, of_candidates
 
-    def _fit(self, view: View, before: NDArray[np.intp], now: NDArray[np.intp]) -> PoseFit | None:
-        """The motion that brings the last view's points to this view's features."""
-        assert self._last is not None
-        if len(now) < self._settings.min_points:
+    def _fit(self, last: View, view: View, of_last: Indices, of_view: Indices) -> PoseFit | None:
+        """The motion that brings the last view's points to this view's features; None if there is none."""
+        if len(of_view) < self._settings.min_points:
             return None
         return pose_from_points(
-            self._pair.points(self._last.uv_px[before], self._last.disparity_px[before]),
-            self._pair.left.in_view(view.uv_px[now]),
+            self._pair.points(last.uv_px[of_last], last.disparity_px[of_last]),
+            self._pair.left.in_view(view.uv_px[of_view]),
             self._pair.K,
-            disparity_px=view.disparity_px[now],
+            disparity_px=view.disparity_px[of_view],
             baseline_m=self._pair.baseline_m,
             ransac_px=self._settings.ransac_px,
         )
 
     def _step(self, view: View, fit: PoseFit, flow_px: float, tracks: Tracks) -> Result:
-        """Chain the motion on the pose of the last view."""
+        """Chain the motion onto the pose of the last view; take a new view if that one is far away."""
         T_odom_now = self._T_odom_last @ se3.inverse(fit.T_now_last)
-        self._T_odom_now = se3.transform(se3.nearest_rotation(T_odom_now[:3, :3]), T_odom_now[:3, 3])
+        R_odom_now = se3.nearest_rotation(T_odom_now[:3, :3])
+        self._T_odom_now = se3.transform(R_odom_now, T_odom_now[:3, 3])
         if flow_px >= self._settings.keep_below_px:
             self._last = view
             self._T_odom_last = self._T_odom_now
-        stats = {"tracks": len(fit.inlier), "inliers": int(fit.inlier.sum()), "error_px": fit.error_px}
+        stats = {
+            "tracks": len(fit.inlier),
+            "inliers": int(fit.inlier.sum()),
+            "error_px": fit.error_px,
+        }
         return Result(self._pair.T_left(self._T_odom_now), Status.OK, "", tracks, stats)

@@ -12,14 +12,14 @@ from .strapdown import State, carried
 
 
 class ImuDeadReckoning:
-    """Starts at rest half a reading before the first frame, and from then on adds up what the IMU says.
+    """Integrates the readings of the IMU from half a reading before the first frame, where it is at rest.
 
-    A reading holds from half-way to the one before until half-way to the next: it is a mean over that time.
-    While it is not yet clear whether the body stands still at the start, the answer is that it has not moved.
+    A reading is a mean over time: it holds from the middle between its stamp and the one before to the middle
+    between its stamp and the next. Until a standstill at the start is decided, the pose is that of the start.
     """
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:  # noqa: ARG002
-        """Take the IMU's place and its noise."""
+        """Take the IMU's mount and its noise."""
         if rig.imu is None:
             raise VobenchError("imu_dead_reckoning needs an IMU, and this recording has none")
         self._T_body_imu = rig.imu.T_body_imu
@@ -44,22 +44,26 @@ class ImuDeadReckoning:
             self._integrate(frame.imu)
         now = self._carried(float(frame.t_ns))
         T_odom_body = self._T_body_imu @ now.T_odom_imu @ se3.inverse(self._T_body_imu)
-        return Result(T_odom_body, stats={"speed_mps": float(np.linalg.norm(now.v_mps))})
+        speed_mps = float(np.linalg.norm(now.v_mps))
+        return Result(T_odom_body, stats={"speed_mps": speed_mps})
 
     def _integrate(self, readings: ImuReadings) -> None:
-        """Let each reading take over from the one before half-way between their stamps."""
+        """Advance the state through all of these; each reading takes over midway between its stamp and the last."""
         rows = zip(readings.t_ns.tolist(), readings.gyro_radps, readings.accel_mps2, strict=True)
-        for t_ns, turn, force in rows:
+        for t_ns, gyro_radps, accel_mps2 in rows:
             if self._reading is not None:
-                self._state = self._carried((self._reading[0] + t_ns) / 2)
-            self._reading = (t_ns, turn, force)
+                middle_ns = (self._reading[0] + t_ns) / 2
+                self._state = self._carried(middle_ns)
+            self._reading = (t_ns, gyro_radps, accel_mps2)
 
     def _carried(self, until_ns: float) -> State:
-        """The state at an instant by the last reading; no reading yet: as it was."""
-        assert self._state is not None
-        assert self._rest is not None
-        if self._reading is None or until_ns <= self._state.t_ns:
-            return self._state
-        _, turn, force = self._reading
-        turn = turn - self._rest.gyro_bias_radps
-        return carried(self._state, turn, force, gravity_mps2=self._rest.gravity_mps2, until_ns=until_ns)
+        """The state at an instant by the last reading; unchanged without a reading."""
+        state = self._state
+        rest = self._rest
+        assert state is not None
+        assert rest is not None
+        if self._reading is None or until_ns <= state.t_ns:
+            return state
+        _, gyro_radps, accel_mps2 = self._reading
+        turn_radps = gyro_radps - rest.gyro_bias_radps
+        return carried(state, turn_radps, accel_mps2, gravity_mps2=rest.gravity_mps2, until_ns=until_ns)

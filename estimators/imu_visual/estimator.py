@@ -1,4 +1,4 @@
-"""IMU and stereo: the IMU says where to look and bridges what cannot be seen, stereo corrects it."""
+"""IMU and stereo: the IMU predicts the motion and bridges dark frames, and stereo corrects it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ import numpy as np
 
 from vobench.plugin import (
     STANDARD_GRAVITY_MPS2,
-    Array,
     Frame,
+    Image,
     ImuReadings,
     PoseFit,
     Result,
@@ -26,13 +26,13 @@ from vobench.plugin import (
     unit,
 )
 
-from .filter import State, anchored, carried, corrected, started
+from .filter import Reading, State, anchored, carried, corrected, started
 
-CORRELATED = 4.0  # tracks near each other err alike: so many count as one
-# what stereo errs by beyond the noise of its tracks
+CORRELATED = 4.0  # errors of near tracks are correlated: so many count as one
+# Standard deviations of stereo beyond the noise of its tracks.
 STEREO_M = 2e-5
 STEREO_RAD = 2e-5
-MOST_DOUBTS = 5  # frames after which stereo is right and the filter wrong
+MOST_REJECTED = 5  # successive frames; after these stereo is taken as right and the filter as wrong
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,10 +44,10 @@ class Settings(TrackerSettings):
 
 
 class ImuVisual:
-    """The filter runs from reading to reading; poses from stereo are measured from the last view, whose pose holds."""
+    """A filter advanced by IMU readings and corrected by stereo poses relative to the last view (the anchor)."""
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Take the IMU's place and noise, and the cameras. Raises VobenchError where either is missing."""
+        """Take the IMU's mount and noise, and the cameras. Raises VobenchError if either is missing."""
         cv2.setRNGSeed(seed)
         if rig.imu is None:
             raise VobenchError("imu_visual needs an IMU, and this recording has none")
@@ -58,68 +58,89 @@ class ImuVisual:
         self._T_imu_left = se3.inverse(rig.imu.T_body_imu) @ rig.T_body_left
         self._T_imu_view = self._T_imu_left @ se3.inverse(self._pair.T_view_left)
         self._state: State | None = None
-        self._reading: tuple[float, Array, Array] | None = None
+        self._reading: Reading | None = None
         self._T_odom_anchor = np.eye(4)  # the IMU's pose when the view was taken
-        self._doubts = 0
+        self._rejected = 0
 
     def process(self, frame: Frame) -> Result:
-        """Integrate the readings, look where that leads, correct, and take a new view when the old one is far away."""
-        if frame.left is None or frame.right is None or frame.imu is None:
+        """Integrate the readings, track from the predicted pose, correct it; take a new view if the old one is far."""
+        left = frame.left
+        right = frame.right
+        if left is None or right is None or frame.imu is None:
             return Result(None, Status.LOST, "no_reading")
         state = self._integrated(frame.imu, frame.t_ns)
         if not self._tracker.has_view:
-            self._state = state
-            return self._anchor(frame, Status.INIT, "")
+            return self._anchor(left, right, state, Status.INIT)
+
         T_now_anchor = se3.inverse(state.T_odom_imu) @ self._T_odom_anchor
         T_now_view = se3.inverse(self._T_imu_view) @ T_now_anchor @ self._T_imu_view
-        followed = self._tracker.follow(frame.left, frame.right, T_now_view)
+        followed = self._tracker.follow(left, right, T_now_view)
         fit = self._tracker.fit(followed)
         after = None if fit is None else self._corrected(state, fit)
-        self._state = after or state
         if fit is None or after is None:
-            return self._anchor(frame, Status.DEGRADED, "inertial")
+            return self._anchor(left, right, state, Status.DEGRADED, "inertial")
+
         if followed.flow_px >= self._settings.keep_below_px:
             self._tracker.learn(followed, fit.T_now_last)
-            return self._anchor(frame, Status.OK, "")
-        return self._said(Status.OK, "")
+            return self._anchor(left, right, after, Status.OK)
+        self._state = after
+        return self._result(after, Status.OK)
 
     def _integrated(self, readings: ImuReadings, t_ns: int) -> State:
-        """The state at a frame. A reading is a mean: it holds from half-way to the last until half-way to the next."""
+        """The state at a frame.
+
+        A reading is a mean over time: it holds from the middle between its stamp and the one before to the middle
+        between its stamp and the next.
+        """
+        state = self._state or self._first_state(readings, t_ns)
         rows = zip(readings.t_ns.tolist(), readings.gyro_radps, readings.accel_mps2, strict=True)
-        if self._state is None:
-            felt = readings.accel_mps2.mean(0) if len(readings.t_ns) else self._imu.T_body_imu[2, :3]
-            state = started(float(t_ns), -STANDARD_GRAVITY_MPS2 * unit(felt))
-        else:
-            state = self._state
-        for stamp, turn, force in rows:
+        for stamp_ns, gyro_radps, accel_mps2 in rows:
             if self._reading is not None:
-                state = carried(state, *self._reading[1:], (self._reading[0] + stamp) / 2, self._imu)
-            self._reading = (float(stamp), turn, force)
-        return state if self._reading is None else carried(state, *self._reading[1:], float(t_ns), self._imu)
+                middle_ns = (self._reading.t_ns + stamp_ns) / 2
+                state = carried(state, self._reading, middle_ns, self._imu)
+            self._reading = Reading(float(stamp_ns), gyro_radps, accel_mps2)
+        if self._reading is None:
+            return state
+        return carried(state, self._reading, float(t_ns), self._imu)
+
+    def _first_state(self, readings: ImuReadings, t_ns: int) -> State:
+        """The state at the first frame: up is the mean specific force or, without readings, the body's z."""
+        up = self._imu.T_body_imu[2, :3]
+        if len(readings.t_ns):
+            up = readings.accel_mps2.mean(0)
+        return started(float(t_ns), -STANDARD_GRAVITY_MPS2 * unit(up))
 
     def _corrected(self, state: State, fit: PoseFit) -> State | None:
-        """The state by what stereo saw since the view; None where the two contradict each other."""
+        """The state corrected by stereo's motion since the view; None if the gate rejects it."""
         T_anchor_imu = self._T_imu_view @ se3.inverse(fit.T_now_last) @ se3.inverse(self._T_imu_view)
         to_imu = adjoint(self._T_imu_view)
-        noise = CORRELATED * to_imu @ fit.covariance @ to_imu.T + np.diag(np.repeat([STEREO_M, STEREO_RAD], 3) ** 2)
-        self._doubts += 1
-        gate = self._settings.gate if self._doubts <= MOST_DOUBTS else np.inf
+        of_tracks = CORRELATED * to_imu @ fit.covariance @ to_imu.T
+        sigmas = np.repeat([STEREO_M, STEREO_RAD], 3)
+        noise = of_tracks + np.diag(sigmas**2)
+
+        self._rejected += 1
+        gate = self._settings.gate if self._rejected <= MOST_REJECTED else np.inf
         after = corrected(state, self._T_odom_anchor @ T_anchor_imu, noise, gate=gate)
-        self._doubts = self._doubts if after is None else 0
+        if after is not None:
+            self._rejected = 0
         return after
 
-    def _anchor(self, frame: Frame, status: Status, reason: str) -> Result:
-        """Take a new view here; where there is nothing to see, keep the old one."""
-        assert self._state is not None
-        if frame.left is not None and frame.right is not None and self._tracker.look(frame.left, frame.right):
-            self._state = anchored(self._state)
-            self._T_odom_anchor = self._state.T_odom_imu
-        return self._said(status, reason)
+    def _anchor(self, left: Image, right: Image, state: State, status: Status, reason: str = "") -> Result:
+        """Take a new view at a state; if it has too few points, keep the old one."""
+        if self._tracker.look(left, right):
+            state = anchored(state)
+            self._T_odom_anchor = state.T_odom_imu
+        self._state = state
+        return self._result(state, status, reason)
 
-    def _said(self, status: Status, reason: str) -> Result:
-        """The left camera's pose in its own frame at the start."""
-        assert self._state is not None
-        T_odom_left = se3.inverse(self._T_imu_left) @ self._state.T_odom_imu @ self._T_imu_left
-        bias_dps = float(np.rad2deg(np.linalg.norm(self._state.bias_radps)))
-        stats = {"speed_mps": float(np.linalg.norm(self._state.v_mps)), "bias_dps": bias_dps}
-        return Result(T_odom_left, status, reason, stats=stats | {"offset_px": self._tracker.offset.px})
+    def _result(self, state: State, status: Status, reason: str = "") -> Result:
+        """The pose of the left camera in its own frame at the start."""
+        T_odom_left = se3.inverse(self._T_imu_left) @ state.T_odom_imu @ self._T_imu_left
+        speed_mps = np.linalg.norm(state.v_mps)
+        bias_dps = np.rad2deg(np.linalg.norm(state.bias_radps))
+        stats = {
+            "speed_mps": float(speed_mps),
+            "bias_dps": float(bias_dps),
+            "offset_px": self._tracker.offset.px,
+        }
+        return Result(T_odom_left, status, reason, stats=stats)

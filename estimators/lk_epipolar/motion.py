@@ -1,4 +1,4 @@
-"""How the camera moved between two views: direction from epipolar geometry, length from stereo.
+"""The camera's motion between two views: direction from epipolar geometry, length from stereo.
 
 x0, x1     rays (N, 3) with z = 1 through the tracks in the last view and in this one, in the rectified view's axes
 rho        inverse depth (N,) in 1/m of the tracks in the last view, NaN where stereo has none
@@ -17,10 +17,13 @@ from vobench.plugin import Array, Mask, cross_matrix, se3
 
 MIN_STEREO = 12  # points with depth that a length needs
 MAX_BEHIND = 0.1  # share of points that may land behind the camera
+CONFIDENCE = 0.9999
 SCALE_ITERATIONS = 5
+LEAST_SCALE_NOISE = 1e-16  # squared, in units of a ray
 NO_TRANSLATION = 1e-9
 HUBER_PX = 0.1  # about the noise of a good track
 MAX_EVALUATIONS = 20
+TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,22 +43,24 @@ class Matches:
     @property
     def focal_px(self) -> float:
         """Pixels per unit of a ray, for pixels that need not be square."""
-        return float(np.sqrt(self.K[0, 0] * self.K[1, 1]))
+        fx_fy = self.K[0, 0] * self.K[1, 1]
+        return float(np.sqrt(fx_fy))
 
     @property
     def flat0_px(self) -> Array:
-        """Pixels (N, 2) of the tracks in the last view, had the lens no distortion."""
+        """Undistorted pixels (N, 2) of the tracks in the last view."""
         return (self.x0 @ self.K.T)[:, :2]
 
     @property
     def flat1_px(self) -> Array:
-        """Pixels (N, 2) of the tracks in this view, had the lens no distortion."""
+        """Undistorted pixels (N, 2) of the tracks in this view."""
         return (self.x1 @ self.K.T)[:, :2]
 
     @property
     def flow_px(self) -> float:
         """Median length of the tracks."""
-        return float(np.median(np.linalg.norm(self.uv1_px - self.uv0_px, axis=1)))
+        lengths_px = np.linalg.norm(self.uv1_px - self.uv0_px, axis=1)
+        return float(np.median(lengths_px))
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +82,7 @@ class TwoViews:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A shape with its length: T_now_last in metres, and the median distance in px by which it misses the tracks."""
+    """A shape with its length: T_now_last in metres, and the median transfer error of the tracks in px."""
 
     shape: Shape
     T_now_last: Array
@@ -85,32 +90,38 @@ class Motion:
 
 
 def two_views(matches: Matches, ransac_px: float) -> TwoViews:
-    """Fit both models and take them apart.
+    """Fit both models and decompose them into motions.
 
     On a plane the essential matrix has two exact solutions and RANSAC returns either; in a room
-    the homography fits a part only. So keep all that either allows.
+    the homography fits a part only. So all motions of both are candidates.
     """
     E, on_E = essential(matches, ransac_px)
     H, on_H = homography(matches, ransac_px)
-    shapes = [] if E is None else list(from_essential(E))
-    shapes += [] if H is None else list(from_homography(H, matches.K))
+    shapes: list[Shape] = []
+    if E is not None:
+        shapes += from_essential(E)
+    if H is not None:
+        shapes += from_homography(H, matches.K)
     h_ratio = on_H.sum() / max(on_E.sum(), 1)
-    return TwoViews(shapes, on_E if E is not None and h_ratio < 1 else on_H, float(h_ratio))
+    inlier = on_E if E is not None and h_ratio < 1 else on_H
+    return TwoViews(shapes, inlier, float(h_ratio))
 
 
 def essential(matches: Matches, ransac_px: float) -> tuple[Array | None, Mask]:
-    """The essential matrix and its inliers; None where there is none. Source: Nistér (2004)."""
-    E, inlier = cv2.findEssentialMat(
-        matches.flat0_px, matches.flat1_px, matches.K, cv2.USAC_MAGSAC, prob=0.9999, threshold=ransac_px
-    )
-    if E is None or E.shape[0] < 3 or not np.isfinite(E).all():
+    """The essential matrix and its inliers; None if there is none. Source: Nistér (2004)."""
+    uv0_px = matches.flat0_px
+    uv1_px = matches.flat1_px
+    E, inlier = cv2.findEssentialMat(uv0_px, uv1_px, matches.K, cv2.USAC_MAGSAC, prob=CONFIDENCE, threshold=ransac_px)
+    if E is None or len(E) < 3 or not np.isfinite(E).all():
         return None, np.zeros(len(matches.x0), bool)
     return E[:3].astype(float), inlier.ravel() > 0
 
 
 def homography(matches: Matches, ransac_px: float) -> tuple[Array | None, Mask]:
-    """The homography in px and its inliers; None where there is none."""
-    H, inlier = cv2.findHomography(matches.flat0_px, matches.flat1_px, cv2.USAC_MAGSAC, ransac_px, confidence=0.9999)
+    """The homography in px and its inliers; None if there is none."""
+    uv0_px = matches.flat0_px
+    uv1_px = matches.flat1_px
+    H, inlier = cv2.findHomography(uv0_px, uv1_px, cv2.USAC_MAGSAC, ransac_px, confidence=CONFIDENCE)
     if H is None or not np.isfinite(H).all():
         return None, np.zeros(len(matches.x0), bool)
     return H.astype(float), inlier.ravel() > 0
@@ -126,89 +137,107 @@ def from_essential(E: Array) -> Iterator[Shape]:
 def from_homography(H: Array, K: Array) -> Iterator[Shape]:
     """Up to four motions over a plane. Source: Malis and Vargas (2007).
 
-    For a pure rotation OpenCV returns a matrix that is no rotation: take the nearest one.
+    For a pure rotation OpenCV returns a matrix that is no rotation, so the nearest one is taken.
     """
     _, rotations, translations, _ = cv2.decomposeHomographyMat(H, K)
     for R, t in zip(rotations, translations, strict=True):
         length = np.linalg.norm(t)
-        direction = t.ravel() / length if length > NO_TRANSLATION else np.array([0.0, 0.0, 1.0])
+        direction = np.array([0.0, 0.0, 1.0])
+        if length > NO_TRANSLATION:
+            direction = t.ravel() / length
         yield Shape(se3.nearest_rotation(R.astype(float)), direction)
 
 
 def best_motion(shapes: list[Shape], matches: Matches) -> Motion | None:
-    """Of all shapes, each with its length from stereo, the one that sends the points to their tracks."""
+    """The shape with the least transfer error, each with its length from stereo; None without enough depths."""
     if np.isfinite(matches.rho).sum() < MIN_STEREO:
         return None
-    motions = [motion for shape in shapes if (motion := scaled(shape, matches)) is not None]
-    return min(motions, key=lambda motion: motion.transfer_px, default=None)
+    motions = [scaled(shape, matches) for shape in shapes]
+    possible = [motion for motion in motions if motion is not None]
+    return min(possible, key=lambda motion: motion.transfer_px, default=None)
 
 
 def scaled(shape: Shape, matches: Matches) -> Motion | None:
-    """The shape with the length that fits stereo best; None where points land behind the camera.
+    """The shape with the length that fits stereo best; None if points land behind the camera.
 
     x1 is parallel to R x0 + s rho d, which is linear in s: a s + b = 0, two equations a point.
     """
-    seen = np.isfinite(matches.rho)
-    x0 = matches.x0[seen]
-    x1 = matches.x1[seen]
-    rho = matches.rho[seen, None]
+    has_depth = np.isfinite(matches.rho)
+    x0 = matches.x0[has_depth]
+    x1 = matches.x1[has_depth]
+    rho = matches.rho[has_depth, None]
+
     turned = x0 @ shape.R.T
     shift = rho * shape.direction
-    b = turned[:, :2] - x1[:, :2] * turned[:, 2:]
-    a = shift[:, :2] - x1[:, :2] * shift[:, 2:]
+    slopes = x1[:, :2]
+    b = turned[:, :2] - slopes * turned[:, 2:]
+    a = shift[:, :2] - slopes * shift[:, 2:]
     s = robust_scale(a, b)
-    landed = turned + s * shift
-    if not np.isfinite(s) or (landed[:, 2] <= 0).mean() > MAX_BEHIND:
+
+    landed = turned + s * shift  # points (N, 3) now, times rho
+    share_behind = (landed[:, 2] <= 0).mean()
+    if not np.isfinite(s) or share_behind > MAX_BEHIND:
         return None
-    error = np.linalg.norm(landed[:, :2] / landed[:, 2:] - x1[:, :2], axis=1) * matches.focal_px
-    return Motion(shape, se3.transform(shape.R, s * shape.direction), float(np.median(error)))
+    residual = landed[:, :2] / landed[:, 2:] - slopes
+    error_px = np.linalg.norm(residual, axis=1) * matches.focal_px
+    T_now_last = se3.transform(shape.R, s * shape.direction)
+    return Motion(shape, T_now_last, float(np.median(error_px)))
 
 
 def robust_scale(a: Array, b: Array) -> float:
     """The s that makes a s + b (N, 2) small for most points: least squares with Cauchy's weights."""
     aa = (a * a).sum(1)
     ab = (a * b).sum(1)
-    s = float(np.median(-ab / np.maximum(aa, np.finfo(float).tiny)))
+    scales = -ab / np.maximum(aa, TINY)
+    s = float(np.median(scales))
     for _ in range(SCALE_ITERATIONS):
         squared = ((a * s + b) ** 2).sum(1)
-        weight = 1 / (1 + squared / max(2 * float(np.median(squared)), 1e-16))
-        s = -float(weight @ ab) / max(float(weight @ aa), np.finfo(float).tiny)
+        noise_squared = max(2 * float(np.median(squared)), LEAST_SCALE_NOISE)
+        weight = 1 / (1 + squared / noise_squared)
+        weighted_aa = float(weight @ aa)
+        weighted_ab = float(weight @ ab)
+        s = -weighted_ab / max(weighted_aa, TINY)
     return s
 
 
 def refined(motion: Motion, matches: Matches, inlier: Mask) -> Motion:
-    """The motion near the given one that fits best: all tracks by epipolar lines, those with depth by their place.
+    """The motion near the given one that fits all tracks by their epipolar lines, and those with depth by their pixel.
 
-    The distance to the line is Sampson's; the place is that of the transferred point, in px.
+    The distance to the line is Sampson's; the pixel is that of the transferred point.
     """
     x0 = matches.x0[inlier]
     x1 = matches.x1[inlier]
     rho = matches.rho[inlier, None]
-    known = np.isfinite(rho[:, 0])
+    has_depth = np.isfinite(rho[:, 0])
     focal_px = matches.focal_px
-    size_m = max(float(np.linalg.norm(motion.T_now_last[:3, 3])), NO_TRANSLATION)
+    R_start = motion.T_now_last[:3, :3]
+    t_start_m = motion.T_now_last[:3, 3]
+    size_m = max(float(np.linalg.norm(t_start_m)), NO_TRANSLATION)
 
     def moved(delta: Array) -> Array:
-        R = Rotation.from_rotvec(delta[:3]).as_matrix() @ motion.T_now_last[:3, :3]
-        return se3.transform(R, motion.T_now_last[:3, 3] + size_m * delta[3:])
+        R = Rotation.from_rotvec(delta[:3]).as_matrix() @ R_start
+        return se3.transform(R, t_start_m + size_m * delta[3:])
 
     def cost(delta: Array) -> Array:
         T = moved(delta)
-        landed = x0[known] @ T[:3, :3].T + rho[known] * T[:3, 3]
-        off = landed[:, :2] / landed[:, 2:] - x1[known, :2]
-        residual: Array = focal_px * np.r_[sampson(shape_of(T), x0, x1), off.ravel()]
-        return residual
+        landed = x0[has_depth] @ T[:3, :3].T + rho[has_depth] * T[:3, 3]
+        transfer = landed[:, :2] / landed[:, 2:] - x1[has_depth, :2]
+        epipolar = sampson(shape_of(T), x0, x1)
+        residual_px: Array = focal_px * np.r_[epipolar, transfer.ravel()]
+        return residual_px
 
     fit = least_squares(cost, np.zeros(6), loss="huber", f_scale=HUBER_PX, max_nfev=MAX_EVALUATIONS)
-    T = moved(fit.x)
-    error = np.linalg.norm(cost(fit.x)[len(x0) :].reshape(-1, 2), axis=1)
-    return Motion(shape_of(T), T, float(np.median(error)))
+    T_now_last = moved(fit.x)
+    transfer_px = cost(fit.x)[len(x0) :].reshape(-1, 2)
+    error_px = np.linalg.norm(transfer_px, axis=1)
+    return Motion(shape_of(T_now_last), T_now_last, float(np.median(error_px)))
 
 
 def shape_of(T_now_last: Array) -> Shape:
     """A motion without its length."""
-    t = T_now_last[:3, 3]
-    return Shape(T_now_last[:3, :3], t / max(float(np.linalg.norm(t)), NO_TRANSLATION))
+    t_m = T_now_last[:3, 3]
+    length_m = max(float(np.linalg.norm(t_m)), NO_TRANSLATION)
+    return Shape(T_now_last[:3, :3], t_m / length_m)
 
 
 def sampson(shape: Shape, x0: Array, x1: Array) -> Array:
@@ -216,6 +245,9 @@ def sampson(shape: Shape, x0: Array, x1: Array) -> Array:
     E = cross_matrix(shape.direction[None])[0] @ shape.R
     line1 = x0 @ E.T
     line0 = x1 @ E
-    gradient = line1[:, 0] ** 2 + line1[:, 1] ** 2 + line0[:, 0] ** 2 + line0[:, 1] ** 2
-    distance: Array = (x1 * line1).sum(1) / np.sqrt(gradient + np.finfo(float).tiny)
+    a1, b1, _ = line1.T
+    a0, b0, _ = line0.T
+    gradient = np.sqrt(a1**2 + b1**2 + a0**2 + b0**2 + TINY)
+    algebraic_error = (x1 * line1).sum(1)
+    distance: Array = algebraic_error / gradient
     return distance

@@ -12,8 +12,8 @@ class StandStill:
     """Answers every frame with the pose of the first."""
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Take nothing: there is nothing to prepare."""
+        """Nothing to prepare."""
 
     def process(self, frame: Frame) -> Result:  # noqa: ARG002
-        """Still here."""
+        """The pose of the first frame."""
         return Result(np.eye(4))

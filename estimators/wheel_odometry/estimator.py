@@ -24,7 +24,9 @@ class WheelOdometry:
         self._metres_per_tick = 2 * np.pi * wheels.radius_m / wheels.ticks_per_revolution
         self._track_m = wheels.track_m
         self._ticks: NDArray[np.int64] = np.zeros((1, 2), np.int64)
-        self._x_m = self._y_m = self._psi_rad = 0.0
+        self._x_m = 0.0
+        self._y_m = 0.0
+        self._psi_rad = 0.0
 
     def process(self, frame: Frame) -> Result:
         """Integrate all readings since the last frame."""
@@ -35,14 +37,15 @@ class WheelOdometry:
         return Result(T_odom_body, stats={"readings": len(frame.encoders.ticks)})
 
     def _integrate(self, ticks: NDArray[np.int64]) -> None:
-        """Drive the arcs from the last reading through these (M, 2), left and right."""
+        """Add the arcs from the last reading to the last of these (M, 2), left and right."""
         counts = np.concatenate([self._ticks, ticks])
-        left_m, right_m = np.diff(counts, axis=0).T * self._metres_per_tick
+        steps_m = np.diff(counts, axis=0) * self._metres_per_tick
+        left_m, right_m = steps_m.T
         ds = (left_m + right_m) / 2
         dpsi = (right_m - left_m) / self._track_m
-        psi = self._psi_rad + np.cumsum(dpsi) - dpsi / 2  # in the middle of each arc
+        psi_middle = self._psi_rad + np.cumsum(dpsi) - dpsi / 2  # in the middle of each arc
         chord = ds * np.sinc(dpsi / 2 / np.pi)
-        self._x_m += float(chord @ np.cos(psi))
-        self._y_m += float(chord @ np.sin(psi))
+        self._x_m += float(chord @ np.cos(psi_middle))
+        self._y_m += float(chord @ np.sin(psi_middle))
         self._psi_rad += float(dpsi.sum())
         self._ticks = counts[-1:]

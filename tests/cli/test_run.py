@@ -177,13 +177,34 @@ def test_view_runs_no_file_of_the_working_folder(vobench, ran, here, monkeypatch
     assert not (here / "executed").exists()
 
 
-def test_view_of_a_run_without_a_single_pose_works_too(vobench, here):
+def add_failing_estimator(here):
     plug = here / "estimators" / "blind"
     plug.mkdir(parents=True)
     (plug / "estimator.yaml").write_text(
         "name: blind\nversion: '1'\nclass: estimator:Blind\npose_of: body\nsummary: Blind\n"
     )
     (plug / "estimator.py").write_text("raise ValueError('no eyes')\n")
+
+
+def test_a_run_in_which_no_estimator_finishes_a_trial_ends_with_code_1_and_one_line(vobench, here):
+    add_failing_estimator(here)
+    failed = vobench("run", "tiny", "-e", "blind", "-n", "2")
+    (sentence,) = [line for line in failed.err.splitlines() if "no estimator finished" in line]
+    assert failed.code == 1
+    assert sentence.startswith("vobench: no estimator finished a trial: 2 refused; blind on short: estimator 'blind'")
+    assert "ValueError: no eyes" in sentence
+    assert "blind" in failed.out  # the board is there all the same
+
+
+def test_an_estimator_that_fails_while_another_finishes_leaves_the_code_0(vobench, here):
+    add_failing_estimator(here)
+    ran = vobench("run", "tiny", "-e", "blind", "-e", "stand_still")
+    assert ran.code == 0
+    assert "no estimator finished" not in ran.err
+
+
+def test_view_of_a_run_without_a_single_pose_works_too(vobench, here):
+    add_failing_estimator(here)
     assert vobench("run", "tiny", "-e", "blind", "-e", "stand_still").code == 0
     said = vobench("view", "runs/tiny", "--save", "a.rrd", "--json")
     assert said.json["estimator"] == "blind"

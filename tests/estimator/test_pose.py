@@ -1,10 +1,21 @@
-"""Motion and the offset of disparity from points: exact without noise, honest with it."""
+"""Motion from points: exact without noise, and with noise its covariance is that of its errors."""
 
 import numpy as np
 import pytest
 
-from vobench.estimator.pose import DisparityOffset, adjoint, carried_on, pose_from_points, twist
-from vobench.estimator.tools import stereo_pair
+from vobench.estimator.pose import (
+    NOISE_FLOOR_PX,
+    _stereo_jacobian,
+    _stereo_pixels,
+    adjoint,
+    carried_on,
+    cauchy_weights,
+    normal_equations,
+    pose_from_points,
+    robust_noise_px,
+    twist,
+)
+from vobench.estimator.stereo import stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.rig import paper_lens, stereo_rig
 
@@ -93,49 +104,42 @@ def test_who_moves_as_before_is_where_that_leads():
     np.testing.assert_allclose(carried_on(before, before @ STEP, share=0.0), before @ STEP, atol=1e-12)
 
 
-def learnt(true_px, frames, *, flat=False, noise_px=0.1, start_scale=1.0):
-    """What is known of an offset after so many steps; the motion that is handed in is off by start_scale."""
-    rng, offset = np.random.default_rng(6), DisparityOffset()
-    for _ in range(frames):
-        uv, disparity_px, points = cloud(rng, 300, 4.0, 30.0)
-        if flat:
-            disparity_px = np.full(300, 200.0)
-            points = PAIR.points(uv, disparity_px)
-        now = PAIR.left.project(se3.apply(STEP, points)) + rng.normal(0, noise_px, uv.shape)
-        measured_px = disparity_px + true_px + rng.normal(0, noise_px, 300)
-        told = se3.transform(STEP[:3, :3], start_scale * STEP[:3, 3])
-        offset = offset.after(PAIR.left.rays(uv), PAIR.left.rays(now), measured_px, told, PAIR)
-    return offset
+def test_the_derivatives_of_the_pixels_are_those_of_small_motions():
+    rng = np.random.default_rng(9)
+    *_, points = cloud(rng, 20)
+    K = PAIR.K.copy()
+    K[0, 1] = 3.0  # skew
+    jacobian = _stereo_jacobian(points, K, 0.2)
+    size = 1e-6
+    for column in range(6):
+        step = np.zeros(6)
+        step[column] = size
+        later = _stereo_pixels(se3.apply(twist(step), points), K, 0.2)
+        earlier = _stereo_pixels(se3.apply(twist(-step), points), K, 0.2)
+        np.testing.assert_allclose(jacobian[:, :, column], (later - earlier) / (2 * size), rtol=1e-5, atol=1e-3)
 
 
-@pytest.mark.parametrize("true_px", [0.5, -0.5, 0.3])
-def test_an_offset_is_learnt_though_it_spoils_the_motion_handed_in(true_px):
-    offset = learnt(true_px, 30, start_scale=1.05)
-    assert offset.px == pytest.approx(true_px, abs=max(3 * offset.information**-0.5, 0.05))
-    assert offset.px != 0
+def test_the_pixels_of_a_pair_differ_by_the_disparity_and_points_behind_are_far_outside():
+    pixels_px = _stereo_pixels(np.array([[0.1, -0.2, 2.0], [0.1, -0.2, -2.0]]), PAIR.K, 0.2)
+    assert pixels_px[0, 0] - pixels_px[0, 2] == pytest.approx(PAIR.K[0, 0] * 0.2 / 2.0)
+    assert np.abs(pixels_px[1]).min() > 1e9
 
 
-def test_a_perfect_pair_is_left_as_it_is():
-    offset = learnt(0.0, 60)
-    assert offset.px == 0.0
-    assert abs(offset.estimate_px) < 0.1
+def test_weights_are_one_at_zero_and_a_half_at_their_scale():
+    np.testing.assert_allclose(cauchy_weights(np.array([0.0, 0.24, -0.24]), 0.1), [1, 0.5, 0.5])
 
 
-@pytest.mark.parametrize(
-    ("guess_px", "sigma_px", "is_taken"), [(0.4, 0.1, True), (0.4, 0.2, False), (0.14, 0.01, False), (-0.2, 0.05, True)]
-)
-def test_a_guess_is_taken_off_once_it_is_large_and_certain(guess_px, sigma_px, is_taken):
-    offset = DisparityOffset(sigma_px**-2, guess_px * sigma_px**-2)
-    assert offset.px == pytest.approx(guess_px if is_taken else 0.0)
+def test_the_noise_of_residuals_is_that_of_most_of_them_and_never_below_its_floor():
+    residual_px = np.random.default_rng(3).normal(0, 0.4, 20_000)
+    residual_px[:2000] = 50.0
+    assert robust_noise_px(residual_px) == pytest.approx(0.4, rel=0.2)
+    assert robust_noise_px(np.zeros(5)) == NOISE_FLOOR_PX
 
 
-def test_points_at_one_distance_tell_nothing():
-    """Their disparities differ by noise alone, which must not be taken for depth."""
-    offset = learnt(0.5, 30, flat=True)
-    assert offset.information == DisparityOffset().information
-    assert offset.px == 0.0
-
-
-def test_without_depths_nothing_is_learnt():
-    rays = PAIR.left.rays(np.random.default_rng(7).uniform(100, 400, (50, 2)))
-    assert DisparityOffset().after(rays, rays, np.full(50, np.nan), STEP, PAIR) == DisparityOffset()
+def test_the_normal_equations_are_those_of_weighted_least_squares():
+    rng = np.random.default_rng(4)
+    jacobian, weight, residual = rng.normal(size=(30, 2, 3)), rng.uniform(size=(30, 2)), rng.normal(size=(30, 2))
+    information, gradient = normal_equations(jacobian, weight, residual)
+    A, w, r = jacobian.reshape(-1, 3), weight.ravel(), residual.ravel()
+    np.testing.assert_allclose(information, A.T @ np.diag(w) @ A, rtol=1e-8)
+    np.testing.assert_allclose(gradient, A.T @ (w * r))

@@ -5,18 +5,22 @@ import pytest
 from scipy.stats import chi2
 
 from vobench.errors import InputError
+from vobench.geometry import se3
 from vobench.report import page
 from vobench.report.verify import verify_run
 from vobench.runner.consistency import (
     COVARIANCE,
+    HEAD,
     MEDIAN,
     NINETY_PERCENT,
     Consistency,
     format_covariances,
     read_covariances,
+    trial_consistency,
 )
 from vobench.runner.estimate import REVISED
 from vobench.runner.folder import value_of
+from vobench.trajectory.trajectory import Trajectory
 
 ESTIMATORS = "[wheel_odometry, stand_still]"
 NOISY = "{{name: noisy_truth, label: {}, params: {{position_m: {}, rotation_rad: {}, stated: {}}}}}"
@@ -140,4 +144,57 @@ def test_a_file_of_covariances_of_other_poses_is_refused(tmp_path):
 def test_the_gap_is_the_factor_between_errors_and_deviations(factor, verdict):
     found = Consistency.of(factor**2 * np.random.default_rng(2).chisquare(6, 20_000))
     assert found.scale_gap == pytest.approx(factor, rel=0.02)
+    assert found.sentence.startswith(f"claims {verdict}: ")
+
+
+def estimate_with_covariances(folder, est, scale):
+    rows = [(t, np.eye(6) * 1e-4) for t in est.t_ns.tolist()]
+    (folder / COVARIANCE).write_text(format_covariances(rows))
+    return lambda gt, start_ns: trial_consistency(folder, gt, est, start_ns=start_ns, scale=scale)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0, 0.25])
+@pytest.mark.parametrize("first", [0, 7])
+def test_a_perfect_estimate_of_any_scale_has_no_error_wherever_the_truth_begins(tmp_path, scale, first):
+    """The truth begins at the first picture, or later; the estimate is in odom, in units of its own."""
+    rng = np.random.default_rng(3)
+    n = 30
+    s = np.linspace(0, 4, n)
+    positions_m = np.stack([s, np.sin(s), 0.1 * s], -1) + rng.normal(size=3)
+    T_world_left = np.stack([se3.transform(se3.rotation_z(0.3 * a), p) for a, p in zip(s, positions_m, strict=True)])
+    T_odom_left = se3.inverse(T_world_left[0]) @ T_world_left
+    T_odom_left[:, :3, 3] /= scale
+    t_ns = np.arange(n, dtype=np.int64) * 10**8
+    consistency_of = estimate_with_covariances(tmp_path, Trajectory(t_ns, T_odom_left), scale)
+    found = consistency_of(Trajectory(t_ns[first:], T_world_left[first:]), start_ns=0)
+    assert found.poses == n - first
+    assert found.nees_median < 1e-9
+    assert found.covered_90 == 1.0
+
+
+def test_an_error_of_one_deviation_in_one_axis_has_a_nees_of_one(tmp_path):
+    n = 5
+    t_ns = np.arange(n, dtype=np.int64) * 10**8
+    T = np.tile(np.eye(4), (n, 1, 1))
+    moved = T.copy()
+    moved[1:, 1, 3] = 0.01
+    found = estimate_with_covariances(tmp_path, Trajectory(t_ns, moved), 1.0)(Trajectory(t_ns, T), 0)
+    assert found.nees_median == pytest.approx(1.0)
+    assert found.nees_mean == pytest.approx(0.8)
+
+
+def test_without_stated_covariances_there_is_no_consistency(tmp_path):
+    t_ns = np.arange(3, dtype=np.int64)
+    still = Trajectory(t_ns, np.tile(np.eye(4), (3, 1, 1)))
+    assert trial_consistency(tmp_path, still, still, start_ns=0, scale=1.0) is None
+    (tmp_path / COVARIANCE).write_text(HEAD)
+    assert np.isnan(read_covariances(tmp_path / COVARIANCE, t_ns)).all()
+    assert trial_consistency(tmp_path, still, still, start_ns=0, scale=1.0) is None
+
+
+@pytest.mark.parametrize(
+    ("gap", "verdict"), [(1.99, "what it holds"), (2.01, "too much"), (0.51, "what it holds"), (0.49, "too little")]
+)
+def test_a_gap_within_a_half_and_two_is_let_pass(gap, verdict):
+    found = Consistency.of(np.full(3, MEDIAN * gap**2))
     assert found.sentence.startswith(f"claims {verdict}: ")

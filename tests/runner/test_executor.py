@@ -18,7 +18,7 @@ from vobench.runner.executor import Dask, Done, Event, Executor, LocalProcesses,
 from vobench.runner.folder import PAGE, RunFolder
 from vobench.runner.run import run_suite
 from vobench.runner.store import locked
-from vobench.runner.task import Task, plan
+from vobench.runner.task import NO_LIMIT, Task, plan
 
 pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
 
@@ -35,6 +35,7 @@ class Recorder:
     failures: dict[str, Done] = field(default_factory=dict)
     beside: list[tuple[str, int]] = field(default_factory=list)
     running: list = field(default_factory=list)
+    threads: dict[str, int] = field(default_factory=dict)
 
     def submit(self, one, store, slot, threads, tell):
         from concurrent.futures import Future
@@ -42,6 +43,7 @@ class Recorder:
 
         future = Future()
         self.running.append(future)
+        self.threads[one.inputs["name"]] = threads
         self.beside.append((one.inputs["name"], sum(not other.done() for other in self.running) - 1))
         Timer(0.02, lambda: future.set_result(self.failures.get(one.key, Done()))).start()
         return future
@@ -76,6 +78,47 @@ def test_an_estimator_is_timed_with_nothing_beside_it_unless_that_is_asked_for(t
     perform_all(ALL, tmp_path, shared, shares_time=True)
     assert {count for name, count in alone.beside if name.startswith("estimate")} == {0}
     assert max(count for name, count in shared.beside if name.startswith("estimate")) > 0
+
+
+def threads_of(tasks, store, cores, monkeypatch, *, slots, shares_time=False):
+    """The threads that each task is given on a machine of so many cores, by its name."""
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(cores)))
+    recorder = Recorder(slots)
+    perform_all(tasks, store, recorder, shares_time=shares_time)
+    return recorder.threads
+
+
+def test_slots_share_the_cores_and_a_task_that_runs_alone_has_all_of_them(tmp_path, monkeypatch):
+    threads = threads_of(ALL, tmp_path, 8, monkeypatch, slots=4)
+    assert threads["light"] == NO_LIMIT  # nothing else is ready
+    assert {threads[one.inputs["name"]] for one in PICTURES} == {2}
+    assert {threads[one.inputs["name"]] for one in ESTIMATES} == {NO_LIMIT}  # timed: nothing runs beside it
+
+
+def test_estimators_that_share_their_time_share_the_cores_too(tmp_path, monkeypatch):
+    threads = threads_of(ALL, tmp_path, 8, monkeypatch, slots=2, shares_time=True)
+    assert 4 in {threads[one.inputs["name"]] for one in ESTIMATES}
+
+
+@pytest.mark.parametrize(("cores", "slots", "expected"), [(8, 3, 2), (2, 4, 1), (9, 2, 4)])
+def test_a_slot_has_its_whole_share_of_the_cores_and_one_at_least(tmp_path, monkeypatch, cores, slots, expected):
+    independent = [task(f"pictures {n}") for n in range(12)]
+    threads = threads_of(independent, tmp_path, cores, monkeypatch, slots=slots)
+    assert threads["pictures 0"] == expected
+    assert set(threads.values()) <= {expected, NO_LIMIT}
+
+
+def test_the_only_slot_has_all_cores(tmp_path, monkeypatch):
+    independent = [task(f"pictures {n}") for n in range(3)]
+    assert set(threads_of(independent, tmp_path, 8, monkeypatch, slots=1).values()) == {NO_LIMIT}
+
+
+@pytest.mark.parametrize(
+    ("slot", "threads", "cores"),
+    [(0, 2, [10, 11]), (1, 2, [12, 13]), (2, 2, [10, 11]), (1, 3, [13, 10, 11]), (0, 9, [10, 11, 12, 13])],
+)
+def test_each_slot_has_cores_of_its_own_as_long_as_there_are_some(slot, threads, cores):
+    assert executor._share([10, 11, 12, 13], slot, threads) == cores
 
 
 def test_a_failure_takes_what_needs_it_along_and_nothing_else(tmp_path):

@@ -146,14 +146,14 @@ def modules_behind(tmp_path, source: str) -> set[str]:
 
 def test_a_name_of_the_plugin_module_stands_for_the_module_it_lives_in(tmp_path):
     modules = modules_behind(tmp_path, "from vobench.plugin import Result, StereoTracker, se3\n")
-    assert {"vobench.estimator.stereo_tracker", "vobench.estimator.tools", "vobench.geometry.se3"} <= modules
+    assert {"vobench.estimator.stereo_tracker", "vobench.estimator.stereo", "vobench.geometry.se3"} <= modules
     assert not {"vobench.asset.shape", "vobench.metric.comparison", "vobench.dataset.layout"} & modules
 
 
 def test_an_estimator_that_takes_little_from_the_plugin_module_depends_on_little(tmp_path):
     modules = modules_behind(tmp_path, "from vobench.plugin import Result\n")
     assert "vobench.estimator.protocol" in modules
-    assert "vobench.estimator.tools" not in modules
+    assert "vobench.estimator.tracking" not in modules
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_an_estimator_that_takes_little_from_the_plugin_module_depends_on_little
 )
 def test_a_name_is_found_however_the_plugin_module_is_imported(tmp_path, source):
     modules = modules_behind(tmp_path, source)
-    assert "vobench.estimator.tools" in modules
+    assert "vobench.estimator.stereo" in modules
     assert "vobench.asset.shape" not in modules
 
 

@@ -164,6 +164,11 @@ class TestDisplacement:
         rig, scene = case().build_rig(), case().build_scene()
         assert Displacement(scene).largest_px(rig.left, rig.T_body_left, rig.T_body_left, start_ns=0, end_ns=1) == 0
 
+    def test_what_the_last_pose_sees_nothing_of_has_not_moved(self, case) -> None:
+        rig, scene = case().build_rig(), case().build_scene()
+        away = rig.T_body_left @ se3.transform(np.diag([-1.0, 1.0, -1.0]), [0, 0, 0])
+        assert Displacement(scene).largest_px(rig.left, rig.T_body_left, away, start_ns=0, end_ns=1) == 0
+
     def test_a_mover_counts_while_the_camera_stands(self, case, tmp_path) -> None:
         keys = "{t_s: 0, position_m: [0.25, 0, 0.1]}, {t_s: 1, position_m: [0.25, 0.1, 0.1]}"
         mover = f"movers: [{{name: cart, size_m: [0.2, 0.2, 0.2], material: m, path: [{keys}]}}]\n"

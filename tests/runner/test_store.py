@@ -369,7 +369,7 @@ def test_what_a_run_has_used_since_it_began_is_not_removed(store):
 def test_a_store_that_is_larger_than_wanted_is_told_after_a_run(store, monkeypatch):
     said = list[str]()
     filled(store, 2)
-    for limit in ("1", "1e-6"):
+    for limit in ("1", "0.5", "1e-6"):
         monkeypatch.setenv("VOBENCH_CACHE_GB", limit)
         with store.in_use(said.append):
             pass

@@ -14,6 +14,7 @@ from vobench.cli.option import Json, SuiteName, Trust, option_group, with_option
 from vobench.cli.progress import Bars
 from vobench.cli.run_display import TerminalDisplay
 from vobench.errors import InputError
+from vobench.runner.folder import total_failure
 from vobench.runner.launch import run_plan
 from vobench.runner.motion import cut
 from vobench.runner.preflight import summarize
@@ -173,7 +174,10 @@ def run_command(
         broken_limits += threshold.broken_by(scores)
     for sentence in broken_limits:
         terminal.warn(sentence)
-    if board.unmade:  # an incomplete run fails, whatever the thresholds are
+    failure = total_failure(scores)
+    if failure:
+        terminal.warn(failure)
+    if board.unmade or failure:  # an incomplete run fails, whatever the thresholds are
         raise typer.Exit(INCOMPLETE_RUN)
     if broken_limits:
         raise typer.Exit(BROKEN_LIMIT)

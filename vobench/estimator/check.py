@@ -1,4 +1,4 @@
-"""The contract's word on an answer: what is checked before anything is kept of it."""
+"""The check of an estimator's answers: nothing of an answer is used before it."""
 
 from collections.abc import Mapping
 from math import isfinite
@@ -11,19 +11,21 @@ from vobench.estimator.protocol import Result, Status, Tracks
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
-# Beyond any path, and small enough for sums of squares to stay finite.
-FARTHEST_M = 1e12
+FARTHEST_M = 1e12  # beyond any path, and small enough for sums of squares to stay finite
 REASON_LETTERS = 500
 NAME_LETTERS = 80
+REAL_KINDS = "fiub"  # numpy's kinds of float, signed and unsigned integer, and bool
 
 
 class InvalidOutputError(VobenchError):
-    """An estimator's answer is not what the contract says."""
+    """An estimator's answer that breaks the contract."""
 
 
-def in_one_line(said: object, most: int = REASON_LETTERS) -> str:
-    """A text of somebody else's as it may be printed: without control characters or lone surrogates, cut at `most`."""
-    return " ".join(printable(str(said)[: 4 * most]).split())[:most]
+def in_one_line(text: object, limit: int = REASON_LETTERS) -> str:
+    """A text from outside as it may be printed: without control characters or lone surrogates, cut at `limit`."""
+    beginning = str(text)[: 4 * limit]
+    words = printable(beginning).split()
+    return " ".join(words)[:limit]
 
 
 def checked(answer: Any, frame: int) -> Result:
@@ -32,7 +34,8 @@ def checked(answer: Any, frame: int) -> Result:
         raise InvalidOutputError(
             f"frame {frame}: process() must return a vobench.estimator.Result, got {type(answer).__name__}"
         )
-    if answer.T_odom_frame is None and answer.status not in (Status.LOST, Status.INIT):
+    needs_pose = answer.status not in (Status.LOST, Status.INIT)
+    if answer.T_odom_frame is None and needs_pose:
         raise InvalidOutputError(f"frame {frame}: status '{answer.status}' needs a pose; without one say lost or init")
     try:
         return Result(
@@ -49,12 +52,12 @@ def checked(answer: Any, frame: int) -> Result:
 
 
 def _array(value: Any, what: str) -> Array:
-    """A float64 array. Raises InvalidOutputError where the value is none of real numbers."""
+    """A float64 array. Raises InvalidOutputError unless the value is an array of real numbers."""
     try:
         array = np.asarray(value)
     except (TypeError, ValueError) as error:
         raise InvalidOutputError(f"{what} should be an array ({error})") from None
-    if array.dtype.kind not in "fiub":
+    if array.dtype.kind not in REAL_KINDS:
         raise InvalidOutputError(f"{what} should be an array of real numbers, got {array.dtype}")
     return array.astype(np.float64)
 
@@ -62,19 +65,23 @@ def _array(value: Any, what: str) -> Array:
 def _pose(T_odom_frame: Any) -> Array:
     T = _array(T_odom_frame, "the pose")
     if T.shape != (4, 4) or not np.isfinite(T).all():
-        raise InvalidOutputError(f"the pose is no finite (4, 4) array (shape {T.shape})")
+        raise InvalidOutputError(f"the pose should be a finite (4, 4) array, got shape {T.shape}")
     if np.abs(T[:3, 3]).max() > FARTHEST_M:
         raise InvalidOutputError(f"the pose is farther than {FARTHEST_M:g} m away")
-    if not se3.is_rotation(T[:3, :3]) or not np.array_equal(T[3], [0, 0, 0, 1]):
-        raise InvalidOutputError("the pose is no rigid transform (R'R differs from I, or the last row from 0 0 0 1)")
+    has_last_row = np.array_equal(T[3], [0, 0, 0, 1])
+    if not se3.is_rotation(T[:3, :3]) or not has_last_row:
+        raise InvalidOutputError("the pose is not a rigid transform (R'R differs from I, or the last row from 0 0 0 1)")
     return T
 
 
 def _covariance(covariance: Any) -> Array:
     P = _array(covariance, "the covariance")
     if P.shape != (6, 6) or not np.isfinite(P).all():
-        raise InvalidOutputError(f"the covariance is no finite (6, 6) array (shape {P.shape})")
-    if not np.allclose(P, P.T, rtol=1e-6, atol=1e-9 * np.abs(P).max()) or np.linalg.eigvalsh(P)[0] <= 0:
+        raise InvalidOutputError(f"the covariance should be a finite (6, 6) array, got shape {P.shape}")
+    rounding = 1e-9 * np.abs(P).max()
+    is_symmetric = np.allclose(P, P.T, rtol=1e-6, atol=rounding)
+    least_variance = np.linalg.eigvalsh(P)[0]
+    if not is_symmetric or least_variance <= 0:
         raise InvalidOutputError("the covariance is not symmetric and positive definite")
     return P
 
@@ -87,7 +94,7 @@ def _points(points: Any) -> Array:
 
 
 def checked_revision(revised: Any) -> dict[int, Array]:
-    """Poses by their frame's index, as `finish` gives them. Raises InvalidOutputError."""
+    """Poses by their frame's index, as `finish` returns them. Raises InvalidOutputError."""
     if not isinstance(revised, Mapping):
         raise InvalidOutputError(f"finish() must return poses by their frame's index, got {type(revised).__name__}")
     try:
@@ -108,17 +115,18 @@ def _status(status: Any) -> Status:
 def _tracks(tracks: Any) -> Tracks:
     if not isinstance(tracks, Tracks):
         raise InvalidOutputError(f"tracks must be a vobench.estimator.Tracks, got {type(tracks).__name__}")
-    last = _array(tracks.uv_last_px, "uv_last_px")
-    now = _array(tracks.uv_px, "uv_px")
+    uv_last_px = _array(tracks.uv_last_px, "uv_last_px")
+    uv_px = _array(tracks.uv_px, "uv_px")
     inlier = _array(tracks.inlier, "inlier").astype(bool)
-    if not (last.shape == now.shape == (len(inlier), 2) and inlier.ndim == 1):
-        shapes = f"{last.shape}, {now.shape} and {inlier.shape}"
+    pixels_shape = (len(inlier), 2) if inlier.ndim == 1 else None
+    if uv_last_px.shape != pixels_shape or uv_px.shape != pixels_shape:
+        shapes = f"{uv_last_px.shape}, {uv_px.shape} and {inlier.shape}"
         raise InvalidOutputError(f"tracks should be (N, 2), (N, 2) and (N,), got {shapes}")
-    return Tracks(last, now, inlier)
+    return Tracks(uv_last_px, uv_px, inlier)
 
 
 def _stats(stats: Any) -> dict[str, float]:
-    """Numbers by name; one that is not finite says nothing and is left out."""
+    """Numbers by name, without those that are not finite."""
     if not isinstance(stats, Mapping):
         raise InvalidOutputError(f"stats should be numbers by name, got {type(stats).__name__}")
     try:

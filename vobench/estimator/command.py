@@ -1,4 +1,4 @@
-"""A program of any language that reads a whole recording from files, and writes all its poses to one."""
+"""A program in any language that reads a whole recording from files and writes all its poses to one file."""
 
 import shutil
 import time
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vobench.errors import TrajectoryError, VobenchError
 from vobench.estimator.check import FARTHEST_M
@@ -28,18 +29,26 @@ OUT_BYTES_PER_FRAME = 4096
 
 
 def filled(argv: Sequence[str], folder: Path, values: Mapping[str, Any]) -> list[str]:
-    """A manifest's words for the system: {name} is filled in, and what begins with ./ lies in the manifest's folder."""
-    words = [PLACEHOLDER.sub(lambda name: str(values[name[1]]), word) for word in argv]
-    placed = [str(folder.resolve() / word[2:]) if word.startswith("./") else word for word in words]
-    if not Path(placed[0]).is_absolute() and shutil.which(placed[0]) is None:
-        raise EstimatorFailure("refused", f"no executable {placed[0]!r} on PATH; install it, or name it by its path")
-    return placed
+    """A manifest's argv for the system: each {name} is replaced by its value, and ./ by the manifest's folder.
+
+    Raises EstimatorFailure if there is no such program.
+    """
+    words = []
+    for template in argv:
+        word = PLACEHOLDER.sub(lambda name: str(values[name[1]]), template)
+        if word.startswith("./"):
+            word = str(folder.resolve() / word.removeprefix("./"))
+        words.append(word)
+    program = words[0]
+    if not Path(program).is_absolute() and shutil.which(program) is None:
+        raise EstimatorFailure("refused", f"no executable {program!r} on PATH; install it, or name it by its path")
+    return words
 
 
 class CommandProgram:
-    """A program that is run once at the start; each frame is then answered with what it wrote of it.
+    """A program that runs once at the start; each frame is then answered with the pose that the program wrote.
 
-    `write_dataset` fills the folder of {dataset}; a frame's cost is the program's, divided among all frames (N,).
+    `write_dataset` fills the folder of {dataset}; the program's cost is divided evenly among all frames (N,).
     """
 
     def __init__(
@@ -62,42 +71,64 @@ class CommandProgram:
         self._t_ns = t_ns
         self._write_dataset = write_dataset
         self._hidden = hidden
-        self._cost = (0.0, 0.0, 0.0)
+        self._wall_ms = 0.0  # a frame's share
+        self._cpu_ms = 0.0
+        self._memory_mib = 0.0
         self._poses = dict[int, Array]()
-        self.sandbox: Sandbox | None = None  # what the program could see; None where it has not been started
+        self.sandbox: Sandbox | None = None  # what the program could see; None if it has not been started
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
         """Write the recording, run the program on it and read its poses. Raises EstimatorFailure."""
-        del rig  # which is in the files
+        del rig  # it is in the files
+        frame_count = len(self._t_ns)
         with Home(self._log) as home:
-            dataset = home.path / "dataset"
-            dataset.mkdir()
-            try:
-                self._write_dataset(dataset)
-            except VobenchError as error:
-                raise EstimatorFailure("refused", str(error)) from None
-            values = {"dataset": dataset, "calib": dataset / CALIBRATION, "out": home.path / self._out, "seed": seed}
-            argv = filled(self._argv, self._folder, {**params, **values, "rate_hz": rate_hz(self._t_ns)})
-            began = time.monotonic()
+            dataset = self._written_dataset(home)
+            values = {
+                **params,
+                "dataset": dataset,
+                "calib": dataset / CALIBRATION,
+                "out": home.path / self._out,
+                "seed": seed,
+                "rate_hz": rate_hz(self._t_ns),
+            }
+            argv = filled(self._argv, self._folder, values)
+
+            began_s = time.monotonic()
             with Program(
-                argv, log=self._log, limits=self._limits, home=home, hidden=self._hidden, folder=self._folder.resolve()
+                argv,
+                log=self._log,
+                limits=self._limits,
+                home=home,
+                hidden=self._hidden,
+                folder=self._folder.resolve(),
             ) as program:
                 self.sandbox = program.sandbox
                 program.wait()
-                most_bytes = OUT_BYTES + OUT_BYTES_PER_FRAME * len(self._t_ns)
-                text = program.read(self._out, most_bytes=most_bytes).decode("utf-8", "replace")
-            self._poses = poses_in(text, self._t_ns)
-        wall_s = time.monotonic() - began
-        frames_per_ms = len(self._t_ns) / 1e3
-        self._cost = wall_s / frames_per_ms, program.cpu_s / frames_per_ms, program.peak_mib
+                content = program.read(self._out, most_bytes=OUT_BYTES + OUT_BYTES_PER_FRAME * frame_count)
+            self._poses = poses_in(content.decode("utf-8", "replace"), self._t_ns)
+        wall_s = time.monotonic() - began_s
+        self._wall_ms = 1e3 * wall_s / frame_count
+        self._cpu_ms = 1e3 * program.cpu_s / frame_count
+        self._memory_mib = program.peak_mib
+
+    def _written_dataset(self, home: Home) -> Path:
+        """The folder with the recording. Raises EstimatorFailure if its layout cannot hold this recording."""
+        dataset = home.path / "dataset"
+        dataset.mkdir()
+        try:
+            self._write_dataset(dataset)
+        except VobenchError as error:
+            raise EstimatorFailure("refused", str(error)) from None
+        return dataset
 
     def process(self, frame: Frame) -> Answer:
-        """What it wrote of a frame."""
+        """The pose that the program wrote for a frame."""
         T = self._poses.get(frame.t_ns)
-        return Answer(Result(T) if T is not None else Result(None, Status.LOST, "no_pose"), *self._cost)
+        result = Result(None, Status.LOST, "no_pose") if T is None else Result(T)
+        return Answer(result, self._wall_ms, self._cpu_ms, self._memory_mib)
 
     def finish(self) -> dict[int, Array]:
-        """All that it revised is in its poses already."""
+        """Nothing: revised poses are in its file already."""
         return {}
 
     def __enter__(self) -> Self:
@@ -108,12 +139,15 @@ class CommandProgram:
 
 
 def rate_hz(t_ns: Stamps) -> float:
-    """Frames a second, by the median of the steps of stamps (N,)."""
-    return round(1e9 / float(np.median(np.diff(t_ns))), 6) if len(t_ns) > 1 else 1.0
+    """Frames per second, by the median of the steps of stamps (N,)."""
+    if len(t_ns) < 2:
+        return 1.0
+    step_ns = float(np.median(np.diff(t_ns)))
+    return round(1e9 / step_ns, 6)
 
 
 def poses_in(text: str, t_ns: Stamps) -> dict[int, Array]:
-    """The poses that a program wrote, by the stamps of the frames, each within half a step of its own.
+    """The poses that a program wrote, by the stamps of the frames (N,), each within half a step of its own.
 
     Any form that `vobench score` reads; one without stamps has a pose for each frame. Raises EstimatorFailure.
     """
@@ -131,19 +165,33 @@ def poses_in(text: str, t_ns: Stamps) -> dict[int, Array]:
 
 
 def _matched(parsed: Parsed, t_ns: Stamps) -> dict[int, Array]:
-    """Each pose at the frame whose stamp is nearest. Raises TrajectoryError where that is none of the poses' own."""
-    stamps = parsed.t_ns if parsed.t_ns is not None else parsed.stamped_by(t_ns)
+    """Each pose by the stamp of the nearest frame.
+
+    Raises TrajectoryError if a pose is too far away, or if a frame has no pose of its own stamp or several.
+    """
+    stamps = parsed.stamped_by(t_ns) if parsed.t_ns is None else parsed.t_ns
     if stamps is None:
         raise TrajectoryError(f"{{out}} has {len(parsed.T)} poses without stamps, for {len(t_ns)} frames")
-    if np.abs(parsed.T[:, :3, 3]).max() > FARTHEST_M:
+    positions_m = parsed.T[:, :3, 3]
+    if np.abs(positions_m).max() > FARTHEST_M:
         raise TrajectoryError(f"{{out}} has a pose farther than {FARTHEST_M:g} m away")
-    after = np.clip(np.searchsorted(t_ns, stamps), 1, max(len(t_ns) - 1, 1))
-    near = np.where(stamps - t_ns[after - 1] < t_ns[after] - stamps, after - 1, after) if len(t_ns) > 1 else after - 1
-    half_ns = np.diff(t_ns).min() / 2 if len(t_ns) > 1 else np.inf
-    off = np.abs(t_ns[near] - stamps) > half_ns
-    again = np.diff(near, prepend=-1) < 1
-    for wrong, said in ((off, "no frame"), (again, "the same frame as the one before")):
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            raise TrajectoryError(f"{{out}}: pose {row}, stamped {stamps[row] / 1e9:.9f} s, is of {said}")
-    return dict(zip(t_ns[near].tolist(), parsed.T, strict=True))
+
+    frames = _nearest(t_ns, stamps)
+    half_step_ns = np.diff(t_ns).min() / 2 if len(t_ns) > 1 else np.inf
+    is_off = np.abs(t_ns[frames] - stamps) > half_step_ns
+    is_repeated = np.diff(frames, prepend=-1) < 1
+    for is_wrong, cause in ((is_off, "no frame"), (is_repeated, "the same frame as the one before")):
+        if is_wrong.any():
+            row = int(np.argmax(is_wrong))
+            raise TrajectoryError(f"{{out}}: pose {row}, stamped {stamps[row] / 1e9:.9f} s, is of {cause}")
+    return dict(zip(t_ns[frames].tolist(), parsed.T, strict=True))
+
+
+def _nearest(t_ns: Stamps, stamps: Stamps) -> NDArray[np.intp]:
+    """The index (M,) of the stamp in t_ns (N,) that is nearest to each of these stamps (M,); the later one of two."""
+    if len(t_ns) == 1:
+        return np.zeros(len(stamps), np.intp)
+    after = np.clip(np.searchsorted(t_ns, stamps), 1, len(t_ns) - 1)
+    before = after - 1
+    is_nearer_before = stamps - t_ns[before] < t_ns[after] - stamps
+    return np.where(is_nearer_before, before, after)

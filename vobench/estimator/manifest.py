@@ -1,4 +1,4 @@
-"""What an estimator's `estimator.yaml` may say: how it is run, what it needs, what it claims, what it may take."""
+"""The settings of an estimator's `estimator.yaml`: how it is run, its sensors, its claims and its limits."""
 
 import re
 from dataclasses import field
@@ -25,7 +25,7 @@ Argv = tuple[Annotated[str, MinLen(1)], ...]
 
 @settings()
 class Limits:
-    """What an estimator may take, its processes together; the clock of `trial_s` runs from its start."""
+    """Limits of an estimator's processes together; the clock of `trial_s` runs from its start."""
 
     start_s: Positive = 60.0
     frame_s: Positive = 20.0
@@ -44,7 +44,7 @@ def _key_of(name: str) -> str:
 
 @settings()
 class Manifest:
-    """One estimator: its name, one way to run it, which sensors it needs, whose pose it gives, what it claims."""
+    """One estimator: its name, how it is run, the sensors it needs, the frame of its poses, and its claims."""
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"alias_generator": _key_of}
 
@@ -67,35 +67,48 @@ class Manifest:
     params: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        ways = {"class": self.class_path, "command": self.command, "stream": self.stream, "oracle": self.oracle}
-        given = [way for way, said in ways.items() if said]
+        kinds = {
+            "class": self.class_path,
+            "command": self.command,
+            "stream": self.stream,
+            "oracle": self.oracle,
+        }
+        given = [kind for kind, value in kinds.items() if value]
         if len(given) != 1:
-            raise SettingError(f"an estimator has one of {', '.join(ways)} (got {' and '.join(given) or 'none'})")
-        if self.command and self.out == OUT and not any("{out}" in word for word in self.command):
+            raise SettingError(f"an estimator has one of {', '.join(kinds)} (got {' and '.join(given) or 'none'})")
+        names_out = any("{out}" in word for word in self.command)
+        if self.command and self.out == OUT and not names_out:
             raise SettingError(
-                "should have {out}, where the program is to write its poses, or `out` say where", "command"
+                "should have {out}, the file for the program's poses, or `out` should name it", "command"
             )
-        for key, argv, known in (("command", self.command, PLACEHOLDERS), ("stream", self.stream, IN_STREAM)):
-            for name in PLACEHOLDER.findall(" ".join(argv)):
-                if name not in (*known, *self.params):
-                    raise SettingError(unknown("placeholder or parameter", name, [*known, *self.params]), key)
+        self._check_placeholders("command", self.command, PLACEHOLDERS)
+        self._check_placeholders("stream", self.stream, IN_STREAM)
+
+    def _check_placeholders(self, key: str, argv: Argv, placeholders: tuple[str, ...]) -> None:
+        """Raise SettingError if an argv has a placeholder that is neither one of these nor a parameter."""
+        known = [*placeholders, *self.params]
+        for name in PLACEHOLDER.findall(" ".join(argv)):
+            if name not in known:
+                raise SettingError(unknown("placeholder or parameter", name, known), key)
 
     @property
     def described(self) -> str:
-        """The summary or, where the manifest has none, how the estimator is run and which sensors it needs."""
+        """The summary or, without one, how the estimator is run and which sensors it needs."""
         if self.summary:
             return self.summary
-        how = self.class_path or " ".join(self.command or self.stream) or "oracle"
-        return f"{how}, needs {' and '.join(self.needs) or 'no sensor'}"
+        argv = self.command or self.stream
+        program = self.class_path or " ".join(argv) or "oracle"
+        sensors = " and ".join(self.needs) or "no sensor"
+        return f"{program}, needs {sensors}"
 
     @property
     def claims(self) -> tuple[str, ...]:
-        """What a board says beside the name, as it is not what all others claim."""
-        said = {
+        """The claims that a board shows beside the name: those that most estimators do not make."""
+        claims = {
             "Sim(3)": not self.metric,
             "whole recording": bool(self.command),
             "not causal": not self.causal and not self.command,
             "not deterministic": not self.deterministic,
             "oracle": self.oracle,
         }
-        return tuple(claim for claim, holds in said.items() if holds)
+        return tuple(claim for claim, holds in claims.items() if holds)

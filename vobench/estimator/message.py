@@ -1,7 +1,7 @@
 """The messages between vobench and an estimator, as bytes: the calibration and frames out, answers back.
 
-docs/estimators.md has the specification. Every message is a tag of four letters, the length of what follows in bytes
-(uint32), and that; all numbers are little-endian. What comes back is numbers and text: nothing of it is unpickled.
+docs/estimators.md has the specification. Every message is a tag of four letters, the length of its payload in bytes
+(uint32), and the payload; all numbers are little-endian. Answers are numbers and text: nothing of them is unpickled.
 """
 
 import json
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.estimator.check import InvalidOutputError, checked, checked_revision
-from vobench.estimator.protocol import Frame, Result, Status, Tracks
+from vobench.estimator.protocol import Frame, Image, Result, Status, Tracks
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
@@ -23,7 +23,8 @@ from vobench.geometry.se3 import Array
 VERSION = 1
 HEADER = struct.Struct("<4sI")
 FRAME = struct.Struct("<qqIIIIII")  # index, t_ns, width, height, channels, pictures, IMU readings, encoder readings
-ANSWER = struct.Struct("<qII")  # index, status, what follows: the sum of some of these
+STAMP = struct.Struct("<q")  # t_ns of a reading, or a frame's index
+ANSWER = struct.Struct("<qII")  # index, status, contents: the sum of these bits
 POSE = 1
 COVARIANCE = 2
 STATS = 4
@@ -32,18 +33,24 @@ POINTS = 16
 COUNT = struct.Struct("<I")
 STATUSES = tuple(Status)
 LAST_ROW = np.array([0.0, 0.0, 0.0, 1.0])
-# What an estimator may say instead of an answer, and the status of its trial then.
+# Tags of failures, which may come instead of an answer, and the status of the trial then.
 FAILURES = {b"FAIL": "refused", b"CRSH": "crashed", b"NMEM": "out_of_memory", b"WRNG": "invalid_output"}
-ANSWER_BYTES = 64 << 20  # a pose, some numbers, tracks and points; more is no answer but noise on the connection
+ANSWER_BYTES = 64 << 20  # limit of an answer; more than this is noise on the connection
 STATS_BYTES = 1 << 16
 REASON_BYTES = 1 << 12
 
 
 def calibration(rig: Rig) -> dict[str, Any]:
-    """A rig as JSON: cameras by their models, the left one first; places as (4, 4) in rows; None for what is not."""
-    cameras = [_camera(rig.camera(side), rig.T_body_camera(side)) for side in rig.sides]
-    imu = rig.imu and {**asdict(rig.imu), "T_body_imu": rig.imu.T_body_imu.tolist()}
-    return {"cameras": cameras, "imu": imu, "wheels": asdict(rig.wheels) if rig.wheels else None}
+    """A rig as JSON: cameras by their models, the left one first; poses as (4, 4) by rows; None for no sensor."""
+    cameras = []
+    for side in rig.sides:
+        T_body_camera = rig.T_body_camera(side)
+        cameras.append(_camera(rig.camera(side), T_body_camera))
+    imu = None
+    if rig.imu:
+        imu = {**asdict(rig.imu), "T_body_imu": rig.imu.T_body_imu.tolist()}
+    wheels = asdict(rig.wheels) if rig.wheels else None
+    return {"cameras": cameras, "imu": imu, "wheels": wheels}
 
 
 def _camera(camera: Camera, T_body_camera: Array) -> dict[str, Any]:
@@ -52,63 +59,86 @@ def _camera(camera: Camera, T_body_camera: Array) -> dict[str, Any]:
 
 def framed(frame: Frame) -> list[bytes | memoryview]:
     """A frame's parts: FRAME, the pictures row by row, IMU readings and encoder counts, each after its stamp."""
-    pictures = [picture for picture in (frame.left, frame.right) if picture is not None]
-    height, width, channels = (*pictures[0].shape, 1)[:3] if pictures else (0, 0, 0)
-    imu = frame.imu
-    encoders = frame.encoders
-    counts = (len(pictures), 0 if imu is None else len(imu.t_ns), 0 if encoders is None else len(encoders.t_ns))
-    parts: list[bytes | memoryview] = [FRAME.pack(frame.index, frame.t_ns, width, height, channels, *counts)]
-    parts += [np.ascontiguousarray(picture).tobytes() for picture in pictures]
-    if imu is not None:
-        values = np.hstack([imu.gyro_radps, imu.accel_mps2]).astype("<f8")
-        parts += [struct.pack("<q", t) + row.tobytes() for t, row in zip(imu.t_ns.tolist(), values, strict=True)]
-    if encoders is not None:
-        parts.append(np.column_stack([encoders.t_ns, encoders.ticks]).astype("<i8").tobytes())
+    parts: list[bytes | memoryview] = [_frame_head(frame)]
+    parts += [np.ascontiguousarray(picture).tobytes() for picture in _pictures(frame)]
+    if frame.imu is not None:
+        vectors = np.hstack([frame.imu.gyro_radps, frame.imu.accel_mps2]).astype("<f8")
+        for t_ns, row in zip(frame.imu.t_ns.tolist(), vectors, strict=True):
+            parts.append(STAMP.pack(t_ns) + row.tobytes())
+    if frame.encoders is not None:
+        counts = np.column_stack([frame.encoders.t_ns, frame.encoders.ticks])
+        parts.append(counts.astype("<i8").tobytes())
     return parts
 
 
+def _pictures(frame: Frame) -> list[Image]:
+    return [picture for picture in (frame.left, frame.right) if picture is not None]
+
+
+def _frame_head(frame: Frame) -> bytes:
+    pictures = _pictures(frame)
+    height = 0
+    width = 0
+    channels = 0
+    if pictures:
+        height, width, channels = (*pictures[0].shape, 1)[:3]  # a grey picture has one channel
+    imu_readings = 0 if frame.imu is None else len(frame.imu.t_ns)
+    encoder_readings = 0 if frame.encoders is None else len(frame.encoders.t_ns)
+    return FRAME.pack(frame.index, frame.t_ns, width, height, channels, len(pictures), imu_readings, encoder_readings)
+
+
 def pickled(frame: Frame) -> list[bytes | memoryview]:
-    """A frame's parts for our own worker: its pickle and its arrays as they lie in memory, each after its length."""
+    """A frame's parts for vobench's own worker: its pickle and its arrays in memory order, each after its length."""
     arrays = list[pickle.PickleBuffer]()
-    said = pickle.dumps(frame, 5, buffer_callback=arrays.append)
-    parts: list[bytes | memoryview] = [said, *(array.raw() for array in arrays)]
-    return [each for part in parts for each in (COUNT.pack(len(part)), part)]
+    head = pickle.dumps(frame, 5, buffer_callback=arrays.append)
+    contents: list[bytes | memoryview] = [head, *(array.raw() for array in arrays)]
+    parts: list[bytes | memoryview] = []
+    for content in contents:
+        parts += [COUNT.pack(len(content)), content]
+    return parts
 
 
 def unpickled(payload: bytearray) -> Frame:
-    """The frame of these parts; its arrays are the payload's memory."""
+    """The frame of these parts; its arrays share the payload's memory."""
     view = memoryview(payload)
-    parts = list[memoryview]()
+    contents = list[memoryview]()
     while view:
-        end = COUNT.size + COUNT.unpack_from(view)[0]
-        parts.append(view[COUNT.size : end])
+        (length,) = COUNT.unpack_from(view)
+        end = COUNT.size + length
+        contents.append(view[COUNT.size : end])
         view = view[end:]
-    frame: Frame = pickle.loads(parts[0], buffers=parts[1:])
+    frame: Frame = pickle.loads(contents[0], buffers=contents[1:])
     return frame
 
 
 def answered(result: Result, index: int) -> bytes:
-    """What a POSE says: a checked result of a frame as bytes."""
-    reason = result.reason.encode("utf-8", "replace")
-    what = 0
+    """The payload of a POSE: a checked result of a frame as bytes. Raises InvalidOutputError if it is too long."""
+    contents = 0
     parts = list[bytes]()
-    for bit, table in ((POSE, result.T_odom_frame), (COVARIANCE, result.covariance)):
-        if table is not None:
-            what |= bit
-            parts.append((table[:3] if bit == POSE else table).astype("<f8").tobytes())
+    if result.T_odom_frame is not None:
+        contents |= POSE
+        parts.append(_numbers(result.T_odom_frame[:3]))
+    if result.covariance is not None:
+        contents |= COVARIANCE
+        parts.append(_numbers(result.covariance))
     if result.stats:
-        said = json.dumps(dict(result.stats)).encode()
-        if len(said) > STATS_BYTES:
-            raise InvalidOutputError(f"frame {index}: {len(said)} bytes of stats, where {STATS_BYTES} are the limit")
-        what |= STATS
-        parts.append(COUNT.pack(len(said)) + said)
-    tracks = result.tracks
-    lines = None if tracks is None else np.column_stack([tracks.uv_last_px, tracks.uv_px, tracks.inlier])
-    for bit, rows in ((TRACKS, lines), (POINTS, result.points)):
-        if rows is not None:
-            what |= bit
-            parts.append(COUNT.pack(len(rows)) + rows.astype("<f8").tobytes())
-    payload = b"".join([ANSWER.pack(index, STATUSES.index(result.status), what), *parts, reason])
+        contents |= STATS
+        stats = json.dumps(dict(result.stats)).encode()
+        if len(stats) > STATS_BYTES:
+            raise InvalidOutputError(f"frame {index}: {len(stats)} bytes of stats, where {STATS_BYTES} are the limit")
+        parts.append(COUNT.pack(len(stats)) + stats)
+    if result.tracks is not None:
+        contents |= TRACKS
+        tracks = result.tracks
+        rows = np.column_stack([tracks.uv_last_px, tracks.uv_px, tracks.inlier])
+        parts.append(COUNT.pack(len(rows)) + _numbers(rows))
+    if result.points is not None:
+        contents |= POINTS
+        parts.append(COUNT.pack(len(result.points)) + _numbers(result.points))
+
+    head = ANSWER.pack(index, STATUSES.index(result.status), contents)
+    reason = result.reason.encode("utf-8", "replace")
+    payload = b"".join([head, *parts, reason])
     if len(payload) > ANSWER_BYTES:
         raise InvalidOutputError(
             f"frame {index}: an answer of {len(payload)} bytes, where {ANSWER_BYTES} are the limit"
@@ -116,69 +146,94 @@ def answered(result: Result, index: int) -> bytes:
     return payload
 
 
-def read_answer(payload: bytes, asked: int) -> Result:
-    """The checked result that a POSE has of the frame that was asked for. Raises InvalidOutputError."""
+def _numbers(array: Array) -> bytes:
+    return array.astype("<f8").tobytes()
+
+
+def read_answer(payload: bytes, requested: int) -> Result:
+    """The checked result in a POSE, of the frame that was requested. Raises InvalidOutputError."""
     try:
-        index, status, what = ANSWER.unpack_from(payload)
-        if index != asked:
-            raise InvalidOutputError(f"frame {asked}: the answer is to frame {index}")
-        if status >= len(STATUSES) or what >= 2 * POINTS:
-            raise InvalidOutputError(f"frame {asked}: no status {status} with contents {what}")
-        said = _Reader(payload, ANSWER.size)
-        T = np.vstack([said.numbers(3, 4), LAST_ROW]) if what & POSE else None
-        P = said.numbers(6, 6) if what & COVARIANCE else None
-        stats = json.loads(said.counted(STATS_BYTES)) if what & STATS else {}
-        rows = said.numbers(said.count(), 5) if what & TRACKS else None
-        points = said.numbers(said.count(), 3) if what & POINTS else None
-        tracks = None if rows is None else Tracks(rows[:, :2], rows[:, 2:4], rows[:, 4] != 0)
-        reason = payload[said.at : said.at + REASON_BYTES].decode("utf-8", "replace")
         with np.errstate(all="ignore"):
-            return checked(Result(T, STATUSES[status], reason, tracks, stats, P, points), asked)
+            return checked(_read_result(payload, requested), requested)
     except InvalidOutputError:
         raise
     except (struct.error, ValueError, RecursionError) as error:
-        raise InvalidOutputError(f"frame {asked}: {error}") from None
+        raise InvalidOutputError(f"frame {requested}: {error}") from None
+
+
+def _read_result(payload: bytes, requested: int) -> Result:
+    index, status, contents = ANSWER.unpack_from(payload)
+    if index != requested:
+        raise InvalidOutputError(f"frame {requested}: the answer is to frame {index}")
+    if status >= len(STATUSES) or contents >= 2 * POINTS:
+        raise InvalidOutputError(f"frame {requested}: no status {status} with contents {contents}")
+
+    reader = _Reader(payload, ANSWER.size)
+    T_odom_frame = reader.pose() if contents & POSE else None
+    covariance = reader.numbers(6, 6) if contents & COVARIANCE else None
+    stats = json.loads(reader.counted(STATS_BYTES)) if contents & STATS else {}
+    tracks = reader.tracks() if contents & TRACKS else None
+    points = reader.numbers(reader.count(), 3) if contents & POINTS else None
+    reason = reader.rest(REASON_BYTES).decode("utf-8", "replace")
+    return Result(T_odom_frame, STATUSES[status], reason, tracks, stats, covariance, points)
 
 
 def revision(index: int, T_odom_frame: Array) -> bytes:
-    """What a REVI says: a revised pose."""
-    return struct.pack("<q", index) + T_odom_frame[:3].astype("<f8").tobytes()
+    """The payload of a REVI: a revised pose."""
+    return STAMP.pack(index) + _numbers(T_odom_frame[:3])
 
 
 def read_revision(payload: bytes) -> Mapping[int, Array]:
     """The checked pose of a REVI, by its frame's index. Raises InvalidOutputError."""
     try:
-        (index,) = struct.unpack_from("<q", payload)
+        (index,) = STAMP.unpack_from(payload)
+        T_odom_frame = _Reader(payload, STAMP.size).pose()
         with np.errstate(all="ignore"):
-            return checked_revision({index: np.vstack([_Reader(payload, 8).numbers(3, 4), LAST_ROW])})
+            return checked_revision({index: T_odom_frame})
     except (struct.error, ValueError) as error:
         raise InvalidOutputError(f"finish(): {error}") from None
 
 
 class _Reader:
-    """Reads one thing after another from a message. Raises InvalidOutputError where it is too short."""
+    """Reads one part after another from a message. Raises ValueError where it is too short."""
 
-    def __init__(self, payload: bytes, at: int) -> None:
+    def __init__(self, payload: bytes, start: int) -> None:
         self._payload = payload
-        self.at = at
+        self._position = start
 
     def _take(self, length: int) -> bytes:
-        self.at += length
-        if self.at > len(self._payload):
-            raise ValueError(f"a message of {len(self._payload)} bytes should have {self.at} or more")
-        return self._payload[self.at - length : self.at]
+        start = self._position
+        self._position += length
+        if self._position > len(self._payload):
+            raise ValueError(f"a message of {len(self._payload)} bytes should have {self._position} or more")
+        return self._payload[start : self._position]
 
     def count(self) -> int:
         """A uint32."""
-        return int(COUNT.unpack(self._take(COUNT.size))[0])
+        (count,) = COUNT.unpack(self._take(COUNT.size))
+        return int(count)
 
-    def counted(self, most: int) -> bytes:
-        """So many bytes as the uint32 before them says, `most` at most."""
+    def counted(self, limit: int) -> bytes:
+        """The bytes that a uint32 before them counts, `limit` at most."""
         length = self.count()
-        if length > most:
-            raise ValueError(f"{length} bytes of stats, where {most} are the limit")
+        if length > limit:
+            raise ValueError(f"{length} bytes of stats, where {limit} are the limit")
         return self._take(length)
 
     def numbers(self, rows: int, columns: int) -> NDArray[np.float64]:
         """A table of float64."""
-        return np.frombuffer(self._take(8 * rows * columns), "<f8").reshape(rows, columns)
+        values = np.frombuffer(self._take(8 * rows * columns), "<f8")
+        return values.reshape(rows, columns)
+
+    def pose(self) -> NDArray[np.float64]:
+        """A transform (4, 4), of which the message has three rows."""
+        return np.vstack([self.numbers(3, 4), LAST_ROW])
+
+    def tracks(self) -> Tracks:
+        """Tracks, a row of the message each: pixel before, pixel now, inlier."""
+        rows = self.numbers(self.count(), 5)
+        return Tracks(rows[:, :2], rows[:, 2:4], rows[:, 4] != 0)
+
+    def rest(self, limit: int) -> bytes:
+        """The bytes that are left, `limit` at most."""
+        return self._payload[self._position : self._position + limit]

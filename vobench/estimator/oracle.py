@@ -1,4 +1,4 @@
-"""`noisy_truth`: the truth with noise of a stated level, which the harness itself draws; no plugin is run."""
+"""`noisy_truth`: the ground truth with noise of a stated level, drawn by the harness itself; no plugin runs."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,11 +12,13 @@ from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.trajectory.trajectory import Trajectory
 
+NOISE_STREAM = 20260101  # sets this noise apart from other streams of a seed
+
 
 class NoisyTruth:
-    """True poses of the left camera with independent noise of the deviations `position_m` and `rotation_rad`.
+    """True poses of the left camera with independent noise of the standard deviations `position_m` and `rotation_rad`.
 
-    It states the covariance of that noise, times `stated`.
+    The stated covariance is that of the noise, times `stated`.
     """
 
     def __init__(self, gt: Trajectory) -> None:
@@ -24,24 +26,26 @@ class NoisyTruth:
         self._T_odom_left = dict(zip(gt.t_ns.tolist(), T_odom_left, strict=True))
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Take the level of noise."""
+        """Take the level of noise. Raises EstimatorFailure if it is not positive."""
         del rig
-        self._sigma = np.repeat([params["position_m"], params["rotation_rad"]], 3)
+        self._sigmas = np.repeat([params["position_m"], params["rotation_rad"]], 3)
         self._stated = params["stated"]
-        self._rng = np.random.default_rng([seed, 20260101])
-        if not ((self._sigma > 0).all() and self._stated > 0):
+        self._rng = np.random.default_rng([seed, NOISE_STREAM])
+        has_noise = (self._sigmas > 0).all()
+        if not has_noise or self._stated <= 0:
             raise EstimatorFailure("refused", "position_m, rotation_rad and stated should be more than 0")
 
     def process(self, frame: Frame) -> Answer:
-        """The true pose at a frame, moved and turned by noise about the axes of odom."""
-        e = self._rng.normal(size=6) * self._sigma
+        """The true pose at a frame with noise about the axes of odom."""
+        noise = self._rng.normal(size=6) * self._sigmas
         T = self._T_odom_left.get(frame.t_ns)
         if T is None:
             return Answer(Result(None, Status.LOST, "no truth"), 0.0, 0.0)
-        half_rad = np.linalg.norm(e[3:]) / 2
-        R = se3.from_quaternion([*(np.sinc(half_rad / np.pi) * e[3:] / 2), np.cos(half_rad)]) @ T[:3, :3]
-        P = np.diag(self._stated * self._sigma**2)
-        return Answer(Result(se3.transform(R, T[:3, 3] + e[:3]), covariance=P), 0.0, 0.0)
+        noise_m = noise[:3]
+        R_noise = _rotation(noise[3:])
+        T_noisy = se3.transform(R_noise @ T[:3, :3], T[:3, 3] + noise_m)
+        covariance = np.diag(self._stated * self._sigmas**2)
+        return Answer(Result(T_noisy, covariance=covariance), 0.0, 0.0)
 
     def finish(self) -> dict[int, Array]:
         """Nothing to revise."""
@@ -52,3 +56,10 @@ class NoisyTruth:
 
     def __exit__(self, *_: object) -> None:
         """Nothing to end."""
+
+
+def _rotation(vector: Array) -> Array:
+    """The matrix (3, 3) of a rotation vector (3,) in rad."""
+    half_rad = np.linalg.norm(vector) / 2
+    x, y, z = np.sinc(half_rad / np.pi) * vector / 2
+    return se3.from_quaternion([x, y, z, np.cos(half_rad)])

@@ -1,6 +1,6 @@
-"""A running estimator that is sent one frame at a time: a program of any language, or our worker with a class in it.
+"""A running estimator that is sent one frame at a time: a program in any language, or vobench's worker with a class.
 
-What it says is data: read as far as it is long, within one deadline for sending and receiving, and checked here.
+Its messages are data: read up to their stated length, within one deadline for sending and receiving, and checked.
 """
 
 import fcntl
@@ -38,7 +38,8 @@ from vobench.estimator.sandbox import Sandbox, hint_on_modules
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 
-PIPE_BYTES = 1 << 20  # what anybody may ask for
+PIPE_BYTES = 1 << 20  # the largest pipe of a user without privileges
+READ_BYTES = 1 << 20
 WORKER = (sys.executable, "-P", "-m", "vobench.estimator.worker")
 
 
@@ -51,7 +52,7 @@ class Door:
 
 
 class EstimatorProcess:
-    """A running estimator; what it prints goes to `log`. Its verbs raise EstimatorFailure."""
+    """A running estimator; what it prints goes to `log`. Its methods raise EstimatorFailure."""
 
     def __init__(
         self, door: Door, *, log: Path, limits: Limits, hidden: Sequence[Path] = (), folder: Path | None = None
@@ -65,7 +66,7 @@ class EstimatorProcess:
 
     @property
     def sandbox(self) -> Sandbox | None:
-        """What the estimator could see; None where it has not been started."""
+        """What the estimator could see; None if it has not been started."""
         return self._program.sandbox if self._running else None
 
     @classmethod
@@ -80,9 +81,10 @@ class EstimatorProcess:
         is_watched: bool = False,
         hidden: Sequence[Path] = (),
     ) -> Self:
-        """A class in Python, in a process of its own; who `is_watched` fails where it changes a frame."""
+        """A class in Python, in a process of its own; one that `is_watched` fails if it changes a frame."""
         folder = folder.resolve()
-        argv = [*WORKER, str(folder), class_path, name, str(limits.memory_mib << 20)]
+        memory_bytes = limits.memory_mib << 20
+        argv = [*WORKER, str(folder), class_path, name, str(memory_bytes)]
 
         def opened(rig: Rig, params: Mapping[str, Any], seed: int) -> tuple[Sequence[str], bytes]:
             return argv, pickle.dumps((rig, dict(params), seed, is_watched))
@@ -103,21 +105,26 @@ class EstimatorProcess:
         """A program that takes frames on standard input and gives poses on standard output."""
 
         def opened(rig: Rig, params: Mapping[str, Any], seed: int) -> tuple[Sequence[str], bytes]:
-            said = {"version": VERSION, "seed": seed, "rate_hz": rate_hz, "params": dict(params), **calibration(rig)}
-            return filled(argv, folder, {**params, "seed": seed, "rate_hz": rate_hz}), json.dumps(
-                said, default=str
-            ).encode()
+            content = {
+                "version": VERSION,
+                "seed": seed,
+                "rate_hz": rate_hz,
+                "params": dict(params),
+                **calibration(rig),
+            }
+            words = filled(argv, folder, {**params, "seed": seed, "rate_hz": rate_hz})
+            return words, json.dumps(content, default=str).encode()
 
         return cls(Door(opened, framed), log=log, limits=limits, hidden=hidden, folder=folder)
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Start it, hand over the calibration, and wait until it is ready; a second time, to start again."""
-        argv, said = self._door.opened(rig, params, seed)
+        """Start it, send the calibration, and wait until it is ready; a second call starts it again."""
+        argv, payload = self._door.opened(rig, params, seed)
         if self._running is None:
             self._open(list(argv))
         self._frames = 0
         until = self._until(self._limits.start_s)
-        self._send(b"CALB", [said], until)
+        self._send(b"CALB", [payload], until)
         self._receive("its start", {b"REDY"}, until)
         self._program.look(at_once=True)
 
@@ -139,29 +146,32 @@ class EstimatorProcess:
         self._input = process.stdin.fileno()
         self._output = process.stdout.fileno()
         os.set_blocking(self._input, False)
-        with suppress(OSError, AttributeError):  # Linux's: a picture goes in one piece
+        with suppress(OSError, AttributeError):  # on Linux only, so that a picture is sent in one piece
             fcntl.fcntl(self._input, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
 
     def process(self, frame: Frame) -> Answer:
-        """Hand over the next frame; what the estimator says of it, checked."""
-        cpu_s = self._program.cpu_s
+        """Send the next frame; its checked answer."""
+        cpu_before_s = self._program.cpu_s
         parts = self._door.framed(frame)
         self._refuse_early_answer(f"frame {frame.index}")
-        began = time.monotonic()
+
+        began_s = time.monotonic()
         until = self._until(self._limits.frame_s)
         self._send(b"FRAM", parts, until)
         _, payload = self._receive(f"frame {frame.index}", {b"POSE"}, until)
-        wall_s = time.monotonic() - began
-        self._frames = self._frames + 1
+        wall_s = time.monotonic() - began_s
+
+        self._frames += 1
         self._program.look(at_once=True)
         try:
             result = read_answer(payload, frame.index)
         except InvalidOutputError as error:
             raise EstimatorFailure("invalid_output", str(error)) from None
-        return Answer(result, 1e3 * wall_s, 1e3 * (self._program.cpu_s - cpu_s), self._program.peak_mib)
+        cpu_s = self._program.cpu_s - cpu_before_s
+        return Answer(result, 1e3 * wall_s, 1e3 * cpu_s, self._program.peak_mib)
 
     def finish(self) -> dict[int, Array]:
-        """Say that there are no more frames; the poses that it revises, until it says so too or ends well."""
+        """Tell it that there are no more frames; the poses that it revises before it is done or ends well."""
         self._refuse_early_answer("the end")
         revised = dict[int, Array]()
         until = self._until(self._program.left_s())
@@ -177,9 +187,9 @@ class EstimatorProcess:
         raise EstimatorFailure("invalid_output", f"the end: more poses revised than the {self._frames} frames it had")
 
     def _refuse_early_answer(self, what: str) -> None:
-        """Raise EstimatorFailure where it has answered what it has not been asked yet."""
-        answered, _, _ = select.select([self._output], [], [], 0)
-        if answered:
+        """Raise EstimatorFailure if it has answered before the request."""
+        readable, _, _ = select.select([self._output], [], [], 0)
+        if readable:
             self._receive(f"{what}, before it was asked", set(), self._until(self._limits.frame_s))
 
     def _until(self, limit_s: float) -> float:
@@ -187,60 +197,66 @@ class EstimatorProcess:
         return time.monotonic() + limit_s
 
     def _send(self, tag: bytes, parts: Sequence[bytes | memoryview], until: float) -> None:
-        for part in (HEADER.pack(tag, sum(map(len, parts))), *parts):
-            left = memoryview(part)
-            while left:
+        length = sum(map(len, parts))
+        for part in (HEADER.pack(tag, length), *parts):
+            unsent = memoryview(part)
+            while unsent:
                 self._await([], [self._input], until)
                 try:
-                    left = left[os.write(self._input, left) :]
+                    sent = os.write(self._input, unsent)
                 except BlockingIOError:
                     continue
                 except BrokenPipeError:
                     if tag != b"DONE":
-                        self._receive("its input", set(), until)  # why it went, if it says so
+                        self._receive("its input", set(), until)  # a failure, if it reports one
                     return
+                unsent = unsent[sent:]
 
     def _receive(self, what: str, tags: set[bytes], until: float) -> tuple[bytes, bytes]:
-        """The next message; an empty tag where the program has ended well and may."""
+        """The next message; an empty tag if the program has ended well, where that is among the tags."""
         head = self._read(HEADER.size, what, until, may_end=b"" in tags)
         if not head:
             return b"", b""
         tag, length = HEADER.unpack(head)
         if tag in FAILURES:
             reason = self._read(min(length, REASON_BYTES), what, until).decode("utf-8", "replace")
-            self._program.look(at_once=True)  # a limit, of which the failure may be a consequence
+            self._program.look(at_once=True)  # the failure may follow from a limit, which is then the cause
             is_isolated = self._program.sandbox.level != "none"
             if is_isolated and "ModuleNotFoundError" in reason:
                 reason += hint_on_modules(self._folder)
             raise EstimatorFailure(FAILURES[tag], reason)
         if tag not in tags or length > ANSWER_BYTES:
-            wanted = " or ".join(sorted(tag.decode() for tag in tags if tag)) or "nothing"
-            said = f"{tag!r} and {length} bytes"
-            raise EstimatorFailure("invalid_output", f"{what}: it should answer {wanted}, but says {said}")
+            names = sorted(tag.decode() for tag in tags if tag)
+            expected = " or ".join(names) or "nothing"
+            raise EstimatorFailure(
+                "invalid_output", f"{what}: it should answer {expected}, but says {tag!r} and {length} bytes"
+            )
         return tag, self._read(length, what, until)
 
     def _read(self, length: int, what: str, until: float, *, may_end: bool = False) -> bytes:
-        read = bytearray()
-        while len(read) < length:
+        content = bytearray()
+        while len(content) < length:
             self._await([self._output], [], until)
-            more = os.read(self._output, min(length - len(read), 1 << 20))
-            if not more:
+            missing = length - len(content)
+            part = os.read(self._output, min(missing, READ_BYTES))
+            if not part:
                 kind, reason = self._end(what)
-                if may_end and not read and kind == "invalid_output":
+                if may_end and not content and kind == "invalid_output":
                     return b""
-                torn = f": its answer breaks off after {len(read)} of {length} bytes" if read else ""
+                torn = f": its answer breaks off after {len(content)} of {length} bytes" if content else ""
                 raise EstimatorFailure(kind, reason + torn)
-            read += more
-        return bytes(read)
+            content += part
+        return bytes(content)
 
     def _end(self, what: str) -> tuple[str, str]:
-        """Status and reason of an end before its time."""
+        """Status and reason of a premature end."""
         kind, reason = self._program.death()
         return kind, f"{what}: {reason}" if kind == "invalid_output" else reason
 
     def _await(self, reads: list[int], writes: list[int], until: float) -> None:
         while True:
-            ready = select.select(reads, writes, [], max(min(LOOK_S, until - time.monotonic()), 0))
+            left_s = until - time.monotonic()
+            ready = select.select(reads, writes, [], max(min(LOOK_S, left_s), 0))
             self._program.look()
             if any(ready):
                 return

@@ -1,21 +1,20 @@
-"""Points of a stereo view, followed in both eyes until the view is too far away and a new one takes its place."""
+"""Points of a stereo view, tracked in both cameras until the view is too far away and a new one replaces it."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from vobench.estimator.pose import DisparityOffset, PoseFit, pose_from_points
+from vobench.estimator.disparity_offset import DisparityOffset
+from vobench.estimator.pose import PoseFit, pose_from_points
 from vobench.estimator.protocol import Image
-from vobench.estimator.tools import (
-    Mask,
+from vobench.estimator.stereo import StereoPair, predicted, shifted_left
+from vobench.estimator.tracking import (
     Points,
-    StereoPair,
     comparable,
     corners_per_cell,
     follow_predicted,
     inside,
     lucas_kanade,
-    predicted,
 )
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
@@ -23,7 +22,7 @@ from vobench.geometry.se3 import Array
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackerSettings:
-    """What a tracker looks for: corners in each of 6 x 4 cells, and how they are followed."""
+    """How many corners each of 6 x 4 cells has, and how they are tracked."""
 
     corners_per_cell: int
     corner_distance_px: float
@@ -35,7 +34,7 @@ class TrackerSettings:
 
 @dataclass(frozen=True, slots=True)
 class StereoView:
-    """A stereo pair, the pixels (N, 2) of its points in both pictures, and their disparities (N,) in px as measured."""
+    """A stereo pair, the pixels (N, 2) of its points in both pictures, and their measured disparities (N,) in px."""
 
     left: Image
     right: Image
@@ -46,9 +45,9 @@ class StereoView:
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """Points found again: where (N, 2) then and now in the left picture, and disparities (N,) then and now, in px.
+    """Tracks from the view: pixels (N, 2) in the left pictures and disparities (N,) in px, in the view and now.
 
-    Disparities are as measured; the later one is NaN where the right eye lost the point.
+    Disparities are as measured; the present one is NaN if the right camera lost the point.
     """
 
     uv_last_px: Points
@@ -58,13 +57,15 @@ class Followed:
 
     @property
     def flow_px(self) -> float:
-        """Median length of the tracks; 0 where there is none."""
-        flow = np.linalg.norm(self.uv_px - self.uv_last_px, axis=1)
-        return float(np.median(flow)) if len(flow) else 0.0
+        """Median length of the tracks; 0 without tracks."""
+        if not len(self.uv_px):
+            return 0.0
+        lengths_px = np.linalg.norm(self.uv_px - self.uv_last_px, axis=1)
+        return float(np.median(lengths_px))
 
 
 class StereoTracker:
-    """Holds one view and follows its points into later pictures, each from its own eye: the eyes' errors cancel."""
+    """Holds one view and tracks its points, left to left and right to right, so that the cameras' errors cancel."""
 
     def __init__(self, pair: StereoPair, settings: TrackerSettings) -> None:
         self._pair = pair
@@ -74,16 +75,15 @@ class StereoTracker:
 
     @property
     def has_view(self) -> bool:
-        """Whether there is a view to follow points from."""
+        """Whether there is a view to track points from."""
         return self._view is not None
 
     def look(self, left: Image, right: Image) -> bool:
-        """Take this pair as the view; False, and nothing happens, where it has too few points with a depth."""
+        """Take this pair as the view; return False, and keep the old view, if it has too few points with a depth."""
         s = self._settings
-        pair = self._pair
         corners = corners_per_cell(left, s.corners_per_cell, distance_px=s.corner_distance_px, margin_px=s.margin_px)
-        corners = corners[pair.seen(corners)]
-        in_right, disparity_px = pair.match(
+        corners = corners[self._pair.seen(corners)]
+        in_right, disparity_px = self._pair.match(
             left, right, corners, margin_px=s.margin_px, window_px=s.window_px, with_edges=False
         )
         known = np.isfinite(disparity_px)
@@ -93,51 +93,63 @@ class StereoTracker:
         return True
 
     def follow(self, left: Image, right: Image, T_now_last: Array) -> Followed:
-        """The view's points in a later pair, looked for where a predicted motion of the view would bring them."""
-        view = self._view
-        s = self._settings
-        assert view is not None
-        rho = (view.disparity_px - self.offset.px) / self._pair.focal_baseline
-        guess = predicted(self._pair.left, view.in_left, rho, T_now_last)
-        there, found = follow_predicted(*comparable(view.left, left), view.in_left, guess, window_px=s.window_px)
-        good = found & inside(there, left, s.margin_px) & self._pair.seen(there)
-        return Followed(
-            view.in_left[good], there[good], view.disparity_px[good], self._in_right(right, there, good, T_now_last)
-        )
-
-    def _in_right(self, right: Image, there: Points, good: Mask, T_now_last: Array) -> Array:
-        """Disparities (M,) now of the good ones, NaN for those lost: as much nearer as the prediction says, first."""
+        """The view's points in a later pair; a predicted motion of the view is the guess."""
         view = self._view
         pair = self._pair
         s = self._settings
         assert view is not None
-        if not good.any():
+        rho = (view.disparity_px - self.offset.px) / pair.focal_baseline
+        guess = predicted(pair.left, view.in_left, rho, T_now_last)
+
+        earlier, now = comparable(view.left, left)
+        there, found = follow_predicted(earlier, now, view.in_left, guess, window_px=s.window_px)
+        good = found & inside(there, left, s.margin_px) & pair.seen(there)
+        in_view = StereoView(view.left, view.right, view.in_left[good], view.in_right[good], view.disparity_px[good])
+        disparity_px = self._present_disparity(in_view, right, there[good], T_now_last)
+        return Followed(in_view.in_left, there[good], in_view.disparity_px, disparity_px)
+
+    def _present_disparity(self, view: StereoView, right: Image, there: Points, T_now_last: Array) -> Array:
+        """Disparities (N,) of a view's points, which are now at `there` (N, 2) in the left picture; NaN if lost.
+
+        The predicted motion gives the guess.
+        """
+        pair = self._pair
+        s = self._settings
+        if not len(there):
             return np.zeros(0)
-        points_m = pair.points(view.in_left[good], view.disparity_px[good] - self.offset.px)
-        shift_px = pair.focal_baseline / se3.apply(T_now_last, points_m)[:, 2] + self.offset.px
-        beside = pair.right.from_view(pair.left.in_view(there[good]) - np.c_[shift_px, np.zeros_like(shift_px)])
-        start = view.in_right[good]
-        guess = np.where(np.isfinite(beside), beside, start).astype(np.float32)
-        # One way only: least squares sees whether both eyes agree.
-        in_right, found = lucas_kanade(*comparable(view.right, right), start, guess, window_px=s.window_px)
-        disparity_px = pair.disparity(there[good], in_right)
-        return np.where(found & inside(in_right, right, s.margin_px), disparity_px, np.nan)
+        offset_px = self.offset.px
+        points_m = pair.points(view.in_left, view.disparity_px - offset_px)
+        depth_m = se3.apply(T_now_last, points_m)[:, 2]
+        predicted_px = pair.focal_baseline / depth_m + offset_px
+        in_right_view = shifted_left(pair.left.in_view(there), predicted_px)
+        in_right_guess = pair.right.from_view(in_right_view)
+        guess = np.where(np.isfinite(in_right_guess), in_right_guess, view.in_right).astype(np.float32)
+
+        # Not checked backwards: least squares shows whether both cameras agree.
+        earlier, now = comparable(view.right, right)
+        in_right, found = lucas_kanade(earlier, now, view.in_right, guess, window_px=s.window_px)
+        disparity_px = pair.disparity(there, in_right)
+        is_tracked = found & inside(in_right, right, s.margin_px)
+        return np.where(is_tracked, disparity_px, np.nan)
 
     def fit(self, followed: Followed) -> PoseFit | None:
-        """The motion T_now_last of the view that explains the points; None where there is none."""
+        """The motion T_now_last of the view that explains the points; None if there is none."""
         if len(followed.uv_px) < self._settings.min_points:
             return None
+        true_last_px = followed.disparity_last_px - self.offset.px
+        true_px = followed.disparity_px - self.offset.px
         return pose_from_points(
-            self._pair.points(followed.uv_last_px, followed.disparity_last_px - self.offset.px),
+            self._pair.points(followed.uv_last_px, true_last_px),
             self._pair.left.in_view(followed.uv_px),
             self._pair.K,
-            disparity_px=followed.disparity_px - self.offset.px,
+            disparity_px=true_px,
             baseline_m=self._pair.baseline_m,
             ransac_px=self._settings.ransac_px,
         )
 
     def learn(self, followed: Followed, T_now_last: Array) -> None:
-        """Learn the pair's offset of disparity from points followed over a motion that is known by now."""
-        rays0 = self._pair.left.rays(followed.uv_last_px)
-        rays1 = self._pair.left.rays(followed.uv_px)
-        self.offset = self.offset.after(rays0, rays1, followed.disparity_last_px, T_now_last, self._pair)
+        """Update the pair's disparity offset from tracks over a motion that is known by now."""
+        rays_last = self._pair.left.rays(followed.uv_last_px)
+        rays_now = self._pair.left.rays(followed.uv_px)
+        disparity_px = followed.disparity_last_px
+        self.offset = self.offset.after(rays_last, rays_now, disparity_px, T_now_last, self._pair)

@@ -1,4 +1,4 @@
-"""The process an estimator runs in: its folder imported, frames handed to it."""
+"""The process that an estimator's class runs in: it imports the estimator's folder and passes frames to it."""
 
 import errno
 import importlib
@@ -26,36 +26,38 @@ NAMESPACE = "vobench_estimators"
 def load(folder: Path, class_path: str, *, name: str) -> Estimator:
     """A new estimator from `file:Class` in a folder, imported as the package `vobench_estimators.<name>`.
 
-    Raises VobenchError, one line, where the plugin cannot be imported, found or constructed.
+    Raises VobenchError, one line, if the plugin cannot be imported, found or constructed.
     """
     folder = folder.resolve()
-    (module_name, _, class_name) = class_path.partition(":")
+    module_name, _, class_name = class_path.partition(":")
     file = folder / f"{module_name.replace('.', '/')}.py"
     if not file.is_file():
         raise VobenchError(f"estimator {name!r} says class: {class_path}, but there is no {file}")
-    made = getattr(_module(folder, f"{NAMESPACE}.{name}", module_name), class_name, None)
-    if not isinstance(made, type):
+    module = _module(folder, f"{NAMESPACE}.{name}", module_name)
+    kind = getattr(module, class_name, None)
+    if not isinstance(kind, type):
         raise VobenchError(f"estimator {name!r} has no class {class_name!r}: {file}")
-    missing = [verb for verb in ("start", "process") if not callable(getattr(made, verb, None))]
+    missing = [method for method in ("start", "process") if not callable(getattr(kind, method, None))]
     if missing:
         raise VobenchError(f"{class_name} lacks the method {' and '.join(missing)}: {file}")
     try:
-        return cast("Estimator", made())
+        return cast("Estimator", kind())
     except Exception as error:  # the user's code may raise anything
         raise VobenchError(f"{class_name}() {_cause(error, folder)}") from error
 
 
 def _module(folder: Path, package: str, module_name: str) -> ModuleType:
     """The module with the class, freshly imported from this folder and no other of the same name."""
-    for name in [name for name in sys.modules if name == package or name.startswith(f"{package}.")]:
-        del sys.modules[name]
+    for name in list(sys.modules):
+        if f"{name}.".startswith(f"{package}."):
+            del sys.modules[name]
     importlib.invalidate_caches()
     try:
         _open_package(package, folder)
         return importlib.import_module(f"{package}.{module_name}")
     except Exception as error:
-        name = package.removeprefix(f"{NAMESPACE}.")
-        raise VobenchError(f"estimator {name!r} cannot be imported: {_cause(error, folder)}") from error
+        estimator = package.removeprefix(f"{NAMESPACE}.")
+        raise VobenchError(f"estimator {estimator!r} cannot be imported: {_cause(error, folder)}") from error
 
 
 def _open_package(package: str, folder: Path) -> None:
@@ -63,7 +65,9 @@ def _open_package(package: str, folder: Path) -> None:
     namespace = sys.modules.setdefault(NAMESPACE, ModuleType(NAMESPACE))
     namespace.__path__ = []
     init = folder / "__init__.py"
-    loader = importlib.machinery.SourceFileLoader(package, str(init)) if init.is_file() else None
+    loader = None
+    if init.is_file():
+        loader = importlib.machinery.SourceFileLoader(package, str(init))
     spec = importlib.machinery.ModuleSpec(package, loader, is_package=True)
     spec.submodule_search_locations = [str(folder)]
     module = importlib.util.module_from_spec(spec)
@@ -73,68 +77,72 @@ def _open_package(package: str, folder: Path) -> None:
 
 
 def _cause(error: Exception, folder: Path) -> str:
-    """What was raised, and the innermost line of the plugin that raised it."""
+    """The exception, and the innermost line of the plugin in its traceback."""
     if isinstance(error, SyntaxError):
         return f"SyntaxError: {error.msg}: {error.filename}:{error.lineno}"
-    inside = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).is_relative_to(folder)]
-    place = f"{inside[-1].filename}:{inside[-1].lineno}" if inside else str(folder)
-    return f"{type(error).__name__}: {' '.join(str(error).split())}: {place}"
+    place = str(folder)
+    for call in traceback.extract_tb(error.__traceback__):
+        if Path(call.filename).is_relative_to(folder):
+            place = f"{call.filename}:{call.lineno}"
+    sentence = " ".join(str(error).split())
+    return f"{type(error).__name__}: {sentence}: {place}"
 
 
-Says = tuple[bytes, bytes]  # a message: tag and content
+Message = tuple[bytes, bytes]  # tag and content
 
 
 def main(folder: Path, class_path: str, name: str, memory_bytes: int) -> None:
-    """Serve frames until the other side hangs up."""
-    warnings.filterwarnings(
-        "default", message=r"vobench\.", category=DeprecationWarning
-    )  # of retired names: in the log
+    """Serve frames until vobench closes the connection."""
+    # Warnings about retired names go to the log.
+    warnings.filterwarnings("default", message=r"vobench\.", category=DeprecationWarning)
     resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))
-    asked, told = _taken_over()
+    requests, answers = _taken_over()
     try:
         estimator = load(folder, class_path, name=name)
-        for tag, content in _answers(asked, estimator):
-            told.write(HEADER.pack(tag, len(content)) + content)
+        for tag, content in _answers(requests, estimator):
+            answers.write(HEADER.pack(tag, len(content)) + content)
     except (EOFError, BrokenPipeError):
         return
     except Exception as error:
         traceback.print_exc()
         content = _in_one_line(error).encode("utf-8", "replace")
-        told.write(HEADER.pack(_tag(error), len(content)) + content)
+        answers.write(HEADER.pack(_tag(error), len(content)) + content)
 
 
 def _taken_over() -> tuple[BinaryIO, BinaryIO]:
-    """Standard input and output, which are the estimator's own from here on: nothing, and what is kept as log."""
-    asked = os.fdopen(os.dup(0), "rb")
-    told = os.fdopen(os.dup(1), "wb", buffering=0)
+    """The connection on standard input and output; from here on these are empty, and the log."""
+    requests = os.fdopen(os.dup(0), "rb")
+    answers = os.fdopen(os.dup(1), "wb", buffering=0)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.dup2(2, 1)
     os.close(nothing)
-    return asked, told
+    return requests, answers
 
 
-def _answers(asked: BinaryIO, estimator: Estimator) -> Iterator[Says]:
-    """What is to be said to one message after another. Our own side alone is unpickled."""
+def _answers(requests: BinaryIO, estimator: Estimator) -> Iterator[Message]:
+    """The answers to one request after another. Requests are vobench's own, so they are unpickled."""
     is_watched = False
-    while head := asked.read(HEADER.size):
+    while head := requests.read(HEADER.size):
         tag, length = HEADER.unpack(head)
-        said = bytearray(length)
-        asked.readinto(said)  # type: ignore[attr-defined]
+        payload = bytearray(length)
+        requests.readinto(payload)  # type: ignore[attr-defined]
         if tag == b"FRAM":
-            frame = unpickled(said)
+            frame = unpickled(payload)
             before = pickle.dumps(frame) if is_watched else b""
             result = checked(estimator.process(frame), frame.index)
             if is_watched and pickle.dumps(frame) != before:
                 raise InvalidOutputError(f"frame {frame.index}: process() changed the frame it was given")
             yield b"POSE", answered(result, frame.index)
         elif tag == b"CALB":
-            *told, is_watched = pickle.loads(said)
-            estimator.start(*told)
+            *arguments, is_watched = pickle.loads(payload)
+            estimator.start(*arguments)
             yield b"REDY", b""
         else:
-            revised = checked_revision(getattr(estimator, "finish", dict)() or {})
-            yield from ((b"REVI", revision(index, T)) for index, T in revised.items())
+            finish = getattr(estimator, "finish", dict)
+            revised = checked_revision(finish() or {})
+            for index, T_odom_frame in revised.items():
+                yield b"REVI", revision(index, T_odom_frame)
             yield b"DONE", b""
 
 

@@ -52,7 +52,8 @@ LABEL = re.compile(r"[a-z0-9][a-z0-9_.]*( of [A-Za-z0-9_.-]+)?")
 CASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 REPEAT = re.compile(r"[0-9]{1,9}")
 NO_PLAIN = re.compile(r"[^A-Za-z0-9_.-]|^[^A-Za-z0-9]")
-MOST_OF_A_NAME = 60
+NAME_LETTERS = 60
+FOLLOW_NOTHING = os.O_RDONLY | os.O_NOFOLLOW
 SAME_POSE = 1e-9  # metres, and elements of a rotation: below it two poses are one
 EPOCH = (1980, 1, 1, 0, 0, 0)  # no date, so that equal runs make equal bundles
 
@@ -62,29 +63,41 @@ def bundle(folder: RunFolder, out: Path) -> int:
 
     Raises InputError where the folder is none of a run.
     """
-    places = [folder.path, *(file.parent for file in folder.score_files())]
-    places[1:1] = sorted({place.parents[2] for place in places[1:]})
-    names = [*(folder.path / name for name in OF_RUN)]
-    names += [place / name for place in places[1:] for name in (*OF_CASE, *OF_TRIAL)]
     root = folder.path.resolve()
-    recorded = {name: held for name, held in read_hashes(folder).items() if SEQUENCE in PurePosixPath(name).parts}
     files = dict[str, bytes]()
-    for path in names:
-        name = str(path.relative_to(folder.path))
+    for name in _bundled_names(folder):
         content = _content(root, name)
         if content is not None:
             files[name] = content
     hashes = {name: sha256(content).hexdigest() for name, content in files.items()}
+    tables = {HASHES: hashes, TIMES_HASHES: {}, SEQUENCES: _sequence_hashes(folder)}
     with ZipFile(out, "w", ZIP_DEFLATED) as file:
-        for name, stated in ((HASHES, hashes), (TIMES_HASHES, {}), (SEQUENCES, recorded)):
-            file.writestr(ZipInfo(name, EPOCH), json.dumps(stated, indent=1), ZIP_DEFLATED)
+        for name, table in tables.items():
+            file.writestr(ZipInfo(name, EPOCH), json.dumps(table, indent=1), ZIP_DEFLATED)
         for name, content in files.items():
             file.writestr(ZipInfo(name, EPOCH), content, ZIP_DEFLATED)
     return len(files)
 
 
+def _bundled_names(folder: RunFolder) -> Iterator[str]:
+    """The names of the files that a bundle of a run may hold, those of the run first, then cases, then trials."""
+    yield from OF_RUN
+    trials = [file.parent for file in folder.score_files()]
+    cases = sorted({trial.parents[2] for trial in trials})
+    for place in (*cases, *trials):
+        below = place.relative_to(folder.path)
+        for name in (*OF_CASE, *OF_TRIAL):
+            yield str(below / name)
+
+
+def _sequence_hashes(folder: RunFolder) -> dict[str, str]:
+    """The hashes of the recordings that a run links to."""
+    hashes = read_hashes(folder)
+    return {name: value for name, value in hashes.items() if SEQUENCE in PurePosixPath(name).parts}
+
+
 def require_zip(out: Path) -> None:
-    """Raise InputError where a bundle's file has another ending."""
+    """Raise InputError unless the name of a bundle's file ends in .zip."""
     if out.suffix.lower() != ".zip":
         raise InputError(f"a bundle's name should end in .zip, got {out.name!r}")
 
@@ -98,8 +111,8 @@ def _content(root: Path, name: str) -> bytes | None:
     opened = [os.open(root, os.O_RDONLY | os.O_DIRECTORY)]
     try:
         for part in folders:
-            opened.append(os.open(part, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=opened[-1]))
-        opened.append(os.open(last, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=opened[-1]))
+            opened.append(os.open(part, os.O_DIRECTORY | FOLLOW_NOTHING, dir_fd=opened[-1]))
+        opened.append(os.open(last, os.O_NONBLOCK | FOLLOW_NOTHING, dir_fd=opened[-1]))
         if not stat.S_ISREG(os.fstat(opened[-1]).st_mode):
             raise InputError(f"only files can be bundled, which this is not: {root / name}")
         with open(opened.pop(), "rb") as file:
@@ -161,8 +174,8 @@ def _require_names(folder: RunFolder) -> None:
             ("repeat", repeat, REPEAT),
         ):
             if not pattern.fullmatch(name):
-                told = printable(name)[:MOST_OF_A_NAME]
-                raise InputError(f"the name of its {what} should match {pattern.pattern}, got {told!r}: {folder.path}")
+                shown = printable(name)[:NAME_LETTERS]
+                raise InputError(f"the name of its {what} should match {pattern.pattern}, got {shown!r}: {folder.path}")
 
 
 def _clean(path: Path) -> bool:
@@ -170,30 +183,36 @@ def _clean(path: Path) -> bool:
     if path.suffix not in (".json", ".csv"):
         return False
     text = path.read_text(encoding="utf-8", errors="replace")
-    if path.suffix == ".csv":
-        cleaned = "".join(letter if letter.isprintable() or letter in "\r\n\t" else " " for letter in text)
-        is_other = cleaned != text
-    else:
-        try:
-            found = json.loads(text)
-            printable_only = _printable(found)
-        except (ValueError, RecursionError) as error:
-            raise InputError(f"not readable as JSON ({error}): {path.name}") from None
-        is_other = printable_only != found
-        cleaned = json.dumps(printable_only, ensure_ascii=False) if is_other else text
-    if is_other:
-        path.write_text(cleaned, encoding="utf-8")
-    return is_other
+    cleaned = _clean_table(text) if path.suffix == ".csv" else _clean_json(text, path.name)
+    if cleaned == text:
+        return False
+    path.write_text(cleaned, encoding="utf-8")
+    return True
+
+
+def _clean_table(text: str) -> str:
+    """A table with a space for each control character, except ends of lines and tabs."""
+    return "".join(letter if letter.isprintable() or letter in "\r\n\t" else " " for letter in text)
+
+
+def _clean_json(text: str, name: str) -> str:
+    """JSON with printable texts; the same text if they are printable already. Raises InputError."""
+    try:
+        value = json.loads(text)
+        cleaned = _printable(value)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"not readable as JSON ({error}): {name}") from None
+    return text if cleaned == value else json.dumps(cleaned, ensure_ascii=False)
 
 
 def _printable(value: Any) -> Any:
-    """The same JSON with printable texts."""
+    """The same JSON value with printable texts."""
     if isinstance(value, str):
         return printable(value)
     if isinstance(value, list):
-        return [_printable(each) for each in value]
+        return [_printable(entry) for entry in value]
     if isinstance(value, dict):
-        return {printable(key): _printable(each) for key, each in value.items()}
+        return {printable(key): _printable(entry) for key, entry in value.items()}
     return value
 
 
@@ -214,12 +233,12 @@ def _suite(file: ZipFile) -> str:
 def _unpack(file: ZipFile, to: Path, path: Path) -> list[str]:
     """Unpack all files, and return their names. Raises InputError if one is twice, or would lie outside."""
     entries = file.infolist()
-    if (total := sum(entry.file_size for entry in entries)) > MOST_BYTES:
+    total = sum(entry.file_size for entry in entries)
+    if total > MOST_BYTES:
         raise InputError(f"unpacks to {total / 1e9:.3g} GB, more than {MOST_BYTES / 1e9:.3g}: {path}")
     seen = set[str]()
     for entry in entries:
-        parts = PurePosixPath(entry.filename).parts
-        if entry.filename.startswith("/") or ".." in parts or stat.S_ISLNK(entry.external_attr >> 16):
+        if _is_outside(entry):
             raise InputError(f"holds a file that would lie outside of it ({entry.filename!r}): {path}")
         name = str(PurePosixPath(entry.filename))
         if name in seen:
@@ -228,6 +247,13 @@ def _unpack(file: ZipFile, to: Path, path: Path) -> list[str]:
     to.mkdir(parents=True)
     file.extractall(to)
     return [str(PurePosixPath(entry.filename)) for entry in entries if not entry.is_dir()]
+
+
+def _is_outside(entry: ZipInfo) -> bool:
+    """Whether an entry is a link, or its path leads out of the folder that it is unpacked to."""
+    parts = PurePosixPath(entry.filename).parts
+    is_link = stat.S_ISLNK(entry.external_attr >> 16)
+    return is_link or ".." in parts or entry.filename.startswith("/")
 
 
 def scored_again(
@@ -268,7 +294,8 @@ def merged(folders: Sequence[RunFolder], names: Sequence[str]) -> Iterator[RunFo
                 repeat = len(list(others.glob("*"))) if others.is_dir() else 0
                 place = made.estimate(score.case, label, repeat)
                 place.mkdir(parents=True)
-                for path in folder.estimate(score.case, score.estimator, score.repeat).iterdir():
+                source = folder.estimate(score.case, score.estimator, score.repeat)
+                for path in source.iterdir():
                     if path.name != SCORE:
                         (place / path.name).symlink_to(path.resolve())
                 again = score.model_copy(update={"estimator": label, "repeat": repeat})
@@ -278,12 +305,12 @@ def merged(folders: Sequence[RunFolder], names: Sequence[str]) -> Iterator[RunFo
 
 def _stated(folder: RunFolder) -> list[dict[str, Any]]:
     try:
-        found = json.loads((folder.path / ESTIMATORS).read_text(encoding="utf-8"))
+        entries = json.loads((folder.path / ESTIMATORS).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return []
-    if not isinstance(found, list):
+    if not isinstance(entries, list):
         return []
-    return [each for each in found if isinstance(each, dict) and "label" in each]
+    return [entry for entry in entries if isinstance(entry, dict) and "label" in entry]
 
 
 def _is_same_path(one: Path, other: Path) -> bool:

@@ -1,4 +1,4 @@
-"""The covariances that an estimator states of its poses: as a file, and against the errors that it made."""
+"""The covariances that an estimator states of its poses: as a file, and compared with its errors."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,43 +16,49 @@ from vobench.trajectory.trajectory import Stamps, Trajectory
 
 COVARIANCE = "covariance.txt"
 UPPER = np.triu_indices(6)
-COLUMNS = ("t", *(f"c{row}{column}" for row, column in zip(*UPPER, strict=True)))
+ENTRIES = tuple(f"c{row}{column}" for row, column in zip(*UPPER, strict=True))
+COLUMNS = ("t", *ENTRIES)
 HEAD = "# timestamp, then the upper triangle by rows: position in m, rotation vector in rad, about the axes of odom\n"
 # Median and 90 % quantile of χ² with six degrees of freedom.
 MEDIAN = 5.348121
 NINETY_PERCENT = 10.644641
-MOST_GAP = 2.0  # an honest estimator's whole path has one error more or less: 2 and 1/2 are beyond 95 % of such
+MOST_GAP = 2.0  # errors along a path are correlated: for 95 % of consistent estimators the gap is within 1/2 and 2
 
 
 def format_covariances(rows: Iterable[tuple[int, Array]]) -> str:
     """Stamps in ns and covariances (6, 6) as text that gives the same numbers back."""
-    return HEAD + "".join(f"{seconds(t)} {' '.join(map(repr, P[UPPER].tolist()))}\n" for t, P in rows)
+    lines = [HEAD]
+    for t_ns, covariance in rows:
+        entries = " ".join(map(repr, covariance[UPPER].tolist()))
+        lines.append(f"{seconds(t_ns)} {entries}\n")
+    return "".join(lines)
 
 
 def read_covariances(path: Path, t_ns: Stamps) -> Array:
-    """The covariances (N, 6, 6) of poses stamped t_ns (N,), NaN for a pose without. Raises InputError."""
+    """The covariances (N, 6, 6) of poses stamped t_ns (N,), NaN for a pose without one. Raises InputError."""
     try:
         rows = content(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot read {path}: {error}") from None
-    P = np.full((len(t_ns), 6, 6), np.nan)
+    covariances = np.full((len(t_ns), 6, 6), np.nan)
     if not rows:
-        return P
+        return covariances
     table = read_table(rows, name=str(path), columns=COLUMNS, row="a covariance")
-    at = {t: row for row, t in enumerate(stamps_ns(table, "s").tolist())}
-    if not any(t in at for t in t_ns.tolist()):
-        raise InputError(f"none of {len(at)} covariances has the stamp of a pose: {path}")
-    for pose, row in ((pose, at[t]) for pose, t in enumerate(t_ns.tolist()) if t in at):
-        P[pose][UPPER] = table.values[row, 1:]
-        P[pose].T[UPPER] = table.values[row, 1:]
-    return P
+    entries = dict(zip(stamps_ns(table, "s").tolist(), table.values[:, 1:], strict=True))
+    if entries.keys().isdisjoint(t_ns.tolist()):
+        raise InputError(f"none of {len(entries)} covariances has the stamp of a pose: {path}")
+    for covariance, stamp in zip(covariances, t_ns.tolist(), strict=True):
+        if stamp in entries:
+            covariance[UPPER] = entries[stamp]
+            covariance.T[UPPER] = entries[stamp]
+    return covariances
 
 
 class Consistency(BaseModel):
-    """Errors against stated covariances: NEES of poses, and the factor that errors are larger than deviations stated.
+    """Errors against stated covariances: NEES of poses, and the ratio of errors to stated deviations.
 
-    `scale_gap` is the square root of the median NEES over that of its law, χ² with six degrees of freedom: 1 where
-    covariances are honest. `covered_90` is the share of poses inside the region that should hold 90 %.
+    `scale_gap` is the square root of the median NEES over that of its distribution, χ² with six degrees of freedom:
+    1 for consistent covariances. `covered_90` is the share of poses inside the region that should hold 90 %.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -65,7 +71,7 @@ class Consistency(BaseModel):
 
     @classmethod
     def of(cls, nees: Array) -> "Consistency":
-        """That of the normalised errors (K,) of one pose or more."""
+        """The consistency of normalised errors squared (K,) of at least one pose."""
         median = float(np.median(nees))
         return cls(
             poses=len(nees),
@@ -92,23 +98,26 @@ class Consistency(BaseModel):
 def trial_consistency(
     estimate: Path, gt: Trajectory, est: Trajectory, *, start_ns: int, scale: float
 ) -> Consistency | None:
-    """What a trial's covariances are worth; None where it stated none.
+    """The consistency of a trial's covariances with its errors; None if it stated none.
 
-    They are of poses in odom, the left camera at the first frame's stamp, so nothing is fitted but the scale. Where
-    the truth of that is not known, the first frame that has truth and pose stands for it.
+    The covariances are of poses in odom, the left camera at the first frame's stamp, so nothing is fitted but the
+    scale. If the truth at that stamp is unknown, the first frame with truth and pose is the reference instead.
     """
     if not (estimate / COVARIANCE).is_file():
         return None
-    P = read_covariances(estimate / COVARIANCE, est.t_ns)
-    _, true, stated = np.intersect1d(gt.t_ns, est.t_ns[np.isfinite(P).all((1, 2))], return_indices=True)
-    if not len(true):
+    covariances = read_covariances(estimate / COVARIANCE, est.t_ns)
+    with_covariance = np.flatnonzero(np.isfinite(covariances).all((1, 2)))
+    _, in_gt, in_stated = np.intersect1d(gt.t_ns, est.t_ns[with_covariance], return_indices=True)
+    if not len(in_gt):
         return None
-    which = np.flatnonzero(np.isfinite(P).all((1, 2)))[stated]
+    in_est = with_covariance[in_stated]
+
     T_world_odom = gt.T_world_frame[0]
     if gt.t_ns[0] != start_ns:
-        T_odom_left = est.T_world_frame[which[0]]
-        T_odom_left = se3.transform(T_odom_left[:3, :3], scale * T_odom_left[:3, 3])
-        T_world_odom = gt.T_world_frame[true[0]] @ se3.inverse(T_odom_left)
-    T_odom_true = (se3.inverse(T_world_odom) @ gt.T_world_frame)[true]
-    scaled = Alignment("scale", np.eye(3), np.zeros(3), scale, ())
-    return Consistency.of(consistency(T_odom_true, est.T_world_frame[which], P[which], scaled).pose)
+        T_odom_left = est.T_world_frame[in_est[0]]
+        scaled_T_odom_left = se3.transform(T_odom_left[:3, :3], scale * T_odom_left[:3, 3])
+        T_world_odom = gt.T_world_frame[in_gt[0]] @ se3.inverse(scaled_T_odom_left)
+    T_odom_true = (se3.inverse(T_world_odom) @ gt.T_world_frame)[in_gt]
+    alignment = Alignment("scale", np.eye(3), np.zeros(3), scale, ())
+    nees = consistency(T_odom_true, est.T_world_frame[in_est], covariances[in_est], alignment)
+    return Consistency.of(nees.pose)

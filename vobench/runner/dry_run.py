@@ -15,7 +15,8 @@ from vobench.runner.store import INPUTS, Store
 from vobench.runner.task import KINDS, Task, has_failed, missing
 
 COMPARED = 300  # of each kind, the results used last
-MOST_CHANGES = 3  # between a result and one that it is told to be made anew for
+MOST_CHANGES = 3  # between a task's inputs and a result's that its reason compares them with
+VALUE_LETTERS = 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,41 +36,45 @@ class ToDo:
 
 def to_do(tasks: Sequence[Task], root: Path) -> list[ToDo]:
     """What is to be done, stage by stage in order."""
-    wanted = missing(tasks, root)
-    keys = {task.key: task for task in wanted}
-    reasons = {stage: Counter[str]() for stage in dict.fromkeys(task.stage for task in tasks)}
-    for task in wanted:
-        reasons[task.stage][_reason(task, keys, root)] += 1
-    counts = Counter(task.stage for task in tasks)
+    wanted = {task.key: task for task in missing(tasks, root)}
     store = Store(root)
-    found = []
-    for stage, why in reasons.items():
-        took = store.seconds(stage)
-        found.append(ToDo(stage, counts[stage], dict(why), sum(why.values()) * median(took) if took else None))
-    return found
+    stages = []
+    for stage, count in Counter(task.stage for task in tasks).items():
+        reasons = Counter(_reason(task, wanted, root) for task in wanted.values() if task.stage == stage)
+        taken_s = store.seconds(stage)
+        left_s = reasons.total() * median(taken_s) if taken_s else None
+        stages.append(ToDo(stage, count, dict(reasons), left_s))
+    return stages
 
 
 def _reason(task: Task, wanted: Mapping[str, Task], root: Path) -> str:
-    before = [wanted[key].stage for key in task.needs if key in wanted]
-    if before:
-        return f"its {before[0]} is to be made"
+    """Why a task is to be done."""
+    for key in task.needs:
+        if key in wanted:
+            return f"its {wanted[key].stage} is to be made"
     folder = root / task.key
     if folder.is_dir():
-        if fault := Store(root).fault(task.key):
+        fault = Store(root).fault(task.key)
+        if fault:
             return f"damaged: {fault}"
         if has_failed(task, folder):
             return f"failed before: {read_outcome(folder).reason}"
-    return _changes(dict(_flat(json.loads(json.dumps(task.inputs)))), root / KINDS[task.stage])
+    inputs = json.loads(json.dumps(task.inputs))
+    return _changes(dict(_flat(inputs)), root / KINDS[task.stage])
 
 
 def _changes(inputs: dict[str, str], kind: Path) -> str:
-    """What differs from the nearest of the results used last; "new" where none is near."""
-    best: tuple[int, list[str]] = (MOST_CHANGES + 1, [])
+    """The differences from the most similar of the results used last; "new" if none is similar."""
+    fewest: set[str] | None = None
+    nearest: dict[str, str] = {}
     for other in _stored(kind):
         names = {name for name in inputs.keys() | other.keys() if inputs.get(name) != other.get(name)}
-        if len(names) < best[0]:
-            best = len(names), [_change(name, other.get(name), inputs.get(name)) for name in sorted(names)]
-    return "; ".join(best[1]) or "new"
+        limit = MOST_CHANGES + 1 if fewest is None else len(fewest)
+        if len(names) < limit:
+            fewest = names
+            nearest = other
+    changes = [_change(name, nearest.get(name), inputs.get(name)) for name in sorted(fewest or ())]
+    return "; ".join(changes) or "new"
 
 
 def _change(name: str, before: str | None, now: str | None) -> str:
@@ -79,20 +84,26 @@ def _change(name: str, before: str | None, now: str | None) -> str:
         return "its code in vobench changed"
     if name == "estimator":
         return "the estimator's files changed"
-    short = [text if text is None or len(text) <= 24 else f"{text[:23]}…" for text in (before, now)]
-    return f"{name}: {short[0] or 'nothing'} → {short[1] or 'nothing'}"
+    return f"{name}: {_shortened(before)} → {_shortened(now)}"
+
+
+def _shortened(text: str | None) -> str:
+    if not text:
+        return "nothing"
+    return text if len(text) <= VALUE_LETTERS else f"{text[: VALUE_LETTERS - 1]}…"
 
 
 @cache
 def _stored(kind: Path) -> list[dict[str, str]]:
     """The inputs of a kind's results, of those used last."""
-    found = []
+    stored = []
     with suppress(OSError):
         paths = sorted(kind.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
         for path in paths[:COMPARED]:
             with suppress(OSError, ValueError):
-                found.append(dict(_flat(json.loads((path / INPUTS).read_text(encoding="utf-8")))))
-    return found
+                inputs = json.loads((path / INPUTS).read_text(encoding="utf-8"))
+                stored.append(dict(_flat(inputs)))
+    return stored
 
 
 def _flat(value: Any, name: str = "") -> Iterator[tuple[str, str]]:

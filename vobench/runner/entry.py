@@ -81,7 +81,7 @@ def _states(folder: Path, names: Iterable[str]) -> States:
 
 
 def _files_of(folder: Path) -> dict[str, File]:
-    """The files of an entry, by its manifest. Raises OSError or ValueError where that is not as it was written."""
+    """The files of an entry, by its manifest. Raises OSError or ValueError if that is not as it was written."""
     text = (folder / MANIFEST).read_bytes()
     files = FILES.validate_json(text, strict=True)
     if _text(files) != text:
@@ -90,28 +90,42 @@ def _files_of(folder: Path) -> dict[str, File]:
 
 
 def fault(folder: Path, checked: Path | None = None) -> str:
-    """What is wrong with an entry, empty where its files are what its manifest says.
+    """What is wrong with an entry; empty if its files are those of its manifest.
 
-    Sizes are compared always, and hashes unless the file `checked` says that they were of files of these states.
+    Sizes are always compared. Hashes are compared unless the file `checked` has these states of the files.
     """
     try:
         files = _files_of(folder)
         states = _states(folder, [*files, MANIFEST])
-        resized = (name for name, file in files.items() if states[name][0] != file.bytes)
-        if name := next(resized, ""):
-            return f"{name} has {states[name][0]} bytes, should have {files[name].bytes}"
-        if checked and states == _remembered(checked):
-            return ""
-        for name, file in files.items():
-            held = _hash_of(folder / name, states[name]) if checked else file_hash(folder / name)
-            if held != file.sha256:
-                return f"{name} holds other bytes than were written"
+        difference = _size_difference(files, states)
+        if difference or (checked and states == _remembered(checked)):
+            return difference
+        difference = _content_difference(folder, files, states, uses_hash_cache=checked is not None)
+        if difference:
+            return difference
     except ValueError:
         return f"{MANIFEST} is not as it was written"
     except OSError as error:
         return f"{Path(error.filename or folder).name} cannot be read ({error.strerror})"
     if checked:
         remember(checked, states)
+    return ""
+
+
+def _size_difference(files: Mapping[str, File], states: States) -> str:
+    for name, file in files.items():
+        size = states[name][0]
+        if size != file.bytes:
+            return f"{name} has {size} bytes, should have {file.bytes}"
+    return ""
+
+
+def _content_difference(folder: Path, files: Mapping[str, File], states: States, *, uses_hash_cache: bool) -> str:
+    for name, file in files.items():
+        path = folder / name
+        content_hash = _hash_of(path, states[name]) if uses_hash_cache else file_hash(path)
+        if content_hash != file.sha256:
+            return f"{name} holds other bytes than were written"
     return ""
 
 

@@ -4,6 +4,7 @@ import os
 import platform
 import subprocess
 import sys
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
@@ -27,6 +28,7 @@ LIBRARIES = (*SCORING, "pyrender2", "mcap", "rosbags", "pandas", "rerun-sdk")
 # What of vobench's clone a result depends on.
 SOURCES = ("vobench", "scenes", "estimators", "suites")
 GIT_S = 10.0
+
 
 # The levels of the x86-64 psABI, by flags as Linux names them, the highest first.
 V2 = {"cx16", "lahf_lm", "popcnt", "pni", "sse4_1", "sse4_2", "ssse3"}
@@ -81,12 +83,12 @@ class Environment:
     @property
     def processor(self) -> str:
         """The models of all processors."""
-        return " and ".join(dict.fromkeys(each.model for each in self.processors))
+        return _joined(processor.model for processor in self.processors)
 
     @property
     def simd(self) -> str:
         """The instruction sets of all processors."""
-        return " and ".join(dict.fromkeys(each.simd for each in self.processors))
+        return _joined(processor.simd for processor in self.processors)
 
     @property
     def driver(self) -> str:
@@ -113,14 +115,16 @@ class Environment:
             parts.append(self.release)
         if self.python:
             parts.append(f"Python {self.python}")
-        parts += [f"{name} {self.libraries[name]}" for name in SCORING if name in self.libraries]
+        parts += self._scoring_libraries()
         if self.date:
             parts.append(self.date)
         return ", ".join(parts)
 
+    def _scoring_libraries(self) -> list[str]:
+        return [f"{name} {self.libraries[name]}" for name in SCORING if name in self.libraries]
+
     def facts(self) -> dict[str, str]:
         """The same as columns of a table."""
-        libraries = ", ".join(f"{name} {self.libraries[name]}" for name in SCORING if name in self.libraries)
         return {
             "processor": self.processor,
             "simd": self.simd,
@@ -130,7 +134,7 @@ class Environment:
             "vobench": self.vobench,
             "commit": self.commit,
             "python": self.python,
-            "libraries": libraries,
+            "libraries": ", ".join(self._scoring_libraries()),
             "date": self.date,
         }
 
@@ -140,15 +144,27 @@ ORIGINS = TypeAdapter(Origin)
 
 
 def differences(old: Environment, new: Environment) -> list[str]:
-    """What differs between two environments that can change scores, as `name: old value → new value`."""
-    pairs = [
-        ("processor", " and ".join(map(str, old.processors)), " and ".join(map(str, new.processors))),
-        ("drawn by", old.driver, new.driver),
-        ("portable", str(old.portable), str(new.portable)),
-        ("Python", old.python, new.python),
-    ]
-    pairs += [(name, old.libraries.get(name, ""), new.libraries.get(name, "")) for name in SCORING]
-    return [f"{name} {was} → {now}" for name, was, now in pairs if was and now and was != now]
+    """The differences of two environments that can change scores, as `name old value → new value`."""
+    old_facts = _comparable_facts(old)
+    new_facts = _comparable_facts(new)
+    changes = []
+    for name, before in old_facts.items():
+        now = new_facts[name]
+        if before and now and before != now:
+            changes.append(f"{name} {before} → {now}")
+    return changes
+
+
+def _comparable_facts(environment: Environment) -> dict[str, str]:
+    """The facts that can change scores, by name; empty if the run does not state them."""
+    libraries = {name: environment.libraries.get(name, "") for name in SCORING}
+    return {
+        "processor": " and ".join(map(str, environment.processors)),
+        "drawn by": environment.driver,
+        "portable": str(environment.portable),
+        "Python": environment.python,
+        **libraries,
+    }
 
 
 @cache
@@ -282,25 +298,36 @@ def read_environment(folder: RunFolder) -> Environment | None:
 
 
 def merged_environment(environments: Sequence[Environment]) -> dict[str, Any]:
-    """What several runs state together: all processors and drivers, and each version, joined where they differ."""
+    """The environment of several runs together: all processors and drivers, and versions, joined if they differ."""
     origin = joined(Origin(each.processors, each.drawn_by) for each in environments)
-    names = dict.fromkeys(name for each in environments for name in each.libraries)
-    libraries = {name: _each_once(each.libraries.get(name, "") for each in environments) for name in names}
-    return asdict(
-        Environment(
-            vobench=_each_once(each.vobench for each in environments),
-            commit=_each_once(each.commit for each in environments),
-            python=_each_once(each.python for each in environments),
-            platform=_each_once(each.platform for each in environments),
-            processors=origin.processors,
-            drawn_by=origin.drawn_by,
-            portable=bool(environments) and all(each.portable for each in environments),
-            libraries=libraries,
-            timed=_each_once(each.timed for each in environments),
-            date=_each_once(each.date for each in environments),
-        )
+    are_portable = bool(environments) and all(each.portable for each in environments)
+
+    def text(name: str) -> str:
+        return _joined(getattr(each, name) for each in environments)
+
+    merged = Environment(
+        vobench=text("vobench"),
+        commit=text("commit"),
+        python=text("python"),
+        platform=text("platform"),
+        processors=origin.processors,
+        drawn_by=origin.drawn_by,
+        portable=are_portable,
+        libraries=_merged_libraries(environments),
+        timed=text("timed"),
+        date=text("date"),
     )
+    return asdict(merged)
 
 
-def _each_once(values: Iterable[str]) -> str:
-    return " and ".join(dict.fromkeys(filter(None, values)))
+def _merged_libraries(environments: Sequence[Environment]) -> dict[str, str]:
+    versions = defaultdict[str, list[str]](list)
+    for environment in environments:
+        for name, version in environment.libraries.items():
+            versions[name].append(version)
+    return {name: _joined(its_versions) for name, its_versions in versions.items()}
+
+
+def _joined(texts: Iterable[str]) -> str:
+    """The texts that are not empty, each once."""
+    return " and ".join(dict.fromkeys(filter(None, texts)))

@@ -1,4 +1,4 @@
-"""Sequence to estimate: an estimator is fed frame by frame; poses, frames and tracks are kept as files."""
+"""Sequence to estimate: an estimator gets frame after frame; its poses, statuses and tracks are written to files."""
 
 import csv
 import io
@@ -28,9 +28,9 @@ from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.runner.consistency import COVARIANCE, format_covariances
 from vobench.runner.folder import NOT_APPLICABLE, read_tum
-from vobench.runner.frames import ANSWER_COLUMNS, ANSWERS, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
+from vobench.runner.frames import ANSWER_COLUMNS, ANSWERS, COST_COLUMNS, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.sensor.imu import ImuReadings
-from vobench.sequence import Sequence, StereoFrame
+from vobench.sequence import EncodedFrame, Sequence, StereoFrame
 from vobench.sequence.picture import grey, rgb
 from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
@@ -47,13 +47,15 @@ POINTS = "points/"
 OUTCOME = "outcome.json"
 LOG = "log.txt"
 FINISHED = "finished"
-DROPPED = "dropped"  # a frame that came while the estimator was busy with another
+DROPPED = "dropped"  # status of a frame that came while the estimator was busy with another
+EARLIEST_NS = np.iinfo(np.int64).min
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # fixed, so that equal tracks are equal bytes
 
 
 class Outcome(BaseModel):
-    """How an estimator's process ended: FINISHED, or the kind of its failure and why; and what it could see.
+    """How an estimator's process ended: FINISHED, or the kind of its failure and the reason; and what it could see.
 
-    `sandbox` is None where no process was started.
+    `sandbox` is None if no process was started.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -70,21 +72,23 @@ def read_outcome(folder: Path) -> Outcome:
 
 def read_tracks(folder: Path, *, of: str = "") -> Iterator[tuple[int, NDArray[np.float32]]]:
     """Frame index and its table (N, 5): u, v before, u, v now, inlier; or `of` POINTS (N, 3), in odom, in m."""
+    is_in_folder = bool(of)
     with zipfile.ZipFile(folder / TRACKS) as archive:
         for name in archive.namelist():
-            if name.startswith(of) and ("/" in name) == bool(of):
-                yield int(Path(name).stem), np.load(io.BytesIO(archive.read(name)))
+            if name.startswith(of) and ("/" in name) == is_in_folder:
+                table = np.load(io.BytesIO(archive.read(name)))
+                yield int(Path(name).stem), table
 
 
 Readings = TypeVar("Readings", EncoderReadings, ImuReadings)
 
 
-# An estimator that runs, by whichever door it came: start, process, finish, each of which raises EstimatorFailure.
+# A running estimator of any kind; its methods start, process and finish raise EstimatorFailure.
 Running = EstimatorProcess | CommandProgram | NoisyTruth
 
 
 def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress") -> None:
-    """Feed a sequence to a trial's estimator; whatever happens, the folder is complete afterwards."""
+    """Run a trial's estimator on a sequence; the folder is complete afterwards, also if the estimator fails."""
     sequence = Sequence.open(recording)
     kind = FINISHED
     reason = ""
@@ -99,45 +103,61 @@ def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress"
         except EstimatorFailure as failure:
             kind = failure.kind
             reason = failure.reason
-        except SequenceError as error:  # a layout that cannot have this recording
+        except SequenceError as error:  # a layout that cannot hold this recording
             kind = "refused"
             reason = str(error)
-    saw = None if running is None or isinstance(running, NoisyTruth) else running.sandbox
-    outcome = Outcome(kind=kind, reason=reason, sandbox=saw)
+    sandbox = None
+    if isinstance(running, EstimatorProcess | CommandProgram):
+        sandbox = running.sandbox
+    outcome = Outcome(kind=kind, reason=reason, sandbox=sandbox)
     (folder / OUTCOME).write_text(outcome.model_dump_json(), encoding="utf-8")
 
 
 def _running(trial: "Trial", recording: Path, log: Path) -> Running:
-    """The trial's estimator as its manifest says that it is run."""
+    """The trial's estimator, run as its manifest states."""
     entrant = trial.entrant
-    manifest = trial.entrant.manifest
+    manifest = entrant.manifest
+    limits = entrant.limits
     hidden = _hidden(trial, recording)
     if manifest.oracle:
         return NoisyTruth(read_tum(recording / GROUND_TRUTH))
     if manifest.class_path:
         return EstimatorProcess.of_class(
-            entrant.folder, manifest.class_path, name=manifest.name, log=log, limits=entrant.limits, hidden=hidden
+            entrant.folder,
+            manifest.class_path,
+            name=manifest.name,
+            log=log,
+            limits=limits,
+            hidden=hidden,
         )
     t_ns = Sequence.open(recording).frame_stamps()
-    limits = entrant.limits
     if manifest.stream:
-        rate = rate_hz(t_ns)
         return EstimatorProcess.of_stream(
-            manifest.stream, entrant.folder, log=log, limits=limits, rate_hz=rate, hidden=hidden
+            manifest.stream,
+            entrant.folder,
+            log=log,
+            limits=limits,
+            rate_hz=rate_hz(t_ns),
+            hidden=hidden,
         )
     if entrant.mode == "real_time":
         raise EstimatorFailure("refused", "it takes the whole recording at once, so it cannot go at the camera's pace")
-    write = partial(_write_blind, recording, manifest)
     return CommandProgram(
-        manifest.command, entrant.folder, log=log, limits=limits, out=manifest.out, t_ns=t_ns, write_dataset=write,
+        manifest.command,
+        entrant.folder,
+        log=log,
+        limits=limits,
+        out=manifest.out,
+        t_ns=t_ns,
+        write_dataset=partial(_write_blind, recording, manifest),
         hidden=hidden,
-    )  # fmt: skip
+    )
 
 
 def _hidden(trial: "Trial", recording: Path) -> list[Path]:
-    """What is hidden should it lie in a folder that the estimator may read.
+    """The folders that are hidden even inside of a folder that the estimator may read.
 
-    That is the store that the sequence is in, the recording that it was read from, and earlier runs.
+    These are the store with the sequence, the recording that it was read from, and earlier runs.
     """
     hidden = [recording.resolve().parents[1], Path("runs").absolute()]
     source = getattr(trial.case, "source", None)
@@ -147,53 +167,62 @@ def _hidden(trial: "Trial", recording: Path) -> list[Path]:
 
 
 def _write_blind(recording: Path, manifest: Manifest, folder: Path) -> None:
-    """Write a recording in the manifest's layout: what it needs and Kalibr's calibration, and nothing of the truth."""
+    """Write a recording in the manifest's layout: the sensors it needs and Kalibr's calibration, without the truth."""
     from vobench.dataset.export import write_calibration
     from vobench.dataset.layout import writable
     from vobench.dataset.source import ExportSource
 
     sequence = Sequence.open(recording)
     layout = writable()[manifest.dataset]
-    source = ExportSource(recording, sequence, sequence.rig, imu=sequence.imu() if "imu" in manifest.needs else None)
+    imu = sequence.imu() if "imu" in manifest.needs else None
+    source = ExportSource(recording, sequence, sequence.rig, imu=imu)
     views = _views(manifest, source.rig)
     layout.write(source, views, folder)
     write_calibration(views.rig, layout, folder)
 
 
 def _views(manifest: Manifest, rig: Rig) -> "Views":
-    """The pictures of a recording as a program finds them in its files."""
+    """The pictures of a recording as they are in a program's files."""
     from vobench.dataset.layout import writable
 
-    one = replace(rig, right=None, T_body_right=None)
-    return writable()[manifest.dataset].views(rig if "stereo" in manifest.needs else one)
+    layout = writable()[manifest.dataset]
+    if "stereo" in manifest.needs:
+        return layout.views(rig)
+    mono_rig = replace(rig, right=None, T_body_right=None)
+    return layout.views(mono_rig)
 
 
 def _T_frame_left(rig: Rig, manifest: Manifest) -> Array:
-    """The left camera in the frame whose poses the estimator gives; a program's pictures may be rectified ones."""
+    """The left camera in the frame of the estimator's poses; a program's pictures may be rectified ones."""
     if manifest.pose_of == "left_camera":
-        return se3.inverse(_views(manifest, rig).rig.T_body_left) @ rig.T_body_left if manifest.command else np.eye(4)
-    return (
-        se3.inverse(rig.imu.T_body_imu) @ rig.T_body_left if manifest.pose_of == "imu" and rig.imu else rig.T_body_left
-    )
+        if not manifest.command:
+            return np.eye(4)
+        T_body_view = _views(manifest, rig).rig.T_body_left
+        return se3.inverse(T_body_view) @ rig.T_body_left
+    if manifest.pose_of == "imu" and rig.imu:
+        return se3.inverse(rig.imu.T_body_imu) @ rig.T_body_left
+    return rig.T_body_left
 
 
 def _check_needs(needs: tuple[str, ...], sequence: Sequence) -> None:
-    """Refuse, with a sentence, an estimator that this recording cannot serve."""
+    """Raise EstimatorFailure for an estimator that needs a sensor which this recording lacks."""
     rig = sequence.rig
-    has = {
-        "stereo": "" if rig.right else "one camera",
-        "encoders": "" if rig.wheels else "no wheels",
-        "imu": "" if rig.imu else "no IMU",
-    }
+    lacks = {}
+    if not rig.right:
+        lacks["stereo"] = "one camera"
+    if not rig.wheels:
+        lacks["encoders"] = "no wheels"
+    if not rig.imu:
+        lacks["imu"] = "no IMU"
     for need in needs:
-        if short := has.get(need):
-            raise EstimatorFailure(NOT_APPLICABLE, f"it needs {need!r}, but this recording has {short}")
+        if need in lacks:
+            raise EstimatorFailure(NOT_APPLICABLE, f"it needs {need!r}, but this recording has {lacks[need]}")
 
 
-def _feed(trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Progress", door: Running) -> None:
-    """Start the estimator, hand it frame after frame, and keep what it says. Raises EstimatorFailure."""
+def _feed(trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Progress", estimator: Running) -> None:
+    """Start the estimator, send it frame after frame, and write its answers. Raises EstimatorFailure."""
     entrant = trial.entrant
-    with door as running:
+    with estimator as running:
         running.start(sequence.rig, entrant.params, trial.repeat)
         pace = _Pace(keeper, is_real_time=entrant.mode == "real_time")
         frames = frames_of(sequence, entrant.manifest.needs, pace)
@@ -206,39 +235,53 @@ def _feed(trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Prog
 
 @dataclass(slots=True)
 class _Pace:
-    """The camera's pace, by the clock of its stamps and of what answers took: nobody sleeps.
+    """The camera's pace, on a clock of its stamps and of the time that answers took; nothing sleeps.
 
     An estimator is free again at `free_ns`. In real time, a frame that comes earlier is dropped.
     """
 
     keeper: "_Keeper"
     is_real_time: bool
-    free_ns: int = np.iinfo(np.int64).min
+    free_ns: int = EARLIEST_NS
 
     def drops(self, index: int, t_ns: int) -> bool:
-        """Whether this frame is lost to the estimator, which the table of frames then says."""
-        is_lost = self.is_real_time and t_ns < self.free_ns
-        if is_lost:
+        """Whether this frame is dropped, which is then noted in the table of frames."""
+        is_dropped = self.is_real_time and t_ns < self.free_ns
+        if is_dropped:
             self.keeper.answers.writerow({"frame": index, "status": DROPPED})
-        return is_lost
+        return is_dropped
 
 
 def frames_of(sequence: Sequence, needs: tuple[str, ...], pace: _Pace | None = None) -> Iterator[Frame]:
-    """What the estimator asked for, one instant at a time, but for the frames that it is too late for."""
+    """The frames of a sequence with the sensors that an estimator needs, without those that its pace drops."""
     encoders = EncoderReadings(*sequence.encoders()) if "encoders" in needs else None
     imu = sequence.imu() if "imu" in needs else None
-    last_ns = np.iinfo(np.int64).min
-    # Pictures that nobody asked for are not decoded.
-    looks = "stereo" in needs or "mono" in needs
-    stereo = "stereo" in needs
-    shown = rgb if "colour" in needs else grey
-    for f in sequence.frames(right=stereo) if looks else sequence.encoded_frames():
-        if pace and pace.drops(f.index, f.t_ns):
+    convert = rgb if "colour" in needs else grey
+    last_ns = EARLIEST_NS
+    for recorded in _recorded_frames(sequence, needs):
+        index = recorded.index
+        t_ns = recorded.t_ns
+        if pace and pace.drops(index, t_ns):
             continue
-        seen = (f.left, f.right) if isinstance(f, StereoFrame) else (None, None)
-        left, right = (image if image is None else shown(image, f.colour) for image in seen)
-        yield Frame(f.index, f.t_ns, left, right, _between(encoders, last_ns, f.t_ns), _between(imu, last_ns, f.t_ns))
-        last_ns = f.t_ns
+        left = None
+        right = None
+        if isinstance(recorded, StereoFrame):
+            left = convert(recorded.left, recorded.colour)
+            if recorded.right is not None:
+                right = convert(recorded.right, recorded.colour)
+        new_encoders = _between(encoders, last_ns, t_ns)
+        new_imu = _between(imu, last_ns, t_ns)
+        yield Frame(index, t_ns, left, right, new_encoders, new_imu)
+        last_ns = t_ns
+
+
+def _recorded_frames(sequence: Sequence, needs: tuple[str, ...]) -> Iterator[StereoFrame | EncodedFrame]:
+    """The recorded frames; pictures are decoded only if an estimator needs them."""
+    if "stereo" in needs:
+        return sequence.frames(right=True)
+    if "mono" in needs:
+        return sequence.frames(right=False)
+    return sequence.encoded_frames()
 
 
 def _between(readings: Readings | None, last_ns: int, now_ns: int) -> Readings | None:
@@ -246,12 +289,13 @@ def _between(readings: Readings | None, last_ns: int, now_ns: int) -> Readings |
     if readings is None:
         return None
     first, end = np.searchsorted(readings.t_ns, [last_ns, now_ns], side="right")
-    return type(readings)(*(getattr(readings, field.name)[first:end] for field in fields(readings)))
+    columns = [getattr(readings, column.name) for column in fields(readings)]
+    return type(readings)(*(column[first:end] for column in columns))
 
 
 @dataclass(slots=True)
 class _Keeper:
-    """Writes what an estimator says as it says it: memory does not grow with the sequence's length."""
+    """Writes an estimator's answers as they come, so that memory does not grow with the length of the sequence."""
 
     answers: "csv.DictWriter[str]"
     times: "csv.DictWriter[str]"
@@ -263,61 +307,73 @@ class _Keeper:
     revised: dict[int, Array] = field(default_factory=dict)
 
     def keep(self, frame: Frame, answer: Answer) -> None:
-        """Add one frame."""
-        r = answer.result
-        self.stamps[frame.index] = frame.t_ns
-        if r.T_odom_frame is not None and r.status is not Status.LOST:
-            self.poses[frame.index] = r.T_odom_frame
-            if r.covariance is not None:
-                self.covariances[frame.index] = self._of_left(r.T_odom_frame[:3, :3], r.covariance)
-        if r.points is not None:
-            points = se3.apply(se3.inverse(self.T_frame_left), r.points)
-            self.tracks.writestr(_member(frame.index, POINTS), _npy(points))
-        stats = json.dumps({key: float(f"{value:.6g}") for key, value in sorted(r.stats.items())})
-        answered = {"frame": frame.index, "status": str(r.status), "reason": r.reason, "stats": stats}
-        self.times.writerow(
-            {"frame": frame.index, **{name: f"{getattr(answer, name):.3f}" for name in TIME_COLUMNS[1:]}}
-        )
-        if r.tracks is None:
-            self.answers.writerow(answered)
-        else:
-            inlier = r.tracks.inlier
-            table = np.column_stack([r.tracks.uv_last_px, r.tracks.uv_px, r.tracks.inlier])
-            self.answers.writerow({**answered, "tracks": len(inlier), "inliers": int(inlier.sum())})
-            self.tracks.writestr(_member(frame.index), _npy(table))
+        """Write the answer to one frame."""
+        index = frame.index
+        result = answer.result
+        self.stamps[index] = frame.t_ns
+        if result.T_odom_frame is not None and result.status is not Status.LOST:
+            self.poses[index] = result.T_odom_frame
+            if result.covariance is not None:
+                R_odom_frame = result.T_odom_frame[:3, :3]
+                self.covariances[index] = self._covariance_of_left(R_odom_frame, result.covariance)
+        if result.points is not None:
+            points = se3.apply(se3.inverse(self.T_frame_left), result.points)
+            self.tracks.writestr(_member(index, POINTS), _npy(points))
 
-    def _of_left(self, R_odom_frame: Array, P: Array) -> Array:
-        """The covariance (6, 6) of the left camera's pose, where P is that of the frame that it is mounted on.
+        stats = {name: float(f"{value:.6g}") for name, value in sorted(result.stats.items())}
+        row: dict[str, int | str] = {
+            "frame": index,
+            "status": str(result.status),
+            "reason": result.reason,
+            "stats": json.dumps(stats),
+        }
+        if result.tracks is not None:
+            tracks = result.tracks
+            row["tracks"] = len(tracks.inlier)
+            row["inliers"] = int(tracks.inlier.sum())
+            table = np.column_stack([tracks.uv_last_px, tracks.uv_px, tracks.inlier])
+            self.tracks.writestr(_member(index), _npy(table))
+        self.answers.writerow(row)
+        costs = {name: f"{getattr(answer, name):.3f}" for name in COST_COLUMNS}
+        self.times.writerow({"frame": index, **costs})
 
-        A rotation of the frame by δ about odom's axes moves the camera by δ × r, with r its place in the frame.
+    def _covariance_of_left(self, R_odom_frame: Array, covariance: Array) -> Array:
+        """The covariance (6, 6) of the left camera's pose, from that of the frame that it is mounted on.
+
+        A rotation of the frame by δ about odom's axes moves the camera by δ × r, with r its position in the frame.
         """
         x, y, z = R_odom_frame @ self.T_frame_left[:3, 3]
-        J = np.eye(6)
-        J[:3, 3:] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
-        J = np.kron(np.eye(2), self.T_frame_left[:3, :3].T) @ J
-        return np.asarray(J @ P @ J.T)
+        lever = np.eye(6)
+        lever[0, 3:] = [0, z, -y]
+        lever[1, 3:] = [-z, 0, x]
+        lever[2, 3:] = [y, -x, 0]
+        R_left_frame = self.T_frame_left[:3, :3].T
+        jacobian = np.kron(np.eye(2), R_left_frame) @ lever
+        return np.asarray(jacobian @ covariance @ jacobian.T)
 
     def write(self, folder: Path) -> None:
-        """The files of poses: the left camera's, in its frame at the start."""
+        """Write the files of poses: the left camera's, in its frame at the start."""
         (folder / ESTIMATE).write_text(self._tum(self.poses), encoding="utf-8")
         if self.covariances:
-            rows = ((self.stamps[index], P) for index, P in self.covariances.items())
+            rows = [(self.stamps[index], covariance) for index, covariance in self.covariances.items()]
             (folder / COVARIANCE).write_text(format_covariances(rows), encoding="utf-8")
         if self.revised:
             (folder / REVISED).write_text(self._tum(self.revised), encoding="utf-8")
 
     def _tum(self, poses: Mapping[int, Array]) -> str:
-        at = sorted(poses.keys() & self.stamps.keys())
-        if not at:
+        """The poses of the frames that were sent, as the text of a TUM file."""
+        indices = sorted(poses.keys() & self.stamps.keys())
+        if not indices:
             return ""
-        T_odom_frame = np.stack([poses[index] for index in at])
-        T = se3.inverse(self.T_frame_left) @ T_odom_frame @ self.T_frame_left
-        return format_tum(Trajectory(np.array([self.stamps[index] for index in at], np.int64), T))
+        T_odom_frame = np.stack([poses[index] for index in indices])
+        T_odom_left = se3.inverse(self.T_frame_left) @ T_odom_frame @ self.T_frame_left
+        t_ns = np.array([self.stamps[index] for index in indices], np.int64)
+        return format_tum(Trajectory(t_ns, T_odom_left))
 
 
 @contextmanager
 def _keeper(folder: Path) -> Iterator[_Keeper]:
-    """A keeper while an estimator runs; then its files of poses."""
+    """A keeper while an estimator runs; its files of poses are written at the end."""
     with (
         new_table(folder / ANSWERS, ANSWER_COLUMNS) as answers,
         new_table(folder / TIMES, TIME_COLUMNS) as times,
@@ -329,8 +385,8 @@ def _keeper(folder: Path) -> Iterator[_Keeper]:
 
 
 def _member(index: int, of: str = "") -> zipfile.ZipInfo:
-    """A fixed date, so that equal tracks are equal bytes."""
-    info = zipfile.ZipInfo(f"{of}{index:08d}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+    """The entry of a frame's table in the archive."""
+    info = zipfile.ZipInfo(f"{of}{index:08d}.npy", date_time=ZIP_DATE)
     info.compress_type = zipfile.ZIP_DEFLATED
     return info
 

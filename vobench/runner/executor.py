@@ -1,7 +1,7 @@
-"""Who performs the tasks of a run: this process, some processes of this machine, or the workers of a Dask cluster.
+"""Executors of a run's tasks: this process, processes of this machine, or the workers of a Dask cluster.
 
 Every executor takes one task at a time and answers with a future of `Done`, which never raises; `perform_all` decides
-what runs when. A task that fails takes those that need it with it, and nobody else.
+what runs when. If a task fails, the tasks that need it fail, and no other.
 """
 
 import errno
@@ -32,17 +32,19 @@ from vobench.runner.store import STATE, Progress, SilentProgress, Store, Tell
 from vobench.runner.task import ENTRIES, NO_LIMIT, Stage, Task, perform
 
 FailureKind = Literal["crashed", "out_of_memory", "refused"]
-# What no other task can do without either.
+# Lacks that every other task would meet, too.
 Shortage = Literal["disk", "library"]
 LOOK_S = 0.2
 GRACE_S = 0.7  # for a process that is asked to stop, before it is killed
 STOP_S = 0.4  # for its main thread, before another one tidies up and ends it
 CONNECT_S = 10.0
-MOST_OF_A_STACK = 1 << 20  # bytes
-# What a library's fault ends, as once in hundreds of sequences; what is made so is the same however often it is made.
+STACK_BYTES = 1 << 20  # of a stack that is kept, at most
+END_LOOK_S = 0.01
+# Exit codes of a process that a library's fault ended, as happens once in hundreds of sequences.
 FAULTS = (-signal.SIGABRT, -signal.SIGSEGV, -signal.SIGBUS)
-MADE = ("bake", "sequence")
-# What a stage makes, in the words of a sentence about what needed it.
+# Stages that are performed again after a fault: their result is the same each time.
+REPEATABLE = ("bake", "sequence")
+# The result of a stage, as a sentence names it.
 PRODUCTS: dict[Stage, str] = {
     "bake": "scene's light",
     "sequence": "sequence",
@@ -66,9 +68,9 @@ PRELOADED = [
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """How a task ended: no failure, or which and why.
+    """How a task ended: the kind of its failure and the reason, or none.
 
-    `lacks` names what ends the whole run, as no other task can end better without it.
+    `lacks` names what ends the whole run, since every other task would lack it, too.
     `stack` is what a process wrote when a fault of a library ended it.
     """
 
@@ -81,9 +83,9 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """News of one task: `what` happens to it, on which slot of the executor, after how many seconds, and why.
+    """An event of one task: `what` happens, on which slot of the executor, after how many seconds, and why.
 
-    A message that the user should read, such as for whom the task waits, is `told`, and comes at once.
+    A message that the user should read, such as for whom the task waits, is in `told`, and comes at once.
     """
 
     what: Literal["started", "told", "done", "failed"]
@@ -130,23 +132,28 @@ class Serial:
 
 def performed(task: Task, store: Path, threads: int, progress: Progress) -> Done:
     """Perform a task; whatever it raises becomes its result, except a request to stop."""
-    began = time.monotonic()
+    began_s = time.monotonic()
     try:
         perform(task, store, threads, progress=progress)
+        done = Done()
     except MissingDependencyError as error:
-        return Done("refused", _line(error), time.monotonic() - began, lacks="library")
+        done = Done("refused", _line(error), lacks="library")
     except VobenchError as error:
-        return Done("refused", _line(error), time.monotonic() - began)
+        done = Done("refused", _line(error))
     except MemoryError:
-        return Done("out_of_memory", "there was not enough memory", time.monotonic() - began)
-    except Exception as error:  # of one cell; the others go on
-        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-            return Done("refused", f"{FULL}: {error.filename or store}", time.monotonic() - began, lacks="disk")
-        return Done("crashed", f"{type(error).__name__}: {_line(error)}", time.monotonic() - began)
-    return Done(wall_s=time.monotonic() - began)
+        done = Done("out_of_memory", "there was not enough memory")
+    except Exception as error:  # of one task; the others go on
+        done = _unexpected(error, store)
+    return replace(done, wall_s=time.monotonic() - began_s)
 
 
 FULL = "no space is left on the device; free some, or let VOBENCH_CACHE name a folder elsewhere"
+
+
+def _unexpected(error: Exception, store: Path) -> Done:
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return Done("refused", f"{FULL}: {error.filename or store}", lacks="disk")
+    return Done("crashed", f"{type(error).__name__}: {_line(error)}")
 
 
 def _line(error: Exception) -> str:
@@ -156,9 +163,9 @@ def _line(error: Exception) -> str:
 class LocalProcesses:
     """Processes forked from a server that has imported what tasks import and nothing else, one for each task.
 
-    Only sequences of one light, one after the other in a slot, share a process, which then has their scene at hand.
-    Unless `pins_cores` is False, each slot has its own cores, as many as a task is given threads: libraries that draw,
-    trace, filter and multiply look at which cores they may use.
+    Only sequences of one light, one after the other in a slot, share a process, which has their scene loaded.
+    Unless `pins_cores` is False, each slot has its own cores, as many as a task gets threads: libraries that draw,
+    trace, filter and multiply use as many threads as they have cores.
     """
 
     def __init__(self, slots: int, *, server: ForkServer | None = None, pins_cores: bool = True) -> None:
@@ -182,17 +189,12 @@ class LocalProcesses:
         def await_end() -> None:
             worker = first
             done = worker.ask(task, store, limit, tell)
-            fault = worker.process.exit_code in FAULTS
-            if fault:
-                done = worker.traced(done, task, store)
-            if fault and task.stage in MADE:
+            if worker.had_fault and task.stage in REPEATABLE:
                 tell(f"{task.key}: {done.reason}, by a fault in a library; it is made once more")
                 self._running.discard(worker.process)
                 worker.leave()
                 worker = self._worker(slot, task, cores)
                 done = worker.ask(task, store, limit, tell)
-                if worker.process.exit_code in FAULTS:
-                    done = worker.traced(done, task, store)
             if task.stage == "sequence" and worker.process.is_alive:
                 self._idle[slot] = worker
             else:
@@ -204,74 +206,96 @@ class LocalProcesses:
         return future
 
     def _worker(self, slot: int, task: Task, cores: list[int]) -> "_Worker":
+        """The idle process of a slot if it has the task's input loaded on these cores, else a new one."""
         idle = self._idle.pop(slot, None)
-        if idle and (idle.at_hand, idle.cores) == (_takes_up(task), cores) and idle.process.is_alive:
+        if idle and idle.suits(task, cores):
             self._running.add(idle.process)
             return idle
         if idle:
             idle.leave()
         process = self._server.start_worker()
         self._running.add(process)
-        worker = _Worker(process, cores, _takes_up(task), TemporaryFile())  # noqa: SIM115 - it lives as long as the worker
+        trace = TemporaryFile()  # noqa: SIM115 - open as long as the worker runs
+        worker = _Worker(process, cores, _main_input(task), trace)
         worker.begin()
         return worker
 
     def close(self) -> None:
         """End the idle processes; ask those that run to stop, kill them after a grace period, and tidy up."""
         while self._idle:
-            self._idle.popitem()[1].leave()
-        was_killed = False
-        for number in (signal.SIGTERM, signal.SIGKILL):
-            running = [process for process in list(self._running) if process.is_alive and not process.abandon()]
-            for process in running:
-                process.kill(number)
-                was_killed = was_killed or number == signal.SIGKILL
-            ends_s = time.monotonic() + GRACE_S
-            while any(process.is_alive for process in running) and time.monotonic() < ends_s:
-                time.sleep(0.01)
-        for store in self._stores if was_killed else ():
-            Store(store).sweep()
+            _, idle = self._idle.popitem()
+            idle.leave()
+        self._signal_all(signal.SIGTERM)
+        was_killed = self._signal_all(signal.SIGKILL)
+        if was_killed:
+            for store in self._stores:
+                Store(store).sweep()
+
+    def _signal_all(self, number: int) -> bool:
+        """Signal the processes that run, and wait for their ends, GRACE_S at most; whether there were any."""
+        running = [process for process in list(self._running) if process.is_alive and not process.abandon()]
+        for process in running:
+            process.kill(number)
+        ends_s = time.monotonic() + GRACE_S
+        while any(process.is_alive for process in running) and time.monotonic() < ends_s:
+            time.sleep(END_LOOK_S)
+        return bool(running)
 
 
 @dataclass(frozen=True, slots=True)
 class _Worker:
-    """A process that performs tasks, on these cores, until nobody can send it another.
+    """A process that performs tasks, on these cores, until its connection is closed.
 
-    `trace` is the file to which it writes its stack when a fault ends it.
+    `main_input` is the key of the light or sequence that it has loaded; `trace` is the file to which it writes its
+    stack when a fault ends it.
     """
 
     process: WorkerProcess
     cores: list[int]
-    at_hand: str
+    main_input: str
     trace: IO[bytes]
 
+    @property
+    def had_fault(self) -> bool:
+        """Whether a fault of a library has ended the process."""
+        return self.process.exit_code in FAULTS
+
+    def suits(self, task: Task, cores: list[int]) -> bool:
+        """Whether the process runs on these cores and has the task's input loaded."""
+        has_input = self.main_input == _main_input(task) and self.cores == cores
+        return has_input and self.process.is_alive
+
     def begin(self) -> None:
-        """Tell the process where it works; it may not have started yet."""
-        with suppress(OSError):  # it is dead: `ask` says so
+        """Send the process its folder, environment and cores; it may not have started yet."""
+        with suppress(OSError):  # it is dead, which `ask` reports
             self.process.connection.send((os.getcwd(), dict(os.environ), self.cores))
             send_handle(self.process.connection, self.trace.fileno(), None)
 
     def ask(self, task: Task, store: Path, threads: int, tell: Tell) -> Done:
-        """How the process reports that a task ended, or how the process died; its messages go to `tell` at once."""
-        began = time.monotonic()
+        """The process's report of how a task ended, or how the process died; its messages go to `tell` at once."""
+        began_s = time.monotonic()
         try:
             self.process.connection.send((task, store, threads))
-            while not isinstance(answer := self.process.connection.recv(), Done):
+            while True:
+                answer = self.process.connection.recv()
+                if isinstance(answer, Done):
+                    return answer
                 tell(answer)
         except (EOFError, OSError):
-            return _death(self.process.join(), time.monotonic() - began)
-        return answer
+            done = _death(self.process.join(), time.monotonic() - began_s)
+            return self._with_stack(done, task, store) if self.had_fault else done
 
-    def traced(self, done: Done, task: Task, store: Path) -> Done:
+    def _with_stack(self, done: Done, task: Task, store: Path) -> Done:
         """The same failure with the stack that the process wrote when a fault ended it, which is kept in the store."""
         self.trace.seek(0)
-        stack = self.trace.read(MOST_OF_A_STACK).decode("utf-8", "replace")
+        stack = self.trace.read(STACK_BYTES).decode("utf-8", "replace")
         if not stack:
             return done
         name = f"{STATE}/faults/{task.key.replace('/', '-')}.txt"
+        path = store / name
         with suppress(OSError):
-            (store / name).parent.mkdir(parents=True, exist_ok=True)
-            (store / name).write_text(f"{task.stage} {task.name}: {done.reason}\n\n{stack}", encoding="utf-8")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(f"{task.stage} {task.name}: {done.reason}\n\n{stack}", encoding="utf-8")
         return replace(done, reason=f"{done.reason} (its stack: {name} in the cache)", stack=stack)
 
     def leave(self) -> None:
@@ -281,15 +305,19 @@ class _Worker:
 
 
 def _share(cores: Sequence[int], slot: int, threads: int) -> list[int]:
-    first = slot * threads % len(cores)
-    return [cores[(first + n) % len(cores)] for n in range(min(threads, len(cores)))]
+    """The cores of a slot, one for each of its threads, all of them at most."""
+    count = min(threads, len(cores))
+    first = slot * threads
+    return [cores[(first + n) % len(cores)] for n in range(count)]
 
 
-def _death(exitcode: int | None, wall_s: float) -> Done:
-    if exitcode == -signal.SIGKILL:
+def _death(exit_code: int | None, wall_s: float) -> Done:
+    if exit_code == -signal.SIGKILL:
         return Done("out_of_memory", "its process was killed by the system, most likely for memory", wall_s)
-    by = f"signal {signal.Signals(-exitcode).name}" if exitcode and exitcode < 0 else f"exit code {exitcode}"
-    return Done("crashed", f"its process ended with {by}", wall_s)
+    cause = f"exit code {exit_code}"
+    if exit_code and exit_code < 0:
+        cause = f"signal {signal.Signals(-exit_code).name}"
+    return Done("crashed", f"its process ended with {cause}", wall_s)
 
 
 def work(connection: Connection, vobench_fd: int) -> None:
@@ -307,7 +335,7 @@ def work(connection: Connection, vobench_fd: int) -> None:
     threading.Thread(target=watching, name="watch vobench", daemon=True).start()
     try:
         folder, environment, cores = connection.recv()
-        # The stack of every thread, that of the libraries too since Python 3.14, where a fault ends this process.
+        # Writes the stack of every thread, and since Python 3.14 that of the libraries, if a fault ends this process.
         faulthandler.enable(recv_handle(connection))
         os.environ.clear()
         os.environ.update(environment)
@@ -326,7 +354,8 @@ def work(connection: Connection, vobench_fd: int) -> None:
 def _leave() -> None:
     """Tidy up and end this process, whatever its main thread does."""
     stop.undo_all()
-    os._exit(128 + stop.requested() if stop.requested() else 1)
+    number = stop.requested()
+    os._exit(128 + number if number else 1)
 
 
 class Dask:
@@ -342,29 +371,34 @@ class Dask:
         except (OSError, ValueError) as error:
             raise InputError(f"no Dask scheduler answers ({_line(error)}): {address}") from None
         try:
-            own = versions()
-            theirs = self._client.run(versions)
-        except OSError as error:
+            self._workers = self._checked_workers(address)
+        except InputError:
             self.close()
-            raise InputError(f"a Dask worker went while we asked it, try again ({_line(error)}): {address}") from None
-        for worker, found in theirs.items():
-            other = [f"{name} {said}, not {own[name]}" for name, said in found.items() if said != own[name]]
-            if other:
-                self.close()
-                raise InputError(f"the worker has {other[0]}: {worker}")
-        if not theirs:
-            self.close()
-            raise InputError(f"this Dask scheduler has no workers: {address}")
-        self._workers = list(theirs)
+            raise
         self.slots = len(self._workers)
-        # Every worker that performs tasks of ours holds the lease, which the scheduler takes back when we are gone.
+        # Every worker that performs tasks of this client holds the lease, which ends with the client.
         self._lease = f"vobench-lease-{uuid4().hex}"
         self._held = self._client.submit(str, self._lease, key=self._lease, pure=False)
         self._tells: dict[str, Tell] = {}
         self._client.subscribe_topic(self._lease, self._hear)
 
+    def _checked_workers(self, address: str) -> list[str]:
+        """The addresses of the workers. Raises InputError if there are none, or if one has other versions."""
+        expected = versions()
+        try:
+            versions_of = self._client.run(versions)
+        except OSError as error:
+            raise InputError(f"a Dask worker left during the check, try again ({_line(error)}): {address}") from None
+        for worker, its_versions in versions_of.items():
+            for name, version in its_versions.items():
+                if version != expected[name]:
+                    raise InputError(f"the worker has {name} {version}, not {expected[name]}: {worker}")
+        if not versions_of:
+            raise InputError(f"this Dask scheduler has no workers: {address}")
+        return list(versions_of)
+
     def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[Done]":
-        """Send the task to the worker of that slot, or to another where that one is gone."""
+        """Send the task to the worker of that slot, or to another if that one is gone."""
         future: Future[Done] = Future()
         worker = self._workers[slot]
         self._tells[task.key] = tell
@@ -375,7 +409,8 @@ class Dask:
 
         def ended(sent: Any) -> None:
             error = sent.exception()
-            future.set_result(Done("crashed", f"on {worker}: {_line(error)}") if error else sent.result())
+            done = Done("crashed", f"on {worker}: {_line(error)}") if error else sent.result()
+            future.set_result(done)
 
         sent.add_done_callback(ended)
         return future
@@ -432,63 +467,73 @@ def versions() -> dict[str, str]:
 
 @dataclass(slots=True)
 class _Queue:
-    """The tasks that wait: those that are ready, timed ones apart, by what they take up; and who waits for whom."""
+    """The tasks that have not begun: those that are ready, by their main input, and those that wait for others.
 
-    ready: tuple[dict[str, deque[Task]], dict[str, deque[Task]]] = field(default_factory=lambda: ({}, {}))
+    `ready` is of tasks that may run beside others, `ready_timed` of estimates, whose time is measured. `missing` counts
+    the tasks that each waiting task needs; `dependents` are the tasks that wait for each.
+    """
+
+    ready: dict[str, deque[Task]] = field(default_factory=dict)
+    ready_timed: dict[str, deque[Task]] = field(default_factory=dict)
     missing: dict[str, int] = field(default_factory=dict)
-    after: dict[str, list[Task]] = field(default_factory=lambda: defaultdict(list))
+    dependents: dict[str, list[Task]] = field(default_factory=lambda: defaultdict(list))
 
     @classmethod
     def of(cls, tasks: Sequence[Task]) -> "_Queue":
         queue = cls()
-        own = {task.key for task in tasks}
+        keys = {task.key for task in tasks}
         for task in tasks:
-            needs = own.intersection(task.needs)
+            needs = keys.intersection(task.needs)
             queue.missing[task.key] = len(needs)
             for key in needs:
-                queue.after[key].append(task)
+                queue.dependents[key].append(task)
             if not needs:
                 queue.add(task)
         return queue
 
     def add(self, task: Task) -> None:
-        self.ready[_is_timed(task)].setdefault(_takes_up(task), deque()).append(task)
+        """Add a task that is ready."""
+        by_input = self.ready_timed if _is_timed(task) else self.ready
+        by_input.setdefault(_main_input(task), deque()).append(task)
 
     def take(self, last: str, *, timed: bool) -> Task | None:
-        """The first that is ready of what a slot took up last, else of anything; one that is timed only if `timed`."""
-        for ready in self.ready[: 1 + timed]:
-            if ready:
-                first = last if last in ready else next(iter(ready))
-                task = ready[first].popleft()
-                if not ready[first]:
-                    del ready[first]
+        """The first ready task with the main input that a slot had last, else any; a timed one only if `timed`."""
+        choices = [self.ready, self.ready_timed] if timed else [self.ready]
+        for by_input in choices:
+            if by_input:
+                main_input = last if last in by_input else next(iter(by_input))
+                task = by_input[main_input].popleft()
+                if not by_input[main_input]:
+                    del by_input[main_input]
                 return task
         return None
 
     def __len__(self) -> int:
-        return sum(len(tasks) for ready in self.ready for tasks in ready.values())
+        """The number of tasks that are ready."""
+        tasks = [*self.ready.values(), *self.ready_timed.values()]
+        return sum(map(len, tasks))
 
     def release(self, key: str) -> None:
-        """Tasks that waited for this one alone are ready."""
-        for task in self.after.pop(key, ()):
+        """Make the tasks ready that waited for this one alone."""
+        for task in self.dependents.pop(key, ()):
             self.missing[task.key] -= 1
             if not self.missing[task.key]:
                 self.add(task)
 
-    def fell(self, key: str) -> Iterator[Task]:
-        """All that cannot be performed without this one."""
-        for task in self.after.pop(key, ()):
+    def drop_dependents(self, key: str) -> Iterator[Task]:
+        """Remove all tasks that cannot be performed without this one."""
+        for task in self.dependents.pop(key, ()):
             if self.missing.pop(task.key, None) is not None:
                 yield task
-                yield from self.fell(task.key)
+                yield from self.drop_dependents(task.key)
 
 
 def _is_timed(task: Task) -> bool:
     return task.stage == "estimate"
 
 
-def _takes_up(task: Task) -> str:
-    """The light or sequence that a task reads; whoever has it at hand should have the next one too."""
+def _main_input(task: Task) -> str:
+    """The key of the light or sequence that a task reads; a slot that has it loaded should get the next such task."""
     return task.needs[0] if task.needs else task.key
 
 
@@ -500,68 +545,106 @@ def perform_all(
     shares_time: bool = False,
     heard: Callable[[Event], object] = lambda _: None,
 ) -> dict[str, Done]:
-    """Perform tasks, each after those that it needs; the failures by key, those of what they took with them included.
+    """Perform tasks, each after those that it needs; the failures by key, with those of the tasks that needed them.
 
-    An estimator is timed: unless `shares_time`, nothing else runs beside it. `heard` is called with what happens.
+    An estimator is timed: unless `shares_time`, nothing else runs beside it. `heard` is called with each event.
     Raises InputError if the disk is full, MissingDependencyError if a library is missing, and Stopped.
     """
-    queue = _Queue.of(tasks)
-    failures = dict[str, Done]()
-    running = dict["Future[Done]", tuple[Task, int]]()
-    last = [""] * executor.slots
-    messages: SimpleQueue[Event] = SimpleQueue()
+    schedule = _Schedule(_Queue.of(tasks), store, executor, shares_time=shares_time, heard=heard)
     try:
-        while len(queue) or running:
+        while not schedule.is_finished:
             stop.check()
-            _fill(queue, running, last, executor, store, messages=messages, shares_time=shares_time, heard=heard)
-            ended = wait(running, timeout=LOOK_S, return_when=FIRST_COMPLETED).done
-            while not messages.empty():
-                heard(messages.get())
-            for future in ended:
-                task, slot = running.pop(future)
-                done = future.result()
-                if done.lacks == "library":
-                    raise MissingDependencyError(done.reason)
-                if done.lacks:
-                    raise InputError(done.reason)
-                heard(Event("failed" if done.failure else "done", task, slot, done.wall_s, done.reason))
-                if not done.failure:
-                    queue.release(task.key)
-                    continue
-                failures[task.key] = done
-                lost = f"its {PRODUCTS[task.stage]} could not be made: {done.reason}"
-                for other in queue.fell(task.key):
-                    failures[other.key] = Done(done.failure, lost, stack=done.stack)
+            schedule.begin_tasks()
+            schedule.await_ends()
     finally:
         executor.close()
-    return failures
+    return schedule.failures
 
 
-def _fill(
-    queue: _Queue,
-    running: dict["Future[Done]", tuple[Task, int]],
-    last: list[str],
-    executor: Executor,
-    store: Path,
-    *,
-    messages: "SimpleQueue[Event]",
-    shares_time: bool,
-    heard: Callable[[Event], object],
-) -> None:
-    """Begin what may begin now."""
-    cores = len(os.sched_getaffinity(0))
-    for slot in sorted(set(range(executor.slots)) - {slot for _, slot in running.values()}):
-        if not shares_time and any(_is_timed(task) for task, _ in running.values()):
+class _Schedule:
+    """The tasks of a run over the slots of an executor, and the failures so far by key."""
+
+    def __init__(
+        self,
+        queue: _Queue,
+        store: Path,
+        executor: Executor,
+        *,
+        shares_time: bool,
+        heard: Callable[[Event], object],
+    ) -> None:
+        self.failures: dict[str, Done] = {}
+        self._queue = queue
+        self._store = store
+        self._executor = executor
+        self._shares_time = shares_time
+        self._heard = heard
+        self._cores = len(os.sched_getaffinity(0))
+        self._running: dict[Future[Done], tuple[Task, int]] = {}
+        self._last_inputs = [""] * executor.slots
+        self._messages: SimpleQueue[Event] = SimpleQueue()
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether nothing runs and nothing is ready."""
+        return not self._running and not len(self._queue)
+
+    def begin_tasks(self) -> None:
+        """Begin the tasks that may begin now, one in each free slot."""
+        busy = {slot for _, slot in self._running.values()}
+        for slot in range(self._executor.slots):
+            if slot in busy:
+                continue
+            if not self._shares_time and self._has_timed:
+                return
+            task = self._queue.take(self._last_inputs[slot], timed=self._shares_time or not self._running)
+            if task is None:
+                return
+            self._begin(task, slot)
+
+    @property
+    def _has_timed(self) -> bool:
+        return any(_is_timed(task) for task, _ in self._running.values())
+
+    def _begin(self, task: Task, slot: int) -> None:
+        self._last_inputs[slot] = _main_input(task)
+        threads = self._threads(task)
+        self._heard(Event("started", task, slot))
+
+        def tell(sentence: str) -> None:
+            self._messages.put(Event("told", task, slot, told=sentence))
+
+        future = self._executor.submit(task, self._store, slot, threads, tell)
+        self._running[future] = (task, slot)
+
+    def _threads(self, task: Task) -> int:
+        """The threads of a task that begins: all if nothing can run beside it, else its slot's share of the cores."""
+        runs_apart = _is_timed(task) and not self._shares_time
+        is_alone = not self._running and (runs_apart or not len(self._queue))
+        if is_alone or self._executor.slots == 1:
+            return NO_LIMIT
+        return max(self._cores // self._executor.slots, 1)
+
+    def await_ends(self) -> None:
+        """Wait a little for ends of tasks; pass on their messages and what follows from the ends."""
+        ended = wait(self._running, timeout=LOOK_S, return_when=FIRST_COMPLETED).done
+        while not self._messages.empty():
+            self._heard(self._messages.get())
+        for future in ended:
+            task, slot = self._running.pop(future)
+            self._end(task, slot, future.result())
+
+    def _end(self, task: Task, slot: int, done: Done) -> None:
+        if done.lacks == "library":
+            raise MissingDependencyError(done.reason)
+        if done.lacks:
+            raise InputError(done.reason)
+        what: Literal["failed", "done"] = "failed" if done.failure else "done"
+        self._heard(Event(what, task, slot, done.wall_s, done.reason))
+        if not done.failure:
+            self._queue.release(task.key)
             return
-        task = queue.take(last[slot], timed=shares_time or not running)
-        if task is None:
-            return
-        last[slot] = _takes_up(task)
-        is_alone = not running and ((_is_timed(task) and not shares_time) or not len(queue))
-        heard(Event("started", task, slot))
-        threads = NO_LIMIT if is_alone or executor.slots == 1 else max(cores // executor.slots, 1)
-
-        def tell(sentence: str, task: Task = task, slot: int = slot) -> None:
-            messages.put(Event("told", task, slot, told=sentence))
-
-        running[executor.submit(task, store, slot, threads, tell)] = (task, slot)
+        self.failures[task.key] = done
+        cause = f"its {PRODUCTS[task.stage]} could not be made: {done.reason}"
+        for dependent in self._queue.drop_dependents(task.key):
+            self.failures[dependent.key] = Done(done.failure, cause, stack=done.stack)

@@ -1,7 +1,8 @@
-"""The folder of a run, as a person reads it, and the hashes of its files."""
+"""The folder of a run, which people read, and the hashes of its files."""
 
 import json
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -31,7 +32,7 @@ SUITE = "suite.json"
 ESTIMATORS = "estimators.json"
 
 # Best first. Those from `lost` to `not_applicable` are failures, and no failure ranks before a survivor. The last one
-# is no failure of an estimator: its case is excluded for all of them.
+# is not a failure of an estimator: its case is excluded for all of them.
 TrialStatus = Literal[
     "ok",
     "partial",
@@ -47,6 +48,7 @@ TrialStatus = Literal[
 ]
 STATUSES: tuple[TrialStatus, ...] = get_args(TrialStatus)
 SURVIVED = ("ok", "partial")
+FINISHED_TRIAL = (*SURVIVED, "lost", "diverged")  # the estimator answered to the end, well or not
 NOT_APPLICABLE = "not_applicable"  # the recording lacks a sensor that the estimator needs
 NO_SEQUENCE: Final = "no_sequence"  # the case could not be simulated or imported
 MOST_NAMED = 3  # cases that a sentence names; the others are counted
@@ -148,10 +150,24 @@ def with_sequence(scores: Iterable[TrialScore]) -> list[TrialScore]:
     return [score for score in scores if score.status != NO_SEQUENCE]
 
 
+def total_failure(scores: Iterable[TrialScore]) -> str:
+    """One sentence if no estimator finished any trial: how many trials failed how, and the first; else empty."""
+    trials = with_sequence(scores)
+    if not trials or any(trial.status in FINISHED_TRIAL for trial in trials):
+        return ""
+    counts = Counter(trial.status for trial in trials)
+    kinds = ", ".join(f"{count} {status}" for status, count in counts.most_common())
+    first = trials[0]
+    return f"no estimator finished a trial: {kinds}; {first.estimator} on {first.case}: {first.reason}"
+
+
 def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> float | None:
-    """One statistic of one metric of a score as JSON has it, None where it has no such."""
-    entries = (score or {"metrics": []})["metrics"]
-    return next((float(entry[statistic]) for entry in entries if entry["name"] == metric), None)
+    """One statistic of one metric of a score as JSON has it; None without such a metric."""
+    metrics = score["metrics"] if score else []
+    for entry in metrics:
+        if entry["name"] == metric:
+            return float(entry[statistic])
+    return None
 
 
 ONLY_THEIR_OWN = "Estimators saw only their own files."
@@ -173,11 +189,13 @@ def visible_to(trials: Iterable[TrialScore]) -> str:
 
 
 def seen_by(trial: TrialScore) -> str:
-    """What a trial's estimator saw beyond its own files; empty where that is nothing."""
-    if trial.sandbox is not None:
-        is_strict = trial.sandbox.level == "full" and not trial.sandbox.read
-        return "" if is_strict else trial.sandbox.sentence
-    was_started = trial.status not in ("refused", NOT_APPLICABLE) and ORACLE not in trial.claims
+    """What a trial's estimator saw beyond its own files; empty if nothing."""
+    sandbox = trial.sandbox
+    if sandbox is not None:
+        is_strict = sandbox.level == "full" and not sandbox.read
+        return "" if is_strict else sandbox.sentence
+    is_program = ORACLE not in trial.claims
+    was_started = is_program and trial.status not in ("refused", NOT_APPLICABLE)
     return "what it could see is not recorded" if was_started else ""
 
 
@@ -222,9 +240,10 @@ class RunFolder:
         scores = []
         for file in self.score_files():
             score = read_score(file)
-            if self.estimate(score.case, score.estimator, score.repeat) / SCORE != file:
-                told = f"{score.estimator!r} on {score.case!r}, {score.repeat}"
-                raise InputError(f"should be the score of the folder it lies in, but is of {told}: {file}")
+            folder = self.estimate(score.case, score.estimator, score.repeat)
+            if folder / SCORE != file:
+                trial = f"{score.estimator!r} on {score.case!r}, {score.repeat}"
+                raise InputError(f"should be the score of the folder it lies in, but is of {trial}: {file}")
             scores.append(score)
         return scores
 
@@ -299,11 +318,15 @@ TIMES_HASHES = "times_hashes.json"
 
 
 def write_hashes(folder: RunFolder) -> None:
-    """Hash all that lies in a run's folder, and the sequences that it links to; files of times apart."""
-    hashes = {name: file_hash(folder.path / name) for name in _names(folder.path)}
-    for file, are_times in ((HASHES, False), (TIMES_HASHES, True)):
-        chosen = {name: held for name, held in hashes.items() if (Path(name).name in (TIMES, PAGE)) == are_times}
-        write_json(folder.path / file, chosen)
+    """Hash all files in a run's folder, and the sequences that it links to; files of times apart."""
+    hashes: dict[str, str] = {}
+    times_hashes: dict[str, str] = {}
+    for name in _names(folder.path):
+        of_times = Path(name).name in (TIMES, PAGE)
+        chosen = times_hashes if of_times else hashes
+        chosen[name] = file_hash(folder.path / name)
+    write_json(folder.path / HASHES, hashes)
+    write_json(folder.path / TIMES_HASHES, times_hashes)
 
 
 def read_hashes(folder: RunFolder) -> dict[str, str]:
@@ -313,23 +336,27 @@ def read_hashes(folder: RunFolder) -> dict[str, str]:
 
 def _hashes_in(path: Path) -> dict[str, str]:
     try:
-        held = json.loads(path.read_text(encoding="utf-8"))
+        hashes = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(f"this run kept no hashes (its vobench was older, or it is no run): {path}") from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"not readable as JSON ({error}): {path}") from None
-    if not isinstance(held, dict) or not all(isinstance(value, str) for value in held.values()):
+    is_table = isinstance(hashes, dict) and all(isinstance(value, str) for value in hashes.values())
+    if not is_table:
         raise InputError(f"should hold one hash for each file: {path}")
-    escaped = [name for name in held if Path(name).is_absolute() or ".." in Path(name).parts]
-    if escaped:
-        raise InputError(f"names a file outside the run's folder ({escaped[0]!r}): {path}")
-    return held
+    for name in hashes:
+        file = Path(name)
+        if file.is_absolute() or ".." in file.parts:
+            raise InputError(f"names a file outside the run's folder ({name!r}): {path}")
+    return dict(hashes)
 
 
 def _names(root: Path) -> Iterator[str]:
     """Paths of all files below a run's folder; a sequence is a link to a folder in the cache."""
-    linked = (file for link in root.glob(f"cases/*/{SEQUENCE}") for file in link.glob("*.mcap"))
-    for path in sorted({*(p for p in root.rglob("*") if p.is_file()), *linked}):
+    files = {path for path in root.rglob("*") if path.is_file()}
+    for link in root.glob(f"cases/*/{SEQUENCE}"):
+        files.update(link.glob("*.mcap"))
+    for path in sorted(files):
         name = str(path.relative_to(root))
         if name not in (HASHES, TIMES_HASHES):
             yield name

@@ -1,4 +1,4 @@
-"""The table of a trial's frames: what the estimator said of each, how wrong its pose is, and how it was exposed."""
+"""The table of a trial's frames: the estimator's answer to each, the error of its pose, and its exposure."""
 
 import csv
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,24 +17,25 @@ if TYPE_CHECKING:
 
 FRAMES = "frames.csv"
 TIMES = "times.csv"
-# What these are made of: tables in the store, one of a sequence and one of an estimate.
+# The tables in the store that these are joined from: one of a sequence, one of an estimate.
 EXPOSURES = "exposures.csv"
 ANSWERS = "answers.csv"
 GROUND_TRUTH = "ground_truth.tum"
 EXPOSURE_COLUMNS = ("frame", "t_ns", "exposure_s", "gain_db")
 ANSWER_COLUMNS = ("frame", "status", "reason", "tracks", "inliers", "stats")
-TIME_COLUMNS = ("frame", "wall_ms", "cpu_ms", "memory_mib")
+COST_COLUMNS = ("wall_ms", "cpu_ms", "memory_mib")
+TIME_COLUMNS = ("frame", *COST_COLUMNS)
 ERROR_COLUMNS = ("position_error_m", "rotation_error_deg")
 
 
 @dataclass(frozen=True, slots=True)
 class FrameRow:
-    """One frame of a trial; what is not known of it is None.
+    """One frame of a trial; unknown values are None.
 
-    `status` is empty where the estimator never answered. The errors are against the truth after the score's
-    alignment; `tracks` and `inliers` count the points that were followed; `stats` is a JSON object of what else the
-    estimator said. `wall_ms` and `cpu_ms` are what the answer cost, `memory_mib` the most
-    that the estimator's processes held so far.
+    `status` is empty if the estimator never answered. The errors are against the truth after the score's alignment;
+    `tracks` and `inliers` count the tracked points; `stats` is a JSON object of the estimator's other numbers.
+    `wall_ms` and `cpu_ms` are the cost of the answer, `memory_mib` the largest memory of the estimator's processes
+    so far.
     """
 
     frame: int
@@ -53,41 +54,56 @@ class FrameRow:
     memory_mib: float | None = None
 
 
-COLUMNS = tuple(field.name for field in fields(FrameRow) if field.name not in TIME_COLUMNS[1:])
+FRAME_FIELDS = tuple(field.name for field in fields(FrameRow))
+COLUMNS = tuple(name for name in FRAME_FIELDS if name not in COST_COLUMNS)
 
 
 def write_frames(sequence: Path, estimate: Path, scored: "Score | None", folder: Path) -> None:
-    """Join what the store holds of a sequence and of an estimate on it, and the score's errors, in one table."""
+    """Join a sequence's exposures, the answers of an estimator and the errors of their score in one table."""
     answers = {row["frame"]: row for row in read_table(estimate / ANSWERS)}
     errors = _errors(scored) if scored else {}
     with new_table(folder / FRAMES, COLUMNS) as table:
         for row in read_table(sequence / EXPOSURES):
-            table.writerow({**row, **answers.get(row["frame"], {}), **errors.get(row["t_ns"], {})})
+            answer = answers.get(row["frame"], {})
+            error = errors.get(row["t_ns"], {})
+            table.writerow({**row, **answer, **error})
 
 
 def _errors(scored: "Score") -> Mapping[str, Mapping[str, float]]:
-    rows = zip(scored.gt_t_ns.tolist(), scored.ate_trans_m.tolist(), scored.ate_rot_deg.tolist(), strict=True)
-    return {str(t_ns): dict(zip(ERROR_COLUMNS, errors, strict=True)) for t_ns, *errors in rows}
+    """The errors of each pose by the stamp of its frame."""
+    stamps = map(str, scored.gt_t_ns.tolist())
+    errors = zip(scored.ate_trans_m.tolist(), scored.ate_rot_deg.tolist(), strict=True)
+    rows = (dict(zip(ERROR_COLUMNS, pair, strict=True)) for pair in errors)
+    return dict(zip(stamps, rows, strict=True))
 
 
 def read_frames(folder: Path) -> list[FrameRow]:
     """One row for each frame of a trial's sequence, joined with the times in the file beside it.
 
-    Raises InputError where a run has no such tables.
+    Raises InputError if a run has no such tables.
     """
     if not (folder / TIMES).is_file():
         raise InputError(f"a run of an older vobench, without a table of times; run the suite again: {folder}")
     times = {row.get("frame", ""): row for row in read_table(folder / TIMES)}
-    nothing = {field.name: "" if field.type is str else None for field in fields(FrameRow)}
-    untimed = dict.fromkeys(TIME_COLUMNS, "")
-    rows = [{**untimed, **times.get(row.get("frame", ""), {}), **row} for row in read_table(folder / FRAMES)]
-    known = [{name: row.get(name) or empty for name, empty in nothing.items()} for row in rows]
+    rows = []
+    for row in read_table(folder / FRAMES):
+        cost = times.get(row.get("frame", ""), {})
+        rows.append(_known_cells({**cost, **row}))
     try:
-        return _adapter().validate_python(known)
+        return _adapter().validate_python(rows)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
         raise InputError(f"not a table of frames as vobench writes it ({place}: {first['msg']}): {folder}") from None
+
+
+def _known_cells(row: Mapping[str, str]) -> dict[str, str | None]:
+    """The cells of a row; an empty one is an empty text or, if it should be a number, None."""
+    cells: dict[str, str | None] = {}
+    for column in fields(FrameRow):
+        empty = "" if column.type is str else None
+        cells[column.name] = row.get(column.name) or empty
+    return cells
 
 
 @cache

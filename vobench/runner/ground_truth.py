@@ -1,4 +1,4 @@
-"""The ground truth that trials are scored against, and the exposures of the frames: what a sequence tells of itself."""
+"""The ground truth that trials are scored against, and the exposures of the frames, as files beside a sequence."""
 
 from pathlib import Path
 
@@ -16,15 +16,14 @@ from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
 NOISE_STREAM = 9_173  # sets the noise of the truth apart from other streams of a seed
-# Between two true poses further apart than this nobody knows where the camera was.
-LONGEST_GAP_NS = 200_000_000
+LONGEST_GAP_NS = 200_000_000  # the truth is not interpolated between poses further apart
 
 
 def left_truth(folder: Path) -> Trajectory:
-    """The left camera's true poses at all pictures that have one; the truth is interpolated where it is not theirs.
+    """The left camera's true poses at all pictures that have one; the truth is interpolated if its stamps differ.
 
     Pictures before, after or in a gap of the truth are left out, and so not scored.
-    Raises SequenceError where that leaves none.
+    Raises SequenceError if no picture is left.
     """
     sequence = Sequence.open(folder)
     truth = read_truth(folder)
@@ -40,39 +39,43 @@ def left_truth(folder: Path) -> Trajectory:
 
 
 def scored_truth(exact: str, case: Case | RecordedCase) -> str:
-    """The truth, as TUM text, that estimates on a case are scored against; that of its sequence without its noise."""
+    """The truth, as TUM text, that estimates on a case are scored against: the exact one with the case's noise."""
     if isinstance(case, RecordedCase):
         return exact
     return noisy(exact, case.truth_noise, seed=case.seed, frames=case.frames)
 
 
 def noisy(exact: str, noise: TruthNoise, *, seed: int, frames: Window | None) -> str:
-    """A truth, as TUM text, with noise on each pose; of `frames` the noise is what it is in the whole way."""
+    """A truth, as TUM text, with noise on each pose; a window of frames has the noise that it has in the whole case."""
     if noise == EXACT:
         return exact
     truth = parse_tum(exact, name=GROUND_TRUTH)
-    before = frames[0] if frames else 0
-    draws = np.random.default_rng([seed, NOISE_STREAM]).standard_normal((before + len(truth), 2, 3))
-    moved, turned = draws[before:].swapaxes(0, 1)
-    R = Rotation.from_rotvec(noise.rotation_deg * turned, degrees=True).as_matrix()
-    return format_tum(Trajectory(truth.t_ns, truth.T_world_frame @ se3.transform(R, noise.position_m * moved)))
+    skipped = frames[0] if frames else 0
+    rng = np.random.default_rng([seed, NOISE_STREAM])
+    draws = rng.standard_normal((skipped + len(truth), 2, 3))
+    of_position, of_rotation = draws[skipped:].swapaxes(0, 1)  # (N, 3) each
+    R = Rotation.from_rotvec(noise.rotation_deg * of_rotation, degrees=True).as_matrix()
+    T_true_noisy = se3.transform(R, noise.position_m * of_position)
+    return format_tum(Trajectory(truth.t_ns, truth.T_world_frame @ T_true_noisy))
 
 
 def is_known(truth_ns: Stamps, stamps: Stamps) -> NDArray[np.bool_]:
-    """Which stamps lie on a true pose, or between two that are near to each other in time."""
+    """Which stamps (M,) lie on a true pose, or between two that are at most LONGEST_GAP_NS apart."""
     after = np.searchsorted(truth_ns, stamps, side="left")
     before = np.searchsorted(truth_ns, stamps, side="right") - 1
-    inside = (before >= 0) & (after < len(truth_ns))
     last = len(truth_ns) - 1
-    gap_ns = truth_ns[np.minimum(after, last)] - truth_ns[np.maximum(before, 0)]
-    return np.asarray(inside & (gap_ns <= LONGEST_GAP_NS))
+    is_covered = (before >= 0) & (after <= last)
+    after_ns = truth_ns[np.minimum(after, last)]
+    before_ns = truth_ns[np.maximum(before, 0)]
+    return np.asarray(is_covered & (after_ns - before_ns <= LONGEST_GAP_NS))
 
 
 def write_ground_truth(folder: Path) -> None:
-    """Put beside a sequence's recordings what each of its trials reads: the true path, and every frame's exposure."""
+    """Write the files beside a sequence that its trials read: the true path, and the exposure of each frame."""
     (folder / GROUND_TRUTH).write_text(format_tum(left_truth(folder)), encoding="utf-8")
     sequence = Sequence.open(folder)
-    known = dict(zip(*(part.tolist() for part in sequence.exposures()), strict=True))
+    stamps, exposures = sequence.exposures()
+    known = dict(zip(stamps.tolist(), exposures.tolist(), strict=True))
     with new_table(folder / EXPOSURES, EXPOSURE_COLUMNS) as table:
         for frame, t_ns in enumerate(sequence.frame_stamps().tolist()):
             exposure_s, gain_db = known.get(t_ns, ("", ""))

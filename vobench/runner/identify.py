@@ -165,7 +165,8 @@ def read_csv_log(path: Path, wheels: WheelGeometry) -> WheelLog:
     if missing:
         raise InputError(f"a drive to identify has the columns {listed}; no {', '.join(missing)} in {path}")
     try:
-        values = np.array([[float(row[name]) for name in names] for row in rows])  # (N, 5)
+        columns = [np.array([float(row[name]) for row in rows]) for name in names]
+        values = np.stack(columns, -1)  # (N, 5)
     except (TypeError, ValueError):
         raise InputError(f"the columns {listed} should hold a number in each row: {path}") from None
     is_rising = bool((np.diff(values[:, 0]) > 0).all())

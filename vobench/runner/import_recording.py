@@ -34,10 +34,10 @@ def read_all(plan: Plan) -> dict[str, Recording]:
 
 
 def _why_not_scored(recording: Recording) -> str:
-    """Why a recording cannot be scored, and what its reader says of the truth; empty where it can."""
+    """Why a recording cannot be scored, with its reader's note on the truth; empty if it can."""
     if recording.truth is None:
-        said = [note.rstrip(".") for note in recording.notes if "truth" in note and note != NO_TRUTH]
-        return f"no ground truth ({said[-1]})" if said else "no ground truth"
+        notes = [note.rstrip(".") for note in recording.notes if "truth" in note and note != NO_TRUTH]
+        return f"no ground truth ({notes[-1]})" if notes else "no ground truth"
     known = int(is_known(recording.truth.t_ns, recording.t_ns).sum())
     return "" if known > 1 else f"the ground truth covers {known} of {recording.frame_count} pictures in time"
 
@@ -47,8 +47,13 @@ def read_case(case: RecordedCase) -> Recording:
     from vobench.dataset.layout import read
 
     source = case.source
-    files: dict[str, Any] = {key: Path(file) for key in FILE_KEYS if (file := getattr(source, key))}
-    options = ReadOptions(**files, rate_hz=source.rate_hz, topics=Topics(**source.topics))
+    files: dict[str, Any] = {}
+    for key in FILE_KEYS:
+        file = getattr(source, key)
+        if file:
+            files[key] = Path(file)
+    topics = Topics(**source.topics)
+    options = ReadOptions(**files, rate_hz=source.rate_hz, topics=topics)
     return read(Path(source.path), form=source.form, options=options)
 
 
@@ -60,19 +65,35 @@ def import_recording(recording: Recording, folder: Path) -> None:
 
 
 def content(case: RecordedCase, recording: Recording) -> dict[str, Any]:
-    """What is imported: the recording as read; files by size and time of change, for reading gigabytes is slow."""
+    """The recording that is imported: its files by size and time of change, since reading gigabytes is slow."""
     source = case.source
-    truth = recording.truth
-    files = [Path(file) for file in (source.path, source.calibration, source.imu) if file]
+    listing = []
+    for file in (source.path, source.calibration, source.imu):
+        if file:
+            listing += _listing(Path(file))
     return {
         "source": plain(source, exclude={"name"}),
-        "files": [line for path in files for line in _listing(path)],
-        # KITTI's lies outside the folder.
-        "truth": hashlib.sha256(truth.t_ns.tobytes() + truth.T_world_frame.tobytes()).hexdigest() if truth else "",
+        "files": listing,
+        "truth": _truth_hash(recording),
     }
+
+
+def _truth_hash(recording: Recording) -> str:
+    """A hash of the ground truth, which may lie outside of the folder, as KITTI's does."""
+    truth = recording.truth
+    if not truth:
+        return ""
+    content = truth.t_ns.tobytes() + truth.T_world_frame.tobytes()
+    return hashlib.sha256(content).hexdigest()
 
 
 def _listing(path: Path) -> list[str]:
     """A line for each file: its path, size and time of change."""
-    files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
-    return [f"{file.relative_to(path)} {(stat := file.stat()).st_size} {stat.st_mtime_ns}" for file in files]
+    files = [path]
+    if path.is_dir():
+        files = sorted(file for file in path.rglob("*") if file.is_file())
+    lines = []
+    for file in files:
+        facts = file.stat()
+        lines.append(f"{file.relative_to(path)} {facts.st_size} {facts.st_mtime_ns}")
+    return lines

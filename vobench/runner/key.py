@@ -1,4 +1,4 @@
-"""Keys: a hash of all that a result depends on, from its inputs to the code that makes it."""
+"""Keys of results: hashes of all that a result depends on, from its inputs to the code that makes it."""
 
 import ast
 import hashlib
@@ -23,8 +23,9 @@ from vobench import __version__
 
 PACKAGE = Path(__file__).resolve().parents[1]
 PLUGIN = "vobench.plugin"
-# What reads modules: this Python and this file.
+# The digest of a module depends on the Python that compiles it and on this file.
 READER = hashlib.sha256(sys.version.encode() + Path(__file__).read_bytes()).digest()
+NOT_DATA = {".py", ".pyc"}
 # Imports that only a type checker sees: no result depends on them.
 TYPES_ONLY = re.compile(rb"^if TYPE_CHECKING:\n(?:(?: .*)?\n)+", re.MULTILINE)
 
@@ -86,13 +87,18 @@ def code_digest(*entries: str, package: Path = PACKAGE) -> str:
     A room among them stands for all of its modules.
     """
     known = _modules(package)
+    rooms = tuple(f"{entry}." for entry in entries)
+    entered = [name for name in known if f"{name}.".startswith(rooms)]
+    modules = closure(entered, package=package)
     state = hashlib.sha256()
-    found = closure((n for entry in entries for n in known if f"{n}.".startswith(f"{entry}.")), package=package)
-    for name, module in sorted(found.items()):
+    for name, module in sorted(modules.items()):
         state.update(f"{name}\0{module.digest}".encode())
-    for folder in sorted({known[name].parent for name in found} - {package}):
-        for path in sorted(path for path in _files(folder) if path.suffix not in {".py", ".pyc"}):
-            state.update(f"{path.relative_to(package)}\0{hashlib.sha256(path.read_bytes()).hexdigest()}".encode())
+    folders = {known[name].parent for name in modules} - {package}
+    for folder in sorted(folders):
+        data_files = [path for path in _files(folder) if path.suffix not in NOT_DATA]
+        for path in sorted(data_files):
+            content = hashlib.sha256(path.read_bytes()).hexdigest()
+            state.update(f"{path.relative_to(package)}\0{content}".encode())
     return state.hexdigest()[:32]
 
 
@@ -159,27 +165,33 @@ def closure(entries: Iterable[str], *, package: Path = PACKAGE) -> dict[str, Mod
     The package's own file and `vobench.plugin` are none of them: they look names up when these are asked for.
     """
     known = _modules(package)
-    found = dict[str, Module]()
+    modules = dict[str, Module]()
     waiting = list(entries)
     while waiting:
         name = waiting.pop()
-        if name in known and name not in found:
-            found[name] = _module(known[name].read_bytes())
-            waiting += [*found[name].imports, name.rpartition(".")[0]]
-    return found
+        if name in known and name not in modules:
+            module = _module(known[name].read_bytes())
+            modules[name] = module
+            room = name.rpartition(".")[0]
+            waiting += [*module.imports, room]
+    return modules
 
 
 @cache
 def _modules(package: Path) -> dict[str, Path]:
-    """Where each module of vobench lies."""
-    paths = {path.relative_to(package).with_suffix(""): path for path in package.glob("**/*.py")}
-    named = {".".join(("vobench", *place.parts)).removesuffix(".__init__"): path for place, path in paths.items()}
-    return {name: path for name, path in named.items() if name not in {"vobench", PLUGIN}}
+    """The file of each module of vobench."""
+    modules = {}
+    for path in package.glob("**/*.py"):
+        parts = path.relative_to(package).with_suffix("").parts
+        name = ".".join(("vobench", *parts)).removesuffix(".__init__")
+        if name not in {"vobench", PLUGIN}:
+            modules[name] = path
+    return modules
 
 
 @cache
 def _module(source: bytes) -> Module:
-    """What a source says, compiled once for all processes: the cache folder may be without it, or broken."""
+    """The digest and imports of a source, compiled once for all processes; the file that holds them may be missing."""
     known = cache_folder() / "modules" / hashlib.sha256(READER + source).hexdigest()
     with suppress(OSError, ValueError):
         return MODULE.validate_json(known.read_bytes(), strict=True)
@@ -194,10 +206,12 @@ def _module(source: bytes) -> Module:
 
 def _compiled(source: bytes) -> Module:
     # optimize=2 leaves docstrings out; asserts go too, which change no result.
-    bare = _bare(compile(TYPES_ONLY.sub(b"", source), "", "exec", optimize=2, dont_inherit=True))
+    seen_at_runtime = TYPES_ONLY.sub(b"", source)
+    bare = _bare(compile(seen_at_runtime, "", "exec", optimize=2, dont_inherit=True))
     # The second form of marshal has no references, which depend on what else the process holds.
+    digest = hashlib.sha256(marshal.dumps(bare, 2)).hexdigest()
     imports = {*_imports(bare), *_plugin_names(ast.parse(source))}
-    return Module(hashlib.sha256(marshal.dumps(bare, 2)).hexdigest(), frozenset(imports))
+    return Module(digest, frozenset(imports))
 
 
 def _bare(code: CodeType) -> CodeType:
@@ -207,7 +221,7 @@ def _bare(code: CodeType) -> CodeType:
 
 
 def _imports(code: CodeType) -> Iterator[str]:
-    """Dotted names in code are of modules; `from` one of them may come another."""
+    """The dotted names in code, which are modules, and each name that may be imported from one of them."""
     for name in code.co_names:
         if (name == "vobench" or name.startswith("vobench.")) and name != PLUGIN:
             yield name
@@ -217,20 +231,32 @@ def _imports(code: CodeType) -> Iterator[str]:
             yield from _imports(const)
 
 
-def _plugin_names(tree: ast.Module) -> Iterator[str]:
+def _plugin_names(tree: ast.Module) -> set[str]:
     """The names that a file takes from `vobench.plugin`, each as `vobench.plugin.name`.
 
-    Where the module itself is imported, or all of its names by a star, every name in the file may be one of them.
+    If the module itself is imported, or all of its names by a star, every name in the file may be one of them.
     """
-    is_whole = False
+    imported = set[str]()
     for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module == PLUGIN:
-            yield from (f"{PLUGIN}.{alias.name}" for alias in node.names)
-            is_whole = is_whole or any(alias.name == "*" for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module == "vobench":
-            is_whole = is_whole or any(alias.name == "plugin" for alias in node.names)
-        elif isinstance(node, ast.Import):
-            is_whole = is_whole or any(alias.name == PLUGIN for alias in node.names)
-    if is_whole:
-        yield from (f"{PLUGIN}.{node.attr}" for node in ast.walk(tree) if isinstance(node, ast.Attribute))
-        yield from (f"{PLUGIN}.{node.id}" for node in ast.walk(tree) if isinstance(node, ast.Name))
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            imported |= _imported_names(node)
+    is_whole = not imported.isdisjoint({PLUGIN, f"{PLUGIN}.*"})
+    names = imported | _all_names(tree) if is_whole else imported
+    return {name for name in names if name.startswith(f"{PLUGIN}.")}
+
+
+def _imported_names(node: ast.Import | ast.ImportFrom) -> set[str]:
+    """The full names that an import statement imports, as in `vobench.plugin.se3`."""
+    module = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
+    return {f"{module}{alias.name}" for alias in node.names}
+
+
+def _all_names(tree: ast.Module) -> set[str]:
+    """Every name and attribute in a file, as if each were one of `vobench.plugin`."""
+    names = set[str]()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute):
+            names.add(f"{PLUGIN}.{node.attr}")
+        elif isinstance(node, ast.Name):
+            names.add(f"{PLUGIN}.{node.id}")
+    return names

@@ -1,4 +1,4 @@
-"""Where a case's body goes, and whether it can: motion, wheels, preflight checks."""
+"""The motion of a case's body and its wheels, and the checks that a case can be simulated."""
 
 import hashlib
 import json
@@ -26,6 +26,7 @@ from vobench.motion.slip import DISTURBANCE_STREAMS, Generators
 from vobench.motion.wheeled import Wheeled
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.mesh import Thing, Triangles, table
+from vobench.scene.scene import Scene
 from vobench.suite.suite import Case, Plan
 from vobench.suite.trajectory import TrajectorySpec
 from vobench.suite.yaml_file import Mistakes, checked
@@ -35,16 +36,16 @@ from vobench.trajectory.trajectory import Stamps
 
 
 def generator(seed: int, stream: str) -> np.random.Generator:
-    """The random stream of that name: no other stream, and nothing else in a case, changes its draws."""
-    name = int.from_bytes(hashlib.sha256(stream.encode()).digest()[:8], "big")
-    return np.random.default_rng([seed, name])
+    """The random stream of a name; its draws depend on no other stream, and on nothing else in a case."""
+    digest = hashlib.sha256(stream.encode()).digest()
+    stream_number = int.from_bytes(digest[:8], "big")
+    return np.random.default_rng([seed, stream_number])
 
 
 NS_PER_S = 1e9
 ENCODERS_PER_FRAME = 4
-# Nearly two hours at 30 Hz.
-MOST_FRAMES = 200_000
-UP_M = 1e3
+MOST_FRAMES = 200_000  # nearly two hours at 30 Hz
+UP_M = 1e3  # length of the ray that finds the ceiling above
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,10 +58,10 @@ class Rims:
 
 @dataclass(frozen=True, slots=True)
 class BodyMotion:
-    """A body's way: its motion, the stamps t_ns (N,) of its pictures; `rims` where it rolls, `drive` where it is led.
+    """A body's motion and the stamps t_ns (N,) of its pictures; `rims` if it has wheels, `drive` if it is controlled.
 
-    All that is true of it comes from `motion`: poses, twists, accelerations, at these stamps or any other. `first` is
-    which of the way's pictures is the first that is taken.
+    All true poses, twists and accelerations come from `motion`, at these stamps or any other. `first` is the index of
+    the first picture that is taken among those of the whole motion.
     """
 
     motion: Motion
@@ -70,12 +71,12 @@ class BodyMotion:
     first: int = 0
 
     def at_frames(self) -> Kinematics:
-        """Where the body is and how it moves at its pictures' stamps."""
+        """Poses and velocities of the body at the stamps of its pictures."""
         return self.motion.at(self.t_ns)
 
 
 def body_motion(case: Case) -> BodyMotion:
-    """The case's body on its way; the same for every scene, rig and camera. Raises MotionError."""
+    """The motion of the case's body, which is the same for every scene, rig and camera. Raises MotionError."""
     whole = _whole_motion(case)
     if case.frames is None:
         return whole
@@ -94,12 +95,17 @@ def _whole_motion(case: Case) -> BodyMotion:
         if not isinstance(spec, Waypoints) and spec.mover != "pioneer":
             return _rolling(spec)
         drive = _driven(spec, case.seed)
-        return BodyMotion(drive.motion, drive.t_ns, Rims(drive.encoder_t_ns, drive.rim_rad), drive)
+        rims = Rims(drive.encoder_t_ns, drive.rim_rad)
+        return BodyMotion(drive.motion, drive.t_ns, rims, drive)
+    motion: Motion
     if isinstance(spec, Replay):
         assert case.replayed is not None  # read with the suite
-        motion: Motion = spec.motion(parse_tum(case.replayed, name=spec.file))
+        recorded = parse_tum(case.replayed, name=spec.file)
+        motion = spec.motion(recorded)
+    elif isinstance(spec, Handheld):
+        motion = spec.motion(generator(case.seed, "shake"))
     else:
-        motion = spec.motion(generator(case.seed, "shake")) if isinstance(spec, Handheld) else spec.motion()
+        motion = spec.motion()
     return BodyMotion(motion, stamps(motion, spec.rate_hz))
 
 
@@ -121,9 +127,11 @@ def recorded_drive(folder: Path) -> Drive:
 
 
 def _driven(spec: Waypoints | Planar, seed: int) -> Drive:
-    """Led through its targets or along its way, pushed and slipping as the seed has it."""
+    """The drive through its targets or along its path, with the disturbances and slip of the seed."""
     rngs = {stream: generator(seed, f"slip.{stream}") for stream in DISTURBANCE_STREAMS}
-    return spec.drive(rngs) if isinstance(spec, Waypoints) else _along(spec, rngs)
+    if isinstance(spec, Waypoints):
+        return spec.drive(rngs)
+    return _along(spec, rngs)
 
 
 def stamps(motion: Motion, rate_hz: float, *, per_frame: int = 1) -> Stamps:
@@ -136,36 +144,39 @@ def stamps(motion: Motion, rate_hz: float, *, per_frame: int = 1) -> Stamps:
     if frames > MOST_FRAMES:
         raise MotionError(f"{lasts_s:.4g} s at {rate_hz:g} Hz are {frames} frames, and {MOST_FRAMES} are the most")
     index = np.arange(frames * per_frame + 1)
-    return np.rint(index * NS_PER_S / per_frame / rate_hz).astype(np.int64) + motion.start_ns
+    since_start_ns = np.rint(index * NS_PER_S / per_frame / rate_hz)
+    return since_start_ns.astype(np.int64) + motion.start_ns
 
 
 def _along(spec: Planar, rngs: Generators) -> Drive:
-    """The Pioneer on a way: its point h goes after where an ideal robot's would be.
+    """The Pioneer on a path: its point h follows that of an ideal robot.
 
-    Where no point ahead of the axle can lead it, it gets the speeds that would take it there undisturbed.
+    If no point ahead of the axle can lead it, it gets the speeds that would take it along the path undisturbed.
     """
-    way = spec.way()
+    ideal = spec.way()
     robot = options(spec, rngs)
-    t_ns = stamps(way, spec.rate_hz)
-    path_m, path_mps = _path_of_h(way, t_ns, robot["controller"])
+    t_ns = stamps(ideal, spec.rate_hz)
+    path_m, path_mps = _path_of_h(ideal, t_ns, robot["controller"])
     x, y = path_m[0].tolist()
     start = (x, y, spec.start[2])
     if isinstance(spec, Unled):
-        amid_ns = t_ns + round(NS_PER_S / spec.rate_hz / 2)
-        return led_by(_fed_forward(way, amid_ns, spec.theta), start=start, **robot)
+        middle_ns = t_ns + round(NS_PER_S / spec.rate_hz / 2)
+        return led_by(_fed_forward(ideal, middle_ns, spec.theta), start=start, **robot)
     return follow(path_m, path_mps, start=start, **robot)
 
 
-def _path_of_h(way: Motion, t_ns: Stamps, controller: ControllerSettings) -> tuple[Array, Array]:
-    """Places and velocities (N, 2) in the world of the point h of a body that goes this way exactly."""
-    h = way.at(t_ns).of_mounted(se3.transform(np.eye(3), [controller.a_m, 0.0, 0.0]))
-    velocity_mps = np.einsum("kij,kj->ki", h.T_world_body[:, :3, :3], h.velocity_mps)
+def _path_of_h(ideal: Motion, t_ns: Stamps, controller: ControllerSettings) -> tuple[Array, Array]:
+    """Positions and velocities (N, 2) in the world of the point h of a body with exactly this motion."""
+    T_body_h = se3.transform(np.eye(3), [controller.a_m, 0.0, 0.0])
+    h = ideal.at(t_ns).of_mounted(T_body_h)
+    R_world_h = h.T_world_body[:, :3, :3]
+    velocity_mps = np.einsum("kij,kj->ki", R_world_h, h.velocity_mps)
     return h.T_world_body[:, :2, 3], velocity_mps[:, :2]
 
 
-def _fed_forward(way: Motion, t_ns: Stamps, theta: Theta) -> Array:
-    """References (N, 2) with which the robot of (18) moves as this way does at t_ns: the middles of its frames."""
-    ideal = way.at(t_ns)
+def _fed_forward(motion: Motion, t_ns: Stamps, theta: Theta) -> Array:
+    """References (N, 2) with which the robot of (18) has this motion at t_ns, the middles of its frames."""
+    ideal = motion.at(t_ns)
     u = ideal.velocity_mps[:, 0]
     omega = ideal.turn_radps[:, 2]
     u_rate = ideal.acceleration_mps2[:, 0]
@@ -174,95 +185,104 @@ def _fed_forward(way: Motion, t_ns: Stamps, theta: Theta) -> Array:
 
 
 def _rolling(spec: Planar) -> BodyMotion:
-    """A body whose wheels do as they are told; a car's as its steering lets them."""
-    way = spec.way()
-    fine = stamps(way, spec.rate_hz, per_frame=ENCODERS_PER_FRAME)
-    motion: Motion = ackermann(way, ACKERMANNS[spec.car]) if spec.mover == "ackermann" else way
-    return BodyMotion(motion, fine[::ENCODERS_PER_FRAME], Rims(fine, rolled(motion, fine, spec.wheels)))
+    """A body whose wheels move exactly as commanded; a car moves as its steering allows."""
+    path = spec.way()
+    encoder_t_ns = stamps(path, spec.rate_hz, per_frame=ENCODERS_PER_FRAME)
+    motion: Motion = path
+    if spec.mover == "ackermann":
+        motion = ackermann(path, ACKERMANNS[spec.car])
+    rims = Rims(encoder_t_ns, rolled(motion, encoder_t_ns, spec.wheels))
+    return BodyMotion(motion, encoder_t_ns[::ENCODERS_PER_FRAME], rims)
 
 
 def cut(planned: Plan, frames: int) -> Plan:
-    """The plan with so many frames of each simulated case, or all where there are no more; recordings stay whole.
+    """The plan with at most so many frames of each simulated case; recordings stay whole.
 
-    Raises SuiteError where a body cannot go its way.
+    Raises SuiteError if a body cannot follow its trajectory.
     """
-    travels = body_motions(planned, are_checked=False)
-
-    def shorter(case: Case) -> Case:
-        travel = travels[case.variant["trajectory"]]
-        return replace(case, frames=(travel.first, travel.first + frames)) if frames < len(travel.t_ns) else case
-
-    return replace(planned, simulated=tuple(shorter(case) for case in planned.simulated))
+    motions = body_motions(planned, are_checked=False)
+    cases = []
+    for case in planned.simulated:
+        motion = motions[case.variant["trajectory"]]
+        is_longer = len(motion.t_ns) > frames
+        window = (motion.first, motion.first + frames)
+        cases.append(replace(case, frames=window) if is_longer else case)
+    return replace(planned, simulated=tuple(cases))
 
 
 def body_motions(plan: Plan, *, are_checked: bool = True) -> dict[str, BodyMotion]:
-    """The travel of each trajectory of a plan, by its name: said before hours of rendering.
+    """The motion of each trajectory of a plan, by its name, before anything is rendered.
 
-    Raises SuiteError with all that is wrong: a target cannot be reached and, where cases `are_checked`, a way ends
+    Raises SuiteError with all mistakes: a target cannot be reached and, if cases `are_checked`, a trajectory ends
     within a frame, a camera leaves the room, its pictures take longer than a frame, or an IMU would feel the noise of
     a recording.
     """
-    travels = dict[str, BodyMotion]()
-    wrong = plan.mistakes()
+    motions = dict[str, BodyMotion]()
+    mistakes = plan.mistakes()
     for name, cases in _by(plan.simulated, "trajectory").items():
         stop.check()
-        with wrong.at(*_said_at(cases[0], "trajectory")):
-            travels[name] = body_motion(cases[0])
+        with mistakes.at(*_place_in_suite(cases[0], "trajectory")):
+            motions[name] = body_motion(cases[0])
             if are_checked:
-                check_cases(cases, travels[name], wrong)
-    wrong.require_none()
-    return travels
+                check_cases(cases, motions[name], mistakes)
+    mistakes.require_none()
+    return motions
 
 
-def check_cases(cases: Sequence[Case], travel: BodyMotion, wrong: Mistakes) -> None:
-    """Gather why these cases of one trajectory cannot be: `travel` is the trajectory's."""
-    with wrong.at(*_said_at(cases[0], "trajectory")):
-        if len(travel.t_ns) < 2:
+def check_cases(cases: Sequence[Case], motion: BodyMotion, mistakes: Mistakes) -> None:
+    """Collect the mistakes for which these cases of one trajectory, of this motion, cannot be simulated."""
+    with mistakes.at(*_place_in_suite(cases[0], "trajectory")):
+        if len(motion.t_ns) < 2:
             raise MotionError(
                 f"the way ends within its first frame at {cases[0].trajectory.rate_hz:g} Hz: one picture shows no "
                 "motion; go further, more slowly or with a higher rate_hz"
             )
     for case, *_ in _by(cases, "scene", "rig").values():
-        with wrong.at(*_said_at(case, "trajectory")):
-            _check_clear(case, travel)
+        with mistakes.at(*_place_in_suite(case, "trajectory")):
+            _check_clear(case, motion)
             _check_smooth(case)
     for case, *_ in _by(cases, "rig", "camera").values():
-        with wrong.at(*_said_at(case, "camera")):
+        with mistakes.at(*_place_in_suite(case, "camera")):
             _check_fits_frame(case)
-            _check_heeded(case)
+            _check_imu_delay(case)
 
 
 AXIS_KEYS = {"trajectory": "trajectories", "camera": "cameras"}
 
 
-def _said_at(case: Case, axis: str) -> tuple[str, str]:
-    """Where a suite says what a case has on this axis."""
-    return ("scenarios", case.scenario) if case.scenario else (AXIS_KEYS[axis], case.variant[axis])
+def _place_in_suite(case: Case, axis: str) -> tuple[str, str]:
+    """The key and name under which a suite has the variant of a case on this axis."""
+    if case.scenario:
+        return "scenarios", case.scenario
+    return AXIS_KEYS[axis], case.variant[axis]
 
 
 def _by(cases: Sequence[Case], *axes: str) -> dict[str, list[Case]]:
     """The cases of each combination of variants on these axes."""
-    of = dict[str, list[Case]]()
+    groups = dict[str, list[Case]]()
     for case in cases:
-        of.setdefault(" ".join(case.variant[axis] for axis in axes), []).append(case)
-    return of
+        combination = " ".join(case.variant[axis] for axis in axes)
+        groups.setdefault(combination, []).append(case)
+    return groups
 
 
 def _check_smooth(case: Case) -> None:
-    if isinstance(case.trajectory, Replay) and case.trajectory.exact and case.rig.imu:
+    is_noisy = isinstance(case.trajectory, Replay) and case.trajectory.exact
+    if is_noisy and case.rig.imu:
         raise MotionError(
             f"the IMU of rig '{case.variant['rig']}' would feel the noise of an exact replay; "
             "leave exact out, or the IMU"
         )
 
 
-def _check_heeded(case: Case) -> None:
-    if case.camera.timing.imu_delay_ms and not case.rig.imu:
+def _check_imu_delay(case: Case) -> None:
+    has_delay = bool(case.camera.timing.imu_delay_ms)
+    if has_delay and not case.rig.imu:
         raise MotionError(f"timing.imu_delay_ms delays the IMU, and rig '{case.variant['rig']}' has none")
 
 
 def _check_fits_frame(case: Case) -> None:
-    """Raise MotionError where a picture would still be exposed or read out when the next one begins."""
+    """Raise MotionError if a picture would still be exposed or read out when the next one begins."""
     camera = case.camera
     frame_ms = 1e3 / case.trajectory.rate_hz
     durations = {
@@ -280,61 +300,78 @@ def _check_fits_frame(case: Case) -> None:
             )
 
 
-def _check_clear(case: Case, travel: BodyMotion) -> None:
-    """Raise MotionError where a camera leaves the room, starts inside a thing or goes through one."""
+def _check_clear(case: Case, motion: BodyMotion) -> None:
+    """Raise MotionError if a camera leaves the room, starts inside a thing or moves through one."""
     rig = case.build_rig()
-    room = case.scene.room
     scene = case.build_scene()
-    T_world_body = travel.at_frames().T_world_body
-    for T_body_camera in map(rig.T_body_camera, rig.sides):
-        at_m = (T_world_body @ T_body_camera)[:, :3, 3]
-        if room:
-            outside = ~room.holds(at_m / case.scene.scale)
-            is_under = at_m[np.argmax(outside), 2] <= 0
-            what = "is under the floor" if is_under else f"leaves the room ({room.extent})"
-            _refuse(case, travel, at_m, outside, what)
-        _refuse_met(case, travel, at_m, scene.things, at_m)
-        for mover in scene.movers:
-            poses = np.stack([mover.path.pose(t_ns) for t_ns in travel.t_ns])
-            _refuse_met(case, travel, at_m, mover.things, se3.apply(se3.inverse(poses), at_m[:, None])[:, 0])
+    T_world_body = motion.at_frames().T_world_body
+    for side in rig.sides:
+        positions_m = (T_world_body @ rig.T_body_camera(side))[:, :3, 3]  # (N, 3), world
+        _check_path(case, scene, motion, positions_m)
 
 
-def _refuse_met(case: Case, travel: BodyMotion, at_m: Array, things: tuple[Thing, ...], own_m: Array) -> None:
-    """Raise MotionError where a way, own_m (N, 3) in the things' frame, goes through one of them."""
-    if things:
-        faces, _ = _solid(things)
-        met = _met(things, own_m)
-        name = faces.things[faces.thing[met[np.argmax(met >= 0)]]].name
-        _refuse(case, travel, at_m, met >= 0, f"runs into '{name}'")
+def _check_path(case: Case, scene: Scene, motion: BodyMotion, positions_m: Array) -> None:
+    """Raise MotionError if a camera at these positions (N, 3) leaves the room or meets a thing."""
+    room = case.scene.room
+    if room:
+        is_outside = ~room.holds(positions_m / case.scene.scale)
+        is_under = positions_m[np.argmax(is_outside), 2] <= 0
+        what = "is under the floor" if is_under else f"leaves the room ({room.extent})"
+        _refuse(case, motion, positions_m, is_outside, what)
+
+    _check_things(case, motion, positions_m, scene.things, positions_m)
+    for mover in scene.movers:
+        T_world_mover = np.stack([mover.path.pose(t_ns) for t_ns in motion.t_ns])
+        relative_m = se3.apply(se3.inverse(T_world_mover), positions_m[:, None])[:, 0]
+        _check_things(case, motion, positions_m, mover.things, relative_m)
 
 
-def _met(things: tuple[Thing, ...], at_m: Array) -> NDArray[np.int32]:
-    """The face (N,) that each way from a place (N, 3) to the next goes through, -1 for none.
+def _check_things(
+    case: Case, motion: BodyMotion, positions_m: Array, things: tuple[Thing, ...], relative_m: Array
+) -> None:
+    """Raise MotionError if a path, relative_m (N, 3) in the things' frame, goes through one of them."""
+    if not things:
+        return
+    met_faces = _met_faces(things, relative_m)
+    is_met = met_faces >= 0
+    if is_met.any():
+        faces, _ = _faces_and_caster(things)
+        first_face = met_faces[np.argmax(is_met)]
+        name = faces.things[faces.thing[first_face]].name
+        _refuse(case, motion, positions_m, is_met, f"runs into '{name}'")
 
-    The last entry is of the first place: the back that it sees straight above, from inside a thing.
+
+def _met_faces(things: tuple[Thing, ...], positions_m: Array) -> NDArray[np.int32]:
+    """The face (N,) that each step to a position (N, 3) goes through, -1 for none.
+
+    The entry of the first position is the back of the face straight above it, which only a start inside a thing sees.
     """
-    faces, caster = _solid(things)
-    ways = np.append(np.diff(at_m, axis=0), [[0.0, 0.0, UP_M]], axis=0)
-    hits = caster.hits(np.append(at_m[:-1], at_m[:1], axis=0), ways)
+    faces, caster = _faces_and_caster(things)
+    upwards_m = [[0.0, 0.0, UP_M]]
+    starts_m = np.append(positions_m[:-1], positions_m[:1], axis=0)
+    steps_m = np.append(np.diff(positions_m, axis=0), upwards_m, axis=0)
+    hits = caster.hits(starts_m, steps_m)
     met = np.where(hits.distance <= 1, hits.face, -1)
-    if met[-1] >= 0 and faces.plane[met[-1], 2] <= 0:
+    above = met[-1]
+    if above >= 0 and faces.plane[above, 2] <= 0:
         met[-1] = -1
     return np.asarray(np.roll(met, 1), np.int32)
 
 
 @lru_cache(maxsize=8)
-def _solid(things: tuple[Thing, ...]) -> tuple[Triangles, RayCaster]:
-    """The faces of things in one frame, and rays against them; kept, as many cases share a scene."""
-    faces = table(things, [-1] * len(things), [-1] * len(things))
+def _faces_and_caster(things: tuple[Thing, ...]) -> tuple[Triangles, RayCaster]:
+    """The faces of things in one frame, and rays against them; cached, since many cases share a scene."""
+    no_index = [-1] * len(things)
+    faces = table(things, no_index, no_index)
     return faces, RayCaster(faces, np.arange(len(faces)))
 
 
-def _refuse(case: Case, travel: BodyMotion, at_m: Array, wrong: NDArray[np.bool_], what: str) -> None:
+def _refuse(case: Case, motion: BodyMotion, positions_m: Array, is_wrong: NDArray[np.bool_], what: str) -> None:
     """Raise MotionError for the first instant at which a camera is where it cannot be."""
-    if wrong.any():
-        first = int(np.flatnonzero(wrong)[0])
-        where = ", ".join(f"{x:.2f}" for x in at_m[first])
+    if is_wrong.any():
+        first = int(np.argmax(is_wrong))
+        position = ", ".join(f"{x:.2f}" for x in positions_m[first])
         raise MotionError(
             f"a camera of rig '{case.variant['rig']}' {what} of scene '{case.variant['scene']}' "
-            f"after {travel.t_ns[first] / 1e9:.1f} s, at ({where}) m"
+            f"after {motion.t_ns[first] / NS_PER_S:.1f} s, at ({position}) m"
         )

@@ -1,4 +1,4 @@
-"""Scores computed again from estimates and true paths, for results that somebody else hands over."""
+"""Scores recomputed from estimates and ground truths, for results that come from somebody else."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -15,12 +15,12 @@ from vobench import stop
 from vobench.errors import InputError, VobenchError
 from vobench.metric.score import Score
 from vobench.runner.consistency import COVARIANCE, Consistency, trial_consistency
-from vobench.runner.estimate import DROPPED, ESTIMATE, FINISHED, REVISED, Outcome
+from vobench.runner.estimate import DROPPED, ESTIMATE, FINISHED, Outcome
 from vobench.runner.folder import CASE, SURVIVED, RunFolder, TrialScore, read_tum
 from vobench.runner.frames import FRAMES, GROUND_TRUTH, read_table
 from vobench.runner.ground_truth import scored_truth
 from vobench.runner.motion import body_motion
-from vobench.runner.score import extent_m, score_estimate, stands_still, status_of, status_of_handed
+from vobench.runner.score import drift_m, scale_of, score_estimate, score_revised, status_of, status_of_handed
 from vobench.runner.simulate import frames_of
 from vobench.suite.suite import Case
 from vobench.suite.yaml_file import checked
@@ -31,16 +31,19 @@ from vobench.trajectory.trajectory import Trajectory
 RELATIVE = 1e-6
 ABSOLUTE = 1e-9
 SAME_TRUTH_M = 1e-6
-# Outcomes that follow from the estimate; why a program crashed is in no trajectory.
+# Statuses that follow from the estimate; the cause of a crash is in no trajectory.
 OF_ESTIMATE = (*SURVIVED, "lost", "diverged")
+# Settings of a case that its path does not depend on.
+NOT_OF_PATH = ("name", "variant", "scene", "lighting")
+VALUE_LETTERS = 60
 
 
 @dataclass(frozen=True, slots=True)
 class Rescored:
-    """A trial with its score computed again.
+    """A trial with its recomputed score.
 
-    `differs` names the first thing that the run stated otherwise, empty if all agrees. `claimed` says why the trial
-    cannot be scored again; its `score` is then what the run states, and should not be ranked.
+    `differs` names the first value that the run states differently, empty if all agree. `claimed` is the reason why
+    the score cannot be recomputed; `score` is then what the run states, and should not be ranked.
     """
 
     score: TrialScore
@@ -50,7 +53,7 @@ class Rescored:
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """The trials of a run that may be ranked, scored again, those that only claim a score, and what differs."""
+    """The trials of a run that may be ranked, rescored, those that only claim a score, and notes on differences."""
 
     scores: list[TrialScore]
     claimed: list[Rescored]
@@ -67,10 +70,9 @@ def check(folder: RunFolder, wrong_truths: Mapping[str, str] = MappingProxyType(
         raise InputError(
             f"none of its scores can be computed again: {_named(first.score)}: {first.claimed}: {folder.path}"
         )
-    notes = [
-        f"{_named(each.score)}: another score than its run states: {each.differs}" for each in trials if each.differs
-    ]
-    notes += [f"{_named(each.score)}: claimed, not ranked: {each.claimed}" for each in claimed]
+    different = [trial for trial in trials if trial.differs]
+    notes = [f"{_named(trial.score)}: another score than its run states: {trial.differs}" for trial in different]
+    notes += [f"{_named(trial.score)}: claimed, not ranked: {trial.claimed}" for trial in claimed]
     return Checked(ranked, claimed, notes)
 
 
@@ -81,36 +83,39 @@ def _named(score: TrialScore) -> str:
 def rescored(folder: RunFolder, wrong_truths: Mapping[str, str] = MappingProxyType({})) -> Iterator[Rescored]:
     """Score every trial of a run again.
 
-    `wrong_truths` says of cases, by name, why their true path cannot be trusted. A failure that is none of the
-    estimate's stays one. Raises InputError if the folder is not a run.
+    `wrong_truths` has the reason, by the names of cases, why their ground truth cannot be trusted. A failure that does
+    not follow from the estimate stays one. Raises InputError if the folder is not a run.
     """
-    for held in folder.scores():
+    for stated in folder.scores():
         stop.check()
-        if wrong := wrong_truths.get(held.case):
-            yield Rescored(held, claimed=wrong)
+        reason = wrong_truths.get(stated.case)
+        if reason:
+            yield Rescored(stated, claimed=reason)
             continue
         try:
-            yield _rescored(folder, held)
+            yield _rescored(folder, stated)
         except (VobenchError, OSError, ValueError, LookupError) as error:
-            yield Rescored(held, claimed=" ".join(str(error).split()))
+            yield Rescored(stated, claimed=_one_line(error))
 
 
-def _rescored(folder: RunFolder, held: TrialScore) -> Rescored:
-    place = folder.estimate(held.case, held.estimator, held.repeat)
-    truth = folder.case(held.case) / GROUND_TRUTH
-    missing = next((path.name for path in (truth, place / ESTIMATE) if not path.is_file()), "")
-    if missing or not held.frames:
-        states_more = held.score is not None or held.status in OF_ESTIMATE
-        why = f"there is no {missing}" if missing else "its run counts no frames"
-        return Rescored(held, claimed=why if states_more else "")
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+def _rescored(folder: RunFolder, stated: TrialScore) -> Rescored:
+    trial = folder.estimate(stated.case, stated.estimator, stated.repeat)
+    truth = folder.case(stated.case) / GROUND_TRUTH
+    obstacle = _why_not_scored(stated, truth, trial / ESTIMATE)
+    if obstacle:
+        follows_from_estimate = stated.score is not None or stated.status in OF_ESTIMATE
+        return Rescored(stated, claimed=obstacle if follows_from_estimate else "")
 
     gt = read_tum(truth)
-    est = read_tum(place / ESTIMATE)
-    scored = score_estimate(est, gt, held.claims)
-    later = score_estimate(read_tum(place / REVISED), gt, held.claims) if (place / REVISED).is_file() else None
-    rows = read_table(place / FRAMES)
-    status, reason = _status(held, est, gt, scored, rows)
-    again = held.model_copy(
+    est = read_tum(trial / ESTIMATE)
+    scored = score_estimate(est, gt, stated.claims)
+    rows = read_table(trial / FRAMES)
+    status, reason = _status(stated, est, gt, scored, rows)
+    computed = stated.model_copy(
         update={
             "status": status,
             "reason": reason,
@@ -118,76 +123,108 @@ def _rescored(folder: RunFolder, held: TrialScore) -> Rescored:
             "frames": len(gt),
             "path_m": float(gt.distances_m()[-1]),
             "score": _as_json(scored),
-            "drift_m": extent_m(est) if scored and stands_still(gt) else None,
-            "consistency": _consistency(place, gt, est, scored, rows),
-            "revised": _as_json(later),
+            "drift_m": drift_m(est, gt, scored),
+            "consistency": _consistency(trial, gt, est, scored, rows),
+            "revised": _as_json(score_revised(trial, gt, stated.claims)),
         }
     )
-    differs = _difference(held.model_dump(mode="json"), again.model_dump(mode="json"))
-    return Rescored(again, differs or _errors_differ(rows, scored))
+    difference = _difference(stated.model_dump(mode="json"), computed.model_dump(mode="json"))
+    return Rescored(computed, difference or _frame_difference(rows, scored))
+
+
+def _why_not_scored(stated: TrialScore, truth: Path, estimate: Path) -> str:
+    """The reason why a trial cannot be rescored; empty if it can."""
+    for path in (truth, estimate):
+        if not path.is_file():
+            return f"there is no {path.name}"
+    return "" if stated.frames else "its run counts no frames"
 
 
 def _as_json(scored: Score | None) -> dict[str, Any] | None:
-    found: dict[str, Any] | None = json.loads(json.dumps(scored.as_dict())) if scored else None
-    return found
+    """A score as it is read from JSON."""
+    if scored is None:
+        return None
+    content: dict[str, Any] = json.loads(json.dumps(scored.as_dict()))
+    return content
 
 
 def _status(
-    held: TrialScore, est: Trajectory, gt: Trajectory, scored: Score | None, rows: list[dict[str, str]]
+    stated: TrialScore, est: Trajectory, gt: Trajectory, scored: Score | None, rows: list[dict[str, str]]
 ) -> tuple[str, str]:
-    """How the trial ended, by its estimate if that can tell."""
-    if held.status not in OF_ESTIMATE:
-        return held.status, held.reason
+    """The status of the trial and its reason, recomputed if they follow from the estimate."""
+    if stated.status not in OF_ESTIMATE:
+        return stated.status, stated.reason
     dropped = [int(row["t_ns"]) for row in rows if row.get("status") == DROPPED]
     if dropped:
-        return status_of_handed(est, gt, held.claims, dropped)
+        return status_of_handed(est, gt, stated.claims, dropped)
     return status_of(Outcome(kind=FINISHED, reason=""), scored, gt)
 
 
 def _consistency(
-    place: Path, gt: Trajectory, est: Trajectory, scored: Score | None, rows: list[dict[str, str]]
+    trial: Path, gt: Trajectory, est: Trajectory, scored: Score | None, rows: list[dict[str, str]]
 ) -> Consistency | None:
-    """What the covariances are worth; the start is that of the frames, which a bundle has."""
-    if not (place / COVARIANCE).is_file():
+    """The consistency of the covariances; the start is that of the frames, which a bundle has."""
+    if not (trial / COVARIANCE).is_file():
         return None
-    start_ns = min((int(row["t_ns"]) for row in rows), default=int(gt.t_ns[0]))
-    scale = scored.alignment.scale if scored else 1.0
-    return trial_consistency(place, gt, est, start_ns=start_ns, scale=scale)
+    stamps = [int(row["t_ns"]) for row in rows]
+    start_ns = min(stamps, default=int(gt.t_ns[0]))
+    return trial_consistency(trial, gt, est, start_ns=start_ns, scale=scale_of(scored))
 
 
-def _errors_differ(rows: list[dict[str, str]], scored: Score | None) -> str:
-    """Whether the table of frames states other errors than those of the estimate."""
-    stated = {int(row["t_ns"]): float(row["position_error_m"]) for row in rows if row.get("position_error_m")}
-    if not stated or scored is None:
+def _frame_difference(rows: list[dict[str, str]], scored: Score | None) -> str:
+    """The first error in the table of frames that is not that of the estimate; empty if there is none."""
+    if scored is None:
         return ""
     errors_m = dict(zip(scored.gt_t_ns.tolist(), scored.ate_trans_m.tolist(), strict=True))
-    for t_ns, error_m in stated.items():
+    for row in rows:
+        if not row.get("position_error_m"):
+            continue
+        t_ns = int(row["t_ns"])
+        error_m = float(row["position_error_m"])
         if not isclose(errors_m.get(t_ns, np.inf), error_m, rel_tol=RELATIVE, abs_tol=SAME_TRUTH_M):
             return f"{FRAMES}: position error {error_m:.6g} m at {t_ns} ns, not that of the estimate"
     return ""
 
 
-def _difference(stated: Any, again: Any, place: str = "") -> str:
-    """Where two JSON values differ first by more than rounding; empty if nowhere."""
-    if isinstance(stated, dict) and isinstance(again, dict):
-        for key in [*stated, *(key for key in again if key not in stated)]:
-            if found := _difference(stated.get(key), again.get(key), f"{place} {key}".strip()):
-                return found
+def _difference(stated: Any, computed: Any, place: str = "") -> str:
+    """The first place at which two JSON values differ by more than rounding; empty if there is none."""
+    for name, stated_part, computed_part in _parts(stated, computed):
+        difference = _difference(stated_part, computed_part, f"{place} {name}".strip())
+        if difference:
+            return difference
+    if _are_containers(stated, computed) or _are_equal(stated, computed):
         return ""
-    if isinstance(stated, list) and isinstance(again, list) and len(stated) == len(again):
-        for index, pair in enumerate(zip(stated, again, strict=True)):
-            named = pair[1].get("name", index) if isinstance(pair[1], dict) else index
-            if found := _difference(*pair, f"{place} {named}".strip()):
-                return found
-        return ""
-    are_numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (stated, again))
-    if are_numbers and isclose(stated, again, rel_tol=RELATIVE, abs_tol=ABSOLUTE):
-        return ""
-    return (
-        ""
-        if stated == again
-        else f"{place or 'all of it'}: {brief_value(stated)} is stated, {brief_value(again)} computed"
-    )
+    return f"{place or 'all of it'}: {brief_value(stated)} is stated, {brief_value(computed)} computed"
+
+
+def _are_containers(stated: Any, computed: Any) -> bool:
+    """Whether both are objects, or both are lists of one length: then their parts are compared."""
+    if isinstance(stated, dict) and isinstance(computed, dict):
+        return True
+    return isinstance(stated, list) and isinstance(computed, list) and len(stated) == len(computed)
+
+
+def _parts(stated: Any, computed: Any) -> Iterator[tuple[Any, Any, Any]]:
+    """Name and values of the parts of two containers; an entry of a list that has a name is called by it."""
+    if not _are_containers(stated, computed):
+        return
+    if isinstance(stated, dict):
+        for key in dict.fromkeys([*stated, *computed]):
+            yield key, stated.get(key), computed.get(key)
+        return
+    for index, (stated_entry, entry) in enumerate(zip(stated, computed, strict=True)):
+        name = entry.get("name", index) if isinstance(entry, dict) else index
+        yield name, stated_entry, entry
+
+
+def _are_equal(stated: Any, computed: Any) -> bool:
+    if _is_number(stated) and _is_number(computed):
+        return isclose(stated, computed, rel_tol=RELATIVE, abs_tol=ABSOLUTE)
+    return bool(stated == computed)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def brief_value(value: Any) -> str:
@@ -196,14 +233,14 @@ def brief_value(value: Any) -> str:
         return f"{len(value)} entries"
     if isinstance(value, float):
         return f"{value:.9g}"
-    return "nothing" if value is None else repr(value)[:60]
+    return "nothing" if value is None else repr(value)[:VALUE_LETTERS]
 
 
 def wrong_truths(folder: RunFolder) -> dict[str, str]:
-    """The simulated cases of a run, by name, whose true path is not the one that their settings give, and why.
+    """The reason, by name, for each simulated case of a run whose ground truth is not the path of its settings.
 
-    Nothing is drawn for it, and nothing of a scene is executed. The truth of recordings cannot be checked, nor that of
-    cases that another version of vobench wrote.
+    Nothing is drawn, and nothing of a scene is executed. The truth of recordings cannot be checked, nor that of cases
+    that another version of vobench wrote.
     """
     wrong = {}
     paths: dict[str, Trajectory] = {}
@@ -214,18 +251,18 @@ def wrong_truths(folder: RunFolder) -> dict[str, str]:
         if case is None or not truth.is_file():
             continue
         try:
-            held = read_tum(truth)
+            stated = read_tum(truth)
         except VobenchError as error:
-            wrong[place.name] = " ".join(str(error).split())
+            wrong[place.name] = _one_line(error)
             continue
         try:
             key = json.dumps(_settings_of_path(place / CASE), sort_keys=True)
             if key not in paths:
                 paths[key] = _true_path(case)
-            if not _is_same(held, paths[key]):
-                wrong[place.name] = f"its {GROUND_TRUTH} is not the path that its {CASE} gives"
         except (VobenchError, OSError, ValueError, LookupError, AssertionError):
             continue  # such as a camera file of another machine
+        if not _is_same(stated, paths[key]):
+            wrong[place.name] = f"its {GROUND_TRUTH} is not the path that its {CASE} gives"
     return wrong
 
 
@@ -237,21 +274,25 @@ def _case(path: Path) -> Case | None:
 
 
 def _settings_of_path(path: Path) -> dict[str, Any]:
-    """The settings of a case but for those that differ between cases of one path: pictures do not change it."""
+    """The settings of a case, without those that do not change its path, such as the scene."""
     settings: dict[str, Any] = json.loads(path.read_bytes())
-    return {key: value for key, value in settings.items() if key not in ("name", "variant", "scene", "lighting")}
+    for key in NOT_OF_PATH:
+        settings.pop(key, None)
+    return settings
 
 
 def _true_path(case: Case) -> Trajectory:
     """The left camera's true path that a case is scored against."""
-    travel = body_motion(case)
-    frames = frames_of(case, travel)
-    body = Trajectory(frames.t_ns, travel.at_frames().T_world_body[frames.index])
+    motion = body_motion(case)
+    frames = frames_of(case, motion)
+    T_world_body = motion.at_frames().T_world_body[frames.index]
+    body = Trajectory(frames.t_ns, T_world_body)
     exact = format_tum(body.of_mounted(case.build_rig().T_body_left))
     return parse_tum(scored_truth(exact, case), name=GROUND_TRUTH)
 
 
-def _is_same(held: Trajectory, true: Trajectory) -> bool:
-    if not np.array_equal(held.t_ns, true.t_ns):
+def _is_same(stated: Trajectory, true: Trajectory) -> bool:
+    if not np.array_equal(stated.t_ns, true.t_ns):
         return False
-    return bool(np.allclose(held.T_world_frame, true.T_world_frame, rtol=0, atol=SAME_TRUTH_M))
+    is_close = np.allclose(stated.T_world_frame, true.T_world_frame, rtol=0, atol=SAME_TRUTH_M)
+    return bool(is_close)

@@ -1,4 +1,4 @@
-"""A run of a suite: its tasks are performed, and what a person reads is gathered in one folder."""
+"""A run of a suite: its tasks are performed, and the files for people are gathered in one folder."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -45,15 +45,15 @@ if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
 
 Finish = Callable[[RunFolder, list[TrialScore]], None]
-OF_ESTIMATE = (ESTIMATE, TRACKS, LOG, TIMES, COVARIANCE, REVISED)
+OF_ESTIMATE = (ESTIMATE, TRACKS, LOG, TIMES)
 OF_SCORE = (SCORE, FRAMES)
 OPTIONAL = (COVARIANCE, REVISED)
-# What helps where a sequence could not be made; a refusal's sentence says it already.
+# Remedies if a sequence could not be made; the sentence of a refusal has its own.
 REMEDIES: dict[str, str] = {
     "crashed": " (`vobench doctor` checks what this machine lacks)",
     "out_of_memory": " (run fewer tasks at once, as with --jobs 1)",
 }
-# How the cost of estimators was taken that were run this time.
+# How the costs of estimators were measured.
 ALONE = "with nothing beside it"
 BESIDE = "beside other tasks"
 
@@ -86,39 +86,64 @@ def run_suite(
     """
     require_held()
     tasks = plan(suite, recordings)
-    kept = Store(store)
-    with kept.in_use(tell):
+    scores = [task for task in tasks if task.stage == "score"]
+    results = Store(store)
+    with results.in_use(tell):
         if is_fresh:
-            kept.require_writable()
-            kept.forget(task.key for task in tasks)
+            results.require_writable()
+            results.forget(task.key for task in tasks)
         to_make = missing(tasks, store)
         if to_make:
-            kept.require_writable()
-            kept.set_aside_damaged((task.key for task in to_make), tell)
+            results.require_writable()
+            results.set_aside_damaged((task.key for task in to_make), tell)
         shares_time = shares_time or suite.suite.share_time
         begin(to_make)
         failures = perform_all(to_make, store, executor, shares_time=shares_time, heard=heard)
-        scores = [task for task in tasks if task.stage == "score"]
-        unmade = _unmade(scores, failures)
-        _require_sequences(unmade, {task.inputs["case"] for task in scores}, require_all=require_all)
-        cases = {case.name: case for case in suite.cases}
-        stated = plain(suite.suite)
-        entrants = [_entrant_facts(entrant) for entrant in suite.entrants]
+        gathering = _Gathering(suite, store, scores, failures)
+        gathering.require_sequences(require_all=require_all)
 
         def fill(folder: RunFolder) -> None:
-            write_json(folder.path / SUITE, stated)
-            write_json(folder.path / ESTIMATORS, entrants)
-            origin = joined(read_origin(store / task.key) for task in scores)
-            timed = BESIDE if shares_time else ALONE
-            write_json(folder.path / ENVIRONMENT, environment(origin, timed=timed, sandboxed=sandbox_works()))
-            trials = []
-            for task in scores:
-                failure = unmade.get(task.inputs["case"]) or _trial_failure(failures.get(task.key))
-                trials.append(_gather(task, cases, store, folder, failure))
+            trials = gathering.write(folder, timed=BESIDE if shares_time else ALONE)
             finish(folder, trials)
             write_hashes(folder)
 
-        return make_run(root, suite.suite.name, digest({"suite": stated, "estimators": entrants}), fill)
+        return make_run(root, suite.suite.name, digest(gathering.identity), fill)
+
+
+class _Gathering:
+    """The results of a run in the store, and how they are gathered in its folder."""
+
+    def __init__(self, suite: Plan, store: Path, scores: Sequence[Task], failures: Mapping[str, Done]) -> None:
+        self._store = store
+        self._scores = scores
+        self._failures = failures
+        self._cases = {case.name: case for case in suite.cases}
+        self._unmade = _unmade(scores, failures)
+        estimators = [_entrant_facts(entrant) for entrant in suite.entrants]
+        self.identity = {"suite": plain(suite.suite), "estimators": estimators}
+
+    def require_sequences(self, *, require_all: bool) -> None:
+        """Raise NoSequenceError if no case could be made; with `require_all`, if any could not."""
+        cases = {task.inputs["case"] for task in self._scores}
+        _require_sequences(self._unmade, cases, require_all=require_all)
+
+    def write(self, folder: RunFolder, *, timed: str) -> list[TrialScore]:
+        """Write the files of the run, its cases and its trials; the score of each trial."""
+        origin = joined(read_origin(self._store / task.key) for task in self._scores)
+        write_json(folder.path / SUITE, self.identity["suite"])
+        write_json(folder.path / ESTIMATORS, self.identity["estimators"])
+        write_json(folder.path / ENVIRONMENT, environment(origin, timed=timed, sandboxed=sandbox_works()))
+        return [_gather(task, self._cases, self._store, folder, self._failure(task)) for task in self._scores]
+
+    def _failure(self, task: Task) -> "_Failure | None":
+        """Why a trial has no score; None if it has one."""
+        unmade = self._unmade.get(task.inputs["case"])
+        if unmade:
+            return unmade
+        done = self._failures.get(task.key)
+        if done is None:
+            return None
+        return _Failure(done.failure or "crashed", done.reason, done.stack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,14 +183,10 @@ def _require_sequences(unmade: Mapping[str, _Failure], cases: Collection[str], *
     )
 
 
-def _trial_failure(done: Done | None) -> _Failure | None:
-    return _Failure(done.failure or "crashed", done.reason, done.stack) if done else None
-
-
 def _gather(
     task: Task, cases: Mapping[str, Case | RecordedCase], store: Path, folder: RunFolder, failure: _Failure | None
 ) -> TrialScore:
-    """Copy a trial's files out of the store, and its case's before the first of them."""
+    """Copy a trial's files from the store, and before its case's first trial those of the case."""
     stop.check()
     sequence, estimate = (store / key for key in task.needs)
     case = task.inputs["case"]
@@ -176,13 +197,14 @@ def _gather(
     score = read_score(store / task.key / SCORE)
     target = folder.estimate(score.case, score.estimator, score.repeat)
     target.mkdir(parents=True)
-    for place, names in ((estimate, OF_ESTIMATE), (store / task.key, OF_SCORE)):
-        copy_files(place, [name for name in names if name not in OPTIONAL or (place / name).is_file()], target)
+    optional = [name for name in OPTIONAL if (estimate / name).is_file()]
+    copy_files(estimate, [*OF_ESTIMATE, *optional], target)
+    copy_files(store / task.key, OF_SCORE, target)
     return score
 
 
 def _write_failed(task: Task, failure: _Failure, folder: RunFolder) -> TrialScore:
-    """The row of a cell that came to no score."""
+    """Write the files of a trial without a score."""
     score = TrialScore(
         case=task.inputs["case"],
         variant=task.inputs["variant"],
@@ -201,16 +223,21 @@ def _write_failed(task: Task, failure: _Failure, folder: RunFolder) -> TrialScor
     write_json(target / SCORE, score.model_dump(mode="json"))
     (target / ESTIMATE).touch()
     (target / LOG).write_text(f"{failure.reason}\n{failure.stack}", encoding="utf-8")
-    with new_table(target / FRAMES, COLUMNS), new_table(target / TIMES, TIME_COLUMNS), ZipFile(target / TRACKS, "w"):
-        return score
+    for table, columns in ((FRAMES, COLUMNS), (TIMES, TIME_COLUMNS)):
+        with new_table(target / table, columns):
+            pass  # no rows
+    with ZipFile(target / TRACKS, "w"):
+        pass  # no tracks
+    return score
 
 
 def _gather_case(case: Case | RecordedCase, sequence: Path, target: Path) -> None:
     target.mkdir(parents=True)
-    # Of a recording: all that its import assumed, converted or dropped.
     is_made = sequence.is_dir()
-    assumed = {"import": read_import_notes(sequence)} if is_made and isinstance(case, RecordedCase) else {}
-    write_json(target / CASE, {**plain(case), **assumed})
+    settings = plain(case)
+    if is_made and isinstance(case, RecordedCase):
+        settings["import"] = read_import_notes(sequence)  # all that the import assumed, converted or dropped
+    write_json(target / CASE, settings)
     if not is_made:
         return
     copy_files(sequence, [GROUND_TRUTH], target)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,25 +26,26 @@ if TYPE_CHECKING:
 # The truth that a trial is scored against has one pose for each frame.
 SETTINGS = ScoreSettings(coverage_of="frames")
 NO_SCALE = "Sim(3)"
+# Metrics of an estimate without a scale: those of every score, and how its scale drifts.
 OF_NO_SCALE = tuple(metric for metric in DEFINITIONS.values() if not metric.full or metric.id == "scale_drift")
-# What trackers of resting things jitter by. Extents, not path lengths: jitter adds up along a path.
+NO_SCALE_SETTINGS = replace(SETTINGS, alignment="sim3", full=True)
+# Jitter of trackers at rest. Extents, not path lengths: jitter adds up along a path.
 STILL_M = 2e-3
 STILL_RAD = np.deg2rad(0.2)
+LEAST_DIVERGED_M = 1e-3
 
 
 def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) -> None:
-    """Score a trial's estimate against its sequence's true path: the score and the table of frames, in a folder."""
+    """Score a trial's estimate against its sequence's ground truth; write the score and the table of frames."""
     exact = (sequence / GROUND_TRUTH).read_text(encoding="utf-8")
-    gt = parse_tum(scored_truth(exact, trial.case), name=GROUND_TRUTH)  # as a file has it that anybody can score again
+    # The truth is read from the text that the run holds, so that anybody gets the same score from it.
+    gt = parse_tum(scored_truth(exact, trial.case), name=GROUND_TRUTH)
     claims = trial.entrant.claims
     est = read_tum(estimate / ESTIMATE)
-    revised = estimate / REVISED
     scored = score_estimate(est, gt, claims)
-    later = score_estimate(read_tum(revised), gt, claims) if revised.is_file() else None
     stamps = {row["frame"]: int(row["t_ns"]) for row in read_table(sequence / EXPOSURES)}
     dropped = [stamps[row["frame"]] for row in read_table(estimate / ANSWERS) if row["status"] == DROPPED]
     outcome = read_outcome(estimate)
-    scale = scored.alignment.scale if scored else 1.0
     status, reason = status_of(outcome, scored, gt)
     if dropped and outcome.kind == FINISHED:
         status, reason = status_of_handed(est, gt, claims, dropped)
@@ -59,64 +60,98 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
         frames=len(gt),
         path_m=float(gt.distances_m()[-1]),
         score=scored.as_dict() if scored else None,
-        drift_m=extent_m(est) if scored and stands_still(gt) else None,
+        drift_m=drift_m(est, gt, scored),
         claims=claims,
-        consistency=trial_consistency(estimate, gt, est, start_ns=min(stamps.values()), scale=scale),
-        revised=later.as_dict() if later else None,
+        consistency=trial_consistency(estimate, gt, est, start_ns=min(stamps.values()), scale=scale_of(scored)),
+        revised=_revised_score(estimate, gt, claims),
         sandbox=outcome.sandbox,
     )
     write_json(folder / SCORE, score.model_dump(mode="json"))
     write_frames(sequence, estimate, scored, folder)
 
 
+def _revised_score(estimate: Path, gt: Trajectory, claims: Sequence[str]) -> dict[str, Any] | None:
+    """The score of the poses that an estimator revised at the end; None if it has none."""
+    revised = score_revised(estimate, gt, claims)
+    return revised.as_dict() if revised else None
+
+
+def score_revised(folder: Path, gt: Trajectory, claims: Sequence[str]) -> Score | None:
+    """The score of the revised poses in a trial's folder; None if there are none."""
+    path = folder / REVISED
+    if not path.is_file():
+        return None
+    return score_estimate(read_tum(path), gt, claims)
+
+
+def scale_of(scored: Score | None) -> float:
+    """The scale that an estimate was aligned with; 1 without a score."""
+    return scored.alignment.scale if scored else 1.0
+
+
+def drift_m(est: Trajectory, gt: Trajectory, scored: Score | None) -> float | None:
+    """The largest distance of a scored estimate from its start if the truth stands still; else None."""
+    if scored is None or not stands_still(gt):
+        return None
+    return extent_m(est)
+
+
 def stands_still(gt: Trajectory) -> bool:
-    """Whether the truth stays within 2 mm and 0.2° of its first pose: an error of its path would mean nothing."""
-    turned_rad = se3.rotation_angle(se3.inverse(gt.T_world_frame[:1])[:, :3, :3] @ gt.T_world_frame[:, :3, :3])
+    """Whether the truth stays within 2 mm and 0.2° of its first pose, so that a relative error means nothing."""
+    R_world_frame = gt.T_world_frame[:, :3, :3]
+    R_first_world = se3.inverse(gt.T_world_frame[:1])[:, :3, :3]
+    turned_rad = se3.rotation_angle(R_first_world @ R_world_frame)
     return bool(extent_m(gt) <= STILL_M and np.max(turned_rad) <= STILL_RAD)
 
 
 def extent_m(trajectory: Trajectory) -> float:
     """The largest distance from the first position."""
-    return float(np.linalg.norm(trajectory.positions_m - trajectory.positions_m[:1], axis=1).max())
+    offsets_m = trajectory.positions_m - trajectory.positions_m[:1]
+    return float(np.linalg.norm(offsets_m, axis=1).max())
 
 
 def score_estimate(est: Trajectory, gt: Trajectory, claims: Sequence[str]) -> Score | None:
-    """The score of an estimate, None where it holds no pose of a frame whose truth is known.
+    """The score of an estimate; None if it has no pose at a frame whose truth is known.
 
-    One that claims no more than Sim(3) is aligned with a scale, and how that drifts is told.
+    An estimate that claims no scale, Sim(3), is aligned with a scale, and the drift of its scale is measured.
     """
     if not np.isin(est.t_ns, gt.t_ns).any():
         return None
     if NO_SCALE not in claims:
         return score(gt, est, settings=SETTINGS)
-    return score(gt, est, settings=replace(SETTINGS, alignment="sim3", full=True), metrics=OF_NO_SCALE)
+    return score(gt, est, settings=NO_SCALE_SETTINGS, metrics=OF_NO_SCALE)
 
 
 def status_of(outcome: Outcome, scored: Score | None, gt: Trajectory) -> tuple[TrialStatus, str]:
-    """How the trial ended, the gravest first; an estimator that died is not saved by what it answered before."""
+    """The status of a trial and its reason, the worst first; a process that failed counts before its answers."""
     if outcome.kind != FINISHED:
         return outcome.kind, outcome.reason  # type: ignore[return-value]  # EstimatorFailure's kinds are statuses
-    if scored is None or not scored.failure.survived:
-        covered = scored.coverage.ratio if scored else 0.0
-        at_the_end = " and none at the end" if covered and scored and scored.coverage.ends_lost else ""
-        return "lost", f"a pose for {covered:.0%} of the frames{at_the_end}"
+    if scored is None:
+        return "lost", "a pose for 0% of the frames"
+    coverage = scored.coverage
+    if not scored.failure.survived:
+        at_the_end = " and none at the end" if coverage.ratio and coverage.ends_lost else ""
+        return "lost", f"a pose for {coverage.ratio:.0%} of the frames{at_the_end}"
+
     ate = scored.metric("ate_trans")
     path_m = float(gt.distances_m()[-1])
-    if ate is not None and ate.statistics.rmse > max(path_m, 1e-3) and not stands_still(gt):
+    limit_m = max(path_m, LEAST_DIVERGED_M)
+    if ate is not None and ate.statistics.rmse > limit_m and not stands_still(gt):
         return "diverged", f"ATE {ate.statistics.rmse:.3g} m on a path of {path_m:.3g} m"
-    if scored.coverage.ratio < 1:
-        without = scored.association.gt_poses - scored.association.pairs
-        return "partial", f"no pose for {without} of {len(gt)} frames; the first is {scored.coverage.first_lost_frame}"
+    if coverage.ratio < 1:
+        missing = scored.association.gt_poses - scored.association.pairs
+        return "partial", f"no pose for {missing} of {len(gt)} frames; the first is {coverage.first_lost_frame}"
     return "ok", ""
 
 
 def status_of_handed(
     est: Trajectory, gt: Trajectory, claims: Sequence[str], dropped: Sequence[int]
 ) -> tuple[TrialStatus, str]:
-    """How a trial in real time ended, by the frames that came in time; those of these stamps did not."""
-    in_time = ~np.isin(gt.t_ns, dropped)
-    handed = Trajectory(gt.t_ns[in_time], gt.T_world_frame[in_time])
-    status, reason = status_of(Outcome(kind=FINISHED, reason=""), score_estimate(est, handed, claims), handed)
+    """The status of a trial in real time and its reason, by the frames whose stamps were not dropped."""
+    is_sent = ~np.isin(gt.t_ns, dropped)
+    sent = Trajectory(gt.t_ns[is_sent], gt.T_world_frame[is_sent])
+    scored = score_estimate(est, sent, claims)
+    status, reason = status_of(Outcome(kind=FINISHED, reason=""), scored, sent)
     if status not in SURVIVED:
         return status, reason
     late = f"it was too late for {len(dropped)} of {len(gt)} frames"

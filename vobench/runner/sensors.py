@@ -1,4 +1,4 @@
-"""Readings of a body's wheels and IMU on its way, and the ground truth of its cameras' pixels."""
+"""Readings of a body's wheels and IMU, and the ground truth of its cameras' pixels."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ EMPTY = np.zeros(0, np.int64)
 
 
 class SensorFeed:
-    """The readings of a case's encoders and IMU, where it has them, and the IMU's true biases."""
+    """The readings of a case's encoders and IMU, if it has them, and the IMU's true biases."""
 
     def __init__(self, case: Case, travel: BodyMotion) -> None:
         self._encoder_t_ns, self._ticks = _counted(case, travel)
@@ -31,32 +31,38 @@ class SensorFeed:
         self._last_ns = int(travel.t_ns[0]) - 1
 
     def write_until(self, t_ns: int, writer: SequenceWriter) -> None:
-        """Write what was read since the last call, up to and at a stamp."""
-        new = _between(self._encoder_t_ns, self._last_ns, t_ns)
-        for now_ns, counts in zip(self._encoder_t_ns[new].tolist(), self._ticks[new], strict=True):
-            self._write_imu(now_ns, writer)
-            writer.write_encoders([now_ns], counts)
+        """Write the readings after the last call, up to and including a stamp."""
+        rows = _between(self._encoder_t_ns, self._last_ns, t_ns)
+        stamps = self._encoder_t_ns[rows].tolist()
+        for stamp_ns, counts in zip(stamps, self._ticks[rows], strict=True):
+            self._write_imu(stamp_ns, writer)
+            writer.write_encoders([stamp_ns], counts)
         self._write_imu(t_ns, writer)
 
     def _write_imu(self, t_ns: int, writer: SequenceWriter) -> None:
         if self._imu:
             readings, bias = self._imu
-            new = _between(readings.t_ns, self._last_ns, t_ns)
-            writer.write_imu(ImuReadings(readings.t_ns[new], readings.gyro_radps[new], readings.accel_mps2[new]))
-            for row in zip(bias.t_ns[new].tolist(), bias.gyro_radps[new], bias.accel_mps2[new], strict=True):
-                writer.write_imu_bias(*row)
+            rows = _between(readings.t_ns, self._last_ns, t_ns)
+            new = ImuReadings(readings.t_ns[rows], readings.gyro_radps[rows], readings.accel_mps2[rows])
+            writer.write_imu(new)
+            stamps = bias.t_ns[rows].tolist()
+            for stamp_ns, gyro_radps, accel_mps2 in zip(
+                stamps, bias.gyro_radps[rows], bias.accel_mps2[rows], strict=True
+            ):
+                writer.write_imu_bias(stamp_ns, gyro_radps, accel_mps2)
         self._last_ns = t_ns
 
 
 def _counted(case: Case, travel: BodyMotion) -> tuple[Stamps, Stamps]:
-    """Stamps (M,) and counts (M, 2) of both encoders, 0 at the first picture; none where nothing rolls."""
+    """Stamps (M,) and counts (M, 2) of both encoders, 0 at the first picture; none for a body without wheels."""
     spec = case.trajectory
     if travel.rims is None or not isinstance(spec, Wheeled):
         return EMPTY, EMPTY.reshape(0, 2)
     t_ns = travel.rims.t_ns
     counts = ticks(travel.rims.rim_rad, spec.wheels, ENCODERS[spec.encoders])
     if travel.first:
-        counts = counts - counts[np.searchsorted(t_ns, travel.t_ns[0])]
+        first_row = np.searchsorted(t_ns, travel.t_ns[0])
+        counts = counts - counts[first_row]
     return t_ns, counts
 
 
@@ -65,7 +71,8 @@ def _felt(case: Case, travel: BodyMotion) -> tuple[ImuReadings, ImuBias] | None:
         return None
     rngs = {stream: generator(case.seed, f"imu.{stream}") for stream in STREAMS}
     readings, bias = measure(travel.motion, case.rig.imu, rngs=rngs)
-    t_ns = readings.t_ns + round(case.camera.timing.imu_delay_ms * NS_PER_MS)
+    delay_ns = round(case.camera.timing.imu_delay_ms * NS_PER_MS)
+    t_ns = readings.t_ns + delay_ns
     return replace(readings, t_ns=t_ns), replace(bias, t_ns=t_ns)
 
 
@@ -76,24 +83,30 @@ def _between(t_ns: Stamps, last_ns: int, now_ns: int) -> slice:
 
 
 def wheel_error_m(case: Case, travel: BodyMotion) -> float | None:
-    """How far off an odometer is at the end that believes the wheels from a known start; None where nothing rolls."""
+    """The final position error of wheel odometry from the true start; None for a body without wheels."""
     spec = case.trajectory
     if not isinstance(spec, Wheeled):
         return None
+    wheels = spec.wheels
     t_ns, counts = _counted(case, travel)
-    gone = counts[(t_ns >= travel.t_ns[0]) & (t_ns <= travel.t_ns[-1])]
-    left, right = np.diff(gone, axis=0).T * 2 * np.pi * spec.wheels.radius_m / spec.wheels.ticks_per_revolution
-    turned = (right - left) / spec.wheels.track_m
-    first, last = travel.motion.at(travel.t_ns[[0, -1]]).T_world_body
-    heading = np.arctan2(first[1, 0], first[0, 0]) + np.cumsum(turned) - turned / 2
+    is_in_case = (t_ns >= travel.t_ns[0]) & (t_ns <= travel.t_ns[-1])
+    steps = np.diff(counts[is_in_case], axis=0)  # ticks (M, 2)
+    left_m, right_m = steps.T * 2 * np.pi * wheels.radius_m / wheels.ticks_per_revolution
+    turned = (right_m - left_m) / wheels.track_m
+    T_world_first, T_world_last = travel.motion.at(travel.t_ns[[0, -1]]).T_world_body
+    first_heading = np.arctan2(T_world_first[1, 0], T_world_first[0, 0])
+    heading = first_heading + np.cumsum(turned) - turned / 2  # in the middle of each arc
+
     # Each step is an arc, and its chord a little shorter.
-    chord_m = (left + right) / 2 * np.sinc(turned / 2 / np.pi)
-    believed_m = first[:2, 3] + np.array([(chord_m * np.cos(heading)).sum(), (chord_m * np.sin(heading)).sum()])
-    return float(np.linalg.norm(believed_m - last[:2, 3]))
+    chord_m = (left_m + right_m) / 2 * np.sinc(turned / 2 / np.pi)
+    x_m = (chord_m * np.cos(heading)).sum()
+    y_m = (chord_m * np.sin(heading)).sum()
+    end_m = T_world_first[:2, 3] + np.array([x_m, y_m])
+    return float(np.linalg.norm(end_m - T_world_last[:2, 3]))
 
 
 class PixelTruth:
-    """Ground truth of a case's pictures, amid each row's exposure; the true rig sees it."""
+    """Ground truth of a case's pictures, at the middle of each row's exposure, seen by the true rig."""
 
     def __init__(self, case: Case, scene: Scene, motion: Motion) -> None:
         self._rig = case.build_true_rig()
@@ -104,17 +117,21 @@ class PixelTruth:
 
     @property
     def names(self) -> TruthNames:
-        """What ids stand for."""
+        """The names of the ids."""
         return self._caster.names
 
     def frame(self, side: Side, t_ns: int, next_t_ns: int | None) -> TruthFrame:
-        """The channels of the picture stamped t_ns; the one stamped next_t_ns is where flow leads."""
+        """The channels of the picture stamped t_ns; flow leads to the one stamped next_t_ns."""
+        camera = self._rig.camera(side)
+        shot = self._shot(side, t_ns)
         later = None if next_t_ns is None else self._shot(side, next_t_ns)
-        return self._caster.frame(self._rig.camera(side), self._shot(side, t_ns), self._channels, later=later)
+        return self._caster.frame(camera, shot, self._channels, later=later)
 
     def _shot(self, side: Side, t_ns: int) -> Shot:
         T_body_camera = self._rig.T_body_camera(side)
         if not self._readout_s:
-            return Shot(self._motion.at(np.array([t_ns])).T_world_body[0] @ T_body_camera, t_ns)
+            T_world_body = self._motion.at(np.array([t_ns])).T_world_body[0]
+            return Shot(T_world_body @ T_body_camera, t_ns)
         stamps = row_stamps(self._rig.camera(side).height_px, self._readout_s, t_ns)
-        return Shot(self._motion.at(stamps).T_world_body @ T_body_camera, stamps)
+        T_world_body = self._motion.at(stamps).T_world_body
+        return Shot(T_world_body @ T_body_camera, stamps)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from vobench.suite.scene_spec import SceneFile
     from vobench.suite.suite import Case, Rendering
 
-# What of a case is for people: names, and where the poses of a replay were found.
+# Settings of a case that the simulation does not depend on: names, and the file of a replay's poses.
 UNSIMULATED: dict[str, Any] = {
     "name": True,
     "variant": True,
@@ -41,9 +41,10 @@ def libraries(rendering: "Rendering") -> tuple[str, ...]:
 
 
 def content(case: "Case") -> dict[str, Any]:
-    """What is simulated, without what the suite calls it: the same for equal cases of two suites."""
-    said: dict[str, Any] = plain(case, exclude=UNSIMULATED)
-    return said | {"scene": scene_content(case.scene, exclude=UNSIMULATED["scene"])}
+    """The settings that are simulated, without names: the same for equal cases of two suites."""
+    settings: dict[str, Any] = plain(case, exclude=UNSIMULATED)
+    scene = scene_content(case.scene, exclude=UNSIMULATED["scene"])
+    return {**settings, "scene": scene}
 
 
 # What draws and writes is imported where it is used: whoever asks whether a sequence is there needs none of it.
@@ -107,13 +108,13 @@ def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progr
         frames = frames_of(case, travel)
         watched = progress.track(_pairs(camera, frames), f"simulate {case.name}", total=len(frames.t_ns))
         with _writer(case, folder, truth) as writer:
-            _write(writer, (travel, frames), SensorFeed(case, travel), watched, truth)
+            _write(writer, travel, frames, feed=SensorFeed(case, travel), pairs=watched, truth=truth)
     finally:
         renderer.close()
 
 
 def frames_of(case: "Case", travel: BodyMotion) -> "Schedule":
-    """The frames that come of a case's way, and when their pictures are taken."""
+    """The frames of a case's motion, and when their pictures are taken."""
     from vobench.sensor.timing import STREAMS, schedule
 
     rngs = {stream: generator(case.seed, f"camera.{stream}") for stream in STREAMS}
@@ -123,8 +124,9 @@ def frames_of(case: "Case", travel: BodyMotion) -> "Schedule":
 def _pairs(camera: "StereoCamera", frames: "Schedule") -> "Iterator[StereoPair]":
     """The pictures of each frame; one that repeats has those before."""
     pair = None
-    for left_ns, right_ns, repeats in zip(frames.left_ns, frames.right_ns, frames.repeats, strict=True):
-        pair = pair if repeats and pair else camera.shoot(int(left_ns), int(right_ns))
+    for left_ns, right_ns, is_repeated in zip(frames.left_ns, frames.right_ns, frames.repeats, strict=True):
+        if pair is None or not is_repeated:
+            pair = camera.shoot(int(left_ns), int(right_ns))
         yield pair
 
 
@@ -147,15 +149,21 @@ def _writer(case: "Case", folder: Path, truth: "PixelTruth | None") -> "Sequence
 
 def _write(
     writer: "SequenceWriter",
-    way: "tuple[BodyMotion, Schedule]",
+    travel: BodyMotion,
+    frames: "Schedule",
+    *,
     feed: "SensorFeed",
     pairs: "Iterator[StereoPair]",
     truth: "PixelTruth | None",
 ) -> None:
-    travel, frames = way
     body = travel.at_frames()
-    taken = {"left": [*frames.left_ns.tolist(), None], "right": [*frames.right_ns.tolist(), None]}
-    for nth, (pair, index, t_ns) in enumerate(zip(pairs, frames.index, frames.t_ns.tolist(), strict=True)):
+    # The stamps of each side's pictures; flow leads from one to the next, and from the last nowhere.
+    taken_ns = {
+        "left": [*frames.left_ns.tolist(), None],
+        "right": [*frames.right_ns.tolist(), None],
+    }
+    rows = zip(pairs, frames.index, frames.t_ns.tolist(), strict=True)
+    for number, (pair, index, t_ns) in enumerate(rows):
         feed.write_until(t_ns, writer)
         writer.write_frame(t_ns, pair.left, pair.right)
         writer.write_exposure(t_ns, pair.exposure.time_s, pair.exposure.gain_db)
@@ -165,4 +173,6 @@ def _write(
             writer.write_disturbance(t_ns, travel.drive.slip[step], travel.drive.delta[step])
         if truth:
             for side in SIDES:
-                writer.write_truth_frame(t_ns, side, truth.frame(side, *taken[side][nth : nth + 2]))
+                picture_ns = taken_ns[side][number]
+                next_picture_ns = taken_ns[side][number + 1]
+                writer.write_truth_frame(t_ns, side, truth.frame(side, picture_ns, next_picture_ns))

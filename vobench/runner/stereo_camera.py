@@ -1,5 +1,6 @@
-"""The stereo pair at work: light through the lens onto the chip, exposed by a shutter while the body moves."""
+"""The simulated stereo cameras: light through the lens onto the chip, exposed by a shutter while the body moves."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
-from vobench.geometry.rig import SIDES, Side
+from vobench.geometry.rig import Side
 from vobench.geometry.se3 import Array
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.renderer import Radiance, Renderer, View
@@ -24,9 +25,10 @@ from vobench.suite.suite import Case
 from vobench.trajectory.kinematics import Motion
 from vobench.trajectory.trajectory import Stamps
 
-# Rays that meet nothing look at the sky, which is as good as this far.
-FAR_M = 1e3
-GRID = (9, 7)
+FAR_M = 1e3  # distance of what a ray sees that meets nothing: the sky
+# Pixels of a picture at which displacements are measured, across and down.
+GRID_COLUMNS = 9
+GRID_ROWS = 7
 
 
 class Displacement:
@@ -34,49 +36,56 @@ class Displacement:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._at_rest = _solid(scene, 0)
+        self._at_rest = _faces_seen(scene, 0)
 
     def largest_px(
         self, camera: Camera, T_world_first: Array, T_world_last: Array, *, start_ns: int, end_ns: int
     ) -> float:
-        """How far what the first pose sees at start_ns has moved for the last one at end_ns, in pixels, at most."""
-        rays = _grid_rays(camera) @ T_world_first[:3, :3].T
-        caster, mover_of = _solid(self._scene, start_ns) if self._scene.movers else self._at_rest
-        hits = caster.hits(np.broadcast_to(T_world_first[:3, 3], rays.shape), rays)
-        before_m = T_world_first[:3, 3] + np.nan_to_num(hits.distance, nan=FAR_M)[:, None] * rays
+        """The largest displacement in px of visible points from the first pose at start_ns to the last at end_ns."""
+        rays = _grid_rays(camera) @ T_world_first[:3, :3].T  # (K, 3), world
+        camera_m = T_world_first[:3, 3]
+        caster, mover_of_face = _faces_seen(self._scene, start_ns) if self._scene.movers else self._at_rest
+        hits = caster.hits(np.broadcast_to(camera_m, rays.shape), rays)
+        distance_m = np.nan_to_num(hits.distance, nan=FAR_M)
+        before_m = camera_m + distance_m[:, None] * rays
+
         after_m = before_m.copy()
-        mover_at = np.where(hits.face < 0, -1, mover_of[hits.face])
+        mover_of_ray = np.where(hits.face < 0, -1, mover_of_face[hits.face])
         for index, mover in enumerate(self._scene.movers):
-            T_later_now = mover.path.pose(end_ns) @ se3.inverse(mover.path.pose(start_ns))
-            after_m[mover_at == index] = se3.apply(T_later_now, before_m[mover_at == index])
-        first = camera.project(se3.apply(se3.inverse(T_world_first), before_m))
-        last = camera.project(se3.apply(se3.inverse(T_world_last), after_m))
-        moved = np.linalg.norm(last - first, axis=-1)
-        return float(np.nanmax(moved)) if np.isfinite(moved).any() else 0.0
+            T_end_start = mover.path.pose(end_ns) @ se3.inverse(mover.path.pose(start_ns))
+            is_on_mover = mover_of_ray == index
+            after_m[is_on_mover] = se3.apply(T_end_start, before_m[is_on_mover])
+
+        first_px = camera.project(se3.apply(se3.inverse(T_world_first), before_m))
+        last_px = camera.project(se3.apply(se3.inverse(T_world_last), after_m))
+        moved_px = np.linalg.norm(last_px - first_px, axis=-1)
+        return float(np.nanmax(moved_px)) if np.isfinite(moved_px).any() else 0.0
 
 
-def _solid(scene: Scene, t_ns: int) -> tuple[RayCaster, NDArray[np.int32]]:
-    """What rays meet in a scene at an instant, seen through panes; and the mover of each surface, -1 for none."""
+def _faces_seen(scene: Scene, t_ns: int) -> tuple[RayCaster, NDArray[np.int32]]:
+    """Rays against the faces of a scene at an instant, except panes; and the mover of each face, -1 for none."""
     faces = triangles(scene, t_ns=t_ns)
-    looks = [scene.materials.get(thing.material) for thing in faces.things]
-    is_pane = np.array([look is not None and look.kind == "pane" for look in looks], bool)
-    return RayCaster(faces, np.flatnonzero(~is_pane[faces.thing])), faces.mover
+    materials = [scene.materials.get(thing.material) for thing in faces.things]
+    is_pane = np.array([material is not None and material.kind == "pane" for material in materials], bool)
+    opaque_faces = np.flatnonzero(~is_pane[faces.thing])
+    return RayCaster(faces, opaque_faces), faces.mover
 
 
 @lru_cache(maxsize=8)
 def _grid_rays(camera: Camera) -> Array:
-    """Rays (K, 3) through pixels spread over the whole picture, borders included, where the lens has any."""
-    u, v = np.meshgrid(np.linspace(0, camera.width_px - 1, GRID[0]), np.linspace(0, camera.height_px - 1, GRID[1]))
+    """Rays (K, 3) through pixels spread over the whole picture, borders included, where the lens has rays."""
+    columns = np.linspace(0, camera.width_px - 1, GRID_COLUMNS)
+    rows = np.linspace(0, camera.height_px - 1, GRID_ROWS)
+    u, v = np.meshgrid(columns, rows)
     rays = camera.rays(np.stack([u, v], -1)).reshape(-1, 3)
     return rays[np.isfinite(rays).all(1)]
 
 
-# Between two sub-frames, and between the first and last row of a strip, nothing should move further than this.
+# Largest displacement between two sub-frames, and between the first and last row of a strip.
 SUB_FRAME_PX = 1.0
 STRIP_PX = 0.25
 MOST_SUB_FRAMES = 32
-# Where lamps change in time, a strip has so few rows that it sees one phase of theirs.
-ROWS_UNDER_CHANGING_LIGHT = 4
+ROWS_UNDER_CHANGING_LIGHT = 4  # of a strip, so that it sees one phase of lamps that change in time
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +99,7 @@ class StereoPair:
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """What there is to see, who draws it, and the way through it."""
+    """A scene, its renderer, and the motion of the body through it."""
 
     scene: Scene
     renderer: Renderer
@@ -102,7 +111,8 @@ class StereoCamera:
 
     def __init__(self, case: Case, world: World) -> None:
         displacement = Displacement(world.scene)
-        self._left, self._right = (SimulatedCamera(case, side, world, displacement) for side in SIDES)
+        self._left = SimulatedCamera(case, "left", world, displacement)
+        self._right = SimulatedCamera(case, "right", world, displacement)
         self._settings = case.camera
         first = case.camera.exposure
         loop = case.camera.auto_exposure
@@ -114,17 +124,21 @@ class StereoCamera:
             camera.skip(pictures)
 
     def shoot(self, t_ns: int, right_ns: int | None = None) -> StereoPair:
-        """The pictures amid whose exposure is t_ns, the right one's where it has its own; call in order of time."""
+        """The pictures with t_ns at the middle of their exposure, the right one with right_ns if that is given.
+
+        Call it in order of time.
+        """
         exposure = self._state[0]
-        right_ns = t_ns if right_ns is None else right_ns
-        pair = StereoPair(self._left.picture(t_ns, exposure), self._right.picture(right_ns, exposure), exposure)
-        if loop := self._settings.auto_exposure:
-            self._state = step(loop, self._state, pair.left, self._settings.chip.signal_of_grey)
-        return pair
+        left = self._left.picture(t_ns, exposure)
+        right = self._right.picture(t_ns if right_ns is None else right_ns, exposure)
+        loop = self._settings.auto_exposure
+        if loop:
+            self._state = step(loop, self._state, left, self._settings.chip.signal_of_grey)
+        return StereoPair(left, right, exposure)
 
 
 class SimulatedCamera:
-    """One camera: where it is, how its shutter cuts time, its lens, and its chip with noise of its own."""
+    """One camera: its poses, its shutter, its lens, and its chip with noise of its own."""
 
     def __init__(self, case: Case, side: Side, world: World, displacement: Displacement) -> None:
         def stream(name: str) -> np.random.Generator:
@@ -158,10 +172,10 @@ class SimulatedCamera:
         return self.exposed(self.light(t_ns, exposure), exposure)
 
     def light(self, t_ns: int, exposure: Exposure) -> Radiance:
-        """What comes to the lens (H, W), or (H, W, 3) in colour, in shares of matt white."""
+        """The light at the lens (H, W), or (H, W, 3) in colour, relative to diffuse white."""
         views = self.views(t_ns, exposure)
-        weights = self._settings.weights
-        light: Radiance = self._world.renderer.radiance(self._camera, views, weights=weights) / self._white_cd_m2
+        radiance = self._world.renderer.radiance(self._camera, views, weights=self._settings.weights)
+        light: Radiance = radiance / self._white_cd_m2
         return light
 
     def exposed(self, light: Radiance, exposure: Exposure) -> Grey:
@@ -171,46 +185,56 @@ class SimulatedCamera:
 
     def views(self, t_ns: int, exposure: Exposure) -> list[View]:
         """How the rows are exposed, in strips and sub-frames as fine as the motion asks for."""
-        height = self._camera.height_px
-        cut = strips(
-            height,
+        exposed_strips = strips(
+            self._camera.height_px,
             self._settings.readout_s,
             t_ns,
             exposure.time_s,
             row_strips=self._row_strips(t_ns),
             sub_frames=self._sub_frames(t_ns, exposure),
         )
-        return [View(s.rows, self._seen_from(s.mid_ns), s.start_ns, s.end_ns) for s in cut]
+        views = []
+        for strip in exposed_strips:
+            T_world_camera = self._poses(strip.mid_ns)
+            views.append(View(strip.rows, T_world_camera, strip.start_ns, strip.end_ns))
+        return views
 
     def _sub_frames(self, t_ns: int, exposure: Exposure) -> int:
         if not self._settings.motion_blur:
             return 1
         moved_px = self._moved_px(t_ns, exposure.time_s)
-        return int(np.clip(np.ceil(moved_px / SUB_FRAME_PX), 1, MOST_SUB_FRAMES))
+        sub_frames = np.ceil(moved_px / SUB_FRAME_PX)
+        return int(np.clip(sub_frames, 1, MOST_SUB_FRAMES))
 
     def _row_strips(self, t_ns: int) -> int:
         height = self._camera.height_px
         if not self._settings.readout_s:
             return 1
-        least = -(-height // ROWS_UNDER_CHANGING_LIGHT) if self._light_changes else 1
+        least = 1
+        if self._light_changes:
+            least = math.ceil(height / ROWS_UNDER_CHANGING_LIGHT)
         moved_px = self._moved_px(t_ns, self._settings.readout_s)
-        return int(np.clip(np.ceil(moved_px / STRIP_PX), least, height))
+        row_strips = np.ceil(moved_px / STRIP_PX)
+        return int(np.clip(row_strips, least, height))
 
     def _moved_px(self, t_ns: int, duration_s: float) -> float:
         half_ns = round(duration_s * 1e9) // 2
         start_ns = t_ns - half_ns
         end_ns = t_ns + half_ns
-        first, last = self._seen_from(np.array([start_ns, end_ns]))
-        return self._displacement.largest_px(self._camera, first, last, start_ns=start_ns, end_ns=end_ns)
+        T_world_first, T_world_last = self._poses(np.array([start_ns, end_ns]))
+        return self._displacement.largest_px(
+            self._camera, T_world_first, T_world_last, start_ns=start_ns, end_ns=end_ns
+        )
 
-    def _seen_from(self, t_ns: Stamps) -> Array:
+    def _poses(self, t_ns: Stamps) -> Array:
         """T_world_camera (K, 4, 4) at instants (K,)."""
-        T_world_camera: Array = self._world.motion.at(t_ns).T_world_body @ self._T_body_camera
+        T_world_body = self._world.motion.at(t_ns).T_world_body
+        T_world_camera: Array = T_world_body @ self._T_body_camera
         return T_world_camera
 
 
 def exposed_by(case: Case, world: World, stamps: Sequence[int]) -> Callable[[CameraSettings], list[Grey]]:
-    """What takes a case's left pictures at instants with any camera; the light is drawn once."""
+    """A function that takes a case's left pictures at instants with any camera; the light is drawn once."""
     displacement = Displacement(world.scene)
     plain = CameraSettings()
     first = SimulatedCamera(replace(case, camera=plain), "left", world, displacement)

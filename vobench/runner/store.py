@@ -169,10 +169,14 @@ class Entry:
 
 
 def _entry(path: Path) -> Entry:
-    files = [path] if path.is_file() else [file for file in path.rglob("*") if file.is_file()]
+    used_s = path.stat().st_mtime
+    files = [path]
+    if path.is_dir():
+        files = [file for file in path.rglob("*") if file.is_file()]
     stats = [file.stat() for file in files]
-    made_s = max((stat.st_mtime for stat in stats), default=path.stat().st_mtime)
-    return Entry(path.parent.name, path, sum(stat.st_size for stat in stats), made_s, path.stat().st_mtime)
+    size = sum(facts.st_size for facts in stats)
+    made_s = max((facts.st_mtime for facts in stats), default=used_s)
+    return Entry(path.parent.name, path, size, made_s, used_s)
 
 
 LIMIT = "VOBENCH_CACHE_GB"
@@ -274,7 +278,8 @@ class Store:
     def seconds(self, stage: str) -> list[float]:
         """How long the last results of a stage took; empty where none was made."""
         with suppress(OSError, ValueError):
-            lines = (self.root / STATE / "seconds" / stage).read_text(encoding="ascii").split()
+            path = self.root / STATE / "seconds" / stage
+            lines = path.read_text(encoding="ascii").split()
             return [float(line) for line in lines[-TIMED:]]
         return []
 
@@ -319,7 +324,10 @@ class Store:
         self.sweep()
         with locked(runs / f"{socket.gethostname()}-{os.getpid()}-{time.monotonic_ns()}"):
             yield
-        if limit < math.inf and (held := sum(entry.bytes for entry in self.entries())) > limit:
+        if limit == math.inf:
+            return
+        held = sum(entry.bytes for entry in self.entries())
+        if held > limit:
             tell(
                 f"the cache holds {held / GB:.3g} GB, more than {LIMIT} says; "
                 f"run: vobench cache gc --keep-gb {limit / GB:g}"
@@ -342,7 +350,8 @@ class Store:
                         yield _entry(path)
 
     def _kinds(self) -> list[Path]:
-        return sorted(path for path in self.root.glob("*") if path.is_dir() and path.name != STATE)
+        folders = [path for path in self.root.glob("*") if path.is_dir()]
+        return sorted(path for path in folders if path.name != STATE)
 
     def collect(self, *, keep_bytes: float = math.inf, older_s: float = math.inf) -> list[Entry]:
         """Remove what is unfinished or damaged, what was last used so long ago, and then the least recently used.
@@ -352,15 +361,17 @@ class Store:
         self.require_writable()
         self.sweep()
         now_s = time.time()
-        since_s = min((path.stat().st_mtime for path in self.root.glob(f"{STATE}/runs/*")), default=math.inf)
-        found = sorted(self.entries(), key=lambda entry: (not entry.is_damaged, entry.used_s))
-        held = sum(entry.bytes for entry in found)
+        starts_s = [path.stat().st_mtime for path in self.root.glob(f"{STATE}/runs/*")]
+        first_run_s = min(starts_s, default=math.inf)
+        entries = sorted(self.entries(), key=lambda entry: (not entry.is_damaged, entry.used_s))
+        held = sum(entry.bytes for entry in entries)
         removed = list[Entry]()
-        for entry in found:
+        for entry in entries:
             stop.check()
             is_old = now_s - entry.used_s > older_s
-            is_too_much = (is_old or held > keep_bytes) and entry.used_s < since_s
-            if (entry.is_damaged or is_too_much) and self._removed(entry):
+            is_unused = entry.used_s < first_run_s  # by the runs that are under way
+            is_dispensable = is_unused and (is_old or held > keep_bytes)
+            if (entry.is_damaged or is_dispensable) and self._removed(entry):
                 held -= entry.bytes
                 removed.append(entry)
         return removed

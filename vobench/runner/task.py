@@ -166,7 +166,8 @@ def _noise(case: Case | RecordedCase) -> dict[str, Any]:
     """What the truth of a case that is scored depends on, beside the exact one."""
     if isinstance(case, RecordedCase) or case.truth_noise == EXACT:
         return {}
-    return {"truth_noise": asdict(case.truth_noise), "seed": case.seed, "first": case.frames and case.frames[0]}
+    first_frame = case.frames[0] if case.frames else None
+    return {"truth_noise": asdict(case.truth_noise), "seed": case.seed, "first": first_frame}
 
 
 def _made_by(stage: Stage, needs: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -179,23 +180,25 @@ def _portable() -> dict[str, bool]:
 
 
 def missing(tasks: Iterable[Task], root: Path) -> list[Task]:
-    """The tasks to perform, in order: what is there is not made again, nor light that no picture is drawn with."""
-    wanted = set[str]()
-    found = list[Task]()
+    """The tasks to perform, in order: not those whose result is stored, nor light that no sequence to make needs."""
+    needed = set[str]()
+    to_make = list[Task]()
     for task in reversed(list(tasks)):
-        if (task.stage != "bake" or task.key in wanted) and not is_done(task, root):
-            wanted.update(task.needs)
-            found.append(task)
-    return found[::-1]
+        is_needed = task.stage != "bake" or task.key in needed
+        if is_needed and not is_done(task, root):
+            needed.update(task.needs)
+            to_make.append(task)
+    return to_make[::-1]
 
 
 def is_done(task: Task, root: Path) -> bool:
-    """Whether the store holds the task's result; that of a failure is made anew, for its cause may be gone."""
-    return Store(root).has(task.key) and not has_failed(task, root / task.key)
+    """Whether the store holds the task's result; a failure does not count, since its cause may be gone."""
+    is_stored = Store(root).has(task.key)
+    return is_stored and not has_failed(task, root / task.key)
 
 
 def has_failed(task: Task, folder: Path) -> bool:
-    """Whether what lies there is the result of a trial that came to no end."""
+    """Whether a folder holds the result of a trial whose estimator failed."""
     from vobench.runner.estimate import FINISHED, read_outcome
 
     return task.stage in ("estimate", "score") and read_outcome(folder).kind != FINISHED
@@ -219,12 +222,15 @@ def perform(
     store = Store(root)
 
     def build(folder: Path) -> None:
-        began = time.monotonic()
+        began_s = time.monotonic()
         needs = [store.need(key) for key in task.needs]
         PERFORMERS[task.stage](task.subject, needs, folder, progress)
-        engine = task.subject.rendering.engine if isinstance(task.subject, Case) else ""
-        write_json(folder / MADE_ON, asdict(origin_here(needs, engine=engine)))
-        store.note_seconds(task.stage, time.monotonic() - began)
+        engine = ""
+        if isinstance(task.subject, Case):
+            engine = task.subject.rendering.engine
+        origin = origin_here(needs, engine=engine)
+        write_json(folder / MADE_ON, asdict(origin))
+        store.note_seconds(task.stage, time.monotonic() - began_s)
 
     def keeps(folder: Path) -> bool:
         return not has_failed(task, folder)

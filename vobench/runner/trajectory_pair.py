@@ -1,10 +1,9 @@
-"""Two trajectories out of whatever files they lie in, on one clock."""
+"""A ground truth and an estimate, read from files of any format onto one clock."""
 
 import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import reduce
 from pathlib import Path
 from typing import get_args
 
@@ -32,7 +31,7 @@ SAY_WHICH = (
 
 @dataclass(frozen=True, slots=True)
 class TrajectorySource:
-    """A file, the topic in it, and what differs from its form: `words` such as ns, wxyz or axes:z,-x,-y."""
+    """A file, a topic in it, and `words` that state its unit, order or axes: ns, wxyz, axes:z,-x,-y."""
 
     path: Path
     topic: str | None = None
@@ -41,7 +40,7 @@ class TrajectorySource:
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryPair:
-    """Ground truth and estimate, what was done to the files, and how they are paired where neither has stamps."""
+    """Ground truth and estimate, notes on how the files were read, and how they are paired if neither has stamps."""
 
     gt: Reading
     est: Reading
@@ -55,48 +54,56 @@ class _Read:
     path: Path
     moves: tuple[Move, ...]
     says_truth: bool
-    unit: Unit | None = None  # as told, which nothing in the file can make wrong
+    unit: Unit | None = None  # as stated by the user, which overrides the file
     order: Order | None = None
 
 
 def read_pair(
     gt: TrajectorySource, est: TrajectorySource, *, times: Sequence[Path] = (), any_unit: bool = False
 ) -> TrajectoryPair:
-    """Read both; files without stamps get them from `times`, or are paired by frame where both have none.
+    """Read both; files without stamps get them from `times`, or are paired by frame if both have none.
 
-    `any_unit` tries the finer units where stamps are too large for seconds. Raises InputError.
+    `any_unit` tries finer units if stamps are too large for seconds. Raises InputError.
     """
     reads = [_read(gt, any_unit=any_unit), _read(est, any_unit=any_unit)]
     unstamped = [read for read in reads if read.parsed.t_ns is None]
-    by_frame = None
     if times:
         if not unstamped:
             raise InputError(f"--times is for files without stamps, but both files have theirs: {times[0]}")
-        stamped = [_stamp(read, times) for read in reads]
+        gt_read, est_read = (_stamp(read, times) for read in reads)
     elif len(unstamped) == 1:
         raise InputError(f"no stamps in {unstamped[0].path}; name the file that has them with --times")
     else:
         _require_same_frames(unstamped)
-        stamped = [_numbered(read) for read in reads]
-        if unstamped:
-            has_frames = any(read.parsed.frames is not None for read in reads)
-            by_frame = BY_FRAME if has_frames else BY_ROW
-    notes = [note for read in reads for note in _notes(read)]
-    return TrajectoryPair(_reading(stamped[0]), _reading(stamped[1]), tuple(notes), by_frame)
+        gt_read, est_read = (_numbered(read) for read in reads)
+    notes = (*_notes(reads[0]), *_notes(reads[1]))
+    by_frame = None if times else _pairing(unstamped)
+    return TrajectoryPair(_reading(gt_read), _reading(est_read), notes, by_frame)
 
 
-def _require_same_frames(reads: Sequence[_Read]) -> None:
-    """Raise InputError where files without stamps can't be of the same frames."""
-    rows = {len(read.parsed.T) for read in reads if read.parsed.frames is None}
-    if len(rows) > 1:
-        counts = " and ".join(f"{len(read.parsed.T)} in {read.path}" for read in reads)
+def _pairing(unstamped: Sequence[_Read]) -> str | None:
+    """How files without stamps are paired; None if there are none."""
+    if not unstamped:
+        return None
+    has_frames = any(read.parsed.frames is not None for read in unstamped)
+    return BY_FRAME if has_frames else BY_ROW
+
+
+def _require_same_frames(unstamped: Sequence[_Read]) -> None:
+    """Raise InputError if files without stamps cannot have the same frames."""
+    by_row = [read for read in unstamped if read.parsed.frames is None]
+    row_counts = {len(read.parsed.T) for read in by_row}
+    if len(row_counts) > 1:
+        counts = " and ".join(f"{len(read.parsed.T)} in {read.path}" for read in by_row)
         raise InputError(f"files without stamps pair by row, but have {counts} rows; {SAY_WHICH}")
-    for read in reads:
+    if not by_row:
+        return
+    rows = len(by_row[0].parsed.T)
+    for read in unstamped:
         frames = read.parsed.frames
-        if frames is not None and rows and frames[-1] >= min(rows):
-            other = next(other for other in reads if other.parsed.frames is None)
+        if frames is not None and frames[-1] >= rows:
             raise InputError(
-                f"frames should be below {min(rows)}, the number of rows in {other.path}, but there is {frames[-1]} "
+                f"frames should be below {rows}, the number of rows in {by_row[0].path}, but there is {frames[-1]} "
                 f"in {read.path}"
             )
 
@@ -123,7 +130,9 @@ def read_one(source: TrajectorySource, *, times: Sequence[Path] = (), any_unit: 
 def _reading(read: _Read) -> Reading:
     parsed = read.parsed
     assert parsed.t_ns is not None
-    T = reduce(lambda poses, move: move.apply(poses), read.moves, parsed.T)
+    T = parsed.T
+    for move in read.moves:
+        T = move.apply(T)
     return Reading(
         Trajectory(parsed.t_ns, T),
         parsed.unit,
@@ -135,55 +144,74 @@ def _reading(read: _Read) -> Reading:
 
 
 def _stamp(read: _Read, times: Sequence[Path]) -> _Read:
-    """The poses with their stamps out of the one file of times that fits them."""
-    clocks = [(path, parse_times(_text(path), name=str(path))) for path in times]
-    if read.parsed.t_ns is not None:
+    """The poses with their stamps, from the one file of times that fits them."""
+    clocks = {path: parse_times(_text(path), name=str(path)) for path in times}
+    parsed = read.parsed
+    if parsed.t_ns is not None:
         return read
-    fitting = [(path, t_ns) for path, clock in clocks if (t_ns := read.parsed.stamped_by(clock)) is not None]
+    fitting = {}
+    for path, clock in clocks.items():
+        stamps = parsed.stamped_by(clock)
+        if stamps is not None:
+            fitting[path] = stamps
     if not fitting:
-        path, clock = clocks[0]
-        given = f"{len(clock)} stamps in {path}" if len(clocks) == 1 else f"none of {len(clocks)} files of times is"
-        raise InputError(f"{given} for {len(read.parsed.T)} poses in {read.path}; {SAY_WHICH}")
-    if any(not np.array_equal(t_ns, fitting[0][1]) for _, t_ns in fitting):
-        names = " and ".join(str(path) for path, _ in fitting)
-        raise InputError(f"one file of times should fit the {len(read.parsed.T)} poses in {read.path}, but {names} do")
-    return replace(read, parsed=replace(read.parsed, t_ns=fitting[0][1], unit="s", form_unit="s"))
+        given = f"none of {len(times)} files of times is"
+        if len(times) == 1:
+            given = f"{len(clocks[times[0]])} stamps in {times[0]}"
+        raise InputError(f"{given} for {len(parsed.T)} poses in {read.path}; {SAY_WHICH}")
+    first, *others = fitting.values()
+    if any(not np.array_equal(stamps, first) for stamps in others):
+        names = " and ".join(map(str, fitting))
+        raise InputError(f"one file of times should fit the {len(parsed.T)} poses in {read.path}, but {names} do")
+    return replace(read, parsed=replace(parsed, t_ns=first, unit="s", form_unit="s"))
 
 
 def _numbered(read: _Read) -> _Read:
-    if read.parsed.t_ns is not None:
+    """The poses with a second for each frame in place of missing stamps."""
+    parsed = read.parsed
+    if parsed.t_ns is not None:
         return read
-    frames = np.arange(len(read.parsed.T), dtype=np.int64) if read.parsed.frames is None else read.parsed.frames
-    return replace(read, parsed=replace(read.parsed, t_ns=frames * NS_PER_S))
+    frames = parsed.frames
+    if frames is None:
+        frames = np.arange(len(parsed.T), dtype=np.int64)
+    return replace(read, parsed=replace(parsed, t_ns=frames * NS_PER_S))
 
 
 def _read(source: TrajectorySource, *, any_unit: bool) -> _Read:
-    unit, order, moves = _words(source.words)
+    if _is_recording(source.path):
+        return _read_recording(source)
     path = source.path
-    if _is_recording(path):
-        if unit or order:
-            raise InputError(f"a recording says its stamps' unit and quaternions' order itself: {path}")
-        trajectory = _recorded(path, source.topic)
-        return _Read(Parsed(trajectory.t_ns, trajectory.T_world_frame, "ns", "ns"), path, moves, says_truth=False)
+    unit, order, moves = _words(source.words)
     if source.topic:
         raise InputError(f"a topic is for a recording, but this is a text file: {path}")
-    written = _text(path)
-    comments = "\n".join(line for line in written[:HEAD_BYTES].splitlines() if line.startswith("#"))
-    says_truth = bool(SAYS_TRUTH.search(path.stem) or SAYS_TRUTH.search(comments))
-    parsed = _parse(written, str(path), unit, order, any_unit=any_unit)
-    if (unit and parsed.t_ns is None) or (order and parsed.order is None):
-        raise InputError(f"no {'stamps' if unit else 'quaternions'} to read as {unit or order} in {path}")
+    text = _text(path)
+    comments = [line for line in text[:HEAD_BYTES].splitlines() if line.startswith("#")]
+    says_truth = any(SAYS_TRUTH.search(line) for line in (path.stem, *comments))
+    parsed = _parse(text, str(path), unit, order, any_unit=any_unit)
+    if unit and parsed.t_ns is None:
+        raise InputError(f"no stamps to read as {unit} in {path}")
+    if order and parsed.order is None:
+        raise InputError(f"no quaternions to read as {order} in {path}")
     return _Read(parsed, path, moves, says_truth, unit, order)
 
 
-def _parse(written: str, name: str, unit: Unit | None, order: Order | None, *, any_unit: bool) -> Parsed:
+def _read_recording(source: TrajectorySource) -> _Read:
+    unit, order, moves = _words(source.words)
+    if unit or order:
+        raise InputError(f"a recording states its stamps' unit and quaternions' order itself: {source.path}")
+    trajectory = _recorded(source.path, source.topic)
+    parsed = Parsed(trajectory.t_ns, trajectory.T_world_frame, "ns", "ns")
+    return _Read(parsed, source.path, moves, says_truth=False)
+
+
+def _parse(text: str, name: str, unit: Unit | None, order: Order | None, *, any_unit: bool) -> Parsed:
     try:
-        return parse_any(written, name=name, unit=unit, order=order)
+        return parse_any(text, name=name, unit=unit, order=order)
     except TrajectoryError:
         if any_unit and not unit:
             for finer in UNITS[1:]:
                 with suppress(TrajectoryError):
-                    return parse_any(written, name=name, unit=finer, order=order)
+                    return parse_any(text, name=name, unit=finer, order=order)
         raise
 
 
@@ -226,14 +254,15 @@ def _text(path: Path) -> str:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise TrajectoryError(f"{path}:{line}: not a text in UTF-8") from None
+        raise TrajectoryError(f"{path}:{line}: not text in UTF-8") from None
 
 
 def _recorded(path: Path, topic: str | None) -> Trajectory:
     """A sequence's true path of the left camera, or the poses of a topic."""
     folder = path if path.is_dir() else path.parent
     is_sequence = (folder / TRUTH).is_file() and (folder / SENSORS).is_file()
-    if topic is None and is_sequence and (path.is_dir() or path.name == TRUTH):
+    names_sequence = is_sequence and path in (folder, folder / TRUTH)
+    if topic is None and names_sequence:
         from vobench.runner.ground_truth import left_truth
 
         return left_truth(folder)

@@ -1,0 +1,117 @@
+"""What a program's processes use: counted as the system counts it, and each thing once."""
+
+import os
+import resource
+import sys
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from vobench.estimator import program
+from vobench.estimator.manifest import Limits
+from vobench.estimator.program import EstimatorFailure, Program, _cpu_s, _nameless, _proportional_bytes, _used_bytes
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what /proc says")
+
+
+def run(tmp_path, code, **limits):
+    with Program([sys.executable, "-c", code], log=tmp_path / "log", limits=Limits(**limits)) as running:
+        running.wait()
+        return running
+
+
+def failure(tmp_path, code, **limits):
+    with pytest.raises(EstimatorFailure) as raised:
+        run(tmp_path, code, **limits)
+    return raised.value.kind, raised.value.reason
+
+
+def test_a_program_that_ends_well_has_its_time_and_its_memory(tmp_path):
+    ended = run(tmp_path, "x = b'1' * (80 << 20)\nimport time\nwhile time.process_time() < 0.8: pass")
+    assert 0.3 < ended.cpu_s < 3
+    assert 80 < ended.peak_mib < 400
+
+
+@pytest.mark.parametrize(
+    ("code", "kind", "sentence"),
+    [
+        ("print('last words'); raise SystemExit(3)", "crashed", "the process ended with exit code 3: last words"),
+        ("import os; os.kill(os.getpid(), 11)", "crashed", "the process ended with signal SIGSEGV"),
+        ("import os; os.kill(os.getpid(), 9)", "out_of_memory", "killed by the system, most likely for memory"),
+        ("print('a'); print('b'); print(' '); raise SystemExit(1)", "crashed", "ended with exit code 1: b"),
+    ],
+)
+def test_an_end_before_its_time_has_its_cause_and_the_last_line(tmp_path, code, kind, sentence):
+    found = failure(tmp_path, code)
+    assert found[0] == kind
+    assert sentence in found[1]
+
+
+def test_a_program_that_takes_too_long_or_too_much_is_ended(tmp_path):
+    assert failure(tmp_path, "import time; time.sleep(60)", trial_s=0.5) == (
+        "timeout",
+        "the whole trial took more than 0.5 s",
+    )
+    kind, reason = failure(tmp_path, "x = b'1' * (200 << 20); import time; time.sleep(60)", memory_mib=100)
+    assert kind == "out_of_memory"
+    assert reason.endswith("MiB, where the limit is 100 MiB")
+
+
+def test_a_program_that_is_not_there_is_refused_by_its_name(tmp_path):
+    with pytest.raises(EstimatorFailure, match="refused: no-such-program cannot be started"):
+        Program(["no-such-program"], log=tmp_path / "log", limits=Limits())
+
+
+def test_a_log_without_end_is_cut_and_says_so(tmp_path):
+    log_bytes = program.LOG_BYTES
+    run(tmp_path, f"print('x' * {3 * log_bytes}, flush=True); import time; time.sleep(0.5)")
+    text = (tmp_path / "log").read_text()
+    assert len(text) < log_bytes + 200
+    assert f"the estimator printed {3 * log_bytes + 1} bytes" in text
+
+
+def test_open_files_without_a_name_are_counted_and_others_are_not(tmp_path):
+    with open(tmp_path / "shown", "wb") as shown, open(tmp_path / "gone", "wb") as gone:
+        for file in (shown, gone):
+            file.write(b"1" * 100_000)
+            file.flush()
+        os.unlink(tmp_path / "gone")
+        reads, writes = os.pipe()
+        names = {file.target for file in _nameless([os.getpid(), os.getpid()])}
+        sizes = [file.size for file in _nameless([os.getpid()]) if "gone" in file.target]
+        os.close(reads)
+        os.close(writes)
+    assert not any("shown" in name for name in names)
+    assert not any("pipe:" in name for name in names)
+    assert any("gone" in name for name in names)
+    assert len(sizes) == 1
+    assert 100_000 <= sizes[0] <= 200_000
+
+
+def test_the_use_of_a_file_system_is_that_of_its_blocks_or_of_its_files(monkeypatch):
+    def facts(blocks, free_blocks, files, free_files):
+        return SimpleNamespace(f_blocks=blocks, f_bfree=free_blocks, f_frsize=1000, f_files=files, f_ffree=free_files)
+
+    for stated, used in ((facts(100, 30, 10, 9), 70_000), (facts(100, 99, 50, 20), 30 * 4096)):
+        monkeypatch.setattr(os, "fstatvfs", lambda _, stated=stated: stated)
+        assert _used_bytes(0) == used
+
+
+def test_the_time_of_a_process_is_that_of_its_clock_and_of_its_ended_children():
+    ticks = os.sysconf("SC_CLK_TCK")
+    fields = ["0"] * 22
+    fields[13] = str(3 * ticks)
+    fields[14] = str(4 * ticks)
+    before_s = time.process_time()
+    assert before_s + 7 <= _cpu_s(os.getpid(), fields) <= time.process_time() + 7
+    fields[11] = str(5 * ticks)
+    fields[12] = str(6 * ticks)
+    assert _cpu_s(2**22 + 1, fields) == 18  # no such process: by ticks
+
+
+def test_the_memory_of_a_process_is_its_part_of_each_page_or_all_that_is_resident():
+    private, shared = _proportional_bytes(os.getpid(), 10**6)
+    assert 10 << 20 < private < 4 << 30
+    assert shared >= 0
+    assert _proportional_bytes(2**22 + 1, 3) == (3 * resource.getpagesize(), 0)

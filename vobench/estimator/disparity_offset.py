@@ -1,0 +1,146 @@
+"""The common error of all disparities of a stereo pair, estimated from tracks between views.
+
+R, t       T_now_last: a point X of the last view is at R X + t in this one
+rays       (N, 3) with z = 1 in the view's axes; disparity in px, inverse depth = disparity / (K[0, 0] baseline)
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vobench.estimator.pose import (
+    MIN_POINTS,
+    cauchy_weights,
+    cross_matrix,
+    normal_equations,
+    robust_noise_px,
+    twist,
+)
+from vobench.estimator.stereo import StereoPair
+from vobench.geometry import se3
+from vobench.geometry.se3 import Array
+
+OFFSET_PRIOR_PX = 0.3  # standard deviation of the prior
+# An offset is applied if it is larger than this many sigmas, and than this.
+APPLIED_SIGMAS = 3.0
+LEAST_APPLIED_PX = 0.15
+FIT_STEPS = 5
+# Noise of a disparity: relative to that of a track, and at least.
+NOISE_RATIO = 2.0
+LEAST_NOISE_PX = 0.1
+MOST_BIAS_PX = 0.05
+CORRELATED = 8.0  # errors of near tracks are correlated: so many count as one
+# Parameters of the fit.
+MOTION = slice(0, 6)
+OFFSET = 6
+
+
+@dataclass(frozen=True, slots=True)
+class DisparityOffset:
+    """The estimated excess of all disparities of a pair, learnt view by view from a prior of zero.
+
+    Sums of information in 1/px² and of information times offset in 1/px.
+    """
+
+    information: float = 1 / OFFSET_PRIOR_PX**2
+    weighted: float = 0.0
+
+    @property
+    def estimate_px(self) -> float:
+        """The best estimate."""
+        return self.weighted / self.information
+
+    @property
+    def px(self) -> float:
+        """The correction to subtract from every disparity: zero until the estimate is large and certain enough."""
+        sigma_px = self.information**-0.5
+        threshold_px = max(APPLIED_SIGMAS * sigma_px, LEAST_APPLIED_PX)
+        return self.estimate_px if abs(self.estimate_px) > threshold_px else 0.0
+
+    def after(
+        self, rays0: Array, rays1: Array, disparity_px: Array, T_now_last: Array, pair: StereoPair
+    ) -> "DisparityOffset":
+        """The offset after one more pair of views.
+
+        Takes tracks as rays (N, 3) of the last view and of this one, the disparities (N,) measured in the last,
+        NaN for none, and the estimated motion between both: motion and offset are fitted together.
+        """
+        has_rays = np.isfinite(rays0).all(1) & np.isfinite(rays1).all(1)
+        known = np.isfinite(disparity_px) & has_rays
+        if known.sum() < MIN_POINTS:
+            return self
+        tracks = _Tracks(rays0[known], rays1[known], disparity_px[known], pair)
+        offset_px, information = tracks.fitted_offset(T_now_last, self.estimate_px)
+        if not np.isfinite(offset_px) or information <= 0:
+            return self
+        return DisparityOffset(self.information + information, self.weighted + information * offset_px)
+
+
+@dataclass(frozen=True, slots=True)
+class _Linearization:
+    """The tracks' residuals (N, 2) in px at a motion and an offset, with their weights and derivatives.
+
+    `by_point` (N, 2, 3) is by the moved point, `jacobian` (N, 2, 7) by translation, rotation and offset.
+    """
+
+    residual_px: Array
+    noise_px: float
+    weight: Array
+    by_point: Array
+    jacobian: Array
+
+
+@dataclass(frozen=True, slots=True)
+class _Tracks:
+    rays0: Array
+    rays1: Array
+    disparity_px: Array
+    pair: StereoPair
+
+    def fitted_offset(self, T: Array, offset_px: float) -> tuple[float, float]:
+        """An offset of disparity and its information in 1/px², without what the motion could explain.
+
+        A point of ray x0 comes to R x0 + t (d - o) / (f b): least squares in t, R and o with Cauchy's weights. Where
+        depths differ by little more than their noise, the fit would take the noise for depth: no information.
+        """
+        for _ in range(FIT_STEPS):
+            fit = self._linearized(T, offset_px)
+            information, gradient = normal_equations(fit.jacobian, fit.weight, fit.residual_px)
+            step = np.linalg.solve(information, gradient).astype(float)
+            R_step = twist(step[MOTION])[:3, :3]
+            T = se3.transform(R_step @ T[:3, :3], T[:3, 3] + step[:3])
+            offset_px += float(step[OFFSET])
+
+        bias_px = self._bias_px(fit, information, T[:3, 3])
+        if not abs(bias_px) < MOST_BIAS_PX:
+            return offset_px, 0.0
+        of_motion = np.linalg.solve(information[MOTION, MOTION], information[MOTION, OFFSET])
+        marginal = float(information[OFFSET, OFFSET] - information[OFFSET, MOTION] @ of_motion)
+        return offset_px - bias_px, marginal / (CORRELATED * fit.noise_px**2)
+
+    def _linearized(self, T: Array, offset_px: float) -> _Linearization:
+        focal_px = np.diag(self.pair.K)[:2]  # of columns and of rows
+        rho_per_px = 1 / self.pair.focal_baseline
+        rho = (self.disparity_px - offset_px) * rho_per_px
+        turned = self.rays0 @ T[:3, :3].T
+        moved = turned + rho[:, None] * T[:3, 3]  # points (N, 3) now, times rho
+        slopes = moved[:, :2] / moved[:, 2:]
+        residual_px = (self.rays1[:, :2] - slopes) * focal_px
+        noise_px = robust_noise_px(residual_px)
+
+        identity = np.broadcast_to(np.eye(2), (len(rho), 2, 2))
+        slopes_by_point = np.concatenate([identity, -slopes[..., None]], -1)
+        by_point = slopes_by_point * focal_px[:, None] / moved[:, 2, None, None]
+        by_translation = rho[:, None, None] * by_point
+        by_rotation = -by_point @ cross_matrix(turned)
+        by_offset = -rho_per_px * by_point @ T[:3, 3]
+        jacobian = np.concatenate([by_translation, by_rotation, by_offset[..., None]], -1)
+        return _Linearization(residual_px, noise_px, cauchy_weights(residual_px, noise_px), by_point, jacobian)
+
+    def _bias_px(self, fit: _Linearization, information: Array, t_m: Array) -> float:
+        """The expected error of the offset: noise in depth shortens t, and the offset with it (errors in variables)."""
+        noise_rho = max(NOISE_RATIO * fit.noise_px, LEAST_NOISE_PX) * (1 / self.pair.focal_baseline)
+        weighted = np.einsum("nij,ni,nik->jk", fit.by_point, fit.weight, fit.by_point)
+        pull_on_t = noise_rho**2 * weighted @ t_m
+        pull = np.r_[pull_on_t, np.zeros(4)]
+        return -float(np.linalg.solve(information, pull)[OFFSET])
