@@ -59,13 +59,12 @@ if TYPE_CHECKING:
         cushion,
         extrusion,
         lathe,
-        pierced,
-        reveal,
         sheet,
         spline,
         tube,
     )
     from vobench.asset.texture import Procedural
+    from vobench.asset.wall import pierced, reveal
     from vobench.dataset.kalibr import chain_rig
     from vobench.dataset.layout import Layout, Writing
     from vobench.dataset.picture import Picture as RecordedPicture
@@ -190,8 +189,8 @@ HOMES = {
     "cushion": "vobench.asset.shape",
     "extrusion": "vobench.asset.shape",
     "lathe": "vobench.asset.shape",
-    "pierced": "vobench.asset.shape",
-    "reveal": "vobench.asset.shape",
+    "pierced": "vobench.asset.wall",
+    "reveal": "vobench.asset.wall",
     "sheet": "vobench.asset.shape",
     "spline": "vobench.asset.shape",
     "tube": "vobench.asset.shape",

@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
-from vobench.asset.shape import Hole
+from vobench.asset.wall import Hole
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Map, Picture, Texture
 

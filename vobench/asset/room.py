@@ -9,7 +9,8 @@ import numpy as np
 
 from vobench.asset import fitting, furniture, household, outdoors, picture
 from vobench.asset.furniture import Part, matt
-from vobench.asset.shape import Hole, at, pierced, reveal
+from vobench.asset.shape import at
+from vobench.asset.wall import Hole, pierced, reveal
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material
 from vobench.scene.mesh import Mesh, Thing, joined, quad
