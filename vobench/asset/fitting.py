@@ -165,8 +165,12 @@ def radiator(_: Rng, width_m: float = 1.4, height_m: float = 0.55) -> list[Part]
     columns = []
     for y in np.arange(-width_m / 2 + 0.025, width_m / 2, 0.05):
         for x in (0.05, 0.1):
-            columns.append(tube([[x, y, bottom], [x, y, top]], 0.013))
-    headers = [tube([[0.075, -w, z], [0.075, w, z]], 0.027, sections=12) for z in (bottom, top)]
+            axis = [[x, y, bottom], [x, y, top]]
+            columns.append(tube(axis, 0.013))
+    headers = []
+    for z in (bottom, top):
+        axis = [[0.075, -w, z], [0.075, w, z]]
+        headers.append(tube(axis, 0.027, sections=12))
 
     feed_path = spline(mm("75 0 140, 75 60 140, 75 90 110, 75 90 0"), 12)
     feed = tube(feed_path, 0.01)
