@@ -14,7 +14,7 @@ import pytest
 import trimesh
 from PIL import Image
 
-from vobench.asset import gltf
+from vobench.asset import gltf_material
 from vobench.asset.model import Model, read_model
 from vobench.errors import ModelError
 from vobench.scene.light import PointLight, SpotLight, Sun
@@ -218,7 +218,7 @@ def test_a_skin_is_taken_as_its_joints_stand(read: Reader) -> None:
     glb.tree["nodes"] = [*nodes, {"translation": [1, 0, 0], "children": [2]}, {"translation": [0, 2, 1]}]
     model = read(glb)
     np.testing.assert_allclose(only(model).corners_m[0], z_up([[1, 0, 0], [2, 2, 0], [1, 2, 0]]), atol=1e-6)
-    assert model.notes == ("node 'person': skin taken in the pose of the file",)
+    assert model.notes == ("node 'person': skin read in the pose of the file",)
 
 
 # Materials
@@ -250,7 +250,7 @@ def test_what_has_neither_material_nor_colours_is_grey_and_said_so(read: Reader)
     glb.tree["meshes"] = [{"primitives": [glb.primitive()]}]
     model = read(glb)
     assert [look.colour for look in model.materials.values()] == [(0.5, 0.5, 0.5)]
-    assert model.notes == ("what has no material is read as grey and matt",)
+    assert model.notes == ("surfaces without a material are read as grey and diffuse",)
     assert material_of(read, {}).colour == (1, 1, 1)  # as glTF has it
 
 
@@ -622,7 +622,7 @@ FAULTS: dict[str, tuple[Callable[[], Glb | bytes], str]] = {
         lambda: triangle().bytes()[:-20],
         "has 428 of 448 bytes, or they are damaged; copy or export it again",
     ),
-    "broken JSON": (lambda: triangle().bytes().replace(b'"nodes":', b'"nodes" ;'), "is not as glTF 2.0 has it"),
+    "broken JSON": (lambda: triangle().bytes().replace(b'"nodes":', b'"nodes" ;'), "does not conform to glTF 2.0"),
     "glTF 1": (lambda: changed("asset", {"version": "1.0"}), "is glTF 1.0, not 2; gltf-pipeline"),
     "Draco": (
         lambda: changed("extensionsRequired", ["KHR_draco_mesh_compression"]),
@@ -635,27 +635,30 @@ FAULTS: dict[str, tuple[Callable[[], Glb | bytes], str]] = {
         "accessor 0 has no data; where it is",
     ),
     "no faces": (lambda: changed("nodes", []), "has no faces to see"),
-    "NaN": (with_nan, "node 'tile': has vertices at NaN or infinity; mend it where it was made"),
-    "an index too large": (lambda: of_index(3), "node 'tile': a face asks for vertex 3 of 3"),
-    "a mesh too many": (lambda: changed("mesh", 4, of="nodes"), "number 4 of 1 meshes is asked for"),
-    "bytes that are not there": (lambda: changed("count", 4000, of="accessors"), "byte 48,000 of 36 is asked for"),
+    "NaN": (with_nan, "node 'tile': has vertices at NaN or infinity; repair it where it was made"),
+    "an index too large": (lambda: of_index(3), "node 'tile': a face has vertex 3 of 3"),
+    "a mesh too many": (lambda: changed("mesh", 4, of="nodes"), "number 4 of 1 meshes is requested"),
+    "bytes that are not there": (lambda: changed("count", 4000, of="accessors"), "byte 48,000 of 36 is requested"),
     "5 million faces": (
         lambda: changed("count", 15_000_000, of="accessors"),
         "has 5,000,000 faces, more than 1,000,000",
     ),
     "a loop": (
         lambda: changed("children", [0], of="nodes", scenes=[{"nodes": [0]}]),
-        "node 'tile': hangs in the tree twice",
+        "node 'tile': is in the tree twice",
     ),
     "two parents": (
         lambda: triangle(nodes=[{}, {"children": [0]}, {"children": [0]}]),
-        "'tile': hangs in the tree twice",
+        "'tile': is in the tree twice",
     ),
     "a role": (
         lambda: triangle(nodes=[{"extras": {"vobench": "miror"}}]),
         "no role named 'miror'. Did you mean 'mirror'?",
     ),
-    "a matrix": (lambda: triangle(nodes=[{"matrix": [1, 2]}]), r"node 'tile': \[1, 2\] stands where 16 finite numbers"),
+    "a matrix": (
+        lambda: triangle(nodes=[{"matrix": [1, 2]}]),
+        r"node 'tile': expected 16 finite numbers, found \[1, 2\]",
+    ),
     "a lost picture": (
         lambda: of_picture(uri="a%20b.png"),
         "material 'wood': picture .*: needs 'a b.png', which is not",
@@ -717,7 +720,7 @@ def test_buffers_and_pictures_beside_a_gltf_are_read(read: Reader, tmp_path: Pat
 
 
 def test_many_large_pictures_are_made_smaller(read: Reader, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gltf, "MOST_TEXELS", 16 * 16)
+    monkeypatch.setattr(gltf_material, "MOST_TEXELS", 16 * 16)
     glb = triangle(material={})
     glb.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": glb.texture(np.full((64, 32, 3), 7))}}]
     model = read(glb)
@@ -767,7 +770,7 @@ def test_an_obj_stands_upright_with_the_colour_of_its_material(read: Reader, tmp
     np.testing.assert_allclose(only(model).normals, [[0, -1, 0]] * 3)
     assert model.materials["red"].colour == pytest.approx((1, 0, 0))
     assert (model.materials["red"].metal, model.materials["red"].eta) == (0, 1.5)
-    assert model.notes[0] == ".obj knows no unit and no axes: read as 1 m each, y up"
+    assert model.notes[0] == ".obj has no unit and no axes: read as 1 m each, y up"
     assert model.things[0].name == "thing.obj"
 
 
