@@ -183,11 +183,10 @@ class Gltf:
 
     def _faces(self, source: Json, mode: int, count: int) -> NDArray[np.int32]:
         """Faces (F, 3) of a primitive with that many vertices."""
+        index = np.arange(count)
         if "indices" in source:
-            index = self.file.accessor(source["indices"])[:, 0]
-        else:
-            index = np.arange(count)
-        faces = _triangles(index.astype(np.int64), mode)
+            index = self.file.accessor(source["indices"])[:, 0].astype(np.int64)
+        faces = _triangles(index, mode)
         if faces.size and not 0 <= faces.min() <= faces.max() < count:
             raise ModelError(f"a face has vertex {faces.max():,} of {count:,}; export it again")
         return faces.astype(np.int32)

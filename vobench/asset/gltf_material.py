@@ -1,4 +1,4 @@
-"""Materials and pictures of glTF 2.0 as those of a scene. Source: Khronos, glTF 2.0, sections 3.8, 3.9 and appendix B."""
+"""Materials and pictures of glTF 2.0. Source: Khronos, glTF 2.0, sections 3.8 and 3.9, appendix B."""
 
 import warnings
 from collections.abc import Sequence

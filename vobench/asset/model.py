@@ -280,7 +280,7 @@ def _doubt_of_unit(model: Model) -> list[str]:
 
 
 def _sound(primitive: Primitive) -> Primitive:
-    """Faces with an area in the model's frame, each with vertices and normals of its own, and backs if these are seen."""
+    """Separate faces with an area and normals, in the model's frame, with backs where these are seen."""
     mesh = primitive.mesh
     T_model_mesh = primitive.T_model_mesh
     if not np.isfinite(mesh.vertices_m).all():
