@@ -8,7 +8,8 @@ Estimators   Estimator Frame Result Status Tracks Image EncoderReadings ImuReadi
              PoseFit pose_from_points carried_on: motion
              StereoTracker TrackerSettings Followed: a view whose points are tracked in both cameras
              parameters assert_contract: the manifest's parameters, and the contract in a plugin's own test
-Makers       Mesh Thing joined quad at block card cushion extrusion lathe pierced reveal sheet spline tube: shapes
+Makers       Thing make_mesh joined moved copies flipped two_sided textured: meshes, as trimesh.Trimesh
+             quad at block card cushion extrusion lathe pierced reveal sheet spline tube: shapes
              Material Picture Procedural coated matt wood picture STEEL CHROME WHITE DARK BLACK: materials, textures
              BRICK INK INKS NAVY OCHRE PAPER PLUM SAND TEAL: colours
              Part Piece put stood things mm bars bulb: furniture
@@ -145,7 +146,7 @@ if TYPE_CHECKING:
         Switched,
     )
     from vobench.scene.material import Material, Picture
-    from vobench.scene.mesh import Mesh, Thing, joined, quad
+    from vobench.scene.mesh import Thing, copies, flipped, joined, make_mesh, moved, quad, textured, two_sided
     from vobench.sensor.imu import ImuReadings
     from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2
     from vobench.trajectory.trajectory import Stamps, Trajectory
@@ -282,10 +283,15 @@ HOMES = {
     "Switched": "vobench.scene.light",
     "Material": "vobench.scene.material",
     "Picture": "vobench.scene.material",
-    "Mesh": "vobench.scene.mesh",
     "Thing": "vobench.scene.mesh",
+    "copies": "vobench.scene.mesh",
+    "flipped": "vobench.scene.mesh",
     "joined": "vobench.scene.mesh",
+    "make_mesh": "vobench.scene.mesh",
+    "moved": "vobench.scene.mesh",
     "quad": "vobench.scene.mesh",
+    "textured": "vobench.scene.mesh",
+    "two_sided": "vobench.scene.mesh",
     "ImuReadings": "vobench.sensor.imu",
     "STANDARD_GRAVITY_MPS2": "vobench.trajectory.kinematics",
     "Stamps": "vobench.trajectory.trajectory",
@@ -335,7 +341,6 @@ __all__ = [
     "Layout",
     "Mask",
     "Material",
-    "Mesh",
     "MetricDefinition",
     "Opening",
     "OverLengths",
@@ -389,10 +394,12 @@ __all__ = [
     "coarse_disparity",
     "coated",
     "comparable",
+    "copies",
     "corners_per_cell",
     "cross_matrix",
     "cushion",
     "extrusion",
+    "flipped",
     "follow",
     "follow_predicted",
     "inside",
@@ -401,8 +408,10 @@ __all__ = [
     "local_contrast",
     "looking",
     "lucas_kanade",
+    "make_mesh",
     "matt",
     "mm",
+    "moved",
     "numbered",
     "parameters",
     "picture",
@@ -423,10 +432,12 @@ __all__ = [
     "spline",
     "stereo_pair",
     "stood",
+    "textured",
     "things",
     "truth_file",
     "tube",
     "twist",
+    "two_sided",
     "unit",
     "unread",
     "wood",

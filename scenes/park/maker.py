@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 from vobench.plugin import (
     NAVY,
     AreaLight,
-    Mesh,
     Part,
     Picture,
     Piece,
@@ -20,13 +19,17 @@ from vobench.plugin import (
     card,
     coated,
     joined,
+    make_mesh,
     matt,
+    moved,
     picture,
     put,
     quad,
     sheet,
     stood,
+    textured,
     things,
+    two_sided,
     wood,
 )
 
@@ -168,8 +171,8 @@ def _paths(ways):
         crown = 0.035 - 0.11 * (2 * np.linspace(-0.5, 0.5, 9)) ** 6
         grid = np.concatenate([p, (height(p[..., 0], p[..., 1]) + crown)[..., None]], axis=-1)
         mesh = sheet(grid[:, ::-1])
-        meshes.append(replace(mesh, uv=mesh.vertices_m[:, :2].copy()))
-    meshes[1] = replace(meshes[1], vertices_m=meshes[1].vertices_m - [0, 0, 0.012])
+        meshes.append(textured(mesh, mesh.vertices[:, :2]))
+    meshes[1].apply_translation([0, 0, -0.012])
     return [Part(joined(meshes), matt("#f2ece0", _gravel()))]
 
 
@@ -179,8 +182,8 @@ def _turf(near):
     y = np.arange(-WIDE / 2, WIDE / 2 + 0.01, CELL_M)
     X, Y = np.meshgrid(x, y)
     mesh = sheet(np.stack([X, Y, height(X, Y)], axis=-1))
-    mesh = replace(mesh, uv=mesh.vertices_m[:, :2].copy())
-    middle = mesh.corners_m.mean(axis=1)
+    mesh = textured(mesh, mesh.vertices[:, :2])
+    middle = mesh.triangles.mean(axis=1)
     tint = (
         np.sin(middle[:, 0] / 5.2 + 1)
         + np.sin(middle[:, 1] / 4.1)
@@ -198,7 +201,7 @@ def _turf(near):
 def _some(mesh, faces):
     """A mesh of some of its faces."""
     used, index = np.unique(mesh.faces[faces], return_inverse=True)
-    return Mesh(mesh.vertices_m[used], index.reshape(-1, 3).astype(np.int32), mesh.uv[used], mesh.normals[used])
+    return make_mesh(mesh.vertices[used], index.reshape(-1, 3), mesh.visual.uv[used], mesh.vertex_normals[used])
 
 
 def _pond():
@@ -258,10 +261,11 @@ def _tufts(rng, near):
     for x, y in chosen:
         high = float(rng.uniform(0.1, 0.26))
         for turn in (0, 90):
-            one = card((1.5 * high, high)).moved(
-                at(x, y, float(height(x, y)) + 0.42 * high, yaw=turn + float(rng.uniform(0, 90)))
+            one = moved(
+                card((1.5 * high, high)),
+                at(x, y, float(height(x, y)) + 0.42 * high, yaw=turn + float(rng.uniform(0, 90))),
             )
-            cards.append(one.two_sided())
+            cards.append(two_sided(one))
     return [Part(joined(cards), replace(matt("#f4f6e0", blades), cutout=0.5))]
 
 

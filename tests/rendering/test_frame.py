@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from trimesh import Trimesh
 
 from tests.rendering.rectangles import room
 from vobench.asset.texture import Procedural
@@ -15,7 +16,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.renderer import Radiance, still
 from vobench.scene.light import AreaLight, Sky
 from vobench.scene.material import LUMINANCE, Material, Picture, linear
-from vobench.scene.mesh import Mesh, Thing, flat, quad
+from vobench.scene.mesh import Thing, flat, make_mesh, moved, quad
 from vobench.scene.scene import Scene, ceiling_light
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
@@ -39,23 +40,23 @@ MATERIALS = {
 SKY = Sky("sky", 1000.0, "clear", colour=(0.8, 0.9, 1.2))
 
 
-def ball(radius_m: float, *, at_m: tuple[float, float, float], count: int = 24) -> Mesh:
+def ball(radius_m: float, *, at_m: tuple[float, float, float], count: int = 24) -> Trimesh:
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * count + 1), np.linspace(0, np.pi, count + 1))
     points = np.stack([np.sin(v) * np.cos(u), np.sin(v) * np.sin(u), np.cos(v)], -1).reshape(-1, 3)
     a = (np.arange(count)[:, None] * (2 * count + 1) + np.arange(2 * count)).ravel()
     b = a + 2 * count + 1
     faces = np.concatenate([np.stack([a, b, b + 1], -1), np.stack([a, b + 1, a + 1], -1)]).astype(np.int32)
-    return Mesh(radius_m * points + at_m, faces, np.stack([u, v], -1).reshape(-1, 2), points)
+    return make_mesh(radius_m * points + at_m, faces, np.stack([u, v], -1).reshape(-1, 2), points)
 
 
-def board(x_m: float, width_m: float, height_m: float, z_m: float = 1.0) -> Mesh:
+def board(x_m: float, width_m: float, height_m: float, z_m: float = 1.0) -> Trimesh:
     """A rectangle ahead of the camera, which it faces."""
     return quad((x_m, width_m / 2, z_m - height_m / 2), (0, -width_m, 0), (0, 0, height_m))
 
 
-def scene(*things: tuple[Mesh, str], lights: Any = (), sides: str | None = "grey") -> Scene:
+def scene(*things: tuple[Trimesh, str], lights: Any = (), sides: str | None = "grey") -> Scene:
     around = room((8, 8, 3), floor=sides or "grey", wall=sides or "grey", ceiling=sides or "grey")
-    around = around if sides else [side.moved(se3.transform(np.eye(3), [-20.0, 0, -10])) for side in around[:1]]
+    around = around if sides else [moved(side, se3.transform(np.eye(3), [-20.0, 0, -10])) for side in around[:1]]
     made = tuple(Thing(str(nth), mesh, material) for nth, (mesh, material) in enumerate(things))
     return Scene("meshes", (*around, *made), MATERIALS, lights)
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from trimesh import Trimesh
 
 from vobench.asset.texture import Procedural
 from vobench.errors import UnknownNameError
@@ -22,7 +23,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.truth import Shot, TruthCaster, lamp_of
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Mesh, Thing, Triangles, flat, joined, quad, unit
+from vobench.scene.mesh import Thing, Triangles, flat, flipped, joined, moved, quad, two_sided, unit
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light, triangles
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame
 
@@ -42,7 +43,7 @@ def sheet(name: str, center_m, edge_u_m, edge_v_m, material: str = "matt") -> Th
     return Thing(name, quad(np.asarray(center_m) - (u + v) / 2, u, v), material)
 
 
-def sides(center_m, size_m, *, yaw_deg: float = 0.0) -> list[Mesh]:
+def sides(center_m, size_m, *, yaw_deg: float = 0.0) -> list[Trimesh]:
     """The sides of a block, seen from outside: east, west, north, south, top, bottom."""
     x, y, z = np.diag(np.asarray(size_m, float)) @ se3.rotation_z(np.deg2rad(yaw_deg)).T
     ways = ((x, y, z), (-x, z, y), (y, z, x), (-y, x, z), (z, x, y), (-z, y, x))
@@ -56,7 +57,7 @@ def block(name: str, center_m, size_m, *, yaw_deg: float = 0.0) -> Thing:
 def shell(size_m, *, floor: str = "matt") -> list[Thing]:
     """The inner sides of a block that stands on the floor."""
     names = ("wall_east", "wall_west", "wall_north", "wall_south", "ceiling", "floor")
-    meshes = [side.flipped() for side in sides([0, 0, size_m[2] / 2], size_m)]
+    meshes = [flipped(side) for side in sides([0, 0, size_m[2] / 2], size_m)]
     return [Thing(n, mesh, floor if n == "floor" else "matt") for n, mesh in zip(names, meshes, strict=True)]
 
 
@@ -205,7 +206,7 @@ def test_mirrors_coats_and_what_stands_behind_panes_are_in_the_mask(truth, expec
     surface, distance_m, rays = expected
     faces = triangles(HALL, t_ns=0)
     shiny = np.array([*(faces.things[n].material in {"wax", "steel"} for n in faces.thing), False])[surface]
-    both = replace(PANE, mesh=PANE.mesh.two_sided())
+    both = replace(PANE, mesh=two_sided(PANE.mesh))
     pane = triangles(Scene("pane", (both,), MATERIALS, ()))
     behind = met(pane, HERE[:3, 3], rays @ HERE[:3, :3].T).min(1) < distance_m
     assert behind.any()
@@ -425,12 +426,12 @@ def test_backs_are_not_seen_but_hide_lights():
     ceiling = sheet("ceiling", [0, 0, 1.5], [0, 1.0, 0], [1.0, 0, 0])
     caster = stage(PointLight("bulb", np.array([0, 0, 3.0]), 100.0), things=(ceiling,))
     truth = caster.frame(TOP, Shot(ABOVE, 0), ["depth", "shadow"])
-    assert (ceiling.mesh.normals[:, 2] < 0).all()
+    assert (ceiling.mesh.vertex_normals[:, 2] < 0).all()
     np.testing.assert_allclose(truth.depth, 2.0, rtol=1e-6)
     assert truth.shadow[100, 100] == 1
 
 
-def icosphere(center_m, radius_m: float, *, splits: int) -> Mesh:
+def icosphere(center_m, radius_m: float, *, splits: int) -> Trimesh:
     """A ball of 20 * 4^splits faces whose corners are on it."""
     gold = (1 + 5**0.5) / 2
     pairs = np.array([[-1, gold], [1, gold], [-1, -gold], [1, -gold]])
@@ -499,7 +500,7 @@ def shards(count: int, seed: int) -> Scene:
     things = [
         Thing(
             f"shard {n}",
-            flat(c, [[0, 1, 2]], np.zeros((3, 2))).two_sided() if n % 3 else flat(c, [[0, 1, 2]], np.zeros((3, 2))),
+            two_sided(flat(c, [[0, 1, 2]], np.zeros((3, 2)))) if n % 3 else flat(c, [[0, 1, 2]], np.zeros((3, 2))),
             "matt",
         )
         for n, c in enumerate(corners)
@@ -525,7 +526,7 @@ def test_ids_and_depth_of_many_meshes_are_those_of_every_triangle_tried_in_float
     np.testing.assert_allclose(flattened(truth.normals)[seen], normals, atol=1e-6)
 
 
-def tessellated(corner_m, edge_u_m, edge_v_m, count: int) -> Mesh:
+def tessellated(corner_m, edge_u_m, edge_v_m, count: int) -> Trimesh:
     """A rectangle of count * count squares, each of two faces with corners of its own."""
     u, v = np.asarray(edge_u_m, float) / count, np.asarray(edge_v_m, float) / count
     places = np.ndindex(count, count)
@@ -534,7 +535,7 @@ def tessellated(corner_m, edge_u_m, edge_v_m, count: int) -> Mesh:
 
 def test_rays_through_corners_and_edges_of_faces_meet_one_of_them():
     # Every pixel's ray goes through a corner of the wall's squares, 5 m away: 1/20 m a pixel.
-    wall = tessellated([5.0, -1.5, -1.0], [0, 3.0, 0], [0, 0, 2.0], 20).flipped()
+    wall = flipped(tessellated([5.0, -1.5, -1.0], [0, 3.0, 0], [0, 0, 2.0], 20))
     camera, pose = Pinhole(21, 21, 100.0 / 3, 50.0, 10.0, 10.0), looking(pitch_deg=0, position_m=(0, 0, 0))
     caster = TruthCaster(Scene("wall", (Thing("wall", wall, "matt"),), MATERIALS, ()))
     truth = caster.frame(camera, Shot(pose, 0), ["depth", "instance"])
@@ -548,7 +549,7 @@ def test_every_ray_inside_a_closed_room_ends(seed):
     rng = np.random.default_rng(seed)
     turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     T = se3.transform(turned * np.linalg.det(turned), rng.uniform(-40, 40, 3))
-    inside = joined([side.flipped() for side in sides([0, 0, 1.5], rng.uniform(3, 12, 3))]).moved(T)
+    inside = moved(joined([flipped(side) for side in sides([0, 0, 1.5], rng.uniform(3, 12, 3))]), T)
     caster = TruthCaster(Scene("room", (Thing("room", inside, "matt"),), MATERIALS, ()))
     shot = Shot(T @ se3.transform(np.eye(3), [0.1, -0.3, 1.6]), 0)
     truth = caster.frame(Equirectangular(720, 360), shot, ["depth", "normals", "instance"])
@@ -558,7 +559,7 @@ def test_every_ray_inside_a_closed_room_ends(seed):
 
 
 def test_the_back_of_a_sheet_of_two_sides_is_seen_as_its_front_is():
-    both = Thing("card", quad([2.0, -0.5, -0.5], [0, 1.0, 0], [0, 0, 1.0]).two_sided(), "matt")
+    both = Thing("card", two_sided(quad([2.0, -0.5, -0.5], [0, 1.0, 0], [0, 0, 1.0])), "matt")
     caster = TruthCaster(Scene("card", (both,), MATERIALS, ()))
     camera = CAMERAS["pinhole"]
     ahead = looking(pitch_deg=0, position_m=(0, 0, 0))
@@ -581,7 +582,7 @@ def holed(opacity) -> dict[str, Material]:
 def test_what_is_seen_through_holes_is_what_is_behind_and_light_falls_through():
     # Left half solid: opacity rises from a hole to solid over a pixel, half way at its edge.
     opacity = np.where(np.arange(4) < 2, 255, 0)[None]
-    sheet_m = quad([-0.4, -0.4, 0.5], [0.8, 0, 0], [0, 0.8, 0]).two_sided()
+    sheet_m = two_sided(quad([-0.4, -0.4, 0.5], [0.8, 0, 0], [0, 0.8, 0]))
     floor = sheet("floor", np.zeros(3), [4.0, 0, 0], [0, 4.0, 0])
     bulb = PointLight("bulb", np.array([0.0, 0, 1.0]), 100.0)
     still = Scene("holes", (floor, Thing("paper", sheet_m, "paper")), holed(opacity), (bulb,))
@@ -610,7 +611,7 @@ def test_a_lamp_with_faces_to_all_sides_shines_to_all_sides_and_is_not_in_its_ow
     center_m, rng = np.array([1.0, 2.0, 3.0]), np.random.default_rng(0)
     points_m = (center_m + 2 * unit(rng.normal(size=(50, 3)))).astype(np.float32)
     ball, panel = (
-        lamp_of(mesh.corners_m) for mesh in (icosphere(center_m, 0.5, splits=1), sides(center_m, (1, 1, 0))[4])
+        lamp_of(mesh.triangles) for mesh in (icosphere(center_m, 0.5, splits=1), sides(center_m, (1, 1, 0))[4])
     )
     for lamp, stops_m, half in ((ball, 1.5, False), (panel, 2.0, True)):
         way = lamp.way(points_m)

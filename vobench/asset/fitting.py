@@ -1,5 +1,7 @@
 """Fittings of rooms: doors, windows, pictures, pipes and lamps, on a wall at x = 0 that faces x, or hung from z = 0."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from vobench.asset import picture
@@ -24,7 +26,10 @@ from vobench.asset.furniture import (
 from vobench.asset.picture import BRICK, INK, SAND, Rng
 from vobench.asset.shape import at, block, card, lathe, sheet, spline, tube
 from vobench.scene.material import Material
-from vobench.scene.mesh import Mesh, joined
+from vobench.scene.mesh import joined, moved, two_sided
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 MIRROR = Material("mirror", tint=0.85)
 PANE = Material("pane", eta=1.5)
@@ -37,7 +42,7 @@ def bars(
     deep_m: float,
     *,
     bevel_m: float = 0.003,
-) -> Mesh:
+) -> "Trimesh":
     """Four bars around a rectangle around the origin."""
     upright = block((deep_m, thick_m, height_m + 2 * thick_m), bevel_m=bevel_m)
     level = block((deep_m, width_m, thick_m), bevel_m=bevel_m)
@@ -45,10 +50,10 @@ def bars(
     z = (height_m + thick_m) / 2
     return joined(
         [
-            upright.moved(at(0, -y)),
-            upright.moved(at(0, y)),
-            level.moved(at(0, 0, -z)),
-            level.moved(at(0, 0, z)),
+            moved(upright, at(0, -y)),
+            moved(upright, at(0, y)),
+            moved(level, at(0, 0, -z)),
+            moved(level, at(0, 0, z)),
         ]
     )
 
@@ -68,9 +73,9 @@ def door(
     lintel = block((0.07, w + 0.14, 0.07), bevel_m=0.006)
     frame = joined(
         [
-            jamb.moved(at(0, -jamb_y, h / 2)),
-            jamb.moved(at(0, jamb_y, h / 2)),
-            lintel.moved(at(0, 0, h + 0.035)),
+            moved(jamb, at(0, -jamb_y, h / 2)),
+            moved(jamb, at(0, jamb_y, h / 2)),
+            moved(lintel, at(0, 0, h + 0.035)),
         ]
     )
 
@@ -104,7 +109,7 @@ def window_frame(
     border = bars(w - 0.12, h - 0.12, 0.06, 0.06, bevel_m=0.006)
     mullion = block((0.06, 0.06, h - 0.12))
     transom = block((0.056, w - 0.12, 0.05))
-    frame = joined([border, mullion, transom.moved(at(0, 0, 0.21 * h))])
+    frame = joined([border, mullion, moved(transom, at(0, 0, 0.21 * h))])
     handle = block((0.02, 0.03, 0.12), bevel_m=0.006)
     sill_m = (depth_m + 0.04, w + 0.1, 0.03)
     return [
@@ -126,7 +131,7 @@ def blind(
     slats = []
     for depth in depths_m:
         pitch = slat_deg + rng.normal(0, 1.5)
-        slats.append(slat.moved(at(0, 0, -depth, pitch=pitch)))
+        slats.append(moved(slat, at(0, 0, -depth, pitch=pitch)))
 
     cords = []
     for share in (-0.35, 0.35):
@@ -154,7 +159,7 @@ def curtain(
     x = folds + 0.008 * np.sin(2.3 * phase) * v
     y = (u - 0.5) * width_m * (1 - 0.08 * np.sin(np.pi * v))
     hanging = sheet(np.stack([x, y, -height_m * v], axis=-1))
-    return [Part(hanging.two_sided(), cloth(colour))]
+    return [Part(two_sided(hanging), cloth(colour))]
 
 
 def radiator(_: Rng, width_m: float = 1.4, height_m: float = 0.55) -> list[Part]:
@@ -244,8 +249,8 @@ def noticeboard(rng: Rng, width_m: float = 1.2, height_m: float = 0.9) -> list[P
         row = k // 3 % 2
         cell = (column / 3, (column + 1) / 3, row / 2, (row + 1) / 2)
         page = card((0.21 * scale, 0.297 * scale), cell=cell)
-        sheets.append(page.moved(at(x, y, z, roll=rng.normal(0, 5))))
-        pins.append(pin.moved(at(x, y, z + 0.13 * scale, pitch=90)))
+        sheets.append(moved(page, at(x, y, z, roll=rng.normal(0, 5))))
+        pins.append(moved(pin, at(x, y, z + 0.13 * scale, pitch=90)))
     return [
         put(block((0.014, width_m, height_m)), cork, 0.009),
         put(bars(width_m, height_m, 0.025, 0.02), STEEL, 0.011),
@@ -272,7 +277,7 @@ def pipe(
     end = length_m / 2
     rod = tube([[0, -length_m / 2, 0], [0, end, 0]], radius_m, sections=16)
     flange = lathe(mm("0 -12, 1350 -12, 1350 12, 0 12") * [radius_m, 1])
-    flanges = [flange.moved(at(0, y, 0, roll=90)) for y in np.arange(0.4 - length_m / 2, end, 1.2)]
+    flanges = [moved(flange, at(0, y, 0, roll=90)) for y in np.arange(0.4 - length_m / 2, end, 1.2)]
     return [put(joined([rod, *flanges]), coated(colour), 0.06 + radius_m)]
 
 

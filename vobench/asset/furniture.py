@@ -2,28 +2,58 @@
 
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vobench.asset import picture
 from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PAPER, SAGE, SAND, TEAL, Rng, Spines, some
-from vobench.asset.shape import at, block, card, cushion, extrusion, lathe, sheet, spline, tube
+from vobench.asset.shape import (
+    at,
+    block,
+    block_arrays,
+    card,
+    cushion,
+    extrusion,
+    lathe,
+    sheet,
+    sheet_arrays,
+    spline,
+    tube,
+    tube_arrays,
+)
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material, Texture, linear
-from vobench.scene.mesh import Mesh, joined
+from vobench.scene.mesh import MeshArrays, arrays, joined, joined_arrays, moved, textured
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A mesh of one material."""
+    """Faces of one material.
 
-    mesh: Mesh
+    geometry: a mesh, or the arrays of one, which are far quicker to move.
+    """
+
+    geometry: "Trimesh | MeshArrays"
     material: Material
+
+    @property
+    def arrays(self) -> MeshArrays:
+        """The arrays of its mesh."""
+        return self.geometry if isinstance(self.geometry, MeshArrays) else arrays(self.geometry)
+
+    @property
+    def mesh(self) -> "Trimesh":
+        """Its mesh."""
+        return self.geometry.mesh() if isinstance(self.geometry, MeshArrays) else self.geometry
 
     def moved(self, T_a_b: Array) -> "Part":
         """The part of a frame b in the frame a."""
-        return replace(self, mesh=self.mesh.moved(T_a_b))
+        return Part(self.arrays.moved(T_a_b), self.material)
 
 
 def matt(colour: str = "#ffffff", texture: Texture | None = None) -> Material:
@@ -65,7 +95,7 @@ def mm(places: str) -> Array:
 
 
 def put(
-    mesh: Mesh,
+    mesh: "Trimesh | MeshArrays",
     material: Material,
     x: float = 0,
     y: float = 0,
@@ -74,7 +104,7 @@ def put(
 ) -> Part:
     """A part at a position in metres; turn: yaw, pitch and roll in degrees."""
     T = at(x, y, z, **turn)
-    return Part(mesh.moved(T), material)
+    return Part(mesh, material).moved(T)
 
 
 def stood(
@@ -89,7 +119,7 @@ def stood(
 ) -> Part:
     """A block whose underside is at z; its texture begins at u."""
     height = float(np.asarray(size_m)[2])
-    mesh = block(size_m, bevel_m=bevel, uv_m=(u, 1.7 * u))
+    mesh = block_arrays(size_m, bevel_m=bevel, uv_m=(u, 1.7 * u))
     return put(mesh, material, x, y, z + height / 2)
 
 
@@ -165,11 +195,11 @@ def chair(rng: Rng, colour: str = NAVY) -> list[Part]:
     return parts
 
 
-def _book(spines: Spines, k: int, depth_m: float) -> Mesh:
+def _book(spines: Spines, k: int, depth_m: float) -> MeshArrays:
     """A closed book, its spine towards x: spine and covers from its cell of the picture, pages from the last row."""
     u0, u1, v0, v1 = spines.cells[k]
     thickness, height = spines.sizes_m[k]
-    closed = block((depth_m, thickness, height), bevel_m=0)
+    closed = block_arrays((depth_m, thickness, height), bevel_m=0)
     mesh = closed.moved(at(0, 0, height / 2))
 
     share = mesh.vertices_m / [1, thickness, height]
@@ -186,7 +216,7 @@ def _book(spines: Spines, k: int, depth_m: float) -> Mesh:
     return replace(mesh, uv=uv)
 
 
-def _books(rng: Rng, spines: Spines, width_m: float, height_m: float) -> Mesh:
+def _books(rng: Rng, spines: Spines, width_m: float, height_m: float) -> MeshArrays:
     """A row of books between ±width_m / 2, in runs of neighbours, some leaning, and a pile in what is left."""
     fitting = [k for k, (_, high) in enumerate(spines.sizes_m) if high < height_m - 0.01]
     y = -width_m / 2
@@ -213,10 +243,10 @@ def _books(rng: Rng, spines: Spines, width_m: float, height_m: float) -> Mesh:
     if width_m / 2 - end > 0.2:
         pile = _pile(rng, spines, 3)
         meshes.append(pile.moved(at(-0.12, end + 0.15)))
-    return joined(meshes)
+    return joined_arrays(meshes)
 
 
-def _pile(rng: Rng, spines: Spines, count: int) -> Mesh:
+def _pile(rng: Rng, spines: Spines, count: int) -> MeshArrays:
     """Books that lie on one another, each turned a little."""
     books = [k for k, (_, height) in enumerate(spines.sizes_m) if height < 0.3]
     z = 0.0
@@ -227,7 +257,7 @@ def _pile(rng: Rng, spines: Spines, count: int) -> Mesh:
         lying = upright.moved(at(0, height / 2, thickness / 2, roll=90))
         meshes.append(lying.moved(at(0, 0, z, yaw=rng.normal(0, 7))))
         z += thickness
-    return joined(meshes)
+    return joined_arrays(meshes)
 
 
 def book_stack(rng: Rng, count: int = 4, seed: int = 0) -> list[Part]:
@@ -281,7 +311,7 @@ def shelf(
         else:
             row_of_books = _books(rng, spines, bay_m - 0.03, row_m - 0.03)
             books.append(row_of_books.moved(at(depth_m / 2 - 0.02, y, z)))
-    return [*parts, Part(joined(books), matt(texture=spines.picture))]
+    return [*parts, Part(joined_arrays(books), matt(texture=spines.picture))]
 
 
 def papers(rng: Rng, count: int = 4, spread_m: float = 0.07, seed: int = 0) -> list[Part]:
@@ -295,9 +325,9 @@ def papers(rng: Rng, count: int = 4, spread_m: float = 0.07, seed: int = 0) -> l
         column = rng.integers(3)
         row = rng.integers(2)
         cells = np.stack([column + u, row + v], axis=-1).reshape(-1, 2)
-        page = replace(sheet(points_m), uv=cells / [3, 2])
+        page = textured(sheet(points_m), cells / [3, 2])
         x, y = rng.normal(0, spread_m, 2)
-        sheets.append(page.moved(at(x, y, yaw=rng.normal(0, 14))))
+        sheets.append(moved(page, at(x, y, yaw=rng.normal(0, 14))))
     return [Part(joined(sheets), matt(texture=picture.pages(seed)))]
 
 
@@ -315,7 +345,7 @@ def monitor(rng: Rng, width_m: float = 0.6, seed: int = 0) -> list[Part]:
     stand = lathe(mm(f"0 0, 115 0, 115 6, 30 12, 18 20, 18 {1000 * z}, 0 {1000 * z}"), sections=32)
     bezel = block((0.022, width_m, h), bevel_m=0.004)
     mount = block((0.03, 0.3, 0.2), bevel_m=0.012)
-    screen = card((width_m - 0.014, h - 0.018)).moved(at(0.0115))
+    screen = moved(card((width_m - 0.014, h - 0.018)), at(0.0115))
     return [
         put(stand, BLACK, -0.03),
         put(bezel, BLACK, 0.02, 0, z, pitch=tilt),
@@ -326,8 +356,8 @@ def monitor(rng: Rng, width_m: float = 0.6, seed: int = 0) -> list[Part]:
 
 def keyboard(_: Rng) -> list[Part]:
     """Five rows of keys, the digits apart from the letters, on a board."""
-    key = block((0.016, 0.016, 0.008), bevel_m=0)
-    space_bar = block((0.016, 0.111, 0.008), bevel_m=0)
+    key = block_arrays((0.016, 0.016, 0.008), bevel_m=0)
+    space_bar = block_arrays((0.016, 0.111, 0.008), bevel_m=0)
     keys = []
     for row, column in product(range(5), range(23)):
         is_gap = column in (14, 18)
@@ -337,7 +367,7 @@ def keyboard(_: Rng) -> list[Part]:
             y = 0.019 * column - 0.209
             keys.append(key.moved(at(x, y, 0.014)))
     keys.append(space_bar.moved(at(-0.038, -0.1045, 0.014)))
-    return [stood((0.125, 0.45, 0.011), BLACK), Part(joined(keys), DARK)]
+    return [stood((0.125, 0.45, 0.011), BLACK), Part(joined_arrays(keys), DARK)]
 
 
 def mouse(rng: Rng) -> list[Part]:
@@ -394,8 +424,8 @@ def cables(rng: Rng, length_m: float = 1.2, height_m: float = 0.7) -> list[Part]
     for k in range(3):
         y = np.array([*rng.normal(0, 0.12, 4), 0.04 * k])
         path = spline(np.stack([x, y, z], axis=1), 28)
-        leads.append(tube(np.maximum(path, lowest), radius_m, sections=6))
-    return [Part(joined(leads), BLACK)]
+        leads.append(tube_arrays(np.maximum(path, lowest), radius_m, sections=6))
+    return [Part(joined_arrays(leads), BLACK)]
 
 
 def plant(rng: Rng, height_m: float = 1.2, leaves: int = 26) -> list[Part]:
@@ -411,7 +441,7 @@ def plant(rng: Rng, height_m: float = 1.2, leaves: int = 26) -> list[Part]:
         reach, length, drop = shares * [height_m, height_m, 1]
 
         bend = spline([[0, 0, 0.85 * pot_m], [0.3 * reach, 0, 0.6 * rise], [reach, 0, rise]], 6)
-        stem = tube(bend, 0.0035 * height_m, sections=5)
+        stem = tube_arrays(bend, 0.0035 * height_m, sections=5)
         stems.append(stem.moved(turned))
 
         half_width = 0.26 * length * np.sin(np.pi * t**0.75) + 0.0005
@@ -419,7 +449,7 @@ def plant(rng: Rng, height_m: float = 1.2, leaves: int = 26) -> list[Part]:
         arch = length * (0.35 * t - drop * t**2)
         z = rise + arch + 0.25 * np.abs(y) + 0.006 * np.sin(9 * t)
         x = reach + length * (t + 0 * y)
-        blade = sheet(np.stack([x, y, z], axis=-1))
+        blade = sheet_arrays(np.stack([x, y, z], axis=-1))
         blades.append(blade.moved(turned).two_sided())
 
     pot = lathe(mm("0 0, 360 0, 480 920, 520 930, 520 1000, 460 1000, 440 850, 0 860") * pot_m, sections=32)
@@ -429,8 +459,8 @@ def plant(rng: Rng, height_m: float = 1.2, leaves: int = 26) -> list[Part]:
     return [
         put(pot, clay),
         put(soil, matt("#3a2c22")),
-        Part(joined(stems), matt("#4b5a2e")),
-        Part(joined(blades), leaf),
+        Part(joined_arrays(stems), matt("#4b5a2e")),
+        Part(joined_arrays(blades), leaf),
     ]
 
 
@@ -438,7 +468,7 @@ def carton(_: Rng, size_m: tuple[float, float, float] = (0.36, 0.46, 0.3), seed:
     """A cardboard box, taped and labelled."""
     tile_m = max(size_m)
     box = block(size_m, bevel_m=0.002, uv_m=(tile_m / 2, tile_m / 2))
-    standing = box.moved(at(0, 0, size_m[2] / 2))
+    standing = moved(box, at(0, 0, size_m[2] / 2))
     return [Part(standing, matt(texture=picture.carton(seed, tile_m)))]
 
 
@@ -530,7 +560,7 @@ def waste_bin(rng: Rng, width_m: float = 0.3, height_m: float = 0.4) -> list[Par
         x, y, z = rng.uniform(-0.25, 0.25, 3) * size_m + [0, 0, 0.6 * height_m]
         yaw = rng.uniform(0, 360)
         roll = rng.uniform(0, 90)
-        balls.append(ball.moved(at(x, y, z, yaw=yaw, roll=roll)))
+        balls.append(moved(ball, at(x, y, z, yaw=yaw, roll=roll)))
     return [put(lathe(profile, sections=32), DARK), Part(joined(balls), PAGE)]
 
 

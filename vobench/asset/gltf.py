@@ -19,7 +19,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.scene.light import PointLight, SpotLight, Sun
 from vobench.scene.material import WHITE, linear
-from vobench.scene.mesh import Mesh, unit
+from vobench.scene.mesh import MeshArrays, unit
 
 ModelLight = PointLight | SpotLight | Sun
 MOST_INSTANCES = 100_000
@@ -55,7 +55,7 @@ class Primitive:
     """
 
     node: Node
-    mesh: Mesh
+    mesh: MeshArrays
     look: Look
     T_model_mesh: Array
     colours: Array | None = None
@@ -174,14 +174,14 @@ class Gltf:
         uv = self._uv(attributes, look, count)
         return Primitive(
             node,
-            Mesh(vertices, faces, uv, normals),
+            MeshArrays(vertices, faces, uv, normals),
             look,
             T_model_mesh,
             colours=self._colours(attributes, count),
             notes=tuple(f"{node}: {note}" for note in notes),
         )
 
-    def _faces(self, source: Json, mode: int, count: int) -> NDArray[np.int32]:
+    def _faces(self, source: Json, mode: int, count: int) -> NDArray[np.int64]:
         """Faces (F, 3) of a primitive with that many vertices."""
         index = np.arange(count)
         if "indices" in source:
@@ -189,7 +189,7 @@ class Gltf:
         faces = _triangles(index, mode)
         if faces.size and not 0 <= faces.min() <= faces.max() < count:
             raise ModelError(f"a face has vertex {faces.max():,} of {count:,}; export it again")
-        return faces.astype(np.int32)
+        return faces
 
     def _uv(self, attributes: Json, look: Look, count: int) -> Array:
         """Texture coordinates (V, 2) as a look uses them, 0 where there are none."""

@@ -1,6 +1,7 @@
 """What stands and hangs in homes and halls; parts on z = 0 around the origin, their front towards x."""
 
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -10,7 +11,10 @@ from vobench.asset.furniture import BLACK, DARK, STEEL, WHITE, Part, cloth, coat
 from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, SAGE, SAND, Rng, some
 from vobench.asset.shape import at, card, cushion, lathe, sheet, spline, tube
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Mesh, joined
+from vobench.scene.mesh import flipped, joined, moved
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 
 def table(
@@ -113,7 +117,7 @@ def rug(
 ) -> list[Part]:
     """A woven rug on the floor."""
     base_m = (depth_m, width_m, 0.008)
-    top = card((width_m, depth_m)).moved(at(z_m=0.0085, pitch=-90))
+    top = moved(card((width_m, depth_m)), at(z_m=0.0085, pitch=-90))
     return [
         stood(base_m, cloth(SAND), bevel=0.003),
         Part(top, matt(texture=_weave(seed))),
@@ -149,16 +153,16 @@ def _shade(colour: str, width_m: float, height_m: float) -> list[Part]:
     z = height_m * share + 0 * angle
 
     cone = sheet(np.stack([x, y, z], axis=-1))
-    looks_outward = cone.normals[0] @ [1, 0, 0] > 0
-    outer = cone if looks_outward else cone.flipped()
-    inner = outer.flipped().moved(np.diag([0.985, 0.985, 1, 1]))
+    looks_outward = cone.vertex_normals[0] @ [1, 0, 0] > 0
+    outer = cone if looks_outward else flipped(cone)
+    inner = moved(flipped(outer), np.diag([0.985, 0.985, 1, 1]))
     return [Part(outer, cloth(colour)), Part(inner, WHITE)]
 
 
-def bulb(x_m: float, y_m: float, z_m: float, width_m: float = 0.07) -> Mesh:
+def bulb(x_m: float, y_m: float, z_m: float, width_m: float = 0.07) -> "Trimesh":
     """A round bulb, to be the mesh of a lamp."""
     ball = cushion((width_m, width_m, width_m), power=2, cells=3)
-    return ball.moved(at(x_m, y_m, z_m))
+    return moved(ball, at(x_m, y_m, z_m))
 
 
 def floor_lamp(
@@ -186,7 +190,7 @@ def pendant(
     scale = wide_m / 0.4
     profile = mm("200 0, 196 60, 160 130, 70 190, 30 230, 0 232") * [scale, scale]
     shade = lathe(profile, sections=36)
-    inner = shade.flipped().moved(np.diag([0.985, 0.985, 0.985, 1]))
+    inner = moved(flipped(shade), np.diag([0.985, 0.985, 0.985, 1]))
     paint = coated(colour or some(rng, NAVY, INK, "#5c6b5a"), roughness=0.3)
     cord = tube(np.array([[0, 0, 0.2 - drop_m], [0, 0, 0]]), 0.004, sections=6)
     rose = lathe(mm("0 -30, 50 -25, 50 0, 0 0"))

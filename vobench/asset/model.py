@@ -18,7 +18,7 @@ from vobench.asset.vertex_colour import painted
 from vobench.errors import ModelError, unknown
 from vobench.geometry.se3 import Array
 from vobench.scene.material import LUMINANCE, Material
-from vobench.scene.mesh import Mesh, Thing, areas_m2, face_normals
+from vobench.scene.mesh import Faces, MeshArrays, Thing, areas_m2, arrays, corners, face_normals
 
 Roles = Mapping[str, str]
 Key = TypeVar("Key")
@@ -152,7 +152,7 @@ def _model(primitives: Sequence[Primitive], lights: Sequence[ModelLight], roles:
     bright = {}
     for primitive, named in zip(solid, named_materials, strict=True):
         node = primitive.node
-        thing = Thing(names[node], primitive.mesh, material_names[named])
+        thing = Thing(names[node], primitive.mesh.mesh(), material_names[named])
         mover = role[node].mover
         if mover is None:
             stationary.append(thing)
@@ -187,8 +187,9 @@ def _movers(moving: Sequence[tuple[Node, int, Thing]]) -> tuple[Moving, ...]:
 
 
 def _shifted(thing: Thing, by_m: Array) -> Thing:
-    mesh = thing.mesh
-    return replace(thing, mesh=replace(mesh, vertices_m=mesh.vertices_m + by_m))
+    original = arrays(thing.mesh)
+    shifted = replace(original, vertices_m=original.vertices_m + by_m)
+    return replace(thing, mesh=shifted.mesh())
 
 
 def _unique_names(wanted: Mapping[Key, str]) -> dict[Key, str]:
@@ -252,7 +253,7 @@ def _doubt_of_axis(model: Model, path: Path, axis: str) -> list[str]:
 
     Either most of its faces look along the other axis, or it is flat along that axis, as rooms are in height.
     """
-    corners_m = np.concatenate([thing.mesh.corners_m for thing in model.everything])
+    corners_m = np.concatenate([corners(thing.mesh) for thing in model.everything])
     width_m, depth_m, height_m = np.ptp(corners_m, axis=(0, 1))
     _, along_m2, up_m2 = areas_m2(corners_m) @ np.abs(face_normals(corners_m))
 
@@ -270,7 +271,7 @@ def _doubt_of_axis(model: Model, path: Path, axis: str) -> list[str]:
 
 def _doubt_of_unit(model: Model) -> list[str]:
     """Whether a model is likely of another unit than metres."""
-    corners_m = np.concatenate([thing.mesh.corners_m for thing in model.everything])
+    corners_m = np.concatenate([corners(thing.mesh) for thing in model.everything])
     span = float(np.ptp(corners_m, axis=(0, 1)).max())
     if SMALLEST_M <= span <= LARGEST_M:
         return []
@@ -310,14 +311,14 @@ def _sound(primitive: Primitive) -> Primitive:
     return replace(primitive, mesh=solid, look=look, colours=None, notes=notes, dropped=dropped)
 
 
-def _separate_faces(mesh: Mesh, faces: NDArray[np.int32]) -> Mesh:
+def _separate_faces(mesh: MeshArrays, faces: Faces) -> MeshArrays:
     """Faces (F, 3) of a mesh with vertices of their own, and the flat face's normal where a vertex has none."""
     normals = np.nan_to_num(mesh.normals)[faces]
     flat_normals = face_normals(mesh.vertices_m[faces])[:, None]
     has_normal = np.linalg.norm(normals, axis=2, keepdims=True) > 0.5
     complete = np.where(has_normal, normals, flat_normals)
-    separate = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
-    return Mesh(
+    separate = np.arange(faces.size).reshape(-1, 3)
+    return MeshArrays(
         mesh.vertices_m[faces].reshape(-1, 3),
         separate,
         mesh.uv[faces].reshape(-1, 2),
@@ -325,7 +326,7 @@ def _separate_faces(mesh: Mesh, faces: NDArray[np.int32]) -> Mesh:
     )
 
 
-def _is_small_and_closed(mesh: Mesh) -> bool:
+def _is_small_and_closed(mesh: MeshArrays) -> bool:
     """Whether a mesh is a body seen from outside that is too small for a camera to be in it."""
     extent_m = np.ptp(mesh.vertices_m, axis=0).max(initial=0)
     if extent_m > CLOSED_M or _has_open_edges(mesh):
@@ -335,7 +336,7 @@ def _is_small_and_closed(mesh: Mesh) -> bool:
     return bool(volume > 0)
 
 
-def _has_open_edges(mesh: Mesh) -> bool:
+def _has_open_edges(mesh: MeshArrays) -> bool:
     """Whether an edge has more faces on one side than on the other, once corners that are near are welded."""
     welded = _welded(mesh)
     start = welded.ravel()
@@ -347,7 +348,7 @@ def _has_open_edges(mesh: Mesh) -> bool:
     return bool(np.bincount(number, direction).any())
 
 
-def _welded(mesh: Mesh) -> NDArray[np.int64]:
+def _welded(mesh: MeshArrays) -> NDArray[np.int64]:
     """Numbers (F, 3) of the cells of WELD_M in which the corners of faces are."""
     cells = np.round(mesh.vertices_m / WELD_M).astype(np.int64)
     return _numbered(cells)[mesh.faces]

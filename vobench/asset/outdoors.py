@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -10,11 +11,25 @@ from PIL import Image, ImageDraw
 from vobench.asset import picture
 from vobench.asset.furniture import BLACK, CHROME, DARK, GREY, STEEL, Part, cloth, coated, matt, mm, put, stood
 from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PLUM, SAGE, SAND, TEAL, Rng, some
-from vobench.asset.shape import at, block, card, cushion, lathe, sheet, spline, tube
+from vobench.asset.shape import at, block, card, card_arrays, cushion, lathe, sheet, spline, tube
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Mesh, flat, joined, unit
+from vobench.scene.mesh import (
+    arrays,
+    corners,
+    flat,
+    flipped,
+    joined,
+    joined_arrays,
+    make_mesh,
+    moved,
+    texture_coordinates,
+    unit,
+)
 from vobench.scene.scene import jointed
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 PAINTS = ("#8d1f1c", "#20334e", "#d9dad7", "#5d6468", "#2f3a34", "#b7bcc0", "#17191b", "#3f6c87")
 GLASS = coated("#12161a", roughness=0.12)
@@ -94,7 +109,7 @@ def _plates_and_bumpers(number: str) -> list[Part]:
     return parts
 
 
-def _body() -> Mesh:
+def _body() -> "Trimesh":
     """The body of a car, rounded at waist and sill."""
     outline = _outline(spline(mm(BODY), 30))
     turn = np.linspace(0, 2 * np.pi, 29)
@@ -115,20 +130,21 @@ def _superellipse(share: Array, power: float) -> Array:
     return np.sign(share) * np.abs(share) ** power
 
 
-def _cap(ring_m: Array, side: float) -> Mesh:
+def _cap(ring_m: Array, side: float) -> "Trimesh":
     """The flat end of a body within a ring (C, 3) of vertices, towards x times side."""
     center = np.broadcast_to(ring_m.mean(axis=0), ring_m.shape)
     mesh = _outward(sheet(np.stack([center, ring_m])))
-    normals = np.tile([side, 0.0, 0.0], (len(mesh.vertices_m), 1))
-    return replace(mesh, normals=normals)
+    normals = np.tile([side, 0.0, 0.0], (len(mesh.vertices), 1))
+    return make_mesh(mesh.vertices, mesh.faces, texture_coordinates(mesh), normals)
 
 
-def _outward(mesh: Mesh) -> Mesh:
+def _outward(mesh: "Trimesh") -> "Trimesh":
     """The mesh seen from outside of what it lies around."""
-    from_center = mesh.corners_m.mean(axis=1) - [0, 0, 0.6]
-    a, b, c = mesh.corners_m.swapaxes(0, 1)
+    corners_m = corners(mesh)
+    from_center = corners_m.mean(axis=1) - [0, 0, 0.6]
+    a, b, c = corners_m.swapaxes(0, 1)
     is_outward = (np.cross(b - a, c - a) * from_center).sum() > 0
-    return mesh if is_outward else mesh.flipped()
+    return mesh if is_outward else flipped(mesh)
 
 
 def _cabin(paint: Material) -> list[Part]:
@@ -171,7 +187,7 @@ def _wheel() -> tuple[Part, ...]:
     for angle in np.deg2rad(72 * np.arange(5)):
         x = 0.11 * np.cos(angle)
         y = 0.11 * np.sin(angle)
-        spokes.append(spoke.moved(at(x, y, 0.085, yaw=np.rad2deg(angle))))
+        spokes.append(moved(spoke, at(x, y, 0.085, yaw=np.rad2deg(angle))))
     return (
         Part(tyre, matt("#1b1c1d")),
         put(rim, STEEL, 0, 0, 0.07),
@@ -213,7 +229,14 @@ class Limb:
 
     def lowest_m(self, step: int) -> float:
         """The lowest z of its vertices at a step."""
-        return min(float(part.mesh.vertices_m[:, 2].min()) for part in self.posed(step))
+        T_body_limb = jointed(self.joints_m, self.pitch_rad[step])
+        return min(_lowest_z_m(part.arrays.vertices_m, T_body_limb) for part in self.parts)
+
+
+def _lowest_z_m(points_m: Array, T_a_b: Array) -> float:
+    """The lowest z in a frame a of points (N, 3) in a frame b."""
+    moved_m = points_m @ T_a_b[:3, :3].T + T_a_b[:3, 3]
+    return float(moved_m[:, 2].min())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -320,8 +343,8 @@ def _trunk(coat: Material, skin: Material, hair: Material) -> list[Part]:
     rings_y = width[:, None] * np.sin(turn)
     rings_z = z[:, None] + 0 * turn
     trunk = sheet(np.stack([rings_x, rings_y, rings_z], axis=-1))
-    outward = [*trunk.vertices_m[30][:2], 0]
-    looks_outward = trunk.normals[30] @ outward > 0
+    outward = [*trunk.vertices[30][:2], 0]
+    looks_outward = trunk.vertex_normals[30] @ outward > 0
 
     head = cushion((0.2, 0.155, 0.235), power=2.2, cells=7)
     mop = cushion((0.205, 0.17, 0.17), power=2.2, cells=7)
@@ -329,7 +352,7 @@ def _trunk(coat: Material, skin: Material, hair: Material) -> list[Part]:
     nose = cushion((0.035, 0.03, 0.05), power=2, cells=3)
     eye = cushion((0.02, 0.03, 0.014), power=2, cells=3)
     return [
-        Part(trunk if looks_outward else trunk.flipped(), coat),
+        Part(trunk if looks_outward else flipped(trunk), coat),
         put(head, skin, 0.02, 0, 1.62),
         put(mop, hair, -0.012, 0, 1.668),
         put(neck, skin, 0, 0, 1.46),
@@ -361,7 +384,7 @@ def _limb(start_m: Array, end_m: Array, first_radius_m: float, last_radius_m: fl
     T = np.eye(4)
     T[:3, :3] = np.stack([across, np.cross(along, across), along], axis=1)
     T[:3, 3] = start_m
-    return Part(lathe(profile, sections=14).moved(T), material)
+    return Part(moved(lathe(profile, sections=14), T), material)
 
 
 @picture.painted
@@ -432,11 +455,11 @@ def tree(rng: Rng, height_m: float = 6.0, clumps: int = 110) -> list[Part]:
         yaw = _facing(outward, 30, rng)
         pitch = rng.normal(-25, 30)
         roll = rng.uniform(0, 360)
-        clump = card((side, side)).moved(at(*center, yaw=yaw, pitch=pitch, roll=roll))
+        clump = card_arrays((side, side)).moved(at(*center, yaw=yaw, pitch=pitch, roll=roll))
         cards.append(clump.two_sided())
 
     leaves = _leaves(rng, ("#f4ffe4", "#e6f0d0", "#fff6d8"), 0)
-    return [Part(trunk, bark), Part(joined(boughs), bark), Part(joined(cards), leaves)]
+    return [Part(trunk, bark), Part(joined(boughs), bark), Part(joined_arrays(cards), leaves)]
 
 
 def street_lamp(_: Rng, height_m: float = 5.0, reach_m: float = 1.2) -> list[Part]:
@@ -473,13 +496,13 @@ def bush(rng: Rng, height_m: float = 1.1, width_m: float = 1.6) -> list[Part]:
         yaw = _facing(outward, 25, rng)
         pitch = rng.normal(-30, 25)
         roll = rng.uniform(0, 360)
-        clump = card((side, side)).moved(at(*center, yaw=yaw, pitch=pitch, roll=roll))
+        clump = card_arrays((side, side)).moved(at(*center, yaw=yaw, pitch=pitch, roll=roll))
         cards.append(clump.two_sided())
 
     leaves = _leaves(rng, ("#e2f0d0", "#d0e0c8", "#f4f0d0"), 1)
     core = cushion(0.9 * radii_m, power=2.2, cells=6)
     return [
-        Part(joined(cards), leaves),
+        Part(joined_arrays(cards), leaves),
         put(core, matt("#2f4020"), z=0.22 * height_m),
     ]
 
@@ -488,7 +511,7 @@ def rock(rng: Rng, size_m: float = 0.6) -> list[Part]:
     """A boulder, broken and worn, a third of it in the ground."""
     extent_m = size_m * rng.uniform([0.8, 0.6, 0.5], [1.2, 1.0, 0.8])
     mesh = cushion(extent_m, power=2.4, cells=9)
-    points_m = mesh.vertices_m
+    points_m = arrays(mesh).vertices_m
 
     flat_breaks = 9
     for _ in range(flat_breaks):
@@ -506,7 +529,7 @@ def rock(rng: Rng, size_m: float = 0.6) -> list[Part]:
         some(rng, "#c9c4ba", "#a8a59e", "#b9ad9a"),
         picture.ground("concrete", 3, 1024, 1.4),
     )
-    boulder = flat(points_m, mesh.faces, mesh.uv)
+    boulder = flat(points_m, mesh.faces, texture_coordinates(mesh))
     return [put(boulder, stone, z=0.12 * size_m, yaw=rng.uniform(0, 360))]
 
 
@@ -535,12 +558,12 @@ def park_bench(rng: Rng, width_m: float = 1.8) -> list[Part]:
         start_u = rng.uniform(0, 2)
         start_v = rng.uniform(0, 2)
         slat = block((0.09, width_m, 0.028), bevel_m=0.006, uv_m=(start_u, start_v))
-        slats.append(slat.moved(at(x, 0, z, pitch=pitch)))
+        slats.append(moved(slat, at(x, 0, z, pitch=pitch)))
 
     feet = []
     for side in (-1, 1):
         T = at(0, side * (width_m / 2 - 0.2))
-        feet += [foot.moved(T), leg.moved(T)]
+        feet += [moved(foot, T), moved(leg, T)]
     wood = matt("#d8c0a0", picture.boards("oak", 4, 1024))
     return [Part(joined(feet), iron), Part(joined(slats), wood)]
 
@@ -553,7 +576,7 @@ def park_lamp(_: Rng, height_m: float = 3.4) -> list[Part]:
     post[6:, 1] = h - np.array([0.2, 0.16, 0.16])
     hat = lathe(mm("0 170, 160 170, 240 150, 236 165, 90 240, 20 290, 0 292"))
     rod = tube(mm("130 0 -170, 180 0 160"), 0.008)
-    rods = [rod.moved(at(z_m=h, yaw=90 * k)) for k in range(4)]
+    rods = [moved(rod, at(z_m=h, yaw=90 * k)) for k in range(4)]
     return [
         put(joined([lathe(post), *rods]), iron),
         put(hat, iron, z=h),

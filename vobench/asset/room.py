@@ -14,7 +14,7 @@ from vobench.asset.shape import at
 from vobench.asset.wall import Hole, pierced, reveal
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material
-from vobench.scene.mesh import Mesh, Thing, joined, quad
+from vobench.scene.mesh import MeshArrays, Thing, joined_arrays, quad_arrays
 
 Instance = tuple[str, Sequence[Part]]
 Wall = Literal["east", "north", "west", "south"]
@@ -89,14 +89,14 @@ def things(
     for name, parts in instances:
         for k, (material, meshes) in enumerate(_by_material(parts).items()):
             material_name = names.setdefault(material, f"{name}.{k}")
-            result.append(Thing(name, joined(meshes), material_name))
+            result.append(Thing(name, joined_arrays(meshes).mesh(), material_name))
     return tuple(result), {name: material for material, name in names.items()}
 
 
-def _by_material(parts: Sequence[Part]) -> dict[Material, list[Mesh]]:
-    meshes: dict[Material, list[Mesh]] = {}
+def _by_material(parts: Sequence[Part]) -> dict[Material, list[MeshArrays]]:
+    meshes: dict[Material, list[MeshArrays]] = {}
     for part in parts:
-        meshes.setdefault(part.material, []).append(part.mesh)
+        meshes.setdefault(part.material, []).append(part.arrays)
     return meshes
 
 
@@ -140,7 +140,7 @@ def shell(
             u0, u1, v0, v1 = hole
             depth = openings[k].depth_m
             pane_corner = corner + right * u0 + [0, 0, v0] + outward * depth
-            glass = quad(pane_corner, right * (u1 - u0), (0, 0, v1 - v0))
+            glass = quad_arrays(pane_corner, right * (u1 - u0), (0, 0, v1 - v0))
             sides = reveal(corner, edge, up, hole, depth)
             yield f"window_{k}", [Part(sides, frame), Part(glass, pane)]
 

@@ -1,8 +1,9 @@
 """Shapes as meshes: lengths in metres, texture coordinates in metres, normals outward."""
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cache
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
@@ -12,10 +13,22 @@ from vobench.asset.polygon import oriented, triangulated
 from vobench.asset.wall import Hole
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import Faces, Mesh, cross, face_normals, joined, quad, unit
+from vobench.scene.mesh import (
+    Faces,
+    MeshArrays,
+    cross,
+    face_normals,
+    joined_arrays,
+    quad_arrays,
+    unit,
+)
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 SMOOTH_DEG = 40.0  # a profile that bends by less is shaded as round there
 LEAST_AREA_M2 = 1e-12  # twice the area below which a face of a grid is left out
+WHOLE_PICTURE: Hole = (0.0, 1.0, 0.0, 1.0)
 LARGEST_BEVEL = 0.45  # of half the shortest side of a block
 
 
@@ -32,24 +45,42 @@ def at(
     return se3.transform(Rz @ Ry @ Rx, [x_m, y_m, z_m])
 
 
-def block(size_m: ArrayLike, *, bevel_m: float = 0.003, uv_m: ArrayLike = (0.0, 0.0)) -> Mesh:
-    """A box around the origin with bevelled edges, shaded as round; u runs along the longer side of each face."""
+def block(
+    size_m: ArrayLike,
+    *,
+    bevel_m: float = 0.003,
+    uv_m: ArrayLike = (0.0, 0.0),
+    transform: Array | None = None,
+) -> "Trimesh":
+    """A box around the origin with bevelled edges, shaded as round; u runs along the longer side of each face.
+
+    uv_m: where its texture begins; transform: the pose (4, 4) that it is moved to, if any.
+    """
+    arrays = block_arrays(size_m, bevel_m=bevel_m, uv_m=uv_m)
+    return arrays.mesh() if transform is None else arrays.moved(transform).mesh()
+
+
+def block_arrays(size_m: ArrayLike, *, bevel_m: float = 0.003, uv_m: ArrayLike = (0.0, 0.0)) -> MeshArrays:
+    """The arrays of `block`."""
     half_m = np.asarray(size_m, float) / 2
     bevel = min(bevel_m, LARGEST_BEVEL * half_m.min())
-
     if bevel > 0:
-        signs, faces = _bevelled_cube()
-        side = np.eye(3)[np.arange(len(signs)) % 3]  # (24, 3), the axis of the side that a corner is on
-        vertices_m = signs * (half_m - bevel * (1 - side))
-        corners_m = vertices_m[faces]
-        normals = (signs * side)[faces]
+        cube = _bevelled_cube()
+        vertices_m = cube.signs * (half_m - bevel * (1 - cube.sides))
     else:
-        signs, faces = _cube()
-        corners_m = (signs * half_m)[faces]
-        normals = _flat_normals(corners_m)
+        cube = _cube()
+        vertices_m = cube.signs * half_m
 
-    longest_first = np.argsort(-half_m, kind="stable")
-    return _textured_along_axes(corners_m, normals, longest_first, np.asarray(uv_m, float))
+    corners_m = vertices_m[cube.faces]
+    normals = cube.normals if half_m.all() else _flat_normals(corners_m)  # those of a plate's rim are 0
+    longest_first = tuple(np.argsort(-half_m, kind="stable").tolist())
+    uv = corners_m[cube.uv_index(longest_first)] + np.asarray(uv_m, float)
+    return MeshArrays(
+        corners_m.reshape(-1, 3),
+        np.arange(3 * len(corners_m)).reshape(-1, 3),
+        uv.reshape(-1, 2),
+        normals.reshape(-1, 3),
+    )
 
 
 def _flat_normals(corners_m: Array) -> Array:
@@ -57,34 +88,52 @@ def _flat_normals(corners_m: Array) -> Array:
     return np.repeat(face_normals(corners_m)[:, None], 3, axis=1)
 
 
-def _textured_along_axes(corners_m: Array, normals: Array, order: NDArray[np.int64], uv_m: Array) -> Mesh:
-    """Separate faces (F, 3, 3), each textured along the axis that it faces most.
+def _uv_axes(corners_m: Array, order: Sequence[int]) -> NDArray[np.int64]:
+    """The two axes (F, 2) along which the texture of each face (F, 3, 3) runs.
 
-    u is along the first axis in `order` that is not this one, v along the other; the texture begins at uv_m.
+    They are those of the axis that the face faces most; u is along the first in `order` that is not this one.
     """
     prefers_x = np.array([2e-6, 1e-6, 0])  # so that faces at 45° have one axis on every machine
     facing = np.argmax(np.abs(face_normals(corners_m)) + prefers_x, axis=1)
     axes_across = np.array([[axis for axis in order if axis != normal] for normal in range(3)])
-    uv_axes = axes_across[facing][:, None, :]  # (F, 1, 2)
-    uv = np.take_along_axis(corners_m, uv_axes, axis=2) + uv_m
-
-    faces = np.arange(len(corners_m) * 3, dtype=np.int32).reshape(-1, 3)
-    return Mesh(corners_m.reshape(-1, 3), faces, uv.reshape(-1, 2), normals.reshape(-1, 3))
+    return np.asarray(axes_across[facing])
 
 
-@lru_cache
-def _bevelled_cube() -> tuple[Array, Faces]:
-    """Signs (24, 3) of a cube's corners, three times each, and faces (44, 3); 3 c + a is on the side of axis a."""
-    signs = np.repeat(_cube()[0], 3, axis=0)
-    side = np.eye(3)[np.arange(24) % 3]
-    vertices = signs * (1 - 0.1 * (1 - side))
+class _Cube:
+    """The faces of a cube around the origin, whose size does not matter to its normals and directions."""
+
+    def __init__(self, signs: Array, faces: Faces, sides: Array) -> None:
+        """Signs (V, 3) of its corners, faces (F, 3), and the axis (V, 3) of the side that each vertex is on, or 0."""
+        self.signs = signs
+        self.faces = faces
+        self.sides = sides
+        self._corners = (signs * (1 - 0.1 * (1 - sides)))[faces] if sides.any() else signs[faces]
+        self.normals = (signs * sides)[faces] if sides.any() else _flat_normals(self._corners)
+        self._uv_indices: dict[tuple[int, ...], tuple[NDArray[np.int64], ...]] = {}
+
+    def uv_index(self, order: tuple[int, ...]) -> tuple[NDArray[np.int64], ...]:
+        """The index of u and v (F, 3, 2) in corners (F, 3, 3), as `_uv_axes` has them."""
+        if order not in self._uv_indices:
+            axes = _uv_axes(self._corners, order)
+            face = np.arange(len(self.faces))[:, None, None]
+            corner = np.arange(3)[None, :, None]
+            self._uv_indices[order] = (face, corner, axes[:, None, :])
+        return self._uv_indices[order]
+
+
+@cache
+def _bevelled_cube() -> _Cube:
+    """A cube of 24 vertices, each of its corners three times, and 44 faces; vertex 3 c + a is on the side of axis a."""
+    signs = np.repeat(_cube().signs, 3, axis=0)
+    sides = np.eye(3)[np.arange(24) % 3]
+    vertices = signs * (1 - 0.1 * (1 - sides))
     hull = scipy.spatial.ConvexHull(vertices)
-    return signs, _outward(vertices, hull.simplices)
+    return _Cube(signs, _outward(vertices, hull.simplices), sides)
 
 
-@lru_cache
-def _cube() -> tuple[Array, Faces]:
-    """Signs (8, 3) of a cube's corners and its faces (12, 3)."""
+@cache
+def _cube() -> _Cube:
+    """A cube of 8 vertices and 12 faces."""
     grid = np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0], indexing="ij")
     signs = np.stack(grid, axis=-1).reshape(-1, 3)
     quadrilaterals = np.array(
@@ -98,7 +147,8 @@ def _cube() -> tuple[Array, Faces]:
         ]
     )
     halves = [[0, 1, 2], [0, 2, 3]]
-    return signs, _outward(signs, quadrilaterals[:, halves].reshape(-1, 3))
+    faces = _outward(signs, quadrilaterals[:, halves].reshape(-1, 3))
+    return _Cube(signs, faces, np.zeros((8, 3)))
 
 
 def _outward(vertices: Array, faces: Faces) -> Faces:
@@ -107,13 +157,13 @@ def _outward(vertices: Array, faces: Faces) -> Faces:
     a = corners[:, 0]
     area_vectors = cross(corners[:, 1] - a, corners[:, 2] - a)
     is_inward = np.einsum("fk,fk->f", area_vectors, a) < 0
-    return np.where(is_inward[:, None], faces[:, ::-1], faces).astype(np.int32)
+    return np.where(is_inward[:, None], faces[:, ::-1], faces).astype(np.int64)
 
 
-def _grids(points_m: Array, normals: Array, uv: Array) -> Mesh:
+def _grids(points_m: Array, normals: Array, uv: Array) -> MeshArrays:
     """Grids (B, R, C, 3) of vertices, seen from the side of columns × rows, without faces that have no area."""
     grids, rows, columns = points_m.shape[:3]
-    index = np.arange(grids * rows * columns, dtype=np.int32).reshape(grids, rows, columns)
+    index = np.arange(grids * rows * columns).reshape(grids, rows, columns)
     a = index[:, :-1, :-1].ravel()
     b = index[:, :-1, 1:].ravel()
     c = index[:, 1:, 1:].ravel()
@@ -125,7 +175,7 @@ def _grids(points_m: Array, normals: Array, uv: Array) -> Mesh:
     q = vertices_m[faces[:, 1]]
     r = vertices_m[faces[:, 2]]
     has_area = np.linalg.norm(cross(q - p, r - p), axis=1) > LEAST_AREA_M2
-    return Mesh(vertices_m, faces[has_area], uv.reshape(-1, 2), normals.reshape(-1, 3))
+    return MeshArrays(vertices_m, faces[has_area], uv.reshape(-1, 2), normals.reshape(-1, 3))
 
 
 def _circle(sections: int) -> tuple[Array, Array]:
@@ -141,7 +191,7 @@ def _arc_length_m(steps_m: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps_m, axis=1))])
 
 
-def lathe(profile_m: ArrayLike, *, sections: int = 24) -> Mesh:
+def lathe(profile_m: ArrayLike, *, sections: int = 24) -> "Trimesh":
     """A solid of revolution about z; its profile (K, 2) of radius and height runs from the axis below to that above."""
     profile = np.asarray(profile_m, float)
     segments = np.stack([profile[:-1], profile[1:]], axis=1)  # (K - 1, 2, 2), both ends of each
@@ -159,7 +209,7 @@ def lathe(profile_m: ArrayLike, *, sections: int = 24) -> Mesh:
     is_level = (np.abs(outward[:, 1]) > 0.9)[:, None, None, None]
     wrapped = np.stack([around, along], axis=-1)
     uv = np.where(is_level, points[..., :2], wrapped)
-    return _grids(points, normals, uv)
+    return _grids(points, normals, uv).mesh()
 
 
 def _profile_normals(outward: Array) -> Array:
@@ -192,8 +242,13 @@ def spline(points_m: ArrayLike, count: int = 16) -> Array:
     return np.asarray(scipy.interpolate.CubicSpline(knots, points)(t))
 
 
-def tube(path_m: ArrayLike, radius_m: float, *, sections: int = 8) -> Mesh:
+def tube(path_m: ArrayLike, radius_m: float, *, sections: int = 8) -> "Trimesh":
     """A round rod along a polyline (N, 3), closed by flat ends."""
+    return tube_arrays(path_m, radius_m, sections=sections).mesh()
+
+
+def tube_arrays(path_m: ArrayLike, radius_m: float, *, sections: int = 8) -> MeshArrays:
+    """The arrays of `tube`."""
     path = np.asarray(path_m, float)
     steps = np.diff(path, axis=0)
     tangents = _tangents(unit(steps))
@@ -206,7 +261,7 @@ def tube(path_m: ArrayLike, radius_m: float, *, sections: int = 8) -> Mesh:
     uv = np.stack([along, around], axis=-1)
 
     end_uv = circle * radius_m
-    return joined(
+    return joined_arrays(
         [
             _grids(rings[None], normals[None], uv[None]),
             _disc(path[0], rings[0], -tangents[0], end_uv),
@@ -232,7 +287,7 @@ def _cross_section_axes(tangents: Array) -> Array:
     return np.stack([first, cross(tangents, first)], axis=1)
 
 
-def _disc(center_m: Array, ring_m: Array, normal: Array, uv: Array) -> Mesh:
+def _disc(center_m: Array, ring_m: Array, normal: Array, uv: Array) -> MeshArrays:
     """The flat end of a tube within a ring (C, 3) of vertices, seen from the side of its normal."""
     rows = np.stack([np.broadcast_to(center_m, ring_m.shape), ring_m])
     places = np.stack([0 * uv, uv])
@@ -243,7 +298,7 @@ def _disc(center_m: Array, ring_m: Array, normal: Array, uv: Array) -> Mesh:
     return _grids(rows[None], normals, places[None])
 
 
-def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> Mesh:
+def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> "Trimesh":
     """A superellipsoid around the origin: |x/a|^p + |y/b|^p + |z/c|^p = 1; 2 is an ellipsoid, more is boxier."""
     half_m = np.asarray(size_m, float) / 2
     steps = np.linspace(-1, 1, cells + 1)
@@ -262,11 +317,16 @@ def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> Mesh:
     gradient = np.sign(points) * np.abs(points) ** (power - 1) / half_m
     points_m = points * half_m
     uv = [np.roll(points_m[k], -(k // 2), axis=-1)[..., :2] for k in range(6)]
-    return _grids(points_m, unit(gradient), np.stack(uv))
+    return _grids(points_m, unit(gradient), np.stack(uv)).mesh()
 
 
-def sheet(points_m: ArrayLike) -> Mesh:
+def sheet(points_m: ArrayLike) -> "Trimesh":
     """A smooth surface through a grid (R, C, 3), seen from the side of columns × rows."""
+    return sheet_arrays(points_m).mesh()
+
+
+def sheet_arrays(points_m: ArrayLike) -> MeshArrays:
+    """The arrays of `sheet`."""
     points = np.asarray(points_m, float)
     along_rows = np.gradient(points, axis=0)
     along_columns = np.gradient(points, axis=1)
@@ -282,16 +342,21 @@ def _grid_length_m(points_m: Array, axis: int) -> Array:
     return np.cumsum(np.linalg.norm(steps, axis=2), axis=axis)
 
 
-def card(size_m: tuple[float, float], *, cell: Hole = (0.0, 1.0, 0.0, 1.0)) -> Mesh:
+def card(size_m: tuple[float, float], *, cell: Hole = WHOLE_PICTURE) -> "Trimesh":
     """An upright rectangle around the origin that faces x and shows a cell of a picture, in shares of its sides."""
+    return card_arrays(size_m, cell=cell).mesh()
+
+
+def card_arrays(size_m: tuple[float, float], *, cell: Hole = WHOLE_PICTURE) -> MeshArrays:
+    """The arrays of `card`."""
     width, height = size_m
     u0, u1, v0, v1 = cell
-    rectangle = quad((0, -width / 2, -height / 2), (0, width, 0), (0, 0, height))
+    rectangle = quad_arrays((0, -width / 2, -height / 2), (0, width, 0), (0, 0, height))
     uv = np.array([[u0, v1], [u1, v1], [u1, v0], [u0, v0]])
-    return Mesh(rectangle.vertices_m, rectangle.faces, uv, rectangle.normals)
+    return MeshArrays(rectangle.vertices_m, rectangle.faces, uv, rectangle.normals)
 
 
-def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayLike] = ()) -> Mesh:
+def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayLike] = ()) -> "Trimesh":
     """A prism between z = 0 and height_m over a polygon (N, 2) less holes within it, in any orientation."""
     outline = oriented(polygon_m, counter_clockwise=True)
     holes = [oriented(hole, counter_clockwise=False) for hole in holes_m]
@@ -305,10 +370,16 @@ def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayL
     parts = [_cap(top), _cap(bottom)]
     for ring in rings:
         for start, end in pairwise([*ring, ring[0]]):
-            parts.append(quad((*start, 0), (*(end - start), 0), (0, 0, height_m)))
-    return joined(parts)
+            parts.append(quad_arrays((*start, 0), (*(end - start), 0), (0, 0, height_m)))
+    return joined_arrays(parts).mesh()
 
 
-def _cap(corners_m: Array) -> Mesh:
+def _cap(corners_m: Array) -> MeshArrays:
     """Level faces (F, 3, 3), textured in x and y."""
-    return _textured_along_axes(corners_m, _flat_normals(corners_m), np.arange(3), np.zeros(2))
+    uv = np.take_along_axis(corners_m, _uv_axes(corners_m, range(3))[:, None, :], axis=2)
+    return MeshArrays(
+        corners_m.reshape(-1, 3),
+        np.arange(3 * len(corners_m)).reshape(-1, 3),
+        uv.reshape(-1, 2),
+        _flat_normals(corners_m).reshape(-1, 3),
+    )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from vobench.asset.gltf_material import Look
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Map, Material, Picture, srgb
-from vobench.scene.mesh import Mesh
+from vobench.scene.mesh import MeshArrays
 
 EVEN = 1 / 255  # colours that differ by less are one
 LEVELS = 4095  # to which colours are rounded to find faces that share a patch
@@ -16,7 +16,7 @@ MOST_LARGE_PATCHES = 1 << 16
 FACES_AT_ONCE = 65_536  # that are drawn, which bounds the memory
 
 
-def painted(mesh: Mesh, colours: Array, look: Look) -> tuple[Mesh, Look]:
+def painted(mesh: MeshArrays, colours: Array, look: Look) -> tuple[MeshArrays, Look]:
     """Linear colours (F, 3, 3) of corners: the material's where there is but one, else a picture with a patch for each.
 
     Over a texture only their mean is used. In a patch colours run linearly from corner to corner.

@@ -2,12 +2,16 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import Mesh, cross, joined, quad, unit
+from vobench.scene.mesh import MeshArrays, cross, joined_arrays, quad_arrays, unit
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 # A lap lies this far behind a wall's edge and reaches this far to both sides of it.
 LAP_BEHIND_M = 0.002
@@ -15,7 +19,7 @@ LAP_M = 0.01
 Hole = tuple[float, float, float, float]  # first and last u, first and last v, in metres from a wall's corner
 
 
-def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes: Sequence[Hole] = ()) -> Mesh:
+def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes: Sequence[Hole] = ()) -> "Trimesh":
     """A rectangle less rectangular holes, cut into a grid along their edges, with laps behind its four borders.
 
     The laps stop the light that would pass where two walls only touch.
@@ -29,7 +33,7 @@ def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes
     behind = -LAP_BEHIND_M * unit(cross(u, v))
     cells = [_rectangle(corner, u, v, cell) for cell in _solid_cells(width_m, height_m, holes)]
     laps = [_rectangle(corner + behind, u, v, lap) for lap in _laps(width_m, height_m)]
-    return joined(cells + laps)
+    return joined_arrays(cells + laps).mesh()
 
 
 def _solid_cells(width_m: float, height_m: float, holes: Sequence[Hole]) -> list[Hole]:
@@ -60,16 +64,16 @@ def _laps(width_m: float, height_m: float) -> list[Hole]:
     return along_u + along_v
 
 
-def _rectangle(corner: Array, u: Array, v: Array, cell: Hole) -> Mesh:
+def _rectangle(corner: Array, u: Array, v: Array, cell: Hole) -> MeshArrays:
     """A cell of a wall, whose texture continues that of its neighbours."""
     u0, u1, v0, v1 = cell
     axis_u = unit(u)
     axis_v = unit(v)
     cell_corner = corner + u0 * axis_u + v0 * axis_v
-    return quad(cell_corner, (u1 - u0) * axis_u, (v1 - v0) * axis_v, uv_m=(u0, v0))
+    return quad_arrays(cell_corner, (u1 - u0) * axis_u, (v1 - v0) * axis_v, (u0, v0))
 
 
-def reveal(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, hole: Hole, depth_m: float) -> Mesh:
+def reveal(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, hole: Hole, depth_m: float) -> "Trimesh":
     """The four sides of a rectangle's hole, down to depth_m behind its face."""
     u = unit(edge_u_m)
     v = unit(edge_v_m)
@@ -80,9 +84,9 @@ def reveal(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, hole: 
     along = (v1 - v0) * v
     inwards = -depth_m * cross(u, v)
     sides = [
-        quad(corner, inwards, along),
-        quad(corner + across, along, inwards),
-        quad(corner, across, inwards),
-        quad(corner + along, inwards, across),
+        quad_arrays(corner, inwards, along),
+        quad_arrays(corner + across, along, inwards),
+        quad_arrays(corner, across, inwards),
+        quad_arrays(corner + along, inwards, across),
     ]
-    return joined(sides)
+    return joined_arrays(sides).mesh()

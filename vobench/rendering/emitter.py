@@ -11,6 +11,7 @@ from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, Ball, Flat, Floats, 
 from vobench.rendering.lightmap import Texels, tangents
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.mesh import areas_m2, face_normals, unit
+from vobench.scene.mesh import corners as mesh_corners
 
 FAR_OFF = 2.9  # radii of a rectangle, beyond which rays spread over its area tell as well what hides it
 MESH_SPOTS = 8
@@ -131,19 +132,19 @@ class Emitter:
 
 def panel_emitter(light: AreaLight) -> Emitter:
     """A lamp's faces, which shine only to their front: rectangles by solid angle, all else by area."""
-    corners = light.mesh.corners_m
-    face = rectangle(corners)
-    around = ball(corners)
+    corners_m = mesh_corners(light.mesh)
+    face = rectangle(corners_m)
+    around = ball(corners_m)
     if face is None:
         # In an order in which near triangles are near to one another (Morton).
-        shares = (corners.mean(1) - around.centre_m) / around.radius_m / 2 + 0.5
-        curve = corners[np.argsort(_interleaved(np.clip(shares, 0, 1 - 1e-6)), kind="stable")]
+        shares = (corners_m.mean(1) - around.centre_m) / around.radius_m / 2 + 0.5
+        curve = corners_m[np.argsort(_interleaved(np.clip(shares, 0, 1 - 1e-6)), kind="stable")]
         return Emitter(around, lambda texels: _by_area(light, curve, texels), _width_rad(around), spots=MESH_SPOTS)
 
     def towards(texels: Texels) -> Aim:
         nearest = lengths(texels.points_m - around.centre_m).min(initial=np.inf)
         is_far = nearest > FAR_OFF * around.radius_m
-        return _by_area(light, corners, texels, face) if is_far else evenly(texels)
+        return _by_area(light, corners_m, texels, face) if is_far else evenly(texels)
 
     def evenly(texels: Texels) -> Aim:
         angle = SolidAngle(face, texels.points_m)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
-from typing import Annotated, Protocol
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 import numpy as np
 from annotated_types import MinLen
@@ -12,8 +12,11 @@ from annotated_types import MinLen
 from vobench.errors import SettingError
 from vobench.geometry.se3 import Array
 from vobench.scene.material import WHITE, Rgb
-from vobench.scene.mesh import Mesh, areas_m2
+from vobench.scene.mesh import areas_m2, corners
 from vobench.setting import Positive, Share, settings
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 NS_PER_S = 1e9
 SUN_RADIUS_RAD = np.deg2rad(0.533 / 2)  # seen from the Earth
@@ -134,7 +137,7 @@ class AreaLight:
     """
 
     name: str
-    mesh: Mesh
+    mesh: "Trimesh"
     power_lm: float
     level: Level = STEADY
     colour: Rgb = WHITE
@@ -143,7 +146,7 @@ class AreaLight:
     @property
     def luminance_cd_m2(self) -> float:
         """Luminance of the faces: power / (π area)."""
-        area_m2 = float(areas_m2(self.mesh.corners_m).sum())
+        area_m2 = float(areas_m2(corners(self.mesh)).sum())
         return self.power_lm / (np.pi * area_m2)
 
 

@@ -9,7 +9,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.scene.light import NS_PER_S, AreaLight, Light, PointLight, SpotLight
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, Triangles, quad, table
+from vobench.scene.mesh import Thing, Triangles, moved, quad, table
 
 
 class Way(Protocol):
@@ -173,13 +173,13 @@ def sized(scene: Scene, by: float) -> Scene:
 
 def _sized_thing(thing: Thing, by: float) -> Thing:
     spacing_m = thing.spacing_m and thing.spacing_m * by
-    return replace(thing, mesh=thing.mesh.moved(_scaling(by)), spacing_m=spacing_m)
+    return replace(thing, mesh=moved(thing.mesh, _scaling(by)), spacing_m=spacing_m)
 
 
 def _sized_light(light: Light, by: float) -> Light:
     """A light whose power grows with the areas that it shines on."""
     if isinstance(light, AreaLight):
-        return replace(light, mesh=light.mesh.moved(_scaling(by)), power_lm=light.power_lm * by**2)
+        return replace(light, mesh=moved(light.mesh, _scaling(by)), power_lm=light.power_lm * by**2)
     if isinstance(light, PointLight | SpotLight):
         return replace(light, position_m=light.position_m * by, power_lm=light.power_lm * by**2)
     return light

@@ -15,7 +15,7 @@ from vobench.asset import FINISHES, MODEL_SUFFIXES
 from vobench.errors import SuiteError, unknown
 from vobench.scene.light import Light, Sky, Sun, scaled
 from vobench.scene.material import LUMINANCE, emitted_cd_m2, reflectance
-from vobench.scene.mesh import areas_m2
+from vobench.scene.mesh import areas_m2, corners
 from vobench.scene.scene import Scene
 from vobench.setting import Triple
 from vobench.suite import yaml_file
@@ -103,7 +103,7 @@ def _bare(path: Path) -> SceneFile:
     from vobench.asset.model import read_model
 
     model = read_model(path)
-    corners_m = np.concatenate([thing.mesh.vertices_m for thing in model.everything])
+    corners_m = np.concatenate([thing.mesh.vertices for thing in model.everything])
     scale = CENTIMETRE if float(np.ptp(corners_m, axis=0).max()) > LARGEST_M else 1.0
     if scale != 1:
         model = read_model(path, scale=scale)
@@ -111,7 +111,7 @@ def _bare(path: Path) -> SceneFile:
         name: (emitted_cd_m2(m) @ LUMINANCE, min(reflectance(m).mean(), WHITEST) if m.kind == "body" else 0.5)
         for name, m in model.materials.items()
     }
-    area_m2 = np.array([areas_m2(thing.mesh.corners_m).sum() for thing in model.everything])
+    area_m2 = np.array([areas_m2(corners(thing.mesh)).sum() for thing in model.everything])
     glow_cd_m2, kept = np.array([own[thing.material] for thing in model.everything]).T
     swallows_m2 = float(area_m2 @ (1 - kept))
     lamps_lm = sum(light.power_lm for light in model.lights if not isinstance(light, Sun | Sky))
