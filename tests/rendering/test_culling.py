@@ -192,14 +192,14 @@ def test_sealing_what_is_sealed_changes_nothing() -> None:
 
 
 def test_what_only_comes_near_is_left_as_it_is() -> None:
-    square = quad((0, 0, 0), (1, 0, 0), (0, 1, 0)).corners_m
-    beside = quad((0.2, -1, 0), (0.5, 0, 0), (0, 0.999, 0)).corners_m
+    square = quad((0, 0, 0), (1, 0, 0), (0, 1, 0)).triangles
+    beside = quad((0.2, -1, 0), (0.5, 0, 0), (0, 0.999, 0)).triangles
     both = np.concatenate([square, beside])
     np.testing.assert_array_equal(sealed(both).corners_m, both)
 
 
 def test_a_closed_mesh_is_left_as_it_is() -> None:
-    ball = sphere(40).corners_m
+    ball = sphere(40).triangles
     ball = ball[np.linalg.norm(np.cross(*np.moveaxis(np.diff(ball, axis=1), 1, 0)), axis=1) > 1e-9]
     assert len(sealed(ball).corners_m) == len(ball)
 

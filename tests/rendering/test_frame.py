@@ -16,7 +16,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.renderer import Radiance, still
 from vobench.scene.light import AreaLight, Sky
 from vobench.scene.material import LUMINANCE, Material, Picture, linear
-from vobench.scene.mesh import Thing, flat, make_mesh, moved, quad
+from vobench.scene.mesh import Thing, flat, make_mesh, quad, textured
 from vobench.scene.scene import Scene, ceiling_light
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
@@ -56,7 +56,7 @@ def board(x_m: float, width_m: float, height_m: float, z_m: float = 1.0) -> Trim
 
 def scene(*things: tuple[Trimesh, str], lights: Any = (), sides: str | None = "grey") -> Scene:
     around = room((8, 8, 3), floor=sides or "grey", wall=sides or "grey", ceiling=sides or "grey")
-    around = around if sides else [moved(side, se3.transform(np.eye(3), [-20.0, 0, -10])) for side in around[:1]]
+    around = around if sides else [side.moved(se3.transform(np.eye(3), [-20.0, 0, -10])) for side in around[:1]]
     made = tuple(Thing(str(nth), mesh, material) for nth, (mesh, material) in enumerate(things))
     return Scene("meshes", (*around, *made), MATERIALS, lights)
 
@@ -110,7 +110,7 @@ def test_a_picture_on_a_wall_shows_its_linear_colours_where_they_belong(draw: An
     values[0], values[1] = [[250, 0, 0], [0, 200, 0], [0, 0, 150]], [[90, 90, 0], [0, 60, 60], [30, 30, 30]]
     big = np.kron(values, np.ones((64, 64, 1), np.uint8))
     # Row 0 lies at v = 0, which is the lower edge here.
-    wall = replace(board(2.0, 2.0, 1.2), uv=np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]))
+    wall = textured(board(2.0, 2.0, 1.2), np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]))
     shown = replace(scene((wall, "print")), materials=MATERIALS | {"print": Material(texture=Picture(big, 1.0))})
     picture = draw(even_light(shown)).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
     for row in range(2):
@@ -121,7 +121,7 @@ def test_a_picture_on_a_wall_shows_its_linear_colours_where_they_belong(draw: An
 
 def test_a_soup_of_the_same_triangles_cut_otherwise_gives_the_same_picture(snap: Any) -> None:
     whole = ball(0.5, at_m=(2.0, 0.1, 1.0))
-    corners, uv = whole.corners_m, whole.uv[whole.faces]
+    corners, uv = whole.triangles, whole.visual.uv[whole.faces]
     order = RNG.permutation(len(corners))
     middle = [np.concatenate([part[:, [0, 1]], part.mean(1, keepdims=True)], 1) for part in (corners, uv)]
     others = [
@@ -142,7 +142,7 @@ def test_what_is_under_the_cut_out_is_not_there(draw: Any, even_light: Any) -> N
     leaf = np.full((64, 64, 4), 255, np.uint8)
     leaf[:, 32:, 3] = 40
     materials = MATERIALS | {"leaf": Material(texture=Picture(leaf, 1.0), cutout=0.5)}
-    mesh = replace(board(2.0, 1.0, 1.0), uv=np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]))
+    mesh = textured(board(2.0, 1.0, 1.0), np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]))
     shown = replace(scene((mesh, "leaf")), materials=materials)
     picture = draw(even_light(shown)).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
     without = draw(even_light(scene())).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
@@ -155,7 +155,7 @@ def test_what_glows_adds_its_emission_and_its_picture_to_what_it_reflects(draw: 
     half = np.zeros((64, 64, 3), np.uint8)
     half[:, :32] = 255
     screen = Material(colour=(0.2, 0.2, 0.2), emission_cd_m2=(50, 80, 20), emission_texture=Picture(half, 1.0))
-    mesh = replace(board(2.0, 1.0, 1.0), uv=np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]))
+    mesh = textured(board(2.0, 1.0, 1.0), np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]))
     shown = replace(scene((mesh, "screen")), materials=MATERIALS | {"screen": screen})
     picture = draw(even_light(shown)).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
     np.testing.assert_allclose(picture[60, 60], 0.2 * LIGHT + np.array([50, 80, 20]), rtol=1e-5)

@@ -38,12 +38,12 @@ def each(balls: Ball) -> list[Ball]:
 
 def test_parts_enclose_all_of_a_thing_and_are_smaller_than_one_ball() -> None:
     weights = np.random.default_rng(0).dirichlet((1, 1, 1), 200)
-    points = np.einsum("nk,fkj->fnj", weights, PILLAR.corners_m).reshape(-1, 3)
-    balls = parts(PILLAR.corners_m)
+    points = np.einsum("nk,fkj->fnj", weights, PILLAR.triangles).reshape(-1, 3)
+    balls = parts(PILLAR.triangles)
     apart = np.linalg.norm(points[:, None] - balls.centre_m, axis=-1)
     assert (apart <= balls.radius_m + 1e-9).any(1).all()
     assert balls.radius_m.max() < 0.6
-    assert len(parts(FLOOR.corners_m).radius_m) == 1
+    assert len(parts(FLOOR.triangles).radius_m) == 1
 
 
 @pytest.mark.parametrize("emitter", [PANEL, BULB], ids=["panel", "bulb"])
@@ -53,7 +53,7 @@ def test_a_place_from_which_a_ray_meets_the_thing_is_never_left_out(emitter: Emi
     spots = np.einsum("nk,kj->nj", numbers.dirichlet((1, 1, 1), 4000), LAMP.mesh.triangles[0])
     lamp = spots if emitter is PANEL else np.broadcast_to(emitter.ball.centre_m, points.shape)
     hidden = CASTER.occluded(points, lamp)
-    kept = np.any([may_shade(b, emitter.ball, Ball(points, np.zeros(4000))) for b in each(parts(PILLAR.corners_m))], 0)
+    kept = np.any([may_shade(b, emitter.ball, Ball(points, np.zeros(4000))) for b in each(parts(PILLAR.triangles))], 0)
     assert hidden.any()
     assert not (hidden & ~kept).any()
     assert kept.mean() < 0.6

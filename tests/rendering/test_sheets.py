@@ -38,8 +38,8 @@ def test_a_ray_meets_the_side_of_a_sheet_that_it_comes_from(back_first: bool) ->
 
 def test_only_faces_with_the_same_corners_in_reverse_are_twins() -> None:
     solid = block((1, 1, 1))
-    assert (twins(solid.corners_m) < 0).all()
-    doubled = two_sided(solid).corners_m
+    assert (twins(solid.triangles) < 0).all()
+    doubled = two_sided(solid).triangles
     found, count = twins(doubled), len(solid.faces)
     np.testing.assert_array_equal(found, np.roll(np.arange(2 * count), count))
 

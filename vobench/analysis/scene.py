@@ -14,13 +14,12 @@ from vobench.rendering.geometry import RayCaster
 from vobench.rendering.renderer import Renderer, still
 from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Texture, reflectance, srgb
-from vobench.scene.mesh import Triangles, distinct, unit
+from vobench.scene.mesh import Triangles, distinct, open_edges, unit, welded
 from vobench.scene.scene import Scene, triangles
 from vobench.suite.free_way import Free, down, free_circle
 
 EYE_M = 1.2
 LOOKS = 4096
-WELD_M = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,15 +75,13 @@ def survey(scene: Scene) -> SceneSurvey:
 def _open_edges(faces: Triangles, point: NDArray[np.intp]) -> int:
     """Edges that one face of a thing has alone; rectangles, which are nothing but open, do not count."""
     solid = np.isin(faces.thing, np.flatnonzero(np.bincount(faces.thing, minlength=len(faces.things)) > 2))
-    ends = np.sort(np.stack([point[solid], np.roll(point[solid], -1, axis=1)], -1), axis=-1)
-    edges = np.column_stack([np.repeat(faces.thing[solid], 3), ends.reshape(-1, 2)])
-    return int((np.bincount(distinct(edges)[1]) == 1).sum())
+    point_of_thing = point[solid] + faces.thing[solid, None] * (point.max(initial=0) + 1)
+    return len(open_edges(point_of_thing))
 
 
 def _points(faces: Triangles) -> NDArray[np.intp]:
     """Which point (F, 3) each corner is; nearer than WELD_M they are one."""
-    cells = np.rint(faces.corners_m.reshape(-1, 3) / WELD_M).astype(np.int64)
-    return distinct(cells)[1].reshape(-1, 3)
+    return welded(faces.corners_m.reshape(-1, 3))[1].reshape(-1, 3)
 
 
 def _backs(faces: Triangles, caster: RayCaster, eye_m: ArrayLike) -> float:

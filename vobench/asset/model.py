@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.asset.gltf import ModelLight, Node, Primitive, read_gltf
 from vobench.asset.gltf_file import MOST_BYTES, located
@@ -18,7 +17,7 @@ from vobench.asset.vertex_colour import painted
 from vobench.errors import ModelError, unknown
 from vobench.geometry.se3 import Array
 from vobench.scene.material import LUMINANCE, Material
-from vobench.scene.mesh import Faces, MeshArrays, Thing, areas_m2, arrays, corners, face_normals
+from vobench.scene.mesh import Faces, MeshArrays, Thing, areas_m2, arrays, corners, face_normals, is_closed_body
 
 Roles = Mapping[str, str]
 Key = TypeVar("Key")
@@ -27,7 +26,6 @@ GLTF_SUFFIXES = (".glb", ".gltf")
 Z_UP_SUFFIXES = (".stl", ".ply")  # by custom: these formats do not define an axis
 SILVER_TINT = 0.9  # of a mirror whose material is no metal
 LEAST_M2 = 1e-12  # faces smaller have no area
-WELD_M = 1e-5  # corners nearer are one
 # No camera gets into a closed body this small: its backs are never seen.
 CLOSED_M = 1.0
 # Beyond these a model is likely in another unit, or damaged; most are about TYPICAL_M across.
@@ -329,36 +327,4 @@ def _separate_faces(mesh: MeshArrays, faces: Faces) -> MeshArrays:
 def _is_small_and_closed(mesh: MeshArrays) -> bool:
     """Whether a mesh is a body seen from outside that is too small for a camera to be in it."""
     extent_m = np.ptp(mesh.vertices_m, axis=0).max(initial=0)
-    if extent_m > CLOSED_M or _has_open_edges(mesh):
-        return False
-    a, b, c = np.moveaxis(mesh.corners_m, 1, 0)
-    volume = (a * np.cross(b, c)).sum()
-    return bool(volume > 0)
-
-
-def _has_open_edges(mesh: MeshArrays) -> bool:
-    """Whether an edge has more faces on one side than on the other, once corners that are near are welded."""
-    welded = _welded(mesh)
-    start = welded.ravel()
-    end = np.roll(welded, -1, axis=1).ravel()
-    vertices = welded.max(initial=0) + 1
-    edge = np.minimum(start, end) * vertices + np.maximum(start, end)
-    number = np.unique(edge, return_inverse=True)[1]
-    direction = np.sign(end - start)
-    return bool(np.bincount(number, direction).any())
-
-
-def _welded(mesh: MeshArrays) -> NDArray[np.int64]:
-    """Numbers (F, 3) of the cells of WELD_M in which the corners of faces are."""
-    cells = np.round(mesh.vertices_m / WELD_M).astype(np.int64)
-    return _numbered(cells)[mesh.faces]
-
-
-def _numbered(rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Numbers (N,) from 0 on that are equal where rows (N, K) are."""
-    number = np.zeros(len(rows), np.int64)
-    for column in rows.T:
-        rank = np.unique(column, return_inverse=True)[1]
-        pair = number * (rank.max(initial=0) + 1) + rank
-        number = np.unique(pair, return_inverse=True)[1]
-    return number
+    return bool(extent_m <= CLOSED_M) and is_closed_body(mesh)

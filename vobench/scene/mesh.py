@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 Faces = NDArray[np.int64]
 Index = NDArray[np.int32]
-WELD_M = 1e-5  # vertices nearer than that are one
+# Vertices nearer than this are one, here and in all rooms above: float32 resolves 1e-6 m at 10 m.
+WELD_M = 1e-5
 
 
 def unit(vectors: ArrayLike) -> Array:
@@ -143,6 +144,11 @@ def make_mesh(vertices_m: ArrayLike, faces: ArrayLike, uv: ArrayLike, normals: A
     )
 
 
+def has_texture_coordinates(mesh: "Trimesh") -> bool:
+    """Whether a mesh has texture coordinates; those of `trimesh.creation` have none."""
+    return getattr(mesh.visual, "uv", None) is not None
+
+
 def texture_coordinates(mesh: "Trimesh") -> Array:
     """Texture coordinates (V, 2) of a mesh, 0 where it has none."""
     uv = getattr(mesh.visual, "uv", None)
@@ -245,6 +251,40 @@ def distinct(rows: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     is_first = np.append(True, (np.diff(rows[order], axis=0) != 0).any(1))[: len(rows)]
     kind = np.cumsum(is_first) - 1
     return order[is_first], kind[np.argsort(order)]
+
+
+def welded(points_m: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which points (N, 3) are the first in their cell of WELD_M (P,), and which of these each is (N,)."""
+    cells = np.rint(points_m / WELD_M).astype(np.int64)
+    return distinct(cells)
+
+
+def open_edges(faces: NDArray[Any]) -> NDArray[np.int64]:
+    """The edges (E, 2) that one of the faces (F, 3) alone has."""
+    from trimesh.geometry import faces_to_edges
+    from trimesh.grouping import group_rows
+
+    edges = np.sort(faces_to_edges(faces), axis=1)  # type: ignore[no-untyped-call]
+    alone = group_rows(edges, require_count=1)  # type: ignore[no-untyped-call]
+    return np.asarray(edges[alone], np.int64)
+
+
+def is_closed_body(mesh: MeshArrays) -> bool:
+    """Whether a mesh, its vertices welded, encloses a volume and is seen from outside."""
+    from trimesh import Trimesh
+
+    first, point = welded(mesh.vertices_m)
+    faces = point[mesh.faces]
+    has_three_corners = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    body = Trimesh(mesh.vertices_m[first], faces[has_three_corners], process=False, use_embree=False)
+    return bool(body.is_volume)
+
+
+def is_mesh(value: object) -> bool:
+    """Whether a value is a mesh."""
+    from trimesh import Trimesh
+
+    return isinstance(value, Trimesh)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

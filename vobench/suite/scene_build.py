@@ -22,7 +22,7 @@ from vobench.geometry.se3 import Array
 from vobench.scene import scene as scripted
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Material, emitted_cd_m2
-from vobench.scene.mesh import Thing, areas_m2, corners, moved
+from vobench.scene.mesh import Thing, areas_m2, corners, has_texture_coordinates, is_mesh, moved
 from vobench.scene.scene import Scene
 from vobench.suite.scene_file import SKY, SUN, Lighting, content, lit, materials_used
 from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile, SunSpec, hue
@@ -145,7 +145,19 @@ def _from_maker(spec: SceneFile) -> Iterator[Contents]:
         missing = {thing.material for thing in found} - materials.keys()
         if missing:
             raise SuiteError(f"make() returns things without materials: {', '.join(sorted(missing))}")
+        for thing in found:
+            _require_mesh(thing, materials[thing.material])
     yield Contents(tuple(found), materials, *map(tuple, lights))
+
+
+def _require_mesh(thing: Thing, material: Material) -> None:
+    """Refuse a thing of a maker whose mesh cannot be drawn."""
+    if not is_mesh(thing.mesh):
+        kind = type(thing.mesh).__name__
+        raise SuiteError(f"make() returns '{thing.name}' with a mesh of type {kind}; it should be a trimesh.Trimesh")
+    if material.texture is not None and not has_texture_coordinates(thing.mesh):
+        advice = "set mesh.visual = trimesh.visual.TextureVisuals(uv=...)"
+        raise SuiteError(f"make() returns '{thing.name}' with a texture but without texture coordinates; {advice}")
 
 
 @contextmanager
