@@ -9,7 +9,7 @@ Estimators   Estimator Frame Result Status Tracks Image EncoderReadings ImuReadi
              StereoTracker TrackerSettings Followed: a view whose points are tracked in both cameras
              parameters assert_contract: the manifest's parameters, and the contract in a plugin's own test
 Makers       Thing make_mesh joined moved copies flipped two_sided textured: meshes, as trimesh.Trimesh
-             quad at block card cushion extrusion lathe pierced reveal sheet spline tube: shapes
+             quad at block card cards cushion extrusion lathe pierced reveal sheet spline tube: shapes
              Material Picture Procedural coated matt wood picture STEEL CHROME WHITE DARK BLACK: materials, textures
              BRICK INK INKS NAVY OCHRE PAPER PLUM SAND TEAL: colours
              Part Piece put stood things mm bars bulb: furniture
@@ -57,6 +57,7 @@ if TYPE_CHECKING:
         at,
         block,
         card,
+        cards,
         cushion,
         extrusion,
         lathe,
@@ -187,6 +188,7 @@ HOMES = {
     "at": "vobench.asset.shape",
     "block": "vobench.asset.shape",
     "card": "vobench.asset.shape",
+    "cards": "vobench.asset.shape",
     "cushion": "vobench.asset.shape",
     "extrusion": "vobench.asset.shape",
     "lathe": "vobench.asset.shape",
@@ -389,6 +391,7 @@ __all__ = [
     "block",
     "bulb",
     "card",
+    "cards",
     "carried_on",
     "chain_rig",
     "coarse_disparity",

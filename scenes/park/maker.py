@@ -17,11 +17,11 @@ from vobench.plugin import (
     at,
     bulb,
     card,
+    cards,
     coated,
     joined,
     make_mesh,
     matt,
-    moved,
     picture,
     put,
     quad,
@@ -29,7 +29,6 @@ from vobench.plugin import (
     stood,
     textured,
     things,
-    two_sided,
     wood,
 )
 
@@ -257,16 +256,15 @@ def _tufts(rng, near):
     chance = np.where((far > 0.75) & (far < 1.25), 0.8, 0.04) + 0.5 * np.exp(-(((away - 1.35) / 0.3) ** 2))
     chosen = places[(rng.random(len(places)) < chance) & (away > 1.12) & (far > 0.7)]
     blades = _blades()
-    cards = []
+    sizes_m = []
+    poses = []
     for x, y in chosen:
         high = float(rng.uniform(0.1, 0.26))
         for turn in (0, 90):
-            one = moved(
-                card((1.5 * high, high)),
-                at(x, y, float(height(x, y)) + 0.42 * high, yaw=turn + float(rng.uniform(0, 90))),
-            )
-            cards.append(two_sided(one))
-    return [Part(joined(cards), replace(matt("#f4f6e0", blades), cutout=0.5))]
+            yaw = turn + float(rng.uniform(0, 90))
+            sizes_m.append((1.5 * high, high))
+            poses.append(at(x, y, float(height(x, y)) + 0.42 * high, yaw=yaw))
+    return [Part(cards(sizes_m, poses), replace(matt("#f4f6e0", blades), cutout=0.5))]
 
 
 def _blades(px=256):

@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 from vobench.asset import picture
 from vobench.asset.furniture import BLACK, CHROME, DARK, GREY, STEEL, Part, cloth, coated, matt, mm, put, stood
 from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PLUM, SAGE, SAND, TEAL, Rng, some
-from vobench.asset.shape import at, block, card, card_arrays, cushion, lathe, sheet, spline, tube
+from vobench.asset.shape import at, block, card, cards_arrays, cushion, lathe, sheet, spline, tube
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import (
@@ -20,7 +20,6 @@ from vobench.scene.mesh import (
     flat,
     flipped,
     joined,
-    joined_arrays,
     make_mesh,
     moved,
     texture_coordinates,
@@ -447,7 +446,8 @@ def tree(rng: Rng, height_m: float = 6.0, clumps: int = 110) -> list[Part]:
 
     crown_m = np.array([*sway, 0.67 * h])
     crown_radii_m = np.array([0.26, 0.26, 0.3]) * h
-    cards = []
+    sizes_m = []
+    poses = []
     for _ in range(clumps):
         outward = unit(rng.standard_normal(3))
         center = crown_m + crown_radii_m * outward * rng.uniform(0.55, 1.0)
@@ -455,11 +455,11 @@ def tree(rng: Rng, height_m: float = 6.0, clumps: int = 110) -> list[Part]:
         yaw = _facing(outward, 30, rng)
         pitch = rng.normal(-25, 30)
         roll = rng.uniform(0, 360)
-        clump = card_arrays((side, side)).moved(at(*center, yaw=yaw, pitch=pitch, roll=roll))
-        cards.append(clump.two_sided())
+        sizes_m.append((side, side))
+        poses.append(at(*center, yaw=yaw, pitch=pitch, roll=roll))
 
     leaves = _leaves(rng, ("#f4ffe4", "#e6f0d0", "#fff6d8"), 0)
-    return [Part(trunk, bark), Part(joined(boughs), bark), Part(joined_arrays(cards), leaves)]
+    return [Part(trunk, bark), Part(joined(boughs), bark), Part(cards_arrays(sizes_m, poses), leaves)]
 
 
 def street_lamp(_: Rng, height_m: float = 5.0, reach_m: float = 1.2) -> list[Part]:
@@ -488,7 +488,8 @@ def bollard(_: Rng, height_m: float = 0.95) -> list[Part]:
 def bush(rng: Rng, height_m: float = 1.1, width_m: float = 1.6) -> list[Part]:
     """A round bush of leaves down to the ground."""
     radii_m = np.array([width_m, width_m, height_m]) / 2
-    cards = []
+    sizes_m = []
+    poses = []
     for _ in range(48):
         outward = unit(rng.normal([0, 0, 0.15], 1))
         center = [0, 0, 0.42 * height_m] + radii_m * outward * rng.uniform(0.55, 0.95)
@@ -496,13 +497,13 @@ def bush(rng: Rng, height_m: float = 1.1, width_m: float = 1.6) -> list[Part]:
         yaw = _facing(outward, 25, rng)
         pitch = rng.normal(-30, 25)
         roll = rng.uniform(0, 360)
-        clump = card_arrays((side, side)).moved(at(*center, yaw=yaw, pitch=pitch, roll=roll))
-        cards.append(clump.two_sided())
+        sizes_m.append((side, side))
+        poses.append(at(*center, yaw=yaw, pitch=pitch, roll=roll))
 
     leaves = _leaves(rng, ("#e2f0d0", "#d0e0c8", "#f4f0d0"), 1)
     core = cushion(0.9 * radii_m, power=2.2, cells=6)
     return [
-        Part(joined_arrays(cards), leaves),
+        Part(cards_arrays(sizes_m, poses), leaves),
         put(core, matt("#2f4020"), z=0.22 * height_m),
     ]
 

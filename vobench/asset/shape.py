@@ -356,6 +356,37 @@ def card_arrays(size_m: tuple[float, float], *, cell: Hole = WHOLE_PICTURE) -> M
     return MeshArrays(rectangle.vertices_m, rectangle.faces, uv, rectangle.normals)
 
 
+def cards(sizes_m: ArrayLike, poses: ArrayLike) -> "Trimesh":
+    """Rectangles as of `card`, of sizes (N, 2) and at rigid poses (N, 4, 4), seen from both sides, as one mesh."""
+    return cards_arrays(sizes_m, poses).mesh()
+
+
+def cards_arrays(sizes_m: ArrayLike, poses: ArrayLike) -> MeshArrays:
+    """The arrays of `cards`."""
+    sizes = np.asarray(sizes_m, float).reshape(-1, 2)
+    T = np.asarray(poses, float).reshape(-1, 4, 4)
+    R = T[:, :3, :3]
+    one = card_arrays((1.0, 1.0))
+    width = sizes[:, 0, None]
+    height = sizes[:, 1, None]
+    y = -width / 2 + [0.0, 1.0, 1.0, 0.0] * width
+    z = -height / 2 + [0.0, 0.0, 1.0, 1.0] * height
+    corners_m = np.stack([0 * y, y, z], axis=-1)  # (N, 4, 3)
+
+    front = corners_m @ R.swapaxes(1, 2) + T[:, None, :3, 3]
+    normals = unit(one.normals @ np.linalg.inv(R))
+    vertices_m = np.stack([front, front], axis=1)  # (N, 2, 4, 3), front and back
+    both_normals = np.stack([normals, -normals], axis=1)
+    faces = np.concatenate([one.faces, one.faces[:, ::-1] + 4])
+    first_vertex = 8 * np.arange(len(sizes))
+    return MeshArrays(
+        vertices_m.reshape(-1, 3),
+        (first_vertex[:, None, None] + faces).reshape(-1, 3),
+        np.tile(one.uv, (2 * len(sizes), 1)),
+        both_normals.reshape(-1, 3),
+    )
+
+
 def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayLike] = ()) -> "Trimesh":
     """A prism between z = 0 and height_m over a polygon (N, 2) less holes within it, in any orientation."""
     outline = oriented(polygon_m, counter_clockwise=True)
